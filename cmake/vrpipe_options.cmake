@@ -1,0 +1,42 @@
+# What every target of the project is built with.
+set(CMAKE_CXX_STANDARD 17)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+set(CMAKE_LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
+
+option(VRPIPE_WARNINGS_AS_ERRORS "stop at warnings" OFF)
+set(VRPIPE_SANITIZE "" CACHE STRING "sanitizers, as for -fsanitize=")
+
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(systemc REQUIRED IMPORTED_TARGET systemc)
+find_package(fmt REQUIRED)
+find_package(Boost 1.81 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(glm REQUIRED)
+find_package(Threads REQUIRED)
+
+# Debian's SystemC is built for C++17 alone.
+add_library(vrpipe_systemc INTERFACE)
+target_link_libraries(vrpipe_systemc INTERFACE PkgConfig::systemc)
+
+# Part of what plugins and platforms outside must be built with: results are the same on every compiler and processor.
+add_library(vrpipe_options INTERFACE)
+target_compile_features(vrpipe_options INTERFACE cxx_std_17)
+target_compile_options(vrpipe_options INTERFACE -ffp-contract=off)
+set(VRPIPE_PLUGIN_TAG "vrpipe-plugin/${PROJECT_VERSION}/${CMAKE_CXX_COMPILER_ID}-abi")
+string(REGEX REPLACE "GNU|Clang" "itanium" VRPIPE_PLUGIN_TAG "${VRPIPE_PLUGIN_TAG}")
+target_compile_definitions(vrpipe_options INTERFACE BOOST_DLL_USE_STD_FS VRPIPE_VERSION="${PROJECT_VERSION}"
+  VRPIPE_PLUGIN_TAG="${VRPIPE_PLUGIN_TAG}")
+
+# For the project's own code only.
+add_compile_options(-Wall -Wextra -Wshadow -Wconversion)
+if(VRPIPE_WARNINGS_AS_ERRORS)
+  add_compile_options(-Werror)
+endif()
+if(VRPIPE_SANITIZE)
+  add_compile_options(-fsanitize=${VRPIPE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${VRPIPE_SANITIZE})
+endif()

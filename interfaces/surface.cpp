@@ -1,0 +1,28 @@
+#include <vrpipe/surface.h>
+
+namespace vrpipe {
+
+namespace {
+constexpr std::uint32_t tiles(std::uint32_t pixels) { return (pixels + screen_tile_pixels - 1) / screen_tile_pixels; }
+}  // namespace
+
+ColorSurface::ColorSurface(std::uint32_t width, std::uint32_t height, ColorFormat format)
+    : width_(width),
+      height_(height),
+      format_(format),
+      tiles_x_(tiles(width)),
+      bytes_per_quad_(4 * bytes_per_pixel(format)),
+      quads_(std::size_t{tiles_x_} * tiles(height) * positions_per_tile) {}
+
+std::uint64_t ColorSurface::size_bytes() const { return std::uint64_t{quads_.size()} * bytes_per_quad_; }
+
+std::array<float, 4> ColorSurface::pixel(std::uint32_t x, std::uint32_t y) const {
+  const TileId tile{static_cast<std::uint16_t>(x / screen_tile_pixels),
+                    static_cast<std::uint16_t>(y / screen_tile_pixels)};
+  const unsigned position = (y % screen_tile_pixels) / 2 * quads_per_tile_row + (x % screen_tile_pixels) / 2;
+  const unsigned lane = (y % 2) * 2 + x % 2;
+  const QuadColor& color = quad(tile, position);
+  return {color.red[lane], color.green[lane], color.blue[lane], color.alpha[lane]};
+}
+
+}  // namespace vrpipe

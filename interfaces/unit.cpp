@@ -1,0 +1,45 @@
+#include <vrpipe/unit.h>
+
+#include <map>
+
+#include <vrpipe/error.h>
+
+namespace vrpipe {
+
+namespace {
+
+template <class Port>
+Port& port_named(const std::vector<Port*>& ports, const std::string& unit, const std::string& name) {
+  std::vector<std::string> names;
+  for (Port* port : ports) {
+    if (port->name() == name) return *port;
+    names.push_back(port->name());
+  }
+  throw UserError("unknown port '" + name + "'", "unit " + unit, "the unit has no such port",
+                  names.empty() ? "it has none in this direction" : "did you mean " + nearest_name(name, names) + "?");
+}
+
+std::map<std::string, UnitMaker>& makers() {
+  static std::map<std::string, UnitMaker> all;
+  return all;
+}
+
+}  // namespace
+
+Unit::Unit(const sc_core::sc_module_name& name, ClockDomain& domain) : sc_module(name) {
+  clock.domain = &domain;
+  clock.unit = domain.attach(*this);
+}
+
+InPort& Unit::in(const std::string& name) { return port_named(in_ports, this->name(), name); }
+OutPort& Unit::out(const std::string& name) { return port_named(out_ports, this->name(), name); }
+
+void register_unit_maker(const std::string& slot, UnitMaker maker) { makers()[slot] = std::move(maker); }
+
+const UnitMaker& unit_maker(const std::string& slot) {
+  const auto found = makers().find(slot);
+  if (found == makers().end()) throw SimulationFault("registry", 0, "slot " + slot + " has no module");
+  return found->second;
+}
+
+}  // namespace vrpipe

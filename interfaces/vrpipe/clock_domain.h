@@ -1,0 +1,67 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <systemc>
+
+#include <vrpipe/accounting.h>
+
+namespace vrpipe {
+
+/// A unit that does something at clock edges.
+class Clocked {
+ public:
+  virtual ~Clocked() = default;
+  /// One clock edge. Sees only what other units did in earlier cycles. Returns the next cycle at which the unit wants
+  /// an edge even if nothing arrives: now + 1 while it works, `never` to sleep until a link wakes it.
+  virtual Cycle tick(Cycle now) = 0;
+};
+
+/// One clock for many units: a single event, armed for the next cycle at which a unit has something to do.
+/// Cycles in which every unit sleeps cost nothing. Cycles are counted as integers; sc_time only carries them.
+class ClockDomain : public sc_core::sc_module {
+ public:
+  /// @param period_ps length of a cycle on the SystemC time axis, picoseconds (rounded; cycle counts are exact)
+  ClockDomain(const sc_core::sc_module_name& name, std::uint64_t period_ps);
+  SC_HAS_PROCESS(ClockDomain);
+
+  /// Returns the handle for `wake`. Units tick in the order of attachment; the order does not change results.
+  unsigned attach(Clocked& unit);
+  Cycle now() const { return now_; }
+  sc_core::sc_time period() const { return period_; }
+
+  /// Asks for an edge of a unit at cycle `at`, later than now while the simulation runs.
+  void wake(unsigned handle, Cycle at) {
+    if (at < due_[handle]) due_[handle] = at;
+  }
+
+  /// Whether the first edge has come.
+  bool running() const { return running_; }
+
+  /// Ends the simulation after this cycle.
+  void finish() { finished_ = true; }
+  bool finished() const { return finished_; }
+  /// Number of edges at which at least one unit was ticked.
+  std::uint64_t edges() const { return edges_; }
+
+  /// Ticks in the order of this permutation of handles; for the tests that show that the order does not matter.
+  void set_tick_order(std::vector<unsigned> order);
+
+ private:
+  void edge();
+  void start_of_simulation() override;
+
+  sc_core::sc_time period_;
+  sc_core::sc_event event_;
+  std::vector<Clocked*> units_;
+  std::vector<Cycle> due_;
+  std::vector<std::uint8_t> active_;
+  std::vector<unsigned> order_;
+  Cycle now_ = 0;
+  std::uint64_t edges_ = 0;
+  bool running_ = false;
+  bool finished_ = false;
+};
+
+}  // namespace vrpipe

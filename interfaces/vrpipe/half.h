@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#include <vrpipe/lanes.h>
+
+namespace vrpipe {
+
+/// IEEE binary16, as a register of the colour target holds it; arithmetic happens in float.
+constexpr float half_max = 65504.0F;
+
+/// Rounds to the nearest value that binary16 represents, ties to even; beyond 65519.99 gives infinity.
+/// The result is a float, so that a surface can keep binary16 values without converting at every blend.
+inline Lanes round_to_half(Lanes value) {
+  const LaneBits bits = bits_of(value);
+  const LaneBits sign = bits & LaneBits{INT32_MIN, INT32_MIN, INT32_MIN, INT32_MIN};
+  const LaneBits magnitude = bits & 0x7fffffff;
+  const LaneBits odd = (magnitude >> 13) & 1;
+  const LaneBits normal = (magnitude + 0xfff + odd) & ~0x1fff;
+  // Below 2^-14 the quantum is fixed at 2^-24, which is the ulp of floats in [0.5, 1).
+  const Lanes shifted = lanes_of(magnitude) + 0.5F;
+  const Lanes subnormal = shifted - 0.5F;
+  const LaneBits is_small = magnitude < 0x38800000;
+  const LaneBits overflows = (normal > 0x477fe000) & (magnitude <= 0x7f800000);
+  LaneBits rounded = (is_small & bits_of(subnormal)) | (~is_small & normal);
+  rounded = (overflows & 0x7f800000) | (~overflows & rounded);
+  return lanes_of(rounded | sign);
+}
+
+/// Rounds towards zero; beyond 65504 gives 65504 (D3D11.3 functional specification, float to lower-precision float).
+inline Lanes truncate_to_half(Lanes value) {
+  const LaneBits bits = bits_of(value);
+  const LaneBits sign = bits & LaneBits{INT32_MIN, INT32_MIN, INT32_MIN, INT32_MIN};
+  const LaneBits magnitude = bits & 0x7fffffff;
+  const LaneBits normal = magnitude & ~0x1fff;
+  const Lanes exact = lanes_of(magnitude);
+  const Lanes shifted = exact + 0.5F;
+  Lanes subnormal = shifted - 0.5F;
+  subnormal = select(subnormal > exact, subnormal - 5.9604645e-8F, subnormal);
+  const LaneBits is_small = magnitude < 0x38800000;
+  const LaneBits saturates = (normal > 0x477fe000) & (magnitude <= 0x7f800000);
+  LaneBits truncated = (is_small & bits_of(subnormal)) | (~is_small & normal);
+  truncated = (saturates & 0x477fe000) | (~saturates & truncated);
+  return lanes_of(truncated | sign);
+}
+
+inline float round_to_half(float value) { return round_to_half(splat_lanes(value))[0]; }
+
+/// The 16 bits of a float that binary16 represents exactly.
+inline std::uint16_t half_bits(float value) {
+  std::uint32_t bits;
+  std::memcpy(&bits, &value, sizeof bits);
+  const std::uint32_t sign = (bits >> 16) & 0x8000U;
+  const std::uint32_t magnitude = bits & 0x7fffffffU;
+  if (magnitude > 0x7f800000U) return static_cast<std::uint16_t>(sign | 0x7e00U);
+  if (magnitude >= 0x47800000U) return static_cast<std::uint16_t>(sign | 0x7c00U);
+  if (magnitude >= 0x38800000U) return static_cast<std::uint16_t>(sign | ((magnitude - 0x38000000U) >> 13));
+  float absolute;
+  std::memcpy(&absolute, &magnitude, sizeof absolute);
+  return static_cast<std::uint16_t>(sign | static_cast<std::uint32_t>(absolute * 16777216.0F));
+}
+
+/// The value of 16 bits as binary16.
+inline float half_value(std::uint16_t half) {
+  const std::uint32_t sign = static_cast<std::uint32_t>(half & 0x8000U) << 16;
+  const std::uint32_t exponent = (half >> 10) & 0x1fU;
+  const std::uint32_t fraction = half & 0x3ffU;
+  if (exponent == 0) {
+    const float magnitude = static_cast<float>(fraction) * 5.9604645e-8F;
+    return sign != 0 ? -magnitude : magnitude;
+  }
+  const std::uint32_t bits = exponent == 31 ? sign | 0x7f800000U | (fraction << 13)
+                                            : sign | ((exponent + 112) << 23) | (fraction << 13);
+  float value;
+  std::memcpy(&value, &bits, sizeof value);
+  return value;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,376 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <systemc>
+#include <tlm>
+
+#include <vrpipe/clock_domain.h>
+#include <vrpipe/error.h>
+#include <vrpipe/random.h>
+
+/// The stream link between two units: TLM-2.0 sockets with protocol traits of our own.
+///
+/// Forward, phase `transfer`: one item moves; the receiver must have room, always accepts, and sees it `latency`
+/// cycles later. Backward, phase `credit`: the receiver has freed `credits` places of its queue; the sender sees them
+/// one cycle later. Initial credits, the depth of the queue, arrive in the same way before the first cycle.
+/// Thus no unit sees what another did in the same cycle.
+
+namespace vrpipe {
+
+enum class StreamPhase : std::uint8_t { transfer, credit };
+
+template <class Item>
+struct StreamPayload {
+  const Item* item = nullptr;  ///< transfer
+  unsigned latency = 0;        ///< transfer: cycles that the sender's pipeline adds to those of the link
+  unsigned credits = 0;        ///< credit
+};
+
+template <class Item>
+struct StreamProtocol {
+  using tlm_payload_type = StreamPayload<Item>;
+  using tlm_phase_type = StreamPhase;
+};
+
+template <class Item>
+using StreamInitiatorSocket = tlm::tlm_initiator_socket<32, StreamProtocol<Item>>;
+template <class Item>
+using StreamTargetSocket = tlm::tlm_target_socket<32, StreamProtocol<Item>>;
+
+/// The clock domain of a unit and the unit's handle in it.
+struct ClockHandle {
+  ClockDomain* domain = nullptr;
+  unsigned unit = 0;
+};
+
+class PortOwner;
+
+/// What the ports of all item types have in common: a name, and being stubbed or made to stall.
+class Port {
+ public:
+  virtual ~Port() = default;
+  Port(const Port&) = delete;
+  Port& operator=(const Port&) = delete;
+  const std::string& name() const { return name_; }
+  bool connected() const { return connected_; }
+  /// Leaves the port legally unconnected.
+  virtual void stub() = 0;
+  /// For tests: in a random part of the cycles (`per_256` of 256) the port pretends that nothing moves. Results of a
+  /// strict run do not depend on it.
+  void stall_randomly(std::uint64_t seed, unsigned per_256) {
+    stall_seed_ = seed;
+    stall_per_256_ = per_256;
+  }
+
+ protected:
+  Port(std::string name, const ClockHandle& clock) : clock_(clock), name_(std::move(name)) {}
+  bool stalled() const { return stall_per_256_ != 0 && stall_at(stall_seed_, clock_.domain->now(), stall_per_256_); }
+  void mark_connected() { connected_ = true; }
+
+  const ClockHandle& clock_;
+
+ private:
+  std::string name_;
+  bool connected_ = false;
+  std::uint64_t stall_seed_ = 0;
+  unsigned stall_per_256_ = 0;
+};
+
+class InPort : public Port {
+ public:
+  using Port::Port;
+  /// Grants the initial credits, before the first cycle.
+  virtual void open() = 0;
+  /// Whether nothing is queued.
+  virtual bool empty() const = 0;
+};
+
+class OutPort : public Port {
+ public:
+  using Port::Port;
+  /// Binds to `in`, whose queue is to hold `depth` items, each visible `latency` cycles after it was pushed.
+  /// Throws UserError when the ends carry different items or one is taken.
+  virtual void connect(InPort& in, unsigned depth, unsigned latency) = 0;
+  virtual std::uint64_t transferred() const = 0;  ///< items so far
+};
+
+/// Whatever has ports: a unit, a test's source or sink.
+class PortOwner {
+ public:
+  virtual ~PortOwner() = default;
+  ClockHandle clock;
+  std::vector<InPort*> in_ports;
+  std::vector<OutPort*> out_ports;
+};
+
+/// The sending end.
+template <class Item>
+class StreamOut : public OutPort, private tlm::tlm_bw_transport_if<StreamProtocol<Item>> {
+ public:
+  StreamOut(PortOwner& owner, const std::string& name) : OutPort(name, owner.clock), socket(name.c_str()) {
+    socket.bind(*this);
+    owner.out_ports.push_back(this);
+  }
+
+  StreamInitiatorSocket<Item> socket;
+
+  /// Free places at the receiver, as known at the start of this cycle.
+  unsigned credits() {
+    if (clock_.domain->now() > credit_cycle_) {
+      credits_ += pending_;
+      pending_ = 0;
+    }
+    return stalled() ? 0 : credits_;
+  }
+  /// When to look at `credits()` again if it is 0: `never`, since a credit wakes the unit, but for a random stall.
+  Cycle retry() const { return stalled() ? clock_.domain->now() + 1 : never; }
+  /// Moves an item; `credits()` must not be 0.
+  void push(const Item& item) {
+    if (credits_ == 0) {
+      throw SimulationFault(socket.name(), clock_.domain->now(), "an item was pushed without a credit");
+    }
+    --credits_;
+    ++transferred_;
+    StreamPayload<Item> payload;
+    payload.item = &item;
+    payload.latency = pipeline_;
+    StreamPhase phase = StreamPhase::transfer;
+    sc_core::sc_time delay;
+    socket->nb_transport_fw(payload, phase, delay);
+  }
+  /// The sender has a pipeline of this many cycles behind what it pushes, `items_per_cycle` wide; the items in it do
+  /// not take places of the receiver's queue. Before `connect`.
+  void set_pipeline(unsigned latency_cycles, unsigned items_per_cycle = 1) {
+    pipeline_ = latency_cycles;
+    pipeline_items_ = latency_cycles * items_per_cycle;
+  }
+  std::uint64_t transferred() const override { return transferred_; }
+  unsigned pipeline_items() const { return pipeline_items_; }
+  /// Called when the socket is bound by hand, for instance through a recorder.
+  void taken() { mark_connected(); }
+  void connect(InPort& in, unsigned depth, unsigned latency) override;
+
+  /// Whatever is pushed is taken at once and lost.
+  void stub() override {
+    stub_ = std::make_unique<Sink>(sc_core::sc_gen_unique_name("stub"));
+    socket.bind(stub_->socket);
+    credits_ = ~0U;
+    mark_connected();
+  }
+
+ private:
+  struct Sink : sc_core::sc_module, tlm::tlm_fw_transport_if<StreamProtocol<Item>> {
+    explicit Sink(const sc_core::sc_module_name& name) : sc_module(name), socket("socket") { socket.bind(*this); }
+    StreamTargetSocket<Item> socket;
+    tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>&, StreamPhase&, sc_core::sc_time&) override {
+      return tlm::TLM_ACCEPTED;
+    }
+    void b_transport(StreamPayload<Item>&, sc_core::sc_time&) override {}
+    bool get_direct_mem_ptr(StreamPayload<Item>&, tlm::tlm_dmi&) override { return false; }
+    unsigned transport_dbg(StreamPayload<Item>&) override { return 0; }
+  };
+
+  tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
+    if (!clock_.domain->running()) {
+      credits_ += payload.credits;
+      return tlm::TLM_ACCEPTED;
+    }
+    const Cycle now = clock_.domain->now();
+    if (now > credit_cycle_) {
+      credits_ += pending_;
+      pending_ = 0;
+      credit_cycle_ = now;
+    }
+    pending_ += payload.credits;
+    clock_.domain->wake(clock_.unit, now + 1);
+    return tlm::TLM_ACCEPTED;
+  }
+  void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
+
+  unsigned credits_ = 0;
+  unsigned pending_ = 0;
+  Cycle credit_cycle_ = 0;
+  std::uint64_t transferred_ = 0;
+  unsigned pipeline_ = 0;
+  unsigned pipeline_items_ = 0;
+  std::unique_ptr<Sink> stub_;
+};
+
+/// The receiving end, with its queue.
+template <class Item>
+class StreamIn : public InPort, private tlm::tlm_fw_transport_if<StreamProtocol<Item>> {
+ public:
+  StreamIn(PortOwner& owner, const std::string& name) : InPort(name, owner.clock), socket(name.c_str()) {
+    socket.bind(*this);
+    owner.in_ports.push_back(this);
+    configure(4, 1);
+  }
+
+  StreamTargetSocket<Item> socket;
+
+  /// @param depth items that the queue holds, at least 1
+  /// @param latency cycles from push to visibility, at least 1
+  void configure(unsigned depth, unsigned latency) {
+    depth_ = depth;
+    latency_ = latency;
+    unsigned size = 1;
+    while (size < depth) size *= 2;
+    queue_.resize(size);
+    mask_ = size - 1;
+  }
+  /// Called by the sending end.
+  void taken() { mark_connected(); }
+  unsigned depth() const { return depth_; }
+
+  void open() override {
+    if (!stub_) grant(depth_);
+  }
+  bool empty() const override { return head_ == tail_; }
+
+  bool ready() const { return head_ != tail_ && queue_[head_ & mask_].ready <= clock_.domain->now() && !stalled(); }
+  const Item& front() const { return queue_[head_ & mask_].item; }
+  void pop() {
+    ++head_;
+    grant(1);
+  }
+  /// Items in the queue, visible or not.
+  unsigned size() const { return tail_ - head_; }
+  /// The cycle at which the head becomes visible; `never` for an empty queue.
+  Cycle next_ready() const {
+    if (head_ == tail_) return never;
+    return stalled() ? std::max(queue_[head_ & mask_].ready, clock_.domain->now() + 1) : queue_[head_ & mask_].ready;
+  }
+
+  /// Nothing ever arrives.
+  void stub() override {
+    stub_ = std::make_unique<Source>(sc_core::sc_gen_unique_name("stub"));
+    stub_->socket.bind(socket);
+    mark_connected();
+  }
+
+ private:
+  struct Entry {
+    Cycle ready;
+    Item item;
+  };
+  struct Source : sc_core::sc_module, tlm::tlm_bw_transport_if<StreamProtocol<Item>> {
+    explicit Source(const sc_core::sc_module_name& name) : sc_module(name), socket("socket") { socket.bind(*this); }
+    StreamInitiatorSocket<Item> socket;
+    tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>&, StreamPhase&, sc_core::sc_time&) override {
+      return tlm::TLM_ACCEPTED;
+    }
+    void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
+  };
+
+  void grant(unsigned credits) {
+    StreamPayload<Item> payload;
+    payload.credits = credits;
+    StreamPhase phase = StreamPhase::credit;
+    sc_core::sc_time delay;
+    socket->nb_transport_bw(payload, phase, delay);
+  }
+
+  tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
+    if (size() == depth_) {
+      throw SimulationFault(socket.name(), clock_.domain->now(), "an item arrived at a full queue");
+    }
+    Entry& entry = queue_[tail_ & mask_];
+    entry.ready = clock_.domain->now() + latency_ + payload.latency;
+    entry.item = *payload.item;
+    ++tail_;
+    clock_.domain->wake(clock_.unit, entry.ready);
+    return tlm::TLM_ACCEPTED;
+  }
+  void b_transport(StreamPayload<Item>&, sc_core::sc_time&) override {
+    throw SimulationFault(socket.name(), clock_.domain->now(), "b_transport on a link of a clocked unit");
+  }
+  bool get_direct_mem_ptr(StreamPayload<Item>&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(StreamPayload<Item>&) override { return 0; }
+
+  std::vector<Entry> queue_;
+  unsigned mask_ = 0;
+  unsigned head_ = 0;
+  unsigned tail_ = 0;
+  unsigned depth_ = 0;
+  unsigned latency_ = 1;
+  std::unique_ptr<Source> stub_;
+};
+
+/// A proxy on a link that keeps every transfer with its cycle, and changes nothing.
+template <class Item>
+class LinkRecorder : public sc_core::sc_module,
+                     private tlm::tlm_fw_transport_if<StreamProtocol<Item>>,
+                     private tlm::tlm_bw_transport_if<StreamProtocol<Item>> {
+ public:
+  struct Record {
+    Cycle cycle;
+    Item item;
+  };
+  LinkRecorder(const sc_core::sc_module_name& name, const ClockDomain& clock)
+      : sc_module(name), in("in"), out("out"), clock_(clock) {
+    in.bind(*static_cast<tlm::tlm_fw_transport_if<StreamProtocol<Item>>*>(this));
+    out.bind(*static_cast<tlm::tlm_bw_transport_if<StreamProtocol<Item>>*>(this));
+  }
+  StreamTargetSocket<Item> in;
+  StreamInitiatorSocket<Item> out;
+  const std::vector<Record>& records() const { return records_; }
+
+ private:
+  tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase& phase, sc_core::sc_time& t) override {
+    records_.push_back({clock_.now(), *payload.item});
+    return out->nb_transport_fw(payload, phase, t);
+  }
+  tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase& phase, sc_core::sc_time& t) override {
+    return in->nb_transport_bw(payload, phase, t);
+  }
+  void b_transport(StreamPayload<Item>& payload, sc_core::sc_time& t) override { out->b_transport(payload, t); }
+  bool get_direct_mem_ptr(StreamPayload<Item>&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(StreamPayload<Item>&) override { return 0; }
+  void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
+
+  const ClockDomain& clock_;
+  std::vector<Record> records_;
+};
+
+/// Checks that the two ends carry the same item and are free; gives the receiving end.
+template <class Item>
+StreamIn<Item>& receiving_end(OutPort& out, InPort& in) {
+  auto* const typed = dynamic_cast<StreamIn<Item>*>(&in);
+  if (typed == nullptr) {
+    throw UserError("cannot connect", out.name() + " to " + in.name(), "the ports carry different items",
+                    "connect ports of the same item type");
+  }
+  if (out.connected() || in.connected()) {
+    throw UserError("cannot connect", out.name() + " to " + in.name(), "a port is connected already",
+                    "connect each port once");
+  }
+  return *typed;
+}
+
+template <class Item>
+void StreamOut<Item>::connect(InPort& in, unsigned depth, unsigned latency) {
+  StreamIn<Item>& end = receiving_end<Item>(*this, in);
+  end.configure(depth + pipeline_items_, latency);
+  socket.bind(end.socket);
+  mark_connected();
+  end.taken();
+}
+
+/// The same through a recorder.
+template <class Item>
+void connect_recorded(StreamOut<Item>& out, InPort& in, LinkRecorder<Item>& recorder, unsigned depth = 4,
+                      unsigned latency = 1) {
+  StreamIn<Item>& end = receiving_end<Item>(out, in);
+  end.configure(depth + out.pipeline_items(), latency);
+  out.socket.bind(recorder.in);
+  recorder.out.bind(end.socket);
+  out.taken();
+  end.taken();
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <vector>
+
+#include <systemc>
+#include <tlm>
+
+#include <vrpipe/clock_domain.h>
+#include <vrpipe/link.h>
+
+namespace vrpipe {
+
+/// An initiator on the unmodified TLM-2.0 base protocol, for timing only: payloads carry addresses and lengths, data
+/// stays with the behaviours. Accesses are naturally aligned and a power of two long, checked in every build.
+/// Understands early completion, annotated delays and all four phases, so that any memory model binds.
+class MemoryPort : private tlm::tlm_bw_transport_if<> {
+ public:
+  /// @param in_flight most accesses at a time
+  MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight);
+  ~MemoryPort() override;
+
+  tlm::tlm_initiator_socket<32> socket;
+
+  /// Whether another access can be issued now.
+  bool available() const { return !free_.empty() && !request_pending_; }
+  /// Issues an access. Returns a ticket, which comes back from `next_completed`.
+  unsigned read(std::uint64_t address, unsigned bytes) { return issue(tlm::TLM_READ_COMMAND, address, bytes); }
+  unsigned write(std::uint64_t address, unsigned bytes) { return issue(tlm::TLM_WRITE_COMMAND, address, bytes); }
+  /// Takes the next access that has completed, in a cycle after the one in which it was answered; false for none.
+  bool next_completed(unsigned& ticket);
+  /// When the next known completion is due; `never` for none.
+  Cycle next_completion() const { return completions_.empty() ? never : completions_.front().at; }
+
+  std::uint64_t reads() const { return reads_; }
+  std::uint64_t writes() const { return writes_; }
+
+ private:
+  struct Slot {
+    tlm::tlm_generic_payload payload;
+    std::vector<unsigned char> data;
+    bool answered = false;
+  };
+  struct Completion {
+    Cycle at;
+    unsigned ticket;
+  };
+  unsigned issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes);
+  void complete(unsigned ticket, const sc_core::sc_time& delay);
+  tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                                     sc_core::sc_time& delay) override;
+  void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
+
+  const ClockHandle& clock_;
+  std::vector<Slot> slots_;
+  std::vector<unsigned> free_;
+  std::deque<Completion> completions_;  ///< by cycle
+  bool request_pending_ = false;  ///< BEGIN_REQ without END_REQ yet
+  std::uint64_t reads_ = 0;
+  std::uint64_t writes_ = 0;
+};
+
+/// A memory that answers every access after the same time; each port moves a number of bytes per cycle.
+class FixedLatencyMemory : public sc_core::sc_module {
+ public:
+  FixedLatencyMemory(const sc_core::sc_module_name& name, const ClockDomain& domain, unsigned latency_cycles,
+                     unsigned bytes_per_cycle, unsigned ports);
+  ~FixedLatencyMemory() override;
+  /// Each port is for one initiator.
+  tlm::tlm_target_socket<32>& port(unsigned index);
+  std::uint64_t bytes() const;
+  /// Bytes per cycle of all ports.
+  double peak_rate() const;
+
+ private:
+  class MemoryTarget;
+  const ClockDomain& domain_;
+  unsigned latency_cycles_;
+  unsigned bytes_per_cycle_;
+  std::vector<std::unique_ptr<MemoryTarget>> ports_;
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,163 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <vrpipe/blend.h>
+#include <vrpipe/lanes.h>
+
+namespace vrpipe {
+
+constexpr unsigned screen_tile_pixels = 16;   ///< side of a screen tile (paper 5.1; measured)
+constexpr unsigned raster_tile_pixels = 8;    ///< side of a raster tile (paper, table)
+constexpr unsigned quads_per_tile_row = 8;    ///< quads along a side of a screen tile
+constexpr unsigned positions_per_tile = 64;   ///< quad positions in a screen tile
+constexpr unsigned quads_per_warp = 8;        ///< 32 threads
+constexpr unsigned vertices_per_splat = 4;
+constexpr unsigned splats_per_vertex_warp = 8;
+
+/// A screen tile, in tiles from the upper left.
+struct TileId {
+  std::uint16_t x = 0;
+  std::uint16_t y = 0;
+  friend bool operator==(TileId a, TileId b) { return a.x == b.x && a.y == b.y; }
+  friend bool operator!=(TileId a, TileId b) { return !(a == b); }
+};
+
+/// Pixels [x0, x1) x [y0, y1).
+struct PixelRect {
+  std::int32_t x0 = 0;
+  std::int32_t y0 = 0;
+  std::int32_t x1 = 0;
+  std::int32_t y1 = 0;
+  bool empty() const { return !(x0 < x1 && y0 < y1); }
+};
+
+/// A triangle after vertex processing. Attributes stay in the circular buffer in L2; units pass the pointer (`splat`).
+struct Primitive {
+  std::uint32_t splat = 0;   ///< index in draw order
+  std::uint8_t triangle = 0; ///< 0 or 1 of the splat's two triangles
+  PixelRect bounds;          ///< of the pixels that may be covered, clipped to the viewport, never empty
+};
+
+/// 2x2 samples of one primitive of which at least one is covered.
+struct Quad {
+  std::uint32_t splat = 0;
+  std::uint8_t position = 0;  ///< in the screen tile: 8 * row + column, 0 to 63
+  LaneMask coverage = 0;      ///< live samples; never 0 in flight
+  std::uint8_t triangle = 0;
+  std::uint8_t reserved = 0;
+};
+static_assert(sizeof(Quad) == 8, "quads are copied from buffer to buffer");
+
+/// Vertices of up to eight consecutive splats, shaded by one warp. DRAW to SM to VPO.
+struct VertexWarp {
+  std::uint32_t first_splat = 0;
+  std::uint32_t splats = 0;
+  bool end_of_draw = false;  ///< after the last warp of the draw; then `splats` is 0
+};
+
+/// VPO to TGC.
+struct PrimitiveItem {
+  Primitive primitive;
+  bool end_of_draw = false;  ///< then there is no primitive
+};
+
+/// TGC to RASTER: a primitive and the part of the screen in which to rasterise it now.
+struct RasterJob {
+  Primitive primitive;
+  PixelRect clip;
+  bool end_of_draw = false;
+};
+
+/// Quads of one screen tile that move in one cycle. RASTER to TC, TC to PROP, PROP to ZROP and back, PROP to QRU.
+struct QuadBeat {
+  static constexpr unsigned capacity = 16;
+  TileId tile;
+  std::uint8_t count = 0;
+  bool last_of_bin = false;  ///< closes the bin that TC flushed (count may be 0 once its quads are dead)
+  bool end_of_draw = false;  ///< then count is 0
+  std::array<Quad, capacity> quads;
+};
+
+/// Up to eight quads of one screen tile, to be shaded together. QRU to SM.
+struct Warp {
+  TileId tile;
+  std::uint32_t sequence = 0;       ///< launch order in the GPC, from 0
+  std::uint32_t tile_sequence = 0;  ///< launch order in its screen tile, from 0
+  std::uint8_t count = 0;
+  std::uint8_t merge_pairs = 0;  ///< bit n: quads 2n (front) and 2n + 1 (back) are to be merged
+  bool end_of_draw = false;      ///< then count is 0
+  std::array<Quad, quads_per_warp> quads;
+};
+
+/// A warp's quads after shading, pruning and merging, as many as survive.
+struct ShadedWarp {
+  TileId tile;
+  std::uint32_t sequence = 0;
+  std::uint32_t tile_sequence = 0;
+  std::uint8_t count = 0;
+  bool end_of_draw = false;
+  std::uint16_t slot = 0;  ///< of the SM, to be released when the last quad has left PROP
+  /// Holders in the simulator (not in the hardware): the SM until release, and each quad on its way to blending.
+  mutable std::uint32_t holders = 0;
+  std::array<std::uint8_t, quads_per_warp> position;
+  std::array<LaneMask, quads_per_warp> live;
+  /// Draw order of the first and the last primitive in a quad's colour, for the order monitor.
+  std::array<std::uint32_t, quads_per_warp> first_primitive;
+  std::array<std::uint32_t, quads_per_warp> last_primitive;
+  std::array<QuadColor, quads_per_warp> color;  ///< premultiplied; (0,0,0,0) in dead lanes
+};
+
+/// Draw order of a quad's primitive.
+inline std::uint32_t primitive_order(const Quad& quad) { return 2 * quad.splat + quad.triangle; }
+
+/// SM to PROP: registers stay in the SM until PROP releases the slot.
+struct ShadedWarpItem {
+  const ShadedWarp* warp = nullptr;
+};
+
+/// PROP to SM.
+struct WarpRelease {
+  std::uint16_t slot = 0;
+};
+
+/// One quad on its way to blending; whoever takes it off the pipeline drops the hold on the warp.
+struct ColorQuad {
+  const ShadedWarp* warp = nullptr;
+  std::uint32_t index = 0;
+  TileId tile() const { return warp->tile; }
+  unsigned position() const { return warp->position[index]; }
+  LaneMask live() const { return warp->live[index]; }
+  const QuadColor& color() const { return warp->color[index]; }
+};
+
+/// Quads that move from PROP to CROP in one cycle.
+struct ColorBeat {
+  static constexpr unsigned capacity = 4;
+  std::uint8_t count = 0;
+  bool end_of_draw = false;
+  std::array<ColorQuad, capacity> quads;
+};
+
+/// Pixels of one quad position that newly passed the termination threshold.
+struct TerminationSignal {
+  TileId tile;
+  std::uint8_t position = 0;
+  LaneMask pixels = 0;
+};
+
+/// The GPC that owns a screen tile: neighbours go to different GPCs.
+constexpr unsigned owner_of(TileId tile, unsigned gpcs) {
+  return gpcs == 1 ? 0 : (tile.x + tile.y * (gpcs / 2 + 1U)) % gpcs;
+}
+
+/// CROP to ZROP: signals of one cycle.
+struct TerminationBeat {
+  static constexpr unsigned capacity = 4;
+  std::uint8_t count = 0;
+  std::array<TerminationSignal, capacity> signals;
+};
+
+}  // namespace vrpipe

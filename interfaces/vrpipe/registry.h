@@ -1,0 +1,78 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <vrpipe/parameter.h>
+#include <vrpipe/render_state.h>
+#include <vrpipe/units.h>
+
+namespace vrpipe {
+
+/// An implementation of a slot: a unit that a platform can be built with.
+struct Implementation {
+  std::string slot;         ///< draw vpo tgc raster tc prop zrop qru sm crop
+  std::string name;         ///< e.g. "pairing"
+  std::string description;  ///< one line
+  bool pass_through = false;  ///< stands in for a unit that a variant does not have
+  std::function<std::unique_ptr<ParameterSet>()> make_parameters;
+  std::function<std::unique_ptr<Behaviour>(const ParameterSet&, const RenderState&)> make_behaviour;
+};
+
+/// All implementations that are linked in or loaded. Filled by static registrars; there is one per process.
+class Registry {
+ public:
+  static Registry& instance();
+
+  /// A second implementation of a slot and name is not taken but kept as a problem: registrars run while a library is
+  /// loaded, when nothing may be thrown.
+  void add(Implementation implementation);
+  const std::vector<std::string>& problems() const { return problems_; }
+  /// Throws UserError naming the nearest slot or implementation.
+  const Implementation& find(const std::string& slot, const std::string& name) const;
+  /// In order of slot in the pipeline, then of name.
+  std::vector<const Implementation*> all() const;
+  std::vector<const Implementation*> of_slot(const std::string& slot) const;
+
+  /// The slots, in the order in which a frame flows through them.
+  static const std::vector<std::string>& slots();
+
+ private:
+  std::vector<std::unique_ptr<Implementation>> implementations_;
+  std::vector<std::string> problems_;
+};
+
+/// Registers a behaviour class at program or plugin load. `Unit` has a nested `Parameters` (a ParameterSet) and a
+/// constructor (const Parameters&, const RenderState&), and derives from the slot's behaviour.
+template <class Unit, class SlotBehaviour>
+class Registrar {
+  static_assert(std::is_base_of<SlotBehaviour, Unit>::value, "a unit implements the behaviour of its slot");
+
+ public:
+  Registrar(const char* slot, const char* name, const char* description, bool pass_through = false) {
+    Implementation implementation;
+    implementation.slot = slot;
+    implementation.name = name;
+    implementation.description = description;
+    implementation.pass_through = pass_through;
+    implementation.make_parameters = [] { return std::make_unique<typename Unit::Parameters>(); };
+    implementation.make_behaviour = [](const ParameterSet& parameters, const RenderState& state) {
+      return std::make_unique<Unit>(dynamic_cast<const typename Unit::Parameters&>(parameters), state);
+    };
+    Registry::instance().add(std::move(implementation));
+  }
+};
+
+/// Put VRPIPE_PLUGIN once in a plugin's source: the tag by which the loader knows, before it runs any code of the
+/// plugin, that it was built for this vrpipe. VRPIPE_PLUGIN_TAG comes from the build (vrpipe_add_plugin).
+#define VRPIPE_PLUGIN                                                                         \
+  extern "C" __attribute__((visibility("default"), used)) const char vrpipe_plugin_tag[];     \
+  extern "C" __attribute__((visibility("default"), used)) const char vrpipe_plugin_tag[] = VRPIPE_PLUGIN_TAG;
+
+/// Loads a plugin; its units are in the registry afterwards. Throws UserError when the file is missing, is not a
+/// plugin of vrpipe, was built against another version, or registers nothing.
+void load_plugin(const std::string& path);
+
+}  // namespace vrpipe

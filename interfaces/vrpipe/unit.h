@@ -1,0 +1,73 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <systemc>
+
+#include <vrpipe/accounting.h>
+#include <vrpipe/clock_domain.h>
+#include <vrpipe/link.h>
+#include <vrpipe/units.h>
+
+namespace vrpipe {
+
+/// A unit as a SystemC module at cycle fidelity: a behaviour with ports and a clock. Ports are found by name, so that a
+/// platform wires units without knowing their classes.
+class Unit : public sc_core::sc_module, public Clocked, public PortOwner {
+ public:
+  /// Attaches to the clock.
+  Unit(const sc_core::sc_module_name& name, ClockDomain& domain);
+
+  /// Throws UserError naming the nearest port.
+  InPort& in(const std::string& name);
+  OutPort& out(const std::string& name);
+
+  Cycle tick(Cycle now) final { return step(now); }
+
+  /// Whether no work is left inside or queued.
+  virtual bool idle() const = 0;
+  /// Work done so far, in the unit's items.
+  virtual std::uint64_t work() const = 0;
+  /// Items per cycle at peak.
+  virtual double peak_rate() const = 0;
+  virtual Behaviour& behaviour() = 0;
+  /// For a unit with a memory port; null otherwise.
+  virtual tlm::tlm_initiator_socket<32>* memory_socket() { return nullptr; }
+  /// For the unit at the end of the pipeline: the cycle after its last work on the draw; `never` before that.
+  virtual Cycle end_of_draw() const { return never; }
+
+  const StateAccount& account() const { return account_; }
+  void close_account(Cycle end) { account_.close(end); }
+
+ protected:
+  /// One clock edge; see Clocked::tick.
+  virtual Cycle step(Cycle now) = 0;
+  void enter(UnitState state, Cycle now) { account_.enter(state, now); }
+  Cycle now() const { return clock.domain->now(); }
+
+ private:
+  StateAccount account_;
+};
+
+/// Makes the cycle-fidelity module around a behaviour of a slot. `gpcs` is how many GPCs the front end serves.
+using UnitMaker = std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain,
+                                                      std::unique_ptr<Behaviour> behaviour, const RenderState& state,
+                                                      unsigned gpcs)>;
+
+/// Registered by each module for its slot.
+void register_unit_maker(const std::string& slot, UnitMaker maker);
+const UnitMaker& unit_maker(const std::string& slot);
+
+/// Hands a behaviour to a module that needs the interface of its slot.
+template <class SlotBehaviour>
+std::unique_ptr<SlotBehaviour> behaviour_as(std::unique_ptr<Behaviour> behaviour) {
+  auto* const typed = dynamic_cast<SlotBehaviour*>(behaviour.get());
+  if (typed == nullptr) throw SimulationFault("registry", 0, "a behaviour was made for another slot");
+  behaviour.release();
+  return std::unique_ptr<SlotBehaviour>(typed);
+}
+
+}  // namespace vrpipe

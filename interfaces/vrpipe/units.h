@@ -1,0 +1,214 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <vrpipe/payload.h>
+#include <vrpipe/render_state.h>
+#include <vrpipe/statistic.h>
+#include <vrpipe/surface.h>
+
+/// The slots of the pipeline. Each is a *behaviour*: what a unit does and what that costs, without SystemC and
+/// without time. Shells (modules/<unit>/) give a behaviour sockets and time, one shell for each fidelity.
+///
+/// Behaviours that turn a stream into batches work by steps: a call takes items until a batch comes out or the items
+/// are used up. So one behaviour serves a shell that moves a few quads a cycle and a loop that runs a whole draw.
+
+namespace vrpipe {
+
+/// How fast a unit works, as its shell sees it.
+struct Throughput {
+  std::uint32_t items_per_cycle = 1;  ///< peak rate
+  std::uint32_t latency_cycles = 1;   ///< from the last item in to the first item out
+};
+
+class Behaviour : public StatisticSet {
+ public:
+  virtual ~Behaviour() = default;
+};
+
+/// Slot `draw`: issues the splats of a draw as vertex warps.
+class DrawBehaviour : public Behaviour {
+ public:
+  /// The next warp; false after the last.
+  virtual bool next(VertexWarp& out) = 0;
+  /// Vertex warps in 1024 cycles.
+  virtual std::uint32_t warps_per_1024_cycles() const = 0;
+};
+
+/// Slot `vpo`: primitive assembly, culling, clipping to the viewport, bounding boxes.
+class VpoBehaviour : public Behaviour {
+ public:
+  /// The visible triangles of a splat, in order. Returns how many of `out` are set (0 to 2).
+  virtual unsigned assemble(std::uint32_t splat, std::array<Primitive, 2>& out) = 0;
+  virtual Throughput cost() const = 0;  ///< items: triangles
+};
+
+/// Slot `tgc`: collects primitives per tile grid.
+class TgcBehaviour : public Behaviour {
+ public:
+  /// Primitives of one tile grid that are to be rasterised in `clip` now.
+  struct Flush {
+    PixelRect clip;
+    std::vector<Primitive> primitives;
+  };
+  /// Starts to enter a primitive into the bins of the grids that it touches.
+  virtual void begin(const Primitive& primitive) = 0;
+  /// Whether the primitive of `begin` has bins left to enter.
+  virtual bool entering() const = 0;
+  /// Enters one bin, or evicts one to make room. True when `out` was flushed (its old contents are replaced).
+  virtual bool step(Flush& out) = 0;
+  /// Flushes what is left, the bin allocated first going first; false when nothing is.
+  virtual bool drain(Flush& out) = 0;
+  virtual Throughput cost() const = 0;           ///< items: bin entries
+  virtual std::uint32_t largest_flush() const = 0;  ///< primitives
+  virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
+};
+
+/// Slot `raster`: setup, coarse and fine rasterisation of one primitive at a time.
+class RasterBehaviour : public Behaviour {
+ public:
+  /// Sets up a primitive, to be rasterised in `clip`.
+  virtual void begin(const Primitive& primitive, const PixelRect& clip) = 0;
+  /// Advances to the next raster tile that coarse rasterisation keeps, and gives its quads (0 to 16).
+  /// `coarse_tests` counts the raster tiles tested on the way; `new_screen_tile` tells whether it is the first raster
+  /// tile kept of its screen tile. False, with `coarse_tests` set, when the primitive is done.
+  virtual bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) = 0;
+  struct Cost {
+    std::uint32_t setup_latency_cycles;
+    std::uint32_t setup_interval_cycles;         ///< between primitives
+    std::uint32_t coarse_tiles_per_cycle;        ///< raster tiles tested
+    std::uint32_t fine_tiles_per_cycle;          ///< raster tiles made into quads
+    std::uint32_t screen_tile_interval_cycles;   ///< between (primitive, screen tile) pairs
+    std::uint32_t quads_per_cycle;               ///< handed to TC
+  };
+  virtual Cost cost() const = 0;
+};
+
+/// Slot `tc`: collects quads per screen tile.
+class TcBehaviour : public Behaviour {
+ public:
+  enum class FlushReason : std::uint8_t { full, evicted, timed_out, end_of_draw };
+  struct Flush {
+    TileId tile;
+    FlushReason reason = FlushReason::full;
+    std::vector<Quad> quads;
+  };
+  /// Takes quads `from`.. of a beat until all are taken or a bin is flushed. Returns the number taken;
+  /// `flushed` tells whether `out` was filled.
+  virtual unsigned insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) = 0;
+  /// Flushes the bin allocated first; false when all are empty.
+  virtual bool flush_oldest(FlushReason reason, Flush& out) = 0;
+  struct Cost {
+    std::uint32_t quads_per_cycle;
+    std::uint32_t latency_cycles;
+    std::uint32_t idle_timeout_cycles;  ///< without an incoming quad until bins are flushed; 0: never
+    std::uint32_t flush_queue_bins;     ///< flushed bins that wait for PROP
+  };
+  virtual Cost cost() const = 0;
+};
+
+/// Slot `prop`: hands bins to ZROP and on to QRU, and shaded warps to CROP in order.
+class PropBehaviour : public Behaviour {
+ public:
+  enum class Order : std::uint8_t { draw, tile };
+  struct Cost {
+    std::uint32_t quads_per_cycle;        ///< TC to ZROP to QRU
+    std::uint32_t color_quads_per_cycle;  ///< to CROP, of this draw's format
+    std::uint32_t latency_cycles;
+    Order order;
+  };
+  virtual Cost cost() const = 0;
+};
+
+/// Strict termination: what the bins tested so far will have terminated, whenever their quads reach CROP.
+class TerminationForesight {
+ public:
+  virtual ~TerminationForesight() = default;
+  /// Runs the survivors of a tested bin through merging, shading and blending; `terminated` gets the new signals.
+  virtual void bin_tested(TileId tile, const std::vector<Quad>& survivors,
+                          std::vector<TerminationSignal>& terminated) = 0;
+};
+
+/// Slot `zrop`: depth and stencil test, termination test and update.
+class ZropBehaviour : public Behaviour {
+ public:
+  /// Removes dead samples, and quads without a live one, from the beat.
+  virtual void test(QuadBeat& beat) = 0;
+  /// Sets the termination bit (stencil MSB) of the signalled pixels.
+  virtual void update(const TerminationSignal& signal) = 0;
+  /// Strict mode at fidelities with time: termination comes from `foresight`, and `update` only costs time.
+  virtual void foresee(TerminationForesight& foresight) = 0;
+  struct Cost {
+    std::uint32_t quads_per_cycle;
+    std::uint32_t latency_cycles;
+    std::uint32_t updates_per_cycle;   ///< signals; a cycle with updates tests no quads: one z-cache port
+  };
+  virtual Cost cost() const = 0;
+};
+
+/// Slot `qru`: forms warps from the surviving quads of a bin.
+class QruBehaviour : public Behaviour {
+ public:
+  /// Examines quads `from`.. of a beat until all are examined or a warp is complete. Returns the number examined;
+  /// `launched` tells whether `out` was filled.
+  virtual unsigned examine(const QuadBeat& beat, unsigned from, Warp& out, bool& launched) = 0;
+  /// At the end of a bin: the next warp of what is left; false when nothing is.
+  virtual bool finish_bin(Warp& out) = 0;
+  virtual Throughput cost() const = 0;              ///< items: quads examined
+  virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
+};
+
+/// A shader as its scheduler sees it: instructions to issue, then cycles until the next can issue.
+struct ShaderSegment {
+  std::uint32_t instructions;
+  std::uint32_t stall_cycles;
+};
+
+/// Slot `sm`: vertex and fragment shading, alpha pruning, quad merging.
+class SmBehaviour : public Behaviour {
+ public:
+  virtual void shade(const Warp& warp, ShadedWarp& out) = 0;
+  virtual void shade_vertices(const VertexWarp& warp) = 0;
+  struct Cost {
+    std::uint32_t cores;
+    std::uint32_t schedulers_per_core;
+    std::uint32_t lanes_per_scheduler;
+    std::uint32_t warps_per_core;
+    std::uint32_t vertex_warps;          ///< of the array that may be in flight
+    std::uint32_t warps_to_one_core;     ///< consecutive warps of a tile that go to one core
+    std::vector<ShaderSegment> vertex;
+    std::vector<ShaderSegment> fragment;
+    std::vector<ShaderSegment> merge;    ///< appended for a warp with pairs
+  };
+  virtual Cost cost() const = 0;
+};
+
+/// Slot `crop`: blends quads into the colour target and tests for termination.
+class CropBehaviour : public Behaviour {
+ public:
+  /// Before the first blend.
+  void attach(ColorSurface& surface) { surface_ = &surface; }
+  const ColorSurface* surface() const { return surface_; }
+  /// Blends the live samples of a quad. Returns the pixels to signal: those that newly passed the termination
+  /// threshold (HET only).
+  virtual LaneMask blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) = 0;
+  struct Cost {
+    std::uint32_t quads_per_cycle;          ///< of this draw's format
+    std::uint32_t input_quads;              ///< queue between tag look-up and blending
+    std::uint32_t latency_cycles;           ///< of blending, termination test included
+    bool forwards;                          ///< overlapping quads need not wait for `latency_cycles`
+    std::uint32_t cache_bytes;
+    std::uint32_t line_bytes;
+    std::uint32_t sector_bytes;
+    std::uint32_t mshrs;                    ///< sectors in flight
+    std::uint32_t sectors_per_cycle;        ///< filled or written back
+  };
+  virtual Cost cost() const = 0;
+
+ protected:
+  ColorSurface* surface_ = nullptr;
+};
+
+}  // namespace vrpipe

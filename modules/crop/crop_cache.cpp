@@ -1,0 +1,74 @@
+#include "crop/crop_cache.h"
+
+#include <vrpipe/error.h>
+
+namespace vrpipe {
+
+CropCache::CropCache(std::uint32_t cache_bytes, std::uint32_t line_bytes, std::uint32_t sector_bytes,
+                     std::uint64_t surface_bytes)
+    : line_bytes_(line_bytes),
+      sector_bytes_(sector_bytes),
+      lines_(cache_bytes / line_bytes),
+      line_of_tag_((surface_bytes + line_bytes - 1) / line_bytes, no_line) {
+  const auto power_of_two = [](std::uint32_t value) { return value != 0 && (value & (value - 1)) == 0; };
+  if (!power_of_two(line_bytes) || !power_of_two(sector_bytes) || sector_bytes > line_bytes ||
+      line_bytes / sector_bytes > 32 || lines_.empty()) {
+    throw UserError("unusable CROP cache", "crop.cache_bytes, crop.line_bytes, crop.sector_bytes",
+                    "it does not hold a line of sectors", "use powers of two: sector <= line <= cache");
+  }
+}
+
+void CropCache::unlink(Line line) {
+  Entry& entry = lines_[line];
+  (entry.newer == no_line ? newest_ : lines_[entry.newer].older) = entry.older;
+  (entry.older == no_line ? oldest_ : lines_[entry.older].newer) = entry.newer;
+}
+
+void CropCache::make_newest(Line line) {
+  Entry& entry = lines_[line];
+  entry.newer = no_line;
+  entry.older = newest_;
+  (newest_ == no_line ? oldest_ : lines_[newest_].newer) = line;
+  newest_ = line;
+}
+
+CropCache::Line CropCache::find(std::uint64_t address) {
+  const Line line = line_of_tag_[address / line_bytes_];
+  if (line != no_line && line != newest_) {
+    unlink(line);
+    make_newest(line);
+  }
+  return line;
+}
+
+CropCache::Line CropCache::victim() const {
+  Line line = oldest_;
+  while (line != no_line && lines_[line].pins != 0) line = lines_[line].newer;
+  return line;
+}
+
+bool CropCache::can_allocate() const { return used_ < lines_.size() || victim() != no_line; }
+
+CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dirty, std::uint64_t& evicted_address) {
+  evicted_dirty = 0;
+  Line line = used_;
+  if (used_ < lines_.size()) {
+    ++used_;
+  } else {
+    line = victim();
+    evicted_dirty = lines_[line].dirty;
+    evicted_address = lines_[line].tag * line_bytes_;
+    line_of_tag_[lines_[line].tag] = no_line;
+    unlink(line);
+  }
+  Entry& entry = lines_[line];
+  entry.tag = address / line_bytes_;
+  entry.present = 0;
+  entry.dirty = 0;
+  entry.pins = 0;
+  line_of_tag_[entry.tag] = line;
+  make_newest(line);
+  return line;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,265 @@
+#include <algorithm>
+
+#include "crop/crop_cache.h"
+
+#include <vrpipe/memory_port.h>
+#include <vrpipe/order_monitor.h>
+#include <vrpipe/unit.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// CROP at cycle fidelity. A quad looks up the colour cache when it arrives and starts the fills that it needs, then
+/// waits in order; blending takes place at the head. Moving a sector takes cycles from blending (measured: CROP cycles
+/// = quads / rate + sectors / 8).
+/// Ports: in_color (ColorBeat), out_terminations (TerminationBeat), memory (TLM-2.0 base protocol).
+class CropUnit : public Unit {
+ public:
+  CropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
+           const RenderState& state)
+      : Unit(name, domain),
+        in_(*this, "in_color"),
+        out_(*this, "out_terminations"),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()),
+        signals_(state.early_termination),
+        memory_(*this, "memory", 2 * cost_.mshrs),
+        queue_(cost_.input_quads),
+        fills_(2 * std::size_t{cost_.mshrs}) {
+    out_.set_pipeline(cost_.latency_cycles - 1, 1);
+  }
+
+  bool idle() const override { return in_.empty() && queued_ == 0; }
+  std::uint64_t work() const override { return blended_; }
+  double peak_rate() const override { return cost_.quads_per_cycle; }
+  Behaviour& behaviour() override { return *behaviour_; }
+  tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket; }
+  Cycle end_of_draw() const override { return end_; }
+
+ private:
+  struct Entry {
+    ColorQuad quad;
+    std::uint64_t address = 0;
+    CropCache::Line line = CropCache::no_line;
+    std::uint32_t sectors = 0;  ///< of the line, a bit each
+  };
+  struct Fill {
+    CropCache::Line line = CropCache::no_line;  ///< none for a write-back
+    std::uint32_t sector = 0;
+  };
+
+  void end_of_elaboration() override {
+    const ColorSurface* const surface = behaviour_->surface();
+    if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
+    bytes_per_quad_ = 4 * bytes_per_pixel(surface->format());
+    cache_ = std::make_unique<CropCache>(cost_.cache_bytes, cost_.line_bytes, cost_.sector_bytes, surface->size_bytes());
+    monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
+    pending_.assign(cost_.cache_bytes / cost_.line_bytes, 0);
+    if (cost_.line_bytes < bytes_per_quad_) {
+      throw UserError("unusable CROP cache", "crop.line_bytes", "a line is smaller than a quad", "use longer lines");
+    }
+  }
+
+  void finish_fills() {
+    unsigned ticket = 0;
+    while (memory_.next_completed(ticket)) {
+      const Fill fill = fills_[ticket];
+      if (fill.line == CropCache::no_line) continue;
+      cache_->add_sector(fill.line, fill.sector);
+      pending_[fill.line] &= ~(1U << fill.sector);
+      --fills_in_flight_;
+    }
+  }
+
+  /// The line of a quad, allocated if need be; `no_line` when that has to wait.
+  CropCache::Line line_of(std::uint64_t address) {
+    const CropCache::Line found = cache_->find(address);
+    if (found != CropCache::no_line) return found;
+    if (!cache_->can_allocate() || !memory_.available()) return CropCache::no_line;
+    unsigned dirty = 0;
+    std::uint64_t old_address = 0;
+    const CropCache::Line line = cache_->allocate(address, dirty, old_address);
+    write_back_ = dirty;
+    write_back_address_ = old_address;
+    return line;
+  }
+
+  /// Sends the dirty sectors of an evicted line; false while some are left.
+  bool write_back() {
+    while (write_back_ != 0 && memory_.available()) {
+      const auto sector = static_cast<unsigned>(__builtin_ctz(write_back_));
+      write_back_ &= write_back_ - 1;
+      const unsigned ticket =
+          memory_.write(write_back_address_ + std::uint64_t{sector} * cost_.sector_bytes, cost_.sector_bytes);
+      fills_[ticket].line = CropCache::no_line;
+      tokens_ -= cost_.quads_per_cycle;
+    }
+    return write_back_ == 0;
+  }
+
+  /// Takes a quad from the link into the queue; false when it has to wait.
+  bool look_up(const ColorQuad& quad) {
+    if (!write_back()) return false;
+    const std::uint64_t address = behaviour_->surface()->address(quad.tile(), quad.position());
+    const CropCache::Line line = line_of(address);
+    if (line == CropCache::no_line) return false;
+    const auto first = static_cast<unsigned>(address % cost_.line_bytes / cost_.sector_bytes);
+    const auto last = static_cast<unsigned>((address % cost_.line_bytes + bytes_per_quad_ - 1) / cost_.sector_bytes);
+    Entry entry{quad, address, line, 0};
+    for (unsigned sector = first; sector <= last; ++sector) {
+      entry.sectors |= 1U << sector;
+      if (cache_->has_sector(line, sector) || ((pending_[line] >> sector) & 1U) != 0) continue;
+      if (!memory_.available() || fills_in_flight_ == cost_.mshrs) return false;
+      const unsigned ticket =
+          memory_.read(address / cost_.line_bytes * cost_.line_bytes + std::uint64_t{sector} * cost_.sector_bytes,
+                       cost_.sector_bytes);
+      fills_[ticket] = {line, sector};
+      pending_[line] |= 1U << sector;
+      ++fills_in_flight_;
+      tokens_ -= cost_.quads_per_cycle;
+    }
+    cache_->pin(line);
+    queue_[(head_ + queued_) % queue_.size()] = entry;
+    ++queued_;
+    return true;
+  }
+
+  bool accept() {
+    bool moved = false;
+    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && queued_ < queue_.size() && in_.ready(); --budget) {
+      const ColorBeat& beat = in_.front();
+      if (beat.end_of_draw) {
+        ending_ = true;
+        in_.pop();
+        return true;
+      }
+      if (!look_up(beat.quads[at_])) break;
+      moved = true;
+      if (++at_ == beat.count) {
+        in_.pop();
+        at_ = 0;
+      }
+    }
+    return moved;
+  }
+
+  /// Whether a quad of the same position is still in the blending pipeline.
+  bool hazard(std::uint64_t address, Cycle now) {
+    while (!recent_.empty() && recent_.front().second + cost_.latency_cycles <= now) recent_.pop_front();
+    return std::any_of(recent_.begin(), recent_.end(), [&](const auto& blend) { return blend.first == address; });
+  }
+
+  /// Blends from the head of the queue; why it stopped is in `stop_`.
+  bool blend(Cycle now) {
+    // What sectors took from blending is paid back first; unused cycles are lost.
+    const std::int32_t full = static_cast<std::int32_t>(cost_.quads_per_cycle * cost_.sectors_per_cycle);
+    if (now > refilled_) {
+      const Cycle gap = std::min<Cycle>(now - refilled_, 1U << 20U);
+      tokens_ = static_cast<std::int32_t>(
+          std::min<std::int64_t>(full, tokens_ + static_cast<std::int64_t>(gap) * full));
+      refilled_ = now;
+    }
+    const auto price = static_cast<std::int32_t>(cost_.sectors_per_cycle);
+    TerminationBeat beat;
+    bool moved = false;
+    stop_ = UnitState::starved;
+    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && queued_ > 0; --budget) {
+      const Entry& entry = queue_[head_];
+      if (signals_ && out_.credits() == 0) {
+        stop_ = UnitState::blocked;
+        break;
+      }
+      if ((pending_[entry.line] & entry.sectors) != 0) {
+        stop_ = UnitState::memory;
+        break;
+      }
+      if (tokens_ < price) {
+        stop_ = UnitState::memory;
+        break;
+      }
+      if (!cost_.forwards) {
+        if (hazard(entry.address, now)) {
+          stop_ = UnitState::latency;
+          break;
+        }
+        recent_.emplace_back(entry.address, now);
+      }
+      const ColorQuad& quad = entry.quad;
+      monitor_->blended(*quad.warp, quad.index, now);
+      const LaneMask pixels = behaviour_->blend(quad.tile(), quad.position(), quad.live(), quad.color());
+      if (pixels != 0) beat.signals[beat.count++] = {quad.tile(), static_cast<std::uint8_t>(quad.position()), pixels};
+      --quad.warp->holders;
+      for (std::uint32_t sectors = entry.sectors; sectors != 0; sectors &= sectors - 1) {
+        cache_->dirty_sector(entry.line, static_cast<unsigned>(__builtin_ctz(sectors)));
+      }
+      cache_->unpin(entry.line);
+      tokens_ -= price;
+      head_ = head_ + 1 == queue_.size() ? 0 : head_ + 1;
+      --queued_;
+      ++blended_;
+      last_blend_ = now;
+      moved = true;
+    }
+    if (beat.count > 0) out_.push(beat);
+    return moved;
+  }
+
+  Cycle step(Cycle now) override {
+    finish_fills();
+    const bool blended = blend(now);
+    const bool accepted = accept();
+    if (ending_ && queued_ == 0) {
+      end_ = blended_ == 0 ? now : last_blend_ + cost_.latency_cycles;
+      ending_ = false;
+    }
+    enter(blended ? UnitState::busy : queued_ > 0 ? stop_ : UnitState::starved, now);
+    if (blended || accepted || (queued_ > 0 && stop_ != UnitState::blocked &&
+                                (stop_ == UnitState::latency || tokens_ < static_cast<std::int32_t>(cost_.sectors_per_cycle)))) {
+      return now + 1;
+    }
+    // A quad at the link that could not be looked up waits for a completion or for the queue to move.
+    Cycle next = memory_.next_completion();
+    if (in_.next_ready() > now) next = std::min(next, in_.next_ready());
+    return std::min(next, out_.retry());
+  }
+
+  StreamIn<ColorBeat> in_;
+  StreamOut<TerminationBeat> out_;
+  std::unique_ptr<CropBehaviour> behaviour_;
+  const CropBehaviour::Cost cost_;
+  const bool signals_;
+  MemoryPort memory_;
+  std::unique_ptr<CropCache> cache_;
+  std::unique_ptr<BlendOrderMonitor> monitor_;
+  unsigned bytes_per_quad_ = 0;
+  std::vector<Entry> queue_;  ///< looked up and waiting to be blended, a ring
+  std::size_t head_ = 0;
+  std::size_t queued_ = 0;
+  unsigned at_ = 0;                     ///< quads taken of the beat at the link
+  std::vector<Fill> fills_;             ///< by ticket
+  std::vector<std::uint32_t> pending_;  ///< sectors being filled, by line
+  unsigned fills_in_flight_ = 0;
+  std::uint32_t write_back_ = 0;  ///< dirty sectors of an evicted line yet to be sent
+  std::uint64_t write_back_address_ = 0;
+  std::int32_t tokens_ = 0;  ///< quads_per_cycle * sectors_per_cycle are a cycle
+  Cycle refilled_ = 0;
+  std::deque<std::pair<std::uint64_t, Cycle>> recent_;  ///< blends in the pipeline, without forwarding
+  UnitState stop_ = UnitState::starved;
+  bool ending_ = false;
+  Cycle last_blend_ = 0;
+  Cycle end_ = never;
+  std::uint64_t blended_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_unit_maker("crop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                 const RenderState& state, unsigned) {
+    return std::make_unique<CropUnit>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)), state);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

@@ -1,0 +1,74 @@
+#include <vrpipe/unit.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// DRAW at cycle fidelity. Warps go to the GPCs in turn.
+/// Ports: out_vertices_<gpc> (VertexWarp).
+class DrawUnit : public Unit {
+ public:
+  DrawUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<DrawBehaviour> behaviour, unsigned gpcs)
+      : Unit(name, domain), behaviour_(std::move(behaviour)) {
+    for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
+      outs_.push_back(std::make_unique<StreamOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
+    }
+    have_ = behaviour_->next(warp_);
+  }
+
+  bool idle() const override { return ended_ == outs_.size(); }
+  std::uint64_t work() const override { return issued_; }
+  double peak_rate() const override { return behaviour_->warps_per_1024_cycles() / 1024.0; }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  Cycle step(Cycle now) override {
+    if (idle()) {
+      enter(UnitState::starved, now);
+      return never;
+    }
+    const Cycle due = issued_ * 1024 / behaviour_->warps_per_1024_cycles();
+    if (have_ && now < due) {
+      enter(UnitState::latency, now);
+      return due;
+    }
+    StreamOut<VertexWarp>& out = *outs_[turn_];
+    if (out.credits() == 0) {
+      enter(UnitState::blocked, now);
+      return out.retry();
+    }
+    enter(UnitState::busy, now);
+    turn_ = (turn_ + 1) % outs_.size();
+    if (have_) {
+      out.push(warp_);
+      ++issued_;
+      have_ = behaviour_->next(warp_);
+    } else {
+      VertexWarp end;
+      end.end_of_draw = true;
+      out.push(end);
+      ++ended_;
+    }
+    return now + 1;
+  }
+
+  std::unique_ptr<DrawBehaviour> behaviour_;
+  std::vector<std::unique_ptr<StreamOut<VertexWarp>>> outs_;
+  VertexWarp warp_;
+  bool have_ = false;
+  std::size_t turn_ = 0;
+  std::size_t ended_ = 0;
+  std::uint64_t issued_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_unit_maker("draw", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                 const RenderState&, unsigned gpcs) {
+    return std::make_unique<DrawUnit>(name.c_str(), domain, behaviour_as<DrawBehaviour>(std::move(behaviour)), gpcs);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

@@ -1,0 +1,203 @@
+#include <algorithm>
+#include <queue>
+
+#include <vrpipe/unit.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// PROP at cycle fidelity. Ports: in_bins, out_test, in_tested, out_survivors (QuadBeat), in_shaded (ShadedWarpItem),
+/// out_release (WarpRelease), out_color (ColorBeat). Without any test enabled bins bypass ZROP.
+class PropUnit : public Unit {
+ public:
+  PropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
+           const RenderState& state)
+      : Unit(name, domain),
+        in_bins_(*this, "in_bins"),
+        out_test_(*this, "out_test"),
+        in_tested_(*this, "in_tested"),
+        out_survivors_(*this, "out_survivors"),
+        in_shaded_(*this, "in_shaded"),
+        out_release_(*this, "out_release"),
+        out_color_(*this, "out_color"),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()),
+        tests_(state.early_termination),
+        tiles_x_((state.draw->width + screen_tile_pixels - 1) / screen_tile_pixels) {
+    out_test_.set_pipeline(cost_.latency_cycles - 1, 1);
+    out_survivors_.set_pipeline(cost_.latency_cycles - 1, 1);
+    out_color_.set_pipeline(cost_.latency_cycles - 1, 1);
+    if (cost_.order == PropBehaviour::Order::tile) {
+      const std::uint32_t tiles_y = (state.draw->height + screen_tile_pixels - 1) / screen_tile_pixels;
+      next_of_tile_.assign(std::size_t{tiles_x_} * tiles_y, 0);
+    }
+  }
+
+  bool idle() const override {
+    return in_bins_.empty() && in_tested_.empty() && in_shaded_.empty() && current_ == nullptr && early_.empty() &&
+           in_turn_.empty() && end_ == nullptr;
+  }
+  std::uint64_t work() const override { return color_quads_; }
+  double peak_rate() const override { return cost_.color_quads_per_cycle; }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  struct LaterFirst {
+    bool operator()(const ShadedWarp* a, const ShadedWarp* b) const { return a->sequence > b->sequence; }
+  };
+  using BySequence = std::priority_queue<const ShadedWarp*, std::vector<const ShadedWarp*>, LaterFirst>;
+
+  std::uint32_t& next_of_tile(TileId tile) { return next_of_tile_[std::size_t{tile.y} * tiles_x_ + tile.x]; }
+
+  bool is_next(const ShadedWarp& warp) {
+    return cost_.order == PropBehaviour::Order::draw ? warp.sequence == next_sequence_
+                                                     : warp.tile_sequence == next_of_tile(warp.tile);
+  }
+
+  /// Moves beats, `quads_per_cycle` wide, from one port to the next.
+  bool forward(StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to) {
+    bool moved = false;
+    unsigned budget = cost_.quads_per_cycle;
+    while (from.ready() && to.credits() > 0) {
+      const QuadBeat& beat = from.front();
+      const unsigned width = std::max<unsigned>(beat.count, 1);
+      if (width > budget && budget < cost_.quads_per_cycle) break;
+      to.push(beat);
+      from.pop();
+      moved = true;
+      if (width >= budget) break;
+      budget -= width;
+    }
+    return moved;
+  }
+
+  bool collect() {
+    bool moved = false;
+    while (in_shaded_.ready()) {
+      const ShadedWarp* const warp = in_shaded_.front().warp;
+      in_shaded_.pop();
+      moved = true;
+      if (warp->end_of_draw) {
+        end_ = warp;
+      } else if (is_next(*warp)) {
+        in_turn_.push(warp);
+      } else {
+        early_.push_back(warp);
+      }
+    }
+    return moved;
+  }
+
+  /// After a warp has left: the one that follows it may be among those that came early.
+  void promote(const ShadedWarp& left) {
+    if (cost_.order == PropBehaviour::Order::tile) ++next_of_tile(left.tile);
+    ++next_sequence_;
+    for (std::size_t i = 0; i < early_.size(); ++i) {
+      if (!is_next(*early_[i])) continue;
+      in_turn_.push(early_[i]);
+      early_[i] = early_.back();
+      early_.pop_back();
+      break;
+    }
+  }
+
+  bool send_color() {
+    if (out_color_.credits() == 0) return false;
+    ColorBeat beat;
+    bool moved = false;
+    while (beat.count < cost_.color_quads_per_cycle) {
+      if (current_ == nullptr) {
+        if (in_turn_.empty()) break;
+        if (out_release_.credits() == 0) break;
+        current_ = in_turn_.top();
+        in_turn_.pop();
+        index_ = 0;
+      }
+      if (index_ < current_->count) {
+        ++current_->holders;
+        beat.quads[beat.count++] = {current_, index_++};
+      }
+      if (index_ == current_->count) {
+        const ShadedWarp* const left = current_;
+        current_ = nullptr;
+        promote(*left);
+        out_release_.push({left->slot});
+        --left->holders;
+        moved = true;
+        // A warp without survivors takes the cycle in which it is passed over.
+        if (left->count == 0) break;
+      }
+    }
+    if (beat.count > 0) {
+      color_quads_ += beat.count;
+      out_color_.push(beat);
+      return true;
+    }
+    if (!moved && end_ != nullptr && end_->sequence == next_sequence_ && out_release_.credits() > 0) {
+      beat.end_of_draw = true;
+      out_color_.push(beat);
+      out_release_.push({end_->slot});
+      --end_->holders;
+      end_ = nullptr;
+      next_sequence_ = 0;
+      std::fill(next_of_tile_.begin(), next_of_tile_.end(), 0);
+      return true;
+    }
+    return moved;
+  }
+
+  Cycle step(Cycle now) override {
+    bool moved = send_color();
+    moved = collect() || moved;
+    if (tests_) {
+      moved = forward(in_tested_, out_survivors_) || moved;
+      moved = forward(in_bins_, out_test_) || moved;
+    } else {
+      moved = forward(in_bins_, out_survivors_) || moved;
+    }
+    if (moved) {
+      enter(UnitState::busy, now);
+      return now + 1;
+    }
+    const bool has_work = current_ != nullptr || !in_turn_.empty() || in_bins_.ready() || in_tested_.ready();
+    enter(has_work ? UnitState::blocked : early_.empty() ? UnitState::starved : UnitState::latency, now);
+    Cycle next = std::min({out_color_.retry(), out_release_.retry(), out_test_.retry(), out_survivors_.retry()});
+    for (const Cycle ready : {in_bins_.next_ready(), in_tested_.next_ready(), in_shaded_.next_ready()}) {
+      if (ready > now) next = std::min(next, ready);
+    }
+    return next;
+  }
+
+  StreamIn<QuadBeat> in_bins_;
+  StreamOut<QuadBeat> out_test_;
+  StreamIn<QuadBeat> in_tested_;
+  StreamOut<QuadBeat> out_survivors_;
+  StreamIn<ShadedWarpItem> in_shaded_;
+  StreamOut<WarpRelease> out_release_;
+  StreamOut<ColorBeat> out_color_;
+  std::unique_ptr<PropBehaviour> behaviour_;
+  const PropBehaviour::Cost cost_;
+  const bool tests_;
+  const std::uint32_t tiles_x_;
+  std::vector<std::uint32_t> next_of_tile_;
+  std::uint32_t next_sequence_ = 0;
+  std::vector<const ShadedWarp*> early_;  ///< shaded before their turn
+  BySequence in_turn_;
+  const ShadedWarp* current_ = nullptr;  ///< being handed to CROP, from `index_` on
+  std::uint32_t index_ = 0;
+  const ShadedWarp* end_ = nullptr;
+  std::uint64_t color_quads_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_unit_maker("prop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                 const RenderState& state, unsigned) {
+    return std::make_unique<PropUnit>(name.c_str(), domain, behaviour_as<PropBehaviour>(std::move(behaviour)), state);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <vrpipe/parameter.h>
+#include <vrpipe/units.h>
+
+namespace vrpipe {
+
+/// Numbers warps in launch order of the draw and of their screen tile.
+class WarpNumbering {
+ public:
+  explicit WarpNumbering(const RenderState& state);
+  void number(Warp& warp);
+
+ private:
+  std::uint32_t tiles_x_;
+  std::uint32_t next_ = 0;
+  std::vector<std::uint32_t> next_of_tile_;
+};
+
+/// Quad reorder unit (paper 5.3): 64 position registers pair overlapping quads of a bin, a 128-bit bitmap tells which
+/// are left for the end. A register that holds a quad means a pair, and is then empty again.
+class PairingQru : public QruBehaviour {
+ public:
+  struct Parameters : ParameterSet {
+    Integer bin_quads{*this, "bin_quads", 128, 1, 4096, "quads", source::paper_table,
+                      "quads buffered; a larger bin is examined in parts"};
+    Integer quads_per_cycle{*this, "quads_per_cycle", 8, 1, 16, "quads", source::open,
+                            "examined in a cycle, a warp's worth; below 3 merging loses more than it gains"};
+    Integer latency_cycles{*this, "latency_cycles", 4, 1, 1000, "cycles", source::open,
+                           "from the quad that completes a warp to its launch"};
+  };
+  PairingQru(const Parameters& parameters, const RenderState& state);
+
+  unsigned examine(const QuadBeat& beat, unsigned from, Warp& out, bool& launched) override;
+  bool finish_bin(Warp& out) override;
+  Throughput cost() const override { return {quads_per_cycle_, latency_cycles_}; }
+  /// (4 B pointer + 6-bit position) x quads + 64 x 1 B register + bitmap (paper, table of hardware cost).
+  std::uint64_t storage_bytes() const override;
+
+  Counter warps{*this, "warps", "warps", "launched"};
+  Counter pairs{*this, "pairs", "pairs", "of overlapping quads marked for merging"};
+  Counter quads{*this, "quads", "quads", "examined"};
+
+ private:
+  static constexpr std::int16_t no_quad = -1;
+  bool launch_when_full(Warp& out);
+  void launch(Warp& out);
+
+  const std::uint32_t bin_quads_;
+  const std::uint32_t quads_per_cycle_;
+  const std::uint32_t latency_cycles_;
+  WarpNumbering numbering_;
+  std::vector<Quad> buffer_;        ///< by quad id
+  std::vector<bool> merged_;        ///< the bitmap
+  std::array<std::int16_t, positions_per_tile> registers_;
+  Warp warp_;                       ///< being filled
+  std::size_t left_ = 0;            ///< next quad id to look at for the left-over warps
+};
+
+/// The baseline: quads of a bin become warps in the order in which they come.
+class QruPassThrough : public QruBehaviour {
+ public:
+  struct Parameters : ParameterSet {};
+  QruPassThrough(const Parameters&, const RenderState& state);
+
+  unsigned examine(const QuadBeat& beat, unsigned from, Warp& out, bool& launched) override;
+  bool finish_bin(Warp& out) override;
+  Throughput cost() const override { return {QuadBeat::capacity, 1}; }
+  std::uint64_t storage_bytes() const override { return 0; }
+
+  Counter warps{*this, "warps", "warps", "launched"};
+  Counter quads{*this, "quads", "quads", "examined"};
+
+ private:
+  void launch(Warp& out);
+
+  WarpNumbering numbering_;
+  Warp warp_;
+};
+
+}  // namespace vrpipe

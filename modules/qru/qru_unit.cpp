@@ -1,0 +1,102 @@
+#include <vrpipe/unit.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// QRU at cycle fidelity: examines quads at its rate, launches at most one warp a cycle; one buffer, so the left-over
+/// warps of a bin go before the next bin. Ports: in_quads (QuadBeat), out_warps (Warp).
+class QruUnit : public Unit {
+ public:
+  QruUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour)
+      : Unit(name, domain),
+        in_(*this, "in_quads"),
+        out_(*this, "out_warps"),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()) {
+    out_.set_pipeline(cost_.latency_cycles - 1, 1);
+  }
+
+  bool idle() const override { return in_.empty(); }
+  std::uint64_t work() const override { return examined_; }
+  double peak_rate() const override { return cost_.items_per_cycle; }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  Cycle step(Cycle now) override {
+    unsigned budget = cost_.items_per_cycle;
+    bool moved = false;
+    bool blocked = false;
+    while (budget > 0 && in_.ready()) {
+      const QuadBeat& beat = in_.front();
+      if (out_.credits() == 0) {
+        blocked = true;
+        break;
+      }
+      Warp warp;
+      bool launched = false;
+      if (beat.end_of_draw) {
+        warp.end_of_draw = true;
+        warp.sequence = warps_;
+        warps_ = 0;
+        out_.push(warp);
+        in_.pop();
+        moved = true;
+        break;
+      }
+      if (from_ < beat.count) {
+        QuadBeat part = beat;
+        part.count = static_cast<std::uint8_t>(std::min<unsigned>(beat.count, from_ + budget));
+        const unsigned taken = behaviour_->examine(part, from_, warp, launched);
+        from_ += taken;
+        examined_ += taken;
+        budget -= taken;
+        moved = true;
+      } else if (beat.last_of_bin) {
+        launched = behaviour_->finish_bin(warp);
+        moved = moved || launched;
+        if (!launched) done_ = true;
+      } else {
+        done_ = true;
+      }
+      if (launched) {
+        out_.push(warp);
+        ++warps_;
+      }
+      if (done_ || (from_ == beat.count && !beat.last_of_bin)) {
+        in_.pop();
+        from_ = 0;
+        done_ = false;
+        moved = true;
+      }
+      if (launched) break;
+    }
+    if (moved) {
+      enter(UnitState::busy, now);
+      return now + 1;
+    }
+    enter(blocked ? UnitState::blocked : UnitState::starved, now);
+    return blocked ? out_.retry() : in_.next_ready();
+  }
+
+  StreamIn<QuadBeat> in_;
+  StreamOut<Warp> out_;
+  std::unique_ptr<QruBehaviour> behaviour_;
+  const Throughput cost_;
+  unsigned from_ = 0;
+  bool done_ = false;
+  std::uint32_t warps_ = 0;
+  std::uint64_t examined_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_unit_maker("qru", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                const RenderState&, unsigned) {
+    return std::make_unique<QruUnit>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)));
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

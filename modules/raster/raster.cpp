@@ -1,0 +1,210 @@
+#include "raster/raster.h"
+
+#include <algorithm>
+
+#include <vrpipe/error.h>
+#include <vrpipe/registry.h>
+
+namespace vrpipe {
+
+namespace {
+constexpr auto tile_side = static_cast<std::int32_t>(screen_tile_pixels);
+constexpr auto raster_side = static_cast<std::int32_t>(raster_tile_pixels);
+// Within a raster tile an edge function changes by at most 7 (|dx| + |dy|). Below this bound that is under 2^30, and a
+// value beyond +-2^30 at the tile's first sample keeps its sign over the tile: then 32 bits are exact after clamping.
+constexpr std::int64_t narrow_gradient = (std::int64_t{1} << 30) / 7;
+constexpr std::int64_t narrow_limit = std::int64_t{1} << 30;
+}  // namespace
+
+TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderState& state)
+    : state_(state),
+      cost_{parameters.setup_latency_cycles, parameters.setup_interval_cycles,       parameters.coarse_tiles_per_cycle,
+            parameters.fine_tiles_per_cycle, parameters.screen_tile_interval_cycles, parameters.quads_per_cycle} {}
+
+void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
+  ++setups;
+  primitive_ = primitive;
+  area_ = {std::max(primitive.bounds.x0, clip.x0), std::max(primitive.bounds.y0, clip.y0),
+           std::min(primitive.bounds.x1, clip.x1), std::min(primitive.bounds.y1, clip.y1)};
+  // A primitive covers nothing outside its bounds, so those need no masking.
+  const bool whole = clip.x0 <= primitive.bounds.x0 && clip.y0 <= primitive.bounds.y0 &&
+                     clip.x1 >= primitive.bounds.x1 && clip.y1 >= primitive.bounds.y1;
+  const auto width = static_cast<std::int32_t>(state_.draw->width);
+  const auto height = static_cast<std::int32_t>(state_.draw->height);
+  mask_area_ = {0, 0, width, height};
+  if (!whole) mask_area_ = {std::max(clip.x0, 0), std::max(clip.y0, 0), std::min(clip.x1, width), std::min(clip.y1, height)};
+  tile_x_begin_ = area_.x0 / tile_side;
+  tile_x_end_ = (area_.x1 - 1) / tile_side + 1;
+  tile_y_ = area_.y0 / tile_side;
+  tile_y_end_ = area_.empty() ? tile_y_ : (area_.y1 - 1) / tile_side + 1;
+  tile_x_ = tile_x_begin_;
+  part_ = 0;
+  tile_counted_ = false;
+
+  SnappedTriangle t;
+  if (!snap_triangle(state_, primitive.splat, primitive.triangle, t)) {
+    throw SimulationFault("raster", 0, "primitive of splat " + std::to_string(primitive.splat) + " has no vertices");
+  }
+  if (doubled_area(t) < 0) {
+    std::swap(t.x[1], t.x[2]);
+    std::swap(t.y[1], t.y[2]);
+  }
+  const std::int64_t step = std::int64_t{1} << state_.subpixel_bits;
+  const std::int64_t half = step / 2;
+  wide_ = false;
+  for (unsigned i = 0; i < 3; ++i) {
+    const unsigned j = (i + 1) % 3;
+    // Positive inside, y down: E(x, y) = (xj - xi)(y - yi) - (yj - yi)(x - xi).
+    const std::int64_t across = std::int64_t{t.x[j]} - t.x[i];
+    const std::int64_t down = std::int64_t{t.y[j]} - t.y[i];
+    Edge& edge = edges_[i];
+    edge.dx = -down * step;
+    edge.dy = across * step;
+    // A sample on an edge belongs to the triangle if the edge is a top edge (horizontal, inside below it) or a left
+    // edge (inside to its right); on any other edge it does not, which one less says in integers.
+    const bool top_left = (down == 0 && across > 0) || down < 0;
+    edge.origin = across * (half - t.y[i]) - down * (half - t.x[i]) - (top_left ? 0 : 1);
+    if (std::abs(edge.dx) + std::abs(edge.dy) > narrow_gradient) wide_ = true;
+  }
+  if (wide_) ++wide_edges;
+}
+
+bool TileRasterizer::advance() {
+  if (++part_ < 4) return true;
+  part_ = 0;
+  tile_counted_ = false;
+  if (++tile_x_ == tile_x_end_) {
+    tile_x_ = tile_x_begin_;
+    ++tile_y_;
+  }
+  return tile_y_ < tile_y_end_;
+}
+
+bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) {
+  coarse_tests = 0;
+  for (; tile_y_ < tile_y_end_; advance()) {
+    const std::int32_t x = tile_x_ * tile_side + static_cast<std::int32_t>(part_ & 1U) * raster_side;
+    const std::int32_t y = tile_y_ * tile_side + static_cast<std::int32_t>(part_ >> 1U) * raster_side;
+    if (x >= area_.x1 || y >= area_.y1 || x + raster_side <= area_.x0 || y + raster_side <= area_.y0) continue;
+    const TileId tile{static_cast<std::uint16_t>(tile_x_), static_cast<std::uint16_t>(tile_y_)};
+    if (state_.gpcs > 1 && owner_of(tile, state_.gpcs) != state_.gpc) continue;
+    ++coarse_tests;
+    std::int64_t value[3];
+    bool rejected = false;
+    for (unsigned i = 0; i < 3; ++i) {
+      const Edge& edge = edges_[i];
+      value[i] = edge.origin + edge.dx * x + edge.dy * y;
+      // The largest value over the tile's samples is at the corner to which the gradient points.
+      const std::int64_t most = value[i] + 7 * (std::max<std::int64_t>(edge.dx, 0) + std::max<std::int64_t>(edge.dy, 0));
+      rejected = rejected || most < 0;
+    }
+    if (rejected) continue;
+
+    out.tile = tile;
+    out.count = 0;
+    out.last_of_bin = false;
+    out.end_of_draw = false;
+    const unsigned fragments = wide_ ? fill_wide(out, x, y, value) : fill_narrow(out, x, y, value);
+    quads_rasterized += out.count;
+    fragments_rasterized += fragments;
+    raster_tiles_tested += coarse_tests;
+    ++raster_tiles_kept;
+    new_screen_tile = !tile_counted_;
+    if (new_screen_tile) ++screen_tile_pairs;
+    tile_counted_ = true;
+    advance();
+    return true;
+  }
+  raster_tiles_tested += coarse_tests;
+  return false;
+}
+
+LaneMask TileRasterizer::in_area(std::int32_t x, std::int32_t y) const {
+  unsigned mask = all_lanes;
+  if (x < mask_area_.x0) mask &= x + 1 < mask_area_.x0 ? 0U : 0b1010U;
+  if (x + 1 >= mask_area_.x1) mask &= x >= mask_area_.x1 ? 0U : 0b0101U;
+  if (y < mask_area_.y0) mask &= y + 1 < mask_area_.y0 ? 0U : 0b1100U;
+  if (y + 1 >= mask_area_.y1) mask &= y >= mask_area_.y1 ? 0U : 0b0011U;
+  return static_cast<LaneMask>(mask);
+}
+
+unsigned TileRasterizer::fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]) {
+  LaneBits at[3];
+  LaneBits right[3];
+  LaneBits down[3];
+  for (unsigned i = 0; i < 3; ++i) {
+    const auto start = static_cast<std::int32_t>(std::clamp(value[i], -narrow_limit, narrow_limit));
+    const auto dx = static_cast<std::int32_t>(edges_[i].dx);
+    const auto dy = static_cast<std::int32_t>(edges_[i].dy);
+    at[i] = LaneBits{start, start + dx, start + dy, start + dx + dy};
+    right[i] = LaneBits{2 * dx, 2 * dx, 2 * dx, 2 * dx};
+    down[i] = LaneBits{2 * dy, 2 * dy, 2 * dy, 2 * dy};
+  }
+  const bool inside_area = x >= mask_area_.x0 && y >= mask_area_.y0 && x + raster_side <= mask_area_.x1 &&
+                           y + raster_side <= mask_area_.y1;
+  const unsigned first = static_cast<unsigned>((y % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) +
+                                               (x % tile_side) / 2);
+  unsigned fragments = 0;
+  unsigned count = 0;
+  for (unsigned row = 0; row < 4; ++row) {
+    LaneBits a = at[0];
+    LaneBits b = at[1];
+    LaneBits c = at[2];
+    for (unsigned column = 0; column < 4; ++column) {
+      auto mask = static_cast<LaneMask>(sign_mask(a | b | c) ^ all_lanes);
+      if (!inside_area) {
+        mask = static_cast<LaneMask>(mask & in_area(x + static_cast<std::int32_t>(2 * column),
+                                                    y + static_cast<std::int32_t>(2 * row)));
+      }
+      // Written always, kept only if covered: the branch would be mispredicted too often.
+      Quad& quad = out.quads[count];
+      quad.splat = primitive_.splat;
+      quad.position = static_cast<std::uint8_t>(first + row * quads_per_tile_row + column);
+      quad.coverage = mask;
+      quad.triangle = primitive_.triangle;
+      quad.reserved = 0;
+      count += mask != 0 ? 1U : 0U;
+      fragments += popcount(mask);
+      a += right[0];
+      b += right[1];
+      c += right[2];
+    }
+    for (unsigned i = 0; i < 3; ++i) at[i] += down[i];
+  }
+  out.count = static_cast<std::uint8_t>(count);
+  return fragments;
+}
+
+unsigned TileRasterizer::fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]) {
+  unsigned fragments = 0;
+  for (std::int32_t row = 0; row < raster_side; row += 2) {
+    for (std::int32_t column = 0; column < raster_side; column += 2) {
+      unsigned mask = 0;
+      for (std::int32_t lane = 0; lane < 4; ++lane) {
+        const std::int32_t dx = column + (lane & 1);
+        const std::int32_t dy = row + (lane >> 1);
+        bool inside = true;
+        for (unsigned i = 0; i < 3; ++i) inside = inside && value[i] + edges_[i].dx * dx + edges_[i].dy * dy >= 0;
+        mask |= (inside ? 1U : 0U) << lane;
+      }
+      mask &= in_area(x + column, y + row);
+      if (mask == 0) continue;
+      Quad& quad = out.quads[out.count++];
+      quad.splat = primitive_.splat;
+      quad.position = static_cast<std::uint8_t>(((y + row) % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) +
+                                                ((x + column) % tile_side) / 2);
+      quad.coverage = static_cast<LaneMask>(mask);
+      quad.triangle = primitive_.triangle;
+      quad.reserved = 0;
+      fragments += popcount(quad.coverage);
+    }
+  }
+  return fragments;
+}
+
+namespace {
+const Registrar<TileRasterizer, RasterBehaviour> registrar("raster", "tile-rasterizer",
+                                                           "fixed-point edge functions, 8x8 raster tiles, top-left rule");
+}
+
+}  // namespace vrpipe

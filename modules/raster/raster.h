@@ -1,0 +1,70 @@
+#pragma once
+
+#include <vrpipe/geometry.h>
+#include <vrpipe/parameter.h>
+#include <vrpipe/units.h>
+
+namespace vrpipe {
+
+/// Setup, coarse and fine rasterisation (paper 5.1): fixed point, samples at pixel centres, top-left rule, so that the
+/// two triangles of a splat never share a sample. Screen tiles row by row, raster tiles row by row within.
+class TileRasterizer : public RasterBehaviour {
+ public:
+  struct Parameters : ParameterSet {
+    Integer setup_latency_cycles{*this, "setup_latency_cycles", 10, 1, 1000, "cycles", "ATTILA, Emerald: set-up latency 10",
+                                 "of setting up a primitive's edge functions"};
+    Integer setup_interval_cycles{*this, "setup_interval_cycles", 1, 1, 1000, "cycles", source::open,
+                                  "between primitives; taken as latency the 8 to 10 cycles of set-up cost nothing"};
+    Integer coarse_tiles_per_cycle{*this, "coarse_tiles_per_cycle", 8, 1, 1024, "raster tiles",
+                                   "ATTILA: 16x16 scan tiles, two a cycle",
+                                   "raster tiles tested against the edges in a cycle"};
+    Integer fine_tiles_per_cycle{*this, "fine_tiles_per_cycle", 2, 1, 64, "raster tiles",
+                                 "Emerald: 2 fine tiles a cycle and cluster",
+                                 "raster tiles made into quads in a cycle"};
+    Integer screen_tile_interval_cycles{*this, "screen_tile_interval_cycles", 1, 1, 1000, "cycles",
+                                        "measured on a GH100 graphics GPC: 5.5 cycles with 2 TPCs, scaled to 8",
+                                        "between (primitive, screen tile) pairs"};
+    Integer quads_per_cycle{*this, "quads_per_cycle", 16, 1, 16, "quads",
+                            "measured on a GH100 graphics GPC: 64 pixels a cycle", "quads handed to TC in a cycle"};
+  };
+  TileRasterizer(const Parameters& parameters, const RenderState& state);
+
+  void begin(const Primitive& primitive, const PixelRect& clip) override;
+  bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override;
+  Cost cost() const override { return cost_; }
+
+  Counter quads_rasterized{*this, "quads_rasterized", "quads", "with at least one covered sample"};
+  Counter fragments_rasterized{*this, "fragments_rasterized", "fragments", "covered samples"};
+  Counter setups{*this, "setups", "primitives", "set up; again for each flush that a primitive is in"};
+  Counter raster_tiles_tested{*this, "raster_tiles_tested", "raster tiles", "by coarse rasterisation"};
+  Counter raster_tiles_kept{*this, "raster_tiles_kept", "raster tiles", "handed to fine rasterisation"};
+  Counter screen_tile_pairs{*this, "screen_tile_pairs", "pairs", "of a primitive and a screen tile that it may cover"};
+  Counter wide_edges{*this, "wide_edges", "primitives", "that need 64-bit edge functions inside a raster tile"};
+
+ private:
+  struct Edge {
+    std::int64_t dx, dy;   ///< change of the edge function a pixel to the right and down
+    std::int64_t origin;   ///< at the sample of pixel (0, 0), top-left rule included
+  };
+  unsigned fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]);
+  unsigned fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]);
+  LaneMask in_area(std::int32_t x, std::int32_t y) const;
+  bool advance();
+
+  const RenderState& state_;
+  Cost cost_;
+  Edge edges_[3];
+  bool wide_ = false;
+  Primitive primitive_;
+  PixelRect area_;             ///< bounds of the primitive within the clip
+  PixelRect mask_area_;        ///< outside which samples are masked off
+  std::int32_t tile_x_ = 0;    ///< screen tile, in tiles
+  std::int32_t tile_y_ = 0;
+  std::int32_t tile_x_begin_ = 0;
+  std::int32_t tile_x_end_ = 0;
+  std::int32_t tile_y_end_ = 0;
+  unsigned part_ = 0;          ///< raster tile in the screen tile, 0 to 3
+  bool tile_counted_ = false;
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,142 @@
+#include <vrpipe/unit.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// RASTER at cycle fidelity: set-up, coarse tests and fine tiles at their rates, quads to TC as they come out.
+/// Ports: in_jobs (RasterJob), out_quads (QuadBeat).
+class RasterUnit : public Unit {
+ public:
+  RasterUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour)
+      : Unit(name, domain),
+        in_(*this, "in_jobs"),
+        out_(*this, "out_quads"),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()) {
+    out_.set_pipeline(cost_.setup_latency_cycles - 1, cost_.fine_tiles_per_cycle);
+  }
+
+  bool idle() const override { return in_.empty() && !active_ && at_ == tile_.count; }
+  std::uint64_t work() const override { return quads_; }
+  double peak_rate() const override { return cost_.quads_per_cycle; }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  /// Sends quads of the tile in hand, as many as the cycle has room for. False when the receiver takes none.
+  bool send(unsigned& quad_budget) {
+    while (at_ < tile_.count && quad_budget > 0) {
+      if (out_.credits() == 0) return false;
+      if (at_ == 0 && tile_.count <= quad_budget) {
+        out_.push(tile_);
+        quads_ += tile_.count;
+        quad_budget -= tile_.count;
+        at_ = tile_.count;
+        break;
+      }
+      QuadBeat beat;
+      beat.tile = tile_.tile;
+      while (at_ < tile_.count && quad_budget > 0) {
+        beat.quads[beat.count++] = tile_.quads[at_++];
+        --quad_budget;
+      }
+      out_.push(beat);
+      quads_ += beat.count;
+    }
+    return true;
+  }
+
+  Cycle step(Cycle now) override {
+    unsigned quad_budget = cost_.quads_per_cycle;
+    unsigned fine_budget = cost_.fine_tiles_per_cycle;
+    unsigned coarse_budget = cost_.coarse_tiles_per_cycle;
+    bool moved = false;
+    while (true) {
+      if (coarse_debt_ > 0) {
+        const unsigned paid = std::min(coarse_debt_, coarse_budget);
+        coarse_debt_ -= paid;
+        coarse_budget -= paid;
+        moved = moved || paid > 0;
+        if (coarse_debt_ > 0) break;
+      }
+      if (at_ < tile_.count) {
+        if (now < tile_due_) break;
+        const unsigned before = quad_budget;
+        const bool taken = send(quad_budget);
+        moved = moved || quad_budget != before;
+        if (!taken && !moved) {
+          enter(UnitState::blocked, now);
+          return out_.retry();
+        }
+        if (at_ < tile_.count) break;
+      }
+      if (fine_budget == 0) break;
+      if (!active_) {
+        if (!in_.ready()) {
+          if (moved) break;
+          enter(UnitState::starved, now);
+          return in_.next_ready();
+        }
+        if (in_.front().end_of_draw) {
+          if (out_.credits() == 0) {
+            if (moved) break;
+            enter(UnitState::blocked, now);
+            return out_.retry();
+          }
+          QuadBeat end;
+          end.end_of_draw = true;
+          out_.push(end);
+          in_.pop();
+          moved = true;
+          break;
+        }
+        if (now < next_setup_) break;
+        behaviour_->begin(in_.front().primitive, in_.front().clip);
+        in_.pop();
+        next_setup_ = now + cost_.setup_interval_cycles;
+        active_ = true;
+        moved = true;
+      }
+      unsigned tests = 0;
+      bool new_screen_tile = false;
+      active_ = behaviour_->next(tile_, tests, new_screen_tile);
+      coarse_debt_ += tests;
+      at_ = active_ ? 0U : tile_.count;
+      if (active_) {
+        --fine_budget;
+        if (new_screen_tile) {
+          tile_due_ = std::max(now, next_pair_);
+          next_pair_ = tile_due_ + cost_.screen_tile_interval_cycles;
+        }
+      }
+      moved = true;
+    }
+    enter(moved ? UnitState::busy : UnitState::latency, now);
+    return now + 1;
+  }
+
+  StreamIn<RasterJob> in_;
+  StreamOut<QuadBeat> out_;
+  std::unique_ptr<RasterBehaviour> behaviour_;
+  const RasterBehaviour::Cost cost_;
+  bool active_ = false;
+  QuadBeat tile_;             ///< quads of the raster tile in hand, sent up to `at_`
+  unsigned at_ = 0;
+  unsigned coarse_debt_ = 0;  ///< raster tiles tested ahead of the coarse rasteriser's rate
+  Cycle tile_due_ = 0;
+  Cycle next_pair_ = 0;
+  Cycle next_setup_ = 0;
+  std::uint64_t quads_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_unit_maker("raster", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                   const RenderState&, unsigned) {
+    return std::make_unique<RasterUnit>(name.c_str(), domain, behaviour_as<RasterBehaviour>(std::move(behaviour)));
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

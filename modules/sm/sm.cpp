@@ -1,0 +1,119 @@
+#include "sm/sm.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <vrpipe/exp2.h>
+#include <vrpipe/registry.h>
+
+namespace vrpipe {
+
+namespace {
+constexpr float alpha_max = 0.99F;
+constexpr float half_log2_e = 0.72134752F;
+}  // namespace
+
+SplatShader::SplatShader(const Parameters& parameters, const RenderState& state) : state_(state) {
+  cost_.cores = parameters.cores;
+  cost_.schedulers_per_core = parameters.schedulers_per_core;
+  cost_.lanes_per_scheduler = parameters.lanes_per_scheduler;
+  cost_.warps_per_core = parameters.warps_per_core;
+  cost_.vertex_warps = parameters.vertex_warps;
+  cost_.warps_to_one_core = parameters.warps_to_one_core;
+  // The first instructions compute addresses and load; the rest waits for the attributes.
+  const auto program = [&](std::uint32_t instructions, std::uint32_t latency) {
+    const std::uint32_t loads = std::min(instructions, 4U);
+    return std::vector<ShaderSegment>{{loads, parameters.attribute_latency_cycles}, {instructions - loads, latency}};
+  };
+  cost_.vertex = program(parameters.vertex_instructions, parameters.fragment_latency_cycles);
+  cost_.fragment = program(parameters.fragment_instructions, parameters.fragment_latency_cycles);
+  cost_.merge = {{parameters.merge_instructions, parameters.merge_latency_cycles}};
+}
+
+void SplatShader::load(std::uint32_t index) {
+  loaded_ = index;
+  const Splat& splat = state_.draw->splats[index];
+  const float determinant = splat.ax * splat.by - splat.ay * splat.bx;
+  // A splat without extent has alpha = opacity wherever it is rasterised at all.
+  const float scale = determinant != 0.0F ? splat.r / determinant : 0.0F;
+  const float largest = std::max({splat.red, splat.green, splat.blue});
+  if (largest > half_max) ++colors_clamped;
+  attributes_ = {splat.cx,
+                 splat.cy,
+                 splat.by * scale,
+                 -splat.bx * scale,
+                 -splat.ay * scale,
+                 splat.ax * scale,
+                 splat.opacity,
+                 std::min(splat.red, half_max),
+                 std::min(splat.green, half_max),
+                 std::min(splat.blue, half_max)};
+}
+
+LaneMask SplatShader::shade_quad(TileId tile, const Quad& quad, QuadColor& out) {
+  if (quad.splat != loaded_) load(quad.splat);
+  const Attributes& splat = attributes_;
+  const auto x = static_cast<float>(tile.x * screen_tile_pixels + (quad.position % quads_per_tile_row) * 2);
+  const auto y = static_cast<float>(tile.y * screen_tile_pixels + (quad.position / quads_per_tile_row) * 2);
+  const Lanes dx = Lanes{x + 0.5F, x + 1.5F, x + 0.5F, x + 1.5F} - splat.cx;
+  const Lanes dy = Lanes{y + 0.5F, y + 0.5F, y + 1.5F, y + 1.5F} - splat.cy;
+  const Lanes u = dx * splat.m00 + dy * splat.m01;
+  const Lanes v = dx * splat.m10 + dy * splat.m11;
+  const Lanes squared = u * u + v * v;
+  Lanes alpha = exp2_nonpositive(squared * -half_log2_e) * splat.opacity;
+  alpha = select(alpha < alpha_max, alpha, splat_lanes(alpha_max));
+  const LaneBits kept = (alpha >= state_.pruning_threshold) & expand_mask(quad.coverage);
+  alpha = lanes_of(bits_of(alpha) & kept);
+  out = {alpha * splat.red, alpha * splat.green, alpha * splat.blue, alpha};
+  return sign_mask(kept);
+}
+
+void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
+  out.tile = warp.tile;
+  out.sequence = warp.sequence;
+  out.tile_sequence = warp.tile_sequence;
+  out.end_of_draw = false;
+  ++fragment_warps;
+  quads_shaded += warp.count;
+  unsigned count = 0;
+  unsigned shaded = 0;
+  unsigned pruned = 0;
+  bool previous_lives = false;
+  for (unsigned i = 0; i < warp.count; ++i) {
+    const Quad& quad = warp.quads[i];
+    QuadColor& color = out.color[count];
+    const LaneMask live = shade_quad(warp.tile, quad, color);
+    shaded += popcount(quad.coverage);
+    pruned += popcount(static_cast<LaneMask>(quad.coverage & ~live));
+    const bool back_of_pair = (i & 1U) != 0 && ((warp.merge_pairs >> (i / 2)) & 1U) != 0;
+    if (live == 0) {
+      ++quads_pruned;
+    } else if (back_of_pair && previous_lives) {
+      LaneMask& front = out.live[count - 1];
+      out.color[count - 1] = blend_front_to_back(out.color[count - 1], color);
+      fragments_merged += popcount(static_cast<LaneMask>(front & live));
+      front = static_cast<LaneMask>(front | live);
+      out.last_primitive[count - 1] = primitive_order(quad);
+      ++quads_merged;
+    } else {
+      out.position[count] = quad.position;
+      out.live[count] = live;
+      out.first_primitive[count] = primitive_order(quad);
+      out.last_primitive[count] = primitive_order(quad);
+      ++count;
+    }
+    previous_lives = live != 0;
+  }
+  fragments_shaded += shaded;
+  fragments_pruned += pruned;
+  out.count = static_cast<std::uint8_t>(count);
+}
+
+void SplatShader::shade_vertices(const VertexWarp&) { ++vertex_warps; }
+
+namespace {
+const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
+                                                    "Gaussian splatting shaders with alpha pruning and quad merging");
+}
+
+}  // namespace vrpipe

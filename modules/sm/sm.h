@@ -1,0 +1,74 @@
+#pragma once
+
+#include <vrpipe/parameter.h>
+#include <vrpipe/units.h>
+
+namespace vrpipe {
+
+/// The SM array of a GPC: the splatting shaders and the merge extension (paper 2.2, 5.3).
+///
+/// Fragment shader: u, v are the sample's coordinates along the splat's axes in sigmas, from the pixel centre;
+/// alpha = min(0.99, opacity * 2^(-log2(e)/2 (u^2 + v^2))); alpha below the pruning threshold is discarded; the output
+/// is (alpha r, alpha g, alpha b, alpha) in single precision. Merging: f_fb of the pair, dead lanes being (0,0,0,0).
+class SplatShader : public SmBehaviour {
+ public:
+  struct Parameters : ParameterSet {
+    Integer cores{*this, "cores", 16, 1, 1024, "cores", source::paper_table, "SIMT cores of the GPC"};
+    Integer schedulers_per_core{*this, "schedulers_per_core", 4, 1, 64, "schedulers", source::paper_table,
+                                "warp schedulers"};
+    Integer lanes_per_scheduler{*this, "lanes_per_scheduler", 16, 1, 32, "lanes", source::paper_table,
+                                "a warp instruction issues for 32 / lanes cycles"};
+    Integer warps_per_core{*this, "warps_per_core", 48, 1, 256, "warps", "Accel-Sim, SM87_ORIN: 48 warps",
+                           "fragment warps in flight"};
+    Integer vertex_warps{*this, "vertex_warps", 32, 1, 1024, "warps", source::open,
+                         "vertex warps in flight in the array, kept apart so that the pipeline cannot lock"};
+    Integer warps_to_one_core{*this, "warps_to_one_core", 8, 1, 256, "warps",
+                              "measured on a GH100 graphics GPC: 64 quads to one SM, SMs in turn",
+                              "consecutive warps of a screen tile that go to the same core"};
+    Integer vertex_instructions{*this, "vertex_instructions", 20, 1, 1000, "instructions", source::open,
+                                "of the vertex shader: centre plus two semi-axes"};
+    Integer fragment_instructions{*this, "fragment_instructions", 24, 1, 1000, "instructions", source::open,
+                                  "of the fragment shader: attributes, dot product, ex2, prune, export"};
+    Integer merge_instructions{*this, "merge_instructions", 13, 1, 1000, "instructions", source::open,
+                               "issue slots of a merge: 4 shuffles of two slots, 1 subtraction, 4 multiply-adds"};
+    Integer attribute_latency_cycles{*this, "attribute_latency_cycles", 146, 0, 10000, "cycles",
+                                     "Accel-Sim, SM87_ORIN: L2 latency", "of fetching attributes from L2"};
+    Integer fragment_latency_cycles{*this, "fragment_latency_cycles", 75, 0, 10000, "cycles",
+                                    "Accel-Sim, SM87_ORIN: 4 cycles an instruction, 23 a special function",
+                                    "of the dependent instructions beyond their issue slots"};
+    Integer merge_latency_cycles{*this, "merge_latency_cycles", 30, 0, 10000, "cycles", source::open,
+                                 "of shuffle and partial blend beyond their issue slots"};
+  };
+  SplatShader(const Parameters& parameters, const RenderState& state);
+
+  void shade(const Warp& warp, ShadedWarp& out) override;
+  void shade_vertices(const VertexWarp& warp) override;
+  Cost cost() const override { return cost_; }
+
+  Counter quads_shaded{*this, "quads_shaded", "quads", "launched in fragment warps"};
+  Counter fragments_shaded{*this, "fragments_shaded", "fragments", "live samples launched"};
+  Counter quads_pruned{*this, "quads_pruned", "quads", "that lost their last fragment to alpha pruning"};
+  Counter fragments_pruned{*this, "fragments_pruned", "fragments", "with alpha below the threshold"};
+  Counter quads_merged{*this, "quads_merged", "quads", "taken away by merging, one a pair with two live quads"};
+  Counter fragments_merged{*this, "fragments_merged", "fragments", "taken away by merging, where both are live"};
+  Counter fragment_warps{*this, "fragment_warps", "warps", "of fragments"};
+  Counter vertex_warps{*this, "vertex_warps", "warps", "of vertices"};
+  Counter colors_clamped{*this, "colors_clamped", "splats", "set-ups of a splat with a colour beyond the largest half"};
+
+ private:
+  /// What the fragment shader needs of a splat.
+  struct Attributes {
+    float cx, cy;
+    float m00, m01, m10, m11;  ///< pixels to sigmas along the two axes
+    float opacity, red, green, blue;
+  };
+  void load(std::uint32_t splat);
+  LaneMask shade_quad(TileId tile, const Quad& quad, QuadColor& out);
+
+  const RenderState& state_;
+  Cost cost_;
+  Attributes attributes_{};
+  std::uint32_t loaded_ = ~0U;
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,87 @@
+#include "tc/tc.h"
+
+#include <algorithm>
+
+#include <vrpipe/registry.h>
+
+namespace vrpipe {
+
+namespace {
+std::uint32_t tiles(std::uint32_t pixels) { return (pixels + screen_tile_pixels - 1) / screen_tile_pixels; }
+}  // namespace
+
+TileCoalescing::TileCoalescing(const Parameters& parameters, const RenderState& state)
+    : bin_quads_(parameters.bin_quads),
+      tiles_x_(tiles(state.draw->width)),
+      // A time-out would make the contents of bins depend on time, which strict termination excludes.
+      cost_{parameters.quads_per_cycle, parameters.latency_cycles,
+            state.termination == Termination::strict ? 0U : std::uint32_t{parameters.idle_timeout_cycles},
+            parameters.flush_queue_bins},
+      bins_(parameters.bins),
+      bin_of_tile_(std::size_t{tiles_x_} * tiles(state.draw->height), -1) {
+  for (auto bin = static_cast<std::uint32_t>(bins_.size()); bin-- > 0;) {
+    bins_[bin].quads.reserve(bin_quads_);
+    free_.push_back(bin);
+  }
+}
+
+void TileCoalescing::flush_bin(std::uint32_t index, FlushReason reason, Flush& out) {
+  Bin& bin = bins_[index];
+  out.tile = bin.tile;
+  out.reason = reason;
+  out.quads.clear();
+  std::swap(out.quads, bin.quads);
+  bin.quads.reserve(bin_quads_);
+  bin_of_tile_[index_of(bin.tile)] = -1;
+  free_.push_back(index);
+  ++flushes;
+  switch (reason) {
+    case FlushReason::full: ++flushes_full; break;
+    case FlushReason::evicted: ++flushes_evicted; break;
+    case FlushReason::timed_out: ++flushes_timed_out; break;
+    case FlushReason::end_of_draw: ++flushes_end_of_draw; break;
+  }
+}
+
+unsigned TileCoalescing::insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) {
+  flushed = false;
+  if (from == beat.count) return 0;
+  std::int32_t index = bin_of_tile_[index_of(beat.tile)];
+  if (index < 0) {
+    if (free_.empty()) {
+      flushed = flush_oldest(FlushReason::evicted, out);
+      return 0;
+    }
+    index = static_cast<std::int32_t>(free_.back());
+    free_.pop_back();
+    bins_[static_cast<std::size_t>(index)].tile = beat.tile;
+    bin_of_tile_[index_of(beat.tile)] = index;
+    allocation_order_.push_back(static_cast<std::uint32_t>(index));
+  }
+  Bin& bin = bins_[static_cast<std::size_t>(index)];
+  const unsigned room = bin_quads_ - static_cast<unsigned>(bin.quads.size());
+  const unsigned taken = std::min(room, beat.count - from);
+  bin.quads.insert(bin.quads.end(), beat.quads.begin() + from, beat.quads.begin() + from + taken);
+  quads += taken;
+  if (bin.quads.size() == bin_quads_) {
+    allocation_order_.erase(
+        std::find(allocation_order_.begin(), allocation_order_.end(), static_cast<std::uint32_t>(index)));
+    flush_bin(static_cast<std::uint32_t>(index), FlushReason::full, out);
+    flushed = true;
+  }
+  return taken;
+}
+
+bool TileCoalescing::flush_oldest(FlushReason reason, Flush& out) {
+  if (allocation_order_.empty()) return false;
+  const std::uint32_t oldest = allocation_order_.front();
+  allocation_order_.pop_front();
+  flush_bin(oldest, reason, out);
+  return true;
+}
+
+namespace {
+const Registrar<TileCoalescing, TcBehaviour> registrar("tc", "tile-coalescing", "bins of quads, one per screen tile");
+}
+
+}  // namespace vrpipe

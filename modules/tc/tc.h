@@ -1,0 +1,55 @@
+#pragma once
+
+#include <deque>
+
+#include <vrpipe/parameter.h>
+#include <vrpipe/units.h>
+
+namespace vrpipe {
+
+/// Tile coalescing (paper 5.1, 7.1): bins of quads, a bin per screen tile, replaced first in, first out.
+class TileCoalescing : public TcBehaviour {
+ public:
+  struct Parameters : ParameterSet {
+    Integer bins{*this, "bins", 32, 1, 65536, "bins", source::paper_table, "screen tiles collected at a time"};
+    Integer bin_quads{*this, "bin_quads", 128, 1, 4096, "quads", source::paper_table, "quads in a full bin"};
+    Integer quads_per_cycle{*this, "quads_per_cycle", 16, 1, 16, "quads", source::open,
+                            "quads taken into bins in a cycle; the rasteriser's peak"};
+    Integer latency_cycles{*this, "latency_cycles", 4, 1, 1000, "cycles", source::open,
+                           "from the flush decision to the first quad at PROP"};
+    Integer idle_timeout_cycles{*this, "idle_timeout_cycles", 150, 0, 1000000, "cycles", source::measured,
+                                "without an incoming quad until bins are flushed; 0 never; not in strict termination"};
+    Integer flush_queue_bins{*this, "flush_queue_bins", 2, 1, 1024, "bins", source::open,
+                             "flushed bins that wait for PROP before TC stops"};
+  };
+  TileCoalescing(const Parameters& parameters, const RenderState& state);
+
+  unsigned insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) override;
+  bool flush_oldest(FlushReason reason, Flush& out) override;
+  Cost cost() const override { return cost_; }
+
+  Counter quads{*this, "quads", "quads", "taken into bins"};
+  Counter flushes{*this, "flushes", "flushes", "bins handed to PROP"};
+  Counter flushes_full{*this, "flushes_full", "flushes", "because the bin was full"};
+  Counter flushes_evicted{*this, "flushes_evicted", "flushes", "because another tile needed the bin"};
+  Counter flushes_timed_out{*this, "flushes_timed_out", "flushes", "because no quad came for the time-out"};
+  Counter flushes_end_of_draw{*this, "flushes_end_of_draw", "flushes", "at the end of the draw"};
+
+ private:
+  struct Bin {
+    TileId tile;
+    std::vector<Quad> quads;
+  };
+  std::size_t index_of(TileId tile) const { return std::size_t{tile.y} * tiles_x_ + tile.x; }
+  void flush_bin(std::uint32_t bin, FlushReason reason, Flush& out);
+
+  const std::uint32_t bin_quads_;
+  const std::uint32_t tiles_x_;
+  const Cost cost_;
+  std::vector<Bin> bins_;
+  std::vector<std::uint32_t> free_;
+  std::deque<std::uint32_t> allocation_order_;
+  std::vector<std::int32_t> bin_of_tile_;  ///< -1: none
+};
+
+}  // namespace vrpipe

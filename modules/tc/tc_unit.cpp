@@ -1,0 +1,157 @@
+#include <deque>
+
+#include <vrpipe/unit.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// TC at cycle fidelity: takes quads at its rate, hands flushed bins to PROP at the same rate.
+/// Ports: in_quads (QuadBeat), out_bins (QuadBeat).
+class TcUnit : public Unit {
+ public:
+  TcUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour)
+      : Unit(name, domain),
+        in_(*this, "in_quads"),
+        out_(*this, "out_bins"),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()),
+        queue_(cost_.flush_queue_bins) {
+    out_.set_pipeline(cost_.latency_cycles - 1, 1);
+  }
+
+  bool idle() const override { return in_.empty() && queued_ == 0 && !ending_ && !holds_quads_; }
+  std::uint64_t work() const override { return taken_; }
+  double peak_rate() const override { return cost_.quads_per_cycle; }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  using Flush = TcBehaviour::Flush;
+  bool has_room() const { return queued_ < queue_.size(); }
+  Flush& next_place() { return queue_[(first_ + queued_) % queue_.size()]; }
+
+  bool collect(Cycle now) {
+    bool moved = false;
+    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && !ending_ && in_.ready() && has_room();) {
+      const QuadBeat& beat = in_.front();
+      if (beat.end_of_draw) {
+        ending_ = true;
+        in_.pop();
+        return true;
+      }
+      // Beats are no wider than the unit: a beat that exceeds what is left of this cycle waits for the next.
+      if (beat.count - from_ > budget && budget < cost_.quads_per_cycle) break;
+      bool flushed = false;
+      const unsigned taken = behaviour_->insert(beat, from_, next_place(), flushed);
+      if (flushed) ++queued_;
+      from_ += taken;
+      taken_ += taken;
+      budget -= std::min(budget, taken);
+      holds_quads_ = true;
+      last_arrival_ = now;
+      moved = true;
+      if (from_ == beat.count) {
+        in_.pop();
+        from_ = 0;
+      }
+    }
+    return moved;
+  }
+
+  bool flush_idle_or_ending(Cycle now) {
+    if (!has_room()) return false;
+    if (ending_ && !drained_) {
+      if (behaviour_->flush_oldest(TcBehaviour::FlushReason::end_of_draw, next_place())) {
+        ++queued_;
+      } else {
+        drained_ = true;
+        holds_quads_ = false;
+      }
+      return true;
+    }
+    if (!ending_ && holds_quads_ && timeout_due() <= now) {
+      if (behaviour_->flush_oldest(TcBehaviour::FlushReason::timed_out, next_place())) {
+        ++queued_;
+      } else {
+        holds_quads_ = false;
+      }
+      return true;
+    }
+    return false;
+  }
+
+  Cycle timeout_due() const {
+    return cost_.idle_timeout_cycles == 0 || !holds_quads_ ? never : last_arrival_ + cost_.idle_timeout_cycles;
+  }
+
+  bool send() {
+    if (queued_ == 0) {
+      if (!drained_ || out_.credits() == 0) return false;
+      QuadBeat end;
+      end.end_of_draw = true;
+      out_.push(end);
+      ending_ = false;
+      drained_ = false;
+      return true;
+    }
+    if (out_.credits() == 0) return false;
+    const Flush& flush = queue_[first_];
+    QuadBeat beat;
+    beat.tile = flush.tile;
+    const auto left = static_cast<unsigned>(flush.quads.size()) - sent_;
+    beat.count = static_cast<std::uint8_t>(std::min(left, cost_.quads_per_cycle));
+    std::copy_n(flush.quads.begin() + sent_, beat.count, beat.quads.begin());
+    sent_ += beat.count;
+    beat.last_of_bin = sent_ == flush.quads.size();
+    out_.push(beat);
+    if (beat.last_of_bin) {
+      first_ = (first_ + 1) % static_cast<unsigned>(queue_.size());
+      --queued_;
+      sent_ = 0;
+    }
+    return true;
+  }
+
+  Cycle step(Cycle now) override {
+    const bool sent = send();
+    const bool collected = collect(now);
+    const bool flushed = flush_idle_or_ending(now);
+    if (sent || collected || flushed) {
+      enter(UnitState::busy, now);
+      return now + 1;
+    }
+    if (queued_ > 0 || drained_) {
+      enter(UnitState::blocked, now);
+      return std::min({out_.retry(), has_room() ? in_.next_ready() : never, has_room() ? timeout_due() : never});
+    }
+    enter(UnitState::starved, now);
+    return std::min(in_.next_ready(), timeout_due());
+  }
+
+  StreamIn<QuadBeat> in_;
+  StreamOut<QuadBeat> out_;
+  std::unique_ptr<TcBehaviour> behaviour_;
+  const TcBehaviour::Cost cost_;
+  std::vector<Flush> queue_;  ///< flushed bins, a ring
+  unsigned first_ = 0;
+  unsigned queued_ = 0;
+  unsigned sent_ = 0;  ///< quads of the first bin
+  unsigned from_ = 0;  ///< quads taken of the beat at the head
+  bool holds_quads_ = false;
+  bool ending_ = false;
+  bool drained_ = false;
+  Cycle last_arrival_ = 0;
+  std::uint64_t taken_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_unit_maker("tc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                               const RenderState&, unsigned) {
+    return std::make_unique<TcUnit>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)));
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

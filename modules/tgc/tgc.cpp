@@ -1,0 +1,138 @@
+#include "tgc/tgc.h"
+
+#include <algorithm>
+
+#include <vrpipe/registry.h>
+
+namespace vrpipe {
+
+TileGridCoalescing::TileGridCoalescing(const Parameters& parameters, const RenderState& state)
+    : state_(state),
+      bins_limit_(parameters.bins),
+      bin_primitives_(parameters.bin_primitives),
+      grid_pixels_(static_cast<std::int32_t>(parameters.grid_tiles * screen_tile_pixels)),
+      grids_x_((state.draw->width + static_cast<std::uint32_t>(grid_pixels_) - 1) /
+               static_cast<std::uint32_t>(grid_pixels_)),
+      entries_per_cycle_(parameters.entries_per_cycle),
+      latency_cycles_(parameters.latency_cycles),
+      bins_(bins_limit_) {
+  const std::uint32_t grids_y =
+      (state.draw->height + static_cast<std::uint32_t>(grid_pixels_) - 1) / static_cast<std::uint32_t>(grid_pixels_);
+  bin_of_grid_.assign(std::size_t{grids_x_} * grids_y, -1);
+  for (std::uint32_t bin = bins_limit_; bin-- > 0;) {
+    bins_[bin].primitives.reserve(bin_primitives_);
+    free_.push_back(bin);
+  }
+}
+
+void TileGridCoalescing::begin(const Primitive& primitive) {
+  primitive_ = primitive;
+  grid_x_begin_ = primitive.bounds.x0 / grid_pixels_;
+  grid_x_end_ = (primitive.bounds.x1 - 1) / grid_pixels_ + 1;
+  grid_y_ = primitive.bounds.y0 / grid_pixels_;
+  grid_y_end_ = (primitive.bounds.y1 - 1) / grid_pixels_ + 1;
+  grid_x_ = grid_x_begin_;
+  skip_foreign_grids();
+}
+
+void TileGridCoalescing::advance() {
+  if (++grid_x_ == grid_x_end_) {
+    grid_x_ = grid_x_begin_;
+    ++grid_y_;
+  }
+}
+
+bool TileGridCoalescing::owns_tile_of_grid(std::uint32_t grid_x, std::uint32_t grid_y) const {
+  const auto tiles = static_cast<std::uint32_t>(grid_pixels_) / screen_tile_pixels;
+  for (std::uint32_t y = grid_y * tiles; y < (grid_y + 1) * tiles; ++y) {
+    for (std::uint32_t x = grid_x * tiles; x < (grid_x + 1) * tiles; ++x) {
+      if (owner_of({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, state_.gpcs) == state_.gpc) return true;
+    }
+  }
+  return false;
+}
+
+void TileGridCoalescing::skip_foreign_grids() {
+  if (state_.gpcs == 1) return;
+  while (entering() && !owns_tile_of_grid(static_cast<std::uint32_t>(grid_x_), static_cast<std::uint32_t>(grid_y_))) {
+    advance();
+  }
+}
+
+void TileGridCoalescing::flush_bin(std::uint32_t index, Flush& out) {
+  Bin& bin = bins_[index];
+  const auto x = static_cast<std::int32_t>(bin.grid % grids_x_);
+  const auto y = static_cast<std::int32_t>(bin.grid / grids_x_);
+  out.clip = {x * grid_pixels_, y * grid_pixels_, (x + 1) * grid_pixels_, (y + 1) * grid_pixels_};
+  out.primitives.clear();
+  std::swap(out.primitives, bin.primitives);
+  bin_of_grid_[bin.grid] = -1;
+  free_.push_back(index);
+  ++flushes;
+}
+
+bool TileGridCoalescing::step(Flush& out) {
+  const std::uint32_t grid = static_cast<std::uint32_t>(grid_y_) * grids_x_ + static_cast<std::uint32_t>(grid_x_);
+  std::int32_t index = bin_of_grid_[grid];
+  if (index < 0) {
+    if (free_.empty()) {
+      const std::uint32_t oldest = allocation_order_.front();
+      allocation_order_.pop_front();
+      flush_bin(oldest, out);
+      ++evictions;
+      return true;
+    }
+    index = static_cast<std::int32_t>(free_.back());
+    free_.pop_back();
+    bins_[static_cast<std::size_t>(index)].grid = grid;
+    bin_of_grid_[grid] = index;
+    allocation_order_.push_back(static_cast<std::uint32_t>(index));
+  }
+  Bin& bin = bins_[static_cast<std::size_t>(index)];
+  bin.primitives.push_back(primitive_);
+  ++entries;
+  advance();
+  skip_foreign_grids();
+  if (bin.primitives.size() < bin_primitives_) return false;
+  allocation_order_.erase(
+      std::find(allocation_order_.begin(), allocation_order_.end(), static_cast<std::uint32_t>(index)));
+  flush_bin(static_cast<std::uint32_t>(index), out);
+  return true;
+}
+
+bool TileGridCoalescing::drain(Flush& out) {
+  if (allocation_order_.empty()) return false;
+  const std::uint32_t oldest = allocation_order_.front();
+  allocation_order_.pop_front();
+  flush_bin(oldest, out);
+  return true;
+}
+
+std::uint64_t TileGridCoalescing::storage_bytes() const {
+  constexpr std::uint64_t pointer_bytes = 4;
+  constexpr std::uint64_t vertices = 3;
+  constexpr std::uint64_t grid_id_bytes = 2;
+  return (pointer_bytes * vertices * bin_primitives_ + grid_id_bytes) * bins_limit_;
+}
+
+TgcPassThrough::TgcPassThrough(const Parameters&, const RenderState&) {}
+
+void TgcPassThrough::begin(const Primitive& primitive) {
+  primitive_ = primitive;
+  pending_ = true;
+}
+
+bool TgcPassThrough::step(Flush& out) {
+  out.clip = primitive_.bounds;
+  out.primitives.assign(1, primitive_);
+  pending_ = false;
+  return true;
+}
+
+namespace {
+const Registrar<TileGridCoalescing, TgcBehaviour> coalescing("tgc", "tile-grid-coalescing",
+                                                             "bins of primitives, one per tile grid (QM)");
+const Registrar<TgcPassThrough, TgcBehaviour> pass_through("tgc", "pass-through", "primitives go on one by one", true);
+}  // namespace
+
+}  // namespace vrpipe

@@ -1,0 +1,113 @@
+#include <vrpipe/unit.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// TGC at cycle fidelity: enters bins at its rate, and reads a flushed bin out one primitive a cycle; a further flush
+/// waits for the read-out. Ports: in_primitives (PrimitiveItem), out_jobs (RasterJob).
+class TgcUnit : public Unit {
+ public:
+  TgcUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TgcBehaviour> behaviour)
+      : Unit(name, domain),
+        in_(*this, "in_primitives"),
+        out_(*this, "out_jobs"),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()) {
+    out_.set_pipeline(cost_.latency_cycles - 1, 1);
+  }
+
+  bool idle() const override { return in_.empty() && !behaviour_->entering() && !reading_out() && !waiting_ && !ending_; }
+  std::uint64_t work() const override { return steps_; }
+  double peak_rate() const override { return cost_.items_per_cycle; }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  bool reading_out() const { return at_ < current_.primitives.size(); }
+
+  /// Enters bins; true when something moved.
+  bool collect() {
+    bool moved = false;
+    for (unsigned budget = cost_.items_per_cycle; budget > 0 && !waiting_; --budget) {
+      if (!behaviour_->entering()) {
+        if (ending_ || !in_.ready()) break;
+        if (in_.front().end_of_draw) {
+          ending_ = true;
+        } else {
+          behaviour_->begin(in_.front().primitive);
+        }
+        in_.pop();
+        moved = true;
+      }
+      if (behaviour_->entering()) {
+        waiting_ = behaviour_->step(next_);
+        ++steps_;
+        moved = true;
+      }
+    }
+    if (ending_ && !drained_ && !waiting_ && !behaviour_->entering()) {
+      waiting_ = behaviour_->drain(next_);
+      drained_ = !waiting_;
+      moved = true;
+    }
+    return moved;
+  }
+
+  /// Hands on one primitive, or the end of the draw; true when something moved.
+  bool read_out() {
+    if (!reading_out() && waiting_) {
+      std::swap(current_, next_);
+      at_ = 0;
+      waiting_ = false;
+    }
+    const bool end = drained_ && !reading_out();
+    if (!(reading_out() || end) || out_.credits() == 0) return false;
+    RasterJob job;
+    job.end_of_draw = end;
+    if (end) {
+      ending_ = false;
+      drained_ = false;
+    } else {
+      job.primitive = current_.primitives[at_++];
+      job.clip = current_.clip;
+    }
+    out_.push(job);
+    return true;
+  }
+
+  Cycle step(Cycle now) override {
+    const bool sent = read_out();
+    const bool collected = collect();
+    if (sent || collected) {
+      enter(UnitState::busy, now);
+      return now + 1;
+    }
+    const bool blocked = reading_out() || drained_;
+    enter(blocked ? UnitState::blocked : UnitState::starved, now);
+    return blocked ? out_.retry() : in_.next_ready();
+  }
+
+  StreamIn<PrimitiveItem> in_;
+  StreamOut<RasterJob> out_;
+  std::unique_ptr<TgcBehaviour> behaviour_;
+  const Throughput cost_;
+  TgcBehaviour::Flush current_;  ///< being read out, from `at_` on
+  TgcBehaviour::Flush next_;     ///< flushed and waiting for the read-out, if `waiting_`
+  std::size_t at_ = 0;
+  bool waiting_ = false;
+  bool ending_ = false;   ///< the end of the draw has arrived
+  bool drained_ = false;  ///< and all bins are flushed
+  std::uint64_t steps_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_unit_maker("tgc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                const RenderState&, unsigned) {
+    return std::make_unique<TgcUnit>(name.c_str(), domain, behaviour_as<TgcBehaviour>(std::move(behaviour)));
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <vrpipe/parameter.h>
+#include <vrpipe/units.h>
+
+namespace vrpipe {
+
+/// Vertex processing and operations: two triangles per splat, culling, viewport clip, bounding box (paper 5.1).
+class PrimitiveAssembly : public VpoBehaviour {
+ public:
+  struct Parameters : ParameterSet {
+    Integer triangles_per_cycle{*this, "triangles_per_cycle", 2, 1, 16, "triangles",
+                                "ATTILA: primitive assembly and set-up take 2 triangles a cycle",
+                                "triangles assembled, culled and boxed in a cycle"};
+    Integer latency_cycles{*this, "latency_cycles", 10, 1, 1000, "cycles",
+                           "Emerald: bounding box 4 cycles; ATTILA: clipper 6 cycles",
+                           "from the last vertex to the primitive at the GPC"};
+  };
+  PrimitiveAssembly(const Parameters& parameters, const RenderState& state);
+
+  unsigned assemble(std::uint32_t splat, std::array<Primitive, 2>& out) override;
+  Throughput cost() const override { return {triangles_per_cycle_, latency_cycles_}; }
+
+  Counter primitives{*this, "primitives", "triangles", "triangles handed to the GPCs"};
+  Counter culled_zero_area{*this, "culled_zero_area", "triangles", "without area after snapping"};
+  Counter culled_outside{*this, "culled_outside", "triangles", "that cover no sample of the viewport's pixels"};
+  Counter dropped_not_finite{*this, "dropped_not_finite", "splats", "with a vertex that is NaN or cannot be cut to the guard band"};
+
+ private:
+  const RenderState& state_;
+  const std::uint32_t triangles_per_cycle_;
+  const std::uint32_t latency_cycles_;
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,137 @@
+#include <vrpipe/unit.h>
+
+namespace vrpipe {
+
+namespace {
+
+bool touches_tile_of(const Primitive& primitive, unsigned gpcs, unsigned gpc) {
+  constexpr auto side = static_cast<int>(screen_tile_pixels);
+  for (int y = primitive.bounds.y0 / side; y <= (primitive.bounds.y1 - 1) / side; ++y) {
+    for (int x = primitive.bounds.x0 / side; x <= (primitive.bounds.x1 - 1) / side; ++x) {
+      if (owner_of({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, gpcs) == gpc) return true;
+    }
+  }
+  return false;
+}
+
+/// VPO at cycle fidelity. Takes the GPCs' vertex warps in turn, which is draw order, and sends each primitive to every
+/// GPC that owns a screen tile of its bounding box.
+/// Ports: in_vertices_<gpc> (VertexWarp), out_primitives_<gpc> (PrimitiveItem).
+class VpoUnit : public Unit {
+ public:
+  VpoUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<VpoBehaviour> behaviour, unsigned gpcs)
+      : Unit(name, domain), behaviour_(std::move(behaviour)), cost_(behaviour_->cost()), gpcs_(gpcs) {
+    for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
+      ins_.push_back(std::make_unique<StreamIn<VertexWarp>>(*this, "in_vertices_" + std::to_string(gpc)));
+      outs_.push_back(std::make_unique<StreamOut<PrimitiveItem>>(*this, "out_primitives_" + std::to_string(gpc)));
+      outs_.back()->set_pipeline(cost_.latency_cycles - 1, cost_.items_per_cycle);
+    }
+  }
+
+  bool idle() const override { return at_ == count_ && ins_[turn_]->empty(); }
+  std::uint64_t work() const override { return assembled_; }
+  double peak_rate() const override { return cost_.items_per_cycle; }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  /// Pushes to every GPC concerned, or to none.
+  bool send(const PrimitiveItem& item) {
+    for (unsigned gpc = 0; gpc < gpcs_; ++gpc) {
+      if (wanted(item, gpc) && outs_[gpc]->credits() == 0) return false;
+    }
+    for (unsigned gpc = 0; gpc < gpcs_; ++gpc) {
+      if (wanted(item, gpc)) outs_[gpc]->push(item);
+    }
+    return true;
+  }
+  bool wanted(const PrimitiveItem& item, unsigned gpc) const {
+    return gpcs_ == 1 || item.end_of_draw || touches_tile_of(item.primitive, gpcs_, gpc);
+  }
+  Cycle retry() const {
+    Cycle at = never;
+    for (const auto& out : outs_) at = std::min(at, out->retry());
+    return at;
+  }
+
+  Cycle step(Cycle now) override {
+    unsigned budget = cost_.items_per_cycle;
+    bool moved = false;
+    while (budget > 0) {
+      if (at_ < count_) {
+        PrimitiveItem item;
+        item.primitive = primitives_[at_];
+        if (!send(item)) {
+          enter(moved ? UnitState::busy : UnitState::blocked, now);
+          return moved ? now + 1 : retry();
+        }
+        ++at_;
+        --budget;
+        moved = true;
+        continue;
+      }
+      if (splat_ < last_splat_) {
+        // Culled triangles take their turn as well.
+        at_ = 0;
+        count_ = behaviour_->assemble(splat_++, primitives_);
+        assembled_ += 2;
+        if (count_ == 0) --budget;
+        moved = true;
+        continue;
+      }
+      StreamIn<VertexWarp>& in = *ins_[turn_];
+      if (!in.ready()) {
+        enter(moved ? UnitState::busy : UnitState::starved, now);
+        return moved ? now + 1 : in.next_ready();
+      }
+      const VertexWarp warp = in.front();
+      if (warp.end_of_draw) {
+        // The GPCs' ends follow one another; the first stands for all, since no warp comes after it.
+        if (!ended_) {
+          PrimitiveItem end;
+          end.end_of_draw = true;
+          if (!send(end)) {
+            enter(UnitState::blocked, now);
+            return retry();
+          }
+          ended_ = true;
+        }
+        in.pop();
+        turn_ = (turn_ + 1) % gpcs_;
+        moved = true;
+        break;
+      }
+      in.pop();
+      turn_ = (turn_ + 1) % gpcs_;
+      splat_ = warp.first_splat;
+      last_splat_ = warp.first_splat + warp.splats;
+    }
+    enter(UnitState::busy, now);
+    return now + 1;
+  }
+
+  std::unique_ptr<VpoBehaviour> behaviour_;
+  const Throughput cost_;
+  const unsigned gpcs_;
+  std::vector<std::unique_ptr<StreamIn<VertexWarp>>> ins_;
+  std::vector<std::unique_ptr<StreamOut<PrimitiveItem>>> outs_;
+  std::array<Primitive, 2> primitives_;
+  unsigned at_ = 0;
+  unsigned count_ = 0;
+  std::uint32_t splat_ = 0;
+  std::uint32_t last_splat_ = 0;
+  unsigned turn_ = 0;
+  bool ended_ = false;
+  std::uint64_t assembled_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_unit_maker("vpo", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                const RenderState&, unsigned gpcs) {
+    return std::make_unique<VpoUnit>(name.c_str(), domain, behaviour_as<VpoBehaviour>(std::move(behaviour)), gpcs);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

@@ -1,0 +1,49 @@
+#include "zrop/zrop.h"
+
+#include <vrpipe/registry.h>
+
+namespace vrpipe {
+
+namespace {
+std::uint32_t tiles(std::uint32_t pixels) { return (pixels + screen_tile_pixels - 1) / screen_tile_pixels; }
+}  // namespace
+
+DepthStencilRop::DepthStencilRop(const Parameters& parameters, const RenderState& state)
+    : cost_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.updates_per_cycle},
+      tiles_x_(tiles(state.draw->width)),
+      terminated_(std::size_t{tiles_x_} * tiles(state.draw->height) * positions_per_tile) {}
+
+void DepthStencilRop::test(QuadBeat& beat) {
+  unsigned kept = 0;
+  quads_tested += beat.count;
+  const std::uint8_t* const tile_bits = &terminated(beat.tile, 0);
+  for (unsigned i = 0; i < beat.count; ++i) {
+    Quad quad = beat.quads[i];
+    const unsigned dead = quad.coverage & tile_bits[quad.position];
+    fragments_terminated += popcount(static_cast<LaneMask>(dead));
+    quad.coverage = static_cast<LaneMask>(quad.coverage & ~dead);
+    beat.quads[kept] = quad;
+    kept += quad.coverage != 0 ? 1U : 0U;
+  }
+  quads_terminated += beat.count - kept;
+  beat.count = static_cast<std::uint8_t>(kept);
+  if (foresight_ == nullptr || beat.end_of_draw) return;
+  survivors_.insert(survivors_.end(), beat.quads.begin(), beat.quads.begin() + kept);
+  if (!beat.last_of_bin) return;
+  foreseen_.clear();
+  foresight_->bin_tested(beat.tile, survivors_, foreseen_);
+  survivors_.clear();
+  for (const TerminationSignal& signal : foreseen_) mark(signal);
+}
+
+void DepthStencilRop::update(const TerminationSignal& signal) {
+  ++termination_updates;
+  if (foresight_ == nullptr) mark(signal);
+}
+
+namespace {
+const Registrar<DepthStencilRop, ZropBehaviour> registrar("zrop", "depth-stencil-rop",
+                                                          "termination test and update on the stencil MSB");
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <vrpipe/parameter.h>
+#include <vrpipe/units.h>
+
+namespace vrpipe {
+
+/// Depth-stencil ROP: the termination test and update on the stencil's most significant bit (paper 5.2).
+class DepthStencilRop : public ZropBehaviour {
+ public:
+  struct Parameters : ParameterSet {
+    Integer quads_per_cycle{*this, "quads_per_cycle", 16, 1, 16, "quads",
+                            "measured on a GH100 graphics GPC: 8 quads a cycle and ROP partition; the paper's GPC has two",
+                            "tested in a cycle"};
+    Integer latency_cycles{*this, "latency_cycles", 8, 1, 1000, "cycles", source::open,
+                           "of a test, z-cache read included"};
+    Integer updates_per_cycle{*this, "updates_per_cycle", 1, 1, 16, "signals", source::open,
+                              "termination updates, each a read-modify-write of the z-cache; such a cycle tests nothing"};
+  };
+  DepthStencilRop(const Parameters& parameters, const RenderState& state);
+
+  void test(QuadBeat& beat) override;
+  void update(const TerminationSignal& signal) override;
+  void foresee(TerminationForesight& foresight) override { foresight_ = &foresight; }
+  Cost cost() const override { return cost_; }
+
+  Counter quads_tested{*this, "quads_tested", "quads", "that entered the termination test"};
+  Counter quads_terminated{*this, "quads_terminated", "quads", "that lost their last fragment to the termination test"};
+  Counter fragments_terminated{*this, "fragments_terminated", "fragments", "that failed the termination test"};
+  Counter termination_updates{*this, "termination_updates", "signals", "received from CROP, one for a quad's pixels"};
+
+ private:
+  std::uint8_t& terminated(TileId tile, unsigned position) {
+    return terminated_[(std::size_t{tile.y} * tiles_x_ + tile.x) * positions_per_tile + position];
+  }
+  void mark(const TerminationSignal& signal) {
+    std::uint8_t& bits = terminated(signal.tile, signal.position);
+    bits = static_cast<std::uint8_t>(bits | signal.pixels);
+  }
+
+  const Cost cost_;
+  const std::uint32_t tiles_x_;
+  std::vector<std::uint8_t> terminated_;  ///< the stencil MSBs of a quad position's four pixels
+  TerminationForesight* foresight_ = nullptr;
+  std::vector<Quad> survivors_;  ///< of the bin under test, for the foresight
+  std::vector<TerminationSignal> foreseen_;
+};
+
+}  // namespace vrpipe

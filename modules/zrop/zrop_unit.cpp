@@ -1,0 +1,95 @@
+#include <vrpipe/unit.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// ZROP at cycle fidelity. One z-cache port: a cycle either applies updates, which go first, or tests.
+/// Ports: in_quads, out_quads (QuadBeat), in_terminations (TerminationBeat).
+class ZropUnit : public Unit {
+ public:
+  ZropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour)
+      : Unit(name, domain),
+        in_(*this, "in_quads"),
+        out_(*this, "out_quads"),
+        in_terminations_(*this, "in_terminations"),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()) {
+    out_.set_pipeline(cost_.latency_cycles - 1, cost_.quads_per_cycle);
+  }
+
+  bool idle() const override { return in_.empty() && in_terminations_.empty(); }
+  std::uint64_t work() const override { return tested_; }
+  double peak_rate() const override { return cost_.quads_per_cycle; }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  bool update() {
+    unsigned budget = cost_.updates_per_cycle;
+    bool moved = false;
+    while (budget > 0 && in_terminations_.ready()) {
+      const TerminationBeat& beat = in_terminations_.front();
+      while (budget > 0 && signal_ < beat.count) {
+        behaviour_->update(beat.signals[signal_++]);
+        --budget;
+      }
+      moved = true;
+      if (signal_ < beat.count) break;
+      in_terminations_.pop();
+      signal_ = 0;
+    }
+    return moved;
+  }
+
+  bool test() {
+    unsigned budget = cost_.quads_per_cycle;
+    bool moved = false;
+    while (in_.ready() && out_.credits() > 0) {
+      const unsigned width = std::max<unsigned>(in_.front().count, 1);
+      if (width > budget && budget < cost_.quads_per_cycle) break;
+      QuadBeat beat = in_.front();
+      in_.pop();
+      tested_ += beat.count;
+      behaviour_->test(beat);
+      moved = true;
+      // A beat without survivors goes no further, but for the mark that closes a bin.
+      if (beat.count > 0 || beat.last_of_bin || beat.end_of_draw) out_.push(beat);
+      if (width >= budget) break;
+      budget -= width;
+    }
+    return moved;
+  }
+
+  Cycle step(Cycle now) override {
+    if (update() || test()) {
+      enter(UnitState::busy, now);
+      return now + 1;
+    }
+    if (in_.ready()) {
+      enter(UnitState::blocked, now);
+      return std::min(out_.retry(), in_terminations_.next_ready());
+    }
+    enter(UnitState::starved, now);
+    return std::min(in_.next_ready(), in_terminations_.next_ready());
+  }
+
+  StreamIn<QuadBeat> in_;
+  StreamOut<QuadBeat> out_;
+  StreamIn<TerminationBeat> in_terminations_;
+  std::unique_ptr<ZropBehaviour> behaviour_;
+  const ZropBehaviour::Cost cost_;
+  unsigned signal_ = 0;
+  std::uint64_t tested_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_unit_maker("zrop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                 const RenderState&, unsigned) {
+    return std::make_unique<ZropUnit>(name.c_str(), domain, behaviour_as<ZropBehaviour>(std::move(behaviour)));
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

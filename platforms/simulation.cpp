@@ -1,0 +1,296 @@
+#include <vrpipe/platforms/simulation.h>
+
+#include <chrono>
+#include <cstring>
+#include <map>
+
+#include "functional.h"
+
+#include <fmt/format.h>
+
+#include <vrpipe/error.h>
+#include <vrpipe/platforms/gpu.h>
+
+namespace vrpipe {
+
+const char* name_of(Fidelity fidelity) {
+  switch (fidelity) {
+    case Fidelity::functional: return "functional";
+    case Fidelity::bound: return "bound";
+    case Fidelity::lt: return "lt";
+    case Fidelity::at: return "at";
+    case Fidelity::cycle: return "cycle";
+  }
+  return "";
+}
+
+Fidelity fidelity_named(const std::string& name) {
+  for (const Fidelity fidelity : {Fidelity::functional, Fidelity::cycle}) {
+    if (name == name_of(fidelity)) return fidelity;
+  }
+  throw UserError("unknown fidelity '" + name + "'", "--fidelity", "this build has no such fidelity",
+                  "use functional or cycle");
+}
+
+const std::vector<Variant>& variants() {
+  static const std::vector<Variant> all{
+      {"baseline", false, false}, {"qm", true, false}, {"het", false, true}, {"het+qm", true, true}};
+  return all;
+}
+
+const Variant& variant_named(const std::string& name) {
+  for (const Variant& variant : variants()) {
+    if (variant.name == name) return variant;
+  }
+  throw UserError("unknown variant '" + name + "'", "--variant", "there is no such variant",
+                  "use baseline, qm, het or het+qm");
+}
+
+namespace {
+
+void fnv1a(std::uint64_t& hash, std::uint64_t value) {
+  for (unsigned byte = 0; byte < 8; ++byte) {
+    hash = (hash ^ ((value >> (8 * byte)) & 0xffU)) * 0x100000001b3ULL;
+  }
+}
+
+std::string hash_of(const RunResult& result) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  for (const auto& count : result.counts.named()) fnv1a(hash, count.second);
+  fnv1a(hash, result.cycles.value_or(0));
+  const ColorSurface& surface = result.surface;
+  for (std::uint32_t y = 0; y < surface.height(); ++y) {
+    for (std::uint32_t x = 0; x < surface.width(); ++x) {
+      const std::array<float, 4> pixel = surface.pixel(x, y);
+      std::array<std::uint64_t, 2> bits;
+      std::memcpy(bits.data(), pixel.data(), sizeof bits);
+      fnv1a(hash, bits[0]);
+      fnv1a(hash, bits[1]);
+    }
+  }
+  return fmt::format("{:016x}", hash);
+}
+
+/// Counters of all units, summed over GPCs, in the order of the pipeline.
+std::vector<StatisticReport> collect(const BehaviourList& behaviours) {
+  std::vector<StatisticReport> reports;
+  std::map<std::string, std::size_t> index;
+  for (const auto& [slot, behaviour] : behaviours.of_slot) {
+    for (const Counter* counter : behaviour->counters()) {
+      const std::string name = slot + "." + counter->name();
+      const auto place = index.emplace(name, reports.size());
+      if (place.second) reports.push_back({name, counter->unit(), counter->meaning(), 0});
+      reports[place.first->second].value += counter->value();
+    }
+  }
+  return reports;
+}
+
+Counts counts_from(const std::vector<StatisticReport>& statistics) {
+  const auto value = [&](const char* name) -> std::uint64_t {
+    for (const StatisticReport& report : statistics) {
+      if (report.name == name) return report.value;
+    }
+    return 0;
+  };
+  Counts c;
+  c.primitives = value("vpo.primitives");
+  c.quads_rasterized = value("raster.quads_rasterized");
+  c.fragments_rasterized = value("raster.fragments_rasterized");
+  c.quads_depth_stencil_failed = value("zrop.quads_depth_stencil_failed");
+  c.fragments_depth_stencil_failed = value("zrop.fragments_depth_stencil_failed");
+  c.quads_terminated = value("zrop.quads_terminated");
+  c.fragments_terminated = value("zrop.fragments_terminated");
+  c.quads_shaded = value("sm.quads_shaded");
+  c.fragments_shaded = value("sm.fragments_shaded");
+  c.quads_pruned = value("sm.quads_pruned");
+  c.fragments_pruned = value("sm.fragments_pruned");
+  c.quads_merged = value("sm.quads_merged");
+  c.fragments_merged = value("sm.fragments_merged");
+  c.quads_dropped_late = value("crop.quads_dropped_late");
+  c.fragments_dropped_late = value("crop.fragments_dropped_late");
+  c.quads_late_failed = value("crop.quads_late_failed");
+  c.fragments_late_failed = value("crop.fragments_late_failed");
+  c.quads_blended = value("crop.quads_blended");
+  c.fragments_blended = value("crop.fragments_blended");
+  c.warps = value("sm.fragment_warps");
+  c.tgc_flushes = value("tgc.flushes");
+  c.tc_flushes = value("tc.flushes");
+  c.termination_updates = value("crop.termination_signals");
+  return c;
+}
+
+void check_conservation(const Counts& c) {
+  const auto check = [](const char* what, std::uint64_t in, std::uint64_t out) {
+    if (in == out) return;
+    throw SimulationFault("conservation", 0, fmt::format("{}: {} went in, {} came out", what, in, out));
+  };
+  check("quads rasterized = depth_stencil_failed + terminated + shaded", c.quads_rasterized,
+        c.quads_depth_stencil_failed + c.quads_terminated + c.quads_shaded);
+  check("fragments rasterized = depth_stencil_failed + terminated + shaded", c.fragments_rasterized,
+        c.fragments_depth_stencil_failed + c.fragments_terminated + c.fragments_shaded);
+  check("quads shaded = pruned + merged + dropped_late + late_failed + blended", c.quads_shaded,
+        c.quads_pruned + c.quads_merged + c.quads_dropped_late + c.quads_late_failed + c.quads_blended);
+  check("fragments shaded = pruned + merged + dropped_late + late_failed + blended", c.fragments_shaded,
+        c.fragments_pruned + c.fragments_merged + c.fragments_dropped_late + c.fragments_late_failed +
+            c.fragments_blended);
+}
+
+/// Work over peak rate x cycles, per slot over all GPCs.
+void report_utilization(const Gpu& gpu, std::uint64_t cycles, RunResult& result) {
+  const auto share = [&](const std::string& slot) {
+    double work = 0;
+    double peak = 0;
+    for (std::size_t i = 0; i < gpu.units().size(); ++i) {
+      const std::string& name = gpu.unit_names()[i];
+      if (name.substr(name.rfind('.') + 1) != slot) continue;
+      work += static_cast<double>(gpu.units()[i]->work());
+      peak += gpu.units()[i]->peak_rate() * static_cast<double>(cycles);
+    }
+    return peak > 0 ? work / peak : 0.0;
+  };
+  for (const char* slot : {"raster", "zrop", "prop", "sm", "crop"}) result.utilization.emplace_back(slot, share(slot));
+  const double l2_peak = gpu.l2().peak_rate() * static_cast<double>(cycles);
+  result.utilization.emplace_back("l2", l2_peak > 0 ? static_cast<double>(gpu.l2().bytes()) / l2_peak : 0.0);
+  result.utilization.emplace_back("dram", 0.0);
+}
+
+void run_clocked(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
+  Gpu gpu(configuration, result.surface);
+  const auto start = std::chrono::steady_clock::now();
+  const Cycle cycles = gpu.run(progress);
+  result.host_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.cycles = cycles;
+  result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
+  result.kernel_events = gpu.clock().edges();
+
+  BehaviourList behaviours;
+  for (std::size_t i = 0; i < gpu.units().size(); ++i) {
+    const std::string& name = gpu.unit_names()[i];
+    behaviours.of_slot.emplace_back(name.substr(name.rfind('.') + 1), &gpu.units()[i]->behaviour());
+    UnitReport report;
+    report.name = name;
+    std::uint64_t sum = 0;
+    for (unsigned state = 0; state < unit_states; ++state) {
+      report.cycles[state] = gpu.units()[i]->account().cycles(static_cast<UnitState>(state));
+      sum += report.cycles[state];
+    }
+    if (sum != cycles) {
+      throw SimulationFault(name, cycles, fmt::format("its states sum to {} cycles", sum));
+    }
+    result.units.push_back(std::move(report));
+  }
+  result.statistics = collect(behaviours);
+  report_utilization(gpu, cycles, result);
+}
+
+void run_functional(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
+  FunctionalGpu gpu(configuration, result.surface);
+  const auto start = std::chrono::steady_clock::now();
+  gpu.run(progress);
+  result.host_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.statistics = collect(gpu.behaviours());
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::uint64_t>> Counts::named() const {
+  return {{"primitives", primitives},
+          {"quads_rasterized", quads_rasterized},
+          {"fragments_rasterized", fragments_rasterized},
+          {"quads_depth_stencil_failed", quads_depth_stencil_failed},
+          {"fragments_depth_stencil_failed", fragments_depth_stencil_failed},
+          {"quads_terminated", quads_terminated},
+          {"fragments_terminated", fragments_terminated},
+          {"quads_shaded", quads_shaded},
+          {"fragments_shaded", fragments_shaded},
+          {"quads_pruned", quads_pruned},
+          {"fragments_pruned", fragments_pruned},
+          {"quads_merged", quads_merged},
+          {"fragments_merged", fragments_merged},
+          {"quads_dropped_late", quads_dropped_late},
+          {"fragments_dropped_late", fragments_dropped_late},
+          {"quads_late_failed", quads_late_failed},
+          {"fragments_late_failed", fragments_late_failed},
+          {"quads_blended", quads_blended},
+          {"fragments_blended", fragments_blended},
+          {"warps", warps},
+          {"tgc_flushes", tgc_flushes},
+          {"tc_flushes", tc_flushes},
+          {"termination_updates", termination_updates}};
+}
+
+RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<float>* progress) {
+  if (draw.width == 0 || draw.height == 0 || draw.width > 16384 || draw.height > 16384) {
+    throw UserError("unusable size " + std::to_string(draw.width) + "x" + std::to_string(draw.height), "draw",
+                    "a side is 0 or beyond 16384 pixels", "use 1 to 16384");
+  }
+  if (!draw.triangles.empty() && draw.triangles.size() != draw.splats.size()) {
+    throw SimulationFault("draw", 0, "explicit triangles and splats differ in number");
+  }
+  const Configuration configuration(request, draw);
+  RunResult result;
+  result.request = request;
+  result.surface = ColorSurface(draw.width, draw.height, request.format);
+  result.parameters = configuration.parameters();
+  if (request.fidelity == Fidelity::functional) {
+    run_functional(configuration, progress, result);
+  } else {
+    run_clocked(configuration, progress, result);
+  }
+  result.counts = counts_from(result.statistics);
+  check_conservation(result.counts);
+  result.result_hash = hash_of(result);
+  return result;
+}
+
+void check_configuration(const RunRequest& request) {
+  Draw empty;
+  empty.width = 1;
+  empty.height = 1;
+  const Configuration configuration(request, empty);
+  for (const std::string& slot : Registry::slots()) configuration.make(slot, 0);
+}
+
+std::vector<ParameterListing> list_parameters(const Platform* platform) {
+  std::vector<ParameterListing> listings;
+  const auto apply = [&](const std::string& unit, ParameterSet& set) {
+    if (platform == nullptr) return;
+    for (const Setting& setting : platform->settings) {
+      if (setting.unit == unit) set.set(setting.unit, setting.parameter, setting.value);
+    }
+  };
+  for (const Implementation* implementation : Registry::instance().all()) {
+    ParameterListing listing{implementation->slot, implementation->name, implementation->description,
+                             implementation->pass_through, implementation->make_parameters()};
+    if (implementation == &default_implementation(implementation->slot, variants().back())) {
+      apply(implementation->slot, *listing.parameters);
+    }
+    listings.push_back(std::move(listing));
+  }
+  listings.push_back({"l2", "fixed-latency", "the shared L2: fixed latency, a number of bytes a cycle for each GPC", false,
+                      std::make_unique<L2Parameters>()});
+  apply("l2", *listings.back().parameters);
+  listings.push_back({"state", "draw-state", "the draw's state and the precision of the fixed-function hardware", false,
+                      std::make_unique<StateParameters>()});
+  apply("state", *listings.back().parameters);
+  return listings;
+}
+
+StorageReport quad_merging_storage(const RunRequest& request) {
+  Draw empty;
+  empty.width = 1;
+  empty.height = 1;
+  RunRequest merging = request;
+  merging.variant.quad_merging = true;
+  const Configuration configuration(merging, empty);
+  return {configuration.make_as<TgcBehaviour>("tgc", 0)->storage_bytes(),
+          configuration.make_as<QruBehaviour>("qru", 0)->storage_bytes()};
+}
+
+void fresh_simulation() {
+  sc_core::sc_curr_simcontext = new sc_core::sc_simcontext();
+  sc_core::sc_default_global_context = sc_core::sc_curr_simcontext;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,162 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <string>
+#include <vector>
+
+#include <vrpipe/accounting.h>
+#include <vrpipe/draw.h>
+#include <vrpipe/parameter.h>
+#include <vrpipe/render_state.h>
+#include <vrpipe/surface.h>
+
+namespace vrpipe {
+
+class Gpu;
+
+/// How exact a run is about time.
+enum class Fidelity : std::uint8_t { functional, bound, lt, at, cycle };
+const char* name_of(Fidelity fidelity);
+/// Throws UserError naming those that exist.
+Fidelity fidelity_named(const std::string& name);
+
+/// Which of the paper's two extensions a run has.
+struct Variant {
+  std::string name;  ///< baseline, qm, het, het+qm
+  bool quad_merging = false;
+  bool early_termination = false;
+};
+const std::vector<Variant>& variants();
+/// Throws UserError naming those that exist.
+const Variant& variant_named(const std::string& name);
+
+/// `--set UNIT.PARAMETER=VALUE`.
+struct Setting {
+  std::string unit;
+  std::string parameter;
+  std::string value;
+};
+
+/// `--unit SLOT=IMPLEMENTATION`.
+struct UnitChoice {
+  std::string slot;
+  std::string implementation;
+};
+
+/// A GPU: units wired up in C++.
+struct Platform {
+  std::string name;
+  std::string description;  ///< one line
+  unsigned gpcs = 1;
+  double frequency_mhz = 0;
+  std::vector<Setting> settings;      ///< where it differs from the units' defaults
+  void (*wire)(Gpu& gpu) = nullptr;   ///< the wiring diagram, used where there is time
+};
+
+/// All named platforms, the default first. `add_platform` adds one of your own.
+const std::vector<Platform>& platforms();
+void add_platform(Platform platform);
+/// Throws UserError naming the nearest.
+const Platform& platform_named(const std::string& name);
+
+/// One simulation.
+struct RunRequest {
+  const Platform* platform = nullptr;
+  Variant variant;
+  Fidelity fidelity = Fidelity::cycle;
+  ColorFormat format = ColorFormat::rgba16f;
+  Termination termination = Termination::paper;
+  std::vector<Setting> settings;
+  std::vector<UnitChoice> units;
+
+  /// For tests: a seed and a share of cycles (of 256) in which ports stall at random; 0 for none.
+  std::uint64_t stall_seed = 0;
+  unsigned stall_per_256 = 0;
+  /// For tests: ticks units in a random order drawn from this seed; 0 for the order of wiring.
+  std::uint64_t tick_order_seed = 0;
+};
+
+/// Exact integers, per draw; the names and rules are those of the contract.
+struct Counts {
+  std::uint64_t primitives = 0;
+  std::uint64_t quads_rasterized = 0, fragments_rasterized = 0;
+  std::uint64_t quads_depth_stencil_failed = 0, fragments_depth_stencil_failed = 0;
+  std::uint64_t quads_terminated = 0, fragments_terminated = 0;
+  std::uint64_t quads_shaded = 0, fragments_shaded = 0;
+  std::uint64_t quads_pruned = 0, fragments_pruned = 0;
+  std::uint64_t quads_merged = 0, fragments_merged = 0;
+  std::uint64_t quads_dropped_late = 0, fragments_dropped_late = 0;
+  std::uint64_t quads_late_failed = 0, fragments_late_failed = 0;
+  std::uint64_t quads_blended = 0, fragments_blended = 0;
+  std::uint64_t warps = 0, tgc_flushes = 0, tc_flushes = 0, termination_updates = 0;
+
+  /// Name and value of each, in the order of the contract.
+  std::vector<std::pair<std::string, std::uint64_t>> named() const;
+};
+
+/// The cycles of one unit by state; they sum to the run's cycles.
+struct UnitReport {
+  std::string name;  ///< e.g. "gpc0.crop"
+  std::array<std::uint64_t, unit_states> cycles{};
+};
+
+/// A counter that a unit declared, summed over GPCs.
+struct StatisticReport {
+  std::string name;  ///< UNIT.COUNTER
+  std::string unit;
+  std::string meaning;
+  std::uint64_t value = 0;
+};
+
+struct RunResult {
+  RunRequest request;
+  std::optional<std::uint64_t> cycles;  ///< none where the fidelity has no time
+  double milliseconds = 0;              ///< simulated, at the platform's clock
+  double host_seconds = 0;              ///< of the simulation alone
+  Counts counts;
+  /// raster zrop prop sm crop l2 dram, in [0, 1]; empty without time. DRAM is 0 while L2 is all the memory there is.
+  std::vector<std::pair<std::string, double>> utilization;
+  std::vector<UnitReport> units;
+  std::vector<StatisticReport> statistics;
+  /// UNIT.PARAMETER and value of everything that could be set, pass-through units left out.
+  std::vector<std::pair<std::string, std::string>> parameters;
+  std::string result_hash;  ///< of counts, cycles and the stored bits of the image, 16 hex digits
+  std::uint64_t kernel_events = 0;  ///< activations of the SystemC kernel's processes
+  ColorSurface surface{1, 1, ColorFormat::rgba16f};
+};
+
+/// Runs one variant. Checks conservation, order per pixel and that the states of each unit sum to the cycles; throws
+/// SimulationFault if one is broken and UserError for a configuration that does not exist. With time, one simulation
+/// per process is the safe way; tests run several with `fresh_simulation()`.
+/// `progress`, if given, goes from 0 to 1.
+RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<float>* progress = nullptr);
+
+/// Checks settings and unit choices against a platform without running anything; throws UserError.
+void check_configuration(const RunRequest& request);
+
+/// What can be set by --set, per unit, with the platform's settings applied. For `vrpipe units` and the reference.
+struct ParameterListing {
+  std::string unit;
+  std::string implementation;
+  std::string description;
+  bool pass_through = false;
+  std::unique_ptr<ParameterSet> parameters;
+};
+std::vector<ParameterListing> list_parameters(const Platform* platform);
+
+/// The hardware that QM adds, from the configured sizes.
+struct StorageReport {
+  std::uint64_t tgc_bytes = 0;
+  std::uint64_t qru_bytes = 0;
+};
+StorageReport quad_merging_storage(const RunRequest& request);
+
+/// Replaces the SystemC context, so that the next simulation of this process starts at time 0. The old one leaks.
+void fresh_simulation();
+
+}  // namespace vrpipe
