@@ -1,0 +1,122 @@
+#include <vrpipe/workloads/builtin_scenes.h>
+
+#include <cmath>
+#include <ostream>
+#include <set>
+
+#include <vrpipe/workloads/preprocess.h>
+
+#include "../support/reference_renderer.h"
+#include "workload_test_support.h"
+
+namespace vrpipe {
+namespace {
+
+TEST(BuiltinScenes, AreNamedAndDescribedAndSizedAsInThePaper) {
+  const auto& scenes = builtin_scenes();
+  ASSERT_EQ(scenes.size(), 3u);
+  EXPECT_EQ(builtin_scene_names(), (std::vector<std::string>{"object", "indoor", "outdoor"}));
+  EXPECT_EQ(scenes.front().name, kDefaultBuiltinScene);
+  for (const BuiltinSceneInfo& info : scenes) {
+    EXPECT_FALSE(info.description.empty());
+    EXPECT_EQ(info.description.find('\n'), std::string::npos);
+  }
+  EXPECT_EQ(scenes[0].size.width * 10000u + scenes[0].size.height, 8000800u);
+  EXPECT_EQ(scenes[1].size.width * 10000u + scenes[1].size.height, 15521040u);
+  EXPECT_EQ(scenes[2].size.width * 10000u + scenes[2].size.height, 9800545u);
+}
+
+TEST(BuiltinScenes, AnUnknownNameGetsTheNearestOne) {
+  testing::expect_user_error([] { make_builtin_scene("outdor"); }, {"unknown built-in scene (builtin:outdor)", "builtin:outdoor?", "object, indoor, outdoor"});
+  testing::expect_user_error([] { make_builtin_scene(""); }, {"builtin:"});
+}
+
+/// FNV-1a over every attribute.
+std::uint64_t hash_of(const GaussianScene& scene) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  const auto add = [&hash](float value) {
+    std::uint32_t bits;
+    std::memcpy(&bits, &value, sizeof bits);
+    hash = (hash ^ bits) * 0x100000001b3u;
+  };
+  for (std::uint64_t i = 0; i < scene.size(); ++i) {
+    const GaussianRef g = scene[i];
+    for (const float f : g.position()) add(f);
+    for (const float f : g.log_scale()) add(f);
+    for (const float f : g.rotation()) add(f);
+    for (const float f : g.f_dc()) add(f);
+    add(g.opacity_logit());
+    for (std::uint32_t channel = 0; channel < 3; ++channel) {
+      for (std::uint32_t c = 1; c <= kShRestPerChannel[static_cast<std::size_t>(scene.sh_degree())]; ++c) add(g.f_rest(channel, c));
+    }
+  }
+  return hash;
+}
+
+std::uint64_t hash_of(const Draw& draw) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const Splat& splat : draw.splats) {
+    std::uint32_t words[12];
+    std::memcpy(words, &splat, sizeof words);
+    for (const std::uint32_t word : words) hash = (hash ^ word) * 0x100000001b3u;
+  }
+  return hash;
+}
+
+struct Marks {
+  std::string name;
+  double least_ratio, most_ratio;
+  std::uint64_t scene_hash, draw_hash;  ///< the same with every compiler, optimisation level and processor
+};
+
+void PrintTo(const Marks& marks, std::ostream* out) { *out << marks.name; }
+
+class BuiltinSceneMarks : public ::testing::TestWithParam<Marks> {};
+
+TEST_P(BuiltinSceneMarks, AreThoseOfATrainedScene) {
+  const Marks& marks = GetParam();
+  const BuiltinScene builtin = make_builtin_scene(marks.name);
+  EXPECT_GE(builtin.gaussians.sh_degree(), 1);
+  EXPECT_GE(builtin.gaussians.size(), 150000u);
+  EXPECT_LE(builtin.gaussians.size(), 650000u);
+  EXPECT_EQ(hash_of(builtin.gaussians), marks.scene_hash) << std::hex << hash_of(builtin.gaussians);
+
+  SceneSummary summary;
+  const Draw draw = preprocess(builtin.gaussians, look_at(builtin.info.view, builtin.info.size), {}, summary);
+  EXPECT_EQ(hash_of(draw), marks.draw_hash) << std::hex << hash_of(draw);
+  EXPECT_EQ(summary.rejected.total(), 0u);
+  const testing::ReferenceImage whole = testing::render_reference(draw);
+  testing::ReferenceOptions options;
+  options.termination_threshold = 0.996;
+  const testing::ReferenceImage terminated = testing::render_reference(draw, options);
+
+  const double pixels = static_cast<double>(draw.width) * draw.height;
+  const double per_pixel = static_cast<double>(whole.fragments_covered) / pixels;
+  EXPECT_GE(per_pixel, 90);
+  EXPECT_LE(per_pixel, 190);
+  const double ratio = static_cast<double>(whole.fragments_blended) / static_cast<double>(terminated.fragments_blended);
+  EXPECT_GE(ratio, marks.least_ratio);
+  EXPECT_LE(ratio, marks.most_ratio);
+  const double per_splat = static_cast<double>(whole.fragments_covered) / static_cast<double>(draw.splats.size());
+  EXPECT_GE(per_splat, 50);
+  EXPECT_LE(per_splat, 350);
+
+  // Something to see: many different colours, nearly all pixels filled.
+  std::set<int> colours;
+  std::size_t filled = 0;
+  for (const auto& rgba : whole.rgba) {
+    filled += rgba[3] > 0.9;
+    colours.insert(static_cast<int>(rgba[0] * 15) * 256 + static_cast<int>(rgba[1] * 15) * 16 + static_cast<int>(rgba[2] * 15));
+  }
+  EXPECT_GT(static_cast<double>(filled), 0.95 * pixels);
+  EXPECT_GT(colours.size(), 200u);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, BuiltinSceneMarks,
+                         ::testing::Values(Marks{"object", 1.5, 2.5, 0xe92fba68cefc2487u, 0x1500f97734b33edau},
+                                           Marks{"indoor", 1.5, 2.5, 0x6f4135ccdcff3eadu, 0x5996d84f7542c595u},
+                                           Marks{"outdoor", 2.5, 4.4, 0xc2439b2563c49edfu, 0x1002638defa821d8u}),
+                         [](const auto& parameter) { return parameter.param.name; });
+
+}  // namespace
+}  // namespace vrpipe

@@ -1,0 +1,181 @@
+#include <vrpipe/workloads/camera.h>
+
+#include <cmath>
+#include <limits>
+
+#include <nlohmann/json.hpp>
+
+#include "workload_test_support.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::expect_user_error;
+
+Vec3 column(const Camera& camera, std::size_t i) {
+  return {camera.rotation[0][i], camera.rotation[1][i], camera.rotation[2][i]};
+}
+
+void expect_near(const Vec3& a, const Vec3& b, double tolerance) {
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(a[i], b[i], tolerance) << i;
+}
+
+TEST(LookAt, InAYDownWorldLookingAlongZIsTheIdentity) {
+  const Camera camera = look_at({1, 2, 3}, {1, 2, 9}, {0, -1, 0}, 90, 640, 480);
+  expect_near(column(camera, 0), {1, 0, 0}, 0);
+  expect_near(column(camera, 1), {0, 1, 0}, 0);
+  expect_near(column(camera, 2), {0, 0, 1}, 0);
+  EXPECT_NEAR(camera.fy, 240, 1e-12);
+  EXPECT_EQ(camera.fx, camera.fy);
+  EXPECT_EQ(camera.near_plane, 0.2f);
+}
+
+TEST(LookAt, AxesAreRightDownForwardAndRightHanded) {
+  const Camera camera = look_at({3, 1, -4}, {-1, 0.5, 2}, {0.2, 1, 0.1}, 50, 640, 480);
+  const Vec3 right = column(camera, 0), down = column(camera, 1), forward = column(camera, 2);
+  const Vec3 cross = {right[1] * down[2] - right[2] * down[1], right[2] * down[0] - right[0] * down[2],
+                      right[0] * down[1] - right[1] * down[0]};
+  expect_near(cross, forward, 1e-15);
+  const double length = std::sqrt(16 + 0.25 + 36);
+  expect_near(forward, {-4 / length, -0.5 / length, 6 / length}, 1e-15);
+  EXPECT_LT(0.2 * down[0] + down[1] + 0.1 * down[2], 0) << "down points away from up";
+  EXPECT_NEAR(0.2 * right[0] + right[1] + 0.1 * right[2], 0, 1e-15) << "the horizon is level";
+}
+
+TEST(LookAt, LengthsAndMagnitudesOfTheArgumentsDoNotMatter) {
+  const Camera a = look_at({0, 0, 0}, {1, 1, 2}, {0, -1, 0}, 50, 64, 64);
+  const Camera b = look_at({0, 0, 0}, {1e200, 1e200, 2e200}, {0, -1e-200, 0}, 50, 64, 64);
+  for (std::size_t row = 0; row < 3; ++row) expect_near(a.rotation[row], b.rotation[row], 1e-15);
+}
+
+TEST(LookAt, RefusesWhatHasNoDirection) {
+  expect_user_error([] { look_at({1, 2, 3}, {1, 2, 3}, {0, -1, 0}, 50, 64, 64); }, {"--look-at", "where the camera stands"});
+  expect_user_error([] { look_at({0, 0, 0}, {0, 3, 0}, {0, -1, 0}, 50, 64, 64); }, {"--up", "parallel"});
+  expect_user_error([] { look_at({0, 0, 0}, {0, 0, 1}, {0, 0, 0}, 50, 64, 64); }, {"--up", "no direction"});
+  const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
+  expect_user_error([=] { look_at({nan, 0, 0}, {0, 0, 1}, {0, -1, 0}, 50, 64, 64); }, {"--eye", "not finite"});
+  expect_user_error([=] { look_at({0, 0, 0}, {0, 0, infinity}, {0, -1, 0}, 50, 64, 64); }, {"--look-at", "not finite"});
+  expect_user_error([=] { look_at({0, 0, 0}, {0, 0, 1}, {0, -infinity, 0}, 50, 64, 64); }, {"--up", "not finite"});
+}
+
+// P05: a field of view of 180 degrees.
+TEST(LookAt, FieldOfViewMustLieBetweenZeroAndAlmost180Degrees) {
+  for (const double fovy : {0.0, -10.0, 179.999, 180.0, 1e9, std::nan("")}) {
+    expect_user_error([=] { look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, fovy, 64, 64); }, {"--fovy"});
+  }
+  for (const double fovy : {1e-6, 0.01, 179.9, 179.9989}) {
+    const Camera camera = look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, fovy, 64, 64);
+    EXPECT_TRUE(std::isfinite(camera.fy) && camera.fy > 0);
+    EXPECT_NEAR(camera.fy / (32 / std::tan(fovy * 3.14159265358979323846 / 360)), 1.0, 1e-9);
+  }
+}
+
+TEST(LookAt, ImageSizeMustBeOneTo16384) {
+  for (const std::uint32_t side : {0u, 16385u, 4294967295u}) {
+    expect_user_error([=] { look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 50, side, 64); }, {"image size", "1 to 16384"});
+    expect_user_error([=] { look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 50, 64, side); }, {"image size", "1 to 16384"});
+  }
+  EXPECT_EQ(look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 50, 16384, 1).width, 16384u);
+}
+
+TEST(Resized, KeepsTheVerticalFieldOfViewAndSquarePixels) {
+  const Camera camera = resized(look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 50, 640, 480), {1000, 240});
+  EXPECT_EQ(camera.width, 1000u);
+  EXPECT_NEAR(camera.fy, look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 50, 1000, 240).fy, 1e-12);
+  EXPECT_EQ(camera.fx, camera.fy);
+  expect_user_error([&] { resized(camera, {0, 240}); }, {"--size"});
+}
+
+class CameraFile : public testing::FolderTest {
+ protected:
+  static nlohmann::json camera_json() {
+    return {{"id", 0},          {"img_name", "00001"},
+            {"width", 64},      {"height", 48},
+            {"position", {1, 2, 3}}, {"rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+            {"fx", 50.0},       {"fy", 51.0}};
+  }
+  void expect_refused(const std::string& text, const std::vector<std::string>& parts) {
+    const std::string path = write("cameras.json", text).string();
+    expect_user_error([&] { load_cameras(path); }, parts);
+  }
+  void expect_refused_with(const char* key, const nlohmann::json& value, const std::vector<std::string>& parts) {
+    nlohmann::json camera = camera_json();
+    camera[key] = value;
+    expect_refused(nlohmann::json::array({camera}).dump(), parts);
+  }
+};
+
+TEST_F(CameraFile, ReadsTheInriaLayout) {
+  nlohmann::json second = camera_json();
+  second["rotation"] = {{0, 0, 1}, {0, 1, 0}, {-1, 0, 0}};
+  const std::string path = write("cameras.json", nlohmann::json::array({camera_json(), second}).dump()).string();
+  const std::vector<Camera> cameras = load_cameras(path);
+  ASSERT_EQ(cameras.size(), 2u);
+  EXPECT_EQ(cameras[0].eye, (Vec3{1, 2, 3}));
+  EXPECT_EQ(cameras[0].fx, 50);
+  EXPECT_EQ(cameras[0].fy, 51);
+  EXPECT_EQ(column(cameras[1], 2), (Vec3{1, 0, 0})) << "columns are right, down, forward";
+}
+
+TEST_F(CameraFile, IndexSelectsAndSizeRescales) {
+  nlohmann::json second = camera_json();
+  second["fx"] = 70;
+  const std::string path = write("cameras.json", nlohmann::json::array({camera_json(), second}).dump()).string();
+  EXPECT_EQ(camera_from_file(path).fx, 50);
+  EXPECT_EQ(camera_from_file(path + "#1").fx, 70);
+  const Camera large = camera_from_file(path + "#1", ImageSize{200, 96});
+  EXPECT_EQ(large.fx, 140);
+  EXPECT_EQ(large.fy, 102);
+  EXPECT_EQ(large.width, 200u);
+  expect_user_error([&] { camera_from_file(path + "#2"); }, {"no camera 2", "the file has 2", "0 to 1"});
+  for (const char* index : {"#-1", "#x", "#", "#1x", "#99999999999999999999"}) {
+    expect_user_error([&] { camera_from_file(path + index); }, {path + index, "FILE#INDEX"});
+  }
+}
+
+TEST_F(CameraFile, WhatCannotBeUsedIsNamed) {
+  expect_user_error([&] { load_cameras(in_folder("none.json").string()); }, {"cannot read camera file", "no such file"});
+  expect_refused("[{", {"not valid JSON"});
+  expect_refused("{}", {"not an array of cameras"});
+  expect_refused("[3]", {"camera 0", "not an object"});
+  for (const char* key : {"width", "height", "position", "rotation", "fx", "fy"}) {
+    nlohmann::json camera = camera_json();
+    camera.erase(key);
+    expect_refused(nlohmann::json::array({camera_json(), camera}).dump(), {"camera 1", std::string("no \"") + key + "\""});
+  }
+  expect_refused_with("width", 0, {"\"width\"", "1 to 16384"});
+  expect_refused_with("height", 16385, {"\"height\"", "1 to 16384"});
+  expect_refused_with("width", 3.5, {"\"width\""});
+  expect_refused_with("position", {1, 2}, {"\"position\"", "3 numbers"});
+  expect_refused_with("position", {1, 2, "x"}, {"\"position\"", "not a number"});
+  expect_refused_with("rotation", {{1, 0, 0}, {0, 1, 0}}, {"\"rotation\"", "3 rows"});
+  expect_refused_with("rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, -1}}, {"not a rotation matrix", "right-handed"});
+  expect_refused_with("rotation", {{2, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {"not a rotation matrix"});
+  expect_refused_with("fx", 0, {"focal length"});
+  expect_refused_with("fy", -5, {"focal length"});
+  const std::string empty = write("empty.json", "[]").string();
+  expect_user_error([&] { camera_from_file(empty); }, {"no camera 0", "the file has 0"});
+}
+
+TEST(RealCameras, InriaTrainCamerasLoad) {
+  const auto path = testing::shared_folder() / "scenes/cameras/train_inria_first10.json";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no train cameras in " << testing::shared_folder();
+  const std::vector<Camera> cameras = load_cameras(path.string());
+  ASSERT_EQ(cameras.size(), 10u);
+  EXPECT_EQ(cameras[0].width, 1959u);
+  EXPECT_NEAR(cameras[0].fy, 1164.66, 0.01);
+}
+
+TEST(RealCameras, LookAtAgreesWithTheSuggestedViews) {
+  const auto path = testing::shared_folder() / "scenes/cameras/suggested_views.json";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no suggested views in " << testing::shared_folder();
+  const auto vec = [](const nlohmann::json& v) { return Vec3{v[0], v[1], v[2]}; };
+  for (const auto& view : nlohmann::json::parse(testing::read_bytes(path))) {
+    const Camera camera = look_at(vec(view["eye"]), vec(view["look_at"]), vec(view["up"]), view["fovy_deg"], view["width"], view["height"]);
+    EXPECT_NEAR(camera.fy, view["fy"].get<double>(), 1e-9);
+    for (std::size_t row = 0; row < 3; ++row) expect_near(camera.rotation[row], vec(view["rotation"][row]), 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe

@@ -1,0 +1,209 @@
+#include <vrpipe/workloads/scene.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include <nlohmann/json.hpp>
+
+#include <vrpipe/workloads/draw_list.h>
+
+#include "../support/reference_renderer.h"
+#include "workload_test_support.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::expect_user_error;
+
+class SceneFile : public testing::FolderTest {
+ protected:
+  SceneFile() {
+    std::vector<GaussianAttributes> gaussians(4, testing::ordinary_gaussian());
+    gaussians[1].position = {1, 0, 6};
+    gaussians[2].position = {0, 1, 5};
+    gaussians[3].rotation = {0, 0, 0, 0};
+    write_gaussian_ply(in_folder("four.ply"), testing::scene_of(gaussians));
+    request_.scene = in_folder("four.ply").string();
+  }
+  SceneRequest request_;
+};
+
+TEST_F(SceneFile, PlyWithoutAnyOptionGetsAViewThatShowsItAll) {
+  const LoadedScene loaded = load_scene(request_);
+  EXPECT_EQ(loaded.summary.name, "four.ply");
+  EXPECT_EQ(loaded.summary.gaussians_total, 4u);
+  EXPECT_EQ(loaded.summary.gaussians_visible, 3u);
+  EXPECT_EQ(loaded.summary.rejected.zero_quaternion, 1u);
+  EXPECT_EQ(loaded.draw.width, kDefaultImageSize.width);
+  EXPECT_EQ(loaded.draw.height, kDefaultImageSize.height);
+  for (const Splat& s : loaded.draw.splats) {
+    EXPECT_TRUE(s.cx > 0 && s.cx < static_cast<float>(loaded.draw.width) && s.cy > 0 && s.cy < static_cast<float>(loaded.draw.height));
+  }
+}
+
+TEST_F(SceneFile, TheWorldsUpIsMinusYUnlessSaidOtherwise) {
+  request_.eye = Vec3{0, 0, 0};
+  request_.look_at = Vec3{0, 0, 1};
+  const auto lowest = [](const Draw& draw) {
+    return std::max_element(draw.splats.begin(), draw.splats.end(), [](const Splat& a, const Splat& b) { return a.cy < b.cy; })->cy;
+  };
+  const auto highest = [](const Draw& draw) {
+    return std::min_element(draw.splats.begin(), draw.splats.end(), [](const Splat& a, const Splat& b) { return a.cy < b.cy; })->cy;
+  };
+  const float middle = static_cast<float>(kDefaultImageSize.height) / 2;
+  EXPECT_GT(lowest(load_scene(request_).draw), middle + 50) << "the one at y = 1 is below";
+  request_.up = Vec3{0, 1, 0};
+  EXPECT_LT(highest(load_scene(request_).draw), middle - 50) << "with y up it is above";
+}
+
+TEST_F(SceneFile, ViewOptionsReplaceWhatTheyName) {
+  request_.eye = Vec3{0, 0, 0};
+  request_.look_at = Vec3{0, 0, 1};
+  request_.fovy_degrees = 90;
+  request_.size = ImageSize{64, 64};
+  SceneSummary summary;
+  const Draw expected = preprocess(open_gaussian_ply(request_.scene), look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 90, 64, 64), {}, summary);
+  const Draw draw = load_scene(request_).draw;
+  ASSERT_EQ(draw.splats.size(), expected.splats.size());
+  EXPECT_EQ(std::memcmp(draw.splats.data(), expected.splats.data(), draw.splats.size() * sizeof(Splat)), 0);
+}
+
+TEST_F(SceneFile, CameraFileGivesSizeAndViewAndExcludesViewOptions) {
+  write("cameras.json",
+        R"([{"width":64,"height":48,"position":[0,0,0],"rotation":[[1,0,0],[0,1,0],[0,0,1]],"fx":40,"fy":40}])");
+  request_.camera = in_folder("cameras.json").string();
+  EXPECT_EQ(load_scene(request_).draw.height, 48u);
+  EXPECT_EQ(load_scene(request_).draw.splats[0].cx, 32);
+  request_.size = ImageSize{128, 96};
+  EXPECT_EQ(load_scene(request_).draw.splats[0].cx, 64);
+  request_.fovy_degrees = 40;
+  expect_user_error([&] { load_scene(request_); }, {"--fovy", "--camera gives a whole camera"});
+  request_.fovy_degrees.reset();
+  request_.eye = Vec3{};
+  expect_user_error([&] { load_scene(request_); }, {"--eye", "--camera gives a whole camera"});
+}
+
+TEST_F(SceneFile, ADrawListComesInAsItIsAndRefusesCameras) {
+  const LoadedScene original = load_scene(request_);
+  write_draw_list(in_folder("saved.SPL"), original.draw);
+  SceneRequest replay;
+  replay.scene = in_folder("saved.SPL").string();
+  const LoadedScene loaded = load_scene(replay);
+  ASSERT_EQ(loaded.draw.splats.size(), original.draw.splats.size());
+  EXPECT_EQ(std::memcmp(loaded.draw.splats.data(), original.draw.splats.data(), original.draw.splats.size() * sizeof(Splat)), 0);
+  EXPECT_EQ(loaded.draw.width, original.draw.width);
+  EXPECT_EQ(loaded.summary.gaussians_total, 3u);
+  EXPECT_EQ(loaded.summary.name, "saved.SPL");
+  SceneRequest sized = replay;
+  sized.size = ImageSize{64, 64};
+  expect_user_error([&] { load_scene(sized); }, {"--size", ".spl"});
+  SceneRequest viewed = replay;
+  viewed.up = Vec3{0, 1, 0};
+  expect_user_error([&] { load_scene(viewed); }, {"--up", ".spl"});
+  SceneRequest filmed = replay;
+  filmed.camera = "cameras.json";
+  expect_user_error([&] { load_scene(filmed); }, {"--camera", ".spl"});
+}
+
+TEST_F(SceneFile, UnknownKindsOfFilesAreRefusedWithWhatIsSupported) {
+  request_.scene = "scene.splat";
+  expect_user_error([&] { load_scene(request_); }, {"scene.splat", "`.splat` are not supported", ".ply", ".spl", "builtin:NAME"});
+  request_.scene = "scene";
+  expect_user_error([&] { load_scene(request_); }, {"no extension"});
+  request_.scene = "builtin:objekt";
+  expect_user_error([&] { load_scene(request_); }, {"builtin:object?"});
+}
+
+TEST_F(SceneFile, SizeOutOfRangeIsRefused) {
+  request_.size = ImageSize{0, 10};
+  expect_user_error([&] { load_scene(request_); }, {"--size", "0x10", "1 to 16384"});
+  request_.size = ImageSize{10, 16385};
+  expect_user_error([&] { load_scene(request_); }, {"--size", "10x16385"});
+}
+
+TEST_F(SceneFile, AnEmptySceneIsAnEmptyDraw) {
+  write_gaussian_ply(in_folder("none.ply"), GaussianScene());
+  request_.scene = in_folder("none.ply").string();
+  EXPECT_TRUE(load_scene(request_).draw.splats.empty());
+}
+
+TEST(BuiltinRequest, TheDefaultIsTheObjectSceneAndOptionsChangeIt) {
+  SceneRequest request;
+  request.size = ImageSize{100, 80};
+  const LoadedScene loaded = load_scene(request);
+  EXPECT_EQ(loaded.summary.name, "builtin:object");
+  EXPECT_EQ(loaded.draw.width, 100u);
+  EXPECT_GT(loaded.summary.gaussians_visible, 100000u);
+  request.eye = Vec3{0, -20, 0.001};
+  EXPECT_NE(load_scene(request).summary.gaussians_visible, loaded.summary.gaussians_visible);
+}
+
+TEST(RealScene, PlaybotRendersWithTheWorkloadOfItsSuggestedView) {
+  const auto folder = testing::shared_folder() / "scenes";
+  const auto ply = folder / "playbot/playbot_lod2_sh2.inria.ply";
+  if (!std::filesystem::exists(ply)) GTEST_SKIP() << "no playbot scene in " << folder;
+  SceneRequest request;
+  request.scene = ply.string();
+  request.eye = Vec3{-2, -1.5, -2};
+  request.look_at = Vec3{0, -0.35, 0};
+  request.fovy_degrees = 45;
+  request.size = ImageSize{640, 480};
+  const LoadedScene loaded = load_scene(request);
+  EXPECT_EQ(loaded.summary.gaussians_total, 125000u);
+  // The CPU renderer behind suggested_views.json kept 124862.
+  EXPECT_NEAR(static_cast<double>(loaded.summary.gaussians_visible), 124862, 700);
+  const testing::ReferenceImage image = testing::render_reference(loaded.draw);
+  double transmitted = 0;
+  for (const auto& rgba : image.rgba) transmitted += 1 - rgba[3];
+  EXPECT_NEAR(transmitted / static_cast<double>(image.rgba.size()), 0.6972, 0.01);
+}
+
+/// A tensor of a safetensors file: an 8-byte header length, a JSON header, raw data.
+std::vector<float> read_tensor(const std::string& bytes, const std::string& name) {
+  std::uint64_t length = 0;
+  std::memcpy(&length, bytes.data(), sizeof length);
+  const auto header = nlohmann::json::parse(bytes.substr(8, static_cast<std::size_t>(length)));
+  const std::size_t begin = header.at(name).at("data_offsets").at(0), end = header.at(name).at("data_offsets").at(1);
+  std::vector<float> values((end - begin) / sizeof(float));
+  std::memcpy(values.data(), bytes.data() + 8 + length + begin, end - begin);
+  return values;
+}
+
+TEST(GoldenImage, AgreesWithGsplatWithinSixThousandths) {
+  const auto path = testing::shared_folder() / "scenes/golden/tiny_case.safetensors";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no golden case in " << testing::shared_folder();
+  const std::string bytes = testing::read_bytes(path);
+  const auto means = read_tensor(bytes, "means"), scales = read_tensor(bytes, "scales"), quats = read_tensor(bytes, "quats"),
+             opacities = read_tensor(bytes, "opacities"), coefficients = read_tensor(bytes, "coeffs"), golden = read_tensor(bytes, "out_img");
+  std::vector<GaussianAttributes> gaussians(opacities.size());
+  for (std::size_t i = 0; i < gaussians.size(); ++i) {
+    GaussianAttributes& g = gaussians[i];
+    for (std::size_t k = 0; k < 3; ++k) {
+      g.position[k] = means[3 * i + k];
+      g.log_scale[k] = scales[3 * i + k];
+      g.f_dc[k] = coefficients[48 * i + k];
+      for (std::size_t c = 1; c < 16; ++c) g.f_rest[k][c - 1] = coefficients[48 * i + 3 * c + k];
+    }
+    for (std::size_t k = 0; k < 4; ++k) g.rotation[k] = quats[4 * i + k];
+    g.opacity_logit = opacities[i];
+  }
+  Camera camera;
+  camera.eye = {0.123, 0.456, -8};
+  camera.fx = camera.fy = 61.5;
+  camera.width = 123;
+  camera.height = 82;
+  SceneSummary summary;
+  const Draw draw = preprocess(testing::scene_of(gaussians, 3), camera, {}, summary);
+  const testing::ReferenceImage image = testing::render_reference(draw);
+  ASSERT_EQ(golden.size(), image.rgba.size() * 4);
+  double largest = 0, brightest = 0;
+  for (std::size_t i = 0; i < golden.size(); ++i) {
+    largest = std::max(largest, std::fabs(image.rgba[i / 4][i % 4] - static_cast<double>(golden[i])));
+    brightest = std::max(brightest, static_cast<double>(golden[i]));
+  }
+  EXPECT_LE(largest, 0.006);
+  EXPECT_GT(brightest, 0.3) << "the golden image is not empty";
+}
+
+}  // namespace
+}  // namespace vrpipe

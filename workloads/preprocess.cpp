@@ -1,0 +1,435 @@
+#include <vrpipe/workloads/preprocess.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <system_error>
+#include <thread>
+
+#include <vrpipe/error.h>
+#include <vrpipe/workloads/portable_math.h>
+
+namespace vrpipe {
+namespace {
+
+/// Gaussians that a thread takes at a time.
+constexpr std::uint64_t kChunk = 4096;
+/// Larger log scales are taken as this one: e^100 times any focal length, to the fourth power, still fits a double.
+constexpr double kMaxLogScale = 100.0;
+/// With this, no product of a projection overflows a double.
+constexpr float kMinNearPlane = 1e-6f;
+constexpr float kMaxFloat = std::numeric_limits<float>::max();
+constexpr float kPruneThreshold = 1.0f / 255.0f;
+
+// Real SH basis constants, as INRIA names them.
+constexpr double kShC0 = 0.28209479177387814;
+constexpr double kShC1 = 0.4886025119029199;
+constexpr std::array<double, 5> kShC2 = {1.0925484305920792, -1.0925484305920792, 0.31539156525252005,
+                                         -1.0925484305920792, 0.5462742152960396};
+constexpr std::array<double, 7> kShC3 = {-0.5900435899266435, 2.890611442640554, -0.4570457994644658, 0.3731763325901154,
+                                         -0.4570457994644658, 1.445305721320277, -0.5900435899266435};
+
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+template <std::size_t N>
+bool all_finite(const std::array<float, N>& values) {
+  return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
+}
+
+/// Casts a double of any size to a finite float.
+float to_float(double value) {
+  if (value >= kMaxFloat) return kMaxFloat;
+  if (value <= -kMaxFloat) return -kMaxFloat;
+  return static_cast<float>(value);
+}
+
+enum class Fate { visible, culled, not_finite, zero_quaternion };
+
+/// What the attributes alone decide. Independent of the camera, so counts do not change with the view.
+Fate check_attributes(const GaussianRef& gaussian, int degree) {
+  if (!all_finite(gaussian.position()) || !all_finite(gaussian.rotation()) || !all_finite(gaussian.f_dc())) {
+    return Fate::not_finite;
+  }
+  for (const float log_scale : gaussian.log_scale()) {
+    // Minus infinity is scale 0.
+    if (!(log_scale <= kMaxFloat)) return Fate::not_finite;
+  }
+  if (std::isnan(gaussian.opacity_logit())) return Fate::not_finite;
+  // Bands that are not evaluated may hold anything.
+  const std::uint32_t coefficients = kShRestPerChannel[static_cast<std::size_t>(degree)];
+  for (std::uint32_t channel = 0; channel < 3; ++channel) {
+    for (std::uint32_t c = 1; c <= coefficients; ++c) {
+      if (!std::isfinite(gaussian.f_rest(channel, c))) return Fate::not_finite;
+    }
+  }
+  const std::array<float, 4> q = gaussian.rotation();
+  if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return Fate::zero_quaternion;
+  return Fate::visible;
+}
+
+/// Rotation matrix, rows, of a quaternion (w, x, y, z) of any length but zero. The squares of the smallest and of the
+/// largest float are normal doubles, so no scaling is needed.
+std::array<Vec3, 3> rotation_matrix(const std::array<float, 4>& quaternion) {
+  const double w = quaternion[0], x = quaternion[1], y = quaternion[2], z = quaternion[3];
+  const double k = 2.0 / (w * w + x * x + y * y + z * z);
+  return {{{1.0 - k * (y * y + z * z), k * (x * y - w * z), k * (x * z + w * y)},
+           {k * (x * y + w * z), 1.0 - k * (x * x + z * z), k * (y * z - w * x)},
+           {k * (x * z - w * y), k * (y * z + w * x), 1.0 - k * (x * x + y * y)}}};
+}
+
+/// Projects Gaussians for one camera. Stateless between calls: any thread, any order, the same bits.
+class Projector {
+ public:
+  Projector(const Camera& camera, const PreprocessOptions& options) : camera_(camera), options_(options) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      world_to_camera_[i] = {camera.rotation[0][i], camera.rotation[1][i], camera.rotation[2][i]};
+    }
+    limit_x_ = 1.3 * (0.5 * camera.width / camera.fx);
+    limit_y_ = 1.3 * (0.5 * camera.height / camera.fy);
+  }
+
+  /// Fills the geometry and the opacity of `splat` and the camera z, if the Gaussian is visible.
+  /// @pre check_attributes passed
+  bool project(const GaussianRef& gaussian, Splat& splat, float& depth) const {
+    // The eye is subtracted in double, so a scene far from the origin loses nothing.
+    const Vec3 offset = eye_to(gaussian);
+    const double z = dot(world_to_camera_[2], offset);
+    if (!(z > static_cast<double>(camera_.near_plane))) return false;
+    const float opacity = static_cast<float>(sigmoid(static_cast<double>(gaussian.opacity_logit())));
+    if (!(opacity >= kPruneThreshold)) return false;
+
+    const double ray_x = dot(world_to_camera_[0], offset) / z;
+    const double ray_y = dot(world_to_camera_[1], offset) / z;
+    Vec3 m1, m2;
+    covariance_factor(gaussian, z, ray_x, ray_y, m1, m2);
+    const EllipseAxes ellipse = decompose_covariance(m1, m2);
+
+    const double r = half_extent_in_sigmas(opacity, options_.extent);
+    const double half_width = 0.5 * camera_.width, half_height = 0.5 * camera_.height;
+    // Centre relative to the image's centre, along the ellipse's axes: there an extent can be limited exactly.
+    const double x = camera_.fx * ray_x, y = camera_.fy * ray_y;
+    double along_a = x * ellipse.axis_x + y * ellipse.axis_y;
+    double along_b = y * ellipse.axis_x - x * ellipse.axis_y;
+    double extent_a = std::sqrt(ellipse.lambda1) * r;
+    double extent_b = std::sqrt(ellipse.lambda2) * r;
+    const bool limited = extent_a > kMaxHalfExtent;
+    limit_extent(extent_a, along_a);
+    limit_extent(extent_b, along_b);
+    const double cx = half_width + (limited ? along_a * ellipse.axis_x - along_b * ellipse.axis_y : x);
+    const double cy = half_height + (limited ? along_a * ellipse.axis_y + along_b * ellipse.axis_x : y);
+    const double ax = extent_a * ellipse.axis_x, ay = extent_a * ellipse.axis_y;
+    const double bx = -extent_b * ellipse.axis_y, by = extent_b * ellipse.axis_x;
+
+    const double reach_x = std::fabs(ax) + std::fabs(bx), reach_y = std::fabs(ay) + std::fabs(by);
+    if (!(cx + reach_x >= 0 && cx - reach_x <= camera_.width)) return false;
+    if (!(cy + reach_y >= 0 && cy - reach_y <= camera_.height)) return false;
+
+    splat.cx = static_cast<float>(cx);
+    splat.cy = static_cast<float>(cy);
+    splat.ax = static_cast<float>(ax);
+    splat.ay = static_cast<float>(ay);
+    splat.bx = static_cast<float>(bx);
+    splat.by = static_cast<float>(by);
+    splat.r = static_cast<float>(r);
+    splat.reserved = 0;
+    splat.opacity = opacity;
+    depth = to_float(z);
+    return true;
+  }
+
+  void colour(const GaussianRef& gaussian, int degree, Splat& splat) const {
+    Vec3 direction = eye_to(gaussian);
+    const double length = std::sqrt(dot(direction, direction));
+    for (double& component : direction) component = length > 0 ? component / length : 0.0;
+    const std::array<float, 3> rgb = sh_colour(gaussian, direction, degree);
+    splat.red = rgb[0];
+    splat.green = rgb[1];
+    splat.blue = rgb[2];
+  }
+
+ private:
+  Vec3 eye_to(const GaussianRef& gaussian) const {
+    const std::array<float, 3> position = gaussian.position();
+    return {static_cast<double>(position[0]) - camera_.eye[0], static_cast<double>(position[1]) - camera_.eye[1],
+            static_cast<double>(position[2]) - camera_.eye[2]};
+  }
+
+  /// Rows of M = J W R S with Sigma = M M^T: the Jacobian of the projection, the view, the Gaussian's axes.
+  void covariance_factor(const GaussianRef& gaussian, double z, double ray_x, double ray_y, Vec3& m1, Vec3& m2) const {
+    const double x = std::min(limit_x_, std::max(-limit_x_, ray_x));
+    const double y = std::min(limit_y_, std::max(-limit_y_, ray_y));
+    const double focal_x = camera_.fx / z, focal_y = camera_.fy / z;
+    Vec3 j1, j2;  // rows of J W
+    for (std::size_t k = 0; k < 3; ++k) {
+      j1[k] = focal_x * (world_to_camera_[0][k] - x * world_to_camera_[2][k]);
+      j2[k] = focal_y * (world_to_camera_[1][k] - y * world_to_camera_[2][k]);
+    }
+    const std::array<Vec3, 3> rotation = rotation_matrix(gaussian.rotation());
+    const std::array<float, 3> log_scale = gaussian.log_scale();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double scale = portable_exp(std::min(static_cast<double>(log_scale[k]), kMaxLogScale));
+      const Vec3 axis = {rotation[0][k], rotation[1][k], rotation[2][k]};
+      m1[k] = dot(j1, axis) * scale;
+      m2[k] = dot(j2, axis) * scale;
+    }
+  }
+
+  /// See kMaxHalfExtent.
+  static void limit_extent(double& extent, double& offset) {
+    if (!(extent > kMaxHalfExtent)) return;
+    offset *= kMaxHalfExtent / extent;
+    extent = kMaxHalfExtent;
+  }
+
+  const Camera& camera_;
+  const PreprocessOptions& options_;
+  std::array<Vec3, 3> world_to_camera_;  ///< rows: right, down, forward
+  double limit_x_, limit_y_;
+};
+
+/// Runs work(chunk) for chunk 0 .. chunks-1 on up to `threads` threads, whichever is free.
+template <class Work>
+void for_each_chunk(std::uint64_t chunks, unsigned threads, const Work& work) {
+  std::atomic<std::uint64_t> next{0};
+  const auto run = [&] {
+    for (std::uint64_t chunk = next++; chunk < chunks; chunk = next++) work(chunk);
+  };
+  std::vector<std::thread> others;
+  try {
+    for (unsigned i = 1; i < threads && i < chunks; ++i) others.emplace_back(run);
+  } catch (const std::system_error&) {
+    // No more threads to be had: those that run do the work.
+  }
+  run();
+  for (std::thread& thread : others) thread.join();
+}
+
+void check_options(const GaussianScene& scene, const Camera& camera, const PreprocessOptions& options) {
+  constexpr char kCannot[] = "cannot preprocess the scene";
+  if (options.sh_degree < 0 || options.sh_degree > 3) {
+    throw UserError(kCannot, "SH degree", "it is " + std::to_string(options.sh_degree), "give 0 to 3");
+  }
+  const int bits = options.depth_key_bits;
+  if (bits != 32 && bits != 24 && bits != 16 && bits != 12) {
+    throw UserError(kCannot, "depth key bits", "there are " + std::to_string(bits), "give 32, 24, 16 or 12");
+  }
+  // Indices are 32 bits beside the key.
+  if (scene.size() > std::numeric_limits<std::uint32_t>::max()) {
+    throw UserError(kCannot, "scene", "it has " + std::to_string(scene.size()) + " Gaussians", "use at most 2^32-1");
+  }
+  check_image_size(camera.width, camera.height, "camera");
+  const float near_plane = camera.near_plane;
+  bool good = camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy);
+  good = good && near_plane >= kMinNearPlane && std::isfinite(near_plane);
+  for (std::size_t i = 0; i < 3; ++i) {
+    good = good && std::isfinite(camera.eye[i]);
+    for (const double element : camera.rotation[i]) good = good && std::fabs(element) <= 2;
+  }
+  if (!good) {
+    throw UserError(kCannot, "camera", "an element is not finite, a focal length is not above 0, or the near plane is below 1e-6",
+                    "make it with look_at or load_cameras");
+  }
+}
+
+void reduce_keys(std::vector<std::uint64_t>& entries, int bits) {
+  if (bits == 32 || entries.empty()) return;
+  std::uint64_t low = std::numeric_limits<std::uint64_t>::max(), high = 0;
+  for (const std::uint64_t entry : entries) {
+    low = std::min(low, entry >> 32);
+    high = std::max(high, entry >> 32);
+  }
+  const std::uint64_t range = high - low + 1;
+  for (std::uint64_t& entry : entries) {
+    const std::uint64_t key = (((entry >> 32) - low) << bits) / range;
+    entry = (key << 32) | (entry & 0xffffffffu);
+  }
+}
+
+}  // namespace
+
+double covariance_determinant(const Vec3& m1, const Vec3& m2) {
+  const Vec3 c = {m1[1] * m2[2] - m1[2] * m2[1], m1[2] * m2[0] - m1[0] * m2[2], m1[0] * m2[1] - m1[1] * m2[0]};
+  return dot(c, c) + kDilation * (dot(m1, m1) + dot(m2, m2)) + kDilation * kDilation;
+}
+
+EllipseAxes decompose_covariance(const Vec3& m1, const Vec3& m2) {
+  // Sigma = [a b; b d]
+  const double a = dot(m1, m1), b = dot(m1, m2), d = dot(m2, m2);
+  if (b == 0) {  // axis-aligned: no square root, no division, so exact
+    if (a >= d) return {a + kDilation, d + kDilation, 1.0, 0.0};
+    return {d + kDilation, a + kDilation, 0.0, 1.0};
+  }
+  const double half_difference = 0.5 * (a - d);
+  const double radius = std::sqrt(half_difference * half_difference + b * b);
+  const double lambda1 = 0.5 * (a + d) + radius + kDilation;
+  // det / lambda1 keeps a small lambda2 that lambda1 - 2 radius would lose; rounding must not leave the dilation.
+  const double quotient = covariance_determinant(m1, m2) / lambda1;
+  const double lambda2 = std::min(lambda1, std::max(kDilation, quotient));
+  // Of the two rows of Sigma - lambda2 I, the one whose terms do not cancel.
+  double x = b, y = b;
+  if (a >= d) {
+    x = half_difference + radius;
+  } else {
+    y = radius - half_difference;
+  }
+  // Denormal b: its square vanished, and with it the length of (x, y).
+  const double largest = std::max(std::fabs(x), std::fabs(y));
+  x /= largest;
+  y /= largest;
+  const double length = std::sqrt(x * x + y * y);
+  return {lambda1, lambda2, x / length, y / length};
+}
+
+double half_extent_in_sigmas(float opacity, SplatExtent extent) {
+  if (extent == SplatExtent::three_sigma) return 3.0;
+  // 1/255 rounded to float is a little more than 1/255; the splat reaches its centre alone.
+  if (opacity <= kPruneThreshold) return 0.0;
+  return std::sqrt(2.0 * portable_log(255.0 * static_cast<double>(opacity)));
+}
+
+double sigmoid(double logit) {
+  // The exponential's argument is never positive, so it never overflows.
+  if (logit >= 0) return 1.0 / (1.0 + portable_exp(-logit));
+  const double e = portable_exp(logit);
+  return e / (1.0 + e);
+}
+
+std::array<float, 3> sh_colour(const GaussianRef& gaussian, const Vec3& direction, int degree) {
+  const double x = direction[0], y = direction[1], z = direction[2];
+  const std::array<float, 3> f_dc = gaussian.f_dc();
+  degree = std::min(degree, gaussian.sh_degree());
+  if (x == 0 && y == 0 && z == 0) degree = 0;
+  std::array<double, 15> basis{};
+  if (degree >= 1) {
+    basis[0] = -kShC1 * y;
+    basis[1] = kShC1 * z;
+    basis[2] = -kShC1 * x;
+  }
+  const double xx = x * x, yy = y * y, zz = z * z;
+  if (degree >= 2) {
+    basis[3] = kShC2[0] * (x * y);
+    basis[4] = kShC2[1] * (y * z);
+    basis[5] = kShC2[2] * (2.0 * zz - xx - yy);
+    basis[6] = kShC2[3] * (x * z);
+    basis[7] = kShC2[4] * (xx - yy);
+  }
+  if (degree >= 3) {
+    basis[8] = kShC3[0] * (y * (3.0 * xx - yy));
+    basis[9] = kShC3[1] * (x * y * z);
+    basis[10] = kShC3[2] * (y * (4.0 * zz - xx - yy));
+    basis[11] = kShC3[3] * (z * (2.0 * zz - 3.0 * xx - 3.0 * yy));
+    basis[12] = kShC3[4] * (x * (4.0 * zz - xx - yy));
+    basis[13] = kShC3[5] * (z * (xx - yy));
+    basis[14] = kShC3[6] * (x * (xx - 3.0 * yy));
+  }
+  std::array<float, 3> rgb{};
+  for (std::uint32_t channel = 0; channel < 3; ++channel) {
+    // Left to right whatever the degree: a band of zeros changes no bit.
+    double sum = kShC0 * static_cast<double>(f_dc[channel]);
+    for (std::uint32_t c = 1; c <= kShRestPerChannel[static_cast<std::size_t>(degree)]; ++c) {
+      sum += basis[c - 1] * static_cast<double>(gaussian.f_rest(channel, c));
+    }
+    sum += 0.5;
+    rgb[channel] = sum > 0 ? to_float(sum) : 0.0f;  // also NaN becomes 0
+  }
+  return rgb;
+}
+
+std::uint32_t depth_key(float depth) {
+  depth += 0.0f;  // -0 becomes +0
+  std::uint32_t bits;
+  std::memcpy(&bits, &depth, sizeof bits);
+  return (bits & 0x80000000u) != 0 ? ~bits : bits | 0x80000000u;
+}
+
+void sort_by_key(std::vector<std::uint64_t>& entries) {
+  std::vector<std::uint64_t> other(entries.size());
+  for (unsigned shift = 32; shift < 64; shift += 8) {
+    std::array<std::size_t, 256> next{};
+    for (const std::uint64_t entry : entries) ++next[(entry >> shift) & 0xff];
+    if (!entries.empty() && next[(entries[0] >> shift) & 0xff] == entries.size()) continue;  // one value: in order
+    std::size_t sum = 0;
+    for (std::size_t& slot : next) {
+      const std::size_t count = slot;
+      slot = sum;
+      sum += count;
+    }
+    for (const std::uint64_t entry : entries) other[next[(entry >> shift) & 0xff]++] = entry;
+    entries.swap(other);
+  }
+}
+
+Draw preprocess(const GaussianScene& scene, const Camera& camera, const PreprocessOptions& options,
+                SceneSummary& summary) {
+  check_options(scene, camera, options);
+  const int degree = std::min(options.sh_degree, scene.sh_degree());
+  const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
+  const Projector projector(camera, options);
+
+  // First which are visible, and their keys; the splats only once their places are known. Projecting twice is cheaper
+  // than a second copy of the splats, and keeps the memory per Gaussian small.
+  const std::uint64_t chunks = (scene.size() + kChunk - 1) / kChunk;
+  struct ChunkResult {
+    std::vector<std::uint64_t> entries;  ///< key << 32 | index
+    RejectedGaussians rejected;
+  };
+  std::vector<ChunkResult> results(static_cast<std::size_t>(chunks));
+  for_each_chunk(chunks, threads, [&](std::uint64_t chunk) {
+    std::vector<std::uint64_t> entries;
+    RejectedGaussians rejected;
+    const std::uint64_t end = std::min(scene.size(), (chunk + 1) * kChunk);
+    for (std::uint64_t i = chunk * kChunk; i < end; ++i) {
+      const GaussianRef gaussian = scene[i];
+      const Fate fate = check_attributes(gaussian, degree);
+      rejected.not_finite += fate == Fate::not_finite;
+      rejected.zero_quaternion += fate == Fate::zero_quaternion;
+      if (fate != Fate::visible) continue;
+      Splat splat;
+      float depth = 0;
+      if (!projector.project(gaussian, splat, depth)) continue;
+      entries.push_back((std::uint64_t{depth_key(depth)} << 32) | i);
+    }
+    entries.shrink_to_fit();
+    results[static_cast<std::size_t>(chunk)] = {std::move(entries), rejected};
+  });
+
+  RejectedGaussians rejected;
+  std::vector<std::uint64_t> order;
+  std::size_t visible = 0;
+  for (const ChunkResult& result : results) visible += result.entries.size();
+  order.reserve(visible);
+  for (ChunkResult& result : results) {
+    order.insert(order.end(), result.entries.begin(), result.entries.end());
+    rejected.not_finite += result.rejected.not_finite;
+    rejected.zero_quaternion += result.rejected.zero_quaternion;
+    result.entries = {};
+  }
+  results = {};
+  reduce_keys(order, options.depth_key_bits);
+  sort_by_key(order);
+
+  Draw draw;
+  draw.width = camera.width;
+  draw.height = camera.height;
+  draw.splats.resize(order.size());
+  for_each_chunk((order.size() + kChunk - 1) / kChunk, threads, [&](std::uint64_t chunk) {
+    const std::uint64_t end = std::min<std::uint64_t>(order.size(), (chunk + 1) * kChunk);
+    for (std::uint64_t rank = chunk * kChunk; rank < end; ++rank) {
+      const GaussianRef gaussian = scene[order[static_cast<std::size_t>(rank)] & 0xffffffffu];
+      Splat& splat = draw.splats[static_cast<std::size_t>(rank)];
+      float depth = 0;
+      projector.project(gaussian, splat, depth);
+      projector.colour(gaussian, degree, splat);
+    }
+  });
+
+  summary.gaussians_total = scene.size();
+  summary.gaussians_visible = draw.splats.size();
+  summary.rejected = rejected;
+  return draw;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,181 @@
+#include <vrpipe/workloads/scene.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <vector>
+
+#include <vrpipe/error.h>
+#include <vrpipe/workloads/builtin_scenes.h>
+#include <vrpipe/workloads/draw_list.h>
+#include <vrpipe/workloads/gaussian_scene.h>
+#include <vrpipe/workloads/portable_math.h>
+
+namespace vrpipe {
+namespace {
+
+constexpr char kCannotUse[] = "cannot use option";
+const std::string kBuiltinPrefix = "builtin:";
+
+
+Vec3 plus(const Vec3& a, const Vec3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+Vec3 scaled(const Vec3& a, double factor) { return {a[0] * factor, a[1] * factor, a[2] * factor}; }
+double length(const Vec3& a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
+
+/// The view with what the user named in place of what was there.
+View with_options(View view, const SceneRequest& request) {
+  if (request.eye) view.eye = *request.eye;
+  if (request.look_at) view.look_at = *request.look_at;
+  if (request.up) view.up = *request.up;
+  if (request.fovy_degrees) view.fovy_degrees = *request.fovy_degrees;
+  return view;
+}
+
+/// The automatic view that load_scene documents, for what the user did not name.
+View automatic_view(const GaussianScene& scene, const SceneRequest& request) {
+  View view;
+  if (request.up) view.up = *request.up;
+  if (request.fovy_degrees) view.fovy_degrees = *request.fovy_degrees;
+  // Quantiles of a sample: trained scenes hold a few Gaussians very far out.
+  constexpr std::uint64_t kSample = 100000;
+  const std::uint64_t step = scene.size() / kSample + 1;
+  std::array<std::vector<float>, 3> coordinates;
+  std::vector<float> sizes;
+  for (std::uint64_t i = 0; i < scene.size(); i += step) {
+    const std::array<float, 3> position = scene[i].position();
+    if (!std::isfinite(position[0]) || !std::isfinite(position[1]) || !std::isfinite(position[2])) continue;
+    const std::array<float, 3> log_scale = scene[i].log_scale();
+    if (!(log_scale[0] == log_scale[0] && log_scale[1] == log_scale[1] && log_scale[2] == log_scale[2])) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis) coordinates[axis].push_back(position[axis]);
+    sizes.push_back(std::max(log_scale[0], std::max(log_scale[1], log_scale[2])));
+  }
+  double squares = 0, size = 0;
+  Vec3 middle{};
+  if (!sizes.empty()) {
+    // Of few values, the low quantile is the least and the high one the greatest.
+    const auto quantile = [](std::vector<float>& values, std::size_t tenths) {
+      std::sort(values.begin(), values.end());
+      const std::size_t last = values.size() - 1;
+      return static_cast<double>(values[(last * tenths + (tenths > 5 ? 9 : 0)) / 10]);
+    };
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      middle[axis] = quantile(coordinates[axis], 5);
+      const double half = 0.5 * quantile(coordinates[axis], 9) - 0.5 * quantile(coordinates[axis], 1);
+      squares += half * half;
+    }
+    size = portable_exp(std::min(quantile(sizes, 5), 80.0));
+  }
+  view.look_at = request.look_at.value_or(middle);
+  if (request.eye) {
+    view.eye = *request.eye;
+    return view;
+  }
+  // Not nearer than three sigmas of the median Gaussian, nor than the near plane lets anything be seen.
+  const double radius = std::max(std::sqrt(squares), std::max(3.0 * size, 0.5));
+  // Out of range fields of view are refused by look_at.
+  const double half_fov = std::min(std::max(0.5 * view.fovy_degrees, 1.0), 80.0);
+  const double distance = radius / portable_sin(half_fov * 3.14159265358979323846 / 180.0);
+  // From the front (-z, or what of it is horizontal), 30 degrees to the left, 20 above.
+  Vec3 up = scaled(view.up, 1.0 / std::max(length(view.up), 1e-300));
+  if (!(length(up) > 0.5)) up = {0, -1, 0};  // refused by look_at
+  Vec3 front = plus(Vec3{0, 0, -1}, scaled(up, up[2]));
+  if (length(front) < 1e-3) front = {0, 1, 0};
+  front = scaled(front, 1.0 / length(front));
+  const Vec3 left = {front[1] * up[2] - front[2] * up[1], front[2] * up[0] - front[0] * up[2],
+                     front[0] * up[1] - front[1] * up[0]};
+  constexpr double kSin20 = 0.3420201433256687, kCos20 = 0.9396926207859084, kSin30 = 0.5, kCos30 = 0.8660254037844386;
+  const Vec3 level = plus(scaled(front, kCos30), scaled(left, kSin30));
+  const Vec3 direction = plus(scaled(level, kCos20), scaled(up, kSin20));
+  view.eye = plus(view.look_at, scaled(direction, distance));
+  return view;
+}
+
+void refuse(bool given, const std::string& option, const std::string& why, const std::string& remedy) {
+  if (given) throw UserError(kCannotUse, option, why, remedy);
+}
+
+void check_view_options(const SceneRequest& request) {
+  if (!request.camera) return;
+  const std::string why = "--camera gives a whole camera";
+  const std::string remedy = "give one or the other";
+  refuse(request.eye.has_value(), "--eye", why, remedy);
+  refuse(request.look_at.has_value(), "--look-at", why, remedy);
+  refuse(request.up.has_value(), "--up", why, remedy);
+  refuse(request.fovy_degrees.has_value(), "--fovy", why, remedy);
+}
+
+LoadedScene load_draw_list(const std::string& path, const SceneRequest& request) {
+  const std::string why = "a .spl is a draw list: its camera and size are part of it";
+  const std::string remedy = "leave the option out, or give the .ply";
+  refuse(request.size.has_value(), "--size", why, remedy);
+  refuse(request.camera.has_value(), "--camera", why, remedy);
+  refuse(request.eye.has_value(), "--eye", why, remedy);
+  refuse(request.look_at.has_value(), "--look-at", why, remedy);
+  refuse(request.up.has_value(), "--up", why, remedy);
+  refuse(request.fovy_degrees.has_value(), "--fovy", why, remedy);
+  DrawList list = read_draw_list(path);
+  LoadedScene loaded;
+  loaded.draw = std::move(list.draw);
+  loaded.summary.gaussians_total = list.splats_in_file;
+  loaded.summary.gaussians_visible = loaded.draw.splats.size();
+  loaded.summary.rejected.not_finite = list.dropped_not_finite;
+  return loaded;
+}
+
+LoadedScene load_gaussians(const GaussianScene& scene, const Camera& camera, const SceneRequest& request) {
+  LoadedScene loaded;
+  loaded.draw = preprocess(scene, camera, request.preprocess, loaded.summary);
+  return loaded;
+}
+
+LoadedScene load_builtin(const std::string& name, const SceneRequest& request) {
+  const BuiltinScene builtin = make_builtin_scene(name);
+  const Camera camera =
+      request.camera ? camera_from_file(*request.camera, request.size)
+                     : look_at(with_options(builtin.info.view, request), request.size.value_or(builtin.info.size));
+  return load_gaussians(builtin.gaussians, camera, request);
+}
+
+LoadedScene load_ply(const std::string& path, const SceneRequest& request) {
+  const GaussianScene scene = open_gaussian_ply(path);
+  const Camera camera = request.camera
+                            ? camera_from_file(*request.camera, request.size)
+                            : look_at(automatic_view(scene, request), request.size.value_or(kDefaultImageSize));
+  return load_gaussians(scene, camera, request);
+}
+
+std::string lower_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+}  // namespace
+
+LoadedScene load_scene(const SceneRequest& request) {
+  const std::string name = request.scene.empty() ? kBuiltinPrefix + kDefaultBuiltinScene : request.scene;
+  if (request.size) check_image_size(request.size->width, request.size->height, "--size");
+  LoadedScene loaded;
+  if (name.rfind(kBuiltinPrefix, 0) == 0) {
+    check_view_options(request);
+    loaded = load_builtin(name.substr(kBuiltinPrefix.size()), request);
+    loaded.summary.name = name;
+    return loaded;
+  }
+  const std::filesystem::path path(name);
+  const std::string extension = lower_case(path.extension().string());
+  if (extension == ".spl") {
+    loaded = load_draw_list(name, request);
+  } else if (extension == ".ply") {
+    check_view_options(request);
+    loaded = load_ply(name, request);
+  } else {
+    throw UserError("cannot read scene", name,
+                    extension.empty() ? "it has no extension" : "scenes of type `" + extension + "` are not supported",
+                    "give an INRIA .ply, a .spl draw list, or builtin:NAME");
+  }
+  loaded.summary.name = path.filename().string();
+  return loaded;
+}
+
+}  // namespace vrpipe

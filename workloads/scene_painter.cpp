@@ -1,0 +1,393 @@
+#include "scene_painter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <vrpipe/workloads/portable_math.h>
+
+namespace vrpipe {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kShC0 = 0.28209479177387814;
+constexpr double kShC1 = 0.4886025119029199;
+/// Mean area of a splat's box over the square of its median sigma, for the sizes and opacities of splat().
+constexpr double kBoxArea = 45.0;
+
+/// Two unit vectors at right angles to a unit vector.
+void tangents(const Vec3& normal, Vec3& t, Vec3& b) {
+  t = unit(std::fabs(normal[0]) < 0.6 ? cross(normal, {1, 0, 0}) : cross(normal, {0, 1, 0}));
+  b = cross(normal, t);
+}
+
+/// Unit quaternion (w, x, y, z) of the rotation with these columns, by its largest component.
+std::array<double, 4> quaternion(const Vec3& c0, const Vec3& c1, const Vec3& c2) {
+  const double trace = c0[0] + c1[1] + c2[2];
+  if (trace > 0) {
+    const double s = 2.0 * std::sqrt(1.0 + trace);
+    return {0.25 * s, (c1[2] - c2[1]) / s, (c2[0] - c0[2]) / s, (c0[1] - c1[0]) / s};
+  }
+  if (c0[0] > c1[1] && c0[0] > c2[2]) {
+    const double s = 2.0 * std::sqrt(1.0 + c0[0] - c1[1] - c2[2]);
+    return {(c1[2] - c2[1]) / s, 0.25 * s, (c1[0] + c0[1]) / s, (c2[0] + c0[2]) / s};
+  }
+  if (c1[1] > c2[2]) {
+    const double s = 2.0 * std::sqrt(1.0 + c1[1] - c0[0] - c2[2]);
+    return {(c2[0] - c0[2]) / s, (c1[0] + c0[1]) / s, 0.25 * s, (c2[1] + c1[2]) / s};
+  }
+  const double s = 2.0 * std::sqrt(1.0 + c2[2] - c0[0] - c1[1]);
+  return {(c0[1] - c1[0]) / s, (c2[0] + c0[2]) / s, (c2[1] + c1[2]) / s, 0.25 * s};
+}
+
+std::uint64_t scramble(std::uint64_t z) {
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return z ^ (z >> 31);
+}
+
+double lattice(std::int64_t x, std::int64_t y, std::int64_t z) {
+  const std::uint64_t key = static_cast<std::uint64_t>(x) * 0x9e3779b97f4a7c15u ^
+                            static_cast<std::uint64_t>(y) * 0xc2b2ae3d27d4eb4fu ^
+                            static_cast<std::uint64_t>(z) * 0x165667b19e3779f9u;
+  return static_cast<double>(scramble(key) >> 11) * (1.0 / 9007199254740992.0);
+}
+
+}  // namespace
+
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+Vec3 unit(const Vec3& a) {
+  const double length = std::sqrt(dot(a, a));
+  if (!(length > 0)) return {0, 1, 0};
+  return a * (1.0 / length);
+}
+
+Vec3 mix(const Vec3& a, const Vec3& b, double t) {
+  t = std::min(1.0, std::max(0.0, t));
+  return a * (1.0 - t) + b * t;
+}
+
+std::uint64_t RandomStream::next() {
+  state_ += 0x9e3779b97f4a7c15u;
+  return scramble(state_);
+}
+
+double RandomStream::uniform() { return static_cast<double>(next() >> 11) * (1.0 / 9007199254740992.0); }
+
+double RandomStream::normal() {
+  // Marsaglia's polar method; the second value is left unused to keep the stream simple.
+  for (;;) {
+    const double x = uniform(-1, 1), y = uniform(-1, 1);
+    const double s = x * x + y * y;
+    if (s > 0 && s < 1) return x * std::sqrt(-2.0 * portable_log(s) / s);
+  }
+}
+
+Vec3 RandomStream::direction() {
+  for (;;) {
+    const Vec3 p = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+    const double s = dot(p, p);
+    if (s > 1e-6 && s < 1) return p * (1.0 / std::sqrt(s));
+  }
+}
+
+double value_noise(const Vec3& p) {
+  std::array<std::int64_t, 3> cell;
+  Vec3 t;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double whole = std::floor(p[i]);
+    cell[i] = static_cast<std::int64_t>(whole);
+    const double f = p[i] - whole;
+    t[i] = f * f * (3.0 - 2.0 * f);
+  }
+  double sum = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int dx = corner & 1, dy = (corner >> 1) & 1, dz = corner >> 2;
+    const double weight = (dx ? t[0] : 1 - t[0]) * (dy ? t[1] : 1 - t[1]) * (dz ? t[2] : 1 - t[2]);
+    sum += weight * lattice(cell[0] + dx, cell[1] + dy, cell[2] + dz);
+  }
+  return sum;
+}
+
+double fractal_noise(const Vec3& p, int octaves) {
+  double sum = 0, weight = 0.5, total = 0, frequency = 1;
+  for (int i = 0; i < octaves; ++i) {
+    sum += weight * value_noise(p * frequency);
+    total += weight;
+    weight *= 0.5;
+    frequency *= 2.03;
+  }
+  return sum / total;
+}
+
+Paint plain(const Vec3& colour) {
+  return [colour](const Vec3&, double, double) { return colour; };
+}
+
+Surface quad_surface(const Vec3& corner, const Vec3& edge_u, const Vec3& edge_v) {
+  const Vec3 normal = unit(cross(edge_u, edge_v));
+  return [=](double u, double v) { return SurfacePoint{corner + edge_u * u + edge_v * v, normal}; };
+}
+
+Surface frustum_surface(const Vec3& base, const Vec3& top, double base_radius, double top_radius) {
+  const Vec3 axis = top - base;
+  const double length = std::sqrt(dot(axis, axis));
+  const Vec3 along = unit(axis);
+  Vec3 t, b;
+  tangents(along, t, b);
+  return [=](double u, double v) {
+    const double angle = 2 * kPi * u;
+    const Vec3 out = t * portable_cos(angle) + b * portable_sin(angle);
+    const double radius = base_radius + (top_radius - base_radius) * v;
+    const Vec3 normal = unit(out + along * ((base_radius - top_radius) / length));
+    return SurfacePoint{base + axis * v + out * radius, normal};
+  };
+}
+
+Surface disc_surface(const Vec3& centre, const Vec3& normal, double inner_radius, double outer_radius) {
+  const Vec3 n = unit(normal);
+  Vec3 t, b;
+  tangents(n, t, b);
+  return [=](double u, double v) {
+    const double angle = 2 * kPi * u;
+    const double radius = inner_radius + (outer_radius - inner_radius) * v;
+    return SurfacePoint{centre + (t * portable_cos(angle) + b * portable_sin(angle)) * radius, n};
+  };
+}
+
+Surface ellipsoid_surface(const Vec3& centre, const Vec3& radii) {
+  return [=](double u, double v) {
+    const double angle = 2 * kPi * u, y = 2 * v - 1;
+    const double ring = std::sqrt(std::max(0.0, 1 - y * y));
+    const Vec3 p = {ring * portable_cos(angle), y, ring * portable_sin(angle)};
+    return SurfacePoint{centre + p * radii, unit({p[0] / radii[0], p[1] / radii[1], p[2] / radii[2]})};
+  };
+}
+
+Surface dome_surface(const Vec3& centre, double radius, double low, double high) {
+  return [=](double u, double v) {
+    const double angle = 2 * kPi * u, y = low + (high - low) * v;
+    const double ring = std::sqrt(std::max(0.0, 1 - y * y));
+    const Vec3 p = {ring * portable_cos(angle), y, ring * portable_sin(angle)};
+    return SurfacePoint{centre + p * radius, p * -1.0};
+  };
+}
+
+ScenePainter::ScenePainter(std::uint64_t seed, const View& view, const ImageSize& size)
+    : random_(seed),
+      viewer_{view.eye[0], -view.eye[1], view.eye[2]},
+      camera_(look_at(view, size)),
+      pixel_angle_(2.0 * portable_tan_degrees(0.5 * view.fovy_degrees) / size.height),
+      builder_(1) {}
+
+void ScenePainter::block_box(const Vec3& centre, const Vec3& half) { blockers_.push_back({centre, half, false}); }
+void ScenePainter::block_ball(const Vec3& centre, const Vec3& radii) { blockers_.push_back({centre, radii, true}); }
+
+bool ScenePainter::blocked(const std::vector<Blocker>& blockers, const Vec3& from, const Vec3& direction, double reach) {
+  for (const Blocker& blocker : blockers) {
+    const Vec3 o = from - blocker.centre;
+    if (blocker.ball) {
+      const Vec3 scale = {1 / blocker.half[0], 1 / blocker.half[1], 1 / blocker.half[2]};
+      const Vec3 p = o * scale, d = direction * scale;
+      const double a = dot(d, d), b = dot(p, d), c = dot(p, p) - 1;
+      if (c <= 0 || b >= 0) continue;  // inside, or turned away
+      const double discriminant = b * b - a * c;
+      if (discriminant > 0 && -b - std::sqrt(discriminant) < reach * a) return true;
+      continue;
+    }
+    double enter = 1e-4, leave = reach;
+    bool inside = true;
+    for (std::size_t i = 0; i < 3 && enter <= leave; ++i) {
+      inside = inside && std::fabs(o[i]) < blocker.half[i];
+      if (std::fabs(direction[i]) < 1e-9) {
+        if (std::fabs(o[i]) > blocker.half[i]) leave = -1;
+        continue;
+      }
+      const double near_side = (-blocker.half[i] - o[i]) / direction[i];
+      const double far_side = (blocker.half[i] - o[i]) / direction[i];
+      enter = std::max(enter, std::min(near_side, far_side));
+      leave = std::min(leave, std::max(near_side, far_side));
+    }
+    if (!inside && enter < leave) return true;
+  }
+  return false;
+}
+
+bool ScenePainter::hidden(const Vec3& position, const Vec3& normal) const {
+  const Vec3 ray = viewer_ - position;
+  if (dot(ray, normal) < -0.05 * std::sqrt(dot(ray, ray))) return true;
+  // Stops short of the viewer and starts clear of the surface.
+  return blocked(blockers_, position + ray * 0.01, ray, 0.98) || blocked(screens_, position + ray * 0.01, ray, 0.98);
+}
+
+bool ScenePainter::out_of_view(const Vec3& position) const {
+  const Vec3 offset = {position[0] - camera_.eye[0], -position[1] - camera_.eye[1], position[2] - camera_.eye[2]};
+  Vec3 seen{};
+  for (std::size_t row = 0; row < 3; ++row) seen = seen + camera_.rotation[row] * offset[row];
+  constexpr double kMargin = 1.15;
+  return seen[2] < 0.3 || std::fabs(seen[0]) * camera_.fx > kMargin * 0.5 * camera_.width * seen[2] ||
+         std::fabs(seen[1]) * camera_.fy > kMargin * 0.5 * camera_.height * seen[2];
+}
+
+double ScenePainter::splat_size(const Vec3& position, double sigma_pixels) const {
+  const Vec3 offset = position - viewer_;
+  const double distance = std::max(0.5, std::sqrt(dot(offset, offset)));
+  return sigma_pixels * pixel_angle_ * distance;
+}
+
+void ScenePainter::splat(const Vec3& position, const Vec3& normal, const Paint& paint, double u, double v, const Brush& brush) {
+  if (hidden_share_ < 1 && hidden(position, normal) && random_.uniform() > hidden_share_) return;
+  const Vec3 albedo = paint(position, u, v);
+  const double size = splat_size(position, brush.sigma_pixels);
+  // One ray to a sun of some width and one into the sky; over the many splats of a pixel they add up to soft shadows.
+  const Vec3 sun_ray = unit(to_sun_ + random_.direction() * 0.06);
+  const double facing = dot(normal, to_sun_);
+  const double direct = facing > 0 && !blocked(blockers_, position, sun_ray, 1e3) ? facing : 0.0;
+  const Vec3 sky_ray = unit(normal + random_.direction() * 0.98);
+  const double open = blocked(blockers_, position, sky_ray, 1.5) ? 0.35 : 1.0;
+  const Vec3 light = sun_ * direct + sky_ * (open * (0.75 + 0.25 * normal[1]));
+  Vec3 colour = albedo * (light * (1 - brush.emission) + Vec3{1, 1, 1} * brush.emission);
+  const double tone = 1 + 0.06 * random_.normal();
+  colour = colour * tone;
+
+  GaussianAttributes g;
+  const Vec3 shifted = position + normal * (random_.normal() * brush.depth * size / (brush.sigma_pixels * pixel_angle_));
+  g.position = {static_cast<float>(shifted[0]), static_cast<float>(-shifted[1]), static_cast<float>(shifted[2])};
+
+  // A frame around the normal, which wobbles a little, turned at random about it. y turns down here.
+  const Vec3 tilted = unit(normal + random_.direction() * 0.15);
+  const Vec3 n = {tilted[0], -tilted[1], tilted[2]};
+  Vec3 t, b;
+  tangents(n, t, b);
+  Vec3 turn = random_.direction();
+  turn = turn - n * dot(turn, n);
+  if (dot(turn, turn) > 1e-4) {
+    t = unit(turn);
+    b = cross(n, t);
+  }
+  const std::array<double, 4> q = quaternion(t, b, n);
+  for (std::size_t i = 0; i < 4; ++i) g.rotation[i] = static_cast<float>(q[i]);
+
+  // Log-normal sizes, flat along the normal. A few splats are much larger and faint.
+  double log_size = portable_log(size);
+  double kind = random_.uniform();
+  const bool large = random_.uniform() < 0.012;
+  if (large) {
+    log_size += 1.1;
+    kind = 1 - 0.5 * brush.faint;
+  }
+  g.log_scale = {static_cast<float>(log_size + 0.45 * random_.normal()), static_cast<float>(log_size + 0.45 * random_.normal()),
+                 static_cast<float>(log_size + portable_log(brush.thickness) + 0.3 * random_.normal())};
+  double logit;
+  if (kind < brush.opaque) {
+    logit = 3.2 + 1.3 * random_.normal();
+  } else if (kind < 1 - brush.faint) {
+    logit = -0.2 + 1.0 * random_.normal();
+  } else {
+    logit = -2.4 + 0.8 * random_.normal();
+  }
+  g.opacity_logit = static_cast<float>(logit);
+
+  // Degree 1: brighter when seen along the mirrored sun ray.
+  const Vec3 mirrored = normal * (2 * facing) - to_sun_;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    g.f_dc[channel] = static_cast<float>((colour[channel] - 0.5) / kShC0);
+    const double strength = brush.gloss * (facing > 0 ? 1.0 : 0.3);
+    const auto noise = [this] { return 0.01 * random_.normal(); };
+    g.f_rest[channel][0] = static_cast<float>((-strength * mirrored[1] + noise()) / kShC1);
+    g.f_rest[channel][1] = static_cast<float>((-strength * mirrored[2] + noise()) / kShC1);
+    g.f_rest[channel][2] = static_cast<float>((strength * mirrored[0] + noise()) / kShC1);
+  }
+  builder_.add(g);
+}
+
+void ScenePainter::surface(const Surface& surface, const Paint& paint, const Brush& brush) {
+  const double step = 1.0 / brush.grid;
+  for (int i = 0; i < brush.grid; ++i) {
+    for (int j = 0; j < brush.grid; ++j) {
+      const double u = i * step, v = j * step;
+      const Vec3 corner = surface(u, v).position;
+      const Vec3 far_corner = surface(u + step, v + step).position;
+      const Vec3 diagonal = far_corner - corner;
+      const Vec3 other = surface(u, v + step).position - surface(u + step, v).position;
+      const Vec3 twice_area = cross(diagonal, other);
+      const double area = 0.5 * std::sqrt(dot(twice_area, twice_area));
+      Brush cell_brush = brush;
+      if (out_of_view(corner + diagonal * 0.5)) {
+        cell_brush.sigma_pixels *= 4;
+        cell_brush.layers *= 0.5;
+      }
+      const double size = splat_size(corner + diagonal * 0.5, cell_brush.sigma_pixels);
+      const double expected = cell_brush.layers * area / (kBoxArea * size * size);
+      const int count = static_cast<int>(std::min(1e6, expected + random_.uniform()));
+      for (int k = 0; k < count; ++k) {
+        const double pu = u + step * random_.uniform(), pv = v + step * random_.uniform();
+        const SurfacePoint point = surface(pu, pv);
+        splat(point.position, point.normal, paint, pu, pv, cell_brush);
+      }
+    }
+  }
+}
+
+void ScenePainter::box(const Vec3& centre, const Vec3& half, const Paint& paint, const Brush& brush) {
+  block_box(centre, half);
+  // Splats reach beyond their centres: drawn in a little, the box's edges stay sharp.
+  const double inset = std::min(0.3 * std::min(half[0], std::min(half[1], half[2])), splat_size(centre, 0.8 * brush.sigma_pixels));
+  const Vec3 h = half - Vec3{inset, inset, inset};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::size_t second = (axis + 1) % 3, third = (axis + 2) % 3;
+    for (const double side : {-1.0, 1.0}) {
+      Vec3 corner = centre - h, edge_u{}, edge_v{};
+      corner[axis] = centre[axis] + side * h[axis];
+      edge_u[side > 0 ? second : third] = 2 * h[side > 0 ? second : third];
+      edge_v[side > 0 ? third : second] = 2 * h[side > 0 ? third : second];
+      surface(quad_surface(corner, edge_u, edge_v), paint, brush);
+    }
+  }
+}
+
+void ScenePainter::cylinder(const Vec3& base, const Vec3& top, double base_radius, double top_radius, const Paint& paint,
+                            const Brush& brush) {
+  const Vec3 axis = unit(top - base);
+  const double inner = 0.7 * std::min(base_radius, top_radius);
+  Vec3 half = (top - base) * 0.5;
+  for (std::size_t i = 0; i < 3; ++i) half[i] = std::fabs(half[i]) + inner * std::sqrt(std::max(0.0, 1 - axis[i] * axis[i]));
+  block_box((base + top) * 0.5, half);
+  surface(frustum_surface(base, top, base_radius, top_radius), paint, brush);
+  surface(disc_surface(base, axis * -1.0, 0, base_radius), paint, brush);
+  surface(disc_surface(top, axis, 0, top_radius), paint, brush);
+}
+
+void ScenePainter::cloud(const Vec3& centre, const Vec3& radii, const Paint& paint, const Brush& brush) {
+  const double size = splat_size(centre, brush.sigma_pixels);
+  const double shadow = kPi * std::max(radii[0], radii[2]) * radii[1];  // about what it covers of the view
+  const int count = static_cast<int>(std::min(1e6, brush.layers * shadow / (kBoxArea * size * size) + 1));
+  for (int i = 0; i < count; ++i) {
+    const Vec3 out = random_.direction();
+    // One draw per statement: the order of evaluation inside an expression is the compiler's. More near the outside.
+    const double first = random_.uniform();
+    const double reach = 1 - 0.6 * (first * random_.uniform());
+    const Vec3 position = centre + out * radii * reach;
+    const Vec3 normal = unit(out + random_.direction() * 0.9);
+    splat(position, normal, paint, random_.uniform(), reach, brush);
+  }
+}
+
+void ScenePainter::floaters(const Vec3& centre, const Vec3& half, int count, double sigma_pixels) {
+  Brush brush;
+  brush.opaque = 0.0;
+  brush.faint = 0.9;
+  brush.emission = 0.6;
+  for (int i = 0; i < count; ++i) {
+    const Vec3 position = centre + half * Vec3{random_.uniform(-1, 1), random_.uniform(-1, 1), random_.uniform(-1, 1)};
+    brush.sigma_pixels = sigma_pixels * random_.uniform(0.5, 2.0);
+    const Vec3 normal = random_.direction();
+    splat(position, normal, plain(Vec3{0.6, 0.6, 0.62} * random_.uniform(0.5, 1.3)), 0, 0, brush);
+  }
+}
+
+}  // namespace vrpipe

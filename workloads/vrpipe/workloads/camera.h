@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace vrpipe {
+
+using Vec3 = std::array<double, 3>;
+
+/// Largest width and height of an image, pixels.
+constexpr std::uint32_t kMaxImageSize = 16384;
+
+struct ImageSize {
+  std::uint32_t width = 0, height = 0;  ///< pixels, 1 to kMaxImageSize
+};
+
+/// A pinhole camera in the INRIA frame: x right, y down, z forward; square pixels with centres at +0.5; the
+/// principal point is the centre of the image.
+struct Camera {
+  Vec3 eye{};                                                   ///< camera centre, world units
+  std::array<Vec3, 3> rotation{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  ///< camera to world, rows; columns right, down, forward
+  double fx = 1, fy = 1;                                        ///< focal lengths, pixels
+  std::uint32_t width = 1, height = 1;                          ///< pixels
+  float near_plane = 0.2f;  ///< world units, >= 1e-6; Gaussians at camera z <= near_plane are culled (0.2 as INRIA)
+};
+
+/// Where a camera stands and what it looks at, without the image.
+struct View {
+  Vec3 eye{};
+  Vec3 look_at{0, 0, 1};
+  Vec3 up{0, -1, 0};      ///< the world's up direction; y points down in COLMAP and INRIA worlds
+  double fovy_degrees = 50;  ///< vertical field of view
+};
+
+/// The camera at `eye` that looks at `target`, its image upright with respect to the world direction `up`.
+/// @throws UserError when a value is not finite, eye == target, up is zero or parallel to the view direction,
+///         fovy is not in [1e-6, 180 - 1e-3) degrees, or a side of the image is not in 1 to kMaxImageSize
+Camera look_at(const Vec3& eye, const Vec3& target, const Vec3& up, double fovy_degrees, std::uint32_t width,
+               std::uint32_t height);
+Camera look_at(const View& view, ImageSize size);
+
+/// The same camera with another image size. Keeps the vertical field of view and square pixels: the focal lengths
+/// scale by the ratio of the heights.
+/// @throws UserError when a side is not in 1 to kMaxImageSize
+Camera resized(const Camera& camera, ImageSize size);
+
+/// Reads a cameras.json in the INRIA layout: an array of {"width", "height", "position": [3] = camera centre,
+/// "rotation": [3][3] camera to world, "fx", "fy" in pixels}; other keys are ignored.
+/// @throws UserError when the file cannot be read or a camera in it cannot be used
+std::vector<Camera> load_cameras(const std::string& path);
+
+/// The camera that `text` names: FILE or FILE#INDEX, index from 0 (the default).
+/// @throws UserError as load_cameras, and when there is no such index
+Camera camera_from_file(const std::string& text, const std::optional<ImageSize>& size = std::nullopt);
+
+/// @throws UserError unless both sides are 1 to kMaxImageSize; `where` names the option or file
+void check_image_size(std::uint64_t width, std::uint64_t height, const std::string& where);
+
+}  // namespace vrpipe

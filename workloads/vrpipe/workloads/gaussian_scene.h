@@ -1,0 +1,134 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+namespace vrpipe {
+
+/// Number of f_rest coefficients per colour channel at SH degree 0, 1, 2, 3: (degree + 1)^2 - 1.
+constexpr std::array<std::uint32_t, 4> kShRestPerChannel = {0, 3, 8, 15};
+
+/// Where each attribute of a Gaussian lies inside its record, in bytes from the record's start. Every attribute is a
+/// float32, possibly unaligned. f_rest is channel-major (all red, then all green, then all blue), as INRIA writes it.
+struct GaussianLayout {
+  std::array<std::uint32_t, 3> position{};   ///< x, y, z
+  std::array<std::uint32_t, 3> log_scale{};  ///< scale_0..2
+  std::array<std::uint32_t, 4> rotation{};   ///< rot_0..3 = w, x, y, z
+  std::uint32_t opacity = 0;                 ///< logit
+  std::array<std::uint32_t, 3> f_dc{};       ///< SH degree 0, red, green, blue
+  std::array<std::uint32_t, 45> f_rest{};    ///< first 3 * kShRestPerChannel[degree] are used
+};
+
+/// The attributes of one Gaussian, read where they lie (no copy is kept). Cheap to copy; valid while the scene lives.
+class GaussianRef {
+ public:
+  GaussianRef(const std::byte* record, const GaussianLayout* layout, int sh_degree)
+      : record_(record), layout_(layout), sh_degree_(sh_degree) {}
+
+  std::array<float, 3> position() const { return load_all(layout_->position); }
+  std::array<float, 3> log_scale() const { return load_all(layout_->log_scale); }
+  std::array<float, 4> rotation() const { return load_all(layout_->rotation); }  ///< w, x, y, z; not normalised
+  float opacity_logit() const { return load(layout_->opacity); }
+  std::array<float, 3> f_dc() const { return load_all(layout_->f_dc); }
+  int sh_degree() const { return sh_degree_; }
+
+  /// SH coefficient `coefficient` (1 .. (degree+1)^2 - 1) of colour channel `channel` (0 red, 1 green, 2 blue).
+  float f_rest(std::uint32_t channel, std::uint32_t coefficient) const {
+    const std::uint32_t per_channel = kShRestPerChannel[static_cast<std::size_t>(sh_degree_)];
+    return load(layout_->f_rest[channel * per_channel + coefficient - 1]);
+  }
+
+ private:
+  float load(std::uint32_t offset) const {
+    float value;
+    std::memcpy(&value, record_ + offset, sizeof value);
+    return value;
+  }
+  template <std::size_t N>
+  std::array<float, N> load_all(const std::array<std::uint32_t, N>& offsets) const {
+    std::array<float, N> values;
+    for (std::size_t i = 0; i < N; ++i) values[i] = load(offsets[i]);
+    return values;
+  }
+
+  const std::byte* record_;
+  const GaussianLayout* layout_;
+  int sh_degree_;
+};
+
+/// A set of 3D Gaussians: records of equal stride somewhere in memory (a mapped file, or a block of floats).
+/// Copies share the records. Immutable, so safe to read from any number of threads.
+class GaussianScene {
+ public:
+  GaussianScene() = default;
+
+  /// @param storage  keeps `records` alive
+  GaussianScene(std::shared_ptr<const void> storage, const std::byte* records, std::uint64_t count,
+                std::size_t stride_bytes, const GaussianLayout& layout, int sh_degree);
+
+  std::uint64_t size() const { return count_; }
+  bool empty() const { return count_ == 0; }
+  int sh_degree() const { return sh_degree_; }  ///< 0 to 3
+
+  /// Gaussian `index` < size().
+  GaussianRef operator[](std::uint64_t index) const {
+    return GaussianRef(records_ + static_cast<std::size_t>(index) * stride_bytes_, layout_.get(), sh_degree_);
+  }
+
+ private:
+  std::shared_ptr<const void> storage_;
+  const std::byte* records_ = nullptr;
+  std::uint64_t count_ = 0;
+  std::size_t stride_bytes_ = 0;
+  std::shared_ptr<const GaussianLayout> layout_ = std::make_shared<const GaussianLayout>();
+  int sh_degree_ = 0;
+};
+
+/// The attributes of a Gaussian to add to a scene; f_rest[channel][coefficient - 1], unused ones are ignored.
+struct GaussianAttributes {
+  std::array<float, 3> position{};
+  std::array<float, 3> log_scale{};
+  std::array<float, 4> rotation{1, 0, 0, 0};  ///< w, x, y, z
+  float opacity_logit = 0;
+  std::array<float, 3> f_dc{};
+  std::array<std::array<float, 15>, 3> f_rest{};
+};
+
+/// Collects Gaussians in memory, in one block of floats.
+class GaussianSceneBuilder {
+ public:
+  /// @throws std::invalid_argument when sh_degree is not 0 to 3
+  explicit GaussianSceneBuilder(int sh_degree);
+
+  void reserve(std::size_t gaussians);
+  void add(const GaussianAttributes& gaussian);
+  std::size_t size() const { return floats_.size() / floats_per_gaussian_; }
+
+  /// Hands the Gaussians over; the builder is empty afterwards.
+  GaussianScene build();
+
+ private:
+  int sh_degree_;
+  std::size_t floats_per_gaussian_;
+  std::vector<float> floats_;
+};
+
+/// Opens an INRIA .ply (`format binary_little_endian 1.0`) by mapping it into memory: nothing is copied, so a file
+/// larger than the machine's memory can be read.
+/// Properties of the element `vertex` are found by name: x y z, scale_0..2, rot_0..3, opacity, f_dc_0..2 (all float)
+/// and f_rest_* (0, 9, 24 or 45 of them: SH degree 0 to 3). Other scalar properties, other elements (also with lists
+/// behind the vertices, without lists before them) and trailing bytes are skipped. No vertices is a valid, empty scene.
+/// @throws UserError when the file cannot be read, is cut short, or is not such a file
+GaussianScene open_gaussian_ply(const std::filesystem::path& path);
+
+/// Writes an INRIA .ply: x y z nx ny nz f_dc_0..2 f_rest_* opacity scale_0..2 rot_0..3, attributes bit for bit.
+/// The file appears complete or not at all.
+/// @throws UserError when it cannot be written
+void write_gaussian_ply(const std::filesystem::path& path, const GaussianScene& scene);
+
+}  // namespace vrpipe

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <vrpipe/draw.h>
+#include <vrpipe/workloads/camera.h>
+#include <vrpipe/workloads/gaussian_scene.h>
+
+namespace vrpipe {
+
+/// How far a splat's oriented box reaches.
+enum class SplatExtent {
+  obb,          ///< to alpha = 1/255 along both axes: r = sqrt(2 ln(255 opacity)) (the paper)
+  three_sigma,  ///< r = 3 whatever the opacity (INRIA's radius)
+};
+
+struct PreprocessOptions {
+  int sh_degree = 3;  ///< highest SH degree evaluated, 0 to 3; a scene of a lower degree uses its own
+  SplatExtent extent = SplatExtent::obb;
+  /// 32, 24, 16 or 12. Below 32 the order-preserving keys k of the visible splats are reduced to
+  /// floor((k - min) * 2^bits / (max - min + 1)); splats of equal reduced keys keep the scene's order.
+  int depth_key_bits = 32;
+  unsigned threads = 0;  ///< 0: one per hardware thread. The result does not depend on it.
+};
+
+/// What a splat's 2-D covariance is dilated by, pixels^2 (INRIA).
+constexpr double kDilation = 0.3;
+/// Largest half extent of a splat along one axis, pixels. A longer axis is shortened to it, and the offset of the
+/// centre from the image's centre along this axis shrinks by the same factor: the alpha at the image's centre stays
+/// what it was, and coverage never shrinks when a scale grows. So every corner lies within +-2^22 pixels.
+constexpr double kMaxHalfExtent = 1e6;
+
+/// Projects a scene to what the vertex shader takes in, as the INRIA renderer does: frustum and off-screen culling,
+/// EWA projection (0.3 px^2 dilation, view rays clamped at 1.3 tan(fov/2)), SH colour + 0.5 clamped at 0, sigmoid
+/// opacity, stable sort by camera z, equal depths in the scene's order. Computed in double, stored as float; every
+/// splat that leaves is finite.
+/// Dropped and counted in summary.rejected: Gaussians with a NaN or infinite position, a NaN or +Inf log scale, a NaN
+/// logit, a NaN or infinite rotation or (used) SH coefficient; and those with an all-zero quaternion. Log scale -Inf
+/// is scale 0, logit +-Inf is opacity 1 or 0. Dropped as culled: camera z <= near plane, opacity < 1/255, an oriented
+/// box whose bounding box misses the image. Fills gaussians_total, gaussians_visible and rejected of `summary`.
+/// Needs at most 64 bytes per Gaussian beside the scene.
+/// @throws UserError when an option or the camera is out of range
+Draw preprocess(const GaussianScene& scene, const Camera& camera, const PreprocessOptions& options,
+                SceneSummary& summary);
+
+// The steps, for tests and for units that need them.
+
+/// A 2-D covariance M M^T + kDilation I in factor form, decomposed. `m1`, `m2` are the rows of M, pixels.
+/// `lambda1` >= `lambda2` >= kDilation are the eigenvalues, (`axis_x`, `axis_y`) the unit eigenvector of lambda1; that of
+/// lambda2 is (-axis_y, axis_x).
+struct EllipseAxes {
+  double lambda1, lambda2;
+  double axis_x, axis_y;
+};
+EllipseAxes decompose_covariance(const Vec3& m1, const Vec3& m2);
+/// Determinant of that covariance: |m1 x m2|^2 + e (|m1|^2 + |m2|^2) + e^2, which never cancels.
+double covariance_determinant(const Vec3& m1, const Vec3& m2);
+
+/// Opacity from its logit, exactly 0 and 1 at -+Inf; overflows nowhere.
+double sigmoid(double logit);
+
+/// How far a splat of this opacity reaches along either axis, in sigmas; 0 at opacity 1/255 (and below).
+double half_extent_in_sigmas(float opacity, SplatExtent extent);
+
+/// Colour (RGB) of a Gaussian seen along the unit vector `direction` (from the camera to the Gaussian), SH bands up to
+/// `degree`: 0.5 added, negative values and NaN become 0, at most FLT_MAX. A zero direction gives the DC term.
+std::array<float, 3> sh_colour(const GaussianRef& gaussian, const Vec3& direction, int degree);
+
+/// Sort key: orders like the depths themselves, -0 equal to +0.
+std::uint32_t depth_key(float depth);
+
+/// (key << 32 | index) entries in stable ascending order of key; a least-significant-digit radix sort.
+void sort_by_key(std::vector<std::uint64_t>& entries);
+
+}  // namespace vrpipe

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <vrpipe/draw.h>
+#include <vrpipe/workloads/camera.h>
+#include <vrpipe/workloads/preprocess.h>
+
+namespace vrpipe {
+
+/// What the user asked to draw; field by field the options --scene, --size, --camera, --eye, --look-at, --up, --fovy.
+struct SceneRequest {
+  std::string scene;  ///< FILE.ply, FILE.spl or builtin:NAME; empty: builtin:object
+  std::optional<ImageSize> size;
+  std::optional<std::string> camera;  ///< FILE[#INDEX]; excludes the four below
+  std::optional<Vec3> eye;
+  std::optional<Vec3> look_at;
+  std::optional<Vec3> up;
+  std::optional<double> fovy_degrees;
+  PreprocessOptions preprocess;
+};
+
+struct LoadedScene {
+  Draw draw;
+  SceneSummary summary;  ///< name: the file's name without folder, or builtin:NAME
+};
+
+/// Image size of a .ply that is drawn without a camera file or a size.
+constexpr ImageSize kDefaultImageSize{1280, 720};
+
+/// Loads a scene and preprocesses it.
+/// Built-in: its own camera and size; view options replace what they name, the rest stays.
+/// .ply: the camera of the file given, or the view options. What is not given comes from an automatic view: it looks
+/// at the median position from a distance at which the middle 80 % of the positions fit (a ball of radius 0.5 and of
+/// three median sigmas at least), from the front (-z), 30 degrees to the left and 20 degrees above, with the world's
+/// up at 0,-1,0 (y points down, as in INRIA and COLMAP worlds; give --up 0,1,0 for y-up files) and a vertical field of
+/// view of 50 degrees.
+/// .spl: the draw as it is; size, camera and view options are refused.
+/// @throws UserError for whatever cannot be used
+LoadedScene load_scene(const SceneRequest& request);
+
+}  // namespace vrpipe
