@@ -15,17 +15,15 @@ ClockDomain::ClockDomain(const sc_core::sc_module_name& name, std::uint64_t peri
 }
 
 unsigned ClockDomain::attach(Clocked& unit) {
-  units_.push_back(&unit);
-  due_.push_back(0);
-  active_.push_back(0);
+  slots_.push_back({&unit, 0, false});
   order_.push_back(static_cast<unsigned>(order_.size()));
-  return static_cast<unsigned>(units_.size() - 1);
+  return order_.back();
 }
 
 void ClockDomain::set_tick_order(std::vector<unsigned> order) {
   std::vector<unsigned> sorted = order;
   std::sort(sorted.begin(), sorted.end());
-  std::vector<unsigned> all(units_.size());
+  std::vector<unsigned> all(slots_.size());
   std::iota(all.begin(), all.end(), 0U);
   if (sorted != all) throw SimulationFault(name(), now_, "the tick order is not a permutation of the units");
   order_ = std::move(order);
@@ -37,17 +35,19 @@ void ClockDomain::edge() {
   running_ = true;
   ++edges_;
   // First all that are due, then all ticks: a wake-up in this cycle is for a later one, also for a unit yet to tick.
-  for (std::size_t unit = 0; unit < due_.size(); ++unit) {
-    active_[unit] = due_[unit] <= now_;
-    if (active_[unit] != 0) due_[unit] = never;
+  for (Slot& slot : slots_) {
+    slot.active = slot.due <= now_;
+    if (slot.active) slot.due = never;
   }
-  for (const unsigned unit : order_) {
-    if (active_[unit] == 0) continue;
-    const Cycle next = units_[unit]->tick(now_);
-    if (next < due_[unit]) due_[unit] = next;
+  for (const unsigned index : order_) {
+    Slot& slot = slots_[index];
+    if (!slot.active) continue;
+    const Cycle next = slot.unit->tick(now_);
+    if (next < slot.due) slot.due = next;
   }
   if (finished_) return;
-  const Cycle next = *std::min_element(due_.begin(), due_.end());
+  Cycle next = never;
+  for (const Slot& slot : slots_) next = std::min(next, slot.due);
   if (next == never) return;
   if (next <= now_) throw SimulationFault(name(), now_, "a unit asked for an edge in the past");
   event_.notify(sc_core::sc_time::from_value((next - now_) * period_.value()));

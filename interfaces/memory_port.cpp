@@ -1,22 +1,27 @@
 #include <vrpipe/memory_port.h>
 
-#include <iterator>
-
 #include <vrpipe/error.h>
 
 namespace vrpipe {
 
 MemoryPort::MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight)
     : socket(name.c_str()), clock_(owner.clock), slots_(in_flight) {
+  std::size_t ring = 1;
+  while (ring < in_flight) ring *= 2;
+  completions_.resize(ring);
   socket.bind(*this);
   free_.reserve(in_flight);
   for (unsigned slot = in_flight; slot-- > 0;) free_.push_back(slot);
+  for (Slot& slot : slots_) {
+    slot.payload.set_byte_enable_ptr(nullptr);
+    slot.payload.set_dmi_allowed(false);
+  }
 }
 
 MemoryPort::~MemoryPort() = default;
 
 unsigned MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes) {
-  if (bytes == 0 || (bytes & (bytes - 1)) != 0 || address % bytes != 0) {
+  if (bytes == 0 || (bytes & (bytes - 1)) != 0 || (address & (bytes - 1)) != 0) {
     throw SimulationFault(socket.name(), clock_.domain->now(),
                           "an access of " + std::to_string(bytes) + " bytes at " + std::to_string(address) +
                               " is not naturally aligned");
@@ -24,15 +29,13 @@ unsigned MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsi
   const unsigned ticket = free_.back();
   free_.pop_back();
   Slot& slot = slots_[ticket];
-  slot.data.resize(bytes);
+  if (slot.data.size() < bytes) slot.data.resize(bytes);
   slot.answered = false;
   slot.payload.set_command(command);
   slot.payload.set_address(address);
   slot.payload.set_data_ptr(slot.data.data());
   slot.payload.set_data_length(bytes);
   slot.payload.set_streaming_width(bytes);
-  slot.payload.set_byte_enable_ptr(nullptr);
-  slot.payload.set_dmi_allowed(false);
   slot.payload.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
   (command == tlm::TLM_READ_COMMAND ? reads_ : writes_) += 1;
 
@@ -61,9 +64,13 @@ void MemoryPort::complete(unsigned ticket, const sc_core::sc_time& delay) {
   const std::uint64_t period = clock_.domain->period().value();
   const Cycle cycles = (delay.value() + period - 1) / period;
   const Cycle at = clock_.domain->now() + (cycles == 0 ? 1 : cycles);
-  auto place = completions_.end();
-  while (place != completions_.begin() && std::prev(place)->at > at) --place;
-  completions_.insert(place, {at, ticket});
+  // Nearly always the last: memories answer in order. The ring holds an entry for every slot.
+  std::size_t place = completions_head_ + completions_count_++;
+  while (place != completions_head_ && completion(place - 1).at > at) {
+    completion(place) = completion(place - 1);
+    --place;
+  }
+  completion(place) = {at, ticket};
   clock_.domain->wake(clock_.unit, at);
 }
 
@@ -86,8 +93,9 @@ tlm::tlm_sync_enum MemoryPort::nb_transport_bw(tlm::tlm_generic_payload& payload
 
 bool MemoryPort::next_completed(unsigned& ticket) {
   if (next_completion() > clock_.domain->now()) return false;
-  ticket = completions_.front().ticket;
-  completions_.pop_front();
+  ticket = completion(completions_head_).ticket;
+  ++completions_head_;
+  --completions_count_;
   free_.push_back(ticket);
   return true;
 }

@@ -42,7 +42,8 @@ class BackEnd {
     sm->shade(warp, shaded_);
     for (unsigned i = 0; i < shaded_.count; ++i) {
       monitor_.blended(shaded_, i, 0);
-      const LaneMask pixels = crop->blend(shaded_.tile, shaded_.position[i], shaded_.live[i], shaded_.color[i]);
+      const LaneMask pixels =
+          crop->blend(shaded_.tile, shaded_.position[i], shaded_.live[i], shaded_.color[i]).terminated;
       if (pixels != 0) signal(TerminationSignal{shaded_.tile, shaded_.position[i], pixels});
     }
   }

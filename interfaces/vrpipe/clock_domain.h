@@ -33,7 +33,7 @@ class ClockDomain : public sc_core::sc_module {
 
   /// Asks for an edge of a unit at cycle `at`, later than now while the simulation runs.
   void wake(unsigned handle, Cycle at) {
-    if (at < due_[handle]) due_[handle] = at;
+    if (at < slots_[handle].due) slots_[handle].due = at;
   }
 
   /// Whether the first edge has come.
@@ -54,9 +54,12 @@ class ClockDomain : public sc_core::sc_module {
 
   sc_core::sc_time period_;
   sc_core::sc_event event_;
-  std::vector<Clocked*> units_;
-  std::vector<Cycle> due_;
-  std::vector<std::uint8_t> active_;
+  struct Slot {
+    Clocked* unit;
+    Cycle due;    ///< the next edge that the unit wants
+    bool active;  ///< ticked at this edge
+  };
+  std::vector<Slot> slots_;
   std::vector<unsigned> order_;
   Cycle now_ = 0;
   std::uint64_t edges_ = 0;

@@ -51,6 +51,7 @@ inline LaneBits expand_mask(LaneMask mask) {
   return (set & bit) == bit;
 }
 
-inline unsigned popcount(LaneMask mask) { return static_cast<unsigned>(__builtin_popcount(mask)); }
+/// Lanes set in a mask of four: a table in a register, since the baseline instruction set has no popcnt.
+constexpr unsigned popcount(LaneMask mask) { return (0x4332322132212110ULL >> (mask * 4U)) & 0xFU; }
 
 }  // namespace vrpipe

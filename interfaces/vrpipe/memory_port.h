@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <vector>
 
@@ -32,7 +31,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<> {
   /// Takes the next access that has completed, in a cycle after the one in which it was answered; false for none.
   bool next_completed(unsigned& ticket);
   /// When the next known completion is due; `never` for none.
-  Cycle next_completion() const { return completions_.empty() ? never : completions_.front().at; }
+  Cycle next_completion() const { return completions_count_ == 0 ? never : completions_[completions_head_ & (completions_.size() - 1)].at; }
 
   std::uint64_t reads() const { return reads_; }
   std::uint64_t writes() const { return writes_; }
@@ -49,6 +48,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<> {
   };
   unsigned issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes);
   void complete(unsigned ticket, const sc_core::sc_time& delay);
+  Completion& completion(std::size_t place) { return completions_[place & (completions_.size() - 1)]; }
   tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override;
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
@@ -56,7 +56,9 @@ class MemoryPort : private tlm::tlm_bw_transport_if<> {
   const ClockHandle& clock_;
   std::vector<Slot> slots_;
   std::vector<unsigned> free_;
-  std::deque<Completion> completions_;  ///< by cycle
+  std::vector<Completion> completions_;  ///< a ring of a power of two, by cycle
+  std::size_t completions_head_ = 0;
+  std::size_t completions_count_ = 0;
   bool request_pending_ = false;  ///< BEGIN_REQ without END_REQ yet
   std::uint64_t reads_ = 0;
   std::uint64_t writes_ = 0;

@@ -126,10 +126,10 @@ struct WarpRelease {
 /// One quad on its way to blending; whoever takes it off the pipeline drops the hold on the warp.
 struct ColorQuad {
   const ShadedWarp* warp = nullptr;
-  std::uint32_t index = 0;
-  TileId tile() const { return warp->tile; }
-  unsigned position() const { return warp->position[index]; }
-  LaneMask live() const { return warp->live[index]; }
+  TileId tile;
+  std::uint8_t position = 0;
+  LaneMask live = 0;
+  std::uint8_t index = 0;  ///< in the warp
   const QuadColor& color() const { return warp->color[index]; }
 };
 

@@ -25,8 +25,6 @@ class Unit : public sc_core::sc_module, public Clocked, public PortOwner {
   InPort& in(const std::string& name);
   OutPort& out(const std::string& name);
 
-  Cycle tick(Cycle now) final { return step(now); }
-
   /// Whether no work is left inside or queued.
   virtual bool idle() const = 0;
   /// Work done so far, in the unit's items.
@@ -43,8 +41,6 @@ class Unit : public sc_core::sc_module, public Clocked, public PortOwner {
   void close_account(Cycle end) { account_.close(end); }
 
  protected:
-  /// One clock edge; see Clocked::tick.
-  virtual Cycle step(Cycle now) = 0;
   void enter(UnitState state, Cycle now) { account_.enter(state, now); }
   Cycle now() const { return clock.domain->now(); }
 

@@ -191,9 +191,12 @@ class CropBehaviour : public Behaviour {
   /// Before the first blend.
   void attach(ColorSurface& surface) { surface_ = &surface; }
   const ColorSurface* surface() const { return surface_; }
-  /// Blends the live samples of a quad. Returns the pixels to signal: those that newly passed the termination
-  /// threshold (HET only).
-  virtual LaneMask blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) = 0;
+  struct Outcome {
+    LaneMask terminated;  ///< pixels to signal: those that newly passed the termination threshold (HET only)
+    bool changed;         ///< whether a stored value is another one than before
+  };
+  /// Blends the live samples of a quad.
+  virtual Outcome blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) = 0;
   struct Cost {
     std::uint32_t quads_per_cycle;          ///< of this draw's format
     std::uint32_t input_quads;              ///< queue between tag look-up and blending
@@ -204,6 +207,7 @@ class CropBehaviour : public Behaviour {
     std::uint32_t sector_bytes;
     std::uint32_t mshrs;                    ///< sectors in flight
     std::uint32_t sectors_per_cycle;        ///< filled or written back
+    bool writes_unchanged;                  ///< a blend that changes no value makes its sector dirty all the same
   };
   virtual Cost cost() const = 0;
 

@@ -19,10 +19,12 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
             parameters.line_bytes,
             parameters.sector_bytes,
             parameters.mshrs,
-            parameters.sectors_per_cycle} {}
+            parameters.sectors_per_cycle,
+            parameters.writes_unchanged} {}
 
 template <ColorFormat Format, BlendRounding Rounding>
-LaneMask ColorRop<Format, Rounding>::blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) {
+CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(TileId tile, unsigned position, LaneMask live,
+                                                         const QuadColor& color) {
   QuadColor& destination = surface_->quad(tile, position);
   LaneBits lanes = expand_mask(live);
   if (drops_late_) {
@@ -31,7 +33,7 @@ LaneMask ColorRop<Format, Rounding>::blend(TileId tile, unsigned position, LaneM
     fragments_dropped_late += popcount(static_cast<LaneMask>(live & ~kept));
     if (kept == 0) {
       ++quads_dropped_late;
-      return 0;
+      return {0, false};
     }
     lanes = open;
     live = kept;
@@ -45,13 +47,18 @@ LaneMask ColorRop<Format, Rounding>::blend(TileId tile, unsigned position, LaneM
     blended = blend_into_target<Format, Rounding>(destination, color);
   }
   const Lanes previous = destination.alpha;
-  destination = select(lanes, blended, destination);
-  if (!state_.early_termination) return 0;
+  blended = select(lanes, blended, destination);
+  const LaneBits difference =
+      (bits_of(blended.red) ^ bits_of(destination.red)) | (bits_of(blended.green) ^ bits_of(destination.green)) |
+      (bits_of(blended.blue) ^ bits_of(destination.blue)) | (bits_of(blended.alpha) ^ bits_of(destination.alpha));
+  const bool changed = sign_mask(difference != 0) != 0;
+  destination = blended;
+  if (!state_.early_termination) return {0, changed};
   LaneBits terminated = passes(destination.alpha) & lanes;
   if (checks_previous_) terminated &= ~passes(previous);
   const LaneMask signalled = sign_mask(terminated);
   if (signalled != 0) ++termination_signals;
-  return signalled;
+  return {signalled, changed};
 }
 
 namespace {

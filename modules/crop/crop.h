@@ -21,8 +21,11 @@ struct CropParameters : ParameterSet {
   Integer line_bytes{*this, "line_bytes", 128, 32, 1024, "bytes", source::paper_table, "of a cache line"};
   Integer sector_bytes{*this, "sector_bytes", 32, 16, 1024, "bytes", source::paper_table, "of a cache sector"};
   Integer mshrs{*this, "mshrs", 384, 1, 65536, "sectors", "Accel-Sim, SM87_ORIN: 384 MSHRs of a first-level cache", "fills in flight, and as many write-backs"};
-  Integer sectors_per_cycle{*this, "sectors_per_cycle", 8, 1, 64, "sectors", source::measured,
+  Integer sectors_per_cycle{*this, "sectors_per_cycle", 16, 1, 64, "sectors",
+                            "measured on a GH100 graphics GPC: 8 a cycle and ROP partition; the paper's GPC has two",
                             "filled or written back in a cycle in which nothing is blended"};
+  Switch writes_unchanged{*this, "writes_unchanged", false, source::measured,
+                          "write sectors back in which no value changed"};
 };
 
 /// Colour ROP (paper 3.1, 5.2): blends in arrival order; the alpha test unit signals terminated pixels.
@@ -32,7 +35,7 @@ class ColorRop : public CropBehaviour {
  public:
   ColorRop(const CropParameters& parameters, const RenderState& state);
 
-  LaneMask blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) override;
+  Outcome blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) override;
   Cost cost() const override { return cost_; }
 
   Counter quads_blended{*this, "quads_blended", "quads", "blended"};

@@ -6,8 +6,7 @@ namespace vrpipe {
 
 CropCache::CropCache(std::uint32_t cache_bytes, std::uint32_t line_bytes, std::uint32_t sector_bytes,
                      std::uint64_t surface_bytes)
-    : line_bytes_(line_bytes),
-      sector_bytes_(sector_bytes),
+    : line_shift_(static_cast<unsigned>(__builtin_ctz(line_bytes))),
       lines_(cache_bytes / line_bytes),
       line_of_tag_((surface_bytes + line_bytes - 1) / line_bytes, no_line) {
   const auto power_of_two = [](std::uint32_t value) { return value != 0 && (value & (value - 1)) == 0; };
@@ -32,37 +31,20 @@ void CropCache::make_newest(Line line) {
   newest_ = line;
 }
 
-CropCache::Line CropCache::find(std::uint64_t address) {
-  const Line line = line_of_tag_[address / line_bytes_];
-  if (line != no_line && line != newest_) {
-    unlink(line);
-    make_newest(line);
-  }
-  return line;
-}
-
-CropCache::Line CropCache::victim() const {
-  Line line = oldest_;
-  while (line != no_line && lines_[line].pins != 0) line = lines_[line].newer;
-  return line;
-}
-
-bool CropCache::can_allocate() const { return used_ < lines_.size() || victim() != no_line; }
-
 CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dirty, std::uint64_t& evicted_address) {
   evicted_dirty = 0;
   Line line = used_;
   if (used_ < lines_.size()) {
     ++used_;
   } else {
-    line = victim();
+    line = oldest_;
     evicted_dirty = lines_[line].dirty;
-    evicted_address = lines_[line].tag * line_bytes_;
+    evicted_address = lines_[line].tag << line_shift_;
     line_of_tag_[lines_[line].tag] = no_line;
     unlink(line);
   }
   Entry& entry = lines_[line];
-  entry.tag = address / line_bytes_;
+  entry.tag = address >> line_shift_;
   entry.present = 0;
   entry.dirty = 0;
   entry.pins = 0;

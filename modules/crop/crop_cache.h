@@ -5,7 +5,8 @@
 
 namespace vrpipe {
 
-/// The colour cache: sectored lines, fully associative, least recently used goes. Tags only; data stays in the surface.
+/// The colour cache: sectored lines, fully associative; of the lines that no queued quad needs, the one not needed for
+/// the longest time goes. Tags only; data stays in the surface.
 /// Fully associative since a real GPU's holds its whole size in any shape of rectangles (measured, paper 7.1).
 class CropCache {
  public:
@@ -15,24 +16,24 @@ class CropCache {
   CropCache(std::uint32_t cache_bytes, std::uint32_t line_bytes, std::uint32_t sector_bytes,
             std::uint64_t surface_bytes);
 
-  std::uint32_t line_bytes() const { return line_bytes_; }
-  std::uint32_t sector_bytes() const { return sector_bytes_; }
-
-  /// The line that holds the address, made most recently used; `no_line` when none does.
-  Line find(std::uint64_t address);
-  /// Whether a line can be had for another address: one is free, or the least recently used ones are not pinned.
-  bool can_allocate() const;
+  /// The line that holds the address; `no_line` when none does.
+  Line find(std::uint64_t address) const { return line_of_tag_[address >> line_shift_]; }
+  /// Whether a line can be had for another address: one is free or not pinned.
+  bool can_allocate() const { return used_ < lines_.size() || oldest_ != no_line; }
   /// Takes a line for the address. `evicted_dirty` gets the dirty sectors, a bit each, of the line that went, and
   /// `evicted_address` its byte address.
   Line allocate(std::uint64_t address, unsigned& evicted_dirty, std::uint64_t& evicted_address);
 
-  void pin(Line line) { ++lines_[line].pins; }
-  void unpin(Line line) { --lines_[line].pins; }
+  /// Keeps a line while a queued quad needs it.
+  void pin(Line line) {
+    if (lines_[line].pins++ == 0) unlink(line);
+  }
+  void unpin(Line line) {
+    if (--lines_[line].pins == 0) make_newest(line);
+  }
   bool has_sector(Line line, unsigned sector) const { return ((lines_[line].present >> sector) & 1U) != 0; }
   void add_sector(Line line, unsigned sector) { lines_[line].present |= 1U << sector; }
-  void dirty_sector(Line line, unsigned sector) { lines_[line].dirty |= 1U << sector; }
-  /// Bytes of all lines in use.
-  std::uint64_t occupied_bytes() const { return std::uint64_t{used_} * line_bytes_; }
+  void dirty(Line line, std::uint32_t sectors) { lines_[line].dirty |= sectors; }
 
  private:
   struct Entry {
@@ -45,12 +46,10 @@ class CropCache {
   };
   void unlink(Line line);
   void make_newest(Line line);
-  Line victim() const;
 
-  std::uint32_t line_bytes_;
-  std::uint32_t sector_bytes_;
+  unsigned line_shift_;  ///< log2 of the bytes of a line
   std::uint32_t used_ = 0;
-  Line newest_ = no_line;
+  Line newest_ = no_line;  ///< of the lines that are not pinned
   Line oldest_ = no_line;
   std::vector<Entry> lines_;
   std::vector<Line> line_of_tag_;

@@ -52,6 +52,7 @@ class CropUnit : public Unit {
   void end_of_elaboration() override {
     const ColorSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
+    sector_shift_ = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
     bytes_per_quad_ = 4 * bytes_per_pixel(surface->format());
     cache_ = std::make_unique<CropCache>(cost_.cache_bytes, cost_.line_bytes, cost_.sector_bytes, surface->size_bytes());
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
@@ -60,6 +61,8 @@ class CropUnit : public Unit {
       throw UserError("unusable CROP cache", "crop.line_bytes", "a line is smaller than a quad", "use longer lines");
     }
   }
+
+  static constexpr std::uint32_t run_of(unsigned sectors) { return sectors == 32 ? ~0U : (1U << sectors) - 1; }
 
   void finish_fills() {
     unsigned ticket = 0;
@@ -89,11 +92,17 @@ class CropUnit : public Unit {
   bool write_back() {
     while (write_back_ != 0 && memory_.available()) {
       const auto sector = static_cast<unsigned>(__builtin_ctz(write_back_));
-      write_back_ &= write_back_ - 1;
+      // Neighbours go in one access where they are naturally aligned.
+      unsigned sectors = 1;
+      while (sector % (2 * sectors) == 0 && 2 * sectors <= cost_.line_bytes / cost_.sector_bytes &&
+             ((write_back_ >> sector) & run_of(2 * sectors)) == run_of(2 * sectors)) {
+        sectors *= 2;
+      }
+      write_back_ &= ~(run_of(sectors) << sector);
       const unsigned ticket =
-          memory_.write(write_back_address_ + std::uint64_t{sector} * cost_.sector_bytes, cost_.sector_bytes);
+          memory_.write(write_back_address_ + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_);
       fills_[ticket].line = CropCache::no_line;
-      tokens_ -= cost_.quads_per_cycle;
+      tokens_ -= static_cast<std::int32_t>(sectors * cost_.quads_per_cycle);
     }
     return write_back_ == 0;
   }
@@ -101,23 +110,23 @@ class CropUnit : public Unit {
   /// Takes a quad from the link into the queue; false when it has to wait.
   bool look_up(const ColorQuad& quad) {
     if (!write_back()) return false;
-    const std::uint64_t address = behaviour_->surface()->address(quad.tile(), quad.position());
+    const std::uint64_t address = behaviour_->surface()->address(quad.tile, quad.position);
     const CropCache::Line line = line_of(address);
     if (line == CropCache::no_line) return false;
-    const auto first = static_cast<unsigned>(address % cost_.line_bytes / cost_.sector_bytes);
-    const auto last = static_cast<unsigned>((address % cost_.line_bytes + bytes_per_quad_ - 1) / cost_.sector_bytes);
+    const std::uint64_t offset = address & (cost_.line_bytes - 1);
+    const auto first = static_cast<unsigned>(offset >> sector_shift_);
+    const auto last = static_cast<unsigned>((offset + bytes_per_quad_ - 1) >> sector_shift_);
     Entry entry{quad, address, line, 0};
     for (unsigned sector = first; sector <= last; ++sector) {
       entry.sectors |= 1U << sector;
       if (cache_->has_sector(line, sector) || ((pending_[line] >> sector) & 1U) != 0) continue;
       if (!memory_.available() || fills_in_flight_ == cost_.mshrs) return false;
       const unsigned ticket =
-          memory_.read(address / cost_.line_bytes * cost_.line_bytes + std::uint64_t{sector} * cost_.sector_bytes,
-                       cost_.sector_bytes);
+          memory_.read(address - offset + (std::uint64_t{sector} << sector_shift_), cost_.sector_bytes);
       fills_[ticket] = {line, sector};
       pending_[line] |= 1U << sector;
       ++fills_in_flight_;
-      tokens_ -= cost_.quads_per_cycle;
+      tokens_ -= static_cast<std::int32_t>(cost_.quads_per_cycle);
     }
     cache_->pin(line);
     queue_[(head_ + queued_) % queue_.size()] = entry;
@@ -152,15 +161,15 @@ class CropUnit : public Unit {
 
   /// Blends from the head of the queue; why it stopped is in `stop_`.
   bool blend(Cycle now) {
-    // What sectors took from blending is paid back first; unused cycles are lost.
-    const std::int32_t full = static_cast<std::int32_t>(cost_.quads_per_cycle * cost_.sectors_per_cycle);
+    // What sectors took from blending is paid back first; unused cycles are lost, fractions of a quad are not.
+    const auto full = static_cast<std::int32_t>(cost_.quads_per_cycle * cost_.sectors_per_cycle);
+    const auto price = static_cast<std::int32_t>(cost_.sectors_per_cycle);
     if (now > refilled_) {
       const Cycle gap = std::min<Cycle>(now - refilled_, 1U << 20U);
       tokens_ = static_cast<std::int32_t>(
-          std::min<std::int64_t>(full, tokens_ + static_cast<std::int64_t>(gap) * full));
+          std::min<std::int64_t>(full + price - 1, tokens_ + static_cast<std::int64_t>(gap) * full));
       refilled_ = now;
     }
-    const auto price = static_cast<std::int32_t>(cost_.sectors_per_cycle);
     TerminationBeat beat;
     bool moved = false;
     stop_ = UnitState::starved;
@@ -187,12 +196,13 @@ class CropUnit : public Unit {
       }
       const ColorQuad& quad = entry.quad;
       monitor_->blended(*quad.warp, quad.index, now);
-      const LaneMask pixels = behaviour_->blend(quad.tile(), quad.position(), quad.live(), quad.color());
-      if (pixels != 0) beat.signals[beat.count++] = {quad.tile(), static_cast<std::uint8_t>(quad.position()), pixels};
-      --quad.warp->holders;
-      for (std::uint32_t sectors = entry.sectors; sectors != 0; sectors &= sectors - 1) {
-        cache_->dirty_sector(entry.line, static_cast<unsigned>(__builtin_ctz(sectors)));
+      const CropBehaviour::Outcome outcome =
+          behaviour_->blend(quad.tile, quad.position, quad.live, quad.color());
+      if (outcome.terminated != 0) {
+        beat.signals[beat.count++] = {quad.tile, quad.position, outcome.terminated};
       }
+      --quad.warp->holders;
+      if (outcome.changed || cost_.writes_unchanged) cache_->dirty(entry.line, entry.sectors);
       cache_->unpin(entry.line);
       tokens_ -= price;
       head_ = head_ + 1 == queue_.size() ? 0 : head_ + 1;
@@ -205,7 +215,7 @@ class CropUnit : public Unit {
     return moved;
   }
 
-  Cycle step(Cycle now) override {
+  Cycle tick(Cycle now) override {
     finish_fills();
     const bool blended = blend(now);
     const bool accepted = accept();
@@ -233,6 +243,7 @@ class CropUnit : public Unit {
   std::unique_ptr<CropCache> cache_;
   std::unique_ptr<BlendOrderMonitor> monitor_;
   unsigned bytes_per_quad_ = 0;
+  unsigned sector_shift_ = 0;  ///< log2 of the bytes of a sector
   std::vector<Entry> queue_;  ///< looked up and waiting to be blended, a ring
   std::size_t head_ = 0;
   std::size_t queued_ = 0;

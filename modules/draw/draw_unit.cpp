@@ -22,7 +22,7 @@ class DrawUnit : public Unit {
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  Cycle step(Cycle now) override {
+  Cycle tick(Cycle now) override {
     if (idle()) {
       enter(UnitState::starved, now);
       return never;

@@ -35,7 +35,7 @@ class PropUnit : public Unit {
   }
 
   bool idle() const override {
-    return in_bins_.empty() && in_tested_.empty() && in_shaded_.empty() && current_ == nullptr && early_.empty() &&
+    return in_bins_.empty() && in_tested_.empty() && in_shaded_.empty() && current_ == nullptr && early_ == 0 &&
            in_turn_.empty() && end_ == nullptr;
   }
   std::uint64_t work() const override { return color_quads_; }
@@ -83,21 +83,33 @@ class PropUnit : public Unit {
       } else if (is_next(*warp)) {
         in_turn_.push(warp);
       } else {
-        early_.push_back(warp);
+        early_by_bucket_[bucket_of(*warp)].push_back(warp);
+        ++early_;
       }
     }
     return moved;
+  }
+
+  /// Early warps are kept apart by tile, or by launch order, so that finding the next one is quick.
+  std::size_t bucket_of(const ShadedWarp& warp) const {
+    return cost_.order == PropBehaviour::Order::draw ? warp.sequence % early_by_bucket_.size()
+                                                     : (warp.tile.y * 31U + warp.tile.x) % early_by_bucket_.size();
   }
 
   /// After a warp has left: the one that follows it may be among those that came early.
   void promote(const ShadedWarp& left) {
     if (cost_.order == PropBehaviour::Order::tile) ++next_of_tile(left.tile);
     ++next_sequence_;
-    for (std::size_t i = 0; i < early_.size(); ++i) {
-      if (!is_next(*early_[i])) continue;
-      in_turn_.push(early_[i]);
-      early_[i] = early_.back();
-      early_.pop_back();
+    if (early_ == 0) return;
+    std::vector<const ShadedWarp*>& bucket =
+        early_by_bucket_[cost_.order == PropBehaviour::Order::draw ? next_sequence_ % early_by_bucket_.size()
+                                                                   : bucket_of(left)];
+    for (std::size_t i = 0; i < bucket.size(); ++i) {
+      if (!is_next(*bucket[i])) continue;
+      in_turn_.push(bucket[i]);
+      bucket[i] = bucket.back();
+      bucket.pop_back();
+      --early_;
       break;
     }
   }
@@ -116,7 +128,8 @@ class PropUnit : public Unit {
       }
       if (index_ < current_->count) {
         ++current_->holders;
-        beat.quads[beat.count++] = {current_, index_++};
+        beat.quads[beat.count++] = {current_, current_->tile, current_->position[index_], current_->live[index_], index_};
+        ++index_;
       }
       if (index_ == current_->count) {
         const ShadedWarp* const left = current_;
@@ -147,7 +160,7 @@ class PropUnit : public Unit {
     return moved;
   }
 
-  Cycle step(Cycle now) override {
+  Cycle tick(Cycle now) override {
     bool moved = send_color();
     moved = collect() || moved;
     if (tests_) {
@@ -161,7 +174,7 @@ class PropUnit : public Unit {
       return now + 1;
     }
     const bool has_work = current_ != nullptr || !in_turn_.empty() || in_bins_.ready() || in_tested_.ready();
-    enter(has_work ? UnitState::blocked : early_.empty() ? UnitState::starved : UnitState::latency, now);
+    enter(has_work ? UnitState::blocked : early_ == 0 ? UnitState::starved : UnitState::latency, now);
     Cycle next = std::min({out_color_.retry(), out_release_.retry(), out_test_.retry(), out_survivors_.retry()});
     for (const Cycle ready : {in_bins_.next_ready(), in_tested_.next_ready(), in_shaded_.next_ready()}) {
       if (ready > now) next = std::min(next, ready);
@@ -182,10 +195,11 @@ class PropUnit : public Unit {
   const std::uint32_t tiles_x_;
   std::vector<std::uint32_t> next_of_tile_;
   std::uint32_t next_sequence_ = 0;
-  std::vector<const ShadedWarp*> early_;  ///< shaded before their turn
+  std::array<std::vector<const ShadedWarp*>, 256> early_by_bucket_;  ///< shaded before their turn
+  std::size_t early_ = 0;
   BySequence in_turn_;
   const ShadedWarp* current_ = nullptr;  ///< being handed to CROP, from `index_` on
-  std::uint32_t index_ = 0;
+  std::uint8_t index_ = 0;
   const ShadedWarp* end_ = nullptr;
   std::uint64_t color_quads_ = 0;
 };

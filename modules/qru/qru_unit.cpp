@@ -23,7 +23,7 @@ class QruUnit : public Unit {
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  Cycle step(Cycle now) override {
+  Cycle tick(Cycle now) override {
     unsigned budget = cost_.items_per_cycle;
     bool moved = false;
     bool blocked = false;

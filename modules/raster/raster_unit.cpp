@@ -46,7 +46,7 @@ class RasterUnit : public Unit {
     return true;
   }
 
-  Cycle step(Cycle now) override {
+  Cycle tick(Cycle now) override {
     unsigned quad_budget = cost_.quads_per_cycle;
     unsigned fine_budget = cost_.fine_tiles_per_cycle;
     unsigned coarse_budget = cost_.coarse_tiles_per_cycle;

@@ -9,9 +9,13 @@ namespace {
 
 constexpr std::uint16_t no_slot = 0xffff;
 
-/// Warps on one warp scheduler: those that can issue wait in order; a segment's instructions issue back to back.
+constexpr std::uint32_t no_flight = ~0U;
+
+/// Warps on one warp scheduler: those that can issue wait in order, chained through their flights; a segment's
+/// instructions issue back to back.
 struct Scheduler {
-  std::deque<std::uint32_t> ready;
+  std::uint32_t first_ready = no_flight;
+  std::uint32_t last_ready = no_flight;
   Cycle free_at = 0;
   bool event_pending = false;
 };
@@ -88,6 +92,7 @@ class SmUnit : public Unit {
     const std::vector<ShaderSegment>* program = nullptr;
     std::uint32_t segment = 0;
     std::uint32_t scheduler = 0;
+    std::uint32_t next_ready = no_flight;  ///< behind this one on its scheduler
     bool done = false;  ///< vertex warps only
     Warp warp;
     VertexWarp vertices;
@@ -105,9 +110,9 @@ class SmUnit : public Unit {
   }
 
   void issue(Scheduler& scheduler, Cycle now) {
-    const std::uint32_t slot = scheduler.ready.front();
-    scheduler.ready.pop_front();
+    const std::uint32_t slot = scheduler.first_ready;
     Flight& flight = flights_[slot];
+    scheduler.first_ready = flight.next_ready;
     const ShaderSegment& segment = (*flight.program)[flight.segment++];
     const Cycle busy = Cycle{segment.instructions} * cycles_per_instruction_;
     scheduler.free_at = now + busy;
@@ -118,7 +123,7 @@ class SmUnit : public Unit {
 
   void arm(std::uint32_t index, Cycle now) {
     Scheduler& scheduler = schedulers_[index];
-    if (scheduler.ready.empty() || scheduler.event_pending) return;
+    if (scheduler.first_ready == no_flight || scheduler.event_pending) return;
     wheel_.add(std::max(scheduler.free_at, now + 1), scheduler_event | index);
     scheduler.event_pending = true;
   }
@@ -126,7 +131,9 @@ class SmUnit : public Unit {
   void make_ready(std::uint32_t slot, Cycle now) {
     const std::uint32_t index = flights_[slot].scheduler;
     Scheduler& scheduler = schedulers_[index];
-    scheduler.ready.push_back(slot);
+    (scheduler.first_ready == no_flight ? scheduler.first_ready : flights_[scheduler.last_ready].next_ready) = slot;
+    scheduler.last_ready = slot;
+    flights_[slot].next_ready = no_flight;
     if (scheduler.free_at <= now && !scheduler.event_pending) issue(scheduler, now);
     arm(index, now);
   }
@@ -156,9 +163,8 @@ class SmUnit : public Unit {
     completed_.push_back(shaded);
   }
 
-  bool run_events(Cycle now) {
+  void run_events(Cycle now) {
     std::vector<std::uint32_t>& events = wheel_.at(now);
-    if (events.empty()) return false;
     // Events are only ever added to later cycles, so the bucket does not change under the loop.
     for (const std::uint32_t event : events) {
       if ((event & scheduler_event) != 0) {
@@ -173,34 +179,26 @@ class SmUnit : public Unit {
       }
     }
     wheel_.clear(now);
-    return true;
   }
 
-  bool release_slots() {
-    bool moved = false;
+  void release_slots() {
     for (; in_release_.ready(); in_release_.pop()) {
       const std::uint32_t slot = in_release_.front().slot;
-      moved = true;
       if (slot == no_slot) continue;
       free_of_core_[slot / cost_.warps_per_core].push_back(slot);
       --in_flight_;
     }
-    return moved;
   }
 
-  bool send() {
-    bool moved = false;
+  void send() {
     while (!completed_.empty() && out_shaded_.credits() > 0) {
       out_shaded_.push({completed_.front()});
       completed_.pop_front();
-      moved = true;
     }
     while (!vertex_order_.empty() && flights_[vertex_order_.front()].done && out_vertices_.credits() > 0) {
       out_vertices_.push(flights_[vertex_order_.front()].vertices);
       vertex_order_.pop_front();
-      moved = true;
     }
-    return moved;
   }
 
   bool choose_core(TileId tile) {
@@ -214,9 +212,9 @@ class SmUnit : public Unit {
     return false;
   }
 
-  bool launch_fragments(Cycle now) {
+  void launch_fragments(Cycle now) {
     slots_full_ = false;
-    if (!in_warps_.ready()) return false;
+    if (!in_warps_.ready()) return;
     const Warp& warp = in_warps_.front();
     if (warp.end_of_draw) {
       ShadedWarp* const end = take_from_pool();
@@ -227,11 +225,11 @@ class SmUnit : public Unit {
       end->holders = 1;
       completed_.push_back(end);
       in_warps_.pop();
-      return true;
+      return;
     }
     if (!choose_core(warp.tile)) {
       slots_full_ = true;
-      return false;
+      return;
     }
     last_tile_ = warp.tile;
     ++sent_to_core_;
@@ -245,11 +243,10 @@ class SmUnit : public Unit {
     in_warps_.pop();
     ++in_flight_;
     make_ready(slot, now);
-    return true;
   }
 
-  bool launch_vertices(Cycle now) {
-    if (!in_vertices_.ready() || vertex_order_.size() == cost_.vertex_warps) return false;
+  void launch_vertices(Cycle now) {
+    if (!in_vertices_.ready() || vertex_order_.size() == cost_.vertex_warps) return;
     const std::uint32_t slot = fragment_slots_ + vertex_turn_;
     vertex_turn_ = vertex_turn_ + 1 == cost_.vertex_warps ? 0 : vertex_turn_ + 1;
     Flight& flight = flights_[slot];
@@ -257,20 +254,19 @@ class SmUnit : public Unit {
     flight.done = flight.vertices.end_of_draw;
     in_vertices_.pop();
     vertex_order_.push_back(slot);
-    if (flight.done) return true;
+    if (flight.done) return;
     flight.program = &cost_.vertex;
     flight.segment = 0;
     flight.scheduler = static_cast<std::uint32_t>(vertex_scheduler_++ % schedulers_.size());
     make_ready(slot, now);
-    return true;
   }
 
-  Cycle step(Cycle now) override {
-    bool moved = release_slots();
-    moved = run_events(now) || moved;
-    moved = launch_fragments(now) || moved;
-    moved = launch_vertices(now) || moved;
-    moved = send() || moved;
+  Cycle tick(Cycle now) override {
+    release_slots();
+    run_events(now);
+    launch_fragments(now);
+    launch_vertices(now);
+    send();
 
     if (busy_until_ > now) {
       enter(UnitState::busy, now);
@@ -281,13 +277,12 @@ class SmUnit : public Unit {
     } else {
       enter(UnitState::starved, now);
     }
-    if (moved) return now + 1;
     Cycle next = wheel_.next_after(now);
     if (busy_until_ > now) next = std::min(next, busy_until_);
-    for (const Cycle ready : {in_warps_.next_ready(), in_vertices_.next_ready(), in_release_.next_ready()}) {
-      if (ready > now) next = std::min(next, ready);
-    }
-    return std::min({next, out_shaded_.retry(), out_vertices_.retry()});
+    // What could not be taken for want of a slot or a credit waits for the port that brings one.
+    if (!slots_full_) next = std::min(next, std::max(in_warps_.next_ready(), now + 1));
+    if (vertex_order_.size() < cost_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
+    return std::min({next, in_release_.next_ready(), out_shaded_.retry(), out_vertices_.retry()});
   }
 
   StreamIn<VertexWarp> in_vertices_;

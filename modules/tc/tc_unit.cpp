@@ -112,7 +112,7 @@ class TcUnit : public Unit {
     return true;
   }
 
-  Cycle step(Cycle now) override {
+  Cycle tick(Cycle now) override {
     const bool sent = send();
     const bool collected = collect(now);
     const bool flushed = flush_idle_or_ending(now);

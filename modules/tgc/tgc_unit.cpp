@@ -75,7 +75,7 @@ class TgcUnit : public Unit {
     return true;
   }
 
-  Cycle step(Cycle now) override {
+  Cycle tick(Cycle now) override {
     const bool sent = read_out();
     const bool collected = collect();
     if (sent || collected) {

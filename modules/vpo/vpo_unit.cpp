@@ -53,7 +53,7 @@ class VpoUnit : public Unit {
     return at;
   }
 
-  Cycle step(Cycle now) override {
+  Cycle tick(Cycle now) override {
     unsigned budget = cost_.items_per_cycle;
     bool moved = false;
     while (budget > 0) {

@@ -60,7 +60,7 @@ class ZropUnit : public Unit {
     return moved;
   }
 
-  Cycle step(Cycle now) override {
+  Cycle tick(Cycle now) override {
     if (update() || test()) {
       enter(UnitState::busy, now);
       return now + 1;
