@@ -34,6 +34,16 @@ bool box_corners(const RenderState& state, const Splat& splat, std::array<Point,
   const Point center{splat.cx, splat.cy};
   Point a{splat.ax, splat.ay};
   Point b{splat.bx, splat.by};
+  if (state.splat_extent == SplatExtent::axis_aligned_box) {
+    const double half_width = std::sqrt(a.x * a.x + b.x * b.x);
+    const double half_height = std::sqrt(a.y * a.y + b.y * b.y);
+    a = {half_width, 0.0};
+    b = {0.0, half_height};
+  } else if (state.splat_extent == SplatExtent::three_sigma && splat.r > 0) {
+    const double scale = 3.0 / static_cast<double>(splat.r);
+    a = {a.x * scale, a.y * scale};
+    b = {b.x * scale, b.y * scale};
+  }
   const double padding = static_cast<double>(state.obb_padding) / static_cast<double>(1U << state.subpixel_bits);
   for (Point* axis : {&a, &b}) {
     const double length = std::sqrt(axis->x * axis->x + axis->y * axis->y);

@@ -49,6 +49,7 @@ Configuration::Configuration(const RunRequest& request, const Draw& draw) : requ
     state.termination_inclusive = state_parameters_.termination_compare == 0U;
     state.pruning_threshold = static_cast<float>(static_cast<double>(state_parameters_.pruning_threshold));
     state.exponential = static_cast<Exponential>(static_cast<unsigned>(state_parameters_.exponential));
+    state.splat_extent = static_cast<SplatExtent>(static_cast<unsigned>(state_parameters_.splat_extent));
     state.subpixel_bits = state_parameters_.subpixel_bits;
     state.obb_padding = static_cast<float>(static_cast<double>(state_parameters_.obb_padding));
     state.gpcs = static_cast<unsigned>(states_.size());

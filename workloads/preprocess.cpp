@@ -107,7 +107,7 @@ class Projector {
     covariance_factor(gaussian, z, ray_x, ray_y, m1, m2);
     const EllipseAxes ellipse = decompose_covariance(m1, m2);
 
-    const double r = half_extent_in_sigmas(opacity, options_.extent);
+    const double r = half_extent_in_sigmas(opacity);
     const double half_width = 0.5 * camera_.width, half_height = 0.5 * camera_.height;
     // Centre relative to the image's centre, along the ellipse's axes: there an extent can be limited exactly.
     const double x = camera_.fx * ray_x, y = camera_.fy * ray_y;
@@ -283,8 +283,7 @@ EllipseAxes decompose_covariance(const Vec3& m1, const Vec3& m2) {
   return {lambda1, lambda2, x / length, y / length};
 }
 
-double half_extent_in_sigmas(float opacity, SplatExtent extent) {
-  if (extent == SplatExtent::three_sigma) return 3.0;
+double half_extent_in_sigmas(float opacity) {
   // 1/255 rounded to float is a little more than 1/255; the splat reaches its centre alone.
   if (opacity <= kPruneThreshold) return 0.0;
   return std::sqrt(2.0 * portable_log(255.0 * static_cast<double>(opacity)));

@@ -55,18 +55,27 @@ class PropUnit : public Unit {
                                                      : warp.tile_sequence == next_of_tile(warp.tile);
   }
 
-  /// Moves beats, `quads_per_cycle` wide, from one port to the next.
-  bool forward(StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to) {
+  /// A way through the unit, `quads_per_cycle` wide.
+  struct Passage {
+    Cycle free_at = 0;
+  };
+
+  /// Moves beats from one port to the next; a beat wider than the unit takes several cycles.
+  bool forward(Passage& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to, Cycle now) {
+    if (now < passage.free_at) return false;
     bool moved = false;
     unsigned budget = cost_.quads_per_cycle;
     while (from.ready() && to.credits() > 0) {
       const QuadBeat& beat = from.front();
       const unsigned width = std::max<unsigned>(beat.count, 1);
-      if (width > budget && budget < cost_.quads_per_cycle) break;
+      if (width > budget && moved) break;
       to.push(beat);
       from.pop();
       moved = true;
-      if (width >= budget) break;
+      if (width >= budget) {
+        passage.free_at = now + (width + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
+        break;
+      }
       budget -= width;
     }
     return moved;
@@ -164,10 +173,10 @@ class PropUnit : public Unit {
     bool moved = send_color();
     moved = collect() || moved;
     if (tests_) {
-      moved = forward(in_tested_, out_survivors_) || moved;
-      moved = forward(in_bins_, out_test_) || moved;
+      moved = forward(back_, in_tested_, out_survivors_, now) || moved;
+      moved = forward(there_, in_bins_, out_test_, now) || moved;
     } else {
-      moved = forward(in_bins_, out_survivors_) || moved;
+      moved = forward(there_, in_bins_, out_survivors_, now) || moved;
     }
     if (moved) {
       enter(UnitState::busy, now);
@@ -175,7 +184,8 @@ class PropUnit : public Unit {
     }
     const bool has_work = current_ != nullptr || !in_turn_.empty() || in_bins_.ready() || in_tested_.ready();
     enter(has_work ? UnitState::blocked : early_ == 0 ? UnitState::starved : UnitState::latency, now);
-    Cycle next = std::min({out_color_.retry(), out_release_.retry(), out_test_.retry(), out_survivors_.retry()});
+    Cycle next = std::min({there_.free_at > now ? there_.free_at : never, back_.free_at > now ? back_.free_at : never,
+                           out_color_.retry(), out_release_.retry(), out_test_.retry(), out_survivors_.retry()});
     for (const Cycle ready : {in_bins_.next_ready(), in_tested_.next_ready(), in_shaded_.next_ready()}) {
       if (ready > now) next = std::min(next, ready);
     }
@@ -193,6 +203,8 @@ class PropUnit : public Unit {
   const PropBehaviour::Cost cost_;
   const bool tests_;
   const std::uint32_t tiles_x_;
+  Passage there_;  ///< to the tests, or past them
+  Passage back_;   ///< from the tests
   std::vector<std::uint32_t> next_of_tile_;
   std::uint32_t next_sequence_ = 0;
   std::array<std::vector<const ShadedWarp*>, 256> early_by_bucket_;  ///< shaded before their turn

@@ -50,6 +50,7 @@ void SplatShader::load(std::uint32_t index) {
                  std::min(splat.blue, half_max)};
 }
 
+template <Exponential Kind>
 LaneMask SplatShader::shade_quad(TileId tile, const Quad& quad, QuadColor& out) {
   if (quad.splat != loaded_) load(quad.splat);
   const Attributes& splat = attributes_;
@@ -60,7 +61,7 @@ LaneMask SplatShader::shade_quad(TileId tile, const Quad& quad, QuadColor& out) 
   const Lanes u = dx * splat.m00 + dy * splat.m01;
   const Lanes v = dx * splat.m10 + dy * splat.m11;
   const Lanes squared = u * u + v * v;
-  Lanes alpha = exp2_nonpositive(squared * -half_log2_e) * splat.opacity;
+  Lanes alpha = shader_exp2<Kind>(squared * -half_log2_e) * splat.opacity;
   alpha = select(alpha < alpha_max, alpha, splat_lanes(alpha_max));
   const LaneBits kept = (alpha >= state_.pruning_threshold) & expand_mask(quad.coverage);
   alpha = lanes_of(bits_of(alpha) & kept);
@@ -69,6 +70,17 @@ LaneMask SplatShader::shade_quad(TileId tile, const Quad& quad, QuadColor& out) 
 }
 
 void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
+  switch (state_.exponential) {
+    case Exponential::exact: return shade_warp<Exponential::exact>(warp, out);
+    case Exponential::ex2: return shade_warp<Exponential::ex2>(warp, out);
+    case Exponential::fp16: return shade_warp<Exponential::fp16>(warp, out);
+    case Exponential::table256: return shade_warp<Exponential::table256>(warp, out);
+    case Exponential::table16: return shade_warp<Exponential::table16>(warp, out);
+  }
+}
+
+template <Exponential Kind>
+void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
   out.tile = warp.tile;
   out.sequence = warp.sequence;
   out.tile_sequence = warp.tile_sequence;
@@ -82,7 +94,7 @@ void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
   for (unsigned i = 0; i < warp.count; ++i) {
     const Quad& quad = warp.quads[i];
     QuadColor& color = out.color[count];
-    const LaneMask live = shade_quad(warp.tile, quad, color);
+    const LaneMask live = shade_quad<Kind>(warp.tile, quad, color);
     shaded += popcount(quad.coverage);
     pruned += popcount(static_cast<LaneMask>(quad.coverage & ~live));
     const bool back_of_pair = (i & 1U) != 0 && ((warp.merge_pairs >> (i / 2)) & 1U) != 0;

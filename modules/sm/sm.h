@@ -63,6 +63,9 @@ class SplatShader : public SmBehaviour {
     float opacity, red, green, blue;
   };
   void load(std::uint32_t splat);
+  template <Exponential Kind>
+  void shade_warp(const Warp& warp, ShadedWarp& out);
+  template <Exponential Kind>
   LaneMask shade_quad(TileId tile, const Quad& quad, QuadColor& out);
 
   const RenderState& state_;

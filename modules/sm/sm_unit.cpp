@@ -156,6 +156,7 @@ class SmUnit : public Unit {
       flight.done = true;
       return;
     }
+    --running_;
     ShadedWarp* const shaded = take_from_pool();
     behaviour_->shade(flight.warp, *shaded);
     shaded->slot = static_cast<std::uint16_t>(slot);
@@ -242,6 +243,7 @@ class SmUnit : public Unit {
     flight.warp = warp;
     in_warps_.pop();
     ++in_flight_;
+    ++running_;
     make_ready(slot, now);
   }
 
@@ -268,9 +270,11 @@ class SmUnit : public Unit {
     launch_vertices(now);
     send();
 
-    if (busy_until_ > now) {
+    // Full of shaded warps that nobody takes is back-pressure, even if a scheduler issues; full of running ones is work.
+    const bool held_up = slots_full_ && 2 * (in_flight_ - running_) > in_flight_;
+    if (!held_up && busy_until_ > now) {
       enter(UnitState::busy, now);
-    } else if (slots_full_ || !completed_.empty()) {
+    } else if (held_up || slots_full_ || !completed_.empty()) {
       enter(UnitState::blocked, now);
     } else if (wheel_.next_after(now) != never) {
       enter(UnitState::memory, now);
@@ -309,7 +313,8 @@ class SmUnit : public Unit {
   std::uint32_t turn_of_scheduler_ = 0;
   std::uint64_t vertex_scheduler_ = 0;
   std::uint32_t vertex_turn_ = 0;
-  std::uint32_t in_flight_ = 0;
+  std::uint32_t in_flight_ = 0;  ///< fragment warps, up to their release
+  std::uint32_t running_ = 0;    ///< of these, not shaded yet
   bool slots_full_ = false;
   Cycle busy_until_ = 0;
   std::uint64_t instructions_ = 0;

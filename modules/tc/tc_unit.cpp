@@ -39,14 +39,19 @@ class TcUnit : public Unit {
         in_.pop();
         return true;
       }
-      // Beats are no wider than the unit: a beat that exceeds what is left of this cycle waits for the next.
-      if (beat.count - from_ > budget && budget < cost_.quads_per_cycle) break;
       bool flushed = false;
-      const unsigned taken = behaviour_->insert(beat, from_, next_place(), flushed);
+      unsigned taken = 0;
+      if (beat.count - from_ <= budget) {
+        taken = behaviour_->insert(beat, from_, next_place(), flushed);
+      } else {
+        QuadBeat part = beat;
+        part.count = static_cast<std::uint8_t>(from_ + budget);
+        taken = behaviour_->insert(part, from_, next_place(), flushed);
+      }
       if (flushed) ++queued_;
       from_ += taken;
       taken_ += taken;
-      budget -= std::min(budget, taken);
+      budget -= taken;
       holds_quads_ = true;
       last_arrival_ = now;
       moved = true;

@@ -41,12 +41,13 @@ class ZropUnit : public Unit {
     return moved;
   }
 
-  bool test() {
+  bool test(Cycle now) {
+    if (now < free_at_) return false;
     unsigned budget = cost_.quads_per_cycle;
     bool moved = false;
     while (in_.ready() && out_.credits() > 0) {
       const unsigned width = std::max<unsigned>(in_.front().count, 1);
-      if (width > budget && budget < cost_.quads_per_cycle) break;
+      if (width > budget && moved) break;
       QuadBeat beat = in_.front();
       in_.pop();
       tested_ += beat.count;
@@ -54,16 +55,23 @@ class ZropUnit : public Unit {
       moved = true;
       // A beat without survivors goes no further, but for the mark that closes a bin.
       if (beat.count > 0 || beat.last_of_bin || beat.end_of_draw) out_.push(beat);
-      if (width >= budget) break;
+      if (width >= budget) {
+        free_at_ = now + (width + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
+        break;
+      }
       budget -= width;
     }
     return moved;
   }
 
   Cycle tick(Cycle now) override {
-    if (update() || test()) {
+    if (update() || test(now)) {
       enter(UnitState::busy, now);
       return now + 1;
+    }
+    if (now < free_at_) {
+      enter(UnitState::busy, now);
+      return free_at_;
     }
     if (in_.ready()) {
       enter(UnitState::blocked, now);
@@ -79,6 +87,7 @@ class ZropUnit : public Unit {
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZropBehaviour::Cost cost_;
   unsigned signal_ = 0;
+  Cycle free_at_ = 0;  ///< after a beat wider than the unit
   std::uint64_t tested_ = 0;
 };
 

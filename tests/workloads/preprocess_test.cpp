@@ -490,9 +490,9 @@ TEST(PreprocessOpacity, O01O02BelowOne255thIsCulledNotRejected) {
 
 TEST(PreprocessOpacity, O03O04AtOne255thTheExtentIsZeroAndGrowsFromThere) {
   const float edge = 1.0f / 255;
-  EXPECT_EQ(half_extent_in_sigmas(edge, SplatExtent::obb), 0);
-  EXPECT_EQ(half_extent_in_sigmas(0, SplatExtent::obb), 0);
-  const double above = half_extent_in_sigmas(std::nextafter(edge, 1.0f), SplatExtent::obb);
+  EXPECT_EQ(half_extent_in_sigmas(edge), 0);
+  EXPECT_EQ(half_extent_in_sigmas(0), 0);
+  const double above = half_extent_in_sigmas(std::nextafter(edge, 1.0f));
   EXPECT_GT(above, 0);
   EXPECT_LT(above, 1e-3);
 }
@@ -525,18 +525,6 @@ TEST(PreprocessOpacity, O04O05TheExtentEndsWhereAlphaIsOne255th) {
     EXPECT_NEAR(s.by, sigma * s.r, 1e-5);
   }
   EXPECT_NEAR(last, 3.3290, 1e-4);
-}
-
-TEST(PreprocessOpacity, ThreeSigmaExtentDoesNotDependOnTheOpacity) {
-  GaussianAttributes g = ordinary_gaussian();
-  PreprocessOptions options;
-  options.extent = SplatExtent::three_sigma;
-  for (const float logit : {-5.0f, 0.0f, kInf}) {
-    g.opacity_logit = logit;
-    const Splat s = run({g}, 0, options).splats.at(0);
-    EXPECT_EQ(s.r, 3);
-    EXPECT_NEAR(s.ax, 3 * std::sqrt(std::pow(32.0 / 5 * std::exp(-2.0), 2) + 0.3), 1e-5);
-  }
 }
 
 TEST(PreprocessCulling, ABoxThatMissesTheImageIsDropped) {

@@ -23,6 +23,8 @@ struct StateParameters : ParameterSet {
                      "the fragment shader's exponential"};
   Choice blend_rounding{*this, "blend_rounding", {"rne", "rtz", "measured"}, 0, source::open,
                         "of the blender into the target format"};
+  Choice splat_extent{*this, "splat_extent", {"obb", "aabb", "three_sigma"}, 0, source::paper_text,
+                      "what is rasterised for a splat: its box at alpha 1/255, oriented or axis-aligned, or at 3 sigmas"};
   Integer subpixel_bits{*this, "subpixel_bits", 8, 4, 12, "bits", "D3D11.3: 8", "of vertex coordinates"};
   Real obb_padding{*this, "obb_padding", 0.75, 0.0, 16.0, "sub-pixel steps", source::open,
                    "added to half axes so that snapping loses no fragment above the pruning threshold"};

@@ -10,15 +10,8 @@
 
 namespace vrpipe {
 
-/// How far a splat's oriented box reaches.
-enum class SplatExtent {
-  obb,          ///< to alpha = 1/255 along both axes: r = sqrt(2 ln(255 opacity)) (the paper)
-  three_sigma,  ///< r = 3 whatever the opacity (INRIA's radius)
-};
-
 struct PreprocessOptions {
   int sh_degree = 3;  ///< highest SH degree evaluated, 0 to 3; a scene of a lower degree uses its own
-  SplatExtent extent = SplatExtent::obb;
   /// 32, 24, 16 or 12. Below 32 the order-preserving keys k of the visible splats are reduced to
   /// floor((k - min) * 2^bits / (max - min + 1)); splats of equal reduced keys keep the scene's order.
   int depth_key_bits = 32;
@@ -62,7 +55,7 @@ double covariance_determinant(const Vec3& m1, const Vec3& m2);
 double sigmoid(double logit);
 
 /// How far a splat of this opacity reaches along either axis, in sigmas; 0 at opacity 1/255 (and below).
-double half_extent_in_sigmas(float opacity, SplatExtent extent);
+double half_extent_in_sigmas(float opacity);
 
 /// Colour (RGB) of a Gaussian seen along the unit vector `direction` (from the camera to the Gaussian), SH bands up to
 /// `degree`: 0.5 added, negative values and NaN become 0, at most FLT_MAX. A zero direction gives the DC term.
