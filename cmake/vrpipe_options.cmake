@@ -6,6 +6,7 @@ set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 set(CMAKE_LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
+set(CMAKE_INSTALL_RPATH $ORIGIN/../${CMAKE_INSTALL_LIBDIR})
 
 option(VRPIPE_WARNINGS_AS_ERRORS "stop at warnings" OFF)
 set(VRPIPE_SANITIZE "" CACHE STRING "sanitizers, as for -fsanitize=")
@@ -18,18 +19,16 @@ find_package(nlohmann_json REQUIRED)
 find_package(glm REQUIRED)
 find_package(Threads REQUIRED)
 
-# Debian's SystemC is built for C++17 alone.
-add_library(vrpipe_systemc INTERFACE)
-target_link_libraries(vrpipe_systemc INTERFACE PkgConfig::systemc)
-
-# Part of what plugins and platforms outside must be built with: results are the same on every compiler and processor.
+# What the headers need, also outside the tree: results are the same on every compiler and processor. Debian's SystemC
+# is built for C++17 alone.
 add_library(vrpipe_options INTERFACE)
 target_compile_features(vrpipe_options INTERFACE cxx_std_17)
 target_compile_options(vrpipe_options INTERFACE -ffp-contract=off)
-set(VRPIPE_PLUGIN_TAG "vrpipe-plugin/${PROJECT_VERSION}/${CMAKE_CXX_COMPILER_ID}-abi")
-string(REGEX REPLACE "GNU|Clang" "itanium" VRPIPE_PLUGIN_TAG "${VRPIPE_PLUGIN_TAG}")
-target_compile_definitions(vrpipe_options INTERFACE BOOST_DLL_USE_STD_FS VRPIPE_VERSION="${PROJECT_VERSION}"
-  VRPIPE_PLUGIN_TAG="${VRPIPE_PLUGIN_TAG}")
+target_compile_definitions(vrpipe_options INTERFACE VRPIPE_VERSION="${PROJECT_VERSION}")
+target_link_libraries(vrpipe_options INTERFACE PkgConfig::systemc fmt::fmt Boost::headers)
+
+include(vrpipe_plugin)
+vrpipe_plugin_tag(VRPIPE_PLUGIN_TAG ${PROJECT_VERSION})
 
 # For the project's own code only.
 add_compile_options(-Wall -Wextra -Wshadow -Wconversion)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include <vrpipe/error.h>
 
@@ -31,9 +32,30 @@ void ClockDomain::set_tick_order(std::vector<unsigned> order) {
 
 void ClockDomain::start_of_simulation() { event_.notify(sc_core::SC_ZERO_TIME); }
 
+void ClockDomain::run(const sc_core::sc_time& duration) {
+  sc_core::sc_start(duration);
+  if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
+}
+
 void ClockDomain::edge() {
   running_ = true;
+  in_edge_ = true;
+  now_ = std::exchange(next_, never);
   ++edges_;
+  // Through the kernel an exception would come out as a report of the kernel's.
+  try {
+    tick_all();
+  } catch (...) {
+    thrown_ = std::current_exception();
+    finished_ = true;
+  }
+  in_edge_ = false;
+  if (finished_) return;
+  for (const Slot& slot : slots_) next_ = std::min(next_, slot.due);
+  if (next_ != never) event_.notify(sc_core::sc_time::from_value((next_ - now_) * period_.value()));
+}
+
+void ClockDomain::tick_all() {
   // First all that are due, then all ticks: a wake-up in this cycle is for a later one, also for a unit yet to tick.
   for (Slot& slot : slots_) {
     slot.active = slot.due <= now_;
@@ -44,14 +66,17 @@ void ClockDomain::edge() {
     if (!slot.active) continue;
     const Cycle next = slot.unit->tick(now_);
     if (next < slot.due) slot.due = next;
+    if (slot.due <= now_) throw SimulationFault(name(), now_, "a unit asked for an edge in the past");
   }
+}
+
+void ClockDomain::wake_from_outside(unsigned handle, Cycle at) {
   if (finished_) return;
-  Cycle next = never;
-  for (const Slot& slot : slots_) next = std::min(next, slot.due);
-  if (next == never) return;
-  if (next <= now_) throw SimulationFault(name(), now_, "a unit asked for an edge in the past");
-  event_.notify(sc_core::sc_time::from_value((next - now_) * period_.value()));
-  now_ = next;
+  at = std::max(at, edge_after(sc_core::SC_ZERO_TIME));
+  slots_[handle].due = std::min(slots_[handle].due, at);
+  if (at >= next_) return;
+  next_ = at;
+  event_.notify(sc_core::sc_time::from_value(at * period_.value()) - sc_core::sc_time_stamp());
 }
 
 }  // namespace vrpipe

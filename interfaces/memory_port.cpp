@@ -61,9 +61,7 @@ void MemoryPort::complete(unsigned ticket, const sc_core::sc_time& delay) {
                           "the memory answered " + slot.payload.get_response_string());
   }
   slot.answered = true;
-  const std::uint64_t period = clock_.domain->period().value();
-  const Cycle cycles = (delay.value() + period - 1) / period;
-  const Cycle at = clock_.domain->now() + (cycles == 0 ? 1 : cycles);
+  const Cycle at = clock_.domain->edge_after(delay);
   // Nearly always the last: memories answer in order. The ring holds an entry for every slot.
   std::size_t place = completions_head_ + completions_count_++;
   while (place != completions_head_ && completion(place - 1).at > at) {

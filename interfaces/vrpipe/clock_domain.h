@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <exception>
 #include <string>
 #include <vector>
 
@@ -28,13 +30,26 @@ class ClockDomain : public sc_core::sc_module {
 
   /// Returns the handle for `wake`. Units tick in the order of attachment; the order does not change results.
   unsigned attach(Clocked& unit);
+  /// The cycle of this edge; between edges, of the last one.
   Cycle now() const { return now_; }
   sc_core::sc_time period() const { return period_; }
 
-  /// Asks for an edge of a unit at cycle `at`, later than now while the simulation runs.
+  /// Asks for an edge of a unit at cycle `at`, later than now while the simulation runs. Also from outside an edge, by
+  /// a module with time of its own: the edge is then one that is yet to come.
   void wake(unsigned handle, Cycle at) {
+    if (!in_edge_ && running_) return wake_from_outside(handle, at);
     if (at < slots_[handle].due) slots_[handle].due = at;
   }
+
+  /// The first edge that is later than the present time, and not before `delay` has passed.
+  Cycle edge_after(const sc_core::sc_time& delay) const {
+    const std::uint64_t period = period_.value();
+    const std::uint64_t present = sc_core::sc_time_stamp().value();
+    return std::max<Cycle>(present / period + 1, (present + delay.value() + period - 1) / period);
+  }
+
+  /// Runs for a time, as sc_start does; what a unit throws comes out as it is.
+  void run(const sc_core::sc_time& duration);
 
   /// Whether the first edge has come.
   bool running() const { return running_; }
@@ -50,6 +65,8 @@ class ClockDomain : public sc_core::sc_module {
 
  private:
   void edge();
+  void tick_all();
+  void wake_from_outside(unsigned handle, Cycle at);
   void start_of_simulation() override;
 
   sc_core::sc_time period_;
@@ -62,7 +79,10 @@ class ClockDomain : public sc_core::sc_module {
   std::vector<Slot> slots_;
   std::vector<unsigned> order_;
   Cycle now_ = 0;
+  Cycle next_ = 0;  ///< the edge that is armed; `never` for none
   std::uint64_t edges_ = 0;
+  std::exception_ptr thrown_;
+  bool in_edge_ = false;
   bool running_ = false;
   bool finished_ = false;
 };

@@ -1,0 +1,23 @@
+# `cmake --install`, and find_package(vrpipe) for units, platforms and testbenches outside the tree.
+include(CMakePackageConfigHelpers)
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/vrpipe)
+
+set(installed_targets vrpipe_core vrpipe_options vrpipe)
+if(TARGET vrpipe_testkit)
+  list(APPEND installed_targets vrpipe_testkit)
+  set_target_properties(vrpipe_testkit PROPERTIES EXPORT_NAME testkit)
+endif()
+set_target_properties(vrpipe_options PROPERTIES EXPORT_NAME options)
+set_target_properties(vrpipe_core PROPERTIES EXPORT_NAME vrpipe)
+set_target_properties(vrpipe PROPERTIES EXPORT_NAME command)
+install(TARGETS ${installed_targets} EXPORT vrpipe)
+
+foreach(part interfaces platforms workloads testkit)
+  install(DIRECTORY ${part}/vrpipe DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+endforeach()
+
+configure_package_config_file(cmake/vrpipe-config.cmake.in vrpipe-config.cmake INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(vrpipe-config-version.cmake COMPATIBILITY SameMinorVersion)
+install(EXPORT vrpipe NAMESPACE vrpipe:: DESTINATION ${package_dir} FILE vrpipe-targets.cmake)
+install(FILES ${PROJECT_BINARY_DIR}/vrpipe-config.cmake ${PROJECT_BINARY_DIR}/vrpipe-config-version.cmake
+  cmake/vrpipe_plugin.cmake DESTINATION ${package_dir})

@@ -1,0 +1,20 @@
+# Plugins: shared objects whose units register themselves when `vrpipe --plugin FILE.so` loads them.
+
+# What a plugin and the vrpipe that loads it must agree on: the version, since headers are part of the interface, and
+# the C++ ABI, which g++ and clang++ share.
+function(vrpipe_plugin_tag variable version)
+  if(CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
+    set(abi itanium)
+  else()
+    set(abi ${CMAKE_CXX_COMPILER_ID})
+  endif()
+  set(${variable} "vrpipe-plugin/${version}/${abi}-abi" PARENT_SCOPE)
+endfunction()
+
+# vrpipe_add_plugin(name sources...): builds name.so. One of the sources contains VRPIPE_PLUGIN.
+function(vrpipe_add_plugin name)
+  add_library(${name} MODULE ${ARGN})
+  set_target_properties(${name} PROPERTIES PREFIX "")
+  target_compile_definitions(${name} PRIVATE VRPIPE_PLUGIN_TAG="${VRPIPE_PLUGIN_TAG}")
+  target_link_libraries(${name} PRIVATE vrpipe::vrpipe)
+endfunction()

@@ -1,0 +1,181 @@
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <systemc>
+
+#include <vrpipe/clock_domain.h>
+#include <vrpipe/error.h>
+#include <vrpipe/memory_port.h>
+#include <vrpipe/platforms/simulation.h>
+#include <vrpipe/random.h>
+#include <vrpipe/registry.h>
+#include <vrpipe/surface.h>
+#include <vrpipe/testkit/sink.h>
+#include <vrpipe/testkit/source.h>
+#include <vrpipe/unit.h>
+
+namespace vrpipe::testkit {
+
+/// A testbench around one unit at cycle fidelity: sources and sinks by port name, the rest stubbed.
+///
+///     Draw draw;
+///     draw.width = draw.height = 64;
+///     RenderState state;
+///     state.draw = &draw;
+///
+///     Bench bench("qru", "pairing", state, {{"quads_per_cycle", "4"}});   // a plugin's: load_plugin("my.so") first
+///     Source<QuadBeat>& quads = bench.source<QuadBeat>("in_quads");
+///     Sink<Warp>& warps = bench.sink<Warp>("out_warps");
+///     quads.add(beat);                  // as soon as there is room
+///     quads.add(later_beat, 100);       // not before cycle 100
+///     warps.close(0, 50);               // takes nothing in cycles 0 to 49
+///     bench.stall_randomly(seed, 64);   // every port pretends that nothing moves in a quarter of the cycles
+///     bench.run();
+///     for (const auto& record : warps.records()) { record.cycle; record.item; }
+///
+/// Each Bench has a SystemC context of its own, so that a program can have one after another (not two at a time).
+class Bench {
+ public:
+  using Settings = std::vector<std::pair<std::string, std::string>>;  ///< parameter and value, as for --set
+
+  /// A bench without a unit, for sources and sinks connected to one another or to modules of your own.
+  explicit Bench(std::uint64_t period_ps = 1000) {
+    fresh_simulation();
+    clock_ = std::make_unique<ClockDomain>("clock", period_ps);
+  }
+
+  /// @param state  copied; its draw is not. @param gpcs  that a front-end unit serves.
+  /// Throws UserError for an unknown slot, implementation, parameter or value.
+  Bench(const std::string& slot, const std::string& implementation, const RenderState& state,
+        const Settings& settings = {}, unsigned gpcs = 1)
+      : Bench() {
+    state_ = state;
+    const Implementation& found = Registry::instance().find(slot, implementation);
+    const std::unique_ptr<ParameterSet> parameters = found.make_parameters();
+    for (const auto& [name, value] : settings) parameters->set(slot, name, value);
+    std::unique_ptr<Behaviour> behaviour = found.make_behaviour(*parameters, state_);
+    if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) {
+      surface_ = std::make_unique<ColorSurface>(state.draw->width, state.draw->height, state.format);
+      crop->attach(*surface_);
+    }
+    unit_ = unit_maker(slot)(slot, *clock_, std::move(behaviour), state_, gpcs);
+  }
+  Bench(const Bench&) = delete;
+  Bench& operator=(const Bench&) = delete;
+
+  ClockDomain& clock() { return *clock_; }
+  Unit& unit() { return *unit_; }
+  /// The unit's behaviour as the class that it is, for its counters: behaviour<PairingQru>().
+  template <class Type>
+  Type& behaviour() {
+    return dynamic_cast<Type&>(unit_->behaviour());
+  }
+  /// What a CROP blends into.
+  ColorSurface& surface() { return *surface_; }
+
+  /// A source connected to an input of the unit, or, without a port's name, to nothing yet.
+  template <class Item>
+  Source<Item>& source(const std::string& port = "", unsigned depth = 4, unsigned latency = 1) {
+    auto made = std::make_unique<Source<Item>>(sc_core::sc_gen_unique_name("source"), *clock_);
+    Source<Item>& result = *made;
+    if (!port.empty()) result.out.connect(unit_->in(port), depth, latency);
+    keep(std::move(made));
+    return result;
+  }
+
+  /// A sink connected to an output of the unit, or to nothing yet.
+  template <class Item>
+  Sink<Item>& sink(const std::string& port = "", unsigned depth = 4, unsigned latency = 1) {
+    auto made = std::make_unique<Sink<Item>>(sc_core::sc_gen_unique_name("sink"), *clock_);
+    Sink<Item>& result = *made;
+    if (!port.empty()) unit_->out(port).connect(result.in, depth, latency);
+    keep(std::move(made));
+    return result;
+  }
+
+  /// Binds the unit's memory port to a memory of your own; without it, a FixedLatencyMemory is made.
+  void bind_memory(tlm::tlm_target_socket<32>& memory) {
+    unit_->memory_socket()->bind(memory);
+    memory_bound_ = true;
+  }
+  /// Time and bytes per cycle of the memory that is made.
+  void set_memory(unsigned latency_cycles, unsigned bytes_per_cycle) {
+    memory_latency_ = latency_cycles;
+    memory_bytes_per_cycle_ = bytes_per_cycle;
+  }
+
+  /// Every port stalls at random in `per_256` of 256 cycles, each differently.
+  void stall_randomly(std::uint64_t seed, unsigned per_256) {
+    stall_seed_ = seed;
+    stall_per_256_ = per_256;
+  }
+  /// Ticks unit, sources and sinks in a random order.
+  void shuffle_ticks(std::uint64_t seed) { tick_seed_ = seed; }
+
+  /// Runs until nothing moves any more; once. Returns the last cycle in which something was asked to move.
+  /// Throws SimulationFault when that takes more than `limit` cycles.
+  Cycle run(Cycle limit = 10'000'000) {
+    prepare();
+    do {
+      if (clock_->now() > limit) throw SimulationFault("bench", clock_->now(), "it does not come to rest");
+      sc_core::sc_start(sc_core::sc_time::from_value(clock_->period().value() * 10000));
+    } while (sc_core::sc_pending_activity());
+    return clock_->now();
+  }
+
+ private:
+  template <class Owner>
+  void keep(std::unique_ptr<Owner> made) {
+    owners_.push_back(made.get());
+    modules_.push_back(std::move(made));
+  }
+
+  void prepare() {
+    std::vector<PortOwner*> owners = owners_;
+    if (unit_) owners.insert(owners.begin(), unit_.get());
+    std::uint64_t seed = stall_seed_;
+    for (PortOwner* owner : owners) {
+      for (InPort* port : owner->in_ports) {
+        if (!port->connected()) port->stub();
+        port->stall_randomly(mix(++seed), stall_per_256_);
+        port->open();
+      }
+      for (OutPort* port : owner->out_ports) {
+        if (!port->connected()) port->stub();
+        port->stall_randomly(mix(++seed), stall_per_256_);
+      }
+    }
+    if (unit_ && unit_->memory_socket() != nullptr && !memory_bound_) {
+      memory_ = std::make_unique<FixedLatencyMemory>("memory", *clock_, memory_latency_, memory_bytes_per_cycle_, 1);
+      bind_memory(memory_->port(0));
+    }
+    if (tick_seed_ != 0) {
+      std::vector<unsigned> order(owners.size());
+      std::iota(order.begin(), order.end(), 0U);
+      for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[mix(tick_seed_ + i) % i]);
+      clock_->set_tick_order(order);
+    }
+  }
+
+  std::unique_ptr<ClockDomain> clock_;
+  RenderState state_;
+  std::unique_ptr<ColorSurface> surface_;
+  std::unique_ptr<FixedLatencyMemory> memory_;
+  std::unique_ptr<Unit> unit_;
+  std::vector<std::unique_ptr<sc_core::sc_module>> modules_;
+  std::vector<PortOwner*> owners_;
+  unsigned memory_latency_ = 146;
+  unsigned memory_bytes_per_cycle_ = 128;
+  bool memory_bound_ = false;
+  std::uint64_t stall_seed_ = 0;
+  unsigned stall_per_256_ = 0;
+  std::uint64_t tick_seed_ = 0;
+};
+
+}  // namespace vrpipe::testkit

@@ -1,0 +1,17 @@
+#include <vrpipe/registry.h>
+
+VRPIPE_PLUGIN
+
+namespace {
+
+class Draws : public vrpipe::DrawBehaviour {
+ public:
+  struct Parameters : vrpipe::ParameterSet {};
+  Draws(const Parameters&, const vrpipe::RenderState&) {}
+  bool next(vrpipe::VertexWarp&) override { return false; }
+  std::uint32_t warps_per_1024_cycles() const override { return 1; }
+};
+
+const vrpipe::Registrar<Draws, vrpipe::DrawBehaviour> registrar("draw", "vertex-issue", "a name that is taken");
+
+}  // namespace

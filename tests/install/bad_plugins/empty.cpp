@@ -1,0 +1,3 @@
+#include <vrpipe/registry.h>
+
+VRPIPE_PLUGIN

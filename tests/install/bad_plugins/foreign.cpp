@@ -1,0 +1,1 @@
+extern "C" int foreign() { return 0; }

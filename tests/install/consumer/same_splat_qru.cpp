@@ -1,0 +1,95 @@
+#include "same_splat_qru.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <vrpipe/registry.h>
+
+namespace {
+std::uint32_t tiles(std::uint32_t pixels) {
+  return (pixels + vrpipe::screen_tile_pixels - 1) / vrpipe::screen_tile_pixels;
+}
+}  // namespace
+
+SameSplatQru::SameSplatQru(const Parameters& parameters, const vrpipe::RenderState& state)
+    : cost_{parameters.quads_per_cycle, parameters.latency_cycles},
+      tiles_x_(tiles(state.draw->width)),
+      next_warp_of_tile_(std::size_t{tiles_x_} * tiles(state.draw->height)) {}
+
+unsigned SameSplatQru::examine(const vrpipe::QuadBeat& beat, unsigned from, vrpipe::Warp& out, bool& launched) {
+  launched = false;
+  warp_.tile = beat.tile;
+  unsigned taken = 0;
+  while (from + taken < beat.count && !launched) {
+    const vrpipe::Quad& quad = beat.quads[from + taken++];
+    ++quads;
+    vrpipe::Quad& held = registers_[quad.position];
+    if (held.coverage == 0) {
+      held = quad;
+    } else if (held.splat == quad.splat) {
+      add_pair(std::exchange(held, {}), quad);
+    } else {
+      add_single(std::exchange(held, quad));
+    }
+    launched = launch_when_full(out);
+  }
+  return taken;
+}
+
+bool SameSplatQru::finish_bin(vrpipe::Warp& out) {
+  for (vrpipe::Quad& held : registers_) {
+    if (held.coverage == 0) continue;
+    add_single(std::exchange(held, {}));
+    if (launch_when_full(out)) return true;
+  }
+  if (waiting_.coverage != 0) warp_.quads[warp_.count++] = std::exchange(waiting_, {});
+  if (warp_.count == 0) return false;
+  launch(out);
+  return true;
+}
+
+void SameSplatQru::add_pair(const vrpipe::Quad& front, const vrpipe::Quad& back) {
+  if (waiting_.coverage != 0 && waiting_.position == front.position) {
+    // The waiting single is in front of the pair, and quads of a position leave in order.
+    fill_slots(std::exchange(waiting_, back), front, false);
+    return;
+  }
+  ++pairs;
+  fill_slots(front, back, true);
+}
+
+void SameSplatQru::add_single(const vrpipe::Quad& quad) {
+  if (waiting_.coverage == 0) {
+    waiting_ = quad;
+  } else {
+    fill_slots(std::exchange(waiting_, {}), quad, false);
+  }
+}
+
+void SameSplatQru::fill_slots(const vrpipe::Quad& first, const vrpipe::Quad& second, bool merge) {
+  if (merge) warp_.merge_pairs = static_cast<std::uint8_t>(warp_.merge_pairs | (1U << (warp_.count / 2U)));
+  warp_.quads[warp_.count++] = first;
+  warp_.quads[warp_.count++] = second;
+}
+
+bool SameSplatQru::launch_when_full(vrpipe::Warp& out) {
+  if (warp_.count < vrpipe::quads_per_warp) return false;
+  launch(out);
+  return true;
+}
+
+void SameSplatQru::launch(vrpipe::Warp& out) {
+  warp_.sequence = next_warp_++;
+  warp_.tile_sequence = next_warp_of_tile_[std::size_t{warp_.tile.y} * tiles_x_ + warp_.tile.x]++;
+  out = warp_;
+  warp_.count = 0;
+  warp_.merge_pairs = 0;
+  ++warps;
+}
+
+VRPIPE_PLUGIN
+
+namespace {
+const vrpipe::Registrar<SameSplatQru, vrpipe::QruBehaviour> registrar("qru", "same-splat",
+                                                                      "pairs only quads of the same splat");
+}

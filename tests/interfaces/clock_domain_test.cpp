@@ -1,0 +1,144 @@
+#include <vrpipe/clock_domain.h>
+
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/error.h>
+#include <vrpipe/platforms/simulation.h>
+
+namespace vrpipe {
+namespace {
+
+/// Ticks when its script says so, and keeps the cycles.
+class Ticker : public Clocked {
+ public:
+  Ticker(ClockDomain& domain, std::vector<Cycle> wanted) : wanted_(std::move(wanted)), handle(domain.attach(*this)) {}
+  Cycle tick(Cycle now) override {
+    ticks.push_back(now);
+    if (action) action(now);
+    while (!wanted_.empty() && wanted_.front() <= now) wanted_.erase(wanted_.begin());
+    return wanted_.empty() ? never : wanted_.front();
+  }
+  std::vector<Cycle> ticks;
+  std::function<void(Cycle)> action;
+
+ private:
+  std::vector<Cycle> wanted_;
+
+ public:
+  unsigned handle;
+};
+
+class ClockDomainTest : public ::testing::Test {
+ protected:
+  ClockDomainTest() {
+    fresh_simulation();
+    clock = std::make_unique<ClockDomain>("clock", 1634);
+  }
+  std::unique_ptr<ClockDomain> clock;
+};
+
+TEST_F(ClockDomainTest, TicksEveryUnitAtCycle0AndThenWhenItAsks) {
+  Ticker a(*clock, {3, 4, 100});
+  Ticker b(*clock, {4});
+  sc_core::sc_start();
+  EXPECT_EQ(a.ticks, (std::vector<Cycle>{0, 3, 4, 100}));
+  EXPECT_EQ(b.ticks, (std::vector<Cycle>{0, 4}));
+}
+
+TEST_F(ClockDomainTest, CyclesInWhichAllSleepCostNothing) {
+  Ticker a(*clock, {1'000'000'000});
+  sc_core::sc_start();
+  EXPECT_EQ(clock->edges(), 2u);
+  EXPECT_EQ(clock->now(), 1'000'000'000u);
+}
+
+// case T08
+TEST_F(ClockDomainTest, TimeIsAWholeNumberOfPeriodsHoweverLongItRuns) {
+  Ticker a(*clock, {125'000, 1'000'000'000'000});
+  sc_core::sc_start();
+  EXPECT_EQ(a.ticks.back(), 1'000'000'000'000u);
+  EXPECT_EQ(sc_core::sc_time_stamp(), sc_core::sc_time::from_value(1'000'000'000'000ULL * clock->period().value()));
+}
+
+TEST_F(ClockDomainTest, AWakeUpInACycleIsForALaterOneWhoeverTicksFirst) {
+  for (const bool waker_first : {true, false}) {
+    fresh_simulation();
+    ClockDomain domain("clock", 1000);
+    Ticker waker(domain, {10});
+    Ticker sleeper(domain, {});
+    waker.action = [&](Cycle now) {
+      if (now == 10) domain.wake(sleeper.handle, 11);
+    };
+    domain.set_tick_order(waker_first ? std::vector<unsigned>{0, 1} : std::vector<unsigned>{1, 0});
+    sc_core::sc_start();
+    EXPECT_EQ(sleeper.ticks, (std::vector<Cycle>{0, 11}));
+  }
+}
+
+TEST_F(ClockDomainTest, TheEarliestOfSeveralWakeUpsCounts) {
+  Ticker waker(*clock, {});
+  Ticker sleeper(*clock, {50});
+  waker.action = [&](Cycle) {
+    clock->wake(sleeper.handle, 30);
+    clock->wake(sleeper.handle, 20);
+    clock->wake(sleeper.handle, 40);
+  };
+  sc_core::sc_start();
+  EXPECT_EQ(sleeper.ticks, (std::vector<Cycle>{0, 20, 50}));
+}
+
+TEST_F(ClockDomainTest, OnlyAPermutationIsATickOrder) {
+  Ticker a(*clock, {});
+  Ticker b(*clock, {});
+  EXPECT_THROW(clock->set_tick_order({0}), SimulationFault);
+  EXPECT_THROW(clock->set_tick_order({0, 0}), SimulationFault);
+  EXPECT_THROW(clock->set_tick_order({0, 2}), SimulationFault);
+  EXPECT_NO_THROW(clock->set_tick_order({1, 0}));
+}
+
+TEST_F(ClockDomainTest, FinishEndsAfterTheCycle) {
+  Ticker a(*clock, {1, 2, 3, 4});
+  a.action = [&](Cycle now) {
+    if (now == 2) clock->finish();
+  };
+  sc_core::sc_start();
+  EXPECT_EQ(a.ticks.back(), 2u);
+  EXPECT_TRUE(clock->finished());
+}
+
+/// A module with time of its own, as a third-party memory is.
+struct Outsider : sc_core::sc_module {
+  Outsider(const sc_core::sc_module_name& name, sc_core::sc_time at, std::function<void()> act)
+      : sc_module(name), at_(at), act_(std::move(act)) {
+    SC_THREAD(run);
+  }
+  SC_HAS_PROCESS(Outsider);
+  void run() {
+    wait(at_);
+    act_();
+  }
+  sc_core::sc_time at_;
+  std::function<void()> act_;
+};
+
+TEST_F(ClockDomainTest, AWakeUpFromOutsideTheClockReachesAUnitWhileAllSleep) {
+  Ticker sleeper(*clock, {});
+  Outsider outsider("outsider", sc_core::sc_time(50.5 * 1634, sc_core::SC_PS), [&] { clock->wake(sleeper.handle, 0); });
+  sc_core::sc_start();
+  EXPECT_EQ(sleeper.ticks, (std::vector<Cycle>{0, 51})) << "the first edge after it";
+}
+
+TEST_F(ClockDomainTest, AWakeUpFromOutsideTheClockComesBeforeAnEdgeAlreadyPlanned) {
+  Ticker busy(*clock, {1000});
+  Ticker sleeper(*clock, {});
+  Outsider outsider("outsider", sc_core::sc_time(50.0 * 1634, sc_core::SC_PS), [&] { clock->wake(sleeper.handle, 60); });
+  sc_core::sc_start();
+  EXPECT_EQ(sleeper.ticks, (std::vector<Cycle>{0, 60}));
+  EXPECT_EQ(busy.ticks, (std::vector<Cycle>{0, 1000}));
+}
+
+}  // namespace
+}  // namespace vrpipe

@@ -1,0 +1,72 @@
+#include <vrpipe/exp2.h>
+
+#include <cmath>
+#include <cstring>
+
+#include <gtest/gtest.h>
+
+namespace vrpipe {
+namespace {
+
+float exp2_of(float x) { return exp2_nonpositive(splat_lanes(x))[0]; }
+
+double error_in_ulp(float x) {
+  const long double exact = std::exp2(static_cast<long double>(x));
+  int exponent = 0;
+  std::frexp(exact, &exponent);
+  const long double ulp = std::ldexp(1.0L, std::max(exponent - 24, -149));
+  return static_cast<double>(std::fabs(static_cast<long double>(exp2_of(x)) - exact) / ulp);
+}
+
+// case Q06
+TEST(Exp2, IsWithinTwoUlpFrom0ToMinus126) {
+  double worst = 0;
+  for (std::uint32_t i = 0; i <= 1'500'000; ++i) {
+    const float x = -126.0F * static_cast<float>(i) / 1'500'000.0F;
+    const double error = error_in_ulp(x);
+    worst = std::fmax(worst, error);
+    ASSERT_LE(error, 2.0) << x;
+  }
+  EXPECT_GT(worst, 0.5) << "the samples do not reach a hard one";
+}
+
+// case Q06
+TEST(Exp2, IsWithinTwoUlpOverAllSmallExponents) {
+  // Floats from 2^-40 to 16, evenly in their bits.
+  for (std::uint32_t bits = 0x2b800000U; bits < 0x41800000U; bits += 211) {
+    float x;
+    std::memcpy(&x, &bits, sizeof x);
+    ASSERT_LE(error_in_ulp(-x), 2.0) << -x;
+  }
+}
+
+// case Q06
+TEST(Exp2, NeverRisesByMoreThanAnUlpAsAFragmentMovesOutward) {
+  float previous = 1.0F;
+  for (std::uint32_t i = 0; i <= 1'000'000; ++i) {
+    const float value = exp2_of(-8.0F * static_cast<float>(i) / 1'000'000.0F);
+    ASSERT_LE(value, std::nextafter(previous, 2.0F)) << i;
+    previous = value;
+  }
+}
+
+TEST(Exp2, WholePowersAreExact) {
+  for (int n = 0; n <= 126; ++n) ASSERT_EQ(exp2_of(static_cast<float>(-n)), std::ldexp(1.0F, -n));
+}
+
+TEST(Exp2, FarBelowItStaysAtTheSmallestNormalNumber) {
+  EXPECT_EQ(exp2_of(-127.0F), std::ldexp(1.0F, -126));
+  EXPECT_EQ(exp2_of(-1e30F), std::ldexp(1.0F, -126));
+  EXPECT_EQ(exp2_of(-HUGE_VALF), std::ldexp(1.0F, -126));
+}
+
+TEST(Exp2, IsNeverAboveOne) {
+  for (std::uint32_t bits = 1; bits < 0x3f000000U; bits += 10007) {
+    float x;
+    std::memcpy(&x, &bits, sizeof x);
+    ASSERT_LE(exp2_of(-x), 1.0F) << x;
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe

@@ -1,0 +1,272 @@
+#include <vrpipe/memory_port.h>
+
+#include <deque>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/error.h>
+#include <vrpipe/platforms/simulation.h>
+
+namespace vrpipe {
+namespace {
+
+/// Reads line after line as fast as the port allows, and keeps when each came back.
+class Reader : public sc_core::sc_module, public Clocked, public PortOwner {
+ public:
+  Reader(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned in_flight, unsigned accesses, unsigned bytes = 32)
+      : sc_module(name), memory(attach(domain), "memory", in_flight), left_(accesses), bytes_(bytes) {}
+
+  MemoryPort memory;
+  std::vector<Cycle> issued, completed;
+  std::vector<unsigned> tickets;
+  unsigned most_in_flight = 0;
+
+ private:
+  PortOwner& attach(ClockDomain& domain) {
+    clock.domain = &domain;
+    clock.unit = domain.attach(*this);
+    return *this;
+  }
+  Cycle tick(Cycle now) override {
+    unsigned ticket = 0;
+    while (memory.next_completed(ticket)) {
+      completed.push_back(now);
+      tickets.push_back(ticket);
+      --in_flight_;
+    }
+    while (left_ > 0 && memory.available()) {
+      memory.read(address_, bytes_);
+      address_ += bytes_;
+      issued.push_back(now);
+      --left_;
+      most_in_flight = std::max(most_in_flight, ++in_flight_);
+    }
+    return memory.next_completion();
+  }
+  unsigned left_;
+  unsigned bytes_;
+  unsigned in_flight_ = 0;
+  std::uint64_t address_ = 0;
+};
+
+/// A memory of another make: approximately timed, all four phases, processes and time of its own.
+class FourPhaseMemory : public sc_core::sc_module, private tlm::tlm_fw_transport_if<> {
+ public:
+  SC_HAS_PROCESS(FourPhaseMemory);
+  FourPhaseMemory(const sc_core::sc_module_name& name, sc_core::sc_time accept, sc_core::sc_time latency)
+      : sc_module(name), socket("socket"), accept_(accept), latency_(latency) {
+    socket.bind(*this);
+    SC_THREAD(serve);
+  }
+  tlm::tlm_target_socket<32> socket;
+  unsigned begin_requests = 0, end_responses = 0;
+  bool overlapped_requests = false;
+
+ private:
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase, sc_core::sc_time&) override {
+    if (phase == tlm::BEGIN_REQ) {
+      overlapped_requests = overlapped_requests || request_open_;
+      request_open_ = true;
+      ++begin_requests;
+      queue_.push_back(&payload);
+      arrived_.notify(sc_core::SC_ZERO_TIME);
+      return tlm::TLM_ACCEPTED;
+    }
+    ++end_responses;
+    return tlm::TLM_COMPLETED;
+  }
+  void serve() {
+    while (true) {
+      while (queue_.empty()) wait(arrived_);
+      tlm::tlm_generic_payload* const payload = queue_.front();
+      queue_.pop_front();
+      wait(accept_);
+      tlm::tlm_phase phase = tlm::END_REQ;
+      sc_core::sc_time delay;
+      request_open_ = false;
+      socket->nb_transport_bw(*payload, phase, delay);
+      wait(latency_);
+      payload->set_response_status(tlm::TLM_OK_RESPONSE);
+      phase = tlm::BEGIN_RESP;
+      delay = sc_core::SC_ZERO_TIME;
+      const tlm::tlm_sync_enum status = socket->nb_transport_bw(*payload, phase, delay);
+      if (status == tlm::TLM_COMPLETED || phase == tlm::END_RESP) ++end_responses;
+    }
+  }
+  void b_transport(tlm::tlm_generic_payload&, sc_core::sc_time&) override {}
+  bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
+
+  sc_core::sc_time accept_, latency_;
+  sc_core::sc_event arrived_;
+  std::deque<tlm::tlm_generic_payload*> queue_;
+  bool request_open_ = false;
+};
+
+/// Answers in the call itself, in one of the ways that the base protocol allows.
+class ImmediateMemory : public sc_core::sc_module, private tlm::tlm_fw_transport_if<> {
+ public:
+  enum class Way { completed, updated_to_response, response_from_within, accepted_from_within, error };
+  ImmediateMemory(const sc_core::sc_module_name& name, Way way, sc_core::sc_time delay)
+      : sc_module(name), socket("socket"), way_(way), delay_(delay) {
+    socket.bind(*this);
+  }
+  tlm::tlm_target_socket<32> socket;
+  unsigned end_responses = 0;
+
+ private:
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase, sc_core::sc_time& delay) override {
+    if (phase == tlm::END_RESP) {
+      ++end_responses;
+      return tlm::TLM_COMPLETED;
+    }
+    payload.set_response_status(way_ == Way::error ? tlm::TLM_ADDRESS_ERROR_RESPONSE : tlm::TLM_OK_RESPONSE);
+    switch (way_) {
+      case Way::completed:
+      case Way::error: delay += delay_; return tlm::TLM_COMPLETED;
+      case Way::updated_to_response:
+        delay += delay_;
+        phase = tlm::BEGIN_RESP;
+        return tlm::TLM_UPDATED;
+      case Way::accepted_from_within: {
+        tlm::tlm_phase back = tlm::END_REQ;
+        sc_core::sc_time none;
+        socket->nb_transport_bw(payload, back, none);
+        [[fallthrough]];
+      }
+      case Way::response_from_within: {
+        tlm::tlm_phase back = tlm::BEGIN_RESP;
+        sc_core::sc_time after = delay_;
+        socket->nb_transport_bw(payload, back, after);
+        return tlm::TLM_ACCEPTED;
+      }
+    }
+    return tlm::TLM_COMPLETED;
+  }
+  void b_transport(tlm::tlm_generic_payload&, sc_core::sc_time&) override {}
+  bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
+
+  Way way_;
+  sc_core::sc_time delay_;
+};
+
+class MemoryPortTest : public ::testing::Test {
+ protected:
+  MemoryPortTest() {
+    fresh_simulation();
+    clock = std::make_unique<ClockDomain>("clock", 1000);
+  }
+  sc_core::sc_time cycles(double count) const { return sc_core::sc_time(1000.0 * count, sc_core::SC_PS); }
+  std::unique_ptr<ClockDomain> clock;
+};
+
+TEST_F(MemoryPortTest, AFixedLatencyMemoryAnswersAfterLatencyAndTransfer) {
+  Reader reader("reader", *clock, 4, 1);
+  FixedLatencyMemory memory("memory", *clock, 10, 32, 1);
+  reader.memory.socket.bind(memory.port(0));
+  sc_core::sc_start();
+  EXPECT_EQ(reader.completed, (std::vector<Cycle>{11}));
+  EXPECT_EQ(memory.bytes(), 32u);
+  EXPECT_EQ(reader.memory.reads(), 1u);
+  EXPECT_EQ(reader.memory.writes(), 0u);
+}
+
+TEST_F(MemoryPortTest, AFixedLatencyMemoryMovesItsBytesPerCycle) {
+  Reader reader("reader", *clock, 8, 8);
+  FixedLatencyMemory memory("memory", *clock, 10, 64, 1);
+  reader.memory.socket.bind(memory.port(0));
+  sc_core::sc_start();
+  EXPECT_EQ(reader.completed, (std::vector<Cycle>{11, 11, 12, 12, 13, 13, 14, 14}));
+}
+
+TEST_F(MemoryPortTest, NoMoreAccessesAreInFlightThanItHasSlots) {
+  Reader reader("reader", *clock, 3, 20);
+  FixedLatencyMemory memory("memory", *clock, 50, 1024, 1);
+  reader.memory.socket.bind(memory.port(0));
+  sc_core::sc_start();
+  EXPECT_EQ(reader.most_in_flight, 3u);
+  EXPECT_EQ(reader.completed.size(), 20u);
+}
+
+TEST_F(MemoryPortTest, AFourPhaseMemoryWithTimeOfItsOwnIsServedWhileAllUnitsSleep) {
+  Reader reader("reader", *clock, 4, 5);
+  FourPhaseMemory memory("memory", cycles(3), cycles(40.5));
+  reader.memory.socket.bind(memory.socket);
+  sc_core::sc_start();
+  ASSERT_EQ(reader.completed.size(), 5u);
+  // Accepted at 3, answered at 43.5, seen at the next edge.
+  EXPECT_EQ(reader.completed[0], 44u);
+  EXPECT_EQ(reader.completed[1], 88u) << "one at a time: 43.5 more, then the next edge";
+  EXPECT_FALSE(memory.overlapped_requests);
+  EXPECT_EQ(memory.begin_requests, 5u);
+  EXPECT_EQ(memory.end_responses, 5u);
+}
+
+TEST_F(MemoryPortTest, AnAnswerAtAnEdgeIsSeenACycleLater) {
+  Reader reader("reader", *clock, 1, 1);
+  FourPhaseMemory memory("memory", cycles(2), cycles(8));
+  reader.memory.socket.bind(memory.socket);
+  sc_core::sc_start();
+  EXPECT_EQ(reader.completed, (std::vector<Cycle>{11}));
+}
+
+TEST_F(MemoryPortTest, TheNextRequestWaitsForTheEndOfTheLast) {
+  Reader reader("reader", *clock, 4, 2);
+  FourPhaseMemory memory("memory", cycles(6), cycles(100));
+  reader.memory.socket.bind(memory.socket);
+  sc_core::sc_start();
+  EXPECT_EQ(reader.issued, (std::vector<Cycle>{0, 7}));
+}
+
+class EarlyCompletion : public MemoryPortTest, public ::testing::WithParamInterface<ImmediateMemory::Way> {};
+
+TEST_P(EarlyCompletion, IsSeenAfterTheAnnotatedDelay) {
+  Reader reader("reader", *clock, 2, 3);
+  ImmediateMemory memory("memory", GetParam(), cycles(9.5));
+  reader.memory.socket.bind(memory.socket);
+  sc_core::sc_start();
+  EXPECT_EQ(reader.completed, (std::vector<Cycle>{10, 10, 20}));
+}
+
+TEST_P(EarlyCompletion, IsSeenInTheNextCycleAtTheEarliest) {
+  Reader reader("reader", *clock, 1, 2);
+  ImmediateMemory memory("memory", GetParam(), sc_core::SC_ZERO_TIME);
+  reader.memory.socket.bind(memory.socket);
+  sc_core::sc_start();
+  EXPECT_EQ(reader.completed, (std::vector<Cycle>{1, 2}));
+}
+
+const char* name_of(ImmediateMemory::Way way) {
+  constexpr const char* names[] = {"Completed", "UpdatedToResponse", "ResponseFromWithin", "AcceptedFromWithin", "Error"};
+  return names[static_cast<int>(way)];
+}
+
+INSTANTIATE_TEST_SUITE_P(Ways, EarlyCompletion,
+                         ::testing::Values(ImmediateMemory::Way::completed, ImmediateMemory::Way::updated_to_response,
+                                           ImmediateMemory::Way::response_from_within,
+                                           ImmediateMemory::Way::accepted_from_within),
+                         [](const auto& way) { return std::string(name_of(way.param)); });
+
+TEST_F(MemoryPortTest, AnErrorResponseIsAFault) {
+  Reader reader("reader", *clock, 1, 1);
+  ImmediateMemory memory("memory", ImmediateMemory::Way::error, sc_core::SC_ZERO_TIME);
+  reader.memory.socket.bind(memory.socket);
+  EXPECT_THROW(sc_core::sc_start(), SimulationFault);
+}
+
+TEST_F(MemoryPortTest, AnAccessThatIsNotNaturallyAlignedIsRefused) {
+  Reader reader("reader", *clock, 8, 0);
+  FixedLatencyMemory memory("memory", *clock, 1, 32, 1);
+  reader.memory.socket.bind(memory.port(0));
+  for (const auto& [address, bytes] : {std::pair{16U, 32U}, {8U, 16U}, {0U, 48U}, {0U, 0U}, {1U, 2U}}) {
+    EXPECT_THROW(reader.memory.read(address, bytes), SimulationFault) << address << " " << bytes;
+    EXPECT_THROW(reader.memory.write(address, bytes), SimulationFault) << address << " " << bytes;
+  }
+  EXPECT_NO_THROW(reader.memory.read(32, 32));
+}
+
+}  // namespace
+}  // namespace vrpipe

@@ -1,0 +1,138 @@
+#include <vrpipe/parameter.h>
+
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/error.h>
+#include <vrpipe/registry.h>
+#include <vrpipe/statistic.h>
+
+namespace vrpipe {
+namespace {
+
+struct Example : ParameterSet {
+  Integer count{*this, "count", 8, 1, 64, "quads", source::open, "how many"};
+  Real share{*this, "share", 0.5, 0.0, 1.0, "alpha", source::paper_text, "how much"};
+  Switch forwarding{*this, "forwarding", true, source::open, "whether"};
+  Choice order{*this, "order", {"draw", "tile"}, 1, source::measured, "which"};
+};
+
+std::string message_of(Example& set, const std::string& name, const std::string& value) {
+  try {
+    set.set("tc", name, value);
+  } catch (const UserError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Parameters, AreFoundByNameAndKeepTheirDefault) {
+  Example set;
+  set.set("tc", "count", "12");
+  set.set("tc", "share", "0.25");
+  set.set("tc", "forwarding", "off");
+  set.set("tc", "order", "draw");
+  EXPECT_EQ(set.count, 12u);
+  EXPECT_EQ(static_cast<double>(set.share), 0.25);
+  EXPECT_FALSE(set.forwarding);
+  EXPECT_EQ(set.order, 0u);
+  EXPECT_EQ(set.count.default_value(), "8");
+  EXPECT_EQ(set.order.default_value(), "tile");
+  EXPECT_EQ(set.parameters().size(), 4u);
+}
+
+TEST(Parameters, AnUnknownNameGetsTheNearestOne) {
+  Example set;
+  const std::string message = message_of(set, "cuont", "3");
+  EXPECT_NE(message.find("cuont"), std::string::npos);
+  EXPECT_NE(message.find("tc.count"), std::string::npos);
+}
+
+TEST(Parameters, AValueOutOfRangeNamesTheKeyAndTheRange) {
+  Example set;
+  const std::vector<std::pair<std::string, std::vector<std::string>>> bad{
+      {"count", {"0", "65", "-1", "8.5", "8 ", "", "eight", "99999999999"}},
+      {"share", {"-0.1", "1.1", "nan", "inf", "", "0.5x"}},
+      {"forwarding", {"yes", "1", ""}},
+      {"order", {"tiles", "", "0"}}};
+  for (const auto& [name, values] : bad) {
+    for (const std::string& value : values) {
+      const std::string message = message_of(set, name, value);
+      EXPECT_NE(message.find("tc." + name), std::string::npos) << name << "=" << value << ": " << message;
+    }
+  }
+  EXPECT_EQ(set.count, 8u) << "a refused value changes nothing";
+}
+
+TEST(Parameters, TheEndsOfTheRangeAreAllowed) {
+  Example set;
+  for (const char* value : {"1", "64"}) EXPECT_EQ(message_of(set, "count", value), "");
+  for (const char* value : {"0", "1"}) EXPECT_EQ(message_of(set, "share", value), "");
+}
+
+// case T07
+TEST(Counter, CountsBeyond32Bits) {
+  StatisticSet set;
+  Counter counter(set, "quads", "quads", "seen");
+  counter += (1ULL << 32U) - 2;
+  for (int i = 0; i < 4; ++i) ++counter;
+  EXPECT_EQ(counter.value(), (1ULL << 32U) + 2);
+  EXPECT_EQ(set.counters().size(), 1u);
+}
+
+TEST(Registry, AllSlotsHaveAnImplementationWithParametersThatSayAllAboutThemselves) {
+  for (const std::string& slot : Registry::slots()) {
+    const auto implementations = Registry::instance().of_slot(slot);
+    EXPECT_FALSE(implementations.empty()) << slot;
+    for (const Implementation* implementation : implementations) {
+      EXPECT_FALSE(implementation->description.empty()) << slot;
+      const std::unique_ptr<ParameterSet> set = implementation->make_parameters();
+      for (const Parameter* parameter : set->parameters()) {
+        EXPECT_STRNE(parameter->source(), "") << slot << "." << parameter->name();
+        EXPECT_STRNE(parameter->meaning(), "") << slot << "." << parameter->name();
+        EXPECT_EQ(parameter->value(), parameter->default_value());
+      }
+    }
+  }
+}
+
+TEST(Registry, AnUnknownSlotOrUnitGetsTheNearestName) {
+  const auto message = [](const char* slot, const char* name) {
+    try {
+      Registry::instance().find(slot, name);
+    } catch (const UserError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(message("qur", "pairing").find("qru"), std::string::npos);
+  EXPECT_NE(message("qru", "paring").find("pairing"), std::string::npos);
+}
+
+TEST(Registry, APluginThatIsMissingOrForeignIsRefused) {
+  EXPECT_THROW(load_plugin("/nowhere/plugin.so"), UserError);
+  EXPECT_THROW(load_plugin("/proc/self/exe/"), UserError);
+}
+
+TEST(NearestName, IsTheOneWithTheFewestEdits) {
+  const std::vector<std::string> names{"baseline", "qm", "het", "het+qm"};
+  EXPECT_EQ(nearest_name("hte", names), "het");
+  EXPECT_EQ(nearest_name("basline", names), "baseline");
+  EXPECT_EQ(nearest_name("qn", names), "qm");
+  EXPECT_EQ(nearest_name("x", std::vector<std::string>{}), "");
+  EXPECT_EQ(edit_distance("kitten", "sitting"), 3u);
+  EXPECT_EQ(edit_distance("", "abc"), 3u);
+}
+
+TEST(UserError, IsOneLineThatNamesThingPlaceReasonAndRemedy) {
+  const std::string message = UserError("cannot read scene", "a.ply", "it is empty", "give another").what();
+  for (const char* part : {"cannot read scene", "a.ply", "it is empty", "give another"}) {
+    EXPECT_NE(message.find(part), std::string::npos);
+  }
+  EXPECT_EQ(message.find('\n'), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vrpipe

@@ -1,0 +1,197 @@
+#include "tool_test_support.h"
+
+#include <cmath>
+#include <limits>
+
+#include <vrpipe/workloads/gaussian_scene.h>
+
+namespace vrpipe::testing {
+namespace {
+
+/// The contract for a mistake of the user: exit code 2, one line on stderr, nothing on stdout, nothing written.
+class BadInput : public ToolTest {
+ protected:
+  void SetUp() override {
+    write("empty.ply", "");
+    write("empty.spl", "");
+    write("text.ply", "hello\n");
+    write("text.spl", "hello, this is not a draw list");
+    write("cut.spl", read_file(folder() / "tiny.spl").substr(0, 700));
+    GaussianSceneBuilder builder(0);
+    GaussianAttributes gaussian;
+    gaussian.position = {0, 0, 5};
+    gaussian.log_scale = {-1, -1, -1};
+    gaussian.opacity_logit = 3;
+    for (int i = 0; i < 4; ++i) builder.add(gaussian);
+    write_gaussian_ply(folder() / "good.ply", builder.build());
+    std::string ply = read_file(folder() / "good.ply");
+    write("cut.ply", ply.substr(0, ply.size() - 10));
+    write("other.ply", ply.replace(ply.find("opacity"), 7, "opacitx"));
+    write("cameras.json",
+          R"([{"width": 64, "height": 48, "position": [0, 0, 0], "rotation": [[1,0,0],[0,1,0],[0,0,1]],
+               "fx": 60, "fy": 60}])");
+    write("broken.json", "[{");
+    write("foreign.so", "not a plugin at all");
+    write("old.so", std::string("...vrpipe-plugin/0.0.0/itanium-abi") + '\0' + "...");
+    write("file", "");
+    std::filesystem::create_directory(folder() / "folder.ply");
+  }
+
+  /// `parts`: what the message has to name.
+  void refused(const std::vector<std::string>& arguments, const std::vector<std::string>& parts) {
+    const std::vector<std::string> before = files();
+    const Finished finished = vrpipe(arguments);
+    std::string command = "vrpipe";
+    for (const std::string& argument : arguments) command += " " + argument;
+    SCOPED_TRACE(command + "\n" + finished.err);
+    EXPECT_EQ(finished.code, 2);
+    EXPECT_EQ(finished.out, "");
+    EXPECT_EQ(finished.err.rfind("vrpipe: error: ", 0), 0U);
+    EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1);
+    EXPECT_EQ(finished.err.back(), '\n');
+    // WHAT (WHERE): WHY; WHAT TO DO
+    const std::size_t where = finished.err.find(" (");
+    const std::size_t why = finished.err.find("): ", where);
+    const std::size_t remedy = finished.err.find("; ", why);
+    EXPECT_TRUE(where != std::string::npos && why != std::string::npos && remedy != std::string::npos);
+    for (const std::string& part : parts) EXPECT_NE(finished.err.find(part), std::string::npos) << part;
+    EXPECT_EQ(files(), before);
+  }
+
+  /// The same with every kind of output asked for, which must not appear.
+  void refused_with_outputs(std::vector<std::string> arguments, const std::vector<std::string>& parts) {
+    arguments.insert(arguments.end(), {"--output", "images/deep", "--json", "result.json", "--save-draw", "draw.spl"});
+    refused(arguments, parts);
+  }
+};
+
+TEST_F(BadInput, Commands) {
+  refused({}, {"no command", "run, compare, scenes, platforms, units"});
+  refused({"reproduce"}, {"'reproduce'", "compare"});
+  refused({"microbench", "tile-binning"}, {"'microbench'"});
+  refused({"compar"}, {"'compar'", "did you mean compare?"});
+  refused({"--scene", "tiny.spl"}, {"'--scene'", "after the command"});
+}
+
+TEST_F(BadInput, Options) {
+  refused({"run", "--scen", "tiny.spl"}, {"'--scen'", "vrpipe run", "did you mean --scene?"});
+  refused({"run", "--formt=rgba8"}, {"'--formt'", "did you mean --format?"});
+  refused({"compare", "--effects", "all"}, {"'--effects'", "vrpipe compare", "--help"});
+  refused({"compare", "--variant", "qm"}, {"'--variant'", "`vrpipe run`"});
+  refused({"run", "-x"}, {"'-x'"});
+  refused({"run", "extra"}, {"'extra'"});
+  refused({"run", "--scene"}, {"missing value", "--scene"});
+  refused({"run", "--scene", "--size", "8x8"}, {"missing value", "--scene", "--size"});
+  refused({"run", "--output", ""}, {"missing value", "--output"});
+  refused({"run", "--size", "8x8", "--size", "9x9"}, {"twice", "--size", "8x8", "9x9"});
+}
+
+TEST_F(BadInput, Numbers) {
+  refused_with_outputs({"run", "--size", "0x8"}, {"--size", "0x8", "1 to 16384"});
+  refused_with_outputs({"run", "--size", "8x0"}, {"--size", "8x0", "1 to 16384"});
+  refused_with_outputs({"compare", "--size", "16385x8"}, {"16385x8", "16384"});
+  refused_with_outputs({"run", "--size", "4294967297x1"}, {"4294967297x1", "16384"});
+  for (const char* text : {"8", "8x", "x8", "8x8x8", "-8x8", "8.5x8", "8X8", "99999999999999999999x1"}) {
+    refused_with_outputs({"run", "--size", text}, {text, "--size", "1280x720"});
+  }
+  refused_with_outputs({"run", "--eye", "1,2"}, {"--eye", "2 numbers", "X,Y,Z"});
+  refused_with_outputs({"run", "--eye", "1,2,nan"}, {"--eye", "'nan'", "finite"});
+  refused_with_outputs({"run", "--look-at", "1,2,3x"}, {"--look-at", "'3x'"});
+  refused_with_outputs({"run", "--up", "1,,3"}, {"--up", "''"});
+  refused_with_outputs({"run", "--eye", "1,1,1", "--look-at", "1,1,1"}, {"--look-at", "--eye"});
+  refused_with_outputs({"run", "--fovy", "wide"}, {"--fovy", "'wide'"});
+  refused_with_outputs({"run", "--fovy", "inf"}, {"--fovy", "'inf'"});
+  refused_with_outputs({"run", "--fovy", "180"}, {"--fovy", "180"});
+  refused_with_outputs({"run", "--background", "255,255,255"}, {"--background", "255", "0 to 1"});
+  refused_with_outputs({"run", "--background", "0,0"}, {"--background", "R,G,B"});
+  refused({"compare", "--jobs", "0"}, {"--jobs", "'0'"});
+}
+
+TEST_F(BadInput, Scenes) {
+  refused_with_outputs({"run", "--scene", "missing.ply"}, {"missing.ply", "no such file"});
+  refused_with_outputs({"compare", "--scene", "missing.spl"}, {"missing.spl", "no such file"});
+  refused_with_outputs({"run", "--scene", "empty.ply"}, {"empty.ply", "empty"});
+  refused_with_outputs({"run", "--scene", "empty.spl"}, {"empty.spl", "empty"});
+  refused_with_outputs({"run", "--scene", "text.ply"}, {"text.ply", "ply"});
+  refused_with_outputs({"run", "--scene", "text.spl"}, {"text.spl", "--save-draw"});
+  refused_with_outputs({"compare", "--scene", "cut.ply"}, {"cut.ply"});
+  refused_with_outputs({"run", "--scene", "cut.spl"}, {"cut.spl", "60 splats"});
+  refused_with_outputs({"run", "--scene", "other.ply"}, {"other.ply", "opacity"});
+  refused_with_outputs({"run", "--scene", "folder.ply"}, {"folder.ply", "directory"});
+  refused_with_outputs({"run", "--scene", "file"}, {"file", ".ply"});
+  refused_with_outputs({"run", "--scene", "builtin:objekt"}, {"builtin:objekt", "object"});
+  refused_with_outputs({"run", "--scene", "tiny.spl", "--size", "8x8"}, {"--size", ".spl"});
+}
+
+TEST_F(BadInput, Cameras) {
+  refused_with_outputs({"run", "--scene", "good.ply", "--camera", "missing.json"}, {"missing.json", "no such file"});
+  refused_with_outputs({"run", "--scene", "good.ply", "--camera", "cameras.json#1"}, {"cameras.json", "1"});
+  refused_with_outputs({"run", "--scene", "good.ply", "--camera", "cameras.json#x"}, {"cameras.json", "x"});
+  refused_with_outputs({"run", "--scene", "good.ply", "--camera", "broken.json"}, {"broken.json"});
+  refused_with_outputs({"run", "--scene", "good.ply", "--camera", "cameras.json", "--eye", "1,2,3"}, {"--eye", "--camera"});
+}
+
+TEST_F(BadInput, Machines) {
+  refused_with_outputs({"run", "--platform", "agx-orim"}, {"'agx-orim'", "did you mean agx-orin?"});
+  refused_with_outputs({"run", "--variant", "hett"}, {"'hett'", "het+qm"});
+  refused_with_outputs({"run", "--fidelity", "exact"}, {"'exact'", "cycle"});
+  refused_with_outputs({"run", "--format", "rgb10"}, {"'rgb10'", "rgba16f"});
+  refused_with_outputs({"run", "--termination", "late"}, {"'late'", "strict"});
+  refused_with_outputs({"compare", "--set", "tcc.bins=1"}, {"'tcc'", "did you mean"});
+  refused_with_outputs({"compare", "--set", "tc.bin=1"}, {"'bin'", "did you mean tc.bins?"});
+  refused_with_outputs({"compare", "--set", "tc.bins=0"}, {"'0'", "tc.bins", "1 to"});
+  refused_with_outputs({"compare", "--set", "tc.bins=many"}, {"'many'", "tc.bins"});
+  refused_with_outputs({"run", "--set", "tc.bins"}, {"'tc.bins'", "UNIT.PARAMETER=VALUE"});
+  refused_with_outputs({"run", "--set", "bins=3"}, {"'bins=3'", "UNIT.PARAMETER=VALUE"});
+  refused_with_outputs({"run", "--unit", "qqu=pairing"}, {"'qqu'", "did you mean qru?"});
+  refused_with_outputs({"run", "--unit", "qru=paring"}, {"'paring'", "qru", "did you mean pairing?"});
+  refused_with_outputs({"run", "--unit", "qru"}, {"'qru'", "SLOT=IMPLEMENTATION"});
+  refused({"units", "--slot", "tcc"}, {"'tcc'", "did you mean"});
+}
+
+TEST_F(BadInput, Plugins) {
+  refused_with_outputs({"run", "--plugin", "missing.so"}, {"missing.so", "no such file"});
+  refused_with_outputs({"run", "--plugin", "foreign.so"}, {"foreign.so", "not a vrpipe plugin"});
+  refused_with_outputs({"run", "--plugin", "old.so"}, {"old.so", "0.0.0"});
+  refused({"units", "--plugin", "missing.so"}, {"missing.so"});
+}
+
+TEST_F(BadInput, Outputs) {
+  refused({"run", "--scene", "tiny.spl", "--output", "file"}, {"--output file", "not a folder"});
+  refused({"run", "--scene", "tiny.spl", "--output", "file/images"}, {"--output file/images", "not a folder"});
+  refused({"run", "--scene", "tiny.spl", "--json", "nowhere/r.json"}, {"--json nowhere/r.json", "no folder nowhere"});
+  refused({"run", "--scene", "tiny.spl", "--json", "folder.ply"}, {"--json folder.ply", "folder"});
+  refused({"run", "--scene", "tiny.spl", "--save-draw", "nowhere/d.spl"}, {"--save-draw nowhere/d.spl", "no folder"});
+  refused({"scenes", "--json", "nowhere/s.json"}, {"nowhere"});
+}
+
+TEST_F(BadInput, BrokenGaussiansAreCountedNotFatal) {
+  GaussianSceneBuilder builder(0);
+  GaussianAttributes gaussian;
+  gaussian.position = {0, 0, 5};
+  gaussian.log_scale = {-1, -1, -1};
+  gaussian.opacity_logit = 3;
+  builder.add(gaussian);
+  GaussianAttributes broken = gaussian;
+  broken.position[1] = std::numeric_limits<float>::quiet_NaN();
+  builder.add(broken);
+  broken = gaussian;
+  broken.position[0] = std::numeric_limits<float>::infinity();
+  builder.add(broken);
+  broken = gaussian;
+  broken.rotation = {0, 0, 0, 0};
+  builder.add(broken);
+  write_gaussian_ply(folder() / "broken.ply", builder.build());
+  const std::vector<std::string> arguments{"run",   "--scene", "broken.ply", "--size", "32x32",
+                                           "--eye", "0,0,0",   "--look-at",  "0,0,1"};
+  const nlohmann::json json = json_of(arguments);
+  EXPECT_EQ(json["scene"]["gaussians_total"], 4);
+  EXPECT_EQ(json["scene"]["gaussians_visible"], 1);
+  EXPECT_EQ(json["scene"]["gaussians_rejected"], 3);
+  EXPECT_EQ(json["scene"]["rejected_by_reason"]["not_finite"], 2);
+  EXPECT_EQ(json["scene"]["rejected_by_reason"]["zero_quaternion"], 1);
+  EXPECT_NE(vrpipe(arguments).out.find("rejected 3 Gaussians"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vrpipe::testing

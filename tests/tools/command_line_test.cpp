@@ -1,0 +1,132 @@
+#include "tool_test_support.h"
+
+#include <pty.h>
+
+#include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/builtin_scenes.h>
+
+namespace vrpipe::testing {
+namespace {
+
+class CommandLine : public ToolTest {};
+
+void expect_in(const std::string& text, const std::vector<std::string>& parts) {
+  for (const std::string& part : parts) EXPECT_NE(text.find(part), std::string::npos) << part << " is not in:\n" << text;
+}
+
+TEST_F(CommandLine, VersionAndHelp) {
+  const Finished version = vrpipe({"--version"});
+  EXPECT_EQ(version.code, 0);
+  EXPECT_EQ(version.out.rfind("vrpipe ", 0), 0U) << version.out;
+  const Finished help = vrpipe({"--help"});
+  EXPECT_EQ(help.code, 0);
+  EXPECT_EQ(help.err, "");
+  expect_in(help.out, {"run", "compare", "scenes", "platforms", "units", "--version", "Exit code"});
+}
+
+TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
+  const std::vector<std::string> shared{"--scene",  "--size",     "--camera", "--eye",         "--look-at",    "--up",
+                                        "--fovy",   "--platform", "--set",    "--unit",        "--plugin",     "--fidelity",
+                                        "--format", "--termination", "--background", "--output", "--json", "--save-draw",
+                                        "default: agx-orin", "default: cycle", "default: rgba16f", "default: paper",
+                                        "default: 0,0,0", "pixels", "DEGREES", "Examples:"};
+  for (const char* command : {"run", "compare"}) {
+    const Finished help = vrpipe({command, "--help"});
+    EXPECT_EQ(help.code, 0);
+    expect_in(help.out, shared);
+    expect_in(help.out, {std::string(command) == "run" ? "--variant" : "--jobs"});
+  }
+  expect_in(vrpipe({"units", "--help"}).out, {"--slot", "--platform", "--plugin", "--json", "--markdown"});
+  expect_in(vrpipe({"platforms", "--help"}).out, {"--plugin", "--json"});
+  expect_in(vrpipe({"scenes", "--help"}).out, {"--json"});
+}
+
+TEST_F(CommandLine, NegativeNumbersAreValues) {
+  const Finished finished = vrpipe({"run", "--size", "8x8", "--fidelity", "functional", "--eye", "-3,-1,-3",
+                                    "--look-at=-0,-0.5,0", "--up", "-0.1,-1,0", "--fovy", "+40.5"});
+  EXPECT_EQ(finished.code, 0) << finished.err;
+}
+
+TEST_F(CommandLine, ScenesPlatformsAndUnitsListEverything) {
+  const std::string scenes = vrpipe({"scenes"}).out;
+  const nlohmann::json scenes_json = json_of({"scenes"});
+  for (const BuiltinSceneInfo& scene : builtin_scenes()) {
+    expect_in(scenes, {"builtin:" + scene.name, scene.description});
+    EXPECT_NE(scenes_json.dump().find("builtin:" + scene.name), std::string::npos);
+  }
+  EXPECT_EQ(scenes_json["schema"], "vrpipe.scenes/1");
+
+  const std::string text = vrpipe({"platforms"}).out;
+  const nlohmann::json platforms_json = json_of({"platforms"});
+  ASSERT_EQ(platforms_json["platforms"].size(), platforms().size());
+  for (std::size_t i = 0; i < platforms().size(); ++i) {
+    expect_in(text, {platforms()[i].name, platforms()[i].description});
+    EXPECT_EQ(platforms_json["platforms"][i]["name"], platforms()[i].name);
+    EXPECT_EQ(platforms_json["platforms"][i]["gpcs"], platforms()[i].gpcs);
+  }
+
+  const std::string units = vrpipe({"units"}).out;
+  const std::string markdown = vrpipe({"units", "--markdown"}).out;
+  const nlohmann::json units_json = json_of({"units"});
+  std::size_t index = 0;
+  for (const ParameterListing& unit : list_parameters(&platforms().front())) {
+    expect_in(units, {unit.unit + "=" + unit.implementation, unit.description});
+    const nlohmann::json& entry = units_json["units"][index++];
+    EXPECT_EQ(entry["slot"], unit.unit);
+    EXPECT_EQ(entry["implementation"], unit.implementation);
+    EXPECT_EQ(entry["parameters"].size(), unit.parameters->parameters().size());
+    for (const Parameter* parameter : unit.parameters->parameters()) {
+      expect_in(units, {unit.unit + "." + parameter->name() + " = ", parameter->meaning(), parameter->source(),
+                        parameter->range()});
+      expect_in(markdown, {"| `" + unit.unit + "." + parameter->name() + "` | " + parameter->default_value()});
+    }
+  }
+  EXPECT_EQ(units_json["units"].size(), index);
+
+  const std::string only = vrpipe({"units", "--slot", "crop"}).out;
+  expect_in(only, {"crop.cache_bytes"});
+  EXPECT_EQ(only.find("tc.bins"), std::string::npos);
+}
+
+TEST_F(CommandLine, CompareReportsWhatAResearcherWants) {
+  const Finished finished = vrpipe({"compare", "--scene", "tiny.spl"});
+  EXPECT_EQ(finished.code, 0);
+  EXPECT_EQ(finished.err, "");
+  expect_in(finished.out,
+            {"tiny.spl, 48x40", "agx-orin", "baseline", "het+qm", "cycles", "simulated ms", "speed-up over baseline", "1.00x",
+             "fragments", "quads", "terminated", "merged away", "blended, reduction", "warps", "utilization", "raster",
+             "zrop", "prop", "sm", "crop", "l2", "host seconds", "early-termination ratio", "24.92 KB", "24.25 KB", "688 B"});
+  // No terminal: no colours, nothing but ASCII.
+  for (const char c : finished.out) ASSERT_TRUE(c == '\n' || (c >= ' ' && c <= '~')) << finished.out;
+  EXPECT_EQ(finished.out.find("rejected"), std::string::npos);
+}
+
+TEST_F(CommandLine, RunReportsWhatUnitsSpentTheirCyclesOn) {
+  const Finished finished = vrpipe({"run", "--scene", "tiny.spl", "--variant", "qm"});
+  EXPECT_EQ(finished.code, 0);
+  expect_in(finished.out, {"busy", "starved", "blocked", "memory", "latency", "gpc0.crop", "gpc0.qru"});
+}
+
+TEST_F(CommandLine, ProgressIsDrawnOnATerminalAndErased) {
+  int master = -1;
+  int slave = -1;
+  ASSERT_EQ(::openpty(&master, &slave, nullptr, nullptr, nullptr), 0);
+  ::setenv("TERM", "xterm", 1);
+  const Finished finished = vrpipe({"compare", "--scene", "tiny.spl"}, slave);
+  ::close(slave);
+  std::string drawn;
+  char buffer[4096];
+  for (ssize_t count; (count = ::read(master, buffer, sizeof buffer)) > 0;) drawn.append(buffer, static_cast<std::size_t>(count));
+  ::close(master);
+  EXPECT_EQ(finished.code, 0);
+  expect_in(drawn, {"baseline", "het+qm", "%"});
+  const std::string erase = "\r\x1b[K";
+  ASSERT_GE(drawn.size(), erase.size());
+  EXPECT_EQ(drawn.substr(drawn.size() - erase.size()), erase);
+  EXPECT_EQ(drawn.find('\n'), std::string::npos);
+  // stdout is a file here: no colours in it.
+  EXPECT_EQ(finished.out.find('\x1b'), std::string::npos);
+}
+
+}  // namespace
+}  // namespace vrpipe::testing

@@ -1,0 +1,116 @@
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <stdexcept>
+
+#include <vrpipe/error.h>
+
+#include "command_line.h"
+#include "processes.h"
+#include "tool_test_support.h"
+
+namespace vrpipe::testing {
+namespace {
+
+using tools::CommandFailure;
+
+/// Platforms whose wiring fails in every way in which a simulation can.
+Platform failing(void (*wire)(Gpu&)) {
+  Platform platform = platforms().front();
+  platform.name = "failing";
+  platform.wire = wire;
+  return platform;
+}
+
+std::vector<RunRequest> all_variants(const Platform& platform) {
+  std::vector<RunRequest> requests;
+  for (const Variant& variant : variants()) {
+    requests.emplace_back();
+    requests.back().platform = &platform;
+    requests.back().variant = variant;
+  }
+  return requests;
+}
+
+CommandFailure failure_of(void (*wire)(Gpu&)) {
+  fresh_simulation();  // other tests may have left one in this process
+  const Platform platform = failing(wire);
+  tools::ProgressLine progress;
+  try {
+    tools::simulate_in_processes(all_variants(platform), tiny_draw(), false, 2, progress);
+  } catch (const CommandFailure& failure) {
+    return failure;
+  }
+  ADD_FAILURE() << "nothing failed";
+  return {0, ""};
+}
+
+TEST(Processes, AMistakeOfTheUserComesBackAsOne) {
+  const CommandFailure failure =
+      failure_of([](Gpu&) { throw UserError("bad wiring", "here", "it is wrong", "mend it"); });
+  EXPECT_EQ(failure.exit_code, 2);
+  EXPECT_STREQ(failure.what(), "bad wiring (here): it is wrong; mend it");
+}
+
+TEST(Processes, AFaultNamesTheVariant) {
+  const CommandFailure failure = failure_of([](Gpu&) { throw SimulationFault("gpc0.tc", 17, "a bin is lost"); });
+  EXPECT_EQ(failure.exit_code, 1);
+  const std::string text = failure.what();
+  EXPECT_EQ(text.rfind("variant ", 0), 0U) << text;
+  EXPECT_NE(text.find("gpc0.tc at cycle 17: a bin is lost"), std::string::npos) << text;
+}
+
+TEST(Processes, AKilledSimulationNamesTheSignal) {
+  const CommandFailure failure = failure_of([](Gpu&) { ::raise(SIGKILL); });
+  EXPECT_EQ(failure.exit_code, 1);
+  const std::string text = failure.what();
+  EXPECT_NE(text.find("variant "), std::string::npos) << text;
+  EXPECT_NE(text.find("signal 9"), std::string::npos) << text;
+  EXPECT_NE(text.find("--jobs 1"), std::string::npos) << text;
+}
+
+TEST(Processes, AnEarlyExitIsAFault) {
+  const CommandFailure failure = failure_of([](Gpu&) { ::_exit(0); });
+  EXPECT_EQ(failure.exit_code, 1);
+  EXPECT_NE(std::string(failure.what()).find("before it was done"), std::string::npos) << failure.what();
+}
+
+TEST(Processes, ResultsComeBackWhole) {
+  fresh_simulation();
+  const Draw draw = tiny_draw();
+  const std::vector<RunRequest> requests = all_variants(platforms().front());
+  tools::ProgressLine progress;
+  const std::vector<tools::Simulated> apart = tools::simulate_in_processes(requests, draw, true, 3, progress);
+  ASSERT_EQ(apart.size(), 4U);
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    fresh_simulation();
+    const tools::Simulated here = tools::simulate_here(requests[i], draw, true, progress);
+    const RunResult& a = apart[i].result;
+    const RunResult& b = here.result;
+    EXPECT_EQ(a.request.variant.name, b.request.variant.name);
+    EXPECT_EQ(a.result_hash, b.result_hash);
+    EXPECT_EQ(a.cycles, b.cycles);
+    EXPECT_EQ(a.milliseconds, b.milliseconds);
+    EXPECT_GT(a.host_seconds, 0);
+    EXPECT_EQ(a.counts.named(), b.counts.named());
+    EXPECT_EQ(a.utilization, b.utilization);
+    EXPECT_EQ(a.parameters, b.parameters);
+    EXPECT_EQ(a.kernel_events, b.kernel_events);
+    ASSERT_EQ(a.units.size(), b.units.size());
+    for (std::size_t unit = 0; unit < a.units.size(); ++unit) {
+      EXPECT_EQ(a.units[unit].name, b.units[unit].name);
+      EXPECT_EQ(a.units[unit].cycles, b.units[unit].cycles);
+    }
+    ASSERT_EQ(a.statistics.size(), b.statistics.size());
+    for (std::size_t statistic = 0; statistic < a.statistics.size(); ++statistic) {
+      EXPECT_EQ(a.statistics[statistic].name, b.statistics[statistic].name);
+      EXPECT_EQ(a.statistics[statistic].value, b.statistics[statistic].value);
+      EXPECT_EQ(a.statistics[statistic].meaning, b.statistics[statistic].meaning);
+    }
+    const std::size_t values = std::size_t{4} * draw.width * draw.height;
+    EXPECT_TRUE(std::equal(apart[i].image->values(), apart[i].image->values() + values, here.image->values()));
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe::testing

@@ -1,0 +1,94 @@
+#include <gtest/gtest.h>
+
+#include <vrpipe/error.h>
+
+#include "parse.h"
+#include "progress_line.h"
+#include "report.h"
+#include "text_table.h"
+
+namespace vrpipe::tools {
+namespace {
+
+TEST(Text, GroupsDigits) {
+  EXPECT_EQ(grouped(0), "0");
+  EXPECT_EQ(grouped(999), "999");
+  EXPECT_EQ(grouped(1000), "1,000");
+  EXPECT_EQ(grouped(12345678), "12,345,678");
+  EXPECT_EQ(grouped(~std::uint64_t{0}), "18,446,744,073,709,551,615");
+}
+
+TEST(Text, TablesAlign) {
+  TextTable table({"", "one", "two"});
+  table.group("group");
+  table.row({"long label", "1", "22222"});
+  table.row({"x", "333", "4"}, true);
+  EXPECT_EQ(table.text({}),
+            "              one    two\n"
+            "------------------------\n"
+            "group\n"
+            "  long label    1  22222\n"
+            "  x           333      4\n");
+  TextStyle terminal;
+  terminal.colors = true;
+  EXPECT_NE(table.text(terminal).find("\x1b[32m"), std::string::npos);
+}
+
+TEST(Text, ProgressFitsItsLine) {
+  const std::vector<std::string> names{"baseline", "qm", "het", "het+qm"};
+  for (unsigned width : {10U, 50U, 79U, 200U}) {
+    for (float done : {0.0F, 0.01F, 0.5F, 1.0F, 2.0F}) {
+      EXPECT_LE(progress_text(names, {done, 0, done, 0}, 7200, width).size(), width);
+    }
+  }
+  EXPECT_EQ(progress_text({"run"}, {0.5F}, 90, 40), "run  50%  [=========        ] 1:30 left");
+}
+
+TEST(Text, BusiestUnitsOfARun) {
+  RunResult run;
+  EXPECT_TRUE(busiest_units(run).empty());
+  run.utilization = {{"raster", 0.2}, {"prop", 0.91}, {"sm", 0.3}, {"crop", 0.94}};
+  const auto busiest = busiest_units(run);
+  ASSERT_EQ(busiest.size(), 2U);
+  EXPECT_EQ(busiest[0].first, "crop");
+  EXPECT_EQ(busiest[1].first, "prop");
+}
+
+TEST(Text, RatiosNeedBothRuns) {
+  RunResult baseline;
+  RunResult het;
+  baseline.request.variant = variant_named("baseline");
+  het.request.variant = variant_named("het");
+  EXPECT_FALSE(speedup(baseline, het).has_value());
+  baseline.cycles = 300;
+  het.cycles = 100;
+  EXPECT_EQ(speedup(baseline, het), 3.0);
+  EXPECT_FALSE(early_termination_ratio({baseline}).has_value());
+  EXPECT_FALSE(early_termination_ratio({baseline, het}).has_value());
+  baseline.counts.fragments_blended = 50;
+  het.counts.fragments_blended = 20;
+  EXPECT_EQ(early_termination_ratio({baseline, het}), 2.5);
+}
+
+TEST(Text, ParsesStrictly) {
+  EXPECT_EQ(parse_number("-1.5e2", "--x"), -150);
+  EXPECT_EQ(parse_number("+2", "--x"), 2);
+  for (const char* text : {"", " 1", "1 ", "0x10", "nan", "inf", "1,5", "+-1", "1e999"}) {
+    EXPECT_THROW(parse_number(text, "--x"), UserError) << text;
+  }
+  EXPECT_EQ(parse_triple("1,-2,3e1", "--x", "X,Y,Z", "0,0,0"), (Vec3{1, -2, 30}));
+  const ImageSize size = parse_size("16384x1", "--size");
+  EXPECT_EQ(size.width, 16384U);
+  EXPECT_EQ(size.height, 1U);
+  const Setting setting = parse_setting("tc.bins=a=b.c");
+  EXPECT_EQ(setting.unit, "tc");
+  EXPECT_EQ(setting.parameter, "bins");
+  EXPECT_EQ(setting.value, "a=b.c");
+  for (const char* text : {"", "=", ".", ".=", "tc.=1", ".bins=1", "tc.bins=", "tc.bins", "tc=1"}) {
+    EXPECT_THROW(parse_setting(text), UserError) << text;
+  }
+  EXPECT_EQ(parse_unit_choice("qru=mine").implementation, "mine");
+}
+
+}  // namespace
+}  // namespace vrpipe::tools

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include <vrpipe/surface.h>
+
+namespace vrpipe::tools {
+
+/// Premultiplied RGBA in floats, row by row from the top, in memory that processes forked later share.
+class SharedImage {
+ public:
+  /// All zero. Pages take memory only once they are written.
+  SharedImage(std::uint32_t width, std::uint32_t height);
+  ~SharedImage();
+  SharedImage(SharedImage&& other) noexcept;
+  SharedImage& operator=(SharedImage&& other) noexcept;
+  SharedImage(const SharedImage&) = delete;
+  SharedImage& operator=(const SharedImage&) = delete;
+
+  std::uint32_t width() const { return width_; }
+  std::uint32_t height() const { return height_; }
+  /// 4 * width * height values.
+  float* values() { return values_; }
+  const float* values() const { return values_; }
+
+  /// Takes the pixels of a surface of the same size.
+  void copy_from(const ColorSurface& surface);
+
+ private:
+  std::size_t size_bytes() const { return sizeof(float) * 4 * width_ * height_; }
+
+  std::uint32_t width_;
+  std::uint32_t height_;
+  float* values_ = nullptr;
+};
+
+/// A PNG file: 8-bit RGB, the image over a background colour. Values are display values, as Gaussian splats are trained
+/// in display space: clamped to [0, 1] and rounded to the nearest n/255, without a gamma curve.
+std::string encode_png(const SharedImage& image, const std::array<float, 3>& background);
+
+/// An OpenEXR file: RGBA float32, premultiplied, without a background.
+std::string encode_exr(const SharedImage& image);
+
+}  // namespace vrpipe::tools

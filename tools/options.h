@@ -1,0 +1,65 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/scene.h>
+
+namespace CLI {
+class App;
+class FormatterBase;
+class Option;
+}  // namespace CLI
+
+namespace vrpipe::tools {
+
+/// The texts given for one option, in the order of the command line; empty when it was not given.
+using Values = std::vector<std::string>;
+
+/// Adds an option that takes one text. `group` is its heading in --help.
+CLI::Option* add_option(CLI::App& app, const std::string& name, Values& values, const std::string& value_name,
+                        const std::string& help, const std::string& group);
+
+/// The text of an option that may be given once; none when it was not. Throws UserError.
+std::optional<std::string> single(const Values& values, const std::string& option);
+
+std::shared_ptr<CLI::FormatterBase> help_formatter();
+
+/// Everything that `run` or `compare` is asked to do, checked as far as that is possible without reading the scene.
+struct SimulationJob {
+  SceneRequest scene;
+  std::vector<RunRequest> requests;  ///< one for each variant, alike in everything else
+  std::array<float, 3> background{};
+  std::optional<std::filesystem::path> output;     ///< folder for images
+  std::optional<std::string> json;                 ///< file, or "-" for stdout
+  std::optional<std::filesystem::path> save_draw;  ///< file
+  unsigned processes = 1;                          ///< simulations at a time
+};
+
+/// The options that all simulating commands share, as typed.
+class SimulationArguments {
+ public:
+  enum class Variants { one, all };
+
+  void declare(CLI::App& app, Variants variants);
+  /// Loads the plugins and checks every option. Throws UserError.
+  SimulationJob resolve(Variants variants) const;
+
+ private:
+  SceneRequest scene_request() const;
+
+  Values scene_, size_, camera_, eye_, look_at_, up_, fovy_;
+  Values platform_, settings_, variant_, units_, plugins_;
+  Values fidelity_, format_, termination_;
+  Values background_, output_, json_, save_draw_, jobs_;
+};
+
+/// `--plugin` for commands that only list things.
+void load_plugins(const Values& plugins);
+
+}  // namespace vrpipe::tools

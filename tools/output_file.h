@@ -1,0 +1,23 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace vrpipe::tools {
+
+// Files that the user named. A long simulation must not end in a file that cannot be written, so names are checked
+// first; and no file is seen half-written. `option` names the option in messages. All throw UserError.
+
+/// Checks, without creating anything, that a file can be written under this name.
+void check_output_file(const std::filesystem::path& path, const std::string& option);
+
+/// Checks, without creating anything, that a folder is there or can be made.
+void check_output_folder(const std::filesystem::path& path, const std::string& option);
+
+/// Makes the folder, with the folders above it, unless it is there.
+void create_output_folder(const std::filesystem::path& path, const std::string& option);
+
+/// Writes a file, which appears complete or not at all. What is no regular file, such as a pipe, is written as it is.
+void write_output_file(const std::filesystem::path& path, const std::string& bytes, const std::string& option);
+
+}  // namespace vrpipe::tools

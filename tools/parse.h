@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <string>
+
+#include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/camera.h>
+
+namespace vrpipe::tools {
+
+// Texts of the command line, read strictly: all of the text must be the value. `option` names the option in messages.
+// All throw UserError.
+
+/// A finite number.
+double parse_number(const std::string& text, const std::string& option);
+
+/// A whole number from 1 to `largest`.
+unsigned parse_count(const std::string& text, const std::string& option, unsigned largest);
+
+/// Three finite numbers; `form` and `example` show the user what to write, e.g. "X,Y,Z" and "0,-1,0".
+Vec3 parse_triple(const std::string& text, const std::string& option, const std::string& form,
+                  const std::string& example);
+
+/// "WIDTHxHEIGHT", pixels, both 1 to kMaxImageSize.
+ImageSize parse_size(const std::string& text, const std::string& option);
+
+/// "R,G,B", each 0 to 1.
+std::array<float, 3> parse_background(const std::string& text, const std::string& option);
+
+/// "UNIT.PARAMETER=VALUE".
+Setting parse_setting(const std::string& text);
+
+/// "SLOT=IMPLEMENTATION".
+UnitChoice parse_unit_choice(const std::string& text);
+
+Termination termination_named(const std::string& name);
+const char* name_of(Termination termination);
+
+}  // namespace vrpipe::tools

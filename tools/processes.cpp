@@ -1,0 +1,385 @@
+#include "processes.h"
+
+#include <poll.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <condition_variable>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <type_traits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <vrpipe/error.h>
+
+#include "command_line.h"
+#include "terminal.h"
+
+namespace vrpipe::tools {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+constexpr int redraw_milliseconds = 100;
+
+double seconds_since(SteadyClock::time_point start) {
+  return std::chrono::duration<double>(SteadyClock::now() - start).count();
+}
+
+// A result crosses the pipe as bytes. Both ends are the same program, so values go as they lie in memory.
+
+class Packer {
+ public:
+  template <class T>
+  void operator()(const T& value) {
+    static_assert(std::is_trivially_copyable<T>::value, "goes as it lies in memory");
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  void operator()(const std::string& text) {
+    (*this)(text.size());
+    bytes_ += text;
+  }
+  template <class T>
+  void size_of(const std::vector<T>& items) {
+    (*this)(items.size());
+  }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+};
+
+class Unpacker {
+ public:
+  Unpacker(const char* begin, const char* end) : next_(begin), end_(end) {}
+  template <class T>
+  void operator()(T& value) {
+    static_assert(std::is_trivially_copyable<T>::value, "goes as it lies in memory");
+    std::memcpy(static_cast<void*>(&value), take(sizeof value), sizeof value);
+  }
+  void operator()(std::string& text) {
+    std::size_t size = 0;
+    (*this)(size);
+    const char* const from = take(size);
+    text.assign(from, size);
+  }
+  template <class T>
+  void size_of(std::vector<T>& items) {
+    std::size_t size = 0;
+    (*this)(size);
+    items.resize(size);
+  }
+
+ private:
+  const char* take(std::size_t size) {
+    if (static_cast<std::size_t>(end_ - next_) < size) throw std::runtime_error("a result came back cut short");
+    next_ += size;
+    return next_ - size;
+  }
+  const char* next_;
+  const char* end_;
+};
+
+/// Packs or unpacks all of a result but the request, which the receiver has, and the pixels, which are shared.
+template <class Archive, class Result>
+void exchange(Archive& archive, Result& result) {
+  archive(result.cycles);
+  archive(result.milliseconds);
+  archive(result.host_seconds);
+  archive(result.counts);
+  archive.size_of(result.utilization);
+  for (auto& [name, share] : result.utilization) archive(name), archive(share);
+  archive.size_of(result.units);
+  for (auto& unit : result.units) archive(unit.name), archive(unit.cycles);
+  archive.size_of(result.statistics);
+  for (auto& statistic : result.statistics) {
+    archive(statistic.name);
+    archive(statistic.unit);
+    archive(statistic.meaning);
+    archive(statistic.value);
+  }
+  archive.size_of(result.parameters);
+  for (auto& [name, value] : result.parameters) archive(name), archive(value);
+  archive(result.result_hash);
+  archive(result.kernel_events);
+}
+
+/// The first byte of what a worker sends.
+enum Outcome : char { outcome_result = 'R', outcome_user_error = 'U', outcome_fault = 'F' };
+
+/// Memory that forked processes share, for the progress of each.
+class SharedProgress {
+ public:
+  explicit SharedProgress(std::size_t count) : count_(count) {
+    void* const memory =
+        ::mmap(nullptr, count * sizeof(std::atomic<float>), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (memory == MAP_FAILED) throw std::bad_alloc();
+    values_ = static_cast<std::atomic<float>*>(memory);
+    for (std::size_t i = 0; i < count; ++i) new (&values_[i]) std::atomic<float>(0.0F);
+  }
+  ~SharedProgress() { ::munmap(static_cast<void*>(values_), count_ * sizeof(std::atomic<float>)); }
+  SharedProgress(const SharedProgress&) = delete;
+  SharedProgress& operator=(const SharedProgress&) = delete;
+
+  std::atomic<float>& operator[](std::size_t index) { return values_[index]; }
+  std::vector<float> now() const {
+    std::vector<float> values;
+    for (std::size_t i = 0; i < count_; ++i) values.push_back(values_[i].load(std::memory_order_relaxed));
+    return values;
+  }
+
+ private:
+  static_assert(std::atomic<float>::is_always_lock_free, "a lock would not work across processes");
+  std::size_t count_;
+  std::atomic<float>* values_;
+};
+
+/// While it lives, what is written to stdout goes to stderr: SystemC and plugins may print, and stdout is for results.
+class StdoutToStderr {
+ public:
+  StdoutToStderr() {
+    flush();
+    saved_ = ::dup(STDOUT_FILENO);
+    if (saved_ >= 0) ::dup2(STDERR_FILENO, STDOUT_FILENO);
+  }
+  ~StdoutToStderr() {
+    flush();
+    if (saved_ < 0) return;
+    ::dup2(saved_, STDOUT_FILENO);
+    ::close(saved_);
+  }
+  StdoutToStderr(const StdoutToStderr&) = delete;
+  StdoutToStderr& operator=(const StdoutToStderr&) = delete;
+
+ private:
+  static void flush() {
+    std::cout.flush();
+    std::fflush(stdout);
+  }
+  int saved_;
+};
+
+/// Draws the progress of one simulation of this process from a thread of its own.
+class ProgressThread {
+ public:
+  ProgressThread(const std::string& name, const std::atomic<float>& done, ProgressLine& line) {
+    if (!line.visible()) return;
+    thread_ = std::thread([this, name, &done, &line] {
+      const SteadyClock::time_point start = SteadyClock::now();
+      std::unique_lock<std::mutex> lock(mutex_);
+      while (!ended_.wait_for(lock, std::chrono::milliseconds(redraw_milliseconds), [this] { return stop_; })) {
+        line.show(progress_text({name}, {done.load(std::memory_order_relaxed)}, seconds_since(start), stderr_width() - 1));
+      }
+    });
+  }
+  ~ProgressThread() {
+    if (!thread_.joinable()) return;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stop_ = true;
+    }
+    ended_.notify_all();
+    thread_.join();
+  }
+  ProgressThread(const ProgressThread&) = delete;
+  ProgressThread& operator=(const ProgressThread&) = delete;
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable ended_;
+  bool stop_ = false;
+  std::thread thread_;
+};
+
+[[noreturn]] void system_failure(const char* what) {
+  throw std::system_error(errno, std::generic_category(), what);
+}
+
+/// A simulation in a process of its own. Ends it, if need be, when destroyed.
+class Worker {
+ public:
+  Worker(std::size_t index, const RunRequest& request) : index_(index), request_(request) {}
+  ~Worker() {
+    if (process_ > 0) {
+      ::kill(process_, SIGKILL);
+      while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) {}
+    }
+    if (pipe_ >= 0) ::close(pipe_);
+  }
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  std::size_t index() const { return index_; }
+  int pipe() const { return pipe_; }
+
+  void start(const Draw& draw, SharedImage* image, std::atomic<float>& progress) {
+    int ends[2];
+    if (::pipe(ends) != 0) system_failure("cannot open a pipe to a simulation");
+    std::cout.flush();
+    std::fflush(nullptr);
+    const pid_t parent = ::getpid();
+    process_ = ::fork();
+    if (process_ < 0) {
+      const int error = errno;
+      ::close(ends[0]);
+      ::close(ends[1]);
+      errno = error;
+      system_failure("cannot start a process for a simulation");
+    }
+    if (process_ == 0) {
+      ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+      if (::getppid() != parent) ::_exit(exit_fault);
+      ::close(ends[0]);
+      work(ends[1], draw, image, progress);
+    }
+    ::close(ends[1]);
+    pipe_ = ends[0];
+  }
+
+  /// Takes what the process has sent; true once it has sent all.
+  bool receive() {
+    char buffer[65536];
+    const ssize_t count = ::read(pipe_, buffer, sizeof buffer);
+    if (count < 0) {
+      if (errno == EINTR) return false;
+      system_failure("cannot read a simulation's result");
+    }
+    received_.append(buffer, static_cast<std::size_t>(count));
+    return count == 0;
+  }
+
+  /// The result, once all of it is here. Throws CommandFailure.
+  RunResult finish() {
+    int status = 0;
+    while (::waitpid(process_, &status, 0) < 0 && errno == EINTR) {}
+    process_ = -1;
+    if (WIFSIGNALED(status)) {
+      const int signal = WTERMSIG(status);
+      fail(exit_fault, fmt::format("its process was ended by signal {} ({}){}", signal, ::strsignal(signal),
+                                   signal == SIGKILL ? "; if memory ran out, try --jobs 1 or a smaller --size" : ""));
+    }
+    if (received_.empty() || WEXITSTATUS(status) != 0) {
+      fail(exit_fault, fmt::format("its process ended with code {} before it was done", WEXITSTATUS(status)));
+    }
+    const std::string content = received_.substr(1);
+    if (received_[0] == outcome_user_error) throw CommandFailure(exit_user_error, content);
+    if (received_[0] != outcome_result) fail(exit_fault, content);
+    RunResult result;
+    Unpacker unpacker(content.data(), content.data() + content.size());
+    exchange(unpacker, result);
+    result.request = request_;
+    return result;
+  }
+
+ private:
+  [[noreturn]] void fail(int code, const std::string& text) const {
+    throw CommandFailure(code, "variant " + request_.variant.name + ": " + text);
+  }
+
+  [[noreturn]] void work(int out, const Draw& draw, SharedImage* image, std::atomic<float>& progress) const {
+    ::dup2(STDERR_FILENO, STDOUT_FILENO);
+    std::string message;
+    try {
+      RunResult result = simulate(request_, draw, &progress);
+      if (image != nullptr) image->copy_from(result.surface);
+      Packer packer;
+      exchange(packer, result);
+      message = char{outcome_result} + packer.bytes();
+    } catch (const UserError& error) {
+      message = char{outcome_user_error} + std::string(error.what());
+    } catch (const std::bad_alloc&) {
+      message = char{outcome_fault} + std::string("out of memory; try --jobs 1 or a smaller --size");
+    } catch (const std::exception& fault) {
+      message = char{outcome_fault} + std::string(fault.what());
+    } catch (...) {
+      message = char{outcome_fault} + std::string("an exception of unknown type");
+    }
+    std::cout.flush();
+    std::fflush(nullptr);
+    std::size_t sent = 0;
+    while (sent < message.size()) {
+      const ssize_t count = ::write(out, message.data() + sent, message.size() - sent);
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) ::_exit(exit_fault);
+      sent += static_cast<std::size_t>(count);
+    }
+    // Not exit(): what the parent registered to happen at its end is not this process's business.
+    ::_exit(0);
+  }
+
+  std::size_t index_;
+  const RunRequest& request_;
+  pid_t process_ = -1;
+  int pipe_ = -1;
+  std::string received_;
+};
+
+}  // namespace
+
+Simulated simulate_here(const RunRequest& request, const Draw& draw, bool with_image, ProgressLine& progress) {
+  Simulated simulated;
+  {
+    const StdoutToStderr redirected;
+    std::atomic<float> done{0.0F};
+    const ProgressThread drawing(request.variant.name, done, progress);
+    simulated.result = simulate(request, draw, &done);
+  }
+  progress.erase();
+  if (with_image) {
+    simulated.image.emplace(draw.width, draw.height);
+    simulated.image->copy_from(simulated.result.surface);
+  }
+  simulated.result.surface = ColorSurface(1, 1, request.format);
+  return simulated;
+}
+
+std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requests, const Draw& draw,
+                                             bool with_images, unsigned processes, ProgressLine& progress) {
+  const SteadyClock::time_point start = SteadyClock::now();
+  SharedProgress done(requests.size());
+  std::vector<Simulated> simulated(requests.size());
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    names.push_back(requests[i].variant.name);
+    if (with_images) simulated[i].image.emplace(draw.width, draw.height);
+  }
+
+  std::vector<std::unique_ptr<Worker>> workers;
+  std::size_t next = 0;
+  while (next < requests.size() || !workers.empty()) {
+    while (next < requests.size() && workers.size() < processes) {
+      workers.push_back(std::make_unique<Worker>(next, requests[next]));
+      workers.back()->start(draw, with_images ? &*simulated[next].image : nullptr, done[next]);
+      ++next;
+    }
+    std::vector<pollfd> pipes;
+    for (const auto& worker : workers) pipes.push_back({worker->pipe(), POLLIN, 0});
+    if (::poll(pipes.data(), pipes.size(), progress.visible() ? redraw_milliseconds : -1) < 0 && errno != EINTR) {
+      system_failure("cannot wait for the simulations");
+    }
+    for (std::size_t i = pipes.size(); i-- > 0;) {
+      if (pipes[i].revents == 0 || !workers[i]->receive()) continue;
+      simulated[workers[i]->index()].result = workers[i]->finish();
+      workers.erase(workers.begin() + static_cast<std::ptrdiff_t>(i));
+    }
+    progress.show(progress_text(names, done.now(), seconds_since(start), stderr_width() - 1));
+  }
+  progress.erase();
+  return simulated;
+}
+
+}  // namespace vrpipe::tools

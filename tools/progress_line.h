@@ -1,0 +1,33 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+namespace vrpipe::tools {
+
+/// One line on stderr that is redrawn and erased at the end; nothing at all where stderr is not a terminal.
+class ProgressLine {
+ public:
+  ProgressLine();
+  ~ProgressLine();
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  bool visible() const { return visible_; }
+  /// Shows a text, cut to the terminal's width.
+  void show(const std::string& text);
+  void erase();
+
+ private:
+  bool visible_;
+  bool drawn_ = false;
+};
+
+/// Percentages, a bar and the time left of simulations that run side by side. ASCII, at most `width` characters.
+/// @param done             share of each that is done, 0 to 1
+/// @param elapsed_seconds  since they began
+std::string progress_text(const std::vector<std::string>& names, const std::vector<float>& done,
+                          double elapsed_seconds, unsigned width);
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "simulation_job.h"
+#include "terminal.h"
+
+namespace vrpipe::tools {
+
+/// What a person reads: the runs side by side, and under the table what they mean.
+std::string report(const JobResult& result, const TextStyle& style);
+
+/// Cycles of `baseline` over those of `run`; none without time.
+std::optional<double> speedup(const RunResult& baseline, const RunResult& run);
+
+/// Fragments blended by the baseline over those blended with early termination alone; none when a run is missing, or
+/// nothing is blended.
+std::optional<double> early_termination_ratio(const std::vector<RunResult>& runs);
+
+/// The units of a run that are busiest by utilisation, busiest first: the first, and those within 0.05 of it.
+std::vector<std::pair<std::string, double>> busiest_units(const RunResult& run);
+
+/// Digits in groups of three: 12,345,678.
+std::string grouped(std::uint64_t value);
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,158 @@
+#include "result_json.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include <vrpipe/accounting.h>
+#include <vrpipe/blend.h>
+
+#include "parse.h"
+#include "report.h"
+
+namespace vrpipe::tools {
+namespace {
+
+template <class Number>
+Json number(const std::string& text) {
+  Number value{};
+  const char* const end = text.data() + text.size();
+  const std::from_chars_result read = std::from_chars(text.data(), end, value);
+  return read.ec == std::errc() && read.ptr == end ? Json(value) : Json(text);
+}
+
+Json scene_json(const JobResult& result) {
+  return {{"name", result.scene.name},
+          {"gaussians_total", result.scene.gaussians_total},
+          {"gaussians_visible", result.scene.gaussians_visible},
+          {"gaussians_rejected", result.scene.rejected.total()},
+          {"width", result.width},
+          {"height", result.height},
+          {"rejected_by_reason",
+           {{"not_finite", result.scene.rejected.not_finite},
+            {"zero_quaternion", result.scene.rejected.zero_quaternion}}}};
+}
+
+/// The declaration of UNIT.PARAMETER, in the implementation that the request puts into the slot.
+const Parameter* declaration(const std::vector<ParameterListing>& listings, const RunRequest& request,
+                             const std::string& key) {
+  const std::size_t dot = key.find('.');
+  const std::string unit = key.substr(0, dot);
+  const std::string name = key.substr(dot + 1);
+  const Parameter* found = nullptr;
+  for (const ParameterListing& listing : listings) {
+    if (listing.unit != unit) continue;
+    const bool chosen =
+        std::any_of(request.units.begin(), request.units.end(), [&](const UnitChoice& choice) {
+          return choice.slot == unit && choice.implementation == listing.implementation;
+        });
+    for (const Parameter* parameter : listing.parameters->parameters()) {
+      if (name == parameter->name() && (found == nullptr || chosen)) found = parameter;
+    }
+  }
+  return found;
+}
+
+Json parameters_json(const std::vector<RunResult>& runs) {
+  const RunRequest& request = runs.front().request;
+  const std::vector<ParameterListing> listings = list_parameters(request.platform);
+  Json values = Json::object();
+  for (const RunResult& run : runs) {
+    for (const auto& [key, value] : run.parameters) {
+      if (values.contains(key)) continue;
+      const Parameter* const parameter = declaration(listings, request, key);
+      values[key] = parameter != nullptr ? typed_value(*parameter, value) : Json(value);
+    }
+  }
+  return values;
+}
+
+Json units_json(const RunResult& run) {
+  Json units = Json::array();
+  for (const UnitReport& unit : run.units) {
+    Json cycles = Json::object();
+    for (unsigned state = 0; state < unit_states; ++state) {
+      cycles[vrpipe::name_of(static_cast<UnitState>(state))] = unit.cycles[state];
+    }
+    units.push_back({{"name", unit.name}, {"cycles", std::move(cycles)}});
+  }
+  return units;
+}
+
+Json statistics_json(const RunResult& run) {
+  Json statistics = Json::array();
+  for (const StatisticReport& statistic : run.statistics) {
+    statistics.push_back({{"name", statistic.name},
+                          {"value", statistic.value},
+                          {"unit", statistic.unit},
+                          {"meaning", statistic.meaning}});
+  }
+  return statistics;
+}
+
+Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
+  Json counts = Json::object();
+  for (const auto& [name, value] : run.counts.named()) counts[name] = value;
+  // Without time there is no utilization, and the keys are still there.
+  Json utilization = Json::object();
+  for (const char* unit : {"raster", "zrop", "prop", "sm", "crop", "l2", "dram"}) utilization[unit] = nullptr;
+  for (const auto& [name, share] : run.utilization) utilization[name] = share;
+  const bool timed = run.cycles.has_value();
+  return {{"variant", run.request.variant.name},
+          {"cycles", timed ? Json(*run.cycles) : Json()},
+          {"milliseconds", timed ? Json(run.milliseconds) : Json()},
+          {"host_seconds", run.host_seconds},
+          {"counts", std::move(counts)},
+          {"utilization", std::move(utilization)},
+          {"effects", Json::array()},
+          {"result_hash", run.result_hash},
+          {"images", {{"png", images ? Json(images->png) : Json()}, {"exr", images ? Json(images->exr) : Json()}}},
+          {"units", units_json(run)},
+          {"statistics", statistics_json(run)},
+          {"kernel_events", run.kernel_events}};
+}
+
+}  // namespace
+
+Json typed_value(const Parameter& parameter, const std::string& value) {
+  if (dynamic_cast<const Integer*>(&parameter) != nullptr) return number<std::uint64_t>(value);
+  if (dynamic_cast<const Real*>(&parameter) != nullptr) return number<double>(value);
+  if (dynamic_cast<const Switch*>(&parameter) != nullptr) return value == "on";
+  return value;
+}
+
+Json result_json(const JobResult& result) {
+  const RunRequest& request = result.runs.front().request;
+  Json runs = Json::array();
+  for (std::size_t i = 0; i < result.runs.size(); ++i) runs.push_back(run_json(result.runs[i], result.images[i]));
+  const StorageReport storage = quad_merging_storage(request);
+  Json json = {{"schema", "vrpipe.compare/1"},
+               {"version", VRPIPE_VERSION},
+               {"seed", request.stall_seed},
+               {"scene", scene_json(result)},
+               {"platform",
+                {{"name", request.platform->name},
+                 {"frequency_mhz", request.platform->frequency_mhz},
+                 {"parameters", parameters_json(result.runs)}}},
+               {"fidelity", vrpipe::name_of(request.fidelity)},
+               {"format", vrpipe::name_of(request.format)},
+               {"termination", name_of(request.termination)},
+               {"runs", std::move(runs)}};
+  if (result.runs.size() > 1) {
+    Json speedups = Json::object();
+    for (const RunResult& run : result.runs) {
+      if (&run == &result.runs.front()) continue;
+      const std::optional<double> gain = speedup(result.runs.front(), run);
+      speedups[run.request.variant.name] = gain ? Json(*gain) : Json();
+    }
+    json["speedup"] = std::move(speedups);
+    const std::optional<double> ratio = early_termination_ratio(result.runs);
+    json["early_termination_ratio"] = ratio ? Json(*ratio) : Json();
+  }
+  json["quad_merging_storage_bytes"] = {{"tgc", storage.tgc_bytes}, {"qru", storage.qru_bytes}};
+  return json;
+}
+
+}  // namespace vrpipe::tools

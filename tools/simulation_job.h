@@ -1,0 +1,39 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vrpipe/draw.h>
+#include <vrpipe/platforms/simulation.h>
+
+#include "options.h"
+
+namespace vrpipe::tools {
+
+/// The image files of one run.
+struct ImageFiles {
+  std::string png;
+  std::string exr;
+};
+
+/// What reports and JSON are made from.
+struct JobResult {
+  SceneSummary scene;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<RunResult> runs;
+  std::vector<std::optional<ImageFiles>> images;  ///< one for each run
+  unsigned processes = 1;
+  double load_seconds = 0;     ///< wall time of reading and preprocessing the scene
+  double simulate_seconds = 0; ///< wall time of all simulations together
+};
+
+/// Name of the images of a run, without folder and extension: SCENE-VARIANT.
+std::string image_name(const std::string& scene, const std::string& variant);
+
+/// Loads the scene, simulates, and writes the files and the report that the user asked for. One request is simulated in
+/// this process, several in processes of their own. Throws UserError, CommandFailure or a fault.
+void perform(const SimulationJob& job);
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,157 @@
+#include <algorithm>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <vrpipe/error.h>
+#include <vrpipe/platforms/configuration.h>
+#include <vrpipe/platforms/simulation.h>
+
+#include "command_line.h"
+#include "listing.h"
+#include "options.h"
+#include "result_json.h"
+#include "terminal.h"
+
+namespace vrpipe::tools {
+namespace {
+
+/// Whether the unit is what its slot gets in a variant that has it; l2 and state are no slots, and have one each.
+bool is_default(const ParameterListing& unit) {
+  const std::vector<std::string>& slots = Registry::slots();
+  if (std::find(slots.begin(), slots.end(), unit.unit) == slots.end()) return true;
+  return default_implementation(unit.unit, variants().back()).name == unit.implementation;
+}
+
+std::string with_unit(const std::string& value, const Parameter& parameter) {
+  std::string unit = parameter.unit();
+  if (unit.empty()) return value;
+  if (value == "1" && unit.back() == 's') unit.pop_back();
+  return value + " " + unit;
+}
+
+/// How a heading calls the unit's part in a run; starts with a blank unless it is empty.
+std::string role(const ParameterListing& unit) {
+  return is_default(unit) ? " (default)" : unit.pass_through ? " (where a variant does without the unit)" : "";
+}
+
+std::string as_text(const std::vector<ParameterListing>& units, const std::string& platform, const TextStyle& style) {
+  std::string text;
+  for (const ParameterListing& unit : units) {
+    if (!text.empty()) text += '\n';
+    text += style.bold(unit.unit + "=" + unit.implementation) + role(unit) + "\n  " + unit.description + "\n";
+    for (const Parameter* parameter : unit.parameters->parameters()) {
+      text += fmt::format("  {} = {}", style.bold(unit.unit + "." + parameter->name()),
+                          with_unit(parameter->value(), *parameter));
+      if (parameter->value() != parameter->default_value()) {
+        text += fmt::format(" on {}, by default {}", platform, parameter->default_value());
+      }
+      text += fmt::format("; {}\n      {}\n      default from: {}\n", parameter->range(), parameter->meaning(),
+                          parameter->source());
+    }
+  }
+  return text;
+}
+
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '|' || c == '<') result += '\\';
+    result += c;
+  }
+  return result;
+}
+
+/// The reference that the documentation holds, a table for each implementation.
+std::string as_markdown(const std::vector<ParameterListing>& units) {
+  std::string text;
+  std::string slot;
+  for (const ParameterListing& unit : units) {
+    if (!text.empty()) text += '\n';
+    if (unit.unit != slot) {
+      slot = unit.unit;
+      text += "## " + slot + "\n\n";
+    }
+    text += fmt::format("### `{}={}`{}\n\n{}.\n", unit.unit, unit.implementation, role(unit), escaped(unit.description));
+    if (unit.parameters->parameters().empty()) continue;
+    text += "\n| parameter | default | unit | allowed | meaning | default from |\n|---|---|---|---|---|---|\n";
+    for (const Parameter* parameter : unit.parameters->parameters()) {
+      text += fmt::format("| `{}.{}` | {} | {} | {} | {} | {} |\n", unit.unit, parameter->name(),
+                          parameter->default_value(), escaped(parameter->unit()), escaped(parameter->range()),
+                          escaped(parameter->meaning()), escaped(parameter->source()));
+    }
+  }
+  return text;
+}
+
+Json as_json(const std::vector<ParameterListing>& units, const std::string& platform) {
+  Json list = Json::array();
+  for (const ParameterListing& unit : units) {
+    Json parameters = Json::array();
+    for (const Parameter* parameter : unit.parameters->parameters()) {
+      parameters.push_back({{"name", unit.unit + "." + parameter->name()},
+                            {"default", typed_value(*parameter, parameter->default_value())},
+                            {"value", typed_value(*parameter, parameter->value())},
+                            {"unit", parameter->unit()},
+                            {"range", parameter->range()},
+                            {"meaning", parameter->meaning()},
+                            {"source", parameter->source()}});
+    }
+    list.push_back({{"slot", unit.unit},
+                    {"implementation", unit.implementation},
+                    {"description", unit.description},
+                    {"default", is_default(unit)},
+                    {"pass_through", unit.pass_through},
+                    {"parameters", std::move(parameters)}});
+  }
+  return {{"schema", "vrpipe.units/1"}, {"platform", platform}, {"units", std::move(list)}};
+}
+
+class UnitsCommand : public Command {
+ public:
+  std::string name() const override { return "units"; }
+  std::string summary() const override { return "every unit, its implementations and all parameters"; }
+
+  void declare(CLI::App& app) override {
+    add_option(app, "--slot", slot_, "NAME", "only the units of this slot, e.g. tc", "What is listed");
+    add_option(app, "--platform", platform_, "NAME",
+               "values as this GPU sets them (default: " + platforms().front().name + ")", "What is listed");
+    add_option(app, "--plugin", plugins_, "FILE.so", "loads a plugin's units first; can be repeated", "What is listed");
+    declare_json(app, json_);
+    app.add_flag("--markdown", markdown_, "prints the reference as Markdown")->group("Where results go");
+    app.footer(
+        "Examples:\n"
+        "  vrpipe units --slot crop\n"
+        "  vrpipe run --set crop.cache_bytes=32768      changes a parameter\n"
+        "  vrpipe run --unit qru=pass-through           puts another unit into a slot");
+  }
+
+  void run() override {
+    load_plugins(plugins_);
+    const auto named = single(platform_, "--platform");
+    const Platform& platform = named ? platform_named(*named) : platforms().front();
+    std::vector<ParameterListing> units = list_parameters(&platform);
+    if (const auto slot = single(slot_, "--slot")) {
+      std::vector<std::string> slots;
+      for (const ParameterListing& unit : units) slots.push_back(unit.unit);
+      const auto is_other = [&](const ParameterListing& unit) { return unit.unit != *slot; };
+      units.erase(std::remove_if(units.begin(), units.end(), is_other), units.end());
+      if (units.empty()) {
+        throw UserError("unknown slot '" + *slot + "'", "--slot", "there is no such slot",
+                        "did you mean " + nearest_name(*slot, slots) + "? `vrpipe units` lists all");
+      }
+    }
+    print_listing(as_json(units, platform.name),
+                  markdown_ ? as_markdown(units) : as_text(units, platform.name, stdout_style()), json_);
+  }
+
+ private:
+  Values slot_, platform_, plugins_, json_;
+  bool markdown_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_units_command() { return std::make_unique<UnitsCommand>(); }
+
+}  // namespace vrpipe::tools
