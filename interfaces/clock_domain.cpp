@@ -50,9 +50,7 @@ void ClockDomain::edge() {
     finished_ = true;
   }
   in_edge_ = false;
-  if (finished_) return;
-  for (const Slot& slot : slots_) next_ = std::min(next_, slot.due);
-  if (next_ != never) event_.notify(sc_core::sc_time::from_value((next_ - now_) * period_.value()));
+  if (!finished_ && next_ != never) event_.notify(sc_core::sc_time::from_value((next_ - now_) * period_.value()));
 }
 
 void ClockDomain::tick_all() {
@@ -66,8 +64,9 @@ void ClockDomain::tick_all() {
     if (!slot.active) continue;
     const Cycle next = slot.unit->tick(now_);
     if (next < slot.due) slot.due = next;
-    if (slot.due <= now_) throw SimulationFault(name(), now_, "a unit asked for an edge in the past");
   }
+  for (const Slot& slot : slots_) next_ = std::min(next_, slot.due);
+  if (next_ <= now_) throw SimulationFault(name(), now_, "a unit asked for an edge in the past");
 }
 
 void ClockDomain::wake_from_outside(unsigned handle, Cycle at) {

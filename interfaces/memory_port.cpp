@@ -13,8 +13,10 @@ MemoryPort::MemoryPort(PortOwner& owner, const std::string& name, unsigned in_fl
   free_.reserve(in_flight);
   for (unsigned slot = in_flight; slot-- > 0;) free_.push_back(slot);
   for (Slot& slot : slots_) {
-    slot.payload.set_byte_enable_ptr(nullptr);
-    slot.payload.set_dmi_allowed(false);
+    slot.ticket = static_cast<unsigned>(&slot - slots_.data());
+    slot.set_mm(this);
+    slot.set_byte_enable_ptr(nullptr);
+    slot.set_dmi_allowed(false);
   }
 }
 
@@ -31,34 +33,34 @@ unsigned MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsi
   Slot& slot = slots_[ticket];
   if (slot.data.size() < bytes) slot.data.resize(bytes);
   slot.answered = false;
-  slot.payload.set_command(command);
-  slot.payload.set_address(address);
-  slot.payload.set_data_ptr(slot.data.data());
-  slot.payload.set_data_length(bytes);
-  slot.payload.set_streaming_width(bytes);
-  slot.payload.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
+  slot.acquire();
+  slot.set_command(command);
+  slot.set_address(address);
+  slot.set_data_ptr(slot.data.data());
+  slot.set_data_length(bytes);
+  slot.set_streaming_width(bytes);
+  slot.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
   (command == tlm::TLM_READ_COMMAND ? reads_ : writes_) += 1;
 
   tlm::tlm_phase phase = tlm::BEGIN_REQ;
   sc_core::sc_time delay = sc_core::SC_ZERO_TIME;
-  const tlm::tlm_sync_enum status = socket->nb_transport_fw(slot.payload, phase, delay);
-  if (status == tlm::TLM_COMPLETED || (status == tlm::TLM_UPDATED && phase == tlm::BEGIN_RESP)) {
-    complete(ticket, delay);
-    if (status == tlm::TLM_UPDATED) {
-      phase = tlm::END_RESP;
-      socket->nb_transport_fw(slot.payload, phase, delay);
-    }
-  } else if (status == tlm::TLM_ACCEPTED && !slot.answered) {
-    request_pending_ = true;
+  requesting_ = &slot;  // until the memory says otherwise, perhaps from within the call
+  const tlm::tlm_sync_enum status = socket->nb_transport_fw(slot, phase, delay);
+  if (status == tlm::TLM_ACCEPTED) return ticket;
+  requesting_ = nullptr;
+  if (status == tlm::TLM_UPDATED && phase != tlm::BEGIN_RESP) return ticket;
+  complete(slot, delay);
+  if (status == tlm::TLM_UPDATED) {
+    phase = tlm::END_RESP;
+    socket->nb_transport_fw(slot, phase, delay);
   }
   return ticket;
 }
 
-void MemoryPort::complete(unsigned ticket, const sc_core::sc_time& delay) {
-  Slot& slot = slots_[ticket];
-  if (slot.payload.is_response_error()) {
+void MemoryPort::complete(Slot& slot, const sc_core::sc_time& delay) {
+  if (slot.is_response_error()) {
     throw SimulationFault(socket.name(), clock_.domain->now(),
-                          "the memory answered " + slot.payload.get_response_string());
+                          "the memory answered " + slot.get_response_string());
   }
   slot.answered = true;
   const Cycle at = clock_.domain->edge_after(delay);
@@ -68,25 +70,28 @@ void MemoryPort::complete(unsigned ticket, const sc_core::sc_time& delay) {
     completion(place) = completion(place - 1);
     --place;
   }
-  completion(place) = {at, ticket};
+  completion(place) = {at, slot.ticket};
   clock_.domain->wake(clock_.unit, at);
 }
 
 tlm::tlm_sync_enum MemoryPort::nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                                sc_core::sc_time& delay) {
+  auto& slot = static_cast<Slot&>(payload);
+  if (requesting_ == &slot) requesting_ = nullptr;  // BEGIN_RESP implies END_REQ
   if (phase == tlm::END_REQ) {
-    request_pending_ = false;
     clock_.domain->wake(clock_.unit, clock_.domain->now() + 1);
     return tlm::TLM_ACCEPTED;
   }
-  for (unsigned ticket = 0; ticket < slots_.size(); ++ticket) {
-    if (&slots_[ticket].payload != &payload) continue;
-    request_pending_ = false;  // BEGIN_RESP implies END_REQ
-    complete(ticket, delay);
-    phase = tlm::END_RESP;
-    return tlm::TLM_COMPLETED;
-  }
-  throw SimulationFault(socket.name(), clock_.domain->now(), "a response to no request");
+  if (slot.answered) throw SimulationFault(socket.name(), clock_.domain->now(), "a second response to a request");
+  complete(slot, delay);
+  phase = tlm::END_RESP;
+  return tlm::TLM_COMPLETED;
+}
+
+void MemoryPort::free(tlm::tlm_generic_payload* payload) {
+  const bool none_free = free_.empty();
+  free_.push_back(static_cast<Slot*>(payload)->ticket);
+  if (none_free) clock_.domain->wake(clock_.unit, clock_.domain->now() + 1);
 }
 
 bool MemoryPort::next_completed(unsigned& ticket) {
@@ -94,7 +99,7 @@ bool MemoryPort::next_completed(unsigned& ticket) {
   ticket = completion(completions_head_).ticket;
   ++completions_head_;
   --completions_count_;
-  free_.push_back(ticket);
+  slots_[ticket].release();
   return true;
 }
 

@@ -6,6 +6,8 @@
 #include <vrpipe/order_monitor.h>
 #include <vrpipe/platforms/configuration.h>
 
+#include "bound.h"
+
 namespace vrpipe {
 
 /// QRU, SM and CROP of one GPC without time: a tested bin goes in, terminations come out.
@@ -32,6 +34,12 @@ class BackEnd {
     while (qru->finish_bin(warp)) run(warp, signal);
   }
 
+  /// Counts the work from now on, and what the colour cache moves.
+  void count_into(Work& work) {
+    work_ = &work;
+    writes_unchanged_ = crop->cost().writes_unchanged;
+  }
+
   std::unique_ptr<QruBehaviour> qru;
   std::unique_ptr<SmBehaviour> sm;
   std::unique_ptr<CropBehaviour> crop;
@@ -40,16 +48,38 @@ class BackEnd {
   template <class Signal>
   void run(const Warp& warp, Signal& signal) {
     sm->shade(warp, shaded_);
+    if (work_ != nullptr) count(warp);
     for (unsigned i = 0; i < shaded_.count; ++i) {
       monitor_.blended(shaded_, i, 0);
-      const LaneMask pixels =
-          crop->blend(shaded_.tile, shaded_.position[i], shaded_.live[i], shaded_.color[i]).terminated;
-      if (pixels != 0) signal(TerminationSignal{shaded_.tile, shaded_.position[i], pixels});
+      const CropBehaviour::Outcome outcome =
+          crop->blend(shaded_.tile, shaded_.position[i], shaded_.live[i], shaded_.color[i]);
+      if (work_ != nullptr) follow_cache(i, outcome.changed);
+      if (outcome.terminated != 0) signal(TerminationSignal{shaded_.tile, shaded_.position[i], outcome.terminated});
     }
+  }
+
+  void count(const Warp& warp) {
+    ++work_->warps;
+    work_->merging_warps += warp.merge_pairs != 0 ? 1U : 0U;
+    work_->color_quads += shaded_.count;
+  }
+
+  void follow_cache(unsigned index, bool changed) {
+    const CropBehaviour::CacheAccess access = crop->look_up(shaded_.tile, shaded_.position[index]);
+    work_->sectors += sectors_in(access.filled) + sectors_in(access.written_back);
+    if (changed || writes_unchanged_) crop->make_dirty(access);
+  }
+
+  static unsigned sectors_in(std::uint32_t mask) {
+    unsigned count = 0;
+    for (; mask != 0; mask &= mask - 1) ++count;
+    return count;
   }
 
   ShadedWarp shaded_;
   BlendOrderMonitor monitor_;
+  Work* work_ = nullptr;
+  bool writes_unchanged_ = false;
 };
 
 /// Strict termination where there is time: runs tested bins ahead, in order, on units of its own.

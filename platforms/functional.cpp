@@ -19,7 +19,7 @@ void BinForesight::bin_tested(TileId tile, const std::vector<Quad>& survivors,
 }
 
 struct FunctionalGpu::Gpc {
-  Gpc(const Configuration& configuration, unsigned gpc, ColorSurface& surface)
+  Gpc(const Configuration& configuration, unsigned gpc, ColorSurface& surface, bool with_bounds)
       : index(gpc),
         tests(configuration.state_of(gpc).early_termination),
         tgc(configuration.make_as<TgcBehaviour>("tgc", gpc)),
@@ -27,7 +27,10 @@ struct FunctionalGpu::Gpc {
         tc(configuration.make_as<TcBehaviour>("tc", gpc)),
         prop(configuration.make_as<PropBehaviour>("prop", gpc)),
         zrop(configuration.make_as<ZropBehaviour>("zrop", gpc)),
-        back_end(configuration, gpc, surface) {}
+        back_end(configuration, gpc, surface),
+        bound(configuration, gpc) {
+    if (with_bounds) back_end.count_into(bound.work);
+  }
 
   unsigned index;
   bool tests;
@@ -37,18 +40,19 @@ struct FunctionalGpu::Gpc {
   std::unique_ptr<PropBehaviour> prop;
   std::unique_ptr<ZropBehaviour> zrop;
   BackEnd back_end;
+  PhaseBound bound;
 
   TgcBehaviour::Flush grid;
   TcBehaviour::Flush bin;
   QuadBeat tile;
 };
 
-FunctionalGpu::FunctionalGpu(const Configuration& configuration, ColorSurface& surface)
+FunctionalGpu::FunctionalGpu(const Configuration& configuration, ColorSurface& surface, bool with_bounds)
     : configuration_(configuration),
       draw_(configuration.make_as<DrawBehaviour>("draw", 0)),
       vpo_(configuration.make_as<VpoBehaviour>("vpo", 0)) {
   for (unsigned gpc = 0; gpc < configuration.platform().gpcs; ++gpc) {
-    gpcs_.push_back(std::make_unique<Gpc>(configuration, gpc, surface));
+    gpcs_.push_back(std::make_unique<Gpc>(configuration, gpc, surface, with_bounds));
   }
 }
 
@@ -56,6 +60,7 @@ FunctionalGpu::~FunctionalGpu() = default;
 
 void FunctionalGpu::bin_flushed(Gpc& gpc) {
   // All quads of a bin are tested before any is blended: the test sees the terminations of earlier bins only.
+  Work& work = gpc.bound.work;
   QuadBeat beat;
   beat.tile = gpc.bin.tile;
   const std::vector<Quad>& quads = gpc.bin.quads;
@@ -66,12 +71,21 @@ void FunctionalGpu::bin_flushed(Gpc& gpc) {
     std::copy_n(quads.begin() + static_cast<std::ptrdiff_t>(sent), beat.count, beat.quads.begin());
     sent += beat.count;
     beat.last_of_bin = sent == quads.size();
-    if (gpc.tests) gpc.zrop->test(beat);
+    ++work.bin_beats;
+    if (gpc.tests) {
+      work.quads_tested += beat.count;
+      gpc.zrop->test(beat);
+    }
+    work.survivors += beat.count;
     tested.push_back(beat);
   }
   for (const QuadBeat& part : tested) {
-    gpc.back_end.take(part, [&](const TerminationSignal& signal) { gpc.zrop->update(signal); });
+    gpc.back_end.take(part, [&](const TerminationSignal& signal) {
+      ++work.updates;
+      gpc.zrop->update(signal);
+    });
   }
+  if (gpc.bound.phase_is_full()) gpc.bound.end_phase();
 }
 
 void FunctionalGpu::rasterize(Gpc& gpc) {
@@ -79,13 +93,20 @@ void FunctionalGpu::rasterize(Gpc& gpc) {
   bool new_screen_tile = false;
   for (const Primitive& primitive : gpc.grid.primitives) {
     gpc.raster->begin(primitive, gpc.grid.clip);
+    ++gpc.bound.work.setups;
     while (gpc.raster->next(gpc.tile, tests, new_screen_tile)) {
+      Work& work = gpc.bound.work;
+      work.coarse_tiles += tests;
+      ++work.fine_tiles;
+      work.tile_pairs += new_screen_tile ? 1U : 0U;
+      work.quads_rasterized += gpc.tile.count;
       for (unsigned from = 0; from < gpc.tile.count;) {
         bool flushed = false;
         from += gpc.tc->insert(gpc.tile, from, gpc.bin, flushed);
         if (flushed) bin_flushed(gpc);
       }
     }
+    gpc.bound.work.coarse_tiles += tests;
   }
 }
 
@@ -96,13 +117,18 @@ void FunctionalGpu::run(std::atomic<float>* progress) {
   unsigned turn = 0;
   while (draw_->next(warp)) {
     gpcs_[turn]->back_end.sm->shade_vertices(warp);
+    ++gpcs_[turn]->bound.work.vertex_warps;
+    for (const auto& gpc : gpcs_) ++gpc->bound.work.vertex_warps_issued;
     turn = turn + 1 == gpcs_.size() ? 0 : turn + 1;
     for (std::uint32_t splat = warp.first_splat; splat < warp.first_splat + warp.splats; ++splat) {
       const unsigned count = vpo_->assemble(splat, primitives);
+      for (const auto& gpc : gpcs_) gpc->bound.work.triangles += std::max(count, 1U);
       for (unsigned i = 0; i < count; ++i) {
         for (const auto& gpc : gpcs_) {
+          if (!concerns(primitives[i], static_cast<unsigned>(gpcs_.size()), gpc->index)) continue;
           gpc->tgc->begin(primitives[i]);
           while (gpc->tgc->entering()) {
+            ++gpc->bound.work.bin_entries;
             if (gpc->tgc->step(gpc->grid)) rasterize(*gpc);
           }
         }
@@ -113,8 +139,15 @@ void FunctionalGpu::run(std::atomic<float>* progress) {
   for (const auto& gpc : gpcs_) {
     while (gpc->tgc->drain(gpc->grid)) rasterize(*gpc);
     while (gpc->tc->flush_oldest(TcBehaviour::FlushReason::end_of_draw, gpc->bin)) bin_flushed(*gpc);
+    gpc->bound.end_phase();
   }
   if (progress != nullptr) *progress = 1;
+}
+
+std::vector<const PhaseBound*> FunctionalGpu::bounds() const {
+  std::vector<const PhaseBound*> all;
+  for (const auto& gpc : gpcs_) all.push_back(&gpc->bound);
+  return all;
 }
 
 BehaviourList FunctionalGpu::behaviours() const {

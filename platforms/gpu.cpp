@@ -119,7 +119,7 @@ Cycle Gpu::run(std::atomic<float>* progress) {
   const sc_core::sc_time slice = sc_core::sc_time::from_value(clock_->period().value() * 50000);
   const auto splats = static_cast<float>(std::max<std::size_t>(configuration_.state_of(0).draw->splats.size(), 1));
   do {
-    sc_core::sc_start(slice);
+    clock_->run(slice);
     if (progress != nullptr) {
       *progress = std::min(1.0F, static_cast<float>(units_.front()->work() * splats_per_vertex_warp) / splats);
     }

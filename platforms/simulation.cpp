@@ -1,5 +1,6 @@
 #include <vrpipe/platforms/simulation.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <map>
@@ -25,11 +26,13 @@ const char* name_of(Fidelity fidelity) {
 }
 
 Fidelity fidelity_named(const std::string& name) {
-  for (const Fidelity fidelity : {Fidelity::functional, Fidelity::cycle}) {
+  std::vector<std::string> names;
+  for (const Fidelity fidelity : {Fidelity::functional, Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
     if (name == name_of(fidelity)) return fidelity;
+    names.emplace_back(name_of(fidelity));
   }
-  throw UserError("unknown fidelity '" + name + "'", "--fidelity", "this build has no such fidelity",
-                  "use functional or cycle");
+  throw UserError("unknown fidelity '" + name + "'", "--fidelity", "there is no such fidelity",
+                  "did you mean " + nearest_name(name, names) + "? There are functional, bound, lt, at and cycle");
 }
 
 const std::vector<Variant>& variants() {
@@ -71,7 +74,7 @@ std::string hash_of(const RunResult& result) {
   return fmt::format("{:016x}", hash);
 }
 
-/// Counters of all units, summed over GPCs, in the order of the pipeline.
+/// Counters of all units, summed over GPCs, and extremes over them, in the order of the pipeline.
 std::vector<StatisticReport> collect(const BehaviourList& behaviours) {
   std::vector<StatisticReport> reports;
   std::map<std::string, std::size_t> index;
@@ -81,6 +84,15 @@ std::vector<StatisticReport> collect(const BehaviourList& behaviours) {
       const auto place = index.emplace(name, reports.size());
       if (place.second) reports.push_back({name, counter->unit(), counter->meaning(), 0});
       reports[place.first->second].value += counter->value();
+    }
+    for (const Extreme* extreme : behaviour->extremes()) {
+      if (!extreme->seen()) continue;
+      const std::string name = slot + "." + extreme->name();
+      const auto place = index.emplace(name, reports.size());
+      if (place.second) reports.push_back({name, extreme->unit(), extreme->meaning(), extreme->value()});
+      std::uint64_t& value = reports[place.first->second].value;
+      const bool largest = extreme->of() == Extreme::Of::largest;
+      value = largest ? std::max(value, extreme->value()) : std::min(value, extreme->value());
     }
   }
   return reports;
@@ -184,12 +196,45 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
   report_utilization(gpu, cycles, result);
 }
 
+void report_bound(const Configuration& configuration, const FunctionalGpu& gpu, RunResult& result) {
+  const std::vector<const PhaseBound*> bounds = gpu.bounds();
+  double longest = 0;
+  for (const PhaseBound* bound : bounds) longest = std::max(longest, bound->cycles());
+  const auto cycles = static_cast<Cycle>(longest);
+  result.cycles = cycles;
+  result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
+  for (const char* slot : {"raster", "zrop", "prop", "sm", "crop", "l2"}) {
+    double sum = 0;
+    for (const PhaseBound* bound : bounds) sum += bound->utilization(slot, longest);
+    result.utilization.emplace_back(slot, sum / static_cast<double>(bounds.size()));
+  }
+  result.utilization.emplace_back("dram", 0.0);
+  // Front end first; then a GPC's units, as the wiring diagrams add them.
+  const auto report = [&](const std::string& name, const PhaseBound& bound, const std::string& slot) {
+    UnitReport unit;
+    unit.name = name;
+    const Cycle busy = std::min(cycles, static_cast<Cycle>(bound.busy_cycles(slot)));
+    unit.cycles[static_cast<unsigned>(UnitState::busy)] = busy;
+    unit.cycles[static_cast<unsigned>(UnitState::starved)] = cycles - busy;
+    result.units.push_back(std::move(unit));
+  };
+  for (const char* slot : {"draw", "vpo"}) report(slot, *bounds.front(), slot);
+  for (std::size_t gpc = 0; gpc < bounds.size(); ++gpc) {
+    for (const char* slot : {"tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) {
+      report("gpc" + std::to_string(gpc) + "." + slot, *bounds[gpc], slot);
+    }
+  }
+}
+
+/// Without time, or with the bound that follows from the work.
 void run_functional(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
-  FunctionalGpu gpu(configuration, result.surface);
+  const bool bounded = result.request.fidelity == Fidelity::bound;
+  FunctionalGpu gpu(configuration, result.surface, bounded);
   const auto start = std::chrono::steady_clock::now();
   gpu.run(progress);
   result.host_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   result.statistics = collect(gpu.behaviours());
+  if (bounded) report_bound(configuration, gpu, result);
 }
 
 }  // namespace
@@ -233,7 +278,7 @@ RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<floa
   result.request = request;
   result.surface = ColorSurface(draw.width, draw.height, request.format);
   result.parameters = configuration.parameters();
-  if (request.fidelity == Fidelity::functional) {
+  if (request.fidelity == Fidelity::functional || request.fidelity == Fidelity::bound) {
     run_functional(configuration, progress, result);
   } else {
     run_clocked(configuration, progress, result);

@@ -10,6 +10,7 @@
 
 #include "output_file.h"
 #include "parse.h"
+#include "stdout_to_stderr.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -58,6 +59,7 @@ std::optional<std::string> single(const Values& values, const std::string& optio
 }
 
 void load_plugins(const Values& plugins) {
+  const StdoutToStderr redirected;
   for (const std::string& plugin : plugins) load_plugin(plugin);
 }
 
@@ -87,7 +89,8 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
   if (variants == Variants::one) {
     add_option(app, "--variant", variant_, "NAME",
                "baseline, qm (quad merging), het (hardware early termination) or\n"
-               "het+qm (default: " + variant_default + ")",
+               "het+qm (default: " +
+                   variant_default + ")",
                machine_group);
   }
   add_option(app, "--set", settings_, "UNIT.PARAMETER=VALUE",
@@ -105,8 +108,8 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              "how exact time is: cycle (every unit, every cycle) or functional (no\n"
              "time: images and counts only) (default: cycle)",
              rules_group);
-  add_option(app, "--format", format_, "NAME",
-             "colour target: rgba8, rgba16f or rgba32f (default: rgba16f)", rules_group);
+  add_option(app, "--format", format_, "NAME", "colour target: rgba8, rgba16f or rgba32f (default: rgba16f)",
+             rules_group);
   add_option(app, "--termination", termination_, "NAME",
              "when a termination bit counts: paper (once its update has travelled) or\n"
              "strict (order alone decides) (default: paper)",
@@ -135,7 +138,8 @@ SceneRequest SimulationArguments::scene_request() const {
   if (const auto text = single(size_, "--size")) request.size = parse_size(*text, "--size");
   request.camera = single(camera_, "--camera");
   if (const auto text = single(eye_, "--eye")) request.eye = parse_triple(*text, "--eye", "X,Y,Z", "2,-1.5,-4");
-  if (const auto text = single(look_at_, "--look-at")) request.look_at = parse_triple(*text, "--look-at", "X,Y,Z", "0,0,0");
+  if (const auto text = single(look_at_, "--look-at"))
+    request.look_at = parse_triple(*text, "--look-at", "X,Y,Z", "0,0,0");
   if (const auto text = single(up_, "--up")) request.up = parse_triple(*text, "--up", "X,Y,Z", "0,-1,0");
   if (const auto text = single(fovy_, "--fovy")) request.fovy_degrees = parse_number(*text, "--fovy");
   return request;
@@ -162,6 +166,7 @@ SimulationJob SimulationArguments::resolve(Variants variants) const {
   for (const Variant& variant : wanted) {
     job.requests.push_back(request);
     job.requests.back().variant = variant;
+    const StdoutToStderr redirected;
     check_configuration(job.requests.back());
   }
 
@@ -184,8 +189,8 @@ SimulationJob SimulationArguments::resolve(Variants variants) const {
 
   const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
   const auto jobs = single(jobs_, "--jobs");
-  job.processes = std::min(jobs ? parse_count(*jobs, "--jobs", 1024) : processors,
-                           static_cast<unsigned>(job.requests.size()));
+  job.processes =
+      std::min(jobs ? parse_count(*jobs, "--jobs", 1024) : processors, static_cast<unsigned>(job.requests.size()));
   return job;
 }
 

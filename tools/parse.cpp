@@ -83,7 +83,7 @@ ImageSize parse_size(const std::string& text, const std::string& option) {
 
 std::array<float, 3> parse_background(const std::string& text, const std::string& option) {
   const Vec3 values = parse_triple(text, option, "R,G,B", "1,1,1");
-  for (const double value : values) {
+  for (const double value : {values.x, values.y, values.z}) {
     if (!(value >= 0 && value <= 1)) {
       throw UserError("bad value '" + text + "'", option, fmt::format("{} is not from 0 to 1", value),
                       "give three numbers from 0 to 1, e.g. 1,1,1 for white");

@@ -1,5 +1,5 @@
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <vrpipe/platforms/simulation.h>
 
@@ -52,8 +52,10 @@ class PlatformsCommand : public Command {
                       {"gpcs", platform.gpcs},
                       {"frequency_mhz", platform.frequency_mhz},
                       {"parameters", std::move(differs)}});
-      text += fmt::format("{}{}\n  {}\n", style.bold(platform.name), is_default ? " (default)" : "", platform.description);
-      text += fmt::format("  {} GPC{}, {:g} MHz\n", platform.gpcs, platform.gpcs == 1 ? "" : "s", platform.frequency_mhz);
+      text +=
+          fmt::format("{}{}\n  {}\n", style.bold(platform.name), is_default ? " (default)" : "", platform.description);
+      text +=
+          fmt::format("  {} GPC{}, {:g} MHz\n", platform.gpcs, platform.gpcs == 1 ? "" : "s", platform.frequency_mhz);
       text += settings.empty() ? "  every parameter at its unit's default\n"
                                : "  differs from the units' defaults in\n" + settings;
     }

@@ -28,6 +28,7 @@
 #include <vrpipe/error.h>
 
 #include "command_line.h"
+#include "stdout_to_stderr.h"
 #include "terminal.h"
 
 namespace vrpipe::tools {
@@ -148,31 +149,6 @@ class SharedProgress {
   std::atomic<float>* values_;
 };
 
-/// While it lives, what is written to stdout goes to stderr: SystemC and plugins may print, and stdout is for results.
-class StdoutToStderr {
- public:
-  StdoutToStderr() {
-    flush();
-    saved_ = ::dup(STDOUT_FILENO);
-    if (saved_ >= 0) ::dup2(STDERR_FILENO, STDOUT_FILENO);
-  }
-  ~StdoutToStderr() {
-    flush();
-    if (saved_ < 0) return;
-    ::dup2(saved_, STDOUT_FILENO);
-    ::close(saved_);
-  }
-  StdoutToStderr(const StdoutToStderr&) = delete;
-  StdoutToStderr& operator=(const StdoutToStderr&) = delete;
-
- private:
-  static void flush() {
-    std::cout.flush();
-    std::fflush(stdout);
-  }
-  int saved_;
-};
-
 /// Draws the progress of one simulation of this process from a thread of its own.
 class ProgressThread {
  public:
@@ -182,7 +158,8 @@ class ProgressThread {
       const SteadyClock::time_point start = SteadyClock::now();
       std::unique_lock<std::mutex> lock(mutex_);
       while (!ended_.wait_for(lock, std::chrono::milliseconds(redraw_milliseconds), [this] { return stop_; })) {
-        line.show(progress_text({name}, {done.load(std::memory_order_relaxed)}, seconds_since(start), stderr_width() - 1));
+        line.show(
+            progress_text({name}, {done.load(std::memory_order_relaxed)}, seconds_since(start), stderr_width() - 1));
       }
     });
   }
@@ -205,9 +182,7 @@ class ProgressThread {
   std::thread thread_;
 };
 
-[[noreturn]] void system_failure(const char* what) {
-  throw std::system_error(errno, std::generic_category(), what);
-}
+[[noreturn]] void system_failure(const char* what) { throw std::system_error(errno, std::generic_category(), what); }
 
 /// A simulation in a process of its own. Ends it, if need be, when destroyed.
 class Worker {

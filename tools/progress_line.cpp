@@ -28,8 +28,8 @@ void ProgressLine::erase() {
   drawn_ = false;
 }
 
-std::string progress_text(const std::vector<std::string>& names, const std::vector<float>& done,
-                          double elapsed_seconds, unsigned width) {
+std::string progress_text(const std::vector<std::string>& names, const std::vector<float>& done, double elapsed_seconds,
+                          unsigned width) {
   std::string text;
   double share = 0;
   for (std::size_t i = 0; i < names.size(); ++i) {

@@ -27,7 +27,7 @@ class ProgressLine {
 /// Percentages, a bar and the time left of simulations that run side by side. ASCII, at most `width` characters.
 /// @param done             share of each that is done, 0 to 1
 /// @param elapsed_seconds  since they began
-std::string progress_text(const std::vector<std::string>& names, const std::vector<float>& done,
-                          double elapsed_seconds, unsigned width);
+std::string progress_text(const std::vector<std::string>& names, const std::vector<float>& done, double elapsed_seconds,
+                          unsigned width);
 
 }  // namespace vrpipe::tools

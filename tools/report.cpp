@@ -91,13 +91,16 @@ struct Fates {
   std::uint64_t Counts::*blended;
 };
 
-constexpr Fates quad_fates{&Counts::quads_rasterized,   &Counts::quads_depth_stencil_failed, &Counts::quads_terminated,
-                           &Counts::quads_shaded,       &Counts::quads_pruned,               &Counts::quads_merged,
-                           &Counts::quads_dropped_late, &Counts::quads_late_failed,          &Counts::quads_blended};
-constexpr Fates fragment_fates{
-    &Counts::fragments_rasterized, &Counts::fragments_depth_stencil_failed, &Counts::fragments_terminated,
-    &Counts::fragments_shaded,     &Counts::fragments_pruned,               &Counts::fragments_merged,
-    &Counts::fragments_dropped_late, &Counts::fragments_late_failed,        &Counts::fragments_blended};
+constexpr Fates quad_fates{&Counts::quads_rasterized,   &Counts::quads_depth_stencil_failed,
+                           &Counts::quads_terminated,   &Counts::quads_shaded,
+                           &Counts::quads_pruned,       &Counts::quads_merged,
+                           &Counts::quads_dropped_late, &Counts::quads_late_failed,
+                           &Counts::quads_blended};
+constexpr Fates fragment_fates{&Counts::fragments_rasterized,   &Counts::fragments_depth_stencil_failed,
+                               &Counts::fragments_terminated,   &Counts::fragments_shaded,
+                               &Counts::fragments_pruned,       &Counts::fragments_merged,
+                               &Counts::fragments_dropped_late, &Counts::fragments_late_failed,
+                               &Counts::fragments_blended};
 
 void add_fates(RunTable& table, const std::string& title, const Fates& fates, const std::vector<RunResult>& runs) {
   std::uint64_t largest = 0;
@@ -170,7 +173,7 @@ std::string heading(const JobResult& result, const TextStyle& style) {
   std::string text = style.bold(fmt::format("{}, {}x{}", result.scene.name, result.width, result.height));
   text += fmt::format(": {} of {} Gaussians visible\n", grouped(result.scene.gaussians_visible),
                       grouped(result.scene.gaussians_total));
-  text += style.bold(platform.name) + ": " + platform.description + "\n";
+  text += style.bold(platform.name) + " (" + platform.description + ")\n";
   text += fmt::format("{} fidelity, {} colour, {} termination", vrpipe::name_of(request.fidelity),
                       vrpipe::name_of(request.format), name_of(request.termination));
   for (const Setting& setting : request.settings) {
@@ -185,7 +188,10 @@ std::string bound_text(const RunResult& run) {
   if (busiest.empty()) return {};
   std::string units;
   for (std::size_t i = 0; i < busiest.size(); ++i) {
-    units += fmt::format("{}{} ({} %)", i == 0 ? "" : i + 1 == busiest.size() ? " and " : ", ",
+    units += fmt::format("{}{} ({} %)",
+                         i == 0                    ? ""
+                         : i + 1 == busiest.size() ? " and "
+                                                   : ", ",
                          upper(busiest[i].first), percent(busiest[i].second));
   }
   // Where no unit comes near its peak, latency or batches of few items bound the run, not a rate.
@@ -198,25 +204,61 @@ std::string bound_text(const RunResult& run) {
   return text + "\n";
 }
 
+/// The largest value of a statistic over the runs; 0 where none has it.
+std::uint64_t largest_statistic(const std::vector<RunResult>& runs, const std::string& name) {
+  std::uint64_t largest = 0;
+  for (const RunResult& run : runs) {
+    for (const StatisticReport& report : run.statistics) {
+      if (report.name == name) largest = std::max(largest, report.value);
+    }
+  }
+  return largest;
+}
+
+/// One line on numbers that went wrong, where any did.
+std::string trouble_text(const std::vector<RunResult>& runs) {
+  std::vector<std::string> parts;
+  const auto add = [&](const char* statistic, const char* meaning) {
+    const std::uint64_t value = largest_statistic(runs, statistic);
+    if (value > 0) parts.push_back(fmt::format("{} {}", grouped(value), meaning));
+  };
+  add("crop.pixels_stuck", "pixels stuck below the termination threshold by rounding");
+  add("crop.colors_saturated", "fragments took a colour beyond the format's largest");
+  add("sm.colors_clamped", "times a colour was clamped to the format's range");
+  add("vpo.dropped_not_finite", "splats dropped as not finite");
+  // Within 32 bits for every splat but those far larger than a tile.
+  const std::uint64_t bits = largest_statistic(runs, "raster.widest_edge");
+  if (largest_statistic(runs, "raster.wide_edges") > 0) parts.push_back(fmt::format("edge functions of {} bits", bits));
+  for (const StatisticReport& report : runs.front().statistics) {
+    if (report.name != "vpo.smallest_determinant" || report.value >= 1000) continue;
+    parts.push_back(fmt::format("smallest splat of determinant {:.6f} px^2", static_cast<double>(report.value) * 1e-6));
+  }
+  if (parts.empty()) return {};
+  std::string text = "numbers to watch: ";
+  for (std::size_t i = 0; i < parts.size(); ++i) text += (i > 0 ? "; " : "") + parts[i];
+  return text + "\n";
+}
+
 std::string remarks(const JobResult& result) {
   const std::vector<RunResult>& runs = result.runs;
   std::string text = bound_text(runs.front());
   if (const auto early = early_termination_ratio(runs)) {
     text += fmt::format("early-termination ratio {:.2f} (fragments blended without over with termination)\n", *early);
   }
-  const bool merges = std::any_of(runs.begin(), runs.end(),
-                                  [](const RunResult& run) { return run.request.variant.quad_merging; });
+  const bool merges =
+      std::any_of(runs.begin(), runs.end(), [](const RunResult& run) { return run.request.variant.quad_merging; });
   if (merges) {
     const StorageReport storage = quad_merging_storage(runs.front().request);
-    text += fmt::format("quad merging adds {} of hardware storage per GPC: TGC {}, QRU {}\n",
-                        bytes(storage.tgc_bytes + storage.qru_bytes), bytes(storage.tgc_bytes),
-                        bytes(storage.qru_bytes));
+    text +=
+        fmt::format("quad merging adds {} of hardware storage per GPC: TGC {}, QRU {}\n",
+                    bytes(storage.tgc_bytes + storage.qru_bytes), bytes(storage.tgc_bytes), bytes(storage.qru_bytes));
   }
   const RejectedGaussians& rejected = result.scene.rejected;
   if (rejected.total() > 0) {
     text += fmt::format("rejected {} Gaussians: {} with a NaN or infinite value, {} without an orientation\n",
                         grouped(rejected.total()), grouped(rejected.not_finite), grouped(rejected.zero_quaternion));
   }
+  text += trouble_text(runs);
   text += fmt::format("took {:.1f} s to load the scene, {:.1f} s to simulate", result.load_seconds,
                       result.simulate_seconds);
   if (runs.size() > 1) {

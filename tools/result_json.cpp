@@ -44,10 +44,9 @@ const Parameter* declaration(const std::vector<ParameterListing>& listings, cons
   const Parameter* found = nullptr;
   for (const ParameterListing& listing : listings) {
     if (listing.unit != unit) continue;
-    const bool chosen =
-        std::any_of(request.units.begin(), request.units.end(), [&](const UnitChoice& choice) {
-          return choice.slot == unit && choice.implementation == listing.implementation;
-        });
+    const bool chosen = std::any_of(request.units.begin(), request.units.end(), [&](const UnitChoice& choice) {
+      return choice.slot == unit && choice.implementation == listing.implementation;
+    });
     for (const Parameter* parameter : listing.parameters->parameters()) {
       if (name == parameter->name() && (found == nullptr || chosen)) found = parameter;
     }

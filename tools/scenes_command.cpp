@@ -1,7 +1,7 @@
 #include <iostream>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <vrpipe/workloads/builtin_scenes.h>
 
@@ -14,6 +14,7 @@
 namespace vrpipe::tools {
 namespace {
 
+Json json_triple(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 std::string triple(const Vec3& v) { return fmt::format("{},{},{}", v[0], v[1], v[2]); }
 
 class ScenesCommand : public Command {
@@ -38,16 +39,17 @@ class ScenesCommand : public Command {
                       {"default", is_default},
                       {"width", scene.size.width},
                       {"height", scene.size.height},
-                      {"eye", scene.view.eye},
-                      {"look_at", scene.view.look_at},
-                      {"up", scene.view.up},
+                      {"eye", json_triple(scene.view.eye)},
+                      {"look_at", json_triple(scene.view.look_at)},
+                      {"up", json_triple(scene.view.up)},
                       {"fovy_degrees", scene.view.fovy_degrees}});
       text += fmt::format("{}{}\n  {}\n", style.bold(full_name), is_default ? " (default)" : "", scene.description);
       text += fmt::format("  --size {}x{} --eye {} --look-at {} --up {} --fovy {}\n", scene.size.width,
-                          scene.size.height, triple(scene.view.eye), triple(scene.view.look_at),
-                          triple(scene.view.up), scene.view.fovy_degrees);
+                          scene.size.height, triple(scene.view.eye), triple(scene.view.look_at), triple(scene.view.up),
+                          scene.view.fovy_degrees);
     }
-    text += style.bold("FILE.ply") + "\n  trained Gaussians as the INRIA code writes them, seen from --camera, or from "
+    text += style.bold("FILE.ply") +
+            "\n  trained Gaussians as the INRIA code writes them, seen from --camera, or from "
             "--eye to --look-at, or\n  from a view that fits the scene\n";
     text += style.bold("FILE.spl") + "\n  a draw list that --save-draw wrote: its camera and size are part of it\n";
     print_listing({{"schema", "vrpipe.scenes/1"}, {"scenes", std::move(list)}}, text, json_);

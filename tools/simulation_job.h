@@ -25,8 +25,8 @@ struct JobResult {
   std::vector<RunResult> runs;
   std::vector<std::optional<ImageFiles>> images;  ///< one for each run
   unsigned processes = 1;
-  double load_seconds = 0;     ///< wall time of reading and preprocessing the scene
-  double simulate_seconds = 0; ///< wall time of all simulations together
+  double load_seconds = 0;      ///< wall time of reading and preprocessing the scene
+  double simulate_seconds = 0;  ///< wall time of all simulations together
 };
 
 /// Name of the images of a run, without folder and extension: SCENE-VARIANT.

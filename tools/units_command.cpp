@@ -1,7 +1,7 @@
 #include <algorithm>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <vrpipe/error.h>
 #include <vrpipe/platforms/configuration.h>
@@ -21,6 +21,29 @@ bool is_default(const ParameterListing& unit) {
   const std::vector<std::string>& slots = Registry::slots();
   if (std::find(slots.begin(), slots.end(), unit.unit) == slots.end()) return true;
   return default_implementation(unit.unit, variants().back()).name == unit.implementation;
+}
+
+struct Statistic {
+  std::string name, unit, meaning;
+};
+
+/// What a unit counts; nothing for l2 and state, which are no slots.
+std::vector<Statistic> statistics_of(const ParameterListing& unit) {
+  const std::vector<std::string>& slots = Registry::slots();
+  if (std::find(slots.begin(), slots.end(), unit.unit) == slots.end()) return {};
+  Draw draw;
+  draw.width = draw.height = 1;
+  RenderState state;
+  state.draw = &draw;
+  const Implementation& implementation = Registry::instance().find(unit.unit, unit.implementation);
+  const std::unique_ptr<Behaviour> behaviour = implementation.make_behaviour(*unit.parameters, state);
+  std::vector<Statistic> all;
+  const auto add = [&](const auto& statistics) {
+    for (const auto* one : statistics) all.push_back({unit.unit + "." + one->name(), one->unit(), one->meaning()});
+  };
+  add(behaviour->counters());
+  add(behaviour->extremes());
+  return all;
 }
 
 std::string with_unit(const std::string& value, const Parameter& parameter) {
@@ -49,6 +72,9 @@ std::string as_text(const std::vector<ParameterListing>& units, const std::strin
       text += fmt::format("; {}\n      {}\n      default from: {}\n", parameter->range(), parameter->meaning(),
                           parameter->source());
     }
+    for (const Statistic& statistic : statistics_of(unit)) {
+      text += fmt::format("  counts {}: {}, {}\n", style.bold(statistic.name), statistic.unit, statistic.meaning);
+    }
   }
   return text;
 }
@@ -72,13 +98,20 @@ std::string as_markdown(const std::vector<ParameterListing>& units) {
       slot = unit.unit;
       text += "## " + slot + "\n\n";
     }
-    text += fmt::format("### `{}={}`{}\n\n{}.\n", unit.unit, unit.implementation, role(unit), escaped(unit.description));
-    if (unit.parameters->parameters().empty()) continue;
-    text += "\n| parameter | default | unit | allowed | meaning | default from |\n|---|---|---|---|---|---|\n";
+    text +=
+        fmt::format("### `{}={}`{}\n\n{}.\n", unit.unit, unit.implementation, role(unit), escaped(unit.description));
+    if (!unit.parameters->parameters().empty()) {
+      text += "\n| parameter | default | unit | allowed | meaning | default from |\n|---|---|---|---|---|---|\n";
+    }
     for (const Parameter* parameter : unit.parameters->parameters()) {
       text += fmt::format("| `{}.{}` | {} | {} | {} | {} | {} |\n", unit.unit, parameter->name(),
                           parameter->default_value(), escaped(parameter->unit()), escaped(parameter->range()),
                           escaped(parameter->meaning()), escaped(parameter->source()));
+    }
+    const std::vector<Statistic> statistics = statistics_of(unit);
+    if (!statistics.empty()) text += "\n| statistic | unit | meaning |\n|---|---|---|\n";
+    for (const Statistic& statistic : statistics) {
+      text += fmt::format("| `{}` | {} | {} |\n", statistic.name, statistic.unit, escaped(statistic.meaning));
     }
   }
   return text;
@@ -97,12 +130,17 @@ Json as_json(const std::vector<ParameterListing>& units, const std::string& plat
                             {"meaning", parameter->meaning()},
                             {"source", parameter->source()}});
     }
+    Json statistics = Json::array();
+    for (const Statistic& statistic : statistics_of(unit)) {
+      statistics.push_back({{"name", statistic.name}, {"unit", statistic.unit}, {"meaning", statistic.meaning}});
+    }
     list.push_back({{"slot", unit.unit},
                     {"implementation", unit.implementation},
                     {"description", unit.description},
                     {"default", is_default(unit)},
                     {"pass_through", unit.pass_through},
-                    {"parameters", std::move(parameters)}});
+                    {"parameters", std::move(parameters)},
+                    {"statistics", std::move(statistics)}});
   }
   return {{"schema", "vrpipe.units/1"}, {"platform", platform}, {"units", std::move(list)}};
 }
@@ -110,7 +148,7 @@ Json as_json(const std::vector<ParameterListing>& units, const std::string& plat
 class UnitsCommand : public Command {
  public:
   std::string name() const override { return "units"; }
-  std::string summary() const override { return "every unit, its implementations and all parameters"; }
+  std::string summary() const override { return "every unit, its implementations, all parameters and statistics"; }
 
   void declare(CLI::App& app) override {
     add_option(app, "--slot", slot_, "NAME", "only the units of this slot, e.g. tc", "What is listed");

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/error.h>
@@ -21,20 +22,12 @@ constexpr char kLayoutRemedy[] =
 
 bool all_finite(const Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
 
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
 /// Divides by the largest component first, so that no square overflows or vanishes. Zero stays zero.
 Vec3 normalized(Vec3 v) {
   const double largest = std::fmax(std::fabs(v[0]), std::fmax(std::fabs(v[1]), std::fabs(v[2])));
   if (!(largest > 0)) return {0, 0, 0};
-  for (double& component : v) component /= largest;
-  const double length = std::sqrt(dot(v, v));
-  for (double& component : v) component /= length;
-  return v;
+  v /= largest;
+  return v / glm::length(v);
 }
 
 double read_number(const nlohmann::json& value, const std::string& where, const std::string& name) {
@@ -126,7 +119,7 @@ Camera look_at(const Vec3& eye, const Vec3& target, const Vec3& up, double fovy_
                     "give 1e-6 to less than 179.999");
   }
   // Halved first: the difference of two large numbers must not overflow.
-  const Vec3 forward = normalized({0.5 * target[0] - 0.5 * eye[0], 0.5 * target[1] - 0.5 * eye[1], 0.5 * target[2] - 0.5 * eye[2]});
+  const Vec3 forward = normalized(0.5 * target - 0.5 * eye);
   if (dot(forward, forward) == 0) {
     throw UserError(kCannotUse, "--look-at", "it is the point where the camera stands (--eye)", "give another point");
   }

@@ -9,6 +9,8 @@
 #include <system_error>
 #include <thread>
 
+#include <glm/geometric.hpp>
+
 #include <vrpipe/error.h>
 #include <vrpipe/workloads/portable_math.h>
 
@@ -31,8 +33,6 @@ constexpr std::array<double, 5> kShC2 = {1.0925484305920792, -1.0925484305920792
                                          -1.0925484305920792, 0.5462742152960396};
 constexpr std::array<double, 7> kShC3 = {-0.5900435899266435, 2.890611442640554, -0.4570457994644658, 0.3731763325901154,
                                          -0.4570457994644658, 1.445305721320277, -0.5900435899266435};
-
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 template <std::size_t N>
 bool all_finite(const std::array<float, N>& values) {
@@ -141,9 +141,9 @@ class Projector {
   }
 
   void colour(const GaussianRef& gaussian, int degree, Splat& splat) const {
-    Vec3 direction = eye_to(gaussian);
-    const double length = std::sqrt(dot(direction, direction));
-    for (double& component : direction) component = length > 0 ? component / length : 0.0;
+    const Vec3 offset = eye_to(gaussian);
+    const double length = glm::length(offset);
+    const Vec3 direction = length > 0 ? offset / length : Vec3{};
     const std::array<float, 3> rgb = sh_colour(gaussian, direction, degree);
     splat.red = rgb[0];
     splat.green = rgb[1];
@@ -162,11 +162,9 @@ class Projector {
     const double x = std::min(limit_x_, std::max(-limit_x_, ray_x));
     const double y = std::min(limit_y_, std::max(-limit_y_, ray_y));
     const double focal_x = camera_.fx / z, focal_y = camera_.fy / z;
-    Vec3 j1, j2;  // rows of J W
-    for (std::size_t k = 0; k < 3; ++k) {
-      j1[k] = focal_x * (world_to_camera_[0][k] - x * world_to_camera_[2][k]);
-      j2[k] = focal_y * (world_to_camera_[1][k] - y * world_to_camera_[2][k]);
-    }
+    // Rows of J W.
+    const Vec3 j1 = focal_x * (world_to_camera_[0] - x * world_to_camera_[2]);
+    const Vec3 j2 = focal_y * (world_to_camera_[1] - y * world_to_camera_[2]);
     const std::array<Vec3, 3> rotation = rotation_matrix(gaussian.rotation());
     const std::array<float, 3> log_scale = gaussian.log_scale();
     for (std::size_t k = 0; k < 3; ++k) {
@@ -226,7 +224,7 @@ void check_options(const GaussianScene& scene, const Camera& camera, const Prepr
   good = good && near_plane >= kMinNearPlane && std::isfinite(near_plane);
   for (std::size_t i = 0; i < 3; ++i) {
     good = good && std::isfinite(camera.eye[i]);
-    for (const double element : camera.rotation[i]) good = good && std::fabs(element) <= 2;
+    for (std::size_t k = 0; k < 3; ++k) good = good && std::fabs(camera.rotation[i][k]) <= 2;
   }
   if (!good) {
     throw UserError(kCannot, "camera", "an element is not finite, a focal length is not above 0, or the near plane is below 1e-6",
@@ -251,7 +249,7 @@ void reduce_keys(std::vector<std::uint64_t>& entries, int bits) {
 }  // namespace
 
 double covariance_determinant(const Vec3& m1, const Vec3& m2) {
-  const Vec3 c = {m1[1] * m2[2] - m1[2] * m2[1], m1[2] * m2[0] - m1[0] * m2[2], m1[0] * m2[1] - m1[1] * m2[0]};
+  const Vec3 c = cross(m1, m2);
   return dot(c, c) + kDilation * (dot(m1, m1) + dot(m2, m2)) + kDilation * kDilation;
 }
 

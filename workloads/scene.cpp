@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <vector>
 
+#include <glm/geometric.hpp>
+
 #include <vrpipe/error.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/draw_list.h>
@@ -18,10 +20,6 @@ namespace {
 constexpr char kCannotUse[] = "cannot use option";
 const std::string kBuiltinPrefix = "builtin:";
 
-
-Vec3 plus(const Vec3& a, const Vec3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-Vec3 scaled(const Vec3& a, double factor) { return {a[0] * factor, a[1] * factor, a[2] * factor}; }
-double length(const Vec3& a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
 
 /// The view with what the user named in place of what was there.
 View with_options(View view, const SceneRequest& request) {
@@ -77,17 +75,16 @@ View automatic_view(const GaussianScene& scene, const SceneRequest& request) {
   const double half_fov = std::min(std::max(0.5 * view.fovy_degrees, 1.0), 80.0);
   const double distance = radius / portable_sin(half_fov * 3.14159265358979323846 / 180.0);
   // From the front (-z, or what of it is horizontal), 30 degrees to the left, 20 above.
-  Vec3 up = scaled(view.up, 1.0 / std::max(length(view.up), 1e-300));
-  if (!(length(up) > 0.5)) up = {0, -1, 0};  // refused by look_at
-  Vec3 front = plus(Vec3{0, 0, -1}, scaled(up, up[2]));
-  if (length(front) < 1e-3) front = {0, 1, 0};
-  front = scaled(front, 1.0 / length(front));
-  const Vec3 left = {front[1] * up[2] - front[2] * up[1], front[2] * up[0] - front[0] * up[2],
-                     front[0] * up[1] - front[1] * up[0]};
+  Vec3 up = view.up * (1.0 / std::max(glm::length(view.up), 1e-300));
+  if (!(glm::length(up) > 0.5)) up = {0, -1, 0};  // refused by look_at
+  Vec3 front = Vec3{0, 0, -1} + up * up[2];
+  if (glm::length(front) < 1e-3) front = {0, 1, 0};
+  front *= 1.0 / glm::length(front);
+  const Vec3 left = glm::cross(front, up);
   constexpr double kSin20 = 0.3420201433256687, kCos20 = 0.9396926207859084, kSin30 = 0.5, kCos30 = 0.8660254037844386;
-  const Vec3 level = plus(scaled(front, kCos30), scaled(left, kSin30));
-  const Vec3 direction = plus(scaled(level, kCos20), scaled(up, kSin20));
-  view.eye = plus(view.look_at, scaled(direction, distance));
+  const Vec3 level = front * kCos30 + left * kSin30;
+  const Vec3 direction = level * kCos20 + up * kSin20;
+  view.eye = view.look_at + direction * distance;
   return view;
 }
 

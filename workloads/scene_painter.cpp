@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/geometric.hpp>
+
 #include <vrpipe/workloads/portable_math.h>
 
 namespace vrpipe {
@@ -16,7 +18,7 @@ constexpr double kBoxArea = 45.0;
 
 /// Two unit vectors at right angles to a unit vector.
 void tangents(const Vec3& normal, Vec3& t, Vec3& b) {
-  t = unit(std::fabs(normal[0]) < 0.6 ? cross(normal, {1, 0, 0}) : cross(normal, {0, 1, 0}));
+  t = unit(std::fabs(normal[0]) < 0.6 ? cross(normal, Vec3{1, 0, 0}) : cross(normal, Vec3{0, 1, 0}));
   b = cross(normal, t);
 }
 
@@ -54,14 +56,8 @@ double lattice(std::int64_t x, std::int64_t y, std::int64_t z) {
 
 }  // namespace
 
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
 Vec3 unit(const Vec3& a) {
-  const double length = std::sqrt(dot(a, a));
+  const double length = glm::length(a);
   if (!(length > 0)) return {0, 1, 0};
   return a * (1.0 / length);
 }

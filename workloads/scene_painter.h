@@ -11,12 +11,6 @@
 namespace vrpipe {
 
 // Vectors in the painter's world: x right, y UP, z away from the default viewer. The painter turns y down on output.
-inline Vec3 operator+(const Vec3& a, const Vec3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-inline Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline Vec3 operator*(const Vec3& a, double k) { return {a[0] * k, a[1] * k, a[2] * k}; }
-inline Vec3 operator*(const Vec3& a, const Vec3& b) { return {a[0] * b[0], a[1] * b[1], a[2] * b[2]}; }
-double dot(const Vec3& a, const Vec3& b);
-Vec3 cross(const Vec3& a, const Vec3& b);
 Vec3 unit(const Vec3& a);  ///< zero gives (0, 1, 0)
 Vec3 mix(const Vec3& a, const Vec3& b, double t);  ///< a at t = 0, b at t = 1; t is clamped
 

@@ -29,6 +29,7 @@ struct StreamPayload {
   const Item* item = nullptr;  ///< transfer
   unsigned latency = 0;        ///< transfer: cycles that the sender's pipeline adds to those of the link
   unsigned credits = 0;        ///< credit
+  Cycle at = never;            ///< between units that are not clocked: the cycle in which it takes place (timed.h)
 };
 
 template <class Item>
@@ -69,7 +70,8 @@ class Port {
 
  protected:
   Port(std::string name, const ClockHandle& clock) : clock_(clock), name_(std::move(name)) {}
-  bool stalled() const { return stall_per_256_ != 0 && stall_at(stall_seed_, clock_.domain->now(), stall_per_256_); }
+  bool stalled() const { return stalled_at(clock_.domain->now()); }
+  bool stalled_at(Cycle cycle) const { return stall_per_256_ != 0 && stall_at(stall_seed_, cycle, stall_per_256_); }
   void mark_connected() { connected_ = true; }
 
   const ClockHandle& clock_;
@@ -108,41 +110,17 @@ class PortOwner {
   std::vector<OutPort*> out_ports;
 };
 
-/// The sending end.
+/// What the sending ends of all fidelities have in common.
 template <class Item>
-class StreamOut : public OutPort, private tlm::tlm_bw_transport_if<StreamProtocol<Item>> {
+class OutEnd : public OutPort, protected tlm::tlm_bw_transport_if<StreamProtocol<Item>> {
  public:
-  StreamOut(PortOwner& owner, const std::string& name) : OutPort(name, owner.clock), socket(name.c_str()) {
+  OutEnd(PortOwner& owner, const std::string& name) : OutPort(name, owner.clock), socket(name.c_str()) {
     socket.bind(*this);
     owner.out_ports.push_back(this);
   }
 
   StreamInitiatorSocket<Item> socket;
 
-  /// Free places at the receiver, as known at the start of this cycle.
-  unsigned credits() {
-    if (clock_.domain->now() > credit_cycle_) {
-      credits_ += pending_;
-      pending_ = 0;
-    }
-    return stalled() ? 0 : credits_;
-  }
-  /// When to look at `credits()` again if it is 0: `never`, since a credit wakes the unit, but for a random stall.
-  Cycle retry() const { return stalled() ? clock_.domain->now() + 1 : never; }
-  /// Moves an item; `credits()` must not be 0.
-  void push(const Item& item) {
-    if (credits_ == 0) {
-      throw SimulationFault(socket.name(), clock_.domain->now(), "an item was pushed without a credit");
-    }
-    --credits_;
-    ++transferred_;
-    StreamPayload<Item> payload;
-    payload.item = &item;
-    payload.latency = pipeline_;
-    StreamPhase phase = StreamPhase::transfer;
-    sc_core::sc_time delay;
-    socket->nb_transport_fw(payload, phase, delay);
-  }
   /// The sender has a pipeline of this many cycles behind what it pushes, `items_per_cycle` wide; the items in it do
   /// not take places of the receiver's queue. Before `connect`.
   void set_pipeline(unsigned latency_cycles, unsigned items_per_cycle = 1) {
@@ -159,9 +137,16 @@ class StreamOut : public OutPort, private tlm::tlm_bw_transport_if<StreamProtoco
   void stub() override {
     stub_ = std::make_unique<Sink>(sc_core::sc_gen_unique_name("stub"));
     socket.bind(stub_->socket);
-    credits_ = ~0U;
     mark_connected();
+    unlimited();
   }
+
+ protected:
+  /// The receiver has room for whatever comes.
+  virtual void unlimited() = 0;
+
+  std::uint64_t transferred_ = 0;
+  unsigned pipeline_ = 0;
 
  private:
   struct Sink : sc_core::sc_module, tlm::tlm_fw_transport_if<StreamProtocol<Item>> {
@@ -174,6 +159,46 @@ class StreamOut : public OutPort, private tlm::tlm_bw_transport_if<StreamProtoco
     bool get_direct_mem_ptr(StreamPayload<Item>&, tlm::tlm_dmi&) override { return false; }
     unsigned transport_dbg(StreamPayload<Item>&) override { return 0; }
   };
+
+  void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
+
+  unsigned pipeline_items_ = 0;
+  std::unique_ptr<Sink> stub_;
+};
+
+/// The sending end of a clocked unit.
+template <class Item>
+class StreamOut : public OutEnd<Item> {
+ public:
+  using OutEnd<Item>::OutEnd;
+
+  /// Free places at the receiver, as known at the start of this cycle.
+  unsigned credits() {
+    if (clock_.domain->now() > credit_cycle_) {
+      credits_ += pending_;
+      pending_ = 0;
+    }
+    return this->stalled() ? 0 : credits_;
+  }
+  /// When to look at `credits()` again if it is 0: `never`, since a credit wakes the unit, but for a random stall.
+  Cycle retry() const { return this->stalled() ? clock_.domain->now() + 1 : never; }
+  /// Moves an item; `credits()` must not be 0.
+  void push(const Item& item) {
+    if (credits_ == 0) {
+      throw SimulationFault(this->socket.name(), clock_.domain->now(), "an item was pushed without a credit");
+    }
+    --credits_;
+    ++this->transferred_;
+    StreamPayload<Item> payload;
+    payload.item = &item;
+    payload.latency = this->pipeline_;
+    StreamPhase phase = StreamPhase::transfer;
+    sc_core::sc_time delay;
+    this->socket->nb_transport_fw(payload, phase, delay);
+  }
+
+ private:
+  using OutEnd<Item>::clock_;
 
   tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
     if (!clock_.domain->running()) {
@@ -190,32 +215,63 @@ class StreamOut : public OutPort, private tlm::tlm_bw_transport_if<StreamProtoco
     clock_.domain->wake(clock_.unit, now + 1);
     return tlm::TLM_ACCEPTED;
   }
-  void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
+  void unlimited() override { credits_ = ~0U; }
 
   unsigned credits_ = 0;
   unsigned pending_ = 0;
   Cycle credit_cycle_ = 0;
-  std::uint64_t transferred_ = 0;
-  unsigned pipeline_ = 0;
-  unsigned pipeline_items_ = 0;
-  std::unique_ptr<Sink> stub_;
 };
 
-/// The receiving end, with its queue.
+/// What the receiving ends of all fidelities have in common.
 template <class Item>
-class StreamIn : public InPort, private tlm::tlm_fw_transport_if<StreamProtocol<Item>> {
+class InEnd : public InPort, protected tlm::tlm_fw_transport_if<StreamProtocol<Item>> {
  public:
-  StreamIn(PortOwner& owner, const std::string& name) : InPort(name, owner.clock), socket(name.c_str()) {
+  InEnd(PortOwner& owner, const std::string& name) : InPort(name, owner.clock), socket(name.c_str()) {
     socket.bind(*this);
     owner.in_ports.push_back(this);
-    configure(4, 1);
   }
 
   StreamTargetSocket<Item> socket;
 
   /// @param depth items that the queue holds, at least 1
   /// @param latency cycles from push to visibility, at least 1
-  void configure(unsigned depth, unsigned latency) {
+  virtual void configure(unsigned depth, unsigned latency) = 0;
+  /// Called by the sending end.
+  void taken() { mark_connected(); }
+
+  /// Nothing ever arrives.
+  void stub() override {
+    stub_ = std::make_unique<Source>(sc_core::sc_gen_unique_name("stub"));
+    stub_->socket.bind(socket);
+    mark_connected();
+  }
+
+ protected:
+  bool is_stub() const { return stub_ != nullptr; }
+
+ private:
+  struct Source : sc_core::sc_module, tlm::tlm_bw_transport_if<StreamProtocol<Item>> {
+    explicit Source(const sc_core::sc_module_name& name) : sc_module(name), socket("socket") { socket.bind(*this); }
+    StreamInitiatorSocket<Item> socket;
+    tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>&, StreamPhase&, sc_core::sc_time&) override {
+      return tlm::TLM_ACCEPTED;
+    }
+    void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
+  };
+
+  bool get_direct_mem_ptr(StreamPayload<Item>&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(StreamPayload<Item>&) override { return 0; }
+
+  std::unique_ptr<Source> stub_;
+};
+
+/// The receiving end of a clocked unit, with its queue.
+template <class Item>
+class StreamIn : public InEnd<Item> {
+ public:
+  StreamIn(PortOwner& owner, const std::string& name) : InEnd<Item>(owner, name) { StreamIn::configure(4, 1); }
+
+  void configure(unsigned depth, unsigned latency) override {
     depth_ = depth;
     latency_ = latency;
     unsigned size = 1;
@@ -223,16 +279,16 @@ class StreamIn : public InPort, private tlm::tlm_fw_transport_if<StreamProtocol<
     queue_.resize(size);
     mask_ = size - 1;
   }
-  /// Called by the sending end.
-  void taken() { mark_connected(); }
   unsigned depth() const { return depth_; }
 
   void open() override {
-    if (!stub_) grant(depth_);
+    if (!this->is_stub()) grant(depth_);
   }
   bool empty() const override { return head_ == tail_; }
 
-  bool ready() const { return head_ != tail_ && queue_[head_ & mask_].ready <= clock_.domain->now() && !stalled(); }
+  bool ready() const {
+    return head_ != tail_ && queue_[head_ & mask_].ready <= clock_.domain->now() && !this->stalled();
+  }
   const Item& front() const { return queue_[head_ & mask_].item; }
   void pop() {
     ++head_;
@@ -243,28 +299,15 @@ class StreamIn : public InPort, private tlm::tlm_fw_transport_if<StreamProtocol<
   /// The cycle at which the head becomes visible; `never` for an empty queue.
   Cycle next_ready() const {
     if (head_ == tail_) return never;
-    return stalled() ? std::max(queue_[head_ & mask_].ready, clock_.domain->now() + 1) : queue_[head_ & mask_].ready;
-  }
-
-  /// Nothing ever arrives.
-  void stub() override {
-    stub_ = std::make_unique<Source>(sc_core::sc_gen_unique_name("stub"));
-    stub_->socket.bind(socket);
-    mark_connected();
+    const Cycle ready = queue_[head_ & mask_].ready;
+    return this->stalled() ? std::max(ready, clock_.domain->now() + 1) : ready;
   }
 
  private:
+  using InEnd<Item>::clock_;
   struct Entry {
     Cycle ready;
     Item item;
-  };
-  struct Source : sc_core::sc_module, tlm::tlm_bw_transport_if<StreamProtocol<Item>> {
-    explicit Source(const sc_core::sc_module_name& name) : sc_module(name), socket("socket") { socket.bind(*this); }
-    StreamInitiatorSocket<Item> socket;
-    tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>&, StreamPhase&, sc_core::sc_time&) override {
-      return tlm::TLM_ACCEPTED;
-    }
-    void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
   };
 
   void grant(unsigned credits) {
@@ -272,12 +315,12 @@ class StreamIn : public InPort, private tlm::tlm_fw_transport_if<StreamProtocol<
     payload.credits = credits;
     StreamPhase phase = StreamPhase::credit;
     sc_core::sc_time delay;
-    socket->nb_transport_bw(payload, phase, delay);
+    this->socket->nb_transport_bw(payload, phase, delay);
   }
 
   tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
     if (size() == depth_) {
-      throw SimulationFault(socket.name(), clock_.domain->now(), "an item arrived at a full queue");
+      throw SimulationFault(this->socket.name(), clock_.domain->now(), "an item arrived at a full queue");
     }
     Entry& entry = queue_[tail_ & mask_];
     entry.ready = clock_.domain->now() + latency_ + payload.latency;
@@ -287,10 +330,8 @@ class StreamIn : public InPort, private tlm::tlm_fw_transport_if<StreamProtocol<
     return tlm::TLM_ACCEPTED;
   }
   void b_transport(StreamPayload<Item>&, sc_core::sc_time&) override {
-    throw SimulationFault(socket.name(), clock_.domain->now(), "b_transport on a link of a clocked unit");
+    throw SimulationFault(this->socket.name(), clock_.domain->now(), "b_transport on a link of a clocked unit");
   }
-  bool get_direct_mem_ptr(StreamPayload<Item>&, tlm::tlm_dmi&) override { return false; }
-  unsigned transport_dbg(StreamPayload<Item>&) override { return 0; }
 
   std::vector<Entry> queue_;
   unsigned mask_ = 0;
@@ -298,7 +339,6 @@ class StreamIn : public InPort, private tlm::tlm_fw_transport_if<StreamProtocol<
   unsigned tail_ = 0;
   unsigned depth_ = 0;
   unsigned latency_ = 1;
-  std::unique_ptr<Source> stub_;
 };
 
 /// A proxy on a link that keeps every transfer with its cycle, and changes nothing.
@@ -322,13 +362,20 @@ class LinkRecorder : public sc_core::sc_module,
 
  private:
   tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase& phase, sc_core::sc_time& t) override {
-    records_.push_back({clock_.now(), *payload.item});
+    records_.push_back({payload.at == never ? clock_.now() : payload.at, *payload.item});
     return out->nb_transport_fw(payload, phase, t);
   }
   tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase& phase, sc_core::sc_time& t) override {
     return in->nb_transport_bw(payload, phase, t);
   }
-  void b_transport(StreamPayload<Item>& payload, sc_core::sc_time& t) override { out->b_transport(payload, t); }
+  void b_transport(StreamPayload<Item>& payload, sc_core::sc_time& t) override {
+    // The call returns only once what the item leads to has passed here, so its record comes first; the cycle in which
+    // it was taken is known afterwards.
+    const std::size_t index = records_.size();
+    records_.push_back({payload.at, *payload.item});
+    out->b_transport(payload, t);
+    records_[index].cycle = payload.at;
+  }
   bool get_direct_mem_ptr(StreamPayload<Item>&, tlm::tlm_dmi&) override { return false; }
   unsigned transport_dbg(StreamPayload<Item>&) override { return 0; }
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
@@ -339,8 +386,8 @@ class LinkRecorder : public sc_core::sc_module,
 
 /// Checks that the two ends carry the same item and are free; gives the receiving end.
 template <class Item>
-StreamIn<Item>& receiving_end(OutPort& out, InPort& in) {
-  auto* const typed = dynamic_cast<StreamIn<Item>*>(&in);
+InEnd<Item>& receiving_end(OutPort& out, InPort& in) {
+  auto* const typed = dynamic_cast<InEnd<Item>*>(&in);
   if (typed == nullptr) {
     throw UserError("cannot connect", out.name() + " to " + in.name(), "the ports carry different items",
                     "connect ports of the same item type");
@@ -353,8 +400,8 @@ StreamIn<Item>& receiving_end(OutPort& out, InPort& in) {
 }
 
 template <class Item>
-void StreamOut<Item>::connect(InPort& in, unsigned depth, unsigned latency) {
-  StreamIn<Item>& end = receiving_end<Item>(*this, in);
+void OutEnd<Item>::connect(InPort& in, unsigned depth, unsigned latency) {
+  InEnd<Item>& end = receiving_end<Item>(*this, in);
   end.configure(depth + pipeline_items_, latency);
   socket.bind(end.socket);
   mark_connected();
@@ -363,9 +410,9 @@ void StreamOut<Item>::connect(InPort& in, unsigned depth, unsigned latency) {
 
 /// The same through a recorder.
 template <class Item>
-void connect_recorded(StreamOut<Item>& out, InPort& in, LinkRecorder<Item>& recorder, unsigned depth = 4,
+void connect_recorded(OutEnd<Item>& out, InPort& in, LinkRecorder<Item>& recorder, unsigned depth = 4,
                       unsigned latency = 1) {
-  StreamIn<Item>& end = receiving_end<Item>(out, in);
+  InEnd<Item>& end = receiving_end<Item>(out, in);
   end.configure(depth + out.pipeline_items(), latency);
   out.socket.bind(recorder.in);
   recorder.out.bind(end.socket);

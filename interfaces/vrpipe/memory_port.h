@@ -15,7 +15,7 @@ namespace vrpipe {
 /// An initiator on the unmodified TLM-2.0 base protocol, for timing only: payloads carry addresses and lengths, data
 /// stays with the behaviours. Accesses are naturally aligned and a power of two long, checked in every build.
 /// Understands early completion, annotated delays and all four phases, so that any memory model binds.
-class MemoryPort : private tlm::tlm_bw_transport_if<> {
+class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_interface {
  public:
   /// @param in_flight most accesses at a time
   MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight);
@@ -24,7 +24,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<> {
   tlm::tlm_initiator_socket<32> socket;
 
   /// Whether another access can be issued now.
-  bool available() const { return !free_.empty() && !request_pending_; }
+  bool available() const { return !free_.empty() && requesting_ == nullptr; }
   /// Issues an access. Returns a ticket, which comes back from `next_completed`.
   unsigned read(std::uint64_t address, unsigned bytes) { return issue(tlm::TLM_READ_COMMAND, address, bytes); }
   unsigned write(std::uint64_t address, unsigned bytes) { return issue(tlm::TLM_WRITE_COMMAND, address, bytes); }
@@ -37,8 +37,8 @@ class MemoryPort : private tlm::tlm_bw_transport_if<> {
   std::uint64_t writes() const { return writes_; }
 
  private:
-  struct Slot {
-    tlm::tlm_generic_payload payload;
+  struct Slot : tlm::tlm_generic_payload {
+    unsigned ticket = 0;
     std::vector<unsigned char> data;
     bool answered = false;
   };
@@ -47,11 +47,13 @@ class MemoryPort : private tlm::tlm_bw_transport_if<> {
     unsigned ticket;
   };
   unsigned issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes);
-  void complete(unsigned ticket, const sc_core::sc_time& delay);
+  void complete(Slot& slot, const sc_core::sc_time& delay);
   Completion& completion(std::size_t place) { return completions_[place & (completions_.size() - 1)]; }
   tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override;
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
+  /// The last holder of a payload, port or memory, has released it.
+  void free(tlm::tlm_generic_payload* payload) override;
 
   const ClockHandle& clock_;
   std::vector<Slot> slots_;
@@ -59,7 +61,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<> {
   std::vector<Completion> completions_;  ///< a ring of a power of two, by cycle
   std::size_t completions_head_ = 0;
   std::size_t completions_count_ = 0;
-  bool request_pending_ = false;  ///< BEGIN_REQ without END_REQ yet
+  const Slot* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
   std::uint64_t reads_ = 0;
   std::uint64_t writes_ = 0;
 };

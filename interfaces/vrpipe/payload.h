@@ -153,6 +153,18 @@ constexpr unsigned owner_of(TileId tile, unsigned gpcs) {
   return gpcs == 1 ? 0 : (tile.x + tile.y * (gpcs / 2 + 1U)) % gpcs;
 }
 
+/// Whether a primitive may cover a pixel of a GPC's screen tiles; primitives go to those GPCs alone.
+inline bool concerns(const Primitive& primitive, unsigned gpcs, unsigned gpc) {
+  if (gpcs == 1) return true;
+  constexpr auto side = static_cast<int>(screen_tile_pixels);
+  for (int y = primitive.bounds.y0 / side; y <= (primitive.bounds.y1 - 1) / side; ++y) {
+    for (int x = primitive.bounds.x0 / side; x <= (primitive.bounds.x1 - 1) / side; ++x) {
+      if (owner_of({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, gpcs) == gpc) return true;
+    }
+  }
+  return false;
+}
+
 /// CROP to ZROP: signals of one cycle.
 struct TerminationBeat {
   static constexpr unsigned capacity = 4;

@@ -197,6 +197,22 @@ class CropBehaviour : public Behaviour {
   };
   /// Blends the live samples of a quad.
   virtual Outcome blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) = 0;
+
+  /// What the colour cache does for a quad. It sees the quads in the order of blending alone, so that which sectors move
+  /// does not depend on when; for shells that do not follow fills through the cache themselves.
+  struct CacheAccess {
+    std::uint32_t line = 0;        ///< of the cache, from 0
+    std::uint32_t sectors = 0;     ///< of the line that the quad needs, a bit each
+    std::uint32_t filled = 0;      ///< of these, not there yet
+    bool replaced = false;         ///< the line held something else, or nothing, before
+    std::uint32_t written_back = 0;  ///< dirty sectors of what it held
+    std::uint64_t address = 0;       ///< of the line, bytes
+    std::uint64_t old_address = 0;   ///< of what it held
+  };
+  /// Before the quad's `blend`, in the order of blending. Without a cache, nothing moves.
+  virtual CacheAccess look_up(TileId, unsigned /*position*/) { return {}; }
+  /// After a `blend` whose sectors are dirty for it.
+  virtual void make_dirty(const CacheAccess&) {}
   struct Cost {
     std::uint32_t quads_per_cycle;          ///< of this draw's format
     std::uint32_t input_quads;              ///< queue between tag look-up and blending

@@ -1,6 +1,8 @@
 #include "crop/crop.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include <vrpipe/registry.h>
 
@@ -8,7 +10,11 @@ namespace vrpipe {
 
 template <ColorFormat Format, BlendRounding Rounding>
 ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const RenderState& state)
-    : state_(state),
+    : signals_(state.early_termination),
+      // Passing an exclusive threshold is reaching the next float.
+      threshold_(state.termination_inclusive
+                     ? state.termination_threshold
+                     : std::nextafter(state.termination_threshold, std::numeric_limits<float>::infinity())),
       drops_late_(state.early_termination && state.termination == Termination::strict),
       checks_previous_(parameters.previous_alpha_check),
       cost_{std::clamp(parameters.bytes_per_cycle / (4 * bytes_per_pixel(Format)), 1U, ColorBeat::capacity),
@@ -21,6 +27,35 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
             parameters.mshrs,
             parameters.sectors_per_cycle,
             parameters.writes_unchanged} {}
+
+template <ColorFormat Format, BlendRounding Rounding>
+CropBehaviour::CacheAccess ColorRop<Format, Rounding>::look_up(TileId tile, unsigned position) {
+  if (!cache_) cache_ = make_crop_cache(cost_, *surface_);
+  return cache_->access(surface_->address(tile, position), 4 * bytes_per_pixel(Format), cost_.sector_bytes);
+}
+
+// Out of line, so that the common case stays short.
+template <ColorFormat Format, BlendRounding Rounding>
+void ColorRop<Format, Rounding>::count_trouble(TileId tile, unsigned position, LaneBits lanes, const QuadColor& color,
+                                               const QuadColor& destination, const QuadColor& stored) {
+  const QuadColor sum = blend_front_to_back(destination, color);
+  const LaneBits saturated =
+      lanes & ((sum.red > largest_color) | (sum.green > largest_color) | (sum.blue > largest_color));
+  colors_saturated += popcount(sign_mask(saturated));
+
+  const LaneBits swallowed = lanes & (stored.alpha == destination.alpha) & ~passes(stored.alpha);
+  if (sign_mask(swallowed) == 0) return;
+  const std::uint32_t tiles_x = (surface_->width() + screen_tile_pixels - 1) / screen_tile_pixels;
+  const std::uint32_t tiles_y = (surface_->height() + screen_tile_pixels - 1) / screen_tile_pixels;
+  if (swallowed_.empty()) swallowed_.assign(std::size_t{tiles_x} * tiles_y * positions_per_tile, splat_lanes(1.0F));
+  Lanes& transmittance = swallowed_[(std::size_t{tile.y} * tiles_x + tile.x) * positions_per_tile + position];
+  fragments_swallowed += popcount(sign_mask(swallowed));
+  transmittance = select(swallowed, transmittance * (1.0F - color.alpha), transmittance);
+  const LaneBits stuck = passes(1.0F - (1.0F - stored.alpha) * transmittance) & (transmittance >= 0.0F) & swallowed;
+  if (sign_mask(stuck) == 0) return;
+  pixels_stuck += popcount(sign_mask(stuck));
+  transmittance = select(stuck, splat_lanes(-1.0F), transmittance);
+}
 
 template <ColorFormat Format, BlendRounding Rounding>
 CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(TileId tile, unsigned position, LaneMask live,
@@ -52,9 +87,15 @@ CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(TileId tile, unsigned p
       (bits_of(blended.red) ^ bits_of(destination.red)) | (bits_of(blended.green) ^ bits_of(destination.green)) |
       (bits_of(blended.blue) ^ bits_of(destination.blue)) | (bits_of(blended.alpha) ^ bits_of(destination.alpha));
   const bool changed = sign_mask(difference != 0) != 0;
+  const LaneBits passed = passes(blended.alpha);
+  LaneBits trouble = (blended.alpha == previous) & ~passed;
+  if constexpr (largest_color < std::numeric_limits<float>::infinity()) {
+    trouble |= (blended.red >= largest_color) | (blended.green >= largest_color) | (blended.blue >= largest_color);
+  }
+  if (sign_mask(trouble & lanes) != 0) count_trouble(tile, position, lanes, color, destination, blended);
   destination = blended;
-  if (!state_.early_termination) return {0, changed};
-  LaneBits terminated = passes(destination.alpha) & lanes;
+  if (!signals_) return {0, changed};
+  LaneBits terminated = passed & lanes;
   if (checks_previous_) terminated &= ~passes(previous);
   const LaneMask signalled = sign_mask(terminated);
   if (signalled != 0) ++termination_signals;

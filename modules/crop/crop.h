@@ -1,5 +1,10 @@
 #pragma once
 
+#include <limits>
+#include <vector>
+
+#include "crop/crop_cache.h"
+
 #include <vrpipe/parameter.h>
 #include <vrpipe/units.h>
 
@@ -36,6 +41,8 @@ class ColorRop : public CropBehaviour {
   ColorRop(const CropParameters& parameters, const RenderState& state);
 
   Outcome blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) override;
+  CacheAccess look_up(TileId tile, unsigned position) override;
+  void make_dirty(const CacheAccess& access) override { cache_->dirty(access.line, access.sectors); }
   Cost cost() const override { return cost_; }
 
   Counter quads_blended{*this, "quads_blended", "quads", "blended"};
@@ -44,17 +51,30 @@ class ColorRop : public CropBehaviour {
   Counter fragments_dropped_late{*this, "fragments_dropped_late", "fragments", "whose pixel CROP finds terminated (strict)"};
   Counter quads_late_failed{*this, "quads_late_failed", "quads", "that fail a late depth or stencil test"};
   Counter fragments_late_failed{*this, "fragments_late_failed", "fragments", "that fail a late depth or stencil test"};
+  Counter fragments_swallowed{*this, "fragments_swallowed", "fragments",
+                              "below the threshold whose alpha rounding left nothing of"};
+  Counter pixels_stuck{*this, "pixels_stuck", "pixels",
+                       "below the threshold that the swallowed fragments would have taken past it"};
+  Counter colors_saturated{*this, "colors_saturated", "fragments", "that took a colour beyond the format's largest"};
   Counter termination_signals{*this, "termination_signals", "signals", "sent to ZROP, one for a quad's pixels"};
 
  private:
-  LaneBits passes(Lanes alpha) const {
-    return state_.termination_inclusive ? alpha >= state_.termination_threshold : alpha > state_.termination_threshold;
-  }
+  static constexpr float largest_color = Format == ColorFormat::rgba8      ? 1.0F
+                                         : Format == ColorFormat::rgba16f ? half_max
+                                                                          : std::numeric_limits<float>::infinity();
 
-  const RenderState& state_;
+  LaneBits passes(Lanes alpha) const { return alpha >= threshold_; }
+  void count_trouble(TileId tile, unsigned position, LaneBits lanes, const QuadColor& color,
+                     const QuadColor& destination, const QuadColor& stored);
+
+  const bool signals_;
+  const float threshold_;  ///< that alpha reaches to be terminated
+  /// By quad, once a fragment was swallowed: transmittance of those swallowed; negative once counted as stuck.
+  std::vector<Lanes> swallowed_;
   const bool drops_late_;
   const bool checks_previous_;
   Cost cost_;
+  std::unique_ptr<CropCache> cache_;  ///< once looked up here; the clocked shell has one of its own
 };
 
 }  // namespace vrpipe

@@ -53,4 +53,33 @@ CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dir
   return line;
 }
 
+CropBehaviour::CacheAccess CropCache::access(std::uint64_t address, std::uint32_t bytes, std::uint32_t sector_bytes) {
+  CropBehaviour::CacheAccess access;
+  const std::uint64_t offset = address & ((std::uint64_t{1} << line_shift_) - 1);
+  const auto sector_shift = static_cast<unsigned>(__builtin_ctz(sector_bytes));
+  const auto first = static_cast<unsigned>(offset >> sector_shift);
+  const auto last = static_cast<unsigned>((offset + bytes - 1) >> sector_shift);
+  access.address = address - offset;
+  access.line = find(address);
+  if (access.line == no_line) {
+    access.replaced = true;
+    access.line = allocate(address, access.written_back, access.old_address);
+  } else if (access.line != newest_) {
+    unlink(access.line);
+    make_newest(access.line);
+  }
+  for (unsigned sector = first; sector <= last; ++sector) access.sectors |= 1U << sector;
+  Entry& entry = lines_[access.line];
+  access.filled = access.sectors & ~entry.present;
+  entry.present |= access.sectors;
+  return access;
+}
+
+std::unique_ptr<CropCache> make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface) {
+  if (cost.line_bytes < 4 * bytes_per_pixel(surface.format())) {
+    throw UserError("unusable CROP cache", "crop.line_bytes", "a line is smaller than a quad", "use longer lines");
+  }
+  return std::make_unique<CropCache>(cost.cache_bytes, cost.line_bytes, cost.sector_bytes, surface.size_bytes());
+}
+
 }  // namespace vrpipe

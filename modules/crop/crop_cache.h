@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
+
+#include <vrpipe/units.h>
 
 namespace vrpipe {
 
@@ -35,6 +38,10 @@ class CropCache {
   void add_sector(Line line, unsigned sector) { lines_[line].present |= 1U << sector; }
   void dirty(Line line, std::uint32_t sectors) { lines_[line].dirty |= sectors; }
 
+  /// All at once for bytes that lie in one line: looks it up, allocates and fills. Lines go in the same order as with
+  /// pins, since the line that was looked up the longest ago is the first to lose its last pin.
+  CropBehaviour::CacheAccess access(std::uint64_t address, std::uint32_t bytes, std::uint32_t sector_bytes);
+
  private:
   struct Entry {
     std::uint64_t tag = 0;
@@ -54,5 +61,8 @@ class CropCache {
   std::vector<Entry> lines_;
   std::vector<Line> line_of_tag_;
 };
+
+/// The cache of a CROP for its surface. Throws UserError for sizes that cannot be.
+std::unique_ptr<CropCache> make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface);
 
 }  // namespace vrpipe

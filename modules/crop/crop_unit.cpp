@@ -54,12 +54,9 @@ class CropUnit : public Unit {
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     sector_shift_ = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
     bytes_per_quad_ = 4 * bytes_per_pixel(surface->format());
-    cache_ = std::make_unique<CropCache>(cost_.cache_bytes, cost_.line_bytes, cost_.sector_bytes, surface->size_bytes());
+    cache_ = make_crop_cache(cost_, *surface);
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
     pending_.assign(cost_.cache_bytes / cost_.line_bytes, 0);
-    if (cost_.line_bytes < bytes_per_quad_) {
-      throw UserError("unusable CROP cache", "crop.line_bytes", "a line is smaller than a quad", "use longer lines");
-    }
   }
 
   static constexpr std::uint32_t run_of(unsigned sectors) { return sectors == 32 ? ~0U : (1U << sectors) - 1; }

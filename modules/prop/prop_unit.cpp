@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <queue>
+#include <deque>
 
 #include <vrpipe/unit.h>
 
@@ -43,11 +43,6 @@ class PropUnit : public Unit {
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  struct LaterFirst {
-    bool operator()(const ShadedWarp* a, const ShadedWarp* b) const { return a->sequence > b->sequence; }
-  };
-  using BySequence = std::priority_queue<const ShadedWarp*, std::vector<const ShadedWarp*>, LaterFirst>;
-
   std::uint32_t& next_of_tile(TileId tile) { return next_of_tile_[std::size_t{tile.y} * tiles_x_ + tile.x]; }
 
   bool is_next(const ShadedWarp& warp) {
@@ -90,7 +85,7 @@ class PropUnit : public Unit {
       if (warp->end_of_draw) {
         end_ = warp;
       } else if (is_next(*warp)) {
-        in_turn_.push(warp);
+        in_turn_.push_back(warp);
       } else {
         early_by_bucket_[bucket_of(*warp)].push_back(warp);
         ++early_;
@@ -115,7 +110,7 @@ class PropUnit : public Unit {
                                                                    : bucket_of(left)];
     for (std::size_t i = 0; i < bucket.size(); ++i) {
       if (!is_next(*bucket[i])) continue;
-      in_turn_.push(bucket[i]);
+      in_turn_.push_back(bucket[i]);
       bucket[i] = bucket.back();
       bucket.pop_back();
       --early_;
@@ -131,8 +126,8 @@ class PropUnit : public Unit {
       if (current_ == nullptr) {
         if (in_turn_.empty()) break;
         if (out_release_.credits() == 0) break;
-        current_ = in_turn_.top();
-        in_turn_.pop();
+        current_ = in_turn_.front();
+        in_turn_.pop_front();
         index_ = 0;
       }
       if (index_ < current_->count) {
@@ -209,7 +204,7 @@ class PropUnit : public Unit {
   std::uint32_t next_sequence_ = 0;
   std::array<std::vector<const ShadedWarp*>, 256> early_by_bucket_;  ///< shaded before their turn
   std::size_t early_ = 0;
-  BySequence in_turn_;
+  std::deque<const ShadedWarp*> in_turn_;  ///< whose turn has come, in the order in which it came
   const ShadedWarp* current_ = nullptr;  ///< being handed to CROP, from `index_` on
   std::uint8_t index_ = 0;
   const ShadedWarp* end_ = nullptr;

@@ -52,6 +52,7 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   const std::int64_t step = std::int64_t{1} << state_.subpixel_bits;
   const std::int64_t half = step / 2;
   wide_ = false;
+  std::int64_t magnitudes = 1;  // the bits of all of them together are those of the largest
   for (unsigned i = 0; i < 3; ++i) {
     const unsigned j = (i + 1) % 3;
     // Positive inside, y down: E(x, y) = (xj - xi)(y - yi) - (yj - yi)(x - xi).
@@ -65,8 +66,10 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
     const bool top_left = (down == 0 && across > 0) || down < 0;
     edge.origin = across * (half - t.y[i]) - down * (half - t.x[i]) - (top_left ? 0 : 1);
     if (std::abs(edge.dx) + std::abs(edge.dy) > narrow_gradient) wide_ = true;
+    magnitudes |= std::abs(edge.origin) + std::abs(edge.dx) * width + std::abs(edge.dy) * height;
   }
   if (wide_) ++wide_edges;
+  widest_edge.see(static_cast<std::uint64_t>(65 - __builtin_clzll(static_cast<unsigned long long>(magnitudes))));
 }
 
 bool TileRasterizer::advance() {

@@ -39,6 +39,8 @@ class TileRasterizer : public RasterBehaviour {
   Counter raster_tiles_tested{*this, "raster_tiles_tested", "raster tiles", "by coarse rasterisation"};
   Counter raster_tiles_kept{*this, "raster_tiles_kept", "raster tiles", "handed to fine rasterisation"};
   Counter screen_tile_pairs{*this, "screen_tile_pairs", "pairs", "of a primitive and a screen tile that it may cover"};
+  Extreme widest_edge{*this, Extreme::Of::largest, "widest_edge", "bits",
+                      "sign included, that the largest edge function needs over the samples of the viewport"};
   Counter wide_edges{*this, "wide_edges", "primitives", "that need 64-bit edge functions inside a raster tile"};
 
  private:

@@ -11,6 +11,11 @@ namespace vrpipe {
 namespace {
 constexpr float alpha_max = 0.99F;
 constexpr float half_log2_e = 0.72134752F;
+// Of the axes' determinant, px^2: below it the inverse overflows, and flushing denormals would decide.
+constexpr float smallest_determinant = 1e-30F;
+
+/// What a colour target of 16 bits can hold; NaN gives 0.
+float clamp_color(float value) { return std::min(std::max(0.0F, value), half_max); }
 }  // namespace
 
 SplatShader::SplatShader(const Parameters& parameters, const RenderState& state) : state_(state) {
@@ -35,9 +40,10 @@ void SplatShader::load(std::uint32_t index) {
   const Splat& splat = state_.draw->splats[index];
   const float determinant = splat.ax * splat.by - splat.ay * splat.bx;
   // A splat without extent has alpha = opacity wherever it is rasterised at all.
-  const float scale = determinant != 0.0F ? splat.r / determinant : 0.0F;
+  const float scale = std::fabs(determinant) >= smallest_determinant ? splat.r / determinant : 0.0F;
   const float largest = std::max({splat.red, splat.green, splat.blue});
-  if (largest > half_max) ++colors_clamped;
+  const float least = std::min({splat.red, splat.green, splat.blue});
+  if (!(least >= 0.0F && largest <= half_max)) ++colors_clamped;
   attributes_ = {splat.cx,
                  splat.cy,
                  splat.by * scale,
@@ -45,9 +51,9 @@ void SplatShader::load(std::uint32_t index) {
                  -splat.ay * scale,
                  splat.ax * scale,
                  splat.opacity,
-                 std::min(splat.red, half_max),
-                 std::min(splat.green, half_max),
-                 std::min(splat.blue, half_max)};
+                 clamp_color(splat.red),
+                 clamp_color(splat.green),
+                 clamp_color(splat.blue)};
 }
 
 template <Exponential Kind>
@@ -62,7 +68,8 @@ LaneMask SplatShader::shade_quad(TileId tile, const Quad& quad, QuadColor& out) 
   const Lanes v = dx * splat.m10 + dy * splat.m11;
   const Lanes squared = u * u + v * v;
   Lanes alpha = shader_exp2<Kind>(squared * -half_log2_e) * splat.opacity;
-  alpha = select(alpha < alpha_max, alpha, splat_lanes(alpha_max));
+  // So written that NaN stays NaN, and the next test prunes it.
+  alpha = select(alpha > alpha_max, splat_lanes(alpha_max), alpha);
   const LaneBits kept = (alpha >= state_.pruning_threshold) & expand_mask(quad.coverage);
   alpha = lanes_of(bits_of(alpha) & kept);
   out = {alpha * splat.red, alpha * splat.green, alpha * splat.blue, alpha};

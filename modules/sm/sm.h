@@ -53,7 +53,7 @@ class SplatShader : public SmBehaviour {
   Counter fragments_merged{*this, "fragments_merged", "fragments", "taken away by merging, where both are live"};
   Counter fragment_warps{*this, "fragment_warps", "warps", "of fragments"};
   Counter vertex_warps{*this, "vertex_warps", "warps", "of vertices"};
-  Counter colors_clamped{*this, "colors_clamped", "splats", "set-ups of a splat with a colour beyond the largest half"};
+  Counter colors_clamped{*this, "colors_clamped", "splats", "set-ups of a splat with a colour below 0 or beyond the largest half"};
 
  private:
   /// What the fragment shader needs of a splat.

@@ -67,6 +67,7 @@ class SmUnit : public Unit {
         wheel_(horizon()),
         schedulers_(std::size_t{cost_.cores} * cost_.schedulers_per_core) {
     fragment_slots_ = cost_.cores * cost_.warps_per_core;
+    free_slots_ = fragment_slots_;
     flights_.resize(fragment_slots_ + cost_.vertex_warps);
     free_of_core_.resize(cost_.cores);
     for (std::uint32_t core = 0; core < cost_.cores; ++core) {
@@ -187,6 +188,7 @@ class SmUnit : public Unit {
       const std::uint32_t slot = in_release_.front().slot;
       if (slot == no_slot) continue;
       free_of_core_[slot / cost_.warps_per_core].push_back(slot);
+      ++free_slots_;
       --in_flight_;
     }
   }
@@ -204,13 +206,12 @@ class SmUnit : public Unit {
 
   bool choose_core(TileId tile) {
     if (tile == last_tile_ && sent_to_core_ < cost_.warps_to_one_core && !free_of_core_[core_].empty()) return true;
-    for (std::uint32_t tried = 0; tried < cost_.cores; ++tried) {
+    if (free_slots_ == 0) return false;
+    do {
       core_ = core_ + 1 == cost_.cores ? 0 : core_ + 1;
-      if (free_of_core_[core_].empty()) continue;
-      sent_to_core_ = 0;
-      return true;
-    }
-    return false;
+    } while (free_of_core_[core_].empty());
+    sent_to_core_ = 0;
+    return true;
   }
 
   void launch_fragments(Cycle now) {
@@ -236,6 +237,7 @@ class SmUnit : public Unit {
     ++sent_to_core_;
     const std::uint32_t slot = free_of_core_[core_].back();
     free_of_core_[core_].pop_back();
+    --free_slots_;
     Flight& flight = flights_[slot];
     flight.program = warp.merge_pairs != 0 ? &merged_ : &cost_.fragment;
     flight.segment = 0;
@@ -303,6 +305,7 @@ class SmUnit : public Unit {
   std::uint32_t fragment_slots_ = 0;
   std::vector<Flight> flights_;  ///< fragment slots, core by core, then vertex slots
   std::vector<std::vector<std::uint32_t>> free_of_core_;
+  std::uint32_t free_slots_ = 0;  ///< of all cores
   std::deque<std::uint32_t> vertex_order_;
   std::deque<const ShadedWarp*> completed_;
   std::deque<ShadedWarp> pool_;

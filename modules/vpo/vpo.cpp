@@ -1,14 +1,45 @@
 #include "vpo/vpo.h"
 
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
 #include <vrpipe/geometry.h>
 #include <vrpipe/registry.h>
 
 namespace vrpipe {
 
+namespace {
+
+/// The positions alone would let a NaN colour or opacity through to the colour target.
+bool is_finite(const Splat& splat) {
+  const float fields[] = {splat.cx, splat.cy,  splat.ax,    splat.ay,   splat.bx,     splat.by,
+                          splat.r,  splat.red, splat.green, splat.blue, splat.opacity};
+  return std::all_of(std::begin(fields), std::end(fields), [](float field) { return std::isfinite(field); });
+}
+
+/// In millionths of a square pixel.
+std::uint64_t determinant(const Splat& splat) {
+  const double area = std::fabs(static_cast<double>(splat.ax) * static_cast<double>(splat.by) -
+                                static_cast<double>(splat.ay) * static_cast<double>(splat.bx));
+  const double squared_extent = static_cast<double>(splat.r) * static_cast<double>(splat.r);
+  if (!(area > 0) || !(squared_extent > 0)) return 0;
+  return static_cast<std::uint64_t>(std::min(area / squared_extent * 1e6, 1e18));
+}
+
+}  // namespace
+
 PrimitiveAssembly::PrimitiveAssembly(const Parameters& parameters, const RenderState& state)
     : state_(state), triangles_per_cycle_(parameters.triangles_per_cycle), latency_cycles_(parameters.latency_cycles) {}
 
 unsigned PrimitiveAssembly::assemble(std::uint32_t splat, std::array<Primitive, 2>& out) {
+  const Splat& given = state_.draw->splats[splat];
+  if (!is_finite(given)) {
+    ++dropped_not_finite;
+    return 0;
+  }
+  // A splat at opacity 1/255 has no extent by design, and triangles of their own have no axes.
+  if (given.r > 0 && state_.draw->triangles.empty()) smallest_determinant.see(determinant(given));
   unsigned count = 0;
   for (unsigned triangle = 0; triangle < triangles_per_splat(*state_.draw); ++triangle) {
     SnappedTriangle snapped;

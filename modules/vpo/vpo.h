@@ -24,7 +24,11 @@ class PrimitiveAssembly : public VpoBehaviour {
   Counter primitives{*this, "primitives", "triangles", "triangles handed to the GPCs"};
   Counter culled_zero_area{*this, "culled_zero_area", "triangles", "without area after snapping"};
   Counter culled_outside{*this, "culled_outside", "triangles", "that cover no sample of the viewport's pixels"};
-  Counter dropped_not_finite{*this, "dropped_not_finite", "splats", "with a vertex that is NaN or cannot be cut to the guard band"};
+  Counter dropped_not_finite{*this, "dropped_not_finite", "splats",
+                             "with a NaN or infinite attribute, or a vertex that cannot be cut to the guard band"};
+  Extreme smallest_determinant{*this, Extreme::Of::smallest, "smallest_determinant", "1e-6 px^2",
+                               "of a splat's axes in sigmas, the product of its standard deviations; the projection's "
+                               "dilation leaves 300000 or more, 0 is a splat without area"};
 
  private:
   const RenderState& state_;

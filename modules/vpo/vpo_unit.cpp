@@ -4,16 +4,6 @@ namespace vrpipe {
 
 namespace {
 
-bool touches_tile_of(const Primitive& primitive, unsigned gpcs, unsigned gpc) {
-  constexpr auto side = static_cast<int>(screen_tile_pixels);
-  for (int y = primitive.bounds.y0 / side; y <= (primitive.bounds.y1 - 1) / side; ++y) {
-    for (int x = primitive.bounds.x0 / side; x <= (primitive.bounds.x1 - 1) / side; ++x) {
-      if (owner_of({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, gpcs) == gpc) return true;
-    }
-  }
-  return false;
-}
-
 /// VPO at cycle fidelity. Takes the GPCs' vertex warps in turn, which is draw order, and sends each primitive to every
 /// GPC that owns a screen tile of its bounding box.
 /// Ports: in_vertices_<gpc> (VertexWarp), out_primitives_<gpc> (PrimitiveItem).
@@ -45,7 +35,7 @@ class VpoUnit : public Unit {
     return true;
   }
   bool wanted(const PrimitiveItem& item, unsigned gpc) const {
-    return gpcs_ == 1 || item.end_of_draw || touches_tile_of(item.primitive, gpcs_, gpc);
+    return item.end_of_draw || concerns(item.primitive, gpcs_, gpc);
   }
   Cycle retry() const {
     Cycle at = never;

@@ -50,6 +50,40 @@ TEST(Exp2, NeverRisesByMoreThanAnUlpAsAFragmentMovesOutward) {
   }
 }
 
+template <Exponential Kind>
+double worst_relative_error() {
+  double worst = 0;
+  for (int i = 0; i <= 100'000; ++i) {
+    const float x = -8.0F * static_cast<float>(i) / 100'000.0F;  // alpha from 1 to 1/256
+    const double exact = std::exp2(static_cast<double>(x));
+    worst = std::fmax(worst, std::fabs(static_cast<double>(shader_exp2<Kind>(splat_lanes(x))[0]) - exact) / exact);
+  }
+  return worst;
+}
+
+// case Q06
+TEST(ShaderExp2, EachVariantHasTheErrorOfItsMake) {
+  EXPECT_LE(worst_relative_error<Exponential::exact>(), 0x1.01p-24);
+  EXPECT_LE(worst_relative_error<Exponential::ex2>(), 2 * 0x1p-23);
+  EXPECT_LE(worst_relative_error<Exponential::fp16>(), 1.01 * 0x1p-11);
+  EXPECT_LE(worst_relative_error<Exponential::table256>(), 1.01 * std::log(2.0) / 512);  // half a step of the table
+  EXPECT_LE(worst_relative_error<Exponential::table16>(), 1.03 * std::log(2.0) / 32);
+  EXPECT_GT(worst_relative_error<Exponential::table256>(), worst_relative_error<Exponential::fp16>());
+}
+
+// case Q06
+TEST(ShaderExp2, TablesNeverRiseAsAFragmentMovesOutward) {
+  float previous[2] = {1, 1};
+  for (int i = 0; i <= 200'000; ++i) {
+    const Lanes x = splat_lanes(-10.0F * static_cast<float>(i) / 200'000.0F);
+    const float now[2] = {shader_exp2<Exponential::table256>(x)[0], shader_exp2<Exponential::table16>(x)[0]};
+    for (int k = 0; k < 2; ++k) {
+      ASSERT_LE(now[k], previous[k]);
+      previous[k] = now[k];
+    }
+  }
+}
+
 TEST(Exp2, WholePowersAreExact) {
   for (int n = 0; n <= 126; ++n) ASSERT_EQ(exp2_of(static_cast<float>(-n)), std::ldexp(1.0F, -n));
 }

@@ -61,6 +61,8 @@ class FourPhaseMemory : public sc_core::sc_module, private tlm::tlm_fw_transport
     SC_THREAD(serve);
   }
   tlm::tlm_target_socket<32> socket;
+  /// How long it keeps a payload after the response.
+  void hold(sc_core::sc_time time) { hold_ = time; }
   unsigned begin_requests = 0, end_responses = 0;
   bool overlapped_requests = false;
 
@@ -70,6 +72,7 @@ class FourPhaseMemory : public sc_core::sc_module, private tlm::tlm_fw_transport
       overlapped_requests = overlapped_requests || request_open_;
       request_open_ = true;
       ++begin_requests;
+      payload.acquire();
       queue_.push_back(&payload);
       arrived_.notify(sc_core::SC_ZERO_TIME);
       return tlm::TLM_ACCEPTED;
@@ -93,13 +96,15 @@ class FourPhaseMemory : public sc_core::sc_module, private tlm::tlm_fw_transport
       delay = sc_core::SC_ZERO_TIME;
       const tlm::tlm_sync_enum status = socket->nb_transport_bw(*payload, phase, delay);
       if (status == tlm::TLM_COMPLETED || phase == tlm::END_RESP) ++end_responses;
+      wait(hold_);
+      payload->release();
     }
   }
   void b_transport(tlm::tlm_generic_payload&, sc_core::sc_time&) override {}
   bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
   unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
 
-  sc_core::sc_time accept_, latency_;
+  sc_core::sc_time accept_, latency_, hold_;
   sc_core::sc_event arrived_;
   std::deque<tlm::tlm_generic_payload*> queue_;
   bool request_open_ = false;
@@ -221,6 +226,15 @@ TEST_F(MemoryPortTest, TheNextRequestWaitsForTheEndOfTheLast) {
   EXPECT_EQ(reader.issued, (std::vector<Cycle>{0, 7}));
 }
 
+TEST_F(MemoryPortTest, APayloadThatTheMemoryStillHoldsIsNotUsedAgain) {
+  Reader reader("reader", *clock, 1, 2);
+  FourPhaseMemory memory("memory", cycles(2), cycles(8));
+  memory.hold(cycles(20));
+  reader.memory.socket.bind(memory.socket);
+  sc_core::sc_start();
+  EXPECT_EQ(reader.issued, (std::vector<Cycle>{0, 31})) << "released at 30";
+}
+
 class EarlyCompletion : public MemoryPortTest, public ::testing::WithParamInterface<ImmediateMemory::Way> {};
 
 TEST_P(EarlyCompletion, IsSeenAfterTheAnnotatedDelay) {
@@ -254,7 +268,7 @@ TEST_F(MemoryPortTest, AnErrorResponseIsAFault) {
   Reader reader("reader", *clock, 1, 1);
   ImmediateMemory memory("memory", ImmediateMemory::Way::error, sc_core::SC_ZERO_TIME);
   reader.memory.socket.bind(memory.socket);
-  EXPECT_THROW(sc_core::sc_start(), SimulationFault);
+  EXPECT_THROW(clock->run(cycles(100)), SimulationFault);
 }
 
 TEST_F(MemoryPortTest, AnAccessThatIsNotNaturallyAlignedIsRefused) {

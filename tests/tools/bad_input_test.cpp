@@ -128,7 +128,8 @@ TEST_F(BadInput, Cameras) {
   refused_with_outputs({"run", "--scene", "good.ply", "--camera", "cameras.json#1"}, {"cameras.json", "1"});
   refused_with_outputs({"run", "--scene", "good.ply", "--camera", "cameras.json#x"}, {"cameras.json", "x"});
   refused_with_outputs({"run", "--scene", "good.ply", "--camera", "broken.json"}, {"broken.json"});
-  refused_with_outputs({"run", "--scene", "good.ply", "--camera", "cameras.json", "--eye", "1,2,3"}, {"--eye", "--camera"});
+  refused_with_outputs({"run", "--scene", "good.ply", "--camera", "cameras.json", "--eye", "1,2,3"},
+                       {"--eye", "--camera"});
 }
 
 TEST_F(BadInput, Machines) {

@@ -11,7 +11,8 @@ namespace {
 class CommandLine : public ToolTest {};
 
 void expect_in(const std::string& text, const std::vector<std::string>& parts) {
-  for (const std::string& part : parts) EXPECT_NE(text.find(part), std::string::npos) << part << " is not in:\n" << text;
+  for (const std::string& part : parts)
+    EXPECT_NE(text.find(part), std::string::npos) << part << " is not in:\n" << text;
 }
 
 TEST_F(CommandLine, VersionAndHelp) {
@@ -25,11 +26,32 @@ TEST_F(CommandLine, VersionAndHelp) {
 }
 
 TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
-  const std::vector<std::string> shared{"--scene",  "--size",     "--camera", "--eye",         "--look-at",    "--up",
-                                        "--fovy",   "--platform", "--set",    "--unit",        "--plugin",     "--fidelity",
-                                        "--format", "--termination", "--background", "--output", "--json", "--save-draw",
-                                        "default: agx-orin", "default: cycle", "default: rgba16f", "default: paper",
-                                        "default: 0,0,0", "pixels", "DEGREES", "Examples:"};
+  const std::vector<std::string> shared{"--scene",
+                                        "--size",
+                                        "--camera",
+                                        "--eye",
+                                        "--look-at",
+                                        "--up",
+                                        "--fovy",
+                                        "--platform",
+                                        "--set",
+                                        "--unit",
+                                        "--plugin",
+                                        "--fidelity",
+                                        "--format",
+                                        "--termination",
+                                        "--background",
+                                        "--output",
+                                        "--json",
+                                        "--save-draw",
+                                        "default: agx-orin",
+                                        "default: cycle",
+                                        "default: rgba16f",
+                                        "default: paper",
+                                        "default: 0,0,0",
+                                        "pixels",
+                                        "DEGREES",
+                                        "Examples:"};
   for (const char* command : {"run", "compare"}) {
     const Finished help = vrpipe({command, "--help"});
     EXPECT_EQ(help.code, 0);
@@ -92,10 +114,32 @@ TEST_F(CommandLine, CompareReportsWhatAResearcherWants) {
   const Finished finished = vrpipe({"compare", "--scene", "tiny.spl"});
   EXPECT_EQ(finished.code, 0);
   EXPECT_EQ(finished.err, "");
-  expect_in(finished.out,
-            {"tiny.spl, 48x40", "agx-orin", "baseline", "het+qm", "cycles", "simulated ms", "speed-up over baseline", "1.00x",
-             "fragments", "quads", "terminated", "merged away", "blended, reduction", "warps", "utilization", "raster",
-             "zrop", "prop", "sm", "crop", "l2", "host seconds", "early-termination ratio", "24.92 KB", "24.25 KB", "688 B"});
+  expect_in(finished.out, {"tiny.spl, 48x40",
+                           "agx-orin",
+                           "baseline",
+                           "het+qm",
+                           "cycles",
+                           "simulated ms",
+                           "speed-up over baseline",
+                           "1.00x",
+                           "fragments",
+                           "quads",
+                           "terminated",
+                           "merged away",
+                           "blended, reduction",
+                           "warps",
+                           "utilization",
+                           "raster",
+                           "zrop",
+                           "prop",
+                           "sm",
+                           "crop",
+                           "l2",
+                           "host seconds",
+                           "early-termination ratio",
+                           "24.92 KB",
+                           "24.25 KB",
+                           "688 B"});
   // No terminal: no colours, nothing but ASCII.
   for (const char c : finished.out) ASSERT_TRUE(c == '\n' || (c >= ' ' && c <= '~')) << finished.out;
   EXPECT_EQ(finished.out.find("rejected"), std::string::npos);
@@ -116,7 +160,8 @@ TEST_F(CommandLine, ProgressIsDrawnOnATerminalAndErased) {
   ::close(slave);
   std::string drawn;
   char buffer[4096];
-  for (ssize_t count; (count = ::read(master, buffer, sizeof buffer)) > 0;) drawn.append(buffer, static_cast<std::size_t>(count));
+  for (ssize_t count; (count = ::read(master, buffer, sizeof buffer)) > 0;)
+    drawn.append(buffer, static_cast<std::size_t>(count));
   ::close(master);
   EXPECT_EQ(finished.code, 0);
   expect_in(drawn, {"baseline", "het+qm", "%"});

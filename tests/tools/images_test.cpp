@@ -68,25 +68,43 @@ class Images : public ToolTest {};
 
 TEST_F(Images, PngIsOverTheBackgroundClampedAndRoundedToNearest) {
   tools::SharedImage image(3, 2);
-  const std::vector<float> pixels{
-      0, 0, 0, 0,                                                     // all background
-      0.5F, 0.25F, 0, 1,                                              // all image
-      0.2F, 0.1F, 0.05F, 0.5F,                                        // half of each
-      2, -1, std::numeric_limits<float>::quiet_NaN(), 1,              // clamped; NaN is black
-      std::numeric_limits<float>::infinity(), 100.4F / 255, 100.6F / 255, 1,  //
-      1, 1, 1, 1};
+  const std::vector<float> pixels{0,
+                                  0,
+                                  0,
+                                  0,  // all background
+                                  0.5F,
+                                  0.25F,
+                                  0,
+                                  1,  // all image
+                                  0.2F,
+                                  0.1F,
+                                  0.05F,
+                                  0.5F,  // half of each
+                                  2,
+                                  -1,
+                                  std::numeric_limits<float>::quiet_NaN(),
+                                  1,  // clamped; NaN is black
+                                  std::numeric_limits<float>::infinity(),
+                                  100.4F / 255,
+                                  100.6F / 255,
+                                  1,  //
+                                  1,
+                                  1,
+                                  1,
+                                  1};
   std::copy(pixels.begin(), pixels.end(), image.values());
   const Png png = read_png(write("image.png", tools::encode_png(image, {1.0F, 0.5F, 0.0F})));
   EXPECT_EQ(png.width, 3U);
   EXPECT_EQ(png.height, 2U);
-  const std::vector<std::uint8_t> expected{255, 128, 0,   128, 64,  0,   179, 89,  13,
-                                           255, 0,   0,   255, 100, 101, 255, 255, 255};
+  const std::vector<std::uint8_t> expected{255, 128, 0, 128, 64,  0,   179, 89,  13,
+                                           255, 0,   0, 255, 100, 101, 255, 255, 255};
   EXPECT_EQ(png.rgb, expected);
 }
 
 TEST_F(Images, ExrKeepsEveryBit) {
   tools::SharedImage image(5, 3);
-  for (std::size_t i = 0; i < 60; ++i) image.values()[i] = std::ldexp(1.0F + static_cast<float>(i) / 64, 7 - static_cast<int>(i));
+  for (std::size_t i = 0; i < 60; ++i)
+    image.values()[i] = std::ldexp(1.0F + static_cast<float>(i) / 64, 7 - static_cast<int>(i));
   const Exr exr = read_exr(write("image.exr", tools::encode_exr(image)));
   ASSERT_EQ(exr.width, 5);
   ASSERT_EQ(exr.height, 3);
@@ -136,7 +154,8 @@ TEST_F(Images, AreNamedAfterTheBuiltInScene) {
   const Finished finished =
       vrpipe({"run", "--size", "16x16", "--fidelity", "functional", "--variant", "het", "--output", "images"});
   EXPECT_EQ(finished.code, 0) << finished.err;
-  EXPECT_EQ(files(), (std::vector<std::string>{"images", "images/object-het.exr", "images/object-het.png", "tiny.spl"}));
+  EXPECT_EQ(files(),
+            (std::vector<std::string>{"images", "images/object-het.exr", "images/object-het.png", "tiny.spl"}));
 }
 
 }  // namespace

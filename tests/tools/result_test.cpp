@@ -159,7 +159,9 @@ TEST_F(Result, FunctionalHasNoTime) {
 }
 
 TEST_F(Result, CompareEqualsRun) {
-  for (const json& run : json_of({"compare", "--scene", "tiny.spl"})["runs"]) {
+  const json result = json_of({"compare", "--scene", "tiny.spl"});
+  ASSERT_EQ(result["runs"].size(), 4U);
+  for (const json& run : result["runs"]) {
     json alone = json_of({"run", "--scene", "tiny.spl", "--variant", run["variant"].get<std::string>()})["runs"][0];
     json together = run;
     for (json* one : {&alone, &together}) one->erase("host_seconds");
@@ -204,7 +206,8 @@ TEST_F(Result, JsonInAFileIsTheSameBesideTheReport) {
 }
 
 TEST_F(Result, SavedDrawIsTakenInAgain) {
-  const std::vector<std::string> view{"run", "--scene", "builtin:object", "--size", "24x24", "--fidelity", "functional"};
+  const std::vector<std::string> view{"run",   "--scene",    "builtin:object", "--size",
+                                      "24x24", "--fidelity", "functional"};
   std::vector<std::string> saving = view;
   saving.insert(saving.end(), {"--save-draw", "draw.spl"});
   const json first = json_of(saving);

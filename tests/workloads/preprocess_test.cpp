@@ -423,7 +423,7 @@ TEST(PreprocessCovariance, E02DirectionAgreesWithHalfTheArcTangent) {
   for (int trial = 0; trial < 2000; ++trial) {
     Vec3 m1, m2;
     for (auto* m : {&m1, &m2}) {
-      for (double& f : *m) f = static_cast<double>(random()) / 2147483648.0 - 1;
+      for (std::size_t k = 0; k < 3; ++k) (*m)[k] = static_cast<double>(random()) / 2147483648.0 - 1;
     }
     const auto dot = [](const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
     const double angle = 0.5 * std::atan2(2 * dot(m1, m2), dot(m1, m1) - dot(m2, m2));
@@ -465,7 +465,7 @@ TEST(PreprocessCovariance, E05MirrorAndTransposeAreExact) {
   for (int trial = 0; trial < 1000; ++trial) {
     Vec3 m1, m2;
     for (auto* m : {&m1, &m2}) {
-      for (double& f : *m) f = static_cast<double>(random()) / 2147483648.0 - 1;
+      for (std::size_t k = 0; k < 3; ++k) (*m)[k] = static_cast<double>(random()) / 2147483648.0 - 1;
     }
     const EllipseAxes e = decompose_covariance(m1, m2);
     const EllipseAxes mirrored = decompose_covariance(m1, {-m2[0], -m2[1], -m2[2]});

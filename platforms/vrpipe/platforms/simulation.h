@@ -105,7 +105,7 @@ struct UnitReport {
   std::array<std::uint64_t, unit_states> cycles{};
 };
 
-/// A counter that a unit declared, summed over GPCs.
+/// A counter that a unit declared, summed over GPCs, or an extreme, over all of them.
 struct StatisticReport {
   std::string name;  ///< UNIT.COUNTER
   std::string unit;

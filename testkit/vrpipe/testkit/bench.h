@@ -124,7 +124,7 @@ class Bench {
     prepare();
     do {
       if (clock_->now() > limit) throw SimulationFault("bench", clock_->now(), "it does not come to rest");
-      sc_core::sc_start(sc_core::sc_time::from_value(clock_->period().value() * 10000));
+      clock_->run(sc_core::sc_time::from_value(clock_->period().value() * 10000));
     } while (sc_core::sc_pending_activity());
     return clock_->now();
   }

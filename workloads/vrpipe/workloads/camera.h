@@ -6,9 +6,11 @@
 #include <string>
 #include <vector>
 
+#include <glm/vec3.hpp>
+
 namespace vrpipe {
 
-using Vec3 = std::array<double, 3>;
+using Vec3 = glm::dvec3;
 
 /// Largest width and height of an image, pixels.
 constexpr std::uint32_t kMaxImageSize = 16384;

@@ -1,0 +1,80 @@
+#include <vrpipe/timed.h>
+
+#include <algorithm>
+#include <map>
+
+#include <vrpipe/error.h>
+
+namespace vrpipe {
+
+namespace {
+
+std::map<std::string, TimedUnitMaker>& makers() {
+  static std::map<std::string, TimedUnitMaker> all;
+  return all;
+}
+
+}  // namespace
+
+bool TimedUnit::idle() const {
+  return std::all_of(in_ports.begin(), in_ports.end(), [](const InPort* port) { return port->empty(); }) &&
+         std::none_of(outputs_.begin(), outputs_.end(), [](const TimedOutput* out) { return out->blocked(); });
+}
+
+void TimedUnit::close_account(Cycle end) {
+  enter(UnitState::starved, charged_);
+  Unit::close_account(end);
+}
+
+Cycle TimedUnit::tick(Cycle now) {
+  advance();
+  bool served = true;
+  while (served) {
+    served = false;
+    for (TimedInput* input : inputs_) served = input->serve(now + lookahead_cycles) || served;
+  }
+  Cycle next = never;
+  for (const TimedInput* input : inputs_) next = std::min(next, input->next());
+  return std::max(next, now + 1);
+}
+
+TimedMemoryPort::TimedMemoryPort(PortOwner& owner, const std::string& name) : socket(name.c_str()), clock_(owner.clock) {
+  socket.bind(*this);
+  payload_.set_byte_enable_ptr(nullptr);
+}
+
+TimedMemoryPort::~TimedMemoryPort() = default;
+
+Cycle TimedMemoryPort::access(tlm::tlm_command command, std::uint64_t address, unsigned bytes, Cycle at) {
+  if (bytes == 0 || (bytes & (bytes - 1)) != 0 || (address & (bytes - 1)) != 0) {
+    throw SimulationFault(socket.name(), at,
+                          "an access of " + std::to_string(bytes) + " bytes at " + std::to_string(address) +
+                              " is not naturally aligned");
+  }
+  if (data_.size() < bytes) data_.resize(bytes);
+  payload_.set_command(command);
+  payload_.set_address(address);
+  payload_.set_data_ptr(data_.data());
+  payload_.set_data_length(bytes);
+  payload_.set_streaming_width(bytes);
+  payload_.set_dmi_allowed(false);
+  payload_.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
+  const Cycle now = clock_.domain->now();
+  const std::uint64_t period = clock_.domain->period().value();
+  sc_core::sc_time delay = sc_core::sc_time::from_value((std::max(at, now) - now) * period);
+  socket->b_transport(payload_, delay);
+  if (payload_.is_response_error()) {
+    throw SimulationFault(socket.name(), at, "the memory answered " + payload_.get_response_string());
+  }
+  return now + (delay.value() + period - 1) / period;
+}
+
+void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker) { makers()[slot] = std::move(maker); }
+
+const TimedUnitMaker& timed_unit_maker(const std::string& slot) {
+  const auto found = makers().find(slot);
+  if (found == makers().end()) throw SimulationFault("registry", 0, "slot " + slot + " has no module for lt and at");
+  return found->second;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,122 @@
+#include "bound.h"
+
+#include <algorithm>
+
+namespace vrpipe {
+
+namespace {
+
+double ratio(std::uint64_t items, std::uint64_t per_cycle) {
+  return static_cast<double>(items) / static_cast<double>(per_cycle);
+}
+
+std::uint64_t instructions_of(const std::vector<ShaderSegment>& program) {
+  std::uint64_t sum = 0;
+  for (const ShaderSegment& segment : program) sum += segment.instructions;
+  return sum;
+}
+
+}  // namespace
+
+void Work::add(const Work& other) {
+  vertex_warps_issued += other.vertex_warps_issued;
+  triangles += other.triangles;
+  bin_entries += other.bin_entries;
+  setups += other.setups;
+  coarse_tiles += other.coarse_tiles;
+  fine_tiles += other.fine_tiles;
+  tile_pairs += other.tile_pairs;
+  quads_rasterized += other.quads_rasterized;
+  bin_beats += other.bin_beats;
+  quads_tested += other.quads_tested;
+  updates += other.updates;
+  survivors += other.survivors;
+  vertex_warps += other.vertex_warps;
+  warps += other.warps;
+  merging_warps += other.merging_warps;
+  color_quads += other.color_quads;
+  sectors += other.sectors;
+}
+
+PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc)
+    : vertex_warps_per_cycle_(configuration.make_as<DrawBehaviour>("draw", gpc)->warps_per_1024_cycles() / 1024.0),
+      vpo_(configuration.make_as<VpoBehaviour>("vpo", gpc)->cost()),
+      tgc_(configuration.make_as<TgcBehaviour>("tgc", gpc)->cost()),
+      raster_(configuration.make_as<RasterBehaviour>("raster", gpc)->cost()),
+      tc_(configuration.make_as<TcBehaviour>("tc", gpc)->cost()),
+      prop_(configuration.make_as<PropBehaviour>("prop", gpc)->cost()),
+      zrop_(configuration.make_as<ZropBehaviour>("zrop", gpc)->cost()),
+      qru_(configuration.make_as<QruBehaviour>("qru", gpc)->cost()),
+      sm_(configuration.make_as<SmBehaviour>("sm", gpc)->cost()),
+      crop_(configuration.make_as<CropBehaviour>("crop", gpc)->cost()),
+      l2_bytes_per_cycle_(configuration.l2().bytes_per_cycle),
+      // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
+      warps_in_phase_(2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads)) {}
+
+double PhaseBound::issue_slots_per_cycle() const {
+  return sm_.cores * sm_.schedulers_per_core * sm_.lanes_per_scheduler / 32.0;
+}
+
+double PhaseBound::instructions(const Work& done) const {
+  return static_cast<double>(done.vertex_warps * instructions_of(sm_.vertex) +
+                             done.warps * instructions_of(sm_.fragment) +
+                             done.merging_warps * instructions_of(sm_.merge));
+}
+
+std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done) const {
+  std::array<double, stages> cycles{};
+  cycles[draw] = static_cast<double>(done.vertex_warps_issued) / vertex_warps_per_cycle_;
+  cycles[vpo] = ratio(done.triangles, vpo_.items_per_cycle);
+  cycles[tgc] = std::max(ratio(done.bin_entries, tgc_.items_per_cycle), ratio(done.setups, 1));
+  cycles[raster] = std::max({static_cast<double>(done.setups * raster_.setup_interval_cycles),
+                             ratio(done.coarse_tiles, raster_.coarse_tiles_per_cycle),
+                             ratio(done.fine_tiles, raster_.fine_tiles_per_cycle),
+                             static_cast<double>(done.tile_pairs * raster_.screen_tile_interval_cycles),
+                             ratio(done.quads_rasterized, raster_.quads_per_cycle)});
+  cycles[tc] = std::max(ratio(done.quads_rasterized, tc_.quads_per_cycle), ratio(done.bin_beats, 1));
+  cycles[test] = ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(done.updates, zrop_.updates_per_cycle);
+  cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
+  cycles[sm] = instructions(done) / issue_slots_per_cycle();
+  cycles[color] = ratio(done.color_quads, prop_.color_quads_per_cycle);
+  cycles[l2] = ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_);
+  cycles[crop] = ratio(done.color_quads, crop_.quads_per_cycle) + ratio(done.sectors, crop_.sectors_per_cycle);
+  return cycles;
+}
+
+void PhaseBound::end_phase() {
+  const std::array<double, stages> cycles = cycles_of(work);
+  std::array<double, stages> end{};
+  for (unsigned stage = 0; stage < stages; ++stage) {
+    double begin = 0;
+    for (unsigned before = 0; before <= stage; ++before) begin = std::max(begin, end_[before]);
+    for (unsigned after = stage + 1; stage >= raster && after < stages; ++after) begin = std::max(begin, end_before_[after]);
+    end[stage] = begin + cycles[stage];
+    if (stage > 0) end[stage] = std::max(end[stage], end[stage - 1]);
+  }
+  end_before_ = end_;
+  end_ = end;
+  total_.add(work);
+  work = Work();
+}
+
+double PhaseBound::cycles() const { return *std::max_element(end_.begin(), end_.end()); }
+
+double PhaseBound::busy_cycles(const std::string& slot) const {
+  static const std::map<std::string, Stage> stage_of{{"draw", draw}, {"vpo", vpo},   {"tgc", tgc}, {"raster", raster},
+                                                     {"tc", tc},     {"prop", color}, {"zrop", test}, {"qru", qru},
+                                                     {"sm", sm},     {"crop", crop}};
+  return cycles_of(total_)[stage_of.at(slot)];
+}
+
+double PhaseBound::utilization(const std::string& slot, double cycles) const {
+  if (cycles == 0) return 0;
+  if (slot == "raster") return ratio(total_.quads_rasterized, raster_.quads_per_cycle) / cycles;
+  if (slot == "zrop") return ratio(total_.quads_tested, zrop_.quads_per_cycle) / cycles;
+  if (slot == "prop") return ratio(total_.color_quads, prop_.color_quads_per_cycle) / cycles;
+  if (slot == "sm") return instructions(total_) / issue_slots_per_cycle() / cycles;
+  if (slot == "crop") return ratio(total_.color_quads, crop_.quads_per_cycle) / cycles;
+  if (slot == "l2") return cycles_of(total_)[l2] / cycles;
+  return 0;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include <vrpipe/platforms/configuration.h>
+
+namespace vrpipe {
+
+/// What the units of a GPC did, in the terms of their costs, and the front end for it.
+struct Work {
+  std::uint64_t vertex_warps_issued = 0;
+  std::uint64_t triangles = 0;
+  std::uint64_t bin_entries = 0;
+  std::uint64_t setups = 0;
+  std::uint64_t coarse_tiles = 0;
+  std::uint64_t fine_tiles = 0;
+  std::uint64_t tile_pairs = 0;
+  std::uint64_t quads_rasterized = 0;
+  std::uint64_t bin_beats = 0;
+  std::uint64_t quads_tested = 0;
+  std::uint64_t updates = 0;
+  std::uint64_t survivors = 0;
+  std::uint64_t vertex_warps = 0;  ///< shaded
+  std::uint64_t warps = 0;
+  std::uint64_t merging_warps = 0;
+  std::uint64_t color_quads = 0;
+  std::uint64_t sectors = 0;
+
+  void add(const Work& other);
+};
+
+/// The least cycles that a GPC's work takes when every unit works at its peak: the busiest unit's, phase by phase.
+///
+/// The whole draw's busiest unit alone would overlap what cannot overlap: where everything is terminated the rasteriser
+/// is the busiest, where nothing is CROP, and between the two there is room for a limited number of warps only. So the
+/// draw is cut into phases in each of which more warps are launched than there is room for between TC and the end of
+/// CROP. Then, by each unit's order and by that room, a unit begins a phase no earlier than
+/// - it, or any unit before it in the pipeline, has finished the phase before,
+/// - any unit after it has finished the last phase but one (units from the rasteriser on).
+class PhaseBound {
+ public:
+  PhaseBound(const Configuration& configuration, unsigned gpc);
+
+  Work work;  ///< of the phase
+  bool phase_is_full() const { return work.warps >= warps_in_phase_; }
+  void end_phase();
+  double cycles() const;
+
+  /// Of all phases: cycles in which the unit of a slot works at its peak, and the share of its peak in `cycles` cycles,
+  /// as the fidelities with time report it (raster zrop prop sm crop l2).
+  double busy_cycles(const std::string& slot) const;
+  double utilization(const std::string& slot, double cycles) const;
+
+ private:
+  /// In the order of the pipeline; PROP is there twice.
+  enum Stage : unsigned { draw, vpo, tgc, raster, tc, test, qru, sm, color, l2, crop, stages };
+  std::array<double, stages> cycles_of(const Work& done) const;
+  double instructions(const Work& done) const;
+  double issue_slots_per_cycle() const;
+
+  double vertex_warps_per_cycle_;
+  Throughput vpo_;
+  Throughput tgc_;
+  RasterBehaviour::Cost raster_;
+  TcBehaviour::Cost tc_;
+  PropBehaviour::Cost prop_;
+  ZropBehaviour::Cost zrop_;
+  Throughput qru_;
+  SmBehaviour::Cost sm_;
+  CropBehaviour::Cost crop_;
+  std::uint32_t l2_bytes_per_cycle_;
+  std::uint64_t warps_in_phase_;
+  Work total_;
+  std::array<double, stages> end_{};       ///< of the last phase
+  std::array<double, stages> end_before_{};  ///< of the phase before it
+};
+
+}  // namespace vrpipe

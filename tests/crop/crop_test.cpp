@@ -1,0 +1,269 @@
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/error.h>
+#include <vrpipe/half.h>
+#include <vrpipe/registry.h>
+
+#include "crop/crop_cache.h"
+#include "support/builders.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::color_of;
+
+class ColorRopTest : public ::testing::Test {
+ protected:
+  ColorRopTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) { state.early_termination = true; }
+
+  void make(const std::vector<std::pair<std::string, std::string>>& settings = {}) {
+    const Implementation& implementation = Registry::instance().find("crop", "color-rop");
+    const std::unique_ptr<ParameterSet> parameters = implementation.make_parameters();
+    for (const auto& [name, value] : settings) parameters->set("crop", name, value);
+    behaviour = implementation.make_behaviour(*parameters, state);
+    crop = dynamic_cast<CropBehaviour*>(behaviour.get());
+    surface = std::make_unique<ColorSurface>(draw.width, draw.height, state.format);
+    crop->attach(*surface);
+  }
+  std::uint64_t count(const std::string& name) const {
+    for (const Counter* counter : behaviour->counters()) {
+      if (name == counter->name()) return counter->value();
+    }
+    ADD_FAILURE() << "no counter " << name;
+    return 0;
+  }
+  LaneMask blend(float alpha, LaneMask live = all_lanes, unsigned position = 0, float grey = 1) {
+    return crop->blend({0, 0}, position, live, color_of(alpha * grey, alpha * grey, alpha * grey, alpha)).terminated;
+  }
+  void set_alpha(float alpha) { surface->quad({0, 0}, 0).alpha = splat_lanes(alpha); }
+  float alpha(unsigned lane = 0) const { return surface->quad({0, 0}, 0).alpha[lane]; }
+
+  Draw draw;
+  RenderState state;
+  std::unique_ptr<Behaviour> behaviour;
+  CropBehaviour* crop = nullptr;
+  std::unique_ptr<ColorSurface> surface;
+};
+
+TEST_F(ColorRopTest, OnlyLiveLanesAreBlendedAndCounted) {
+  make();
+  blend(0.5F, 0b0110);
+  EXPECT_EQ(alpha(0), 0.0F);
+  EXPECT_EQ(alpha(1), 0.5F);
+  EXPECT_EQ(alpha(2), 0.5F);
+  EXPECT_EQ(alpha(3), 0.0F);
+  EXPECT_EQ(count("quads_blended"), 1U);
+  EXPECT_EQ(count("fragments_blended"), 2U);
+}
+
+// case H01
+TEST_F(ColorRopTest, EveryPixelSignalsOnceWhenItPassesTheThreshold) {
+  make();
+  unsigned pixels = 0;
+  for (std::uint64_t i = 0; i < 400; ++i) {
+    const LaneMask signalled = blend(testing::uniform(8, i, 0.1F, 0.5F), static_cast<LaneMask>(1 + mix(i) % 15));
+    pixels += popcount(signalled);
+  }
+  unsigned terminated = 0;
+  for (unsigned lane = 0; lane < 4; ++lane) terminated += alpha(lane) >= 0.996F;
+  EXPECT_EQ(terminated, 4U);
+  EXPECT_EQ(pixels, terminated);
+}
+
+// case H01
+TEST_F(ColorRopTest, WithoutThePreviousAlphaCheckEveryLaterFragmentSignals) {
+  make({{"previous_alpha_check", "off"}});
+  unsigned signals = 0;
+  for (unsigned i = 0; i < 10; ++i) signals += blend(0.99F) != 0;
+  EXPECT_EQ(signals, 9U) << "0.99, then 0.9999 and all that follow";
+}
+
+// case H06
+TEST_F(ColorRopTest, PixelsThatTerminateTogetherAreOneSignal) {
+  make();
+  blend(0.99F, 0b1011);
+  EXPECT_EQ(blend(0.9F, 0b0011), 0b0011);
+  EXPECT_EQ(count("termination_signals"), 1U);
+}
+
+// case H07
+TEST_F(ColorRopTest, AMergedQuadThatTerminatesItsPixelsSignalsOnce) {
+  make();
+  const QuadColor merged = blend_front_to_back(color_of(0, 0, 0, 0.99F), color_of(0, 0, 0, 0.99F));
+  EXPECT_EQ(crop->blend({0, 0}, 0, all_lanes, merged).terminated, all_lanes);
+  EXPECT_EQ(count("termination_signals"), 1U);
+  EXPECT_EQ(half_bits(alpha()), 0x3C00);
+}
+
+TEST_F(ColorRopTest, WithoutEarlyTerminationNothingIsSignalled) {
+  state.early_termination = false;
+  make();
+  for (unsigned i = 0; i < 5; ++i) EXPECT_EQ(blend(0.99F), 0);
+}
+
+// case B03
+TEST_F(ColorRopTest, TheThresholdIsPassedAtTheFirstStoredAlphaNotBelowIt) {
+  const auto passes = [&](ColorFormat format, bool inclusive, float stored) {
+    state.format = format;
+    state.termination_inclusive = inclusive;
+    make();
+    QuadColor fragment{};
+    fragment.alpha = splat_lanes(stored);
+    return crop->blend({0, 0}, 0, all_lanes, fragment).terminated != 0;
+  };
+  for (const bool inclusive : {true, false}) {
+    EXPECT_TRUE(passes(ColorFormat::rgba16f, inclusive, half_value(0x3BF8)));
+    EXPECT_FALSE(passes(ColorFormat::rgba16f, inclusive, half_value(0x3BF7)));
+    EXPECT_TRUE(passes(ColorFormat::rgba8, inclusive, 254.0F / 255.0F));
+    EXPECT_FALSE(passes(ColorFormat::rgba8, inclusive, 253.0F / 255.0F));
+    EXPECT_EQ(passes(ColorFormat::rgba32f, inclusive, 0.996F), inclusive) << "only here the two comparisons differ";
+    EXPECT_TRUE(passes(ColorFormat::rgba32f, inclusive, std::nextafter(0.996F, 1.0F)));
+    EXPECT_FALSE(passes(ColorFormat::rgba32f, inclusive, std::nextafter(0.996F, 0.0F)));
+  }
+}
+
+// case M11
+TEST_F(ColorRopTest, AcrossTheThresholdAPairDiffersFromItsPartsByTheMissingTransmittanceAtMost) {
+  state.format = ColorFormat::rgba32f;
+  state.termination = Termination::strict;
+  make();
+  set_alpha(0.995F);
+  blend(0.5F);
+  blend(0.5F);  // dropped: terminated
+  const float unmerged = alpha();
+  EXPECT_NEAR(static_cast<double>(unmerged), 0.9975, 1e-6);
+  make();
+  set_alpha(0.995F);
+  const QuadColor pair = blend_front_to_back(color_of(0.5F, 0, 0, 0.5F), color_of(0.5F, 0, 0, 0.5F));
+  crop->blend({0, 0}, 0, all_lanes, pair);
+  EXPECT_NEAR(static_cast<double>(alpha()), 0.99875, 1e-6);
+  EXPECT_LE(alpha() - unmerged, 0.004F);
+}
+
+TEST_F(ColorRopTest, StrictlyAFragmentOfATerminatedPixelIsDropped) {
+  state.termination = Termination::strict;
+  make();
+  blend(0.99F, 0b0011);
+  blend(0.9F, 0b0011);
+  const float before = alpha(0);
+  const CropBehaviour::Outcome part = crop->blend({0, 0}, 0, 0b0110, color_of(0.5F, 0.5F, 0.5F, 0.5F));
+  EXPECT_TRUE(part.changed);
+  EXPECT_EQ(alpha(1), before);
+  EXPECT_EQ(alpha(2), 0.5F);
+  EXPECT_EQ(count("fragments_dropped_late"), 1U);
+  EXPECT_EQ(count("quads_dropped_late"), 0U);
+  const CropBehaviour::Outcome all = crop->blend({0, 0}, 0, 0b0001, color_of(0.5F, 0.5F, 0.5F, 0.5F));
+  EXPECT_FALSE(all.changed);
+  EXPECT_EQ(count("fragments_dropped_late"), 2U);
+  EXPECT_EQ(count("quads_dropped_late"), 1U);
+}
+
+// case H02
+TEST_F(ColorRopTest, InPaperTerminationALateFragmentStillBlendsByWhatIsLeftAtMost) {
+  make();
+  blend(0.99F, all_lanes, 0, 0);
+  blend(0.9F, all_lanes, 0, 0);
+  ASSERT_GE(alpha(), 0.996F);
+  for (unsigned i = 0; i < 50; ++i) blend(0.99F);
+  EXPECT_LE(surface->quad({0, 0}, 0).red[0], 0.004F);
+  EXPECT_EQ(count("fragments_dropped_late"), 0U);
+}
+
+TEST_F(ColorRopTest, TellsWhetherAValueChanged) {
+  make();
+  EXPECT_TRUE(crop->blend({0, 0}, 0, all_lanes, color_of(0.5F, 0, 0, 0.5F)).changed);
+  EXPECT_FALSE(crop->blend({0, 0}, 0, all_lanes, color_of(0, 0, 0, 0)).changed);
+  set_alpha(1.0F);
+  EXPECT_FALSE(crop->blend({0, 0}, 0, all_lanes, color_of(0.5F, 0.5F, 0.5F, 0.5F)).changed);
+}
+
+// case B10
+TEST_F(ColorRopTest, AThousandQuadsOnOnePositionAreTheSequentialResult) {
+  for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
+    state.format = format;
+    make();
+    QuadColor expected{};
+    const BlendFunction reference = blend_function(format, BlendRounding::rne);
+    for (std::uint64_t i = 0; i < 1000; ++i) {
+      const float a = testing::uniform(9, i, 0.001F, 0.02F);
+      const QuadColor fragment = color_of(a * 0.3F, a * 0.9F, a, a);
+      crop->blend({1, 1}, 7, all_lanes, fragment);
+      expected = reference(expected, fragment);
+    }
+    EXPECT_EQ(std::memcmp(&surface->quad({1, 1}, 7), &expected, sizeof expected), 0) << name_of(format);
+  }
+}
+
+TEST_F(ColorRopTest, QuadsPerCycleFollowTheFormat) {
+  const std::pair<ColorFormat, unsigned> expected[] = {{ColorFormat::rgba8, 4}, {ColorFormat::rgba16f, 2}, {ColorFormat::rgba32f, 1}};
+  for (const auto& [format, quads] : expected) {
+    state.format = format;
+    make();
+    EXPECT_EQ(crop->cost().quads_per_cycle, quads);
+  }
+}
+
+TEST(CropCache, HoldsItsLinesAndThenLetsTheOldestUnneededGo) {
+  CropCache cache(512, 128, 32, 4096);
+  unsigned dirty = 0;
+  std::uint64_t evicted = 0;
+  CropCache::Line lines[4];
+  for (unsigned i = 0; i < 4; ++i) {
+    EXPECT_EQ(cache.find(128 * i), CropCache::no_line);
+    ASSERT_TRUE(cache.can_allocate());
+    lines[i] = cache.allocate(128 * i, dirty, evicted);
+    EXPECT_EQ(cache.find(128 * i + 127), lines[i]);
+  }
+  cache.dirty(lines[1], 0b0101);
+  cache.pin(lines[0]);  // a queued quad needs the oldest
+  const CropCache::Line line = cache.allocate(1024, dirty, evicted);
+  EXPECT_EQ(line, lines[1]);
+  EXPECT_EQ(dirty, 0b0101U);
+  EXPECT_EQ(evicted, 128U);
+  EXPECT_EQ(cache.find(128), CropCache::no_line);
+  EXPECT_NE(cache.find(0), CropCache::no_line);
+}
+
+TEST(CropCache, NoLineCanBeHadWhileAllAreNeeded) {
+  CropCache cache(256, 128, 32, 4096);
+  unsigned dirty = 0;
+  std::uint64_t evicted = 0;
+  const CropCache::Line a = cache.allocate(0, dirty, evicted);
+  const CropCache::Line b = cache.allocate(128, dirty, evicted);
+  cache.pin(a);
+  cache.pin(b);
+  cache.pin(a);
+  EXPECT_FALSE(cache.can_allocate());
+  cache.unpin(a);
+  EXPECT_FALSE(cache.can_allocate());
+  cache.unpin(a);
+  EXPECT_TRUE(cache.can_allocate());
+}
+
+TEST(CropCache, SectorsComeOneByOneAndGoWithTheirLine) {
+  CropCache cache(128, 128, 32, 4096);
+  unsigned dirty = 0;
+  std::uint64_t evicted = 0;
+  CropCache::Line line = cache.allocate(0, dirty, evicted);
+  EXPECT_FALSE(cache.has_sector(line, 2));
+  cache.add_sector(line, 2);
+  EXPECT_TRUE(cache.has_sector(line, 2));
+  EXPECT_FALSE(cache.has_sector(line, 1));
+  line = cache.allocate(256, dirty, evicted);
+  EXPECT_FALSE(cache.has_sector(line, 2));
+  EXPECT_EQ(dirty, 0U);
+}
+
+TEST(CropCache, SizesThatMakeNoCacheAreRefused) {
+  EXPECT_THROW(CropCache(64, 128, 32, 4096), UserError);
+  EXPECT_THROW(CropCache(1024, 96, 32, 4096), UserError);
+  EXPECT_THROW(CropCache(1024, 128, 48, 4096), UserError);
+  EXPECT_THROW(CropCache(1024, 128, 256, 4096), UserError);
+}
+
+}  // namespace
+}  // namespace vrpipe

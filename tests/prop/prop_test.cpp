@@ -1,0 +1,31 @@
+#include "prop/prop.h"
+
+#include <gtest/gtest.h>
+
+#include "support/builders.h"
+
+namespace vrpipe {
+namespace {
+
+TEST(PreRop, ColourQuadsPerCycleFollowTheFormat) {
+  const Draw draw = testing::draw_of(16, 16);
+  RenderState state = testing::state_of(draw);
+  const PreRop::Parameters parameters;
+  const std::pair<ColorFormat, unsigned> expected[] = {{ColorFormat::rgba8, 4}, {ColorFormat::rgba16f, 2}, {ColorFormat::rgba32f, 1}};
+  for (const auto& [format, quads] : expected) {
+    state.format = format;
+    EXPECT_EQ(PreRop(parameters, state).cost().color_quads_per_cycle, quads) << name_of(format);
+  }
+}
+
+TEST(PreRop, ANarrowPathStillMovesAQuadACycle) {
+  const Draw draw = testing::draw_of(16, 16);
+  RenderState state = testing::state_of(draw);
+  state.format = ColorFormat::rgba32f;
+  PreRop::Parameters parameters;
+  parameters.set("prop", "color_bytes_per_cycle", "16");
+  EXPECT_EQ(PreRop(parameters, state).cost().color_quads_per_cycle, 1U);
+}
+
+}  // namespace
+}  // namespace vrpipe

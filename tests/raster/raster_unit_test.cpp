@@ -1,0 +1,192 @@
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/geometry.h>
+#include <vrpipe/testkit/bench.h>
+
+#include "support/builders.h"
+
+namespace vrpipe {
+namespace {
+
+using testkit::Bench;
+using testkit::Sink;
+using testkit::Source;
+
+class RasterUnitTest : public ::testing::Test {
+ protected:
+  RasterUnitTest() : draw(testing::draw_of(128, 128)), state(testing::state_of(draw)) { state.obb_padding = 0; }
+
+  /// The jobs of all triangles of the draw, unclipped.
+  std::vector<RasterJob> jobs() const {
+    std::vector<RasterJob> all;
+    for (std::uint32_t splat = 0; splat < draw.splats.size(); ++splat) {
+      for (unsigned triangle = 0; triangle < triangles_per_splat(draw); ++triangle) {
+        SnappedTriangle snapped;
+        if (!snap_triangle(state, splat, triangle, snapped) || doubled_area(snapped) == 0) continue;
+        RasterJob job;
+        job.primitive.splat = splat;
+        job.primitive.triangle = static_cast<std::uint8_t>(triangle);
+        job.primitive.bounds = covered_bounds(snapped, state.subpixel_bits, draw.width, draw.height);
+        job.clip = job.primitive.bounds;
+        if (!job.primitive.bounds.empty()) all.push_back(job);
+      }
+    }
+    return all;
+  }
+  void add_triangle(const ScreenTriangle& triangle) {
+    draw.triangles.push_back(triangle);
+    draw.splats.emplace_back();
+  }
+  /// A triangle that covers the whole image.
+  void add_full() { add_triangle({{-1, 300, -1}, {-1, -1, 300}}); }
+
+  Draw draw;
+  RenderState state;
+};
+
+RasterJob end_of_draw() {
+  RasterJob job;
+  job.end_of_draw = true;
+  return job;
+}
+
+std::uint64_t quads_in(const Sink<QuadBeat>& sink) {
+  std::uint64_t quads = 0;
+  for (const auto& record : sink.records()) quads += record.item.count;
+  return quads;
+}
+
+TEST_F(RasterUnitTest, TheFirstQuadIsSeenTheSetUpLatencyAfterTheJob) {
+  add_triangle(testing::one_quad_triangle(4, 4));
+  Bench bench("raster", "tile-rasterizer", state);
+  Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+  Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads");
+  in.add(jobs()[0], 10);
+  bench.run();
+  ASSERT_EQ(out.records().size(), 1U);
+  EXPECT_EQ(out.records()[0].cycle, 11U + 10) << "in hand at 11, latency 10";
+}
+
+TEST_F(RasterUnitTest, MakesItsFineTilesPerCycle) {
+  add_full();
+  for (const unsigned rate : {1U, 2U}) {
+    Bench bench("raster", "tile-rasterizer", state,
+                {{"fine_tiles_per_cycle", std::to_string(rate)}, {"quads_per_cycle", "16"}, {"coarse_tiles_per_cycle", "64"}});
+    Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+    Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 64);
+    in.add(jobs()[0]);
+    bench.run();
+    // 256 raster tiles of 16 quads; 16 quads a cycle at most in either case.
+    EXPECT_EQ(quads_in(out), 4096U);
+    EXPECT_EQ(out.records().back().cycle - out.records().front().cycle + 1, 256U);
+  }
+}
+
+TEST_F(RasterUnitTest, HandsOverItsQuadsPerCycle) {
+  add_full();
+  for (const unsigned rate : {1U, 4U, 8U, 16U}) {
+    Bench bench("raster", "tile-rasterizer", state, {{"quads_per_cycle", std::to_string(rate)}});
+    Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+    Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 64);
+    in.add(jobs()[0]);
+    bench.run();
+    EXPECT_EQ(quads_in(out), 4096U);
+    EXPECT_EQ(out.records().back().cycle - out.records().front().cycle + 1, 4096U / rate);
+    for (const auto& record : out.records()) EXPECT_LE(record.item.count, rate);
+  }
+}
+
+TEST_F(RasterUnitTest, PrimitiveAndScreenTilePairsComeAtTheirInterval) {
+  for (float x = 0; x < 128; x += 16) add_triangle(testing::one_quad_triangle(x + 4, 4));
+  Bench bench("raster", "tile-rasterizer", state, {{"screen_tile_interval_cycles", "5"}});
+  Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", 16);
+  Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 16);
+  for (const RasterJob& job : jobs()) in.add(job);
+  bench.run();
+  ASSERT_EQ(out.records().size(), 8U);
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(out.records()[i].cycle, out.records()[0].cycle + 5 * i);
+}
+
+TEST_F(RasterUnitTest, SetUpsComeAtTheirInterval) {
+  for (int i = 0; i < 8; ++i) add_triangle(testing::one_quad_triangle(4, 4));
+  Bench bench("raster", "tile-rasterizer", state, {{"setup_interval_cycles", "7"}});
+  Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", 16);
+  Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 16);
+  for (const RasterJob& job : jobs()) in.add(job);
+  bench.run();
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(out.records()[i].cycle, out.records()[0].cycle + 7 * i);
+}
+
+// case R07
+TEST_F(RasterUnitTest, APrimitiveWithoutSamplesCostsItsCoarseTests) {
+  // A sliver between samples whose bounds hold the whole diagonal: 256 raster tiles are tested.
+  add_triangle({{0.7F, 128, 128}, {0.2F, 127.2F, 127.3F}});
+  add_triangle(testing::one_quad_triangle(4, 4));
+  for (const unsigned rate : {1U, 4U}) {
+    Bench bench("raster", "tile-rasterizer", state, {{"coarse_tiles_per_cycle", std::to_string(rate)}});
+    Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+    Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 64);
+    for (const RasterJob& job : jobs()) in.add(job);
+    bench.run();
+    ASSERT_FALSE(out.records().empty());
+    EXPECT_GE(out.records().back().cycle, 256 / rate);
+  }
+}
+
+TEST_F(RasterUnitTest, TheEndComesLast) {
+  add_full();
+  Bench bench("raster", "tile-rasterizer", state);
+  Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+  Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 1);
+  in.add(jobs()[0]);
+  in.add(end_of_draw());
+  bench.run();
+  EXPECT_TRUE(out.records().back().item.end_of_draw);
+  EXPECT_EQ(quads_in(out), 4096U);
+  EXPECT_TRUE(bench.unit().idle());
+}
+
+TEST_F(RasterUnitTest, ABlockedReceiverStopsItUntilACycleAfterItTakes) {
+  add_full();
+  Bench bench("raster", "tile-rasterizer", state, {{"setup_latency_cycles", "1"}});
+  Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+  Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 2);
+  in.add(jobs()[0]);
+  out.close(0, 100);
+  bench.run();
+  EXPECT_EQ(out.records()[0].cycle, 100U);
+  EXPECT_EQ(out.records()[1].cycle, 100U);
+  EXPECT_EQ(out.records()[2].cycle, 102U);
+}
+
+TEST_F(RasterUnitTest, QuadsAndTheirOrderAreTheSameUnderAnyStalls) {
+  draw = testing::random_draw(128, 128, 40, 9);
+  const std::vector<RasterJob> all = jobs();
+  std::vector<std::uint64_t> expected;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    Bench bench("raster", "tile-rasterizer", state);
+    Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", static_cast<unsigned>(1 + seed % 4));
+    Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", static_cast<unsigned>(1 + seed % 3));
+    for (const RasterJob& job : all) in.add(job);
+    in.add(end_of_draw());
+    if (seed > 0) bench.stall_randomly(seed, 80);
+    bench.run();
+    std::vector<std::uint64_t> quads;
+    for (const auto& record : out.records()) {
+      for (unsigned i = 0; i < record.item.count; ++i) {
+        const Quad& quad = record.item.quads[i];
+        quads.push_back((std::uint64_t{quad.splat} << 32U) | (quad.triangle << 28U) | (record.item.tile.x << 20U) |
+                        (record.item.tile.y << 12U) | (quad.position << 4U) | quad.coverage);
+      }
+    }
+    if (seed == 0) expected = quads;
+    ASSERT_EQ(quads, expected) << seed;
+    ASSERT_TRUE(bench.unit().idle());
+  }
+  EXPECT_GT(expected.size(), 1000U);
+}
+
+}  // namespace
+}  // namespace vrpipe

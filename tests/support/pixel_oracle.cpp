@@ -1,0 +1,108 @@
+#include "pixel_oracle.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <vrpipe/registry.h>
+#include <vrpipe/units.h>
+
+namespace vrpipe::testing {
+
+namespace {
+
+template <class SlotBehaviour>
+std::unique_ptr<Behaviour> make(const char* slot, const char* name, const RenderState& state, SlotBehaviour*& out) {
+  const Implementation& implementation = Registry::instance().find(slot, name);
+  const std::unique_ptr<ParameterSet> parameters = implementation.make_parameters();
+  std::unique_ptr<Behaviour> behaviour = implementation.make_behaviour(*parameters, state);
+  out = dynamic_cast<SlotBehaviour*>(behaviour.get());
+  return behaviour;
+}
+
+/// The most that one rounding to the format is off at a magnitude: half an ulp, or one where it truncates.
+double rounding_error(const RenderState& state, double magnitude) {
+  double error = 0;
+  if (state.format == ColorFormat::rgba8) {
+    error = 0.5 / 255.0;
+  } else {
+    const int significand_bits = state.format == ColorFormat::rgba16f ? 11 : 24;
+    const int least_exponent = state.format == ColorFormat::rgba16f ? -13 : -125;
+    int exponent = 0;
+    std::frexp(magnitude, &exponent);
+    error = std::ldexp(0.5, std::max(exponent, least_exponent) - significand_bits);
+  }
+  return state.blend_rounding == BlendRounding::rne ? error : 2 * error;
+}
+
+}  // namespace
+
+std::vector<std::vector<OracleFragment>> fragments_of(const RenderState& state) {
+  VpoBehaviour* vpo = nullptr;
+  RasterBehaviour* raster = nullptr;
+  SmBehaviour* sm = nullptr;
+  const auto owned_vpo = make("vpo", "primitive-assembly", state, vpo);
+  const auto owned_raster = make("raster", "tile-rasterizer", state, raster);
+  const auto owned_sm = make("sm", "splat-shader", state, sm);
+
+  std::vector<std::vector<OracleFragment>> pixels(std::size_t{state.draw->width} * state.draw->height);
+  std::array<Primitive, 2> primitives;
+  for (std::uint32_t splat = 0; splat < state.draw->splats.size(); ++splat) {
+    const unsigned count = vpo->assemble(splat, primitives);
+    for (unsigned i = 0; i < count; ++i) {
+      raster->begin(primitives[i], primitives[i].bounds);
+      QuadBeat beat;
+      unsigned tests = 0;
+      bool new_tile = false;
+      while (raster->next(beat, tests, new_tile)) {
+        for (unsigned q = 0; q < beat.count; ++q) {
+          Warp warp;
+          warp.tile = beat.tile;
+          warp.count = 1;
+          warp.quads[0] = beat.quads[q];
+          ShadedWarp shaded;
+          sm->shade(warp, shaded);
+          if (shaded.count == 0) continue;
+          for (unsigned lane = 0; lane < 4; ++lane) {
+            if (((shaded.live[0] >> lane) & 1U) == 0) continue;
+            const std::uint32_t x = beat.tile.x * screen_tile_pixels + beat.quads[q].position % 8U * 2 + (lane & 1U);
+            const std::uint32_t y = beat.tile.y * screen_tile_pixels + beat.quads[q].position / 8U * 2 + (lane >> 1U);
+            const QuadColor& c = shaded.color[0];
+            pixels[std::size_t{y} * state.draw->width + x].push_back(
+                {{c.red[lane], c.green[lane], c.blue[lane]}, c.alpha[lane]});
+          }
+        }
+      }
+    }
+  }
+  return pixels;
+}
+
+OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const RenderState& state) {
+  // Of multiply, add and 1 - alpha in single precision, and as many again for merging.
+  constexpr double arithmetic = 8.0 / 16777216.0;
+  OraclePixel pixel;
+  double alpha_error = 0;
+  for (const OracleFragment& fragment : fragments) {
+    const double transmittance = 1.0 - pixel.rgba[3];
+    const double alpha = fragment.alpha;
+    for (unsigned i = 0; i < 3; ++i) {
+      const double color = fragment.color[i];
+      pixel.rgba[i] += transmittance * color;
+      const double reach = std::fabs(pixel.rgba[i]) + pixel.color_bound[i];
+      pixel.color_bound[i] += color * alpha_error + rounding_error(state, reach) + arithmetic * std::max(1.0, reach);
+    }
+    pixel.rgba[3] += transmittance * alpha;
+    alpha_error = (1.0 - alpha) * alpha_error + rounding_error(state, std::min(1.0, pixel.rgba[3] + alpha_error)) + arithmetic;
+    pixel.alpha_bound = std::max(pixel.alpha_bound, alpha_error);
+    ++pixel.fragments;
+  }
+  return pixel;
+}
+
+float largest_color(const Draw& draw) {
+  float largest = 0;
+  for (const Splat& splat : draw.splats) largest = std::max({largest, splat.red, splat.green, splat.blue});
+  return largest;
+}
+
+}  // namespace vrpipe::testing

@@ -1,0 +1,96 @@
+#include "vpo/vpo.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/geometry.h>
+
+#include "support/builders.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::draw_of;
+using testing::flat_box;
+
+struct Assembled {
+  explicit Assembled(const Draw& draw, std::uint32_t splat = 0)
+      : state(testing::state_of(draw)), vpo(parameters, state), count(vpo.assemble(splat, primitives)) {}
+  RenderState state;
+  PrimitiveAssembly::Parameters parameters;
+  PrimitiveAssembly vpo;
+  std::array<Primitive, 2> primitives;
+  unsigned count;
+};
+
+TEST(PrimitiveAssembly, ASplatIsTwoTrianglesInOrder) {
+  const Assembled a(draw_of(64, 64, {flat_box(10, 10, 20, 20, 0.5F)}));
+  ASSERT_EQ(a.count, 2U);
+  EXPECT_EQ(a.primitives[0].triangle, 0);
+  EXPECT_EQ(a.primitives[1].triangle, 1);
+  EXPECT_EQ(a.vpo.primitives.value(), 2U);
+}
+
+TEST(PrimitiveAssembly, AnExplicitTriangleIsOne) {
+  Draw draw = draw_of(64, 64, {Splat{}});
+  draw.triangles = {testing::one_quad_triangle(4, 4)};
+  const Assembled a(draw);
+  ASSERT_EQ(a.count, 1U);
+  EXPECT_EQ(a.primitives[0].bounds.x0, 4);
+  EXPECT_EQ(a.primitives[0].bounds.x1, 6);
+  EXPECT_EQ(a.primitives[0].bounds.y0, 4);
+  EXPECT_EQ(a.primitives[0].bounds.y1, 6);
+}
+
+TEST(PrimitiveAssembly, BoundsHoldEverySampleInTheViewport) {
+  const Assembled a(draw_of(64, 48, {flat_box(-10, 30, 70, 60, 0.5F)}));
+  ASSERT_EQ(a.count, 2U);
+  for (const Primitive& primitive : a.primitives) {
+    EXPECT_EQ(primitive.bounds.x0, 0);
+    EXPECT_EQ(primitive.bounds.x1, 64);
+    EXPECT_EQ(primitive.bounds.y0, 30);
+    EXPECT_EQ(primitive.bounds.y1, 48);
+  }
+}
+
+// case R08
+TEST(PrimitiveAssembly, WhatHasNoAreaAfterSnappingIsCulledAndCounted) {
+  Draw draw = draw_of(64, 64, {Splat{}});
+  draw.triangles = {{{10, 30, 20.001F}, {10, 30, 20.001F}}};
+  const Assembled a(draw);
+  EXPECT_EQ(a.count, 0U);
+  EXPECT_EQ(a.vpo.culled_zero_area.value(), 1U);
+  EXPECT_EQ(a.vpo.culled_outside.value(), 0U);
+}
+
+TEST(PrimitiveAssembly, WhatMissesTheViewportIsCulledAndCounted) {
+  const Assembled a(draw_of(64, 64, {flat_box(70, 10, 90, 20, 0.5F)}));
+  EXPECT_EQ(a.count, 0U);
+  EXPECT_EQ(a.vpo.culled_outside.value(), 2U);
+}
+
+// case R07
+TEST(PrimitiveAssembly, WhatLiesBetweenSamplesIsCulledAndCounted) {
+  const Assembled a(draw_of(64, 64, {flat_box(10.6F, 10.6F, 11.4F, 11.4F, 0.5F)}));
+  EXPECT_EQ(a.count, 0U);
+  EXPECT_EQ(a.vpo.culled_outside.value(), 2U);
+}
+
+TEST(PrimitiveAssembly, WhatIsNotFiniteIsDroppedAndCounted) {
+  Splat splat = flat_box(10, 10, 20, 20, 0.5F);
+  splat.cx = std::nanf("");
+  const Assembled a(draw_of(64, 64, {splat}));
+  EXPECT_EQ(a.count, 0U);
+  EXPECT_EQ(a.vpo.dropped_not_finite.value(), 1U);
+}
+
+// case O12
+TEST(PrimitiveAssembly, EitherWindingIsKept) {
+  Splat mirrored = flat_box(10, 10, 20, 20, 0.5F);
+  mirrored.by = -mirrored.by;
+  EXPECT_EQ(Assembled(draw_of(64, 64, {mirrored})).count, 2U);
+}
+
+}  // namespace
+}  // namespace vrpipe

@@ -1,0 +1,127 @@
+#include <gtest/gtest.h>
+
+#include <vrpipe/testkit/bench.h>
+
+#include "support/builders.h"
+
+namespace vrpipe {
+namespace {
+
+using testkit::Bench;
+using testkit::Sink;
+using testkit::Source;
+
+VertexWarp warp_at(std::uint32_t first, std::uint32_t splats) { return {first, splats, false}; }
+VertexWarp end_of_draw() { return {0, 0, true}; }
+
+class VpoUnitTest : public ::testing::Test {
+ protected:
+  VpoUnitTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) {
+    for (unsigned i = 0; i < 32; ++i) {
+      const auto x = static_cast<float>(i % 8 * 8);
+      const auto y = static_cast<float>(i / 8 * 16);
+      draw.splats.push_back(testing::flat_box(x, y, x + 6, y + 6, 0.5F));
+    }
+  }
+  Draw draw;
+  RenderState state;
+};
+
+TEST_F(VpoUnitTest, APrimitiveIsSeenItsLatencyAfterTheVertices) {
+  Bench bench("vpo", "primitive-assembly", state);
+  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
+  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
+  vertices.add(warp_at(0, 1), 20);
+  bench.run();
+  ASSERT_EQ(primitives.records().size(), 2U);
+  EXPECT_EQ(primitives.records()[0].cycle, 21U + 10) << "in hand at 21, latency 10";
+}
+
+TEST_F(VpoUnitTest, AssemblesItsTrianglesPerCycle) {
+  for (const unsigned rate : {1U, 2U, 4U}) {
+    Bench bench("vpo", "primitive-assembly", state, {{"triangles_per_cycle", std::to_string(rate)}});
+    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", 8);
+    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
+    for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
+    bench.run();
+    ASSERT_EQ(primitives.records().size(), 64U);
+    EXPECT_EQ(primitives.records().back().cycle - primitives.records().front().cycle + 1, 64 / rate);
+  }
+}
+
+TEST_F(VpoUnitTest, PrimitivesComeInDrawOrderAndTheEndLast) {
+  Bench bench("vpo", "primitive-assembly", state);
+  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
+  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
+  for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
+  vertices.add(end_of_draw());
+  bench.run();
+  ASSERT_EQ(primitives.records().size(), 65U);
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    EXPECT_EQ(primitives.records()[i].item.primitive.splat, i / 2);
+    EXPECT_EQ(primitives.records()[i].item.primitive.triangle, i % 2);
+  }
+  EXPECT_TRUE(primitives.records()[64].item.end_of_draw);
+  EXPECT_TRUE(bench.unit().idle());
+}
+
+TEST_F(VpoUnitTest, TakesTheGpcsVerticesInTurnHoweverLateOneIs) {
+  Bench bench("vpo", "primitive-assembly", state, {}, 2);
+  Source<VertexWarp>& even = bench.source<VertexWarp>("in_vertices_0");
+  Source<VertexWarp>& odd = bench.source<VertexWarp>("in_vertices_1");
+  Sink<PrimitiveItem>& first = bench.sink<PrimitiveItem>("out_primitives_0");
+  Sink<PrimitiveItem>& second = bench.sink<PrimitiveItem>("out_primitives_1");
+  even.add(warp_at(0, 8), 500);
+  odd.add(warp_at(8, 8));
+  even.add(warp_at(16, 8), 700);
+  odd.add(warp_at(24, 8));
+  even.add(end_of_draw());
+  odd.add(end_of_draw());
+  bench.run();
+  for (const Sink<PrimitiveItem>* sink : {&first, &second}) {
+    std::uint32_t last = 0;
+    for (const auto& record : sink->records()) {
+      if (record.item.end_of_draw) continue;
+      const std::uint32_t order = 2 * record.item.primitive.splat + record.item.primitive.triangle;
+      EXPECT_GE(order, last);
+      last = order;
+    }
+    EXPECT_TRUE(sink->records().back().item.end_of_draw);
+  }
+  EXPECT_TRUE(bench.unit().idle());
+}
+
+TEST_F(VpoUnitTest, APrimitiveGoesToEveryGpcThatOwnsATileOfItsBoundsAndToNoOther) {
+  draw.splats.push_back(testing::flat_box(1, 1, 30, 5, 0.5F));  // tiles (0,0) and (1,0)
+  Bench bench("vpo", "primitive-assembly", state, {}, 4);
+  Source<VertexWarp>* sources[4];
+  Sink<PrimitiveItem>* sinks[4];
+  for (unsigned gpc = 0; gpc < 4; ++gpc) {
+    sources[gpc] = &bench.source<VertexWarp>("in_vertices_" + std::to_string(gpc));
+    sinks[gpc] = &bench.sink<PrimitiveItem>("out_primitives_" + std::to_string(gpc));
+  }
+  sources[0]->add(warp_at(32, 1));
+  bench.run();
+  for (unsigned gpc = 0; gpc < 4; ++gpc) {
+    const bool owns = gpc == owner_of({0, 0}, 4) || gpc == owner_of({1, 0}, 4);
+    EXPECT_EQ(sinks[gpc]->records().size(), owns ? 2U : 0U) << gpc;
+  }
+}
+
+TEST_F(VpoUnitTest, StallsChangeNeitherPrimitivesNorOrder) {
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    Bench bench("vpo", "primitive-assembly", state);
+    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", static_cast<unsigned>(1 + seed % 2));
+    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", static_cast<unsigned>(1 + seed % 5));
+    for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
+    vertices.add(end_of_draw());
+    bench.stall_randomly(seed, 100);
+    bench.shuffle_ticks(seed);
+    bench.run();
+    ASSERT_EQ(primitives.records().size(), 65U) << seed;
+    for (std::uint32_t i = 0; i < 64; ++i) ASSERT_EQ(primitives.records()[i].item.primitive.splat, i / 2) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe
