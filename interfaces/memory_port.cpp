@@ -113,7 +113,9 @@ class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
 
  private:
   void serve(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) {
-    const std::uint64_t arrival = memory_.domain_.now() * memory_.bytes_per_cycle_;
+    // The delay that comes in says how far ahead of the clock the access is.
+    const Cycle ahead = delay.value() / memory_.domain_.period().value();
+    const std::uint64_t arrival = (memory_.domain_.now() + ahead) * memory_.bytes_per_cycle_;
     const std::uint64_t start = free_at_ > arrival ? free_at_ : arrival;
     free_at_ = start + payload.get_data_length();
     bytes += payload.get_data_length();

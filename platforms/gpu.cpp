@@ -10,6 +10,7 @@
 
 #include <vrpipe/error.h>
 #include <vrpipe/random.h>
+#include <vrpipe/timed.h>
 
 namespace vrpipe {
 
@@ -50,7 +51,13 @@ Unit& Gpu::add_unit(const std::string& name, const std::string& slot, const Rend
   }
   std::string module = name;
   std::replace(module.begin(), module.end(), '.', '_');
-  units_.push_back(unit_maker(slot)(module, *clock_, std::move(behaviour), state, gpcs()));
+  const Fidelity fidelity = configuration_.request().fidelity;
+  if (fidelity == Fidelity::cycle) {
+    units_.push_back(unit_maker(slot)(module, *clock_, std::move(behaviour), state, gpcs()));
+  } else {
+    const Transport transport = fidelity == Fidelity::lt ? Transport::blocking : Transport::non_blocking;
+    units_.push_back(timed_unit_maker(slot)(module, *clock_, std::move(behaviour), state, gpcs(), transport));
+  }
   names_.push_back(name);
   return *units_.back();
 }

@@ -256,7 +256,9 @@ double covariance_determinant(const Vec3& m1, const Vec3& m2) {
 EllipseAxes decompose_covariance(const Vec3& m1, const Vec3& m2) {
   // Sigma = [a b; b d]
   const double a = dot(m1, m1), b = dot(m1, m2), d = dot(m2, m2);
-  if (b == 0) {  // axis-aligned: no square root, no division, so exact
+  // Axis-aligned, or turned by less than a double resolves beside the dilation (by a denormal, say): no square root and
+  // no division, so exact.
+  if (std::fabs(b) <= 0x1p-53 * (a + d + kDilation)) {
     if (a >= d) return {a + kDilation, d + kDilation, 1.0, 0.0};
     return {d + kDilation, a + kDilation, 0.0, 1.0};
   }

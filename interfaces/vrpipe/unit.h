@@ -38,7 +38,7 @@ class Unit : public sc_core::sc_module, public Clocked, public PortOwner {
   virtual Cycle end_of_draw() const { return never; }
 
   const StateAccount& account() const { return account_; }
-  void close_account(Cycle end) { account_.close(end); }
+  virtual void close_account(Cycle end) { account_.close(end); }
 
  protected:
   void enter(UnitState state, Cycle now) { account_.enter(state, now); }

@@ -13,7 +13,7 @@
 
 namespace vrpipe {
 
-/// A GPU under construction at cycle fidelity, and then in operation. A platform's `wire` function adds units and
+/// A GPU under construction, at any fidelity with time, and then in operation. A platform's `wire` function adds units and
 /// connects their ports by name; which implementation a slot gets is the configuration's choice, not the diagram's.
 class Gpu {
  public:

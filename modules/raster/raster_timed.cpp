@@ -1,0 +1,87 @@
+#include <vrpipe/timed.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// RASTER at lt and at. Ports as in raster_unit.cpp.
+class TimedRaster : public TimedUnit {
+ public:
+  TimedRaster(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour,
+              Transport transport)
+      : TimedUnit(name, domain, transport),
+        out_(*this, "out_quads"),
+        in_(*this, "in_jobs", [this](const RasterJob& job, Cycle visible) { return rasterize(job, visible); }, {&out_}),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()),
+        coarse_(cost_.coarse_tiles_per_cycle),
+        fine_(cost_.fine_tiles_per_cycle),
+        quads_out_(cost_.quads_per_cycle) {
+    out_.set_pipeline(cost_.setup_latency_cycles - 1, cost_.fine_tiles_per_cycle);
+  }
+
+  std::uint64_t work() const override { return quads_; }
+  double peak_rate() const override { return cost_.quads_per_cycle; }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  Cycle rasterize(const RasterJob& job, Cycle visible) {
+    now_ = std::max({now_, visible, out_.last()});
+    charge(UnitState::starved, now_);
+    if (job.end_of_draw) {
+      QuadBeat end;
+      end.end_of_draw = true;
+      return now_ = out_.send(end, now_);
+    }
+    now_ = std::max(now_, next_setup_);
+    const Cycle setup = now_;
+    next_setup_ = setup + cost_.setup_interval_cycles;
+    charge(UnitState::busy, setup + 1);
+    behaviour_->begin(job.primitive, job.clip);
+    QuadBeat tile;
+    unsigned tests = 0;
+    bool new_screen_tile = false;
+    while (behaviour_->next(tile, tests, new_screen_tile)) {
+      now_ = std::max(coarse_.take(now_, tests), fine_.take(now_));
+      if (new_screen_tile) {
+        now_ = std::max(now_, next_pair_);
+        next_pair_ = now_ + cost_.screen_tile_interval_cycles;
+      }
+      if (tile.count == 0) continue;
+      quads_ += tile.count;
+      now_ = quads_out_.take(now_, tile.count);
+      charge(UnitState::busy, now_);
+      now_ = out_.send(tile, now_);
+      charge(UnitState::blocked, now_);
+      charge(UnitState::busy, now_ + 1);
+    }
+    coarse_.take(now_, tests);
+    return setup;
+  }
+
+  TimedOut<QuadBeat> out_;
+  TimedIn<RasterJob> in_;
+  std::unique_ptr<RasterBehaviour> behaviour_;
+  const RasterBehaviour::Cost cost_;
+  Flow coarse_;
+  Lane fine_;
+  Flow quads_out_;
+  Cycle now_ = 0;  ///< how far the primitive in hand has come
+  Cycle next_pair_ = 0;
+  Cycle next_setup_ = 0;
+  std::uint64_t quads_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_timed_unit_maker("raster", [](const std::string& name, ClockDomain& domain,
+                                         std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
+                                         Transport transport) {
+    return std::make_unique<TimedRaster>(name.c_str(), domain, behaviour_as<RasterBehaviour>(std::move(behaviour)),
+                                         transport);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

@@ -1,0 +1,180 @@
+#include <algorithm>
+#include <deque>
+
+#include <vrpipe/timed.h>
+
+namespace vrpipe {
+
+namespace {
+
+constexpr std::uint16_t no_slot = 0xffff;
+
+/// The SM array at lt and at. Ports as in sm_unit.cpp. A warp has its scheduler for all its instructions at once, then
+/// waits for all its latencies: with several warps that is what issuing segment by segment comes to. Vertex warps take
+/// issue slots from fragment warps but do not wait for them; they are few.
+class TimedSm : public TimedUnit {
+ public:
+  TimedSm(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour,
+          Transport transport)
+      : TimedUnit(name, domain, transport),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()),
+        cycles_per_instruction_(32 / cost_.lanes_per_scheduler),
+        vertex_(program({&cost_.vertex})),
+        fragment_(program({&cost_.fragment})),
+        merged_(program({&cost_.fragment, &cost_.merge})),
+        out_vertices_(*this, "out_vertices"),
+        out_shaded_(*this, "out_shaded"),
+        in_release_(*this, "in_release", [this](const WarpRelease& release, Cycle visible) { return free(release, visible); }),
+        in_warps_(*this, "in_warps", [this](const Warp& warp, Cycle visible) { return shade(warp, visible); },
+                  {&out_shaded_}),
+        in_vertices_(*this, "in_vertices",
+                     [this](const VertexWarp& warp, Cycle visible) { return shade_vertices(warp, visible); },
+                     {&out_vertices_}),
+        scheduler_free_at_(std::size_t{cost_.cores} * cost_.schedulers_per_core, 0),
+        slots_(std::size_t{cost_.cores} * cost_.warps_per_core, 0),
+        vertex_slots_(cost_.vertex_warps, 0) {
+    in_warps_.set_gate([this] { return !slots_.empty(); });
+  }
+
+  std::uint64_t work() const override { return instructions_; }
+  double peak_rate() const override {
+    return static_cast<double>(scheduler_free_at_.size()) / static_cast<double>(cycles_per_instruction_);
+  }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  struct Program {
+    std::uint64_t instructions = 0;
+    Cycle issue = 0;    ///< cycles that it has the scheduler
+    Cycle latency = 0;  ///< of its stalls
+  };
+
+  Program program(std::initializer_list<const std::vector<ShaderSegment>*> parts) const {
+    Program sum;
+    for (const auto* part : parts) {
+      for (const ShaderSegment& segment : *part) {
+        sum.instructions += segment.instructions;
+        sum.latency += segment.stall_cycles;
+      }
+    }
+    sum.issue = sum.instructions * cycles_per_instruction_;
+    return sum;
+  }
+
+  ShadedWarp& take_from_pool() {
+    for (std::size_t tried = 0; tried < pool_.size(); ++tried) {
+      pool_at_ = pool_at_ + 1 == pool_.size() ? 0 : pool_at_ + 1;
+      if (pool_[pool_at_].holders == 0) return pool_[pool_at_];
+    }
+    pool_.emplace_back();
+    pool_at_ = pool_.size() - 1;
+    return pool_.back();
+  }
+
+  std::size_t choose_scheduler(TileId tile) {
+    if (!(tile == last_tile_) || sent_to_core_ == cost_.warps_to_one_core) {
+      core_ = core_ + 1 == cost_.cores ? 0 : core_ + 1;
+      sent_to_core_ = 0;
+    }
+    last_tile_ = tile;
+    ++sent_to_core_;
+    return std::size_t{core_} * cost_.schedulers_per_core + turn_++ % cost_.schedulers_per_core;
+  }
+
+  Cycle shade(const Warp& warp, Cycle visible) {
+    Cycle launch = std::max(visible, next_launch_);
+    ShadedWarp& shaded = take_from_pool();
+    shaded.holders = 1;
+    if (warp.end_of_draw) {
+      shaded.end_of_draw = true;
+      shaded.sequence = warp.sequence;
+      shaded.count = 0;
+      shaded.slot = no_slot;
+      out_shaded_.send({&shaded}, std::max(launch, last_done_));
+      return launch;
+    }
+    charge(UnitState::memory, std::min(launch, last_done_));
+    charge(UnitState::starved, launch);
+    launch = std::max(launch, slots_.front());
+    slots_.pop_front();
+    charge(UnitState::blocked, launch);
+    next_launch_ = launch + 1;
+
+    const Program& needed = warp.merge_pairs != 0 ? merged_ : fragment_;
+    Cycle& free_at = scheduler_free_at_[choose_scheduler(warp.tile)];
+    free_at = std::max(free_at, launch) + needed.issue;
+    instructions_ += needed.instructions;
+    const Cycle done = free_at + needed.latency;
+    last_done_ = std::max(last_done_, done);
+    charge(UnitState::busy, free_at);
+
+    behaviour_->shade(warp, shaded);
+    shaded.slot = 0;
+    out_shaded_.send({&shaded}, done);
+    return launch;
+  }
+
+  Cycle shade_vertices(const VertexWarp& warp, Cycle visible) {
+    Cycle launch = std::max(visible, next_vertex_launch_);
+    if (!warp.end_of_draw) {
+      launch = std::max(launch, vertex_slots_[vertex_turn_]);
+      Cycle& free_at = scheduler_free_at_[vertex_scheduler_++ % scheduler_free_at_.size()];
+      free_at = std::max(free_at, launch) + vertex_.issue;
+      instructions_ += vertex_.instructions;
+      behaviour_->shade_vertices(warp);
+      vertices_done_ = std::max(vertices_done_, launch + vertex_.issue + vertex_.latency);
+    }
+    next_vertex_launch_ = launch + 1;
+    // Vertex warps leave in order.
+    const Cycle taken = out_vertices_.send(warp, std::max(vertices_done_, launch));
+    vertex_slots_[vertex_turn_] = taken + 1;
+    vertex_turn_ = vertex_turn_ + 1 == cost_.vertex_warps ? 0 : vertex_turn_ + 1;
+    return launch;
+  }
+
+  Cycle free(const WarpRelease& release, Cycle visible) {
+    if (release.slot != no_slot) slots_.push_back(visible);
+    return visible;
+  }
+
+  std::unique_ptr<SmBehaviour> behaviour_;
+  const SmBehaviour::Cost cost_;
+  const Cycle cycles_per_instruction_;
+  const Program vertex_;
+  const Program fragment_;
+  const Program merged_;
+  TimedOut<VertexWarp> out_vertices_;
+  TimedOut<ShadedWarpItem> out_shaded_;
+  TimedIn<WarpRelease> in_release_;
+  TimedIn<Warp> in_warps_;
+  TimedIn<VertexWarp> in_vertices_;
+  std::vector<Cycle> scheduler_free_at_;
+  std::deque<Cycle> slots_;          ///< for fragment warps: when each that is free, or known to become so, is
+  std::vector<Cycle> vertex_slots_;  ///< a ring
+  std::uint32_t vertex_turn_ = 0;
+  std::uint64_t vertex_scheduler_ = 0;
+  Cycle next_vertex_launch_ = 0;
+  Cycle vertices_done_ = 0;
+  Cycle next_launch_ = 0;
+  Cycle last_done_ = 0;
+  TileId last_tile_;
+  std::uint32_t core_ = 0;
+  std::uint32_t sent_to_core_ = 0;
+  std::uint32_t turn_ = 0;
+  std::deque<ShadedWarp> pool_;
+  std::size_t pool_at_ = 0;
+  std::uint64_t instructions_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_timed_unit_maker("sm", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                     const RenderState&, unsigned, Transport transport) {
+    return std::make_unique<TimedSm>(name.c_str(), domain, behaviour_as<SmBehaviour>(std::move(behaviour)), transport);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

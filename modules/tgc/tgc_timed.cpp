@@ -1,0 +1,91 @@
+#include <vrpipe/timed.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// TGC at lt and at. Ports as in tgc_unit.cpp.
+class TimedTgc : public TimedUnit {
+ public:
+  TimedTgc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TgcBehaviour> behaviour,
+           Transport transport)
+      : TimedUnit(name, domain, transport),
+        out_(*this, "out_jobs"),
+        in_(*this, "in_primitives",
+            [this](const PrimitiveItem& item, Cycle visible) { return item.end_of_draw ? drain(visible) : enter_bins(item, visible); },
+            {&out_}),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()),
+        entries_(cost_.items_per_cycle) {
+    out_.set_pipeline(cost_.latency_cycles - 1, 1);
+  }
+
+  std::uint64_t work() const override { return steps_; }
+  double peak_rate() const override { return cost_.items_per_cycle; }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  Cycle enter_bins(const PrimitiveItem& item, Cycle visible) {
+    behaviour_->begin(item.primitive);
+    if (!behaviour_->entering()) return visible;
+    const Cycle first = step(visible);
+    while (behaviour_->entering()) step(first);
+    return first;
+  }
+
+  Cycle step(Cycle earliest) {
+    const Cycle at = entries_.take(earliest);
+    charge(UnitState::starved, at);
+    charge(UnitState::busy, at + 1);
+    ++steps_;
+    if (behaviour_->step(flush_)) read_out(at);
+    return at;
+  }
+
+  /// Hands on the flush of a cycle, one primitive a cycle. Bins fill on meanwhile, up to the next flush.
+  void read_out(Cycle flushed) {
+    Cycle at = std::max({flushed + 1, read_, out_.last() + 1});
+    entries_.hold(at);
+    RasterJob job;
+    job.clip = flush_.clip;
+    for (const Primitive& primitive : flush_.primitives) {
+      job.primitive = primitive;
+      const Cycle taken = out_.send(job, at);
+      charge(UnitState::blocked, taken);
+      charge(UnitState::busy, taken + 1);
+      at = taken + 1;
+    }
+    read_ = at;
+  }
+
+  Cycle drain(Cycle visible) {
+    const Cycle left = entries_.take(visible);
+    entries_.hold(left + 1);
+    while (behaviour_->drain(flush_)) read_out(entries_.take(left));
+    RasterJob end;
+    end.end_of_draw = true;
+    out_.send(end, std::max(read_, left + 1));
+    return left;
+  }
+
+  TimedOut<RasterJob> out_;
+  TimedIn<PrimitiveItem> in_;
+  std::unique_ptr<TgcBehaviour> behaviour_;
+  const Throughput cost_;
+  TgcBehaviour::Flush flush_;
+  Lane entries_;
+  Cycle read_ = 0;  ///< the last flush has been read out
+  std::uint64_t steps_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_timed_unit_maker("tgc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                      const RenderState&, unsigned, Transport transport) {
+    return std::make_unique<TimedTgc>(name.c_str(), domain, behaviour_as<TgcBehaviour>(std::move(behaviour)), transport);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

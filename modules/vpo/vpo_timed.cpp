@@ -1,0 +1,104 @@
+#include <vrpipe/timed.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// VPO at lt and at. Ports as in vpo_unit.cpp.
+class TimedVpo : public TimedUnit {
+ public:
+  TimedVpo(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<VpoBehaviour> behaviour,
+           unsigned gpcs, Transport transport)
+      : TimedUnit(name, domain, transport),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()),
+        gpcs_(gpcs),
+        lane_(cost_.items_per_cycle) {
+    std::vector<TimedOutput*> sends_to;
+    for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
+      outs_.push_back(std::make_unique<TimedOut<PrimitiveItem>>(*this, "out_primitives_" + std::to_string(gpc)));
+      outs_.back()->set_pipeline(cost_.latency_cycles - 1, cost_.items_per_cycle);
+      sends_to.push_back(outs_.back().get());
+    }
+    for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
+      ins_.push_back(std::make_unique<TimedIn<VertexWarp>>(
+          *this, "in_vertices_" + std::to_string(gpc),
+          [this](const VertexWarp& warp, Cycle visible) { return assemble(warp, visible); }, sends_to));
+      ins_.back()->set_gate([this, gpc] { return turn_ == gpc; });
+    }
+  }
+
+  std::uint64_t work() const override { return assembled_; }
+  double peak_rate() const override { return cost_.items_per_cycle; }
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  /// To every GPC concerned; returns the cycle in which the last has taken it.
+  Cycle send(const PrimitiveItem& item, Cycle at) {
+    Cycle taken = at;
+    for (unsigned gpc = 0; gpc < gpcs_; ++gpc) {
+      if (item.end_of_draw || concerns(item.primitive, gpcs_, gpc)) taken = std::max(taken, outs_[gpc]->send(item, at));
+    }
+    return taken;
+  }
+
+  Cycle assemble(const VertexWarp& warp, Cycle visible) {
+    turn_ = turn_ + 1 == gpcs_ ? 0 : turn_ + 1;
+    for (const auto& out : outs_) lane_.hold(out->last());
+    if (warp.end_of_draw) {
+      // The GPCs' ends follow one another; the first stands for all, since no warp comes after it.
+      const Cycle at = lane_.take(visible);
+      if (!ended_) {
+        PrimitiveItem end;
+        end.end_of_draw = true;
+        send(end, at);
+        ended_ = true;
+      }
+      return at;
+    }
+    Cycle left = never;
+    for (std::uint32_t splat = warp.first_splat; splat < warp.first_splat + warp.splats; ++splat) {
+      std::array<Primitive, 2> primitives;
+      const unsigned count = behaviour_->assemble(splat, primitives);
+      assembled_ += 2;
+      // Culled triangles take their turn as well.
+      for (unsigned i = 0; i < std::max(count, 1U); ++i) {
+        const Cycle at = lane_.take(visible);
+        left = std::min(left, at);
+        charge(UnitState::starved, at);
+        if (i < count) {
+          PrimitiveItem item;
+          item.primitive = primitives[i];
+          const Cycle taken = send(item, at);
+          charge(UnitState::blocked, taken);
+          lane_.hold(taken);
+        }
+        charge(UnitState::busy, at + 1);
+      }
+    }
+    return left;
+  }
+
+  std::unique_ptr<VpoBehaviour> behaviour_;
+  const Throughput cost_;
+  const unsigned gpcs_;
+  std::vector<std::unique_ptr<TimedOut<PrimitiveItem>>> outs_;
+  std::vector<std::unique_ptr<TimedIn<VertexWarp>>> ins_;
+  Lane lane_;
+  unsigned turn_ = 0;
+  bool ended_ = false;
+  std::uint64_t assembled_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_timed_unit_maker("vpo", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                      const RenderState&, unsigned gpcs, Transport transport) {
+    return std::make_unique<TimedVpo>(name.c_str(), domain, behaviour_as<VpoBehaviour>(std::move(behaviour)), gpcs,
+                                      transport);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe
