@@ -42,10 +42,12 @@ void frame(benchmark::State& state, const char* variant, Fidelity fidelity) {
   if (cycles != 0) state.counters["cycles_per_second"] = static_cast<double>(cycles) / host_seconds;
 }
 
-#define FRAMES(fidelity)                                                                                           \
-  BENCHMARK_CAPTURE(frame, fidelity##_baseline, "baseline", Fidelity::fidelity)->UseManualTime()->Unit(benchmark::kSecond); \
-  BENCHMARK_CAPTURE(frame, fidelity##_qm, "qm", Fidelity::fidelity)->UseManualTime()->Unit(benchmark::kSecond);             \
-  BENCHMARK_CAPTURE(frame, fidelity##_het, "het", Fidelity::fidelity)->UseManualTime()->Unit(benchmark::kSecond);           \
+#define FRAMES(fidelity)                                                                                          \
+  BENCHMARK_CAPTURE(frame, fidelity##_baseline, "baseline", Fidelity::fidelity)                                   \
+      ->UseManualTime()                                                                                           \
+      ->Unit(benchmark::kSecond);                                                                                 \
+  BENCHMARK_CAPTURE(frame, fidelity##_qm, "qm", Fidelity::fidelity)->UseManualTime()->Unit(benchmark::kSecond);   \
+  BENCHMARK_CAPTURE(frame, fidelity##_het, "het", Fidelity::fidelity)->UseManualTime()->Unit(benchmark::kSecond); \
   BENCHMARK_CAPTURE(frame, fidelity##_het_qm, "het+qm", Fidelity::fidelity)->UseManualTime()->Unit(benchmark::kSecond)
 
 FRAMES(functional);

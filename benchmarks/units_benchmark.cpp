@@ -106,7 +106,8 @@ const Frame& frame() {
 
 void report_quads(benchmark::State& state, std::uint64_t quads) {
   state.counters["quads_per_second"] =
-      benchmark::Counter(static_cast<double>(quads) * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+      benchmark::Counter(static_cast<double>(quads) * static_cast<double>(state.iterations()),
+                         benchmark::Counter::kIsRate);
 }
 
 std::uint64_t quads_of(const std::vector<QuadBeat>& beats) {

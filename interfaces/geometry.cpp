@@ -116,7 +116,9 @@ std::int64_t doubled_area(const SnappedTriangle& t) {
 PixelRect covered_bounds(const SnappedTriangle& t, unsigned subpixel_bits, std::uint32_t width, std::uint32_t height) {
   const std::int32_t half = std::int32_t{1} << (subpixel_bits - 1);
   // The sample of pixel p is at p + 1/2: the first at or right of x is ceil(x - 1/2), the last at or left is floor.
-  const auto first = [&](std::int32_t v) { return (v - half + (std::int32_t{1} << subpixel_bits) - 1) >> subpixel_bits; };
+  const auto first = [&](std::int32_t v) {
+    return (v - half + (std::int32_t{1} << subpixel_bits) - 1) >> subpixel_bits;
+  };
   const auto last = [&](std::int32_t v) { return (v - half) >> subpixel_bits; };
   PixelRect bounds;
   bounds.x0 = std::max(first(*std::min_element(t.x.begin(), t.x.end())), 0);

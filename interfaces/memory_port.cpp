@@ -59,8 +59,7 @@ unsigned MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsi
 
 void MemoryPort::complete(Slot& slot, const sc_core::sc_time& delay) {
   if (slot.is_response_error()) {
-    throw SimulationFault(socket.name(), clock_.domain->now(),
-                          "the memory answered " + slot.get_response_string());
+    throw SimulationFault(socket.name(), clock_.domain->now(), "the memory answered " + slot.get_response_string());
   }
   slot.answered = true;
   const Cycle at = clock_.domain->edge_after(delay);
@@ -119,8 +118,7 @@ class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
     const std::uint64_t start = free_at_ > arrival ? free_at_ : arrival;
     free_at_ = start + payload.get_data_length();
     bytes += payload.get_data_length();
-    const std::uint64_t transfer =
-        (free_at_ - arrival + memory_.bytes_per_cycle_ - 1) / memory_.bytes_per_cycle_;
+    const std::uint64_t transfer = (free_at_ - arrival + memory_.bytes_per_cycle_ - 1) / memory_.bytes_per_cycle_;
     delay += sc_core::sc_time::from_value((memory_.latency_cycles_ + transfer) * memory_.domain_.period().value());
     payload.set_response_status(tlm::TLM_OK_RESPONSE);
   }

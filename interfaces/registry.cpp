@@ -20,14 +20,16 @@ Registry& Registry::instance() {
 }
 
 const std::vector<std::string>& Registry::slots() {
-  static const std::vector<std::string> names{"draw", "vpo", "tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"};
+  static const std::vector<std::string> names{"draw", "vpo",  "tgc", "raster", "tc",
+                                              "prop", "zrop", "qru", "sm",     "crop"};
   return names;
 }
 
 void Registry::add(Implementation implementation) {
   for (const auto& known : implementations_) {
     if (known->slot == implementation.slot && known->name == implementation.name) {
-      problems_.push_back("slot " + implementation.slot + " has an implementation '" + implementation.name + "' already");
+      problems_.push_back("slot " + implementation.slot + " has an implementation '" + implementation.name +
+                          "' already");
       return;
     }
   }
@@ -90,8 +92,8 @@ void load_plugin(const std::string& path) {
     throw UserError("cannot load plugin", path, "it was built for " + tag + ", this is " VRPIPE_PLUGIN_TAG, remedy);
   }
   const std::size_t before = Registry::instance().all().size();
-  // Plugins stay loaded to the end of the process: their units live in the registry.
-  static std::vector<boost::dll::shared_library> loaded;
+  // Plugins are never unloaded, not even at exit: the registry holds code of theirs.
+  static auto& loaded = *new std::vector<boost::dll::shared_library>;
   boost::dll::fs::error_code error;
   boost::dll::shared_library library(std::filesystem::absolute(path), error, boost::dll::load_mode::rtld_now);
   if (error) {

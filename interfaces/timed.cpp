@@ -38,7 +38,8 @@ Cycle TimedUnit::tick(Cycle now) {
   return std::max(next, now + 1);
 }
 
-TimedMemoryPort::TimedMemoryPort(PortOwner& owner, const std::string& name) : socket(name.c_str()), clock_(owner.clock) {
+TimedMemoryPort::TimedMemoryPort(PortOwner& owner, const std::string& name)
+    : socket(name.c_str()), clock_(owner.clock) {
   socket.bind(*this);
   payload_.set_byte_enable_ptr(nullptr);
 }

@@ -89,7 +89,8 @@ void PhaseBound::end_phase() {
   for (unsigned stage = 0; stage < stages; ++stage) {
     double begin = 0;
     for (unsigned before = 0; before <= stage; ++before) begin = std::max(begin, end_[before]);
-    for (unsigned after = stage + 1; stage >= raster && after < stages; ++after) begin = std::max(begin, end_before_[after]);
+    for (unsigned after = stage + 1; stage >= raster && after < stages; ++after)
+      begin = std::max(begin, end_before_[after]);
     end[stage] = begin + cycles[stage];
     if (stage > 0) end[stage] = std::max(end[stage], end[stage - 1]);
   }
@@ -102,9 +103,10 @@ void PhaseBound::end_phase() {
 double PhaseBound::cycles() const { return *std::max_element(end_.begin(), end_.end()); }
 
 double PhaseBound::busy_cycles(const std::string& slot) const {
-  static const std::map<std::string, Stage> stage_of{{"draw", draw}, {"vpo", vpo},   {"tgc", tgc}, {"raster", raster},
-                                                     {"tc", tc},     {"prop", color}, {"zrop", test}, {"qru", qru},
-                                                     {"sm", sm},     {"crop", crop}};
+  static const std::map<std::string, Stage> stage_of{{"draw", draw},     {"vpo", vpo}, {"tgc", tgc},
+                                                     {"raster", raster}, {"tc", tc},   {"prop", color},
+                                                     {"zrop", test},     {"qru", qru}, {"sm", sm},
+                                                     {"crop", crop}};
   return cycles_of(total_)[stage_of.at(slot)];
 }
 

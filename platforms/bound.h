@@ -72,7 +72,7 @@ class PhaseBound {
   std::uint32_t l2_bytes_per_cycle_;
   std::uint64_t warps_in_phase_;
   Work total_;
-  std::array<double, stages> end_{};       ///< of the last phase
+  std::array<double, stages> end_{};         ///< of the last phase
   std::array<double, stages> end_before_{};  ///< of the phase before it
 };
 

@@ -8,11 +8,11 @@ namespace vrpipe {
 
 const Implementation& default_implementation(const std::string& slot, const Variant& variant) {
   const bool absent = !variant.quad_merging && (slot == "tgc" || slot == "qru");
-  static const std::map<std::string, std::string> real{
-      {"draw", "vertex-issue"},     {"vpo", "primitive-assembly"}, {"tgc", "tile-grid-coalescing"},
-      {"raster", "tile-rasterizer"}, {"tc", "tile-coalescing"},     {"prop", "pre-rop"},
-      {"zrop", "depth-stencil-rop"}, {"qru", "pairing"},            {"sm", "splat-shader"},
-      {"crop", "color-rop"}};
+  static const std::map<std::string, std::string> real{{"draw", "vertex-issue"},        {"vpo", "primitive-assembly"},
+                                                       {"tgc", "tile-grid-coalescing"}, {"raster", "tile-rasterizer"},
+                                                       {"tc", "tile-coalescing"},       {"prop", "pre-rop"},
+                                                       {"zrop", "depth-stencil-rop"},   {"qru", "pairing"},
+                                                       {"sm", "splat-shader"},          {"crop", "color-rop"}};
   return Registry::instance().find(slot, absent ? "pass-through" : real.at(slot));
 }
 
@@ -82,7 +82,8 @@ std::unique_ptr<Behaviour> Configuration::make(const std::string& slot, unsigned
 std::vector<std::pair<std::string, std::string>> Configuration::parameters() const {
   std::vector<std::pair<std::string, std::string>> all;
   const auto add = [&](const std::string& unit, const ParameterSet& set) {
-    for (const Parameter* parameter : set.parameters()) all.emplace_back(unit + "." + parameter->name(), parameter->value());
+    for (const Parameter* parameter : set.parameters())
+      all.emplace_back(unit + "." + parameter->name(), parameter->value());
   };
   for (const std::string& name : Registry::slots()) add(name, *slots_.at(name).real_parameters);
   add("l2", l2_);

@@ -29,8 +29,8 @@ std::pair<std::string, std::string> split_port(const std::string& port) {
 Gpu::Gpu(const Configuration& configuration, ColorSurface& surface)
     : configuration_(configuration),
       surface_(surface),
-      clock_(std::make_unique<ClockDomain>(
-          "clock", static_cast<std::uint64_t>(std::llround(1e6 / configuration.platform().frequency_mhz)))),
+      clock_(std::make_unique<ClockDomain>("clock", static_cast<std::uint64_t>(
+                                                        std::llround(1e6 / configuration.platform().frequency_mhz)))),
       l2_(std::make_unique<FixedLatencyMemory>("l2", *clock_, configuration.l2().latency_cycles,
                                                configuration.l2().bytes_per_cycle, configuration.platform().gpcs)) {
   configuration.platform().wire(*this);

@@ -27,17 +27,20 @@ const char* name_of(Fidelity fidelity) {
 
 Fidelity fidelity_named(const std::string& name) {
   std::vector<std::string> names;
-  for (const Fidelity fidelity : {Fidelity::functional, Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+  // lt and at exist as timed units, but do not pass the property tests yet.
+  for (const Fidelity fidelity : {Fidelity::functional, Fidelity::bound, Fidelity::cycle}) {
     if (name == name_of(fidelity)) return fidelity;
     names.emplace_back(name_of(fidelity));
   }
-  throw UserError("unknown fidelity '" + name + "'", "--fidelity", "there is no such fidelity",
-                  "did you mean " + nearest_name(name, names) + "? There are functional, bound, lt, at and cycle");
+  throw UserError("unknown fidelity '" + name + "'", "--fidelity", "this build has no such fidelity",
+                  "did you mean " + nearest_name(name, names) + "? There are functional, bound and cycle");
 }
 
 const std::vector<Variant>& variants() {
-  static const std::vector<Variant> all{
-      {"baseline", false, false}, {"qm", true, false}, {"het", false, true}, {"het+qm", true, true}};
+  static const std::vector<Variant> all{{"baseline", false, false},
+                                        {"qm", true, false},
+                                        {"het", false, true},
+                                        {"het+qm", true, true}};
   return all;
 }
 
@@ -313,8 +316,8 @@ std::vector<ParameterListing> list_parameters(const Platform* platform) {
     }
     listings.push_back(std::move(listing));
   }
-  listings.push_back({"l2", "fixed-latency", "the shared L2: fixed latency, a number of bytes a cycle for each GPC", false,
-                      std::make_unique<L2Parameters>()});
+  listings.push_back({"l2", "fixed-latency", "the shared L2: fixed latency, a number of bytes a cycle for each GPC",
+                      false, std::make_unique<L2Parameters>()});
   apply("l2", *listings.back().parameters);
   listings.push_back({"state", "draw-state", "the draw's state and the precision of the fixed-function hardware", false,
                       std::make_unique<StateParameters>()});

@@ -58,8 +58,12 @@ void paint_locomotive(ScenePainter& painter) {
     return within(ring, 0.0, 0.2) ? Vec3{0.16, 0.16, 0.18} : black;
   };
   painter.surface(disc_surface({1.03, 0.78, 0}, {1, 0, 0}, 0, 0.32), door, fine);
-  painter.cylinder({1.0, 1.14, 0}, {1.12, 1.14, 0}, 0.075, 0.085,
-                   [=](const Vec3& p, double, double) { return p[0] > 1.115 ? Vec3{1.6, 1.5, 1.1} : brass; }, fine);
+  painter.cylinder(
+      {1.0, 1.14, 0}, {1.12, 1.14, 0}, 0.075, 0.085,
+      [=](const Vec3& p, double, double) {
+        return p[0] > 1.115 ? Vec3{1.6, 1.5, 1.1} : brass;
+      },
+      fine);
 
   // Chimney, dome, whistle.
   const Paint chimney = [=](const Vec3& p, double, double) { return p[1] > 1.43 ? brass : black; };
@@ -85,21 +89,28 @@ void paint_locomotive(ScenePainter& painter) {
   painter.box({-0.71, 1.39, 0}, {0.42, 0.035, 0.49}, plain(black), body);
 
   // Frame, buffer beam, buffers, cow catcher.
-  painter.box({0.12, 0.43, 0}, {1.18, 0.05, 0.40},
-              [=](const Vec3& p, double, double) { return std::fabs(p[2]) > 0.36 ? red : Vec3{0.13, 0.13, 0.14}; }, body);
+  painter.box(
+      {0.12, 0.43, 0}, {1.18, 0.05, 0.40},
+      [=](const Vec3& p, double, double) {
+        return std::fabs(p[2]) > 0.36 ? red : Vec3{0.13, 0.13, 0.14};
+      },
+      body);
   painter.box({1.33, 0.42, 0}, {0.04, 0.10, 0.43}, plain(red), fine);
   for (const double z : {-0.27, 0.27}) {
     painter.cylinder({1.37, 0.43, z}, {1.47, 0.43, z}, 0.04, 0.04, plain(black), fine);
     painter.cylinder({1.46, 0.43, z}, {1.49, 0.43, z}, 0.085, 0.085, plain(Vec3{0.45, 0.45, 0.48}), fine);
   }
-  const Paint bars = [=](const Vec3&, double u, double) { return fraction(u * 7) < 0.55 ? red : Vec3{0.03, 0.03, 0.03}; };
+  const Paint bars = [=](const Vec3&, double u, double) {
+    return fraction(u * 7) < 0.55 ? red : Vec3{0.03, 0.03, 0.03};
+  };
   painter.surface(quad_surface({1.36, 0.31, -0.36}, {0, 0, 0.72}, {0.24, -0.2, 0}), bars, fine);
 
   // Cylinders, wheels and rods on both sides.
   for (const double side : {-1.0, 1.0}) {
     const double z = 0.36 * side;
-    painter.cylinder({0.78, 0.36, z + 0.04 * side}, {1.14, 0.36, z + 0.04 * side}, 0.13, 0.13,
-                     [=](const Vec3& p, double, double) { return within(p[0], 0.82, 1.10) ? green : brass; }, fine);
+    painter.cylinder(
+        {0.78, 0.36, z + 0.04 * side}, {1.14, 0.36, z + 0.04 * side}, 0.13, 0.13,
+        [=](const Vec3& p, double, double) { return within(p[0], 0.82, 1.10) ? green : brass; }, fine);
     const auto wheel = [&](double x, double radius) {
       const Paint spokes = [=](const Vec3& p, double u, double) {
         const double dx = p[0] - x, dy = p[1] - radius;
@@ -137,7 +148,8 @@ void paint_locomotive(ScenePainter& painter) {
     const double height = 1.02 + 0.10 * (1 - (x + 1.6) * (x + 1.6) / 0.14);
     const double shade = painter.random().uniform(0.05, 0.15);
     painter.block_ball({x, height, z}, {size, size, size});
-    painter.surface(ellipsoid_surface({x, height, z}, {size, size * 0.8, size}), plain({shade, shade, shade * 1.1}), fine);
+    painter.surface(ellipsoid_surface({x, height, z}, {size, size * 0.8, size}), plain({shade, shade, shade * 1.1}),
+                    fine);
   }
 
   // Rails, sleepers.
@@ -170,11 +182,12 @@ void paint_locomotive(ScenePainter& painter) {
   painter.surface(disc_surface({0, -0.09, 0}, {0, 1, 0}, 0, 3.4), meadow, ground);
   Brush rim = ground;
   rim.sigma_pixels = 2.0;
-  painter.surface(frustum_surface({0, -0.36, 0}, {0, -0.09, 0}, 3.45, 3.4),
-                  [](const Vec3& p, double u, double) {
-                    return mix({0.30, 0.17, 0.09}, {0.44, 0.27, 0.14}, fractal_noise({u * 60, p[1] * 30, 0}, 3));
-                  },
-                  rim);
+  painter.surface(
+      frustum_surface({0, -0.36, 0}, {0, -0.09, 0}, 3.45, 3.4),
+      [](const Vec3& p, double u, double) {
+        return mix({0.30, 0.17, 0.09}, {0.44, 0.27, 0.14}, fractal_noise({u * 60, p[1] * 30, 0}, 3));
+      },
+      rim);
   painter.block_box({0, -0.23, 0}, {2.4, 0.13, 2.4});
   const Paint table = [](const Vec3& p, double, double) {
     const double plank = std::floor(p[2] / 0.9);
@@ -287,7 +300,8 @@ void paint_room(ScenePainter& painter) {
     const double shift = hash_fraction(plank, 5) * 2;
     const double board = std::floor((p[2] + shift) / 1.4);
     const double grain = fractal_noise({p[0] * 30, plank + board * 3, p[2] * 2.5}, 3);
-    const Vec3 wood = mix({0.50, 0.32, 0.18}, {0.76, 0.55, 0.34}, 0.6 * grain + 0.5 * hash_fraction(plank * 7 + board, 6) - 0.05);
+    const Vec3 wood =
+        mix({0.50, 0.32, 0.18}, {0.76, 0.55, 0.34}, 0.6 * grain + 0.5 * hash_fraction(plank * 7 + board, 6) - 0.05);
     return fraction(p[0] / 0.22) < 0.04 || fraction((p[2] + shift) / 1.4) < 0.008 ? wood * 0.55 : wood;
   };
   Brush floor_brush = wall;
@@ -420,8 +434,12 @@ void paint_room(ScenePainter& painter) {
   painter.cylinder({-1.55, 0.03, 2.35}, {-1.55, 1.45, 2.35}, 0.016, 0.016, plain({0.16, 0.16, 0.17}), fine);
   Brush glow = thing;
   glow.emission = 0.85;
-  painter.surface(frustum_surface({-1.55, 1.40, 2.35}, {-1.55, 1.76, 2.35}, 0.27, 0.17),
-                  [](const Vec3& p, double, double) { return mix({1.35, 1.05, 0.62}, {0.98, 0.80, 0.55}, (p[1] - 1.4) / 0.36); }, glow);
+  painter.surface(
+      frustum_surface({-1.55, 1.40, 2.35}, {-1.55, 1.76, 2.35}, 0.27, 0.17),
+      [](const Vec3& p, double, double) {
+        return mix({1.35, 1.05, 0.62}, {0.98, 0.80, 0.55}, (p[1] - 1.4) / 0.36);
+      },
+      glow);
   painter.cylinder({-2.35, 0, 2.2}, {-2.35, 0.42, 2.2}, 0.17, 0.23, plain({0.78, 0.42, 0.28}), fine);
   const Paint leaf = [](const Vec3& p, double u, double) {
     return mix({0.08, 0.26, 0.10}, {0.36, 0.58, 0.22}, 0.6 * u + 0.5 * value_noise(p * 12.0));
@@ -522,7 +540,8 @@ void paint_street(ScenePainter& painter) {
         const double storey = fraction(p[1] / 1.55), bay = fraction((along + 2.7) / 1.35);
         if (p[1] > top - 0.14) return tint * 1.12;
         if (front && p[1] < 1.45 && within(along, -0.38, 0.38)) {
-          return p[1] > 1.36 || std::fabs(along) > 0.32 ? Vec3{0.95, 0.94, 0.9} : Vec3{0.30, 0.14, 0.08} * (1 + hash_fraction(key, 4));
+          return p[1] > 1.36 || std::fabs(along) > 0.32 ? Vec3{0.95, 0.94, 0.9}
+                                                        : Vec3{0.30, 0.14, 0.08} * (1 + hash_fraction(key, 4));
         }
         if (p[1] > 0.1 && within(storey, 0.30, 0.80) && within(bay, 0.24, 0.76)) {
           if (!within(storey, 0.34, 0.76) || !within(bay, 0.29, 0.71)) return Vec3{0.96, 0.95, 0.92};
@@ -541,7 +560,8 @@ void paint_street(ScenePainter& painter) {
       const double rise = 1.7, eave = 3.05;
       for (const double slope : {-1.0, 1.0}) {
         const Vec3 corner = {x + slope * eave, top - 0.15, z - slope * (depth + 0.15)};
-        painter.surface(quad_surface(corner, {0, 0, slope * (2 * depth + 0.3)}, {-slope * eave, rise + 0.15, 0}), tiles, house);
+        painter.surface(quad_surface(corner, {0, 0, slope * (2 * depth + 0.3)}, {-slope * eave, rise + 0.15, 0}), tiles,
+                        house);
       }
       painter.block_box({x, top + 0.4, z}, {1.6, 0.5, depth});
       for (const double end : {-1.0, 1.0}) {
@@ -563,8 +583,12 @@ void paint_street(ScenePainter& painter) {
   const auto tree = [&](double x, double z, double size, double key) {
     const Vec3 dark = mix({0.10, 0.26, 0.07}, {0.26, 0.28, 0.07}, hash_fraction(key, 11));
     const Vec3 light = mix({0.38, 0.58, 0.16}, {0.66, 0.60, 0.16}, hash_fraction(key, 12));
-    const Paint leaves = [=](const Vec3& p, double u, double) { return mix(dark, light, 0.5 * u + 0.7 * value_noise(p * 3.0) - 0.1); };
-    const Paint bark = [](const Vec3& p, double, double) { return mix({0.22, 0.15, 0.10}, {0.44, 0.33, 0.24}, value_noise({p[0] * 20, p[1] * 4, p[2] * 20})); };
+    const Paint leaves = [=](const Vec3& p, double u, double) {
+      return mix(dark, light, 0.5 * u + 0.7 * value_noise(p * 3.0) - 0.1);
+    };
+    const Paint bark = [](const Vec3& p, double, double) {
+      return mix({0.22, 0.15, 0.10}, {0.44, 0.33, 0.24}, value_noise({p[0] * 20, p[1] * 4, p[2] * 20}));
+    };
     painter.cylinder({x, 0, z}, {x, 1.9 * size, z}, 0.15 * size, 0.09 * size, bark, fine);
     for (int i = 0; i < 9; ++i) {
       const double dx = painter.random().uniform(-0.85, 0.85) * size;
@@ -609,21 +633,23 @@ void paint_street(ScenePainter& painter) {
     };
     painter.surface(window_front, glass, shiny);
     painter.surface(window_back, glass, shiny);
-    painter.box({x, 1.02, z - 0.05}, {0.70, 0.24, 0.72},
-                [=](const Vec3& p, double, double) {
-                  if (p[1] > 1.22) return paint;
-                  return std::fabs(p[2] - z + 0.05) < 0.06 ? paint : Vec3{0.24, 0.30, 0.36};
-                },
-                shiny);
+    painter.box(
+        {x, 1.02, z - 0.05}, {0.70, 0.24, 0.72},
+        [=](const Vec3& p, double, double) {
+          if (p[1] > 1.22) return paint;
+          return std::fabs(p[2] - z + 0.05) < 0.06 ? paint : Vec3{0.24, 0.30, 0.36};
+        },
+        shiny);
     painter.box({x, 1.28, z - 0.05}, {0.71, 0.03, 0.72}, plain(paint), shiny);
     for (const double side : {-1.0, 1.0}) {
       for (const double wz : {-1.05, 1.05}) {
-        painter.cylinder({x + 0.72 * side, 0.3, z + wz}, {x + 0.83 * side, 0.3, z + wz}, 0.3, 0.3,
-                         [=](const Vec3& p, double, double) {
-                           const double dy = p[1] - 0.3, dz = p[2] - z - wz;
-                           return dy * dy + dz * dz < 0.03 ? Vec3{0.7, 0.7, 0.72} : Vec3{0.08, 0.08, 0.08};
-                         },
-                         fine);
+        painter.cylinder(
+            {x + 0.72 * side, 0.3, z + wz}, {x + 0.83 * side, 0.3, z + wz}, 0.3, 0.3,
+            [=](const Vec3& p, double, double) {
+              const double dy = p[1] - 0.3, dz = p[2] - z - wz;
+              return dy * dy + dz * dz < 0.03 ? Vec3{0.7, 0.7, 0.72} : Vec3{0.08, 0.08, 0.08};
+            },
+            fine);
       }
     }
   };
@@ -667,7 +693,9 @@ void paint_street(ScenePainter& painter) {
   Brush beyond = far;
   beyond.sigma_pixels = 6;
   beyond.layers = 36;
-  const Paint murk = [](const Vec3& p, double, double) { return mix({0.28, 0.30, 0.22}, {0.46, 0.44, 0.36}, fractal_noise(p * 0.5, 2)); };
+  const Paint murk = [](const Vec3& p, double, double) {
+    return mix({0.28, 0.30, 0.22}, {0.46, 0.44, 0.36}, fractal_noise(p * 0.5, 2));
+  };
   painter.surface(quad_surface({-60, -1.2, -1}, {0, 0, 110}, {120, 0, 0}), murk, beyond);
   painter.surface(quad_surface({-30, 0, 4}, {0, 0, 90}, {0, 6, 0}), murk, beyond);
   painter.surface(quad_surface({30, 0, 94}, {0, 0, -90}, {0, 6, 0}), murk, beyond);
@@ -681,17 +709,25 @@ struct Entry {
   Painting paint;
 };
 
-constexpr Entry kEntries[] = {{0x6f626a656374, paint_locomotive}, {0x696e646f6f72, paint_room}, {0x6f7574646f6f72, paint_street}};
+constexpr Entry kEntries[] = {{0x6f626a656374, paint_locomotive},
+                              {0x696e646f6f72, paint_room},
+                              {0x6f7574646f6f72, paint_street}};
 
 }  // namespace
 
 const std::vector<BuiltinSceneInfo>& builtin_scenes() {
   static const std::vector<BuiltinSceneInfo> scenes = {
-      {"object", "a toy steam locomotive on a grassy base, 800x800, as the synthetic captures", {800, 800},
+      {"object",
+       "a toy steam locomotive on a grassy base, 800x800, as the synthetic captures",
+       {800, 800},
        {{2.85, -1.75, -3.3}, {0.0, -0.55, 0.1}, {0, -1, 0}, 42}},
-      {"indoor", "a living room seen from its corner, 1552x1040, as the indoor captures", {1552, 1040},
+      {"indoor",
+       "a living room seen from its corner, 1552x1040, as the indoor captures",
+       {1552, 1040},
        {{1.1, -1.6, -2.5}, {-0.05, -0.95, 1.4}, {0, -1, 0}, 62}},
-      {"outdoor", "a street with houses and trees under a wide sky, 980x545, as the outdoor captures", {980, 545},
+      {"outdoor",
+       "a street with houses and trees under a wide sky, 980x545, as the outdoor captures",
+       {980, 545},
        {{-0.9, -1.9, -0.6}, {0.35, -2.2, 12}, {0, -1, 0}, 52}}};
   return scenes;
 }

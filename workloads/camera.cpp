@@ -18,7 +18,8 @@ namespace {
 constexpr char kCannotUse[] = "cannot use camera";
 constexpr char kCannotRead[] = "cannot read camera file";
 constexpr char kLayoutRemedy[] =
-    "an INRIA cameras.json is an array of {\"width\", \"height\", \"position\": [3], \"rotation\": [3][3], \"fx\", \"fy\"}";
+    "an INRIA cameras.json is an array of {\"width\", \"height\", \"position\": [3], \"rotation\": [3][3], \"fx\", "
+    "\"fy\"}";
 
 bool all_finite(const Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
 
@@ -39,7 +40,8 @@ double read_number(const nlohmann::json& value, const std::string& where, const 
 
 const nlohmann::json& read_member(const nlohmann::json& camera, const std::string& where, const char* name) {
   const auto found = camera.find(name);
-  if (found == camera.end()) throw UserError(kCannotRead, where, std::string("it has no \"") + name + "\"", kLayoutRemedy);
+  if (found == camera.end())
+    throw UserError(kCannotRead, where, std::string("it has no \"") + name + "\"", kLayoutRemedy);
   return *found;
 }
 
@@ -179,14 +181,16 @@ Camera camera_from_file(const std::string& text, const std::optional<ImageSize>&
     const char* end = text.data() + text.size();
     const auto result = std::from_chars(text.data() + mark + 1, end, index);
     if (result.ec != std::errc{} || result.ptr != end) {
-      throw UserError(kCannotUse, "--camera " + text, "what follows # is not an index", "give FILE#INDEX, index from 0");
+      throw UserError(kCannotUse, "--camera " + text, "what follows # is not an index",
+                      "give FILE#INDEX, index from 0");
     }
   }
   const std::vector<Camera> cameras = load_cameras(path);
   if (index >= cameras.size()) {
     throw UserError(kCannotUse, "--camera " + text,
                     "there is no camera " + std::to_string(index) + ", the file has " + std::to_string(cameras.size()),
-                    cameras.empty() ? "use another file" : "give an index of 0 to " + std::to_string(cameras.size() - 1));
+                    cameras.empty() ? "use another file"
+                                    : "give an index of 0 to " + std::to_string(cameras.size() - 1));
   }
   return size ? resized(cameras[index], *size) : cameras[index];
 }

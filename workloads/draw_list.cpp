@@ -43,8 +43,7 @@ DrawList read_draw_list(const std::filesystem::path& path) {
                     "write one with --save-draw");
   }
   if (file.size() < sizeof header) {
-    throw UserError(kCannotRead, where,
-                    "its header needs 16 bytes, and the file has " + std::to_string(file.size()),
+    throw UserError(kCannotRead, where, "its header needs 16 bytes, and the file has " + std::to_string(file.size()),
                     "get or write the file again");
   }
   if (header.count < 0) {

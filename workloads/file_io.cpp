@@ -68,7 +68,8 @@ AtomicFile::AtomicFile(const std::filesystem::path& path, const std::string& wha
     descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   } while (descriptor_ < 0 && errno == EEXIST);
   if (descriptor_ < 0) {
-    throw UserError(what, path.string(), describe_errno(errno), "name a file in a folder that exists and can be written");
+    throw UserError(what, path.string(), describe_errno(errno),
+                    "name a file in a folder that exists and can be written");
   }
   buffer_.reserve(std::size_t{1} << 16);
 }

@@ -9,8 +9,7 @@
 
 namespace vrpipe {
 
-static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
-              "scene files are little-endian and are read where they lie");
+static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "scene files are little-endian and are read where they lie");
 
 /// A regular file mapped read-only into memory. The file must not shrink while it is mapped.
 class MappedFile {

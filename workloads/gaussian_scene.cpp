@@ -48,8 +48,9 @@ std::size_t canonical_floats(int sh_degree) {
 /// Bytes of a PLY scalar type; 0 for an unknown one.
 std::uint32_t scalar_size(std::string_view type) {
   static const std::unordered_map<std::string_view, std::uint32_t> sizes = {
-      {"char", 1},  {"uchar", 1}, {"short", 2}, {"ushort", 2}, {"int", 4},   {"uint", 4},   {"float", 4},   {"double", 8},
-      {"int8", 1},  {"uint8", 1}, {"int16", 2}, {"uint16", 2}, {"int32", 4}, {"uint32", 4}, {"float32", 4}, {"float64", 8}};
+      {"char", 1},  {"uchar", 1},  {"short", 2},   {"ushort", 2}, {"int", 4},   {"uint", 4},
+      {"float", 4}, {"double", 8}, {"int8", 1},    {"uint8", 1},  {"int16", 2}, {"uint16", 2},
+      {"int32", 4}, {"uint32", 4}, {"float32", 4}, {"float64", 8}};
   const auto found = sizes.find(type);
   return found == sizes.end() ? 0 : found->second;
 }
@@ -118,8 +119,8 @@ class HeaderParser {
   std::string_view next_line() {
     const std::size_t end = bytes_.substr(0, kMaxHeaderBytes).find('\n', position_);
     if (end == std::string_view::npos) {
-      fail("the header has no `end_header` line in its first " + std::to_string(std::min(bytes_.size(), kMaxHeaderBytes)) +
-               " bytes",
+      fail("the header has no `end_header` line in its first " +
+               std::to_string(std::min(bytes_.size(), kMaxHeaderBytes)) + " bytes",
            "get the file again, it seems cut short");
     }
     std::string_view line = bytes_.substr(position_, end - position_);
@@ -206,7 +207,8 @@ class VertexProperties {
     const auto found = by_name_.find(name);
     if (found == by_name_.end()) {
       throw UserError(kCannotRead, where_, "element vertex has no property `" + name + "`",
-                      has("packed_position") ? "this is a compressed .ply: convert it to an INRIA .ply" : kExportRemedy);
+                      has("packed_position") ? "this is a compressed .ply: convert it to an INRIA .ply"
+                                             : kExportRemedy);
     }
     const Property& property = *found->second;
     if (property.type != "float" && property.type != "float32") {

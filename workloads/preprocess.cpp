@@ -31,8 +31,9 @@ constexpr double kShC0 = 0.28209479177387814;
 constexpr double kShC1 = 0.4886025119029199;
 constexpr std::array<double, 5> kShC2 = {1.0925484305920792, -1.0925484305920792, 0.31539156525252005,
                                          -1.0925484305920792, 0.5462742152960396};
-constexpr std::array<double, 7> kShC3 = {-0.5900435899266435, 2.890611442640554, -0.4570457994644658, 0.3731763325901154,
-                                         -0.4570457994644658, 1.445305721320277, -0.5900435899266435};
+constexpr std::array<double, 7> kShC3 = {-0.5900435899266435, 2.890611442640554,   -0.4570457994644658,
+                                         0.3731763325901154,  -0.4570457994644658, 1.445305721320277,
+                                         -0.5900435899266435};
 
 template <std::size_t N>
 bool all_finite(const std::array<float, N>& values) {
@@ -227,7 +228,8 @@ void check_options(const GaussianScene& scene, const Camera& camera, const Prepr
     for (std::size_t k = 0; k < 3; ++k) good = good && std::fabs(camera.rotation[i][k]) <= 2;
   }
   if (!good) {
-    throw UserError(kCannot, "camera", "an element is not finite, a focal length is not above 0, or the near plane is below 1e-6",
+    throw UserError(kCannot, "camera",
+                    "an element is not finite, a focal length is not above 0, or the near plane is below 1e-6",
                     "make it with look_at or load_cameras");
   }
 }

@@ -20,7 +20,6 @@ namespace {
 constexpr char kCannotUse[] = "cannot use option";
 const std::string kBuiltinPrefix = "builtin:";
 
-
 /// The view with what the user named in place of what was there.
 View with_options(View view, const SceneRequest& request) {
   if (request.eye) view.eye = *request.eye;

@@ -183,7 +183,8 @@ ScenePainter::ScenePainter(std::uint64_t seed, const View& view, const ImageSize
 void ScenePainter::block_box(const Vec3& centre, const Vec3& half) { blockers_.push_back({centre, half, false}); }
 void ScenePainter::block_ball(const Vec3& centre, const Vec3& radii) { blockers_.push_back({centre, radii, true}); }
 
-bool ScenePainter::blocked(const std::vector<Blocker>& blockers, const Vec3& from, const Vec3& direction, double reach) {
+bool ScenePainter::blocked(const std::vector<Blocker>& blockers, const Vec3& from, const Vec3& direction,
+                           double reach) {
   for (const Blocker& blocker : blockers) {
     const Vec3 o = from - blocker.centre;
     if (blocker.ball) {
@@ -235,7 +236,8 @@ double ScenePainter::splat_size(const Vec3& position, double sigma_pixels) const
   return sigma_pixels * pixel_angle_ * distance;
 }
 
-void ScenePainter::splat(const Vec3& position, const Vec3& normal, const Paint& paint, double u, double v, const Brush& brush) {
+void ScenePainter::splat(const Vec3& position, const Vec3& normal, const Paint& paint, double u, double v,
+                         const Brush& brush) {
   if (hidden_share_ < 1 && hidden(position, normal) && random_.uniform() > hidden_share_) return;
   const Vec3 albedo = paint(position, u, v);
   const double size = splat_size(position, brush.sigma_pixels);
@@ -251,7 +253,8 @@ void ScenePainter::splat(const Vec3& position, const Vec3& normal, const Paint& 
   colour = colour * tone;
 
   GaussianAttributes g;
-  const Vec3 shifted = position + normal * (random_.normal() * brush.depth * size / (brush.sigma_pixels * pixel_angle_));
+  const Vec3 shifted =
+      position + normal * (random_.normal() * brush.depth * size / (brush.sigma_pixels * pixel_angle_));
   g.position = {static_cast<float>(shifted[0]), static_cast<float>(-shifted[1]), static_cast<float>(shifted[2])};
 
   // A frame around the normal, which wobbles a little, turned at random about it. y turns down here.
@@ -276,7 +279,8 @@ void ScenePainter::splat(const Vec3& position, const Vec3& normal, const Paint& 
     log_size += 1.1;
     kind = 1 - 0.5 * brush.faint;
   }
-  g.log_scale = {static_cast<float>(log_size + 0.45 * random_.normal()), static_cast<float>(log_size + 0.45 * random_.normal()),
+  g.log_scale = {static_cast<float>(log_size + 0.45 * random_.normal()),
+                 static_cast<float>(log_size + 0.45 * random_.normal()),
                  static_cast<float>(log_size + portable_log(brush.thickness) + 0.3 * random_.normal())};
   double logit;
   if (kind < brush.opaque) {
@@ -332,7 +336,8 @@ void ScenePainter::surface(const Surface& surface, const Paint& paint, const Bru
 void ScenePainter::box(const Vec3& centre, const Vec3& half, const Paint& paint, const Brush& brush) {
   block_box(centre, half);
   // Splats reach beyond their centres: drawn in a little, the box's edges stay sharp.
-  const double inset = std::min(0.3 * std::min(half[0], std::min(half[1], half[2])), splat_size(centre, 0.8 * brush.sigma_pixels));
+  const double inset =
+      std::min(0.3 * std::min(half[0], std::min(half[1], half[2])), splat_size(centre, 0.8 * brush.sigma_pixels));
   const Vec3 h = half - Vec3{inset, inset, inset};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::size_t second = (axis + 1) % 3, third = (axis + 2) % 3;
@@ -346,12 +351,13 @@ void ScenePainter::box(const Vec3& centre, const Vec3& half, const Paint& paint,
   }
 }
 
-void ScenePainter::cylinder(const Vec3& base, const Vec3& top, double base_radius, double top_radius, const Paint& paint,
-                            const Brush& brush) {
+void ScenePainter::cylinder(const Vec3& base, const Vec3& top, double base_radius, double top_radius,
+                            const Paint& paint, const Brush& brush) {
   const Vec3 axis = unit(top - base);
   const double inner = 0.7 * std::min(base_radius, top_radius);
   Vec3 half = (top - base) * 0.5;
-  for (std::size_t i = 0; i < 3; ++i) half[i] = std::fabs(half[i]) + inner * std::sqrt(std::max(0.0, 1 - axis[i] * axis[i]));
+  for (std::size_t i = 0; i < 3; ++i)
+    half[i] = std::fabs(half[i]) + inner * std::sqrt(std::max(0.0, 1 - axis[i] * axis[i]));
   block_box((base + top) * 0.5, half);
   surface(frustum_surface(base, top, base_radius, top_radius), paint, brush);
   surface(disc_surface(base, axis * -1.0, 0, base_radius), paint, brush);

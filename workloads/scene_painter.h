@@ -11,7 +11,7 @@
 namespace vrpipe {
 
 // Vectors in the painter's world: x right, y UP, z away from the default viewer. The painter turns y down on output.
-Vec3 unit(const Vec3& a);  ///< zero gives (0, 1, 0)
+Vec3 unit(const Vec3& a);                          ///< zero gives (0, 1, 0)
 Vec3 mix(const Vec3& a, const Vec3& b, double t);  ///< a at t = 0, b at t = 1; t is clamped
 
 /// A small random generator (splitmix64); the standard library's distributions differ between implementations.
@@ -21,7 +21,7 @@ class RandomStream {
   std::uint64_t next();
   double uniform();  ///< in [0, 1)
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
-  double normal();  ///< mean 0, deviation 1
+  double normal();   ///< mean 0, deviation 1
   Vec3 direction();  ///< uniform on the unit sphere
 
  private:
@@ -51,15 +51,15 @@ Surface ellipsoid_surface(const Vec3& centre, const Vec3& radii);
 Surface dome_surface(const Vec3& centre, double radius, double low, double high);
 
 struct Brush {
-  double sigma_pixels = 2.2;   ///< median size of a splat on the default image
-  double layers = 60;          ///< boxes over each pixel that shows the surface, about
-  double gloss = 0.05;         ///< strength of the view-dependent term
-  double opaque = 0.45;        ///< share of nearly opaque splats
-  double faint = 0.2;          ///< share of nearly transparent ones; the rest lies between
-  double depth = 0.004;        ///< scatter along the normal, as a share of the distance to the viewer
-  double thickness = 0.135;    ///< median size along the normal, as a share of that across
-  double emission = 0;         ///< share of the colour that needs no light
-  int grid = 24;               ///< cells per direction over which density follows the distance
+  double sigma_pixels = 2.2;  ///< median size of a splat on the default image
+  double layers = 60;         ///< boxes over each pixel that shows the surface, about
+  double gloss = 0.05;        ///< strength of the view-dependent term
+  double opaque = 0.45;       ///< share of nearly opaque splats
+  double faint = 0.2;         ///< share of nearly transparent ones; the rest lies between
+  double depth = 0.004;       ///< scatter along the normal, as a share of the distance to the viewer
+  double thickness = 0.135;   ///< median size along the normal, as a share of that across
+  double emission = 0;        ///< share of the colour that needs no light
+  int grid = 24;              ///< cells per direction over which density follows the distance
 };
 
 /// Paints surfaces with flat oriented splats, as dense and as small as the default camera needs, lit by a sun and a

@@ -13,8 +13,7 @@ class UserError : public std::runtime_error {
   /// @param where   the file, option or property it is wrong in
   /// @param why     what was found
   /// @param remedy  what to do about it, e.g. the allowed values
-  UserError(const std::string& what, const std::string& where, const std::string& why,
-            const std::string& remedy);
+  UserError(const std::string& what, const std::string& where, const std::string& why, const std::string& remedy);
 };
 
 /// A fault of the program itself: a broken invariant of a unit. The command prints it and exits with code 1.

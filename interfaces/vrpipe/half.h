@@ -70,8 +70,8 @@ inline float half_value(std::uint16_t half) {
     const float magnitude = static_cast<float>(fraction) * 5.9604645e-8F;
     return sign != 0 ? -magnitude : magnitude;
   }
-  const std::uint32_t bits = exponent == 31 ? sign | 0x7f800000U | (fraction << 13)
-                                            : sign | ((exponent + 112) << 23) | (fraction << 13);
+  const std::uint32_t bits =
+      exponent == 31 ? sign | 0x7f800000U | (fraction << 13) : sign | ((exponent + 112) << 23) | (fraction << 13);
   float value;
   std::memcpy(&value, &bits, sizeof value);
   return value;

@@ -31,7 +31,9 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   /// Takes the next access that has completed, in a cycle after the one in which it was answered; false for none.
   bool next_completed(unsigned& ticket);
   /// When the next known completion is due; `never` for none.
-  Cycle next_completion() const { return completions_count_ == 0 ? never : completions_[completions_head_ & (completions_.size() - 1)].at; }
+  Cycle next_completion() const {
+    return completions_count_ == 0 ? never : completions_[completions_head_ & (completions_.size() - 1)].at;
+  }
 
   std::uint64_t reads() const { return reads_; }
   std::uint64_t writes() const { return writes_; }

@@ -18,12 +18,14 @@ class BlendOrderMonitor {
 
   /// Throws SimulationFault when a primitive comes after a later one.
   void blended(const ShadedWarp& warp, unsigned index, std::uint64_t cycle) {
-    std::uint32_t& next = next_[(std::size_t{warp.tile.y} * tiles_x_ + warp.tile.x) * positions_per_tile + warp.position[index]];
+    std::uint32_t& next =
+        next_[(std::size_t{warp.tile.y} * tiles_x_ + warp.tile.x) * positions_per_tile + warp.position[index]];
     if (warp.first_primitive[index] < next || warp.last_primitive[index] < warp.first_primitive[index]) {
       throw SimulationFault("crop", cycle,
-                            "primitive " + std::to_string(warp.first_primitive[index]) + " is blended after primitive " +
-                                std::to_string(next - 1) + " in tile " + std::to_string(warp.tile.x) + "," +
-                                std::to_string(warp.tile.y) + " position " + std::to_string(warp.position[index]));
+                            "primitive " + std::to_string(warp.first_primitive[index]) +
+                                " is blended after primitive " + std::to_string(next - 1) + " in tile " +
+                                std::to_string(warp.tile.x) + "," + std::to_string(warp.tile.y) + " position " +
+                                std::to_string(warp.position[index]));
     }
     next = warp.last_primitive[index] + 1;
   }

@@ -9,11 +9,11 @@
 
 namespace vrpipe {
 
-constexpr unsigned screen_tile_pixels = 16;   ///< side of a screen tile (paper 5.1; measured)
-constexpr unsigned raster_tile_pixels = 8;    ///< side of a raster tile (paper, table)
-constexpr unsigned quads_per_tile_row = 8;    ///< quads along a side of a screen tile
-constexpr unsigned positions_per_tile = 64;   ///< quad positions in a screen tile
-constexpr unsigned quads_per_warp = 8;        ///< 32 threads
+constexpr unsigned screen_tile_pixels = 16;  ///< side of a screen tile (paper 5.1; measured)
+constexpr unsigned raster_tile_pixels = 8;   ///< side of a raster tile (paper, table)
+constexpr unsigned quads_per_tile_row = 8;   ///< quads along a side of a screen tile
+constexpr unsigned positions_per_tile = 64;  ///< quad positions in a screen tile
+constexpr unsigned quads_per_warp = 8;       ///< 32 threads
 constexpr unsigned vertices_per_splat = 4;
 constexpr unsigned splats_per_vertex_warp = 8;
 
@@ -36,9 +36,9 @@ struct PixelRect {
 
 /// A triangle after vertex processing. Attributes stay in the circular buffer in L2; units pass the pointer (`splat`).
 struct Primitive {
-  std::uint32_t splat = 0;   ///< index in draw order
-  std::uint8_t triangle = 0; ///< 0 or 1 of the splat's two triangles
-  PixelRect bounds;          ///< of the pixels that may be covered, clipped to the viewport, never empty
+  std::uint32_t splat = 0;    ///< index in draw order
+  std::uint8_t triangle = 0;  ///< 0 or 1 of the splat's two triangles
+  PixelRect bounds;           ///< of the pixels that may be covered, clipped to the viewport, never empty
 };
 
 /// 2x2 samples of one primitive of which at least one is covered.

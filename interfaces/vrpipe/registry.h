@@ -13,9 +13,9 @@ namespace vrpipe {
 
 /// An implementation of a slot: a unit that a platform can be built with.
 struct Implementation {
-  std::string slot;         ///< draw vpo tgc raster tc prop zrop qru sm crop
-  std::string name;         ///< e.g. "pairing"
-  std::string description;  ///< one line
+  std::string slot;           ///< draw vpo tgc raster tc prop zrop qru sm crop
+  std::string name;           ///< e.g. "pairing"
+  std::string description;    ///< one line
   bool pass_through = false;  ///< stands in for a unit that a variant does not have
   std::function<std::unique_ptr<ParameterSet>()> make_parameters;
   std::function<std::unique_ptr<Behaviour>(const ParameterSet&, const RenderState&)> make_behaviour;
@@ -67,8 +67,8 @@ class Registrar {
 
 /// Put VRPIPE_PLUGIN once in a plugin's source: the tag by which the loader knows, before it runs any code of the
 /// plugin, that it was built for this vrpipe. VRPIPE_PLUGIN_TAG comes from the build (vrpipe_add_plugin).
-#define VRPIPE_PLUGIN                                                                         \
-  extern "C" __attribute__((visibility("default"), used)) const char vrpipe_plugin_tag[];     \
+#define VRPIPE_PLUGIN                                                                     \
+  extern "C" __attribute__((visibility("default"), used)) const char vrpipe_plugin_tag[]; \
   extern "C" __attribute__((visibility("default"), used)) const char vrpipe_plugin_tag[] = VRPIPE_PLUGIN_TAG;
 
 /// Loads a plugin; its units are in the registry afterwards. Throws UserError when the file is missing, is not a

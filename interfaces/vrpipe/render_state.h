@@ -24,13 +24,13 @@ struct RenderState {
   ColorFormat format = ColorFormat::rgba16f;
   BlendRounding blend_rounding = BlendRounding::rne;
   Termination termination = Termination::paper;
-  bool early_termination = false;          ///< HET on: ZROP tests, CROP signals
-  float termination_threshold = 0.996F;    ///< alpha, compared in single precision (paper 3.2)
-  bool termination_inclusive = true;       ///< >= (paper, alg. 1) rather than > (paper 5.2)
-  float pruning_threshold = 1.0F / 255.0F; ///< fragments with alpha below are excluded from blending
+  bool early_termination = false;           ///< HET on: ZROP tests, CROP signals
+  float termination_threshold = 0.996F;     ///< alpha, compared in single precision (paper 3.2)
+  bool termination_inclusive = true;        ///< >= (paper, alg. 1) rather than > (paper 5.2)
+  float pruning_threshold = 1.0F / 255.0F;  ///< fragments with alpha below are excluded from blending
   Exponential exponential = Exponential::ex2;
   SplatExtent splat_extent = SplatExtent::oriented_box;
-  unsigned subpixel_bits = 8;              ///< of vertex coordinates (D3D11.3: 8)
+  unsigned subpixel_bits = 8;  ///< of vertex coordinates (D3D11.3: 8)
   /// Half axes grow by this many sub-pixel steps, so that snapping loses no fragment at the pruning threshold.
   float obb_padding = 0.75F;
   unsigned gpcs = 1;  ///< of the platform

@@ -312,8 +312,12 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<> {
   tlm::tlm_initiator_socket<32> socket;
 
   /// An access in cycle `at`; returns the cycle in which it is complete.
-  Cycle read(std::uint64_t address, unsigned bytes, Cycle at) { return access(tlm::TLM_READ_COMMAND, address, bytes, at); }
-  Cycle write(std::uint64_t address, unsigned bytes, Cycle at) { return access(tlm::TLM_WRITE_COMMAND, address, bytes, at); }
+  Cycle read(std::uint64_t address, unsigned bytes, Cycle at) {
+    return access(tlm::TLM_READ_COMMAND, address, bytes, at);
+  }
+  Cycle write(std::uint64_t address, unsigned bytes, Cycle at) {
+    return access(tlm::TLM_WRITE_COMMAND, address, bytes, at);
+  }
 
  private:
   Cycle access(tlm::tlm_command command, std::uint64_t address, unsigned bytes, Cycle at);
@@ -329,8 +333,9 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<> {
 
 /// Makes the module of a slot for `lt` or `at` around a behaviour.
 using TimedUnitMaker =
-    std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                        const RenderState& state, unsigned gpcs, Transport transport)>;
+    std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain,
+                                        std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned gpcs,
+                                        Transport transport)>;
 
 /// Registered by each module for its slot.
 void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker);

@@ -49,9 +49,9 @@ class Unit : public sc_core::sc_module, public Clocked, public PortOwner {
 };
 
 /// Makes the cycle-fidelity module around a behaviour of a slot. `gpcs` is how many GPCs the front end serves.
-using UnitMaker = std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain,
-                                                      std::unique_ptr<Behaviour> behaviour, const RenderState& state,
-                                                      unsigned gpcs)>;
+using UnitMaker =
+    std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain,
+                                        std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned gpcs)>;
 
 /// Registered by each module for its slot.
 void register_unit_maker(const std::string& slot, UnitMaker maker);

@@ -61,7 +61,7 @@ class TgcBehaviour : public Behaviour {
   virtual bool step(Flush& out) = 0;
   /// Flushes what is left, the bin allocated first going first; false when nothing is.
   virtual bool drain(Flush& out) = 0;
-  virtual Throughput cost() const = 0;           ///< items: bin entries
+  virtual Throughput cost() const = 0;              ///< items: bin entries
   virtual std::uint32_t largest_flush() const = 0;  ///< primitives
   virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
 };
@@ -77,11 +77,11 @@ class RasterBehaviour : public Behaviour {
   virtual bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) = 0;
   struct Cost {
     std::uint32_t setup_latency_cycles;
-    std::uint32_t setup_interval_cycles;         ///< between primitives
-    std::uint32_t coarse_tiles_per_cycle;        ///< raster tiles tested
-    std::uint32_t fine_tiles_per_cycle;          ///< raster tiles made into quads
-    std::uint32_t screen_tile_interval_cycles;   ///< between (primitive, screen tile) pairs
-    std::uint32_t quads_per_cycle;               ///< handed to TC
+    std::uint32_t setup_interval_cycles;        ///< between primitives
+    std::uint32_t coarse_tiles_per_cycle;       ///< raster tiles tested
+    std::uint32_t fine_tiles_per_cycle;         ///< raster tiles made into quads
+    std::uint32_t screen_tile_interval_cycles;  ///< between (primitive, screen tile) pairs
+    std::uint32_t quads_per_cycle;              ///< handed to TC
   };
   virtual Cost cost() const = 0;
 };
@@ -143,7 +143,7 @@ class ZropBehaviour : public Behaviour {
   struct Cost {
     std::uint32_t quads_per_cycle;
     std::uint32_t latency_cycles;
-    std::uint32_t updates_per_cycle;   ///< signals; a cycle with updates tests no quads: one z-cache port
+    std::uint32_t updates_per_cycle;  ///< signals; a cycle with updates tests no quads: one z-cache port
   };
   virtual Cost cost() const = 0;
 };
@@ -176,11 +176,11 @@ class SmBehaviour : public Behaviour {
     std::uint32_t schedulers_per_core;
     std::uint32_t lanes_per_scheduler;
     std::uint32_t warps_per_core;
-    std::uint32_t vertex_warps;          ///< of the array that may be in flight
-    std::uint32_t warps_to_one_core;     ///< consecutive warps of a tile that go to one core
+    std::uint32_t vertex_warps;       ///< of the array that may be in flight
+    std::uint32_t warps_to_one_core;  ///< consecutive warps of a tile that go to one core
     std::vector<ShaderSegment> vertex;
     std::vector<ShaderSegment> fragment;
-    std::vector<ShaderSegment> merge;    ///< appended for a warp with pairs
+    std::vector<ShaderSegment> merge;  ///< appended for a warp with pairs
   };
   virtual Cost cost() const = 0;
 };
@@ -201,10 +201,10 @@ class CropBehaviour : public Behaviour {
   /// What the colour cache does for a quad. It sees the quads in the order of blending alone, so that which sectors move
   /// does not depend on when; for shells that do not follow fills through the cache themselves.
   struct CacheAccess {
-    std::uint32_t line = 0;        ///< of the cache, from 0
-    std::uint32_t sectors = 0;     ///< of the line that the quad needs, a bit each
-    std::uint32_t filled = 0;      ///< of these, not there yet
-    bool replaced = false;         ///< the line held something else, or nothing, before
+    std::uint32_t line = 0;          ///< of the cache, from 0
+    std::uint32_t sectors = 0;       ///< of the line that the quad needs, a bit each
+    std::uint32_t filled = 0;        ///< of these, not there yet
+    bool replaced = false;           ///< the line held something else, or nothing, before
     std::uint32_t written_back = 0;  ///< dirty sectors of what it held
     std::uint64_t address = 0;       ///< of the line, bytes
     std::uint64_t old_address = 0;   ///< of what it held
@@ -214,16 +214,16 @@ class CropBehaviour : public Behaviour {
   /// After a `blend` whose sectors are dirty for it.
   virtual void make_dirty(const CacheAccess&) {}
   struct Cost {
-    std::uint32_t quads_per_cycle;          ///< of this draw's format
-    std::uint32_t input_quads;              ///< queue between tag look-up and blending
-    std::uint32_t latency_cycles;           ///< of blending, termination test included
-    bool forwards;                          ///< overlapping quads need not wait for `latency_cycles`
+    std::uint32_t quads_per_cycle;  ///< of this draw's format
+    std::uint32_t input_quads;      ///< queue between tag look-up and blending
+    std::uint32_t latency_cycles;   ///< of blending, termination test included
+    bool forwards;                  ///< overlapping quads need not wait for `latency_cycles`
     std::uint32_t cache_bytes;
     std::uint32_t line_bytes;
     std::uint32_t sector_bytes;
-    std::uint32_t mshrs;                    ///< sectors in flight
-    std::uint32_t sectors_per_cycle;        ///< filled or written back
-    bool writes_unchanged;                  ///< a blend that changes no value makes its sector dirty all the same
+    std::uint32_t mshrs;              ///< sectors in flight
+    std::uint32_t sectors_per_cycle;  ///< filled or written back
+    bool writes_unchanged;            ///< a blend that changes no value makes its sector dirty all the same
   };
   virtual Cost cost() const = 0;
 

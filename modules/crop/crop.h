@@ -11,11 +11,30 @@
 namespace vrpipe {
 
 struct CropParameters : ParameterSet {
-  Integer bytes_per_cycle{*this, "bytes_per_cycle", 64, 16, 256, "bytes", source::paper_text,
-                          "of target format blended in a cycle: 4 quads of RGBA8, 2 of RGBA16F, 1 of RGBA32F (assumed)"};
-  Integer input_quads{*this, "input_quads", 512, 1, 65536, "quads", "ATTILA: fetch queue of 256 stamps for each ROP of 1 stamp a cycle",
+  Integer bytes_per_cycle{
+      *this,
+      "bytes_per_cycle",
+      64,
+      16,
+      256,
+      "bytes",
+      source::paper_text,
+      "of target format blended in a cycle: 4 quads of RGBA8, 2 of RGBA16F, 1 of RGBA32F (assumed)"};
+  Integer input_quads{*this,
+                      "input_quads",
+                      512,
+                      1,
+                      65536,
+                      "quads",
+                      "ATTILA: fetch queue of 256 stamps for each ROP of 1 stamp a cycle",
                       "between cache look-up and blending; hides the latency of fills"};
-  Integer latency_cycles{*this, "latency_cycles", 8, 1, 1000, "cycles", source::open,
+  Integer latency_cycles{*this,
+                         "latency_cycles",
+                         8,
+                         1,
+                         1000,
+                         "cycles",
+                         source::open,
                          "of a blend; its termination signal leaves after that"};
   Switch forwarding{*this, "forwarding", true, source::open,
                     "an overlapping quad takes the value in the pipeline; without, it waits for the latency, which "
@@ -25,8 +44,20 @@ struct CropParameters : ParameterSet {
   Integer cache_bytes{*this, "cache_bytes", 16384, 128, 1 << 24, "bytes", source::paper_table, "CROP cache"};
   Integer line_bytes{*this, "line_bytes", 128, 32, 1024, "bytes", source::paper_table, "of a cache line"};
   Integer sector_bytes{*this, "sector_bytes", 32, 16, 1024, "bytes", source::paper_table, "of a cache sector"};
-  Integer mshrs{*this, "mshrs", 384, 1, 65536, "sectors", "Accel-Sim, SM87_ORIN: 384 MSHRs of a first-level cache", "fills in flight, and as many write-backs"};
-  Integer sectors_per_cycle{*this, "sectors_per_cycle", 16, 1, 64, "sectors",
+  Integer mshrs{*this,
+                "mshrs",
+                384,
+                1,
+                65536,
+                "sectors",
+                "Accel-Sim, SM87_ORIN: 384 MSHRs of a first-level cache",
+                "fills in flight, and as many write-backs"};
+  Integer sectors_per_cycle{*this,
+                            "sectors_per_cycle",
+                            16,
+                            1,
+                            64,
+                            "sectors",
                             "measured on a GH100 graphics GPC: 8 a cycle and ROP partition; the paper's GPC has two",
                             "filled or written back in a cycle in which nothing is blended"};
   Switch writes_unchanged{*this, "writes_unchanged", false, source::measured,
@@ -47,8 +78,10 @@ class ColorRop : public CropBehaviour {
 
   Counter quads_blended{*this, "quads_blended", "quads", "blended"};
   Counter fragments_blended{*this, "fragments_blended", "fragments", "blended"};
-  Counter quads_dropped_late{*this, "quads_dropped_late", "quads", "of which CROP finds every pixel terminated (strict)"};
-  Counter fragments_dropped_late{*this, "fragments_dropped_late", "fragments", "whose pixel CROP finds terminated (strict)"};
+  Counter quads_dropped_late{*this, "quads_dropped_late", "quads",
+                             "of which CROP finds every pixel terminated (strict)"};
+  Counter fragments_dropped_late{*this, "fragments_dropped_late", "fragments",
+                                 "whose pixel CROP finds terminated (strict)"};
   Counter quads_late_failed{*this, "quads_late_failed", "quads", "that fail a late depth or stencil test"};
   Counter fragments_late_failed{*this, "fragments_late_failed", "fragments", "that fail a late depth or stencil test"};
   Counter fragments_swallowed{*this, "fragments_swallowed", "fragments",
@@ -59,7 +92,7 @@ class ColorRop : public CropBehaviour {
   Counter termination_signals{*this, "termination_signals", "signals", "sent to ZROP, one for a quad's pixels"};
 
  private:
-  static constexpr float largest_color = Format == ColorFormat::rgba8      ? 1.0F
+  static constexpr float largest_color = Format == ColorFormat::rgba8     ? 1.0F
                                          : Format == ColorFormat::rgba16f ? half_max
                                                                           : std::numeric_limits<float>::infinity();
 

@@ -24,7 +24,7 @@ class TimedCrop : public TimedUnit {
         blended_at_(cost_.input_quads, 0),
         filled_at_(cost_.mshrs, 0),
         blending_(cost_.quads_per_cycle * cost_.sectors_per_cycle),
-        lines_(cost_.cache_bytes / cost_.line_bytes),
+        lines_(std::max(cost_.cache_bytes / cost_.line_bytes, 1U)),
         sectors_per_line_(cost_.line_bytes / cost_.sector_bytes),
         sector_there_at_(lines_.size() * sectors_per_line_, 0),
         sector_shift_(static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes))) {
@@ -59,7 +59,7 @@ class TimedCrop : public TimedUnit {
     const CropBehaviour::CacheAccess access = behaviour_->look_up(quad.tile, quad.position);
     // A place in the queue, and a line that no queued quad needs.
     Cycle looked_up = std::max(visible, blended_at_[place_]);
-    if (access.replaced && !lines_.empty()) looked_up = std::max(looked_up, lines_[access.line] + 1);
+    if (access.replaced) looked_up = std::max(looked_up, lines_[access.line]);
     looked_up = look_ups_.take(looked_up);
     if (access.written_back != 0) write_back(access, looked_up);
     Cycle there = looked_up + 1;
@@ -68,7 +68,8 @@ class TimedCrop : public TimedUnit {
       Cycle& sector_there = sector_there_at_[access.line * sectors_per_line_ + sector];
       if (((access.filled >> sector) & 1U) != 0) {
         looked_up = std::max(looked_up, filled_at_[fill_]);
-        sector_there = memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), cost_.sector_bytes, looked_up);
+        sector_there =
+            memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), cost_.sector_bytes, looked_up);
         filled_at_[fill_] = sector_there;
         fill_ = fill_ + 1 == filled_at_.size() ? 0 : fill_ + 1;
         move_sectors(1, looked_up);
@@ -76,8 +77,9 @@ class TimedCrop : public TimedUnit {
       there = std::max(there, sector_there);
     }
     look_ups_.hold(looked_up);
+    charge(UnitState::starved, looked_up + 1);
     const Cycle blended = blend(quad, access, there);
-    if (!lines_.empty()) lines_[access.line] = blended;
+    lines_[access.line] = blended;
     blended_at_[place_] = blended;
     place_ = place_ + 1 == blended_at_.size() ? 0 : place_ + 1;
     return looked_up;
@@ -103,7 +105,6 @@ class TimedCrop : public TimedUnit {
   void move_sectors(unsigned sectors, Cycle at) { blending_.take(at, sectors * cost_.quads_per_cycle); }
 
   Cycle blend(const ColorQuad& quad, const CropBehaviour::CacheAccess& access, Cycle there) {
-    charge(UnitState::memory, std::min(there, last_blend_ + 1));
     if (!cost_.forwards) there = std::max(there, hazard_until(quad));
     const Cycle at = blending_.take(std::max(there, out_.last()), cost_.sectors_per_cycle);
     monitor_->blended(*quad.warp, quad.index, at);
@@ -111,7 +112,7 @@ class TimedCrop : public TimedUnit {
     --quad.warp->holders;
     if (outcome.changed || cost_.writes_unchanged) behaviour_->make_dirty(access);
     if (!cost_.forwards) recent_.push_back({quad.tile, quad.position, at});
-    charge(UnitState::starved, at);
+    charge(UnitState::memory, at);
     charge(UnitState::busy, at + 1);
     ++blended_;
     last_blend_ = at;
@@ -152,7 +153,7 @@ class TimedCrop : public TimedUnit {
   std::size_t place_ = 0;
   std::vector<Cycle> filled_at_;  ///< the fills in flight, a ring
   std::size_t fill_ = 0;
-  Flow blending_;  ///< in parts of a cycle that both a quad and a sector are whole numbers of
+  Flow blending_;             ///< in parts of a cycle that both a quad and a sector are whole numbers of
   std::vector<Cycle> lines_;  ///< of the cache: the last blend of a quad that needed it
   const unsigned sectors_per_line_;
   std::vector<Cycle> sector_there_at_;
@@ -164,8 +165,9 @@ class TimedCrop : public TimedUnit {
 };
 
 [[maybe_unused]] const bool registered = [] {
-  register_timed_unit_maker("crop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                       const RenderState& state, unsigned, Transport transport) {
+  register_timed_unit_maker("crop", [](const std::string& name, ClockDomain& domain,
+                                       std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned,
+                                       Transport transport) {
     return std::make_unique<TimedCrop>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)), state,
                                        transport);
   });

@@ -193,8 +193,7 @@ class CropUnit : public Unit {
       }
       const ColorQuad& quad = entry.quad;
       monitor_->blended(*quad.warp, quad.index, now);
-      const CropBehaviour::Outcome outcome =
-          behaviour_->blend(quad.tile, quad.position, quad.live, quad.color());
+      const CropBehaviour::Outcome outcome = behaviour_->blend(quad.tile, quad.position, quad.live, quad.color());
       if (outcome.terminated != 0) {
         beat.signals[beat.count++] = {quad.tile, quad.position, outcome.terminated};
       }
@@ -221,8 +220,9 @@ class CropUnit : public Unit {
       ending_ = false;
     }
     enter(blended ? UnitState::busy : queued_ > 0 ? stop_ : UnitState::starved, now);
-    if (blended || accepted || (queued_ > 0 && stop_ != UnitState::blocked &&
-                                (stop_ == UnitState::latency || tokens_ < static_cast<std::int32_t>(cost_.sectors_per_cycle)))) {
+    if (blended || accepted ||
+        (queued_ > 0 && stop_ != UnitState::blocked &&
+         (stop_ == UnitState::latency || tokens_ < static_cast<std::int32_t>(cost_.sectors_per_cycle)))) {
       return now + 1;
     }
     // A quad at the link that could not be looked up waits for a completion or for the queue to move.
@@ -241,7 +241,7 @@ class CropUnit : public Unit {
   std::unique_ptr<BlendOrderMonitor> monitor_;
   unsigned bytes_per_quad_ = 0;
   unsigned sector_shift_ = 0;  ///< log2 of the bytes of a sector
-  std::vector<Entry> queue_;  ///< looked up and waiting to be blended, a ring
+  std::vector<Entry> queue_;   ///< looked up and waiting to be blended, a ring
   std::size_t head_ = 0;
   std::size_t queued_ = 0;
   unsigned at_ = 0;                     ///< quads taken of the beat at the link

@@ -9,7 +9,12 @@ namespace vrpipe {
 class VertexIssue : public DrawBehaviour {
  public:
   struct Parameters : ParameterSet {
-    Integer warps_per_1024_cycles{*this, "warps_per_1024_cycles", 88, 1, 65536, "warps",
+    Integer warps_per_1024_cycles{*this,
+                                  "warps_per_1024_cycles",
+                                  88,
+                                  1,
+                                  65536,
+                                  "warps",
                                   "measured on a GH100 graphics GPC: 5.8 cycles a splat with 2 TPCs, scaled to 8",
                                   "vertex warps issued in 1024 cycles: vertex fetch and attribute set-up"};
   };

@@ -56,8 +56,9 @@ class TimedDraw : public TimedUnit {
 };
 
 [[maybe_unused]] const bool registered = [] {
-  register_timed_unit_maker("draw", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                       const RenderState&, unsigned gpcs, Transport transport) {
+  register_timed_unit_maker("draw", [](const std::string& name, ClockDomain& domain,
+                                       std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned gpcs,
+                                       Transport transport) {
     return std::make_unique<TimedDraw>(name.c_str(), domain, behaviour_as<DrawBehaviour>(std::move(behaviour)), gpcs,
                                        transport);
   });

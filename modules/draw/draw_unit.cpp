@@ -8,7 +8,8 @@ namespace {
 /// Ports: out_vertices_<gpc> (VertexWarp).
 class DrawUnit : public Unit {
  public:
-  DrawUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<DrawBehaviour> behaviour, unsigned gpcs)
+  DrawUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<DrawBehaviour> behaviour,
+           unsigned gpcs)
       : Unit(name, domain), behaviour_(std::move(behaviour)) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<StreamOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));

@@ -9,14 +9,27 @@ namespace vrpipe {
 class PreRop : public PropBehaviour {
  public:
   struct Parameters : ParameterSet {
-    Integer quads_per_cycle{*this, "quads_per_cycle", 16, 1, 16, "quads", source::open,
+    Integer quads_per_cycle{*this,
+                            "quads_per_cycle",
+                            16,
+                            1,
+                            16,
+                            "quads",
+                            source::open,
                             "from TC to ZROP and on to QRU; must exceed what the shaders and CROP can take by the "
                             "share that termination kills"};
-    Integer color_bytes_per_cycle{*this, "color_bytes_per_cycle", 64, 16, 256, "bytes", source::paper_text,
+    Integer color_bytes_per_cycle{*this,
+                                  "color_bytes_per_cycle",
+                                  64,
+                                  16,
+                                  256,
+                                  "bytes",
+                                  source::paper_text,
                                   "of target format from PROP to CROP: 2 quads of RGBA16F, 4 of RGBA8"};
     Integer latency_cycles{*this, "latency_cycles", 4, 1, 1000, "cycles", source::open, "of each passage"};
-    Choice order{*this, "order", {"draw", "tile"}, 1, source::measured,
-                 "shaded warps leave in launch order of the whole draw, or of their screen tile"};
+    Choice order{
+        *this, "order",          {"draw", "tile"},
+        1,     source::measured, "shaded warps leave in launch order of the whole draw, or of their screen tile"};
   };
   PreRop(const Parameters& parameters, const RenderState& state);
 

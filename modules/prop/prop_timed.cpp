@@ -27,7 +27,9 @@ class TimedProp : public TimedUnit {
                  },
                  {tests_ ? &out_test_ : &out_survivors_}),
         in_tested_(*this, "in_tested",
-                   [this](const QuadBeat& beat, Cycle visible) { return forward(beat, visible, back_, out_survivors_); },
+                   [this](const QuadBeat& beat, Cycle visible) {
+                     return forward(beat, visible, back_, out_survivors_);
+                   },
                    {&out_survivors_}),
         in_shaded_(*this, "in_shaded",
                    [this](const ShadedWarpItem& item, Cycle visible) { return collect(*item.warp, visible); }),
@@ -164,7 +166,7 @@ class TimedProp : public TimedUnit {
   Lane color_;
   std::vector<std::uint32_t> next_of_tile_;
   std::uint32_t next_sequence_ = 0;
-  std::vector<Ready> early_;    ///< shaded before their turn
+  std::vector<Ready> early_;  ///< shaded before their turn
   std::deque<Ready> in_turn_;
   const ShadedWarp* end_ = nullptr;
   Cycle end_from_ = 0;
@@ -172,8 +174,9 @@ class TimedProp : public TimedUnit {
 };
 
 [[maybe_unused]] const bool registered = [] {
-  register_timed_unit_maker("prop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                       const RenderState& state, unsigned, Transport transport) {
+  register_timed_unit_maker("prop", [](const std::string& name, ClockDomain& domain,
+                                       std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned,
+                                       Transport transport) {
     return std::make_unique<TimedProp>(name.c_str(), domain, behaviour_as<PropBehaviour>(std::move(behaviour)), state,
                                        transport);
   });

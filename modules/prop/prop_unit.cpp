@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <deque>
+#include <queue>
 
 #include <vrpipe/unit.h>
 
@@ -43,6 +43,10 @@ class PropUnit : public Unit {
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
+  struct LaterFirst {
+    bool operator()(const ShadedWarp* a, const ShadedWarp* b) const { return a->sequence > b->sequence; }
+  };
+
   std::uint32_t& next_of_tile(TileId tile) { return next_of_tile_[std::size_t{tile.y} * tiles_x_ + tile.x]; }
 
   bool is_next(const ShadedWarp& warp) {
@@ -85,7 +89,7 @@ class PropUnit : public Unit {
       if (warp->end_of_draw) {
         end_ = warp;
       } else if (is_next(*warp)) {
-        in_turn_.push_back(warp);
+        in_turn_.push(warp);
       } else {
         early_by_bucket_[bucket_of(*warp)].push_back(warp);
         ++early_;
@@ -110,7 +114,7 @@ class PropUnit : public Unit {
                                                                    : bucket_of(left)];
     for (std::size_t i = 0; i < bucket.size(); ++i) {
       if (!is_next(*bucket[i])) continue;
-      in_turn_.push_back(bucket[i]);
+      in_turn_.push(bucket[i]);
       bucket[i] = bucket.back();
       bucket.pop_back();
       --early_;
@@ -126,13 +130,14 @@ class PropUnit : public Unit {
       if (current_ == nullptr) {
         if (in_turn_.empty()) break;
         if (out_release_.credits() == 0) break;
-        current_ = in_turn_.front();
-        in_turn_.pop_front();
+        current_ = in_turn_.top();
+        in_turn_.pop();
         index_ = 0;
       }
       if (index_ < current_->count) {
         ++current_->holders;
-        beat.quads[beat.count++] = {current_, current_->tile, current_->position[index_], current_->live[index_], index_};
+        beat.quads[beat.count++] = {current_, current_->tile, current_->position[index_], current_->live[index_],
+                                    index_};
         ++index_;
       }
       if (index_ == current_->count) {
@@ -204,8 +209,9 @@ class PropUnit : public Unit {
   std::uint32_t next_sequence_ = 0;
   std::array<std::vector<const ShadedWarp*>, 256> early_by_bucket_;  ///< shaded before their turn
   std::size_t early_ = 0;
-  std::deque<const ShadedWarp*> in_turn_;  ///< whose turn has come, in the order in which it came
-  const ShadedWarp* current_ = nullptr;  ///< being handed to CROP, from `index_` on
+  /// Whose turn has come; the oldest leaves first, which keeps a tile's quads together in the colour cache.
+  std::priority_queue<const ShadedWarp*, std::vector<const ShadedWarp*>, LaterFirst> in_turn_;
+  const ShadedWarp* current_ = nullptr;    ///< being handed to CROP, from `index_` on
   std::uint8_t index_ = 0;
   const ShadedWarp* end_ = nullptr;
   std::uint64_t color_quads_ = 0;

@@ -125,8 +125,10 @@ bool QruPassThrough::finish_bin(Warp& out) {
 }
 
 namespace {
-const Registrar<PairingQru, QruBehaviour> pairing("qru", "pairing", "pairs overlapping quads of a bin for merging (QM)");
-const Registrar<QruPassThrough, QruBehaviour> pass_through("qru", "pass-through", "warps in the order of the quads", true);
+const Registrar<PairingQru, QruBehaviour> pairing("qru", "pairing",
+                                                  "pairs overlapping quads of a bin for merging (QM)");
+const Registrar<QruPassThrough, QruBehaviour> pass_through("qru", "pass-through", "warps in the order of the quads",
+                                                           true);
 }  // namespace
 
 }  // namespace vrpipe

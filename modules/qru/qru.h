@@ -22,11 +22,29 @@ class WarpNumbering {
 class PairingQru : public QruBehaviour {
  public:
   struct Parameters : ParameterSet {
-    Integer bin_quads{*this, "bin_quads", 128, 1, 4096, "quads", source::paper_table,
+    Integer bin_quads{*this,
+                      "bin_quads",
+                      128,
+                      1,
+                      4096,
+                      "quads",
+                      source::paper_table,
                       "quads buffered; a larger bin is examined in parts"};
-    Integer quads_per_cycle{*this, "quads_per_cycle", 8, 1, 16, "quads", source::open,
+    Integer quads_per_cycle{*this,
+                            "quads_per_cycle",
+                            8,
+                            1,
+                            16,
+                            "quads",
+                            source::open,
                             "examined in a cycle, a warp's worth; below 3 merging loses more than it gains"};
-    Integer latency_cycles{*this, "latency_cycles", 4, 1, 1000, "cycles", source::open,
+    Integer latency_cycles{*this,
+                           "latency_cycles",
+                           4,
+                           1,
+                           1000,
+                           "cycles",
+                           source::open,
                            "from the quad that completes a warp to its launch"};
   };
   PairingQru(const Parameters& parameters, const RenderState& state);
@@ -50,11 +68,11 @@ class PairingQru : public QruBehaviour {
   const std::uint32_t quads_per_cycle_;
   const std::uint32_t latency_cycles_;
   WarpNumbering numbering_;
-  std::vector<Quad> buffer_;        ///< by quad id
-  std::vector<bool> merged_;        ///< the bitmap
+  std::vector<Quad> buffer_;  ///< by quad id
+  std::vector<bool> merged_;  ///< the bitmap
   std::array<std::int16_t, positions_per_tile> registers_;
-  Warp warp_;                       ///< being filled
-  std::size_t left_ = 0;            ///< next quad id to look at for the left-over warps
+  Warp warp_;             ///< being filled
+  std::size_t left_ = 0;  ///< next quad id to look at for the left-over warps
 };
 
 /// The baseline: quads of a bin become warps in the order in which they come.

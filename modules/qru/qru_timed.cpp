@@ -83,9 +83,11 @@ class TimedQru : public TimedUnit {
 };
 
 [[maybe_unused]] const bool registered = [] {
-  register_timed_unit_maker("qru", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                      const RenderState&, unsigned, Transport transport) {
-    return std::make_unique<TimedQru>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)), transport);
+  register_timed_unit_maker("qru", [](const std::string& name, ClockDomain& domain,
+                                      std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
+                                      Transport transport) {
+    return std::make_unique<TimedQru>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)),
+                                      transport);
   });
   return true;
 }();

@@ -17,9 +17,9 @@ constexpr std::int64_t narrow_limit = std::int64_t{1} << 30;
 }  // namespace
 
 TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderState& state)
-    : state_(state),
-      cost_{parameters.setup_latency_cycles, parameters.setup_interval_cycles,       parameters.coarse_tiles_per_cycle,
-            parameters.fine_tiles_per_cycle, parameters.screen_tile_interval_cycles, parameters.quads_per_cycle} {}
+    : state_(state), cost_{parameters.setup_latency_cycles,        parameters.setup_interval_cycles,
+                           parameters.coarse_tiles_per_cycle,      parameters.fine_tiles_per_cycle,
+                           parameters.screen_tile_interval_cycles, parameters.quads_per_cycle} {}
 
 void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   ++setups;
@@ -32,7 +32,8 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   const auto width = static_cast<std::int32_t>(state_.draw->width);
   const auto height = static_cast<std::int32_t>(state_.draw->height);
   mask_area_ = {0, 0, width, height};
-  if (!whole) mask_area_ = {std::max(clip.x0, 0), std::max(clip.y0, 0), std::min(clip.x1, width), std::min(clip.y1, height)};
+  if (!whole)
+    mask_area_ = {std::max(clip.x0, 0), std::max(clip.y0, 0), std::min(clip.x1, width), std::min(clip.y1, height)};
   tile_x_begin_ = area_.x0 / tile_side;
   tile_x_end_ = (area_.x1 - 1) / tile_side + 1;
   tile_y_ = area_.y0 / tile_side;
@@ -98,7 +99,8 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
       const Edge& edge = edges_[i];
       value[i] = edge.origin + edge.dx * x + edge.dy * y;
       // The largest value over the tile's samples is at the corner to which the gradient points.
-      const std::int64_t most = value[i] + 7 * (std::max<std::int64_t>(edge.dx, 0) + std::max<std::int64_t>(edge.dy, 0));
+      const std::int64_t most =
+          value[i] + 7 * (std::max<std::int64_t>(edge.dx, 0) + std::max<std::int64_t>(edge.dy, 0));
       rejected = rejected || most < 0;
     }
     if (rejected) continue;
@@ -143,10 +145,10 @@ unsigned TileRasterizer::fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t
     right[i] = LaneBits{2 * dx, 2 * dx, 2 * dx, 2 * dx};
     down[i] = LaneBits{2 * dy, 2 * dy, 2 * dy, 2 * dy};
   }
-  const bool inside_area = x >= mask_area_.x0 && y >= mask_area_.y0 && x + raster_side <= mask_area_.x1 &&
-                           y + raster_side <= mask_area_.y1;
-  const unsigned first = static_cast<unsigned>((y % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) +
-                                               (x % tile_side) / 2);
+  const bool inside_area =
+      x >= mask_area_.x0 && y >= mask_area_.y0 && x + raster_side <= mask_area_.x1 && y + raster_side <= mask_area_.y1;
+  const unsigned first =
+      static_cast<unsigned>((y % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) + (x % tile_side) / 2);
   unsigned fragments = 0;
   unsigned count = 0;
   for (unsigned row = 0; row < 4; ++row) {
@@ -156,8 +158,8 @@ unsigned TileRasterizer::fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t
     for (unsigned column = 0; column < 4; ++column) {
       auto mask = static_cast<LaneMask>(sign_mask(a | b | c) ^ all_lanes);
       if (!inside_area) {
-        mask = static_cast<LaneMask>(mask & in_area(x + static_cast<std::int32_t>(2 * column),
-                                                    y + static_cast<std::int32_t>(2 * row)));
+        mask = static_cast<LaneMask>(
+            mask & in_area(x + static_cast<std::int32_t>(2 * column), y + static_cast<std::int32_t>(2 * row)));
       }
       // Written always, kept only if covered: the branch would be mispredicted too often.
       Quad& quad = out.quads[count];
@@ -194,8 +196,8 @@ unsigned TileRasterizer::fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y
       if (mask == 0) continue;
       Quad& quad = out.quads[out.count++];
       quad.splat = primitive_.splat;
-      quad.position = static_cast<std::uint8_t>(((y + row) % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) +
-                                                ((x + column) % tile_side) / 2);
+      quad.position = static_cast<std::uint8_t>(
+          ((y + row) % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) + ((x + column) % tile_side) / 2);
       quad.coverage = static_cast<LaneMask>(mask);
       quad.triangle = primitive_.triangle;
       quad.reserved = 0;
@@ -206,8 +208,8 @@ unsigned TileRasterizer::fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y
 }
 
 namespace {
-const Registrar<TileRasterizer, RasterBehaviour> registrar("raster", "tile-rasterizer",
-                                                           "fixed-point edge functions, 8x8 raster tiles, top-left rule");
+const Registrar<TileRasterizer, RasterBehaviour> registrar(
+    "raster", "tile-rasterizer", "fixed-point edge functions, 8x8 raster tiles, top-left rule");
 }
 
 }  // namespace vrpipe

@@ -11,21 +11,54 @@ namespace vrpipe {
 class TileRasterizer : public RasterBehaviour {
  public:
   struct Parameters : ParameterSet {
-    Integer setup_latency_cycles{*this, "setup_latency_cycles", 10, 1, 1000, "cycles", "ATTILA, Emerald: set-up latency 10",
+    Integer setup_latency_cycles{*this,
+                                 "setup_latency_cycles",
+                                 10,
+                                 1,
+                                 1000,
+                                 "cycles",
+                                 "ATTILA, Emerald: set-up latency 10",
                                  "of setting up a primitive's edge functions"};
-    Integer setup_interval_cycles{*this, "setup_interval_cycles", 1, 1, 1000, "cycles", source::open,
+    Integer setup_interval_cycles{*this,
+                                  "setup_interval_cycles",
+                                  1,
+                                  1,
+                                  1000,
+                                  "cycles",
+                                  source::open,
                                   "between primitives; taken as latency the 8 to 10 cycles of set-up cost nothing"};
-    Integer coarse_tiles_per_cycle{*this, "coarse_tiles_per_cycle", 8, 1, 1024, "raster tiles",
+    Integer coarse_tiles_per_cycle{*this,
+                                   "coarse_tiles_per_cycle",
+                                   8,
+                                   1,
+                                   1024,
+                                   "raster tiles",
                                    "ATTILA: 16x16 scan tiles, two a cycle",
                                    "raster tiles tested against the edges in a cycle"};
-    Integer fine_tiles_per_cycle{*this, "fine_tiles_per_cycle", 2, 1, 64, "raster tiles",
+    Integer fine_tiles_per_cycle{*this,
+                                 "fine_tiles_per_cycle",
+                                 2,
+                                 1,
+                                 64,
+                                 "raster tiles",
                                  "Emerald: 2 fine tiles a cycle and cluster",
                                  "raster tiles made into quads in a cycle"};
-    Integer screen_tile_interval_cycles{*this, "screen_tile_interval_cycles", 1, 1, 1000, "cycles",
+    Integer screen_tile_interval_cycles{*this,
+                                        "screen_tile_interval_cycles",
+                                        1,
+                                        1,
+                                        1000,
+                                        "cycles",
                                         "measured on a GH100 graphics GPC: 5.5 cycles with 2 TPCs, scaled to 8",
                                         "between (primitive, screen tile) pairs"};
-    Integer quads_per_cycle{*this, "quads_per_cycle", 16, 1, 16, "quads",
-                            "measured on a GH100 graphics GPC: 64 pixels a cycle", "quads handed to TC in a cycle"};
+    Integer quads_per_cycle{*this,
+                            "quads_per_cycle",
+                            16,
+                            1,
+                            16,
+                            "quads",
+                            "measured on a GH100 graphics GPC: 64 pixels a cycle",
+                            "quads handed to TC in a cycle"};
   };
   TileRasterizer(const Parameters& parameters, const RenderState& state);
 
@@ -45,8 +78,8 @@ class TileRasterizer : public RasterBehaviour {
 
  private:
   struct Edge {
-    std::int64_t dx, dy;   ///< change of the edge function a pixel to the right and down
-    std::int64_t origin;   ///< at the sample of pixel (0, 0), top-left rule included
+    std::int64_t dx, dy;  ///< change of the edge function a pixel to the right and down
+    std::int64_t origin;  ///< at the sample of pixel (0, 0), top-left rule included
   };
   unsigned fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]);
   unsigned fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]);
@@ -58,14 +91,14 @@ class TileRasterizer : public RasterBehaviour {
   Edge edges_[3];
   bool wide_ = false;
   Primitive primitive_;
-  PixelRect area_;             ///< bounds of the primitive within the clip
-  PixelRect mask_area_;        ///< outside which samples are masked off
-  std::int32_t tile_x_ = 0;    ///< screen tile, in tiles
+  PixelRect area_;           ///< bounds of the primitive within the clip
+  PixelRect mask_area_;      ///< outside which samples are masked off
+  std::int32_t tile_x_ = 0;  ///< screen tile, in tiles
   std::int32_t tile_y_ = 0;
   std::int32_t tile_x_begin_ = 0;
   std::int32_t tile_x_end_ = 0;
   std::int32_t tile_y_end_ = 0;
-  unsigned part_ = 0;          ///< raster tile in the screen tile, 0 to 3
+  unsigned part_ = 0;  ///< raster tile in the screen tile, 0 to 3
   bool tile_counted_ = false;
 };
 

@@ -120,7 +120,7 @@ class RasterUnit : public Unit {
   std::unique_ptr<RasterBehaviour> behaviour_;
   const RasterBehaviour::Cost cost_;
   bool active_ = false;
-  QuadBeat tile_;             ///< quads of the raster tile in hand, sent up to `at_`
+  QuadBeat tile_;  ///< quads of the raster tile in hand, sent up to `at_`
   unsigned at_ = 0;
   unsigned coarse_debt_ = 0;  ///< raster tiles tested ahead of the coarse rasteriser's rate
   Cycle tile_due_ = 0;

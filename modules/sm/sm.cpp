@@ -44,16 +44,9 @@ void SplatShader::load(std::uint32_t index) {
   const float largest = std::max({splat.red, splat.green, splat.blue});
   const float least = std::min({splat.red, splat.green, splat.blue});
   if (!(least >= 0.0F && largest <= half_max)) ++colors_clamped;
-  attributes_ = {splat.cx,
-                 splat.cy,
-                 splat.by * scale,
-                 -splat.bx * scale,
-                 -splat.ay * scale,
-                 splat.ax * scale,
-                 splat.opacity,
-                 clamp_color(splat.red),
-                 clamp_color(splat.green),
-                 clamp_color(splat.blue)};
+  attributes_ = {
+      splat.cx,         splat.cy,      splat.by * scale,       -splat.bx * scale,        -splat.ay * scale,
+      splat.ax * scale, splat.opacity, clamp_color(splat.red), clamp_color(splat.green), clamp_color(splat.blue)};
 }
 
 template <Exponential Kind>

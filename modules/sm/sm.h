@@ -14,30 +14,64 @@ class SplatShader : public SmBehaviour {
  public:
   struct Parameters : ParameterSet {
     Integer cores{*this, "cores", 16, 1, 1024, "cores", source::paper_table, "SIMT cores of the GPC"};
-    Integer schedulers_per_core{*this, "schedulers_per_core", 4, 1, 64, "schedulers", source::paper_table,
-                                "warp schedulers"};
-    Integer lanes_per_scheduler{*this, "lanes_per_scheduler", 16, 1, 32, "lanes", source::paper_table,
+    Integer schedulers_per_core{
+        *this, "schedulers_per_core", 4, 1, 64, "schedulers", source::paper_table, "warp schedulers"};
+    Integer lanes_per_scheduler{*this,
+                                "lanes_per_scheduler",
+                                16,
+                                1,
+                                32,
+                                "lanes",
+                                source::paper_table,
                                 "a warp instruction issues for 32 / lanes cycles"};
-    Integer warps_per_core{*this, "warps_per_core", 48, 1, 256, "warps", "Accel-Sim, SM87_ORIN: 48 warps",
-                           "fragment warps in flight"};
-    Integer vertex_warps{*this, "vertex_warps", 32, 1, 1024, "warps", source::open,
-                         "vertex warps in flight in the array, kept apart so that the pipeline cannot lock"};
-    Integer warps_to_one_core{*this, "warps_to_one_core", 8, 1, 256, "warps",
+    Integer warps_per_core{
+        *this, "warps_per_core", 48, 1, 256, "warps", "Accel-Sim, SM87_ORIN: 48 warps", "fragment warps in flight"};
+    Integer vertex_warps{
+        *this,        "vertex_warps",
+        32,           1,
+        1024,         "warps",
+        source::open, "vertex warps in flight in the array, kept apart so that the pipeline cannot lock"};
+    Integer warps_to_one_core{*this,
+                              "warps_to_one_core",
+                              8,
+                              1,
+                              256,
+                              "warps",
                               "measured on a GH100 graphics GPC: 64 quads to one SM, SMs in turn",
                               "consecutive warps of a screen tile that go to the same core"};
-    Integer vertex_instructions{*this, "vertex_instructions", 20, 1, 1000, "instructions", source::open,
-                                "of the vertex shader: centre plus two semi-axes"};
-    Integer fragment_instructions{*this, "fragment_instructions", 24, 1, 1000, "instructions", source::open,
-                                  "of the fragment shader: attributes, dot product, ex2, prune, export"};
-    Integer merge_instructions{*this, "merge_instructions", 13, 1, 1000, "instructions", source::open,
-                               "issue slots of a merge: 4 shuffles of two slots, 1 subtraction, 4 multiply-adds"};
-    Integer attribute_latency_cycles{*this, "attribute_latency_cycles", 146, 0, 10000, "cycles",
-                                     "Accel-Sim, SM87_ORIN: L2 latency", "of fetching attributes from L2"};
-    Integer fragment_latency_cycles{*this, "fragment_latency_cycles", 75, 0, 10000, "cycles",
+    Integer vertex_instructions{*this,        "vertex_instructions",
+                                20,           1,
+                                1000,         "instructions",
+                                source::open, "of the vertex shader: centre plus two semi-axes"};
+    Integer fragment_instructions{*this,        "fragment_instructions",
+                                  24,           1,
+                                  1000,         "instructions",
+                                  source::open, "of the fragment shader: attributes, dot product, ex2, prune, export"};
+    Integer merge_instructions{
+        *this,        "merge_instructions",
+        13,           1,
+        1000,         "instructions",
+        source::open, "issue slots of a merge: 4 shuffles of two slots, 1 subtraction, 4 multiply-adds"};
+    Integer attribute_latency_cycles{*this,
+                                     "attribute_latency_cycles",
+                                     146,
+                                     0,
+                                     10000,
+                                     "cycles",
+                                     "Accel-Sim, SM87_ORIN: L2 latency",
+                                     "of fetching attributes from L2"};
+    Integer fragment_latency_cycles{*this,
+                                    "fragment_latency_cycles",
+                                    75,
+                                    0,
+                                    10000,
+                                    "cycles",
                                     "Accel-Sim, SM87_ORIN: 4 cycles an instruction, 23 a special function",
                                     "of the dependent instructions beyond their issue slots"};
-    Integer merge_latency_cycles{*this, "merge_latency_cycles", 30, 0, 10000, "cycles", source::open,
-                                 "of shuffle and partial blend beyond their issue slots"};
+    Integer merge_latency_cycles{*this,        "merge_latency_cycles",
+                                 30,           0,
+                                 10000,        "cycles",
+                                 source::open, "of shuffle and partial blend beyond their issue slots"};
   };
   SplatShader(const Parameters& parameters, const RenderState& state);
 
@@ -53,7 +87,8 @@ class SplatShader : public SmBehaviour {
   Counter fragments_merged{*this, "fragments_merged", "fragments", "taken away by merging, where both are live"};
   Counter fragment_warps{*this, "fragment_warps", "warps", "of fragments"};
   Counter vertex_warps{*this, "vertex_warps", "warps", "of vertices"};
-  Counter colors_clamped{*this, "colors_clamped", "splats", "set-ups of a splat with a colour below 0 or beyond the largest half"};
+  Counter colors_clamped{*this, "colors_clamped", "splats",
+                         "set-ups of a splat with a colour below 0 or beyond the largest half"};
 
  private:
   /// What the fragment shader needs of a splat.

@@ -94,7 +94,7 @@ class SmUnit : public Unit {
     std::uint32_t segment = 0;
     std::uint32_t scheduler = 0;
     std::uint32_t next_ready = no_flight;  ///< behind this one on its scheduler
-    bool done = false;  ///< vertex warps only
+    bool done = false;                     ///< vertex warps only
     Warp warp;
     VertexWarp vertices;
   };

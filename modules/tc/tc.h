@@ -13,14 +13,28 @@ class TileCoalescing : public TcBehaviour {
   struct Parameters : ParameterSet {
     Integer bins{*this, "bins", 32, 1, 65536, "bins", source::paper_table, "screen tiles collected at a time"};
     Integer bin_quads{*this, "bin_quads", 128, 1, 4096, "quads", source::paper_table, "quads in a full bin"};
-    Integer quads_per_cycle{*this, "quads_per_cycle", 16, 1, 16, "quads", source::open,
-                            "quads taken into bins in a cycle; the rasteriser's peak"};
-    Integer latency_cycles{*this, "latency_cycles", 4, 1, 1000, "cycles", source::open,
+    Integer quads_per_cycle{*this,        "quads_per_cycle",
+                            16,           1,
+                            16,           "quads",
+                            source::open, "quads taken into bins in a cycle; the rasteriser's peak"};
+    Integer latency_cycles{*this,
+                           "latency_cycles",
+                           4,
+                           1,
+                           1000,
+                           "cycles",
+                           source::open,
                            "from the flush decision to the first quad at PROP"};
-    Integer idle_timeout_cycles{*this, "idle_timeout_cycles", 150, 0, 1000000, "cycles", source::measured,
+    Integer idle_timeout_cycles{*this,
+                                "idle_timeout_cycles",
+                                150,
+                                0,
+                                1000000,
+                                "cycles",
+                                source::measured,
                                 "without an incoming quad until bins are flushed; 0 never; not in strict termination"};
-    Integer flush_queue_bins{*this, "flush_queue_bins", 2, 1, 1024, "bins", source::open,
-                             "flushed bins that wait for PROP before TC stops"};
+    Integer flush_queue_bins{
+        *this, "flush_queue_bins", 2, 1, 1024, "bins", source::open, "flushed bins that wait for PROP before TC stops"};
   };
   TileCoalescing(const Parameters& parameters, const RenderState& state);
 

@@ -46,7 +46,8 @@ bool TileGridCoalescing::owns_tile_of_grid(std::uint32_t grid_x, std::uint32_t g
   const auto tiles = static_cast<std::uint32_t>(grid_pixels_) / screen_tile_pixels;
   for (std::uint32_t y = grid_y * tiles; y < (grid_y + 1) * tiles; ++y) {
     for (std::uint32_t x = grid_x * tiles; x < (grid_x + 1) * tiles; ++x) {
-      if (owner_of({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, state_.gpcs) == state_.gpc) return true;
+      if (owner_of({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, state_.gpcs) == state_.gpc)
+        return true;
     }
   }
   return false;

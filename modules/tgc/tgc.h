@@ -13,12 +13,30 @@ class TileGridCoalescing : public TgcBehaviour {
  public:
   struct Parameters : ParameterSet {
     Integer bins{*this, "bins", 128, 1, 65536, "bins", source::paper_table, "tile grids collected at a time"};
-    Integer bin_primitives{*this, "bin_primitives", 16, 1, 65536, "primitives", source::paper_table,
+    Integer bin_primitives{*this,
+                           "bin_primitives",
+                           16,
+                           1,
+                           65536,
+                           "primitives",
+                           source::paper_table,
                            "primitives in a full bin; a splat is two"};
     Integer grid_tiles{*this, "grid_tiles", 4, 1, 64, "screen tiles", source::paper_table, "side of a tile grid"};
-    Integer entries_per_cycle{*this, "entries_per_cycle", 2, 1, 64, "entries", source::open,
+    Integer entries_per_cycle{*this,
+                              "entries_per_cycle",
+                              2,
+                              1,
+                              64,
+                              "entries",
+                              source::open,
                               "bins that primitives enter in a cycle; matches the rate of VPO"};
-    Integer latency_cycles{*this, "latency_cycles", 4, 1, 1000, "cycles", source::open,
+    Integer latency_cycles{*this,
+                           "latency_cycles",
+                           4,
+                           1,
+                           1000,
+                           "cycles",
+                           source::open,
                            "from the flush decision to the first primitive at the rasteriser"};
   };
   TileGridCoalescing(const Parameters& parameters, const RenderState& state);

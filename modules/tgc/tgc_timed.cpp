@@ -12,7 +12,9 @@ class TimedTgc : public TimedUnit {
       : TimedUnit(name, domain, transport),
         out_(*this, "out_jobs"),
         in_(*this, "in_primitives",
-            [this](const PrimitiveItem& item, Cycle visible) { return item.end_of_draw ? drain(visible) : enter_bins(item, visible); },
+            [this](const PrimitiveItem& item, Cycle visible) {
+              return item.end_of_draw ? drain(visible) : enter_bins(item, visible);
+            },
             {&out_}),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
@@ -79,9 +81,11 @@ class TimedTgc : public TimedUnit {
 };
 
 [[maybe_unused]] const bool registered = [] {
-  register_timed_unit_maker("tgc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                      const RenderState&, unsigned, Transport transport) {
-    return std::make_unique<TimedTgc>(name.c_str(), domain, behaviour_as<TgcBehaviour>(std::move(behaviour)), transport);
+  register_timed_unit_maker("tgc", [](const std::string& name, ClockDomain& domain,
+                                      std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
+                                      Transport transport) {
+    return std::make_unique<TimedTgc>(name.c_str(), domain, behaviour_as<TgcBehaviour>(std::move(behaviour)),
+                                      transport);
   });
   return true;
 }();

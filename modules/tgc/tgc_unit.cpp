@@ -17,7 +17,9 @@ class TgcUnit : public Unit {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
 
-  bool idle() const override { return in_.empty() && !behaviour_->entering() && !reading_out() && !waiting_ && !ending_; }
+  bool idle() const override {
+    return in_.empty() && !behaviour_->entering() && !reading_out() && !waiting_ && !ending_;
+  }
   std::uint64_t work() const override { return steps_; }
   double peak_rate() const override { return cost_.items_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }

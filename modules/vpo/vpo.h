@@ -9,10 +9,20 @@ namespace vrpipe {
 class PrimitiveAssembly : public VpoBehaviour {
  public:
   struct Parameters : ParameterSet {
-    Integer triangles_per_cycle{*this, "triangles_per_cycle", 2, 1, 16, "triangles",
+    Integer triangles_per_cycle{*this,
+                                "triangles_per_cycle",
+                                2,
+                                1,
+                                16,
+                                "triangles",
                                 "ATTILA: primitive assembly and set-up take 2 triangles a cycle",
                                 "triangles assembled, culled and boxed in a cycle"};
-    Integer latency_cycles{*this, "latency_cycles", 10, 1, 1000, "cycles",
+    Integer latency_cycles{*this,
+                           "latency_cycles",
+                           10,
+                           1,
+                           1000,
+                           "cycles",
                            "Emerald: bounding box 4 cycles; ATTILA: clipper 6 cycles",
                            "from the last vertex to the primitive at the GPC"};
   };

@@ -91,8 +91,9 @@ class TimedVpo : public TimedUnit {
 };
 
 [[maybe_unused]] const bool registered = [] {
-  register_timed_unit_maker("vpo", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                      const RenderState&, unsigned gpcs, Transport transport) {
+  register_timed_unit_maker("vpo", [](const std::string& name, ClockDomain& domain,
+                                      std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned gpcs,
+                                      Transport transport) {
     return std::make_unique<TimedVpo>(name.c_str(), domain, behaviour_as<VpoBehaviour>(std::move(behaviour)), gpcs,
                                       transport);
   });

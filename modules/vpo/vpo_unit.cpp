@@ -9,7 +9,8 @@ namespace {
 /// Ports: in_vertices_<gpc> (VertexWarp), out_primitives_<gpc> (PrimitiveItem).
 class VpoUnit : public Unit {
  public:
-  VpoUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<VpoBehaviour> behaviour, unsigned gpcs)
+  VpoUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<VpoBehaviour> behaviour,
+          unsigned gpcs)
       : Unit(name, domain), behaviour_(std::move(behaviour)), cost_(behaviour_->cost()), gpcs_(gpcs) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       ins_.push_back(std::make_unique<StreamIn<VertexWarp>>(*this, "in_vertices_" + std::to_string(gpc)));

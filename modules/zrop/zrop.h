@@ -9,13 +9,26 @@ namespace vrpipe {
 class DepthStencilRop : public ZropBehaviour {
  public:
   struct Parameters : ParameterSet {
-    Integer quads_per_cycle{*this, "quads_per_cycle", 16, 1, 16, "quads",
-                            "measured on a GH100 graphics GPC: 8 quads a cycle and ROP partition; the paper's GPC has two",
-                            "tested in a cycle"};
-    Integer latency_cycles{*this, "latency_cycles", 8, 1, 1000, "cycles", source::open,
-                           "of a test, z-cache read included"};
-    Integer updates_per_cycle{*this, "updates_per_cycle", 1, 1, 16, "signals", source::open,
-                              "termination updates, each a read-modify-write of the z-cache; such a cycle tests nothing"};
+    Integer quads_per_cycle{
+        *this,
+        "quads_per_cycle",
+        16,
+        1,
+        16,
+        "quads",
+        "measured on a GH100 graphics GPC: 8 quads a cycle and ROP partition; the paper's GPC has two",
+        "tested in a cycle"};
+    Integer latency_cycles{
+        *this, "latency_cycles", 8, 1, 1000, "cycles", source::open, "of a test, z-cache read included"};
+    Integer updates_per_cycle{
+        *this,
+        "updates_per_cycle",
+        1,
+        1,
+        16,
+        "signals",
+        source::open,
+        "termination updates, each a read-modify-write of the z-cache; such a cycle tests nothing"};
   };
   DepthStencilRop(const Parameters& parameters, const RenderState& state);
 

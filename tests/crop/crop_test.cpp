@@ -199,7 +199,9 @@ TEST_F(ColorRopTest, AThousandQuadsOnOnePositionAreTheSequentialResult) {
 }
 
 TEST_F(ColorRopTest, QuadsPerCycleFollowTheFormat) {
-  const std::pair<ColorFormat, unsigned> expected[] = {{ColorFormat::rgba8, 4}, {ColorFormat::rgba16f, 2}, {ColorFormat::rgba32f, 1}};
+  const std::pair<ColorFormat, unsigned> expected[] = {{ColorFormat::rgba8, 4},
+                                                       {ColorFormat::rgba16f, 2},
+                                                       {ColorFormat::rgba32f, 1}};
   for (const auto& [format, quads] : expected) {
     state.format = format;
     make();

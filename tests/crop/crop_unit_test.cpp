@@ -27,7 +27,8 @@ class CountingMemory : public sc_core::sc_module, private tlm::tlm_fw_transport_
   std::map<std::uint64_t, unsigned> reads_of;  ///< by address
 
  private:
-  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase&, sc_core::sc_time& delay) override {
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase&,
+                                     sc_core::sc_time& delay) override {
     if (payload.is_read()) {
       bytes_read += payload.get_data_length();
       ++reads_of[payload.get_address()];
@@ -115,7 +116,8 @@ class CropRate : public CropUnitTest, public ::testing::WithParamInterface<std::
 TEST_P(CropRate, ResidentQuadsBlendAtExactlyTheRateOfTheFormat) {
   state.format = GetParam().first;
   const unsigned rate = GetParam().second;
-  for (const LaneMask live : {LaneMask{0b1111}, LaneMask{0b0001}, LaneMask{0b0110}}) {  // case Q07: partial quads cost as much
+  for (const LaneMask live :
+       {LaneMask{0b1111}, LaneMask{0b0001}, LaneMask{0b0110}}) {  // case Q07: partial quads cost as much
     CropBench crop(state);
     for (unsigned i = 0; i < 4; ++i) crop.quad({0, 0}, i % 2 + 8 * (i / 2));
     crop.flush();
@@ -274,7 +276,8 @@ std::uint64_t reads_beyond_compulsory(const RenderState& state, unsigned width, 
       const unsigned y0 = r / per_row * ((height + 15) / 16) * 16;
       for (unsigned y = y0; y < y0 + height; y += 2) {
         for (unsigned x = x0; x < x0 + width; x += 2) {
-          crop.quad({static_cast<std::uint16_t>(x / 16), static_cast<std::uint16_t>(y / 16)}, y % 16 / 2 * 8 + x % 16 / 2, 0.001F);
+          crop.quad({static_cast<std::uint16_t>(x / 16), static_cast<std::uint16_t>(y / 16)},
+                    y % 16 / 2 * 8 + x % 16 / 2, 0.001F);
         }
       }
     }
@@ -300,27 +303,31 @@ TEST_P(CropKnee, ReadsStartAbove16KiloBytesWhateverTheShape) {
   EXPECT_GT(reads_beyond_compulsory(state, shape.width, shape.height, shape.rectangles + 1), 0U);
 }
 
-INSTANTIATE_TEST_SUITE_P(Shapes, CropKnee,
-                         ::testing::Values(KneeShape{ColorFormat::rgba16f, 8, 8, 32}, KneeShape{ColorFormat::rgba16f, 8, 16, 16},
-                                           KneeShape{ColorFormat::rgba16f, 16, 16, 8}, KneeShape{ColorFormat::rgba16f, 32, 64, 1},
-                                           KneeShape{ColorFormat::rgba16f, 64, 4, 8}, KneeShape{ColorFormat::rgba8, 8, 16, 32},
-                                           KneeShape{ColorFormat::rgba8, 16, 16, 16}, KneeShape{ColorFormat::rgba32f, 16, 16, 4}),
-                         [](const auto& shape) {
-                           const KneeShape& s = shape.param;
-                           return std::string(name_of(s.format)) + "_" + std::to_string(s.width) + "x" + std::to_string(s.height) + "x" +
-                                  std::to_string(s.rectangles);
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Shapes, CropKnee,
+    ::testing::Values(KneeShape{ColorFormat::rgba16f, 8, 8, 32}, KneeShape{ColorFormat::rgba16f, 8, 16, 16},
+                      KneeShape{ColorFormat::rgba16f, 16, 16, 8}, KneeShape{ColorFormat::rgba16f, 32, 64, 1},
+                      KneeShape{ColorFormat::rgba16f, 64, 4, 8}, KneeShape{ColorFormat::rgba8, 8, 16, 32},
+                      KneeShape{ColorFormat::rgba8, 16, 16, 16}, KneeShape{ColorFormat::rgba32f, 16, 16, 4}),
+    [](const auto& shape) {
+      const KneeShape& s = shape.param;
+      return std::string(name_of(s.format)) + "_" + std::to_string(s.width) + "x" + std::to_string(s.height) + "x" +
+             std::to_string(s.rectangles);
+    });
 
 TEST_F(CropUnitTest, ImageAndSignalsAreTheSameUnderAnyStallsAndMemory) {
   state.early_termination = true;
   state.termination = Termination::strict;
   std::vector<float> expected;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    CropBench crop(state, {{"cache_bytes", seed % 2 == 0 ? "1024" : "16384"}, {"mshrs", seed % 3 == 0 ? "2" : "16"}, {"input_quads", seed % 5 == 0 ? "1" : "64"}},
+    CropBench crop(state,
+                   {{"cache_bytes", seed % 2 == 0 ? "1024" : "16384"},
+                    {"mshrs", seed % 3 == 0 ? "2" : "16"},
+                    {"input_quads", seed % 5 == 0 ? "1" : "64"}},
                    static_cast<unsigned>(1 + seed * 7 % 300));
     for (std::uint64_t i = 0; i < 600; ++i) {
-      crop.quad({static_cast<std::uint16_t>(mix(i) % 3), 0}, static_cast<unsigned>(mix(i + 999) % 64), testing::uniform(4, i, 0.2F, 0.95F),
-                static_cast<LaneMask>(1 + mix(i + 5) % 15));
+      crop.quad({static_cast<std::uint16_t>(mix(i) % 3), 0}, static_cast<unsigned>(mix(i + 999) % 64),
+                testing::uniform(4, i, 0.2F, 0.95F), static_cast<LaneMask>(1 + mix(i + 5) % 15));
     }
     if (seed > 0) crop.bench.stall_randomly(seed, 90);
     if (seed > 0) crop.bench.shuffle_ticks(seed);

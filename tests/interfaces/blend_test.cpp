@@ -25,7 +25,8 @@ constexpr BlendRounding roundings[] = {BlendRounding::rne, BlendRounding::rtz};
 struct Stack {
   Stack(ColorFormat format, BlendRounding rounding) : blend(blend_function(format, rounding)) {}
   void add(float alpha, float grey, unsigned count) {
-    for (unsigned i = 0; i < count; ++i) pixel = blend(pixel, color_of(alpha * grey, alpha * grey, alpha * grey, alpha));
+    for (unsigned i = 0; i < count; ++i)
+      pixel = blend(pixel, color_of(alpha * grey, alpha * grey, alpha * grey, alpha));
   }
   float alpha() const { return pixel.alpha[0]; }
   float grey() const { return pixel.red[0]; }
@@ -52,8 +53,10 @@ TEST(Unorm8, RoundsToTheNearestLevelAndClamps) {
   for (int level = 0; level < 255; ++level) {
     const double middle = (level + 0.5) / 255.0;
     ASSERT_EQ(round_to_unorm8(splat_lanes(static_cast<float>(middle - 1e-6)))[0], static_cast<float>(level) / 255.0F);
-    ASSERT_EQ(round_to_unorm8(splat_lanes(static_cast<float>(middle + 1e-6)))[0], static_cast<float>(level + 1) / 255.0F);
-    ASSERT_EQ(truncate_to_unorm8(splat_lanes(static_cast<float>((level + 0.99) / 255.0)))[0], static_cast<float>(level) / 255.0F);
+    ASSERT_EQ(round_to_unorm8(splat_lanes(static_cast<float>(middle + 1e-6)))[0],
+              static_cast<float>(level + 1) / 255.0F);
+    ASSERT_EQ(truncate_to_unorm8(splat_lanes(static_cast<float>((level + 0.99) / 255.0)))[0],
+              static_cast<float>(level) / 255.0F);
   }
   EXPECT_EQ(round_to_unorm8(splat_lanes(-3.0F))[0], 0.0F);
   EXPECT_EQ(round_to_unorm8(splat_lanes(7.0F))[0], 1.0F);
@@ -69,7 +72,8 @@ TEST(Unorm8, AllBlendsOfStoredValuesAreTheIntegerFormula) {
     for (int source = 0; source < 256; ++source) {
       // The four colour values of a run are checked in the four lanes.
       for (int color = 0; color < 256; color += 51) {
-        const QuadColor destination = color_of(static_cast<float>(color) / 255.0F, 0, 0, static_cast<float>(alpha) / 255.0F);
+        const QuadColor destination =
+            color_of(static_cast<float>(color) / 255.0F, 0, 0, static_cast<float>(alpha) / 255.0F);
         const auto s = static_cast<float>(source) / 255.0F;
         const QuadColor result = blend(destination, color_of(s, 0, 0, s));
         const int product = (2 * (255 - alpha) * source + 255) / 510;  // 255 is odd: no ties
@@ -175,7 +179,8 @@ TEST(Blend, AlphaNeverFallsAndNeverPassesOne) {
       const float destination = half_value(static_cast<std::uint16_t>(half));
       for (unsigned k = 0; k < 256; k += 4) {
         const Lanes source = Lanes{static_cast<float>(k), static_cast<float>(k + 1), static_cast<float>(k + 2),
-                                   static_cast<float>(k + 3)} / 255.0F;
+                                   static_cast<float>(k + 3)} /
+                             255.0F;
         QuadColor fragment{};
         fragment.alpha = source;
         const Lanes alpha = blend(color_of(0, 0, 0, destination), fragment).alpha;
@@ -214,12 +219,15 @@ TEST(Blend, IsWithinTheConformanceToleranceOfExactBlending) {
   for (unsigned f = 0; f < 3; ++f) {
     const BlendFunction blend = blend_function(formats[f], BlendRounding::rne);
     for (std::uint64_t i = 0; i < 20'000; ++i) {
-      const QuadColor destination = blend(QuadColor{}, color_of(testing::uniform(1, 8 * i, 0, 1), 0, 0, testing::uniform(1, 8 * i + 1, 0, 1)));
+      const QuadColor destination =
+          blend(QuadColor{}, color_of(testing::uniform(1, 8 * i, 0, 1), 0, 0, testing::uniform(1, 8 * i + 1, 0, 1)));
       const float red = testing::uniform(1, 8 * i + 2, 0, 1);
       const float alpha = testing::uniform(1, 8 * i + 3, 0, 1);
       const QuadColor result = blend(destination, color_of(red, 0, 0, alpha));
-      const double exact = static_cast<double>(destination.red[0]) + (1.0 - static_cast<double>(destination.alpha[0])) * static_cast<double>(red);
-      ASSERT_NEAR(static_cast<double>(result.red[0]), formats[f] == ColorFormat::rgba8 ? std::fmin(exact, 1.0) : exact, tolerances[f]);
+      const double exact = static_cast<double>(destination.red[0]) +
+                           (1.0 - static_cast<double>(destination.alpha[0])) * static_cast<double>(red);
+      ASSERT_NEAR(static_cast<double>(result.red[0]), formats[f] == ColorFormat::rgba8 ? std::fmin(exact, 1.0) : exact,
+                  tolerances[f]);
     }
   }
 }
@@ -242,9 +250,12 @@ TEST(Blend, GreyStaysGrey) {
 TEST(Blend, IntoAClearedPixelAFragmentIsStoredAsItIs) {
   for (std::uint64_t i = 0; i < 1000; ++i) {
     const float value = testing::uniform(3, i, 0, 1);
-    EXPECT_EQ(blend_function(ColorFormat::rgba16f, BlendRounding::rne)(QuadColor{}, color_of(value, 0, 0, value)).red[0],
-              round_to_half(value));
-    EXPECT_EQ(blend_function(ColorFormat::rgba32f, BlendRounding::rne)(QuadColor{}, color_of(value, 0, 0, value)).red[0], value);
+    EXPECT_EQ(
+        blend_function(ColorFormat::rgba16f, BlendRounding::rne)(QuadColor{}, color_of(value, 0, 0, value)).red[0],
+        round_to_half(value));
+    EXPECT_EQ(
+        blend_function(ColorFormat::rgba32f, BlendRounding::rne)(QuadColor{}, color_of(value, 0, 0, value)).red[0],
+        value);
   }
 }
 
@@ -312,8 +323,9 @@ TEST(FrontToBack, ADeadFragmentIsTheExactIdentityOnEitherSide) {
   for (const ColorFormat format : formats) {
     const BlendFunction store = blend_function(format, BlendRounding::rne);
     for (std::uint64_t i = 0; i < 2000; ++i) {
-      const QuadColor fragment = color_of(testing::uniform(5, 4 * i, 0, 1), testing::uniform(5, 4 * i + 1, 0, 2),
-                                          testing::uniform(5, 4 * i + 2, 0, 1), testing::uniform(5, 4 * i + 3, 0, 0.99F));
+      const QuadColor fragment =
+          color_of(testing::uniform(5, 4 * i, 0, 1), testing::uniform(5, 4 * i + 1, 0, 2),
+                   testing::uniform(5, 4 * i + 2, 0, 1), testing::uniform(5, 4 * i + 3, 0, 0.99F));
       const QuadColor before = blend_front_to_back(nothing, fragment);
       const QuadColor behind = blend_front_to_back(fragment, nothing);
       ASSERT_EQ(std::memcmp(&before, &fragment, sizeof fragment), 0);
@@ -332,8 +344,9 @@ TEST(FrontToBack, IsWithinItsArithmeticErrorOfDouble) {
     const double front = static_cast<double>(testing::uniform(6, 4 * i + 1, 0, 1));
     const float back_alpha = testing::uniform(6, 4 * i + 2, 0, 0.99F);
     const float grey = testing::uniform(6, 4 * i + 3, 0, 1);
-    const QuadColor result = blend_front_to_back(color_of(static_cast<float>(front), 0, 0, static_cast<float>(front_alpha)),
-                                                 color_of(back_alpha * grey, 0, 0, back_alpha));
+    const QuadColor result =
+        blend_front_to_back(color_of(static_cast<float>(front), 0, 0, static_cast<float>(front_alpha)),
+                            color_of(back_alpha * grey, 0, 0, back_alpha));
     const double exact = front + (1.0 - front_alpha) * static_cast<double>(back_alpha) * static_cast<double>(grey);
     ASSERT_NEAR(static_cast<double>(result.red[0]), exact, 4 * 0x1p-24 * std::fmax(1.0, exact));
   }
@@ -371,7 +384,8 @@ double share_of_exact_channels(std::ifstream& file, ColorFormat format) {
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const QuadColor got = blend(pixel(block[1], i), pixel(block[0], i));
     const QuadColor want = pixel(block[2], i);
-    exact += (got.red[0] == want.red[0]) + (got.green[0] == want.green[0]) + (got.blue[0] == want.blue[0]) + (got.alpha[0] == want.alpha[0]);
+    exact += (got.red[0] == want.red[0]) + (got.green[0] == want.green[0]) + (got.blue[0] == want.blue[0]) +
+             (got.alpha[0] == want.alpha[0]);
   }
   return static_cast<double>(exact) / (4.0 * count);
 }

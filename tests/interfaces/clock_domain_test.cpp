@@ -134,7 +134,8 @@ TEST_F(ClockDomainTest, AWakeUpFromOutsideTheClockReachesAUnitWhileAllSleep) {
 TEST_F(ClockDomainTest, AWakeUpFromOutsideTheClockComesBeforeAnEdgeAlreadyPlanned) {
   Ticker busy(*clock, {1000});
   Ticker sleeper(*clock, {});
-  Outsider outsider("outsider", sc_core::sc_time(50.0 * 1634, sc_core::SC_PS), [&] { clock->wake(sleeper.handle, 60); });
+  Outsider outsider("outsider", sc_core::sc_time(50.0 * 1634, sc_core::SC_PS),
+                    [&] { clock->wake(sleeper.handle, 60); });
   sc_core::sc_start();
   EXPECT_EQ(sleeper.ticks, (std::vector<Cycle>{0, 60}));
   EXPECT_EQ(busy.ticks, (std::vector<Cycle>{0, 1000}));

@@ -60,7 +60,8 @@ std::vector<float> halves_midpoints_and_neighbours() {
       }
     }
   }
-  for (const float f : {65535.0F, 65536.0F, 1e6F, 3.4e38F, 1e-40F, 1e-45F, 5.9e-8F, std::numeric_limits<float>::infinity()}) {
+  for (const float f :
+       {65535.0F, 65536.0F, 1e6F, 3.4e38F, 1e-40F, 1e-45F, 5.9e-8F, std::numeric_limits<float>::infinity()}) {
     values.push_back(f);
     values.push_back(-f);
   }
@@ -96,7 +97,8 @@ TEST(Half, RoundingIsToNearestEvenAtEveryHalfMidpointAndNeighbour) {
 
 TEST(Half, TruncationIsTowardsZeroAtEveryHalfMidpointAndNeighbour) {
   for (const float value : halves_midpoints_and_neighbours()) {
-    ASSERT_EQ(bits_of_float(truncate_to_half(splat_lanes(value))[0]), bits_of_float(static_cast<float>(truncated_half(value))))
+    ASSERT_EQ(bits_of_float(truncate_to_half(splat_lanes(value))[0]),
+              bits_of_float(static_cast<float>(truncated_half(value))))
         << value;
   }
 }

@@ -15,7 +15,8 @@ namespace {
 /// Reads line after line as fast as the port allows, and keeps when each came back.
 class Reader : public sc_core::sc_module, public Clocked, public PortOwner {
  public:
-  Reader(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned in_flight, unsigned accesses, unsigned bytes = 32)
+  Reader(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned in_flight, unsigned accesses,
+         unsigned bytes = 32)
       : sc_module(name), memory(attach(domain), "memory", in_flight), left_(accesses), bytes_(bytes) {}
 
   MemoryPort memory;
@@ -67,7 +68,8 @@ class FourPhaseMemory : public sc_core::sc_module, private tlm::tlm_fw_transport
   bool overlapped_requests = false;
 
  private:
-  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase, sc_core::sc_time&) override {
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                                     sc_core::sc_time&) override {
     if (phase == tlm::BEGIN_REQ) {
       overlapped_requests = overlapped_requests || request_open_;
       request_open_ = true;
@@ -122,7 +124,8 @@ class ImmediateMemory : public sc_core::sc_module, private tlm::tlm_fw_transport
   unsigned end_responses = 0;
 
  private:
-  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase, sc_core::sc_time& delay) override {
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                                     sc_core::sc_time& delay) override {
     if (phase == tlm::END_RESP) {
       ++end_responses;
       return tlm::TLM_COMPLETED;
@@ -254,7 +257,8 @@ TEST_P(EarlyCompletion, IsSeenInTheNextCycleAtTheEarliest) {
 }
 
 const char* name_of(ImmediateMemory::Way way) {
-  constexpr const char* names[] = {"Completed", "UpdatedToResponse", "ResponseFromWithin", "AcceptedFromWithin", "Error"};
+  constexpr const char* names[] = {"Completed", "UpdatedToResponse", "ResponseFromWithin", "AcceptedFromWithin",
+                                   "Error"};
   return names[static_cast<int>(way)];
 }
 

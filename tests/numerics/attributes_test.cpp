@@ -64,7 +64,8 @@ TEST(Attributes, DenormalsChangeNothingAndFlushingThemDoesNotEither) {
 TEST(Attributes, ADenormalColourOfBinary16SurvivesInItsTarget) {
   Splat splat = flat_box(0, 0, 16, 16, 0.5F, 0x1p-23F, 0, 0);  // 2^-24 after alpha: the smallest half
   const auto red = [&] {
-    return simulate(untimed("baseline", ColorFormat::rgba16f, {{"state", "exponential", "exact"}}), draw_of(16, 16, {splat}))
+    return simulate(untimed("baseline", ColorFormat::rgba16f, {{"state", "exponential", "exact"}}),
+                    draw_of(16, 16, {splat}))
         .surface.pixel(8, 8)[0];
   };
   EXPECT_EQ(red(), 0x1p-24F);
@@ -95,7 +96,8 @@ TEST(Attributes, EveryCornerOfAnEightBitQuaternionIsARotationOrRejected) {
           // A rotation keeps the axes between the smallest and the largest scale, 32 / 5 pixels a unit, and dilated.
           const double longest = std::sqrt(0.3 + 6.4 * 6.4 * 1.001) * static_cast<double>(s.r);
           ASSERT_LE(std::hypot(static_cast<double>(s.ax), static_cast<double>(s.ay)), longest);
-          ASSERT_GE(std::hypot(static_cast<double>(s.bx), static_cast<double>(s.by)), std::sqrt(0.3) * static_cast<double>(s.r) * 0.999999);
+          ASSERT_GE(std::hypot(static_cast<double>(s.bx), static_cast<double>(s.by)),
+                    std::sqrt(0.3) * static_cast<double>(s.r) * 0.999999);
         }
       }
     }
@@ -165,8 +167,9 @@ TEST(Attributes, ColoursBeyondTheLargestHalfAreClampedAndCounted) {
   for (const float color : {70000.0F, 3e38F}) {
     for (const char* rounding : {"rne", "rtz", "measured"}) {
       std::vector<Splat> splats(40, flat_box(0, 0, 8, 8, 1.0F, color, 1, 0));
-      const RunResult result = simulate(untimed("baseline", ColorFormat::rgba16f, {{"state", "blend_rounding", rounding}}),
-                                        draw_of(16, 16, std::move(splats)));
+      const RunResult result =
+          simulate(untimed("baseline", ColorFormat::rgba16f, {{"state", "blend_rounding", rounding}}),
+                   draw_of(16, 16, std::move(splats)));
       const std::array<float, 4> pixel = result.surface.pixel(3, 3);
       EXPECT_LE(pixel[0], half_max);
       EXPECT_GT(pixel[0], 0.98F * half_max);

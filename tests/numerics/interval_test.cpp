@@ -13,7 +13,9 @@ namespace {
 using namespace testing;
 namespace bni = boost::numeric;
 template <class T>
-using Interval = bni::interval<T, bni::interval_lib::policies<bni::interval_lib::rounded_math<T>, bni::interval_lib::checking_base<T>>>;
+using Interval =
+    bni::interval<T,
+                  bni::interval_lib::policies<bni::interval_lib::rounded_math<T>, bni::interval_lib::checking_base<T>>>;
 
 // case P08
 TEST(Interval, ADeterminantOfDifferencesIsUndecidedWhereTheFactorFormIsCertain) {
@@ -29,7 +31,8 @@ TEST(Interval, ADeterminantOfDifferencesIsUndecidedWhereTheFactorFormIsCertain) 
     const Interval<float> factor = dilation * (m * m + m * m) + dilation * dilation;
     EXPECT_GT(factor.lower(), 0.0F);
     EXPECT_LT(width(factor) / factor.lower(), 1e-5F);
-    const double determinant = covariance_determinant({static_cast<double>(half), 0, 0}, {static_cast<double>(half), 0, 0});
+    const double determinant =
+        covariance_determinant({static_cast<double>(half), 0, 0}, {static_cast<double>(half), 0, 0});
     EXPECT_GE(determinant, 0.999999 * static_cast<double>(factor.lower()));
     EXPECT_LE(determinant, 1.000001 * static_cast<double>(factor.upper()));
   }
@@ -39,8 +42,9 @@ TEST(Interval, ADeterminantOfDifferencesIsUndecidedWhereTheFactorFormIsCertain) 
 TEST(Interval, WithPaddingEverySampleThatIsCertainlyVisibleIsBlended) {
   constexpr std::uint64_t seed = 10;
   for (unsigned i = 0; i < 200; ++i) {
-    const Splat splat = splat_at(uniform(seed, 8 * i, 4, 60), uniform(seed, 8 * i + 1, 4, 60), uniform(seed, 8 * i + 2, 0.55F, 9),
-                                 uniform(seed, 8 * i + 3, 0.55F, 4), uniform(seed, 8 * i + 4, 0, 6), uniform(seed, 8 * i + 5, 0.005F, 1));
+    const Splat splat = splat_at(uniform(seed, 8 * i, 4, 60), uniform(seed, 8 * i + 1, 4, 60),
+                                 uniform(seed, 8 * i + 2, 0.55F, 9), uniform(seed, 8 * i + 3, 0.55F, 4),
+                                 uniform(seed, 8 * i + 4, 0, 6), uniform(seed, 8 * i + 5, 0.005F, 1));
     const Draw draw = draw_of(64, 64, {splat});
     for (const unsigned bits : {4U, 8U, 12U}) {
       RenderState state = state_of(draw);

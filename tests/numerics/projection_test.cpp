@@ -64,8 +64,8 @@ TEST(Needle, TheExponentIsNeverAboveZero) {
   std::uniform_real_distribution<float> any(-1, 1);
   for (int i = 0; i < 300; ++i) {
     const float length = std::exp(8 * any(random));
-    const Splat splat = splat_at(32 + 30 * any(random), 32 + 30 * any(random), length, 0.3F * length * std::fabs(any(random)) + 1e-3F,
-                                 3 * any(random), 0.9F);
+    const Splat splat = splat_at(32 + 30 * any(random), 32 + 30 * any(random), length,
+                                 0.3F * length * std::fabs(any(random)) + 1e-3F, 3 * any(random), 0.9F);
     const Draw draw = draw_of(64, 64, {splat});
     for (const auto& list : fragments_of(state_of(draw))) {
       for (const OracleFragment& fragment : list) ASSERT_LE(fragment.alpha, 0.9F);
@@ -160,7 +160,8 @@ TEST(Splat, DepositsItsIntegralFlatOrTurned) {
 // case E03
 TEST(Splat, ARoundOneCoversTheSameHoweverItsAxesAreTurned) {
   const auto covered = [](float angle) {
-    return simulate(untimed("baseline", ColorFormat::rgba32f), draw_of(32, 32, {splat_at(15.9F, 16.2F, 2.5F, 2.5F, angle, 0.8F)}));
+    return simulate(untimed("baseline", ColorFormat::rgba32f),
+                    draw_of(32, 32, {splat_at(15.9F, 16.2F, 2.5F, 2.5F, angle, 0.8F)}));
   };
   const RunResult flat = covered(0);
   for (const float angle : {0.2F, 0.78539816F, 1.3F}) {

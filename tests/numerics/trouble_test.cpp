@@ -56,7 +56,9 @@ TEST(Trouble, WhatIsNotFiniteIsDroppedWholeWhicheverFieldItIs) {
 TEST(Trouble, TheWidestEdgeFunctionIsReportedInBits) {
   const auto widest = [](float half_extent, const char* bits) {
     return statistic(simulate(untimed("baseline", ColorFormat::rgba16f, {{"state", "subpixel_bits", bits}}),
-                              draw_of(64, 64, {flat_box(32 - half_extent, 32 - half_extent, 32 + half_extent, 32 + half_extent, 0.5F)})),
+                              draw_of(64, 64,
+                                      {flat_box(32 - half_extent, 32 - half_extent, 32 + half_extent, 32 + half_extent,
+                                                0.5F)})),
                      "raster.widest_edge");
   };
   EXPECT_LE(widest(4, "8"), 32U);

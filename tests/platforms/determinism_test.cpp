@@ -22,7 +22,8 @@ TEST(Determinism, RepeatedRunsHaveTheSameHash) {
   const Draw draw = testing::random_draw(64, 64, 300, 1);
   for (const Variant& variant : variants()) {
     const RunResult first = run(request_of(variant.name), draw);
-    for (int i = 0; i < 3; ++i) EXPECT_EQ(run(request_of(variant.name), draw).result_hash, first.result_hash) << variant.name;
+    for (int i = 0; i < 3; ++i)
+      EXPECT_EQ(run(request_of(variant.name), draw).result_hash, first.result_hash) << variant.name;
   }
 }
 
@@ -37,7 +38,8 @@ TEST(Determinism, TheOrderInWhichUnitsTickChangesNoBit) {
         });
       };
       const std::string expected = run(on(0), draw).result_hash;
-      for (std::uint64_t seed = 1; seed <= 6; ++seed) EXPECT_EQ(run(on(seed), draw).result_hash, expected) << variant.name << " " << platform << " " << seed;
+      for (std::uint64_t seed = 1; seed <= 6; ++seed)
+        EXPECT_EQ(run(on(seed), draw).result_hash, expected) << variant.name << " " << platform << " " << seed;
     }
   }
 }
@@ -47,11 +49,13 @@ TEST(Determinism, StrictlyStallsChangeNeitherImageNorCounts) {
   for (const Variant& variant : variants()) {
     const RunResult expected = run(request_of(variant.name, Fidelity::cycle, strictly), draw);
     for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-      const RunResult stalled = run(request_of(variant.name, Fidelity::cycle, [&](RunRequest& r) {
-        strictly(r);
-        r.stall_seed = seed;
-        r.stall_per_256 = static_cast<unsigned>(16 + seed % 100);
-      }), draw);
+      const RunResult stalled = run(request_of(variant.name, Fidelity::cycle,
+                                               [&](RunRequest& r) {
+                                                 strictly(r);
+                                                 r.stall_seed = seed;
+                                                 r.stall_per_256 = static_cast<unsigned>(16 + seed % 100);
+                                               }),
+                                    draw);
       ASSERT_TRUE(same_image(stalled.surface, expected.surface)) << variant.name << " " << seed;
       ASSERT_EQ(stalled.counts.named(), expected.counts.named()) << variant.name << " " << seed;
       ASSERT_GT(*stalled.cycles, *expected.cycles);
@@ -62,10 +66,13 @@ TEST(Determinism, StrictlyStallsChangeNeitherImageNorCounts) {
 TEST(Determinism, InPaperTerminationStallsKeepTheImageWithinItsBound) {
   const Draw draw = testing::random_draw(48, 48, 300, 4);
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    testing::expect_near_reference(run(request_of("het+qm", Fidelity::cycle, [&](RunRequest& r) {
-      r.stall_seed = seed;
-      r.stall_per_256 = 80;
-    }), draw), draw, 0.004);
+    testing::expect_near_reference(run(request_of("het+qm", Fidelity::cycle,
+                                                  [&](RunRequest& r) {
+                                                    r.stall_seed = seed;
+                                                    r.stall_per_256 = 80;
+                                                  }),
+                                       draw),
+                                   draw, 0.004);
   }
 }
 
@@ -75,10 +82,14 @@ TEST(Determinism, TheLatenciesOfShadersChangeNoImage) {
   for (const char* variant : {"baseline", "qm"}) {
     RunResult expected;
     for (const char* latency : {"0", "75", "5000"}) {
-      const RunResult result = run(request_of(variant, Fidelity::cycle, [&](RunRequest& r) {
-        strictly(r);
-        r.settings = {{"sm", "fragment_latency_cycles", latency}, {"sm", "attribute_latency_cycles", latency}};
-      }), draw);
+      const RunResult result = run(
+          request_of(
+              variant, Fidelity::cycle,
+              [&](RunRequest& r) {
+                strictly(r);
+                r.settings = {{"sm", "fragment_latency_cycles", latency}, {"sm", "attribute_latency_cycles", latency}};
+              }),
+          draw);
       if (std::string(latency) == "0") {
         expected = result;
       } else {
@@ -95,13 +106,13 @@ void wire_shallow(Gpu& gpu) {
   gpu.add_front_end("vpo");
   for (const char* slot : {"tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) gpu.add(0, slot);
   const std::pair<const char*, const char*> links[] = {
-      {"draw.out_vertices_0", "gpc0.sm.in_vertices"}, {"gpc0.sm.out_vertices", "vpo.in_vertices_0"},
+      {"draw.out_vertices_0", "gpc0.sm.in_vertices"},     {"gpc0.sm.out_vertices", "vpo.in_vertices_0"},
       {"vpo.out_primitives_0", "gpc0.tgc.in_primitives"}, {"gpc0.tgc.out_jobs", "gpc0.raster.in_jobs"},
-      {"gpc0.raster.out_quads", "gpc0.tc.in_quads"}, {"gpc0.tc.out_bins", "gpc0.prop.in_bins"},
-      {"gpc0.prop.out_test", "gpc0.zrop.in_quads"}, {"gpc0.zrop.out_quads", "gpc0.prop.in_tested"},
-      {"gpc0.prop.out_survivors", "gpc0.qru.in_quads"}, {"gpc0.qru.out_warps", "gpc0.sm.in_warps"},
-      {"gpc0.sm.out_shaded", "gpc0.prop.in_shaded"}, {"gpc0.prop.out_release", "gpc0.sm.in_release"},
-      {"gpc0.prop.out_color", "gpc0.crop.in_color"}, {"gpc0.crop.out_terminations", "gpc0.zrop.in_terminations"}};
+      {"gpc0.raster.out_quads", "gpc0.tc.in_quads"},      {"gpc0.tc.out_bins", "gpc0.prop.in_bins"},
+      {"gpc0.prop.out_test", "gpc0.zrop.in_quads"},       {"gpc0.zrop.out_quads", "gpc0.prop.in_tested"},
+      {"gpc0.prop.out_survivors", "gpc0.qru.in_quads"},   {"gpc0.qru.out_warps", "gpc0.sm.in_warps"},
+      {"gpc0.sm.out_shaded", "gpc0.prop.in_shaded"},      {"gpc0.prop.out_release", "gpc0.sm.in_release"},
+      {"gpc0.prop.out_color", "gpc0.crop.in_color"},      {"gpc0.crop.out_terminations", "gpc0.zrop.in_terminations"}};
   for (const auto& [out, in] : links) gpu.connect(out, in, 1);
   gpu.connect_to_l2("gpc0.crop");
 }
@@ -187,7 +198,8 @@ TEST(Wiring, UnknownUnitsAndPortsGetTheNearestName) {
   const auto message = [&](void (*wire)(Gpu&)) {
     wrong.wire = wire;
     try {
-      run(request_of("baseline", Fidelity::cycle, [&](RunRequest& r) { r.platform = &wrong; }), testing::draw_of(16, 16));
+      run(request_of("baseline", Fidelity::cycle, [&](RunRequest& r) { r.platform = &wrong; }),
+          testing::draw_of(16, 16));
     } catch (const UserError& error) {
       return std::string(error.what());
     }
@@ -197,17 +209,20 @@ TEST(Wiring, UnknownUnitsAndPortsGetTheNearestName) {
               gpu.add_front_end("draw");
               gpu.add_front_end("vpo");
               gpu.connect("drow.out_vertices_0", "vpo.in_vertices_0");
-            }).find("did you mean draw"), std::string::npos);
+            }).find("did you mean draw"),
+            std::string::npos);
   EXPECT_NE(message([](Gpu& gpu) {
               gpu.add_front_end("draw");
               gpu.add_front_end("vpo");
               gpu.connect("draw.out_vertexes_0", "vpo.in_vertices_0");
-            }).find("out_vertices_0"), std::string::npos);
+            }).find("out_vertices_0"),
+            std::string::npos);
   EXPECT_NE(message([](Gpu& gpu) {
               gpu.add_front_end("draw");
               gpu.add(0, "tc");
               gpu.connect("draw.out_vertices_0", "gpc0.tc.in_quads");
-            }).find("different items"), std::string::npos);
+            }).find("different items"),
+            std::string::npos);
 }
 
 TEST(Requests, UnknownNamesAndValuesAreRefusedBeforeAnythingRuns) {
@@ -221,7 +236,9 @@ TEST(Requests, UnknownNamesAndValuesAreRefusedBeforeAnythingRuns) {
   refused([](RunRequest& r) { r.settings = {{"l2", "latency", "0"}}; });
   refused([](RunRequest& r) { r.units = {{"qru", "pear"}}; });
   refused([](RunRequest& r) { r.units = {{"quru", "pairing"}}; });
-  EXPECT_NO_THROW(check_configuration(request_of("baseline", Fidelity::cycle, [](RunRequest& r) { r.settings = {{"qru", "quads_per_cycle", "4"}}; })));
+  EXPECT_NO_THROW(check_configuration(request_of("baseline", Fidelity::cycle, [](RunRequest& r) {
+    r.settings = {{"qru", "quads_per_cycle", "4"}};
+  })));
   EXPECT_THROW(platform_named("agx-orni"), UserError);
   EXPECT_THROW(variant_named("hat"), UserError);
 }

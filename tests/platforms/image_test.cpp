@@ -21,7 +21,8 @@ void PrintTo(const Size& size, std::ostream* out) { *out << size.width << "x" <<
 
 class RandomScene : public ::testing::TestWithParam<Size> {
  protected:
-  RandomScene() : draw(testing::random_draw(GetParam().width, GetParam().height, GetParam().splats, 1000 + GetParam().width)) {}
+  RandomScene()
+      : draw(testing::random_draw(GetParam().width, GetParam().height, GetParam().splats, 1000 + GetParam().width)) {}
   Draw draw;
 };
 
@@ -30,7 +31,8 @@ TEST_P(RandomScene, BaselineAndMergingAreWithinTheRunningBoundOfTheReference) {
   for (const char* variant : {"baseline", "qm"}) {
     for (const ColorFormat format : formats) {
       SCOPED_TRACE(std::string(variant) + " " + name_of(format));
-      testing::expect_near_reference(run(request_of(variant, Fidelity::functional, [&](RunRequest& r) { r.format = format; }), draw), draw, 0);
+      testing::expect_near_reference(
+          run(request_of(variant, Fidelity::functional, [&](RunRequest& r) { r.format = format; }), draw), draw, 0);
     }
   }
 }
@@ -40,7 +42,8 @@ TEST_P(RandomScene, EarlyTerminationIsWithinTheThresholdsRemainderOfTheReference
   for (const char* variant : {"het", "het+qm"}) {
     for (const ColorFormat format : formats) {
       SCOPED_TRACE(std::string(variant) + " " + name_of(format));
-      testing::expect_near_reference(run(request_of(variant, Fidelity::cycle, [&](RunRequest& r) { r.format = format; }), draw), draw, 0.004);
+      testing::expect_near_reference(
+          run(request_of(variant, Fidelity::cycle, [&](RunRequest& r) { r.format = format; }), draw), draw, 0.004);
     }
   }
 }
@@ -67,13 +70,15 @@ TEST_P(RandomScene, StrictlyFunctionalAndCycleHaveTheSameImageAndCounts) {
 TEST_P(RandomScene, WhatGoesInComesOutAndStatesSumToTheCycles) {
   for (const Variant& variant : variants()) {
     for (const Termination termination : {Termination::paper, Termination::strict}) {
-      const RunResult result = run(request_of(variant.name, Fidelity::cycle, [&](RunRequest& r) { r.termination = termination; }), draw);
+      const RunResult result =
+          run(request_of(variant.name, Fidelity::cycle, [&](RunRequest& r) { r.termination = termination; }), draw);
       const Counts& c = result.counts;
       EXPECT_EQ(c.quads_rasterized, c.quads_depth_stencil_failed + c.quads_terminated + c.quads_shaded);
       EXPECT_EQ(c.fragments_rasterized, c.fragments_depth_stencil_failed + c.fragments_terminated + c.fragments_shaded);
-      EXPECT_EQ(c.quads_shaded, c.quads_pruned + c.quads_merged + c.quads_dropped_late + c.quads_late_failed + c.quads_blended);
-      EXPECT_EQ(c.fragments_shaded,
-                c.fragments_pruned + c.fragments_merged + c.fragments_dropped_late + c.fragments_late_failed + c.fragments_blended);
+      EXPECT_EQ(c.quads_shaded,
+                c.quads_pruned + c.quads_merged + c.quads_dropped_late + c.quads_late_failed + c.quads_blended);
+      EXPECT_EQ(c.fragments_shaded, c.fragments_pruned + c.fragments_merged + c.fragments_dropped_late +
+                                        c.fragments_late_failed + c.fragments_blended);
       if (variant.quad_merging) {
         EXPECT_GT(c.quads_merged, 0U) << variant.name;
       } else {
@@ -94,8 +99,11 @@ TEST_P(RandomScene, WhatGoesInComesOutAndStatesSumToTheCycles) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Sizes, RandomScene, ::testing::Values(Size{1, 1, 60}, Size{15, 17, 150}, Size{64, 64, 300}, Size{97, 65, 400}),
-                         [](const auto& size) { return std::to_string(size.param.width) + "x" + std::to_string(size.param.height); });
+INSTANTIATE_TEST_SUITE_P(Sizes, RandomScene,
+                         ::testing::Values(Size{1, 1, 60}, Size{15, 17, 150}, Size{64, 64, 300}, Size{97, 65, 400}),
+                         [](const auto& size) {
+                           return std::to_string(size.param.width) + "x" + std::to_string(size.param.height);
+                         });
 
 TEST(DesktopPlatform, HasTheImageOfAgxOrinBitForBit) {
   const Draw draw = testing::random_draw(97, 65, 400, 5);
@@ -120,7 +128,8 @@ TEST(DesktopPlatform, HasTheImageOfAgxOrinBitForBit) {
 TEST(MobilePlatform, HasTheImageOfAgxOrinBitForBitAndTakesLonger) {
   const Draw draw = testing::random_draw(97, 65, 400, 5);
   const RunResult orin = run(request_of("baseline"), draw);
-  const RunResult mobile = run(request_of("baseline", Fidelity::cycle, [](RunRequest& r) { r.platform = &platform_named("mobile"); }), draw);
+  const RunResult mobile =
+      run(request_of("baseline", Fidelity::cycle, [](RunRequest& r) { r.platform = &platform_named("mobile"); }), draw);
   EXPECT_TRUE(same_image(orin.surface, mobile.surface));
   EXPECT_GT(*mobile.cycles, *orin.cycles);
 }
@@ -128,7 +137,9 @@ TEST(MobilePlatform, HasTheImageOfAgxOrinBitForBitAndTakesLonger) {
 TEST(Desktop, IsFasterThanOneOfItsGpcs) {
   const Draw draw = testing::random_draw(256, 256, 600, 8);
   const RunResult orin = run(request_of("baseline"), draw);
-  const RunResult desktop = run(request_of("baseline", Fidelity::cycle, [](RunRequest& r) { r.platform = &platform_named("desktop"); }), draw);
+  const RunResult desktop =
+      run(request_of("baseline", Fidelity::cycle, [](RunRequest& r) { r.platform = &platform_named("desktop"); }),
+          draw);
   EXPECT_LT(*desktop.cycles * 2, *orin.cycles);
 }
 
@@ -147,7 +158,8 @@ TEST(EmptyDraw, HasOnlyItsFixedOverheadAndNoNumberThatIsNone) {
 // case Z02
 TEST(AllOutside, HasTheImageOfNothing) {
   Draw draw = testing::draw_of(64, 64);
-  for (int i = 0; i < 100; ++i) draw.splats.push_back(testing::round_splat(-500.0F - static_cast<float>(i), 900, 5, 0.8F));
+  for (int i = 0; i < 100; ++i)
+    draw.splats.push_back(testing::round_splat(-500.0F - static_cast<float>(i), 900, 5, 0.8F));
   const RunResult result = run(request_of("het+qm"), draw);
   EXPECT_EQ(result.counts.primitives, 0U);
   EXPECT_TRUE(same_image(result.surface, ColorSurface(64, 64, ColorFormat::rgba16f)));
@@ -156,7 +168,8 @@ TEST(AllOutside, HasTheImageOfNothing) {
 // case Z03
 TEST(OneSplat, IsItsClosedFormAtEveryPixel) {
   const Draw draw = testing::draw_of(40, 30, {testing::round_splat(17.3F, 12.8F, 3, 0.8F, 0.5F, 0.25F, 1)});
-  const RunResult result = run(request_of("baseline", Fidelity::cycle, [](RunRequest& r) { r.format = ColorFormat::rgba32f; }), draw);
+  const RunResult result =
+      run(request_of("baseline", Fidelity::cycle, [](RunRequest& r) { r.format = ColorFormat::rgba32f; }), draw);
   for (std::uint32_t y = 0; y < 30; ++y) {
     for (std::uint32_t x = 0; x < 40; ++x) {
       const double dx = x + 0.5 - static_cast<double>(17.3F);
@@ -174,7 +187,8 @@ TEST(OneSplat, IsItsClosedFormAtEveryPixel) {
 TEST(EqualSplats, FillUpAsAPower) {
   const Draw draw = testing::draw_of(32, 32, std::vector<Splat>(20, testing::flat_box(0, 0, 32, 32, 0.25F)));
   for (const char* variant : {"baseline", "qm"}) {
-    const RunResult result = run(request_of(variant, Fidelity::cycle, [](RunRequest& r) { r.format = ColorFormat::rgba32f; }), draw);
+    const RunResult result =
+        run(request_of(variant, Fidelity::cycle, [](RunRequest& r) { r.format = ColorFormat::rgba32f; }), draw);
     EXPECT_NEAR(static_cast<double>(result.surface.pixel(11, 21)[3]), 1 - std::pow(0.75, 20), 1e-6) << variant;
   }
 }
@@ -197,7 +211,8 @@ TEST(SplatsThatAreNotSeen, DoNotPerturbTheImage) {
 TEST(FullScreenSplats, LoseNoTile) {
   Draw draw = testing::draw_of(200, 120);
   for (std::uint64_t i = 0; i < 150; ++i) {
-    draw.splats.push_back(testing::splat_at(testing::uniform(i, 1, 0, 200), testing::uniform(i, 2, 0, 120), 3000, 2000, testing::uniform(i, 3, 0, 6), 0.03F));
+    draw.splats.push_back(testing::splat_at(testing::uniform(i, 1, 0, 200), testing::uniform(i, 2, 0, 120), 3000, 2000,
+                                            testing::uniform(i, 3, 0, 6), 0.03F));
   }
   for (const char* variant : {"baseline", "het+qm"}) {
     const RunResult result = run(request_of(variant), draw);
@@ -227,8 +242,9 @@ TEST(AnOpaqueWall, HidesAllThatLiesBehindIt) {
   const RunResult result = run(request_of("het", Fidelity::cycle, strictly), draw);
   EXPECT_LE(result.counts.fragments_blended, wall * 64 * 64);
   EXPECT_GT(result.counts.fragments_terminated, 0U);
-  const RunResult alone = run(request_of("het", Fidelity::cycle, strictly),
-                              testing::draw_of(64, 64, {draw.splats.begin(), draw.splats.begin() + static_cast<std::ptrdiff_t>(wall)}));
+  const RunResult alone =
+      run(request_of("het", Fidelity::cycle, strictly),
+          testing::draw_of(64, 64, {draw.splats.begin(), draw.splats.begin() + static_cast<std::ptrdiff_t>(wall)}));
   EXPECT_TRUE(same_image(result.surface, alone.surface));
 }
 
@@ -260,10 +276,12 @@ TEST(TerminationSignals, AreAsManyAsPixelsThatPassTheThreshold) {
   for (std::uint64_t i = 0; i < 6000; ++i) {
     const float x = 2 * std::floor(testing::uniform(i, 1, 0, 24));
     const float y = 2 * std::floor(testing::uniform(i, 2, 0, 24));
-    draw.splats.push_back(testing::flat_box(x + 0.2F, y + 0.2F, x + 0.8F, y + 0.8F, testing::uniform(i, 3, 0.05F, 0.9F)));
+    draw.splats.push_back(
+        testing::flat_box(x + 0.2F, y + 0.2F, x + 0.8F, y + 0.8F, testing::uniform(i, 3, 0.05F, 0.9F)));
   }
   for (const Termination termination : {Termination::paper, Termination::strict}) {
-    const RunResult result = run(request_of("het", Fidelity::cycle, [&](RunRequest& r) { r.termination = termination; }), draw);
+    const RunResult result =
+        run(request_of("het", Fidelity::cycle, [&](RunRequest& r) { r.termination = termination; }), draw);
     std::uint64_t terminated = 0;
     for (std::uint32_t y = 0; y < 48; ++y) {
       for (std::uint32_t x = 0; x < 48; ++x) terminated += result.surface.pixel(x, y)[3] >= 0.996F;
@@ -302,7 +320,12 @@ TEST(UpdateLatency, LengthensTheTimeInWhichLateFragmentsBlendAndStrictlyChangesN
 TEST(EarlyTermination, ThatCannotFireChangesNeitherImageNorBlends) {
   const Draw draw = testing::random_draw(64, 64, 300, 2);
   const RunResult off = run(request_of("baseline"), draw);
-  const RunResult never_fires = run(request_of("het", Fidelity::cycle, [](RunRequest& r) { r.settings.push_back({"state", "termination_threshold", "1"}); r.settings.push_back({"state", "termination_compare", "gt"}); }), draw);
+  const RunResult never_fires = run(request_of("het", Fidelity::cycle,
+                                               [](RunRequest& r) {
+                                                 r.settings.push_back({"state", "termination_threshold", "1"});
+                                                 r.settings.push_back({"state", "termination_compare", "gt"});
+                                               }),
+                                    draw);
   EXPECT_TRUE(same_image(off.surface, never_fires.surface));
   EXPECT_EQ(off.counts.fragments_blended, never_fires.counts.fragments_blended);
   EXPECT_EQ(never_fires.counts.termination_updates, 0U);
@@ -362,7 +385,8 @@ TEST(GreySplats, GiveAGreyImageInEveryFormat) {
   Draw draw = testing::random_draw(64, 64, 200, 14);
   for (Splat& splat : draw.splats) splat.green = splat.blue = splat.red;
   for (const ColorFormat format : formats) {
-    const RunResult result = run(request_of("het+qm", Fidelity::cycle, [&](RunRequest& r) { r.format = format; }), draw);
+    const RunResult result =
+        run(request_of("het+qm", Fidelity::cycle, [&](RunRequest& r) { r.format = format; }), draw);
     for (std::uint32_t y = 0; y < 64; ++y) {
       for (std::uint32_t x = 0; x < 64; ++x) {
         const auto pixel = result.surface.pixel(x, y);
@@ -376,7 +400,9 @@ TEST(GreySplats, GiveAGreyImageInEveryFormat) {
 TEST(PrunedFragments, AreTheCornersOfTheBoxes) {
   const Draw draw = testing::draw_of(512, 512, {testing::splat_at(256, 256, 60, 40, 0.5F, 0.95F)});
   const RunResult result = run(request_of("baseline", Fidelity::functional), draw);
-  EXPECT_NEAR(static_cast<double>(result.counts.fragments_pruned) / static_cast<double>(result.counts.fragments_rasterized), 0.2146, 0.003);
+  EXPECT_NEAR(static_cast<double>(result.counts.fragments_pruned) /
+                  static_cast<double>(result.counts.fragments_rasterized),
+              0.2146, 0.003);
 }
 
 }  // namespace

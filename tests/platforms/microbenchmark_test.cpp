@@ -15,7 +15,8 @@ Draw rectangles_over_tiles(unsigned rectangles, unsigned tiles) {
   Draw draw = testing::draw_of(32 * 8, 32 * ((tiles + 7) / 8));
   for (unsigned i = 0; i < rectangles; ++i) {
     const unsigned tile = i % tiles;
-    draw.triangles.push_back(testing::one_quad_triangle(static_cast<float>(tile % 8 * 32 + 4), static_cast<float>(tile / 8 * 32 + 6)));
+    draw.triangles.push_back(
+        testing::one_quad_triangle(static_cast<float>(tile % 8 * 32 + 4), static_cast<float>(tile / 8 * 32 + 6)));
     draw.splats.push_back(testing::flat_box(0, 0, 1, 1, 0.1F));
   }
   return draw;
@@ -44,7 +45,8 @@ TEST(TileBinning, TheBinAllocatedFirstGoesHoweverRecentlyUsed) {
   for (unsigned tile = 0; tile < 32; ++tile) order.push_back(tile);
   order.insert(order.end(), {0, 32, 0});
   for (const unsigned tile : order) {
-    draw.triangles.push_back(testing::one_quad_triangle(static_cast<float>(tile % 8 * 32 + 4), static_cast<float>(tile / 8 * 32 + 6)));
+    draw.triangles.push_back(
+        testing::one_quad_triangle(static_cast<float>(tile % 8 * 32 + 4), static_cast<float>(tile / 8 * 32 + 6)));
     draw.splats.push_back(testing::flat_box(0, 0, 1, 1, 0.1F));
   }
   const RunResult result = run(request_of("baseline", Fidelity::functional), draw);
@@ -60,10 +62,13 @@ Draw layers(unsigned count) {
 }
 
 TEST(RopThroughput, IsTwoQuadsACycleOfRgba16fFourOfRgba8AndOneOfRgba32f) {
-  const std::pair<ColorFormat, double> formats[] = {{ColorFormat::rgba8, 4}, {ColorFormat::rgba16f, 2}, {ColorFormat::rgba32f, 1}};
+  const std::pair<ColorFormat, double> formats[] = {{ColorFormat::rgba8, 4},
+                                                    {ColorFormat::rgba16f, 2},
+                                                    {ColorFormat::rgba32f, 1}};
   const Draw draw = layers(300);
   for (const auto& [format, rate] : formats) {
-    const RunResult result = run(request_of("baseline", Fidelity::cycle, [&, f = format](RunRequest& r) { r.format = f; }), draw);
+    const RunResult result =
+        run(request_of("baseline", Fidelity::cycle, [&, f = format](RunRequest& r) { r.format = f; }), draw);
     ASSERT_EQ(result.counts.quads_blended, 300U * 256);
     const double cycles = static_cast<double>(*result.cycles);
     const double per_cycle = static_cast<double>(result.counts.quads_blended) / cycles;
@@ -83,7 +88,8 @@ TEST(RopThroughput, PartialQuadsCostAsMuchAsFullOnes) {
       draw.triangles.push_back({{-1, -1, 4000}, {y + 0.2F, y + 0.2F + height, y + 0.2F + height / 2}});
       draw.splats.push_back(testing::flat_box(0, 0, 1, 1, 0.01F));
     }
-    const RunResult result = run(request_of("baseline", Fidelity::cycle, [](RunRequest& r) { r.format = ColorFormat::rgba32f; }), draw);
+    const RunResult result =
+        run(request_of("baseline", Fidelity::cycle, [](RunRequest& r) { r.format = ColorFormat::rgba32f; }), draw);
     ASSERT_EQ(result.counts.quads_blended, 4000U * 16);
     ASSERT_EQ(result.counts.fragments_blended, 4000U * 16 * (full ? 4 : 2));
     per_quad[full] = static_cast<double>(*result.cycles) / static_cast<double>(result.counts.quads_blended);
@@ -101,7 +107,9 @@ TEST(Storage, IsThatOfThePapersTable) {
 }
 
 TEST(Storage, FollowsTheConfiguredSizes) {
-  const StorageReport half = quad_merging_storage(request_of("het+qm", Fidelity::cycle, [](RunRequest& r) { r.settings = {{"tgc", "bins", "64"}}; }));
+  const StorageReport half = quad_merging_storage(request_of("het+qm", Fidelity::cycle, [](RunRequest& r) {
+    r.settings = {{"tgc", "bins", "64"}};
+  }));
   EXPECT_EQ(half.tgc_bytes, 12'416U);
 }
 
@@ -109,7 +117,8 @@ TEST(QuadMerging, HalvesTheBlendsOfAStackAndItsTime) {
   const Draw draw = layers(256);
   const RunResult baseline = run(request_of("baseline"), draw);
   const RunResult merged = run(request_of("qm"), draw);
-  EXPECT_NEAR(static_cast<double>(merged.counts.quads_blended) / static_cast<double>(baseline.counts.quads_blended), 0.5, 0.02);
+  EXPECT_NEAR(static_cast<double>(merged.counts.quads_blended) / static_cast<double>(baseline.counts.quads_blended),
+              0.5, 0.02);
   EXPECT_NEAR(static_cast<double>(*merged.cycles) / static_cast<double>(*baseline.cycles), 0.5, 0.1);
 }
 

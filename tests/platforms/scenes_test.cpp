@@ -20,19 +20,22 @@ Vec3 vector_of(const nlohmann::json& numbers) {
 
 void expect_the_papers_shape(const Draw& draw) {
   std::map<std::string, RunResult> results;
-  for (const Variant& variant : variants()) results.emplace(variant.name, testing::run(testing::request_of(variant.name), draw));
+  for (const Variant& variant : variants())
+    results.emplace(variant.name, testing::run(testing::request_of(variant.name), draw));
   const auto cycles = [&](const std::string& variant) { return static_cast<double>(*results.at(variant).cycles); };
   const double qm = cycles("baseline") / cycles("qm");
   const double het = cycles("baseline") / cycles("het");
   const double both = cycles("baseline") / cycles("het+qm");
-  ::testing::Test::RecordProperty("speedups", std::to_string(qm) + " " + std::to_string(het) + " " + std::to_string(both));
+  ::testing::Test::RecordProperty("speedups",
+                                  std::to_string(qm) + " " + std::to_string(het) + " " + std::to_string(both));
   EXPECT_GT(qm, 1.0);
   EXPECT_GT(het, 1.0);
   EXPECT_GT(both, het);
   EXPECT_GT(both, qm);
 
   const RunResult& baseline = results.at("baseline");
-  for (const auto& [unit, share] : baseline.utilization) EXPECT_LE(share, testing::utilization(baseline, "crop")) << unit;
+  for (const auto& [unit, share] : baseline.utilization)
+    EXPECT_LE(share, testing::utilization(baseline, "crop")) << unit;
   EXPECT_LT(testing::utilization(baseline, "sm"), 0.5);
   EXPECT_GT(baseline.counts.fragments_blended, results.at("het").counts.fragments_blended);
   EXPECT_GT(results.at("het").counts.fragments_blended, results.at("het+qm").counts.fragments_blended);

@@ -60,8 +60,9 @@ std::vector<std::uint16_t> read_xz_halves(const std::filesystem::path& path, std
   std::size_t in = 0;
   std::size_t out = 0;
   const lzma_ret status =
-      lzma_stream_buffer_decode(&memory_limit, 0, nullptr, reinterpret_cast<const std::uint8_t*>(packed.data()), &in, packed.size(),
-                                reinterpret_cast<std::uint8_t*>(halves.data()), &out, count * sizeof(std::uint16_t));
+      lzma_stream_buffer_decode(&memory_limit, 0, nullptr, reinterpret_cast<const std::uint8_t*>(packed.data()), &in,
+                                packed.size(), reinterpret_cast<std::uint8_t*>(halves.data()), &out,
+                                count * sizeof(std::uint16_t));
   EXPECT_EQ(status, LZMA_OK);
   EXPECT_EQ(out, count * sizeof(std::uint16_t));
   return halves;
@@ -69,7 +70,8 @@ std::vector<std::uint16_t> read_xz_halves(const std::filesystem::path& path, std
 
 TEST_F(MeasuredDraw, HasTheImageOfTheGpuAt50Decibel) {
   const auto path = testing::shared_folder() / "silicon/playbot_close.rgba16f.xz";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no silicon/playbot_close.rgba16f.xz in " << testing::shared_folder();
+  if (!std::filesystem::exists(path))
+    GTEST_SKIP() << "no silicon/playbot_close.rgba16f.xz in " << testing::shared_folder();
   const ColorSurface& surface = result->surface;
   const std::vector<std::uint16_t> halves = read_xz_halves(path, std::size_t{4} * surface.width() * surface.height());
   double squares = 0;
@@ -77,7 +79,8 @@ TEST_F(MeasuredDraw, HasTheImageOfTheGpuAt50Decibel) {
     for (std::uint32_t x = 0; x < surface.width(); ++x) {
       for (unsigned channel = 0; channel < 4; ++channel) {
         const auto clamp = [](float value) { return std::fmin(std::fmax(static_cast<double>(value), 0.0), 1.0); };
-        const double off = clamp(surface.pixel(x, y)[channel]) - clamp(half_value(halves[4 * (std::size_t{y} * surface.width() + x) + channel]));
+        const double off = clamp(surface.pixel(x, y)[channel]) -
+                           clamp(half_value(halves[4 * (std::size_t{y} * surface.width() + x) + channel]));
         squares += off * off;
       }
     }

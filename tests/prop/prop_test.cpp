@@ -11,7 +11,9 @@ TEST(PreRop, ColourQuadsPerCycleFollowTheFormat) {
   const Draw draw = testing::draw_of(16, 16);
   RenderState state = testing::state_of(draw);
   const PreRop::Parameters parameters;
-  const std::pair<ColorFormat, unsigned> expected[] = {{ColorFormat::rgba8, 4}, {ColorFormat::rgba16f, 2}, {ColorFormat::rgba32f, 1}};
+  const std::pair<ColorFormat, unsigned> expected[] = {{ColorFormat::rgba8, 4},
+                                                       {ColorFormat::rgba16f, 2},
+                                                       {ColorFormat::rgba32f, 1}};
   for (const auto& [format, quads] : expected) {
     state.format = format;
     EXPECT_EQ(PreRop(parameters, state).cost().color_quads_per_cycle, quads) << name_of(format);

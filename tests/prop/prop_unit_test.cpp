@@ -54,7 +54,8 @@ class PropUnitTest : public ::testing::Test {
 std::vector<std::uint32_t> quads_of(const Sink<ColorBeat>& sink) {
   std::vector<std::uint32_t> quads;
   for (const auto& record : sink.records()) {
-    for (unsigned i = 0; i < record.item.count; ++i) quads.push_back(record.item.quads[i].warp->first_primitive[record.item.quads[i].index]);
+    for (unsigned i = 0; i < record.item.count; ++i)
+      quads.push_back(record.item.quads[i].warp->first_primitive[record.item.quads[i].index]);
   }
   return quads;
 }
@@ -108,7 +109,9 @@ TEST_F(PropUnitTest, MovesItsQuadsPerCycleEachWay) {
 }
 
 TEST_F(PropUnitTest, HandsItsColourQuadsPerCycleToCrop) {
-  const std::pair<ColorFormat, unsigned> formats[] = {{ColorFormat::rgba8, 4}, {ColorFormat::rgba16f, 2}, {ColorFormat::rgba32f, 1}};
+  const std::pair<ColorFormat, unsigned> formats[] = {{ColorFormat::rgba8, 4},
+                                                      {ColorFormat::rgba16f, 2},
+                                                      {ColorFormat::rgba32f, 1}};
   for (const auto& [format, rate] : formats) {
     state.format = format;
     Bench bench("prop", "pre-rop", state, {{"latency_cycles", "4"}});
@@ -206,7 +209,8 @@ TEST_F(PropUnitTest, OrderHoldsPerTileUnderAnyArrivalAndStalls) {
       std::size_t quads = 0;
       for (const ShadedWarp* w : all) quads += w->count;
       // Within a window of 24 any order.
-      for (std::size_t i = 0; i < all.size(); ++i) std::swap(all[i], all[std::min(all.size() - 1, i + mix(seed * 7 + i) % 24)]);
+      for (std::size_t i = 0; i < all.size(); ++i)
+        std::swap(all[i], all[std::min(all.size() - 1, i + mix(seed * 7 + i) % 24)]);
       for (const ShadedWarp* w : all) shaded.add({w});
       shaded.add({end(80)});
       bench.stall_randomly(seed, 100);

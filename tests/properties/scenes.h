@@ -39,15 +39,12 @@ namespace vrpipe::testing {
 constexpr float one_255th = 1.0F / 255.0F;
 
 /// An integer in [low, high), evenly whatever RapidCheck's size is.
-inline rc::Gen<int> whole(int low, int high) {
-  return rc::gen::resize(rc::kNominalSize, rc::gen::inRange(low, high));
-}
+inline rc::Gen<int> whole(int low, int high) { return rc::gen::resize(rc::kNominalSize, rc::gen::inRange(low, high)); }
 
 /// A float in [low, high), evenly.
 inline rc::Gen<float> even(float low, float high) {
-  return rc::gen::map(whole(0, 1 << 20), [=](int k) {
-    return low + (high - low) * static_cast<float>(k) / static_cast<float>(1 << 20);
-  });
+  return rc::gen::map(whole(0, 1 << 20),
+                      [=](int k) { return low + (high - low) * static_cast<float>(k) / static_cast<float>(1 << 20); });
 }
 
 inline rc::Gen<float> coordinate(std::uint32_t side) {
@@ -61,11 +58,10 @@ inline rc::Gen<float> coordinate(std::uint32_t side) {
 }
 
 inline rc::Gen<float> sigma() {
-  return rc::gen::weightedOneOf<float>(
-      {{8, rc::gen::map(even(-1.5F, 3.0F), [](float k) { return std::exp(k); })},
-       {2, rc::gen::element(0.3F, 0.5477F, 1.0F, 2.0F, 4.0F, 16.0F)},
-       {2, rc::gen::element(0.0F, 1e-40F, 1e-20F, 1e-6F, 0.001F)},
-       {1, rc::gen::element(100.0F, 1000.0F, 3000.0F, 1e5F, 3e5F)}});
+  return rc::gen::weightedOneOf<float>({{8, rc::gen::map(even(-1.5F, 3.0F), [](float k) { return std::exp(k); })},
+                                        {2, rc::gen::element(0.3F, 0.5477F, 1.0F, 2.0F, 4.0F, 16.0F)},
+                                        {2, rc::gen::element(0.0F, 1e-40F, 1e-20F, 1e-6F, 0.001F)},
+                                        {1, rc::gen::element(100.0F, 1000.0F, 3000.0F, 1e5F, 3e5F)}});
 }
 
 inline rc::Gen<float> opacity() {
@@ -84,8 +80,10 @@ inline rc::Gen<float> channel(float largest) {
 }
 
 inline rc::Gen<Splat> splat_in(std::uint32_t width, std::uint32_t height, float largest) {
-  const auto angle = rc::gen::weightedOneOf<float>({{2, even(0.0F, 6.2831F)}, {1, rc::gen::element(0.0F, 0.78539816F, 1.5707964F)}});
-  const auto thin = rc::gen::weightedOneOf<float>({{3, even(0.05F, 1.0F)}, {2, rc::gen::just(1.0F)}, {1, rc::gen::element(0.0F, 1e-6F, 1e-3F)}});
+  const auto angle =
+      rc::gen::weightedOneOf<float>({{2, even(0.0F, 6.2831F)}, {1, rc::gen::element(0.0F, 0.78539816F, 1.5707964F)}});
+  const auto thin = rc::gen::weightedOneOf<float>(
+      {{3, even(0.05F, 1.0F)}, {2, rc::gen::just(1.0F)}, {1, rc::gen::element(0.0F, 1e-6F, 1e-3F)}});
   return rc::gen::apply(
       [](float x, float y, float a, float t, float turn, float o, float red, float green, float blue) {
         const float visible = std::fmax(o, one_255th);
@@ -104,15 +102,15 @@ inline rc::Gen<Draw> scene(int splats, float largest) {
                                        rc::gen::element(1U, 2U, 15U, 16U, 17U, 33U, 65U)),
                          [=](std::pair<std::uint32_t, std::uint32_t> size) {
                            const auto [width, height] = size;
-                           return rc::gen::map(
-                               rc::gen::resize(splats, rc::gen::container<std::vector<Splat>>(splat_in(width, height, largest))),
-                               [=](std::vector<Splat> list) {
-                                 for (std::size_t i = 2; i < list.size(); i += 3) {
-                                   list[i].cx = list[i - 2].cx;
-                                   list[i].cy = list[i - 2].cy;
-                                 }
-                                 return draw_of(width, height, std::move(list));
-                               });
+                           return rc::gen::map(rc::gen::resize(splats, rc::gen::container<std::vector<Splat>>(
+                                                                           splat_in(width, height, largest))),
+                                               [=](std::vector<Splat> list) {
+                                                 for (std::size_t i = 2; i < list.size(); i += 3) {
+                                                   list[i].cx = list[i - 2].cx;
+                                                   list[i].cy = list[i - 2].cy;
+                                                 }
+                                                 return draw_of(width, height, std::move(list));
+                                               });
                          });
 }
 
@@ -125,9 +123,9 @@ inline rc::Gen<std::vector<Setting>> bins() {
   return rc::gen::apply(
       [](const char* tc_bins, const char* tc_quads, const char* tgc_bins, const char* tgc_primitives, const char* grid,
          const char* qru_quads) {
-        return std::vector<Setting>{{"tc", "bins", tc_bins},       {"tc", "bin_quads", tc_quads},
-                                    {"tgc", "bins", tgc_bins},     {"tgc", "bin_primitives", tgc_primitives},
-                                    {"tgc", "grid_tiles", grid},   {"qru", "bin_quads", qru_quads}};
+        return std::vector<Setting>{{"tc", "bins", tc_bins},     {"tc", "bin_quads", tc_quads},
+                                    {"tgc", "bins", tgc_bins},   {"tgc", "bin_primitives", tgc_primitives},
+                                    {"tgc", "grid_tiles", grid}, {"qru", "bin_quads", qru_quads}};
       },
       rc::gen::element("32", "1", "2", "5"), rc::gen::element("128", "1", "7", "16", "300"),
       rc::gen::element("128", "1", "3"), rc::gen::element("16", "1", "2", "9"), rc::gen::element("4", "1", "3"),

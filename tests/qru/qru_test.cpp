@@ -41,12 +41,14 @@ class QruTest : public ::testing::Test {
   QruTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) {}
 
   /// One bin of quads at these positions, numbered from `first`.
-  Outcome run(QruBehaviour& qru, const std::vector<unsigned>& positions, std::uint32_t first = 0, TileId tile = {0, 0}) {
+  Outcome run(QruBehaviour& qru, const std::vector<unsigned>& positions, std::uint32_t first = 0,
+              TileId tile = {0, 0}) {
     Outcome outcome;
     Warp warp;
     for (std::size_t at = 0; at < positions.size(); at += 16) {
       const std::vector<unsigned> part(positions.begin() + static_cast<std::ptrdiff_t>(at),
-                                       positions.begin() + static_cast<std::ptrdiff_t>(std::min(at + 16, positions.size())));
+                                       positions.begin() +
+                                           static_cast<std::ptrdiff_t>(std::min(at + 16, positions.size())));
       const QuadBeat beat = beat_of(tile, part, first + static_cast<std::uint32_t>(at));
       for (unsigned from = 0; from < beat.count;) {
         bool launched = false;
@@ -104,7 +106,10 @@ TEST_F(QruTest, ABufferOf128QuadsIsExaminedInOnePartAndABiggerBinInTwo) {
     positions[0] = positions[count - 1] = 3;
     const Outcome outcome = run(positions);
     const bool one_part = count <= 128;
-    EXPECT_EQ(std::count(outcome.pairs.begin(), outcome.pairs.end(), std::pair<std::uint32_t, std::uint32_t>(0, count - 1)), one_part ? 1 : 0) << count;
+    EXPECT_EQ(std::count(outcome.pairs.begin(), outcome.pairs.end(),
+                         std::pair<std::uint32_t, std::uint32_t>(0, count - 1)),
+              one_part ? 1 : 0)
+        << count;
     EXPECT_EQ(2 * outcome.pairs.size() + outcome.singles.size(), count);
   }
 }
@@ -199,7 +204,8 @@ TEST_F(QruTest, NoQuadIsLostOrDoubledAndEachPositionKeepsItsOrder) {
   std::uint32_t first = 0;
   for (std::uint64_t bin = 0; bin < 300; ++bin) {
     std::vector<unsigned> positions;
-    for (std::uint64_t i = 0; i < mix(bin) % 200; ++i) positions.push_back(static_cast<unsigned>(mix(bin * 1000 + i) % (1 + bin % 64)));
+    for (std::uint64_t i = 0; i < mix(bin) % 200; ++i)
+      positions.push_back(static_cast<unsigned>(mix(bin * 1000 + i) % (1 + bin % 64)));
     const Outcome outcome = run(qru, positions, first);
     std::map<unsigned, std::uint32_t> last;
     std::set<std::uint32_t> seen;
@@ -218,9 +224,7 @@ TEST_F(QruTest, NoQuadIsLostOrDoubledAndEachPositionKeepsItsOrder) {
   EXPECT_EQ(qru.quads.value(), first);
 }
 
-TEST_F(QruTest, StorageIsThatOfThePapersTable) {
-  EXPECT_EQ(PairingQru(parameters, state).storage_bytes(), 688U);
-}
+TEST_F(QruTest, StorageIsThatOfThePapersTable) { EXPECT_EQ(PairingQru(parameters, state).storage_bytes(), 688U); }
 
 TEST_F(QruTest, PassingThroughQuadsBecomeWarpsOfEightInTheirOrder) {
   const QruPassThrough::Parameters none;

@@ -109,7 +109,8 @@ TEST_F(QruUnitTest, WarpsAreTheSameUnderAnyStalls) {
       std::uint32_t next = 0;
       for (std::uint64_t i = 0; i < 100; ++i) {
         std::vector<unsigned> positions;
-        for (std::uint64_t q = 0; q < mix(i) % 17; ++q) positions.push_back(static_cast<unsigned>(mix(200 * i + q) % 30));
+        for (std::uint64_t q = 0; q < mix(i) % 17; ++q)
+          positions.push_back(static_cast<unsigned>(mix(200 * i + q) % 30));
         in.add(beat_of({static_cast<std::uint16_t>(i / 20), 0}, positions, next, i % 5 == 4));
         next += static_cast<std::uint32_t>(positions.size());
       }

@@ -27,7 +27,8 @@ RenderState unpadded(const Draw& draw) {
 Coverage cover(const Draw& draw) { return rasterize(unpadded(draw)); }
 
 void expect_all_once(const Coverage& coverage, const std::string& what) {
-  const auto wrong = std::count_if(coverage.times.begin(), coverage.times.end(), [](unsigned times) { return times != 1; });
+  const auto wrong =
+      std::count_if(coverage.times.begin(), coverage.times.end(), [](unsigned times) { return times != 1; });
   EXPECT_EQ(wrong, 0) << what;
 }
 
@@ -72,7 +73,8 @@ TEST(TileRasterizer, AnEdgeOfABoxBeyondTheGuardBandStaysWhereItIs) {
     for (std::uint32_t y = 0; y < 64; ++y) {
       for (std::uint32_t x = 0; x < 64; ++x) {
         const double along = ((x + 0.5 - static_cast<double>(cx)) * static_cast<double>(c * half) +
-                              (y + 0.5 - static_cast<double>(cy)) * static_cast<double>(s * half)) / length;
+                              (y + 0.5 - static_cast<double>(cy)) * static_cast<double>(s * half)) /
+                             length;
         if (std::fabs(along - length) < 0.01) continue;
         EXPECT_EQ(coverage.at(x, y), along < length ? 1U : 0U) << x << "," << y << " at " << angle;
       }
@@ -130,7 +132,8 @@ TEST(TileRasterizer, AFanOfTrianglesAroundASampleCoversItOnce) {
   const double pi = std::acos(-1.0);
   for (int i = 0; i < 13; ++i) {
     const auto corner = [&](int k) {
-      return std::pair{static_cast<float>(16.5 + 100 * std::cos(2 * pi * k / 13)), static_cast<float>(16.5 + 100 * std::sin(2 * pi * k / 13))};
+      return std::pair{static_cast<float>(16.5 + 100 * std::cos(2 * pi * k / 13)),
+                       static_cast<float>(16.5 + 100 * std::sin(2 * pi * k / 13))};
     };
     const auto [x0, y0] = corner(i);
     const auto [x1, y1] = corner((i + 1) % 13);
@@ -207,13 +210,16 @@ TEST(TileRasterizer, FewerSubpixelBitsMoveEdgesByLessThanAStep) {
           double area = 0;
           for (unsigned v = 0; v < 3; ++v) {
             const unsigned w = (v + 1) % 3;
-            area += static_cast<double>(t.x[v]) * static_cast<double>(t.y[w]) - static_cast<double>(t.x[w]) * static_cast<double>(t.y[v]);
+            area += static_cast<double>(t.x[v]) * static_cast<double>(t.y[w]) -
+                    static_cast<double>(t.x[w]) * static_cast<double>(t.y[v]);
           }
           for (unsigned v = 0; v < 3; ++v) {
             const unsigned w = (v + 1) % 3;
             const double ex = static_cast<double>(t.x[w]) - static_cast<double>(t.x[v]);
             const double ey = static_cast<double>(t.y[w]) - static_cast<double>(t.y[v]);
-            const double d = (ex * (y + 0.5 - static_cast<double>(t.y[v])) - ey * (x + 0.5 - static_cast<double>(t.x[v]))) / std::hypot(ex, ey);
+            const double d =
+                (ex * (y + 0.5 - static_cast<double>(t.y[v])) - ey * (x + 0.5 - static_cast<double>(t.x[v]))) /
+                std::hypot(ex, ey);
             inside = std::fmin(inside, area > 0 ? d : -d);
           }
           if (std::fabs(inside) <= 1.5 / (1 << bits)) continue;
@@ -318,6 +324,25 @@ TEST(TileRasterizer, RandomTrianglesOfEverySizeAreCoveredExactly) {
   }
 }
 
+// case R01
+TEST(TileRasterizer, EdgesJustShortOfNeeding64BitsAreCoveredExactlyAndWithoutOverflow) {
+  for (int i = 0; i < 150; ++i) {
+    const float s = 300.0F + 8.0F * static_cast<float>(i);
+    const float turn = 0.17F * static_cast<float>(i);
+    ScreenTriangle t;
+    for (unsigned v = 0; v < 3; ++v) {
+      t.x[v] = 32 + s * std::cos(turn + 2.0944F * static_cast<float>(v));
+      t.y[v] = 32 + s * std::sin(turn + 2.0944F * static_cast<float>(v));
+    }
+    for (const float shift : {0.0F, 0.5F * s - 20.0F}) {  // the screen within, and an edge across it
+      ScreenTriangle moved = t;
+      for (float& x : moved.x) x += shift;
+      const Draw draw = triangles_of(64, 64, {moved});
+      ASSERT_EQ(rasterize(unpadded(draw)).times, testing::cover_exactly(unpadded(draw)).times) << s;
+    }
+  }
+}
+
 TEST(TileRasterizer, AClipCutsAtItsPixelsAndClipsThatTileTheScreenLoseNothing) {
   const Draw draw = testing::random_draw(128, 128, 60, 5);
   const RenderState state = state_of(draw);
@@ -373,7 +398,9 @@ TEST(TileRasterizer, BoxesThinnerThanASubpixelCoverNoSampleTwice) {
     const float c = std::cos(angle) * 20;
     const float s = std::sin(angle) * 20;
     const float thin = testing::uniform(i, 61, 0, 0.5F / 256) / 20;
-    const Draw draw = draw_of(64, 64, {Splat{testing::uniform(i, 62, 10, 50), testing::uniform(i, 63, 10, 50), c, s, -s * thin, c * thin, 3, 0, 1, 1, 1, 1}});
+    const Draw draw = draw_of(64, 64,
+                              {Splat{testing::uniform(i, 62, 10, 50), testing::uniform(i, 63, 10, 50), c, s, -s * thin,
+                                     c * thin, 3, 0, 1, 1, 1, 1}});
     for (const RenderState& state : {state_of(draw), unpadded(draw)}) {
       const Coverage coverage = rasterize(state);
       ASSERT_LE(*std::max_element(coverage.times.begin(), coverage.times.end()), 1U);
@@ -393,8 +420,10 @@ TEST(TileRasterizer, WithPaddingNoSampleInsideABoxIsLost) {
       for (std::uint32_t x = 0; x < 64; ++x) {
         const double dx = x + 0.5 - static_cast<double>(splat.cx);
         const double dy = y + 0.5 - static_cast<double>(splat.cy);
-        const double a = static_cast<double>(splat.ax) * static_cast<double>(splat.ax) + static_cast<double>(splat.ay) * static_cast<double>(splat.ay);
-        const double b = static_cast<double>(splat.bx) * static_cast<double>(splat.bx) + static_cast<double>(splat.by) * static_cast<double>(splat.by);
+        const double a = static_cast<double>(splat.ax) * static_cast<double>(splat.ax) +
+                         static_cast<double>(splat.ay) * static_cast<double>(splat.ay);
+        const double b = static_cast<double>(splat.bx) * static_cast<double>(splat.bx) +
+                         static_cast<double>(splat.by) * static_cast<double>(splat.by);
         const double u = (dx * static_cast<double>(splat.ax) + dy * static_cast<double>(splat.ay)) / a;
         const double v = (dx * static_cast<double>(splat.bx) + dy * static_cast<double>(splat.by)) / b;
         if (std::fabs(u) <= 1 && std::fabs(v) <= 1) {

@@ -73,7 +73,9 @@ TEST_F(RasterUnitTest, MakesItsFineTilesPerCycle) {
   add_full();
   for (const unsigned rate : {1U, 2U}) {
     Bench bench("raster", "tile-rasterizer", state,
-                {{"fine_tiles_per_cycle", std::to_string(rate)}, {"quads_per_cycle", "16"}, {"coarse_tiles_per_cycle", "64"}});
+                {{"fine_tiles_per_cycle", std::to_string(rate)},
+                 {"quads_per_cycle", "16"},
+                 {"coarse_tiles_per_cycle", "64"}});
     Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 64);
     in.add(jobs()[0]);

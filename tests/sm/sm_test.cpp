@@ -52,8 +52,9 @@ double alpha_at(const Splat& splat, double x, double y) {
 // case R15
 TEST(SplatShader, OneSplatIsItsClosedFormAtEverySample) {
   for (std::uint64_t i = 0; i < 300; ++i) {
-    const Splat splat = testing::splat_at(testing::uniform(i, 0, 0, 16), testing::uniform(i, 1, 0, 16), testing::uniform(i, 2, 0.6F, 8),
-                                          testing::uniform(i, 3, 0.6F, 8), testing::uniform(i, 4, 0, 6.2F), testing::uniform(i, 5, 0.1F, 1));
+    const Splat splat = testing::splat_at(testing::uniform(i, 0, 0, 16), testing::uniform(i, 1, 0, 16),
+                                          testing::uniform(i, 2, 0.6F, 8), testing::uniform(i, 3, 0.6F, 8),
+                                          testing::uniform(i, 4, 0, 6.2F), testing::uniform(i, 5, 0.1F, 1));
     Shader shader({splat});
     shader.state.pruning_threshold = 0;
     for (unsigned position = 0; position < 64; position += 9) {
@@ -86,14 +87,16 @@ TEST(SplatShader, OnHugeSplatsAlphaIsWithinTheErrorOfTheirCoordinates) {
     for (std::uint64_t i = 0; i < 50; ++i) {
       const float angle = testing::uniform(i, 6, 0, 6.2F);
       const float away = testing::uniform(i, 7, 0, 2) * sigma;
-      const Splat splat = testing::splat_at(8 + away * std::cos(angle), 8 + away * std::sin(angle), sigma, sigma / 3, angle + 0.3F, 0.9F);
+      const Splat splat = testing::splat_at(8 + away * std::cos(angle), 8 + away * std::sin(angle), sigma, sigma / 3,
+                                            angle + 0.3F, 0.9F);
       Shader shader({splat});
       const ShadedWarp out = shader.shade({quad_of(0, 27)});
       const double exact = alpha_at(splat, 6.5, 6.5);
       if (exact < 0.01) continue;
       // dx and dy carry half an ulp of the centre; u, v and their squares a few more roundings.
       const double r = std::sqrt(-2 * std::log(exact / 0.9));
-      EXPECT_NEAR(static_cast<double>(out.color[0].alpha[0]), exact, exact * (r + 1) * 8 * 0x1p-24 * (1 + 3 * r)) << sigma;
+      EXPECT_NEAR(static_cast<double>(out.color[0].alpha[0]), exact, exact * (r + 1) * 8 * 0x1p-24 * (1 + 3 * r))
+          << sigma;
     }
   }
 }
@@ -165,11 +168,13 @@ TEST(SplatShader, TheCornersOfABoxHold1MinusPiOver4OfItsFragments) {
       for (unsigned position = 0; position < 64; ++position) {
         const double x = tile_x * 16 + position % 8 * 2 + 1;
         const double y = tile_y * 16 + position / 8 * 2 + 1;
-        if (std::fabs(x - 128) < reach && std::fabs(y - 128) < reach) shader.shade({quad_of(0, position)}, 0, {tile_x, tile_y});
+        if (std::fabs(x - 128) < reach && std::fabs(y - 128) < reach)
+          shader.shade({quad_of(0, position)}, 0, {tile_x, tile_y});
       }
     }
   }
-  EXPECT_NEAR(static_cast<double>(shader.sm.fragments_pruned.value()) / static_cast<double>(shader.sm.fragments_shaded.value()),
+  EXPECT_NEAR(static_cast<double>(shader.sm.fragments_pruned.value()) /
+                  static_cast<double>(shader.sm.fragments_shaded.value()),
               0.2146, 0.006);
 }
 
@@ -331,7 +336,8 @@ TEST(SplatShader, EveryFragmentIsPrunedMergedOrLeaves) {
       const bool pair = mix(i + q) % 2 == 0;
       const auto position = static_cast<unsigned>(mix(i * 8 + q) % 64);
       for (std::uint64_t k = 0; k < 2; ++k) {
-        quads.push_back(quad_of(static_cast<std::uint32_t>(mix(i * 16 + q + k) % 200), pair ? position : (position + static_cast<unsigned>(k)) % 64,
+        quads.push_back(quad_of(static_cast<std::uint32_t>(mix(i * 16 + q + k) % 200),
+                                pair ? position : (position + static_cast<unsigned>(k)) % 64,
                                 static_cast<LaneMask>(1 + mix(i * 32 + q + k) % 15)));
       }
       if (pair) pairs = static_cast<std::uint8_t>(pairs | (1U << (q / 2)));

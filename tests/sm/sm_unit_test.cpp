@@ -25,7 +25,8 @@ class SmUnitTest : public ::testing::Test {
     result.sequence = result.tile_sequence = sequence;
     result.merge_pairs = merge_pairs;
     for (unsigned i = 0; i < 8; ++i) {
-      result.quads[result.count++] = {sequence % 64, static_cast<std::uint8_t>(merge_pairs != 0 ? i / 2 : i), all_lanes, 0, 0};
+      result.quads[result.count++] = {sequence % 64, static_cast<std::uint8_t>(merge_pairs != 0 ? i / 2 : i), all_lanes,
+                                      0, 0};
     }
     return result;
   }
@@ -42,7 +43,8 @@ class SmUnitTest : public ::testing::Test {
 
 /// The unit with everything around it: what is shaded is noted and its slot released at once, or later.
 struct SmBench {
-  SmBench(const RenderState& state, const Bench::Settings& settings = {}, unsigned in_depth = 8, unsigned out_depth = 64)
+  SmBench(const RenderState& state, const Bench::Settings& settings = {}, unsigned in_depth = 8,
+          unsigned out_depth = 64)
       : bench("sm", "splat-shader", state, settings),
         warps(bench.source<Warp>("in_warps", in_depth)),
         release(bench.source<WarpRelease>("in_release", 4096)),
@@ -175,7 +177,8 @@ TEST_F(SmUnitTest, FragmentsThatFillAllSlotsDoNotHoldUpVertices) {
 // case M06
 TEST_F(SmUnitTest, EveryWarpComesOutOnceUnderAnyStallsInWhateverOrder) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    SmBench sm(state, {{"cores", "2"}, {"warps_per_core", "6"}, {"vertex_warps", "3"}}, static_cast<unsigned>(1 + seed % 4), static_cast<unsigned>(1 + seed % 5));
+    SmBench sm(state, {{"cores", "2"}, {"warps_per_core", "6"}, {"vertex_warps", "3"}},
+               static_cast<unsigned>(1 + seed % 4), static_cast<unsigned>(1 + seed % 5));
     Source<VertexWarp>& vertices = sm.bench.source<VertexWarp>("in_vertices");
     Sink<VertexWarp>& shaded_vertices = sm.bench.sink<VertexWarp>("out_vertices");
     sm.release_after = 1 + seed % 40;

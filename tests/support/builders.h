@@ -19,7 +19,7 @@ inline Splat splat_at(float x, float y, float sigma_a, float sigma_b, float angl
   const float r = std::sqrt(std::fmax(0.0F, 2 * std::log(255 * opacity)));
   const float c = std::cos(angle);
   const float s = std::sin(angle);
-  return {x,  y, c * sigma_a * r, s * sigma_a * r, -s * sigma_b * r, c * sigma_b * r, r, 0, red, green, blue, opacity};
+  return {x, y, c * sigma_a * r, s * sigma_a * r, -s * sigma_b * r, c * sigma_b * r, r, 0, red, green, blue, opacity};
 }
 
 inline Splat round_splat(float x, float y, float sigma, float opacity, float red = 1, float green = 1, float blue = 1) {

@@ -69,7 +69,8 @@ inline bool covers(const SnappedTriangle& t, unsigned subpixel_bits, std::int64_
   int negative = 0;
   for (unsigned i = 0; i < 3; ++i) {
     const unsigned j = (i + 1) % 3;
-    const Wide cross = (Wide{t.x[j]} - t.x[i]) * (y - Wide{t.y[i]} * unit) - (Wide{t.y[j]} - t.y[i]) * (x - Wide{t.x[i]} * unit);
+    const Wide cross =
+        (Wide{t.x[j]} - t.x[i]) * (y - Wide{t.y[i]} * unit) - (Wide{t.y[j]} - t.y[i]) * (x - Wide{t.x[i]} * unit);
     positive += cross > 0;
     negative += cross < 0;
   }

@@ -92,7 +92,8 @@ OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const Re
       pixel.color_bound[i] += color * alpha_error + rounding_error(state, reach) + arithmetic * std::max(1.0, reach);
     }
     pixel.rgba[3] += transmittance * alpha;
-    alpha_error = (1.0 - alpha) * alpha_error + rounding_error(state, std::min(1.0, pixel.rgba[3] + alpha_error)) + arithmetic;
+    alpha_error =
+        (1.0 - alpha) * alpha_error + rounding_error(state, std::min(1.0, pixel.rgba[3] + alpha_error)) + arithmetic;
     pixel.alpha_bound = std::max(pixel.alpha_bound, alpha_error);
     ++pixel.fragments;
   }

@@ -23,9 +23,9 @@ double half_ulp(BoundFormat format, double value) {
 
 /// One axis of an oriented box.
 struct Axis {
-  double x, y;      ///< unit direction
-  double extent;    ///< half extent, pixels
-  double per_pixel; ///< sigmas per pixel; 0 for a box without extent
+  double x, y;       ///< unit direction
+  double extent;     ///< half extent, pixels
+  double per_pixel;  ///< sigmas per pixel; 0 for a box without extent
 };
 
 Axis make_axis(double x, double y, double r, double fallback_x, double fallback_y) {

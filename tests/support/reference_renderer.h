@@ -27,7 +27,8 @@ struct ReferenceImage {
   std::vector<std::array<double, 2>> bound;  ///< per pixel: of a colour channel, of alpha; empty unless asked for
   std::uint64_t fragments_covered = 0;       ///< samples inside oriented boxes, of pixels not yet terminated
   std::uint64_t fragments_blended = 0;       ///< of these, alpha >= 1/255
-  std::uint64_t fragments_near_prune_edge = 0;  ///< alpha within a relative 1e-5 of 1/255: rounding may decide otherwise
+  std::uint64_t fragments_near_prune_edge =
+      0;  ///< alpha within a relative 1e-5 of 1/255: rounding may decide otherwise
   std::vector<std::uint32_t> near_edge_per_pixel;  ///< the same, per pixel
 
   const std::array<double, 4>& at(std::uint32_t x, std::uint32_t y) const {

@@ -61,7 +61,9 @@ inline double utilization(const RunResult& result, const std::string& unit) {
 }
 
 inline BoundFormat bound_format(ColorFormat format) {
-  return format == ColorFormat::rgba8 ? BoundFormat::rgba8 : format == ColorFormat::rgba16f ? BoundFormat::rgba16f : BoundFormat::rgba32f;
+  return format == ColorFormat::rgba8     ? BoundFormat::rgba8
+         : format == ColorFormat::rgba16f ? BoundFormat::rgba16f
+                                          : BoundFormat::rgba32f;
 }
 
 /// Checks every pixel against the double-precision reference: within its running bound, `slack` times the largest
@@ -86,14 +88,15 @@ inline void expect_near_reference(const RunResult& result, const Draw& draw, dou
       const double shader = 2e-5 * largest;
       const double edge = reference.near_edge_per_pixel[index] * largest / 255.0;
       for (unsigned channel = 0; channel < 4; ++channel) {
-        const double bound = reference.bound[index][channel == 3 ? 1 : 0] + slack * (channel == 3 ? 1 : largest) + shader + edge;
+        const double bound =
+            reference.bound[index][channel == 3 ? 1 : 0] + slack * (channel == 3 ? 1 : largest) + shader + edge;
         const double want = clamps ? std::fmin(exact[channel], 1.0) : exact[channel];
         const double off = std::fabs(static_cast<double>(pixel[channel]) - want);
         if (off <= bound) continue;
         if (wrong++ == 0) {
-          first = "pixel " + std::to_string(x) + "," + std::to_string(y) + " channel " + std::to_string(channel) + ": " +
-                  std::to_string(pixel[channel]) + " instead of " + std::to_string(want) + ", off by " + std::to_string(off) +
-                  " where " + std::to_string(bound) + " is allowed";
+          first = "pixel " + std::to_string(x) + "," + std::to_string(y) + " channel " + std::to_string(channel) +
+                  ": " + std::to_string(pixel[channel]) + " instead of " + std::to_string(want) + ", off by " +
+                  std::to_string(off) + " where " + std::to_string(bound) + " is allowed";
         }
       }
     }

@@ -134,7 +134,8 @@ TEST_F(TileCoalescingTest, NoQuadIsLostDoubledOrReorderedWithinItsTile) {
   for (std::uint64_t i = 0; i < 2000; ++i) {
     std::vector<unsigned> positions;
     for (std::uint64_t q = 0; q <= mix(i) % 16; ++q) positions.push_back(static_cast<unsigned>(mix(i + q) % 64));
-    for (Flush& flush : insert(tc, beat_of(tile(static_cast<unsigned>(mix(i + 77) % 9)), positions, next))) flushes.push_back(flush);
+    for (Flush& flush : insert(tc, beat_of(tile(static_cast<unsigned>(mix(i + 77) % 9)), positions, next)))
+      flushes.push_back(flush);
     next += static_cast<std::uint32_t>(positions.size());
   }
   for (Flush& flush : drain(tc)) flushes.push_back(flush);

@@ -41,7 +41,8 @@ std::size_t bins_in(const Sink<QuadBeat>& sink) {
 
 TEST_F(TcUnitTest, TheIdleTimeOutFiresExactlyItsCyclesAfterTheLastArrival) {
   for (const unsigned timeout : {1U, 150U, 151U}) {
-    Bench bench("tc", "tile-coalescing", state, {{"idle_timeout_cycles", std::to_string(timeout)}, {"latency_cycles", "4"}});
+    Bench bench("tc", "tile-coalescing", state,
+                {{"idle_timeout_cycles", std::to_string(timeout)}, {"latency_cycles", "4"}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins");
     in.add(beat_of(tile(0), {1}), 10);
@@ -135,7 +136,8 @@ TEST_F(TcUnitTest, TheEndOfAnEmptyDrawGoesThroughAlone) {
 }
 
 TEST_F(TcUnitTest, FlushedBinsThatNobodyTakesStopItAtTheQueuesDepth) {
-  Bench bench("tc", "tile-coalescing", state, {{"bin_quads", "16"}, {"flush_queue_bins", "3"}, {"latency_cycles", "1"}});
+  Bench bench("tc", "tile-coalescing", state,
+              {{"bin_quads", "16"}, {"flush_queue_bins", "3"}, {"latency_cycles", "1"}});
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 1);
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins", 1);
   for (unsigned i = 0; i < 10; ++i) in.add(beat_of(tile(0), sixteen, 16 * i));

@@ -85,7 +85,8 @@ TEST_F(TileGridCoalescingTest, SeventeenPrimitivesOfAGridAreTwoFlushes) {
 TEST_F(TileGridCoalescingTest, All128BinsCanBeTakenAndThe129thGridEvictsTheFirstAllocated) {
   TileGridCoalescing tgc(parameters, state);
   std::vector<Primitive> primitives;
-  for (std::int32_t i = 0; i < 128; ++i) primitives.push_back(primitive_in(static_cast<std::uint32_t>(i), in_grid(i, 16)));
+  for (std::int32_t i = 0; i < 128; ++i)
+    primitives.push_back(primitive_in(static_cast<std::uint32_t>(i), in_grid(i, 16)));
   primitives.push_back(primitive_in(200, in_grid(0, 16)));  // touching it again does not save it
   EXPECT_TRUE(enter(tgc, primitives).empty());
   EXPECT_EQ(tgc.evictions.value(), 0U);
@@ -176,7 +177,8 @@ TEST_F(TileGridCoalescingTest, NoEntryIsLostOrDoubled) {
     const auto y = static_cast<std::int32_t>(mix(i + 5000) % 900);
     const PixelRect bounds{x, y, x + 1 + static_cast<std::int32_t>(mix(i + 9000) % 120), y + 60};
     primitives.push_back(primitive_in(i, bounds));
-    entered[i] = static_cast<unsigned>(((bounds.x1 - 1) / 64 - bounds.x0 / 64 + 1) * ((bounds.y1 - 1) / 64 - bounds.y0 / 64 + 1));
+    entered[i] = static_cast<unsigned>(((bounds.x1 - 1) / 64 - bounds.x0 / 64 + 1) *
+                                       ((bounds.y1 - 1) / 64 - bounds.y0 / 64 + 1));
   }
   auto flushes = enter(tgc, primitives);
   for (auto& flush : drain(tgc)) flushes.push_back(flush);
@@ -205,7 +207,9 @@ TEST_F(TileGridCoalescingTest, AGpcSkipsGridsInWhichItOwnsNoTile) {
     TileGridCoalescing tgc(parameters, state);
     enter(tgc, {primitive_in(0, {0, 0, 256, 256})});
     for (const auto& flush : drain(tgc)) {
-      EXPECT_EQ(owner_of({static_cast<std::uint16_t>(flush.clip.x0 / 16), static_cast<std::uint16_t>(flush.clip.y0 / 16)}, 4), gpc);
+      EXPECT_EQ(
+          owner_of({static_cast<std::uint16_t>(flush.clip.x0 / 16), static_cast<std::uint16_t>(flush.clip.y0 / 16)}, 4),
+          gpc);
       ++entries;
     }
   }

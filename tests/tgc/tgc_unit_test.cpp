@@ -56,7 +56,8 @@ TEST_F(TgcUnitTest, AFlushIsReadOutOnePrimitiveACycleInOrder) {
 
 TEST_F(TgcUnitTest, TakesItsEntriesPerCycle) {
   for (const unsigned rate : {1U, 2U, 8U}) {
-    Bench bench("tgc", "tile-grid-coalescing", state, {{"entries_per_cycle", std::to_string(rate)}, {"bin_primitives", "32"}});
+    Bench bench("tgc", "tile-grid-coalescing", state,
+                {{"entries_per_cycle", std::to_string(rate)}, {"bin_primitives", "32"}});
     Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 64);
     Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 64);
     for (std::uint32_t i = 0; i < 32; ++i) in.add(item_in(i, {0, 0, 4, 4}));
@@ -113,7 +114,10 @@ TEST_F(TgcUnitTest, FlushesAreTheSameUnderAnyStalls) {
     bench.run();
     std::vector<std::uint32_t> jobs;
     for (const auto& record : out.records()) {
-      jobs.push_back(record.item.end_of_draw ? ~0U : record.item.primitive.splat << 8U | static_cast<std::uint32_t>(record.item.clip.x0 / 64 + 16 * (record.item.clip.y0 / 64)));
+      jobs.push_back(record.item.end_of_draw
+                         ? ~0U
+                         : record.item.primitive.splat << 8U |
+                               static_cast<std::uint32_t>(record.item.clip.x0 / 64 + 16 * (record.item.clip.y0 / 64)));
     }
     if (seed == 0) expected = jobs;
     ASSERT_EQ(jobs, expected) << seed;

@@ -112,7 +112,8 @@ TEST_F(VpoUnitTest, StallsChangeNeitherPrimitivesNorOrder) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     Bench bench("vpo", "primitive-assembly", state);
     Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", static_cast<unsigned>(1 + seed % 2));
-    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", static_cast<unsigned>(1 + seed % 5));
+    Sink<PrimitiveItem>& primitives =
+        bench.sink<PrimitiveItem>("out_primitives_0", static_cast<unsigned>(1 + seed % 5));
     for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
     vertices.add(end_of_draw());
     bench.stall_randomly(seed, 100);

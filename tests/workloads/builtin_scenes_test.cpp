@@ -27,7 +27,8 @@ TEST(BuiltinScenes, AreNamedAndDescribedAndSizedAsInThePaper) {
 }
 
 TEST(BuiltinScenes, AnUnknownNameGetsTheNearestOne) {
-  testing::expect_user_error([] { make_builtin_scene("outdor"); }, {"unknown built-in scene (builtin:outdor)", "builtin:outdoor?", "object, indoor, outdoor"});
+  testing::expect_user_error([] { make_builtin_scene("outdor"); }, {"unknown built-in scene (builtin:outdor)",
+                                                                    "builtin:outdoor?", "object, indoor, outdoor"});
   testing::expect_user_error([] { make_builtin_scene(""); }, {"builtin:"});
 }
 
@@ -47,7 +48,8 @@ std::uint64_t hash_of(const GaussianScene& scene) {
     for (const float f : g.f_dc()) add(f);
     add(g.opacity_logit());
     for (std::uint32_t channel = 0; channel < 3; ++channel) {
-      for (std::uint32_t c = 1; c <= kShRestPerChannel[static_cast<std::size_t>(scene.sh_degree())]; ++c) add(g.f_rest(channel, c));
+      for (std::uint32_t c = 1; c <= kShRestPerChannel[static_cast<std::size_t>(scene.sh_degree())]; ++c)
+        add(g.f_rest(channel, c));
     }
   }
   return hash;
@@ -106,7 +108,8 @@ TEST_P(BuiltinSceneMarks, AreThoseOfATrainedScene) {
   std::size_t filled = 0;
   for (const auto& rgba : whole.rgba) {
     filled += rgba[3] > 0.9;
-    colours.insert(static_cast<int>(rgba[0] * 15) * 256 + static_cast<int>(rgba[1] * 15) * 16 + static_cast<int>(rgba[2] * 15));
+    colours.insert(static_cast<int>(rgba[0] * 15) * 256 + static_cast<int>(rgba[1] * 15) * 16 +
+                   static_cast<int>(rgba[2] * 15));
   }
   EXPECT_GT(static_cast<double>(filled), 0.95 * pixels);
   EXPECT_GT(colours.size(), 200u);

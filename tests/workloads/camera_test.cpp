@@ -49,7 +49,11 @@ TEST(LookAt, LengthsAndMagnitudesOfTheArgumentsDoNotMatter) {
 }
 
 TEST(LookAt, RefusesWhatHasNoDirection) {
-  expect_user_error([] { look_at({1, 2, 3}, {1, 2, 3}, {0, -1, 0}, 50, 64, 64); }, {"--look-at", "where the camera stands"});
+  expect_user_error(
+      [] {
+        look_at({1, 2, 3}, {1, 2, 3}, {0, -1, 0}, 50, 64, 64);
+      },
+      {"--look-at", "where the camera stands"});
   expect_user_error([] { look_at({0, 0, 0}, {0, 3, 0}, {0, -1, 0}, 50, 64, 64); }, {"--up", "parallel"});
   expect_user_error([] { look_at({0, 0, 0}, {0, 0, 1}, {0, 0, 0}, 50, 64, 64); }, {"--up", "no direction"});
   const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
@@ -89,10 +93,14 @@ TEST(Resized, KeepsTheVerticalFieldOfViewAndSquarePixels) {
 class CameraFile : public testing::FolderTest {
  protected:
   static nlohmann::json camera_json() {
-    return {{"id", 0},          {"img_name", "00001"},
-            {"width", 64},      {"height", 48},
-            {"position", {1, 2, 3}}, {"rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
-            {"fx", 50.0},       {"fy", 51.0}};
+    return {{"id", 0},
+            {"img_name", "00001"},
+            {"width", 64},
+            {"height", 48},
+            {"position", {1, 2, 3}},
+            {"rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+            {"fx", 50.0},
+            {"fy", 51.0}};
   }
   void expect_refused(const std::string& text, const std::vector<std::string>& parts) {
     const std::string path = write("cameras.json", text).string();
@@ -134,14 +142,16 @@ TEST_F(CameraFile, IndexSelectsAndSizeRescales) {
 }
 
 TEST_F(CameraFile, WhatCannotBeUsedIsNamed) {
-  expect_user_error([&] { load_cameras(in_folder("none.json").string()); }, {"cannot read camera file", "no such file"});
+  expect_user_error([&] { load_cameras(in_folder("none.json").string()); },
+                    {"cannot read camera file", "no such file"});
   expect_refused("[{", {"not valid JSON"});
   expect_refused("{}", {"not an array of cameras"});
   expect_refused("[3]", {"camera 0", "not an object"});
   for (const char* key : {"width", "height", "position", "rotation", "fx", "fy"}) {
     nlohmann::json camera = camera_json();
     camera.erase(key);
-    expect_refused(nlohmann::json::array({camera_json(), camera}).dump(), {"camera 1", std::string("no \"") + key + "\""});
+    expect_refused(nlohmann::json::array({camera_json(), camera}).dump(),
+                   {"camera 1", std::string("no \"") + key + "\""});
   }
   expect_refused_with("width", 0, {"\"width\"", "1 to 16384"});
   expect_refused_with("height", 16385, {"\"height\"", "1 to 16384"});
@@ -171,7 +181,8 @@ TEST(RealCameras, LookAtAgreesWithTheSuggestedViews) {
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no suggested views in " << testing::shared_folder();
   const auto vec = [](const nlohmann::json& v) { return Vec3{v[0], v[1], v[2]}; };
   for (const auto& view : nlohmann::json::parse(testing::read_bytes(path))) {
-    const Camera camera = look_at(vec(view["eye"]), vec(view["look_at"]), vec(view["up"]), view["fovy_deg"], view["width"], view["height"]);
+    const Camera camera = look_at(vec(view["eye"]), vec(view["look_at"]), vec(view["up"]), view["fovy_deg"],
+                                  view["width"], view["height"]);
     EXPECT_NEAR(camera.fy, view["fy"].get<double>(), 1e-9);
     for (std::size_t row = 0; row < 3; ++row) expect_near(camera.rotation[row], vec(view["rotation"][row]), 1e-9);
   }

@@ -77,7 +77,8 @@ TEST_F(DrawListFile, ForeignAndShortFilesAreRefused) {
   expect_refused("1S", {"magic number"});
   expect_refused("something else entirely", {"magic number", "--save-draw"});
   expect_refused(header(kDrawListMagic, 1, 4, 4).substr(0, 11), {"needs 16 bytes", "has 11"});
-  expect_refused(header(kDrawListMagic, 2, 4, 4) + std::string(95, '\0'), {"2 splats need 112 bytes", "has 111", "cut short"});
+  expect_refused(header(kDrawListMagic, 2, 4, 4) + std::string(95, '\0'),
+                 {"2 splats need 112 bytes", "has 111", "cut short"});
   expect_refused(header(kDrawListMagic, 2147483647, 4, 4), {"2147483647 splats need 103079215072 bytes"});
   expect_refused(header(kDrawListMagic, -1, 4, 4), {"-1 splats"});
 }
@@ -99,7 +100,8 @@ TEST_F(DrawListFile, AFailedWriteLeavesWhatWasThere) {
   expect_user_error([&] { write_draw_list(in_folder("draw.spl"), draw); }, {"1 to 16384"});
   EXPECT_EQ(testing::read_bytes(in_folder("draw.spl")), before);
   EXPECT_EQ(files_in_folder(), 1u);
-  expect_user_error([&] { write_draw_list(in_folder("none/draw.spl"), small_draw()); }, {"cannot write draw list", "none/draw.spl"});
+  expect_user_error([&] { write_draw_list(in_folder("none/draw.spl"), small_draw()); },
+                    {"cannot write draw list", "none/draw.spl"});
   expect_user_error([&] { write_draw_list("/dev/null", small_draw()); }, {"/dev/null", "not a regular file"});
 }
 

@@ -91,9 +91,12 @@ TEST_F(GaussianPly, PropertiesAreFoundByNameAndUnknownOnesOfAnyTypeSkipped) {
   std::string header = std::string(kFormat) + "comment made by hand\nobj_info nothing\nelement vertex 2\n";
   std::string record;
   std::vector<std::string> names(kRequired.rbegin(), kRequired.rend());
-  const std::vector<std::pair<std::string, std::size_t>> types = {
-      {"char", 1},  {"uchar", 1}, {"short", 2}, {"ushort", 2}, {"int", 4},   {"uint", 4},   {"float", 4},   {"double", 8},
-      {"int8", 1},  {"uint8", 1}, {"int16", 2}, {"uint16", 2}, {"int32", 4}, {"uint32", 4}, {"float32", 4}, {"float64", 8}};
+  const std::vector<std::pair<std::string, std::size_t>> types = {{"char", 1},   {"uchar", 1},  {"short", 2},
+                                                                  {"ushort", 2}, {"int", 4},    {"uint", 4},
+                                                                  {"float", 4},  {"double", 8}, {"int8", 1},
+                                                                  {"uint8", 1},  {"int16", 2},  {"uint16", 2},
+                                                                  {"int32", 4},  {"uint32", 4}, {"float32", 4},
+                                                                  {"float64", 8}};
   for (std::size_t i = 0; i < names.size() || i < types.size(); ++i) {
     if (i < types.size()) {
       header += "property " + types[i].first + " extra_" + std::to_string(i) + "\n";
@@ -118,7 +121,8 @@ TEST_F(GaussianPly, PropertiesAreFoundByNameAndUnknownOnesOfAnyTypeSkipped) {
 
 TEST_F(GaussianPly, TrailingBytesOtherElementsAndCarriageReturnsAreTolerated) {
   const std::string body = floats(14);
-  std::string header = "ply\r\nformat binary_little_endian 1.0\r\nelement camera 3\r\nproperty uchar id\r\nelement vertex 1\r\n";
+  std::string header =
+      "ply\r\nformat binary_little_endian 1.0\r\nelement camera 3\r\nproperty uchar id\r\nelement vertex 1\r\n";
   for (const std::string& name : kRequired) header += "property float " + name + "\r\n";
   header += "element face 7\r\nproperty list uchar int vertex_indices\r\nend_header\r\n";
   const GaussianScene scene = open_gaussian_ply(write("scene.ply", header + "abc" + body + "trailing bytes"));
@@ -167,9 +171,12 @@ TEST_F(GaussianPly, MalformedHeaderLinesAreRefused) {
   expect_refused(std::string(kFormat) + "element vertex -1\nend_header\n", {"header line 3", "element NAME COUNT"});
   expect_refused(std::string(kFormat) + "element vertex 99999999999999999999\nend_header\n", {"header line 3"});
   expect_refused(std::string(kFormat) + "element vertex 1 2\nend_header\n", {"header line 3"});
-  expect_refused(std::string(kFormat) + "property float x\nend_header\n", {"header line 3 is a property before any element"});
-  expect_refused(std::string(kFormat) + "element vertex 1\nproperty float\nend_header\n", {"header line 4", "property TYPE NAME"});
-  expect_refused(std::string(kFormat) + "element vertex 1\nproperty half x\nend_header\n", {"`x`", "unknown type `half`"});
+  expect_refused(std::string(kFormat) + "property float x\nend_header\n",
+                 {"header line 3 is a property before any element"});
+  expect_refused(std::string(kFormat) + "element vertex 1\nproperty float\nend_header\n",
+                 {"header line 4", "property TYPE NAME"});
+  expect_refused(std::string(kFormat) + "element vertex 1\nproperty half x\nend_header\n",
+                 {"`x`", "unknown type `half`"});
   expect_refused(std::string(kFormat) + "verteces 1\nend_header\n", {"header line 3 begins with `verteces`"});
   expect_refused(std::string(kFormat) + "element chunk 0\nend_header\n", {"no element vertex"});
 }
@@ -241,7 +248,8 @@ TEST_F(GaussianPly, HugeCountsOverflowNothing) {
 
 TEST_F(GaussianPly, WritingIntoAMissingFolderSaysSoAndLeavesNothing) {
   const auto path = in_folder("nowhere/scene.ply");
-  expect_user_error([&] { write_gaussian_ply(path, GaussianScene()); }, {"cannot write scene", path.string(), "folder"});
+  expect_user_error([&] { write_gaussian_ply(path, GaussianScene()); },
+                    {"cannot write scene", path.string(), "folder"});
   EXPECT_EQ(files_in_folder(), 0u);
 }
 

@@ -59,7 +59,9 @@ TEST(PortableMath, TangentAgreesWithLibmAndStaysAccurateNearNinetyDegrees) {
     EXPECT_NEAR(portable_tan_degrees(x) / expected, 1.0, kTolerance) << x;
   }
   // tan(89.9995) = 1 / tan(0.0005 degrees)
-  EXPECT_NEAR(portable_tan_degrees(89.9995) * static_cast<double>(std::tan((90 - 89.9995) * 3.14159265358979323846L / 180)), 1.0, kTolerance);
+  EXPECT_NEAR(portable_tan_degrees(89.9995) *
+                  static_cast<double>(std::tan((90 - 89.9995) * 3.14159265358979323846L / 180)),
+              1.0, kTolerance);
 }
 
 }  // namespace

@@ -157,7 +157,8 @@ TEST(PreprocessAttributes, AHugeGaussianFarAsideStillCoversTheImage) {
   const Draw draw = run({g});
   ASSERT_EQ(draw.splats.size(), 1u);
   const Splat& s = draw.splats[0];
-  const double u = ((32 - double{s.cx}) * s.ax + (32 - double{s.cy}) * s.ay) / (double{s.ax} * s.ax + double{s.ay} * s.ay);
+  const double u =
+      ((32 - double{s.cx}) * s.ax + (32 - double{s.cy}) * s.ay) / (double{s.ax} * s.ax + double{s.ay} * s.ay);
   EXPECT_LT(std::fabs(u), 1e-3) << "the image's centre is next to the splat's centre, in half extents";
 }
 
@@ -326,7 +327,8 @@ TEST(PreprocessProjection, AgreesWithTheTextbookFormulaInExtendedPrecision) {
     Exact t[3], q[4], length = 0;
     for (std::size_t i = 0; i < 3; ++i) {
       t[i] = 0;
-      for (std::size_t k = 0; k < 3; ++k) t[i] += Exact(camera.rotation[k][i]) * (Exact(g.position[k]) - Exact(camera.eye[k]));
+      for (std::size_t k = 0; k < 3; ++k)
+        t[i] += Exact(camera.rotation[k][i]) * (Exact(g.position[k]) - Exact(camera.eye[k]));
     }
     EXPECT_NEAR(s.cx, static_cast<double>(100 + Exact(camera.fx) * t[0] / t[2]), 1e-4);
     EXPECT_NEAR(s.cy, static_cast<double>(60 + Exact(camera.fy) * t[1] / t[2]), 1e-4);
@@ -337,7 +339,9 @@ TEST(PreprocessProjection, AgreesWithTheTextbookFormulaInExtendedPrecision) {
                            {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
                            {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
     const Exact limit_x = Exact(1.3) * 100 / Exact(camera.fx), limit_y = Exact(1.3) * 60 / Exact(camera.fy);
-    const auto clamp = [](const Exact& v, const Exact& limit) { return v > limit ? limit : (v < -limit ? Exact(-limit) : v); };
+    const auto clamp = [](const Exact& v, const Exact& limit) {
+      return v > limit ? limit : (v < -limit ? Exact(-limit) : v);
+    };
     const Exact rx = clamp(t[0] / t[2], limit_x), ry = clamp(t[1] / t[2], limit_y);
     Exact sigma[2][2] = {{Exact(3) / 10, 0}, {0, Exact(3) / 10}};
     for (std::size_t k = 0; k < 3; ++k) {
@@ -347,7 +351,8 @@ TEST(PreprocessProjection, AgreesWithTheTextbookFormulaInExtendedPrecision) {
         for (std::size_t j = 0; j < 3; ++j) axis[i] += Exact(camera.rotation[j][i]) * r[j][k];
         axis[i] *= exp(Exact(g.log_scale[k]));
       }
-      const Exact m[2] = {Exact(camera.fx) / t[2] * (axis[0] - rx * axis[2]), Exact(camera.fy) / t[2] * (axis[1] - ry * axis[2])};
+      const Exact m[2] = {Exact(camera.fx) / t[2] * (axis[0] - rx * axis[2]),
+                          Exact(camera.fy) / t[2] * (axis[1] - ry * axis[2])};
       for (int i = 0; i < 2; ++i) {
         for (int j = 0; j < 2; ++j) sigma[i][j] += m[i] * m[j];
       }
@@ -371,7 +376,8 @@ TEST(PreprocessProjection, P07FarFromTheOriginNothingIsLost) {
   for (float& f : moved.position) f += 1e6f;
   const Camera there = look_at({1e6, 1e6, 1e6}, {1e6, 1e6, 1e6 + 1}, {0, -1, 0}, 90, 64, 64);
   SceneSummary summary;
-  EXPECT_TRUE(same_bits(preprocess(scene_of({g}), here, {}, summary), preprocess(scene_of({moved}), there, {}, summary)));
+  EXPECT_TRUE(
+      same_bits(preprocess(scene_of({g}), here, {}, summary), preprocess(scene_of({moved}), there, {}, summary)));
 }
 
 TEST(PreprocessCovariance, P08ANeedleKeepsItsDeterminantAndItsMinorAxis) {
@@ -379,7 +385,9 @@ TEST(PreprocessCovariance, P08ANeedleKeepsItsDeterminantAndItsMinorAxis) {
     const double side = length * std::sqrt(0.5);
     for (const double wobble : {0.0, 1e-3, 1.0}) {
       const Vec3 m1 = {side, wobble, 0}, m2 = {side, -wobble, 0.25 * wobble};
-      const auto dot = [](const Vec3& a, const Vec3& b) { return Exact(a[0]) * b[0] + Exact(a[1]) * b[1] + Exact(a[2]) * b[2]; };
+      const auto dot = [](const Vec3& a, const Vec3& b) {
+        return Exact(a[0]) * b[0] + Exact(a[1]) * b[1] + Exact(a[2]) * b[2];
+      };
       const Exact e(kDilation), a = dot(m1, m1) + e, b = dot(m1, m2), d = dot(m2, m2) + e;
       const Exact det = a * d - b * b;
       EXPECT_LE(abs(Exact(covariance_determinant(m1, m2)) / det - 1), Exact(8 * 2.22e-16)) << length;
@@ -446,9 +454,12 @@ TEST(PreprocessCovariance, E03SmallRoundSplatsStayRound) {
 TEST(PreprocessCovariance, E04NearlyRoundSplatsHaveSmallResiduals) {
   for (int k = 20; k < 60; ++k) {
     const double delta = std::ldexp(1.0, -k);
-    for (const Vec3& m2 : {Vec3{delta, 1 + delta, 0}, Vec3{-delta, 1, 0}, Vec3{delta, 1 - delta, delta}, Vec3{5e-324, 1, 0}}) {
+    for (const Vec3& m2 :
+         {Vec3{delta, 1 + delta, 0}, Vec3{-delta, 1, 0}, Vec3{delta, 1 - delta, delta}, Vec3{5e-324, 1, 0}}) {
       const Vec3 m1 = {1, 0, 0};
-      const auto dot = [](const Vec3& a, const Vec3& b) { return Exact(a[0]) * b[0] + Exact(a[1]) * b[1] + Exact(a[2]) * b[2]; };
+      const auto dot = [](const Vec3& a, const Vec3& b) {
+        return Exact(a[0]) * b[0] + Exact(a[1]) * b[1] + Exact(a[2]) * b[2];
+      };
       const Exact a = dot(m1, m1) + kDilation, b = dot(m1, m2), d = dot(m2, m2) + kDilation;
       const EllipseAxes e = decompose_covariance(m1, m2);
       const Exact vx = e.axis_x, vy = e.axis_y;
@@ -596,12 +607,13 @@ TEST(PreprocessColour, S04BasisValuesAlongTheAxes) {
     EXPECT_NEAR(basis(1, y), -sign * y1, 1e-6);
     EXPECT_NEAR(basis(2, z), sign * y1, 1e-6);
     EXPECT_NEAR(basis(3, x), -sign * y1, 1e-6);
-    for (const auto& [index, direction] : {std::pair<std::size_t, Vec3>{1, x}, {1, z}, {2, x}, {2, y}, {3, y}, {3, z}}) {
+    for (const auto& [index, direction] :
+         {std::pair<std::size_t, Vec3>{1, x}, {1, z}, {2, x}, {2, y}, {3, y}, {3, z}}) {
       EXPECT_NEAR(basis(index, direction), 0, 1e-6);
     }
-    EXPECT_NEAR(basis(6, z), std::sqrt(5 / (4 * pi)), 1e-6);        // (3 z^2 - 1) / 2
+    EXPECT_NEAR(basis(6, z), std::sqrt(5 / (4 * pi)), 1e-6);  // (3 z^2 - 1) / 2
     EXPECT_NEAR(basis(6, x), -0.5 * std::sqrt(5 / (4 * pi)), 1e-6);
-    EXPECT_NEAR(basis(8, x), std::sqrt(15 / (16 * pi)), 1e-6);      // x^2 - y^2
+    EXPECT_NEAR(basis(8, x), std::sqrt(15 / (16 * pi)), 1e-6);  // x^2 - y^2
     EXPECT_NEAR(basis(8, y), -std::sqrt(15 / (16 * pi)), 1e-6);
     EXPECT_NEAR(basis(12, z), sign * std::sqrt(7 / (4 * pi)), 1e-6);  // (5 z^3 - 3 z) / 2
     EXPECT_NEAR(basis(15, x), -sign * std::sqrt(35 / (32 * pi)), 1e-6);
@@ -684,13 +696,16 @@ TEST(PreprocessOrder, K01EqualDepthsKeepTheScenesOrder) {
   for (std::size_t i = 0; i < gaussians.size(); ++i) gaussians[i].f_dc[0] = 0.001f * static_cast<float>(i);
   const Draw draw = run(gaussians);
   ASSERT_EQ(draw.splats.size(), 1000u);
-  EXPECT_TRUE(std::is_sorted(draw.splats.begin(), draw.splats.end(), [](const Splat& a, const Splat& b) { return a.red < b.red; }));
+  EXPECT_TRUE(std::is_sorted(draw.splats.begin(), draw.splats.end(),
+                             [](const Splat& a, const Splat& b) { return a.red < b.red; }));
 }
 
 TEST(PreprocessOrder, K02KeysOrderLikeDepthsAndBothZerosTie) {
   EXPECT_EQ(depth_key(-0.0f), depth_key(0.0f));
-  const std::vector<float> ascending = {-kInf, -kMax, -1, -1e-40f, 0, 1e-45f, 1e-40f, 1e-39f, 0.2f, 1, std::nextafter(1.0f, 2.0f), kMax, kInf};
-  for (std::size_t i = 1; i < ascending.size(); ++i) EXPECT_LT(depth_key(ascending[i - 1]), depth_key(ascending[i])) << i;
+  const std::vector<float> ascending = {
+      -kInf, -kMax, -1, -1e-40f, 0, 1e-45f, 1e-40f, 1e-39f, 0.2f, 1, std::nextafter(1.0f, 2.0f), kMax, kInf};
+  for (std::size_t i = 1; i < ascending.size(); ++i)
+    EXPECT_LT(depth_key(ascending[i - 1]), depth_key(ascending[i])) << i;
 }
 
 TEST(PreprocessOrder, K08RadixSortEqualsAStableSortAtEverySize) {
@@ -700,11 +715,13 @@ TEST(PreprocessOrder, K08RadixSortEqualsAStableSortAtEverySize) {
       std::vector<std::uint64_t> entries(size);
       for (std::size_t i = 0; i < size; ++i) {
         const std::uint32_t number = static_cast<std::uint32_t>(random());
-        const std::uint32_t keys[] = {number, number & 7u, 42, static_cast<std::uint32_t>(size - i), static_cast<std::uint32_t>(i)};
+        const std::uint32_t keys[] = {number, number & 7u, 42, static_cast<std::uint32_t>(size - i),
+                                      static_cast<std::uint32_t>(i)};
         entries[i] = (std::uint64_t{keys[pattern]} << 32) | (size - i);
       }
       std::vector<std::uint64_t> expected = entries;
-      std::stable_sort(expected.begin(), expected.end(), [](std::uint64_t a, std::uint64_t b) { return (a >> 32) < (b >> 32); });
+      std::stable_sort(expected.begin(), expected.end(),
+                       [](std::uint64_t a, std::uint64_t b) { return (a >> 32) < (b >> 32); });
       sort_by_key(entries);
       EXPECT_EQ(entries, expected) << size << " " << pattern;
     }
@@ -725,7 +742,8 @@ TEST(PreprocessOrder, K04FewerKeyBitsMergeNeighbouringDepthsAsDocumented) {
       order[i] = i;
       keys.push_back(depth_key(gaussians[i].position[2]));
     }
-    const std::uint64_t low = *std::min_element(keys.begin(), keys.end()), high = *std::max_element(keys.begin(), keys.end());
+    const std::uint64_t low = *std::min_element(keys.begin(), keys.end()),
+                        high = *std::max_element(keys.begin(), keys.end());
     if (bits < 32) {
       for (std::uint64_t& key : keys) key = ((key - low) << bits) / (high - low + 1);
     }
@@ -739,7 +757,8 @@ TEST(PreprocessOrder, K04FewerKeyBitsMergeNeighbouringDepthsAsDocumented) {
       if (i > 50) break;
     }
     std::size_t inversions = 0;
-    for (std::size_t i = 1; i < order.size(); ++i) inversions += gaussians[order[i]].position[2] < gaussians[order[i - 1]].position[2];
+    for (std::size_t i = 1; i < order.size(); ++i)
+      inversions += gaussians[order[i]].position[2] < gaussians[order[i - 1]].position[2];
     EXPECT_EQ(inversions > 0, bits <= 16);
   }
 }
@@ -796,7 +815,8 @@ TEST(Preprocess, WhateverTheBitsOfAFileEverySplatIsFinite) {
   EXPECT_GT(draw.splats.size(), 100u);
   EXPECT_GT(summary.rejected.not_finite, 100u);
   for (const Splat& s : draw.splats) {
-    for (const float f : {s.cx, s.cy, s.ax, s.ay, s.bx, s.by, s.r, s.red, s.green, s.blue, s.opacity}) ASSERT_TRUE(std::isfinite(f));
+    for (const float f : {s.cx, s.cy, s.ax, s.ay, s.bx, s.by, s.r, s.red, s.green, s.blue, s.opacity})
+      ASSERT_TRUE(std::isfinite(f));
     ASSERT_TRUE(s.red >= 0 && s.green >= 0 && s.blue >= 0 && s.opacity >= 1.0f / 255 && s.opacity <= 1);
     ASSERT_LE(std::fabs(s.cx) + std::fabs(s.ax) + std::fabs(s.bx), 4194304.0f);
     ASSERT_LE(std::fabs(s.cy) + std::fabs(s.ay) + std::fabs(s.by), 4194304.0f);

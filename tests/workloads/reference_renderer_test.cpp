@@ -37,7 +37,8 @@ TEST(ReferenceRenderer, OneSplatIsItsClosedFormAtEveryPixel) {
 
 // Z04
 TEST(ReferenceRenderer, EqualSplatsFillUpAsAPower) {
-  const ReferenceImage image = render_reference(draw_of(1, 1, std::vector<Splat>(20, round_splat(0.5f, 0.5f, 2, 0.25f))));
+  const ReferenceImage image =
+      render_reference(draw_of(1, 1, std::vector<Splat>(20, round_splat(0.5f, 0.5f, 2, 0.25f))));
   EXPECT_NEAR(image.at(0, 0)[3], 1 - std::pow(0.75, 20), 1e-12);
   EXPECT_EQ(image.fragments_blended, 20u);
 }
@@ -47,7 +48,8 @@ TEST(ReferenceRenderer, AlphaIsCappedAt099) {
 }
 
 TEST(ReferenceRenderer, ATerminatedPixelTakesNothingMore) {
-  const std::vector<Splat> splats = {round_splat(0.5f, 0.5f, 2, 1), round_splat(0.5f, 0.5f, 2, 1), round_splat(0.5f, 0.5f, 2, 1)};
+  const std::vector<Splat> splats = {round_splat(0.5f, 0.5f, 2, 1), round_splat(0.5f, 0.5f, 2, 1),
+                                     round_splat(0.5f, 0.5f, 2, 1)};
   ReferenceOptions options;
   options.termination_threshold = 0.996;
   const ReferenceImage image = render_reference(draw_of(1, 1, splats), options);
@@ -65,7 +67,8 @@ TEST(ReferenceRenderer, CornersOfTheBoxArePruned) {
   turned.by = c * extent;
   for (const Splat& splat : {round_splat(300, 300, 60, 0.9f), turned}) {
     const ReferenceImage image = render_reference(draw_of(600, 600, {splat}));
-    EXPECT_NEAR(1 - static_cast<double>(image.fragments_blended) / static_cast<double>(image.fragments_covered), 1 - 3.14159265 / 4, 0.002);
+    EXPECT_NEAR(1 - static_cast<double>(image.fragments_blended) / static_cast<double>(image.fragments_covered),
+                1 - 3.14159265 / 4, 0.002);
     EXPECT_NEAR(static_cast<double>(image.fragments_covered), 4 * extent * extent, 0.01 * 4 * extent * extent);
   }
 }
@@ -82,7 +85,8 @@ TEST(ReferenceRenderer, ASplatWithoutExtentCoversOnlyASampleAtItsCentre) {
 
 TEST(ReferenceRenderer, TheRunningBoundHoldsForARoundingBlender) {
   std::vector<Splat> splats;
-  for (int i = 0; i < 300; ++i) splats.push_back(round_splat(0.5f, 0.5f, 2, 0.01f + 0.0007f * static_cast<float>(i), i % 3 ? 0.9f : 0.1f));
+  for (int i = 0; i < 300; ++i)
+    splats.push_back(round_splat(0.5f, 0.5f, 2, 0.01f + 0.0007f * static_cast<float>(i), i % 3 ? 0.9f : 0.1f));
   const Draw draw = draw_of(1, 1, splats);
   ReferenceOptions options;
   options.bound_format = BoundFormat::rgba8;

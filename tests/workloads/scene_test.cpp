@@ -37,7 +37,8 @@ TEST_F(SceneFile, PlyWithoutAnyOptionGetsAViewThatShowsItAll) {
   EXPECT_EQ(loaded.draw.width, kDefaultImageSize.width);
   EXPECT_EQ(loaded.draw.height, kDefaultImageSize.height);
   for (const Splat& s : loaded.draw.splats) {
-    EXPECT_TRUE(s.cx > 0 && s.cx < static_cast<float>(loaded.draw.width) && s.cy > 0 && s.cy < static_cast<float>(loaded.draw.height));
+    EXPECT_TRUE(s.cx > 0 && s.cx < static_cast<float>(loaded.draw.width) && s.cy > 0 &&
+                s.cy < static_cast<float>(loaded.draw.height));
   }
 }
 
@@ -45,10 +46,14 @@ TEST_F(SceneFile, TheWorldsUpIsMinusYUnlessSaidOtherwise) {
   request_.eye = Vec3{0, 0, 0};
   request_.look_at = Vec3{0, 0, 1};
   const auto lowest = [](const Draw& draw) {
-    return std::max_element(draw.splats.begin(), draw.splats.end(), [](const Splat& a, const Splat& b) { return a.cy < b.cy; })->cy;
+    return std::max_element(draw.splats.begin(), draw.splats.end(),
+                            [](const Splat& a, const Splat& b) { return a.cy < b.cy; })
+        ->cy;
   };
   const auto highest = [](const Draw& draw) {
-    return std::min_element(draw.splats.begin(), draw.splats.end(), [](const Splat& a, const Splat& b) { return a.cy < b.cy; })->cy;
+    return std::min_element(draw.splats.begin(), draw.splats.end(),
+                            [](const Splat& a, const Splat& b) { return a.cy < b.cy; })
+        ->cy;
   };
   const float middle = static_cast<float>(kDefaultImageSize.height) / 2;
   EXPECT_GT(lowest(load_scene(request_).draw), middle + 50) << "the one at y = 1 is below";
@@ -62,7 +67,8 @@ TEST_F(SceneFile, ViewOptionsReplaceWhatTheyName) {
   request_.fovy_degrees = 90;
   request_.size = ImageSize{64, 64};
   SceneSummary summary;
-  const Draw expected = preprocess(open_gaussian_ply(request_.scene), look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 90, 64, 64), {}, summary);
+  const Draw expected =
+      preprocess(open_gaussian_ply(request_.scene), look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 90, 64, 64), {}, summary);
   const Draw draw = load_scene(request_).draw;
   ASSERT_EQ(draw.splats.size(), expected.splats.size());
   EXPECT_EQ(std::memcmp(draw.splats.data(), expected.splats.data(), draw.splats.size() * sizeof(Splat)), 0);
@@ -90,7 +96,9 @@ TEST_F(SceneFile, ADrawListComesInAsItIsAndRefusesCameras) {
   replay.scene = in_folder("saved.SPL").string();
   const LoadedScene loaded = load_scene(replay);
   ASSERT_EQ(loaded.draw.splats.size(), original.draw.splats.size());
-  EXPECT_EQ(std::memcmp(loaded.draw.splats.data(), original.draw.splats.data(), original.draw.splats.size() * sizeof(Splat)), 0);
+  EXPECT_EQ(std::memcmp(loaded.draw.splats.data(), original.draw.splats.data(),
+                        original.draw.splats.size() * sizeof(Splat)),
+            0);
   EXPECT_EQ(loaded.draw.width, original.draw.width);
   EXPECT_EQ(loaded.summary.gaussians_total, 3u);
   EXPECT_EQ(loaded.summary.name, "saved.SPL");
@@ -107,7 +115,8 @@ TEST_F(SceneFile, ADrawListComesInAsItIsAndRefusesCameras) {
 
 TEST_F(SceneFile, UnknownKindsOfFilesAreRefusedWithWhatIsSupported) {
   request_.scene = "scene.splat";
-  expect_user_error([&] { load_scene(request_); }, {"scene.splat", "`.splat` are not supported", ".ply", ".spl", "builtin:NAME"});
+  expect_user_error([&] { load_scene(request_); },
+                    {"scene.splat", "`.splat` are not supported", ".ply", ".spl", "builtin:NAME"});
   request_.scene = "scene";
   expect_user_error([&] { load_scene(request_); }, {"no extension"});
   request_.scene = "builtin:objekt";
@@ -173,8 +182,9 @@ TEST(GoldenImage, AgreesWithGsplatWithinSixThousandths) {
   const auto path = testing::shared_folder() / "scenes/golden/tiny_case.safetensors";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no golden case in " << testing::shared_folder();
   const std::string bytes = testing::read_bytes(path);
-  const auto means = read_tensor(bytes, "means"), scales = read_tensor(bytes, "scales"), quats = read_tensor(bytes, "quats"),
-             opacities = read_tensor(bytes, "opacities"), coefficients = read_tensor(bytes, "coeffs"), golden = read_tensor(bytes, "out_img");
+  const auto means = read_tensor(bytes, "means"), scales = read_tensor(bytes, "scales"),
+             quats = read_tensor(bytes, "quats"), opacities = read_tensor(bytes, "opacities"),
+             coefficients = read_tensor(bytes, "coeffs"), golden = read_tensor(bytes, "out_img");
   std::vector<GaussianAttributes> gaussians(opacities.size());
   for (std::size_t i = 0; i < gaussians.size(); ++i) {
     GaussianAttributes& g = gaussians[i];

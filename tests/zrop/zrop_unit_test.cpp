@@ -18,7 +18,8 @@ const std::vector<unsigned> sixteen{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13
 
 TerminationBeat signals(std::initializer_list<unsigned> positions, LaneMask pixels = all_lanes) {
   TerminationBeat beat;
-  for (const unsigned position : positions) beat.signals[beat.count++] = {{0, 0}, static_cast<std::uint8_t>(position), pixels};
+  for (const unsigned position : positions)
+    beat.signals[beat.count++] = {{0, 0}, static_cast<std::uint8_t>(position), pixels};
   return beat;
 }
 
@@ -120,7 +121,8 @@ TEST_F(ZropUnitTest, NoUpdateIsLostUnderAnyStallsAndEveryQuadIsAccountedFor) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     Bench bench("zrop", "depth-stencil-rop", state);
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", static_cast<unsigned>(1 + seed % 3));
-    Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations", static_cast<unsigned>(1 + seed % 4));
+    Source<TerminationBeat>& updates =
+        bench.source<TerminationBeat>("in_terminations", static_cast<unsigned>(1 + seed % 4));
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", static_cast<unsigned>(1 + seed % 5));
     for (unsigned i = 0; i < 60; ++i) {
       in.add(beat_of({0, 0}, {i, (i + 1) % 64, (i + 2) % 64}, 3 * i));

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <utility>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/accounting.h>
@@ -54,8 +54,8 @@ struct Platform {
   std::string description;  ///< one line
   unsigned gpcs = 1;
   double frequency_mhz = 0;
-  std::vector<Setting> settings;      ///< where it differs from the units' defaults
-  void (*wire)(Gpu& gpu) = nullptr;   ///< the wiring diagram, used where there is time
+  std::vector<Setting> settings;     ///< where it differs from the units' defaults
+  void (*wire)(Gpu& gpu) = nullptr;  ///< the wiring diagram, used where there is time
 };
 
 /// All named platforms, the default first. `add_platform` adds one of your own.
@@ -125,7 +125,7 @@ struct RunResult {
   std::vector<StatisticReport> statistics;
   /// UNIT.PARAMETER and value of everything that could be set, pass-through units left out.
   std::vector<std::pair<std::string, std::string>> parameters;
-  std::string result_hash;  ///< of counts, cycles and the stored bits of the image, 16 hex digits
+  std::string result_hash;          ///< of counts, cycles and the stored bits of the image, 16 hex digits
   std::uint64_t kernel_events = 0;  ///< activations of the SystemC kernel's processes
   ColorSurface surface{1, 1, ColorFormat::rgba16f};
 };

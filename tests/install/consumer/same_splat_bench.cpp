@@ -64,8 +64,8 @@ int main(int argc, char** argv) try {
   QuadBeat bin;
   bin.tile = {1, 2};
   // Position 5: both triangles of splat 1, then both of splat 2. Position 9: splats 3 and 4, then 4 again.
-  for (const Quad& q : {quad(1, 5, 0), quad(1, 5, 1), quad(3, 9, 0), quad(2, 5, 0), quad(4, 9, 0), quad(4, 9, 1),
-                        quad(2, 5, 1)}) {
+  for (const Quad& q :
+       {quad(1, 5, 0), quad(1, 5, 1), quad(3, 9, 0), quad(2, 5, 0), quad(4, 9, 0), quad(4, 9, 1), quad(2, 5, 1)}) {
     bin.quads[bin.count++] = q;
   }
   bin.last_of_bin = true;

@@ -14,9 +14,15 @@
 class SameSplatQru : public vrpipe::QruBehaviour {
  public:
   struct Parameters : vrpipe::ParameterSet {
-    vrpipe::Integer quads_per_cycle{*this, "quads_per_cycle", 8, 1, 16, "quads", "same as unit pairing",
-                                    "examined in a cycle"};
-    vrpipe::Integer latency_cycles{*this, "latency_cycles", 4, 1, 1000, "cycles", "same as unit pairing",
+    vrpipe::Integer quads_per_cycle{
+        *this, "quads_per_cycle", 8, 1, 16, "quads", "same as unit pairing", "examined in a cycle"};
+    vrpipe::Integer latency_cycles{*this,
+                                   "latency_cycles",
+                                   4,
+                                   1,
+                                   1000,
+                                   "cycles",
+                                   "same as unit pairing",
                                    "from the quad that completes a warp to its launch"};
   };
   SameSplatQru(const Parameters& parameters, const vrpipe::RenderState& state);

@@ -22,10 +22,11 @@ struct ImageSize {
 /// A pinhole camera in the INRIA frame: x right, y down, z forward; square pixels with centres at +0.5; the
 /// principal point is the centre of the image.
 struct Camera {
-  Vec3 eye{};                                                   ///< camera centre, world units
-  std::array<Vec3, 3> rotation{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  ///< camera to world, rows; columns right, down, forward
-  double fx = 1, fy = 1;                                        ///< focal lengths, pixels
-  std::uint32_t width = 1, height = 1;                          ///< pixels
+  Vec3 eye{};  ///< camera centre, world units
+  std::array<Vec3, 3> rotation{
+      {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  ///< camera to world, rows; columns right, down, forward
+  double fx = 1, fy = 1;                   ///< focal lengths, pixels
+  std::uint32_t width = 1, height = 1;     ///< pixels
   float near_plane = 0.2f;  ///< world units, >= 1e-6; Gaussians at camera z <= near_plane are culled (0.2 as INRIA)
 };
 
@@ -33,7 +34,7 @@ struct Camera {
 struct View {
   Vec3 eye{};
   Vec3 look_at{0, 0, 1};
-  Vec3 up{0, -1, 0};      ///< the world's up direction; y points down in COLMAP and INRIA worlds
+  Vec3 up{0, -1, 0};         ///< the world's up direction; y points down in COLMAP and INRIA worlds
   double fovy_degrees = 50;  ///< vertical field of view
 };
 

@@ -1,8 +1,8 @@
 #pragma once
 
+#include <vrpipe/draw.h>
 #include <cstdint>
 #include <filesystem>
-#include <vrpipe/draw.h>
 
 namespace vrpipe {
 
