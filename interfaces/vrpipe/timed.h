@@ -31,7 +31,7 @@ constexpr Cycle lookahead_cycles = 16;
 /// A resource that takes so many items a cycle, in order. An item that is wider than a cycle takes several.
 class Lane {
  public:
-  explicit Lane(unsigned per_cycle = 1) : per_cycle_(per_cycle), left_(per_cycle) {}
+  explicit Lane(unsigned per_cycle = 1) : per_cycle_(per_cycle > 0 ? per_cycle : 1), left_(per_cycle_) {}
   /// Reserves; returns the cycle in which the item goes.
   Cycle take(Cycle earliest, unsigned width = 1) {
     hold(earliest);

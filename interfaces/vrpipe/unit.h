@@ -62,7 +62,7 @@ template <class SlotBehaviour>
 std::unique_ptr<SlotBehaviour> behaviour_as(std::unique_ptr<Behaviour> behaviour) {
   auto* const typed = dynamic_cast<SlotBehaviour*>(behaviour.get());
   if (typed == nullptr) throw SimulationFault("registry", 0, "a behaviour was made for another slot");
-  behaviour.release();
+  static_cast<void>(behaviour.release());
   return std::unique_ptr<SlotBehaviour>(typed);
 }
 
