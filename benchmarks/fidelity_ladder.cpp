@@ -22,9 +22,9 @@ namespace {
 
 struct Rung {
   Fidelity fidelity;
-  double cycles_percent;   ///< wanted: error of the cycles at most; 0: no mark
-  double speedup_percent;  ///< wanted: error of the speed-up over the baseline at most
-  double quads_per_second; ///< wanted: at least
+  double cycles_percent;    ///< wanted: error of the cycles at most; 0: no mark
+  double speedup_percent;   ///< wanted: error of the speed-up over the baseline at most
+  double quads_per_second;  ///< wanted: at least
 };
 constexpr std::array<Rung, 5> rungs{{{Fidelity::functional, 0, 0, 10e6},
                                      {Fidelity::bound, 25, 15, 9e6},
@@ -41,7 +41,9 @@ struct Worst {
 double processor_seconds() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
@@ -108,8 +110,8 @@ int run(const std::vector<std::string>& arguments) {
   if (scenes.empty()) {
     for (const std::string& name : builtin_scene_names()) scenes.push_back("builtin:" + name);
   }
-  std::printf("%-18s %-9s %-11s %12s %9s %12s %9s\n", "scene", "variant", "fidelity", "cycles", "error",
-              "speed-up err", "Mquads/s");
+  std::printf("%-18s %-9s %-11s %12s %9s %12s %9s\n", "scene", "variant", "fidelity", "cycles", "error", "speed-up err",
+              "Mquads/s");
   std::array<Worst, rungs.size()> worst;
   for (const std::string& scene : scenes) {
     const std::array<Worst, rungs.size()> here = climb(scene, repeat);

@@ -162,7 +162,7 @@ class PropUnit : public Unit {
   Passage there_;  ///< to the tests, or past them
   Passage back_;   ///< from the tests
   WarpOrder order_;
-  const ShadedWarp* current_ = nullptr;    ///< being handed to CROP, from `index_` on
+  const ShadedWarp* current_ = nullptr;  ///< being handed to CROP, from `index_` on
   std::uint8_t index_ = 0;
   const ShadedWarp* end_ = nullptr;
   std::uint64_t color_quads_ = 0;

@@ -73,9 +73,9 @@ TEST(Fidelity, StrictImagesAndCountsAreTheSameOnEveryPlatform) {
   const Draw draw = random_draw(200, 120, 500, 3);
   for (const Platform& platform : platforms()) {
     for (const Variant& variant : variants()) {
-      expect_same_on_every_rung(
-          request_of(variant.name, Fidelity::functional, [&](RunRequest& request) { request.platform = &platform; }),
-          draw);
+      expect_same_on_every_rung(request_of(variant.name, Fidelity::functional,
+                                           [&](RunRequest& request) { request.platform = &platform; }),
+                                draw);
     }
   }
 }
@@ -119,22 +119,16 @@ TEST(Fidelity, RandomStallsChangeNothingButTime) {
 TEST(Fidelity, NarrowUnitsNeitherLockNorChangeTheResult) {
   const Draw draw = random_draw(120, 80, 200, 5);
   for (const Variant& variant : variants()) {
-    expect_same_on_every_rung(request_of(variant.name, Fidelity::functional,
-                                         [](RunRequest& request) {
-                                           request.settings = {{"sm", "cores", "1"},
-                                                               {"sm", "warps_per_core", "1"},
-                                                               {"sm", "vertex_warps", "1"},
-                                                               {"tc", "bins", "2"},
-                                                               {"tc", "bin_quads", "3"},
-                                                               {"tc", "flush_queue_bins", "1"},
-                                                               {"tgc", "bins", "1"},
-                                                               {"crop", "input_quads", "1"},
-                                                               {"crop", "cache_bytes", "128"},
-                                                               {"crop", "mshrs", "1"},
-                                                               {"zrop", "quads_per_cycle", "1"},
-                                                               {"raster", "quads_per_cycle", "1"}};
-                                         }),
-                              draw);
+    expect_same_on_every_rung(
+        request_of(variant.name, Fidelity::functional,
+                   [](RunRequest& request) {
+                     request.settings = {
+                         {"sm", "cores", "1"},   {"sm", "warps_per_core", "1"},    {"sm", "vertex_warps", "1"},
+                         {"tc", "bins", "2"},    {"tc", "bin_quads", "3"},         {"tc", "flush_queue_bins", "1"},
+                         {"tgc", "bins", "1"},   {"crop", "input_quads", "1"},     {"crop", "cache_bytes", "128"},
+                         {"crop", "mshrs", "1"}, {"zrop", "quads_per_cycle", "1"}, {"raster", "quads_per_cycle", "1"}};
+                   }),
+        draw);
   }
 }
 
@@ -144,14 +138,16 @@ TEST(Fidelity, TheBoundIsBelowCycleWhateverTheBottleneck) {
                                                       {{"vpo", "triangles_per_cycle", "1"}},
                                                       {{"raster", "setup_interval_cycles", "40"}},
                                                       {{"raster", "coarse_tiles_per_cycle", "1"}},
-                                                      {{"raster", "fine_tiles_per_cycle", "1"}, {"raster", "quads_per_cycle", "1"}},
+                                                      {{"raster", "fine_tiles_per_cycle", "1"},
+                                                       {"raster", "quads_per_cycle", "1"}},
                                                       {{"raster", "screen_tile_interval_cycles", "20"}},
                                                       {{"tc", "quads_per_cycle", "1"}},
                                                       {{"zrop", "quads_per_cycle", "1"}},
                                                       {{"qru", "quads_per_cycle", "1"}},
                                                       {{"sm", "cores", "1"}},
                                                       {{"crop", "cache_bytes", "1024"}},
-                                                      {{"l2", "bytes_per_cycle", "32"}, {"crop", "cache_bytes", "1024"}}};
+                                                      {{"l2", "bytes_per_cycle", "32"},
+                                                       {"crop", "cache_bytes", "1024"}}};
   for (const auto& settings : bottlenecks) {
     for (const char* variant : {"baseline", "het+qm"}) {
       RunRequest request = request_of(variant, Fidelity::bound, strictly);
