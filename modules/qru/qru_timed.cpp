@@ -1,3 +1,5 @@
+#include "qru/warp_numbering.h"
+
 #include <vrpipe/timed.h>
 
 namespace vrpipe {
@@ -8,12 +10,13 @@ namespace {
 class TimedQru : public TimedUnit {
  public:
   TimedQru(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour,
-           Transport transport)
+           const RenderState& state, Transport transport)
       : TimedUnit(name, domain, transport),
         out_(*this, "out_warps"),
         in_(*this, "in_quads", [this](const QuadBeat& beat, Cycle visible) { return examine(beat, visible); }, {&out_}),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
+        numbering_(state),
         budget_(cost_.items_per_cycle) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
@@ -43,8 +46,7 @@ class TimedQru : public TimedUnit {
     Warp warp;
     if (beat.end_of_draw) {
       warp.end_of_draw = true;
-      warp.sequence = warps_;
-      warps_ = 0;
+      numbering_.number_end(warp);
       launch(warp);
       return out_.last();
     }
@@ -60,13 +62,13 @@ class TimedQru : public TimedUnit {
       examined_ += examined;
       budget_ -= examined;
       if (!launched) continue;
-      ++warps_;
+      numbering_.number(warp);
       launch(warp);
     }
     charge(UnitState::busy, left + 1);
     if (!beat.last_of_bin) return left;
     while (behaviour_->finish_bin(warp)) {
-      ++warps_;
+      numbering_.number(warp);
       launch(warp);
     }
     return cycle_;
@@ -76,17 +78,17 @@ class TimedQru : public TimedUnit {
   TimedIn<QuadBeat> in_;
   std::unique_ptr<QruBehaviour> behaviour_;
   const Throughput cost_;
+  WarpNumbering numbering_;
   Cycle cycle_ = 0;
   unsigned budget_;  ///< quads that can still be examined in the cycle
-  std::uint32_t warps_ = 0;
   std::uint64_t examined_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("qru", [](const std::string& name, ClockDomain& domain,
-                                      std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
+                                      std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned,
                                       Transport transport) {
-    return std::make_unique<TimedQru>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)),
+    return std::make_unique<TimedQru>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)), state,
                                       transport);
   });
   return true;
