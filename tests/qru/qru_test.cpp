@@ -185,8 +185,8 @@ TEST_F(QruTest, WarpsOfPairsAreFullBeforeTheLeftOversCome) {
 }
 
 TEST_F(QruTest, WarpsAreNumberedInTheDrawAndInTheirTile) {
-  const Draw draw = testing::draw_of(32, 16);
-  WarpNumbering numbering(testing::state_of(draw));
+  const Draw two_tiles = testing::draw_of(32, 16);
+  WarpNumbering numbering(testing::state_of(two_tiles));
   const std::uint32_t in_tile[] = {0, 1, 0, 1, 2, 3};
   std::uint32_t launched = 0;
   for (const unsigned x : {0U, 0U, 1U, 1U, 0U, 0U}) {
@@ -200,8 +200,8 @@ TEST_F(QruTest, WarpsAreNumberedInTheDrawAndInTheirTile) {
 }
 
 TEST_F(QruTest, TheEndOfADrawCarriesItsWarpsAndTheNextDrawCountsFromZero) {
-  const Draw draw = testing::draw_of(32, 16);
-  WarpNumbering numbering(testing::state_of(draw));
+  const Draw two_tiles = testing::draw_of(32, 16);
+  WarpNumbering numbering(testing::state_of(two_tiles));
   Warp warp;
   numbering.number(warp);
   numbering.number(warp);
