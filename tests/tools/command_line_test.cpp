@@ -5,6 +5,8 @@
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 
+#include "settings.h"
+
 namespace vrpipe::testing {
 namespace {
 
@@ -91,7 +93,7 @@ TEST_F(CommandLine, ScenesPlatformsAndUnitsListEverything) {
   const std::string markdown = vrpipe({"units", "--markdown"}).out;
   const nlohmann::json units_json = json_of({"units"});
   std::size_t index = 0;
-  for (const ParameterListing& unit : list_parameters(&platforms().front())) {
+  for (const ParameterListing& unit : tools::all_parameters(&platforms().front())) {
     expect_in(units, {unit.unit + "=" + unit.implementation, unit.description});
     const nlohmann::json& entry = units_json["units"][index++];
     EXPECT_EQ(entry["slot"], unit.unit);
