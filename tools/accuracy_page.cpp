@@ -89,6 +89,10 @@ std::string list(const std::vector<std::string>& lines) {
   return text + "</ul>\n";
 }
 
+std::string exactness(const ImageError& error) {
+  return std::isinf(error.psnr_db) ? std::string("equal to the reference") : fmt::format("{:.2f} dB", error.psnr_db);
+}
+
 const std::vector<std::string>& colors() {
   static const std::vector<std::string> all{"#1f6fb4", "#d1495b", "#2e8b57", "#e08e0b", "#7b4fb5", "#00838f", "#8d5a2b",
                                             "#c2408f", "#6b7d00", "#4d5b6a", "#e4572e", "#3a4fb0", "#178f9b"};
@@ -176,7 +180,7 @@ std::string precision_plot(const AccuracyResult& result) {
       const bool apart = run.run.result_hash != result.runs.front().run.result_hash;
       plot.points.push_back(
           {x, y, colors()[color % colors().size()], Marker::circle, !run.on_front, apart ? label : "",
-           fmt::format("{}: {:.2f} dB, {} cycles", name, run.error.psnr_db, grouped(run.run.cycles.value_or(0)))});
+           fmt::format("{}: {}, {} cycles", name, exactness(run.error), grouped(run.run.cycles.value_or(0)))});
     }
     if (seen) plot.legend.push_back({knob.name, colors()[color % colors().size()], Marker::circle, false, false});
     ++color;
@@ -204,12 +208,10 @@ std::string figures(const AccuracyResult& result) {
   text += "<figure class=\"reference\"><figcaption><b>exact arithmetic</b><br>the reference</figcaption>" +
           image(result.reference, "exact image") + "</figure>\n";
   const auto add = [&](const std::string& name, const PrecisionRun& run) {
-    const std::string psnr =
-        std::isinf(run.error.psnr_db) ? "equal to the reference" : fmt::format("{:.2f} dB", run.error.psnr_db);
     text += fmt::format(
         "<figure><figcaption><b>{}</b><br>{}, largest error {:.2g}</figcaption><div class=\"pair\">{}{}"
         "</div></figure>\n",
-        html_escaped(name), psnr, run.error.max_abs_error, image(run.picture, name),
+        html_escaped(name), exactness(run.error), run.error.max_abs_error, image(run.picture, name),
         image(run.error_map, "error map of " + name));
   };
   add("the default", result.runs.front());

@@ -43,9 +43,10 @@ std::vector<std::string> precision_cells(const std::string& value, const Precisi
           fmt::format("{:.2f}", 100 * run.error.share_differing),
           grouped(run.pixels_stuck),
           cycles_text(run.run),
-          is_default ? ""
-          : free     ? "none"
-                     : signed_percent(run.cycles_change_percent),
+          is_default                  ? ""
+          : free                      ? "none"
+          : run.cycles_change_percent ? fmt::format("{:+.3f}", *run.cycles_change_percent)
+                                      : "-",
           fmt::format("{:.2f}", run.run.host_seconds),
           run.on_front ? "front" : ""};
 }

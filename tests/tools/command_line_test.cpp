@@ -24,7 +24,7 @@ TEST_F(CommandLine, VersionAndHelp) {
   const Finished help = vrpipe({"--help"});
   EXPECT_EQ(help.code, 0);
   EXPECT_EQ(help.err, "");
-  expect_in(help.out, {"run", "compare", "scenes", "platforms", "units", "--version", "Exit code"});
+  expect_in(help.out, {"run", "compare", "accuracy", "scenes", "platforms", "units", "--version", "Exit code"});
 }
 
 TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
@@ -54,12 +54,13 @@ TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
                                         "pixels",
                                         "DEGREES",
                                         "Examples:"};
-  for (const char* command : {"run", "compare"}) {
+  for (const char* command : {"run", "compare", "accuracy"}) {
     const Finished help = vrpipe({command, "--help"});
     EXPECT_EQ(help.code, 0);
     expect_in(help.out, shared);
     expect_in(help.out, {std::string(command) == "run" ? "--variant" : "--jobs"});
   }
+  expect_in(vrpipe({"accuracy", "--help"}).out, {"--quick", "--repeat", "--html", "--markdown"});
   expect_in(vrpipe({"units", "--help"}).out, {"--slot", "--platform", "--plugin", "--json", "--markdown"});
   expect_in(vrpipe({"platforms", "--help"}).out, {"--plugin", "--json"});
   expect_in(vrpipe({"scenes", "--help"}).out, {"--json"});
