@@ -35,7 +35,7 @@ tr.group td { font-weight: 600; padding-top: 10px; border-bottom: 1px solid #e7e
 tr.marked td { background: #e6f4ea; }
 .cards { display: grid; grid-template-columns: repeat(auto-fill, minmax(330px, 1fr)); gap: 18px; margin-top: 14px; }
 figure { margin: 0; border: 1px solid #dfe3e8; border-radius: 6px; padding: 10px; }
-figure .pair { display: flex; gap: 8px; } figure img { width: calc(50% - 4px); image-rendering: auto; background: #000; }
+figure .pair { display: flex; gap: 8px; } figure img { width: calc(50% - 4px); height: auto; }
 figcaption { font-size: 13px; margin-bottom: 6px; } figcaption b { font-size: 14px; }
 figure.reference img { width: 100%; }
 .scale { display: flex; align-items: center; gap: 8px; font-size: 13px; margin: 8px 0; }
@@ -175,11 +175,8 @@ std::string precision_plot(const AccuracyResult& result) {
       const auto [x, y] = point_of(run);
       const std::string value = readable_value(knob, row.value);
       const std::string name = knob.name + "=" + value;
-      const std::string label = value == "off" ? "no " + knob.name : value;
-      // What lies on the default has no place of its own.
-      const bool apart = run.run.result_hash != result.runs.front().run.result_hash;
       plot.points.push_back(
-          {x, y, colors()[color % colors().size()], Marker::circle, !run.on_front, apart ? label : "",
+          {x, y, colors()[color % colors().size()], Marker::circle, !run.on_front, name,
            fmt::format("{}: {}, {} cycles", name, exactness(run.error), grouped(run.run.cycles.value_or(0)))});
     }
     if (seen) plot.legend.push_back({knob.name, colors()[color % colors().size()], Marker::circle, false, false});
@@ -261,7 +258,10 @@ std::string accuracy_page(const AccuracyResult& result) {
       "no termination, all bands, exact order, alpha below 1/255 pruned. What lies further left takes the modelled "
       "hardware less time, further up is more exact.</p>\n",
       html_escaped(result.base.variant.name), vrpipe::name_of(result.base.fidelity));
-  if (result.runs.front().run.cycles) text += precision_plot(result);
+  if (result.runs.front().run.cycles) {
+    text += precision_plot(result) +
+            "<p class=\"subtle\">What lies on the default has no label; a point's name shows under the pointer.</p>\n";
+  }
   text += list(precision_summary(result)) + table(precision_table(result));
 
   text += "<h2>Images and error maps</h2>\n";

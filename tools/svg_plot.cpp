@@ -232,9 +232,13 @@ std::string svg(const Plot& plot) {
   const std::vector<Place> candidates = places();
   std::string labels;
   for (const PlotPoint& point : plot.points) {
-    if (point.label.empty()) continue;
     const double px = x(point.x);
     const double py = y(point.y);
+    const auto is_here = [&](const PlotPoint& other) {
+      return std::fabs(x(other.x) - px) < radius && std::fabs(y(other.y) - py) < radius;
+    };
+    const bool covered = &*std::find_if(plot.points.begin(), plot.points.end(), is_here) != &point;
+    if (point.label.empty() || covered) continue;
     const double text_width = character_width * static_cast<double>(point.label.size()) + 2;
     for (const Place& place : candidates) {
       const Box box = label_box(px, py, place, text_width);
@@ -251,8 +255,10 @@ std::string svg(const Plot& plot) {
     }
   }
   text += labels;
-  for (const PlotPoint& point : plot.points) {
-    text += marker_shape(point.marker, x(point.x), y(point.y), marker_style(point.color, point.hollow), point.tooltip);
+  // The first on top.
+  for (auto point = plot.points.rbegin(); point != plot.points.rend(); ++point) {
+    text += marker_shape(point->marker, x(point->x), y(point->y), marker_style(point->color, point->hollow),
+                         point->tooltip);
   }
   return text + legend_text(plot.legend) + "</svg>\n";
 }

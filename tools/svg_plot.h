@@ -45,7 +45,8 @@ struct Plot {
   std::vector<LegendEntry> legend;
 };
 
-/// An <svg> element. Labels never overlap one another or a point: one for which there is no room is left out.
+/// An <svg> element. Labels never overlap one another or a point: one for which there is no room is left out, and so is
+/// that of a point which lies under an earlier one.
 std::string svg(const Plot& plot);
 
 /// Text for HTML and SVG, also inside double quotes.
