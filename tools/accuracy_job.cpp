@@ -20,8 +20,9 @@ namespace {
 
 /// A quick look divides both sides of the image by this.
 constexpr std::uint32_t quick_divisor = 4;
-/// Of a picture on the page.
+// Of pictures on the page, at most.
 constexpr std::uint32_t picture_width = 280;
+constexpr std::uint32_t reference_width = 560;
 
 class Stopwatch {
  public:
@@ -106,7 +107,7 @@ ShownImage make_reference(const AccuracyJob& job, const Workload& workload, Accu
     write_image(job, result.scene.name, "reference", image);
   }
   ShownImage reference = shown(exact, job.simulation.background);
-  if (job.html) result.reference = picture_of(reference, picture_width);
+  if (job.html) result.reference = picture_of(reference, reference_width);
   return reference;
 }
 

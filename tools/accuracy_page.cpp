@@ -37,7 +37,7 @@ tr.marked td { background: #e6f4ea; }
 figure { margin: 0; border: 1px solid #dfe3e8; border-radius: 6px; padding: 10px; }
 figure .pair { display: flex; gap: 8px; } figure img { width: calc(50% - 4px); height: auto; }
 figcaption { font-size: 13px; margin-bottom: 6px; } figcaption b { font-size: 14px; }
-figure.reference img { width: 100%; }
+figure.reference { max-width: 420px; } figure.reference img { width: 100%; }
 .scale { display: flex; align-items: center; gap: 8px; font-size: 13px; margin: 8px 0; }
 .scale i { display: inline-block; width: 260px; height: 14px; border-radius: 2px; }
 )";
@@ -201,9 +201,8 @@ std::string error_scale() {
 }
 
 std::string figures(const AccuracyResult& result) {
-  std::string text = "<div class=\"cards\">\n";
-  text += "<figure class=\"reference\"><figcaption><b>exact arithmetic</b><br>the reference</figcaption>" +
-          image(result.reference, "exact image") + "</figure>\n";
+  std::string text = "<figure class=\"reference\"><figcaption><b>exact arithmetic</b><br>the reference</figcaption>" +
+                     image(result.reference, "exact image") + "</figure>\n<div class=\"cards\">\n";
   const auto add = [&](const std::string& name, const PrecisionRun& run) {
     text += fmt::format(
         "<figure><figcaption><b>{}</b><br>{}, largest error {:.2g}</figcaption><div class=\"pair\">{}{}"
