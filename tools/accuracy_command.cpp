@@ -26,8 +26,8 @@ class AccuracyCommand : public Command {
     arguments_.declare(app, SimulationArguments::Variants::all);
     const std::string ladders = "The ladders";
     app.add_flag("--quick", quick_,
-                 "a first answer: a quarter of the width and height unless --size says\n"
-                 "otherwise, two variants, and one value of some knobs")
+                 "a first answer: the middle ninth of the image unless --size is given, two\n"
+                 "variants, and one value of some knobs")
         ->group(ladders);
     add_option(app, "--repeat", repeat_, "N",
                "measures each rung of the fidelity ladder N times, interleaved, and\n"

@@ -18,8 +18,8 @@
 namespace vrpipe::tools {
 namespace {
 
-/// A quick look divides both sides of the image by this.
-constexpr std::uint32_t quick_divisor = 4;
+/// A quick look takes the middle of the image, of which both sides are smaller by this.
+constexpr std::uint32_t quick_divisor = 3;
 // Of pictures on the page, at most.
 constexpr std::uint32_t picture_width = 280;
 constexpr std::uint32_t reference_width = 560;
@@ -73,9 +73,10 @@ Workload load(const AccuracyJob& job, AccuracyResult& result) {
     Camera& camera = workload.scene.camera;
     result.full_width = camera.width;
     result.full_height = camera.height;
+    // A part of the image, not a smaller one: splats keep their size, and so the units their share of the work.
     if (job.quick && !job.simulation.scene.size) {
-      camera =
-          resized(camera, {std::max(1U, camera.width / quick_divisor), std::max(1U, camera.height / quick_divisor)});
+      camera.width = std::max(1U, camera.width / quick_divisor);
+      camera.height = std::max(1U, camera.height / quick_divisor);
     }
   }
   LoadedScene loaded = preprocess_scene(workload.scene, workload.options);

@@ -19,7 +19,7 @@ namespace vrpipe::tools {
 /// What `vrpipe accuracy` is asked to do.
 struct AccuracyJob {
   SimulationJob simulation;
-  bool quick = false;                         ///< smaller images, fewer variants and values
+  bool quick = false;                         ///< the middle of the image, fewer variants and values
   unsigned repeat = 1;                        ///< times that each rung of the fidelity ladder is measured
   std::optional<std::filesystem::path> html;  ///< file
   bool markdown = false;                      ///< the tables for documentation in place of the report
@@ -59,7 +59,7 @@ struct PrecisionRow {
 struct AccuracyResult {
   SceneSummary scene;
   std::uint32_t width = 0, height = 0;            ///< pixels
-  std::uint32_t full_width = 0, full_height = 0;  ///< what a quick look made smaller
+  std::uint32_t full_width = 0, full_height = 0;  ///< of which a quick look takes the middle
   bool quick = false;
   unsigned repeat = 1;
   unsigned processes = 1;                   ///< of the precision ladder

@@ -200,8 +200,7 @@ std::vector<std::string> accuracy_heading(const AccuracyResult& result) {
   if (result.quick) {
     std::string line = "a quick look: two variants, and one value of some knobs";
     if (result.width != result.full_width || result.height != result.full_height) {
-      line += fmt::format(", at {}x{} in place of {}x{}", result.width, result.height, result.full_width,
-                          result.full_height);
+      line += fmt::format(", in the middle of {}x{}", result.full_width, result.full_height);
     }
     lines.push_back(line);
   }
@@ -236,8 +235,8 @@ std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) 
 
 std::string accuracy_markdown(const AccuracyResult& result) {
   std::string text;
-  for (const std::string& line : accuracy_heading(result)) text += line + (result.quick ? "  \n" : ". ");
-  text += "\n\n" + markdown(fidelity_table(result)) + "\n";
+  for (const std::string& line : accuracy_heading(result)) text += line + ".\n";
+  text += "\n" + markdown(fidelity_table(result)) + "\n";
   for (const std::string& line : fidelity_summary(result)) text += "* " + line + "\n";
   text += "\n" + markdown(precision_table(result)) + "\n";
   for (const std::string& line : precision_summary(result)) text += "* " + line + "\n";

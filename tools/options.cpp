@@ -41,6 +41,15 @@ constexpr const char* result_group = "Where results go";
 
 const std::string variant_default = "het+qm";
 
+std::string names_of(const std::vector<Fidelity>& fidelities) {
+  std::string text;
+  for (const Fidelity fidelity : fidelities) {
+    if (!text.empty()) text += fidelity == fidelities.back() ? " or " : ", ";
+    text += vrpipe::name_of(fidelity);
+  }
+  return text;
+}
+
 }  // namespace
 
 std::shared_ptr<CLI::FormatterBase> help_formatter() { return std::make_shared<HelpFormatter>(); }
@@ -106,8 +115,9 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              machine_group);
 
   add_option(app, "--fidelity", fidelity_, "NAME",
-             "how exact time is: cycle (every unit, every cycle) or functional (no\n"
-             "time: images and counts only) (default: cycle)",
+             "how exact time is, from images and counts alone to every unit in every\n"
+             "cycle: " +
+                 names_of(fidelities()) + " (default: cycle)",
              rules_group);
   add_option(app, "--format", format_, "NAME", "colour target: rgba8, rgba16f or rgba32f (default: rgba16f)",
              rules_group);
