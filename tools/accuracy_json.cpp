@@ -39,6 +39,8 @@ Json precision_json(const PrecisionRow& row, const PrecisionRun& run) {
   return {{"knob", row.knob->name},
           {"value", row.value},
           {"option", row.knob->option},
+          {"meaning", row.knob->meaning},
+          {"charged", row.knob->is_charged},
           {"default", row.run == 0},
           {"variant", run.run.request.variant.name},
           {"psnr_db", decibels_json(run.error.psnr_db)},

@@ -183,6 +183,15 @@ std::vector<std::string> precision_summary(const AccuracyResult& result) {
   } else if (const std::vector<std::string> free = free_knobs(result); !free.empty()) {
     lines.push_back("cost no simulated time: " + joined(free));
   }
+  std::vector<std::string> uncharged;
+  for (const PrecisionKnob& knob : precision_knobs()) {
+    const auto of_knob = [&](const PrecisionRow& row) { return row.knob == &knob; };
+    const bool is_there = std::any_of(result.precision.begin(), result.precision.end(), of_knob);
+    if (is_there && !knob.is_charged) uncharged.push_back(knob.name);
+  }
+  if (result.runs.front().run.cycles && !uncharged.empty()) {
+    lines.push_back("have no price of their own, and change cycles only by which fragments live: " + joined(uncharged));
+  }
   if (!result.knobs_left_out.empty()) {
     lines.push_back("left out, since a draw list is preprocessed already: " + joined(result.knobs_left_out));
   }

@@ -1,5 +1,6 @@
 #include "precision_knobs.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -110,6 +111,10 @@ std::vector<PrecisionKnob> make_knobs() {
   knobs.push_back(variant_knob("quad_merging", "TGC and QRU merge overlapping quads", &Variant::quad_merging));
   knobs.push_back(
       variant_knob("early_termination", "ZROP and CROP terminate opaque pixels", &Variant::early_termination));
+  // The same rates, latencies and instructions whatever they are set to; and preprocessing is before the draw.
+  const std::vector<std::string> free{"blend_rounding", "termination_compare", "subpixel_bits",
+                                      "exponential",    "depth_key_bits",      "sh_degree"};
+  for (PrecisionKnob& knob : knobs) knob.is_charged = std::find(free.begin(), free.end(), knob.name) == free.end();
   return knobs;
 }
 

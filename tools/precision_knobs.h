@@ -25,6 +25,8 @@ struct PrecisionKnob {
   bool is_preprocessing = false;  ///< of no meaning for a draw list
   std::function<std::string(const PrecisionSettings&)> value;
   std::function<void(PrecisionSettings&, const std::string&)> set;
+  /// Whether the model takes time for it. Without, cycles may still differ: by which fragments live.
+  bool is_charged = true;
 };
 
 /// All knobs, in the order of reports.
