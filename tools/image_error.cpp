@@ -16,8 +16,9 @@ using Kernel = std::array<double, window_rows>;
 
 Kernel gaussian_kernel() {
   Kernel kernel{};
-  for (int i = -window_reach; i <= window_reach; ++i) {
-    kernel[static_cast<std::size_t>(i + window_reach)] = portable_exp(-0.5 * i * i / (1.5 * 1.5));
+  for (std::size_t i = 0; i < window_rows; ++i) {
+    const double offset = static_cast<double>(i) - window_reach;
+    kernel[i] = portable_exp(-0.5 * offset * offset / (1.5 * 1.5));
   }
   return kernel;
 }
