@@ -101,7 +101,8 @@ inline rc::Gen<Draw> scene(int splats, float largest) {
   return rc::gen::mapcat(rc::gen::pair(rc::gen::element(1U, 2U, 15U, 16U, 17U, 33U, 48U, 64U),
                                        rc::gen::element(1U, 2U, 15U, 16U, 17U, 33U, 65U)),
                          [=](std::pair<std::uint32_t, std::uint32_t> size) {
-                           const auto [width, height] = size;
+                           const std::uint32_t width = size.first;
+                           const std::uint32_t height = size.second;
                            return rc::gen::map(rc::gen::resize(splats, rc::gen::container<std::vector<Splat>>(
                                                                            splat_in(width, height, largest))),
                                                [=](std::vector<Splat> list) {
