@@ -18,7 +18,7 @@ std::map<std::string, TimedUnitMaker>& makers() {
 
 bool TimedUnit::idle() const {
   return std::all_of(in_ports.begin(), in_ports.end(), [](const InPort* port) { return port->empty(); }) &&
-         std::none_of(outputs_.begin(), outputs_.end(), [](const TimedOutput* out) { return out->blocked(); });
+         std::none_of(outputs_.begin(), outputs_.end(), [](const TimedOutput* out) { return !out->clear(); });
 }
 
 void TimedUnit::close_account(Cycle end) {
@@ -27,13 +27,13 @@ void TimedUnit::close_account(Cycle end) {
 }
 
 Cycle TimedUnit::tick(Cycle now) {
-  advance();
+  Cycle next = never;
   bool served = true;
   while (served) {
     served = false;
     for (TimedInput* input : inputs_) served = input->serve(now + lookahead_cycles) || served;
+    next = advance(now + lookahead_cycles);
   }
-  Cycle next = never;
   for (const TimedInput* input : inputs_) next = std::min(next, input->next());
   return std::max(next, now + 1);
 }

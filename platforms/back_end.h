@@ -1,8 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
+#include <vrpipe/batch.h>
 #include <vrpipe/order_monitor.h>
 #include <vrpipe/platforms/configuration.h>
 
@@ -38,6 +40,7 @@ class BackEnd {
   void count_into(Work& work) {
     work_ = &work;
     writes_unchanged_ = crop->cost().writes_unchanged;
+    looked_up_at_once_ = quads_looked_up_at_once(crop->cost());
   }
 
   std::unique_ptr<QruBehaviour> qru;
@@ -48,12 +51,27 @@ class BackEnd {
   template <class Signal>
   void run(const Warp& warp, Signal& signal) {
     sm->shade(warp, shaded_);
-    if (work_ != nullptr) count(warp);
-    for (unsigned i = 0; i < shaded_.count; ++i) {
+    if (work_ == nullptr) return blend(0, shaded_.count, signal);
+    count(warp);
+    for (unsigned from = 0; from < shaded_.count; from += looked_up_at_once_) {
+      const unsigned to = std::min<unsigned>(from + looked_up_at_once_, shaded_.count);
+      crop->look_up(shaded_, from, to, cache_);
+      for (unsigned line = 0; line < cache_.count; ++line) {
+        work_->sectors += popcount_of(cache_.lines[line].filled) + popcount_of(cache_.lines[line].written_back);
+      }
+      blend(from, to, signal);
+    }
+  }
+
+  template <class Signal>
+  void blend(unsigned from, unsigned to, Signal& signal) {
+    for (unsigned i = from; i < to; ++i) {
       monitor_.blended(shaded_, i, 0);
       const CropBehaviour::Outcome outcome =
           crop->blend(shaded_.tile, shaded_.position[i], shaded_.live[i], shaded_.color[i]);
-      if (work_ != nullptr) follow_cache(i, outcome.changed);
+      if (work_ != nullptr && cache_.count > 0 && (outcome.changed || writes_unchanged_)) {
+        crop->make_dirty(cache_.lines[cache_.line_of[i]].line, cache_.sectors_of[i]);
+      }
       if (outcome.terminated != 0) signal(TerminationSignal{shaded_.tile, shaded_.position[i], outcome.terminated});
     }
   }
@@ -64,13 +82,7 @@ class BackEnd {
     work_->color_quads += shaded_.count;
   }
 
-  void follow_cache(unsigned index, bool changed) {
-    const CropBehaviour::CacheAccess access = crop->look_up(shaded_.tile, shaded_.position[index]);
-    work_->sectors += sectors_in(access.filled) + sectors_in(access.written_back);
-    if (changed || writes_unchanged_) crop->make_dirty(access);
-  }
-
-  static unsigned sectors_in(std::uint32_t mask) {
+  static unsigned popcount_of(std::uint32_t mask) {
     unsigned count = 0;
     for (; mask != 0; mask &= mask - 1) ++count;
     return count;
@@ -80,6 +92,8 @@ class BackEnd {
   BlendOrderMonitor monitor_;
   Work* work_ = nullptr;
   bool writes_unchanged_ = false;
+  unsigned looked_up_at_once_ = quads_per_warp;
+  CropBehaviour::CacheLookUp cache_;
 };
 
 /// Strict termination where there is time: runs tested bins ahead, in order, on units of its own.

@@ -25,15 +25,20 @@ const char* name_of(Fidelity fidelity) {
   return "";
 }
 
+const std::vector<Fidelity>& fidelities() {
+  static const std::vector<Fidelity> all{Fidelity::functional, Fidelity::bound, Fidelity::lt, Fidelity::at,
+                                         Fidelity::cycle};
+  return all;
+}
+
 Fidelity fidelity_named(const std::string& name) {
   std::vector<std::string> names;
-  // lt and at exist as timed units, but do not pass the property tests yet.
-  for (const Fidelity fidelity : {Fidelity::functional, Fidelity::bound, Fidelity::cycle}) {
+  for (const Fidelity fidelity : fidelities()) {
     if (name == name_of(fidelity)) return fidelity;
     names.emplace_back(name_of(fidelity));
   }
   throw UserError("unknown fidelity '" + name + "'", "--fidelity", "this build has no such fidelity",
-                  "did you mean " + nearest_name(name, names) + "? There are functional, bound and cycle");
+                  "did you mean " + nearest_name(name, names) + "? There are functional, bound, lt, at and cycle");
 }
 
 const std::vector<Variant>& variants() {

@@ -11,7 +11,8 @@ constexpr std::uint16_t no_slot = 0xffff;
 
 /// The SM array at lt and at. Ports as in sm_unit.cpp. A warp has its scheduler for all its instructions at once, then
 /// waits for all its latencies: with several warps that is what issuing segment by segment comes to. Vertex warps take
-/// issue slots from fragment warps but do not wait for them; they are few.
+/// issue slots from fragment warps but do not wait for them; they are few. Shaded warps go to PROP as they are done, at
+/// lt in launch order.
 class TimedSm : public TimedUnit {
  public:
   TimedSm(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour,
@@ -26,15 +27,14 @@ class TimedSm : public TimedUnit {
         out_vertices_(*this, "out_vertices"),
         out_shaded_(*this, "out_shaded"),
         in_release_(*this, "in_release",
-                    [this](const WarpRelease& release, Cycle visible) { return free(release, visible); }),
-        in_warps_(*this, "in_warps", [this](const Warp& warp, Cycle visible) { return shade(warp, visible); },
-                  {&out_shaded_}),
+                    [this](const WarpRelease& release, Span visible) { return free(release, visible.first); }),
+        in_warps_(*this, "in_warps", [this](const Warp& warp, Span visible) { return shade(warp, visible.first); }),
         in_vertices_(*this, "in_vertices",
-                     [this](const VertexWarp& warp, Cycle visible) { return shade_vertices(warp, visible); },
+                     [this](const VertexWarp& warp, Span visible) { return shade_vertices(warp, visible.first); },
                      {&out_vertices_}),
         scheduler_free_at_(std::size_t{cost_.cores} * cost_.schedulers_per_core, 0),
-        slots_(std::size_t{cost_.cores} * cost_.warps_per_core, 0),
         vertex_slots_(cost_.vertex_warps, 0) {
+    for (std::uint32_t slot = 0; slot < cost_.cores * cost_.warps_per_core; ++slot) slots_.push(0);
     in_warps_.set_gate([this] { return !slots_.empty(); });
   }
 
@@ -92,13 +92,13 @@ class TimedSm : public TimedUnit {
       shaded.sequence = warp.sequence;
       shaded.count = 0;
       shaded.slot = no_slot;
-      out_shaded_.send({&shaded}, std::max(launch, last_done_));
+      hand_on(shaded, std::max(launch, last_done_));
       return launch;
     }
     charge(UnitState::memory, std::min(launch, last_done_));
     charge(UnitState::starved, launch);
     launch = std::max(launch, slots_.front());
-    slots_.pop_front();
+    slots_.pop();
     charge(UnitState::blocked, launch);
     next_launch_ = launch + 1;
 
@@ -112,8 +112,28 @@ class TimedSm : public TimedUnit {
 
     behaviour_->shade(warp, shaded);
     shaded.slot = 0;
-    out_shaded_.send({&shaded}, done);
+    hand_on(shaded, done);
     return launch;
+  }
+
+  /// Sends a warp that is shaded in a cycle to come.
+  void hand_on(const ShadedWarp& shaded, Cycle done) {
+    if (blocking()) {
+      out_shaded_.send({&shaded}, done);
+      return;
+    }
+    // By cycle; nearly always the last.
+    running_.push({&shaded, done});
+    for (std::size_t place = running_.size() - 1; place > 0 && running_[place - 1].done > done; --place) {
+      std::swap(running_[place - 1], running_[place]);
+    }
+  }
+
+  Cycle advance(Cycle until) override {
+    for (; !running_.empty() && running_.front().done <= until && out_shaded_.clear(); running_.pop()) {
+      out_shaded_.send({running_.front().shaded}, running_.front().done);
+    }
+    return running_.empty() || !out_shaded_.clear() ? never : running_.front().done;
   }
 
   Cycle shade_vertices(const VertexWarp& warp, Cycle visible) {
@@ -128,14 +148,14 @@ class TimedSm : public TimedUnit {
     }
     next_vertex_launch_ = launch + 1;
     // Vertex warps leave in order.
-    const Cycle taken = out_vertices_.send(warp, std::max(vertices_done_, launch));
+    const Cycle taken = out_vertices_.send(warp, std::max(vertices_done_, launch)).first;
     vertex_slots_[vertex_turn_] = taken + 1;
     vertex_turn_ = vertex_turn_ + 1 == cost_.vertex_warps ? 0 : vertex_turn_ + 1;
     return launch;
   }
 
   Cycle free(const WarpRelease& release, Cycle visible) {
-    if (release.slot != no_slot) slots_.push_back(visible);
+    if (release.slot != no_slot) slots_.push(visible);
     return visible;
   }
 
@@ -151,7 +171,12 @@ class TimedSm : public TimedUnit {
   TimedIn<Warp> in_warps_;
   TimedIn<VertexWarp> in_vertices_;
   std::vector<Cycle> scheduler_free_at_;
-  std::deque<Cycle> slots_;          ///< for fragment warps: when each that is free, or known to become so, is
+  struct Running {
+    const ShadedWarp* shaded = nullptr;
+    Cycle done = 0;
+  };
+  Ring<Running> running_;            ///< by cycle; non-blocking
+  Ring<Cycle> slots_;                ///< for fragment warps: when each that is free, or known to become so, is
   std::vector<Cycle> vertex_slots_;  ///< a ring
   std::uint32_t vertex_turn_ = 0;
   std::uint64_t vertex_scheduler_ = 0;
