@@ -57,7 +57,11 @@ class BackEnd {
       const unsigned to = std::min<unsigned>(from + looked_up_at_once_, shaded_.count);
       crop->look_up(shaded_, from, to, cache_);
       for (unsigned line = 0; line < cache_.count; ++line) {
-        work_->sectors += popcount_of(cache_.lines[line].filled) + popcount_of(cache_.lines[line].written_back);
+        const CropBehaviour::LineAccess& access = cache_.lines[line];
+        const unsigned filled = popcount_of(access.filled);
+        work_->sectors += filled + popcount_of(access.written_back);
+        work_->sectors_filled += filled;
+        work_->lines_filled += access.replaced && filled > 0 ? 1U : 0U;
       }
       blend(from, to, signal);
     }

@@ -38,7 +38,7 @@ Fidelity fidelity_named(const std::string& name) {
     names.emplace_back(name_of(fidelity));
   }
   throw UserError("unknown fidelity '" + name + "'", "--fidelity", "this build has no such fidelity",
-                  "did you mean " + nearest_name(name, names) + "? There are functional, bound, lt, at and cycle");
+                  fmt::format("did you mean {}? There are {}", nearest_name(name, names), fmt::join(names, ", ")));
 }
 
 const std::vector<Variant>& variants() {

@@ -105,8 +105,10 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              machine_group);
 
   add_option(app, "--fidelity", fidelity_, "NAME",
-             "how exact time is: cycle (every unit, every cycle) or functional (no\n"
-             "time: images and counts only) (default: cycle)",
+             "how exact time is: functional (no time: images and counts only), bound\n"
+             "(the busiest unit's work), lt (loosely timed: bins and warps, one after\n"
+             "another), at (approximately timed: queues and back-pressure) or cycle\n"
+             "(every unit, every cycle) (default: cycle)",
              rules_group);
   add_option(app, "--format", format_, "NAME", "colour target: rgba8, rgba16f or rgba32f (default: rgba16f)",
              rules_group);

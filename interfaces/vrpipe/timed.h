@@ -27,9 +27,14 @@ namespace vrpipe {
 
 enum class Transport : std::uint8_t { blocking, non_blocking };
 
-/// At `at`, a unit that is activated takes also what becomes visible in the next cycles: bursts cost one activation.
-/// Times stay exact; what depends on their order (a termination update before a test) may be off by as much.
-constexpr Cycle lookahead_cycles = 32;
+/// At `at`, units are activated in cycles so far apart, and take what becomes visible until the next: bursts cost one
+/// activation. Times stay exact; what depends on their order (a termination update before a test) may be off by as much.
+/// Shallower queues, which would move no more than their depth in that time, are served as items and credits come.
+constexpr Cycle activation_cycles = 8;
+/// The cycle in which what is wanted for a cycle is activated; later than `now`.
+constexpr Cycle activation_for(Cycle wanted, Cycle now) {
+  return wanted == never ? never : std::max(wanted, now + activation_cycles) / activation_cycles * activation_cycles;
+}
 
 /// The cycles in which the first and the last part of an item move.
 struct Span {
@@ -294,6 +299,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
 
   tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
     const Span at(payload.at, payload.last);
+    if (!clock_.domain->running()) places_ += payload.credits;
     for (unsigned credit = 0; credit < payload.credits; ++credit) {
       const Cycle cycle = at.of_part(credit, payload.credits);
       if (owed_ > 0) {
@@ -310,7 +316,10 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
       waiting_.pop();
       --waiting_items_;
     }
-    if (was_waiting && !blocked()) clock_.domain->wake(clock_.unit, clock_.domain->now() + 1);
+    if (was_waiting && !blocked()) {
+      const Cycle now = clock_.domain->now();
+      clock_.domain->wake(clock_.unit, places_ < activation_cycles ? now + 1 : activation_for(now, now));
+    }
     return tlm::TLM_ACCEPTED;
   }
   void unlimited() override { unlimited_ = true; }
@@ -322,7 +331,8 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
   };
   const bool blocking_;
   bool unlimited_ = false;
-  unsigned owed_ = 0;  ///< places that sent items take and the queue has not had yet
+  unsigned places_ = 0;  ///< of the queue
+  unsigned owed_ = 0;    ///< places that sent items take and the queue has not had yet
   Cycle last_ = 0;
   Ring<Cycle> credits_;  ///< the cycle from which each can be used
   Ring<Waiting> waiting_;
@@ -438,7 +448,10 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     entry.visible = visible(payload);
     entry.beats = payload.beats;
     entry.item = *payload.item;
-    clock_.domain->wake(clock_.unit, std::max(entry.visible.first, clock_.domain->now() + 1));
+    const Cycle now = clock_.domain->now();
+    const Cycle visible_at = entry.visible.first;
+    clock_.domain->wake(clock_.unit,
+                        depth_ < activation_cycles ? std::max(visible_at, now + 1) : activation_for(visible_at, now));
     return tlm::TLM_ACCEPTED;
   }
 
@@ -481,6 +494,8 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<> {
   const ClockHandle& clock_;
   tlm::tlm_generic_payload payload_;
   std::vector<unsigned char> data_;
+  std::uint64_t took_ = 0;  ///< the last answer, in units of sc_time
+  Cycle took_cycles_ = 0;
 };
 
 /// Makes the module of a slot for `lt` or `at` around a behaviour.

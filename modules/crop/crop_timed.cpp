@@ -79,12 +79,14 @@ class TimedCrop : public TimedUnit {
     Span looked_up = look_ups_.take(at, quads);
     looked_up.last = std::max(looked_up.last, visible.last);
     Cycle there = looked_up.first + 1;
+    moved_ = 0;
     for (unsigned line = 0; line < cache_.count; ++line) {
       const CropBehaviour::LineAccess& access = cache_.lines[line];
       if (access.written_back != 0) write_back(access, looked_up.last);
       if (access.filled != 0) there = std::max(there, fill(access, looked_up.last));
     }
     look_ups_.hold(looked_up.last);
+    if (moved_ > 0) moves_.push({looked_up.last, moved_});
 
     if (!cost_.forwards) there = std::max(there, hazard_until(warp.tile, warp.position[from]));
     there = std::max(there, out_.last());
@@ -137,7 +139,7 @@ class TimedCrop : public TimedUnit {
       for (; fill_place_ != place; fill_place_ = fill_place_ + 1 == filled_at_.size() ? 0 : fill_place_ + 1) {
         filled_at_[fill_place_] = there;
       }
-      moves_.push({at, sectors});
+      moved_ += sectors;
     });
     return there;
   }
@@ -145,7 +147,7 @@ class TimedCrop : public TimedUnit {
   void write_back(const CropBehaviour::LineAccess& access, Cycle at) {
     for_each_run(access.written_back, [&](unsigned sector, unsigned sectors) {
       memory_.write(access.old_address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
-      moves_.push({at, sectors});
+      moved_ += sectors;
     });
   }
 
@@ -204,6 +206,7 @@ class TimedCrop : public TimedUnit {
   std::vector<Cycle> filled_at_;  ///< the fills in flight, a ring
   std::size_t fill_place_ = 0;
   Flow blending_;             ///< in parts of a cycle that both a quad and a sector are whole numbers of
+  unsigned moved_ = 0;        ///< sectors, for the quads in hand
   Ring<Move> moves_;          ///< of sectors, that blending has not given its time to yet
   std::vector<Cycle> lines_;  ///< of the cache: the last blend of a quad that needed it
   const unsigned longest_run_;
