@@ -31,6 +31,16 @@ include(vrpipe_plugin)
 vrpipe_plugin_tag(VRPIPE_PLUGIN_TAG ${PROJECT_VERSION})
 
 # For the project's own code only.
+# Results are the same on every processor; the wider instructions only take less time.
+include(CheckCXXSourceRuns)
+set(CMAKE_REQUIRED_FLAGS -march=x86-64-v3)
+check_cxx_source_runs("int main() { return __builtin_cpu_supports(\"avx2\") && __builtin_cpu_supports(\"bmi2\") ? 0 : 1; }"
+  VRPIPE_RUNS_X86_64_V3)
+unset(CMAKE_REQUIRED_FLAGS)
+option(VRPIPE_X86_64_V3 "instructions of x86-64-v3 (2013 on)" ${VRPIPE_RUNS_X86_64_V3})
+if(VRPIPE_X86_64_V3)
+  add_compile_options(-march=x86-64-v3)
+endif()
 add_compile_options(-Wall -Wextra -Wshadow -Wconversion)
 if(VRPIPE_WARNINGS_AS_ERRORS)
   add_compile_options(-Werror)

@@ -58,14 +58,15 @@ void ClockDomain::tick_all() {
   for (Slot& slot : slots_) {
     slot.active = slot.due <= now_;
     if (slot.active) slot.due = never;
+    next_ = std::min(next_, slot.due);
   }
   for (const unsigned index : order_) {
     Slot& slot = slots_[index];
     if (!slot.active) continue;
     const Cycle next = slot.unit->tick(now_);
     if (next < slot.due) slot.due = next;
+    next_ = std::min(next_, next);
   }
-  for (const Slot& slot : slots_) next_ = std::min(next_, slot.due);
   if (next_ <= now_) throw SimulationFault(name(), now_, "a unit asked for an edge in the past");
 }
 

@@ -5,22 +5,35 @@
 namespace vrpipe {
 
 MemoryPort::MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight)
-    : socket(name.c_str()), clock_(owner.clock), slots_(in_flight) {
+    : socket(name.c_str()), clock_(owner.clock) {
   std::size_t ring = 1;
   while (ring < in_flight) ring *= 2;
   completions_.resize(ring);
   socket.bind(*this);
-  free_.reserve(in_flight);
-  for (unsigned slot = in_flight; slot-- > 0;) free_.push_back(slot);
-  for (Slot& slot : slots_) {
-    slot.ticket = static_cast<unsigned>(&slot - slots_.data());
-    slot.set_mm(this);
-    slot.set_byte_enable_ptr(nullptr);
-    slot.set_dmi_allowed(false);
-  }
+  free_tickets_.reserve(in_flight);
+  for (unsigned ticket = in_flight; ticket-- > 0;) free_tickets_.push_back(ticket);
 }
 
 MemoryPort::~MemoryPort() = default;
+
+MemoryPort::Access& MemoryPort::take_access(unsigned bytes) {
+  if (free_accesses_.empty()) {
+    Access& made = accesses_.emplace_back();
+    made.set_mm(this);
+    made.set_byte_enable_ptr(nullptr);
+    made.set_dmi_allowed(false);
+    free_accesses_.push_back(&made);
+  }
+  Access& access = *free_accesses_.back();
+  free_accesses_.pop_back();
+  if (access.data.size() < bytes) access.data.resize(bytes);
+  access.set_data_ptr(access.data.data());
+  access.set_data_length(bytes);
+  access.set_streaming_width(bytes);
+  access.answered = false;
+  access.acquire();
+  return access;
+}
 
 unsigned MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes) {
   if (bytes == 0 || (bytes & (bytes - 1)) != 0 || (address & (bytes - 1)) != 0) {
@@ -28,79 +41,63 @@ unsigned MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsi
                           "an access of " + std::to_string(bytes) + " bytes at " + std::to_string(address) +
                               " is not naturally aligned");
   }
-  const unsigned ticket = free_.back();
-  free_.pop_back();
-  Slot& slot = slots_[ticket];
-  if (slot.data.size() < bytes) slot.data.resize(bytes);
-  slot.answered = false;
-  slot.acquire();
-  slot.set_command(command);
-  slot.set_address(address);
-  slot.set_data_ptr(slot.data.data());
-  slot.set_data_length(bytes);
-  slot.set_streaming_width(bytes);
-  slot.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
+  const unsigned ticket = free_tickets_.back();
+  free_tickets_.pop_back();
+  Access& access = take_access(bytes);
+  access.ticket = ticket;
+  access.set_command(command);
+  access.set_address(address);
+  access.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
   (command == tlm::TLM_READ_COMMAND ? reads_ : writes_) += 1;
 
   tlm::tlm_phase phase = tlm::BEGIN_REQ;
   sc_core::sc_time delay = sc_core::SC_ZERO_TIME;
-  requesting_ = &slot;  // until the memory says otherwise, perhaps from within the call
-  const tlm::tlm_sync_enum status = socket->nb_transport_fw(slot, phase, delay);
+  requesting_ = &access;  // until the memory says otherwise, perhaps from within the call
+  const tlm::tlm_sync_enum status = socket->nb_transport_fw(access, phase, delay);
   if (status == tlm::TLM_ACCEPTED) return ticket;
   requesting_ = nullptr;
   if (status == tlm::TLM_UPDATED && phase != tlm::BEGIN_RESP) return ticket;
-  complete(slot, delay);
+  complete(access, delay);
   if (status == tlm::TLM_UPDATED) {
     phase = tlm::END_RESP;
-    socket->nb_transport_fw(slot, phase, delay);
+    socket->nb_transport_fw(access, phase, delay);
   }
+  access.release();
   return ticket;
 }
 
-void MemoryPort::complete(Slot& slot, const sc_core::sc_time& delay) {
-  if (slot.is_response_error()) {
-    throw SimulationFault(socket.name(), clock_.domain->now(), "the memory answered " + slot.get_response_string());
+void MemoryPort::complete(Access& access, const sc_core::sc_time& delay) {
+  if (access.is_response_error()) {
+    throw SimulationFault(socket.name(), clock_.domain->now(), "the memory answered " + access.get_response_string());
   }
-  slot.answered = true;
+  access.answered = true;
   const Cycle at = clock_.domain->edge_after(delay);
-  // Nearly always the last: memories answer in order. The ring holds an entry for every slot.
+  // Nearly always the last: memories answer in order. The ring holds an entry for every ticket.
   std::size_t place = completions_head_ + completions_count_++;
   while (place != completions_head_ && completion(place - 1).at > at) {
     completion(place) = completion(place - 1);
     --place;
   }
-  completion(place) = {at, slot.ticket};
+  completion(place) = {at, access.ticket};
   clock_.domain->wake(clock_.unit, at);
 }
 
 tlm::tlm_sync_enum MemoryPort::nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                                sc_core::sc_time& delay) {
-  auto& slot = static_cast<Slot&>(payload);
-  if (requesting_ == &slot) requesting_ = nullptr;  // BEGIN_RESP implies END_REQ
+  auto& access = static_cast<Access&>(payload);
+  if (requesting_ == &access) requesting_ = nullptr;  // BEGIN_RESP implies END_REQ
   if (phase == tlm::END_REQ) {
     clock_.domain->wake(clock_.unit, clock_.domain->now() + 1);
     return tlm::TLM_ACCEPTED;
   }
-  if (slot.answered) throw SimulationFault(socket.name(), clock_.domain->now(), "a second response to a request");
-  complete(slot, delay);
+  if (access.answered) throw SimulationFault(socket.name(), clock_.domain->now(), "a second response to a request");
+  complete(access, delay);
   phase = tlm::END_RESP;
+  access.release();
   return tlm::TLM_COMPLETED;
 }
 
-void MemoryPort::free(tlm::tlm_generic_payload* payload) {
-  const bool none_free = free_.empty();
-  free_.push_back(static_cast<Slot*>(payload)->ticket);
-  if (none_free) clock_.domain->wake(clock_.unit, clock_.domain->now() + 1);
-}
-
-bool MemoryPort::next_completed(unsigned& ticket) {
-  if (next_completion() > clock_.domain->now()) return false;
-  ticket = completion(completions_head_).ticket;
-  ++completions_head_;
-  --completions_count_;
-  slots_[ticket].release();
-  return true;
-}
+void MemoryPort::free(tlm::tlm_generic_payload* payload) { free_accesses_.push_back(static_cast<Access*>(payload)); }
 
 class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
  public:

@@ -38,12 +38,15 @@ class ClockDomain : public sc_core::sc_module {
   /// a module with time of its own: the edge is then one that is yet to come.
   void wake(unsigned handle, Cycle at) {
     if (!in_edge_ && running_) return wake_from_outside(handle, at);
-    if (at < slots_[handle].due) slots_[handle].due = at;
+    if (at >= slots_[handle].due) return;
+    slots_[handle].due = at;
+    next_ = std::min(next_, at);
   }
 
   /// The first edge that is later than the present time, and not before `delay` has passed.
   Cycle edge_after(const sc_core::sc_time& delay) const {
     const std::uint64_t period = period_.value();
+    if (in_edge_) return now_ + std::max<Cycle>(1, (delay.value() + period - 1) / period);
     const std::uint64_t present = sc_core::sc_time_stamp().value();
     return std::max<Cycle>(present / period + 1, (present + delay.value() + period - 1) / period);
   }

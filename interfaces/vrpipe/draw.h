@@ -37,8 +37,8 @@ struct Draw {
 
 /// Gaussians that preprocessing dropped, by reason. A dropped Gaussian never reaches the pipeline.
 struct RejectedGaussians {
-  std::uint64_t not_finite = 0;       ///< a NaN or infinite position, scale, rotation, opacity or colour
-  std::uint64_t zero_quaternion = 0;  ///< |q|^2 < 1e-12: no orientation
+  std::uint64_t not_finite = 0;       ///< a value that preprocess() cannot use; see there
+  std::uint64_t zero_quaternion = 0;  ///< all zero: no orientation
   std::uint64_t total() const { return not_finite + zero_quaternion; }
 };
 

@@ -28,6 +28,19 @@ inline Lanes round_to_half(Lanes value) {
   return lanes_of(rounded | sign);
 }
 
+/// All ones where a value is zero or rounds to a normal half and not to infinity: then `round_to_normal_half` suffices.
+inline LaneBits rounds_to_normal_half(Lanes value) {
+  // From 2^-14 to 65504, without the sign; as one signed comparison, the range being moved to the smallest integers.
+  using Unsigned = std::uint32_t __attribute__((vector_size(16)));
+  const LaneBits magnitude = bits_of(value) & 0x7fffffff;
+  const auto moved = reinterpret_cast<LaneBits>(reinterpret_cast<Unsigned>(magnitude) + (0x80000000U - 0x38800000U));
+  return (moved <= INT32_MIN + (0x477fe000 - 0x38800000)) | (magnitude == 0);
+}
+inline Lanes round_to_normal_half(Lanes value) {
+  const LaneBits bits = bits_of(value);
+  return lanes_of((bits + 0xfff + ((bits >> 13) & 1)) & ~0x1fff);
+}
+
 /// Rounds towards zero; beyond 65504 gives 65504 (D3D11.3 functional specification, float to lower-precision float).
 inline Lanes truncate_to_half(Lanes value) {
   const LaneBits bits = bits_of(value);

@@ -74,7 +74,7 @@ class Port {
 
  protected:
   Port(std::string name, const ClockHandle& clock) : clock_(clock), name_(std::move(name)) {}
-  bool stalled() const { return stalled_at(clock_.domain->now()); }
+  bool stalled() const { return stall_per_256_ != 0 && stall_at(stall_seed_, clock_.domain->now(), stall_per_256_); }
   bool stalled_at(Cycle cycle) const { return stall_per_256_ != 0 && stall_at(stall_seed_, cycle, stall_per_256_); }
   void mark_connected() { connected_ = true; }
 

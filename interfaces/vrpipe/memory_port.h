@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <vector>
 
@@ -24,12 +25,18 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   tlm::tlm_initiator_socket<32> socket;
 
   /// Whether another access can be issued now.
-  bool available() const { return !free_.empty() && requesting_ == nullptr; }
+  bool available() const { return !free_tickets_.empty() && requesting_ == nullptr; }
   /// Issues an access. Returns a ticket, which comes back from `next_completed`.
   unsigned read(std::uint64_t address, unsigned bytes) { return issue(tlm::TLM_READ_COMMAND, address, bytes); }
   unsigned write(std::uint64_t address, unsigned bytes) { return issue(tlm::TLM_WRITE_COMMAND, address, bytes); }
   /// Takes the next access that has completed, in a cycle after the one in which it was answered; false for none.
-  bool next_completed(unsigned& ticket);
+  bool next_completed(unsigned& ticket) {
+    if (next_completion() > clock_.domain->now()) return false;
+    ticket = completion(completions_head_++).ticket;
+    --completions_count_;
+    free_tickets_.push_back(ticket);
+    return true;
+  }
   /// When the next known completion is due; `never` for none.
   Cycle next_completion() const {
     return completions_count_ == 0 ? never : completions_[completions_head_ & (completions_.size() - 1)].at;
@@ -39,7 +46,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   std::uint64_t writes() const { return writes_; }
 
  private:
-  struct Slot : tlm::tlm_generic_payload {
+  struct Access : tlm::tlm_generic_payload {
     unsigned ticket = 0;
     std::vector<unsigned char> data;
     bool answered = false;
@@ -48,8 +55,9 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
     Cycle at;
     unsigned ticket;
   };
+  Access& take_access(unsigned bytes);
   unsigned issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes);
-  void complete(Slot& slot, const sc_core::sc_time& delay);
+  void complete(Access& access, const sc_core::sc_time& delay);
   Completion& completion(std::size_t place) { return completions_[place & (completions_.size() - 1)]; }
   tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override;
@@ -58,12 +66,13 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   void free(tlm::tlm_generic_payload* payload) override;
 
   const ClockHandle& clock_;
-  std::vector<Slot> slots_;
-  std::vector<unsigned> free_;
+  std::deque<Access> accesses_;  ///< as many as were ever in use at a time; free once answered and no longer held
+  std::vector<Access*> free_accesses_;
+  std::vector<unsigned> free_tickets_;
   std::vector<Completion> completions_;  ///< a ring of a power of two, by cycle
   std::size_t completions_head_ = 0;
   std::size_t completions_count_ = 0;
-  const Slot* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
+  const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
   std::uint64_t reads_ = 0;
   std::uint64_t writes_ = 0;
 };

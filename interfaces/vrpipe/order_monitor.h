@@ -18,19 +18,21 @@ class BlendOrderMonitor {
 
   /// Throws SimulationFault when a primitive comes after a later one.
   void blended(const ShadedWarp& warp, unsigned index, std::uint64_t cycle) {
-    std::uint32_t& next =
-        next_[(std::size_t{warp.tile.y} * tiles_x_ + warp.tile.x) * positions_per_tile + warp.position[index]];
+    std::uint32_t& next = next_[place_of(warp.tile, warp.position[index])];
     if (warp.first_primitive[index] < next || warp.last_primitive[index] < warp.first_primitive[index]) {
-      throw SimulationFault("crop", cycle,
-                            "primitive " + std::to_string(warp.first_primitive[index]) +
-                                " is blended after primitive " + std::to_string(next - 1) + " in tile " +
-                                std::to_string(warp.tile.x) + "," + std::to_string(warp.tile.y) + " position " +
-                                std::to_string(warp.position[index]));
+      fault(warp, index, next, cycle);
     }
     next = warp.last_primitive[index] + 1;
   }
+  /// A quad of this position will be blended before long.
+  void prefetch(TileId tile, unsigned position) const { __builtin_prefetch(&next_[place_of(tile, position)], 1); }
 
  private:
+  std::size_t place_of(TileId tile, unsigned position) const {
+    return (std::size_t{tile.y} * tiles_x_ + tile.x) * positions_per_tile + position;
+  }
+  [[noreturn]] static void fault(const ShadedWarp& warp, unsigned index, std::uint32_t next, std::uint64_t cycle);
+
   std::uint32_t tiles_x_;
   std::vector<std::uint32_t> next_;
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -37,10 +38,20 @@ class ColorSurface {
   std::array<float, 4> pixel(std::uint32_t x, std::uint32_t y) const;
 
  private:
+  static constexpr std::array<std::uint8_t, positions_per_tile> morton_order() {
+    std::array<std::uint8_t, positions_per_tile> order{};
+    for (unsigned position = 0; position < positions_per_tile; ++position) {
+      const unsigned x = position % quads_per_tile_row;
+      const unsigned y = position / quads_per_tile_row;
+      unsigned code = 0;
+      for (unsigned bit = 0; bit < 3; ++bit) code |= (((x >> bit) & 1U) | (((y >> bit) & 1U) << 1U)) << (2 * bit);
+      order[position] = static_cast<std::uint8_t>(code);
+    }
+    return order;
+  }
   static unsigned morton(unsigned position) {
-    const unsigned x = position & 7U;
-    const unsigned y = position >> 3U;
-    return (x & 1U) | ((y & 1U) << 1U) | ((x & 2U) << 1U) | ((y & 2U) << 2U) | ((x & 4U) << 2U) | ((y & 4U) << 3U);
+    static constexpr std::array<std::uint8_t, positions_per_tile> order = morton_order();
+    return order[position];
   }
 
   std::uint32_t width_;

@@ -34,7 +34,7 @@ class CropCache {
   void unpin(Line line) {
     if (--lines_[line].pins == 0) make_newest(line);
   }
-  bool has_sector(Line line, unsigned sector) const { return ((lines_[line].present >> sector) & 1U) != 0; }
+  std::uint32_t present(Line line) const { return lines_[line].present; }  ///< sectors, a bit each
   void add_sector(Line line, unsigned sector) { lines_[line].present |= 1U << sector; }
   void dirty(Line line, std::uint32_t sectors) { lines_[line].dirty |= sectors; }
 

@@ -50,12 +50,12 @@ class CropUnit : public Unit {
   };
 
   void end_of_elaboration() override {
-    const ColorSurface* const surface = behaviour_->surface();
-    if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
+    surface_ = behaviour_->surface();
+    if (surface_ == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     sector_shift_ = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
-    bytes_per_quad_ = 4 * bytes_per_pixel(surface->format());
-    cache_ = make_crop_cache(cost_, *surface);
-    monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
+    bytes_per_quad_ = 4 * bytes_per_pixel(surface_->format());
+    cache_ = make_crop_cache(cost_, *surface_);
+    monitor_ = std::make_unique<BlendOrderMonitor>(surface_->width(), surface_->height());
     pending_.assign(cost_.cache_bytes / cost_.line_bytes, 0);
   }
 
@@ -107,17 +107,17 @@ class CropUnit : public Unit {
   /// Takes a quad from the link into the queue; false when it has to wait.
   bool look_up(const ColorQuad& quad) {
     if (!write_back()) return false;
-    const std::uint64_t address = behaviour_->surface()->address(quad.tile, quad.position);
+    const std::uint64_t address = surface_->address(quad.tile, quad.position);
     const CropCache::Line line = line_of(address);
     if (line == CropCache::no_line) return false;
     const std::uint64_t offset = address & (cost_.line_bytes - 1);
     const auto first = static_cast<unsigned>(offset >> sector_shift_);
     const auto last = static_cast<unsigned>((offset + bytes_per_quad_ - 1) >> sector_shift_);
-    Entry entry{quad, address, line, 0};
-    for (unsigned sector = first; sector <= last; ++sector) {
-      entry.sectors |= 1U << sector;
-      if (cache_->has_sector(line, sector) || ((pending_[line] >> sector) & 1U) != 0) continue;
+    const std::uint32_t sectors = run_of(last - first + 1) << first;
+    for (std::uint32_t missing = sectors & ~(cache_->present(line) | pending_[line]); missing != 0;
+         missing &= missing - 1) {
       if (!memory_.available() || fills_in_flight_ == cost_.mshrs) return false;
+      const auto sector = static_cast<unsigned>(__builtin_ctz(missing));
       const unsigned ticket =
           memory_.read(address - offset + (std::uint64_t{sector} << sector_shift_), cost_.sector_bytes);
       fills_[ticket] = {line, sector};
@@ -126,8 +126,13 @@ class CropUnit : public Unit {
       tokens_ -= static_cast<std::int32_t>(cost_.quads_per_cycle);
     }
     cache_->pin(line);
-    queue_[(head_ + queued_) % queue_.size()] = entry;
+    std::size_t place = head_ + queued_;
+    if (place >= queue_.size()) place -= queue_.size();
+    queue_[place] = {quad, address, line, sectors};
     ++queued_;
+    // It is read only once it is at the head.
+    __builtin_prefetch(&surface_->quad(quad.tile, quad.position), 1);
+    monitor_->prefetch(quad.tile, quad.position);
     return true;
   }
 
@@ -237,6 +242,7 @@ class CropUnit : public Unit {
   const CropBehaviour::Cost cost_;
   const bool signals_;
   MemoryPort memory_;
+  const ColorSurface* surface_ = nullptr;
   std::unique_ptr<CropCache> cache_;
   std::unique_ptr<BlendOrderMonitor> monitor_;
   unsigned bytes_per_quad_ = 0;

@@ -16,21 +16,24 @@ class WarpOrder {
  public:
   struct Waiting {
     const ShadedWarp* warp;
-    Cycle from;  ///< the first cycle in which it can leave, for shells that know it ahead
+    std::uint32_t sequence;  ///< of the warp
+    Cycle from;              ///< the first cycle in which it can leave, for shells that know it ahead
   };
 
   WarpOrder(PropBehaviour::Order order, const RenderState& state)
       : by_draw_(order == PropBehaviour::Order::draw),
         tiles_x_((state.draw->width + screen_tile_pixels - 1) / screen_tile_pixels) {
     const std::uint32_t tiles_y = (state.draw->height + screen_tile_pixels - 1) / screen_tile_pixels;
-    if (!by_draw_) next_of_tile_.assign(std::size_t{tiles_x_} * tiles_y, 0);
+    next_of_line_.assign(by_draw_ ? 1 : std::size_t{tiles_x_} * tiles_y, 0);
   }
 
   void arrive(const ShadedWarp& warp, Cycle from = 0) {
-    if (is_next(warp)) {
-      in_turn_.push({&warp, from});
+    const Waiting waiting{&warp, warp.sequence, from};
+    const Turn turn = turn_of(warp);
+    if (turn.number == next_of(turn.line)) {
+      in_turn_.push(waiting);
     } else {
-      bucket_of(warp).push_back({&warp, from});
+      bucket_of(turn.line, turn.number).push_back({turn, waiting});
       ++early_;
     }
   }
@@ -43,16 +46,19 @@ class WarpOrder {
   }
   /// A warp that was taken has left: the one that follows it may be among those that came early.
   void leave(const ShadedWarp& warp, Cycle at = 0) {
-    if (!by_draw_) ++next_of_tile(warp.tile);
+    const std::uint32_t line = turn_of(warp).line;
+    const std::uint32_t number = ++next_of(line);
     ++left_;
     if (early_ == 0) return;
-    std::vector<Waiting>& bucket = by_draw_ ? early_by_bucket_[left_ % early_by_bucket_.size()] : bucket_of(warp);
-    const auto next = std::find_if(bucket.begin(), bucket.end(), [this](const Waiting& w) { return is_next(*w.warp); });
-    if (next == bucket.end()) return;
-    in_turn_.push({next->warp, std::max(next->from, at)});
-    *next = bucket.back();
-    bucket.pop_back();
-    --early_;
+    std::vector<Early>& bucket = bucket_of(line, number);
+    for (Early& early : bucket) {
+      if (early.turn.line != line || early.turn.number != number) continue;
+      in_turn_.push({early.waiting.warp, early.waiting.sequence, std::max(early.waiting.from, at)});
+      early = bucket.back();
+      bucket.pop_back();
+      --early_;
+      return;
+    }
   }
 
   bool empty() const { return in_turn_.empty() && early_ == 0; }
@@ -61,29 +67,38 @@ class WarpOrder {
   std::uint32_t left() const { return left_; }
   void restart() {
     left_ = 0;
-    std::fill(next_of_tile_.begin(), next_of_tile_.end(), 0);
+    std::fill(next_of_line_.begin(), next_of_line_.end(), 0);
   }
 
  private:
+  /// A warp leaves when the warps of smaller number in its line have left: a line for the draw, or for each screen tile.
+  struct Turn {
+    std::uint32_t line;
+    std::uint32_t number;
+  };
+  struct Early {
+    Turn turn;
+    Waiting waiting;
+  };
   struct LaterFirst {
-    bool operator()(const Waiting& a, const Waiting& b) const { return a.warp->sequence > b.warp->sequence; }
+    bool operator()(const Waiting& a, const Waiting& b) const { return a.sequence > b.sequence; }
   };
 
-  std::uint32_t& next_of_tile(TileId tile) { return next_of_tile_[std::size_t{tile.y} * tiles_x_ + tile.x]; }
-  bool is_next(const ShadedWarp& warp) {
-    return by_draw_ ? warp.sequence == left_ : warp.tile_sequence == next_of_tile(warp.tile);
+  Turn turn_of(const ShadedWarp& warp) const {
+    if (by_draw_) return {0, warp.sequence};
+    return {warp.tile.y * tiles_x_ + warp.tile.x, warp.tile_sequence};
   }
-  /// Early warps are kept apart by tile, or by launch order, so that finding the next one is quick.
-  std::vector<Waiting>& bucket_of(const ShadedWarp& warp) {
-    const std::size_t key = by_draw_ ? warp.sequence : warp.tile.y * 31U + warp.tile.x;
-    return early_by_bucket_[key % early_by_bucket_.size()];
+  std::uint32_t& next_of(std::uint32_t line) { return next_of_line_[line]; }
+  /// Early warps are kept apart, so that finding the next one is quick.
+  std::vector<Early>& bucket_of(std::uint32_t line, std::uint32_t number) {
+    return early_by_bucket_[(line + 31 * number) % early_by_bucket_.size()];
   }
 
   const bool by_draw_;
   const std::uint32_t tiles_x_;
-  std::vector<std::uint32_t> next_of_tile_;
+  std::vector<std::uint32_t> next_of_line_;
   std::uint32_t left_ = 0;
-  std::array<std::vector<Waiting>, 256> early_by_bucket_;
+  std::array<std::vector<Early>, 256> early_by_bucket_;
   std::size_t early_ = 0;
   std::priority_queue<Waiting, std::vector<Waiting>, LaterFirst> in_turn_;
 };

@@ -6,30 +6,16 @@
 
 namespace vrpipe {
 
-namespace {
-std::uint32_t tiles(std::uint32_t pixels) { return (pixels + screen_tile_pixels - 1) / screen_tile_pixels; }
-}  // namespace
-
-WarpNumbering::WarpNumbering(const RenderState& state)
-    : tiles_x_(tiles(state.draw->width)), next_of_tile_(std::size_t{tiles_x_} * tiles(state.draw->height)) {}
-
-void WarpNumbering::number(Warp& warp) {
-  warp.sequence = next_++;
-  warp.tile_sequence = next_of_tile_[std::size_t{warp.tile.y} * tiles_x_ + warp.tile.x]++;
-}
-
-PairingQru::PairingQru(const Parameters& parameters, const RenderState& state)
+PairingQru::PairingQru(const Parameters& parameters, const RenderState&)
     : bin_quads_(parameters.bin_quads),
       quads_per_cycle_(parameters.quads_per_cycle),
-      latency_cycles_(parameters.latency_cycles),
-      numbering_(state) {
+      latency_cycles_(parameters.latency_cycles) {
   buffer_.reserve(bin_quads_);
   merged_.reserve(bin_quads_);
   registers_.fill(no_quad);
 }
 
 void PairingQru::launch(Warp& out) {
-  numbering_.number(warp_);
   out = warp_;
   warp_.count = 0;
   warp_.merge_pairs = 0;
@@ -98,10 +84,7 @@ std::uint64_t PairingQru::storage_bytes() const {
   return (std::uint64_t{bin_quads_} * (pointer_bits + position_bits + 1) + positions_per_tile * register_bits) / 8;
 }
 
-QruPassThrough::QruPassThrough(const Parameters&, const RenderState& state) : numbering_(state) {}
-
 void QruPassThrough::launch(Warp& out) {
-  numbering_.number(warp_);
   out = warp_;
   warp_.count = 0;
   ++warps;

@@ -5,18 +5,6 @@
 
 namespace vrpipe {
 
-/// Numbers warps in launch order of the draw and of their screen tile.
-class WarpNumbering {
- public:
-  explicit WarpNumbering(const RenderState& state);
-  void number(Warp& warp);
-
- private:
-  std::uint32_t tiles_x_;
-  std::uint32_t next_ = 0;
-  std::vector<std::uint32_t> next_of_tile_;
-};
-
 /// Quad reorder unit (paper 5.3): 64 position registers pair overlapping quads of a bin, a 128-bit bitmap tells which
 /// are left for the end. A register that holds a quad means a pair, and is then empty again.
 class PairingQru : public QruBehaviour {
@@ -47,7 +35,7 @@ class PairingQru : public QruBehaviour {
                            source::open,
                            "from the quad that completes a warp to its launch"};
   };
-  PairingQru(const Parameters& parameters, const RenderState& state);
+  PairingQru(const Parameters& parameters, const RenderState&);
 
   unsigned examine(const QuadBeat& beat, unsigned from, Warp& out, bool& launched) override;
   bool finish_bin(Warp& out) override;
@@ -67,7 +55,6 @@ class PairingQru : public QruBehaviour {
   const std::uint32_t bin_quads_;
   const std::uint32_t quads_per_cycle_;
   const std::uint32_t latency_cycles_;
-  WarpNumbering numbering_;
   std::vector<Quad> buffer_;  ///< by quad id
   std::vector<bool> merged_;  ///< the bitmap
   std::array<std::int16_t, positions_per_tile> registers_;
@@ -79,7 +66,7 @@ class PairingQru : public QruBehaviour {
 class QruPassThrough : public QruBehaviour {
  public:
   struct Parameters : ParameterSet {};
-  QruPassThrough(const Parameters&, const RenderState& state);
+  QruPassThrough(const Parameters&, const RenderState&) {}
 
   unsigned examine(const QuadBeat& beat, unsigned from, Warp& out, bool& launched) override;
   bool finish_bin(Warp& out) override;
@@ -92,7 +79,6 @@ class QruPassThrough : public QruBehaviour {
  private:
   void launch(Warp& out);
 
-  WarpNumbering numbering_;
   Warp warp_;
 };
 

@@ -1,5 +1,7 @@
 #include <algorithm>
 
+#include "qru/warp_numbering.h"
+
 #include <vrpipe/timed.h>
 
 namespace vrpipe {
@@ -10,12 +12,13 @@ namespace {
 class TimedQru : public TimedUnit {
  public:
   TimedQru(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour,
-           Transport transport)
+           const RenderState& state, Transport transport)
       : TimedUnit(name, domain, transport),
         out_(*this, "out_warps"),
         in_(*this, "in_quads", [this](const BinItem& item, Span visible) { return examine(item, visible); }, {&out_}),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
+        numbering_(state),
         budget_(cost_.items_per_cycle) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
@@ -47,8 +50,7 @@ class TimedQru : public TimedUnit {
     left_ = cycle_;
     if (item.end_of_draw) {
       warp_.end_of_draw = true;
-      warp_.sequence = warps_;
-      warps_ = 0;
+      numbering_.number_end(warp_);
       launch(warp_);
       warp_.end_of_draw = false;
       return {begin, left_};
@@ -72,14 +74,14 @@ class TimedQru : public TimedUnit {
         budget_ -= std::min(taken, budget_);
         left_ = cycle_;
         if (!launched) continue;
-        ++warps_;
+        numbering_.number(warp_);
         launch(warp_);
       }
     }
     charge(UnitState::busy, left_ + 1);
     go_to(visible.last);
     while (behaviour_->finish_bin(warp_)) {
-      ++warps_;
+      numbering_.number(warp_);
       launch(warp_);
     }
     item.storage->in_use = false;
@@ -90,19 +92,19 @@ class TimedQru : public TimedUnit {
   TimedIn<BinItem> in_;
   std::unique_ptr<QruBehaviour> behaviour_;
   const Throughput cost_;
+  WarpNumbering numbering_;
   Warp warp_;
   Cycle cycle_ = 0;
   Cycle left_ = 0;   ///< when the last quads were examined or the last warp was taken
   unsigned budget_;  ///< quads that can still be examined in the cycle
-  std::uint32_t warps_ = 0;
   std::uint64_t examined_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("qru", [](const std::string& name, ClockDomain& domain,
-                                      std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
+                                      std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned,
                                       Transport transport) {
-    return std::make_unique<TimedQru>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)),
+    return std::make_unique<TimedQru>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)), state,
                                       transport);
   });
   return true;

@@ -1,3 +1,5 @@
+#include "qru/warp_numbering.h"
+
 #include <vrpipe/unit.h>
 
 namespace vrpipe {
@@ -8,12 +10,14 @@ namespace {
 /// warps of a bin go before the next bin. Ports: in_quads (QuadBeat), out_warps (Warp).
 class QruUnit : public Unit {
  public:
-  QruUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour)
+  QruUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour,
+          const RenderState& state)
       : Unit(name, domain),
         in_(*this, "in_quads"),
         out_(*this, "out_warps"),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()) {
+        cost_(behaviour_->cost()),
+        numbering_(state) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
 
@@ -37,8 +41,7 @@ class QruUnit : public Unit {
       bool launched = false;
       if (beat.end_of_draw) {
         warp.end_of_draw = true;
-        warp.sequence = warps_;
-        warps_ = 0;
+        numbering_.number_end(warp);
         out_.push(warp);
         in_.pop();
         moved = true;
@@ -60,8 +63,8 @@ class QruUnit : public Unit {
         done_ = true;
       }
       if (launched) {
+        numbering_.number(warp);
         out_.push(warp);
-        ++warps_;
       }
       if (done_ || (from_ == beat.count && !beat.last_of_bin)) {
         in_.pop();
@@ -85,14 +88,14 @@ class QruUnit : public Unit {
   const Throughput cost_;
   unsigned from_ = 0;
   bool done_ = false;
-  std::uint32_t warps_ = 0;
+  WarpNumbering numbering_;
   std::uint64_t examined_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("qru", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                const RenderState&, unsigned) {
-    return std::make_unique<QruUnit>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)));
+                                const RenderState& state, unsigned) {
+    return std::make_unique<QruUnit>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)), state);
   });
   return true;
 }();

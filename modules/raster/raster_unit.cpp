@@ -94,8 +94,6 @@ class RasterUnit : public Unit {
         behaviour_->begin(in_.front().primitive, in_.front().clip);
         in_.pop();
         next_setup_ = now + cost_.setup_interval_cycles;
-        active_ = true;
-        moved = true;
       }
       unsigned tests = 0;
       bool new_screen_tile = false;

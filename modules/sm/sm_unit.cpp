@@ -140,8 +140,9 @@ class SmUnit : public Unit {
   }
 
   ShadedWarp* take_from_pool() {
-    // Round robin: the entry after the last one is the likeliest to be free.
-    for (std::size_t tried = 0; tried < pool_.size(); ++tried) {
+    // Round robin: the entry after the last one is the likeliest to be free. A few that are held for long are not worth
+    // a search.
+    for (std::size_t tried = 0; tried < std::min<std::size_t>(pool_.size(), 8); ++tried) {
       pool_at_ = pool_at_ + 1 == pool_.size() ? 0 : pool_at_ + 1;
       if (pool_[pool_at_].holders == 0) return &pool_[pool_at_];
     }
@@ -272,18 +273,19 @@ class SmUnit : public Unit {
     launch_vertices(now);
     send();
 
+    const Cycle next_event = wheel_.next_after(now);
     // Full of shaded warps that nobody takes is back-pressure, even if a scheduler issues; full of running ones is work.
     const bool held_up = slots_full_ && 2 * (in_flight_ - running_) > in_flight_;
     if (!held_up && busy_until_ > now) {
       enter(UnitState::busy, now);
     } else if (held_up || slots_full_ || !completed_.empty()) {
       enter(UnitState::blocked, now);
-    } else if (wheel_.next_after(now) != never) {
+    } else if (next_event != never) {
       enter(UnitState::memory, now);
     } else {
       enter(UnitState::starved, now);
     }
-    Cycle next = wheel_.next_after(now);
+    Cycle next = next_event;
     if (busy_until_ > now) next = std::min(next, busy_until_);
     // What could not be taken for want of a slot or a credit waits for the port that brings one.
     if (!slots_full_) next = std::min(next, std::max(in_warps_.next_ready(), now + 1));

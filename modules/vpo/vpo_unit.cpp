@@ -88,7 +88,6 @@ class VpoUnit : public Unit {
         }
         in.pop();
         turn_ = (turn_ + 1) % gpcs_;
-        moved = true;
         break;
       }
       in.pop();

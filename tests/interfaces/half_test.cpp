@@ -117,6 +117,23 @@ TEST(Half, NotANumberStaysOne) {
   EXPECT_TRUE(std::isnan(truncate_to_half(splat_lanes(std::nanf("")))[0]));
 }
 
+TEST(Half, TheShortRoundingIsTheSameWhereItIsSaidToBe) {
+  unsigned short_ones = 0;
+  for (const float value : halves_midpoints_and_neighbours()) {
+    const Lanes lanes = splat_lanes(value);
+    if (sign_mask(rounds_to_normal_half(lanes)) == 0) {
+      EXPECT_TRUE(std::fabs(value) < 0x1p-14F || std::fabs(value) > half_max) << value;
+      continue;
+    }
+    ++short_ones;
+    ASSERT_EQ(bits_of_float(round_to_normal_half(lanes)[0]), bits_of_float(round_to_half(value))) << value;
+  }
+  EXPECT_GT(short_ones, 360000U);
+  for (const float value : {std::nanf(""), HUGE_VALF, 65505.0F, 0x1p-15F}) {
+    EXPECT_EQ(sign_mask(rounds_to_normal_half(splat_lanes(value))), 0) << value;
+  }
+}
+
 TEST(Half, OneTwoHundredFiftyFifthIsBelowItselfInHalf) { EXPECT_LT(round_to_half(1.0F / 255.0F), 1.0F / 255.0F); }
 
 TEST(Half, EachLaneRoundsOnItsOwn) {

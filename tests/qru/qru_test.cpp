@@ -1,4 +1,5 @@
 #include "qru/qru.h"
+#include "qru/warp_numbering.h"
 
 #include <algorithm>
 #include <map>
@@ -184,18 +185,32 @@ TEST_F(QruTest, WarpsOfPairsAreFullBeforeTheLeftOversCome) {
 }
 
 TEST_F(QruTest, WarpsAreNumberedInTheDrawAndInTheirTile) {
-  PairingQru qru(parameters, state);
-  const std::vector<unsigned> nine{0, 1, 2, 3, 4, 5, 6, 7, 8};
-  std::vector<Warp> warps;
-  for (const TileId tile : {TileId{0, 0}, TileId{1, 0}, TileId{0, 0}}) {
-    for (const Warp& warp : run(qru, nine, 0, tile).warps) warps.push_back(warp);
-  }
-  ASSERT_EQ(warps.size(), 6U);
+  const Draw two_tiles = testing::draw_of(32, 16);
+  WarpNumbering numbering(testing::state_of(two_tiles));
   const std::uint32_t in_tile[] = {0, 1, 0, 1, 2, 3};
-  for (std::uint32_t i = 0; i < 6; ++i) {
-    EXPECT_EQ(warps[i].sequence, i);
-    EXPECT_EQ(warps[i].tile_sequence, in_tile[i]);
+  std::uint32_t launched = 0;
+  for (const unsigned x : {0U, 0U, 1U, 1U, 0U, 0U}) {
+    Warp warp;
+    warp.tile = {static_cast<std::uint16_t>(x), 0};
+    numbering.number(warp);
+    EXPECT_EQ(warp.sequence, launched);
+    EXPECT_EQ(warp.tile_sequence, in_tile[launched]);
+    ++launched;
   }
+}
+
+TEST_F(QruTest, TheEndOfADrawCarriesItsWarpsAndTheNextDrawCountsFromZero) {
+  const Draw two_tiles = testing::draw_of(32, 16);
+  WarpNumbering numbering(testing::state_of(two_tiles));
+  Warp warp;
+  numbering.number(warp);
+  numbering.number(warp);
+  Warp end;
+  numbering.number_end(end);
+  EXPECT_EQ(end.sequence, 2U);
+  numbering.number(warp);
+  EXPECT_EQ(warp.sequence, 0U);
+  EXPECT_EQ(warp.tile_sequence, 0U);
 }
 
 // case T06

@@ -5,16 +5,8 @@
 
 #include <vrpipe/registry.h>
 
-namespace {
-std::uint32_t tiles(std::uint32_t pixels) {
-  return (pixels + vrpipe::screen_tile_pixels - 1) / vrpipe::screen_tile_pixels;
-}
-}  // namespace
-
-SameSplatQru::SameSplatQru(const Parameters& parameters, const vrpipe::RenderState& state)
-    : cost_{parameters.quads_per_cycle, parameters.latency_cycles},
-      tiles_x_(tiles(state.draw->width)),
-      next_warp_of_tile_(std::size_t{tiles_x_} * tiles(state.draw->height)) {}
+SameSplatQru::SameSplatQru(const Parameters& parameters, const vrpipe::RenderState&)
+    : cost_{parameters.quads_per_cycle, parameters.latency_cycles} {}
 
 unsigned SameSplatQru::examine(const vrpipe::QuadBeat& beat, unsigned from, vrpipe::Warp& out, bool& launched) {
   launched = false;
@@ -79,8 +71,6 @@ bool SameSplatQru::launch_when_full(vrpipe::Warp& out) {
 }
 
 void SameSplatQru::launch(vrpipe::Warp& out) {
-  warp_.sequence = next_warp_++;
-  warp_.tile_sequence = next_warp_of_tile_[std::size_t{warp_.tile.y} * tiles_x_ + warp_.tile.x]++;
   out = warp_;
   warp_.count = 0;
   warp_.merge_pairs = 0;

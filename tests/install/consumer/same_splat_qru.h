@@ -45,9 +45,6 @@ class SameSplatQru : public vrpipe::QruBehaviour {
   void launch(vrpipe::Warp& out);
 
   const vrpipe::Throughput cost_;
-  const std::uint32_t tiles_x_;
-  std::uint32_t next_warp_ = 0;
-  std::vector<std::uint32_t> next_warp_of_tile_;
   std::array<vrpipe::Quad, vrpipe::positions_per_tile> registers_{};  ///< empty where the coverage is 0
   vrpipe::Quad waiting_{};                                            ///< the single; none when its coverage is 0
   vrpipe::Warp warp_;                                                 ///< being filled
