@@ -38,6 +38,7 @@ class TimedSm : public TimedUnit {
     in_warps_.set_gate([this] { return !slots_.empty(); });
   }
 
+  bool idle() const override { return TimedUnit::idle() && running_.empty(); }
   std::uint64_t work() const override { return instructions_; }
   double peak_rate() const override {
     return static_cast<double>(scheduler_free_at_.size()) / static_cast<double>(cycles_per_instruction_);
@@ -97,6 +98,10 @@ class TimedSm : public TimedUnit {
     }
     charge(UnitState::memory, std::min(launch, last_done_));
     charge(UnitState::starved, launch);
+    if (slots_.empty()) {
+      // At lt all that leads to a release has happened by now.
+      throw SimulationFault("deadlock", launch, std::string(name()) + " has warps to launch, and no slot is released");
+    }
     launch = std::max(launch, slots_.front());
     slots_.pop();
     charge(UnitState::blocked, launch);
