@@ -377,7 +377,7 @@ class TimedIn : public InEnd<Item>, public TimedInput {
       const Span left = handler_(entry.item, entry.visible);
       queue_.pop();
       queued_beats_ -= beats;
-      grant(beats, {left.first + 1, left.last + 1});
+      grant(beats, beats == 1 ? Span(left.last + 1) : Span(left.first + 1, left.last + 1));
       served = true;
     }
     return served;

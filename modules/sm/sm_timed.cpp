@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <deque>
 
 #include <vrpipe/timed.h>
 
@@ -65,13 +64,15 @@ class TimedSm : public TimedUnit {
   }
 
   ShadedWarp& take_from_pool() {
-    for (std::size_t tried = 0; tried < pool_.size(); ++tried) {
+    // The one that was taken the longest ago is the likeliest to be free. Rather one more than a search through all.
+    for (std::size_t tried = 0; tried < std::min<std::size_t>(pool_.size(), 4); ++tried) {
+      ShadedWarp& oldest = *pool_[pool_at_];
       pool_at_ = pool_at_ + 1 == pool_.size() ? 0 : pool_at_ + 1;
-      if (pool_[pool_at_].holders == 0) return pool_[pool_at_];
+      __builtin_prefetch(pool_[pool_at_].get(), 1);
+      if (oldest.holders == 0) return oldest;
     }
-    pool_.emplace_back();
-    pool_at_ = pool_.size() - 1;
-    return pool_.back();
+    pool_.push_back(std::make_unique<ShadedWarp>());
+    return *pool_.back();
   }
 
   std::size_t choose_scheduler(TileId tile) {
@@ -193,7 +194,7 @@ class TimedSm : public TimedUnit {
   std::uint32_t core_ = 0;
   std::uint32_t sent_to_core_ = 0;
   std::uint32_t turn_ = 0;
-  std::deque<ShadedWarp> pool_;
+  std::vector<std::unique_ptr<ShadedWarp>> pool_;
   std::size_t pool_at_ = 0;
   std::uint64_t instructions_ = 0;
 };
