@@ -19,6 +19,7 @@ class BackEnd {
       : qru(configuration.make_as<QruBehaviour>("qru", gpc)),
         sm(configuration.make_as<SmBehaviour>("sm", gpc)),
         crop(configuration.make_as<CropBehaviour>("crop", gpc)),
+        surface_(surface),
         monitor_(surface.width(), surface.height()) {
     crop->attach(surface);
   }
@@ -50,6 +51,11 @@ class BackEnd {
  private:
   template <class Signal>
   void run(const Warp& warp, Signal& signal) {
+    // Shading takes longer than the memory does.
+    for (unsigned i = 0; i < warp.count; ++i) {
+      __builtin_prefetch(&surface_.quad(warp.tile, warp.quads[i].position), 1);
+      monitor_.prefetch(warp.tile, warp.quads[i].position);
+    }
     sm->shade(warp, shaded_);
     if (work_ == nullptr) return blend(0, shaded_.count, signal);
     count(warp);
@@ -93,6 +99,7 @@ class BackEnd {
   }
 
   ShadedWarp shaded_;
+  const ColorSurface& surface_;
   BlendOrderMonitor monitor_;
   Work* work_ = nullptr;
   bool writes_unchanged_ = false;

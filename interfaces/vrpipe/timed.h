@@ -46,7 +46,7 @@ struct Span {
   Cycle of_part(unsigned index, unsigned parts) const {
     if (last == first || index == 0) return first;
     if (last - first + 1 == parts) return first + index;
-    return first + static_cast<std::uint32_t>(last - first) * index / (parts - 1);
+    return first + (last - first) * index / (parts - 1);
   }
   Cycle first = 0;
   Cycle last = 0;

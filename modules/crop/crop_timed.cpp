@@ -47,6 +47,10 @@ class TimedCrop : public TimedUnit {
 
   Span take(const ShadedWarp& warp, Span visible) {
     Span left = visible;
+    for (unsigned i = 0; i < warp.count; ++i) {
+      __builtin_prefetch(&behaviour_->surface()->quad(warp.tile, warp.position[i]), 1);
+      monitor_->prefetch(warp.tile, warp.position[i]);
+    }
     if (warp.end_of_draw) {
       end_ = blended_ == 0 ? visible.first : last_blend_ + cost_.latency_cycles;
     } else if (at_once_ >= warp.count) {
