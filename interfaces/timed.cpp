@@ -71,7 +71,7 @@ Cycle TimedMemoryPort::access(tlm::tlm_command command, std::uint64_t address, u
     throw SimulationFault(socket.name(), at, "the memory answered " + payload_.get_response_string());
   }
   // Most answers take as long as the one before; a division is dear.
-  const std::uint64_t took = delay.value() - asked;
+  const std::uint64_t took = std::max<std::uint64_t>(delay.value(), asked) - asked;
   if (took != took_) {
     took_ = took;
     took_cycles_ = (took + period - 1) / period;
