@@ -25,6 +25,7 @@ constexpr const char* program_footer =
     "  vrpipe compare                                   the four variants on the built-in scene\n"
     "  vrpipe compare --scene point_cloud.ply --camera cameras.json#3 --output images\n"
     "  vrpipe run --variant het --set crop.cache_bytes=32768 --json result.json\n"
+    "  vrpipe accuracy --quick --html accuracy.html     what accuracy costs in time\n"
     "  vrpipe units                                     every unit and parameter that can be changed\n"
     "\n"
     "`vrpipe COMMAND --help` explains a command's options.\n"
@@ -170,6 +171,7 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   std::vector<std::unique_ptr<Command>> commands;
   commands.push_back(make_run_command());
   commands.push_back(make_compare_command());
+  commands.push_back(make_accuracy_command());
   commands.push_back(make_scenes_command());
   commands.push_back(make_platforms_command());
   commands.push_back(make_units_command());

@@ -73,9 +73,9 @@ void append(png_structp png, png_bytep data, std::size_t size) {
 /// libpng's own would take the string for a FILE.
 void flush_nothing(png_structp) {}
 
-}  // namespace
-
-std::string encode_png(const SharedImage& image, const std::array<float, 3>& background) {
+/// @param fill_row  writes the 3 * width bytes of row y
+template <class FillRow>
+std::string encode_rows(std::uint32_t width, std::uint32_t height, const FillRow& fill_row) {
   std::string file;
   PngWriter writer;
   writer.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, png_failed, nullptr);
@@ -83,23 +83,37 @@ std::string encode_png(const SharedImage& image, const std::array<float, 3>& bac
   writer.info = png_create_info_struct(writer.png);
   if (writer.info == nullptr) throw std::bad_alloc();
   png_set_write_fn(writer.png, &file, append, flush_nothing);
-  png_set_IHDR(writer.png, writer.info, image.width(), image.height(), 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+  png_set_IHDR(writer.png, writer.info, width, height, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_sRGB(writer.png, writer.info, PNG_sRGB_INTENT_PERCEPTUAL);
   png_write_info(writer.png, writer.info);
-  std::vector<std::uint8_t> row(std::size_t{3} * image.width());
-  const float* pixel = image.values();
-  for (std::uint32_t y = 0; y < image.height(); ++y) {
+  std::vector<std::uint8_t> row(std::size_t{3} * width);
+  for (std::uint32_t y = 0; y < height; ++y) {
+    fill_row(y, row);
+    png_write_row(writer.png, row.data());
+  }
+  png_write_end(writer.png, writer.info);
+  return file;
+}
+
+}  // namespace
+
+std::string encode_png(const SharedImage& image, const std::array<float, 3>& background) {
+  return encode_rows(image.width(), image.height(), [&](std::uint32_t y, std::vector<std::uint8_t>& row) {
+    const float* pixel = image.values() + std::size_t{4} * y * image.width();
     for (std::uint32_t x = 0; x < image.width(); ++x, pixel += 4) {
       const float transmittance = 1.0F - pixel[3];
       for (std::size_t channel = 0; channel < 3; ++channel) {
         row[std::size_t{3} * x + channel] = to_byte(pixel[channel] + transmittance * background[channel]);
       }
     }
-    png_write_row(writer.png, row.data());
-  }
-  png_write_end(writer.png, writer.info);
-  return file;
+  });
+}
+
+std::string encode_png(std::uint32_t width, std::uint32_t height, const std::vector<std::uint8_t>& rgb) {
+  return encode_rows(width, height, [&](std::uint32_t y, std::vector<std::uint8_t>& row) {
+    std::copy_n(rgb.begin() + static_cast<std::ptrdiff_t>(row.size() * y), row.size(), row.begin());
+  });
 }
 
 std::string encode_exr(const SharedImage& image) {

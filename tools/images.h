@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <vrpipe/surface.h>
 
@@ -40,6 +41,10 @@ class SharedImage {
 /// A PNG file: 8-bit RGB, the image over a background colour. Values are display values, as Gaussian splats are trained
 /// in display space: clamped to [0, 1] and rounded to the nearest n/255, without a gamma curve.
 std::string encode_png(const SharedImage& image, const std::array<float, 3>& background);
+
+/// A PNG file of display values.
+/// @param rgb  3 * width * height bytes, row by row from the top
+std::string encode_png(std::uint32_t width, std::uint32_t height, const std::vector<std::uint8_t>& rgb);
 
 /// An OpenEXR file: RGBA float32, premultiplied, without a background.
 std::string encode_exr(const SharedImage& image);

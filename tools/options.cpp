@@ -10,6 +10,7 @@
 
 #include "output_file.h"
 #include "parse.h"
+#include "settings.h"
 #include "stdout_to_stderr.h"
 
 namespace vrpipe::tools {
@@ -39,6 +40,15 @@ constexpr const char* rules_group = "How exactly";
 constexpr const char* result_group = "Where results go";
 
 const std::string variant_default = "het+qm";
+
+std::string names_of(const std::vector<Fidelity>& fidelities) {
+  std::string text;
+  for (const Fidelity fidelity : fidelities) {
+    if (!text.empty()) text += fidelity == fidelities.back() ? " or " : ", ";
+    text += vrpipe::name_of(fidelity);
+  }
+  return text;
+}
 
 }  // namespace
 
@@ -105,10 +115,9 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              machine_group);
 
   add_option(app, "--fidelity", fidelity_, "NAME",
-             "how exact time is: functional (no time: images and counts only), bound\n"
-             "(the busiest unit's work), lt (loosely timed: bins and warps, one after\n"
-             "another), at (approximately timed: queues and back-pressure) or cycle\n"
-             "(every unit, every cycle) (default: cycle)",
+             "how exact time is, from images and counts alone to every unit in every\n"
+             "cycle: " +
+                 names_of(fidelities()) + " (default: cycle)",
              rules_group);
   add_option(app, "--format", format_, "NAME", "colour target: rgba8, rgba16f or rgba32f (default: rgba16f)",
              rules_group);
@@ -160,7 +169,13 @@ SimulationJob SimulationArguments::resolve(Variants variants) const {
   if (const auto name = single(fidelity_, "--fidelity")) request.fidelity = fidelity_named(*name);
   if (const auto name = single(format_, "--format")) request.format = color_format_named(*name);
   if (const auto name = single(termination_, "--termination")) request.termination = termination_named(*name);
-  for (const std::string& text : settings_) request.settings.push_back(parse_setting(text));
+  std::vector<Setting> settings;
+  for (const std::string& text : settings_) settings.push_back(parse_setting(text));
+  SettingsByPart parts = sort_settings(settings);
+  request.settings = std::move(parts.machine);
+  job.scene.preprocess = parts.preprocess;
+  job.preprocessing = std::move(parts.preprocessing);
+  job.preprocess_parameters = std::move(parts.preprocess_parameters);
   for (const std::string& text : units_) request.units.push_back(parse_unit_choice(text));
 
   std::vector<Variant> wanted = vrpipe::variants();
@@ -177,22 +192,16 @@ SimulationJob SimulationArguments::resolve(Variants variants) const {
     check_output_folder(*folder, "--output");
     job.output = *folder;
   }
-  // A file in the folder of --output need not wait for that folder to be there.
-  const auto is_in_output = [&](const std::string& file) {
-    return job.output && std::filesystem::absolute(file).lexically_normal().parent_path() ==
-                             (std::filesystem::absolute(*job.output) / "").lexically_normal().parent_path();
-  };
   job.json = single(json_, "--json");
-  if (job.json && *job.json != "-" && !is_in_output(*job.json)) check_output_file(*job.json, "--json");
+  if (job.json && *job.json != "-") check_output_file(*job.json, "--json", job.output);
   if (const auto file = single(save_draw_, "--save-draw")) {
-    if (!is_in_output(*file)) check_output_file(*file, "--save-draw");
+    check_output_file(*file, "--save-draw", job.output);
     job.save_draw = *file;
   }
 
   const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
   const auto jobs = single(jobs_, "--jobs");
-  job.processes =
-      std::min(jobs ? parse_count(*jobs, "--jobs", 1024) : processors, static_cast<unsigned>(job.requests.size()));
+  job.processes = jobs ? parse_count(*jobs, "--jobs", 1024) : processors;
   return job;
 }
 

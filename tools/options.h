@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/platforms/simulation.h>
@@ -33,7 +34,10 @@ std::shared_ptr<CLI::FormatterBase> help_formatter();
 /// Everything that `run` or `compare` is asked to do, checked as far as that is possible without reading the scene.
 struct SimulationJob {
   SceneRequest scene;
-  std::vector<RunRequest> requests;  ///< one for each variant, alike in everything else
+  std::vector<RunRequest> requests;    ///< one for each variant, alike in everything else
+  std::vector<Setting> preprocessing;  ///< of --set, for the report; `scene` has them
+  /// `preprocess.NAME` and value of every parameter of preprocessing.
+  std::vector<std::pair<std::string, std::string>> preprocess_parameters;
   std::array<float, 3> background{};
   std::optional<std::filesystem::path> output;     ///< folder for images
   std::optional<std::string> json;                 ///< file, or "-" for stdout

@@ -45,8 +45,12 @@ int write_all(int descriptor, const std::string& bytes) {
 
 }  // namespace
 
-void check_output_file(const fs::path& path, const std::string& option) {
+void check_output_file(const fs::path& path, const std::string& option, const std::optional<fs::path>& folder_to_be) {
   std::error_code error;
+  if (folder_to_be && fs::absolute(path).lexically_normal().parent_path() ==
+                          (fs::absolute(*folder_to_be) / "").lexically_normal().parent_path()) {
+    return;
+  }
   if (fs::is_directory(path, error)) {
     throw UserError(cannot_write, place(path, option), "it is a folder", "name a file in it");
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 namespace vrpipe::tools {
@@ -9,7 +10,9 @@ namespace vrpipe::tools {
 // first; and no file is seen half-written. `option` names the option in messages. All throw UserError.
 
 /// Checks, without creating anything, that a file can be written under this name.
-void check_output_file(const std::filesystem::path& path, const std::string& option);
+/// @param folder_to_be  a folder that will be there by then, if any
+void check_output_file(const std::filesystem::path& path, const std::string& option,
+                       const std::optional<std::filesystem::path>& folder_to_be = std::nullopt);
 
 /// Checks, without creating anything, that a folder is there or can be made.
 void check_output_folder(const std::filesystem::path& path, const std::string& option);

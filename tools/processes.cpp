@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
@@ -187,7 +188,7 @@ class ProgressThread {
 /// A simulation in a process of its own. Ends it, if need be, when destroyed.
 class Worker {
  public:
-  Worker(std::size_t index, const RunRequest& request) : index_(index), request_(request) {}
+  Worker(std::size_t index, const Task& task) : index_(index), name_(task.name), request_(task.request) {}
   ~Worker() {
     if (process_ > 0) {
       ::kill(process_, SIGKILL);
@@ -201,7 +202,8 @@ class Worker {
   std::size_t index() const { return index_; }
   int pipe() const { return pipe_; }
 
-  void start(const Draw& draw, SharedImage* image, std::atomic<float>& progress) {
+  void start(const Draw& draw, bool with_image, std::atomic<float>& progress) {
+    if (with_image) image_.emplace(draw.width, draw.height);
     int ends[2];
     if (::pipe(ends) != 0) system_failure("cannot open a pipe to a simulation");
     std::cout.flush();
@@ -219,7 +221,7 @@ class Worker {
       ::prctl(PR_SET_PDEATHSIG, SIGKILL);
       if (::getppid() != parent) ::_exit(exit_fault);
       ::close(ends[0]);
-      work(ends[1], draw, image, progress);
+      work(ends[1], draw, image_ ? &*image_ : nullptr, progress);
     }
     ::close(ends[1]);
     pipe_ = ends[0];
@@ -238,7 +240,7 @@ class Worker {
   }
 
   /// The result, once all of it is here. Throws CommandFailure.
-  RunResult finish() {
+  Simulated finish() {
     int status = 0;
     while (::waitpid(process_, &status, 0) < 0 && errno == EINTR) {}
     process_ = -1;
@@ -253,16 +255,18 @@ class Worker {
     const std::string content = received_.substr(1);
     if (received_[0] == outcome_user_error) throw CommandFailure(exit_user_error, content);
     if (received_[0] != outcome_result) fail(exit_fault, content);
-    RunResult result;
+    Simulated simulated;
     Unpacker unpacker(content.data(), content.data() + content.size());
-    exchange(unpacker, result);
-    result.request = request_;
-    return result;
+    exchange(unpacker, simulated.result);
+    simulated.result.request = request_;
+    simulated.image = std::move(image_);
+    return simulated;
   }
 
  private:
   [[noreturn]] void fail(int code, const std::string& text) const {
-    throw CommandFailure(code, "variant " + request_.variant.name + ": " + text);
+    const std::string& variant = request_.variant.name;
+    throw CommandFailure(code, "variant " + variant + (name_ == variant ? "" : ", " + name_) + ": " + text);
   }
 
   [[noreturn]] void work(int out, const Draw& draw, SharedImage* image, std::atomic<float>& progress) const {
@@ -297,7 +301,9 @@ class Worker {
   }
 
   std::size_t index_;
+  const std::string& name_;
   const RunRequest& request_;
+  std::optional<SharedImage> image_;
   pid_t process_ = -1;
   int pipe_ = -1;
   std::string received_;
@@ -322,23 +328,20 @@ Simulated simulate_here(const RunRequest& request, const Draw& draw, bool with_i
   return simulated;
 }
 
-std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requests, const Draw& draw,
-                                             bool with_images, unsigned processes, ProgressLine& progress) {
+void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned processes, const std::string& title,
+               ProgressLine& progress, const std::function<void(std::size_t index, Simulated&& simulated)>& finished) {
   const SteadyClock::time_point start = SteadyClock::now();
-  SharedProgress done(requests.size());
-  std::vector<Simulated> simulated(requests.size());
+  SharedProgress done(tasks.size());
   std::vector<std::string> names;
-  for (std::size_t i = 0; i < requests.size(); ++i) {
-    names.push_back(requests[i].variant.name);
-    if (with_images) simulated[i].image.emplace(draw.width, draw.height);
-  }
+  for (const Task& task : tasks) names.push_back(task.name);
 
   std::vector<std::unique_ptr<Worker>> workers;
   std::size_t next = 0;
-  while (next < requests.size() || !workers.empty()) {
-    while (next < requests.size() && workers.size() < processes) {
-      workers.push_back(std::make_unique<Worker>(next, requests[next]));
-      workers.back()->start(draw, with_images ? &*simulated[next].image : nullptr, done[next]);
+  while (next < tasks.size() || !workers.empty()) {
+    while (next < tasks.size() && workers.size() < processes) {
+      const std::shared_ptr<const Draw> draw = tasks[next].draw();
+      workers.push_back(std::make_unique<Worker>(next, tasks[next]));
+      workers.back()->start(*draw, with_images, done[next]);
       ++next;
     }
     std::vector<pollfd> pipes;
@@ -348,13 +351,27 @@ std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requ
     }
     for (std::size_t i = pipes.size(); i-- > 0;) {
       if (pipes[i].revents == 0 || !workers[i]->receive()) continue;
-      simulated[workers[i]->index()].result = workers[i]->finish();
+      const std::size_t index = workers[i]->index();
+      Simulated simulated = workers[i]->finish();
       workers.erase(workers.begin() + static_cast<std::ptrdiff_t>(i));
+      done[index] = 1.0F;
+      finished(index, std::move(simulated));
     }
-    progress.show(progress_text(names, done.now(), seconds_since(start), stderr_width() - 1));
+    const auto room = static_cast<unsigned>(stderr_width() - std::min<std::size_t>(stderr_width(), title.size() + 1));
+    progress.show(title + progress_text(names, done.now(), seconds_since(start), room));
   }
   progress.erase();
-  return simulated;
+}
+
+std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requests, const Draw& draw,
+                                             bool with_images, unsigned processes, ProgressLine& progress) {
+  const std::shared_ptr<const Draw> shared(std::shared_ptr<const Draw>(), &draw);  // the caller's
+  std::vector<Task> tasks;
+  for (const RunRequest& request : requests) tasks.push_back({request.variant.name, request, [&] { return shared; }});
+  std::vector<Simulated> results(requests.size());
+  run_tasks(tasks, with_images, processes, "", progress,
+            [&](std::size_t index, Simulated&& simulated) { results[index] = std::move(simulated); });
+  return results;
 }
 
 }  // namespace vrpipe::tools

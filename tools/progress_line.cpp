@@ -30,13 +30,17 @@ void ProgressLine::erase() {
 
 std::string progress_text(const std::vector<std::string>& names, const std::vector<float>& done, double elapsed_seconds,
                           unsigned width) {
+  const bool many = names.size() > 4;
   std::string text;
   double share = 0;
+  std::size_t finished = 0;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const double part = std::clamp(static_cast<double>(done[i]), 0.0, 1.0);
     share += part / static_cast<double>(names.size());
-    text += fmt::format("{} {:3.0f}%  ", names[i], 100 * part);
+    finished += part >= 1 ? 1U : 0U;
+    if (!many || (part > 0 && part < 1)) text += fmt::format("{} {:3.0f}%  ", names[i], 100 * part);
   }
+  if (many) text = fmt::format("{}/{}  ", finished, names.size()) + text;
   std::string time;
   // The first percents say little about the rest.
   if (share > 0.03) {

@@ -24,7 +24,8 @@ class ProgressLine {
   bool drawn_ = false;
 };
 
-/// Percentages, a bar and the time left of simulations that run side by side. ASCII, at most `width` characters.
+/// Percentages, a bar and the time left of simulations that run side by side; of more than four, how many are done and
+/// the percentages of those under way. ASCII, at most `width` characters.
 /// @param done             share of each that is done, 0 to 1
 /// @param elapsed_seconds  since they began
 std::string progress_text(const std::vector<std::string>& names, const std::vector<float>& done, double elapsed_seconds,

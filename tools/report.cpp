@@ -176,8 +176,10 @@ std::string heading(const JobResult& result, const TextStyle& style) {
   text += style.bold(platform.name) + " (" + platform.description + ")\n";
   text += fmt::format("{} fidelity, {} colour, {} termination", vrpipe::name_of(request.fidelity),
                       vrpipe::name_of(request.format), name_of(request.termination));
-  for (const Setting& setting : request.settings) {
-    text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
+  for (const std::vector<Setting>* settings : {&request.settings, &result.preprocessing}) {
+    for (const Setting& setting : *settings) {
+      text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
+    }
   }
   for (const UnitChoice& unit : request.units) text += fmt::format(", {}={}", unit.slot, unit.implementation);
   return text + "\n\n";

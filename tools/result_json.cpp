@@ -11,6 +11,7 @@
 
 #include "parse.h"
 #include "report.h"
+#include "settings.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -21,18 +22,6 @@ Json number(const std::string& text) {
   const char* const end = text.data() + text.size();
   const std::from_chars_result read = std::from_chars(text.data(), end, value);
   return read.ec == std::errc() && read.ptr == end ? Json(value) : Json(text);
-}
-
-Json scene_json(const JobResult& result) {
-  return {{"name", result.scene.name},
-          {"gaussians_total", result.scene.gaussians_total},
-          {"gaussians_visible", result.scene.gaussians_visible},
-          {"gaussians_rejected", result.scene.rejected.total()},
-          {"width", result.width},
-          {"height", result.height},
-          {"rejected_by_reason",
-           {{"not_finite", result.scene.rejected.not_finite},
-            {"zero_quaternion", result.scene.rejected.zero_quaternion}}}};
 }
 
 /// The declaration of UNIT.PARAMETER, in the implementation that the request puts into the slot.
@@ -56,7 +45,7 @@ const Parameter* declaration(const std::vector<ParameterListing>& listings, cons
 
 Json parameters_json(const std::vector<RunResult>& runs) {
   const RunRequest& request = runs.front().request;
-  const std::vector<ParameterListing> listings = list_parameters(request.platform);
+  const std::vector<ParameterListing> listings = all_parameters(request.platform);
   Json values = Json::object();
   for (const RunResult& run : runs) {
     for (const auto& [key, value] : run.parameters) {
@@ -122,6 +111,22 @@ Json typed_value(const Parameter& parameter, const std::string& value) {
   return value;
 }
 
+Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t height) {
+  return {{"name", scene.name},
+          {"gaussians_total", scene.gaussians_total},
+          {"gaussians_visible", scene.gaussians_visible},
+          {"gaussians_rejected", scene.rejected.total()},
+          {"width", width},
+          {"height", height},
+          {"rejected_by_reason",
+           {{"not_finite", scene.rejected.not_finite}, {"zero_quaternion", scene.rejected.zero_quaternion}}}};
+}
+
+Json platform_json(const std::vector<RunResult>& runs) {
+  const Platform& platform = *runs.front().request.platform;
+  return {{"name", platform.name}, {"frequency_mhz", platform.frequency_mhz}, {"parameters", parameters_json(runs)}};
+}
+
 Json result_json(const JobResult& result) {
   const RunRequest& request = result.runs.front().request;
   Json runs = Json::array();
@@ -130,11 +135,8 @@ Json result_json(const JobResult& result) {
   Json json = {{"schema", "vrpipe.compare/1"},
                {"version", VRPIPE_VERSION},
                {"seed", request.stall_seed},
-               {"scene", scene_json(result)},
-               {"platform",
-                {{"name", request.platform->name},
-                 {"frequency_mhz", request.platform->frequency_mhz},
-                 {"parameters", parameters_json(result.runs)}}},
+               {"scene", scene_json(result.scene, result.width, result.height)},
+               {"platform", platform_json(result.runs)},
                {"fidelity", vrpipe::name_of(request.fidelity)},
                {"format", vrpipe::name_of(request.format)},
                {"termination", name_of(request.termination)},

@@ -1,5 +1,6 @@
 #include "simulation_job.h"
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <future>
@@ -51,6 +52,7 @@ void perform(const SimulationJob& job) {
   JobResult result;
   ProgressLine progress;
   std::vector<Simulated> simulated;
+  bool preprocessed_here = false;
   {
     progress.show("loading " + (job.scene.scene.empty() ? std::string("the built-in scene") : job.scene.scene));
     const auto start = std::chrono::steady_clock::now();
@@ -58,6 +60,8 @@ void perform(const SimulationJob& job) {
     result.load_seconds = seconds_since(start);
     progress.erase();
     result.scene = loaded.summary;
+    result.preprocessing = job.preprocessing;
+    preprocessed_here = loaded.preprocessed_here;
     result.width = loaded.draw.width;
     result.height = loaded.draw.height;
     if (job.output) create_output_folder(*job.output, "--output");
@@ -70,7 +74,7 @@ void perform(const SimulationJob& job) {
       simulated = simulate_in_processes(job.requests, loaded.draw, job.output.has_value(), job.processes, progress);
     }
     result.simulate_seconds = seconds_since(simulation_start);
-    result.processes = job.processes;
+    result.processes = std::min(job.processes, static_cast<unsigned>(job.requests.size()));
   }
 
   if (job.output) {
@@ -80,7 +84,13 @@ void perform(const SimulationJob& job) {
   } else {
     result.images.resize(simulated.size());
   }
-  for (Simulated& run : simulated) result.runs.push_back(std::move(run.result));
+  for (Simulated& run : simulated) {
+    if (preprocessed_here) {
+      run.result.parameters.insert(run.result.parameters.end(), job.preprocess_parameters.begin(),
+                                   job.preprocess_parameters.end());
+    }
+    result.runs.push_back(std::move(run.result));
+  }
   simulated.clear();
 
   if (job.json) {

@@ -20,6 +20,7 @@ struct ImageFiles {
 /// What reports and JSON are made from.
 struct JobResult {
   SceneSummary scene;
+  std::vector<Setting> preprocessing;  ///< what --set changed of it
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::vector<RunResult> runs;

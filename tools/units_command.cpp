@@ -11,12 +11,13 @@
 #include "listing.h"
 #include "options.h"
 #include "result_json.h"
+#include "settings.h"
 #include "terminal.h"
 
 namespace vrpipe::tools {
 namespace {
 
-/// Whether the unit is what its slot gets in a variant that has it; l2 and state are no slots, and have one each.
+/// Whether the unit is what its slot gets in a variant that has it; l2, state and preprocess are no slots, and have one each.
 bool is_default(const ParameterListing& unit) {
   const std::vector<std::string>& slots = Registry::slots();
   if (std::find(slots.begin(), slots.end(), unit.unit) == slots.end()) return true;
@@ -27,7 +28,7 @@ struct Statistic {
   std::string name, unit, meaning;
 };
 
-/// What a unit counts; nothing for l2 and state, which are no slots.
+/// What a unit counts; nothing for l2, state and preprocess, which are no slots.
 std::vector<Statistic> statistics_of(const ParameterListing& unit) {
   const std::vector<std::string>& slots = Registry::slots();
   if (std::find(slots.begin(), slots.end(), unit.unit) == slots.end()) return {};
@@ -168,7 +169,7 @@ class UnitsCommand : public Command {
     load_plugins(plugins_);
     const auto named = single(platform_, "--platform");
     const Platform& platform = named ? platform_named(*named) : platforms().front();
-    std::vector<ParameterListing> units = list_parameters(&platform);
+    std::vector<ParameterListing> units = all_parameters(&platform);
     if (const auto slot = single(slot_, "--slot")) {
       std::vector<std::string> slots;
       for (const ParameterListing& unit : units) slots.push_back(unit.unit);

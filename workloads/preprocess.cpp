@@ -1,18 +1,18 @@
 #include <vrpipe/workloads/preprocess.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <string>
-#include <system_error>
 #include <thread>
 
 #include <glm/geometric.hpp>
 
 #include <vrpipe/error.h>
 #include <vrpipe/workloads/portable_math.h>
+
+#include "for_each_chunk.h"
 
 namespace vrpipe {
 namespace {
@@ -188,23 +188,6 @@ class Projector {
   std::array<Vec3, 3> world_to_camera_;  ///< rows: right, down, forward
   double limit_x_, limit_y_;
 };
-
-/// Runs work(chunk) for chunk 0 .. chunks-1 on up to `threads` threads, whichever is free.
-template <class Work>
-void for_each_chunk(std::uint64_t chunks, unsigned threads, const Work& work) {
-  std::atomic<std::uint64_t> next{0};
-  const auto run = [&] {
-    for (std::uint64_t chunk = next++; chunk < chunks; chunk = next++) work(chunk);
-  };
-  std::vector<std::thread> others;
-  try {
-    for (unsigned i = 1; i < threads && i < chunks; ++i) others.emplace_back(run);
-  } catch (const std::system_error&) {
-    // No more threads to be had: those that run do the work.
-  }
-  run();
-  for (std::thread& thread : others) thread.join();
-}
 
 void check_options(const GaussianScene& scene, const Camera& camera, const PreprocessOptions& options) {
   constexpr char kCannot[] = "cannot preprocess the scene";

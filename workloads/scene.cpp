@@ -110,6 +110,11 @@ LoadedScene load_draw_list(const std::string& path, const SceneRequest& request)
   refuse(request.look_at.has_value(), "--look-at", why, remedy);
   refuse(request.up.has_value(), "--up", why, remedy);
   refuse(request.fovy_degrees.has_value(), "--fovy", why, remedy);
+  const std::string preprocessed = "a .spl is a draw list, preprocessed already";
+  const PreprocessOptions untouched;
+  refuse(request.preprocess.sh_degree != untouched.sh_degree, "--set preprocess.sh_degree", preprocessed, remedy);
+  refuse(request.preprocess.depth_key_bits != untouched.depth_key_bits, "--set preprocess.depth_key_bits", preprocessed,
+         remedy);
   DrawList list = read_draw_list(path);
   LoadedScene loaded;
   loaded.draw = std::move(list.draw);
@@ -119,26 +124,19 @@ LoadedScene load_draw_list(const std::string& path, const SceneRequest& request)
   return loaded;
 }
 
-LoadedScene load_gaussians(const GaussianScene& scene, const Camera& camera, const SceneRequest& request) {
-  LoadedScene loaded;
-  loaded.draw = preprocess(scene, camera, request.preprocess, loaded.summary);
-  return loaded;
-}
-
-LoadedScene load_builtin(const std::string& name, const SceneRequest& request) {
+void open_builtin(const std::string& name, const SceneRequest& request, OpenedScene& scene) {
   const BuiltinScene builtin = make_builtin_scene(name);
-  const Camera camera =
-      request.camera ? camera_from_file(*request.camera, request.size)
+  scene.gaussians = builtin.gaussians;
+  scene.camera = request.camera
+                     ? camera_from_file(*request.camera, request.size)
                      : look_at(with_options(builtin.info.view, request), request.size.value_or(builtin.info.size));
-  return load_gaussians(builtin.gaussians, camera, request);
 }
 
-LoadedScene load_ply(const std::string& path, const SceneRequest& request) {
-  const GaussianScene scene = open_gaussian_ply(path);
-  const Camera camera = request.camera
-                            ? camera_from_file(*request.camera, request.size)
-                            : look_at(automatic_view(scene, request), request.size.value_or(kDefaultImageSize));
-  return load_gaussians(scene, camera, request);
+void open_ply(const std::string& path, const SceneRequest& request, OpenedScene& scene) {
+  scene.gaussians = open_gaussian_ply(path);
+  scene.camera = request.camera
+                     ? camera_from_file(*request.camera, request.size)
+                     : look_at(automatic_view(scene.gaussians, request), request.size.value_or(kDefaultImageSize));
 }
 
 std::string lower_case(std::string text) {
@@ -148,30 +146,49 @@ std::string lower_case(std::string text) {
 
 }  // namespace
 
-LoadedScene load_scene(const SceneRequest& request) {
+OpenedScene open_scene(const SceneRequest& request) {
   const std::string name = request.scene.empty() ? kBuiltinPrefix + kDefaultBuiltinScene : request.scene;
   if (request.size) check_image_size(request.size->width, request.size->height, "--size");
-  LoadedScene loaded;
+  OpenedScene scene;
   if (name.rfind(kBuiltinPrefix, 0) == 0) {
     check_view_options(request);
-    loaded = load_builtin(name.substr(kBuiltinPrefix.size()), request);
-    loaded.summary.name = name;
-    return loaded;
+    open_builtin(name.substr(kBuiltinPrefix.size()), request, scene);
+    scene.name = name;
+    return scene;
   }
   const std::filesystem::path path(name);
+  scene.name = path.filename().string();
   const std::string extension = lower_case(path.extension().string());
   if (extension == ".spl") {
-    loaded = load_draw_list(name, request);
+    scene.draw_list = load_draw_list(name, request);
   } else if (extension == ".ply") {
     check_view_options(request);
-    loaded = load_ply(name, request);
+    open_ply(name, request, scene);
   } else {
     throw UserError("cannot read scene", name,
                     extension.empty() ? "it has no extension" : "scenes of type `" + extension + "` are not supported",
                     "give an INRIA .ply, a .spl draw list, or builtin:NAME");
   }
-  loaded.summary.name = path.filename().string();
+  return scene;
+}
+
+LoadedScene preprocess_scene(const OpenedScene& scene, const PreprocessOptions& options) {
+  LoadedScene loaded;
+  if (scene.draw_list) {
+    loaded = *scene.draw_list;
+  } else {
+    loaded.draw = preprocess(scene.gaussians, scene.camera, options, loaded.summary);
+    loaded.preprocessed_here = true;
+  }
+  loaded.summary.name = scene.name;
   return loaded;
+}
+
+LoadedScene load_scene(const SceneRequest& request) {
+  OpenedScene scene = open_scene(request);
+  if (!scene.draw_list) return preprocess_scene(scene, request.preprocess);
+  scene.draw_list->summary.name = scene.name;
+  return std::move(*scene.draw_list);
 }
 
 }  // namespace vrpipe

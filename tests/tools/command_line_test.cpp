@@ -5,6 +5,8 @@
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 
+#include "settings.h"
+
 namespace vrpipe::testing {
 namespace {
 
@@ -22,7 +24,7 @@ TEST_F(CommandLine, VersionAndHelp) {
   const Finished help = vrpipe({"--help"});
   EXPECT_EQ(help.code, 0);
   EXPECT_EQ(help.err, "");
-  expect_in(help.out, {"run", "compare", "scenes", "platforms", "units", "--version", "Exit code"});
+  expect_in(help.out, {"run", "compare", "accuracy", "scenes", "platforms", "units", "--version", "Exit code"});
 }
 
 TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
@@ -52,12 +54,13 @@ TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
                                         "pixels",
                                         "DEGREES",
                                         "Examples:"};
-  for (const char* command : {"run", "compare"}) {
+  for (const char* command : {"run", "compare", "accuracy"}) {
     const Finished help = vrpipe({command, "--help"});
     EXPECT_EQ(help.code, 0);
     expect_in(help.out, shared);
     expect_in(help.out, {std::string(command) == "run" ? "--variant" : "--jobs"});
   }
+  expect_in(vrpipe({"accuracy", "--help"}).out, {"--quick", "--repeat", "--html", "--markdown"});
   expect_in(vrpipe({"units", "--help"}).out, {"--slot", "--platform", "--plugin", "--json", "--markdown"});
   expect_in(vrpipe({"platforms", "--help"}).out, {"--plugin", "--json"});
   expect_in(vrpipe({"scenes", "--help"}).out, {"--json"});
@@ -91,7 +94,7 @@ TEST_F(CommandLine, ScenesPlatformsAndUnitsListEverything) {
   const std::string markdown = vrpipe({"units", "--markdown"}).out;
   const nlohmann::json units_json = json_of({"units"});
   std::size_t index = 0;
-  for (const ParameterListing& unit : list_parameters(&platforms().front())) {
+  for (const ParameterListing& unit : tools::all_parameters(&platforms().front())) {
     expect_in(units, {unit.unit + "=" + unit.implementation, unit.description});
     const nlohmann::json& entry = units_json["units"][index++];
     EXPECT_EQ(entry["slot"], unit.unit);

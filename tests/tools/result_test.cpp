@@ -5,6 +5,8 @@
 
 #include <vrpipe/platforms/simulation.h>
 
+#include "settings.h"
+
 namespace vrpipe::testing {
 namespace {
 
@@ -125,7 +127,7 @@ TEST_F(Result, ParametersHaveTypes) {
   EXPECT_EQ(parameters["state.termination_threshold"], 0.5);
   EXPECT_EQ(parameters["state.exponential"], "ex2");
   std::set<std::string> declared;
-  for (const ParameterListing& unit : list_parameters(&platforms().front())) {
+  for (const ParameterListing& unit : tools::all_parameters(&platforms().front())) {
     for (const Parameter* parameter : unit.parameters->parameters()) {
       const std::string name = unit.unit + "." + parameter->name();
       declared.insert(name);

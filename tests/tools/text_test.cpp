@@ -42,6 +42,9 @@ TEST(Text, ProgressFitsItsLine) {
     }
   }
   EXPECT_EQ(progress_text({"run"}, {0.5F}, 90, 40), "run  50%  [=========        ] 1:30 left");
+  // Of many, those under way.
+  EXPECT_EQ(progress_text({"a", "b", "c", "d", "e"}, {1, 0.5F, 1, 0, 0}, 50, 46),
+            "2/5  b  50%  [==========          ] 0:50 left");
 }
 
 TEST(Text, BusiestUnitsOfARun) {

@@ -111,6 +111,34 @@ TEST_F(SceneFile, ADrawListComesInAsItIsAndRefusesCameras) {
   SceneRequest filmed = replay;
   filmed.camera = "cameras.json";
   expect_user_error([&] { load_scene(filmed); }, {"--camera", ".spl"});
+  SceneRequest preprocessed = replay;
+  preprocessed.preprocess.sh_degree = 1;
+  expect_user_error([&] { load_scene(preprocessed); }, {"preprocess.sh_degree", "preprocessed already"});
+  preprocessed.preprocess = {};
+  preprocessed.preprocess.depth_key_bits = 16;
+  expect_user_error([&] { load_scene(preprocessed); }, {"preprocess.depth_key_bits", "preprocessed already"});
+}
+
+TEST_F(SceneFile, AnOpenedSceneCanBePreprocessedAgain) {
+  const OpenedScene scene = open_scene(request_);
+  for (const int bits : {32, 12, 32}) {
+    request_.preprocess.depth_key_bits = bits;
+    const LoadedScene expected = load_scene(request_);
+    const LoadedScene again = preprocess_scene(scene, request_.preprocess);
+    EXPECT_TRUE(again.preprocessed_here);
+    EXPECT_EQ(again.summary.name, expected.summary.name);
+    ASSERT_EQ(again.draw.splats.size(), expected.draw.splats.size());
+    EXPECT_EQ(std::memcmp(again.draw.splats.data(), expected.draw.splats.data(),
+                          expected.draw.splats.size() * sizeof(Splat)),
+              0);
+  }
+  write_draw_list(in_folder("saved.spl"), load_scene(request_).draw);
+  SceneRequest replay;
+  replay.scene = in_folder("saved.spl").string();
+  const LoadedScene list = preprocess_scene(open_scene(replay), {});
+  EXPECT_FALSE(list.preprocessed_here);
+  EXPECT_EQ(list.summary.name, "saved.spl");
+  EXPECT_EQ(list.draw.splats.size(), load_scene(request_).draw.splats.size());
 }
 
 TEST_F(SceneFile, UnknownKindsOfFilesAreRefusedWithWhatIsSupported) {

@@ -5,6 +5,7 @@
 
 #include <vrpipe/draw.h>
 #include <vrpipe/workloads/camera.h>
+#include <vrpipe/workloads/gaussian_scene.h>
 #include <vrpipe/workloads/preprocess.h>
 
 namespace vrpipe {
@@ -23,21 +24,38 @@ struct SceneRequest {
 
 struct LoadedScene {
   Draw draw;
-  SceneSummary summary;  ///< name: the file's name without folder, or builtin:NAME
+  SceneSummary summary;            ///< name: the file's name without folder, or builtin:NAME
+  bool preprocessed_here = false;  ///< false for a draw list
 };
 
 /// Image size of a .ply that is drawn without a camera file or a size.
 constexpr ImageSize kDefaultImageSize{1280, 720};
 
-/// Loads a scene and preprocesses it.
+/// A scene that can be preprocessed more than once: Gaussians and a camera, or a draw list, which is preprocessed
+/// already.
+struct OpenedScene {
+  std::string name;  ///< as SceneSummary has it
+  GaussianScene gaussians;
+  Camera camera;
+  std::optional<LoadedScene> draw_list;
+};
+
+/// Opens a scene.
 /// Built-in: its own camera and size; view options replace what they name, the rest stays.
 /// .ply: the camera of the file given, or the view options. What is not given comes from an automatic view: it looks
 /// at the median position from a distance at which the middle 80 % of the positions fit (a ball of radius 0.5 and of
 /// three median sigmas at least), from the front (-z), 30 degrees to the left and 20 degrees above, with the world's
 /// up at 0,-1,0 (y points down, as in INRIA and COLMAP worlds; give --up 0,1,0 for y-up files) and a vertical field of
 /// view of 50 degrees.
-/// .spl: the draw as it is; size, camera and view options are refused.
+/// .spl: the draw as it is; size, camera, view options and preprocessing other than the default are refused.
 /// @throws UserError for whatever cannot be used
+OpenedScene open_scene(const SceneRequest& request);
+
+/// Preprocesses an opened scene; of a draw list, a copy.
+/// @throws UserError as preprocess()
+LoadedScene preprocess_scene(const OpenedScene& scene, const PreprocessOptions& options);
+
+/// Opens a scene and preprocesses it. Throws as these do.
 LoadedScene load_scene(const SceneRequest& request);
 
 }  // namespace vrpipe

@@ -1,0 +1,449 @@
+#include "tool_test_support.h"
+
+#include <cmath>
+#include <map>
+#include <regex>
+#include <set>
+
+#include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/gaussian_scene.h>
+
+#include "picture.h"
+#include "precision_knobs.h"
+#include "settings.h"
+#include "svg_plot.h"
+#include "trade_off.h"
+
+namespace vrpipe::testing {
+namespace {
+
+using nlohmann::json;
+
+class Accuracy : public ToolTest {
+ protected:
+  json accuracy(std::vector<std::string> options) const {
+    options.insert(options.begin(), {"accuracy", "--scene", "tiny.spl"});
+    return json_of(options);
+  }
+};
+
+std::size_t occurrences(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++count;
+  return count;
+}
+
+// What does not depend on the scene.
+
+TEST(TradeOffs, TheFrontIsWhatNothingBeatsInBoth) {
+  using tools::dominated;
+  EXPECT_EQ(dominated({{1, 9}, {2, 5}, {3, 6}, {4, 0}}), (std::vector<bool>{false, false, true, false}));
+  // Worse in one and equal in the other is beaten; equals are not.
+  EXPECT_EQ(dominated({{1, 1}, {1, 2}, {2, 1}, {1, 1}}), (std::vector<bool>{false, true, true, false}));
+  EXPECT_EQ(dominated({{1, -INFINITY}, {0, 3}, {2, -INFINITY}}), (std::vector<bool>{false, false, true}));
+  EXPECT_TRUE(dominated({}).empty());
+}
+
+TEST(PrecisionKnobs, AreAllThatTheHardwareChooses) {
+  std::vector<std::string> names;
+  for (const auto& knob : tools::precision_knobs()) names.push_back(knob.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"format", "blend_rounding", "termination_threshold", "termination_compare",
+                                             "termination", "pruning_threshold", "subpixel_bits", "exponential",
+                                             "depth_key_bits", "sh_degree", "splat_extent", "quad_merging",
+                                             "early_termination"}));
+  // A choice that is added to a parameter belongs here too.
+  for (const ParameterListing& unit : tools::all_parameters(nullptr)) {
+    for (const Parameter* parameter : unit.parameters->parameters()) {
+      if ((unit.unit != "state" && unit.unit != "preprocess") || dynamic_cast<const Choice*>(parameter) == nullptr) {
+        continue;
+      }
+      const auto& knobs = tools::precision_knobs();
+      const auto knob =
+          std::find_if(knobs.begin(), knobs.end(), [&](const auto& one) { return one.name == parameter->name(); });
+      ASSERT_NE(knob, knobs.end()) << parameter->name();
+      std::string values;
+      for (const std::string& value : knob->values) values += (values.empty() ? "one of " : ", ") + value;
+      EXPECT_EQ(values, parameter->range()) << parameter->name();
+    }
+  }
+}
+
+TEST(PrecisionKnobs, EachTakesItsValuesAndTellsThem) {
+  tools::PrecisionSettings untouched;
+  untouched.request.platform = &platforms().front();
+  untouched.request.variant = variant_named("het+qm");
+  for (const auto& knob : tools::precision_knobs()) {
+    SCOPED_TRACE(knob.name);
+    const auto has = [&](const std::string& value) {
+      return std::find(knob.values.begin(), knob.values.end(), value) != knob.values.end();
+    };
+    EXPECT_TRUE(has(knob.value(untouched))) << "the default " << knob.value(untouched) << " is not on the ladder";
+    EXPECT_TRUE(knob.quick_value.empty() || has(knob.quick_value));
+    EXPECT_NE(knob.quick_value, knob.value(untouched));
+    for (const std::string& value : knob.values) {
+      tools::PrecisionSettings settings = untouched;
+      knob.set(settings, value);
+      EXPECT_EQ(knob.value(settings), value);
+      EXPECT_NO_THROW(check_configuration(settings.request)) << value;
+      for (const auto& other : tools::precision_knobs()) {
+        if (other.name != knob.name) {
+          EXPECT_EQ(other.value(settings), other.value(untouched)) << other.name;
+        }
+      }
+    }
+  }
+}
+
+TEST(Pictures, AreAveragedAndTheirErrorMapsKeepTheLargest) {
+  tools::ShownImage image{5, 3, std::vector<double>(45, 0.0)};
+  image.rgb[0] = 1;  // red of the first pixel
+  const tools::Picture picture = tools::picture_of(image, 3);
+  EXPECT_EQ(picture.width, 3U);
+  EXPECT_EQ(picture.height, 2U);
+  EXPECT_EQ(picture.rgb[0], 64);
+  EXPECT_EQ(picture.rgb[1], 0);
+  const tools::ShownImage black{5, 3, std::vector<double>(45, 0.0)};
+  const tools::Picture map = tools::error_map(image, black, 3);
+  const auto worst = tools::error_color(1);
+  const auto none = tools::error_color(0);
+  EXPECT_TRUE(std::equal(worst.begin(), worst.end(), map.rgb.begin()));
+  EXPECT_TRUE(std::equal(none.begin(), none.end(), map.rgb.begin() + 3));
+  EXPECT_NE(worst, none);
+  EXPECT_EQ(tools::picture_of(image, 5).width, 5U);
+}
+
+TEST(Plots, LabelsNeverOverlap) {
+  tools::Plot plot;
+  for (int i = 0; i < 40; ++i) {
+    plot.points.push_back(
+        {1 + 0.002 * i, 0.05 * (i % 7), "#000", tools::Marker::circle, false, "label number " + std::to_string(i), ""});
+  }
+  plot.points.push_back({2, 1, "#000", tools::Marker::circle, false, "far", ""});
+  const std::string drawn = tools::svg(plot);
+  EXPECT_NE(drawn.find(">far<"), std::string::npos);
+  struct Label {
+    double x, y;
+    std::string anchor;
+    double width;
+  };
+  std::vector<Label> labels;
+  const std::regex pattern(
+      R"re(<text x="([-0-9.]+)" y="([-0-9.]+)" text-anchor="(\w+)" class="label">([^<]*)</text>)re");
+  for (std::sregex_iterator i(drawn.begin(), drawn.end(), pattern), end; i != end; ++i) {
+    labels.push_back({std::stod((*i)[1]), std::stod((*i)[2]), (*i)[3], 6.0 * static_cast<double>((*i)[4].length())});
+  }
+  ASSERT_GT(labels.size(), 5U);
+  const auto left = [](const Label& label) {
+    return label.anchor == "start" ? label.x
+           : label.anchor == "end" ? label.x - label.width
+                                   : label.x - label.width / 2;
+  };
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      const bool apart = std::fabs(labels[i].y - labels[k].y) >= 12 ||
+                         left(labels[i]) >= left(labels[k]) + labels[k].width ||
+                         left(labels[k]) >= left(labels[i]) + labels[i].width;
+      EXPECT_TRUE(apart) << i << " and " << k;
+    }
+  }
+}
+
+TEST(Plots, EscapeWhatTheyAreGiven) {
+  tools::Plot plot;
+  plot.points.push_back({1, 1, "#000", tools::Marker::star, false, "<b>&\"", "<i>"});
+  const std::string drawn = tools::svg(plot);
+  EXPECT_NE(drawn.find("&lt;b&gt;&amp;&quot;"), std::string::npos);
+  EXPECT_EQ(drawn.find("<i>"), std::string::npos);
+  EXPECT_EQ(drawn.find("nan"), std::string::npos);
+}
+
+// The command.
+
+TEST_F(Accuracy, FidelityHasEveryVariantAtEveryRung) {
+  const json result = accuracy({});
+  EXPECT_EQ(result["schema"], "vrpipe.accuracy/1");
+  EXPECT_EQ(result["scene"]["name"], "tiny.spl");
+  EXPECT_EQ(result["scene"]["width"], 48);
+  EXPECT_EQ(result["platform"]["name"], platforms().front().name);
+  EXPECT_EQ(result["platform"]["parameters"]["state.exponential"], "ex2");
+  const json& ladder = result["fidelity"];
+  ASSERT_EQ(ladder.size(), variants().size() * fidelities().size());
+  std::map<std::string, double> baseline;
+  std::map<std::string, double> exact;
+  for (const json& rung : ladder) {
+    if (rung["variant"] == "baseline" && rung["cycles"].is_number()) baseline[rung["fidelity"]] = rung["cycles"];
+    if (rung["fidelity"] == "cycle") exact[rung["variant"]] = rung["cycles"];
+  }
+  std::size_t i = 0;
+  for (const Variant& variant : variants()) {
+    std::vector<tools::TradeOff> timed;
+    std::vector<bool> said;
+    for (const Fidelity fidelity : fidelities()) {
+      const json& rung = ladder[i++];
+      SCOPED_TRACE(rung.dump());
+      EXPECT_EQ(rung["variant"], variant.name);
+      EXPECT_EQ(rung["fidelity"], name_of(fidelity));
+      EXPECT_GT(rung["host_seconds"].get<double>(), 0);
+      EXPECT_GT(rung["quads_per_second"].get<double>(), 0);
+      EXPECT_TRUE(rung["kernel_events"].is_number_unsigned());
+      EXPECT_TRUE(rung["dominated"].is_boolean());
+      if (fidelity == Fidelity::functional) {
+        for (const char* key : {"cycles", "cycles_error_percent", "speedup", "speedup_error_percent"}) {
+          EXPECT_TRUE(rung[key].is_null()) << key;
+        }
+        EXPECT_FALSE(rung["dominated"].get<bool>());
+        continue;
+      }
+      const double cycles = rung["cycles"];
+      const double error = rung["cycles_error_percent"];
+      EXPECT_NEAR(error, 100 * (cycles / exact[variant.name] - 1), 1e-9);
+      EXPECT_NEAR(rung["speedup"].get<double>(), baseline[name_of(fidelity)] / cycles, 1e-9);
+      EXPECT_NEAR(rung["speedup_error_percent"].get<double>(),
+                  100 * (rung["speedup"].get<double>() / (baseline["cycle"] / exact[variant.name]) - 1), 1e-9);
+      timed.push_back({rung["host_seconds"], std::fabs(error)});
+      said.push_back(rung["dominated"]);
+    }
+    EXPECT_EQ(said, tools::dominated(timed)) << variant.name;
+  }
+}
+
+TEST_F(Accuracy, InStrictTerminationEveryRungHasTheSameImage) {
+  const json result = accuracy({"--termination", "strict", "--quick"});
+  ASSERT_FALSE(result["fidelity"].empty());
+  for (const json& rung : result["fidelity"]) {
+    EXPECT_TRUE(rung["image_equal"].get<bool>()) << rung;
+    EXPECT_EQ(rung["image_max_abs_difference"], 0);
+    EXPECT_EQ(rung["fragments_blended_error_percent"], 0);
+  }
+}
+
+TEST_F(Accuracy, PrecisionHasEveryValueOfEveryKnob) {
+  const json result = accuracy({});
+  const json& ladder = result["precision"];
+  std::size_t i = 0;
+  json by_default;
+  for (const auto& knob : tools::precision_knobs()) {
+    if (knob.is_preprocessing) continue;  // of no meaning for a draw list
+    std::size_t defaults = 0;
+    for (const std::string& value : knob.values) {
+      ASSERT_LT(i, ladder.size());
+      const json& row = ladder[i++];
+      SCOPED_TRACE(row.dump());
+      EXPECT_EQ(row["knob"], knob.name);
+      EXPECT_EQ(row["value"], value);
+      EXPECT_TRUE(row["psnr_db"].is_number() && row["ssim"].is_number() && row["max_abs_error"].is_number());
+      EXPECT_TRUE(row["cycles"].is_number_unsigned() && row["pixels_stuck"].is_number_unsigned());
+      EXPECT_GT(row["host_seconds"].get<double>(), 0);
+      EXPECT_LE(row["pixels_differing_8bit"].get<unsigned>(), 48U * 40U);
+      EXPECT_EQ(row["costs_no_time"].get<bool>(), row["cycles_change_percent"] == 0);
+      if (!row["default"].get<bool>()) continue;
+      ++defaults;
+      if (by_default.is_null()) by_default = row;
+      EXPECT_EQ(row["result_hash"], by_default["result_hash"]);
+      EXPECT_EQ(row["cycles_change_percent"], 0);
+    }
+    EXPECT_EQ(defaults, 1U) << knob.name;
+  }
+  EXPECT_EQ(i, ladder.size());
+  EXPECT_EQ(result["knobs_left_out"], (json{"depth_key_bits", "sh_degree"}));
+  // The default's numbers are those of `run`.
+  const json alone = json_of({"run", "--scene", "tiny.spl"})["runs"][0];
+  EXPECT_EQ(by_default["result_hash"], alone["result_hash"]);
+  EXPECT_EQ(by_default["cycles"], alone["cycles"]);
+}
+
+TEST_F(Accuracy, FewerBitsAreFartherFromTheExactImage) {
+  std::map<std::string, json> rows;
+  const json result = accuracy({"--set", "state.exponential=exact"});
+  for (const json& row : result["precision"]) {
+    rows[row["knob"].get<std::string>() + "=" + row["value"].get<std::string>()] = row;
+  }
+  const auto psnr = [&](const std::string& name) { return rows.at(name)["psnr_db"].get<double>(); };
+  EXPECT_TRUE(rows.at("exponential=exact")["default"].get<bool>());
+  EXPECT_GT(psnr("format=rgba16f"), psnr("format=rgba8") + 5);
+  EXPECT_GT(psnr("exponential=exact"), psnr("exponential=table16") + 1);
+  EXPECT_GT(psnr("termination_threshold=0.999"), psnr("termination_threshold=0.98"));
+  // Two images of which one is more than another 8-bit level off, and the other nearly exact.
+  EXPECT_GT(rows.at("format=rgba8")["max_abs_error"].get<double>(), 1 / 255.0);
+  EXPECT_GT(rows.at("format=rgba8")["share_differing_8bit"].get<double>(),
+            rows.at("early_termination=off")["share_differing_8bit"].get<double>());
+}
+
+/// Gaussians at many depths close together, whose colours depend on the direction.
+void write_scene(const std::filesystem::path& path) {
+  GaussianSceneBuilder builder(3);
+  for (unsigned i = 0; i < 300; ++i) {
+    GaussianAttributes gaussian;
+    gaussian.position = {0.02F * static_cast<float>(i % 17) - 0.16F, 0.02F * static_cast<float>(i % 13) - 0.12F,
+                         2 + 0.001F * static_cast<float>(i * 7 % 300)};
+    gaussian.log_scale = {-3, -2.5F, -3};
+    gaussian.opacity_logit = i % 2 == 0 ? 2.0F : -1.0F;
+    gaussian.f_dc = {i % 3 == 0 ? 1.0F : 0.0F, i % 3 == 1 ? 1.0F : 0.0F, i % 3 == 2 ? 1.0F : 0.0F};
+    for (auto& channel : gaussian.f_rest) channel.fill(0.3F);
+    builder.add(gaussian);
+  }
+  // Far away, so that few bits of a depth are left for the others.
+  GaussianAttributes far;
+  far.position = {0, 0, 1e6F};
+  far.log_scale = {9, 9, 9};
+  far.opacity_logit = 1;
+  builder.add(far);
+  write_gaussian_ply(path, builder.build());
+}
+
+TEST_F(Accuracy, KnobsOfPreprocessingPreprocessAgain) {
+  write_scene(folder() / "scene.ply");
+  const auto with_view = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--scene", "scene.ply", "--size", "48x48", "--eye", "0,0,0", "--look-at",
+                                       "0,0,1", "--fidelity", "functional"});
+    return arguments;
+  };
+  const json result = json_of(with_view({"accuracy", "--quick"}));
+  std::map<std::string, json> rows;
+  for (const json& row : result["precision"]) {
+    rows[row["knob"].get<std::string>() + "=" + row["value"].get<std::string>()] = row;
+    EXPECT_TRUE(row["cycles"].is_null() && row["costs_no_time"].is_null()) << row;
+  }
+  EXPECT_EQ(result["precision_fidelity"], "functional");
+  EXPECT_EQ(result["platform"]["parameters"]["preprocess.sh_degree"], 3);
+  EXPECT_EQ(result["platform"]["parameters"]["preprocess.depth_key_bits"], "32");
+  for (const char* changed : {"sh_degree=0", "depth_key_bits=12"}) {
+    const json& row = rows.at(changed);
+    EXPECT_NE(row["result_hash"], rows.at("sh_degree=3")["result_hash"]) << changed;
+    EXPECT_LT(row["psnr_db"].get<double>(), rows.at("sh_degree=3")["psnr_db"].get<double>()) << changed;
+    const json run = json_of(with_view({"run", "--set", std::string("preprocess.") + changed}));
+    EXPECT_EQ(row["result_hash"], run["runs"][0]["result_hash"]) << changed;
+  }
+}
+
+TEST_F(Accuracy, QuickIsSmallerAndSaysSo) {
+  const Finished finished = vrpipe({"accuracy", "--quick", "--scene", "tiny.spl"});
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  EXPECT_NE(finished.out.find("a quick look"), std::string::npos);
+  const json quick = accuracy({"--quick"});
+  EXPECT_TRUE(quick["quick"].get<bool>());
+  EXPECT_EQ(quick["fidelity"].size(), 2 * fidelities().size());
+  EXPECT_LT(quick["precision"].size(), accuracy({})["precision"].size());
+}
+
+TEST_F(Accuracy, ReportSaysWhatCostsNothing) {
+  const Finished finished = vrpipe({"accuracy", "--scene", "tiny.spl"});
+  EXPECT_EQ(finished.code, 0);
+  EXPECT_EQ(finished.err, "");
+  // No half equals the threshold, so >= and > are the same.
+  EXPECT_TRUE(std::regex_search(finished.out, std::regex("cost no simulated time: [^\n]*termination_compare")))
+      << finished.out;
+  for (const char* part : {"Fidelity", "Precision", "speed-up", "PSNR", "SSIM", "stuck", "dominated",
+                           "bound: cycles within", "exponential, default ex2", "1/255", "left out"}) {
+    EXPECT_NE(finished.out.find(part), std::string::npos) << part << " is not in:\n" << finished.out;
+  }
+  for (const char c : finished.out) ASSERT_TRUE(c == '\n' || (c >= ' ' && c <= '~')) << finished.out;
+}
+
+TEST_F(Accuracy, MarkdownHoldsBothTables) {
+  const Finished finished = vrpipe({"accuracy", "--scene", "tiny.spl", "--quick", "--markdown"});
+  EXPECT_EQ(finished.code, 0);
+  EXPECT_NE(finished.out.find("| variant | fidelity | cycles |"), std::string::npos) << finished.out;
+  EXPECT_NE(finished.out.find("| knob | value | PSNR, dB |"), std::string::npos);
+}
+
+TEST_F(Accuracy, ResultsDoNotDependOnTheNumberOfProcesses) {
+  json results[2];
+  const char* const jobs[] = {"1", "3"};
+  for (std::size_t i = 0; i < 2; ++i) {
+    results[i] = accuracy({"--jobs", jobs[i]});
+    for (const char* ladder : {"fidelity", "precision"}) {
+      for (json& row : results[i][ladder]) {
+        for (const char* key : {"host_seconds", "quads_per_second", "dominated"}) row.erase(key);
+      }
+    }
+    results[i].erase("precision_processes");
+  }
+  EXPECT_EQ(results[0], results[1]);
+}
+
+TEST_F(Accuracy, PageStandsAlone) {
+  write("<b>.spl", read_file(folder() / "tiny.spl"));
+  const Finished finished = vrpipe({"accuracy", "--scene", "<b>.spl", "--quick", "--html", "page.html"});
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  const std::string page = read_file(folder() / "page.html");
+  EXPECT_EQ(page.rfind("<!DOCTYPE html>", 0), 0U);
+  EXPECT_EQ(occurrences(page, "</html>"), 1U);
+  EXPECT_EQ(occurrences(page, "<svg"), 2U);
+  // Nothing is loaded: the only address is the name of SVG.
+  EXPECT_EQ(occurrences(page, "http"), occurrences(page, "xmlns=\"http://www.w3.org/2000/svg\""));
+  EXPECT_EQ(occurrences(page, "src="), occurrences(page, "src=\"data:image/png;base64,"));
+  for (const char* loading : {"<script", "<link", "<iframe", "@import", "url(", "href="}) {
+    EXPECT_EQ(page.find(loading), std::string::npos) << loading;
+  }
+  // The reference, and for each run an image and an error map.
+  std::set<std::string> runs;
+  const json quick = accuracy({"--quick"});
+  for (const json& row : quick["precision"]) {
+    if (!row["default"].get<bool>()) runs.insert(row["knob"].get<std::string>() + row["value"].get<std::string>());
+  }
+  EXPECT_EQ(occurrences(page, "<img"), 1 + 2 * (1 + runs.size()));
+  EXPECT_NE(page.find("&lt;b&gt;.spl"), std::string::npos);
+  EXPECT_EQ(page.find("<b>.spl"), std::string::npos);
+  for (const char* broken : {">nan", " nan", "inf dB", "{}"}) EXPECT_EQ(page.find(broken), std::string::npos) << broken;
+}
+
+TEST_F(Accuracy, WritesTheImageOfEveryChoice) {
+  const Finished finished = vrpipe({"accuracy", "--scene", "tiny.spl", "--quick", "--output", "new", "--html",
+                                    "new/page.html", "--json", "new/result.json", "--save-draw", "new/draw.spl"});
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  const std::vector<std::string> there = files();
+  for (const char* file :
+       {"new/tiny-reference.png", "new/tiny-reference.exr", "new/tiny-default.png", "new/tiny-format-rgba8.png",
+        "new/tiny-exponential-table16.exr", "new/page.html", "new/result.json", "new/draw.spl"}) {
+    EXPECT_TRUE(std::binary_search(there.begin(), there.end(), file)) << file;
+  }
+  for (const std::string& file : there) EXPECT_EQ(file.find("tmp"), std::string::npos) << file;
+}
+
+TEST_F(Accuracy, RefusesBadInputAndWritesNothing) {
+  const std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>> cases{
+      {{"--format", "rgb10a2"}, {"rgb10a2", "2-bit alpha", "rgba16f"}},
+      {{"--format", "r11g11b10f"}, {"r11g11b10f", "no alpha"}},
+      {{"--variant", "qm"}, {"'--variant'", "`vrpipe run`"}},
+      {{"--repeat", "0"}, {"--repeat", "1 to 100"}},
+      {{"--html", "nowhere/page.html"}, {"--html nowhere/page.html", "no folder"}},
+      {{"--html", ""}, {"--html", "missing value"}},
+      {{"--fidelity", "exact"}, {"'exact'", "cycle"}},
+      {{"--set", "preprocess.sh_degree=1"}, {"preprocess.sh_degree", ".spl", "preprocessed already"}},
+      {{"--set", "preprocess.depth_key_bits=16"}, {"preprocess.depth_key_bits", ".spl"}},
+      {{"--set", "preprocess.sh_degree=4"}, {"preprocess.sh_degree", "0 to 3"}},
+      {{"--set", "preprocess.depth_key_bits=20"}, {"'20'", "32, 24, 16, 12"}},
+      {{"--set", "preprocess.sh=1"}, {"did you mean preprocess.sh_degree?"}},
+      {{"--set", "preproces.sh_degree=1"}, {"did you mean preprocess?"}}};
+  const std::vector<std::string> before = files();
+  for (const auto& [options, parts] : cases) {
+    std::vector<std::string> arguments{"accuracy", "--scene", "tiny.spl"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Finished finished = vrpipe(arguments);
+    SCOPED_TRACE(finished.err);
+    EXPECT_EQ(finished.code, 2);
+    EXPECT_EQ(finished.out, "");
+    EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1);
+    EXPECT_EQ(finished.err.rfind("vrpipe: error: ", 0), 0U);
+    for (const std::string& part : parts) EXPECT_NE(finished.err.find(part), std::string::npos) << part;
+    EXPECT_EQ(files(), before);
+  }
+}
+
+TEST_F(Accuracy, AnEmptyDrawIsFine) {
+  Draw empty;
+  empty.width = 8;
+  empty.height = 8;
+  write_draw_list(folder() / "empty.spl", empty);
+  const Finished finished = vrpipe({"accuracy", "--scene", "empty.spl", "--html", "page.html"});
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  const std::string page = read_file(folder() / "page.html");
+  for (const std::string& text : {finished.out, page}) {
+    for (const char* broken : {">nan", " nan", "\"nan", "inf dB"})
+      EXPECT_EQ(text.find(broken), std::string::npos) << broken;
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe::testing

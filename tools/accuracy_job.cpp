@@ -1,0 +1,279 @@
+#include "accuracy_job.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include <vrpipe/workloads/draw_list.h>
+#include <vrpipe/workloads/exact_image.h>
+#include <vrpipe/workloads/scene.h>
+
+#include "output_file.h"
+#include "processes.h"
+#include "simulation_job.h"
+#include "trade_off.h"
+
+namespace vrpipe::tools {
+namespace {
+
+/// A quick look takes the middle of the image, of which both sides are smaller by this.
+constexpr std::uint32_t quick_divisor = 3;
+// Of pictures on the page, at most.
+constexpr std::uint32_t picture_width = 280;
+constexpr std::uint32_t reference_width = 560;
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
+}
+
+double percent_above(double value, double reference) { return reference > 0 ? 100 * (value / reference - 1) : 0; }
+
+std::optional<double> error_percent(const std::optional<double>& value, const std::optional<double>& reference) {
+  if (!value || !reference) return std::nullopt;
+  return percent_above(*value, *reference);
+}
+
+std::optional<double> cycles_of(const RunResult& run) {
+  return run.cycles ? std::optional<double>(static_cast<double>(*run.cycles)) : std::nullopt;
+}
+
+/// The scene, and the one draw that most runs share.
+struct Workload {
+  OpenedScene scene;
+  PreprocessOptions options;
+  std::shared_ptr<const Draw> draw;
+
+  std::shared_ptr<const Draw> draw_with(const PreprocessOptions& wanted) const {
+    const bool same = wanted.sh_degree == options.sh_degree && wanted.depth_key_bits == options.depth_key_bits;
+    if (same || scene.draw_list) return draw;
+    return std::make_shared<const Draw>(preprocess_scene(scene, wanted).draw);
+  }
+};
+
+Workload load(const AccuracyJob& job, AccuracyResult& result) {
+  Workload workload;
+  workload.scene = open_scene(job.simulation.scene);
+  workload.options = job.simulation.scene.preprocess;
+  if (workload.scene.draw_list) {
+    result.full_width = workload.scene.draw_list->draw.width;
+    result.full_height = workload.scene.draw_list->draw.height;
+  } else {
+    Camera& camera = workload.scene.camera;
+    result.full_width = camera.width;
+    result.full_height = camera.height;
+    // A part of the image, not a smaller one: splats keep their size, and so the units their share of the work.
+    if (job.quick && !job.simulation.scene.size) {
+      camera.width = std::max(1U, camera.width / quick_divisor);
+      camera.height = std::max(1U, camera.height / quick_divisor);
+    }
+  }
+  LoadedScene loaded = preprocess_scene(workload.scene, workload.options);
+  result.scene = std::move(loaded.summary);
+  result.preprocessing = job.simulation.preprocessing;
+  result.width = loaded.draw.width;
+  result.height = loaded.draw.height;
+  workload.draw = std::make_shared<const Draw>(std::move(loaded.draw));
+  return workload;
+}
+
+void write_image(const AccuracyJob& job, const std::string& scene, const std::string& name, const SharedImage& image) {
+  const std::string stem = (*job.simulation.output / image_name(scene, name)).string();
+  write_output_file(stem + ".png", encode_png(image, job.simulation.background), "--output");
+  write_output_file(stem + ".exr", encode_exr(image), "--output");
+}
+
+/// The image that errors are measured against: all bands, exact order.
+ShownImage make_reference(const AccuracyJob& job, const Workload& workload, AccuracyResult& result) {
+  const Stopwatch watch;
+  const ExactImage exact = render_exactly(*workload.draw_with(PreprocessOptions()));
+  result.reference_seconds = watch.seconds();
+  if (job.simulation.output) {
+    SharedImage image(exact.width, exact.height);
+    float* value = image.values();
+    for (const std::array<double, 4>& pixel : exact.rgba) {
+      value = std::transform(pixel.begin(), pixel.end(), value, [](double x) { return static_cast<float>(x); });
+    }
+    write_image(job, result.scene.name, "reference", image);
+  }
+  ShownImage reference = shown(exact, job.simulation.background);
+  if (job.html) result.reference = picture_of(reference, reference_width);
+  return reference;
+}
+
+/// Compares the rungs of a variant, the first of which is the most exact.
+void compare_rungs(FidelityRung* rungs, std::size_t count) {
+  const FidelityRung& exact = rungs[0];
+  std::vector<FidelityRung*> timed;
+  std::vector<TradeOff> trade_offs;
+  for (FidelityRung* rung = rungs; rung != rungs + count; ++rung) {
+    rung->fragments_blended_error_percent = percent_above(static_cast<double>(rung->run.counts.fragments_blended),
+                                                          static_cast<double>(exact.run.counts.fragments_blended));
+    rung->cycles_error_percent = error_percent(cycles_of(rung->run), cycles_of(exact.run));
+    rung->speedup_error_percent = error_percent(rung->speedup, exact.speedup);
+    if (!rung->run.cycles) continue;
+    timed.push_back(rung);
+    trade_offs.push_back({rung->host_seconds, std::fabs(rung->cycles_error_percent.value_or(0))});
+  }
+  const std::vector<bool> beaten = dominated(trade_offs);
+  for (std::size_t i = 0; i < timed.size(); ++i) timed[i]->dominated = beaten[i];
+}
+
+void climb_fidelities(const AccuracyJob& job, const Workload& workload, AccuracyResult& result,
+                      ProgressLine& progress) {
+  // From the most exact on, so that its image is there to compare with.
+  std::vector<Fidelity> rungs = fidelities();
+  std::reverse(rungs.begin(), rungs.end());
+  std::vector<RunRequest> requests;
+  for (const RunRequest& request : job.simulation.requests) {
+    const Variant& variant = request.variant;
+    if (job.quick && variant.quad_merging != variant.early_termination) continue;
+    for (const Fidelity fidelity : rungs) {
+      requests.push_back(request);
+      requests.back().fidelity = fidelity;
+    }
+  }
+  std::vector<Task> tasks;
+  for (unsigned round = 0; round < job.repeat; ++round) {
+    for (const RunRequest& request : requests) {
+      tasks.push_back({request.variant.name + " " + vrpipe::name_of(request.fidelity), request,
+                       [&workload] { return workload.draw; }});
+    }
+  }
+  result.fidelity.resize(requests.size());
+  std::vector<std::vector<double>> seconds(requests.size());
+  ShownImage most_exact;
+  // One at a time: host seconds are those of a machine that does nothing else.
+  run_tasks(tasks, true, 1, "fidelity ", progress, [&](std::size_t index, Simulated&& simulated) {
+    const std::size_t place = index % requests.size();
+    seconds[place].push_back(simulated.result.host_seconds);
+    if (index >= requests.size()) return;
+    FidelityRung& rung = result.fidelity[place];
+    rung.run = std::move(simulated.result);
+    ShownImage image = shown(*simulated.image, job.simulation.background);
+    if (rung.run.request.fidelity == rungs.front()) most_exact = image;
+    rung.image = image_error(image, most_exact);
+  });
+
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    FidelityRung& rung = result.fidelity[i];
+    rung.host_seconds = median(seconds[i]);
+    const auto quads = static_cast<double>(rung.run.counts.quads_rasterized);
+    rung.quads_per_second = rung.host_seconds > 0 ? quads / rung.host_seconds : 0;
+    const std::optional<double> cycles = cycles_of(rung.run);
+    const std::optional<double> baseline = cycles_of(result.fidelity[i % rungs.size()].run);
+    if (cycles && baseline && *cycles > 0) rung.speedup = *baseline / *cycles;
+  }
+  for (std::size_t first = 0; first < requests.size(); first += rungs.size()) {
+    compare_rungs(&result.fidelity[first], rungs.size());
+    std::reverse(result.fidelity.begin() + static_cast<std::ptrdiff_t>(first),
+                 result.fidelity.begin() + static_cast<std::ptrdiff_t>(first + rungs.size()));
+  }
+}
+
+/// All knobs' values, and the settings of the runs that they need; the default is the first run.
+std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_draw_list, AccuracyResult& result) {
+  std::vector<PrecisionSettings> settings{{result.base, job.simulation.scene.preprocess}};
+  result.runs.resize(1);
+  result.runs.front().name = "default";
+  for (const PrecisionKnob& knob : precision_knobs()) {
+    if (job.quick && knob.quick_value.empty()) continue;
+    if (knob.is_preprocessing && is_draw_list) {
+      result.knobs_left_out.push_back(knob.name);
+      continue;
+    }
+    const std::string chosen = knob.value(settings.front());
+    std::vector<std::string> values = job.quick ? std::vector<std::string>{knob.quick_value} : knob.values;
+    if (std::find(values.begin(), values.end(), chosen) == values.end()) values.insert(values.begin(), chosen);
+    for (const std::string& value : values) {
+      if (value == chosen) {
+        result.precision.push_back({&knob, value, 0});
+        continue;
+      }
+      result.precision.push_back({&knob, value, settings.size()});
+      settings.push_back(settings.front());
+      knob.set(settings.back(), value);
+      result.runs.emplace_back();
+      result.runs.back().name = knob.name + "=" + value;
+    }
+  }
+  return settings;
+}
+
+void climb_precisions(const AccuracyJob& job, const Workload& workload, const ShownImage& reference,
+                      AccuracyResult& result, ProgressLine& progress) {
+  const std::vector<PrecisionSettings> settings = choose_values(job, workload.scene.draw_list.has_value(), result);
+  std::vector<Task> tasks;
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const PreprocessOptions options = settings[i].preprocess;
+    tasks.push_back(
+        {result.runs[i].name, settings[i].request, [&workload, options] { return workload.draw_with(options); }});
+  }
+  result.processes = std::min(job.simulation.processes, static_cast<unsigned>(tasks.size()));
+  run_tasks(tasks, true, result.processes, "precision ", progress, [&](std::size_t index, Simulated&& simulated) {
+    PrecisionRun& run = result.runs[index];
+    run.run = std::move(simulated.result);
+    const ShownImage image = shown(*simulated.image, job.simulation.background);
+    run.error = image_error(image, reference);
+    for (const StatisticReport& statistic : run.run.statistics) {
+      if (statistic.name == "crop.pixels_stuck") run.pixels_stuck = statistic.value;
+    }
+    if (job.html) {
+      run.picture = picture_of(image, picture_width);
+      run.error_map = error_map(image, reference, picture_width);
+    }
+    if (job.simulation.output) {
+      std::string name = run.name;
+      std::replace(name.begin(), name.end(), '=', '-');
+      write_image(job, result.scene.name, name, *simulated.image);
+    }
+  });
+
+  std::vector<TradeOff> trade_offs;
+  for (PrecisionRun& run : result.runs) {
+    run.cycles_change_percent = error_percent(cycles_of(run.run), cycles_of(result.runs.front().run));
+    trade_offs.push_back({cycles_of(run.run).value_or(0), -run.error.psnr_db});
+  }
+  if (!result.runs.front().run.cycles) return;
+  const std::vector<bool> beaten = dominated(trade_offs);
+  for (std::size_t i = 0; i < result.runs.size(); ++i) result.runs[i].on_front = !beaten[i];
+}
+
+}  // namespace
+
+AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) {
+  const Stopwatch watch;
+  AccuracyResult result;
+  result.quick = job.quick;
+  result.repeat = job.repeat;
+  result.base = job.simulation.requests.back();  // with all that the paper adds
+  progress.show("loading the scene");
+  const Workload workload = load(job, result);
+  if (job.simulation.output) create_output_folder(*job.simulation.output, "--output");
+  if (job.simulation.save_draw) write_draw_list(*job.simulation.save_draw, *workload.draw);
+  progress.show("rendering the exact image");
+  const ShownImage reference = make_reference(job, workload, result);
+  climb_fidelities(job, workload, result, progress);
+  climb_precisions(job, workload, reference, result, progress);
+  if (!workload.scene.draw_list) {
+    for (PrecisionRun& run : result.runs) {
+      run.run.parameters.insert(run.run.parameters.end(), job.simulation.preprocess_parameters.begin(),
+                                job.simulation.preprocess_parameters.end());
+    }
+  }
+  result.seconds = watch.seconds();
+  return result;
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vrpipe/platforms/simulation.h>
+
+#include "image_error.h"
+#include "options.h"
+#include "picture.h"
+#include "precision_knobs.h"
+#include "progress_line.h"
+
+namespace vrpipe::tools {
+
+/// What `vrpipe accuracy` is asked to do.
+struct AccuracyJob {
+  SimulationJob simulation;
+  bool quick = false;                         ///< the middle of the image, fewer variants and values
+  unsigned repeat = 1;                        ///< times that each rung of the fidelity ladder is measured
+  std::optional<std::filesystem::path> html;  ///< file
+  bool markdown = false;                      ///< the tables for documentation in place of the report
+};
+
+/// One variant at one fidelity, beside the most exact fidelity.
+struct FidelityRung {
+  RunResult run;
+  double host_seconds = 0;                     ///< the median, measured with nothing else running
+  std::optional<double> cycles_error_percent;  ///< above 0: too many cycles; none without time
+  std::optional<double> speedup;               ///< over the baseline at the same fidelity
+  std::optional<double> speedup_error_percent;
+  double quads_per_second = 0;  ///< rasterised, per host second
+  double fragments_blended_error_percent = 0;
+  ImageError image;        ///< against the most exact fidelity's
+  bool dominated = false;  ///< another rung is no worse in error and time, and better in one
+};
+
+/// A run of the precision ladder.
+struct PrecisionRun {
+  std::string name;                             ///< KNOB=VALUE, or "default"
+  RunResult run;                                ///< with its host seconds beside other processes
+  ImageError error;                             ///< against the exact image
+  std::uint64_t pixels_stuck = 0;               ///< below the termination threshold, by rounding
+  std::optional<double> cycles_change_percent;  ///< against the default; none without time
+  bool on_front = false;                        ///< none is as exact in fewer cycles; false without time
+  Picture picture, error_map;                   ///< for the page; else empty
+};
+
+/// A knob's value, and the run that has it.
+struct PrecisionRow {
+  const PrecisionKnob* knob;
+  std::string value;
+  std::size_t run;  ///< 0 is the default
+};
+
+struct AccuracyResult {
+  SceneSummary scene;
+  std::uint32_t width = 0, height = 0;            ///< pixels
+  std::uint32_t full_width = 0, full_height = 0;  ///< of which a quick look takes the middle
+  bool quick = false;
+  unsigned repeat = 1;
+  unsigned processes = 1;                   ///< of the precision ladder
+  std::vector<Setting> preprocessing;       ///< what --set changed of it
+  RunRequest base;                          ///< what the precision ladder varies
+  std::vector<FidelityRung> fidelity;       ///< by variant, then from the least exact to the most
+  std::vector<PrecisionRun> runs;           ///< the default first
+  std::vector<PrecisionRow> precision;      ///< by knob
+  std::vector<std::string> knobs_left_out;  ///< those that mean nothing for a draw list
+  Picture reference;                        ///< the exact image, for the page
+  double reference_seconds = 0;             ///< to render it
+  double seconds = 0;                       ///< wall time of everything
+};
+
+/// Runs both ladders. Images go to the folder of --output. Throws UserError, CommandFailure or a fault.
+AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress);
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "accuracy_job.h"
+#include "terminal.h"
+
+namespace vrpipe::tools {
+
+/// A table of the accuracy report, whatever it is printed on.
+struct AccuracyTable {
+  struct Row {
+    std::string group;               ///< what the rows of a group have in common
+    std::vector<std::string> cells;  ///< as many as the heading has
+    bool marked = false;             ///< dominated, or on the Pareto front
+  };
+  std::string group_heading;
+  std::vector<std::string> heading;
+  std::vector<Row> rows;
+};
+AccuracyTable fidelity_table(const AccuracyResult& result);
+/// The default once, and below it every other value.
+AccuracyTable precision_table(const AccuracyResult& result);
+
+/// What the rungs of the fidelity ladder are good for, one line each.
+std::vector<std::string> fidelity_summary(const AccuracyResult& result);
+/// What knobs cost nothing, and what else the precision ladder says; one line each.
+std::vector<std::string> precision_summary(const AccuracyResult& result);
+
+/// What was drawn on which GPU, and how; one line each.
+std::vector<std::string> accuracy_heading(const AccuracyResult& result);
+
+/// For the terminal.
+std::string accuracy_text(const AccuracyResult& result, const TextStyle& style);
+/// For the documentation: heading, tables and summaries.
+std::string accuracy_markdown(const AccuracyResult& result);
+
+}  // namespace vrpipe::tools

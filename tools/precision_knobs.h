@@ -1,0 +1,38 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/preprocess.h>
+
+namespace vrpipe::tools {
+
+/// What knobs turn: a run, and the preprocessing before it.
+struct PrecisionSettings {
+  RunRequest request;
+  PreprocessOptions preprocess;
+};
+
+/// An arithmetic choice of the modelled hardware, or of what feeds it.
+struct PrecisionKnob {
+  std::string name;
+  std::string option;               ///< how the command line sets it, up to the value
+  std::string meaning;              ///< one line
+  std::vector<std::string> values;  ///< as the command line takes them
+  std::string quick_value;        ///< the one that a quick look tries, far from the default; none: leaves the knob out
+  bool is_preprocessing = false;  ///< of no meaning for a draw list
+  std::function<std::string(const PrecisionSettings&)> value;
+  std::function<void(PrecisionSettings&, const std::string&)> set;
+  /// Whether the model takes time for it. Without, cycles may still differ: by which fragments live.
+  bool is_charged = true;
+};
+
+/// All knobs, in the order of reports.
+const std::vector<PrecisionKnob>& precision_knobs();
+
+/// The value as people write it: n/255 for the thresholds that are one, else as it is.
+std::string readable_value(const PrecisionKnob& knob, const std::string& value);
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/preprocess.h>
+
+namespace vrpipe::tools {
+
+/// All that --set can set: what `list_parameters` lists, and `preprocess`.
+std::vector<ParameterListing> all_parameters(const Platform* platform);
+
+/// Settings of `--set`, by what they are for.
+struct SettingsByPart {
+  std::vector<Setting> machine;  ///< of units, l2 and state
+  std::vector<Setting> preprocessing;
+  PreprocessOptions preprocess;  ///< what `preprocessing` comes to
+  /// `preprocess.NAME` and value of every parameter of preprocessing.
+  std::vector<std::pair<std::string, std::string>> preprocess_parameters;
+};
+
+/// Sorts settings, and applies those of preprocessing. Throws UserError for an unknown parameter or a bad value of
+/// preprocessing; the others are not checked.
+SettingsByPart sort_settings(const std::vector<Setting>& settings);
+
+}  // namespace vrpipe::tools
