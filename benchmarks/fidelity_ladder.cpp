@@ -1,7 +1,9 @@
 // What each fidelity costs in accuracy and brings in speed: measured beside wanted, against `cycle`.
-//   fidelity_ladder [--repeat N] [SCENE ...]      (default: 3, and the built-in scenes)
-// A scene is a file or builtin:NAME. Rates are rasterised quads per second of processor time of this process, the median
-// of N runs of each rung in turn; a rung's rate is that of its slowest variant.
+//   fidelity_ladder [--repeat N] [SCENE ...]
+// A SCENE is a file or builtin:NAME; without one, the built-in scenes and, where there is a shared folder, playbot.
+// Accuracy: every rung and variant of every scene, once. Rates: the baseline of one large frame, each rung in turn N times
+// (default: 5), the median; of the first scene where the frame of the shared folder is absent. Rates are rasterised quads
+// per second of processor time of this process.
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -9,12 +11,15 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <string>
 #include <vector>
 
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/scene.h>
+
+#include "support/shared_folder.h"
 
 namespace vrpipe {
 
@@ -32,10 +37,14 @@ constexpr std::array<Rung, 5> rungs{{{Fidelity::functional, 0, 0, 10e6},
                                      {Fidelity::at, 3, 2, 6e6},
                                      {Fidelity::cycle, 0, 0, 4e6}}};
 
+struct Run {
+  double cycles = 0;
+  double quads_per_second = 0;
+};
+
 struct Worst {
   double cycles_percent = 0;
   double speedup_percent = 0;
-  double quads_per_second = INFINITY;
 };
 
 double processor_seconds() {
@@ -54,92 +63,133 @@ double median(std::vector<double> values) {
 
 double percent(double value, double reference) { return 100.0 * (value / reference - 1.0); }
 
-std::array<Worst, rungs.size()> climb(const std::string& name, int repeat) {
-  SceneRequest scene;
-  scene.scene = name;
-  const LoadedScene loaded = load_scene(scene);
-  std::array<Worst, rungs.size()> worst;
+Run run_once(const Draw& draw, const Variant& variant, Fidelity fidelity) {
+  RunRequest request;
+  request.platform = &platforms().front();
+  request.variant = variant;
+  request.fidelity = fidelity;
+  fresh_simulation();
+  const double start = processor_seconds();
+  const RunResult result = simulate(request, draw);
+  const double seconds = processor_seconds() - start;
+  return {static_cast<double>(result.cycles.value_or(0)),
+          static_cast<double>(result.counts.quads_rasterized) / seconds};
+}
+
+/// The rungs with time that one of the others beats in error and rate; `cycle` has no error.
+std::string dominated_by(std::size_t rung, const std::array<double, rungs.size()>& error,
+                         const std::array<double, rungs.size()>& rate) {
+  std::string names;
+  for (std::size_t other = 1; other < rungs.size() && rung > 0; ++other) {
+    if (error[other] >= error[rung] || rate[other] <= rate[rung]) continue;
+    names += std::string(names.empty() ? "dominated by " : ", ") + name_of(rungs[other].fidelity);
+  }
+  return names;
+}
+
+void measure_accuracy(const SceneRequest& request, std::array<Worst, rungs.size()>& worst) {
+  const LoadedScene scene = load_scene(request);
   std::array<double, rungs.size()> baseline{};
   for (const Variant& variant : variants()) {
-    std::array<double, rungs.size()> cycles{};
-    std::array<std::vector<double>, rungs.size()> rates;
-    for (int run = 0; run < repeat; ++run) {
-      for (std::size_t i = 0; i < rungs.size(); ++i) {
-        RunRequest request;
-        request.platform = &platforms().front();
-        request.variant = variant;
-        request.fidelity = rungs[i].fidelity;
-        fresh_simulation();
-        const double start = processor_seconds();
-        const RunResult result = simulate(request, loaded.draw);
-        rates[i].push_back(static_cast<double>(result.counts.quads_rasterized) / (processor_seconds() - start));
-        cycles[i] = static_cast<double>(result.cycles.value_or(0));
-      }
-    }
-    if (!variant.quad_merging && !variant.early_termination) baseline = cycles;
+    std::array<Run, rungs.size()> runs;
+    for (std::size_t i = 0; i < rungs.size(); ++i) runs[i] = run_once(scene.draw, variant, rungs[i].fidelity);
+    std::array<double, rungs.size()> error{};
+    std::array<double, rungs.size()> rate{};
     for (std::size_t i = 0; i < rungs.size(); ++i) {
-      const double rate = median(rates[i]);
-      worst[i].quads_per_second = std::min(worst[i].quads_per_second, rate);
-      if (rungs[i].fidelity == Fidelity::functional) {
-        std::printf("%-18s %-9s %-11s %12s %9s %12s %9.1f\n", name.c_str(), variant.name.c_str(),
-                    name_of(rungs[i].fidelity), "", "", "", rate / 1e6);
+      if (!variant.quad_merging && !variant.early_termination) baseline[i] = runs[i].cycles;
+      error[i] = std::fabs(percent(runs[i].cycles, runs.back().cycles));
+      rate[i] = runs[i].quads_per_second;
+    }
+    for (std::size_t i = 0; i < rungs.size(); ++i) {
+      std::printf("%-28s %-9s %-11s", scene.summary.name.c_str(), variant.name.c_str(), name_of(rungs[i].fidelity));
+      if (runs[i].cycles == 0) {
+        std::printf(" %12s %9s %9s %12s %9.1f\n", "", "", "", "", rate[i] / 1e6);
         continue;
       }
-      const double cycles_error = percent(cycles[i], cycles.back());
-      const double speedup_error = percent(baseline[i] / cycles[i], baseline.back() / cycles.back());
-      worst[i].cycles_percent = std::max(worst[i].cycles_percent, std::fabs(cycles_error));
+      const double speedup = baseline[i] / runs[i].cycles;
+      const double speedup_error = percent(speedup, baseline.back() / runs.back().cycles);
+      worst[i].cycles_percent = std::max(worst[i].cycles_percent, error[i]);
       worst[i].speedup_percent = std::max(worst[i].speedup_percent, std::fabs(speedup_error));
-      std::printf("%-18s %-9s %-11s %12.0f %+8.2f%% %+11.2f%% %9.1f\n", name.c_str(), variant.name.c_str(),
-                  name_of(rungs[i].fidelity), cycles[i], cycles_error, speedup_error, rate / 1e6);
-      std::fflush(stdout);
+      std::printf(" %12.0f %+8.2f%% %9.3f %+11.2f%% %9.1f  %s\n", runs[i].cycles,
+                  percent(runs[i].cycles, runs.back().cycles), speedup, speedup_error, rate[i] / 1e6,
+                  dominated_by(i, error, rate).c_str());
+    }
+    std::fflush(stdout);
+  }
+}
+
+std::array<double, rungs.size()> measure_rates(const SceneRequest& request, int repeat) {
+  const LoadedScene scene = load_scene(request);
+  std::array<std::vector<double>, rungs.size()> rates;
+  for (int run = 0; run < repeat; ++run) {
+    for (std::size_t i = 0; i < rungs.size(); ++i) {
+      rates[i].push_back(run_once(scene.draw, variants().front(), rungs[i].fidelity).quads_per_second);
     }
   }
-  return worst;
+  std::array<double, rungs.size()> medians{};
+  std::transform(rates.begin(), rates.end(), medians.begin(), median);
+  std::printf("\nrates: medians of %d runs of %s\n", repeat, scene.summary.name.c_str());
+  return medians;
 }
 
 int run(const std::vector<std::string>& arguments) {
-  int repeat = 3;
-  std::vector<std::string> scenes;
+  int repeat = 5;
+  std::vector<SceneRequest> scenes;
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     if (arguments[i] == "--repeat" && i + 1 < arguments.size()) {
       repeat = std::max(1, std::stoi(arguments[++i]));
     } else {
-      scenes.push_back(arguments[i]);
+      scenes.emplace_back().scene = arguments[i];
     }
   }
-  if (scenes.empty()) {
-    for (const std::string& name : builtin_scene_names()) scenes.push_back("builtin:" + name);
+  const bool all = scenes.empty();
+  if (all) {
+    for (const std::string& name : builtin_scene_names()) scenes.emplace_back().scene = "builtin:" + name;
+    const std::filesystem::path playbot = testing::shared_folder() / "scenes/playbot/playbot_lod2_sh2.inria.ply";
+    if (std::filesystem::exists(playbot)) {
+      SceneRequest& request = scenes.emplace_back();
+      request.scene = playbot.string();
+      request.size = ImageSize{640, 480};
+      request.eye = Vec3{-2.0, -1.5, -2.0};
+      request.look_at = Vec3{0.0, -0.35, 0.0};
+      request.up = Vec3{0.0, -1.0, 0.0};
+      request.fovy_degrees = 45;
+    } else {
+      std::printf("skipped: playbot_lod2_sh2.inria.ply, there is no shared folder\n");
+    }
   }
-  std::printf("%-18s %-9s %-11s %12s %9s %12s %9s\n", "scene", "variant", "fidelity", "cycles", "error", "speed-up err",
-              "Mquads/s");
+  std::printf("%-28s %-9s %-11s %12s %9s %9s %12s %9s\n", "scene", "variant", "fidelity", "cycles", "error", "speed-up",
+              "error", "Mquads/s");
   std::array<Worst, rungs.size()> worst;
-  for (const std::string& scene : scenes) {
-    const std::array<Worst, rungs.size()> here = climb(scene, repeat);
-    for (std::size_t i = 0; i < rungs.size(); ++i) {
-      worst[i].cycles_percent = std::max(worst[i].cycles_percent, here[i].cycles_percent);
-      worst[i].speedup_percent = std::max(worst[i].speedup_percent, here[i].speedup_percent);
-      worst[i].quads_per_second = std::min(worst[i].quads_per_second, here[i].quads_per_second);
-    }
+  for (const SceneRequest& scene : scenes) measure_accuracy(scene, worst);
+
+  SceneRequest frame = scenes.front();
+  const std::filesystem::path close = testing::shared_folder() / "silicon/playbot_close.spl";
+  if (all && std::filesystem::exists(close)) {
+    frame = SceneRequest();
+    frame.scene = close.string();
   }
-  std::printf("\nworst of all scenes and variants, and wanted\n");
+  const std::array<double, rungs.size()> rates = measure_rates(frame, repeat);
+
+  std::printf("errors: the worst of all scenes and variants\n");
   std::printf("%-11s %9s %9s %12s %9s %9s %9s\n", "fidelity", "cycles", "wanted", "speed-up", "wanted", "Mquads/s",
               "wanted");
+  std::array<double, rungs.size()> errors{};
+  for (std::size_t i = 0; i < rungs.size(); ++i) errors[i] = worst[i].cycles_percent;
   for (std::size_t i = 0; i < rungs.size(); ++i) {
     const Rung& rung = rungs[i];
-    const bool met = (rung.cycles_percent == 0 || worst[i].cycles_percent <= rung.cycles_percent) &&
-                     (rung.speedup_percent == 0 || worst[i].speedup_percent <= rung.speedup_percent) &&
-                     worst[i].quads_per_second >= rung.quads_per_second;
-    std::printf("%-11s %8.2f%% %8.0f%% %11.2f%% %8.0f%% %9.1f %9.0f  %s", name_of(rung.fidelity),
-                worst[i].cycles_percent, rung.cycles_percent, worst[i].speedup_percent, rung.speedup_percent,
-                worst[i].quads_per_second / 1e6, rung.quads_per_second / 1e6, met ? "met" : "MISSED");
-    for (std::size_t j = 1; j + 1 < rungs.size(); ++j) {
-      if (i == 0 || i + 1 == rungs.size() || worst[j].cycles_percent >= worst[i].cycles_percent ||
-          worst[j].quads_per_second <= worst[i].quads_per_second) {
-        continue;
-      }
-      std::printf(", dominated by %s", name_of(rungs[j].fidelity));
+    std::printf("%-11s", name_of(rung.fidelity));
+    if (rung.cycles_percent > 0) {
+      std::printf(" %8.2f%% %8.0f%% %11.2f%% %8.0f%%", worst[i].cycles_percent, rung.cycles_percent,
+                  worst[i].speedup_percent, rung.speedup_percent);
+    } else {
+      std::printf(" %9s %9s %12s %9s", "", "", "", "");
     }
-    std::printf("\n");
+    const bool met = (rung.cycles_percent == 0 || (worst[i].cycles_percent <= rung.cycles_percent &&
+                                                   worst[i].speedup_percent <= rung.speedup_percent)) &&
+                     rates[i] >= rung.quads_per_second;
+    std::printf(" %9.1f %9.0f  %s  %s\n", rates[i] / 1e6, rung.quads_per_second / 1e6, met ? "met" : "MISSED",
+                dominated_by(i, errors, rates).c_str());
   }
   return 0;
 }

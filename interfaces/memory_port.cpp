@@ -115,7 +115,9 @@ class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
     const std::uint64_t start = free_at_ > arrival ? free_at_ : arrival;
     free_at_ = start + payload.get_data_length();
     bytes += payload.get_data_length();
-    const std::uint64_t transfer = (free_at_ - arrival + memory_.bytes_per_cycle_ - 1) / memory_.bytes_per_cycle_;
+    const std::uint64_t waited = free_at_ - arrival;  // nearly always a cycle: a division is dear
+    const std::uint64_t transfer =
+        waited <= memory_.bytes_per_cycle_ ? 1 : (waited + memory_.bytes_per_cycle_ - 1) / memory_.bytes_per_cycle_;
     delay += sc_core::sc_time::from_value((memory_.latency_cycles_ + transfer) * memory_.domain_.period().value());
     payload.set_response_status(tlm::TLM_OK_RESPONSE);
   }

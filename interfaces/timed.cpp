@@ -18,7 +18,7 @@ std::map<std::string, TimedUnitMaker>& makers() {
 
 bool TimedUnit::idle() const {
   return std::all_of(in_ports.begin(), in_ports.end(), [](const InPort* port) { return port->empty(); }) &&
-         std::none_of(outputs_.begin(), outputs_.end(), [](const TimedOutput* out) { return out->blocked(); });
+         std::none_of(outputs_.begin(), outputs_.end(), [](const TimedOutput* out) { return !out->clear(); });
 }
 
 void TimedUnit::close_account(Cycle end) {
@@ -27,15 +27,16 @@ void TimedUnit::close_account(Cycle end) {
 }
 
 Cycle TimedUnit::tick(Cycle now) {
-  advance();
+  const Cycle until = now + activation_cycles;
+  Cycle next = never;
   bool served = true;
   while (served) {
     served = false;
-    for (TimedInput* input : inputs_) served = input->serve(now + lookahead_cycles) || served;
+    for (TimedInput* input : inputs_) served = input->serve(until) || served;
+    next = advance(until);
   }
-  Cycle next = never;
   for (const TimedInput* input : inputs_) next = std::min(next, input->next());
-  return std::max(next, now + 1);
+  return activation_for(next, now);
 }
 
 TimedMemoryPort::TimedMemoryPort(PortOwner& owner, const std::string& name)
@@ -62,12 +63,20 @@ Cycle TimedMemoryPort::access(tlm::tlm_command command, std::uint64_t address, u
   payload_.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
   const Cycle now = clock_.domain->now();
   const std::uint64_t period = clock_.domain->period().value();
-  sc_core::sc_time delay = sc_core::sc_time::from_value((std::max(at, now) - now) * period);
+  const Cycle ahead = std::max(at, now) - now;
+  const std::uint64_t asked = ahead * period;
+  sc_core::sc_time delay = sc_core::sc_time::from_value(asked);
   socket->b_transport(payload_, delay);
   if (payload_.is_response_error()) {
     throw SimulationFault(socket.name(), at, "the memory answered " + payload_.get_response_string());
   }
-  return now + (delay.value() + period - 1) / period;
+  // Most answers take as long as the one before; a division is dear.
+  const std::uint64_t took = std::max<std::uint64_t>(delay.value(), asked) - asked;
+  if (took != took_) {
+    took_ = took;
+    took_cycles_ = (took + period - 1) / period;
+  }
+  return now + ahead + took_cycles_;
 }
 
 void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker) { makers()[slot] = std::move(maker); }

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
+#include <vrpipe/batch.h>
 #include <vrpipe/order_monitor.h>
 #include <vrpipe/platforms/configuration.h>
 
@@ -17,6 +19,7 @@ class BackEnd {
       : qru(configuration.make_as<QruBehaviour>("qru", gpc)),
         sm(configuration.make_as<SmBehaviour>("sm", gpc)),
         crop(configuration.make_as<CropBehaviour>("crop", gpc)),
+        surface_(surface),
         monitor_(surface.width(), surface.height()) {
     crop->attach(surface);
   }
@@ -38,6 +41,7 @@ class BackEnd {
   void count_into(Work& work) {
     work_ = &work;
     writes_unchanged_ = crop->cost().writes_unchanged;
+    looked_up_at_once_ = quads_looked_up_at_once(crop->cost());
   }
 
   std::unique_ptr<QruBehaviour> qru;
@@ -47,13 +51,37 @@ class BackEnd {
  private:
   template <class Signal>
   void run(const Warp& warp, Signal& signal) {
+    // Shading takes longer than the memory does.
+    for (unsigned i = 0; i < warp.count; ++i) {
+      __builtin_prefetch(&surface_.quad(warp.tile, warp.quads[i].position), 1);
+      monitor_.prefetch(warp.tile, warp.quads[i].position);
+    }
     sm->shade(warp, shaded_);
-    if (work_ != nullptr) count(warp);
-    for (unsigned i = 0; i < shaded_.count; ++i) {
+    if (work_ == nullptr) return blend(0, shaded_.count, signal);
+    count(warp);
+    for (unsigned from = 0; from < shaded_.count; from += looked_up_at_once_) {
+      const unsigned to = std::min<unsigned>(from + looked_up_at_once_, shaded_.count);
+      crop->look_up(shaded_, from, to, cache_);
+      for (unsigned line = 0; line < cache_.count; ++line) {
+        const CropBehaviour::LineAccess& access = cache_.lines[line];
+        const unsigned filled = popcount_of(access.filled);
+        work_->sectors += filled + popcount_of(access.written_back);
+        work_->sectors_filled += filled;
+        work_->lines_filled += access.replaced && filled > 0 ? 1U : 0U;
+      }
+      blend(from, to, signal);
+    }
+  }
+
+  template <class Signal>
+  void blend(unsigned from, unsigned to, Signal& signal) {
+    for (unsigned i = from; i < to; ++i) {
       monitor_.blended(shaded_, i, 0);
       const CropBehaviour::Outcome outcome =
           crop->blend(shaded_.tile, shaded_.position[i], shaded_.live[i], shaded_.color[i]);
-      if (work_ != nullptr) follow_cache(i, outcome.changed);
+      if (work_ != nullptr && cache_.count > 0 && (outcome.changed || writes_unchanged_)) {
+        crop->make_dirty(cache_.lines[cache_.line_of[i]].line, cache_.sectors_of[i]);
+      }
       if (outcome.terminated != 0) signal(TerminationSignal{shaded_.tile, shaded_.position[i], outcome.terminated});
     }
   }
@@ -64,22 +92,19 @@ class BackEnd {
     work_->color_quads += shaded_.count;
   }
 
-  void follow_cache(unsigned index, bool changed) {
-    const CropBehaviour::CacheAccess access = crop->look_up(shaded_.tile, shaded_.position[index]);
-    work_->sectors += sectors_in(access.filled) + sectors_in(access.written_back);
-    if (changed || writes_unchanged_) crop->make_dirty(access);
-  }
-
-  static unsigned sectors_in(std::uint32_t mask) {
+  static unsigned popcount_of(std::uint32_t mask) {
     unsigned count = 0;
     for (; mask != 0; mask &= mask - 1) ++count;
     return count;
   }
 
   ShadedWarp shaded_;
+  const ColorSurface& surface_;
   BlendOrderMonitor monitor_;
   Work* work_ = nullptr;
   bool writes_unchanged_ = false;
+  unsigned looked_up_at_once_ = quads_per_warp;
+  CropBehaviour::CacheLookUp cache_;
 };
 
 /// Strict termination where there is time: runs tested bins ahead, in order, on units of its own.

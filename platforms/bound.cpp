@@ -36,6 +36,8 @@ void Work::add(const Work& other) {
   merging_warps += other.merging_warps;
   color_quads += other.color_quads;
   sectors += other.sectors;
+  sectors_filled += other.sectors_filled;
+  lines_filled += other.lines_filled;
 }
 
 PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc)
@@ -50,6 +52,7 @@ PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc)
       sm_(configuration.make_as<SmBehaviour>("sm", gpc)->cost()),
       crop_(configuration.make_as<CropBehaviour>("crop", gpc)->cost()),
       l2_bytes_per_cycle_(configuration.l2().bytes_per_cycle),
+      l2_latency_cycles_(configuration.l2().latency_cycles),
       // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
       warps_in_phase_(2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads)) {}
 
@@ -79,12 +82,20 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done) c
   cycles[sm] = instructions(done) / issue_slots_per_cycle();
   cycles[color] = ratio(done.color_quads, prop_.color_quads_per_cycle);
   cycles[l2] = ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_);
-  cycles[crop] = ratio(done.color_quads, crop_.quads_per_cycle) + ratio(done.sectors, crop_.sectors_per_cycle);
+  // A line, and a miss register, is taken for as long as a fill is under way; those of a phase's beginning may have been
+  // asked for before it.
+  const auto turns = [&](std::uint64_t fills, std::uint64_t places) {
+    return fills <= places ? 0.0 : ratio(fills - places, places) * l2_latency_cycles_;
+  };
+  cycles[crop] =
+      std::max({ratio(done.color_quads, crop_.quads_per_cycle) + ratio(done.sectors, crop_.sectors_per_cycle),
+                turns(done.lines_filled, std::max(crop_.cache_bytes / crop_.line_bytes, 1U)),
+                turns(done.sectors_filled, crop_.mshrs)});
   return cycles;
 }
 
-void PhaseBound::end_phase() {
-  const std::array<double, stages> cycles = cycles_of(work);
+std::array<double, PhaseBound::stages> PhaseBound::end_of(const Work& done) const {
+  const std::array<double, stages> cycles = cycles_of(done);
   std::array<double, stages> end{};
   for (unsigned stage = 0; stage < stages; ++stage) {
     double begin = 0;
@@ -94,13 +105,25 @@ void PhaseBound::end_phase() {
     end[stage] = begin + cycles[stage];
     if (stage > 0) end[stage] = std::max(end[stage], end[stage - 1]);
   }
+  return end;
+}
+
+void PhaseBound::end_phase() {
+  if (up_to_blend_.color_quads > 0) {
+    const std::array<double, stages> end = end_of(up_to_blend_);
+    last_blend_ = *std::max_element(end.begin(), end.end());
+  }
+  const std::array<double, stages> end = end_of(work);
   end_before_ = end_;
   end_ = end;
   total_.add(work);
   work = Work();
+  up_to_blend_ = Work();
 }
 
-double PhaseBound::cycles() const { return *std::max_element(end_.begin(), end_.end()); }
+double PhaseBound::cycles() const {
+  return total_.color_quads > 0 ? last_blend_ : *std::max_element(end_.begin(), end_.end());
+}
 
 double PhaseBound::busy_cycles(const std::string& slot) const {
   static const std::map<std::string, Stage> stage_of{{"draw", draw},     {"vpo", vpo}, {"tgc", tgc},

@@ -25,12 +25,15 @@ struct Work {
   std::uint64_t warps = 0;
   std::uint64_t merging_warps = 0;
   std::uint64_t color_quads = 0;
-  std::uint64_t sectors = 0;
+  std::uint64_t sectors = 0;  ///< filled or written back
+  std::uint64_t sectors_filled = 0;
+  std::uint64_t lines_filled = 0;  ///< of the colour cache, in the place of others
 
   void add(const Work& other);
 };
 
-/// The least cycles that a GPC's work takes when every unit works at its peak: the busiest unit's, phase by phase.
+/// The least cycles that a GPC's work takes when every unit works at its peak: the busiest unit's, phase by phase, up to
+/// the last blend. What follows it (where all is terminated, the rasteriser goes on) is no part of a draw's cycles.
 ///
 /// The whole draw's busiest unit alone would overlap what cannot overlap: where everything is terminated the rasteriser
 /// is the busiest, where nothing is CROP, and between the two there is room for a limited number of warps only. So the
@@ -44,6 +47,8 @@ class PhaseBound {
 
   Work work;  ///< of the phase
   bool phase_is_full() const { return work.warps >= warps_in_phase_; }
+  /// The work so far includes a blend; what is counted from now on comes after it.
+  void blended() { up_to_blend_ = work; }
   void end_phase();
   double cycles() const;
 
@@ -56,6 +61,7 @@ class PhaseBound {
   /// In the order of the pipeline; PROP is there twice.
   enum Stage : unsigned { draw, vpo, tgc, raster, tc, test, qru, sm, color, l2, crop, stages };
   std::array<double, stages> cycles_of(const Work& done) const;
+  std::array<double, stages> end_of(const Work& done) const;
   double instructions(const Work& done) const;
   double issue_slots_per_cycle() const;
 
@@ -70,8 +76,11 @@ class PhaseBound {
   SmBehaviour::Cost sm_;
   CropBehaviour::Cost crop_;
   std::uint32_t l2_bytes_per_cycle_;
+  std::uint32_t l2_latency_cycles_;
   std::uint64_t warps_in_phase_;
   Work total_;
+  Work up_to_blend_;  ///< of the phase
+  double last_blend_ = 0;
   std::array<double, stages> end_{};         ///< of the last phase
   std::array<double, stages> end_before_{};  ///< of the phase before it
 };

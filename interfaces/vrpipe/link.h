@@ -29,7 +29,11 @@ struct StreamPayload {
   const Item* item = nullptr;  ///< transfer
   unsigned latency = 0;        ///< transfer: cycles that the sender's pipeline adds to those of the link
   unsigned credits = 0;        ///< credit
-  Cycle at = never;            ///< between units that are not clocked: the cycle in which it takes place (timed.h)
+  /// Between units that are not clocked (timed.h): the cycles in which it begins and ends, and how many it takes of the
+  /// link.
+  Cycle at = never;
+  Cycle last = never;
+  unsigned beats = 1;
 };
 
 template <class Item>

@@ -1,22 +1,25 @@
 #pragma once
 
-#include <deque>
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include <vrpipe/batch.h>
 #include <vrpipe/link.h>
 #include <vrpipe/unit.h>
 
-/// Units and ports of the fidelities `lt` and `at`: the same links, items, latencies and queue depths as at `cycle`, but
-/// the passage of an item is computed instead of clocked. A unit has a handler for each input, which is given an item and
-/// the cycle in which it becomes visible, reserves the unit's resources from that cycle on, sends what comes of the item,
-/// and returns the cycle in which the item leaves the queue. One handler serves both fidelities; the ports differ:
+/// Units and ports of the fidelities `lt` and `at`: the behaviours, latencies and queue depths of `cycle`, but the passage
+/// of an item is computed instead of clocked, and a batch moves in one piece (batch.h). A unit has a handler for each
+/// input, which is given an item and the cycles in which it becomes visible, reserves the unit's resources from then on,
+/// sends what comes of the item, and returns the cycles in which the item leaves the queue. One handler serves both
+/// fidelities; the ports differ:
 ///
-/// - `lt`, blocking: a transfer is a b_transport call whose delay says when the item is offered and, on return, when it
-///   was taken: as soon as the item as many places ahead as the queue is deep has left it. Calls nest, so that what one
-///   vertex warp leads to runs down to its last blend at once; only termination updates wait for their time.
+/// - `lt`, blocking: a transfer is a b_transport call annotated (in its payload, in cycles) with when the item is offered
+///   and, on return, when it was taken: as soon as the item as many places ahead as the queue is deep has left it. Calls
+///   nest, so that what one vertex warp leads to runs down to its last blend at once; only termination updates wait for
+///   their time.
 /// - `at`, non-blocking: transfers and credits are nb_transport calls annotated with their cycle. An item waits in its
 ///   queue until its cycle comes and whatever its unit sends has found room. Units are activated in the order of time.
 
@@ -24,9 +27,30 @@ namespace vrpipe {
 
 enum class Transport : std::uint8_t { blocking, non_blocking };
 
-/// At `at`, a unit that is activated takes also what becomes visible in the next cycles: bursts cost one activation.
-/// Times stay exact; what depends on their order (a termination update before a test) may be off by as much.
-constexpr Cycle lookahead_cycles = 16;
+/// At `at`, units are activated in cycles so far apart, and take what becomes visible until the next: bursts cost one
+/// activation. Times stay exact; what depends on their order (a termination update before a test) may be off by as much.
+/// Shallower queues, which would move no more than their depth in that time, are served as items and credits come.
+constexpr Cycle activation_cycles = 8;
+/// The cycle in which what is wanted for a cycle is activated; later than `now`.
+constexpr Cycle activation_for(Cycle wanted, Cycle now) {
+  return wanted == never ? never : std::max(wanted, now + activation_cycles) / activation_cycles * activation_cycles;
+}
+
+/// The cycles in which the first and the last part of an item move.
+struct Span {
+  Span() = default;
+  // NOLINTNEXTLINE(google-explicit-constructor): an item that moves in one cycle
+  Span(Cycle cycle) : first(cycle), last(cycle) {}
+  Span(Cycle begin, Cycle end) : first(begin), last(end) {}
+  /// When part `index` of `parts` moves, if they are spread evenly.
+  Cycle of_part(unsigned index, unsigned parts) const {
+    if (last == first || index == 0) return first;
+    if (last - first + 1 == parts) return first + index;
+    return first + (last - first) * index / (parts - 1);
+  }
+  Cycle first = 0;
+  Cycle last = 0;
+};
 
 /// A resource that takes so many items a cycle, in order. An item that is wider than a cycle takes several.
 class Lane {
@@ -62,16 +86,57 @@ class Lane {
 /// A resource that takes so many parts a cycle; the parts of an item may go in neighbouring cycles.
 class Flow {
  public:
-  explicit Flow(unsigned per_cycle) : per_cycle_(per_cycle) {}
-  /// Reserves; returns the cycle in which the last part goes.
-  Cycle take(Cycle earliest, unsigned parts) {
-    position_ = std::max(position_, earliest * per_cycle_) + parts;
-    return (position_ - (parts > 0 ? 1 : 0)) / per_cycle_;
+  explicit Flow(unsigned per_cycle) : per_cycle_(per_cycle > 0 ? per_cycle : 1) {}
+  /// Reserves; returns the cycles in which the first and the last part go.
+  Span take(Cycle earliest, unsigned parts) {
+    hold(earliest);
+    if (parts == 0) return cycle_;
+    if (used_ == per_cycle_) {
+      ++cycle_;
+      used_ = 0;
+    }
+    const Cycle first = cycle_;
+    used_ += parts;
+    if (used_ > 8 * per_cycle_) {
+      cycle_ += (used_ - 1) / per_cycle_;
+      used_ = (used_ - 1) % per_cycle_ + 1;
+    }
+    for (; used_ > per_cycle_; used_ -= per_cycle_) ++cycle_;  // quicker than dividing
+    return {first, cycle_};
   }
+  /// Nothing goes before this cycle any more.
+  void hold(Cycle cycle) {
+    if (cycle <= cycle_) return;
+    cycle_ = cycle;
+    used_ = 0;
+  }
+  /// The cycle in which the next part goes.
+  Cycle next() const { return cycle_ + (used_ == per_cycle_ ? 1 : 0); }
 
  private:
-  Cycle per_cycle_;
-  Cycle position_ = 0;
+  unsigned per_cycle_;
+  unsigned used_ = 0;  ///< parts of `cycle_`
+  Cycle cycle_ = 0;
+};
+
+/// The way of batches through a unit, so many items a cycle: a batch begins in a cycle of its own, when its first items
+/// have come, and does not end before its last.
+class Passage {
+ public:
+  explicit Passage(unsigned per_cycle) : per_cycle_(per_cycle > 0 ? per_cycle : 1) {}
+  Span take(Span visible, unsigned items) {
+    const Cycle first = std::max(visible.first, free_at_);
+    const Cycle cycles = items <= per_cycle_ ? 1 : (items + per_cycle_ - 1) / per_cycle_;
+    const Span span(first, std::max(first + cycles - 1, visible.last));
+    free_at_ = span.last + 1;
+    return span;
+  }
+  /// Nothing goes before this cycle any more.
+  void hold(Cycle cycle) { free_at_ = std::max(free_at_, cycle); }
+
+ private:
+  unsigned per_cycle_;
+  Cycle free_at_ = 0;
 };
 
 /// What a unit's activation sees of its inputs.
@@ -88,8 +153,18 @@ class TimedInput {
 class TimedOutput {
  public:
   virtual ~TimedOutput() = default;
-  /// Whether something sent waits for room.
-  virtual bool blocked() const = 0;
+  /// Whether as much that was sent waits for room as may.
+  bool blocked() const { return waiting_items_ > may_wait_; }
+  /// Whether nothing waits.
+  bool clear() const { return waiting_items_ == 0; }
+  /// The unit may send so many more items while one waits: a buffer of its own in front of the port.
+  void set_buffer(std::size_t items) { may_wait_ = items; }
+
+ protected:
+  std::size_t waiting_items_ = 0;
+
+ private:
+  std::size_t may_wait_ = 0;
 };
 
 class TimedUnit : public Unit {
@@ -98,6 +173,7 @@ class TimedUnit : public Unit {
       : Unit(name, domain), transport_(transport) {}
 
   Transport transport() const { return transport_; }
+  bool blocking() const { return transport_ == Transport::blocking; }
   bool idle() const override;
   void close_account(Cycle end) override;
 
@@ -107,8 +183,9 @@ class TimedUnit : public Unit {
   template <class>
   friend class TimedOut;
 
-  /// Non-blocking: work that waited for room. Called at each activation.
-  virtual void advance() {}
+  /// Non-blocking: what the unit does by itself up to a cycle, for instance work that waited for room. Called at each
+  /// activation, after the inputs; returns the cycle in which it is to be called again.
+  virtual Cycle advance(Cycle /*until*/) { return never; }
   Cycle tick(Cycle now) override;
   /// Charges the cycles not charged yet, up to `until`, to a state.
   void charge(UnitState state, Cycle until) {
@@ -124,6 +201,39 @@ class TimedUnit : public Unit {
   std::vector<TimedOutput*> outputs_;
 };
 
+/// A queue in a ring that grows.
+template <class Entry>
+class Ring {
+ public:
+  bool empty() const { return head_ == tail_; }
+  std::size_t size() const { return tail_ - head_; }
+  Entry& front() { return entries_[head_ & mask_]; }
+  const Entry& front() const { return entries_[head_ & mask_]; }
+  Entry& operator[](std::size_t index) { return entries_[(head_ + index) & mask_]; }
+  /// A place at the end, to be filled.
+  Entry& push() {
+    if (tail_ - head_ == entries_.size()) grow();
+    return entries_[tail_++ & mask_];
+  }
+  void push(const Entry& entry) { push() = entry; }
+  void pop() { ++head_; }
+
+ private:
+  void grow() {
+    std::vector<Entry> larger(entries_.empty() ? 8 : 2 * entries_.size());
+    const std::size_t count = size();
+    for (std::size_t i = 0; i < count; ++i) larger[i] = std::move(entries_[(head_ + i) & mask_]);
+    entries_ = std::move(larger);
+    mask_ = entries_.size() - 1;
+    head_ = 0;
+    tail_ = count;
+  }
+  std::vector<Entry> entries_;
+  std::size_t mask_ = 0;
+  std::size_t head_ = 0;
+  std::size_t tail_ = 0;
+};
+
 /// The sending end.
 template <class Item>
 class TimedOut : public OutEnd<Item>, public TimedOutput {
@@ -133,75 +243,107 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     owner.outputs_.push_back(this);
   }
 
-  /// Sends an item that is there in cycle `at`. Returns the cycle in which it is taken; `at`, if it has to wait and
-  /// nobody knows yet how long: then the port is `blocked`.
-  Cycle send(const Item& item, Cycle at) {
-    while (this->stalled_at(at)) ++at;
-    if (!blocking_ && (!waiting_.empty() || (credits_.empty() && !unlimited_))) {
-      waiting_.push_back({item, at});
+  /// Sends an item whose parts are there in the cycles `at`, and which takes the link for so many. Returns the cycles in
+  /// which it is taken; `at`, if it has to wait and nobody knows yet how long: then the port is not `clear`.
+  Span send(const Item& item, Span at, unsigned beats = 1) {
+    for (; this->stalled_at(at.first); ++at.first) at.last = std::max(at.last, at.first + 1);
+    if (!blocking_ && !unlimited_ && (waiting_items_ > 0 || credits_.empty())) {
+      waiting_.push({item, at, beats});
+      ++waiting_items_;
       return at;
     }
-    return transfer(item, at);
+    return transfer(item, at, beats);
   }
-  bool blocked() const override { return !waiting_.empty(); }
-  /// The cycle in which the last item was taken.
+  /// The cycle in which the last part of the last item was taken.
   Cycle last() const { return last_; }
 
  private:
   using OutEnd<Item>::clock_;
 
-  Cycle transfer(const Item& item, Cycle at) {
+  Span transfer(const Item& item, Span at, unsigned beats) {
     ++this->transferred_;
     StreamPayload<Item> payload;
     payload.item = &item;
     payload.latency = this->pipeline_;
-    payload.at = at;
+    payload.beats = beats;
     if (blocking_) {
-      const Cycle now = clock_.domain->now();
-      sc_core::sc_time delay = sc_core::sc_time::from_value((at - now) * clock_.domain->period().value());
+      payload.at = at.first;
+      payload.last = at.last;
+      sc_core::sc_time delay;
       this->socket->b_transport(payload, delay);
-      return last_ = payload.at;
+      last_ = payload.last;
+      return {payload.at, payload.last};
     }
     if (!unlimited_) {
-      payload.at = std::max(at, credits_.front());
-      credits_.pop_front();
+      const Cycle begin = std::max(at.first, credits_.front());
+      at.last = std::max(at.last, begin + (at.last - at.first));
+      at.first = begin;
+      // What the queue has no place for yet follows when it has: nobody knows when, but the next item waits for it.
+      for (unsigned beat = 0; beat < beats; ++beat) {
+        if (credits_.empty()) {
+          owed_ += beats - beat;
+          break;
+        }
+        at.last = std::max(at.last, credits_.front());
+        credits_.pop();
+      }
     }
-    last_ = payload.at;
+    payload.at = at.first;
+    payload.last = at.last;
+    last_ = at.last;
     StreamPhase phase = StreamPhase::transfer;
     sc_core::sc_time delay;
     this->socket->nb_transport_fw(payload, phase, delay);
-    return last_;
+    return at;
   }
 
   tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
-    credits_.insert(credits_.end(), payload.credits, payload.at);
-    const bool was_blocked = blocked();
-    while (!waiting_.empty() && !credits_.empty()) {
-      transfer(waiting_.front().item, waiting_.front().at);
-      waiting_.pop_front();
+    const Span at(payload.at, payload.last);
+    if (!clock_.domain->running()) places_ += payload.credits;
+    for (unsigned credit = 0; credit < payload.credits; ++credit) {
+      const Cycle cycle = at.of_part(credit, payload.credits);
+      if (owed_ > 0) {
+        --owed_;
+        last_ = std::max(last_, cycle);
+      } else {
+        credits_.push(cycle);
+      }
     }
-    if (was_blocked && !blocked()) clock_.domain->wake(clock_.unit, clock_.domain->now() + 1);
+    const bool was_waiting = waiting_items_ > 0;
+    while (waiting_items_ > 0 && !credits_.empty()) {
+      const Waiting& next = waiting_.front();
+      transfer(next.item, next.at, next.beats);
+      waiting_.pop();
+      --waiting_items_;
+    }
+    if (was_waiting && !blocked()) {
+      const Cycle now = clock_.domain->now();
+      clock_.domain->wake(clock_.unit, places_ < activation_cycles ? now + 1 : activation_for(now, now));
+    }
     return tlm::TLM_ACCEPTED;
   }
   void unlimited() override { unlimited_ = true; }
 
   struct Waiting {
     Item item;
-    Cycle at;
+    Span at;
+    unsigned beats;
   };
   const bool blocking_;
   bool unlimited_ = false;
+  unsigned places_ = 0;  ///< of the queue
+  unsigned owed_ = 0;    ///< places that sent items take and the queue has not had yet
   Cycle last_ = 0;
-  std::deque<Cycle> credits_;  ///< the cycle from which each can be used
-  std::deque<Waiting> waiting_;
+  Ring<Cycle> credits_;  ///< the cycle from which each can be used
+  Ring<Waiting> waiting_;
 };
 
 /// The receiving end, with its queue.
 template <class Item>
 class TimedIn : public InEnd<Item>, public TimedInput {
  public:
-  /// Given an item and the cycle in which it becomes visible, returns the cycle in which it leaves the queue.
-  using Handler = std::function<Cycle(const Item&, Cycle)>;
+  /// Given an item and the cycles in which its parts become visible, returns those in which they leave the queue.
+  using Handler = std::function<Span(const Item&, Span)>;
 
   /// @param sends_to  the handler is called while none of these is blocked
   TimedIn(TimedUnit& owner, const std::string& name, Handler handler, std::vector<TimedOutput*> sends_to = {})
@@ -218,75 +360,98 @@ class TimedIn : public InEnd<Item>, public TimedInput {
 
   void configure(unsigned depth, unsigned latency) override {
     latency_ = latency;
-    queue_.assign(blocking_ ? 0 : depth, {});
+    depth_ = depth;
     free_at_.assign(blocking_ ? depth : 0, 0);
+    place_ = 0;
   }
   void open() override {
-    if (!blocking_ && !this->is_stub()) grant(static_cast<unsigned>(queue_.size()), 0);
+    if (!blocking_ && !this->is_stub()) grant(depth_, 0);
   }
-  bool empty() const override { return queued_ == 0; }
+  bool empty() const override { return queue_.empty(); }
 
   bool serve(Cycle until) override {
     bool served = false;
     while (next() <= until) {
-      const Cycle left = handler_(queue_[head_].item, queue_[head_].visible);
-      head_ = head_ + 1 == queue_.size() ? 0 : head_ + 1;
-      --queued_;
-      grant(1, left + 1);
+      const Entry& entry = queue_.front();
+      const unsigned beats = entry.beats;
+      const Span left = handler_(entry.item, entry.visible);
+      queue_.pop();
+      queued_beats_ -= beats;
+      grant(beats, beats == 1 ? Span(left.last + 1) : Span(left.first + 1, left.last + 1));
       served = true;
     }
     return served;
   }
   Cycle next() const override {
-    if (queued_ == 0 || (gate_ && !gate_())) return never;
+    if (queue_.empty() || (gate_ && !gate_())) return never;
     for (const TimedOutput* out : sends_to_) {
       if (out->blocked()) return never;
     }
-    return queue_[head_].visible;
+    return queue_.front().visible.first;
   }
 
  private:
   using InEnd<Item>::clock_;
   struct Entry {
-    Cycle visible = 0;
+    Span visible;
+    unsigned beats = 1;
     Item item;
   };
 
-  Cycle visible(const StreamPayload<Item>& payload) const {
-    Cycle cycle = payload.at + latency_ + payload.latency;
-    while (this->stalled_at(cycle)) ++cycle;
-    return cycle;
+  Span visible(const StreamPayload<Item>& payload) const {
+    const Cycle latency = latency_ + payload.latency;
+    Span span(payload.at + latency, payload.last + latency);
+    for (; this->stalled_at(span.first); ++span.first) span.last = std::max(span.last, span.first + 1);
+    return span;
   }
 
-  void grant(unsigned credits, Cycle at) {
+  void grant(unsigned credits, Span at) {
     StreamPayload<Item> payload;
     payload.credits = credits;
-    payload.at = at;
+    payload.at = at.first;
+    payload.last = at.last;
     StreamPhase phase = StreamPhase::credit;
     sc_core::sc_time delay;
     this->socket->nb_transport_bw(payload, phase, delay);
   }
 
-  void b_transport(StreamPayload<Item>& payload, sc_core::sc_time& delay) override {
-    const std::size_t place = place_;
-    place_ = place_ + 1 == free_at_.size() ? 0 : place_ + 1;
+  void b_transport(StreamPayload<Item>& payload, sc_core::sc_time&) override {
+    const unsigned beats = payload.beats;
+    std::size_t place = place_;
     if (free_at_[place] > payload.at) {
+      payload.last += free_at_[place] - payload.at;
       payload.at = free_at_[place];
-      delay = sc_core::sc_time::from_value((payload.at - clock_.domain->now()) * clock_.domain->period().value());
     }
-    free_at_[place] = handler_(*payload.item, visible(payload)) + 1;
+    if (beats == 1) {
+      place_ = place + 1 == depth_ ? 0 : place + 1;
+      free_at_[place] = handler_(*payload.item, visible(payload)).last + 1;
+      return;
+    }
+    // Parts that the queue has no place for at first follow when the item's own first parts have left.
+    const std::size_t last_place = (place + std::min(beats, depth_) - 1) % depth_;
+    payload.last = std::max(payload.last, free_at_[last_place]);
+    const Span left = handler_(*payload.item, visible(payload));
+    for (unsigned beat = 0; beat < beats; ++beat) {
+      free_at_[place] = left.of_part(beat, beats) + 1;
+      place = place + 1 == depth_ ? 0 : place + 1;
+    }
+    place_ = place;
+    if (beats > depth_) payload.last = std::max(payload.last, left.of_part(beats - depth_ - 1, beats) + 1);
   }
 
   tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
-    if (queued_ == queue_.size()) {
+    if (queued_beats_ >= depth_) {
       throw SimulationFault(this->socket.name(), clock_.domain->now(), "an item arrived at a full queue");
     }
-    const std::size_t place = head_ + queued_;
-    Entry& entry = queue_[place < queue_.size() ? place : place - queue_.size()];
+    queued_beats_ += payload.beats;
+    Entry& entry = queue_.push();
     entry.visible = visible(payload);
+    entry.beats = payload.beats;
     entry.item = *payload.item;
-    ++queued_;
-    clock_.domain->wake(clock_.unit, std::max(entry.visible, clock_.domain->now() + 1));
+    const Cycle now = clock_.domain->now();
+    const Cycle visible_at = entry.visible.first;
+    clock_.domain->wake(clock_.unit,
+                        depth_ < activation_cycles ? std::max(visible_at, now + 1) : activation_for(visible_at, now));
     return tlm::TLM_ACCEPTED;
   }
 
@@ -294,12 +459,12 @@ class TimedIn : public InEnd<Item>, public TimedInput {
   Handler handler_;
   std::vector<TimedOutput*> sends_to_;
   std::function<bool()> gate_;
+  unsigned depth_ = 4;
   unsigned latency_ = 1;
   std::vector<Cycle> free_at_;  ///< blocking: when each place of the queue can be filled, a ring
   std::size_t place_ = 0;
-  std::vector<Entry> queue_;  ///< non-blocking, a ring
-  std::size_t head_ = 0;
-  std::size_t queued_ = 0;
+  Ring<Entry> queue_;  ///< non-blocking
+  unsigned queued_beats_ = 0;
 };
 
 /// An initiator on the TLM-2.0 base protocol, for timing only, whose accesses are b_transport calls that return when the
@@ -329,6 +494,8 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<> {
   const ClockHandle& clock_;
   tlm::tlm_generic_payload payload_;
   std::vector<unsigned char> data_;
+  std::uint64_t took_ = 0;  ///< the last answer, in units of sc_time
+  Cycle took_cycles_ = 0;
 };
 
 /// Makes the module of a slot for `lt` or `at` around a behaviour.

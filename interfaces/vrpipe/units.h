@@ -198,21 +198,29 @@ class CropBehaviour : public Behaviour {
   /// Blends the live samples of a quad.
   virtual Outcome blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) = 0;
 
-  /// What the colour cache does for a quad. It sees the quads in the order of blending alone, so that which sectors move
-  /// does not depend on when; for shells that do not follow fills through the cache themselves.
-  struct CacheAccess {
+  /// What the colour cache does for a line that quads need.
+  struct LineAccess {
     std::uint32_t line = 0;          ///< of the cache, from 0
-    std::uint32_t sectors = 0;       ///< of the line that the quad needs, a bit each
+    std::uint32_t sectors = 0;       ///< of the line that the quads need, a bit each
     std::uint32_t filled = 0;        ///< of these, not there yet
+    std::uint32_t written_back = 0;  ///< dirty sectors of what the line held
     bool replaced = false;           ///< the line held something else, or nothing, before
-    std::uint32_t written_back = 0;  ///< dirty sectors of what it held
     std::uint64_t address = 0;       ///< of the line, bytes
     std::uint64_t old_address = 0;   ///< of what it held
   };
-  /// Before the quad's `blend`, in the order of blending. Without a cache, nothing moves.
-  virtual CacheAccess look_up(TileId, unsigned /*position*/) { return {}; }
+  /// And for quads of a warp; quad `i` needs `sectors_of[i]` of the line in `lines[line_of[i]]`.
+  struct CacheLookUp {
+    unsigned count = 0;  ///< of lines, in the order in which they are needed first
+    std::array<LineAccess, quads_per_warp> lines;
+    std::array<std::uint8_t, quads_per_warp> line_of{};
+    std::array<std::uint32_t, quads_per_warp> sectors_of{};
+  };
+  /// Looks quads `from` to `to` - 1 of a warp up, before their `blend`, in the order of blending. The cache sees this
+  /// order alone, so that which sectors move does not depend on when; for shells that do not follow fills through the
+  /// cache themselves. Without a cache, no line is needed.
+  virtual void look_up(const ShadedWarp&, unsigned /*from*/, unsigned /*to*/, CacheLookUp& out) { out.count = 0; }
   /// After a `blend` whose sectors are dirty for it.
-  virtual void make_dirty(const CacheAccess&) {}
+  virtual void make_dirty(std::uint32_t /*line*/, std::uint32_t /*sectors*/) {}
   struct Cost {
     std::uint32_t quads_per_cycle;  ///< of this draw's format
     std::uint32_t input_quads;      ///< queue between tag look-up and blending

@@ -29,9 +29,29 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
             parameters.writes_unchanged} {}
 
 template <ColorFormat Format, BlendRounding Rounding>
-CropBehaviour::CacheAccess ColorRop<Format, Rounding>::look_up(TileId tile, unsigned position) {
+void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
   if (!cache_) cache_ = make_crop_cache(cost_, *surface_);
-  return cache_->access(surface_->address(tile, position), 4 * bytes_per_pixel(Format), cost_.sector_bytes);
+  const std::uint64_t offset_mask = cost_.line_bytes - 1;
+  const auto sector_shift = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
+  out.count = 0;
+  for (unsigned i = from; i < to; ++i) {
+    const std::uint64_t address = surface_->address(warp.tile, warp.position[i]);
+    const std::uint64_t offset = address & offset_mask;
+    const std::uint64_t first = offset >> sector_shift;
+    const std::uint64_t last = (offset + 4 * bytes_per_pixel(Format) - 1) >> sector_shift;
+    const auto sectors = static_cast<std::uint32_t>((std::uint64_t{2} << last) - (std::uint64_t{1} << first));
+    unsigned line = 0;
+    while (line < out.count && out.lines[line].address != address - offset) ++line;
+    if (line == out.count) {
+      out.lines[line].address = address - offset;
+      out.lines[line].sectors = 0;
+      ++out.count;
+    }
+    out.lines[line].sectors |= sectors;
+    out.line_of[i] = static_cast<std::uint8_t>(line);
+    out.sectors_of[i] = sectors;
+  }
+  for (unsigned line = 0; line < out.count; ++line) cache_->access(out.lines[line]);
 }
 
 // Out of line, so that the common case stays short.

@@ -72,8 +72,8 @@ class ColorRop : public CropBehaviour {
   ColorRop(const CropParameters& parameters, const RenderState& state);
 
   Outcome blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) override;
-  CacheAccess look_up(TileId tile, unsigned position) override;
-  void make_dirty(const CacheAccess& access) override { cache_->dirty(access.line, access.sectors); }
+  void look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) override;
+  void make_dirty(std::uint32_t line, std::uint32_t sectors) override { cache_->dirty(line, sectors); }
   Cost cost() const override { return cost_; }
 
   Counter quads_blended{*this, "quads_blended", "quads", "blended"};

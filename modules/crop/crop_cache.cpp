@@ -17,20 +17,6 @@ CropCache::CropCache(std::uint32_t cache_bytes, std::uint32_t line_bytes, std::u
   }
 }
 
-void CropCache::unlink(Line line) {
-  Entry& entry = lines_[line];
-  (entry.newer == no_line ? newest_ : lines_[entry.newer].older) = entry.older;
-  (entry.older == no_line ? oldest_ : lines_[entry.older].newer) = entry.newer;
-}
-
-void CropCache::make_newest(Line line) {
-  Entry& entry = lines_[line];
-  entry.newer = no_line;
-  entry.older = newest_;
-  (newest_ == no_line ? oldest_ : lines_[newest_].newer) = line;
-  newest_ = line;
-}
-
 CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dirty, std::uint64_t& evicted_address) {
   evicted_dirty = 0;
   Line line = used_;
@@ -51,28 +37,6 @@ CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dir
   line_of_tag_[entry.tag] = line;
   make_newest(line);
   return line;
-}
-
-CropBehaviour::CacheAccess CropCache::access(std::uint64_t address, std::uint32_t bytes, std::uint32_t sector_bytes) {
-  CropBehaviour::CacheAccess access;
-  const std::uint64_t offset = address & ((std::uint64_t{1} << line_shift_) - 1);
-  const auto sector_shift = static_cast<unsigned>(__builtin_ctz(sector_bytes));
-  const auto first = static_cast<unsigned>(offset >> sector_shift);
-  const auto last = static_cast<unsigned>((offset + bytes - 1) >> sector_shift);
-  access.address = address - offset;
-  access.line = find(address);
-  if (access.line == no_line) {
-    access.replaced = true;
-    access.line = allocate(address, access.written_back, access.old_address);
-  } else if (access.line != newest_) {
-    unlink(access.line);
-    make_newest(access.line);
-  }
-  for (unsigned sector = first; sector <= last; ++sector) access.sectors |= 1U << sector;
-  Entry& entry = lines_[access.line];
-  access.filled = access.sectors & ~entry.present;
-  entry.present |= access.sectors;
-  return access;
 }
 
 std::unique_ptr<CropCache> make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface) {

@@ -38,9 +38,22 @@ class CropCache {
   void add_sector(Line line, unsigned sector) { lines_[line].present |= 1U << sector; }
   void dirty(Line line, std::uint32_t sectors) { lines_[line].dirty |= sectors; }
 
-  /// All at once for bytes that lie in one line: looks it up, allocates and fills. Lines go in the same order as with
-  /// pins, since the line that was looked up the longest ago is the first to lose its last pin.
-  CropBehaviour::CacheAccess access(std::uint64_t address, std::uint32_t bytes, std::uint32_t sector_bytes);
+  /// All at once for sectors of a line (`address` and `sectors` are given): looks it up, allocates and fills. Lines go
+  /// in the same order as with pins, since the line that was looked up the longest ago is the first to lose its last pin.
+  void access(CropBehaviour::LineAccess& access) {
+    access.line = find(access.address);
+    access.written_back = 0;
+    access.replaced = access.line == no_line;
+    if (access.replaced) {
+      access.line = allocate(access.address, access.written_back, access.old_address);
+    } else if (access.line != newest_) {
+      unlink(access.line);
+      make_newest(access.line);
+    }
+    Entry& entry = lines_[access.line];
+    access.filled = access.sectors & ~entry.present;
+    entry.present |= access.sectors;
+  }
 
  private:
   struct Entry {
@@ -51,8 +64,18 @@ class CropCache {
     Line newer = no_line;
     Line older = no_line;
   };
-  void unlink(Line line);
-  void make_newest(Line line);
+  void unlink(Line line) {
+    const Entry& entry = lines_[line];
+    (entry.newer == no_line ? newest_ : lines_[entry.newer].older) = entry.older;
+    (entry.older == no_line ? oldest_ : lines_[entry.older].newer) = entry.newer;
+  }
+  void make_newest(Line line) {
+    Entry& entry = lines_[line];
+    entry.newer = no_line;
+    entry.older = newest_;
+    (newest_ == no_line ? oldest_ : lines_[newest_].newer) = line;
+    newest_ = line;
+  }
 
   unsigned line_shift_;  ///< log2 of the bytes of a line
   std::uint32_t used_ = 0;

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <deque>
 
 #include <vrpipe/order_monitor.h>
 #include <vrpipe/timed.h>
@@ -8,25 +7,27 @@ namespace vrpipe {
 
 namespace {
 
-/// CROP at lt and at. Ports as in crop_unit.cpp.
+/// CROP at lt and at: as crop_unit.cpp, but a warp is taken in one piece: its quads look up the colour cache, and are
+/// blended once the sectors of all are there. Neighbouring sectors are filled in one access.
+/// Ports: in_color (ShadedWarpItem), out_terminations (TerminationBeat), memory (TLM-2.0 base protocol).
 class TimedCrop : public TimedUnit {
  public:
   TimedCrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
-            const RenderState& state, Transport transport)
+            Transport transport)
       : TimedUnit(name, domain, transport),
         out_(*this, "out_terminations"),
-        in_(*this, "in_color", [this](const ColorBeat& beat, Cycle visible) { return take(beat, visible); }, {&out_}),
+        in_(*this, "in_color", [this](const ShadedWarpItem& item, Span visible) { return take(*item.warp, visible); },
+            {&out_}),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
-        signals_(state.early_termination),
+        // A hazard is one of quads.
+        at_once_(cost_.forwards ? quads_looked_up_at_once(cost_) : 1),
         memory_(*this, "memory"),
         look_ups_(cost_.quads_per_cycle),
-        blended_at_(cost_.input_quads, 0),
         filled_at_(cost_.mshrs, 0),
         blending_(cost_.quads_per_cycle * cost_.sectors_per_cycle),
         lines_(std::max(cost_.cache_bytes / cost_.line_bytes, 1U)),
-        sectors_per_line_(cost_.line_bytes / cost_.sector_bytes),
-        sector_there_at_(lines_.size() * sectors_per_line_, 0),
+        longest_run_(std::min(cost_.line_bytes / cost_.sector_bytes, cost_.mshrs)),
         sector_shift_(static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes))) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
@@ -44,121 +45,177 @@ class TimedCrop : public TimedUnit {
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
   }
 
-  Cycle take(const ColorBeat& beat, Cycle visible) {
-    if (beat.end_of_draw) {
-      end_ = blended_ == 0 ? visible : last_blend_ + cost_.latency_cycles;
-      return visible;
+  Span take(const ShadedWarp& warp, Span visible) {
+    Span left = visible;
+    for (unsigned i = 0; i < warp.count; ++i) {
+      __builtin_prefetch(&behaviour_->surface()->quad(warp.tile, warp.position[i]), 1);
+      monitor_->prefetch(warp.tile, warp.position[i]);
     }
-    Cycle left = visible;
-    for (unsigned i = 0; i < beat.count; ++i) left = pass(beat.quads[i], left);
+    if (warp.end_of_draw) {
+      end_ = blended_ == 0 ? visible.first : last_blend_ + cost_.latency_cycles;
+    } else if (at_once_ >= warp.count) {
+      left = pass(warp, 0, warp.count, visible);
+    } else {
+      left.first = never;
+      for (unsigned i = 0; i < warp.count; ++i) {
+        const Span at = pass(warp, i, i + 1, visible.of_part(i, warp.count));
+        left.first = std::min(left.first, at.first);
+        left.last = at.last;
+      }
+    }
+    --warp.holders;
     return left;
   }
 
-  /// Looks a quad up and blends it; returns the cycle of the look-up.
-  Cycle pass(const ColorQuad& quad, Cycle visible) {
-    const CropBehaviour::CacheAccess access = behaviour_->look_up(quad.tile, quad.position);
-    // A place in the queue, and a line that no queued quad needs.
-    Cycle looked_up = std::max(visible, blended_at_[place_]);
-    if (access.replaced) looked_up = std::max(looked_up, lines_[access.line]);
-    looked_up = look_ups_.take(looked_up);
-    if (access.written_back != 0) write_back(access, looked_up);
-    Cycle there = looked_up + 1;
-    for (std::uint32_t left = access.sectors; left != 0; left &= left - 1) {
-      const auto sector = static_cast<unsigned>(__builtin_ctz(left));
-      Cycle& sector_there = sector_there_at_[access.line * sectors_per_line_ + sector];
-      if (((access.filled >> sector) & 1U) != 0) {
-        looked_up = std::max(looked_up, filled_at_[fill_]);
-        sector_there =
-            memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), cost_.sector_bytes, looked_up);
-        filled_at_[fill_] = sector_there;
-        fill_ = fill_ + 1 == filled_at_.size() ? 0 : fill_ + 1;
-        move_sectors(1, looked_up);
-      }
-      there = std::max(there, sector_there);
+  /// Looks quads of a warp up and blends them; returns the cycles of the look-ups.
+  Span pass(const ShadedWarp& warp, unsigned from, unsigned to, Span visible) {
+    const unsigned quads = to - from;
+    behaviour_->look_up(warp, from, to, cache_);
+    // Places in the queue, and lines that no queued quad needs.
+    Cycle at = visible.first;
+    for (; queued_quads_ + quads > cost_.input_quads; queued_.pop()) {
+      queued_quads_ -= queued_.front().quads;
+      at = std::max(at, queued_.front().blended);
     }
-    look_ups_.hold(looked_up);
-    charge(UnitState::starved, looked_up + 1);
-    const Cycle blended = blend(quad, access, there);
-    lines_[access.line] = blended;
-    blended_at_[place_] = blended;
-    place_ = place_ + 1 == blended_at_.size() ? 0 : place_ + 1;
+    for (unsigned line = 0; line < cache_.count; ++line) {
+      if (cache_.lines[line].replaced) at = std::max(at, lines_[cache_.lines[line].line]);
+    }
+    Span looked_up = look_ups_.take(at, quads);
+    looked_up.last = std::max(looked_up.last, visible.last);
+    Cycle there = looked_up.first + 1;
+    moved_ = 0;
+    for (unsigned line = 0; line < cache_.count; ++line) {
+      const CropBehaviour::LineAccess& access = cache_.lines[line];
+      if (access.written_back != 0) write_back(access, looked_up.last);
+      if (access.filled != 0) there = std::max(there, fill(access, looked_up.last));
+    }
+    look_ups_.hold(looked_up.last);
+    if (moved_ > 0) moves_.push({looked_up.last, moved_});
+
+    if (!cost_.forwards) there = std::max(there, hazard_until(warp.tile, warp.position[from]));
+    there = std::max(there, out_.last());
+    // Moving a sector takes time from blending, from when it moves.
+    for (; !moves_.empty() && moves_.front().at <= std::max(there, blending_.next()); moves_.pop()) {
+      blending_.take(moves_.front().at, moves_.front().sectors * cost_.quads_per_cycle);
+    }
+    const Span blended = blending_.take(there, quads * cost_.sectors_per_cycle);
+    charge(UnitState::starved, looked_up.first + 1);
+    charge(UnitState::memory, blended.first);
+    charge(UnitState::busy, blended.last + 1);
+    for (unsigned line = 0; line < cache_.count; ++line) lines_[cache_.lines[line].line] = blended.last;
+    queued_.push({blended.last, quads});
+    queued_quads_ += quads;
+    last_blend_ = blended.last;
+    blended_ += quads;
+    if (!cost_.forwards) recent_.push({warp.tile, warp.position[from], blended.last});
+    blend(warp, from, to, blended);
     return looked_up;
   }
 
-  void write_back(const CropBehaviour::CacheAccess& access, Cycle at) {
-    for (std::uint32_t left = access.written_back; left != 0;) {
-      const auto sector = static_cast<unsigned>(__builtin_ctz(left));
-      // Neighbours go in one access where they are naturally aligned.
+  void blend(const ShadedWarp& warp, unsigned from, unsigned to, Span at) {
+    TerminationBeat signals;
+    for (unsigned i = from; i < to; ++i) {
+      monitor_->blended(warp, i, at.last);
+      const CropBehaviour::Outcome outcome =
+          behaviour_->blend(warp.tile, warp.position[i], warp.live[i], warp.color[i]);
+      if ((outcome.changed || cost_.writes_unchanged) && cache_.count > 0) {
+        behaviour_->make_dirty(cache_.lines[cache_.line_of[i]].line, cache_.sectors_of[i]);
+      }
+      if (outcome.terminated == 0) continue;
+      signals.signals[signals.count++] = {warp.tile, warp.position[i], outcome.terminated};
+      if (signals.count < TerminationBeat::capacity) continue;
+      out_.send(signals, at.of_part(i - from, to - from));
+      signals.count = 0;
+    }
+    if (signals.count > 0) out_.send(signals, at.last);
+  }
+
+  /// Reads the sectors that a line does without; returns when they are there, and in `at` when the last was asked for.
+  Cycle fill(const CropBehaviour::LineAccess& access, Cycle& at) {
+    Cycle there = 0;
+    for_each_run(access.filled, [&](unsigned sector, unsigned sectors) {
+      std::size_t place = fill_place_;
+      for (unsigned i = 0; i < sectors; ++i) {
+        at = std::max(at, filled_at_[place]);
+        place = place + 1 == filled_at_.size() ? 0 : place + 1;
+      }
+      there = memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
+      for (; fill_place_ != place; fill_place_ = fill_place_ + 1 == filled_at_.size() ? 0 : fill_place_ + 1) {
+        filled_at_[fill_place_] = there;
+      }
+      moved_ += sectors;
+    });
+    return there;
+  }
+
+  void write_back(const CropBehaviour::LineAccess& access, Cycle at) {
+    for_each_run(access.written_back, [&](unsigned sector, unsigned sectors) {
+      memory_.write(access.old_address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
+      moved_ += sectors;
+    });
+  }
+
+  /// Neighbouring sectors of a line, as many as one naturally aligned access takes.
+  template <class Access>
+  void for_each_run(std::uint32_t mask, Access&& access) const {
+    while (mask != 0) {
+      const auto sector = static_cast<unsigned>(__builtin_ctz(mask));
       unsigned sectors = 1;
-      while (sector % (2 * sectors) == 0 && 2 * sectors <= sectors_per_line_ &&
-             ((left >> sector) & run_of(2 * sectors)) == run_of(2 * sectors)) {
+      while (sector % (2 * sectors) == 0 && 2 * sectors <= longest_run_ &&
+             ((mask >> sector) & run_of(2 * sectors)) == run_of(2 * sectors)) {
         sectors *= 2;
       }
-      left &= ~(run_of(sectors) << sector);
-      memory_.write(access.old_address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
-      move_sectors(sectors, at);
+      mask &= ~(run_of(sectors) << sector);
+      access(sector, sectors);
     }
   }
   static constexpr std::uint32_t run_of(unsigned sectors) { return sectors == 32 ? ~0U : (1U << sectors) - 1; }
 
-  /// Moving a sector takes time from blending.
-  void move_sectors(unsigned sectors, Cycle at) { blending_.take(at, sectors * cost_.quads_per_cycle); }
-
-  Cycle blend(const ColorQuad& quad, const CropBehaviour::CacheAccess& access, Cycle there) {
-    if (!cost_.forwards) there = std::max(there, hazard_until(quad));
-    const Cycle at = blending_.take(std::max(there, out_.last()), cost_.sectors_per_cycle);
-    monitor_->blended(*quad.warp, quad.index, at);
-    const CropBehaviour::Outcome outcome = behaviour_->blend(quad.tile, quad.position, quad.live, quad.color());
-    --quad.warp->holders;
-    if (outcome.changed || cost_.writes_unchanged) behaviour_->make_dirty(access);
-    if (!cost_.forwards) recent_.push_back({quad.tile, quad.position, at});
-    charge(UnitState::memory, at);
-    charge(UnitState::busy, at + 1);
-    ++blended_;
-    last_blend_ = at;
-    if (outcome.terminated != 0) {
-      TerminationBeat signal;
-      signal.count = 1;
-      signal.signals[0] = {quad.tile, quad.position, outcome.terminated};
-      out_.send(signal, at);
-    }
-    return at;
-  }
-
   /// The cycle in which a quad of the same position has left the blending pipeline.
-  Cycle hazard_until(const ColorQuad& quad) {
-    while (!recent_.empty() && recent_.front().at + cost_.latency_cycles <= last_blend_) recent_.pop_front();
+  Cycle hazard_until(TileId tile, std::uint8_t position) {
+    while (!recent_.empty() && recent_.front().at + cost_.latency_cycles <= last_blend_) recent_.pop();
     Cycle until = 0;
-    for (const Recent& blend : recent_) {
-      if (blend.tile == quad.tile && blend.position == quad.position) until = blend.at + cost_.latency_cycles;
+    for (std::size_t i = 0; i < recent_.size(); ++i) {
+      const Recent& blend = recent_[i];
+      if (blend.tile == tile && blend.position == position) until = blend.at + cost_.latency_cycles;
     }
     return until;
   }
 
+  struct Queued {
+    Cycle blended = 0;
+    unsigned quads = 0;
+  };
+  struct Move {
+    Cycle at = 0;
+    unsigned sectors = 0;
+  };
   struct Recent {
     TileId tile;
-    std::uint8_t position;
-    Cycle at;
+    std::uint8_t position = 0;
+    Cycle at = 0;
   };
 
   TimedOut<TerminationBeat> out_;
-  TimedIn<ColorBeat> in_;
+  TimedIn<ShadedWarpItem> in_;
   std::unique_ptr<CropBehaviour> behaviour_;
   const CropBehaviour::Cost cost_;
-  const bool signals_;
+  const unsigned at_once_;  ///< quads looked up before the first of them is blended
   TimedMemoryPort memory_;
   std::unique_ptr<BlendOrderMonitor> monitor_;
-  Lane look_ups_;
-  std::vector<Cycle> blended_at_;  ///< the quads of the queue, a ring
-  std::size_t place_ = 0;
+  CropBehaviour::CacheLookUp cache_;
+  Flow look_ups_;
+  Ring<Queued> queued_;  ///< between look-up and blending
+  unsigned queued_quads_ = 0;
   std::vector<Cycle> filled_at_;  ///< the fills in flight, a ring
-  std::size_t fill_ = 0;
+  std::size_t fill_place_ = 0;
   Flow blending_;             ///< in parts of a cycle that both a quad and a sector are whole numbers of
+  unsigned moved_ = 0;        ///< sectors, for the quads in hand
+  Ring<Move> moves_;          ///< of sectors, that blending has not given its time to yet
   std::vector<Cycle> lines_;  ///< of the cache: the last blend of a quad that needed it
-  const unsigned sectors_per_line_;
-  std::vector<Cycle> sector_there_at_;
+  const unsigned longest_run_;
   const unsigned sector_shift_;
-  std::deque<Recent> recent_;  ///< blends in the pipeline, without forwarding
+  Ring<Recent> recent_;  ///< blends in the pipeline, without forwarding
   Cycle last_blend_ = 0;
   Cycle end_ = never;
   std::uint64_t blended_ = 0;
@@ -166,9 +223,9 @@ class TimedCrop : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("crop", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned,
+                                       std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
                                        Transport transport) {
-    return std::make_unique<TimedCrop>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)), state,
+    return std::make_unique<TimedCrop>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)),
                                        transport);
   });
   return true;

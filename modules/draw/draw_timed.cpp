@@ -32,7 +32,7 @@ class TimedDraw : public TimedUnit {
     TimedOut<VertexWarp>& out = *outs_[turn_];
     charge(UnitState::latency, at);
     if (!have_) warp_.end_of_draw = true;
-    charge(UnitState::blocked, out.send(warp_, at));
+    charge(UnitState::blocked, out.send(warp_, at).first);
     charge(UnitState::busy, out.last() + 1);
     if (have_) {
       ++issued_;

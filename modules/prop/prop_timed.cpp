@@ -8,7 +8,10 @@ namespace vrpipe {
 
 namespace {
 
-/// PROP at lt and at. Ports as in prop_unit.cpp.
+/// PROP at lt and at: as prop_unit.cpp, but bins and warps go in one piece. Of the warps whose turn has come the oldest
+/// of those that are there goes when the way to CROP is free; at lt all are there in launch order.
+/// Ports: in_bins, out_test, in_tested, out_survivors (BinItem), in_shaded, out_color (ShadedWarpItem),
+/// out_release (WarpRelease).
 class TimedProp : public TimedUnit {
  public:
   TimedProp(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
@@ -21,18 +24,16 @@ class TimedProp : public TimedUnit {
         out_survivors_(*this, "out_survivors"),
         out_release_(*this, "out_release"),
         out_color_(*this, "out_color"),
+        in_tested_(*this, "in_tested",
+                   [this](const BinItem& item, Span visible) { return forward(item, visible, back_, out_survivors_); },
+                   {&out_survivors_}),
         in_bins_(*this, "in_bins",
-                 [this](const QuadBeat& beat, Cycle visible) {
-                   return forward(beat, visible, there_, tests_ ? out_test_ : out_survivors_);
+                 [this](const BinItem& item, Span visible) {
+                   return forward(item, visible, there_, tests_ ? out_test_ : out_survivors_);
                  },
                  {tests_ ? &out_test_ : &out_survivors_}),
-        in_tested_(*this, "in_tested",
-                   [this](const QuadBeat& beat, Cycle visible) {
-                     return forward(beat, visible, back_, out_survivors_);
-                   },
-                   {&out_survivors_}),
         in_shaded_(*this, "in_shaded",
-                   [this](const ShadedWarpItem& item, Cycle visible) { return collect(*item.warp, visible); }),
+                   [this](const ShadedWarpItem& item, Span visible) { return collect(*item.warp, visible.first); }),
         order_(cost_.order, state),
         there_(cost_.quads_per_cycle),
         back_(cost_.quads_per_cycle),
@@ -48,92 +49,87 @@ class TimedProp : public TimedUnit {
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  Cycle forward(const QuadBeat& beat, Cycle visible, Lane& lane, TimedOut<QuadBeat>& out) {
-    const Cycle at = lane.take(std::max(visible, out.last()), std::max<unsigned>(beat.count, 1));
-    const Cycle taken = out.send(beat, at);
-    lane.hold(taken);
+  Span forward(const BinItem& item, Span visible, Passage& passage, TimedOut<BinItem>& out) {
+    passage.hold(out.last());
+    const Span at = passage.take(visible, item.quads);
+    const unsigned beats = std::max(1U, (item.quads + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle);
+    const Span taken = out.send(item, at, beats);
+    passage.hold(taken.last + 1);
     return taken;
   }
 
   Cycle collect(const ShadedWarp& warp, Cycle visible) {
+    leave_until(visible);
     if (warp.end_of_draw) {
       end_ = &warp;
       end_from_ = visible + 1;
     } else {
       order_.arrive(warp, visible + 1);
     }
-    advance();
+    if (blocking()) leave_until(never);
     return visible;
   }
 
-  void advance() override {
-    while (order_.has_next() && !out_color_.blocked() && !out_release_.blocked()) {
+  Cycle advance(Cycle until) override {
+    leave_until(until);
+    return order_.has_next() && can_send() ? color_.next() : never;
+  }
+
+  bool can_send() const { return out_color_.clear() && out_release_.clear(); }
+
+  /// Lets those warps leave whose time comes up to a cycle.
+  void leave_until(Cycle until) {
+    while (order_.has_next() && can_send() && color_.next() <= until) {
       const WarpOrder::Waiting next = order_.take();
       leave(*next.warp, next.from);
     }
-    if (end_ == nullptr || end_->sequence != order_.left() || out_color_.blocked() || out_release_.blocked()) return;
-    ColorBeat beat;
-    beat.end_of_draw = true;
-    const Cycle at = color_.take(end_from_);
-    out_color_.send(beat, at);
+    if (end_ == nullptr || end_->sequence != order_.left() || !can_send()) return;
+    const Cycle at = color_.take(end_from_, cost_.color_quads_per_cycle).first;
+    ++end_->holders;
+    out_color_.send({end_}, at);
     out_release_.send({end_->slot}, at);
     --end_->holders;
     end_ = nullptr;
     order_.restart();
   }
 
-  /// Hands a warp to CROP, a cycle's quads at a time.
+  /// Hands a warp to CROP.
   void leave(const ShadedWarp& warp, Cycle from) {
-    Cycle at = std::max(from, out_color_.last());
-    ColorBeat beat;
-    Cycle beat_at = 0;
-    charge(UnitState::starved, at);
-    for (unsigned i = 0; i < warp.count; ++i) {
-      at = color_.take(at);
-      if (beat.count > 0 && at != beat_at) {
-        send(beat, beat_at);
-        at = std::max(at, out_color_.last());
-      }
-      beat_at = at;
-      ++warp.holders;
-      beat.quads[beat.count++] = {&warp, warp.tile, warp.position[i], warp.live[i], static_cast<std::uint8_t>(i)};
-    }
+    color_.hold(out_color_.last());
+    Cycle left = 0;
     if (warp.count > 0) {
-      send(beat, beat_at);
+      const Span at = color_.take(from, warp.count);
+      charge(UnitState::starved, at.first);
+      charge(UnitState::busy, at.last + 1);
+      color_quads_ += warp.count;
+      ++warp.holders;
+      const unsigned beats = (warp.count + cost_.color_quads_per_cycle - 1) / cost_.color_quads_per_cycle;
+      left = out_color_.send({&warp}, at, beats).last;
+      charge(UnitState::blocked, left);
+      color_.hold(left);
     } else {
       // A warp without survivors takes the cycle in which it is passed over.
-      beat_at = color_.take(at);
-      color_.hold(beat_at + 1);
+      left = color_.take(from, cost_.color_quads_per_cycle).last;
     }
-    const Cycle left = std::max(beat_at, out_color_.last());
-    charge(UnitState::busy, left + 1);
     order_.leave(warp, left);
     out_release_.send({warp.slot}, left);
     --warp.holders;
   }
 
-  void send(ColorBeat& beat, Cycle at) {
-    color_quads_ += beat.count;
-    const Cycle taken = out_color_.send(beat, at);
-    charge(UnitState::blocked, taken);
-    color_.hold(taken);
-    beat.count = 0;
-  }
-
   std::unique_ptr<PropBehaviour> behaviour_;
   const PropBehaviour::Cost cost_;
   const bool tests_;
-  TimedOut<QuadBeat> out_test_;
-  TimedOut<QuadBeat> out_survivors_;
+  TimedOut<BinItem> out_test_;
+  TimedOut<BinItem> out_survivors_;
   TimedOut<WarpRelease> out_release_;
-  TimedOut<ColorBeat> out_color_;
-  TimedIn<QuadBeat> in_bins_;
-  TimedIn<QuadBeat> in_tested_;
+  TimedOut<ShadedWarpItem> out_color_;
+  TimedIn<BinItem> in_tested_;
+  TimedIn<BinItem> in_bins_;
   TimedIn<ShadedWarpItem> in_shaded_;
   WarpOrder order_;
-  Lane there_;  ///< to the tests, or past them
-  Lane back_;   ///< from the tests
-  Lane color_;
+  Passage there_;  ///< to the tests, or past them
+  Passage back_;   ///< from the tests
+  Flow color_;
   const ShadedWarp* end_ = nullptr;
   Cycle end_from_ = 0;
   std::uint64_t color_quads_ = 0;

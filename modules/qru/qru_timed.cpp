@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "qru/warp_numbering.h"
 
 #include <vrpipe/timed.h>
@@ -6,14 +8,14 @@ namespace vrpipe {
 
 namespace {
 
-/// QRU at lt and at. Ports as in qru_unit.cpp.
+/// QRU at lt and at. Ports: in_quads (BinItem), out_warps (Warp).
 class TimedQru : public TimedUnit {
  public:
   TimedQru(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour,
            const RenderState& state, Transport transport)
       : TimedUnit(name, domain, transport),
         out_(*this, "out_warps"),
-        in_(*this, "in_quads", [this](const QuadBeat& beat, Cycle visible) { return examine(beat, visible); }, {&out_}),
+        in_(*this, "in_quads", [this](const BinItem& item, Span visible) { return examine(item, visible); }, {&out_}),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
         numbering_(state),
@@ -34,52 +36,66 @@ class TimedQru : public TimedUnit {
 
   /// A launch ends the cycle.
   void launch(const Warp& warp) {
-    const Cycle taken = out_.send(warp, cycle_);
+    const Cycle taken = out_.send(warp, cycle_).first;
     charge(UnitState::blocked, taken);
     charge(UnitState::busy, taken + 1);
+    left_ = taken;
     go_to(taken + 1);
   }
 
-  Cycle examine(const QuadBeat& beat, Cycle visible) {
-    go_to(std::max(visible, out_.last() + 1));
+  Span examine(const BinItem& item, Span visible) {
+    go_to(std::max(visible.first, out_.last() + 1));
     charge(UnitState::starved, cycle_);
-    Warp warp;
-    if (beat.end_of_draw) {
-      warp.end_of_draw = true;
-      numbering_.number_end(warp);
-      launch(warp);
-      return out_.last();
+    const Cycle begin = cycle_;
+    left_ = cycle_;
+    if (item.end_of_draw) {
+      warp_.end_of_draw = true;
+      numbering_.number_end(warp_);
+      launch(warp_);
+      warp_.end_of_draw = false;
+      return {begin, left_};
     }
-    Cycle left = cycle_;
-    for (unsigned from = 0; from < beat.count;) {
+    const std::vector<Quad>& quads = item.storage->flush.quads;
+    QuadBeat beat;
+    beat.tile = item.tile;
+    for (unsigned from = 0; from < item.quads;) {
+      go_to(visible.of_part(from, item.quads));
       if (budget_ == 0) go_to(cycle_ + 1);
-      left = cycle_;
-      QuadBeat part = beat;
-      part.count = static_cast<std::uint8_t>(std::min<unsigned>(beat.count, from + budget_));
-      bool launched = false;
-      const unsigned examined = behaviour_->examine(part, from, warp, launched);
-      from += examined;
-      examined_ += examined;
-      budget_ -= examined;
-      if (!launched) continue;
-      numbering_.number(warp);
-      launch(warp);
+      const unsigned count = std::min({item.quads - from, budget_, QuadBeat::capacity});
+      beat.count = static_cast<std::uint8_t>(count);
+      std::copy_n(quads.begin() + from, count, beat.quads.begin());
+      from += count;
+      examined_ += count;
+      for (unsigned at = 0; at < count;) {
+        bool launched = false;
+        const unsigned taken = behaviour_->examine(beat, at, warp_, launched);
+        at += taken;
+        if (budget_ == 0) go_to(cycle_ + 1);
+        budget_ -= std::min(taken, budget_);
+        left_ = cycle_;
+        if (!launched) continue;
+        numbering_.number(warp_);
+        launch(warp_);
+      }
     }
-    charge(UnitState::busy, left + 1);
-    if (!beat.last_of_bin) return left;
-    while (behaviour_->finish_bin(warp)) {
-      numbering_.number(warp);
-      launch(warp);
+    charge(UnitState::busy, left_ + 1);
+    go_to(visible.last);
+    while (behaviour_->finish_bin(warp_)) {
+      numbering_.number(warp_);
+      launch(warp_);
     }
-    return cycle_;
+    item.storage->in_use = false;
+    return {begin, std::max(left_, begin)};
   }
 
   TimedOut<Warp> out_;
-  TimedIn<QuadBeat> in_;
+  TimedIn<BinItem> in_;
   std::unique_ptr<QruBehaviour> behaviour_;
   const Throughput cost_;
   WarpNumbering numbering_;
+  Warp warp_;
   Cycle cycle_ = 0;
+  Cycle left_ = 0;   ///< when the last quads were examined or the last warp was taken
   unsigned budget_;  ///< quads that can still be examined in the cycle
   std::uint64_t examined_ = 0;
 };

@@ -11,7 +11,8 @@ class TimedRaster : public TimedUnit {
               Transport transport)
       : TimedUnit(name, domain, transport),
         out_(*this, "out_quads"),
-        in_(*this, "in_jobs", [this](const RasterJob& job, Cycle visible) { return rasterize(job, visible); }, {&out_}),
+        in_(*this, "in_jobs", [this](const RasterJob& job, Span visible) { return rasterize(job, visible.first); },
+            {&out_}),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
         coarse_(cost_.coarse_tiles_per_cycle),
@@ -31,7 +32,7 @@ class TimedRaster : public TimedUnit {
     if (job.end_of_draw) {
       QuadBeat end;
       end.end_of_draw = true;
-      return now_ = out_.send(end, now_);
+      return now_ = out_.send(end, now_).first;
     }
     now_ = std::max(now_, next_setup_);
     const Cycle setup = now_;
@@ -42,16 +43,16 @@ class TimedRaster : public TimedUnit {
     unsigned tests = 0;
     bool new_screen_tile = false;
     while (behaviour_->next(tile, tests, new_screen_tile)) {
-      now_ = std::max(coarse_.take(now_, tests), fine_.take(now_));
+      now_ = std::max(coarse_.take(now_, tests).last, fine_.take(now_));
       if (new_screen_tile) {
         now_ = std::max(now_, next_pair_);
         next_pair_ = now_ + cost_.screen_tile_interval_cycles;
       }
       if (tile.count == 0) continue;
       quads_ += tile.count;
-      now_ = quads_out_.take(now_, tile.count);
+      now_ = quads_out_.take(now_, tile.count).last;
       charge(UnitState::busy, now_);
-      now_ = out_.send(tile, now_);
+      now_ = out_.send(tile, now_).first;
       charge(UnitState::blocked, now_);
       charge(UnitState::busy, now_ + 1);
     }

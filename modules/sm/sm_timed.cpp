@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <deque>
 
 #include <vrpipe/timed.h>
 
@@ -11,7 +10,8 @@ constexpr std::uint16_t no_slot = 0xffff;
 
 /// The SM array at lt and at. Ports as in sm_unit.cpp. A warp has its scheduler for all its instructions at once, then
 /// waits for all its latencies: with several warps that is what issuing segment by segment comes to. Vertex warps take
-/// issue slots from fragment warps but do not wait for them; they are few.
+/// issue slots from fragment warps but do not wait for them; they are few. Shaded warps go to PROP as they are done, at
+/// lt in launch order.
 class TimedSm : public TimedUnit {
  public:
   TimedSm(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour,
@@ -26,18 +26,18 @@ class TimedSm : public TimedUnit {
         out_vertices_(*this, "out_vertices"),
         out_shaded_(*this, "out_shaded"),
         in_release_(*this, "in_release",
-                    [this](const WarpRelease& release, Cycle visible) { return free(release, visible); }),
-        in_warps_(*this, "in_warps", [this](const Warp& warp, Cycle visible) { return shade(warp, visible); },
-                  {&out_shaded_}),
+                    [this](const WarpRelease& release, Span visible) { return free(release, visible.first); }),
+        in_warps_(*this, "in_warps", [this](const Warp& warp, Span visible) { return shade(warp, visible.first); }),
         in_vertices_(*this, "in_vertices",
-                     [this](const VertexWarp& warp, Cycle visible) { return shade_vertices(warp, visible); },
+                     [this](const VertexWarp& warp, Span visible) { return shade_vertices(warp, visible.first); },
                      {&out_vertices_}),
         scheduler_free_at_(std::size_t{cost_.cores} * cost_.schedulers_per_core, 0),
-        slots_(std::size_t{cost_.cores} * cost_.warps_per_core, 0),
         vertex_slots_(cost_.vertex_warps, 0) {
+    for (std::uint32_t slot = 0; slot < cost_.cores * cost_.warps_per_core; ++slot) slots_.push(0);
     in_warps_.set_gate([this] { return !slots_.empty(); });
   }
 
+  bool idle() const override { return TimedUnit::idle() && running_.empty(); }
   std::uint64_t work() const override { return instructions_; }
   double peak_rate() const override {
     return static_cast<double>(scheduler_free_at_.size()) / static_cast<double>(cycles_per_instruction_);
@@ -64,13 +64,15 @@ class TimedSm : public TimedUnit {
   }
 
   ShadedWarp& take_from_pool() {
-    for (std::size_t tried = 0; tried < pool_.size(); ++tried) {
+    // The one that was taken the longest ago is the likeliest to be free. Rather one more than a search through all.
+    for (std::size_t tried = 0; tried < std::min<std::size_t>(pool_.size(), 4); ++tried) {
+      ShadedWarp& oldest = *pool_[pool_at_];
       pool_at_ = pool_at_ + 1 == pool_.size() ? 0 : pool_at_ + 1;
-      if (pool_[pool_at_].holders == 0) return pool_[pool_at_];
+      __builtin_prefetch(pool_[pool_at_].get(), 1);
+      if (oldest.holders == 0) return oldest;
     }
-    pool_.emplace_back();
-    pool_at_ = pool_.size() - 1;
-    return pool_.back();
+    pool_.push_back(std::make_unique<ShadedWarp>());
+    return *pool_.back();
   }
 
   std::size_t choose_scheduler(TileId tile) {
@@ -92,13 +94,17 @@ class TimedSm : public TimedUnit {
       shaded.sequence = warp.sequence;
       shaded.count = 0;
       shaded.slot = no_slot;
-      out_shaded_.send({&shaded}, std::max(launch, last_done_));
+      hand_on(shaded, std::max(launch, last_done_));
       return launch;
     }
     charge(UnitState::memory, std::min(launch, last_done_));
     charge(UnitState::starved, launch);
+    if (slots_.empty()) {
+      // At lt all that leads to a release has happened by now.
+      throw SimulationFault("deadlock", launch, std::string(name()) + " has warps to launch, and no slot is released");
+    }
     launch = std::max(launch, slots_.front());
-    slots_.pop_front();
+    slots_.pop();
     charge(UnitState::blocked, launch);
     next_launch_ = launch + 1;
 
@@ -112,8 +118,28 @@ class TimedSm : public TimedUnit {
 
     behaviour_->shade(warp, shaded);
     shaded.slot = 0;
-    out_shaded_.send({&shaded}, done);
+    hand_on(shaded, done);
     return launch;
+  }
+
+  /// Sends a warp that is shaded in a cycle to come.
+  void hand_on(const ShadedWarp& shaded, Cycle done) {
+    if (blocking()) {
+      out_shaded_.send({&shaded}, done);
+      return;
+    }
+    // By cycle; nearly always the last.
+    running_.push({&shaded, done});
+    for (std::size_t place = running_.size() - 1; place > 0 && running_[place - 1].done > done; --place) {
+      std::swap(running_[place - 1], running_[place]);
+    }
+  }
+
+  Cycle advance(Cycle until) override {
+    for (; !running_.empty() && running_.front().done <= until && out_shaded_.clear(); running_.pop()) {
+      out_shaded_.send({running_.front().shaded}, running_.front().done);
+    }
+    return running_.empty() || !out_shaded_.clear() ? never : running_.front().done;
   }
 
   Cycle shade_vertices(const VertexWarp& warp, Cycle visible) {
@@ -128,14 +154,14 @@ class TimedSm : public TimedUnit {
     }
     next_vertex_launch_ = launch + 1;
     // Vertex warps leave in order.
-    const Cycle taken = out_vertices_.send(warp, std::max(vertices_done_, launch));
+    const Cycle taken = out_vertices_.send(warp, std::max(vertices_done_, launch)).first;
     vertex_slots_[vertex_turn_] = taken + 1;
     vertex_turn_ = vertex_turn_ + 1 == cost_.vertex_warps ? 0 : vertex_turn_ + 1;
     return launch;
   }
 
   Cycle free(const WarpRelease& release, Cycle visible) {
-    if (release.slot != no_slot) slots_.push_back(visible);
+    if (release.slot != no_slot) slots_.push(visible);
     return visible;
   }
 
@@ -151,7 +177,12 @@ class TimedSm : public TimedUnit {
   TimedIn<Warp> in_warps_;
   TimedIn<VertexWarp> in_vertices_;
   std::vector<Cycle> scheduler_free_at_;
-  std::deque<Cycle> slots_;          ///< for fragment warps: when each that is free, or known to become so, is
+  struct Running {
+    const ShadedWarp* shaded = nullptr;
+    Cycle done = 0;
+  };
+  Ring<Running> running_;            ///< by cycle; non-blocking
+  Ring<Cycle> slots_;                ///< for fragment warps: when each that is free, or known to become so, is
   std::vector<Cycle> vertex_slots_;  ///< a ring
   std::uint32_t vertex_turn_ = 0;
   std::uint64_t vertex_scheduler_ = 0;
@@ -163,7 +194,7 @@ class TimedSm : public TimedUnit {
   std::uint32_t core_ = 0;
   std::uint32_t sent_to_core_ = 0;
   std::uint32_t turn_ = 0;
-  std::deque<ShadedWarp> pool_;
+  std::vector<std::unique_ptr<ShadedWarp>> pool_;
   std::size_t pool_at_ = 0;
   std::uint64_t instructions_ = 0;
 };

@@ -1,22 +1,27 @@
+#include <deque>
+
 #include <vrpipe/timed.h>
 
 namespace vrpipe {
 
 namespace {
 
-/// TC at lt and at. Ports as in tc_unit.cpp.
+/// TC at lt and at: as tc_unit.cpp, but a flushed bin goes in one piece.
+/// Ports: in_quads (QuadBeat), out_bins (BinItem).
 class TimedTc : public TimedUnit {
  public:
   TimedTc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour,
           Transport transport)
       : TimedUnit(name, domain, transport),
         out_(*this, "out_bins"),
-        in_(*this, "in_quads", [this](const QuadBeat& beat, Cycle visible) { return collect(beat, visible); }, {&out_}),
+        in_(*this, "in_quads", [this](const QuadBeat& beat, Span visible) { return collect(beat, visible.first); },
+            {&out_}),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
         entries_(cost_.quads_per_cycle),
         sent_at_(cost_.flush_queue_bins, 0) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
+    out_.set_buffer(cost_.flush_queue_bins - 1);
   }
 
   std::uint64_t work() const override { return taken_; }
@@ -33,8 +38,8 @@ class TimedTc : public TimedUnit {
     Cycle at = visible;
     for (unsigned from = 0; from < beat.count;) {
       bool flushed = false;
-      const unsigned taken = behaviour_->insert(beat, from, bin_, flushed);
-      at = entries_.take(std::max(visible, sent_at_[place_]), taken);
+      const unsigned taken = behaviour_->insert(beat, from, next_storage().flush, flushed);
+      at = entries_.take(std::max(visible, sent_at_[place_]), taken).last;
       from += taken;
       if (flushed) send(at);
     }
@@ -46,20 +51,27 @@ class TimedTc : public TimedUnit {
     return at;
   }
 
-  /// Hands on the bin flushed in a cycle, a beat a cycle.
-  void send(Cycle flushed) {
-    Cycle at = std::max({flushed, sent_, out_.last()}) + 1;
-    QuadBeat beat;
-    beat.tile = bin_.tile;
-    for (std::size_t sent = 0; sent < bin_.quads.size();) {
-      const std::size_t left = bin_.quads.size() - sent;
-      beat.count = static_cast<std::uint8_t>(std::min<std::size_t>(left, cost_.quads_per_cycle));
-      std::copy_n(bin_.quads.begin() + static_cast<std::ptrdiff_t>(sent), beat.count, beat.quads.begin());
-      sent += beat.count;
-      beat.last_of_bin = sent == bin_.quads.size();
-      sent_ = out_.send(beat, at);
-      at = sent_ + 1;
+  /// A place for the next bin.
+  BinStorage& next_storage() {
+    for (std::size_t tried = 0; tried < storage_.size(); ++tried) {
+      if (!storage_[storage_at_].in_use) return storage_[storage_at_];
+      storage_at_ = storage_at_ + 1 == storage_.size() ? 0 : storage_at_ + 1;
     }
+    storage_at_ = storage_.size();
+    return storage_.emplace_back();
+  }
+
+  /// Hands on the bin flushed in a cycle.
+  void send(Cycle flushed) {
+    BinStorage& storage = next_storage();
+    storage.in_use = true;
+    BinItem item;
+    item.storage = &storage;
+    item.tile = storage.flush.tile;
+    item.quads = static_cast<std::uint32_t>(storage.flush.quads.size());
+    const unsigned beats = (item.quads + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
+    const Cycle begin = std::max({flushed, sent_, out_.last()}) + 1;
+    sent_ = out_.send(item, {begin, begin + beats - 1}, beats).last;
     sent_at_[place_] = sent_;
     place_ = place_ + 1 == sent_at_.size() ? 0 : place_ + 1;
   }
@@ -72,7 +84,7 @@ class TimedTc : public TimedUnit {
   /// Flushes the bins whose time is out before a quad comes.
   void flush_idle(Cycle next_arrival) {
     for (Cycle due = timeout_due(); due < next_arrival && !out_.blocked(); due = timeout_due()) {
-      if (!behaviour_->flush_oldest(Reason::timed_out, bin_)) {
+      if (!behaviour_->flush_oldest(Reason::timed_out, next_storage().flush)) {
         holds_quads_ = false;
         return;
       }
@@ -85,28 +97,28 @@ class TimedTc : public TimedUnit {
 
   Cycle drain(Cycle visible) {
     Cycle at = visible + 1;
-    while (behaviour_->flush_oldest(Reason::end_of_draw, bin_)) {
+    while (behaviour_->flush_oldest(Reason::end_of_draw, next_storage().flush)) {
       at = std::max(at, sent_at_[place_]);
       send(at++);
     }
     holds_quads_ = false;
-    QuadBeat end;
+    BinItem end;
     end.end_of_draw = true;
-    out_.send(end, std::max(at, sent_ + 1));
+    out_.send(end, std::max({at, sent_ + 1, out_.last() + 1}));
     return visible;
   }
 
-  Cycle tick(Cycle now) override {
-    const Cycle next = TimedUnit::tick(now);
-    if (in_.empty()) flush_idle(now + 1);
-    return out_.blocked() ? next : std::min(next, std::max(timeout_due(), now + 1));
+  Cycle advance(Cycle) override {
+    if (in_.empty()) flush_idle(now() + 1);
+    return out_.blocked() ? never : timeout_due();
   }
 
-  TimedOut<QuadBeat> out_;
+  TimedOut<BinItem> out_;
   TimedIn<QuadBeat> in_;
   std::unique_ptr<TcBehaviour> behaviour_;
   const TcBehaviour::Cost cost_;
-  TcBehaviour::Flush bin_;
+  std::deque<BinStorage> storage_;
+  std::size_t storage_at_ = 0;
   Flow entries_;
   std::vector<Cycle> sent_at_;  ///< the last beat of the last bins, a ring
   std::size_t place_ = 0;       ///< of the bin that has to have gone before the next is flushed

@@ -12,8 +12,8 @@ class TimedTgc : public TimedUnit {
       : TimedUnit(name, domain, transport),
         out_(*this, "out_jobs"),
         in_(*this, "in_primitives",
-            [this](const PrimitiveItem& item, Cycle visible) {
-              return item.end_of_draw ? drain(visible) : enter_bins(item, visible);
+            [this](const PrimitiveItem& item, Span visible) {
+              return item.end_of_draw ? drain(visible.first) : enter_bins(item, visible.first);
             },
             {&out_}),
         behaviour_(std::move(behaviour)),
@@ -52,7 +52,7 @@ class TimedTgc : public TimedUnit {
     job.clip = flush_.clip;
     for (const Primitive& primitive : flush_.primitives) {
       job.primitive = primitive;
-      const Cycle taken = out_.send(job, at);
+      const Cycle taken = out_.send(job, at).first;
       charge(UnitState::blocked, taken);
       charge(UnitState::busy, taken + 1);
       at = taken + 1;

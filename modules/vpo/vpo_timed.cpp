@@ -23,7 +23,7 @@ class TimedVpo : public TimedUnit {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       ins_.push_back(std::make_unique<TimedIn<VertexWarp>>(
           *this, "in_vertices_" + std::to_string(gpc),
-          [this](const VertexWarp& warp, Cycle visible) { return assemble(warp, visible); }, sends_to));
+          [this](const VertexWarp& warp, Span visible) { return assemble(warp, visible.first); }, sends_to));
       ins_.back()->set_gate([this, gpc] { return turn_ == gpc; });
     }
   }
@@ -37,7 +37,8 @@ class TimedVpo : public TimedUnit {
   Cycle send(const PrimitiveItem& item, Cycle at) {
     Cycle taken = at;
     for (unsigned gpc = 0; gpc < gpcs_; ++gpc) {
-      if (item.end_of_draw || concerns(item.primitive, gpcs_, gpc)) taken = std::max(taken, outs_[gpc]->send(item, at));
+      if (item.end_of_draw || concerns(item.primitive, gpcs_, gpc))
+        taken = std::max(taken, outs_[gpc]->send(item, at).first);
     }
     return taken;
   }

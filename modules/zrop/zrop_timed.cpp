@@ -1,4 +1,4 @@
-#include <deque>
+#include <algorithm>
 
 #include <vrpipe/timed.h>
 
@@ -6,19 +6,20 @@ namespace vrpipe {
 
 namespace {
 
-/// ZROP at lt and at. Ports as in zrop_unit.cpp. Updates go first, so that the cycle of one is known when it arrives; a
-/// test applies those of its past.
+/// ZROP at lt and at. Updates go first, so that the cycle of one is known when it arrives; a test applies those of its
+/// past. Ports: in_quads, out_quads (BinItem), in_terminations (TerminationBeat).
 class TimedZrop : public TimedUnit {
  public:
   TimedZrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
             Transport transport)
       : TimedUnit(name, domain, transport),
         out_(*this, "out_quads"),
-        in_(*this, "in_quads", [this](const QuadBeat& beat, Cycle visible) { return test(beat, visible); }, {&out_}),
         in_terminations_(*this, "in_terminations",
-                         [this](const TerminationBeat& beat, Cycle visible) { return update(beat, visible); }),
+                         [this](const TerminationBeat& beat, Span visible) { return update(beat, visible.first); }),
+        in_(*this, "in_quads", [this](const BinItem& item, Span visible) { return test(item, visible); }, {&out_}),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
+        at_once_(std::min(cost_.quads_per_cycle, QuadBeat::capacity)),
         tests_(cost_.quads_per_cycle),
         updates_(cost_.updates_per_cycle) {
     out_.set_pipeline(cost_.latency_cycles - 1, cost_.quads_per_cycle);
@@ -29,56 +30,90 @@ class TimedZrop : public TimedUnit {
   Behaviour& behaviour() override { return *behaviour_; }
 
   void close_account(Cycle end) override {
-    for (; !pending_.empty(); pending_.pop_front()) behaviour_->update(pending_.front().signal);
+    for (; !pending_.empty(); pending_.pop()) behaviour_->update(pending_.front().signal);
     TimedUnit::close_account(end);
   }
 
  private:
   struct Pending {
     TerminationSignal signal;
-    Cycle at;
+    Cycle at = 0;
   };
 
   Cycle update(const TerminationBeat& beat, Cycle visible) {
     Cycle at = visible;
     for (unsigned i = 0; i < beat.count; ++i) {
       at = updates_.take(visible);
-      pending_.push_back({beat.signals[i], at});
+      pending_.push({beat.signals[i], at});
     }
     return at;
   }
 
-  Cycle test(const QuadBeat& incoming, Cycle visible) {
-    QuadBeat beat = incoming;
-    const unsigned width = std::max<unsigned>(beat.count, 1);
-    Cycle at = tests_.take(std::max(visible, out_.last()), width);
+  Span test(const BinItem& incoming, Span visible) {
+    BinItem item = incoming;
+    tests_.hold(out_.last());
+    if (item.end_of_draw) {
+      const Cycle at = tests_.take(visible.first);
+      const Cycle taken = out_.send(item, at).first;
+      tests_.hold(taken);
+      return {at, taken};
+    }
+    std::vector<Quad>& quads = item.storage->flush.quads;
+    const unsigned total = item.quads;
+    const unsigned parts = (total + at_once_ - 1) / at_once_;
+    Span tested(never, 0);
+    Span left(never, 0);
+    unsigned beats_left = 0;
+    QuadBeat beat;
+    beat.tile = item.tile;
+    item.quads = 0;
+    for (unsigned part = 0; part < parts; ++part) {
+      const unsigned from = part * at_once_;
+      beat.count = static_cast<std::uint8_t>(std::min(total - from, at_once_));
+      beat.last_of_bin = part + 1 == parts;
+      std::copy_n(quads.begin() + from, beat.count, beat.quads.begin());
+      const Cycle at = take(visible.of_part(part, parts), beat.count);
+      behaviour_->test(beat);
+      tested.first = std::min(tested.first, at);
+      tested.last = at;
+      // A part without survivors goes no further, but for the mark that closes the bin.
+      if (beat.count == 0 && !beat.last_of_bin) continue;
+      std::copy_n(beat.quads.begin(), beat.count, quads.begin() + item.quads);
+      item.quads += beat.count;
+      left.first = std::min(left.first, at);
+      left.last = at;
+      ++beats_left;
+    }
+    tested_ += total;
+    charge(UnitState::starved, tested.first);
+    const Span taken = out_.send(item, left, beats_left);
+    charge(UnitState::busy, tested.last + 1);
+    charge(UnitState::blocked, taken.last);
+    tests_.hold(taken.last);
+    return {tested.first, std::max(tested.last, taken.last)};
+  }
+
+  /// The cycle in which so many quads are tested; applies the updates of its past.
+  Cycle take(Cycle visible, unsigned quads) {
+    Cycle at = tests_.take(visible, quads);
     while (!pending_.empty() && pending_.front().at <= at) {
       // One z-cache port: a cycle with updates tests nothing.
-      if (pending_.front().at == at) at = tests_.take(at + 1, width);
+      if (pending_.front().at == at) at = tests_.take(at + 1, quads);
       behaviour_->update(pending_.front().signal);
-      pending_.pop_front();
+      pending_.pop();
     }
-    charge(UnitState::starved, at);
-    tested_ += beat.count;
-    behaviour_->test(beat);
-    // A beat without survivors goes no further, but for the mark that closes a bin.
-    if (beat.count > 0 || beat.last_of_bin || beat.end_of_draw) {
-      at = out_.send(beat, at);
-      charge(UnitState::blocked, at);
-      tests_.hold(at);
-    }
-    charge(UnitState::busy, at + 1);
     return at;
   }
 
-  TimedOut<QuadBeat> out_;
-  TimedIn<QuadBeat> in_;
+  TimedOut<BinItem> out_;
   TimedIn<TerminationBeat> in_terminations_;
+  TimedIn<BinItem> in_;
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZropBehaviour::Cost cost_;
+  const unsigned at_once_;
   Lane tests_;
   Lane updates_;
-  std::deque<Pending> pending_;  ///< updates not applied yet, by cycle
+  Ring<Pending> pending_;  ///< updates not applied yet, by cycle
   std::uint64_t tested_ = 0;
 };
 

@@ -22,7 +22,7 @@ class Gpu;
 /// How exact a run is about time.
 enum class Fidelity : std::uint8_t { functional, bound, lt, at, cycle };
 const char* name_of(Fidelity fidelity);
-/// Those that this build has, the least exact first.
+/// All, the least exact first.
 const std::vector<Fidelity>& fidelities();
 /// Throws UserError naming those that exist.
 Fidelity fidelity_named(const std::string& name);

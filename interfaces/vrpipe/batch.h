@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+
+#include <vrpipe/payload.h>
+#include <vrpipe/units.h>
+
+/// What moves in one piece at `lt` and `at` where `cycle` moves what fits into a cycle: a flushed bin from TC to QRU
+/// (instead of QuadBeat), a shaded warp from PROP to CROP (ShadedWarpItem instead of ColorBeat). Other links carry the
+/// same items at every fidelity with time.
+
+namespace vrpipe {
+
+/// Where TC keeps the quads of a flushed bin until QRU has formed its warps.
+struct BinStorage {
+  TcBehaviour::Flush flush;
+  bool in_use = false;
+};
+
+/// A flushed bin, or the end of the draw.
+struct BinItem {
+  BinStorage* storage = nullptr;  ///< its first `quads` quads; the test takes the dead ones out
+  TileId tile;
+  std::uint32_t quads = 0;
+  bool end_of_draw = false;
+};
+
+/// Quads of a warp that may be looked up before the first of them is blended: not more than CROP's queue has room for,
+/// nor than the cache has lines for without one of them going for another. With few lines, a line that is taken a few
+/// cycles longer than it need be tells; then quads go one by one.
+inline unsigned quads_looked_up_at_once(const CropBehaviour::Cost& crop) {
+  const bool roomy = crop.cache_bytes / crop.line_bytes >= 16 * quads_per_warp && crop.input_quads >= quads_per_warp;
+  return roomy ? quads_per_warp : 1;
+}
+
+}  // namespace vrpipe

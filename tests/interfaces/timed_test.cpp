@@ -1,0 +1,260 @@
+// Ports and resources of the fidelities lt and at.
+#include <vrpipe/timed.h>
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/platforms/simulation.h>
+
+namespace vrpipe {
+namespace {
+
+class NoBehaviour : public Behaviour {};
+
+/// What the units of this file have in common.
+class Plain : public TimedUnit {
+ public:
+  using TimedUnit::TimedUnit;
+  std::uint64_t work() const override { return 0; }
+  double peak_rate() const override { return 1; }
+  Behaviour& behaviour() override { return behaviour_; }
+
+ private:
+  NoBehaviour behaviour_;
+};
+
+/// Sends items, each in a cycle or as soon as there is room.
+class Sender : public Plain {
+ public:
+  Sender(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport)
+      : Plain(name, domain, transport), out(*this, "out") {}
+  TimedOut<int> out;
+  std::vector<Span> at;         ///< of each item
+  std::vector<unsigned> beats;  ///< of each item; 1 where there is none
+  std::vector<Span> taken;      ///< as known when it was sent
+
+ private:
+  Cycle tick(Cycle now) override {
+    while (sent_ < at.size() && !out.blocked()) {
+      const Span when = at[sent_];
+      const Cycle earliest = std::max(when.first, sent_ == 0 ? 0 : out.last() + 1);
+      taken.push_back(out.send(static_cast<int>(sent_), {earliest, earliest + (when.last - when.first)},
+                               sent_ < beats.size() ? beats[sent_] : 1));
+      ++sent_;
+    }
+    return sent_ < at.size() && !out.blocked() ? now + 1 : never;
+  }
+  std::size_t sent_ = 0;
+};
+
+/// Takes an item every so many cycles.
+class Taker : public Plain {
+ public:
+  Taker(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport, Cycle cycles_per_item)
+      : Plain(name, domain, transport), in(*this, "in", [this, cycles_per_item](const int& item, Span visible) {
+          const Cycle at = std::max(visible.first, free_at_);
+          free_at_ = std::max(at + cycles_per_item, visible.last + 1);
+          items.push_back(item);
+          came.push_back(visible);
+          left.push_back(at);
+          return Span(at, std::max(at, visible.last));
+        }) {}
+  TimedIn<int> in;
+  std::vector<int> items;
+  std::vector<Span> came;   ///< visible
+  std::vector<Cycle> left;  ///< the queue
+
+ private:
+  Cycle free_at_ = 0;
+};
+
+/// A sender and a receiver, and a link between them.
+struct Pair {
+  Pair(Transport transport, unsigned depth, unsigned latency, Cycle cycles_per_item) {
+    fresh_simulation();
+    clock = std::make_unique<ClockDomain>("clock", 1000);
+    sender = std::make_unique<Sender>("sender", *clock, transport);
+    taker = std::make_unique<Taker>("taker", *clock, transport, cycles_per_item);
+    sender->out.connect(taker->in, depth, latency);
+  }
+  void run() {
+    taker->in.open();
+    do {
+      clock->run(sc_core::sc_time(1, sc_core::SC_US));
+    } while (sc_core::sc_pending_activity());
+  }
+  std::unique_ptr<ClockDomain> clock;
+  std::unique_ptr<Sender> sender;
+  std::unique_ptr<Taker> taker;
+};
+
+std::vector<Cycle> firsts(const std::vector<Span>& spans) {
+  std::vector<Cycle> cycles;
+  for (const Span& span : spans) cycles.push_back(span.first);
+  return cycles;
+}
+
+class TimedLink : public ::testing::TestWithParam<Transport> {};
+
+TEST_P(TimedLink, AnItemOfCycleTThroughLatencyLIsVisibleAtTPlusL) {
+  for (const unsigned latency : {1U, 2U, 7U}) {
+    Pair pair(GetParam(), 4, latency, 1);
+    pair.sender->at = {10, 25};
+    pair.run();
+    EXPECT_EQ(firsts(pair.taker->came), (std::vector<Cycle>{10 + latency, 25 + latency}));
+  }
+}
+
+TEST_P(TimedLink, TheSendersPipelineAddsItsLatency) {
+  fresh_simulation();
+  ClockDomain clock("clock", 1000);
+  Sender sender("sender", clock, GetParam());
+  Taker taker("taker", clock, GetParam(), 1);
+  sender.out.set_pipeline(5, 2);
+  sender.out.connect(taker.in, 4, 1);
+  taker.in.open();
+  sender.at = {10};
+  clock.run(sc_core::sc_time(1, sc_core::SC_US));
+  EXPECT_EQ(firsts(taker.came), (std::vector<Cycle>{16}));
+}
+
+TEST_P(TimedLink, BlockedAtTMinus1ReadyAtT) {
+  // One place, an item every 10 cycles. An item that leaves the queue in cycle t makes room for one of cycle t + 1.
+  Pair pair(GetParam(), 1, 1, 10);
+  pair.sender->at = {0, 0, 0, 0};
+  pair.run();
+  EXPECT_EQ(pair.taker->left, (std::vector<Cycle>{1, 11, 21, 31}));
+  EXPECT_EQ(firsts(pair.taker->came), (std::vector<Cycle>{1, 3, 13, 23}));
+}
+
+TEST_P(TimedLink, AQueueHoldsItsDepthAndNoMore) {
+  Pair pair(GetParam(), 3, 1, 100);
+  pair.sender->at = {0, 0, 0, 0, 0};
+  pair.run();
+  // Three places, and the place of an item is free once it has left.
+  EXPECT_EQ(pair.taker->left, (std::vector<Cycle>{1, 101, 201, 301, 401}));
+  EXPECT_LE(pair.taker->came[2].first, 3U);
+  EXPECT_LE(pair.taker->came[3].first, 103U);
+  EXPECT_GT(pair.taker->came[4].first, 101U);
+}
+
+TEST_P(TimedLink, ABatchTakesItsCyclesAndAsManyPlaces) {
+  Pair pair(GetParam(), 8, 2, 1);
+  pair.sender->at = {Span(10, 14), Span(15, 15)};
+  pair.sender->beats = {5, 1};
+  pair.run();
+  ASSERT_EQ(pair.taker->came.size(), 2U);
+  EXPECT_EQ(pair.taker->came[0].first, 12U);
+  EXPECT_EQ(pair.taker->came[0].last, 16U);
+  EXPECT_EQ(pair.taker->came[1].first, 17U);
+}
+
+TEST_P(TimedLink, ABatchLargerThanTheQueuePassesAllTheSame) {
+  Pair pair(GetParam(), 2, 1, 1);
+  pair.sender->at = {Span(0, 15), Span(16, 31), Span(32, 32)};
+  pair.sender->beats = {16, 16, 1};
+  pair.run();
+  EXPECT_EQ(pair.taker->items, (std::vector<int>{0, 1, 2}));
+  EXPECT_GE(pair.taker->came[2].first, 33U);
+}
+
+TEST_P(TimedLink, ItemsComeInOrderEachOnceUnderAnyStallsAndLater) {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    Cycle unstalled = 0;
+    for (const bool stalls : {false, true}) {
+      Pair pair(GetParam(), static_cast<unsigned>(1 + seed % 5), static_cast<unsigned>(1 + seed % 3), 2);
+      pair.sender->at.assign(100, 0);
+      if (stalls) {
+        pair.sender->out.stall_randomly(seed, 96);
+        pair.taker->in.stall_randomly(seed + 1000, 96);
+      }
+      pair.run();
+      ASSERT_EQ(pair.taker->items.size(), 100U) << seed;
+      for (int i = 0; i < 100; ++i) ASSERT_EQ(pair.taker->items[static_cast<std::size_t>(i)], i) << seed;
+      for (const Span& span : pair.taker->came) {
+        ASSERT_FALSE(stalls && stall_at(seed + 1000, span.first, 96)) << "a stalled port shows nothing, seed " << seed;
+      }
+      if (!stalls) unstalled = pair.taker->left.back();
+      ASSERT_GE(pair.taker->left.back(), unstalled) << seed;
+    }
+  }
+}
+
+TEST_P(TimedLink, AStubbedOutputSwallows) {
+  fresh_simulation();
+  ClockDomain clock("clock", 1000);
+  Sender sender("sender", clock, GetParam());
+  sender.out.stub();
+  sender.at.assign(1000, 0);
+  clock.run(sc_core::sc_time(10, sc_core::SC_US));
+  EXPECT_EQ(sender.out.transferred(), 1000U);
+  EXPECT_TRUE(sender.idle());
+}
+
+INSTANTIATE_TEST_SUITE_P(Transports, TimedLink, ::testing::Values(Transport::blocking, Transport::non_blocking),
+                         [](const auto& transport) { return transport.param == Transport::blocking ? "lt" : "at"; });
+
+TEST(TimedLink, AGateKeepsItemsInTheQueue) {
+  Pair pair(Transport::non_blocking, 4, 1, 1);
+  bool open = false;
+  pair.taker->in.set_gate([&] { return open; });
+  pair.sender->at = {0, 0, 0};
+  pair.run();
+  EXPECT_TRUE(pair.taker->items.empty());
+  EXPECT_FALSE(pair.taker->idle());
+}
+
+TEST(Lane, TakesSoManyACycleInOrder) {
+  Lane lane(4);
+  EXPECT_EQ(lane.take(10, 2), 10U);
+  EXPECT_EQ(lane.take(10, 2), 10U);
+  EXPECT_EQ(lane.take(10, 1), 11U);
+  EXPECT_EQ(lane.take(5, 4), 12U) << "what does not fit goes in the next cycle";
+  EXPECT_EQ(lane.take(5, 9), 13U) << "wider than a cycle: three of them";
+  EXPECT_EQ(lane.take(5, 1), 16U);
+  lane.hold(20);
+  EXPECT_EQ(lane.take(0, 1), 20U);
+}
+
+TEST(Flow, PartsOfAnItemMayGoInNeighbouringCycles) {
+  Flow flow(4);
+  const auto taken = [&](Cycle earliest, unsigned parts) {
+    const Span span = flow.take(earliest, parts);
+    return std::pair(span.first, span.last);
+  };
+  EXPECT_EQ(taken(10, 3), (std::pair<Cycle, Cycle>(10, 10)));
+  EXPECT_EQ(taken(10, 3), (std::pair<Cycle, Cycle>(10, 11)));
+  EXPECT_EQ(flow.next(), 11U);
+  EXPECT_EQ(taken(0, 2), (std::pair<Cycle, Cycle>(11, 11)));
+  EXPECT_EQ(flow.next(), 12U);
+  EXPECT_EQ(taken(0, 100), (std::pair<Cycle, Cycle>(12, 36)));
+  EXPECT_EQ(taken(50, 0), (std::pair<Cycle, Cycle>(50, 50))) << "nothing takes nothing";
+}
+
+TEST(Passage, ABatchBeginsWithItsFirstItemsAndEndsNoEarlierThanItsLastCome) {
+  Passage passage(8);
+  const auto taken = [&](Span visible, unsigned items) {
+    const Span span = passage.take(visible, items);
+    return std::pair(span.first, span.last);
+  };
+  EXPECT_EQ(taken({10, 13}, 27), (std::pair<Cycle, Cycle>(10, 13)));
+  EXPECT_EQ(taken({11, 11}, 3), (std::pair<Cycle, Cycle>(14, 14)));
+  EXPECT_EQ(taken({20, 30}, 3), (std::pair<Cycle, Cycle>(20, 30)));
+  EXPECT_EQ(taken({20, 20}, 17), (std::pair<Cycle, Cycle>(31, 33)));
+}
+
+TEST(Span, SpreadsPartsEvenly) {
+  const Span dense(10, 13);
+  EXPECT_EQ(dense.of_part(0, 4), 10U);
+  EXPECT_EQ(dense.of_part(2, 4), 12U);
+  const Span sparse(10, 40);
+  EXPECT_EQ(sparse.of_part(1, 4), 20U);
+  EXPECT_EQ(sparse.of_part(3, 4), 40U);
+  EXPECT_EQ(Span(7).of_part(3, 4), 7U);
+}
+
+}  // namespace
+}  // namespace vrpipe
