@@ -16,7 +16,8 @@ ClockDomain::ClockDomain(const sc_core::sc_module_name& name, std::uint64_t peri
 }
 
 unsigned ClockDomain::attach(Clocked& unit) {
-  slots_.push_back({&unit, 0, false});
+  slots_.push_back({&unit, 0});
+  active_.push_back(0);
   order_.push_back(static_cast<unsigned>(order_.size()));
   return order_.back();
 }
@@ -55,16 +56,19 @@ void ClockDomain::edge() {
 
 void ClockDomain::tick_all() {
   // First all that are due, then all ticks: a wake-up in this cycle is for a later one, also for a unit yet to tick.
-  for (Slot& slot : slots_) {
-    slot.active = slot.due <= now_;
-    if (slot.active) slot.due = never;
-    next_ = std::min(next_, slot.due);
-  }
+  // Without branches, since which units are due changes from edge to edge.
+  std::size_t active = 0;
   for (const unsigned index : order_) {
-    Slot& slot = slots_[index];
-    if (!slot.active) continue;
+    Cycle& due = slots_[index].due;
+    active_[active] = index;
+    active += due <= now_ ? 1 : 0;
+    due = due <= now_ ? never : due;
+    next_ = std::min(next_, due);
+  }
+  for (std::size_t i = 0; i < active; ++i) {
+    Slot& slot = slots_[active_[i]];
     const Cycle next = slot.unit->tick(now_);
-    if (next < slot.due) slot.due = next;
+    slot.due = std::min(slot.due, next);
     next_ = std::min(next_, next);
   }
   if (next_ <= now_) throw SimulationFault(name(), now_, "a unit asked for an edge in the past");

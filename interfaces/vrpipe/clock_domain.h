@@ -76,11 +76,11 @@ class ClockDomain : public sc_core::sc_module {
   sc_core::sc_event event_;
   struct Slot {
     Clocked* unit;
-    Cycle due;    ///< the next edge that the unit wants
-    bool active;  ///< ticked at this edge
+    Cycle due;  ///< the next edge that the unit wants
   };
   std::vector<Slot> slots_;
   std::vector<unsigned> order_;
+  std::vector<unsigned> active_;  ///< due at this edge
   Cycle now_ = 0;
   Cycle next_ = 0;  ///< the edge that is armed; `never` for none
   std::uint64_t edges_ = 0;

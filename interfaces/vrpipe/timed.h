@@ -39,8 +39,7 @@ constexpr Cycle activation_for(Cycle wanted, Cycle now) {
 /// The cycles in which the first and the last part of an item move.
 struct Span {
   Span() = default;
-  // NOLINTNEXTLINE(google-explicit-constructor): an item that moves in one cycle
-  Span(Cycle cycle) : first(cycle), last(cycle) {}
+  Span(Cycle cycle) : first(cycle), last(cycle) {}  ///< an item that moves in one cycle
   Span(Cycle begin, Cycle end) : first(begin), last(end) {}
   /// When part `index` of `parts` moves, if they are spread evenly.
   Cycle of_part(unsigned index, unsigned parts) const {
@@ -64,7 +63,7 @@ class Lane {
     if (width < left_) {
       left_ -= width;
     } else {
-      next_cycle((width + per_cycle_ - 1) / per_cycle_);
+      next_cycle((width + per_cycle_ - 1) / per_cycle_);  // NOLINT(clang-analyzer-core.DivideZero): at least 1
     }
     return taken;
   }

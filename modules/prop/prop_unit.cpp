@@ -94,8 +94,13 @@ class PropUnit : public Unit {
       }
       if (index_ < current_->count) {
         ++current_->holders;
-        beat.quads[beat.count++] = {current_, current_->tile, current_->position[index_], current_->live[index_],
-                                    index_};
+        // In place: a temporary of narrow stores would be waited for when it is copied.
+        ColorQuad& quad = beat.quads[beat.count++];
+        quad.warp = current_;
+        quad.tile = current_->tile;
+        quad.position = current_->position[index_];
+        quad.live = current_->live[index_];
+        quad.index = index_;
         ++index_;
       }
       if (index_ == current_->count) {
