@@ -41,17 +41,21 @@ void ClockDomain::run(const sc_core::sc_time& duration) {
 void ClockDomain::edge() {
   running_ = true;
   in_edge_ = true;
-  now_ = std::exchange(next_, never);
-  ++edges_;
+  ++activations_;
+  const Cycle present = next_;
   // Through the kernel an exception would come out as a report of the kernel's.
   try {
-    tick_all();
+    do {
+      now_ = std::exchange(next_, never);
+      ++edges_;
+      tick_all();
+    } while (!finished_ && next_ - present < cycles_per_activation_);
   } catch (...) {
     thrown_ = std::current_exception();
     finished_ = true;
   }
   in_edge_ = false;
-  if (!finished_ && next_ != never) event_.notify(sc_core::sc_time::from_value((next_ - now_) * period_.value()));
+  if (!finished_ && next_ != never) event_.notify(sc_core::sc_time::from_value((next_ - present) * period_.value()));
 }
 
 void ClockDomain::tick_all() {

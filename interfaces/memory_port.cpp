@@ -118,7 +118,7 @@ class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
     const std::uint64_t waited = free_at_ - arrival;  // nearly always a cycle: a division is dear
     const std::uint64_t transfer =
         waited <= memory_.bytes_per_cycle_ ? 1 : (waited + memory_.bytes_per_cycle_ - 1) / memory_.bytes_per_cycle_;
-    delay += sc_core::sc_time::from_value((memory_.latency_cycles_ + transfer) * memory_.domain_.period().value());
+    delay += memory_.time_of(memory_.latency_cycles_ + transfer);
     payload.set_response_status(tlm::TLM_OK_RESPONSE);
   }
   tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
@@ -137,6 +137,9 @@ class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
 FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, const ClockDomain& domain,
                                        unsigned latency_cycles, unsigned bytes_per_cycle, unsigned ports)
     : sc_module(name), domain_(domain), latency_cycles_(latency_cycles), bytes_per_cycle_(bytes_per_cycle) {
+  for (std::uint64_t cycles = 0; cycles < times_.size(); ++cycles) {
+    times_[cycles] = sc_core::sc_time::from_value(cycles * domain_.period().value());
+  }
   for (unsigned index = 0; index < ports; ++index) {
     ports_.push_back(std::make_unique<MemoryTarget>("port_" + std::to_string(index), *this));
   }

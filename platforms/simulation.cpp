@@ -182,7 +182,7 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
   result.host_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   result.cycles = cycles;
   result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
-  result.kernel_events = gpu.clock().edges();
+  result.kernel_events = gpu.clock().activations();
 
   BehaviourList behaviours;
   for (std::size_t i = 0; i < gpu.units().size(); ++i) {

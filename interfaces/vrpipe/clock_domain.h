@@ -57,11 +57,17 @@ class ClockDomain : public sc_core::sc_module {
   /// Whether the first edge has come.
   bool running() const { return running_; }
 
+  /// Up to so many cycles pass each time that the kernel activates the clock, which is not free. sc_time_stamp() is then
+  /// behind now() by as much, so this is for systems in which nothing but this clock has time of its own. At first 1.
+  void set_cycles_per_activation(unsigned cycles) { cycles_per_activation_ = cycles; }
+
   /// Ends the simulation after this cycle.
   void finish() { finished_ = true; }
   bool finished() const { return finished_; }
   /// Number of edges at which at least one unit was ticked.
   std::uint64_t edges() const { return edges_; }
+  /// Number of times that the kernel activated the clock.
+  std::uint64_t activations() const { return activations_; }
 
   /// Ticks in the order of this permutation of handles; for the tests that show that the order does not matter.
   void set_tick_order(std::vector<unsigned> order);
@@ -83,7 +89,9 @@ class ClockDomain : public sc_core::sc_module {
   std::vector<unsigned> active_;  ///< due at this edge
   Cycle now_ = 0;
   Cycle next_ = 0;  ///< the edge that is armed; `never` for none
+  unsigned cycles_per_activation_ = 1;
   std::uint64_t edges_ = 0;
+  std::uint64_t activations_ = 0;
   std::exception_ptr thrown_;
   bool in_edge_ = false;
   bool running_ = false;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -91,9 +92,13 @@ class FixedLatencyMemory : public sc_core::sc_module {
 
  private:
   class MemoryTarget;
+  sc_core::sc_time time_of(std::uint64_t cycles) const {
+    return cycles < times_.size() ? times_[cycles] : sc_core::sc_time::from_value(cycles * domain_.period().value());
+  }
   const ClockDomain& domain_;
   unsigned latency_cycles_;
   unsigned bytes_per_cycle_;
+  std::array<sc_core::sc_time, 1024> times_;  ///< of the first cycles, since making one is a call into the kernel
   std::vector<std::unique_ptr<MemoryTarget>> ports_;
 };
 

@@ -97,7 +97,7 @@ class Flow {
     const Cycle first = cycle_;
     used_ += parts;
     if (used_ > 8 * per_cycle_) {
-      cycle_ += (used_ - 1) / per_cycle_;
+      cycle_ += (used_ - 1) / per_cycle_;  // NOLINT(clang-analyzer-core.DivideZero): at least 1
       used_ = (used_ - 1) % per_cycle_ + 1;
     }
     for (; used_ > per_cycle_; used_ -= per_cycle_) ++cycle_;  // quicker than dividing

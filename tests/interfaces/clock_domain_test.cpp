@@ -55,6 +55,21 @@ TEST_F(ClockDomainTest, CyclesInWhichAllSleepCostNothing) {
   EXPECT_EQ(clock->now(), 1'000'000'000u);
 }
 
+TEST_F(ClockDomainTest, SeveralCyclesOfAnActivationAreTheSameCycles) {
+  for (const unsigned cycles : {1U, 4U}) {
+    fresh_simulation();
+    ClockDomain domain("clock", 1000);
+    domain.set_cycles_per_activation(cycles);
+    Ticker a(domain, {1, 2, 3, 4, 9});
+    Ticker b(domain, {2, 100});
+    sc_core::sc_start();
+    EXPECT_EQ(a.ticks, (std::vector<Cycle>{0, 1, 2, 3, 4, 9}));
+    EXPECT_EQ(b.ticks, (std::vector<Cycle>{0, 2, 100}));
+    EXPECT_EQ(domain.edges(), 7U);
+    EXPECT_EQ(domain.activations(), cycles == 1 ? 7U : 4U) << "0 to 3, 4, 9 and 100";
+  }
+}
+
 // case T08
 TEST_F(ClockDomainTest, TimeIsAWholeNumberOfPeriodsHoweverLongItRuns) {
   Ticker a(*clock, {125'000, 1'000'000'000'000});
