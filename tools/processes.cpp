@@ -365,7 +365,7 @@ void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned proces
 
 std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requests, const Draw& draw,
                                              bool with_images, unsigned processes, ProgressLine& progress) {
-  const std::shared_ptr<const Draw> shared(std::shared_ptr<const Draw>(), &draw);  // the caller's
+  std::shared_ptr<const Draw> shared(std::shared_ptr<const Draw>(), &draw);  // the caller's
   std::vector<Task> tasks;
   for (const RunRequest& request : requests) tasks.push_back({request.variant.name, request, [&] { return shared; }});
   std::vector<Simulated> results(requests.size());

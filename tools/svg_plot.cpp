@@ -28,7 +28,7 @@ struct Box {
 /// From values to pixels.
 class Scale {
  public:
-  Scale(const PlotAxis& axis, std::vector<double> values, double from, double to)
+  Scale(const PlotAxis& axis, const std::vector<double>& values, double from, double to)
       : logarithmic_(axis.logarithmic), from_(from), to_(to) {
     double least = std::numeric_limits<double>::infinity();
     double largest = -least;
