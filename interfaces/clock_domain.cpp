@@ -61,14 +61,17 @@ void ClockDomain::edge() {
 void ClockDomain::tick_all() {
   // First all that are due, then all ticks: a wake-up in this cycle is for a later one, also for a unit yet to tick.
   // Without branches, since which units are due changes from edge to edge.
+  const Cycle now = now_;
+  Cycle next_due = never;
   std::size_t active = 0;
   for (const unsigned index : order_) {
     Cycle& due = slots_[index].due;
     active_[active] = index;
-    active += due <= now_ ? 1 : 0;
-    due = due <= now_ ? never : due;
-    next_ = std::min(next_, due);
+    active += due <= now ? 1 : 0;
+    due = due <= now ? never : due;
+    next_due = std::min(next_due, due);
   }
+  next_ = next_due;
   for (std::size_t i = 0; i < active; ++i) {
     Slot& slot = slots_[active_[i]];
     const Cycle next = slot.unit->tick(now_);
