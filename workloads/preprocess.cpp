@@ -84,7 +84,7 @@ std::array<Vec3, 3> rotation_matrix(const std::array<float, 4>& quaternion) {
 /// Projects Gaussians for one camera. Stateless between calls: any thread, any order, the same bits.
 class Projector {
  public:
-  Projector(const Camera& camera, const PreprocessOptions& options) : camera_(camera), options_(options) {
+  explicit Projector(const Camera& camera) : camera_(camera) {
     for (std::size_t i = 0; i < 3; ++i) {
       world_to_camera_[i] = {camera.rotation[0][i], camera.rotation[1][i], camera.rotation[2][i]};
     }
@@ -184,7 +184,6 @@ class Projector {
   }
 
   const Camera& camera_;
-  const PreprocessOptions& options_;
   std::array<Vec3, 3> world_to_camera_;  ///< rows: right, down, forward
   double limit_x_, limit_y_;
 };
@@ -351,7 +350,7 @@ Draw preprocess(const GaussianScene& scene, const Camera& camera, const Preproce
   check_options(scene, camera, options);
   const int degree = std::min(options.sh_degree, scene.sh_degree());
   const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
-  const Projector projector(camera, options);
+  const Projector projector(camera);
 
   // First which are visible, and their keys; the splats only once their places are known. Projecting twice is cheaper
   // than a second copy of the splats, and keeps the memory per Gaussian small.
