@@ -1,4 +1,5 @@
 #include "crop/crop.h"
+#include "crop/sectors.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,9 +38,7 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   for (unsigned i = from; i < to; ++i) {
     const std::uint64_t address = surface_->address(warp.tile, warp.position[i]);
     const std::uint64_t offset = address & offset_mask;
-    const std::uint64_t first = offset >> sector_shift;
-    const std::uint64_t last = (offset + 4 * bytes_per_pixel(Format) - 1) >> sector_shift;
-    const auto sectors = static_cast<std::uint32_t>((std::uint64_t{2} << last) - (std::uint64_t{1} << first));
+    const std::uint32_t sectors = sectors_of(offset, 4 * bytes_per_pixel(Format), sector_shift);
     unsigned line = 0;
     while (line < out.count && out.lines[line].address != address - offset) ++line;
     if (line == out.count) {

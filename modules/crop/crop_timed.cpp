@@ -1,5 +1,7 @@
 #include <algorithm>
 
+#include "crop/sectors.h"
+
 #include <vrpipe/order_monitor.h>
 #include <vrpipe/timed.h>
 
@@ -159,17 +161,10 @@ class TimedCrop : public TimedUnit {
   template <class Access>
   void for_each_run(std::uint32_t mask, Access&& access) const {
     while (mask != 0) {
-      const auto sector = static_cast<unsigned>(__builtin_ctz(mask));
-      unsigned sectors = 1;
-      while (sector % (2 * sectors) == 0 && 2 * sectors <= longest_run_ &&
-             ((mask >> sector) & run_of(2 * sectors)) == run_of(2 * sectors)) {
-        sectors *= 2;
-      }
-      mask &= ~(run_of(sectors) << sector);
-      access(sector, sectors);
+      const SectorRun run = take_sector_run(mask, longest_run_);
+      access(run.first, run.count);
     }
   }
-  static constexpr std::uint32_t run_of(unsigned sectors) { return sectors == 32 ? ~0U : (1U << sectors) - 1; }
 
   /// The cycle in which a quad of the same position has left the blending pipeline.
   Cycle hazard_until(TileId tile, std::uint8_t position) {

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "crop/crop_cache.h"
+#include "crop/sectors.h"
 
 #include <vrpipe/memory_port.h>
 #include <vrpipe/order_monitor.h>
@@ -59,8 +60,6 @@ class CropUnit : public Unit {
     pending_.assign(cost_.cache_bytes / cost_.line_bytes, 0);
   }
 
-  static constexpr std::uint32_t run_of(unsigned sectors) { return sectors == 32 ? ~0U : (1U << sectors) - 1; }
-
   void finish_fills() {
     unsigned ticket = 0;
     while (memory_.next_completed(ticket)) {
@@ -88,18 +87,11 @@ class CropUnit : public Unit {
   /// Sends the dirty sectors of an evicted line; false while some are left.
   bool write_back() {
     while (write_back_ != 0 && memory_.available()) {
-      const auto sector = static_cast<unsigned>(__builtin_ctz(write_back_));
-      // Neighbours go in one access where they are naturally aligned.
-      unsigned sectors = 1;
-      while (sector % (2 * sectors) == 0 && 2 * sectors <= cost_.line_bytes / cost_.sector_bytes &&
-             ((write_back_ >> sector) & run_of(2 * sectors)) == run_of(2 * sectors)) {
-        sectors *= 2;
-      }
-      write_back_ &= ~(run_of(sectors) << sector);
+      const SectorRun run = take_sector_run(write_back_, cost_.line_bytes / cost_.sector_bytes);
       const unsigned ticket =
-          memory_.write(write_back_address_ + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_);
+          memory_.write(write_back_address_ + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_);
       fills_[ticket].line = CropCache::no_line;
-      tokens_ -= static_cast<std::int32_t>(sectors * cost_.quads_per_cycle);
+      tokens_ -= static_cast<std::int32_t>(run.count * cost_.quads_per_cycle);
     }
     return write_back_ == 0;
   }
@@ -111,9 +103,7 @@ class CropUnit : public Unit {
     const CropCache::Line line = line_of(address);
     if (line == CropCache::no_line) return false;
     const std::uint64_t offset = address & (cost_.line_bytes - 1);
-    const auto first = static_cast<unsigned>(offset >> sector_shift_);
-    const auto last = static_cast<unsigned>((offset + bytes_per_quad_ - 1) >> sector_shift_);
-    const std::uint32_t sectors = run_of(last - first + 1) << first;
+    const std::uint32_t sectors = sectors_of(offset, bytes_per_quad_, sector_shift_);
     for (std::uint32_t missing = sectors & ~(cache_->present(line) | pending_[line]); missing != 0;
          missing &= missing - 1) {
       if (!memory_.available() || fills_in_flight_ == cost_.mshrs) return false;

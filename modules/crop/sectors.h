@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+
+namespace vrpipe {
+
+// Sectors of a line, a bit each, at most 32.
+
+constexpr std::uint32_t sector_mask(unsigned first, unsigned count) {
+  return (count == 32 ? ~0U : (1U << count) - 1) << first;
+}
+
+/// Those that hold bytes from an offset in the line on. @param shift log2 of the bytes of a sector
+constexpr std::uint32_t sectors_of(std::uint64_t offset, std::uint32_t bytes, unsigned shift) {
+  const auto first = static_cast<unsigned>(offset >> shift);
+  const auto last = static_cast<unsigned>((offset + bytes - 1) >> shift);
+  return sector_mask(first, last - first + 1);
+}
+
+struct SectorRun {
+  unsigned first;
+  unsigned count;
+};
+/// Takes the first sectors out of a mask that is not 0: neighbours, as many as go in one naturally aligned access of up
+/// to `longest`.
+inline SectorRun take_sector_run(std::uint32_t& mask, unsigned longest) {
+  const auto first = static_cast<unsigned>(__builtin_ctz(mask));
+  unsigned count = 1;
+  while (first % (2 * count) == 0 && 2 * count <= longest &&
+         (mask & sector_mask(first, 2 * count)) == sector_mask(first, 2 * count)) {
+    count *= 2;
+  }
+  mask &= ~sector_mask(first, count);
+  return {first, count};
+}
+
+}  // namespace vrpipe
