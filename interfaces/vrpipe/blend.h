@@ -73,14 +73,6 @@ inline Lanes store_channel(Lanes value) {
 template <ColorFormat Format, BlendRounding Rounding>
 inline QuadColor blend_into_target(const QuadColor& destination, const QuadColor& source) {
   const QuadColor sum = blend_front_to_back(destination, source);
-  if constexpr (Format == ColorFormat::rgba16f && Rounding != BlendRounding::rtz) {
-    // The same result at half the price, for nearly every quad.
-    if (sign_mask(rounds_to_normal_half(sum.red) & rounds_to_normal_half(sum.green) & rounds_to_normal_half(sum.blue) &
-                  rounds_to_normal_half(sum.alpha)) == all_lanes) {
-      return {round_to_normal_half(sum.red), round_to_normal_half(sum.green), round_to_normal_half(sum.blue),
-              round_to_normal_half(sum.alpha)};
-    }
-  }
   return {store_channel<Format, Rounding>(sum.red), store_channel<Format, Rounding>(sum.green),
           store_channel<Format, Rounding>(sum.blue), store_channel<Format, Rounding>(sum.alpha)};
 }

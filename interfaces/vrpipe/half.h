@@ -10,9 +10,8 @@ namespace vrpipe {
 /// IEEE binary16, as a register of the colour target holds it; arithmetic happens in float.
 constexpr float half_max = 65504.0F;
 
-/// Rounds to the nearest value that binary16 represents, ties to even; beyond 65519.99 gives infinity.
-/// The result is a float, so that a surface can keep binary16 values without converting at every blend.
-inline Lanes round_to_half(Lanes value) {
+/// `round_to_half` for every processor.
+inline Lanes round_to_half_by_integers(Lanes value) {
   const LaneBits bits = bits_of(value);
   const LaneBits sign = bits & LaneBits{INT32_MIN, INT32_MIN, INT32_MIN, INT32_MIN};
   const LaneBits magnitude = bits & 0x7fffffff;
@@ -22,23 +21,22 @@ inline Lanes round_to_half(Lanes value) {
   const Lanes shifted = lanes_of(magnitude) + 0.5F;
   const Lanes subnormal = shifted - 0.5F;
   const LaneBits is_small = magnitude < 0x38800000;
-  const LaneBits overflows = (normal > 0x477fe000) & (magnitude <= 0x7f800000);
+  const LaneBits is_nan = magnitude > 0x7f800000;
   LaneBits rounded = (is_small & bits_of(subnormal)) | (~is_small & normal);
-  rounded = (overflows & 0x7f800000) | (~overflows & rounded);
+  rounded = normal > 0x477fe000 ? LaneBits{} + 0x7f800000 : rounded;
+  rounded = is_nan ? (magnitude & ~0x1fff) | 0x400000 : rounded;
   return lanes_of(rounded | sign);
 }
 
-/// All ones where a value is zero or rounds to a normal half and not to infinity: then `round_to_normal_half` suffices.
-inline LaneBits rounds_to_normal_half(Lanes value) {
-  // From 2^-14 to 65504, without the sign; as one signed comparison, the range being moved to the smallest integers.
-  using Unsigned = std::uint32_t __attribute__((vector_size(16)));
-  const LaneBits magnitude = bits_of(value) & 0x7fffffff;
-  const auto moved = reinterpret_cast<LaneBits>(reinterpret_cast<Unsigned>(magnitude) + (0x80000000U - 0x38800000U));
-  return (moved <= INT32_MIN + (0x477fe000 - 0x38800000)) | (magnitude == 0);
-}
-inline Lanes round_to_normal_half(Lanes value) {
-  const LaneBits bits = bits_of(value);
-  return lanes_of((bits + 0xfff + ((bits >> 13) & 1)) & ~0x1fff);
+/// Rounds to the nearest value that binary16 represents, ties to even; beyond 65519.99 gives infinity, NaN a quiet NaN.
+/// The result is a float, so that a surface can keep binary16 values without converting at every blend.
+inline Lanes round_to_half(Lanes value) {
+#if defined(__F16C__) && !defined(__clang__)
+  // The same bits. Clang has these only behind a header that takes long to read.
+  return __builtin_ia32_vcvtph2ps(__builtin_ia32_vcvtps2ph(value, 0));
+#else
+  return round_to_half_by_integers(value);
+#endif
 }
 
 /// Rounds towards zero; beyond 65504 gives 65504 (D3D11.3 functional specification, float to lower-precision float).

@@ -29,9 +29,7 @@ inline Lanes lanes_of(LaneBits bits) {
 }
 
 /// `condition` holds all ones or all zeros in each lane, as a vector comparison gives.
-inline Lanes select(LaneBits condition, Lanes if_true, Lanes if_false) {
-  return lanes_of((condition & bits_of(if_true)) | (~condition & bits_of(if_false)));
-}
+inline Lanes select(LaneBits condition, Lanes if_true, Lanes if_false) { return condition != 0 ? if_true : if_false; }
 
 /// The sign bit of each lane.
 inline LaneMask sign_mask(LaneBits bits) {

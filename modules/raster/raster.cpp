@@ -1,6 +1,8 @@
 #include "raster/raster.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstring>
 
 #include <vrpipe/error.h>
 #include <vrpipe/registry.h>
@@ -14,6 +16,21 @@ constexpr auto raster_side = static_cast<std::int32_t>(raster_tile_pixels);
 // value beyond +-2^30 at the tile's first sample keeps its sign over the tile: then 32 bits are exact after clamping.
 constexpr std::int64_t narrow_gradient = (std::int64_t{1} << 30) / 7;
 constexpr std::int64_t narrow_limit = std::int64_t{1} << 30;
+
+/// The samples of two quads.
+using PairBits = std::int32_t __attribute__((vector_size(32)));
+
+/// Of edge functions, or-ed: a bit for each sample at which none is negative.
+unsigned inside_of(const PairBits& edges) {
+#if defined(__AVX__)
+  using Floats = float __attribute__((vector_size(32)));
+  return ~static_cast<unsigned>(__builtin_ia32_movmskps256(reinterpret_cast<Floats>(edges))) & 0xffU;
+#else
+  LaneBits quads[2];
+  std::memcpy(quads, &edges, sizeof quads);
+  return ~(sign_mask(quads[0]) | static_cast<unsigned>(sign_mask(quads[1])) << 4U) & 0xffU;
+#endif
+}
 }  // namespace
 
 TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderState& state)
@@ -134,50 +151,51 @@ LaneMask TileRasterizer::in_area(std::int32_t x, std::int32_t y) const {
 }
 
 unsigned TileRasterizer::fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]) {
-  LaneBits at[3];
-  LaneBits right[3];
-  LaneBits down[3];
+  // Two quads of a row at a time.
+  PairBits at[3];
+  PairBits right[3];
+  PairBits down[3];
   for (unsigned i = 0; i < 3; ++i) {
     const auto start = static_cast<std::int32_t>(std::clamp(value[i], -narrow_limit, narrow_limit));
     const auto dx = static_cast<std::int32_t>(edges_[i].dx);
     const auto dy = static_cast<std::int32_t>(edges_[i].dy);
-    at[i] = LaneBits{start, start + dx, start + dy, start + dx + dy};
-    right[i] = LaneBits{2 * dx, 2 * dx, 2 * dx, 2 * dx};
-    down[i] = LaneBits{2 * dy, 2 * dy, 2 * dy, 2 * dy};
+    at[i] = PairBits{0, dx, dy, dx + dy, 2 * dx, 3 * dx, 2 * dx + dy, 3 * dx + dy} + start;
+    right[i] = PairBits{} + 4 * dx;
+    down[i] = PairBits{} + 2 * dy;
   }
-  const bool inside_area =
-      x >= mask_area_.x0 && y >= mask_area_.y0 && x + raster_side <= mask_area_.x1 && y + raster_side <= mask_area_.y1;
-  const unsigned first =
-      static_cast<unsigned>((y % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) + (x % tile_side) / 2);
-  unsigned fragments = 0;
-  unsigned count = 0;
+  std::uint64_t coverage = 0;  // of the 4x4 quads, 4 bits each
   for (unsigned row = 0; row < 4; ++row) {
-    LaneBits a = at[0];
-    LaneBits b = at[1];
-    LaneBits c = at[2];
-    for (unsigned column = 0; column < 4; ++column) {
-      auto mask = static_cast<LaneMask>(sign_mask(a | b | c) ^ all_lanes);
-      if (!inside_area) {
-        mask = static_cast<LaneMask>(
-            mask & in_area(x + static_cast<std::int32_t>(2 * column), y + static_cast<std::int32_t>(2 * row)));
-      }
-      // Written always, kept only if covered: the branch would be mispredicted too often.
-      Quad& quad = out.quads[count];
-      quad.splat = primitive_.splat;
-      quad.position = static_cast<std::uint8_t>(first + row * quads_per_tile_row + column);
-      quad.coverage = mask;
-      quad.triangle = primitive_.triangle;
-      quad.reserved = 0;
-      count += mask != 0 ? 1U : 0U;
-      fragments += popcount(mask);
-      a += right[0];
-      b += right[1];
-      c += right[2];
-    }
+    coverage |= std::uint64_t{inside_of(at[0] | at[1] | at[2])} << (16 * row);
+    coverage |= std::uint64_t{inside_of((at[0] + right[0]) | (at[1] + right[1]) | (at[2] + right[2]))}
+                << (16 * row + 8);
     for (unsigned i = 0; i < 3; ++i) at[i] += down[i];
   }
+  if (x < mask_area_.x0 || y < mask_area_.y0 || x + raster_side > mask_area_.x1 || y + raster_side > mask_area_.y1) {
+    for (unsigned quad = 0; quad < 16; ++quad) {
+      const auto column = static_cast<std::int32_t>(quad % 4);
+      const auto row = static_cast<std::int32_t>(quad / 4);
+      const auto outside = static_cast<LaneMask>(in_area(x + 2 * column, y + 2 * row) ^ all_lanes);
+      coverage &= ~(std::uint64_t{outside} << (4 * quad));
+    }
+  }
+  const unsigned first =
+      static_cast<unsigned>((y % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) + (x % tile_side) / 2);
+  // Written always, kept only if covered: the branch would be mispredicted too often. And in one piece, since a quad of
+  // narrow stores would be waited for when it is copied.
+  static_assert(offsetof(Quad, position) == 4 && offsetof(Quad, coverage) == 5 && offsetof(Quad, triangle) == 6);
+  static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
+  const std::uint64_t common =
+      primitive_.splat | std::uint64_t{first} << 32U | std::uint64_t{primitive_.triangle} << 48U;
+  unsigned count = 0;
+  for (unsigned quad = 0; quad < 16; ++quad) {
+    const std::uint64_t mask = (coverage >> (4 * quad)) & all_lanes;
+    const std::uint64_t position = quad / 4 * quads_per_tile_row + quad % 4;
+    const std::uint64_t bits = common + (position << 32U) + (mask << 40U);
+    std::memcpy(static_cast<void*>(&out.quads[count]), &bits, sizeof bits);
+    count += mask != 0 ? 1U : 0U;
+  }
   out.count = static_cast<std::uint8_t>(count);
-  return fragments;
+  return static_cast<unsigned>(__builtin_popcountll(coverage));
 }
 
 unsigned TileRasterizer::fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]) {

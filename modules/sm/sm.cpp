@@ -14,6 +14,19 @@ constexpr float half_log2_e = 0.72134752F;
 // Of the axes' determinant, px^2: below it the inverse overflows, and flushing denormals would decide.
 constexpr float smallest_determinant = 1e-30F;
 
+/// Sample positions of the quads of a screen tile, by column and by row.
+struct Samples {
+  Lanes x[quads_per_tile_row];
+  Lanes y[quads_per_tile_row];
+  Samples() {
+    for (unsigned i = 0; i < quads_per_tile_row; ++i) {
+      x[i] = 2.0F * static_cast<float>(i) + Lanes{0.5F, 1.5F, 0.5F, 1.5F};
+      y[i] = 2.0F * static_cast<float>(i) + Lanes{0.5F, 0.5F, 1.5F, 1.5F};
+    }
+  }
+};
+const Samples samples;
+
 /// What a colour target of 16 bits can hold; NaN gives 0.
 float clamp_color(float value) { return std::min(std::max(0.0F, value), half_max); }
 }  // namespace
@@ -50,13 +63,12 @@ void SplatShader::load(std::uint32_t index) {
 }
 
 template <Exponential Kind>
-LaneMask SplatShader::shade_quad(TileId tile, const Quad& quad, QuadColor& out) {
+LaneMask SplatShader::shade_quad(float x, float y, const Quad& quad, QuadColor& out) {
   if (quad.splat != loaded_) load(quad.splat);
   const Attributes& splat = attributes_;
-  const auto x = static_cast<float>(tile.x * screen_tile_pixels + (quad.position % quads_per_tile_row) * 2);
-  const auto y = static_cast<float>(tile.y * screen_tile_pixels + (quad.position / quads_per_tile_row) * 2);
-  const Lanes dx = Lanes{x + 0.5F, x + 1.5F, x + 0.5F, x + 1.5F} - splat.cx;
-  const Lanes dy = Lanes{y + 0.5F, y + 0.5F, y + 1.5F, y + 1.5F} - splat.cy;
+  // The positions are sums of small integers and halves: exact.
+  const Lanes dx = x + samples.x[quad.position % quads_per_tile_row] - splat.cx;
+  const Lanes dy = y + samples.y[quad.position / quads_per_tile_row] - splat.cy;
   const Lanes u = dx * splat.m00 + dy * splat.m01;
   const Lanes v = dx * splat.m10 + dy * splat.m11;
   const Lanes squared = u * u + v * v;
@@ -87,6 +99,8 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
   out.end_of_draw = false;
   ++fragment_warps;
   quads_shaded += warp.count;
+  const auto x = static_cast<float>(warp.tile.x * screen_tile_pixels);
+  const auto y = static_cast<float>(warp.tile.y * screen_tile_pixels);
   unsigned count = 0;
   unsigned shaded = 0;
   unsigned pruned = 0;
@@ -94,7 +108,7 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
   for (unsigned i = 0; i < warp.count; ++i) {
     const Quad& quad = warp.quads[i];
     QuadColor& color = out.color[count];
-    const LaneMask live = shade_quad<Kind>(warp.tile, quad, color);
+    const LaneMask live = shade_quad<Kind>(x, y, quad, color);
     shaded += popcount(quad.coverage);
     pruned += popcount(static_cast<LaneMask>(quad.coverage & ~live));
     const bool back_of_pair = (i & 1U) != 0 && ((warp.merge_pairs >> (i / 2)) & 1U) != 0;

@@ -101,7 +101,7 @@ class SplatShader : public SmBehaviour {
   template <Exponential Kind>
   void shade_warp(const Warp& warp, ShadedWarp& out);
   template <Exponential Kind>
-  LaneMask shade_quad(TileId tile, const Quad& quad, QuadColor& out);
+  LaneMask shade_quad(float x, float y, const Quad& quad, QuadColor& out);
 
   const RenderState& state_;
   Cost cost_;
