@@ -1,12 +1,32 @@
 #include <vrpipe/clock_domain.h>
 
 #include <algorithm>
+#include <cstring>
 #include <numeric>
 #include <utility>
 
 #include <vrpipe/error.h>
 
 namespace vrpipe {
+
+namespace {
+
+using CycleVector = Cycle __attribute__((vector_size(32)));
+constexpr std::size_t cycles_per_vector = sizeof(CycleVector) / sizeof(Cycle);
+
+/// A bit for each lane that is all ones; the others are 0.
+unsigned mask_of(const CycleVector& lanes) {
+#if defined(__AVX__)
+  using Doubles = double __attribute__((vector_size(32)));
+  return static_cast<unsigned>(__builtin_ia32_movmskpd256(reinterpret_cast<Doubles>(lanes)));
+#else
+  unsigned mask = 0;
+  for (std::size_t lane = 0; lane < cycles_per_vector; ++lane) mask |= static_cast<unsigned>(lanes[lane] & 1U) << lane;
+  return mask;
+#endif
+}
+
+}  // namespace
 
 ClockDomain::ClockDomain(const sc_core::sc_module_name& name, std::uint64_t period_ps)
     : sc_module(name), period_(static_cast<double>(period_ps), sc_core::SC_PS) {
@@ -16,19 +36,29 @@ ClockDomain::ClockDomain(const sc_core::sc_module_name& name, std::uint64_t peri
 }
 
 unsigned ClockDomain::attach(Clocked& unit) {
-  slots_.push_back({&unit, 0});
-  active_.push_back(0);
-  order_.push_back(static_cast<unsigned>(order_.size()));
-  return order_.back();
+  const auto handle = static_cast<unsigned>(units_.size());
+  units_.push_back(&unit);
+  place_of_.push_back(handle);
+  if (handle == due_.size()) due_.resize(due_.size() + cycles_per_vector, never);
+  due_[handle] = 0;
+  active_.resize(handle / 64 + 1);
+  return handle;
 }
 
 void ClockDomain::set_tick_order(std::vector<unsigned> order) {
-  std::vector<unsigned> sorted = order;
-  std::sort(sorted.begin(), sorted.end());
-  std::vector<unsigned> all(slots_.size());
+  std::vector<unsigned> all(units_.size());
   std::iota(all.begin(), all.end(), 0U);
-  if (sorted != all) throw SimulationFault(name(), now_, "the tick order is not a permutation of the units");
-  order_ = std::move(order);
+  if (!std::is_permutation(order.begin(), order.end(), all.begin(), all.end())) {
+    throw SimulationFault(name(), now_, "the tick order is not a permutation of the units");
+  }
+  if (running_) throw SimulationFault(name(), now_, "the tick order is set after the first edge");
+  std::vector<Clocked*> units;
+  for (unsigned place = 0; place < order.size(); ++place) {
+    units.push_back(units_[place_of_[order[place]]]);
+    all[order[place]] = place;
+  }
+  units_ = std::move(units);
+  place_of_ = std::move(all);
 }
 
 void ClockDomain::start_of_simulation() { event_.notify(sc_core::SC_ZERO_TIME); }
@@ -46,9 +76,12 @@ void ClockDomain::edge() {
   // Through the kernel an exception would come out as a report of the kernel's.
   try {
     do {
-      now_ = std::exchange(next_, never);
+      now_ = next_;
       ++edges_;
-      tick_all();
+      some_soon_ = false;
+      tick_due();
+      next_ = some_soon_ ? now_ + 1 : *std::min_element(due_.begin(), due_.end());
+      if (next_ <= now_) throw SimulationFault(name(), now_, "a unit asked for an edge in the past");
     } while (!finished_ && next_ - present < cycles_per_activation_);
   } catch (...) {
     thrown_ = std::current_exception();
@@ -58,34 +91,40 @@ void ClockDomain::edge() {
   if (!finished_ && next_ != never) event_.notify(sc_core::sc_time::from_value((next_ - present) * period_.value()));
 }
 
-void ClockDomain::tick_all() {
+void ClockDomain::tick_due() {
   // First all that are due, then all ticks: a wake-up in this cycle is for a later one, also for a unit yet to tick.
-  // Without branches, since which units are due changes from edge to edge.
+  // Several units at a time and without branches, since which of them are due changes from edge to edge.
   const Cycle now = now_;
-  Cycle next_due = never;
-  std::size_t active = 0;
-  for (const unsigned index : order_) {
-    Cycle& due = slots_[index].due;
-    active_[active] = index;
-    active += due <= now ? 1 : 0;
-    due = due <= now ? never : due;
-    next_due = std::min(next_due, due);
+  Cycle* const due = due_.data();
+  const std::size_t places = due_.size();
+  for (std::size_t first = 0; first < places; first += 64) {
+    std::uint64_t active = 0;
+    for (std::size_t place = first; place < std::min(first + 64, places); place += cycles_per_vector) {
+      CycleVector wanted;
+      std::memcpy(&wanted, due + place, sizeof wanted);
+      const auto is_due = reinterpret_cast<CycleVector>(wanted == now);
+      wanted |= is_due;  // `never` has all bits set
+      std::memcpy(due + place, &wanted, sizeof wanted);
+      active |= std::uint64_t{mask_of(is_due)} << (place - first);
+    }
+    active_[first / 64] = active;
   }
-  next_ = next_due;
-  for (std::size_t i = 0; i < active; ++i) {
-    Slot& slot = slots_[active_[i]];
-    const Cycle next = slot.unit->tick(now_);
-    slot.due = std::min(slot.due, next);
-    next_ = std::min(next_, next);
+  for (std::size_t first = 0; first < places; first += 64) {
+    for (std::uint64_t left = active_[first / 64]; left != 0; left &= left - 1) {
+      const std::size_t place = first + static_cast<unsigned>(__builtin_ctzll(left));
+      const Cycle next = units_[place]->tick(now);
+      due[place] = std::min(due[place], next);
+      some_soon_ |= next == now + 1;
+    }
   }
-  if (next_ <= now_) throw SimulationFault(name(), now_, "a unit asked for an edge in the past");
 }
 
 void ClockDomain::wake_from_outside(unsigned handle, Cycle at) {
   if (finished_) return;
-  at = std::max(at, edge_after(sc_core::SC_ZERO_TIME));
-  slots_[handle].due = std::min(slots_[handle].due, at);
-  if (at >= next_) return;
+  if (running_) at = std::max(at, edge_after(sc_core::SC_ZERO_TIME));
+  Cycle& due = due_[place_of_[handle]];
+  due = std::min(due, at);
+  if (!running_ || at >= next_) return;
   next_ = at;
   event_.notify(sc_core::sc_time::from_value(at * period_.value()) - sc_core::sc_time_stamp());
 }

@@ -5,18 +5,18 @@
 namespace vrpipe {
 
 MemoryPort::MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight)
-    : socket(name.c_str()), clock_(owner.clock) {
+    : socket(name.c_str()), clock_(owner.clock), most_in_flight_(in_flight) {
   std::size_t ring = 1;
   while (ring < in_flight) ring *= 2;
   completions_.resize(ring);
+  ring_mask_ = ring - 1;
   socket.bind(*this);
-  free_tickets_.reserve(in_flight);
-  for (unsigned ticket = in_flight; ticket-- > 0;) free_tickets_.push_back(ticket);
+  next_access_ = unused_access();
 }
 
 MemoryPort::~MemoryPort() = default;
 
-MemoryPort::Access& MemoryPort::take_access(unsigned bytes) {
+MemoryPort::Access* MemoryPort::unused_access() {
   if (free_accesses_.empty()) {
     Access& made = accesses_.emplace_back();
     made.set_mm(this);
@@ -24,62 +24,61 @@ MemoryPort::Access& MemoryPort::take_access(unsigned bytes) {
     made.set_dmi_allowed(false);
     free_accesses_.push_back(&made);
   }
-  Access& access = *free_accesses_.back();
+  Access* const access = free_accesses_.back();
   free_accesses_.pop_back();
-  if (access.data.size() < bytes) access.data.resize(bytes);
-  access.set_data_ptr(access.data.data());
-  access.set_data_length(bytes);
-  access.set_streaming_width(bytes);
-  access.answered = false;
-  access.acquire();
+  access->acquire();
   return access;
 }
 
-unsigned MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes) {
-  if (bytes == 0 || (bytes & (bytes - 1)) != 0 || (address & (bytes - 1)) != 0) {
-    throw SimulationFault(socket.name(), clock_.domain->now(),
-                          "an access of " + std::to_string(bytes) + " bytes at " + std::to_string(address) +
-                              " is not naturally aligned");
-  }
-  const unsigned ticket = free_tickets_.back();
-  free_tickets_.pop_back();
-  Access& access = take_access(bytes);
-  access.ticket = ticket;
-  access.set_command(command);
-  access.set_address(address);
-  access.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
-  (command == tlm::TLM_READ_COMMAND ? reads_ : writes_) += 1;
-
-  tlm::tlm_phase phase = tlm::BEGIN_REQ;
-  sc_core::sc_time delay = sc_core::SC_ZERO_TIME;
-  requesting_ = &access;  // until the memory says otherwise, perhaps from within the call
-  const tlm::tlm_sync_enum status = socket->nb_transport_fw(access, phase, delay);
-  if (status == tlm::TLM_ACCEPTED) return ticket;
-  requesting_ = nullptr;
-  if (status == tlm::TLM_UPDATED && phase != tlm::BEGIN_RESP) return ticket;
-  complete(access, delay);
-  if (status == tlm::TLM_UPDATED) {
-    phase = tlm::END_RESP;
-    socket->nb_transport_fw(access, phase, delay);
-  }
-  access.release();
-  return ticket;
-}
-
-void MemoryPort::complete(Access& access, const sc_core::sc_time& delay) {
+inline void MemoryPort::complete(Access& access, const sc_core::sc_time& delay) {
   if (access.is_response_error()) {
     throw SimulationFault(socket.name(), clock_.domain->now(), "the memory answered " + access.get_response_string());
   }
   access.answered = true;
   const Cycle at = clock_.domain->edge_after(delay);
-  // Nearly always the last: memories answer in order. The ring holds an entry for every ticket.
-  std::size_t place = completions_head_ + completions_count_++;
+  // Nearly always the last: memories answer in order. The ring holds all in flight.
+  std::size_t place = completions_tail_++;
   while (place != completions_head_ && completion(place - 1).at > at) {
     completion(place) = completion(place - 1);
     --place;
   }
-  completion(place) = {at, access.ticket};
+  completion(place) = {at, access.tag};
   clock_.domain->wake(clock_.unit, at);
+}
+
+void MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag) {
+  if (bytes == 0 || ((address | bytes) & (bytes - 1)) != 0) {
+    throw SimulationFault(socket.name(), clock_.domain->now(),
+                          "an access of " + std::to_string(bytes) + " bytes at " + std::to_string(address) +
+                              " is not naturally aligned");
+  }
+  ++in_flight_;
+  Access& access = *next_access_;
+  if (access.data.size() < bytes) access.data.resize(bytes);
+  access.set_data_ptr(access.data.data());
+  access.set_data_length(bytes);
+  access.set_streaming_width(bytes);
+  access.answered = false;
+  access.tag = tag;
+  access.set_command(command);
+  access.set_address(address);
+  access.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
+
+  tlm::tlm_phase phase = tlm::BEGIN_REQ;
+  sc_core::sc_time delay = sc_core::SC_ZERO_TIME;
+  requesting_ = &access;  // until the memory says otherwise, perhaps from within the call
+  const tlm::tlm_sync_enum status = socket->nb_transport_fw(access, phase, delay);
+  if (status != tlm::TLM_ACCEPTED) requesting_ = nullptr;
+  if (status == tlm::TLM_COMPLETED || (status == tlm::TLM_UPDATED && phase == tlm::BEGIN_RESP)) {
+    complete(access, delay);
+    if (status == tlm::TLM_UPDATED) {
+      phase = tlm::END_RESP;
+      socket->nb_transport_fw(access, phase, delay);
+    }
+    if (access.get_ref_count() == 1) return;  // ours alone: it serves again
+    access.release();
+  }
+  next_access_ = unused_access();
 }
 
 tlm::tlm_sync_enum MemoryPort::nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
@@ -110,8 +109,12 @@ class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
  private:
   void serve(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) {
     // The delay that comes in says how far ahead of the clock the access is.
-    const Cycle ahead = delay.value() / memory_.domain_.period().value();
-    const std::uint64_t arrival = (memory_.domain_.now() + ahead) * memory_.bytes_per_cycle_;
+    // Mostly the last one's; a division is dear.
+    if (delay.value() != delay_) {
+      delay_ = delay.value();
+      ahead_ = delay_ / memory_.domain_.period().value();
+    }
+    const std::uint64_t arrival = (memory_.domain_.now() + ahead_) * memory_.bytes_per_cycle_;
     const std::uint64_t start = free_at_ > arrival ? free_at_ : arrival;
     free_at_ = start + payload.get_data_length();
     bytes += payload.get_data_length();
@@ -131,6 +134,8 @@ class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
   unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
 
   const FixedLatencyMemory& memory_;
+  std::uint64_t delay_ = 0;
+  Cycle ahead_ = 0;            // delay_ in cycles
   std::uint64_t free_at_ = 0;  // in bytes since the start, so that fractions of a cycle are kept
 };
 

@@ -64,8 +64,13 @@ Cycle TimedMemoryPort::access(tlm::tlm_command command, std::uint64_t address, u
   const Cycle now = clock_.domain->now();
   const std::uint64_t period = clock_.domain->period().value();
   const Cycle ahead = std::max(at, now) - now;
-  const std::uint64_t asked = ahead * period;
-  sc_core::sc_time delay = sc_core::sc_time::from_value(asked);
+  // Most accesses are asked for together with others, and making a time is a call into the kernel.
+  if (ahead != ahead_) {
+    ahead_ = ahead;
+    delay_ = sc_core::sc_time::from_value(ahead * period);
+  }
+  const std::uint64_t asked = delay_.value();
+  sc_core::sc_time delay = delay_;
   socket->b_transport(payload_, delay);
   if (payload_.is_response_error()) {
     throw SimulationFault(socket.name(), at, "the memory answered " + payload_.get_response_string());

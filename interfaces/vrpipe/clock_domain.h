@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <exception>
 #include <string>
 #include <vector>
@@ -35,12 +36,13 @@ class ClockDomain : public sc_core::sc_module {
   sc_core::sc_time period() const { return period_; }
 
   /// Asks for an edge of a unit at cycle `at`, later than now while the simulation runs. Also from outside an edge, by
-  /// a module with time of its own: the edge is then one that is yet to come.
+  /// a module with time of its own: the edge is then one that is yet to come. Of several wishes of a unit the earliest
+  /// counts.
   void wake(unsigned handle, Cycle at) {
-    if (!in_edge_ && running_) return wake_from_outside(handle, at);
-    if (at >= slots_[handle].due) return;
-    slots_[handle].due = at;
-    next_ = std::min(next_, at);
+    if (!in_edge_) return wake_from_outside(handle, at);
+    Cycle& due = due_[place_of_[handle]];
+    due = std::min(due, at);
+    some_soon_ |= at == now_ + 1;
   }
 
   /// The first edge that is later than the present time, and not before `delay` has passed.
@@ -69,24 +71,23 @@ class ClockDomain : public sc_core::sc_module {
   /// Number of times that the kernel activated the clock.
   std::uint64_t activations() const { return activations_; }
 
-  /// Ticks in the order of this permutation of handles; for the tests that show that the order does not matter.
+  /// Ticks in the order of this permutation of handles; for the tests that show that the order does not matter. Before
+  /// the first edge.
   void set_tick_order(std::vector<unsigned> order);
 
  private:
   void edge();
-  void tick_all();
+  void tick_due();
   void wake_from_outside(unsigned handle, Cycle at);
   void start_of_simulation() override;
 
   sc_core::sc_time period_;
   sc_core::sc_event event_;
-  struct Slot {
-    Clocked* unit;
-    Cycle due;  ///< the next edge that the unit wants
-  };
-  std::vector<Slot> slots_;
-  std::vector<unsigned> order_;
-  std::vector<unsigned> active_;  ///< due at this edge
+  std::vector<Clocked*> units_;        ///< in the order in which they tick
+  std::vector<unsigned> place_of_;     ///< of a handle, in that order
+  std::vector<Cycle> due_;             ///< the edge that each wants; filled up with `never` to whole vectors
+  std::vector<std::uint64_t> active_;  ///< who is due at this edge, a bit each
+  bool some_soon_ = false;             ///< someone wants the next cycle's edge
   Cycle now_ = 0;
   Cycle next_ = 0;  ///< the edge that is armed; `never` for none
   unsigned cycles_per_activation_ = 1;

@@ -11,7 +11,6 @@
 
 #include <vrpipe/clock_domain.h>
 #include <vrpipe/error.h>
-#include <vrpipe/random.h>
 
 /// The stream link between two units: TLM-2.0 sockets with protocol traits of our own.
 ///
@@ -74,13 +73,15 @@ class Port {
 
  protected:
   Port(std::string name, const ClockHandle& clock) : clock_(clock), name_(std::move(name)) {}
-  bool stalled() const { return stall_per_256_ != 0 && stall_at(stall_seed_, clock_.domain->now(), stall_per_256_); }
-  bool stalled_at(Cycle cycle) const { return stall_per_256_ != 0 && stall_at(stall_seed_, cycle, stall_per_256_); }
+  bool stalled() const { return stall_per_256_ != 0 && stalls_at(clock_.domain->now()); }
+  bool stalled_at(Cycle cycle) const { return stall_per_256_ != 0 && stalls_at(cycle); }
   void mark_connected() { connected_ = true; }
 
   const ClockHandle& clock_;
 
  private:
+  bool stalls_at(Cycle cycle) const;
+
   std::string name_;
   bool connected_ = false;
   std::uint64_t stall_seed_ = 0;
@@ -193,12 +194,11 @@ class StreamOut : public OutEnd<Item> {
     }
     --credits_;
     ++this->transferred_;
-    StreamPayload<Item> payload;
-    payload.item = &item;
-    payload.latency = this->pipeline_;
+    payload_.item = &item;
+    payload_.latency = this->pipeline_;
     StreamPhase phase = StreamPhase::transfer;
     sc_core::sc_time delay;
-    this->socket->nb_transport_fw(payload, phase, delay);
+    this->socket->nb_transport_fw(payload_, phase, delay);
   }
 
  private:
@@ -221,6 +221,7 @@ class StreamOut : public OutEnd<Item> {
   }
   void unlimited() override { credits_ = ~0U; }
 
+  StreamPayload<Item> payload_;  ///< of the transfer under way
   unsigned credits_ = 0;
   unsigned pending_ = 0;
   Cycle credit_cycle_ = 0;
@@ -290,22 +291,17 @@ class StreamIn : public InEnd<Item> {
   }
   bool empty() const override { return head_ == tail_; }
 
-  bool ready() const {
-    return head_ != tail_ && queue_[head_ & mask_].ready <= clock_.domain->now() && !this->stalled();
-  }
+  bool ready() const { return front_ready_ <= clock_.domain->now() && !this->stalled(); }
   const Item& front() const { return queue_[head_ & mask_].item; }
   void pop() {
     ++head_;
+    front_ready_ = head_ == tail_ ? never : queue_[head_ & mask_].ready;
     grant(1);
   }
   /// Items in the queue, visible or not.
   unsigned size() const { return tail_ - head_; }
   /// The cycle at which the head becomes visible; `never` for an empty queue.
-  Cycle next_ready() const {
-    if (head_ == tail_) return never;
-    const Cycle ready = queue_[head_ & mask_].ready;
-    return this->stalled() ? std::max(ready, clock_.domain->now() + 1) : ready;
-  }
+  Cycle next_ready() const { return this->stalled() ? std::max(front_ready_, clock_.domain->now() + 1) : front_ready_; }
 
  private:
   using InEnd<Item>::clock_;
@@ -315,11 +311,10 @@ class StreamIn : public InEnd<Item> {
   };
 
   void grant(unsigned credits) {
-    StreamPayload<Item> payload;
-    payload.credits = credits;
+    payload_.credits = credits;
     StreamPhase phase = StreamPhase::credit;
     sc_core::sc_time delay;
-    this->socket->nb_transport_bw(payload, phase, delay);
+    this->socket->nb_transport_bw(payload_, phase, delay);
   }
 
   tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
@@ -329,6 +324,7 @@ class StreamIn : public InEnd<Item> {
     Entry& entry = queue_[tail_ & mask_];
     entry.ready = clock_.domain->now() + latency_ + payload.latency;
     entry.item = *payload.item;
+    if (head_ == tail_) front_ready_ = entry.ready;
     ++tail_;
     clock_.domain->wake(clock_.unit, entry.ready);
     return tlm::TLM_ACCEPTED;
@@ -337,10 +333,12 @@ class StreamIn : public InEnd<Item> {
     throw SimulationFault(this->socket.name(), clock_.domain->now(), "b_transport on a link of a clocked unit");
   }
 
+  StreamPayload<Item> payload_;  ///< of credits
   std::vector<Entry> queue_;
   unsigned mask_ = 0;
   unsigned head_ = 0;
   unsigned tail_ = 0;
+  Cycle front_ready_ = never;  ///< when the head becomes visible; `never` for an empty queue
   unsigned depth_ = 0;
   unsigned latency_ = 1;
 };

@@ -26,40 +26,40 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   tlm::tlm_initiator_socket<32> socket;
 
   /// Whether another access can be issued now.
-  bool available() const { return !free_tickets_.empty() && requesting_ == nullptr; }
-  /// Issues an access. Returns a ticket, which comes back from `next_completed`.
-  unsigned read(std::uint64_t address, unsigned bytes) { return issue(tlm::TLM_READ_COMMAND, address, bytes); }
-  unsigned write(std::uint64_t address, unsigned bytes) { return issue(tlm::TLM_WRITE_COMMAND, address, bytes); }
+  bool available() const { return in_flight_ < most_in_flight_ && requesting_ == nullptr; }
+  /// Issues an access. Its tag comes back from `next_completed`.
+  void read(std::uint64_t address, unsigned bytes, std::uint32_t tag) {
+    issue(tlm::TLM_READ_COMMAND, address, bytes, tag);
+  }
+  void write(std::uint64_t address, unsigned bytes, std::uint32_t tag) {
+    issue(tlm::TLM_WRITE_COMMAND, address, bytes, tag);
+  }
   /// Takes the next access that has completed, in a cycle after the one in which it was answered; false for none.
-  bool next_completed(unsigned& ticket) {
+  bool next_completed(std::uint32_t& tag) {
     if (next_completion() > clock_.domain->now()) return false;
-    ticket = completion(completions_head_++).ticket;
-    --completions_count_;
-    free_tickets_.push_back(ticket);
+    tag = completion(completions_head_++).tag;
+    --in_flight_;
     return true;
   }
   /// When the next known completion is due; `never` for none.
   Cycle next_completion() const {
-    return completions_count_ == 0 ? never : completions_[completions_head_ & (completions_.size() - 1)].at;
+    return completions_head_ == completions_tail_ ? never : completions_[completions_head_ & ring_mask_].at;
   }
-
-  std::uint64_t reads() const { return reads_; }
-  std::uint64_t writes() const { return writes_; }
 
  private:
   struct Access : tlm::tlm_generic_payload {
-    unsigned ticket = 0;
+    std::uint32_t tag = 0;
     std::vector<unsigned char> data;
     bool answered = false;
   };
   struct Completion {
     Cycle at;
-    unsigned ticket;
+    std::uint32_t tag;
   };
-  Access& take_access(unsigned bytes);
-  unsigned issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes);
+  Access* unused_access();
+  void issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag);
   void complete(Access& access, const sc_core::sc_time& delay);
-  Completion& completion(std::size_t place) { return completions_[place & (completions_.size() - 1)]; }
+  Completion& completion(std::size_t place) { return completions_[place & ring_mask_]; }
   tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override;
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
@@ -69,13 +69,14 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   const ClockHandle& clock_;
   std::deque<Access> accesses_;  ///< as many as were ever in use at a time; free once answered and no longer held
   std::vector<Access*> free_accesses_;
-  std::vector<unsigned> free_tickets_;
+  Access* next_access_ = nullptr;  ///< for the next request
+  const unsigned most_in_flight_;
+  unsigned in_flight_ = 0;
   std::vector<Completion> completions_;  ///< a ring of a power of two, by cycle
   std::size_t completions_head_ = 0;
-  std::size_t completions_count_ = 0;
+  std::size_t completions_tail_ = 0;
+  std::size_t ring_mask_ = 0;
   const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
-  std::uint64_t reads_ = 0;
-  std::uint64_t writes_ = 0;
 };
 
 /// A memory that answers every access after the same time; each port moves a number of bytes per cycle.

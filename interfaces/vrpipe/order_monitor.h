@@ -16,14 +16,18 @@ class BlendOrderMonitor {
       : tiles_x_((width + screen_tile_pixels - 1) / screen_tile_pixels),
         next_(std::size_t{tiles_x_} * ((height + screen_tile_pixels - 1) / screen_tile_pixels) * positions_per_tile) {}
 
-  /// Throws SimulationFault when a primitive comes after a later one.
-  void blended(const ShadedWarp& warp, unsigned index, std::uint64_t cycle) {
-    std::uint32_t& next = next_[place_of(warp.tile, warp.position[index])];
-    if (warp.first_primitive[index] < next || warp.last_primitive[index] < warp.first_primitive[index]) {
-      fault(warp, index, next, cycle);
+  /// Quads `from` to `to` - 1 of a warp. Throws SimulationFault when a primitive comes after a later one.
+  void blended(const ShadedWarp& warp, unsigned from, unsigned to, std::uint64_t cycle) {
+    std::uint32_t* const tile = &next_[place_of(warp.tile, 0)];
+    for (unsigned i = from; i < to; ++i) {
+      std::uint32_t& next = tile[warp.position[i]];
+      if (warp.first_primitive[i] < next || warp.last_primitive[i] < warp.first_primitive[i]) {
+        fault(warp, i, next, cycle);
+      }
+      next = warp.last_primitive[i] + 1;
     }
-    next = warp.last_primitive[index] + 1;
   }
+  void blended(const ShadedWarp& warp, unsigned index, std::uint64_t cycle) { blended(warp, index, index + 1, cycle); }
   /// A quad of this position will be blended before long.
   void prefetch(TileId tile, unsigned position) const { __builtin_prefetch(&next_[place_of(tile, position)], 1); }
 

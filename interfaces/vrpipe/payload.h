@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <vector>
 
 #include <vrpipe/blend.h>
@@ -92,6 +93,8 @@ struct Warp {
   std::array<Quad, quads_per_warp> quads;
 };
 
+class ShadedWarpPool;
+
 /// A warp's quads after shading, pruning and merging, as many as survive.
 struct ShadedWarp {
   TileId tile;
@@ -100,15 +103,45 @@ struct ShadedWarp {
   std::uint8_t count = 0;
   bool end_of_draw = false;
   std::uint16_t slot = 0;  ///< of the SM, to be released when the last quad has left PROP
-  /// Holders in the simulator (not in the hardware): the SM until release, and each quad on its way to blending.
-  mutable std::uint32_t holders = 0;
   std::array<std::uint8_t, quads_per_warp> position;
   std::array<LaneMask, quads_per_warp> live;
+  /// Holders in the simulator (not in the hardware): the SM until release, and each quad on its way to blending.
+  mutable std::uint32_t holders = 0;
+  ShadedWarpPool* pool = nullptr;  ///< to which it returns with its last holder; null: it stays where it is
   /// Draw order of the first and the last primitive in a quad's colour, for the order monitor.
   std::array<std::uint32_t, quads_per_warp> first_primitive;
   std::array<std::uint32_t, quads_per_warp> last_primitive;
   std::array<QuadColor, quads_per_warp> color;  ///< premultiplied; (0,0,0,0) in dead lanes
+
+  void hold() const { ++holders; }
+  inline void release() const;
 };
+
+/// Shaded warps of an SM array, as many as were ever held at a time. The one released last is taken first: it is still
+/// in the host's cache.
+class ShadedWarpPool {
+ public:
+  /// A warp with one holder.
+  ShadedWarp& take() {
+    if (free_.empty()) {
+      warps_.emplace_back().pool = this;
+      free_.push_back(&warps_.back());
+    }
+    ShadedWarp& warp = *free_.back();
+    free_.pop_back();
+    warp.holders = 1;
+    return warp;
+  }
+
+ private:
+  friend struct ShadedWarp;
+  std::deque<ShadedWarp> warps_;
+  std::vector<ShadedWarp*> free_;
+};
+
+void ShadedWarp::release() const {
+  if (--holders == 0 && pool != nullptr) pool->free_.push_back(const_cast<ShadedWarp*>(this));
+}
 
 /// Draw order of a quad's primitive.
 inline std::uint32_t primitive_order(const Quad& quad) { return 2 * quad.splat + quad.triangle; }

@@ -9,6 +9,19 @@
 
 namespace vrpipe {
 
+/// Where a quad position of a screen tile stands in Morton order.
+inline constexpr std::array<std::uint8_t, positions_per_tile> morton_order = [] {
+  std::array<std::uint8_t, positions_per_tile> order{};
+  for (unsigned position = 0; position < positions_per_tile; ++position) {
+    const unsigned x = position % quads_per_tile_row;
+    const unsigned y = position / quads_per_tile_row;
+    unsigned code = 0;
+    for (unsigned bit = 0; bit < 3; ++bit) code |= (((x >> bit) & 1U) | (((y >> bit) & 1U) << 1U)) << (2 * bit);
+    order[position] = static_cast<std::uint8_t>(code);
+  }
+  return order;
+}();
+
 /// A colour target, block-linear: screen tile by screen tile, quad by quad, so that a quad is one 32-byte sector of
 /// RGBA16F and four quads (4x4 pixels) are one 128-byte line. Holds the stored values as floats.
 class ColorSurface {
@@ -27,10 +40,11 @@ class ColorSurface {
     return quads_[(std::size_t{tile.y} * tiles_x_ + tile.x) * positions_per_tile + position];
   }
 
-  /// Byte address of a quad in the modelled memory. Quads of a tile follow in Morton order, 4x4 pixels a 4-quad group.
+  /// Byte address of a quad in the modelled memory. Tiles, and quads in them, are naturally aligned; quads of a tile
+  /// follow in Morton order, 4x4 pixels a 4-quad group.
   std::uint64_t address(TileId tile, unsigned position) const {
     const std::uint64_t tile_index = std::uint64_t{tile.y} * tiles_x_ + tile.x;
-    return (tile_index * positions_per_tile + morton(position)) * bytes_per_quad_;
+    return (tile_index * positions_per_tile + morton_order[position]) * bytes_per_quad_;
   }
   std::uint64_t size_bytes() const;
 
@@ -38,22 +52,6 @@ class ColorSurface {
   std::array<float, 4> pixel(std::uint32_t x, std::uint32_t y) const;
 
  private:
-  static constexpr std::array<std::uint8_t, positions_per_tile> morton_order() {
-    std::array<std::uint8_t, positions_per_tile> order{};
-    for (unsigned position = 0; position < positions_per_tile; ++position) {
-      const unsigned x = position % quads_per_tile_row;
-      const unsigned y = position / quads_per_tile_row;
-      unsigned code = 0;
-      for (unsigned bit = 0; bit < 3; ++bit) code |= (((x >> bit) & 1U) | (((y >> bit) & 1U) << 1U)) << (2 * bit);
-      order[position] = static_cast<std::uint8_t>(code);
-    }
-    return order;
-  }
-  static unsigned morton(unsigned position) {
-    static constexpr std::array<std::uint8_t, positions_per_tile> order = morton_order();
-    return order[position];
-  }
-
   std::uint32_t width_;
   std::uint32_t height_;
   ColorFormat format_;

@@ -493,6 +493,8 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<> {
   const ClockHandle& clock_;
   tlm::tlm_generic_payload payload_;
   std::vector<unsigned char> data_;
+  Cycle ahead_ = 0;         ///< of the clock, the last access
+  sc_core::sc_time delay_;  ///< the same as a time
   std::uint64_t took_ = 0;  ///< the last answer, in units of sc_time
   Cycle took_cycles_ = 0;
 };

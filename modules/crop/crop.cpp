@@ -32,24 +32,32 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
 template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
   if (!cache_) cache_ = make_crop_cache(cost_, *surface_);
-  const std::uint64_t offset_mask = cost_.line_bytes - 1;
+  // Quads are naturally aligned, in lines and in sectors.
   const auto sector_shift = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
-  out.count = 0;
+  const auto line_shift = static_cast<unsigned>(__builtin_ctz(cost_.line_bytes));
+  const std::uint64_t line_mask = cost_.line_bytes - 1;
+  constexpr std::uint32_t bytes_per_quad = 4 * bytes_per_pixel(Format);
+  const std::uint32_t sectors_of_quad = sectors_of(0, bytes_per_quad, sector_shift);
+  const std::uint64_t tile = surface_->address(warp.tile, 0);
+  // Where a line of the tile is in `out.lines`, if it is there. Without branches, which would be mispredicted.
+  std::array<std::uint8_t, positions_per_tile> place_of;
+  std::uint64_t seen = 0;
+  unsigned count = 0;
   for (unsigned i = from; i < to; ++i) {
-    const std::uint64_t address = surface_->address(warp.tile, warp.position[i]);
-    const std::uint64_t offset = address & offset_mask;
-    const std::uint32_t sectors = sectors_of(offset, 4 * bytes_per_pixel(Format), sector_shift);
-    unsigned line = 0;
-    while (line < out.count && out.lines[line].address != address - offset) ++line;
-    if (line == out.count) {
-      out.lines[line].address = address - offset;
-      out.lines[line].sectors = 0;
-      ++out.count;
-    }
-    out.lines[line].sectors |= sectors;
-    out.line_of[i] = static_cast<std::uint8_t>(line);
+    const std::uint64_t offset = std::uint64_t{morton_order[warp.position[i]]} * bytes_per_quad;
+    const std::uint64_t line = offset >> line_shift;
+    const std::uint32_t sectors = sectors_of_quad << ((offset & line_mask) >> sector_shift);
+    const bool is_new = (seen >> line & 1U) == 0;
+    seen |= std::uint64_t{1} << line;
+    const unsigned place = is_new ? count : place_of[line];
+    place_of[line] = static_cast<std::uint8_t>(place);
+    out.lines[place].address = tile + (line << line_shift);
+    out.lines[place].sectors = (is_new ? 0 : out.lines[place].sectors) | sectors;
+    count += is_new ? 1U : 0U;
+    out.line_of[i] = static_cast<std::uint8_t>(place);
     out.sectors_of[i] = sectors;
   }
+  out.count = count;
   for (unsigned line = 0; line < out.count; ++line) cache_->access(out.lines[line]);
 }
 

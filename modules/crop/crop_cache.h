@@ -34,8 +34,14 @@ class CropCache {
   void unpin(Line line) {
     if (--lines_[line].pins == 0) make_newest(line);
   }
-  std::uint32_t present(Line line) const { return lines_[line].present; }  ///< sectors, a bit each
-  void add_sector(Line line, unsigned sector) { lines_[line].present |= 1U << sector; }
+  // Sectors are a bit each.
+  std::uint32_t filling(Line line) const { return lines_[line].filling; }  ///< those on their way
+  std::uint32_t absent(Line line) const { return ~(lines_[line].present | lines_[line].filling); }
+  void start_fill(Line line, unsigned sector) { lines_[line].filling |= 1U << sector; }
+  void finish_fill(Line line, unsigned sector) {
+    lines_[line].filling &= ~(1U << sector);
+    lines_[line].present |= 1U << sector;
+  }
   void dirty(Line line, std::uint32_t sectors) { lines_[line].dirty |= sectors; }
 
   /// All at once for sectors of a line (`address` and `sectors` are given): looks it up, allocates and fills. Lines go
@@ -59,6 +65,7 @@ class CropCache {
   struct Entry {
     std::uint64_t tag = 0;
     std::uint32_t present = 0;
+    std::uint32_t filling = 0;
     std::uint32_t dirty = 0;
     std::uint32_t pins = 0;
     Line newer = no_line;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 
 #include "crop/sectors.h"
 
@@ -49,10 +50,6 @@ class TimedCrop : public TimedUnit {
 
   Span take(const ShadedWarp& warp, Span visible) {
     Span left = visible;
-    for (unsigned i = 0; i < warp.count; ++i) {
-      __builtin_prefetch(&behaviour_->surface()->quad(warp.tile, warp.position[i]), 1);
-      monitor_->prefetch(warp.tile, warp.position[i]);
-    }
     if (warp.end_of_draw) {
       end_ = blended_ == 0 ? visible.first : last_blend_ + cost_.latency_cycles;
     } else if (at_once_ >= warp.count) {
@@ -65,13 +62,15 @@ class TimedCrop : public TimedUnit {
         left.last = at.last;
       }
     }
-    --warp.holders;
+    warp.release();
     return left;
   }
 
   /// Looks quads of a warp up and blends them; returns the cycles of the look-ups.
   Span pass(const ShadedWarp& warp, unsigned from, unsigned to, Span visible) {
     const unsigned quads = to - from;
+    const QuadColor* const tile = &behaviour_->surface()->quad(warp.tile, 0);
+    for (unsigned i = from; i < to; ++i) __builtin_prefetch(tile + warp.position[i], 1);
     behaviour_->look_up(warp, from, to, cache_);
     // Places in the queue, and lines that no queued quad needs.
     Cycle at = visible.first;
@@ -116,13 +115,12 @@ class TimedCrop : public TimedUnit {
 
   void blend(const ShadedWarp& warp, unsigned from, unsigned to, Span at) {
     TerminationBeat signals;
+    monitor_->blended(warp, from, to, at.last);
+    std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
     for (unsigned i = from; i < to; ++i) {
-      monitor_->blended(warp, i, at.last);
       const CropBehaviour::Outcome outcome =
           behaviour_->blend(warp.tile, warp.position[i], warp.live[i], warp.color[i]);
-      if ((outcome.changed || cost_.writes_unchanged) && cache_.count > 0) {
-        behaviour_->make_dirty(cache_.lines[cache_.line_of[i]].line, cache_.sectors_of[i]);
-      }
+      dirty[cache_.line_of[i]] |= outcome.changed || cost_.writes_unchanged ? cache_.sectors_of[i] : 0U;
       if (outcome.terminated == 0) continue;
       signals.signals[signals.count++] = {warp.tile, warp.position[i], outcome.terminated};
       if (signals.count < TerminationBeat::capacity) continue;
@@ -130,6 +128,9 @@ class TimedCrop : public TimedUnit {
       signals.count = 0;
     }
     if (signals.count > 0) out_.send(signals, at.last);
+    for (unsigned line = 0; line < cache_.count; ++line) {
+      if (dirty[line] != 0) behaviour_->make_dirty(cache_.lines[line].line, dirty[line]);
+    }
   }
 
   /// Reads the sectors that a line does without; returns when they are there, and in `at` when the last was asked for.

@@ -26,8 +26,8 @@ class CropUnit : public Unit {
         cost_(behaviour_->cost()),
         signals_(state.early_termination),
         memory_(*this, "memory", 2 * cost_.mshrs),
-        queue_(cost_.input_quads),
-        fills_(2 * std::size_t{cost_.mshrs}) {
+        queue_(ring_for(cost_.input_quads)),
+        queue_mask_(queue_.size() - 1) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
 
@@ -39,34 +39,38 @@ class CropUnit : public Unit {
   Cycle end_of_draw() const override { return end_; }
 
  private:
+  static constexpr std::size_t quads_ahead = 8;
   struct Entry {
     ColorQuad quad;
     std::uint64_t address = 0;
     CropCache::Line line = CropCache::no_line;
     std::uint32_t sectors = 0;  ///< of the line, a bit each
   };
-  struct Fill {
-    CropCache::Line line = CropCache::no_line;  ///< none for a write-back
-    std::uint32_t sector = 0;
-  };
+  static std::vector<Entry> ring_for(std::size_t entries) {
+    std::size_t size = 1;
+    while (size < entries) size *= 2;
+    return std::vector<Entry>(size);
+  }
+  // What a memory access is for: a sector of a line, or nothing that anyone waits for.
+  static constexpr std::uint32_t write_back_tag = ~0U;
+  static constexpr unsigned sector_bits = 5;
+  static std::uint32_t fill_tag(CropCache::Line line, unsigned sector) { return line << sector_bits | sector; }
 
   void end_of_elaboration() override {
     surface_ = behaviour_->surface();
     if (surface_ == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     sector_shift_ = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
-    bytes_per_quad_ = 4 * bytes_per_pixel(surface_->format());
+    // Quads are naturally aligned.
+    sectors_of_quad_ = sectors_of(0, 4 * bytes_per_pixel(surface_->format()), sector_shift_);
     cache_ = make_crop_cache(cost_, *surface_);
     monitor_ = std::make_unique<BlendOrderMonitor>(surface_->width(), surface_->height());
-    pending_.assign(cost_.cache_bytes / cost_.line_bytes, 0);
   }
 
   void finish_fills() {
-    unsigned ticket = 0;
-    while (memory_.next_completed(ticket)) {
-      const Fill fill = fills_[ticket];
-      if (fill.line == CropCache::no_line) continue;
-      cache_->add_sector(fill.line, fill.sector);
-      pending_[fill.line] &= ~(1U << fill.sector);
+    std::uint32_t tag = 0;
+    while (memory_.next_completed(tag)) {
+      if (tag == write_back_tag) continue;
+      cache_->finish_fill(tag >> sector_bits, tag & ((1U << sector_bits) - 1));
       --fills_in_flight_;
     }
   }
@@ -88,9 +92,8 @@ class CropUnit : public Unit {
   bool write_back() {
     while (write_back_ != 0 && memory_.available()) {
       const SectorRun run = take_sector_run(write_back_, cost_.line_bytes / cost_.sector_bytes);
-      const unsigned ticket =
-          memory_.write(write_back_address_ + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_);
-      fills_[ticket].line = CropCache::no_line;
+      memory_.write(write_back_address_ + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_,
+                    write_back_tag);
       tokens_ -= static_cast<std::int32_t>(run.count * cost_.quads_per_cycle);
     }
     return write_back_ == 0;
@@ -103,32 +106,25 @@ class CropUnit : public Unit {
     const CropCache::Line line = line_of(address);
     if (line == CropCache::no_line) return false;
     const std::uint64_t offset = address & (cost_.line_bytes - 1);
-    const std::uint32_t sectors = sectors_of(offset, bytes_per_quad_, sector_shift_);
-    for (std::uint32_t missing = sectors & ~(cache_->present(line) | pending_[line]); missing != 0;
-         missing &= missing - 1) {
+    const std::uint32_t sectors = sectors_of_quad_ << (offset >> sector_shift_);
+    for (std::uint32_t missing = sectors & cache_->absent(line); missing != 0; missing &= missing - 1) {
       if (!memory_.available() || fills_in_flight_ == cost_.mshrs) return false;
       const auto sector = static_cast<unsigned>(__builtin_ctz(missing));
-      const unsigned ticket =
-          memory_.read(address - offset + (std::uint64_t{sector} << sector_shift_), cost_.sector_bytes);
-      fills_[ticket] = {line, sector};
-      pending_[line] |= 1U << sector;
+      memory_.read(address - offset + (std::uint64_t{sector} << sector_shift_), cost_.sector_bytes,
+                   fill_tag(line, sector));
+      cache_->start_fill(line, sector);
       ++fills_in_flight_;
       tokens_ -= static_cast<std::int32_t>(cost_.quads_per_cycle);
     }
     cache_->pin(line);
-    std::size_t place = head_ + queued_;
-    if (place >= queue_.size()) place -= queue_.size();
-    queue_[place] = {quad, address, line, sectors};
+    queue_[(head_ + queued_) & queue_mask_] = {quad, address, line, sectors};
     ++queued_;
-    // It is read only once it is at the head.
-    __builtin_prefetch(&surface_->quad(quad.tile, quad.position), 1);
-    monitor_->prefetch(quad.tile, quad.position);
     return true;
   }
 
   bool accept() {
     bool moved = false;
-    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && queued_ < queue_.size() && in_.ready(); --budget) {
+    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && queued_ < cost_.input_quads && in_.ready(); --budget) {
       const ColorBeat& beat = in_.front();
       if (beat.end_of_draw) {
         ending_ = true;
@@ -151,6 +147,14 @@ class CropUnit : public Unit {
     return std::any_of(recent_.begin(), recent_.end(), [&](const auto& blend) { return blend.first == address; });
   }
 
+  /// For the host: what blending a quad will touch was last touched long ago.
+  void prefetch(const ColorQuad& quad) const {
+    __builtin_prefetch(&surface_->quad(quad.tile, quad.position), 1);
+    __builtin_prefetch(&quad.color());
+    __builtin_prefetch(&quad.warp->first_primitive[quad.index]);
+    monitor_->prefetch(quad.tile, quad.position);
+  }
+
   /// Blends from the head of the queue; why it stopped is in `stop_`.
   bool blend(Cycle now) {
     // What sectors took from blending is paid back first; unused cycles are lost, fractions of a quad are not.
@@ -171,7 +175,7 @@ class CropUnit : public Unit {
         stop_ = UnitState::blocked;
         break;
       }
-      if ((pending_[entry.line] & entry.sectors) != 0) {
+      if ((cache_->filling(entry.line) & entry.sectors) != 0) {
         stop_ = UnitState::memory;
         break;
       }
@@ -192,12 +196,13 @@ class CropUnit : public Unit {
       if (outcome.terminated != 0) {
         beat.signals[beat.count++] = {quad.tile, quad.position, outcome.terminated};
       }
-      --quad.warp->holders;
+      quad.warp->release();
       if (outcome.changed || cost_.writes_unchanged) cache_->dirty(entry.line, entry.sectors);
       cache_->unpin(entry.line);
       tokens_ -= price;
-      head_ = head_ + 1 == queue_.size() ? 0 : head_ + 1;
+      head_ = (head_ + 1) & queue_mask_;
       --queued_;
+      if (queued_ > quads_ahead) prefetch(queue_[(head_ + quads_ahead) & queue_mask_].quad);
       ++blended_;
       last_blend_ = now;
       moved = true;
@@ -235,14 +240,13 @@ class CropUnit : public Unit {
   const ColorSurface* surface_ = nullptr;
   std::unique_ptr<CropCache> cache_;
   std::unique_ptr<BlendOrderMonitor> monitor_;
-  unsigned bytes_per_quad_ = 0;
-  unsigned sector_shift_ = 0;  ///< log2 of the bytes of a sector
-  std::vector<Entry> queue_;   ///< looked up and waiting to be blended, a ring
+  std::uint32_t sectors_of_quad_ = 0;  ///< if it began a line
+  unsigned sector_shift_ = 0;          ///< log2 of the bytes of a sector
+  std::vector<Entry> queue_;           ///< looked up and waiting to be blended, a ring
+  const std::size_t queue_mask_;
   std::size_t head_ = 0;
   std::size_t queued_ = 0;
-  unsigned at_ = 0;                     ///< quads taken of the beat at the link
-  std::vector<Fill> fills_;             ///< by ticket
-  std::vector<std::uint32_t> pending_;  ///< sectors being filled, by line
+  unsigned at_ = 0;  ///< quads taken of the beat at the link
   unsigned fills_in_flight_ = 0;
   std::uint32_t write_back_ = 0;  ///< dirty sectors of an evicted line yet to be sent
   std::uint64_t write_back_address_ = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace vrpipe {
@@ -25,8 +26,13 @@ struct SectorRun {
 /// to `longest`.
 inline SectorRun take_sector_run(std::uint32_t& mask, unsigned longest) {
   const auto first = static_cast<unsigned>(__builtin_ctz(mask));
-  unsigned count = 1;
-  while (first % (2 * count) == 0 && 2 * count <= longest &&
+  // Up to four without branches, which would be mispredicted.
+  const std::uint32_t from_first = mask >> first;
+  const unsigned two = ((from_first >> 1U) & ~first) & 1U;
+  const unsigned four = (from_first & 15U) == 15U ? two & ~(first >> 1U) : 0U;
+  unsigned count = std::min(1U + two + 2 * four, longest);
+  count -= count == 3 ? 1U : 0U;
+  while (count >= 4 && first % (2 * count) == 0 && 2 * count <= longest &&
          (mask & sector_mask(first, 2 * count)) == sector_mask(first, 2 * count)) {
     count *= 2;
   }

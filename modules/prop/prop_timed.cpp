@@ -85,10 +85,10 @@ class TimedProp : public TimedUnit {
     }
     if (end_ == nullptr || end_->sequence != order_.left() || !can_send()) return;
     const Cycle at = color_.take(end_from_, cost_.color_quads_per_cycle).first;
-    ++end_->holders;
+    end_->hold();
     out_color_.send({end_}, at);
     out_release_.send({end_->slot}, at);
-    --end_->holders;
+    end_->release();
     end_ = nullptr;
     order_.restart();
   }
@@ -102,7 +102,7 @@ class TimedProp : public TimedUnit {
       charge(UnitState::starved, at.first);
       charge(UnitState::busy, at.last + 1);
       color_quads_ += warp.count;
-      ++warp.holders;
+      warp.hold();
       const unsigned beats = (warp.count + cost_.color_quads_per_cycle - 1) / cost_.color_quads_per_cycle;
       left = out_color_.send({&warp}, at, beats).last;
       charge(UnitState::blocked, left);
@@ -113,7 +113,7 @@ class TimedProp : public TimedUnit {
     }
     order_.leave(warp, left);
     out_release_.send({warp.slot}, left);
-    --warp.holders;
+    warp.release();
   }
 
   std::unique_ptr<PropBehaviour> behaviour_;

@@ -93,7 +93,7 @@ class PropUnit : public Unit {
         index_ = 0;
       }
       if (index_ < current_->count) {
-        ++current_->holders;
+        current_->hold();
         // In place: a temporary of narrow stores would be waited for when it is copied.
         ColorQuad& quad = beat.quads[beat.count++];
         quad.warp = current_;
@@ -108,7 +108,7 @@ class PropUnit : public Unit {
         current_ = nullptr;
         order_.leave(*left);
         out_release_.push({left->slot});
-        --left->holders;
+        left->release();
         moved = true;
         // A warp without survivors takes the cycle in which it is passed over.
         if (left->count == 0) break;
@@ -123,7 +123,7 @@ class PropUnit : public Unit {
       beat.end_of_draw = true;
       out_color_.push(beat);
       out_release_.push({end_->slot});
-      --end_->holders;
+      end_->release();
       end_ = nullptr;
       order_.restart();
       return true;

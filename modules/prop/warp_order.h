@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <queue>
 #include <vector>
 
 #include <vrpipe/accounting.h>
@@ -15,9 +14,9 @@ namespace vrpipe {
 class WarpOrder {
  public:
   struct Waiting {
-    const ShadedWarp* warp;
-    std::uint32_t sequence;  ///< of the warp
-    Cycle from;              ///< the first cycle in which it can leave, for shells that know it ahead
+    const ShadedWarp* warp = nullptr;
+    std::uint32_t sequence = 0;  ///< of the warp
+    Cycle from = 0;              ///< the first cycle in which it can leave, for shells that know it ahead
   };
 
   WarpOrder(PropBehaviour::Order order, const RenderState& state)
@@ -33,36 +32,26 @@ class WarpOrder {
     if (turn.number == next_of(turn.line)) {
       in_turn_.push(waiting);
     } else {
-      bucket_of(turn.line, turn.number).push_back({turn, waiting});
-      ++early_;
+      early_.push(turn, waiting);
     }
   }
 
   bool has_next() const { return !in_turn_.empty(); }
-  Waiting take() {
-    const Waiting next = in_turn_.top();
-    in_turn_.pop();
-    return next;
-  }
+  Waiting take() { return in_turn_.take_oldest(); }
   /// A warp that was taken has left: the one that follows it may be among those that came early.
   void leave(const ShadedWarp& warp, Cycle at = 0) {
     const std::uint32_t line = turn_of(warp).line;
     const std::uint32_t number = ++next_of(line);
     ++left_;
-    if (early_ == 0) return;
-    std::vector<Early>& bucket = bucket_of(line, number);
-    for (Early& early : bucket) {
-      if (early.turn.line != line || early.turn.number != number) continue;
-      in_turn_.push({early.waiting.warp, early.waiting.sequence, std::max(early.waiting.from, at)});
-      early = bucket.back();
-      bucket.pop_back();
-      --early_;
-      return;
+    Waiting waiting;
+    if (early_.take({line, number}, waiting)) {
+      waiting.from = std::max(waiting.from, at);
+      in_turn_.push(waiting);
     }
   }
 
-  bool empty() const { return in_turn_.empty() && early_ == 0; }
-  bool has_early() const { return early_ > 0; }
+  bool empty() const { return in_turn_.empty() && early_.empty(); }
+  bool has_early() const { return !early_.empty(); }
   /// Warps that have left since the draw began.
   std::uint32_t left() const { return left_; }
   void restart() {
@@ -76,12 +65,104 @@ class WarpOrder {
     std::uint32_t line;
     std::uint32_t number;
   };
-  struct Early {
-    Turn turn;
-    Waiting waiting;
+
+  /// By sequence, in a ring that holds all from the oldest to the newest: a window on the launch order.
+  class Window {
+   public:
+    bool empty() const { return count_ == 0; }
+    void push(const Waiting& waiting) {
+      oldest_ = count_ == 0 ? waiting.sequence : std::min(oldest_, waiting.sequence);
+      newest_ = count_ == 0 ? waiting.sequence : std::max(newest_, waiting.sequence);
+      if (newest_ - oldest_ >= ring_.size()) grow();
+      put(waiting);
+      ++count_;
+    }
+    Waiting take_oldest() {
+      const std::size_t from = oldest_ & (ring_.size() - 1);
+      std::size_t word = from / 64;
+      std::uint64_t there = there_[word] & (~std::uint64_t{0} << (from % 64));
+      while (there == 0) {
+        word = word + 1 == there_.size() ? 0 : word + 1;
+        there = there_[word];
+      }
+      const Waiting& oldest = ring_[64 * word + static_cast<unsigned>(__builtin_ctzll(there))];
+      there_[word] &= ~(there & -there);
+      oldest_ = oldest.sequence + 1;
+      --count_;
+      return oldest;
+    }
+
+   private:
+    void put(const Waiting& waiting) {
+      const std::size_t place = waiting.sequence & (ring_.size() - 1);
+      ring_[place] = waiting;
+      there_[place / 64] |= std::uint64_t{1} << (place % 64);
+    }
+    void grow() {
+      std::vector<Waiting> waiting;
+      for (std::size_t place = 0; place < ring_.size(); ++place) {
+        if ((there_[place / 64] >> (place % 64) & 1U) != 0) waiting.push_back(ring_[place]);
+      }
+      std::size_t size = ring_.size();
+      while (newest_ - oldest_ >= size) size *= 2;
+      ring_.assign(size, {});
+      there_.assign(size / 64, 0);
+      for (const Waiting& each : waiting) put(each);
+    }
+
+    std::uint32_t oldest_ = 0;  ///< no warp that is there is older
+    std::uint32_t newest_ = 0;
+    std::size_t count_ = 0;
+    std::vector<Waiting> ring_ = std::vector<Waiting>(1024);
+    std::vector<std::uint64_t> there_ = std::vector<std::uint64_t>(1024 / 64);  ///< a bit a place
   };
-  struct LaterFirst {
-    bool operator()(const Waiting& a, const Waiting& b) const { return a.sequence > b.sequence; }
+
+  /// Warps whose turn has not come, to be found by turn: chains from a table of hashes.
+  class EarlyWarps {
+   public:
+    EarlyWarps() { first_.fill(none); }
+    bool empty() const { return count_ == 0; }
+    void push(Turn turn, const Waiting& waiting) {
+      if (free_ == none) {
+        free_ = static_cast<std::uint32_t>(entries_.size());
+        entries_.push_back({turn, none, waiting});
+      }
+      std::uint32_t& first = first_of(turn);
+      Entry& entry = entries_[free_];
+      const std::uint32_t next_free = entry.next;
+      entry = {turn, first, waiting};
+      first = free_;
+      free_ = next_free;
+      ++count_;
+    }
+    bool take(Turn turn, Waiting& out) {
+      for (std::uint32_t* at = &first_of(turn); *at != none; at = &entries_[*at].next) {
+        Entry& entry = entries_[*at];
+        if (entry.turn.line != turn.line || entry.turn.number != turn.number) continue;
+        out = entry.waiting;
+        const std::uint32_t taken = *at;
+        *at = entry.next;
+        entry.next = free_;
+        free_ = taken;
+        --count_;
+        return true;
+      }
+      return false;
+    }
+
+   private:
+    static constexpr std::uint32_t none = ~0U;
+    struct Entry {
+      Turn turn;
+      std::uint32_t next;
+      Waiting waiting;
+    };
+    std::uint32_t& first_of(Turn turn) { return first_[(turn.line + 31 * turn.number) % first_.size()]; }
+
+    std::array<std::uint32_t, 1024> first_;
+    std::vector<Entry> entries_;
+    std::uint32_t free_ = none;  ///< chain of the unused ones
+    std::size_t count_ = 0;
   };
 
   Turn turn_of(const ShadedWarp& warp) const {
@@ -89,18 +170,13 @@ class WarpOrder {
     return {warp.tile.y * tiles_x_ + warp.tile.x, warp.tile_sequence};
   }
   std::uint32_t& next_of(std::uint32_t line) { return next_of_line_[line]; }
-  /// Early warps are kept apart, so that finding the next one is quick.
-  std::vector<Early>& bucket_of(std::uint32_t line, std::uint32_t number) {
-    return early_by_bucket_[(line + 31 * number) % early_by_bucket_.size()];
-  }
 
   const bool by_draw_;
   const std::uint32_t tiles_x_;
   std::vector<std::uint32_t> next_of_line_;
   std::uint32_t left_ = 0;
-  std::array<std::vector<Early>, 256> early_by_bucket_;
-  std::size_t early_ = 0;
-  std::priority_queue<Waiting, std::vector<Waiting>, LaterFirst> in_turn_;
+  Window in_turn_;
+  EarlyWarps early_;
 };
 
 }  // namespace vrpipe

@@ -63,18 +63,6 @@ class TimedSm : public TimedUnit {
     return sum;
   }
 
-  ShadedWarp& take_from_pool() {
-    // The one that was taken the longest ago is the likeliest to be free. Rather one more than a search through all.
-    for (std::size_t tried = 0; tried < std::min<std::size_t>(pool_.size(), 4); ++tried) {
-      ShadedWarp& oldest = *pool_[pool_at_];
-      pool_at_ = pool_at_ + 1 == pool_.size() ? 0 : pool_at_ + 1;
-      __builtin_prefetch(pool_[pool_at_].get(), 1);
-      if (oldest.holders == 0) return oldest;
-    }
-    pool_.push_back(std::make_unique<ShadedWarp>());
-    return *pool_.back();
-  }
-
   std::size_t choose_scheduler(TileId tile) {
     if (!(tile == last_tile_) || sent_to_core_ == cost_.warps_to_one_core) {
       core_ = core_ + 1 == cost_.cores ? 0 : core_ + 1;
@@ -87,8 +75,7 @@ class TimedSm : public TimedUnit {
 
   Cycle shade(const Warp& warp, Cycle visible) {
     Cycle launch = std::max(visible, next_launch_);
-    ShadedWarp& shaded = take_from_pool();
-    shaded.holders = 1;
+    ShadedWarp& shaded = pool_.take();
     if (warp.end_of_draw) {
       shaded.end_of_draw = true;
       shaded.sequence = warp.sequence;
@@ -194,8 +181,7 @@ class TimedSm : public TimedUnit {
   std::uint32_t core_ = 0;
   std::uint32_t sent_to_core_ = 0;
   std::uint32_t turn_ = 0;
-  std::vector<std::unique_ptr<ShadedWarp>> pool_;
-  std::size_t pool_at_ = 0;
+  ShadedWarpPool pool_;
   std::uint64_t instructions_ = 0;
 };
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <deque>
+#include <utility>
 
 #include <vrpipe/unit.h>
 
@@ -9,44 +10,65 @@ namespace {
 
 constexpr std::uint16_t no_slot = 0xffff;
 
-constexpr std::uint32_t no_flight = ~0U;
+constexpr std::uint32_t nobody = ~0U;
 
-/// Warps on one warp scheduler: those that can issue wait in order, chained through their flights; a segment's
-/// instructions issue back to back.
+/// Warps, by slot, and schedulers, numbered after them, wait in lists that are chained through one array, since each is
+/// in one list at most.
+struct Chain {
+  std::uint32_t first = nobody;
+  std::uint32_t last = nobody;
+  bool empty() const { return first == nobody; }
+  void push(std::uint32_t who, std::vector<std::uint32_t>& next) {
+    (first == nobody ? first : next[last]) = who;
+    last = who;
+    next[who] = nobody;
+  }
+};
+
+/// A warp scheduler. A segment's instructions issue back to back.
 struct Scheduler {
-  std::uint32_t first_ready = no_flight;
-  std::uint32_t last_ready = no_flight;
+  Chain ready;  ///< warps that can issue, in order
   Cycle free_at = 0;
   bool event_pending = false;
 };
 
-/// Events of the next cycles, in buckets by cycle.
+/// Who has an event in one of the next cycles, in buckets by cycle.
 class Wheel {
  public:
   explicit Wheel(std::uint32_t horizon) {
-    std::size_t size = 1;
+    std::size_t size = 64;
     while (size <= horizon) size *= 2;
     buckets_.resize(size);
+    occupied_.resize(size / 64);
   }
-  void add(Cycle at, std::uint32_t event) {
-    buckets_[at & (buckets_.size() - 1)].push_back(event);
-    ++count_;
+  void add(Cycle at, std::uint32_t who, std::vector<std::uint32_t>& next) {
+    const std::size_t bucket = at & (buckets_.size() - 1);
+    buckets_[bucket].push(who, next);
+    occupied_[bucket / 64] |= std::uint64_t{1} << (bucket % 64);
   }
-  std::vector<std::uint32_t>& at(Cycle now) { return buckets_[now & (buckets_.size() - 1)]; }
-  void clear(Cycle now) {
-    count_ -= at(now).size();
-    at(now).clear();
+  /// The first of those with an event in this cycle, and so of the chain of them, which is taken out.
+  std::uint32_t take(Cycle now) {
+    const std::size_t bucket = now & (buckets_.size() - 1);
+    occupied_[bucket / 64] &= ~(std::uint64_t{1} << (bucket % 64));
+    return std::exchange(buckets_[bucket], Chain{}).first;
   }
+  std::uint32_t first_at(Cycle cycle) const { return buckets_[cycle & (buckets_.size() - 1)].first; }
   Cycle next_after(Cycle now) const {
-    if (count_ == 0) return never;
-    Cycle cycle = now + 1;
-    while (buckets_[cycle & (buckets_.size() - 1)].empty()) ++cycle;
-    return cycle;
+    const std::size_t from = (now + 1) & (buckets_.size() - 1);
+    std::size_t word = from / 64;
+    const std::uint64_t ahead = occupied_[word] >> (from % 64);
+    if (ahead != 0) return now + 1 + static_cast<unsigned>(__builtin_ctzll(ahead));
+    Cycle cycle = now + 1 + 64 - from % 64;
+    for (std::size_t words = occupied_.size(); words > 0; --words, cycle += 64) {
+      word = word + 1 == occupied_.size() ? 0 : word + 1;
+      if (occupied_[word] != 0) return cycle + static_cast<unsigned>(__builtin_ctzll(occupied_[word]));
+    }
+    return never;
   }
 
  private:
-  std::vector<std::vector<std::uint32_t>> buckets_;
-  std::size_t count_ = 0;
+  std::vector<Chain> buckets_;
+  std::vector<std::uint64_t> occupied_;  ///< a bit a bucket
 };
 
 /// The SM array at cycle fidelity: warps issue on their scheduler segment by segment, oldest ready first, and hide one
@@ -69,6 +91,9 @@ class SmUnit : public Unit {
     fragment_slots_ = cost_.cores * cost_.warps_per_core;
     free_slots_ = fragment_slots_;
     flights_.resize(fragment_slots_ + cost_.vertex_warps);
+    next_.resize(flights_.size() + schedulers_.size());
+    warps_.resize(fragment_slots_);
+    vertices_.resize(cost_.vertex_warps);
     free_of_core_.resize(cost_.cores);
     for (std::uint32_t core = 0; core < cost_.cores; ++core) {
       for (std::uint32_t slot = cost_.warps_per_core; slot-- > 0;) {
@@ -80,7 +105,7 @@ class SmUnit : public Unit {
   }
 
   bool idle() const override {
-    return in_vertices_.empty() && in_warps_.empty() && in_flight_ == 0 && vertex_order_.empty() && completed_.empty();
+    return in_vertices_.empty() && in_warps_.empty() && in_flight_ == 0 && vertex_count_ == 0 && completed_.empty();
   }
   std::uint64_t work() const override { return instructions_; }
   double peak_rate() const override {
@@ -89,16 +114,13 @@ class SmUnit : public Unit {
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
+  /// A warp on its way through a program; what it shades is kept apart, being needed at the ends alone.
   struct Flight {
     const std::vector<ShaderSegment>* program = nullptr;
-    std::uint32_t segment = 0;
-    std::uint32_t scheduler = 0;
-    std::uint32_t next_ready = no_flight;  ///< behind this one on its scheduler
-    bool done = false;                     ///< vertex warps only
-    Warp warp;
-    VertexWarp vertices;
+    std::uint16_t segment = 0;
+    std::uint16_t scheduler = 0;
+    bool done = false;  ///< vertex warps only
   };
-  static constexpr std::uint32_t scheduler_event = 0x80000000U;
 
   std::uint32_t horizon() const {
     std::uint32_t longest = 1;
@@ -111,77 +133,66 @@ class SmUnit : public Unit {
   }
 
   void issue(Scheduler& scheduler, Cycle now) {
-    const std::uint32_t slot = scheduler.first_ready;
+    const std::uint32_t slot = scheduler.ready.first;
+    scheduler.ready.first = next_[slot];
     Flight& flight = flights_[slot];
-    scheduler.first_ready = flight.next_ready;
     const ShaderSegment& segment = (*flight.program)[flight.segment++];
     const Cycle busy = Cycle{segment.instructions} * cycles_per_instruction_;
     scheduler.free_at = now + busy;
     busy_until_ = std::max(busy_until_, scheduler.free_at);
     instructions_ += segment.instructions;
-    wheel_.add(std::max(now + busy + segment.stall_cycles, now + 1), slot);
+    wheel_.add(std::max(now + busy + segment.stall_cycles, now + 1), slot, next_);
   }
 
   void arm(std::uint32_t index, Cycle now) {
     Scheduler& scheduler = schedulers_[index];
-    if (scheduler.first_ready == no_flight || scheduler.event_pending) return;
-    wheel_.add(std::max(scheduler.free_at, now + 1), scheduler_event | index);
+    if (scheduler.ready.empty() || scheduler.event_pending) return;
+    wheel_.add(std::max(scheduler.free_at, now + 1), static_cast<std::uint32_t>(flights_.size()) + index, next_);
     scheduler.event_pending = true;
   }
 
   void make_ready(std::uint32_t slot, Cycle now) {
     const std::uint32_t index = flights_[slot].scheduler;
     Scheduler& scheduler = schedulers_[index];
-    (scheduler.first_ready == no_flight ? scheduler.first_ready : flights_[scheduler.last_ready].next_ready) = slot;
-    scheduler.last_ready = slot;
-    flights_[slot].next_ready = no_flight;
+    scheduler.ready.push(slot, next_);
     if (scheduler.free_at <= now && !scheduler.event_pending) issue(scheduler, now);
     arm(index, now);
   }
 
-  ShadedWarp* take_from_pool() {
-    // Round robin: the entry after the last one is the likeliest to be free. A few that are held for long are not worth
-    // a search.
-    for (std::size_t tried = 0; tried < std::min<std::size_t>(pool_.size(), 8); ++tried) {
-      pool_at_ = pool_at_ + 1 == pool_.size() ? 0 : pool_at_ + 1;
-      if (pool_[pool_at_].holders == 0) return &pool_[pool_at_];
-    }
-    pool_.emplace_back();
-    pool_at_ = pool_.size() - 1;
-    return &pool_.back();
-  }
-
   void complete(std::uint32_t slot) {
-    Flight& flight = flights_[slot];
     if (slot >= fragment_slots_) {
-      behaviour_->shade_vertices(flight.vertices);
-      flight.done = true;
+      behaviour_->shade_vertices(vertices_[slot - fragment_slots_]);
+      flights_[slot].done = true;
       return;
     }
     --running_;
-    ShadedWarp* const shaded = take_from_pool();
-    behaviour_->shade(flight.warp, *shaded);
-    shaded->slot = static_cast<std::uint16_t>(slot);
-    shaded->holders = 1;
-    completed_.push_back(shaded);
+    ShadedWarp& shaded = pool_.take();
+    behaviour_->shade(warps_[slot], shaded);
+    shaded.slot = static_cast<std::uint16_t>(slot);
+    completed_.push_back(&shaded);
   }
 
   void run_events(Cycle now) {
-    std::vector<std::uint32_t>& events = wheel_.at(now);
-    // Events are only ever added to later cycles, so the bucket does not change under the loop.
-    for (const std::uint32_t event : events) {
-      if ((event & scheduler_event) != 0) {
-        const std::uint32_t index = event & ~scheduler_event;
+    // Events are only ever added to later cycles.
+    for (std::uint32_t who = wheel_.take(now), following = nobody; who != nobody; who = following) {
+      following = next_[who];
+      if (who >= flights_.size()) {
+        const auto index = static_cast<std::uint32_t>(who - flights_.size());
         schedulers_[index].event_pending = false;
         issue(schedulers_[index], now);
         arm(index, now);
-      } else if (flights_[event].segment == flights_[event].program->size()) {
-        complete(event);
+      } else if (flights_[who].segment == flights_[who].program->size()) {
+        complete(who);
       } else {
-        make_ready(event, now);
+        make_ready(who, now);
       }
     }
-    wheel_.clear(now);
+    // What was launched long ago is no longer in the host's first cache.
+    const std::uint32_t soon = wheel_.first_at(now + 1);
+    if (soon < fragment_slots_) {
+      __builtin_prefetch(&warps_[soon]);
+      __builtin_prefetch(&warps_[soon].quads[quads_per_warp - 1]);
+    }
   }
 
   void release_slots() {
@@ -199,9 +210,10 @@ class SmUnit : public Unit {
       out_shaded_.push({completed_.front()});
       completed_.pop_front();
     }
-    while (!vertex_order_.empty() && flights_[vertex_order_.front()].done && out_vertices_.credits() > 0) {
-      out_vertices_.push(flights_[vertex_order_.front()].vertices);
-      vertex_order_.pop_front();
+    while (vertex_count_ > 0 && flights_[fragment_slots_ + vertex_first_].done && out_vertices_.credits() > 0) {
+      out_vertices_.push(vertices_[vertex_first_]);
+      vertex_first_ = vertex_first_ + 1 == cost_.vertex_warps ? 0 : vertex_first_ + 1;
+      --vertex_count_;
     }
   }
 
@@ -220,13 +232,12 @@ class SmUnit : public Unit {
     if (!in_warps_.ready()) return;
     const Warp& warp = in_warps_.front();
     if (warp.end_of_draw) {
-      ShadedWarp* const end = take_from_pool();
-      end->end_of_draw = true;
-      end->sequence = warp.sequence;
-      end->count = 0;
-      end->slot = no_slot;
-      end->holders = 1;
-      completed_.push_back(end);
+      ShadedWarp& end = pool_.take();
+      end.end_of_draw = true;
+      end.sequence = warp.sequence;
+      end.count = 0;
+      end.slot = no_slot;
+      completed_.push_back(&end);
       in_warps_.pop();
       return;
     }
@@ -242,8 +253,9 @@ class SmUnit : public Unit {
     Flight& flight = flights_[slot];
     flight.program = warp.merge_pairs != 0 ? &merged_ : &cost_.fragment;
     flight.segment = 0;
-    flight.scheduler = core_ * cost_.schedulers_per_core + turn_of_scheduler_++ % cost_.schedulers_per_core;
-    flight.warp = warp;
+    flight.scheduler = static_cast<std::uint16_t>(core_ * cost_.schedulers_per_core +
+                                                  turn_of_scheduler_++ % cost_.schedulers_per_core);
+    warps_[slot] = warp;
     in_warps_.pop();
     ++in_flight_;
     ++running_;
@@ -251,18 +263,18 @@ class SmUnit : public Unit {
   }
 
   void launch_vertices(Cycle now) {
-    if (!in_vertices_.ready() || vertex_order_.size() == cost_.vertex_warps) return;
-    const std::uint32_t slot = fragment_slots_ + vertex_turn_;
-    vertex_turn_ = vertex_turn_ + 1 == cost_.vertex_warps ? 0 : vertex_turn_ + 1;
-    Flight& flight = flights_[slot];
-    flight.vertices = in_vertices_.front();
-    flight.done = flight.vertices.end_of_draw;
+    if (!in_vertices_.ready() || vertex_count_ == cost_.vertex_warps) return;
+    std::uint32_t turn = vertex_first_ + vertex_count_++;
+    if (turn >= cost_.vertex_warps) turn -= cost_.vertex_warps;
+    const std::uint32_t slot = fragment_slots_ + turn;
+    vertices_[turn] = in_vertices_.front();
     in_vertices_.pop();
-    vertex_order_.push_back(slot);
+    Flight& flight = flights_[slot];
+    flight.done = vertices_[turn].end_of_draw;
     if (flight.done) return;
     flight.program = &cost_.vertex;
     flight.segment = 0;
-    flight.scheduler = static_cast<std::uint32_t>(vertex_scheduler_++ % schedulers_.size());
+    flight.scheduler = static_cast<std::uint16_t>(vertex_scheduler_++ % schedulers_.size());
     make_ready(slot, now);
   }
 
@@ -289,7 +301,7 @@ class SmUnit : public Unit {
     if (busy_until_ > now) next = std::min(next, busy_until_);
     // What could not be taken for want of a slot or a credit waits for the port that brings one.
     if (!slots_full_) next = std::min(next, std::max(in_warps_.next_ready(), now + 1));
-    if (vertex_order_.size() < cost_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
+    if (vertex_count_ < cost_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
     return std::min({next, in_release_.next_ready(), out_shaded_.retry(), out_vertices_.retry()});
   }
 
@@ -305,19 +317,21 @@ class SmUnit : public Unit {
   Wheel wheel_;
   std::vector<Scheduler> schedulers_;
   std::uint32_t fragment_slots_ = 0;
-  std::vector<Flight> flights_;  ///< fragment slots, core by core, then vertex slots
+  std::vector<Flight> flights_;       ///< fragment slots, core by core, then vertex slots
+  std::vector<std::uint32_t> next_;   ///< in a chain, of slots and then of schedulers
+  std::vector<Warp> warps_;           ///< of fragment slots
+  std::vector<VertexWarp> vertices_;  ///< of vertex slots
   std::vector<std::vector<std::uint32_t>> free_of_core_;
-  std::uint32_t free_slots_ = 0;  ///< of all cores
-  std::deque<std::uint32_t> vertex_order_;
+  std::uint32_t free_slots_ = 0;    ///< of all cores
+  std::uint32_t vertex_first_ = 0;  ///< of the vertex warps in flight, in order
+  std::uint32_t vertex_count_ = 0;
   std::deque<const ShadedWarp*> completed_;
-  std::deque<ShadedWarp> pool_;
-  std::size_t pool_at_ = 0;
+  ShadedWarpPool pool_;
   TileId last_tile_;
   std::uint32_t core_ = 0;
   std::uint32_t sent_to_core_ = 0;
   std::uint32_t turn_of_scheduler_ = 0;
   std::uint64_t vertex_scheduler_ = 0;
-  std::uint32_t vertex_turn_ = 0;
   std::uint32_t in_flight_ = 0;  ///< fragment warps, up to their release
   std::uint32_t running_ = 0;    ///< of these, not shaded yet
   bool slots_full_ = false;

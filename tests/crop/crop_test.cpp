@@ -9,6 +9,7 @@
 #include <vrpipe/registry.h>
 
 #include "crop/crop_cache.h"
+#include "crop/sectors.h"
 #include "support/builders.h"
 
 namespace vrpipe {
@@ -251,13 +252,41 @@ TEST(CropCache, SectorsComeOneByOneAndGoWithTheirLine) {
   unsigned dirty = 0;
   std::uint64_t evicted = 0;
   CropCache::Line line = cache.allocate(0, dirty, evicted);
-  EXPECT_EQ(cache.present(line) & (1U << 2), 0U);
-  cache.add_sector(line, 2);
-  EXPECT_NE(cache.present(line) & (1U << 2), 0U);
-  EXPECT_EQ(cache.present(line) & (1U << 1), 0U);
+  EXPECT_EQ(cache.absent(line) & 15U, 0b1111U);
+  cache.start_fill(line, 2);
+  EXPECT_EQ(cache.filling(line), 0b0100U);
+  EXPECT_EQ(cache.absent(line) & 15U, 0b1011U) << "on its way: need not be asked for again";
+  cache.finish_fill(line, 2);
+  EXPECT_EQ(cache.filling(line), 0U);
+  EXPECT_EQ(cache.absent(line) & 15U, 0b1011U);
   line = cache.allocate(256, dirty, evicted);
-  EXPECT_EQ(cache.present(line) & (1U << 2), 0U);
+  EXPECT_EQ(cache.absent(line) & 15U, 0b1111U);
   EXPECT_EQ(dirty, 0U);
+}
+
+TEST(CropCache, SectorsMoveInTheLongestNaturallyAlignedRuns) {
+  // By brute force: of all aligned runs that begin with the first sector, the longest that is wholly there.
+  for (const unsigned longest : {1U, 2U, 3U, 4U, 7U, 8U, 32U}) {
+    for (std::uint32_t seed = 1; seed < 4096; ++seed) {
+      const std::uint32_t mask = seed | (seed % 3 == 0 ? 0xfff000U : 0U) | (seed % 5 == 0 ? 0xff000000U : 0U);
+      unsigned first = 0;
+      while ((mask >> first & 1U) == 0) ++first;
+      unsigned count = 1;
+      for (const unsigned longer : {2U, 4U, 8U, 16U, 32U}) {
+        bool whole = longer <= longest && first % longer == 0 && first + longer <= 32;
+        for (unsigned i = 0; whole && i < longer; ++i) whole = (mask >> (first + i) & 1U) != 0;
+        if (whole) count = longer;
+      }
+      std::uint32_t left = mask;
+      const SectorRun run = take_sector_run(left, longest);
+      ASSERT_EQ(run.first, first) << mask;
+      ASSERT_EQ(run.count, count) << mask << " up to " << longest;
+      for (unsigned i = 0; i < 32; ++i) {
+        const bool taken = i >= first && i < first + count;
+        ASSERT_EQ(left >> i & 1U, taken ? 0U : mask >> i & 1U);
+      }
+    }
+  }
 }
 
 TEST(CropCache, SizesThatMakeNoCacheAreRefused) {

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/random.h>
 
 namespace vrpipe {
 namespace {

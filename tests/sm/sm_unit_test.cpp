@@ -53,7 +53,7 @@ struct SmBench {
       sequences.push_back(item.warp->end_of_draw ? ~0U : item.warp->sequence);
       quads += item.warp->count;
       cycles.push_back(now);
-      --item.warp->holders;
+      item.warp->release();
       release.add({item.warp->slot}, now + release_after);
     });
   }
