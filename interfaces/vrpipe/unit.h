@@ -15,8 +15,8 @@
 namespace vrpipe {
 
 /// A unit as a SystemC module at cycle fidelity: a behaviour with ports and a clock. Ports are found by name, so that a
-/// platform wires units without knowing their classes.
-class Unit : public sc_core::sc_module, public Clocked, public PortOwner {
+/// platform wires units without knowing their classes. Clocked is the first base, so that the clock calls it directly.
+class Unit : public Clocked, public sc_core::sc_module, public PortOwner {
  public:
   /// Attaches to the clock.
   Unit(const sc_core::sc_module_name& name, ClockDomain& domain);
