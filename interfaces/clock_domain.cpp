@@ -120,11 +120,11 @@ void ClockDomain::tick_due() {
 }
 
 void ClockDomain::wake_from_outside(unsigned handle, Cycle at) {
-  if (finished_) return;
-  if (running_) at = std::max(at, edge_after(sc_core::SC_ZERO_TIME));
+  if (finished_ || !running_) return;  // before the first edge all are due
+  at = std::max(at, edge_after(sc_core::SC_ZERO_TIME));
   Cycle& due = due_[place_of_[handle]];
   due = std::min(due, at);
-  if (!running_ || at >= next_) return;
+  if (at >= next_) return;
   next_ = at;
   event_.notify(sc_core::sc_time::from_value(at * period_.value()) - sc_core::sc_time_stamp());
 }

@@ -4,12 +4,15 @@
 
 namespace vrpipe {
 
+void check_alignment(const char* port, Cycle now, std::uint64_t address, unsigned bytes) {
+  if (bytes != 0 && ((address | bytes) & (bytes - 1)) == 0) return;
+  throw SimulationFault(port, now,
+                        "an access of " + std::to_string(bytes) + " bytes at " + std::to_string(address) +
+                            " is not naturally aligned");
+}
+
 MemoryPort::MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight)
     : socket(name.c_str()), clock_(owner.clock), most_in_flight_(in_flight) {
-  std::size_t ring = 1;
-  while (ring < in_flight) ring *= 2;
-  completions_.resize(ring);
-  ring_mask_ = ring - 1;
   socket.bind(*this);
   next_access_ = unused_access();
 }
@@ -36,22 +39,16 @@ inline void MemoryPort::complete(Access& access, const sc_core::sc_time& delay) 
   }
   access.answered = true;
   const Cycle at = clock_.domain->edge_after(delay);
-  // Nearly always the last: memories answer in order. The ring holds all in flight.
-  std::size_t place = completions_tail_++;
-  while (place != completions_head_ && completion(place - 1).at > at) {
-    completion(place) = completion(place - 1);
-    --place;
+  // Nearly always the last: memories answer in order.
+  completions_.push({at, access.tag});
+  for (std::size_t place = completions_.size() - 1; place > 0 && completions_[place - 1].at > at; --place) {
+    std::swap(completions_[place - 1], completions_[place]);
   }
-  completion(place) = {at, access.tag};
   clock_.domain->wake(clock_.unit, at);
 }
 
 void MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag) {
-  if (bytes == 0 || ((address | bytes) & (bytes - 1)) != 0) {
-    throw SimulationFault(socket.name(), clock_.domain->now(),
-                          "an access of " + std::to_string(bytes) + " bytes at " + std::to_string(address) +
-                              " is not naturally aligned");
-  }
+  check_alignment(socket.name(), clock_.domain->now(), address, bytes);
   ++in_flight_;
   Access& access = *next_access_;
   if (access.data.size() < bytes) access.data.resize(bytes);

@@ -4,6 +4,7 @@
 #include <map>
 
 #include <vrpipe/error.h>
+#include <vrpipe/memory_port.h>
 
 namespace vrpipe {
 
@@ -48,11 +49,7 @@ TimedMemoryPort::TimedMemoryPort(PortOwner& owner, const std::string& name)
 TimedMemoryPort::~TimedMemoryPort() = default;
 
 Cycle TimedMemoryPort::access(tlm::tlm_command command, std::uint64_t address, unsigned bytes, Cycle at) {
-  if (bytes == 0 || (bytes & (bytes - 1)) != 0 || (address & (bytes - 1)) != 0) {
-    throw SimulationFault(socket.name(), at,
-                          "an access of " + std::to_string(bytes) + " bytes at " + std::to_string(address) +
-                              " is not naturally aligned");
-  }
+  check_alignment(socket.name(), at, address, bytes);
   if (data_.size() < bytes) data_.resize(bytes);
   payload_.set_command(command);
   payload_.set_address(address);

@@ -22,7 +22,7 @@ inline Lanes round_to_half_by_integers(Lanes value) {
   const Lanes subnormal = shifted - 0.5F;
   const LaneBits is_small = magnitude < 0x38800000;
   const LaneBits is_nan = magnitude > 0x7f800000;
-  LaneBits rounded = (is_small & bits_of(subnormal)) | (~is_small & normal);
+  LaneBits rounded = is_small ? bits_of(subnormal) : normal;
   rounded = normal > 0x477fe000 ? LaneBits{} + 0x7f800000 : rounded;
   rounded = is_nan ? (magnitude & ~0x1fff) | 0x400000 : rounded;
   return lanes_of(rounded | sign);

@@ -11,8 +11,12 @@
 
 #include <vrpipe/clock_domain.h>
 #include <vrpipe/link.h>
+#include <vrpipe/ring.h>
 
 namespace vrpipe {
+
+/// Throws SimulationFault naming the port, unless the access is naturally aligned and a power of two long.
+void check_alignment(const char* port, Cycle now, std::uint64_t address, unsigned bytes);
 
 /// An initiator on the unmodified TLM-2.0 base protocol, for timing only: payloads carry addresses and lengths, data
 /// stays with the behaviours. Accesses are naturally aligned and a power of two long, checked in every build.
@@ -37,14 +41,13 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   /// Takes the next access that has completed, in a cycle after the one in which it was answered; false for none.
   bool next_completed(std::uint32_t& tag) {
     if (next_completion() > clock_.domain->now()) return false;
-    tag = completion(completions_head_++).tag;
+    tag = completions_.front().tag;
+    completions_.pop();
     --in_flight_;
     return true;
   }
   /// When the next known completion is due; `never` for none.
-  Cycle next_completion() const {
-    return completions_head_ == completions_tail_ ? never : completions_[completions_head_ & ring_mask_].at;
-  }
+  Cycle next_completion() const { return completions_.empty() ? never : completions_.front().at; }
 
  private:
   struct Access : tlm::tlm_generic_payload {
@@ -59,7 +62,6 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   Access* unused_access();
   void issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag);
   void complete(Access& access, const sc_core::sc_time& delay);
-  Completion& completion(std::size_t place) { return completions_[place & ring_mask_]; }
   tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override;
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
@@ -72,10 +74,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   Access* next_access_ = nullptr;  ///< for the next request
   const unsigned most_in_flight_;
   unsigned in_flight_ = 0;
-  std::vector<Completion> completions_;  ///< a ring of a power of two, by cycle
-  std::size_t completions_head_ = 0;
-  std::size_t completions_tail_ = 0;
-  std::size_t ring_mask_ = 0;
+  Ring<Completion> completions_;        ///< by cycle
   const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
 };
 

@@ -32,12 +32,11 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
 template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
   if (!cache_) cache_ = make_crop_cache(cost_, *surface_);
-  // Quads are naturally aligned, in lines and in sectors.
   const auto sector_shift = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
   const auto line_shift = static_cast<unsigned>(__builtin_ctz(cost_.line_bytes));
   const std::uint64_t line_mask = cost_.line_bytes - 1;
   constexpr std::uint32_t bytes_per_quad = 4 * bytes_per_pixel(Format);
-  const std::uint32_t sectors_of_quad = sectors_of(0, bytes_per_quad, sector_shift);
+  const std::uint32_t first_sectors = sectors_of_quad(Format, sector_shift);
   const std::uint64_t tile = surface_->address(warp.tile, 0);
   // Where a line of the tile is in `out.lines`, if it is there. Without branches, which would be mispredicted.
   std::array<std::uint8_t, positions_per_tile> place_of;
@@ -46,7 +45,7 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   for (unsigned i = from; i < to; ++i) {
     const std::uint64_t offset = std::uint64_t{morton_order[warp.position[i]]} * bytes_per_quad;
     const std::uint64_t line = offset >> line_shift;
-    const std::uint32_t sectors = sectors_of_quad << ((offset & line_mask) >> sector_shift);
+    const std::uint32_t sectors = first_sectors << ((offset & line_mask) >> sector_shift);
     const bool is_new = (seen >> line & 1U) == 0;
     seen |= std::uint64_t{1} << line;
     const unsigned place = is_new ? count : place_of[line];

@@ -5,6 +5,7 @@
 
 #include <vrpipe/memory_port.h>
 #include <vrpipe/order_monitor.h>
+#include <vrpipe/ring.h>
 #include <vrpipe/unit.h>
 
 namespace vrpipe {
@@ -25,13 +26,11 @@ class CropUnit : public Unit {
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
         signals_(state.early_termination),
-        memory_(*this, "memory", 2 * cost_.mshrs),
-        queue_(ring_for(cost_.input_quads)),
-        queue_mask_(queue_.size() - 1) {
+        memory_(*this, "memory", 2 * cost_.mshrs) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
 
-  bool idle() const override { return in_.empty() && queued_ == 0; }
+  bool idle() const override { return in_.empty() && queue_.empty(); }
   std::uint64_t work() const override { return blended_; }
   double peak_rate() const override { return cost_.quads_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
@@ -46,11 +45,6 @@ class CropUnit : public Unit {
     CropCache::Line line = CropCache::no_line;
     std::uint32_t sectors = 0;  ///< of the line, a bit each
   };
-  static std::vector<Entry> ring_for(std::size_t entries) {
-    std::size_t size = 1;
-    while (size < entries) size *= 2;
-    return std::vector<Entry>(size);
-  }
   // What a memory access is for: a sector of a line, or nothing that anyone waits for.
   static constexpr std::uint32_t write_back_tag = ~0U;
   static constexpr unsigned sector_bits = 5;
@@ -60,8 +54,7 @@ class CropUnit : public Unit {
     surface_ = behaviour_->surface();
     if (surface_ == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     sector_shift_ = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
-    // Quads are naturally aligned.
-    sectors_of_quad_ = sectors_of(0, 4 * bytes_per_pixel(surface_->format()), sector_shift_);
+    first_sectors_ = sectors_of_quad(surface_->format(), sector_shift_);
     cache_ = make_crop_cache(cost_, *surface_);
     monitor_ = std::make_unique<BlendOrderMonitor>(surface_->width(), surface_->height());
   }
@@ -106,7 +99,7 @@ class CropUnit : public Unit {
     const CropCache::Line line = line_of(address);
     if (line == CropCache::no_line) return false;
     const std::uint64_t offset = address & (cost_.line_bytes - 1);
-    const std::uint32_t sectors = sectors_of_quad_ << (offset >> sector_shift_);
+    const std::uint32_t sectors = first_sectors_ << (offset >> sector_shift_);
     for (std::uint32_t missing = sectors & cache_->absent(line); missing != 0; missing &= missing - 1) {
       if (!memory_.available() || fills_in_flight_ == cost_.mshrs) return false;
       const auto sector = static_cast<unsigned>(__builtin_ctz(missing));
@@ -117,14 +110,14 @@ class CropUnit : public Unit {
       tokens_ -= static_cast<std::int32_t>(cost_.quads_per_cycle);
     }
     cache_->pin(line);
-    queue_[(head_ + queued_) & queue_mask_] = {quad, address, line, sectors};
-    ++queued_;
+    queue_.push({quad, address, line, sectors});
     return true;
   }
 
   bool accept() {
     bool moved = false;
-    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && queued_ < cost_.input_quads && in_.ready(); --budget) {
+    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && queue_.size() < cost_.input_quads && in_.ready();
+         --budget) {
       const ColorBeat& beat = in_.front();
       if (beat.end_of_draw) {
         ending_ = true;
@@ -169,8 +162,8 @@ class CropUnit : public Unit {
     TerminationBeat beat;
     bool moved = false;
     stop_ = UnitState::starved;
-    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && queued_ > 0; --budget) {
-      const Entry& entry = queue_[head_];
+    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && !queue_.empty(); --budget) {
+      const Entry& entry = queue_.front();
       if (signals_ && out_.credits() == 0) {
         stop_ = UnitState::blocked;
         break;
@@ -200,9 +193,8 @@ class CropUnit : public Unit {
       if (outcome.changed || cost_.writes_unchanged) cache_->dirty(entry.line, entry.sectors);
       cache_->unpin(entry.line);
       tokens_ -= price;
-      head_ = (head_ + 1) & queue_mask_;
-      --queued_;
-      if (queued_ > quads_ahead) prefetch(queue_[(head_ + quads_ahead) & queue_mask_].quad);
+      queue_.pop();
+      if (queue_.size() > quads_ahead) prefetch(queue_[quads_ahead].quad);
       ++blended_;
       last_blend_ = now;
       moved = true;
@@ -215,13 +207,13 @@ class CropUnit : public Unit {
     finish_fills();
     const bool blended = blend(now);
     const bool accepted = accept();
-    if (ending_ && queued_ == 0) {
+    if (ending_ && queue_.empty()) {
       end_ = blended_ == 0 ? now : last_blend_ + cost_.latency_cycles;
       ending_ = false;
     }
-    enter(blended ? UnitState::busy : queued_ > 0 ? stop_ : UnitState::starved, now);
+    enter(blended ? UnitState::busy : !queue_.empty() ? stop_ : UnitState::starved, now);
     if (blended || accepted ||
-        (queued_ > 0 && stop_ != UnitState::blocked &&
+        (!queue_.empty() && stop_ != UnitState::blocked &&
          (stop_ == UnitState::latency || tokens_ < static_cast<std::int32_t>(cost_.sectors_per_cycle)))) {
       return now + 1;
     }
@@ -240,13 +232,10 @@ class CropUnit : public Unit {
   const ColorSurface* surface_ = nullptr;
   std::unique_ptr<CropCache> cache_;
   std::unique_ptr<BlendOrderMonitor> monitor_;
-  std::uint32_t sectors_of_quad_ = 0;  ///< if it began a line
-  unsigned sector_shift_ = 0;          ///< log2 of the bytes of a sector
-  std::vector<Entry> queue_;           ///< looked up and waiting to be blended, a ring
-  const std::size_t queue_mask_;
-  std::size_t head_ = 0;
-  std::size_t queued_ = 0;
-  unsigned at_ = 0;  ///< quads taken of the beat at the link
+  std::uint32_t first_sectors_ = 0;  ///< of a quad that begins a line
+  unsigned sector_shift_ = 0;        ///< log2 of the bytes of a sector
+  Ring<Entry> queue_;                ///< looked up and waiting to be blended
+  unsigned at_ = 0;                  ///< quads taken of the beat at the link
   unsigned fills_in_flight_ = 0;
   std::uint32_t write_back_ = 0;  ///< dirty sectors of an evicted line yet to be sent
   std::uint64_t write_back_address_ = 0;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include <vrpipe/blend.h>
+
 namespace vrpipe {
 
 // Sectors of a line, a bit each, at most 32.
@@ -11,11 +13,10 @@ constexpr std::uint32_t sector_mask(unsigned first, unsigned count) {
   return (count == 32 ? ~0U : (1U << count) - 1) << first;
 }
 
-/// Those that hold bytes from an offset in the line on. @param shift log2 of the bytes of a sector
-constexpr std::uint32_t sectors_of(std::uint64_t offset, std::uint32_t bytes, unsigned shift) {
-  const auto first = static_cast<unsigned>(offset >> shift);
-  const auto last = static_cast<unsigned>((offset + bytes - 1) >> shift);
-  return sector_mask(first, last - first + 1);
+/// Of a quad that begins a line. Quads are naturally aligned, so that another's are these, moved.
+/// @param shift log2 of the bytes of a sector
+constexpr std::uint32_t sectors_of_quad(ColorFormat format, unsigned shift) {
+  return sector_mask(0, ((4 * bytes_per_pixel(format) - 1) >> shift) + 1);
 }
 
 struct SectorRun {

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+namespace vrpipe {
+
+/// A queue in a ring that grows.
+template <class Entry>
+class Ring {
+ public:
+  bool empty() const { return head_ == tail_; }
+  std::size_t size() const { return tail_ - head_; }
+  Entry& front() { return entries_[head_ & mask_]; }
+  const Entry& front() const { return entries_[head_ & mask_]; }
+  Entry& operator[](std::size_t index) { return entries_[(head_ + index) & mask_]; }
+  /// A place at the end, to be filled.
+  Entry& push() {
+    if (tail_ - head_ == entries_.size()) grow();
+    return entries_[tail_++ & mask_];
+  }
+  void push(const Entry& entry) { push() = entry; }
+  void pop() { ++head_; }
+
+ private:
+  void grow() {
+    std::vector<Entry> larger(entries_.empty() ? 8 : 2 * entries_.size());
+    const std::size_t count = size();
+    for (std::size_t i = 0; i < count; ++i) larger[i] = std::move(entries_[(head_ + i) & mask_]);
+    entries_ = std::move(larger);
+    mask_ = entries_.size() - 1;
+    head_ = 0;
+    tail_ = count;
+  }
+  std::vector<Entry> entries_;
+  std::size_t mask_ = 0;
+  std::size_t head_ = 0;
+  std::size_t tail_ = 0;
+};
+
+}  // namespace vrpipe
