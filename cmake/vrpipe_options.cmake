@@ -41,6 +41,11 @@ option(VRPIPE_X86_64_V3 "instructions of x86-64-v3 (2013 on)" ${VRPIPE_RUNS_X86_
 if(VRPIPE_X86_64_V3)
   add_compile_options(-march=x86-64-v3)
 endif()
+# Nobody replaces a function of the library's by one of the same name.
+add_compile_options(-fno-semantic-interposition -fno-plt -fvisibility-inlines-hidden)
+add_link_options(-Wl,-Bsymbolic-functions)
+# Vectors wider than the processor's registers cross no library's boundary.
+add_compile_options(-Wno-psabi)
 add_compile_options(-Wall -Wextra -Wshadow -Wconversion)
 if(VRPIPE_WARNINGS_AS_ERRORS)
   add_compile_options(-Werror)

@@ -29,7 +29,7 @@ unsigned mask_of(const CycleVector& lanes) {
 }  // namespace
 
 ClockDomain::ClockDomain(const sc_core::sc_module_name& name, std::uint64_t period_ps)
-    : sc_module(name), period_(static_cast<double>(period_ps), sc_core::SC_PS) {
+    : sc_module(name), period_(static_cast<double>(period_ps), sc_core::SC_PS), period_value_(period_.value()) {
   SC_METHOD(edge);
   sensitive << event_;
   dont_initialize();
@@ -41,7 +41,6 @@ unsigned ClockDomain::attach(Clocked& unit) {
   place_of_.push_back(handle);
   if (handle == due_.size()) due_.resize(due_.size() + cycles_per_vector, never);
   due_[handle] = 0;
-  active_.resize(handle / 64 + 1);
   return handle;
 }
 
@@ -92,31 +91,32 @@ void ClockDomain::edge() {
 }
 
 void ClockDomain::tick_due() {
-  // First all that are due, then all ticks: a wake-up in this cycle is for a later one, also for a unit yet to tick.
-  // Several units at a time and without branches, since which of them are due changes from edge to edge.
+  // Several units are looked at together and without branches, since which of them are due changes from edge to edge. A
+  // wake-up in this cycle is for a later one, so it does not matter who has ticked before it.
   const Cycle now = now_;
   Cycle* const due = due_.data();
-  const std::size_t places = due_.size();
-  for (std::size_t first = 0; first < places; first += 64) {
+  Clocked* const* const units = units_.data();
+  bool soon = false;
+  for (std::size_t first = 0, end = 0; first < due_.size(); first = end) {
+    end = std::min(first + 64, due_.size());
     std::uint64_t active = 0;
-    for (std::size_t place = first; place < std::min(first + 64, places); place += cycles_per_vector) {
+    for (std::size_t place = end; place > first;) {
+      place -= cycles_per_vector;
       CycleVector wanted;
       std::memcpy(&wanted, due + place, sizeof wanted);
       const auto is_due = reinterpret_cast<CycleVector>(wanted == now);
       wanted |= is_due;  // `never` has all bits set
       std::memcpy(due + place, &wanted, sizeof wanted);
-      active |= std::uint64_t{mask_of(is_due)} << (place - first);
+      active = active << cycles_per_vector | mask_of(is_due);
     }
-    active_[first / 64] = active;
-  }
-  for (std::size_t first = 0; first < places; first += 64) {
-    for (std::uint64_t left = active_[first / 64]; left != 0; left &= left - 1) {
-      const std::size_t place = first + static_cast<unsigned>(__builtin_ctzll(left));
-      const Cycle next = units_[place]->tick(now);
+    for (; active != 0; active &= active - 1) {
+      const std::size_t place = first + static_cast<unsigned>(__builtin_ctzll(active));
+      const Cycle next = units[place]->tick(now);
       due[place] = std::min(due[place], next);
-      some_soon_ |= next == now + 1;
+      soon |= next == now + 1;
     }
   }
+  some_soon_ |= soon;
 }
 
 void ClockDomain::wake_from_outside(unsigned handle, Cycle at) {

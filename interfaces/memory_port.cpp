@@ -4,9 +4,8 @@
 
 namespace vrpipe {
 
-void check_alignment(const char* port, Cycle now, std::uint64_t address, unsigned bytes) {
-  if (bytes != 0 && ((address | bytes) & (bytes - 1)) == 0) return;
-  throw SimulationFault(port, now,
+void fault_of_alignment(const sc_core::sc_object& port, Cycle now, std::uint64_t address, unsigned bytes) {
+  throw SimulationFault(port.name(), now,
                         "an access of " + std::to_string(bytes) + " bytes at " + std::to_string(address) +
                             " is not naturally aligned");
 }
@@ -33,22 +32,31 @@ MemoryPort::Access* MemoryPort::unused_access() {
   return access;
 }
 
-inline void MemoryPort::complete(Access& access, const sc_core::sc_time& delay) {
-  if (access.is_response_error()) {
-    throw SimulationFault(socket.name(), clock_.domain->now(), "the memory answered " + access.get_response_string());
+void MemoryPort::fault(const Access& access) const {
+  throw SimulationFault(socket.name(), clock_.domain->now(), "the memory answered " + access.get_response_string());
+}
+
+void MemoryPort::sort_in_last() {
+  for (std::size_t place = completions_.size() - 1; place > 0 && completions_[place - 1].at > completions_[place].at;
+       --place) {
+    std::swap(completions_[place - 1], completions_[place]);
   }
+}
+
+inline void MemoryPort::complete(Access& access, const sc_core::sc_time& delay) {
+  if (access.is_response_error()) fault(access);
   access.answered = true;
   const Cycle at = clock_.domain->edge_after(delay);
   // Nearly always the last: memories answer in order.
+  const bool in_order = completions_.empty() || completions_.back().at <= at;
   completions_.push({at, access.tag});
-  for (std::size_t place = completions_.size() - 1; place > 0 && completions_[place - 1].at > at; --place) {
-    std::swap(completions_[place - 1], completions_[place]);
-  }
+  if (!in_order) sort_in_last();
+  next_completion_ = std::min(next_completion_, at);
   clock_.domain->wake(clock_.unit, at);
 }
 
 void MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag) {
-  check_alignment(socket.name(), clock_.domain->now(), address, bytes);
+  check_alignment(socket, clock_.domain->now(), address, bytes);
   ++in_flight_;
   Access& access = *next_access_;
   if (access.data.size() < bytes) access.data.resize(bytes);
@@ -106,18 +114,12 @@ class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
  private:
   void serve(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) {
     // The delay that comes in says how far ahead of the clock the access is.
-    // Mostly the last one's; a division is dear.
-    if (delay.value() != delay_) {
-      delay_ = delay.value();
-      ahead_ = delay_ / memory_.domain_.period().value();
-    }
-    const std::uint64_t arrival = (memory_.domain_.now() + ahead_) * memory_.bytes_per_cycle_;
+    const std::uint64_t arrival =
+        (memory_.domain_.now() + memory_.domain_.whole_cycles(delay)) * memory_.bytes_per_cycle_.value();
     const std::uint64_t start = free_at_ > arrival ? free_at_ : arrival;
     free_at_ = start + payload.get_data_length();
     bytes += payload.get_data_length();
-    const std::uint64_t waited = free_at_ - arrival;  // nearly always a cycle: a division is dear
-    const std::uint64_t transfer =
-        waited <= memory_.bytes_per_cycle_ ? 1 : (waited + memory_.bytes_per_cycle_ - 1) / memory_.bytes_per_cycle_;
+    const std::uint64_t transfer = memory_.bytes_per_cycle_.quotient_up(free_at_ - arrival);
     delay += memory_.time_of(memory_.latency_cycles_ + transfer);
     payload.set_response_status(tlm::TLM_OK_RESPONSE);
   }
@@ -131,8 +133,6 @@ class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
   unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
 
   const FixedLatencyMemory& memory_;
-  std::uint64_t delay_ = 0;
-  Cycle ahead_ = 0;            // delay_ in cycles
   std::uint64_t free_at_ = 0;  // in bytes since the start, so that fractions of a cycle are kept
 };
 
@@ -158,7 +158,7 @@ std::uint64_t FixedLatencyMemory::bytes() const {
 }
 
 double FixedLatencyMemory::peak_rate() const {
-  return static_cast<double>(bytes_per_cycle_) * static_cast<double>(ports_.size());
+  return static_cast<double>(bytes_per_cycle_.value()) * static_cast<double>(ports_.size());
 }
 
 }  // namespace vrpipe

@@ -49,7 +49,7 @@ TimedMemoryPort::TimedMemoryPort(PortOwner& owner, const std::string& name)
 TimedMemoryPort::~TimedMemoryPort() = default;
 
 Cycle TimedMemoryPort::access(tlm::tlm_command command, std::uint64_t address, unsigned bytes, Cycle at) {
-  check_alignment(socket.name(), at, address, bytes);
+  check_alignment(socket, at, address, bytes);
   if (data_.size() < bytes) data_.resize(bytes);
   payload_.set_command(command);
   payload_.set_address(address);
@@ -59,26 +59,18 @@ Cycle TimedMemoryPort::access(tlm::tlm_command command, std::uint64_t address, u
   payload_.set_dmi_allowed(false);
   payload_.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
   const Cycle now = clock_.domain->now();
-  const std::uint64_t period = clock_.domain->period().value();
   const Cycle ahead = std::max(at, now) - now;
   // Most accesses are asked for together with others, and making a time is a call into the kernel.
   if (ahead != ahead_) {
     ahead_ = ahead;
-    delay_ = sc_core::sc_time::from_value(ahead * period);
+    delay_ = sc_core::sc_time::from_value(ahead * clock_.domain->period().value());
   }
-  const std::uint64_t asked = delay_.value();
   sc_core::sc_time delay = delay_;
   socket->b_transport(payload_, delay);
   if (payload_.is_response_error()) {
     throw SimulationFault(socket.name(), at, "the memory answered " + payload_.get_response_string());
   }
-  // Most answers take as long as the one before; a division is dear.
-  const std::uint64_t took = std::max<std::uint64_t>(delay.value(), asked) - asked;
-  if (took != took_) {
-    took_ = took;
-    took_cycles_ = (took + period - 1) / period;
-  }
-  return now + ahead + took_cycles_;
+  return now + std::max(ahead, clock_.domain->cycles_up(delay));
 }
 
 void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker) { makers()[slot] = std::move(maker); }

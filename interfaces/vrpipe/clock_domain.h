@@ -9,6 +9,7 @@
 #include <systemc>
 
 #include <vrpipe/accounting.h>
+#include <vrpipe/divisor.h>
 
 namespace vrpipe {
 
@@ -34,6 +35,9 @@ class ClockDomain : public sc_core::sc_module {
   /// The cycle of this edge; between edges, of the last one.
   Cycle now() const { return now_; }
   sc_core::sc_time period() const { return period_; }
+  /// Cycles in a time, rounded down or up.
+  Cycle whole_cycles(const sc_core::sc_time& time) const { return period_value_.quotient(time.value()); }
+  Cycle cycles_up(const sc_core::sc_time& time) const { return period_value_.quotient_up(time.value()); }
 
   /// Asks for an edge of a unit at cycle `at`, later than now while the simulation runs. Also from outside an edge, by
   /// a module with time of its own: the edge is then one that is yet to come. Of several wishes of a unit the earliest
@@ -47,10 +51,9 @@ class ClockDomain : public sc_core::sc_module {
 
   /// The first edge that is later than the present time, and not before `delay` has passed.
   Cycle edge_after(const sc_core::sc_time& delay) const {
-    const std::uint64_t period = period_.value();
-    if (in_edge_) return now_ + std::max<Cycle>(1, (delay.value() + period - 1) / period);
-    const std::uint64_t present = sc_core::sc_time_stamp().value();
-    return std::max<Cycle>(present / period + 1, (present + delay.value() + period - 1) / period);
+    if (in_edge_) return now_ + std::max<Cycle>(1, cycles_up(delay));
+    const sc_core::sc_time& present = sc_core::sc_time_stamp();
+    return std::max<Cycle>(whole_cycles(present) + 1, cycles_up(present + delay));
   }
 
   /// Runs for a time, as sc_start does; what a unit throws comes out as it is.
@@ -82,12 +85,12 @@ class ClockDomain : public sc_core::sc_module {
   void start_of_simulation() override;
 
   sc_core::sc_time period_;
+  Divisor period_value_;  ///< in units of sc_time
   sc_core::sc_event event_;
-  std::vector<Clocked*> units_;        ///< in the order in which they tick
-  std::vector<unsigned> place_of_;     ///< of a handle, in that order
-  std::vector<Cycle> due_;             ///< the edge that each wants; filled up with `never` to whole vectors
-  std::vector<std::uint64_t> active_;  ///< who is due at this edge, a bit each
-  bool some_soon_ = false;             ///< someone wants the next cycle's edge
+  std::vector<Clocked*> units_;     ///< in the order in which they tick
+  std::vector<unsigned> place_of_;  ///< of a handle, in that order
+  std::vector<Cycle> due_;          ///< the edge that each wants; filled up with `never` to whole vectors
+  bool some_soon_ = false;          ///< someone wants the next cycle's edge
   Cycle now_ = 0;
   Cycle next_ = 0;  ///< the edge that is armed; `never` for none
   unsigned cycles_per_activation_ = 1;

@@ -73,9 +73,11 @@ class Port {
 
  protected:
   Port(std::string name, const ClockHandle& clock) : clock_(clock), name_(std::move(name)) {}
-  bool stalled() const { return stall_per_256_ != 0 && stalls_at(clock_.domain->now()); }
+  [[gnu::always_inline]] bool stalled() const { return stall_per_256_ != 0 && stalls_at(clock_.domain->now()); }
   bool stalled_at(Cycle cycle) const { return stall_per_256_ != 0 && stalls_at(cycle); }
   void mark_connected() { connected_ = true; }
+  /// Throws SimulationFault. Out of line, so that what does not fail stays short.
+  [[noreturn]] void fault(const sc_core::sc_object& socket, const char* what) const;
 
   const ClockHandle& clock_;
 
@@ -171,11 +173,17 @@ class OutEnd : public OutPort, protected tlm::tlm_bw_transport_if<StreamProtocol
   std::unique_ptr<Sink> stub_;
 };
 
-/// The sending end of a clocked unit.
+template <class Item>
+class StreamIn;
+
+/// The sending end of a clocked unit. Ends of clocked units with nothing in between call each other directly instead of
+/// through their sockets, as with a direct memory interface; in the same cycles.
 template <class Item>
 class StreamOut : public OutEnd<Item> {
  public:
   using OutEnd<Item>::OutEnd;
+
+  void connect(InPort& in, unsigned depth, unsigned latency) override;
 
   /// Free places at the receiver, as known at the start of this cycle.
   unsigned credits() {
@@ -189,38 +197,47 @@ class StreamOut : public OutEnd<Item> {
   Cycle retry() const { return this->stalled() ? clock_.domain->now() + 1 : never; }
   /// Moves an item; `credits()` must not be 0.
   void push(const Item& item) {
-    if (credits_ == 0) {
-      throw SimulationFault(this->socket.name(), clock_.domain->now(), "an item was pushed without a credit");
-    }
+    if (credits_ == 0) this->fault(this->socket, "an item was pushed without a credit");
     --credits_;
     ++this->transferred_;
+    if (direct_ == nullptr) return transfer(item);
+    direct_->accept(item, this->pipeline_);
+  }
+
+ private:
+  using OutEnd<Item>::clock_;
+
+  friend class StreamIn<Item>;
+
+  [[gnu::noinline]] void transfer(const Item& item) {
     payload_.item = &item;
     payload_.latency = this->pipeline_;
     StreamPhase phase = StreamPhase::transfer;
     sc_core::sc_time delay;
     this->socket->nb_transport_fw(payload_, phase, delay);
   }
-
- private:
-  using OutEnd<Item>::clock_;
-
-  tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
-    if (!clock_.domain->running()) {
-      credits_ += payload.credits;
-      return tlm::TLM_ACCEPTED;
-    }
+  /// Credits from the receiver, for the next cycle.
+  void give(unsigned credits) {
     const Cycle now = clock_.domain->now();
     if (now > credit_cycle_) {
       credits_ += pending_;
       pending_ = 0;
       credit_cycle_ = now;
     }
-    pending_ += payload.credits;
+    pending_ += credits;
     clock_.domain->wake(clock_.unit, now + 1);
+  }
+  tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
+    if (clock_.domain->running()) {
+      give(payload.credits);
+    } else {
+      credits_ += payload.credits;
+    }
     return tlm::TLM_ACCEPTED;
   }
   void unlimited() override { credits_ = ~0U; }
 
+  StreamIn<Item>* direct_ = nullptr;
   StreamPayload<Item> payload_;  ///< of the transfer under way
   unsigned credits_ = 0;
   unsigned pending_ = 0;
@@ -296,7 +313,8 @@ class StreamIn : public InEnd<Item> {
   void pop() {
     ++head_;
     front_ready_ = head_ == tail_ ? never : queue_[head_ & mask_].ready;
-    grant(1);
+    if (direct_ == nullptr) return grant(1);
+    direct_->give(1);
   }
   /// Items in the queue, visible or not.
   unsigned size() const { return tail_ - head_; }
@@ -304,35 +322,40 @@ class StreamIn : public InEnd<Item> {
   Cycle next_ready() const { return this->stalled() ? std::max(front_ready_, clock_.domain->now() + 1) : front_ready_; }
 
  private:
+  friend class StreamOut<Item>;
   using InEnd<Item>::clock_;
   struct Entry {
     Cycle ready;
     Item item;
   };
 
-  void grant(unsigned credits) {
+  [[gnu::noinline]] void grant(unsigned credits) {
     payload_.credits = credits;
     StreamPhase phase = StreamPhase::credit;
     sc_core::sc_time delay;
     this->socket->nb_transport_bw(payload_, phase, delay);
   }
 
-  tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
-    if (size() == depth_) {
-      throw SimulationFault(this->socket.name(), clock_.domain->now(), "an item arrived at a full queue");
-    }
+  /// An item from the sender, behind a pipeline of so many cycles.
+  void accept(const Item& item, unsigned pipeline) {
+    if (size() == depth_) this->fault(this->socket, "an item arrived at a full queue");
     Entry& entry = queue_[tail_ & mask_];
-    entry.ready = clock_.domain->now() + latency_ + payload.latency;
-    entry.item = *payload.item;
-    if (head_ == tail_) front_ready_ = entry.ready;
+    const Cycle ready = clock_.domain->now() + latency_ + pipeline;
+    entry.ready = ready;
+    entry.item = item;
+    if (head_ == tail_) front_ready_ = ready;
     ++tail_;
-    clock_.domain->wake(clock_.unit, entry.ready);
+    clock_.domain->wake(clock_.unit, ready);
+  }
+  tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
+    accept(*payload.item, payload.latency);
     return tlm::TLM_ACCEPTED;
   }
   void b_transport(StreamPayload<Item>&, sc_core::sc_time&) override {
-    throw SimulationFault(this->socket.name(), clock_.domain->now(), "b_transport on a link of a clocked unit");
+    this->fault(this->socket, "b_transport on a link of a clocked unit");
   }
 
+  StreamOut<Item>* direct_ = nullptr;
   StreamPayload<Item> payload_;  ///< of credits
   std::vector<Entry> queue_;
   unsigned mask_ = 0;
@@ -408,6 +431,13 @@ void OutEnd<Item>::connect(InPort& in, unsigned depth, unsigned latency) {
   socket.bind(end.socket);
   mark_connected();
   end.taken();
+}
+
+template <class Item>
+void StreamOut<Item>::connect(InPort& in, unsigned depth, unsigned latency) {
+  OutEnd<Item>::connect(in, depth, latency);
+  direct_ = dynamic_cast<StreamIn<Item>*>(&in);
+  if (direct_ != nullptr) direct_->direct_ = this;
 }
 
 /// The same through a recorder.

@@ -15,8 +15,12 @@
 
 namespace vrpipe {
 
+[[noreturn]] void fault_of_alignment(const sc_core::sc_object& port, Cycle now, std::uint64_t address, unsigned bytes);
+
 /// Throws SimulationFault naming the port, unless the access is naturally aligned and a power of two long.
-void check_alignment(const char* port, Cycle now, std::uint64_t address, unsigned bytes);
+inline void check_alignment(const sc_core::sc_object& port, Cycle now, std::uint64_t address, unsigned bytes) {
+  if (bytes == 0 || ((address | bytes) & (bytes - 1)) != 0) fault_of_alignment(port, now, address, bytes);
+}
 
 /// An initiator on the unmodified TLM-2.0 base protocol, for timing only: payloads carry addresses and lengths, data
 /// stays with the behaviours. Accesses are naturally aligned and a power of two long, checked in every build.
@@ -40,14 +44,15 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   }
   /// Takes the next access that has completed, in a cycle after the one in which it was answered; false for none.
   bool next_completed(std::uint32_t& tag) {
-    if (next_completion() > clock_.domain->now()) return false;
+    if (next_completion_ > clock_.domain->now()) return false;
     tag = completions_.front().tag;
     completions_.pop();
+    next_completion_ = completions_.empty() ? never : completions_.front().at;
     --in_flight_;
     return true;
   }
   /// When the next known completion is due; `never` for none.
-  Cycle next_completion() const { return completions_.empty() ? never : completions_.front().at; }
+  Cycle next_completion() const { return next_completion_; }
 
  private:
   struct Access : tlm::tlm_generic_payload {
@@ -62,6 +67,8 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   Access* unused_access();
   void issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag);
   void complete(Access& access, const sc_core::sc_time& delay);
+  [[gnu::noinline]] void sort_in_last();
+  [[noreturn, gnu::noinline]] void fault(const Access& access) const;
   tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override;
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
@@ -74,7 +81,8 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   Access* next_access_ = nullptr;  ///< for the next request
   const unsigned most_in_flight_;
   unsigned in_flight_ = 0;
-  Ring<Completion> completions_;        ///< by cycle
+  Ring<Completion> completions_;  ///< by cycle
+  Cycle next_completion_ = never;
   const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
 };
 
@@ -97,7 +105,7 @@ class FixedLatencyMemory : public sc_core::sc_module {
   }
   const ClockDomain& domain_;
   unsigned latency_cycles_;
-  unsigned bytes_per_cycle_;
+  Divisor bytes_per_cycle_;
   std::array<sc_core::sc_time, 1024> times_;  ///< of the first cycles, since making one is a call into the kernel
   std::vector<std::unique_ptr<MemoryTarget>> ports_;
 };

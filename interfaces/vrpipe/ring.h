@@ -14,18 +14,19 @@ class Ring {
   std::size_t size() const { return tail_ - head_; }
   Entry& front() { return entries_[head_ & mask_]; }
   const Entry& front() const { return entries_[head_ & mask_]; }
+  Entry& back() { return entries_[(tail_ - 1) & mask_]; }
   Entry& operator[](std::size_t index) { return entries_[(head_ + index) & mask_]; }
   /// A place at the end, to be filled.
   Entry& push() {
-    if (tail_ - head_ == entries_.size()) grow();
+    if (tail_ - head_ > mask_) grow();
     return entries_[tail_++ & mask_];
   }
   void push(const Entry& entry) { push() = entry; }
   void pop() { ++head_; }
 
  private:
-  void grow() {
-    std::vector<Entry> larger(entries_.empty() ? 8 : 2 * entries_.size());
+  [[gnu::noinline]] void grow() {
+    std::vector<Entry> larger(2 * entries_.size());
     const std::size_t count = size();
     for (std::size_t i = 0; i < count; ++i) larger[i] = std::move(entries_[(head_ + i) & mask_]);
     entries_ = std::move(larger);
@@ -33,8 +34,8 @@ class Ring {
     head_ = 0;
     tail_ = count;
   }
-  std::vector<Entry> entries_;
-  std::size_t mask_ = 0;
+  std::vector<Entry> entries_ = std::vector<Entry>(8);
+  std::size_t mask_ = 7;
   std::size_t head_ = 0;
   std::size_t tail_ = 0;
 };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <vrpipe/batch.h>
+#include <vrpipe/divisor.h>
 #include <vrpipe/link.h>
 #include <vrpipe/ring.h>
 #include <vrpipe/unit.h>
@@ -55,16 +56,16 @@ struct Span {
 /// A resource that takes so many items a cycle, in order. An item that is wider than a cycle takes several.
 class Lane {
  public:
-  explicit Lane(unsigned per_cycle = 1) : per_cycle_(per_cycle > 0 ? per_cycle : 1), left_(per_cycle_) {}
+  explicit Lane(unsigned per_cycle = 1) : per_cycle_(std::max(per_cycle, 1U)), left_(std::max(per_cycle, 1U)) {}
   /// Reserves; returns the cycle in which the item goes.
   Cycle take(Cycle earliest, unsigned width = 1) {
     hold(earliest);
-    if (width > left_ && left_ < per_cycle_) next_cycle(1);
+    if (width > left_ && left_ < per_cycle_.value()) next_cycle(1);
     const Cycle taken = cycle_;
     if (width < left_) {
       left_ -= width;
     } else {
-      next_cycle((width + per_cycle_ - 1) / per_cycle_);  // NOLINT(clang-analyzer-core.DivideZero): at least 1
+      next_cycle(per_cycle_.quotient_up(width));
     }
     return taken;
   }
@@ -76,32 +77,26 @@ class Lane {
  private:
   void next_cycle(Cycle cycles) {
     cycle_ += cycles;
-    left_ = per_cycle_;
+    left_ = per_cycle_.value();
   }
-  unsigned per_cycle_;
-  unsigned left_;
+  Divisor per_cycle_;
+  std::uint64_t left_;
   Cycle cycle_ = 0;
 };
 
 /// A resource that takes so many parts a cycle; the parts of an item may go in neighbouring cycles.
 class Flow {
  public:
-  explicit Flow(unsigned per_cycle) : per_cycle_(per_cycle > 0 ? per_cycle : 1) {}
+  explicit Flow(unsigned per_cycle) : per_cycle_(std::max(per_cycle, 1U)) {}
   /// Reserves; returns the cycles in which the first and the last part go.
   Span take(Cycle earliest, unsigned parts) {
     hold(earliest);
     if (parts == 0) return cycle_;
-    if (used_ == per_cycle_) {
-      ++cycle_;
-      used_ = 0;
-    }
-    const Cycle first = cycle_;
+    const Cycle first = next();
     used_ += parts;
-    if (used_ > 8 * per_cycle_) {
-      cycle_ += (used_ - 1) / per_cycle_;  // NOLINT(clang-analyzer-core.DivideZero): at least 1
-      used_ = (used_ - 1) % per_cycle_ + 1;
-    }
-    for (; used_ > per_cycle_; used_ -= per_cycle_) ++cycle_;  // quicker than dividing
+    const std::uint64_t cycles = per_cycle_.quotient(used_ - 1);
+    cycle_ += cycles;
+    used_ -= cycles * per_cycle_.value();
     return {first, cycle_};
   }
   /// Nothing goes before this cycle any more.
@@ -111,11 +106,11 @@ class Flow {
     used_ = 0;
   }
   /// The cycle in which the next part goes.
-  Cycle next() const { return cycle_ + (used_ == per_cycle_ ? 1 : 0); }
+  Cycle next() const { return cycle_ + (used_ == per_cycle_.value() ? 1 : 0); }
 
  private:
-  unsigned per_cycle_;
-  unsigned used_ = 0;  ///< parts of `cycle_`
+  Divisor per_cycle_;
+  std::uint64_t used_ = 0;  ///< parts of `cycle_`
   Cycle cycle_ = 0;
 };
 
@@ -123,10 +118,10 @@ class Flow {
 /// have come, and does not end before its last.
 class Passage {
  public:
-  explicit Passage(unsigned per_cycle) : per_cycle_(per_cycle > 0 ? per_cycle : 1) {}
+  explicit Passage(unsigned per_cycle) : per_cycle_(std::max(per_cycle, 1U)) {}
   Span take(Span visible, unsigned items) {
     const Cycle first = std::max(visible.first, free_at_);
-    const Cycle cycles = items <= per_cycle_ ? 1 : (items + per_cycle_ - 1) / per_cycle_;
+    const Cycle cycles = std::max<Cycle>(per_cycle_.quotient_up(items), 1);
     const Span span(first, std::max(first + cycles - 1, visible.last));
     free_at_ = span.last + 1;
     return span;
@@ -135,7 +130,7 @@ class Passage {
   void hold(Cycle cycle) { free_at_ = std::max(free_at_, cycle); }
 
  private:
-  unsigned per_cycle_;
+  Divisor per_cycle_;
   Cycle free_at_ = 0;
 };
 
@@ -201,7 +196,10 @@ class TimedUnit : public Unit {
   std::vector<TimedOutput*> outputs_;
 };
 
-/// The sending end.
+template <class Item>
+class TimedIn;
+
+/// The sending end. As between clocked units, ends with nothing in between call each other directly.
 template <class Item>
 class TimedOut : public OutEnd<Item>, public TimedOutput {
  public:
@@ -209,6 +207,8 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
       : OutEnd<Item>(owner, name), blocking_(owner.transport() == Transport::blocking) {
     owner.outputs_.push_back(this);
   }
+
+  void connect(InPort& in, unsigned depth, unsigned latency) override;
 
   /// Sends an item whose parts are there in the cycles `at`, and which takes the link for so many. Returns the cycles in
   /// which it is taken; `at`, if it has to wait and nobody knows yet how long: then the port is not `clear`.
@@ -225,6 +225,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
   Cycle last() const { return last_; }
 
  private:
+  friend class TimedIn<Item>;
   using OutEnd<Item>::clock_;
 
   Span transfer(const Item& item, Span at, unsigned beats) {
@@ -236,8 +237,12 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     if (blocking_) {
       payload.at = at.first;
       payload.last = at.last;
-      sc_core::sc_time delay;
-      this->socket->b_transport(payload, delay);
+      if (direct_ != nullptr) {
+        direct_->offer(payload);
+      } else {
+        sc_core::sc_time delay;
+        this->socket->b_transport(payload, delay);
+      }
       last_ = payload.last;
       return {payload.at, payload.last};
     }
@@ -258,13 +263,21 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     payload.at = at.first;
     payload.last = at.last;
     last_ = at.last;
-    StreamPhase phase = StreamPhase::transfer;
-    sc_core::sc_time delay;
-    this->socket->nb_transport_fw(payload, phase, delay);
+    if (direct_ != nullptr) {
+      direct_->accept(payload);
+    } else {
+      StreamPhase phase = StreamPhase::transfer;
+      sc_core::sc_time delay;
+      this->socket->nb_transport_fw(payload, phase, delay);
+    }
     return at;
   }
 
   tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
+    give(payload);
+    return tlm::TLM_ACCEPTED;
+  }
+  void give(const StreamPayload<Item>& payload) {
     const Span at(payload.at, payload.last);
     if (!clock_.domain->running()) places_ += payload.credits;
     for (unsigned credit = 0; credit < payload.credits; ++credit) {
@@ -287,7 +300,6 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
       const Cycle now = clock_.domain->now();
       clock_.domain->wake(clock_.unit, places_ < activation_cycles ? now + 1 : activation_for(now, now));
     }
-    return tlm::TLM_ACCEPTED;
   }
   void unlimited() override { unlimited_ = true; }
 
@@ -297,6 +309,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     unsigned beats;
   };
   const bool blocking_;
+  TimedIn<Item>* direct_ = nullptr;
   bool unlimited_ = false;
   unsigned places_ = 0;  ///< of the queue
   unsigned owed_ = 0;    ///< places that sent items take and the queue has not had yet
@@ -338,7 +351,7 @@ class TimedIn : public InEnd<Item>, public TimedInput {
 
   bool serve(Cycle until) override {
     bool served = false;
-    while (next() <= until) {
+    while (!queue_.empty() && queue_.front().visible.first <= until && may_serve()) {
       const Entry& entry = queue_.front();
       const unsigned beats = entry.beats;
       const Span left = handler_(entry.item, entry.visible);
@@ -349,21 +362,21 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     }
     return served;
   }
-  Cycle next() const override {
-    if (queue_.empty() || (gate_ && !gate_())) return never;
-    for (const TimedOutput* out : sends_to_) {
-      if (out->blocked()) return never;
-    }
-    return queue_.front().visible.first;
-  }
+  Cycle next() const override { return queue_.empty() || !may_serve() ? never : queue_.front().visible.first; }
 
  private:
+  friend class TimedOut<Item>;
   using InEnd<Item>::clock_;
   struct Entry {
     Span visible;
     unsigned beats = 1;
     Item item;
   };
+
+  bool may_serve() const {
+    return (!gate_ || gate_()) &&
+           std::none_of(sends_to_.begin(), sends_to_.end(), [](const TimedOutput* out) { return out->blocked(); });
+  }
 
   Span visible(const StreamPayload<Item>& payload) const {
     const Cycle latency = latency_ + payload.latency;
@@ -377,12 +390,15 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     payload.credits = credits;
     payload.at = at.first;
     payload.last = at.last;
+    if (direct_ != nullptr) return direct_->give(payload);
     StreamPhase phase = StreamPhase::credit;
     sc_core::sc_time delay;
     this->socket->nb_transport_bw(payload, phase, delay);
   }
 
-  void b_transport(StreamPayload<Item>& payload, sc_core::sc_time&) override {
+  void b_transport(StreamPayload<Item>& payload, sc_core::sc_time&) override { offer(payload); }
+  /// Blocking: takes an item.
+  void offer(StreamPayload<Item>& payload) {
     const unsigned beats = payload.beats;
     std::size_t place = place_;
     if (free_at_[place] > payload.at) {
@@ -407,9 +423,12 @@ class TimedIn : public InEnd<Item>, public TimedInput {
   }
 
   tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
-    if (queued_beats_ >= depth_) {
-      throw SimulationFault(this->socket.name(), clock_.domain->now(), "an item arrived at a full queue");
-    }
+    accept(payload);
+    return tlm::TLM_ACCEPTED;
+  }
+  /// Non-blocking: queues an item.
+  void accept(const StreamPayload<Item>& payload) {
+    if (queued_beats_ >= depth_) this->fault(this->socket, "an item arrived at a full queue");
     queued_beats_ += payload.beats;
     Entry& entry = queue_.push();
     entry.visible = visible(payload);
@@ -419,10 +438,10 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     const Cycle visible_at = entry.visible.first;
     clock_.domain->wake(clock_.unit,
                         depth_ < activation_cycles ? std::max(visible_at, now + 1) : activation_for(visible_at, now));
-    return tlm::TLM_ACCEPTED;
   }
 
   const bool blocking_;
+  TimedOut<Item>* direct_ = nullptr;
   Handler handler_;
   std::vector<TimedOutput*> sends_to_;
   std::function<bool()> gate_;
@@ -433,6 +452,13 @@ class TimedIn : public InEnd<Item>, public TimedInput {
   Ring<Entry> queue_;  ///< non-blocking
   unsigned queued_beats_ = 0;
 };
+
+template <class Item>
+void TimedOut<Item>::connect(InPort& in, unsigned depth, unsigned latency) {
+  OutEnd<Item>::connect(in, depth, latency);
+  direct_ = dynamic_cast<TimedIn<Item>*>(&in);
+  if (direct_ != nullptr) direct_->direct_ = this;
+}
 
 /// An initiator on the TLM-2.0 base protocol, for timing only, whose accesses are b_transport calls that return when the
 /// data is there. The memory must annotate its time, not wait: units are not threads.
@@ -463,8 +489,6 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<> {
   std::vector<unsigned char> data_;
   Cycle ahead_ = 0;         ///< of the clock, the last access
   sc_core::sc_time delay_;  ///< the same as a time
-  std::uint64_t took_ = 0;  ///< the last answer, in units of sc_time
-  Cycle took_cycles_ = 0;
 };
 
 /// Makes the module of a slot for `lt` or `at` around a behaviour.

@@ -41,7 +41,6 @@ class CropUnit : public Unit {
   static constexpr std::size_t quads_ahead = 8;
   struct Entry {
     ColorQuad quad;
-    std::uint64_t address = 0;
     CropCache::Line line = CropCache::no_line;
     std::uint32_t sectors = 0;  ///< of the line, a bit each
   };
@@ -110,23 +109,26 @@ class CropUnit : public Unit {
       tokens_ -= static_cast<std::int32_t>(cost_.quads_per_cycle);
     }
     cache_->pin(line);
-    queue_.push({quad, address, line, sectors});
+    queue_.push({quad, line, sectors});
     return true;
   }
 
   bool accept() {
     bool moved = false;
-    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && queue_.size() < cost_.input_quads && in_.ready();
-         --budget) {
+    auto budget =
+        static_cast<unsigned>(std::min<std::size_t>(cost_.quads_per_cycle, cost_.input_quads - queue_.size()));
+    while (budget > 0 && in_.ready()) {
       const ColorBeat& beat = in_.front();
       if (beat.end_of_draw) {
         ending_ = true;
         in_.pop();
         return true;
       }
-      if (!look_up(beat.quads[at_])) break;
-      moved = true;
-      if (++at_ == beat.count) {
+      for (; at_ < beat.count && budget > 0; ++at_, --budget) {
+        if (!look_up(beat.quads[at_])) return moved;
+        moved = true;
+      }
+      if (at_ == beat.count) {
         in_.pop();
         at_ = 0;
       }
@@ -177,11 +179,12 @@ class CropUnit : public Unit {
         break;
       }
       if (!cost_.forwards) {
-        if (hazard(entry.address, now)) {
+        const std::uint64_t address = surface_->address(entry.quad.tile, entry.quad.position);
+        if (hazard(address, now)) {
           stop_ = UnitState::latency;
           break;
         }
-        recent_.emplace_back(entry.address, now);
+        recent_.emplace_back(address, now);
       }
       const ColorQuad& quad = entry.quad;
       monitor_->blended(*quad.warp, quad.index, now);

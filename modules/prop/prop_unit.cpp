@@ -119,16 +119,19 @@ class PropUnit : public Unit {
       out_color_.push(beat);
       return true;
     }
-    if (!moved && end_ != nullptr && end_->sequence == order_.left() && out_release_.credits() > 0) {
-      beat.end_of_draw = true;
-      out_color_.push(beat);
-      out_release_.push({end_->slot});
-      end_->release();
-      end_ = nullptr;
-      order_.restart();
-      return true;
-    }
-    return moved;
+    return moved || (end_ != nullptr && pass_end_of_draw());
+  }
+
+  [[gnu::noinline]] bool pass_end_of_draw() {
+    if (end_->sequence != order_.left() || out_release_.credits() == 0) return false;
+    ColorBeat beat;
+    beat.end_of_draw = true;
+    out_color_.push(beat);
+    out_release_.push({end_->slot});
+    end_->release();
+    end_ = nullptr;
+    order_.restart();
+    return true;
   }
 
   Cycle tick(Cycle now) override {

@@ -37,20 +37,22 @@ class QruUnit : public Unit {
         blocked = true;
         break;
       }
-      Warp warp;
-      bool launched = false;
       if (beat.end_of_draw) {
-        warp.end_of_draw = true;
-        numbering_.number_end(warp);
-        out_.push(warp);
-        in_.pop();
+        pass_end_of_draw();
         moved = true;
         break;
       }
+      Warp warp;
+      bool launched = false;
       if (from_ < beat.count) {
-        QuadBeat part = beat;
-        part.count = static_cast<std::uint8_t>(std::min<unsigned>(beat.count, from_ + budget));
-        const unsigned taken = behaviour_->examine(part, from_, warp, launched);
+        unsigned taken = 0;
+        if (beat.count - from_ <= budget) {
+          taken = behaviour_->examine(beat, from_, warp, launched);
+        } else {
+          QuadBeat part = beat;
+          part.count = static_cast<std::uint8_t>(from_ + budget);
+          taken = behaviour_->examine(part, from_, warp, launched);
+        }
         from_ += taken;
         examined_ += taken;
         budget -= taken;
@@ -80,6 +82,14 @@ class QruUnit : public Unit {
     }
     enter(blocked ? UnitState::blocked : UnitState::starved, now);
     return blocked ? out_.retry() : in_.next_ready();
+  }
+
+  [[gnu::noinline]] void pass_end_of_draw() {
+    Warp end;
+    end.end_of_draw = true;
+    numbering_.number_end(end);
+    out_.push(end);
+    in_.pop();
   }
 
   StreamIn<QuadBeat> in_;

@@ -34,16 +34,27 @@ class RasterUnit : public Unit {
         at_ = tile_.count;
         break;
       }
-      QuadBeat beat;
-      beat.tile = tile_.tile;
-      while (at_ < tile_.count && quad_budget > 0) {
-        beat.quads[beat.count++] = tile_.quads[at_++];
-        --quad_budget;
-      }
-      out_.push(beat);
-      quads_ += beat.count;
+      send_part(quad_budget);
     }
     return true;
+  }
+
+  [[gnu::noinline]] void send_part(unsigned& quad_budget) {
+    QuadBeat beat;
+    beat.tile = tile_.tile;
+    while (at_ < tile_.count && quad_budget > 0) {
+      beat.quads[beat.count++] = tile_.quads[at_++];
+      --quad_budget;
+    }
+    out_.push(beat);
+    quads_ += beat.count;
+  }
+
+  [[gnu::noinline]] void pass_end_of_draw() {
+    QuadBeat end;
+    end.end_of_draw = true;
+    out_.push(end);
+    in_.pop();
   }
 
   Cycle tick(Cycle now) override {
@@ -83,10 +94,7 @@ class RasterUnit : public Unit {
             enter(UnitState::blocked, now);
             return out_.retry();
           }
-          QuadBeat end;
-          end.end_of_draw = true;
-          out_.push(end);
-          in_.pop();
+          pass_end_of_draw();
           moved = true;
           break;
         }

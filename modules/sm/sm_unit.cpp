@@ -1,7 +1,7 @@
 #include <algorithm>
-#include <deque>
 #include <utility>
 
+#include <vrpipe/ring.h>
 #include <vrpipe/unit.h>
 
 namespace vrpipe {
@@ -38,23 +38,24 @@ class Wheel {
   explicit Wheel(std::uint32_t horizon) {
     std::size_t size = 64;
     while (size <= horizon) size *= 2;
+    mask_ = size - 1;
     buckets_.resize(size);
     occupied_.resize(size / 64);
   }
   void add(Cycle at, std::uint32_t who, std::vector<std::uint32_t>& next) {
-    const std::size_t bucket = at & (buckets_.size() - 1);
+    const std::size_t bucket = at & mask_;
     buckets_[bucket].push(who, next);
     occupied_[bucket / 64] |= std::uint64_t{1} << (bucket % 64);
   }
   /// The first of those with an event in this cycle, and so of the chain of them, which is taken out.
   std::uint32_t take(Cycle now) {
-    const std::size_t bucket = now & (buckets_.size() - 1);
+    const std::size_t bucket = now & mask_;
     occupied_[bucket / 64] &= ~(std::uint64_t{1} << (bucket % 64));
     return std::exchange(buckets_[bucket], Chain{}).first;
   }
-  std::uint32_t first_at(Cycle cycle) const { return buckets_[cycle & (buckets_.size() - 1)].first; }
+  std::uint32_t first_at(Cycle cycle) const { return buckets_[cycle & mask_].first; }
   Cycle next_after(Cycle now) const {
-    const std::size_t from = (now + 1) & (buckets_.size() - 1);
+    const std::size_t from = (now + 1) & mask_;
     std::size_t word = from / 64;
     const std::uint64_t ahead = occupied_[word] >> (from % 64);
     if (ahead != 0) return now + 1 + static_cast<unsigned>(__builtin_ctzll(ahead));
@@ -67,6 +68,7 @@ class Wheel {
   }
 
  private:
+  std::size_t mask_ = 0;
   std::vector<Chain> buckets_;
   std::vector<std::uint64_t> occupied_;  ///< a bit a bucket
 };
@@ -169,7 +171,7 @@ class SmUnit : public Unit {
     ShadedWarp& shaded = pool_.take();
     behaviour_->shade(warps_[slot], shaded);
     shaded.slot = static_cast<std::uint16_t>(slot);
-    completed_.push_back(&shaded);
+    completed_.push(&shaded);
   }
 
   void run_events(Cycle now) {
@@ -208,13 +210,18 @@ class SmUnit : public Unit {
   void send() {
     while (!completed_.empty() && out_shaded_.credits() > 0) {
       out_shaded_.push({completed_.front()});
-      completed_.pop_front();
+      completed_.pop();
     }
     while (vertex_count_ > 0 && flights_[fragment_slots_ + vertex_first_].done && out_vertices_.credits() > 0) {
-      out_vertices_.push(vertices_[vertex_first_]);
-      vertex_first_ = vertex_first_ + 1 == cost_.vertex_warps ? 0 : vertex_first_ + 1;
-      --vertex_count_;
+      send_vertices();
     }
+  }
+
+  // Vertex warps are few, so what they need is kept out of the way of the others.
+  [[gnu::noinline]] void send_vertices() {
+    out_vertices_.push(vertices_[vertex_first_]);
+    vertex_first_ = vertex_first_ + 1 == cost_.vertex_warps ? 0 : vertex_first_ + 1;
+    --vertex_count_;
   }
 
   bool choose_core(TileId tile) {
@@ -227,20 +234,21 @@ class SmUnit : public Unit {
     return true;
   }
 
+  [[gnu::noinline]] void pass_end_of_draw() {
+    ShadedWarp& end = pool_.take();
+    end.end_of_draw = true;
+    end.sequence = in_warps_.front().sequence;
+    end.count = 0;
+    end.slot = no_slot;
+    completed_.push(&end);
+    in_warps_.pop();
+  }
+
   void launch_fragments(Cycle now) {
     slots_full_ = false;
     if (!in_warps_.ready()) return;
     const Warp& warp = in_warps_.front();
-    if (warp.end_of_draw) {
-      ShadedWarp& end = pool_.take();
-      end.end_of_draw = true;
-      end.sequence = warp.sequence;
-      end.count = 0;
-      end.slot = no_slot;
-      completed_.push_back(&end);
-      in_warps_.pop();
-      return;
-    }
+    if (warp.end_of_draw) return pass_end_of_draw();
     if (!choose_core(warp.tile)) {
       slots_full_ = true;
       return;
@@ -262,8 +270,7 @@ class SmUnit : public Unit {
     make_ready(slot, now);
   }
 
-  void launch_vertices(Cycle now) {
-    if (!in_vertices_.ready() || vertex_count_ == cost_.vertex_warps) return;
+  [[gnu::noinline]] void launch_vertices(Cycle now) {
     std::uint32_t turn = vertex_first_ + vertex_count_++;
     if (turn >= cost_.vertex_warps) turn -= cost_.vertex_warps;
     const std::uint32_t slot = fragment_slots_ + turn;
@@ -282,7 +289,7 @@ class SmUnit : public Unit {
     release_slots();
     run_events(now);
     launch_fragments(now);
-    launch_vertices(now);
+    if (in_vertices_.ready() && vertex_count_ < cost_.vertex_warps) launch_vertices(now);
     send();
 
     const Cycle next_event = wheel_.next_after(now);
@@ -299,6 +306,7 @@ class SmUnit : public Unit {
     }
     Cycle next = next_event;
     if (busy_until_ > now) next = std::min(next, busy_until_);
+    if (next == now + 1) return next;
     // What could not be taken for want of a slot or a credit waits for the port that brings one.
     if (!slots_full_) next = std::min(next, std::max(in_warps_.next_ready(), now + 1));
     if (vertex_count_ < cost_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
@@ -325,7 +333,7 @@ class SmUnit : public Unit {
   std::uint32_t free_slots_ = 0;    ///< of all cores
   std::uint32_t vertex_first_ = 0;  ///< of the vertex warps in flight, in order
   std::uint32_t vertex_count_ = 0;
-  std::deque<const ShadedWarp*> completed_;
+  Ring<const ShadedWarp*> completed_;
   ShadedWarpPool pool_;
   TileId last_tile_;
   std::uint32_t core_ = 0;

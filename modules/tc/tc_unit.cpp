@@ -89,14 +89,18 @@ class TcUnit : public Unit {
     return cost_.idle_timeout_cycles == 0 || !holds_quads_ ? never : last_arrival_ + cost_.idle_timeout_cycles;
   }
 
+  [[gnu::noinline]] void pass_end_of_draw() {
+    QuadBeat end;
+    end.end_of_draw = true;
+    out_.push(end);
+    ending_ = false;
+    drained_ = false;
+  }
+
   bool send() {
     if (queued_ == 0) {
       if (!drained_ || out_.credits() == 0) return false;
-      QuadBeat end;
-      end.end_of_draw = true;
-      out_.push(end);
-      ending_ = false;
-      drained_ = false;
+      pass_end_of_draw();
       return true;
     }
     if (out_.credits() == 0) return false;

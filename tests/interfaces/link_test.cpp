@@ -197,5 +197,32 @@ TEST(LinkRecorder, SeesEveryTransferWithItsCycleAndChangesNothing) {
   }
 }
 
+// Recorded, items and credits pass the sockets; not recorded, the ends call each other.
+TEST(LinkRecorder, ChangesNoCycleUnderAnyStalls) {
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    std::vector<Cycle> cycles[2];
+    for (const bool recorded : {false, true}) {
+      Bench bench;
+      Source<int>& source = bench.source<int>();
+      Sink<int>& sink = bench.sink<int>();
+      std::unique_ptr<LinkRecorder<int>> recorder;
+      const auto depth = static_cast<unsigned>(1 + seed % 4);
+      const auto latency = static_cast<unsigned>(1 + seed % 3);
+      if (recorded) {
+        recorder = std::make_unique<LinkRecorder<int>>("recorder", bench.clock());
+        connect_recorded(source.out, sink.in, *recorder, depth, latency);
+      } else {
+        source.out.connect(sink.in, depth, latency);
+      }
+      for (int i = 0; i < 60; ++i) source.add(i);
+      bench.stall_randomly(seed, 80);
+      bench.run();
+      cycles[recorded ? 1 : 0] = cycles_of(sink);
+    }
+    ASSERT_EQ(cycles[0].size(), 60u);
+    ASSERT_EQ(cycles[0], cycles[1]) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace vrpipe

@@ -120,7 +120,7 @@ class FourPhaseMemory : public sc_core::sc_module, private tlm::tlm_fw_transport
 /// Answers in the call itself, in one of the ways that the base protocol allows.
 class ImmediateMemory : public sc_core::sc_module, private tlm::tlm_fw_transport_if<> {
  public:
-  enum class Way { completed, updated_to_response, response_from_within, accepted_from_within, error };
+  enum class Way { completed, updated_to_response, response_from_within, accepted_from_within, error, sooner_each };
   ImmediateMemory(const sc_core::sc_module_name& name, Way way, sc_core::sc_time delay)
       : sc_module(name), socket("socket"), way_(way), delay_(delay) {
     socket.bind(*this);
@@ -137,6 +137,10 @@ class ImmediateMemory : public sc_core::sc_module, private tlm::tlm_fw_transport
     }
     payload.set_response_status(way_ == Way::error ? tlm::TLM_ADDRESS_ERROR_RESPONSE : tlm::TLM_OK_RESPONSE);
     switch (way_) {
+      case Way::sooner_each:
+        delay += delay_;
+        delay_ -= sc_core::sc_time(2, sc_core::SC_NS);
+        return tlm::TLM_COMPLETED;
       case Way::completed:
       case Way::error: delay += delay_; return tlm::TLM_COMPLETED;
       case Way::updated_to_response:
@@ -272,6 +276,16 @@ INSTANTIATE_TEST_SUITE_P(Ways, EarlyCompletion,
                                            ImmediateMemory::Way::response_from_within,
                                            ImmediateMemory::Way::accepted_from_within),
                          [](const auto& way) { return std::string(name_of(way.param)); });
+
+TEST_F(MemoryPortTest, AnswersOutOfOrderComeBackWhenEachIsThere) {
+  Reader reader("reader", *clock, 4, 4);
+  ImmediateMemory memory("memory", ImmediateMemory::Way::sooner_each, cycles(10));
+  reader.memory.socket.bind(memory.socket);
+  clock->run(cycles(100));
+  EXPECT_EQ(reader.issued, (std::vector<Cycle>{0, 0, 0, 0}));
+  EXPECT_EQ(reader.completed, (std::vector<Cycle>{4, 6, 8, 10}));
+  EXPECT_EQ(reader.tags, (std::vector<std::uint32_t>{3, 2, 1, 0}));
+}
 
 TEST_F(MemoryPortTest, AnErrorResponseIsAFault) {
   Reader reader("reader", *clock, 1, 1);

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -72,14 +73,25 @@ class Taker : public Plain {
   Cycle free_at_ = 0;
 };
 
+/// How items pass: recorded, through the sockets; else the ends call each other.
+struct Way {
+  Transport transport;
+  bool recorded;
+};
+
 /// A sender and a receiver, and a link between them.
 struct Pair {
-  Pair(Transport transport, unsigned depth, unsigned latency, Cycle cycles_per_item) {
+  Pair(Way way, unsigned depth, unsigned latency, Cycle cycles_per_item) {
     fresh_simulation();
     clock = std::make_unique<ClockDomain>("clock", 1000);
-    sender = std::make_unique<Sender>("sender", *clock, transport);
-    taker = std::make_unique<Taker>("taker", *clock, transport, cycles_per_item);
-    sender->out.connect(taker->in, depth, latency);
+    sender = std::make_unique<Sender>("sender", *clock, way.transport);
+    taker = std::make_unique<Taker>("taker", *clock, way.transport, cycles_per_item);
+    if (way.recorded) {
+      recorder = std::make_unique<LinkRecorder<int>>("recorder", *clock);
+      connect_recorded(sender->out, taker->in, *recorder, depth, latency);
+    } else {
+      sender->out.connect(taker->in, depth, latency);
+    }
   }
   void run() {
     taker->in.open();
@@ -90,6 +102,7 @@ struct Pair {
   std::unique_ptr<ClockDomain> clock;
   std::unique_ptr<Sender> sender;
   std::unique_ptr<Taker> taker;
+  std::unique_ptr<LinkRecorder<int>> recorder;
 };
 
 std::vector<Cycle> firsts(const std::vector<Span>& spans) {
@@ -98,7 +111,7 @@ std::vector<Cycle> firsts(const std::vector<Span>& spans) {
   return cycles;
 }
 
-class TimedLink : public ::testing::TestWithParam<Transport> {};
+class TimedLink : public ::testing::TestWithParam<Way> {};
 
 TEST_P(TimedLink, AnItemOfCycleTThroughLatencyLIsVisibleAtTPlusL) {
   for (const unsigned latency : {1U, 2U, 7U}) {
@@ -112,8 +125,8 @@ TEST_P(TimedLink, AnItemOfCycleTThroughLatencyLIsVisibleAtTPlusL) {
 TEST_P(TimedLink, TheSendersPipelineAddsItsLatency) {
   fresh_simulation();
   ClockDomain clock("clock", 1000);
-  Sender sender("sender", clock, GetParam());
-  Taker taker("taker", clock, GetParam(), 1);
+  Sender sender("sender", clock, GetParam().transport);
+  Taker taker("taker", clock, GetParam().transport, 1);
   sender.out.set_pipeline(5, 2);
   sender.out.connect(taker.in, 4, 1);
   taker.in.open();
@@ -187,7 +200,7 @@ TEST_P(TimedLink, ItemsComeInOrderEachOnceUnderAnyStallsAndLater) {
 TEST_P(TimedLink, AStubbedOutputSwallows) {
   fresh_simulation();
   ClockDomain clock("clock", 1000);
-  Sender sender("sender", clock, GetParam());
+  Sender sender("sender", clock, GetParam().transport);
   sender.out.stub();
   sender.at.assign(1000, 0);
   clock.run(sc_core::sc_time(10, sc_core::SC_US));
@@ -195,11 +208,16 @@ TEST_P(TimedLink, AStubbedOutputSwallows) {
   EXPECT_TRUE(sender.idle());
 }
 
-INSTANTIATE_TEST_SUITE_P(Transports, TimedLink, ::testing::Values(Transport::blocking, Transport::non_blocking),
-                         [](const auto& transport) { return transport.param == Transport::blocking ? "lt" : "at"; });
+INSTANTIATE_TEST_SUITE_P(Ways, TimedLink,
+                         ::testing::Values(Way{Transport::blocking, false}, Way{Transport::blocking, true},
+                                           Way{Transport::non_blocking, false}, Way{Transport::non_blocking, true}),
+                         [](const auto& way) {
+                           return std::string(way.param.transport == Transport::blocking ? "lt" : "at") +
+                                  (way.param.recorded ? "_recorded" : "");
+                         });
 
 TEST(TimedLink, AGateKeepsItemsInTheQueue) {
-  Pair pair(Transport::non_blocking, 4, 1, 1);
+  Pair pair({Transport::non_blocking, false}, 4, 1, 1);
   bool open = false;
   pair.taker->in.set_gate([&] { return open; });
   pair.sender->at = {0, 0, 0};
