@@ -98,6 +98,13 @@ QuadColor measured_float(const QuadColor& destination, const QuadColor& source) 
   return result;
 }
 
+template <ColorFormat Format, BlendRounding Rounding>
+QuadColor blend_as_specified(const QuadColor& destination, const QuadColor& source) {
+  QuadColor blended;
+  store(blend_into_target<Format, Rounding>(channel_pairs(destination), channel_pairs(source)), blended);
+  return blended;
+}
+
 }  // namespace
 
 BlendFunction blend_function(ColorFormat format, BlendRounding rounding) {
@@ -106,13 +113,13 @@ BlendFunction blend_function(ColorFormat format, BlendRounding rounding) {
   switch (format) {
     case F::rgba8:
       if (rounding == R::measured) return measured_unorm8;
-      return rounding == R::rtz ? blend_into_target<F::rgba8, R::rtz> : blend_into_target<F::rgba8, R::rne>;
+      return rounding == R::rtz ? blend_as_specified<F::rgba8, R::rtz> : blend_as_specified<F::rgba8, R::rne>;
     case F::rgba16f:
       if (rounding == R::measured) return measured_half;
-      return rounding == R::rtz ? blend_into_target<F::rgba16f, R::rtz> : blend_into_target<F::rgba16f, R::rne>;
+      return rounding == R::rtz ? blend_as_specified<F::rgba16f, R::rtz> : blend_as_specified<F::rgba16f, R::rne>;
     case F::rgba32f:
       if (rounding == R::measured) return measured_float;
-      return blend_into_target<F::rgba32f, R::rne>;
+      return blend_as_specified<F::rgba32f, R::rne>;
   }
   return nullptr;
 }

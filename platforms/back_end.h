@@ -75,10 +75,11 @@ class BackEnd {
 
   template <class Signal>
   void blend(unsigned from, unsigned to, Signal& signal) {
+    monitor_.blended(shaded_, from, to, 0);
+    CropBehaviour::Outcomes outcomes;
+    crop->blend_quads(shaded_, from, to, outcomes);
     for (unsigned i = from; i < to; ++i) {
-      monitor_.blended(shaded_, i, 0);
-      const CropBehaviour::Outcome outcome =
-          crop->blend(shaded_.tile, shaded_.position[i], shaded_.live[i], shaded_.color[i]);
+      const CropBehaviour::Outcome outcome = outcomes[i];
       if (work_ != nullptr && cache_.count > 0 && (outcome.changed || writes_unchanged_)) {
         crop->make_dirty(cache_.lines[cache_.line_of[i]].line, cache_.sectors_of[i]);
       }

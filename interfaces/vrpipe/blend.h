@@ -42,26 +42,28 @@ inline QuadColor select(LaneBits condition, const QuadColor& if_true, const Quad
 }
 
 /// The nearest value n/255, halves up; NaN and negatives give 0, above 1 gives 1 (D3D11.3, float to UNORM).
-inline Lanes round_to_unorm8(Lanes value) {
-  value = select(value > 0.0F, value, splat_lanes(0.0F));
-  value = select(value < 1.0F, value, splat_lanes(1.0F));
-  const Lanes scaled = value * 255.0F + 0.5F;
-  const Lanes level = __builtin_convertvector(__builtin_convertvector(scaled, LaneBits), Lanes);
+template <class Floats>
+inline Floats round_to_unorm8(Floats value) {
+  value = select(value > 0.0F, value, Floats{});
+  value = select(value < 1.0F, value, Floats{} + 1.0F);
+  const Floats scaled = value * 255.0F + 0.5F;
+  const Floats level = __builtin_convertvector(__builtin_convertvector(scaled, BitsOf<Floats>), Floats);
   return level / 255.0F;
 }
 
 /// The largest n/255 that is not above the value, with a guard of 2^-12 level for stored values' own rounding.
-inline Lanes truncate_to_unorm8(Lanes value) {
-  value = select(value > 0.0F, value, splat_lanes(0.0F));
-  value = select(value < 1.0F, value, splat_lanes(1.0F));
-  const Lanes scaled = value * 255.0F + 2.44140625e-4F;
-  const Lanes level = __builtin_convertvector(__builtin_convertvector(scaled, LaneBits), Lanes);
+template <class Floats>
+inline Floats truncate_to_unorm8(Floats value) {
+  value = select(value > 0.0F, value, Floats{});
+  value = select(value < 1.0F, value, Floats{} + 1.0F);
+  const Floats scaled = value * 255.0F + 2.44140625e-4F;
+  const Floats level = __builtin_convertvector(__builtin_convertvector(scaled, BitsOf<Floats>), Floats);
   return level / 255.0F;
 }
 
 /// Rounds a channel to what the format stores; the result is the stored value as a float.
-template <ColorFormat Format, BlendRounding Rounding>
-inline Lanes store_channel(Lanes value) {
+template <ColorFormat Format, BlendRounding Rounding, class Floats>
+inline Floats store_channel(Floats value) {
   if constexpr (Format == ColorFormat::rgba32f) return value;
   if constexpr (Format == ColorFormat::rgba16f) {
     return Rounding == BlendRounding::rtz ? truncate_to_half(value) : round_to_half(value);
@@ -69,12 +71,30 @@ inline Lanes store_channel(Lanes value) {
   return Rounding == BlendRounding::rtz ? truncate_to_unorm8(value) : round_to_unorm8(value);
 }
 
+/// A quad's channels two by two, as a host's wider registers hold them.
+struct ChannelPairs {
+  LanePair red_green, blue_alpha;
+};
+static_assert(sizeof(ChannelPairs) == sizeof(QuadColor));
+// In whole registers; copying bytes would go through memory.
+using LanePairInMemory = float __attribute__((vector_size(32), may_alias));
+inline ChannelPairs channel_pairs(const QuadColor& color) {
+  const auto* const pairs = reinterpret_cast<const LanePairInMemory*>(&color);
+  return {pairs[0], pairs[1]};
+}
+inline void store(const ChannelPairs& pairs, QuadColor& out) {
+  auto* const to = reinterpret_cast<LanePairInMemory*>(&out);
+  to[0] = pairs.red_green;
+  to[1] = pairs.blue_alpha;
+}
+
 /// A blend into a target: single-precision multiply, single-precision add, then one rounding to the format.
 template <ColorFormat Format, BlendRounding Rounding>
-inline QuadColor blend_into_target(const QuadColor& destination, const QuadColor& source) {
-  const QuadColor sum = blend_front_to_back(destination, source);
-  return {store_channel<Format, Rounding>(sum.red), store_channel<Format, Rounding>(sum.green),
-          store_channel<Format, Rounding>(sum.blue), store_channel<Format, Rounding>(sum.alpha)};
+inline ChannelPairs blend_into_target(const ChannelPairs& destination, const ChannelPairs& source) {
+  const Lanes transmittance = 1.0F - second_of(destination.blue_alpha);
+  const LanePair both = join(transmittance, transmittance);
+  return {store_channel<Format, Rounding>(destination.red_green + both * source.red_green),
+          store_channel<Format, Rounding>(destination.blue_alpha + both * source.blue_alpha)};
 }
 
 /// The same for a rounding known only at run time; the measured model of a real GPU's blender is here alone.

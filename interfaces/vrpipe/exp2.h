@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 #include <vrpipe/half.h>
 #include <vrpipe/lanes.h>
@@ -10,20 +11,21 @@ namespace vrpipe {
 
 /// 2^x for x <= 0 within 2 ulp, the accuracy of a GPU's ex2.approx; x below -126 gives 2^-126.
 /// A polynomial of our own: libm's exp2 depends on whether the processor has FMA.
-inline Lanes exp2_nonpositive(Lanes x) {
-  x = select(x < -126.0F, splat_lanes(-126.0F), x);
+template <class Floats>
+inline Floats exp2_nonpositive(Floats x) {
+  x = select(x < -126.0F, Floats{} - 126.0F, x);
   // Adding 1.5 * 2^23 leaves the nearest integer in the low bits of the significand.
-  const Lanes shifted = x + 12582912.0F;
-  const LaneBits exponent = bits_of(shifted) - 0x4b400000;
-  const Lanes f = x - (shifted - 12582912.0F);
+  const Floats shifted = x + 12582912.0F;
+  const BitsOf<Floats> exponent = reinterpret_cast<BitsOf<Floats>>(shifted) - 0x4b400000;
+  const Floats f = x - (shifted - 12582912.0F);
   // Cephes' minimax coefficients; Taylor's leave 2.9 ulp at f = -1/2.
-  Lanes p = f * 1.535336188319500e-4F + 1.339887440266574e-3F;
+  Floats p = f * 1.535336188319500e-4F + 1.339887440266574e-3F;
   p = p * f + 9.618437357674640e-3F;
   p = p * f + 5.550332471162809e-2F;
   p = p * f + 2.402264791363012e-1F;
   p = p * f + 6.931472028550421e-1F;
   p = p * f + 1.0F;
-  return lanes_of(bits_of(p) + (exponent << 23));
+  return reinterpret_cast<Floats>(reinterpret_cast<BitsOf<Floats>>(p) + (exponent << 23));
 }
 
 /// 2^x for x <= 0, the double-precision value rounded to single: within 0.5001 ulp.
@@ -57,12 +59,12 @@ inline float exp2_table(float x) {
 }
 
 /// The fragment shader's exponential, 2^x for x <= 0.
-template <Exponential Kind>
-inline Lanes shader_exp2(Lanes x) {
+template <Exponential Kind, class Floats>
+inline Floats shader_exp2(Floats x) {
   if constexpr (Kind == Exponential::ex2) return exp2_nonpositive(x);
   if constexpr (Kind == Exponential::fp16) return round_to_half(exp2_nonpositive(x));
-  Lanes result{};
-  for (int lane = 0; lane < 4; ++lane) {
+  Floats result{};
+  for (std::size_t lane = 0; lane < sizeof(Floats) / sizeof(float); ++lane) {
     if constexpr (Kind == Exponential::exact) result[lane] = exp2_exact(x[lane]);
     if constexpr (Kind == Exponential::table256) result[lane] = exp2_table<256>(x[lane]);
     if constexpr (Kind == Exponential::table16) result[lane] = exp2_table<16>(x[lane]);

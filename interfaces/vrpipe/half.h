@@ -11,49 +11,58 @@ namespace vrpipe {
 constexpr float half_max = 65504.0F;
 
 /// `round_to_half` for every processor.
-inline Lanes round_to_half_by_integers(Lanes value) {
-  const LaneBits bits = bits_of(value);
-  const LaneBits sign = bits & LaneBits{INT32_MIN, INT32_MIN, INT32_MIN, INT32_MIN};
-  const LaneBits magnitude = bits & 0x7fffffff;
-  const LaneBits odd = (magnitude >> 13) & 1;
-  const LaneBits normal = (magnitude + 0xfff + odd) & ~0x1fff;
+template <class Floats>
+inline Floats round_to_half_by_integers(Floats value) {
+  using Bits = BitsOf<Floats>;
+  const auto bits = reinterpret_cast<Bits>(value);
+  const Bits sign = bits & (Bits{} + INT32_MIN);
+  const Bits magnitude = bits & 0x7fffffff;
+  const Bits odd = (magnitude >> 13) & 1;
+  const Bits normal = (magnitude + 0xfff + odd) & ~0x1fff;
   // Below 2^-14 the quantum is fixed at 2^-24, which is the ulp of floats in [0.5, 1).
-  const Lanes shifted = lanes_of(magnitude) + 0.5F;
-  const Lanes subnormal = shifted - 0.5F;
-  const LaneBits is_small = magnitude < 0x38800000;
-  const LaneBits is_nan = magnitude > 0x7f800000;
-  LaneBits rounded = is_small ? bits_of(subnormal) : normal;
-  rounded = normal > 0x477fe000 ? LaneBits{} + 0x7f800000 : rounded;
+  const Floats shifted = reinterpret_cast<Floats>(magnitude) + 0.5F;
+  const Floats subnormal = shifted - 0.5F;
+  const Bits is_small = magnitude < 0x38800000;
+  const Bits is_nan = magnitude > 0x7f800000;
+  Bits rounded = is_small ? reinterpret_cast<Bits>(subnormal) : normal;
+  rounded = normal > 0x477fe000 ? Bits{} + 0x7f800000 : rounded;
   rounded = is_nan ? (magnitude & ~0x1fff) | 0x400000 : rounded;
-  return lanes_of(rounded | sign);
+  return reinterpret_cast<Floats>(rounded | sign);
 }
 
 /// Rounds to the nearest value that binary16 represents, ties to even; beyond 65519.99 gives infinity, NaN a quiet NaN.
 /// The result is a float, so that a surface can keep binary16 values without converting at every blend.
-inline Lanes round_to_half(Lanes value) {
+template <class Floats>
+inline Floats round_to_half(Floats value) {
 #if defined(__F16C__) && !defined(__clang__)
   // The same bits. Clang has these only behind a header that takes long to read.
-  return __builtin_ia32_vcvtph2ps(__builtin_ia32_vcvtps2ph(value, 0));
+  if constexpr (sizeof(Floats) == sizeof(LanePair)) {
+    return __builtin_ia32_vcvtph2ps256(__builtin_ia32_vcvtps2ph256(value, 0));
+  } else {
+    return __builtin_ia32_vcvtph2ps(__builtin_ia32_vcvtps2ph(value, 0));
+  }
 #else
   return round_to_half_by_integers(value);
 #endif
 }
 
 /// Rounds towards zero; beyond 65504 gives 65504 (D3D11.3 functional specification, float to lower-precision float).
-inline Lanes truncate_to_half(Lanes value) {
-  const LaneBits bits = bits_of(value);
-  const LaneBits sign = bits & LaneBits{INT32_MIN, INT32_MIN, INT32_MIN, INT32_MIN};
-  const LaneBits magnitude = bits & 0x7fffffff;
-  const LaneBits normal = magnitude & ~0x1fff;
-  const Lanes exact = lanes_of(magnitude);
-  const Lanes shifted = exact + 0.5F;
-  Lanes subnormal = shifted - 0.5F;
+template <class Floats>
+inline Floats truncate_to_half(Floats value) {
+  using Bits = BitsOf<Floats>;
+  const auto bits = reinterpret_cast<Bits>(value);
+  const Bits sign = bits & (Bits{} + INT32_MIN);
+  const Bits magnitude = bits & 0x7fffffff;
+  const Bits normal = magnitude & ~0x1fff;
+  const auto exact = reinterpret_cast<Floats>(magnitude);
+  const Floats shifted = exact + 0.5F;
+  Floats subnormal = shifted - 0.5F;
   subnormal = select(subnormal > exact, subnormal - 5.9604645e-8F, subnormal);
-  const LaneBits is_small = magnitude < 0x38800000;
-  const LaneBits saturates = (normal > 0x477fe000) & (magnitude <= 0x7f800000);
-  LaneBits truncated = (is_small & bits_of(subnormal)) | (~is_small & normal);
+  const Bits is_small = magnitude < 0x38800000;
+  const Bits saturates = (normal > 0x477fe000) & (magnitude <= 0x7f800000);
+  Bits truncated = (is_small & reinterpret_cast<Bits>(subnormal)) | (~is_small & normal);
   truncated = (saturates & 0x477fe000) | (~saturates & truncated);
-  return lanes_of(truncated | sign);
+  return reinterpret_cast<Floats>(truncated | sign);
 }
 
 inline float round_to_half(float value) { return round_to_half(splat_lanes(value))[0]; }

@@ -14,6 +14,23 @@ using LaneBits = std::int32_t __attribute__((vector_size(16)));
 using LaneMask = std::uint8_t;
 constexpr LaneMask all_lanes = 0xF;
 
+/// Two of these side by side: two quads, or two channels of a quad.
+using LanePair = float __attribute__((vector_size(32)));
+using LanePairBits = std::int32_t __attribute__((vector_size(32)));
+
+/// The integers of as many lanes; a comparison gives all ones or all zeros in each.
+template <class Floats>
+using BitsOf = decltype(Floats{} < Floats{});
+
+inline LanePair join(Lanes first, Lanes second) {
+  return __builtin_shufflevector(first, second, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+inline LanePairBits join(LaneBits first, LaneBits second) {
+  return __builtin_shufflevector(first, second, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+inline Lanes first_of(LanePair pair) { return __builtin_shufflevector(pair, pair, 0, 1, 2, 3); }
+inline Lanes second_of(LanePair pair) { return __builtin_shufflevector(pair, pair, 4, 5, 6, 7); }
+
 inline Lanes splat_lanes(float value) { return Lanes{value, value, value, value}; }
 
 inline LaneBits bits_of(Lanes value) {
@@ -29,7 +46,10 @@ inline Lanes lanes_of(LaneBits bits) {
 }
 
 /// `condition` holds all ones or all zeros in each lane, as a vector comparison gives.
-inline Lanes select(LaneBits condition, Lanes if_true, Lanes if_false) { return condition != 0 ? if_true : if_false; }
+template <class Floats>
+inline Floats select(BitsOf<Floats> condition, Floats if_true, Floats if_false) {
+  return condition != 0 ? if_true : if_false;
+}
 
 /// The sign bit of each lane.
 inline LaneMask sign_mask(LaneBits bits) {
@@ -42,6 +62,17 @@ inline LaneMask sign_mask(LaneBits bits) {
 #endif
 }
 
+/// The same of a pair, the second's in the upper four bits.
+inline unsigned sign_mask(LanePairBits bits) {
+#if defined(__AVX__)
+  return static_cast<unsigned>(__builtin_ia32_movmskps256(reinterpret_cast<LanePair>(bits)));
+#else
+  LaneBits lanes[2];
+  std::memcpy(lanes, &bits, sizeof lanes);
+  return sign_mask(lanes[0]) | static_cast<unsigned>(sign_mask(lanes[1])) << 4U;
+#endif
+}
+
 /// All ones in the lanes whose bit is set.
 inline LaneBits expand_mask(LaneMask mask) {
   const LaneBits bit{1, 2, 4, 8};
@@ -49,7 +80,18 @@ inline LaneBits expand_mask(LaneMask mask) {
   return (set & bit) == bit;
 }
 
-/// Lanes set in a mask of four: a table in a register, since the baseline instruction set has no popcnt.
-constexpr unsigned popcount(LaneMask mask) { return (0x4332322132212110ULL >> (mask * 4U)) & 0xFU; }
+inline LanePairBits expand_mask_twice(LaneMask mask) {
+  const LanePairBits bit{1, 2, 4, 8, 1, 2, 4, 8};
+  return ((LanePairBits{} + mask) & bit) == bit;
+}
+
+/// Lanes set in a mask of four.
+constexpr unsigned popcount(LaneMask mask) {
+#if defined(__POPCNT__)
+  return static_cast<unsigned>(__builtin_popcount(mask));
+#else
+  return (0x4332322132212110ULL >> (mask * 4U)) & 0xFU;  // a table in a register; the builtin would be a call
+#endif
+}
 
 }  // namespace vrpipe

@@ -197,6 +197,14 @@ class CropBehaviour : public Behaviour {
   };
   /// Blends the live samples of a quad.
   virtual Outcome blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) = 0;
+  /// By quad of a warp.
+  using Outcomes = std::array<Outcome, quads_per_warp>;
+  /// Blends quads `from` to `to` - 1 of a warp, in this order.
+  virtual void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
+    for (unsigned i = from; i < to; ++i) {
+      outcomes[i] = blend(warp.tile, warp.position[i], warp.live[i], warp.color[i]);
+    }
+  }
 
   /// What the colour cache does for a line that quads need.
   struct LineAccess {

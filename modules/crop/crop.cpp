@@ -39,7 +39,7 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   const std::uint32_t first_sectors = sectors_of_quad(Format, sector_shift);
   const std::uint64_t tile = surface_->address(warp.tile, 0);
   // Where a line of the tile is in `out.lines`, if it is there. Without branches, which would be mispredicted.
-  std::array<std::uint8_t, positions_per_tile> place_of;
+  std::array<std::uint8_t, positions_per_tile> place_of{};
   std::uint64_t seen = 0;
   unsigned count = 0;
   for (unsigned i = from; i < to; ++i) {
@@ -48,11 +48,12 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
     const std::uint32_t sectors = first_sectors << ((offset & line_mask) >> sector_shift);
     const bool is_new = (seen >> line & 1U) == 0;
     seen |= std::uint64_t{1} << line;
-    const unsigned place = is_new ? count : place_of[line];
+    const unsigned if_new = 0U - static_cast<unsigned>(is_new);
+    const unsigned place = place_of[line] | (count & if_new);
     place_of[line] = static_cast<std::uint8_t>(place);
     out.lines[place].address = tile + (line << line_shift);
-    out.lines[place].sectors = (is_new ? 0 : out.lines[place].sectors) | sectors;
-    count += is_new ? 1U : 0U;
+    out.lines[place].sectors = (out.lines[place].sectors & ~if_new) | sectors;
+    count -= if_new;
     out.line_of[i] = static_cast<std::uint8_t>(place);
     out.sectors_of[i] = sectors;
   }
@@ -62,8 +63,12 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
 
 // Out of line, so that the common case stays short.
 template <ColorFormat Format, BlendRounding Rounding>
-void ColorRop<Format, Rounding>::count_trouble(TileId tile, unsigned position, LaneBits lanes, const QuadColor& color,
-                                               const QuadColor& destination, const QuadColor& stored) {
+void ColorRop<Format, Rounding>::count_trouble(TileId tile, unsigned position, LaneMask live, const QuadColor& color,
+                                               LanePair red_green, LanePair blue_alpha) {
+  const QuadColor& stored = surface_->quad(tile, position);
+  QuadColor destination;
+  store({red_green, blue_alpha}, destination);
+  const LaneBits lanes = expand_mask(live);
   const QuadColor sum = blend_front_to_back(destination, color);
   const LaneBits saturated =
       lanes & ((sum.red > largest_color) | (sum.green > largest_color) | (sum.blue > largest_color));
@@ -84,48 +89,66 @@ void ColorRop<Format, Rounding>::count_trouble(TileId tile, unsigned position, L
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
-CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(TileId tile, unsigned position, LaneMask live,
-                                                         const QuadColor& color) {
-  QuadColor& destination = surface_->quad(tile, position);
-  LaneBits lanes = expand_mask(live);
+[[gnu::always_inline]] inline CropBehaviour::Outcome ColorRop<Format, Rounding>::blend_into(
+    QuadColor& destination, TileId tile, unsigned position, LaneMask live, const QuadColor& color) {
   if (drops_late_) {
-    const LaneBits open = lanes & ~passes(destination.alpha);
-    const LaneMask kept = sign_mask(open);
-    fragments_dropped_late += popcount(static_cast<LaneMask>(live & ~kept));
-    if (kept == 0) {
+    const auto closed = static_cast<LaneMask>(live & sign_mask(passes(destination.alpha)));
+    fragments_dropped_late += popcount(closed);
+    live = static_cast<LaneMask>(live ^ closed);
+    if (live == 0) {
       ++quads_dropped_late;
       return {0, false};
     }
-    lanes = open;
-    live = kept;
   }
   ++quads_blended;
   fragments_blended += popcount(live);
-  QuadColor blended;
+  const ChannelPairs before = channel_pairs(destination);
+  ChannelPairs blended;
   if constexpr (Rounding == BlendRounding::measured) {
-    blended = blend_function(Format, Rounding)(destination, color);
+    blended = channel_pairs(blend_function(Format, Rounding)(destination, color));
   } else {
-    blended = blend_into_target<Format, Rounding>(destination, color);
+    blended = blend_into_target<Format, Rounding>(before, channel_pairs(color));
   }
-  const Lanes previous = destination.alpha;
-  blended = select(lanes, blended, destination);
-  const LaneBits difference =
-      (bits_of(blended.red) ^ bits_of(destination.red)) | (bits_of(blended.green) ^ bits_of(destination.green)) |
-      (bits_of(blended.blue) ^ bits_of(destination.blue)) | (bits_of(blended.alpha) ^ bits_of(destination.alpha));
-  const bool changed = sign_mask(difference != 0) != 0;
-  const LaneBits passed = passes(blended.alpha);
-  LaneBits trouble = (blended.alpha == previous) & ~passed;
+  const LanePairBits kept = expand_mask_twice(live);
+  blended.red_green = select(kept, blended.red_green, before.red_green);
+  blended.blue_alpha = select(kept, blended.blue_alpha, before.blue_alpha);
+  store(blended, destination);
+  const LanePairBits difference =
+      (reinterpret_cast<LanePairBits>(blended.red_green) ^ reinterpret_cast<LanePairBits>(before.red_green)) |
+      (reinterpret_cast<LanePairBits>(blended.blue_alpha) ^ reinterpret_cast<LanePairBits>(before.blue_alpha));
+  const bool changed = sign_mask(difference == 0) != 0xff;
+  const Lanes previous = second_of(before.blue_alpha);
+  const Lanes alpha = second_of(blended.blue_alpha);
+  const unsigned passed = sign_mask(passes(alpha));
+  unsigned signalled = 0;
+  if (signals_) {
+    signalled = passed & live;
+    if (checks_previous_) signalled &= ~static_cast<unsigned>(sign_mask(passes(previous)));
+    if (signalled != 0) ++termination_signals;
+  }
+  unsigned trouble = sign_mask(alpha == previous) & ~passed;
   if constexpr (largest_color < std::numeric_limits<float>::infinity()) {
-    trouble |= (blended.red >= largest_color) | (blended.green >= largest_color) | (blended.blue >= largest_color);
+    const unsigned red_green = sign_mask(blended.red_green >= largest_color);
+    const unsigned blue = sign_mask(blended.blue_alpha >= largest_color);
+    trouble |= red_green | red_green >> 4U | blue;  // alpha, in the upper bits, is none of it
   }
-  if (sign_mask(trouble & lanes) != 0) count_trouble(tile, position, lanes, color, destination, blended);
-  destination = blended;
-  if (!signals_) return {0, changed};
-  LaneBits terminated = passed & lanes;
-  if (checks_previous_) terminated &= ~passes(previous);
-  const LaneMask signalled = sign_mask(terminated);
-  if (signalled != 0) ++termination_signals;
-  return {signalled, changed};
+  if ((trouble & live) != 0) count_trouble(tile, position, live, color, before.red_green, before.blue_alpha);
+  return {static_cast<LaneMask>(signalled), changed};
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
+CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(TileId tile, unsigned position, LaneMask live,
+                                                         const QuadColor& color) {
+  return blend_into(surface_->quad(tile, position), tile, position, live, color);
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
+void ColorRop<Format, Rounding>::blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
+  QuadColor* const tile = &surface_->quad(warp.tile, 0);
+  for (unsigned i = from; i < to; ++i) {
+    const unsigned position = warp.position[i];
+    outcomes[i] = blend_into(tile[position], warp.tile, position, warp.live[i], warp.color[i]);
+  }
 }
 
 namespace {

@@ -72,6 +72,7 @@ class ColorRop : public CropBehaviour {
   ColorRop(const CropParameters& parameters, const RenderState& state);
 
   Outcome blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) override;
+  void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) override;
   void look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) override;
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override { cache_->dirty(line, sectors); }
   Cost cost() const override { return cost_; }
@@ -96,9 +97,11 @@ class ColorRop : public CropBehaviour {
                                          : Format == ColorFormat::rgba16f ? half_max
                                                                           : std::numeric_limits<float>::infinity();
 
+  Outcome blend_into(QuadColor& destination, TileId tile, unsigned position, LaneMask live, const QuadColor& color);
   LaneBits passes(Lanes alpha) const { return alpha >= threshold_; }
-  void count_trouble(TileId tile, unsigned position, LaneBits lanes, const QuadColor& color,
-                     const QuadColor& destination, const QuadColor& stored);
+  /// After a blend of `color` into a quad that held the channels given.
+  [[gnu::noinline]] void count_trouble(TileId tile, unsigned position, LaneMask live, const QuadColor& color,
+                                       LanePair red_green, LanePair blue_alpha);
 
   const bool signals_;
   const float threshold_;  ///< that alpha reaches to be terminated

@@ -27,7 +27,6 @@ class TimedCrop : public TimedUnit {
         at_once_(cost_.forwards ? quads_looked_up_at_once(cost_) : 1),
         memory_(*this, "memory"),
         look_ups_(cost_.quads_per_cycle),
-        filled_at_(cost_.mshrs, 0),
         blending_(cost_.quads_per_cycle * cost_.sectors_per_cycle),
         lines_(std::max(cost_.cache_bytes / cost_.line_bytes, 1U)),
         longest_run_(std::min(cost_.line_bytes / cost_.sector_bytes, cost_.mshrs)),
@@ -103,7 +102,6 @@ class TimedCrop : public TimedUnit {
     charge(UnitState::starved, looked_up.first + 1);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
-    for (unsigned line = 0; line < cache_.count; ++line) lines_[cache_.lines[line].line] = blended.last;
     queued_.push({blended.last, quads});
     queued_quads_ += quads;
     last_blend_ = blended.last;
@@ -115,11 +113,12 @@ class TimedCrop : public TimedUnit {
 
   void blend(const ShadedWarp& warp, unsigned from, unsigned to, Span at) {
     TerminationBeat signals;
-    monitor_->blended(warp, from, to, at.last);
+    CropBehaviour::Outcomes outcomes;
+    behaviour_->blend_quads(warp, from, to, outcomes);
     std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
     for (unsigned i = from; i < to; ++i) {
-      const CropBehaviour::Outcome outcome =
-          behaviour_->blend(warp.tile, warp.position[i], warp.live[i], warp.color[i]);
+      monitor_->blended(warp, i, at.last);
+      const CropBehaviour::Outcome outcome = outcomes[i];
       dirty[cache_.line_of[i]] |= outcome.changed || cost_.writes_unchanged ? cache_.sectors_of[i] : 0U;
       if (outcome.terminated == 0) continue;
       signals.signals[signals.count++] = {warp.tile, warp.position[i], outcome.terminated};
@@ -128,8 +127,10 @@ class TimedCrop : public TimedUnit {
       signals.count = 0;
     }
     if (signals.count > 0) out_.send(signals, at.last);
-    for (unsigned line = 0; line < cache_.count; ++line) {
-      if (dirty[line] != 0) behaviour_->make_dirty(cache_.lines[line].line, dirty[line]);
+    for (unsigned i = 0; i < cache_.count; ++i) {
+      const std::uint32_t line = cache_.lines[i].line;
+      lines_[line] = at.last;
+      if (dirty[i] != 0) behaviour_->make_dirty(line, dirty[i]);
     }
   }
 
@@ -137,15 +138,13 @@ class TimedCrop : public TimedUnit {
   Cycle fill(const CropBehaviour::LineAccess& access, Cycle& at) {
     Cycle there = 0;
     for_each_run(access.filled, [&](unsigned sector, unsigned sectors) {
-      std::size_t place = fill_place_;
-      for (unsigned i = 0; i < sectors; ++i) {
-        at = std::max(at, filled_at_[place]);
-        place = place + 1 == filled_at_.size() ? 0 : place + 1;
+      for (; filling_ + sectors > cost_.mshrs; fills_.pop()) {
+        filling_ -= fills_.front().sectors;
+        at = std::max(at, fills_.front().at);
       }
       there = memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
-      for (; fill_place_ != place; fill_place_ = fill_place_ + 1 == filled_at_.size() ? 0 : fill_place_ + 1) {
-        filled_at_[fill_place_] = there;
-      }
+      fills_.push({there, sectors});
+      filling_ += sectors;
       moved_ += sectors;
     });
     return there;
@@ -168,7 +167,7 @@ class TimedCrop : public TimedUnit {
   }
 
   /// The cycle in which a quad of the same position has left the blending pipeline.
-  Cycle hazard_until(TileId tile, std::uint8_t position) {
+  [[gnu::noinline]] Cycle hazard_until(TileId tile, std::uint8_t position) {
     while (!recent_.empty() && recent_.front().at + cost_.latency_cycles <= last_blend_) recent_.pop();
     Cycle until = 0;
     for (std::size_t i = 0; i < recent_.size(); ++i) {
@@ -203,8 +202,8 @@ class TimedCrop : public TimedUnit {
   Flow look_ups_;
   Ring<Queued> queued_;  ///< between look-up and blending
   unsigned queued_quads_ = 0;
-  std::vector<Cycle> filled_at_;  ///< the fills in flight, a ring
-  std::size_t fill_place_ = 0;
+  Ring<Move> fills_;          ///< in flight, and when they are there
+  unsigned filling_ = 0;      ///< sectors of these
   Flow blending_;             ///< in parts of a cycle that both a quad and a sector are whole numbers of
   unsigned moved_ = 0;        ///< sectors, for the quads in hand
   Ring<Move> moves_;          ///< of sectors, that blending has not given its time to yet

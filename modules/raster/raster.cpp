@@ -16,21 +16,6 @@ constexpr auto raster_side = static_cast<std::int32_t>(raster_tile_pixels);
 // value beyond +-2^30 at the tile's first sample keeps its sign over the tile: then 32 bits are exact after clamping.
 constexpr std::int64_t narrow_gradient = (std::int64_t{1} << 30) / 7;
 constexpr std::int64_t narrow_limit = std::int64_t{1} << 30;
-
-/// The samples of two quads.
-using PairBits = std::int32_t __attribute__((vector_size(32)));
-
-/// Of edge functions, or-ed: a bit for each sample at which none is negative.
-unsigned inside_of(const PairBits& edges) {
-#if defined(__AVX__)
-  using Floats = float __attribute__((vector_size(32)));
-  return ~static_cast<unsigned>(__builtin_ia32_movmskps256(reinterpret_cast<Floats>(edges))) & 0xffU;
-#else
-  LaneBits quads[2];
-  std::memcpy(quads, &edges, sizeof quads);
-  return ~(sign_mask(quads[0]) | static_cast<unsigned>(sign_mask(quads[1])) << 4U) & 0xffU;
-#endif
-}
 }  // namespace
 
 TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderState& state)
@@ -151,22 +136,22 @@ LaneMask TileRasterizer::in_area(std::int32_t x, std::int32_t y) const {
 }
 
 unsigned TileRasterizer::fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]) {
-  // Two quads of a row at a time.
-  PairBits at[3];
-  PairBits right[3];
-  PairBits down[3];
+  // Two quads of a row at a time. No edge function may be negative inside.
+  LanePairBits at[3];
+  LanePairBits right[3];
+  LanePairBits down[3];
   for (unsigned i = 0; i < 3; ++i) {
     const auto start = static_cast<std::int32_t>(std::clamp(value[i], -narrow_limit, narrow_limit));
     const auto dx = static_cast<std::int32_t>(edges_[i].dx);
     const auto dy = static_cast<std::int32_t>(edges_[i].dy);
-    at[i] = PairBits{0, dx, dy, dx + dy, 2 * dx, 3 * dx, 2 * dx + dy, 3 * dx + dy} + start;
-    right[i] = PairBits{} + 4 * dx;
-    down[i] = PairBits{} + 2 * dy;
+    at[i] = LanePairBits{0, dx, dy, dx + dy, 2 * dx, 3 * dx, 2 * dx + dy, 3 * dx + dy} + start;
+    right[i] = LanePairBits{} + 4 * dx;
+    down[i] = LanePairBits{} + 2 * dy;
   }
   std::uint64_t coverage = 0;  // of the 4x4 quads, 4 bits each
   for (unsigned row = 0; row < 4; ++row) {
-    coverage |= std::uint64_t{inside_of(at[0] | at[1] | at[2])} << (16 * row);
-    coverage |= std::uint64_t{inside_of((at[0] + right[0]) | (at[1] + right[1]) | (at[2] + right[2]))}
+    coverage |= std::uint64_t{~sign_mask(at[0] | at[1] | at[2]) & 0xffU} << (16 * row);
+    coverage |= std::uint64_t{~sign_mask((at[0] + right[0]) | (at[1] + right[1]) | (at[2] + right[2])) & 0xffU}
                 << (16 * row + 8);
     for (unsigned i = 0; i < 3; ++i) at[i] += down[i];
   }

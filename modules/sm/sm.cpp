@@ -63,22 +63,16 @@ void SplatShader::load(std::uint32_t index) {
 }
 
 template <Exponential Kind>
-LaneMask SplatShader::shade_quad(float x, float y, const Quad& quad, QuadColor& out) {
-  if (quad.splat != loaded_) load(quad.splat);
+inline LanePair SplatShader::alpha_at(LanePair x, LanePair y) const {
   const Attributes& splat = attributes_;
-  // The positions are sums of small integers and halves: exact.
-  const Lanes dx = x + samples.x[quad.position % quads_per_tile_row] - splat.cx;
-  const Lanes dy = y + samples.y[quad.position / quads_per_tile_row] - splat.cy;
-  const Lanes u = dx * splat.m00 + dy * splat.m01;
-  const Lanes v = dx * splat.m10 + dy * splat.m11;
-  const Lanes squared = u * u + v * v;
-  Lanes alpha = shader_exp2<Kind>(squared * -half_log2_e) * splat.opacity;
-  // So written that NaN stays NaN, and the next test prunes it.
-  alpha = select(alpha > alpha_max, splat_lanes(alpha_max), alpha);
-  const LaneBits kept = (alpha >= state_.pruning_threshold) & expand_mask(quad.coverage);
-  alpha = lanes_of(bits_of(alpha) & kept);
-  out = {alpha * splat.red, alpha * splat.green, alpha * splat.blue, alpha};
-  return sign_mask(kept);
+  const LanePair dx = x - splat.cx;
+  const LanePair dy = y - splat.cy;
+  const LanePair u = dx * splat.m00 + dy * splat.m01;
+  const LanePair v = dx * splat.m10 + dy * splat.m11;
+  const LanePair squared = u * u + v * v;
+  const LanePair alpha = shader_exp2<Kind>(squared * -half_log2_e) * splat.opacity;
+  // So written that NaN stays NaN, and the pruning test prunes it.
+  return select(alpha > alpha_max, LanePair{} + alpha_max, alpha);
 }
 
 void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
@@ -99,19 +93,20 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
   out.end_of_draw = false;
   ++fragment_warps;
   quads_shaded += warp.count;
+  // Sample positions are sums of small integers and halves: exact.
   const auto x = static_cast<float>(warp.tile.x * screen_tile_pixels);
   const auto y = static_cast<float>(warp.tile.y * screen_tile_pixels);
   unsigned count = 0;
   unsigned shaded = 0;
   unsigned pruned = 0;
   bool previous_lives = false;
-  for (unsigned i = 0; i < warp.count; ++i) {
+  unsigned backs_of_pairs = 0;  // a bit a quad
+  for (unsigned left = warp.merge_pairs; left != 0; left &= left - 1) backs_of_pairs |= 2U << (2 * __builtin_ctz(left));
+  const auto finish = [&](unsigned i, LaneMask live, const QuadColor& color) {
     const Quad& quad = warp.quads[i];
-    QuadColor& color = out.color[count];
-    const LaneMask live = shade_quad<Kind>(x, y, quad, color);
     shaded += popcount(quad.coverage);
     pruned += popcount(static_cast<LaneMask>(quad.coverage & ~live));
-    const bool back_of_pair = (i & 1U) != 0 && ((warp.merge_pairs >> (i / 2)) & 1U) != 0;
+    const bool back_of_pair = (backs_of_pairs >> i & 1U) != 0;
     if (live == 0) {
       ++quads_pruned;
     } else if (back_of_pair && previous_lives) {
@@ -122,6 +117,7 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
       out.last_primitive[count - 1] = primitive_order(quad);
       ++quads_merged;
     } else {
+      out.color[count] = color;
       out.position[count] = quad.position;
       out.live[count] = live;
       out.first_primitive[count] = primitive_order(quad);
@@ -129,6 +125,28 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
       ++count;
     }
     previous_lives = live != 0;
+  };
+  for (unsigned i = 0, together = 0; i < warp.count; i += together) {
+    // Two quads of a splat at a time; a single one twice.
+    const Quad& quad = warp.quads[i];
+    together = i + 1 < warp.count && warp.quads[i + 1].splat == quad.splat ? 2 : 1;
+    const Quad& last = warp.quads[i + together - 1];
+    if (quad.splat != loaded_) load(quad.splat);
+    LanePair alpha = alpha_at<Kind>(x + join(samples.x[quad.position % quads_per_tile_row],
+                                             samples.x[last.position % quads_per_tile_row]),
+                                    y + join(samples.y[quad.position / quads_per_tile_row],
+                                             samples.y[last.position / quads_per_tile_row]));
+    const LanePairBits kept =
+        (alpha >= state_.pruning_threshold) & join(expand_mask(quad.coverage), expand_mask(last.coverage));
+    alpha = reinterpret_cast<LanePair>(reinterpret_cast<LanePairBits>(alpha) & kept);
+    const LanePair red = alpha * attributes_.red;
+    const LanePair green = alpha * attributes_.green;
+    const LanePair blue = alpha * attributes_.blue;
+    const unsigned live = sign_mask(kept);
+    finish(i, live & all_lanes, {first_of(red), first_of(green), first_of(blue), first_of(alpha)});
+    if (together == 1) continue;
+    finish(i + 1, static_cast<LaneMask>(live >> 4U),
+           {second_of(red), second_of(green), second_of(blue), second_of(alpha)});
   }
   fragments_shaded += shaded;
   fragments_pruned += pruned;

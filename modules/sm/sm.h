@@ -100,8 +100,9 @@ class SplatShader : public SmBehaviour {
   void load(std::uint32_t splat);
   template <Exponential Kind>
   void shade_warp(const Warp& warp, ShadedWarp& out);
+  /// Alpha of the loaded splat at the samples of two quads.
   template <Exponential Kind>
-  LaneMask shade_quad(float x, float y, const Quad& quad, QuadColor& out);
+  LanePair alpha_at(LanePair x, LanePair y) const;
 
   const RenderState& state_;
   Cost cost_;

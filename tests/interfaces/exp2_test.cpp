@@ -51,6 +51,26 @@ TEST(Exp2, NeverRisesByMoreThanAnUlpAsAFragmentMovesOutward) {
 }
 
 template <Exponential Kind>
+void expect_each_of_a_pair_as_alone() {
+  for (int i = 0; i < 10'000; ++i) {
+    const Lanes x = splat_lanes(-12.0F * static_cast<float>(i) / 10'000.0F) - Lanes{0, 0.003F, 0.07F, 130.0F};
+    const Lanes y = x * 0.3F;
+    const LanePair together = shader_exp2<Kind>(join(x, y));
+    const LanePair alone = join(shader_exp2<Kind>(x), shader_exp2<Kind>(y));
+    ASSERT_EQ(std::memcmp(&together, &alone, sizeof alone), 0) << i;
+  }
+}
+
+// case Q06
+TEST(ShaderExp2, GivesEachOfAPairTheBitsItHasAlone) {
+  expect_each_of_a_pair_as_alone<Exponential::exact>();
+  expect_each_of_a_pair_as_alone<Exponential::ex2>();
+  expect_each_of_a_pair_as_alone<Exponential::fp16>();
+  expect_each_of_a_pair_as_alone<Exponential::table256>();
+  expect_each_of_a_pair_as_alone<Exponential::table16>();
+}
+
+template <Exponential Kind>
 double worst_relative_error() {
   double worst = 0;
   for (int i = 0; i <= 100'000; ++i) {

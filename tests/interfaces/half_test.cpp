@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -130,6 +131,22 @@ TEST(Half, TheProcessorsRoundingHasTheBitsOfTheIntegersOne) {
     const Lanes lanes = splat_lanes(value);
     ASSERT_EQ(bits_of_float(round_to_half(lanes)[0]), bits_of_float(round_to_half_by_integers(lanes)[0]))
         << std::hex << bits_of_float(value);
+  }
+}
+
+TEST(Half, EachOfAPairRoundsAsAlone) {
+  const std::vector<float> values = halves_midpoints_and_neighbours();
+  for (std::size_t i = 0; i + 8 <= values.size(); i += 8) {
+    Lanes halves[2];
+    std::memcpy(halves, &values[i], sizeof halves);
+    const LanePair pair = join(halves[0], halves[1]);
+    for (const auto& [wide, first, second] :
+         {std::tuple(round_to_half(pair), round_to_half(halves[0]), round_to_half(halves[1])),
+          std::tuple(round_to_half_by_integers(pair), round_to_half(halves[0]), round_to_half(halves[1])),
+          std::tuple(truncate_to_half(pair), truncate_to_half(halves[0]), truncate_to_half(halves[1]))}) {
+      const LanePair alone = join(first, second);
+      ASSERT_EQ(std::memcmp(&wide, &alone, sizeof wide), 0) << values[i];
+    }
   }
 }
 
