@@ -10,6 +10,10 @@ void fault_of_alignment(const sc_core::sc_object& port, Cycle now, std::uint64_t
                             " is not naturally aligned");
 }
 
+void fault_of_response(const sc_core::sc_object& port, Cycle now, const tlm::tlm_generic_payload& access) {
+  throw SimulationFault(port.name(), now, "the memory answered " + access.get_response_string());
+}
+
 MemoryPort::MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight)
     : socket(name.c_str()), clock_(owner.clock), most_in_flight_(in_flight) {
   socket.bind(*this);
@@ -32,25 +36,12 @@ MemoryPort::Access* MemoryPort::unused_access() {
   return access;
 }
 
-void MemoryPort::fault(const Access& access) const {
-  throw SimulationFault(socket.name(), clock_.domain->now(), "the memory answered " + access.get_response_string());
-}
-
-void MemoryPort::sort_in_last() {
-  for (std::size_t place = completions_.size() - 1; place > 0 && completions_[place - 1].at > completions_[place].at;
-       --place) {
-    std::swap(completions_[place - 1], completions_[place]);
-  }
-}
-
 inline void MemoryPort::complete(Access& access, const sc_core::sc_time& delay) {
-  if (access.is_response_error()) fault(access);
+  check_response(socket, clock_.domain->now(), access);
   access.answered = true;
   const Cycle at = clock_.domain->edge_after(delay);
   // Nearly always the last: memories answer in order.
-  const bool in_order = completions_.empty() || completions_.back().at <= at;
-  completions_.push({at, access.tag});
-  if (!in_order) sort_in_last();
+  completions_.push_in_order({at, access.tag}, &Completion::at);
   next_completion_ = std::min(next_completion_, at);
   clock_.domain->wake(clock_.unit, at);
 }

@@ -67,9 +67,7 @@ Cycle TimedMemoryPort::access(tlm::tlm_command command, std::uint64_t address, u
   }
   sc_core::sc_time delay = delay_;
   socket->b_transport(payload_, delay);
-  if (payload_.is_response_error()) {
-    throw SimulationFault(socket.name(), at, "the memory answered " + payload_.get_response_string());
-  }
+  check_response(socket, at, payload_);
   return now + std::max(ahead, clock_.domain->cycles_up(delay));
 }
 

@@ -36,29 +36,27 @@ inline QuadColor blend_front_to_back(const QuadColor& front, const QuadColor& ba
           front.blue + transmittance * back.blue, front.alpha + transmittance * back.alpha};
 }
 
-inline QuadColor select(LaneBits condition, const QuadColor& if_true, const QuadColor& if_false) {
-  return {select(condition, if_true.red, if_false.red), select(condition, if_true.green, if_false.green),
-          select(condition, if_true.blue, if_false.blue), select(condition, if_true.alpha, if_false.alpha)};
-}
-
-/// The nearest value n/255, halves up; NaN and negatives give 0, above 1 gives 1 (D3D11.3, float to UNORM).
+/// The value n/255 of the whole number n of levels, once `added` levels are added; NaN and negatives give 0, above 1
+/// gives 1.
 template <class Floats>
-inline Floats round_to_unorm8(Floats value) {
+inline Floats to_unorm8(Floats value, float added) {
   value = select(value > 0.0F, value, Floats{});
   value = select(value < 1.0F, value, Floats{} + 1.0F);
-  const Floats scaled = value * 255.0F + 0.5F;
+  const Floats scaled = value * 255.0F + added;
   const Floats level = __builtin_convertvector(__builtin_convertvector(scaled, BitsOf<Floats>), Floats);
   return level / 255.0F;
+}
+
+/// The nearest value n/255, halves up (D3D11.3, float to UNORM).
+template <class Floats>
+inline Floats round_to_unorm8(Floats value) {
+  return to_unorm8(value, 0.5F);
 }
 
 /// The largest n/255 that is not above the value, with a guard of 2^-12 level for stored values' own rounding.
 template <class Floats>
 inline Floats truncate_to_unorm8(Floats value) {
-  value = select(value > 0.0F, value, Floats{});
-  value = select(value < 1.0F, value, Floats{} + 1.0F);
-  const Floats scaled = value * 255.0F + 2.44140625e-4F;
-  const Floats level = __builtin_convertvector(__builtin_convertvector(scaled, BitsOf<Floats>), Floats);
-  return level / 255.0F;
+  return to_unorm8(value, 2.44140625e-4F);
 }
 
 /// Rounds a channel to what the format stores; the result is the stored value as a float.

@@ -16,7 +16,7 @@ inline Floats exp2_nonpositive(Floats x) {
   x = select(x < -126.0F, Floats{} - 126.0F, x);
   // Adding 1.5 * 2^23 leaves the nearest integer in the low bits of the significand.
   const Floats shifted = x + 12582912.0F;
-  const BitsOf<Floats> exponent = reinterpret_cast<BitsOf<Floats>>(shifted) - 0x4b400000;
+  const BitsOf<Floats> exponent = bits_of(shifted) - 0x4b400000;
   const Floats f = x - (shifted - 12582912.0F);
   // Cephes' minimax coefficients; Taylor's leave 2.9 ulp at f = -1/2.
   Floats p = f * 1.535336188319500e-4F + 1.339887440266574e-3F;
@@ -25,7 +25,7 @@ inline Floats exp2_nonpositive(Floats x) {
   p = p * f + 2.402264791363012e-1F;
   p = p * f + 6.931472028550421e-1F;
   p = p * f + 1.0F;
-  return reinterpret_cast<Floats>(reinterpret_cast<BitsOf<Floats>>(p) + (exponent << 23));
+  return floats_of<Floats>(bits_of(p) + (exponent << 23));
 }
 
 /// 2^x for x <= 0, the double-precision value rounded to single: within 0.5001 ulp.

@@ -10,24 +10,29 @@ namespace vrpipe {
 /// IEEE binary16, as a register of the colour target holds it; arithmetic happens in float.
 constexpr float half_max = 65504.0F;
 
+/// Rounds what is left without the sign, given as bits, and gives the sign back.
+template <class Floats, class Round>
+inline Floats round_magnitude(Floats value, Round round) {
+  const BitsOf<Floats> sign = bits_of(value) & (BitsOf<Floats>{} + INT32_MIN);
+  return floats_of<Floats>(round(bits_of(value) & 0x7fffffff) | sign);
+}
+
 /// `round_to_half` for every processor.
 template <class Floats>
 inline Floats round_to_half_by_integers(Floats value) {
   using Bits = BitsOf<Floats>;
-  const auto bits = reinterpret_cast<Bits>(value);
-  const Bits sign = bits & (Bits{} + INT32_MIN);
-  const Bits magnitude = bits & 0x7fffffff;
-  const Bits odd = (magnitude >> 13) & 1;
-  const Bits normal = (magnitude + 0xfff + odd) & ~0x1fff;
-  // Below 2^-14 the quantum is fixed at 2^-24, which is the ulp of floats in [0.5, 1).
-  const Floats shifted = reinterpret_cast<Floats>(magnitude) + 0.5F;
-  const Floats subnormal = shifted - 0.5F;
-  const Bits is_small = magnitude < 0x38800000;
-  const Bits is_nan = magnitude > 0x7f800000;
-  Bits rounded = is_small ? reinterpret_cast<Bits>(subnormal) : normal;
-  rounded = normal > 0x477fe000 ? Bits{} + 0x7f800000 : rounded;
-  rounded = is_nan ? (magnitude & ~0x1fff) | 0x400000 : rounded;
-  return reinterpret_cast<Floats>(rounded | sign);
+  return round_magnitude(value, [](Bits magnitude) {
+    const Bits odd = (magnitude >> 13) & 1;
+    const Bits normal = (magnitude + 0xfff + odd) & ~0x1fff;
+    // Below 2^-14 the quantum is fixed at 2^-24, which is the ulp of floats in [0.5, 1).
+    const Floats shifted = floats_of<Floats>(magnitude) + 0.5F;
+    const Floats subnormal = shifted - 0.5F;
+    const Bits is_small = magnitude < 0x38800000;
+    const Bits is_nan = magnitude > 0x7f800000;
+    Bits rounded = is_small ? bits_of(subnormal) : normal;
+    rounded = normal > 0x477fe000 ? Bits{} + 0x7f800000 : rounded;
+    return is_nan ? (magnitude & ~0x1fff) | 0x400000 : rounded;
+  });
 }
 
 /// Rounds to the nearest value that binary16 represents, ties to even; beyond 65519.99 gives infinity, NaN a quiet NaN.
@@ -50,19 +55,17 @@ inline Floats round_to_half(Floats value) {
 template <class Floats>
 inline Floats truncate_to_half(Floats value) {
   using Bits = BitsOf<Floats>;
-  const auto bits = reinterpret_cast<Bits>(value);
-  const Bits sign = bits & (Bits{} + INT32_MIN);
-  const Bits magnitude = bits & 0x7fffffff;
-  const Bits normal = magnitude & ~0x1fff;
-  const auto exact = reinterpret_cast<Floats>(magnitude);
-  const Floats shifted = exact + 0.5F;
-  Floats subnormal = shifted - 0.5F;
-  subnormal = select(subnormal > exact, subnormal - 5.9604645e-8F, subnormal);
-  const Bits is_small = magnitude < 0x38800000;
-  const Bits saturates = (normal > 0x477fe000) & (magnitude <= 0x7f800000);
-  Bits truncated = (is_small & reinterpret_cast<Bits>(subnormal)) | (~is_small & normal);
-  truncated = (saturates & 0x477fe000) | (~saturates & truncated);
-  return reinterpret_cast<Floats>(truncated | sign);
+  return round_magnitude(value, [](Bits magnitude) {
+    const Bits normal = magnitude & ~0x1fff;
+    const auto exact = floats_of<Floats>(magnitude);
+    const Floats shifted = exact + 0.5F;
+    Floats subnormal = shifted - 0.5F;
+    subnormal = select(subnormal > exact, subnormal - 5.9604645e-8F, subnormal);
+    const Bits is_small = magnitude < 0x38800000;
+    const Bits saturates = (normal > 0x477fe000) & (magnitude <= 0x7f800000);
+    const Bits truncated = is_small ? bits_of(subnormal) : normal;
+    return saturates ? Bits{} + 0x477fe000 : truncated;
+  });
 }
 
 inline float round_to_half(float value) { return round_to_half(splat_lanes(value))[0]; }

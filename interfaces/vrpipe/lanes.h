@@ -33,16 +33,13 @@ inline Lanes second_of(LanePair pair) { return __builtin_shufflevector(pair, pai
 
 inline Lanes splat_lanes(float value) { return Lanes{value, value, value, value}; }
 
-inline LaneBits bits_of(Lanes value) {
-  LaneBits bits;
-  std::memcpy(&bits, &value, sizeof bits);
-  return bits;
+template <class Floats>
+inline BitsOf<Floats> bits_of(Floats value) {
+  return reinterpret_cast<BitsOf<Floats>>(value);
 }
-
-inline Lanes lanes_of(LaneBits bits) {
-  Lanes value;
-  std::memcpy(&value, &bits, sizeof value);
-  return value;
+template <class Floats>
+inline Floats floats_of(BitsOf<Floats> bits) {
+  return reinterpret_cast<Floats>(bits);
 }
 
 /// `condition` holds all ones or all zeros in each lane, as a vector comparison gives.
@@ -54,7 +51,7 @@ inline Floats select(BitsOf<Floats> condition, Floats if_true, Floats if_false) 
 /// The sign bit of each lane.
 inline LaneMask sign_mask(LaneBits bits) {
 #if defined(__SSE__)
-  return static_cast<LaneMask>(__builtin_ia32_movmskps(lanes_of(bits)));
+  return static_cast<LaneMask>(__builtin_ia32_movmskps(floats_of<Lanes>(bits)));
 #else
   LaneMask mask = 0;
   for (int lane = 0; lane < 4; ++lane) mask = static_cast<LaneMask>(mask | ((bits[lane] < 0) << lane));
@@ -65,7 +62,7 @@ inline LaneMask sign_mask(LaneBits bits) {
 /// The same of a pair, the second's in the upper four bits.
 inline unsigned sign_mask(LanePairBits bits) {
 #if defined(__AVX__)
-  return static_cast<unsigned>(__builtin_ia32_movmskps256(reinterpret_cast<LanePair>(bits)));
+  return static_cast<unsigned>(__builtin_ia32_movmskps256(floats_of<LanePair>(bits)));
 #else
   LaneBits lanes[2];
   std::memcpy(lanes, &bits, sizeof lanes);

@@ -16,10 +16,16 @@
 namespace vrpipe {
 
 [[noreturn]] void fault_of_alignment(const sc_core::sc_object& port, Cycle now, std::uint64_t address, unsigned bytes);
+[[noreturn]] void fault_of_response(const sc_core::sc_object& port, Cycle now, const tlm::tlm_generic_payload& access);
 
 /// Throws SimulationFault naming the port, unless the access is naturally aligned and a power of two long.
 inline void check_alignment(const sc_core::sc_object& port, Cycle now, std::uint64_t address, unsigned bytes) {
   if (bytes == 0 || ((address | bytes) & (bytes - 1)) != 0) fault_of_alignment(port, now, address, bytes);
+}
+
+/// Throws SimulationFault naming the port, if the memory answered an access with an error.
+inline void check_response(const sc_core::sc_object& port, Cycle now, const tlm::tlm_generic_payload& access) {
+  if (access.is_response_error()) fault_of_response(port, now, access);
 }
 
 /// An initiator on the unmodified TLM-2.0 base protocol, for timing only: payloads carry addresses and lengths, data
@@ -67,8 +73,6 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   Access* unused_access();
   void issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag);
   void complete(Access& access, const sc_core::sc_time& delay);
-  [[gnu::noinline]] void sort_in_last();
-  [[noreturn, gnu::noinline]] void fault(const Access& access) const;
   tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override;
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}

@@ -22,9 +22,22 @@ class Ring {
     return entries_[tail_++ & mask_];
   }
   void push(const Entry& entry) { push() = entry; }
+  /// Where entries stand in the order of a member of theirs: behind those that are equal.
+  template <class Member>
+  void push_in_order(const Entry& entry, Member key) {
+    const bool is_last = empty() || !(entry.*key < back().*key);
+    push(entry);
+    if (!is_last) sort_in_last(key);
+  }
   void pop() { ++head_; }
 
  private:
+  template <class Member>
+  [[gnu::noinline]] void sort_in_last(Member key) {
+    for (std::size_t place = size() - 1; place > 0 && (*this)[place].*key < (*this)[place - 1].*key; --place) {
+      std::swap((*this)[place - 1], (*this)[place]);
+    }
+  }
   [[gnu::noinline]] void grow() {
     std::vector<Entry> larger(2 * entries_.size());
     const std::size_t count = size();

@@ -56,7 +56,7 @@ struct Span {
 /// A resource that takes so many items a cycle, in order. An item that is wider than a cycle takes several.
 class Lane {
  public:
-  explicit Lane(unsigned per_cycle = 1) : per_cycle_(std::max(per_cycle, 1U)), left_(std::max(per_cycle, 1U)) {}
+  explicit Lane(unsigned per_cycle = 1) : per_cycle_(std::max(per_cycle, 1U)), left_(per_cycle_.value()) {}
   /// Reserves; returns the cycle in which the item goes.
   Cycle take(Cycle earliest, unsigned width = 1) {
     hold(earliest);

@@ -113,9 +113,8 @@ template <ColorFormat Format, BlendRounding Rounding>
   blended.red_green = select(kept, blended.red_green, before.red_green);
   blended.blue_alpha = select(kept, blended.blue_alpha, before.blue_alpha);
   store(blended, destination);
-  const LanePairBits difference =
-      (reinterpret_cast<LanePairBits>(blended.red_green) ^ reinterpret_cast<LanePairBits>(before.red_green)) |
-      (reinterpret_cast<LanePairBits>(blended.blue_alpha) ^ reinterpret_cast<LanePairBits>(before.blue_alpha));
+  const LanePairBits difference = (bits_of(blended.red_green) ^ bits_of(before.red_green)) |
+                                  (bits_of(blended.blue_alpha) ^ bits_of(before.blue_alpha));
   const bool changed = sign_mask(difference == 0) != 0xff;
   const Lanes previous = second_of(before.blue_alpha);
   const Lanes alpha = second_of(blended.blue_alpha);

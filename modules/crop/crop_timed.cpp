@@ -10,6 +10,32 @@ namespace vrpipe {
 
 namespace {
 
+/// So many places, each taken until a cycle that is known, and freed in the order in which they were taken.
+class Places {
+ public:
+  explicit Places(unsigned places) : free_(places) {}
+  /// The first cycle from `at` on in which so many are free, at most as many as there are.
+  Cycle free_from(Cycle at, unsigned places) {
+    for (; free_ < places; taken_.pop()) {
+      free_ += taken_.front().places;
+      at = std::max(at, taken_.front().until);
+    }
+    return at;
+  }
+  void take(unsigned places, Cycle until) {
+    free_ -= places;
+    taken_.push({places, until});
+  }
+
+ private:
+  struct Taken {
+    unsigned places = 0;
+    Cycle until = 0;
+  };
+  unsigned free_;
+  Ring<Taken> taken_;
+};
+
 /// CROP at lt and at: as crop_unit.cpp, but a warp is taken in one piece: its quads look up the colour cache, and are
 /// blended once the sectors of all are there. Neighbouring sectors are filled in one access.
 /// Ports: in_color (ShadedWarpItem), out_terminations (TerminationBeat), memory (TLM-2.0 base protocol).
@@ -27,6 +53,8 @@ class TimedCrop : public TimedUnit {
         at_once_(cost_.forwards ? quads_looked_up_at_once(cost_) : 1),
         memory_(*this, "memory"),
         look_ups_(cost_.quads_per_cycle),
+        queue_(cost_.input_quads),
+        mshrs_(cost_.mshrs),
         blending_(cost_.quads_per_cycle * cost_.sectors_per_cycle),
         lines_(std::max(cost_.cache_bytes / cost_.line_bytes, 1U)),
         longest_run_(std::min(cost_.line_bytes / cost_.sector_bytes, cost_.mshrs)),
@@ -72,11 +100,7 @@ class TimedCrop : public TimedUnit {
     for (unsigned i = from; i < to; ++i) __builtin_prefetch(tile + warp.position[i], 1);
     behaviour_->look_up(warp, from, to, cache_);
     // Places in the queue, and lines that no queued quad needs.
-    Cycle at = visible.first;
-    for (; queued_quads_ + quads > cost_.input_quads; queued_.pop()) {
-      queued_quads_ -= queued_.front().quads;
-      at = std::max(at, queued_.front().blended);
-    }
+    Cycle at = queue_.free_from(visible.first, quads);
     for (unsigned line = 0; line < cache_.count; ++line) {
       if (cache_.lines[line].replaced) at = std::max(at, lines_[cache_.lines[line].line]);
     }
@@ -102,8 +126,7 @@ class TimedCrop : public TimedUnit {
     charge(UnitState::starved, looked_up.first + 1);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
-    queued_.push({blended.last, quads});
-    queued_quads_ += quads;
+    queue_.take(quads, blended.last);
     last_blend_ = blended.last;
     blended_ += quads;
     if (!cost_.forwards) recent_.push({warp.tile, warp.position[from], blended.last});
@@ -138,13 +161,9 @@ class TimedCrop : public TimedUnit {
   Cycle fill(const CropBehaviour::LineAccess& access, Cycle& at) {
     Cycle there = 0;
     for_each_run(access.filled, [&](unsigned sector, unsigned sectors) {
-      for (; filling_ + sectors > cost_.mshrs; fills_.pop()) {
-        filling_ -= fills_.front().sectors;
-        at = std::max(at, fills_.front().at);
-      }
+      at = mshrs_.free_from(at, sectors);
       there = memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
-      fills_.push({there, sectors});
-      filling_ += sectors;
+      mshrs_.take(sectors, there);
       moved_ += sectors;
     });
     return there;
@@ -177,10 +196,6 @@ class TimedCrop : public TimedUnit {
     return until;
   }
 
-  struct Queued {
-    Cycle blended = 0;
-    unsigned quads = 0;
-  };
   struct Move {
     Cycle at = 0;
     unsigned sectors = 0;
@@ -200,10 +215,8 @@ class TimedCrop : public TimedUnit {
   std::unique_ptr<BlendOrderMonitor> monitor_;
   CropBehaviour::CacheLookUp cache_;
   Flow look_ups_;
-  Ring<Queued> queued_;  ///< between look-up and blending
-  unsigned queued_quads_ = 0;
-  Ring<Move> fills_;          ///< in flight, and when they are there
-  unsigned filling_ = 0;      ///< sectors of these
+  Places queue_;              ///< quads between look-up and blending
+  Places mshrs_;              ///< sectors being filled
   Flow blending_;             ///< in parts of a cycle that both a quad and a sector are whole numbers of
   unsigned moved_ = 0;        ///< sectors, for the quads in hand
   Ring<Move> moves_;          ///< of sectors, that blending has not given its time to yet

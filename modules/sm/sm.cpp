@@ -138,7 +138,7 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
                                              samples.y[last.position / quads_per_tile_row]));
     const LanePairBits kept =
         (alpha >= state_.pruning_threshold) & join(expand_mask(quad.coverage), expand_mask(last.coverage));
-    alpha = reinterpret_cast<LanePair>(reinterpret_cast<LanePairBits>(alpha) & kept);
+    alpha = floats_of<LanePair>(bits_of(alpha) & kept);
     const LanePair red = alpha * attributes_.red;
     const LanePair green = alpha * attributes_.green;
     const LanePair blue = alpha * attributes_.blue;

@@ -115,11 +115,7 @@ class TimedSm : public TimedUnit {
       out_shaded_.send({&shaded}, done);
       return;
     }
-    // By cycle; nearly always the last.
-    running_.push({&shaded, done});
-    for (std::size_t place = running_.size() - 1; place > 0 && running_[place - 1].done > done; --place) {
-      std::swap(running_[place - 1], running_[place]);
-    }
+    running_.push_in_order({&shaded, done}, &Running::done);
   }
 
   Cycle advance(Cycle until) override {

@@ -213,12 +213,12 @@ class SmUnit : public Unit {
       completed_.pop();
     }
     while (vertex_count_ > 0 && flights_[fragment_slots_ + vertex_first_].done && out_vertices_.credits() > 0) {
-      send_vertices();
+      send_vertex_warp();
     }
   }
 
   // Vertex warps are few, so what they need is kept out of the way of the others.
-  [[gnu::noinline]] void send_vertices() {
+  [[gnu::noinline]] void send_vertex_warp() {
     out_vertices_.push(vertices_[vertex_first_]);
     vertex_first_ = vertex_first_ + 1 == cost_.vertex_warps ? 0 : vertex_first_ + 1;
     --vertex_count_;
@@ -270,7 +270,7 @@ class SmUnit : public Unit {
     make_ready(slot, now);
   }
 
-  [[gnu::noinline]] void launch_vertices(Cycle now) {
+  [[gnu::noinline]] void launch_vertex_warp(Cycle now) {
     std::uint32_t turn = vertex_first_ + vertex_count_++;
     if (turn >= cost_.vertex_warps) turn -= cost_.vertex_warps;
     const std::uint32_t slot = fragment_slots_ + turn;
@@ -289,7 +289,7 @@ class SmUnit : public Unit {
     release_slots();
     run_events(now);
     launch_fragments(now);
-    if (in_vertices_.ready() && vertex_count_ < cost_.vertex_warps) launch_vertices(now);
+    if (in_vertices_.ready() && vertex_count_ < cost_.vertex_warps) launch_vertex_warp(now);
     send();
 
     const Cycle next_event = wheel_.next_after(now);
