@@ -29,7 +29,10 @@ unsigned mask_of(const CycleVector& lanes) {
 }  // namespace
 
 ClockDomain::ClockDomain(const sc_core::sc_module_name& name, std::uint64_t period_ps)
-    : sc_module(name), period_(static_cast<double>(period_ps), sc_core::SC_PS), period_value_(period_.value()) {
+    : sc_module(name),
+      period_(static_cast<double>(period_ps), sc_core::SC_PS),
+      period_value_(period_.value()),
+      due_(cycles_per_vector, never) {
   SC_METHOD(edge);
   sensitive << event_;
   dont_initialize();

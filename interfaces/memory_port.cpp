@@ -14,10 +14,14 @@ void fault_of_response(const sc_core::sc_object& port, Cycle now, const tlm::tlm
   throw SimulationFault(port.name(), now, "the memory answered " + access.get_response_string());
 }
 
+PromptMemory* prompt_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
+  auto* const memory = dynamic_cast<PromptMemory*>(socket.operator->());
+  return memory != nullptr && &memory->clock() == &clock ? memory : nullptr;
+}
+
 MemoryPort::MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight)
     : socket(name.c_str()), clock_(owner.clock), most_in_flight_(in_flight) {
   socket.bind(*this);
-  next_access_ = unused_access();
 }
 
 MemoryPort::~MemoryPort() = default;
@@ -36,19 +40,17 @@ MemoryPort::Access* MemoryPort::unused_access() {
   return access;
 }
 
-inline void MemoryPort::complete(Access& access, const sc_core::sc_time& delay) {
+inline void MemoryPort::answer(Access& access, const sc_core::sc_time& delay) {
   check_response(socket, clock_.domain->now(), access);
   access.answered = true;
-  const Cycle at = clock_.domain->edge_after(delay);
-  // Nearly always the last: memories answer in order.
-  completions_.push_in_order({at, access.tag}, &Completion::at);
-  next_completion_ = std::min(next_completion_, at);
-  clock_.domain->wake(clock_.unit, at);
+  complete(clock_.domain->edge_after(delay), access.tag);
 }
 
-void MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag) {
-  check_alignment(socket, clock_.domain->now(), address, bytes);
-  ++in_flight_;
+void MemoryPort::request(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag) {
+  if (next_access_ == nullptr) {
+    next_access_ = unused_access();
+    prompt_ = prompt_memory_of(socket, *clock_.domain);  // from the second access on
+  }
   Access& access = *next_access_;
   if (access.data.size() < bytes) access.data.resize(bytes);
   access.set_data_ptr(access.data.data());
@@ -66,7 +68,7 @@ void MemoryPort::issue(tlm::tlm_command command, std::uint64_t address, unsigned
   const tlm::tlm_sync_enum status = socket->nb_transport_fw(access, phase, delay);
   if (status != tlm::TLM_ACCEPTED) requesting_ = nullptr;
   if (status == tlm::TLM_COMPLETED || (status == tlm::TLM_UPDATED && phase == tlm::BEGIN_RESP)) {
-    complete(access, delay);
+    answer(access, delay);
     if (status == tlm::TLM_UPDATED) {
       phase = tlm::END_RESP;
       socket->nb_transport_fw(access, phase, delay);
@@ -86,7 +88,7 @@ tlm::tlm_sync_enum MemoryPort::nb_transport_bw(tlm::tlm_generic_payload& payload
     return tlm::TLM_ACCEPTED;
   }
   if (access.answered) throw SimulationFault(socket.name(), clock_.domain->now(), "a second response to a request");
-  complete(access, delay);
+  answer(access, delay);
   phase = tlm::END_RESP;
   access.release();
   return tlm::TLM_COMPLETED;
@@ -94,7 +96,7 @@ tlm::tlm_sync_enum MemoryPort::nb_transport_bw(tlm::tlm_generic_payload& payload
 
 void MemoryPort::free(tlm::tlm_generic_payload* payload) { free_accesses_.push_back(static_cast<Access*>(payload)); }
 
-class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
+class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>, public PromptMemory {
  public:
   MemoryTarget(const std::string& name, const FixedLatencyMemory& memory) : socket(name.c_str()), memory_(memory) {
     socket.bind(*this);
@@ -103,23 +105,26 @@ class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
   std::uint64_t bytes = 0;
 
  private:
-  void serve(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) {
-    // The delay that comes in says how far ahead of the clock the access is.
-    const std::uint64_t arrival =
-        (memory_.domain_.now() + memory_.domain_.whole_cycles(delay)) * memory_.bytes_per_cycle_.value();
-    const std::uint64_t start = free_at_ > arrival ? free_at_ : arrival;
-    free_at_ = start + payload.get_data_length();
-    bytes += payload.get_data_length();
-    const std::uint64_t transfer = memory_.bytes_per_cycle_.quotient_up(free_at_ - arrival);
-    delay += memory_.time_of(memory_.latency_cycles_ + transfer);
+  Cycle serve(Cycle arrival, unsigned length) override {
+    const std::uint64_t arrival_byte = arrival * memory_.bytes_per_cycle_.value();
+    free_at_ = std::max(free_at_, arrival_byte) + length;
+    bytes += length;
+    return arrival + memory_.latency_cycles_ + memory_.bytes_per_cycle_.quotient_up(free_at_ - arrival_byte);
+  }
+  const ClockDomain& clock() const override { return memory_.domain_; }
+
+  // The delay that comes in says how far ahead of the clock the access is.
+  void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) override {
+    const Cycle arrival = clock().now() + clock().whole_cycles(delay);
+    const Cycle taken = serve(arrival, payload.get_data_length()) - arrival;
+    delay += sc_core::sc_time::from_value(taken * clock().period().value());
     payload.set_response_status(tlm::TLM_OK_RESPONSE);
   }
   tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override {
-    if (phase == tlm::BEGIN_REQ) serve(payload, delay);
+    if (phase == tlm::BEGIN_REQ) b_transport(payload, delay);
     return tlm::TLM_COMPLETED;
   }
-  void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) override { serve(payload, delay); }
   bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
   unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
 
@@ -130,9 +135,6 @@ class FixedLatencyMemory::MemoryTarget : private tlm::tlm_fw_transport_if<> {
 FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, const ClockDomain& domain,
                                        unsigned latency_cycles, unsigned bytes_per_cycle, unsigned ports)
     : sc_module(name), domain_(domain), latency_cycles_(latency_cycles), bytes_per_cycle_(bytes_per_cycle) {
-  for (std::uint64_t cycles = 0; cycles < times_.size(); ++cycles) {
-    times_[cycles] = sc_core::sc_time::from_value(cycles * domain_.period().value());
-  }
   for (unsigned index = 0; index < ports; ++index) {
     ports_.push_back(std::make_unique<MemoryTarget>("port_" + std::to_string(index), *this));
   }

@@ -4,7 +4,6 @@
 #include <map>
 
 #include <vrpipe/error.h>
-#include <vrpipe/memory_port.h>
 
 namespace vrpipe {
 
@@ -48,8 +47,8 @@ TimedMemoryPort::TimedMemoryPort(PortOwner& owner, const std::string& name)
 
 TimedMemoryPort::~TimedMemoryPort() = default;
 
-Cycle TimedMemoryPort::access(tlm::tlm_command command, std::uint64_t address, unsigned bytes, Cycle at) {
-  check_alignment(socket, at, address, bytes);
+Cycle TimedMemoryPort::request(tlm::tlm_command command, std::uint64_t address, unsigned bytes, Cycle at) {
+  if (data_.empty()) prompt_ = prompt_memory_of(socket, *clock_.domain);  // from the second access on
   if (data_.size() < bytes) data_.resize(bytes);
   payload_.set_command(command);
   payload_.set_address(address);
@@ -59,16 +58,10 @@ Cycle TimedMemoryPort::access(tlm::tlm_command command, std::uint64_t address, u
   payload_.set_dmi_allowed(false);
   payload_.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
   const Cycle now = clock_.domain->now();
-  const Cycle ahead = std::max(at, now) - now;
-  // Most accesses are asked for together with others, and making a time is a call into the kernel.
-  if (ahead != ahead_) {
-    ahead_ = ahead;
-    delay_ = sc_core::sc_time::from_value(ahead * clock_.domain->period().value());
-  }
-  sc_core::sc_time delay = delay_;
+  auto delay = sc_core::sc_time::from_value((at - now) * clock_.domain->period().value());
   socket->b_transport(payload_, delay);
   check_response(socket, at, payload_);
-  return now + std::max(ahead, clock_.domain->cycles_up(delay));
+  return now + std::max(at - now, clock_.domain->cycles_up(delay));
 }
 
 void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker) { makers()[slot] = std::move(maker); }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -28,6 +28,20 @@ inline void check_response(const sc_core::sc_object& port, Cycle now, const tlm:
   if (access.is_response_error()) fault_of_response(port, now, access);
 }
 
+/// A memory that says as soon as an access begins when it will be complete. A port that is bound to one with nothing in
+/// between asks it directly instead of through the sockets, as with a direct memory interface; in the same cycles.
+class PromptMemory {
+ public:
+  virtual ~PromptMemory() = default;
+  /// Takes an access that arrives in a cycle; returns the cycle in which it is complete.
+  virtual Cycle serve(Cycle arrival, unsigned bytes) = 0;
+  /// Whose cycles these are.
+  virtual const ClockDomain& clock() const = 0;
+};
+
+/// The memory that a socket is bound to, if it is prompt and counts the cycles of this clock; null otherwise.
+PromptMemory* prompt_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock);
+
 /// An initiator on the unmodified TLM-2.0 base protocol, for timing only: payloads carry addresses and lengths, data
 /// stays with the behaviours. Accesses are naturally aligned and a power of two long, checked in every build.
 /// Understands early completion, annotated delays and all four phases, so that any memory model binds.
@@ -41,12 +55,12 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
 
   /// Whether another access can be issued now.
   bool available() const { return in_flight_ < most_in_flight_ && requesting_ == nullptr; }
-  /// Issues an access. Its tag comes back from `next_completed`.
+  /// Issues an access, in an edge of its unit. Its tag comes back from `next_completed`.
   void read(std::uint64_t address, unsigned bytes, std::uint32_t tag) {
-    issue(tlm::TLM_READ_COMMAND, address, bytes, tag);
+    access(tlm::TLM_READ_COMMAND, address, bytes, tag);
   }
   void write(std::uint64_t address, unsigned bytes, std::uint32_t tag) {
-    issue(tlm::TLM_WRITE_COMMAND, address, bytes, tag);
+    access(tlm::TLM_WRITE_COMMAND, address, bytes, tag);
   }
   /// Takes the next access that has completed, in a cycle after the one in which it was answered; false for none.
   bool next_completed(std::uint32_t& tag) {
@@ -70,9 +84,23 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
     Cycle at;
     std::uint32_t tag;
   };
+  void access(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag) {
+    const Cycle now = clock_.domain->now();
+    check_alignment(socket, now, address, bytes);
+    ++in_flight_;
+    if (prompt_ == nullptr) return request(command, address, bytes, tag);
+    complete(std::max(prompt_->serve(now, bytes), now + 1), tag);
+  }
   Access* unused_access();
-  void issue(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag);
-  void complete(Access& access, const sc_core::sc_time& delay);
+  [[gnu::noinline]] void request(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag);
+  void answer(Access& access, const sc_core::sc_time& delay);
+  void complete(Cycle at, std::uint32_t tag) {
+    // Nearly always the last: memories answer in order.
+    completions_.push_in_order({at, tag}, &Completion::at);
+    if (at >= next_completion_) return;  // its unit comes for the earlier one, and asks again then
+    next_completion_ = at;
+    clock_.domain->wake(clock_.unit, at);
+  }
   tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override;
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
@@ -82,7 +110,8 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   const ClockHandle& clock_;
   std::deque<Access> accesses_;  ///< as many as were ever in use at a time; free once answered and no longer held
   std::vector<Access*> free_accesses_;
-  Access* next_access_ = nullptr;  ///< for the next request
+  Access* next_access_ = nullptr;  ///< for the next request; null before the first
+  PromptMemory* prompt_ = nullptr;
   const unsigned most_in_flight_;
   unsigned in_flight_ = 0;
   Ring<Completion> completions_;  ///< by cycle
@@ -104,13 +133,9 @@ class FixedLatencyMemory : public sc_core::sc_module {
 
  private:
   class MemoryTarget;
-  sc_core::sc_time time_of(std::uint64_t cycles) const {
-    return cycles < times_.size() ? times_[cycles] : sc_core::sc_time::from_value(cycles * domain_.period().value());
-  }
   const ClockDomain& domain_;
   unsigned latency_cycles_;
   Divisor bytes_per_cycle_;
-  std::array<sc_core::sc_time, 1024> times_;  ///< of the first cycles, since making one is a call into the kernel
   std::vector<std::unique_ptr<MemoryTarget>> ports_;
 };
 

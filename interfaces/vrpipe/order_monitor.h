@@ -28,8 +28,10 @@ class BlendOrderMonitor {
     }
   }
   void blended(const ShadedWarp& warp, unsigned index, std::uint64_t cycle) { blended(warp, index, index + 1, cycle); }
-  /// A quad of this position will be blended before long.
-  void prefetch(TileId tile, unsigned position) const { __builtin_prefetch(&next_[place_of(tile, position)], 1); }
+  /// A quad of this position will be blended before long. Inlined, or GCC drops the call.
+  [[gnu::always_inline]] void prefetch(TileId tile, unsigned position) const {
+    __builtin_prefetch(&next_[place_of(tile, position)], 1);
+  }
 
  private:
   std::size_t place_of(TileId tile, unsigned position) const {

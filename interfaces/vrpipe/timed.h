@@ -9,6 +9,7 @@
 #include <vrpipe/batch.h>
 #include <vrpipe/divisor.h>
 #include <vrpipe/link.h>
+#include <vrpipe/memory_port.h>
 #include <vrpipe/ring.h>
 #include <vrpipe/unit.h>
 
@@ -478,17 +479,21 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<> {
   }
 
  private:
-  Cycle access(tlm::tlm_command command, std::uint64_t address, unsigned bytes, Cycle at);
+  Cycle access(tlm::tlm_command command, std::uint64_t address, unsigned bytes, Cycle at) {
+    check_alignment(socket, at, address, bytes);
+    at = std::max(at, clock_.domain->now());
+    return prompt_ == nullptr ? request(command, address, bytes, at) : prompt_->serve(at, bytes);
+  }
+  [[gnu::noinline]] Cycle request(tlm::tlm_command command, std::uint64_t address, unsigned bytes, Cycle at);
   tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload&, tlm::tlm_phase&, sc_core::sc_time&) override {
     return tlm::TLM_ACCEPTED;
   }
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
 
   const ClockHandle& clock_;
+  PromptMemory* prompt_ = nullptr;
   tlm::tlm_generic_payload payload_;
-  std::vector<unsigned char> data_;
-  Cycle ahead_ = 0;         ///< of the clock, the last access
-  sc_core::sc_time delay_;  ///< the same as a time
+  std::vector<unsigned char> data_;  ///< empty before the first access
 };
 
 /// Makes the module of a slot for `lt` or `at` around a behaviour.

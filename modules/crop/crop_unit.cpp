@@ -142,8 +142,9 @@ class CropUnit : public Unit {
     return std::any_of(recent_.begin(), recent_.end(), [&](const auto& blend) { return blend.first == address; });
   }
 
-  /// For the host: what blending a quad will touch was last touched long ago.
-  void prefetch(const ColorQuad& quad) const {
+  /// For the host: what blending a quad will touch was last touched long ago. Inlined, since GCC drops calls of
+  /// functions that do nothing but prefetch.
+  [[gnu::always_inline]] void prefetch(const ColorQuad& quad) const {
     __builtin_prefetch(&surface_->quad(quad.tile, quad.position), 1);
     __builtin_prefetch(&quad.color());
     __builtin_prefetch(&quad.warp->first_primitive[quad.index]);

@@ -209,6 +209,7 @@ class SmUnit : public Unit {
 
   void send() {
     while (!completed_.empty() && out_shaded_.credits() > 0) {
+      __builtin_prefetch(completed_.front());  // PROP reads it soon
       out_shaded_.push({completed_.front()});
       completed_.pop();
     }

@@ -8,6 +8,7 @@
 
 #include <vrpipe/error.h>
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/timed.h>
 
 namespace vrpipe {
 namespace {
@@ -50,6 +51,14 @@ class Reader : public sc_core::sc_module, public Clocked, public PortOwner {
   unsigned bytes_;
   unsigned in_flight_ = 0;
   std::uint64_t address_ = 0;
+};
+
+/// A timed port and whoever it takes to have one.
+class TimedReader : public sc_core::sc_module, public PortOwner {
+ public:
+  TimedReader(const sc_core::sc_module_name& name, ClockDomain& domain)
+      : sc_module(name), memory((clock.domain = &domain, *this), "memory") {}
+  TimedMemoryPort memory;
 };
 
 /// A memory of another make: approximately timed, all four phases, processes and time of its own.
@@ -170,6 +179,47 @@ class ImmediateMemory : public sc_core::sc_module, private tlm::tlm_fw_transport
   sc_core::sc_time delay_;
 };
 
+/// Stands between a port and its memory, so that they have to keep to the protocol.
+class Relay : public sc_core::sc_module, private tlm::tlm_fw_transport_if<>, private tlm::tlm_bw_transport_if<> {
+ public:
+  explicit Relay(const sc_core::sc_module_name& name) : sc_module(name), in("in"), out("out") {
+    in.bind(*static_cast<tlm::tlm_fw_transport_if<>*>(this));
+    out.bind(*static_cast<tlm::tlm_bw_transport_if<>*>(this));
+  }
+  tlm::tlm_target_socket<32> in;
+  tlm::tlm_initiator_socket<32> out;
+  unsigned accesses = 0;
+
+ private:
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                                     sc_core::sc_time& delay) override {
+    ++accesses;
+    return out->nb_transport_fw(payload, phase, delay);
+  }
+  tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                                     sc_core::sc_time& delay) override {
+    return in->nb_transport_bw(payload, phase, delay);
+  }
+  void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) override {
+    ++accesses;
+    out->b_transport(payload, delay);
+  }
+  bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
+  void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
+};
+
+std::unique_ptr<Relay> bind(tlm::tlm_initiator_socket<32>& port, FixedLatencyMemory& memory, bool relayed) {
+  if (!relayed) {
+    port.bind(memory.port(0));
+    return nullptr;
+  }
+  auto relay = std::make_unique<Relay>("relay");
+  port.bind(relay->in);
+  relay->out.bind(memory.port(0));
+  return relay;
+}
+
 class MemoryPortTest : public ::testing::Test {
  protected:
   MemoryPortTest() {
@@ -196,6 +246,38 @@ TEST_F(MemoryPortTest, AFixedLatencyMemoryMovesItsBytesPerCycle) {
   reader.memory.socket.bind(memory.port(0));
   sc_core::sc_start();
   EXPECT_EQ(reader.completed, (std::vector<Cycle>{11, 11, 12, 12, 13, 13, 14, 14}));
+}
+
+TEST_F(MemoryPortTest, AMemoryAskedDirectlyAnswersInTheSameCyclesAsThroughItsSocket) {
+  for (const unsigned bytes_per_cycle : {7U, 16U, 32U, 64U, 1024U}) {
+    std::vector<Cycle> issued, completed;
+    for (const bool relayed : {false, true}) {
+      fresh_simulation();
+      clock = std::make_unique<ClockDomain>("clock", 735);
+      Reader reader("reader", *clock, 5, 40);
+      FixedLatencyMemory memory("memory", *clock, 10, bytes_per_cycle, 1);
+      const std::unique_ptr<Relay> relay = bind(reader.memory.socket, memory, relayed);
+      sc_core::sc_start();
+      EXPECT_EQ(memory.bytes(), 40U * 32U);
+      if (relayed) {
+        EXPECT_EQ(relay->accesses, 40U);
+        EXPECT_EQ(reader.issued, issued) << bytes_per_cycle;
+        EXPECT_EQ(reader.completed, completed) << bytes_per_cycle;
+      }
+      issued = reader.issued;
+      completed = reader.completed;
+    }
+    EXPECT_EQ(completed.size(), 40U);
+  }
+}
+
+TEST_F(MemoryPortTest, AMemoryOfAnotherClockIsAskedThroughItsSocket) {
+  ClockDomain slow("slow", 4000);
+  Reader reader("reader", *clock, 2, 2);
+  FixedLatencyMemory memory("memory", slow, 10, 32, 1);
+  reader.memory.socket.bind(memory.port(0));
+  sc_core::sc_start();
+  EXPECT_EQ(reader.completed, (std::vector<Cycle>{44, 48})) << "11 and 12 of its cycles";
 }
 
 TEST_F(MemoryPortTest, NoMoreAccessesAreInFlightThanItHasSlots) {
@@ -292,6 +374,23 @@ TEST_F(MemoryPortTest, AnErrorResponseIsAFault) {
   ImmediateMemory memory("memory", ImmediateMemory::Way::error, sc_core::SC_ZERO_TIME);
   reader.memory.socket.bind(memory.socket);
   EXPECT_THROW(clock->run(cycles(100)), SimulationFault);
+}
+
+TEST_F(MemoryPortTest, ATimedPortAsksInTheSameCyclesDirectlyAsThroughTheSocket) {
+  for (const unsigned bytes_per_cycle : {7U, 32U, 64U}) {
+    std::vector<Cycle> completed[2];
+    for (const bool relayed : {false, true}) {
+      fresh_simulation();
+      clock = std::make_unique<ClockDomain>("clock", 735);
+      TimedReader reader("reader", *clock);
+      FixedLatencyMemory memory("memory", *clock, 10, bytes_per_cycle, 1);
+      const std::unique_ptr<Relay> relay = bind(reader.memory.socket, memory, relayed);
+      for (std::uint64_t i = 0; i < 40; ++i) completed[relayed].push_back(reader.memory.read(64 * i, 64, 3 * i / 2));
+      EXPECT_EQ(relayed ? relay->accesses : 40U, 40U);
+    }
+    EXPECT_EQ(completed[0], completed[1]) << bytes_per_cycle;
+    EXPECT_EQ(completed[0][0], 10U + (63U + bytes_per_cycle) / bytes_per_cycle);
+  }
 }
 
 TEST_F(MemoryPortTest, AnAccessThatIsNotNaturallyAlignedIsRefused) {
