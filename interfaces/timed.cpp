@@ -32,10 +32,14 @@ Cycle TimedUnit::tick(Cycle now) {
   bool served = true;
   while (served) {
     served = false;
-    for (TimedInput* input : inputs_) served = input->serve(until) || served;
+    for (TimedInput* input : inputs_) {
+      if (input->front() <= until) served = input->serve(until) || served;
+    }
     next = advance(until);
   }
-  for (const TimedInput* input : inputs_) next = std::min(next, input->next());
+  for (const TimedInput* input : inputs_) {
+    if (input->front() < next && input->may_serve()) next = input->front();
+  }
   return activation_for(next, now);
 }
 

@@ -141,8 +141,13 @@ class TimedInput {
   virtual ~TimedInput() = default;
   /// Handles the items visible up to a cycle, as long as they can be; false if there was none.
   virtual bool serve(Cycle until) = 0;
-  /// When an item is to be handled; `never` if none is there, or none can be.
-  virtual Cycle next() const = 0;
+  /// Whether the first item can be handled.
+  virtual bool may_serve() const = 0;
+  /// When the first item is visible; `never` if none is there.
+  Cycle front() const { return front_; }
+
+ protected:
+  Cycle front_ = never;
 };
 
 /// And of its outputs.
@@ -352,18 +357,24 @@ class TimedIn : public InEnd<Item>, public TimedInput {
 
   bool serve(Cycle until) override {
     bool served = false;
-    while (!queue_.empty() && queue_.front().visible.first <= until && may_serve()) {
+    while (front_ <= until && TimedIn::may_serve()) {
       const Entry& entry = queue_.front();
       const unsigned beats = entry.beats;
       const Span left = handler_(entry.item, entry.visible);
       queue_.pop();
+      front_ = queue_.empty() ? never : queue_.front().visible.first;
       queued_beats_ -= beats;
       grant(beats, beats == 1 ? Span(left.last + 1) : Span(left.first + 1, left.last + 1));
       served = true;
     }
     return served;
   }
-  Cycle next() const override { return queue_.empty() || !may_serve() ? never : queue_.front().visible.first; }
+  bool may_serve() const override {
+    for (const TimedOutput* out : sends_to_) {
+      if (out->blocked()) return false;
+    }
+    return !gate_ || gate_();
+  }
 
  private:
   friend class TimedOut<Item>;
@@ -373,11 +384,6 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     unsigned beats = 1;
     Item item;
   };
-
-  bool may_serve() const {
-    return (!gate_ || gate_()) &&
-           std::none_of(sends_to_.begin(), sends_to_.end(), [](const TimedOutput* out) { return out->blocked(); });
-  }
 
   Span visible(const StreamPayload<Item>& payload) const {
     const Cycle latency = latency_ + payload.latency;
@@ -437,6 +443,7 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     entry.item = *payload.item;
     const Cycle now = clock_.domain->now();
     const Cycle visible_at = entry.visible.first;
+    if (front_ == never) front_ = visible_at;
     clock_.domain->wake(clock_.unit,
                         depth_ < activation_cycles ? std::max(visible_at, now + 1) : activation_for(visible_at, now));
   }

@@ -97,7 +97,10 @@ class TimedCrop : public TimedUnit {
   Span pass(const ShadedWarp& warp, unsigned from, unsigned to, Span visible) {
     const unsigned quads = to - from;
     const QuadColor* const tile = &behaviour_->surface()->quad(warp.tile, 0);
-    for (unsigned i = from; i < to; ++i) __builtin_prefetch(tile + warp.position[i], 1);
+    for (unsigned i = from; i < to; ++i) {
+      __builtin_prefetch(tile + warp.position[i], 1);
+      monitor_->prefetch(warp.tile, warp.position[i]);
+    }
     behaviour_->look_up(warp, from, to, cache_);
     // Places in the queue, and lines that no queued quad needs.
     Cycle at = queue_.free_from(visible.first, quads);
