@@ -99,6 +99,7 @@ class TimedCrop : public TimedUnit {
     const QuadColor* const tile = &behaviour_->surface()->quad(warp.tile, 0);
     for (unsigned i = from; i < to; ++i) {
       __builtin_prefetch(tile + warp.position[i], 1);
+      __builtin_prefetch(&warp.color[i]);
       monitor_->prefetch(warp.tile, warp.position[i]);
     }
     behaviour_->look_up(warp, from, to, cache_);

@@ -33,7 +33,7 @@ inline SectorRun take_sector_run(std::uint32_t& mask, unsigned longest) {
   const unsigned four = (from_first & 15U) == 15U ? two & ~(first >> 1U) : 0U;
   unsigned count = std::min(1U + two + 2 * four, longest);
   count -= count == 3 ? 1U : 0U;
-  while (count >= 4 && first % (2 * count) == 0 && 2 * count <= longest &&
+  while (count >= 4 && 2 * count <= longest && (first & (2 * count - 1)) == 0 &&
          (mask & sector_mask(first, 2 * count)) == sector_mask(first, 2 * count)) {
     count *= 2;
   }

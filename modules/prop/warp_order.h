@@ -46,6 +46,7 @@ class WarpOrder {
     Waiting waiting;
     if (early_.take({line, number}, waiting)) {
       waiting.from = std::max(waiting.from, at);
+      __builtin_prefetch(waiting.warp);  // it came long ago, and leaves soon
       in_turn_.push(waiting);
     }
   }
