@@ -26,6 +26,24 @@ unsigned mask_of(const CycleVector& lanes) {
 #endif
 }
 
+constexpr std::size_t at_a_time = 64;
+
+/// Which of up to 64 are due, a bit each; they are due no longer. Several are looked at together and without branches,
+/// since which of them are due changes from edge to edge. Out of line, to leave the ticks the registers.
+[[gnu::noinline]] std::uint64_t take_due(Cycle* due, std::size_t count, Cycle cycle) {
+  std::uint64_t active = 0;
+  for (std::size_t place = count; place > 0;) {
+    place -= cycles_per_vector;
+    CycleVector wanted;
+    std::memcpy(&wanted, due + place, sizeof wanted);
+    const auto is_due = reinterpret_cast<CycleVector>(wanted == cycle);
+    wanted |= is_due;  // `never` has all bits set
+    std::memcpy(due + place, &wanted, sizeof wanted);
+    active = active << cycles_per_vector | mask_of(is_due);
+  }
+  return active;
+}
+
 }  // namespace
 
 ClockDomain::ClockDomain(const sc_core::sc_module_name& name, std::uint64_t period_ps)
@@ -41,7 +59,6 @@ ClockDomain::ClockDomain(const sc_core::sc_module_name& name, std::uint64_t peri
 unsigned ClockDomain::attach(Clocked& unit) {
   const auto handle = static_cast<unsigned>(units_.size());
   units_.push_back(&unit);
-  place_of_.push_back(handle);
   if (handle == due_.size()) due_.resize(due_.size() + cycles_per_vector, never);
   due_[handle] = 0;
   return handle;
@@ -54,13 +71,7 @@ void ClockDomain::set_tick_order(std::vector<unsigned> order) {
     throw SimulationFault(name(), now_, "the tick order is not a permutation of the units");
   }
   if (running_) throw SimulationFault(name(), now_, "the tick order is set after the first edge");
-  std::vector<Clocked*> units;
-  for (unsigned place = 0; place < order.size(); ++place) {
-    units.push_back(units_[place_of_[order[place]]]);
-    all[order[place]] = place;
-  }
-  units_ = std::move(units);
-  place_of_ = std::move(all);
+  tick_order_ = std::move(order);
 }
 
 void ClockDomain::start_of_simulation() { event_.notify(sc_core::SC_ZERO_TIME); }
@@ -77,14 +88,14 @@ void ClockDomain::edge() {
   const Cycle present = next_;
   // Through the kernel an exception would come out as a report of the kernel's.
   try {
-    do {
-      now_ = next_;
-      ++edges_;
-      some_soon_ = false;
-      tick_due();
-      next_ = some_soon_ ? now_ + 1 : *std::min_element(due_.begin(), due_.end());
-      if (next_ <= now_) throw SimulationFault(name(), now_, "a unit asked for an edge in the past");
-    } while (!finished_ && next_ - present < cycles_per_activation_);
+    // Mostly someone wants the very next cycle.
+    for (Cycle cycle = present; !finished_ && cycle - present < cycles_per_activation_;) {
+      const bool ticked = tick_order_.empty() ? tick_due(cycle) : tick_due_in_order(cycle);
+      if (ticked) ++edges_;
+      cycle = ticked ? cycle + 1 : *std::min_element(due_.begin(), due_.end());
+    }
+    next_ = *std::min_element(due_.begin(), due_.end());
+    if (next_ <= now_) throw SimulationFault(name(), now_, "a unit was woken for an edge in the past");
   } catch (...) {
     thrown_ = std::current_exception();
     finished_ = true;
@@ -93,39 +104,52 @@ void ClockDomain::edge() {
   if (!finished_ && next_ != never) event_.notify(sc_core::sc_time::from_value((next_ - present) * period_.value()));
 }
 
-void ClockDomain::tick_due() {
-  // Several units are looked at together and without branches, since which of them are due changes from edge to edge. A
-  // wake-up in this cycle is for a later one, so it does not matter who has ticked before it.
-  const Cycle now = now_;
-  Cycle* const due = due_.data();
-  Clocked* const* const units = units_.data();
-  bool soon = false;
-  for (std::size_t first = 0, end = 0; first < due_.size(); first = end) {
-    end = std::min(first + 64, due_.size());
-    std::uint64_t active = 0;
-    for (std::size_t place = end; place > first;) {
-      place -= cycles_per_vector;
-      CycleVector wanted;
-      std::memcpy(&wanted, due + place, sizeof wanted);
-      const auto is_due = reinterpret_cast<CycleVector>(wanted == now);
-      wanted |= is_due;  // `never` has all bits set
-      std::memcpy(due + place, &wanted, sizeof wanted);
-      active = active << cycles_per_vector | mask_of(is_due);
-    }
+void ClockDomain::fault_of_tick(const Clocked& unit) const {
+  const auto* const named = dynamic_cast<const sc_core::sc_object*>(&unit);
+  throw SimulationFault(named == nullptr ? name() : named->name(), now_, "it asked for an edge in the past");
+}
+
+inline void ClockDomain::tick(Clocked& unit, Cycle& due) {
+  const Cycle next = unit.tick(now_);
+  if (next <= now_) fault_of_tick(unit);
+  due = std::min(due, next);
+}
+
+bool ClockDomain::tick_due(Cycle cycle) {
+  // A wake-up in this cycle is for a later one, so it does not matter who has ticked before it.
+  bool any = false;
+  for (std::size_t first = 0; first < due_.size(); first += at_a_time) {
+    Cycle* const due = &due_[first];
+    Clocked* const* const units = &units_[first];
+    std::uint64_t active = take_due(due, std::min(at_a_time, due_.size() - first), cycle);
+    if (active == 0) continue;
+    any = true;
+    now_ = cycle;
     for (; active != 0; active &= active - 1) {
-      const std::size_t place = first + static_cast<unsigned>(__builtin_ctzll(active));
-      const Cycle next = units[place]->tick(now);
-      due[place] = std::min(due[place], next);
-      soon |= next == now + 1;
+      const auto place = static_cast<std::size_t>(__builtin_ctzll(active));
+      tick(*units[place], due[place]);
     }
   }
-  some_soon_ |= soon;
+  return any;
+}
+
+bool ClockDomain::tick_due_in_order(Cycle cycle) {
+  std::vector<unsigned> active;
+  for (const unsigned handle : tick_order_) {
+    if (due_[handle] != cycle) continue;
+    due_[handle] = never;
+    active.push_back(handle);
+  }
+  if (active.empty()) return false;
+  now_ = cycle;
+  for (const unsigned handle : active) tick(*units_[handle], due_[handle]);
+  return true;
 }
 
 void ClockDomain::wake_from_outside(unsigned handle, Cycle at) {
   if (finished_ || !running_) return;  // before the first edge all are due
   at = std::max(at, edge_after(sc_core::SC_ZERO_TIME));
-  Cycle& due = due_[place_of_[handle]];
+  Cycle& due = due_[handle];
   due = std::min(due, at);
   if (at >= next_) return;
   next_ = at;

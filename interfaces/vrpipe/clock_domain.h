@@ -44,9 +44,8 @@ class ClockDomain : public sc_core::sc_module {
   /// counts.
   void wake(unsigned handle, Cycle at) {
     if (!in_edge_) return wake_from_outside(handle, at);
-    Cycle& due = due_[place_of_[handle]];
+    Cycle& due = due_[handle];
     due = std::min(due, at);
-    some_soon_ |= at == now_ + 1;
   }
 
   /// The first edge that is later than the present time, and not before `delay` has passed.
@@ -80,17 +79,19 @@ class ClockDomain : public sc_core::sc_module {
 
  private:
   void edge();
-  void tick_due();
+  bool tick_due(Cycle cycle);
+  bool tick_due_in_order(Cycle cycle);
+  void tick(Clocked& unit, Cycle& due);
+  [[noreturn]] void fault_of_tick(const Clocked& unit) const;
   void wake_from_outside(unsigned handle, Cycle at);
   void start_of_simulation() override;
 
   sc_core::sc_time period_;
   Divisor period_value_;  ///< in units of sc_time
   sc_core::sc_event event_;
-  std::vector<Clocked*> units_;     ///< in the order in which they tick
-  std::vector<unsigned> place_of_;  ///< of a handle, in that order
-  std::vector<Cycle> due_;          ///< the edge that each wants; filled up with `never` to whole vectors
-  bool some_soon_ = false;          ///< someone wants the next cycle's edge
+  std::vector<Clocked*> units_;       ///< by handle
+  std::vector<Cycle> due_;            ///< the edge that each wants; filled up with `never` to whole vectors
+  std::vector<unsigned> tick_order_;  ///< of handles; empty for their own order
   Cycle now_ = 0;
   Cycle next_ = 0;  ///< the edge that is armed; `never` for none
   unsigned cycles_per_activation_ = 1;

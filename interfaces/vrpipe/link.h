@@ -79,7 +79,7 @@ class Port {
   /// Throws SimulationFault. Out of line, so that what does not fail stays short.
   [[noreturn]] void fault(const sc_core::sc_object& socket, const char* what) const;
 
-  const ClockHandle& clock_;
+  const ClockHandle clock_;
 
  private:
   bool stalls_at(Cycle cycle) const;
@@ -111,8 +111,9 @@ class OutPort : public Port {
 /// Whatever has ports: a unit, a test's source or sink.
 class PortOwner {
  public:
+  explicit PortOwner(ClockHandle handle) : clock(handle) {}
   virtual ~PortOwner() = default;
-  ClockHandle clock;
+  const ClockHandle clock;
   std::vector<InPort*> in_ports;
   std::vector<OutPort*> out_ports;
 };
@@ -185,16 +186,15 @@ class StreamOut : public OutEnd<Item> {
 
   void connect(InPort& in, unsigned depth, unsigned latency) override;
 
-  /// Free places at the receiver, as known at the start of this cycle.
+  /// Free places at the receiver, as known at the start of this cycle. For 0 of them the unit need not come back by
+  /// itself: a credit wakes it, and so does the end of a random stall.
   unsigned credits() {
     if (clock_.domain->now() > credit_cycle_) {
       credits_ += pending_;
       pending_ = 0;
     }
-    return this->stalled() ? 0 : credits_;
+    return this->stalled() ? wait_a_cycle() : credits_;
   }
-  /// When to look at `credits()` again if it is 0: `never`, since a credit wakes the unit, but for a random stall.
-  Cycle retry() const { return this->stalled() ? clock_.domain->now() + 1 : never; }
   /// Moves an item; `credits()` must not be 0.
   void push(const Item& item) {
     if (credits_ == 0) this->fault(this->socket, "an item was pushed without a credit");
@@ -209,6 +209,10 @@ class StreamOut : public OutEnd<Item> {
 
   friend class StreamIn<Item>;
 
+  [[gnu::noinline]] unsigned wait_a_cycle() {
+    clock_.domain->wake(clock_.unit, clock_.domain->now() + 1);
+    return 0;
+  }
   [[gnu::noinline]] void transfer(const Item& item) {
     payload_.item = &item;
     payload_.latency = this->pipeline_;

@@ -107,7 +107,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   /// The last holder of a payload, port or memory, has released it.
   void free(tlm::tlm_generic_payload* payload) override;
 
-  const ClockHandle& clock_;
+  const ClockHandle clock_;
   std::deque<Access> accesses_;  ///< as many as were ever in use at a time; free once answered and no longer held
   std::vector<Access*> free_accesses_;
   Access* next_access_ = nullptr;  ///< for the next request; null before the first

@@ -497,7 +497,7 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<> {
   }
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
 
-  const ClockHandle& clock_;
+  const ClockHandle clock_;
   PromptMemory* prompt_ = nullptr;
   tlm::tlm_generic_payload payload_;
   std::vector<unsigned char> data_;  ///< empty before the first access

@@ -224,7 +224,7 @@ class CropUnit : public Unit {
     // A quad at the link that could not be looked up waits for a completion or for the queue to move.
     Cycle next = memory_.next_completion();
     if (in_.next_ready() > now) next = std::min(next, in_.next_ready());
-    return std::min(next, out_.retry());
+    return next;
   }
 
   StreamIn<ColorBeat> in_;

@@ -36,7 +36,7 @@ class DrawUnit : public Unit {
     StreamOut<VertexWarp>& out = *outs_[turn_];
     if (out.credits() == 0) {
       enter(UnitState::blocked, now);
-      return out.retry();
+      return never;
     }
     enter(UnitState::busy, now);
     turn_ = (turn_ + 1) % outs_.size();

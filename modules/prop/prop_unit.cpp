@@ -149,10 +149,10 @@ class PropUnit : public Unit {
     }
     const bool has_work = current_ != nullptr || order_.has_next() || in_bins_.ready() || in_tested_.ready();
     enter(has_work ? UnitState::blocked : order_.has_early() ? UnitState::latency : UnitState::starved, now);
-    Cycle next = std::min({there_.free_at > now ? there_.free_at : never, back_.free_at > now ? back_.free_at : never,
-                           out_color_.retry(), out_release_.retry(), out_test_.retry(), out_survivors_.retry()});
-    for (const Cycle ready : {in_bins_.next_ready(), in_tested_.next_ready(), in_shaded_.next_ready()}) {
-      if (ready > now) next = std::min(next, ready);
+    Cycle next = never;
+    for (const Cycle at :
+         {there_.free_at, back_.free_at, in_bins_.next_ready(), in_tested_.next_ready(), in_shaded_.next_ready()}) {
+      if (at > now) next = std::min(next, at);
     }
     return next;
   }

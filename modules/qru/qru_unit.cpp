@@ -81,7 +81,7 @@ class QruUnit : public Unit {
       return now + 1;
     }
     enter(blocked ? UnitState::blocked : UnitState::starved, now);
-    return blocked ? out_.retry() : in_.next_ready();
+    return blocked ? never : in_.next_ready();
   }
 
   [[gnu::noinline]] void pass_end_of_draw() {

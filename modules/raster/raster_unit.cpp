@@ -77,7 +77,7 @@ class RasterUnit : public Unit {
         moved = moved || quad_budget != before;
         if (!taken && !moved) {
           enter(UnitState::blocked, now);
-          return out_.retry();
+          return never;
         }
         if (at_ < tile_.count) break;
       }
@@ -92,7 +92,7 @@ class RasterUnit : public Unit {
           if (out_.credits() == 0) {
             if (moved) break;
             enter(UnitState::blocked, now);
-            return out_.retry();
+            return never;
           }
           pass_end_of_draw();
           moved = true;

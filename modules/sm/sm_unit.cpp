@@ -311,7 +311,7 @@ class SmUnit : public Unit {
     // What could not be taken for want of a slot or a credit waits for the port that brings one.
     if (!slots_full_) next = std::min(next, std::max(in_warps_.next_ready(), now + 1));
     if (vertex_count_ < cost_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
-    return std::min({next, in_release_.next_ready(), out_shaded_.retry(), out_vertices_.retry()});
+    return std::min(next, in_release_.next_ready());
   }
 
   StreamIn<VertexWarp> in_vertices_;

@@ -131,7 +131,7 @@ class TcUnit : public Unit {
     }
     if (queued_ > 0 || drained_) {
       enter(UnitState::blocked, now);
-      return std::min({out_.retry(), has_room() ? in_.next_ready() : never, has_room() ? timeout_due() : never});
+      return has_room() ? std::min(in_.next_ready(), timeout_due()) : never;
     }
     enter(UnitState::starved, now);
     return std::min(in_.next_ready(), timeout_due());

@@ -86,7 +86,7 @@ class TgcUnit : public Unit {
     }
     const bool blocked = reading_out() || drained_;
     enter(blocked ? UnitState::blocked : UnitState::starved, now);
-    return blocked ? out_.retry() : in_.next_ready();
+    return blocked ? never : in_.next_ready();
   }
 
   StreamIn<PrimitiveItem> in_;

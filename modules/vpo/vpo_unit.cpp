@@ -38,11 +38,6 @@ class VpoUnit : public Unit {
   bool wanted(const PrimitiveItem& item, unsigned gpc) const {
     return item.end_of_draw || concerns(item.primitive, gpcs_, gpc);
   }
-  Cycle retry() const {
-    Cycle at = never;
-    for (const auto& out : outs_) at = std::min(at, out->retry());
-    return at;
-  }
 
   Cycle tick(Cycle now) override {
     unsigned budget = cost_.items_per_cycle;
@@ -53,7 +48,7 @@ class VpoUnit : public Unit {
         item.primitive = primitives_[at_];
         if (!send(item)) {
           enter(moved ? UnitState::busy : UnitState::blocked, now);
-          return moved ? now + 1 : retry();
+          return moved ? now + 1 : never;
         }
         ++at_;
         --budget;
@@ -82,7 +77,7 @@ class VpoUnit : public Unit {
           end.end_of_draw = true;
           if (!send(end)) {
             enter(UnitState::blocked, now);
-            return retry();
+            return never;
           }
           ended_ = true;
         }

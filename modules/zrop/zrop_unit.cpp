@@ -75,7 +75,7 @@ class ZropUnit : public Unit {
     }
     if (in_.ready()) {
       enter(UnitState::blocked, now);
-      return std::min(out_.retry(), in_terminations_.next_ready());
+      return in_terminations_.next_ready();
     }
     enter(UnitState::starved, now);
     return std::min(in_.next_ready(), in_terminations_.next_ready());

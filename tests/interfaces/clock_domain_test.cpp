@@ -93,6 +93,21 @@ TEST_F(ClockDomainTest, AWakeUpInACycleIsForALaterOneWhoeverTicksFirst) {
   }
 }
 
+TEST_F(ClockDomainTest, AWakeUpOfAUnitThatTicksInTheSameCycleIsKept) {
+  for (const bool waker_first : {true, false}) {
+    fresh_simulation();
+    ClockDomain domain("clock", 1000);
+    Ticker waker(domain, {10});
+    Ticker other(domain, {10});
+    waker.action = [&](Cycle now) {
+      if (now == 10) domain.wake(other.handle, 11);
+    };
+    domain.set_tick_order(waker_first ? std::vector<unsigned>{0, 1} : std::vector<unsigned>{1, 0});
+    sc_core::sc_start();
+    EXPECT_EQ(other.ticks, (std::vector<Cycle>{0, 10, 11}));
+  }
+}
+
 TEST_F(ClockDomainTest, TheEarliestOfSeveralWakeUpsCounts) {
   Ticker waker(*clock, {});
   Ticker sleeper(*clock, {50});
@@ -122,6 +137,31 @@ TEST_F(ClockDomainTest, FinishEndsAfterTheCycle) {
   sc_core::sc_start();
   EXPECT_EQ(a.ticks.back(), 2u);
   EXPECT_TRUE(clock->finished());
+}
+
+TEST_F(ClockDomainTest, AskingForAnEdgeInThePastStopsAtOnce) {
+  Ticker other(*clock, {4, 5, 6, 7, 8});
+  struct Late : sc_core::sc_module, Clocked {
+    Late(const sc_core::sc_module_name& name, ClockDomain& domain) : sc_module(name) { domain.attach(*this); }
+    Cycle tick(Cycle now) override { return now == 0 ? 5 : now; }
+  } late("late", *clock);
+  clock->set_cycles_per_activation(64);
+  try {
+    clock->run(sc_core::sc_time(1, sc_core::SC_SEC));
+    FAIL() << "nothing was thrown";
+  } catch (const SimulationFault& fault) {
+    EXPECT_STREQ(fault.what(), "late at cycle 5: it asked for an edge in the past");
+  }
+  EXPECT_EQ(other.ticks.back(), 5U);
+}
+
+TEST_F(ClockDomainTest, AWakeUpInThePastIsAFault) {
+  Ticker waker(*clock, {3});
+  Ticker sleeper(*clock, {});
+  waker.action = [&](Cycle now) {
+    if (now == 3) clock->wake(sleeper.handle, 3);
+  };
+  EXPECT_THROW(clock->run(sc_core::sc_time(1, sc_core::SC_SEC)), SimulationFault);
 }
 
 /// A module with time of its own, as a third-party memory is.

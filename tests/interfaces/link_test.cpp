@@ -127,10 +127,8 @@ TEST(Link, TheOrderInWhichTheEndsTickChangesNoCycle) {
 
 TEST(Link, APushWithoutACreditIsAFault) {
   struct Rude : sc_core::sc_module, Clocked, PortOwner {
-    Rude(const sc_core::sc_module_name& name, ClockDomain& domain) : sc_module(name), out(*this, "out") {
-      clock.domain = &domain;
-      clock.unit = domain.attach(*this);
-    }
+    Rude(const sc_core::sc_module_name& name, ClockDomain& domain)
+        : sc_module(name), PortOwner({&domain, domain.attach(*this)}), out(*this, "out") {}
     Cycle tick(Cycle) override {
       out.push(1);
       out.push(2);

@@ -18,7 +18,11 @@ class Reader : public sc_core::sc_module, public Clocked, public PortOwner {
  public:
   Reader(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned in_flight, unsigned accesses,
          unsigned bytes = 32)
-      : sc_module(name), memory(attach(domain), "memory", in_flight), left_(accesses), bytes_(bytes) {}
+      : sc_module(name),
+        PortOwner({&domain, domain.attach(*this)}),
+        memory(*this, "memory", in_flight),
+        left_(accesses),
+        bytes_(bytes) {}
 
   MemoryPort memory;
   std::vector<Cycle> issued, completed;
@@ -26,11 +30,6 @@ class Reader : public sc_core::sc_module, public Clocked, public PortOwner {
   unsigned most_in_flight = 0;
 
  private:
-  PortOwner& attach(ClockDomain& domain) {
-    clock.domain = &domain;
-    clock.unit = domain.attach(*this);
-    return *this;
-  }
   Cycle tick(Cycle now) override {
     std::uint32_t tag = 0;
     while (memory.next_completed(tag)) {
@@ -57,7 +56,7 @@ class Reader : public sc_core::sc_module, public Clocked, public PortOwner {
 class TimedReader : public sc_core::sc_module, public PortOwner {
  public:
   TimedReader(const sc_core::sc_module_name& name, ClockDomain& domain)
-      : sc_module(name), memory((clock.domain = &domain, *this), "memory") {}
+      : sc_module(name), PortOwner({&domain, 0}), memory(*this, "memory") {}
   TimedMemoryPort memory;
 };
 

@@ -20,10 +20,8 @@ class Sink : public sc_core::sc_module, public Clocked, public PortOwner {
     Item item;
   };
 
-  Sink(const sc_core::sc_module_name& name, ClockDomain& domain) : sc_module(name), in(*this, "in") {
-    clock.domain = &domain;
-    clock.unit = domain.attach(*this);
-  }
+  Sink(const sc_core::sc_module_name& name, ClockDomain& domain)
+      : sc_module(name), PortOwner({&domain, domain.attach(*this)}), in(*this, "in") {}
 
   /// At most so many items in a cycle.
   void set_rate(unsigned items_per_cycle) { rate_ = items_per_cycle; }

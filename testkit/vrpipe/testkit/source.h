@@ -16,10 +16,8 @@ namespace vrpipe::testkit {
 template <class Item>
 class Source : public sc_core::sc_module, public Clocked, public PortOwner {
  public:
-  Source(const sc_core::sc_module_name& name, ClockDomain& domain) : sc_module(name), out(*this, "out") {
-    clock.domain = &domain;
-    clock.unit = domain.attach(*this);
-  }
+  Source(const sc_core::sc_module_name& name, ClockDomain& domain)
+      : sc_module(name), PortOwner({&domain, domain.attach(*this)}), out(*this, "out") {}
 
   /// Adds an item that goes at cycle `earliest` or later. Also while the simulation runs: `earliest` is a later cycle.
   void add(const Item& item, Cycle earliest = 0) {
@@ -40,7 +38,7 @@ class Source : public sc_core::sc_module, public Clocked, public PortOwner {
     for (unsigned pushed = 0; !items_.empty(); ++pushed) {
       if (items_.front().earliest > now) return items_.front().earliest;
       if (pushed == rate_) return now + 1;
-      if (out.credits() == 0) return out.retry();
+      if (out.credits() == 0) return never;
       out.push(items_.front().item);
       sent_.push_back(now);
       items_.pop_front();
