@@ -210,7 +210,8 @@ void blend_quads(benchmark::State& state, ColorFormat format) {
     crop->attach(surface);
     quads = 0;
     for (const ShadedWarp& warp : f.shaded) {
-      for (unsigned i = 0; i < warp.count; ++i) crop->blend(warp.tile, warp.position[i], warp.live[i], warp.color[i]);
+      const std::size_t tile = surface.grid().place(warp.tile, 0);
+      for (unsigned i = 0; i < warp.count; ++i) crop->blend(tile + warp.position[i], warp.live[i], warp.color[i]);
       quads += warp.count;
     }
   }

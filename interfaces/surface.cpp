@@ -2,17 +2,13 @@
 
 namespace vrpipe {
 
-namespace {
-constexpr std::uint32_t tiles(std::uint32_t pixels) { return (pixels + screen_tile_pixels - 1) / screen_tile_pixels; }
-}  // namespace
-
 ColorSurface::ColorSurface(std::uint32_t width, std::uint32_t height, ColorFormat format)
     : width_(width),
       height_(height),
       format_(format),
-      tiles_x_(tiles(width)),
+      grid_(width, height),
       bytes_per_quad_(4 * bytes_per_pixel(format)),
-      quads_(std::size_t{tiles_x_} * tiles(height) * positions_per_tile) {}
+      quads_(grid_.size()) {}
 
 std::uint64_t ColorSurface::size_bytes() const { return std::uint64_t{quads_.size()} * bytes_per_quad_; }
 

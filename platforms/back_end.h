@@ -52,9 +52,11 @@ class BackEnd {
   template <class Signal>
   void run(const Warp& warp, Signal& signal) {
     // Shading takes longer than the memory does.
+    const std::size_t tile = surface_.grid().place(warp.tile, 0);
     for (unsigned i = 0; i < warp.count; ++i) {
-      __builtin_prefetch(&surface_.quad(warp.tile, warp.quads[i].position), 1);
-      monitor_.prefetch(warp.tile, warp.quads[i].position);
+      const std::size_t place = tile + warp.quads[i].position;
+      __builtin_prefetch(&surface_.quad(place), 1);
+      monitor_.prefetch(place);
     }
     sm->shade(warp, shaded_);
     if (work_ == nullptr) return blend(0, shaded_.count, signal);

@@ -6,6 +6,7 @@
 
 #include <vrpipe/blend.h>
 #include <vrpipe/payload.h>
+#include <vrpipe/quad_grid.h>
 
 namespace vrpipe {
 
@@ -33,19 +34,19 @@ class ColorSurface {
   std::uint32_t height() const { return height_; }
   ColorFormat format() const { return format_; }
 
-  QuadColor& quad(TileId tile, unsigned position) {
-    return quads_[(std::size_t{tile.y} * tiles_x_ + tile.x) * positions_per_tile + position];
-  }
-  const QuadColor& quad(TileId tile, unsigned position) const {
-    return quads_[(std::size_t{tile.y} * tiles_x_ + tile.x) * positions_per_tile + position];
-  }
+  const QuadGrid& grid() const { return grid_; }
+  QuadColor& quad(std::size_t place) { return quads_[place]; }
+  const QuadColor& quad(std::size_t place) const { return quads_[place]; }
+  QuadColor& quad(TileId tile, unsigned position) { return quads_[grid_.place(tile, position)]; }
+  const QuadColor& quad(TileId tile, unsigned position) const { return quads_[grid_.place(tile, position)]; }
 
   /// Byte address of a quad in the modelled memory. Tiles, and quads in them, are naturally aligned; quads of a tile
   /// follow in Morton order, 4x4 pixels a 4-quad group.
-  std::uint64_t address(TileId tile, unsigned position) const {
-    const std::uint64_t tile_index = std::uint64_t{tile.y} * tiles_x_ + tile.x;
-    return (tile_index * positions_per_tile + morton_order[position]) * bytes_per_quad_;
+  std::uint64_t address(std::size_t place) const {
+    const std::size_t position = place % positions_per_tile;
+    return (std::uint64_t{place} - position + morton_order[position]) * bytes_per_quad_;
   }
+  std::uint64_t address(TileId tile, unsigned position) const { return address(grid_.place(tile, position)); }
   std::uint64_t size_bytes() const;
 
   /// Red, green, blue, alpha of a pixel, premultiplied.
@@ -55,7 +56,7 @@ class ColorSurface {
   std::uint32_t width_;
   std::uint32_t height_;
   ColorFormat format_;
-  std::uint32_t tiles_x_;
+  QuadGrid grid_;
   std::uint32_t bytes_per_quad_;
   std::vector<QuadColor> quads_;
 };

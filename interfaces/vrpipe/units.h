@@ -195,14 +195,14 @@ class CropBehaviour : public Behaviour {
     LaneMask terminated;  ///< pixels to signal: those that newly passed the termination threshold (HET only)
     bool changed;         ///< whether a stored value is another one than before
   };
-  /// Blends the live samples of a quad.
-  virtual Outcome blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) = 0;
+  /// Blends the live samples of a quad into the one at a place of the surface's grid.
+  virtual Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) = 0;
   /// By quad of a warp.
   using Outcomes = std::array<Outcome, quads_per_warp>;
   /// Blends quads `from` to `to` - 1 of a warp, in this order.
   virtual void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
     for (unsigned i = from; i < to; ++i) {
-      outcomes[i] = blend(warp.tile, warp.position[i], warp.live[i], warp.color[i]);
+      outcomes[i] = blend(surface_->grid().place(warp.tile, warp.position[i]), warp.live[i], warp.color[i]);
     }
   }
 

@@ -63,9 +63,9 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
 
 // Out of line, so that the common case stays short.
 template <ColorFormat Format, BlendRounding Rounding>
-void ColorRop<Format, Rounding>::count_trouble(TileId tile, unsigned position, LaneMask live, const QuadColor& color,
+void ColorRop<Format, Rounding>::count_trouble(std::size_t place, LaneMask live, const QuadColor& color,
                                                LanePair red_green, LanePair blue_alpha) {
-  const QuadColor& stored = surface_->quad(tile, position);
+  const QuadColor& stored = surface_->quad(place);
   QuadColor destination;
   store({red_green, blue_alpha}, destination);
   const LaneBits lanes = expand_mask(live);
@@ -76,10 +76,8 @@ void ColorRop<Format, Rounding>::count_trouble(TileId tile, unsigned position, L
 
   const LaneBits swallowed = lanes & (stored.alpha == destination.alpha) & ~passes(stored.alpha);
   if (sign_mask(swallowed) == 0) return;
-  const std::uint32_t tiles_x = (surface_->width() + screen_tile_pixels - 1) / screen_tile_pixels;
-  const std::uint32_t tiles_y = (surface_->height() + screen_tile_pixels - 1) / screen_tile_pixels;
-  if (swallowed_.empty()) swallowed_.assign(std::size_t{tiles_x} * tiles_y * positions_per_tile, splat_lanes(1.0F));
-  Lanes& transmittance = swallowed_[(std::size_t{tile.y} * tiles_x + tile.x) * positions_per_tile + position];
+  if (swallowed_.empty()) swallowed_.assign(surface_->grid().size(), splat_lanes(1.0F));
+  Lanes& transmittance = swallowed_[place];
   fragments_swallowed += popcount(sign_mask(swallowed));
   transmittance = select(swallowed, transmittance * (1.0F - color.alpha), transmittance);
   const LaneBits stuck = passes(1.0F - (1.0F - stored.alpha) * transmittance) & (transmittance >= 0.0F) & swallowed;
@@ -89,8 +87,10 @@ void ColorRop<Format, Rounding>::count_trouble(TileId tile, unsigned position, L
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
-[[gnu::always_inline]] inline CropBehaviour::Outcome ColorRop<Format, Rounding>::blend_into(
-    QuadColor& destination, TileId tile, unsigned position, LaneMask live, const QuadColor& color) {
+[[gnu::always_inline]] inline CropBehaviour::Outcome ColorRop<Format, Rounding>::blend_into(QuadColor& destination,
+                                                                                            std::size_t place,
+                                                                                            LaneMask live,
+                                                                                            const QuadColor& color) {
   if (drops_late_) {
     const auto closed = static_cast<LaneMask>(live & sign_mask(passes(destination.alpha)));
     fragments_dropped_late += popcount(closed);
@@ -131,22 +131,22 @@ template <ColorFormat Format, BlendRounding Rounding>
     const unsigned blue = sign_mask(blended.blue_alpha >= largest_color);
     trouble |= red_green | red_green >> 4U | blue;  // alpha, in the upper bits, is none of it
   }
-  if ((trouble & live) != 0) count_trouble(tile, position, live, color, before.red_green, before.blue_alpha);
+  if ((trouble & live) != 0) count_trouble(place, live, color, before.red_green, before.blue_alpha);
   return {static_cast<LaneMask>(signalled), changed};
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
-CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(TileId tile, unsigned position, LaneMask live,
-                                                         const QuadColor& color) {
-  return blend_into(surface_->quad(tile, position), tile, position, live, color);
+CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(std::size_t place, LaneMask live, const QuadColor& color) {
+  return blend_into(surface_->quad(place), place, live, color);
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
-  QuadColor* const tile = &surface_->quad(warp.tile, 0);
+  const std::size_t tile = surface_->grid().place(warp.tile, 0);
+  QuadColor* const quads = &surface_->quad(tile);
   for (unsigned i = from; i < to; ++i) {
     const unsigned position = warp.position[i];
-    outcomes[i] = blend_into(tile[position], warp.tile, position, warp.live[i], warp.color[i]);
+    outcomes[i] = blend_into(quads[position], tile + position, warp.live[i], warp.color[i]);
   }
 }
 

@@ -71,7 +71,7 @@ class ColorRop : public CropBehaviour {
  public:
   ColorRop(const CropParameters& parameters, const RenderState& state);
 
-  Outcome blend(TileId tile, unsigned position, LaneMask live, const QuadColor& color) override;
+  Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) override;
   void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) override;
   void look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) override;
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override { cache_->dirty(line, sectors); }
@@ -97,11 +97,11 @@ class ColorRop : public CropBehaviour {
                                          : Format == ColorFormat::rgba16f ? half_max
                                                                           : std::numeric_limits<float>::infinity();
 
-  Outcome blend_into(QuadColor& destination, TileId tile, unsigned position, LaneMask live, const QuadColor& color);
+  Outcome blend_into(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color);
   LaneBits passes(Lanes alpha) const { return alpha >= threshold_; }
   /// After a blend of `color` into a quad that held the channels given.
-  [[gnu::noinline]] void count_trouble(TileId tile, unsigned position, LaneMask live, const QuadColor& color,
-                                       LanePair red_green, LanePair blue_alpha);
+  [[gnu::noinline]] void count_trouble(std::size_t place, LaneMask live, const QuadColor& color, LanePair red_green,
+                                       LanePair blue_alpha);
 
   const bool signals_;
   const float threshold_;  ///< that alpha reaches to be terminated

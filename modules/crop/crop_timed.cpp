@@ -96,11 +96,13 @@ class TimedCrop : public TimedUnit {
   /// Looks quads of a warp up and blends them; returns the cycles of the look-ups.
   Span pass(const ShadedWarp& warp, unsigned from, unsigned to, Span visible) {
     const unsigned quads = to - from;
-    const QuadColor* const tile = &behaviour_->surface()->quad(warp.tile, 0);
+    const ColorSurface& surface = *behaviour_->surface();
+    const std::size_t tile = surface.grid().place(warp.tile, 0);
     for (unsigned i = from; i < to; ++i) {
-      __builtin_prefetch(tile + warp.position[i], 1);
+      const std::size_t place = tile + warp.position[i];
+      __builtin_prefetch(&surface.quad(place), 1);
       __builtin_prefetch(&warp.color[i]);
-      monitor_->prefetch(warp.tile, warp.position[i]);
+      monitor_->prefetch(place);
     }
     behaviour_->look_up(warp, from, to, cache_);
     // Places in the queue, and lines that no queued quad needs.
@@ -139,12 +141,12 @@ class TimedCrop : public TimedUnit {
   }
 
   void blend(const ShadedWarp& warp, unsigned from, unsigned to, Span at) {
+    monitor_->blended(warp, from, to, at.last);
     TerminationBeat signals;
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
     std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
     for (unsigned i = from; i < to; ++i) {
-      monitor_->blended(warp, i, at.last);
       const CropBehaviour::Outcome outcome = outcomes[i];
       dirty[cache_.line_of[i]] |= outcome.changed || cost_.writes_unchanged ? cache_.sectors_of[i] : 0U;
       if (outcome.terminated == 0) continue;

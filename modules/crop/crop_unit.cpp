@@ -26,6 +26,9 @@ class CropUnit : public Unit {
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
         signals_(state.early_termination),
+        price_(cost_.sectors_per_cycle),
+        sector_price_(cost_.quads_per_cycle),
+        income_(price_ * sector_price_),
         memory_(*this, "memory", 2 * cost_.mshrs) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
@@ -43,6 +46,7 @@ class CropUnit : public Unit {
     ColorQuad quad;
     CropCache::Line line = CropCache::no_line;
     std::uint32_t sectors = 0;  ///< of the line, a bit each
+    std::uint32_t place = 0;    ///< in the surface's grid
   };
   // What a memory access is for: a sector of a line, or nothing that anyone waits for.
   static constexpr std::uint32_t write_back_tag = ~0U;
@@ -86,7 +90,7 @@ class CropUnit : public Unit {
       const SectorRun run = take_sector_run(write_back_, cost_.line_bytes / cost_.sector_bytes);
       memory_.write(write_back_address_ + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_,
                     write_back_tag);
-      tokens_ -= static_cast<std::int32_t>(run.count * cost_.quads_per_cycle);
+      tokens_ -= run.count * sector_price_;
     }
     return write_back_ == 0;
   }
@@ -94,7 +98,8 @@ class CropUnit : public Unit {
   /// Takes a quad from the link into the queue; false when it has to wait.
   bool look_up(const ColorQuad& quad) {
     if (!write_back()) return false;
-    const std::uint64_t address = surface_->address(quad.tile, quad.position);
+    const std::size_t place = surface_->grid().place(quad.tile, quad.position);
+    const std::uint64_t address = surface_->address(place);
     const CropCache::Line line = line_of(address);
     if (line == CropCache::no_line) return false;
     const std::uint64_t offset = address & (cost_.line_bytes - 1);
@@ -106,10 +111,15 @@ class CropUnit : public Unit {
                    fill_tag(line, sector));
       cache_->start_fill(line, sector);
       ++fills_in_flight_;
-      tokens_ -= static_cast<std::int32_t>(cost_.quads_per_cycle);
+      tokens_ -= sector_price_;
     }
     cache_->pin(line);
-    queue_.push({quad, line, sectors});
+    // In place: a temporary of narrow stores would be waited for when it is copied.
+    Entry& entry = queue_.push();
+    entry.quad = quad;
+    entry.line = line;
+    entry.sectors = sectors;
+    entry.place = static_cast<std::uint32_t>(place);
     return true;
   }
 
@@ -137,29 +147,26 @@ class CropUnit : public Unit {
   }
 
   /// Whether a quad of the same position is still in the blending pipeline.
-  bool hazard(std::uint64_t address, Cycle now) {
+  bool hazard(std::uint32_t place, Cycle now) {
     while (!recent_.empty() && recent_.front().second + cost_.latency_cycles <= now) recent_.pop_front();
-    return std::any_of(recent_.begin(), recent_.end(), [&](const auto& blend) { return blend.first == address; });
+    return std::any_of(recent_.begin(), recent_.end(), [&](const auto& blend) { return blend.first == place; });
   }
 
   /// For the host: what blending a quad will touch was last touched long ago. Inlined, since GCC drops calls of
   /// functions that do nothing but prefetch.
-  [[gnu::always_inline]] void prefetch(const ColorQuad& quad) const {
-    __builtin_prefetch(&surface_->quad(quad.tile, quad.position), 1);
-    __builtin_prefetch(&quad.color());
-    __builtin_prefetch(&quad.warp->first_primitive[quad.index]);
-    monitor_->prefetch(quad.tile, quad.position);
+  [[gnu::always_inline]] void prefetch(const Entry& entry) const {
+    __builtin_prefetch(&surface_->quad(entry.place), 1);
+    __builtin_prefetch(&entry.quad.color());
+    __builtin_prefetch(&entry.quad.warp->first_primitive[entry.quad.index]);
+    monitor_->prefetch(entry.place);
   }
 
   /// Blends from the head of the queue; why it stopped is in `stop_`.
   bool blend(Cycle now) {
     // What sectors took from blending is paid back first; unused cycles are lost, fractions of a quad are not.
-    const auto full = static_cast<std::int32_t>(cost_.quads_per_cycle * cost_.sectors_per_cycle);
-    const auto price = static_cast<std::int32_t>(cost_.sectors_per_cycle);
     if (now > refilled_) {
-      const Cycle gap = std::min<Cycle>(now - refilled_, 1U << 20U);
-      tokens_ = static_cast<std::int32_t>(
-          std::min<std::int64_t>(full + price - 1, tokens_ + static_cast<std::int64_t>(gap) * full));
+      tokens_ =
+          std::min<std::int64_t>(income_ + price_ - 1, tokens_ + static_cast<std::int64_t>(now - refilled_) * income_);
       refilled_ = now;
     }
     TerminationBeat beat;
@@ -175,30 +182,29 @@ class CropUnit : public Unit {
         stop_ = UnitState::memory;
         break;
       }
-      if (tokens_ < price) {
+      if (tokens_ < price_) {
         stop_ = UnitState::memory;
         break;
       }
       if (!cost_.forwards) {
-        const std::uint64_t address = surface_->address(entry.quad.tile, entry.quad.position);
-        if (hazard(address, now)) {
+        if (hazard(entry.place, now)) {
           stop_ = UnitState::latency;
           break;
         }
-        recent_.emplace_back(address, now);
+        recent_.emplace_back(entry.place, now);
       }
       const ColorQuad& quad = entry.quad;
-      monitor_->blended(*quad.warp, quad.index, now);
-      const CropBehaviour::Outcome outcome = behaviour_->blend(quad.tile, quad.position, quad.live, quad.color());
+      monitor_->blended(entry.place, *quad.warp, quad.index, now);
+      const CropBehaviour::Outcome outcome = behaviour_->blend(entry.place, quad.live, quad.color());
       if (outcome.terminated != 0) {
         beat.signals[beat.count++] = {quad.tile, quad.position, outcome.terminated};
       }
       quad.warp->release();
       if (outcome.changed || cost_.writes_unchanged) cache_->dirty(entry.line, entry.sectors);
       cache_->unpin(entry.line);
-      tokens_ -= price;
+      tokens_ -= price_;
       queue_.pop();
-      if (queue_.size() > quads_ahead) prefetch(queue_[quads_ahead].quad);
+      if (queue_.size() > quads_ahead) prefetch(queue_[quads_ahead]);
       ++blended_;
       last_blend_ = now;
       moved = true;
@@ -217,8 +223,7 @@ class CropUnit : public Unit {
     }
     enter(blended ? UnitState::busy : !queue_.empty() ? stop_ : UnitState::starved, now);
     if (blended || accepted ||
-        (!queue_.empty() && stop_ != UnitState::blocked &&
-         (stop_ == UnitState::latency || tokens_ < static_cast<std::int32_t>(cost_.sectors_per_cycle)))) {
+        (!queue_.empty() && stop_ != UnitState::blocked && (stop_ == UnitState::latency || tokens_ < price_))) {
       return now + 1;
     }
     // A quad at the link that could not be looked up waits for a completion or for the queue to move.
@@ -232,6 +237,9 @@ class CropUnit : public Unit {
   std::unique_ptr<CropBehaviour> behaviour_;
   const CropBehaviour::Cost cost_;
   const bool signals_;
+  const std::int64_t price_;         ///< of blending a quad, in tokens
+  const std::int64_t sector_price_;  ///< of moving a sector
+  const std::int64_t income_;        ///< of a cycle: what so many quads, or so many sectors, cost
   MemoryPort memory_;
   const ColorSurface* surface_ = nullptr;
   std::unique_ptr<CropCache> cache_;
@@ -243,9 +251,9 @@ class CropUnit : public Unit {
   unsigned fills_in_flight_ = 0;
   std::uint32_t write_back_ = 0;  ///< dirty sectors of an evicted line yet to be sent
   std::uint64_t write_back_address_ = 0;
-  std::int32_t tokens_ = 0;  ///< quads_per_cycle * sectors_per_cycle are a cycle
+  std::int64_t tokens_ = 0;
   Cycle refilled_ = 0;
-  std::deque<std::pair<std::uint64_t, Cycle>> recent_;  ///< blends in the pipeline, without forwarding
+  std::deque<std::pair<std::uint32_t, Cycle>> recent_;  ///< blends in the pipeline, without forwarding
   UnitState stop_ = UnitState::starved;
   bool ending_ = false;
   Cycle last_blend_ = 0;

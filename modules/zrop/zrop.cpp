@@ -4,19 +4,15 @@
 
 namespace vrpipe {
 
-namespace {
-std::uint32_t tiles(std::uint32_t pixels) { return (pixels + screen_tile_pixels - 1) / screen_tile_pixels; }
-}  // namespace
-
 DepthStencilRop::DepthStencilRop(const Parameters& parameters, const RenderState& state)
     : cost_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.updates_per_cycle},
-      tiles_x_(tiles(state.draw->width)),
-      terminated_(std::size_t{tiles_x_} * tiles(state.draw->height) * positions_per_tile) {}
+      grid_(state.draw->width, state.draw->height),
+      terminated_(grid_.size()) {}
 
 void DepthStencilRop::test(QuadBeat& beat) {
   unsigned kept = 0;
   quads_tested += beat.count;
-  const std::uint8_t* const tile_bits = &terminated(beat.tile, 0);
+  const std::uint8_t* const tile_bits = &terminated_[grid_.place(beat.tile, 0)];
   for (unsigned i = 0; i < beat.count; ++i) {
     Quad quad = beat.quads[i];
     const unsigned dead = quad.coverage & tile_bits[quad.position];

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <vrpipe/parameter.h>
+#include <vrpipe/quad_grid.h>
 #include <vrpipe/units.h>
 
 namespace vrpipe {
@@ -43,16 +44,13 @@ class DepthStencilRop : public ZropBehaviour {
   Counter termination_updates{*this, "termination_updates", "signals", "received from CROP, one for a quad's pixels"};
 
  private:
-  std::uint8_t& terminated(TileId tile, unsigned position) {
-    return terminated_[(std::size_t{tile.y} * tiles_x_ + tile.x) * positions_per_tile + position];
-  }
   void mark(const TerminationSignal& signal) {
-    std::uint8_t& bits = terminated(signal.tile, signal.position);
+    std::uint8_t& bits = terminated_[grid_.place(signal.tile, signal.position)];
     bits = static_cast<std::uint8_t>(bits | signal.pixels);
   }
 
   const Cost cost_;
-  const std::uint32_t tiles_x_;
+  const QuadGrid grid_;
   std::vector<std::uint8_t> terminated_;  ///< the stencil MSBs of a quad position's four pixels
   TerminationForesight* foresight_ = nullptr;
   std::vector<Quad> survivors_;  ///< of the bin under test, for the foresight

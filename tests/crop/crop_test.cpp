@@ -38,7 +38,7 @@ class ColorRopTest : public ::testing::Test {
     return 0;
   }
   LaneMask blend(float alpha, LaneMask live = all_lanes, unsigned position = 0, float grey = 1) {
-    return crop->blend({0, 0}, position, live, color_of(alpha * grey, alpha * grey, alpha * grey, alpha)).terminated;
+    return crop->blend(position, live, color_of(alpha * grey, alpha * grey, alpha * grey, alpha)).terminated;
   }
   void set_alpha(float alpha) { surface->quad({0, 0}, 0).alpha = splat_lanes(alpha); }
   float alpha(unsigned lane = 0) const { return surface->quad({0, 0}, 0).alpha[lane]; }
@@ -95,7 +95,7 @@ TEST_F(ColorRopTest, PixelsThatTerminateTogetherAreOneSignal) {
 TEST_F(ColorRopTest, AMergedQuadThatTerminatesItsPixelsSignalsOnce) {
   make();
   const QuadColor merged = blend_front_to_back(color_of(0, 0, 0, 0.99F), color_of(0, 0, 0, 0.99F));
-  EXPECT_EQ(crop->blend({0, 0}, 0, all_lanes, merged).terminated, all_lanes);
+  EXPECT_EQ(crop->blend(0, all_lanes, merged).terminated, all_lanes);
   EXPECT_EQ(count("termination_signals"), 1U);
   EXPECT_EQ(half_bits(alpha()), 0x3C00);
 }
@@ -114,7 +114,7 @@ TEST_F(ColorRopTest, TheThresholdIsPassedAtTheFirstStoredAlphaNotBelowIt) {
     make();
     QuadColor fragment{};
     fragment.alpha = splat_lanes(stored);
-    return crop->blend({0, 0}, 0, all_lanes, fragment).terminated != 0;
+    return crop->blend(0, all_lanes, fragment).terminated != 0;
   };
   for (const bool inclusive : {true, false}) {
     EXPECT_TRUE(passes(ColorFormat::rgba16f, inclusive, half_value(0x3BF8)));
@@ -140,7 +140,7 @@ TEST_F(ColorRopTest, AcrossTheThresholdAPairDiffersFromItsPartsByTheMissingTrans
   make();
   set_alpha(0.995F);
   const QuadColor pair = blend_front_to_back(color_of(0.5F, 0, 0, 0.5F), color_of(0.5F, 0, 0, 0.5F));
-  crop->blend({0, 0}, 0, all_lanes, pair);
+  crop->blend(0, all_lanes, pair);
   EXPECT_NEAR(static_cast<double>(alpha()), 0.99875, 1e-6);
   EXPECT_LE(alpha() - unmerged, 0.004F);
 }
@@ -151,13 +151,13 @@ TEST_F(ColorRopTest, StrictlyAFragmentOfATerminatedPixelIsDropped) {
   blend(0.99F, 0b0011);
   blend(0.9F, 0b0011);
   const float before = alpha(0);
-  const CropBehaviour::Outcome part = crop->blend({0, 0}, 0, 0b0110, color_of(0.5F, 0.5F, 0.5F, 0.5F));
+  const CropBehaviour::Outcome part = crop->blend(0, 0b0110, color_of(0.5F, 0.5F, 0.5F, 0.5F));
   EXPECT_TRUE(part.changed);
   EXPECT_EQ(alpha(1), before);
   EXPECT_EQ(alpha(2), 0.5F);
   EXPECT_EQ(count("fragments_dropped_late"), 1U);
   EXPECT_EQ(count("quads_dropped_late"), 0U);
-  const CropBehaviour::Outcome all = crop->blend({0, 0}, 0, 0b0001, color_of(0.5F, 0.5F, 0.5F, 0.5F));
+  const CropBehaviour::Outcome all = crop->blend(0, 0b0001, color_of(0.5F, 0.5F, 0.5F, 0.5F));
   EXPECT_FALSE(all.changed);
   EXPECT_EQ(count("fragments_dropped_late"), 2U);
   EXPECT_EQ(count("quads_dropped_late"), 1U);
@@ -176,10 +176,10 @@ TEST_F(ColorRopTest, InPaperTerminationALateFragmentStillBlendsByWhatIsLeftAtMos
 
 TEST_F(ColorRopTest, TellsWhetherAValueChanged) {
   make();
-  EXPECT_TRUE(crop->blend({0, 0}, 0, all_lanes, color_of(0.5F, 0, 0, 0.5F)).changed);
-  EXPECT_FALSE(crop->blend({0, 0}, 0, all_lanes, color_of(0, 0, 0, 0)).changed);
+  EXPECT_TRUE(crop->blend(0, all_lanes, color_of(0.5F, 0, 0, 0.5F)).changed);
+  EXPECT_FALSE(crop->blend(0, all_lanes, color_of(0, 0, 0, 0)).changed);
   set_alpha(1.0F);
-  EXPECT_FALSE(crop->blend({0, 0}, 0, all_lanes, color_of(0.5F, 0.5F, 0.5F, 0.5F)).changed);
+  EXPECT_FALSE(crop->blend(0, all_lanes, color_of(0.5F, 0.5F, 0.5F, 0.5F)).changed);
 }
 
 // case B10
@@ -192,7 +192,7 @@ TEST_F(ColorRopTest, AThousandQuadsOnOnePositionAreTheSequentialResult) {
     for (std::uint64_t i = 0; i < 1000; ++i) {
       const float a = testing::uniform(9, i, 0.001F, 0.02F);
       const QuadColor fragment = color_of(a * 0.3F, a * 0.9F, a, a);
-      crop->blend({1, 1}, 7, all_lanes, fragment);
+      crop->blend(surface->grid().place({1, 1}, 7), all_lanes, fragment);
       expected = reference(expected, fragment);
     }
     EXPECT_EQ(std::memcmp(&surface->quad({1, 1}, 7), &expected, sizeof expected), 0) << name_of(format);
@@ -230,7 +230,8 @@ TEST_F(ColorRopTest, QuadsOfAWarpAreBlendedAsOneByOne) {
         crop->blend_quads(warp, from, warp.count, outcomes);
       } else {
         for (unsigned i = from; i < warp.count; ++i) {
-          outcomes[i] = crop->blend(warp.tile, warp.position[i], warp.live[i], warp.color[i]);
+          const std::size_t place = surface->grid().place(warp.tile, warp.position[i]);
+          outcomes[i] = crop->blend(place, warp.live[i], warp.color[i]);
         }
       }
       for (const CropBehaviour::Outcome outcome : outcomes) {

@@ -61,17 +61,17 @@ ShadedWarp one_quad(TileId tile, std::uint8_t position, std::uint32_t first, std
 
 TEST(BlendOrderMonitor, TakesRisingPrimitivesPerPositionInAnyOrderAcrossPositions) {
   BlendOrderMonitor monitor(64, 64);
-  EXPECT_NO_THROW(monitor.blended(one_quad({1, 1}, 5, 10, 10), 0, 1));
-  EXPECT_NO_THROW(monitor.blended(one_quad({1, 1}, 6, 3, 3), 0, 2));
-  EXPECT_NO_THROW(monitor.blended(one_quad({2, 1}, 5, 3, 3), 0, 3));
-  EXPECT_NO_THROW(monitor.blended(one_quad({1, 1}, 5, 11, 14), 0, 4));
+  EXPECT_NO_THROW(monitor.blended(one_quad({1, 1}, 5, 10, 10), 0, 1, 1));
+  EXPECT_NO_THROW(monitor.blended(one_quad({1, 1}, 6, 3, 3), 0, 1, 2));
+  EXPECT_NO_THROW(monitor.blended(one_quad({2, 1}, 5, 3, 3), 0, 1, 3));
+  EXPECT_NO_THROW(monitor.blended(one_quad({1, 1}, 5, 11, 14), 0, 1, 4));
 }
 
 TEST(BlendOrderMonitor, CatchesAPrimitiveThatComesAfterALaterOne) {
   BlendOrderMonitor monitor(64, 64);
-  monitor.blended(one_quad({1, 1}, 5, 11, 14), 0, 1);
-  EXPECT_THROW(monitor.blended(one_quad({1, 1}, 5, 13, 16), 0, 2), SimulationFault);
-  EXPECT_THROW(monitor.blended(one_quad({1, 1}, 5, 17, 16), 0, 3), SimulationFault);
+  monitor.blended(one_quad({1, 1}, 5, 11, 14), 0, 1, 1);
+  EXPECT_THROW(monitor.blended(one_quad({1, 1}, 5, 13, 16), 0, 1, 2), SimulationFault);
+  EXPECT_THROW(monitor.blended(one_quad({1, 1}, 5, 17, 16), 0, 1, 3), SimulationFault);
 }
 
 TEST(TileOwnership, SpreadsNeighbouringTilesOverAllGpcs) {
