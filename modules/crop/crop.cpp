@@ -40,6 +40,8 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   const std::uint64_t tile = surface_->address(warp.tile, 0);
   // Where a line of the tile is in `out.lines`, if it is there. Without branches, which would be mispredicted.
   std::array<std::uint8_t, positions_per_tile> place_of{};
+  std::array<std::uint8_t, quads_per_warp> line_at;
+  std::array<std::uint32_t, quads_per_warp> sectors_at{};
   std::uint64_t seen = 0;
   unsigned count = 0;
   for (unsigned i = from; i < to; ++i) {
@@ -51,14 +53,18 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
     const unsigned if_new = 0U - static_cast<unsigned>(is_new);
     const unsigned place = place_of[line] | (count & if_new);
     place_of[line] = static_cast<std::uint8_t>(place);
-    out.lines[place].address = tile + (line << line_shift);
-    out.lines[place].sectors = (out.lines[place].sectors & ~if_new) | sectors;
+    line_at[place] = static_cast<std::uint8_t>(line);
+    sectors_at[place] |= sectors;
     count -= if_new;
     out.line_of[i] = static_cast<std::uint8_t>(place);
     out.sectors_of[i] = sectors;
   }
   out.count = count;
-  for (unsigned line = 0; line < out.count; ++line) cache_->access(out.lines[line]);
+  for (unsigned place = 0; place < count; ++place) {
+    out.lines[place].address = tile + (std::uint64_t{line_at[place]} << line_shift);
+    out.lines[place].sectors = sectors_at[place];
+    cache_->access(out.lines[place]);
+  }
 }
 
 // Out of line, so that the common case stays short.

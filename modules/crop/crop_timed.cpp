@@ -142,25 +142,33 @@ class TimedCrop : public TimedUnit {
 
   void blend(const ShadedWarp& warp, unsigned from, unsigned to, Span at) {
     monitor_->blended(warp, from, to, at.last);
-    TerminationBeat signals;
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
     std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
+    unsigned terminated = 0;
     for (unsigned i = from; i < to; ++i) {
       const CropBehaviour::Outcome outcome = outcomes[i];
       dirty[cache_.line_of[i]] |= outcome.changed || cost_.writes_unchanged ? cache_.sectors_of[i] : 0U;
-      if (outcome.terminated == 0) continue;
-      signals.signals[signals.count++] = {warp.tile, warp.position[i], outcome.terminated};
-      if (signals.count < TerminationBeat::capacity) continue;
-      out_.send(signals, at.of_part(i - from, to - from));
-      signals.count = 0;
+      terminated |= outcome.terminated;
     }
-    if (signals.count > 0) out_.send(signals, at.last);
+    if (terminated != 0) signal(warp, from, to, outcomes, at);
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
       lines_[line] = at.last;
       if (dirty[i] != 0) behaviour_->make_dirty(line, dirty[i]);
     }
+  }
+
+  void signal(const ShadedWarp& warp, unsigned from, unsigned to, const CropBehaviour::Outcomes& outcomes, Span at) {
+    TerminationBeat beat;
+    for (unsigned i = from; i < to; ++i) {
+      if (outcomes[i].terminated == 0) continue;
+      beat.signals[beat.count++] = {warp.tile, warp.position[i], outcomes[i].terminated};
+      if (beat.count < TerminationBeat::capacity) continue;
+      out_.send(beat, at.of_part(i - from, to - from));
+      beat.count = 0;
+    }
+    if (beat.count > 0) out_.send(beat, at.last);
   }
 
   /// Reads the sectors that a line does without; returns when they are there, and in `at` when the last was asked for.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 
 #include <vrpipe/blend.h>
@@ -9,9 +10,8 @@ namespace vrpipe {
 
 // Sectors of a line, a bit each, at most 32.
 
-constexpr std::uint32_t sector_mask(unsigned first, unsigned count) {
-  return (count == 32 ? ~0U : (1U << count) - 1) << first;
-}
+/// count: 1 to 32
+constexpr std::uint32_t sector_mask(unsigned first, unsigned count) { return ((2U << (count - 1)) - 1) << first; }
 
 /// Of a quad that begins a line. Quads are naturally aligned, so that another's are these, moved.
 /// @param shift log2 of the bytes of a sector
@@ -20,22 +20,34 @@ constexpr std::uint32_t sectors_of_quad(ColorFormat format, unsigned shift) {
 }
 
 struct SectorRun {
-  unsigned first;
-  unsigned count;
+  unsigned first = 0;
+  unsigned count = 0;
 };
+/// Of four sectors, by their mask: the first run. A table, since branches would be mispredicted.
+inline constexpr std::array<SectorRun, 16> first_run_of_four = [] {
+  std::array<SectorRun, 16> runs{};
+  for (unsigned mask = 1; mask < 16; ++mask) {
+    SectorRun& run = runs[mask];
+    while ((mask >> run.first & 1U) == 0) ++run.first;
+    const bool two = run.first % 2 == 0 && (mask >> run.first & 3U) == 3;
+    run.count = mask == 15 ? 4 : two ? 2 : 1;
+  }
+  return runs;
+}();
+
 /// Takes the first sectors out of a mask that is not 0: neighbours, as many as go in one naturally aligned access of up
 /// to `longest`.
 inline SectorRun take_sector_run(std::uint32_t& mask, unsigned longest) {
-  const auto first = static_cast<unsigned>(__builtin_ctz(mask));
-  // Up to four without branches, which would be mispredicted.
-  const std::uint32_t from_first = mask >> first;
-  const unsigned two = ((from_first >> 1U) & ~first) & 1U;
-  const unsigned four = (from_first & 15U) == 15U ? two & ~(first >> 1U) : 0U;
-  unsigned count = std::min(1U + two + 2 * four, longest);
+  const unsigned four = static_cast<unsigned>(__builtin_ctz(mask)) & ~3U;
+  const SectorRun run = first_run_of_four[mask >> four & 15U];
+  const unsigned first = four + run.first;
+  unsigned count = std::min(run.count, longest);
   count -= count == 3 ? 1U : 0U;
-  while (count >= 4 && 2 * count <= longest && (first & (2 * count - 1)) == 0 &&
-         (mask & sector_mask(first, 2 * count)) == sector_mask(first, 2 * count)) {
-    count *= 2;
+  if (longest > 4 && count == 4) {
+    while (2 * count <= longest && (first & (2 * count - 1)) == 0 &&
+           (mask & sector_mask(first, 2 * count)) == sector_mask(first, 2 * count)) {
+      count *= 2;
+    }
   }
   mask &= ~sector_mask(first, count);
   return {first, count};

@@ -53,12 +53,17 @@ class TimedTc : public TimedUnit {
 
   /// A place for the next bin.
   BinStorage& next_storage() {
+    if (next_storage_->in_use) find_storage();
+    return *next_storage_;
+  }
+  void find_storage() {
     for (std::size_t tried = 0; tried < storage_.size(); ++tried) {
-      if (!storage_[storage_at_].in_use) return storage_[storage_at_];
       storage_at_ = storage_at_ + 1 == storage_.size() ? 0 : storage_at_ + 1;
+      next_storage_ = &storage_[storage_at_];
+      if (!next_storage_->in_use) return;
     }
     storage_at_ = storage_.size();
-    return storage_.emplace_back();
+    next_storage_ = &storage_.emplace_back();
   }
 
   /// Hands on the bin flushed in a cycle.
@@ -117,8 +122,9 @@ class TimedTc : public TimedUnit {
   TimedIn<QuadBeat> in_;
   std::unique_ptr<TcBehaviour> behaviour_;
   const TcBehaviour::Cost cost_;
-  std::deque<BinStorage> storage_;
+  std::deque<BinStorage> storage_ = std::deque<BinStorage>(1);
   std::size_t storage_at_ = 0;
+  BinStorage* next_storage_ = &storage_[0];
   Flow entries_;
   std::vector<Cycle> sent_at_;  ///< the last beat of the last bins, a ring
   std::size_t place_ = 0;       ///< of the bin that has to have gone before the next is flushed
