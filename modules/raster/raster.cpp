@@ -1,6 +1,7 @@
 #include "raster/raster.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstring>
 
@@ -16,6 +17,53 @@ constexpr auto raster_side = static_cast<std::int32_t>(raster_tile_pixels);
 // value beyond +-2^30 at the tile's first sample keeps its sign over the tile: then 32 bits are exact after clamping.
 constexpr std::int64_t narrow_gradient = (std::int64_t{1} << 30) / 7;
 constexpr std::int64_t narrow_limit = std::int64_t{1} << 30;
+
+static_assert(offsetof(Quad, position) == 4 && offsetof(Quad, coverage) == 5 && offsetof(Quad, triangle) == 6);
+static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
+constexpr unsigned position_shift = 32;
+constexpr unsigned coverage_shift = 40;
+constexpr unsigned triangle_shift = 48;
+
+/// Four quads in a row of the raster tile, each in one piece: a quad of narrow stores would be waited for when it is
+/// copied.
+using QuadRow = std::uint64_t __attribute__((vector_size(32)));
+
+/// Puts those of a row that are covered, 4 bits each, one after the other; returns how many. All four are written, since
+/// a branch would be mispredicted too often.
+unsigned put_covered(Quad* out, QuadRow quads, std::uint64_t coverage) {
+  const QuadRow covered = ((QuadRow{} + coverage) >> QuadRow{0, 4, 8, 12}) & all_lanes;
+  quads |= covered << coverage_shift;
+#if defined(__AVX2__)
+  // By the bits of those that are covered: where the halves of each come from.
+  static constexpr auto halves_from = [] {
+    std::array<std::array<std::int32_t, 8>, 16> from{};
+    for (unsigned bits = 0; bits < 16; ++bits) {
+      unsigned put = 0;
+      for (std::int32_t quad = 0; quad < 4; ++quad) {
+        if ((bits >> quad & 1U) == 0) continue;
+        from[bits][put++] = 2 * quad;
+        from[bits][put++] = 2 * quad + 1;
+      }
+    }
+    return from;
+  }();
+  using Doubles = double __attribute__((vector_size(32)));
+  const auto bits = static_cast<unsigned>(__builtin_ia32_movmskpd256(reinterpret_cast<Doubles>(covered != 0)));
+  LanePairBits from;
+  std::memcpy(&from, &halves_from[bits], sizeof from);
+  const LanePairBits packed = __builtin_ia32_permvarsi256(reinterpret_cast<LanePairBits>(quads), from);
+  std::memcpy(static_cast<void*>(out), &packed, sizeof packed);
+  return popcount(static_cast<LaneMask>(bits));
+#else
+  unsigned count = 0;
+  for (unsigned quad = 0; quad < 4; ++quad) {
+    const std::uint64_t bits = quads[quad];
+    std::memcpy(static_cast<void*>(out + count), &bits, sizeof bits);
+    count += covered[quad] != 0 ? 1U : 0U;
+  }
+  return count;
+#endif
+}
 }  // namespace
 
 TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderState& state)
@@ -165,19 +213,14 @@ unsigned TileRasterizer::fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t
   }
   const unsigned first =
       static_cast<unsigned>((y % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) + (x % tile_side) / 2);
-  // Written always, kept only if covered: the branch would be mispredicted too often. And in one piece, since a quad of
-  // narrow stores would be waited for when it is copied.
-  static_assert(offsetof(Quad, position) == 4 && offsetof(Quad, coverage) == 5 && offsetof(Quad, triangle) == 6);
-  static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
-  const std::uint64_t common =
-      primitive_.splat | std::uint64_t{first} << 32U | std::uint64_t{primitive_.triangle} << 48U;
+  const std::uint64_t upper_left =
+      primitive_.splat | std::uint64_t{first} << position_shift | std::uint64_t{primitive_.triangle} << triangle_shift;
+  constexpr std::uint64_t to_the_right = std::uint64_t{1} << position_shift;
+  QuadRow quads = upper_left + QuadRow{0, to_the_right, 2 * to_the_right, 3 * to_the_right};
   unsigned count = 0;
-  for (unsigned quad = 0; quad < 16; ++quad) {
-    const std::uint64_t mask = (coverage >> (4 * quad)) & all_lanes;
-    const std::uint64_t position = quad / 4 * quads_per_tile_row + quad % 4;
-    const std::uint64_t bits = common + (position << 32U) + (mask << 40U);
-    std::memcpy(static_cast<void*>(&out.quads[count]), &bits, sizeof bits);
-    count += mask != 0 ? 1U : 0U;
+  for (unsigned row = 0; row < 4; ++row) {
+    count += put_covered(&out.quads[count], quads, coverage >> (16 * row));
+    quads += quads_per_tile_row * to_the_right;
   }
   out.count = static_cast<std::uint8_t>(count);
   return static_cast<unsigned>(__builtin_popcountll(coverage));
