@@ -47,23 +47,25 @@ class PropUnit : public Unit {
 
   /// Moves beats from one port to the next; a beat wider than the unit takes several cycles.
   bool forward(Passage& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to, Cycle now) {
-    if (now < passage.free_at) return false;
-    bool moved = false;
+    if (now < passage.free_at || !from.ready() || to.credits() == 0) return false;
+    forward_beats(passage, from, to, now);
+    return true;
+  }
+  // Out of line: in most cycles nothing can move.
+  [[gnu::noinline]] void forward_beats(Passage& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to, Cycle now) {
     unsigned budget = cost_.quads_per_cycle;
-    while (from.ready() && to.credits() > 0) {
+    do {
       const QuadBeat& beat = from.front();
       const unsigned width = std::max<unsigned>(beat.count, 1);
-      if (width > budget && moved) break;
+      if (width > budget && budget < cost_.quads_per_cycle) break;
       to.push(beat);
       from.pop();
-      moved = true;
       if (width >= budget) {
         passage.free_at = now + (width + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
         break;
       }
       budget -= width;
-    }
-    return moved;
+    } while (from.ready() && to.credits() > 0);
   }
 
   bool collect() {
