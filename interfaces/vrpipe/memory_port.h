@@ -121,7 +121,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   unsigned in_flight_ = 0;
   Ring<Completion> completions_;  ///< by cycle
   Cycle next_completion_ = never;
-  Cycle last_completion_ = 0;  ///< so far
+  Cycle last_completion_ = 0;           ///< so far
   const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
 };
 
