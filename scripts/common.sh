@@ -10,6 +10,12 @@ build_packages=(g++ cmake ninja-build pkg-config ccache libsystemc-dev libglm-de
 check_packages=(git clang libclang-rt-14-dev clang-format clang-tidy libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
   liblzma-dev)
 
+# The comment at the head of a script is its help.
+if [ "${1-}" = --help ]; then
+  sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0"
+  exit
+fi
+
 say() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; }
 
 # Installs those of the named packages that are missing.
