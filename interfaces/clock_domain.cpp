@@ -119,8 +119,8 @@ bool ClockDomain::tick_due(Cycle cycle) {
   // A wake-up in this cycle is for a later one, so it does not matter who has ticked before it.
   bool any = false;
   for (std::size_t first = 0; first < due_.size(); first += at_a_time) {
-    Cycle* const due = &due_[first];
-    Clocked* const* const units = &units_[first];
+    Cycle* const due = due_.data() + first;
+    Clocked* const* const units = units_.data() + first;
     std::uint64_t active = take_due(due, std::min(at_a_time, due_.size() - first), cycle);
     if (active == 0) continue;
     any = true;
