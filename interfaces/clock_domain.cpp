@@ -6,26 +6,13 @@
 #include <utility>
 
 #include <vrpipe/error.h>
+#include <vrpipe/lanes.h>
 
 namespace vrpipe {
 
 namespace {
 
-using CycleVector = Cycle __attribute__((vector_size(32)));
-constexpr std::size_t cycles_per_vector = sizeof(CycleVector) / sizeof(Cycle);
-
-/// A bit for each lane that is all ones; the others are 0.
-unsigned mask_of(const CycleVector& lanes) {
-#if defined(__AVX__)
-  using Doubles = double __attribute__((vector_size(32)));
-  return static_cast<unsigned>(__builtin_ia32_movmskpd256(reinterpret_cast<Doubles>(lanes)));
-#else
-  unsigned mask = 0;
-  for (std::size_t lane = 0; lane < cycles_per_vector; ++lane) mask |= static_cast<unsigned>(lanes[lane] & 1U) << lane;
-  return mask;
-#endif
-}
-
+constexpr std::size_t cycles_per_vector = sizeof(Words) / sizeof(Cycle);
 constexpr std::size_t at_a_time = 64;
 
 /// Which of up to 64 are due, a bit each; they are due no longer. Several are looked at together and without branches,
@@ -34,12 +21,12 @@ constexpr std::size_t at_a_time = 64;
   std::uint64_t active = 0;
   for (std::size_t place = count; place > 0;) {
     place -= cycles_per_vector;
-    CycleVector wanted;
+    Words wanted;
     std::memcpy(&wanted, due + place, sizeof wanted);
-    const auto is_due = reinterpret_cast<CycleVector>(wanted == cycle);
+    const auto is_due = reinterpret_cast<Words>(wanted == cycle);
     wanted |= is_due;  // `never` has all bits set
     std::memcpy(due + place, &wanted, sizeof wanted);
-    active = active << cycles_per_vector | mask_of(is_due);
+    active = active << cycles_per_vector | sign_mask(is_due);
   }
   return active;
 }

@@ -8,7 +8,7 @@ ColorSurface::ColorSurface(std::uint32_t width, std::uint32_t height, ColorForma
       format_(format),
       grid_(width, height),
       bytes_per_quad_(4 * bytes_per_pixel(format)),
-      quads_(grid_.size()) {}
+      quads_(grid_.quads()) {}
 
 std::uint64_t ColorSurface::size_bytes() const { return std::uint64_t{quads_.size()} * bytes_per_quad_; }
 

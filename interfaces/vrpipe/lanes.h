@@ -70,6 +70,21 @@ inline unsigned sign_mask(LanePairBits bits) {
 #endif
 }
 
+/// Four words of 64 bits side by side.
+using Words = std::uint64_t __attribute__((vector_size(32)));
+
+/// The uppermost bit of each.
+inline unsigned sign_mask(Words words) {
+#if defined(__AVX__)
+  using Doubles = double __attribute__((vector_size(32)));
+  return static_cast<unsigned>(__builtin_ia32_movmskpd256(reinterpret_cast<Doubles>(words)));
+#else
+  unsigned mask = 0;
+  for (int word = 0; word < 4; ++word) mask |= static_cast<unsigned>(words[word] >> 63U) << word;
+  return mask;
+#endif
+}
+
 /// All ones in the lanes whose bit is set.
 inline LaneBits expand_mask(LaneMask mask) {
   const LaneBits bit{1, 2, 4, 8};

@@ -96,12 +96,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   void answer(Access& access, const sc_core::sc_time& delay);
   void complete(Cycle at, std::uint32_t tag) {
     // Nearly always the last: memories answer in order.
-    if (at >= last_completion_) {
-      last_completion_ = at;
-      completions_.push({at, tag});
-    } else {
-      completions_.push_in_order({at, tag}, &Completion::at);
-    }
+    completions_.push_in_order({at, tag}, &Completion::at);
     if (at >= next_completion_) return;  // its unit comes for the earlier one, and asks again then
     next_completion_ = at;
     clock_.domain->wake(clock_.unit, at);
@@ -121,7 +116,6 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   unsigned in_flight_ = 0;
   Ring<Completion> completions_;  ///< by cycle
   Cycle next_completion_ = never;
-  Cycle last_completion_ = 0;           ///< so far
   const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
 };
 

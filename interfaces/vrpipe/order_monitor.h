@@ -6,14 +6,14 @@
 
 #include <vrpipe/error.h>
 #include <vrpipe/payload.h>
-#include <vrpipe/quad_grid.h>
+#include <vrpipe/tile_grid.h>
 
 namespace vrpipe {
 
 /// Watches that the quads of every position are blended in draw order. On in every run.
 class BlendOrderMonitor {
  public:
-  BlendOrderMonitor(std::uint32_t width, std::uint32_t height) : grid_(width, height), next_(grid_.size()) {}
+  BlendOrderMonitor(std::uint32_t width, std::uint32_t height) : grid_(width, height), next_(grid_.quads()) {}
 
   /// Quads `from` to `to` - 1 of a warp. Throws SimulationFault when a primitive comes after a later one.
   void blended(const ShadedWarp& warp, unsigned from, unsigned to, std::uint64_t cycle) {
@@ -33,7 +33,7 @@ class BlendOrderMonitor {
  private:
   [[noreturn]] static void fault(const ShadedWarp& warp, unsigned index, std::uint32_t next, std::uint64_t cycle);
 
-  QuadGrid grid_;
+  TileGrid grid_;
   std::vector<std::uint32_t> next_;
 };
 

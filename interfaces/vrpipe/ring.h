@@ -25,7 +25,7 @@ class Ring {
   /// Where entries stand in the order of a member of theirs: behind those that are equal.
   template <class Member>
   void push_in_order(const Entry& entry, Member key) {
-    const bool is_last = empty() || !(entry.*key < back().*key);
+    const bool is_last = !(entry.*key < back().*key);  // of an empty ring's old entry it does not matter
     push(entry);
     if (!is_last) sort_in_last(key);
   }

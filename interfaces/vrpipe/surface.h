@@ -6,7 +6,7 @@
 
 #include <vrpipe/blend.h>
 #include <vrpipe/payload.h>
-#include <vrpipe/quad_grid.h>
+#include <vrpipe/tile_grid.h>
 
 namespace vrpipe {
 
@@ -34,7 +34,7 @@ class ColorSurface {
   std::uint32_t height() const { return height_; }
   ColorFormat format() const { return format_; }
 
-  const QuadGrid& grid() const { return grid_; }
+  const TileGrid& grid() const { return grid_; }
   QuadColor& quad(std::size_t place) { return quads_[place]; }
   const QuadColor& quad(std::size_t place) const { return quads_[place]; }
   QuadColor& quad(TileId tile, unsigned position) { return quads_[grid_.place(tile, position)]; }
@@ -56,7 +56,7 @@ class ColorSurface {
   std::uint32_t width_;
   std::uint32_t height_;
   ColorFormat format_;
-  QuadGrid grid_;
+  TileGrid grid_;
   std::uint32_t bytes_per_quad_;
   std::vector<QuadColor> quads_;
 };

@@ -82,7 +82,7 @@ void ColorRop<Format, Rounding>::count_trouble(std::size_t place, LaneMask live,
 
   const LaneBits swallowed = lanes & (stored.alpha == destination.alpha) & ~passes(stored.alpha);
   if (sign_mask(swallowed) == 0) return;
-  if (swallowed_.empty()) swallowed_.assign(surface_->grid().size(), splat_lanes(1.0F));
+  if (swallowed_.empty()) swallowed_.assign(surface_->grid().quads(), splat_lanes(1.0F));
   Lanes& transmittance = swallowed_[place];
   fragments_swallowed += popcount(sign_mask(swallowed));
   transmittance = select(swallowed, transmittance * (1.0F - color.alpha), transmittance);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <vrpipe/accounting.h>
+#include <vrpipe/tile_grid.h>
 #include <vrpipe/units.h>
 
 namespace vrpipe {
@@ -21,10 +22,8 @@ class WarpOrder {
 
   WarpOrder(PropBehaviour::Order order, const RenderState& state)
       : by_draw_(order == PropBehaviour::Order::draw),
-        tiles_x_((state.draw->width + screen_tile_pixels - 1) / screen_tile_pixels) {
-    const std::uint32_t tiles_y = (state.draw->height + screen_tile_pixels - 1) / screen_tile_pixels;
-    next_of_line_.assign(by_draw_ ? 1 : std::size_t{tiles_x_} * tiles_y, 0);
-  }
+        grid_(state.draw->width, state.draw->height),
+        next_of_line_(by_draw_ ? 1 : grid_.tiles()) {}
 
   void arrive(const ShadedWarp& warp, Cycle from = 0) {
     const Waiting waiting{&warp, warp.sequence, from};
@@ -168,12 +167,12 @@ class WarpOrder {
 
   Turn turn_of(const ShadedWarp& warp) const {
     if (by_draw_) return {0, warp.sequence};
-    return {warp.tile.y * tiles_x_ + warp.tile.x, warp.tile_sequence};
+    return {static_cast<std::uint32_t>(grid_.index(warp.tile)), warp.tile_sequence};
   }
   std::uint32_t& next_of(std::uint32_t line) { return next_of_line_[line]; }
 
   const bool by_draw_;
-  const std::uint32_t tiles_x_;
+  const TileGrid grid_;
   std::vector<std::uint32_t> next_of_line_;
   std::uint32_t left_ = 0;
   Window in_turn_;

@@ -6,6 +6,7 @@
 #include <vrpipe/draw.h>
 #include <vrpipe/payload.h>
 #include <vrpipe/render_state.h>
+#include <vrpipe/tile_grid.h>
 
 namespace vrpipe {
 
@@ -13,12 +14,11 @@ namespace vrpipe {
 class WarpNumbering {
  public:
   explicit WarpNumbering(const RenderState& state)
-      : tiles_x_((state.draw->width + screen_tile_pixels - 1) / screen_tile_pixels),
-        next_of_tile_(std::size_t{tiles_x_} * ((state.draw->height + screen_tile_pixels - 1) / screen_tile_pixels)) {}
+      : grid_(state.draw->width, state.draw->height), next_of_tile_(grid_.tiles()) {}
 
   void number(Warp& warp) {
     warp.sequence = next_++;
-    warp.tile_sequence = next_of_tile_[std::size_t{warp.tile.y} * tiles_x_ + warp.tile.x]++;
+    warp.tile_sequence = next_of_tile_[grid_.index(warp.tile)]++;
   }
   /// The end of the draw comes after its warps; the next draw's count from 0.
   void number_end(Warp& end) {
@@ -28,7 +28,7 @@ class WarpNumbering {
   }
 
  private:
-  std::uint32_t tiles_x_;
+  TileGrid grid_;
   std::uint32_t next_ = 0;
   std::vector<std::uint32_t> next_of_tile_;
 };

@@ -24,14 +24,11 @@ constexpr unsigned position_shift = 32;
 constexpr unsigned coverage_shift = 40;
 constexpr unsigned triangle_shift = 48;
 
-/// Four quads in a row of the raster tile, each in one piece: a quad of narrow stores would be waited for when it is
-/// copied.
-using QuadRow = std::uint64_t __attribute__((vector_size(32)));
-
-/// Puts those of a row that are covered, 4 bits each, one after the other; returns how many. All four are written, since
-/// a branch would be mispredicted too often.
-unsigned put_covered(Quad* out, QuadRow quads, std::uint64_t coverage) {
-  const QuadRow covered = ((QuadRow{} + coverage) >> QuadRow{0, 4, 8, 12}) & all_lanes;
+/// Puts those of four quads in a row of the raster tile that are covered, 4 bits each, one after the other; returns how
+/// many. A quad is one word, since one of narrow stores would be waited for when it is copied. All four are written,
+/// since a branch would be mispredicted too often.
+unsigned put_covered(Quad* out, Words quads, std::uint64_t coverage) {
+  const Words covered = ((Words{} + coverage) >> Words{0, 4, 8, 12}) & all_lanes;
   quads |= covered << coverage_shift;
 #if defined(__AVX2__)
   // By the bits of those that are covered: where the halves of each come from.
@@ -47,8 +44,7 @@ unsigned put_covered(Quad* out, QuadRow quads, std::uint64_t coverage) {
     }
     return from;
   }();
-  using Doubles = double __attribute__((vector_size(32)));
-  const auto bits = static_cast<unsigned>(__builtin_ia32_movmskpd256(reinterpret_cast<Doubles>(covered != 0)));
+  const unsigned bits = sign_mask(reinterpret_cast<Words>(covered != 0));
   LanePairBits from;
   std::memcpy(&from, &halves_from[bits], sizeof from);
   const LanePairBits packed = __builtin_ia32_permvarsi256(reinterpret_cast<LanePairBits>(quads), from);
@@ -216,7 +212,7 @@ unsigned TileRasterizer::fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t
   const std::uint64_t upper_left =
       primitive_.splat | std::uint64_t{first} << position_shift | std::uint64_t{primitive_.triangle} << triangle_shift;
   constexpr std::uint64_t to_the_right = std::uint64_t{1} << position_shift;
-  QuadRow quads = upper_left + QuadRow{0, to_the_right, 2 * to_the_right, 3 * to_the_right};
+  Words quads = upper_left + Words{0, to_the_right, 2 * to_the_right, 3 * to_the_right};
   unsigned count = 0;
   for (unsigned row = 0; row < 4; ++row) {
     count += put_covered(&out.quads[count], quads, coverage >> (16 * row));

@@ -6,19 +6,15 @@
 
 namespace vrpipe {
 
-namespace {
-std::uint32_t tiles(std::uint32_t pixels) { return (pixels + screen_tile_pixels - 1) / screen_tile_pixels; }
-}  // namespace
-
 TileCoalescing::TileCoalescing(const Parameters& parameters, const RenderState& state)
     : bin_quads_(parameters.bin_quads),
-      tiles_x_(tiles(state.draw->width)),
+      grid_(state.draw->width, state.draw->height),
       // A time-out would make the contents of bins depend on time, which strict termination excludes.
       cost_{parameters.quads_per_cycle, parameters.latency_cycles,
             state.termination == Termination::strict ? 0U : std::uint32_t{parameters.idle_timeout_cycles},
             parameters.flush_queue_bins},
       bins_(parameters.bins),
-      bin_of_tile_(std::size_t{tiles_x_} * tiles(state.draw->height), -1) {
+      bin_of_tile_(grid_.tiles(), -1) {
   for (auto bin = static_cast<std::uint32_t>(bins_.size()); bin-- > 0;) {
     bins_[bin].quads.reserve(bin_quads_);
     free_.push_back(bin);
@@ -32,7 +28,7 @@ void TileCoalescing::flush_bin(std::uint32_t index, FlushReason reason, Flush& o
   out.quads.clear();
   std::swap(out.quads, bin.quads);
   bin.quads.reserve(bin_quads_);
-  bin_of_tile_[index_of(bin.tile)] = -1;
+  bin_of_tile_[grid_.index(bin.tile)] = -1;
   free_.push_back(index);
   ++flushes;
   switch (reason) {
@@ -46,7 +42,7 @@ void TileCoalescing::flush_bin(std::uint32_t index, FlushReason reason, Flush& o
 unsigned TileCoalescing::insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) {
   flushed = false;
   if (from == beat.count) return 0;
-  std::int32_t index = bin_of_tile_[index_of(beat.tile)];
+  std::int32_t index = bin_of_tile_[grid_.index(beat.tile)];
   if (index < 0) {
     if (free_.empty()) {
       flushed = flush_oldest(FlushReason::evicted, out);
@@ -55,7 +51,7 @@ unsigned TileCoalescing::insert(const QuadBeat& beat, unsigned from, Flush& out,
     index = static_cast<std::int32_t>(free_.back());
     free_.pop_back();
     bins_[static_cast<std::size_t>(index)].tile = beat.tile;
-    bin_of_tile_[index_of(beat.tile)] = index;
+    bin_of_tile_[grid_.index(beat.tile)] = index;
     allocation_order_.push_back(static_cast<std::uint32_t>(index));
   }
   Bin& bin = bins_[static_cast<std::size_t>(index)];

@@ -3,6 +3,7 @@
 #include <deque>
 
 #include <vrpipe/parameter.h>
+#include <vrpipe/tile_grid.h>
 #include <vrpipe/units.h>
 
 namespace vrpipe {
@@ -54,11 +55,10 @@ class TileCoalescing : public TcBehaviour {
     TileId tile;
     std::vector<Quad> quads;
   };
-  std::size_t index_of(TileId tile) const { return std::size_t{tile.y} * tiles_x_ + tile.x; }
   void flush_bin(std::uint32_t bin, FlushReason reason, Flush& out);
 
   const std::uint32_t bin_quads_;
-  const std::uint32_t tiles_x_;
+  const TileGrid grid_;
   const Cost cost_;
   std::vector<Bin> bins_;
   std::vector<std::uint32_t> free_;

@@ -7,7 +7,7 @@ namespace vrpipe {
 DepthStencilRop::DepthStencilRop(const Parameters& parameters, const RenderState& state)
     : cost_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.updates_per_cycle},
       grid_(state.draw->width, state.draw->height),
-      terminated_(grid_.size()) {}
+      terminated_(grid_.quads()) {}
 
 void DepthStencilRop::test(QuadBeat& beat) {
   unsigned kept = 0;

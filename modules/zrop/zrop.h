@@ -1,7 +1,7 @@
 #pragma once
 
 #include <vrpipe/parameter.h>
-#include <vrpipe/quad_grid.h>
+#include <vrpipe/tile_grid.h>
 #include <vrpipe/units.h>
 
 namespace vrpipe {
@@ -50,7 +50,7 @@ class DepthStencilRop : public ZropBehaviour {
   }
 
   const Cost cost_;
-  const QuadGrid grid_;
+  const TileGrid grid_;
   std::vector<std::uint8_t> terminated_;  ///< the stencil MSBs of a quad position's four pixels
   TerminationForesight* foresight_ = nullptr;
   std::vector<Quad> survivors_;  ///< of the bin under test, for the foresight
