@@ -105,23 +105,20 @@ struct ShadedWarp {
   std::uint16_t slot = 0;  ///< of the SM, to be released when the last quad has left PROP
   std::array<std::uint8_t, quads_per_warp> position;
   std::array<LaneMask, quads_per_warp> live;
-  /// Holders in the simulator (not in the hardware): the SM until release, and each quad on its way to blending.
-  mutable std::uint32_t holders = 0;
-  ShadedWarpPool* pool = nullptr;  ///< to which it returns with its last holder; null: it stays where it is
+  ShadedWarpPool* pool = nullptr;  ///< to which it returns; null: it stays where it is
   /// Draw order of the first and the last primitive in a quad's colour, for the order monitor.
   std::array<std::uint32_t, quads_per_warp> first_primitive;
   std::array<std::uint32_t, quads_per_warp> last_primitive;
   std::array<QuadColor, quads_per_warp> color;  ///< premultiplied; (0,0,0,0) in dead lanes
 
-  void hold() const { ++holders; }
+  /// Back to its pool: by whoever takes its last quad off the pipeline, or passes it over if it has none.
   inline void release() const;
 };
 
-/// Shaded warps of an SM array, as many as were ever held at a time. The one released last is taken first: it is still
+/// Shaded warps of an SM array, as many as were ever in use at a time. The one released last is taken first: it is still
 /// in the host's cache.
 class ShadedWarpPool {
  public:
-  /// A warp with one holder.
   ShadedWarp& take() {
     if (free_.empty()) {
       warps_.emplace_back().pool = this;
@@ -129,7 +126,6 @@ class ShadedWarpPool {
     }
     ShadedWarp& warp = *free_.back();
     free_.pop_back();
-    warp.holders = 1;
     return warp;
   }
 
@@ -140,7 +136,7 @@ class ShadedWarpPool {
 };
 
 void ShadedWarp::release() const {
-  if (--holders == 0 && pool != nullptr) pool->free_.push_back(const_cast<ShadedWarp*>(this));
+  if (pool != nullptr) pool->free_.push_back(const_cast<ShadedWarp*>(this));
 }
 
 /// Draw order of a quad's primitive.
@@ -156,14 +152,15 @@ struct WarpRelease {
   std::uint16_t slot = 0;
 };
 
-/// One quad on its way to blending; whoever takes it off the pipeline drops the hold on the warp.
+/// One quad on its way to blending. Quads of a warp stay in order, and whoever takes the last off the pipeline releases
+/// the warp.
 struct ColorQuad {
   const ShadedWarp* warp = nullptr;
-  TileId tile;
-  std::uint8_t position = 0;
-  LaneMask live = 0;
-  std::uint8_t index = 0;  ///< in the warp
+  std::uint32_t index = 0;  ///< in the warp
+  unsigned position() const { return warp->position[index]; }
+  LaneMask live() const { return warp->live[index]; }
   const QuadColor& color() const { return warp->color[index]; }
+  bool is_last() const { return index + 1 == warp->count; }
 };
 
 /// Quads that move from PROP to CROP in one cycle.

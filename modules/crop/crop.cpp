@@ -1,5 +1,4 @@
 #include "crop/crop.h"
-#include "crop/sectors.h"
 
 #include <algorithm>
 #include <cmath>
@@ -31,12 +30,10 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
 
 template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
-  if (!cache_) cache_ = make_crop_cache(cost_, *surface_);
-  const auto sector_shift = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
-  const auto line_shift = static_cast<unsigned>(__builtin_ctz(cost_.line_bytes));
-  const std::uint64_t line_mask = cost_.line_bytes - 1;
-  constexpr std::uint32_t bytes_per_quad = 4 * bytes_per_pixel(Format);
-  const std::uint32_t first_sectors = sectors_of_quad(Format, sector_shift);
+  if (!cache_) {
+    cache_ = make_crop_cache(cost_, *surface_);
+    sectors_of_quads_ = sectors_of_quads(cost_, *surface_);
+  }
   const std::uint64_t tile = surface_->address(warp.tile, 0);
   // Where a line of the tile is in `out.lines`, if it is there. Without branches, which would be mispredicted.
   std::array<std::uint8_t, positions_per_tile> place_of{};
@@ -45,9 +42,7 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   std::uint64_t seen = 0;
   unsigned count = 0;
   for (unsigned i = from; i < to; ++i) {
-    const std::uint64_t offset = std::uint64_t{morton_order[warp.position[i]]} * bytes_per_quad;
-    const std::uint64_t line = offset >> line_shift;
-    const std::uint32_t sectors = first_sectors << ((offset & line_mask) >> sector_shift);
+    const auto [line, sectors] = sectors_of_quads_[warp.position[i]];
     const bool is_new = (seen >> line & 1U) == 0;
     seen |= std::uint64_t{1} << line;
     const unsigned if_new = 0U - static_cast<unsigned>(is_new);
@@ -61,7 +56,7 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   }
   out.count = count;
   for (unsigned place = 0; place < count; ++place) {
-    out.lines[place].address = tile + (std::uint64_t{line_at[place]} << line_shift);
+    out.lines[place].address = tile + std::uint64_t{line_at[place]} * cost_.line_bytes;
     out.lines[place].sectors = sectors_at[place];
     cache_->access(out.lines[place]);
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "crop/crop_cache.h"
@@ -110,7 +111,8 @@ class ColorRop : public CropBehaviour {
   const bool drops_late_;
   const bool checks_previous_;
   Cost cost_;
-  std::unique_ptr<CropCache> cache_;  ///< once looked up here; the clocked shell has one of its own
+  std::optional<CropCache> cache_;  ///< once looked up here; the clocked shell has one of its own
+  std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
 };
 
 }  // namespace vrpipe

@@ -1,4 +1,5 @@
 #include "crop/crop_cache.h"
+#include "crop/sectors.h"
 
 #include <vrpipe/error.h>
 
@@ -39,11 +40,25 @@ CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dir
   return line;
 }
 
-std::unique_ptr<CropCache> make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface) {
+CropCache make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface) {
   if (cost.line_bytes < 4 * bytes_per_pixel(surface.format())) {
     throw UserError("unusable CROP cache", "crop.line_bytes", "a line is smaller than a quad", "use longer lines");
   }
-  return std::make_unique<CropCache>(cost.cache_bytes, cost.line_bytes, cost.sector_bytes, surface.size_bytes());
+  return {cost.cache_bytes, cost.line_bytes, cost.sector_bytes, surface.size_bytes()};
+}
+
+std::array<QuadSectors, positions_per_tile> sectors_of_quads(const CropBehaviour::Cost& cost,
+                                                             const ColorSurface& surface) {
+  const std::uint32_t bytes_per_quad = 4 * bytes_per_pixel(surface.format());
+  std::array<QuadSectors, positions_per_tile> places{};
+  for (unsigned position = 0; position < positions_per_tile; ++position) {
+    const auto address = static_cast<std::uint32_t>(surface.address({0, 0}, position));
+    const std::uint32_t offset = address % cost.line_bytes;
+    const std::uint32_t first = offset / cost.sector_bytes;
+    const std::uint32_t last = (offset + bytes_per_quad - 1) / cost.sector_bytes;
+    places[position] = {address / cost.line_bytes, sector_mask(first, last - first + 1)};
+  }
+  return places;
 }
 
 }  // namespace vrpipe

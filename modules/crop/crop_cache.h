@@ -1,7 +1,7 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include <vrpipe/units.h>
@@ -93,6 +93,15 @@ class CropCache {
 };
 
 /// The cache of a CROP for its surface. Throws UserError for sizes that cannot be.
-std::unique_ptr<CropCache> make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface);
+CropCache make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface);
+
+/// Where a quad stands in the modelled memory.
+struct QuadSectors {
+  std::uint32_t line;     ///< of those of its screen tile, from 0
+  std::uint32_t sectors;  ///< of this line, a bit each
+};
+/// By position in a screen tile; every tile is the same, since they are naturally aligned. For sizes that a cache has.
+std::array<QuadSectors, positions_per_tile> sectors_of_quads(const CropBehaviour::Cost& cost,
+                                                             const ColorSurface& surface);
 
 }  // namespace vrpipe

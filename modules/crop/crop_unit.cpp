@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <optional>
 
 #include "crop/crop_cache.h"
 #include "crop/sectors.h"
@@ -57,9 +58,10 @@ class CropUnit : public Unit {
     surface_ = behaviour_->surface();
     if (surface_ == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     sector_shift_ = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
-    first_sectors_ = sectors_of_quad(surface_->format(), sector_shift_);
+    line_shift_ = static_cast<unsigned>(__builtin_ctz(cost_.line_bytes));
     cache_ = make_crop_cache(cost_, *surface_);
-    monitor_ = std::make_unique<BlendOrderMonitor>(surface_->width(), surface_->height());
+    sectors_of_quads_ = sectors_of_quads(cost_, *surface_);
+    monitor_.emplace(surface_->width(), surface_->height());
   }
 
   void finish_fills() {
@@ -98,17 +100,16 @@ class CropUnit : public Unit {
   /// Takes a quad from the link into the queue; false when it has to wait.
   bool look_up(const ColorQuad& quad) {
     if (!write_back()) return false;
-    const std::size_t place = surface_->grid().place(quad.tile, quad.position);
-    const std::uint64_t address = surface_->address(place);
+    const unsigned position = quad.position();
+    const std::size_t tile = surface_->grid().place(quad.warp->tile, 0);
+    const auto [line_of_tile, sectors] = sectors_of_quads_[position];
+    const std::uint64_t address = surface_->address(tile) + (std::uint64_t{line_of_tile} << line_shift_);
     const CropCache::Line line = line_of(address);
     if (line == CropCache::no_line) return false;
-    const std::uint64_t offset = address & (cost_.line_bytes - 1);
-    const std::uint32_t sectors = first_sectors_ << (offset >> sector_shift_);
     for (std::uint32_t missing = sectors & cache_->absent(line); missing != 0; missing &= missing - 1) {
       if (!memory_.available() || fills_in_flight_ == cost_.mshrs) return false;
       const auto sector = static_cast<unsigned>(__builtin_ctz(missing));
-      memory_.read(address - offset + (std::uint64_t{sector} << sector_shift_), cost_.sector_bytes,
-                   fill_tag(line, sector));
+      memory_.read(address + (std::uint64_t{sector} << sector_shift_), cost_.sector_bytes, fill_tag(line, sector));
       cache_->start_fill(line, sector);
       ++fills_in_flight_;
       tokens_ -= sector_price_;
@@ -119,7 +120,7 @@ class CropUnit : public Unit {
     entry.quad = quad;
     entry.line = line;
     entry.sectors = sectors;
-    entry.place = static_cast<std::uint32_t>(place);
+    entry.place = static_cast<std::uint32_t>(tile + position);
     return true;
   }
 
@@ -195,11 +196,11 @@ class CropUnit : public Unit {
       }
       const ColorQuad& quad = entry.quad;
       monitor_->blended(entry.place, *quad.warp, quad.index, now);
-      const CropBehaviour::Outcome outcome = behaviour_->blend(entry.place, quad.live, quad.color());
+      const CropBehaviour::Outcome outcome = behaviour_->blend(entry.place, quad.live(), quad.color());
       if (outcome.terminated != 0) {
-        beat.signals[beat.count++] = {quad.tile, quad.position, outcome.terminated};
+        beat.signals[beat.count++] = {quad.warp->tile, static_cast<std::uint8_t>(quad.position()), outcome.terminated};
       }
-      quad.warp->release();
+      if (quad.is_last()) quad.warp->release();
       if (outcome.changed || cost_.writes_unchanged) cache_->dirty(entry.line, entry.sectors);
       cache_->unpin(entry.line);
       tokens_ -= price_;
@@ -242,12 +243,13 @@ class CropUnit : public Unit {
   const std::int64_t income_;        ///< of a cycle: what so many quads, or so many sectors, cost
   MemoryPort memory_;
   const ColorSurface* surface_ = nullptr;
-  std::unique_ptr<CropCache> cache_;
-  std::unique_ptr<BlendOrderMonitor> monitor_;
-  std::uint32_t first_sectors_ = 0;  ///< of a quad that begins a line
-  unsigned sector_shift_ = 0;        ///< log2 of the bytes of a sector
-  Ring<Entry> queue_;                ///< looked up and waiting to be blended
-  unsigned at_ = 0;                  ///< quads taken of the beat at the link
+  std::optional<CropCache> cache_;
+  std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
+  std::optional<BlendOrderMonitor> monitor_;
+  unsigned sector_shift_ = 0;  ///< log2 of the bytes of a sector
+  unsigned line_shift_ = 0;    ///< log2 of the bytes of a line
+  Ring<Entry> queue_;          ///< looked up and waiting to be blended
+  unsigned at_ = 0;            ///< quads taken of the beat at the link
   unsigned fills_in_flight_ = 0;
   std::uint32_t write_back_ = 0;  ///< dirty sectors of an evicted line yet to be sent
   std::uint64_t write_back_address_ = 0;

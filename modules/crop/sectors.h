@@ -4,20 +4,12 @@
 #include <array>
 #include <cstdint>
 
-#include <vrpipe/blend.h>
-
 namespace vrpipe {
 
 // Sectors of a line, a bit each, at most 32.
 
 /// count: 1 to 32
 constexpr std::uint32_t sector_mask(unsigned first, unsigned count) { return ((2U << (count - 1)) - 1) << first; }
-
-/// Of a quad that begins a line. Quads are naturally aligned, so that another's are these, moved.
-/// @param shift log2 of the bytes of a sector
-constexpr std::uint32_t sectors_of_quad(ColorFormat format, unsigned shift) {
-  return sector_mask(0, ((4 * bytes_per_pixel(format) - 1) >> shift) + 1);
-}
 
 struct SectorRun {
   unsigned first = 0;

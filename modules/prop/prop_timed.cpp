@@ -81,39 +81,39 @@ class TimedProp : public TimedUnit {
   void leave_until(Cycle until) {
     while (order_.has_next() && can_send() && color_.next() <= until) {
       const WarpOrder::Waiting next = order_.take();
-      leave(*next.warp, next.from);
+      leave(next);
     }
     if (end_ == nullptr || end_->sequence != order_.left() || !can_send()) return;
     const Cycle at = color_.take(end_from_, cost_.color_quads_per_cycle).first;
-    end_->hold();
+    const WarpRelease release{end_->slot};
     out_color_.send({end_}, at);
-    out_release_.send({end_->slot}, at);
-    end_->release();
+    out_release_.send(release, at);
     end_ = nullptr;
     order_.restart();
   }
 
   /// Hands a warp to CROP.
-  void leave(const ShadedWarp& warp, Cycle from) {
+  void leave(const WarpOrder::Waiting& next) {
+    const ShadedWarp& warp = *next.warp;
+    const WarpRelease release{warp.slot};
     color_.hold(out_color_.last());
     Cycle left = 0;
     if (warp.count > 0) {
-      const Span at = color_.take(from, warp.count);
+      const Span at = color_.take(next.from, warp.count);
       charge(UnitState::starved, at.first);
       charge(UnitState::busy, at.last + 1);
       color_quads_ += warp.count;
-      warp.hold();
       const unsigned beats = (warp.count + cost_.color_quads_per_cycle - 1) / cost_.color_quads_per_cycle;
       left = out_color_.send({&warp}, at, beats).last;
       charge(UnitState::blocked, left);
       color_.hold(left);
     } else {
       // A warp without survivors takes the cycle in which it is passed over.
-      left = color_.take(from, cost_.color_quads_per_cycle).last;
+      left = color_.take(next.from, cost_.color_quads_per_cycle).last;
+      warp.release();
     }
-    order_.leave(warp, left);
-    out_release_.send({warp.slot}, left);
-    warp.release();
+    order_.leave(next.turn, left);
+    out_release_.send(release, left);
   }
 
   std::unique_ptr<PropBehaviour> behaviour_;

@@ -91,29 +91,23 @@ class PropUnit : public Unit {
       if (current_ == nullptr) {
         if (!order_.has_next()) break;
         if (out_release_.credits() == 0) break;
-        current_ = order_.take().warp;
+        const WarpOrder::Waiting next = order_.take();
+        current_ = next.warp;
+        turn_ = next.turn;
         index_ = 0;
       }
-      if (index_ < current_->count) {
-        current_->hold();
-        // In place: a temporary of narrow stores would be waited for when it is copied.
-        ColorQuad& quad = beat.quads[beat.count++];
-        quad.warp = current_;
-        quad.tile = current_->tile;
-        quad.position = current_->position[index_];
-        quad.live = current_->live[index_];
-        quad.index = index_;
-        ++index_;
-      }
-      if (index_ == current_->count) {
-        const ShadedWarp* const left = current_;
+      const ShadedWarp& warp = *current_;
+      if (index_ < warp.count) beat.quads[beat.count++] = {current_, index_++};
+      if (index_ == warp.count) {
         current_ = nullptr;
-        order_.leave(*left);
-        out_release_.push({left->slot});
-        left->release();
+        order_.leave(turn_);
+        out_release_.push({warp.slot});
         moved = true;
         // A warp without survivors takes the cycle in which it is passed over.
-        if (left->count == 0) break;
+        if (warp.count == 0) {
+          warp.release();
+          break;
+        }
       }
     }
     if (beat.count > 0) {
@@ -173,7 +167,8 @@ class PropUnit : public Unit {
   Passage back_;   ///< from the tests
   WarpOrder order_;
   const ShadedWarp* current_ = nullptr;  ///< being handed to CROP, from `index_` on
-  std::uint8_t index_ = 0;
+  WarpOrder::Turn turn_{};               ///< whose it is
+  std::uint32_t index_ = 0;
   const ShadedWarp* end_ = nullptr;
   std::uint64_t color_quads_ = 0;
 };

@@ -14,10 +14,16 @@ namespace vrpipe {
 /// has left; of those whose turn has come the oldest goes first, which keeps a tile's quads together in the colour cache.
 class WarpOrder {
  public:
+  /// A warp leaves when the warps of smaller number in its line have left: a line for the draw, or for each screen tile.
+  struct Turn {
+    std::uint32_t line;
+    std::uint32_t number;
+  };
   struct Waiting {
     const ShadedWarp* warp = nullptr;
     std::uint32_t sequence = 0;  ///< of the warp
-    Cycle from = 0;              ///< the first cycle in which it can leave, for shells that know it ahead
+    Turn turn{};
+    Cycle from = 0;  ///< the first cycle in which it can leave, for shells that know it ahead
   };
 
   WarpOrder(PropBehaviour::Order order, const RenderState& state)
@@ -26,24 +32,23 @@ class WarpOrder {
         next_of_line_(by_draw_ ? 1 : grid_.tiles()) {}
 
   void arrive(const ShadedWarp& warp, Cycle from = 0) {
-    const Waiting waiting{&warp, warp.sequence, from};
     const Turn turn = turn_of(warp);
-    if (turn.number == next_of(turn.line)) {
+    const Waiting waiting{&warp, warp.sequence, turn, from};
+    if (turn.number == next_of_line_[turn.line]) {
       in_turn_.push(waiting);
     } else {
-      early_.push(turn, waiting);
+      early_.push(waiting);
     }
   }
 
   bool has_next() const { return !in_turn_.empty(); }
   Waiting take() { return in_turn_.take_oldest(); }
-  /// A warp that was taken has left: the one that follows it may be among those that came early.
-  void leave(const ShadedWarp& warp, Cycle at = 0) {
-    const std::uint32_t line = turn_of(warp).line;
-    const std::uint32_t number = ++next_of(line);
+  /// The warp of a turn has left: the one that follows it may be among those that came early.
+  void leave(Turn turn, Cycle at = 0) {
+    next_of_line_[turn.line] = ++turn.number;
     ++left_;
     Waiting waiting;
-    if (early_.take({line, number}, waiting)) {
+    if (early_.take(turn, waiting)) {
       waiting.from = std::max(waiting.from, at);
       __builtin_prefetch(waiting.warp);  // it came long ago, and leaves soon
       in_turn_.push(waiting);
@@ -60,12 +65,6 @@ class WarpOrder {
   }
 
  private:
-  /// A warp leaves when the warps of smaller number in its line have left: a line for the draw, or for each screen tile.
-  struct Turn {
-    std::uint32_t line;
-    std::uint32_t number;
-  };
-
   /// By sequence, in a ring that holds all from the oldest to the newest: a window on the launch order.
   class Window {
    public:
@@ -122,15 +121,15 @@ class WarpOrder {
    public:
     EarlyWarps() { first_.fill(none); }
     bool empty() const { return count_ == 0; }
-    void push(Turn turn, const Waiting& waiting) {
+    void push(const Waiting& waiting) {
       if (free_ == none) {
         free_ = static_cast<std::uint32_t>(entries_.size());
-        entries_.push_back({turn, none, waiting});
+        entries_.push_back({none, waiting});
       }
-      std::uint32_t& first = first_of(turn);
+      std::uint32_t& first = first_of(waiting.turn);
       Entry& entry = entries_[free_];
       const std::uint32_t next_free = entry.next;
-      entry = {turn, first, waiting};
+      entry = {first, waiting};
       first = free_;
       free_ = next_free;
       ++count_;
@@ -138,7 +137,7 @@ class WarpOrder {
     bool take(Turn turn, Waiting& out) {
       for (std::uint32_t* at = &first_of(turn); *at != none; at = &entries_[*at].next) {
         Entry& entry = entries_[*at];
-        if (entry.turn.line != turn.line || entry.turn.number != turn.number) continue;
+        if (entry.waiting.turn.line != turn.line || entry.waiting.turn.number != turn.number) continue;
         out = entry.waiting;
         const std::uint32_t taken = *at;
         *at = entry.next;
@@ -153,7 +152,6 @@ class WarpOrder {
    private:
     static constexpr std::uint32_t none = ~0U;
     struct Entry {
-      Turn turn;
       std::uint32_t next;
       Waiting waiting;
     };
@@ -169,7 +167,6 @@ class WarpOrder {
     if (by_draw_) return {0, warp.sequence};
     return {static_cast<std::uint32_t>(grid_.index(warp.tile)), warp.tile_sequence};
   }
-  std::uint32_t& next_of(std::uint32_t line) { return next_of_line_[line]; }
 
   const bool by_draw_;
   const TileGrid grid_;

@@ -1,5 +1,6 @@
 #include <deque>
 #include <map>
+#include <set>
 
 #include <gtest/gtest.h>
 
@@ -60,21 +61,15 @@ struct CropBench {
 
   /// Adds a quad of the next primitive to the stream; beats are as wide as the format lets PROP be.
   void quad(TileId tile, unsigned position, float alpha = 0.01F, LaneMask live = all_lanes, Cycle earliest = 0) {
-    warps.emplace_back();
-    ShadedWarp& warp = warps.back();
+    ShadedWarp& warp = pool.take();
+    warps.insert(&warp);
     warp.tile = tile;
     warp.count = 1;
-    warp.holders = 1;
     warp.position[0] = static_cast<std::uint8_t>(position);
     warp.live[0] = live;
     warp.first_primitive[0] = warp.last_primitive[0] = static_cast<std::uint32_t>(warps.size());
     warp.color[0] = testing::color_of(alpha, alpha, alpha, alpha);
-    ColorQuad quad;
-    quad.warp = &warp;
-    quad.tile = tile;
-    quad.position = warp.position[0];
-    quad.live = live;
-    beat.quads[beat.count++] = quad;
+    beat.quads[beat.count++] = {&warp, 0};
     if (beat.count == width) flush(earliest);
   }
   void flush(Cycle earliest = 0) {
@@ -100,7 +95,8 @@ struct CropBench {
   Sink<TerminationBeat>& signals;
   unsigned width;
   ColorBeat beat;
-  std::deque<ShadedWarp> warps;
+  ShadedWarpPool pool;
+  std::set<const ShadedWarp*> warps;  ///< all that were taken from it
 };
 
 class CropUnitTest : public ::testing::Test {
@@ -228,14 +224,14 @@ TEST_F(CropUnitTest, SignalsThatNobodyTakesStopTheBlending) {
   std::deque<ShadedWarp> warps;
   for (unsigned i = 0; i < 8; ++i) {
     warps.emplace_back();
-    warps.back().holders = 1;
+    warps.back().count = 1;
+    warps.back().position[0] = static_cast<std::uint8_t>(i);
+    warps.back().live[0] = all_lanes;
     warps.back().first_primitive[0] = warps.back().last_primitive[0] = i;
     warps.back().color[0] = testing::color_of(1, 1, 1, 0.999F);
     ColorBeat beat;
     beat.count = 1;
-    beat.quads[0].warp = &warps.back();
-    beat.quads[0].position = static_cast<std::uint8_t>(i);
-    beat.quads[0].live = all_lanes;
+    beat.quads[0] = {&warps.back(), 0};
     color.add(beat);
   }
   bench.run();
@@ -348,7 +344,9 @@ TEST_F(CropUnitTest, ImageAndSignalsAreTheSameUnderAnyStallsAndMemory) {
     ASSERT_EQ(pixels, terminated) << seed;
     if (seed == 0) expected = got;
     ASSERT_EQ(got, expected) << seed;
-    for (const ShadedWarp& warp : crop.warps) ASSERT_EQ(warp.holders, 0U);
+    for (std::size_t i = crop.warps.size(); i > 0; --i) {
+      ASSERT_EQ(crop.warps.erase(&crop.pool.take()), 1U) << "a blended warp is back in its pool";
+    }
     ASSERT_TRUE(crop.bench.unit().idle());
   }
 }

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <deque>
 #include <map>
 #include <numeric>
 
@@ -23,15 +22,14 @@ class PropUnitTest : public ::testing::Test {
   PropUnitTest() : draw(testing::draw_of(256, 256)), state(testing::state_of(draw)) {}
 
   /// A shaded warp; quads are told apart by their first primitive, sequence * 8 + index.
-  const ShadedWarp* warp(std::uint32_t sequence, TileId tile, std::uint32_t tile_sequence, std::uint8_t count = 8) {
-    warps_.emplace_back();
-    ShadedWarp& made = warps_.back();
+  ShadedWarp* warp(std::uint32_t sequence, TileId tile, std::uint32_t tile_sequence, std::uint8_t count = 8) {
+    ShadedWarp& made = pool_.take();
     made.tile = tile;
     made.sequence = sequence;
     made.tile_sequence = tile_sequence;
     made.count = count;
     made.slot = static_cast<std::uint16_t>(sequence);
-    made.holders = 1;
+    made.end_of_draw = false;
     for (unsigned i = 0; i < count; ++i) {
       made.position[i] = static_cast<std::uint8_t>(i);
       made.first_primitive[i] = made.last_primitive[i] = sequence * 8 + i;
@@ -40,15 +38,15 @@ class PropUnitTest : public ::testing::Test {
     return &made;
   }
   const ShadedWarp* end(std::uint32_t warps) {
-    const ShadedWarp* const made = warp(warps, {}, 0, 0);
-    warps_.back().end_of_draw = true;
-    warps_.back().slot = 0xffff;
+    ShadedWarp* const made = warp(warps, {}, 0, 0);
+    made->end_of_draw = true;
+    made->slot = 0xffff;
     return made;
   }
 
   Draw draw;
   RenderState state;
-  std::deque<ShadedWarp> warps_;
+  ShadedWarpPool pool_;
 };
 
 std::vector<std::uint32_t> quads_of(const Sink<ColorBeat>& sink) {
@@ -156,13 +154,14 @@ TEST_F(PropUnitTest, AWarpIsReleasedWithItsLastQuad) {
   Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded");
   Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color");
   Sink<WarpRelease>& release = bench.sink<WarpRelease>("out_release");
-  shaded.add({warp(0, {0, 0}, 0)}, 10);
+  const ShadedWarp* const only = warp(0, {0, 0}, 0);
+  shaded.add({only}, 10);
   bench.run();
   ASSERT_EQ(release.records().size(), 1U);
   EXPECT_EQ(release.records()[0].item.slot, 0);
   EXPECT_EQ(release.records()[0].cycle, 12U + 3 + 1) << "four beats from 12 on, then the link";
   EXPECT_EQ(color.records().size(), 4U);
-  EXPECT_EQ(warps_[0].holders, 8U) << "quads on their way to CROP keep it";
+  EXPECT_NE(&pool_.take(), only) << "CROP has yet to blend its quads";
 }
 
 TEST_F(PropUnitTest, AWarpWithoutSurvivorsIsReleasedAndPassedOver) {
@@ -170,11 +169,13 @@ TEST_F(PropUnitTest, AWarpWithoutSurvivorsIsReleasedAndPassedOver) {
   Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded");
   Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color");
   Sink<WarpRelease>& release = bench.sink<WarpRelease>("out_release");
-  shaded.add({warp(0, {0, 0}, 0, 0)});
+  const ShadedWarp* const empty = warp(0, {0, 0}, 0, 0);
+  shaded.add({empty});
   shaded.add({warp(1, {0, 0}, 1, 2)});
   bench.run();
   EXPECT_EQ(quads_of(color), (std::vector<std::uint32_t>{8, 9}));
   EXPECT_EQ(release.records().size(), 2U);
+  EXPECT_EQ(&pool_.take(), empty) << "nobody else needs it";
 }
 
 TEST_F(PropUnitTest, TheEndWaitsForAllWarpsOfTheDraw) {
@@ -195,7 +196,6 @@ TEST_F(PropUnitTest, TheEndWaitsForAllWarpsOfTheDraw) {
 TEST_F(PropUnitTest, OrderHoldsPerTileUnderAnyArrivalAndStalls) {
   for (const char* order : {"draw", "tile"}) {
     for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-      warps_.clear();
       Bench bench("prop", "pre-rop", state, {{"order", order}});
       Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded", static_cast<unsigned>(1 + seed % 8));
       Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color", static_cast<unsigned>(1 + seed % 3));
