@@ -42,13 +42,14 @@ struct Primitive {
   PixelRect bounds;           ///< of the pixels that may be covered, clipped to the viewport, never empty
 };
 
-/// 2x2 samples of one primitive of which at least one is covered.
+/// 2x2 samples of one primitive of which at least one is covered. Begins as `Quad{}`; without the braces it has no
+/// values, so that a beat's places for quads cost nothing.
 struct Quad {
-  std::uint32_t splat = 0;
-  std::uint8_t position = 0;  ///< in the screen tile: 8 * row + column, 0 to 63
-  LaneMask coverage = 0;      ///< live samples; never 0 in flight
-  std::uint8_t triangle = 0;
-  std::uint8_t reserved = 0;
+  std::uint32_t splat;
+  std::uint8_t position;  ///< in the screen tile: 8 * row + column, 0 to 63
+  LaneMask coverage;      ///< live samples; never 0 in flight
+  std::uint8_t triangle;
+  std::uint8_t reserved;
 };
 static_assert(sizeof(Quad) == 8, "quads are copied from buffer to buffer");
 

@@ -19,7 +19,7 @@ void check(bool holds, const std::string& what) {
 }
 
 Quad quad(std::uint32_t splat, unsigned position, unsigned triangle) {
-  Quad made;
+  Quad made{};
   made.splat = splat;
   made.position = static_cast<std::uint8_t>(position);
   made.coverage = triangle == 0 ? 0b0011 : 0b1100;
