@@ -30,6 +30,7 @@ class CropUnit : public Unit {
         price_(cost_.sectors_per_cycle),
         sector_price_(cost_.quads_per_cycle),
         income_(price_ * sector_price_),
+        longest_run_(cost_.line_bytes / cost_.sector_bytes),
         memory_(*this, "memory", 2 * cost_.mshrs) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
@@ -89,7 +90,7 @@ class CropUnit : public Unit {
   /// Sends the dirty sectors of an evicted line; false while some are left.
   bool write_back() {
     while (write_back_ != 0 && memory_.available()) {
-      const SectorRun run = take_sector_run(write_back_, cost_.line_bytes / cost_.sector_bytes);
+      const SectorRun run = take_sector_run(write_back_, longest_run_);
       memory_.write(write_back_address_ + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_,
                     write_back_tag);
       tokens_ -= run.count * sector_price_;
@@ -241,6 +242,7 @@ class CropUnit : public Unit {
   const std::int64_t price_;         ///< of blending a quad, in tokens
   const std::int64_t sector_price_;  ///< of moving a sector
   const std::int64_t income_;        ///< of a cycle: what so many quads, or so many sectors, cost
+  const unsigned longest_run_;       ///< sectors of a line
   MemoryPort memory_;
   const ColorSurface* surface_ = nullptr;
   std::optional<CropCache> cache_;

@@ -28,7 +28,7 @@ class TcUnit : public Unit {
  private:
   using Flush = TcBehaviour::Flush;
   bool has_room() const { return queued_ < queue_.size(); }
-  Flush& next_place() { return queue_[(first_ + queued_) % queue_.size()]; }
+  Flush& next_place() { return queue_[first_ + queued_ - (first_ + queued_ < queue_.size() ? 0 : queue_.size())]; }
 
   bool collect(Cycle now) {
     bool moved = false;
@@ -114,7 +114,7 @@ class TcUnit : public Unit {
     beat.last_of_bin = sent_ == flush.quads.size();
     out_.push(beat);
     if (beat.last_of_bin) {
-      first_ = (first_ + 1) % static_cast<unsigned>(queue_.size());
+      first_ = first_ + 1 == queue_.size() ? 0 : first_ + 1;
       --queued_;
       sent_ = 0;
     }
