@@ -94,6 +94,9 @@ struct Warp {
   std::array<Quad, quads_per_warp> quads;
 };
 
+/// The slot of what holds none: the end of a draw.
+inline constexpr std::uint16_t no_slot = 0xffff;
+
 class ShadedWarpPool;
 
 /// A warp's quads after shading, pruning and merging, as many as survive.
@@ -103,7 +106,7 @@ struct ShadedWarp {
   std::uint32_t tile_sequence = 0;
   std::uint8_t count = 0;
   bool end_of_draw = false;
-  std::uint16_t slot = 0;  ///< of the SM, to be released when the last quad has left PROP
+  std::uint16_t slot = no_slot;  ///< of the SM, to be released when the last quad has left PROP
   std::array<std::uint8_t, quads_per_warp> position;
   std::array<LaneMask, quads_per_warp> live;
   ShadedWarpPool* pool = nullptr;  ///< to which it returns; null: it stays where it is

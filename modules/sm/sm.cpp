@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
+#include <vrpipe/error.h>
 #include <vrpipe/exp2.h>
 #include <vrpipe/registry.h>
 
@@ -32,6 +35,12 @@ float clamp_color(float value) { return std::min(std::max(0.0F, value), half_max
 }  // namespace
 
 SplatShader::SplatShader(const Parameters& parameters, const RenderState& state) : state_(state) {
+  if (parameters.cores * parameters.warps_per_core > no_slot) {
+    throw UserError("unusable SM array", "sm.cores, sm.warps_per_core",
+                    fmt::format("{} cores of {} warps are more than {} warps", parameters.cores,
+                                parameters.warps_per_core, no_slot),
+                    "lower one of them");
+  }
   cost_.cores = parameters.cores;
   cost_.schedulers_per_core = parameters.schedulers_per_core;
   cost_.lanes_per_scheduler = parameters.lanes_per_scheduler;

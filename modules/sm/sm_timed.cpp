@@ -6,8 +6,6 @@ namespace vrpipe {
 
 namespace {
 
-constexpr std::uint16_t no_slot = 0xffff;
-
 /// The SM array at lt and at. Ports as in sm_unit.cpp. A warp has its scheduler for all its instructions at once, then
 /// waits for all its latencies: with several warps that is what issuing segment by segment comes to. Vertex warps take
 /// issue slots from fragment warps but do not wait for them; they are few. Shaded warps go to PROP as they are done, at
@@ -70,7 +68,9 @@ class TimedSm : public TimedUnit {
     }
     last_tile_ = tile;
     ++sent_to_core_;
-    return std::size_t{core_} * cost_.schedulers_per_core + turn_++ % cost_.schedulers_per_core;
+    const std::size_t chosen = std::size_t{core_} * cost_.schedulers_per_core + turn_of_scheduler_;
+    turn_of_scheduler_ = turn_of_scheduler_ + 1 == cost_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
+    return chosen;
   }
 
   Cycle shade(const Warp& warp, Cycle visible) {
@@ -176,7 +176,7 @@ class TimedSm : public TimedUnit {
   TileId last_tile_;
   std::uint32_t core_ = 0;
   std::uint32_t sent_to_core_ = 0;
-  std::uint32_t turn_ = 0;
+  std::uint32_t turn_of_scheduler_ = 0;
   ShadedWarpPool pool_;
   std::uint64_t instructions_ = 0;
 };

@@ -8,8 +8,6 @@ namespace vrpipe {
 
 namespace {
 
-constexpr std::uint16_t no_slot = 0xffff;
-
 constexpr std::uint32_t nobody = ~0U;
 
 /// Warps, by slot, and schedulers, numbered after them, wait in lists that are chained through one array, since each is
@@ -120,6 +118,7 @@ class SmUnit : public Unit {
   struct Flight {
     const std::vector<ShaderSegment>* program = nullptr;
     std::uint16_t segment = 0;
+    std::uint16_t core = 0;  ///< fragment warps only
     std::uint16_t scheduler = 0;
     bool done = false;  ///< vertex warps only
   };
@@ -201,7 +200,7 @@ class SmUnit : public Unit {
     for (; in_release_.ready(); in_release_.pop()) {
       const std::uint32_t slot = in_release_.front().slot;
       if (slot == no_slot) continue;
-      free_of_core_[slot / cost_.warps_per_core].push_back(slot);
+      free_of_core_[flights_[slot].core].push_back(slot);
       ++free_slots_;
       --in_flight_;
     }
@@ -262,8 +261,9 @@ class SmUnit : public Unit {
     Flight& flight = flights_[slot];
     flight.program = warp.merge_pairs != 0 ? &merged_ : &cost_.fragment;
     flight.segment = 0;
-    flight.scheduler = static_cast<std::uint16_t>(core_ * cost_.schedulers_per_core +
-                                                  turn_of_scheduler_++ % cost_.schedulers_per_core);
+    flight.core = static_cast<std::uint16_t>(core_);
+    flight.scheduler = static_cast<std::uint16_t>(core_ * cost_.schedulers_per_core + turn_of_scheduler_);
+    turn_of_scheduler_ = turn_of_scheduler_ + 1 == cost_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
     warps_[slot] = warp;
     in_warps_.pop();
     ++in_flight_;

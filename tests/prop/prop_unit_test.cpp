@@ -40,7 +40,7 @@ class PropUnitTest : public ::testing::Test {
   const ShadedWarp* end(std::uint32_t warps) {
     ShadedWarp* const made = warp(warps, {}, 0, 0);
     made->end_of_draw = true;
-    made->slot = 0xffff;
+    made->slot = no_slot;
     return made;
   }
 

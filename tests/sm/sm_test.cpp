@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/error.h>
+
 #include "support/builders.h"
 
 namespace vrpipe {
@@ -50,6 +52,17 @@ double alpha_at(const Splat& splat, double x, double y) {
 }
 
 // case R15
+TEST(SplatShader, MoreWarpsThanSlotsHaveNumbersAreRefused) {
+  const Draw draw = draw_of(64, 64, {});
+  const RenderState state = testing::state_of(draw);
+  SplatShader::Parameters parameters;
+  parameters.cores = 255;
+  parameters.warps_per_core = 256;
+  EXPECT_NO_THROW(SplatShader(parameters, state));
+  parameters.cores = 256;
+  EXPECT_THROW(SplatShader(parameters, state), UserError);
+}
+
 TEST(SplatShader, OneSplatIsItsClosedFormAtEverySample) {
   for (std::uint64_t i = 0; i < 300; ++i) {
     const Splat splat = testing::splat_at(testing::uniform(i, 0, 0, 16), testing::uniform(i, 1, 0, 16),
