@@ -106,6 +106,8 @@ class Flow {
     cycle_ = cycle;
     used_ = 0;
   }
+  /// Cycles that so many parts fill, from the beginning of one.
+  unsigned cycles(unsigned parts) const { return static_cast<unsigned>(per_cycle_.quotient_up(parts)); }
   /// The cycle in which the next part goes.
   Cycle next() const { return cycle_ + (used_ == per_cycle_.value() ? 1 : 0); }
 
@@ -120,10 +122,11 @@ class Flow {
 class Passage {
  public:
   explicit Passage(unsigned per_cycle) : per_cycle_(std::max(per_cycle, 1U)) {}
+  /// Cycles that so many items take.
+  unsigned cycles(unsigned items) const { return std::max(static_cast<unsigned>(per_cycle_.quotient_up(items)), 1U); }
   Span take(Span visible, unsigned items) {
     const Cycle first = std::max(visible.first, free_at_);
-    const Cycle cycles = std::max<Cycle>(per_cycle_.quotient_up(items), 1);
-    const Span span(first, std::max(first + cycles - 1, visible.last));
+    const Span span(first, std::max(first + cycles(items) - 1, visible.last));
     free_at_ = span.last + 1;
     return span;
   }
@@ -418,7 +421,8 @@ class TimedIn : public InEnd<Item>, public TimedInput {
       return;
     }
     // Parts that the queue has no place for at first follow when the item's own first parts have left.
-    const std::size_t last_place = (place + std::min(beats, depth_) - 1) % depth_;
+    std::size_t last_place = place + std::min(beats, depth_) - 1;
+    if (last_place >= depth_) last_place -= depth_;
     payload.last = std::max(payload.last, free_at_[last_place]);
     const Span left = handler_(*payload.item, visible(payload));
     for (unsigned beat = 0; beat < beats; ++beat) {

@@ -52,8 +52,7 @@ class TimedProp : public TimedUnit {
   Span forward(const BinItem& item, Span visible, Passage& passage, TimedOut<BinItem>& out) {
     passage.hold(out.last());
     const Span at = passage.take(visible, item.quads);
-    const unsigned beats = std::max(1U, (item.quads + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle);
-    const Span taken = out.send(item, at, beats);
+    const Span taken = out.send(item, at, passage.cycles(item.quads));
     passage.hold(taken.last + 1);
     return taken;
   }
@@ -103,8 +102,7 @@ class TimedProp : public TimedUnit {
       charge(UnitState::starved, at.first);
       charge(UnitState::busy, at.last + 1);
       color_quads_ += warp.count;
-      const unsigned beats = (warp.count + cost_.color_quads_per_cycle - 1) / cost_.color_quads_per_cycle;
-      left = out_color_.send({&warp}, at, beats).last;
+      left = out_color_.send({&warp}, at, color_.cycles(warp.count)).last;
       charge(UnitState::blocked, left);
       color_.hold(left);
     } else {
