@@ -348,6 +348,30 @@ TEST(CropCache, SectorsMoveInTheLongestNaturallyAlignedRuns) {
   }
 }
 
+TEST(CropCache, AQuadsSectorsAreThoseThatHoldItsBytes) {
+  for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
+    const ColorSurface surface(32, 32, format);
+    CropBehaviour::Cost cost{};
+    for (cost.line_bytes = 64; cost.line_bytes <= 1024; cost.line_bytes *= 2) {
+      for (cost.sector_bytes = std::max(16U, cost.line_bytes / 32); cost.sector_bytes <= cost.line_bytes;
+           cost.sector_bytes *= 2) {
+        const auto quads = sectors_of_quads(cost, surface);
+        for (unsigned position = 0; position < positions_per_tile; ++position) {
+          const std::uint64_t tile = surface.address({1, 1}, 0);
+          const std::uint64_t line = tile + std::uint64_t{quads[position].line} * cost.line_bytes;
+          std::uint32_t expected = 0;
+          for (std::uint64_t byte = 0; byte < 4 * bytes_per_pixel(format); ++byte) {
+            const std::uint64_t offset = surface.address({1, 1}, position) + byte - line;
+            ASSERT_LT(offset, cost.line_bytes) << position;
+            expected |= 1U << (offset / cost.sector_bytes);
+          }
+          ASSERT_EQ(quads[position].sectors, expected) << position;
+        }
+      }
+    }
+  }
+}
+
 TEST(CropCache, SizesThatMakeNoCacheAreRefused) {
   EXPECT_THROW(CropCache(64, 128, 32, 4096), UserError);
   EXPECT_THROW(CropCache(1024, 96, 32, 4096), UserError);
