@@ -181,6 +181,8 @@ class SmBehaviour : public Behaviour {
     std::vector<ShaderSegment> vertex;
     std::vector<ShaderSegment> fragment;
     std::vector<ShaderSegment> merge;  ///< appended for a warp with pairs
+    /// Fragment warps in flight in the array. Throws UserError if they are more than slots have numbers.
+    std::uint32_t fragment_slots() const;
   };
   virtual Cost cost() const = 0;
 };

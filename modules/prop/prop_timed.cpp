@@ -78,10 +78,7 @@ class TimedProp : public TimedUnit {
 
   /// Lets those warps leave whose time comes up to a cycle.
   void leave_until(Cycle until) {
-    while (order_.has_next() && can_send() && color_.next() <= until) {
-      const WarpOrder::Waiting next = order_.take();
-      leave(next);
-    }
+    while (order_.has_next() && can_send() && color_.next() <= until) leave(order_.take());
     if (end_ == nullptr || end_->sequence != order_.left() || !can_send()) return;
     const Cycle at = color_.take(end_from_, cost_.color_quads_per_cycle).first;
     const WarpRelease release{end_->slot};

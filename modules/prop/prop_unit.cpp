@@ -32,7 +32,7 @@ class PropUnit : public Unit {
   }
 
   bool idle() const override {
-    return in_bins_.empty() && in_tested_.empty() && in_shaded_.empty() && current_ == nullptr && order_.empty() &&
+    return in_bins_.empty() && in_tested_.empty() && in_shaded_.empty() && current_.warp == nullptr && order_.empty() &&
            end_ == nullptr;
   }
   std::uint64_t work() const override { return color_quads_; }
@@ -88,19 +88,17 @@ class PropUnit : public Unit {
     ColorBeat beat;
     bool moved = false;
     while (beat.count < cost_.color_quads_per_cycle) {
-      if (current_ == nullptr) {
+      if (current_.warp == nullptr) {
         if (!order_.has_next()) break;
         if (out_release_.credits() == 0) break;
-        const WarpOrder::Waiting next = order_.take();
-        current_ = next.warp;
-        turn_ = next.turn;
+        current_ = order_.take();
         index_ = 0;
       }
-      const ShadedWarp& warp = *current_;
-      if (index_ < warp.count) beat.quads[beat.count++] = {current_, index_++};
+      const ShadedWarp& warp = *current_.warp;
+      if (index_ < warp.count) beat.quads[beat.count++] = {&warp, index_++};
       if (index_ == warp.count) {
-        current_ = nullptr;
-        order_.leave(turn_);
+        current_.warp = nullptr;
+        order_.leave(current_.turn);
         out_release_.push({warp.slot});
         moved = true;
         // A warp without survivors takes the cycle in which it is passed over.
@@ -143,7 +141,7 @@ class PropUnit : public Unit {
       enter(UnitState::busy, now);
       return now + 1;
     }
-    const bool has_work = current_ != nullptr || order_.has_next() || in_bins_.ready() || in_tested_.ready();
+    const bool has_work = current_.warp != nullptr || order_.has_next() || in_bins_.ready() || in_tested_.ready();
     enter(has_work ? UnitState::blocked : order_.has_early() ? UnitState::latency : UnitState::starved, now);
     Cycle next = never;
     for (const Cycle at :
@@ -166,8 +164,7 @@ class PropUnit : public Unit {
   Passage there_;  ///< to the tests, or past them
   Passage back_;   ///< from the tests
   WarpOrder order_;
-  const ShadedWarp* current_ = nullptr;  ///< being handed to CROP, from `index_` on
-  WarpOrder::Turn turn_{};               ///< whose it is
+  WarpOrder::Waiting current_;  ///< being handed to CROP, from `index_` on; none without a warp
   std::uint32_t index_ = 0;
   const ShadedWarp* end_ = nullptr;
   std::uint64_t color_quads_ = 0;

@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <fmt/format.h>
-
-#include <vrpipe/error.h>
 #include <vrpipe/exp2.h>
 #include <vrpipe/registry.h>
 
@@ -35,16 +32,11 @@ float clamp_color(float value) { return std::min(std::max(0.0F, value), half_max
 }  // namespace
 
 SplatShader::SplatShader(const Parameters& parameters, const RenderState& state) : state_(state) {
-  if (parameters.cores * parameters.warps_per_core > no_slot) {
-    throw UserError("unusable SM array", "sm.cores, sm.warps_per_core",
-                    fmt::format("{} cores of {} warps are more than {} warps", parameters.cores,
-                                parameters.warps_per_core, no_slot),
-                    "lower one of them");
-  }
   cost_.cores = parameters.cores;
   cost_.schedulers_per_core = parameters.schedulers_per_core;
   cost_.lanes_per_scheduler = parameters.lanes_per_scheduler;
   cost_.warps_per_core = parameters.warps_per_core;
+  static_cast<void>(cost_.fragment_slots());  // refused at every fidelity, also where slots have no numbers
   cost_.vertex_warps = parameters.vertex_warps;
   cost_.warps_to_one_core = parameters.warps_to_one_core;
   // The first instructions compute addresses and load; the rest waits for the attributes.

@@ -31,7 +31,7 @@ class TimedSm : public TimedUnit {
                      {&out_vertices_}),
         scheduler_free_at_(std::size_t{cost_.cores} * cost_.schedulers_per_core, 0),
         vertex_slots_(cost_.vertex_warps, 0) {
-    for (std::uint32_t slot = 0; slot < cost_.cores * cost_.warps_per_core; ++slot) slots_.push(0);
+    for (std::uint32_t left = cost_.fragment_slots(); left > 0; --left) slots_.push(0);
     in_warps_.set_gate([this] { return !slots_.empty(); });
   }
 

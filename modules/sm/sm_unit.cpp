@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include <vrpipe/divisor.h>
 #include <vrpipe/ring.h>
 #include <vrpipe/unit.h>
 
@@ -86,9 +87,10 @@ class SmUnit : public Unit {
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
         cycles_per_instruction_(32 / cost_.lanes_per_scheduler),
+        warps_per_core_(cost_.warps_per_core),
         wheel_(horizon()),
         schedulers_(std::size_t{cost_.cores} * cost_.schedulers_per_core) {
-    fragment_slots_ = cost_.cores * cost_.warps_per_core;
+    fragment_slots_ = cost_.fragment_slots();
     free_slots_ = fragment_slots_;
     flights_.resize(fragment_slots_ + cost_.vertex_warps);
     next_.resize(flights_.size() + schedulers_.size());
@@ -118,7 +120,6 @@ class SmUnit : public Unit {
   struct Flight {
     const std::vector<ShaderSegment>* program = nullptr;
     std::uint16_t segment = 0;
-    std::uint16_t core = 0;  ///< fragment warps only
     std::uint16_t scheduler = 0;
     bool done = false;  ///< vertex warps only
   };
@@ -200,7 +201,7 @@ class SmUnit : public Unit {
     for (; in_release_.ready(); in_release_.pop()) {
       const std::uint32_t slot = in_release_.front().slot;
       if (slot == no_slot) continue;
-      free_of_core_[flights_[slot].core].push_back(slot);
+      free_of_core_[warps_per_core_.quotient(slot)].push_back(slot);
       ++free_slots_;
       --in_flight_;
     }
@@ -261,7 +262,6 @@ class SmUnit : public Unit {
     Flight& flight = flights_[slot];
     flight.program = warp.merge_pairs != 0 ? &merged_ : &cost_.fragment;
     flight.segment = 0;
-    flight.core = static_cast<std::uint16_t>(core_);
     flight.scheduler = static_cast<std::uint16_t>(core_ * cost_.schedulers_per_core + turn_of_scheduler_);
     turn_of_scheduler_ = turn_of_scheduler_ + 1 == cost_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
     warps_[slot] = warp;
@@ -323,6 +323,7 @@ class SmUnit : public Unit {
   const SmBehaviour::Cost cost_;
   std::vector<ShaderSegment> merged_;  ///< the fragment program with the merge extension
   const std::uint32_t cycles_per_instruction_;
+  const Divisor warps_per_core_;
   Wheel wheel_;
   std::vector<Scheduler> schedulers_;
   std::uint32_t fragment_slots_ = 0;
