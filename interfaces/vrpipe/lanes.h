@@ -92,6 +92,13 @@ inline LaneBits expand_mask(LaneMask mask) {
   return (set & bit) == bit;
 }
 
+/// The same of a pair, the second's bits being the upper four.
+inline LanePairBits expand_mask_pair(std::uint32_t masks) {
+  const LanePairBits bit{1, 2, 4, 8, 16, 32, 64, 128};
+  return ((LanePairBits{} + static_cast<std::int32_t>(masks)) & bit) == bit;
+}
+
+/// The same of a pair, both having these bits.
 inline LanePairBits expand_mask_twice(LaneMask mask) {
   const LanePairBits bit{1, 2, 4, 8, 1, 2, 4, 8};
   return ((LanePairBits{} + mask) & bit) == bit;

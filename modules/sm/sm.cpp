@@ -49,8 +49,7 @@ SplatShader::SplatShader(const Parameters& parameters, const RenderState& state)
   cost_.merge = {{parameters.merge_instructions, parameters.merge_latency_cycles}};
 }
 
-void SplatShader::load(std::uint32_t index) {
-  loaded_ = index;
+void SplatShader::set_up(Attributes& attributes, std::uint32_t index) {
   const Splat& splat = state_.draw->splats[index];
   const float determinant = splat.ax * splat.by - splat.ay * splat.bx;
   // A splat without extent has alpha = opacity wherever it is rasterised at all.
@@ -58,20 +57,33 @@ void SplatShader::load(std::uint32_t index) {
   const float largest = std::max({splat.red, splat.green, splat.blue});
   const float least = std::min({splat.red, splat.green, splat.blue});
   if (!(least >= 0.0F && largest <= half_max)) ++colors_clamped;
-  attributes_ = {
-      splat.cx,         splat.cy,      splat.by * scale,       -splat.bx * scale,        -splat.ay * scale,
-      splat.ax * scale, splat.opacity, clamp_color(splat.red), clamp_color(splat.green), clamp_color(splat.blue)};
+  attributes = {index,
+                splat_lanes(splat.cx),
+                splat_lanes(splat.cy),
+                splat_lanes(splat.by * scale),
+                splat_lanes(-splat.bx * scale),
+                splat_lanes(-splat.ay * scale),
+                splat_lanes(splat.ax * scale),
+                splat_lanes(splat.opacity),
+                splat_lanes(clamp_color(splat.red)),
+                splat_lanes(clamp_color(splat.green)),
+                splat_lanes(clamp_color(splat.blue))};
+}
+
+const SplatShader::Attributes& SplatShader::attributes_of(AttributeTable& table, std::uint32_t splat) {
+  Attributes& attributes = table[splat % table.size()];
+  if (attributes.splat != splat) set_up(attributes, splat);
+  return attributes;
 }
 
 template <Exponential Kind>
-inline LanePair SplatShader::alpha_at(LanePair x, LanePair y) const {
-  const Attributes& splat = attributes_;
-  const LanePair dx = x - splat.cx;
-  const LanePair dy = y - splat.cy;
-  const LanePair u = dx * splat.m00 + dy * splat.m01;
-  const LanePair v = dx * splat.m10 + dy * splat.m11;
+inline LanePair SplatShader::alpha_at(LanePair x, LanePair y, const AttributePair& splats) {
+  const LanePair dx = x - splats.cx;
+  const LanePair dy = y - splats.cy;
+  const LanePair u = dx * splats.m00 + dy * splats.m01;
+  const LanePair v = dx * splats.m10 + dy * splats.m11;
   const LanePair squared = u * u + v * v;
-  const LanePair alpha = shader_exp2<Kind>(squared * -half_log2_e) * splat.opacity;
+  const LanePair alpha = shader_exp2<Kind>(squared * -half_log2_e) * splats.opacity;
   // So written that NaN stays NaN, and the pruning test prunes it.
   return select(alpha > alpha_max, LanePair{} + alpha_max, alpha);
 }
@@ -97,60 +109,63 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
   // Sample positions are sums of small integers and halves: exact.
   const auto x = static_cast<float>(warp.tile.x * screen_tile_pixels);
   const auto y = static_cast<float>(warp.tile.y * screen_tile_pixels);
+  // Two quads at a time, which may be a pair; of an odd number the last is its own neighbour, not covered. First the
+  // colours of all, then what becomes of them: a branch on that waits for the exponential.
+  struct {
+    LanePair red, green, blue, alpha;
+  } colors[quads_per_warp / 2];
+  const unsigned last = warp.count - 1U;
+  std::uint32_t covered_of_warp = 0;  // a bit a thread
+  std::uint32_t live_of_warp = 0;
+  for (unsigned i = 0; i < warp.count; i += 2) {
+    const Quad& first = warp.quads[i];
+    const Quad& second = warp.quads[i + (i < last)];
+    const Attributes& of_first = attributes_of(attributes_of_first_, first.splat);
+    const AttributePair splats = first.splat == second.splat
+                                     ? AttributePair(of_first, of_first)
+                                     : AttributePair(of_first, attributes_of(attributes_of_second_, second.splat));
+    const std::uint32_t covered = first.coverage | (i == last ? 0U : static_cast<unsigned>(second.coverage) << 4U);
+    const LanePair alpha = alpha_at<Kind>(x + join(samples.x[first.position % quads_per_tile_row],
+                                                   samples.x[second.position % quads_per_tile_row]),
+                                          y + join(samples.y[first.position / quads_per_tile_row],
+                                                   samples.y[second.position / quads_per_tile_row]),
+                                          splats);
+    const LanePairBits kept = (alpha >= state_.pruning_threshold) & expand_mask_pair(covered);
+    const LanePair visible = floats_of<LanePair>(bits_of(alpha) & kept);
+    colors[i / 2] = {visible * splats.red, visible * splats.green, visible * splats.blue, visible};
+    covered_of_warp |= covered << (4 * i);
+    live_of_warp |= sign_mask(kept) << (4 * i);
+  }
+
   unsigned count = 0;
-  unsigned shaded = 0;
-  unsigned pruned = 0;
-  bool previous_lives = false;
-  unsigned backs_of_pairs = 0;  // a bit a quad
-  for (unsigned left = warp.merge_pairs; left != 0; left &= left - 1) backs_of_pairs |= 2U << (2 * __builtin_ctz(left));
-  const auto finish = [&](unsigned i, LaneMask live, const QuadColor& color) {
-    const Quad& quad = warp.quads[i];
-    shaded += popcount(quad.coverage);
-    pruned += popcount(static_cast<LaneMask>(quad.coverage & ~live));
-    const bool back_of_pair = (backs_of_pairs >> i & 1U) != 0;
-    if (live == 0) {
-      ++quads_pruned;
-    } else if (back_of_pair && previous_lives) {
-      LaneMask& front = out.live[count - 1];
-      out.color[count - 1] = blend_front_to_back(out.color[count - 1], color);
-      fragments_merged += popcount(static_cast<LaneMask>(front & live));
-      front = static_cast<LaneMask>(front | live);
-      out.last_primitive[count - 1] = primitive_order(quad);
+  // Written whether the quad lives or not, since a branch would be mispredicted too often.
+  const auto put = [&](const Quad& quad, LaneMask live, const QuadColor& color) {
+    out.color[count] = color;
+    out.position[count] = quad.position;
+    out.live[count] = live;
+    out.first_primitive[count] = out.last_primitive[count] = primitive_order(quad);
+    count += live != 0;
+  };
+  for (unsigned i = 0; i < warp.count; i += 2) {
+    const auto& [red, green, blue, alpha] = colors[i / 2];
+    const QuadColor front{first_of(red), first_of(green), first_of(blue), first_of(alpha)};
+    const QuadColor back{second_of(red), second_of(green), second_of(blue), second_of(alpha)};
+    const auto live_front = static_cast<LaneMask>(live_of_warp >> (4 * i) & all_lanes);
+    const auto live_back = static_cast<LaneMask>(live_of_warp >> (4 * i + 4) & all_lanes);
+    if ((warp.merge_pairs >> (i / 2) & 1U) != 0 && live_front != 0 && live_back != 0) {
+      put(warp.quads[i], static_cast<LaneMask>(live_front | live_back), blend_front_to_back(front, back));
+      out.last_primitive[count - 1] = primitive_order(warp.quads[i + 1]);
+      fragments_merged += popcount(static_cast<LaneMask>(live_front & live_back));
       ++quads_merged;
     } else {
-      out.color[count] = color;
-      out.position[count] = quad.position;
-      out.live[count] = live;
-      out.first_primitive[count] = primitive_order(quad);
-      out.last_primitive[count] = primitive_order(quad);
-      ++count;
+      put(warp.quads[i], live_front, front);
+      put(warp.quads[i + (i < last)], live_back, back);
     }
-    previous_lives = live != 0;
-  };
-  for (unsigned i = 0, together = 0; i < warp.count; i += together) {
-    // Two quads of a splat at a time; a single one twice.
-    const Quad& quad = warp.quads[i];
-    together = i + 1 < warp.count && warp.quads[i + 1].splat == quad.splat ? 2 : 1;
-    const Quad& last = warp.quads[i + together - 1];
-    if (quad.splat != loaded_) load(quad.splat);
-    LanePair alpha = alpha_at<Kind>(x + join(samples.x[quad.position % quads_per_tile_row],
-                                             samples.x[last.position % quads_per_tile_row]),
-                                    y + join(samples.y[quad.position / quads_per_tile_row],
-                                             samples.y[last.position / quads_per_tile_row]));
-    const LanePairBits kept =
-        (alpha >= state_.pruning_threshold) & join(expand_mask(quad.coverage), expand_mask(last.coverage));
-    alpha = floats_of<LanePair>(bits_of(alpha) & kept);
-    const LanePair red = alpha * attributes_.red;
-    const LanePair green = alpha * attributes_.green;
-    const LanePair blue = alpha * attributes_.blue;
-    const unsigned live = sign_mask(kept);
-    finish(i, live & all_lanes, {first_of(red), first_of(green), first_of(blue), first_of(alpha)});
-    if (together == 1) continue;
-    finish(i + 1, static_cast<LaneMask>(live >> 4U),
-           {second_of(red), second_of(green), second_of(blue), second_of(alpha)});
   }
-  fragments_shaded += shaded;
-  fragments_pruned += pruned;
+  fragments_shaded += __builtin_popcount(covered_of_warp);
+  fragments_pruned += __builtin_popcount(covered_of_warp & ~live_of_warp);
+  const std::uint32_t dead = ~(live_of_warp | live_of_warp >> 1U | live_of_warp >> 2U | live_of_warp >> 3U);
+  quads_pruned += __builtin_popcount(dead & 0x11111111U) - (quads_per_warp - warp.count);
   out.count = static_cast<std::uint8_t>(count);
 }
 

@@ -91,23 +91,42 @@ class SplatShader : public SmBehaviour {
                          "set-ups of a splat with a colour below 0 or beyond the largest half"};
 
  private:
-  /// What the fragment shader needs of a splat.
+  /// What the fragment shader needs of a splat, each for the four samples of a quad.
   struct Attributes {
-    float cx, cy;
-    float m00, m01, m10, m11;  ///< pixels to sigmas along the two axes
-    float opacity, red, green, blue;
+    std::uint32_t splat = ~0U;
+    Lanes cx, cy;
+    Lanes m00, m01, m10, m11;  ///< pixels to sigmas along the two axes
+    Lanes opacity, red, green, blue;
   };
-  void load(std::uint32_t splat);
+  /// Those of two quads.
+  struct AttributePair {
+    LanePair cx, cy, m00, m01, m10, m11, opacity, red, green, blue;
+    AttributePair(const Attributes& a, const Attributes& b)
+        : cx(join(a.cx, b.cx)),
+          cy(join(a.cy, b.cy)),
+          m00(join(a.m00, b.m00)),
+          m01(join(a.m01, b.m01)),
+          m10(join(a.m10, b.m10)),
+          m11(join(a.m11, b.m11)),
+          opacity(join(a.opacity, b.opacity)),
+          red(join(a.red, b.red)),
+          green(join(a.green, b.green)),
+          blue(join(a.blue, b.blue)) {}
+  };
+  void set_up(Attributes& attributes, std::uint32_t splat);
+  using AttributeTable = std::array<Attributes, 32>;
+  const Attributes& attributes_of(AttributeTable& table, std::uint32_t splat);
   template <Exponential Kind>
   void shade_warp(const Warp& warp, ShadedWarp& out);
-  /// Alpha of the loaded splat at the samples of two quads.
+  /// Alpha at the samples of two quads.
   template <Exponential Kind>
-  LanePair alpha_at(LanePair x, LanePair y) const;
+  static LanePair alpha_at(LanePair x, LanePair y, const AttributePair& splats);
 
   const RenderState& state_;
   Cost cost_;
-  Attributes attributes_{};
-  std::uint32_t loaded_ = ~0U;
+  /// Of the splats last set up, by the low bits of their number; two tables, so that the two quads' are there at once.
+  AttributeTable attributes_of_first_;
+  AttributeTable attributes_of_second_;
 };
 
 }  // namespace vrpipe

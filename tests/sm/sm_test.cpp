@@ -238,6 +238,33 @@ TEST(SplatShader, DeadLanesAreZeroAndDoNotTouchTheirPartners) {
   EXPECT_EQ(merged.color[0].red[0], 0.125F + 0.5F * 0.75F);
 }
 
+// Also of splats whose set-ups share a place in the shader's tables.
+TEST(SplatShader, EveryQuadOfAWarpHasTheColourThatItHasAlone) {
+  const Draw draw = testing::random_draw(64, 64, 200, 4);
+  Shader together(draw.splats);
+  for (std::uint64_t i = 0; i < 500; ++i) {
+    std::vector<Quad> quads;
+    for (std::uint64_t k = 0; k < 1 + i % 8; ++k) {
+      const auto splat =
+          static_cast<std::uint32_t>(i % 3 == 0 ? mix(i) % 8 + 32 * (mix(i * 8 + k) % 6) : mix(i * 8 + k) % 200);
+      quads.push_back(quad_of(splat, static_cast<unsigned>(mix(i * 64 + k) % 64)));
+    }
+    const ShadedWarp out = together.shade(quads, 0, {1, 2});
+    unsigned at = 0;
+    for (const Quad& quad : quads) {
+      Shader one(draw.splats);
+      const ShadedWarp alone = one.shade({quad}, 0, {1, 2});
+      if (alone.count == 0) continue;
+      ASSERT_LT(at, out.count);
+      ASSERT_EQ(out.first_primitive[at], primitive_order(quad));
+      ASSERT_EQ(out.live[at], alone.live[0]);
+      ASSERT_EQ(std::memcmp(&out.color[at], &alone.color[0], sizeof alone.color[0]), 0) << i;
+      ++at;
+    }
+    ASSERT_EQ(at, out.count);
+  }
+}
+
 // case Q03
 TEST(SplatShader, AQuadOfWhichAllIsPrunedLeavesAndIsCounted) {
   Shader shader({flat_box(0, 0, 16, 16, 0.001F), flat_box(0, 0, 16, 16, 0.5F)});
