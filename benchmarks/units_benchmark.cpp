@@ -94,7 +94,7 @@ const Frame& frame() {
       Warp warp;
       bool launched = false;
       for (unsigned from = 0; from < beat.count;) {
-        from += qru->examine(beat, from, warp, launched);
+        from += qru->examine(beat.tile, &beat.quads[from], beat.count - from, warp, launched);
         if (launched) shade(warp);
       }
       while (beat.last_of_bin && qru->finish_bin(warp)) shade(warp);
@@ -174,7 +174,8 @@ void reorder_quads(benchmark::State& state) {
     Warp warp;
     bool launched = false;
     for (const QuadBeat& beat : f.bins) {
-      for (unsigned from = 0; from < beat.count;) from += qru->examine(beat, from, warp, launched);
+      for (unsigned from = 0; from < beat.count;)
+        from += qru->examine(beat.tile, &beat.quads[from], beat.count - from, warp, launched);
       while (beat.last_of_bin && qru->finish_bin(warp)) benchmark::DoNotOptimize(warp);
     }
   }

@@ -30,7 +30,7 @@ class BackEnd {
     Warp warp;
     bool launched = false;
     for (unsigned from = 0; from < beat.count;) {
-      from += qru->examine(beat, from, warp, launched);
+      from += qru->examine(beat.tile, &beat.quads[from], beat.count - from, warp, launched);
       if (launched) run(warp, signal);
     }
     if (!beat.last_of_bin) return;

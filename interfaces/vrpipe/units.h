@@ -151,9 +151,9 @@ class ZropBehaviour : public Behaviour {
 /// Slot `qru`: forms warps from the surviving quads of a bin.
 class QruBehaviour : public Behaviour {
  public:
-  /// Examines quads `from`.. of a beat until all are examined or a warp is complete. Returns the number examined;
+  /// Examines quads of a bin, until all `count` are examined or a warp is complete. Returns the number examined;
   /// `launched` tells whether `out` was filled.
-  virtual unsigned examine(const QuadBeat& beat, unsigned from, Warp& out, bool& launched) = 0;
+  virtual unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) = 0;
   /// At the end of a bin: the next warp of what is left; false when nothing is.
   virtual bool finish_bin(Warp& out) = 0;
   virtual Throughput cost() const = 0;              ///< items: quads examined

@@ -9,9 +9,9 @@ namespace vrpipe {
 PairingQru::PairingQru(const Parameters& parameters, const RenderState&)
     : bin_quads_(parameters.bin_quads),
       quads_per_cycle_(parameters.quads_per_cycle),
-      latency_cycles_(parameters.latency_cycles) {
-  buffer_.reserve(bin_quads_);
-  merged_.reserve(bin_quads_);
+      latency_cycles_(parameters.latency_cycles),
+      buffer_(bin_quads_),
+      single_((bin_quads_ + bits_per_word - 1) / bits_per_word) {
   registers_.fill(no_quad);
 }
 
@@ -22,54 +22,54 @@ void PairingQru::launch(Warp& out) {
   ++warps;
 }
 
-bool PairingQru::launch_when_full(Warp& out) {
-  if (warp_.count < quads_per_warp) return false;
-  launch(out);
-  return true;
-}
-
-unsigned PairingQru::examine(const QuadBeat& beat, unsigned from, Warp& out, bool& launched) {
+unsigned PairingQru::examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) {
+  warp_.tile = tile;
   launched = false;
-  warp_.tile = beat.tile;
-  unsigned taken = 0;
-  while (from + taken < beat.count && !launched) {
-    if (buffer_.size() == bin_quads_) {
+  unsigned at = 0;
+  while (at < count && !launched) {
+    if (buffered_ == bin_quads_) {
       launched = finish_bin(out);
       continue;
     }
-    const Quad& quad = beat.quads[from + taken];
-    ++taken;
-    ++quads;
-    std::int16_t& partner = registers_[quad.position];
-    if (partner == no_quad) {
-      partner = static_cast<std::int16_t>(buffer_.size());
-      buffer_.push_back(quad);
-      merged_.push_back(false);
-      continue;
+    const unsigned end = at + std::min(count - at, bin_quads_ - buffered_);
+    std::uint32_t id = buffered_;
+    unsigned paired = warp_.count;
+    for (; at < end && paired < quads_per_warp; ++at, ++id) {
+      const Quad quad = quads[at];
+      buffer_[id] = quad;
+      // By masks, since a branch on whether the quad finds a partner would be mispredicted: about half do, in no order.
+      std::uint16_t& held = registers_[quad.position];
+      const std::uint32_t found = held != no_quad ? ~0U : 0U;
+      const std::uint32_t front = id ^ ((id ^ held) & found);
+      held = static_cast<std::uint16_t>(id | found);  // after a pair no_quad
+      single_[front / bits_per_word] ^= std::uint64_t{1} << (front % bits_per_word);
+      warp_.quads[paired] = buffer_[front];
+      warp_.quads[paired + 1] = quad;
+      paired += 2 & found;
     }
-    const auto front = static_cast<std::size_t>(partner);
-    partner = no_quad;
-    merged_[front] = true;
-    buffer_.push_back(quad);
-    merged_.push_back(true);
-    ++pairs;
-    warp_.merge_pairs = static_cast<std::uint8_t>(warp_.merge_pairs | (1U << (warp_.count / 2)));
-    warp_.quads[warp_.count++] = buffer_[front];
-    warp_.quads[warp_.count++] = quad;
-    launched = launch_when_full(out);
+    buffered_ = id;
+    pairs += (paired - warp_.count) / 2;
+    warp_.count = static_cast<std::uint8_t>(paired);
+    warp_.merge_pairs = static_cast<std::uint8_t>((1U << paired / 2) - 1);  // left-overs come at the end of the bin
+    launched = paired == quads_per_warp;
+    if (launched) launch(out);
   }
-  return taken;
+  quads_examined += at;
+  return at;
 }
 
 bool PairingQru::finish_bin(Warp& out) {
-  while (left_ < buffer_.size()) {
-    const std::size_t id = left_++;
-    if (merged_[id]) continue;
-    warp_.quads[warp_.count++] = buffer_[id];
-    if (launch_when_full(out)) return true;
+  for (; left_ * bits_per_word < buffered_; ++left_) {
+    std::uint64_t& word = single_[left_];
+    for (; word != 0; word &= word - 1) {
+      if (warp_.count == quads_per_warp) {
+        launch(out);
+        return true;
+      }
+      warp_.quads[warp_.count++] = buffer_[left_ * bits_per_word + static_cast<unsigned>(__builtin_ctzll(word))];
+    }
   }
-  buffer_.clear();
-  merged_.clear();
+  buffered_ = 0;
   left_ = 0;
   registers_.fill(no_quad);
   if (warp_.count == 0) return false;
@@ -90,15 +90,15 @@ void QruPassThrough::launch(Warp& out) {
   ++warps;
 }
 
-unsigned QruPassThrough::examine(const QuadBeat& beat, unsigned from, Warp& out, bool& launched) {
-  warp_.tile = beat.tile;
-  const unsigned taken = std::min<unsigned>(beat.count - from, quads_per_warp - warp_.count);
-  std::copy_n(beat.quads.begin() + from, taken, warp_.quads.begin() + warp_.count);
-  warp_.count = static_cast<std::uint8_t>(warp_.count + taken);
-  quads += taken;
+unsigned QruPassThrough::examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) {
+  warp_.tile = tile;
+  const unsigned examined = std::min<unsigned>(count, quads_per_warp - warp_.count);
+  std::copy_n(quads, examined, warp_.quads.begin() + warp_.count);
+  warp_.count = static_cast<std::uint8_t>(warp_.count + examined);
+  quads_examined += examined;
   launched = warp_.count == quads_per_warp;
   if (launched) launch(out);
-  return taken;
+  return examined;
 }
 
 bool QruPassThrough::finish_bin(Warp& out) {

@@ -37,7 +37,7 @@ class PairingQru : public QruBehaviour {
   };
   PairingQru(const Parameters& parameters, const RenderState&);
 
-  unsigned examine(const QuadBeat& beat, unsigned from, Warp& out, bool& launched) override;
+  unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) override;
   bool finish_bin(Warp& out) override;
   Throughput cost() const override { return {quads_per_cycle_, latency_cycles_}; }
   /// (4 B pointer + 6-bit position) x quads + 64 x 1 B register + bitmap (paper, table of hardware cost).
@@ -45,21 +45,22 @@ class PairingQru : public QruBehaviour {
 
   Counter warps{*this, "warps", "warps", "launched"};
   Counter pairs{*this, "pairs", "pairs", "of overlapping quads marked for merging"};
-  Counter quads{*this, "quads", "quads", "examined"};
+  Counter quads_examined{*this, "quads", "quads", "examined"};
 
  private:
-  static constexpr std::int16_t no_quad = -1;
-  bool launch_when_full(Warp& out);
+  static constexpr std::uint16_t no_quad = 0xffff;
+  static constexpr unsigned bits_per_word = 64;
   void launch(Warp& out);
 
   const std::uint32_t bin_quads_;
   const std::uint32_t quads_per_cycle_;
   const std::uint32_t latency_cycles_;
-  std::vector<Quad> buffer_;  ///< by quad id
-  std::vector<bool> merged_;  ///< the bitmap
-  std::array<std::int16_t, positions_per_tile> registers_;
-  Warp warp_;             ///< being filled
-  std::size_t left_ = 0;  ///< next quad id to look at for the left-over warps
+  std::vector<Quad> buffer_;           ///< by quad id
+  std::vector<std::uint64_t> single_;  ///< the bitmap: buffered quads without a partner
+  std::array<std::uint16_t, positions_per_tile> registers_;
+  Warp warp_;                   ///< being filled
+  std::uint32_t buffered_ = 0;  ///< quads in the buffer
+  std::uint32_t left_ = 0;      ///< word of the bitmap to look at for the left-over warps
 };
 
 /// The baseline: quads of a bin become warps in the order in which they come.
@@ -68,13 +69,13 @@ class QruPassThrough : public QruBehaviour {
   struct Parameters : ParameterSet {};
   QruPassThrough(const Parameters&, const RenderState&) {}
 
-  unsigned examine(const QuadBeat& beat, unsigned from, Warp& out, bool& launched) override;
+  unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) override;
   bool finish_bin(Warp& out) override;
   Throughput cost() const override { return {QuadBeat::capacity, 1}; }
   std::uint64_t storage_bytes() const override { return 0; }
 
   Counter warps{*this, "warps", "warps", "launched"};
-  Counter quads{*this, "quads", "quads", "examined"};
+  Counter quads_examined{*this, "quads", "quads", "examined"};
 
  private:
   void launch(Warp& out);

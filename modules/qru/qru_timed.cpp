@@ -56,20 +56,15 @@ class TimedQru : public TimedUnit {
       return {begin, left_};
     }
     const std::vector<Quad>& quads = item.storage->flush.quads;
-    QuadBeat beat;
-    beat.tile = item.tile;
     for (unsigned from = 0; from < item.quads;) {
       go_to(visible.of_part(from, item.quads));
       if (budget_ == 0) go_to(cycle_ + 1);
-      const unsigned count = std::min({item.quads - from, budget_, QuadBeat::capacity});
-      beat.count = static_cast<std::uint8_t>(count);
-      std::copy_n(quads.begin() + from, count, beat.quads.begin());
-      from += count;
-      examined_ += count;
-      for (unsigned at = 0; at < count;) {
+      const unsigned end = from + std::min(item.quads - from, budget_);
+      examined_ += end - from;
+      while (from < end) {
         bool launched = false;
-        const unsigned taken = behaviour_->examine(beat, at, warp_, launched);
-        at += taken;
+        const unsigned taken = behaviour_->examine(item.tile, &quads[from], end - from, warp_, launched);
+        from += taken;
         if (budget_ == 0) go_to(cycle_ + 1);
         budget_ -= std::min(taken, budget_);
         left_ = cycle_;

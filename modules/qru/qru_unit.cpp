@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "qru/warp_numbering.h"
 
 #include <vrpipe/unit.h>
@@ -45,14 +47,8 @@ class QruUnit : public Unit {
       Warp warp;
       bool launched = false;
       if (from_ < beat.count) {
-        unsigned taken = 0;
-        if (beat.count - from_ <= budget) {
-          taken = behaviour_->examine(beat, from_, warp, launched);
-        } else {
-          QuadBeat part = beat;
-          part.count = static_cast<std::uint8_t>(from_ + budget);
-          taken = behaviour_->examine(part, from_, warp, launched);
-        }
+        const unsigned taken = behaviour_->examine(beat.tile, &beat.quads[from_],
+                                                   std::min<unsigned>(beat.count - from_, budget), warp, launched);
         from_ += taken;
         examined_ += taken;
         budget -= taken;

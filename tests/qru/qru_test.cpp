@@ -53,7 +53,7 @@ class QruTest : public ::testing::Test {
       const QuadBeat beat = beat_of(tile, part, first + static_cast<std::uint32_t>(at));
       for (unsigned from = 0; from < beat.count;) {
         bool launched = false;
-        from += qru.examine(beat, from, warp, launched);
+        from += qru.examine(tile, &beat.quads[from], beat.count - from, warp, launched);
         if (launched) collect(warp, outcome);
       }
     }
@@ -166,7 +166,7 @@ TEST_F(QruTest, QuadsOfOneSplatPairAsAnyOthers) {
   PairingQru qru(parameters, state);
   Warp warp;
   bool launched = false;
-  for (unsigned from = 0; from < 2;) from += qru.examine(beat, from, warp, launched);
+  ASSERT_EQ(qru.examine(beat.tile, beat.quads.data(), 2, warp, launched), 2U);
   ASSERT_TRUE(qru.finish_bin(warp));
   EXPECT_EQ(warp.merge_pairs, 1);
 }
@@ -236,7 +236,7 @@ TEST_F(QruTest, NoQuadIsLostOrDoubledAndEachPositionKeepsItsOrder) {
     ASSERT_EQ(seen.size(), positions.size());
     first += static_cast<std::uint32_t>(positions.size());
   }
-  EXPECT_EQ(qru.quads.value(), first);
+  EXPECT_EQ(qru.quads_examined.value(), first);
 }
 
 TEST_F(QruTest, StorageIsThatOfThePapersTable) { EXPECT_EQ(PairingQru(parameters, state).storage_bytes(), 688U); }

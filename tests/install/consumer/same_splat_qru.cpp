@@ -8,13 +8,14 @@
 SameSplatQru::SameSplatQru(const Parameters& parameters, const vrpipe::RenderState&)
     : cost_{parameters.quads_per_cycle, parameters.latency_cycles} {}
 
-unsigned SameSplatQru::examine(const vrpipe::QuadBeat& beat, unsigned from, vrpipe::Warp& out, bool& launched) {
+unsigned SameSplatQru::examine(vrpipe::TileId tile, const vrpipe::Quad* quads, unsigned count, vrpipe::Warp& out,
+                               bool& launched) {
   launched = false;
-  warp_.tile = beat.tile;
-  unsigned taken = 0;
-  while (from + taken < beat.count && !launched) {
-    const vrpipe::Quad& quad = beat.quads[from + taken++];
-    ++quads;
+  warp_.tile = tile;
+  unsigned examined = 0;
+  while (examined < count && !launched) {
+    const vrpipe::Quad& quad = quads[examined++];
+    ++quads_examined;
     vrpipe::Quad& held = registers_[quad.position];
     if (held.coverage == 0) {
       held = quad;
@@ -25,7 +26,7 @@ unsigned SameSplatQru::examine(const vrpipe::QuadBeat& beat, unsigned from, vrpi
     }
     launched = launch_when_full(out);
   }
-  return taken;
+  return examined;
 }
 
 bool SameSplatQru::finish_bin(vrpipe::Warp& out) {

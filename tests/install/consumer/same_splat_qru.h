@@ -27,7 +27,8 @@ class SameSplatQru : public vrpipe::QruBehaviour {
   };
   SameSplatQru(const Parameters& parameters, const vrpipe::RenderState& state);
 
-  unsigned examine(const vrpipe::QuadBeat& beat, unsigned from, vrpipe::Warp& out, bool& launched) override;
+  unsigned examine(vrpipe::TileId tile, const vrpipe::Quad* quads, unsigned count, vrpipe::Warp& out,
+                   bool& launched) override;
   bool finish_bin(vrpipe::Warp& out) override;
   vrpipe::Throughput cost() const override { return cost_; }
   /// 64 registers of a 4 B pointer and the quad's 4 B, and one for the single that waits.
@@ -35,7 +36,7 @@ class SameSplatQru : public vrpipe::QruBehaviour {
 
   vrpipe::Counter warps{*this, "warps", "warps", "launched"};
   vrpipe::Counter pairs{*this, "pairs", "pairs", "of quads of the same splat"};
-  vrpipe::Counter quads{*this, "quads", "quads", "examined"};
+  vrpipe::Counter quads_examined{*this, "quads", "quads", "examined"};
 
  private:
   void add_pair(const vrpipe::Quad& front, const vrpipe::Quad& back);
