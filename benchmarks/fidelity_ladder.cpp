@@ -1,9 +1,9 @@
 // What each fidelity costs in accuracy and brings in speed: measured beside wanted, against `cycle`.
 //   fidelity_ladder [--repeat N] [SCENE ...]
 // A SCENE is a file or builtin:NAME; without one, the built-in scenes and, where there is a shared folder, playbot.
-// Accuracy: every rung and variant of every scene, once. Rates: the baseline of one large frame, each rung in turn N times
-// (default: 5), the median; of the first scene where the frame of the shared folder is absent. Rates are rasterised quads
-// per second of processor time of this process.
+// Accuracy: every rung and variant of every scene, once. Rates: of one large frame, every rung and variant in turn, N times
+// (default: 5), the median; of the first scene where the frame of the shared folder is absent. The slowest variant counts.
+// Rates are rasterised quads per second of processor time of this process.
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -118,18 +118,29 @@ void measure_accuracy(const SceneRequest& request, std::array<Worst, rungs.size(
   }
 }
 
+/// Prints every variant's; returns the lowest.
 std::array<double, rungs.size()> measure_rates(const SceneRequest& request, int repeat) {
   const LoadedScene scene = load_scene(request);
-  std::array<std::vector<double>, rungs.size()> rates;
+  std::array<std::vector<std::vector<double>>, rungs.size()> rates;  // by variant and run
+  rates.fill(std::vector<std::vector<double>>(variants().size()));
   for (int run = 0; run < repeat; ++run) {
     for (std::size_t i = 0; i < rungs.size(); ++i) {
-      rates[i].push_back(run_once(scene.draw, variants().front(), rungs[i].fidelity).quads_per_second);
+      for (std::size_t v = 0; v < variants().size(); ++v) {
+        rates[i][v].push_back(run_once(scene.draw, variants()[v], rungs[i].fidelity).quads_per_second);
+      }
     }
   }
-  std::array<double, rungs.size()> medians{};
-  std::transform(rates.begin(), rates.end(), medians.begin(), median);
-  std::printf("\nrates: medians of %d runs of %s\n", repeat, scene.summary.name.c_str());
-  return medians;
+  std::printf("\nMquads/s: medians of %d runs of %s\n%-11s", repeat, scene.summary.name.c_str(), "fidelity");
+  for (const Variant& variant : variants()) std::printf(" %9s", variant.name.c_str());
+  std::array<double, rungs.size()> lowest{};
+  for (std::size_t i = 0; i < rungs.size(); ++i) {
+    std::printf("\n%-11s", name_of(rungs[i].fidelity));
+    std::vector<double> medians;
+    for (const std::vector<double>& runs : rates[i]) medians.push_back(median(runs));
+    for (const double rate : medians) std::printf(" %9.1f", rate / 1e6);
+    lowest[i] = *std::min_element(medians.begin(), medians.end());
+  }
+  return lowest;
 }
 
 int run(const std::vector<std::string>& arguments) {
@@ -138,6 +149,13 @@ int run(const std::vector<std::string>& arguments) {
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     if (arguments[i] == "--repeat" && i + 1 < arguments.size()) {
       repeat = std::max(1, std::stoi(arguments[++i]));
+    } else if (arguments[i].rfind('-', 0) == 0) {
+      const bool help = arguments[i] == "--help";
+      std::fprintf(
+          help ? stdout : stderr,
+          "usage: fidelity_ladder [--repeat N] [SCENE ...]\n"
+          "SCENE: a file or builtin:NAME; without one the built-in scenes and, with a shared folder, playbot\n");
+      return help ? 0 : 2;
     } else {
       scenes.emplace_back().scene = arguments[i];
     }
@@ -171,7 +189,7 @@ int run(const std::vector<std::string>& arguments) {
   }
   const std::array<double, rungs.size()> rates = measure_rates(frame, repeat);
 
-  std::printf("errors: the worst of all scenes and variants\n");
+  std::printf("\n\nerrors: the worst of all scenes and variants; rates: the slowest variant\n");
   std::printf("%-11s %9s %9s %12s %9s %9s %9s\n", "fidelity", "cycles", "wanted", "speed-up", "wanted", "Mquads/s",
               "wanted");
   std::array<double, rungs.size()> errors{};
