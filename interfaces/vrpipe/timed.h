@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <functional>
 #include <memory>
+#include <new>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include <vrpipe/batch.h>
@@ -239,21 +241,10 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
 
   Span transfer(const Item& item, Span at, unsigned beats) {
     ++this->transferred_;
-    StreamPayload<Item> payload;
-    payload.item = &item;
-    payload.latency = this->pipeline_;
-    payload.beats = beats;
     if (blocking_) {
-      payload.at = at.first;
-      payload.last = at.last;
-      if (direct_ != nullptr) {
-        direct_->offer(payload);
-      } else {
-        sc_core::sc_time delay;
-        this->socket->b_transport(payload, delay);
-      }
-      last_ = payload.last;
-      return {payload.at, payload.last};
+      at = direct_ != nullptr ? direct_->offer(item, at, beats, this->pipeline_) : call(item, at, beats);
+      last_ = at.last;
+      return at;
     }
     if (!unlimited_) {
       const Cycle begin = std::max(at.first, credits_.front());
@@ -269,28 +260,40 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
         credits_.pop();
       }
     }
-    payload.at = at.first;
-    payload.last = at.last;
     last_ = at.last;
     if (direct_ != nullptr) {
-      direct_->accept(payload);
+      direct_->accept(item, at, beats, this->pipeline_);
     } else {
-      StreamPhase phase = StreamPhase::transfer;
-      sc_core::sc_time delay;
-      this->socket->nb_transport_fw(payload, phase, delay);
+      call(item, at, beats);
     }
     return at;
   }
+  /// Through the socket; returns, from a blocking call, when it is taken.
+  Span call(const Item& item, Span at, unsigned beats) {
+    StreamPayload<Item> payload;
+    payload.item = &item;
+    payload.latency = this->pipeline_;
+    payload.at = at.first;
+    payload.last = at.last;
+    payload.beats = beats;
+    sc_core::sc_time delay;
+    if (blocking_) {
+      this->socket->b_transport(payload, delay);
+    } else {
+      StreamPhase phase = StreamPhase::transfer;
+      this->socket->nb_transport_fw(payload, phase, delay);
+    }
+    return {payload.at, payload.last};
+  }
 
   tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
-    give(payload);
+    give(payload.credits, {payload.at, payload.last});
     return tlm::TLM_ACCEPTED;
   }
-  void give(const StreamPayload<Item>& payload) {
-    const Span at(payload.at, payload.last);
-    if (!clock_.domain->running()) places_ += payload.credits;
-    for (unsigned credit = 0; credit < payload.credits; ++credit) {
-      const Cycle cycle = at.of_part(credit, payload.credits);
+  void give(unsigned credits, Span at) {
+    if (!clock_.domain->running()) places_ += credits;
+    for (unsigned credit = 0; credit < credits; ++credit) {
+      const Cycle cycle = at.of_part(credit, credits);
       if (owed_ > 0) {
         --owed_;
         last_ = std::max(last_, cycle);
@@ -331,14 +334,30 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
 template <class Item>
 class TimedIn : public InEnd<Item>, public TimedInput {
  public:
-  /// Given an item and the cycles in which its parts become visible, returns those in which they leave the queue.
-  using Handler = std::function<Span(const Item&, Span)>;
+  /// Given an item and the cycles in which its parts become visible, returns those in which they leave the queue. Made
+  /// of a lambda that captures little more than its unit; spans go in registers, as they do not to a std::function.
+  class Handler {
+   public:
+    template <class Function>
+    Handler(Function function)
+        : call_([](const void* captured, const Item& item, Span visible) -> Span {
+            return (*static_cast<const Function*>(captured))(item, visible);
+          }) {
+      static_assert(sizeof(Function) <= sizeof(captured_) && std::is_trivially_copyable_v<Function>);
+      new (captured_) Function(function);
+    }
+    Span operator()(const Item& item, Span visible) const { return call_(captured_, item, visible); }
+
+   private:
+    alignas(void*) unsigned char captured_[2 * sizeof(void*)];
+    Span (*call_)(const void*, const Item&, Span);
+  };
 
   /// @param sends_to  the handler is called while none of these is blocked
   TimedIn(TimedUnit& owner, const std::string& name, Handler handler, std::vector<TimedOutput*> sends_to = {})
       : InEnd<Item>(owner, name),
         blocking_(owner.transport() == Transport::blocking),
-        handler_(std::move(handler)),
+        handler_(handler),
         sends_to_(std::move(sends_to)) {
     owner.inputs_.push_back(this);
     TimedIn::configure(4, 1);
@@ -388,68 +407,72 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     Item item;
   };
 
-  Span visible(const StreamPayload<Item>& payload) const {
-    const Cycle latency = latency_ + payload.latency;
-    Span span(payload.at + latency, payload.last + latency);
+  Span visible(Span at, Cycle pipeline) const {
+    const Cycle latency = latency_ + pipeline;
+    Span span(at.first + latency, at.last + latency);
     for (; this->stalled_at(span.first); ++span.first) span.last = std::max(span.last, span.first + 1);
     return span;
   }
 
   void grant(unsigned credits, Span at) {
+    if (direct_ != nullptr) return direct_->give(credits, at);
     StreamPayload<Item> payload;
     payload.credits = credits;
     payload.at = at.first;
     payload.last = at.last;
-    if (direct_ != nullptr) return direct_->give(payload);
     StreamPhase phase = StreamPhase::credit;
     sc_core::sc_time delay;
     this->socket->nb_transport_bw(payload, phase, delay);
   }
 
-  void b_transport(StreamPayload<Item>& payload, sc_core::sc_time&) override { offer(payload); }
-  /// Blocking: takes an item.
-  void offer(StreamPayload<Item>& payload) {
-    const unsigned beats = payload.beats;
+  void b_transport(StreamPayload<Item>& payload, sc_core::sc_time&) override {
+    const Span taken = offer(*payload.item, {payload.at, payload.last}, payload.beats, payload.latency);
+    payload.at = taken.first;
+    payload.last = taken.last;
+  }
+  /// Blocking: takes an item; returns when.
+  Span offer(const Item& item, Span at, unsigned beats, Cycle pipeline) {
     std::size_t place = place_;
-    if (free_at_[place] > payload.at) {
-      payload.last += free_at_[place] - payload.at;
-      payload.at = free_at_[place];
+    if (free_at_[place] > at.first) {
+      at.last += free_at_[place] - at.first;
+      at.first = free_at_[place];
     }
     if (beats == 1) {
       place_ = place + 1 == depth_ ? 0 : place + 1;
-      free_at_[place] = handler_(*payload.item, visible(payload)).last + 1;
-      return;
+      free_at_[place] = handler_(item, visible(at, pipeline)).last + 1;
+      return at;
     }
     // Parts that the queue has no place for at first follow when the item's own first parts have left.
     std::size_t last_place = place + std::min(beats, depth_) - 1;
     if (last_place >= depth_) last_place -= depth_;
-    payload.last = std::max(payload.last, free_at_[last_place]);
-    const Span left = handler_(*payload.item, visible(payload));
+    at.last = std::max(at.last, free_at_[last_place]);
+    const Span left = handler_(item, visible(at, pipeline));
     for (unsigned beat = 0; beat < beats; ++beat) {
       free_at_[place] = left.of_part(beat, beats) + 1;
       place = place + 1 == depth_ ? 0 : place + 1;
     }
     place_ = place;
-    if (beats > depth_) payload.last = std::max(payload.last, left.of_part(beats - depth_ - 1, beats) + 1);
+    if (beats > depth_) at.last = std::max(at.last, left.of_part(beats - depth_ - 1, beats) + 1);
+    return at;
   }
 
   tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
-    accept(payload);
+    accept(*payload.item, {payload.at, payload.last}, payload.beats, payload.latency);
     return tlm::TLM_ACCEPTED;
   }
   /// Non-blocking: queues an item.
-  void accept(const StreamPayload<Item>& payload) {
+  void accept(const Item& item, Span at, unsigned beats, Cycle pipeline) {
     if (queued_beats_ >= depth_) this->fault(this->socket, "an item arrived at a full queue");
-    queued_beats_ += payload.beats;
+    queued_beats_ += beats;
+    const Span seen = visible(at, pipeline);
     Entry& entry = queue_.push();
-    entry.visible = visible(payload);
-    entry.beats = payload.beats;
-    entry.item = *payload.item;
+    entry.visible = seen;
+    entry.beats = beats;
+    entry.item = item;
+    if (front_ == never) front_ = seen.first;
     const Cycle now = clock_.domain->now();
-    const Cycle visible_at = entry.visible.first;
-    if (front_ == never) front_ = visible_at;
     clock_.domain->wake(clock_.unit,
-                        depth_ < activation_cycles ? std::max(visible_at, now + 1) : activation_for(visible_at, now));
+                        depth_ < activation_cycles ? std::max(seen.first, now + 1) : activation_for(seen.first, now));
   }
 
   const bool blocking_;
