@@ -25,18 +25,21 @@ class Ring {
   /// Where entries stand in the order of a member of theirs: behind those that are equal.
   template <class Member>
   void push_in_order(const Entry& entry, Member key) {
-    const bool is_last = !(entry.*key < back().*key);  // of an empty ring's old entry it does not matter
-    push(entry);
-    if (!is_last) sort_in_last(key);
+    if (entry.*key < back().*key) {  // of an empty ring's old entry it does not matter
+      insert_in_order(entry, key);
+    } else {
+      push(entry);
+    }
   }
   void pop() { ++head_; }
 
  private:
   template <class Member>
-  [[gnu::noinline]] void sort_in_last(Member key) {
-    for (std::size_t place = size() - 1; place > 0 && (*this)[place].*key < (*this)[place - 1].*key; --place) {
-      std::swap((*this)[place - 1], (*this)[place]);
-    }
+  [[gnu::noinline]] void insert_in_order(Entry entry, Member key) {
+    push();
+    std::size_t place = size() - 1;
+    for (; place > 0 && entry.*key < (*this)[place - 1].*key; --place) (*this)[place] = (*this)[place - 1];
+    (*this)[place] = entry;
   }
   [[gnu::noinline]] void grow() {
     std::vector<Entry> larger(2 * entries_.size());
