@@ -29,6 +29,9 @@ const Samples samples;
 
 /// What a colour target of 16 bits can hold; NaN gives 0.
 float clamp_color(float value) { return std::min(std::max(0.0F, value), half_max); }
+
+/// Threads of a warp whose bit is set.
+unsigned threads_in(std::uint32_t mask) { return static_cast<unsigned>(__builtin_popcount(mask)); }
 }  // namespace
 
 SplatShader::SplatShader(const Parameters& parameters, const RenderState& state) : state_(state) {
@@ -162,10 +165,10 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
       put(warp.quads[i + (i < last)], live_back, back);
     }
   }
-  fragments_shaded += __builtin_popcount(covered_of_warp);
-  fragments_pruned += __builtin_popcount(covered_of_warp & ~live_of_warp);
+  fragments_shaded += threads_in(covered_of_warp);
+  fragments_pruned += threads_in(covered_of_warp & ~live_of_warp);
   const std::uint32_t dead = ~(live_of_warp | live_of_warp >> 1U | live_of_warp >> 2U | live_of_warp >> 3U);
-  quads_pruned += __builtin_popcount(dead & 0x11111111U) - (quads_per_warp - warp.count);
+  quads_pruned += threads_in(dead & 0x11111111U) - (quads_per_warp - warp.count);
   out.count = static_cast<std::uint8_t>(count);
 }
 
