@@ -102,13 +102,18 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
     socket.bind(*this);
   }
   tlm::tlm_target_socket<32> socket;
-  std::uint64_t bytes = 0;
+
+  std::uint64_t bytes_before(Cycle end) const {
+    // What is not done by then is still queued up.
+    const std::uint64_t done = end == never ? free_at_ : end * memory_.bytes_per_cycle_.value();
+    return bytes_ - std::min(bytes_, free_at_ - std::min(free_at_, done));
+  }
 
  private:
   Cycle serve(Cycle arrival, unsigned length) override {
     const std::uint64_t arrival_byte = arrival * memory_.bytes_per_cycle_.value();
     free_at_ = std::max(free_at_, arrival_byte) + length;
-    bytes += length;
+    bytes_ += length;
     return arrival + memory_.latency_cycles_ + memory_.bytes_per_cycle_.quotient_up(free_at_ - arrival_byte);
   }
   const ClockDomain& clock() const override { return memory_.domain_; }
@@ -129,6 +134,7 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
   unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
 
   const FixedLatencyMemory& memory_;
+  std::uint64_t bytes_ = 0;
   std::uint64_t free_at_ = 0;  // in bytes since the start, so that fractions of a cycle are kept
 };
 
@@ -144,9 +150,9 @@ FixedLatencyMemory::~FixedLatencyMemory() = default;
 
 tlm::tlm_target_socket<32>& FixedLatencyMemory::port(unsigned index) { return ports_.at(index)->socket; }
 
-std::uint64_t FixedLatencyMemory::bytes() const {
+std::uint64_t FixedLatencyMemory::bytes(Cycle end) const {
   std::uint64_t sum = 0;
-  for (const auto& port : ports_) sum += port->bytes;
+  for (const auto& port : ports_) sum += port->bytes_before(end);
   return sum;
 }
 

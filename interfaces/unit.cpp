@@ -26,8 +26,11 @@ std::map<std::string, UnitMaker>& makers() {
 
 }  // namespace
 
-Unit::Unit(const sc_core::sc_module_name& name, ClockDomain& domain)
-    : sc_module(name), PortOwner({&domain, domain.attach(*this)}) {}
+Unit::Unit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector<WorkKind> work)
+    : sc_module(name),
+      PortOwner({&domain, domain.attach(*this)}),
+      occupancy_(domain.draw_end(), std::move(work)),
+      account_(domain.draw_end()) {}
 
 InPort& Unit::in(const std::string& name) { return port_named(in_ports, this->name(), name); }
 OutPort& Unit::out(const std::string& name) { return port_named(out_ports, this->name(), name); }

@@ -1,6 +1,9 @@
 #include "bound.h"
 
 #include <algorithm>
+#include <map>
+
+#include <vrpipe/error.h>
 
 namespace vrpipe {
 
@@ -56,10 +59,6 @@ PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc)
       // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
       warps_in_phase_(2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads)) {}
 
-double PhaseBound::issue_slots_per_cycle() const {
-  return sm_.cores * sm_.schedulers_per_core * sm_.lanes_per_scheduler / 32.0;
-}
-
 double PhaseBound::instructions(const Work& done) const {
   return static_cast<double>(done.vertex_warps * instructions_of(sm_.vertex) +
                              done.warps * instructions_of(sm_.fragment) +
@@ -77,20 +76,22 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done) c
                              static_cast<double>(done.tile_pairs * raster_.screen_tile_interval_cycles),
                              ratio(done.quads_rasterized, raster_.quads_per_cycle)});
   cycles[tc] = std::max(ratio(done.quads_rasterized, tc_.quads_per_cycle), ratio(done.bin_beats, 1));
-  cycles[test] = ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(done.updates, zrop_.updates_per_cycle);
+  cycles[test] =
+      std::max(ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(done.updates, zrop_.updates_per_cycle),
+               ratio(done.quads_rasterized, prop_.quads_per_cycle));
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
-  cycles[sm] = instructions(done) / issue_slots_per_cycle();
-  cycles[color] = ratio(done.color_quads, prop_.color_quads_per_cycle);
+  cycles[sm] = instructions(done) / sm_.instructions_per_cycle();
+  cycles[color] = static_cast<double>(done.color_quads) / prop_.color_rate.per_cycle();
   cycles[l2] = ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_);
   // A line, and a miss register, is taken for as long as a fill is under way; those of a phase's beginning may have been
   // asked for before it.
   const auto turns = [&](std::uint64_t fills, std::uint64_t places) {
     return fills <= places ? 0.0 : ratio(fills - places, places) * l2_latency_cycles_;
   };
-  cycles[crop] =
-      std::max({ratio(done.color_quads, crop_.quads_per_cycle) + ratio(done.sectors, crop_.sectors_per_cycle),
-                turns(done.lines_filled, std::max(crop_.cache_bytes / crop_.line_bytes, 1U)),
-                turns(done.sectors_filled, crop_.mshrs)});
+  cycles[crop] = std::max({static_cast<double>(done.color_quads) / crop_.blend_rate.per_cycle() +
+                               ratio(done.sectors, crop_.sectors_per_cycle),
+                           turns(done.lines_filled, std::max(crop_.cache_bytes / crop_.line_bytes, 1U)),
+                           turns(done.sectors_filled, crop_.mshrs)});
   return cycles;
 }
 
@@ -109,39 +110,72 @@ std::array<double, PhaseBound::stages> PhaseBound::end_of(const Work& done) cons
 }
 
 void PhaseBound::end_phase() {
-  if (up_to_blend_.color_quads > 0) {
-    const std::array<double, stages> end = end_of(up_to_blend_);
-    last_blend_ = *std::max_element(end.begin(), end.end());
+  if (up_to_quads_.quads_rasterized > 0) {
+    const std::array<double, stages> end = end_of(up_to_quads_);
+    last_quad_ = *std::max_element(end.begin(), end.end());
+    ended_ = total_;
+    ended_.add(up_to_quads_);
   }
   const std::array<double, stages> end = end_of(work);
   end_before_ = end_;
   end_ = end;
   total_.add(work);
   work = Work();
-  up_to_blend_ = Work();
+  up_to_quads_ = Work();
 }
 
 double PhaseBound::cycles() const {
-  return total_.color_quads > 0 ? last_blend_ : *std::max_element(end_.begin(), end_.end());
+  return ended_.quads_rasterized > 0 ? last_quad_ : *std::max_element(end_.begin(), end_.end());
 }
 
 double PhaseBound::busy_cycles(const std::string& slot) const {
-  static const std::map<std::string, Stage> stage_of{{"draw", draw},     {"vpo", vpo}, {"tgc", tgc},
-                                                     {"raster", raster}, {"tc", tc},   {"prop", color},
-                                                     {"zrop", test},     {"qru", qru}, {"sm", sm},
-                                                     {"crop", crop}};
-  return cycles_of(total_)[stage_of.at(slot)];
+  double longest = 0;
+  std::map<unsigned, double> resources;
+  for (const OccupancyPart& part : parts(slot)) {
+    longest = std::max(longest, resources[part.resource] += part.cycles);
+  }
+  return longest;
 }
 
-double PhaseBound::utilization(const std::string& slot, double cycles) const {
-  if (cycles == 0) return 0;
-  if (slot == "raster") return ratio(total_.quads_rasterized, raster_.quads_per_cycle) / cycles;
-  if (slot == "zrop") return ratio(total_.quads_tested, zrop_.quads_per_cycle) / cycles;
-  if (slot == "prop") return ratio(total_.color_quads, prop_.color_quads_per_cycle) / cycles;
-  if (slot == "sm") return instructions(total_) / issue_slots_per_cycle() / cycles;
-  if (slot == "crop") return ratio(total_.color_quads, crop_.quads_per_cycle) / cycles;
-  if (slot == "l2") return cycles_of(total_)[l2] / cycles;
-  return 0;
+std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
+  const Work& done = ended_;
+  const auto priced = [](const std::vector<WorkKind>& kinds, const std::vector<double>& items) {
+    std::vector<OccupancyPart> parts;
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      const WorkKind& kind = kinds[i];
+      parts.push_back({kind.name, kind.resource, items[i] * kind.cycles_per_item, kind.is_throughput});
+    }
+    return parts;
+  };
+  const auto count = [](std::uint64_t items) { return static_cast<double>(items); };
+  if (slot == "draw") return priced(DrawWork::kinds(), {count(done.vertex_warps_issued) / vertex_warps_per_cycle_});
+  if (slot == "vpo") return priced(VpoWork::kinds(vpo_), {count(done.triangles)});
+  if (slot == "tgc") return priced(TgcWork::kinds(tgc_), {count(done.bin_entries), count(done.setups)});
+  if (slot == "raster") {
+    return priced(RasterWork::kinds(raster_), {count(done.setups), count(done.coarse_tiles), count(done.fine_tiles),
+                                               count(done.tile_pairs), count(done.quads_rasterized)});
+  }
+  if (slot == "tc") return priced(TcWork::kinds(tc_), {count(done.quads_rasterized), count(done.bin_beats)});
+  if (slot == "prop") {
+    return priced(PropWork::kinds(prop_),
+                  {count(done.quads_rasterized), done.quads_tested > 0 ? count(done.survivors) : 0.0,
+                   count(done.color_quads)});
+  }
+  if (slot == "zrop") {
+    return priced(ZropWork::kinds(zrop_), {count(done.quads_tested), ratio(done.updates, zrop_.updates_per_cycle)});
+  }
+  if (slot == "qru") {
+    const double quads = count(done.survivors) - count(done.warps) * qru_.items_per_cycle;
+    return priced(QruWork::kinds(qru_), {std::max(quads, 0.0), count(done.warps)});
+  }
+  if (slot == "sm") {
+    return priced(SmWork::kinds(sm_), {count(done.vertex_warps * instructions_of(sm_.vertex)),
+                                       count(done.warps * instructions_of(sm_.fragment)),
+                                       count(done.merging_warps * instructions_of(sm_.merge))});
+  }
+  if (slot == "crop") return priced(CropWork::kinds(crop_), {count(done.color_quads), count(done.sectors)});
+  if (slot == "l2") return {{"bytes", 0, ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_), true}};
+  throw SimulationFault("bound", 0, "no slot is called " + slot);
 }
 
 }  // namespace vrpipe

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 
+#include <vrpipe/occupancy.h>
 #include <vrpipe/platforms/configuration.h>
 
 namespace vrpipe {
@@ -33,7 +34,7 @@ struct Work {
 };
 
 /// The least cycles that a GPC's work takes when every unit works at its peak: the busiest unit's, phase by phase, up to
-/// the last blend. What follows it (where all is terminated, the rasteriser goes on) is no part of a draw's cycles.
+/// the last quad. What follows it (splats that cover nothing) is no part of a draw's cycles.
 ///
 /// The whole draw's busiest unit alone would overlap what cannot overlap: where everything is terminated the rasteriser
 /// is the busiest, where nothing is CROP, and between the two there is room for a limited number of warps only. So the
@@ -47,15 +48,14 @@ class PhaseBound {
 
   Work work;  ///< of the phase
   bool phase_is_full() const { return work.warps >= warps_in_phase_; }
-  /// The work so far includes a blend; what is counted from now on comes after it.
-  void blended() { up_to_blend_ = work; }
+  /// All quads so far have been blended or dropped.
+  void quads_ended() { up_to_quads_ = work; }
   void end_phase();
   double cycles() const;
 
-  /// Of all phases: cycles in which the unit of a slot works at its peak, and the share of its peak in `cycles` cycles,
-  /// as the fidelities with time report it (raster zrop prop sm crop l2).
+  /// Of all phases, up to the last quad: cycles in which the unit of a slot, or `l2`, works at its peak, and what on.
   double busy_cycles(const std::string& slot) const;
-  double utilization(const std::string& slot, double cycles) const;
+  std::vector<OccupancyPart> parts(const std::string& slot) const;
 
  private:
   /// In the order of the pipeline; PROP is there twice.
@@ -63,7 +63,6 @@ class PhaseBound {
   std::array<double, stages> cycles_of(const Work& done) const;
   std::array<double, stages> end_of(const Work& done) const;
   double instructions(const Work& done) const;
-  double issue_slots_per_cycle() const;
 
   double vertex_warps_per_cycle_;
   Throughput vpo_;
@@ -78,9 +77,10 @@ class PhaseBound {
   std::uint32_t l2_bytes_per_cycle_;
   std::uint32_t l2_latency_cycles_;
   std::uint64_t warps_in_phase_;
-  Work total_;
-  Work up_to_blend_;  ///< of the phase
-  double last_blend_ = 0;
+  Work total_;        ///< of the phases before
+  Work up_to_quads_;  ///< of the phase, up to its last quad
+  Work ended_;        ///< of all phases, up to the last quad
+  double last_quad_ = 0;
   std::array<double, stages> end_{};         ///< of the last phase
   std::array<double, stages> end_before_{};  ///< of the phase before it
 };

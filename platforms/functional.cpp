@@ -79,14 +79,13 @@ void FunctionalGpu::bin_flushed(Gpc& gpc) {
     work.survivors += beat.count;
     tested.push_back(beat);
   }
-  const std::uint64_t blended_before = work.color_quads;
   for (const QuadBeat& part : tested) {
     gpc.back_end.take(part, [&](const TerminationSignal& signal) {
       ++work.updates;
       gpc.zrop->update(signal);
     });
   }
-  if (work.color_quads != blended_before) gpc.bound.blended();
+  gpc.bound.quads_ended();
   if (gpc.bound.phase_is_full()) gpc.bound.end_phase();
 }
 

@@ -130,21 +130,26 @@ Cycle Gpu::run(std::atomic<float>* progress) {
   // In slices, so that progress shows; the clock is quiet once nothing is left to do.
   const sc_core::sc_time slice = sc_core::sc_time::from_value(clock_->period().value() * 50000);
   const auto splats = static_cast<float>(std::max<std::size_t>(configuration_.state_of(0).draw->splats.size(), 1));
+  const auto issued = [&] {
+    std::uint64_t warps = 0;
+    for (const OutPort* port : units_.front()->out_ports) warps += port->transferred();
+    return static_cast<float>(warps * splats_per_vertex_warp);
+  };
   do {
     clock_->run(slice);
     if (progress != nullptr) {
-      *progress = std::min(1.0F, static_cast<float>(units_.front()->work() * splats_per_vertex_warp) / splats);
+      *progress = std::min(1.0F, issued() / splats);
     }
   } while (sc_core::sc_pending_activity());
 
-  Cycle end = 0;
+  Cycle passed = 0;
   bool ended = true;
   for (const auto& unit : units_) {
     if (dynamic_cast<CropBehaviour*>(&unit->behaviour()) == nullptr) continue;
     if (unit->end_of_draw() == never) {
       ended = false;
     } else {
-      end = std::max(end, unit->end_of_draw());
+      passed = std::max(passed, unit->end_of_draw());
     }
   }
   if (!ended) {
@@ -159,6 +164,9 @@ Cycle Gpu::run(std::atomic<float>* progress) {
     }
     throw SimulationFault("deadlock", clock_->now(), "units with work left that wait for each other: " + waiting);
   }
+  // A draw without quads ends when its end has passed through.
+  const Cycle last_quad = clock_->draw_end().so_far();
+  const Cycle end = last_quad > 0 ? last_quad : passed;
   for (const auto& unit : units_) unit->close_account(end);
   if (progress != nullptr) *progress = 1;
   return end;

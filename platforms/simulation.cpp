@@ -156,24 +156,68 @@ void check_conservation(const Counts& c) {
             c.fragments_blended);
 }
 
-/// Work over peak rate x cycles, per slot over all GPCs.
-void report_utilization(const Gpu& gpu, std::uint64_t cycles, RunResult& result) {
-  const auto share = [&](const std::string& slot) {
-    double work = 0;
-    double peak = 0;
-    for (std::size_t i = 0; i < gpu.units().size(); ++i) {
-      const std::string& name = gpu.unit_names()[i];
-      if (name.substr(name.rfind('.') + 1) != slot) continue;
-      work += static_cast<double>(gpu.units()[i]->work());
-      peak += gpu.units()[i]->peak_rate() * static_cast<double>(cycles);
+std::string slot_of(const std::string& unit) { return unit.substr(unit.rfind('.') + 1); }
+
+/// Units and what occupied them in a run of `cycles`. Also the bottleneck, and the utilization of the slots that have
+/// one: the share of their throughput's time, over all GPCs.
+class OccupancyReport {
+ public:
+  OccupancyReport(double cycles, RunResult& result) : cycles_(cycles), result_(result) {}
+
+  void add(UnitReport report, const std::vector<OccupancyPart>& parts) {
+    std::map<unsigned, Bottleneck> resources;
+    double throughput = 0;
+    for (const OccupancyPart& part : parts) {
+      const double share = cycles_ > 0 ? part.cycles / cycles_ : 0.0;
+      if (part.is_throughput) throughput += share;
+      report.parts.emplace_back(part.name, share);
+      Bottleneck& resource = resources[part.resource];
+      resource.occupancy += share;
+      if (share > 0) resource.parts.emplace_back(part.name, share);
     }
-    return peak > 0 ? work / peak : 0.0;
-  };
-  for (const char* slot : {"raster", "zrop", "prop", "sm", "crop"}) result.utilization.emplace_back(slot, share(slot));
-  const double l2_peak = gpu.l2().peak_rate() * static_cast<double>(cycles);
-  result.utilization.emplace_back("l2", l2_peak > 0 ? static_cast<double>(gpu.l2().bytes()) / l2_peak : 0.0);
-  result.utilization.emplace_back("dram", 0.0);
-}
+    for (auto& [index, resource] : resources) {
+      report.occupancy = std::max(report.occupancy, resource.occupancy);
+      resource.unit = report.name;
+      if (resource.occupancy > (result_.bottleneck ? result_.bottleneck->occupancy : 0.0)) {
+        result_.bottleneck = std::move(resource);
+      }
+    }
+    check(report);
+    auto& [units, sum] = throughput_of_[slot_of(report.name)];
+    ++units;
+    sum += throughput;
+    if (report.name != "l2") result_.units.push_back(std::move(report));
+  }
+
+  void finish() {
+    for (const char* slot : {"raster", "zrop", "prop", "sm", "crop", "l2"}) {
+      const auto& [units, sum] = throughput_of_[slot];
+      result_.utilization.emplace_back(slot, units > 0 ? sum / units : 0.0);
+    }
+    result_.utilization.emplace_back("dram", 0.0);
+  }
+
+ private:
+  void check(const UnitReport& report) const {
+    const auto cycles = static_cast<Cycle>(cycles_);
+    std::uint64_t sum = 0;
+    for (const std::uint64_t spent : report.cycles) {
+      if (spent > cycles) throw SimulationFault(report.name, cycles, fmt::format("{} cycles in one state", spent));
+      sum += spent;
+    }
+    if (sum != cycles && report.name != "l2") {
+      throw SimulationFault(report.name, cycles, fmt::format("its states sum to {} cycles", sum));
+    }
+    // But for rounding of the shares themselves.
+    if (report.occupancy > 1 + 1e-9) {
+      throw SimulationFault(report.name, cycles, fmt::format("it is occupied {} of its time", report.occupancy));
+    }
+  }
+
+  double cycles_;
+  RunResult& result_;
+  std::map<std::string, std::pair<unsigned, double>> throughput_of_;
+};
 
 void run_clocked(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
   Gpu gpu(configuration, result.surface);
@@ -185,23 +229,23 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
   result.kernel_events = gpu.clock().activations();
 
   BehaviourList behaviours;
+  OccupancyReport occupancy(static_cast<double>(cycles), result);
   for (std::size_t i = 0; i < gpu.units().size(); ++i) {
     const std::string& name = gpu.unit_names()[i];
-    behaviours.of_slot.emplace_back(name.substr(name.rfind('.') + 1), &gpu.units()[i]->behaviour());
+    behaviours.of_slot.emplace_back(slot_of(name), &gpu.units()[i]->behaviour());
     UnitReport report;
     report.name = name;
-    std::uint64_t sum = 0;
     for (unsigned state = 0; state < unit_states; ++state) {
       report.cycles[state] = gpu.units()[i]->account().cycles(static_cast<UnitState>(state));
-      sum += report.cycles[state];
     }
-    if (sum != cycles) {
-      throw SimulationFault(name, cycles, fmt::format("its states sum to {} cycles", sum));
-    }
-    result.units.push_back(std::move(report));
+    occupancy.add(std::move(report), gpu.units()[i]->occupancy().parts(cycles));
   }
+  UnitReport l2;
+  l2.name = "l2";
+  occupancy.add(std::move(l2),
+                {{"bytes", 0, static_cast<double>(gpu.l2().bytes(cycles)) / gpu.l2().peak_rate(), true}});
+  occupancy.finish();
   result.statistics = collect(behaviours);
-  report_utilization(gpu, cycles, result);
 }
 
 void report_bound(const Configuration& configuration, const FunctionalGpu& gpu, RunResult& result) {
@@ -211,12 +255,7 @@ void report_bound(const Configuration& configuration, const FunctionalGpu& gpu, 
   const auto cycles = static_cast<Cycle>(longest);
   result.cycles = cycles;
   result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
-  for (const char* slot : {"raster", "zrop", "prop", "sm", "crop", "l2"}) {
-    double sum = 0;
-    for (const PhaseBound* bound : bounds) sum += bound->utilization(slot, longest);
-    result.utilization.emplace_back(slot, sum / static_cast<double>(bounds.size()));
-  }
-  result.utilization.emplace_back("dram", 0.0);
+  OccupancyReport occupancy(longest, result);
   // Front end first; then a GPC's units, as the wiring diagrams add them.
   const auto report = [&](const std::string& name, const PhaseBound& bound, const std::string& slot) {
     UnitReport unit;
@@ -224,7 +263,7 @@ void report_bound(const Configuration& configuration, const FunctionalGpu& gpu, 
     const Cycle busy = std::min(cycles, static_cast<Cycle>(bound.busy_cycles(slot)));
     unit.cycles[static_cast<unsigned>(UnitState::busy)] = busy;
     unit.cycles[static_cast<unsigned>(UnitState::starved)] = cycles - busy;
-    result.units.push_back(std::move(unit));
+    occupancy.add(std::move(unit), bound.parts(slot));
   };
   for (const char* slot : {"draw", "vpo"}) report(slot, *bounds.front(), slot);
   for (std::size_t gpc = 0; gpc < bounds.size(); ++gpc) {
@@ -232,6 +271,12 @@ void report_bound(const Configuration& configuration, const FunctionalGpu& gpu, 
       report("gpc" + std::to_string(gpc) + "." + slot, *bounds[gpc], slot);
     }
   }
+  UnitReport l2;
+  l2.name = "l2";
+  double moved = 0;
+  for (const PhaseBound* bound : bounds) moved += bound->busy_cycles("l2") / static_cast<double>(bounds.size());
+  occupancy.add(std::move(l2), {{"bytes", 0, moved, true}});
+  occupancy.finish();
 }
 
 /// Without time, or with the bound that follows from the work.

@@ -96,6 +96,12 @@ class Unpacker {
   const char* end_;
 };
 
+template <class Archive, class Shares>
+void exchange_shares(Archive& archive, Shares& shares) {
+  archive.size_of(shares);
+  for (auto& [name, share] : shares) archive(name), archive(share);
+}
+
 /// Packs or unpacks all of a result but the request, which the receiver has, and the pixels, which are shared.
 template <class Archive, class Result>
 void exchange(Archive& archive, Result& result) {
@@ -103,10 +109,20 @@ void exchange(Archive& archive, Result& result) {
   archive(result.milliseconds);
   archive(result.host_seconds);
   archive(result.counts);
-  archive.size_of(result.utilization);
-  for (auto& [name, share] : result.utilization) archive(name), archive(share);
+  exchange_shares(archive, result.utilization);
   archive.size_of(result.units);
-  for (auto& unit : result.units) archive(unit.name), archive(unit.cycles);
+  for (auto& unit : result.units) {
+    archive(unit.name);
+    archive(unit.cycles);
+    archive(unit.occupancy);
+    exchange_shares(archive, unit.parts);
+  }
+  // A run without one comes back as one of a unit without a name.
+  if (!result.bottleneck) result.bottleneck.emplace();
+  archive(result.bottleneck->unit);
+  archive(result.bottleneck->occupancy);
+  exchange_shares(archive, result.bottleneck->parts);
+  if (result.bottleneck->unit.empty()) result.bottleneck.reset();
   archive.size_of(result.statistics);
   for (auto& statistic : result.statistics) {
     archive(statistic.name);

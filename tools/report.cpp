@@ -185,25 +185,11 @@ std::string heading(const JobResult& result, const TextStyle& style) {
   return text + "\n\n";
 }
 
-std::string bound_text(const RunResult& run) {
-  const auto busiest = busiest_units(run);
-  if (busiest.empty()) return {};
-  std::string units;
-  for (std::size_t i = 0; i < busiest.size(); ++i) {
-    units += fmt::format("{}{} ({} %)",
-                         i == 0                    ? ""
-                         : i + 1 == busiest.size() ? " and "
-                                                   : ", ",
-                         upper(busiest[i].first), percent(busiest[i].second));
-  }
-  // Where no unit comes near its peak, latency or batches of few items bound the run, not a rate.
-  const bool at_peak = busiest.front().second >= 0.6;
-  std::string text = fmt::format(at_peak ? "{} is bound by {}" : "no unit of {} is near its peak; nearest are {}",
-                                 run.request.variant.name, units);
-  for (const auto& [name, share] : run.utilization) {
-    if (name == "sm" && busiest.front().first != "sm") text += fmt::format("; SMs are at {} %", percent(share));
-  }
-  return text + "\n";
+/// A unit as the text calls it: CROP, or gpc1.CROP where there are several.
+std::string unit_text(const std::string& unit, const RunResult& run) {
+  const std::size_t dot = unit.rfind('.');
+  if (dot == std::string::npos) return upper(unit);
+  return (run.request.platform->gpcs > 1 ? unit.substr(0, dot + 1) : std::string()) + upper(unit.substr(dot + 1));
 }
 
 /// The largest value of a statistic over the runs; 0 where none has it.
@@ -243,7 +229,8 @@ std::string trouble_text(const std::vector<RunResult>& runs) {
 
 std::string remarks(const JobResult& result) {
   const std::vector<RunResult>& runs = result.runs;
-  std::string text = bound_text(runs.front());
+  std::string text;
+  for (const RunResult& run : runs) text += bound_text(run);
   if (const auto early = early_termination_ratio(runs)) {
     text += fmt::format("early-termination ratio {:.2f} (fragments blended without over with termination)\n", *early);
   }
@@ -300,14 +287,30 @@ std::optional<double> early_termination_ratio(const std::vector<RunResult>& runs
   return static_cast<double>(without->counts.fragments_blended) / static_cast<double>(with->counts.fragments_blended);
 }
 
-std::vector<std::pair<std::string, double>> busiest_units(const RunResult& run) {
-  std::vector<std::pair<std::string, double>> units = run.utilization;
-  std::stable_sort(units.begin(), units.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
-  if (units.empty() || units.front().second <= 0) return {};
-  const double least = units.front().second - 0.05;
-  units.erase(std::find_if(units.begin(), units.end(), [least](const auto& unit) { return unit.second < least; }),
-              units.end());
-  return units;
+std::string bound_text(const RunResult& run) {
+  if (!run.bottleneck) return {};
+  constexpr double nearly_always = 0.9;
+  const Bottleneck& busiest = *run.bottleneck;
+  std::string parts;
+  for (const auto& [name, share] : busiest.parts) {
+    if (share < 0.001) continue;
+    parts += fmt::format("{}{} {} %", parts.empty() ? "" : ", ", name, percent(share));
+  }
+  const std::string unit = unit_text(busiest.unit, run);
+  if (busiest.occupancy >= nearly_always) {
+    return fmt::format("{} is bound by {}, occupied {} % ({})\n", run.request.variant.name, unit,
+                       percent(busiest.occupancy), parts);
+  }
+  std::string text = fmt::format("no one unit bounds {}: {} is occupied {} % ({})", run.request.variant.name, unit,
+                                 percent(busiest.occupancy), parts);
+  const UnitReport* next = nullptr;
+  for (const UnitReport& other : run.units) {
+    if (other.name != busiest.unit && (next == nullptr || other.occupancy > next->occupancy)) next = &other;
+  }
+  if (next != nullptr && next->occupancy > 0) {
+    text += fmt::format(", {} {} %", unit_text(next->name, run), percent(next->occupancy));
+  }
+  return text + "\n";
 }
 
 std::string report(const JobResult& result, const TextStyle& style) {

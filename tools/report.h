@@ -19,8 +19,8 @@ std::optional<double> speedup(const RunResult& baseline, const RunResult& run);
 /// nothing is blended.
 std::optional<double> early_termination_ratio(const std::vector<RunResult>& runs);
 
-/// The units of a run that are busiest by utilisation, busiest first: the first, and those within 0.05 of it.
-std::vector<std::pair<std::string, double>> busiest_units(const RunResult& run);
+/// What bounds a run: the unit that is occupied the most, and what with; a line, empty where nothing has time.
+std::string bound_text(const RunResult& run);
 
 /// Digits in groups of three: 12,345,678.
 std::string grouped(std::uint64_t value);

@@ -57,6 +57,19 @@ Json parameters_json(const std::vector<RunResult>& runs) {
   return values;
 }
 
+Json shares_json(const std::vector<std::pair<std::string, double>>& shares) {
+  Json json = Json::object();
+  for (const auto& [name, share] : shares) json[name] = share;
+  return json;
+}
+
+Json bottleneck_json(const RunResult& run) {
+  if (!run.bottleneck) return {};
+  return {{"unit", run.bottleneck->unit},
+          {"occupancy", run.bottleneck->occupancy},
+          {"parts", shares_json(run.bottleneck->parts)}};
+}
+
 Json units_json(const RunResult& run) {
   Json units = Json::array();
   for (const UnitReport& unit : run.units) {
@@ -64,7 +77,10 @@ Json units_json(const RunResult& run) {
     for (unsigned state = 0; state < unit_states; ++state) {
       cycles[vrpipe::name_of(static_cast<UnitState>(state))] = unit.cycles[state];
     }
-    units.push_back({{"name", unit.name}, {"cycles", std::move(cycles)}});
+    units.push_back({{"name", unit.name},
+                     {"cycles", std::move(cycles)},
+                     {"occupancy", unit.occupancy},
+                     {"parts", shares_json(unit.parts)}});
   }
   return units;
 }
@@ -93,6 +109,7 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
           {"milliseconds", timed ? Json(run.milliseconds) : Json()},
           {"host_seconds", run.host_seconds},
           {"counts", std::move(counts)},
+          {"bottleneck", bottleneck_json(run)},
           {"utilization", std::move(utilization)},
           {"effects", Json::array()},
           {"result_hash", run.result_hash},

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+
+#include <vrpipe/ring.h>
 
 namespace vrpipe {
 
@@ -19,43 +22,90 @@ enum class UnitState : std::uint8_t {
 constexpr unsigned unit_states = 5;
 const char* name_of(UnitState state);
 
-/// Charges cycles to states; a state holds until the next one is entered.
+/// Where a draw ends: in the cycle after the last of its quads has been blended, or dropped by a test, by pruning or by
+/// a merge. Known only once all of the draw has passed; until then units say what it cannot be earlier than.
+class DrawEnd {
+ public:
+  /// A quad ends in the cycle before `cycle`, or later.
+  void not_before(Cycle cycle) { so_far_ = std::max(so_far_, cycle); }
+  /// The end, as far as it is known: it is this or later. 0 before the first quad.
+  Cycle so_far() const { return so_far_; }
+
+ private:
+  Cycle so_far_ = 0;
+};
+
+/// Charges cycles to states; a state holds until the next one is entered. What a unit does after the end of the draw is
+/// not charged, so changes are kept until the draw is known to last as long.
 class StateAccount {
  public:
+  /// `draw_end` outlives the account.
+  explicit StateAccount(const DrawEnd& draw_end) : draw_end_(&draw_end) {}
+
+  /// `now` is not before that of the call before.
   void enter(UnitState state, Cycle now) {
     if (state == state_) return;
-    cycles_[static_cast<unsigned>(state_)] += now - since_;
-    history_[changes_++ % history_.size()] = {state_, since_};
+    changes_.push({state_, now});
     state_ = state;
-    since_ = now;
+    if (changes_.size() >= most_changes_) settle();
   }
 
-  /// Charges exactly the `end` cycles of the run. A unit may change state after the last blend, on signals that nothing
-  /// waits for; what lies beyond `end` is taken back.
-  void close(Cycle end) {
-    for (unsigned kept = 0; since_ > end && kept < history_.size() && changes_ > 0; ++kept) {
-      const Change& earlier = history_[--changes_ % history_.size()];
-      cycles_[static_cast<unsigned>(earlier.state)] -= since_ - earlier.since;
-      state_ = earlier.state;
-      since_ = earlier.since;
-    }
-    cycles_[static_cast<unsigned>(state_)] += end - since_;
-    since_ = end;
-  }
+  /// Charges exactly the `end` cycles of the run; not before `draw_end.so_far()`.
+  void close(Cycle end);
 
   UnitState state() const { return state_; }
   std::uint64_t cycles(UnitState state) const { return cycles_[static_cast<unsigned>(state)]; }
 
  private:
   struct Change {
-    UnitState state;
-    Cycle since;
+    UnitState state;  ///< which held until
+    Cycle until;
   };
+  void settle();
+  void charge(UnitState state, Cycle until) {
+    cycles_[static_cast<unsigned>(state)] += until - charged_;
+    charged_ = until;
+  }
+
+  static constexpr std::size_t fewest_changes = 64;
+  const DrawEnd* draw_end_;
   UnitState state_ = UnitState::starved;
-  Cycle since_ = 0;
+  Ring<Change> changes_;  ///< not charged yet
+  std::size_t most_changes_ = fewest_changes;
+  Cycle charged_ = 0;  ///< cycles charged so far
   std::array<std::uint64_t, unit_states> cycles_{};
-  std::array<Change, 64> history_{};
-  std::uint64_t changes_ = 0;
+};
+
+/// Work of one kind, in items. What is done after the end of the draw is not counted.
+class WorkTally {
+ public:
+  /// `draw_end` outlives the tally.
+  explicit WorkTally(const DrawEnd& draw_end) : draw_end_(&draw_end) {}
+
+  /// Items that keep the unit from cycle `from` to `until` - 1.
+  void add(std::uint64_t items, Cycle from, Cycle until) {
+    items_ += items;
+    if (until > draw_end_->so_far()) note(items, from, until);
+  }
+  /// Items that keep it for a cycle.
+  void add(std::uint64_t items, Cycle at) { add(items, at, at + 1); }
+
+  /// Those done before cycle `end`, and of those under way then the share that is done; `end` is not before
+  /// `draw_end.so_far()`. Without an end, all.
+  double items(Cycle end = never) const;
+
+ private:
+  struct Span {
+    std::uint64_t items;
+    Cycle from, until;
+  };
+  void note(std::uint64_t items, Cycle from, Cycle until);
+
+  static constexpr std::size_t fewest_spans = 64;
+  const DrawEnd* draw_end_;
+  std::uint64_t items_ = 0;
+  Ring<Span> late_;  ///< of `items_`, those that may be after the end
+  std::size_t most_spans_ = fewest_spans;
 };
 
 }  // namespace vrpipe

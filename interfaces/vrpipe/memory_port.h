@@ -127,7 +127,8 @@ class FixedLatencyMemory : public sc_core::sc_module {
   ~FixedLatencyMemory() override;
   /// Each port is for one initiator.
   tlm::tlm_target_socket<32>& port(unsigned index);
-  std::uint64_t bytes() const;
+  /// Moved in all, or before cycle `end`.
+  std::uint64_t bytes(Cycle end = never) const;
   /// Bytes per cycle of all ports.
   double peak_rate() const;
 

@@ -7,6 +7,7 @@
 
 #include <vrpipe/blend.h>
 #include <vrpipe/lanes.h>
+#include <vrpipe/rate.h>
 
 namespace vrpipe {
 
@@ -167,9 +168,10 @@ struct ColorQuad {
   bool is_last() const { return index + 1 == warp->count; }
 };
 
-/// Quads that move from PROP to CROP in one cycle.
+/// Quads that move from PROP to CROP together: in a cycle as many beats as the rate needs.
 struct ColorBeat {
   static constexpr unsigned capacity = 4;
+  static constexpr unsigned in_a_cycle(Rate quads) { return (quads.most_in_a_cycle() + capacity - 1) / capacity; }
   std::uint8_t count = 0;
   bool end_of_draw = false;
   std::array<ColorQuad, capacity> quads;
@@ -199,7 +201,7 @@ inline bool concerns(const Primitive& primitive, unsigned gpcs, unsigned gpc) {
   return false;
 }
 
-/// CROP to ZROP: signals of one cycle.
+/// CROP to ZROP: signals of one cycle, or some of them.
 struct TerminationBeat {
   static constexpr unsigned capacity = 4;
   std::uint8_t count = 0;

@@ -16,6 +16,7 @@ class Ring {
   const Entry& front() const { return entries_[head_ & mask_]; }
   Entry& back() { return entries_[(tail_ - 1) & mask_]; }
   Entry& operator[](std::size_t index) { return entries_[(head_ + index) & mask_]; }
+  const Entry& operator[](std::size_t index) const { return entries_[(head_ + index) & mask_]; }
   /// A place at the end, to be filled.
   Entry& push() {
     if (tail_ - head_ > mask_) grow();

@@ -175,8 +175,8 @@ class TimedOutput {
 
 class TimedUnit : public Unit {
  public:
-  TimedUnit(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport)
-      : Unit(name, domain), transport_(transport) {}
+  TimedUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector<WorkKind> work, Transport transport)
+      : Unit(name, domain, std::move(work)), transport_(transport) {}
 
   Transport transport() const { return transport_; }
   bool blocking() const { return transport_ == Transport::blocking; }

@@ -10,6 +10,7 @@
 #include <vrpipe/accounting.h>
 #include <vrpipe/clock_domain.h>
 #include <vrpipe/link.h>
+#include <vrpipe/occupancy.h>
 #include <vrpipe/units.h>
 
 namespace vrpipe {
@@ -18,8 +19,8 @@ namespace vrpipe {
 /// platform wires units without knowing their classes. Clocked is the first base, so that the clock calls it directly.
 class Unit : public Clocked, public sc_core::sc_module, public PortOwner {
  public:
-  /// Attaches to the clock.
-  Unit(const sc_core::sc_module_name& name, ClockDomain& domain);
+  /// Attaches to the clock. `work`: the kinds of work that take the unit's time.
+  Unit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector<WorkKind> work);
 
   /// Throws UserError naming the nearest port.
   InPort& in(const std::string& name);
@@ -27,24 +28,28 @@ class Unit : public Clocked, public sc_core::sc_module, public PortOwner {
 
   /// Whether no work is left inside or queued.
   virtual bool idle() const = 0;
-  /// Work done so far, in the unit's items.
-  virtual std::uint64_t work() const = 0;
-  /// Items per cycle at peak.
-  virtual double peak_rate() const = 0;
   virtual Behaviour& behaviour() = 0;
   /// For a unit with a memory port; null otherwise.
   virtual tlm::tlm_initiator_socket<32>* memory_socket() { return nullptr; }
-  /// For the unit at the end of the pipeline: the cycle after its last work on the draw; `never` before that.
+  /// For the unit at the end of the pipeline: the cycle in which the end of the draw has come there and all before it is
+  /// done; `never` before that.
   virtual Cycle end_of_draw() const { return never; }
 
+  const Occupancy& occupancy() const { return occupancy_; }
   const StateAccount& account() const { return account_; }
   virtual void close_account(Cycle end) { account_.close(end); }
 
  protected:
   void enter(UnitState state, Cycle now) { account_.enter(state, now); }
   Cycle now() const { return clock.domain->now(); }
+  /// The unit did `items` of a kind of work in this cycle, or from cycle `from` to `until` - 1.
+  void did(unsigned kind, std::uint64_t items, Cycle at) { occupancy_.add(kind, items, at); }
+  void did(unsigned kind, std::uint64_t items, Cycle from, Cycle until) { occupancy_.add(kind, items, from, until); }
+  /// A quad is blended or dropped in the cycle before `cycle`, or later: the draw does not end earlier.
+  void draw_lasts(Cycle cycle) { clock.domain->draw_end().not_before(cycle); }
 
  private:
+  Occupancy occupancy_;
   StateAccount account_;
 };
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <vrpipe/payload.h>
+#include <vrpipe/rate.h>
 #include <vrpipe/render_state.h>
 #include <vrpipe/statistic.h>
 #include <vrpipe/surface.h>
@@ -114,8 +115,8 @@ class PropBehaviour : public Behaviour {
  public:
   enum class Order : std::uint8_t { draw, tile };
   struct Cost {
-    std::uint32_t quads_per_cycle;        ///< TC to ZROP to QRU
-    std::uint32_t color_quads_per_cycle;  ///< to CROP, of this draw's format
+    std::uint32_t quads_per_cycle;  ///< TC to ZROP to QRU
+    Rate color_rate;                ///< of quads to CROP, of this draw's format
     std::uint32_t latency_cycles;
     Order order;
   };
@@ -174,7 +175,7 @@ class SmBehaviour : public Behaviour {
   struct Cost {
     std::uint32_t cores;
     std::uint32_t schedulers_per_core;
-    std::uint32_t lanes_per_scheduler;
+    std::uint32_t lanes_per_scheduler;  ///< a divisor of 32
     std::uint32_t warps_per_core;
     std::uint32_t vertex_warps;       ///< of the array that may be in flight
     std::uint32_t warps_to_one_core;  ///< consecutive warps of a tile that go to one core
@@ -183,6 +184,10 @@ class SmBehaviour : public Behaviour {
     std::vector<ShaderSegment> merge;  ///< appended for a warp with pairs
     /// Fragment warps in flight in the array. Throws UserError if they are more than slots have numbers.
     std::uint32_t fragment_slots() const;
+    /// Cycles for which an instruction of a warp has its scheduler.
+    std::uint32_t cycles_per_instruction() const { return 32 / lanes_per_scheduler; }
+    /// Warp instructions that the array issues at most.
+    double instructions_per_cycle() const { return double{1} * cores * schedulers_per_core / cycles_per_instruction(); }
   };
   virtual Cost cost() const = 0;
 };
@@ -232,10 +237,10 @@ class CropBehaviour : public Behaviour {
   /// After a `blend` whose sectors are dirty for it.
   virtual void make_dirty(std::uint32_t /*line*/, std::uint32_t /*sectors*/) {}
   struct Cost {
-    std::uint32_t quads_per_cycle;  ///< of this draw's format
-    std::uint32_t input_quads;      ///< queue between tag look-up and blending
-    std::uint32_t latency_cycles;   ///< of blending, termination test included
-    bool forwards;                  ///< overlapping quads need not wait for `latency_cycles`
+    Rate blend_rate;               ///< of quads, of this draw's format
+    std::uint32_t input_quads;     ///< queue between tag look-up and blending
+    std::uint32_t latency_cycles;  ///< of blending, termination test included
+    bool forwards;                 ///< overlapping quads need not wait for `latency_cycles`
     std::uint32_t cache_bytes;
     std::uint32_t line_bytes;
     std::uint32_t sector_bytes;

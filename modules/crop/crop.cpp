@@ -17,7 +17,7 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
                      : std::nextafter(state.termination_threshold, std::numeric_limits<float>::infinity())),
       drops_late_(state.early_termination && state.termination == Termination::strict),
       checks_previous_(parameters.previous_alpha_check),
-      cost_{std::clamp(parameters.bytes_per_cycle / (4 * bytes_per_pixel(Format)), 1U, ColorBeat::capacity),
+      cost_{Rate::of_bytes(parameters.bytes_per_cycle, 4 * bytes_per_pixel(Format)),
             parameters.input_quads,
             parameters.latency_cycles,
             parameters.forwarding,

@@ -20,7 +20,8 @@ struct CropParameters : ParameterSet {
       256,
       "bytes",
       source::paper_text,
-      "of target format blended in a cycle: 4 quads of RGBA8, 2 of RGBA16F, 1 of RGBA32F (assumed)"};
+      "of target format blended in a cycle: 4 quads of RGBA8, 2 of RGBA16F, 1 of RGBA32F (assumed); what is no whole "
+      "number of quads is a fraction of one"};
   Integer input_quads{*this,
                       "input_quads",
                       512,

@@ -43,7 +43,7 @@ class TimedCrop : public TimedUnit {
  public:
   TimedCrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
             Transport transport)
-      : TimedUnit(name, domain, transport),
+      : TimedUnit(name, domain, CropWork::kinds(behaviour->cost()), transport),
         out_(*this, "out_terminations"),
         in_(*this, "in_color", [this](const ShadedWarpItem& item, Span visible) { return take(*item.warp, visible); },
             {&out_}),
@@ -52,18 +52,17 @@ class TimedCrop : public TimedUnit {
         // A hazard is one of quads.
         at_once_(cost_.forwards ? quads_looked_up_at_once(cost_) : 1),
         memory_(*this, "memory"),
-        look_ups_(cost_.quads_per_cycle),
+        look_ups_(cost_.blend_rate.most_in_a_cycle()),
         queue_(cost_.input_quads),
         mshrs_(cost_.mshrs),
-        blending_(cost_.quads_per_cycle * cost_.sectors_per_cycle),
+        blending_(static_cast<unsigned>(CropWork::parts_of_a_cycle(cost_))),
+        price_(cost_.blend_rate.cycles * cost_.sectors_per_cycle),
         lines_(std::max(cost_.cache_bytes / cost_.line_bytes, 1U)),
         longest_run_(std::min(cost_.line_bytes / cost_.sector_bytes, cost_.mshrs)),
         sector_shift_(static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes))) {
-    out_.set_pipeline(cost_.latency_cycles - 1, 1);
+    out_.set_pipeline(cost_.latency_cycles - 1, ColorBeat::in_a_cycle(cost_.blend_rate));
   }
 
-  std::uint64_t work() const override { return blended_; }
-  double peak_rate() const override { return cost_.quads_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket; }
   Cycle end_of_draw() const override { return end_; }
@@ -78,7 +77,7 @@ class TimedCrop : public TimedUnit {
   Span take(const ShadedWarp& warp, Span visible) {
     Span left = visible;
     if (warp.end_of_draw) {
-      end_ = blended_ == 0 ? visible.first : last_blend_ + cost_.latency_cycles;
+      end_ = !any_blended_ ? visible.first : last_blend_ + cost_.latency_cycles;
     } else if (at_once_ >= warp.count) {
       left = pass(warp, 0, warp.count, visible);
     } else {
@@ -122,19 +121,22 @@ class TimedCrop : public TimedUnit {
     look_ups_.hold(looked_up.last);
     if (moved_ > 0) moves_.push({looked_up.last, moved_});
 
-    if (!cost_.forwards) there = std::max(there, hazard_until(warp.tile, warp.position[from]));
+    if (!cost_.forwards) there = wait_for_hazard(warp.tile, warp.position[from], there);
     there = std::max(there, out_.last());
     // Moving a sector takes time from blending, from when it moves.
     for (; !moves_.empty() && moves_.front().at <= std::max(there, blending_.next()); moves_.pop()) {
-      blending_.take(moves_.front().at, moves_.front().sectors * cost_.quads_per_cycle);
+      blending_.take(moves_.front().at, moves_.front().sectors * cost_.blend_rate.items);
+      did(CropWork::sectors, moves_.front().sectors, moves_.front().at);
     }
-    const Span blended = blending_.take(there, quads * cost_.sectors_per_cycle);
+    const Span blended = blending_.take(there, quads * price_);
     charge(UnitState::starved, looked_up.first + 1);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
     queue_.take(quads, blended.last);
     last_blend_ = blended.last;
-    blended_ += quads;
+    any_blended_ = true;
+    did(CropWork::blend, quads, blended.first, blended.last + 1);
+    draw_lasts(blended.last + cost_.latency_cycles);
     if (!cost_.forwards) recent_.push({warp.tile, warp.position[from], blended.last});
     blend(warp, from, to, blended);
     return looked_up;
@@ -210,6 +212,14 @@ class TimedCrop : public TimedUnit {
     return until;
   }
 
+  /// When a quad can be blended that is there from a cycle on.
+  Cycle wait_for_hazard(TileId tile, std::uint8_t position, Cycle there) {
+    const Cycle until = hazard_until(tile, position);
+    const Cycle begin = std::max(there, blending_.next());
+    if (until > begin) did(CropWork::forwarding, (until - begin) * CropWork::parts_of_a_cycle(cost_), begin, until);
+    return std::max(there, until);
+  }
+
   struct Move {
     Cycle at = 0;
     unsigned sectors = 0;
@@ -232,6 +242,7 @@ class TimedCrop : public TimedUnit {
   Places queue_;              ///< quads between look-up and blending
   Places mshrs_;              ///< sectors being filled
   Flow blending_;             ///< in parts of a cycle that both a quad and a sector are whole numbers of
+  const unsigned price_;      ///< of blending a quad, in these
   unsigned moved_ = 0;        ///< sectors, for the quads in hand
   Ring<Move> moves_;          ///< of sectors, that blending has not given its time to yet
   std::vector<Cycle> lines_;  ///< of the cache: the last blend of a quad that needed it
@@ -240,7 +251,7 @@ class TimedCrop : public TimedUnit {
   Ring<Recent> recent_;  ///< blends in the pipeline, without forwarding
   Cycle last_blend_ = 0;
   Cycle end_ = never;
-  std::uint64_t blended_ = 0;
+  bool any_blended_ = false;
 };
 
 [[maybe_unused]] const bool registered = [] {

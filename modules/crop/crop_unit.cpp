@@ -21,23 +21,22 @@ class CropUnit : public Unit {
  public:
   CropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
            const RenderState& state)
-      : Unit(name, domain),
+      : Unit(name, domain, CropWork::kinds(behaviour->cost())),
         in_(*this, "in_color"),
         out_(*this, "out_terminations"),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
         signals_(state.early_termination),
-        price_(cost_.sectors_per_cycle),
-        sector_price_(cost_.quads_per_cycle),
-        income_(price_ * sector_price_),
+        price_(std::int64_t{cost_.blend_rate.cycles} * cost_.sectors_per_cycle),
+        sector_price_(cost_.blend_rate.items),
+        income_(static_cast<std::int64_t>(CropWork::parts_of_a_cycle(cost_))),
+        most_in_a_cycle_(cost_.blend_rate.most_in_a_cycle()),
         longest_run_(cost_.line_bytes / cost_.sector_bytes),
         memory_(*this, "memory", 2 * cost_.mshrs) {
-    out_.set_pipeline(cost_.latency_cycles - 1, 1);
+    out_.set_pipeline(cost_.latency_cycles - 1, ColorBeat::in_a_cycle(cost_.blend_rate));
   }
 
   bool idle() const override { return in_.empty() && queue_.empty(); }
-  std::uint64_t work() const override { return blended_; }
-  double peak_rate() const override { return cost_.quads_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket; }
   Cycle end_of_draw() const override { return end_; }
@@ -94,6 +93,7 @@ class CropUnit : public Unit {
       memory_.write(write_back_address_ + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_,
                     write_back_tag);
       tokens_ -= run.count * sector_price_;
+      did(CropWork::sectors, run.count, now());
     }
     return write_back_ == 0;
   }
@@ -114,6 +114,7 @@ class CropUnit : public Unit {
       cache_->start_fill(line, sector);
       ++fills_in_flight_;
       tokens_ -= sector_price_;
+      did(CropWork::sectors, 1, now());
     }
     cache_->pin(line);
     // In place: a temporary of narrow stores would be waited for when it is copied.
@@ -127,8 +128,7 @@ class CropUnit : public Unit {
 
   bool accept() {
     bool moved = false;
-    auto budget =
-        static_cast<unsigned>(std::min<std::size_t>(cost_.quads_per_cycle, cost_.input_quads - queue_.size()));
+    auto budget = static_cast<unsigned>(std::min<std::size_t>(most_in_a_cycle_, cost_.input_quads - queue_.size()));
     while (budget > 0 && in_.ready()) {
       const ColorBeat& beat = in_.front();
       if (beat.end_of_draw) {
@@ -167,16 +167,21 @@ class CropUnit : public Unit {
   bool blend(Cycle now) {
     // What sectors took from blending is paid back first; unused cycles are lost, fractions of a quad are not.
     if (now > refilled_) {
-      tokens_ =
-          std::min<std::int64_t>(income_ + price_ - 1, tokens_ + static_cast<std::int64_t>(now - refilled_) * income_);
+      tokens_ += static_cast<std::int64_t>(now - refilled_) * income_;
+      const std::int64_t lost = tokens_ - (income_ + price_ - 1);
+      if (lost > 0) {
+        tokens_ -= lost;
+        if (stop_ == UnitState::latency) did(CropWork::forwarding, static_cast<std::uint64_t>(lost), refilled_, now);
+      }
       refilled_ = now;
     }
     TerminationBeat beat;
-    bool moved = false;
     stop_ = UnitState::starved;
-    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && !queue_.empty(); --budget) {
+    unsigned budget = most_in_a_cycle_;
+    for (; budget > 0 && !queue_.empty(); --budget) {
       const Entry& entry = queue_.front();
-      if (signals_ && out_.credits() == 0) {
+      // In the same cycle a beat that is full may go before this one.
+      if (signals_ && out_.credits() < (beat.count == TerminationBeat::capacity ? 2U : 1U)) {
         stop_ = UnitState::blocked;
         break;
       }
@@ -185,7 +190,7 @@ class CropUnit : public Unit {
         break;
       }
       if (tokens_ < price_) {
-        stop_ = UnitState::memory;
+        stop_ = UnitState::busy;  // with the quads before it, or with moving sectors
         break;
       }
       if (!cost_.forwards) {
@@ -199,6 +204,10 @@ class CropUnit : public Unit {
       monitor_->blended(entry.place, *quad.warp, quad.index, now);
       const CropBehaviour::Outcome outcome = behaviour_->blend(entry.place, quad.live(), quad.color());
       if (outcome.terminated != 0) {
+        if (beat.count == TerminationBeat::capacity) {
+          out_.push(beat);
+          beat.count = 0;
+        }
         beat.signals[beat.count++] = {quad.warp->tile, static_cast<std::uint8_t>(quad.position()), outcome.terminated};
       }
       if (quad.is_last()) quad.warp->release();
@@ -207,12 +216,15 @@ class CropUnit : public Unit {
       tokens_ -= price_;
       queue_.pop();
       if (queue_.size() > quads_ahead) prefetch(queue_[quads_ahead]);
-      ++blended_;
-      last_blend_ = now;
-      moved = true;
     }
     if (beat.count > 0) out_.push(beat);
-    return moved;
+    const unsigned blended = most_in_a_cycle_ - budget;
+    if (blended == 0) return false;
+    did(CropWork::blend, blended, now);
+    last_blend_ = now;
+    any_blended_ = true;
+    draw_lasts(now + cost_.latency_cycles);
+    return true;
   }
 
   Cycle tick(Cycle now) override {
@@ -220,7 +232,7 @@ class CropUnit : public Unit {
     const bool blended = blend(now);
     const bool accepted = accept();
     if (ending_ && queue_.empty()) {
-      end_ = blended_ == 0 ? now : last_blend_ + cost_.latency_cycles;
+      end_ = !any_blended_ ? now : last_blend_ + cost_.latency_cycles;
       ending_ = false;
     }
     enter(blended ? UnitState::busy : !queue_.empty() ? stop_ : UnitState::starved, now);
@@ -242,6 +254,7 @@ class CropUnit : public Unit {
   const std::int64_t price_;         ///< of blending a quad, in tokens
   const std::int64_t sector_price_;  ///< of moving a sector
   const std::int64_t income_;        ///< of a cycle: what so many quads, or so many sectors, cost
+  const unsigned most_in_a_cycle_;   ///< quads looked up or blended
   const unsigned longest_run_;       ///< sectors of a line
   MemoryPort memory_;
   const ColorSurface* surface_ = nullptr;
@@ -262,7 +275,7 @@ class CropUnit : public Unit {
   bool ending_ = false;
   Cycle last_blend_ = 0;
   Cycle end_ = never;
-  std::uint64_t blended_ = 0;
+  bool any_blended_ = false;
 };
 
 [[maybe_unused]] const bool registered = [] {

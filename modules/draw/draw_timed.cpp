@@ -9,7 +9,7 @@ class TimedDraw : public TimedUnit {
  public:
   TimedDraw(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<DrawBehaviour> behaviour,
             unsigned gpcs, Transport transport)
-      : TimedUnit(name, domain, transport), behaviour_(std::move(behaviour)) {
+      : TimedUnit(name, domain, DrawWork::kinds(), transport), behaviour_(std::move(behaviour)) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<TimedOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
     }
@@ -17,12 +17,11 @@ class TimedDraw : public TimedUnit {
   }
 
   bool idle() const override { return ended_ == outs_.size(); }
-  std::uint64_t work() const override { return issued_; }
-  double peak_rate() const override { return behaviour_->warps_per_1024_cycles() / 1024.0; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  Cycle due() const { return have_ ? issued_ * 1024 / behaviour_->warps_per_1024_cycles() : 0; }
+  Cycle due(std::uint64_t warp) const { return warp * 1024 / behaviour_->warps_per_1024_cycles(); }
+  Cycle due() const { return have_ ? due(issued_) : 0; }
 
   Cycle tick(Cycle now) override {
     if (idle()) return never;
@@ -32,9 +31,12 @@ class TimedDraw : public TimedUnit {
     TimedOut<VertexWarp>& out = *outs_[turn_];
     charge(UnitState::latency, at);
     if (!have_) warp_.end_of_draw = true;
-    charge(UnitState::blocked, out.send(warp_, at).first);
+    const Cycle taken = out.send(warp_, at).first;
+    charge(UnitState::blocked, taken);
     charge(UnitState::busy, out.last() + 1);
     if (have_) {
+      const Cycle interval = due(issued_ + 1) - due(issued_);
+      if (interval > 0) did(DrawWork::warps, interval, taken, taken + interval);
       ++issued_;
       have_ = behaviour_->next(warp_);
     } else {

@@ -10,7 +10,7 @@ class DrawUnit : public Unit {
  public:
   DrawUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<DrawBehaviour> behaviour,
            unsigned gpcs)
-      : Unit(name, domain), behaviour_(std::move(behaviour)) {
+      : Unit(name, domain, DrawWork::kinds()), behaviour_(std::move(behaviour)) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<StreamOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
     }
@@ -18,20 +18,20 @@ class DrawUnit : public Unit {
   }
 
   bool idle() const override { return ended_ == outs_.size(); }
-  std::uint64_t work() const override { return issued_; }
-  double peak_rate() const override { return behaviour_->warps_per_1024_cycles() / 1024.0; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
+  /// When a warp may be issued.
+  Cycle due(std::uint64_t warp) const { return warp * 1024 / behaviour_->warps_per_1024_cycles(); }
+
   Cycle tick(Cycle now) override {
     if (idle()) {
       enter(UnitState::starved, now);
       return never;
     }
-    const Cycle due = issued_ * 1024 / behaviour_->warps_per_1024_cycles();
-    if (have_ && now < due) {
+    if (have_ && now < due(issued_)) {
       enter(UnitState::latency, now);
-      return due;
+      return due(issued_);
     }
     StreamOut<VertexWarp>& out = *outs_[turn_];
     if (out.credits() == 0) {
@@ -42,6 +42,8 @@ class DrawUnit : public Unit {
     turn_ = (turn_ + 1) % outs_.size();
     if (have_) {
       out.push(warp_);
+      const Cycle interval = due(issued_ + 1) - due(issued_);
+      if (interval > 0) did(DrawWork::warps, interval, now, now + interval);
       ++issued_;
       have_ = behaviour_->next(warp_);
     } else {

@@ -1,14 +1,12 @@
 #include "prop/prop.h"
 
-#include <algorithm>
-
 #include <vrpipe/registry.h>
 
 namespace vrpipe {
 
 PreRop::PreRop(const Parameters& parameters, const RenderState& state)
     : cost_{parameters.quads_per_cycle,
-            std::clamp(parameters.color_bytes_per_cycle / (4 * bytes_per_pixel(state.format)), 1U, ColorBeat::capacity),
+            Rate::of_bytes(parameters.color_bytes_per_cycle, 4 * bytes_per_pixel(state.format)),
             parameters.latency_cycles, static_cast<Order>(static_cast<unsigned>(parameters.order))} {}
 
 namespace {

@@ -18,14 +18,16 @@ class PreRop : public PropBehaviour {
                             source::open,
                             "from TC to ZROP and on to QRU; must exceed what the shaders and CROP can take by the "
                             "share that termination kills"};
-    Integer color_bytes_per_cycle{*this,
-                                  "color_bytes_per_cycle",
-                                  64,
-                                  16,
-                                  256,
-                                  "bytes",
-                                  source::paper_text,
-                                  "of target format from PROP to CROP: 2 quads of RGBA16F, 4 of RGBA8"};
+    Integer color_bytes_per_cycle{
+        *this,
+        "color_bytes_per_cycle",
+        64,
+        16,
+        256,
+        "bytes",
+        source::paper_text,
+        "of target format from PROP to CROP: 2 quads of RGBA16F, 4 of RGBA8; what is no whole "
+        "number of quads is a fraction of one"};
     Integer latency_cycles{*this, "latency_cycles", 4, 1, 1000, "cycles", source::open, "of each passage"};
     Choice order{
         *this, "order",          {"draw", "tile"},

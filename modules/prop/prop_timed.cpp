@@ -16,7 +16,7 @@ class TimedProp : public TimedUnit {
  public:
   TimedProp(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
             const RenderState& state, Transport transport)
-      : TimedUnit(name, domain, transport),
+      : TimedUnit(name, domain, PropWork::kinds(behaviour->cost()), transport),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
         tests_(state.early_termination),
@@ -25,11 +25,13 @@ class TimedProp : public TimedUnit {
         out_release_(*this, "out_release"),
         out_color_(*this, "out_color"),
         in_tested_(*this, "in_tested",
-                   [this](const BinItem& item, Span visible) { return forward(item, visible, back_, out_survivors_); },
+                   [this](const BinItem& item, Span visible) {
+                     return forward(PropWork::tested, item, visible, back_, out_survivors_);
+                   },
                    {&out_survivors_}),
         in_bins_(*this, "in_bins",
                  [this](const BinItem& item, Span visible) {
-                   return forward(item, visible, there_, tests_ ? out_test_ : out_survivors_);
+                   return forward(PropWork::bins, item, visible, there_, tests_ ? out_test_ : out_survivors_);
                  },
                  {tests_ ? &out_test_ : &out_survivors_}),
         in_shaded_(*this, "in_shaded",
@@ -37,23 +39,22 @@ class TimedProp : public TimedUnit {
         order_(cost_.order, state),
         there_(cost_.quads_per_cycle),
         back_(cost_.quads_per_cycle),
-        color_(cost_.color_quads_per_cycle) {
+        color_(cost_.color_rate.items) {
     out_test_.set_pipeline(cost_.latency_cycles - 1, 1);
     out_survivors_.set_pipeline(cost_.latency_cycles - 1, 1);
     out_color_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
 
   bool idle() const override { return TimedUnit::idle() && order_.empty() && end_ == nullptr; }
-  std::uint64_t work() const override { return color_quads_; }
-  double peak_rate() const override { return cost_.color_quads_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  Span forward(const BinItem& item, Span visible, Passage& passage, TimedOut<BinItem>& out) {
+  Span forward(unsigned work, const BinItem& item, Span visible, Passage& passage, TimedOut<BinItem>& out) {
     passage.hold(out.last());
     const Span at = passage.take(visible, item.quads);
     const Span taken = out.send(item, at, passage.cycles(item.quads));
     passage.hold(taken.last + 1);
+    did(work, item.quads, taken.last);
     return taken;
   }
 
@@ -80,7 +81,7 @@ class TimedProp : public TimedUnit {
   void leave_until(Cycle until) {
     while (order_.has_next() && can_send() && color_.next() <= until) leave(order_.take());
     if (end_ == nullptr || end_->sequence != order_.left() || !can_send()) return;
-    const Cycle at = color_.take(end_from_, cost_.color_quads_per_cycle).first;
+    const Cycle at = color_.take(end_from_, cost_.color_rate.items).first;
     const WarpRelease release{end_->slot};
     out_color_.send({end_}, at);
     out_release_.send(release, at);
@@ -95,16 +96,17 @@ class TimedProp : public TimedUnit {
     color_.hold(out_color_.last());
     Cycle left = 0;
     if (warp.count > 0) {
-      const Span at = color_.take(next.from, warp.count);
+      const Span at = color_.take(next.from, warp.count * cost_.color_rate.cycles);
       charge(UnitState::starved, at.first);
       charge(UnitState::busy, at.last + 1);
-      color_quads_ += warp.count;
-      left = out_color_.send({&warp}, at, color_.cycles(warp.count)).last;
+      did(PropWork::color, warp.count, at.first, at.last + 1);
+      left = out_color_.send({&warp}, at, color_.cycles(warp.count * cost_.color_rate.cycles)).last;
       charge(UnitState::blocked, left);
       color_.hold(left);
     } else {
       // A warp without survivors takes the cycle in which it is passed over.
-      left = color_.take(next.from, cost_.color_quads_per_cycle).last;
+      left = color_.take(next.from, cost_.color_rate.items).last;
+      did(PropWork::empty_warps, 1, left);
       warp.release();
     }
     order_.leave(next.turn, left);
@@ -124,10 +126,9 @@ class TimedProp : public TimedUnit {
   WarpOrder order_;
   Passage there_;  ///< to the tests, or past them
   Passage back_;   ///< from the tests
-  Flow color_;
+  Flow color_;     ///< in parts of a cycle and of a quad: a cycle passes `color_rate.items`
   const ShadedWarp* end_ = nullptr;
   Cycle end_from_ = 0;
-  std::uint64_t color_quads_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -14,7 +14,7 @@ class PropUnit : public Unit {
  public:
   PropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
            const RenderState& state)
-      : Unit(name, domain),
+      : Unit(name, domain, PropWork::kinds(behaviour->cost())),
         in_bins_(*this, "in_bins"),
         out_test_(*this, "out_test"),
         in_tested_(*this, "in_tested"),
@@ -25,23 +25,26 @@ class PropUnit : public Unit {
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
         tests_(state.early_termination),
-        order_(cost_.order, state) {
+        there_{PropWork::bins, BatchLimit(cost_.quads_per_cycle)},
+        back_{PropWork::tested, BatchLimit(cost_.quads_per_cycle)},
+        order_(cost_.order, state),
+        color_limit_(cost_.color_rate) {
     out_test_.set_pipeline(cost_.latency_cycles - 1, 1);
     out_survivors_.set_pipeline(cost_.latency_cycles - 1, 1);
-    out_color_.set_pipeline(cost_.latency_cycles - 1, 1);
+    out_color_.set_pipeline(cost_.latency_cycles - 1, ColorBeat::in_a_cycle(cost_.color_rate));
   }
 
   bool idle() const override {
     return in_bins_.empty() && in_tested_.empty() && in_shaded_.empty() && current_.warp == nullptr && order_.empty() &&
            end_ == nullptr;
   }
-  std::uint64_t work() const override { return color_quads_; }
-  double peak_rate() const override { return cost_.color_quads_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
   /// A way through the unit, `quads_per_cycle` wide.
   struct Passage {
+    unsigned work;
+    BatchLimit limit;
     Cycle free_at = 0;
   };
 
@@ -53,19 +56,16 @@ class PropUnit : public Unit {
   }
   // Out of line: in most cycles nothing can move.
   [[gnu::noinline]] void forward_beats(Passage& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to, Cycle now) {
-    unsigned budget = cost_.quads_per_cycle;
-    do {
+    while (from.ready() && to.credits() > 0) {
       const QuadBeat& beat = from.front();
       const unsigned width = std::max<unsigned>(beat.count, 1);
-      if (width > budget && budget < cost_.quads_per_cycle) break;
+      if (!passage.limit.allows(width, now)) break;
       to.push(beat);
       from.pop();
-      if (width >= budget) {
-        passage.free_at = now + (width + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
-        break;
-      }
-      budget -= width;
-    } while (from.ready() && to.credits() > 0);
+      passage.limit.take(width);
+      did(passage.work, width, now);
+    }
+    passage.free_at = passage.limit.next(now);
   }
 
   bool collect() {
@@ -83,11 +83,19 @@ class PropUnit : public Unit {
     return moved;
   }
 
-  bool send_color() {
+  bool send_color(Cycle now) {
+    waits_for_rate_ = false;
     if (out_color_.credits() == 0) return false;
     ColorBeat beat;
     bool moved = false;
-    while (beat.count < cost_.color_quads_per_cycle) {
+    unsigned sent = 0;
+    const unsigned allowance = color_limit_.allowance(now);
+    while (sent < allowance) {
+      if (beat.count == ColorBeat::capacity) {
+        out_color_.push(beat);
+        beat.count = 0;
+        if (out_color_.credits() == 0) break;
+      }
       if (current_.warp == nullptr) {
         if (!order_.has_next()) break;
         if (out_release_.credits() == 0) break;
@@ -95,7 +103,10 @@ class PropUnit : public Unit {
         index_ = 0;
       }
       const ShadedWarp& warp = *current_.warp;
-      if (index_ < warp.count) beat.quads[beat.count++] = {&warp, index_++};
+      if (index_ < warp.count) {
+        beat.quads[beat.count++] = {&warp, index_++};
+        ++sent;
+      }
       if (index_ == warp.count) {
         current_.warp = nullptr;
         order_.leave(current_.turn);
@@ -104,16 +115,18 @@ class PropUnit : public Unit {
         // A warp without survivors takes the cycle in which it is passed over.
         if (warp.count == 0) {
           warp.release();
+          if (sent == 0) did(PropWork::empty_warps, 1, now);
           break;
         }
       }
     }
-    if (beat.count > 0) {
-      color_quads_ += beat.count;
-      out_color_.push(beat);
-      return true;
+    waits_for_rate_ = allowance == 0 && (current_.warp != nullptr || order_.has_next());
+    if (sent > 0) {
+      did(PropWork::color, sent, now);
+      color_limit_.take(sent);
     }
-    return moved || (end_ != nullptr && pass_end_of_draw());
+    if (beat.count > 0) out_color_.push(beat);
+    return sent > 0 || moved || (end_ != nullptr && pass_end_of_draw());
   }
 
   [[gnu::noinline]] bool pass_end_of_draw() {
@@ -129,7 +142,7 @@ class PropUnit : public Unit {
   }
 
   Cycle tick(Cycle now) override {
-    bool moved = send_color();
+    bool moved = send_color(now);
     moved = collect() || moved;
     if (tests_) {
       moved = forward(back_, in_tested_, out_survivors_, now) || moved;
@@ -137,7 +150,7 @@ class PropUnit : public Unit {
     } else {
       moved = forward(there_, in_bins_, out_survivors_, now) || moved;
     }
-    if (moved) {
+    if (moved || waits_for_rate_) {
       enter(UnitState::busy, now);
       return now + 1;
     }
@@ -164,10 +177,11 @@ class PropUnit : public Unit {
   Passage there_;  ///< to the tests, or past them
   Passage back_;   ///< from the tests
   WarpOrder order_;
+  RateLimit color_limit_;
   WarpOrder::Waiting current_;  ///< being handed to CROP, from `index_` on; none without a warp
   std::uint32_t index_ = 0;
+  bool waits_for_rate_ = false;  ///< of quads to CROP, below one a cycle
   const ShadedWarp* end_ = nullptr;
-  std::uint64_t color_quads_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

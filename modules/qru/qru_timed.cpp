@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <utility>
 
 #include "qru/warp_numbering.h"
 
@@ -13,7 +14,7 @@ class TimedQru : public TimedUnit {
  public:
   TimedQru(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour,
            const RenderState& state, Transport transport)
-      : TimedUnit(name, domain, transport),
+      : TimedUnit(name, domain, QruWork::kinds(behaviour->cost()), transport),
         out_(*this, "out_warps"),
         in_(*this, "in_quads", [this](const BinItem& item, Span visible) { return examine(item, visible); }, {&out_}),
         behaviour_(std::move(behaviour)),
@@ -23,13 +24,12 @@ class TimedQru : public TimedUnit {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
 
-  std::uint64_t work() const override { return examined_; }
-  double peak_rate() const override { return cost_.items_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
   void go_to(Cycle cycle) {
     if (cycle <= cycle_) return;
+    if (examined_ > 0) did(QruWork::quads, std::exchange(examined_, 0), cycle_);
     cycle_ = cycle;
     budget_ = cost_.items_per_cycle;
   }
@@ -40,6 +40,8 @@ class TimedQru : public TimedUnit {
     charge(UnitState::blocked, taken);
     charge(UnitState::busy, taken + 1);
     left_ = taken;
+    did(QruWork::launches, 1, taken);
+    examined_ = 0;
     go_to(taken + 1);
   }
 
@@ -60,13 +62,13 @@ class TimedQru : public TimedUnit {
       go_to(visible.of_part(from, item.quads));
       if (budget_ == 0) go_to(cycle_ + 1);
       const unsigned end = from + std::min(item.quads - from, budget_);
-      examined_ += end - from;
       while (from < end) {
         bool launched = false;
         const unsigned taken = behaviour_->examine(item.tile, &quads[from], end - from, warp_, launched);
         from += taken;
         if (budget_ == 0) go_to(cycle_ + 1);
         budget_ -= std::min(taken, budget_);
+        examined_ += taken;
         left_ = cycle_;
         if (!launched) continue;
         numbering_.number(warp_);
@@ -90,9 +92,9 @@ class TimedQru : public TimedUnit {
   WarpNumbering numbering_;
   Warp warp_;
   Cycle cycle_ = 0;
-  Cycle left_ = 0;   ///< when the last quads were examined or the last warp was taken
-  unsigned budget_;  ///< quads that can still be examined in the cycle
-  std::uint64_t examined_ = 0;
+  Cycle left_ = 0;         ///< when the last quads were examined or the last warp was taken
+  unsigned budget_;        ///< quads that can still be examined in the cycle
+  unsigned examined_ = 0;  ///< quads, in the cycle so far
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -14,7 +14,7 @@ class QruUnit : public Unit {
  public:
   QruUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour,
           const RenderState& state)
-      : Unit(name, domain),
+      : Unit(name, domain, QruWork::kinds(behaviour->cost())),
         in_(*this, "in_quads"),
         out_(*this, "out_warps"),
         behaviour_(std::move(behaviour)),
@@ -24,8 +24,6 @@ class QruUnit : public Unit {
   }
 
   bool idle() const override { return in_.empty(); }
-  std::uint64_t work() const override { return examined_; }
-  double peak_rate() const override { return cost_.items_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -33,6 +31,7 @@ class QruUnit : public Unit {
     unsigned budget = cost_.items_per_cycle;
     bool moved = false;
     bool blocked = false;
+    unsigned examined = 0;
     while (budget > 0 && in_.ready()) {
       const QuadBeat& beat = in_.front();
       if (out_.credits() == 0) {
@@ -50,7 +49,7 @@ class QruUnit : public Unit {
         const unsigned taken = behaviour_->examine(beat.tile, &beat.quads[from_],
                                                    std::min<unsigned>(beat.count - from_, budget), warp, launched);
         from_ += taken;
-        examined_ += taken;
+        examined += taken;
         budget -= taken;
         moved = true;
       } else if (beat.last_of_bin) {
@@ -63,6 +62,8 @@ class QruUnit : public Unit {
       if (launched) {
         numbering_.number(warp);
         out_.push(warp);
+        did(QruWork::launches, 1, now);
+        examined = 0;
       }
       if (done_ || (from_ == beat.count && !beat.last_of_bin)) {
         in_.pop();
@@ -72,6 +73,7 @@ class QruUnit : public Unit {
       }
       if (launched) break;
     }
+    if (examined > 0) did(QruWork::quads, examined, now);
     if (moved) {
       enter(UnitState::busy, now);
       return now + 1;
@@ -95,7 +97,6 @@ class QruUnit : public Unit {
   unsigned from_ = 0;
   bool done_ = false;
   WarpNumbering numbering_;
-  std::uint64_t examined_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -9,7 +9,7 @@ class TimedRaster : public TimedUnit {
  public:
   TimedRaster(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour,
               Transport transport)
-      : TimedUnit(name, domain, transport),
+      : TimedUnit(name, domain, RasterWork::kinds(behaviour->cost()), transport),
         out_(*this, "out_quads"),
         in_(*this, "in_jobs", [this](const RasterJob& job, Span visible) { return rasterize(job, visible.first); },
             {&out_}),
@@ -21,8 +21,6 @@ class TimedRaster : public TimedUnit {
     out_.set_pipeline(cost_.setup_latency_cycles - 1, cost_.fine_tiles_per_cycle);
   }
 
-  std::uint64_t work() const override { return quads_; }
-  double peak_rate() const override { return cost_.quads_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -37,27 +35,40 @@ class TimedRaster : public TimedUnit {
     now_ = std::max(now_, next_setup_);
     const Cycle setup = now_;
     next_setup_ = setup + cost_.setup_interval_cycles;
+    did(RasterWork::setup, 1, setup, std::max(next_setup_, setup + 1));
     charge(UnitState::busy, setup + 1);
     behaviour_->begin(job.primitive, job.clip);
     QuadBeat tile;
     unsigned tests = 0;
     bool new_screen_tile = false;
     while (behaviour_->next(tile, tests, new_screen_tile)) {
-      now_ = std::max(coarse_.take(now_, tests).last, fine_.take(now_));
+      test_tiles(tests);
+      const Cycle fine = fine_.take(now_);
+      did(RasterWork::fine, 1, fine);
+      now_ = std::max(coarse_done_, fine);
       if (new_screen_tile) {
         now_ = std::max(now_, next_pair_);
         next_pair_ = now_ + cost_.screen_tile_interval_cycles;
+        did(RasterWork::pairs, 1, now_, std::max(next_pair_, now_ + 1));
       }
       if (tile.count == 0) continue;
-      quads_ += tile.count;
       now_ = quads_out_.take(now_, tile.count).last;
+      did(RasterWork::quads, tile.count, now_);
+      draw_lasts(now_ + 1);
       charge(UnitState::busy, now_);
       now_ = out_.send(tile, now_).first;
       charge(UnitState::blocked, now_);
       charge(UnitState::busy, now_ + 1);
     }
-    coarse_.take(now_, tests);
+    test_tiles(tests);
     return setup;
+  }
+
+  /// Coarse tests, which may take several cycles.
+  void test_tiles(unsigned tests) {
+    const Span at = coarse_.take(now_, tests);
+    did(RasterWork::coarse, tests, at.first, at.last + 1);
+    coarse_done_ = at.last;
   }
 
   TimedOut<QuadBeat> out_;
@@ -70,7 +81,7 @@ class TimedRaster : public TimedUnit {
   Cycle now_ = 0;  ///< how far the primitive in hand has come
   Cycle next_pair_ = 0;
   Cycle next_setup_ = 0;
-  std::uint64_t quads_ = 0;
+  Cycle coarse_done_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -9,7 +9,7 @@ namespace {
 class RasterUnit : public Unit {
  public:
   RasterUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour)
-      : Unit(name, domain),
+      : Unit(name, domain, RasterWork::kinds(behaviour->cost())),
         in_(*this, "in_jobs"),
         out_(*this, "out_quads"),
         behaviour_(std::move(behaviour)),
@@ -18,8 +18,6 @@ class RasterUnit : public Unit {
   }
 
   bool idle() const override { return in_.empty() && !active_ && at_ == tile_.count; }
-  std::uint64_t work() const override { return quads_; }
-  double peak_rate() const override { return cost_.quads_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -29,7 +27,6 @@ class RasterUnit : public Unit {
       if (out_.credits() == 0) return false;
       if (at_ == 0 && tile_.count <= quad_budget) {
         out_.push(tile_);
-        quads_ += tile_.count;
         quad_budget -= tile_.count;
         at_ = tile_.count;
         break;
@@ -47,7 +44,6 @@ class RasterUnit : public Unit {
       --quad_budget;
     }
     out_.push(beat);
-    quads_ += beat.count;
   }
 
   [[gnu::noinline]] void pass_end_of_draw() {
@@ -67,6 +63,7 @@ class RasterUnit : public Unit {
         const unsigned paid = std::min(coarse_debt_, coarse_budget);
         coarse_debt_ -= paid;
         coarse_budget -= paid;
+        did(RasterWork::coarse, paid, now);
         moved = moved || paid > 0;
         if (coarse_debt_ > 0) break;
       }
@@ -74,7 +71,11 @@ class RasterUnit : public Unit {
         if (now < tile_due_) break;
         const unsigned before = quad_budget;
         const bool taken = send(quad_budget);
-        moved = moved || quad_budget != before;
+        if (quad_budget != before) {
+          moved = true;
+          did(RasterWork::quads, before - quad_budget, now);
+          draw_lasts(now + 1);
+        }
         if (!taken && !moved) {
           enter(UnitState::blocked, now);
           return never;
@@ -102,6 +103,7 @@ class RasterUnit : public Unit {
         behaviour_->begin(in_.front().primitive, in_.front().clip);
         in_.pop();
         next_setup_ = now + cost_.setup_interval_cycles;
+        did(RasterWork::setup, 1, now, std::max(next_setup_, now + 1));
       }
       unsigned tests = 0;
       bool new_screen_tile = false;
@@ -110,9 +112,11 @@ class RasterUnit : public Unit {
       at_ = active_ ? 0U : tile_.count;
       if (active_) {
         --fine_budget;
+        did(RasterWork::fine, 1, now);
         if (new_screen_tile) {
           tile_due_ = std::max(now, next_pair_);
           next_pair_ = tile_due_ + cost_.screen_tile_interval_cycles;
+          did(RasterWork::pairs, 1, tile_due_, std::max(next_pair_, tile_due_ + 1));
         }
       }
       moved = true;
@@ -132,7 +136,6 @@ class RasterUnit : public Unit {
   Cycle tile_due_ = 0;
   Cycle next_pair_ = 0;
   Cycle next_setup_ = 0;
-  std::uint64_t quads_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

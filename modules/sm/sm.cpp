@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <vrpipe/error.h>
 #include <vrpipe/exp2.h>
 #include <vrpipe/registry.h>
 
@@ -38,6 +39,12 @@ SplatShader::SplatShader(const Parameters& parameters, const RenderState& state)
   cost_.cores = parameters.cores;
   cost_.schedulers_per_core = parameters.schedulers_per_core;
   cost_.lanes_per_scheduler = parameters.lanes_per_scheduler;
+  if (32 % cost_.lanes_per_scheduler != 0) {
+    throw UserError("unusable SM array", "sm.lanes_per_scheduler",
+                    "a warp of 32 threads does not issue in whole cycles on " +
+                        std::to_string(cost_.lanes_per_scheduler) + " lanes",
+                    "use 1, 2, 4, 8, 16 or 32");
+  }
   cost_.warps_per_core = parameters.warps_per_core;
   static_cast<void>(cost_.fragment_slots());  // refused at every fidelity, also where slots have no numbers
   cost_.vertex_warps = parameters.vertex_warps;

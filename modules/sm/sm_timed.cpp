@@ -14,10 +14,10 @@ class TimedSm : public TimedUnit {
  public:
   TimedSm(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour,
           Transport transport)
-      : TimedUnit(name, domain, transport),
+      : TimedUnit(name, domain, SmWork::kinds(behaviour->cost()), transport),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
-        cycles_per_instruction_(32 / cost_.lanes_per_scheduler),
+        cycles_per_instruction_(cost_.cycles_per_instruction()),
         vertex_(program({&cost_.vertex})),
         fragment_(program({&cost_.fragment})),
         merged_(program({&cost_.fragment, &cost_.merge})),
@@ -36,10 +36,6 @@ class TimedSm : public TimedUnit {
   }
 
   bool idle() const override { return TimedUnit::idle() && running_.empty(); }
-  std::uint64_t work() const override { return instructions_; }
-  double peak_rate() const override {
-    return static_cast<double>(scheduler_free_at_.size()) / static_cast<double>(cycles_per_instruction_);
-  }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -98,12 +94,17 @@ class TimedSm : public TimedUnit {
     const Program& needed = warp.merge_pairs != 0 ? merged_ : fragment_;
     Cycle& free_at = scheduler_free_at_[choose_scheduler(warp.tile)];
     free_at = std::max(free_at, launch) + needed.issue;
-    instructions_ += needed.instructions;
+    const Cycle begin = free_at - needed.issue;
+    did(SmWork::fragment, fragment_.instructions, begin, begin + fragment_.issue);
+    if (needed.instructions > fragment_.instructions) {
+      did(SmWork::merge, needed.instructions - fragment_.instructions, begin + fragment_.issue, free_at);
+    }
     const Cycle done = free_at + needed.latency;
     last_done_ = std::max(last_done_, done);
     charge(UnitState::busy, free_at);
 
     behaviour_->shade(warp, shaded);
+    if (shaded.count < warp.count) draw_lasts(done + 1);
     shaded.slot = 0;
     hand_on(shaded, done);
     return launch;
@@ -131,7 +132,7 @@ class TimedSm : public TimedUnit {
       launch = std::max(launch, vertex_slots_[vertex_turn_]);
       Cycle& free_at = scheduler_free_at_[vertex_scheduler_++ % scheduler_free_at_.size()];
       free_at = std::max(free_at, launch) + vertex_.issue;
-      instructions_ += vertex_.instructions;
+      did(SmWork::vertex, vertex_.instructions, free_at - vertex_.issue, free_at);
       behaviour_->shade_vertices(warp);
       vertices_done_ = std::max(vertices_done_, launch + vertex_.issue + vertex_.latency);
     }
@@ -178,7 +179,6 @@ class TimedSm : public TimedUnit {
   std::uint32_t sent_to_core_ = 0;
   std::uint32_t turn_of_scheduler_ = 0;
   ShadedWarpPool pool_;
-  std::uint64_t instructions_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

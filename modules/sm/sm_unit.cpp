@@ -78,7 +78,7 @@ class Wheel {
 class SmUnit : public Unit {
  public:
   SmUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour)
-      : Unit(name, domain),
+      : Unit(name, domain, SmWork::kinds(behaviour->cost())),
         in_vertices_(*this, "in_vertices"),
         out_vertices_(*this, "out_vertices"),
         in_warps_(*this, "in_warps"),
@@ -86,7 +86,7 @@ class SmUnit : public Unit {
         in_release_(*this, "in_release"),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
-        cycles_per_instruction_(32 / cost_.lanes_per_scheduler),
+        cycles_per_instruction_(cost_.cycles_per_instruction()),
         warps_per_core_(cost_.warps_per_core),
         wheel_(horizon()),
         schedulers_(std::size_t{cost_.cores} * cost_.schedulers_per_core) {
@@ -108,10 +108,6 @@ class SmUnit : public Unit {
 
   bool idle() const override {
     return in_vertices_.empty() && in_warps_.empty() && in_flight_ == 0 && vertex_count_ == 0 && completed_.empty();
-  }
-  std::uint64_t work() const override { return instructions_; }
-  double peak_rate() const override {
-    return static_cast<double>(schedulers_.size()) / static_cast<double>(cycles_per_instruction_);
   }
   Behaviour& behaviour() override { return *behaviour_; }
 
@@ -142,8 +138,14 @@ class SmUnit : public Unit {
     const Cycle busy = Cycle{segment.instructions} * cycles_per_instruction_;
     scheduler.free_at = now + busy;
     busy_until_ = std::max(busy_until_, scheduler.free_at);
-    instructions_ += segment.instructions;
+    if (segment.instructions > 0) did(kind_of_work(slot, flight), segment.instructions, now, now + busy);
     wheel_.add(std::max(now + busy + segment.stall_cycles, now + 1), slot, next_);
+  }
+
+  /// Of the segment that a flight has just issued.
+  unsigned kind_of_work(std::uint32_t slot, const Flight& flight) const {
+    if (slot >= fragment_slots_) return SmWork::vertex;
+    return flight.segment > cost_.fragment.size() ? SmWork::merge : SmWork::fragment;
   }
 
   void arm(std::uint32_t index, Cycle now) {
@@ -161,7 +163,7 @@ class SmUnit : public Unit {
     arm(index, now);
   }
 
-  void complete(std::uint32_t slot) {
+  void complete(std::uint32_t slot, Cycle now) {
     if (slot >= fragment_slots_) {
       behaviour_->shade_vertices(vertices_[slot - fragment_slots_]);
       flights_[slot].done = true;
@@ -170,6 +172,7 @@ class SmUnit : public Unit {
     --running_;
     ShadedWarp& shaded = pool_.take();
     behaviour_->shade(warps_[slot], shaded);
+    if (shaded.count < warps_[slot].count) draw_lasts(now + 1);
     shaded.slot = static_cast<std::uint16_t>(slot);
     completed_.push(&shaded);
   }
@@ -184,7 +187,7 @@ class SmUnit : public Unit {
         issue(schedulers_[index], now);
         arm(index, now);
       } else if (flights_[who].segment == flights_[who].program->size()) {
-        complete(who);
+        complete(who, now);
       } else {
         make_ready(who, now);
       }
@@ -346,7 +349,6 @@ class SmUnit : public Unit {
   std::uint32_t running_ = 0;    ///< of these, not shaded yet
   bool slots_full_ = false;
   Cycle busy_until_ = 0;
-  std::uint64_t instructions_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -12,7 +12,7 @@ class TimedTc : public TimedUnit {
  public:
   TimedTc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour,
           Transport transport)
-      : TimedUnit(name, domain, transport),
+      : TimedUnit(name, domain, TcWork::kinds(behaviour->cost()), transport),
         out_(*this, "out_bins"),
         in_(*this, "in_quads", [this](const QuadBeat& beat, Span visible) { return collect(beat, visible.first); },
             {&out_}),
@@ -24,8 +24,6 @@ class TimedTc : public TimedUnit {
     out_.set_buffer(cost_.flush_queue_bins - 1);
   }
 
-  std::uint64_t work() const override { return taken_; }
-  double peak_rate() const override { return cost_.quads_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -43,7 +41,7 @@ class TimedTc : public TimedUnit {
       from += taken;
       if (flushed) send(at);
     }
-    taken_ += beat.count;
+    did(TcWork::quads, beat.count, at);
     holds_quads_ = true;
     last_arrival_ = at;
     charge(UnitState::blocked, at);
@@ -77,6 +75,7 @@ class TimedTc : public TimedUnit {
     const unsigned beats = (item.quads + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
     const Cycle begin = std::max({flushed, sent_, out_.last()}) + 1;
     sent_ = out_.send(item, {begin, begin + beats - 1}, beats).last;
+    did(TcWork::beats, beats, sent_);
     sent_at_[place_] = sent_;
     place_ = place_ + 1 == sent_at_.size() ? 0 : place_ + 1;
   }
@@ -132,7 +131,6 @@ class TimedTc : public TimedUnit {
   Cycle last_arrival_ = 0;
   Cycle timed_out_ = 0;
   bool holds_quads_ = false;
-  std::uint64_t taken_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

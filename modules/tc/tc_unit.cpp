@@ -11,7 +11,7 @@ namespace {
 class TcUnit : public Unit {
  public:
   TcUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour)
-      : Unit(name, domain),
+      : Unit(name, domain, TcWork::kinds(behaviour->cost())),
         in_(*this, "in_quads"),
         out_(*this, "out_bins"),
         behaviour_(std::move(behaviour)),
@@ -21,8 +21,6 @@ class TcUnit : public Unit {
   }
 
   bool idle() const override { return in_.empty() && queued_ == 0 && !ending_ && !holds_quads_; }
-  std::uint64_t work() const override { return taken_; }
-  double peak_rate() const override { return cost_.quads_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -50,7 +48,7 @@ class TcUnit : public Unit {
       }
       if (flushed) ++queued_;
       from_ += taken;
-      taken_ += taken;
+      did(TcWork::quads, taken, now);
       budget -= taken;
       holds_quads_ = true;
       last_arrival_ = now;
@@ -97,7 +95,7 @@ class TcUnit : public Unit {
     drained_ = false;
   }
 
-  bool send() {
+  bool send(Cycle now) {
     if (queued_ == 0) {
       if (!drained_ || out_.credits() == 0) return false;
       pass_end_of_draw();
@@ -113,6 +111,7 @@ class TcUnit : public Unit {
     sent_ += beat.count;
     beat.last_of_bin = sent_ == flush.quads.size();
     out_.push(beat);
+    did(TcWork::beats, 1, now);
     if (beat.last_of_bin) {
       first_ = first_ + 1 == queue_.size() ? 0 : first_ + 1;
       --queued_;
@@ -122,7 +121,7 @@ class TcUnit : public Unit {
   }
 
   Cycle tick(Cycle now) override {
-    const bool sent = send();
+    const bool sent = send(now);
     const bool collected = collect(now);
     const bool flushed = flush_idle_or_ending(now);
     if (sent || collected || flushed) {
@@ -150,7 +149,6 @@ class TcUnit : public Unit {
   bool ending_ = false;
   bool drained_ = false;
   Cycle last_arrival_ = 0;
-  std::uint64_t taken_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

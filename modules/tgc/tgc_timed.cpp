@@ -9,7 +9,7 @@ class TimedTgc : public TimedUnit {
  public:
   TimedTgc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TgcBehaviour> behaviour,
            Transport transport)
-      : TimedUnit(name, domain, transport),
+      : TimedUnit(name, domain, TgcWork::kinds(behaviour->cost()), transport),
         out_(*this, "out_jobs"),
         in_(*this, "in_primitives",
             [this](const PrimitiveItem& item, Span visible) {
@@ -22,8 +22,6 @@ class TimedTgc : public TimedUnit {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
 
-  std::uint64_t work() const override { return steps_; }
-  double peak_rate() const override { return cost_.items_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -39,7 +37,7 @@ class TimedTgc : public TimedUnit {
     const Cycle at = entries_.take(earliest);
     charge(UnitState::starved, at);
     charge(UnitState::busy, at + 1);
-    ++steps_;
+    did(TgcWork::entries, 1, at);
     if (behaviour_->step(flush_)) read_out(at);
     return at;
   }
@@ -55,6 +53,7 @@ class TimedTgc : public TimedUnit {
       const Cycle taken = out_.send(job, at).first;
       charge(UnitState::blocked, taken);
       charge(UnitState::busy, taken + 1);
+      did(TgcWork::primitives, 1, taken);
       at = taken + 1;
     }
     read_ = at;
@@ -77,7 +76,6 @@ class TimedTgc : public TimedUnit {
   TgcBehaviour::Flush flush_;
   Lane entries_;
   Cycle read_ = 0;  ///< the last flush has been read out
-  std::uint64_t steps_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -9,7 +9,7 @@ namespace {
 class TgcUnit : public Unit {
  public:
   TgcUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TgcBehaviour> behaviour)
-      : Unit(name, domain),
+      : Unit(name, domain, TgcWork::kinds(behaviour->cost())),
         in_(*this, "in_primitives"),
         out_(*this, "out_jobs"),
         behaviour_(std::move(behaviour)),
@@ -20,15 +20,13 @@ class TgcUnit : public Unit {
   bool idle() const override {
     return in_.empty() && !behaviour_->entering() && !reading_out() && !waiting_ && !ending_;
   }
-  std::uint64_t work() const override { return steps_; }
-  double peak_rate() const override { return cost_.items_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
   bool reading_out() const { return at_ < current_.primitives.size(); }
 
   /// Enters bins; true when something moved.
-  bool collect() {
+  bool collect(Cycle now) {
     bool moved = false;
     for (unsigned budget = cost_.items_per_cycle; budget > 0 && !waiting_; --budget) {
       if (!behaviour_->entering()) {
@@ -43,7 +41,7 @@ class TgcUnit : public Unit {
       }
       if (behaviour_->entering()) {
         waiting_ = behaviour_->step(next_);
-        ++steps_;
+        did(TgcWork::entries, 1, now);
         moved = true;
       }
     }
@@ -56,7 +54,7 @@ class TgcUnit : public Unit {
   }
 
   /// Hands on one primitive, or the end of the draw; true when something moved.
-  bool read_out() {
+  bool read_out(Cycle now) {
     if (!reading_out() && waiting_) {
       std::swap(current_, next_);
       at_ = 0;
@@ -72,14 +70,15 @@ class TgcUnit : public Unit {
     } else {
       job.primitive = current_.primitives[at_++];
       job.clip = current_.clip;
+      did(TgcWork::primitives, 1, now);
     }
     out_.push(job);
     return true;
   }
 
   Cycle tick(Cycle now) override {
-    const bool sent = read_out();
-    const bool collected = collect();
+    const bool sent = read_out(now);
+    const bool collected = collect(now);
     if (sent || collected) {
       enter(UnitState::busy, now);
       return now + 1;
@@ -99,7 +98,6 @@ class TgcUnit : public Unit {
   bool waiting_ = false;
   bool ending_ = false;   ///< the end of the draw has arrived
   bool drained_ = false;  ///< and all bins are flushed
-  std::uint64_t steps_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

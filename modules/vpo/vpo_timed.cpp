@@ -9,7 +9,7 @@ class TimedVpo : public TimedUnit {
  public:
   TimedVpo(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<VpoBehaviour> behaviour,
            unsigned gpcs, Transport transport)
-      : TimedUnit(name, domain, transport),
+      : TimedUnit(name, domain, VpoWork::kinds(behaviour->cost()), transport),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
         gpcs_(gpcs),
@@ -28,8 +28,6 @@ class TimedVpo : public TimedUnit {
     }
   }
 
-  std::uint64_t work() const override { return assembled_; }
-  double peak_rate() const override { return cost_.items_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -61,10 +59,10 @@ class TimedVpo : public TimedUnit {
     for (std::uint32_t splat = warp.first_splat; splat < warp.first_splat + warp.splats; ++splat) {
       std::array<Primitive, 2> primitives;
       const unsigned count = behaviour_->assemble(splat, primitives);
-      assembled_ += 2;
       // Culled triangles take their turn as well.
       for (unsigned i = 0; i < std::max(count, 1U); ++i) {
         const Cycle at = lane_.take(visible);
+        did(VpoWork::triangles, 1, at);
         left = std::min(left, at);
         charge(UnitState::starved, at);
         if (i < count) {
@@ -88,7 +86,6 @@ class TimedVpo : public TimedUnit {
   Lane lane_;
   unsigned turn_ = 0;
   bool ended_ = false;
-  std::uint64_t assembled_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

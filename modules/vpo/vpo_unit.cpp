@@ -11,7 +11,10 @@ class VpoUnit : public Unit {
  public:
   VpoUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<VpoBehaviour> behaviour,
           unsigned gpcs)
-      : Unit(name, domain), behaviour_(std::move(behaviour)), cost_(behaviour_->cost()), gpcs_(gpcs) {
+      : Unit(name, domain, VpoWork::kinds(behaviour->cost())),
+        behaviour_(std::move(behaviour)),
+        cost_(behaviour_->cost()),
+        gpcs_(gpcs) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       ins_.push_back(std::make_unique<StreamIn<VertexWarp>>(*this, "in_vertices_" + std::to_string(gpc)));
       outs_.push_back(std::make_unique<StreamOut<PrimitiveItem>>(*this, "out_primitives_" + std::to_string(gpc)));
@@ -20,8 +23,6 @@ class VpoUnit : public Unit {
   }
 
   bool idle() const override { return at_ == count_ && ins_[turn_]->empty(); }
-  std::uint64_t work() const override { return assembled_; }
-  double peak_rate() const override { return cost_.items_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -52,6 +53,7 @@ class VpoUnit : public Unit {
         }
         ++at_;
         --budget;
+        did(VpoWork::triangles, 1, now);
         moved = true;
         continue;
       }
@@ -59,8 +61,10 @@ class VpoUnit : public Unit {
         // Culled triangles take their turn as well.
         at_ = 0;
         count_ = behaviour_->assemble(splat_++, primitives_);
-        assembled_ += 2;
-        if (count_ == 0) --budget;
+        if (count_ == 0) {
+          --budget;
+          did(VpoWork::triangles, 1, now);
+        }
         moved = true;
         continue;
       }
@@ -106,7 +110,6 @@ class VpoUnit : public Unit {
   std::uint32_t last_splat_ = 0;
   unsigned turn_ = 0;
   bool ended_ = false;
-  std::uint64_t assembled_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -12,7 +12,7 @@ class TimedZrop : public TimedUnit {
  public:
   TimedZrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
             Transport transport)
-      : TimedUnit(name, domain, transport),
+      : TimedUnit(name, domain, ZropWork::kinds(behaviour->cost()), transport),
         out_(*this, "out_quads"),
         in_terminations_(*this, "in_terminations",
                          [this](const TerminationBeat& beat, Span visible) { return update(beat, visible.first); }),
@@ -25,8 +25,6 @@ class TimedZrop : public TimedUnit {
     out_.set_pipeline(cost_.latency_cycles - 1, cost_.quads_per_cycle);
   }
 
-  std::uint64_t work() const override { return tested_; }
-  double peak_rate() const override { return cost_.quads_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
   void close_account(Cycle end) override {
@@ -43,7 +41,9 @@ class TimedZrop : public TimedUnit {
   Cycle update(const TerminationBeat& beat, Cycle visible) {
     Cycle at = visible;
     for (unsigned i = 0; i < beat.count; ++i) {
+      const Cycle before = at;
       at = updates_.take(visible);
+      if (i == 0 || at != before) did(ZropWork::updates, 1, at);
       pending_.push({beat.signals[i], at});
     }
     return at;
@@ -73,7 +73,9 @@ class TimedZrop : public TimedUnit {
       beat.last_of_bin = part + 1 == parts;
       std::copy_n(quads.begin() + from, beat.count, beat.quads.begin());
       const Cycle at = take(visible.of_part(part, parts), beat.count);
+      const unsigned tested_quads = beat.count;
       behaviour_->test(beat);
+      if (beat.count < tested_quads) draw_lasts(at + cost_.latency_cycles);
       tested.first = std::min(tested.first, at);
       tested.last = at;
       // A part without survivors goes no further, but for the mark that closes the bin.
@@ -84,7 +86,7 @@ class TimedZrop : public TimedUnit {
       left.last = at;
       ++beats_left;
     }
-    tested_ += total;
+    did(ZropWork::tests, total, tested.first, tested.last + 1);
     charge(UnitState::starved, tested.first);
     const Span taken = out_.send(item, left, beats_left);
     charge(UnitState::busy, tested.last + 1);
@@ -114,7 +116,6 @@ class TimedZrop : public TimedUnit {
   Lane tests_;
   Lane updates_;
   Ring<Pending> pending_;  ///< updates not applied yet, by cycle
-  std::uint64_t tested_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

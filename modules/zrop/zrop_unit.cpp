@@ -9,22 +9,21 @@ namespace {
 class ZropUnit : public Unit {
  public:
   ZropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour)
-      : Unit(name, domain),
+      : Unit(name, domain, ZropWork::kinds(behaviour->cost())),
         in_(*this, "in_quads"),
         out_(*this, "out_quads"),
         in_terminations_(*this, "in_terminations"),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()) {
+        cost_(behaviour_->cost()),
+        limit_(cost_.quads_per_cycle) {
     out_.set_pipeline(cost_.latency_cycles - 1, cost_.quads_per_cycle);
   }
 
   bool idle() const override { return in_.empty() && in_terminations_.empty(); }
-  std::uint64_t work() const override { return tested_; }
-  double peak_rate() const override { return cost_.quads_per_cycle; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  bool update() {
+  bool update(Cycle now) {
     unsigned budget = cost_.updates_per_cycle;
     bool moved = false;
     while (budget > 0 && in_terminations_.ready()) {
@@ -38,34 +37,32 @@ class ZropUnit : public Unit {
       in_terminations_.pop();
       signal_ = 0;
     }
+    if (moved) did(ZropWork::updates, 1, now);
     return moved;
   }
 
   bool test(Cycle now) {
-    if (now < free_at_) return false;
-    unsigned budget = cost_.quads_per_cycle;
     bool moved = false;
     while (in_.ready() && out_.credits() > 0) {
       const unsigned width = std::max<unsigned>(in_.front().count, 1);
-      if (width > budget && moved) break;
+      if (!limit_.allows(width, now)) break;
       QuadBeat beat = in_.front();
       in_.pop();
-      tested_ += beat.count;
+      did(ZropWork::tests, beat.count, now);
+      const unsigned tested = beat.count;
       behaviour_->test(beat);
+      if (beat.count < tested) draw_lasts(now + cost_.latency_cycles);
       moved = true;
       // A beat without survivors goes no further, but for the mark that closes a bin.
       if (beat.count > 0 || beat.last_of_bin || beat.end_of_draw) out_.push(beat);
-      if (width >= budget) {
-        free_at_ = now + (width + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
-        break;
-      }
-      budget -= width;
+      limit_.take(width);
     }
+    if (moved) free_at_ = limit_.next(now);
     return moved;
   }
 
   Cycle tick(Cycle now) override {
-    if (update() || test(now)) {
+    if (update(now) || (now >= free_at_ && test(now))) {
       enter(UnitState::busy, now);
       return now + 1;
     }
@@ -87,8 +84,8 @@ class ZropUnit : public Unit {
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZropBehaviour::Cost cost_;
   unsigned signal_ = 0;
+  BatchLimit limit_;
   Cycle free_at_ = 0;  ///< after a beat wider than the unit
-  std::uint64_t tested_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -265,7 +265,7 @@ TEST_F(ColorRopTest, QuadsPerCycleFollowTheFormat) {
   for (const auto& [format, quads] : expected) {
     state.format = format;
     make();
-    EXPECT_EQ(crop->cost().quads_per_cycle, quads);
+    EXPECT_EQ(crop->cost().blend_rate, (Rate{quads, 1}));
   }
 }
 

@@ -120,7 +120,24 @@ TEST_P(CropRate, ResidentQuadsBlendAtExactlyTheRateOfTheFormat) {
     for (unsigned i = 0; i < 400; ++i) crop.quad({0, 0}, i % 2 + 8 * (i / 2 % 2), 0.01F, live, 1000);
     // In hand from 1001 on and in the queue in that cycle; blended from 1002 on; 8 cycles of latency behind the last.
     EXPECT_EQ(crop.run(), 1001 + 400 / rate + 8);
-    EXPECT_EQ(crop.bench.unit().work(), 404U);
+    EXPECT_EQ(crop.bench.unit().occupancy().items(CropWork::blend), 404U);
+  }
+}
+
+TEST_F(CropUnitTest, BytesThatAreNoWholeQuadsBlendAtTheirRateExactly) {
+  for (const unsigned bytes : {16U, 17U, 24U, 48U, 64U, 96U, 128U, 200U, 256U}) {
+    for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
+      state.format = format;
+      const Rate rate = Rate::of_bytes(bytes, 4 * bytes_per_pixel(format));
+      // All wait in the queue for the line of the first.
+      const auto cycles = [&](unsigned quads) {
+        CropBench crop(state, {{"bytes_per_cycle", std::to_string(bytes)}, {"input_quads", "65536"}}, 40000);
+        for (unsigned i = 0; i < quads; ++i) crop.quad({0, 0}, 0);
+        return crop.run();
+      };
+      constexpr unsigned turns = 20;
+      EXPECT_EQ(cycles(100 + turns * rate.items) - cycles(100), turns * rate.cycles) << bytes << " " << name_of(format);
+    }
   }
 }
 

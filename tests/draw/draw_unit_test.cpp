@@ -29,7 +29,9 @@ TEST_F(DrawUnitTest, IssuesAtItsRateAndEndsTheDraw) {
   }
   EXPECT_TRUE(warps.records()[5].item.end_of_draw);
   EXPECT_TRUE(bench.unit().idle());
-  EXPECT_EQ(bench.unit().work(), 5U);
+  // Until the next could go, each keeps the unit.
+  EXPECT_EQ(bench.unit().occupancy().items(DrawWork::warps), 20U);
+  EXPECT_DOUBLE_EQ(bench.unit().occupancy().parts(18)[0].cycles, 18);
 }
 
 TEST_F(DrawUnitTest, TheDefaultRateIs88WarpsIn1024Cycles) {

@@ -1,6 +1,6 @@
 #include <vrpipe/accounting.h>
 
-#include <numeric>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -15,8 +15,17 @@ std::uint64_t sum(const StateAccount& account) {
   return total;
 }
 
+TEST(DrawEnd, IsTheLatestOfWhatIsKnown) {
+  DrawEnd end;
+  EXPECT_EQ(end.so_far(), 0u);
+  end.not_before(12);
+  end.not_before(7);
+  EXPECT_EQ(end.so_far(), 12u);
+}
+
 TEST(StateAccount, AStateHoldsUntilTheNextIsEntered) {
-  StateAccount account;
+  const DrawEnd draw_end;
+  StateAccount account(draw_end);
   account.enter(UnitState::busy, 10);
   account.enter(UnitState::busy, 12);
   account.enter(UnitState::blocked, 15);
@@ -27,8 +36,9 @@ TEST(StateAccount, AStateHoldsUntilTheNextIsEntered) {
   EXPECT_EQ(sum(account), 20u);
 }
 
-TEST(StateAccount, WhatLiesBeyondTheEndIsTakenBack) {
-  StateAccount account;
+TEST(StateAccount, WhatLiesBeyondTheEndIsNotCharged) {
+  const DrawEnd draw_end;
+  StateAccount account(draw_end);
   account.enter(UnitState::busy, 10);
   account.enter(UnitState::memory, 20);
   account.enter(UnitState::busy, 30);
@@ -39,25 +49,44 @@ TEST(StateAccount, WhatLiesBeyondTheEndIsTakenBack) {
   EXPECT_EQ(account.cycles(UnitState::memory), 0u);
 }
 
-TEST(StateAccount, TakingBackGoesNotBeyondTheStart) {
-  StateAccount account;
+TEST(StateAccount, ADrawOfNoCyclesChargesNone) {
+  const DrawEnd draw_end;
+  StateAccount account(draw_end);
   account.enter(UnitState::busy, 5);
   account.enter(UnitState::starved, 8);
   account.close(0);
   EXPECT_EQ(sum(account), 0u);
 }
 
-TEST(StateAccount, AnyHistorySumsToTheEnd) {
+/// Charges every cycle by itself.
+TEST(StateAccount, HoweverLongAUnitGoesOnAfterTheEndNothingOfItIsCharged) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
-    StateAccount account;
-    Cycle now = 0;
-    for (std::uint64_t i = 0; i < 500; ++i) {
-      account.enter(static_cast<UnitState>(mix(seed ^ mix(i)) % unit_states), now);
-      now += mix(seed + i) % 5;
+    DrawEnd draw_end;
+    StateAccount account(draw_end);
+    std::vector<UnitState> states;  // by cycle
+    UnitState state = UnitState::starved;
+    const std::uint64_t changes = 100 + mix(seed) % 3000;
+    // The end becomes known late, or never comes near.
+    const Cycle known_late = mix(seed + 1) % 500;
+    Cycle last_known = 0;
+    for (std::uint64_t i = 0; i < changes; ++i) {
+      state = static_cast<UnitState>(mix(seed ^ mix(i)) % unit_states);
+      account.enter(state, states.size());
+      states.insert(states.end(), mix(seed + i) % 5, state);
+      if (i < changes / 2 && mix(i) % 3 == 0) {
+        last_known = states.size() - std::min<Cycle>(states.size(), known_late);
+        draw_end.not_before(last_known);
+      }
     }
-    const Cycle end = now - mix(seed) % 20;
+    const Cycle end = draw_end.so_far() + mix(seed) % 20;
     account.close(end);
-    ASSERT_EQ(sum(account), end) << seed;
+    std::vector<std::uint64_t> expected(unit_states);
+    for (Cycle cycle = 0; cycle < end; ++cycle) {
+      ++expected[static_cast<unsigned>(cycle < states.size() ? states[cycle] : state)];
+    }
+    for (unsigned i = 0; i < unit_states; ++i) {
+      ASSERT_EQ(account.cycles(static_cast<UnitState>(i)), expected[i]) << "seed " << seed << ", state " << i;
+    }
   }
 }
 
@@ -67,6 +96,42 @@ TEST(StateAccount, StatesHaveNames) {
   EXPECT_STREQ(name_of(UnitState::blocked), "blocked");
   EXPECT_STREQ(name_of(UnitState::memory), "memory");
   EXPECT_STREQ(name_of(UnitState::latency), "latency");
+}
+
+TEST(WorkTally, CountsWhatIsDoneBeforeTheEnd) {
+  DrawEnd draw_end;
+  WorkTally tally(draw_end);
+  tally.add(3, 4);
+  tally.add(5, 9);
+  tally.add(7, 10);
+  EXPECT_DOUBLE_EQ(tally.items(), 15);
+  EXPECT_DOUBLE_EQ(tally.items(10), 8);
+  EXPECT_DOUBLE_EQ(tally.items(0), 0);
+}
+
+TEST(WorkTally, WhatIsUnderWayAtTheEndCountsByItsShare) {
+  const DrawEnd draw_end;
+  WorkTally tally(draw_end);
+  tally.add(1, 100, 1100);
+  EXPECT_DOUBLE_EQ(tally.items(350), 0.25);
+  EXPECT_DOUBLE_EQ(tally.items(2000), 1);
+}
+
+TEST(WorkTally, CountsTheSameWheneverTheEndBecomesKnown) {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    DrawEnd draw_end;
+    WorkTally tally(draw_end);
+    std::vector<std::uint64_t> done(3000);
+    for (Cycle at = 0; at < done.size(); ++at) {
+      done[at] = mix(seed ^ mix(at)) % 4;
+      if (done[at] > 0) tally.add(done[at], at);
+      if (at < 1500 && mix(seed + at) % 7 == 0) draw_end.not_before(at - std::min<Cycle>(at, mix(at) % 300));
+    }
+    const Cycle end = draw_end.so_far() + mix(seed) % 100;
+    double expected = 0;
+    for (Cycle at = 0; at < end; ++at) expected += static_cast<double>(done[at]);
+    ASSERT_DOUBLE_EQ(tally.items(end), expected) << seed;
+  }
 }
 
 }  // namespace

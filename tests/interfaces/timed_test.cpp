@@ -19,9 +19,8 @@ class NoBehaviour : public Behaviour {};
 /// What the units of this file have in common.
 class Plain : public TimedUnit {
  public:
-  using TimedUnit::TimedUnit;
-  std::uint64_t work() const override { return 0; }
-  double peak_rate() const override { return 1; }
+  Plain(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport)
+      : TimedUnit(name, domain, {}, transport) {}
   Behaviour& behaviour() override { return behaviour_; }
 
  private:

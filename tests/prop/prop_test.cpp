@@ -16,17 +16,19 @@ TEST(PreRop, ColourQuadsPerCycleFollowTheFormat) {
                                                        {ColorFormat::rgba32f, 1}};
   for (const auto& [format, quads] : expected) {
     state.format = format;
-    EXPECT_EQ(PreRop(parameters, state).cost().color_quads_per_cycle, quads) << name_of(format);
+    EXPECT_EQ(PreRop(parameters, state).cost().color_rate, (Rate{quads, 1})) << name_of(format);
   }
 }
 
-TEST(PreRop, ANarrowPathStillMovesAQuadACycle) {
+TEST(PreRop, BytesThatAreNoWholeQuadsAreAFraction) {
   const Draw draw = testing::draw_of(16, 16);
   RenderState state = testing::state_of(draw);
   state.format = ColorFormat::rgba32f;
   PreRop::Parameters parameters;
   parameters.set("prop", "color_bytes_per_cycle", "16");
-  EXPECT_EQ(PreRop(parameters, state).cost().color_quads_per_cycle, 1U);
+  EXPECT_EQ(PreRop(parameters, state).cost().color_rate, (Rate{1, 4}));
+  parameters.set("prop", "color_bytes_per_cycle", "48");
+  EXPECT_EQ(PreRop(parameters, state).cost().color_rate, (Rate{3, 4}));
 }
 
 }  // namespace

@@ -123,6 +123,42 @@ TEST_F(PropUnitTest, HandsItsColourQuadsPerCycleToCrop) {
   }
 }
 
+TEST_F(PropUnitTest, ColourBytesThatAreNoWholeQuadsPassAtTheirRateExactly) {
+  for (const unsigned bytes : {16U, 17U, 48U, 64U, 96U, 200U, 256U}) {
+    for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
+      state.format = format;
+      const Rate rate = Rate::of_bytes(bytes, 4 * bytes_per_pixel(format));
+      Bench bench("prop", "pre-rop", state, {{"color_bytes_per_cycle", std::to_string(bytes)}});
+      Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded", 64);
+      Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color", 64);
+      // All wait for the first, so that the rate decides, and not the one warp a cycle that the link brings.
+      for (std::uint32_t i = 1; i < 60; ++i) shaded.add({warp(i, {0, 0}, i)});
+      shaded.add({warp(0, {0, 0}, 0)}, 100);
+      bench.run();
+      std::vector<Cycle> cycles;  // by quad
+      for (const auto& record : color.records()) cycles.insert(cycles.end(), record.item.count, record.cycle);
+      ASSERT_EQ(cycles.size(), 480U);
+      constexpr std::size_t first = 100;
+      for (std::size_t turns = 1; first + turns * rate.items < cycles.size(); ++turns) {
+        ASSERT_EQ(cycles[first + turns * rate.items] - cycles[first], turns * rate.cycles)
+            << bytes << " " << name_of(format);
+      }
+    }
+  }
+}
+
+TEST_F(PropUnitTest, BeatsWiderThanTheUnitTakeExactlyTheirShare) {
+  for (const unsigned rate : {3U, 5U, 12U}) {
+    Bench bench("prop", "pre-rop", state, {{"quads_per_cycle", std::to_string(rate)}});
+    Source<QuadBeat>& bins = bench.source<QuadBeat>("in_bins", 64);
+    Sink<QuadBeat>& survivors = bench.sink<QuadBeat>("out_survivors", 64);
+    for (unsigned i = 0; i < 61; ++i) bins.add(beat_of({0, 0}, std::vector<unsigned>(16, 1), 16 * i));
+    bench.run();
+    ASSERT_EQ(survivors.records().size(), 61U);
+    EXPECT_EQ(survivors.records().back().cycle - survivors.records().front().cycle, 60U * 16 / rate) << rate;
+  }
+}
+
 TEST_F(PropUnitTest, ShadedOutOfOrderQuadsLeaveInTheOrderOfTheirTile) {
   for (const char* order : {"draw", "tile"}) {
     Bench bench("prop", "pre-rop", state, {{"order", order}});

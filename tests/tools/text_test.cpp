@@ -47,14 +47,27 @@ TEST(Text, ProgressFitsItsLine) {
             "2/5  b  50%  [==========          ] 0:50 left");
 }
 
-TEST(Text, BusiestUnitsOfARun) {
+TEST(Text, WhatBoundsARunIsSaidWithItsParts) {
   RunResult run;
-  EXPECT_TRUE(busiest_units(run).empty());
-  run.utilization = {{"raster", 0.2}, {"prop", 0.91}, {"sm", 0.3}, {"crop", 0.94}};
-  const auto busiest = busiest_units(run);
-  ASSERT_EQ(busiest.size(), 2U);
-  EXPECT_EQ(busiest[0].first, "crop");
-  EXPECT_EQ(busiest[1].first, "prop");
+  run.request.variant = variant_named("baseline");
+  run.request.platform = &platform_named("agx-orin");
+  EXPECT_EQ(bound_text(run), "");
+  run.bottleneck = Bottleneck{"gpc0.crop", 0.998, {{"blend", 0.926}, {"sectors", 0.072}, {"forwarding", 0.0}}};
+  EXPECT_EQ(bound_text(run), "baseline is bound by CROP, occupied 99.8 % (blend 92.6 %, sectors 7.2 %)\n");
+  run.request.platform = &platform_named("desktop");
+  EXPECT_EQ(bound_text(run), "baseline is bound by gpc0.CROP, occupied 99.8 % (blend 92.6 %, sectors 7.2 %)\n");
+}
+
+TEST(Text, WhereNoUnitIsAlwaysOccupiedTheNextIsNamedToo) {
+  RunResult run;
+  run.request.variant = variant_named("het");
+  run.request.platform = &platform_named("agx-orin");
+  run.bottleneck = Bottleneck{"gpc0.raster", 0.76, {{"fine tiles", 0.76}}};
+  run.units.resize(3);
+  run.units[0] = {"gpc0.raster", {}, 0.76, {}};
+  run.units[1] = {"gpc0.prop", {}, 0.3, {}};
+  run.units[2] = {"gpc0.crop", {}, 0.756, {}};
+  EXPECT_EQ(bound_text(run), "no one unit bounds het: RASTER is occupied 76.0 % (fine tiles 76.0 %), CROP 75.6 %\n");
 }
 
 TEST(Text, RatiosNeedBothRuns) {

@@ -105,6 +105,16 @@ struct Counts {
 struct UnitReport {
   std::string name;  ///< e.g. "gpc0.crop"
   std::array<std::uint64_t, unit_states> cycles{};
+  double occupancy = 0;  ///< of the busiest of its resources, in [0, 1]
+  /// What it spends time on: shares of the run's cycles, in [0, 1]. Those of one resource add up.
+  std::vector<std::pair<std::string, double>> parts;
+};
+
+/// The unit that is occupied the most, and what occupies it; the parts sum to the occupancy.
+struct Bottleneck {
+  std::string unit;  ///< as in UnitReport, or "l2"
+  double occupancy = 0;
+  std::vector<std::pair<std::string, double>> parts;
 };
 
 /// A counter that a unit declared, summed over GPCs, or an extreme, over all of them.
@@ -124,6 +134,7 @@ struct RunResult {
   /// raster zrop prop sm crop l2 dram, in [0, 1]; empty without time. DRAM is 0 while L2 is all the memory there is.
   std::vector<std::pair<std::string, double>> utilization;
   std::vector<UnitReport> units;
+  std::optional<Bottleneck> bottleneck;  ///< none without time, or without work
   std::vector<StatisticReport> statistics;
   /// UNIT.PARAMETER and value of everything that could be set, pass-through units left out.
   std::vector<std::pair<std::string, std::string>> parameters;
