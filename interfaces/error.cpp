@@ -4,11 +4,13 @@
 #include <numeric>
 #include <vector>
 
+#include <vrpipe/printable.h>
+
 namespace vrpipe {
 
 UserError::UserError(const std::string& what, const std::string& where, const std::string& why,
                      const std::string& remedy)
-    : std::runtime_error(what + " (" + where + "): " + why + "; " + remedy) {}
+    : std::runtime_error(printable(what + " (" + where + "): " + why + "; " + remedy)) {}
 
 SimulationFault::SimulationFault(const std::string& unit, unsigned long long cycle, const std::string& item)
     : std::logic_error(unit + " at cycle " + std::to_string(cycle) + ": " + item) {}
