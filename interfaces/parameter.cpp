@@ -2,6 +2,8 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstdint>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -12,7 +14,11 @@ namespace vrpipe {
 namespace {
 
 [[noreturn]] void refuse(const std::string& key, const std::string& text, const std::string& range) {
-  throw UserError("bad value '" + text + "'", key, "it is not " + range, "give " + range);
+  const std::string what = "bad value '" + text + "'";
+  if (text.find(',') != std::string::npos) {
+    throw UserError(what, key, "it is a list, and a parameter takes one value", "give one value: " + range);
+  }
+  throw UserError(what, key, "it is not " + range, "give " + range);
 }
 
 template <class Number>
@@ -20,6 +26,16 @@ bool parse(const std::string& text, Number& out) {
   const char* const end = text.data() + text.size();
   const auto result = std::from_chars(text.data(), end, out);
   return result.ec == std::errc() && result.ptr == end;
+}
+
+/// Cuts K, M, G, KiB, MiB or GiB off the end of `text`, and returns its power of 1024; 1 without one.
+std::uint64_t take_binary_multiple(std::string& text) {
+  std::size_t length = text.size();
+  if (length > 2 && text.compare(length - 2, 2, "iB") == 0) length -= 2;
+  const std::size_t power = length > 0 ? std::string("KMG").find(text[length - 1]) : std::string::npos;
+  if (power == std::string::npos) return 1;
+  text.resize(length - 1);
+  return std::uint64_t{1024} << (10 * power);
 }
 
 }  // namespace
@@ -60,9 +76,16 @@ std::string Integer::default_value() const { return std::to_string(default_); }
 std::string Integer::range() const { return fmt::format("a whole number from {} to {}", minimum_, maximum_); }
 
 void Integer::set(const std::string& text, const std::string& key) {
-  std::uint32_t value = 0;
-  if (!parse(text, value) || value < minimum_ || value > maximum_) refuse(key, text, range());
-  value_ = value;
+  std::string digits = text;
+  const bool is_size = std::string_view(unit()) == "bytes";
+  const std::uint64_t multiple = is_size ? take_binary_multiple(digits) : 1;
+  std::uint32_t count = 0;
+  const bool is_number = parse(digits, count);
+  const std::uint64_t value = count * multiple;
+  if (!is_number || value < minimum_ || value > maximum_) {
+    refuse(key, text, range() + (is_size ? ", where K, M and G are powers of 1024" : ""));
+  }
+  value_ = static_cast<std::uint32_t>(value);
 }
 
 Real::Real(ParameterSet& owner, const char* name, double value, double minimum, double maximum, const char* unit,

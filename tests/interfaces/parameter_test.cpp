@@ -17,6 +17,7 @@ struct Example : ParameterSet {
   Real share{*this, "share", 0.5, 0.0, 1.0, "alpha", source::paper_text, "how much"};
   Switch forwarding{*this, "forwarding", true, source::open, "whether"};
   Choice order{*this, "order", {"draw", "tile"}, 1, source::measured, "which"};
+  Integer cache{*this, "cache", 4096, 128, 1U << 31U, "bytes", source::open, "how large"};
 };
 
 std::string message_of(Example& set, const std::string& name, const std::string& value) {
@@ -40,7 +41,7 @@ TEST(Parameters, AreFoundByNameAndKeepTheirDefault) {
   EXPECT_EQ(set.order, 0u);
   EXPECT_EQ(set.count.default_value(), "8");
   EXPECT_EQ(set.order.default_value(), "tile");
-  EXPECT_EQ(set.parameters().size(), 4u);
+  EXPECT_EQ(set.parameters().size(), 5u);
 }
 
 TEST(Parameters, AnUnknownNameGetsTheNearestOne) {
@@ -70,6 +71,36 @@ TEST(Parameters, TheEndsOfTheRangeAreAllowed) {
   Example set;
   for (const char* value : {"1", "64"}) EXPECT_EQ(message_of(set, "count", value), "");
   for (const char* value : {"0", "1"}) EXPECT_EQ(message_of(set, "share", value), "");
+}
+
+TEST(Parameters, SizesInBytesTakeBinaryMultiples) {
+  Example set;
+  for (const auto& [text, bytes] : std::vector<std::pair<std::string, std::uint32_t>>{
+           {"512", 512}, {"16K", 16384}, {"16KiB", 16384}, {"3M", 3U << 20U}, {"1MiB", 1U << 20U}, {"2G", 1U << 31U}}) {
+    EXPECT_EQ(message_of(set, "cache", text), "");
+    EXPECT_EQ(set.cache, bytes) << text;
+    EXPECT_EQ(set.cache.value(), std::to_string(bytes)) << text;
+  }
+  for (const char* text : {"K", "iB", "16k", "16KB", "16iB", "1.5K", "16 K", "-1K", "4G", "4294967295G", "KK"}) {
+    const std::string message = message_of(set, "cache", text);
+    EXPECT_NE(message.find("128 to 2147483648, where K, M and G are powers of 1024"), std::string::npos) << message;
+  }
+  EXPECT_EQ(set.cache, 1U << 31U) << "a refused value changes nothing";
+  const std::string message = message_of(set, "count", "1K");
+  EXPECT_NE(message.find("'1K'"), std::string::npos) << "quads are counted: " << message;
+  EXPECT_EQ(message.find("powers"), std::string::npos) << message;
+}
+
+TEST(Parameters, AListIsRefusedAsOne) {
+  Example set;
+  for (const auto& [name, text] : std::vector<std::pair<std::string, std::string>>{{"count", "16,32"},
+                                                                                   {"share", "0.1,0.2"},
+                                                                                   {"forwarding", "on,off"},
+                                                                                   {"order", "draw,tile"},
+                                                                                   {"cache", "1K,2K"}}) {
+    const std::string message = message_of(set, name, text);
+    EXPECT_NE(message.find("it is a list"), std::string::npos) << message;
+  }
 }
 
 // case T07
