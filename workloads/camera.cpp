@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 
+#include <fmt/format.h>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
@@ -117,7 +118,7 @@ Camera look_at(const Vec3& eye, const Vec3& target, const Vec3& up, double fovy_
   if (!all_finite(target)) throw UserError(kCannotUse, "--look-at", "a component is not finite", "give three numbers");
   if (!all_finite(up)) throw UserError(kCannotUse, "--up", "a component is not finite", "give three numbers");
   if (!(fovy_degrees >= 1e-6 && fovy_degrees < 180.0 - 1e-3)) {
-    throw UserError(kCannotUse, "--fovy", "the field of view is " + std::to_string(fovy_degrees) + " degrees",
+    throw UserError(kCannotUse, "--fovy", fmt::format("the field of view is {:g} degrees", fovy_degrees),
                     "give 1e-6 to less than 179.999");
   }
   // Halved first: the difference of two large numbers must not overflow.
@@ -160,9 +161,11 @@ Camera resized(const Camera& camera, ImageSize size) {
 }
 
 std::vector<Camera> load_cameras(const std::string& path) {
-  const MappedFile file(path, kCannotRead);
-  const char* text = reinterpret_cast<const char*>(file.data());
-  const nlohmann::json json = nlohmann::json::parse(text, text + file.size(), nullptr, /*allow_exceptions=*/false);
+  const InputFile file(path, kCannotRead);
+  std::string text(static_cast<std::size_t>(file.size()), '\0');
+  file.read(0, text.data(), text.size());
+  file.check_unchanged();
+  const nlohmann::json json = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (json.is_discarded()) throw UserError(kCannotRead, path, "it is not valid JSON", kLayoutRemedy);
   if (!json.is_array()) throw UserError(kCannotRead, path, "it is not an array of cameras", kLayoutRemedy);
   std::vector<Camera> cameras;

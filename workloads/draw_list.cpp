@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include <vrpipe/error.h>
 #include <vrpipe/workloads/camera.h>
@@ -35,9 +36,9 @@ bool is_finite(const Splat& splat) {
 
 DrawList read_draw_list(const std::filesystem::path& path) {
   const std::string where = path.string();
-  const MappedFile file(path, kCannotRead);
+  const InputFile file(path, kCannotRead);
   DrawListHeader header{};
-  std::memcpy(&header, file.data(), std::min(file.size(), sizeof header));
+  file.read(0, &header, static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), sizeof header)));
   if (file.size() < sizeof header.magic || header.magic != kDrawListMagic) {
     throw UserError(kCannotRead, where, "it does not begin with the draw list's magic number 0x4c505331 (\"1SPL\")",
                     "write one with --save-draw");
@@ -67,17 +68,13 @@ DrawList read_draw_list(const std::filesystem::path& path) {
   }
   list.draw.width = static_cast<std::uint32_t>(header.width);
   list.draw.height = static_cast<std::uint32_t>(header.height);
-  list.draw.splats.reserve(static_cast<std::size_t>(list.splats_in_file));
-  const std::byte* record = file.data() + sizeof header;
-  for (std::uint64_t i = 0; i < list.splats_in_file; ++i, record += sizeof(Splat)) {
-    Splat splat;
-    std::memcpy(&splat, record, sizeof splat);
-    if (is_finite(splat)) {
-      list.draw.splats.push_back(splat);
-    } else {
-      ++list.dropped_not_finite;
-    }
-  }
+  std::vector<Splat>& splats = list.draw.splats;
+  splats.resize(static_cast<std::size_t>(list.splats_in_file));
+  file.read(sizeof header, splats.data(), splats.size() * sizeof(Splat));
+  file.check_unchanged();
+  const auto is_broken = [](const Splat& splat) { return !is_finite(splat); };
+  splats.erase(std::remove_if(splats.begin(), splats.end(), is_broken), splats.end());
+  list.dropped_not_finite = list.splats_in_file - splats.size();
   return list;
 }
 
@@ -94,7 +91,7 @@ void write_draw_list(const std::filesystem::path& path, const Draw& draw) {
   check_image_size(draw.width, draw.height, path.string());
   const DrawListHeader header{kDrawListMagic, static_cast<std::int32_t>(draw.splats.size()),
                               static_cast<std::int32_t>(draw.width), static_cast<std::int32_t>(draw.height)};
-  AtomicFile file(path, kCannotWrite);
+  AtomicFile file(path, kCannotWrite, path.string());
   file.write(&header, sizeof header);
   file.write(draw.splats.data(), draw.splats.size() * sizeof(Splat));
   file.commit();

@@ -1,12 +1,13 @@
 #include "file_io.h"
 
 #include <fcntl.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <atomic>
+#include <algorithm>
+#include <array>
 #include <cerrno>
+#include <climits>
 #include <system_error>
 
 #include <vrpipe/error.h>
@@ -14,74 +15,152 @@
 namespace vrpipe {
 namespace {
 
+namespace fs = std::filesystem;
+
 std::string describe_errno(int error) { return std::generic_category().message(error); }
 
-/// Closes a descriptor at the end of a scope.
-struct DescriptorCloser {
-  int descriptor;
-  ~DescriptorCloser() { ::close(descriptor); }
-};
+/// Temporary files under way. A signal handler reads them, so there are neither locks nor memory to be had; a file
+/// beyond these is not removed when a signal ends the process.
+std::array<std::atomic<const char*>, 64> unfinished{};
+
+std::atomic<const char*>* note_unfinished(const char* name) {
+  for (std::atomic<const char*>& slot : unfinished) {
+    const char* free = nullptr;
+    if (slot.compare_exchange_strong(free, name)) return &slot;
+  }
+  return nullptr;
+}
 
 }  // namespace
 
-MappedFile::MappedFile(const std::filesystem::path& path, const std::string& what) {
-  const std::string where = path.string();
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (descriptor < 0) {
+InputFile::InputFile(const fs::path& path, const std::string& what) : what_(what), where_(path.string()) {
+  // A pipe without a writer would block.
+  descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor_ < 0) {
     const int error = errno;
-    throw UserError(what, where, error == ENOENT ? "no such file" : describe_errno(error),
-                    error == ENOENT ? "check the path" : "check the file's permissions");
+    throw UserError(what, where_, error == ENOENT ? "no such file" : describe_errno(error),
+                    error == EACCES ? "check the file's permissions" : "check the path");
   }
-  const DescriptorCloser closer{descriptor};
   struct stat status {};
-  if (::fstat(descriptor, &status) != 0) throw UserError(what, where, describe_errno(errno), "check the file system");
-  if (S_ISDIR(status.st_mode)) throw UserError(what, where, "it is a directory", "name a file in it");
-  if (!S_ISREG(status.st_mode)) {
-    throw UserError(what, where, "it is not a regular file", "copy its contents to a file first");
-  }
-  if (status.st_size == 0) throw UserError(what, where, "the file is empty", "get or write the file again");
-  size_ = static_cast<std::size_t>(status.st_size);
-  void* address = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, descriptor, 0);
-  if (address == MAP_FAILED) {
-    throw UserError(what, where, "it cannot be mapped into memory: " + describe_errno(errno),
-                    "raise the limit on address space, or use a smaller file");
-  }
-  data_ = static_cast<const std::byte*>(address);
+  const int error = ::fstat(descriptor_, &status) != 0 ? errno : 0;
+  const auto refuse = [&](const std::string& why, const std::string& remedy) {
+    ::close(descriptor_);
+    throw UserError(what, where_, why, remedy);
+  };
+  if (error != 0) refuse(describe_errno(error), "check the file system");
+  if (S_ISDIR(status.st_mode)) refuse("it is a directory", "name a file in it");
+  if (!S_ISREG(status.st_mode)) refuse("it is not a regular file", "copy its contents to a file first");
+  if (status.st_size == 0) refuse("the file is empty", "get or write the file again");
+  size_ = static_cast<std::uint64_t>(status.st_size);
+  seconds_ = status.st_mtim.tv_sec;
+  nanoseconds_ = status.st_mtim.tv_nsec;
 }
 
-MappedFile::~MappedFile() { ::munmap(const_cast<std::byte*>(data_), size_); }
+InputFile::~InputFile() { ::close(descriptor_); }
 
-AtomicFile::AtomicFile(const std::filesystem::path& path, const std::string& what) : path_(path), what_(what) {
-  std::error_code ignored;
-  const auto status = std::filesystem::status(path, ignored);
-  if (std::filesystem::is_directory(status)) {
-    throw UserError(what, path.string(), "it is a directory", "name a file in it");
+void InputFile::read(std::uint64_t offset, void* data, std::size_t size_bytes) const {
+  std::byte* to = static_cast<std::byte*>(data);
+  while (size_bytes > 0) {
+    const ssize_t count = ::pread(descriptor_, to, size_bytes, static_cast<off_t>(offset));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throw UserError(what_, where_, describe_errno(errno), "check the disk and the file system");
+    if (count == 0) {
+      throw UserError(what_, where_, "it became shorter while it was read", "wait until it is written, and try again");
+    }
+    to += count;
+    offset += static_cast<std::uint64_t>(count);
+    size_bytes -= static_cast<std::size_t>(count);
   }
-  // Renaming over a device or a pipe would replace it.
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    throw UserError(what, path.string(), "it is not a regular file", "name a new file or one that may be replaced");
+}
+
+void InputFile::check_unchanged() const {
+  struct stat now {};
+  if (::fstat(descriptor_, &now) != 0) throw UserError(what_, where_, describe_errno(errno), "check the file system");
+  if (static_cast<std::uint64_t>(now.st_size) == size_ && now.st_mtim.tv_sec == seconds_ &&
+      now.st_mtim.tv_nsec == nanoseconds_) {
+    return;
   }
-  static std::atomic<unsigned> counter{0};
-  do {
-    temporary_ = path;
-    temporary_ += ".tmp-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
-    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  } while (descriptor_ < 0 && errno == EEXIST);
-  if (descriptor_ < 0) {
-    throw UserError(what, path.string(), describe_errno(errno),
-                    "name a file in a folder that exists and can be written");
+  throw UserError(what_, where_, "it was written while it was read", "wait until it is written, and try again");
+}
+
+fs::path followed(const fs::path& path, int& error) {
+  fs::path place = path;
+  constexpr int most_links = 40;  // as many as Linux follows
+  for (int i = 0; i < most_links; ++i) {
+    struct stat status {};
+    const bool is_there = ::lstat(place.c_str(), &status) == 0;
+    error = is_there || errno == ENOENT ? 0 : errno;
+    if (!is_there || !S_ISLNK(status.st_mode)) return place;
+    std::error_code unreadable;
+    const fs::path link = fs::read_symlink(place, unreadable);
+    error = unreadable.value();
+    if (error != 0) return place;
+    place = place.parent_path() / link;
+  }
+  error = ELOOP;
+  return place;
+}
+
+std::string remedy_for_output(int error) {
+  switch (error) {
+    case ENOSPC:
+    case EDQUOT: return "free some space, or name another place";
+    case EFBIG: return "raise the limit on the size of files, or name another place";
+    case ENAMETOOLONG: return "give a shorter name";
+    case ENOENT: return "create the folder, or name another place";
+    default: return "name a place that can be written";
+  }
+}
+
+AtomicFile::AtomicFile(const fs::path& path, const std::string& what, const std::string& where)
+    : what_(what), where_(where) {
+  int error = 0;
+  target_ = followed(path, error);
+  if (error != 0) fail(error);
+  struct stat before {};
+  const bool is_there = ::stat(target_.c_str(), &before) == 0;
+  if (is_there && S_ISDIR(before.st_mode)) throw UserError(what, where, "it is a directory", "name a file in it");
+  if (is_there && !S_ISREG(before.st_mode)) {
+    descriptor_ = ::open(target_.c_str(), O_WRONLY | O_CLOEXEC);
+    if (descriptor_ < 0) fail(errno);
+  } else {
+    // Not longer than a name may be, and no more open to others than the file that it replaces.
+    const std::string start = target_.filename().string().substr(0, NAME_MAX - 32);
+    const mode_t mode = is_there ? before.st_mode & 0777U : 0666U;
+    static std::atomic<unsigned> counter{0};
+    do {
+      if (unfinished_ != nullptr) *unfinished_ = nullptr;
+      temporary_ = target_;
+      temporary_.replace_filename(start + ".tmp-" + std::to_string(::getpid()) + "-" + std::to_string(counter++));
+      unfinished_ = note_unfinished(temporary_.c_str());
+      descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+    } while (descriptor_ < 0 && errno == EEXIST);
+    if (descriptor_ < 0) {
+      error = errno;
+      remove();
+      fail(error);
+    }
+    // What the umask took away. Some file systems have no modes to set.
+    if (is_there && ::fchmod(descriptor_, before.st_mode & 07777U) != 0) errno = 0;
   }
   buffer_.reserve(std::size_t{1} << 16);
 }
 
-AtomicFile::~AtomicFile() {
-  if (descriptor_ < 0) return;
-  ::close(descriptor_);
-  ::unlink(temporary_.c_str());
+AtomicFile::~AtomicFile() { remove(); }
+
+/// What is left to do when the file is not wanted, or is done.
+void AtomicFile::remove() {
+  if (descriptor_ >= 0) {
+    ::close(descriptor_);
+    if (!temporary_.empty()) ::unlink(temporary_.c_str());
+  }
+  descriptor_ = -1;
+  if (unfinished_ != nullptr) *unfinished_ = nullptr;
+  unfinished_ = nullptr;
 }
 
-void AtomicFile::fail(const std::string& why) {
-  throw UserError(what_, path_.string(), why, "free some space or name another folder");
+void AtomicFile::fail(int error) const {
+  throw UserError(what_, where_, describe_errno(error), remedy_for_output(error));
 }
 
 void AtomicFile::flush() {
@@ -89,7 +168,7 @@ void AtomicFile::flush() {
   while (done < buffer_.size()) {
     const ssize_t written = ::write(descriptor_, buffer_.data() + done, buffer_.size() - done);
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail(describe_errno(errno));
+    if (written < 0) fail(errno);
     done += static_cast<std::size_t>(written);
   }
   buffer_.clear();
@@ -98,8 +177,7 @@ void AtomicFile::flush() {
 void AtomicFile::write(const void* data, std::size_t size_bytes) {
   const std::byte* bytes = static_cast<const std::byte*>(data);
   while (size_bytes > 0) {
-    const std::size_t room = buffer_.capacity() - buffer_.size();
-    const std::size_t part = size_bytes < room ? size_bytes : room;
+    const std::size_t part = std::min(size_bytes, buffer_.capacity() - buffer_.size());
     buffer_.insert(buffer_.end(), bytes, bytes + part);
     bytes += part;
     size_bytes -= part;
@@ -109,12 +187,20 @@ void AtomicFile::write(const void* data, std::size_t size_bytes) {
 
 void AtomicFile::commit() {
   flush();
-  const int descriptor = descriptor_;
+  int error = ::close(descriptor_) != 0 ? errno : 0;
   descriptor_ = -1;
-  if (::close(descriptor) != 0 || ::rename(temporary_.c_str(), path_.c_str()) != 0) {
-    const int error = errno;
-    ::unlink(temporary_.c_str());
-    fail(describe_errno(error));
+  if (!temporary_.empty()) {
+    if (error == 0 && ::rename(temporary_.c_str(), target_.c_str()) != 0) error = errno;
+    if (error != 0) ::unlink(temporary_.c_str());
+  }
+  remove();
+  if (error != 0) fail(error);
+}
+
+void remove_unfinished_files() noexcept {
+  for (const std::atomic<const char*>& slot : unfinished) {
+    const char* const name = slot;
+    if (name != nullptr) ::unlink(name);
   }
 }
 

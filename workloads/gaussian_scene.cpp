@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <charconv>
 #include <limits>
+#include <memory>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -55,6 +57,12 @@ std::uint32_t scalar_size(std::string_view type) {
   return found == sizes.end() ? 0 : found->second;
 }
 
+/// A word for a message: in a foreign file it may be a megabyte.
+std::string shortened(std::string_view word) {
+  constexpr std::size_t longest = 40;
+  return word.size() <= longest ? std::string(word) : std::string(word.substr(0, longest)) + "...";
+}
+
 struct Property {
   std::string name, type;
   std::uint64_t offset = 0;  ///< bytes from the start of the record
@@ -95,7 +103,7 @@ class HeaderParser {
       } else if (words[0] == "property") {
         add_property(words);
       } else {
-        fail("header line " + std::to_string(line_) + " begins with `" + printable(words[0]) + "`",
+        fail("header line " + std::to_string(line_) + " begins with `" + shortened(words[0]) + "`",
              "a PLY header holds format, comment, obj_info, element and property lines");
       }
     }
@@ -107,13 +115,6 @@ class HeaderParser {
  private:
   [[noreturn]] void fail(const std::string& why, const std::string& remedy) const {
     throw UserError(kCannotRead, where_, why, remedy);
-  }
-
-  /// A word for a message: foreign files may hold anything.
-  static std::string printable(std::string_view word) {
-    std::string text;
-    for (const char c : word.substr(0, 40)) text += (c >= 0x20 && c < 0x7f) ? c : '?';
-    return text;
   }
 
   std::string_view next_line() {
@@ -145,7 +146,7 @@ class HeaderParser {
   void check_format(const std::vector<std::string_view>& words) const {
     if (words.size() == 3 && words[1] == "binary_little_endian" && words[2] == "1.0") return;
     std::string format;
-    for (std::size_t i = 1; i < words.size(); ++i) format += (i > 1 ? " " : "") + printable(words[i]);
+    for (std::size_t i = 1; i < words.size(); ++i) format += (i > 1 ? " " : "") + shortened(words[i]);
     fail("its format is `" + format + "`", "convert it to `binary_little_endian 1.0`, the only one that is read");
   }
 
@@ -175,7 +176,7 @@ class HeaderParser {
     if (words.size() != 3) fail(line + " is not `property TYPE NAME`", kExportRemedy);
     const std::uint32_t size = scalar_size(words[1]);
     if (size == 0) {
-      fail("property `" + printable(words[2]) + "` has the unknown type `" + printable(words[1]) + "`",
+      fail("property `" + shortened(words[2]) + "` has the unknown type `" + shortened(words[1]) + "`",
            "PLY types are char uchar short ushort int uint float double, and int8 to float64");
     }
     element.properties.push_back({std::string(words[2]), std::string(words[1]), element.stride_bytes});
@@ -195,8 +196,8 @@ class VertexProperties {
   VertexProperties(const std::string& where, const Element& vertex) : where_(where) {
     for (const Property& property : vertex.properties) {
       if (!by_name_.emplace(property.name, &property).second) {
-        throw UserError(kCannotRead, where, "property `" + property.name + "` occurs twice in element vertex",
-                        kExportRemedy);
+        throw UserError(kCannotRead, where,
+                        "property `" + shortened(property.name) + "` occurs twice in element vertex", kExportRemedy);
       }
     }
   }
@@ -212,7 +213,7 @@ class VertexProperties {
     }
     const Property& property = *found->second;
     if (property.type != "float" && property.type != "float32") {
-      throw UserError(kCannotRead, where_, "property `" + name + "` has type `" + property.type + "`",
+      throw UserError(kCannotRead, where_, "property `" + name + "` has type `" + shortened(property.type) + "`",
                       "convert it to float");
     }
     return static_cast<std::uint32_t>(property.offset);
@@ -243,9 +244,22 @@ std::uint64_t checked_end(const std::string& where, const Element& element, std:
                                    : "more than 2^64";
   throw UserError(kCannotRead, where,
                   "the header announces " + std::to_string(element.count) + " records of " +
-                      std::to_string(element.stride_bytes) + " bytes in element " + element.name + ", which needs " +
-                      expected + " bytes, and the file has " + std::to_string(available),
+                      std::to_string(element.stride_bytes) + " bytes in element " + shortened(element.name) +
+                      ", which needs " + expected + " bytes, and the file has " + std::to_string(available),
                   "get the file again, it seems cut short");
+}
+
+std::shared_ptr<const std::byte[]> read_records(const InputFile& file, const std::string& where, std::uint64_t offset,
+                                                std::uint64_t size_bytes) {
+  std::shared_ptr<std::byte[]> records;
+  try {
+    records.reset(new std::byte[static_cast<std::size_t>(size_bytes)]);  // not zeroed, as a vector would be
+  } catch (const std::bad_alloc&) {
+    throw UserError(kCannotRead, where, "its Gaussians need " + std::to_string(size_bytes >> 20U) + " MiB of memory",
+                    "raise the limit on memory, or use a smaller scene");
+  }
+  file.read(offset, records.get(), static_cast<std::size_t>(size_bytes));
+  return records;
 }
 
 }  // namespace
@@ -293,9 +307,10 @@ GaussianScene GaussianSceneBuilder::build() {
 
 GaussianScene open_gaussian_ply(const std::filesystem::path& path) {
   const std::string where = path.string();
-  auto file = std::make_shared<const MappedFile>(path, kCannotRead);
-  const std::string_view bytes(reinterpret_cast<const char*>(file->data()), file->size());
-  const Header header = HeaderParser(where, bytes).parse();
+  const InputFile file(path, kCannotRead);
+  std::string head(static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), kMaxHeaderBytes)), '\0');
+  file.read(0, head.data(), head.size());
+  const Header header = HeaderParser(where, head).parse();
 
   std::uint64_t offset = header.size_bytes;
   const Element* vertex = nullptr;
@@ -306,15 +321,16 @@ GaussianScene open_gaussian_ply(const std::filesystem::path& path) {
     }
     if (!element.list_property.empty()) {
       throw UserError(kCannotRead, where,
-                      "element " + element.name + " before element vertex has the list property `" +
-                          element.list_property + "`",
+                      "element " + shortened(element.name) + " before element vertex has the list property `" +
+                          shortened(element.list_property) + "`",
                       "write element vertex first");
     }
-    offset = checked_end(where, element, offset, file->size());
+    offset = checked_end(where, element, offset, file.size());
   }
   if (vertex == nullptr) throw UserError(kCannotRead, where, "the header has no element vertex", kExportRemedy);
   if (!vertex->list_property.empty()) {
-    throw UserError(kCannotRead, where, "element vertex has the list property `" + vertex->list_property + "`",
+    throw UserError(kCannotRead, where,
+                    "element vertex has the list property `" + shortened(vertex->list_property) + "`",
                     "a Gaussian has scalar properties only; remove the list");
   }
 
@@ -338,9 +354,11 @@ GaussianScene open_gaussian_ply(const std::filesystem::path& path) {
   }
   for (std::size_t i = 0; i < rest; ++i) layout.f_rest[i] = properties.offset_of_float("f_rest_" + std::to_string(i));
 
-  checked_end(where, *vertex, offset, file->size());
-  const std::byte* records = file->data() + offset;
-  return GaussianScene(std::move(file), records, vertex->count, static_cast<std::size_t>(vertex->stride_bytes), layout,
+  const std::uint64_t end = checked_end(where, *vertex, offset, file.size());
+  std::shared_ptr<const std::byte[]> records = read_records(file, where, offset, end - offset);
+  file.check_unchanged();
+  const std::byte* const first = records.get();
+  return GaussianScene(std::move(records), first, vertex->count, static_cast<std::size_t>(vertex->stride_bytes), layout,
                        sh_degree);
 }
 
@@ -356,7 +374,7 @@ void write_gaussian_ply(const std::filesystem::path& path, const GaussianScene& 
   for (int i = 0; i < 4; ++i) property("rot_" + std::to_string(i));
   header += "end_header\n";
 
-  AtomicFile file(path, "cannot write scene");
+  AtomicFile file(path, "cannot write scene", path.string());
   file.write(header.data(), header.size());
   std::vector<float> record;
   for (std::uint64_t index = 0; index < scene.size(); ++index) {

@@ -246,6 +246,22 @@ TEST_F(GaussianPly, HugeCountsOverflowNothing) {
   }
 }
 
+// A NUL once cut the message off, and a megabyte of name made one of it.
+TEST_F(GaussianPly, ForeignNamesAreToldInPrintableTextOfModestLength) {
+  const std::string nul("a\0b", 3);
+  const auto twice = [](const std::string& name) {
+    std::vector<std::string> names = kRequired;
+    names.insert(names.end(), {name, name});
+    return header_of("1", names) + floats(16);
+  };
+  expect_refused(twice(nul), {"property `a\\x00b` occurs twice in element vertex; export the scene"});
+  expect_refused(twice("\x1b]0;title\a\xff"), {"`\\x1B]0;title\\x07\\xFF` occurs twice"});
+  expect_refused(twice(std::string(5000, 'n')), {"`" + std::string(40, 'n') + "...` occurs twice"});
+  std::string before = header_of("1", kRequired) + floats(14);
+  before.insert(before.find("element vertex"), "element " + nul + " 9999\nproperty list uchar int \x1b[2J\n");
+  expect_refused(before, {"element a\\x00b before", "`\\x1B[2J`; write element vertex first"});
+}
+
 TEST_F(GaussianPly, WritingIntoAMissingFolderSaysSoAndLeavesNothing) {
   const auto path = in_folder("nowhere/scene.ply");
   expect_user_error([&] { write_gaussian_ply(path, GaussianScene()); },

@@ -17,7 +17,7 @@ struct DrawList {
 
 /// Reads a .spl draw list (little-endian int32 magic, count, width, height; then 12 float32 per splat, see Splat).
 /// Splats come in as they are, bit for bit, but for non-finite ones, which are dropped. Trailing bytes are ignored.
-/// @throws UserError when the file cannot be read, is cut short, or is not a draw list
+/// @throws UserError when the file cannot be read, is cut short, is written meanwhile, or is not a draw list
 DrawList read_draw_list(const std::filesystem::path& path);
 
 /// Writes a .spl draw list. The file appears complete or not at all.

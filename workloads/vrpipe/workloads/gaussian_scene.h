@@ -61,7 +61,7 @@ class GaussianRef {
   int sh_degree_;
 };
 
-/// A set of 3D Gaussians: records of equal stride somewhere in memory (a mapped file, or a block of floats).
+/// A set of 3D Gaussians: records of equal stride somewhere in memory (of a file, or of a block of floats).
 /// Copies share the records. Immutable, so safe to read from any number of threads.
 class GaussianScene {
  public:
@@ -118,12 +118,11 @@ class GaussianSceneBuilder {
   std::vector<float> floats_;
 };
 
-/// Opens an INRIA .ply (`format binary_little_endian 1.0`) by mapping it into memory: nothing is copied, so a file
-/// larger than the machine's memory can be read.
+/// Reads an INRIA .ply (`format binary_little_endian 1.0`). The vertices are kept in memory as they lie in the file.
 /// Properties of the element `vertex` are found by name: x y z, scale_0..2, rot_0..3, opacity, f_dc_0..2 (all float)
 /// and f_rest_* (0, 9, 24 or 45 of them: SH degree 0 to 3). Other scalar properties, other elements (also with lists
 /// behind the vertices, without lists before them) and trailing bytes are skipped. No vertices is a valid, empty scene.
-/// @throws UserError when the file cannot be read, is cut short, or is not such a file
+/// @throws UserError when the file cannot be read, is cut short, is written meanwhile, or is not such a file
 GaussianScene open_gaussian_ply(const std::filesystem::path& path);
 
 /// Writes an INRIA .ply: x y z nx ny nz f_dc_0..2 f_rest_* opacity scale_0..2 rot_0..3, attributes bit for bit.
