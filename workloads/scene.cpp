@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <vector>
 
+#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <vrpipe/error.h>
@@ -30,7 +31,8 @@ View with_options(View view, const SceneRequest& request) {
 }
 
 /// The automatic view that load_scene documents, for what the user did not name.
-View automatic_view(const GaussianScene& scene, const SceneRequest& request) {
+/// @throws UserError when the Gaussians lie so far out that a camera beside them rounds to where they are
+View automatic_view(const std::string& path, const GaussianScene& scene, const SceneRequest& request) {
   View view;
   if (request.up) view.up = *request.up;
   if (request.fovy_degrees) view.fovy_degrees = *request.fovy_degrees;
@@ -84,6 +86,13 @@ View automatic_view(const GaussianScene& scene, const SceneRequest& request) {
   const Vec3 level = front * kCos30 + left * kSin30;
   const Vec3 direction = level * kCos20 + up * kSin20;
   view.eye = view.look_at + direction * distance;
+  const double there = glm::length(view.eye - view.look_at);
+  if (!request.look_at && !(std::fabs(there - distance) <= 0.01 * distance)) {
+    throw UserError("cannot choose a view", path,
+                    fmt::format("its Gaussians lie around {:g},{:g},{:g}, too far out for a camera {:g} beside them",
+                                view.look_at[0], view.look_at[1], view.look_at[2], distance),
+                    "move the scene to the origin, or give --camera, or --eye and --look-at");
+  }
   return view;
 }
 
@@ -134,10 +143,12 @@ void open_builtin(const std::string& name, const SceneRequest& request, OpenedSc
 
 void open_ply(const std::string& path, const SceneRequest& request, OpenedScene& scene) {
   scene.gaussians = open_gaussian_ply(path);
-  scene.camera = request.camera
-                     ? camera_from_file(*request.camera, request.size)
-                     : look_at(automatic_view(scene.gaussians, request), request.size.value_or(kDefaultImageSize));
+  scene.camera = request.camera ? camera_from_file(*request.camera, request.size)
+                                : look_at(automatic_view(path, scene.gaussians, request),
+                                          request.size.value_or(kDefaultImageSize));
 }
+
+bool is_builtin(const std::string& scene) { return scene.rfind(kBuiltinPrefix, 0) == 0; }
 
 std::string lower_case(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -146,26 +157,28 @@ std::string lower_case(std::string text) {
 
 }  // namespace
 
+std::string scene_name(const std::string& scene) {
+  if (scene.empty()) return kBuiltinPrefix + kDefaultBuiltinScene;
+  return is_builtin(scene) ? scene : std::filesystem::path(scene).filename().string();
+}
+
 OpenedScene open_scene(const SceneRequest& request) {
-  const std::string name = request.scene.empty() ? kBuiltinPrefix + kDefaultBuiltinScene : request.scene;
   if (request.size) check_image_size(request.size->width, request.size->height, "--size");
   OpenedScene scene;
-  if (name.rfind(kBuiltinPrefix, 0) == 0) {
+  scene.name = scene_name(request.scene);
+  if (is_builtin(scene.name)) {
     check_view_options(request);
-    open_builtin(name.substr(kBuiltinPrefix.size()), request, scene);
-    scene.name = name;
+    open_builtin(scene.name.substr(kBuiltinPrefix.size()), request, scene);
     return scene;
   }
-  const std::filesystem::path path(name);
-  scene.name = path.filename().string();
-  const std::string extension = lower_case(path.extension().string());
+  const std::string extension = lower_case(std::filesystem::path(request.scene).extension().string());
   if (extension == ".spl") {
-    scene.draw_list = load_draw_list(name, request);
+    scene.draw_list = load_draw_list(request.scene, request);
   } else if (extension == ".ply") {
     check_view_options(request);
-    open_ply(name, request, scene);
+    open_ply(request.scene, request, scene);
   } else {
-    throw UserError("cannot read scene", name,
+    throw UserError("cannot read scene", request.scene,
                     extension.empty() ? "it has no extension" : "scenes of type `" + extension + "` are not supported",
                     "give an INRIA .ply, a .spl draw list, or builtin:NAME");
   }

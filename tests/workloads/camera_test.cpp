@@ -67,6 +67,8 @@ TEST(LookAt, FieldOfViewMustLieBetweenZeroAndAlmost180Degrees) {
   for (const double fovy : {0.0, -10.0, 179.999, 180.0, 1e9, std::nan("")}) {
     expect_user_error([=] { look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, fovy, 64, 64); }, {"--fovy"});
   }
+  expect_user_error([] { look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 1e-300, 64, 64); }, {" is 1e-300 degrees"});
+  expect_user_error([] { look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 1e300, 64, 64); }, {" is 1e+300 degrees"});
   for (const double fovy : {1e-6, 0.01, 179.9, 179.9989}) {
     const Camera camera = look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, fovy, 64, 64);
     EXPECT_TRUE(std::isfinite(camera.fy) && camera.fy > 0);

@@ -164,6 +164,22 @@ TEST_F(SceneFile, AnEmptySceneIsAnEmptyDraw) {
   EXPECT_TRUE(load_scene(request_).draw.splats.empty());
 }
 
+TEST_F(SceneFile, GaussiansTooFarOutForACameraBesideThemAreRefusedForThat) {
+  GaussianAttributes far = testing::ordinary_gaussian();
+  far.position = {-1e38F, -1e38F, -1e38F};
+  write_gaussian_ply(in_folder("far.ply"), testing::scene_of({far, far}));
+  request_.scene = in_folder("far.ply").string();
+  expect_user_error([&] { load_scene(request_); }, {"far.ply", "-1e+38,-1e+38,-1e+38", "too far out", "--camera"});
+  request_.eye = Vec3{0, 0, 0};
+  EXPECT_EQ(load_scene(request_).summary.gaussians_total, 2u) << "with a camera elsewhere it can be drawn";
+}
+
+TEST(SceneName, IsTheFilesWithoutFolderOrTheBuiltInOnes) {
+  EXPECT_EQ(scene_name(""), "builtin:object");
+  EXPECT_EQ(scene_name("builtin:indoor"), "builtin:indoor");
+  EXPECT_EQ(scene_name("a/b.c/scene.ply"), "scene.ply");
+}
+
 TEST(BuiltinRequest, TheDefaultIsTheObjectSceneAndOptionsChangeIt) {
   SceneRequest request;
   request.size = ImageSize{100, 80};

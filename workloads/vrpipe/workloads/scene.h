@@ -40,13 +40,16 @@ struct OpenedScene {
   std::optional<LoadedScene> draw_list;
 };
 
+/// The name that results give to the scene of SceneRequest::scene: the file's without folder, or builtin:NAME.
+std::string scene_name(const std::string& scene);
+
 /// Opens a scene.
 /// Built-in: its own camera and size; view options replace what they name, the rest stays.
 /// .ply: the camera of the file given, or the view options. What is not given comes from an automatic view: it looks
 /// at the median position from a distance at which the middle 80 % of the positions fit (a ball of radius 0.5 and of
 /// three median sigmas at least), from the front (-z), 30 degrees to the left and 20 degrees above, with the world's
 /// up at 0,-1,0 (y points down, as in INRIA and COLMAP worlds; give --up 0,1,0 for y-up files) and a vertical field of
-/// view of 50 degrees.
+/// view of 50 degrees. A scene so far out that a camera beside it rounds to where it is gets none.
 /// .spl: the draw as it is; size, camera, view options and preprocessing other than the default are refused.
 /// @throws UserError for whatever cannot be used
 OpenedScene open_scene(const SceneRequest& request);
