@@ -1,12 +1,13 @@
 #include <vrpipe/registry.h>
 
 #include <algorithm>
+#include <cerrno>
 
 #include <dlfcn.h>
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <system_error>
 
 #include <boost/dll/shared_library.hpp>
 
@@ -72,19 +73,43 @@ namespace {
 
 /// The tag that VRPIPE_PLUGIN left in the file, without loading it; empty when there is none.
 std::string tag_in_file(const std::string& path) {
+  // Part by part: whatever was named may be larger than memory. Each begins with the end of the one before.
+  constexpr std::size_t part_bytes = std::size_t{1} << 20U;
+  constexpr std::size_t longest_tag = 256;
+  const std::string mark = "vrpipe-plugin/";
   std::ifstream file(path, std::ios::binary);
-  const std::string content((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  const std::size_t start = content.find("vrpipe-plugin/");
-  if (start == std::string::npos) return {};
-  return content.substr(start, content.find('\0', start) - start);
+  if (!file) throw UserError("cannot load plugin", path, std::generic_category().message(errno), "make it readable");
+  std::string content(4, '\0');
+  file.read(&content[0], 4);
+  if (content != "\177ELF") return {};  // no shared object, such as a scene of gigabytes
+  do {
+    content.erase(0, content.size() - std::min(content.size(), longest_tag));
+    const std::size_t kept = content.size();
+    content.resize(kept + part_bytes);
+    file.read(&content[kept], part_bytes);
+    content.resize(kept + static_cast<std::size_t>(file.gcount()));
+    const std::size_t start = content.find(mark);
+    const bool is_whole = start != std::string::npos && (content.size() - start >= longest_tag || !file);
+    if (is_whole) return content.substr(start, std::min(content.find('\0', start) - start, longest_tag));
+  } while (file);
+  return {};
 }
 
 }  // namespace
 
 void load_plugin(const std::string& path) {
   const std::string remedy = "build it with this vrpipe's vrpipe_add_plugin()";
-  if (!std::filesystem::is_regular_file(path)) {
-    throw UserError("cannot load plugin", path, "there is no such file", "give the path of a plugin's .so");
+  const std::string path_remedy = "give the path of a plugin's .so";
+  std::error_code status_error;
+  const std::filesystem::file_status status = std::filesystem::status(path, status_error);
+  if (status.type() == std::filesystem::file_type::none) {
+    throw UserError("cannot load plugin", path, status_error.message(), path_remedy);
+  }
+  if (!std::filesystem::exists(status)) {
+    throw UserError("cannot load plugin", path, "there is no such file", path_remedy);
+  }
+  if (!std::filesystem::is_regular_file(status)) {
+    throw UserError("cannot load plugin", path, "it is not a regular file", path_remedy);
   }
   const std::string tag = tag_in_file(path);
   if (tag.empty()) throw UserError("cannot load plugin", path, "it is not a vrpipe plugin", remedy);
@@ -95,7 +120,7 @@ void load_plugin(const std::string& path) {
   // Plugins are never unloaded, not even at exit: the registry holds code of theirs.
   static auto& loaded = *new std::vector<boost::dll::shared_library>;
   boost::dll::fs::error_code error;
-  boost::dll::shared_library library(std::filesystem::absolute(path), error, boost::dll::load_mode::rtld_now);
+  boost::dll::shared_library library(path, error, boost::dll::load_mode::rtld_now);
   if (error) {
     const char* const detail = dlerror();
     throw UserError("cannot load plugin", path, detail != nullptr ? detail : "the loader refuses it", remedy);
