@@ -2,11 +2,14 @@
 
 #include <CLI/CLI.hpp>
 
+#include <vrpipe/printable.h>
+
 #include "accuracy_job.h"
 #include "accuracy_json.h"
 #include "accuracy_page.h"
 #include "accuracy_report.h"
 #include "command_line.h"
+#include "json_text.h"
 #include "options.h"
 #include "output_file.h"
 #include "parse.h"
@@ -28,6 +31,7 @@ class AccuracyCommand : public Command {
     app.add_flag("--quick", quick_,
                  "a first answer: the middle ninth of the image unless --size is given, two\n"
                  "variants, and one value of some knobs")
+        ->disable_flag_override()
         ->group(ladders);
     add_option(app, "--repeat", repeat_, "N",
                "measures each rung of the fidelity ladder N times, interleaved, and\n"
@@ -36,6 +40,7 @@ class AccuracyCommand : public Command {
     add_option(app, "--html", html_, "FILE", "writes a page with plots, images and error maps; it needs no network",
                "Where results go");
     app.add_flag("--markdown", markdown_, "prints the tables as Markdown in place of the report")
+        ->disable_flag_override()
         ->group("Where results go");
     app.footer(
         "Climbs two ladders. Fidelity: every variant at every --fidelity that there is, one at a time, with its\n"
@@ -57,10 +62,7 @@ class AccuracyCommand : public Command {
     job.quick = quick_;
     job.markdown = markdown_;
     if (const auto text = single(repeat_, "--repeat")) job.repeat = parse_count(*text, "--repeat", largest_repeat);
-    if (const auto file = single(html_, "--html")) {
-      check_output_file(*file, "--html", job.simulation.output);
-      job.html = *file;
-    }
+    if (const auto file = single(html_, "--html")) job.html = *file;
 
     ProgressLine progress;
     const AccuracyResult result = measure_accuracy(job, progress);
@@ -71,7 +73,7 @@ class AccuracyCommand : public Command {
     progress.erase();
     const std::optional<std::string>& json = job.simulation.json;
     if (json) {
-      const std::string text = accuracy_json(result).dump(2) + "\n";
+      const std::string text = json_text(accuracy_json(result));
       if (*json == "-") {
         std::cout << text;
         return;
@@ -80,8 +82,8 @@ class AccuracyCommand : public Command {
     }
     std::cout << (job.markdown ? accuracy_markdown(result) : accuracy_text(result, stdout_style()));
     if (job.markdown) return;
-    if (json) std::cout << "result: " << *json << '\n';
-    if (job.html) std::cout << "page: " << job.html->string() << '\n';
+    if (json) std::cout << "result: " << printable(*json) << '\n';
+    if (job.html) std::cout << "page: " << printable(job.html->string()) << '\n';
   }
 
  private:

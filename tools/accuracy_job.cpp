@@ -6,7 +6,6 @@
 #include <memory>
 #include <utility>
 
-#include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/exact_image.h>
 #include <vrpipe/workloads/scene.h>
 
@@ -23,6 +22,7 @@ constexpr std::uint32_t quick_divisor = 3;
 // Of pictures on the page, at most.
 constexpr std::uint32_t picture_width = 280;
 constexpr std::uint32_t reference_width = 560;
+constexpr const char* reference_name = "reference";
 
 class Stopwatch {
  public:
@@ -89,9 +89,9 @@ Workload load(const AccuracyJob& job, AccuracyResult& result) {
 }
 
 void write_image(const AccuracyJob& job, const std::string& scene, const std::string& name, const SharedImage& image) {
-  const std::string stem = (*job.simulation.output / image_name(scene, name)).string();
-  write_output_file(stem + ".png", encode_png(image, job.simulation.background), "--output");
-  write_output_file(stem + ".exr", encode_exr(image), "--output");
+  const ImageFiles files = image_files(job.simulation, image_name(scene, name));
+  write_output_file(files.png, encode_png(image, job.simulation.background), "--output");
+  write_output_file(files.exr, encode_exr(image), "--output");
 }
 
 /// The image that errors are measured against: all bands, exact order.
@@ -105,11 +105,28 @@ ShownImage make_reference(const AccuracyJob& job, const Workload& workload, Accu
     for (const std::array<double, 4>& pixel : exact.rgba) {
       value = std::transform(pixel.begin(), pixel.end(), value, [](double x) { return static_cast<float>(x); });
     }
-    write_image(job, result.scene.name, "reference", image);
+    write_image(job, result.scene.name, reference_name, image);
   }
   ShownImage reference = shown(exact, job.simulation.background);
   if (job.html) result.reference = picture_of(reference, reference_width);
   return reference;
+}
+
+/// A precision run's name as part of a file's.
+std::string file_name(std::string run) {
+  std::replace(run.begin(), run.end(), '=', '-');
+  return run;
+}
+
+/// All images that a job may write; values that are not tried are among them.
+std::vector<std::string> images_of(const AccuracyJob& job) {
+  const std::string scene = scene_name(job.simulation.scene.scene);
+  std::vector<std::string> images{image_name(scene, reference_name), image_name(scene, "default")};
+  for (const PrecisionKnob& knob : precision_knobs()) {
+    for (const std::string& value : knob.values)
+      images.push_back(image_name(scene, file_name(knob.name + "=" + value)));
+  }
+  return images;
 }
 
 /// Compares the rungs of a variant, the first of which is the most exact.
@@ -234,9 +251,7 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const Sh
       run.error_map = error_map(image, reference, picture_width);
     }
     if (job.simulation.output) {
-      std::string name = run.name;
-      std::replace(name.begin(), name.end(), '=', '-');
-      write_image(job, result.scene.name, name, *simulated.image);
+      write_image(job, result.scene.name, file_name(run.name), *simulated.image);
     }
   });
 
@@ -253,6 +268,9 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const Sh
 }  // namespace
 
 AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) {
+  std::vector<NamedFile> page;
+  if (job.html) page.push_back({"--html", *job.html});
+  check_outputs(job.simulation, images_of(job), page);
   const Stopwatch watch;
   AccuracyResult result;
   result.quick = job.quick;
@@ -261,7 +279,7 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   progress.show("loading the scene");
   const Workload workload = load(job, result);
   if (job.simulation.output) create_output_folder(*job.simulation.output, "--output");
-  if (job.simulation.save_draw) write_draw_list(*job.simulation.save_draw, *workload.draw);
+  save_draw(job.simulation, *workload.draw);
   progress.show("rendering the exact image");
   const ShownImage reference = make_reference(job, workload, result);
   climb_fidelities(job, workload, result, progress);

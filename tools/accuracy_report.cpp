@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <vrpipe/blend.h>
+#include <vrpipe/printable.h>
 
 #include "parse.h"
 #include "report.h"
@@ -201,8 +202,9 @@ std::vector<std::string> precision_summary(const AccuracyResult& result) {
 std::vector<std::string> accuracy_heading(const AccuracyResult& result) {
   const RunRequest& base = result.base;
   std::vector<std::string> lines;
-  lines.push_back(fmt::format("{}, {}x{}: {} of {} Gaussians visible", result.scene.name, result.width, result.height,
-                              grouped(result.scene.gaussians_visible), grouped(result.scene.gaussians_total)));
+  lines.push_back(fmt::format("{}, {}x{}: {} of {} Gaussians visible", printable(result.scene.name), result.width,
+                              result.height, grouped(result.scene.gaussians_visible),
+                              grouped(result.scene.gaussians_total)));
   lines.push_back(base.platform->name + " (" + base.platform->description + ")");
   lines.push_back(fmt::format("{} colour, {} termination{}", vrpipe::name_of(base.format), name_of(base.termination),
                               settings_text(result)));

@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include <vrpipe/error.h>
+#include <vrpipe/printable.h>
 
 #include "options.h"
 
@@ -31,11 +32,12 @@ constexpr const char* program_footer =
     "`vrpipe COMMAND --help` explains a command's options.\n"
     "Exit code: 0 done, 2 the command line, a configuration or an input file is wrong, 1 a fault of vrpipe.";
 
-/// One line for one message, whatever a library put into it.
-std::string single_line(std::string text) {
+/// One line for one message, whatever a library put into it. That stderr may be closed or full changes nothing else.
+void complain(const char* kind, std::string text) {
+  std::cout.flush();
   std::replace_if(
       text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
-  return text;
+  std::fputs(fmt::format("vrpipe: {}: {}\n", kind, printable(text)).c_str(), stderr);
 }
 
 std::vector<std::string> option_names(const CLI::App& app) {
@@ -116,6 +118,11 @@ UserError as_user_error(const CLI::ParseError& error, const CLI::App& app) {
       return {"missing value", option, "the command line ends after it", "write its value after it; " + remedy};
     }
   }
+  const std::size_t name_end = text.find(" was given a disallowed flag override");
+  if (name_end != std::string::npos) {
+    return {"unexpected value", "--" + text.substr(0, name_end), "it is a switch",
+            "write it without `=` and what follows; " + remedy};
+  }
   return {"unusable command line", where, text, remedy};
 }
 
@@ -179,10 +186,6 @@ std::vector<std::unique_ptr<Command>> all_commands() {
 }
 
 int run_command_line(int argc, const char* const* argv) {
-  const auto complain = [](const char* kind, const std::string& text) {
-    std::cout.flush();
-    fmt::print(stderr, "vrpipe: {}: {}\n", kind, single_line(text));
-  };
   try {
     const int code = run_parsed(argc, argv);
     std::cout.flush();
@@ -198,7 +201,7 @@ int run_command_line(int argc, const char* const* argv) {
     complain(failure.exit_code == exit_user_error ? "error" : "fault", failure.what());
     return failure.exit_code;
   } catch (const std::bad_alloc&) {
-    complain("fault", "out of memory; try a smaller --size or, with compare, --jobs 1");
+    complain("fault", out_of_memory);
     return exit_fault;
   } catch (const std::exception& fault) {
     complain("fault", fault.what());

@@ -40,6 +40,10 @@ class CommandFailure : public std::runtime_error {
   const int exit_code;  ///< exit_user_error or exit_fault
 };
 
+/// What to say and to advise when memory runs out.
+constexpr const char* out_of_memory =
+    "out of memory; try a smaller --size, fewer --jobs, or smaller queues and bins where --set made them larger";
+
 constexpr int exit_fault = 1;
 constexpr int exit_user_error = 2;
 

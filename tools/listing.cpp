@@ -2,6 +2,7 @@
 
 #include <iostream>
 
+#include "json_text.h"
 #include "output_file.h"
 
 namespace vrpipe::tools {
@@ -11,18 +12,21 @@ void declare_json(CLI::App& app, Values& json) {
              "Where results go");
 }
 
-void print_listing(const Json& json, const std::string& text, const Values& json_option) {
+void print_listing(const Json& json, const std::string& text, const Values& json_option, const Values& plugins) {
   const auto place = single(json_option, "--json");
   if (!place) {
     std::cout << text;
     return;
   }
-  const std::string content = json.dump(2) + "\n";
+  const std::string content = json_text(json);
   if (*place == "-") {
     std::cout << content;
     return;
   }
   check_output_file(*place, "--json");
+  std::vector<NamedFile> inputs;
+  for (const std::string& plugin : plugins) inputs.push_back({"--plugin", plugin});
+  check_files_differ(inputs, {{"--json", *place}});
   write_output_file(*place, content, "--json");
 }
 

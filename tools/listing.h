@@ -12,7 +12,7 @@ namespace vrpipe::tools {
 /// Adds `--json FILE|-`.
 void declare_json(CLI::App& app, Values& json);
 
-/// Prints the text, or writes the JSON to where --json says. Throws UserError.
-void print_listing(const Json& json, const std::string& text, const Values& json_option);
+/// Prints the text, or writes the JSON to where --json says, which must not be one of the plugins. Throws UserError.
+void print_listing(const Json& json, const std::string& text, const Values& json_option, const Values& plugins = {});
 
 }  // namespace vrpipe::tools

@@ -1,6 +1,7 @@
 #include "options.h"
 
 #include <algorithm>
+#include <map>
 #include <thread>
 
 #include <CLI/CLI.hpp>
@@ -48,6 +49,20 @@ std::string names_of(const std::vector<Fidelity>& fidelities) {
     text += vrpipe::name_of(fidelity);
   }
   return text;
+}
+
+/// Of KEY=VALUE texts, only different keys may be given more than once.
+void refuse_keys_given_twice(const Values& values, const std::string& option) {
+  std::map<std::string, std::string> given;
+  for (const std::string& text : values) {
+    const std::size_t equals = std::min(text.find('='), text.size());
+    const std::string key = text.substr(0, equals);
+    const std::string value = text.substr(std::min(equals + 1, text.size()));
+    const auto [first, is_new] = given.emplace(key, value);
+    if (is_new) continue;
+    throw UserError("option given twice", option + " " + key, "as '" + first->second + "' and as '" + value + "'",
+                    "give it once");
+  }
 }
 
 }  // namespace
@@ -104,8 +119,8 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
                machine_group);
   }
   add_option(app, "--set", settings_, "UNIT.PARAMETER=VALUE",
-             "changes a parameter, e.g. tc.bins=64; can be repeated (`vrpipe units`\n"
-             "lists all, with units, ranges and defaults)",
+             "changes a parameter, e.g. tc.bins=64, or crop.cache_bytes=32K; can be\n"
+             "repeated (`vrpipe units` lists all, with units, ranges and defaults)",
              machine_group);
   add_option(app, "--unit", units_, "SLOT=IMPLEMENTATION",
              "puts another unit into a slot, in every variant where the slot is not\n"
@@ -156,6 +171,14 @@ SceneRequest SimulationArguments::scene_request() const {
   return request;
 }
 
+std::vector<NamedFile> SimulationArguments::inputs() const {
+  std::vector<NamedFile> files;
+  for (const std::string& scene : scene_) files.push_back({"--scene", scene});
+  for (const std::string& camera : camera_) files.push_back({"--camera", camera.substr(0, camera.rfind('#'))});
+  for (const std::string& plugin : plugins_) files.push_back({"--plugin", plugin});
+  return files;
+}
+
 SimulationJob SimulationArguments::resolve(Variants variants) const {
   // Plugins first: they may bring the platform and the units that the other options name.
   load_plugins(plugins_);
@@ -169,6 +192,8 @@ SimulationJob SimulationArguments::resolve(Variants variants) const {
   if (const auto name = single(fidelity_, "--fidelity")) request.fidelity = fidelity_named(*name);
   if (const auto name = single(format_, "--format")) request.format = color_format_named(*name);
   if (const auto name = single(termination_, "--termination")) request.termination = termination_named(*name);
+  refuse_keys_given_twice(settings_, "--set");
+  refuse_keys_given_twice(units_, "--unit");
   std::vector<Setting> settings;
   for (const std::string& text : settings_) settings.push_back(parse_setting(text));
   SettingsByPart parts = sort_settings(settings);
@@ -193,11 +218,8 @@ SimulationJob SimulationArguments::resolve(Variants variants) const {
     job.output = *folder;
   }
   job.json = single(json_, "--json");
-  if (job.json && *job.json != "-") check_output_file(*job.json, "--json", job.output);
-  if (const auto file = single(save_draw_, "--save-draw")) {
-    check_output_file(*file, "--save-draw", job.output);
-    job.save_draw = *file;
-  }
+  if (const auto file = single(save_draw_, "--save-draw")) job.save_draw = *file;
+  job.inputs = inputs();
 
   const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
   const auto jobs = single(jobs_, "--jobs");

@@ -11,6 +11,8 @@
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/scene.h>
 
+#include "output_file.h"
+
 namespace CLI {
 class App;
 class FormatterBase;
@@ -39,6 +41,7 @@ struct SimulationJob {
   /// `preprocess.NAME` and value of every parameter of preprocessing.
   std::vector<std::pair<std::string, std::string>> preprocess_parameters;
   std::array<float, 3> background{};
+  std::vector<NamedFile> inputs;                   ///< that the options name; outputs must not be among them
   std::optional<std::filesystem::path> output;     ///< folder for images
   std::optional<std::string> json;                 ///< file, or "-" for stdout
   std::optional<std::filesystem::path> save_draw;  ///< file
@@ -51,11 +54,12 @@ class SimulationArguments {
   enum class Variants { one, all };
 
   void declare(CLI::App& app, Variants variants);
-  /// Loads the plugins and checks every option. Throws UserError.
+  /// Loads the plugins and checks every option but the names of output files, which the commands know. Throws UserError.
   SimulationJob resolve(Variants variants) const;
 
  private:
   SceneRequest scene_request() const;
+  std::vector<NamedFile> inputs() const;
 
   Values scene_, size_, camera_, eye_, look_at_, up_, fovy_;
   Values platform_, settings_, variant_, units_, plugins_;

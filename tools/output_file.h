@@ -3,16 +3,27 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace vrpipe::tools {
 
 // Files that the user named. A long simulation must not end in a file that cannot be written, so names are checked
 // first; and no file is seen half-written. `option` names the option in messages. All throw UserError.
 
+/// A file, and the option that named it.
+struct NamedFile {
+  std::string option;  ///< e.g. "--json"
+  std::filesystem::path path;
+};
+
 /// Checks, without creating anything, that a file can be written under this name.
 /// @param folder_to_be  a folder that will be there by then, if any
 void check_output_file(const std::filesystem::path& path, const std::string& option,
                        const std::optional<std::filesystem::path>& folder_to_be = std::nullopt);
+
+/// Checks that no output is an input or another output, by whatever name, link or path to a file that is not there yet.
+/// Several outputs may go to one pipe or device.
+void check_files_differ(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs);
 
 /// Checks, without creating anything, that a folder is there or can be made.
 void check_output_folder(const std::filesystem::path& path, const std::string& option);
@@ -20,7 +31,7 @@ void check_output_folder(const std::filesystem::path& path, const std::string& o
 /// Makes the folder, with the folders above it, unless it is there.
 void create_output_folder(const std::filesystem::path& path, const std::string& option);
 
-/// Writes a file, which appears complete or not at all. What is no regular file, such as a pipe, is written as it is.
+/// Writes a file as AtomicFile does.
 void write_output_file(const std::filesystem::path& path, const std::string& bytes, const std::string& option);
 
 }  // namespace vrpipe::tools

@@ -60,7 +60,7 @@ class PlatformsCommand : public Command {
                                : "  differs from the units' defaults in\n" + settings;
     }
     text += "`vrpipe units --platform NAME` lists every parameter with its value there\n";
-    print_listing({{"schema", "vrpipe.platforms/1"}, {"platforms", std::move(list)}}, text, json_);
+    print_listing({{"schema", "vrpipe.platforms/1"}, {"platforms", std::move(list)}}, text, json_, plugins_);
   }
 
  private:

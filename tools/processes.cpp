@@ -171,14 +171,19 @@ class ProgressThread {
  public:
   ProgressThread(const std::string& name, const std::atomic<float>& done, ProgressLine& line) {
     if (!line.visible()) return;
-    thread_ = std::thread([this, name, &done, &line] {
+    const auto draw = [this, name, &done, &line] {
       const SteadyClock::time_point start = SteadyClock::now();
       std::unique_lock<std::mutex> lock(mutex_);
       while (!ended_.wait_for(lock, std::chrono::milliseconds(redraw_milliseconds), [this] { return stop_; })) {
         line.show(
             progress_text({name}, {done.load(std::memory_order_relaxed)}, seconds_since(start), stderr_width() - 1));
       }
-    });
+    };
+    try {
+      thread_ = std::thread(draw);
+    } catch (const std::system_error&) {
+      // No more threads to be had: no progress to be seen.
+    }
   }
   ~ProgressThread() {
     if (!thread_.joinable()) return;
@@ -297,7 +302,7 @@ class Worker {
     } catch (const UserError& error) {
       message = char{outcome_user_error} + std::string(error.what());
     } catch (const std::bad_alloc&) {
-      message = char{outcome_fault} + std::string("out of memory; try --jobs 1 or a smaller --size");
+      message = char{outcome_fault} + std::string(out_of_memory);
     } catch (const std::exception& fault) {
       message = char{outcome_fault} + std::string(fault.what());
     } catch (...) {

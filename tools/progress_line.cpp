@@ -5,9 +5,22 @@
 
 #include <fmt/format.h>
 
+#include <vrpipe/printable.h>
+
+#include "process_setup.h"
 #include "terminal.h"
 
 namespace vrpipe::tools {
+
+namespace {
+
+/// A terminal that has gone is no reason to fail.
+void put(const std::string& text) {
+  std::fputs(text.c_str(), stderr);
+  std::fflush(stderr);
+}
+
+}  // namespace
 
 ProgressLine::ProgressLine() : visible_(stderr_is_terminal()) {}
 
@@ -16,15 +29,15 @@ ProgressLine::~ProgressLine() { erase(); }
 void ProgressLine::show(const std::string& text) {
   if (!visible_) return;
   // The last column stays free: some terminals wrap as soon as it is written.
-  fmt::print(stderr, "\r\x1b[K{}", text.substr(0, stderr_width() - 1));
-  std::fflush(stderr);
+  note_progress_line(true);
+  put("\r\x1b[K" + printable(text).substr(0, stderr_width() - 1));
   drawn_ = true;
 }
 
 void ProgressLine::erase() {
   if (!drawn_) return;
-  fmt::print(stderr, "\r\x1b[K");
-  std::fflush(stderr);
+  put("\r\x1b[K");
+  note_progress_line(false);
   drawn_ = false;
 }
 

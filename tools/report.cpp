@@ -8,6 +8,7 @@
 
 #include <vrpipe/accounting.h>
 #include <vrpipe/blend.h>
+#include <vrpipe/printable.h>
 
 #include "parse.h"
 #include "text_table.h"
@@ -170,7 +171,7 @@ std::string unit_states_text(const RunResult& run, const TextStyle& style) {
 std::string heading(const JobResult& result, const TextStyle& style) {
   const RunRequest& request = result.runs.front().request;
   const Platform& platform = *request.platform;
-  std::string text = style.bold(fmt::format("{}, {}x{}", result.scene.name, result.width, result.height));
+  std::string text = style.bold(fmt::format("{}, {}x{}", printable(result.scene.name), result.width, result.height));
   text += fmt::format(": {} of {} Gaussians visible\n", grouped(result.scene.gaussians_visible),
                       grouped(result.scene.gaussians_total));
   text += style.bold(platform.name) + " (" + platform.description + ")\n";
@@ -255,7 +256,7 @@ std::string remarks(const JobResult& result) {
   }
   text += "\n";
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    if (result.images[i]) text += fmt::format("image: {} and .exr\n", result.images[i]->png);
+    if (result.images[i]) text += fmt::format("image: {} and .exr\n", printable(result.images[i]->png));
   }
   return text;
 }

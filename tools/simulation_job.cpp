@@ -3,18 +3,22 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <future>
 #include <iostream>
 #include <utility>
 
+#include <vrpipe/printable.h>
 #include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/scene.h>
 
+#include "for_each_chunk.h"
+#include "json_text.h"
 #include "output_file.h"
+#include "process_setup.h"
 #include "processes.h"
 #include "progress_line.h"
 #include "report.h"
 #include "result_json.h"
+#include "stdout_to_stderr.h"
 #include "terminal.h"
 
 namespace vrpipe::tools {
@@ -26,17 +30,14 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 /// Writes the images of all runs, side by side: compression takes longer than the disk.
 void write_images(const SimulationJob& job, const std::vector<Simulated>& simulated, JobResult& result) {
-  std::vector<std::future<void>> writing;
   for (const Simulated& run : simulated) {
-    const std::filesystem::path stem = *job.output / image_name(result.scene.name, run.result.request.variant.name);
-    const ImageFiles files{stem.string() + ".png", stem.string() + ".exr"};
-    writing.push_back(std::async(std::launch::async, [&job, &run, files] {
-      write_output_file(files.png, encode_png(*run.image, job.background), "--output");
-      write_output_file(files.exr, encode_exr(*run.image), "--output");
-    }));
-    result.images.emplace_back(files);
+    result.images.emplace_back(image_files(job, image_name(result.scene.name, run.result.request.variant.name)));
   }
-  for (std::future<void>& one : writing) one.get();
+  for_each_chunk(simulated.size(), job.processes, [&](std::uint64_t i) {
+    const SharedImage& image = *simulated[i].image;
+    write_output_file(result.images[i]->png, encode_png(image, job.background), "--output");
+    write_output_file(result.images[i]->exr, encode_exr(image), "--output");
+  });
 }
 
 }  // namespace
@@ -48,7 +49,37 @@ std::string image_name(const std::string& scene, const std::string& variant) {
   return name + "-" + variant;
 }
 
+ImageFiles image_files(const SimulationJob& job, const std::string& name) {
+  const std::string stem = (*job.output / name).string();
+  return {stem + ".png", stem + ".exr"};
+}
+
+void check_outputs(const SimulationJob& job, const std::vector<std::string>& images, std::vector<NamedFile> outputs) {
+  if (job.json && *job.json != "-") outputs.push_back({"--json", *job.json});
+  if (job.save_draw) outputs.push_back({"--save-draw", *job.save_draw});
+  if (job.output) {
+    for (const std::string& name : images) {
+      const ImageFiles files = image_files(job, name);
+      outputs.push_back({"--output", files.png});
+      outputs.push_back({"--output", files.exr});
+    }
+  }
+  for (const NamedFile& output : outputs) check_output_file(output.path, output.option, job.output);
+  check_files_differ(job.inputs, outputs);
+}
+
+void save_draw(const SimulationJob& job, const Draw& draw) {
+  if (!job.save_draw) return;
+  write_draw_list(*job.save_draw, draw);
+  note_written(job.save_draw->string());
+}
+
 void perform(const SimulationJob& job) {
+  std::vector<std::string> images;
+  for (const RunRequest& request : job.requests) {
+    images.push_back(image_name(scene_name(job.scene.scene), request.variant.name));
+  }
+  check_outputs(job, images);
   JobResult result;
   ProgressLine progress;
   std::vector<Simulated> simulated;
@@ -65,7 +96,7 @@ void perform(const SimulationJob& job) {
     result.width = loaded.draw.width;
     result.height = loaded.draw.height;
     if (job.output) create_output_folder(*job.output, "--output");
-    if (job.save_draw) write_draw_list(*job.save_draw, loaded.draw);
+    save_draw(job, loaded.draw);
 
     const auto simulation_start = std::chrono::steady_clock::now();
     if (job.requests.size() == 1) {
@@ -93,17 +124,24 @@ void perform(const SimulationJob& job) {
   }
   simulated.clear();
 
+  const TextStyle style = stdout_style();
+  std::string json;
+  std::string text;
+  {
+    const StdoutToStderr redirected;  // both make units of plugins, which may print
+    if (job.json) json = json_text(result_json(result));
+    text = report(result, style);
+  }
   if (job.json) {
-    const std::string json = result_json(result).dump(2) + "\n";
     if (*job.json == "-") {
       std::cout << json;
       return;
     }
     write_output_file(*job.json, json, "--json");
   }
-  std::cout << report(result, stdout_style());
-  if (job.json) std::cout << "result: " << *job.json << '\n';
-  if (job.save_draw) std::cout << "draw: " << job.save_draw->string() << '\n';
+  std::cout << text;
+  if (job.json) std::cout << "result: " << printable(*job.json) << '\n';
+  if (job.save_draw) std::cout << "draw: " << printable(job.save_draw->string()) << '\n';
 }
 
 }  // namespace vrpipe::tools

@@ -33,6 +33,20 @@ struct JobResult {
 /// Name of the images of a run, without folder and extension: SCENE-VARIANT.
 std::string image_name(const std::string& scene, const std::string& variant);
 
+/// Checks, before anything is read, that all files that a job will write can be written, and overwrite neither what it
+/// reads nor each other.
+/// @param images   `image_name` of every image that --output will write
+/// @param outputs  other files
+/// Throws UserError.
+void check_outputs(const SimulationJob& job, const std::vector<std::string>& images,
+                   std::vector<NamedFile> outputs = {});
+
+/// Where an image goes.
+ImageFiles image_files(const SimulationJob& job, const std::string& name);
+
+/// Writes the draw list of --save-draw, if there is one. Throws UserError.
+void save_draw(const SimulationJob& job, const Draw& draw);
+
 /// Loads the scene, simulates, and writes the files and the report that the user asked for. One request is simulated in
 /// this process, several in processes of their own. Throws UserError, CommandFailure or a fault.
 void perform(const SimulationJob& job);

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include <vrpipe/printable.h>
+
 namespace vrpipe::tools {
 namespace {
 
@@ -191,7 +193,7 @@ std::string legend_text(const std::vector<LegendEntry>& legend) {
 
 std::string html_escaped(const std::string& text) {
   std::string result;
-  for (const char c : text) {
+  for (const char c : valid_utf8(text)) {
     switch (c) {
       case '&': result += "&amp;"; break;
       case '<': result += "&lt;"; break;

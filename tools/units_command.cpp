@@ -6,12 +6,14 @@
 #include <vrpipe/error.h>
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/printable.h>
 
 #include "command_line.h"
 #include "listing.h"
 #include "options.h"
 #include "result_json.h"
 #include "settings.h"
+#include "stdout_to_stderr.h"
 #include "terminal.h"
 
 namespace vrpipe::tools {
@@ -63,18 +65,20 @@ std::string as_text(const std::vector<ParameterListing>& units, const std::strin
   std::string text;
   for (const ParameterListing& unit : units) {
     if (!text.empty()) text += '\n';
-    text += style.bold(unit.unit + "=" + unit.implementation) + role(unit) + "\n  " + unit.description + "\n";
+    text += style.bold(printable(unit.unit + "=" + unit.implementation)) + role(unit) + "\n  " +
+            printable(unit.description) + "\n";
     for (const Parameter* parameter : unit.parameters->parameters()) {
       text += fmt::format("  {} = {}", style.bold(unit.unit + "." + parameter->name()),
                           with_unit(parameter->value(), *parameter));
       if (parameter->value() != parameter->default_value()) {
         text += fmt::format(" on {}, by default {}", platform, parameter->default_value());
       }
-      text += fmt::format("; {}\n      {}\n      default from: {}\n", parameter->range(), parameter->meaning(),
-                          parameter->source());
+      text += fmt::format("; {}\n      {}\n      default from: {}\n", parameter->range(),
+                          printable(parameter->meaning()), printable(parameter->source()));
     }
     for (const Statistic& statistic : statistics_of(unit)) {
-      text += fmt::format("  counts {}: {}, {}\n", style.bold(statistic.name), statistic.unit, statistic.meaning);
+      text += fmt::format("  counts {}: {}, {}\n", style.bold(printable(statistic.name)), printable(statistic.unit),
+                          printable(statistic.meaning));
     }
   }
   return text;
@@ -82,7 +86,7 @@ std::string as_text(const std::vector<ParameterListing>& units, const std::strin
 
 std::string escaped(const std::string& text) {
   std::string result;
-  for (const char c : text) {
+  for (const char c : printable(text)) {
     if (c == '|' || c == '<') result += '\\';
     result += c;
   }
@@ -157,7 +161,9 @@ class UnitsCommand : public Command {
                "values as this GPU sets them (default: " + platforms().front().name + ")", "What is listed");
     add_option(app, "--plugin", plugins_, "FILE.so", "loads a plugin's units first; can be repeated", "What is listed");
     declare_json(app, json_);
-    app.add_flag("--markdown", markdown_, "prints the reference as Markdown")->group("Where results go");
+    app.add_flag("--markdown", markdown_, "prints the reference as Markdown")
+        ->disable_flag_override()
+        ->group("Where results go");
     app.footer(
         "Examples:\n"
         "  vrpipe units --slot crop\n"
@@ -180,8 +186,15 @@ class UnitsCommand : public Command {
                         "did you mean " + nearest_name(*slot, slots) + "? `vrpipe units` lists all");
       }
     }
-    print_listing(as_json(units, platform.name),
-                  markdown_ ? as_markdown(units) : as_text(units, platform.name, stdout_style()), json_);
+    const TextStyle style = stdout_style();
+    Json json;
+    std::string text;
+    {
+      const StdoutToStderr redirected;  // plugins may print while their units are made
+      json = as_json(units, platform.name);
+      text = markdown_ ? as_markdown(units) : as_text(units, platform.name, style);
+    }
+    print_listing(json, text, json_, plugins_);
   }
 
  private:

@@ -32,7 +32,9 @@ class BadInput : public ToolTest {
                "fx": 60, "fy": 60}])");
     write("broken.json", "[{");
     write("foreign.so", "not a plugin at all");
-    write("old.so", std::string("...vrpipe-plugin/0.0.0/itanium-abi") + '\0' + "...");
+    write("old.so", std::string("\x7f"
+                                "ELF...vrpipe-plugin/0.0.0/itanium-abi") +
+                        '\0' + "...");
     write("file", "");
     std::filesystem::create_directory(folder() / "folder.ply");
   }
@@ -84,6 +86,12 @@ TEST_F(BadInput, Options) {
   refused({"run", "--scene", "--size", "8x8"}, {"missing value", "--scene", "--size"});
   refused({"run", "--output", ""}, {"missing value", "--output"});
   refused({"run", "--size", "8x8", "--size", "9x9"}, {"twice", "--size", "8x8", "9x9"});
+  refused({"run", "--set", "tc.bins=1", "--set", "tc.bins=2"}, {"twice (--set tc.bins)", "'1'", "'2'"});
+  refused({"run", "--unit", "qru=pairing", "--unit", "qru=pass-through"}, {"twice (--unit qru)", "'pairing'"});
+  for (const char* flag : {"--quick=2", "--quick=false", "--markdown=1"}) {
+    refused({"accuracy", flag}, {"unexpected value", "it is a switch"});
+  }
+  refused({"units", "--markdown=1"}, {"unexpected value (--markdown)", "it is a switch"});
 }
 
 TEST_F(BadInput, Numbers) {
@@ -102,6 +110,7 @@ TEST_F(BadInput, Numbers) {
   refused_with_outputs({"run", "--fovy", "wide"}, {"--fovy", "'wide'"});
   refused_with_outputs({"run", "--fovy", "inf"}, {"--fovy", "'inf'"});
   refused_with_outputs({"run", "--fovy", "180"}, {"--fovy", "180"});
+  refused_with_outputs({"run", "--fovy", "1e-300"}, {"--fovy", " 1e-300 degrees"});
   refused_with_outputs({"run", "--background", "255,255,255"}, {"--background", "255", "0 to 1"});
   refused_with_outputs({"run", "--background", "0,0"}, {"--background", "R,G,B"});
   refused({"compare", "--jobs", "0"}, {"--jobs", "'0'"});
@@ -142,6 +151,8 @@ TEST_F(BadInput, Machines) {
   refused_with_outputs({"compare", "--set", "tc.bin=1"}, {"'bin'", "did you mean tc.bins?"});
   refused_with_outputs({"compare", "--set", "tc.bins=0"}, {"'0'", "tc.bins", "1 to"});
   refused_with_outputs({"compare", "--set", "tc.bins=many"}, {"'many'", "tc.bins"});
+  refused_with_outputs({"compare", "--set", "tc.bins=16,32"}, {"'16,32'", "tc.bins", "it is a list"});
+  refused_with_outputs({"run", "--set", "crop.cache_bytes=1T"}, {"'1T'", "K, M and G are powers of 1024"});
   refused_with_outputs({"run", "--set", "tc.bins"}, {"'tc.bins'", "UNIT.PARAMETER=VALUE"});
   refused_with_outputs({"run", "--set", "bins=3"}, {"'bins=3'", "UNIT.PARAMETER=VALUE"});
   refused_with_outputs({"run", "--unit", "qqu=pairing"}, {"'qqu'", "did you mean qru?"});
@@ -155,6 +166,14 @@ TEST_F(BadInput, Plugins) {
   refused_with_outputs({"run", "--plugin", "foreign.so"}, {"foreign.so", "not a vrpipe plugin"});
   refused_with_outputs({"run", "--plugin", "old.so"}, {"old.so", "0.0.0"});
   refused({"units", "--plugin", "missing.so"}, {"missing.so"});
+  // Far too large to be read before it is refused, and a tag across the border of what is read at a time.
+  std::filesystem::resize_file(write("huge.so", ""), std::uintmax_t{1} << 42U);
+  refused({"units", "--plugin", "huge.so"}, {"huge.so", "not a vrpipe plugin"});
+  write("far.so",
+        "\x7f"
+        "ELF" +
+            std::string((std::size_t{1} << 20U) - 9, 'x') + "vrpipe-plugin/0.0.0/far" + '\0');
+  refused({"units", "--plugin", "far.so"}, {"built for vrpipe-plugin/0.0.0/far, this is"});
 }
 
 TEST_F(BadInput, Outputs) {
