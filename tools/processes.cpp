@@ -361,8 +361,15 @@ void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned proces
   while (next < tasks.size() || !workers.empty()) {
     while (next < tasks.size() && workers.size() < processes) {
       const std::shared_ptr<const Draw> draw = tasks[next].draw();
-      workers.push_back(std::make_unique<Worker>(next, tasks[next]));
-      workers.back()->start(*draw, with_images, done[next]);
+      auto worker = std::make_unique<Worker>(next, tasks[next]);
+      try {
+        worker->start(*draw, with_images, done[next]);
+      } catch (const std::system_error&) {
+        if (workers.empty()) throw;
+        processes = static_cast<unsigned>(workers.size());  // the system gives no more at a time
+        break;
+      }
+      workers.push_back(std::move(worker));
       ++next;
     }
     std::vector<pollfd> pipes;

@@ -114,6 +114,7 @@ std::string remedy_for_output(int error) {
 
 AtomicFile::AtomicFile(const fs::path& path, const std::string& what, const std::string& where)
     : what_(what), where_(where) {
+  buffer_.reserve(std::size_t{1} << 16);  // first, since it may throw
   int error = 0;
   target_ = followed(path, error);
   if (error != 0) fail(error);
@@ -143,7 +144,6 @@ AtomicFile::AtomicFile(const fs::path& path, const std::string& what, const std:
     // What the umask took away. Some file systems have no modes to set.
     if (is_there && ::fchmod(descriptor_, before.st_mode & 07777U) != 0) errno = 0;
   }
-  buffer_.reserve(std::size_t{1} << 16);
 }
 
 AtomicFile::~AtomicFile() { remove(); }

@@ -181,6 +181,30 @@ TEST_F(Process, InterruptedAtATerminalItErasesItsProgress) {
   EXPECT_EQ(drawn.substr(drawn.size() - end.size()), end);
 }
 
+TEST_F(Process, WithFewerDescriptorsFewerSimulationsRunAtATime) {
+  const Finished finished = forked([] {
+    const rlimit limit{5, 5};  // 0 to 2, and the pipe of one simulation
+    ::setrlimit(RLIMIT_NOFILE, &limit);
+    return become_vrpipe({"compare", "--scene", "tiny.spl", "--jobs", "4"});
+  });
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  EXPECT_EQ(finished.err, "");
+}
+
+#ifndef VRPIPE_SANITIZED  // by what needs all addresses there are
+TEST_F(Process, WithoutMemoryForItsBinsItSaysWhatToLower) {
+  const Finished finished = forked([] {
+    const rlimit limit{std::size_t{600} << 20U, std::size_t{600} << 20U};
+    ::setrlimit(RLIMIT_AS, &limit);
+    return become_vrpipe(
+        {"run", "--scene", "tiny.spl", "--set", "tgc.bins=65536", "--set", "tgc.bin_primitives=65536"});
+  });
+  EXPECT_EQ(finished.code, 1);
+  EXPECT_EQ(finished.err.rfind("vrpipe: fault: out of memory; try ", 0), 0U) << finished.err;
+  EXPECT_NE(finished.err.find("bins where --set made them larger"), std::string::npos) << finished.err;
+}
+#endif
+
 TEST_F(Process, AFileThatOutgrowsItsLimitIsAMistake) {
   const Finished finished = forked([] {
     const rlimit limit{1000, 1000};
