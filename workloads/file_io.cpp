@@ -84,6 +84,10 @@ void InputFile::check_unchanged() const {
 }
 
 fs::path followed(const fs::path& path, int& error) {
+  error = 0;
+  struct stat end {};
+  // The links in /dev/fd to pipes lead to no path.
+  if (::stat(path.c_str(), &end) == 0 && !S_ISREG(end.st_mode)) return path;
   fs::path place = path;
   constexpr int most_links = 40;  // as many as Linux follows
   for (int i = 0; i < most_links; ++i) {

@@ -37,7 +37,8 @@ class InputFile {
   std::int64_t seconds_ = 0, nanoseconds_ = 0;  ///< of its last modification
 };
 
-/// Where `path` leads to: symbolic links at its end are followed, also to a file that is not there yet.
+/// Where `path` leads to: symbolic links at its end are followed, also to a file that is not there yet. What leads to
+/// something else than a file stays as it is.
 /// @param error  the error's number, 0 without
 std::filesystem::path followed(const std::filesystem::path& path, int& error);
 

@@ -120,6 +120,17 @@ TEST_F(OutputFiles, APipeIsWrittenAsItIs) {
   EXPECT_TRUE(std::filesystem::is_fifo(path));
 }
 
+TEST_F(OutputFiles, APipeIsReachedThroughTheLinkOfItsDescriptor) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  write_all("/dev/fd/" + std::to_string(ends[1]), "new");
+  char got[4] = "";
+  EXPECT_EQ(::read(ends[0], got, 3), 3);
+  EXPECT_STREQ(got, "new");
+  ::close(ends[0]);
+  ::close(ends[1]);
+}
+
 TEST_F(OutputFiles, ASignalHandlerCanRemoveWhatIsNotDone) {
   write("kept", "kept");
   AtomicFile first(in_folder("kept"), "cannot write file", "x");
