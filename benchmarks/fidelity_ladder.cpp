@@ -3,9 +3,7 @@
 // A SCENE is a file or builtin:NAME; without one, the built-in scenes and, where there is a shared folder, playbot.
 // Accuracy: every rung and variant of every scene, once. Rates: of one large frame, every rung and variant in turn, N times
 // (default: 5), the median; of the first scene where the frame of the shared folder is absent. The slowest variant counts.
-// Rates are rasterised quads per second of processor time of this process.
-#include <sys/resource.h>
-
+// Rates are rasterised quads per second of processor time of the simulation alone.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -47,15 +45,6 @@ struct Worst {
   double speedup_percent = 0;
 };
 
-double processor_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
 double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   return values[values.size() / 2];
@@ -69,11 +58,9 @@ Run run_once(const Draw& draw, const Variant& variant, Fidelity fidelity) {
   request.variant = variant;
   request.fidelity = fidelity;
   fresh_simulation();
-  const double start = processor_seconds();
   const RunResult result = simulate(request, draw);
-  const double seconds = processor_seconds() - start;
   return {static_cast<double>(result.cycles.value_or(0)),
-          static_cast<double>(result.counts.quads_rasterized) / seconds};
+          static_cast<double>(result.counts.quads_rasterized) / result.cpu_seconds};
 }
 
 /// The rungs with time that one of the others beats in error and rate; `cycle` has no error.

@@ -1,4 +1,4 @@
-// Whole frames: simulated cycles and rasterised quads per host second, for every variant and two fidelities.
+// Whole frames: simulated cycles and rasterised quads per second of processor time, for every variant and two fidelities.
 // VRPIPE_SCENE names another scene than the default one: a file, or builtin:NAME.
 #include <cstdlib>
 
@@ -25,21 +25,21 @@ void frame(benchmark::State& state, const char* variant, Fidelity fidelity) {
   request.platform = &platforms().front();
   request.variant = variant_named(variant);
   request.fidelity = fidelity;
-  double host_seconds = 0;
+  double cpu_seconds = 0;
   std::uint64_t quads = 0;
   std::uint64_t cycles = 0;
   draw();
   for (auto _ : state) {
     fresh_simulation();
     const RunResult result = simulate(request, draw());
-    host_seconds = result.host_seconds;
+    cpu_seconds = result.cpu_seconds;
     quads = result.counts.quads_rasterized;
     cycles = result.cycles.value_or(0);
-    state.SetIterationTime(host_seconds);
+    state.SetIterationTime(cpu_seconds);
   }
   state.counters["quads"] = static_cast<double>(quads);
-  state.counters["quads_per_second"] = static_cast<double>(quads) / host_seconds;
-  if (cycles != 0) state.counters["cycles_per_second"] = static_cast<double>(cycles) / host_seconds;
+  state.counters["quads_per_second"] = static_cast<double>(quads) / cpu_seconds;
+  if (cycles != 0) state.counters["cycles_per_second"] = static_cast<double>(cycles) / cpu_seconds;
 }
 
 #define FRAMES(fidelity)                                                                                          \

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <ctime>
 #include <map>
 
 #include "functional.h"
@@ -219,11 +220,29 @@ class OccupancyReport {
   std::map<std::string, std::pair<unsigned, double>> throughput_of_;
 };
 
+/// Takes the time of a simulation on the host. Wall time counts what else the machine does; processor time does not.
+class HostTimer {
+ public:
+  void stop(RunResult& result) const {
+    result.host_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_).count();
+    result.cpu_seconds = processor_seconds() - processor_;
+  }
+
+ private:
+  static double processor_seconds() {
+    timespec now{};
+    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  }
+  std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
+  double processor_ = processor_seconds();
+};
+
 void run_clocked(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
   Gpu gpu(configuration, result.surface);
-  const auto start = std::chrono::steady_clock::now();
+  const HostTimer timer;
   const Cycle cycles = gpu.run(progress);
-  result.host_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  timer.stop(result);
   result.cycles = cycles;
   result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
   result.kernel_events = gpu.clock().activations();
@@ -283,9 +302,9 @@ void report_bound(const Configuration& configuration, const FunctionalGpu& gpu, 
 void run_functional(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
   const bool bounded = result.request.fidelity == Fidelity::bound;
   FunctionalGpu gpu(configuration, result.surface, bounded);
-  const auto start = std::chrono::steady_clock::now();
+  const HostTimer timer;
   gpu.run(progress);
-  result.host_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  timer.stop(result);
   result.statistics = collect(gpu.behaviours());
   if (bounded) report_bound(configuration, gpu, result);
 }
@@ -330,6 +349,9 @@ RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<floa
   RunResult result;
   result.request = request;
   result.surface = ColorSurface(draw.width, draw.height, request.format);
+  for (const std::string& slot : Registry::slots()) {
+    result.implementations.emplace_back(slot, configuration.implementation(slot).name);
+  }
   result.parameters = configuration.parameters();
   if (request.fidelity == Fidelity::functional || request.fidelity == Fidelity::bound) {
     run_functional(configuration, progress, result);

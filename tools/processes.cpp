@@ -108,6 +108,7 @@ void exchange(Archive& archive, Result& result) {
   archive(result.cycles);
   archive(result.milliseconds);
   archive(result.host_seconds);
+  archive(result.cpu_seconds);
   archive(result.counts);
   exchange_shares(archive, result.utilization);
   archive.size_of(result.units);
@@ -130,6 +131,8 @@ void exchange(Archive& archive, Result& result) {
     archive(statistic.meaning);
     archive(statistic.value);
   }
+  archive.size_of(result.implementations);
+  for (auto& [slot, name] : result.implementations) archive(slot), archive(name);
   archive.size_of(result.parameters);
   for (auto& [name, value] : result.parameters) archive(name), archive(value);
   archive(result.result_hash);

@@ -139,6 +139,7 @@ void add_time(RunTable& table, const std::vector<RunResult>& runs) {
     }
   }
   table.row("host seconds", [](const RunResult& run) { return fmt::format("{:.2f}", run.host_seconds); });
+  table.row("CPU seconds", [](const RunResult& run) { return fmt::format("{:.2f}", run.cpu_seconds); });
 }
 
 void add_utilization(RunTable& table, const std::vector<RunResult>& runs) {

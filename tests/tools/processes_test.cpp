@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <sys/time.h>
+
 #include <csignal>
 #include <stdexcept>
 
@@ -75,6 +77,30 @@ TEST(Processes, AnEarlyExitIsAFault) {
   EXPECT_NE(std::string(failure.what()).find("before it was done"), std::string::npos) << failure.what();
 }
 
+// A machine that is busy with other things stretches wall time; here a handler does, which sleeps at every tick of
+// the simulation's own time.
+TEST(Processes, CpuSecondsDoNotCountWaiting) {
+  fresh_simulation();
+  Draw draw = tiny_draw();
+  const std::vector<Splat> splats = draw.splats;
+  for (int i = 0; i < 100; ++i) draw.splats.insert(draw.splats.end(), splats.begin(), splats.end());
+  struct sigaction sleep {};
+  sleep.sa_handler = [](int) { ::usleep(30000); };
+  sleep.sa_flags = SA_RESTART;
+  struct sigaction before {};
+  ::sigaction(SIGVTALRM, &sleep, &before);
+  const itimerval ticks{{0, 4000}, {0, 4000}};
+  const itimerval off{};
+  ::setitimer(ITIMER_VIRTUAL, &ticks, nullptr);
+  tools::ProgressLine progress;
+  const RunResult result =
+      tools::simulate_here(all_variants(platforms().front()).front(), draw, false, progress).result;
+  ::setitimer(ITIMER_VIRTUAL, &off, nullptr);
+  ::sigaction(SIGVTALRM, &before, nullptr);
+  EXPECT_GT(result.cpu_seconds, 0.004) << "the draw is too small to say anything";
+  EXPECT_GT(result.host_seconds, 2 * result.cpu_seconds);
+}
+
 TEST(Processes, ResultsComeBackWhole) {
   fresh_simulation();
   const Draw draw = tiny_draw();
@@ -92,6 +118,8 @@ TEST(Processes, ResultsComeBackWhole) {
     EXPECT_EQ(a.cycles, b.cycles);
     EXPECT_EQ(a.milliseconds, b.milliseconds);
     EXPECT_GT(a.host_seconds, 0);
+    EXPECT_GT(a.cpu_seconds, 0);
+    EXPECT_EQ(a.implementations, b.implementations);
     EXPECT_EQ(a.counts.named(), b.counts.named());
     EXPECT_EQ(a.utilization, b.utilization);
     EXPECT_EQ(a.parameters, b.parameters);

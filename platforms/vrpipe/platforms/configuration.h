@@ -75,6 +75,8 @@ class Configuration {
   const RunRequest& request() const { return request_; }
   const Platform& platform() const { return *request_.platform; }
   const RenderState& state_of(unsigned gpc) const { return states_[gpc]; }
+  /// What is in a slot, in this variant.
+  const Implementation& implementation(const std::string& slot) const { return *slots_.at(slot).chosen; }
   const L2Parameters& l2() const { return l2_; }
   std::vector<std::pair<std::string, std::string>> parameters() const;
 

@@ -129,13 +129,16 @@ struct RunResult {
   RunRequest request;
   std::optional<std::uint64_t> cycles;  ///< none where the fidelity has no time
   double milliseconds = 0;              ///< simulated, at the platform's clock
-  double host_seconds = 0;              ///< of the simulation alone
+  double host_seconds = 0;              ///< wall time of the simulation alone
+  double cpu_seconds = 0;               ///< processor time of this process over the same; what the simulation costs
   Counts counts;
   /// raster zrop prop sm crop l2 dram, in [0, 1]; empty without time. DRAM is 0 while L2 is all the memory there is.
   std::vector<std::pair<std::string, double>> utilization;
   std::vector<UnitReport> units;
   std::optional<Bottleneck> bottleneck;  ///< none without time, or without work
   std::vector<StatisticReport> statistics;
+  /// Slot and name of the implementation in it, as the variant has it, in the order of the pipeline.
+  std::vector<std::pair<std::string, std::string>> implementations;
   /// UNIT.PARAMETER and value of everything that could be set, pass-through units left out.
   std::vector<std::pair<std::string, std::string>> parameters;
   std::string result_hash;          ///< of counts, cycles and the stored bits of the image, 16 hex digits
