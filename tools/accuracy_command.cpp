@@ -58,7 +58,7 @@ class AccuracyCommand : public Command {
 
   void run() override {
     AccuracyJob job;
-    job.simulation = arguments_.resolve(SimulationArguments::Variants::all);
+    job.simulation = arguments_.resolve(SimulationArguments::Variants::all, command_line());
     job.quick = quick_;
     job.markdown = markdown_;
     if (const auto text = single(repeat_, "--repeat")) job.repeat = parse_count(*text, "--repeat", largest_repeat);

@@ -11,8 +11,8 @@
 
 #include "output_file.h"
 #include "processes.h"
+#include "report.h"
 #include "simulation_job.h"
-#include "trade_off.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -70,7 +70,7 @@ Workload load(const AccuracyJob& job, AccuracyResult& result) {
     result.full_width = workload.scene.draw_list->draw.width;
     result.full_height = workload.scene.draw_list->draw.height;
   } else {
-    Camera& camera = workload.scene.camera;
+    Camera& camera = workload.scene.viewpoint.camera;
     result.full_width = camera.width;
     result.full_height = camera.height;
     // A part of the image, not a smaller one: splats keep their size, and so the units their share of the work.
@@ -81,6 +81,7 @@ Workload load(const AccuracyJob& job, AccuracyResult& result) {
   }
   LoadedScene loaded = preprocess_scene(workload.scene, workload.options);
   result.scene = std::move(loaded.summary);
+  result.viewpoint = loaded.viewpoint;
   result.preprocessing = job.simulation.preprocessing;
   result.width = loaded.draw.width;
   result.height = loaded.draw.height;
@@ -139,28 +140,33 @@ void compare_rungs(FidelityRung* rungs, std::size_t count) {
                                                           static_cast<double>(exact.run.counts.fragments_blended));
     rung->cycles_error_percent = error_percent(cycles_of(rung->run), cycles_of(exact.run));
     rung->speedup_error_percent = error_percent(rung->speedup, exact.speedup);
+    if (rung->cpu_seconds > 0) rung->times_as_fast = exact.cpu_seconds / rung->cpu_seconds;
     if (!rung->run.cycles) continue;
     timed.push_back(rung);
-    trade_offs.push_back({rung->host_seconds, std::fabs(rung->cycles_error_percent.value_or(0))});
+    trade_offs.push_back({rung->cpu_seconds, std::fabs(rung->cycles_error_percent.value_or(0))});
   }
-  const std::vector<bool> beaten = dominated(trade_offs);
-  for (std::size_t i = 0; i < timed.size(); ++i) timed[i]->dominated = beaten[i];
+  const std::vector<bool> beaten = dominated(trade_offs, fidelity_tolerance);
+  // Without the most exact, nobody knows how exact the others are.
+  for (std::size_t i = 1; i < timed.size(); ++i) timed[i]->dominated = beaten[i];
 }
 
-void climb_fidelities(const AccuracyJob& job, const Workload& workload, AccuracyResult& result,
-                      ProgressLine& progress) {
-  // From the most exact on, so that its image is there to compare with.
-  std::vector<Fidelity> rungs = fidelities();
-  std::reverse(rungs.begin(), rungs.end());
+/// The runs of the fidelity ladder: for each variant from the most exact fidelity on, so that its image is there to
+/// compare with.
+std::vector<RunRequest> fidelity_requests(const AccuracyJob& job) {
   std::vector<RunRequest> requests;
   for (const RunRequest& request : job.simulation.requests) {
     const Variant& variant = request.variant;
     if (job.quick && variant.quad_merging != variant.early_termination) continue;
-    for (const Fidelity fidelity : rungs) {
+    for (auto fidelity = fidelities().rbegin(); fidelity != fidelities().rend(); ++fidelity) {
       requests.push_back(request);
-      requests.back().fidelity = fidelity;
+      requests.back().fidelity = *fidelity;
     }
   }
+  return requests;
+}
+
+void climb_fidelities(const AccuracyJob& job, const Workload& workload, const std::vector<RunRequest>& requests,
+                      const BatchPlace& place, AccuracyResult& result, ProgressLine& progress) {
   std::vector<Task> tasks;
   for (unsigned round = 0; round < job.repeat; ++round) {
     for (const RunRequest& request : requests) {
@@ -169,33 +175,35 @@ void climb_fidelities(const AccuracyJob& job, const Workload& workload, Accuracy
     }
   }
   result.fidelity.resize(requests.size());
-  std::vector<std::vector<double>> seconds(requests.size());
+  std::vector<std::vector<double>> host_seconds(requests.size());
+  std::vector<std::vector<double>> cpu_seconds(requests.size());
   ShownImage most_exact;
-  // One at a time: host seconds are those of a machine that does nothing else.
-  run_tasks(tasks, true, 1, "fidelity ", progress, [&](std::size_t index, Simulated&& simulated) {
-    const std::size_t place = index % requests.size();
-    seconds[place].push_back(simulated.result.host_seconds);
+  // One at a time, so that none takes cache or memory from another.
+  run_tasks(tasks, true, 1, place, progress, [&](std::size_t index, Simulated&& simulated) {
+    const std::size_t rung_index = index % requests.size();
+    host_seconds[rung_index].push_back(simulated.result.host_seconds);
+    cpu_seconds[rung_index].push_back(simulated.result.cpu_seconds);
     if (index >= requests.size()) return;
-    FidelityRung& rung = result.fidelity[place];
+    FidelityRung& rung = result.fidelity[rung_index];
     rung.run = std::move(simulated.result);
     ShownImage image = shown(*simulated.image, job.simulation.background);
-    if (rung.run.request.fidelity == rungs.front()) most_exact = image;
+    if (rung.run.request.fidelity == fidelities().back()) most_exact = image;
     rung.image = image_error(image, most_exact);
   });
 
+  const std::size_t rungs = fidelities().size();
   for (std::size_t i = 0; i < requests.size(); ++i) {
     FidelityRung& rung = result.fidelity[i];
-    rung.host_seconds = median(seconds[i]);
+    rung.host_seconds = median(host_seconds[i]);
+    rung.cpu_seconds = median(cpu_seconds[i]);
     const auto quads = static_cast<double>(rung.run.counts.quads_rasterized);
-    rung.quads_per_second = rung.host_seconds > 0 ? quads / rung.host_seconds : 0;
-    const std::optional<double> cycles = cycles_of(rung.run);
-    const std::optional<double> baseline = cycles_of(result.fidelity[i % rungs.size()].run);
-    if (cycles && baseline && *cycles > 0) rung.speedup = *baseline / *cycles;
+    rung.quads_per_second = rung.cpu_seconds > 0 ? quads / rung.cpu_seconds : 0;
+    rung.speedup = speedup(result.fidelity[i % rungs].run, rung.run);
   }
-  for (std::size_t first = 0; first < requests.size(); first += rungs.size()) {
-    compare_rungs(&result.fidelity[first], rungs.size());
+  for (std::size_t first = 0; first < requests.size(); first += rungs) {
+    compare_rungs(&result.fidelity[first], rungs);
     std::reverse(result.fidelity.begin() + static_cast<std::ptrdiff_t>(first),
-                 result.fidelity.begin() + static_cast<std::ptrdiff_t>(first + rungs.size()));
+                 result.fidelity.begin() + static_cast<std::ptrdiff_t>(first + rungs));
   }
 }
 
@@ -228,9 +236,9 @@ std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_dra
   return settings;
 }
 
-void climb_precisions(const AccuracyJob& job, const Workload& workload, const ShownImage& reference,
-                      AccuracyResult& result, ProgressLine& progress) {
-  const std::vector<PrecisionSettings> settings = choose_values(job, workload.scene.draw_list.has_value(), result);
+void climb_precisions(const AccuracyJob& job, const Workload& workload, const std::vector<PrecisionSettings>& settings,
+                      const ShownImage& reference, const BatchPlace& place, AccuracyResult& result,
+                      ProgressLine& progress) {
   std::vector<Task> tasks;
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const PreprocessOptions options = settings[i].preprocess;
@@ -238,7 +246,7 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const Sh
         {result.runs[i].name, settings[i].request, [&workload, options] { return workload.draw_with(options); }});
   }
   result.processes = std::min(job.simulation.processes, static_cast<unsigned>(tasks.size()));
-  run_tasks(tasks, true, result.processes, "precision ", progress, [&](std::size_t index, Simulated&& simulated) {
+  run_tasks(tasks, true, result.processes, place, progress, [&](std::size_t index, Simulated&& simulated) {
     PrecisionRun& run = result.runs[index];
     run.run = std::move(simulated.result);
     const ShownImage image = shown(*simulated.image, job.simulation.background);
@@ -261,8 +269,8 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const Sh
     trade_offs.push_back({cycles_of(run.run).value_or(0), -run.error.psnr_db});
   }
   if (!result.runs.front().run.cycles) return;
-  const std::vector<bool> beaten = dominated(trade_offs);
-  for (std::size_t i = 0; i < result.runs.size(); ++i) result.runs[i].on_front = !beaten[i];
+  const std::vector<bool> front = pareto_front(trade_offs, precision_tolerance);
+  for (std::size_t i = 0; i < result.runs.size(); ++i) result.runs[i].on_front = front[i];
 }
 
 }  // namespace
@@ -273,6 +281,7 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   check_outputs(job.simulation, images_of(job), page);
   const Stopwatch watch;
   AccuracyResult result;
+  result.provenance = job.simulation.provenance;
   result.quick = job.quick;
   result.repeat = job.repeat;
   result.base = job.simulation.requests.back();  // with all that the paper adds
@@ -282,8 +291,13 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   save_draw(job.simulation, *workload.draw);
   progress.show("rendering the exact image");
   const ShownImage reference = make_reference(job, workload, result);
-  climb_fidelities(job, workload, result, progress);
-  climb_precisions(job, workload, reference, result, progress);
+
+  const std::vector<RunRequest> rungs = fidelity_requests(job);
+  const std::vector<PrecisionSettings> values = choose_values(job, workload.scene.draw_list.has_value(), result);
+  const std::size_t climbs = job.repeat * rungs.size();
+  const Stopwatch ladders;
+  climb_fidelities(job, workload, rungs, {"fidelity ", 0, values.size(), 0}, result, progress);
+  climb_precisions(job, workload, values, reference, {"precision ", climbs, 0, ladders.seconds()}, result, progress);
   if (!workload.scene.draw_list) {
     for (PrecisionRun& run : result.runs) {
       run.run.parameters.insert(run.run.parameters.end(), job.simulation.preprocess_parameters.begin(),

@@ -13,6 +13,7 @@
 #include "picture.h"
 #include "precision_knobs.h"
 #include "progress_line.h"
+#include "trade_off.h"
 
 namespace vrpipe::tools {
 
@@ -25,27 +26,33 @@ struct AccuracyJob {
   bool markdown = false;                      ///< the tables for documentation in place of the report
 };
 
+// Of the ladders. CPU seconds and error in cycles, percent; simulated cycles and dB of PSNR.
+constexpr Tolerance fidelity_tolerance{0.05, 0.01};
+constexpr Tolerance precision_tolerance{0.001, 0.1};
+
 /// One variant at one fidelity, beside the most exact fidelity.
 struct FidelityRung {
   RunResult run;
-  double host_seconds = 0;                     ///< the median, measured with nothing else running
+  double host_seconds = 0;                     ///< the median
+  double cpu_seconds = 0;                      ///< the median
+  double times_as_fast = 0;                    ///< in CPU seconds, as the most exact fidelity of the variant
   std::optional<double> cycles_error_percent;  ///< above 0: too many cycles; none without time
   std::optional<double> speedup;               ///< over the baseline at the same fidelity
   std::optional<double> speedup_error_percent;
-  double quads_per_second = 0;  ///< rasterised, per host second
+  double quads_per_second = 0;  ///< rasterised, per CPU second
   double fragments_blended_error_percent = 0;
   ImageError image;        ///< against the most exact fidelity's
-  bool dominated = false;  ///< another rung is no worse in error and time, and better in one
+  bool dominated = false;  ///< by another rung of the variant, in CPU seconds and error; the most exact never is
 };
 
 /// A run of the precision ladder.
 struct PrecisionRun {
-  std::string name;                             ///< KNOB=VALUE, or "default"
-  RunResult run;                                ///< with its host seconds beside other processes
+  std::string name;  ///< KNOB=VALUE, or "default"
+  RunResult run;
   ImageError error;                             ///< against the exact image
   std::uint64_t pixels_stuck = 0;               ///< below the termination threshold, by rounding
   std::optional<double> cycles_change_percent;  ///< against the default; none without time
-  bool on_front = false;                        ///< none is as exact in fewer cycles; false without time
+  bool on_front = false;                        ///< the Pareto front of cycles and PSNR; false without time
   Picture picture, error_map;                   ///< for the page; else empty
 };
 
@@ -57,7 +64,9 @@ struct PrecisionRow {
 };
 
 struct AccuracyResult {
+  Provenance provenance;
   SceneSummary scene;
+  std::optional<Viewpoint> viewpoint;             ///< none for a draw list
   std::uint32_t width = 0, height = 0;            ///< pixels
   std::uint32_t full_width = 0, full_height = 0;  ///< of which a quick look takes the middle
   bool quick = false;

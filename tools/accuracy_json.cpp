@@ -23,6 +23,8 @@ Json fidelity_json(const FidelityRung& rung) {
           {"speedup", optional_json(rung.speedup)},
           {"speedup_error_percent", optional_json(rung.speedup_error_percent)},
           {"host_seconds", rung.host_seconds},
+          {"cpu_seconds", rung.cpu_seconds},
+          {"times_as_fast", rung.times_as_fast},
           {"quads_per_second", rung.quads_per_second},
           {"kernel_events", rung.run.kernel_events},
           {"dominated", rung.dominated},
@@ -53,6 +55,7 @@ Json precision_json(const PrecisionRow& row, const PrecisionRun& run) {
           {"cycles_change_percent", optional_json(run.cycles_change_percent)},
           {"costs_no_time", run.cycles_change_percent ? Json(free) : Json()},
           {"host_seconds", run.run.host_seconds},
+          {"cpu_seconds", run.run.cpu_seconds},
           {"pareto_front", run.on_front},
           {"result_hash", run.run.result_hash}};
 }
@@ -64,20 +67,27 @@ Json accuracy_json(const AccuracyResult& result) {
   for (const FidelityRung& rung : result.fidelity) fidelity.push_back(fidelity_json(rung));
   Json precision = Json::array();
   for (const PrecisionRow& row : result.precision) precision.push_back(precision_json(row, result.runs[row.run]));
-  return {{"schema", "vrpipe.accuracy/1"},
-          {"version", VRPIPE_VERSION},
-          {"scene", scene_json(result.scene, result.width, result.height)},
-          {"platform", platform_json({result.runs.front().run})},
-          {"format", vrpipe::name_of(result.base.format)},
-          {"termination", name_of(result.base.termination)},
-          {"quick", result.quick},
-          {"repeat", result.repeat},
-          {"precision_variant", result.base.variant.name},
-          {"precision_fidelity", vrpipe::name_of(result.base.fidelity)},
-          {"precision_processes", result.processes},
-          {"knobs_left_out", result.knobs_left_out},
-          {"fidelity", std::move(fidelity)},
-          {"precision", std::move(precision)}};
+  Json json = head_json("vrpipe.accuracy/1", result.provenance, result.processes);
+  json.update({{"scene", scene_json(result.scene, result.width, result.height)},
+               {"camera", camera_json(result.viewpoint)},
+               {"platform", platform_json({result.runs.front().run}, result.preprocessing)},
+               {"implementations", implementations_json(result.runs.front().run)},
+               {"format", vrpipe::name_of(result.base.format)},
+               {"termination", name_of(result.base.termination)},
+               {"quick", result.quick},
+               {"repeat", result.repeat},
+               {"precision_variant", result.base.variant.name},
+               {"precision_fidelity", vrpipe::name_of(result.base.fidelity)},
+               {"precision_processes", result.processes},
+               {"knobs_left_out", result.knobs_left_out},
+               {"tolerances",
+                {{"cpu_seconds_percent", 100 * fidelity_tolerance.cost_share},
+                 {"cycles_error_percent", fidelity_tolerance.error},
+                 {"cycles_percent", 100 * precision_tolerance.cost_share},
+                 {"psnr_db", precision_tolerance.error}}},
+               {"fidelity", std::move(fidelity)},
+               {"precision", std::move(precision)}});
+  return json;
 }
 
 }  // namespace vrpipe::tools

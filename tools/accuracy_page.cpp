@@ -1,6 +1,7 @@
 #include "accuracy_page.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <utility>
@@ -21,7 +22,7 @@ constexpr const char* style = R"(
 body { margin: 0 auto; padding: 28px 24px 60px; max-width: 1080px; background: #fff; color: #1d232a;
        font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
 h1 { font-size: 26px; margin: 0 0 4px; } h2 { font-size: 20px; margin: 44px 0 6px; } p { margin: 6px 0; max-width: 860px; }
-.subtle { color: #5a6572; } .notice { background: #fff4d6; border-left: 4px solid #d99a00; padding: 8px 12px; }
+.subtle { color: #5a6572; } .verdict { font-size: 17px; } code { font-size: 13px; overflow-wrap: anywhere; } .notice { background: #fff4d6; border-left: 4px solid #d99a00; padding: 8px 12px; }
 ul { margin: 6px 0; padding-left: 20px; }
 svg { width: 100%; height: auto; margin: 10px 0; }
 svg text { font: 12px system-ui, "Segoe UI", "DejaVu Sans", sans-serif; fill: #1d232a; }
@@ -89,22 +90,27 @@ std::string list(const std::vector<std::string>& lines) {
   return text + "</ul>\n";
 }
 
+/// "word: what it means", the word in bold.
+std::string definition(const std::string& text) {
+  const std::size_t end = text.find(':');
+  return "<p class=\"subtle\"><b>" + html_escaped(text.substr(0, end)) + "</b>" + html_escaped(text.substr(end)) +
+         ".</p>\n";
+}
+
 std::string exactness(const ImageError& error) {
   return std::isinf(error.psnr_db) ? std::string("equal to the reference") : fmt::format("{:.2f} dB", error.psnr_db);
 }
 
-const std::vector<std::string>& colors() {
-  static const std::vector<std::string> all{"#1f6fb4", "#d1495b", "#2e8b57", "#e08e0b", "#7b4fb5", "#00838f", "#8d5a2b",
-                                            "#c2408f", "#6b7d00", "#4d5b6a", "#e4572e", "#3a4fb0", "#178f9b"};
-  return all;
-}
+/// Colours that can be told from one another; what is of more kinds differs in the marker.
+constexpr std::array<const char*, 8> colors{"#0072b2", "#d1400f", "#009e73", "#e69f00",
+                                            "#cc79a7", "#56b4e9", "#7a3e9d", "#6b4a2b"};
 
 std::string fidelity_plot(const AccuracyResult& result) {
   constexpr Marker markers[] = {Marker::triangle, Marker::square, Marker::diamond, Marker::circle, Marker::star};
   Plot plot;
-  plot.description = "error in cycles against host seconds, for each variant and fidelity";
-  plot.x = {"host seconds (logarithmic)", true};
-  plot.y = {"error in cycles, %", false};
+  plot.description = "error in cycles against CPU seconds, for each variant and fidelity";
+  plot.x = {"CPU seconds (logarithmic)", true};
+  plot.y = {"error in cycles, % (logarithmic, none at the bottom)", true};
   std::vector<std::string> variants_seen;
   std::vector<Fidelity> fidelities_seen;
   bool any_dominated = false;
@@ -121,23 +127,24 @@ std::string fidelity_plot(const AccuracyResult& result) {
     index_of(fidelities_seen, request.fidelity);
     const std::string name = fmt::format("{} {}", request.variant.name, vrpipe::name_of(request.fidelity));
     const double error = std::fabs(*rung.cycles_error_percent);
-    plot.points.push_back({rung.host_seconds, error, colors()[variant],
-                           markers[static_cast<unsigned>(request.fidelity)], rung.dominated, name,
-                           fmt::format("{}: {:.2f} % in {:.2f} s{}", name, error, rung.host_seconds,
+    const char* const color = colors[variant % colors.size()];
+    plot.points.push_back({rung.cpu_seconds, error, color, markers[static_cast<unsigned>(request.fidelity)],
+                           rung.dominated, name,
+                           fmt::format("{}: {:.2g} % in {:.2f} s{}", name, error, rung.cpu_seconds,
                                        rung.dominated ? ", dominated" : "")});
     any_dominated |= rung.dominated;
-    if (variant >= plot.lines.size()) plot.lines.push_back({{}, colors()[variant], true});
-    if (!rung.dominated) plot.lines[variant].points.emplace_back(rung.host_seconds, error);
+    if (variant >= plot.lines.size()) plot.lines.push_back({{}, color, true});
+    if (!rung.dominated) plot.lines[variant].points.emplace_back(rung.cpu_seconds, error);
   }
   for (PlotLine& line : plot.lines) std::sort(line.points.begin(), line.points.end());
   for (std::size_t i = 0; i < variants_seen.size(); ++i) {
-    plot.legend.push_back({variants_seen[i], colors()[i], Marker::circle, false, false});
+    plot.legend.push_back({variants_seen[i], colors[i % colors.size()], Marker::circle, false, false});
   }
   for (const Fidelity fidelity : fidelities_seen) {
     plot.legend.push_back(
         {vrpipe::name_of(fidelity), "#4d5b6a", markers[static_cast<unsigned>(fidelity)], false, false});
   }
-  plot.legend.push_back({"Pareto front of a variant", "#4d5b6a", Marker::circle, false, true});
+  plot.legend.push_back({"front of a variant", "#4d5b6a", Marker::circle, false, true});
   if (any_dominated) plot.legend.push_back({"dominated", "#4d5b6a", Marker::circle, true, false});
   return svg(plot);
 }
@@ -165,8 +172,10 @@ std::string precision_plot(const AccuracyResult& result) {
   const auto [default_x, default_y] = point_of(result.runs.front());
   plot.points.push_back({default_x, default_y, "#111", Marker::star, false, "default", "the default"});
   plot.legend.push_back({"the default", "#111", Marker::star, false, false});
-  std::size_t color = 0;
-  for (const PrecisionKnob& knob : precision_knobs()) {
+  for (std::size_t k = 0; k < precision_knobs().size(); ++k) {
+    const PrecisionKnob& knob = precision_knobs()[k];
+    const char* const color = colors[k % colors.size()];
+    const Marker marker = k < colors.size() ? Marker::circle : Marker::square;
     bool seen = false;
     for (const PrecisionRow& row : result.precision) {
       if (row.knob != &knob || row.run == 0) continue;
@@ -176,13 +185,12 @@ std::string precision_plot(const AccuracyResult& result) {
       const std::string value = readable_value(knob, row.value);
       const std::string name = knob.name + "=" + value;
       plot.points.push_back(
-          {x, y, colors()[color % colors().size()], Marker::circle, !run.on_front, name,
+          {x, y, color, marker, !run.on_front, name,
            fmt::format("{}: {}, {} cycles", name, exactness(run.error), grouped(run.run.cycles.value_or(0)))});
     }
-    if (seen) plot.legend.push_back({knob.name, colors()[color % colors().size()], Marker::circle, false, false});
-    ++color;
+    if (seen) plot.legend.push_back({knob.name, color, marker, false, false});
   }
-  plot.legend.push_back({"Pareto front", "#4d5b6a", Marker::circle, false, true});
+  plot.legend.push_back({"front", "#4d5b6a", Marker::circle, false, true});
   plot.legend.push_back({"not on the front", "#4d5b6a", Marker::circle, true, false});
   return svg(plot);
 }
@@ -222,7 +230,7 @@ std::string functional_note(const AccuracyResult& result) {
   std::string text;
   for (const FidelityRung& rung : result.fidelity) {
     if (rung.run.cycles) continue;
-    text += fmt::format("{}{} {:.2f} s", text.empty() ? "" : ", ", rung.run.request.variant.name, rung.host_seconds);
+    text += fmt::format("{}{} {:.2f} s", text.empty() ? "" : ", ", rung.run.request.variant.name, rung.cpu_seconds);
   }
   if (text.empty()) return {};
   return "<p class=\"subtle\">Without time, and so not in the plot: functional (" + html_escaped(text) + ").</p>\n";
@@ -237,29 +245,31 @@ std::string accuracy_page(const AccuracyResult& result) {
   text += "<title>vrpipe accuracy: " + html_escaped(result.scene.name) + "</title>\n";
   text += std::string("<style>") + style + "</style>\n</head>\n<body>\n<h1>What accuracy costs in time</h1>\n";
   for (std::size_t i = 0; i < heading.size(); ++i) {
-    const bool is_notice = result.quick && i + 1 == heading.size();
-    text += fmt::format("<p class=\"{}\">{}</p>\n", is_notice ? "notice" : "subtle", html_escaped(heading[i]));
+    text += fmt::format("<p class=\"{}\">{}</p>\n", i < 3 ? "subtle" : "notice", html_escaped(heading[i]));
   }
 
   text += "<h2>Fidelity: how exact time is</h2>\n";
+  text += "<p class=\"verdict\">" + html_escaped(fidelity_verdict(result)) + ".</p>\n";
   text += fmt::format(
       "<p>Every variant at every fidelity, one simulation at a time. Errors are against <b>{}</b>; what lies further "
-      "left "
-      "is sooner done, further down more exact.</p>\n",
+      "left is sooner done, further down more exact.</p>\n",
       vrpipe::name_of(fidelities().back()));
-  text +=
-      fidelity_plot(result) + functional_note(result) + list(fidelity_summary(result)) + table(fidelity_table(result));
+  text += fidelity_plot(result) + functional_note(result) + definition(fidelity_definition()) +
+          list(fidelity_summary(result)) + table(fidelity_table(result));
 
   text += "<h2>Precision: how exact numbers are</h2>\n";
+  if (const std::string verdict = precision_verdict(result); !verdict.empty()) {
+    text += "<p class=\"verdict\">" + html_escaped(verdict) + ".</p>\n";
+  }
   text += fmt::format(
       "<p>{} at {} fidelity, with one choice changed at a time. Errors are against an image in double precision: no "
-      "tiles, "
-      "no termination, all bands, exact order, alpha below 1/255 pruned. What lies further left takes the modelled "
-      "hardware less time, further up is more exact.</p>\n",
+      "tiles, no termination, all bands, exact order, alpha below 1/255 pruned. What lies further left takes the "
+      "modelled hardware less time, further up is more exact.</p>\n",
       html_escaped(result.base.variant.name), vrpipe::name_of(result.base.fidelity));
   if (result.runs.front().run.cycles) {
     text += precision_plot(result) +
-            "<p class=\"subtle\">What lies on the default has no label; a point's name shows under the pointer.</p>\n";
+            "<p class=\"subtle\">What lies on the default has no label; a point's name shows under the pointer.</p>\n" +
+            definition(precision_definition());
   }
   text += list(precision_summary(result)) + table(precision_table(result));
 
@@ -268,8 +278,15 @@ std::string accuracy_page(const AccuracyResult& result) {
       "<p>Left the image, averaged to its size here; right where it is wrong, the largest error of each block of "
       "pixels.</p>\n";
   text += error_scale() + figures(result);
-  text += fmt::format("<p class=\"subtle\">vrpipe {}, {:.0f} s of simulation.</p>\n</body>\n</html>\n", VRPIPE_VERSION,
-                      result.seconds);
+  text += fmt::format(
+      "<h2>What made this page</h2>\n<p><code>{}</code></p>\n<p class=\"subtle\">vrpipe {}; {:.0f} s, with {} "
+      "simulation{} of the precision ladder at a time, on a host whose load average was {:.1f}.</p>\n",
+      html_escaped(command_text(result.provenance)), VRPIPE_VERSION, result.seconds, result.processes,
+      result.processes == 1 ? "" : "s", result.provenance.load_average);
+  for (const PluginFile& plugin : result.provenance.plugins) {
+    text += fmt::format("<p class=\"subtle\">plugin {}, SHA-256 {}</p>\n", html_escaped(plugin.path), plugin.sha256);
+  }
+  text += "</body>\n</html>\n";
   return text;
 }
 

@@ -16,8 +16,19 @@
 namespace vrpipe::tools {
 namespace {
 
-std::string signed_percent(const std::optional<double>& value) {
-  return value ? fmt::format("{:+.2f}", *value == 0 ? 0.0 : *value) : "-";
+/// With as many decimals as something other than zero needs to show.
+int decimals_of(double value, int usual) {
+  int decimals = usual;
+  for (double least = 0.5 * std::pow(10, -usual); value != 0 && std::fabs(value) < least && decimals < 12;
+       least /= 10) {
+    ++decimals;
+  }
+  return decimals;
+}
+
+std::string signed_percent(const std::optional<double>& value, int decimals = 2) {
+  if (!value) return "-";
+  return *value == 0 ? "0" : fmt::format("{:+.{}f}", *value, decimals_of(*value, decimals));
 }
 
 std::string decibels(double psnr) { return std::isinf(psnr) ? "equal" : fmt::format("{:.2f}", psnr); }
@@ -46,9 +57,9 @@ std::vector<std::string> precision_cells(const std::string& value, const Precisi
           cycles_text(run.run),
           is_default                  ? ""
           : free                      ? "none"
-          : run.cycles_change_percent ? fmt::format("{:+.3f}", *run.cycles_change_percent)
+          : run.cycles_change_percent ? signed_percent(run.cycles_change_percent, 3)
                                       : "-",
-          fmt::format("{:.2f}", run.run.host_seconds),
+          fmt::format("{:.2f}", run.run.cpu_seconds),
           run.on_front ? "front" : ""};
 }
 
@@ -95,15 +106,53 @@ std::string markdown(const AccuracyTable& table) {
   return text;
 }
 
-std::string text_of(const AccuracyTable& source, const TextStyle& style) {
-  TextTable table(source.heading);
+/// Some columns, in this order, for a terminal of 80 characters.
+std::string text_of(const AccuracyTable& source, const std::vector<std::size_t>& columns, const TextStyle& style) {
+  const auto chosen = [&](const std::vector<std::string>& cells) {
+    std::vector<std::string> some;
+    for (const std::size_t column : columns) some.push_back(cells[column]);
+    return some;
+  };
+  TextTable table(chosen(source.heading));
   std::string group;
   for (const AccuracyTable::Row& row : source.rows) {
     if (row.group != group) table.group(row.group);
     group = row.group;
-    table.row(row.cells, row.marked);
+    table.row(chosen(row.cells), row.marked);
   }
   return table.text(style);
+}
+
+/// How one fidelity does over all variants.
+struct FidelityRange {
+  bool timed = false;
+  bool always_dominated = true;
+  double slowest = INFINITY, fastest = 0;          // times as fast as the most exact
+  double cycles_percent = 0, speedup_percent = 0;  // the largest errors
+  double quads_per_second = INFINITY;              // the least
+  double worst_image_db = INFINITY;
+};
+
+FidelityRange range_of(const AccuracyResult& result, Fidelity fidelity) {
+  FidelityRange range;
+  for (const FidelityRung& rung : result.fidelity) {
+    if (rung.run.request.fidelity != fidelity) continue;
+    range.timed = rung.run.cycles.has_value();
+    range.always_dominated &= rung.dominated;
+    range.slowest = std::min(range.slowest, rung.times_as_fast);
+    range.fastest = std::max(range.fastest, rung.times_as_fast);
+    range.cycles_percent = std::max(range.cycles_percent, std::fabs(rung.cycles_error_percent.value_or(0)));
+    range.speedup_percent = std::max(range.speedup_percent, std::fabs(rung.speedup_error_percent.value_or(0)));
+    range.quads_per_second = std::min(range.quads_per_second, rung.quads_per_second);
+    range.worst_image_db = std::min(range.worst_image_db, rung.image.psnr_db);
+  }
+  return range;
+}
+
+std::string times_text(const FidelityRange& range) {
+  const std::string slowest = fmt::format("{:.1f}", range.slowest);
+  const std::string fastest = fmt::format("{:.1f}", range.fastest);
+  return slowest == fastest ? slowest + " times" : slowest + " to " + fastest + " times";
 }
 
 }  // namespace
@@ -111,17 +160,27 @@ std::string text_of(const AccuracyTable& source, const TextStyle& style) {
 AccuracyTable fidelity_table(const AccuracyResult& result) {
   AccuracyTable table;
   table.group_heading = "variant";
-  table.heading = {"fidelity", "cycles", "error %",      "speed-up",       "error %",  "host s",
-                   "Mquads/s", "events", "blended +- %", "image PSNR, dB", "dominated"};
+  table.heading = {"fidelity",
+                   "cycles",
+                   "error %",
+                   "speed-up",
+                   "error %",
+                   "CPU s",
+                   std::string("vs ") + vrpipe::name_of(fidelities().back()),
+                   "dominated",
+                   "Mquads/s",
+                   "events",
+                   "blended +- %",
+                   "image PSNR, dB"};
   for (const FidelityRung& rung : result.fidelity) {
     const RunResult& run = rung.run;
     table.rows.push_back(
         {run.request.variant.name,
          {vrpipe::name_of(run.request.fidelity), cycles_text(run), signed_percent(rung.cycles_error_percent),
           rung.speedup ? fmt::format("{:.3f}", *rung.speedup) : "-", signed_percent(rung.speedup_error_percent),
-          fmt::format("{:.2f}", rung.host_seconds), fmt::format("{:.2f}", rung.quads_per_second * 1e-6),
-          grouped(run.kernel_events), signed_percent(rung.fragments_blended_error_percent),
-          decibels(rung.image.psnr_db), rung.dominated ? "yes" : ""},
+          fmt::format("{:.2f}", rung.cpu_seconds), fmt::format("{:.2f}x", rung.times_as_fast),
+          rung.dominated ? "yes" : "", fmt::format("{:.2f}", rung.quads_per_second * 1e-6), grouped(run.kernel_events),
+          signed_percent(rung.fragments_blended_error_percent), decibels(rung.image.psnr_db)},
          false});
   }
   return table;
@@ -131,7 +190,7 @@ AccuracyTable precision_table(const AccuracyResult& result) {
   AccuracyTable table;
   table.group_heading = "knob";
   table.heading = {"value", "PSNR, dB", "SSIM",   "max error", "8-bit differs, %",
-                   "stuck", "cycles",   "cost %", "host s",    ""};
+                   "stuck", "cycles",   "cost %", "CPU s",     ""};
   table.rows.push_back(
       {"the default", precision_cells("everything", result.runs.front(), true), result.runs.front().on_front});
   for (const PrecisionRow& row : result.precision) {
@@ -145,36 +204,83 @@ AccuracyTable precision_table(const AccuracyResult& result) {
   return table;
 }
 
+std::string within(double percent) {
+  if (percent == 0) return "0 %";
+  // Rounded up, since it is a bound.
+  const int decimals = decimals_of(percent, 1);
+  const double scale = std::pow(10, decimals);
+  return fmt::format("{:.{}f} %", std::ceil(percent * scale * (1 - 1e-9)) / scale, decimals);
+}
+
+std::string fidelity_verdict(const AccuracyResult& result) {
+  const std::string exact = vrpipe::name_of(fidelities().back());
+  std::string text;
+  for (auto fidelity = fidelities().rbegin() + 1; fidelity != fidelities().rend(); ++fidelity) {
+    const FidelityRange range = range_of(result, *fidelity);
+    const bool first = text.empty();
+    text += fmt::format("{}{}: {}{}, {}", first ? "" : "; ", vrpipe::name_of(*fidelity), times_text(range),
+                        first ? " as fast as " + exact : "",
+                        range.timed ? "cycles within " + within(range.cycles_percent) : "without cycles");
+  }
+  return text;
+}
+
+std::string fidelity_definition() {
+  return fmt::format(
+      "dominated: another fidelity of the variant is better in CPU seconds (by over {:g} %) or in error (by over {:g} "
+      "points) and no worse in the other; {}, which errors are measured against, never is",
+      100 * fidelity_tolerance.cost_share, fidelity_tolerance.error, vrpipe::name_of(fidelities().back()));
+}
+
+std::string precision_definition() {
+  return fmt::format(
+      "front: nothing is better in cycles (by over {:g} %) or in PSNR (by over {:g} dB) and no worse in the other; of "
+      "those that are alike, the first",
+      100 * precision_tolerance.cost_share, precision_tolerance.error);
+}
+
 std::vector<std::string> fidelity_summary(const AccuracyResult& result) {
   std::vector<std::string> lines;
   for (const Fidelity fidelity : fidelities()) {
-    double cycles = 0;
-    double speedup = 0;
-    double slowest = 0;
-    double worst_image = INFINITY;
-    bool timed = false;
-    bool always_dominated = true;
-    for (const FidelityRung& rung : result.fidelity) {
-      if (rung.run.request.fidelity != fidelity) continue;
-      timed = rung.run.cycles.has_value();
-      cycles = std::max(cycles, std::fabs(rung.cycles_error_percent.value_or(0)));
-      speedup = std::max(speedup, std::fabs(rung.speedup_error_percent.value_or(0)));
-      slowest = slowest == 0 ? rung.quads_per_second : std::min(slowest, rung.quads_per_second);
-      worst_image = std::min(worst_image, rung.image.psnr_db);
-      always_dominated &= rung.dominated;
-    }
+    const FidelityRange range = range_of(result, fidelity);
     std::string line = fmt::format("{}: ", vrpipe::name_of(fidelity));
     if (fidelity == fidelities().back()) {
       line += "what the others are measured against";
     } else {
-      line += timed ? fmt::format("cycles within {:.1f} %, speed-ups within {:.1f} %", cycles, speedup) : "no time";
-      line += std::isinf(worst_image) ? ", the same images" : fmt::format(", images within {:.1f} dB", worst_image);
+      line += times_text(range) + " as fast";
+      line += range.timed ? fmt::format(", cycles within {}, speed-ups within {}", within(range.cycles_percent),
+                                        within(range.speedup_percent))
+                          : ", no cycles";
+      line += std::isinf(range.worst_image_db) ? ", the same images"
+                                               : fmt::format(", images within {:.1f} dB", range.worst_image_db);
     }
-    line += fmt::format(", at least {:.2f} M quads rasterised per host second", slowest * 1e-6);
-    if (always_dominated) line += "; dominated in every variant";
+    line += fmt::format(", at least {:.2f} M quads rasterised per CPU second", range.quads_per_second * 1e-6);
+    if (range.always_dominated) line += "; dominated in every variant";
     lines.push_back(line);
   }
   return lines;
+}
+
+std::string precision_verdict(const AccuracyResult& result) {
+  const PrecisionRun& usual = result.runs.front();
+  if (!usual.run.cycles) return {};
+  const PrecisionRun* cheapest = nullptr;
+  const PrecisionRun* closest = nullptr;
+  for (const PrecisionRun& run : result.runs) {
+    if (!run.on_front) continue;
+    if (cheapest == nullptr || *run.run.cycles < *cheapest->run.cycles) cheapest = &run;
+    if (closest == nullptr || run.error.psnr_db > closest->error.psnr_db) closest = &run;
+  }
+  const auto price = [](const PrecisionRun& run) {
+    return fmt::format("{} % of the cycles for {}", signed_percent(run.cycles_change_percent),
+                       std::isinf(run.error.psnr_db) ? "the exact image" : decibels(run.error.psnr_db) + " dB");
+  };
+  std::string text =
+      "the default: " + (std::isinf(usual.error.psnr_db) ? "exact" : decibels(usual.error.psnr_db) + " dB");
+  if (cheapest != &usual) text += fmt::format("; cheapest, {}: {}", cheapest->name, price(*cheapest));
+  if (closest != &usual && closest != cheapest)
+    text += fmt::format("; most exact, {}: {}", closest->name, price(*closest));
+  return text;
 }
 
 std::vector<std::string> precision_summary(const AccuracyResult& result) {
@@ -182,7 +288,7 @@ std::vector<std::string> precision_summary(const AccuracyResult& result) {
   if (!result.runs.front().run.cycles) {
     lines.push_back("without time at this fidelity: images alone");
   } else if (const std::vector<std::string> free = free_knobs(result); !free.empty()) {
-    lines.push_back("cost no simulated time: " + joined(free));
+    lines.push_back(joined(free) + (free.size() == 1 ? " costs" : " cost") + " no simulated time");
   }
   std::vector<std::string> uncharged;
   for (const PrecisionKnob& knob : precision_knobs()) {
@@ -191,7 +297,10 @@ std::vector<std::string> precision_summary(const AccuracyResult& result) {
     if (is_there && !knob.is_charged) uncharged.push_back(knob.name);
   }
   if (result.runs.front().run.cycles && !uncharged.empty()) {
-    lines.push_back("have no price of their own, and change cycles only by which fragments live: " + joined(uncharged));
+    lines.push_back(joined(uncharged) +
+                    (uncharged.size() == 1 ? " has no price of its own: it changes cycles"
+                                           : " have no price of their own: they change cycles") +
+                    " only by which fragments live");
   }
   if (!result.knobs_left_out.empty()) {
     lines.push_back("left out, since a draw list is preprocessed already: " + joined(result.knobs_left_out));
@@ -215,6 +324,9 @@ std::vector<std::string> accuracy_heading(const AccuracyResult& result) {
     }
     lines.push_back(line);
   }
+  if (result.runs.front().run.counts.fragments_rasterized == 0) {
+    lines.push_back(nothing_visible(result.scene, result.viewpoint.has_value()));
+  }
   return lines;
 }
 
@@ -222,7 +334,7 @@ namespace {
 
 std::string fidelity_title(const AccuracyResult& result) {
   return fmt::format("Fidelity, against {}: one simulation at a time{}", vrpipe::name_of(fidelities().back()),
-                     result.repeat > 1 ? fmt::format(", host seconds the median of {}", result.repeat) : "");
+                     result.repeat > 1 ? fmt::format(", CPU seconds the median of {}", result.repeat) : "");
 }
 
 std::string precision_title(const AccuracyResult& result) {
@@ -236,10 +348,17 @@ std::string precision_title(const AccuracyResult& result) {
 std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) {
   std::string text;
   for (const std::string& line : accuracy_heading(result)) text += (text.empty() ? style.bold(line) : line) + "\n";
-  text += "\n" + style.bold(fidelity_title(result)) + "\n\n" + text_of(fidelity_table(result), style) + "\n";
+  const AccuracyTable fidelity = fidelity_table(result);
+  text += "\n" + style.bold(fidelity_title(result)) + "\n\n";
+  text +=
+      text_of(fidelity, {0, 1, 2, 3, 4, 5, 6}, style) + "\n" + text_of(fidelity, {0, 7, 8, 9, 10, 11}, style) + "\n";
   for (const std::string& line : fidelity_summary(result)) text += line + "\n";
-  text += "\n" + style.bold(precision_title(result)) + "\n\n" + text_of(precision_table(result), style) + "\n";
+  text += fidelity_definition() + "\n";
+  text += "\n" + style.bold(precision_title(result)) + "\n\n";
+  text += text_of(precision_table(result), {0, 1, 3, 5, 6, 7, 9}, style) + "\n";
+  if (const std::string verdict = precision_verdict(result); !verdict.empty()) text += verdict + "\n";
   for (const std::string& line : precision_summary(result)) text += line + "\n";
+  if (result.runs.front().run.cycles) text += precision_definition() + "\n";
   text += fmt::format("took {:.1f} s, {:.1f} s of it for the exact image\n", result.seconds, result.reference_seconds);
   return text;
 }

@@ -23,6 +23,18 @@ AccuracyTable fidelity_table(const AccuracyResult& result);
 /// The default once, and below it every other value.
 AccuracyTable precision_table(const AccuracyResult& result);
 
+/// What accuracy costs on the fidelity ladder, in a sentence.
+std::string fidelity_verdict(const AccuracyResult& result);
+/// The same of the precision ladder; empty without time.
+std::string precision_verdict(const AccuracyResult& result);
+
+// What the words of the tables mean, tolerances included.
+std::string fidelity_definition();   ///< of "dominated"
+std::string precision_definition();  ///< of "front"
+
+/// A bound on an error, percent, rounded up: 0 only for 0.
+std::string within(double percent);
+
 /// What the rungs of the fidelity ladder are good for, one line each.
 std::vector<std::string> fidelity_summary(const AccuracyResult& result);
 /// What knobs cost nothing, and what else the precision ladder says; one line each.

@@ -163,6 +163,7 @@ int run_parsed(int argc, const char* const* argv) {
     if (!parts[i]->parsed()) continue;
     refuse_missing_values(*parts[i]);
     refuse_leftovers(*parts[i], parts);
+    commands[i]->called_as({argv, argv + argc});
     commands[i]->run();
     return 0;
   }

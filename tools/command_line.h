@@ -3,6 +3,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace CLI {
@@ -19,8 +20,16 @@ class Command {
   virtual std::string summary() const = 0;  ///< one line, for `vrpipe --help`
   /// Adds options to the command's own part of the command line.
   virtual void declare(CLI::App& app) = 0;
+  /// The whole command line, before run().
+  void called_as(std::vector<std::string> words) { words_ = std::move(words); }
   /// Does it; the options are parsed. Throws UserError, CommandFailure or a fault.
   virtual void run() = 0;
+
+ protected:
+  const std::vector<std::string>& command_line() const { return words_; }
+
+ private:
+  std::vector<std::string> words_;
 };
 
 std::unique_ptr<Command> make_run_command();

@@ -29,7 +29,7 @@ class CompareCommand : public Command {
         "  vrpipe compare --set qru.quads_per_cycle=4 --json - | python3 -m json.tool");
   }
 
-  void run() override { perform(arguments_.resolve(SimulationArguments::Variants::all)); }
+  void run() override { perform(arguments_.resolve(SimulationArguments::Variants::all, command_line())); }
 
  private:
   SimulationArguments arguments_;

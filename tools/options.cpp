@@ -179,11 +179,13 @@ std::vector<NamedFile> SimulationArguments::inputs() const {
   return files;
 }
 
-SimulationJob SimulationArguments::resolve(Variants variants) const {
+SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<std::string>& command) const {
   // Plugins first: they may bring the platform and the units that the other options name.
   load_plugins(plugins_);
 
   SimulationJob job;
+  job.schema = variants == Variants::one ? "vrpipe.run/1" : "vrpipe.compare/1";
+  job.provenance = make_provenance(command, plugins_);
   job.scene = scene_request();
 
   RunRequest request;

@@ -12,6 +12,7 @@
 #include <vrpipe/workloads/scene.h>
 
 #include "output_file.h"
+#include "provenance.h"
 
 namespace CLI {
 class App;
@@ -35,6 +36,8 @@ std::shared_ptr<CLI::FormatterBase> help_formatter();
 
 /// Everything that `run` or `compare` is asked to do, checked as far as that is possible without reading the scene.
 struct SimulationJob {
+  std::string schema;  ///< of the JSON of `run` or `compare`
+  Provenance provenance;
   SceneRequest scene;
   std::vector<RunRequest> requests;    ///< one for each variant, alike in everything else
   std::vector<Setting> preprocessing;  ///< of --set, for the report; `scene` has them
@@ -54,8 +57,9 @@ class SimulationArguments {
   enum class Variants { one, all };
 
   void declare(CLI::App& app, Variants variants);
-  /// Loads the plugins and checks every option but the names of output files, which the commands know. Throws UserError.
-  SimulationJob resolve(Variants variants) const;
+  /// Loads the plugins and checks every option but the names of output files, which the commands know; `command` is the
+  /// whole command line. Throws UserError.
+  SimulationJob resolve(Variants variants, const std::vector<std::string>& command) const;
 
  private:
   SceneRequest scene_request() const;

@@ -150,7 +150,7 @@ class SharedProgress {
         ::mmap(nullptr, count * sizeof(std::atomic<float>), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (memory == MAP_FAILED) throw std::bad_alloc();
     values_ = static_cast<std::atomic<float>*>(memory);
-    for (std::size_t i = 0; i < count; ++i) new (&values_[i]) std::atomic<float>(0.0F);
+    for (std::size_t i = 0; i < count; ++i) new (&values_[i]) std::atomic<float>(waiting);
   }
   ~SharedProgress() { ::munmap(static_cast<void*>(values_), count_ * sizeof(std::atomic<float>)); }
   SharedProgress(const SharedProgress&) = delete;
@@ -352,12 +352,13 @@ Simulated simulate_here(const RunRequest& request, const Draw& draw, bool with_i
   return simulated;
 }
 
-void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned processes, const std::string& title,
+void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned processes, const BatchPlace& place,
                ProgressLine& progress, const std::function<void(std::size_t index, Simulated&& simulated)>& finished) {
   const SteadyClock::time_point start = SteadyClock::now();
   SharedProgress done(tasks.size());
-  std::vector<std::string> names;
+  std::vector<std::string> names(place.before);
   for (const Task& task : tasks) names.push_back(task.name);
+  names.resize(names.size() + place.after);
 
   std::vector<std::unique_ptr<Worker>> workers;
   std::size_t next = 0;
@@ -365,6 +366,7 @@ void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned proces
     while (next < tasks.size() && workers.size() < processes) {
       const std::shared_ptr<const Draw> draw = tasks[next].draw();
       auto worker = std::make_unique<Worker>(next, tasks[next]);
+      done[next] = 0.0F;
       try {
         worker->start(*draw, with_images, done[next]);
       } catch (const std::system_error&) {
@@ -388,8 +390,13 @@ void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned proces
       done[index] = 1.0F;
       finished(index, std::move(simulated));
     }
-    const auto room = static_cast<unsigned>(stderr_width() - std::min<std::size_t>(stderr_width(), title.size() + 1));
-    progress.show(title + progress_text(names, done.now(), seconds_since(start), room));
+    std::vector<float> all(place.before, 1.0F);
+    const std::vector<float> these = done.now();
+    all.insert(all.end(), these.begin(), these.end());
+    all.resize(all.size() + place.after, waiting);
+    const unsigned width = stderr_width();
+    const auto room = static_cast<unsigned>(width - std::min<std::size_t>(width, place.title.size() + 1));
+    progress.show(place.title + progress_text(names, all, place.seconds_before + seconds_since(start), room));
   }
   progress.erase();
 }
@@ -400,7 +407,7 @@ std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requ
   std::vector<Task> tasks;
   for (const RunRequest& request : requests) tasks.push_back({request.variant.name, request, [&] { return shared; }});
   std::vector<Simulated> results(requests.size());
-  run_tasks(tasks, with_images, processes, "", progress,
+  run_tasks(tasks, with_images, processes, {}, progress,
             [&](std::size_t index, Simulated&& simulated) { results[index] = std::move(simulated); });
   return results;
 }

@@ -32,12 +32,19 @@ struct Task {
   std::function<std::shared_ptr<const Draw>()> draw;
 };
 
+/// Where some simulations stand among all that a command runs, for the progress.
+struct BatchPlace {
+  std::string title;          ///< before the progress
+  std::size_t before = 0;     ///< simulations done already
+  std::size_t after = 0;      ///< simulations that will follow
+  double seconds_before = 0;  ///< that those before took, wall time
+};
+
 /// Runs simulations side by side, each in a process of its own, at most `processes` at a time: SystemC holds one
 /// simulation per process. `finished` gets each as it ends, in whatever order; what it is given for one does not depend
 /// on `processes`. The caller must not have other threads meanwhile, nor have used SystemC.
-/// @param title  before the progress
 /// Throws CommandFailure with the text of the first simulation that failed, or was killed; the others are ended.
-void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned processes, const std::string& title,
+void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned processes, const BatchPlace& place,
                ProgressLine& progress, const std::function<void(std::size_t index, Simulated&& simulated)>& finished);
 
 /// The same for simulations of one draw, which is shared, not copied; results in the order of the requests.

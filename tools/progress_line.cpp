@@ -30,13 +30,13 @@ void ProgressLine::show(const std::string& text) {
   if (!visible_) return;
   // The last column stays free: some terminals wrap as soon as it is written.
   note_progress_line(true);
-  put("\r\x1b[K" + printable(text).substr(0, stderr_width() - 1));
+  put("\r\x1b[J" + printable(text).substr(0, stderr_width() - 1) + "\r");
   drawn_ = true;
 }
 
 void ProgressLine::erase() {
   if (!drawn_) return;
-  put("\r\x1b[K");
+  put("\r\x1b[J");
   note_progress_line(false);
   drawn_ = false;
 }
@@ -51,7 +51,11 @@ std::string progress_text(const std::vector<std::string>& names, const std::vect
     const double part = std::clamp(static_cast<double>(done[i]), 0.0, 1.0);
     share += part / static_cast<double>(names.size());
     finished += part >= 1 ? 1U : 0U;
-    if (!many || (part > 0 && part < 1)) text += fmt::format("{} {:3.0f}%  ", names[i], 100 * part);
+    if (!many && done[i] < 0) {
+      text += names[i] + " waiting  ";
+    } else if (!many || (part > 0 && part < 1)) {
+      text += fmt::format("{} {:3.0f}%  ", names[i], 100 * part);
+    }
   }
   if (many) text = fmt::format("{}/{}  ", finished, names.size()) + text;
   std::string time;

@@ -232,6 +232,9 @@ std::string trouble_text(const std::vector<RunResult>& runs) {
 std::string remarks(const JobResult& result) {
   const std::vector<RunResult>& runs = result.runs;
   std::string text;
+  if (runs.front().counts.fragments_rasterized == 0) {
+    text += nothing_visible(result.scene, result.viewpoint.has_value()) + "\n";
+  }
   for (const RunResult& run : runs) text += bound_text(run);
   if (const auto early = early_termination_ratio(runs)) {
     text += fmt::format("early-termination ratio {:.2f} (fragments blended without over with termination)\n", *early);
@@ -273,8 +276,16 @@ std::string grouped(std::uint64_t value) {
   return digits;
 }
 
+std::string nothing_visible(const SceneSummary& scene, bool has_camera) {
+  return fmt::format("nothing is visible: none of the {} {} covers a pixel; {}", grouped(scene.gaussians_total),
+                     has_camera ? "Gaussians" : "splats",
+                     has_camera ? "turn the camera with --camera, or --eye and --look-at"
+                                : "save the draw list from a camera that sees the scene");
+}
+
 std::optional<double> speedup(const RunResult& baseline, const RunResult& run) {
   if (!baseline.cycles || !run.cycles || *run.cycles == 0) return std::nullopt;
+  if (baseline.counts.fragments_rasterized == 0) return std::nullopt;
   return static_cast<double>(*baseline.cycles) / static_cast<double>(*run.cycles);
 }
 

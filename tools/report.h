@@ -12,7 +12,10 @@ namespace vrpipe::tools {
 /// What a person reads: the runs side by side, and under the table what they mean.
 std::string report(const JobResult& result, const TextStyle& style);
 
-/// Cycles of `baseline` over those of `run`; none without time.
+/// What to say of a draw of which no fragment was rasterised; one line.
+std::string nothing_visible(const SceneSummary& scene, bool has_camera);
+
+/// Cycles of `baseline` over those of `run`; none without time, or where nothing was drawn.
 std::optional<double> speedup(const RunResult& baseline, const RunResult& run);
 
 /// Fragments blended by the baseline over those blended with early termination alone; none when a run is missing, or

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <utility>
@@ -70,6 +71,24 @@ Json bottleneck_json(const RunResult& run) {
           {"parts", shares_json(run.bottleneck->parts)}};
 }
 
+/// Where the value of each of these parameters comes from. The command line comes after the platform, and wins.
+Json origins_json(const Json& parameters, const RunRequest& request, const std::vector<Setting>& preprocessing) {
+  Json origins = Json::object();
+  for (const auto& parameter : parameters.items()) origins[parameter.key()] = "default";
+  const auto mark = [&](const std::vector<Setting>& settings, const char* origin) {
+    for (const Setting& setting : settings) {
+      const std::string key = setting.unit + "." + setting.parameter;
+      if (origins.contains(key)) origins[key] = origin;
+    }
+  };
+  mark(request.platform->settings, "platform");
+  mark(request.settings, "command line");
+  mark(preprocessing, "command line");
+  return origins;
+}
+
+Json triple(const Vec3& vector) { return {vector.x, vector.y, vector.z}; }
+
 Json units_json(const RunResult& run) {
   Json units = Json::array();
   for (const UnitReport& unit : run.units) {
@@ -108,6 +127,8 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
           {"cycles", timed ? Json(*run.cycles) : Json()},
           {"milliseconds", timed ? Json(run.milliseconds) : Json()},
           {"host_seconds", run.host_seconds},
+          {"cpu_seconds", run.cpu_seconds},
+          {"implementations", implementations_json(run)},
           {"counts", std::move(counts)},
           {"bottleneck", bottleneck_json(run)},
           {"utilization", std::move(utilization)},
@@ -128,6 +149,42 @@ Json typed_value(const Parameter& parameter, const std::string& value) {
   return value;
 }
 
+Json head_json(const std::string& schema, const Provenance& provenance, unsigned processes) {
+  Json plugins = Json::array();
+  for (const PluginFile& plugin : provenance.plugins) {
+    plugins.push_back({{"path", plugin.path}, {"sha256", plugin.sha256}});
+  }
+  return {{"schema", schema},
+          {"version", VRPIPE_VERSION},
+          {"command", provenance.command},
+          {"plugins", std::move(plugins)},
+          {"host", {{"processes", processes}, {"load_average", provenance.load_average}}}};
+}
+
+Json camera_json(const std::optional<Viewpoint>& viewpoint) {
+  if (!viewpoint) return {};
+  const auto& [camera, view, file] = *viewpoint;
+  const auto column = [&rows = camera.rotation](int i) { return triple({rows[0][i], rows[1][i], rows[2][i]}); };
+  constexpr double degrees = 57.29577951308232;
+  return {{"file", file ? Json(file->file) : Json()},
+          {"index", file ? Json(file->index) : Json()},
+          {"eye", triple(camera.eye)},
+          {"look_at", view ? triple(view->look_at) : Json()},
+          {"up", view ? triple(view->up) : Json()},
+          {"fovy_degrees", 2 * degrees * std::atan(0.5 * camera.height / camera.fy)},
+          {"right", column(0)},
+          {"down", column(1)},
+          {"forward", column(2)},
+          {"focal_pixels", {camera.fx, camera.fy}},
+          {"near_plane", camera.near_plane}};
+}
+
+Json implementations_json(const RunResult& run) {
+  Json implementations = Json::object();
+  for (const auto& [slot, name] : run.implementations) implementations[slot] = name;
+  return implementations;
+}
+
 Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t height) {
   return {{"name", scene.name},
           {"gaussians_total", scene.gaussians_total},
@@ -139,9 +196,14 @@ Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t he
            {{"not_finite", scene.rejected.not_finite}, {"zero_quaternion", scene.rejected.zero_quaternion}}}};
 }
 
-Json platform_json(const std::vector<RunResult>& runs) {
-  const Platform& platform = *runs.front().request.platform;
-  return {{"name", platform.name}, {"frequency_mhz", platform.frequency_mhz}, {"parameters", parameters_json(runs)}};
+Json platform_json(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing) {
+  const RunRequest& request = runs.front().request;
+  Json parameters = parameters_json(runs);
+  Json origins = origins_json(parameters, request, preprocessing);
+  return {{"name", request.platform->name},
+          {"frequency_mhz", request.platform->frequency_mhz},
+          {"parameters", std::move(parameters)},
+          {"origins", std::move(origins)}};
 }
 
 Json result_json(const JobResult& result) {
@@ -149,15 +211,15 @@ Json result_json(const JobResult& result) {
   Json runs = Json::array();
   for (std::size_t i = 0; i < result.runs.size(); ++i) runs.push_back(run_json(result.runs[i], result.images[i]));
   const StorageReport storage = quad_merging_storage(request);
-  Json json = {{"schema", "vrpipe.compare/1"},
-               {"version", VRPIPE_VERSION},
-               {"seed", request.stall_seed},
+  Json json = head_json(result.schema, result.provenance, result.processes);
+  json.update({{"seed", request.stall_seed},
                {"scene", scene_json(result.scene, result.width, result.height)},
-               {"platform", platform_json(result.runs)},
+               {"camera", camera_json(result.viewpoint)},
+               {"platform", platform_json(result.runs, result.preprocessing)},
                {"fidelity", vrpipe::name_of(request.fidelity)},
                {"format", vrpipe::name_of(request.format)},
                {"termination", name_of(request.termination)},
-               {"runs", std::move(runs)}};
+               {"runs", std::move(runs)}});
   if (result.runs.size() > 1) {
     Json speedups = Json::object();
     for (const RunResult& run : result.runs) {

@@ -26,7 +26,7 @@ class RunCommand : public Command {
         "  vrpipe run --fidelity functional --termination strict");
   }
 
-  void run() override { perform(arguments_.resolve(SimulationArguments::Variants::one)); }
+  void run() override { perform(arguments_.resolve(SimulationArguments::Variants::one, command_line())); }
 
  private:
   SimulationArguments arguments_;

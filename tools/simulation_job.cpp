@@ -81,6 +81,8 @@ void perform(const SimulationJob& job) {
   }
   check_outputs(job, images);
   JobResult result;
+  result.schema = job.schema;
+  result.provenance = job.provenance;
   ProgressLine progress;
   std::vector<Simulated> simulated;
   bool preprocessed_here = false;
@@ -91,6 +93,7 @@ void perform(const SimulationJob& job) {
     result.load_seconds = seconds_since(start);
     progress.erase();
     result.scene = loaded.summary;
+    result.viewpoint = loaded.viewpoint;
     result.preprocessing = job.preprocessing;
     preprocessed_here = loaded.preprocessed_here;
     result.width = loaded.draw.width;

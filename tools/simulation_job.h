@@ -19,7 +19,10 @@ struct ImageFiles {
 
 /// What reports and JSON are made from.
 struct JobResult {
+  std::string schema;  ///< of the JSON
+  Provenance provenance;
   SceneSummary scene;
+  std::optional<Viewpoint> viewpoint;  ///< none for a draw list
   std::vector<Setting> preprocessing;  ///< what --set changed of it
   std::uint32_t width = 0;
   std::uint32_t height = 0;

@@ -27,6 +27,24 @@ struct Box {
   bool overlaps(const Box& other) const { return x0 < other.x1 && other.x0 < x1 && y0 < other.y1 && other.y0 < y1; }
 };
 
+struct Segment {
+  double x0, y0, x1, y1;
+  /// Whether it crosses a box: what is left of it, clipped at the sides one after the other.
+  bool crosses(const Box& box) const {
+    double from = 0;
+    double to = 1;
+    const auto clip = [&](double start, double step, double least, double largest) {
+      if (step == 0) return start > least && start < largest;
+      const double a = (least - start) / step;
+      const double b = (largest - start) / step;
+      from = std::max(from, std::min(a, b));
+      to = std::min(to, std::max(a, b));
+      return from < to;
+    };
+    return clip(x0, x1 - x0, box.x0, box.x1) && clip(y0, y1 - y0, box.y0, box.y1);
+  }
+};
+
 /// From values to pixels.
 class Scale {
  public:
@@ -34,11 +52,20 @@ class Scale {
       : logarithmic_(axis.logarithmic), from_(from), to_(to) {
     double least = std::numeric_limits<double>::infinity();
     double largest = -least;
+    bool has_zero = false;
     for (const double value : values) {
+      if (logarithmic_ && value <= 0) {
+        has_zero = true;
+        continue;
+      }
       least = std::min(least, transformed(value));
       largest = std::max(largest, transformed(value));
     }
     if (!(least <= largest)) least = largest = 0;
+    if (has_zero) {
+      lowest_power_ = least;
+      least = zero_ = least - std::max(0.3, 0.15 * (largest - least));
+    }
     const double margin = largest > least ? 0.07 * (largest - least)
                           : logarithmic_  ? 0.3
                                           : std::max(1.0, 0.1 * std::fabs(least));
@@ -57,17 +84,22 @@ class Scale {
       for (double k = std::ceil(least_ / step); k * step <= largest_; ++k) all.push_back(k * step);
       return all;
     }
-    for (double power = std::floor(least_); power <= largest_; ++power) {
-      for (const double digit : {1.0, 2.0, 5.0}) {
+    if (lowest_power_ > least_) all.push_back(0);
+    const double lowest = std::max(least_, lowest_power_);
+    // Over less than a decade, more of them.
+    const std::vector<double> digits =
+        largest_ - lowest < 1 ? std::vector<double>{1, 1.5, 2, 3, 4, 5, 6, 8} : std::vector<double>{1, 2, 5};
+    for (double power = std::floor(lowest); power <= largest_; ++power) {
+      for (const double digit : digits) {
         const double value = digit * std::pow(10, power);
-        if (transformed(value) >= least_ && transformed(value) <= largest_) all.push_back(value);
+        if (transformed(value) >= lowest && transformed(value) <= largest_) all.push_back(value);
       }
     }
     return all;
   }
 
  private:
-  double transformed(double value) const { return logarithmic_ ? std::log10(std::max(value, 1e-9)) : value; }
+  double transformed(double value) const { return !logarithmic_ ? value : value > 0 ? std::log10(value) : zero_; }
   static double nice_step(double rough) {
     const double power = std::pow(10, std::floor(std::log10(rough)));
     for (const double digit : {1.0, 2.0, 5.0}) {
@@ -79,6 +111,8 @@ class Scale {
   bool logarithmic_;
   double from_, to_;
   double least_ = 0, largest_ = 1;
+  double zero_ = 0;                                                 // where 0 lies on a logarithmic axis
+  double lowest_power_ = -std::numeric_limits<double>::infinity();  // below which such an axis has no ticks but that
 };
 
 std::string marker_shape(Marker marker, double x, double y, const std::string& style, const std::string& tooltip) {
@@ -154,9 +188,12 @@ std::string axes(const Plot& plot, const Scale& x, const Scale& y) {
     last = x(tick);
     text += fmt::format("<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n", x(tick), bottom + 18, label);
   }
+  last = 1e9;
   for (const double tick : y.ticks()) {
     text += fmt::format("<line x1=\"{1}\" x2=\"{2}\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" class=\"grid\"/>\n", y(tick), left,
                         right);
+    if (last - y(tick) < line_height) continue;
+    last = y(tick);
     const double shown = std::fabs(tick) < 1e-12 ? 0 : tick;
     text +=
         fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{:.6g}</text>\n", left - 8, y(tick) + 4, shown);
@@ -219,9 +256,14 @@ std::string svg(const Plot& plot) {
       fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\" xmlns=\"http://www.w3.org/2000/svg\">\n",
                   width, height, html_escaped(plot.description));
   text += axes(plot, x, y);
+  std::vector<Segment> segments;
   for (const PlotLine& line : plot.lines) {
     std::string points;
-    for (const auto& [px, py] : line.points) points += fmt::format("{:.1f},{:.1f} ", x(px), y(py));
+    for (std::size_t i = 0; i < line.points.size(); ++i) {
+      const auto& [px, py] = line.points[i];
+      points += fmt::format("{:.1f},{:.1f} ", x(px), y(py));
+      if (i > 0) segments.push_back({x(line.points[i - 1].first), y(line.points[i - 1].second), x(px), y(py)});
+    }
     text += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"{}/>\n", points,
                         line.color, line.dashed ? " stroke-dasharray=\"5 4\"" : "");
   }
@@ -242,19 +284,26 @@ std::string svg(const Plot& plot) {
     const bool covered = &*std::find_if(plot.points.begin(), plot.points.end(), is_here) != &point;
     if (point.label.empty() || covered) continue;
     const double text_width = character_width * static_cast<double>(point.label.size()) + 2;
-    for (const Place& place : candidates) {
+    const auto is_free = [&](const Place& place) {
       const Box box = label_box(px, py, place, text_width);
-      if (box.x0 < left + 2 || box.x1 > right - 2 || box.y0 < top + 2 || box.y1 > bottom - 2) continue;
-      if (std::any_of(taken.begin(), taken.end(), [&](const Box& other) { return box.overlaps(other); })) continue;
-      taken.push_back(box);
-      if (std::max(std::fabs(place.dx), std::fabs(place.dy)) > 14) {
-        labels += fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" class=\"leader\"/>\n", px,
-                              py, px + place.dx, py + place.dy);
-      }
-      labels += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" class=\"label\">{}</text>\n",
-                            px + place.dx, py + place.dy + 4, place.anchor, html_escaped(point.label));
-      break;
+      if (box.x0 < left + 2 || box.x1 > right - 2 || box.y0 < top + 2 || box.y1 > bottom - 2) return false;
+      return std::none_of(taken.begin(), taken.end(), [&](const Box& other) { return box.overlaps(other); });
+    };
+    const auto is_clear = [&](const Place& place) {
+      const Box box = label_box(px, py, place, text_width);
+      return is_free(place) &&
+             std::none_of(segments.begin(), segments.end(), [&](const Segment& line) { return line.crosses(box); });
+    };
+    auto place = std::find_if(candidates.begin(), candidates.end(), is_clear);
+    if (place == candidates.end()) place = std::find_if(candidates.begin(), candidates.end(), is_free);
+    if (place == candidates.end()) continue;
+    taken.push_back(label_box(px, py, *place, text_width));
+    if (std::max(std::fabs(place->dx), std::fabs(place->dy)) > 14) {
+      labels += fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" class=\"leader\"/>\n", px,
+                            py, px + place->dx, py + place->dy);
     }
+    labels += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" class=\"label\">{}</text>\n",
+                          px + place->dx, py + place->dy + 4, place->anchor, html_escaped(point.label));
   }
   text += labels;
   // The first on top.

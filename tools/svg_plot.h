@@ -10,7 +10,7 @@ enum class Marker { circle, square, diamond, triangle, star };
 
 struct PlotAxis {
   std::string title;
-  bool logarithmic = false;  ///< values above 0 only
+  bool logarithmic = false;  ///< values of 0 lie on a tick of their own, apart
 };
 
 struct PlotPoint {
@@ -45,8 +45,8 @@ struct Plot {
   std::vector<LegendEntry> legend;
 };
 
-/// An <svg> element. Labels never overlap one another or a point: one for which there is no room is left out, and so is
-/// that of a point which lies under an earlier one.
+/// An <svg> element. Labels never overlap one another or a point, nor a line where there is other room: one for which
+/// there is no room is left out, and so is that of a point which lies under an earlier one.
 std::string svg(const Plot& plot);
 
 /// Text for HTML and SVG, also inside double quotes.

@@ -175,20 +175,21 @@ std::vector<Camera> load_cameras(const std::string& path) {
   return cameras;
 }
 
-Camera camera_from_file(const std::string& text, const std::optional<ImageSize>& size) {
-  std::string path = text;
-  std::size_t index = 0;
+CameraName camera_name(const std::string& text) {
   const std::size_t mark = text.rfind('#');
-  if (mark != std::string::npos) {
-    path = text.substr(0, mark);
-    const char* end = text.data() + text.size();
-    const auto result = std::from_chars(text.data() + mark + 1, end, index);
-    if (result.ec != std::errc{} || result.ptr != end) {
-      throw UserError(kCannotUse, "--camera " + text, "what follows # is not an index",
-                      "give FILE#INDEX, index from 0");
-    }
+  if (mark == std::string::npos) return {text, 0};
+  CameraName name{text.substr(0, mark), 0};
+  const char* end = text.data() + text.size();
+  const auto result = std::from_chars(text.data() + mark + 1, end, name.index);
+  if (result.ec != std::errc{} || result.ptr != end) {
+    throw UserError(kCannotUse, "--camera " + text, "what follows # is not an index", "give FILE#INDEX, index from 0");
   }
-  const std::vector<Camera> cameras = load_cameras(path);
+  return name;
+}
+
+Camera camera_from_file(const std::string& text, const std::optional<ImageSize>& size) {
+  const auto [file, index] = camera_name(text);
+  const std::vector<Camera> cameras = load_cameras(file);
   if (index >= cameras.size()) {
     throw UserError(kCannotUse, "--camera " + text,
                     "there is no camera " + std::to_string(index) + ", the file has " + std::to_string(cameras.size()),

@@ -133,19 +133,23 @@ LoadedScene load_draw_list(const std::string& path, const SceneRequest& request)
   return loaded;
 }
 
+/// The camera of the file given, or that of a view, which is only asked for if there is none.
+template <class MakeView>
+Viewpoint viewpoint(const SceneRequest& request, ImageSize default_size, const MakeView& make_view) {
+  if (request.camera) return {camera_from_file(*request.camera, request.size), {}, camera_name(*request.camera)};
+  const View view = make_view();
+  return {look_at(view, request.size.value_or(default_size)), view, {}};
+}
+
 void open_builtin(const std::string& name, const SceneRequest& request, OpenedScene& scene) {
   const BuiltinScene builtin = make_builtin_scene(name);
   scene.gaussians = builtin.gaussians;
-  scene.camera = request.camera
-                     ? camera_from_file(*request.camera, request.size)
-                     : look_at(with_options(builtin.info.view, request), request.size.value_or(builtin.info.size));
+  scene.viewpoint = viewpoint(request, builtin.info.size, [&] { return with_options(builtin.info.view, request); });
 }
 
 void open_ply(const std::string& path, const SceneRequest& request, OpenedScene& scene) {
   scene.gaussians = open_gaussian_ply(path);
-  scene.camera = request.camera ? camera_from_file(*request.camera, request.size)
-                                : look_at(automatic_view(path, scene.gaussians, request),
-                                          request.size.value_or(kDefaultImageSize));
+  scene.viewpoint = viewpoint(request, kDefaultImageSize, [&] { return automatic_view(path, scene.gaussians, request); });
 }
 
 bool is_builtin(const std::string& scene) { return scene.rfind(kBuiltinPrefix, 0) == 0; }
@@ -190,7 +194,8 @@ LoadedScene preprocess_scene(const OpenedScene& scene, const PreprocessOptions& 
   if (scene.draw_list) {
     loaded = *scene.draw_list;
   } else {
-    loaded.draw = preprocess(scene.gaussians, scene.camera, options, loaded.summary);
+    loaded.draw = preprocess(scene.gaussians, scene.viewpoint.camera, options, loaded.summary);
+    loaded.viewpoint = scene.viewpoint;
     loaded.preprocessed_here = true;
   }
   loaded.summary.name = scene.name;

@@ -2,6 +2,10 @@
 
 #include <pty.h>
 
+#include <regex>
+#include <set>
+#include <thread>
+
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 
@@ -154,26 +158,58 @@ TEST_F(CommandLine, RunReportsWhatUnitsSpentTheirCyclesOn) {
   expect_in(finished.out, {"busy", "starved", "blocked", "memory", "latency", "gpc0.crop", "gpc0.qru"});
 }
 
-TEST_F(CommandLine, ProgressIsDrawnOnATerminalAndErased) {
-  int master = -1;
-  int slave = -1;
-  ASSERT_EQ(::openpty(&master, &slave, nullptr, nullptr, nullptr), 0);
-  ::setenv("TERM", "xterm", 1);
-  const Finished finished = vrpipe({"compare", "--scene", "tiny.spl"}, slave);
-  ::close(slave);
-  std::string drawn;
-  char buffer[4096];
-  for (ssize_t count; (count = ::read(master, buffer, sizeof buffer)) > 0;)
-    drawn.append(buffer, static_cast<std::size_t>(count));
-  ::close(master);
-  EXPECT_EQ(finished.code, 0);
-  expect_in(drawn, {"baseline", "het+qm", "%"});
-  const std::string erase = "\r\x1b[K";
+/// What a command draws on a terminal of its own.
+class OnATerminal : public ToolTest {
+ protected:
+  std::string drawn_by(const std::vector<std::string>& arguments) {
+    int master = -1;
+    int slave = -1;
+    EXPECT_EQ(::openpty(&master, &slave, nullptr, nullptr, nullptr), 0);
+    ::setenv("TERM", "xterm", 1);
+    std::string drawn;
+    std::thread reader([&] {
+      char buffer[4096];
+      for (ssize_t count; (count = ::read(master, buffer, sizeof buffer)) > 0;) {
+        drawn.append(buffer, static_cast<std::size_t>(count));
+      }
+    });
+    finished_ = vrpipe(arguments, slave);
+    ::close(slave);
+    reader.join();
+    ::close(master);
+    EXPECT_EQ(finished_.code, 0);
+    return drawn;
+  }
+  Finished finished_;
+};
+
+TEST_F(OnATerminal, ProgressIsDrawnAndErased) {
+  const std::string drawn = drawn_by({"compare", "--scene", "tiny.spl", "--jobs", "1"});
+  expect_in(drawn, {"baseline", "het+qm waiting", "%"});
+  const std::string erase = "\r\x1b[J";
   ASSERT_GE(drawn.size(), erase.size());
   EXPECT_EQ(drawn.substr(drawn.size() - erase.size()), erase);
   EXPECT_EQ(drawn.find('\n'), std::string::npos);
   // stdout is a file here: no colours in it.
-  EXPECT_EQ(finished.out.find('\x1b'), std::string::npos);
+  EXPECT_EQ(finished_.out.find('\x1b'), std::string::npos);
+}
+
+TEST_F(OnATerminal, AccuracyCountsBothLaddersAsOne) {
+  const std::string drawn = drawn_by({"accuracy", "--quick", "--scene", "tiny.spl"});
+  std::vector<int> done;
+  std::set<int> totals;
+  std::set<std::string> ladders;
+  const std::regex pattern("(fidelity|precision) (\\d+)/(\\d+)");
+  for (std::sregex_iterator i(drawn.begin(), drawn.end(), pattern), end; i != end; ++i) {
+    ladders.insert((*i)[1]);
+    done.push_back(std::stoi((*i)[2]));
+    totals.insert(std::stoi((*i)[3]));
+  }
+  EXPECT_EQ(ladders.size(), 2U);
+  EXPECT_EQ(totals.size(), 1U);
+  EXPECT_TRUE(std::is_sorted(done.begin(), done.end()));
+  ASSERT_FALSE(done.empty());
+  EXPECT_EQ(done.back(), *totals.begin());
 }
 
 }  // namespace

@@ -1,9 +1,16 @@
 #include "tool_test_support.h"
 
+#include <algorithm>
+#include <cstdio>
+#include <iterator>
 #include <map>
+#include <regex>
 #include <set>
+#include <sstream>
 
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/registry.h>
+#include <vrpipe/workloads/gaussian_scene.h>
 
 #include "settings.h"
 
@@ -44,6 +51,7 @@ void check_run(const json& run, bool timed) {
   EXPECT_EQ(run["cycles"].is_null(), !timed);
   EXPECT_EQ(run["milliseconds"].is_number_float(), timed);
   EXPECT_TRUE(run["host_seconds"].is_number_float());
+  EXPECT_GT(run["cpu_seconds"].get<double>(), 0);
   for (const std::string& name : count_names) EXPECT_TRUE(run["counts"][name].is_number_unsigned()) << name;
   EXPECT_EQ(run["counts"].size(), count_names.size());
   for (const char* unit : {"raster", "zrop", "prop", "sm", "crop", "l2", "dram"}) {
@@ -76,8 +84,8 @@ void check_run(const json& run, bool timed) {
   EXPECT_GT(count("fragments_blended"), 0U);
 }
 
-void check_head(const json& result) {
-  EXPECT_EQ(result["schema"], "vrpipe.compare/1");
+void check_head(const json& result, const std::string& schema = "vrpipe.compare/1") {
+  EXPECT_EQ(result["schema"], schema);
   EXPECT_TRUE(result["version"].is_string());
   EXPECT_TRUE(result["seed"].is_number_unsigned());
   EXPECT_EQ(result["scene"]["name"], "tiny.spl");
@@ -142,7 +150,7 @@ TEST_F(Result, ParametersHaveTypes) {
 
 TEST_F(Result, RunHasOneEntry) {
   const json result = json_of({"run", "--scene", "tiny.spl", "--format", "rgba8", "--termination", "strict"});
-  check_head(result);
+  check_head(result, "vrpipe.run/1");
   EXPECT_EQ(result["format"], "rgba8");
   EXPECT_EQ(result["termination"], "strict");
   ASSERT_EQ(result["runs"].size(), 1U);
@@ -166,7 +174,10 @@ TEST_F(Result, CompareEqualsRun) {
   for (const json& run : result["runs"]) {
     json alone = json_of({"run", "--scene", "tiny.spl", "--variant", run["variant"].get<std::string>()})["runs"][0];
     json together = run;
-    for (json* one : {&alone, &together}) one->erase("host_seconds");
+    for (json* one : {&alone, &together}) {
+      one->erase("host_seconds");
+      one->erase("cpu_seconds");
+    }
     EXPECT_EQ(alone, together);
   }
 }
@@ -176,7 +187,13 @@ TEST_F(Result, DoesNotDependOnTheNumberOfProcesses) {
   const char* const jobs[] = {"1", "2", "4"};
   for (std::size_t i = 0; i < 3; ++i) {
     results[i] = json_of({"compare", "--scene", "tiny.spl", "--jobs", jobs[i]});
-    for (json& run : results[i]["runs"]) run.erase("host_seconds");
+    for (json& run : results[i]["runs"]) {
+      run.erase("host_seconds");
+      run.erase("cpu_seconds");
+    }
+    // What was asked for, and what else the host did.
+    results[i].erase("command");
+    results[i].erase("host");
   }
   EXPECT_EQ(results[0], results[1]);
   EXPECT_EQ(results[0], results[2]);
@@ -238,6 +255,176 @@ TEST_F(Result, AnEmptyDrawIsFine) {
   EXPECT_EQ(finished.code, 0) << finished.err;
   EXPECT_EQ(finished.out.find("nan"), std::string::npos) << finished.out;
   EXPECT_EQ(finished.out.find("inf"), std::string::npos) << finished.out;
+}
+
+TEST_F(Result, NothingVisibleIsSaidAndHasNoSpeedup) {
+  Draw empty;
+  empty.width = 8;
+  empty.height = 8;
+  write_draw_list(folder() / "empty.spl", empty);
+  const std::vector<std::vector<std::string>> cases{{"compare", "--scene", "builtin:object", "--size", "8x8", "--eye",
+                                                     "0,0,-30", "--look-at", "0,0,-60"},
+                                                    {"compare", "--scene", "empty.spl"}};
+  for (const std::vector<std::string>& arguments : cases) {
+    const Finished finished = vrpipe(arguments);
+    SCOPED_TRACE(finished.out);
+    EXPECT_EQ(finished.code, 0);
+    EXPECT_NE(finished.out.find("nothing is visible"), std::string::npos);
+    EXPECT_NE(finished.out.find("camera"), std::string::npos) << "what to do";
+    EXPECT_TRUE(std::regex_search(finished.out, std::regex("speed-up over baseline( +-){4}\n")));
+    const json result = json_of(arguments);
+    for (const char* variant : {"qm", "het", "het+qm"}) EXPECT_TRUE(result["speedup"][variant].is_null()) << variant;
+  }
+  EXPECT_EQ(vrpipe({"compare", "--scene", "tiny.spl"}).out.find("nothing is visible"), std::string::npos);
+}
+
+// What made a result.
+
+TEST_F(Result, NamesTheCommandThePluginsAndTheUnits) {
+  const std::vector<std::string> words{"compare",  "--scene",   "tiny.spl", "--fidelity",    "functional",
+                                       "--plugin", TEST_PLUGIN, "--unit",   "qru=same-splat"};
+  const json result = json_of(words);
+  ASSERT_EQ(result["command"].size(), words.size() + 3) << "the program, and --json -";
+  for (std::size_t i = 0; i < words.size(); ++i) EXPECT_EQ(result["command"][i + 1], words[i]);
+  ASSERT_EQ(result["plugins"].size(), 1U);
+  EXPECT_EQ(result["plugins"][0]["path"], TEST_PLUGIN);
+  std::FILE* const pipe = ::popen("sha256sum < '" TEST_PLUGIN "'", "r");
+  char digits[65] = "";
+  EXPECT_EQ(std::fread(digits, 1, 64, pipe), 64U);
+  ::pclose(pipe);
+  EXPECT_EQ(result["plugins"][0]["sha256"], digits);
+  const std::map<std::string, std::string> qru{{"baseline", "pass-through"},
+                                               {"qm", "same-splat"},
+                                               {"het", "pass-through"},
+                                               {"het+qm", "same-splat"}};
+  for (const json& run : result["runs"]) {
+    const json& implementations = run["implementations"];
+    EXPECT_EQ(implementations["qru"], qru.at(run["variant"])) << run["variant"];
+    EXPECT_EQ(implementations["crop"], "color-rop");
+    EXPECT_EQ(implementations.size(), Registry::slots().size());
+  }
+  EXPECT_GE(result["host"]["load_average"].get<double>(), 0);
+  EXPECT_EQ(json_of({"compare", "--scene", "tiny.spl", "--jobs", "3"})["host"]["processes"], 3);
+  EXPECT_TRUE(json_of({"run", "--scene", "tiny.spl"})["plugins"].empty());
+}
+
+TEST_F(Result, EveryParameterHasAnOrigin) {
+  const Platform& platform = platform_named("mobile");
+  ASSERT_FALSE(platform.settings.empty());
+  const Setting& both = platform.settings.front();
+  const std::string overridden = both.unit + "." + both.parameter;
+  const json result = json_of({"run", "--scene", "builtin:object", "--size", "16x16", "--fidelity", "functional",
+                               "--platform", "mobile", "--set", "state.exponential=exact", "--set",
+                               "preprocess.sh_degree=1", "--set", overridden + "=" + both.value});
+  std::map<std::string, std::string> expected;
+  for (const auto& parameter : result["platform"]["parameters"].items()) expected[parameter.key()] = "default";
+  for (const Setting& setting : platform.settings) expected.at(setting.unit + "." + setting.parameter) = "platform";
+  for (const std::string& given : {std::string("state.exponential"), std::string("preprocess.sh_degree"), overridden}) {
+    expected.at(given) = "command line";
+  }
+  EXPECT_EQ(result["platform"]["origins"], json(expected));
+}
+
+TEST_F(Result, CameraHasItsFinalNumbers) {
+  const std::vector<std::string> draw{"run",   "--scene",    "builtin:object", "--size",
+                                      "32x24", "--fidelity", "functional"};
+  std::vector<std::string> given = draw;
+  given.insert(given.end(), {"--eye", "0,0,-3", "--look-at", "0,0,1", "--up", "0,-1,0", "--fovy", "90"});
+  const json camera = json_of(given)["camera"];
+  EXPECT_EQ(camera["eye"], (json{0, 0, -3}));
+  EXPECT_EQ(camera["look_at"], (json{0, 0, 1}));
+  EXPECT_EQ(camera["up"], (json{0, -1, 0}));
+  EXPECT_NEAR(camera["fovy_degrees"].get<double>(), 90, 1e-9);
+  EXPECT_NEAR(camera["focal_pixels"][1].get<double>(), 12, 1e-9);
+  EXPECT_NEAR(camera["right"][0].get<double>(), 1, 1e-12);
+  EXPECT_NEAR(camera["down"][1].get<double>(), 1, 1e-12);
+  EXPECT_NEAR(camera["forward"][2].get<double>(), 1, 1e-12);
+  EXPECT_TRUE(camera["file"].is_null() && camera["index"].is_null());
+
+  const json entry = {
+      {"width", 32}, {"height", 24}, {"position", {1, 2, -3}}, {"rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+      {"fx", 20},    {"fy", 24}};
+  write("cameras.json", json{entry, entry}.dump());
+  std::vector<std::string> from_file{"run", "--scene", "builtin:object", "--fidelity", "functional"};
+  from_file.insert(from_file.end(), {"--camera", "cameras.json#1"});
+  const json read = json_of(from_file)["camera"];
+  EXPECT_EQ(read["file"], "cameras.json");
+  EXPECT_EQ(read["index"], 1);
+  EXPECT_EQ(read["eye"], (json{1, 2, -3}));
+  EXPECT_EQ(read["focal_pixels"], (json{20, 24}));
+  EXPECT_TRUE(read["look_at"].is_null() && read["up"].is_null());
+
+  EXPECT_FALSE(json_of(draw)["camera"]["look_at"].is_null()) << "the scene's own";
+  EXPECT_TRUE(json_of({"run", "--scene", "tiny.spl"})["camera"].is_null());
+}
+
+// The documentation.
+
+/// The keys in the first column of the tables of a section.
+std::set<std::string> documented(const std::string& page, const std::string& heading) {
+  std::set<std::string> keys;
+  const std::size_t start = page.find("\n### " + heading + "\n");
+  EXPECT_NE(start, std::string::npos) << heading;
+  std::istringstream lines(page.substr(start + 5, page.find("\n#", start + 5) - start - 5));
+  const std::regex key("`([^`]+)`");
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind("| `", 0) != 0) continue;
+    const std::string cell = line.substr(0, line.find(" |", 2));
+    for (std::sregex_iterator i(cell.begin(), cell.end(), key), end; i != end; ++i) keys.insert((*i)[1]);
+  }
+  return keys;
+}
+
+std::string without_brackets(const std::string& key) {
+  return key.size() > 2 && key.substr(key.size() - 2) == "[]" ? key.substr(0, key.size() - 2) : key;
+}
+
+/// Every key of a result as the documentation writes it; `known` says which names depend on the run.
+void find_keys(const json& value, const std::string& path, const std::set<std::string>& known,
+               std::set<std::string>& found) {
+  if (value.is_object() && !value.empty()) {
+    const bool is_map = known.count(path + ".*") > 0;
+    for (const auto& entry : value.items()) {
+      find_keys(entry.value(), (path.empty() ? "" : path + ".") + (is_map ? "*" : entry.key()), known, found);
+    }
+  } else if (value.is_array() && !value.empty()) {
+    for (const json& element : value) find_keys(element, path + "[]", known, found);
+  } else if (!value.is_array() || known.count(path + "[]") > 0) {
+    found.insert(without_brackets(path));
+  }
+}
+
+std::vector<std::string> only_in(const std::set<std::string>& some, const std::set<std::string>& others) {
+  std::vector<std::string> rest;
+  std::set_difference(some.begin(), some.end(), others.begin(), others.end(), std::back_inserter(rest));
+  return rest;
+}
+
+TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
+  GaussianSceneBuilder builder(0);
+  GaussianAttributes gaussian;
+  gaussian.log_scale = {-2, -2, -2};
+  gaussian.opacity_logit = 2;
+  builder.add(gaussian);
+  write_gaussian_ply(folder() / "scene.ply", builder.build());
+  const std::string page = read_file(RESULTS_PAGE);
+  const auto of_scene = [&](std::vector<std::string> command) {
+    command.insert(command.end(), {"--scene", "scene.ply", "--size", "16x16", "--plugin", TEST_PLUGIN});
+    return json_of(command);
+  };
+  const auto check = [&](const std::string& heading, const std::vector<json>& results) {
+    SCOPED_TRACE(heading);
+    std::set<std::string> known = documented(page, "Of every result");
+    known.merge(documented(page, heading));
+    std::set<std::string> expected;
+    for (const std::string& key : known) expected.insert(without_brackets(key));
+    std::set<std::string> found;
+    for (const json& result : results) find_keys(result, "", known, found);
+    EXPECT_EQ(only_in(found, expected), std::vector<std::string>()) << "are not documented";
+    EXPECT_EQ(only_in(expected, found), std::vector<std::string>()) << "do not exist";
+  };
+  check("Of `run` and `compare`", {of_scene({"run"}), of_scene({"compare"}), json_of({"run", "--scene", "tiny.spl"})});
+  check("Of `accuracy`", {of_scene({"accuracy", "--quick"}), json_of({"accuracy", "--quick", "--scene", "tiny.spl"})});
 }
 
 }  // namespace

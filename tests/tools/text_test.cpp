@@ -1,5 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <fcntl.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+
 #include <vrpipe/error.h>
 
 #include "parse.h"
@@ -42,9 +49,75 @@ TEST(Text, ProgressFitsItsLine) {
     }
   }
   EXPECT_EQ(progress_text({"run"}, {0.5F}, 90, 40), "run  50%  [=========        ] 1:30 left");
+  EXPECT_EQ(progress_text({"het", "het+qm"}, {0.0F, waiting}, 1, 30), "het   0%  het+qm waiting  ");
   // Of many, those under way.
   EXPECT_EQ(progress_text({"a", "b", "c", "d", "e"}, {1, 0.5F, 1, 0, 0}, 50, 46),
             "2/5  b  50%  [==========          ] 0:50 left");
+}
+
+/// A line of a terminal that wraps it anew when its width changes.
+struct TerminalLine {
+  unsigned width;
+  std::string cells;
+  std::size_t cursor = 0;
+
+  void write(const std::string& bytes) {
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+      if (bytes[i] == '\r') {
+        cursor -= cursor % width;
+      } else if (bytes.compare(i, 3, "\x1b[J") == 0) {
+        cells.resize(cursor);
+        i += 2;
+      } else if (bytes.compare(i, 3, "\x1b[K") == 0) {
+        const std::size_t row_end = std::min(cells.size(), cursor - cursor % width + width);
+        std::fill(cells.begin() + static_cast<std::ptrdiff_t>(cursor),
+                  cells.begin() + static_cast<std::ptrdiff_t>(row_end), ' ');
+        i += 2;
+      } else {
+        cells.resize(std::max(cells.size(), cursor + 1));
+        cells[cursor++] = bytes[i];
+      }
+    }
+  }
+};
+
+TEST(Text, ProgressLeavesNothingOnATerminalThatShrinks) {
+  const int terminal = ::posix_openpt(O_RDWR | O_NOCTTY);
+  ASSERT_TRUE(terminal >= 0 && ::grantpt(terminal) == 0 && ::unlockpt(terminal) == 0);
+  const int ours = ::open(::ptsname(terminal), O_RDWR | O_NOCTTY);
+  const int stderr_before = ::dup(STDERR_FILENO);
+  ::dup2(ours, STDERR_FILENO);
+  const std::string term = std::getenv("TERM") == nullptr ? "" : std::getenv("TERM");
+  ::setenv("TERM", "xterm", 1);
+  TerminalLine line{0, {}};
+  const auto resize = [&](unsigned short width) {
+    winsize size{};
+    size.ws_col = width;
+    ::ioctl(terminal, TIOCSWINSZ, &size);
+    line.width = width;
+  };
+  const auto catch_up = [&] {
+    char bytes[1024];
+    line.write(std::string(bytes, static_cast<std::size_t>(::read(terminal, bytes, sizeof bytes))));
+    return line.cells;
+  };
+  std::vector<std::string> seen;
+  {
+    ProgressLine progress;
+    resize(100);
+    progress.show(std::string(200, 'x'));
+    seen.push_back(catch_up());
+    resize(30);
+    progress.show("short");
+    seen.push_back(catch_up());
+    resize(3);
+    progress.erase();
+    seen.push_back(catch_up());
+  }
+  ::dup2(stderr_before, STDERR_FILENO);
+  for (const int descriptor : {terminal, ours, stderr_before}) ::close(descriptor);
+  term.empty() ? ::unsetenv("TERM") : ::setenv("TERM", term.c_str(), 1);
+  EXPECT_EQ(seen, (std::vector<std::string>{std::string(99, 'x'), "short", ""}));
 }
 
 TEST(Text, WhatBoundsARunIsSaidWithItsParts) {
@@ -78,6 +151,8 @@ TEST(Text, RatiosNeedBothRuns) {
   EXPECT_FALSE(speedup(baseline, het).has_value());
   baseline.cycles = 300;
   het.cycles = 100;
+  EXPECT_FALSE(speedup(baseline, het).has_value()) << "nothing was drawn";
+  baseline.counts.fragments_rasterized = 1;
   EXPECT_EQ(speedup(baseline, het), 3.0);
   EXPECT_FALSE(early_termination_ratio({baseline}).has_value());
   EXPECT_FALSE(early_termination_ratio({baseline, het}).has_value());

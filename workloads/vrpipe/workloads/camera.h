@@ -55,8 +55,18 @@ Camera resized(const Camera& camera, ImageSize size);
 /// @throws UserError when the file cannot be read or a camera in it cannot be used
 std::vector<Camera> load_cameras(const std::string& path);
 
-/// The camera that `text` names: FILE or FILE#INDEX, index from 0 (the default).
-/// @throws UserError as load_cameras, and when there is no such index
+/// A camera of a cameras.json.
+struct CameraName {
+  std::string file;
+  std::size_t index = 0;
+};
+
+/// What `text` names: FILE or FILE#INDEX, index from 0 (the default).
+/// @throws UserError when what follows # is no index
+CameraName camera_name(const std::string& text);
+
+/// The camera that `text` names.
+/// @throws UserError as camera_name and load_cameras, and when there is no such index
 Camera camera_from_file(const std::string& text, const std::optional<ImageSize>& size = std::nullopt);
 
 /// @throws UserError unless both sides are 1 to kMaxImageSize; `where` names the option or file

@@ -22,10 +22,18 @@ struct SceneRequest {
   PreprocessOptions preprocess;
 };
 
+/// The camera of a draw, and where it comes from.
+struct Viewpoint {
+  Camera camera;
+  std::optional<View> view;        ///< that the camera was made from; none for a camera of a file
+  std::optional<CameraName> file;  ///< that the camera was read from
+};
+
 struct LoadedScene {
   Draw draw;
-  SceneSummary summary;            ///< name: the file's name without folder, or builtin:NAME
-  bool preprocessed_here = false;  ///< false for a draw list
+  SceneSummary summary;                ///< name: the file's name without folder, or builtin:NAME
+  std::optional<Viewpoint> viewpoint;  ///< none for a draw list
+  bool preprocessed_here = false;      ///< false for a draw list
 };
 
 /// Image size of a .ply that is drawn without a camera file or a size.
@@ -36,7 +44,7 @@ constexpr ImageSize kDefaultImageSize{1280, 720};
 struct OpenedScene {
   std::string name;  ///< as SceneSummary has it
   GaussianScene gaussians;
-  Camera camera;
+  Viewpoint viewpoint;
   std::optional<LoadedScene> draw_list;
 };
 

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace vrpipe::tools {
+
+/// A plugin that was loaded, and what was in it.
+struct PluginFile {
+  std::string path;    ///< as given
+  std::string sha256;  ///< of the file, 64 hex digits
+};
+
+/// What made a result, beside what the result itself says.
+struct Provenance {
+  std::vector<std::string> command;  ///< the command line, word by word
+  std::vector<PluginFile> plugins;
+  double load_average = 0;  ///< of the host over the minute before, processes
+};
+
+/// Takes note of the plugins and of the host as it is now. Throws UserError for a plugin that cannot be read.
+Provenance make_provenance(std::vector<std::string> command, const std::vector<std::string>& plugins);
+
+/// The command line as a shell takes it: words in single quotes where they need them.
+std::string command_text(const Provenance& provenance);
+
+}  // namespace vrpipe::tools
