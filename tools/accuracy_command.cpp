@@ -35,7 +35,7 @@ class AccuracyCommand : public Command {
         ->group(ladders);
     add_option(app, "--repeat", repeat_, "N",
                "measures each rung of the fidelity ladder N times, interleaved, and\n"
-               "takes the median of the host seconds (default: 1)",
+               "takes the median of the seconds (default: 1)",
                ladders);
     add_option(app, "--html", html_, "FILE", "writes a page with plots, images and error maps; it needs no network",
                "Where results go");
@@ -44,7 +44,7 @@ class AccuracyCommand : public Command {
         ->group("Where results go");
     app.footer(
         "Climbs two ladders. Fidelity: every variant at every --fidelity that there is, one at a time, with its\n"
-        "error in cycles and speed-up against the most exact, and its host seconds. Precision: het+qm, at the\n"
+        "error in cycles and speed-up against the most exact, and its CPU seconds. Precision: het+qm, at the\n"
         "--fidelity given (default: cycle), with one arithmetic choice changed at a time, with its error against\n"
         "an image in double precision (no tiles, no termination, all bands, exact order), and its simulated\n"
         "cycles. --jobs is for the precision ladder. --output writes the image of every choice.\n"

@@ -22,7 +22,8 @@ constexpr const char* style = R"(
 body { margin: 0 auto; padding: 28px 24px 60px; max-width: 1080px; background: #fff; color: #1d232a;
        font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
 h1 { font-size: 26px; margin: 0 0 4px; } h2 { font-size: 20px; margin: 44px 0 6px; } p { margin: 6px 0; max-width: 860px; }
-.subtle { color: #5a6572; } .verdict { font-size: 17px; } code { font-size: 13px; overflow-wrap: anywhere; } .notice { background: #fff4d6; border-left: 4px solid #d99a00; padding: 8px 12px; }
+.verdict { font-size: 17px; } code { font-size: 13px; overflow-wrap: anywhere; }
+.subtle { color: #5a6572; } .notice { background: #fff4d6; border-left: 4px solid #d99a00; padding: 8px 12px; }
 ul { margin: 6px 0; padding-left: 20px; }
 svg { width: 100%; height: auto; margin: 10px 0; }
 svg text { font: 12px system-ui, "Segoe UI", "DejaVu Sans", sans-serif; fill: #1d232a; }
@@ -244,6 +245,7 @@ std::string accuracy_page(const AccuracyResult& result) {
   text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
   text += "<title>vrpipe accuracy: " + html_escaped(result.scene.name) + "</title>\n";
   text += std::string("<style>") + style + "</style>\n</head>\n<body>\n<h1>What accuracy costs in time</h1>\n";
+  // Three lines on what was drawn; what follows is to be noticed.
   for (std::size_t i = 0; i < heading.size(); ++i) {
     text += fmt::format("<p class=\"{}\">{}</p>\n", i < 3 ? "subtle" : "notice", html_escaped(heading[i]));
   }

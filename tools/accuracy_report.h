@@ -40,7 +40,7 @@ std::vector<std::string> fidelity_summary(const AccuracyResult& result);
 /// What knobs cost nothing, and what else the precision ladder says; one line each.
 std::vector<std::string> precision_summary(const AccuracyResult& result);
 
-/// What was drawn on which GPU, and how; one line each.
+/// What was drawn on which GPU, and how, in three lines; then what one has to know to trust the rest, one line each.
 std::vector<std::string> accuracy_heading(const AccuracyResult& result);
 
 /// For the terminal.
