@@ -19,8 +19,8 @@ constexpr double right = 820;  // the legend is beyond
 constexpr double top = 16;
 constexpr double bottom = 466;
 constexpr double radius = 5.5;
-constexpr double character_width = 6.4;
-constexpr double line_height = 13;
+constexpr double character_width = 7.4;
+constexpr double line_height = 14;
 
 struct Box {
   double x0, y0, x1, y1;

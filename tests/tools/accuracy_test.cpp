@@ -235,7 +235,7 @@ TEST(Plots, LabelsNeverOverlap) {
   const std::regex pattern(
       R"re(<text x="([-0-9.]+)" y="([-0-9.]+)" text-anchor="(\w+)" class="label">([^<]*)</text>)re");
   for (std::sregex_iterator i(drawn.begin(), drawn.end(), pattern), end; i != end; ++i) {
-    labels.push_back({std::stod((*i)[1]), std::stod((*i)[2]), (*i)[3], 6.0 * static_cast<double>((*i)[4].length())});
+    labels.push_back({std::stod((*i)[1]), std::stod((*i)[2]), (*i)[3], 7.3 * static_cast<double>((*i)[4].length())});
   }
   ASSERT_GT(labels.size(), 5U);
   const auto left = [](const Label& label) {
@@ -245,7 +245,7 @@ TEST(Plots, LabelsNeverOverlap) {
   };
   for (std::size_t i = 0; i < labels.size(); ++i) {
     for (std::size_t k = 0; k < i; ++k) {
-      const bool apart = std::fabs(labels[i].y - labels[k].y) >= 12 ||
+      const bool apart = std::fabs(labels[i].y - labels[k].y) >= 14 ||
                          left(labels[i]) >= left(labels[k]) + labels[k].width ||
                          left(labels[k]) >= left(labels[i]) + labels[i].width;
       EXPECT_TRUE(apart) << i << " and " << k;

@@ -389,6 +389,8 @@ void find_keys(const json& value, const std::string& path, const std::set<std::s
     }
   } else if (value.is_array() && !value.empty()) {
     for (const json& element : value) find_keys(element, path + "[]", known, found);
+  } else if (value.is_object()) {
+    found.insert(path + ".*");
   } else if (!value.is_array() || known.count(path + "[]") > 0) {
     found.insert(without_brackets(path));
   }
