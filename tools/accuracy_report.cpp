@@ -149,6 +149,15 @@ FidelityRange range_of(const AccuracyResult& result, Fidelity fidelity) {
   return range;
 }
 
+/// What bounds the default, and so what can have a price; empty without time.
+std::string price_text(const RunResult& run) {
+  std::string text = bound_text(run);
+  if (text.empty()) return text;
+  text.pop_back();  // the end of its line
+  if (run.bottleneck->occupancy >= bounding_occupancy) text += ": what spares other units saves no time here";
+  return text;
+}
+
 std::string times_text(const FidelityRange& range) {
   const std::string slowest = fmt::format("{:.1f}", range.slowest);
   const std::string fastest = fmt::format("{:.1f}", range.fastest);
@@ -285,6 +294,7 @@ std::string precision_verdict(const AccuracyResult& result) {
 
 std::vector<std::string> precision_summary(const AccuracyResult& result) {
   std::vector<std::string> lines;
+  if (const std::string price = price_text(result.runs.front().run); !price.empty()) lines.push_back(price);
   if (!result.runs.front().run.cycles) {
     lines.push_back("without time at this fidelity: images alone");
   } else if (const std::vector<std::string> free = free_knobs(result); !free.empty()) {

@@ -302,7 +302,6 @@ std::optional<double> early_termination_ratio(const std::vector<RunResult>& runs
 
 std::string bound_text(const RunResult& run) {
   if (!run.bottleneck) return {};
-  constexpr double nearly_always = 0.9;
   const Bottleneck& busiest = *run.bottleneck;
   std::string parts;
   for (const auto& [name, share] : busiest.parts) {
@@ -310,7 +309,7 @@ std::string bound_text(const RunResult& run) {
     parts += fmt::format("{}{} {} %", parts.empty() ? "" : ", ", name, percent(share));
   }
   const std::string unit = unit_text(busiest.unit, run);
-  if (busiest.occupancy >= nearly_always) {
+  if (busiest.occupancy >= bounding_occupancy) {
     return fmt::format("{} is bound by {}, occupied {} % ({})\n", run.request.variant.name, unit,
                        percent(busiest.occupancy), parts);
   }

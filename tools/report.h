@@ -22,6 +22,9 @@ std::optional<double> speedup(const RunResult& baseline, const RunResult& run);
 /// nothing is blended.
 std::optional<double> early_termination_ratio(const std::vector<RunResult>& runs);
 
+/// A unit that is occupied for this share of a run bounds it.
+constexpr double bounding_occupancy = 0.9;
+
 /// What bounds a run: the unit that is occupied the most, and what with; a line, empty where nothing has time.
 std::string bound_text(const RunResult& run);
 

@@ -127,6 +127,19 @@ TEST(AccuracyText, TablesFitATerminalOf80Columns) {
   EXPECT_EQ(tables, 3U);
 }
 
+TEST(AccuracyText, SaysWhatBoundsTheDrawWherePricesCollapse) {
+  tools::AccuracyResult result = large_result();
+  RunResult& run = result.runs.front().run;
+  run.request = result.base;
+  run.bottleneck = Bottleneck{"gpc0.raster", 0.97, {{"fine tiles", 0.97}}};
+  EXPECT_EQ(
+      tools::precision_summary(result).front(),
+      "het+qm is bound by RASTER, occupied 97.0 % (fine tiles 97.0 %): what spares other units saves no time here");
+  run.bottleneck->occupancy = 0.5;
+  EXPECT_EQ(tools::precision_summary(result).front(),
+            "no one unit bounds het+qm: RASTER is occupied 50.0 % (fine tiles 97.0 %)");
+}
+
 TEST(AccuracyText, SaysWhatAccuracyCosts) {
   tools::AccuracyResult result = large_result();
   for (tools::FidelityRung& rung : result.fidelity) {

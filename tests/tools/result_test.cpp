@@ -425,7 +425,8 @@ TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
     EXPECT_EQ(only_in(found, expected), std::vector<std::string>()) << "are not documented";
     EXPECT_EQ(only_in(expected, found), std::vector<std::string>()) << "do not exist";
   };
-  check("Of `run` and `compare`", {of_scene({"run"}), of_scene({"compare"}), json_of({"run", "--scene", "tiny.spl"})});
+  check("Of `run` and `compare`", {of_scene({"run"}), of_scene({"compare"}),
+                                   json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional"})});
   check("Of `accuracy`", {of_scene({"accuracy", "--quick"}), json_of({"accuracy", "--quick", "--scene", "tiny.spl"})});
 }
 
