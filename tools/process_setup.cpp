@@ -33,7 +33,7 @@ void say(const char* text) {
 void end_in_order(int signal) {
   if (::getpid() == owner) {
     remove_unfinished_files();
-    if (progress_is_drawn) say("\r\x1b[K");
+    if (progress_is_drawn) say("\r\x1b[J");
     say(last_words);
   }
   // Delivered when the handler returns: whoever waits for the process sees which signal ended it.

@@ -119,7 +119,7 @@ TEST_F(Process, AnInterruptionSaysWhatWasWrittenAndLeavesNothingElse) {
     return ::raise(SIGTERM);
   });
   EXPECT_EQ(some.code, 128 + SIGTERM);
-  EXPECT_EQ(some.err, "\r\x1b[Kvrpipe: interrupted; written: a, b\\n, c, d and 2 more\n");
+  EXPECT_EQ(some.err, "\r\x1b[Jvrpipe: interrupted; written: a, b\\n, c, d and 2 more\n");
   EXPECT_EQ(files(), (std::vector<std::string>{"a", "b\n", "c", "d", "e", "f", "tiny.spl"}));
   EXPECT_EQ(read_file(folder() / "a"), "text");
 }
@@ -176,7 +176,7 @@ TEST_F(Process, InterruptedAtATerminalItErasesItsProgress) {
   ::waitpid(process, &status, 0);
   ASSERT_TRUE(WIFSIGNALED(status)) << drawn;
   EXPECT_EQ(WTERMSIG(status), SIGINT);
-  const std::string end = "\r\x1b[Kvrpipe: interrupted, nothing written\r\n";
+  const std::string end = "\r\x1b[Jvrpipe: interrupted, nothing written\r\n";
   ASSERT_GE(drawn.size(), end.size());
   EXPECT_EQ(drawn.substr(drawn.size() - end.size()), end);
 }
