@@ -149,7 +149,8 @@ void open_builtin(const std::string& name, const SceneRequest& request, OpenedSc
 
 void open_ply(const std::string& path, const SceneRequest& request, OpenedScene& scene) {
   scene.gaussians = open_gaussian_ply(path);
-  scene.viewpoint = viewpoint(request, kDefaultImageSize, [&] { return automatic_view(path, scene.gaussians, request); });
+  scene.viewpoint =
+      viewpoint(request, kDefaultImageSize, [&] { return automatic_view(path, scene.gaussians, request); });
 }
 
 bool is_builtin(const std::string& scene) { return scene.rfind(kBuiltinPrefix, 0) == 0; }
