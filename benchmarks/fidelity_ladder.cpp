@@ -1,8 +1,8 @@
 // What each fidelity costs in accuracy and brings in speed: measured beside wanted, against `cycle`.
 //   fidelity_ladder [--repeat N] [SCENE ...]
-// A SCENE is a file or builtin:NAME; without one, the built-in scenes and, where there is a shared folder, playbot.
+// A SCENE is a file or builtin:NAME; without one, the built-in scenes and the robot of tests/data.
 // Accuracy: every rung and variant of every scene, once. Rates: of one large frame, every rung and variant in turn, N times
-// (default: 5), the median; of the first scene where the frame of the shared folder is absent. The slowest variant counts.
+// (default: 5), the median: of the measured draw of tests/data, or of the first SCENE. The slowest variant counts.
 // Rates are rasterised quads per second of processor time of the simulation alone.
 #include <algorithm>
 #include <array>
@@ -17,7 +17,7 @@
 #include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/scene.h>
 
-#include "support/shared_folder.h"
+#include "support/data.h"
 
 namespace vrpipe {
 
@@ -138,30 +138,25 @@ int run(const std::vector<std::string>& arguments) {
       repeat = std::max(1, std::stoi(arguments[++i]));
     } else if (arguments[i].rfind('-', 0) == 0) {
       const bool help = arguments[i] == "--help";
-      std::fprintf(
-          help ? stdout : stderr,
-          "usage: fidelity_ladder [--repeat N] [SCENE ...]\n"
-          "SCENE: a file or builtin:NAME; without one the built-in scenes and, with a shared folder, playbot\n");
+      std::fprintf(help ? stdout : stderr,
+                   "usage: fidelity_ladder [--repeat N] [SCENE ...]\n"
+                   "SCENE: a file or builtin:NAME; without one the built-in scenes and the robot of tests/data\n");
       return help ? 0 : 2;
     } else {
       scenes.emplace_back().scene = arguments[i];
     }
   }
   const bool all = scenes.empty();
+  const testing::UnpackedFile robot("robot.ply");
   if (all) {
     for (const std::string& name : builtin_scene_names()) scenes.emplace_back().scene = "builtin:" + name;
-    const std::filesystem::path playbot = testing::shared_folder() / "scenes/playbot/playbot_lod2_sh2.inria.ply";
-    if (std::filesystem::exists(playbot)) {
-      SceneRequest& request = scenes.emplace_back();
-      request.scene = playbot.string();
-      request.size = ImageSize{640, 480};
-      request.eye = Vec3{-2.0, -1.5, -2.0};
-      request.look_at = Vec3{0.0, -0.35, 0.0};
-      request.up = Vec3{0.0, -1.0, 0.0};
-      request.fovy_degrees = 45;
-    } else {
-      std::printf("skipped: playbot_lod2_sh2.inria.ply, there is no shared folder\n");
-    }
+    SceneRequest& request = scenes.emplace_back();
+    request.scene = robot.path().string();
+    request.size = ImageSize{640, 480};
+    request.eye = Vec3{-2.0, -1.5, -2.0};
+    request.look_at = Vec3{0.0, -0.35, 0.0};
+    request.up = Vec3{0.0, -1.0, 0.0};
+    request.fovy_degrees = 45;
   }
   std::printf("%-28s %-9s %-11s %12s %9s %9s %12s %9s\n", "scene", "variant", "fidelity", "cycles", "error", "speed-up",
               "error", "Mquads/s");
@@ -169,10 +164,10 @@ int run(const std::vector<std::string>& arguments) {
   for (const SceneRequest& scene : scenes) measure_accuracy(scene, worst);
 
   SceneRequest frame = scenes.front();
-  const std::filesystem::path close = testing::shared_folder() / "silicon/playbot_close.spl";
-  if (all && std::filesystem::exists(close)) {
+  const testing::UnpackedFile measured_draw("measured_draw.spl");
+  if (all) {
     frame = SceneRequest();
-    frame.scene = close.string();
+    frame.scene = measured_draw.path().string();
   }
   const std::array<double, rungs.size()> rates = measure_rates(frame, repeat);
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 #include <cstring>
-#include <fstream>
+#include <sstream>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 #include <vrpipe/random.h>
 
 #include "support/builders.h"
-#include "support/shared_folder.h"
+#include "support/data.h"
 
 namespace vrpipe {
 namespace {
@@ -367,8 +367,8 @@ TEST(ColorFormatNames, ThoseThatCannotBlendFrontToBackSayWhy) {
   }
 }
 
-/// Over one block of blend.bin: source, destination and result, as a real GPU wrote them.
-double share_of_exact_channels(std::ifstream& file, ColorFormat format) {
+/// Over one block of measured blends: source, destination and result, as a real GPU wrote them.
+double share_of_exact_channels(std::istream& file, ColorFormat format) {
   std::int32_t count = 0;
   file.read(reinterpret_cast<char*>(&count), sizeof count);
   std::vector<float> block[3];
@@ -391,9 +391,7 @@ double share_of_exact_channels(std::ifstream& file, ColorFormat format) {
 }
 
 TEST(MeasuredBlending, IsThatOfARealGpuBitForBitNearlyEverywhere) {
-  const auto path = testing::shared_folder() / "silicon/blend.bin";
-  std::ifstream file(path, std::ios::binary);
-  if (!file) GTEST_SKIP() << "no silicon/blend.bin in " << testing::shared_folder();
+  std::istringstream file(testing::unpacked("measured_blends.bin"));
   EXPECT_GE(share_of_exact_channels(file, ColorFormat::rgba16f), 0.998);
   EXPECT_GE(share_of_exact_channels(file, ColorFormat::rgba8), 0.9999);
 }

@@ -8,7 +8,7 @@
 
 #include <vrpipe/workloads/scene.h>
 
-#include "support/shared_folder.h"
+#include "support/data.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -42,14 +42,12 @@ void expect_the_papers_shape(const Draw& draw) {
 }
 
 TEST(PaperShape, HoldsOnAScannedRobot) {
-  const auto folder = testing::shared_folder() / "scenes";
-  const std::string name = "playbot/playbot_lod2_sh2.inria.ply";
-  std::ifstream views(folder / "cameras/suggested_views.json");
-  if (!views || !std::filesystem::exists(folder / name)) GTEST_SKIP() << "no playbot scene in " << folder;
+  const testing::UnpackedFile robot("robot.ply");
+  std::ifstream views(testing::data_file("views.json"));
   SceneRequest request;
-  request.scene = (folder / name).string();
+  request.scene = robot.path().string();
   for (const nlohmann::json& view : nlohmann::json::parse(views)) {
-    if (view.at("scene") != name) continue;
+    if (view.value("scene", "") != "robot.ply") continue;
     request.size = ImageSize{view.at("width"), view.at("height")};
     request.eye = vector_of(view.at("eye"));
     request.look_at = vector_of(view.at("look_at"));

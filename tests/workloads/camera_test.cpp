@@ -170,19 +170,17 @@ TEST_F(CameraFile, WhatCannotBeUsedIsNamed) {
 }
 
 TEST(RealCameras, InriaTrainCamerasLoad) {
-  const auto path = testing::shared_folder() / "scenes/cameras/train_inria_first10.json";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no train cameras in " << testing::shared_folder();
-  const std::vector<Camera> cameras = load_cameras(path.string());
+  const std::vector<Camera> cameras = load_cameras(testing::data_file("train_cameras.json").string());
   ASSERT_EQ(cameras.size(), 10u);
   EXPECT_EQ(cameras[0].width, 1959u);
   EXPECT_NEAR(cameras[0].fy, 1164.66, 0.01);
 }
 
-TEST(RealCameras, LookAtAgreesWithTheSuggestedViews) {
-  const auto path = testing::shared_folder() / "scenes/cameras/suggested_views.json";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no suggested views in " << testing::shared_folder();
+TEST(RealCameras, LookAtAgreesWithAnotherRenderersViews) {
   const auto vec = [](const nlohmann::json& v) { return Vec3{v[0], v[1], v[2]}; };
-  for (const auto& view : nlohmann::json::parse(testing::read_bytes(path))) {
+  const auto views = nlohmann::json::parse(testing::read_bytes(testing::data_file("views.json")));
+  ASSERT_EQ(views.size(), 10u);
+  for (const auto& view : views) {
     const Camera camera = look_at(vec(view["eye"]), vec(view["look_at"]), vec(view["up"]), view["fovy_deg"],
                                   view["width"], view["height"]);
     EXPECT_NEAR(camera.fy, view["fy"].get<double>(), 1e-9);

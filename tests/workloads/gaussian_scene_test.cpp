@@ -269,18 +269,15 @@ TEST_F(GaussianPly, WritingIntoAMissingFolderSaysSoAndLeavesNothing) {
   EXPECT_EQ(files_in_folder(), 0u);
 }
 
-TEST(RealScene, PlaybotLoads) {
-  const auto path = testing::shared_folder() / "scenes/playbot/playbot_lod2_sh2.inria.ply";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no playbot scene in " << testing::shared_folder();
-  const GaussianScene scene = open_gaussian_ply(path);
+TEST(RealScene, AScannedRobotLoads) {
+  const testing::UnpackedFile robot("robot.ply");
+  const GaussianScene scene = open_gaussian_ply(robot.path());
   EXPECT_EQ(scene.size(), 125000u);
   EXPECT_EQ(scene.sh_degree(), 2);
 }
 
 TEST(RealScene, TrainFixtureWithIntegerAndForeignPropertiesLoads) {
-  const auto path = testing::shared_folder() / "scenes/fixtures/metalsplatter/test-splat.3-points-from-train.ply";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no metalsplatter fixture in " << testing::shared_folder();
-  const GaussianScene scene = open_gaussian_ply(path);
+  const GaussianScene scene = open_gaussian_ply(testing::data_file("train_3_points.ply"));
   EXPECT_EQ(scene.size(), 3u);
   EXPECT_EQ(scene.sh_degree(), 3);
 }

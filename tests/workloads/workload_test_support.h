@@ -15,7 +15,7 @@
 #include <vrpipe/error.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
-#include "support/shared_folder.h"
+#include "support/data.h"
 
 namespace vrpipe::testing {
 
