@@ -1,0 +1,255 @@
+#include "walk/oracle.h"
+
+#include <optional>
+
+#include <fmt/format.h>
+
+#include <vrpipe/error.h>
+
+#include "support/floating_point.h"
+#include "support/simulate.h"
+
+namespace vrpipe::walk {
+
+namespace {
+
+using testing::same_image;
+
+/// Combinations that the documentation calls unusable though each value lies in its range.
+bool documented_refusal(const std::string& message) {
+  return message.find("unusable CROP cache") != std::string::npos ||
+         message.find("unusable SM array") != std::string::npos;
+}
+
+bool is_a_share(double value) { return value >= 0 && value <= 1 + 1e-9; }
+
+/// Sizes, rates and latencies of the machine left out: the draw's state decides the picture alone.
+Case on_another_machine(const Case& c) {
+  Case other = c;
+  other.platform = &platforms().front();
+  other.units.clear();
+  other.settings.clear();
+  for (const Setting& setting : c.settings) {
+    if (setting.unit == "state") other.settings.push_back(setting);
+  }
+  return other;
+}
+
+/// Simulates, and reports what it throws.
+class Judge {
+ public:
+  Judge(const Case& c, Verdict& verdict) : case_(c), verdict_(verdict) {}
+
+  void find(const std::string& at, const Finding& finding) {
+    verdict_.finding({finding.rule, at + ": " + finding.detail});
+  }
+
+  std::optional<RunResult> simulated(const std::string& stage, const RunRequest& request) {
+    verdict_.stage(stage);
+    fresh_simulation();
+    try {
+      const testing::TrapInvalid trap;
+      RunResult result = simulate(request, case_.draw);
+      for (const Finding& finding : broken_rules(result)) find(stage, finding);
+      return result;
+    } catch (const UserError& error) {
+      find(stage, {"refused late", error.what()});
+    } catch (const std::exception& error) {
+      find(stage, {"a fault", error.what()});
+    }
+    return std::nullopt;
+  }
+
+  void refusal() {
+    const Setting& bad = case_.settings.back();
+    try {
+      verdict_.stage("check");
+      check_configuration(case_.request(Fidelity::functional));
+    } catch (const UserError& error) {
+      if (std::string(error.what()).find(bad.parameter) != std::string::npos) return;
+      find("check", {"a bad value is refused by name", error.what()});
+      return;
+    }
+    find("check", {"a bad value is refused", fmt::format("{}.{}='{}'", bad.unit, bad.parameter, bad.value)});
+  }
+
+  /// Whether the configuration can be used; a refusal must be a documented one.
+  bool usable() {
+    verdict_.stage("check");
+    try {
+      check_configuration(case_.request(Fidelity::functional));
+      return true;
+    } catch (const UserError& error) {
+      if (!documented_refusal(error.what())) find("check", {"a good value is taken", error.what()});
+    }
+    return false;
+  }
+
+  void ladder() {
+    std::optional<RunResult> untimed;
+    std::optional<std::uint64_t> bound;
+    for (const Fidelity fidelity : fidelities()) {
+      const std::string stage = name_of(fidelity);
+      std::optional<RunResult> result = simulated(stage, case_.request(fidelity));
+      if (!result) return;
+      if (fidelity == Fidelity::bound) bound = result->cycles;
+      if (fidelity == Fidelity::cycle && *bound > *result->cycles) {
+        find(stage, {"bound is a bound", fmt::format("bound {}, cycle {}", *bound, *result->cycles)});
+      }
+      if (untimed) {
+        for (const Finding& finding : broken_rules(*untimed, *result)) find(stage, finding);
+      } else {
+        untimed = std::move(result);
+      }
+    }
+    RunRequest stalled = case_.request(case_.stalled);
+    stalled.stall_seed = case_.stall_seed;
+    stalled.stall_per_256 = 64;
+    const std::string stage = std::string(name_of(case_.stalled)) + " with stalls";
+    if (const auto result = simulated(stage, stalled)) {
+      for (const Finding& finding : broken_rules(*untimed, *result)) find(stage, finding);
+    }
+    repetition();
+    machine(*untimed);
+  }
+
+  /// At cycle fidelity the order in which units tick must not matter either.
+  void repetition() {
+    const std::string stage = std::string(name_of(case_.repeated)) + " twice";
+    RunRequest request = case_.request(case_.repeated);
+    const auto once = simulated(stage, request);
+    if (request.fidelity == Fidelity::cycle) request.tick_order_seed = case_.stall_seed;
+    const auto again = simulated(stage, request);
+    if (!once || !again) return;
+    for (const Finding& finding : broken_repetition(*once, *again)) find(stage, finding);
+  }
+
+  void machine(const RunResult& untimed) {
+    const bool order_decides = !case_.variant.early_termination || case_.termination == Termination::strict;
+    if (case_.variant.quad_merging || !order_decides) return;
+    const auto other = simulated("another machine", on_another_machine(case_).request(Fidelity::functional));
+    if (other && !same_image(other->surface, untimed.surface)) {
+      find("another machine", {"the machine does not change the picture", "the images differ"});
+    }
+  }
+
+ private:
+  const Case& case_;
+  Verdict& verdict_;
+};
+
+}  // namespace
+
+std::vector<Finding> broken_rules(const RunResult& result) {
+  std::vector<Finding> findings;
+  const Counts& n = result.counts;
+  const auto conserved = [&](const char* what, std::uint64_t in, std::uint64_t out) {
+    if (in != out) findings.push_back({"conservation", fmt::format("{}: {} went in, {} came out", what, in, out)});
+  };
+  conserved("quads rasterized", n.quads_rasterized, n.quads_depth_stencil_failed + n.quads_terminated + n.quads_shaded);
+  conserved("fragments rasterized", n.fragments_rasterized,
+            n.fragments_depth_stencil_failed + n.fragments_terminated + n.fragments_shaded);
+  conserved("quads shaded", n.quads_shaded,
+            n.quads_pruned + n.quads_merged + n.quads_dropped_late + n.quads_late_failed + n.quads_blended);
+  conserved("fragments shaded", n.fragments_shaded,
+            n.fragments_pruned + n.fragments_merged + n.fragments_dropped_late + n.fragments_late_failed +
+                n.fragments_blended);
+
+  const auto none = [&](const char* what, std::uint64_t count) {
+    if (count != 0) findings.push_back({"only what the variant does", fmt::format("{} {}", count, what)});
+  };
+  if (!result.request.variant.early_termination) {
+    none("fragments terminated", n.fragments_terminated);
+    none("termination updates", n.termination_updates);
+  }
+  if (!result.request.variant.quad_merging) none("quads merged", n.quads_merged);
+  if (result.request.termination == Termination::paper) none("fragments dropped late", n.fragments_dropped_late);
+  const auto one_to_four = [&](const char* what, std::uint64_t quads, std::uint64_t fragments) {
+    if (fragments < quads || fragments > 4 * quads) {
+      findings.push_back(
+          {"a quad has 1 to 4 fragments", fmt::format("{} quads, {} fragments {}", quads, fragments, what)});
+    }
+  };
+  one_to_four("rasterized", n.quads_rasterized, n.fragments_rasterized);
+  one_to_four("shaded", n.quads_shaded, n.fragments_shaded);
+  one_to_four("blended", n.quads_blended, n.fragments_blended);
+
+  const bool timed = result.request.fidelity != Fidelity::functional;
+  if (result.cycles.has_value() != timed || result.units.empty() == timed) {
+    findings.push_back({"time where the fidelity has it", "cycles or units are there without time, or are missing"});
+  }
+  for (const UnitReport& unit : result.units) {
+    std::uint64_t sum = 0;
+    for (unsigned state = 0; state < unit_states; ++state) {
+      const std::uint64_t cycles = unit.cycles[state];
+      if (cycles > *result.cycles) {
+        findings.push_back({"a state is part of the cycles",
+                            fmt::format("{} is {} for {} of {} cycles", unit.name,
+                                        name_of(static_cast<UnitState>(state)), cycles, *result.cycles)});
+      }
+      sum += cycles;
+    }
+    if (sum != *result.cycles) {
+      findings.push_back({"states sum to the cycles", fmt::format("{}: {} of {}", unit.name, sum, *result.cycles)});
+    }
+  }
+  for (const auto& [unit, share] : result.utilization) {
+    if (!is_a_share(share)) findings.push_back({"utilization is a share", fmt::format("{} {}", unit, share)});
+  }
+  return findings;
+}
+
+std::vector<Finding> broken_rules(const RunResult& untimed, const RunResult& timed) {
+  std::vector<Finding> findings;
+  const bool strict = timed.request.termination == Termination::strict;
+  const auto expected = untimed.counts.named();
+  const auto got = timed.counts.named();
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const std::string& name = expected[i].first;
+    const bool before_termination = name == "primitives" || name.find("rasterized") != std::string::npos;
+    if ((strict || before_termination) && expected[i] != got[i]) {
+      findings.push_back({strict ? "strict counts are the same" : "time does not change what is rasterized",
+                          fmt::format("{} {}, untimed {}", name, got[i].second, expected[i].second)});
+    }
+  }
+  const Variant& variant = timed.request.variant;
+  const bool order_decides = strict || (!variant.early_termination && !variant.quad_merging);
+  if (order_decides && !same_image(untimed.surface, timed.surface)) {
+    findings.push_back({"order alone decides the picture", "the image differs from the untimed one"});
+  }
+  return findings;
+}
+
+std::vector<Finding> broken_repetition(const RunResult& once, const RunResult& again) {
+  const auto units_equal = [&] {
+    if (once.units.size() != again.units.size()) return false;
+    for (std::size_t i = 0; i < once.units.size(); ++i) {
+      if (once.units[i].name != again.units[i].name || once.units[i].cycles != again.units[i].cycles) return false;
+    }
+    return true;
+  };
+  const auto statistics_equal = [&] {
+    if (once.statistics.size() != again.statistics.size()) return false;
+    for (std::size_t i = 0; i < once.statistics.size(); ++i) {
+      if (once.statistics[i].name != again.statistics[i].name) return false;
+      if (once.statistics[i].value != again.statistics[i].value) return false;
+    }
+    return true;
+  };
+  const bool equal = once.result_hash == again.result_hash && once.cycles == again.cycles &&
+                     once.counts.named() == again.counts.named() && same_image(once.surface, again.surface) &&
+                     once.utilization == again.utilization && units_equal() && statistics_equal();
+  if (equal) return {};
+  return {{"equal requests, equal results", once.result_hash + " and " + again.result_hash}};
+}
+
+void judge(const Case& c, Verdict& verdict) {
+  Judge judge(c, verdict);
+  if (c.refused) {
+    judge.refusal();
+  } else if (judge.usable()) {
+    judge.ladder();
+  }
+}
+
+}  // namespace vrpipe::walk

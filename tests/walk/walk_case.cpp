@@ -1,0 +1,301 @@
+#include "walk/walk_case.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
+
+#include <fmt/format.h>
+
+#include <vrpipe/blend.h>
+#include <vrpipe/random.h>
+
+#include "support/builders.h"
+
+namespace vrpipe::walk {
+
+namespace {
+
+using testing::draw_of;
+using testing::round_splat;
+using testing::splat_at;
+
+class Dice {
+ public:
+  explicit Dice(std::uint64_t seed) : state_(seed) {}
+  std::uint64_t next() { return mix(state_++); }
+  std::uint32_t below(std::uint64_t count) { return static_cast<std::uint32_t>(next() % count); }
+  bool chance(unsigned percent) { return below(100) < percent; }
+  /// In [low, high).
+  double real(double low, double high) { return low + (high - low) * static_cast<double>(next() >> 11U) * 0x1p-53; }
+  float real(float low, float high) {
+    return static_cast<float>(real(static_cast<double>(low), static_cast<double>(high)));
+  }
+  template <class Items>
+  const auto& one_of(const Items& items) {
+    return *(std::begin(items) + below(std::size(items)));
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+// Scenes.
+
+constexpr std::uint32_t most_splats = 800;
+constexpr std::uint32_t most_splats_times_pixels = 1500000;
+
+std::uint32_t splat_count(Dice& dice, std::uint32_t width, std::uint32_t height) {
+  const std::uint32_t most = std::min(most_splats, most_splats_times_pixels / (width * height));
+  return static_cast<std::uint32_t>(std::exp(dice.real(0.0, std::log(most + 1.0))));
+}
+
+/// Splats on pixel and tile boundaries, degenerate, huge, and of opacities about the pruning threshold.
+Splat odd_splat(Dice& dice, float width, float height) {
+  constexpr float one_255th = 1.0F / 255.0F;
+  const auto coordinate = [&](float side) {
+    const float odd[] = {0.0F, 0.5F, 8.0F, 15.5F, 16.0F, side - 0.5F, side, 1e-40F, -3000.0F, 33000.0F, -1e6F};
+    return dice.chance(50) ? dice.real(-4.0F, side + 4.0F) : dice.one_of(odd);
+  };
+  const float sigmas[] = {0.0F, 1e-6F, 0.3F, 0.5477F, 1.0F, 2.0F, 4.0F, 16.0F, 300.0F, 1e5F};
+  const float opacities[] = {
+      one_255th, std::nextafter(one_255th, 0.0F), std::nextafter(one_255th, 1.0F), 0.0F, 1.0F / 18.0F, 0.5F, 0.99F,
+      1.0F};
+  const float colors[] = {0.0F, 1.0F, 0.5F, 6e-8F, 300.0F, 65504.0F, 1e6F};
+  const float opacity = dice.one_of(opacities);
+  Splat splat = splat_at(coordinate(width), coordinate(height), dice.one_of(sigmas), dice.one_of(sigmas),
+                         dice.chance(50) ? 0.0F : dice.real(0.0F, 6.28F), std::fmax(opacity, one_255th),
+                         dice.one_of(colors), dice.one_of(colors), dice.one_of(colors));
+  splat.opacity = opacity;
+  return splat;
+}
+
+/// What a trained scene shows in a window of its image, thinned out.
+Draw window_of(const Draw& real, Dice& dice, std::uint32_t width, std::uint32_t height, std::uint32_t count) {
+  const auto x = static_cast<float>(dice.below(real.width - width + 1));
+  const auto y = static_cast<float>(dice.below(real.height - height + 1));
+  Draw window = draw_of(width, height);
+  for (Splat splat : real.splats) {
+    splat.cx -= x;
+    splat.cy -= y;
+    const float reach_x = std::fabs(splat.ax) + std::fabs(splat.bx);
+    const float reach_y = std::fabs(splat.ay) + std::fabs(splat.by);
+    if (splat.cx + reach_x < 0 || splat.cx - reach_x > static_cast<float>(width)) continue;
+    if (splat.cy + reach_y < 0 || splat.cy - reach_y > static_cast<float>(height)) continue;
+    window.splats.push_back(splat);
+  }
+  const std::size_t step = window.splats.size() / std::max(1U, count) + 1;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < window.splats.size(); i += step) window.splats[kept++] = window.splats[i];
+  window.splats.resize(kept);
+  return window;
+}
+
+Draw draw_scene(Dice& dice, const Draw& real) {
+  const std::uint32_t sides[] = {1, 2, 15, 16, 17, 31, 33, 48, 64, 100};
+  const std::uint32_t width = dice.one_of(sides);
+  const std::uint32_t height = dice.one_of(sides);
+  const auto w = static_cast<float>(width);
+  const auto h = static_cast<float>(height);
+  const std::uint32_t count = splat_count(dice, width, height);
+  Draw draw = draw_of(width, height);
+  switch (dice.below(8)) {
+    case 0:
+    case 1:  // a wall, behind which everything terminates
+      for (std::uint32_t i = 0; i < 8; ++i) draw.splats.push_back(round_splat(w / 2, h / 2, 3 * (w + h), 0.99F));
+      [[fallthrough]];
+    case 2:
+    case 3: {
+      const Draw behind = testing::random_draw(width, height, count, dice.next());
+      draw.splats.insert(draw.splats.end(), behind.splats.begin(), behind.splats.end());
+      return draw;
+    }
+    case 4:  // a stack that rounding keeps below the threshold
+      for (std::uint32_t i = 0; i < count; ++i) {
+        draw.splats.push_back(round_splat(w / 2, h / 2, dice.real(0.5F, 40.0F), dice.real(0.004F, 0.06F)));
+      }
+      return draw;
+    case 5:
+      for (std::uint32_t i = 0; i < count; ++i) draw.splats.push_back(odd_splat(dice, w, h));
+      return draw;
+    case 6: return window_of(real, dice, width, height, count);
+    default:  // one splat or none
+      if (dice.chance(80)) draw.splats.push_back(round_splat(w / 2, h / 2, dice.real(0.3F, 20.0F), 0.9F));
+      return draw;
+  }
+}
+
+// Values.
+
+std::string text_of(double value) { return fmt::format("{}", value); }
+
+/// The bounds of `a whole number from 1 to 16`.
+bool bounds_of(const Parameter& parameter, double& low, double& high) {
+  const std::string range = parameter.range();
+  const std::size_t from = range.find(" from ");
+  return from != std::string::npos && std::sscanf(range.c_str() + from, " from %lf to %lf", &low, &high) == 2;
+}
+
+std::string whole_value(Dice& dice, double low, double high, double usual) {
+  double value = usual;
+  switch (dice.below(6)) {
+    case 0: value = low; break;
+    case 1: value = high; break;
+    case 2: value = low + 1; break;
+    case 3: value = usual * (dice.chance(50) ? 2 : 0.5); break;
+    case 4: value = std::exp2(std::round(dice.real(0.0, std::log2(high)))); break;
+    default: value = std::exp(dice.real(std::log(low + 1), std::log(high + 1))) - 1; break;
+  }
+  return fmt::format("{:.0f}", std::min(high, std::max(low, std::floor(value))));
+}
+
+std::string real_value(Dice& dice, double low, double high, double usual) {
+  switch (dice.below(5)) {
+    case 0: return text_of(low);
+    case 1: return text_of(high);
+    case 2: return text_of(usual);
+    case 3: return text_of(high * std::exp(-dice.real(0.0, 12.0)));
+    default: return text_of(dice.real(low, high));
+  }
+}
+
+std::vector<std::string> names_of(const Parameter& parameter) {
+  std::vector<std::string> names;
+  std::string rest = parameter.range().substr(std::string("one of ").size());
+  for (std::size_t comma; (comma = rest.find(", ")) != std::string::npos; rest = rest.substr(comma + 2)) {
+    names.push_back(rest.substr(0, comma));
+  }
+  names.push_back(rest);
+  return names;
+}
+
+std::string allowed_value(Dice& dice, const Parameter& parameter) {
+  double low = 0;
+  double high = 0;
+  if (dynamic_cast<const Switch*>(&parameter) != nullptr) return dice.chance(50) ? "on" : "off";
+  if (dynamic_cast<const Choice*>(&parameter) != nullptr) return dice.one_of(names_of(parameter));
+  if (!bounds_of(parameter, low, high)) throw std::logic_error("no bounds in " + parameter.range());
+  const double usual = std::stod(parameter.default_value());
+  return dynamic_cast<const Integer*>(&parameter) != nullptr ? whole_value(dice, low, high, usual)
+                                                             : real_value(dice, low, high, usual);
+}
+
+std::string refused_value(Dice& dice, const Parameter& parameter) {
+  double low = 0;
+  double high = 0;
+  if (dice.chance(50) && bounds_of(parameter, low, high)) {
+    if (dynamic_cast<const Integer*>(&parameter) != nullptr) {
+      return fmt::format("{:.0f}", dice.chance(50) ? low - 1 : high + 1);
+    }
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    return text_of(dice.chance(50) ? std::nextafter(low, -infinity) : std::nextafter(high, infinity));
+  }
+  const char* const nonsense[] = {"", " ", "nan", "inf", "-1", "1e99", "0x10", "on ", "1,5", "99999999999999999999"};
+  return dice.one_of(nonsense);
+}
+
+/// Declared maxima that a machine cannot hold together, or that take minutes, are drawn apart: a setting that makes a
+/// product too large is left out.
+bool fits(const Platform& platform, const std::vector<Setting>& settings) {
+  std::map<std::string, double> value;
+  for (const ParameterListing& listing : list_parameters(&platform)) {
+    if (listing.pass_through) continue;
+    for (const Parameter* parameter : listing.parameters->parameters()) {
+      char* end = nullptr;
+      const std::string text = parameter->value();
+      const double number = std::strtod(text.c_str(), &end);
+      if (*end == '\0') value[listing.unit + "." + parameter->name()] = number;
+    }
+  }
+  for (const Setting& setting : settings) {
+    value[setting.unit + "." + setting.parameter] = std::strtod(setting.value.c_str(), nullptr);
+  }
+  return value["tc.bins"] * value["tc.bin_quads"] <= 1 << 20 &&
+         value["tgc.bins"] * value["tgc.bin_primitives"] <= 1 << 20;
+}
+
+std::vector<Setting> draw_settings(Dice& dice, const Platform& platform, bool& refused) {
+  std::vector<std::pair<std::string, const Parameter*>> all;
+  const std::vector<ParameterListing> listings = list_parameters(&platform);
+  for (const ParameterListing& listing : listings) {
+    if (listing.pass_through) continue;
+    for (const Parameter* parameter : listing.parameters->parameters()) all.emplace_back(listing.unit, parameter);
+  }
+  const unsigned counts[] = {0, 1, 1, 1, 1, 2, 2, 3, 4, 7};
+  std::vector<Setting> settings;
+  for (unsigned count = dice.one_of(counts); count > 0; --count) {
+    const auto& [unit, parameter] = dice.one_of(all);
+    settings.push_back({unit, parameter->name(), allowed_value(dice, *parameter)});
+    if (!fits(platform, settings)) settings.pop_back();
+  }
+  refused = dice.chance(3);
+  if (refused) {
+    const auto& [unit, parameter] = dice.one_of(all);
+    settings.push_back({unit, parameter->name(), refused_value(dice, *parameter)});
+  }
+  return settings;
+}
+
+const char* word_for(Termination termination) { return termination == Termination::strict ? "strict" : "paper"; }
+
+}  // namespace
+
+RunRequest Case::request(Fidelity fidelity) const {
+  RunRequest r;
+  r.platform = platform;
+  r.variant = variant;
+  r.fidelity = fidelity;
+  r.format = format;
+  r.termination = termination;
+  r.settings = settings;
+  r.units = units;
+  return r;
+}
+
+Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
+  Dice dice(mix(mix(seed) ^ index));
+  Case c;
+  c.seed = seed;
+  c.index = index;
+  const ColorFormat formats[] = {ColorFormat::rgba16f, ColorFormat::rgba8, ColorFormat::rgba32f};
+  const Fidelity timed[] = {Fidelity::lt, Fidelity::at, Fidelity::cycle};
+  c.platform = dice.chance(40) ? &platforms().front() : &dice.one_of(platforms());
+  c.variant = dice.one_of(variants());
+  c.format = dice.one_of(formats);
+  c.termination = dice.chance(40) ? Termination::strict : Termination::paper;
+  c.settings = draw_settings(dice, *c.platform, c.refused);
+  const std::string left_out = dice.chance(50) ? "qru" : "tgc";
+  const auto is_set = [&](const Setting& setting) { return setting.unit == left_out; };
+  if (dice.chance(4) && std::none_of(c.settings.begin(), c.settings.end(), is_set)) {
+    c.units.push_back({left_out, "pass-through"});
+  }
+  c.repeated = dice.one_of(fidelities());
+  c.stalled = dice.one_of(timed);
+  c.stall_seed = dice.next() | 1U;
+  c.draw = draw_scene(dice, real);
+  return c;
+}
+
+std::string describe(const Case& c) {
+  std::string text = fmt::format("{} {} {} {} {}x{}, {} splats", c.platform->name, c.variant.name, name_of(c.format),
+                                 word_for(c.termination), c.draw.width, c.draw.height, c.draw.splats.size());
+  for (const UnitChoice& unit : c.units) text += fmt::format(" {}={}", unit.slot, unit.implementation);
+  for (const Setting& setting : c.settings) {
+    text += fmt::format(" {}.{}={}", setting.unit, setting.parameter, setting.value);
+  }
+  return text;
+}
+
+std::string command_line(const Case& c, Fidelity fidelity, const std::string& scene) {
+  std::string line =
+      fmt::format("vrpipe run --scene {} --platform {} --variant {} --format {} --termination {} --fidelity {}", scene,
+                  c.platform->name, c.variant.name, name_of(c.format), word_for(c.termination), name_of(fidelity));
+  for (const UnitChoice& unit : c.units) line += fmt::format(" --unit {}={}", unit.slot, unit.implementation);
+  for (const Setting& setting : c.settings) {
+    line += fmt::format(" --set '{}.{}={}'", setting.unit, setting.parameter, setting.value);
+  }
+  return line;
+}
+
+}  // namespace vrpipe::walk
