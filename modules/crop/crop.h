@@ -88,9 +88,9 @@ class ColorRop : public CropBehaviour {
   Counter quads_late_failed{*this, "quads_late_failed", "quads", "that fail a late depth or stencil test"};
   Counter fragments_late_failed{*this, "fragments_late_failed", "fragments", "that fail a late depth or stencil test"};
   Counter fragments_swallowed{*this, "fragments_swallowed", "fragments",
-                              "below the threshold whose alpha rounding left nothing of"};
+                              "blended below the threshold whose alpha is lost to rounding: the pixel keeps its own"};
   Counter pixels_stuck{*this, "pixels_stuck", "pixels",
-                       "below the threshold that the swallowed fragments would have taken past it"};
+                       "kept below the threshold by rounding: the alpha lost would have taken them past it"};
   Counter colors_saturated{*this, "colors_saturated", "fragments", "that took a colour beyond the format's largest"};
   Counter termination_signals{*this, "termination_signals", "signals", "sent to ZROP, one for a quad's pixels"};
 

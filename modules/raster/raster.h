@@ -19,14 +19,15 @@ class TileRasterizer : public RasterBehaviour {
                                  "cycles",
                                  "ATTILA, Emerald: set-up latency 10",
                                  "of setting up a primitive's edge functions"};
-    Integer setup_interval_cycles{*this,
-                                  "setup_interval_cycles",
-                                  1,
-                                  1,
-                                  1000,
-                                  "cycles",
-                                  source::open,
-                                  "between primitives; taken as latency the 8 to 10 cycles of set-up cost nothing"};
+    Integer setup_interval_cycles{
+        *this,
+        "setup_interval_cycles",
+        1,
+        1,
+        1000,
+        "cycles",
+        source::open,
+        "from one set-up to the next; the 8 to 10 cycles that a set-up takes are a latency, not an interval"};
     Integer coarse_tiles_per_cycle{*this,
                                    "coarse_tiles_per_cycle",
                                    8,
