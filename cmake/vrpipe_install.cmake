@@ -21,3 +21,10 @@ write_basic_package_version_file(vrpipe-config-version.cmake COMPATIBILITY SameM
 install(EXPORT vrpipe NAMESPACE vrpipe:: DESTINATION ${package_dir} FILE vrpipe-targets.cmake)
 install(FILES ${PROJECT_BINARY_DIR}/vrpipe-config.cmake ${PROJECT_BINARY_DIR}/vrpipe-config-version.cmake
   cmake/vrpipe_plugin.cmake DESTINATION ${package_dir})
+
+# The documents as they lie here, so that their links hold; and the projects that build against an installation.
+set(documents ${CMAKE_INSTALL_DATADIR}/doc/vrpipe)
+install(DIRECTORY docs DESTINATION ${documents})
+install(DIRECTORY modules DESTINATION ${documents} FILES_MATCHING PATTERN "README.md")
+install(FILES README.md CONTRIBUTING.md CHANGELOG.md LICENSE DESTINATION ${documents})
+install(DIRECTORY tests/install/consumer/ DESTINATION ${CMAKE_INSTALL_DATADIR}/vrpipe/examples)

@@ -8,7 +8,7 @@ project=$PWD
 build_packages=(g++ cmake ninja-build pkg-config ccache libsystemc-dev libglm-dev libboost1.81-dev nlohmann-json3-dev
   libcli11-dev libfmt-dev libpng-dev libopenexr-dev libmd-dev)
 check_packages=(git clang libclang-rt-14-dev clang-format clang-tidy libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
-  liblzma-dev)
+  liblzma-dev xz-utils)
 
 # The comment at the head of a script is its help.
 if [ "${1-}" = --help ]; then

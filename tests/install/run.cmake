@@ -1,4 +1,4 @@
-# Installs BUILD_DIR to a prefix of its own, builds the projects in consumer/ and bad_plugins/ against it, and runs them.
+# Installs BUILD_DIR to a prefix of its own, builds the examples that come with it and bad_plugins/ against it, and runs them.
 
 function(run result_variable output_variable error_variable)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE error)
@@ -33,8 +33,19 @@ endfunction()
 file(REMOVE_RECURSE ${WORK_DIR})
 set(prefix ${WORK_DIR}/prefix)
 expect_success("vrpipe-config.cmake" ${CMAKE_COMMAND} --install ${BUILD_DIR} --config ${CONFIG} --prefix ${prefix})
+
+# The documents, with links that hold, and the examples.
+expect_success("" ${SOURCE_DIR}/../docs/check_links ${prefix}/share/doc/vrpipe)
+foreach(document docs/results.md docs/images/builtin.png modules/crop/README.md LICENSE)
+  if(NOT EXISTS ${prefix}/share/doc/vrpipe/${document})
+    message(FATAL_ERROR "${document} is not installed")
+  endif()
+endforeach()
+
+set(consumer ${prefix}/share/vrpipe/examples)
+set(bad_plugins ${SOURCE_DIR}/bad_plugins)
 foreach(project consumer bad_plugins)
-  expect_success("" ${CMAKE_COMMAND} -G Ninja -S ${SOURCE_DIR}/${project} -B ${WORK_DIR}/${project}
+  expect_success("" ${CMAKE_COMMAND} -G Ninja -S ${${project}} -B ${WORK_DIR}/${project}
     -DCMAKE_PREFIX_PATH=${prefix} -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
     -DCMAKE_BUILD_TYPE=Release)
   expect_success("" ${CMAKE_COMMAND} --build ${WORK_DIR}/${project})

@@ -41,15 +41,15 @@ class PipeVerdict : public Verdict {
   int pipe_;
 };
 
-void limit(int resource, std::uint64_t value) {
+void limit(decltype(RLIMIT_AS) resource, std::uint64_t value) {
   const rlimit both{value, value};
-  if (::setrlimit(static_cast<__rlimit_resource>(resource), &both) != 0) ::_exit(3);
+  if (::setrlimit(resource, &both) != 0) ::_exit(3);
 }
 
 [[noreturn]] void be_the_child(const Case& c, const Limits& limits, int pipe) {
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_CPU, limits.seconds);
-#if !defined(__SANITIZE_ADDRESS__)
+#if !defined(VRPIPE_SHADOW_MEMORY)
   limit(RLIMIT_AS, limits.bytes);
 #endif
   PipeVerdict verdict(pipe);
