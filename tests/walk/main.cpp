@@ -2,8 +2,6 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
-#include <functional>
 #include <map>
 #include <optional>
 
@@ -33,15 +31,12 @@ bool breaks(const Case& c, const std::string& rule, const Limits& limits) {
 /// Takes from a case what it can do without and still break the rule.
 Case shrunk(Case c, const std::string& rule, const Limits& limits) {
   unsigned tries = 0;
-  const auto accept = [&](Case candidate) {
+  const auto without = [&](const auto& change) {
+    Case candidate = c;
+    change(candidate);
     if (++tries > most_tries || !breaks(candidate, rule, limits)) return false;
     c = std::move(candidate);
     return true;
-  };
-  const auto without = [&](const std::function<void(Case&)>& change) {
-    Case candidate = c;
-    change(candidate);
-    return accept(std::move(candidate));
   };
   const std::size_t kept = c.refused ? 1 : 0;
   for (std::size_t i = c.settings.size() - kept; i-- > 0;) {

@@ -63,10 +63,16 @@ Splat odd_splat(Dice& dice, float width, float height) {
       one_255th, std::nextafter(one_255th, 0.0F), std::nextafter(one_255th, 1.0F), 0.0F, 1.0F / 18.0F, 0.5F, 0.99F,
       1.0F};
   const float colors[] = {0.0F, 1.0F, 0.5F, 6e-8F, 300.0F, 65504.0F, 1e6F};
+  // One by one: the order in which arguments are evaluated is the compiler's choice.
+  const float x = coordinate(width);
+  const float y = coordinate(height);
+  const float sigma_a = dice.one_of(sigmas);
+  const float sigma_b = dice.one_of(sigmas);
+  const float angle = dice.chance(50) ? 0.0F : dice.real(0.0F, 6.28F);
+  const float red = dice.one_of(colors);
+  const float green = dice.one_of(colors);
   const float opacity = dice.one_of(opacities);
-  Splat splat = splat_at(coordinate(width), coordinate(height), dice.one_of(sigmas), dice.one_of(sigmas),
-                         dice.chance(50) ? 0.0F : dice.real(0.0F, 6.28F), std::fmax(opacity, one_255th),
-                         dice.one_of(colors), dice.one_of(colors), dice.one_of(colors));
+  Splat splat = splat_at(x, y, sigma_a, sigma_b, angle, std::fmax(opacity, one_255th), red, green, 1.0F);
   splat.opacity = opacity;
   return splat;
 }
@@ -113,7 +119,8 @@ Draw draw_scene(Dice& dice, const Draw& real) {
     }
     case 4:  // a stack that rounding keeps below the threshold
       for (std::uint32_t i = 0; i < count; ++i) {
-        draw.splats.push_back(round_splat(w / 2, h / 2, dice.real(0.5F, 40.0F), dice.real(0.004F, 0.06F)));
+        const float sigma = dice.real(0.5F, 40.0F);
+        draw.splats.push_back(round_splat(w / 2, h / 2, sigma, dice.real(0.004F, 0.06F)));
       }
       return draw;
     case 5:
@@ -195,8 +202,7 @@ std::string refused_value(Dice& dice, const Parameter& parameter) {
   return dice.one_of(nonsense);
 }
 
-/// Declared maxima that a machine cannot hold together, or that take minutes, are drawn apart: a setting that makes a
-/// product too large is left out.
+/// Whether a machine can hold it: some declared maxima fit only one at a time.
 bool fits(const Platform& platform, const std::vector<Setting>& settings) {
   std::map<std::string, double> value;
   for (const ParameterListing& listing : list_parameters(&platform)) {
