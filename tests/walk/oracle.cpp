@@ -1,5 +1,8 @@
 #include "walk/oracle.h"
 
+#include <algorithm>
+#include <cmath>
+#include <map>
 #include <optional>
 
 #include <fmt/format.h>
@@ -21,7 +24,41 @@ bool documented_refusal(const std::string& message) {
          message.find("unusable SM array") != std::string::npos;
 }
 
-bool is_a_share(double value) { return value >= 0 && value <= 1 + 1e-9; }
+constexpr double rounding = 1e-9;
+
+bool is_a_share(double value) { return value >= 0 && value <= 1 + rounding; }
+
+/// Occupancies against themselves, the bottleneck and the utilizations.
+std::vector<Finding> broken_occupancies(const RunResult& result) {
+  std::vector<Finding> findings;
+  std::map<std::string, double> highest;  // of the units of a slot
+  double highest_of_all = 0;
+  for (const UnitReport& unit : result.units) {
+    bool shares = is_a_share(unit.occupancy);
+    for (const auto& part : unit.parts) shares = shares && is_a_share(part.second);
+    if (!shares) findings.push_back({"occupancy is a share", fmt::format("{} {}", unit.name, unit.occupancy)});
+    double& of_slot = highest[unit.name.substr(unit.name.rfind('.') + 1)];
+    of_slot = std::max(of_slot, unit.occupancy);
+    highest_of_all = std::max(highest_of_all, unit.occupancy);
+  }
+  for (const auto& [slot, share] : result.utilization) {
+    if (highest.count(slot) != 0 && share > highest[slot] + rounding) {
+      findings.push_back(
+          {"occupancy covers the utilization", fmt::format("{} is used {}, occupied {}", slot, share, highest[slot])});
+    }
+  }
+  if (!result.bottleneck) return findings;
+  const Bottleneck& bottleneck = *result.bottleneck;
+  double sum = 0;
+  for (const auto& part : bottleneck.parts) sum += part.second;
+  if (!is_a_share(bottleneck.occupancy) || std::fabs(sum - bottleneck.occupancy) > rounding ||
+      bottleneck.occupancy < highest_of_all - rounding) {
+    findings.push_back(
+        {"the bottleneck is occupied the most, by its parts",
+         fmt::format("{} {}, parts {}, highest {}", bottleneck.unit, bottleneck.occupancy, sum, highest_of_all)});
+  }
+  return findings;
+}
 
 /// Sizes, rates and latencies of the machine left out: the draw's state decides the picture alone.
 Case on_another_machine(const Case& c) {
@@ -196,6 +233,8 @@ std::vector<Finding> broken_rules(const RunResult& result) {
   for (const auto& [unit, share] : result.utilization) {
     if (!is_a_share(share)) findings.push_back({"utilization is a share", fmt::format("{} {}", unit, share)});
   }
+  const std::vector<Finding> occupancies = broken_occupancies(result);
+  findings.insert(findings.end(), occupancies.begin(), occupancies.end());
   return findings;
 }
 

@@ -61,6 +61,22 @@ TEST_F(Oracle, SeesAUtilizationBeyondOne) {
               "utilization is a share");
 }
 
+TEST_F(Oracle, SeesAnOccupancyBeyondOneAndOneBelowTheUtilization) {
+  expect_rule(broken_rules(changed([](RunResult& r) { r.units[4].occupancy = 1.01; })), "occupancy is a share");
+  expect_rule(broken_rules(changed([](RunResult& r) { r.units[4].parts.front().second = -0.1; })),
+              "occupancy is a share");
+  const RunResult idle = changed([](RunResult& r) {
+    for (UnitReport& unit : r.units) unit.occupancy = 0;
+  });
+  expect_rule(broken_rules(idle), "occupancy covers the utilization");
+}
+
+TEST_F(Oracle, SeesABottleneckThatAnotherUnitOrItsPartsContradict) {
+  const std::string rule = "the bottleneck is occupied the most, by its parts";
+  expect_rule(broken_rules(changed([](RunResult& r) { r.bottleneck->parts.pop_back(); })), rule);
+  expect_rule(broken_rules(changed([](RunResult& r) { r.units[4].occupancy = 1; })), rule);
+}
+
 TEST_F(Oracle, SeesWhatAVariantCannotDo) {
   expect_rule(broken_rules(changed([](RunResult& r) { r.request.variant = variant_named("qm"); })),
               "only what the variant does");
