@@ -59,7 +59,7 @@ inline LaneMask sign_mask(LaneBits bits) {
 #endif
 }
 
-/// The same of a pair, the second's in the upper four bits.
+/// The sign bits of a pair, the second's in the upper four bits.
 inline unsigned sign_mask(LanePairBits bits) {
 #if defined(__AVX__)
   return static_cast<unsigned>(__builtin_ia32_movmskps256(floats_of<LanePair>(bits)));
@@ -92,13 +92,13 @@ inline LaneBits expand_mask(LaneMask mask) {
   return (set & bit) == bit;
 }
 
-/// The same of a pair, the second's bits being the upper four.
+/// All ones in the lanes of a pair whose bit is set, the second's bits being the upper four.
 inline LanePairBits expand_mask_pair(std::uint32_t masks) {
   const LanePairBits bit{1, 2, 4, 8, 16, 32, 64, 128};
   return ((LanePairBits{} + static_cast<std::int32_t>(masks)) & bit) == bit;
 }
 
-/// The same of a pair, both having these bits.
+/// All ones in the lanes of a pair whose bit is set, both having the same bits.
 inline LanePairBits expand_mask_twice(LaneMask mask) {
   const LanePairBits bit{1, 2, 4, 8, 1, 2, 4, 8};
   return ((LanePairBits{} + mask) & bit) == bit;

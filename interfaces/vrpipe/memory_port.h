@@ -35,7 +35,7 @@ class PromptMemory {
   virtual ~PromptMemory() = default;
   /// Takes an access that arrives in a cycle; returns the cycle in which it is complete.
   virtual Cycle serve(Cycle arrival, unsigned bytes) = 0;
-  /// Whose cycles these are.
+  /// The clock in whose cycles `serve` counts.
   virtual const ClockDomain& clock() const = 0;
 };
 

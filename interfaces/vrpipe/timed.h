@@ -155,7 +155,7 @@ class TimedInput {
   Cycle front_ = never;
 };
 
-/// And of its outputs.
+/// What a unit's activation sees of its outputs.
 class TimedOutput {
  public:
   virtual ~TimedOutput() = default;
@@ -530,13 +530,13 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<> {
   std::vector<unsigned char> data_;  ///< empty before the first access
 };
 
-/// Makes the module of a slot for `lt` or `at` around a behaviour.
+/// Makes the timing model of a slot for `lt` or `at` around a functional model.
 using TimedUnitMaker =
     std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain,
                                         std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned gpcs,
                                         Transport transport)>;
 
-/// Registered by each module for its slot.
+/// Registered by each timing model for its slot.
 void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker);
 const TimedUnitMaker& timed_unit_maker(const std::string& slot);
 

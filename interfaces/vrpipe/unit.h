@@ -15,7 +15,7 @@
 
 namespace vrpipe {
 
-/// A unit as a SystemC module at cycle fidelity: a behaviour with ports and a clock. Ports are found by name, so that a
+/// The timing model of a unit, a SystemC module: a functional model with ports and a clock. Ports are found by name, so that a
 /// platform wires units without knowing their classes. Clocked is the first base, so that the clock calls it directly.
 class Unit : public Clocked, public sc_core::sc_module, public PortOwner {
  public:
@@ -53,16 +53,16 @@ class Unit : public Clocked, public sc_core::sc_module, public PortOwner {
   StateAccount account_;
 };
 
-/// Makes the cycle-fidelity module around a behaviour of a slot. `gpcs` is how many GPCs the front end serves.
+/// Makes the timing model of `cycle` around a functional model of a slot. `gpcs` is how many GPCs the front end serves.
 using UnitMaker =
     std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain,
                                         std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned gpcs)>;
 
-/// Registered by each module for its slot.
+/// Registered by each timing model for its slot.
 void register_unit_maker(const std::string& slot, UnitMaker maker);
 const UnitMaker& unit_maker(const std::string& slot);
 
-/// Hands a behaviour to a module that needs the interface of its slot.
+/// Hands a functional model to a timing model that needs the interface of its slot.
 template <class SlotBehaviour>
 std::unique_ptr<SlotBehaviour> behaviour_as(std::unique_ptr<Behaviour> behaviour) {
   auto* const typed = dynamic_cast<SlotBehaviour*>(behaviour.get());

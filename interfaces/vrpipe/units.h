@@ -10,15 +10,15 @@
 #include <vrpipe/statistic.h>
 #include <vrpipe/surface.h>
 
-/// The slots of the pipeline. Each is a *behaviour*: what a unit does and what that costs, without SystemC and
-/// without time. Shells (modules/<unit>/) give a behaviour sockets and time, one shell for each fidelity.
+/// The slots of the pipeline. Each is a *functional model* (a Behaviour): what a unit does and at which rates, without
+/// SystemC and without time. Timing models (modules/<unit>/) give it sockets and time; see docs/glossary.md.
 ///
-/// Behaviours that turn a stream into batches work by steps: a call takes items until a batch comes out or the items
-/// are used up. So one behaviour serves a shell that moves a few quads a cycle and a loop that runs a whole draw.
+/// Functional models that turn a stream into batches work by steps: a call takes items until a batch comes out or the
+/// items are used up. So one serves a timing model that moves a few quads a cycle and a loop that runs a whole draw.
 
 namespace vrpipe {
 
-/// How fast a unit works, as its shell sees it.
+/// How fast a unit works: what its timing model asks for.
 struct Throughput {
   std::uint32_t items_per_cycle = 1;  ///< peak rate
   std::uint32_t latency_cycles = 1;   ///< from the last item in to the first item out
@@ -231,7 +231,7 @@ class CropBehaviour : public Behaviour {
     std::array<std::uint32_t, quads_per_warp> sectors_of{};
   };
   /// Looks quads `from` to `to` - 1 of a warp up, before their `blend`, in the order of blending. The cache sees this
-  /// order alone, so that which sectors move does not depend on when; for shells that do not follow fills through the
+  /// order alone, so that which sectors move does not depend on when; for timing models that do not follow fills through the
   /// cache themselves. Without a cache, no line is needed.
   virtual void look_up(const ShadedWarp&, unsigned /*from*/, unsigned /*to*/, CacheLookUp& out) { out.count = 0; }
   /// After a `blend` whose sectors are dirty for it.

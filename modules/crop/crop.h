@@ -112,7 +112,7 @@ class ColorRop : public CropBehaviour {
   const bool drops_late_;
   const bool checks_previous_;
   Cost cost_;
-  std::optional<CropCache> cache_;  ///< once looked up here; the clocked shell has one of its own
+  std::optional<CropCache> cache_;  ///< once looked up here; the timing model of `cycle` has one of its own
   std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
 };
 

@@ -23,7 +23,7 @@ class WarpOrder {
     const ShadedWarp* warp = nullptr;
     std::uint32_t sequence = 0;  ///< of the warp
     Turn turn{};
-    Cycle from = 0;  ///< the first cycle in which it can leave, for shells that know it ahead
+    Cycle from = 0;  ///< the first cycle in which it can leave, for timing models that know it ahead
   };
 
   WarpOrder(PropBehaviour::Order order, const RenderState& state)
