@@ -74,6 +74,7 @@ class TimedZrop : public TimedUnit {
       std::copy_n(quads.begin() + from, beat.count, beat.quads.begin());
       const Cycle at = take(visible.of_part(part, parts), beat.count);
       const unsigned tested_quads = beat.count;
+      did(ZropWork::tests, tested_quads, at, at + (tested_quads + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle);
       behaviour_->test(beat);
       if (beat.count < tested_quads) draw_lasts(at + cost_.latency_cycles);
       tested.first = std::min(tested.first, at);
@@ -86,7 +87,6 @@ class TimedZrop : public TimedUnit {
       left.last = at;
       ++beats_left;
     }
-    did(ZropWork::tests, total, tested.first, tested.last + 1);
     charge(UnitState::starved, tested.first);
     const Span taken = out_.send(item, left, beats_left);
     charge(UnitState::busy, tested.last + 1);

@@ -48,7 +48,7 @@ class ZropUnit : public Unit {
       if (!limit_.allows(width, now)) break;
       QuadBeat beat = in_.front();
       in_.pop();
-      did(ZropWork::tests, beat.count, now);
+      did(ZropWork::tests, beat.count, now, now + (width + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle);
       const unsigned tested = beat.count;
       behaviour_->test(beat);
       if (beat.count < tested) draw_lasts(now + cost_.latency_cycles);
