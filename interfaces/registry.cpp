@@ -1,16 +1,15 @@
 #include <vrpipe/registry.h>
 
 #include <algorithm>
-#include <cerrno>
 
 #include <dlfcn.h>
 
 #include <filesystem>
-#include <fstream>
 #include <system_error>
 
-#include <boost/dll/shared_library.hpp>
+#include "plugin_tag.h"
 
+#include <vrpipe/checked_behaviours.h>
 #include <vrpipe/error.h>
 
 namespace vrpipe {
@@ -27,13 +26,19 @@ const std::vector<std::string>& Registry::slots() {
 }
 
 void Registry::add(Implementation implementation) {
+  if (std::find(slots().begin(), slots().end(), implementation.slot) == slots().end()) {
+    return add_problem({"there is no slot '" + implementation.slot + "' for its unit '" + implementation.name + "'",
+                        "did you mean " + nearest_name(implementation.slot, slots()) + "?"});
+  }
   for (const auto& known : implementations_) {
     if (known->slot == implementation.slot && known->name == implementation.name) {
-      problems_.push_back("slot " + implementation.slot + " has an implementation '" + implementation.name +
-                          "' already");
-      return;
+      return add_problem(
+          {"slot " + implementation.slot + " has an implementation '" + implementation.name + "' already",
+           "choose another name"});
     }
   }
+  if (implementation.trust == Trust::checked) check_calls(implementation);
+  count_registration();
   implementations_.push_back(std::make_unique<Implementation>(std::move(implementation)));
 }
 
@@ -70,32 +75,20 @@ std::vector<const Implementation*> Registry::all() const {
 }
 
 namespace {
-
-/// The tag that VRPIPE_PLUGIN left in the file, without loading it; empty when there is none.
-std::string tag_in_file(const std::string& path) {
-  // Part by part: whatever was named may be larger than memory. Each begins with the end of the one before.
-  constexpr std::size_t part_bytes = std::size_t{1} << 20U;
-  constexpr std::size_t longest_tag = 256;
-  const std::string mark = "vrpipe-plugin/";
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw UserError("cannot load plugin", path, std::generic_category().message(errno), "make it readable");
-  std::string content(4, '\0');
-  file.read(&content[0], 4);
-  if (content != "\177ELF") return {};  // no shared object, such as a scene of gigabytes
-  do {
-    content.erase(0, content.size() - std::min(content.size(), longest_tag));
-    const std::size_t kept = content.size();
-    content.resize(kept + part_bytes);
-    file.read(&content[kept], part_bytes);
-    content.resize(kept + static_cast<std::size_t>(file.gcount()));
-    const std::size_t start = content.find(mark);
-    const bool is_whole = start != std::string::npos && (content.size() - start >= longest_tag || !file);
-    if (is_whole) return content.substr(start, std::min(content.find('\0', start) - start, longest_tag));
-  } while (file);
-  return {};
+// Plugins are never unloaded, not even at exit: the registry holds code of theirs.
+std::vector<std::string>& plugins() {
+  static auto& paths = *new std::vector<std::string>;
+  return paths;
 }
-
+bool loading = false;
+struct Loading {
+  Loading() { loading = true; }
+  ~Loading() { loading = false; }
+};
 }  // namespace
+
+const std::vector<std::string>& loaded_plugins() { return plugins(); }
+bool is_loading_plugin() { return loading; }
 
 void load_plugin(const std::string& path) {
   const std::string remedy = "build it with this vrpipe's vrpipe_add_plugin()";
@@ -111,26 +104,35 @@ void load_plugin(const std::string& path) {
   if (!std::filesystem::is_regular_file(status)) {
     throw UserError("cannot load plugin", path, "it is not a regular file", path_remedy);
   }
-  const std::string tag = tag_in_file(path);
+  const std::string tag = plugin_tag(path);
   if (tag.empty()) throw UserError("cannot load plugin", path, "it is not a vrpipe plugin", remedy);
   if (tag != VRPIPE_PLUGIN_TAG) {
     throw UserError("cannot load plugin", path, "it was built for " + tag + ", this is " VRPIPE_PLUGIN_TAG, remedy);
   }
-  const std::size_t before = Registry::instance().all().size();
-  // Plugins are never unloaded, not even at exit: the registry holds code of theirs.
-  static auto& loaded = *new std::vector<boost::dll::shared_library>;
-  boost::dll::fs::error_code error;
-  boost::dll::shared_library library(path, error, boost::dll::load_mode::rtld_now);
-  if (error) {
+  // A name without a folder would be looked for among the system's libraries.
+  const std::string file = path.find('/') == std::string::npos ? "./" + path : path;
+  if (dlopen(file.c_str(), RTLD_NOW | RTLD_NOLOAD) != nullptr) {
+    throw UserError("cannot load plugin", path, "it is loaded already", "give it once");
+  }
+  Registry& registry = Registry::instance();
+  const std::size_t before = registry.registrations();
+  registry.take_problems();
+  void* library = nullptr;
+  {
+    const ForeignCall running(file.c_str(), "while it is loaded");
+    const Loading now;
+    library = dlopen(file.c_str(), RTLD_NOW);
+  }
+  if (library == nullptr) {
     const char* const detail = dlerror();
     throw UserError("cannot load plugin", path, detail != nullptr ? detail : "the loader refuses it", remedy);
   }
-  loaded.push_back(std::move(library));
-  if (!Registry::instance().problems().empty()) {
-    throw UserError("cannot load plugin", path, Registry::instance().problems().front(), "choose another name");
-  }
-  if (Registry::instance().all().size() == before) {
-    throw UserError("cannot load plugin", path, "it registers no unit", "register one with Registrar");
+  plugins().push_back(path);
+  const std::vector<Registry::Problem> problems = registry.take_problems();
+  if (!problems.empty()) throw UserError("cannot load plugin", path, problems.front().why, problems.front().remedy);
+  if (registry.registrations() == before) {
+    throw UserError("cannot load plugin", path, "it registers no unit and no platform",
+                    "register one with Registrar or add_platform");
   }
 }
 

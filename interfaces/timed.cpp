@@ -4,6 +4,7 @@
 #include <map>
 
 #include <vrpipe/error.h>
+#include <vrpipe/registry.h>
 
 namespace vrpipe {
 
@@ -68,7 +69,11 @@ Cycle TimedMemoryPort::request(tlm::tlm_command command, std::uint64_t address, 
   return now + std::max(at - now, clock_.domain->cycles_up(delay));
 }
 
-void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker) { makers()[slot] = std::move(maker); }
+void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker) {
+  if (makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();
+  Registry::instance().add_problem(
+      {"slot " + slot + " has a module for lt and at already", "write a behaviour for the slot instead"});
+}
 
 const TimedUnitMaker& timed_unit_maker(const std::string& slot) {
   const auto found = makers().find(slot);

@@ -3,6 +3,7 @@
 #include <map>
 
 #include <vrpipe/error.h>
+#include <vrpipe/registry.h>
 
 namespace vrpipe {
 
@@ -35,7 +36,11 @@ Unit::Unit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector
 InPort& Unit::in(const std::string& name) { return port_named(in_ports, this->name(), name); }
 OutPort& Unit::out(const std::string& name) { return port_named(out_ports, this->name(), name); }
 
-void register_unit_maker(const std::string& slot, UnitMaker maker) { makers()[slot] = std::move(maker); }
+void register_unit_maker(const std::string& slot, UnitMaker maker) {
+  if (makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();
+  Registry::instance().add_problem(
+      {"slot " + slot + " has a module for cycle already", "write a behaviour for the slot instead"});
+}
 
 const UnitMaker& unit_maker(const std::string& slot) {
   const auto found = makers().find(slot);

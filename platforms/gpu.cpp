@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include <vrpipe/checked_behaviours.h>
 #include <vrpipe/error.h>
 #include <vrpipe/random.h>
 #include <vrpipe/timed.h>
@@ -33,16 +34,37 @@ Gpu::Gpu(const Configuration& configuration, ColorSurface& surface)
                                                         std::llround(1e6 / configuration.platform().frequency_mhz)))),
       l2_(std::make_unique<FixedLatencyMemory>("l2", *clock_, configuration.l2().latency_cycles,
                                                configuration.l2().bytes_per_cycle, configuration.platform().gpcs)) {
-  configuration.platform().wire(*this);
+  wire();
   check_ports();
 }
 
 Gpu::~Gpu() = default;
 
+void Gpu::wire() {
+  const Platform& platform = configuration_.platform();
+  const auto fault = [&](const std::string& item) {
+    throw SimulationFault("platform " + platform.name, 0, "its wiring throws " + item);
+  };
+  try {
+    platform.wire(*this);
+  } catch (const UserError&) {
+    throw;
+  } catch (const SimulationFault&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& thrown) {
+    fault(thrown.what());
+  } catch (...) {
+    fault("an exception of unknown type");
+  }
+}
+
 unsigned Gpu::gpcs() const { return configuration_.platform().gpcs; }
 
 Unit& Gpu::add_unit(const std::string& name, const std::string& slot, const RenderState& state) {
   std::unique_ptr<Behaviour> behaviour = configuration_.make(slot, state.gpc);
+  follow_clock(*behaviour, *clock_);
   if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(surface_);
   if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get());
       zrop != nullptr && state.termination == Termination::strict && state.early_termination) {

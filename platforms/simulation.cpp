@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include <vrpipe/checked_behaviours.h>
 #include <vrpipe/error.h>
 #include <vrpipe/platforms/gpu.h>
 
@@ -88,13 +89,13 @@ std::vector<StatisticReport> collect(const BehaviourList& behaviours) {
   std::vector<StatisticReport> reports;
   std::map<std::string, std::size_t> index;
   for (const auto& [slot, behaviour] : behaviours.of_slot) {
-    for (const Counter* counter : behaviour->counters()) {
+    for (const Counter* counter : behaviour->unit().counters()) {
       const std::string name = slot + "." + counter->name();
       const auto place = index.emplace(name, reports.size());
       if (place.second) reports.push_back({name, counter->unit(), counter->meaning(), 0});
       reports[place.first->second].value += counter->value();
     }
-    for (const Extreme* extreme : behaviour->extremes()) {
+    for (const Extreme* extreme : behaviour->unit().extremes()) {
       if (!extreme->seen()) continue;
       const std::string name = slot + "." + extreme->name();
       const auto place = index.emplace(name, reports.size());
@@ -107,38 +108,51 @@ std::vector<StatisticReport> collect(const BehaviourList& behaviours) {
   return reports;
 }
 
-Counts counts_from(const std::vector<StatisticReport>& statistics) {
-  const auto value = [&](const char* name) -> std::uint64_t {
-    for (const StatisticReport& report : statistics) {
-      if (report.name == name) return report.value;
-    }
-    return 0;
-  };
+/// The counters that every unit of a slot has, summed over GPCs.
+Counts counts_from(const BehaviourList& behaviours) {
   Counts c;
-  c.primitives = value("vpo.primitives");
-  c.quads_rasterized = value("raster.quads_rasterized");
-  c.fragments_rasterized = value("raster.fragments_rasterized");
-  c.quads_depth_stencil_failed = value("zrop.quads_depth_stencil_failed");
-  c.fragments_depth_stencil_failed = value("zrop.fragments_depth_stencil_failed");
-  c.quads_terminated = value("zrop.quads_terminated");
-  c.fragments_terminated = value("zrop.fragments_terminated");
-  c.quads_shaded = value("sm.quads_shaded");
-  c.fragments_shaded = value("sm.fragments_shaded");
-  c.quads_pruned = value("sm.quads_pruned");
-  c.fragments_pruned = value("sm.fragments_pruned");
-  c.quads_merged = value("sm.quads_merged");
-  c.fragments_merged = value("sm.fragments_merged");
-  c.quads_dropped_late = value("crop.quads_dropped_late");
-  c.fragments_dropped_late = value("crop.fragments_dropped_late");
-  c.quads_late_failed = value("crop.quads_late_failed");
-  c.fragments_late_failed = value("crop.fragments_late_failed");
-  c.quads_blended = value("crop.quads_blended");
-  c.fragments_blended = value("crop.fragments_blended");
-  c.warps = value("sm.fragment_warps");
-  c.tgc_flushes = value("tgc.flushes");
-  c.tc_flushes = value("tc.flushes");
-  c.termination_updates = value("crop.termination_signals");
+  for (const auto& [slot, behaviour] : behaviours.of_slot) {
+    const Behaviour& unit = behaviour->unit();
+    if (const auto* const vpo = dynamic_cast<const VpoBehaviour*>(&unit)) {
+      c.primitives += vpo->primitives.value();
+    } else if (const auto* const tgc = dynamic_cast<const TgcBehaviour*>(&unit)) {
+      c.tgc_flushes += tgc->flushes.value();
+    } else if (const auto* const raster = dynamic_cast<const RasterBehaviour*>(&unit)) {
+      c.quads_rasterized += raster->quads_rasterized.value();
+      c.fragments_rasterized += raster->fragments_rasterized.value();
+    } else if (const auto* const tc = dynamic_cast<const TcBehaviour*>(&unit)) {
+      c.tc_flushes += tc->flushes.value();
+    } else if (const auto* const zrop = dynamic_cast<const ZropBehaviour*>(&unit)) {
+      c.quads_depth_stencil_failed += zrop->quads_depth_stencil_failed.value();
+      c.fragments_depth_stencil_failed += zrop->fragments_depth_stencil_failed.value();
+      c.quads_terminated += zrop->quads_terminated.value();
+      c.fragments_terminated += zrop->fragments_terminated.value();
+    } else if (const auto* const sm = dynamic_cast<const SmBehaviour*>(&unit)) {
+      c.quads_shaded += sm->quads_shaded.value();
+      c.fragments_shaded += sm->fragments_shaded.value();
+      c.quads_pruned += sm->quads_pruned.value();
+      c.fragments_pruned += sm->fragments_pruned.value();
+      c.quads_merged += sm->quads_merged.value();
+      c.fragments_merged += sm->fragments_merged.value();
+      c.warps += sm->fragment_warps.value();
+    } else if (const auto* const crop = dynamic_cast<const CropBehaviour*>(&unit)) {
+      c.quads_dropped_late += crop->quads_dropped_late.value();
+      c.fragments_dropped_late += crop->fragments_dropped_late.value();
+      c.quads_late_failed += crop->quads_late_failed.value();
+      c.fragments_late_failed += crop->fragments_late_failed.value();
+      c.quads_blended += crop->quads_blended.value();
+      c.fragments_blended += crop->fragments_blended.value();
+      c.termination_updates += crop->termination_signals.value();
+    }
+  }
   return c;
+}
+
+/// What the units counted, once a checked unit's counters are what went through it.
+void report_counts(const BehaviourList& behaviours, RunResult& result) {
+  for (const auto& [slot, behaviour] : behaviours.of_slot) check_counters(*behaviour);
+  result.statistics = collect(behaviours);
+  result.counts = counts_from(behaviours);
 }
 
 void check_conservation(const Counts& c) {
@@ -264,7 +278,7 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
   occupancy.add(std::move(l2),
                 {{"bytes", 0, static_cast<double>(gpu.l2().bytes(cycles)) / gpu.l2().peak_rate(), true}});
   occupancy.finish();
-  result.statistics = collect(behaviours);
+  report_counts(behaviours, result);
 }
 
 void report_bound(const Configuration& configuration, const FunctionalGpu& gpu, RunResult& result) {
@@ -305,7 +319,7 @@ void run_functional(const Configuration& configuration, std::atomic<float>* prog
   const HostTimer timer;
   gpu.run(progress);
   timer.stop(result);
-  result.statistics = collect(gpu.behaviours());
+  report_counts(gpu.behaviours(), result);
   if (bounded) report_bound(configuration, gpu, result);
 }
 
@@ -358,7 +372,6 @@ RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<floa
   } else {
     run_clocked(configuration, progress, result);
   }
-  result.counts = counts_from(result.statistics);
   check_conservation(result.counts);
   result.result_hash = hash_of(result);
   return result;

@@ -44,8 +44,8 @@ std::vector<Statistic> statistics_of(const ParameterListing& unit) {
   const auto add = [&](const auto& statistics) {
     for (const auto* one : statistics) all.push_back({unit.unit + "." + one->name(), one->unit(), one->meaning()});
   };
-  add(behaviour->counters());
-  add(behaviour->extremes());
+  add(behaviour->unit().counters());
+  add(behaviour->unit().extremes());
   return all;
 }
 

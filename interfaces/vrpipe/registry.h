@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/parameter.h>
@@ -11,12 +12,17 @@
 
 namespace vrpipe {
 
+/// What a unit returns is checked at every call (checked_behaviours.h), which takes time, unless it is trusted: the units
+/// of this repository are, whose tests check it.
+enum class Trust : std::uint8_t { checked, trusted };
+
 /// An implementation of a slot: a unit that a platform can be built with.
 struct Implementation {
   std::string slot;           ///< draw vpo tgc raster tc prop zrop qru sm crop
   std::string name;           ///< e.g. "pairing"
   std::string description;    ///< one line
   bool pass_through = false;  ///< stands in for a unit that a variant does not have
+  Trust trust = Trust::checked;
   std::function<std::unique_ptr<ParameterSet>()> make_parameters;
   std::function<std::unique_ptr<Behaviour>(const ParameterSet&, const RenderState&)> make_behaviour;
 };
@@ -26,10 +32,20 @@ class Registry {
  public:
   static Registry& instance();
 
-  /// A second implementation of a slot and name is not taken but kept as a problem: registrars run while a library is
-  /// loaded, when nothing may be thrown.
+  /// A second implementation of a slot and name, or one of an unknown slot, is not taken but kept as a problem:
+  /// registrars run while a library is loaded, when nothing may be thrown.
   void add(Implementation implementation);
-  const std::vector<std::string>& problems() const { return problems_; }
+  /// Why something could not be registered, and what to do about it.
+  struct Problem {
+    std::string why;
+    std::string remedy;
+  };
+  void add_problem(Problem problem) { problems_.push_back(std::move(problem)); }
+  void count_registration() { ++registrations_; }
+  /// Of everything, so that a plugin that registers nothing is told.
+  std::size_t registrations() const { return registrations_; }
+  /// The problems since the last call.
+  std::vector<Problem> take_problems() { return std::exchange(problems_, {}); }
   /// Throws UserError naming the nearest slot or implementation.
   const Implementation& find(const std::string& slot, const std::string& name) const;
   /// In order of slot in the pipeline, then of name.
@@ -41,7 +57,8 @@ class Registry {
 
  private:
   std::vector<std::unique_ptr<Implementation>> implementations_;
-  std::vector<std::string> problems_;
+  std::vector<Problem> problems_;
+  std::size_t registrations_ = 0;
 };
 
 /// Registers a behaviour class at program or plugin load. `Unit` has a nested `Parameters` (a ParameterSet) and a
@@ -51,12 +68,14 @@ class Registrar {
   static_assert(std::is_base_of<SlotBehaviour, Unit>::value, "a unit implements the behaviour of its slot");
 
  public:
-  Registrar(const char* slot, const char* name, const char* description, bool pass_through = false) {
+  Registrar(const char* slot, const char* name, const char* description, bool pass_through = false,
+            Trust trust = Trust::checked) {
     Implementation implementation;
     implementation.slot = slot;
     implementation.name = name;
     implementation.description = description;
     implementation.pass_through = pass_through;
+    implementation.trust = trust;
     implementation.make_parameters = [] { return std::make_unique<typename Unit::Parameters>(); };
     implementation.make_behaviour = [](const ParameterSet& parameters, const RenderState& state) {
       return std::make_unique<Unit>(dynamic_cast<const typename Unit::Parameters&>(parameters), state);
@@ -71,8 +90,13 @@ class Registrar {
   extern "C" __attribute__((visibility("default"), used)) const char vrpipe_plugin_tag[]; \
   extern "C" __attribute__((visibility("default"), used)) const char vrpipe_plugin_tag[] = VRPIPE_PLUGIN_TAG;
 
-/// Loads a plugin; its units are in the registry afterwards. Throws UserError when the file is missing, is not a
-/// plugin of vrpipe, was built against another version, or registers nothing.
+/// Loads a plugin; its units and platforms can be used afterwards. Throws UserError when the file is missing, is not a
+/// plugin of vrpipe, was built against another version, is loaded already, registers nothing or something that is there
+/// already. An initialiser that throws ends the program: the loader lets no exception through.
 void load_plugin(const std::string& path);
+/// The paths of those loaded, in order.
+const std::vector<std::string>& loaded_plugins();
+/// While `load_plugin` runs a plugin's initialisers.
+bool is_loading_plugin();
 
 }  // namespace vrpipe

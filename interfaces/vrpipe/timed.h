@@ -536,7 +536,7 @@ using TimedUnitMaker =
                                         std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned gpcs,
                                         Transport transport)>;
 
-/// Registered by each timing model for its slot.
+/// Registered by each timing model for its slot. A second one for a slot is a problem of the registry's.
 void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker);
 const TimedUnitMaker& timed_unit_maker(const std::string& slot);
 

@@ -58,7 +58,7 @@ using UnitMaker =
     std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain,
                                         std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned gpcs)>;
 
-/// Registered by each timing model for its slot.
+/// Registered by each timing model for its slot. A second one for a slot is a problem of the registry's.
 void register_unit_maker(const std::string& slot, UnitMaker maker);
 const UnitMaker& unit_maker(const std::string& slot);
 

@@ -24,9 +24,14 @@ struct Throughput {
   std::uint32_t latency_cycles = 1;   ///< from the last item in to the first item out
 };
 
+/// A slot's class declares the counters that reports and the checks of conservation need; every unit of the slot counts
+/// them. Others are its own.
 class Behaviour : public StatisticSet {
  public:
   virtual ~Behaviour() = default;
+  /// The unit as its author wrote it: itself, or what stands behind the checks (checked_behaviours.h).
+  virtual const Behaviour& unit() const { return *this; }
+  Behaviour& unit() { return const_cast<Behaviour&>(static_cast<const Behaviour*>(this)->unit()); }
 };
 
 /// Slot `draw`: issues the splats of a draw as vertex warps.
@@ -44,6 +49,8 @@ class VpoBehaviour : public Behaviour {
   /// The visible triangles of a splat, in order. Returns how many of `out` are set (0 to 2).
   virtual unsigned assemble(std::uint32_t splat, std::array<Primitive, 2>& out) = 0;
   virtual Throughput cost() const = 0;  ///< items: triangles
+
+  Counter primitives{*this, "primitives", "triangles", "triangles handed to the GPCs"};
 };
 
 /// Slot `tgc`: collects primitives per tile grid.
@@ -65,6 +72,8 @@ class TgcBehaviour : public Behaviour {
   virtual Throughput cost() const = 0;              ///< items: bin entries
   virtual std::uint32_t largest_flush() const = 0;  ///< primitives
   virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
+
+  Counter flushes{*this, "flushes", "flushes", "bins handed to the rasteriser; 0 where a unit passes through"};
 };
 
 /// Slot `raster`: setup, coarse and fine rasterisation of one primitive at a time.
@@ -85,6 +94,9 @@ class RasterBehaviour : public Behaviour {
     std::uint32_t quads_per_cycle;              ///< handed to TC
   };
   virtual Cost cost() const = 0;
+
+  Counter quads_rasterized{*this, "quads_rasterized", "quads", "with at least one covered sample"};
+  Counter fragments_rasterized{*this, "fragments_rasterized", "fragments", "covered samples"};
 };
 
 /// Slot `tc`: collects quads per screen tile.
@@ -96,18 +108,25 @@ class TcBehaviour : public Behaviour {
     FlushReason reason = FlushReason::full;
     std::vector<Quad> quads;
   };
-  /// Takes quads `from`.. of a beat until all are taken or a bin is flushed. Returns the number taken;
-  /// `flushed` tells whether `out` was filled.
+  /// Takes quads `from`.. of a beat until all are taken or a bin is flushed. Returns the number taken, 0 only together
+  /// with a flush; `flushed` tells whether `out` was filled. What `out` held before is replaced.
   virtual unsigned insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) = 0;
-  /// Flushes the bin allocated first; false when all are empty.
+  /// Flushes the bin whose turn it is (the shipped unit's: allocated first); false when all are empty.
   virtual bool flush_oldest(FlushReason reason, Flush& out) = 0;
   struct Cost {
     std::uint32_t quads_per_cycle;
     std::uint32_t latency_cycles;
     std::uint32_t idle_timeout_cycles;  ///< without an incoming quad until bins are flushed; 0: never
     std::uint32_t flush_queue_bins;     ///< flushed bins that wait for PROP
+    /// The time-out that applies. None in strict termination: the contents of bins would depend on time.
+    std::uint32_t timeout_in(Termination termination) const {
+      return termination == Termination::strict ? 0 : idle_timeout_cycles;
+    }
   };
   virtual Cost cost() const = 0;
+
+  Counter quads{*this, "quads", "quads", "taken into bins"};
+  Counter flushes{*this, "flushes", "flushes", "bins handed to PROP"};
 };
 
 /// Slot `prop`: hands bins to ZROP and on to QRU, and shaded warps to CROP in order.
@@ -135,7 +154,7 @@ class TerminationForesight {
 /// Slot `zrop`: depth and stencil test, termination test and update.
 class ZropBehaviour : public Behaviour {
  public:
-  /// Removes dead samples, and quads without a live one, from the beat.
+  /// Removes dead samples, and quads without a live one, from the beat; its tile and marks stay.
   virtual void test(QuadBeat& beat) = 0;
   /// Sets the termination bit (stencil MSB) of the signalled pixels.
   virtual void update(const TerminationSignal& signal) = 0;
@@ -147,13 +166,22 @@ class ZropBehaviour : public Behaviour {
     std::uint32_t updates_per_cycle;  ///< signals; a cycle with updates tests no quads: one z-cache port
   };
   virtual Cost cost() const = 0;
+
+  Counter quads_tested{*this, "quads_tested", "quads", "that entered the termination test"};
+  Counter quads_depth_stencil_failed{*this, "quads_depth_stencil_failed", "quads",
+                                     "that lost their last fragment to the depth or stencil test"};
+  Counter fragments_depth_stencil_failed{*this, "fragments_depth_stencil_failed", "fragments",
+                                         "that failed the depth or stencil test"};
+  Counter quads_terminated{*this, "quads_terminated", "quads", "that lost their last fragment to the termination test"};
+  Counter fragments_terminated{*this, "fragments_terminated", "fragments", "that failed the termination test"};
+  Counter termination_updates{*this, "termination_updates", "signals", "received from CROP, one for a quad's pixels"};
 };
 
 /// Slot `qru`: forms warps from the surviving quads of a bin.
 class QruBehaviour : public Behaviour {
  public:
-  /// Examines quads of a bin, until all `count` are examined or a warp is complete. Returns the number examined;
-  /// `launched` tells whether `out` was filled.
+  /// Examines quads of a bin, until all `count` are examined or a warp is complete. Returns the number examined, 0 only
+  /// together with a launch; `launched` tells whether `out` was filled.
   virtual unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) = 0;
   /// At the end of a bin: the next warp of what is left; false when nothing is.
   virtual bool finish_bin(Warp& out) = 0;
@@ -170,6 +198,7 @@ struct ShaderSegment {
 /// Slot `sm`: vertex and fragment shading, alpha pruning, quad merging.
 class SmBehaviour : public Behaviour {
  public:
+  /// Shades, prunes and merges: fills `out` but for its slot and its pool, which are the module's.
   virtual void shade(const Warp& warp, ShadedWarp& out) = 0;
   virtual void shade_vertices(const VertexWarp& warp) = 0;
   struct Cost {
@@ -190,13 +219,21 @@ class SmBehaviour : public Behaviour {
     double instructions_per_cycle() const { return double{1} * cores * schedulers_per_core / cycles_per_instruction(); }
   };
   virtual Cost cost() const = 0;
+
+  Counter quads_shaded{*this, "quads_shaded", "quads", "launched in fragment warps"};
+  Counter fragments_shaded{*this, "fragments_shaded", "fragments", "live samples launched"};
+  Counter quads_pruned{*this, "quads_pruned", "quads", "that lost their last fragment to alpha pruning"};
+  Counter fragments_pruned{*this, "fragments_pruned", "fragments", "with alpha below the threshold"};
+  Counter quads_merged{*this, "quads_merged", "quads", "taken away by merging, one a pair with two live quads"};
+  Counter fragments_merged{*this, "fragments_merged", "fragments", "taken away by merging, where both are live"};
+  Counter fragment_warps{*this, "fragment_warps", "warps", "of fragments"};
 };
 
 /// Slot `crop`: blends quads into the colour target and tests for termination.
 class CropBehaviour : public Behaviour {
  public:
-  /// Before the first blend.
-  void attach(ColorSurface& surface) { surface_ = &surface; }
+  /// Before the first blend. One that overrides it calls it.
+  virtual void attach(ColorSurface& surface) { surface_ = &surface; }
   const ColorSurface* surface() const { return surface_; }
   struct Outcome {
     LaneMask terminated;  ///< pixels to signal: those that newly passed the termination threshold (HET only)
@@ -247,8 +284,21 @@ class CropBehaviour : public Behaviour {
     std::uint32_t mshrs;              ///< sectors in flight
     std::uint32_t sectors_per_cycle;  ///< filled or written back
     bool writes_unchanged;            ///< a blend that changes no value makes its sector dirty all the same
+    /// Throws UserError for a cache that cannot be: sizes are powers of two, quad <= line <= cache, sector <= line, at
+    /// most 32 sectors a line.
+    void check_cache(ColorFormat format) const;
   };
   virtual Cost cost() const = 0;
+
+  Counter quads_blended{*this, "quads_blended", "quads", "blended"};
+  Counter fragments_blended{*this, "fragments_blended", "fragments", "blended"};
+  Counter quads_dropped_late{*this, "quads_dropped_late", "quads",
+                             "of which CROP finds every pixel terminated (strict)"};
+  Counter fragments_dropped_late{*this, "fragments_dropped_late", "fragments",
+                                 "whose pixel CROP finds terminated (strict)"};
+  Counter quads_late_failed{*this, "quads_late_failed", "quads", "that fail a late depth or stencil test"};
+  Counter fragments_late_failed{*this, "fragments_late_failed", "fragments", "that fail a late depth or stencil test"};
+  Counter termination_signals{*this, "termination_signals", "signals", "sent to ZROP, one for a quad's pixels"};
 
  protected:
   ColorSurface* surface_ = nullptr;

@@ -26,7 +26,9 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
             parameters.sector_bytes,
             parameters.mshrs,
             parameters.sectors_per_cycle,
-            parameters.writes_unchanged} {}
+            parameters.writes_unchanged} {
+  cost_.check_cache(Format);
+}
 
 template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
@@ -151,35 +153,24 @@ void ColorRop<Format, Rounding>::blend_quads(const ShadedWarp& warp, unsigned fr
   }
 }
 
+// For units outside this library that derive from them.
+template class ColorRop<ColorFormat::rgba8, BlendRounding::rne>;
+template class ColorRop<ColorFormat::rgba8, BlendRounding::rtz>;
+template class ColorRop<ColorFormat::rgba8, BlendRounding::measured>;
+template class ColorRop<ColorFormat::rgba16f, BlendRounding::rne>;
+template class ColorRop<ColorFormat::rgba16f, BlendRounding::rtz>;
+template class ColorRop<ColorFormat::rgba16f, BlendRounding::measured>;
+template class ColorRop<ColorFormat::rgba32f, BlendRounding::rne>;
+template class ColorRop<ColorFormat::rgba32f, BlendRounding::rtz>;
+template class ColorRop<ColorFormat::rgba32f, BlendRounding::measured>;
+
 namespace {
 
-template <ColorFormat Format>
-std::unique_ptr<Behaviour> make_for_format(const CropParameters& parameters, const RenderState& state) {
-  switch (state.blend_rounding) {
-    case BlendRounding::rne: return std::make_unique<ColorRop<Format, BlendRounding::rne>>(parameters, state);
-    case BlendRounding::rtz: return std::make_unique<ColorRop<Format, BlendRounding::rtz>>(parameters, state);
-    case BlendRounding::measured: return std::make_unique<ColorRop<Format, BlendRounding::measured>>(parameters, state);
-  }
-  return nullptr;
-}
-
-std::unique_ptr<Behaviour> make(const ParameterSet& set, const RenderState& state) {
-  const auto& parameters = dynamic_cast<const CropParameters&>(set);
-  switch (state.format) {
-    case ColorFormat::rgba8: return make_for_format<ColorFormat::rgba8>(parameters, state);
-    case ColorFormat::rgba16f: return make_for_format<ColorFormat::rgba16f>(parameters, state);
-    case ColorFormat::rgba32f: return make_for_format<ColorFormat::rgba32f>(parameters, state);
-  }
-  return nullptr;
-}
-
 [[maybe_unused]] const bool registered = [] {
-  Implementation implementation;
-  implementation.slot = "crop";
-  implementation.name = "color-rop";
-  implementation.description = "front-to-back blending behind a colour cache, alpha test for termination";
-  implementation.make_parameters = [] { return std::make_unique<CropParameters>(); };
-  implementation.make_behaviour = make;
+  Implementation implementation =
+      CropMaker<ColorRop>::implementation("color-rop",
+                                          "front-to-back blending behind a colour cache, alpha test for termination");
+  implementation.trust = Trust::trusted;
   Registry::instance().add(std::move(implementation));
   return true;
 }();

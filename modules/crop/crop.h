@@ -4,9 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "crop/crop_cache.h"
+#include "crop_cache.h"
 
 #include <vrpipe/parameter.h>
+#include <vrpipe/registry.h>
 #include <vrpipe/units.h>
 
 namespace vrpipe {
@@ -71,6 +72,7 @@ struct CropParameters : ParameterSet {
 template <ColorFormat Format, BlendRounding Rounding>
 class ColorRop : public CropBehaviour {
  public:
+  /// Throws UserError for a cache that cannot be.
   ColorRop(const CropParameters& parameters, const RenderState& state);
 
   Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) override;
@@ -79,20 +81,11 @@ class ColorRop : public CropBehaviour {
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override { cache_->dirty(line, sectors); }
   Cost cost() const override { return cost_; }
 
-  Counter quads_blended{*this, "quads_blended", "quads", "blended"};
-  Counter fragments_blended{*this, "fragments_blended", "fragments", "blended"};
-  Counter quads_dropped_late{*this, "quads_dropped_late", "quads",
-                             "of which CROP finds every pixel terminated (strict)"};
-  Counter fragments_dropped_late{*this, "fragments_dropped_late", "fragments",
-                                 "whose pixel CROP finds terminated (strict)"};
-  Counter quads_late_failed{*this, "quads_late_failed", "quads", "that fail a late depth or stencil test"};
-  Counter fragments_late_failed{*this, "fragments_late_failed", "fragments", "that fail a late depth or stencil test"};
   Counter fragments_swallowed{*this, "fragments_swallowed", "fragments",
                               "blended below the threshold whose alpha is lost to rounding: the pixel keeps its own"};
   Counter pixels_stuck{*this, "pixels_stuck", "pixels",
                        "kept below the threshold by rounding: the alpha lost would have taken them past it"};
   Counter colors_saturated{*this, "colors_saturated", "fragments", "that took a colour beyond the format's largest"};
-  Counter termination_signals{*this, "termination_signals", "signals", "sent to ZROP, one for a quad's pixels"};
 
  private:
   static constexpr float largest_color = Format == ColorFormat::rgba8     ? 1.0F
@@ -114,6 +107,42 @@ class ColorRop : public CropBehaviour {
   Cost cost_;
   std::optional<CropCache> cache_;  ///< once looked up here; the timing model of `cycle` has one of its own
   std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
+};
+
+/// Makes a CROP, ColorRop or what derives from it, for the draw's format and rounding.
+template <template <ColorFormat, BlendRounding> class Rop>
+class CropMaker {
+ public:
+  static std::unique_ptr<Behaviour> make(const ParameterSet& set, const RenderState& state) {
+    const auto& parameters = dynamic_cast<const CropParameters&>(set);
+    switch (state.format) {
+      case ColorFormat::rgba8: return make_for<ColorFormat::rgba8>(parameters, state);
+      case ColorFormat::rgba16f: return make_for<ColorFormat::rgba16f>(parameters, state);
+      case ColorFormat::rgba32f: return make_for<ColorFormat::rgba32f>(parameters, state);
+    }
+    return nullptr;
+  }
+  /// To be registered.
+  static Implementation implementation(const char* name, const char* description) {
+    Implementation implementation;
+    implementation.slot = "crop";
+    implementation.name = name;
+    implementation.description = description;
+    implementation.make_parameters = [] { return std::make_unique<CropParameters>(); };
+    implementation.make_behaviour = make;
+    return implementation;
+  }
+
+ private:
+  template <ColorFormat Format>
+  static std::unique_ptr<Behaviour> make_for(const CropParameters& parameters, const RenderState& state) {
+    switch (state.blend_rounding) {
+      case BlendRounding::rne: return std::make_unique<Rop<Format, BlendRounding::rne>>(parameters, state);
+      case BlendRounding::rtz: return std::make_unique<Rop<Format, BlendRounding::rtz>>(parameters, state);
+      case BlendRounding::measured: return std::make_unique<Rop<Format, BlendRounding::measured>>(parameters, state);
+    }
+    return nullptr;
+  }
 };
 
 }  // namespace vrpipe

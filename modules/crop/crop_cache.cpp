@@ -1,22 +1,12 @@
 #include "crop/crop_cache.h"
 #include "crop/sectors.h"
 
-#include <vrpipe/error.h>
-
 namespace vrpipe {
 
-CropCache::CropCache(std::uint32_t cache_bytes, std::uint32_t line_bytes, std::uint32_t sector_bytes,
-                     std::uint64_t surface_bytes)
+CropCache::CropCache(std::uint32_t cache_bytes, std::uint32_t line_bytes, std::uint64_t surface_bytes)
     : line_shift_(static_cast<unsigned>(__builtin_ctz(line_bytes))),
       lines_(cache_bytes / line_bytes),
-      line_of_tag_((surface_bytes + line_bytes - 1) / line_bytes, no_line) {
-  const auto power_of_two = [](std::uint32_t value) { return value != 0 && (value & (value - 1)) == 0; };
-  if (!power_of_two(line_bytes) || !power_of_two(sector_bytes) || sector_bytes > line_bytes ||
-      line_bytes / sector_bytes > 32 || lines_.empty()) {
-    throw UserError("unusable CROP cache", "crop.cache_bytes, crop.line_bytes, crop.sector_bytes",
-                    "it does not hold a line of sectors", "use powers of two: sector <= line <= cache");
-  }
-}
+      line_of_tag_((surface_bytes + line_bytes - 1) / line_bytes, no_line) {}
 
 CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dirty, std::uint64_t& evicted_address) {
   evicted_dirty = 0;
@@ -41,10 +31,8 @@ CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dir
 }
 
 CropCache make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface) {
-  if (cost.line_bytes < 4 * bytes_per_pixel(surface.format())) {
-    throw UserError("unusable CROP cache", "crop.line_bytes", "a line is smaller than a quad", "use longer lines");
-  }
-  return {cost.cache_bytes, cost.line_bytes, cost.sector_bytes, surface.size_bytes()};
+  cost.check_cache(surface.format());
+  return {cost.cache_bytes, cost.line_bytes, surface.size_bytes()};
 }
 
 std::array<QuadSectors, positions_per_tile> sectors_of_quads(const CropBehaviour::Cost& cost,

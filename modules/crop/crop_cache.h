@@ -16,8 +16,7 @@ class CropCache {
   using Line = std::uint32_t;
   static constexpr Line no_line = ~0U;
 
-  CropCache(std::uint32_t cache_bytes, std::uint32_t line_bytes, std::uint32_t sector_bytes,
-            std::uint64_t surface_bytes);
+  CropCache(std::uint32_t cache_bytes, std::uint32_t line_bytes, std::uint64_t surface_bytes);
 
   /// The line that holds the address; `no_line` when none does.
   Line find(std::uint64_t address) const { return line_of_tag_[address >> line_shift_]; }

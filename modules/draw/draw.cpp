@@ -20,7 +20,8 @@ bool VertexIssue::next(VertexWarp& out) {
 }
 
 namespace {
-const Registrar<VertexIssue, DrawBehaviour> registrar("draw", "vertex-issue", "issues sorted splats as vertex warps");
+const Registrar<VertexIssue, DrawBehaviour> registrar("draw", "vertex-issue", "issues sorted splats as vertex warps",
+                                                      false, Trust::trusted);
 }
 
 }  // namespace vrpipe

@@ -10,8 +10,8 @@ PreRop::PreRop(const Parameters& parameters, const RenderState& state)
             parameters.latency_cycles, static_cast<Order>(static_cast<unsigned>(parameters.order))} {}
 
 namespace {
-const Registrar<PreRop, PropBehaviour> registrar("prop", "pre-rop",
-                                                 "quad flow between TC, ZROP, SM and CROP, in order");
+const Registrar<PreRop, PropBehaviour> registrar("prop", "pre-rop", "quad flow between TC, ZROP, SM and CROP, in order",
+                                                 false, Trust::trusted);
 }
 
 }  // namespace vrpipe

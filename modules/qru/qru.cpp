@@ -108,10 +108,10 @@ bool QruPassThrough::finish_bin(Warp& out) {
 }
 
 namespace {
-const Registrar<PairingQru, QruBehaviour> pairing("qru", "pairing",
-                                                  "pairs overlapping quads of a bin for merging (QM)");
+const Registrar<PairingQru, QruBehaviour> pairing("qru", "pairing", "pairs overlapping quads of a bin for merging (QM)",
+                                                  false, Trust::trusted);
 const Registrar<QruPassThrough, QruBehaviour> pass_through("qru", "pass-through", "warps in the order of the quads",
-                                                           true);
+                                                           true, Trust::trusted);
 }  // namespace
 
 }  // namespace vrpipe

@@ -67,8 +67,6 @@ class TileRasterizer : public RasterBehaviour {
   bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override;
   Cost cost() const override { return cost_; }
 
-  Counter quads_rasterized{*this, "quads_rasterized", "quads", "with at least one covered sample"};
-  Counter fragments_rasterized{*this, "fragments_rasterized", "fragments", "covered samples"};
   Counter setups{*this, "setups", "primitives", "set up; again for each flush that a primitive is in"};
   Counter raster_tiles_tested{*this, "raster_tiles_tested", "raster tiles", "by coarse rasterisation"};
   Counter raster_tiles_kept{*this, "raster_tiles_kept", "raster tiles", "handed to fine rasterisation"};

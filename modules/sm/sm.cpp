@@ -183,7 +183,8 @@ void SplatShader::shade_vertices(const VertexWarp&) { ++vertex_warps; }
 
 namespace {
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
-                                                    "Gaussian splatting shaders with alpha pruning and quad merging");
+                                                    "Gaussian splatting shaders with alpha pruning and quad merging",
+                                                    false, Trust::trusted);
 }
 
 }  // namespace vrpipe

@@ -79,13 +79,6 @@ class SplatShader : public SmBehaviour {
   void shade_vertices(const VertexWarp& warp) override;
   Cost cost() const override { return cost_; }
 
-  Counter quads_shaded{*this, "quads_shaded", "quads", "launched in fragment warps"};
-  Counter fragments_shaded{*this, "fragments_shaded", "fragments", "live samples launched"};
-  Counter quads_pruned{*this, "quads_pruned", "quads", "that lost their last fragment to alpha pruning"};
-  Counter fragments_pruned{*this, "fragments_pruned", "fragments", "with alpha below the threshold"};
-  Counter quads_merged{*this, "quads_merged", "quads", "taken away by merging, one a pair with two live quads"};
-  Counter fragments_merged{*this, "fragments_merged", "fragments", "taken away by merging, where both are live"};
-  Counter fragment_warps{*this, "fragment_warps", "warps", "of fragments"};
   Counter vertex_warps{*this, "vertex_warps", "warps", "of vertices"};
   Counter colors_clamped{*this, "colors_clamped", "splats",
                          "set-ups of a splat with a colour below 0 or beyond the largest half"};

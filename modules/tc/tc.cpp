@@ -9,9 +9,7 @@ namespace vrpipe {
 TileCoalescing::TileCoalescing(const Parameters& parameters, const RenderState& state)
     : bin_quads_(parameters.bin_quads),
       grid_(state.draw->width, state.draw->height),
-      // A time-out would make the contents of bins depend on time, which strict termination excludes.
-      cost_{parameters.quads_per_cycle, parameters.latency_cycles,
-            state.termination == Termination::strict ? 0U : std::uint32_t{parameters.idle_timeout_cycles},
+      cost_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.idle_timeout_cycles,
             parameters.flush_queue_bins},
       bins_(parameters.bins),
       bin_of_tile_(grid_.tiles(), -1) {
@@ -77,7 +75,8 @@ bool TileCoalescing::flush_oldest(FlushReason reason, Flush& out) {
 }
 
 namespace {
-const Registrar<TileCoalescing, TcBehaviour> registrar("tc", "tile-coalescing", "bins of quads, one per screen tile");
+const Registrar<TileCoalescing, TcBehaviour> registrar("tc", "tile-coalescing", "bins of quads, one per screen tile",
+                                                       false, Trust::trusted);
 }
 
 }  // namespace vrpipe

@@ -43,8 +43,6 @@ class TileCoalescing : public TcBehaviour {
   bool flush_oldest(FlushReason reason, Flush& out) override;
   Cost cost() const override { return cost_; }
 
-  Counter quads{*this, "quads", "quads", "taken into bins"};
-  Counter flushes{*this, "flushes", "flushes", "bins handed to PROP"};
   Counter flushes_full{*this, "flushes_full", "flushes", "because the bin was full"};
   Counter flushes_evicted{*this, "flushes_evicted", "flushes", "because another tile needed the bin"};
   Counter flushes_timed_out{*this, "flushes_timed_out", "flushes", "because no quad came for the time-out"};

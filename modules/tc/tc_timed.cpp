@@ -11,13 +11,14 @@ namespace {
 class TimedTc : public TimedUnit {
  public:
   TimedTc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour,
-          Transport transport)
+          const RenderState& state, Transport transport)
       : TimedUnit(name, domain, TcWork::kinds(behaviour->cost()), transport),
         out_(*this, "out_bins"),
         in_(*this, "in_quads", [this](const QuadBeat& beat, Span visible) { return collect(beat, visible.first); },
             {&out_}),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
+        idle_timeout_cycles_(cost_.timeout_in(state.termination)),
         entries_(cost_.quads_per_cycle),
         sent_at_(cost_.flush_queue_bins, 0) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
@@ -81,8 +82,8 @@ class TimedTc : public TimedUnit {
   }
 
   Cycle timeout_due() const {
-    if (cost_.idle_timeout_cycles == 0 || !holds_quads_) return never;
-    return std::max({last_arrival_ + cost_.idle_timeout_cycles, timed_out_ + 1, sent_at_[place_]});
+    if (idle_timeout_cycles_ == 0 || !holds_quads_) return never;
+    return std::max({last_arrival_ + idle_timeout_cycles_, timed_out_ + 1, sent_at_[place_]});
   }
 
   /// Flushes the bins whose time is out before a quad comes.
@@ -121,6 +122,7 @@ class TimedTc : public TimedUnit {
   TimedIn<QuadBeat> in_;
   std::unique_ptr<TcBehaviour> behaviour_;
   const TcBehaviour::Cost cost_;
+  const std::uint32_t idle_timeout_cycles_;  ///< 0: never
   std::deque<BinStorage> storage_ = std::deque<BinStorage>(1);
   std::size_t storage_at_ = 0;
   BinStorage* next_storage_ = &storage_[0];
@@ -135,8 +137,9 @@ class TimedTc : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("tc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                     const RenderState&, unsigned, Transport transport) {
-    return std::make_unique<TimedTc>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)), transport);
+                                     const RenderState& state, unsigned, Transport transport) {
+    return std::make_unique<TimedTc>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)), state,
+                                     transport);
   });
   return true;
 }();

@@ -10,12 +10,14 @@ namespace {
 /// Ports: in_quads (QuadBeat), out_bins (QuadBeat).
 class TcUnit : public Unit {
  public:
-  TcUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour)
+  TcUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour,
+         const RenderState& state)
       : Unit(name, domain, TcWork::kinds(behaviour->cost())),
         in_(*this, "in_quads"),
         out_(*this, "out_bins"),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
+        idle_timeout_cycles_(cost_.timeout_in(state.termination)),
         queue_(cost_.flush_queue_bins) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
@@ -84,7 +86,7 @@ class TcUnit : public Unit {
   }
 
   Cycle timeout_due() const {
-    return cost_.idle_timeout_cycles == 0 || !holds_quads_ ? never : last_arrival_ + cost_.idle_timeout_cycles;
+    return idle_timeout_cycles_ == 0 || !holds_quads_ ? never : last_arrival_ + idle_timeout_cycles_;
   }
 
   [[gnu::noinline]] void pass_end_of_draw() {
@@ -140,7 +142,8 @@ class TcUnit : public Unit {
   StreamOut<QuadBeat> out_;
   std::unique_ptr<TcBehaviour> behaviour_;
   const TcBehaviour::Cost cost_;
-  std::vector<Flush> queue_;  ///< flushed bins, a ring
+  const std::uint32_t idle_timeout_cycles_;  ///< 0: never
+  std::vector<Flush> queue_;                 ///< flushed bins, a ring
   unsigned first_ = 0;
   unsigned queued_ = 0;
   unsigned sent_ = 0;  ///< quads of the first bin
@@ -153,8 +156,8 @@ class TcUnit : public Unit {
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("tc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                               const RenderState&, unsigned) {
-    return std::make_unique<TcUnit>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)));
+                               const RenderState& state, unsigned) {
+    return std::make_unique<TcUnit>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)), state);
   });
   return true;
 }();

@@ -132,8 +132,10 @@ bool TgcPassThrough::step(Flush& out) {
 
 namespace {
 const Registrar<TileGridCoalescing, TgcBehaviour> coalescing("tgc", "tile-grid-coalescing",
-                                                             "bins of primitives, one per tile grid (QM)");
-const Registrar<TgcPassThrough, TgcBehaviour> pass_through("tgc", "pass-through", "primitives go on one by one", true);
+                                                             "bins of primitives, one per tile grid (QM)", false,
+                                                             Trust::trusted);
+const Registrar<TgcPassThrough, TgcBehaviour> pass_through("tgc", "pass-through", "primitives go on one by one", true,
+                                                           Trust::trusted);
 }  // namespace
 
 }  // namespace vrpipe

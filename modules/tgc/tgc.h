@@ -51,7 +51,6 @@ class TileGridCoalescing : public TgcBehaviour {
   std::uint64_t storage_bytes() const override;
 
   Counter entries{*this, "entries", "entries", "primitives entered into bins; one for each grid touched"};
-  Counter flushes{*this, "flushes", "flushes", "bins handed to the rasteriser"};
   Counter evictions{*this, "evictions", "flushes", "of these, to make room"};
 
  private:

@@ -67,7 +67,8 @@ unsigned PrimitiveAssembly::assemble(std::uint32_t splat, std::array<Primitive, 
 
 namespace {
 const Registrar<PrimitiveAssembly, VpoBehaviour> registrar("vpo", "primitive-assembly",
-                                                           "two triangles per splat, culled and boxed");
+                                                           "two triangles per splat, culled and boxed", false,
+                                                           Trust::trusted);
 }
 
 }  // namespace vrpipe

@@ -31,7 +31,6 @@ class PrimitiveAssembly : public VpoBehaviour {
   unsigned assemble(std::uint32_t splat, std::array<Primitive, 2>& out) override;
   Throughput cost() const override { return {triangles_per_cycle_, latency_cycles_}; }
 
-  Counter primitives{*this, "primitives", "triangles", "triangles handed to the GPCs"};
   Counter culled_zero_area{*this, "culled_zero_area", "triangles", "without area after snapping"};
   Counter culled_outside{*this, "culled_outside", "triangles", "that cover no sample of the viewport's pixels"};
   Counter dropped_not_finite{*this, "dropped_not_finite", "splats",

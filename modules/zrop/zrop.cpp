@@ -39,7 +39,8 @@ void DepthStencilRop::update(const TerminationSignal& signal) {
 
 namespace {
 const Registrar<DepthStencilRop, ZropBehaviour> registrar("zrop", "depth-stencil-rop",
-                                                          "termination test and update on the stencil MSB");
+                                                          "termination test and update on the stencil MSB", false,
+                                                          Trust::trusted);
 }
 
 }  // namespace vrpipe

@@ -38,11 +38,6 @@ class DepthStencilRop : public ZropBehaviour {
   void foresee(TerminationForesight& foresight) override { foresight_ = &foresight; }
   Cost cost() const override { return cost_; }
 
-  Counter quads_tested{*this, "quads_tested", "quads", "that entered the termination test"};
-  Counter quads_terminated{*this, "quads_terminated", "quads", "that lost their last fragment to the termination test"};
-  Counter fragments_terminated{*this, "fragments_terminated", "fragments", "that failed the termination test"};
-  Counter termination_updates{*this, "termination_updates", "signals", "received from CROP, one for a quad's pixels"};
-
  private:
   void mark(const TerminationSignal& signal) {
     std::uint8_t& bits = terminated_[grid_.place(signal.tile, signal.position)];

@@ -270,7 +270,7 @@ TEST_F(ColorRopTest, QuadsPerCycleFollowTheFormat) {
 }
 
 TEST(CropCache, HoldsItsLinesAndThenLetsTheOldestUnneededGo) {
-  CropCache cache(512, 128, 32, 4096);
+  CropCache cache(512, 128, 4096);
   unsigned dirty = 0;
   std::uint64_t evicted = 0;
   CropCache::Line lines[4];
@@ -291,7 +291,7 @@ TEST(CropCache, HoldsItsLinesAndThenLetsTheOldestUnneededGo) {
 }
 
 TEST(CropCache, NoLineCanBeHadWhileAllAreNeeded) {
-  CropCache cache(256, 128, 32, 4096);
+  CropCache cache(256, 128, 4096);
   unsigned dirty = 0;
   std::uint64_t evicted = 0;
   const CropCache::Line a = cache.allocate(0, dirty, evicted);
@@ -307,7 +307,7 @@ TEST(CropCache, NoLineCanBeHadWhileAllAreNeeded) {
 }
 
 TEST(CropCache, SectorsComeOneByOneAndGoWithTheirLine) {
-  CropCache cache(128, 128, 32, 4096);
+  CropCache cache(128, 128, 4096);
   unsigned dirty = 0;
   std::uint64_t evicted = 0;
   CropCache::Line line = cache.allocate(0, dirty, evicted);
@@ -372,11 +372,24 @@ TEST(CropCache, AQuadsSectorsAreThoseThatHoldItsBytes) {
   }
 }
 
-TEST(CropCache, SizesThatMakeNoCacheAreRefused) {
-  EXPECT_THROW(CropCache(64, 128, 32, 4096), UserError);
-  EXPECT_THROW(CropCache(1024, 96, 32, 4096), UserError);
-  EXPECT_THROW(CropCache(1024, 128, 48, 4096), UserError);
-  EXPECT_THROW(CropCache(1024, 128, 256, 4096), UserError);
+TEST_F(ColorRopTest, ShapesThatMakeNoCacheAreRefusedWhenTheUnitIsMade) {
+  const auto refused = [&](const std::vector<std::pair<std::string, std::string>>& settings, const std::string& names) {
+    try {
+      make(settings);
+      ADD_FAILURE() << "accepted, " << names;
+    } catch (const UserError& error) {
+      EXPECT_NE(std::string(error.what()).find("(" + names + ")"), std::string::npos) << error.what();
+    }
+  };
+  refused({{"cache_bytes", "5000"}}, "crop.cache_bytes");
+  refused({{"line_bytes", "96"}}, "crop.line_bytes");
+  refused({{"sector_bytes", "48"}}, "crop.sector_bytes");
+  refused({{"cache_bytes", "256"}, {"line_bytes", "512"}}, "crop.line_bytes, crop.cache_bytes");
+  refused({{"sector_bytes", "256"}}, "crop.sector_bytes, crop.line_bytes");
+  refused({{"line_bytes", "1024"}, {"sector_bytes", "16"}}, "crop.line_bytes, crop.sector_bytes");
+  make({{"line_bytes", "32"}});
+  state.format = ColorFormat::rgba32f;
+  refused({{"line_bytes", "32"}}, "crop.line_bytes, --format");
 }
 
 }  // namespace

@@ -5,10 +5,12 @@
 #include <vrpipe/error.h>
 #include <vrpipe/platforms/gpu.h>
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/registry.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/scene.h>
 
 #include "support/simulate.h"
+#include "tc/tc.h"
 
 namespace vrpipe {
 namespace {
@@ -98,6 +100,32 @@ TEST(Fidelity, StrictImagesAndCountsAreTheSameOnBuiltinScenes) {
 
 TEST(Fidelity, AnEmptyDrawTakesNoWorkOnAnyRung) {
   for (const Variant& variant : variants()) expect_same_on_every_rung(request_of(variant.name), draw_of(64, 64));
+}
+
+/// A TC of another make, which has its time-out in every mode.
+struct ImpatientTc : TileCoalescing {
+  using TileCoalescing::TileCoalescing;
+  Cost cost() const override {
+    Cost cost = TileCoalescing::cost();
+    cost.idle_timeout_cycles = 3;
+    return cost;
+  }
+};
+const Registrar<ImpatientTc, TcBehaviour> impatient("tc", "impatient", "flushes bins after three idle cycles");
+
+TEST(Fidelity, StrictTerminationHasNoTimeOutWhateverTheUnitAsksFor) {
+  const Draw draw = random_draw(150, 90, 400, 8);
+  RunRequest request = request_of("het+qm");
+  // RASTER is kept waiting, so that TC idles.
+  request.settings = {{"draw", "warps_per_1024_cycles", "16"}};
+  request.units = {{"tc", "impatient"}};
+  EXPECT_GT(statistic(run(request, draw), "tc.flushes_timed_out"), 0U);
+  expect_same_on_every_rung(request, draw);
+  strictly(request);
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+    request.fidelity = fidelity;
+    EXPECT_EQ(statistic(run(request, draw), "tc.flushes_timed_out"), 0U) << name_of(fidelity);
+  }
 }
 
 TEST(Fidelity, RandomStallsChangeNothingButTime) {

@@ -158,9 +158,9 @@ TEST_F(TileCoalescingTest, NoQuadIsLostDoubledOrReorderedWithinItsTile) {
 }
 
 TEST_F(TileCoalescingTest, StrictTerminationHasNoTimeOut) {
-  EXPECT_EQ(TileCoalescing(parameters, state).cost().idle_timeout_cycles, 150U);
-  state.termination = Termination::strict;
-  EXPECT_EQ(TileCoalescing(parameters, state).cost().idle_timeout_cycles, 0U);
+  const TcBehaviour::Cost cost = TileCoalescing(parameters, state).cost();
+  EXPECT_EQ(cost.timeout_in(Termination::paper), 150U);
+  EXPECT_EQ(cost.timeout_in(Termination::strict), 0U);
 }
 
 }  // namespace

@@ -45,6 +45,7 @@ class Gpu {
 
  private:
   Unit& add_unit(const std::string& name, const std::string& slot, const RenderState& state);
+  void wire();
   void check_ports() const;
 
   const Configuration& configuration_;

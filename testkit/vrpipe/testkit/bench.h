@@ -9,6 +9,7 @@
 
 #include <systemc>
 
+#include <vrpipe/checked_behaviours.h>
 #include <vrpipe/clock_domain.h>
 #include <vrpipe/error.h>
 #include <vrpipe/memory_port.h>
@@ -64,6 +65,7 @@ class Bench {
       surface_ = std::make_unique<ColorSurface>(state.draw->width, state.draw->height, state.format);
       crop->attach(*surface_);
     }
+    follow_clock(*behaviour, *clock_);
     unit_ = unit_maker(slot)(slot, *clock_, std::move(behaviour), state_, gpcs);
   }
   Bench(const Bench&) = delete;
@@ -71,10 +73,12 @@ class Bench {
 
   ClockDomain& clock() { return *clock_; }
   Unit& unit() { return *unit_; }
-  /// The unit's behaviour as the class that it is, for its counters: behaviour<PairingQru>().
+  /// The unit's behaviour as the class that it is, for its counters: behaviour<PairingQru>(). Of a plugin's class, link
+  /// the plugin (vrpipe_add_plugin makes a library that can be linked and loaded); it is registered then without
+  /// load_plugin.
   template <class Type>
   Type& behaviour() {
-    return dynamic_cast<Type&>(unit_->behaviour());
+    return dynamic_cast<Type&>(unit_->behaviour().unit());
   }
   /// What a CROP blends into.
   ColorSurface& surface() { return *surface_; }

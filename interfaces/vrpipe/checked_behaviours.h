@@ -1,0 +1,41 @@
+#pragma once
+
+#include <vrpipe/registry.h>
+
+/// Units that are not trusted, a plugin's, stand behind checks of all that they return: a mistake of theirs ends in a
+/// SimulationFault that names the unit (slot=implementation), the cycle and the item, at every fidelity, rather than in a
+/// crash, a hang or a wrong picture elsewhere. Trusted units are called directly.
+
+namespace vrpipe {
+
+class ClockDomain;
+
+/// Puts whatever the implementation makes behind checks. The registry does so for each that is not trusted.
+void check_calls(Implementation& implementation);
+
+/// The clock by which faults of a unit name the cycle; without one they name cycle 0. It outlives the unit.
+void follow_clock(Behaviour& unit, const ClockDomain& clock);
+
+/// After a draw: throws SimulationFault where the counters of the slot are not what went through a checked unit.
+void check_counters(const Behaviour& unit);
+
+/// Code of a plugin that runs at this moment, for the report of a crash.
+struct ForeignCode {
+  const char* owner = nullptr;  ///< slot=implementation, or the plugin's path; null when none runs
+  const char* call = nullptr;   ///< e.g. "insert"
+};
+ForeignCode foreign_code_running();
+
+/// Marks such code for as long as it lives.
+class ForeignCall {
+ public:
+  ForeignCall(const char* owner, const char* call);
+  ~ForeignCall();
+  ForeignCall(const ForeignCall&) = delete;
+  ForeignCall& operator=(const ForeignCall&) = delete;
+
+ private:
+  ForeignCode before_;
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,357 @@
+// Units that are not trusted: each breaks one rule of its slot, and the run ends in a fault that names it, at every
+// fidelity.
+#include <stdexcept>
+
+#include <vrpipe/error.h>
+#include <vrpipe/platforms/configuration.h>
+#include <vrpipe/registry.h>
+
+#include "crop/crop.h"
+#include "draw/draw.h"
+#include "prop/prop.h"
+#include "qru/qru.h"
+#include "raster/raster.h"
+#include "sm/sm.h"
+#include "support/simulate.h"
+#include "tc/tc.h"
+#include "tgc/tgc.h"
+#include "vpo/vpo.h"
+#include "zrop/zrop.h"
+
+namespace vrpipe {
+namespace {
+
+using namespace testing;
+
+struct DrawWithoutRate : VertexIssue {
+  using VertexIssue::VertexIssue;
+  std::uint32_t warps_per_1024_cycles() const override { return 0; }
+};
+struct DrawBeyondTheSplats : VertexIssue {
+  using VertexIssue::VertexIssue;
+  bool next(VertexWarp& out) override {
+    const bool more = VertexIssue::next(out);
+    out.first_splat += 1'000'000;
+    return more;
+  }
+};
+struct DrawOverAndOver : VertexIssue {
+  using VertexIssue::VertexIssue;
+  bool next(VertexWarp& out) override {
+    out = VertexWarp{0, 8, false};
+    return true;
+  }
+};
+struct VpoOfThree : PrimitiveAssembly {
+  using PrimitiveAssembly::PrimitiveAssembly;
+  unsigned assemble(std::uint32_t splat, std::array<Primitive, 2>& out) override {
+    PrimitiveAssembly::assemble(splat, out);
+    return 3;
+  }
+};
+struct VpoThatThrowsWhenMade : PrimitiveAssembly {
+  VpoThatThrowsWhenMade(const Parameters& parameters, const RenderState& state) : PrimitiveAssembly(parameters, state) {
+    throw std::runtime_error("no table");
+  }
+};
+struct VpoWithoutRate : PrimitiveAssembly {
+  using PrimitiveAssembly::PrimitiveAssembly;
+  Throughput cost() const override { return {0, 1}; }
+};
+struct VpoThatCountsTwice : PrimitiveAssembly {
+  using PrimitiveAssembly::PrimitiveAssembly;
+  unsigned assemble(std::uint32_t splat, std::array<Primitive, 2>& out) override {
+    const unsigned count = PrimitiveAssembly::assemble(splat, out);
+    primitives += count;
+    return count;
+  }
+};
+struct TgcWithoutLatency : TileGridCoalescing {
+  using TileGridCoalescing::TileGridCoalescing;
+  Throughput cost() const override { return {2, 0}; }
+};
+struct TgcThatDrainsForEver : TileGridCoalescing {
+  using TileGridCoalescing::TileGridCoalescing;
+  bool drain(Flush& out) override {
+    if (TileGridCoalescing::drain(out)) last_ = out;
+    out = last_;
+    return true;
+  }
+  Flush last_;
+};
+struct TgcThatEntersForEver : TileGridCoalescing {
+  using TileGridCoalescing::TileGridCoalescing;
+  bool entering() const override { return true; }
+  bool step(Flush&) override { return false; }
+};
+struct RasterOutsideTheFrame : TileRasterizer {
+  using TileRasterizer::TileRasterizer;
+  bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override {
+    const bool more = TileRasterizer::next(out, coarse_tests, new_screen_tile);
+    if (more) out.tile.x = 4000;
+    return more;
+  }
+};
+struct RasterThatNeverEnds : TileRasterizer {
+  using TileRasterizer::TileRasterizer;
+  bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override {
+    if (!TileRasterizer::next(out, coarse_tests, new_screen_tile)) out.count = 0;
+    return true;
+  }
+};
+struct TcThatTakesTooMuch : TileCoalescing {
+  using TileCoalescing::TileCoalescing;
+  unsigned insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) override {
+    return TileCoalescing::insert(beat, from, out, flushed) + 1;
+  }
+};
+struct TcThatTakesNothing : TileCoalescing {
+  using TileCoalescing::TileCoalescing;
+  unsigned insert(const QuadBeat&, unsigned, Flush&, bool& flushed) override {
+    flushed = false;
+    return 0;
+  }
+};
+struct TcThatThrows : TileCoalescing {
+  using TileCoalescing::TileCoalescing;
+  unsigned insert(const QuadBeat&, unsigned, Flush&, bool&) override { throw 7; }
+};
+struct TcThatKeepsQuads : TileCoalescing {
+  using TileCoalescing::TileCoalescing;
+  bool flush_oldest(FlushReason, Flush&) override { return false; }
+};
+struct TcOfAnotherPosition : TileCoalescing {
+  using TileCoalescing::TileCoalescing;
+  bool flush_oldest(FlushReason reason, Flush& out) override {
+    const bool flushed = TileCoalescing::flush_oldest(reason, out);
+    if (flushed) out.quads.front().position = 64;
+    return flushed;
+  }
+};
+struct PropWithoutLatency : PreRop {
+  using PreRop::PreRop;
+  Cost cost() const override {
+    Cost cost = PreRop::cost();
+    cost.latency_cycles = 0;
+    return cost;
+  }
+};
+struct ZropOfAnotherTile : DepthStencilRop {
+  using DepthStencilRop::DepthStencilRop;
+  void test(QuadBeat& beat) override {
+    DepthStencilRop::test(beat);
+    ++beat.tile.x;
+  }
+};
+template <unsigned Count>
+struct QruOf : PairingQru {
+  using PairingQru::PairingQru;
+  unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) override {
+    const unsigned examined = PairingQru::examine(tile, quads, count, out, launched);
+    if (launched) out.count = Count;
+    return examined;
+  }
+  bool finish_bin(Warp& out) override {
+    const bool launched = PairingQru::finish_bin(out);
+    if (launched) out.count = Count;
+    return launched;
+  }
+};
+struct QruThatNeverFinishes : PairingQru {
+  using PairingQru::PairingQru;
+  bool finish_bin(Warp& out) override {
+    if (PairingQru::finish_bin(out)) last_ = out;
+    out = last_;
+    return true;
+  }
+  Warp last_;
+};
+struct QruOfAnotherSplat : PairingQru {
+  using PairingQru::PairingQru;
+  bool finish_bin(Warp& out) override {
+    const bool launched = PairingQru::finish_bin(out);
+    if (launched) out.quads[0].splat = 123'456'789;
+    return launched;
+  }
+};
+struct SmWithoutCores : SplatShader {
+  using SplatShader::SplatShader;
+  Cost cost() const override {
+    Cost cost = SplatShader::cost();
+    cost.cores = 0;
+    return cost;
+  }
+};
+struct SmThatForgetsAWarp : SplatShader {
+  using SplatShader::SplatShader;
+  void shade(const Warp& warp, ShadedWarp& out) override {
+    SplatShader::shade(warp, out);
+    out.count = 0;
+  }
+};
+template <ColorFormat Format, BlendRounding Rounding>
+struct CropWithoutMshrs : ColorRop<Format, Rounding> {
+  using ColorRop<Format, Rounding>::ColorRop;
+  CropBehaviour::Cost cost() const override {
+    CropBehaviour::Cost cost = ColorRop<Format, Rounding>::cost();
+    cost.mshrs = 0;
+    return cost;
+  }
+};
+template <ColorFormat Format, BlendRounding Rounding>
+struct CropThatKillsTheDead : ColorRop<Format, Rounding> {
+  using ColorRop<Format, Rounding>::ColorRop;
+  CropBehaviour::Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) override {
+    CropBehaviour::Outcome outcome = ColorRop<Format, Rounding>::blend(place, live, color);
+    outcome.terminated = 0x1f;
+    return outcome;
+  }
+  void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, CropBehaviour::Outcomes& outcomes) override {
+    CropBehaviour::blend_quads(warp, from, to, outcomes);
+  }
+};
+/// Blends, and counts nothing.
+struct CropWithoutCounts : CropBehaviour {
+  struct Parameters : CropParameters {};
+  CropWithoutCounts(const Parameters& parameters, const RenderState& state) : rop(parameters, state) {}
+  void attach(ColorSurface& surface) override {
+    CropBehaviour::attach(surface);
+    rop.attach(surface);
+  }
+  Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) override {
+    return rop.blend(place, live, color);
+  }
+  Cost cost() const override { return rop.cost(); }
+  ColorRop<ColorFormat::rgba16f, BlendRounding::rne> rop;
+};
+
+struct Case {
+  std::string slot;
+  std::string name;
+  std::string expected;  ///< in the message, after slot=name
+};
+std::vector<Case>& cases() {
+  static std::vector<Case> all;
+  return all;
+}
+
+template <class Unit, class SlotBehaviour>
+struct Add {
+  Add(const char* slot, const char* name, const char* expected) {
+    const Registrar<Unit, SlotBehaviour> registrar(slot, name, "breaks a rule");
+    cases().push_back({slot, name, expected});
+  }
+};
+struct AddCrop {
+  AddCrop(Implementation implementation, const char* expected) {
+    cases().push_back({"crop", implementation.name, expected});
+    Registry::instance().add(std::move(implementation));
+  }
+};
+
+const Add<DrawWithoutRate, DrawBehaviour> draw_rate("draw", "no-rate", "warps_per_1024_cycles is 0");
+const Add<DrawBeyondTheSplats, DrawBehaviour> draw_splats("draw", "beyond", "next: a warp of splats 1000000");
+const Add<DrawOverAndOver, DrawBehaviour> draw_again("draw", "again", "next: a warp of splats 0 to 7, after 8 of");
+const Add<VpoOfThree, VpoBehaviour> vpo_three("vpo", "three", "assemble: 3 triangles of splat 0");
+const Add<VpoThatThrowsWhenMade, VpoBehaviour> vpo_throws("vpo", "throws", "make_behaviour throws: no table");
+const Add<VpoWithoutRate, VpoBehaviour> vpo_rate("vpo", "no-rate", "items_per_cycle is 0");
+const Add<VpoThatCountsTwice, VpoBehaviour> vpo_counts("vpo", "counts-twice", "primitives counts");
+const Add<TgcWithoutLatency, TgcBehaviour> tgc_latency("tgc", "no-latency", "latency_cycles is 0");
+const Add<TgcThatDrainsForEver, TgcBehaviour> tgc_drain("tgc", "drains", "drain: ");
+const Add<TgcThatEntersForEver, TgcBehaviour> tgc_enter("tgc", "enters", "step: a primitive is still entering");
+const Add<RasterOutsideTheFrame, RasterBehaviour> raster_tile("raster", "outside", "next: screen tile 4000,");
+const Add<RasterThatNeverEnds, RasterBehaviour> raster_ends("raster", "endless", "more raster tiles than the frame");
+const Add<TcThatTakesTooMuch, TcBehaviour> tc_much("tc", "takes-too-much", "insert: ");
+const Add<TcThatTakesNothing, TcBehaviour> tc_nothing("tc", "takes-nothing", "insert: 0 quads taken of");
+const Add<TcThatThrows, TcBehaviour> tc_throws("tc", "throws", "insert throws an exception of unknown type");
+const Add<TcThatKeepsQuads, TcBehaviour> tc_keeps("tc", "keeps", "flush_oldest: ");
+const Add<TcOfAnotherPosition, TcBehaviour> tc_position("tc", "position", "position 64, a tile has 64");
+const Add<PropWithoutLatency, PropBehaviour> prop_latency("prop", "no-latency", "latency_cycles is 0");
+const Add<ZropOfAnotherTile, ZropBehaviour> zrop_tile("zrop", "other-tile", "test: a beat of screen tile");
+const Add<QruOf<0>, QruBehaviour> qru_0("qru", "warps-of-0", "a warp of 0 quads");
+const Add<QruOf<9>, QruBehaviour> qru_9("qru", "warps-of-9", "a warp of 9 quads");
+const Add<QruOf<255>, QruBehaviour> qru_255("qru", "warps-of-255", "a warp of 255 quads");
+const Add<QruThatNeverFinishes, QruBehaviour> qru_ends("qru", "endless", "finish_bin: a warp of");
+const Add<QruOfAnotherSplat, QruBehaviour> qru_splat("qru", "other-splat", "splat 123456789, the draw has");
+const Add<SmWithoutCores, SmBehaviour> sm_cores("sm", "no-cores", "cores is 0");
+const Add<SmThatForgetsAWarp, SmBehaviour> sm_warp("sm", "forgets", "quads_pruned + quads_merged counts");
+const Add<CropWithoutCounts, CropBehaviour> crop_counts("crop", "no-counts", "quads_late_failed counts 0, but");
+const AddCrop crop_mshrs(CropMaker<CropWithoutMshrs>::implementation("no-mshrs", "breaks a rule"), "mshrs is 0");
+const AddCrop crop_dead(CropMaker<CropThatKillsTheDead>::implementation("kills-the-dead", "breaks a rule"),
+                        "pixels 0x1f terminated by fragments");
+const AddCrop crop_null(
+    [] {
+      Implementation implementation = CropMaker<ColorRop>::implementation("null", "makes nothing");
+      implementation.make_behaviour = [](const ParameterSet&, const RenderState&) { return nullptr; };
+      return implementation;
+    }(),
+    "make_behaviour makes nothing");
+
+std::string fault_of(const Case& broken, Fidelity fidelity, const Draw& draw) {
+  const RunRequest request = request_of("het+qm", fidelity, [&](RunRequest& r) {
+    r.units = {{broken.slot, broken.name}};
+  });
+  try {
+    run(request, draw);
+  } catch (const SimulationFault& fault) {
+    return fault.what();
+  }
+  return "none";
+}
+
+TEST(CheckedUnits, ABrokenRuleIsAFaultThatNamesTheUnitAtEveryFidelity) {
+  const Draw draw = random_draw(100, 60, 200, 1);
+  for (const Case& broken : cases()) {
+    for (const Fidelity fidelity : fidelities()) {
+      SCOPED_TRACE(broken.slot + "=" + broken.name + " at " + name_of(fidelity));
+      const std::string fault = fault_of(broken, fidelity, draw);
+      EXPECT_EQ(fault.rfind(broken.slot + "=" + broken.name + " at cycle ", 0), 0U) << fault;
+      EXPECT_NE(fault.find(broken.expected), std::string::npos) << fault;
+    }
+  }
+}
+
+TEST(CheckedUnits, AFaultNamesTheCycle) {
+  const Draw draw = random_draw(100, 60, 200, 1);
+  const Case late{"tc", "keeps", ""};
+  EXPECT_NE(fault_of(late, Fidelity::functional, draw).find("at cycle 0:"), std::string::npos);
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
+    EXPECT_EQ(fault_of(late, fidelity, draw).find("at cycle 0:"), std::string::npos) << name_of(fidelity);
+  }
+}
+
+/// The shipped units, not trusted.
+const bool registered = [] {
+  for (const std::string& slot : Registry::slots()) {
+    Implementation copy = default_implementation(slot, variant_named("het+qm"));
+    copy.name = "checked";
+    copy.trust = Trust::checked;
+    Registry::instance().add(std::move(copy));
+  }
+  return true;
+}();
+
+TEST(CheckedUnits, ChecksChangeNothing) {
+  ASSERT_TRUE(registered);
+  const Draw draw = random_draw(100, 60, 200, 2);
+  for (const char* platform : {"agx-orin", "desktop"}) {
+    for (const char* variant : {"baseline", "het+qm"}) {
+      for (const Fidelity fidelity : fidelities()) {
+        for (const Termination termination : {Termination::paper, Termination::strict}) {
+          RunRequest request = request_of(variant, fidelity, [&](RunRequest& r) {
+            r.platform = &platform_named(platform);
+            r.termination = termination;
+          });
+          const RunResult trusted = run(request, draw);
+          for (const std::string& slot : Registry::slots()) request.units.push_back({slot, "checked"});
+          const RunResult checked = run(request, draw);
+          EXPECT_EQ(checked.result_hash, trusted.result_hash) << platform << variant << name_of(fidelity);
+          EXPECT_EQ(checked.statistics.size(), trusted.statistics.size());
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe
