@@ -17,6 +17,11 @@ const Implementation& default_implementation(const std::string& slot, const Vari
 }
 
 Configuration::Configuration(const RunRequest& request, const Draw& draw) : request_(request) {
+  // Of the program itself; a plugin's are reported when it is loaded.
+  const std::vector<Registry::Problem> problems = Registry::instance().take_problems();
+  if (!problems.empty()) {
+    throw UserError("cannot use all units of this program", "registry", problems.front().why, problems.front().remedy);
+  }
   Variant with_all = request.variant;
   with_all.quad_merging = true;
   for (const std::string& name : Registry::slots()) {
@@ -34,7 +39,9 @@ Configuration::Configuration(const RunRequest& request, const Draw& draw) : requ
     slot.real_parameters = slot.real->make_parameters();
     slot.chosen_parameters = slot.chosen->make_parameters();
   }
-  for (const Setting& setting : request.platform->settings) apply(setting);
+  for (const Setting& setting : request.platform->settings) {
+    if (concerns_chosen_unit(setting)) apply(setting);
+  }
   for (const Setting& setting : request.settings) apply(setting);
 
   states_.resize(request.platform->gpcs);
@@ -55,6 +62,21 @@ Configuration::Configuration(const RunRequest& request, const Draw& draw) : requ
     state.gpcs = static_cast<unsigned>(states_.size());
     state.gpc = gpc;
   }
+}
+
+/// A platform's settings are for the units that it was made with: another one in a slot takes those that it declares.
+bool Configuration::concerns_chosen_unit(const Setting& setting) const {
+  const auto slot = slots_.find(setting.unit);
+  if (slot == slots_.end()) return true;
+  const auto declared_by = [&](const ParameterSet& set) {
+    return std::any_of(set.parameters().begin(), set.parameters().end(),
+                       [&](const Parameter* parameter) { return setting.parameter == parameter->name(); });
+  };
+  if (declared_by(*slot->second.real_parameters)) return true;
+  Variant with_all = request_.variant;
+  with_all.quad_merging = true;
+  // What no unit declares is a mistake of the platform's.
+  return !declared_by(*default_implementation(setting.unit, with_all).make_parameters());
 }
 
 void Configuration::apply(const Setting& setting) {

@@ -2,6 +2,7 @@
 
 #include <vrpipe/error.h>
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/registry.h>
 
 namespace vrpipe {
 
@@ -19,13 +20,19 @@ std::vector<Platform>& list() {
 const std::vector<Platform>& platforms() { return list(); }
 
 void add_platform(Platform platform) {
+  const auto refuse = [&](const std::string& why, const std::string& remedy) {
+    if (!is_loading_plugin())
+      throw UserError("cannot add platform '" + platform.name + "'", "add_platform", why, remedy);
+    Registry::instance().add_problem({"platform '" + platform.name + "': " + why, remedy});
+  };
   for (const Platform& known : list()) {
-    if (known.name == platform.name) {
-      throw UserError("cannot add platform '" + platform.name + "'", "add_platform", "there is one of that name",
-                      "choose another name");
-    }
+    if (known.name == platform.name) return refuse("there is one of that name", "choose another name");
+  }
+  if (platform.gpcs == 0 || !(platform.frequency_mhz > 0) || platform.wire == nullptr) {
+    return refuse("it has no GPC, no frequency or no wiring", "set gpcs, frequency_mhz and wire");
   }
   list().push_back(std::move(platform));
+  Registry::instance().count_registration();
 }
 
 const Platform& platform_named(const std::string& name) {

@@ -88,6 +88,7 @@ class Configuration {
     std::unique_ptr<ParameterSet> real_parameters;
   };
   void apply(const Setting& setting);
+  bool concerns_chosen_unit(const Setting& setting) const;
 
   RunRequest request_;
   std::map<std::string, Slot> slots_;

@@ -60,8 +60,11 @@ struct Platform {
   void (*wire)(Gpu& gpu) = nullptr;  ///< the wiring diagram, used where there is time
 };
 
-/// All named platforms, the default first. `add_platform` adds one of your own.
+/// All named platforms, the default first.
 const std::vector<Platform>& platforms();
+/// Adds one of your own: in a program before it is used, in a plugin from a static initialiser. Throws UserError for a
+/// name that is taken and a platform without GPC, frequency or wiring; while a plugin is loaded, when nothing may be
+/// thrown, `load_plugin` does.
 void add_platform(Platform platform);
 /// Throws UserError naming the nearest.
 const Platform& platform_named(const std::string& name);

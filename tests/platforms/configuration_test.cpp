@@ -1,0 +1,106 @@
+// What a request and a platform may say, and what is registered only once.
+#include <stdexcept>
+#include <tuple>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/error.h>
+#include <vrpipe/platforms/gpu.h>
+#include <vrpipe/registry.h>
+#include <vrpipe/timed.h>
+
+#include "qru/qru.h"
+#include "support/simulate.h"
+
+namespace vrpipe {
+namespace {
+
+using namespace testing;
+
+/// QRUs of another make: without parameters, and with one of the default's.
+struct PlainQru : PairingQru {
+  struct Parameters : ParameterSet {};
+  PlainQru(const Parameters&, const RenderState& state) : PairingQru(PairingQru::Parameters(), state) {}
+};
+struct SmallQru : PairingQru {
+  struct Parameters : PairingQru::Parameters {};
+  using PairingQru::PairingQru;
+};
+const Registrar<PlainQru, QruBehaviour> plain_qru("qru", "plain", "pairing without parameters");
+const Registrar<SmallQru, QruBehaviour> small_qru("qru", "small", "pairing under another name");
+
+TEST(Configuration, APlatformsSettingsAreForUnitsThatDeclareThem) {
+  const Draw draw = random_draw(64, 48, 40, 3);
+  RunRequest request = request_of("qm", Fidelity::cycle, [](RunRequest& r) { r.platform = &platform_named("mobile"); });
+  const RunResult shipped = run(request, draw);
+  request.units = {{"qru", "small"}};
+  EXPECT_EQ(run(request, draw).cycles, shipped.cycles);
+  request.units = {{"qru", "plain"}};
+  EXPECT_GT(run(request, draw).counts.quads_merged, 0U);
+
+  // The user's own mistakes stay mistakes, and so do a platform's.
+  request.settings = {{"qru", "bin_quads", "64"}};
+  EXPECT_THROW(check_configuration(request), UserError);
+  Platform misspelt = platform_named("mobile");
+  misspelt.settings = {{"qru", "bin_quad", "64"}};
+  request.settings.clear();
+  request.platform = &misspelt;
+  EXPECT_THROW(check_configuration(request), UserError);
+}
+
+TEST(Configuration, ACacheThatCannotBeIsRefusedAtEveryFidelity) {
+  for (const Fidelity fidelity : fidelities()) {
+    RunRequest request = request_of("baseline", fidelity);
+    request.settings = {{"crop", "cache_bytes", "5000"}};
+    EXPECT_THROW(check_configuration(request), UserError) << name_of(fidelity);
+    EXPECT_THROW(run(request, draw_of(16, 16)), UserError) << name_of(fidelity);
+    request.settings = {{"crop", "line_bytes", "32"}};
+    EXPECT_NO_THROW(check_configuration(request)) << name_of(fidelity);
+    request.format = ColorFormat::rgba32f;
+    EXPECT_THROW(check_configuration(request), UserError) << name_of(fidelity);
+  }
+}
+
+TEST(Platforms, OneWithoutGpcFrequencyOrWiringOrOfANameThatIsTakenIsRefused) {
+  const Platform good = platform_named("agx-orin");
+  EXPECT_THROW(add_platform(good), UserError);
+  for (const auto& [gpcs, megahertz, wire] :
+       {std::tuple{0U, 1.0, good.wire}, {1U, 0.0, good.wire}, {1U, 1.0, static_cast<decltype(good.wire)>(nullptr)}}) {
+    Platform bad = good;
+    bad.name = "bad";
+    bad.gpcs = gpcs;
+    bad.frequency_mhz = megahertz;
+    bad.wire = wire;
+    EXPECT_THROW(add_platform(bad), UserError);
+  }
+  EXPECT_THROW(platform_named("bad"), UserError);
+}
+
+TEST(Platforms, WiringThatThrowsIsAFaultThatNamesThePlatform) {
+  Platform platform = platform_named("agx-orin");
+  platform.name = "broken";
+  platform.wire = [](Gpu&) { throw std::out_of_range("no such thing"); };
+  const RunRequest request = request_of("qm", Fidelity::lt, [&](RunRequest& r) { r.platform = &platform; });
+  try {
+    run(request, draw_of(16, 16));
+    FAIL() << "accepted";
+  } catch (const SimulationFault& fault) {
+    EXPECT_EQ(std::string(fault.what()), "platform broken at cycle 0: its wiring throws no such thing");
+  }
+}
+
+TEST(Modules, AreNotReplaced) {
+  const UnitMaker& shipped = unit_maker("zrop");
+  ASSERT_TRUE(Registry::instance().take_problems().empty());
+  register_unit_maker("zrop", nullptr);
+  register_timed_unit_maker("zrop", nullptr);
+  const std::vector<Registry::Problem> problems = Registry::instance().take_problems();
+  ASSERT_EQ(problems.size(), 2U);
+  EXPECT_EQ(problems[0].why, "slot zrop has a module for cycle already");
+  EXPECT_EQ(problems[1].why, "slot zrop has a module for lt and at already");
+  EXPECT_TRUE(shipped);
+  EXPECT_TRUE(timed_unit_maker("zrop"));
+}
+
+}  // namespace
+}  // namespace vrpipe
