@@ -9,6 +9,7 @@
 #include <vrpipe/error.h>
 #include <vrpipe/registry.h>
 
+#include "crash_report.h"
 #include "output_file.h"
 #include "parse.h"
 #include "settings.h"
@@ -85,7 +86,11 @@ std::optional<std::string> single(const Values& values, const std::string& optio
 
 void load_plugins(const Values& plugins) {
   const StdoutToStderr redirected;
-  for (const std::string& plugin : plugins) load_plugin(plugin);
+  for (const std::string& plugin : plugins) {
+    report_crashes();
+    load_plugin(plugin);
+  }
+  if (!plugins.empty()) report_crashes();
 }
 
 void SimulationArguments::declare(CLI::App& app, Variants variants) {

@@ -27,8 +27,10 @@
 #include <fmt/format.h>
 
 #include <vrpipe/error.h>
+#include <vrpipe/registry.h>
 
 #include "command_line.h"
+#include "crash_report.h"
 #include "stdout_to_stderr.h"
 #include "terminal.h"
 
@@ -295,6 +297,7 @@ class Worker {
 
   [[noreturn]] void work(int out, const Draw& draw, SharedImage* image, std::atomic<float>& progress) const {
     ::dup2(STDERR_FILENO, STDOUT_FILENO);
+    if (!loaded_plugins().empty()) report_crashes_to(out, outcome_fault);
     std::string message;
     try {
       RunResult result = simulate(request_, draw, &progress);
@@ -341,6 +344,7 @@ Simulated simulate_here(const RunRequest& request, const Draw& draw, bool with_i
     const StdoutToStderr redirected;
     std::atomic<float> done{0.0F};
     const ProgressThread drawing(request.variant.name, done, progress);
+    if (!loaded_plugins().empty()) report_crashes("variant " + request.variant.name + ": ");
     simulated.result = simulate(request, draw, &done);
   }
   progress.erase();
