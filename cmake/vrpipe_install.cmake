@@ -16,6 +16,9 @@ foreach(part interfaces platforms workloads testkit)
   install(DIRECTORY ${part}/vrpipe DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 endforeach()
 
+# Of the shipped units, for units that derive from them: <vrpipe/modules/crop/crop.h>.
+install(DIRECTORY modules/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vrpipe/modules FILES_MATCHING PATTERN "*.h")
+
 configure_package_config_file(cmake/vrpipe-config.cmake.in vrpipe-config.cmake INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(vrpipe-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(EXPORT vrpipe NAMESPACE vrpipe:: DESTINATION ${package_dir} FILE vrpipe-targets.cmake)

@@ -11,10 +11,13 @@ function(vrpipe_plugin_tag variable version)
   set(${variable} "vrpipe-plugin/${version}/${abi}-abi" PARENT_SCOPE)
 endfunction()
 
-# vrpipe_add_plugin(name sources...): builds name.so. One of the sources contains VRPIPE_PLUGIN.
+# vrpipe_add_plugin(name sources...): builds name.so, to be loaded, or linked by a testbench that names its classes. One of
+# the sources contains VRPIPE_PLUGIN.
 function(vrpipe_add_plugin name)
-  add_library(${name} MODULE ${ARGN})
+  add_library(${name} SHARED ${ARGN})
   set_target_properties(${name} PROPERTIES PREFIX "")
   target_compile_definitions(${name} PRIVATE VRPIPE_PLUGIN_TAG="${VRPIPE_PLUGIN_TAG}")
   target_link_libraries(${name} PRIVATE vrpipe::vrpipe)
+  # Whoever links a plugin wants its units registered, even if it names none of its classes.
+  target_link_options(${name} INTERFACE LINKER:--no-as-needed)
 endfunction()

@@ -30,6 +30,17 @@ function(expect_refusal pattern)
   endif()
 endfunction()
 
+# Runs a command in which a plugin fails: exit code 1, and one line that matches.
+function(expect_fault pattern)
+  run(result output error ${ARGN})
+  if(NOT result EQUAL 1)
+    message(FATAL_ERROR "${ARGN}\nended with ${result}, not 1\n${output}\n${error}")
+  endif()
+  if(NOT error MATCHES "^vrpipe: fault: [^\n]+\n$" OR NOT error MATCHES "${pattern}")
+    message(FATAL_ERROR "${ARGN}\nexpected one line with ${pattern}, not\n${error}")
+  endif()
+endfunction()
+
 file(REMOVE_RECURSE ${WORK_DIR})
 set(prefix ${WORK_DIR}/prefix)
 expect_success("vrpipe-config.cmake" ${CMAKE_COMMAND} --install ${BUILD_DIR} --config ${CONFIG} --prefix ${prefix})
@@ -53,7 +64,10 @@ endforeach()
 
 set(vrpipe ${prefix}/bin/vrpipe)
 set(plugin ${WORK_DIR}/consumer/same_splat_qru.so)
-set(draw --scene builtin:object --size 160x120)
+# Preprocessed once: it is run some sixty times.
+expect_success("" ${vrpipe} run --scene builtin:object --size 160x120 --fidelity functional
+  --save-draw ${WORK_DIR}/draw.spl)
+set(draw --scene ${WORK_DIR}/draw.spl)
 
 # The unit: it pairs some quads, and fewer than the paper's; the picture and the counts are checked by the run itself.
 function(quads_merged variable)
@@ -69,6 +83,21 @@ endif()
 expect_success("" ${vrpipe} compare ${draw} --termination strict --plugin ${plugin} --unit qru=same-splat
   --set qru.quads_per_cycle=4)
 expect_refusal("same-splat" ${vrpipe} run ${draw} --plugin ${plugin} --unit qru=same-spalt)
+# On a platform that sets parameters which the unit does not have; the user may not.
+expect_success("" ${vrpipe} run ${draw} --platform mobile --fidelity lt --plugin ${plugin} --unit qru=same-splat)
+expect_refusal("bin_quads" ${vrpipe} run ${draw} --plugin ${plugin} --unit qru=same-splat --set qru.bin_quads=64)
+
+# The unit that derives from a shipped one: its parameters, all counters, and the same result at every fidelity.
+set(counting ${WORK_DIR}/consumer/counting_rop.so)
+foreach(fidelity functional bound lt at cycle)
+  set(one ${draw} --variant het --fidelity ${fidelity} --set crop.cache_bytes=8192 --json -)
+  expect_success("\"result_hash\": *\"([0-9a-f]+)\"" ${vrpipe} run ${one})
+  string(REGEX MATCH "\"result_hash\": *\"[0-9a-f]+\"" hash "${output}")
+  expect_success("${hash}" ${vrpipe} run ${one} --plugin ${counting} --unit crop=counting-rop)
+  if(NOT output MATCHES "crop.quads_unchanged" OR NOT output MATCHES "crop.pixels_stuck")
+    message(FATAL_ERROR "statistics are missing at ${fidelity} in\n${output}")
+  endif()
+endforeach()
 
 # The platform: two GPCs are faster than one.
 expect_success("twin het\\+qm [0-9]+ cycles" ${WORK_DIR}/consumer/twin_gpu)
@@ -80,8 +109,14 @@ if(NOT two LESS one)
   message(FATAL_ERROR "two GPCs take ${two} cycles, one takes ${one}")
 endif()
 
-# The testbench.
-expect_success("100 seeds" ${WORK_DIR}/consumer/same_splat_bench ${plugin})
+# And as a plugin that brings nothing else.
+set(wide ${WORK_DIR}/consumer/wide_platform.so)
+expect_success("agx-orin with two GPCs" ${vrpipe} platforms --plugin ${wide})
+expect_success("" ${vrpipe} run ${draw} --fidelity lt --plugin ${wide} --platform wide)
+
+# The testbenches.
+expect_success("100 seeds" ${WORK_DIR}/consumer/same_splat_bench)
+expect_success("changes nothing" ${WORK_DIR}/consumer/counting_rop_bench)
 
 # Plugins that cannot be used.
 set(bad ${WORK_DIR}/bad_plugins)
@@ -91,4 +126,25 @@ expect_refusal("not a vrpipe plugin" ${vrpipe} run ${draw} --plugin ${SOURCE_DIR
 expect_refusal("0\\.0\\.1" ${vrpipe} run ${draw} --plugin ${bad}/other_version.so)
 expect_refusal("vertex-issue" ${vrpipe} run ${draw} --plugin ${bad}/duplicate.so)
 expect_refusal("registers no unit" ${vrpipe} run ${draw} --plugin ${bad}/empty.so)
+expect_refusal("'mobile': there is one" ${vrpipe} run ${draw} --plugin ${bad}/duplicate_platform.so)
+expect_refusal("no slot 'tcs'.*did you mean tc" ${vrpipe} run ${draw} --plugin ${bad}/misspelt.so)
+expect_refusal("slot zrop has a module" ${vrpipe} run ${draw} --plugin ${bad}/module.so)
+expect_refusal("loaded already" ${vrpipe} run ${draw} --plugin ${plugin} --plugin ${plugin})
+expect_success("decoy" ${vrpipe} platforms --plugin ${bad}/decoy.so)
+
+# Plugins that fail.
+expect_fault("throwing.so.*no licence" ${vrpipe} units --plugin ${bad}/throwing.so)
+expect_fault("exiting.so, while it is loaded: calls exit" ${vrpipe} units --plugin ${bad}/exiting.so)
+expect_fault("segfaulting.so, while it is loaded: ended by signal 11" ${vrpipe} units --plugin ${bad}/segfaulting.so)
+foreach(fidelity functional bound lt at cycle)
+  foreach(command run compare)
+    set(faulty ${vrpipe} ${command} ${draw} --fidelity ${fidelity} --plugin ${bad}/faulty.so --unit)
+    expect_fault("tc=throws at cycle [0-9]+: insert throws: too full" ${faulty} tc=throws)
+    expect_fault("tc=takes-too-much at cycle [0-9]+: insert: [0-9]+ quads taken of" ${faulty} tc=takes-too-much)
+    expect_fault("variant [a-z+]+: tc=crashes, [a-z_]+: ended by signal 11 .*faulty.so" ${faulty} tc=crashes)
+    expect_fault("variant [a-z+]+: tc=exits, [a-z_]+: calls exit" ${faulty} tc=exits)
+  endforeach()
+endforeach()
+expect_fault("vpo=crashes-when-made, make_behaviour: ended by signal 8" ${vrpipe} run ${draw} --plugin ${bad}/faulty.so
+  --unit vpo=crashes-when-made)
 expect_refusal("pairing" ${vrpipe} run ${draw} --unit qru=paring)

@@ -5,8 +5,9 @@
 #include <string>
 #include <vector>
 
-#include <vrpipe/registry.h>
 #include <vrpipe/testkit/bench.h>
+
+#include "same_splat_qru.h"
 
 namespace {
 
@@ -40,6 +41,7 @@ std::string launched(const std::vector<QuadBeat>& beats, std::uint64_t stall_see
   if (closed_until > 0) sink.close(0, closed_until);
   if (stall_seed != 0) bench.stall_randomly(stall_seed, 64);
   bench.run();
+  check(bench.behaviour<SameSplatQru>().pairs.value() == 2, "pairs of the splats 1 and 2");
 
   std::string text;
   for (const auto& record : sink.records()) {
@@ -57,10 +59,7 @@ std::string launched(const std::vector<QuadBeat>& beats, std::uint64_t stall_see
 
 }  // namespace
 
-int main(int argc, char** argv) try {
-  check(argc == 2, "usage: same_splat_bench PLUGIN");
-  vrpipe::load_plugin(argv[1]);
-
+int main() try {
   QuadBeat bin;
   bin.tile = {1, 2};
   // Position 5: both triangles of splat 1, then both of splat 2. Position 9: splats 3 and 4, then 4 again.

@@ -1,0 +1,11 @@
+#include <vrpipe/platforms/simulation.h>
+#include <vrpipe/registry.h>
+
+VRPIPE_PLUGIN
+
+namespace {
+[[maybe_unused]] const bool added = [] {
+  vrpipe::add_platform(vrpipe::platform_named("mobile"));
+  return true;
+}();
+}  // namespace

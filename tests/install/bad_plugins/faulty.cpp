@@ -1,0 +1,50 @@
+// Units with a fault each; that every rule of a slot is checked, the tests in the tree show.
+#include <csignal>
+#include <cstdlib>
+#include <stdexcept>
+
+#include <vrpipe/modules/tc/tc.h>
+#include <vrpipe/modules/vpo/vpo.h>
+#include <vrpipe/registry.h>
+
+VRPIPE_PLUGIN
+
+namespace {
+
+using Flush = vrpipe::TcBehaviour::Flush;
+
+struct Throws : vrpipe::TileCoalescing {
+  using TileCoalescing::TileCoalescing;
+  unsigned insert(const vrpipe::QuadBeat&, unsigned, Flush&, bool&) override { throw std::runtime_error("too full"); }
+};
+struct TakesTooMuch : vrpipe::TileCoalescing {
+  using TileCoalescing::TileCoalescing;
+  unsigned insert(const vrpipe::QuadBeat& beat, unsigned from, Flush& out, bool& flushed) override {
+    return TileCoalescing::insert(beat, from, out, flushed) + 1;
+  }
+};
+struct Crashes : vrpipe::TileCoalescing {
+  using TileCoalescing::TileCoalescing;
+  bool flush_oldest(FlushReason, Flush&) override { return std::raise(SIGSEGV) == 0; }
+};
+struct Exits : vrpipe::TileCoalescing {
+  using TileCoalescing::TileCoalescing;
+  bool flush_oldest(FlushReason, Flush&) override { std::exit(0); }
+};
+struct CrashesWhenMade : vrpipe::PrimitiveAssembly {
+  CrashesWhenMade(const Parameters& parameters, const vrpipe::RenderState& state)
+      : PrimitiveAssembly(parameters, state) {
+    std::raise(SIGFPE);
+  }
+};
+
+template <class Unit>
+using Tc = vrpipe::Registrar<Unit, vrpipe::TcBehaviour>;
+const Tc<Throws> throws("tc", "throws", "throws in a call");
+const Tc<TakesTooMuch> takes_too_much("tc", "takes-too-much", "takes more quads than there are");
+const Tc<Crashes> crashes("tc", "crashes", "ends by a signal");
+const Tc<Exits> exits("tc", "exits", "calls exit()");
+const vrpipe::Registrar<CrashesWhenMade, vrpipe::VpoBehaviour> when_made("vpo", "crashes-when-made",
+                                                                         "ends by a signal");
+
+}  // namespace

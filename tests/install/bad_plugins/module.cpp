@@ -1,0 +1,15 @@
+// A module in the place of a shipped one.
+#include <vrpipe/registry.h>
+#include <vrpipe/unit.h>
+
+VRPIPE_PLUGIN
+
+namespace {
+[[maybe_unused]] const bool registered = [] {
+  vrpipe::register_unit_maker("zrop",
+                              [](const std::string&, vrpipe::ClockDomain&, std::unique_ptr<vrpipe::Behaviour>,
+                                 const vrpipe::RenderState&,
+                                 unsigned) -> std::unique_ptr<vrpipe::Unit> { return nullptr; });
+  return true;
+}();
+}  // namespace

@@ -1,0 +1,9 @@
+#include <stdexcept>
+
+#include <vrpipe/registry.h>
+
+VRPIPE_PLUGIN
+
+namespace {
+[[maybe_unused]] const bool ran = []() -> bool { throw std::runtime_error("no licence"); }();
+}
