@@ -183,6 +183,7 @@ TEST_F(Process, InterruptedAtATerminalItErasesItsProgress) {
 
 TEST_F(Process, WithFewerDescriptorsFewerSimulationsRunAtATime) {
   const Finished finished = forked([] {
+    ::closefrom(3);            // whatever the tests were started with
     const rlimit limit{5, 5};  // 0 to 2, and the pipe of one simulation
     ::setrlimit(RLIMIT_NOFILE, &limit);
     return become_vrpipe({"compare", "--scene", "tiny.spl", "--jobs", "4"});
