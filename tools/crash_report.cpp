@@ -88,7 +88,7 @@ void install() {
   ::sigaltstack(&alternative, nullptr);
   struct sigaction action = {};
   action.sa_handler = on_signal;
-  action.sa_flags = SA_ONSTACK | SA_RESETHAND;
+  action.sa_flags = static_cast<int>(SA_ONSTACK | SA_RESETHAND);
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) ::sigaction(signal, &action, nullptr);
   std::set_terminate(on_terminate);
   std::atexit(on_exit);

@@ -164,7 +164,9 @@ Json head_json(const std::string& schema, const Provenance& provenance, unsigned
 Json camera_json(const std::optional<Viewpoint>& viewpoint) {
   if (!viewpoint) return {};
   const auto& [camera, view, file] = *viewpoint;
-  const auto column = [&rows = camera.rotation](int i) { return triple({rows[0][i], rows[1][i], rows[2][i]}); };
+  const auto column = [&rows = camera.rotation](glm::length_t i) {
+    return triple({rows[0][i], rows[1][i], rows[2][i]});
+  };
   constexpr double degrees = 57.29577951308232;
   return {{"file", file ? Json(file->file) : Json()},
           {"index", file ? Json(file->index) : Json()},
