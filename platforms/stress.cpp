@@ -1,0 +1,118 @@
+#include <vrpipe/platforms/stress.h>
+
+#include <algorithm>
+
+#include <vrpipe/platforms/wiring.h>
+
+namespace vrpipe {
+
+namespace {
+
+template <unsigned Depth>
+Platform with_links_of_depth() {
+  Platform platform = platform_named("agx-orin");
+  platform.wire = [](Gpu& gpu) {
+    gpu.add_front_end("draw");
+    gpu.add_front_end("vpo");
+    wire_gpc(gpu, 0, {Depth, Depth});
+  };
+  return platform;
+}
+
+template <unsigned Depth>
+Platform with_terminations_of_depth() {
+  Platform platform = platform_named("agx-orin");
+  platform.wire = [](Gpu& gpu) {
+    gpu.add_front_end("draw");
+    gpu.add_front_end("vpo");
+    LinkDepths depths;
+    depths.terminations = Depth;
+    wire_gpc(gpu, 0, depths);
+  };
+  return platform;
+}
+
+/// `UNIT.PARAMETER=VALUE`, several with blanks between.
+StressConfiguration with(const std::string& settings, bool quick = false) {
+  StressConfiguration configuration{settings, platform_named("agx-orin"), {}, quick};
+  for (std::size_t begin = 0; begin < settings.size();) {
+    const std::size_t end = std::min(settings.find(' ', begin), settings.size());
+    const std::size_t dot = settings.find('.', begin);
+    const std::size_t equals = settings.find('=', begin);
+    configuration.settings.push_back({settings.substr(begin, dot - begin), settings.substr(dot + 1, equals - dot - 1),
+                                      settings.substr(equals + 1, end - equals - 1)});
+    begin = end + 1;
+  }
+  return configuration;
+}
+
+std::vector<StressConfiguration> make() {
+  return {
+      {"agx-orin", platform_named("agx-orin"), {}},
+      {"mobile", platform_named("mobile"), {}},
+      {"desktop", platform_named("desktop"), {}},
+      // Short queues.
+      {"links of depth 1", with_links_of_depth<1>(), {}, true},
+      {"links of depth 2", with_links_of_depth<2>(), {}},
+      {"termination queue of depth 1", with_terminations_of_depth<1>(), {}, true},
+      {"termination queue of depth 4", with_terminations_of_depth<4>(), {}},
+      with("crop.input_quads=1"),
+      with("crop.input_quads=8", true),
+      with("crop.input_quads=16"),
+      with("crop.input_quads=64"),
+      with("tc.flush_queue_bins=1"),
+      // Each unit the bottleneck.
+      with("draw.warps_per_1024_cycles=8"),
+      with("vpo.triangles_per_cycle=1 draw.warps_per_1024_cycles=1024"),
+      with("tgc.entries_per_cycle=1 tgc.bins=4 tgc.bin_primitives=2"),
+      with("raster.setup_interval_cycles=20"),
+      with("raster.screen_tile_interval_cycles=6"),
+      with("raster.coarse_tiles_per_cycle=1"),
+      with("raster.fine_tiles_per_cycle=1"),
+      with("raster.quads_per_cycle=2"),
+      with("tc.quads_per_cycle=2"),
+      with("tc.bins=2"),
+      with("tc.bin_quads=8"),
+      with("prop.quads_per_cycle=2"),
+      with("prop.color_bytes_per_cycle=32"),
+      with("prop.order=draw"),
+      with("zrop.quads_per_cycle=2"),
+      with("zrop.updates_per_cycle=4"),
+      with("qru.quads_per_cycle=1"),
+      with("sm.cores=4"),
+      with("sm.cores=1"),
+      with("crop.bytes_per_cycle=32"),
+      with("crop.sectors_per_cycle=1"),
+      with("l2.bytes_per_cycle=32 crop.cache_bytes=4096"),
+      // Few places, and long waits for them.
+      with("sm.warps_per_core=8", true),
+      with("sm.warps_per_core=2"),
+      with("sm.warps_to_one_core=256"),
+      with("sm.warps_to_one_core=256 sm.warps_per_core=8"),
+      with("sm.warps_to_one_core=1"),
+      with("sm.vertex_warps=1"),
+      with("sm.fragment_latency_cycles=1000"),
+      with("crop.mshrs=1"),
+      with("crop.mshrs=4", true),
+      with("crop.mshrs=16"),
+      with("crop.mshrs=64"),
+      with("crop.cache_bytes=1024"),
+      with("crop.cache_bytes=4096"),
+      with("crop.cache_bytes=262144"),
+      with("l2.latency_cycles=1000", true),
+      with("l2.latency_cycles=1000 crop.cache_bytes=4096"),
+      with("crop.latency_cycles=200"),
+      with("zrop.latency_cycles=200"),
+      with("crop.forwarding=off", true),
+      with("crop.forwarding=off crop.latency_cycles=30"),
+  };
+}
+
+}  // namespace
+
+const std::vector<StressConfiguration>& stress_configurations() {
+  static const std::vector<StressConfiguration> all = make();
+  return all;
+}
+
+}  // namespace vrpipe
