@@ -6,10 +6,10 @@ namespace vrpipe {
 
 namespace {
 
-/// The SM array at lt and at. Ports as in sm_unit.cpp. A warp has its scheduler for all its instructions at once, then
-/// waits for all its latencies: with several warps that is what issuing segment by segment comes to. Vertex warps take
-/// issue slots from fragment warps but do not wait for them; they are few. Shaded warps go to PROP as they are done, at
-/// lt in launch order.
+/// The SM array at lt and at. Ports as in sm_unit.cpp. Fragment warps issue segment by segment, first come, first served,
+/// and go to PROP as they are done. An array with room to spare has a scheduler for all of a warp's instructions at once
+/// and waits for all its latencies after that, at lt in launch order: nothing waits for what that makes late.
+/// Vertex warps take issue slots from fragment warps but do not wait for them: they are few.
 class TimedSm : public TimedUnit {
  public:
   TimedSm(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour,
@@ -18,112 +18,221 @@ class TimedSm : public TimedUnit {
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
         cycles_per_instruction_(cost_.cycles_per_instruction()),
-        vertex_(program({&cost_.vertex})),
-        fragment_(program({&cost_.fragment})),
-        merged_(program({&cost_.fragment, &cost_.merge})),
+        roomy_(is_roomy(cost_)),
+        vertex_(program(cost_.vertex, {}, true).front()),
+        fragment_(program(cost_.fragment, {}, roomy_)),
+        merged_(program(cost_.fragment, cost_.merge, roomy_)),
         out_vertices_(*this, "out_vertices"),
         out_shaded_(*this, "out_shaded"),
         in_release_(*this, "in_release",
                     [this](const WarpRelease& release, Span visible) { return free(release, visible.first); }),
-        in_warps_(*this, "in_warps", [this](const Warp& warp, Span visible) { return shade(warp, visible.first); }),
+        in_warps_(*this, "in_warps", [this](const Warp& warp, Span visible) { return launch(warp, visible.first); }),
         in_vertices_(*this, "in_vertices",
                      [this](const VertexWarp& warp, Span visible) { return shade_vertices(warp, visible.first); },
                      {&out_vertices_}),
         scheduler_free_at_(std::size_t{cost_.cores} * cost_.schedulers_per_core, 0),
+        free_of_core_(cost_.cores, cost_.warps_per_core),
         vertex_slots_(cost_.vertex_warps, 0) {
-    for (std::uint32_t left = cost_.fragment_slots(); left > 0; --left) slots_.push(0);
-    in_warps_.set_gate([this] { return !slots_.empty(); });
+    waiting_.resize(merged_.size());
+    free_slots_ = cost_.fragment_slots();
+    in_warps_.set_gate([this] { return has_slot(); });
   }
 
-  bool idle() const override { return TimedUnit::idle() && running_.empty(); }
+  bool idle() const override { return TimedUnit::idle() && next_event() == never; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  struct Program {
-    std::uint64_t instructions = 0;
-    Cycle issue = 0;    ///< cycles that it has the scheduler
-    Cycle latency = 0;  ///< of its stalls
+  struct Segment {
+    std::uint32_t instructions = 0;
+    std::uint32_t merge_instructions = 0;  ///< after these
+    std::uint32_t stall_cycles = 0;
+    std::uint32_t all() const { return instructions + merge_instructions; }
   };
+  using Program = std::vector<Segment>;
 
-  Program program(std::initializer_list<const std::vector<ShaderSegment>*> parts) const {
-    Program sum;
-    for (const auto* part : parts) {
-      for (const ShaderSegment& segment : *part) {
-        sum.instructions += segment.instructions;
-        sum.latency += segment.stall_cycles;
-      }
+  /// A shader and what is appended to it, perhaps as a single segment.
+  static Program program(const std::vector<ShaderSegment>& shader, const std::vector<ShaderSegment>& merge,
+                         bool as_one) {
+    Program program;
+    for (const ShaderSegment& each : shader) program.push_back({each.instructions, 0, each.stall_cycles});
+    for (const ShaderSegment& each : merge) program.push_back({0, each.instructions, each.stall_cycles});
+    if (!as_one) return program;
+    Segment sum;
+    for (const Segment& each : program) {
+      sum.instructions += each.instructions;
+      sum.merge_instructions += each.merge_instructions;
+      sum.stall_cycles += each.stall_cycles;
     }
-    sum.issue = sum.instructions * cycles_per_instruction_;
-    return sum;
+    return {sum};
   }
 
-  std::size_t choose_scheduler(TileId tile) {
-    if (!(tile == last_tile_) || sent_to_core_ == cost_.warps_to_one_core) {
-      core_ = core_ + 1 == cost_.cores ? 0 : core_ + 1;
+  /// Whether a warp can be launched in every cycle, and consecutive ones find schedulers that differ.
+  static bool is_roomy(const SmBehaviour::Cost& cost) {
+    const Cycle cycles_per_instruction = cost.cycles_per_instruction();
+    const Segment fragment = program(cost.fragment, {}, true).front();
+    const Segment merged = program(cost.fragment, cost.merge, true).front();
+    return std::uint64_t{cost.cores} * cost.schedulers_per_core >= fragment.all() * cycles_per_instruction &&
+           cost.fragment_slots() >= 2 * (merged.all() * cycles_per_instruction + merged.stall_cycles) &&
+           cost.warps_to_one_core >= cost.schedulers_per_core && 2 * cost.warps_to_one_core <= cost.warps_per_core;
+  }
+
+  bool has_slot() const { return free_slots_ > 0 || !releases_.empty(); }
+
+  /// Puts a slot of the next core that has one under a warp, from `at` on or as soon as one is released.
+  Cycle take_slot(TileId tile, Cycle at) {
+    if (free_slots_ == 0) at = std::max(at, releases_.front().at);
+    for (; !releases_.empty() && releases_.front().at <= at; releases_.pop()) {
+      ++free_of_core_[releases_.front().core];
+      ++free_slots_;
+    }
+    if (!(tile == last_tile_ && sent_to_core_ < cost_.warps_to_one_core && free_of_core_[core_] > 0)) {
+      do {
+        core_ = core_ + 1 == cost_.cores ? 0 : core_ + 1;
+      } while (free_of_core_[core_] == 0);
       sent_to_core_ = 0;
     }
     last_tile_ = tile;
     ++sent_to_core_;
-    const std::size_t chosen = std::size_t{core_} * cost_.schedulers_per_core + turn_of_scheduler_;
-    turn_of_scheduler_ = turn_of_scheduler_ + 1 == cost_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
-    return chosen;
+    --free_of_core_[core_];
+    --free_slots_;
+    return at;
   }
 
-  Cycle shade(const Warp& warp, Cycle visible) {
+  std::size_t next_scheduler() {
+    const std::size_t next = std::size_t{core_} * cost_.schedulers_per_core + turn_of_scheduler_;
+    turn_of_scheduler_ = turn_of_scheduler_ + 1 == cost_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
+    return next;
+  }
+
+  Cycle launch(const Warp& warp, Cycle visible) {
     Cycle launch = std::max(visible, next_launch_);
+    if (warp.end_of_draw) {
+      issue_until(never);
+      done_.push_in_order({std::max(launch, last_done_), take_flight(warp)}, &Event::at);
+      if (blocking()) hand_on_until(never);
+      return launch;
+    }
+    charge(UnitState::memory, std::min(launch, last_done_));
+    charge(UnitState::starved, launch);
+    if (blocking() && !roomy_) hand_on_until(launch);
+    while (blocking() && !has_slot() && next_event() != never) hand_on_until(next_event());
+    if (!has_slot()) {
+      throw SimulationFault("deadlock", launch, std::string(name()) + " has warps to launch, and no slot is released");
+    }
+    launch = take_slot(warp.tile, launch);
+    charge(UnitState::blocked, launch);
+    next_launch_ = launch + 1;
+
+    const Program& needed = warp.merge_pairs != 0 ? merged_ : fragment_;
+    if (blocking() && roomy_) {
+      const Cycle done = issue(needed.front(), next_scheduler(), launch);
+      last_done_ = std::max(last_done_, done);
+      shade(warp, core_, done);
+      return launch;
+    }
+    issue_until(launch);
+    const std::uint32_t flight = take_flight(warp);
+    flights_[flight].program = &needed;
+    flights_[flight].scheduler = next_scheduler();
+    flights_[flight].core = core_;
+    issue({launch, flight}, 0);
+    return launch;
+  }
+
+  /// A fragment warp from its launch to when it is shaded.
+  struct Flight {
+    Warp warp;
+    const Program* program = nullptr;
+    std::size_t scheduler = 0;
+    std::uint32_t core = 0;
+  };
+  std::uint32_t take_flight(const Warp& warp) {
+    if (free_flights_.empty()) {
+      free_flights_.push_back(static_cast<std::uint32_t>(flights_.size()));
+      flights_.emplace_back();
+    }
+    const std::uint32_t index = free_flights_.back();
+    free_flights_.pop_back();
+    flights_[index].warp = warp;
+    return index;
+  }
+
+  struct Event {
+    Cycle at = 0;
+    std::uint32_t flight = 0;
+  };
+
+  /// Issues a segment on a scheduler; returns when the next can issue.
+  Cycle issue(const Segment& segment, std::size_t scheduler, Cycle from) {
+    Cycle& free_at = scheduler_free_at_[scheduler];
+    const Cycle begin = std::max(free_at, from);
+    const Cycle merge = begin + segment.instructions * cycles_per_instruction_;
+    free_at = merge + segment.merge_instructions * cycles_per_instruction_;
+    if (segment.instructions > 0) did(SmWork::fragment, segment.instructions, begin, merge);
+    if (segment.merge_instructions > 0) did(SmWork::merge, segment.merge_instructions, merge, free_at);
+    charge(UnitState::busy, free_at);
+    return free_at + segment.stall_cycles;
+  }
+  /// The same for a warp that waits; those that waited for its scheduler before it have issued.
+  void issue(const Event& warp, std::size_t segment) {
+    const Flight& flight = flights_[warp.flight];
+    const Cycle next = issue((*flight.program)[segment], flight.scheduler, warp.at);
+    if (++segment < flight.program->size()) {
+      waiting_[segment].push_in_order({next, warp.flight}, &Event::at);
+      next_issue_ = std::min(next_issue_, next);
+    } else {
+      done_.push_in_order({next, warp.flight}, &Event::at);
+      last_done_ = std::max(last_done_, next);
+    }
+  }
+
+  /// Issues what waits from cycles up to this one, in the order of waiting.
+  void issue_until(Cycle until) {
+    while (next_issue_ <= until && next_issue_ != never) {
+      std::size_t segment = 1;
+      while (waiting_[segment].empty() || waiting_[segment].front().at != next_issue_) ++segment;
+      const Event warp = waiting_[segment].front();
+      waiting_[segment].pop();
+      next_issue_ = never;
+      for (std::size_t i = 1; i < waiting_.size(); ++i) {
+        if (!waiting_[i].empty()) next_issue_ = std::min(next_issue_, waiting_[i].front().at);
+      }
+      issue(warp, segment);
+    }
+  }
+
+  /// The cycle in which the next warp waits for its scheduler or is done.
+  Cycle next_event() const { return done_.empty() ? next_issue_ : std::min(next_issue_, done_.front().at); }
+
+  /// Sends the warps that are done up to a cycle, as long as PROP takes them.
+  void hand_on_until(Cycle until) {
+    issue_until(until);
+    for (; !done_.empty() && done_.front().at <= until && out_shaded_.clear(); done_.pop()) {
+      const Flight& flight = flights_[done_.front().flight];
+      shade(flight.warp, flight.core, done_.front().at);
+      free_flights_.push_back(done_.front().flight);
+    }
+  }
+
+  void shade(const Warp& warp, std::uint32_t core, Cycle done) {
     ShadedWarp& shaded = pool_.take();
     if (warp.end_of_draw) {
       shaded.end_of_draw = true;
       shaded.sequence = warp.sequence;
       shaded.count = 0;
       shaded.slot = no_slot;
-      hand_on(shaded, std::max(launch, last_done_));
-      return launch;
+    } else {
+      behaviour_->shade(warp, shaded);
+      if (shaded.count < warp.count) draw_lasts(done + 1);
+      shaded.slot = static_cast<std::uint16_t>(core);
     }
-    charge(UnitState::memory, std::min(launch, last_done_));
-    charge(UnitState::starved, launch);
-    if (slots_.empty()) {
-      // At lt all that leads to a release has happened by now.
-      throw SimulationFault("deadlock", launch, std::string(name()) + " has warps to launch, and no slot is released");
-    }
-    launch = std::max(launch, slots_.front());
-    slots_.pop();
-    charge(UnitState::blocked, launch);
-    next_launch_ = launch + 1;
-
-    const Program& needed = warp.merge_pairs != 0 ? merged_ : fragment_;
-    Cycle& free_at = scheduler_free_at_[choose_scheduler(warp.tile)];
-    free_at = std::max(free_at, launch) + needed.issue;
-    const Cycle begin = free_at - needed.issue;
-    did(SmWork::fragment, fragment_.instructions, begin, begin + fragment_.issue);
-    if (needed.instructions > fragment_.instructions) {
-      did(SmWork::merge, needed.instructions - fragment_.instructions, begin + fragment_.issue, free_at);
-    }
-    const Cycle done = free_at + needed.latency;
-    last_done_ = std::max(last_done_, done);
-    charge(UnitState::busy, free_at);
-
-    behaviour_->shade(warp, shaded);
-    if (shaded.count < warp.count) draw_lasts(done + 1);
-    shaded.slot = 0;
-    hand_on(shaded, done);
-    return launch;
-  }
-
-  /// Sends a warp that is shaded in a cycle to come.
-  void hand_on(const ShadedWarp& shaded, Cycle done) {
-    if (blocking()) {
-      out_shaded_.send({&shaded}, done);
-      return;
-    }
-    running_.push_in_order({&shaded, done}, &Running::done);
+    out_shaded_.send({&shaded}, done);
   }
 
   Cycle advance(Cycle until) override {
-    for (; !running_.empty() && running_.front().done <= until && out_shaded_.clear(); running_.pop()) {
-      out_shaded_.send({running_.front().shaded}, running_.front().done);
-    }
-    return running_.empty() || !out_shaded_.clear() ? never : running_.front().done;
+    if (blocking()) return never;
+    hand_on_until(until);
+    return out_shaded_.clear() ? next_event() : never;
   }
 
   Cycle shade_vertices(const VertexWarp& warp, Cycle visible) {
@@ -131,10 +240,11 @@ class TimedSm : public TimedUnit {
     if (!warp.end_of_draw) {
       launch = std::max(launch, vertex_slots_[vertex_turn_]);
       Cycle& free_at = scheduler_free_at_[vertex_scheduler_++ % scheduler_free_at_.size()];
-      free_at = std::max(free_at, launch) + vertex_.issue;
-      did(SmWork::vertex, vertex_.instructions, free_at - vertex_.issue, free_at);
+      const Cycle issue = vertex_.instructions * cycles_per_instruction_;
+      free_at = std::max(free_at, launch) + issue;
+      did(SmWork::vertex, vertex_.instructions, free_at - issue, free_at);
       behaviour_->shade_vertices(warp);
-      vertices_done_ = std::max(vertices_done_, launch + vertex_.issue + vertex_.latency);
+      vertices_done_ = std::max(vertices_done_, launch + issue + vertex_.stall_cycles);
     }
     next_vertex_launch_ = launch + 1;
     // Vertex warps leave in order.
@@ -145,14 +255,15 @@ class TimedSm : public TimedUnit {
   }
 
   Cycle free(const WarpRelease& release, Cycle visible) {
-    if (release.slot != no_slot) slots_.push(visible);
+    if (release.slot != no_slot) releases_.push_in_order({visible, release.slot}, &Release::at);
     return visible;
   }
 
   std::unique_ptr<SmBehaviour> behaviour_;
   const SmBehaviour::Cost cost_;
   const Cycle cycles_per_instruction_;
-  const Program vertex_;
+  const bool roomy_;
+  const Segment vertex_;
   const Program fragment_;
   const Program merged_;
   TimedOut<VertexWarp> out_vertices_;
@@ -161,12 +272,18 @@ class TimedSm : public TimedUnit {
   TimedIn<Warp> in_warps_;
   TimedIn<VertexWarp> in_vertices_;
   std::vector<Cycle> scheduler_free_at_;
-  struct Running {
-    const ShadedWarp* shaded = nullptr;
-    Cycle done = 0;
+  std::vector<Flight> flights_;
+  std::vector<std::uint32_t> free_flights_;
+  std::vector<Ring<Event>> waiting_;  ///< for a scheduler: by the segment that is to issue, each by cycle
+  Ring<Event> done_;                  ///< by cycle
+  Cycle next_issue_ = never;          ///< the first of those that wait
+  struct Release {
+    Cycle at = 0;
+    std::uint32_t core = 0;
   };
-  Ring<Running> running_;            ///< by cycle; non-blocking
-  Ring<Cycle> slots_;                ///< for fragment warps: when each that is free, or known to become so, is
+  Ring<Release> releases_;  ///< of slots for fragment warps, by cycle, that no launch has come after yet
+  std::vector<std::uint32_t> free_of_core_;
+  std::uint32_t free_slots_ = 0;     ///< of all cores
   std::vector<Cycle> vertex_slots_;  ///< a ring
   std::uint32_t vertex_turn_ = 0;
   std::uint64_t vertex_scheduler_ = 0;
