@@ -60,6 +60,8 @@ std::vector<StressConfiguration> make() {
       with("crop.input_quads=8", true),
       with("crop.input_quads=16"),
       with("crop.input_quads=64"),
+      with("crop.input_quads=128"),
+      with("crop.input_quads=256"),
       with("tc.flush_queue_bins=1"),
       // Each unit the bottleneck.
       with("draw.warps_per_1024_cycles=8"),

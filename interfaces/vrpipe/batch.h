@@ -25,11 +25,12 @@ struct BinItem {
   bool end_of_draw = false;
 };
 
-/// Quads of a warp that may be looked up before the first of them is blended: not more than CROP's queue has room for,
-/// nor than the cache has lines for without one of them going for another. With few lines, a line that is taken a few
-/// cycles longer than it need be tells; then quads go one by one.
+/// Quads of a warp that are looked up before the first of them is blended. Where places in CROP's queue, lines of the
+/// cache or miss registers are few, one that is taken a few cycles longer than it need be tells; then quads go one by one.
 inline unsigned quads_looked_up_at_once(const CropBehaviour::Cost& crop) {
-  const bool roomy = crop.cache_bytes / crop.line_bytes >= 16 * quads_per_warp && crop.input_quads >= quads_per_warp;
+  constexpr std::uint32_t enough = 16 * quads_per_warp;
+  const bool roomy = crop.cache_bytes / crop.line_bytes >= enough && crop.input_quads >= 3 * enough &&
+                     crop.mshrs >= enough;
   return roomy ? quads_per_warp : 1;
 }
 

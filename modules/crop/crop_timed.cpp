@@ -58,7 +58,7 @@ class TimedCrop : public TimedUnit {
         blending_(static_cast<unsigned>(CropWork::parts_of_a_cycle(cost_))),
         price_(cost_.blend_rate.cycles * cost_.sectors_per_cycle),
         lines_(std::max(cost_.cache_bytes / cost_.line_bytes, 1U)),
-        longest_run_(std::min(cost_.line_bytes / cost_.sector_bytes, cost_.mshrs)),
+        longest_run_(at_once_ == 1 ? 1 : std::min(cost_.line_bytes / cost_.sector_bytes, cost_.mshrs)),
         sector_shift_(static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes))) {
     out_.set_pipeline(cost_.latency_cycles - 1, ColorBeat::in_a_cycle(cost_.blend_rate));
   }
