@@ -234,6 +234,15 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
   }
   /// The cycle in which the last part of the last item was taken.
   Cycle last() const { return last_; }
+  /// From when on there is room for another item; `never`, if nobody knows yet: then the unit is activated once it is
+  /// known.
+  Cycle room_from() {
+    if (unlimited_) return 0;
+    if (blocking_) return direct_ == nullptr ? 0 : direct_->free_at_[direct_->place_];
+    if (!credits_.empty()) return credits_.front();
+    room_wanted_ = true;
+    return never;
+  }
 
  private:
   friend class TimedIn<Item>;
@@ -291,7 +300,6 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     return tlm::TLM_ACCEPTED;
   }
   void give(unsigned credits, Span at) {
-    if (!clock_.domain->running()) places_ += credits;
     for (unsigned credit = 0; credit < credits; ++credit) {
       const Cycle cycle = at.of_part(credit, credits);
       if (owed_ > 0) {
@@ -301,7 +309,8 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
         credits_.push(cycle);
       }
     }
-    const bool was_waiting = waiting_items_ > 0;
+    const bool was_waiting = waiting_items_ > 0 || room_wanted_;
+    room_wanted_ = false;
     while (waiting_items_ > 0 && !credits_.empty()) {
       const Waiting& next = waiting_.front();
       transfer(next.item, next.at, next.beats);
@@ -310,7 +319,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     }
     if (was_waiting && !blocked()) {
       const Cycle now = clock_.domain->now();
-      clock_.domain->wake(clock_.unit, places_ < activation_cycles ? now + 1 : activation_for(now, now));
+      clock_.domain->wake(clock_.unit, prompt_ ? now + 1 : activation_for(now, now));
     }
   }
   void unlimited() override { unlimited_ = true; }
@@ -323,7 +332,8 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
   const bool blocking_;
   TimedIn<Item>* direct_ = nullptr;
   bool unlimited_ = false;
-  unsigned places_ = 0;  ///< of the queue
+  bool prompt_ = false;
+  bool room_wanted_ = false;
   unsigned owed_ = 0;    ///< places that sent items take and the queue has not had yet
   Cycle last_ = 0;
   Ring<Cycle> credits_;  ///< the cycle from which each can be used
@@ -369,6 +379,7 @@ class TimedIn : public InEnd<Item>, public TimedInput {
   void configure(unsigned depth, unsigned latency) override {
     latency_ = latency;
     depth_ = depth;
+    prompt_ = depth < activation_cycles;
     free_at_.assign(blocking_ ? depth : 0, 0);
     place_ = 0;
   }
@@ -472,7 +483,7 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     if (front_ == never) front_ = seen.first;
     const Cycle now = clock_.domain->now();
     clock_.domain->wake(clock_.unit,
-                        depth_ < activation_cycles ? std::max(seen.first, now + 1) : activation_for(seen.first, now));
+                        prompt_ ? std::max(seen.first, now + 1) : activation_for(seen.first, now));
   }
 
   const bool blocking_;
@@ -480,6 +491,7 @@ class TimedIn : public InEnd<Item>, public TimedInput {
   Handler handler_;
   std::vector<TimedOutput*> sends_to_;
   std::function<bool()> gate_;
+  bool prompt_ = true;
   unsigned depth_ = 4;
   unsigned latency_ = 1;
   std::vector<Cycle> free_at_;  ///< blocking: when each place of the queue can be filled, a ring
@@ -491,8 +503,12 @@ class TimedIn : public InEnd<Item>, public TimedInput {
 template <class Item>
 void TimedOut<Item>::connect(InPort& in, unsigned depth, unsigned latency) {
   OutEnd<Item>::connect(in, depth, latency);
+  // What is on its way through the pipeline in front of the link takes no place of the queue.
+  prompt_ = depth < activation_cycles;
   direct_ = dynamic_cast<TimedIn<Item>*>(&in);
-  if (direct_ != nullptr) direct_->direct_ = this;
+  if (direct_ == nullptr) return;
+  direct_->direct_ = this;
+  direct_->prompt_ = prompt_;
 }
 
 /// An initiator on the TLM-2.0 base protocol, for timing only, whose accesses are b_transport calls that return when the

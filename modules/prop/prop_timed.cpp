@@ -79,7 +79,13 @@ class TimedProp : public TimedUnit {
 
   /// Lets those warps leave whose time comes up to a cycle.
   void leave_until(Cycle until) {
-    while (order_.has_next() && can_send() && color_.next() <= until) leave(order_.take());
+    while (order_.has_next() && can_send()) {
+      // A warp begins to leave once its release has room.
+      const Cycle room = out_release_.room_from();
+      if (room == never || std::max(room, color_.next()) > until) break;
+      color_.hold(room);
+      leave(order_.take());
+    }
     if (end_ == nullptr || end_->sequence != order_.left() || !can_send()) return;
     const Cycle at = color_.take(end_from_, cost_.color_rate.items).first;
     const WarpRelease release{end_->slot};
