@@ -63,6 +63,7 @@ Cycle TimedMemoryPort::request(tlm::tlm_command command, std::uint64_t address, 
   payload_.set_dmi_allowed(false);
   payload_.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
   const Cycle now = clock_.domain->now();
+  at = std::max(at, now);
   auto delay = sc_core::sc_time::from_value((at - now) * clock_.domain->period().value());
   socket->b_transport(payload_, delay);
   check_response(socket, at, payload_);

@@ -520,7 +520,8 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<> {
 
   tlm::tlm_initiator_socket<32> socket;
 
-  /// An access in cycle `at`; returns the cycle in which it is complete.
+  /// An access in cycle `at`; returns the cycle in which it is complete. At `at` a unit may be behind the clock; only a
+  /// memory that is asked directly knows cycles in the past.
   Cycle read(std::uint64_t address, unsigned bytes, Cycle at) {
     return access(tlm::TLM_READ_COMMAND, address, bytes, at);
   }
@@ -531,7 +532,6 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<> {
  private:
   Cycle access(tlm::tlm_command command, std::uint64_t address, unsigned bytes, Cycle at) {
     check_alignment(socket, at, address, bytes);
-    at = std::max(at, clock_.domain->now());
     return prompt_ == nullptr ? request(command, address, bytes, at) : prompt_->serve(at, bytes);
   }
   [[gnu::noinline]] Cycle request(tlm::tlm_command command, std::uint64_t address, unsigned bytes, Cycle at);
