@@ -37,11 +37,22 @@ class BackEnd {
     while (qru->finish_bin(warp)) run(warp, signal);
   }
 
-  /// Counts the work from now on, and what the colour cache moves.
-  void count_into(Work& work) {
+  /// Counts the work from now on, and what the colour cache moves. With `only_needed` that of quads alone whose pixels
+  /// are not all terminated by what was blended before: no run is spared these, however early it flushes its bins.
+  void count_into(Work& work, bool only_needed) {
     work_ = &work;
+    if (only_needed) terminated_.resize(surface_.grid().quads());
     writes_unchanged_ = crop->cost().writes_unchanged;
     looked_up_at_once_ = quads_looked_up_at_once(crop->cost());
+  }
+
+  /// Of the survivors of a part of a bin, those to be counted.
+  unsigned count_needed(const QuadBeat& beat) const {
+    if (terminated_.empty()) return beat.count;
+    const std::size_t tile = surface_.grid().place(beat.tile, 0);
+    unsigned count = 0;
+    for (unsigned i = 0; i < beat.count; ++i) count += is_needed(tile, beat.quads[i]) ? 1U : 0U;
+    return count;
   }
 
   std::unique_ptr<QruBehaviour> qru;
@@ -60,7 +71,7 @@ class BackEnd {
     }
     sm->shade(warp, shaded_);
     if (work_ == nullptr) return blend(0, shaded_.count, signal);
-    count(warp);
+    count(warp, tile);
     for (unsigned from = 0; from < shaded_.count; from += looked_up_at_once_) {
       const unsigned to = std::min<unsigned>(from + looked_up_at_once_, shaded_.count);
       crop->look_up(shaded_, from, to, cache_);
@@ -85,14 +96,44 @@ class BackEnd {
       if (work_ != nullptr && cache_.count > 0 && (outcome.changed || writes_unchanged_)) {
         crop->make_dirty(cache_.lines[cache_.line_of[i]].line, cache_.sectors_of[i]);
       }
+      if (work_ != nullptr) count_blend(shaded_, i, outcome.terminated);
       if (outcome.terminated != 0) signal(TerminationSignal{shaded_.tile, shaded_.position[i], outcome.terminated});
     }
   }
 
-  void count(const Warp& warp) {
-    ++work_->warps;
-    work_->merging_warps += warp.merge_pairs != 0 ? 1U : 0U;
-    work_->color_quads += shaded_.count;
+  bool is_needed(std::size_t tile, const Quad& quad) const {
+    return (quad.coverage & ~terminated_[tile + quad.position]) != 0;
+  }
+
+  void count(const Warp& warp, std::size_t tile) {
+    if (terminated_.empty()) {
+      ++work_->warps;
+      work_->merging_warps += warp.merge_pairs != 0 ? 1U : 0U;
+      return;
+    }
+    // In warps that are full: flushed at other times, these quads may find other company.
+    for (unsigned i = 0; i < warp.count; ++i) {
+      if (!is_needed(tile, warp.quads[i])) continue;
+      ++needed_quads_;
+      const bool pair = i % 2 == 1 && (warp.merge_pairs >> (i / 2) & 1U) != 0;
+      needed_pairs_ += pair && is_needed(tile, warp.quads[i - 1]) ? 1U : 0U;
+    }
+    work_->warps += needed_quads_ / quads_per_warp;
+    needed_quads_ %= quads_per_warp;
+    work_->merging_warps += needed_pairs_ / (quads_per_warp / 2);
+    needed_pairs_ %= quads_per_warp / 2;
+  }
+
+  void count_blend(const ShadedWarp& warp, unsigned index, LaneMask terminated) {
+    if (terminated_.empty()) {
+      ++work_->color_quads;
+      work_->updates += terminated != 0 ? 1U : 0U;
+      return;
+    }
+    LaneMask& before = terminated_[surface_.grid().place(warp.tile, warp.position[index])];
+    work_->color_quads += (warp.live[index] & ~before) != 0 ? 1U : 0U;
+    work_->updates += before == 0 && terminated != 0 ? 1U : 0U;
+    before = static_cast<LaneMask>(before | terminated);
   }
 
   static unsigned popcount_of(std::uint32_t mask) {
@@ -108,6 +149,9 @@ class BackEnd {
   bool writes_unchanged_ = false;
   unsigned looked_up_at_once_ = quads_per_warp;
   CropBehaviour::CacheLookUp cache_;
+  std::vector<LaneMask> terminated_;  ///< by quad of the surface; empty if all work counts
+  unsigned needed_quads_ = 0;         ///< less than a warp
+  unsigned needed_pairs_ = 0;
 };
 
 /// Strict termination where there is time: runs tested bins ahead, in order, on units of its own.

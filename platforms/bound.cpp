@@ -13,6 +13,11 @@ double ratio(std::uint64_t items, std::uint64_t per_cycle) {
   return static_cast<double>(items) / static_cast<double>(per_cycle);
 }
 
+/// Cycles from the first of so many items to the last, and one.
+double spaced(std::uint64_t items, double cycles) {
+  return items == 0 ? 0 : static_cast<double>(items - 1) * cycles + 1;
+}
+
 std::uint64_t instructions_of(const std::vector<ShaderSegment>& program) {
   std::uint64_t sum = 0;
   for (const ShaderSegment& segment : program) sum += segment.instructions;
@@ -67,13 +72,13 @@ double PhaseBound::instructions(const Work& done) const {
 
 std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done) const {
   std::array<double, stages> cycles{};
-  cycles[draw] = static_cast<double>(done.vertex_warps_issued) / vertex_warps_per_cycle_;
+  cycles[draw] = spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_);
   cycles[vpo] = ratio(done.triangles, vpo_.items_per_cycle);
   cycles[tgc] = std::max(ratio(done.bin_entries, tgc_.items_per_cycle), ratio(done.setups, 1));
-  cycles[raster] = std::max({static_cast<double>(done.setups * raster_.setup_interval_cycles),
+  cycles[raster] = std::max({spaced(done.setups, raster_.setup_interval_cycles),
                              ratio(done.coarse_tiles, raster_.coarse_tiles_per_cycle),
                              ratio(done.fine_tiles, raster_.fine_tiles_per_cycle),
-                             static_cast<double>(done.tile_pairs * raster_.screen_tile_interval_cycles),
+                             spaced(done.tile_pairs, raster_.screen_tile_interval_cycles),
                              ratio(done.quads_rasterized, raster_.quads_per_cycle)});
   cycles[tc] = std::max(ratio(done.quads_rasterized, tc_.quads_per_cycle), ratio(done.bin_beats, 1));
   cycles[test] =

@@ -29,7 +29,8 @@ struct FunctionalGpu::Gpc {
         zrop(configuration.make_as<ZropBehaviour>("zrop", gpc)),
         back_end(configuration, gpc, surface),
         bound(configuration, gpc) {
-    if (with_bounds) back_end.count_into(bound.work);
+    // A time-out flushes bins when this run does not, and quads of theirs may terminate those that are with them here.
+    if (with_bounds) back_end.count_into(bound.work, tests && tc->cost().idle_timeout_cycles > 0);
   }
 
   unsigned index;
@@ -76,14 +77,11 @@ void FunctionalGpu::bin_flushed(Gpc& gpc) {
       work.quads_tested += beat.count;
       gpc.zrop->test(beat);
     }
-    work.survivors += beat.count;
+    work.survivors += gpc.back_end.count_needed(beat);
     tested.push_back(beat);
   }
   for (const QuadBeat& part : tested) {
-    gpc.back_end.take(part, [&](const TerminationSignal& signal) {
-      ++work.updates;
-      gpc.zrop->update(signal);
-    });
+    gpc.back_end.take(part, [&](const TerminationSignal& signal) { gpc.zrop->update(signal); });
   }
   gpc.bound.quads_ended();
   if (gpc.bound.phase_is_full()) gpc.bound.end_phase();
