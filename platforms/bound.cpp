@@ -62,7 +62,8 @@ PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc)
       l2_bytes_per_cycle_(configuration.l2().bytes_per_cycle),
       l2_latency_cycles_(configuration.l2().latency_cycles),
       // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
-      warps_in_phase_(2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads)) {}
+      warps_in_phase_(2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads)),
+      times_out_(tc_.idle_timeout_cycles > 0) {}
 
 double PhaseBound::instructions(const Work& done) const {
   return static_cast<double>(done.vertex_warps * instructions_of(sm_.vertex) +
@@ -127,6 +128,7 @@ void PhaseBound::end_phase() {
   total_.add(work);
   work = Work();
   up_to_quads_ = Work();
+  up_to_quad_ = FrontEndWork();
 }
 
 double PhaseBound::cycles() const {
@@ -153,12 +155,15 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
     return parts;
   };
   const auto count = [](std::uint64_t items) { return static_cast<double>(items); };
-  if (slot == "draw") return priced(DrawWork::kinds(), {count(done.vertex_warps_issued) / vertex_warps_per_cycle_});
+  if (slot == "draw") return priced(DrawWork::kinds(), {spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_)});
   if (slot == "vpo") return priced(VpoWork::kinds(vpo_), {count(done.triangles)});
   if (slot == "tgc") return priced(TgcWork::kinds(tgc_), {count(done.bin_entries), count(done.setups)});
   if (slot == "raster") {
-    return priced(RasterWork::kinds(raster_), {count(done.setups), count(done.coarse_tiles), count(done.fine_tiles),
-                                               count(done.tile_pairs), count(done.quads_rasterized)});
+    const double setups = spaced(done.setups, raster_.setup_interval_cycles) / raster_.setup_interval_cycles;
+    const double pairs =
+        spaced(done.tile_pairs, raster_.screen_tile_interval_cycles) / raster_.screen_tile_interval_cycles;
+    return priced(RasterWork::kinds(raster_), {setups, count(done.coarse_tiles), count(done.fine_tiles), pairs,
+                                               count(done.quads_rasterized)});
   }
   if (slot == "tc") return priced(TcWork::kinds(tc_), {count(done.quads_rasterized), count(done.bin_beats)});
   if (slot == "prop") {

@@ -8,9 +8,10 @@
 
 namespace vrpipe {
 
-/// What the units of a GPC did, in the terms of their costs, and the front end for it.
-struct Work {
+/// What it takes to make quads.
+struct FrontEndWork {
   std::uint64_t vertex_warps_issued = 0;
+  std::uint64_t vertex_warps = 0;  ///< shaded
   std::uint64_t triangles = 0;
   std::uint64_t bin_entries = 0;
   std::uint64_t setups = 0;
@@ -18,11 +19,14 @@ struct Work {
   std::uint64_t fine_tiles = 0;
   std::uint64_t tile_pairs = 0;
   std::uint64_t quads_rasterized = 0;
+};
+
+/// What the units of a GPC did, in the terms of their costs, and the front end for it.
+struct Work : FrontEndWork {
   std::uint64_t bin_beats = 0;
   std::uint64_t quads_tested = 0;
   std::uint64_t updates = 0;
   std::uint64_t survivors = 0;
-  std::uint64_t vertex_warps = 0;  ///< shaded
   std::uint64_t warps = 0;
   std::uint64_t merging_warps = 0;
   std::uint64_t color_quads = 0;
@@ -48,8 +52,14 @@ class PhaseBound {
 
   Work work;  ///< of the phase
   bool phase_is_full() const { return work.warps >= warps_in_phase_; }
-  /// All quads so far have been blended or dropped.
-  void quads_ended() { up_to_quads_ = work; }
+  /// The work so far includes a quad that was rasterised.
+  void quad_rasterized() { up_to_quad_ = work; }
+  /// All quads so far have been blended or dropped. Where a time-out flushes the last bins, what made no quad any more
+  /// does not come before.
+  void quads_ended() {
+    up_to_quads_ = work;
+    if (times_out_) static_cast<FrontEndWork&>(up_to_quads_) = up_to_quad_;
+  }
   void end_phase();
   double cycles() const;
 
@@ -77,9 +87,11 @@ class PhaseBound {
   std::uint32_t l2_bytes_per_cycle_;
   std::uint32_t l2_latency_cycles_;
   std::uint64_t warps_in_phase_;
-  Work total_;        ///< of the phases before
-  Work up_to_quads_;  ///< of the phase, up to its last quad
-  Work ended_;        ///< of all phases, up to the last quad
+  Work total_;               ///< of the phases before
+  FrontEndWork up_to_quad_;  ///< of the phase, up to the last quad that was rasterised
+  Work up_to_quads_;         ///< of the phase, up to its last quad
+  Work ended_;               ///< of all phases, up to the last quad
+  bool times_out_;
   double last_quad_ = 0;
   std::array<double, stages> end_{};         ///< of the last phase
   std::array<double, stages> end_before_{};  ///< of the phase before it

@@ -99,6 +99,7 @@ void FunctionalGpu::rasterize(Gpc& gpc) {
       ++work.fine_tiles;
       work.tile_pairs += new_screen_tile ? 1U : 0U;
       work.quads_rasterized += gpc.tile.count;
+      if (gpc.tile.count > 0) gpc.bound.quad_rasterized();
       for (unsigned from = 0; from < gpc.tile.count;) {
         bool flushed = false;
         from += gpc.tc->insert(gpc.tile, from, gpc.bin, flushed);

@@ -1,0 +1,78 @@
+// The bound is one: no run with links takes fewer cycles, whatever the configuration.
+#include "scenes.h"
+
+namespace vrpipe {
+namespace {
+
+using namespace testing;
+
+/// A parameter far from its default, or not so far.
+rc::Gen<Setting> setting() {
+  struct Choice {
+    const char* unit;
+    const char* parameter;
+    std::vector<const char*> values;
+  };
+  static const std::vector<Choice> choices{{"draw", "warps_per_1024_cycles", {"1", "8", "1024"}},
+                                           {"vpo", "triangles_per_cycle", {"1", "16"}},
+                                           {"tgc", "entries_per_cycle", {"1", "8"}},
+                                           {"raster", "setup_interval_cycles", {"7", "1000"}},
+                                           {"raster", "screen_tile_interval_cycles", {"6", "1000"}},
+                                           {"raster", "coarse_tiles_per_cycle", {"1", "64"}},
+                                           {"raster", "quads_per_cycle", {"1", "3"}},
+                                           {"tc", "quads_per_cycle", {"1", "5"}},
+                                           {"tc", "idle_timeout_cycles", {"0", "1", "20"}},
+                                           {"tc", "flush_queue_bins", {"1", "64"}},
+                                           {"prop", "quads_per_cycle", {"1", "5"}},
+                                           {"prop", "color_bytes_per_cycle", {"16", "256"}},
+                                           {"prop", "order", {"draw"}},
+                                           {"zrop", "quads_per_cycle", {"1", "5"}},
+                                           {"zrop", "updates_per_cycle", {"1", "16"}},
+                                           {"qru", "quads_per_cycle", {"1", "3"}},
+                                           {"sm", "cores", {"1", "3"}},
+                                           {"sm", "warps_per_core", {"1", "5"}},
+                                           {"sm", "warps_to_one_core", {"1", "256"}},
+                                           {"sm", "lanes_per_scheduler", {"1", "32"}},
+                                           {"sm", "merge_instructions", {"1000"}},
+                                           {"crop", "bytes_per_cycle", {"16", "256"}},
+                                           {"crop", "input_quads", {"1", "9"}},
+                                           {"crop", "mshrs", {"1", "5"}},
+                                           {"crop", "cache_bytes", {"128", "1024"}},
+                                           {"crop", "sectors_per_cycle", {"1", "64"}},
+                                           {"crop", "forwarding", {"off"}},
+                                           {"crop", "previous_alpha_check", {"off"}},
+                                           {"crop", "writes_unchanged", {"on"}},
+                                           {"l2", "latency_cycles", {"1", "1000"}},
+                                           {"l2", "bytes_per_cycle", {"32"}},
+                                           {"state", "termination_threshold", {"0.1", "1e-9"}}};
+  return rc::gen::mapcat(rc::gen::elementOf(choices), [](const Choice& choice) {
+    return rc::gen::map(rc::gen::elementOf(choice.values), [choice](const char* value) {
+      return Setting{choice.unit, choice.parameter, value};
+    });
+  });
+}
+
+RC_GTEST_PROP(Bound, IsNeverAboveTheFidelitiesWithLinks, ()) {
+  const Draw draw = *scene(60, 1.0F);
+  RunRequest r = request(*rc::gen::elementOf(variants()), *format(), Fidelity::bound);
+  r.platform = &platforms()[static_cast<std::size_t>(*whole(0, static_cast<int>(platforms().size())))];
+  r.termination = *rc::gen::element(Termination::paper, Termination::strict);
+  r.settings = *bins();
+  const auto far = *rc::gen::resize(4, rc::gen::container<std::vector<Setting>>(setting()));
+  r.settings.insert(r.settings.end(), far.begin(), far.end());
+  const Cycle bound = *run(r, draw).cycles;
+  for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt, Fidelity::at}) {
+    r.fidelity = fidelity;
+    const Cycle cycles = *run(r, draw).cycles;
+    if (bound <= cycles) continue;
+    std::string settings;
+    for (const Setting& each : r.settings) settings += " " + each.unit + "." + each.parameter + "=" + each.value;
+    RC_LOG() << r.platform->name << " " << r.variant.name << " " << name_of(r.format) << " "
+             << (r.termination == Termination::paper ? "paper" : "strict") << settings << ": bound " << bound << ", "
+             << name_of(fidelity) << " " << cycles;
+    RC_FAIL("the bound is above");
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe
