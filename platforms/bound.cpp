@@ -13,9 +13,10 @@ double ratio(std::uint64_t items, std::uint64_t per_cycle) {
   return static_cast<double>(items) / static_cast<double>(per_cycle);
 }
 
-/// Cycles from the first of so many items to the last, and one.
-double spaced(std::uint64_t items, double cycles) {
-  return items == 0 ? 0 : static_cast<double>(items - 1) * cycles + 1;
+/// Cycles of so many items, each so long after the one before; if they are the last of the draw, up to the last item.
+double spaced(std::uint64_t items, double cycles, bool to_last) {
+  if (items == 0) return 0;
+  return to_last ? static_cast<double>(items - 1) * cycles + 1 : static_cast<double>(items) * cycles;
 }
 
 std::uint64_t instructions_of(const std::vector<ShaderSegment>& program) {
@@ -71,15 +72,15 @@ double PhaseBound::instructions(const Work& done) const {
                              done.merging_warps * instructions_of(sm_.merge));
 }
 
-std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done) const {
+std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, bool to_last) const {
   std::array<double, stages> cycles{};
-  cycles[draw] = spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_);
+  cycles[draw] = spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_, to_last);
   cycles[vpo] = ratio(done.triangles, vpo_.items_per_cycle);
   cycles[tgc] = std::max(ratio(done.bin_entries, tgc_.items_per_cycle), ratio(done.setups, 1));
-  cycles[raster] = std::max({spaced(done.setups, raster_.setup_interval_cycles),
+  cycles[raster] = std::max({spaced(done.setups, raster_.setup_interval_cycles, to_last),
                              ratio(done.coarse_tiles, raster_.coarse_tiles_per_cycle),
                              ratio(done.fine_tiles, raster_.fine_tiles_per_cycle),
-                             spaced(done.tile_pairs, raster_.screen_tile_interval_cycles),
+                             spaced(done.tile_pairs, raster_.screen_tile_interval_cycles, to_last),
                              ratio(done.quads_rasterized, raster_.quads_per_cycle)});
   cycles[tc] = std::max(ratio(done.quads_rasterized, tc_.quads_per_cycle), ratio(done.bin_beats, 1));
   cycles[test] =
@@ -101,8 +102,8 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done) c
   return cycles;
 }
 
-std::array<double, PhaseBound::stages> PhaseBound::end_of(const Work& done) const {
-  const std::array<double, stages> cycles = cycles_of(done);
+std::array<double, PhaseBound::stages> PhaseBound::end_of(const Work& done, bool to_last) const {
+  const std::array<double, stages> cycles = cycles_of(done, to_last);
   std::array<double, stages> end{};
   for (unsigned stage = 0; stage < stages; ++stage) {
     double begin = 0;
@@ -117,22 +118,21 @@ std::array<double, PhaseBound::stages> PhaseBound::end_of(const Work& done) cons
 
 void PhaseBound::end_phase() {
   if (up_to_quads_.quads_rasterized > 0) {
-    const std::array<double, stages> end = end_of(up_to_quads_);
+    const std::array<double, stages> end = end_of(up_to_quads_, true);
     last_quad_ = *std::max_element(end.begin(), end.end());
     ended_ = total_;
     ended_.add(up_to_quads_);
+  } else if (!has_quads()) {
+    const std::array<double, stages> end = end_of(work, true);
+    last_quad_ = *std::max_element(end.begin(), end.end());
   }
-  const std::array<double, stages> end = end_of(work);
+  const std::array<double, stages> end = end_of(work, false);
   end_before_ = end_;
   end_ = end;
   total_.add(work);
   work = Work();
   up_to_quads_ = Work();
   up_to_quad_ = FrontEndWork();
-}
-
-double PhaseBound::cycles() const {
-  return ended_.quads_rasterized > 0 ? last_quad_ : *std::max_element(end_.begin(), end_.end());
 }
 
 double PhaseBound::busy_cycles(const std::string& slot) const {
@@ -155,13 +155,13 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
     return parts;
   };
   const auto count = [](std::uint64_t items) { return static_cast<double>(items); };
-  if (slot == "draw") return priced(DrawWork::kinds(), {spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_)});
+  if (slot == "draw") return priced(DrawWork::kinds(), {spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_, true)});
   if (slot == "vpo") return priced(VpoWork::kinds(vpo_), {count(done.triangles)});
   if (slot == "tgc") return priced(TgcWork::kinds(tgc_), {count(done.bin_entries), count(done.setups)});
   if (slot == "raster") {
-    const double setups = spaced(done.setups, raster_.setup_interval_cycles) / raster_.setup_interval_cycles;
+    const double setups = spaced(done.setups, raster_.setup_interval_cycles, true) / raster_.setup_interval_cycles;
     const double pairs =
-        spaced(done.tile_pairs, raster_.screen_tile_interval_cycles) / raster_.screen_tile_interval_cycles;
+        spaced(done.tile_pairs, raster_.screen_tile_interval_cycles, true) / raster_.screen_tile_interval_cycles;
     return priced(RasterWork::kinds(raster_), {setups, count(done.coarse_tiles), count(done.fine_tiles), pairs,
                                                count(done.quads_rasterized)});
   }

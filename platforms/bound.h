@@ -61,7 +61,9 @@ class PhaseBound {
     if (times_out_) static_cast<FrontEndWork&>(up_to_quads_) = up_to_quad_;
   }
   void end_phase();
-  double cycles() const;
+  /// Up to the last quad; without quads, of what the front end does all the same.
+  double cycles() const { return last_quad_; }
+  bool has_quads() const { return ended_.quads_rasterized > 0; }
 
   /// Of all phases, up to the last quad: cycles in which the unit of a slot, or `l2`, works at its peak, and what on.
   double busy_cycles(const std::string& slot) const;
@@ -70,8 +72,8 @@ class PhaseBound {
  private:
   /// In the order of the pipeline; PROP is there twice.
   enum Stage : unsigned { draw, vpo, tgc, raster, tc, test, qru, sm, color, l2, crop, stages };
-  std::array<double, stages> cycles_of(const Work& done) const;
-  std::array<double, stages> end_of(const Work& done) const;
+  std::array<double, stages> cycles_of(const Work& done, bool to_last) const;
+  std::array<double, stages> end_of(const Work& done, bool to_last) const;
   double instructions(const Work& done) const;
 
   double vertex_warps_per_cycle_;

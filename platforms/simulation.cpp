@@ -284,7 +284,11 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
 void report_bound(const Configuration& configuration, const FunctionalGpu& gpu, RunResult& result) {
   const std::vector<const PhaseBound*> bounds = gpu.bounds();
   double longest = 0;
-  for (const PhaseBound* bound : bounds) longest = std::max(longest, bound->cycles());
+  // A GPC without quads does not keep the draw up, unless there is none at all.
+  const bool any_quads = std::any_of(bounds.begin(), bounds.end(), [](const auto* bound) { return bound->has_quads(); });
+  for (const PhaseBound* bound : bounds) {
+    if (bound->has_quads() || !any_quads) longest = std::max(longest, bound->cycles());
+  }
   const auto cycles = static_cast<Cycle>(longest);
   result.cycles = cycles;
   result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);

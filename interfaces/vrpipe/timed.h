@@ -112,6 +112,8 @@ class Flow {
   unsigned cycles(unsigned parts) const { return static_cast<unsigned>(per_cycle_.quotient_up(parts)); }
   /// The cycle in which the next part goes.
   Cycle next() const { return cycle_ + (used_ == per_cycle_.value() ? 1 : 0); }
+  /// Parts that have gone in a cycle, which is `next()` or later.
+  std::uint64_t taken_of(Cycle cycle) const { return cycle == cycle_ ? used_ : 0; }
 
  private:
   Divisor per_cycle_;

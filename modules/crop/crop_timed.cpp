@@ -121,12 +121,18 @@ class TimedCrop : public TimedUnit {
     look_ups_.hold(looked_up.last);
     if (moved_ > 0) moves_.push({looked_up.last, moved_});
 
-    if (!cost_.forwards) there = wait_for_hazard(warp.tile, warp.position[from], there);
     there = std::max(there, out_.last());
+    const Cycle hazard = cost_.forwards ? 0 : hazard_until(warp.tile, warp.position[from]);
     // Moving a sector takes time from blending, from when it moves.
-    for (; !moves_.empty() && moves_.front().at <= std::max(there, blending_.next()); moves_.pop()) {
+    for (; !moves_.empty() && moves_.front().at <= std::max({there, hazard, blending_.next()}); moves_.pop()) {
       blending_.take(moves_.front().at, moves_.front().sectors * cost_.blend_rate.items);
       did(CropWork::sectors, moves_.front().sectors, moves_.front().at);
+    }
+    there = std::max(there, blending_.next());
+    if (hazard > there) {
+      const std::uint64_t wasted = (hazard - there) * CropWork::parts_of_a_cycle(cost_) - blending_.taken_of(there);
+      did(CropWork::forwarding, wasted, there, hazard);
+      there = hazard;
     }
     const Span blended = blending_.take(there, quads * price_);
     charge(UnitState::starved, looked_up.first + 1);
@@ -210,14 +216,6 @@ class TimedCrop : public TimedUnit {
       if (blend.tile == tile && blend.position == position) until = blend.at + cost_.latency_cycles;
     }
     return until;
-  }
-
-  /// When a quad can be blended that is there from a cycle on.
-  Cycle wait_for_hazard(TileId tile, std::uint8_t position, Cycle there) {
-    const Cycle until = hazard_until(tile, position);
-    const Cycle begin = std::max(there, blending_.next());
-    if (until > begin) did(CropWork::forwarding, (until - begin) * CropWork::parts_of_a_cycle(cost_), begin, until);
-    return std::max(there, until);
   }
 
   struct Move {
