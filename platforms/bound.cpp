@@ -155,15 +155,16 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
     return parts;
   };
   const auto count = [](std::uint64_t items) { return static_cast<double>(items); };
-  if (slot == "draw") return priced(DrawWork::kinds(), {spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_, true)});
+  if (slot == "draw")
+    return priced(DrawWork::kinds(), {spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_, true)});
   if (slot == "vpo") return priced(VpoWork::kinds(vpo_), {count(done.triangles)});
   if (slot == "tgc") return priced(TgcWork::kinds(tgc_), {count(done.bin_entries), count(done.setups)});
   if (slot == "raster") {
     const double setups = spaced(done.setups, raster_.setup_interval_cycles, true) / raster_.setup_interval_cycles;
     const double pairs =
         spaced(done.tile_pairs, raster_.screen_tile_interval_cycles, true) / raster_.screen_tile_interval_cycles;
-    return priced(RasterWork::kinds(raster_), {setups, count(done.coarse_tiles), count(done.fine_tiles), pairs,
-                                               count(done.quads_rasterized)});
+    return priced(RasterWork::kinds(raster_),
+                  {setups, count(done.coarse_tiles), count(done.fine_tiles), pairs, count(done.quads_rasterized)});
   }
   if (slot == "tc") return priced(TcWork::kinds(tc_), {count(done.quads_rasterized), count(done.bin_beats)});
   if (slot == "prop") {

@@ -13,6 +13,7 @@
 #include <vrpipe/checked_behaviours.h>
 #include <vrpipe/error.h>
 #include <vrpipe/platforms/gpu.h>
+#include <vrpipe/platforms/validated_range.h>
 
 namespace vrpipe {
 
@@ -285,7 +286,8 @@ void report_bound(const Configuration& configuration, const FunctionalGpu& gpu, 
   const std::vector<const PhaseBound*> bounds = gpu.bounds();
   double longest = 0;
   // A GPC without quads does not keep the draw up, unless there is none at all.
-  const bool any_quads = std::any_of(bounds.begin(), bounds.end(), [](const auto* bound) { return bound->has_quads(); });
+  const bool any_quads =
+      std::any_of(bounds.begin(), bounds.end(), [](const auto* bound) { return bound->has_quads(); });
   for (const PhaseBound* bound : bounds) {
     if (bound->has_quads() || !any_quads) longest = std::max(longest, bound->cycles());
   }
@@ -371,6 +373,9 @@ RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<floa
     result.implementations.emplace_back(slot, configuration.implementation(slot).name);
   }
   result.parameters = configuration.parameters();
+  if (request.fidelity == Fidelity::lt || request.fidelity == Fidelity::at) {
+    result.outside_validated_range = outside_validated_range(result.parameters);
+  }
   if (request.fidelity == Fidelity::functional || request.fidelity == Fidelity::bound) {
     run_functional(configuration, progress, result);
   } else {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <utility>
 
+#include <vrpipe/platforms/stress.h>
 #include <vrpipe/workloads/exact_image.h>
 #include <vrpipe/workloads/scene.h>
 
@@ -19,6 +20,8 @@ namespace {
 
 /// A quick look takes the middle of the image, of which both sides are smaller by this.
 constexpr std::uint32_t quick_divisor = 3;
+// Of the part of the image that the stress configurations draw, pixels.
+constexpr std::uint32_t stress_side = 96;
 // Of pictures on the page, at most.
 constexpr std::uint32_t picture_width = 280;
 constexpr std::uint32_t reference_width = 560;
@@ -54,6 +57,7 @@ struct Workload {
   OpenedScene scene;
   PreprocessOptions options;
   std::shared_ptr<const Draw> draw;
+  std::shared_ptr<const Draw> stress_draw;  ///< the middle of it
 
   std::shared_ptr<const Draw> draw_with(const PreprocessOptions& wanted) const {
     const bool same = wanted.sh_degree == options.sh_degree && wanted.depth_key_bits == options.depth_key_bits;
@@ -86,6 +90,15 @@ Workload load(const AccuracyJob& job, AccuracyResult& result) {
   result.width = loaded.draw.width;
   result.height = loaded.draw.height;
   workload.draw = std::make_shared<const Draw>(std::move(loaded.draw));
+  workload.stress_draw = workload.draw;
+  if (!workload.scene.draw_list) {
+    Camera& camera = workload.scene.viewpoint.camera;
+    const Camera whole = camera;
+    camera.width = std::min(camera.width, stress_side);
+    camera.height = std::min(camera.height, stress_side);
+    workload.stress_draw = std::make_shared<const Draw>(preprocess_scene(workload.scene, workload.options).draw);
+    camera = whole;
+  }
   return workload;
 }
 
@@ -207,6 +220,39 @@ void climb_fidelities(const AccuracyJob& job, const Workload& workload, const st
   }
 }
 
+/// The first variant and the last on every stress configuration, in the middle of the image.
+void climb_stress(const AccuracyJob& job, const Workload& workload, AccuracyResult& result, ProgressLine& progress) {
+  std::vector<RunRequest> variants{job.simulation.requests.front()};
+  if (job.simulation.requests.size() > 1) variants.push_back(job.simulation.requests.back());
+  const std::vector<Fidelity> rungs{Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle};
+  std::vector<Task> tasks;
+  for (const StressConfiguration& configuration : stress_configurations()) {
+    if (job.quick && !configuration.quick) continue;
+    for (RunRequest request : variants) {
+      request.platform = &configuration.platform;
+      request.settings.insert(request.settings.end(), configuration.settings.begin(), configuration.settings.end());
+      result.stress.push_back({configuration.name, request.variant.name, 0, {}});
+      for (const Fidelity fidelity : rungs) {
+        request.fidelity = fidelity;
+        tasks.push_back({configuration.name + " " + vrpipe::name_of(fidelity), request,
+                         [&workload] { return workload.stress_draw; }});
+      }
+    }
+  }
+  std::vector<double> cycles(tasks.size());
+  const unsigned processes = std::min(job.simulation.processes, static_cast<unsigned>(tasks.size()));
+  run_tasks(tasks, false, processes, {"stress ", 0, 0, 0}, progress,
+            [&](std::size_t index, Simulated&& simulated) { cycles[index] = cycles_of(simulated.result).value_or(0); });
+  for (std::size_t i = 0; i < result.stress.size(); ++i) {
+    const double* const of_row = &cycles[i * rungs.size()];
+    const double exact = of_row[rungs.size() - 1];
+    result.stress[i].cycles = static_cast<std::uint64_t>(exact);
+    for (std::size_t rung = 0; rung + 1 < rungs.size(); ++rung) {
+      result.stress[i].error_percent.emplace_back(rungs[rung], percent_above(of_row[rung], exact));
+    }
+  }
+}
+
 /// All knobs' values, and the settings of the runs that they need; the default is the first run.
 std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_draw_list, AccuracyResult& result) {
   std::vector<PrecisionSettings> settings{{result.base, job.simulation.scene.preprocess}};
@@ -297,6 +343,7 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   const std::size_t climbs = job.repeat * rungs.size();
   const Stopwatch ladders;
   climb_fidelities(job, workload, rungs, {"fidelity ", 0, values.size(), 0}, result, progress);
+  climb_stress(job, workload, result, progress);
   climb_precisions(job, workload, values, reference, {"precision ", climbs, 0, ladders.seconds()}, result, progress);
   if (!workload.scene.draw_list) {
     for (PrecisionRun& run : result.runs) {

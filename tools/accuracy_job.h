@@ -63,6 +63,14 @@ struct PrecisionRow {
   std::size_t run;  ///< 0 is the default
 };
 
+/// A stress configuration: cycles at the most exact fidelity, and the errors of the others in the order of `fidelities()`.
+struct StressRow {
+  std::string configuration;
+  std::string variant;
+  std::uint64_t cycles = 0;
+  std::vector<std::pair<Fidelity, double>> error_percent;
+};
+
 struct AccuracyResult {
   Provenance provenance;
   SceneSummary scene;
@@ -78,6 +86,7 @@ struct AccuracyResult {
   std::vector<PrecisionRun> runs;           ///< the default first
   std::vector<PrecisionRow> precision;      ///< by knob
   std::vector<std::string> knobs_left_out;  ///< those that mean nothing for a draw list
+  std::vector<StressRow> stress;            ///< by configuration, then by variant
   Picture reference;                        ///< the exact image, for the page
   double reference_seconds = 0;             ///< to render it
   double seconds = 0;                       ///< wall time of everything

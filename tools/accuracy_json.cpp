@@ -65,6 +65,13 @@ Json precision_json(const PrecisionRow& row, const PrecisionRun& run) {
 Json accuracy_json(const AccuracyResult& result) {
   Json fidelity = Json::array();
   for (const FidelityRung& rung : result.fidelity) fidelity.push_back(fidelity_json(rung));
+  Json stress = Json::array();
+  for (const StressRow& row : result.stress) {
+    stress.push_back({{"configuration", row.configuration}, {"variant", row.variant}, {"cycles", row.cycles}});
+    for (const auto& [rung, error] : row.error_percent) {
+      stress.back()[std::string(vrpipe::name_of(rung)) + "_error_percent"] = error;
+    }
+  }
   Json precision = Json::array();
   for (const PrecisionRow& row : result.precision) precision.push_back(precision_json(row, result.runs[row.run]));
   Json json = head_json("vrpipe.accuracy/1", result.provenance, result.processes);
@@ -86,6 +93,7 @@ Json accuracy_json(const AccuracyResult& result) {
                  {"cycles_percent", 100 * precision_tolerance.cost_share},
                  {"psnr_db", precision_tolerance.error}}},
                {"fidelity", std::move(fidelity)},
+               {"stress", std::move(stress)},
                {"precision", std::move(precision)}});
   return json;
 }

@@ -195,6 +195,17 @@ AccuracyTable fidelity_table(const AccuracyResult& result) {
   return table;
 }
 
+AccuracyTable stress_table(const AccuracyResult& result) {
+  AccuracyTable table;
+  table.group_heading = "configuration";
+  table.heading = {"variant", "cycles", "bound %", "lt %", "at %"};
+  for (const StressRow& row : result.stress) {
+    table.rows.push_back({row.configuration, {row.variant, grouped(row.cycles)}, false});
+    for (const auto& [fidelity, error] : row.error_percent) table.rows.back().cells.push_back(signed_percent(error));
+  }
+  return table;
+}
+
 AccuracyTable precision_table(const AccuracyResult& result) {
   AccuracyTable table;
   table.group_heading = "knob";
@@ -347,6 +358,8 @@ std::string fidelity_title(const AccuracyResult& result) {
                      result.repeat > 1 ? fmt::format(", CPU seconds the median of {}", result.repeat) : "");
 }
 
+constexpr const char* stress_title = "Away from the default: errors of the cycles, in the middle of the image";
+
 std::string precision_title(const AccuracyResult& result) {
   return fmt::format("Precision of {} at {}, against exact arithmetic: {} simulation{} at a time",
                      result.base.variant.name, vrpipe::name_of(result.base.fidelity), result.processes,
@@ -364,6 +377,7 @@ std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) 
       text_of(fidelity, {0, 1, 2, 3, 4, 5, 6}, style) + "\n" + text_of(fidelity, {0, 7, 8, 9, 10, 11}, style) + "\n";
   for (const std::string& line : fidelity_summary(result)) text += line + "\n";
   text += fidelity_definition() + "\n";
+  text += "\n" + style.bold(stress_title) + "\n\n" + text_of(stress_table(result), {0, 1, 2, 3, 4}, style);
   text += "\n" + style.bold(precision_title(result)) + "\n\n";
   text += text_of(precision_table(result), {0, 1, 3, 5, 6, 7, 9}, style) + "\n";
   if (const std::string verdict = precision_verdict(result); !verdict.empty()) text += verdict + "\n";
@@ -378,6 +392,7 @@ std::string accuracy_markdown(const AccuracyResult& result) {
   for (const std::string& line : accuracy_heading(result)) text += line + ".\n";
   text += "\n" + markdown(fidelity_table(result)) + "\n";
   for (const std::string& line : fidelity_summary(result)) text += "* " + line + "\n";
+  text += "\n" + markdown(stress_table(result));
   text += "\n" + markdown(precision_table(result)) + "\n";
   for (const std::string& line : precision_summary(result)) text += "* " + line + "\n";
   return text;

@@ -20,6 +20,8 @@ struct AccuracyTable {
   std::vector<Row> rows;
 };
 AccuracyTable fidelity_table(const AccuracyResult& result);
+/// Errors of the fidelities away from the default configuration.
+AccuracyTable stress_table(const AccuracyResult& result);
 /// The default once, and below it every other value.
 AccuracyTable precision_table(const AccuracyResult& result);
 

@@ -137,6 +137,8 @@ void exchange(Archive& archive, Result& result) {
   for (auto& [slot, name] : result.implementations) archive(slot), archive(name);
   archive.size_of(result.parameters);
   for (auto& [name, value] : result.parameters) archive(name), archive(value);
+  archive.size_of(result.outside_validated_range);
+  for (std::string& reason : result.outside_validated_range) archive(reason);
   archive(result.result_hash);
   archive(result.kernel_events);
 }

@@ -229,6 +229,16 @@ std::string trouble_text(const std::vector<RunResult>& runs) {
   return text + "\n";
 }
 
+/// Where cycles may be farther off than the documentation says; the runs' parameters are the same.
+std::string validated_text(const std::vector<RunResult>& runs) {
+  std::string text;
+  for (const std::string& reason : runs.front().outside_validated_range) {
+    text +=
+        fmt::format("{} may be off: {}; confirm at cycle\n", vrpipe::name_of(runs.front().request.fidelity), reason);
+  }
+  return text;
+}
+
 std::string remarks(const JobResult& result) {
   const std::vector<RunResult>& runs = result.runs;
   std::string text;
@@ -236,6 +246,7 @@ std::string remarks(const JobResult& result) {
     text += nothing_visible(result.scene, result.viewpoint.has_value()) + "\n";
   }
   for (const RunResult& run : runs) text += bound_text(run);
+  text += validated_text(runs);
   if (const auto early = early_termination_ratio(runs)) {
     text += fmt::format("early-termination ratio {:.2f} (fragments blended without over with termination)\n", *early);
   }

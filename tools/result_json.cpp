@@ -137,7 +137,8 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
           {"images", {{"png", images ? Json(images->png) : Json()}, {"exr", images ? Json(images->exr) : Json()}}},
           {"units", units_json(run)},
           {"statistics", statistics_json(run)},
-          {"kernel_events", run.kernel_events}};
+          {"kernel_events", run.kernel_events},
+          {"outside_validated_range", run.outside_validated_range}};
 }
 
 }  // namespace

@@ -336,7 +336,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
   bool unlimited_ = false;
   bool prompt_ = false;
   bool room_wanted_ = false;
-  unsigned owed_ = 0;    ///< places that sent items take and the queue has not had yet
+  unsigned owed_ = 0;  ///< places that sent items take and the queue has not had yet
   Cycle last_ = 0;
   Ring<Cycle> credits_;  ///< the cycle from which each can be used
   Ring<Waiting> waiting_;
@@ -484,8 +484,7 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     entry.item = item;
     if (front_ == never) front_ = seen.first;
     const Cycle now = clock_.domain->now();
-    clock_.domain->wake(clock_.unit,
-                        prompt_ ? std::max(seen.first, now + 1) : activation_for(seen.first, now));
+    clock_.domain->wake(clock_.unit, prompt_ ? std::max(seen.first, now + 1) : activation_for(seen.first, now));
   }
 
   const bool blocking_;

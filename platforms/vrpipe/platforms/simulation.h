@@ -144,6 +144,8 @@ struct RunResult {
   std::vector<std::pair<std::string, std::string>> implementations;
   /// UNIT.PARAMETER and value of everything that could be set, pass-through units left out.
   std::vector<std::pair<std::string, std::string>> parameters;
+  /// Reasons why cycles of lt or at may be farther off than documented; empty at the other fidelities.
+  std::vector<std::string> outside_validated_range;
   std::string result_hash;          ///< of counts, cycles and the stored bits of the image, 16 hex digits
   std::uint64_t kernel_events = 0;  ///< activations of the SystemC kernel's processes
   ColorSurface surface{1, 1, ColorFormat::rgba16f};

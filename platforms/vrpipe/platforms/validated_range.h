@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace vrpipe {
+
+/// How far from the defaults lt and at were tried on the stress configurations (stress.h): where final parameters
+/// (UNIT.PARAMETER and value) lie outside, a reason each, e.g. "sm.cores=1 is below 4, the least that was validated".
+std::vector<std::string> outside_validated_range(const std::vector<std::pair<std::string, std::string>>& parameters);
+
+}  // namespace vrpipe

@@ -1,0 +1,95 @@
+// How far lt and at may be off away from the defaults.
+#include <cmath>
+
+#include <vrpipe/platforms/stress.h>
+#include <vrpipe/platforms/validated_range.h>
+
+#include "support/simulate.h"
+
+namespace vrpipe {
+namespace {
+
+using namespace testing;
+
+class Stress : public ::testing::TestWithParam<std::size_t> {};
+
+TEST_P(Stress, BoundIsBelowLtWithinTenPercentAndAtWithinFive) {
+  const StressConfiguration& configuration = stress_configurations()[GetParam()];
+  const Draw draw = random_draw(160, 120, 2000, 6);
+  for (const Variant& variant : variants()) {
+    const auto result_at = [&](Fidelity fidelity) {
+      return run(request_of(variant.name, fidelity,
+                            [&](RunRequest& request) {
+                              request.platform = &configuration.platform;
+                              request.settings = configuration.settings;
+                            }),
+                 draw);
+    };
+    const auto cycles = static_cast<double>(*result_at(Fidelity::cycle).cycles);
+    EXPECT_LE(static_cast<double>(*result_at(Fidelity::bound).cycles), cycles) << variant.name;
+    for (const auto& [fidelity, percent] : {std::pair{Fidelity::lt, 10.0}, std::pair{Fidelity::at, 5.0}}) {
+      const RunResult result = result_at(fidelity);
+      if (!result.outside_validated_range.empty()) continue;
+      const double error = 100 * (static_cast<double>(*result.cycles) / cycles - 1);
+      EXPECT_LT(std::fabs(error), percent) << variant.name << " " << name_of(fidelity);
+    }
+  }
+}
+
+std::string name_of_case(const ::testing::TestParamInfo<std::size_t>& info) {
+  std::string name;
+  for (const char c : stress_configurations()[info.param].name) name += std::isalnum(c) != 0 ? c : '_';
+  return name;
+}
+INSTANTIATE_TEST_SUITE_P(Configurations, Stress, ::testing::Range(std::size_t{0}, stress_configurations().size()),
+                         name_of_case);
+
+TEST(ValidatedRange, NamesTheParameterThatLiesOutside) {
+  EXPECT_EQ(outside_validated_range({{"sm.cores", "4"}, {"l2.latency_cycles", "1000"}}), std::vector<std::string>{});
+  EXPECT_EQ(outside_validated_range({{"sm.cores", "1"}, {"l2.latency_cycles", "1001"}}),
+            (std::vector<std::string>{"sm.cores=1 is below 4, the least that was validated",
+                                      "l2.latency_cycles=1001 is above 1000, the most that was validated"}));
+}
+
+TEST(ValidatedRange, IsAskedWhereTimeIsApproximate) {
+  const Draw draw = random_draw(32, 32, 20, 1);
+  for (const Fidelity fidelity : fidelities()) {
+    RunRequest request = request_of("het+qm", fidelity);
+    EXPECT_TRUE(run(request, draw).outside_validated_range.empty()) << name_of(fidelity);
+    request.settings = {{"sm", "cores", "1"}};
+    const bool approximate = fidelity == Fidelity::lt || fidelity == Fidelity::at;
+    EXPECT_EQ(run(request, draw).outside_validated_range.empty(), !approximate) << name_of(fidelity);
+  }
+}
+
+/// A unit's slots are full, and the next core has none either (review F12): all warps of a tile to one core.
+TEST(Stress, FewTilesOnOneCoreWaitForTheSlotsOfThatCore) {
+  const Draw draw = random_draw(17, 33, 200, 3);
+  for (const char* variant : {"baseline", "qm"}) {
+    RunRequest request = request_of(variant, Fidelity::cycle, [](RunRequest& r) {
+      r.platform = &platform_named("desktop");
+      r.settings = {{"sm", "warps_to_one_core", "256"}};
+    });
+    const auto cycles = static_cast<double>(*run(request, draw).cycles);
+    for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at}) {
+      request.fidelity = fidelity;
+      EXPECT_NEAR(static_cast<double>(*run(request, draw).cycles) / cycles, 1, 0.05) << variant << name_of(fidelity);
+    }
+  }
+}
+
+/// Few places under way and a long way to memory: `at` asked for fills late by as much as the clock was ahead.
+TEST(Stress, AShortTerminationQueueAndAFarMemoryDoNotDelayFills) {
+  const Draw draw = random_draw(48, 32, 300, 4);
+  RunRequest request = request_of("het+qm", Fidelity::cycle, [](RunRequest& r) {
+    r.settings = {{"l2", "latency_cycles", "20000"},
+                  {"tc", "bin_quads", "1"},
+                  {"state", "termination_threshold", "1e-9"}};
+  });
+  const auto cycles = static_cast<double>(*run(request, draw).cycles);
+  request.fidelity = Fidelity::at;
+  EXPECT_NEAR(static_cast<double>(*run(request, draw).cycles) / cycles, 1, 0.05);
+}
+
+}  // namespace
+}  // namespace vrpipe
