@@ -163,6 +163,8 @@ class TimedOutput {
   virtual ~TimedOutput() = default;
   /// Whether as much that was sent waits for room as may.
   bool blocked() const { return waiting_items_ > may_wait_; }
+  /// Whether one more would be too many: then what was sent before all that waits has gone by `last()`.
+  bool full() const { return waiting_items_ == may_wait_; }
   /// Whether nothing waits.
   bool clear() const { return waiting_items_ == 0; }
   /// The unit may send so many more items while one waits: a buffer of its own in front of the port.
@@ -264,7 +266,8 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
       // What the queue has no place for yet follows when it has: nobody knows when, but the next item waits for it.
       for (unsigned beat = 0; beat < beats; ++beat) {
         if (credits_.empty()) {
-          owed_ += beats - beat;
+          owed_ = beats - beat;
+          ++waiting_items_;
           break;
         }
         at.last = std::max(at.last, credits_.front());
@@ -302,18 +305,18 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     return tlm::TLM_ACCEPTED;
   }
   void give(unsigned credits, Span at) {
+    const bool was_waiting = waiting_items_ > 0 || room_wanted_;
     for (unsigned credit = 0; credit < credits; ++credit) {
       const Cycle cycle = at.of_part(credit, credits);
       if (owed_ > 0) {
-        --owed_;
+        if (--owed_ == 0) --waiting_items_;
         last_ = std::max(last_, cycle);
       } else {
         credits_.push(cycle);
       }
     }
-    const bool was_waiting = waiting_items_ > 0 || room_wanted_;
     room_wanted_ = false;
-    while (waiting_items_ > 0 && !credits_.empty()) {
+    while (!waiting_.empty() && owed_ == 0 && !credits_.empty()) {
       const Waiting& next = waiting_.front();
       transfer(next.item, next.at, next.beats);
       waiting_.pop();

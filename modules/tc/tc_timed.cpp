@@ -38,7 +38,7 @@ class TimedTc : public TimedUnit {
     for (unsigned from = 0; from < beat.count;) {
       bool flushed = false;
       const unsigned taken = behaviour_->insert(beat, from, next_storage().flush, flushed);
-      at = entries_.take(std::max(visible, sent_at_[place_]), taken).last;
+      at = entries_.take(std::max(visible, place_free_at()), taken).last;
       from += taken;
       if (flushed) send(at);
     }
@@ -81,9 +81,12 @@ class TimedTc : public TimedUnit {
     place_ = place_ + 1 == sent_at_.size() ? 0 : place_ + 1;
   }
 
+  /// When the bin has gone whose place the next takes. At `at` its cycle is known once no more bins wait than may.
+  Cycle place_free_at() const { return out_.full() ? std::max(sent_at_[place_], out_.last()) : sent_at_[place_]; }
+
   Cycle timeout_due() const {
     if (idle_timeout_cycles_ == 0 || !holds_quads_) return never;
-    return std::max({last_arrival_ + idle_timeout_cycles_, timed_out_ + 1, sent_at_[place_]});
+    return std::max({last_arrival_ + idle_timeout_cycles_, timed_out_ + 1, place_free_at()});
   }
 
   /// Flushes the bins whose time is out before a quad comes.
@@ -103,7 +106,7 @@ class TimedTc : public TimedUnit {
   Cycle drain(Cycle visible) {
     Cycle at = visible + 1;
     while (behaviour_->flush_oldest(Reason::end_of_draw, next_storage().flush)) {
-      at = std::max(at, sent_at_[place_]);
+      at = std::max(at, place_free_at());
       send(at++);
     }
     holds_quads_ = false;
