@@ -163,7 +163,7 @@ class TimedOutput {
   virtual ~TimedOutput() = default;
   /// Whether as much that was sent waits for room as may.
   bool blocked() const { return waiting_items_ > may_wait_; }
-  /// Whether one more would be too many: then what was sent before all that waits has gone by `last()`.
+  /// Whether one more would be too many: then what was sent before all that waits has gone.
   bool full() const { return waiting_items_ == may_wait_; }
   /// Whether nothing waits.
   bool clear() const { return waiting_items_ == 0; }
@@ -236,6 +236,8 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     }
     return transfer(item, at, beats);
   }
+  /// At `at`: the cycle in which the last item of which nothing waits was taken.
+  Cycle gone() const { return gone_; }
   /// The cycle in which the last part of the last item was taken.
   Cycle last() const { return last_; }
   /// From when on there is room for another item; `never`, if nobody knows yet: then the unit is activated once it is
@@ -275,6 +277,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
       }
     }
     last_ = at.last;
+    if (owed_ == 0) gone_ = last_;
     if (direct_ != nullptr) {
       direct_->accept(item, at, beats, this->pipeline_);
     } else {
@@ -309,8 +312,11 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     for (unsigned credit = 0; credit < credits; ++credit) {
       const Cycle cycle = at.of_part(credit, credits);
       if (owed_ > 0) {
-        if (--owed_ == 0) --waiting_items_;
         last_ = std::max(last_, cycle);
+        if (--owed_ == 0) {
+          --waiting_items_;
+          gone_ = last_;
+        }
       } else {
         credits_.push(cycle);
       }
@@ -341,6 +347,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
   bool room_wanted_ = false;
   unsigned owed_ = 0;  ///< places that sent items take and the queue has not had yet
   Cycle last_ = 0;
+  Cycle gone_ = 0;
   Ring<Cycle> credits_;  ///< the cycle from which each can be used
   Ring<Waiting> waiting_;
 };

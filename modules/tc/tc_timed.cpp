@@ -82,7 +82,7 @@ class TimedTc : public TimedUnit {
   }
 
   /// When the bin has gone whose place the next takes. At `at` its cycle is known once no more bins wait than may.
-  Cycle place_free_at() const { return out_.full() ? std::max(sent_at_[place_], out_.last()) : sent_at_[place_]; }
+  Cycle place_free_at() const { return out_.full() ? std::max(sent_at_[place_], out_.gone()) : sent_at_[place_]; }
 
   Cycle timeout_due() const {
     if (idle_timeout_cycles_ == 0 || !holds_quads_) return never;
