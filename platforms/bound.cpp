@@ -64,7 +64,7 @@ PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc)
       l2_latency_cycles_(configuration.l2().latency_cycles),
       // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
       warps_in_phase_(2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads)),
-      times_out_(tc_.idle_timeout_cycles > 0) {}
+      times_out_(tc_.timeout_in(configuration.request().termination) > 0) {}
 
 double PhaseBound::instructions(const Work& done) const {
   return static_cast<double>(done.vertex_warps * instructions_of(sm_.vertex) +

@@ -30,7 +30,8 @@ struct FunctionalGpu::Gpc {
         back_end(configuration, gpc, surface),
         bound(configuration, gpc) {
     // A time-out flushes bins when this run does not, and quads of theirs may terminate those that are with them here.
-    if (with_bounds) back_end.count_into(bound.work, tests && tc->cost().idle_timeout_cycles > 0);
+    const bool times_out = tc->cost().timeout_in(configuration.request().termination) > 0;
+    if (with_bounds) back_end.count_into(bound.work, tests && times_out);
   }
 
   unsigned index;
