@@ -38,10 +38,12 @@ class BackEnd {
   }
 
   /// Counts the work from now on, and what the colour cache moves. With `only_needed` that of quads alone whose pixels
-  /// are not all terminated by what was blended before: no run is spared these, however early it flushes its bins.
-  void count_into(Work& work, bool only_needed) {
+  /// are not all terminated by what was blended before: no run is spared these, however early it flushes its bins. With
+  /// `any_order` each sector is filled once: in another order of screen tiles the cache may miss it no more often.
+  void count_into(Work& work, bool only_needed, bool any_order) {
     work_ = &work;
     if (only_needed) terminated_.resize(surface_.grid().quads());
+    if (any_order) filled_.resize(surface_.size_bytes() / crop->cost().line_bytes + 1);
     writes_unchanged_ = crop->cost().writes_unchanged;
     looked_up_at_once_ = quads_looked_up_at_once(crop->cost());
   }
@@ -77,10 +79,7 @@ class BackEnd {
       crop->look_up(shaded_, from, to, cache_);
       for (unsigned line = 0; line < cache_.count; ++line) {
         const CropBehaviour::LineAccess& access = cache_.lines[line];
-        const unsigned filled = popcount_of(access.filled);
-        work_->sectors += filled + popcount_of(access.written_back);
-        work_->sectors_filled += filled;
-        work_->lines_filled += access.replaced && filled > 0 ? 1U : 0U;
+        count_moves(access);
       }
       blend(from, to, signal);
     }
@@ -136,6 +135,22 @@ class BackEnd {
     before = static_cast<LaneMask>(before | terminated);
   }
 
+  void count_moves(const CropBehaviour::LineAccess& access) {
+    std::uint32_t fills = access.filled;
+    std::uint32_t written_back = access.written_back;
+    bool fills_line = access.replaced && fills != 0;
+    if (!filled_.empty()) {
+      std::uint32_t& before = filled_[access.address / crop->cost().line_bytes];
+      fills_line = before == 0 && fills != 0;
+      fills &= ~before;
+      before |= fills;
+      written_back = 0;
+    }
+    work_->sectors += popcount_of(fills) + popcount_of(written_back);
+    work_->sectors_filled += popcount_of(fills);
+    work_->lines_filled += fills_line ? 1U : 0U;
+  }
+
   static unsigned popcount_of(std::uint32_t mask) {
     unsigned count = 0;
     for (; mask != 0; mask &= mask - 1) ++count;
@@ -149,8 +164,9 @@ class BackEnd {
   bool writes_unchanged_ = false;
   unsigned looked_up_at_once_ = quads_per_warp;
   CropBehaviour::CacheLookUp cache_;
-  std::vector<LaneMask> terminated_;  ///< by quad of the surface; empty if all work counts
-  unsigned needed_quads_ = 0;         ///< less than a warp
+  std::vector<LaneMask> terminated_;   ///< by quad of the surface; empty if all work counts
+  std::vector<std::uint32_t> filled_;  ///< sectors so far, by line of the surface; empty if all moves count
+  unsigned needed_quads_ = 0;          ///< less than a warp
   unsigned needed_pairs_ = 0;
 };
 

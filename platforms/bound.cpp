@@ -123,7 +123,9 @@ void PhaseBound::end_phase() {
     ended_ = total_;
     ended_.add(up_to_quads_);
   } else if (!has_quads()) {
-    const std::array<double, stages> end = end_of(work, true);
+    Work passed = work;
+    passed.tile_pairs = 0;  // for a pair without quads nobody waits
+    const std::array<double, stages> end = end_of(passed, true);
     last_quad_ = *std::max_element(end.begin(), end.end());
   }
   const std::array<double, stages> end = end_of(work, false);

@@ -59,6 +59,7 @@ class PhaseBound {
   void quads_ended() {
     up_to_quads_ = work;
     if (times_out_) static_cast<FrontEndWork&>(up_to_quads_) = up_to_quad_;
+    up_to_quads_.tile_pairs = up_to_quad_.tile_pairs;  // for a pair without quads nobody waits
   }
   void end_phase();
   /// Up to the last quad; without quads, of what the front end does all the same.

@@ -31,7 +31,8 @@ struct FunctionalGpu::Gpc {
         bound(configuration, gpc) {
     // A time-out flushes bins when this run does not, and quads of theirs may terminate those that are with them here.
     const bool times_out = tc->cost().timeout_in(configuration.request().termination) > 0;
-    if (with_bounds) back_end.count_into(bound.work, tests && times_out);
+    const bool any_order = times_out || prop->cost().order == PropBehaviour::Order::tile;
+    if (with_bounds) back_end.count_into(bound.work, tests && times_out, any_order);
   }
 
   unsigned index;

@@ -62,7 +62,7 @@ TEST(ValidatedRange, IsAskedWhereTimeIsApproximate) {
   }
 }
 
-/// A unit's slots are full, and the next core has none either (review F12): all warps of a tile to one core.
+/// A unit's slots are full, and the next core has none either: all warps of a tile to one core.
 TEST(Stress, FewTilesOnOneCoreWaitForTheSlotsOfThatCore) {
   const Draw draw = random_draw(17, 33, 200, 3);
   for (const char* variant : {"baseline", "qm"}) {
@@ -79,7 +79,7 @@ TEST(Stress, FewTilesOnOneCoreWaitForTheSlotsOfThatCore) {
 }
 
 /// Few places under way and a long way to memory: `at` asked for fills late by as much as the clock was ahead.
-TEST(Stress, AShortTerminationQueueAndAFarMemoryDoNotDelayFills) {
+TEST(Stress, AFarMemoryAndBinsOfOneQuadDoNotDelayFills) {
   const Draw draw = random_draw(48, 32, 300, 4);
   RunRequest request = request_of("het+qm", Fidelity::cycle, [](RunRequest& r) {
     r.settings = {{"l2", "latency_cycles", "20000"},
