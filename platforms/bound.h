@@ -53,7 +53,7 @@ class PhaseBound {
   Work work;  ///< of the phase
   bool phase_is_full() const { return work.warps >= warps_in_phase_; }
   /// The work so far includes a quad that was rasterised.
-  void quad_rasterized() { up_to_quad_ = work; }
+  void quad_rasterized() { up_to_quad_ = static_cast<const FrontEndWork&>(work); }
   /// All quads so far have been blended or dropped. Where a time-out flushes the last bins, what made no quad any more
   /// does not come before.
   void quads_ended() {
