@@ -1,6 +1,7 @@
 #include "accuracy_job.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -220,11 +221,12 @@ void climb_fidelities(const AccuracyJob& job, const Workload& workload, const st
   }
 }
 
-/// The first variant and the last on every stress configuration, in the middle of the image.
-void climb_stress(const AccuracyJob& job, const Workload& workload, AccuracyResult& result, ProgressLine& progress) {
+constexpr std::array stress_rungs{Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle};
+
+/// The first variant and the last on every stress configuration, at each of `stress_rungs`, in the middle of the image.
+std::vector<Task> stress_tasks(const AccuracyJob& job, const Workload& workload, AccuracyResult& result) {
   std::vector<RunRequest> variants{job.simulation.requests.front()};
   if (job.simulation.requests.size() > 1) variants.push_back(job.simulation.requests.back());
-  const std::vector<Fidelity> rungs{Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle};
   std::vector<Task> tasks;
   for (const StressConfiguration& configuration : stress_configurations()) {
     if (job.quick && !configuration.quick) continue;
@@ -232,23 +234,28 @@ void climb_stress(const AccuracyJob& job, const Workload& workload, AccuracyResu
       request.platform = &configuration.platform;
       request.settings.insert(request.settings.end(), configuration.settings.begin(), configuration.settings.end());
       result.stress.push_back({configuration.name, request.variant.name, 0, {}});
-      for (const Fidelity fidelity : rungs) {
+      for (const Fidelity fidelity : stress_rungs) {
         request.fidelity = fidelity;
         tasks.push_back({configuration.name + " " + vrpipe::name_of(fidelity), request,
                          [&workload] { return workload.stress_draw; }});
       }
     }
   }
+  return tasks;
+}
+
+void climb_stress(const AccuracyJob& job, const std::vector<Task>& tasks, const BatchPlace& place,
+                  AccuracyResult& result, ProgressLine& progress) {
   std::vector<double> cycles(tasks.size());
   const unsigned processes = std::min(job.simulation.processes, static_cast<unsigned>(tasks.size()));
-  run_tasks(tasks, false, processes, {"stress ", 0, 0, 0}, progress,
+  run_tasks(tasks, false, processes, place, progress,
             [&](std::size_t index, Simulated&& simulated) { cycles[index] = cycles_of(simulated.result).value_or(0); });
   for (std::size_t i = 0; i < result.stress.size(); ++i) {
-    const double* const of_row = &cycles[i * rungs.size()];
-    const double exact = of_row[rungs.size() - 1];
+    const double* const of_row = &cycles[i * stress_rungs.size()];
+    const double exact = of_row[stress_rungs.size() - 1];
     result.stress[i].cycles = static_cast<std::uint64_t>(exact);
-    for (std::size_t rung = 0; rung + 1 < rungs.size(); ++rung) {
-      result.stress[i].error_percent.emplace_back(rungs[rung], percent_above(of_row[rung], exact));
+    for (std::size_t rung = 0; rung + 1 < stress_rungs.size(); ++rung) {
+      result.stress[i].error_percent.emplace_back(stress_rungs[rung], percent_above(of_row[rung], exact));
     }
   }
 }
@@ -340,11 +347,13 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
 
   const std::vector<RunRequest> rungs = fidelity_requests(job);
   const std::vector<PrecisionSettings> values = choose_values(job, workload.scene.draw_list.has_value(), result);
+  const std::vector<Task> stress = stress_tasks(job, workload, result);
   const std::size_t climbs = job.repeat * rungs.size();
   const Stopwatch ladders;
-  climb_fidelities(job, workload, rungs, {"fidelity ", 0, values.size(), 0}, result, progress);
-  climb_stress(job, workload, result, progress);
-  climb_precisions(job, workload, values, reference, {"precision ", climbs, 0, ladders.seconds()}, result, progress);
+  climb_fidelities(job, workload, rungs, {"fidelity ", 0, stress.size() + values.size(), 0}, result, progress);
+  climb_stress(job, stress, {"stress ", climbs, values.size(), ladders.seconds()}, result, progress);
+  climb_precisions(job, workload, values, reference, {"precision ", climbs + stress.size(), 0, ladders.seconds()},
+                   result, progress);
   if (!workload.scene.draw_list) {
     for (PrecisionRun& run : result.runs) {
       run.run.parameters.insert(run.run.parameters.end(), job.simulation.preprocess_parameters.begin(),

@@ -259,6 +259,8 @@ std::string accuracy_page(const AccuracyResult& result) {
   text += fidelity_plot(result) + functional_note(result) + definition(fidelity_definition()) +
           list(fidelity_summary(result)) + table(fidelity_table(result));
 
+  text += "<h3>" + html_escaped(stress_title) + "</h3>\n" + table(stress_table(result));
+
   text += "<h2>Precision: how exact numbers are</h2>\n";
   if (const std::string verdict = precision_verdict(result); !verdict.empty()) {
     text += "<p class=\"verdict\">" + html_escaped(verdict) + ".</p>\n";

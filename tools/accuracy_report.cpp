@@ -358,8 +358,6 @@ std::string fidelity_title(const AccuracyResult& result) {
                      result.repeat > 1 ? fmt::format(", CPU seconds the median of {}", result.repeat) : "");
 }
 
-constexpr const char* stress_title = "Away from the default: errors of the cycles, in the middle of the image";
-
 std::string precision_title(const AccuracyResult& result) {
   return fmt::format("Precision of {} at {}, against exact arithmetic: {} simulation{} at a time",
                      result.base.variant.name, vrpipe::name_of(result.base.fidelity), result.processes,
@@ -392,7 +390,7 @@ std::string accuracy_markdown(const AccuracyResult& result) {
   for (const std::string& line : accuracy_heading(result)) text += line + ".\n";
   text += "\n" + markdown(fidelity_table(result)) + "\n";
   for (const std::string& line : fidelity_summary(result)) text += "* " + line + "\n";
-  text += "\n" + markdown(stress_table(result));
+  text += std::string("\n") + stress_title + ":\n\n" + markdown(stress_table(result));
   text += "\n" + markdown(precision_table(result)) + "\n";
   for (const std::string& line : precision_summary(result)) text += "* " + line + "\n";
   return text;

@@ -20,7 +20,8 @@ struct AccuracyTable {
   std::vector<Row> rows;
 };
 AccuracyTable fidelity_table(const AccuracyResult& result);
-/// Errors of the fidelities away from the default configuration.
+/// Errors of the fidelities away from the default configuration, and the words above them.
+inline constexpr const char* stress_title = "Away from the default: errors of the cycles, in the middle of the image";
 AccuracyTable stress_table(const AccuracyResult& result);
 /// The default once, and below it every other value.
 AccuracyTable precision_table(const AccuracyResult& result);
