@@ -83,9 +83,8 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
                              spaced(done.tile_pairs, raster_.screen_tile_interval_cycles, to_last),
                              ratio(done.quads_rasterized, raster_.quads_per_cycle)});
   cycles[tc] = std::max(ratio(done.quads_rasterized, tc_.quads_per_cycle), ratio(done.bin_beats, 1));
-  cycles[test] =
-      std::max(ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(done.updates, zrop_.updates_per_cycle),
-               ratio(done.quads_rasterized, prop_.quads_per_cycle));
+  cycles[test] = std::max(ratio(done.quads_tested, zrop_.quads_per_cycle) + update_cycles(done),
+                          ratio(done.quads_rasterized, prop_.quads_per_cycle));
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
   cycles[sm] = instructions(done) / sm_.instructions_per_cycle();
   cycles[color] = static_cast<double>(done.color_quads) / prop_.color_rate.per_cycle();
@@ -102,16 +101,32 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   return cycles;
 }
 
+double PhaseBound::update_cycles(const Work& done) const {
+  const double updates = ratio(done.updates, zrop_.updates_per_cycle);
+  if (zrop_.quads_per_cycle >= QuadBeat::capacity) return updates;
+  // Beside a beat that takes several cycles updates take nothing of their own.
+  return std::max(0.0, updates - ratio(done.quads_tested, zrop_.quads_per_cycle));
+}
+
+double PhaseBound::idle_after_last(unsigned stage) const {
+  const double interval = stage == draw ? 1 / vertex_warps_per_cycle_
+                          : stage == raster
+                              ? std::max(raster_.setup_interval_cycles, raster_.screen_tile_interval_cycles)
+                              : 1.0;
+  return std::max(0.0, interval - 1);
+}
+
 std::array<double, PhaseBound::stages> PhaseBound::end_of(const Work& done, bool to_last) const {
   const std::array<double, stages> cycles = cycles_of(done, to_last);
   std::array<double, stages> end{};
   for (unsigned stage = 0; stage < stages; ++stage) {
     double begin = 0;
-    for (unsigned before = 0; before <= stage; ++before) begin = std::max(begin, end_[before]);
+    for (unsigned before = 0; before < stage; ++before) begin = std::max(begin, end_[before] - idle_after_last(before));
+    begin = std::max(begin, end_[stage]);
     for (unsigned after = stage + 1; stage >= raster && after < stages; ++after)
       begin = std::max(begin, end_before_[after]);
     end[stage] = begin + cycles[stage];
-    if (stage > 0) end[stage] = std::max(end[stage], end[stage - 1]);
+    if (stage > 0) end[stage] = std::max(end[stage], end[stage - 1] - (to_last ? 0 : idle_after_last(stage - 1)));
   }
   return end;
 }
@@ -175,7 +190,7 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
                    count(done.color_quads)});
   }
   if (slot == "zrop") {
-    return priced(ZropWork::kinds(zrop_), {count(done.quads_tested), ratio(done.updates, zrop_.updates_per_cycle)});
+    return priced(ZropWork::kinds(zrop_), {count(done.quads_tested), update_cycles(done)});
   }
   if (slot == "qru") {
     const double quads = count(done.survivors) - count(done.warps) * qru_.items_per_cycle;

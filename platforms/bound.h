@@ -76,6 +76,9 @@ class PhaseBound {
   std::array<double, stages> cycles_of(const Work& done, bool to_last) const;
   std::array<double, stages> end_of(const Work& done, bool to_last) const;
   double instructions(const Work& done) const;
+  double update_cycles(const Work& done) const;
+  /// Between a stage's items are more cycles than an item takes: those after the last, for which nobody waits.
+  double idle_after_last(unsigned stage) const;
 
   double vertex_warps_per_cycle_;
   Throughput vpo_;

@@ -28,7 +28,7 @@ class TimedZrop : public TimedUnit {
   Behaviour& behaviour() override { return *behaviour_; }
 
   void close_account(Cycle end) override {
-    for (; !pending_.empty(); pending_.pop()) behaviour_->update(pending_.front().signal);
+    while (!pending_.empty()) apply_update();
     TimedUnit::close_account(end);
   }
 
@@ -41,9 +41,7 @@ class TimedZrop : public TimedUnit {
   Cycle update(const TerminationBeat& beat, Cycle visible) {
     Cycle at = visible;
     for (unsigned i = 0; i < beat.count; ++i) {
-      const Cycle before = at;
       at = updates_.take(visible);
-      if (i == 0 || at != before) did(ZropWork::updates, 1, at);
       pending_.push({beat.signals[i], at});
     }
     return at;
@@ -74,7 +72,8 @@ class TimedZrop : public TimedUnit {
       std::copy_n(quads.begin() + from, beat.count, beat.quads.begin());
       const Cycle at = take(visible.of_part(part, parts), beat.count);
       const unsigned tested_quads = beat.count;
-      did(ZropWork::tests, tested_quads, at, at + (tested_quads + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle);
+      port_free_at_ = at + (tested_quads + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
+      did(ZropWork::tests, tested_quads, at, port_free_at_);
       behaviour_->test(beat);
       if (beat.count < tested_quads) draw_lasts(at + cost_.latency_cycles);
       tested.first = std::min(tested.first, at);
@@ -101,10 +100,20 @@ class TimedZrop : public TimedUnit {
     while (!pending_.empty() && pending_.front().at <= at) {
       // One z-cache port: a cycle with updates tests nothing.
       if (pending_.front().at == at) at = tests_.take(at + 1, quads);
-      behaviour_->update(pending_.front().signal);
-      pending_.pop();
+      apply_update();
     }
     return at;
+  }
+
+  /// The first of those pending. Beside a test, or other updates of its cycle, it takes nothing of its own.
+  void apply_update() {
+    const Cycle at = pending_.front().at;
+    if (at >= port_free_at_) {
+      did(ZropWork::updates, 1, at);
+      port_free_at_ = at + 1;
+    }
+    behaviour_->update(pending_.front().signal);
+    pending_.pop();
   }
 
   TimedOut<BinItem> out_;
@@ -115,7 +124,8 @@ class TimedZrop : public TimedUnit {
   const unsigned at_once_;
   Lane tests_;
   Lane updates_;
-  Ring<Pending> pending_;  ///< updates not applied yet, by cycle
+  Ring<Pending> pending_;   ///< updates not applied yet, by cycle
+  Cycle port_free_at_ = 0;  ///< of the z-cache, after the last test or update
 };
 
 [[maybe_unused]] const bool registered = [] {

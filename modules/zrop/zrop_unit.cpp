@@ -37,7 +37,8 @@ class ZropUnit : public Unit {
       in_terminations_.pop();
       signal_ = 0;
     }
-    if (moved) did(ZropWork::updates, 1, now);
+    // Beside a beat that takes several cycles an update takes nothing of its own.
+    if (moved && now >= tested_until_) did(ZropWork::updates, 1, now);
     return moved;
   }
 
@@ -48,7 +49,8 @@ class ZropUnit : public Unit {
       if (!limit_.allows(width, now)) break;
       QuadBeat beat = in_.front();
       in_.pop();
-      did(ZropWork::tests, beat.count, now, now + (width + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle);
+      tested_until_ = now + (width + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
+      did(ZropWork::tests, beat.count, now, tested_until_);
       const unsigned tested = beat.count;
       behaviour_->test(beat);
       if (beat.count < tested) draw_lasts(now + cost_.latency_cycles);
@@ -85,7 +87,8 @@ class ZropUnit : public Unit {
   const ZropBehaviour::Cost cost_;
   unsigned signal_ = 0;
   BatchLimit limit_;
-  Cycle free_at_ = 0;  ///< after a beat wider than the unit
+  Cycle tested_until_ = 0;  ///< the last beat, rounded up to whole cycles
+  Cycle free_at_ = 0;       ///< after a beat wider than the unit
 };
 
 [[maybe_unused]] const bool registered = [] {
