@@ -141,8 +141,8 @@ class TimedCrop : public TimedUnit {
     queue_.take(quads, blended.last);
     last_blend_ = blended.last;
     any_blended_ = true;
-    did(CropWork::blend, quads, blended.first, blended.last + 1);
     draw_lasts(blended.last + cost_.latency_cycles);
+    did(CropWork::blend, quads, blended.first, blended.last + 1);
     if (!cost_.forwards) recent_.push({warp.tile, warp.position[from], blended.last});
     blend(warp, from, to, blended);
     return looked_up;

@@ -220,10 +220,10 @@ class CropUnit : public Unit {
     if (beat.count > 0) out_.push(beat);
     const unsigned blended = most_in_a_cycle_ - budget;
     if (blended == 0) return false;
+    draw_lasts(now + cost_.latency_cycles);
     did(CropWork::blend, blended, now);
     last_blend_ = now;
     any_blended_ = true;
-    draw_lasts(now + cost_.latency_cycles);
     return true;
   }
 

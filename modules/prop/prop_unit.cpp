@@ -85,6 +85,9 @@ class PropUnit : public Unit {
 
   bool send_color(Cycle now) {
     waits_for_rate_ = false;
+    if (current_.warp == nullptr && !order_.has_next()) {
+      return end_ != nullptr && out_color_.credits() > 0 && pass_end_of_draw();
+    }
     if (out_color_.credits() == 0) return false;
     ColorBeat beat;
     bool moved = false;

@@ -53,8 +53,8 @@ class TimedRaster : public TimedUnit {
       }
       if (tile.count == 0) continue;
       now_ = quads_out_.take(now_, tile.count).last;
-      did(RasterWork::quads, tile.count, now_);
       draw_lasts(now_ + 1);
+      did(RasterWork::quads, tile.count, now_);
       charge(UnitState::busy, now_);
       now_ = out_.send(tile, now_).first;
       charge(UnitState::blocked, now_);

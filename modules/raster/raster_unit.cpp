@@ -73,8 +73,8 @@ class RasterUnit : public Unit {
         const bool taken = send(quad_budget);
         if (quad_budget != before) {
           moved = true;
-          did(RasterWork::quads, before - quad_budget, now);
           draw_lasts(now + 1);
+          did(RasterWork::quads, before - quad_budget, now);
         }
         if (!taken && !moved) {
           enter(UnitState::blocked, now);

@@ -168,6 +168,7 @@ class TimedSm : public TimedUnit {
     const Cycle begin = std::max(free_at, from);
     const Cycle merge = begin + segment.instructions * cycles_per_instruction_;
     free_at = merge + segment.merge_instructions * cycles_per_instruction_;
+    draw_lasts(free_at);  // the warp's quads end after that
     if (segment.instructions > 0) did(SmWork::fragment, segment.instructions, begin, merge);
     if (segment.merge_instructions > 0) did(SmWork::merge, segment.merge_instructions, merge, free_at);
     charge(UnitState::busy, free_at);

@@ -138,6 +138,7 @@ class SmUnit : public Unit {
     const Cycle busy = Cycle{segment.instructions} * cycles_per_instruction_;
     scheduler.free_at = now + busy;
     busy_until_ = std::max(busy_until_, scheduler.free_at);
+    if (slot < fragment_slots_) draw_lasts(now + busy);  // its quads end after that
     if (segment.instructions > 0) did(kind_of_work(slot, flight), segment.instructions, now, now + busy);
     wheel_.add(std::max(now + busy + segment.stall_cycles, now + 1), slot, next_);
   }
