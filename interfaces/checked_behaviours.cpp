@@ -1,6 +1,5 @@
 #include <vrpipe/checked_behaviours.h>
 
-#include <new>
 #include <utility>
 
 #include <fmt/format.h>
@@ -20,24 +19,15 @@ ForeignCode running;
 constexpr std::uint32_t longest_latency = 1'000'000;
 constexpr std::uint32_t largest_rate = 65536;
 
-/// Calls code of an implementation. What it throws is its fault, but for a UserError, which is meant for the user, and a
-/// SimulationFault, which says whose fault it is.
+/// Calls code of an implementation: what it throws is its fault.
 template <class Call>
 decltype(auto) call_foreign(const std::string& name, const char* what, Cycle cycle, Call&& call) {
   const ForeignCall marked(name.c_str(), what);
-  try {
-    return call();
-  } catch (const UserError&) {
-    throw;
-  } catch (const SimulationFault&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception& thrown) {
-    throw SimulationFault(name, cycle, fmt::format("{} throws: {}", what, thrown.what()));
-  } catch (...) {
-    throw SimulationFault(name, cycle, fmt::format("{} throws an exception of unknown type", what));
-  }
+  return call_with_fault(std::forward<Call>(call), [&](const char* text) {
+    throw SimulationFault(name, cycle,
+                          text != nullptr ? fmt::format("{} throws: {}", what, text)
+                                          : fmt::format("{} throws an exception of unknown type", what));
+  });
 }
 
 std::string words_of(TileId tile) { return fmt::format("screen tile {},{}", tile.x, tile.y); }

@@ -42,22 +42,12 @@ Gpu::~Gpu() = default;
 
 void Gpu::wire() {
   const Platform& platform = configuration_.platform();
-  const auto fault = [&](const std::string& item) {
-    throw SimulationFault("platform " + platform.name, 0, "its wiring throws " + item);
-  };
-  try {
-    platform.wire(*this);
-  } catch (const UserError&) {
-    throw;
-  } catch (const SimulationFault&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;
-  } catch (const std::exception& thrown) {
-    fault(thrown.what());
-  } catch (...) {
-    fault("an exception of unknown type");
-  }
+  call_with_fault([&] { platform.wire(*this); },
+                  [&](const char* text) {
+                    throw SimulationFault("platform " + platform.name, 0,
+                                          std::string("its wiring throws ") +
+                                              (text != nullptr ? text : "an exception of unknown type"));
+                  });
 }
 
 unsigned Gpu::gpcs() const { return configuration_.platform().gpcs; }

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <exception>
+#include <new>
+
+#include <vrpipe/error.h>
 #include <vrpipe/registry.h>
 
 /// Units that are not trusted, a plugin's, stand behind checks of all that they return: a mistake of theirs ends in a
@@ -37,5 +41,26 @@ class ForeignCall {
  private:
   ForeignCode before_;
 };
+
+/// Calls such code. Of what it throws, a UserError is meant for the user, a SimulationFault says whose fault it is, and
+/// memory may run out anywhere; for anything else `fault` throws, given its text, or null where it has none.
+template <class Call, class Fault>
+decltype(auto) call_with_fault(Call&& call, const Fault& fault) {
+  try {
+    return call();
+  } catch (const UserError&) {
+    throw;
+  } catch (const SimulationFault&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& thrown) {
+    fault(thrown.what());
+    throw;
+  } catch (...) {
+    fault(nullptr);
+    throw;
+  }
+}
 
 }  // namespace vrpipe

@@ -19,26 +19,25 @@ function(expect_success pattern)
   set(output "${output}" PARENT_SCOPE)
 endfunction()
 
-# Runs a command that must be refused: exit code 2, and one line that matches.
-function(expect_refusal pattern)
+# Runs a command that must end with an exit code, and one line of a form that matches.
+function(expect_failure code form pattern)
   run(result output error ${ARGN})
-  if(NOT result EQUAL 2)
-    message(FATAL_ERROR "${ARGN}\nended with ${result}, not 2\n${output}\n${error}")
+  if(NOT result EQUAL code)
+    message(FATAL_ERROR "${ARGN}\nended with ${result}, not ${code}\n${output}\n${error}")
   endif()
-  if(NOT error MATCHES "^vrpipe: error: [^\n]+ \\([^\n]+\\): [^\n]+; [^\n]+\n$" OR NOT error MATCHES "${pattern}")
+  if(NOT error MATCHES "${form}" OR NOT error MATCHES "${pattern}")
     message(FATAL_ERROR "${ARGN}\nexpected one line with ${pattern}, not\n${error}")
   endif()
 endfunction()
 
-# Runs a command in which a plugin fails: exit code 1, and one line that matches.
+# A mistake of the user.
+function(expect_refusal pattern)
+  expect_failure(2 "^vrpipe: error: [^\n]+ \\([^\n]+\\): [^\n]+; [^\n]+\n$" "${pattern}" ${ARGN})
+endfunction()
+
+# A plugin that fails.
 function(expect_fault pattern)
-  run(result output error ${ARGN})
-  if(NOT result EQUAL 1)
-    message(FATAL_ERROR "${ARGN}\nended with ${result}, not 1\n${output}\n${error}")
-  endif()
-  if(NOT error MATCHES "^vrpipe: fault: [^\n]+\n$" OR NOT error MATCHES "${pattern}")
-    message(FATAL_ERROR "${ARGN}\nexpected one line with ${pattern}, not\n${error}")
-  endif()
+  expect_failure(1 "^vrpipe: fault: [^\n]+\n$" "${pattern}" ${ARGN})
 endfunction()
 
 file(REMOVE_RECURSE ${WORK_DIR})
