@@ -1,4 +1,6 @@
 // Quads per second of each behaviour alone, on the quads of a built-in scene.
+#include <algorithm>
+
 #include <benchmark/benchmark.h>
 
 #include <vrpipe/platforms/configuration.h>
@@ -26,6 +28,14 @@ RunRequest request_for(ColorFormat format) {
   return request;
 }
 
+/// The unit of a slot in the first GPC.
+template <class SlotBehaviour>
+std::unique_ptr<SlotBehaviour> make_as(const Configuration& configuration, const std::string& slot) {
+  const std::vector<Instance>& all = configuration.netlist().instances();
+  return configuration.make_as<SlotBehaviour>(
+      *std::find_if(all.begin(), all.end(), [&](const Instance& instance) { return instance.slot == slot; }));
+}
+
 void cut_bin(const TcBehaviour::Flush& bin, std::vector<QuadBeat>& out) {
   for (std::size_t sent = 0; sent < bin.quads.size();) {
     QuadBeat beat;
@@ -46,10 +56,10 @@ const Frame& frame() {
     f.scene = load_scene(scene);
     const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
 
-    const auto vpo = configuration.make_as<VpoBehaviour>("vpo", 0);
-    const auto tgc = configuration.make_as<TgcBehaviour>("tgc", 0);
-    const auto raster = configuration.make_as<RasterBehaviour>("raster", 0);
-    const auto tc = configuration.make_as<TcBehaviour>("tc", 0);
+    const auto vpo = make_as<VpoBehaviour>(configuration, "vpo");
+    const auto tgc = make_as<TgcBehaviour>(configuration, "tgc");
+    const auto raster = make_as<RasterBehaviour>(configuration, "raster");
+    const auto tc = make_as<TcBehaviour>(configuration, "tc");
     TgcBehaviour::Flush grid;
     TcBehaviour::Flush bin;
     const auto rasterize = [&] {
@@ -83,8 +93,8 @@ const Frame& frame() {
     while (tgc->drain(grid)) rasterize();
     while (tc->flush_oldest(TcBehaviour::FlushReason::end_of_draw, bin)) cut_bin(bin, f.bins);
 
-    const auto qru = configuration.make_as<QruBehaviour>("qru", 0);
-    const auto sm = configuration.make_as<SmBehaviour>("sm", 0);
+    const auto qru = make_as<QruBehaviour>(configuration, "qru");
+    const auto sm = make_as<SmBehaviour>(configuration, "sm");
     const auto shade = [&](const Warp& warp) {
       f.warps.push_back(warp);
       f.shaded.emplace_back();
@@ -121,7 +131,7 @@ void rasterize(benchmark::State& state) {
   const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
   std::uint64_t quads = 0;
   for (auto _ : state) {
-    const auto raster = configuration.make_as<RasterBehaviour>("raster", 0);
+    const auto raster = make_as<RasterBehaviour>(configuration, "raster");
     quads = 0;
     QuadBeat tile;
     unsigned tests = 0;
@@ -139,7 +149,7 @@ void coalesce_tiles(benchmark::State& state) {
   const Frame& f = frame();
   const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
   for (auto _ : state) {
-    const auto tc = configuration.make_as<TcBehaviour>("tc", 0);
+    const auto tc = make_as<TcBehaviour>(configuration, "tc");
     TcBehaviour::Flush bin;
     bool flushed = false;
     for (const QuadBeat& tile : f.tiles) {
@@ -155,7 +165,7 @@ void test_termination(benchmark::State& state) {
   const Frame& f = frame();
   const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
   for (auto _ : state) {
-    const auto zrop = configuration.make_as<ZropBehaviour>("zrop", 0);
+    const auto zrop = make_as<ZropBehaviour>(configuration, "zrop");
     for (const QuadBeat& beat : f.bins) {
       QuadBeat tested = beat;
       zrop->test(tested);
@@ -170,7 +180,7 @@ void reorder_quads(benchmark::State& state) {
   const Frame& f = frame();
   const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
   for (auto _ : state) {
-    const auto qru = configuration.make_as<QruBehaviour>("qru", 0);
+    const auto qru = make_as<QruBehaviour>(configuration, "qru");
     Warp warp;
     bool launched = false;
     for (const QuadBeat& beat : f.bins) {
@@ -188,7 +198,7 @@ void shade_warps(benchmark::State& state) {
   const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
   std::uint64_t quads = 0;
   for (auto _ : state) {
-    const auto sm = configuration.make_as<SmBehaviour>("sm", 0);
+    const auto sm = make_as<SmBehaviour>(configuration, "sm");
     ShadedWarp shaded;
     quads = 0;
     for (const Warp& warp : f.warps) {
@@ -207,7 +217,7 @@ void blend_quads(benchmark::State& state, ColorFormat format) {
   std::uint64_t quads = 0;
   for (auto _ : state) {
     ColorSurface surface(f.scene.draw.width, f.scene.draw.height, format);
-    const auto crop = configuration.make_as<CropBehaviour>("crop", 0);
+    const auto crop = make_as<CropBehaviour>(configuration, "crop");
     crop->attach(surface);
     quads = 0;
     for (const ShadedWarp& warp : f.shaded) {

@@ -691,7 +691,9 @@ Check check_of_slot(const std::string& slot) {
   if (slot == "zrop") return check<ZropBehaviour>;
   if (slot == "qru") return check<QruBehaviour>;
   if (slot == "sm") return check<SmBehaviour>;
-  return check<CropBehaviour>;
+  if (slot == "crop") return check<CropBehaviour>;
+  // What a slot of a plugin's returns, only that plugin knows.
+  return [](const std::string&, const RenderState&, std::unique_ptr<Behaviour> behaviour) { return behaviour; };
 }
 
 }  // namespace

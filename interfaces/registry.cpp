@@ -19,16 +19,38 @@ Registry& Registry::instance() {
   return registry;
 }
 
-const std::vector<std::string>& Registry::slots() {
-  static const std::vector<std::string> names{"draw", "vpo",  "tgc", "raster", "tc",
-                                              "prop", "zrop", "qru", "sm",     "crop"};
+void Registry::add(Slot slot) {
+  if (has_slot(slot.name)) {
+    return add_problem({"there is a slot '" + slot.name + "' already", "choose another name"});
+  }
+  const auto place = std::upper_bound(slots_.begin(), slots_.end(), slot,
+                                      [](const Slot& a, const Slot& b) { return a.rank < b.rank; });
+  slots_.insert(place, std::move(slot));
+  count_registration();
+}
+
+bool Registry::has_slot(const std::string& name) const {
+  return std::any_of(slots_.begin(), slots_.end(), [&](const Slot& slot) { return slot.name == name; });
+}
+
+const Slot& Registry::slot(const std::string& name) const {
+  for (const Slot& slot : slots_) {
+    if (slot.name == name) return slot;
+  }
+  throw UserError("unknown slot '" + name + "'", "--unit", "no such slot",
+                  "did you mean " + nearest_name(name, slot_names()) + "? `vrpipe units` lists all");
+}
+
+std::vector<std::string> Registry::slot_names() const {
+  std::vector<std::string> names;
+  for (const Slot& slot : slots_) names.push_back(slot.name);
   return names;
 }
 
 void Registry::add(Implementation implementation) {
-  if (std::find(slots().begin(), slots().end(), implementation.slot) == slots().end()) {
+  if (!has_slot(implementation.slot)) {
     return add_problem({"there is no slot '" + implementation.slot + "' for its unit '" + implementation.name + "'",
-                        "did you mean " + nearest_name(implementation.slot, slots()) + "?"});
+                        "did you mean " + nearest_name(implementation.slot, slot_names()) + "?"});
   }
   for (const auto& known : implementations_) {
     if (known->slot == implementation.slot && known->name == implementation.name) {
@@ -43,10 +65,7 @@ void Registry::add(Implementation implementation) {
 }
 
 const Implementation& Registry::find(const std::string& slot, const std::string& name) const {
-  if (std::find(slots().begin(), slots().end(), slot) == slots().end()) {
-    throw UserError("unknown slot '" + slot + "'", "--unit", "no such slot",
-                    "did you mean " + nearest_name(slot, slots()) + "? `vrpipe units` lists all");
-  }
+  static_cast<void>(this->slot(slot));
   std::vector<std::string> names;
   for (const Implementation* implementation : of_slot(slot)) {
     if (implementation->name == name) return *implementation;
@@ -68,8 +87,8 @@ std::vector<const Implementation*> Registry::of_slot(const std::string& slot) co
 
 std::vector<const Implementation*> Registry::all() const {
   std::vector<const Implementation*> found;
-  for (const std::string& slot : slots()) {
-    for (const Implementation* implementation : of_slot(slot)) found.push_back(implementation);
+  for (const Slot& slot : slots_) {
+    for (const Implementation* implementation : of_slot(slot.name)) found.push_back(implementation);
   }
   return found;
 }

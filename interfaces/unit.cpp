@@ -1,5 +1,6 @@
 #include <vrpipe/unit.h>
 
+#include <algorithm>
 #include <map>
 
 #include <vrpipe/error.h>
@@ -29,12 +30,15 @@ std::map<std::string, UnitMaker>& makers() {
 
 Unit::Unit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector<WorkKind> work)
     : sc_module(name),
-      PortOwner({&domain, domain.attach(*this)}),
+      Component({&domain, domain.attach(*this)}),
       occupancy_(domain.draw_end(), std::move(work)),
       account_(domain.draw_end()) {}
 
-InPort& Unit::in(const std::string& name) { return port_named(in_ports, this->name(), name); }
-OutPort& Unit::out(const std::string& name) { return port_named(out_ports, this->name(), name); }
+InPort& Component::in(const std::string& name) { return port_named(in_ports, label(), name); }
+OutPort& Component::out(const std::string& name) { return port_named(out_ports, label(), name); }
+bool Component::has_out(const std::string& name) const {
+  return std::any_of(out_ports.begin(), out_ports.end(), [&](const OutPort* port) { return port->name() == name; });
+}
 
 void register_unit_maker(const std::string& slot, UnitMaker maker) {
   if (makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();

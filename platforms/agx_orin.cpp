@@ -10,11 +10,7 @@ Platform agx_orin() {
   platform.description = "the paper's simulated GPU: 1 GPC, 16 cores, 612 MHz, 2 quads a cycle of RGBA16F";
   platform.gpcs = 1;
   platform.frequency_mhz = 612;
-  platform.wire = [](Gpu& gpu) {
-    gpu.add_front_end("draw");
-    gpu.add_front_end("vpo");
-    wire_gpc(gpu, 0);
-  };
+  platform.wire = wire_pipeline;
   return platform;
 }
 

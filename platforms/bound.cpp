@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <map>
-
-#include <vrpipe/error.h>
+#include <type_traits>
 
 namespace vrpipe {
 
 namespace {
 
 double ratio(std::uint64_t items, std::uint64_t per_cycle) {
-  return static_cast<double>(items) / static_cast<double>(per_cycle);
+  return items == 0 ? 0.0 : static_cast<double>(items) / static_cast<double>(per_cycle);
 }
 
 /// Cycles of so many items, each so long after the one before; if they are the last of the draw, up to the last item.
@@ -49,22 +48,33 @@ void Work::add(const Work& other) {
   lines_filled += other.lines_filled;
 }
 
-PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc)
-    : vertex_warps_per_cycle_(configuration.make_as<DrawBehaviour>("draw", gpc)->warps_per_1024_cycles() / 1024.0),
-      vpo_(configuration.make_as<VpoBehaviour>("vpo", gpc)->cost()),
-      tgc_(configuration.make_as<TgcBehaviour>("tgc", gpc)->cost()),
-      raster_(configuration.make_as<RasterBehaviour>("raster", gpc)->cost()),
-      tc_(configuration.make_as<TcBehaviour>("tc", gpc)->cost()),
-      prop_(configuration.make_as<PropBehaviour>("prop", gpc)->cost()),
-      zrop_(configuration.make_as<ZropBehaviour>("zrop", gpc)->cost()),
-      qru_(configuration.make_as<QruBehaviour>("qru", gpc)->cost()),
-      sm_(configuration.make_as<SmBehaviour>("sm", gpc)->cost()),
-      crop_(configuration.make_as<CropBehaviour>("crop", gpc)->cost()),
-      l2_bytes_per_cycle_(configuration.l2().bytes_per_cycle),
-      l2_latency_cycles_(configuration.l2().latency_cycles),
-      // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
-      warps_in_phase_(2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads)),
-      times_out_(tc_.timeout_in(configuration.request().termination) > 0) {}
+PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc) {
+  const auto cost_of = [&](const char* slot, auto* of_slot, const auto& take) {
+    for (const Instance& instance : configuration.netlist().instances()) {
+      if (instance.slot != slot || (instance.gpc != gpc && !instance.in_front_end)) continue;
+      return take(*configuration.make_as<std::remove_pointer_t<decltype(of_slot)>>(instance));
+    }
+  };
+  cost_of("draw", static_cast<DrawBehaviour*>(nullptr),
+          [&](const auto& unit) { vertex_warps_per_cycle_ = unit.warps_per_1024_cycles() / 1024.0; });
+  cost_of("vpo", static_cast<VpoBehaviour*>(nullptr), [&](const auto& unit) { vpo_ = unit.cost(); });
+  cost_of("tgc", static_cast<TgcBehaviour*>(nullptr), [&](const auto& unit) { tgc_ = unit.cost(); });
+  cost_of("raster", static_cast<RasterBehaviour*>(nullptr), [&](const auto& unit) { raster_ = unit.cost(); });
+  cost_of("tc", static_cast<TcBehaviour*>(nullptr), [&](const auto& unit) { tc_ = unit.cost(); });
+  cost_of("prop", static_cast<PropBehaviour*>(nullptr), [&](const auto& unit) { prop_ = unit.cost(); });
+  cost_of("zrop", static_cast<ZropBehaviour*>(nullptr), [&](const auto& unit) { zrop_ = unit.cost(); });
+  cost_of("qru", static_cast<QruBehaviour*>(nullptr), [&](const auto& unit) { qru_ = unit.cost(); });
+  cost_of("sm", static_cast<SmBehaviour*>(nullptr), [&](const auto& unit) { sm_ = unit.cost(); });
+  cost_of("crop", static_cast<CropBehaviour*>(nullptr), [&](const auto& unit) { crop_ = unit.cost(); });
+  // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
+  warps_in_phase_ = 2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads);
+  times_out_ = tc_.timeout_in(configuration.request().termination) > 0;
+  const std::vector<MemoryInstance>& memories = configuration.netlist().memories();
+  if (std::any_of(memories.begin(), memories.end(), [](const MemoryInstance& memory) { return !memory.make; })) {
+    l2_bytes_per_cycle_ = configuration.l2().bytes_per_cycle;
+    l2_latency_cycles_ = configuration.l2().latency_cycles;
+  }
+}
 
 double PhaseBound::instructions(const Work& done) const {
   return static_cast<double>(done.vertex_warps * instructions_of(sm_.vertex) +
@@ -88,7 +98,7 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
   cycles[sm] = instructions(done) / sm_.instructions_per_cycle();
   cycles[color] = static_cast<double>(done.color_quads) / prop_.color_rate.per_cycle();
-  cycles[l2] = ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_);
+  cycles[l2] = l2_bytes_per_cycle_ == 0 ? 0.0 : ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_);
   // A line, and a miss register, is taken for as long as a fill is under way; those of a phase's beginning may have been
   // asked for before it.
   const auto turns = [&](std::uint64_t fills, std::uint64_t places) {
@@ -202,8 +212,8 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
                                        count(done.merging_warps * instructions_of(sm_.merge))});
   }
   if (slot == "crop") return priced(CropWork::kinds(crop_), {count(done.color_quads), count(done.sectors)});
-  if (slot == "l2") return {{"bytes", 0, ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_), true}};
-  throw SimulationFault("bound", 0, "no slot is called " + slot);
+  if (slot == "l2" && l2_bytes_per_cycle_ > 0) return {{"bytes", 0, ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_), true}};
+  return {};
 }
 
 }  // namespace vrpipe

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include <vrpipe/occupancy.h>
 #include <vrpipe/platforms/configuration.h>
@@ -48,6 +50,7 @@ struct Work : FrontEndWork {
 /// - any unit after it has finished the last phase but one (units from the rasteriser on).
 class PhaseBound {
  public:
+  /// A slot that the platform does without takes no time.
   PhaseBound(const Configuration& configuration, unsigned gpc);
 
   Work work;  ///< of the phase
@@ -65,8 +68,13 @@ class PhaseBound {
   /// Up to the last quad; without quads, of what the front end does all the same.
   double cycles() const { return last_quad_; }
   bool has_quads() const { return ended_.quads_rasterized > 0; }
+  /// In time, bins may be flushed that are not full.
+  bool times_out() const { return times_out_; }
+  /// Screen tiles may be blended in another order than they were flushed in.
+  bool tiles_may_overtake() const { return prop_.order == PropBehaviour::Order::tile; }
 
-  /// Of all phases, up to the last quad: cycles in which the unit of a slot, or `l2`, works at its peak, and what on.
+  /// Of all phases, up to the last quad: cycles in which the unit of a slot, or `l2`, works at its peak, and what on;
+  /// none for a slot that this knows nothing of.
   double busy_cycles(const std::string& slot) const;
   std::vector<OccupancyPart> parts(const std::string& slot) const;
 
@@ -80,24 +88,24 @@ class PhaseBound {
   /// Between a stage's items are more cycles than an item takes: those after the last, for which nobody waits.
   double idle_after_last(unsigned stage) const;
 
-  double vertex_warps_per_cycle_;
+  double vertex_warps_per_cycle_ = 1;
   Throughput vpo_;
   Throughput tgc_;
-  RasterBehaviour::Cost raster_;
-  TcBehaviour::Cost tc_;
-  PropBehaviour::Cost prop_;
-  ZropBehaviour::Cost zrop_;
+  RasterBehaviour::Cost raster_{1, 1, 1, 1, 1, 1};
+  TcBehaviour::Cost tc_{1, 1, 0, 1};
+  PropBehaviour::Cost prop_{1, {}, 1, PropBehaviour::Order::tile};
+  ZropBehaviour::Cost zrop_{1, 1, 1};
   Throughput qru_;
-  SmBehaviour::Cost sm_;
-  CropBehaviour::Cost crop_;
-  std::uint32_t l2_bytes_per_cycle_;
-  std::uint32_t l2_latency_cycles_;
-  std::uint64_t warps_in_phase_;
+  SmBehaviour::Cost sm_{1, 1, 32, 1, 1, 1, {}, {}, {}};
+  CropBehaviour::Cost crop_{{}, 1, 1, true, 0, 1, 1, 1, 1, false};
+  std::uint32_t l2_bytes_per_cycle_ = 0;  ///< 0: a memory of which nothing is known
+  std::uint32_t l2_latency_cycles_ = 0;
+  std::uint64_t warps_in_phase_ = 0;
   Work total_;               ///< of the phases before
   FrontEndWork up_to_quad_;  ///< of the phase, up to the last quad that was rasterised
   Work up_to_quads_;         ///< of the phase, up to its last quad
   Work ended_;               ///< of all phases, up to the last quad
-  bool times_out_;
+  bool times_out_ = false;
   double last_quad_ = 0;
   std::array<double, stages> end_{};         ///< of the last phase
   std::array<double, stages> end_before_{};  ///< of the phase before it

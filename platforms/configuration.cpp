@@ -2,47 +2,42 @@
 
 #include <algorithm>
 
+#include <vrpipe/checked_behaviours.h>
 #include <vrpipe/error.h>
+#include <vrpipe/platforms/observers.h>
 
 namespace vrpipe {
 
-const Implementation& default_implementation(const std::string& slot, const Variant& variant) {
-  const bool absent = !variant.quad_merging && (slot == "tgc" || slot == "qru");
-  static const std::map<std::string, std::string> real{{"draw", "vertex-issue"},        {"vpo", "primitive-assembly"},
-                                                       {"tgc", "tile-grid-coalescing"}, {"raster", "tile-rasterizer"},
-                                                       {"tc", "tile-coalescing"},       {"prop", "pre-rop"},
-                                                       {"zrop", "depth-stencil-rop"},   {"qru", "pairing"},
-                                                       {"sm", "splat-shader"},          {"crop", "color-rop"}};
-  return Registry::instance().find(slot, absent ? "pass-through" : real.at(slot));
+namespace {
+
+const std::string link_prefix = "link.";
+
+bool declares(const ParameterSet& set, const std::string& parameter) {
+  const std::vector<Parameter*>& all = set.parameters();
+  return std::any_of(all.begin(), all.end(), [&](const Parameter* each) { return parameter == each->name(); });
 }
 
-Configuration::Configuration(const RunRequest& request, const Draw& draw) : request_(request) {
+}  // namespace
+
+const Implementation& default_implementation(const Slot& slot, const Variant& variant) {
+  const bool absent = !variant.quad_merging && !slot.stand_in.empty();
+  return Registry::instance().find(slot.name, absent ? slot.stand_in : slot.implementation);
+}
+
+Configuration::Configuration(const RunRequest& request, const Draw& draw)
+    : request_(request), netlist_(request.platform->gpcs) {
   // Of the program itself; a plugin's are reported when it is loaded.
   const std::vector<Registry::Problem> problems = Registry::instance().take_problems();
   if (!problems.empty()) {
     throw UserError("cannot use all units of this program", "registry", problems.front().why, problems.front().remedy);
   }
-  Variant with_all = request.variant;
-  with_all.quad_merging = true;
-  for (const std::string& name : Registry::slots()) {
-    Slot& slot = slots_[name];
-    slot.chosen = &default_implementation(name, request.variant);
-    slot.real = &default_implementation(name, with_all);
-  }
-  for (const UnitChoice& choice : request.units) {
-    const Implementation& implementation = Registry::instance().find(choice.slot, choice.implementation);
-    Slot& slot = slots_[choice.slot];
-    if (!slot.chosen->pass_through) slot.chosen = &implementation;
-    slot.real = &implementation;
-  }
-  for (auto& [name, slot] : slots_) {
-    slot.real_parameters = slot.real->make_parameters();
-    slot.chosen_parameters = slot.chosen->make_parameters();
-  }
+  wire();
+  choose_implementations();
   for (const Setting& setting : request.platform->settings) {
     if (concerns_chosen_unit(setting)) apply(setting);
   }
   for (const Setting& setting : request.settings) apply(setting);
+  if (request.observers != nullptr) request.observers->check(netlist_);
 
   states_.resize(request.platform->gpcs);
   for (unsigned gpc = 0; gpc < states_.size(); ++gpc) {
@@ -64,52 +59,177 @@ Configuration::Configuration(const RunRequest& request, const Draw& draw) : requ
   }
 }
 
-/// A platform's settings are for the units that it was made with: another one in a slot takes those that it declares.
-bool Configuration::concerns_chosen_unit(const Setting& setting) const {
-  const auto slot = slots_.find(setting.unit);
-  if (slot == slots_.end()) return true;
-  const auto declared_by = [&](const ParameterSet& set) {
-    return std::any_of(set.parameters().begin(), set.parameters().end(),
-                       [&](const Parameter* parameter) { return setting.parameter == parameter->name(); });
-  };
-  if (declared_by(*slot->second.real_parameters)) return true;
+void Configuration::wire() {
+  const Platform& platform = *request_.platform;
+  call_with_fault([&] { platform.wire(netlist_); },
+                  [&](const char* text) {
+                    throw SimulationFault("platform " + platform.name, 0,
+                                          std::string("its wiring throws ") +
+                                              (text != nullptr ? text : "an exception of unknown type"));
+                  });
+  if (netlist_.instances().empty()) {
+    throw UserError("incomplete platform " + platform.name, "its wiring", "it adds no unit",
+                    "add units, as platforms/agx_orin.cpp does");
+  }
+}
+
+void Configuration::choose_implementations() {
+  const Registry& registry = Registry::instance();
   Variant with_all = request_.variant;
   with_all.quad_merging = true;
+  for (const Instance& instance : netlist_.instances()) {
+    const Slot& slot = registry.slot(instance.slot);
+    UnitChoices& unit = units_[instance.path];
+    unit.chosen = &default_implementation(slot, request_.variant);
+    unit.real = &default_implementation(slot, with_all);
+    if (instance.implementation.empty()) continue;
+    unit.real = &registry.find(slot.name, instance.implementation);
+    if (!unit.chosen->pass_through) unit.chosen = unit.real;
+  }
+  for (const UnitChoice& choice : request_.units) {
+    const std::vector<const Instance*> named = instances_named(choice.slot);
+    const std::string& slot = named.empty() ? choice.slot : named.front()->slot;
+    const Implementation& implementation = registry.find(slot, choice.implementation);
+    if (named.empty()) {
+      throw UserError("cannot choose a unit for '" + choice.slot + "'", "--unit",
+                      "platform " + request_.platform->name + " has none", "take another platform");
+    }
+    for (const Instance* instance : named) {
+      UnitChoices& unit = units_[instance->path];
+      if (!unit.chosen->pass_through) unit.chosen = &implementation;
+      unit.real = &implementation;
+    }
+  }
+  for (auto& [path, unit] : units_) {
+    unit.real_parameters = unit.real->make_parameters();
+    unit.chosen_parameters = unit.chosen->make_parameters();
+  }
+}
+
+std::vector<const Instance*> Configuration::instances_named(const std::string& name) const {
+  std::vector<const Instance*> found;
+  for (const Instance& instance : netlist_.instances()) {
+    if (name == instance.slot || names_path(name, instance.path)) found.push_back(&instance);
+  }
+  return found;
+}
+
+std::vector<const Instance*> Configuration::instances_of(const std::string& slot) const {
+  std::vector<const Instance*> found;
+  for (const Instance& instance : netlist_.instances()) {
+    if (instance.slot == slot) found.push_back(&instance);
+  }
+  return found;
+}
+
+bool Configuration::has_l2() const {
+  const std::vector<MemoryInstance>& memories = netlist_.memories();
+  return std::any_of(memories.begin(), memories.end(), [](const MemoryInstance& memory) { return !memory.make; });
+}
+
+/// A platform's settings are for the units that it was made with: another one in a slot takes those that it declares.
+bool Configuration::concerns_chosen_unit(const Setting& setting) const {
+  const std::vector<const Instance*> named = instances_named(setting.unit);
+  if (named.empty()) return true;
+  Variant with_all = request_.variant;
+  with_all.quad_merging = true;
+  for (const Instance* instance : named) {
+    if (declares(*units_.at(instance->path).real_parameters, setting.parameter)) return true;
+  }
   // What no unit declares is a mistake of the platform's.
-  return !declared_by(*default_implementation(setting.unit, with_all).make_parameters());
+  const Slot& slot = Registry::instance().slot(named.front()->slot);
+  return !declares(*default_implementation(slot, with_all).make_parameters(), setting.parameter);
 }
 
 void Configuration::apply(const Setting& setting) {
   if (setting.unit == "state") return state_parameters_.set(setting.unit, setting.parameter, setting.value);
-  if (setting.unit == "l2") return l2_.set(setting.unit, setting.parameter, setting.value);
-  const auto slot = slots_.find(setting.unit);
-  if (slot == slots_.end()) {
-    std::vector<std::string> known = Registry::slots();
-    known.insert(known.end(), {"state", "l2"});
+  if (setting.unit == "l2" && has_l2()) return l2_.set(setting.unit, setting.parameter, setting.value);
+  if (setting.unit.compare(0, link_prefix.size(), link_prefix) == 0) return set_link(setting);
+  const std::vector<const Instance*> named = instances_named(setting.unit);
+  if (named.empty()) {
+    std::vector<std::string> known{"state"};
+    if (has_l2()) known.emplace_back("l2");
+    for (const Instance& instance : netlist_.instances()) {
+      known.push_back(instance.slot);
+      known.push_back(instance.path);
+    }
+    const bool elsewhere = Registry::instance().has_slot(setting.unit) || setting.unit == "l2";
     throw UserError("unknown unit '" + setting.unit + "'", "--set " + setting.unit + "." + setting.parameter,
-                    "no such unit", "did you mean " + nearest_name(setting.unit, known) + "? `vrpipe units` lists all");
+                    elsewhere ? "platform " + request_.platform->name + " has none" : "no such unit",
+                    "did you mean " + nearest_name(setting.unit, known) + "? `vrpipe units` lists all");
   }
-  // A setting is for the unit proper; the pass-through of a variant without it has nothing to set.
-  slot->second.real_parameters->set(setting.unit, setting.parameter, setting.value);
-  if (slot->second.chosen == slot->second.real) {
-    slot->second.chosen_parameters->set(setting.unit, setting.parameter, setting.value);
+  for (const Instance* instance : named) {
+    UnitChoices& unit = units_[instance->path];
+    // A setting is for the unit proper; the pass-through of a variant without it has nothing to set.
+    unit.real_parameters->set(setting.unit, setting.parameter, setting.value);
+    if (unit.chosen == unit.real) unit.chosen_parameters->set(setting.unit, setting.parameter, setting.value);
   }
 }
 
-std::unique_ptr<Behaviour> Configuration::make(const std::string& slot, unsigned gpc) const {
-  const Slot& chosen = slots_.at(slot);
-  return chosen.chosen->make_behaviour(*chosen.chosen_parameters, states_[gpc]);
+void Configuration::set_link(const Setting& setting) {
+  const std::string name = setting.unit.substr(link_prefix.size());
+  bool found = false;
+  std::vector<std::string> known;
+  for (const Link& link : netlist_.links()) {
+    known.push_back(link.name());
+    known.push_back(without_gpc(link.name()));
+    if (!names_path(name, link.name())) continue;
+    link.parameters->set(setting.unit, setting.parameter, setting.value);
+    found = true;
+  }
+  if (found) return;
+  throw UserError("unknown link '" + name + "'", "--set " + setting.unit + "." + setting.parameter, "no such link",
+                  known.empty() ? "the platform has none"
+                                : "did you mean " + link_prefix + nearest_name(name, known) +
+                                      "? `vrpipe platforms --verbose` lists all");
+}
+
+std::unique_ptr<Behaviour> Configuration::make(const Instance& instance) const {
+  const UnitChoices& unit = units_.at(instance.path);
+  return unit.chosen->make_behaviour(*unit.chosen_parameters, states_[instance.gpc]);
 }
 
 std::vector<std::pair<std::string, std::string>> Configuration::parameters() const {
   std::vector<std::pair<std::string, std::string>> all;
-  const auto add = [&](const std::string& unit, const ParameterSet& set) {
-    for (const Parameter* parameter : set.parameters())
-      all.emplace_back(unit + "." + parameter->name(), parameter->value());
+  std::map<std::string, std::string> first;  // by the name that stands for all
+  const auto add = [&](const std::string& shared, const std::string& path, const ParameterSet& set) {
+    for (const Parameter* parameter : set.parameters()) {
+      const std::string name = shared + "." + parameter->name();
+      const std::string value = parameter->value();
+      const auto place = first.emplace(name, value);
+      if (place.second) {
+        all.emplace_back(name, value);
+      } else if (place.first->second != value) {
+        all.emplace_back(path + "." + parameter->name(), value);
+      }
+    }
   };
-  for (const std::string& name : Registry::slots()) add(name, *slots_.at(name).real_parameters);
-  add("l2", l2_);
-  add("state", state_parameters_);
+  for (const Slot& slot : Registry::instance().slots()) {
+    for (const Instance* instance : instances_of(slot.name)) {
+      add(slot.name, instance->path, *units_.at(instance->path).real_parameters);
+    }
+  }
+  if (has_l2()) add("l2", "l2", l2_);
+  for (const Link& link : netlist_.links()) {
+    add(link_prefix + without_gpc(link.name()), link_prefix + link.name(), *link.parameters);
+  }
+  add("state", "state", state_parameters_);
+  return all;
+}
+
+std::vector<std::pair<std::string, std::string>> Configuration::implementations() const {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (const Slot& slot : Registry::instance().slots()) {
+    const std::vector<const Instance*> instances = instances_of(slot.name);
+    for (const Instance* instance : instances) {
+      const std::string& name = implementation(*instance).name;
+      if (instance == instances.front()) {
+        all.emplace_back(slot.name, name);
+      } else if (name != implementation(*instances.front()).name) {
+        all.emplace_back(instance->path, name);
+      }
+    }
+  }
   return all;
 }
 

@@ -14,11 +14,7 @@ Platform desktop() {
       {"draw", "warps_per_1024_cycles", "352"},
       {"vpo", "triangles_per_cycle", "4"},
   };
-  platform.wire = [](Gpu& gpu) {
-    gpu.add_front_end("draw");
-    gpu.add_front_end("vpo");
-    for (unsigned gpc = 0; gpc < gpu.gpcs(); ++gpc) wire_gpc(gpu, gpc);
-  };
+  platform.wire = wire_pipeline;
   return platform;
 }
 

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "back_end.h"
+#include "elaborate.h"
+#include "run_ahead.h"
 
 #include <fmt/format.h>
 
@@ -15,115 +16,120 @@
 
 namespace vrpipe {
 
-namespace {
-
-std::pair<std::string, std::string> split_port(const std::string& port) {
-  const std::size_t dot = port.rfind('.');
-  if (dot == std::string::npos) {
-    throw UserError("cannot connect", port, "a port is named UNIT.PORT", "name the unit as well");
-  }
-  return {port.substr(0, dot), port.substr(dot + 1)};
-}
-
-}  // namespace
-
 Gpu::Gpu(const Configuration& configuration, ColorSurface& surface)
     : configuration_(configuration),
-      surface_(surface),
-      clock_(std::make_unique<ClockDomain>("clock", static_cast<std::uint64_t>(
-                                                        std::llround(1e6 / configuration.platform().frequency_mhz)))),
-      l2_(std::make_unique<FixedLatencyMemory>("l2", *clock_, configuration.l2().latency_cycles,
-                                               configuration.l2().bytes_per_cycle, configuration.platform().gpcs)) {
-  wire();
-  check_ports();
+      clock_(std::make_unique<ClockDomain>(
+          "clock", static_cast<std::uint64_t>(std::llround(1e6 / configuration.platform().frequency_mhz)))) {
+  const Netlist& netlist = configuration.netlist();
+  const RunRequest& request = configuration.request();
+  for (const Instance& instance : netlist.instances()) {
+    const bool runs_ahead = instance.slot == "zrop" && request.termination == Termination::strict &&
+                            request.variant.early_termination;
+    if (runs_ahead) ahead_[instance.gpc] = std::make_unique<RunAhead>(configuration, instance.gpc, surface);
+  }
+  for (const Instance& instance : netlist.instances()) add(instance, surface);
+  connect_units(netlist, request.observers.get(), [&](const std::string& path) { return find(path); });
+  for (const MemoryInstance& memory : netlist.memories()) add_memory(memory);
+  check();
 }
 
 Gpu::~Gpu() = default;
 
-void Gpu::wire() {
-  const Platform& platform = configuration_.platform();
-  call_with_fault([&] { platform.wire(*this); },
-                  [&](const char* text) {
-                    throw SimulationFault("platform " + platform.name, 0,
-                                          std::string("its wiring throws ") +
-                                              (text != nullptr ? text : "an exception of unknown type"));
-                  });
+Unit* Gpu::find(const std::string& path) const {
+  for (const Placed& placed : units_) {
+    if (placed.instance->path == path) return placed.unit.get();
+  }
+  return nullptr;
 }
 
-unsigned Gpu::gpcs() const { return configuration_.platform().gpcs; }
-
-Unit& Gpu::add_unit(const std::string& name, const std::string& slot, const RenderState& state) {
-  std::unique_ptr<Behaviour> behaviour = configuration_.make(slot, state.gpc);
-  follow_clock(*behaviour, *clock_);
-  if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(surface_);
-  if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get());
-      zrop != nullptr && state.termination == Termination::strict && state.early_termination) {
-    foresights_.push_back(std::make_unique<BinForesight>(configuration_, state.gpc));
-    zrop->foresee(*foresights_.back());
+void Gpu::add(const Instance& instance, ColorSurface& surface) {
+  const std::string& slot = instance.slot;
+  const RenderState& state = configuration_.state_of(instance.gpc);
+  const auto ahead = ahead_.find(instance.gpc);
+  std::unique_ptr<Behaviour> behaviour;
+  Behaviour* counting = nullptr;
+  if (ahead != ahead_.end() && (slot == "sm" || slot == "crop")) {
+    behaviour = ahead->second->make_repeating(slot);
+    counting = &ahead->second->unit(slot);
+  } else {
+    behaviour = configuration_.make(instance);
+    counting = behaviour.get();
   }
-  std::string module = name;
+  follow_clock(*counting, *clock_);
+  if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(surface);
+  if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get()); zrop != nullptr && ahead != ahead_.end()) {
+    zrop->foresee(*ahead->second);
+  }
+  std::string module = instance.path;
   std::replace(module.begin(), module.end(), '.', '_');
+  const unsigned gpcs = configuration_.netlist().gpcs();
   const Fidelity fidelity = configuration_.request().fidelity;
+  std::unique_ptr<Unit> unit;
   if (fidelity == Fidelity::cycle) {
-    units_.push_back(unit_maker(slot)(module, *clock_, std::move(behaviour), state, gpcs()));
+    unit = unit_maker(slot)(module, *clock_, std::move(behaviour), state, gpcs);
   } else {
     const Transport transport = fidelity == Fidelity::lt ? Transport::blocking : Transport::non_blocking;
-    units_.push_back(timed_unit_maker(slot)(module, *clock_, std::move(behaviour), state, gpcs(), transport));
+    unit = timed_unit_maker(slot)(module, *clock_, std::move(behaviour), state, gpcs, transport);
   }
-  names_.push_back(name);
-  return *units_.back();
-}
-
-Unit& Gpu::add_front_end(const std::string& slot) { return add_unit(slot, slot, configuration_.state_of(0)); }
-
-Unit& Gpu::add(unsigned gpc, const std::string& slot) {
-  return add_unit("gpc" + std::to_string(gpc) + "." + slot, slot, configuration_.state_of(gpc));
-}
-
-Unit& Gpu::unit(const std::string& name) {
-  const auto found = std::find(names_.begin(), names_.end(), name);
-  if (found == names_.end()) {
-    throw UserError("unknown unit '" + name + "'", "platform " + configuration_.platform().name,
-                    "it was not added to the GPU", "did you mean " + nearest_name(name, names_) + "?");
+  if (Observers* const observers = configuration_.request().observers.get()) {
+    if (StateObserver* const states = observers->of_unit(instance.path)) unit->observe_states(*states);
   }
-  return *units_[static_cast<std::size_t>(found - names_.begin())];
+  units_.push_back({&instance, std::move(unit), counting});
 }
 
-void Gpu::connect(const std::string& out, const std::string& in, unsigned depth, unsigned latency) {
-  const auto [from, out_port] = split_port(out);
-  const auto [to, in_port] = split_port(in);
-  unit(from).out(out_port).connect(unit(to).in(in_port), depth, latency);
-}
-
-void Gpu::connect_to_l2(const std::string& name) {
-  tlm::tlm_initiator_socket<32>* const socket = unit(name).memory_socket();
-  if (socket == nullptr) throw UserError("cannot connect", name, "the unit has no memory port", "leave it out");
-  socket->bind(l2_->port(l2_ports_++));
-}
-
-void Gpu::check_ports() const {
-  const auto check = [&](const auto& ports, const std::string& unit) {
-    for (const auto* port : ports) {
-      if (port->connected()) continue;
-      throw UserError("incomplete platform " + configuration_.platform().name, unit + "." + port->name(),
-                      "the port is not connected", "connect or stub it");
-    }
+void Gpu::add_memory(const MemoryInstance& memory) {
+  const auto units = static_cast<unsigned>(memory.units.size());
+  const auto refuse = [&](const std::string& where, const std::string& why, const std::string& remedy) {
+    throw UserError("cannot connect memory", where, why, remedy);
   };
-  for (std::size_t i = 0; i < units_.size(); ++i) {
-    check(units_[i]->in_ports, names_[i]);
-    check(units_[i]->out_ports, names_[i]);
+  std::vector<tlm::tlm_base_target_socket_b<32>*> sockets;
+  if (memory.make) {
+    ForeignMemory made = memory.make(memory.path, units);
+    if (made.module == nullptr) refuse(memory.path, "nothing was made", "return a module and its sockets");
+    memories_.push_back(std::move(made.module));
+    sockets = std::move(made.sockets);
+    if (sockets.size() == 1) sockets.resize(std::max(units, 1U), sockets.front());
+  } else {
+    if (l2_ != nullptr) refuse(memory.path, "the platform has an L2 already", "connect its units to that");
+    l2_ = std::make_unique<FixedLatencyMemory>(memory.path.c_str(), *clock_, configuration_.l2().latency_cycles,
+                                               configuration_.l2().bytes_per_cycle, units);
+    for (unsigned index = 0; index < units; ++index) sockets.push_back(&l2_->port(index));
+  }
+  if (sockets.size() < units) {
+    refuse(memory.path, fmt::format("{} units are connected to {} sockets", units, sockets.size()),
+           "give one for each, or one that takes many");
+  }
+  for (unsigned index = 0; index < units; ++index) {
+    tlm::tlm_initiator_socket<32>* const socket = find(memory.units[index])->memory_socket();
+    if (socket == nullptr) refuse(memory.units[index], "the unit has no memory port", "leave it out");
+    socket->bind(*sockets[index]);
+  }
+}
+
+void Gpu::check() const {
+  const std::string& platform = configuration_.platform().name;
+  const std::vector<MemoryInstance>& memories = configuration_.netlist().memories();
+  for (const Placed& placed : units_) {
+    const std::string& path = placed.instance->path;
+    check_ports(*placed.unit, path, platform);
+    const bool has_memory = std::any_of(memories.begin(), memories.end(), [&](const MemoryInstance& memory) {
+      return std::find(memory.units.begin(), memory.units.end(), path) != memory.units.end();
+    });
+    if (placed.unit->memory_socket() == nullptr || has_memory) continue;
+    throw UserError("incomplete platform " + platform, path, "its memory port is not connected",
+                    "use connect_memory");
   }
 }
 
 Cycle Gpu::run(std::atomic<float>* progress) {
   const RunRequest& request = configuration_.request();
   std::uint64_t seed = request.stall_seed;
-  for (const auto& unit : units_) {
-    for (InPort* port : unit->in_ports) {
+  for (const Placed& placed : units_) {
+    for (InPort* port : placed.unit->in_ports) {
       port->stall_randomly(mix(++seed), request.stall_per_256);
       port->open();
     }
-    for (OutPort* port : unit->out_ports) port->stall_randomly(mix(++seed), request.stall_per_256);
+    for (OutPort* port : placed.unit->out_ports) port->stall_randomly(mix(++seed), request.stall_per_256);
   }
   if (request.tick_order_seed != 0) {
     std::vector<unsigned> order(units_.size());
@@ -135,16 +141,14 @@ Cycle Gpu::run(std::atomic<float>* progress) {
   }
 
   // Unless a memory of another make has time of its own, the kernel's need not advance in every cycle.
-  const auto memory_ports =
-      std::count_if(units_.begin(), units_.end(), [](const auto& unit) { return unit->memory_socket() != nullptr; });
-  if (static_cast<unsigned>(memory_ports) == l2_ports_) clock_->set_cycles_per_activation(64);
+  if (memories_.empty()) clock_->set_cycles_per_activation(64);
 
   // In slices, so that progress shows; the clock is quiet once nothing is left to do.
   const sc_core::sc_time slice = sc_core::sc_time::from_value(clock_->period().value() * 50000);
-  const auto splats = static_cast<float>(std::max<std::size_t>(configuration_.state_of(0).draw->splats.size(), 1));
+  const auto splats = static_cast<float>(std::max<std::size_t>(configuration_.draw().splats.size(), 1));
   const auto issued = [&] {
     std::uint64_t warps = 0;
-    for (const OutPort* port : units_.front()->out_ports) warps += port->transferred();
+    for (const OutPort* port : units_.front().unit->out_ports) warps += port->transferred();
     return static_cast<float>(warps * splats_per_vertex_warp);
   };
   do {
@@ -155,21 +159,27 @@ Cycle Gpu::run(std::atomic<float>* progress) {
   } while (sc_core::sc_pending_activity());
 
   Cycle passed = 0;
+  bool any_end = false;
   bool ended = true;
-  for (const auto& unit : units_) {
-    if (dynamic_cast<CropBehaviour*>(&unit->behaviour()) == nullptr) continue;
-    if (unit->end_of_draw() == never) {
+  for (const Placed& placed : units_) {
+    if (!placed.unit->ends_draw()) continue;
+    any_end = true;
+    if (placed.unit->end_of_draw() == never) {
       ended = false;
     } else {
-      passed = std::max(passed, unit->end_of_draw());
+      passed = std::max(passed, placed.unit->end_of_draw());
     }
   }
+  // A platform whose pipeline ends elsewhere is done when all have come to rest.
+  if (!any_end) ended = std::all_of(units_.begin(), units_.end(), [](const Placed& each) { return each.unit->idle(); });
   if (!ended) {
     std::string waiting;
-    for (std::size_t i = 0; i < units_.size(); ++i) {
-      if (units_[i]->idle()) continue;
-      waiting += fmt::format("{}{} ({}", waiting.empty() ? "" : ", ", names_[i], name_of(units_[i]->account().state()));
-      for (const InPort* port : units_[i]->in_ports) {
+    for (const Placed& placed : units_) {
+      const Unit& unit = *placed.unit;
+      if (unit.idle()) continue;
+      waiting += fmt::format("{}{} ({}", waiting.empty() ? "" : ", ", placed.instance->path,
+                             name_of(unit.account().state()));
+      for (const InPort* port : unit.in_ports) {
         if (!port->empty()) waiting += fmt::format(", items at {}", port->name());
       }
       waiting += ")";
@@ -179,7 +189,7 @@ Cycle Gpu::run(std::atomic<float>* progress) {
   // A draw without quads ends when its end has passed through.
   const Cycle last_quad = clock_->draw_end().so_far();
   const Cycle end = last_quad > 0 ? last_quad : passed;
-  for (const auto& unit : units_) unit->close_account(end);
+  for (const Placed& placed : units_) placed.unit->close_account(end);
   if (progress != nullptr) *progress = 1;
   return end;
 }

@@ -28,11 +28,7 @@ Platform mobile() {
       {"l2", "latency_cycles", "200"},
       {"l2", "bytes_per_cycle", "64"},
   };
-  platform.wire = [](Gpu& gpu) {
-    gpu.add_front_end("draw");
-    gpu.add_front_end("vpo");
-    wire_gpc(gpu, 0);
-  };
+  platform.wire = wire_pipeline;
   return platform;
 }
 

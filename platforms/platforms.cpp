@@ -28,7 +28,7 @@ void add_platform(Platform platform) {
   for (const Platform& known : list()) {
     if (known.name == platform.name) return refuse("there is one of that name", "choose another name");
   }
-  if (platform.gpcs == 0 || !(platform.frequency_mhz > 0) || platform.wire == nullptr) {
+  if (platform.gpcs == 0 || !(platform.frequency_mhz > 0) || !platform.wire) {
     return refuse("it has no GPC, no frequency or no wiring", "set gpcs, frequency_mhz and wire");
   }
   list().push_back(std::move(platform));

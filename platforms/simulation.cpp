@@ -6,7 +6,8 @@
 #include <ctime>
 #include <map>
 
-#include "functional.h"
+#include "untimed_gpu.h"
+#include "work_counter.h"
 
 #include <fmt/format.h>
 
@@ -84,6 +85,13 @@ std::string hash_of(const RunResult& result) {
   }
   return fmt::format("{:016x}", hash);
 }
+
+const std::string l2 = "l2";
+
+/// The functional models of all units, and their slots.
+struct BehaviourList {
+  std::vector<std::pair<std::string, const Behaviour*>> of_slot;
+};
 
 /// Counters of all units, summed over GPCs, and extremes over them, in the order of the pipeline.
 std::vector<StatisticReport> collect(const BehaviourList& behaviours) {
@@ -172,15 +180,14 @@ void check_conservation(const Counts& c) {
             c.fragments_blended);
 }
 
-std::string slot_of(const std::string& unit) { return unit.substr(unit.rfind('.') + 1); }
-
 /// Units and what occupied them in a run of `cycles`. Also the bottleneck, and the utilization of the slots that have
 /// one: the share of their throughput's time, over all GPCs.
 class OccupancyReport {
  public:
   OccupancyReport(double cycles, RunResult& result) : cycles_(cycles), result_(result) {}
 
-  void add(UnitReport report, const std::vector<OccupancyPart>& parts) {
+  /// @param slot  of the unit; or `l2`
+  void add(UnitReport report, const std::string& slot, const std::vector<OccupancyPart>& parts) {
     std::map<unsigned, Bottleneck> resources;
     double throughput = 0;
     for (const OccupancyPart& part : parts) {
@@ -199,17 +206,21 @@ class OccupancyReport {
       }
     }
     check(report);
-    auto& [units, sum] = throughput_of_[slot_of(report.name)];
+    auto& [units, sum] = throughput_of_[slot];
     ++units;
     sum += throughput;
-    if (report.name != "l2") result_.units.push_back(std::move(report));
+    if (slot != l2) result_.units.push_back(std::move(report));
   }
 
   void finish() {
-    for (const char* slot : {"raster", "zrop", "prop", "sm", "crop", "l2"}) {
+    const auto report = [&](const std::string& slot) {
       const auto& [units, sum] = throughput_of_[slot];
       result_.utilization.emplace_back(slot, units > 0 ? sum / units : 0.0);
+    };
+    for (const Slot& slot : Registry::instance().slots()) {
+      if (slot.reports_utilization) report(slot.name);
     }
+    report(l2);
     result_.utilization.emplace_back("dram", 0.0);
   }
 
@@ -221,7 +232,7 @@ class OccupancyReport {
       if (spent > cycles) throw SimulationFault(report.name, cycles, fmt::format("{} cycles in one state", spent));
       sum += spent;
     }
-    if (sum != cycles && report.name != "l2") {
+    if (sum != cycles && report.name != l2) {
       throw SimulationFault(report.name, cycles, fmt::format("its states sum to {} cycles", sum));
     }
     // But for rounding of the shares themselves.
@@ -253,80 +264,93 @@ class HostTimer {
   double processor_ = processor_seconds();
 };
 
+void set_time(const Configuration& configuration, Cycle cycles, RunResult& result) {
+  result.cycles = cycles;
+  result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
+}
+
 void run_clocked(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
   Gpu gpu(configuration, result.surface);
   const HostTimer timer;
   const Cycle cycles = gpu.run(progress);
   timer.stop(result);
-  result.cycles = cycles;
-  result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
+  set_time(configuration, cycles, result);
   result.kernel_events = gpu.clock().activations();
 
   BehaviourList behaviours;
   OccupancyReport occupancy(static_cast<double>(cycles), result);
-  for (std::size_t i = 0; i < gpu.units().size(); ++i) {
-    const std::string& name = gpu.unit_names()[i];
-    behaviours.of_slot.emplace_back(slot_of(name), &gpu.units()[i]->behaviour());
+  for (const Gpu::Placed& placed : gpu.units()) {
+    behaviours.of_slot.emplace_back(placed.instance->slot, placed.behaviour);
     UnitReport report;
-    report.name = name;
+    report.name = placed.instance->path;
     for (unsigned state = 0; state < unit_states; ++state) {
-      report.cycles[state] = gpu.units()[i]->account().cycles(static_cast<UnitState>(state));
+      report.cycles[state] = placed.unit->account().cycles(static_cast<UnitState>(state));
     }
-    occupancy.add(std::move(report), gpu.units()[i]->occupancy().parts(cycles));
+    occupancy.add(std::move(report), placed.instance->slot, placed.unit->occupancy().parts(cycles));
   }
-  UnitReport l2;
-  l2.name = "l2";
-  occupancy.add(std::move(l2),
-                {{"bytes", 0, static_cast<double>(gpu.l2().bytes(cycles)) / gpu.l2().peak_rate(), true}});
+  if (gpu.l2() != nullptr) {
+    UnitReport report;
+    report.name = l2;
+    occupancy.add(std::move(report), l2,
+                  {{"bytes", 0, static_cast<double>(gpu.l2()->bytes(cycles)) / gpu.l2()->peak_rate(), true}});
+  }
   occupancy.finish();
   report_counts(behaviours, result);
 }
 
-void report_bound(const Configuration& configuration, const FunctionalGpu& gpu, RunResult& result) {
-  const std::vector<const PhaseBound*> bounds = gpu.bounds();
+/// The bounds of all GPCs: the longest is the draw's.
+void report_bound(const Configuration& configuration, const UntimedGpu& gpu, const std::vector<PhaseBound>& bounds,
+                  RunResult& result) {
   double longest = 0;
   // A GPC without quads does not keep the draw up, unless there is none at all.
-  const bool any_quads =
-      std::any_of(bounds.begin(), bounds.end(), [](const auto* bound) { return bound->has_quads(); });
-  for (const PhaseBound* bound : bounds) {
-    if (bound->has_quads() || !any_quads) longest = std::max(longest, bound->cycles());
+  const bool any_quads = std::any_of(bounds.begin(), bounds.end(), [](const auto& bound) { return bound.has_quads(); });
+  for (const PhaseBound& bound : bounds) {
+    if (bound.has_quads() || !any_quads) longest = std::max(longest, bound.cycles());
   }
   const auto cycles = static_cast<Cycle>(longest);
-  result.cycles = cycles;
-  result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
+  set_time(configuration, cycles, result);
   OccupancyReport occupancy(longest, result);
-  // Front end first; then a GPC's units, as the wiring diagrams add them.
-  const auto report = [&](const std::string& name, const PhaseBound& bound, const std::string& slot) {
+  for (const UntimedGpu::Placed& placed : gpu.units()) {
+    const Instance& instance = *placed.instance;
+    const PhaseBound& bound = bounds[instance.gpc];
     UnitReport unit;
-    unit.name = name;
-    const Cycle busy = std::min(cycles, static_cast<Cycle>(bound.busy_cycles(slot)));
+    unit.name = instance.path;
+    const Cycle busy = std::min(cycles, static_cast<Cycle>(bound.busy_cycles(instance.slot)));
     unit.cycles[static_cast<unsigned>(UnitState::busy)] = busy;
     unit.cycles[static_cast<unsigned>(UnitState::starved)] = cycles - busy;
-    occupancy.add(std::move(unit), bound.parts(slot));
-  };
-  for (const char* slot : {"draw", "vpo"}) report(slot, *bounds.front(), slot);
-  for (std::size_t gpc = 0; gpc < bounds.size(); ++gpc) {
-    for (const char* slot : {"tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) {
-      report("gpc" + std::to_string(gpc) + "." + slot, *bounds[gpc], slot);
-    }
+    occupancy.add(std::move(unit), instance.slot, bound.parts(instance.slot));
   }
-  UnitReport l2;
-  l2.name = "l2";
+  UnitReport report;
+  report.name = l2;
   double moved = 0;
-  for (const PhaseBound* bound : bounds) moved += bound->busy_cycles("l2") / static_cast<double>(bounds.size());
-  occupancy.add(std::move(l2), {{"bytes", 0, moved, true}});
+  for (const PhaseBound& bound : bounds) moved += bound.busy_cycles(l2) / static_cast<double>(bounds.size());
+  occupancy.add(std::move(report), l2, {{"bytes", 0, moved, true}});
   occupancy.finish();
 }
 
 /// Without time, or with the bound that follows from the work.
-void run_functional(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
-  const bool bounded = result.request.fidelity == Fidelity::bound;
-  FunctionalGpu gpu(configuration, result.surface, bounded);
+void run_untimed(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
+  UntimedGpu gpu(configuration, result.surface);
+  std::vector<PhaseBound> bounds;
+  std::vector<std::unique_ptr<WorkCounter>> counters;
+  if (result.request.fidelity == Fidelity::bound) {
+    const unsigned gpcs = configuration.netlist().gpcs();
+    for (unsigned gpc = 0; gpc < gpcs; ++gpc) bounds.emplace_back(configuration, gpc);
+    for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
+      counters.push_back(std::make_unique<WorkCounter>(configuration, gpu, gpc, bounds[gpc]));
+    }
+  }
   const HostTimer timer;
   gpu.run(progress);
+  for (const auto& counter : counters) counter->end_phase();
   timer.stop(result);
-  report_counts(gpu.behaviours(), result);
-  if (bounded) report_bound(configuration, gpu, result);
+
+  BehaviourList behaviours;
+  for (const UntimedGpu::Placed& placed : gpu.units()) {
+    behaviours.of_slot.emplace_back(placed.instance->slot, &placed.unit->behaviour());
+  }
+  report_counts(behaviours, result);
+  if (!bounds.empty()) report_bound(configuration, gpu, bounds, result);
 }
 
 }  // namespace
@@ -369,15 +393,13 @@ RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<floa
   RunResult result;
   result.request = request;
   result.surface = ColorSurface(draw.width, draw.height, request.format);
-  for (const std::string& slot : Registry::slots()) {
-    result.implementations.emplace_back(slot, configuration.implementation(slot).name);
-  }
+  result.implementations = configuration.implementations();
   result.parameters = configuration.parameters();
   if (request.fidelity == Fidelity::lt || request.fidelity == Fidelity::at) {
     result.outside_validated_range = outside_validated_range(result.parameters);
   }
   if (request.fidelity == Fidelity::functional || request.fidelity == Fidelity::bound) {
-    run_functional(configuration, progress, result);
+    run_untimed(configuration, progress, result);
   } else {
     run_clocked(configuration, progress, result);
   }
@@ -391,31 +413,47 @@ void check_configuration(const RunRequest& request) {
   empty.width = 1;
   empty.height = 1;
   const Configuration configuration(request, empty);
-  for (const std::string& slot : Registry::slots()) configuration.make(slot, 0);
+  for (const Instance& instance : configuration.netlist().instances()) configuration.make(instance);
 }
 
 std::vector<ParameterListing> list_parameters(const Platform* platform) {
   std::vector<ParameterListing> listings;
-  const auto apply = [&](const std::string& unit, ParameterSet& set) {
+  const auto apply = [&](const std::vector<std::string>& names, ParameterSet& set) {
     if (platform == nullptr) return;
     for (const Setting& setting : platform->settings) {
-      if (setting.unit == unit) set.set(setting.unit, setting.parameter, setting.value);
+      if (std::find(names.begin(), names.end(), setting.unit) != names.end())
+        set.set(setting.unit, setting.parameter, setting.value);
     }
   };
   for (const Implementation* implementation : Registry::instance().all()) {
     ParameterListing listing{implementation->slot, implementation->name, implementation->description,
                              implementation->pass_through, implementation->make_parameters()};
-    if (implementation == &default_implementation(implementation->slot, variants().back())) {
-      apply(implementation->slot, *listing.parameters);
+    const Slot& slot = Registry::instance().slot(implementation->slot);
+    if (implementation == &default_implementation(slot, variant_named("het+qm"))) {
+      apply({implementation->slot}, *listing.parameters);
     }
     listings.push_back(std::move(listing));
   }
-  listings.push_back({"l2", "fixed-latency", "the shared L2: fixed latency, a number of bytes a cycle for each GPC",
-                      false, std::make_unique<L2Parameters>()});
-  apply("l2", *listings.back().parameters);
+  listings.push_back({l2, "fixed-latency", "the shared L2: fixed latency, a number of bytes a cycle for each GPC", false,
+                      std::make_unique<L2Parameters>()});
+  apply({l2}, *listings.back().parameters);
+
+  const Platform& wired = platform != nullptr ? *platform : platforms().front();
+  Netlist netlist(wired.gpcs);
+  wired.wire(netlist);
+  std::vector<std::string> listed;
+  for (const Link& link : netlist.links()) {
+    const std::string name = "link." + without_gpc(link.name());
+    if (std::find(listed.begin(), listed.end(), name) != listed.end()) continue;
+    listed.push_back(name);
+    auto parameters = std::make_unique<LinkParameters>(link.parameters->depth, link.parameters->latency_cycles);
+    apply({name, "link." + link.name()}, *parameters);
+    listings.push_back({name, "link", without_gpc(link.from) + " to " + without_gpc(link.to), false, std::move(parameters)});
+  }
+
   listings.push_back({"state", "draw-state", "the draw's state and the precision of the fixed-function hardware", false,
                       std::make_unique<StateParameters>()});
-  apply("state", *listings.back().parameters);
+  apply({"state"}, *listings.back().parameters);
   return listings;
 }
 
@@ -426,8 +464,13 @@ StorageReport quad_merging_storage(const RunRequest& request) {
   RunRequest merging = request;
   merging.variant.quad_merging = true;
   const Configuration configuration(merging, empty);
-  return {configuration.make_as<TgcBehaviour>("tgc", 0)->storage_bytes(),
-          configuration.make_as<QruBehaviour>("qru", 0)->storage_bytes()};
+  StorageReport report;
+  for (const Instance& instance : configuration.netlist().instances()) {
+    if (instance.gpc != 0) continue;
+    if (instance.slot == "tgc") report.tgc_bytes += configuration.make_as<TgcBehaviour>(instance)->storage_bytes();
+    if (instance.slot == "qru") report.qru_bytes += configuration.make_as<QruBehaviour>(instance)->storage_bytes();
+  }
+  return report;
 }
 
 void fresh_simulation() {

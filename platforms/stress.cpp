@@ -8,27 +8,19 @@ namespace vrpipe {
 
 namespace {
 
-template <unsigned Depth>
-Platform with_links_of_depth() {
+/// With links of at most so many items.
+Platform with_links_of_depth(unsigned depth) {
   Platform platform = platform_named("agx-orin");
-  platform.wire = [](Gpu& gpu) {
-    gpu.add_front_end("draw");
-    gpu.add_front_end("vpo");
-    wire_gpc(gpu, 0, {Depth, Depth});
+  platform.wire = [wire = platform.wire, depth](Netlist& netlist) {
+    wire(netlist);
+    for (const Link& link : netlist.links()) link.parameters->depth = std::min<std::uint32_t>(link.parameters->depth, depth);
   };
   return platform;
 }
 
-template <unsigned Depth>
-Platform with_terminations_of_depth() {
+Platform with_terminations_of_depth(unsigned depth) {
   Platform platform = platform_named("agx-orin");
-  platform.wire = [](Gpu& gpu) {
-    gpu.add_front_end("draw");
-    gpu.add_front_end("vpo");
-    LinkDepths depths;
-    depths.terminations = Depth;
-    wire_gpc(gpu, 0, depths);
-  };
+  platform.settings.push_back({"link.crop.terminations", "depth", std::to_string(depth)});
   return platform;
 }
 
@@ -52,10 +44,10 @@ std::vector<StressConfiguration> make() {
       {"mobile", platform_named("mobile"), {}},
       {"desktop", platform_named("desktop"), {}},
       // Short queues.
-      {"links of depth 1", with_links_of_depth<1>(), {}, true},
-      {"links of depth 2", with_links_of_depth<2>(), {}},
-      {"termination queue of depth 1", with_terminations_of_depth<1>(), {}, true},
-      {"termination queue of depth 4", with_terminations_of_depth<4>(), {}},
+      {"links of depth 1", with_links_of_depth(1), {}, true},
+      {"links of depth 2", with_links_of_depth(2), {}},
+      {"termination queue of depth 1", with_terminations_of_depth(1), {}, true},
+      {"termination queue of depth 4", with_terminations_of_depth(4), {}},
       with("crop.input_quads=1"),
       with("crop.input_quads=8", true),
       with("crop.input_quads=16"),

@@ -1,15 +1,13 @@
-#include <algorithm>
-
 #include <vrpipe/platforms/wiring.h>
 
 namespace vrpipe {
 
-void wire_gpc(Gpu& gpu, unsigned gpc, const LinkDepths& depths) {
+void wire_gpc(Netlist& netlist, unsigned gpc, const std::string& memory) {
   const std::string index = std::to_string(gpc);
   const std::string self = "gpc" + index + ".";
-  for (const char* slot : {"tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) gpu.add(gpc, slot);
-  const auto connect = [&](const std::string& out, const std::string& in, unsigned depth = 4) {
-    gpu.connect(out, in, std::min(depth, depths.most));
+  for (const char* slot : {"tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) netlist.add(self + slot);
+  const auto connect = [&](const std::string& from, const std::string& to, unsigned depth = 4) {
+    netlist.connect(from, to, depth);
   };
 
   // Vertices: issued, shaded on the SM array, assembled.
@@ -34,9 +32,16 @@ void wire_gpc(Gpu& gpu, unsigned gpc, const LinkDepths& depths) {
   connect(self + "prop.out_color", self + "crop.in_color", 8);
 
   // Early termination: from the alpha test back to the stencil.
-  connect(self + "crop.out_terminations", self + "zrop.in_terminations", depths.terminations);
+  connect(self + "crop.out_terminations", self + "zrop.in_terminations", 16);
 
-  gpu.connect_to_l2(self + "crop");
+  netlist.connect_memory(self + "crop", memory);
+}
+
+void wire_pipeline(Netlist& netlist) {
+  netlist.add("draw");
+  netlist.add("vpo");
+  netlist.add_memory("l2");
+  for (unsigned gpc = 0; gpc < netlist.gpcs(); ++gpc) wire_gpc(netlist, gpc);
 }
 
 }  // namespace vrpipe

@@ -94,7 +94,7 @@ std::array<float, 3> parse_background(const std::string& text, const std::string
 
 Setting parse_setting(const std::string& text) {
   const std::size_t equals = text.find('=');
-  const std::size_t dot = text.find('.');
+  const std::size_t dot = text.rfind('.', equals);
   if (equals == std::string::npos || dot == std::string::npos || dot == 0 || dot + 1 >= equals ||
       equals + 1 == text.size()) {
     throw UserError("bad value '" + text + "'", "--set", "it is not UNIT.PARAMETER=VALUE",

@@ -9,6 +9,7 @@
 
 #include <vrpipe/accounting.h>
 #include <vrpipe/blend.h>
+#include <vrpipe/platforms/netlist.h>
 
 #include "parse.h"
 #include "report.h"
@@ -25,11 +26,11 @@ Json number(const std::string& text) {
   return read.ec == std::errc() && read.ptr == end ? Json(value) : Json(text);
 }
 
-/// The declaration of UNIT.PARAMETER, in the implementation that the request puts into the slot.
+/// The declaration of UNIT.PARAMETER or PATH.PARAMETER, in the implementation that the request puts into the slot.
 const Parameter* declaration(const std::vector<ParameterListing>& listings, const RunRequest& request,
                              const std::string& key) {
-  const std::size_t dot = key.find('.');
-  const std::string unit = key.substr(0, dot);
+  const std::size_t dot = key.rfind('.');
+  const std::string unit = without_gpc(key.substr(0, dot));
   const std::string name = key.substr(dot + 1);
   const Parameter* found = nullptr;
   for (const ParameterListing& listing : listings) {

@@ -19,21 +19,20 @@
 namespace vrpipe::tools {
 namespace {
 
-/// Whether the unit is what its slot gets in a variant that has it; l2, state and preprocess are no slots, and have one each.
+/// Whether the unit is what its slot gets in a variant that has it; what is no slot (l2, links, state, preprocess) has one each.
 bool is_default(const ParameterListing& unit) {
-  const std::vector<std::string>& slots = Registry::slots();
-  if (std::find(slots.begin(), slots.end(), unit.unit) == slots.end()) return true;
-  return default_implementation(unit.unit, variants().back()).name == unit.implementation;
+  const Registry& registry = Registry::instance();
+  if (!registry.has_slot(unit.unit)) return true;
+  return default_implementation(registry.slot(unit.unit), variant_named("het+qm")).name == unit.implementation;
 }
 
 struct Statistic {
   std::string name, unit, meaning;
 };
 
-/// What a unit counts; nothing for l2, state and preprocess, which are no slots.
+/// What a unit counts; nothing for what is no slot.
 std::vector<Statistic> statistics_of(const ParameterListing& unit) {
-  const std::vector<std::string>& slots = Registry::slots();
-  if (std::find(slots.begin(), slots.end(), unit.unit) == slots.end()) return {};
+  if (!Registry::instance().has_slot(unit.unit)) return {};
   Draw draw;
   draw.width = draw.height = 1;
   RenderState state;

@@ -35,6 +35,14 @@ class DrawEnd {
   Cycle so_far_ = 0;
 };
 
+/// Sees the states of a unit, from outside.
+class StateObserver {
+ public:
+  virtual ~StateObserver() = default;
+  /// The unit is in a state from a cycle on; before the first call it is starved. At `lt` and `at` the cycle may be ahead of the clock.
+  virtual void entered(UnitState state, Cycle from) = 0;
+};
+
 /// Charges cycles to states; a state holds until the next one is entered. What a unit does after the end of the draw is
 /// not charged, so changes are kept until the draw is known to last as long.
 class StateAccount {
@@ -45,6 +53,7 @@ class StateAccount {
   /// `now` is not before that of the call before.
   void enter(UnitState state, Cycle now) {
     if (state == state_) return;
+    if (observer_ != nullptr) observer_->entered(state, now);
     changes_.push({state_, now});
     state_ = state;
     if (changes_.size() >= most_changes_) settle();
@@ -52,6 +61,9 @@ class StateAccount {
 
   /// Charges exactly the `end` cycles of the run; not before `draw_end.so_far()`.
   void close(Cycle end);
+
+  /// The observer outlives the account.
+  void observe(StateObserver& observer) { observer_ = &observer; }
 
   UnitState state() const { return state_; }
   std::uint64_t cycles(UnitState state) const { return cycles_[static_cast<unsigned>(state)]; }
@@ -69,6 +81,7 @@ class StateAccount {
 
   static constexpr std::size_t fewest_changes = 64;
   const DrawEnd* draw_end_;
+  StateObserver* observer_ = nullptr;
   UnitState state_ = UnitState::starved;
   Ring<Change> changes_;  ///< not charged yet
   std::size_t most_changes_ = fewest_changes;

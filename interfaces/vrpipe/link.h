@@ -99,12 +99,40 @@ class InPort : public Port {
   virtual bool empty() const = 0;
 };
 
+/// Sees what passes a link, from outside.
+class LinkObserver {
+ public:
+  virtual ~LinkObserver() = default;
+};
+template <class Item>
+class ItemObserver : public LinkObserver {
+ public:
+  /// An item was taken, in the cycles from `first` to `last`; both are 0 without time. What an item leads to without
+  /// time, and at `lt`, passes other links before this is called.
+  virtual void passed(const Item& item, Cycle first, Cycle last) = 0;
+};
+/// Those of a link, perhaps for different items: it depends on the fidelity what a link carries.
+using LinkObservers = std::vector<LinkObserver*>;
+
+/// Of those of a link the one that sees such items; null for none. Throws UserError if there are others alone.
+template <class Item>
+ItemObserver<Item>* observer_of(const LinkObservers& observers, const Port& port);
+[[noreturn]] void refuse_observers(const Port& port);
+
+/// How a link is made.
+struct LinkOptions {
+  unsigned depth = 4;            ///< items that the receiver's queue holds, at least 1
+  unsigned latency = 1;          ///< cycles from push to visibility, at least 1
+  unsigned items_per_cycle = 0;  ///< that the link passes; 0: as many as its ends move
+  LinkObservers observers = {};  ///< which outlive the link
+};
+
 class OutPort : public Port {
  public:
   using Port::Port;
-  /// Binds to `in`, whose queue is to hold `depth` items, each visible `latency` cycles after it was pushed.
-  /// Throws UserError when the ends carry different items or one is taken.
-  virtual void connect(InPort& in, unsigned depth, unsigned latency) = 0;
+  /// Binds to `in`. Throws UserError when the ends carry different items or one is taken.
+  virtual void connect(InPort& in, const LinkOptions& options) = 0;
+  void connect(InPort& in, unsigned depth, unsigned latency) { connect(in, LinkOptions{depth, latency}); }
   virtual std::uint64_t transferred() const = 0;  ///< items so far
 };
 
@@ -117,6 +145,9 @@ class PortOwner {
   std::vector<InPort*> in_ports;
   std::vector<OutPort*> out_ports;
 };
+
+template <class Item>
+class LinkTap;
 
 /// What the sending ends of all fidelities have in common.
 template <class Item>
@@ -139,7 +170,8 @@ class OutEnd : public OutPort, protected tlm::tlm_bw_transport_if<StreamProtocol
   unsigned pipeline_items() const { return pipeline_items_; }
   /// Called when the socket is bound by hand, for instance through a recorder.
   void taken() { mark_connected(); }
-  void connect(InPort& in, unsigned depth, unsigned latency) override;
+  using OutPort::connect;
+  void connect(InPort& in, const LinkOptions& options) override;
 
   /// Whatever is pushed is taken at once and lost.
   void stub() override {
@@ -172,6 +204,7 @@ class OutEnd : public OutPort, protected tlm::tlm_bw_transport_if<StreamProtocol
 
   unsigned pipeline_items_ = 0;
   std::unique_ptr<Sink> stub_;
+  std::unique_ptr<LinkTap<Item>> tap_;
 };
 
 template <class Item>
@@ -183,8 +216,9 @@ template <class Item>
 class StreamOut : public OutEnd<Item> {
  public:
   using OutEnd<Item>::OutEnd;
+  using OutEnd<Item>::connect;
 
-  void connect(InPort& in, unsigned depth, unsigned latency) override;
+  void connect(InPort& in, const LinkOptions& options) override;
 
   /// Free places at the receiver, as known at the start of this cycle. For 0 of them the unit need not come back by
   /// itself: a credit wakes it, and so does the end of a random stall.
@@ -193,6 +227,7 @@ class StreamOut : public OutEnd<Item> {
       credits_ += pending_;
       pending_ = 0;
     }
+    if (rate_ != 0) return limited_credits();
     return this->stalled() ? wait_a_cycle() : credits_;
   }
   /// Moves an item; `credits()` must not be 0.
@@ -213,7 +248,18 @@ class StreamOut : public OutEnd<Item> {
     clock_.domain->wake(clock_.unit, clock_.domain->now() + 1);
     return 0;
   }
+  /// What the rate leaves of the credits in this cycle.
+  [[gnu::noinline]] unsigned limited_credits() {
+    const Cycle now = clock_.domain->now();
+    if (now > rate_cycle_) {
+      rate_cycle_ = now;
+      passed_ = 0;
+    }
+    if (this->stalled() || (passed_ == rate_ && credits_ > 0)) return wait_a_cycle();
+    return std::min(credits_, rate_ - passed_);
+  }
   [[gnu::noinline]] void transfer(const Item& item) {
+    if (rate_ != 0) ++passed_;
     payload_.item = &item;
     payload_.latency = this->pipeline_;
     StreamPhase phase = StreamPhase::transfer;
@@ -245,7 +291,10 @@ class StreamOut : public OutEnd<Item> {
   StreamPayload<Item> payload_;  ///< of the transfer under way
   unsigned credits_ = 0;
   unsigned pending_ = 0;
+  unsigned rate_ = 0;  ///< items per cycle; 0 for no limit. With one, items go through the socket
   Cycle credit_cycle_ = 0;
+  unsigned passed_ = 0;  ///< in `rate_cycle_`
+  Cycle rate_cycle_ = 0;
 };
 
 /// What the receiving ends of all fidelities have in common.
@@ -370,90 +419,101 @@ class StreamIn : public InEnd<Item> {
   unsigned latency_ = 1;
 };
 
-/// A proxy on a link that keeps every transfer with its cycle, and changes nothing.
+/// A proxy on a link that shows every transfer to an observer, and changes nothing.
 template <class Item>
-class LinkRecorder : public sc_core::sc_module,
-                     private tlm::tlm_fw_transport_if<StreamProtocol<Item>>,
-                     private tlm::tlm_bw_transport_if<StreamProtocol<Item>> {
+class LinkTap : public sc_core::sc_module,
+                private tlm::tlm_fw_transport_if<StreamProtocol<Item>>,
+                private tlm::tlm_bw_transport_if<StreamProtocol<Item>> {
  public:
-  struct Record {
-    Cycle cycle;
-    Item item;
-  };
-  LinkRecorder(const sc_core::sc_module_name& name, const ClockDomain& clock)
-      : sc_module(name), in("in"), out("out"), clock_(clock) {
+  LinkTap(const sc_core::sc_module_name& name, const ClockDomain& clock, ItemObserver<Item>& observer)
+      : sc_module(name), in("in"), out("out"), clock_(clock), observer_(observer) {
     in.bind(*static_cast<tlm::tlm_fw_transport_if<StreamProtocol<Item>>*>(this));
     out.bind(*static_cast<tlm::tlm_bw_transport_if<StreamProtocol<Item>>*>(this));
   }
   StreamTargetSocket<Item> in;
   StreamInitiatorSocket<Item> out;
-  const std::vector<Record>& records() const { return records_; }
 
  private:
   tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase& phase, sc_core::sc_time& t) override {
-    records_.push_back({payload.at == never ? clock_.now() : payload.at, *payload.item});
+    const bool clocked = payload.at == never;
+    observer_.passed(*payload.item, clocked ? clock_.now() : payload.at, clocked ? clock_.now() : payload.last);
     return out->nb_transport_fw(payload, phase, t);
   }
   tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase& phase, sc_core::sc_time& t) override {
     return in->nb_transport_bw(payload, phase, t);
   }
   void b_transport(StreamPayload<Item>& payload, sc_core::sc_time& t) override {
-    // The call returns only once what the item leads to has passed here, so its record comes first; the cycle in which
-    // it was taken is known afterwards.
-    const std::size_t index = records_.size();
-    records_.push_back({payload.at, *payload.item});
+    // The cycles in which it is taken are known when the call returns; what it carries may have changed by then.
+    const Item item = *payload.item;
     out->b_transport(payload, t);
-    records_[index].cycle = payload.at;
+    observer_.passed(item, payload.at, payload.last);
   }
   bool get_direct_mem_ptr(StreamPayload<Item>&, tlm::tlm_dmi&) override { return false; }
   unsigned transport_dbg(StreamPayload<Item>&) override { return 0; }
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
 
   const ClockDomain& clock_;
+  ItemObserver<Item>& observer_;
+};
+
+/// An observer that keeps every item with the cycle in which its first part was taken.
+template <class Item>
+class LinkRecorder : public ItemObserver<Item> {
+ public:
+  struct Record {
+    Cycle cycle;
+    Item item;
+  };
+  void passed(const Item& item, Cycle first, Cycle) override { records_.push_back({first, item}); }
+  const std::vector<Record>& records() const { return records_; }
+
+ private:
   std::vector<Record> records_;
 };
 
-/// Checks that the two ends carry the same item and are free; gives the receiving end.
+/// Throws UserError unless two ends carry the same item and are free.
+void check_ends(const OutPort& out, const InPort& in, bool same_item);
+
+/// Checks the two ends; gives the receiving one.
 template <class Item>
 InEnd<Item>& receiving_end(OutPort& out, InPort& in) {
   auto* const typed = dynamic_cast<InEnd<Item>*>(&in);
-  if (typed == nullptr) {
-    throw UserError("cannot connect", out.name() + " to " + in.name(), "the ports carry different items",
-                    "connect ports of the same item type");
-  }
-  if (out.connected() || in.connected()) {
-    throw UserError("cannot connect", out.name() + " to " + in.name(), "a port is connected already",
-                    "connect each port once");
-  }
+  check_ends(out, in, typed != nullptr);
   return *typed;
 }
 
 template <class Item>
-void OutEnd<Item>::connect(InPort& in, unsigned depth, unsigned latency) {
+ItemObserver<Item>* observer_of(const LinkObservers& observers, const Port& port) {
+  for (LinkObserver* observer : observers) {
+    if (auto* const typed = dynamic_cast<ItemObserver<Item>*>(observer)) return typed;
+  }
+  if (!observers.empty()) refuse_observers(port);
+  return nullptr;
+}
+
+template <class Item>
+void OutEnd<Item>::connect(InPort& in, const LinkOptions& options) {
   InEnd<Item>& end = receiving_end<Item>(*this, in);
-  end.configure(depth + pipeline_items_, latency);
-  socket.bind(end.socket);
+  end.configure(options.depth + pipeline_items_, options.latency);
+  if (ItemObserver<Item>* const observer = observer_of<Item>(options.observers, *this)) {
+    tap_ = std::make_unique<LinkTap<Item>>(sc_core::sc_gen_unique_name("tap"), *clock_.domain, *observer);
+    socket.bind(tap_->in);
+    tap_->out.bind(end.socket);
+  } else {
+    socket.bind(end.socket);
+  }
   mark_connected();
   end.taken();
 }
 
 template <class Item>
-void StreamOut<Item>::connect(InPort& in, unsigned depth, unsigned latency) {
-  OutEnd<Item>::connect(in, depth, latency);
-  direct_ = dynamic_cast<StreamIn<Item>*>(&in);
-  if (direct_ != nullptr) direct_->direct_ = this;
-}
-
-/// The same through a recorder.
-template <class Item>
-void connect_recorded(OutEnd<Item>& out, InPort& in, LinkRecorder<Item>& recorder, unsigned depth = 4,
-                      unsigned latency = 1) {
-  InEnd<Item>& end = receiving_end<Item>(out, in);
-  end.configure(depth + out.pipeline_items(), latency);
-  out.socket.bind(recorder.in);
-  recorder.out.bind(end.socket);
-  out.taken();
-  end.taken();
+void StreamOut<Item>::connect(InPort& in, const LinkOptions& options) {
+  OutEnd<Item>::connect(in, options);
+  rate_ = options.items_per_cycle;
+  auto* const end = dynamic_cast<StreamIn<Item>*>(&in);
+  if (end == nullptr || !options.observers.empty()) return;
+  if (rate_ == 0) direct_ = end;
+  end->direct_ = this;
 }
 
 }  // namespace vrpipe

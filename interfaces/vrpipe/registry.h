@@ -16,9 +16,18 @@ namespace vrpipe {
 /// of this repository are, whose tests check it.
 enum class Trust : std::uint8_t { checked, trusted };
 
+/// A kind of unit that platforms are built of. Instances of it have paths, such as gpc0.tc.
+struct Slot {
+  std::string name;            ///< e.g. "tc"
+  unsigned rank = 0;           ///< by which slots are listed: the order in which a frame flows through them
+  std::string implementation;  ///< what is in it, unless a user or a platform says otherwise
+  std::string stand_in = {};   ///< what is there in a variant without quad merging; empty if that changes nothing
+  bool reports_utilization = false;
+};
+
 /// An implementation of a slot: a unit that a platform can be built with.
 struct Implementation {
-  std::string slot;           ///< draw vpo tgc raster tc prop zrop qru sm crop
+  std::string slot;           ///< name of the slot
   std::string name;           ///< e.g. "pairing"
   std::string description;    ///< one line
   bool pass_through = false;  ///< stands in for a unit that a variant does not have
@@ -32,6 +41,8 @@ class Registry {
  public:
   static Registry& instance();
 
+  /// A second slot of a name is not taken but kept as a problem.
+  void add(Slot slot);
   /// A second implementation of a slot and name, or one of an unknown slot, is not taken but kept as a problem:
   /// registrars run while a library is loaded, when nothing may be thrown.
   void add(Implementation implementation);
@@ -52,13 +63,23 @@ class Registry {
   std::vector<const Implementation*> all() const;
   std::vector<const Implementation*> of_slot(const std::string& slot) const;
 
-  /// The slots, in the order in which a frame flows through them.
-  static const std::vector<std::string>& slots();
+  /// All slots, in the order of their ranks.
+  const std::vector<Slot>& slots() const { return slots_; }
+  bool has_slot(const std::string& name) const;
+  /// Throws UserError naming the nearest.
+  const Slot& slot(const std::string& name) const;
+  std::vector<std::string> slot_names() const;
 
  private:
+  std::vector<Slot> slots_;
   std::vector<std::unique_ptr<Implementation>> implementations_;
   std::vector<Problem> problems_;
   std::size_t registrations_ = 0;
+};
+
+/// Registers a slot at program or plugin load, before its implementations.
+struct SlotRegistrar {
+  explicit SlotRegistrar(Slot slot) { Registry::instance().add(std::move(slot)); }
 };
 
 /// Registers a behaviour class at program or plugin load. `Unit` has a nested `Parameters` (a ParameterSet) and a

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <new>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -223,12 +224,14 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     owner.outputs_.push_back(this);
   }
 
-  void connect(InPort& in, unsigned depth, unsigned latency) override;
+  using OutEnd<Item>::connect;
+  void connect(InPort& in, const LinkOptions& options) override;
 
   /// Sends an item whose parts are there in the cycles `at`, and which takes the link for so many. Returns the cycles in
   /// which it is taken; `at`, if it has to wait and nobody knows yet how long: then the port is not `clear`.
   Span send(const Item& item, Span at, unsigned beats = 1) {
     for (; this->stalled_at(at.first); ++at.first) at.last = std::max(at.last, at.first + 1);
+    if (rate_) at = limited(at, beats);
     if (!blocking_ && !unlimited_ && (waiting_items_ > 0 || credits_.empty())) {
       waiting_.push({item, at, beats});
       ++waiting_items_;
@@ -334,6 +337,11 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     }
   }
   void unlimited() override { unlimited_ = true; }
+  /// When the link passes an item, at its rate.
+  Span limited(Span at, unsigned beats) {
+    const Span passes = rate_->take(at.first, beats);
+    return {passes.first, std::max(passes.last, at.last + (passes.first - at.first))};
+  }
 
   struct Waiting {
     Item item;
@@ -342,6 +350,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
   };
   const bool blocking_;
   TimedIn<Item>* direct_ = nullptr;
+  std::optional<Flow> rate_;
   bool unlimited_ = false;
   bool prompt_ = false;
   bool room_wanted_ = false;
@@ -512,14 +521,17 @@ class TimedIn : public InEnd<Item>, public TimedInput {
 };
 
 template <class Item>
-void TimedOut<Item>::connect(InPort& in, unsigned depth, unsigned latency) {
-  OutEnd<Item>::connect(in, depth, latency);
+void TimedOut<Item>::connect(InPort& in, const LinkOptions& options) {
+  OutEnd<Item>::connect(in, options);
+  if (options.items_per_cycle != 0) rate_.emplace(options.items_per_cycle);
   // What is on its way through the pipeline in front of the link takes no place of the queue.
-  prompt_ = depth < activation_cycles;
-  direct_ = dynamic_cast<TimedIn<Item>*>(&in);
-  if (direct_ == nullptr) return;
-  direct_->direct_ = this;
-  direct_->prompt_ = prompt_;
+  prompt_ = options.depth < activation_cycles;
+  auto* const end = dynamic_cast<TimedIn<Item>*>(&in);
+  if (end == nullptr) return;
+  end->prompt_ = prompt_;
+  if (!options.observers.empty()) return;
+  direct_ = end;
+  end->direct_ = this;
 }
 
 /// An initiator on the TLM-2.0 base protocol, for timing only, whose accesses are b_transport calls that return when the

@@ -15,29 +15,41 @@
 
 namespace vrpipe {
 
-/// The timing model of a unit, a SystemC module: a functional model with ports and a clock. Ports are found by name, so that a
-/// platform wires units without knowing their classes. Clocked is the first base, so that the clock calls it directly.
-class Unit : public Clocked, public sc_core::sc_module, public PortOwner {
+/// A unit of a platform, at any fidelity: a functional model with ports. Ports are found by name, so that a platform wires
+/// units without knowing their classes.
+class Component : public PortOwner {
+ public:
+  using PortOwner::PortOwner;
+  /// Throws UserError naming the nearest port.
+  InPort& in(const std::string& name);
+  OutPort& out(const std::string& name);
+  bool has_out(const std::string& name) const;
+  /// For messages.
+  virtual std::string label() const = 0;
+  virtual Behaviour& behaviour() = 0;
+};
+
+/// The timing model of a unit, a SystemC module with a clock. Clocked is the first base, so that the clock calls it
+/// directly.
+class Unit : public Clocked, public sc_core::sc_module, public Component {
  public:
   /// Attaches to the clock. `work`: the kinds of work that take the unit's time.
   Unit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector<WorkKind> work);
 
-  /// Throws UserError naming the nearest port.
-  InPort& in(const std::string& name);
-  OutPort& out(const std::string& name);
-
+  std::string label() const override { return name(); }
   /// Whether no work is left inside or queued.
   virtual bool idle() const = 0;
-  virtual Behaviour& behaviour() = 0;
   /// For a unit with a memory port; null otherwise.
   virtual tlm::tlm_initiator_socket<32>* memory_socket() { return nullptr; }
-  /// For the unit at the end of the pipeline: the cycle in which the end of the draw has come there and all before it is
-  /// done; `never` before that.
+  /// Whether the draw is done when this unit, with others of the kind, is done: those at the end of the pipeline.
+  virtual bool ends_draw() const { return false; }
+  /// For such a unit: the cycle in which the end of the draw has come there and all before it is done; `never` before that.
   virtual Cycle end_of_draw() const { return never; }
 
   const Occupancy& occupancy() const { return occupancy_; }
   const StateAccount& account() const { return account_; }
   virtual void close_account(Cycle end) { account_.close(end); }
+  void observe_states(StateObserver& observer) { account_.observe(observer); }
 
  protected:
   void enter(UnitState state, Cycle now) { account_.enter(state, now); }

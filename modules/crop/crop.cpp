@@ -165,6 +165,7 @@ template class ColorRop<ColorFormat::rgba32f, BlendRounding::rtz>;
 template class ColorRop<ColorFormat::rgba32f, BlendRounding::measured>;
 
 namespace {
+const SlotRegistrar slot{{"crop", 100, "color-rop", "", true}};
 
 [[maybe_unused]] const bool registered = [] {
   Implementation implementation =

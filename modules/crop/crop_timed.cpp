@@ -65,6 +65,7 @@ class TimedCrop : public TimedUnit {
 
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket; }
+  bool ends_draw() const override { return true; }
   Cycle end_of_draw() const override { return end_; }
 
  private:

@@ -39,6 +39,7 @@ class CropUnit : public Unit {
   bool idle() const override { return in_.empty() && queue_.empty(); }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket; }
+  bool ends_draw() const override { return true; }
   Cycle end_of_draw() const override { return end_; }
 
  private:
@@ -202,7 +203,8 @@ class CropUnit : public Unit {
       }
       const ColorQuad& quad = entry.quad;
       monitor_->blended(entry.place, *quad.warp, quad.index, now);
-      const CropBehaviour::Outcome outcome = behaviour_->blend(entry.place, quad.live(), quad.color());
+      behaviour_->blend_quads(*quad.warp, quad.index, quad.index + 1, outcomes_);
+      const CropBehaviour::Outcome outcome = outcomes_[quad.index];
       if (outcome.terminated != 0) {
         if (beat.count == TerminationBeat::capacity) {
           out_.push(beat);
@@ -258,6 +260,7 @@ class CropUnit : public Unit {
   const unsigned longest_run_;       ///< sectors of a line
   MemoryPort memory_;
   const ColorSurface* surface_ = nullptr;
+  CropBehaviour::Outcomes outcomes_{};
   std::optional<CropCache> cache_;
   std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
   std::optional<BlendOrderMonitor> monitor_;

@@ -182,6 +182,7 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
 void SplatShader::shade_vertices(const VertexWarp&) { ++vertex_warps; }
 
 namespace {
+const SlotRegistrar slot{{"sm", 90, "splat-shader", "", true}};
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
                                                     "Gaussian splatting shaders with alpha pruning and quad merging",
                                                     false, Trust::trusted);

@@ -66,6 +66,7 @@ unsigned PrimitiveAssembly::assemble(std::uint32_t splat, std::array<Primitive, 
 }
 
 namespace {
+const SlotRegistrar slot{{"vpo", 20, "primitive-assembly"}};
 const Registrar<PrimitiveAssembly, VpoBehaviour> registrar("vpo", "primitive-assembly",
                                                            "two triangles per splat, culled and boxed", false,
                                                            Trust::trusted);

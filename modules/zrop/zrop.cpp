@@ -38,6 +38,7 @@ void DepthStencilRop::update(const TerminationSignal& signal) {
 }
 
 namespace {
+const SlotRegistrar slot{{"zrop", 70, "depth-stencil-rop", "", true}};
 const Registrar<DepthStencilRop, ZropBehaviour> registrar("zrop", "depth-stencil-rop",
                                                           "termination test and update on the stencil MSB", false,
                                                           Trust::trusted);

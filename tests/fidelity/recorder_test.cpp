@@ -1,12 +1,15 @@
-// A recorder on a link of a platform, at each fidelity that has links.
+// Observers of a link and of states, at each fidelity.
+#include <array>
 #include <functional>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <vrpipe/batch.h>
 #include <vrpipe/link.h>
-#include <vrpipe/platforms/gpu.h>
-#include <vrpipe/platforms/wiring.h>
+#include <vrpipe/error.h>
+#include <vrpipe/platforms/observers.h>
 
 #include "support/simulate.h"
 
@@ -14,42 +17,6 @@ namespace vrpipe {
 namespace {
 
 using namespace testing;
-
-// A flushed bin goes in beats at cycle, in one piece at lt and at.
-std::unique_ptr<LinkRecorder<QuadBeat>> beats;
-std::unique_ptr<LinkRecorder<BinItem>> bins;
-
-/// Puts a recorder between TC and PROP if they exchange such items.
-template <class Item>
-void record(Gpu& gpu, std::unique_ptr<LinkRecorder<Item>>& recorder) {
-  auto* const out = dynamic_cast<OutEnd<Item>*>(&gpu.unit("gpc0.tc").out("out_bins"));
-  if (out == nullptr) return;
-  recorder = std::make_unique<LinkRecorder<Item>>("bins", gpu.clock());
-  connect_recorded(*out, gpu.unit("gpc0.prop").in("in_bins"), *recorder, 8);
-}
-
-/// agx-orin with a recorder between TC and PROP.
-void wire_recorded(Gpu& gpu) {
-  gpu.add_front_end("draw");
-  gpu.add_front_end("vpo");
-  for (const char* slot : {"tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) gpu.add(0, slot);
-  gpu.connect("draw.out_vertices_0", "gpc0.sm.in_vertices");
-  gpu.connect("gpc0.sm.out_vertices", "vpo.in_vertices_0");
-  gpu.connect("vpo.out_primitives_0", "gpc0.tgc.in_primitives", 16);
-  gpu.connect("gpc0.tgc.out_jobs", "gpc0.raster.in_jobs", 16);
-  gpu.connect("gpc0.raster.out_quads", "gpc0.tc.in_quads", 8);
-  gpu.connect("gpc0.prop.out_test", "gpc0.zrop.in_quads", 8);
-  gpu.connect("gpc0.zrop.out_quads", "gpc0.prop.in_tested", 8);
-  gpu.connect("gpc0.prop.out_survivors", "gpc0.qru.in_quads", 8);
-  gpu.connect("gpc0.qru.out_warps", "gpc0.sm.in_warps", 8);
-  gpu.connect("gpc0.sm.out_shaded", "gpc0.prop.in_shaded", 64);
-  gpu.connect("gpc0.prop.out_release", "gpc0.sm.in_release", 8);
-  gpu.connect("gpc0.prop.out_color", "gpc0.crop.in_color", 8);
-  gpu.connect("gpc0.crop.out_terminations", "gpc0.zrop.in_terminations", 16);
-  gpu.connect_to_l2("gpc0.crop");
-  record(gpu, beats);
-  record(gpu, bins);
-}
 
 struct Seen {
   TileId tile;
@@ -83,26 +50,33 @@ std::vector<Seen> seen_in(const std::vector<Record>& records, Cycle end, const s
   return all;
 }
 
-TEST(Recorder, SeesTheSameBinsAtEveryFidelityAndChangesNothing) {
-  Platform platform = platform_named("agx-orin");
-  platform.name = "recorded";
-  platform.wire = wire_recorded;
+// A flushed bin goes in beats at cycle, in one piece elsewhere.
+TEST(LinkObservers, SeeTheSameBinsAtEveryFidelityAndChangeNothing) {
   const Draw draw = random_draw(150, 90, 300, 9);
   using Beat = LinkRecorder<QuadBeat>::Record;
   using Bin = LinkRecorder<BinItem>::Record;
 
   std::vector<Seen> reference;
-  for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt, Fidelity::at}) {
+  for (const Fidelity fidelity :
+       {Fidelity::cycle, Fidelity::lt, Fidelity::at, Fidelity::bound, Fidelity::functional}) {
     SCOPED_TRACE(name_of(fidelity));
     RunRequest request = request_of("het+qm", fidelity, strictly);
     const RunResult plain = run(request, draw);
-    request.platform = &platform;
+    std::vector<Beat> beats;
+    std::vector<Bin> bins;
+    request.observers = std::make_shared<Observers>();
+    request.observers->on_link<QuadBeat>("gpc0.tc.bins",
+                                         [&](const auto& passed) { beats.push_back({passed.first, passed.item}); });
+    request.observers->on_link<BinItem>("tc.bins", [&](const auto& passed) {
+      EXPECT_EQ(passed.link, "gpc0.tc.bins");
+      bins.push_back({passed.first, passed.item});
+    });
     const RunResult recorded = run(request, draw);
     EXPECT_EQ(recorded.result_hash, plain.result_hash);
     std::vector<Seen> seen;
     if (fidelity == Fidelity::cycle) {
       seen = seen_in<Beat>(
-          beats->records(), *recorded.cycles,
+          beats, *recorded.cycles,
           [](const Beat& beat) {
             return Seen{beat.item.tile, beat.item.count, beat.item.end_of_draw};
           },
@@ -110,7 +84,7 @@ TEST(Recorder, SeesTheSameBinsAtEveryFidelityAndChangesNothing) {
       reference = seen;
     } else {
       seen = seen_in<Bin>(
-          bins->records(), *recorded.cycles,
+          bins, recorded.cycles.value_or(0),
           [](const Bin& bin) {
             return Seen{bin.item.tile, bin.item.quads, bin.item.end_of_draw};
           },
@@ -120,8 +94,49 @@ TEST(Recorder, SeesTheSameBinsAtEveryFidelityAndChangesNothing) {
     for (const Seen& bin : seen) quads += bin.quads;
     EXPECT_EQ(quads, recorded.counts.quads_rasterized);
     EXPECT_TRUE(seen == reference);
-    beats.reset();
-    bins.reset();
+  }
+}
+
+TEST(LinkObservers, OfALinkThatIsNotThereOrCarriesOtherItemsAreRefused) {
+  const Draw draw = random_draw(32, 32, 10, 9);
+  const auto refused = [&](const auto& observe) {
+    RunRequest request = request_of("qm", Fidelity::at);
+    request.observers = std::make_shared<Observers>();
+    observe(*request.observers);
+    EXPECT_THROW(run(request, draw), UserError);
+  };
+  refused([](Observers& observers) { observers.on_link<BinItem>("tc.binz", [](const auto&) {}); });
+  refused([](Observers& observers) { observers.on_link<Warp>("tc.bins", [](const auto&) {}); });
+}
+
+TEST(StateObservers, SeeTheCyclesThatTheAccountsHave) {
+  const Draw draw = random_draw(150, 90, 300, 9);
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+    RunRequest request = request_of("het+qm", fidelity);
+    struct Unit {
+      UnitState state = UnitState::starved;
+      Cycle since = 0;
+      std::vector<std::pair<UnitState, std::pair<Cycle, Cycle>>> spans;
+    };
+    std::map<std::string, Unit> units;
+    request.observers = std::make_shared<Observers>();
+    request.observers->on_states([&](const std::string& name, UnitState state, Cycle from) {
+      Unit& unit = units[name];
+      unit.spans.push_back({unit.state, {unit.since, from}});
+      unit.state = state;
+      unit.since = from;
+    });
+    const RunResult result = run(request, draw);
+    for (const UnitReport& report : result.units) {
+      Unit& unit = units[report.name];
+      unit.spans.push_back({unit.state, {unit.since, *result.cycles}});
+      std::array<std::uint64_t, unit_states> cycles{};
+      for (const auto& [state, span] : unit.spans) {
+        const Cycle end = std::min(span.second, *result.cycles);
+        if (end > span.first) cycles[static_cast<unsigned>(state)] += end - span.first;
+      }
+      EXPECT_EQ(cycles, report.cycles) << report.name << " " << name_of(fidelity);
+    }
   }
 }
 

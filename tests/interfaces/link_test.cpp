@@ -172,13 +172,10 @@ TEST(LinkRecorder, SeesEveryTransferWithItsCycleAndChangesNothing) {
     Bench bench;
     Source<int>& source = bench.source<int>();
     Sink<int>& sink = bench.sink<int>();
-    std::unique_ptr<LinkRecorder<int>> recorder;
-    if (recorded) {
-      recorder = std::make_unique<LinkRecorder<int>>("recorder", bench.clock());
-      connect_recorded(source.out, sink.in, *recorder, 3, 2);
-    } else {
-      source.out.connect(sink.in, 3, 2);
-    }
+    LinkRecorder<int> recorder;
+    LinkOptions options{3, 2};
+    if (recorded) options.observers = {&recorder};
+    source.out.connect(sink.in, options);
     for (int i = 0; i < 40; ++i) source.add(i);
     sink.close(5, 17);
     bench.run();
@@ -187,10 +184,10 @@ TEST(LinkRecorder, SeesEveryTransferWithItsCycleAndChangesNothing) {
       continue;
     }
     EXPECT_EQ(cycles_of(sink), plain);
-    ASSERT_EQ(recorder->records().size(), 40u);
+    ASSERT_EQ(recorder.records().size(), 40u);
     for (std::size_t i = 0; i < 40; ++i) {
-      EXPECT_EQ(recorder->records()[i].item, static_cast<int>(i));
-      EXPECT_EQ(recorder->records()[i].cycle, source.sent()[i]);
+      EXPECT_EQ(recorder.records()[i].item, static_cast<int>(i));
+      EXPECT_EQ(recorder.records()[i].cycle, source.sent()[i]);
     }
   }
 }
@@ -203,15 +200,10 @@ TEST(LinkRecorder, ChangesNoCycleUnderAnyStalls) {
       Bench bench;
       Source<int>& source = bench.source<int>();
       Sink<int>& sink = bench.sink<int>();
-      std::unique_ptr<LinkRecorder<int>> recorder;
-      const auto depth = static_cast<unsigned>(1 + seed % 4);
-      const auto latency = static_cast<unsigned>(1 + seed % 3);
-      if (recorded) {
-        recorder = std::make_unique<LinkRecorder<int>>("recorder", bench.clock());
-        connect_recorded(source.out, sink.in, *recorder, depth, latency);
-      } else {
-        source.out.connect(sink.in, depth, latency);
-      }
+      LinkRecorder<int> recorder;
+      LinkOptions options{static_cast<unsigned>(1 + seed % 4), static_cast<unsigned>(1 + seed % 3)};
+      if (recorded) options.observers = {&recorder};
+      source.out.connect(sink.in, options);
       for (int i = 0; i < 60; ++i) source.add(i);
       bench.stall_randomly(seed, 80);
       bench.run();
@@ -219,6 +211,31 @@ TEST(LinkRecorder, ChangesNoCycleUnderAnyStalls) {
     }
     ASSERT_EQ(cycles[0].size(), 60u);
     ASSERT_EQ(cycles[0], cycles[1]) << seed;
+  }
+}
+
+TEST(LinkRecorder, OfOtherItemsIsRefused) {
+  Bench bench;
+  Source<int>& source = bench.source<int>();
+  Sink<int>& sink = bench.sink<int>();
+  LinkRecorder<char> recorder;
+  LinkOptions options;
+  options.observers = {&recorder};
+  EXPECT_THROW(source.out.connect(sink.in, options), UserError);
+}
+
+TEST(Link, PassesNoMoreItemsInACycleThanItsRate) {
+  for (const unsigned rate : {1U, 3U}) {
+    Bench bench;
+    Source<int>& source = bench.source<int>();
+    Sink<int>& sink = bench.sink<int>();
+    LinkOptions options{8, 1};
+    options.items_per_cycle = rate;
+    source.out.connect(sink.in, options);
+    for (int i = 0; i < 30; ++i) source.add(i);
+    bench.run();
+    ASSERT_EQ(sink.records().size(), 30U);
+    for (unsigned i = 0; i < 30; ++i) EXPECT_EQ(source.sent()[i], source.sent()[0] + i / rate) << rate;
   }
 }
 

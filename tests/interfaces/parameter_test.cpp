@@ -114,7 +114,7 @@ TEST(Counter, CountsBeyond32Bits) {
 }
 
 TEST(Registry, AllSlotsHaveAnImplementationWithParametersThatSayAllAboutThemselves) {
-  for (const std::string& slot : Registry::slots()) {
+  for (const std::string& slot : Registry::instance().slot_names()) {
     const auto implementations = Registry::instance().of_slot(slot);
     EXPECT_FALSE(implementations.empty()) << slot;
     for (const Implementation* implementation : implementations) {

@@ -85,12 +85,9 @@ struct Pair {
     clock = std::make_unique<ClockDomain>("clock", 1000);
     sender = std::make_unique<Sender>("sender", *clock, way.transport);
     taker = std::make_unique<Taker>("taker", *clock, way.transport, cycles_per_item);
-    if (way.recorded) {
-      recorder = std::make_unique<LinkRecorder<int>>("recorder", *clock);
-      connect_recorded(sender->out, taker->in, *recorder, depth, latency);
-    } else {
-      sender->out.connect(taker->in, depth, latency);
-    }
+    LinkOptions options{depth, latency};
+    if (way.recorded) options.observers = {&recorder};
+    sender->out.connect(taker->in, options);
   }
   void run() {
     taker->in.open();
@@ -101,7 +98,7 @@ struct Pair {
   std::unique_ptr<ClockDomain> clock;
   std::unique_ptr<Sender> sender;
   std::unique_ptr<Taker> taker;
-  std::unique_ptr<LinkRecorder<int>> recorder;
+  LinkRecorder<int> recorder;
 };
 
 std::vector<Cycle> firsts(const std::vector<Span>& spans) {

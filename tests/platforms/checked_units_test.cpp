@@ -322,7 +322,7 @@ TEST(CheckedUnits, AFaultNamesTheCycle) {
 
 /// The shipped units, not trusted.
 const bool registered = [] {
-  for (const std::string& slot : Registry::slots()) {
+  for (const Slot& slot : Registry::instance().slots()) {
     Implementation copy = default_implementation(slot, variant_named("het+qm"));
     copy.name = "checked";
     copy.trust = Trust::checked;
@@ -343,7 +343,7 @@ TEST(CheckedUnits, ChecksChangeNothing) {
             r.termination = termination;
           });
           const RunResult trusted = run(request, draw);
-          for (const std::string& slot : Registry::slots()) request.units.push_back({slot, "checked"});
+          for (const std::string& slot : Registry::instance().slot_names()) request.units.push_back({slot, "checked"});
           const RunResult checked = run(request, draw);
           EXPECT_EQ(checked.result_hash, trusted.result_hash) << platform << variant << name_of(fidelity);
           EXPECT_EQ(checked.statistics.size(), trusted.statistics.size());

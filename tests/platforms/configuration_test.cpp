@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/error.h>
-#include <vrpipe/platforms/gpu.h>
+#include <vrpipe/platforms/netlist.h>
 #include <vrpipe/registry.h>
 #include <vrpipe/timed.h>
 
@@ -65,7 +65,7 @@ TEST(Platforms, OneWithoutGpcFrequencyOrWiringOrOfANameThatIsTakenIsRefused) {
   const Platform good = platform_named("agx-orin");
   EXPECT_THROW(add_platform(good), UserError);
   for (const auto& [gpcs, megahertz, wire] :
-       {std::tuple{0U, 1.0, good.wire}, {1U, 0.0, good.wire}, {1U, 1.0, static_cast<decltype(good.wire)>(nullptr)}}) {
+       {std::tuple{0U, 1.0, good.wire}, {1U, 0.0, good.wire}, {1U, 1.0, decltype(good.wire)()}}) {
     Platform bad = good;
     bad.name = "bad";
     bad.gpcs = gpcs;
@@ -79,7 +79,7 @@ TEST(Platforms, OneWithoutGpcFrequencyOrWiringOrOfANameThatIsTakenIsRefused) {
 TEST(Platforms, WiringThatThrowsIsAFaultThatNamesThePlatform) {
   Platform platform = platform_named("agx-orin");
   platform.name = "broken";
-  platform.wire = [](Gpu&) { throw std::out_of_range("no such thing"); };
+  platform.wire = [](Netlist&) { throw std::out_of_range("no such thing"); };
   const RunRequest request = request_of("qm", Fidelity::lt, [&](RunRequest& r) { r.platform = &platform; });
   try {
     run(request, draw_of(16, 16));

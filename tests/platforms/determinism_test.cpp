@@ -1,11 +1,15 @@
 // What results may not depend on: repetition, the order of ticks, stalls, the depth of queues.
 
+#include <functional>
+#include <memory>
+#include <string>
+
 #include <gtest/gtest.h>
 
 #include <vrpipe/error.h>
-#include <vrpipe/platforms/gpu.h>
-#include <vrpipe/platforms/wiring.h>
-#include <vrpipe/testkit/sink.h>
+#include <vrpipe/platforms/netlist.h>
+#include <vrpipe/registry.h>
+#include <vrpipe/unit.h>
 
 #include "support/simulate.h"
 
@@ -100,28 +104,14 @@ TEST(Determinism, TheLatenciesOfShadersChangeNoImage) {
   }
 }
 
-/// agx-orin with queues of one place between all units.
-void wire_shallow(Gpu& gpu) {
-  gpu.add_front_end("draw");
-  gpu.add_front_end("vpo");
-  for (const char* slot : {"tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) gpu.add(0, slot);
-  const std::pair<const char*, const char*> links[] = {
-      {"draw.out_vertices_0", "gpc0.sm.in_vertices"},     {"gpc0.sm.out_vertices", "vpo.in_vertices_0"},
-      {"vpo.out_primitives_0", "gpc0.tgc.in_primitives"}, {"gpc0.tgc.out_jobs", "gpc0.raster.in_jobs"},
-      {"gpc0.raster.out_quads", "gpc0.tc.in_quads"},      {"gpc0.tc.out_bins", "gpc0.prop.in_bins"},
-      {"gpc0.prop.out_test", "gpc0.zrop.in_quads"},       {"gpc0.zrop.out_quads", "gpc0.prop.in_tested"},
-      {"gpc0.prop.out_survivors", "gpc0.qru.in_quads"},   {"gpc0.qru.out_warps", "gpc0.sm.in_warps"},
-      {"gpc0.sm.out_shaded", "gpc0.prop.in_shaded"},      {"gpc0.prop.out_release", "gpc0.sm.in_release"},
-      {"gpc0.prop.out_color", "gpc0.crop.in_color"},      {"gpc0.crop.out_terminations", "gpc0.zrop.in_terminations"}};
-  for (const auto& [out, in] : links) gpu.connect(out, in, 1);
-  gpu.connect_to_l2("gpc0.crop");
-}
-
 // case T10
 TEST(QueuesOfOnePlace, CompleteWithTheSameImageAndAreNotFaster) {
   Platform shallow = platform_named("agx-orin");
   shallow.name = "shallow";
-  shallow.wire = wire_shallow;
+  shallow.wire = [wire = shallow.wire](Netlist& netlist) {
+    wire(netlist);
+    for (const Link& link : netlist.links()) link.parameters->depth = 1;
+  };
   const Draw draw = testing::random_draw(64, 64, 300, 6);
   for (const Variant& variant : variants()) {
     const auto on = [&](const Platform* platform) {
@@ -139,33 +129,44 @@ TEST(QueuesOfOnePlace, CompleteWithTheSameImageAndAreNotFaster) {
   }
 }
 
+/// Takes nothing.
+class Wall : public Unit {
+ public:
+  Wall(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour)
+      : Unit(name, domain, {}), in_(*this, "in_color"), behaviour_(std::move(behaviour)) {}
+  bool idle() const override { return true; }
+  Behaviour& behaviour() override { return *behaviour_; }
+  bool ends_draw() const override { return true; }
+
+ private:
+  Cycle tick(Cycle) override { return never; }
+  StreamIn<ColorBeat> in_;
+  std::unique_ptr<Behaviour> behaviour_;
+};
+
+struct WallBehaviour : Behaviour {
+  struct Parameters : ParameterSet {};
+  WallBehaviour(const Parameters&, const RenderState&) {}
+};
+
+void register_wall() {
+  Registry::instance().add(Slot{"wall", 1000, "wall"});
+  const Registrar<WallBehaviour, Behaviour> wall("wall", "wall", "takes nothing");
+  register_unit_maker("wall", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                                 const RenderState&, unsigned) -> std::unique_ptr<Unit> {
+    return std::make_unique<Wall>(name.c_str(), domain, std::move(behaviour));
+  });
+}
+
 TEST(Deadlock, IsReportedWithTheUnitsThatWait) {
+  register_wall();
   Platform broken = platform_named("agx-orin");
   broken.name = "broken";
-  broken.wire = [](Gpu& gpu) {
-    gpu.add_front_end("draw");
-    gpu.add_front_end("vpo");
-    for (const char* slot : {"tgc", "raster", "tc", "prop", "qru", "sm", "crop"}) gpu.add(0, slot);
-    gpu.connect("draw.out_vertices_0", "gpc0.sm.in_vertices");
-    gpu.connect("gpc0.sm.out_vertices", "vpo.in_vertices_0");
-    gpu.connect("vpo.out_primitives_0", "gpc0.tgc.in_primitives");
-    gpu.connect("gpc0.tgc.out_jobs", "gpc0.raster.in_jobs");
-    gpu.connect("gpc0.raster.out_quads", "gpc0.tc.in_quads");
-    gpu.connect("gpc0.tc.out_bins", "gpc0.prop.in_bins");
-    gpu.connect("gpc0.prop.out_survivors", "gpc0.qru.in_quads");
-    gpu.connect("gpc0.qru.out_warps", "gpc0.sm.in_warps");
-    gpu.connect("gpc0.sm.out_shaded", "gpc0.prop.in_shaded");
-    gpu.connect("gpc0.prop.out_release", "gpc0.sm.in_release");
-    gpu.unit("gpc0.prop").in("in_tested").stub();
-    gpu.unit("gpc0.prop").out("out_test").stub();
-    gpu.unit("gpc0.crop").in("in_color").stub();
-    gpu.unit("gpc0.crop").out("out_terminations").stub();
-    gpu.connect_to_l2("gpc0.crop");
-    // Lives as long as the process; the GPU cannot own it.
-    auto* const wall = new testkit::Sink<ColorBeat>("wall", gpu.clock());
-    wall->close(0);
-    gpu.unit("gpc0.prop").out("out_color").connect(wall->in, 2, 1);
-    wall->in.open();
+  broken.wire = [wire = broken.wire](Netlist& netlist) {
+    wire(netlist);
+    netlist.disconnect("gpc0.prop.out_color");
+    netlist.add("gpc0.wall");
+    netlist.connect("gpc0.prop.out_color", "gpc0.wall.in_color", 2);
   };
   const Draw draw = testing::random_draw(64, 64, 300, 7);
   try {
@@ -180,49 +181,50 @@ TEST(Deadlock, IsReportedWithTheUnitsThatWait) {
   }
 }
 
-TEST(Wiring, APortLeftOpenIsNamed) {
-  Platform open = platform_named("agx-orin");
-  open.name = "open";
-  open.wire = [](Gpu& gpu) { gpu.add_front_end("draw"); };
+std::string refusal_of(std::function<void(Netlist&)> wire, Fidelity fidelity) {
+  Platform wrong = platform_named("agx-orin");
+  wrong.name = "wrong";
+  wrong.wire = std::move(wire);
   try {
-    run(request_of("baseline", Fidelity::cycle, [&](RunRequest& r) { r.platform = &open; }), testing::draw_of(16, 16));
-    FAIL();
+    run(request_of("baseline", fidelity, [&](RunRequest& r) { r.platform = &wrong; }), testing::draw_of(16, 16));
   } catch (const UserError& error) {
-    EXPECT_NE(std::string(error.what()).find("draw.out_vertices_0"), std::string::npos) << error.what();
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Wiring, APortLeftOpenIsNamed) {
+  for (const Fidelity fidelity : fidelities()) {
+    const std::string error = refusal_of([](Netlist& netlist) { netlist.add("draw"); }, fidelity);
+    EXPECT_NE(error.find("draw.out_vertices_0"), std::string::npos) << error;
   }
 }
 
 TEST(Wiring, UnknownUnitsAndPortsGetTheNearestName) {
-  Platform wrong = platform_named("agx-orin");
-  wrong.name = "wrong";
-  const auto message = [&](void (*wire)(Gpu&)) {
-    wrong.wire = wire;
-    try {
-      run(request_of("baseline", Fidelity::cycle, [&](RunRequest& r) { r.platform = &wrong; }),
-          testing::draw_of(16, 16));
-    } catch (const UserError& error) {
-      return std::string(error.what());
-    }
-    return std::string("no error");
-  };
-  EXPECT_NE(message([](Gpu& gpu) {
-              gpu.add_front_end("draw");
-              gpu.add_front_end("vpo");
-              gpu.connect("drow.out_vertices_0", "vpo.in_vertices_0");
-            }).find("did you mean draw"),
-            std::string::npos);
-  EXPECT_NE(message([](Gpu& gpu) {
-              gpu.add_front_end("draw");
-              gpu.add_front_end("vpo");
-              gpu.connect("draw.out_vertexes_0", "vpo.in_vertices_0");
-            }).find("out_vertices_0"),
-            std::string::npos);
-  EXPECT_NE(message([](Gpu& gpu) {
-              gpu.add_front_end("draw");
-              gpu.add(0, "tc");
-              gpu.connect("draw.out_vertices_0", "gpc0.tc.in_quads");
-            }).find("different items"),
-            std::string::npos);
+  for (const Fidelity fidelity : fidelities()) {
+    const auto expect = [&](const std::string& text, std::function<void(Netlist&)> wire) {
+      const std::string error = refusal_of(std::move(wire), fidelity);
+      EXPECT_NE(error.find(text), std::string::npos) << error << " at " << name_of(fidelity);
+    };
+    expect("did you mean draw", [](Netlist& netlist) {
+      netlist.add("draw");
+      netlist.add("vpo");
+      netlist.connect("drow.out_vertices_0", "vpo.in_vertices_0");
+    });
+    expect("out_vertices_0", [](Netlist& netlist) {
+      netlist.add("draw");
+      netlist.add("vpo");
+      netlist.connect("draw.out_vertexes_0", "vpo.in_vertices_0");
+    });
+    expect("different items", [](Netlist& netlist) {
+      netlist.add("draw");
+      netlist.add("gpc0.tc");
+      netlist.connect("draw.out_vertices_0", "gpc0.tc.in_quads");
+    });
+    expect("adds no unit", [](Netlist&) {});
+    expect("unknown slot 'tcc'", [](Netlist& netlist) { netlist.add("gpc0.tcc"); });
+    expect("has 1 GPCs", [](Netlist& netlist) { netlist.add("gpc1.tc"); });
+  }
 }
 
 TEST(Requests, UnknownNamesAndValuesAreRefusedBeforeAnythingRuns) {

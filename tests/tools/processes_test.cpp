@@ -17,7 +17,7 @@ namespace {
 using tools::CommandFailure;
 
 /// Platforms whose wiring fails in every way in which a simulation can.
-Platform failing(void (*wire)(Gpu&)) {
+Platform failing(void (*wire)(Netlist&)) {
   Platform platform = platforms().front();
   platform.name = "failing";
   platform.wire = wire;
@@ -34,7 +34,7 @@ std::vector<RunRequest> all_variants(const Platform& platform) {
   return requests;
 }
 
-CommandFailure failure_of(void (*wire)(Gpu&)) {
+CommandFailure failure_of(void (*wire)(Netlist&)) {
   fresh_simulation();  // other tests may have left one in this process
   const Platform platform = failing(wire);
   tools::ProgressLine progress;
@@ -49,13 +49,13 @@ CommandFailure failure_of(void (*wire)(Gpu&)) {
 
 TEST(Processes, AMistakeOfTheUserComesBackAsOne) {
   const CommandFailure failure =
-      failure_of([](Gpu&) { throw UserError("bad wiring", "here", "it is wrong", "mend it"); });
+      failure_of([](Netlist&) { throw UserError("bad wiring", "here", "it is wrong", "mend it"); });
   EXPECT_EQ(failure.exit_code, 2);
   EXPECT_STREQ(failure.what(), "bad wiring (here): it is wrong; mend it");
 }
 
 TEST(Processes, AFaultNamesTheVariant) {
-  const CommandFailure failure = failure_of([](Gpu&) { throw SimulationFault("gpc0.tc", 17, "a bin is lost"); });
+  const CommandFailure failure = failure_of([](Netlist&) { throw SimulationFault("gpc0.tc", 17, "a bin is lost"); });
   EXPECT_EQ(failure.exit_code, 1);
   const std::string text = failure.what();
   EXPECT_EQ(text.rfind("variant ", 0), 0U) << text;
@@ -63,7 +63,7 @@ TEST(Processes, AFaultNamesTheVariant) {
 }
 
 TEST(Processes, AKilledSimulationNamesTheSignal) {
-  const CommandFailure failure = failure_of([](Gpu&) { ::raise(SIGKILL); });
+  const CommandFailure failure = failure_of([](Netlist&) { ::raise(SIGKILL); });
   EXPECT_EQ(failure.exit_code, 1);
   const std::string text = failure.what();
   EXPECT_NE(text.find("variant "), std::string::npos) << text;
@@ -72,7 +72,7 @@ TEST(Processes, AKilledSimulationNamesTheSignal) {
 }
 
 TEST(Processes, AnEarlyExitIsAFault) {
-  const CommandFailure failure = failure_of([](Gpu&) { ::_exit(0); });
+  const CommandFailure failure = failure_of([](Netlist&) { ::_exit(0); });
   EXPECT_EQ(failure.exit_code, 1);
   EXPECT_NE(std::string(failure.what()).find("before it was done"), std::string::npos) << failure.what();
 }

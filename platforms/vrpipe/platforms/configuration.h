@@ -3,11 +3,14 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/parameter.h>
+#include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/registry.h>
+#include <vrpipe/unit.h>
 
 namespace vrpipe {
 
@@ -61,54 +64,60 @@ struct L2Parameters : ParameterSet {
                           4096,  "bytes",           source::open, "moved for each GPC: four sectors"};
 };
 
-/// A run's choices made final: an implementation and parameters for every slot.
+/// A run's choices made final: the platform's netlist, an implementation and parameters for every unit and link of it.
 class Configuration {
  public:
-  /// Throws UserError for an unknown unit, parameter or value.
+  /// Throws UserError for an unknown unit, link, parameter or value, and SimulationFault for a platform whose wiring
+  /// throws something else.
   Configuration(const RunRequest& request, const Draw& draw);
 
-  /// A unit of a slot, of GPC `gpc`. `state_of(gpc)` outlives it.
-  std::unique_ptr<Behaviour> make(const std::string& slot, unsigned gpc) const;
+  /// The functional model of an instance. This configuration outlives it.
+  std::unique_ptr<Behaviour> make(const Instance& instance) const;
   template <class SlotBehaviour>
-  std::unique_ptr<SlotBehaviour> make_as(const std::string& slot, unsigned gpc) const;
+  std::unique_ptr<SlotBehaviour> make_as(const Instance& instance) const {
+    return behaviour_as<SlotBehaviour>(make(instance));
+  }
 
   const RunRequest& request() const { return request_; }
   const Platform& platform() const { return *request_.platform; }
+  const Netlist& netlist() const { return netlist_; }
   const RenderState& state_of(unsigned gpc) const { return states_[gpc]; }
-  /// What is in a slot, in this variant.
-  const Implementation& implementation(const std::string& slot) const { return *slots_.at(slot).chosen; }
+  const Draw& draw() const { return *states_.front().draw; }
+  /// What is in an instance, in this variant.
+  const Implementation& implementation(const Instance& instance) const { return *units_.at(instance.path).chosen; }
   const L2Parameters& l2() const { return l2_; }
+  /// PATH.PARAMETER and value: the slot's where all its instances agree, otherwise also those of the instances that
+  /// differ from the first.
   std::vector<std::pair<std::string, std::string>> parameters() const;
+  /// Slot and name of the implementation in it, in the order of the pipeline; an instance's, by its path, where it
+  /// differs from the slot's first.
+  std::vector<std::pair<std::string, std::string>> implementations() const;
 
  private:
-  struct Slot {
+  struct UnitChoices {
     const Implementation* chosen = nullptr;  ///< in this variant
     const Implementation* real = nullptr;    ///< when not pass-through
     std::unique_ptr<ParameterSet> chosen_parameters;
     std::unique_ptr<ParameterSet> real_parameters;
   };
+  void wire();
+  void choose_implementations();
   void apply(const Setting& setting);
+  void set_link(const Setting& setting);
   bool concerns_chosen_unit(const Setting& setting) const;
+  std::vector<const Instance*> instances_named(const std::string& name) const;
+  std::vector<const Instance*> instances_of(const std::string& slot) const;
+  bool has_l2() const;
 
   RunRequest request_;
-  std::map<std::string, Slot> slots_;
+  Netlist netlist_;
+  std::map<std::string, UnitChoices> units_;  ///< by path
   StateParameters state_parameters_;
   L2Parameters l2_;
-  std::vector<RenderState> states_;
+  std::vector<RenderState> states_;  ///< by GPC
 };
 
-/// The default implementation of a slot; the pass-through one where the variant does without the unit.
-const Implementation& default_implementation(const std::string& slot, const Variant& variant);
-
-}  // namespace vrpipe
-
-#include <vrpipe/unit.h>
-
-namespace vrpipe {
-
-template <class SlotBehaviour>
-std::unique_ptr<SlotBehaviour> Configuration::make_as(const std::string& slot, unsigned gpc) const {
-  return behaviour_as<SlotBehaviour>(make(slot, gpc));
-}
+/// The default implementation of a slot; what stands in where the variant does without the unit.
+const Implementation& default_implementation(const Slot& slot, const Variant& variant);
 
 }  // namespace vrpipe

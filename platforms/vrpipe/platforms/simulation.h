@@ -3,6 +3,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,7 +18,8 @@
 
 namespace vrpipe {
 
-class Gpu;
+class Netlist;
+class Observers;
 
 /// How exact a run is about time.
 enum class Fidelity : std::uint8_t { functional, bound, lt, at, cycle };
@@ -39,25 +41,25 @@ const Variant& variant_named(const std::string& name);
 
 /// `--set UNIT.PARAMETER=VALUE`.
 struct Setting {
-  std::string unit;
+  std::string unit;  ///< a slot, or a unit's path; link.NAME; l2; state
   std::string parameter;
   std::string value;
 };
 
 /// `--unit SLOT=IMPLEMENTATION`.
 struct UnitChoice {
-  std::string slot;
+  std::string slot;  ///< or a unit's path
   std::string implementation;
 };
 
-/// A GPU: units wired up in C++.
+/// A GPU: units and the links between them.
 struct Platform {
   std::string name;
   std::string description;  ///< one line
   unsigned gpcs = 1;
   double frequency_mhz = 0;
-  std::vector<Setting> settings;     ///< where it differs from the units' defaults
-  void (*wire)(Gpu& gpu) = nullptr;  ///< the wiring diagram, used where there is time
+  std::vector<Setting> settings;               ///< where it differs from the units' defaults
+  std::function<void(Netlist& netlist)> wire;  ///< adds the units and links
 };
 
 /// All named platforms, the default first.
@@ -78,6 +80,8 @@ struct RunRequest {
   Termination termination = Termination::paper;
   std::vector<Setting> settings;
   std::vector<UnitChoice> units;
+  /// Seen from outside in this process; null for nothing.
+  std::shared_ptr<Observers> observers;
 
   /// For tests: a seed and a share of cycles (of 256) in which ports stall at random; 0 for none.
   std::uint64_t stall_seed = 0;

@@ -1,19 +1,15 @@
 #pragma once
 
-#include <string>
-
-#include <vrpipe/platforms/gpu.h>
+#include <vrpipe/platforms/netlist.h>
+#include <vrpipe/platforms/simulation.h>
 
 namespace vrpipe {
 
-/// Items that the links of a GPC hold: at most, and between CROP and ZROP.
-struct LinkDepths {
-  unsigned most = 64;
-  unsigned terminations = 16;
-};
+/// Adds the pipeline of one GPC behind a front end of `draw` and `vpo`, and connects it as in agx-orin; CROP's memory is
+/// `memory`, which is there already. Building block for platforms of several GPCs.
+void wire_gpc(Netlist& netlist, unsigned gpc, const std::string& memory = "l2");
 
-/// The pipeline of one GPC behind a front end of `draw` and `vpo`: adds its units and connects them as agx-orin does.
-/// Building block for platforms of several GPCs.
-void wire_gpc(Gpu& gpu, unsigned gpc, const LinkDepths& depths = {});
+/// The same for all GPCs, with a front end and an L2.
+void wire_pipeline(Netlist& netlist);
 
 }  // namespace vrpipe

@@ -3,18 +3,20 @@
 #include <string>
 
 #include <vrpipe/error.h>
-#include <vrpipe/platforms/gpu.h>
+#include <vrpipe/platforms/netlist.h>
+#include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/scene.h>
 
 namespace {
 
-void wire_twin(vrpipe::Gpu& gpu) {
-  gpu.add_front_end("draw");
-  gpu.add_front_end("vpo");
+void wire_twin(vrpipe::Netlist& gpu) {
+  gpu.add("draw");
+  gpu.add("vpo");
+  gpu.add_memory("l2");
   for (unsigned gpc = 0; gpc < gpu.gpcs(); ++gpc) {
     const std::string index = std::to_string(gpc);
     const std::string self = "gpc" + index + ".";
-    for (const char* slot : {"tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) gpu.add(gpc, slot);
+    for (const char* slot : {"tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) gpu.add(self + slot);
     gpu.connect("draw.out_vertices_" + index, self + "sm.in_vertices");
     gpu.connect(self + "sm.out_vertices", "vpo.in_vertices_" + index);
     gpu.connect("vpo.out_primitives_" + index, self + "tgc.in_primitives", 16);
@@ -29,7 +31,7 @@ void wire_twin(vrpipe::Gpu& gpu) {
     gpu.connect(self + "prop.out_release", self + "sm.in_release", 8);
     gpu.connect(self + "prop.out_color", self + "crop.in_color", 256);
     gpu.connect(self + "crop.out_terminations", self + "zrop.in_terminations", 16);
-    gpu.connect_to_l2(self + "crop");
+    gpu.connect_memory(self + "crop", "l2");
   }
 }
 

@@ -1,0 +1,50 @@
+#include <vrpipe/occupancy.h>
+#include <vrpipe/untimed.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// DRAW without time. Ports as in draw_unit.cpp.
+class UntimedDraw : public UntimedUnit {
+ public:
+  UntimedDraw(const std::string& name, std::unique_ptr<DrawBehaviour> behaviour, unsigned gpcs)
+      : UntimedUnit(name, DrawWork::count), behaviour_(std::move(behaviour)) {
+    for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
+      outs_.push_back(std::make_unique<UntimedOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
+    }
+  }
+
+  Behaviour& behaviour() override { return *behaviour_; }
+
+  bool run_piece() override {
+    VertexWarp warp;
+    if (behaviour_->next(warp)) {
+      did(DrawWork::warps, 1);
+      outs_[turn_]->send(warp);
+      turn_ = turn_ + 1 == outs_.size() ? 0 : turn_ + 1;
+      return true;
+    }
+    VertexWarp end;
+    end.end_of_draw = true;
+    for (const auto& out : outs_) out->send(end);
+    return false;
+  }
+
+ private:
+  std::unique_ptr<DrawBehaviour> behaviour_;
+  std::vector<std::unique_ptr<UntimedOut<VertexWarp>>> outs_;
+  std::size_t turn_ = 0;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_untimed_unit_maker("draw", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
+                                        const RenderState&, unsigned gpcs) {
+    return std::make_unique<UntimedDraw>(name, behaviour_as<DrawBehaviour>(std::move(behaviour)), gpcs);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

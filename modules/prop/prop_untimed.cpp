@@ -1,0 +1,58 @@
+#include <vrpipe/occupancy.h>
+#include <vrpipe/untimed.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// PROP without time: warps come and go in launch order. Ports as in prop_timed.cpp; slots are not released.
+class UntimedProp : public UntimedUnit {
+ public:
+  UntimedProp(const std::string& name, std::unique_ptr<PropBehaviour> behaviour, const RenderState& state)
+      : UntimedUnit(name, PropWork::count),
+        out_test_(*this, "out_test"),
+        out_survivors_(*this, "out_survivors"),
+        out_release_(*this, "out_release"),
+        out_color_(*this, "out_color"),
+        in_tested_(input<BinItem>("in_tested", [this](const BinItem& item) { forward(item); })),
+        in_bins_(input<BinItem>("in_bins",
+                                [this, tests = state.early_termination](const BinItem& item) {
+                                  did(PropWork::bins, item.quads);
+                                  tests ? out_test_.send(item) : forward(item);
+                                })),
+        in_shaded_(input<ShadedWarpItem>("in_shaded", [this](const ShadedWarpItem& item) { leave(item); })),
+        behaviour_(std::move(behaviour)) {}
+
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  void forward(const BinItem& item) {
+    did(PropWork::tested, item.quads);
+    out_survivors_.send(item);
+  }
+  void leave(const ShadedWarpItem& item) {
+    if (item.warp->count == 0 && !item.warp->end_of_draw) return item.warp->release();
+    out_color_.send(item);
+  }
+
+  UntimedOut<BinItem> out_test_;
+  UntimedOut<BinItem> out_survivors_;
+  UntimedOut<WarpRelease> out_release_;
+  UntimedOut<ShadedWarpItem> out_color_;
+  std::unique_ptr<UntimedIn<BinItem>> in_tested_;
+  std::unique_ptr<UntimedIn<BinItem>> in_bins_;
+  std::unique_ptr<UntimedIn<ShadedWarpItem>> in_shaded_;
+  std::unique_ptr<PropBehaviour> behaviour_;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_untimed_unit_maker("prop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
+                                        const RenderState& state, unsigned) {
+    return std::make_unique<UntimedProp>(name, behaviour_as<PropBehaviour>(std::move(behaviour)), state);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

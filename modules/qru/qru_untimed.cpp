@@ -1,0 +1,62 @@
+#include "qru/warp_numbering.h"
+
+#include <vrpipe/occupancy.h>
+#include <vrpipe/untimed.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// QRU without time. Ports as in qru_timed.cpp.
+class UntimedQru : public UntimedUnit {
+ public:
+  UntimedQru(const std::string& name, std::unique_ptr<QruBehaviour> behaviour, const RenderState& state)
+      : UntimedUnit(name, QruWork::count),
+        out_(*this, "out_warps"),
+        in_(input<BinItem>("in_quads", [this](const BinItem& item) { examine(item); })),
+        behaviour_(std::move(behaviour)),
+        numbering_(state) {}
+
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  void examine(const BinItem& item) {
+    if (item.end_of_draw) {
+      Warp end;
+      end.end_of_draw = true;
+      numbering_.number_end(end);
+      return out_.send(end);
+    }
+    const Quad* const quads = item.storage->flush.quads.data();
+    for (unsigned from = 0; from < item.quads;) {
+      bool launched = false;
+      from += behaviour_->examine(item.tile, quads + from, item.quads - from, warp_, launched);
+      if (launched) launch();
+    }
+    while (behaviour_->finish_bin(warp_)) launch();
+  }
+
+  void launch() {
+    did(QruWork::launches, 1);
+    numbering_.number(warp_);
+    out_.send(warp_);
+  }
+
+  UntimedOut<Warp> out_;
+  std::unique_ptr<UntimedIn<BinItem>> in_;
+  std::unique_ptr<QruBehaviour> behaviour_;
+  WarpNumbering numbering_;
+  Warp warp_;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_untimed_unit_maker("qru", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
+                                        const RenderState& state, unsigned) {
+    return std::make_unique<UntimedQru>(name, behaviour_as<QruBehaviour>(std::move(behaviour)), state);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

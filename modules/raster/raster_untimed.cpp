@@ -1,0 +1,56 @@
+#include <vrpipe/occupancy.h>
+#include <vrpipe/untimed.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// RASTER without time. Ports as in raster_unit.cpp.
+class UntimedRaster : public UntimedUnit {
+ public:
+  UntimedRaster(const std::string& name, std::unique_ptr<RasterBehaviour> behaviour)
+      : UntimedUnit(name, RasterWork::count),
+        out_(*this, "out_quads"),
+        in_(input<RasterJob>("in_jobs", [this](const RasterJob& job) { rasterize(job); })),
+        behaviour_(std::move(behaviour)) {}
+
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  void rasterize(const RasterJob& job) {
+    if (job.end_of_draw) {
+      QuadBeat end;
+      end.end_of_draw = true;
+      return out_.send(end);
+    }
+    did(RasterWork::setup, 1);
+    behaviour_->begin(job.primitive, job.clip);
+    unsigned tests = 0;
+    bool new_screen_tile = false;
+    while (behaviour_->next(tile_, tests, new_screen_tile)) {
+      did(RasterWork::coarse, tests);
+      did(RasterWork::fine, 1);
+      did(RasterWork::pairs, new_screen_tile ? 1U : 0U);
+      did(RasterWork::quads, tile_.count);
+      if (tile_.count > 0) out_.send(tile_);
+    }
+    did(RasterWork::coarse, tests);
+  }
+
+  UntimedOut<QuadBeat> out_;
+  std::unique_ptr<UntimedIn<RasterJob>> in_;
+  std::unique_ptr<RasterBehaviour> behaviour_;
+  QuadBeat tile_;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_untimed_unit_maker("raster", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
+                                        const RenderState&, unsigned) {
+    return std::make_unique<UntimedRaster>(name, behaviour_as<RasterBehaviour>(std::move(behaviour)));
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

@@ -1,0 +1,62 @@
+#include <vrpipe/occupancy.h>
+#include <vrpipe/untimed.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// TC without time: no time-out. Ports as in tc_timed.cpp.
+class UntimedTc : public UntimedUnit {
+ public:
+  UntimedTc(const std::string& name, std::unique_ptr<TcBehaviour> behaviour)
+      : UntimedUnit(name, TcWork::count),
+        out_(*this, "out_bins"),
+        in_(input<QuadBeat>("in_quads", [this](const QuadBeat& beat) { collect(beat); })),
+        behaviour_(std::move(behaviour)) {}
+
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  void collect(const QuadBeat& beat) {
+    if (beat.end_of_draw) return drain();
+    did(TcWork::quads, beat.count);
+    for (unsigned from = 0; from < beat.count;) {
+      bool flushed = false;
+      from += behaviour_->insert(beat, from, storage_.flush, flushed);
+      if (flushed) send();
+    }
+  }
+
+  void drain() {
+    while (behaviour_->flush_oldest(TcBehaviour::FlushReason::end_of_draw, storage_.flush)) send();
+    BinItem end;
+    end.end_of_draw = true;
+    out_.send(end);
+  }
+
+  void send() {
+    BinItem item;
+    item.storage = &storage_;
+    item.tile = storage_.flush.tile;
+    item.quads = static_cast<std::uint32_t>(storage_.flush.quads.size());
+    did(TcWork::beats, (item.quads + QuadBeat::capacity - 1) / QuadBeat::capacity);
+    out_.send(item);
+  }
+
+  UntimedOut<BinItem> out_;
+  std::unique_ptr<UntimedIn<QuadBeat>> in_;
+  std::unique_ptr<TcBehaviour> behaviour_;
+  BinStorage storage_;  ///< whose bin has passed by the time of the next
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_untimed_unit_maker("tc", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
+                                        const RenderState&, unsigned) {
+    return std::make_unique<UntimedTc>(name, behaviour_as<TcBehaviour>(std::move(behaviour)));
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

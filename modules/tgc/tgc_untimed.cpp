@@ -1,0 +1,62 @@
+#include <vrpipe/occupancy.h>
+#include <vrpipe/untimed.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// TGC without time. Ports as in tgc_unit.cpp.
+class UntimedTgc : public UntimedUnit {
+ public:
+  UntimedTgc(const std::string& name, std::unique_ptr<TgcBehaviour> behaviour)
+      : UntimedUnit(name, TgcWork::count),
+        out_(*this, "out_jobs"),
+        in_(input<PrimitiveItem>("in_primitives", [this](const PrimitiveItem& item) { enter_bins(item); })),
+        behaviour_(std::move(behaviour)) {}
+
+  Behaviour& behaviour() override { return *behaviour_; }
+
+ private:
+  void enter_bins(const PrimitiveItem& item) {
+    if (item.end_of_draw) return drain();
+    behaviour_->begin(item.primitive);
+    while (behaviour_->entering()) {
+      did(TgcWork::entries, 1);
+      if (behaviour_->step(flush_)) read_out();
+    }
+  }
+
+  void drain() {
+    while (behaviour_->drain(flush_)) read_out();
+    RasterJob end;
+    end.end_of_draw = true;
+    out_.send(end);
+  }
+
+  void read_out() {
+    RasterJob job;
+    job.clip = flush_.clip;
+    for (const Primitive& primitive : flush_.primitives) {
+      job.primitive = primitive;
+      out_.send(job);
+    }
+    did(TgcWork::primitives, flush_.primitives.size());
+  }
+
+  UntimedOut<RasterJob> out_;
+  std::unique_ptr<UntimedIn<PrimitiveItem>> in_;
+  std::unique_ptr<TgcBehaviour> behaviour_;
+  TgcBehaviour::Flush flush_;
+};
+
+[[maybe_unused]] const bool registered = [] {
+  register_untimed_unit_maker("tgc", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
+                                        const RenderState&, unsigned) {
+    return std::make_unique<UntimedTgc>(name, behaviour_as<TgcBehaviour>(std::move(behaviour)));
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

@@ -1,0 +1,54 @@
+#include <vrpipe/platforms/observers.h>
+
+#include <algorithm>
+
+#include <vrpipe/error.h>
+#include <vrpipe/platforms/netlist.h>
+
+namespace vrpipe {
+
+class Observers::States final : public StateObserver {
+ public:
+  States(std::string unit, const std::vector<std::function<void(const std::string&, UnitState, Cycle)>>& see)
+      : unit_(std::move(unit)), see_(see) {}
+  void entered(UnitState state, Cycle from) override {
+    for (const auto& see : see_) see(unit_, state, from);
+  }
+
+ private:
+  const std::string unit_;
+  const std::vector<std::function<void(const std::string&, UnitState, Cycle)>>& see_;
+};
+
+void Observers::check(const Netlist& netlist) const {
+  for (const OnLink& wanted : links_) {
+    std::vector<std::string> names;
+    bool found = false;
+    for (const Link& link : netlist.links()) {
+      names.push_back(link.name());
+      names.push_back(without_gpc(link.name()));
+      found = found || names_path(wanted.name, link.name());
+    }
+    if (found) continue;
+    throw UserError("cannot observe link '" + wanted.name + "'", "observers", "the platform has no such link",
+                    names.empty() ? "it has none" : "did you mean " + nearest_name(wanted.name, names) + "?");
+  }
+}
+
+LinkObservers Observers::of_link(const std::string& name) {
+  LinkObservers observers;
+  for (const OnLink& wanted : links_) {
+    if (!names_path(wanted.name, name)) continue;
+    made_.push_back(wanted.make(name));
+    observers.push_back(made_.back().get());
+  }
+  return observers;
+}
+
+StateObserver* Observers::of_unit(const std::string& path) {
+  if (states_.empty()) return nullptr;
+  made_states_.push_back(std::make_shared<States>(path, states_));
+  return made_states_.back().get();
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,79 @@
+#include "untimed_gpu.h"
+
+#include <algorithm>
+
+#include "elaborate.h"
+
+namespace vrpipe {
+
+namespace {
+
+class Prefetcher final : public UntimedTarget<Warp> {
+ public:
+  Prefetcher(UntimedTarget<Warp>& next, UntimedUnit& crop) : next_(next), crop_(crop) {}
+  void take(const Warp& warp) override {
+    crop_.prefetch(warp);
+    next_.take(warp);
+  }
+
+ private:
+  UntimedTarget<Warp>& next_;
+  UntimedUnit& crop_;
+};
+
+}  // namespace
+
+std::unique_ptr<UntimedTarget<Warp>> prefetch_ahead(UntimedUnit& qru, UntimedUnit& crop) {
+  for (OutPort* port : qru.out_ports) {
+    auto* const warps = dynamic_cast<UntimedOut<Warp>*>(port);
+    if (warps == nullptr || warps->target() == nullptr) continue;
+    auto prefetcher = std::make_unique<Prefetcher>(*warps->target(), crop);
+    warps->attach(*prefetcher);
+    return prefetcher;
+  }
+  return nullptr;
+}
+
+UntimedGpu::UntimedGpu(const Configuration& configuration, ColorSurface& surface) : configuration_(configuration) {
+  const Netlist& netlist = configuration.netlist();
+  for (const Instance& instance : netlist.instances()) {
+    std::unique_ptr<Behaviour> behaviour = configuration.make(instance);
+    if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(surface);
+    units_.push_back({&instance, untimed_unit_maker(instance.slot)(instance.path, std::move(behaviour),
+                                                                  configuration.state_of(instance.gpc), netlist.gpcs())});
+  }
+  connect_units(netlist, configuration.request().observers.get(), [&](const std::string& path) -> Component* {
+    for (const Placed& placed : units_) {
+      if (placed.instance->path == path) return placed.unit.get();
+    }
+    return nullptr;
+  });
+  for (const Placed& placed : units_) check_ports(*placed.unit, placed.instance->path, configuration.platform().name);
+  for (unsigned gpc = 0; gpc < netlist.gpcs(); ++gpc) {
+    UntimedUnit* const qru = of_slot("qru", gpc);
+    UntimedUnit* const crop = of_slot("crop", gpc);
+    if (qru != nullptr && crop != nullptr) prefetchers_.push_back(prefetch_ahead(*qru, *crop));
+  }
+}
+
+UntimedUnit* UntimedGpu::of_slot(const std::string& slot, unsigned gpc) const {
+  for (const Placed& placed : units_) {
+    const Instance& instance = *placed.instance;
+    if (instance.slot == slot && (instance.gpc == gpc || instance.in_front_end)) return placed.unit.get();
+  }
+  return nullptr;
+}
+
+void UntimedGpu::run(std::atomic<float>* progress) {
+  const auto splats = static_cast<float>(std::max<std::size_t>(configuration_.draw().splats.size(), 1));
+  for (const Placed& placed : units_) {
+    for (std::uint64_t pieces = 1; placed.unit->run_piece(); ++pieces) {
+      if (progress != nullptr && pieces % 128 == 0) {
+        *progress = std::min(1.0F, static_cast<float>(pieces * splats_per_vertex_warp) / splats);
+      }
+    }
+  }
+  if (progress != nullptr) *progress = 1;
+}
+
+}  // namespace vrpipe

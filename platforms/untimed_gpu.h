@@ -1,0 +1,41 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <vrpipe/platforms/configuration.h>
+#include <vrpipe/untimed.h>
+
+namespace vrpipe {
+
+/// A platform without time: its netlist, elaborated.
+class UntimedGpu {
+ public:
+  struct Placed {
+    const Instance* instance;
+    std::unique_ptr<UntimedUnit> unit;
+  };
+
+  /// CROP blends into the surface.
+  UntimedGpu(const Configuration& configuration, ColorSurface& surface);
+
+  const std::vector<Placed>& units() const { return units_; }
+  /// A slot's unit in a GPC; in a slot of the front end it serves all. Null for none.
+  UntimedUnit* of_slot(const std::string& slot, unsigned gpc) const;
+
+  /// `progress`, if given, goes from 0 to 1.
+  void run(std::atomic<float>* progress);
+
+ private:
+  const Configuration& configuration_;
+  std::vector<Placed> units_;
+  std::vector<std::unique_ptr<UntimedTarget<Warp>>> prefetchers_;
+};
+
+/// Lets the blender of a part of a platform know of the warps that a QRU launches: what they blend into is then in the
+/// host's cache.
+std::unique_ptr<UntimedTarget<Warp>> prefetch_ahead(UntimedUnit& qru, UntimedUnit& crop);
+
+}  // namespace vrpipe

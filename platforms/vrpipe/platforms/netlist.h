@@ -1,0 +1,118 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <systemc>
+#include <tlm>
+
+#include <vrpipe/parameter.h>
+
+namespace vrpipe {
+
+/// What a link is, set as `link.NAME.PARAMETER`: NAME is the sending unit's path and its port without "out_", for
+/// instance gpc0.tc.bins, or, of all GPCs alike, tc.bins.
+struct LinkParameters : ParameterSet {
+  LinkParameters(std::uint32_t items, std::uint32_t cycles);
+  Integer depth;
+  Integer latency_cycles;
+  Integer items_per_cycle;
+};
+
+/// A unit of a platform.
+struct Instance {
+  std::string path;            ///< gpc0.tc; vpo, which serves all GPCs
+  std::string slot;            ///< the kind of unit: tc
+  std::string implementation;  ///< another than the slot's default; empty for that
+  unsigned gpc = 0;            ///< from the path; 0 in the front end
+  bool in_front_end = true;    ///< serves all GPCs
+};
+
+/// A connection of two units.
+struct Link {
+  std::string from;  ///< PATH.PORT of the sending end
+  std::string to;    ///< and of the receiving end
+  std::shared_ptr<LinkParameters> parameters;
+  std::string name() const;  ///< as in `link.NAME`
+};
+
+/// A memory of another make, as an instance of a platform: a SystemC module, and sockets of the unmodified TLM-2.0 base
+/// protocol: one for each unit that is connected to it, or a single one that takes many.
+struct ForeignMemory {
+  std::unique_ptr<sc_core::sc_module> module;
+  std::vector<tlm::tlm_base_target_socket_b<32>*> sockets;
+};
+/// Makes the module of a name for so many units. At fidelities without time there are no accesses, and it is not called.
+using MemoryMaker = std::function<ForeignMemory(const std::string& name, unsigned units)>;
+
+struct MemoryInstance {
+  std::string path;
+  MemoryMaker make;                ///< none for the L2 of this library
+  std::vector<std::string> units;  ///< connected to it
+};
+
+/// A GPU as a list of units and links, which every fidelity elaborates: what is missing here is missing everywhere. A
+/// platform's `wire` fills it in; another's can be taken and edited. All throw UserError for a path or port that is not
+/// there, or is taken.
+class Netlist {
+ public:
+  /// @param gpcs  that the platform has
+  explicit Netlist(unsigned gpcs) : gpcs_(gpcs) {}
+  unsigned gpcs() const { return gpcs_; }
+
+  /// Adds a unit. The path ends in its slot, or `slot` says what it is; gpcN. at its beginning puts it in a GPC.
+  void add(const std::string& path, const std::string& slot = "", const std::string& implementation = "");
+  /// Connects two ports, PATH.PORT each. `depth`: items that the receiver's queue holds; `latency`: cycles from push to
+  /// visibility, at least 1. Ports are checked when the netlist is elaborated.
+  void connect(const std::string& from, const std::string& to, unsigned depth = 4, unsigned latency = 1);
+
+  /// Adds the L2 of this library, with the parameters `l2`, or a memory of another make in its place.
+  void add_memory(const std::string& path, MemoryMaker make = nullptr);
+  /// Binds the memory port of a unit.
+  void connect_memory(const std::string& unit, const std::string& memory);
+
+  /// Puts another implementation into an instance.
+  void replace(const std::string& path, const std::string& implementation);
+  /// Puts a unit into the link that begins at a port: `path` with its ports `in` and `out`. The new link, behind it, is
+  /// like the old one.
+  void insert(const std::string& from, const std::string& path, const std::string& slot, const std::string& in,
+              const std::string& out, const std::string& implementation = "");
+  /// Takes a unit out, with its links; the ports at their other ends are stubbed.
+  void remove(const std::string& path);
+  /// Takes a link out. Its ends are stubbed, if they are not connected again.
+  void disconnect(const std::string& from);
+  /// Leaves a port legally unconnected: nothing comes, and what is sent is lost.
+  void stub(const std::string& port);
+
+  const std::vector<Instance>& instances() const { return instances_; }
+  const std::vector<Link>& links() const { return links_; }
+  const std::vector<MemoryInstance>& memories() const { return memories_; }
+  const std::vector<std::string>& stubs() const { return stubs_; }
+
+  /// Null for none.
+  const Instance* find(const std::string& path) const;
+  const Link* link_from(const std::string& port) const;
+
+ private:
+  Instance& instance(const std::string& path);
+  std::vector<Link>::iterator link_at(const std::string& port);
+
+  unsigned gpcs_;
+  std::vector<Instance> instances_;
+  std::vector<Link> links_;
+  std::vector<MemoryInstance> memories_;
+  std::vector<std::string> stubs_;
+};
+
+/// Path and port of PATH.PORT. Throws UserError.
+std::pair<std::string, std::string> split_port(const std::string& port);
+/// A path without its GPC: tc of gpc0.tc; with `_N` of a port taken off as well.
+std::string without_gpc(const std::string& path);
+/// Whether a name means a path: the path itself, or that of all GPCs alike.
+bool names_path(const std::string& name, const std::string& path);
+
+}  // namespace vrpipe
