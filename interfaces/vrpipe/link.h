@@ -69,6 +69,7 @@ class Port {
   void stall_randomly(std::uint64_t seed, unsigned per_256) {
     stall_seed_ = seed;
     stall_per_256_ = per_256;
+    limited_ = limited_ || per_256 != 0;
   }
 
  protected:
@@ -80,6 +81,7 @@ class Port {
   [[noreturn]] void fault(const sc_core::sc_object& socket, const char* what) const;
 
   const ClockHandle clock_;
+  bool limited_ = false;  ///< by random stalls or a rate
 
  private:
   bool stalls_at(Cycle cycle) const;
@@ -227,8 +229,7 @@ class StreamOut : public OutEnd<Item> {
       credits_ += pending_;
       pending_ = 0;
     }
-    if (rate_ != 0) return limited_credits();
-    return this->stalled() ? wait_a_cycle() : credits_;
+    return this->limited_ ? limited_credits() : credits_;
   }
   /// Moves an item; `credits()` must not be 0.
   void push(const Item& item) {
@@ -255,7 +256,9 @@ class StreamOut : public OutEnd<Item> {
       rate_cycle_ = now;
       passed_ = 0;
     }
-    if (this->stalled() || (passed_ == rate_ && credits_ > 0)) return wait_a_cycle();
+    if (this->stalled()) return wait_a_cycle();
+    if (rate_ == 0) return credits_;
+    if (passed_ == rate_ && credits_ > 0) return wait_a_cycle();
     return std::min(credits_, rate_ - passed_);
   }
   [[gnu::noinline]] void transfer(const Item& item) {
@@ -510,6 +513,7 @@ template <class Item>
 void StreamOut<Item>::connect(InPort& in, const LinkOptions& options) {
   OutEnd<Item>::connect(in, options);
   rate_ = options.items_per_cycle;
+  this->limited_ = rate_ != 0;
   auto* const end = dynamic_cast<StreamIn<Item>*>(&in);
   if (end == nullptr || !options.observers.empty()) return;
   if (rate_ == 0) direct_ = end;

@@ -57,45 +57,45 @@ class Occupancy {
 // The kinds of work of each slot, and what they cost by the unit's own words: the same at every fidelity.
 
 struct DrawWork {
-  enum : unsigned { warps, count };  ///< in cycles between a warp and the next
+  enum : unsigned { warps };  ///< in cycles between a warp and the next
   static std::vector<WorkKind> kinds();
 };
 struct VpoWork {
-  enum : unsigned { triangles, count };
+  enum : unsigned { triangles };
   static std::vector<WorkKind> kinds(const Throughput& cost);
 };
 struct TgcWork {
-  enum : unsigned { entries, primitives, count };
+  enum : unsigned { entries, primitives };
   static std::vector<WorkKind> kinds(const Throughput& cost);
 };
 struct RasterWork {
-  enum : unsigned { setup, coarse, fine, pairs, quads, count };
+  enum : unsigned { setup, coarse, fine, pairs, quads };
   static std::vector<WorkKind> kinds(const RasterBehaviour::Cost& cost);
 };
 struct TcWork {
-  enum : unsigned { quads, beats, count };
+  enum : unsigned { quads, beats };
   static std::vector<WorkKind> kinds(const TcBehaviour::Cost& cost);
 };
 struct PropWork {
-  enum : unsigned { bins, tested, color, empty_warps, count };
+  enum : unsigned { bins, tested, color, empty_warps };
   static std::vector<WorkKind> kinds(const PropBehaviour::Cost& cost);
 };
 struct ZropWork {
-  enum : unsigned { tests, updates, count };  ///< quads tested, cycles with updates
+  enum : unsigned { tests, updates };  ///< quads tested, cycles with updates
   static std::vector<WorkKind> kinds(const ZropBehaviour::Cost& cost);
 };
 struct QruWork {
-  enum : unsigned { quads, launches, count };  ///< quads examined in cycles without a launch, which ends a cycle
+  enum : unsigned { quads, launches };  ///< quads examined in cycles without a launch, which ends a cycle
   static std::vector<WorkKind> kinds(const Throughput& cost);
 };
 struct SmWork {
-  enum : unsigned { vertex, fragment, merge, count };  ///< warp instructions
+  enum : unsigned { vertex, fragment, merge };  ///< warp instructions
   static std::vector<WorkKind> kinds(const SmBehaviour::Cost& cost);
 };
 struct CropWork {
   /// Quads blended, sectors moved, and what hazards waste of the blender: shares of a cycle, of which one has
   /// `parts_of_a_cycle`.
-  enum : unsigned { blend, sectors, forwarding, count };
+  enum : unsigned { blend, sectors, forwarding };
   static std::uint64_t parts_of_a_cycle(const CropBehaviour::Cost& cost) {
     return std::uint64_t{cost.blend_rate.items} * cost.sectors_per_cycle;
   }

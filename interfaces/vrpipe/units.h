@@ -241,6 +241,10 @@ class CropBehaviour : public Behaviour {
   };
   /// Blends the live samples of a quad into the one at a place of the surface's grid.
   virtual Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) = 0;
+  /// The same for a quad of a warp, which timing models that blend quad by quad call.
+  virtual Outcome blend_quad(std::size_t place, const ShadedWarp& warp, unsigned index) {
+    return blend(place, warp.live[index], warp.color[index]);
+  }
   /// By quad of a warp.
   using Outcomes = std::array<Outcome, quads_per_warp>;
   /// Blends quads `from` to `to` - 1 of a warp, in this order.

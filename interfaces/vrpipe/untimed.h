@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <string>
@@ -64,7 +65,7 @@ class UntimedOut : public OutPort {
 
 /// The receiving end of a unit.
 template <class Item>
-class UntimedIn : public InPort, public UntimedTarget<Item> {
+class UntimedIn : public UntimedTarget<Item>, public InPort {
  public:
   UntimedIn(PortOwner& owner, const std::string& name) : InPort(name, owner.clock) { owner.in_ports.push_back(this); }
   void taken() { mark_connected(); }
@@ -117,11 +118,11 @@ class BlendObserver {
 /// A unit without time: a functional model with ports.
 class UntimedUnit : public Component {
  public:
-  /// @param kinds  of work that the slot's units do (occupancy.h)
-  UntimedUnit(std::string name, unsigned kinds) : Component(ClockHandle()), name_(std::move(name)), items_(kinds, 0) {}
+  explicit UntimedUnit(std::string name) : Component(ClockHandle()), name_(std::move(name)) {}
 
   std::string label() const override { return name_; }
-  /// Of a kind of work, so far: the items that it is counted in, but whole warps where that is cycles or instructions.
+  /// Of a kind of work of its slot (occupancy.h), so far: the items that it is counted in, but whole warps where that is
+  /// cycles or instructions.
   std::uint64_t items(unsigned kind) const { return items_[kind]; }
 
   /// For the unit that begins a draw: does a piece of it; false after the last.
@@ -140,7 +141,8 @@ class UntimedUnit : public Component {
 
  private:
   std::string name_;
-  std::vector<std::uint64_t> items_;
+  static constexpr unsigned most_kinds = 8;
+  std::array<std::uint64_t, most_kinds> items_{};
 };
 
 /// Makes the unit without time around a functional model of a slot. `gpcs` is how many GPCs the front end serves.

@@ -203,8 +203,7 @@ class CropUnit : public Unit {
       }
       const ColorQuad& quad = entry.quad;
       monitor_->blended(entry.place, *quad.warp, quad.index, now);
-      behaviour_->blend_quads(*quad.warp, quad.index, quad.index + 1, outcomes_);
-      const CropBehaviour::Outcome outcome = outcomes_[quad.index];
+      const CropBehaviour::Outcome outcome = behaviour_->blend_quad(entry.place, *quad.warp, quad.index);
       if (outcome.terminated != 0) {
         if (beat.count == TerminationBeat::capacity) {
           out_.push(beat);
@@ -260,7 +259,6 @@ class CropUnit : public Unit {
   const unsigned longest_run_;       ///< sectors of a line
   MemoryPort memory_;
   const ColorSurface* surface_ = nullptr;
-  CropBehaviour::Outcomes outcomes_{};
   std::optional<CropCache> cache_;
   std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
   std::optional<BlendOrderMonitor> monitor_;

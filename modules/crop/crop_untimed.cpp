@@ -13,7 +13,7 @@ namespace {
 class UntimedCrop : public UntimedUnit {
  public:
   UntimedCrop(const std::string& name, std::unique_ptr<CropBehaviour> behaviour)
-      : UntimedUnit(name, CropWork::count),
+      : UntimedUnit(name),
         out_(*this, "out_terminations"),
         in_(input<ShadedWarpItem>("in_color", [this](const ShadedWarpItem& item) { take(*item.warp); })),
         behaviour_(std::move(behaviour)) {}

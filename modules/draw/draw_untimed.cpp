@@ -9,7 +9,7 @@ namespace {
 class UntimedDraw : public UntimedUnit {
  public:
   UntimedDraw(const std::string& name, std::unique_ptr<DrawBehaviour> behaviour, unsigned gpcs)
-      : UntimedUnit(name, DrawWork::count), behaviour_(std::move(behaviour)) {
+      : UntimedUnit(name), behaviour_(std::move(behaviour)) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<UntimedOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
     }

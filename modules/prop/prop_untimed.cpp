@@ -9,7 +9,7 @@ namespace {
 class UntimedProp : public UntimedUnit {
  public:
   UntimedProp(const std::string& name, std::unique_ptr<PropBehaviour> behaviour, const RenderState& state)
-      : UntimedUnit(name, PropWork::count),
+      : UntimedUnit(name),
         out_test_(*this, "out_test"),
         out_survivors_(*this, "out_survivors"),
         out_release_(*this, "out_release"),
@@ -17,7 +17,6 @@ class UntimedProp : public UntimedUnit {
         in_tested_(input<BinItem>("in_tested", [this](const BinItem& item) { forward(item); })),
         in_bins_(input<BinItem>("in_bins",
                                 [this, tests = state.early_termination](const BinItem& item) {
-                                  did(PropWork::bins, item.quads);
                                   tests ? out_test_.send(item) : forward(item);
                                 })),
         in_shaded_(input<ShadedWarpItem>("in_shaded", [this](const ShadedWarpItem& item) { leave(item); })),
@@ -27,7 +26,6 @@ class UntimedProp : public UntimedUnit {
 
  private:
   void forward(const BinItem& item) {
-    did(PropWork::tested, item.quads);
     out_survivors_.send(item);
   }
   void leave(const ShadedWarpItem& item) {

@@ -11,7 +11,7 @@ namespace {
 class UntimedQru : public UntimedUnit {
  public:
   UntimedQru(const std::string& name, std::unique_ptr<QruBehaviour> behaviour, const RenderState& state)
-      : UntimedUnit(name, QruWork::count),
+      : UntimedUnit(name),
         out_(*this, "out_warps"),
         in_(input<BinItem>("in_quads", [this](const BinItem& item) { examine(item); })),
         behaviour_(std::move(behaviour)),

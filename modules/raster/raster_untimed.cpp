@@ -9,7 +9,7 @@ namespace {
 class UntimedRaster : public UntimedUnit {
  public:
   UntimedRaster(const std::string& name, std::unique_ptr<RasterBehaviour> behaviour)
-      : UntimedUnit(name, RasterWork::count),
+      : UntimedUnit(name),
         out_(*this, "out_quads"),
         in_(input<RasterJob>("in_jobs", [this](const RasterJob& job) { rasterize(job); })),
         behaviour_(std::move(behaviour)) {}

@@ -9,7 +9,7 @@ namespace {
 class UntimedSm : public UntimedUnit {
  public:
   UntimedSm(const std::string& name, std::unique_ptr<SmBehaviour> behaviour)
-      : UntimedUnit(name, SmWork::count),
+      : UntimedUnit(name),
         out_vertices_(*this, "out_vertices"),
         out_shaded_(*this, "out_shaded"),
         in_release_(input<WarpRelease>("in_release", [](const WarpRelease&) {})),

@@ -9,7 +9,7 @@ namespace {
 class UntimedTc : public UntimedUnit {
  public:
   UntimedTc(const std::string& name, std::unique_ptr<TcBehaviour> behaviour)
-      : UntimedUnit(name, TcWork::count),
+      : UntimedUnit(name),
         out_(*this, "out_bins"),
         in_(input<QuadBeat>("in_quads", [this](const QuadBeat& beat) { collect(beat); })),
         behaviour_(std::move(behaviour)) {}

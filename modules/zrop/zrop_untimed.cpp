@@ -11,7 +11,7 @@ namespace {
 class UntimedZrop : public UntimedUnit {
  public:
   UntimedZrop(const std::string& name, std::unique_ptr<ZropBehaviour> behaviour)
-      : UntimedUnit(name, ZropWork::count),
+      : UntimedUnit(name),
         out_(*this, "out_quads"),
         in_(input<BinItem>("in_quads", [this](const BinItem& item) { test(item); })),
         in_terminations_(input<TerminationBeat>("in_terminations",
