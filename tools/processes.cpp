@@ -18,10 +18,10 @@
 #include <memory>
 #include <mutex>
 #include <new>
+#include <stdexcept>
 #include <string>
 #include <system_error>
 #include <thread>
-#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -31,6 +31,7 @@
 
 #include "command_line.h"
 #include "crash_report.h"
+#include "result_encoding.h"
 #include "stdout_to_stderr.h"
 #include "terminal.h"
 
@@ -42,105 +43,6 @@ constexpr int redraw_milliseconds = 100;
 
 double seconds_since(SteadyClock::time_point start) {
   return std::chrono::duration<double>(SteadyClock::now() - start).count();
-}
-
-// A result crosses the pipe as bytes. Both ends are the same program, so values go as they lie in memory.
-
-class Packer {
- public:
-  template <class T>
-  void operator()(const T& value) {
-    static_assert(std::is_trivially_copyable<T>::value, "goes as it lies in memory");
-    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
-  }
-  void operator()(const std::string& text) {
-    (*this)(text.size());
-    bytes_ += text;
-  }
-  template <class T>
-  void size_of(const std::vector<T>& items) {
-    (*this)(items.size());
-  }
-  const std::string& bytes() const { return bytes_; }
-
- private:
-  std::string bytes_;
-};
-
-class Unpacker {
- public:
-  Unpacker(const char* begin, const char* end) : next_(begin), end_(end) {}
-  template <class T>
-  void operator()(T& value) {
-    static_assert(std::is_trivially_copyable<T>::value, "goes as it lies in memory");
-    std::memcpy(static_cast<void*>(&value), take(sizeof value), sizeof value);
-  }
-  void operator()(std::string& text) {
-    std::size_t size = 0;
-    (*this)(size);
-    const char* const from = take(size);
-    text.assign(from, size);
-  }
-  template <class T>
-  void size_of(std::vector<T>& items) {
-    std::size_t size = 0;
-    (*this)(size);
-    items.resize(size);
-  }
-
- private:
-  const char* take(std::size_t size) {
-    if (static_cast<std::size_t>(end_ - next_) < size) throw std::runtime_error("a result came back cut short");
-    next_ += size;
-    return next_ - size;
-  }
-  const char* next_;
-  const char* end_;
-};
-
-template <class Archive, class Shares>
-void exchange_shares(Archive& archive, Shares& shares) {
-  archive.size_of(shares);
-  for (auto& [name, share] : shares) archive(name), archive(share);
-}
-
-/// Packs or unpacks all of a result but the request, which the receiver has, and the pixels, which are shared.
-template <class Archive, class Result>
-void exchange(Archive& archive, Result& result) {
-  archive(result.cycles);
-  archive(result.milliseconds);
-  archive(result.host_seconds);
-  archive(result.cpu_seconds);
-  archive(result.counts);
-  exchange_shares(archive, result.utilization);
-  archive.size_of(result.units);
-  for (auto& unit : result.units) {
-    archive(unit.name);
-    archive(unit.cycles);
-    archive(unit.occupancy);
-    exchange_shares(archive, unit.parts);
-  }
-  // A run without one comes back as one of a unit without a name.
-  if (!result.bottleneck) result.bottleneck.emplace();
-  archive(result.bottleneck->unit);
-  archive(result.bottleneck->occupancy);
-  exchange_shares(archive, result.bottleneck->parts);
-  if (result.bottleneck->unit.empty()) result.bottleneck.reset();
-  archive.size_of(result.statistics);
-  for (auto& statistic : result.statistics) {
-    archive(statistic.name);
-    archive(statistic.unit);
-    archive(statistic.meaning);
-    archive(statistic.value);
-  }
-  archive.size_of(result.implementations);
-  for (auto& [slot, name] : result.implementations) archive(slot), archive(name);
-  archive.size_of(result.parameters);
-  for (auto& [name, value] : result.parameters) archive(name), archive(value);
-  archive.size_of(result.outside_validated_range);
-  for (std::string& reason : result.outside_validated_range) archive(reason);
-  archive(result.result_hash);
-  archive(result.kernel_events);
 }
 
 /// The first byte of what a worker sends.
@@ -284,9 +186,11 @@ class Worker {
     if (received_[0] == outcome_user_error) throw CommandFailure(exit_user_error, content);
     if (received_[0] != outcome_result) fail(exit_fault, content);
     Simulated simulated;
-    Unpacker unpacker(content.data(), content.data() + content.size());
-    exchange(unpacker, simulated.result);
-    simulated.result.request = request_;
+    try {
+      simulated.result = from_bytes(content, request_);
+    } catch (const std::runtime_error& error) {
+      fail(exit_fault, error.what());
+    }
     simulated.image = std::move(image_);
     return simulated;
   }
@@ -302,11 +206,9 @@ class Worker {
     if (!loaded_plugins().empty()) report_crashes_to(out, outcome_fault);
     std::string message;
     try {
-      RunResult result = simulate(request_, draw, &progress);
+      const RunResult result = simulate(request_, draw, &progress);
       if (image != nullptr) image->copy_from(result.surface);
-      Packer packer;
-      exchange(packer, result);
-      message = char{outcome_result} + packer.bytes();
+      message = char{outcome_result} + to_bytes(result);
     } catch (const UserError& error) {
       message = char{outcome_user_error} + std::string(error.what());
     } catch (const std::bad_alloc&) {

@@ -1,0 +1,232 @@
+#include "result_encoding.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+namespace vrpipe::tools {
+namespace {
+
+using Json = nlohmann::json;
+using Shares = std::vector<std::pair<std::string, double>>;
+constexpr double denormal = std::numeric_limits<double>::denorm_min();
+
+RunRequest a_request() {
+  RunRequest request;
+  request.platform = &platforms().back();
+  request.variant = variants().back();
+  request.fidelity = Fidelity::at;
+  request.settings = {{"tc", "bins", "8"}};
+  return request;
+}
+
+/// A result without a field that has its default value, or the value of another.
+RunResult full_result() {
+  constexpr std::uint64_t huge = std::numeric_limits<std::uint64_t>::max();  // no double has it
+  RunResult result;
+  result.request = a_request();
+  result.cycles = huge;
+  result.milliseconds = 0.1;
+  result.host_seconds = 1.0 / 3;
+  result.cpu_seconds = 12345678.901234567;
+  std::array<std::uint64_t, sizeof(Counts) / sizeof(std::uint64_t)> counts{};
+  for (std::size_t i = 0; i < counts.size(); ++i) counts[i] = huge - 1 - i;
+  std::memcpy(static_cast<void*>(&result.counts), counts.data(), sizeof counts);
+  result.utilization = {{"raster", 0.25}, {"zrop", denormal}, {"prop", -0.0}};
+  UnitReport unit;
+  unit.name = "gpc0.crop";
+  for (std::size_t i = 0; i < unit.cycles.size(); ++i) unit.cycles[i] = (std::uint64_t{1} << 53) + 1 + i;
+  unit.occupancy = 0.75;
+  unit.parts = {{"blend", 0.5}, {"sectors", 0.125}};
+  result.units = {unit, {}};
+  result.bottleneck = {"l2", 0.625, {{"reads", 0.375}}};
+  result.statistics = {{"crop.hits", "sectors", "found in the \"cache\"\n", 7}, {"crop.misses", "%", "µ", 8}};
+  result.implementations = {{"qru", "caf\xe9"}, {"tc", std::string("\0\xff", 2)}};
+  result.parameters = {{"tc.bins", "32"}, {"state.exponential", "exact"}};
+  result.outside_validated_range = {"\xc3", ""};
+  result.result_hash = "0123456789abcdef";
+  result.kernel_events = 9;
+  return result;
+}
+
+void expect_equal_units(const UnitReport& actual, const UnitReport& expected) {
+  const auto& [name, cycles, occupancy, parts] = actual;
+  EXPECT_EQ(name, expected.name);
+  EXPECT_EQ(cycles, expected.cycles);
+  EXPECT_EQ(occupancy, expected.occupancy);
+  EXPECT_EQ(parts, expected.parts);
+}
+
+void expect_equal_statistics(const StatisticReport& actual, const StatisticReport& expected) {
+  const auto& [name, unit, meaning, value] = actual;
+  EXPECT_EQ(name, expected.name);
+  EXPECT_EQ(unit, expected.unit);
+  EXPECT_EQ(meaning, expected.meaning);
+  EXPECT_EQ(value, expected.value);
+}
+
+/// All but the request and the surface. A new member has to be named here, and compared.
+void expect_equal(const RunResult& actual, const RunResult& expected) {
+  const auto& [request, cycles, milliseconds, host_seconds, cpu_seconds, counts, utilization, units, bottleneck,
+               statistics, implementations, parameters, outside_validated_range, result_hash, kernel_events, surface] =
+      actual;
+  EXPECT_EQ(cycles, expected.cycles);
+  EXPECT_EQ(milliseconds, expected.milliseconds);
+  EXPECT_EQ(host_seconds, expected.host_seconds);
+  EXPECT_EQ(cpu_seconds, expected.cpu_seconds);
+  EXPECT_EQ(std::memcmp(&counts, &expected.counts, sizeof counts), 0);
+  EXPECT_EQ(counts.named(), expected.counts.named());
+  EXPECT_EQ(utilization, expected.utilization);
+  ASSERT_EQ(units.size(), expected.units.size());
+  for (std::size_t i = 0; i < units.size(); ++i) expect_equal_units(units[i], expected.units[i]);
+  ASSERT_EQ(bottleneck.has_value(), expected.bottleneck.has_value());
+  if (bottleneck) {
+    const auto& [unit, occupancy, parts] = *bottleneck;
+    EXPECT_EQ(unit, expected.bottleneck->unit);
+    EXPECT_EQ(occupancy, expected.bottleneck->occupancy);
+    EXPECT_EQ(parts, expected.bottleneck->parts);
+  }
+  ASSERT_EQ(statistics.size(), expected.statistics.size());
+  for (std::size_t i = 0; i < statistics.size(); ++i) expect_equal_statistics(statistics[i], expected.statistics[i]);
+  EXPECT_EQ(implementations, expected.implementations);
+  EXPECT_EQ(parameters, expected.parameters);
+  EXPECT_EQ(outside_validated_range, expected.outside_validated_range);
+  EXPECT_EQ(result_hash, expected.result_hash);
+  EXPECT_EQ(kernel_events, expected.kernel_events);
+}
+
+RunResult through_bytes(const RunResult& result) { return from_bytes(to_bytes(result), result.request); }
+
+/// What is wrong with it; empty when it is read.
+std::string refusal(const std::function<RunResult()>& read) {
+  try {
+    read();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return {};
+}
+
+std::string refusal_of(const Json& json) {
+  return refusal([&] { return decode(json, a_request()); });
+}
+std::string refusal_of(const std::string& bytes) {
+  return refusal([&] { return from_bytes(bytes, a_request()); });
+}
+
+/// Calls `visit` with every value of a document, which it may change for the time of the call.
+void for_each_value(Json& json, const std::function<void(Json&)>& visit) {
+  visit(json);
+  if (!json.is_structured()) return;
+  for (Json& value : json) for_each_value(value, visit);
+}
+
+TEST(ResultEncoding, EveryFieldComesBack) {
+  expect_equal(through_bytes(full_result()), full_result());
+  expect_equal(decode(encode(full_result()), a_request()), full_result());
+}
+
+TEST(ResultEncoding, NothingIsAFieldToo) { expect_equal(through_bytes(RunResult()), RunResult()); }
+
+TEST(ResultEncoding, ABottleneckWithoutANameIsOne) {
+  RunResult result;
+  result.bottleneck.emplace();
+  EXPECT_TRUE(through_bytes(result).bottleneck.has_value());
+}
+
+TEST(ResultEncoding, DoublesComeBackExactly) {
+  for (const double value : {0.0, -0.0, 0.1, denormal, std::numeric_limits<double>::max(), 65504.0, 1e-5,
+                             std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()}) {
+    RunResult result;
+    result.milliseconds = value;
+    const double back = through_bytes(result).milliseconds;
+    EXPECT_EQ(back, value);
+    EXPECT_EQ(std::signbit(back), std::signbit(value));
+  }
+  RunResult result;
+  result.milliseconds = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(std::isnan(through_bytes(result).milliseconds));
+}
+
+TEST(ResultEncoding, TheRequestIsWhatTheReceiverSays) {
+  const RunResult result = through_bytes(full_result());
+  EXPECT_EQ(result.request.platform, a_request().platform);
+  EXPECT_EQ(result.request.variant.name, a_request().variant.name);
+  EXPECT_EQ(result.request.fidelity, a_request().fidelity);
+  EXPECT_EQ(result.request.settings.size(), 1U);
+}
+
+// RFC 8949 wants UTF-8 of texts; other bytes are byte strings, so that other programs read the file as well.
+TEST(ResultEncoding, TextsThatAreNotUtf8AreBytes) {
+  const Json json = encode(full_result());
+  EXPECT_TRUE(json["implementations"][0][1].is_binary());
+  EXPECT_TRUE(json["statistics"][1]["meaning"].is_string());
+  std::size_t texts = 0;
+  Json copy = json;
+  for_each_value(copy, [&](Json& value) { texts += value.is_string() ? 1U : 0U; });
+  EXPECT_GT(texts, 10U);
+  EXPECT_NO_THROW(json.dump());
+}
+
+TEST(ResultEncoding, WhatIsMissingTooMuchOrOfAnotherTypeIsRefused) {
+  ASSERT_EQ(refusal_of(encode(full_result())), "");
+  EXPECT_EQ(refusal_of(Json::array()), "a simulation's result cannot be read: result is not what it should be");
+  Json json = encode(full_result());
+  for_each_value(json, [&](Json& value) {
+    const Json good = value;
+    // A negative or broken number is no count, and a count no share.
+    for (const Json& bad : {Json(true), Json(-1), good.is_number_float() ? Json(1U) : Json(1.5), Json({{"x", 1U}})}) {
+      value = bad;
+      EXPECT_NE(refusal_of(json), "") << bad << " in place of " << good;
+    }
+    if (good.is_object()) {
+      for (const auto& member : good.items()) {
+        value = good;
+        value.erase(member.key());
+        EXPECT_NE(refusal_of(json).find(member.key()), std::string::npos) << refusal_of(json);
+      }
+      value = good;
+      value["unheard_of"] = 1U;
+      EXPECT_NE(refusal_of(json), "");
+    }
+    value = good;
+  });
+  json["units"][0]["cycles"].push_back(1U);
+  EXPECT_NE(refusal_of(json), "") << "a unit state too many";
+}
+
+TEST(ResultEncoding, ADamagedResultIsRefused) {
+  const std::string bytes = to_bytes(full_result());
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    EXPECT_NE(refusal_of(bytes.substr(0, size)), "") << "cut to " << size << " bytes";
+  }
+  EXPECT_NE(refusal_of(bytes + '\0'), "");
+  EXPECT_NE(refusal_of(std::string("a file of something else")), "");
+  // As deep as the stack would not bear.
+  EXPECT_NE(refusal_of(std::string(1000000, '\x81')), "");
+  EXPECT_NE(refusal_of(std::string(1000, '\x9b') + std::string(8, '\xff')), "");
+  // Sizes that are not there.
+  for (const char* head : {"\x9b", "\xbb", "\x5b", "\x7b"}) {
+    EXPECT_NE(refusal_of(head + std::string(8, '\xff')), "");
+    EXPECT_NE(refusal_of(head + std::string("\x7f") + std::string(7, '\xff')), "");
+  }
+  // Whatever else happens to a byte: a result, or a refusal.
+  std::mt19937 random(1);
+  for (int i = 0; i < 20000; ++i) {
+    std::string damaged = bytes;
+    for (auto changes = 1 + random() % 3; changes > 0; --changes) {
+      damaged[random() % damaged.size()] = static_cast<char>(random());
+    }
+    refusal_of(damaged);
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe::tools

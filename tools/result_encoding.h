@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include <vrpipe/platforms/simulation.h>
+
+namespace vrpipe::tools {
+
+// Results on their way between processes and into files: all of a RunResult but the request, which points into the
+// process and which the receiver knows, and the pixels. Integers, doubles and texts of any bytes come back as they were.
+
+nlohmann::json encode(const RunResult& result);
+/// @throws std::runtime_error for what encode() cannot have made
+RunResult decode(const nlohmann::json& json, const RunRequest& request);
+
+/// The same as CBOR (RFC 8949).
+std::string to_bytes(const RunResult& result);
+/// @throws std::runtime_error for what to_bytes() cannot have made
+RunResult from_bytes(const std::string& bytes, const RunRequest& request);
+
+}  // namespace vrpipe::tools
