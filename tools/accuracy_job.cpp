@@ -11,10 +11,9 @@
 #include <vrpipe/workloads/exact_image.h>
 #include <vrpipe/workloads/scene.h>
 
+#include "comparison.h"
 #include "output_file.h"
 #include "processes.h"
-#include "report.h"
-#include "simulation_job.h"
 
 namespace vrpipe::tools {
 namespace {

@@ -9,10 +9,10 @@
 #include <vrpipe/platforms/simulation.h>
 
 #include "image_error.h"
-#include "options.h"
 #include "picture.h"
 #include "precision_knobs.h"
 #include "progress_line.h"
+#include "simulation_job.h"
 #include "trade_off.h"
 
 namespace vrpipe::tools {

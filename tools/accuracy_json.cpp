@@ -6,7 +6,7 @@
 
 #include <vrpipe/blend.h>
 
-#include "parse.h"
+#include "termination.h"
 
 namespace vrpipe::tools {
 namespace {

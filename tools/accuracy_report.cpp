@@ -9,8 +9,8 @@
 #include <vrpipe/blend.h>
 #include <vrpipe/printable.h>
 
-#include "parse.h"
 #include "report.h"
+#include "termination.h"
 #include "text_table.h"
 
 namespace vrpipe::tools {

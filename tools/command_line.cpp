@@ -11,6 +11,7 @@
 #include <vrpipe/error.h>
 #include <vrpipe/printable.h>
 
+#include "command_failure.h"
 #include "options.h"
 
 namespace vrpipe::tools {

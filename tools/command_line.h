@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -41,20 +40,6 @@ std::unique_ptr<Command> make_units_command();
 
 /// In the order in which `vrpipe --help` lists them.
 std::vector<std::unique_ptr<Command>> all_commands();
-
-/// A failure whose kind and text are already decided, as when it comes from another process.
-class CommandFailure : public std::runtime_error {
- public:
-  CommandFailure(int code, const std::string& text) : std::runtime_error(text), exit_code(code) {}
-  const int exit_code;  ///< exit_user_error or exit_fault
-};
-
-/// What to say and to advise when memory runs out.
-constexpr const char* out_of_memory =
-    "out of memory; try a smaller --size, fewer --jobs, or smaller queues and bins where --set made them larger";
-
-constexpr int exit_fault = 1;
-constexpr int exit_user_error = 2;
 
 /// The whole program. Returns the exit code: 0 done, 2 a mistake of the user, 1 a fault of the program; the last two
 /// after one line on stderr.

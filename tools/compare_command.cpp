@@ -2,6 +2,7 @@
 
 #include "command_line.h"
 #include "options.h"
+#include "print_result.h"
 #include "simulation_job.h"
 
 namespace vrpipe::tools {
@@ -29,7 +30,10 @@ class CompareCommand : public Command {
         "  vrpipe compare --set qru.quads_per_cycle=4 --json - | python3 -m json.tool");
   }
 
-  void run() override { perform(arguments_.resolve(SimulationArguments::Variants::all, command_line())); }
+  void run() override {
+    const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::all, command_line());
+    print_result(job, perform(job));
+  }
 
  private:
   SimulationArguments arguments_;

@@ -12,7 +12,7 @@
 #include <vrpipe/checked_behaviours.h>
 #include <vrpipe/registry.h>
 
-#include "command_line.h"
+#include "command_failure.h"
 
 namespace vrpipe::tools {
 namespace {

@@ -14,6 +14,7 @@
 #include "parse.h"
 #include "settings.h"
 #include "stdout_to_stderr.h"
+#include "termination.h"
 
 namespace vrpipe::tools {
 namespace {

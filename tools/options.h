@@ -1,18 +1,13 @@
 #pragma once
 
-#include <array>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/scene.h>
 
-#include "output_file.h"
-#include "provenance.h"
+#include "simulation_job.h"
 
 namespace CLI {
 class App;
@@ -33,23 +28,6 @@ CLI::Option* add_option(CLI::App& app, const std::string& name, Values& values, 
 std::optional<std::string> single(const Values& values, const std::string& option);
 
 std::shared_ptr<CLI::FormatterBase> help_formatter();
-
-/// Everything that `run` or `compare` is asked to do, checked as far as that is possible without reading the scene.
-struct SimulationJob {
-  std::string schema;  ///< of the JSON of `run` or `compare`
-  Provenance provenance;
-  SceneRequest scene;
-  std::vector<RunRequest> requests;    ///< one for each variant, alike in everything else
-  std::vector<Setting> preprocessing;  ///< of --set, for the report; `scene` has them
-  /// `preprocess.NAME` and value of every parameter of preprocessing.
-  std::vector<std::pair<std::string, std::string>> preprocess_parameters;
-  std::array<float, 3> background{};
-  std::vector<NamedFile> inputs;                   ///< that the options name; outputs must not be among them
-  std::optional<std::filesystem::path> output;     ///< folder for images
-  std::optional<std::string> json;                 ///< file, or "-" for stdout
-  std::optional<std::filesystem::path> save_draw;  ///< file
-  unsigned processes = 1;                          ///< simulations at a time
-};
 
 /// The options that all simulating commands share, as typed.
 class SimulationArguments {

@@ -112,14 +112,4 @@ UnitChoice parse_unit_choice(const std::string& text) {
   return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
-Termination termination_named(const std::string& name) {
-  for (const Termination termination : {Termination::paper, Termination::strict}) {
-    if (name == name_of(termination)) return termination;
-  }
-  throw UserError("unknown termination '" + name + "'", "--termination", "there is no such rule",
-                  "use paper or strict");
-}
-
-const char* name_of(Termination termination) { return termination == Termination::paper ? "paper" : "strict"; }
-
 }  // namespace vrpipe::tools

@@ -33,7 +33,4 @@ Setting parse_setting(const std::string& text);
 /// "SLOT=IMPLEMENTATION".
 UnitChoice parse_unit_choice(const std::string& text);
 
-Termination termination_named(const std::string& name);
-const char* name_of(Termination termination);
-
 }  // namespace vrpipe::tools

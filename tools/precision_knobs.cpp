@@ -8,7 +8,7 @@
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/workloads/preprocess_parameters.h>
 
-#include "parse.h"
+#include "termination.h"
 
 namespace vrpipe::tools {
 namespace {

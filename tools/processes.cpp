@@ -29,7 +29,7 @@
 #include <vrpipe/error.h>
 #include <vrpipe/registry.h>
 
-#include "command_line.h"
+#include "command_failure.h"
 #include "crash_report.h"
 #include "result_encoding.h"
 #include "stdout_to_stderr.h"

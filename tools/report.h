@@ -1,8 +1,6 @@
 #pragma once
 
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "simulation_job.h"
 #include "terminal.h"
@@ -14,13 +12,6 @@ std::string report(const JobResult& result, const TextStyle& style);
 
 /// What to say of a draw of which no fragment was rasterised; one line.
 std::string nothing_visible(const SceneSummary& scene, bool has_camera);
-
-/// Cycles of `baseline` over those of `run`; none without time, or where nothing was drawn.
-std::optional<double> speedup(const RunResult& baseline, const RunResult& run);
-
-/// Fragments blended by the baseline over those blended with early termination alone; none when a run is missing, or
-/// nothing is blended.
-std::optional<double> early_termination_ratio(const std::vector<RunResult>& runs);
 
 /// A unit that is occupied for this share of a run bounds it.
 constexpr double bounding_occupancy = 0.9;

@@ -11,9 +11,10 @@
 #include <vrpipe/blend.h>
 #include <vrpipe/platforms/netlist.h>
 
-#include "parse.h"
+#include "comparison.h"
 #include "report.h"
 #include "settings.h"
+#include "termination.h"
 
 namespace vrpipe::tools {
 namespace {

@@ -2,6 +2,7 @@
 
 #include "command_line.h"
 #include "options.h"
+#include "print_result.h"
 #include "simulation_job.h"
 
 namespace vrpipe::tools {
@@ -26,7 +27,10 @@ class RunCommand : public Command {
         "  vrpipe run --fidelity functional --termination strict");
   }
 
-  void run() override { perform(arguments_.resolve(SimulationArguments::Variants::one, command_line())); }
+  void run() override {
+    const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::one, command_line());
+    print_result(job, perform(job));
+  }
 
  private:
   SimulationArguments arguments_;

@@ -3,23 +3,16 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <iostream>
 #include <utility>
 
-#include <vrpipe/printable.h>
 #include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/scene.h>
 
 #include "for_each_chunk.h"
-#include "json_text.h"
 #include "output_file.h"
 #include "process_setup.h"
 #include "processes.h"
 #include "progress_line.h"
-#include "report.h"
-#include "result_json.h"
-#include "stdout_to_stderr.h"
-#include "terminal.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -74,7 +67,7 @@ void save_draw(const SimulationJob& job, const Draw& draw) {
   note_written(job.save_draw->string());
 }
 
-void perform(const SimulationJob& job) {
+JobResult perform(const SimulationJob& job) {
   std::vector<std::string> images;
   for (const RunRequest& request : job.requests) {
     images.push_back(image_name(scene_name(job.scene.scene), request.variant.name));
@@ -125,26 +118,7 @@ void perform(const SimulationJob& job) {
     }
     result.runs.push_back(std::move(run.result));
   }
-  simulated.clear();
-
-  const TextStyle style = stdout_style();
-  std::string json;
-  std::string text;
-  {
-    const StdoutToStderr redirected;  // both make units of plugins, which may print
-    if (job.json) json = json_text(result_json(result));
-    text = report(result, style);
-  }
-  if (job.json) {
-    if (*job.json == "-") {
-      std::cout << json;
-      return;
-    }
-    write_output_file(*job.json, json, "--json");
-  }
-  std::cout << text;
-  if (job.json) std::cout << "result: " << printable(*job.json) << '\n';
-  if (job.save_draw) std::cout << "draw: " << printable(job.save_draw->string()) << '\n';
+  return result;
 }
 
 }  // namespace vrpipe::tools

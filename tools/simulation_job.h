@@ -1,15 +1,38 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/draw.h>
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/scene.h>
 
-#include "options.h"
+#include "output_file.h"
+#include "provenance.h"
 
 namespace vrpipe::tools {
+
+/// Everything that `run` or `compare` is asked to do, checked as far as that is possible without reading the scene.
+struct SimulationJob {
+  std::string schema;  ///< of the JSON of `run` or `compare`
+  Provenance provenance;
+  SceneRequest scene;
+  std::vector<RunRequest> requests;    ///< one for each variant, alike in everything else
+  std::vector<Setting> preprocessing;  ///< of --set, for the report; `scene` has them
+  /// `preprocess.NAME` and value of every parameter of preprocessing.
+  std::vector<std::pair<std::string, std::string>> preprocess_parameters;
+  std::array<float, 3> background{};
+  std::vector<NamedFile> inputs;                   ///< that the options name; outputs must not be among them
+  std::optional<std::filesystem::path> output;     ///< folder for images
+  std::optional<std::string> json;                 ///< file, or "-" for stdout
+  std::optional<std::filesystem::path> save_draw;  ///< file
+  unsigned processes = 1;                          ///< simulations at a time
+};
 
 /// The image files of one run.
 struct ImageFiles {
@@ -50,8 +73,8 @@ ImageFiles image_files(const SimulationJob& job, const std::string& name);
 /// Writes the draw list of --save-draw, if there is one. Throws UserError.
 void save_draw(const SimulationJob& job, const Draw& draw);
 
-/// Loads the scene, simulates, and writes the files and the report that the user asked for. One request is simulated in
-/// this process, several in processes of their own. Throws UserError, CommandFailure or a fault.
-void perform(const SimulationJob& job);
+/// Loads the scene, simulates, and writes the images and the draw list that the user asked for. One request is simulated
+/// in this process, several in processes of their own. Throws UserError, CommandFailure or a fault.
+JobResult perform(const SimulationJob& job);
 
 }  // namespace vrpipe::tools

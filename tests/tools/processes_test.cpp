@@ -7,7 +7,7 @@
 
 #include <vrpipe/error.h>
 
-#include "command_line.h"
+#include "command_failure.h"
 #include "processes.h"
 #include "tool_test_support.h"
 

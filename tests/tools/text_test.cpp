@@ -9,6 +9,7 @@
 
 #include <vrpipe/error.h>
 
+#include "comparison.h"
 #include "parse.h"
 #include "progress_line.h"
 #include "report.h"
