@@ -1,5 +1,5 @@
-#include "command_line.h"
-#include "process_setup.h"
+#include "cli/command_line.h"
+#include "host/process_setup.h"
 
 int main(int argc, char** argv) {
   vrpipe::tools::set_up_process();

@@ -9,12 +9,12 @@
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
-#include "accuracy_report.h"
-#include "picture.h"
-#include "precision_knobs.h"
-#include "settings.h"
-#include "svg_plot.h"
-#include "trade_off.h"
+#include "image/picture.h"
+#include "jobs/precision_knobs.h"
+#include "jobs/settings.h"
+#include "jobs/trade_off.h"
+#include "output/accuracy_report.h"
+#include "output/svg_plot.h"
 
 namespace vrpipe::testing {
 namespace {

@@ -9,7 +9,7 @@
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 
-#include "settings.h"
+#include "jobs/settings.h"
 
 namespace vrpipe::testing {
 namespace {

@@ -1,4 +1,4 @@
-#include "image_error.h"
+#include "image/image_error.h"
 
 #include <gtest/gtest.h>
 

@@ -11,7 +11,7 @@
 
 #include <vrpipe/platforms/simulation.h>
 
-#include "images.h"
+#include "image/images.h"
 
 namespace vrpipe::testing {
 namespace {

@@ -7,11 +7,11 @@
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/registry.h>
 
-#include "command_line.h"
+#include "cli/command_line.h"
 #include "file_io.h"
 #include "forked.h"
-#include "output_file.h"
-#include "process_setup.h"
+#include "host/output_file.h"
+#include "host/process_setup.h"
 
 namespace vrpipe::testing {
 namespace {

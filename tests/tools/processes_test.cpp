@@ -7,8 +7,8 @@
 
 #include <vrpipe/error.h>
 
-#include "command_failure.h"
-#include "processes.h"
+#include "host/command_failure.h"
+#include "jobs/processes.h"
 #include "tool_test_support.h"
 
 namespace vrpipe::testing {

@@ -1,4 +1,4 @@
-#include "result_encoding.h"
+#include "jobs/result_encoding.h"
 
 #include <gtest/gtest.h>
 

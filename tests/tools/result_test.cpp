@@ -12,7 +12,7 @@
 #include <vrpipe/registry.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
-#include "settings.h"
+#include "jobs/settings.h"
 
 namespace vrpipe::testing {
 namespace {

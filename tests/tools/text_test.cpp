@@ -9,11 +9,11 @@
 
 #include <vrpipe/error.h>
 
-#include "comparison.h"
-#include "parse.h"
-#include "progress_line.h"
-#include "report.h"
-#include "text_table.h"
+#include "cli/parse.h"
+#include "host/progress_line.h"
+#include "jobs/comparison.h"
+#include "output/report.h"
+#include "output/text_table.h"
 
 namespace vrpipe::tools {
 namespace {

@@ -1,0 +1,100 @@
+#include <iostream>
+
+#include <CLI/CLI.hpp>
+
+#include <vrpipe/printable.h>
+
+#include "cli/command_line.h"
+#include "cli/options.h"
+#include "cli/parse.h"
+#include "host/output_file.h"
+#include "host/terminal.h"
+#include "jobs/accuracy_job.h"
+#include "output/accuracy_json.h"
+#include "output/accuracy_page.h"
+#include "output/accuracy_report.h"
+#include "output/json_text.h"
+
+namespace vrpipe::tools {
+namespace {
+
+constexpr unsigned largest_repeat = 100;
+
+class AccuracyCommand : public Command {
+ public:
+  std::string name() const override { return "accuracy"; }
+  std::string summary() const override { return "what accuracy costs in time, on one scene"; }
+
+  void declare(CLI::App& app) override {
+    arguments_.declare(app, SimulationArguments::Variants::all);
+    const std::string ladders = "The ladders";
+    app.add_flag("--quick", quick_,
+                 "a first answer: the middle ninth of the image unless --size is given, two\n"
+                 "variants, and one value of some knobs")
+        ->disable_flag_override()
+        ->group(ladders);
+    add_option(app, "--repeat", repeat_, "N",
+               "measures each rung of the fidelity ladder N times, interleaved, and\n"
+               "takes the median of the seconds (default: 1)",
+               ladders);
+    add_option(app, "--html", html_, "FILE", "writes a page with plots, images and error maps; it needs no network",
+               "Where results go");
+    app.add_flag("--markdown", markdown_, "prints the tables as Markdown in place of the report")
+        ->disable_flag_override()
+        ->group("Where results go");
+    app.footer(
+        "Climbs two ladders. Fidelity: every variant at every --fidelity that there is, one at a time, with its\n"
+        "error in cycles and speed-up against the most exact, and its CPU seconds. Precision: het+qm, at the\n"
+        "--fidelity given (default: cycle), with one arithmetic choice changed at a time, with its error against\n"
+        "an image in double precision (no tiles, no termination, all bands, exact order), and its simulated\n"
+        "cycles. --jobs is for the precision ladder. --output writes the image of every choice.\n"
+        "\n"
+        "Examples:\n"
+        "  vrpipe accuracy --quick\n"
+        "  vrpipe accuracy --scene builtin:indoor --html indoor.html --json indoor.json\n"
+        "  vrpipe accuracy --repeat 5 --set state.blend_rounding=measured\n"
+        "  vrpipe accuracy --scene point_cloud.ply --camera cameras.json#3 --fidelity functional");
+  }
+
+  void run() override {
+    AccuracyJob job;
+    job.simulation = arguments_.resolve(SimulationArguments::Variants::all, command_line());
+    job.quick = quick_;
+    job.markdown = markdown_;
+    if (const auto text = single(repeat_, "--repeat")) job.repeat = parse_count(*text, "--repeat", largest_repeat);
+    if (const auto file = single(html_, "--html")) job.html = *file;
+
+    ProgressLine progress;
+    const AccuracyResult result = measure_accuracy(job, progress);
+    if (job.html) {
+      progress.show("writing the page");
+      write_output_file(*job.html, accuracy_page(result), "--html");
+    }
+    progress.erase();
+    const std::optional<std::string>& json = job.simulation.json;
+    if (json) {
+      const std::string text = json_text(accuracy_json(result));
+      if (*json == "-") {
+        std::cout << text;
+        return;
+      }
+      write_output_file(*json, text, "--json");
+    }
+    std::cout << (job.markdown ? accuracy_markdown(result) : accuracy_text(result, stdout_style()));
+    if (job.markdown) return;
+    if (json) std::cout << "result: " << printable(*json) << '\n';
+    if (job.html) std::cout << "page: " << printable(job.html->string()) << '\n';
+  }
+
+ private:
+  SimulationArguments arguments_;
+  Values repeat_, html_;
+  bool quick_ = false;
+  bool markdown_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_accuracy_command() { return std::make_unique<AccuracyCommand>(); }
+
+}  // namespace vrpipe::tools

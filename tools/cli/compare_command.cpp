@@ -1,0 +1,46 @@
+#include <CLI/CLI.hpp>
+
+#include "cli/command_line.h"
+#include "cli/options.h"
+#include "cli/print_result.h"
+#include "jobs/simulation_job.h"
+
+namespace vrpipe::tools {
+namespace {
+
+class CompareCommand : public Command {
+ public:
+  std::string name() const override { return "compare"; }
+  std::string summary() const override {
+    return "the variants baseline, qm, het and het+qm side by side (the main job)";
+  }
+
+  void declare(CLI::App& app) override {
+    arguments_.declare(app, SimulationArguments::Variants::all);
+    app.footer(
+        "Simulates four GPUs that differ only in the units swapped in, on the same draw: baseline, qm (TGC and QRU\n"
+        "merge overlapping quads), het (ZROP and CROP terminate opaque pixels) and het+qm (both). Prints cycles,\n"
+        "speed-ups, counts and utilization side by side.\n"
+        "\n"
+        "Examples:\n"
+        "  vrpipe compare\n"
+        "  vrpipe compare --scene builtin:outdoor --output images --json outdoor.json\n"
+        "  vrpipe compare --scene point_cloud.ply --camera cameras.json#3 --size 1280x720\n"
+        "  vrpipe compare --platform mobile --format rgba8\n"
+        "  vrpipe compare --set qru.quads_per_cycle=4 --json - | python3 -m json.tool");
+  }
+
+  void run() override {
+    const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::all, command_line());
+    print_result(job, perform(job));
+  }
+
+ private:
+  SimulationArguments arguments_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_compare_command() { return std::make_unique<CompareCommand>(); }
+
+}  // namespace vrpipe::tools

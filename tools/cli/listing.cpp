@@ -1,0 +1,33 @@
+#include "cli/listing.h"
+
+#include <iostream>
+
+#include "host/output_file.h"
+#include "output/json_text.h"
+
+namespace vrpipe::tools {
+
+void declare_json(CLI::App& app, Values& json) {
+  add_option(app, "--json", json, "FILE|-", "writes the list as JSON; `-`: to stdout, in place of the text",
+             "Where results go");
+}
+
+void print_listing(const Json& json, const std::string& text, const Values& json_option, const Values& plugins) {
+  const auto place = single(json_option, "--json");
+  if (!place) {
+    std::cout << text;
+    return;
+  }
+  const std::string content = json_text(json);
+  if (*place == "-") {
+    std::cout << content;
+    return;
+  }
+  check_output_file(*place, "--json");
+  std::vector<NamedFile> inputs;
+  for (const std::string& plugin : plugins) inputs.push_back({"--plugin", plugin});
+  check_files_differ(inputs, {{"--json", *place}});
+  write_output_file(*place, content, "--json");
+}
+
+}  // namespace vrpipe::tools

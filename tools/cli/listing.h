@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "cli/options.h"
+#include "output/result_json.h"
+
+namespace vrpipe::tools {
+
+// What the commands that list things have in common.
+
+/// Adds `--json FILE|-`.
+void declare_json(CLI::App& app, Values& json);
+
+/// Prints the text, or writes the JSON to where --json says, which must not be one of the plugins. Throws UserError.
+void print_listing(const Json& json, const std::string& text, const Values& json_option, const Values& plugins = {});
+
+}  // namespace vrpipe::tools

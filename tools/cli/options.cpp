@@ -1,0 +1,238 @@
+#include "cli/options.h"
+
+#include <algorithm>
+#include <map>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+
+#include <vrpipe/error.h>
+#include <vrpipe/registry.h>
+
+#include "cli/parse.h"
+#include "host/crash_report.h"
+#include "host/output_file.h"
+#include "host/stdout_to_stderr.h"
+#include "jobs/settings.h"
+#include "jobs/termination.h"
+
+namespace vrpipe::tools {
+namespace {
+
+/// CLI11's layout, with our names of values and without its marks for repeatable options.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  HelpFormatter() { column_width(34); }
+  std::string make_option_opts(const CLI::Option* option) const override {
+    return option->get_type_name().empty() ? std::string() : " " + option->get_type_name();
+  }
+  std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override {
+    std::string text = CLI::Formatter::make_help(app, std::move(name), mode);
+    for (std::size_t gap; (gap = text.find("\n\n\n")) != std::string::npos;) text.erase(gap, 1);
+    return text;
+  }
+  std::string make_usage(const CLI::App* app, std::string name) const override {
+    const std::string full = name.empty() ? app->get_name() : name;
+    return "\nUsage: " + full + (app->get_subcommands({}).empty() ? " [OPTIONS]" : " COMMAND [OPTIONS]") + "\n";
+  }
+};
+
+constexpr const char* scene_group = "What is drawn";
+constexpr const char* machine_group = "On which GPU";
+constexpr const char* rules_group = "How exactly";
+constexpr const char* result_group = "Where results go";
+
+const std::string variant_default = "het+qm";
+
+std::string names_of(const std::vector<Fidelity>& fidelities) {
+  std::string text;
+  for (const Fidelity fidelity : fidelities) {
+    if (!text.empty()) text += fidelity == fidelities.back() ? " or " : ", ";
+    text += vrpipe::name_of(fidelity);
+  }
+  return text;
+}
+
+/// Of KEY=VALUE texts, only different keys may be given more than once.
+void refuse_keys_given_twice(const Values& values, const std::string& option) {
+  std::map<std::string, std::string> given;
+  for (const std::string& text : values) {
+    const std::size_t equals = std::min(text.find('='), text.size());
+    const std::string key = text.substr(0, equals);
+    const std::string value = text.substr(std::min(equals + 1, text.size()));
+    const auto [first, is_new] = given.emplace(key, value);
+    if (is_new) continue;
+    throw UserError("option given twice", option + " " + key, "as '" + first->second + "' and as '" + value + "'",
+                    "give it once");
+  }
+}
+
+}  // namespace
+
+std::shared_ptr<CLI::FormatterBase> help_formatter() { return std::make_shared<HelpFormatter>(); }
+
+CLI::Option* add_option(CLI::App& app, const std::string& name, Values& values, const std::string& value_name,
+                        const std::string& help, const std::string& group) {
+  // Every option collects its texts, so that one given twice is refused with a message of our own.
+  return app.add_option(name, values, help)->type_name(value_name)->allow_extra_args(false)->take_all()->group(group);
+}
+
+std::optional<std::string> single(const Values& values, const std::string& option) {
+  if (values.empty()) return std::nullopt;
+  if (values.size() > 1) {
+    throw UserError("option given twice", option, "as '" + values[0] + "' and as '" + values[1] + "'", "give it once");
+  }
+  return values.front();
+}
+
+void load_plugins(const Values& plugins) {
+  const StdoutToStderr redirected;
+  for (const std::string& plugin : plugins) {
+    report_crashes();
+    load_plugin(plugin);
+  }
+  if (!plugins.empty()) report_crashes();
+}
+
+void SimulationArguments::declare(CLI::App& app, Variants variants) {
+  add_option(app, "--scene", scene_, "FILE|builtin:NAME",
+             "an INRIA .ply of trained Gaussians, a .spl draw list, or a built-in scene\n"
+             "(default: builtin:object; `vrpipe scenes` lists them)",
+             scene_group);
+  add_option(app, "--size", size_, "WxH",
+             "image size, pixels, each side 1 to 16384 (default: the scene's or the\n"
+             "camera's own, 1280x720 for a .ply without a camera)",
+             scene_group);
+  add_option(app, "--camera", camera_, "FILE[#INDEX]",
+             "a cameras.json in the INRIA layout, and which camera of it (default: #0)", scene_group);
+  add_option(app, "--eye", eye_, "X,Y,Z", "where the camera stands, world units (default: chosen to fit the scene)",
+             scene_group);
+  add_option(app, "--look-at", look_at_, "X,Y,Z", "the point in the middle of the image, world units", scene_group);
+  add_option(app, "--up", up_, "X,Y,Z",
+             "the world's up direction (default: 0,-1,0, since y points down in INRIA\n"
+             "scenes; 0,1,0 for y-up files)",
+             scene_group);
+  add_option(app, "--fovy", fovy_, "DEGREES", "vertical field of view (default: the scene's own, 50 for a .ply)",
+             scene_group);
+
+  add_option(app, "--platform", platform_, "NAME",
+             "the GPU (default: " + platforms().front().name + "; `vrpipe platforms` lists them)", machine_group);
+  if (variants == Variants::one) {
+    add_option(app, "--variant", variant_, "NAME",
+               "baseline, qm (quad merging), het (hardware early termination) or\n"
+               "het+qm (default: " +
+                   variant_default + ")",
+               machine_group);
+  }
+  add_option(app, "--set", settings_, "UNIT.PARAMETER=VALUE",
+             "changes a parameter, e.g. tc.bins=64, or crop.cache_bytes=32K; can be\n"
+             "repeated (`vrpipe units` lists all, with units, ranges and defaults)",
+             machine_group);
+  add_option(app, "--unit", units_, "SLOT=IMPLEMENTATION",
+             "puts another unit into a slot, in every variant where the slot is not\n"
+             "pass-through; can be repeated",
+             machine_group);
+  add_option(app, "--plugin", plugins_, "FILE.so", "loads units from a plugin, for --unit; can be repeated",
+             machine_group);
+
+  add_option(app, "--fidelity", fidelity_, "NAME",
+             "how exact time is, from images and counts alone to every unit in every\n"
+             "cycle: " +
+                 names_of(fidelities()) + " (default: cycle)",
+             rules_group);
+  add_option(app, "--format", format_, "NAME", "colour target: rgba8, rgba16f or rgba32f (default: rgba16f)",
+             rules_group);
+  add_option(app, "--termination", termination_, "NAME",
+             "when a termination bit counts: paper (once its update has travelled) or\n"
+             "strict (order alone decides) (default: paper)",
+             rules_group);
+
+  add_option(app, "--output", output_, "DIR",
+             "writes SCENE-VARIANT.png (8 bit, over the background) and .exr (RGBA\n"
+             "float, premultiplied, no background) there; created if missing",
+             result_group);
+  add_option(app, "--background", background_, "R,G,B", "behind the PNG, each 0 to 1 (default: 0,0,0)", result_group);
+  add_option(app, "--json", json_, "FILE|-", "writes the result as JSON; `-`: to stdout, and nothing else there",
+             result_group);
+  add_option(app, "--save-draw", save_draw_, "FILE.spl",
+             "writes the draw after preprocessing; --scene FILE.spl takes it in again", result_group);
+  if (variants == Variants::all) {
+    add_option(app, "--jobs", jobs_, "N",
+               "simulations at a time, each a process of its own (default: one for each\n"
+               "processor; results do not depend on it)",
+               result_group);
+  }
+}
+
+SceneRequest SimulationArguments::scene_request() const {
+  SceneRequest request;
+  request.scene = single(scene_, "--scene").value_or("");
+  if (const auto text = single(size_, "--size")) request.size = parse_size(*text, "--size");
+  request.camera = single(camera_, "--camera");
+  if (const auto text = single(eye_, "--eye")) request.eye = parse_triple(*text, "--eye", "X,Y,Z", "2,-1.5,-4");
+  if (const auto text = single(look_at_, "--look-at"))
+    request.look_at = parse_triple(*text, "--look-at", "X,Y,Z", "0,0,0");
+  if (const auto text = single(up_, "--up")) request.up = parse_triple(*text, "--up", "X,Y,Z", "0,-1,0");
+  if (const auto text = single(fovy_, "--fovy")) request.fovy_degrees = parse_number(*text, "--fovy");
+  return request;
+}
+
+std::vector<NamedFile> SimulationArguments::inputs() const {
+  std::vector<NamedFile> files;
+  for (const std::string& scene : scene_) files.push_back({"--scene", scene});
+  for (const std::string& camera : camera_) files.push_back({"--camera", camera.substr(0, camera.rfind('#'))});
+  for (const std::string& plugin : plugins_) files.push_back({"--plugin", plugin});
+  return files;
+}
+
+SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<std::string>& command) const {
+  // Plugins first: they may bring the platform and the units that the other options name.
+  load_plugins(plugins_);
+
+  SimulationJob job;
+  job.schema = variants == Variants::one ? "vrpipe.run/1" : "vrpipe.compare/1";
+  job.provenance = make_provenance(command, plugins_);
+  job.scene = scene_request();
+
+  RunRequest request;
+  const auto platform = single(platform_, "--platform");
+  request.platform = platform ? &platform_named(*platform) : &platforms().front();
+  if (const auto name = single(fidelity_, "--fidelity")) request.fidelity = fidelity_named(*name);
+  if (const auto name = single(format_, "--format")) request.format = color_format_named(*name);
+  if (const auto name = single(termination_, "--termination")) request.termination = termination_named(*name);
+  refuse_keys_given_twice(settings_, "--set");
+  refuse_keys_given_twice(units_, "--unit");
+  std::vector<Setting> settings;
+  for (const std::string& text : settings_) settings.push_back(parse_setting(text));
+  SettingsByPart parts = sort_settings(settings);
+  request.settings = std::move(parts.machine);
+  job.scene.preprocess = parts.preprocess;
+  job.preprocessing = std::move(parts.preprocessing);
+  job.preprocess_parameters = std::move(parts.preprocess_parameters);
+  for (const std::string& text : units_) request.units.push_back(parse_unit_choice(text));
+
+  std::vector<Variant> wanted = vrpipe::variants();
+  if (variants == Variants::one) wanted = {variant_named(single(variant_, "--variant").value_or(variant_default))};
+  for (const Variant& variant : wanted) {
+    job.requests.push_back(request);
+    job.requests.back().variant = variant;
+    const StdoutToStderr redirected;
+    check_configuration(job.requests.back());
+  }
+
+  if (const auto text = single(background_, "--background")) job.background = parse_background(*text, "--background");
+  if (const auto folder = single(output_, "--output")) {
+    check_output_folder(*folder, "--output");
+    job.output = *folder;
+  }
+  job.json = single(json_, "--json");
+  if (const auto file = single(save_draw_, "--save-draw")) job.save_draw = *file;
+  job.inputs = inputs();
+
+  const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
+  const auto jobs = single(jobs_, "--jobs");
+  job.processes = jobs ? parse_count(*jobs, "--jobs", 1024) : processors;
+  return job;
+}
+
+}  // namespace vrpipe::tools

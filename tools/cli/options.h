@@ -1,0 +1,55 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vrpipe/workloads/scene.h>
+
+#include "jobs/simulation_job.h"
+
+namespace CLI {
+class App;
+class FormatterBase;
+class Option;
+}  // namespace CLI
+
+namespace vrpipe::tools {
+
+/// The texts given for one option, in the order of the command line; empty when it was not given.
+using Values = std::vector<std::string>;
+
+/// Adds an option that takes one text. `group` is its heading in --help.
+CLI::Option* add_option(CLI::App& app, const std::string& name, Values& values, const std::string& value_name,
+                        const std::string& help, const std::string& group);
+
+/// The text of an option that may be given once; none when it was not. Throws UserError.
+std::optional<std::string> single(const Values& values, const std::string& option);
+
+std::shared_ptr<CLI::FormatterBase> help_formatter();
+
+/// The options that all simulating commands share, as typed.
+class SimulationArguments {
+ public:
+  enum class Variants { one, all };
+
+  void declare(CLI::App& app, Variants variants);
+  /// Loads the plugins and checks every option but the names of output files, which the commands know; `command` is the
+  /// whole command line. Throws UserError.
+  SimulationJob resolve(Variants variants, const std::vector<std::string>& command) const;
+
+ private:
+  SceneRequest scene_request() const;
+  std::vector<NamedFile> inputs() const;
+
+  Values scene_, size_, camera_, eye_, look_at_, up_, fovy_;
+  Values platform_, settings_, variant_, units_, plugins_;
+  Values fidelity_, format_, termination_;
+  Values background_, output_, json_, save_draw_, jobs_;
+};
+
+/// `--plugin` for commands that only list things.
+void load_plugins(const Values& plugins);
+
+}  // namespace vrpipe::tools

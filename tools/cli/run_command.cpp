@@ -1,0 +1,43 @@
+#include <CLI/CLI.hpp>
+
+#include "cli/command_line.h"
+#include "cli/options.h"
+#include "cli/print_result.h"
+#include "jobs/simulation_job.h"
+
+namespace vrpipe::tools {
+namespace {
+
+class RunCommand : public Command {
+ public:
+  std::string name() const override { return "run"; }
+  std::string summary() const override { return "one platform, one variant, one scene"; }
+
+  void declare(CLI::App& app) override {
+    arguments_.declare(app, SimulationArguments::Variants::one);
+    app.footer(
+        "Prints cycles, counts, utilization and what each unit spent its cycles on.\n"
+        "\n"
+        "Examples:\n"
+        "  vrpipe run\n"
+        "  vrpipe run --variant baseline --size 640x360 --output images\n"
+        "  vrpipe run --scene point_cloud.ply --eye 0,1.5,-4 --look-at 0,0,0 --fovy 45\n"
+        "  vrpipe run --set crop.cache_bytes=32768 --set tc.bins=64 --json -\n"
+        "  vrpipe run --plugin my_qru.so --unit qru=my-qru\n"
+        "  vrpipe run --fidelity functional --termination strict");
+  }
+
+  void run() override {
+    const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::one, command_line());
+    print_result(job, perform(job));
+  }
+
+ private:
+  SimulationArguments arguments_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_run_command() { return std::make_unique<RunCommand>(); }
+
+}  // namespace vrpipe::tools

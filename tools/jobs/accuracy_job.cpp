@@ -1,0 +1,366 @@
+#include "jobs/accuracy_job.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include <vrpipe/platforms/stress.h>
+#include <vrpipe/workloads/exact_image.h>
+#include <vrpipe/workloads/scene.h>
+
+#include "host/output_file.h"
+#include "jobs/comparison.h"
+#include "jobs/processes.h"
+
+namespace vrpipe::tools {
+namespace {
+
+/// A quick look takes the middle of the image, of which both sides are smaller by this.
+constexpr std::uint32_t quick_divisor = 3;
+// Of the part of the image that the stress configurations draw, pixels.
+constexpr std::uint32_t stress_side = 96;
+// Of pictures on the page, at most.
+constexpr std::uint32_t picture_width = 280;
+constexpr std::uint32_t reference_width = 560;
+constexpr const char* reference_name = "reference";
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
+}
+
+double percent_above(double value, double reference) { return reference > 0 ? 100 * (value / reference - 1) : 0; }
+
+std::optional<double> error_percent(const std::optional<double>& value, const std::optional<double>& reference) {
+  if (!value || !reference) return std::nullopt;
+  return percent_above(*value, *reference);
+}
+
+std::optional<double> cycles_of(const RunResult& run) {
+  return run.cycles ? std::optional<double>(static_cast<double>(*run.cycles)) : std::nullopt;
+}
+
+/// The scene, and the one draw that most runs share.
+struct Workload {
+  OpenedScene scene;
+  PreprocessOptions options;
+  std::shared_ptr<const Draw> draw;
+  std::shared_ptr<const Draw> stress_draw;  ///< the middle of it
+
+  std::shared_ptr<const Draw> draw_with(const PreprocessOptions& wanted) const {
+    const bool same = wanted.sh_degree == options.sh_degree && wanted.depth_key_bits == options.depth_key_bits;
+    if (same || scene.draw_list) return draw;
+    return std::make_shared<const Draw>(preprocess_scene(scene, wanted).draw);
+  }
+};
+
+Workload load(const AccuracyJob& job, AccuracyResult& result) {
+  Workload workload;
+  workload.scene = open_scene(job.simulation.scene);
+  workload.options = job.simulation.scene.preprocess;
+  if (workload.scene.draw_list) {
+    result.full_width = workload.scene.draw_list->draw.width;
+    result.full_height = workload.scene.draw_list->draw.height;
+  } else {
+    Camera& camera = workload.scene.viewpoint.camera;
+    result.full_width = camera.width;
+    result.full_height = camera.height;
+    // A part of the image, not a smaller one: splats keep their size, and so the units their share of the work.
+    if (job.quick && !job.simulation.scene.size) {
+      camera.width = std::max(1U, camera.width / quick_divisor);
+      camera.height = std::max(1U, camera.height / quick_divisor);
+    }
+  }
+  LoadedScene loaded = preprocess_scene(workload.scene, workload.options);
+  result.scene = std::move(loaded.summary);
+  result.viewpoint = loaded.viewpoint;
+  result.preprocessing = job.simulation.preprocessing;
+  result.width = loaded.draw.width;
+  result.height = loaded.draw.height;
+  workload.draw = std::make_shared<const Draw>(std::move(loaded.draw));
+  workload.stress_draw = workload.draw;
+  if (!workload.scene.draw_list) {
+    Camera& camera = workload.scene.viewpoint.camera;
+    const Camera whole = camera;
+    camera.width = std::min(camera.width, stress_side);
+    camera.height = std::min(camera.height, stress_side);
+    workload.stress_draw = std::make_shared<const Draw>(preprocess_scene(workload.scene, workload.options).draw);
+    camera = whole;
+  }
+  return workload;
+}
+
+void write_image(const AccuracyJob& job, const std::string& scene, const std::string& name, const SharedImage& image) {
+  const ImageFiles files = image_files(job.simulation, image_name(scene, name));
+  write_output_file(files.png, encode_png(image, job.simulation.background), "--output");
+  write_output_file(files.exr, encode_exr(image), "--output");
+}
+
+/// The image that errors are measured against: all bands, exact order.
+ShownImage make_reference(const AccuracyJob& job, const Workload& workload, AccuracyResult& result) {
+  const Stopwatch watch;
+  const ExactImage exact = render_exactly(*workload.draw_with(PreprocessOptions()));
+  result.reference_seconds = watch.seconds();
+  if (job.simulation.output) {
+    SharedImage image(exact.width, exact.height);
+    float* value = image.values();
+    for (const std::array<double, 4>& pixel : exact.rgba) {
+      value = std::transform(pixel.begin(), pixel.end(), value, [](double x) { return static_cast<float>(x); });
+    }
+    write_image(job, result.scene.name, reference_name, image);
+  }
+  ShownImage reference = shown(exact, job.simulation.background);
+  if (job.html) result.reference = picture_of(reference, reference_width);
+  return reference;
+}
+
+/// A precision run's name as part of a file's.
+std::string file_name(std::string run) {
+  std::replace(run.begin(), run.end(), '=', '-');
+  return run;
+}
+
+/// All images that a job may write; values that are not tried are among them.
+std::vector<std::string> images_of(const AccuracyJob& job) {
+  const std::string scene = scene_name(job.simulation.scene.scene);
+  std::vector<std::string> images{image_name(scene, reference_name), image_name(scene, "default")};
+  for (const PrecisionKnob& knob : precision_knobs()) {
+    for (const std::string& value : knob.values)
+      images.push_back(image_name(scene, file_name(knob.name + "=" + value)));
+  }
+  return images;
+}
+
+/// Compares the rungs of a variant, the first of which is the most exact.
+void compare_rungs(FidelityRung* rungs, std::size_t count) {
+  const FidelityRung& exact = rungs[0];
+  std::vector<FidelityRung*> timed;
+  std::vector<TradeOff> trade_offs;
+  for (FidelityRung* rung = rungs; rung != rungs + count; ++rung) {
+    rung->fragments_blended_error_percent = percent_above(static_cast<double>(rung->run.counts.fragments_blended),
+                                                          static_cast<double>(exact.run.counts.fragments_blended));
+    rung->cycles_error_percent = error_percent(cycles_of(rung->run), cycles_of(exact.run));
+    rung->speedup_error_percent = error_percent(rung->speedup, exact.speedup);
+    if (rung->cpu_seconds > 0) rung->times_as_fast = exact.cpu_seconds / rung->cpu_seconds;
+    if (!rung->run.cycles) continue;
+    timed.push_back(rung);
+    trade_offs.push_back({rung->cpu_seconds, std::fabs(rung->cycles_error_percent.value_or(0))});
+  }
+  const std::vector<bool> beaten = dominated(trade_offs, fidelity_tolerance);
+  // Without the most exact, nobody knows how exact the others are.
+  for (std::size_t i = 1; i < timed.size(); ++i) timed[i]->dominated = beaten[i];
+}
+
+/// The runs of the fidelity ladder: for each variant from the most exact fidelity on, so that its image is there to
+/// compare with.
+std::vector<RunRequest> fidelity_requests(const AccuracyJob& job) {
+  std::vector<RunRequest> requests;
+  for (const RunRequest& request : job.simulation.requests) {
+    const Variant& variant = request.variant;
+    if (job.quick && variant.quad_merging != variant.early_termination) continue;
+    for (auto fidelity = fidelities().rbegin(); fidelity != fidelities().rend(); ++fidelity) {
+      requests.push_back(request);
+      requests.back().fidelity = *fidelity;
+    }
+  }
+  return requests;
+}
+
+void climb_fidelities(const AccuracyJob& job, const Workload& workload, const std::vector<RunRequest>& requests,
+                      const BatchPlace& place, AccuracyResult& result, ProgressLine& progress) {
+  std::vector<Task> tasks;
+  for (unsigned round = 0; round < job.repeat; ++round) {
+    for (const RunRequest& request : requests) {
+      tasks.push_back({request.variant.name + " " + vrpipe::name_of(request.fidelity), request,
+                       [&workload] { return workload.draw; }});
+    }
+  }
+  result.fidelity.resize(requests.size());
+  std::vector<std::vector<double>> host_seconds(requests.size());
+  std::vector<std::vector<double>> cpu_seconds(requests.size());
+  ShownImage most_exact;
+  // One at a time, so that none takes cache or memory from another.
+  run_tasks(tasks, true, 1, place, progress, [&](std::size_t index, Simulated&& simulated) {
+    const std::size_t rung_index = index % requests.size();
+    host_seconds[rung_index].push_back(simulated.result.host_seconds);
+    cpu_seconds[rung_index].push_back(simulated.result.cpu_seconds);
+    if (index >= requests.size()) return;
+    FidelityRung& rung = result.fidelity[rung_index];
+    rung.run = std::move(simulated.result);
+    ShownImage image = shown(*simulated.image, job.simulation.background);
+    if (rung.run.request.fidelity == fidelities().back()) most_exact = image;
+    rung.image = image_error(image, most_exact);
+  });
+
+  const std::size_t rungs = fidelities().size();
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    FidelityRung& rung = result.fidelity[i];
+    rung.host_seconds = median(host_seconds[i]);
+    rung.cpu_seconds = median(cpu_seconds[i]);
+    const auto quads = static_cast<double>(rung.run.counts.quads_rasterized);
+    rung.quads_per_second = rung.cpu_seconds > 0 ? quads / rung.cpu_seconds : 0;
+    rung.speedup = speedup(result.fidelity[i % rungs].run, rung.run);
+  }
+  for (std::size_t first = 0; first < requests.size(); first += rungs) {
+    compare_rungs(&result.fidelity[first], rungs);
+    std::reverse(result.fidelity.begin() + static_cast<std::ptrdiff_t>(first),
+                 result.fidelity.begin() + static_cast<std::ptrdiff_t>(first + rungs));
+  }
+}
+
+constexpr std::array stress_rungs{Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle};
+
+/// The first variant and the last on every stress configuration, at each of `stress_rungs`, in the middle of the image.
+std::vector<Task> stress_tasks(const AccuracyJob& job, const Workload& workload, AccuracyResult& result) {
+  std::vector<RunRequest> variants{job.simulation.requests.front()};
+  if (job.simulation.requests.size() > 1) variants.push_back(job.simulation.requests.back());
+  std::vector<Task> tasks;
+  for (const StressConfiguration& configuration : stress_configurations()) {
+    if (job.quick && !configuration.quick) continue;
+    for (RunRequest request : variants) {
+      request.platform = &configuration.platform;
+      request.settings.insert(request.settings.end(), configuration.settings.begin(), configuration.settings.end());
+      result.stress.push_back({configuration.name, request.variant.name, 0, {}});
+      for (const Fidelity fidelity : stress_rungs) {
+        request.fidelity = fidelity;
+        tasks.push_back({configuration.name + " " + vrpipe::name_of(fidelity), request,
+                         [&workload] { return workload.stress_draw; }});
+      }
+    }
+  }
+  return tasks;
+}
+
+void climb_stress(const AccuracyJob& job, const std::vector<Task>& tasks, const BatchPlace& place,
+                  AccuracyResult& result, ProgressLine& progress) {
+  std::vector<double> cycles(tasks.size());
+  const unsigned processes = std::min(job.simulation.processes, static_cast<unsigned>(tasks.size()));
+  run_tasks(tasks, false, processes, place, progress,
+            [&](std::size_t index, Simulated&& simulated) { cycles[index] = cycles_of(simulated.result).value_or(0); });
+  for (std::size_t i = 0; i < result.stress.size(); ++i) {
+    const double* const of_row = &cycles[i * stress_rungs.size()];
+    const double exact = of_row[stress_rungs.size() - 1];
+    result.stress[i].cycles = static_cast<std::uint64_t>(exact);
+    for (std::size_t rung = 0; rung + 1 < stress_rungs.size(); ++rung) {
+      result.stress[i].error_percent.emplace_back(stress_rungs[rung], percent_above(of_row[rung], exact));
+    }
+  }
+}
+
+/// All knobs' values, and the settings of the runs that they need; the default is the first run.
+std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_draw_list, AccuracyResult& result) {
+  std::vector<PrecisionSettings> settings{{result.base, job.simulation.scene.preprocess}};
+  result.runs.resize(1);
+  result.runs.front().name = "default";
+  for (const PrecisionKnob& knob : precision_knobs()) {
+    if (job.quick && knob.quick_value.empty()) continue;
+    if (knob.is_preprocessing && is_draw_list) {
+      result.knobs_left_out.push_back(knob.name);
+      continue;
+    }
+    const std::string chosen = knob.value(settings.front());
+    std::vector<std::string> values = job.quick ? std::vector<std::string>{knob.quick_value} : knob.values;
+    if (std::find(values.begin(), values.end(), chosen) == values.end()) values.insert(values.begin(), chosen);
+    for (const std::string& value : values) {
+      if (value == chosen) {
+        result.precision.push_back({&knob, value, 0});
+        continue;
+      }
+      result.precision.push_back({&knob, value, settings.size()});
+      settings.push_back(settings.front());
+      knob.set(settings.back(), value);
+      result.runs.emplace_back();
+      result.runs.back().name = knob.name + "=" + value;
+    }
+  }
+  return settings;
+}
+
+void climb_precisions(const AccuracyJob& job, const Workload& workload, const std::vector<PrecisionSettings>& settings,
+                      const ShownImage& reference, const BatchPlace& place, AccuracyResult& result,
+                      ProgressLine& progress) {
+  std::vector<Task> tasks;
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const PreprocessOptions options = settings[i].preprocess;
+    tasks.push_back(
+        {result.runs[i].name, settings[i].request, [&workload, options] { return workload.draw_with(options); }});
+  }
+  result.processes = std::min(job.simulation.processes, static_cast<unsigned>(tasks.size()));
+  run_tasks(tasks, true, result.processes, place, progress, [&](std::size_t index, Simulated&& simulated) {
+    PrecisionRun& run = result.runs[index];
+    run.run = std::move(simulated.result);
+    const ShownImage image = shown(*simulated.image, job.simulation.background);
+    run.error = image_error(image, reference);
+    for (const StatisticReport& statistic : run.run.statistics) {
+      if (statistic.name == "crop.pixels_stuck") run.pixels_stuck = statistic.value;
+    }
+    if (job.html) {
+      run.picture = picture_of(image, picture_width);
+      run.error_map = error_map(image, reference, picture_width);
+    }
+    if (job.simulation.output) {
+      write_image(job, result.scene.name, file_name(run.name), *simulated.image);
+    }
+  });
+
+  std::vector<TradeOff> trade_offs;
+  for (PrecisionRun& run : result.runs) {
+    run.cycles_change_percent = error_percent(cycles_of(run.run), cycles_of(result.runs.front().run));
+    trade_offs.push_back({cycles_of(run.run).value_or(0), -run.error.psnr_db});
+  }
+  if (!result.runs.front().run.cycles) return;
+  const std::vector<bool> front = pareto_front(trade_offs, precision_tolerance);
+  for (std::size_t i = 0; i < result.runs.size(); ++i) result.runs[i].on_front = front[i];
+}
+
+}  // namespace
+
+AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) {
+  std::vector<NamedFile> page;
+  if (job.html) page.push_back({"--html", *job.html});
+  check_outputs(job.simulation, images_of(job), page);
+  const Stopwatch watch;
+  AccuracyResult result;
+  result.provenance = job.simulation.provenance;
+  result.quick = job.quick;
+  result.repeat = job.repeat;
+  result.base = job.simulation.requests.back();  // with all that the paper adds
+  progress.show("loading the scene");
+  const Workload workload = load(job, result);
+  if (job.simulation.output) create_output_folder(*job.simulation.output, "--output");
+  save_draw(job.simulation, *workload.draw);
+  progress.show("rendering the exact image");
+  const ShownImage reference = make_reference(job, workload, result);
+
+  const std::vector<RunRequest> rungs = fidelity_requests(job);
+  const std::vector<PrecisionSettings> values = choose_values(job, workload.scene.draw_list.has_value(), result);
+  const std::vector<Task> stress = stress_tasks(job, workload, result);
+  const std::size_t climbs = job.repeat * rungs.size();
+  const Stopwatch ladders;
+  climb_fidelities(job, workload, rungs, {"fidelity ", 0, stress.size() + values.size(), 0}, result, progress);
+  climb_stress(job, stress, {"stress ", climbs, values.size(), ladders.seconds()}, result, progress);
+  climb_precisions(job, workload, values, reference, {"precision ", climbs + stress.size(), 0, ladders.seconds()},
+                   result, progress);
+  if (!workload.scene.draw_list) {
+    for (PrecisionRun& run : result.runs) {
+      run.run.parameters.insert(run.run.parameters.end(), job.simulation.preprocess_parameters.begin(),
+                                job.simulation.preprocess_parameters.end());
+    }
+  }
+  result.seconds = watch.seconds();
+  return result;
+}
+
+}  // namespace vrpipe::tools

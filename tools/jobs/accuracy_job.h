@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vrpipe/platforms/simulation.h>
+
+#include "host/progress_line.h"
+#include "image/image_error.h"
+#include "image/picture.h"
+#include "jobs/precision_knobs.h"
+#include "jobs/simulation_job.h"
+#include "jobs/trade_off.h"
+
+namespace vrpipe::tools {
+
+/// What `vrpipe accuracy` is asked to do.
+struct AccuracyJob {
+  SimulationJob simulation;
+  bool quick = false;                         ///< the middle of the image, fewer variants and values
+  unsigned repeat = 1;                        ///< times that each rung of the fidelity ladder is measured
+  std::optional<std::filesystem::path> html;  ///< file
+  bool markdown = false;                      ///< the tables for documentation in place of the report
+};
+
+// Of the ladders. CPU seconds and error in cycles, percent; simulated cycles and dB of PSNR.
+constexpr Tolerance fidelity_tolerance{0.05, 0.01};
+constexpr Tolerance precision_tolerance{0.001, 0.1};
+
+/// One variant at one fidelity, beside the most exact fidelity.
+struct FidelityRung {
+  RunResult run;
+  double host_seconds = 0;                     ///< the median
+  double cpu_seconds = 0;                      ///< the median
+  double times_as_fast = 0;                    ///< in CPU seconds, as the most exact fidelity of the variant
+  std::optional<double> cycles_error_percent;  ///< above 0: too many cycles; none without time
+  std::optional<double> speedup;               ///< over the baseline at the same fidelity
+  std::optional<double> speedup_error_percent;
+  double quads_per_second = 0;  ///< rasterised, per CPU second
+  double fragments_blended_error_percent = 0;
+  ImageError image;        ///< against the most exact fidelity's
+  bool dominated = false;  ///< by another rung of the variant, in CPU seconds and error; the most exact never is
+};
+
+/// A run of the precision ladder.
+struct PrecisionRun {
+  std::string name;  ///< KNOB=VALUE, or "default"
+  RunResult run;
+  ImageError error;                             ///< against the exact image
+  std::uint64_t pixels_stuck = 0;               ///< below the termination threshold, by rounding
+  std::optional<double> cycles_change_percent;  ///< against the default; none without time
+  bool on_front = false;                        ///< the Pareto front of cycles and PSNR; false without time
+  Picture picture, error_map;                   ///< for the page; else empty
+};
+
+/// A knob's value, and the run that has it.
+struct PrecisionRow {
+  const PrecisionKnob* knob;
+  std::string value;
+  std::size_t run;  ///< 0 is the default
+};
+
+/// A stress configuration: cycles at the most exact fidelity, and the errors of the others in the order of `fidelities()`.
+struct StressRow {
+  std::string configuration;
+  std::string variant;
+  std::uint64_t cycles = 0;
+  std::vector<std::pair<Fidelity, double>> error_percent;
+};
+
+struct AccuracyResult {
+  Provenance provenance;
+  SceneSummary scene;
+  std::optional<Viewpoint> viewpoint;             ///< none for a draw list
+  std::uint32_t width = 0, height = 0;            ///< pixels
+  std::uint32_t full_width = 0, full_height = 0;  ///< of which a quick look takes the middle
+  bool quick = false;
+  unsigned repeat = 1;
+  unsigned processes = 1;                   ///< of the precision ladder
+  std::vector<Setting> preprocessing;       ///< what --set changed of it
+  RunRequest base;                          ///< what the precision ladder varies
+  std::vector<FidelityRung> fidelity;       ///< by variant, then from the least exact to the most
+  std::vector<PrecisionRun> runs;           ///< the default first
+  std::vector<PrecisionRow> precision;      ///< by knob
+  std::vector<std::string> knobs_left_out;  ///< those that mean nothing for a draw list
+  std::vector<StressRow> stress;            ///< by configuration, then by variant
+  Picture reference;                        ///< the exact image, for the page
+  double reference_seconds = 0;             ///< to render it
+  double seconds = 0;                       ///< wall time of everything
+};
+
+/// Runs both ladders. Images go to the folder of --output. Throws UserError, CommandFailure or a fault.
+AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress);
+
+}  // namespace vrpipe::tools

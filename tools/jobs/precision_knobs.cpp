@@ -1,0 +1,136 @@
+#include "jobs/precision_knobs.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include <vrpipe/platforms/configuration.h>
+#include <vrpipe/workloads/preprocess_parameters.h>
+
+#include "jobs/termination.h"
+
+namespace vrpipe::tools {
+namespace {
+
+std::string parameter_value(const ParameterSet& set, const std::string& name) {
+  for (const Parameter* parameter : set.parameters()) {
+    if (name == parameter->name()) return parameter->value();
+  }
+  throw std::logic_error("there is no parameter " + name);
+}
+
+/// A parameter of the draw's state.
+PrecisionKnob state_knob(const std::string& name, const std::string& meaning, std::vector<std::string> values,
+                         const std::string& quick_value) {
+  PrecisionKnob knob{name, "--set state." + name + "=", meaning, std::move(values), quick_value, false, {}, {}};
+  knob.value = [name](const PrecisionSettings& settings) {
+    StateParameters state;
+    for (const auto* list : {&settings.request.platform->settings, &settings.request.settings}) {
+      for (const Setting& setting : *list) {
+        if (setting.unit == "state") state.set(setting.unit, setting.parameter, setting.value);
+      }
+    }
+    return parameter_value(state, name);
+  };
+  knob.set = [name](PrecisionSettings& settings, const std::string& value) {
+    settings.request.settings.push_back({"state", name, value});
+  };
+  return knob;
+}
+
+PrecisionKnob preprocess_knob(const std::string& name, const std::string& meaning, std::vector<std::string> values,
+                              const std::string& quick_value, int PreprocessOptions::*member) {
+  PrecisionKnob knob{name, "--set preprocess." + name + "=", meaning, std::move(values), quick_value, true, {}, {}};
+  knob.value = [member](const PrecisionSettings& settings) { return std::to_string(settings.preprocess.*member); };
+  knob.set = [name, member](PrecisionSettings& settings, const std::string& value) {
+    PreprocessParameters parameters;
+    parameters.set(name, value);
+    settings.preprocess.*member = parameters.options().*member;
+  };
+  return knob;
+}
+
+/// An extension of the paper: another variant.
+PrecisionKnob variant_knob(const std::string& name, const std::string& meaning, bool Variant::*member) {
+  PrecisionKnob knob{name, "--variant ", meaning, {"on", "off"}, "off", false, {}, {}};
+  knob.value = [member](const PrecisionSettings& settings) {
+    return settings.request.variant.*member ? std::string("on") : std::string("off");
+  };
+  knob.set = [member](PrecisionSettings& settings, const std::string& value) {
+    Variant wanted = settings.request.variant;
+    wanted.*member = value == "on";
+    for (const Variant& variant : variants()) {
+      if (variant.quad_merging == wanted.quad_merging && variant.early_termination == wanted.early_termination) {
+        settings.request.variant = variant;
+      }
+    }
+  };
+  return knob;
+}
+
+std::string level(int n) { return fmt::format("{}", n / 255.0); }
+
+std::vector<PrecisionKnob> make_knobs() {
+  std::vector<PrecisionKnob> knobs;
+  knobs.push_back({"format",
+                   "--format ",
+                   "what the colour target stores per channel",
+                   {"rgba8", "rgba16f", "rgba32f"},
+                   "rgba8",
+                   false,
+                   [](const PrecisionSettings& settings) { return vrpipe::name_of(settings.request.format); },
+                   [](PrecisionSettings& settings, const std::string& value) {
+                     settings.request.format = color_format_named(value);
+                   }});
+  knobs.push_back(
+      state_knob("blend_rounding", "how the blender rounds to the format", {"rne", "rtz", "measured"}, "rtz"));
+  knobs.push_back(state_knob("termination_threshold", "alpha at which a pixel is terminated",
+                             {"0.98", "0.99", "0.996", "0.999"}, "0.98"));
+  knobs.push_back(state_knob("termination_compare", "how alpha passes that threshold", {"ge", "gt"}, ""));
+  knobs.push_back({"termination",
+                   "--termination ",
+                   "when a termination bit counts",
+                   {"paper", "strict"},
+                   "",
+                   false,
+                   [](const PrecisionSettings& settings) { return name_of(settings.request.termination); },
+                   [](PrecisionSettings& settings, const std::string& value) {
+                     settings.request.termination = termination_named(value);
+                   }});
+  knobs.push_back(state_knob("pruning_threshold", "alpha below which a fragment is not blended",
+                             {"0", level(1), level(2), level(4)}, level(4)));
+  knobs.push_back(state_knob("subpixel_bits", "of vertex coordinates", {"4", "8", "12"}, ""));
+  knobs.push_back(
+      state_knob("exponential", "of the fragment shader", {"exact", "ex2", "fp16", "table256", "table16"}, "table16"));
+  knobs.push_back(preprocess_knob("depth_key_bits", "of the depths that splats are sorted by", {"32", "24", "16", "12"},
+                                  "12", &PreprocessOptions::depth_key_bits));
+  knobs.push_back(preprocess_knob("sh_degree", "highest degree of spherical harmonics evaluated", {"3", "2", "1", "0"},
+                                  "0", &PreprocessOptions::sh_degree));
+  knobs.push_back(state_knob("splat_extent", "what is rasterised for a splat", {"obb", "aabb", "three_sigma"}, ""));
+  knobs.push_back(variant_knob("quad_merging", "TGC and QRU merge overlapping quads", &Variant::quad_merging));
+  knobs.push_back(
+      variant_knob("early_termination", "ZROP and CROP terminate opaque pixels", &Variant::early_termination));
+  // The same rates, latencies and instructions whatever they are set to; and preprocessing is before the draw.
+  const std::vector<std::string> free{"blend_rounding", "termination_compare", "subpixel_bits",
+                                      "exponential",    "depth_key_bits",      "sh_degree"};
+  for (PrecisionKnob& knob : knobs) knob.is_charged = std::find(free.begin(), free.end(), knob.name) == free.end();
+  return knobs;
+}
+
+}  // namespace
+
+const std::vector<PrecisionKnob>& precision_knobs() {
+  static const std::vector<PrecisionKnob> knobs = make_knobs();
+  return knobs;
+}
+
+std::string readable_value(const PrecisionKnob& knob, const std::string& value) {
+  if (knob.name != "pruning_threshold") return value;
+  for (int n = 1; n < 255; ++n) {
+    if (value == level(n)) return fmt::format("{}/255", n);
+  }
+  return value;
+}
+
+}  // namespace vrpipe::tools

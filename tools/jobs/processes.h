@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vrpipe/draw.h>
+#include <vrpipe/platforms/simulation.h>
+
+#include "host/progress_line.h"
+#include "image/images.h"
+
+namespace vrpipe::tools {
+
+/// A simulation's result; its pixels are in `image`, when images were asked for, and not in `result.surface`.
+struct Simulated {
+  RunResult result;
+  std::optional<SharedImage> image;
+};
+
+/// Runs one simulation in this process. Whatever is printed to stdout meanwhile goes to stderr.
+Simulated simulate_here(const RunRequest& request, const Draw& draw, bool with_image, ProgressLine& progress);
+
+/// One of several simulations.
+struct Task {
+  std::string name;  ///< in progress and messages
+  RunRequest request;
+  /// Gives the draw when the simulation's process is about to start. It may let go of it afterwards.
+  std::function<std::shared_ptr<const Draw>()> draw;
+};
+
+/// Where some simulations stand among all that a command runs, for the progress.
+struct BatchPlace {
+  std::string title;          ///< before the progress
+  std::size_t before = 0;     ///< simulations done already
+  std::size_t after = 0;      ///< simulations that will follow
+  double seconds_before = 0;  ///< that those before took, wall time
+};
+
+/// Runs simulations side by side, each in a process of its own, at most `processes` at a time: SystemC holds one
+/// simulation per process. `finished` gets each as it ends, in whatever order; what it is given for one does not depend
+/// on `processes`. The caller must not have other threads meanwhile, nor have used SystemC.
+/// Throws CommandFailure with the text of the first simulation that failed, or was killed; the others are ended.
+void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned processes, const BatchPlace& place,
+               ProgressLine& progress, const std::function<void(std::size_t index, Simulated&& simulated)>& finished);
+
+/// The same for simulations of one draw, which is shared, not copied; results in the order of the requests.
+std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requests, const Draw& draw,
+                                             bool with_images, unsigned processes, ProgressLine& progress);
+
+}  // namespace vrpipe::tools

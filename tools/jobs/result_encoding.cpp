@@ -1,0 +1,216 @@
+#include "jobs/result_encoding.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <type_traits>
+
+#include <fmt/format.h>
+
+#include <vrpipe/printable.h>
+
+namespace vrpipe::tools {
+namespace {
+
+using Json = nlohmann::json;
+
+/// The first of some names, "one, two, three", which is taken off.
+std::string next_name(std::string& names) {
+  const std::size_t end = std::min(names.find(','), names.size());
+  std::string name = names.substr(0, end);
+  names.erase(0, names.find_first_not_of(", ", end));
+  return name;
+}
+
+/// `each_member(value, visit)` calls `visit(name, member)` for every member of a struct. The structured binding does not
+/// compile when the struct has a member that is not named here.
+#define VRPIPE_MEMBERS(STRUCT, ...)                                                                            \
+  template <class Value, class Visit>                                                                          \
+  std::enable_if_t<std::is_same<std::remove_const_t<Value>, STRUCT>::value> each_member(Value& value_,         \
+                                                                                        const Visit& visit_) { \
+    auto& [__VA_ARGS__] = value_;                                                                              \
+    visit_all(#__VA_ARGS__, visit_, __VA_ARGS__);                                                              \
+  }
+
+template <class Visit, class... Members>
+void visit_all(std::string names, const Visit& visit, Members&... members) {
+  (visit(next_name(names), members), ...);
+}
+
+VRPIPE_MEMBERS(Counts, primitives, quads_rasterized, fragments_rasterized, quads_depth_stencil_failed,
+               fragments_depth_stencil_failed, quads_terminated, fragments_terminated, quads_shaded, fragments_shaded,
+               quads_pruned, fragments_pruned, quads_merged, fragments_merged, quads_dropped_late,
+               fragments_dropped_late, quads_late_failed, fragments_late_failed, quads_blended, fragments_blended,
+               warps, tgc_flushes, tc_flushes, termination_updates)
+VRPIPE_MEMBERS(UnitReport, name, cycles, occupancy, parts)
+VRPIPE_MEMBERS(Bottleneck, unit, occupancy, parts)
+VRPIPE_MEMBERS(StatisticReport, name, unit, meaning, value)
+VRPIPE_MEMBERS(RunResult, request, cycles, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
+               bottleneck, statistics, implementations, parameters, outside_validated_range, result_hash, kernel_events,
+               surface)
+
+/// Types of members that stay behind.
+template <class Member>
+constexpr bool stays = std::is_same<Member, RunRequest>::value || std::is_same<Member, ColorSurface>::value;
+
+struct Writer {
+  static Json of(std::uint64_t value) { return value; }
+  static Json of(double value) { return value; }
+  /// CBOR's texts are UTF-8.
+  static Json of(const std::string& text) {
+    if (valid_utf8(text) == text) return text;
+    return Json::binary({text.begin(), text.end()});
+  }
+  template <class Value>
+  static Json of(const std::optional<Value>& value) {
+    return value ? of(*value) : Json();
+  }
+  template <class First, class Second>
+  static Json of(const std::pair<First, Second>& pair) {
+    return Json::array({of(pair.first), of(pair.second)});
+  }
+  template <class Value>
+  static Json of(const std::vector<Value>& values) {
+    return of_all(values);
+  }
+  template <class Value, std::size_t Size>
+  static Json of(const std::array<Value, Size>& values) {
+    return of_all(values);
+  }
+  template <class Struct>
+  static Json of(const Struct& value) {
+    Json json = Json::object();
+    each_member(value, [&](const std::string& name, const auto& member) {
+      if constexpr (!stays<std::decay_t<decltype(member)>>) json[name] = of(member);
+    });
+    return json;
+  }
+
+ private:
+  template <class Values>
+  static Json of_all(const Values& values) {
+    Json json = Json::array();
+    for (const auto& value : values) json.push_back(of(value));
+    return json;
+  }
+};
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw std::runtime_error("a simulation's result cannot be read: " + why);
+}
+
+/// Takes nothing for what it is not: the library would turn any number into any other.
+struct Reader {
+  static void read(const Json& json, std::uint64_t& value, const std::string& where) {
+    check(json.is_number_unsigned(), where);
+    value = json.get<std::uint64_t>();
+  }
+  static void read(const Json& json, double& value, const std::string& where) {
+    check(json.is_number_float(), where);
+    value = json.get<double>();
+  }
+  static void read(const Json& json, std::string& text, const std::string& where) {
+    if (json.is_binary()) {
+      text.assign(json.get_binary().begin(), json.get_binary().end());
+      return;
+    }
+    check(json.is_string(), where);
+    text = json.get_ref<const std::string&>();
+  }
+  template <class Value>
+  static void read(const Json& json, std::optional<Value>& value, const std::string& where) {
+    if (!json.is_null()) read(json, value.emplace(), where);
+  }
+  template <class First, class Second>
+  static void read(const Json& json, std::pair<First, Second>& pair, const std::string& where) {
+    check(json.is_array() && json.size() == 2, where);
+    read(json[0], pair.first, where);
+    read(json[1], pair.second, where);
+  }
+  template <class Value>
+  static void read(const Json& json, std::vector<Value>& values, const std::string& where) {
+    check(json.is_array(), where);
+    values.resize(json.size());
+    for (std::size_t i = 0; i < values.size(); ++i) read(json[i], values[i], where);
+  }
+  template <class Value, std::size_t Size>
+  static void read(const Json& json, std::array<Value, Size>& values, const std::string& where) {
+    check(json.is_array() && json.size() == Size, where);
+    for (std::size_t i = 0; i < Size; ++i) read(json[i], values[i], where);
+  }
+  template <class Struct>
+  static void read(const Json& json, Struct& value, const std::string& where) {
+    check(json.is_object(), where);
+    std::size_t expected = 0;
+    each_member(value, [&](const std::string& name, auto& member) {
+      if constexpr (!stays<std::decay_t<decltype(member)>>) {
+        const auto found = json.find(name);
+        if (found == json.end()) refuse(where + " has no " + name);
+        read(*found, member, where + "." + name);
+        ++expected;
+      }
+    });
+    if (json.size() != expected) refuse(where + " has more than this version knows");
+  }
+
+ private:
+  static void check(bool is_right, const std::string& where) {
+    if (!is_right) refuse(where + " is not what it should be");
+  }
+};
+
+/// Looks through a document before it is built, which takes the stack for every level of it.
+class Examination : public nlohmann::json_sax<Json> {
+ public:
+  /// What is wrong with it; none otherwise.
+  static std::optional<std::string> of(const std::string& bytes) {
+    Examination examination;
+    if (Json::sax_parse(bytes, &examination, Json::input_format_t::cbor)) return std::nullopt;
+    return examination.complaint_;
+  }
+
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(number_integer_t) override { return true; }
+  bool number_unsigned(number_unsigned_t) override { return true; }
+  bool number_float(number_float_t, const string_t&) override { return true; }
+  bool string(string_t&) override { return true; }
+  bool binary(binary_t&) override { return true; }
+  bool key(string_t&) override { return true; }
+  bool start_object(std::size_t) override { return ++depth_ <= deepest; }
+  bool end_object() override { return --depth_, true; }
+  bool start_array(std::size_t) override { return ++depth_ <= deepest; }
+  bool end_array() override { return --depth_, true; }
+  bool parse_error(std::size_t, const std::string&, const Json::exception& error) override {
+    complaint_ = error.what();
+    return false;
+  }
+
+ private:
+  static constexpr unsigned deepest = 16;
+  unsigned depth_ = 0;
+  std::string complaint_ = "it goes deeper than a result";
+};
+
+}  // namespace
+
+Json encode(const RunResult& result) { return Writer::of(result); }
+
+RunResult decode(const Json& json, const RunRequest& request) {
+  RunResult result;
+  Reader::read(json, result, "result");
+  result.request = request;
+  return result;
+}
+
+std::string to_bytes(const RunResult& result) {
+  std::string bytes;
+  Json::to_cbor(encode(result), bytes);
+  return bytes;
+}
+
+RunResult from_bytes(const std::string& bytes, const RunRequest& request) {
+  if (const auto complaint = Examination::of(bytes)) refuse(*complaint);
+  return decode(Json::from_cbor(bytes), request);
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,124 @@
+#include "jobs/simulation_job.h"
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <utility>
+
+#include <vrpipe/workloads/draw_list.h>
+#include <vrpipe/workloads/scene.h>
+
+#include "for_each_chunk.h"
+#include "host/output_file.h"
+#include "host/process_setup.h"
+#include "host/progress_line.h"
+#include "jobs/processes.h"
+
+namespace vrpipe::tools {
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Writes the images of all runs, side by side: compression takes longer than the disk.
+void write_images(const SimulationJob& job, const std::vector<Simulated>& simulated, JobResult& result) {
+  for (const Simulated& run : simulated) {
+    result.images.emplace_back(image_files(job, image_name(result.scene.name, run.result.request.variant.name)));
+  }
+  for_each_chunk(simulated.size(), job.processes, [&](std::uint64_t i) {
+    const SharedImage& image = *simulated[i].image;
+    write_output_file(result.images[i]->png, encode_png(image, job.background), "--output");
+    write_output_file(result.images[i]->exr, encode_exr(image), "--output");
+  });
+}
+
+}  // namespace
+
+std::string image_name(const std::string& scene, const std::string& variant) {
+  const std::string builtin = "builtin:";
+  const std::string name =
+      scene.rfind(builtin, 0) == 0 ? scene.substr(builtin.size()) : std::filesystem::path(scene).stem().string();
+  return name + "-" + variant;
+}
+
+ImageFiles image_files(const SimulationJob& job, const std::string& name) {
+  const std::string stem = (*job.output / name).string();
+  return {stem + ".png", stem + ".exr"};
+}
+
+void check_outputs(const SimulationJob& job, const std::vector<std::string>& images, std::vector<NamedFile> outputs) {
+  if (job.json && *job.json != "-") outputs.push_back({"--json", *job.json});
+  if (job.save_draw) outputs.push_back({"--save-draw", *job.save_draw});
+  if (job.output) {
+    for (const std::string& name : images) {
+      const ImageFiles files = image_files(job, name);
+      outputs.push_back({"--output", files.png});
+      outputs.push_back({"--output", files.exr});
+    }
+  }
+  for (const NamedFile& output : outputs) check_output_file(output.path, output.option, job.output);
+  check_files_differ(job.inputs, outputs);
+}
+
+void save_draw(const SimulationJob& job, const Draw& draw) {
+  if (!job.save_draw) return;
+  write_draw_list(*job.save_draw, draw);
+  note_written(job.save_draw->string());
+}
+
+JobResult perform(const SimulationJob& job) {
+  std::vector<std::string> images;
+  for (const RunRequest& request : job.requests) {
+    images.push_back(image_name(scene_name(job.scene.scene), request.variant.name));
+  }
+  check_outputs(job, images);
+  JobResult result;
+  result.schema = job.schema;
+  result.provenance = job.provenance;
+  ProgressLine progress;
+  std::vector<Simulated> simulated;
+  bool preprocessed_here = false;
+  {
+    progress.show("loading " + (job.scene.scene.empty() ? std::string("the built-in scene") : job.scene.scene));
+    const auto start = std::chrono::steady_clock::now();
+    LoadedScene loaded = load_scene(job.scene);
+    result.load_seconds = seconds_since(start);
+    progress.erase();
+    result.scene = loaded.summary;
+    result.viewpoint = loaded.viewpoint;
+    result.preprocessing = job.preprocessing;
+    preprocessed_here = loaded.preprocessed_here;
+    result.width = loaded.draw.width;
+    result.height = loaded.draw.height;
+    if (job.output) create_output_folder(*job.output, "--output");
+    save_draw(job, loaded.draw);
+
+    const auto simulation_start = std::chrono::steady_clock::now();
+    if (job.requests.size() == 1) {
+      simulated.push_back(simulate_here(job.requests.front(), loaded.draw, job.output.has_value(), progress));
+    } else {
+      simulated = simulate_in_processes(job.requests, loaded.draw, job.output.has_value(), job.processes, progress);
+    }
+    result.simulate_seconds = seconds_since(simulation_start);
+    result.processes = std::min(job.processes, static_cast<unsigned>(job.requests.size()));
+  }
+
+  if (job.output) {
+    progress.show("writing images");
+    write_images(job, simulated, result);
+    progress.erase();
+  } else {
+    result.images.resize(simulated.size());
+  }
+  for (Simulated& run : simulated) {
+    if (preprocessed_here) {
+      run.result.parameters.insert(run.result.parameters.end(), job.preprocess_parameters.begin(),
+                                   job.preprocess_parameters.end());
+    }
+    result.runs.push_back(std::move(run.result));
+  }
+  return result;
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <vrpipe/draw.h>
+#include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/scene.h>
+
+#include "host/output_file.h"
+#include "host/provenance.h"
+
+namespace vrpipe::tools {
+
+/// Everything that `run` or `compare` is asked to do, checked as far as that is possible without reading the scene.
+struct SimulationJob {
+  std::string schema;  ///< of the JSON of `run` or `compare`
+  Provenance provenance;
+  SceneRequest scene;
+  std::vector<RunRequest> requests;    ///< one for each variant, alike in everything else
+  std::vector<Setting> preprocessing;  ///< of --set, for the report; `scene` has them
+  /// `preprocess.NAME` and value of every parameter of preprocessing.
+  std::vector<std::pair<std::string, std::string>> preprocess_parameters;
+  std::array<float, 3> background{};
+  std::vector<NamedFile> inputs;                   ///< that the options name; outputs must not be among them
+  std::optional<std::filesystem::path> output;     ///< folder for images
+  std::optional<std::string> json;                 ///< file, or "-" for stdout
+  std::optional<std::filesystem::path> save_draw;  ///< file
+  unsigned processes = 1;                          ///< simulations at a time
+};
+
+/// The image files of one run.
+struct ImageFiles {
+  std::string png;
+  std::string exr;
+};
+
+/// What reports and JSON are made from.
+struct JobResult {
+  std::string schema;  ///< of the JSON
+  Provenance provenance;
+  SceneSummary scene;
+  std::optional<Viewpoint> viewpoint;  ///< none for a draw list
+  std::vector<Setting> preprocessing;  ///< what --set changed of it
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::vector<RunResult> runs;
+  std::vector<std::optional<ImageFiles>> images;  ///< one for each run
+  unsigned processes = 1;
+  double load_seconds = 0;      ///< wall time of reading and preprocessing the scene
+  double simulate_seconds = 0;  ///< wall time of all simulations together
+};
+
+/// Name of the images of a run, without folder and extension: SCENE-VARIANT.
+std::string image_name(const std::string& scene, const std::string& variant);
+
+/// Checks, before anything is read, that all files that a job will write can be written, and overwrite neither what it
+/// reads nor each other.
+/// @param images   `image_name` of every image that --output will write
+/// @param outputs  other files
+/// Throws UserError.
+void check_outputs(const SimulationJob& job, const std::vector<std::string>& images,
+                   std::vector<NamedFile> outputs = {});
+
+/// Where an image goes.
+ImageFiles image_files(const SimulationJob& job, const std::string& name);
+
+/// Writes the draw list of --save-draw, if there is one. Throws UserError.
+void save_draw(const SimulationJob& job, const Draw& draw);
+
+/// Loads the scene, simulates, and writes the images and the draw list that the user asked for. One request is simulated
+/// in this process, several in processes of their own. Throws UserError, CommandFailure or a fault.
+JobResult perform(const SimulationJob& job);
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,101 @@
+#include "output/accuracy_json.h"
+
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <vrpipe/blend.h>
+
+#include "jobs/termination.h"
+
+namespace vrpipe::tools {
+namespace {
+
+Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+Json cycles_json(const RunResult& run) { return run.cycles ? Json(*run.cycles) : Json(); }
+Json decibels_json(double psnr) { return std::isinf(psnr) ? Json() : Json(psnr); }
+
+Json fidelity_json(const FidelityRung& rung) {
+  return {{"fidelity", vrpipe::name_of(rung.run.request.fidelity)},
+          {"variant", rung.run.request.variant.name},
+          {"cycles", cycles_json(rung.run)},
+          {"cycles_error_percent", optional_json(rung.cycles_error_percent)},
+          {"speedup", optional_json(rung.speedup)},
+          {"speedup_error_percent", optional_json(rung.speedup_error_percent)},
+          {"host_seconds", rung.host_seconds},
+          {"cpu_seconds", rung.cpu_seconds},
+          {"times_as_fast", rung.times_as_fast},
+          {"quads_per_second", rung.quads_per_second},
+          {"kernel_events", rung.run.kernel_events},
+          {"dominated", rung.dominated},
+          {"fragments_blended", rung.run.counts.fragments_blended},
+          {"fragments_blended_error_percent", rung.fragments_blended_error_percent},
+          {"image_equal", std::isinf(rung.image.psnr_db)},
+          {"image_psnr_db", decibels_json(rung.image.psnr_db)},
+          {"image_max_abs_difference", rung.image.max_abs_error},
+          {"result_hash", rung.run.result_hash}};
+}
+
+Json precision_json(const PrecisionRow& row, const PrecisionRun& run) {
+  const bool free = run.cycles_change_percent && *run.cycles_change_percent == 0;
+  return {{"knob", row.knob->name},
+          {"value", row.value},
+          {"option", row.knob->option},
+          {"meaning", row.knob->meaning},
+          {"charged", row.knob->is_charged},
+          {"default", row.run == 0},
+          {"variant", run.run.request.variant.name},
+          {"psnr_db", decibels_json(run.error.psnr_db)},
+          {"ssim", run.error.ssim},
+          {"max_abs_error", run.error.max_abs_error},
+          {"pixels_differing_8bit", run.error.pixels_differing},
+          {"share_differing_8bit", run.error.share_differing},
+          {"pixels_stuck", run.pixels_stuck},
+          {"cycles", cycles_json(run.run)},
+          {"cycles_change_percent", optional_json(run.cycles_change_percent)},
+          {"costs_no_time", run.cycles_change_percent ? Json(free) : Json()},
+          {"host_seconds", run.run.host_seconds},
+          {"cpu_seconds", run.run.cpu_seconds},
+          {"pareto_front", run.on_front},
+          {"result_hash", run.run.result_hash}};
+}
+
+}  // namespace
+
+Json accuracy_json(const AccuracyResult& result) {
+  Json fidelity = Json::array();
+  for (const FidelityRung& rung : result.fidelity) fidelity.push_back(fidelity_json(rung));
+  Json stress = Json::array();
+  for (const StressRow& row : result.stress) {
+    stress.push_back({{"configuration", row.configuration}, {"variant", row.variant}, {"cycles", row.cycles}});
+    for (const auto& [rung, error] : row.error_percent) {
+      stress.back()[std::string(vrpipe::name_of(rung)) + "_error_percent"] = error;
+    }
+  }
+  Json precision = Json::array();
+  for (const PrecisionRow& row : result.precision) precision.push_back(precision_json(row, result.runs[row.run]));
+  Json json = head_json("vrpipe.accuracy/1", result.provenance, result.processes);
+  json.update({{"scene", scene_json(result.scene, result.width, result.height)},
+               {"camera", camera_json(result.viewpoint)},
+               {"platform", platform_json({result.runs.front().run}, result.preprocessing)},
+               {"implementations", implementations_json(result.runs.front().run)},
+               {"format", vrpipe::name_of(result.base.format)},
+               {"termination", name_of(result.base.termination)},
+               {"quick", result.quick},
+               {"repeat", result.repeat},
+               {"precision_variant", result.base.variant.name},
+               {"precision_fidelity", vrpipe::name_of(result.base.fidelity)},
+               {"precision_processes", result.processes},
+               {"knobs_left_out", result.knobs_left_out},
+               {"tolerances",
+                {{"cpu_seconds_percent", 100 * fidelity_tolerance.cost_share},
+                 {"cycles_error_percent", fidelity_tolerance.error},
+                 {"cycles_percent", 100 * precision_tolerance.cost_share},
+                 {"psnr_db", precision_tolerance.error}}},
+               {"fidelity", std::move(fidelity)},
+               {"stress", std::move(stress)},
+               {"precision", std::move(precision)}});
+  return json;
+}
+
+}  // namespace vrpipe::tools

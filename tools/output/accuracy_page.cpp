@@ -1,0 +1,297 @@
+#include "output/accuracy_page.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "image/images.h"
+#include "output/accuracy_report.h"
+#include "output/report.h"
+#include "output/svg_plot.h"
+
+namespace vrpipe::tools {
+namespace {
+
+constexpr const char* style = R"(
+:root { color-scheme: light; }
+body { margin: 0 auto; padding: 28px 24px 60px; max-width: 1080px; background: #fff; color: #1d232a;
+       font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
+h1 { font-size: 26px; margin: 0 0 4px; } h2 { font-size: 20px; margin: 44px 0 6px; } p { margin: 6px 0; max-width: 860px; }
+.verdict { font-size: 17px; } code { font-size: 13px; overflow-wrap: anywhere; }
+.subtle { color: #5a6572; } .notice { background: #fff4d6; border-left: 4px solid #d99a00; padding: 8px 12px; }
+ul { margin: 6px 0; padding-left: 20px; }
+svg { width: 100%; height: auto; margin: 10px 0; }
+svg text { font: 12px system-ui, "Segoe UI", "DejaVu Sans", sans-serif; fill: #1d232a; }
+svg .label { paint-order: stroke; stroke: #fff; stroke-width: 3px; } svg .axis { font-size: 13px; } svg .grid { stroke: #e7eaee; } svg .frame { fill: none; stroke: #aab3bd; }
+svg .leader { stroke: #aab3bd; stroke-width: .8; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; white-space: nowrap; }
+th, td { padding: 3px 9px; text-align: right; } th { border-bottom: 2px solid #aab3bd; vertical-align: bottom; }
+th:first-child, td:first-child { text-align: left; padding-left: 4px; }
+tr.group td { font-weight: 600; padding-top: 10px; border-bottom: 1px solid #e7eaee; }
+tr.marked td { background: #e6f4ea; }
+.cards { display: grid; grid-template-columns: repeat(auto-fill, minmax(330px, 1fr)); gap: 18px; margin-top: 14px; }
+figure { margin: 0; border: 1px solid #dfe3e8; border-radius: 6px; padding: 10px; }
+figure .pair { display: flex; gap: 8px; } figure img { width: calc(50% - 4px); height: auto; }
+figcaption { font-size: 13px; margin-bottom: 6px; } figcaption b { font-size: 14px; }
+figure.reference { max-width: 420px; } figure.reference img { width: 100%; }
+.scale { display: flex; align-items: center; gap: 8px; font-size: 13px; margin: 8px 0; }
+.scale i { display: inline-block; width: 260px; height: 14px; border-radius: 2px; }
+)";
+
+std::string base64(const std::string& bytes) {
+  constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      group = group << 8U | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0U);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      text += i + k > bytes.size() ? '=' : digits[group >> (18 - 6 * k) & 63U];
+    }
+  }
+  return text;
+}
+
+std::string image(const Picture& picture, const std::string& description) {
+  return fmt::format("<img alt=\"{}\" width=\"{}\" height=\"{}\" src=\"data:image/png;base64,{}\">",
+                     html_escaped(description), picture.width, picture.height,
+                     base64(encode_png(picture.width, picture.height, picture.rgb)));
+}
+
+std::string table(const AccuracyTable& source) {
+  std::string text = "<div class=\"scroll\"><table>\n<tr>";
+  for (const std::string& cell : source.heading) text += "<th>" + html_escaped(cell) + "</th>";
+  text += "</tr>\n";
+  std::string group;
+  for (const AccuracyTable::Row& row : source.rows) {
+    if (row.group != group) {
+      text += fmt::format("<tr class=\"group\"><td colspan=\"{}\">{}</td></tr>\n", source.heading.size(),
+                          html_escaped(row.group));
+    }
+    group = row.group;
+    text += row.marked ? "<tr class=\"marked\">" : "<tr>";
+    for (const std::string& cell : row.cells) text += "<td>" + html_escaped(cell) + "</td>";
+    text += "</tr>\n";
+  }
+  return text + "</table></div>\n";
+}
+
+std::string list(const std::vector<std::string>& lines) {
+  if (lines.empty()) return {};
+  std::string text = "<ul>\n";
+  for (const std::string& line : lines) text += "<li>" + html_escaped(line) + "</li>\n";
+  return text + "</ul>\n";
+}
+
+/// "word: what it means", the word in bold.
+std::string definition(const std::string& text) {
+  const std::size_t end = text.find(':');
+  return "<p class=\"subtle\"><b>" + html_escaped(text.substr(0, end)) + "</b>" + html_escaped(text.substr(end)) +
+         ".</p>\n";
+}
+
+std::string exactness(const ImageError& error) {
+  return std::isinf(error.psnr_db) ? std::string("equal to the reference") : fmt::format("{:.2f} dB", error.psnr_db);
+}
+
+/// Colours that can be told from one another; what is of more kinds differs in the marker.
+constexpr std::array<const char*, 8> colors{"#0072b2", "#d1400f", "#009e73", "#e69f00",
+                                            "#cc79a7", "#56b4e9", "#7a3e9d", "#6b4a2b"};
+
+std::string fidelity_plot(const AccuracyResult& result) {
+  constexpr Marker markers[] = {Marker::triangle, Marker::square, Marker::diamond, Marker::circle, Marker::star};
+  Plot plot;
+  plot.description = "error in cycles against CPU seconds, for each variant and fidelity";
+  plot.x = {"CPU seconds (logarithmic)", true};
+  plot.y = {"error in cycles, % (logarithmic, none at the bottom)", true};
+  std::vector<std::string> variants_seen;
+  std::vector<Fidelity> fidelities_seen;
+  bool any_dominated = false;
+  for (const FidelityRung& rung : result.fidelity) {
+    const RunRequest& request = rung.run.request;
+    if (!rung.cycles_error_percent) continue;
+    const auto index_of = [](auto& seen, const auto& what) {
+      const auto place = std::find(seen.begin(), seen.end(), what);
+      if (place != seen.end()) return static_cast<std::size_t>(place - seen.begin());
+      seen.push_back(what);
+      return seen.size() - 1;
+    };
+    const std::size_t variant = index_of(variants_seen, request.variant.name);
+    index_of(fidelities_seen, request.fidelity);
+    const std::string name = fmt::format("{} {}", request.variant.name, vrpipe::name_of(request.fidelity));
+    const double error = std::fabs(*rung.cycles_error_percent);
+    const char* const color = colors[variant % colors.size()];
+    plot.points.push_back({rung.cpu_seconds, error, color, markers[static_cast<unsigned>(request.fidelity)],
+                           rung.dominated, name,
+                           fmt::format("{}: {:.2g} % in {:.2f} s{}", name, error, rung.cpu_seconds,
+                                       rung.dominated ? ", dominated" : "")});
+    any_dominated |= rung.dominated;
+    if (variant >= plot.lines.size()) plot.lines.push_back({{}, color, true});
+    if (!rung.dominated) plot.lines[variant].points.emplace_back(rung.cpu_seconds, error);
+  }
+  for (PlotLine& line : plot.lines) std::sort(line.points.begin(), line.points.end());
+  for (std::size_t i = 0; i < variants_seen.size(); ++i) {
+    plot.legend.push_back({variants_seen[i], colors[i % colors.size()], Marker::circle, false, false});
+  }
+  for (const Fidelity fidelity : fidelities_seen) {
+    plot.legend.push_back(
+        {vrpipe::name_of(fidelity), "#4d5b6a", markers[static_cast<unsigned>(fidelity)], false, false});
+  }
+  plot.legend.push_back({"front of a variant", "#4d5b6a", Marker::circle, false, true});
+  if (any_dominated) plot.legend.push_back({"dominated", "#4d5b6a", Marker::circle, true, false});
+  return svg(plot);
+}
+
+std::string precision_plot(const AccuracyResult& result) {
+  Plot plot;
+  plot.description = "PSNR against simulated cycles, for each value of each knob";
+  plot.x = {"simulated cycles, millions", false};
+  plot.y = {"PSNR against exact arithmetic, dB (more is better)", false};
+  double best = 0;
+  for (const PrecisionRun& run : result.runs) {
+    if (!std::isinf(run.error.psnr_db)) best = std::max(best, run.error.psnr_db);
+  }
+  const auto point_of = [&](const PrecisionRun& run) {
+    const double psnr = std::isinf(run.error.psnr_db) ? best + 10 : run.error.psnr_db;
+    return std::pair<double, double>{static_cast<double>(run.run.cycles.value_or(0)) * 1e-6, psnr};
+  };
+  PlotLine front{{}, "#4d5b6a", true};
+  for (const PrecisionRun& run : result.runs) {
+    if (run.on_front) front.points.push_back(point_of(run));
+  }
+  std::sort(front.points.begin(), front.points.end());
+  plot.lines.push_back(front);
+
+  const auto [default_x, default_y] = point_of(result.runs.front());
+  plot.points.push_back({default_x, default_y, "#111", Marker::star, false, "default", "the default"});
+  plot.legend.push_back({"the default", "#111", Marker::star, false, false});
+  for (std::size_t k = 0; k < precision_knobs().size(); ++k) {
+    const PrecisionKnob& knob = precision_knobs()[k];
+    const char* const color = colors[k % colors.size()];
+    const Marker marker = k < colors.size() ? Marker::circle : Marker::square;
+    bool seen = false;
+    for (const PrecisionRow& row : result.precision) {
+      if (row.knob != &knob || row.run == 0) continue;
+      seen = true;
+      const PrecisionRun& run = result.runs[row.run];
+      const auto [x, y] = point_of(run);
+      const std::string value = readable_value(knob, row.value);
+      const std::string name = knob.name + "=" + value;
+      plot.points.push_back(
+          {x, y, color, marker, !run.on_front, name,
+           fmt::format("{}: {}, {} cycles", name, exactness(run.error), grouped(run.run.cycles.value_or(0)))});
+    }
+    if (seen) plot.legend.push_back({knob.name, color, marker, false, false});
+  }
+  plot.legend.push_back({"front", "#4d5b6a", Marker::circle, false, true});
+  plot.legend.push_back({"not on the front", "#4d5b6a", Marker::circle, true, false});
+  return svg(plot);
+}
+
+std::string error_scale() {
+  std::string stops;
+  for (int i = 0; i <= 8; ++i) {
+    const double error = smallest_mapped_error * std::pow(largest_mapped_error / smallest_mapped_error, i / 8.0);
+    const auto color = error_color(error);
+    stops += fmt::format("{}rgb({},{},{})", i == 0 ? "" : ",", color[0], color[1], color[2]);
+  }
+  return fmt::format(
+      "<div class=\"scale\">error {:g} or less <i style=\"background:linear-gradient(90deg,{})\"></i> {:g} or more, "
+      "logarithmic; an 8-bit level is {:.4f}</div>\n",
+      smallest_mapped_error, stops, largest_mapped_error, 1 / 255.0);
+}
+
+std::string figures(const AccuracyResult& result) {
+  std::string text = "<figure class=\"reference\"><figcaption><b>exact arithmetic</b><br>the reference</figcaption>" +
+                     image(result.reference, "exact image") + "</figure>\n<div class=\"cards\">\n";
+  const auto add = [&](const std::string& name, const PrecisionRun& run) {
+    text += fmt::format(
+        "<figure><figcaption><b>{}</b><br>{}, largest error {:.2g}</figcaption><div class=\"pair\">{}{}"
+        "</div></figure>\n",
+        html_escaped(name), exactness(run.error), run.error.max_abs_error, image(run.picture, name),
+        image(run.error_map, "error map of " + name));
+  };
+  add("the default", result.runs.front());
+  for (const PrecisionRow& row : result.precision) {
+    if (row.run == 0) continue;
+    add(row.knob->name + " = " + readable_value(*row.knob, row.value), result.runs[row.run]);
+  }
+  return text + "</div>\n";
+}
+
+std::string functional_note(const AccuracyResult& result) {
+  std::string text;
+  for (const FidelityRung& rung : result.fidelity) {
+    if (rung.run.cycles) continue;
+    text += fmt::format("{}{} {:.2f} s", text.empty() ? "" : ", ", rung.run.request.variant.name, rung.cpu_seconds);
+  }
+  if (text.empty()) return {};
+  return "<p class=\"subtle\">Without time, and so not in the plot: functional (" + html_escaped(text) + ").</p>\n";
+}
+
+}  // namespace
+
+std::string accuracy_page(const AccuracyResult& result) {
+  const std::vector<std::string> heading = accuracy_heading(result);
+  std::string text = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
+  text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
+  text += "<title>vrpipe accuracy: " + html_escaped(result.scene.name) + "</title>\n";
+  text += std::string("<style>") + style + "</style>\n</head>\n<body>\n<h1>What accuracy costs in time</h1>\n";
+  // Three lines on what was drawn; what follows is to be noticed.
+  for (std::size_t i = 0; i < heading.size(); ++i) {
+    text += fmt::format("<p class=\"{}\">{}</p>\n", i < 3 ? "subtle" : "notice", html_escaped(heading[i]));
+  }
+
+  text += "<h2>Fidelity: how exact time is</h2>\n";
+  text += "<p class=\"verdict\">" + html_escaped(fidelity_verdict(result)) + ".</p>\n";
+  text += fmt::format(
+      "<p>Every variant at every fidelity, one simulation at a time. Errors are against <b>{}</b>; what lies further "
+      "left is sooner done, further down more exact.</p>\n",
+      vrpipe::name_of(fidelities().back()));
+  text += fidelity_plot(result) + functional_note(result) + definition(fidelity_definition()) +
+          list(fidelity_summary(result)) + table(fidelity_table(result));
+
+  text += "<h3>" + html_escaped(stress_title) + "</h3>\n" + table(stress_table(result));
+
+  text += "<h2>Precision: how exact numbers are</h2>\n";
+  if (const std::string verdict = precision_verdict(result); !verdict.empty()) {
+    text += "<p class=\"verdict\">" + html_escaped(verdict) + ".</p>\n";
+  }
+  text += fmt::format(
+      "<p>{} at {} fidelity, with one choice changed at a time. Errors are against an image in double precision: no "
+      "tiles, no termination, all bands, exact order, alpha below 1/255 pruned. What lies further left takes the "
+      "modelled hardware less time, further up is more exact.</p>\n",
+      html_escaped(result.base.variant.name), vrpipe::name_of(result.base.fidelity));
+  if (result.runs.front().run.cycles) {
+    text += precision_plot(result) +
+            "<p class=\"subtle\">What lies on the default has no label; a point's name shows under the pointer.</p>\n" +
+            definition(precision_definition());
+  }
+  text += list(precision_summary(result)) + table(precision_table(result));
+
+  text += "<h2>Images and error maps</h2>\n";
+  text +=
+      "<p>Left the image, averaged to its size here; right where it is wrong, the largest error of each block of "
+      "pixels.</p>\n";
+  text += error_scale() + figures(result);
+  text += fmt::format(
+      "<h2>What made this page</h2>\n<p><code>{}</code></p>\n<p class=\"subtle\">vrpipe {}; {:.0f} s, with {} "
+      "simulation{} of the precision ladder at a time, on a host whose load average was {:.1f}.</p>\n",
+      html_escaped(command_text(result.provenance)), VRPIPE_VERSION, result.seconds, result.processes,
+      result.processes == 1 ? "" : "s", result.provenance.load_average);
+  for (const PluginFile& plugin : result.provenance.plugins) {
+    text += fmt::format("<p class=\"subtle\">plugin {}, SHA-256 {}</p>\n", html_escaped(plugin.path), plugin.sha256);
+  }
+  text += "</body>\n</html>\n";
+  return text;
+}
+
+}  // namespace vrpipe::tools

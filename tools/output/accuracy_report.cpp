@@ -1,0 +1,399 @@
+#include "output/accuracy_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <vrpipe/blend.h>
+#include <vrpipe/printable.h>
+
+#include "jobs/termination.h"
+#include "output/report.h"
+#include "output/text_table.h"
+
+namespace vrpipe::tools {
+namespace {
+
+/// With as many decimals as something other than zero needs to show.
+int decimals_of(double value, int usual) {
+  int decimals = usual;
+  for (double least = 0.5 * std::pow(10, -usual); value != 0 && std::fabs(value) < least && decimals < 12;
+       least /= 10) {
+    ++decimals;
+  }
+  return decimals;
+}
+
+std::string signed_percent(const std::optional<double>& value, int decimals = 2) {
+  if (!value) return "-";
+  return *value == 0 ? "0" : fmt::format("{:+.{}f}", *value, decimals_of(*value, decimals));
+}
+
+std::string decibels(double psnr) { return std::isinf(psnr) ? "equal" : fmt::format("{:.2f}", psnr); }
+
+std::string cycles_text(const RunResult& run) { return run.cycles ? grouped(*run.cycles) : "-"; }
+
+std::string settings_text(const AccuracyResult& result) {
+  std::string text;
+  for (const std::vector<Setting>* settings : {&result.base.settings, &result.preprocessing}) {
+    for (const Setting& setting : *settings) {
+      text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
+    }
+  }
+  for (const UnitChoice& unit : result.base.units) text += fmt::format(", {}={}", unit.slot, unit.implementation);
+  return text;
+}
+
+std::vector<std::string> precision_cells(const std::string& value, const PrecisionRun& run, bool is_default) {
+  const bool free = run.cycles_change_percent && *run.cycles_change_percent == 0;
+  return {value,
+          decibels(run.error.psnr_db),
+          fmt::format("{:.5f}", run.error.ssim),
+          fmt::format("{:.2g}", run.error.max_abs_error),
+          fmt::format("{:.2f}", 100 * run.error.share_differing),
+          grouped(run.pixels_stuck),
+          cycles_text(run.run),
+          is_default                  ? ""
+          : free                      ? "none"
+          : run.cycles_change_percent ? signed_percent(run.cycles_change_percent, 3)
+                                      : "-",
+          fmt::format("{:.2f}", run.run.cpu_seconds),
+          run.on_front ? "front" : ""};
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    text += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + names[i];
+  }
+  return text;
+}
+
+/// The knobs of which every value takes the cycles of the default.
+std::vector<std::string> free_knobs(const AccuracyResult& result) {
+  std::vector<std::string> names;
+  for (const PrecisionKnob& knob : precision_knobs()) {
+    bool tried = false;
+    bool free = true;
+    for (const PrecisionRow& row : result.precision) {
+      if (row.knob != &knob || row.run == 0) continue;
+      const std::optional<double>& change = result.runs[row.run].cycles_change_percent;
+      tried = true;
+      free &= change && *change == 0;
+    }
+    if (tried && free) names.push_back(knob.name);
+  }
+  return names;
+}
+
+std::string markdown(const AccuracyTable& table) {
+  std::string text = "| " + table.group_heading;
+  std::string line = "|---";
+  for (const std::string& cell : table.heading) {
+    text += " | " + cell;
+    line += &cell == &table.heading.front() ? "|---" : "|--:";
+  }
+  text += " |\n" + line + "|\n";
+  std::string group;
+  for (const AccuracyTable::Row& row : table.rows) {
+    text += "| " + (row.group == group ? std::string() : row.group);
+    group = row.group;
+    for (const std::string& cell : row.cells) text += " | " + cell;
+    text += " |\n";
+  }
+  return text;
+}
+
+/// Some columns, in this order, for a terminal of 80 characters.
+std::string text_of(const AccuracyTable& source, const std::vector<std::size_t>& columns, const TextStyle& style) {
+  const auto chosen = [&](const std::vector<std::string>& cells) {
+    std::vector<std::string> some;
+    for (const std::size_t column : columns) some.push_back(cells[column]);
+    return some;
+  };
+  TextTable table(chosen(source.heading));
+  std::string group;
+  for (const AccuracyTable::Row& row : source.rows) {
+    if (row.group != group) table.group(row.group);
+    group = row.group;
+    table.row(chosen(row.cells), row.marked);
+  }
+  return table.text(style);
+}
+
+/// How one fidelity does over all variants.
+struct FidelityRange {
+  bool timed = false;
+  bool always_dominated = true;
+  double slowest = INFINITY, fastest = 0;          // times as fast as the most exact
+  double cycles_percent = 0, speedup_percent = 0;  // the largest errors
+  double quads_per_second = INFINITY;              // the least
+  double worst_image_db = INFINITY;
+};
+
+FidelityRange range_of(const AccuracyResult& result, Fidelity fidelity) {
+  FidelityRange range;
+  for (const FidelityRung& rung : result.fidelity) {
+    if (rung.run.request.fidelity != fidelity) continue;
+    range.timed = rung.run.cycles.has_value();
+    range.always_dominated &= rung.dominated;
+    range.slowest = std::min(range.slowest, rung.times_as_fast);
+    range.fastest = std::max(range.fastest, rung.times_as_fast);
+    range.cycles_percent = std::max(range.cycles_percent, std::fabs(rung.cycles_error_percent.value_or(0)));
+    range.speedup_percent = std::max(range.speedup_percent, std::fabs(rung.speedup_error_percent.value_or(0)));
+    range.quads_per_second = std::min(range.quads_per_second, rung.quads_per_second);
+    range.worst_image_db = std::min(range.worst_image_db, rung.image.psnr_db);
+  }
+  return range;
+}
+
+/// What bounds the default, and so what can have a price; empty without time.
+std::string price_text(const RunResult& run) {
+  std::string text = bound_text(run);
+  if (text.empty()) return text;
+  text.pop_back();  // the end of its line
+  if (run.bottleneck->occupancy >= bounding_occupancy) text += ": what spares other units saves no time here";
+  return text;
+}
+
+std::string times_text(const FidelityRange& range) {
+  const std::string slowest = fmt::format("{:.1f}", range.slowest);
+  const std::string fastest = fmt::format("{:.1f}", range.fastest);
+  return slowest == fastest ? slowest + " times" : slowest + " to " + fastest + " times";
+}
+
+}  // namespace
+
+AccuracyTable fidelity_table(const AccuracyResult& result) {
+  AccuracyTable table;
+  table.group_heading = "variant";
+  table.heading = {"fidelity",
+                   "cycles",
+                   "error %",
+                   "speed-up",
+                   "error %",
+                   "CPU s",
+                   std::string("vs ") + vrpipe::name_of(fidelities().back()),
+                   "dominated",
+                   "Mquads/s",
+                   "events",
+                   "blended +- %",
+                   "image PSNR, dB"};
+  for (const FidelityRung& rung : result.fidelity) {
+    const RunResult& run = rung.run;
+    table.rows.push_back(
+        {run.request.variant.name,
+         {vrpipe::name_of(run.request.fidelity), cycles_text(run), signed_percent(rung.cycles_error_percent),
+          rung.speedup ? fmt::format("{:.3f}", *rung.speedup) : "-", signed_percent(rung.speedup_error_percent),
+          fmt::format("{:.2f}", rung.cpu_seconds), fmt::format("{:.2f}x", rung.times_as_fast),
+          rung.dominated ? "yes" : "", fmt::format("{:.2f}", rung.quads_per_second * 1e-6), grouped(run.kernel_events),
+          signed_percent(rung.fragments_blended_error_percent), decibels(rung.image.psnr_db)},
+         false});
+  }
+  return table;
+}
+
+AccuracyTable stress_table(const AccuracyResult& result) {
+  AccuracyTable table;
+  table.group_heading = "configuration";
+  table.heading = {"variant", "cycles", "bound %", "lt %", "at %"};
+  for (const StressRow& row : result.stress) {
+    table.rows.push_back({row.configuration, {row.variant, grouped(row.cycles)}, false});
+    for (const auto& [fidelity, error] : row.error_percent) table.rows.back().cells.push_back(signed_percent(error));
+  }
+  return table;
+}
+
+AccuracyTable precision_table(const AccuracyResult& result) {
+  AccuracyTable table;
+  table.group_heading = "knob";
+  table.heading = {"value", "PSNR, dB", "SSIM",   "max error", "8-bit differs, %",
+                   "stuck", "cycles",   "cost %", "CPU s",     ""};
+  table.rows.push_back(
+      {"the default", precision_cells("everything", result.runs.front(), true), result.runs.front().on_front});
+  for (const PrecisionRow& row : result.precision) {
+    if (row.run == 0) continue;
+    const auto is_default = [&](const PrecisionRow& other) { return other.knob == row.knob && other.run == 0; };
+    const auto usual = std::find_if(result.precision.begin(), result.precision.end(), is_default);
+    const std::string group = fmt::format("{}, default {}", row.knob->name, readable_value(*row.knob, usual->value));
+    const PrecisionRun& run = result.runs[row.run];
+    table.rows.push_back({group, precision_cells(readable_value(*row.knob, row.value), run, false), run.on_front});
+  }
+  return table;
+}
+
+std::string within(double percent) {
+  if (percent == 0) return "0 %";
+  // Rounded up, since it is a bound.
+  const int decimals = decimals_of(percent, 1);
+  const double scale = std::pow(10, decimals);
+  return fmt::format("{:.{}f} %", std::ceil(percent * scale * (1 - 1e-9)) / scale, decimals);
+}
+
+std::string fidelity_verdict(const AccuracyResult& result) {
+  const std::string exact = vrpipe::name_of(fidelities().back());
+  std::string text;
+  for (auto fidelity = fidelities().rbegin() + 1; fidelity != fidelities().rend(); ++fidelity) {
+    const FidelityRange range = range_of(result, *fidelity);
+    const bool first = text.empty();
+    text += fmt::format("{}{}: {}{}, {}", first ? "" : "; ", vrpipe::name_of(*fidelity), times_text(range),
+                        first ? " as fast as " + exact : "",
+                        range.timed ? "cycles within " + within(range.cycles_percent) : "without cycles");
+  }
+  return text;
+}
+
+std::string fidelity_definition() {
+  return fmt::format(
+      "dominated: another fidelity of the variant is better in CPU seconds (by over {:g} %) or in error (by over {:g} "
+      "points) and no worse in the other; {}, which errors are measured against, never is",
+      100 * fidelity_tolerance.cost_share, fidelity_tolerance.error, vrpipe::name_of(fidelities().back()));
+}
+
+std::string precision_definition() {
+  return fmt::format(
+      "front: nothing is better in cycles (by over {:g} %) or in PSNR (by over {:g} dB) and no worse in the other; of "
+      "those that are alike, the first",
+      100 * precision_tolerance.cost_share, precision_tolerance.error);
+}
+
+std::vector<std::string> fidelity_summary(const AccuracyResult& result) {
+  std::vector<std::string> lines;
+  for (const Fidelity fidelity : fidelities()) {
+    const FidelityRange range = range_of(result, fidelity);
+    std::string line = fmt::format("{}: ", vrpipe::name_of(fidelity));
+    if (fidelity == fidelities().back()) {
+      line += "what the others are measured against";
+    } else {
+      line += times_text(range) + " as fast";
+      line += range.timed ? fmt::format(", cycles within {}, speed-ups within {}", within(range.cycles_percent),
+                                        within(range.speedup_percent))
+                          : ", no cycles";
+      line += std::isinf(range.worst_image_db) ? ", the same images"
+                                               : fmt::format(", images within {:.1f} dB", range.worst_image_db);
+    }
+    line += fmt::format(", at least {:.2f} M quads rasterised per CPU second", range.quads_per_second * 1e-6);
+    if (range.always_dominated) line += "; dominated in every variant";
+    lines.push_back(line);
+  }
+  return lines;
+}
+
+std::string precision_verdict(const AccuracyResult& result) {
+  const PrecisionRun& usual = result.runs.front();
+  if (!usual.run.cycles) return {};
+  const PrecisionRun* cheapest = nullptr;
+  const PrecisionRun* closest = nullptr;
+  for (const PrecisionRun& run : result.runs) {
+    if (!run.on_front) continue;
+    if (cheapest == nullptr || *run.run.cycles < *cheapest->run.cycles) cheapest = &run;
+    if (closest == nullptr || run.error.psnr_db > closest->error.psnr_db) closest = &run;
+  }
+  const auto price = [](const PrecisionRun& run) {
+    return fmt::format("{} % of the cycles for {}", signed_percent(run.cycles_change_percent),
+                       std::isinf(run.error.psnr_db) ? "the exact image" : decibels(run.error.psnr_db) + " dB");
+  };
+  std::string text =
+      "the default: " + (std::isinf(usual.error.psnr_db) ? "exact" : decibels(usual.error.psnr_db) + " dB");
+  if (cheapest != &usual) text += fmt::format("; cheapest, {}: {}", cheapest->name, price(*cheapest));
+  if (closest != &usual && closest != cheapest)
+    text += fmt::format("; most exact, {}: {}", closest->name, price(*closest));
+  return text;
+}
+
+std::vector<std::string> precision_summary(const AccuracyResult& result) {
+  std::vector<std::string> lines;
+  if (const std::string price = price_text(result.runs.front().run); !price.empty()) lines.push_back(price);
+  if (!result.runs.front().run.cycles) {
+    lines.push_back("without time at this fidelity: images alone");
+  } else if (const std::vector<std::string> free = free_knobs(result); !free.empty()) {
+    lines.push_back(joined(free) + (free.size() == 1 ? " costs" : " cost") + " no simulated time");
+  }
+  std::vector<std::string> uncharged;
+  for (const PrecisionKnob& knob : precision_knobs()) {
+    const auto of_knob = [&](const PrecisionRow& row) { return row.knob == &knob; };
+    const bool is_there = std::any_of(result.precision.begin(), result.precision.end(), of_knob);
+    if (is_there && !knob.is_charged) uncharged.push_back(knob.name);
+  }
+  if (result.runs.front().run.cycles && !uncharged.empty()) {
+    lines.push_back(joined(uncharged) +
+                    (uncharged.size() == 1 ? " has no price of its own: it changes cycles"
+                                           : " have no price of their own: they change cycles") +
+                    " only by which fragments live");
+  }
+  if (!result.knobs_left_out.empty()) {
+    lines.push_back("left out, since a draw list is preprocessed already: " + joined(result.knobs_left_out));
+  }
+  return lines;
+}
+
+std::vector<std::string> accuracy_heading(const AccuracyResult& result) {
+  const RunRequest& base = result.base;
+  std::vector<std::string> lines;
+  lines.push_back(fmt::format("{}, {}x{}: {} of {} Gaussians visible", printable(result.scene.name), result.width,
+                              result.height, grouped(result.scene.gaussians_visible),
+                              grouped(result.scene.gaussians_total)));
+  lines.push_back(base.platform->name + " (" + base.platform->description + ")");
+  lines.push_back(fmt::format("{} colour, {} termination{}", vrpipe::name_of(base.format), name_of(base.termination),
+                              settings_text(result)));
+  if (result.quick) {
+    std::string line = "a quick look: two variants, and one value of some knobs";
+    if (result.width != result.full_width || result.height != result.full_height) {
+      line += fmt::format(", in the middle of {}x{}", result.full_width, result.full_height);
+    }
+    lines.push_back(line);
+  }
+  if (result.runs.front().run.counts.fragments_rasterized == 0) {
+    lines.push_back(nothing_visible(result.scene, result.viewpoint.has_value()));
+  }
+  return lines;
+}
+
+namespace {
+
+std::string fidelity_title(const AccuracyResult& result) {
+  return fmt::format("Fidelity, against {}: one simulation at a time{}", vrpipe::name_of(fidelities().back()),
+                     result.repeat > 1 ? fmt::format(", CPU seconds the median of {}", result.repeat) : "");
+}
+
+std::string precision_title(const AccuracyResult& result) {
+  return fmt::format("Precision of {} at {}, against exact arithmetic: {} simulation{} at a time",
+                     result.base.variant.name, vrpipe::name_of(result.base.fidelity), result.processes,
+                     result.processes == 1 ? "" : "s");
+}
+
+}  // namespace
+
+std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) {
+  std::string text;
+  for (const std::string& line : accuracy_heading(result)) text += (text.empty() ? style.bold(line) : line) + "\n";
+  const AccuracyTable fidelity = fidelity_table(result);
+  text += "\n" + style.bold(fidelity_title(result)) + "\n\n";
+  text +=
+      text_of(fidelity, {0, 1, 2, 3, 4, 5, 6}, style) + "\n" + text_of(fidelity, {0, 7, 8, 9, 10, 11}, style) + "\n";
+  for (const std::string& line : fidelity_summary(result)) text += line + "\n";
+  text += fidelity_definition() + "\n";
+  text += "\n" + style.bold(stress_title) + "\n\n" + text_of(stress_table(result), {0, 1, 2, 3, 4}, style);
+  text += "\n" + style.bold(precision_title(result)) + "\n\n";
+  text += text_of(precision_table(result), {0, 1, 3, 5, 6, 7, 9}, style) + "\n";
+  if (const std::string verdict = precision_verdict(result); !verdict.empty()) text += verdict + "\n";
+  for (const std::string& line : precision_summary(result)) text += line + "\n";
+  if (result.runs.front().run.cycles) text += precision_definition() + "\n";
+  text += fmt::format("took {:.1f} s, {:.1f} s of it for the exact image\n", result.seconds, result.reference_seconds);
+  return text;
+}
+
+std::string accuracy_markdown(const AccuracyResult& result) {
+  std::string text;
+  for (const std::string& line : accuracy_heading(result)) text += line + ".\n";
+  text += "\n" + markdown(fidelity_table(result)) + "\n";
+  for (const std::string& line : fidelity_summary(result)) text += "* " + line + "\n";
+  text += std::string("\n") + stress_title + ":\n\n" + markdown(stress_table(result));
+  text += "\n" + markdown(precision_table(result)) + "\n";
+  for (const std::string& line : precision_summary(result)) text += "* " + line + "\n";
+  return text;
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,342 @@
+#include "output/report.h"
+
+#include <algorithm>
+#include <cctype>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <vrpipe/accounting.h>
+#include <vrpipe/blend.h>
+#include <vrpipe/printable.h>
+
+#include "jobs/comparison.h"
+#include "jobs/termination.h"
+#include "output/text_table.h"
+
+namespace vrpipe::tools {
+namespace {
+
+/// Counts of a table in one scale, so that they compare at a glance.
+struct Scale {
+  double divisor;
+  const char* suffix;  ///< for the heading of a group
+  std::string operator()(std::uint64_t value) const {
+    if (value == 0) return "0";
+    return divisor > 1 ? fmt::format("{:.2f}", static_cast<double>(value) / divisor) : grouped(value);
+  }
+};
+
+Scale scale_for(std::uint64_t largest) {
+  if (largest >= 1000000) return {1e6, ", millions"};
+  if (largest >= 100000) return {1e3, ", thousands"};
+  return {1, ""};
+}
+
+std::string percent(double share) { return fmt::format("{:.1f}", 100 * share); }
+
+std::string ratio(std::uint64_t numerator, std::uint64_t denominator) {
+  if (denominator == 0) return "-";
+  return fmt::format("{:.2f}x", static_cast<double>(numerator) / static_cast<double>(denominator));
+}
+
+std::string bytes(std::uint64_t value) {
+  return value < 1024 ? fmt::format("{} B", value) : fmt::format("{:.2f} KB", static_cast<double>(value) / 1024);
+}
+
+std::string upper(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return text;
+}
+
+/// Builds rows with one cell for each run.
+class RunTable {
+ public:
+  explicit RunTable(const std::vector<RunResult>& runs) : runs_(runs), table_(heading(runs)) {}
+
+  void group(const std::string& title) { table_.group(title); }
+  template <class Cell>
+  void row(const std::string& label, const Cell& cell, bool emphasised = false) {
+    std::vector<std::string> cells{label};
+    for (const RunResult& run : runs_) cells.push_back(cell(run));
+    table_.row(std::move(cells), emphasised);
+  }
+  /// A row of counts; left out when all are zero and it is not `always` there.
+  void counts(const std::string& label, std::uint64_t Counts::*member, const Scale& scale, bool always = true) {
+    const auto is_zero = [member](const RunResult& run) { return run.counts.*member == 0; };
+    if (!always && std::all_of(runs_.begin(), runs_.end(), is_zero)) return;
+    row(label, [&](const RunResult& run) { return scale(run.counts.*member); });
+  }
+  std::string text(const TextStyle& style) const { return table_.text(style); }
+
+ private:
+  static std::vector<std::string> heading(const std::vector<RunResult>& runs) {
+    std::vector<std::string> cells{""};
+    for (const RunResult& run : runs) cells.push_back(run.request.variant.name);
+    return cells;
+  }
+  const std::vector<RunResult>& runs_;
+  TextTable table_;
+};
+
+/// The fates of quads or of fragments.
+struct Fates {
+  std::uint64_t Counts::*rasterized;
+  std::uint64_t Counts::*depth_stencil_failed;
+  std::uint64_t Counts::*terminated;
+  std::uint64_t Counts::*shaded;
+  std::uint64_t Counts::*pruned;
+  std::uint64_t Counts::*merged;
+  std::uint64_t Counts::*dropped_late;
+  std::uint64_t Counts::*late_failed;
+  std::uint64_t Counts::*blended;
+};
+
+constexpr Fates quad_fates{&Counts::quads_rasterized,   &Counts::quads_depth_stencil_failed,
+                           &Counts::quads_terminated,   &Counts::quads_shaded,
+                           &Counts::quads_pruned,       &Counts::quads_merged,
+                           &Counts::quads_dropped_late, &Counts::quads_late_failed,
+                           &Counts::quads_blended};
+constexpr Fates fragment_fates{&Counts::fragments_rasterized,   &Counts::fragments_depth_stencil_failed,
+                               &Counts::fragments_terminated,   &Counts::fragments_shaded,
+                               &Counts::fragments_pruned,       &Counts::fragments_merged,
+                               &Counts::fragments_dropped_late, &Counts::fragments_late_failed,
+                               &Counts::fragments_blended};
+
+void add_fates(RunTable& table, const std::string& title, const Fates& fates, const std::vector<RunResult>& runs) {
+  std::uint64_t largest = 0;
+  for (const RunResult& run : runs) largest = std::max(largest, run.counts.*fates.rasterized);
+  const Scale scale = scale_for(largest);
+  table.group(title + scale.suffix);
+  table.counts("rasterized", fates.rasterized, scale);
+  table.counts("depth/stencil failed", fates.depth_stencil_failed, scale, false);
+  table.counts("terminated", fates.terminated, scale);
+  table.counts("shaded", fates.shaded, scale);
+  table.counts("pruned (alpha < 1/255)", fates.pruned, scale);
+  table.counts("merged away", fates.merged, scale);
+  table.counts("dropped late", fates.dropped_late, scale, false);
+  table.counts("late failed", fates.late_failed, scale, false);
+  table.counts("blended", fates.blended, scale);
+  if (runs.size() > 1) {
+    const std::uint64_t before = runs.front().counts.*fates.blended;
+    table.row("blended, reduction", [&](const RunResult& run) { return ratio(before, run.counts.*fates.blended); });
+  }
+}
+
+void add_time(RunTable& table, const std::vector<RunResult>& runs) {
+  table.group("time");
+  if (runs.front().cycles) {
+    table.row("cycles", [](const RunResult& run) { return grouped(run.cycles.value_or(0)); });
+    table.row("simulated ms", [](const RunResult& run) { return fmt::format("{:.3f}", run.milliseconds); });
+    if (runs.size() > 1) {
+      table.row(
+          "speed-up over " + runs.front().request.variant.name,
+          [&](const RunResult& run) {
+            const std::optional<double> gain = speedup(runs.front(), run);
+            return gain ? fmt::format("{:.2f}x", *gain) : std::string("-");
+          },
+          true);
+    }
+  }
+  table.row("host seconds", [](const RunResult& run) { return fmt::format("{:.2f}", run.host_seconds); });
+  table.row("CPU seconds", [](const RunResult& run) { return fmt::format("{:.2f}", run.cpu_seconds); });
+}
+
+void add_utilization(RunTable& table, const std::vector<RunResult>& runs) {
+  if (runs.front().utilization.empty()) return;
+  table.group("utilization, % of peak");
+  for (std::size_t i = 0; i < runs.front().utilization.size(); ++i) {
+    const auto& [name, share] = runs.front().utilization[i];
+    // DRAM does nothing while L2 is all the memory there is.
+    if (name == "dram" && share <= 0) continue;
+    table.row(name, [i](const RunResult& run) { return percent(run.utilization[i].second); });
+  }
+}
+
+/// What each unit spent its cycles on.
+std::string unit_states_text(const RunResult& run, const TextStyle& style) {
+  std::vector<std::string> heading{"unit cycles, %"};
+  for (unsigned state = 0; state < unit_states; ++state) {
+    heading.emplace_back(vrpipe::name_of(static_cast<UnitState>(state)));
+  }
+  TextTable table(std::move(heading));
+  const double cycles = static_cast<double>(std::max<std::uint64_t>(run.cycles.value_or(0), 1));
+  for (const UnitReport& unit : run.units) {
+    std::vector<std::string> cells{unit.name};
+    for (const std::uint64_t spent : unit.cycles) cells.push_back(percent(static_cast<double>(spent) / cycles));
+    table.row(std::move(cells));
+  }
+  return table.text(style);
+}
+
+std::string heading(const JobResult& result, const TextStyle& style) {
+  const RunRequest& request = result.runs.front().request;
+  const Platform& platform = *request.platform;
+  std::string text = style.bold(fmt::format("{}, {}x{}", printable(result.scene.name), result.width, result.height));
+  text += fmt::format(": {} of {} Gaussians visible\n", grouped(result.scene.gaussians_visible),
+                      grouped(result.scene.gaussians_total));
+  text += style.bold(platform.name) + " (" + platform.description + ")\n";
+  text += fmt::format("{} fidelity, {} colour, {} termination", vrpipe::name_of(request.fidelity),
+                      vrpipe::name_of(request.format), name_of(request.termination));
+  for (const std::vector<Setting>* settings : {&request.settings, &result.preprocessing}) {
+    for (const Setting& setting : *settings) {
+      text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
+    }
+  }
+  for (const UnitChoice& unit : request.units) text += fmt::format(", {}={}", unit.slot, unit.implementation);
+  return text + "\n\n";
+}
+
+/// A unit as the text calls it: CROP, or gpc1.CROP where there are several.
+std::string unit_text(const std::string& unit, const RunResult& run) {
+  const std::size_t dot = unit.rfind('.');
+  if (dot == std::string::npos) return upper(unit);
+  return (run.request.platform->gpcs > 1 ? unit.substr(0, dot + 1) : std::string()) + upper(unit.substr(dot + 1));
+}
+
+/// The largest value of a statistic over the runs; 0 where none has it.
+std::uint64_t largest_statistic(const std::vector<RunResult>& runs, const std::string& name) {
+  std::uint64_t largest = 0;
+  for (const RunResult& run : runs) {
+    for (const StatisticReport& report : run.statistics) {
+      if (report.name == name) largest = std::max(largest, report.value);
+    }
+  }
+  return largest;
+}
+
+/// One line on numbers that went wrong, where any did.
+std::string trouble_text(const std::vector<RunResult>& runs) {
+  std::vector<std::string> parts;
+  const auto add = [&](const char* statistic, const char* meaning) {
+    const std::uint64_t value = largest_statistic(runs, statistic);
+    if (value > 0) parts.push_back(fmt::format("{} {}", grouped(value), meaning));
+  };
+  add("crop.pixels_stuck", "pixels stuck below the termination threshold by rounding");
+  add("crop.colors_saturated", "fragments took a colour beyond the format's largest");
+  add("sm.colors_clamped", "times a colour was clamped to the format's range");
+  add("vpo.dropped_not_finite", "splats dropped as not finite");
+  // Within 32 bits for every splat but those far larger than a tile.
+  const std::uint64_t bits = largest_statistic(runs, "raster.widest_edge");
+  if (largest_statistic(runs, "raster.wide_edges") > 0) parts.push_back(fmt::format("edge functions of {} bits", bits));
+  for (const StatisticReport& report : runs.front().statistics) {
+    if (report.name != "vpo.smallest_determinant" || report.value >= 1000) continue;
+    parts.push_back(fmt::format("smallest splat of determinant {:.6f} px^2", static_cast<double>(report.value) * 1e-6));
+  }
+  if (parts.empty()) return {};
+  std::string text = "numbers to watch: ";
+  for (std::size_t i = 0; i < parts.size(); ++i) text += (i > 0 ? "; " : "") + parts[i];
+  return text + "\n";
+}
+
+/// Where cycles may be farther off than the documentation says; the runs' parameters are the same.
+std::string validated_text(const std::vector<RunResult>& runs) {
+  std::string text;
+  for (const std::string& reason : runs.front().outside_validated_range) {
+    text +=
+        fmt::format("{} may be off: {}; confirm at cycle\n", vrpipe::name_of(runs.front().request.fidelity), reason);
+  }
+  return text;
+}
+
+std::string remarks(const JobResult& result) {
+  const std::vector<RunResult>& runs = result.runs;
+  std::string text;
+  if (runs.front().counts.fragments_rasterized == 0) {
+    text += nothing_visible(result.scene, result.viewpoint.has_value()) + "\n";
+  }
+  for (const RunResult& run : runs) text += bound_text(run);
+  text += validated_text(runs);
+  if (const auto early = early_termination_ratio(runs)) {
+    text += fmt::format("early-termination ratio {:.2f} (fragments blended without over with termination)\n", *early);
+  }
+  const bool merges =
+      std::any_of(runs.begin(), runs.end(), [](const RunResult& run) { return run.request.variant.quad_merging; });
+  if (merges) {
+    const StorageReport storage = quad_merging_storage(runs.front().request);
+    text +=
+        fmt::format("quad merging adds {} of hardware storage per GPC: TGC {}, QRU {}\n",
+                    bytes(storage.tgc_bytes + storage.qru_bytes), bytes(storage.tgc_bytes), bytes(storage.qru_bytes));
+  }
+  const RejectedGaussians& rejected = result.scene.rejected;
+  if (rejected.total() > 0) {
+    text += fmt::format("rejected {} Gaussians: {} with a NaN or infinite value, {} without an orientation\n",
+                        grouped(rejected.total()), grouped(rejected.not_finite), grouped(rejected.zero_quaternion));
+  }
+  text += trouble_text(runs);
+  text += fmt::format("took {:.1f} s to load the scene, {:.1f} s to simulate", result.load_seconds,
+                      result.simulate_seconds);
+  if (runs.size() > 1) {
+    text += fmt::format(" in {} process{}", result.processes, result.processes == 1 ? "" : "es at a time");
+  }
+  text += "\n";
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (result.images[i]) text += fmt::format("image: {} and .exr\n", printable(result.images[i]->png));
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string grouped(std::uint64_t value) {
+  std::string digits = std::to_string(value);
+  for (std::size_t place = digits.size(); place > 3;) {
+    place -= 3;
+    digits.insert(place, 1, ',');
+  }
+  return digits;
+}
+
+std::string nothing_visible(const SceneSummary& scene, bool has_camera) {
+  return fmt::format("nothing is visible: none of the {} {} covers a pixel; {}", grouped(scene.gaussians_total),
+                     has_camera ? "Gaussians" : "splats",
+                     has_camera ? "turn the camera with --camera, or --eye and --look-at"
+                                : "save the draw list from a camera that sees the scene");
+}
+
+std::string bound_text(const RunResult& run) {
+  if (!run.bottleneck) return {};
+  const Bottleneck& busiest = *run.bottleneck;
+  std::string parts;
+  for (const auto& [name, share] : busiest.parts) {
+    if (share < 0.001) continue;
+    parts += fmt::format("{}{} {} %", parts.empty() ? "" : ", ", name, percent(share));
+  }
+  const std::string unit = unit_text(busiest.unit, run);
+  if (busiest.occupancy >= bounding_occupancy) {
+    return fmt::format("{} is bound by {}, occupied {} % ({})\n", run.request.variant.name, unit,
+                       percent(busiest.occupancy), parts);
+  }
+  std::string text = fmt::format("no one unit bounds {}: {} is occupied {} % ({})", run.request.variant.name, unit,
+                                 percent(busiest.occupancy), parts);
+  const UnitReport* next = nullptr;
+  for (const UnitReport& other : run.units) {
+    if (other.name != busiest.unit && (next == nullptr || other.occupancy > next->occupancy)) next = &other;
+  }
+  if (next != nullptr && next->occupancy > 0) {
+    text += fmt::format(", {} {} %", unit_text(next->name, run), percent(next->occupancy));
+  }
+  return text + "\n";
+}
+
+std::string report(const JobResult& result, const TextStyle& style) {
+  const std::vector<RunResult>& runs = result.runs;
+  RunTable table(runs);
+  add_time(table, runs);
+  add_fates(table, "fragments", fragment_fates, runs);
+  add_fates(table, "quads", quad_fates, runs);
+  const Scale exact{1, ""};
+  table.group("batches");
+  table.counts("warps", &Counts::warps, exact);
+  table.counts("TGC flushes", &Counts::tgc_flushes, exact);
+  table.counts("TC flushes", &Counts::tc_flushes, exact);
+  table.counts("termination updates", &Counts::termination_updates, exact);
+  add_utilization(table, runs);
+
+  std::string text = heading(result, style) + table.text(style) + "\n";
+  if (runs.size() == 1 && !runs.front().units.empty()) text += unit_states_text(runs.front(), style) + "\n";
+  return text + remarks(result);
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+
+#include "host/terminal.h"
+#include "jobs/simulation_job.h"
+
+namespace vrpipe::tools {
+
+/// What a person reads: the runs side by side, and under the table what they mean.
+std::string report(const JobResult& result, const TextStyle& style);
+
+/// What to say of a draw of which no fragment was rasterised; one line.
+std::string nothing_visible(const SceneSummary& scene, bool has_camera);
+
+/// A unit that is occupied for this share of a run bounds it.
+constexpr double bounding_occupancy = 0.9;
+
+/// What bounds a run: the unit that is occupied the most, and what with; a line, empty where nothing has time.
+std::string bound_text(const RunResult& run);
+
+/// Digits in groups of three: 12,345,678.
+std::string grouped(std::uint64_t value);
+
+}  // namespace vrpipe::tools

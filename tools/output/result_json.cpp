@@ -1,0 +1,243 @@
+#include "output/result_json.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include <vrpipe/accounting.h>
+#include <vrpipe/blend.h>
+#include <vrpipe/platforms/netlist.h>
+
+#include "jobs/comparison.h"
+#include "jobs/settings.h"
+#include "jobs/termination.h"
+#include "output/report.h"
+
+namespace vrpipe::tools {
+namespace {
+
+template <class Number>
+Json number(const std::string& text) {
+  Number value{};
+  const char* const end = text.data() + text.size();
+  const std::from_chars_result read = std::from_chars(text.data(), end, value);
+  return read.ec == std::errc() && read.ptr == end ? Json(value) : Json(text);
+}
+
+/// The declaration of UNIT.PARAMETER or PATH.PARAMETER, in the implementation that the request puts into the slot.
+const Parameter* declaration(const std::vector<ParameterListing>& listings, const RunRequest& request,
+                             const std::string& key) {
+  const std::size_t dot = key.rfind('.');
+  const std::string unit = without_gpc(key.substr(0, dot));
+  const std::string name = key.substr(dot + 1);
+  const Parameter* found = nullptr;
+  for (const ParameterListing& listing : listings) {
+    if (listing.unit != unit) continue;
+    const bool chosen = std::any_of(request.units.begin(), request.units.end(), [&](const UnitChoice& choice) {
+      return choice.slot == unit && choice.implementation == listing.implementation;
+    });
+    for (const Parameter* parameter : listing.parameters->parameters()) {
+      if (name == parameter->name() && (found == nullptr || chosen)) found = parameter;
+    }
+  }
+  return found;
+}
+
+Json parameters_json(const std::vector<RunResult>& runs) {
+  const RunRequest& request = runs.front().request;
+  const std::vector<ParameterListing> listings = all_parameters(request.platform);
+  Json values = Json::object();
+  for (const RunResult& run : runs) {
+    for (const auto& [key, value] : run.parameters) {
+      if (values.contains(key)) continue;
+      const Parameter* const parameter = declaration(listings, request, key);
+      values[key] = parameter != nullptr ? typed_value(*parameter, value) : Json(value);
+    }
+  }
+  return values;
+}
+
+Json shares_json(const std::vector<std::pair<std::string, double>>& shares) {
+  Json json = Json::object();
+  for (const auto& [name, share] : shares) json[name] = share;
+  return json;
+}
+
+Json bottleneck_json(const RunResult& run) {
+  if (!run.bottleneck) return {};
+  return {{"unit", run.bottleneck->unit},
+          {"occupancy", run.bottleneck->occupancy},
+          {"parts", shares_json(run.bottleneck->parts)}};
+}
+
+/// Where the value of each of these parameters comes from. The command line comes after the platform, and wins.
+Json origins_json(const Json& parameters, const RunRequest& request, const std::vector<Setting>& preprocessing) {
+  Json origins = Json::object();
+  for (const auto& parameter : parameters.items()) origins[parameter.key()] = "default";
+  const auto mark = [&](const std::vector<Setting>& settings, const char* origin) {
+    for (const Setting& setting : settings) {
+      const std::string key = setting.unit + "." + setting.parameter;
+      if (origins.contains(key)) origins[key] = origin;
+    }
+  };
+  mark(request.platform->settings, "platform");
+  mark(request.settings, "command line");
+  mark(preprocessing, "command line");
+  return origins;
+}
+
+Json triple(const Vec3& vector) { return {vector.x, vector.y, vector.z}; }
+
+Json units_json(const RunResult& run) {
+  Json units = Json::array();
+  for (const UnitReport& unit : run.units) {
+    Json cycles = Json::object();
+    for (unsigned state = 0; state < unit_states; ++state) {
+      cycles[vrpipe::name_of(static_cast<UnitState>(state))] = unit.cycles[state];
+    }
+    units.push_back({{"name", unit.name},
+                     {"cycles", std::move(cycles)},
+                     {"occupancy", unit.occupancy},
+                     {"parts", shares_json(unit.parts)}});
+  }
+  return units;
+}
+
+Json statistics_json(const RunResult& run) {
+  Json statistics = Json::array();
+  for (const StatisticReport& statistic : run.statistics) {
+    statistics.push_back({{"name", statistic.name},
+                          {"value", statistic.value},
+                          {"unit", statistic.unit},
+                          {"meaning", statistic.meaning}});
+  }
+  return statistics;
+}
+
+Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
+  Json counts = Json::object();
+  for (const auto& [name, value] : run.counts.named()) counts[name] = value;
+  // Without time there is no utilization, and the keys are still there.
+  Json utilization = Json::object();
+  for (const char* unit : {"raster", "zrop", "prop", "sm", "crop", "l2", "dram"}) utilization[unit] = nullptr;
+  for (const auto& [name, share] : run.utilization) utilization[name] = share;
+  const bool timed = run.cycles.has_value();
+  return {{"variant", run.request.variant.name},
+          {"cycles", timed ? Json(*run.cycles) : Json()},
+          {"milliseconds", timed ? Json(run.milliseconds) : Json()},
+          {"host_seconds", run.host_seconds},
+          {"cpu_seconds", run.cpu_seconds},
+          {"implementations", implementations_json(run)},
+          {"counts", std::move(counts)},
+          {"bottleneck", bottleneck_json(run)},
+          {"utilization", std::move(utilization)},
+          {"effects", Json::array()},
+          {"result_hash", run.result_hash},
+          {"images", {{"png", images ? Json(images->png) : Json()}, {"exr", images ? Json(images->exr) : Json()}}},
+          {"units", units_json(run)},
+          {"statistics", statistics_json(run)},
+          {"kernel_events", run.kernel_events},
+          {"outside_validated_range", run.outside_validated_range}};
+}
+
+}  // namespace
+
+Json typed_value(const Parameter& parameter, const std::string& value) {
+  if (dynamic_cast<const Integer*>(&parameter) != nullptr) return number<std::uint64_t>(value);
+  if (dynamic_cast<const Real*>(&parameter) != nullptr) return number<double>(value);
+  if (dynamic_cast<const Switch*>(&parameter) != nullptr) return value == "on";
+  return value;
+}
+
+Json head_json(const std::string& schema, const Provenance& provenance, unsigned processes) {
+  Json plugins = Json::array();
+  for (const PluginFile& plugin : provenance.plugins) {
+    plugins.push_back({{"path", plugin.path}, {"sha256", plugin.sha256}});
+  }
+  return {{"schema", schema},
+          {"version", VRPIPE_VERSION},
+          {"command", provenance.command},
+          {"plugins", std::move(plugins)},
+          {"host", {{"processes", processes}, {"load_average", provenance.load_average}}}};
+}
+
+Json camera_json(const std::optional<Viewpoint>& viewpoint) {
+  if (!viewpoint) return {};
+  const auto& [camera, view, file] = *viewpoint;
+  const auto column = [&rows = camera.rotation](glm::length_t i) {
+    return triple({rows[0][i], rows[1][i], rows[2][i]});
+  };
+  constexpr double degrees = 57.29577951308232;
+  return {{"file", file ? Json(file->file) : Json()},
+          {"index", file ? Json(file->index) : Json()},
+          {"eye", triple(camera.eye)},
+          {"look_at", view ? triple(view->look_at) : Json()},
+          {"up", view ? triple(view->up) : Json()},
+          {"fovy_degrees", 2 * degrees * std::atan(0.5 * camera.height / camera.fy)},
+          {"right", column(0)},
+          {"down", column(1)},
+          {"forward", column(2)},
+          {"focal_pixels", {camera.fx, camera.fy}},
+          {"near_plane", camera.near_plane}};
+}
+
+Json implementations_json(const RunResult& run) {
+  Json implementations = Json::object();
+  for (const auto& [slot, name] : run.implementations) implementations[slot] = name;
+  return implementations;
+}
+
+Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t height) {
+  return {{"name", scene.name},
+          {"gaussians_total", scene.gaussians_total},
+          {"gaussians_visible", scene.gaussians_visible},
+          {"gaussians_rejected", scene.rejected.total()},
+          {"width", width},
+          {"height", height},
+          {"rejected_by_reason",
+           {{"not_finite", scene.rejected.not_finite}, {"zero_quaternion", scene.rejected.zero_quaternion}}}};
+}
+
+Json platform_json(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing) {
+  const RunRequest& request = runs.front().request;
+  Json parameters = parameters_json(runs);
+  Json origins = origins_json(parameters, request, preprocessing);
+  return {{"name", request.platform->name},
+          {"frequency_mhz", request.platform->frequency_mhz},
+          {"parameters", std::move(parameters)},
+          {"origins", std::move(origins)}};
+}
+
+Json result_json(const JobResult& result) {
+  const RunRequest& request = result.runs.front().request;
+  Json runs = Json::array();
+  for (std::size_t i = 0; i < result.runs.size(); ++i) runs.push_back(run_json(result.runs[i], result.images[i]));
+  const StorageReport storage = quad_merging_storage(request);
+  Json json = head_json(result.schema, result.provenance, result.processes);
+  json.update({{"seed", request.stall_seed},
+               {"scene", scene_json(result.scene, result.width, result.height)},
+               {"camera", camera_json(result.viewpoint)},
+               {"platform", platform_json(result.runs, result.preprocessing)},
+               {"fidelity", vrpipe::name_of(request.fidelity)},
+               {"format", vrpipe::name_of(request.format)},
+               {"termination", name_of(request.termination)},
+               {"runs", std::move(runs)}});
+  if (result.runs.size() > 1) {
+    Json speedups = Json::object();
+    for (const RunResult& run : result.runs) {
+      if (&run == &result.runs.front()) continue;
+      const std::optional<double> gain = speedup(result.runs.front(), run);
+      speedups[run.request.variant.name] = gain ? Json(*gain) : Json();
+    }
+    json["speedup"] = std::move(speedups);
+    const std::optional<double> ratio = early_termination_ratio(result.runs);
+    json["early_termination_ratio"] = ratio ? Json(*ratio) : Json();
+  }
+  json["quad_merging_storage_bytes"] = {{"tgc", storage.tgc_bytes}, {"qru", storage.qru_bytes}};
+  return json;
+}
+
+}  // namespace vrpipe::tools

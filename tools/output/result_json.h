@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <vrpipe/platforms/simulation.h>
+
+#include "jobs/simulation_job.h"
+
+namespace vrpipe::tools {
+
+using Json = nlohmann::ordered_json;
+
+/// The result of `compare` or of `run`: schema vrpipe.compare/1 of the contract, or vrpipe.run/1, which is the same.
+Json result_json(const JobResult& result);
+
+// Parts that results have in common.
+
+/// Schema, version, and what made the result. `processes` simulations ran at a time.
+Json head_json(const std::string& schema, const Provenance& provenance, unsigned processes);
+/// Null for a draw list.
+Json camera_json(const std::optional<Viewpoint>& viewpoint);
+Json implementations_json(const RunResult& run);
+Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t height);
+/// The parameters are those of all runs, which differ in the variant at most.
+/// @param preprocessing  what --set changed of it
+Json platform_json(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing);
+
+/// A parameter's value with its type: numbers as numbers, switches as true and false, choices as strings.
+Json typed_value(const Parameter& parameter, const std::string& value);
+
+}  // namespace vrpipe::tools
