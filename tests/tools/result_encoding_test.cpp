@@ -133,6 +133,36 @@ TEST(ResultEncoding, EveryFieldComesBack) {
   expect_equal(decode(encode(full_result()), a_request()), full_result());
 }
 
+// Two names exchanged would go unnoticed between two ends of the same program, but not in a file.
+TEST(ResultEncoding, EveryFieldHasItsOwnName) {
+  const RunResult result = full_result();
+  const Json json = encode(result);
+  for (const auto& [name, value] : result.counts.named()) EXPECT_EQ(json["counts"].value(name, Json()), value) << name;
+  EXPECT_EQ(json["counts"].size(), result.counts.named().size());
+  EXPECT_EQ(json["cycles"], *result.cycles);
+  EXPECT_EQ(json["milliseconds"], result.milliseconds);
+  EXPECT_EQ(json["host_seconds"], result.host_seconds);
+  EXPECT_EQ(json["cpu_seconds"], result.cpu_seconds);
+  EXPECT_EQ(json["utilization"], Json(result.utilization));
+  const UnitReport& unit = result.units[0];
+  EXPECT_EQ(
+      json["units"][0],
+      Json({{"name", unit.name}, {"cycles", unit.cycles}, {"occupancy", unit.occupancy}, {"parts", Json(unit.parts)}}));
+  const Bottleneck& bottleneck = *result.bottleneck;
+  EXPECT_EQ(json["bottleneck"],
+            Json({{"unit", bottleneck.unit}, {"occupancy", bottleneck.occupancy}, {"parts", Json(bottleneck.parts)}}));
+  const StatisticReport& statistic = result.statistics[0];
+  EXPECT_EQ(json["statistics"][0], Json({{"name", statistic.name},
+                                         {"unit", statistic.unit},
+                                         {"meaning", statistic.meaning},
+                                         {"value", statistic.value}}));
+  EXPECT_EQ(json["implementations"][0][0], "qru");
+  EXPECT_EQ(json["parameters"], Json(result.parameters));
+  EXPECT_EQ(json["outside_validated_range"][1], "");
+  EXPECT_EQ(json["result_hash"], result.result_hash);
+  EXPECT_EQ(json["kernel_events"], result.kernel_events);
+}
+
 TEST(ResultEncoding, NothingIsAFieldToo) { expect_equal(through_bytes(RunResult()), RunResult()); }
 
 TEST(ResultEncoding, ABottleneckWithoutANameIsOne) {

@@ -1,10 +1,12 @@
 #include "jobs/result_encoding.h"
 
 #include <algorithm>
+#include <array>
+#include <optional>
 #include <stdexcept>
 #include <type_traits>
-
-#include <fmt/format.h>
+#include <utility>
+#include <vector>
 
 #include <vrpipe/printable.h>
 
