@@ -418,8 +418,8 @@ class CheckedUnit<ZropBehaviour> final : public CheckedSlot<ZropBehaviour> {
     ++updates_;
     ask("update", [&] { checked_->update(signal); });
   }
-  void foresee(TerminationForesight& foresight) override {
-    ask("foresee", [&] { checked_->foresee(foresight); });
+  void follow(FunctionalRunAhead& run_ahead) override {
+    ask("follow", [&] { checked_->follow(run_ahead); });
   }
   Cost cost() const override {
     const Cost cost = ask("cost", [&] { return checked_->cost(); });

@@ -212,7 +212,8 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
                                        count(done.merging_warps * instructions_of(sm_.merge))});
   }
   if (slot == "crop") return priced(CropWork::kinds(crop_), {count(done.color_quads), count(done.sectors)});
-  if (slot == "l2" && l2_bytes_per_cycle_ > 0) return {{"bytes", 0, ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_), true}};
+  if (slot == "l2" && l2_bytes_per_cycle_ > 0)
+    return {{"bytes", 0, ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_), true}};
   return {};
 }
 

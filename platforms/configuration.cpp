@@ -129,6 +129,7 @@ bool Configuration::has_l2() const {
 
 /// A platform's settings are for the units that it was made with: another one in a slot takes those that it declares.
 bool Configuration::concerns_chosen_unit(const Setting& setting) const {
+  if (setting.unit == "l2") return has_l2();
   const std::vector<const Instance*> named = instances_named(setting.unit);
   if (named.empty()) return true;
   Variant with_all = request_.variant;

@@ -18,13 +18,13 @@ namespace vrpipe {
 
 Gpu::Gpu(const Configuration& configuration, ColorSurface& surface)
     : configuration_(configuration),
-      clock_(std::make_unique<ClockDomain>(
-          "clock", static_cast<std::uint64_t>(std::llround(1e6 / configuration.platform().frequency_mhz)))) {
+      clock_(std::make_unique<ClockDomain>("clock", static_cast<std::uint64_t>(
+                                                        std::llround(1e6 / configuration.platform().frequency_mhz)))) {
   const Netlist& netlist = configuration.netlist();
   const RunRequest& request = configuration.request();
   for (const Instance& instance : netlist.instances()) {
-    const bool runs_ahead = instance.slot == "zrop" && request.termination == Termination::strict &&
-                            request.variant.early_termination;
+    const bool runs_ahead =
+        instance.slot == "zrop" && request.termination == Termination::strict && request.variant.early_termination;
     if (runs_ahead) ahead_[instance.gpc] = std::make_unique<RunAhead>(configuration, instance.gpc, surface);
   }
   for (const Instance& instance : netlist.instances()) add(instance, surface);
@@ -116,8 +116,7 @@ void Gpu::check() const {
       return std::find(memory.units.begin(), memory.units.end(), path) != memory.units.end();
     });
     if (placed.unit->memory_socket() == nullptr || has_memory) continue;
-    throw UserError("incomplete platform " + platform, path, "its memory port is not connected",
-                    "use connect_memory");
+    throw UserError("incomplete platform " + platform, path, "its memory port is not connected", "use connect_memory");
   }
 }
 
@@ -171,14 +170,17 @@ Cycle Gpu::run(std::atomic<float>* progress) {
     }
   }
   // A platform whose pipeline ends elsewhere is done when all have come to rest.
-  if (!any_end) ended = std::all_of(units_.begin(), units_.end(), [](const Placed& each) { return each.unit->idle(); });
+  if (!any_end) {
+    ended = std::all_of(units_.begin(), units_.end(), [](const Placed& each) { return each.unit->idle(); });
+    passed = clock_->now() + 1;
+  }
   if (!ended) {
     std::string waiting;
     for (const Placed& placed : units_) {
       const Unit& unit = *placed.unit;
       if (unit.idle()) continue;
-      waiting += fmt::format("{}{} ({}", waiting.empty() ? "" : ", ", placed.instance->path,
-                             name_of(unit.account().state()));
+      waiting +=
+          fmt::format("{}{} ({}", waiting.empty() ? "" : ", ", placed.instance->path, name_of(unit.account().state()));
       for (const InPort* port : unit.in_ports) {
         if (!port->empty()) waiting += fmt::format(", items at {}", port->name());
       }

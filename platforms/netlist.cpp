@@ -69,10 +69,11 @@ void Netlist::add(const std::string& path, const std::string& slot, const std::s
 void Netlist::connect(const std::string& from, const std::string& to, unsigned depth, unsigned latency) {
   static_cast<void>(instance(split_port(from).first));
   static_cast<void>(instance(split_port(to).first));
-  const bool taken = std::any_of(links_.begin(), links_.end(),
-                                 [&](const Link& link) { return link.from == from || link.to == to; });
+  const bool taken =
+      std::any_of(links_.begin(), links_.end(), [&](const Link& link) { return link.from == from || link.to == to; });
   if (taken) refuse("cannot connect", from + " to " + to, "a port is connected already", "connect each port once");
-  stubs_.erase(std::remove_if(stubs_.begin(), stubs_.end(), [&](const auto& port) { return port == from || port == to; }),
+  stubs_.erase(std::remove_if(stubs_.begin(), stubs_.end(),
+                              [&](const auto& port) { return port == from || port == to; }),
                stubs_.end());
   links_.push_back({from, to, std::make_shared<LinkParameters>(depth, latency)});
 }
@@ -90,14 +91,10 @@ void Netlist::connect_memory(const std::string& unit, const std::string& memory)
     const auto found = std::find(known.units.begin(), known.units.end(), unit);
     if (found != known.units.end()) known.units.erase(found);  // it is moved
   }
-  std::vector<std::string> paths;
-  for (MemoryInstance& known : memories_) {
-    if (known.path == memory) return known.units.push_back(unit);
-    paths.push_back(known.path);
-  }
-  refuse("unknown memory '" + memory + "'", "platform", "it was not added",
-         paths.empty() ? "add it with add_memory" : "did you mean " + nearest_name(memory, paths) + "?");
+  this->memory(memory).units.push_back(unit);
 }
+
+void Netlist::replace_memory(const std::string& path, MemoryMaker make) { memory(path).make = std::move(make); }
 
 void Netlist::replace(const std::string& path, const std::string& implementation) {
   instance(path).implementation = implementation;
@@ -129,7 +126,8 @@ void Netlist::remove(const std::string& path) {
   for (MemoryInstance& memory : memories_) {
     memory.units.erase(std::remove(memory.units.begin(), memory.units.end(), path), memory.units.end());
   }
-  instances_.erase(std::find_if(instances_.begin(), instances_.end(), [&](const Instance& i) { return i.path == path; }));
+  instances_.erase(
+      std::find_if(instances_.begin(), instances_.end(), [&](const Instance& i) { return i.path == path; }));
 }
 
 void Netlist::disconnect(const std::string& from) {
@@ -166,6 +164,16 @@ Instance& Netlist::instance(const std::string& path) {
   }
   refuse("unknown unit '" + path + "'", "platform", "it was not added",
          paths.empty() ? "add it first" : "did you mean " + nearest_name(path, paths) + "?");
+}
+
+MemoryInstance& Netlist::memory(const std::string& path) {
+  std::vector<std::string> paths;
+  for (MemoryInstance& memory : memories_) {
+    if (memory.path == path) return memory;
+    paths.push_back(memory.path);
+  }
+  refuse("unknown memory '" + path + "'", "platform", "it was not added",
+         paths.empty() ? "add it with add_memory" : "did you mean " + nearest_name(path, paths) + "?");
 }
 
 std::vector<Link>::iterator Netlist::link_at(const std::string& port) {

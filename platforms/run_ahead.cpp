@@ -70,7 +70,10 @@ class RunAhead::Record {
     CropBehaviour::Outcomes outcomes;
     unsigned left = not_shaded;  ///< quads that the timing model has not blended yet
   };
-  Entry& find(std::uint32_t sequence) { return warps_[sequence - first_]; }
+  Entry& find(std::uint32_t sequence) {
+    if (sequence - first_ < warps_.size()) return warps_[sequence - first_];
+    throw SimulationFault("strict termination", 0, "a warp was launched that did not run ahead");
+  }
   void forget() {
     for (; !warps_.empty() && warps_.front().left == 0; ++first_) warps_.pop_front();
   }
@@ -98,8 +101,7 @@ class RunAhead::RecordingSm final : public SmBehaviour {
 
 class RunAhead::RecordingCrop final : public CropBehaviour {
  public:
-  RecordingCrop(std::unique_ptr<CropBehaviour> crop, Record& record)
-      : crop_(std::move(crop)), record_(record) {}
+  RecordingCrop(std::unique_ptr<CropBehaviour> crop, Record& record) : crop_(std::move(crop)), record_(record) {}
   const Behaviour& unit() const override { return crop_->unit(); }
   void attach(ColorSurface& surface) override {
     CropBehaviour::attach(surface);
@@ -255,15 +257,14 @@ RunAhead::RunAhead(const Configuration& configuration, unsigned gpc, ColorSurfac
 
 RunAhead::~RunAhead() = default;
 
-void RunAhead::bin_tested(TileId tile, const std::vector<Quad>& survivors,
-                          std::vector<TerminationSignal>& terminated) {
-  if (survivors.empty()) return;
+void RunAhead::tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) {
   signals_->terminated = &terminated;
-  bin_.flush.quads = survivors;
+  bin_.flush.quads.assign(survivors.quads.begin(), survivors.quads.begin() + survivors.count);
   BinItem item;
   item.storage = &bin_;
-  item.tile = tile;
-  item.quads = static_cast<std::uint32_t>(survivors.size());
+  item.tile = survivors.tile;
+  item.quads = survivors.count;
+  item.last_part = survivors.last_of_bin;
   entry_->take(item);
 }
 

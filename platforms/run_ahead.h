@@ -10,15 +10,15 @@
 namespace vrpipe {
 
 /// Strict termination where there is time: what comes behind ZROP in a GPC, elaborated without time. It takes each bin
-/// when it has been tested, in order, through merging, shading and blending, and knows what that terminates before the
+/// as it is tested, in order, through merging, shading and blending, and knows what that terminates before the
 /// next bin is tested, whenever the timing models get there. They get units that repeat what has been done here.
-class RunAhead final : public TerminationForesight {
+class RunAhead final : public FunctionalRunAhead {
  public:
   /// Makes units of the GPC; CROP blends into the surface. Throws UserError where no way leads from PROP to CROP.
   RunAhead(const Configuration& configuration, unsigned gpc, ColorSurface& surface);
   ~RunAhead() override;
 
-  void bin_tested(TileId tile, const std::vector<Quad>& survivors, std::vector<TerminationSignal>& terminated) override;
+  void tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) override;
 
   /// For the timing model of the GPC's SM array or CROP: gives each warp the outcome that it had here.
   std::unique_ptr<Behaviour> make_repeating(const std::string& slot);

@@ -434,8 +434,8 @@ std::vector<ParameterListing> list_parameters(const Platform* platform) {
     }
     listings.push_back(std::move(listing));
   }
-  listings.push_back({l2, "fixed-latency", "the shared L2: fixed latency, a number of bytes a cycle for each GPC", false,
-                      std::make_unique<L2Parameters>()});
+  listings.push_back({l2, "fixed-latency", "the shared L2: fixed latency, a number of bytes a cycle for each GPC",
+                      false, std::make_unique<L2Parameters>()});
   apply({l2}, *listings.back().parameters);
 
   const Platform& wired = platform != nullptr ? *platform : platforms().front();
@@ -448,7 +448,8 @@ std::vector<ParameterListing> list_parameters(const Platform* platform) {
     listed.push_back(name);
     auto parameters = std::make_unique<LinkParameters>(link.parameters->depth, link.parameters->latency_cycles);
     apply({name, "link." + link.name()}, *parameters);
-    listings.push_back({name, "link", without_gpc(link.from) + " to " + without_gpc(link.to), false, std::move(parameters)});
+    listings.push_back(
+        {name, "link", without_gpc(link.from) + " to " + without_gpc(link.to), false, std::move(parameters)});
   }
 
   listings.push_back({"state", "draw-state", "the draw's state and the precision of the fixed-function hardware", false,

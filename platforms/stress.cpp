@@ -13,7 +13,8 @@ Platform with_links_of_depth(unsigned depth) {
   Platform platform = platform_named("agx-orin");
   platform.wire = [wire = platform.wire, depth](Netlist& netlist) {
     wire(netlist);
-    for (const Link& link : netlist.links()) link.parameters->depth = std::min<std::uint32_t>(link.parameters->depth, depth);
+    for (const Link& link : netlist.links())
+      link.parameters->depth = std::min<std::uint32_t>(link.parameters->depth, depth);
   };
   return platform;
 }

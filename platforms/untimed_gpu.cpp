@@ -39,8 +39,9 @@ UntimedGpu::UntimedGpu(const Configuration& configuration, ColorSurface& surface
   for (const Instance& instance : netlist.instances()) {
     std::unique_ptr<Behaviour> behaviour = configuration.make(instance);
     if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(surface);
-    units_.push_back({&instance, untimed_unit_maker(instance.slot)(instance.path, std::move(behaviour),
-                                                                  configuration.state_of(instance.gpc), netlist.gpcs())});
+    units_.push_back(
+        {&instance, untimed_unit_maker(instance.slot)(instance.path, std::move(behaviour),
+                                                      configuration.state_of(instance.gpc), netlist.gpcs())});
   }
   connect_units(netlist, configuration.request().observers.get(), [&](const std::string& path) -> Component* {
     for (const Placed& placed : units_) {

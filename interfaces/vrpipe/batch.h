@@ -23,6 +23,7 @@ struct BinItem {
   TileId tile;
   std::uint32_t quads = 0;
   bool end_of_draw = false;
+  bool last_part = true;  ///< closes the bin; what runs ahead of time has a bin in parts
 };
 
 /// Quads of a warp that are looked up before the first of them is blended. Where places in CROP's queue, lines of the

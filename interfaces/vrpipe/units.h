@@ -143,12 +143,12 @@ class PropBehaviour : public Behaviour {
 };
 
 /// Strict termination: what the bins tested so far will have terminated, whenever their quads reach CROP.
-class TerminationForesight {
+class FunctionalRunAhead {
  public:
-  virtual ~TerminationForesight() = default;
-  /// Runs the survivors of a tested bin through merging, shading and blending; `terminated` gets the new signals.
-  virtual void bin_tested(TileId tile, const std::vector<Quad>& survivors,
-                          std::vector<TerminationSignal>& terminated) = 0;
+  virtual ~FunctionalRunAhead() = default;
+  /// Takes the survivors of a part of a bin, as soon as that is tested, through merging, shading and blending; with the
+  /// last of a bin, `terminated` has what all of them newly terminate.
+  virtual void tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) = 0;
 };
 
 /// Slot `zrop`: depth and stencil test, termination test and update.
@@ -158,8 +158,8 @@ class ZropBehaviour : public Behaviour {
   virtual void test(QuadBeat& beat) = 0;
   /// Sets the termination bit (stencil MSB) of the signalled pixels.
   virtual void update(const TerminationSignal& signal) = 0;
-  /// Strict mode at fidelities with time: termination comes from `foresight`, and `update` only costs time.
-  virtual void foresee(TerminationForesight& foresight) = 0;
+  /// Strict mode at fidelities with time: termination comes from `run_ahead`, and `update` only costs time.
+  virtual void follow(FunctionalRunAhead& run_ahead) = 0;
   struct Cost {
     std::uint32_t quads_per_cycle;
     std::uint32_t latency_cycles;

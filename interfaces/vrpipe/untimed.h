@@ -146,8 +146,9 @@ class UntimedUnit : public Component {
 };
 
 /// Makes the unit without time around a functional model of a slot. `gpcs` is how many GPCs the front end serves.
-using UntimedUnitMaker = std::function<std::unique_ptr<UntimedUnit>(
-    const std::string& name, std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned gpcs)>;
+using UntimedUnitMaker =
+    std::function<std::unique_ptr<UntimedUnit>(const std::string& name, std::unique_ptr<Behaviour> behaviour,
+                                               const RenderState& state, unsigned gpcs)>;
 
 /// Registered by each unit without time for its slot. A second one for a slot is a problem of the registry's.
 void register_untimed_unit_maker(const std::string& slot, UntimedUnitMaker maker);

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <optional>
 
-#include <vrpipe/order_monitor.h>
 #include <vrpipe/occupancy.h>
+#include <vrpipe/order_monitor.h>
 #include <vrpipe/untimed.h>
 
 namespace vrpipe {
@@ -91,7 +91,7 @@ class UntimedCrop : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("crop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                        const RenderState&, unsigned) {
+                                         const RenderState&, unsigned) {
     return std::make_unique<UntimedCrop>(name, behaviour_as<CropBehaviour>(std::move(behaviour)));
   });
   return true;

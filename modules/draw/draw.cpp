@@ -23,6 +23,6 @@ namespace {
 const SlotRegistrar slot{{"draw", 10, "vertex-issue"}};
 const Registrar<VertexIssue, DrawBehaviour> registrar("draw", "vertex-issue", "issues sorted splats as vertex warps",
                                                       false, Trust::trusted);
-}
+}  // namespace
 
 }  // namespace vrpipe

@@ -39,7 +39,7 @@ class UntimedDraw : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("draw", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                        const RenderState&, unsigned gpcs) {
+                                         const RenderState&, unsigned gpcs) {
     return std::make_unique<UntimedDraw>(name, behaviour_as<DrawBehaviour>(std::move(behaviour)), gpcs);
   });
   return true;

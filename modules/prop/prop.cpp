@@ -13,6 +13,6 @@ namespace {
 const SlotRegistrar slot{{"prop", 60, "pre-rop", "", true}};
 const Registrar<PreRop, PropBehaviour> registrar("prop", "pre-rop", "quad flow between TC, ZROP, SM and CROP, in order",
                                                  false, Trust::trusted);
-}
+}  // namespace
 
 }  // namespace vrpipe

@@ -15,19 +15,15 @@ class UntimedProp : public UntimedUnit {
         out_release_(*this, "out_release"),
         out_color_(*this, "out_color"),
         in_tested_(input<BinItem>("in_tested", [this](const BinItem& item) { forward(item); })),
-        in_bins_(input<BinItem>("in_bins",
-                                [this, tests = state.early_termination](const BinItem& item) {
-                                  tests ? out_test_.send(item) : forward(item);
-                                })),
+        in_bins_(input<BinItem>("in_bins", [this, tests = state.early_termination](
+                                               const BinItem& item) { tests ? out_test_.send(item) : forward(item); })),
         in_shaded_(input<ShadedWarpItem>("in_shaded", [this](const ShadedWarpItem& item) { leave(item); })),
         behaviour_(std::move(behaviour)) {}
 
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  void forward(const BinItem& item) {
-    out_survivors_.send(item);
-  }
+  void forward(const BinItem& item) { out_survivors_.send(item); }
   void leave(const ShadedWarpItem& item) {
     if (item.warp->count == 0 && !item.warp->end_of_draw) return item.warp->release();
     out_color_.send(item);
@@ -45,7 +41,7 @@ class UntimedProp : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("prop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                        const RenderState& state, unsigned) {
+                                         const RenderState& state, unsigned) {
     return std::make_unique<UntimedProp>(name, behaviour_as<PropBehaviour>(std::move(behaviour)), state);
   });
   return true;

@@ -33,7 +33,7 @@ class UntimedQru : public UntimedUnit {
       from += behaviour_->examine(item.tile, quads + from, item.quads - from, warp_, launched);
       if (launched) launch();
     }
-    while (behaviour_->finish_bin(warp_)) launch();
+    while (item.last_part && behaviour_->finish_bin(warp_)) launch();
   }
 
   void launch() {

@@ -253,6 +253,6 @@ namespace {
 const SlotRegistrar slot{{"raster", 40, "tile-rasterizer", "", true}};
 const Registrar<TileRasterizer, RasterBehaviour> registrar(
     "raster", "tile-rasterizer", "fixed-point edge functions, 8x8 raster tiles, top-left rule", false, Trust::trusted);
-}
+}  // namespace
 
 }  // namespace vrpipe

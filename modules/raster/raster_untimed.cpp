@@ -45,7 +45,7 @@ class UntimedRaster : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("raster", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                        const RenderState&, unsigned) {
+                                           const RenderState&, unsigned) {
     return std::make_unique<UntimedRaster>(name, behaviour_as<RasterBehaviour>(std::move(behaviour)));
   });
   return true;

@@ -186,6 +186,6 @@ const SlotRegistrar slot{{"sm", 90, "splat-shader", "", true}};
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
                                                     "Gaussian splatting shaders with alpha pruning and quad merging",
                                                     false, Trust::trusted);
-}
+}  // namespace
 
 }  // namespace vrpipe

@@ -46,7 +46,7 @@ class UntimedSm : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("sm", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                        const RenderState&, unsigned) {
+                                       const RenderState&, unsigned) {
     return std::make_unique<UntimedSm>(name, behaviour_as<SmBehaviour>(std::move(behaviour)));
   });
   return true;

@@ -78,6 +78,6 @@ namespace {
 const SlotRegistrar slot{{"tc", 50, "tile-coalescing"}};
 const Registrar<TileCoalescing, TcBehaviour> registrar("tc", "tile-coalescing", "bins of quads, one per screen tile",
                                                        false, Trust::trusted);
-}
+}  // namespace
 
 }  // namespace vrpipe

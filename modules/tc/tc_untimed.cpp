@@ -51,7 +51,7 @@ class UntimedTc : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("tc", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                        const RenderState&, unsigned) {
+                                       const RenderState&, unsigned) {
     return std::make_unique<UntimedTc>(name, behaviour_as<TcBehaviour>(std::move(behaviour)));
   });
   return true;

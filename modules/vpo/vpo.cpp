@@ -70,6 +70,6 @@ const SlotRegistrar slot{{"vpo", 20, "primitive-assembly"}};
 const Registrar<PrimitiveAssembly, VpoBehaviour> registrar("vpo", "primitive-assembly",
                                                            "two triangles per splat, culled and boxed", false,
                                                            Trust::trusted);
-}
+}  // namespace
 
 }  // namespace vrpipe

@@ -16,8 +16,7 @@ class UntimedVpo : public UntimedUnit {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       const std::string index = std::to_string(gpc);
       outs_.push_back(std::make_unique<UntimedOut<PrimitiveItem>>(*this, "out_primitives_" + index));
-      ins_.push_back(
-          input<VertexWarp>("in_vertices_" + index, [this](const VertexWarp& warp) { assemble(warp); }));
+      ins_.push_back(input<VertexWarp>("in_vertices_" + index, [this](const VertexWarp& warp) { assemble(warp); }));
     }
   }
 

@@ -23,18 +23,16 @@ void DepthStencilRop::test(QuadBeat& beat) {
   }
   quads_terminated += beat.count - kept;
   beat.count = static_cast<std::uint8_t>(kept);
-  if (foresight_ == nullptr || beat.end_of_draw) return;
-  survivors_.insert(survivors_.end(), beat.quads.begin(), beat.quads.begin() + kept);
+  if (run_ahead_ == nullptr || beat.end_of_draw) return;
+  run_ahead_->tested(beat, ahead_);
   if (!beat.last_of_bin) return;
-  foreseen_.clear();
-  foresight_->bin_tested(beat.tile, survivors_, foreseen_);
-  survivors_.clear();
-  for (const TerminationSignal& signal : foreseen_) mark(signal);
+  for (const TerminationSignal& signal : ahead_) mark(signal);
+  ahead_.clear();
 }
 
 void DepthStencilRop::update(const TerminationSignal& signal) {
   ++termination_updates;
-  if (foresight_ == nullptr) mark(signal);
+  if (run_ahead_ == nullptr) mark(signal);
 }
 
 namespace {
@@ -42,6 +40,6 @@ const SlotRegistrar slot{{"zrop", 70, "depth-stencil-rop", "", true}};
 const Registrar<DepthStencilRop, ZropBehaviour> registrar("zrop", "depth-stencil-rop",
                                                           "termination test and update on the stencil MSB", false,
                                                           Trust::trusted);
-}
+}  // namespace
 
 }  // namespace vrpipe

@@ -35,7 +35,7 @@ class DepthStencilRop : public ZropBehaviour {
 
   void test(QuadBeat& beat) override;
   void update(const TerminationSignal& signal) override;
-  void foresee(TerminationForesight& foresight) override { foresight_ = &foresight; }
+  void follow(FunctionalRunAhead& run_ahead) override { run_ahead_ = &run_ahead; }
   Cost cost() const override { return cost_; }
 
  private:
@@ -47,9 +47,8 @@ class DepthStencilRop : public ZropBehaviour {
   const Cost cost_;
   const TileGrid grid_;
   std::vector<std::uint8_t> terminated_;  ///< the stencil MSBs of a quad position's four pixels
-  TerminationForesight* foresight_ = nullptr;
-  std::vector<Quad> survivors_;  ///< of the bin under test, for the foresight
-  std::vector<TerminationSignal> foreseen_;
+  FunctionalRunAhead* run_ahead_ = nullptr;
+  std::vector<TerminationSignal> ahead_;  ///< of the bin under test
 };
 
 }  // namespace vrpipe

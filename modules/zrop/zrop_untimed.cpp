@@ -52,7 +52,7 @@ class UntimedZrop : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("zrop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                        const RenderState&, unsigned) {
+                                         const RenderState&, unsigned) {
     return std::make_unique<UntimedZrop>(name, behaviour_as<ZropBehaviour>(std::move(behaviour)));
   });
   return true;

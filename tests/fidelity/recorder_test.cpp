@@ -7,8 +7,8 @@
 #include <vector>
 
 #include <vrpipe/batch.h>
-#include <vrpipe/link.h>
 #include <vrpipe/error.h>
+#include <vrpipe/link.h>
 #include <vrpipe/platforms/observers.h>
 
 #include "support/simulate.h"
@@ -57,16 +57,16 @@ TEST(LinkObservers, SeeTheSameBinsAtEveryFidelityAndChangeNothing) {
   using Bin = LinkRecorder<BinItem>::Record;
 
   std::vector<Seen> reference;
-  for (const Fidelity fidelity :
-       {Fidelity::cycle, Fidelity::lt, Fidelity::at, Fidelity::bound, Fidelity::functional}) {
+  for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt, Fidelity::at, Fidelity::bound, Fidelity::functional}) {
     SCOPED_TRACE(name_of(fidelity));
     RunRequest request = request_of("het+qm", fidelity, strictly);
     const RunResult plain = run(request, draw);
     std::vector<Beat> beats;
     std::vector<Bin> bins;
     request.observers = std::make_shared<Observers>();
-    request.observers->on_link<QuadBeat>("gpc0.tc.bins",
-                                         [&](const auto& passed) { beats.push_back({passed.first, passed.item}); });
+    request.observers->on_link<QuadBeat>("gpc0.tc.bins", [&](const auto& passed) {
+      beats.push_back({passed.first, passed.item});
+    });
     request.observers->on_link<BinItem>("tc.bins", [&](const auto& passed) {
       EXPECT_EQ(passed.link, "gpc0.tc.bins");
       bins.push_back({passed.first, passed.item});

@@ -99,10 +99,10 @@ foreach(fidelity functional bound lt at cycle)
 endforeach()
 
 # The platform: two GPCs are faster than one.
-expect_success("twin het\\+qm [0-9]+ cycles" ${WORK_DIR}/consumer/twin_gpu)
-string(REGEX MATCH "agx-orin baseline ([0-9]+)" ignored "${output}")
+expect_success("twin cycle het\\+qm [0-9]+ cycles" ${WORK_DIR}/consumer/twin_gpu)
+string(REGEX MATCH "agx-orin cycle baseline ([0-9]+)" ignored "${output}")
 set(one ${CMAKE_MATCH_1})
-string(REGEX MATCH "twin baseline ([0-9]+)" ignored "${output}")
+string(REGEX MATCH "twin cycle baseline ([0-9]+)" ignored "${output}")
 set(two ${CMAKE_MATCH_1})
 if(NOT two LESS one)
   message(FATAL_ERROR "two GPCs take ${two} cycles, one takes ${one}")
@@ -112,6 +112,23 @@ endif()
 set(wide ${WORK_DIR}/consumer/wide_platform.so)
 expect_success("agx-orin with two GPCs" ${vrpipe} platforms --plugin ${wide})
 expect_success("" ${vrpipe} run ${draw} --fidelity lt --plugin ${wide} --platform wide)
+
+# The slot: it counts at every fidelity what RASTER makes, and is listed with its parameter.
+set(tally --plugin ${WORK_DIR}/consumer/tally_slot.so)
+expect_success("tally.beats_per_cycle" ${vrpipe} units ${tally} --platform tallied)
+foreach(fidelity functional bound lt at cycle)
+  expect_success("\"quads_rasterized\": *([0-9]+)" ${vrpipe} run ${draw} ${tally} --platform tallied --fidelity ${fidelity}
+    --json -)
+  string(REGEX MATCH "\"quads_rasterized\": *([0-9]+)" ignored "${output}")
+  set(quads ${CMAKE_MATCH_1})
+  string(REGEX REPLACE "[ \n]" "" compact "${output}")
+  if(NOT compact MATCHES "\"name\":\"tally.quads\",\"unit\":\"quads\",\"value\":${quads}[,}]" AND
+     NOT compact MATCHES "\"name\":\"tally.quads\"[^{}]*\"value\":${quads}[,}]")
+    message(FATAL_ERROR "tally.quads is not ${quads} at ${fidelity} in\n${output}")
+  endif()
+endforeach()
+expect_refusal("link.tally.quads" ${vrpipe} run ${draw} ${tally} --platform tallied --set link.tally.quadz.depth=4)
+expect_success("" ${vrpipe} run ${draw} ${tally} --platform tallied --set link.tally.quads.depth=1)
 
 # The testbenches.
 expect_success("100 seeds" ${WORK_DIR}/consumer/same_splat_bench)

@@ -152,10 +152,11 @@ struct WallBehaviour : Behaviour {
 void register_wall() {
   Registry::instance().add(Slot{"wall", 1000, "wall"});
   const Registrar<WallBehaviour, Behaviour> wall("wall", "wall", "takes nothing");
-  register_unit_maker("wall", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                 const RenderState&, unsigned) -> std::unique_ptr<Unit> {
-    return std::make_unique<Wall>(name.c_str(), domain, std::move(behaviour));
-  });
+  register_unit_maker("wall",
+                      [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                         const RenderState&, unsigned) -> std::unique_ptr<Unit> {
+                        return std::make_unique<Wall>(name.c_str(), domain, std::move(behaviour));
+                      });
 }
 
 TEST(Deadlock, IsReportedWithTheUnitsThatWait) {
@@ -224,6 +225,28 @@ TEST(Wiring, UnknownUnitsAndPortsGetTheNearestName) {
     expect("adds no unit", [](Netlist&) {});
     expect("unknown slot 'tcc'", [](Netlist& netlist) { netlist.add("gpc0.tcc"); });
     expect("has 1 GPCs", [](Netlist& netlist) { netlist.add("gpc1.tc"); });
+  }
+}
+
+// What ran ahead is repeated by warps that reach the SMs before the last of their bin is tested.
+TEST(StrictTermination, DoesNotDependOnHowFastBinsAreTested) {
+  const Draw draw = testing::random_draw(64, 64, 300, 8);
+  for (const char* variant : {"het", "het+qm"}) {
+    const RunResult expected = run(request_of(variant, Fidelity::functional, strictly), draw);
+    for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+      for (const char* quads : {"1", "2", "5"}) {
+        const RunResult result = run(request_of(variant, fidelity,
+                                                [&](RunRequest& r) {
+                                                  strictly(r);
+                                                  r.settings = {{"zrop", "quads_per_cycle", quads}};
+                                                }),
+                                     draw);
+        EXPECT_TRUE(same_image(result.surface, expected.surface))
+            << variant << " " << name_of(fidelity) << " " << quads;
+        EXPECT_EQ(result.counts.named(), expected.counts.named())
+            << variant << " " << name_of(fidelity) << " " << quads;
+      }
+    }
   }
 }
 

@@ -102,27 +102,28 @@ TEST_F(DepthStencilRopTest, SurvivorsKeepTheirOrder) {
 }
 
 /// Terminates what it is told to, bin by bin.
-struct Foresight : TerminationForesight {
-  void bin_tested(TileId, const std::vector<Quad>& survivors, std::vector<TerminationSignal>& terminated) override {
-    bins.push_back(survivors);
-    if (bins.size() == 1) terminated.push_back({{0, 0}, 5, all_lanes});
+struct Ahead : FunctionalRunAhead {
+  void tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) override {
+    beats.push_back(survivors);
+    if (beats.size() == 1) terminated.push_back({{0, 0}, 5, all_lanes});
   }
-  std::vector<std::vector<Quad>> bins;
+  std::vector<QuadBeat> beats;
 };
 
 TEST_F(DepthStencilRopTest, StrictlyABinsTestSeesWhatEarlierBinsTerminateAndNoUpdate) {
   state.termination = Termination::strict;
   DepthStencilRop zrop(parameters, state);
-  Foresight foresight;
-  zrop.foresee(foresight);
+  Ahead ahead;
+  zrop.follow(ahead);
   zrop.update({{0, 0}, 6, all_lanes});  // costs time, decides nothing
   QuadBeat first = beat_of({0, 0}, {5, 6});
   zrop.test(first);
   QuadBeat rest = beat_of({0, 0}, {5}, 2, true);
   zrop.test(rest);
   EXPECT_EQ(first.count + rest.count, 3) << "within a bin nothing is terminated";
-  ASSERT_EQ(foresight.bins.size(), 1U);
-  EXPECT_EQ(foresight.bins[0].size(), 3U);
+  ASSERT_EQ(ahead.beats.size(), 2U) << "as soon as they are tested";
+  EXPECT_EQ(ahead.beats[0].count, 2U);
+  EXPECT_TRUE(ahead.beats[1].last_of_bin);
   QuadBeat next = beat_of({0, 0}, {5, 6}, 3, true);
   zrop.test(next);
   ASSERT_EQ(next.count, 1);

@@ -46,7 +46,7 @@ class Gpu {
   std::unique_ptr<ClockDomain> clock_;
   std::unique_ptr<FixedLatencyMemory> l2_;
   std::vector<std::unique_ptr<sc_core::sc_module>> memories_;  ///< of another make
-  std::map<unsigned, std::unique_ptr<RunAhead>> ahead_;         ///< by GPC, in strict termination
+  std::map<unsigned, std::unique_ptr<RunAhead>> ahead_;        ///< by GPC, in strict termination
   std::vector<Placed> units_;
 };
 

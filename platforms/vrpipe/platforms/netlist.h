@@ -72,6 +72,8 @@ class Netlist {
 
   /// Adds the L2 of this library, with the parameters `l2`, or a memory of another make in its place.
   void add_memory(const std::string& path, MemoryMaker make = nullptr);
+  /// Puts a memory of another make in the place of one.
+  void replace_memory(const std::string& path, MemoryMaker make);
   /// Binds the memory port of a unit.
   void connect_memory(const std::string& unit, const std::string& memory);
 
@@ -99,6 +101,7 @@ class Netlist {
 
  private:
   Instance& instance(const std::string& path);
+  MemoryInstance& memory(const std::string& path);
   std::vector<Link>::iterator link_at(const std::string& port);
 
   unsigned gpcs_;

@@ -42,9 +42,8 @@ class Observers {
       const std::string name;
       const std::function<void(const Passed<Item>&)> call;
     };
-    links_.push_back({std::move(link), [see = std::move(see)](const std::string& name) {
-                        return std::make_unique<Seeing>(name, see);
-                      }});
+    links_.push_back({std::move(link),
+                      [see = std::move(see)](const std::string& name) { return std::make_unique<Seeing>(name, see); }});
   }
 
   /// Called when a unit enters a state; units begin starved. With time alone.

@@ -1,48 +1,62 @@
-// A platform of one's own: two GPCs with a deeper queue in front of the colour ROPs, drawn in every variant.
+// A platform of one's own: two GPCs, the second with twice the colour cache and a deeper queue in front of its colour ROP,
+// and a memory of another make in the place of the L2; drawn in every variant.
+#include <cstdint>
 #include <cstdio>
+#include <memory>
 #include <string>
 
+#include <tlm_utils/multi_passthrough_target_socket.h>
+#include <systemc>
+#include <tlm>
+
 #include <vrpipe/error.h>
-#include <vrpipe/platforms/netlist.h>
-#include <vrpipe/platforms/simulation.h>
+#include <vrpipe/platforms/wiring.h>
 #include <vrpipe/workloads/scene.h>
 
 namespace {
 
-void wire_twin(vrpipe::Netlist& gpu) {
-  gpu.add("draw");
-  gpu.add("vpo");
-  gpu.add_memory("l2");
-  for (unsigned gpc = 0; gpc < gpu.gpcs(); ++gpc) {
-    const std::string index = std::to_string(gpc);
-    const std::string self = "gpc" + index + ".";
-    for (const char* slot : {"tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) gpu.add(self + slot);
-    gpu.connect("draw.out_vertices_" + index, self + "sm.in_vertices");
-    gpu.connect(self + "sm.out_vertices", "vpo.in_vertices_" + index);
-    gpu.connect("vpo.out_primitives_" + index, self + "tgc.in_primitives", 16);
-    gpu.connect(self + "tgc.out_jobs", self + "raster.in_jobs", 16);
-    gpu.connect(self + "raster.out_quads", self + "tc.in_quads", 8);
-    gpu.connect(self + "tc.out_bins", self + "prop.in_bins", 8);
-    gpu.connect(self + "prop.out_test", self + "zrop.in_quads", 8);
-    gpu.connect(self + "zrop.out_quads", self + "prop.in_tested", 8);
-    gpu.connect(self + "prop.out_survivors", self + "qru.in_quads", 8);
-    gpu.connect(self + "qru.out_warps", self + "sm.in_warps", 8);
-    gpu.connect(self + "sm.out_shaded", self + "prop.in_shaded", 64);
-    gpu.connect(self + "prop.out_release", self + "sm.in_release", 8);
-    gpu.connect(self + "prop.out_color", self + "crop.in_color", 256);
-    gpu.connect(self + "crop.out_terminations", self + "zrop.in_terminations", 16);
-    gpu.connect_memory(self + "crop", "l2");
+/// A memory that knows nothing of vrpipe: 200 ns for any access, in a time of its own, and a refresh that never stops.
+class Dram : public sc_core::sc_module {
+ public:
+  explicit Dram(const sc_core::sc_module_name& name) : sc_module(name), socket("socket") {
+    socket.register_b_transport(this, &Dram::access);
+    socket.register_nb_transport_fw(this, &Dram::request);
+    SC_HAS_PROCESS(Dram);
+    SC_METHOD(refresh);
   }
-}
+  tlm_utils::multi_passthrough_target_socket<Dram> socket;
+
+ private:
+  void access(int, tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) {
+    delay += sc_core::sc_time(200, sc_core::SC_NS);
+    payload.set_response_status(tlm::TLM_OK_RESPONSE);
+  }
+  tlm::tlm_sync_enum request(int from, tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                             sc_core::sc_time& delay) {
+    if (phase == tlm::BEGIN_REQ) access(from, payload, delay);
+    return tlm::TLM_COMPLETED;
+  }
+  void refresh() { next_trigger(3900, sc_core::SC_NS); }
+};
 
 vrpipe::Platform twin() {
   vrpipe::Platform platform;
   platform.name = "twin";
-  platform.description = "two GPCs of agx-orin, 256 beats in front of each CROP";
+  platform.description = "two GPCs of agx-orin with different colour caches, and a memory of another make";
   platform.gpcs = 2;
   platform.frequency_mhz = 612;
-  platform.settings = {{"draw", "warps_per_1024_cycles", "176"}, {"vpo", "triangles_per_cycle", "4"}};
-  platform.wire = wire_twin;
+  platform.settings = {{"draw", "warps_per_1024_cycles", "176"},
+                       {"vpo", "triangles_per_cycle", "4"},
+                       {"gpc1.crop", "cache_bytes", "32768"},
+                       {"link.gpc1.prop.color", "depth", "256"}};
+  platform.wire = [](vrpipe::Netlist& netlist) {
+    vrpipe::wire_pipeline(netlist);
+    netlist.replace_memory("l2", [](const std::string& name, unsigned) {
+      auto dram = std::make_unique<Dram>(name.c_str());
+      tlm::tlm_base_target_socket_b<32>* const socket = &dram->socket;
+      return vrpipe::ForeignMemory{std::move(dram), {socket}};
+    });
+  };
   return platform;
 }
 
@@ -57,14 +71,17 @@ int main() try {
   const vrpipe::Draw draw = vrpipe::load_scene(scene).draw;
 
   for (const char* platform : {"agx-orin", "twin"}) {
-    for (const vrpipe::Variant& variant : vrpipe::variants()) {
-      vrpipe::RunRequest request;
-      request.platform = &vrpipe::platform_named(platform);
-      request.variant = variant;
-      vrpipe::fresh_simulation();
-      const vrpipe::RunResult result = vrpipe::simulate(request, draw);
-      std::printf("%s %s %llu cycles\n", platform, variant.name.c_str(),
-                  static_cast<unsigned long long>(result.cycles.value()));
+    for (const vrpipe::Fidelity fidelity : {vrpipe::Fidelity::lt, vrpipe::Fidelity::cycle}) {
+      for (const vrpipe::Variant& variant : vrpipe::variants()) {
+        vrpipe::RunRequest request;
+        request.platform = &vrpipe::platform_named(platform);
+        request.variant = variant;
+        request.fidelity = fidelity;
+        vrpipe::fresh_simulation();
+        const vrpipe::RunResult result = vrpipe::simulate(request, draw);
+        std::printf("%s %s %s %llu cycles\n", platform, name_of(fidelity), variant.name.c_str(),
+                    static_cast<unsigned long long>(result.cycles.value()));
+      }
     }
   }
   return 0;
