@@ -20,10 +20,12 @@ std::vector<Cycle> cycles_of(const Sink<int>& sink) {
   return cycles;
 }
 
+StreamIn<int>& clocked(Sink<int>& sink) { return dynamic_cast<StreamIn<int>&>(sink.in()); }
+
 /// A sender and a receiver, and a link between them.
 struct Pair {
   Pair(unsigned depth, unsigned latency) : source(bench.source<int>()), sink(bench.sink<int>()) {
-    source.out.connect(sink.in, depth, latency);
+    source.out().connect(sink.in(), depth, latency);
   }
   Bench bench;
   Source<int>& source;
@@ -38,13 +40,13 @@ TEST(Link, AnItemPushedAtTThroughLatencyLIsVisibleAtTPlusLAndNotBefore) {
     std::vector<std::pair<Cycle, bool>> looks;
     struct Looker : Clocked {
       Cycle tick(Cycle now) override {
-        looks->emplace_back(now, sink->in.ready());
+        looks->emplace_back(now, end->ready());
         return now < 30 ? now + 1 : never;
       }
-      Sink<int>* sink;
+      StreamIn<int>* end;
       std::vector<std::pair<Cycle, bool>>* looks;
     } looker;
-    looker.sink = &pair.sink;
+    looker.end = &clocked(pair.sink);
     looker.looks = &looks;
     pair.bench.clock().attach(looker);
     pair.sink.close(0, 29);
@@ -58,9 +60,9 @@ TEST(Link, TheSendersPipelineAddsItsLatencyAndItsPlaces) {
   Bench bench;
   Source<int>& source = bench.source<int>();
   Sink<int>& sink = bench.sink<int>();
-  source.out.set_pipeline(5, 2);
-  source.out.connect(sink.in, 4, 1);
-  EXPECT_EQ(sink.in.depth(), 4u + 5 * 2);
+  source.out().set_pipeline(5, 2);
+  source.out().connect(sink.in(), 4, 1);
+  EXPECT_EQ(clocked(sink).depth(), 4u + 5 * 2);
   source.add(1, 10);
   bench.run();
   EXPECT_EQ(cycles_of(sink), (std::vector<Cycle>{16}));
@@ -139,7 +141,7 @@ TEST(Link, APushWithoutACreditIsAFault) {
   Bench bench;
   Sink<int>& sink = bench.sink<int>();
   Rude rude("rude", bench.clock());
-  rude.out.connect(sink.in, 1, 1);
+  rude.out.connect(sink.in(), 1, 1);
   EXPECT_THROW(bench.run(), SimulationFault);
 }
 
@@ -148,11 +150,11 @@ TEST(Link, EndsOfDifferentItemsAndEndsInUseAreRefused) {
   Source<int>& source = bench.source<int>();
   Sink<float>& other = bench.sink<float>();
   Sink<int>& sink = bench.sink<int>();
-  EXPECT_THROW(source.out.connect(other.in, 4, 1), UserError);
-  source.out.connect(sink.in, 4, 1);
+  EXPECT_THROW(source.out().connect(other.in(), 4, 1), UserError);
+  source.out().connect(sink.in(), 4, 1);
   Source<int>& second = bench.source<int>();
-  EXPECT_THROW(second.out.connect(sink.in, 4, 1), UserError);
-  EXPECT_THROW(source.out.connect(bench.sink<int>().in, 4, 1), UserError);
+  EXPECT_THROW(second.out().connect(sink.in(), 4, 1), UserError);
+  EXPECT_THROW(source.out().connect(bench.sink<int>().in(), 4, 1), UserError);
 }
 
 TEST(Link, AStubbedOutputSwallowsAndAStubbedInputStaysEmpty) {
@@ -162,7 +164,7 @@ TEST(Link, AStubbedOutputSwallowsAndAStubbedInputStaysEmpty) {
   for (int i = 0; i < 1000; ++i) source.add(i);
   bench.run();  // stubs both
   EXPECT_TRUE(source.done());
-  EXPECT_EQ(source.out.transferred(), 1000u);
+  EXPECT_EQ(source.out().transferred(), 1000u);
   EXPECT_TRUE(sink.records().empty());
 }
 
@@ -175,7 +177,7 @@ TEST(LinkRecorder, SeesEveryTransferWithItsCycleAndChangesNothing) {
     LinkRecorder<int> recorder;
     LinkOptions options{3, 2};
     if (recorded) options.observers = {&recorder};
-    source.out.connect(sink.in, options);
+    source.out().connect(sink.in(), options);
     for (int i = 0; i < 40; ++i) source.add(i);
     sink.close(5, 17);
     bench.run();
@@ -203,7 +205,7 @@ TEST(LinkRecorder, ChangesNoCycleUnderAnyStalls) {
       LinkRecorder<int> recorder;
       LinkOptions options{static_cast<unsigned>(1 + seed % 4), static_cast<unsigned>(1 + seed % 3)};
       if (recorded) options.observers = {&recorder};
-      source.out.connect(sink.in, options);
+      source.out().connect(sink.in(), options);
       for (int i = 0; i < 60; ++i) source.add(i);
       bench.stall_randomly(seed, 80);
       bench.run();
@@ -221,7 +223,7 @@ TEST(LinkRecorder, OfOtherItemsIsRefused) {
   LinkRecorder<char> recorder;
   LinkOptions options;
   options.observers = {&recorder};
-  EXPECT_THROW(source.out.connect(sink.in, options), UserError);
+  EXPECT_THROW(source.out().connect(sink.in(), options), UserError);
 }
 
 TEST(Link, PassesNoMoreItemsInACycleThanItsRate) {
@@ -231,7 +233,7 @@ TEST(Link, PassesNoMoreItemsInACycleThanItsRate) {
     Sink<int>& sink = bench.sink<int>();
     LinkOptions options{8, 1};
     options.items_per_cycle = rate;
-    source.out.connect(sink.in, options);
+    source.out().connect(sink.in(), options);
     for (int i = 0; i < 30; ++i) source.add(i);
     bench.run();
     ASSERT_EQ(sink.records().size(), 30U);

@@ -19,11 +19,12 @@
 #include <vrpipe/surface.h>
 #include <vrpipe/testkit/sink.h>
 #include <vrpipe/testkit/source.h>
+#include <vrpipe/timed.h>
 #include <vrpipe/unit.h>
 
 namespace vrpipe::testkit {
 
-/// A testbench around one unit at cycle fidelity: sources and sinks by port name, the rest stubbed.
+/// A testbench around one unit, at `cycle` or another fidelity with time: sources and sinks by port name, the rest stubbed.
 ///
 ///     Draw draw;
 ///     draw.width = draw.height = 64;
@@ -40,13 +41,23 @@ namespace vrpipe::testkit {
 ///     bench.run();
 ///     for (const auto& record : warps.records()) { record.cycle; record.item; }
 ///
+/// Bench(Fidelity::lt, "qru", ...) makes the unit's timing model of `lt` and `at` instead, and sources and sinks that speak
+/// its protocol; all else is written once. Where a batch moves in one piece there, the item is another (batch.h):
+/// `source<BinItem>` for `source<QuadBeat>`.
+///
 /// Each Bench has a SystemC context of its own, so that a program can have one after another (not two at a time).
 class Bench {
  public:
   using Settings = std::vector<std::pair<std::string, std::string>>;  ///< parameter and value, as for --set
 
   /// A bench without a unit, for sources and sinks connected to one another or to modules of your own.
-  explicit Bench(std::uint64_t period_ps = 1000) {
+  explicit Bench(std::uint64_t period_ps = 1000) : Bench(Fidelity::cycle, period_ps) {}
+  /// Throws UserError for a fidelity without time.
+  explicit Bench(Fidelity fidelity, std::uint64_t period_ps = 1000) : fidelity_(fidelity) {
+    if (fidelity != Fidelity::lt && fidelity != Fidelity::at && fidelity != Fidelity::cycle) {
+      throw UserError("no testbench", std::string("fidelity ") + name_of(fidelity), "units have no ports there",
+                      "choose lt, at or cycle");
+    }
     fresh_simulation();
     clock_ = std::make_unique<ClockDomain>("clock", period_ps);
   }
@@ -55,7 +66,10 @@ class Bench {
   /// Throws UserError for an unknown slot, implementation, parameter or value.
   Bench(const std::string& slot, const std::string& implementation, const RenderState& state,
         const Settings& settings = {}, unsigned gpcs = 1)
-      : Bench() {
+      : Bench(Fidelity::cycle, slot, implementation, state, settings, gpcs) {}
+  Bench(Fidelity fidelity, const std::string& slot, const std::string& implementation, const RenderState& state,
+        const Settings& settings = {}, unsigned gpcs = 1)
+      : Bench(fidelity) {
     state_ = state;
     const Implementation& found = Registry::instance().find(slot, implementation);
     const std::unique_ptr<ParameterSet> parameters = found.make_parameters();
@@ -66,11 +80,13 @@ class Bench {
       crop->attach(*surface_);
     }
     follow_clock(*behaviour, *clock_);
-    unit_ = unit_maker(slot)(slot, *clock_, std::move(behaviour), state_, gpcs);
+    unit_ = clocked() ? unit_maker(slot)(slot, *clock_, std::move(behaviour), state_, gpcs)
+                      : timed_unit_maker(slot)(slot, *clock_, std::move(behaviour), state_, gpcs, transport());
   }
   Bench(const Bench&) = delete;
   Bench& operator=(const Bench&) = delete;
 
+  Fidelity fidelity() const { return fidelity_; }
   ClockDomain& clock() { return *clock_; }
   Unit& unit() { return *unit_; }
   /// The unit's behaviour as the class that it is, for its counters: behaviour<PairingQru>(). Of a plugin's class, link
@@ -86,21 +102,22 @@ class Bench {
   /// A source connected to an input of the unit, or, without a port's name, to nothing yet.
   template <class Item>
   Source<Item>& source(const std::string& port = "", unsigned depth = 4, unsigned latency = 1) {
-    auto made = std::make_unique<Source<Item>>(sc_core::sc_gen_unique_name("source"), *clock_);
-    Source<Item>& result = *made;
-    if (!port.empty()) result.out.connect(unit_->in(port), depth, latency);
-    keep(std::move(made));
-    return result;
+    const char* const name = sc_core::sc_gen_unique_name("source");
+    Source<Item>& made = clocked()
+                             ? static_cast<Source<Item>&>(keep(std::make_unique<ClockedSource<Item>>(name, *clock_)))
+                             : keep(std::make_unique<TimedSource<Item>>(name, *clock_, transport()));
+    if (!port.empty()) made.out().connect(unit_->in(port), depth, latency);
+    return made;
   }
 
   /// A sink connected to an output of the unit, or to nothing yet.
   template <class Item>
   Sink<Item>& sink(const std::string& port = "", unsigned depth = 4, unsigned latency = 1) {
-    auto made = std::make_unique<Sink<Item>>(sc_core::sc_gen_unique_name("sink"), *clock_);
-    Sink<Item>& result = *made;
-    if (!port.empty()) unit_->out(port).connect(result.in, depth, latency);
-    keep(std::move(made));
-    return result;
+    const char* const name = sc_core::sc_gen_unique_name("sink");
+    Sink<Item>& made = clocked() ? static_cast<Sink<Item>&>(keep(std::make_unique<ClockedSink<Item>>(name, *clock_)))
+                                 : keep(std::make_unique<TimedSink<Item>>(name, *clock_, transport()));
+    if (!port.empty()) unit_->out(port).connect(made.in(), depth, latency);
+    return made;
   }
 
   /// Binds the unit's memory port to a memory of your own; without it, a FixedLatencyMemory is made.
@@ -119,10 +136,11 @@ class Bench {
     stall_seed_ = seed;
     stall_per_256_ = per_256;
   }
-  /// Ticks unit, sources and sinks in a random order.
+  /// Ticks unit, sources and sinks in a random order, which changes nothing at `cycle`.
   void shuffle_ticks(std::uint64_t seed) { tick_seed_ = seed; }
 
-  /// Runs until nothing moves any more; once. Returns the last cycle in which something was asked to move.
+  /// Runs until nothing moves any more; once. Returns the last cycle in which something was asked to move; at `lt` and
+  /// `at` the clock need not come as far as the items.
   /// Throws SimulationFault when that takes more than `limit` cycles.
   Cycle run(Cycle limit = 10'000'000) {
     prepare();
@@ -134,10 +152,15 @@ class Bench {
   }
 
  private:
+  bool clocked() const { return fidelity_ == Fidelity::cycle; }
+  Transport transport() const { return fidelity_ == Fidelity::lt ? Transport::blocking : Transport::non_blocking; }
+
   template <class Owner>
-  void keep(std::unique_ptr<Owner> made) {
-    owners_.push_back(made.get());
+  Owner& keep(std::unique_ptr<Owner> made) {
+    Owner& kept = *made;
+    owners_.push_back(&kept);
     modules_.push_back(std::move(made));
+    return kept;
   }
 
   void prepare() {
@@ -167,6 +190,7 @@ class Bench {
     }
   }
 
+  const Fidelity fidelity_;
   std::unique_ptr<ClockDomain> clock_;
   RenderState state_;
   std::unique_ptr<ColorSurface> surface_;
