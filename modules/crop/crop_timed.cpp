@@ -122,7 +122,12 @@ class TimedCrop : public TimedUnit {
     look_ups_.hold(looked_up.last);
     if (moved_ > 0) moves_.push({looked_up.last, moved_});
 
-    there = std::max(there, out_.last());
+    charge(UnitState::starved, looked_up.first + 1);
+    if (out_.last() > there) {
+      charge(UnitState::memory, there);
+      charge(UnitState::blocked, out_.last());
+      there = out_.last();
+    }
     const Cycle hazard = cost_.forwards ? 0 : hazard_until(warp.tile, warp.position[from]);
     // Moving a sector takes time from blending, from when it moves.
     for (; !moves_.empty() && moves_.front().at <= std::max({there, hazard, blending_.next()}); moves_.pop()) {
@@ -136,7 +141,6 @@ class TimedCrop : public TimedUnit {
       there = hazard;
     }
     const Span blended = blending_.take(there, quads * price_);
-    charge(UnitState::starved, looked_up.first + 1);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
     queue_.take(quads, blended.last);

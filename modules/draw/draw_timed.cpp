@@ -24,8 +24,13 @@ class TimedDraw : public TimedUnit {
   Cycle due() const { return have_ ? due(issued_) : 0; }
 
   Cycle tick(Cycle now) override {
+    if (last_ != nullptr) {
+      if (last_->blocked()) return never;
+      // At `at` it is known only now when what waited was taken.
+      charge(UnitState::blocked, last_->last());
+      charge(UnitState::busy, last_->last() + 1);
+    }
     if (idle()) return never;
-    if (last_ != nullptr && last_->blocked()) return never;
     const Cycle at = std::max(due(), last_ == nullptr ? 0 : last_->last() + 1);
     if (at > now) return at;
     TimedOut<VertexWarp>& out = *outs_[turn_];

@@ -100,6 +100,7 @@ class TimedProp : public TimedUnit {
     const ShadedWarp& warp = *next.warp;
     const WarpRelease release{warp.slot};
     color_.hold(out_color_.last());
+    charge(UnitState::blocked, out_color_.last());
     Cycle left = 0;
     if (warp.count > 0) {
       const Span at = color_.take(next.from, warp.count * cost_.color_rate.cycles);

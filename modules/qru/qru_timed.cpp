@@ -47,14 +47,15 @@ class TimedQru : public TimedUnit {
 
   Span examine(const BinItem& item, Span visible) {
     go_to(std::max(visible.first, out_.last() + 1));
+    charge(UnitState::blocked, out_.last());
     charge(UnitState::starved, cycle_);
     const Cycle begin = cycle_;
     left_ = cycle_;
     if (item.end_of_draw) {
-      warp_.end_of_draw = true;
-      numbering_.number_end(warp_);
-      launch(warp_);
-      warp_.end_of_draw = false;
+      Warp end;
+      end.end_of_draw = true;
+      numbering_.number_end(end);
+      launch(end);
       return {begin, left_};
     }
     const std::vector<Quad>& quads = item.storage->flush.quads;

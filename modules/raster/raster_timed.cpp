@@ -26,6 +26,7 @@ class TimedRaster : public TimedUnit {
  private:
   Cycle rasterize(const RasterJob& job, Cycle visible) {
     now_ = std::max({now_, visible, out_.last()});
+    charge(UnitState::blocked, out_.last());
     charge(UnitState::starved, now_);
     if (job.end_of_draw) {
       QuadBeat end;

@@ -26,6 +26,7 @@ class TimedTgc : public TimedUnit {
 
  private:
   Cycle enter_bins(const PrimitiveItem& item, Cycle visible) {
+    charge(UnitState::blocked, out_.last());
     behaviour_->begin(item.primitive);
     if (!behaviour_->entering()) return visible;
     const Cycle first = step(visible);

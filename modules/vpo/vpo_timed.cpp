@@ -43,7 +43,10 @@ class TimedVpo : public TimedUnit {
 
   Cycle assemble(const VertexWarp& warp, Cycle visible) {
     turn_ = turn_ + 1 == gpcs_ ? 0 : turn_ + 1;
-    for (const auto& out : outs_) lane_.hold(out->last());
+    for (const auto& out : outs_) {
+      lane_.hold(out->last());
+      charge(UnitState::blocked, out->last());
+    }
     if (warp.end_of_draw) {
       // The GPCs' ends follow one another; the first stands for all, since no warp comes after it.
       const Cycle at = lane_.take(visible);

@@ -50,6 +50,7 @@ class TimedZrop : public TimedUnit {
   Span test(const BinItem& incoming, Span visible) {
     BinItem item = incoming;
     tests_.hold(out_.last());
+    charge(UnitState::blocked, out_.last());
     if (item.end_of_draw) {
       const Cycle at = tests_.take(visible.first);
       const Cycle taken = out_.send(item, at).first;
