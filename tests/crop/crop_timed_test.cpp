@@ -1,0 +1,310 @@
+// CROP at lt and at, where a warp goes in one piece; what has one closed form at every fidelity is compared with cycle by
+// it.
+#include <gtest/gtest.h>
+
+#include "support/fidelities.h"
+
+namespace vrpipe {
+namespace {
+
+using testkit::Bench;
+using testkit::Sink;
+using testkit::Source;
+
+/// CROP with a source of warps and a memory around it.
+struct CropBench {
+  /// `latency`: of a fill, in cycles, at least 2. `depth`: of less than eight, since deeper queues are served up to so many
+  /// cycles late at `at`, and the first access goes through the memory's socket, which knows no past.
+  CropBench(Fidelity fidelity, const RenderState& state, const Bench::Settings& settings = {}, unsigned latency = 100,
+            unsigned depth = 7, unsigned signal_depth = 64)
+      : bench(fidelity, "crop", "color-rop", state, settings),
+        memory("memory", bench.clock(), latency - 1, 4096, 1),  // the last cycle moves the bytes
+        signals(bench.sink<TerminationBeat>("out_terminations", signal_depth)),
+        width(static_cast<unsigned>(64 / (4 * bytes_per_pixel(state.format)))) {
+    bench.bind_memory(memory.port(0));
+    if (fidelity == Fidelity::cycle) {
+      beats = &bench.source<ColorBeat>("in_color", depth);
+      beats->set_rate(1);
+    } else {
+      items = &bench.source<ShadedWarpItem>("in_color", depth);
+    }
+  }
+
+  /// Adds a quad to the warp in hand, which goes when it is full.
+  void quad(TileId tile, unsigned position, float alpha = 0.01F, LaneMask live = all_lanes, Cycle earliest = 0) {
+    if (warp != nullptr && warp->tile != tile) flush(earliest);
+    if (warp == nullptr) {
+      warp = &pool.take();
+      ++taken;
+      warp->tile = tile;
+      warp->count = 0;
+      warp->end_of_draw = false;
+    }
+    const unsigned i = warp->count++;
+    warp->position[i] = static_cast<std::uint8_t>(position);
+    warp->live[i] = live;
+    warp->first_primitive[i] = warp->last_primitive[i] = next_primitive++;
+    warp->color[i] = testing::color_of(alpha, alpha, alpha, alpha);
+    if (warp->count == quads_per_warp) flush(earliest);
+  }
+  /// Sends the warp in hand, as many quads a cycle as the format lets PROP hand on.
+  void flush(Cycle earliest = 0) {
+    if (warp == nullptr) return;
+    const unsigned cycles = (warp->count + width - 1) / width;
+    if (items != nullptr) items->add({warp}, {earliest, earliest + cycles - 1}, cycles);
+    for (unsigned i = 0; beats != nullptr && i < warp->count;) {
+      ColorBeat beat;
+      while (i < warp->count && beat.count < width) beat.quads[beat.count++] = {warp, i++};
+      beats->add(beat, earliest);
+    }
+    warp = nullptr;
+  }
+  /// The cycles of the draw, `never` if it did not end.
+  Cycle run() {
+    flush();
+    end_mark.end_of_draw = true;
+    ColorBeat last;
+    last.end_of_draw = true;
+    if (items != nullptr) items->add({&end_mark});
+    if (beats != nullptr) beats->add(last);
+    bench.run();
+    return bench.unit().end_of_draw();
+  }
+
+  Bench bench;
+  FixedLatencyMemory memory;
+  Sink<TerminationBeat>& signals;
+  Source<ShadedWarpItem>* items = nullptr;
+  Source<ColorBeat>* beats = nullptr;
+  const unsigned width;
+  ShadedWarp* warp = nullptr;  ///< in hand
+  ShadedWarp end_mark;
+  ShadedWarpPool pool;
+  unsigned taken = 0;  ///< warps, from the pool
+  std::uint32_t next_primitive = 0;
+};
+
+class CropTimedTest : public ::testing::TestWithParam<Fidelity> {
+ protected:
+  CropTimedTest() : draw(testing::draw_of(1024, 1024)), state(testing::state_of(draw)) {}
+  Draw draw;
+  RenderState state;
+};
+
+INSTANTIATE_TEST_SUITE_P(Fidelities, CropTimedTest, ::testing::ValuesIn(testing::fidelities_with_time()),
+                         testing::name_of_fidelity);
+
+TEST_P(CropTimedTest, ResidentQuadsBlendAtTheRateOfTheFormat) {
+  const std::pair<ColorFormat, unsigned> formats[] = {{ColorFormat::rgba8, 4},
+                                                      {ColorFormat::rgba16f, 2},
+                                                      {ColorFormat::rgba32f, 1}};
+  for (const auto& [format, rate] : formats) {
+    state.format = format;
+    CropBench crop(GetParam(), state, {{"latency_cycles", "8"}});
+    for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i % 2 + 8 * (i / 2 % 2));
+    for (unsigned i = 0; i < 400; ++i) crop.quad({0, 0}, i % 2 + 8 * (i / 2 % 2), 0.01F, 0b0110, 1000);
+    // In hand and in the queue from 1001 on, blended from 1002 on; 8 cycles of latency behind the last.
+    EXPECT_EQ(crop.run(), 1001 + 400 / rate + 8) << name_of(format);
+    EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::blend), 408.0 / rate);
+    EXPECT_EQ(testing::charged(crop.bench.unit(), UnitState::busy, crop.bench.unit().end_of_draw()), 408 / rate);
+  }
+}
+
+TEST_P(CropTimedTest, AMissWaitsForTheMemoryAndAHitDoesNot) {
+  CropBench crop(GetParam(), state, {{"latency_cycles", "8"}, {"sectors_per_cycle", "8"}}, 100);
+  crop.quad({0, 0}, 0);
+  crop.flush();
+  // In hand at 1, its sector asked for at 1, there at 101, blended then.
+  EXPECT_EQ(crop.run(), 101U + 8);
+  EXPECT_EQ(crop.memory.bytes(), 32U);
+  EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::sectors), 1.0 / 8) << "one of eight in a cycle";
+  EXPECT_EQ(testing::charged(crop.bench.unit(), UnitState::memory, 109), 99U) << "cycles 2 to 100";
+}
+
+TEST_P(CropTimedTest, FillsOfAWarpAndOfThoseBehindItOverlap) {
+  CropBench crop(GetParam(), state, {{"latency_cycles", "8"}, {"sectors_per_cycle", "8"}}, 100);
+  for (unsigned i = 0; i < 64; ++i) crop.quad({0, 0}, i);
+  // One latency, 32 cycles of blending and 8 of moving sectors. A warp is blended once the sectors of all its quads are
+  // there, which it asks for in its last cycle.
+  const Cycle least = 101 + 32 - 1 + 8;
+  const Cycle end = crop.run();
+  EXPECT_GE(end, least);
+  EXPECT_LE(end, least + 8 + (GetParam() == Fidelity::cycle ? 0 : 3));
+  EXPECT_EQ(crop.memory.bytes(), 64U * 32);
+}
+
+TEST_P(CropTimedTest, QuadsInTheSameSectorAskForItOnce) {
+  CropBench crop(GetParam(), state);
+  for (unsigned i = 0; i < 20; ++i) crop.quad({0, 0}, 5);
+  crop.run();
+  EXPECT_EQ(crop.memory.bytes(), 32U);
+}
+
+TEST_P(CropTimedTest, MovingSectorsTakesCyclesFromBlending) {
+  CropBench crop(GetParam(), state, {{"sectors_per_cycle", "8"}, {"cache_bytes", "1048576"}}, 20);
+  for (std::uint16_t tile = 0; tile < 64; ++tile) {
+    for (unsigned i = 0; i < 64; ++i) crop.quad({tile, 0}, i);
+  }
+  const auto cycles = static_cast<double>(crop.run());
+  EXPECT_NEAR(cycles, 4096 / 2.0 + 4096 / 8.0, 40) << "each quad has a sector of its own";
+  EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::blend), 2048);
+  EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::sectors), 512);
+}
+
+TEST_P(CropTimedTest, NoMoreFillsAreInFlightThanItHasMissRegisters) {
+  for (const unsigned mshrs : {1U, 2U, 4U, 8U}) {
+    CropBench crop(GetParam(), state, {{"mshrs", std::to_string(mshrs)}, {"latency_cycles", "8"}}, 100);
+    for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i);
+    // A round of the memory for each so many sectors, each from the cycle in which the one before is complete; the first
+    // begins in cycles 1 to 4 as the quads come, two a cycle.
+    const Cycle end = crop.run();
+    EXPECT_GE(end, 1 + 8 / mshrs * 100 + 8) << mshrs;
+    EXPECT_LE(end, 4 + 8 / mshrs * 100 + 1 + 8) << mshrs;
+  }
+}
+
+// case B10
+TEST_P(CropTimedTest, WithoutForwardingAQuadWaitsForTheOneBeforeAtItsPosition) {
+  for (const bool forwarding : {true, false}) {
+    CropBench crop(GetParam(), state, {{"forwarding", forwarding ? "on" : "off"}, {"latency_cycles", "8"}});
+    crop.quad({0, 0}, 0);
+    crop.flush();
+    for (unsigned i = 0; i < 96; ++i) crop.quad({0, 0}, 0, 0.01F, all_lanes, 1000);
+    EXPECT_EQ(crop.run(), forwarding ? 1001U + 48 + 8 : 1002U + 95 * 8 + 8);
+    // Of the 8 cycles from a quad to the next, 7 and the half that the quad leaves.
+    const double wasted = testing::occupied(crop.bench.unit(), CropWork::forwarding);
+    EXPECT_DOUBLE_EQ(wasted, forwarding ? 0 : 95 * 7.5);
+  }
+}
+
+// case B10
+TEST_P(CropTimedTest, WithoutForwardingOtherPositionsDoNotWait) {
+  CropBench crop(GetParam(), state, {{"forwarding", "off"}, {"latency_cycles", "8"}});
+  for (unsigned i = 0; i < 64; ++i) crop.quad({0, 0}, i);
+  for (unsigned i = 0; i < 256; ++i) crop.quad({0, 0}, i % 64, 0.01F, all_lanes, 1000);
+  EXPECT_EQ(crop.run(), 1001U + 128 + 8);
+}
+
+TEST_P(CropTimedTest, ATerminationIsSeenTheLatencyAfterItsBlend) {
+  state.early_termination = true;
+  for (const unsigned latency : {1U, 8U}) {
+    CropBench crop(GetParam(), state, {{"latency_cycles", std::to_string(latency)}});
+    crop.quad({2, 1}, 9, 0.5F);
+    crop.flush();
+    crop.quad({2, 1}, 9, 0.999F, 0b0101, 1000);
+    crop.flush(1000);
+    crop.run();
+    ASSERT_EQ(crop.signals.records().size(), 1U);
+    EXPECT_EQ(crop.signals.records()[0].cycle, 1002U + latency);
+    const TerminationBeat& beat = crop.signals.records()[0].item;
+    ASSERT_EQ(beat.count, 1);
+    EXPECT_EQ(beat.signals[0].tile, (TileId{2, 1}));
+    EXPECT_EQ(beat.signals[0].position, 9);
+    EXPECT_EQ(beat.signals[0].pixels, 0b0101);
+  }
+}
+
+TEST_P(CropTimedTest, TheSignalsOfAWarpComeNoLaterThanTheLatencyAfterItsLastBlend) {
+  state.early_termination = true;
+  CropBench crop(GetParam(), state, {{"latency_cycles", "8"}});
+  for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i, 0.5F);
+  for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i, 0.999F, all_lanes, 1000);
+  crop.run();
+  // Blended in cycles 1002 to 1005, two a cycle; at lt and at the signals of four quads go together.
+  std::vector<unsigned> positions;
+  for (const auto& record : crop.signals.records()) {
+    EXPECT_GE(record.cycle, 1002U + 8);
+    EXPECT_LE(record.cycle, 1005U + 8);
+    for (unsigned i = 0; i < record.item.count; ++i) positions.push_back(record.item.signals[i].position);
+  }
+  EXPECT_EQ(crop.signals.records().back().cycle, 1005U + 8);
+  EXPECT_EQ(positions, testing::numbers(8));
+}
+
+TEST_P(CropTimedTest, SignalsThatNobodyTakesStopTheBlending) {
+  state.early_termination = true;
+  CropBench crop(GetParam(), state, {{"latency_cycles", "1"}}, 2, 8, 1);
+  crop.signals.close(0, 500);
+  for (unsigned i = 0; i < 8; ++i) {
+    crop.quad({0, 0}, i, 0.999F);
+    crop.flush();
+  }
+  crop.run();
+  std::size_t received = 0;
+  for (const auto& record : crop.signals.records()) received += record.item.count;
+  EXPECT_EQ(received, 8U);
+  EXPECT_GT(testing::charged(crop.bench.unit(), UnitState::blocked, crop.bench.unit().end_of_draw()), 400U);
+}
+
+// case T05
+TEST_P(CropTimedTest, AnEmptyDrawEndsWithItsMark) {
+  CropBench crop(GetParam(), state);
+  EXPECT_EQ(crop.run(), 1U);
+}
+
+TEST_P(CropTimedTest, DirtySectorsAreWrittenBackWhenTheirLineGoesAndCleanOnesAreNot) {
+  for (const bool changes : {true, false}) {
+    CropBench crop(GetParam(), state, {{"cache_bytes", "1024"}}, 10);  // 8 lines, 32 quads
+    for (std::uint16_t tile = 0; tile < 4; ++tile) {
+      for (unsigned i = 0; i < 64; ++i) crop.quad({tile, 0}, i, changes ? 0.5F : 0.0F);
+    }
+    crop.run();
+    const std::uint64_t written = changes ? (256U - 32) * 32 : 0;  // the last 8 lines stay
+    EXPECT_EQ(crop.memory.bytes(), 256U * 32 + written);
+  }
+}
+
+TEST_P(CropTimedTest, ALineIsNotReplacedBeforeItsQuadsAreBlended) {
+  // One line, memory of 100 cycles: every second warp needs another, and a fill can only begin once the quads before are
+  // blended.
+  CropBench crop(GetParam(), state, {{"cache_bytes", "128"}, {"latency_cycles", "8"}}, 100);
+  for (std::uint16_t i = 0; i < 6; ++i) {
+    crop.quad({static_cast<std::uint16_t>(i % 2), 0}, 0);
+    crop.flush();
+  }
+  // Asked for at 1, blended at 101, the next asked for in that cycle or the next.
+  const Cycle end = crop.run();
+  EXPECT_GE(end, 1 + 6 * 100 + 8U);
+  EXPECT_LE(end, 1 + 6 * 102 + 8U);
+}
+
+TEST_P(CropTimedTest, ImageAndSignalsAreThoseOfCycleUnderAnyStallsAndMemory) {
+  state.early_termination = true;
+  state.termination = Termination::strict;
+  std::vector<float> expected;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    // What is to come out is what cycle makes of it undisturbed.
+    CropBench crop(seed == 0 ? Fidelity::cycle : GetParam(), state,
+                   {{"cache_bytes", seed % 2 == 0 ? "1024" : "16384"},
+                    {"mshrs", seed % 3 == 0 ? "2" : "16"},
+                    {"input_quads", seed % 5 == 0 ? "1" : "64"}},
+                   static_cast<unsigned>(2 + seed * 7 % 300), static_cast<unsigned>(1 + seed % 10),
+                   static_cast<unsigned>(1 + seed % 9));
+    for (std::uint64_t i = 0; i < 600; ++i) {
+      crop.quad({static_cast<std::uint16_t>(mix(i / 5) % 3), 0}, static_cast<unsigned>(mix(i + 999) % 64),
+                testing::uniform(4, i, 0.2F, 0.95F), static_cast<LaneMask>(1 + mix(i + 5) % 15));
+    }
+    if (seed > 0) crop.bench.stall_randomly(seed, 90);
+    ASSERT_NE(crop.run(), never) << seed;
+    std::vector<float> got;
+    unsigned pixels = 0;
+    for (const auto& record : crop.signals.records()) {
+      for (unsigned i = 0; i < record.item.count; ++i) pixels += popcount(record.item.signals[i].pixels);
+    }
+    unsigned terminated = 0;
+    for (std::uint32_t y = 0; y < 16; ++y) {
+      for (std::uint32_t x = 0; x < 48; ++x) {
+        const auto pixel = crop.bench.surface().pixel(x, y);
+        got.insert(got.end(), pixel.begin(), pixel.end());
+        terminated += pixel[3] >= 0.996F;
+      }
+    }
+    ASSERT_EQ(pixels, terminated) << seed;
+    if (seed == 0) expected = got;
+    ASSERT_EQ(got, expected) << seed;
+    ASSERT_TRUE(crop.bench.unit().idle()) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe

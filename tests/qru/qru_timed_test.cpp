@@ -1,0 +1,230 @@
+// QRU at lt and at, where a bin comes in one piece, compared with cycle, where it comes beat by beat.
+#include <gtest/gtest.h>
+
+#include "support/fidelities.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::Bins;
+using testing::cycles_of;
+using testkit::Bench;
+using testkit::Sink;
+using testkit::Source;
+
+const std::vector<unsigned> four_pairs{1, 1, 2, 2, 3, 3, 4, 4};
+
+class QruTimedTest : public ::testing::TestWithParam<Fidelity> {
+ protected:
+  QruTimedTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) {}
+
+  /// So many quads that pair as they come: a warp every eight.
+  BinItem pairs(unsigned quads, TileId tile = {0, 0}) {
+    std::vector<unsigned> positions;
+    for (unsigned i = 0; i < quads; ++i) positions.push_back(four_pairs[i % 8]);
+    return bins.at(tile, positions);
+  }
+
+  Draw draw;
+  RenderState state;
+  Bins bins;
+};
+
+INSTANTIATE_TEST_SUITE_P(Fidelities, QruTimedTest, ::testing::ValuesIn(testing::timed_fidelities()),
+                         testing::name_of_fidelity);
+
+TEST_P(QruTimedTest, AWarpIsSeenTheLatencyAfterItsLastQuad) {
+  for (const unsigned latency : {1U, 6U}) {
+    Bench bench(GetParam(), "qru", "pairing", state, {{"latency_cycles", std::to_string(latency)}});
+    Source<BinItem>& in = bench.source<BinItem>("in_quads");
+    Sink<Warp>& out = bench.sink<Warp>("out_warps");
+    in.add(pairs(8), 10);
+    bench.run();
+    EXPECT_EQ(cycles_of(out), (std::vector<Cycle>{11 + latency}));
+    EXPECT_EQ(out.records().at(0).item.merge_pairs, 0b1111);
+  }
+}
+
+TEST_P(QruTimedTest, ExaminesItsQuadsPerCycle) {
+  for (const unsigned rate : {1U, 2U, 4U, 8U}) {
+    Bench bench(GetParam(), "qru", "pairing", state,
+                {{"quads_per_cycle", std::to_string(rate)}, {"latency_cycles", "4"}});
+    Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
+    Sink<Warp>& out = bench.sink<Warp>("out_warps", 64);
+    in.add(pairs(128));
+    bench.run();
+    ASSERT_EQ(out.records().size(), 16U);
+    for (std::size_t n = 0; n < 16; ++n) EXPECT_EQ(out.records()[n].cycle, (n + 1) * 8 / rate + 4) << rate;
+    // Of the 8 / rate cycles of a warp the last launches it.
+    EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), QruWork::launches), 16);
+    EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), QruWork::quads), 16.0 * (8.0 / rate - 1));
+  }
+}
+
+TEST_P(QruTimedTest, ALaunchEndsACycleHoweverManyQuadsItMayExamine) {
+  Bench bench(GetParam(), "qru", "pairing", state, {{"quads_per_cycle", "16"}, {"latency_cycles", "4"}});
+  Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
+  Sink<Warp>& out = bench.sink<Warp>("out_warps", 64);
+  in.add(pairs(128));
+  bench.run();
+  ASSERT_EQ(out.records().size(), 16U);
+  for (std::size_t n = 0; n < 16; ++n) EXPECT_EQ(out.records()[n].cycle, 1 + n + 4);
+}
+
+TEST_P(QruTimedTest, ABinWhosePartsComeLateIsExaminedAsTheyCome) {
+  Bench bench(GetParam(), "qru", "pairing", state, {{"quads_per_cycle", "8"}, {"latency_cycles", "4"}});
+  Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
+  Sink<Warp>& out = bench.sink<Warp>("out_warps", 64);
+  in.add(pairs(32), {10, 41}, 4);
+  bench.run();
+  ASSERT_EQ(out.records().size(), 4U);
+  // Taken for a quad a cycle from 11 on; those of a warp are examined at once, when the first of them is there.
+  for (std::size_t n = 0; n < 4; ++n) EXPECT_EQ(out.records()[n].cycle, 11 + 8 * n + 4);
+}
+
+TEST_P(QruTimedTest, LeftOversOfABinGoOneACycleBeforeTheNext) {
+  Bench bench(GetParam(), "qru", "pairing", state, {{"quads_per_cycle", "8"}, {"latency_cycles", "1"}});
+  Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
+  Sink<Warp>& out = bench.sink<Warp>("out_warps", 64);
+  in.add(bins.at({0, 0}, testing::numbers(32)), {0, 3}, 4);  // none pairs
+  in.add(bins.at({1, 0}, testing::numbers(8), 100));
+  bench.run();
+  ASSERT_EQ(out.records().size(), 5U);
+  // Examined in cycles 1 to 4; in the last of them nothing more comes, so that the first goes in it.
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(out.records()[i].cycle, 4 + i + 1);
+    EXPECT_EQ(out.records()[i].item.tile, (TileId{0, 0}));
+  }
+  EXPECT_EQ(out.records()[4].item.tile, (TileId{1, 0}));
+  EXPECT_EQ(out.records()[4].cycle, out.records()[3].cycle + 1);
+}
+
+TEST_P(QruTimedTest, TheEndCarriesTheNumberOfWarpsAndBinsGoBackToTc) {
+  for (const char* implementation : {"pairing", "pass-through"}) {
+    Bench bench(GetParam(), "qru", implementation, state);
+    Source<BinItem>& in = bench.source<BinItem>("in_quads");
+    Sink<Warp>& out = bench.sink<Warp>("out_warps");
+    std::vector<BinItem> all;
+    for (unsigned i = 0; i < 7; ++i) all.push_back(bins.at({0, 0}, testing::numbers(8), 8 * i));
+    for (const BinItem& bin : all) in.add(bin);
+    in.add(Bins::end());
+    bench.run();
+    ASSERT_EQ(out.records().size(), 8U);
+    EXPECT_TRUE(out.records()[7].item.end_of_draw);
+    EXPECT_EQ(out.records()[7].item.sequence, 7U);
+    for (const BinItem& bin : all) EXPECT_FALSE(bin.storage->in_use);
+    EXPECT_TRUE(bench.unit().idle());
+  }
+}
+
+// case M13
+TEST_P(QruTimedTest, ABinThatDiedInTheTestsLaunchesNothing) {
+  Bench bench(GetParam(), "qru", "pairing", state);
+  Source<BinItem>& in = bench.source<BinItem>("in_quads");
+  Sink<Warp>& out = bench.sink<Warp>("out_warps");
+  in.add(bins.of({0, 0}, {}));
+  in.add(Bins::end());
+  bench.run();
+  ASSERT_EQ(out.records().size(), 1U);
+  EXPECT_EQ(out.records()[0].item.sequence, 0U);
+}
+
+TEST_P(QruTimedTest, ABlockedReceiverStopsItUntilACycleAfterItTakes) {
+  Bench bench(GetParam(), "qru", "pairing", state, {{"quads_per_cycle", "8"}, {"latency_cycles", "1"}});
+  Source<BinItem>& in = bench.source<BinItem>("in_quads", 16);
+  Sink<Warp>& out = bench.sink<Warp>("out_warps", 1);
+  for (unsigned i = 0; i < 3; ++i) in.add(pairs(8));
+  in.add(Bins::end(), 100);
+  out.close(0, 40);
+  bench.run();
+  EXPECT_EQ(cycles_of(out), (std::vector<Cycle>{40, 42, 44, 102}));
+  // Cycles 2 to 40, and 42; at `at` the cycle in which the warp that waits was launched is work.
+  const std::uint64_t busy = GetParam() == Fidelity::at ? 1 : 0;
+  EXPECT_EQ(testing::charged(bench.unit(), UnitState::blocked, 102), 40 - busy);
+}
+
+/// Numbers, pairs and quads of all warps, in the order of their launch.
+std::vector<std::uint32_t> contents(const Sink<Warp>& sink) {
+  std::vector<std::uint32_t> all;
+  for (const auto& record : sink.records()) {
+    const Warp& warp = record.item;
+    all.insert(all.end(), {warp.sequence, warp.tile_sequence, warp.merge_pairs, warp.tile.x, warp.end_of_draw});
+    for (unsigned i = 0; i < warp.count; ++i) all.push_back(warp.quads[i].splat);
+  }
+  return all;
+}
+
+/// Bins of 0 to 79 quads, some of which pair, for a QRU of any fidelity.
+class ManyBins {
+ public:
+  ManyBins() {
+    for (std::uint64_t bin = 0; bin < positions_.size(); ++bin) {
+      for (std::uint64_t q = 0; q < mix(bin) % 80; ++q)
+        positions_[bin].push_back(static_cast<unsigned>(mix(200 * bin + q) % 30));
+    }
+  }
+  void add_to(Source<QuadBeat>& in) const {
+    in.set_rate(1);
+    for (std::size_t bin = 0; bin < positions_.size(); ++bin) {
+      const std::size_t quads = positions_[bin].size();
+      for (std::size_t from = 0; from == 0 || from < quads; from += 16) {
+        const std::size_t to = std::min(from + 16, quads);
+        const std::vector<unsigned> part(&positions_[bin][from], &positions_[bin][to]);
+        in.add(testing::beat_of(tile_of(bin), part, static_cast<std::uint32_t>(1000 * bin + from), to == quads));
+      }
+    }
+    in.add(testing::end_beat());
+  }
+  void add_to(Source<BinItem>& in, Bins& bins) const {
+    for (std::size_t bin = 0; bin < positions_.size(); ++bin) {
+      const auto beats = static_cast<unsigned>(std::max<std::size_t>((positions_[bin].size() + 15) / 16, 1));
+      in.add(bins.at(tile_of(bin), positions_[bin], static_cast<std::uint32_t>(1000 * bin)), {0, beats - 1}, beats);
+    }
+    in.add(Bins::end());
+  }
+
+ private:
+  static TileId tile_of(std::size_t bin) { return {static_cast<std::uint16_t>(bin / 5), 0}; }
+  std::vector<std::vector<unsigned>> positions_ = std::vector<std::vector<unsigned>>(20);
+};
+
+TEST_P(QruTimedTest, WithRoomToSpareWarpsLeaveWhenTheyDoAtCycle) {
+  for (const char* implementation : {"pairing", "pass-through"}) {
+    Bench cycle("qru", implementation, state);
+    ManyBins().add_to(cycle.source<QuadBeat>("in_quads", 128));
+    const Sink<Warp>& expected = cycle.sink<Warp>("out_warps", 256);
+    cycle.run();
+    const std::vector<Cycle> cycles = cycles_of(expected);
+    Bench bench(GetParam(), "qru", implementation, state);
+    ManyBins().add_to(bench.source<BinItem>("in_quads", 128), bins);
+    const Sink<Warp>& out = bench.sink<Warp>("out_warps", 256);
+    bench.run();
+    EXPECT_EQ(cycles_of(out), cycles) << implementation;
+  }
+}
+
+TEST_P(QruTimedTest, WarpsAreThoseOfCycleUnderAnyStalls) {
+  for (const char* implementation : {"pairing", "pass-through"}) {
+    std::vector<std::uint32_t> expected;
+    {
+      Bench cycle("qru", implementation, state);
+      ManyBins().add_to(cycle.source<QuadBeat>("in_quads"));
+      const Sink<Warp>& out = cycle.sink<Warp>("out_warps");
+      cycle.run();
+      expected = contents(out);
+    }
+    for (std::uint64_t seed = 0; seed < 100; ++seed) {
+      Bench bench(GetParam(), "qru", implementation, state);
+      Source<BinItem>& in = bench.source<BinItem>("in_quads", static_cast<unsigned>(1 + seed % 10));
+      Sink<Warp>& out = bench.sink<Warp>("out_warps", static_cast<unsigned>(1 + seed % 9));
+      ManyBins().add_to(in, bins);
+      bench.stall_randomly(seed, seed == 0 ? 0 : 100);
+      bench.run();
+      ASSERT_EQ(contents(out), expected) << seed;
+      ASSERT_TRUE(bench.unit().idle()) << seed;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe

@@ -1,0 +1,224 @@
+// RASTER at lt and at; what has one closed form at every fidelity is compared with cycle by it. At lt and at a raster
+// tile goes in one piece, in the cycle of its last quad.
+#include <gtest/gtest.h>
+
+#include <vrpipe/geometry.h>
+
+#include "support/fidelities.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::cycles_of;
+using testkit::Bench;
+using testkit::Sink;
+using testkit::Source;
+
+class RasterTimedTest : public ::testing::TestWithParam<Fidelity> {
+ protected:
+  RasterTimedTest() : draw(testing::draw_of(128, 128)), state(testing::state_of(draw)) { state.obb_padding = 0; }
+
+  /// The jobs of all triangles of the draw, unclipped.
+  std::vector<RasterJob> jobs() const {
+    std::vector<RasterJob> all;
+    for (std::uint32_t splat = 0; splat < draw.splats.size(); ++splat) {
+      for (unsigned triangle = 0; triangle < triangles_per_splat(draw); ++triangle) {
+        SnappedTriangle snapped;
+        if (!snap_triangle(state, splat, triangle, snapped) || doubled_area(snapped) == 0) continue;
+        RasterJob job;
+        job.primitive.splat = splat;
+        job.primitive.triangle = static_cast<std::uint8_t>(triangle);
+        job.primitive.bounds = covered_bounds(snapped, state.subpixel_bits, draw.width, draw.height);
+        job.clip = job.primitive.bounds;
+        if (!job.primitive.bounds.empty()) all.push_back(job);
+      }
+    }
+    return all;
+  }
+  void add_triangle(const ScreenTriangle& triangle) {
+    draw.triangles.push_back(triangle);
+    draw.splats.emplace_back();
+  }
+  /// A triangle that covers the whole image: 4096 quads in 256 raster tiles.
+  void add_full() { add_triangle({{-1, 300, -1}, {-1, -1, 300}}); }
+  void add_one_quad(float x) { add_triangle(testing::one_quad_triangle(x, 4)); }
+
+  Draw draw;
+  RenderState state;
+};
+
+INSTANTIATE_TEST_SUITE_P(Fidelities, RasterTimedTest, ::testing::ValuesIn(testing::fidelities_with_time()),
+                         testing::name_of_fidelity);
+
+RasterJob end_of_draw() {
+  RasterJob job;
+  job.end_of_draw = true;
+  return job;
+}
+
+std::uint64_t quads_in(const Sink<QuadBeat>& sink) {
+  std::uint64_t quads = 0;
+  for (const auto& record : sink.records()) quads += record.item.count;
+  return quads;
+}
+
+TEST_P(RasterTimedTest, TheFirstQuadIsSeenTheSetUpLatencyAfterTheJob) {
+  add_one_quad(4);
+  for (const unsigned latency : {1U, 10U}) {
+    Bench bench(GetParam(), "raster", "tile-rasterizer", state, {{"setup_latency_cycles", std::to_string(latency)}});
+    Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+    Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads");
+    in.add(jobs()[0], 10);
+    bench.run();
+    EXPECT_EQ(cycles_of(out), (std::vector<Cycle>{11 + latency})) << "in hand at 11";
+  }
+}
+
+TEST_P(RasterTimedTest, HandsOverItsQuadsPerCycle) {
+  add_full();
+  for (const unsigned rate : {1U, 3U, 4U, 8U, 16U}) {
+    Bench bench(GetParam(), "raster", "tile-rasterizer", state,
+                {{"quads_per_cycle", std::to_string(rate)},
+                 {"setup_latency_cycles", "10"},
+                 {"coarse_tiles_per_cycle", "64"}});
+    Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+    Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 64);
+    in.add(jobs()[0]);
+    bench.run();
+    EXPECT_EQ(quads_in(out), 4096U);
+    EXPECT_EQ(out.records().back().cycle, (4096 + rate - 1) / rate + 10) << "from cycle 1 on, rate " << rate;
+    EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::quads), 4096.0 / rate);
+    EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::setup), 1);
+  }
+}
+
+TEST_P(RasterTimedTest, MakesItsFineTilesPerCycle) {
+  // Raster tiles of few quads each: a triangle a pixel high over 16 of them, in 8 screen tiles, one of which begins in a
+  // cycle.
+  add_triangle({{-1, 200, -1}, {3.9F, 4.6F, 5.3F}});
+  for (const unsigned rate : {1U, 2U}) {
+    Bench bench(GetParam(), "raster", "tile-rasterizer", state,
+                {{"fine_tiles_per_cycle", std::to_string(rate)}, {"coarse_tiles_per_cycle", "64"}});
+    Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+    Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 64);
+    in.add(jobs()[0]);
+    bench.run();
+    const std::size_t tiles = out.records().size();
+    EXPECT_GE(tiles, 14U);
+    EXPECT_EQ(out.records().back().cycle - out.records().front().cycle, (tiles - 1) / rate);
+  }
+}
+
+TEST_P(RasterTimedTest, PrimitiveAndScreenTilePairsComeAtTheirInterval) {
+  for (float x = 0; x < 128; x += 16) add_one_quad(x + 4);
+  Bench bench(GetParam(), "raster", "tile-rasterizer", state,
+              {{"screen_tile_interval_cycles", "5"}, {"setup_latency_cycles", "10"}});
+  Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", 16);
+  Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 16);
+  for (const RasterJob& job : jobs()) in.add(job);
+  bench.run();
+  ASSERT_EQ(out.records().size(), 8U);
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(out.records()[i].cycle, 1 + 5 * i + 10);
+  EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::pairs), 8 * 5);
+}
+
+TEST_P(RasterTimedTest, SetUpsComeAtTheirInterval) {
+  for (int i = 0; i < 8; ++i) add_one_quad(4);
+  Bench bench(GetParam(), "raster", "tile-rasterizer", state,
+              {{"setup_interval_cycles", "7"}, {"setup_latency_cycles", "10"}});
+  Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", 16);
+  Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 16);
+  for (const RasterJob& job : jobs()) in.add(job);
+  bench.run();
+  ASSERT_EQ(out.records().size(), 8U);
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(out.records()[i].cycle, 1 + 7 * i + 10);
+  EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::setup), 8 * 7);
+}
+
+// case R07
+TEST_P(RasterTimedTest, APrimitiveWithoutSamplesCostsItsCoarseTests) {
+  // A sliver between samples whose bounds hold the whole diagonal: 256 raster tiles are tested, then one.
+  add_triangle({{0.7F, 128, 128}, {0.2F, 127.2F, 127.3F}});
+  add_one_quad(4);
+  for (const unsigned rate : {1U, 4U, 16U}) {
+    Bench bench(GetParam(), "raster", "tile-rasterizer", state,
+                {{"coarse_tiles_per_cycle", std::to_string(rate)}, {"setup_latency_cycles", "10"}});
+    Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+    Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 64);
+    for (const RasterJob& job : jobs()) in.add(job);
+    bench.run();
+    EXPECT_EQ(cycles_of(out), (std::vector<Cycle>{256 / rate + 1 + 10})) << rate;
+    EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::coarse), 257.0 / rate);
+  }
+}
+
+TEST_P(RasterTimedTest, TheEndComesLast) {
+  add_full();
+  Bench bench(GetParam(), "raster", "tile-rasterizer", state);
+  Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+  Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 1);
+  in.add(jobs()[0]);
+  in.add(end_of_draw());
+  bench.run();
+  EXPECT_TRUE(out.records().back().item.end_of_draw);
+  EXPECT_EQ(quads_in(out), 4096U);
+  EXPECT_TRUE(bench.unit().idle());
+}
+
+TEST_P(RasterTimedTest, ABlockedReceiverStopsItUntilACycleAfterItTakes) {
+  add_full();
+  Bench bench(GetParam(), "raster", "tile-rasterizer", state, {{"setup_latency_cycles", "1"}});
+  Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
+  Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 4);
+  in.add(jobs()[0]);
+  out.close(0, 100);
+  bench.run();
+  ASSERT_EQ(out.records().size(), 256U);
+  EXPECT_EQ(out.records()[3].cycle, 100U);
+  EXPECT_EQ(out.records()[4].cycle, 102U);
+  // At lt the tile that waited goes beside the next, which was made meanwhile. At `at` all tiles of a job are made before
+  // it is known that they wait, in cycles 1 to 256, and then go as places become free.
+  const bool ahead = GetParam() == Fidelity::at;
+  for (std::size_t i = 5; i < 256; ++i) {
+    ASSERT_LE(out.records()[i].cycle, 98 + i);
+    ASSERT_GE(out.records()[i].cycle, ahead ? i + 2 : GetParam() == Fidelity::lt ? 97 + i : 98 + i);
+  }
+  const std::uint64_t blocked = testing::charged(bench.unit(), UnitState::blocked, 356);
+  if (!ahead) {
+    EXPECT_EQ(blocked, 96U) << "cycles 5 to 100";
+  }
+}
+
+TEST_P(RasterTimedTest, QuadsAndTheirOrderAreTheSameUnderAnyStalls) {
+  draw = testing::random_draw(128, 128, 40, 9);
+  const std::vector<RasterJob> all = jobs();
+  std::vector<std::uint64_t> expected;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    // What is to come out is what cycle makes of it undisturbed.
+    Bench bench(seed == 0 ? Fidelity::cycle : GetParam(), "raster", "tile-rasterizer", state);
+    Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", static_cast<unsigned>(1 + seed % 10));
+    Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", static_cast<unsigned>(1 + seed % 9));
+    for (const RasterJob& job : all) in.add(job);
+    in.add(end_of_draw());
+    if (seed > 0) bench.stall_randomly(seed, 80);
+    bench.run();
+    std::vector<std::uint64_t> quads;
+    for (const auto& record : out.records()) {
+      for (unsigned i = 0; i < record.item.count; ++i) {
+        const Quad& quad = record.item.quads[i];
+        std::uint64_t word = quad.splat;
+        for (const unsigned part : {unsigned{quad.triangle}, unsigned{record.item.tile.x}, unsigned{record.item.tile.y},
+                                    unsigned{quad.position}, unsigned{quad.coverage}}) {
+          word = word << 6U | part;
+        }
+        quads.push_back(word);
+      }
+    }
+    if (seed == 0) expected = quads;
+    ASSERT_EQ(quads, expected) << seed;
+    ASSERT_TRUE(bench.unit().idle()) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe

@@ -1,0 +1,175 @@
+// VPO at lt and at; what has one closed form at every fidelity is compared with cycle by it.
+#include <gtest/gtest.h>
+
+#include "support/fidelities.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::cycles_of;
+using testkit::Bench;
+using testkit::Sink;
+using testkit::Source;
+
+VertexWarp warp_at(std::uint32_t first, std::uint32_t splats) { return {first, splats, false}; }
+VertexWarp end_of_draw() { return {0, 0, true}; }
+
+class VpoTimedTest : public ::testing::TestWithParam<Fidelity> {
+ protected:
+  VpoTimedTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) {
+    for (unsigned i = 0; i < 32; ++i) {
+      const auto x = static_cast<float>(i % 8 * 8);
+      const auto y = static_cast<float>(i / 8 * 16);
+      draw.splats.push_back(testing::flat_box(x, y, x + 6, y + 6, 0.5F));
+    }
+  }
+  static void expect_in_draw_order(const Sink<PrimitiveItem>& sink) {
+    ASSERT_EQ(sink.records().size(), 65U);
+    for (std::uint32_t i = 0; i < 64; ++i) {
+      ASSERT_EQ(2 * sink.records()[i].item.primitive.splat + sink.records()[i].item.primitive.triangle, i);
+    }
+    EXPECT_TRUE(sink.records()[64].item.end_of_draw);
+  }
+  Draw draw;
+  RenderState state;
+};
+
+INSTANTIATE_TEST_SUITE_P(Fidelities, VpoTimedTest, ::testing::ValuesIn(testing::fidelities_with_time()),
+                         testing::name_of_fidelity);
+
+TEST_P(VpoTimedTest, APrimitiveIsSeenTheLatencyAfterItsVertices) {
+  for (const unsigned latency : {1U, 10U}) {
+    Bench bench(GetParam(), "vpo", "primitive-assembly", state,
+                {{"latency_cycles", std::to_string(latency)}, {"triangles_per_cycle", "1"}});
+    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
+    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
+    vertices.add(warp_at(0, 1), 20);
+    bench.run();
+    EXPECT_EQ(cycles_of(primitives), (std::vector<Cycle>{21 + latency, 22 + latency})) << "in hand at 21";
+  }
+}
+
+TEST_P(VpoTimedTest, AssemblesItsTrianglesPerCycle) {
+  for (const unsigned rate : {1U, 2U, 4U}) {
+    Bench bench(GetParam(), "vpo", "primitive-assembly", state,
+                {{"triangles_per_cycle", std::to_string(rate)}, {"latency_cycles", "10"}});
+    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", 8);
+    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
+    for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
+    bench.run();
+    ASSERT_EQ(primitives.records().size(), 64U);
+    for (std::size_t i = 0; i < 64; ++i) EXPECT_EQ(primitives.records()[i].cycle, 1 + i / rate + 10);
+    EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), VpoWork::triangles), 64.0 / rate);
+  }
+}
+
+TEST_P(VpoTimedTest, CulledTrianglesTakeTheirTurn) {
+  for (unsigned i = 0; i < 8; ++i) draw.splats[i] = testing::flat_box(-40, -40, -30, -30, 0.5F);
+  Bench bench(GetParam(), "vpo", "primitive-assembly", state, {{"triangles_per_cycle", "1"}, {"latency_cycles", "1"}});
+  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
+  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
+  vertices.add(warp_at(0, 8));
+  vertices.add(warp_at(8, 1));
+  bench.run();
+  // Eight splats without a triangle, a cycle each from 1 on.
+  EXPECT_EQ(cycles_of(primitives), (std::vector<Cycle>{10, 11}));
+}
+
+TEST_P(VpoTimedTest, PrimitivesComeInDrawOrderAndTheEndLast) {
+  Bench bench(GetParam(), "vpo", "primitive-assembly", state);
+  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
+  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
+  for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
+  vertices.add(end_of_draw());
+  bench.run();
+  expect_in_draw_order(primitives);
+  EXPECT_TRUE(bench.unit().idle());
+}
+
+TEST_P(VpoTimedTest, TakesTheGpcsVerticesInTurn) {
+  // At lt vertices come in draw order, since a warp and all that it leads to is a call from DRAW; elsewhere one that
+  // comes before its turn waits in its queue.
+  const bool in_order = GetParam() == Fidelity::lt;
+  Bench bench(GetParam(), "vpo", "primitive-assembly", state, {}, 2);
+  Source<VertexWarp>& even = bench.source<VertexWarp>("in_vertices_0");
+  Source<VertexWarp>& odd = bench.source<VertexWarp>("in_vertices_1");
+  Sink<PrimitiveItem>& first = bench.sink<PrimitiveItem>("out_primitives_0");
+  Sink<PrimitiveItem>& second = bench.sink<PrimitiveItem>("out_primitives_1");
+  even.add(warp_at(0, 8), 500);
+  odd.add(warp_at(8, 8), in_order ? 600 : 0);
+  even.add(warp_at(16, 8), 700);
+  odd.add(warp_at(24, 8), in_order ? 800 : 0);
+  even.add(end_of_draw(), 900);
+  odd.add(end_of_draw(), in_order ? 901 : 0);
+  bench.run();
+  std::size_t primitives = 0;
+  for (const Sink<PrimitiveItem>* sink : {&first, &second}) {
+    std::uint32_t last = 0;
+    for (const auto& record : sink->records()) {
+      if (record.item.end_of_draw) continue;
+      const std::uint32_t order = 2 * record.item.primitive.splat + record.item.primitive.triangle;
+      EXPECT_GE(order, last);
+      EXPECT_GE(record.cycle, 500U);
+      last = order;
+      ++primitives;
+    }
+    EXPECT_TRUE(sink->records().back().item.end_of_draw);
+  }
+  EXPECT_EQ(primitives, 64U) << "no box is in tiles of both";
+  EXPECT_TRUE(bench.unit().idle());
+}
+
+TEST_P(VpoTimedTest, APrimitiveGoesToEveryGpcThatOwnsATileOfItsBoundsAndToNoOther) {
+  draw.splats.push_back(testing::flat_box(1, 1, 30, 5, 0.5F));  // tiles (0,0) and (1,0)
+  Bench bench(GetParam(), "vpo", "primitive-assembly", state, {}, 4);
+  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
+  const Sink<PrimitiveItem>* sinks[4];
+  for (unsigned gpc = 0; gpc < 4; ++gpc) {
+    sinks[gpc] = &bench.sink<PrimitiveItem>("out_primitives_" + std::to_string(gpc));
+  }
+  vertices.add(warp_at(32, 1));
+  bench.run();
+  for (unsigned gpc = 0; gpc < 4; ++gpc) {
+    const bool owns = gpc == owner_of({0, 0}, 4) || gpc == owner_of({1, 0}, 4);
+    EXPECT_EQ(sinks[gpc]->records().size(), owns ? 2U : 0U) << gpc;
+  }
+}
+
+TEST_P(VpoTimedTest, AFullReceiverStopsItUntilACycleAfterItTakes) {
+  Bench bench(GetParam(), "vpo", "primitive-assembly", state, {{"triangles_per_cycle", "1"}, {"latency_cycles", "1"}});
+  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
+  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 2);
+  primitives.close(0, 50);
+  vertices.add(warp_at(0, 2));
+  vertices.add(end_of_draw());
+  bench.run();
+  // At lt and at the one that waited goes beside the next.
+  const Cycle fourth = GetParam() == Fidelity::cycle ? 53 : 52;
+  ASSERT_EQ(primitives.records().size(), 5U);
+  EXPECT_EQ(primitives.records()[1].cycle, 50U);
+  EXPECT_EQ(primitives.records()[2].cycle, 52U);
+  EXPECT_EQ(primitives.records()[3].cycle, fourth);
+  // Cycles 3 to 50. At cycle it takes the next splat in hand in the first of them, which is work; at `at` the two that
+  // wait were assembled in 3 and 4.
+  const std::uint64_t busy = GetParam() == Fidelity::lt ? 0 : GetParam() == Fidelity::at ? 2 : 1;
+  EXPECT_EQ(testing::charged(bench.unit(), UnitState::blocked, 55), 48 - busy);
+}
+
+TEST_P(VpoTimedTest, StallsChangeNeitherPrimitivesNorOrder) {
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    Bench bench(GetParam(), "vpo", "primitive-assembly", state);
+    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", static_cast<unsigned>(1 + seed % 2));
+    Sink<PrimitiveItem>& primitives =
+        bench.sink<PrimitiveItem>("out_primitives_0", static_cast<unsigned>(1 + seed % 10));
+    for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
+    vertices.add(end_of_draw());
+    bench.stall_randomly(seed, 100);
+    bench.run();
+    expect_in_draw_order(primitives);
+    ASSERT_FALSE(HasFatalFailure()) << seed;
+    ASSERT_TRUE(bench.unit().idle()) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe
