@@ -1,16 +1,18 @@
-// A testbench of the same-splat QRU, with the installed testbench kit: what comes out, when, and that neither the other
-// side's pace nor random stalls change it.
+// A testbench of the same-splat QRU, with the installed testbench kit: what comes out at each fidelity with time, and
+// that neither the other side's pace nor random stalls change it.
 #include <cstdio>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
+#include <vrpipe/batch.h>
 #include <vrpipe/testkit/bench.h>
 
 #include "same_splat_qru.h"
 
 namespace {
 
+using vrpipe::BinItem;
+using vrpipe::Fidelity;
 using vrpipe::Quad;
 using vrpipe::QuadBeat;
 using vrpipe::Warp;
@@ -28,18 +30,37 @@ Quad quad(std::uint32_t splat, unsigned position, unsigned triangle) {
   return made;
 }
 
-/// Quads and pairing of all warps, in the order in which they are launched.
-std::string launched(const std::vector<QuadBeat>& beats, std::uint64_t stall_seed, vrpipe::Cycle closed_until) {
+/// Quads and pairing of all warps of a bin, in the order in which they are launched.
+std::string launched(Fidelity fidelity, const QuadBeat& bin, std::uint64_t stall_seed, vrpipe::Cycle closed_until) {
   vrpipe::Draw draw;
   draw.width = draw.height = 64;
   vrpipe::RenderState state;
   state.draw = &draw;
-  vrpipe::testkit::Bench bench("qru", "same-splat", state);
-  auto& source = bench.source<QuadBeat>("in_quads");
+  vrpipe::testkit::Bench bench(fidelity, "qru", "same-splat", state);
   auto& sink = bench.sink<Warp>("out_warps");
-  for (const QuadBeat& beat : beats) source.add(beat);
   if (closed_until > 0) sink.close(0, closed_until);
   if (stall_seed != 0) bench.stall_randomly(stall_seed, 64);
+
+  vrpipe::BinStorage storage;  // of the bin, until its warps are formed
+  if (fidelity == Fidelity::cycle) {
+    auto& source = bench.source<QuadBeat>("in_quads");
+    source.add(bin);
+    QuadBeat end;
+    end.end_of_draw = true;
+    source.add(end);
+  } else {
+    // At lt and at a bin comes in one piece: batch.h.
+    auto& source = bench.source<BinItem>("in_quads");
+    storage.flush.quads.assign(bin.quads.begin(), bin.quads.begin() + bin.count);
+    BinItem item;
+    item.storage = &storage;
+    item.tile = bin.tile;
+    item.quads = bin.count;
+    source.add(item);
+    BinItem end;
+    end.end_of_draw = true;
+    source.add(end);
+  }
   bench.run();
   check(bench.behaviour<SameSplatQru>().pairs.value() == 2, "pairs of the splats 1 and 2");
 
@@ -68,18 +89,19 @@ int main() try {
     bin.quads[bin.count++] = q;
   }
   bin.last_of_bin = true;
-  QuadBeat end;
-  end.end_of_draw = true;
-  const std::vector<QuadBeat> beats{bin, end};
 
   // Splat 3 leaves before the pair of splat 4 would; the order of a position is worth more than a pair.
   const std::string expected = " 5:1.0+5:1.1 9:3.0 9:4.0 5:2.0+5:2.1 9:4.1 | end";
-  check(launched(beats, 0, 0) == expected, "unexpected warps:" + launched(beats, 0, 0));
-  check(launched(beats, 0, 500) == expected, "a late receiver changes the warps");
-  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-    check(launched(beats, seed, 0) == expected, "stalls of seed " + std::to_string(seed) + " change the warps");
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+    const std::string where = std::string(" at ") + name_of(fidelity);
+    check(launched(fidelity, bin, 0, 0) == expected, "unexpected warps" + where + ":" + launched(fidelity, bin, 0, 0));
+    check(launched(fidelity, bin, 0, 500) == expected, "a late receiver changes the warps" + where);
+    for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+      check(launched(fidelity, bin, seed, 0) == expected,
+            "stalls of seed " + std::to_string(seed) + " change the warps" + where);
+    }
   }
-  std::puts("same-splat: as expected under 100 seeds of stalls");
+  std::puts("same-splat: as expected under 100 seeds of stalls at lt, at and cycle");
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "same_splat_bench: %s\n", error.what());
