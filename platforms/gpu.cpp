@@ -58,7 +58,7 @@ void Gpu::add(const Instance& instance, ColorSurface& surface) {
   follow_clock(*counting, *clock_);
   if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(surface);
   if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get()); zrop != nullptr && ahead != ahead_.end()) {
-    zrop->foresee(*ahead->second);
+    zrop->follow(*ahead->second);
   }
   std::string module = instance.path;
   std::replace(module.begin(), module.end(), '.', '_');
