@@ -61,11 +61,48 @@ void ClockDomain::set_tick_order(std::vector<unsigned> order) {
   tick_order_ = std::move(order);
 }
 
-void ClockDomain::start_of_simulation() { event_.notify(sc_core::SC_ZERO_TIME); }
+void ClockDomain::start_of_simulation() {
+  const bool any_own_time = std::any_of(outside_ports_.begin(), outside_ports_.end(),
+                                        [](OutsidePort* port) { return port->meets_own_time(); });
+  if (any_own_time) cycles_per_activation_ = 1;
+  event_.notify(sc_core::SC_ZERO_TIME);
+}
 
 void ClockDomain::run(const sc_core::sc_time& duration) {
   sc_core::sc_start(duration);
   if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
+}
+
+bool ClockDomain::run_to_rest(const sc_core::sc_time& at_most) {
+  if (at_rest()) return true;
+  pauses_at_rest_ = true;
+  run(at_most);
+  pauses_at_rest_ = false;
+  if (at_rest()) return true;
+  check_answers();
+  return false;
+}
+
+void ClockDomain::check_answers() const {
+  if (awaited_ == 0 || next_ != never) return;
+  const sc_core::sc_time silence = sc_core::sc_time_stamp() - sc_core::sc_time::from_value(now_ * period_.value());
+  if (silence < longest_silence() && sc_core::sc_pending_activity()) return;
+  OutsidePort::Unanswered oldest{never, name(), "something outside the clock"};
+  for (const OutsidePort* port : outside_ports_) {
+    OutsidePort::Unanswered request = port->oldest_unanswered();
+    if (request.since < oldest.since) oldest = std::move(request);
+  }
+  throw SimulationFault(oldest.port, now_,
+                        "all units sleep, and there is no answer to " + oldest.request + ", the oldest of " +
+                            std::to_string(awaited_) + " that are awaited; " +
+                            (sc_core::sc_pending_activity() ? "so for " + silence.to_string() + " now"
+                                                            : "nothing is left that could answer"));
+}
+
+void ClockDomain::fail(std::exception_ptr thrown) {
+  thrown_ = std::move(thrown);
+  finished_ = true;
+  if (pauses_at_rest_) sc_core::sc_pause();
 }
 
 void ClockDomain::edge() {
@@ -88,6 +125,7 @@ void ClockDomain::edge() {
     finished_ = true;
   }
   in_edge_ = false;
+  if (pauses_at_rest_ && at_rest()) sc_core::sc_pause();
   if (!finished_ && next_ != never) event_.notify(sc_core::sc_time::from_value((next_ - present) * period_.value()));
 }
 

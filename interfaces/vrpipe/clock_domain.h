@@ -22,6 +22,22 @@ class Clocked {
   virtual Cycle tick(Cycle now) = 0;
 };
 
+/// Where a unit meets what may have time of its own: a memory port.
+class OutsidePort {
+ public:
+  virtual ~OutsidePort() = default;
+  /// Whether what it is bound to has time of its own, so that the kernel's must keep step with the clock. Asked once all
+  /// is bound, before the first edge.
+  virtual bool meets_own_time() = 0;
+  struct Unanswered {
+    Cycle since = never;
+    std::string port;
+    std::string request;  ///< in words
+  };
+  /// The oldest of the requests that have no answer yet; since `never`, if there is none.
+  virtual Unanswered oldest_unanswered() const = 0;
+};
+
 /// One clock for many units: a single event, armed for the next cycle at which a unit has something to do.
 /// Cycles in which every unit sleeps cost nothing. Cycles are counted as integers; sc_time only carries them.
 class ClockDomain : public sc_core::sc_module {
@@ -55,8 +71,29 @@ class ClockDomain : public sc_core::sc_module {
     return std::max<Cycle>(whole_cycles(present) + 1, cycles_up(present + delay));
   }
 
+  /// A port whose requests may be answered from outside the clock. It outlives the simulation.
+  void attach(OutsidePort& port) { outside_ports_.push_back(&port); }
+  /// A unit waits for one answer more, or less, that comes from outside the clock; until then the clock is not at rest.
+  void await_answer() { ++awaited_; }
+  void answered() { --awaited_; }
+  bool awaits_answers() const { return awaited_ > 0; }
+
   /// Runs for a time, as sc_start does; what a unit throws comes out as it is.
   void run(const sc_core::sc_time& duration);
+  /// Runs until the clock is at rest, at most for a time; returns whether it is. What else has time of its own may go on
+  /// for ever. Throws SimulationFault as `check_answers` does.
+  bool run_to_rest(const sc_core::sc_time& at_most);
+  /// Whether no unit wants an edge and none waits for an answer, so that no edge will come; or an edge has thrown, or
+  /// `finish` was called.
+  bool at_rest() const { return running_ && (finished_ || (next_ == never && awaited_ == 0)); }
+  /// While all units sleep and some wait for answers from outside: throws SimulationFault that names a port and its
+  /// oldest request, once nothing is left that could answer, or no edge has come for `longest_silence()`.
+  void check_answers() const;
+  /// 10 ms. DRAM answers in 0.1 us, after a refresh in 1 us, and after it was powered up in 2 ms (LPDDR4, tINIT3).
+  static sc_core::sc_time longest_silence() { return {10, sc_core::SC_MS}; }
+
+  /// Ends the simulation with what was thrown by code that the kernel called, not this clock; `run` throws it.
+  void fail(std::exception_ptr thrown);
 
   /// Where the draw ends that the units of this clock work on; they say what they know.
   DrawEnd& draw_end() { return draw_end_; }
@@ -65,7 +102,7 @@ class ClockDomain : public sc_core::sc_module {
   bool running() const { return running_; }
 
   /// Up to so many cycles pass each time that the kernel activates the clock, which is not free. sc_time_stamp() is then
-  /// behind now() by as much, so this is for systems in which nothing but this clock has time of its own. At first 1.
+  /// behind now() by as much, so it stays 1 where an outside port meets time of its own. At first 1.
   void set_cycles_per_activation(unsigned cycles) { cycles_per_activation_ = cycles; }
 
   /// Ends the simulation after this cycle.
@@ -101,10 +138,13 @@ class ClockDomain : public sc_core::sc_module {
   unsigned cycles_per_activation_ = 1;
   std::uint64_t edges_ = 0;
   std::uint64_t activations_ = 0;
+  std::vector<OutsidePort*> outside_ports_;
+  std::uint64_t awaited_ = 0;
   std::exception_ptr thrown_;
   bool in_edge_ = false;
   bool running_ = false;
   bool finished_ = false;
+  bool pauses_at_rest_ = false;
 };
 
 }  // namespace vrpipe

@@ -139,6 +139,49 @@ TEST_F(ClockDomainTest, FinishEndsAfterTheCycle) {
   EXPECT_TRUE(clock->finished());
 }
 
+/// A timer that never ends.
+struct Timer : sc_core::sc_module {
+  explicit Timer(const sc_core::sc_module_name& name) : sc_module(name) { SC_METHOD(tick); }
+  SC_HAS_PROCESS(Timer);
+  void tick() {
+    ++ticks;
+    next_trigger(7, sc_core::SC_NS);
+  }
+  unsigned ticks = 0;
+};
+
+TEST_F(ClockDomainTest, IsAtRestOnceNobodyWantsAnEdgeWhateverElseHasTime) {
+  Ticker a(*clock, {1, 2, 100});
+  Timer timer("timer");
+  EXPECT_FALSE(clock->run_to_rest(sc_core::sc_time(50 * 1634, sc_core::SC_PS)));
+  EXPECT_TRUE(clock->run_to_rest(sc_core::sc_time(1, sc_core::SC_SEC)));
+  EXPECT_EQ(a.ticks, (std::vector<Cycle>{0, 1, 2, 100}));
+  EXPECT_EQ(sc_core::sc_time_stamp(), sc_core::sc_time(100 * 1634, sc_core::SC_PS)) << "it is not waited for";
+  EXPECT_EQ(timer.ticks, 1U + 100 * 1634 / 7000);
+  EXPECT_TRUE(clock->run_to_rest(sc_core::sc_time(1, sc_core::SC_SEC)));
+}
+
+TEST_F(ClockDomainTest, IsNotAtRestWhileAnAnswerIsAwaited) {
+  Ticker a(*clock, {10});
+  a.action = [&](Cycle now) {
+    if (now == 10) clock->await_answer();
+  };
+  Timer timer("timer");
+  EXPECT_FALSE(clock->run_to_rest(sc_core::sc_time(1, sc_core::SC_US)));
+  clock->answered();
+  EXPECT_TRUE(clock->run_to_rest(sc_core::sc_time(1, sc_core::SC_US)));
+}
+
+TEST_F(ClockDomainTest, WhatAUnitThrowsEndsTheRunThoughTimersGoOn) {
+  Ticker a(*clock, {3});
+  a.action = [&](Cycle now) {
+    if (now == 3) throw SimulationFault("a", now, "thrown");
+  };
+  Timer timer("timer");
+  EXPECT_THROW(clock->run_to_rest(sc_core::sc_time(1, sc_core::SC_SEC)), SimulationFault);
+  EXPECT_LE(sc_core::sc_time_stamp(), sc_core::sc_time(1, sc_core::SC_US));
+}
+
 TEST_F(ClockDomainTest, AskingForAnEdgeInThePastStopsAtOnce) {
   Ticker other(*clock, {4, 5, 6, 7, 8});
   struct Late : sc_core::sc_module, Clocked {
