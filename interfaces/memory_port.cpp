@@ -14,14 +14,20 @@ void fault_of_response(const sc_core::sc_object& port, Cycle now, const tlm::tlm
   throw SimulationFault(port.name(), now, "the memory answered " + access.get_response_string());
 }
 
-PromptMemory* prompt_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
-  auto* const memory = dynamic_cast<PromptMemory*>(socket.operator->());
+EarlyCompletionMemory* early_completion_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
+  auto* const memory = dynamic_cast<EarlyCompletionMemory*>(socket.operator->());
   return memory != nullptr && &memory->clock() == &clock ? memory : nullptr;
 }
 
-MemoryPort::MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight)
-    : socket(name.c_str()), clock_(owner.clock), most_in_flight_(in_flight) {
+bool meets_own_time(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
+  const EarlyCompletionMemory* const memory = early_completion_memory_of(socket, clock);
+  return memory == nullptr || memory->has_own_time();
+}
+
+MemoryPort::MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight, MemoryOrigin origin)
+    : socket(name.c_str()), clock_(owner.clock), origin_(origin), most_in_flight_(in_flight) {
   socket.bind(*this);
+  clock_.domain->attach(*this);
 }
 
 MemoryPort::~MemoryPort() = default;
@@ -32,6 +38,8 @@ MemoryPort::Access* MemoryPort::unused_access() {
     made.set_mm(this);
     made.set_byte_enable_ptr(nullptr);
     made.set_dmi_allowed(false);
+    made.extension = new MemoryRequestExtension;
+    made.set_extension(made.extension);
     free_accesses_.push_back(&made);
   }
   Access* const access = free_accesses_.back();
@@ -42,24 +50,28 @@ MemoryPort::Access* MemoryPort::unused_access() {
 
 inline void MemoryPort::answer(Access& access, const sc_core::sc_time& delay) {
   check_response(socket, clock_.domain->now(), access);
-  access.answered = true;
+  access.pending = false;
+  clock_.domain->answered();
   complete(clock_.domain->edge_after(delay), access.tag);
 }
 
-void MemoryPort::request(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag) {
+void MemoryPort::send(const MemoryRequest& request, std::uint32_t tag) {
   if (next_access_ == nullptr) {
     next_access_ = unused_access();
-    prompt_ = prompt_memory_of(socket, *clock_.domain);  // from the second access on
+    memory_ = early_completion_memory_of(socket, *clock_.domain);  // from the second access on
   }
   Access& access = *next_access_;
-  if (access.data.size() < bytes) access.data.resize(bytes);
+  if (access.data.size() < request.bytes) access.data.resize(request.bytes);
   access.set_data_ptr(access.data.data());
-  access.set_data_length(bytes);
-  access.set_streaming_width(bytes);
-  access.answered = false;
+  access.set_data_length(request.bytes);
+  access.set_streaming_width(request.bytes);
+  access.pending = true;
+  access.since = clock_.domain->now();
+  clock_.domain->await_answer();
   access.tag = tag;
-  access.set_command(command);
-  access.set_address(address);
+  access.extension->origin = request.origin;
+  access.set_command(request.command);
+  access.set_address(request.address);
   access.set_response_status(tlm::TLM_INCOMPLETE_RESPONSE);
 
   tlm::tlm_phase phase = tlm::BEGIN_REQ;
@@ -73,7 +85,10 @@ void MemoryPort::request(tlm::tlm_command command, std::uint64_t address, unsign
       phase = tlm::END_RESP;
       socket->nb_transport_fw(access, phase, delay);
     }
-    if (access.get_ref_count() == 1) return;  // ours alone: it serves again
+    if (access.get_ref_count() == 1) {  // ours alone: it serves again
+      access.reset();
+      return;
+    }
     access.release();
   }
   next_access_ = unused_access();
@@ -82,46 +97,70 @@ void MemoryPort::request(tlm::tlm_command command, std::uint64_t address, unsign
 tlm::tlm_sync_enum MemoryPort::nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                                sc_core::sc_time& delay) {
   auto& access = static_cast<Access&>(payload);
-  if (requesting_ == &access) requesting_ = nullptr;  // BEGIN_RESP implies END_REQ
+  if (phase != tlm::END_REQ && phase != tlm::BEGIN_RESP) return tlm::TLM_ACCEPTED;  // ignorable ones of the memory's
+  if (requesting_ == &access) requesting_ = nullptr;                                // BEGIN_RESP implies END_REQ
   if (phase == tlm::END_REQ) {
     clock_.domain->wake(clock_.unit, clock_.domain->now() + 1);
     return tlm::TLM_ACCEPTED;
   }
-  if (access.answered) throw SimulationFault(socket.name(), clock_.domain->now(), "a second response to a request");
-  answer(access, delay);
+  // The memory's own process has called: through the kernel what is thrown would come out as a report of the kernel's.
+  try {
+    if (!access.pending) throw SimulationFault(socket.name(), clock_.domain->now(), "a second response to a request");
+    answer(access, delay);
+  } catch (...) {
+    clock_.domain->fail(std::current_exception());
+    return tlm::TLM_COMPLETED;
+  }
   phase = tlm::END_RESP;
   access.release();
   return tlm::TLM_COMPLETED;
 }
 
-void MemoryPort::free(tlm::tlm_generic_payload* payload) { free_accesses_.push_back(static_cast<Access*>(payload)); }
+void MemoryPort::free(tlm::tlm_generic_payload* payload) {
+  payload->reset();  // of extensions that others have left
+  free_accesses_.push_back(static_cast<Access*>(payload));
+}
 
-class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>, public PromptMemory {
+bool MemoryPort::meets_own_time() { return vrpipe::meets_own_time(socket, *clock_.domain); }
+
+OutsidePort::Unanswered MemoryPort::oldest_unanswered() const {
+  Unanswered oldest;
+  for (const Access& access : accesses_) {
+    if (!access.pending || access.since >= oldest.since) continue;
+    oldest = {access.since, socket.name(),
+              std::string(access.is_write() ? "the write" : "the read") + " of " +
+                  std::to_string(access.get_data_length()) + " bytes at address " +
+                  std::to_string(access.get_address()) + " in cycle " + std::to_string(access.since)};
+  }
+  return oldest;
+}
+
+class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>, public EarlyCompletionMemory {
  public:
-  MemoryTarget(const std::string& name, const FixedLatencyMemory& memory) : socket(name.c_str()), memory_(memory) {
+  MemoryTarget(const std::string& name, FixedLatencyMemory& memory)
+      : socket(name.c_str()), memory_(memory), bandwidth_(memory.bytes_per_cycle_) {
     socket.bind(*this);
   }
-  tlm::tlm_target_socket<32> socket;
+  tlm::tlm_target_socket<32, tlm::tlm_base_protocol_types, 1, sc_core::SC_ZERO_OR_MORE_BOUND> socket;
 
   std::uint64_t bytes_before(Cycle end) const {
-    // What is not done by then is still queued up.
-    const std::uint64_t done = end == never ? free_at_ : end * memory_.bytes_per_cycle_.value();
-    return bytes_ - std::min(bytes_, free_at_ - std::min(free_at_, done));
+    return end == never ? bytes_ : bytes_ - std::min(bytes_, bandwidth_.reserved_from(end));
   }
 
  private:
-  Cycle serve(Cycle arrival, unsigned length) override {
-    const std::uint64_t arrival_byte = arrival * memory_.bytes_per_cycle_.value();
-    free_at_ = std::max(free_at_, arrival_byte) + length;
-    bytes_ += length;
-    return arrival + memory_.latency_cycles_ + memory_.bytes_per_cycle_.quotient_up(free_at_ - arrival_byte);
+  Cycle serve(const MemoryRequest& request, Cycle arrival) override {
+    memory_.traffic_.count(request);
+    bytes_ += request.bytes;
+    return memory_.latency_cycles_ + bandwidth_.take(arrival, request.bytes, clock().now());
   }
   const ClockDomain& clock() const override { return memory_.domain_; }
 
   // The delay that comes in says how far ahead of the clock the access is.
   void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) override {
-    const Cycle arrival = clock().now() + clock().whole_cycles(delay);
-    const Cycle taken = serve(arrival, payload.get_data_length()) - arrival;
+    Cycle arrival = clock().now() + clock().whole_cycles(delay);
+    if (const auto* const extension = payload.get_extension<MemoryRequestExtension>())
+      arrival -= extension->late_cycles;
+    const Cycle taken = serve(request_of(payload), arrival) - arrival;
     delay += sc_core::sc_time::from_value(taken * clock().period().value());
     payload.set_response_status(tlm::TLM_OK_RESPONSE);
   }
@@ -133,14 +172,18 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
   bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
   unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
 
-  const FixedLatencyMemory& memory_;
+  FixedLatencyMemory& memory_;
+  BandwidthReservation bandwidth_;
   std::uint64_t bytes_ = 0;
-  std::uint64_t free_at_ = 0;  // in bytes since the start, so that fractions of a cycle are kept
 };
 
 FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, const ClockDomain& domain,
                                        unsigned latency_cycles, unsigned bytes_per_cycle, unsigned ports)
-    : sc_module(name), domain_(domain), latency_cycles_(latency_cycles), bytes_per_cycle_(bytes_per_cycle) {
+    : sc_module(name),
+      domain_(domain),
+      latency_cycles_(latency_cycles),
+      bytes_per_cycle_(bytes_per_cycle),
+      traffic_(*this) {
   for (unsigned index = 0; index < ports; ++index) {
     ports_.push_back(std::make_unique<MemoryTarget>("port_" + std::to_string(index), *this));
   }
@@ -148,7 +191,7 @@ FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, cons
 
 FixedLatencyMemory::~FixedLatencyMemory() = default;
 
-tlm::tlm_target_socket<32>& FixedLatencyMemory::port(unsigned index) { return ports_.at(index)->socket; }
+tlm::tlm_base_target_socket_b<32>& FixedLatencyMemory::port(unsigned index) { return ports_.at(index)->socket; }
 
 std::uint64_t FixedLatencyMemory::bytes(Cycle end) const {
   std::uint64_t sum = 0;
@@ -157,7 +200,7 @@ std::uint64_t FixedLatencyMemory::bytes(Cycle end) const {
 }
 
 double FixedLatencyMemory::peak_rate() const {
-  return static_cast<double>(bytes_per_cycle_.value()) * static_cast<double>(ports_.size());
+  return static_cast<double>(bytes_per_cycle_) * static_cast<double>(ports_.size());
 }
 
 }  // namespace vrpipe

@@ -9,8 +9,10 @@
 #include <systemc>
 #include <tlm>
 
+#include <vrpipe/bandwidth.h>
 #include <vrpipe/clock_domain.h>
 #include <vrpipe/link.h>
+#include <vrpipe/memory_request.h>
 #include <vrpipe/ring.h>
 
 namespace vrpipe {
@@ -30,25 +32,31 @@ inline void check_response(const sc_core::sc_object& port, Cycle now, const tlm:
 
 /// A memory that says as soon as an access begins when it will be complete. A port that is bound to one with nothing in
 /// between asks it directly instead of through the sockets, as with a direct memory interface; in the same cycles.
-class PromptMemory {
+class EarlyCompletionMemory {
  public:
-  virtual ~PromptMemory() = default;
-  /// Takes an access that arrives in a cycle; returns the cycle in which it is complete.
-  virtual Cycle serve(Cycle arrival, unsigned bytes) = 0;
+  virtual ~EarlyCompletionMemory() = default;
+  /// Takes an access that arrives in a cycle; returns the cycle in which it is complete. Accesses need not come in the
+  /// order of their cycles: at `lt` units run ahead of the clock.
+  virtual Cycle serve(const MemoryRequest& request, Cycle arrival) = 0;
   /// The clock in whose cycles `serve` counts.
   virtual const ClockDomain& clock() const = 0;
+  /// Whether its answers depend on anything but the requests and their cycles: on sc_time, or timers.
+  virtual bool has_own_time() const { return false; }
 };
 
-/// The memory that a socket is bound to, if it is prompt and counts the cycles of this clock; null otherwise.
-PromptMemory* prompt_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock);
+/// The memory that a socket is bound to, if it completes early and counts the cycles of this clock; null otherwise.
+EarlyCompletionMemory* early_completion_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock);
+/// Whether what a socket is bound to has time of its own, as everything may that is no early-completion memory.
+bool meets_own_time(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock);
 
 /// An initiator on the unmodified TLM-2.0 base protocol, for timing only: payloads carry addresses and lengths, data
 /// stays with the behaviours. Accesses are naturally aligned and a power of two long, checked in every build.
 /// Understands early completion, annotated delays and all four phases, so that any memory model binds.
-class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_interface {
+class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_interface, private OutsidePort {
  public:
   /// @param in_flight most accesses at a time
-  MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight);
+  /// @param origin    of reads and writes
+  MemoryPort(PortOwner& owner, const std::string& name, unsigned in_flight, MemoryOrigin origin = {});
   ~MemoryPort() override;
 
   tlm::tlm_initiator_socket<32> socket;
@@ -57,10 +65,18 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   bool available() const { return in_flight_ < most_in_flight_ && requesting_ == nullptr; }
   /// Issues an access, in an edge of its unit. Its tag comes back from `next_completed`.
   void read(std::uint64_t address, unsigned bytes, std::uint32_t tag) {
-    access(tlm::TLM_READ_COMMAND, address, bytes, tag);
+    access({address, bytes, tlm::TLM_READ_COMMAND, origin_}, tag);
   }
   void write(std::uint64_t address, unsigned bytes, std::uint32_t tag) {
-    access(tlm::TLM_WRITE_COMMAND, address, bytes, tag);
+    access({address, bytes, tlm::TLM_WRITE_COMMAND, origin_}, tag);
+  }
+  /// On behalf of another origin than the port's, as a cache does.
+  void access(const MemoryRequest& request, std::uint32_t tag) {
+    const Cycle now = clock_.domain->now();
+    check_alignment(socket, now, request.address, request.bytes);
+    ++in_flight_;
+    if (memory_ == nullptr) return send(request, tag);
+    complete(std::max(memory_->serve(request, now), now + 1), tag);
   }
   /// Takes the next access that has completed, in a cycle after the one in which it was answered; false for none.
   bool next_completed(std::uint32_t& tag) {
@@ -78,21 +94,16 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   struct Access : tlm::tlm_generic_payload {
     std::uint32_t tag = 0;
     std::vector<unsigned char> data;
-    bool answered = false;
+    bool pending = false;  ///< not answered yet
+    Cycle since = 0;
+    MemoryRequestExtension* extension = nullptr;  ///< the payload's
   };
   struct Completion {
     Cycle at;
     std::uint32_t tag;
   };
-  void access(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag) {
-    const Cycle now = clock_.domain->now();
-    check_alignment(socket, now, address, bytes);
-    ++in_flight_;
-    if (prompt_ == nullptr) return request(command, address, bytes, tag);
-    complete(std::max(prompt_->serve(now, bytes), now + 1), tag);
-  }
   Access* unused_access();
-  [[gnu::noinline]] void request(tlm::tlm_command command, std::uint64_t address, unsigned bytes, std::uint32_t tag);
+  [[gnu::noinline]] void send(const MemoryRequest& request, std::uint32_t tag);
   void answer(Access& access, const sc_core::sc_time& delay);
   void complete(Cycle at, std::uint32_t tag) {
     // Nearly always the last: memories answer in order.
@@ -106,12 +117,15 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
   /// The last holder of a payload, port or memory, has released it.
   void free(tlm::tlm_generic_payload* payload) override;
+  bool meets_own_time() override;
+  Unanswered oldest_unanswered() const override;
 
   const ClockHandle clock_;
   std::deque<Access> accesses_;  ///< as many as were ever in use at a time; free once answered and no longer held
   std::vector<Access*> free_accesses_;
-  Access* next_access_ = nullptr;  ///< for the next request; null before the first
-  PromptMemory* prompt_ = nullptr;
+  Access* next_access_ = nullptr;            ///< for the next request; null before the first
+  EarlyCompletionMemory* memory_ = nullptr;  ///< if it can be asked directly
+  const MemoryOrigin origin_;
   const unsigned most_in_flight_;
   unsigned in_flight_ = 0;
   Ring<Completion> completions_;  ///< by cycle
@@ -119,24 +133,28 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
 };
 
-/// A memory that answers every access after the same time; each port moves a number of bytes per cycle.
-class FixedLatencyMemory : public sc_core::sc_module {
+/// A memory that answers every access after the same time; each port moves a number of bytes per cycle. Ports may stay
+/// unbound.
+class FixedLatencyMemory : public sc_core::sc_module, public StatisticSet {
  public:
   FixedLatencyMemory(const sc_core::sc_module_name& name, const ClockDomain& domain, unsigned latency_cycles,
                      unsigned bytes_per_cycle, unsigned ports);
   ~FixedLatencyMemory() override;
   /// Each port is for one initiator.
-  tlm::tlm_target_socket<32>& port(unsigned index);
+  tlm::tlm_base_target_socket_b<32>& port(unsigned index);
   /// Moved in all, or before cycle `end`.
   std::uint64_t bytes(Cycle end = never) const;
   /// Bytes per cycle of all ports.
   double peak_rate() const;
+  /// Of all ports.
+  const MemoryTrafficCounters& traffic() const { return traffic_; }
 
  private:
   class MemoryTarget;
   const ClockDomain& domain_;
   unsigned latency_cycles_;
-  Divisor bytes_per_cycle_;
+  unsigned bytes_per_cycle_;
+  MemoryTrafficCounters traffic_;
   std::vector<std::unique_ptr<MemoryTarget>> ports_;
 };
 

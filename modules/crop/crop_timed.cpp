@@ -42,7 +42,7 @@ class Places {
 class TimedCrop : public TimedUnit {
  public:
   TimedCrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
-            Transport transport)
+            const RenderState& state, Transport transport)
       : TimedUnit(name, domain, CropWork::kinds(behaviour->cost()), transport),
         out_(*this, "out_terminations"),
         in_(*this, "in_color", [this](const ShadedWarpItem& item, Span visible) { return take(*item.warp, visible); },
@@ -51,7 +51,7 @@ class TimedCrop : public TimedUnit {
         cost_(behaviour_->cost()),
         // A hazard is one of quads.
         at_once_(cost_.forwards ? quads_looked_up_at_once(cost_) : 1),
-        memory_(*this, "memory"),
+        memory_(*this, "memory", {MemoryTraffic::color, static_cast<std::uint16_t>(state.gpc)}),
         look_ups_(cost_.blend_rate.most_in_a_cycle()),
         queue_(cost_.input_quads),
         mshrs_(cost_.mshrs),
@@ -259,9 +259,9 @@ class TimedCrop : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("crop", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
+                                       std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned,
                                        Transport transport) {
-    return std::make_unique<TimedCrop>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)),
+    return std::make_unique<TimedCrop>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)), state,
                                        transport);
   });
   return true;

@@ -32,7 +32,7 @@ class CropUnit : public Unit {
         income_(static_cast<std::int64_t>(CropWork::parts_of_a_cycle(cost_))),
         most_in_a_cycle_(cost_.blend_rate.most_in_a_cycle()),
         longest_run_(cost_.line_bytes / cost_.sector_bytes),
-        memory_(*this, "memory", 2 * cost_.mshrs) {
+        memory_(*this, "memory", 2 * cost_.mshrs, {MemoryTraffic::color, static_cast<std::uint16_t>(state.gpc)}) {
     out_.set_pipeline(cost_.latency_cycles - 1, ColorBeat::in_a_cycle(cost_.blend_rate));
   }
 

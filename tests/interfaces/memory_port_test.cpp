@@ -8,7 +8,10 @@
 
 #include <vrpipe/error.h>
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/random.h>
 #include <vrpipe/timed.h>
+
+#include "support/foreign_memory.h"
 
 namespace vrpipe {
 namespace {
@@ -20,7 +23,7 @@ class Reader : public sc_core::sc_module, public Clocked, public PortOwner {
          unsigned bytes = 32)
       : sc_module(name),
         PortOwner({&domain, domain.attach(*this)}),
-        memory(*this, "memory", in_flight),
+        memory(*this, "memory", in_flight, {MemoryTraffic::vertex, 3}),
         left_(accesses),
         bytes_(bytes) {}
 
@@ -56,7 +59,7 @@ class Reader : public sc_core::sc_module, public Clocked, public PortOwner {
 class TimedReader : public sc_core::sc_module, public PortOwner {
  public:
   TimedReader(const sc_core::sc_module_name& name, ClockDomain& domain)
-      : sc_module(name), PortOwner({&domain, 0}), memory(*this, "memory") {}
+      : sc_module(name), PortOwner({&domain, 0}), memory(*this, "memory", {MemoryTraffic::attribute, 2}) {}
   TimedMemoryPort memory;
 };
 
@@ -188,11 +191,13 @@ class Relay : public sc_core::sc_module, private tlm::tlm_fw_transport_if<>, pri
   tlm::tlm_target_socket<32> in;
   tlm::tlm_initiator_socket<32> out;
   unsigned accesses = 0;
+  MemoryRequest last;
 
  private:
   tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override {
     ++accesses;
+    last = request_of(payload);
     return out->nb_transport_fw(payload, phase, delay);
   }
   tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
@@ -201,6 +206,7 @@ class Relay : public sc_core::sc_module, private tlm::tlm_fw_transport_if<>, pri
   }
   void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) override {
     ++accesses;
+    last = request_of(payload);
     out->b_transport(payload, delay);
   }
   bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
@@ -390,6 +396,268 @@ TEST_F(MemoryPortTest, ATimedPortAsksInTheSameCyclesDirectlyAsThroughTheSocket) 
     EXPECT_EQ(completed[0], completed[1]) << bytes_per_cycle;
     EXPECT_EQ(completed[0][0], 10U + (63U + bytes_per_cycle) / bytes_per_cycle);
   }
+}
+
+TEST_F(MemoryPortTest, ATimedPortAsksOutOfOrderAndBehindTheClockInTheSameCyclesEitherWay) {
+  for (const std::uint64_t stream : {1U, 2U, 3U}) {
+    std::vector<Cycle> completed[2];
+    for (const bool relayed : {false, true}) {
+      fresh_simulation();
+      clock = std::make_unique<ClockDomain>("clock", 735);
+      TimedReader reader("reader", *clock);
+      Reader later("later", *clock, 1, 0);  // for the clock to advance
+      FixedLatencyMemory memory("memory", *clock, 10, 48, 2);
+      const std::unique_ptr<Relay> relay = bind(reader.memory.socket, memory, relayed);
+      later.memory.socket.bind(memory.port(1));
+      clock->run(cycles(2));
+      clock->wake(later.clock.unit, 500);
+      clock->run(cycles(1000));
+      ASSERT_EQ(clock->now(), 500U);
+      for (std::uint64_t i = 0; i < 300; ++i) {
+        const Cycle at = 470 + mix(stream << 32U | i) % 300;
+        completed[relayed].push_back(i % 3 == 0 ? reader.memory.write(64 * i, 64, at)
+                                                : reader.memory.read(64 * i, 64, at));
+      }
+      EXPECT_EQ(memory.traffic().accesses(MemoryTraffic::attribute, false), 200U);
+      EXPECT_EQ(memory.traffic().bytes(MemoryTraffic::attribute, true), 6400U);
+    }
+    EXPECT_EQ(completed[0], completed[1]);
+  }
+}
+
+TEST_F(MemoryPortTest, AnAccessAheadOfTimeDoesNotDelayAnEarlierOne) {
+  TimedReader reader("reader", *clock);
+  FixedLatencyMemory memory("memory", *clock, 10, 32, 1);
+  reader.memory.socket.bind(memory.port(0));
+  clock->run(cycles(1));
+  for (Cycle at = 4000; at < 4100; ++at) EXPECT_EQ(reader.memory.read(0, 32, at), at + 11);
+  EXPECT_EQ(reader.memory.read(0, 32, 7), 18U);
+}
+
+TEST_F(MemoryPortTest, ABlockingMemoryOfAnotherMakeIsAskedAheadOfTheClockAndBehindIt) {
+  TimedReader reader("reader", *clock);
+  Reader later("later", *clock, 1, 0);
+  foreign::Dram dram("dram", cycles(0), cycles(10), cycles(25.5));
+  dram.never_refresh();
+  FixedLatencyMemory memory("memory", *clock, 10, 32, 1);
+  reader.memory.socket.bind(dram.socket);
+  later.memory.socket.bind(memory.port(0));
+  clock->run(cycles(2));
+  clock->wake(later.clock.unit, 500);
+  clock->run(cycles(1000));
+  EXPECT_EQ(reader.memory.read(4096, 32, 600), 626U);
+  EXPECT_EQ(reader.memory.read(4128, 32, 700), 710U);
+  EXPECT_EQ(reader.memory.read(4160, 32, 480), 490U) << "its cycle, though the annotation cannot say so";
+}
+
+/// Waits where it should annotate its time.
+class WaitingMemory : public sc_core::sc_module {
+ public:
+  explicit WaitingMemory(const sc_core::sc_module_name& name) : sc_module(name), socket("socket") {
+    socket.register_b_transport(this, &WaitingMemory::b_transport);
+  }
+  tlm_utils::simple_target_socket<WaitingMemory> socket;
+
+ private:
+  void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time&) {
+    wait(20, sc_core::SC_NS);
+    payload.set_response_status(tlm::TLM_OK_RESPONSE);
+  }
+};
+
+/// A unit of lt or at that reads once.
+class OneRead : public sc_core::sc_module, public Clocked, public PortOwner {
+ public:
+  OneRead(const sc_core::sc_module_name& name, ClockDomain& domain)
+      : sc_module(name), PortOwner({&domain, domain.attach(*this)}), memory(*this, "memory") {}
+  TimedMemoryPort memory;
+
+ private:
+  Cycle tick(Cycle now) override {
+    memory.read(0, 32, now);
+    return never;
+  }
+};
+
+TEST_F(MemoryPortTest, ABlockingMemoryThatWaitsIsNamed) {
+  OneRead reader("reader", *clock);
+  WaitingMemory memory("memory");
+  reader.memory.socket.bind(memory.socket);
+  try {
+    clock->run(cycles(10));
+    FAIL() << "it waited";
+  } catch (const SimulationFault& fault) {
+    const std::string what = fault.what();
+    EXPECT_NE(what.find("reader.memory"), std::string::npos) << what;
+    EXPECT_NE(what.find("must not wait"), std::string::npos) << what;
+  }
+}
+
+TEST_F(MemoryPortTest, AtCycleABlockingMemoryMayWait) {
+  Reader reader("reader", *clock, 2, 3);
+  WaitingMemory memory("memory");
+  reader.memory.socket.bind(memory.socket);
+  EXPECT_TRUE(clock->run_to_rest(cycles(1000)));
+  EXPECT_EQ(reader.completed, (std::vector<Cycle>{21, 42, 63})) << "one at a time, by the socket's own process";
+}
+
+TEST_F(MemoryPortTest, ARequestSaysWhoAsksAndForWhat) {
+  Reader reader("reader", *clock, 2, 3);
+  FixedLatencyMemory memory("memory", *clock, 10, 32, 1);
+  const std::unique_ptr<Relay> relay = bind(reader.memory.socket, memory, true);
+  clock->run(cycles(100));
+  EXPECT_EQ(relay->last.address, 64U);
+  EXPECT_EQ(relay->last.bytes, 32U);
+  EXPECT_EQ(relay->last.command, tlm::TLM_READ_COMMAND);
+  EXPECT_EQ(relay->last.origin.traffic, MemoryTraffic::vertex);
+  EXPECT_EQ(relay->last.origin.gpc, 3U);
+  for (const Counter* counter : memory.counters()) {
+    const std::string name = counter->name();
+    EXPECT_EQ(counter->value(), name == "vertex_reads" ? 3U : name == "vertex_bytes_read" ? 96U : 0U) << name;
+  }
+  EXPECT_EQ(memory.counters().size(), 4 * memory_traffics);
+}
+
+TEST_F(MemoryPortTest, AnAccessOnBehalfOfAnotherKeepsItsOrigin) {
+  const MemoryRequest request{256, 64, tlm::TLM_WRITE_COMMAND, {MemoryTraffic::depth_stencil, 7}};
+  TimedReader timed("timed", *clock);
+  Reader reader("reader", *clock, 4, 0);
+  FixedLatencyMemory memory("memory", *clock, 10, 64, 2);
+  const std::unique_ptr<Relay> relay = bind(timed.memory.socket, memory, true);
+  reader.memory.socket.bind(memory.port(1));
+  clock->run(cycles(1));
+  timed.memory.access(request, 5);
+  EXPECT_EQ(relay->last.origin.traffic, MemoryTraffic::depth_stencil);
+  EXPECT_EQ(relay->last.origin.gpc, 7U);
+  reader.memory.access(request, 0);  // through the socket, since it is the first
+  reader.memory.access(request, 1);
+  EXPECT_EQ(memory.traffic().accesses(MemoryTraffic::depth_stencil, true), 3U);
+  EXPECT_EQ(memory.traffic().bytes(MemoryTraffic::depth_stencil, true), 192U);
+}
+
+TEST_F(MemoryPortTest, AnInitiatorOfAnotherMakeIsServedWithoutAnOrigin) {
+  tlm::tlm_generic_payload payload;
+  payload.set_command(tlm::TLM_WRITE_COMMAND);
+  payload.set_address(64);
+  payload.set_data_length(16);
+  EXPECT_EQ(request_of(payload).address, 64U);
+  EXPECT_EQ(request_of(payload).origin.traffic, MemoryTraffic::other);
+  EXPECT_STREQ(name_of(MemoryTraffic::depth_stencil), "depth_stencil");
+}
+
+TEST_F(MemoryPortTest, AMemoryOfAnotherMakeAnswersOutOfOrderUnderBackPressureAndRefresh) {
+  Reader reader("reader", *clock, 16, 2000, 256);
+  foreign::Dram dram("dram", cycles(1.3), cycles(30.7), cycles(61.1));
+  reader.memory.socket.bind(dram.socket);
+  while (!clock->run_to_rest(cycles(1000))) {}
+  EXPECT_EQ(reader.completed.size(), 2000U);
+  EXPECT_EQ(dram.responses, 2000U);
+  EXPECT_GT(dram.out_of_order, 0U);
+  EXPECT_GT(dram.refreshes, 1U);
+  EXPECT_TRUE(sc_core::sc_pending_activity()) << "the refresh never ends";
+  std::vector<std::uint32_t> tags = reader.tags;
+  EXPECT_FALSE(std::is_sorted(tags.begin(), tags.end()));
+  std::sort(tags.begin(), tags.end());
+  for (std::uint32_t tag = 0; tag < 2000; ++tag) ASSERT_EQ(tags[tag], tag);
+  for (std::size_t i = 1; i < reader.issued.size(); ++i) ASSERT_GE(reader.issued[i] - reader.issued[i - 1], 2U);
+}
+
+TEST_F(MemoryPortTest, TheKernelKeepsStepWithTheClockWhereAMemoryHasTimeOfItsOwn) {
+  for (const unsigned kind : {0U, 1U, 2U}) {
+    fresh_simulation();
+    clock = std::make_unique<ClockDomain>("clock", 1000);
+    ClockDomain slow("slow", 4000);
+    Reader reader("reader", *clock, 1, 10);
+    FixedLatencyMemory memory("memory", kind == 1 ? slow : *clock, 2, 32, 1);
+    const std::unique_ptr<Relay> relay = bind(reader.memory.socket, memory, kind == 2);
+    clock->set_cycles_per_activation(64);
+    clock->run(cycles(1000));
+    EXPECT_EQ(reader.completed.size(), 10U);
+    EXPECT_EQ(clock->activations() < clock->edges(), kind == 0) << kind;
+  }
+}
+
+/// Answers at once, from a table that depends on sc_time.
+class DriftingMemory : public sc_core::sc_module, private tlm::tlm_fw_transport_if<>, public EarlyCompletionMemory {
+ public:
+  DriftingMemory(const sc_core::sc_module_name& name, const ClockDomain& domain)
+      : sc_module(name), socket("socket"), domain_(domain) {
+    socket.bind(*this);
+  }
+  tlm::tlm_target_socket<32> socket;
+
+ private:
+  Cycle serve(const MemoryRequest&, Cycle arrival) override { return arrival + 3; }
+  const ClockDomain& clock() const override { return domain_; }
+  bool has_own_time() const override { return true; }
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase&,
+                                     sc_core::sc_time& delay) override {
+    b_transport(payload, delay);
+    return tlm::TLM_COMPLETED;
+  }
+  void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) override {
+    delay += 3 * domain_.period();
+    payload.set_response_status(tlm::TLM_OK_RESPONSE);
+  }
+  bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
+
+  const ClockDomain& domain_;
+};
+
+TEST_F(MemoryPortTest, AnEarlyCompletionMemoryMayDeclareTimeOfItsOwn) {
+  Reader reader("reader", *clock, 1, 10);
+  DriftingMemory memory("memory", *clock);
+  reader.memory.socket.bind(memory.socket);
+  clock->set_cycles_per_activation(64);
+  clock->run(cycles(200));
+  EXPECT_EQ(reader.completed.size(), 10U);
+  EXPECT_EQ(clock->activations(), clock->edges());
+}
+
+/// What is thrown once the clock does not come to rest; empty if it does.
+std::string fault_before_rest(ClockDomain& clock) {
+  try {
+    while (!clock.run_to_rest(sc_core::sc_time(100, sc_core::SC_US))) {}
+  } catch (const SimulationFault& fault) {
+    return fault.what();
+  }
+  return "";
+}
+
+TEST_F(MemoryPortTest, AMemoryThatFallsSilentIsNamedWithTheOldestRequest) {
+  Reader reader("reader", *clock, 4, 100);
+  foreign::Dram dram("dram", cycles(1), cycles(30), cycles(60));
+  dram.fall_silent_after(10);
+  reader.memory.socket.bind(dram.socket);
+  const std::string what = fault_before_rest(*clock);
+  EXPECT_NE(what.find("reader.memory at cycle"), std::string::npos) << what;
+  EXPECT_NE(what.find("the read of 32 bytes at address 320 in cycle"), std::string::npos) << what;
+  EXPECT_NE(what.find("the oldest of 4"), std::string::npos) << what;
+  EXPECT_GE(sc_core::sc_time_stamp(), ClockDomain::longest_silence());
+  EXPECT_LE(sc_core::sc_time_stamp(), ClockDomain::longest_silence() + sc_core::sc_time(1, sc_core::SC_MS));
+}
+
+TEST_F(MemoryPortTest, AMemoryWithoutTimersThatFallsSilentIsNamedAtOnce) {
+  Reader reader("reader", *clock, 4, 100);
+  foreign::Dram dram("dram", cycles(1), cycles(30), cycles(60));
+  dram.never_refresh();
+  dram.fall_silent_after(0);
+  reader.memory.socket.bind(dram.socket);
+  const std::string what = fault_before_rest(*clock);
+  EXPECT_NE(what.find("the read of 32 bytes at address 0 in cycle 0, the oldest of 4"), std::string::npos) << what;
+  EXPECT_NE(what.find("nothing is left that could answer"), std::string::npos) << what;
+  EXPECT_LE(sc_core::sc_time_stamp(), sc_core::sc_time(100, sc_core::SC_US));
+}
+
+TEST_F(MemoryPortTest, AnErrorResponseFromAProcessOfTheMemoryIsAFaultOfThePort) {
+  Reader reader("reader", *clock, 4, 100);
+  foreign::Dram dram("dram", cycles(1), cycles(30), cycles(60));
+  dram.answer_with(tlm::TLM_ADDRESS_ERROR_RESPONSE);
+  reader.memory.socket.bind(dram.socket);
+  const std::string what = fault_before_rest(*clock);
+  EXPECT_NE(what.find("reader.memory at cycle"), std::string::npos) << what;
+  EXPECT_NE(what.find("TLM_ADDRESS_ERROR_RESPONSE"), std::string::npos) << what;
 }
 
 TEST_F(MemoryPortTest, AnAccessThatIsNotNaturallyAlignedIsRefused) {

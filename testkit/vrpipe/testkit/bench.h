@@ -121,7 +121,7 @@ class Bench {
   }
 
   /// Binds the unit's memory port to a memory of your own; without it, a FixedLatencyMemory is made.
-  void bind_memory(tlm::tlm_target_socket<32>& memory) {
+  void bind_memory(tlm::tlm_base_target_socket_b<32>& memory) {
     unit_->memory_socket()->bind(memory);
     memory_bound_ = true;
   }
@@ -139,15 +139,19 @@ class Bench {
   /// Ticks unit, sources and sinks in a random order, which changes nothing at `cycle`.
   void shuffle_ticks(std::uint64_t seed) { tick_seed_ = seed; }
 
-  /// Runs until nothing moves any more; once. Returns the last cycle in which something was asked to move; at `lt` and
-  /// `at` the clock need not come as far as the items.
-  /// Throws SimulationFault when that takes more than `limit` cycles.
+  /// Runs until nothing moves any more; once. Modules of your own may move an item again within 10,000 cycles; timers
+  /// that never end, as of a memory's refresh, are not waited for. Returns the last cycle in which something was asked to
+  /// move; at `lt` and `at` the clock need not come as far as the items. Throws SimulationFault when that takes more than
+  /// `limit` cycles, or a memory does not answer.
   Cycle run(Cycle limit = 10'000'000) {
     prepare();
+    std::uint64_t edges = 0;
     do {
       if (clock_->now() > limit) throw SimulationFault("bench", clock_->now(), "it does not come to rest");
+      edges = clock_->edges();
       clock_->run(sc_core::sc_time::from_value(clock_->period().value() * 10000));
-    } while (sc_core::sc_pending_activity());
+      clock_->check_answers();
+    } while (sc_core::sc_pending_activity() && !(clock_->at_rest() && clock_->edges() == edges));
     return clock_->now();
   }
 
