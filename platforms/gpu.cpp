@@ -120,6 +120,12 @@ void Gpu::check() const {
   }
 }
 
+bool Gpu::draw_is_over() const {
+  return !clock_->awaits_answers() && std::all_of(units_.begin(), units_.end(), [](const Placed& placed) {
+    return placed.unit->idle() && (!placed.unit->ends_draw() || placed.unit->end_of_draw() != never);
+  });
+}
+
 Cycle Gpu::run(std::atomic<float>* progress) {
   const RunRequest& request = configuration_.request();
   std::uint64_t seed = request.stall_seed;
@@ -139,10 +145,9 @@ Cycle Gpu::run(std::atomic<float>* progress) {
     clock_->set_tick_order(order);
   }
 
-  // Unless a memory of another make has time of its own, the kernel's need not advance in every cycle.
-  if (memories_.empty()) clock_->set_cycles_per_activation(64);
+  clock_->set_cycles_per_activation(64);
 
-  // In slices, so that progress shows; the clock is quiet once nothing is left to do.
+  // In slices, so that progress shows.
   const sc_core::sc_time slice = sc_core::sc_time::from_value(clock_->period().value() * 50000);
   const auto splats = static_cast<float>(std::max<std::size_t>(configuration_.draw().splats.size(), 1));
   const auto issued = [&] {
@@ -150,12 +155,15 @@ Cycle Gpu::run(std::atomic<float>* progress) {
     for (const OutPort* port : units_.front().unit->out_ports) warps += port->transferred();
     return static_cast<float>(warps * splats_per_vertex_warp);
   };
-  do {
-    clock_->run(slice);
-    if (progress != nullptr) {
-      *progress = std::min(1.0F, issued() / splats);
-    }
-  } while (sc_core::sc_pending_activity());
+  // A clock with a timer among its units is never at rest; what is still on its way when the last unit is done has long
+  // arrived after a slice.
+  bool over = false;
+  while (!clock_->run_to_rest(slice)) {
+    if (progress != nullptr) *progress = std::min(1.0F, issued() / splats);
+    const bool was_over = over;
+    over = draw_is_over();
+    if (was_over && over) break;
+  }
 
   Cycle passed = 0;
   bool any_end = false;

@@ -8,6 +8,7 @@
 #include <vrpipe/testkit/bench.h>
 
 #include "support/builders.h"
+#include "support/foreign_memory.h"
 
 namespace vrpipe {
 namespace {
@@ -365,6 +366,60 @@ TEST_F(CropUnitTest, ImageAndSignalsAreTheSameUnderAnyStallsAndMemory) {
       ASSERT_EQ(crop.warps.erase(&crop.pool.take()), 1U) << "a blended warp is back in its pool";
     }
     ASSERT_TRUE(crop.bench.unit().idle());
+  }
+}
+
+TEST_F(CropUnitTest, AMemoryOfAnotherMakeIsServedToTheEndWhateverItsRefresh) {
+  Bench bench("crop", "color-rop", state, {{"cache_bytes", "1024"}});
+  foreign::Dram dram("dram", sc_core::sc_time(1.5, sc_core::SC_NS), sc_core::sc_time(30, sc_core::SC_NS),
+                     sc_core::sc_time(75, sc_core::SC_NS));
+  bench.bind_memory(dram.socket);
+  Source<ColorBeat>& color = bench.source<ColorBeat>("in_color", 8);
+  bench.sink<TerminationBeat>("out_terminations", 64);
+  ShadedWarpPool pool;
+  for (unsigned i = 0; i < 2000; ++i) {
+    ShadedWarp& warp = pool.take();
+    warp.tile = {static_cast<std::uint16_t>(i / 4 * 7 % 64), static_cast<std::uint16_t>(i / 4 * 5 % 64)};
+    warp.count = 1;
+    warp.position[0] = static_cast<std::uint8_t>(i % 64);
+    warp.live[0] = all_lanes;
+    warp.first_primitive[0] = warp.last_primitive[0] = i + 1;
+    warp.color[0] = testing::color_of(0.01F, 0.01F, 0.01F, 0.01F);
+    ColorBeat beat;
+    beat.quads[beat.count++] = {&warp, 0};
+    color.add(beat);
+  }
+  ColorBeat last;
+  last.end_of_draw = true;
+  color.add(last);
+  bench.run();
+  EXPECT_NE(bench.unit().end_of_draw(), never);
+  EXPECT_EQ(bench.unit().occupancy().items(CropWork::blend), 2000U);
+  EXPECT_GE(dram.requests, 2000U);
+  EXPECT_EQ(dram.responses, dram.requests);
+  EXPECT_GT(dram.out_of_order, 0U);
+  EXPECT_TRUE(sc_core::sc_pending_activity()) << "its timer goes on";
+}
+
+TEST_F(CropUnitTest, ABenchNamesAMemoryThatFallsSilent) {
+  Bench bench("crop", "color-rop", state);
+  foreign::Dram dram("dram", sc_core::sc_time(1.5, sc_core::SC_NS), sc_core::sc_time(30, sc_core::SC_NS),
+                     sc_core::sc_time(75, sc_core::SC_NS));
+  dram.fall_silent_after(0);
+  bench.bind_memory(dram.socket);
+  ShadedWarpPool pool;
+  ShadedWarp& warp = pool.take();
+  warp.tile = {1, 0};
+  warp.count = 1;
+  warp.live[0] = all_lanes;
+  ColorBeat beat;
+  beat.quads[beat.count++] = {&warp, 0};
+  bench.source<ColorBeat>("in_color").add(beat);
+  try {
+    bench.run();
+    FAIL() << "it came to an end";
+  } catch (const SimulationFault& fault) {
+    EXPECT_NE(std::string(fault.what()).find("crop.memory"), std::string::npos) << fault.what();
   }
 }
 

@@ -40,6 +40,8 @@ class Gpu {
   void add(const Instance& instance, ColorSurface& surface);
   void add_memory(const MemoryInstance& memory);
   void check() const;
+  /// Whether the draw has ended everywhere, no unit has work left and no access to memory is under way.
+  bool draw_is_over() const;
   Unit* find(const std::string& path) const;
 
   const Configuration& configuration_;

@@ -1,0 +1,235 @@
+// A memory of another make in place of the L2, with times and timers of its own.
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/error.h>
+#include <vrpipe/memory_port.h>
+#include <vrpipe/platforms/wiring.h>
+
+#include "support/foreign_memory.h"
+#include "support/simulate.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::request_of;
+using testing::run;
+using testing::same_image;
+using testing::strictly;
+
+using Socket = tlm::tlm_base_target_socket_b<32>;
+
+/// agx-orin with a memory of another make in place of its L2.
+Platform with_memory(MemoryMaker make) {
+  Platform platform = platform_named("agx-orin");
+  platform.name = "foreign";
+  platform.wire = [make = std::move(make)](Netlist& netlist) {
+    netlist.add("draw");
+    netlist.add("vpo");
+    netlist.add_memory("dram", make);
+    wire_gpc(netlist, 0, "dram");
+  };
+  return platform;
+}
+
+/// The clock of the units, for what is not of another make.
+ClockDomain& clock_of_units() { return dynamic_cast<ClockDomain&>(*sc_core::sc_find_object("clock")); }
+
+sc_core::sc_time ns(double nanoseconds) { return sc_core::sc_time(nanoseconds, sc_core::SC_NS); }
+
+/// What a DRAM did, beyond its life, which ends with the run.
+struct Counts {
+  std::uint64_t requests = 0, responses = 0, refreshes = 0;
+};
+
+class CountedDram : public foreign::Dram {
+ public:
+  CountedDram(const std::string& name, Counts& counts) : Dram(name.c_str(), ns(1), ns(40), ns(70)), counts_(counts) {}
+  ~CountedDram() override { counts_ = {requests, responses, refreshes}; }
+
+ private:
+  Counts& counts_;
+};
+
+template <class Module>
+ForeignMemory as_memory(std::unique_ptr<Module> module) {
+  Socket& socket = module->socket;
+  return {std::move(module), {&socket}};
+}
+
+std::string fault_of(const RunRequest& request, const Draw& draw) {
+  try {
+    run(request, draw);
+  } catch (const SimulationFault& fault) {
+    return fault.what();
+  }
+  return "no fault";
+}
+
+constexpr Fidelity with_time[] = {Fidelity::lt, Fidelity::at, Fidelity::cycle};
+
+TEST(ForeignMemory, TakesThePlaceOfTheL2ThoughItsRefreshNeverEnds) {
+  const Draw draw = testing::random_draw(96, 96, 600, 21);
+  Counts dram;
+  const Platform platform = with_memory(
+      [&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
+  for (const char* variant : {"baseline", "het+qm"}) {
+    const RunResult expected = run(request_of(variant, Fidelity::functional, strictly), draw);
+    for (const Fidelity fidelity : with_time) {
+      const RunResult result = run(request_of(variant, fidelity,
+                                              [&](RunRequest& r) {
+                                                strictly(r);
+                                                r.platform = &platform;
+                                                r.settings = {{"crop", "cache_bytes", "2048"}};
+                                              }),
+                                   draw);
+      EXPECT_TRUE(same_image(result.surface, expected.surface)) << variant << " " << name_of(fidelity);
+      EXPECT_EQ(result.counts.named(), expected.counts.named()) << variant << " " << name_of(fidelity);
+      EXPECT_GT(dram.requests, 100U) << variant << " " << name_of(fidelity);
+      EXPECT_EQ(dram.responses, dram.requests) << variant << " " << name_of(fidelity);
+      // At lt what a warp leads to is annotated ahead of the kernel's time, which hardly passes.
+      EXPECT_GT(dram.refreshes, fidelity == Fidelity::lt ? 0U : 1U) << variant << " " << name_of(fidelity);
+    }
+  }
+}
+
+/// Passes the base protocol on, so that what is behind it cannot be asked directly.
+class Proxy : public sc_core::sc_module, private tlm::tlm_fw_transport_if<>, private tlm::tlm_bw_transport_if<> {
+ public:
+  explicit Proxy(const sc_core::sc_module_name& name) : sc_module(name), socket("socket"), out("out") {
+    socket.bind(*static_cast<tlm::tlm_fw_transport_if<>*>(this));
+    out.bind(*static_cast<tlm::tlm_bw_transport_if<>*>(this));
+  }
+  tlm::tlm_target_socket<32> socket;
+  tlm::tlm_initiator_socket<32> out;
+  std::unique_ptr<sc_core::sc_module> behind;
+
+ private:
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                                     sc_core::sc_time& delay) override {
+    return out->nb_transport_fw(payload, phase, delay);
+  }
+  tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                                     sc_core::sc_time& delay) override {
+    return socket->nb_transport_bw(payload, phase, delay);
+  }
+  void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) override {
+    out->b_transport(payload, delay);
+  }
+  bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
+  void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
+};
+
+/// Leaves its counters behind.
+class CountedMemory : public FixedLatencyMemory {
+ public:
+  CountedMemory(const sc_core::sc_module_name& name, std::vector<std::uint64_t>& counts)
+      : FixedLatencyMemory(name, clock_of_units(), 100, 32, 1), socket(port(0)), counts_(counts) {}
+  ~CountedMemory() override {
+    EXPECT_GT(traffic().accesses(MemoryTraffic::color, false), 100U);
+    EXPECT_GT(traffic().bytes(MemoryTraffic::color, true), 3200U);
+    for (const Counter* counter : counters()) counts_.push_back(counter->value());
+  }
+  Socket& socket;
+
+ private:
+  std::vector<std::uint64_t>& counts_;
+};
+
+TEST(ForeignMemory, ThroughSocketsAloneARunIsTheSameAsWithDirectCalls) {
+  const Draw draw = testing::random_draw(128, 96, 800, 22);
+  for (const Fidelity fidelity : with_time) {
+    for (const char* variant : {"baseline", "het+qm"}) {
+      std::string hashes[2];
+      std::vector<std::uint64_t> traffic[2];
+      for (const bool proxied : {false, true}) {
+        const Platform platform = with_memory([&](const std::string& name, unsigned) {
+          auto memory = std::make_unique<CountedMemory>("memory", traffic[proxied]);
+          if (!proxied) return as_memory(std::move(memory));
+          auto proxy = std::make_unique<Proxy>(name.c_str());
+          proxy->out.bind(memory->socket);
+          proxy->behind = std::move(memory);
+          return as_memory(std::move(proxy));
+        });
+        hashes[proxied] = run(request_of(variant, fidelity,
+                                         [&](RunRequest& r) {
+                                           r.platform = &platform;
+                                           r.settings = {{"crop", "cache_bytes", "2048"}};
+                                         }),
+                              draw)
+                              .result_hash;
+      }
+      EXPECT_EQ(hashes[0], hashes[1]) << variant << " " << name_of(fidelity);
+      EXPECT_EQ(traffic[0], traffic[1]) << variant << " " << name_of(fidelity);
+    }
+  }
+}
+
+TEST(ForeignMemory, ADeadlockIsFoundAndNamedThoughATimerGoesOn) {
+  const Draw draw = testing::random_draw(64, 64, 300, 7);
+  Counts dram;
+  Platform platform = with_memory(
+      [&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
+  platform.wire = [wire = platform.wire](Netlist& netlist) {
+    wire(netlist);
+    netlist.disconnect("gpc0.prop.out_release");  // the SMs run out of room for warps
+  };
+  const std::string message = fault_of(request_of("het", Fidelity::cycle,
+                                                  [&](RunRequest& r) {
+                                                    r.platform = &platform;
+                                                    r.settings = {{"sm", "cores", "1"}};
+                                                  }),
+                                       draw);
+  EXPECT_NE(message.find("deadlock"), std::string::npos) << message;
+  EXPECT_NE(message.find("gpc0.sm"), std::string::npos) << message;
+  EXPECT_GT(dram.refreshes, 0U);
+}
+
+TEST(ForeignMemory, ThatFallsSilentIsNamedWithItsPortAndTheOldestRequest) {
+  const Draw draw = testing::random_draw(64, 64, 300, 8);
+  for (const bool refreshes : {true, false}) {
+    Counts counts;
+    const Platform platform = with_memory([&](const std::string& name, unsigned) {
+      auto dram = std::make_unique<CountedDram>(name, counts);
+      dram->fall_silent_after(20);
+      if (!refreshes) dram->never_refresh();
+      return as_memory(std::move(dram));
+    });
+    const std::string message =
+        fault_of(request_of("baseline", Fidelity::cycle, [&](RunRequest& r) { r.platform = &platform; }), draw);
+    EXPECT_NE(message.find("gpc0_crop.memory"), std::string::npos) << message;
+    EXPECT_NE(message.find("no answer to the read of 32 bytes at address"), std::string::npos) << message;
+  }
+}
+
+/// A memory with a refresh that is counted in cycles of the units' clock, which then never comes to rest.
+class TickingMemory : public FixedLatencyMemory, public Clocked {
+ public:
+  TickingMemory(const std::string& name, ClockDomain& clock, bool ticks)
+      : FixedLatencyMemory(name.c_str(), clock, 100, 128, 1), socket(port(0)) {
+    if (ticks) clock.attach(*this);
+  }
+  Socket& socket;
+
+ private:
+  Cycle tick(Cycle now) override { return now + 1000; }
+};
+
+TEST(ForeignMemory, ATimerInTheClockOfTheUnitsDoesNotKeepARunUp) {
+  const Draw draw = testing::random_draw(64, 64, 300, 9);
+  for (const Fidelity fidelity : with_time) {
+    std::string hashes[2];
+    for (const bool ticks : {false, true}) {
+      const Platform platform = with_memory([&](const std::string& name, unsigned) {
+        return as_memory(std::make_unique<TickingMemory>(name, clock_of_units(), ticks));
+      });
+      hashes[ticks] =
+          run(request_of("het", fidelity, [&](RunRequest& r) { r.platform = &platform; }), draw).result_hash;
+    }
+    EXPECT_EQ(hashes[0], hashes[1]) << name_of(fidelity);
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe
