@@ -36,6 +36,7 @@ Configuration::Configuration(const RunRequest& request, const Draw& draw)
   for (const Setting& setting : request.platform->settings) {
     if (concerns_chosen_unit(setting)) apply(setting);
   }
+  for (const Setting& setting : request.variant.settings) apply(setting);
   for (const Setting& setting : request.settings) apply(setting);
   if (request.observers != nullptr) request.observers->check(netlist_);
 
@@ -86,7 +87,9 @@ void Configuration::choose_implementations() {
     unit.real = &registry.find(slot.name, instance.implementation);
     if (!unit.chosen->pass_through) unit.chosen = unit.real;
   }
-  for (const UnitChoice& choice : request_.units) {
+  std::vector<UnitChoice> choices = request_.variant.units;
+  choices.insert(choices.end(), request_.units.begin(), request_.units.end());
+  for (const UnitChoice& choice : choices) {
     const std::vector<const Instance*> named = instances_named(choice.slot);
     const std::string& slot = named.empty() ? choice.slot : named.front()->slot;
     const Implementation& implementation = registry.find(slot, choice.implementation);
@@ -180,9 +183,9 @@ void Configuration::set_link(const Setting& setting) {
   }
   if (found) return;
   throw UserError("unknown link '" + name + "'", "--set " + setting.unit + "." + setting.parameter, "no such link",
-                  known.empty() ? "the platform has none"
-                                : "did you mean " + link_prefix + nearest_name(name, known) +
-                                      "? `vrpipe platforms --verbose` lists all");
+                  known.empty()
+                      ? "the platform has none"
+                      : "did you mean " + link_prefix + nearest_name(name, known) + "? `vrpipe units` lists all");
 }
 
 std::unique_ptr<Behaviour> Configuration::make(const Instance& instance) const {

@@ -30,8 +30,9 @@ bool gpc_of(const std::string& path, unsigned& gpc) {
 
 LinkParameters::LinkParameters(std::uint32_t items, std::uint32_t cycles)
     : depth(*this, "depth", items, 1, 65536, "items", source::open, "that the receiver's queue holds"),
-      latency_cycles(*this, "latency_cycles", cycles, 1, 100000, "cycles", source::open, "from push to visibility"),
-      items_per_cycle(*this, "items_per_cycle", 0, 0, 65536, "items", source::open,
+      latency_cycles(*this, "latency_cycles", cycles, 1, 100000, "cycles", "a register between units",
+                     "from push to visibility"),
+      items_per_cycle(*this, "items_per_cycle", 0, 0, 65536, "items", "no limit but the units' own",
                       "that the link passes in a cycle; 0: as many as its ends move") {}
 
 std::pair<std::string, std::string> split_port(const std::string& port) {

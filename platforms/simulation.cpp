@@ -45,20 +45,40 @@ Fidelity fidelity_named(const std::string& name) {
                   fmt::format("did you mean {}? There are {}", nearest_name(name, names), fmt::join(names, ", ")));
 }
 
-const std::vector<Variant>& variants() {
-  static const std::vector<Variant> all{{"baseline", false, false},
-                                        {"qm", true, false},
-                                        {"het", false, true},
-                                        {"het+qm", true, true}};
+namespace {
+std::vector<Variant>& variant_list() {
+  static std::vector<Variant> all{{"baseline", false, false},
+                                  {"qm", true, false},
+                                  {"het", false, true},
+                                  {"het+qm", true, true}};
   return all;
+}
+}  // namespace
+
+const std::vector<Variant>& variants() { return variant_list(); }
+
+void add_variant(Variant variant) {
+  const std::vector<Variant>& known = variants();
+  const bool taken =
+      std::any_of(known.begin(), known.end(), [&](const Variant& each) { return each.name == variant.name; });
+  if (taken || variant.name.empty()) {
+    const std::string why = taken ? "there is one of that name" : "it has no name";
+    if (!is_loading_plugin())
+      throw UserError("cannot add variant '" + variant.name + "'", "add_variant", why, "choose another name");
+    return Registry::instance().add_problem({"variant '" + variant.name + "': " + why, "choose another name"});
+  }
+  variant_list().push_back(std::move(variant));
+  Registry::instance().count_registration();
 }
 
 const Variant& variant_named(const std::string& name) {
+  std::vector<std::string> names;
   for (const Variant& variant : variants()) {
     if (variant.name == name) return variant;
+    names.push_back(variant.name);
   }
   throw UserError("unknown variant '" + name + "'", "--variant", "there is no such variant",
-                  "use baseline, qm, het or het+qm");
+                  fmt::format("did you mean {}? There are {}", nearest_name(name, names), fmt::join(names, ", ")));
 }
 
 namespace {
@@ -449,7 +469,7 @@ std::vector<ParameterListing> list_parameters(const Platform* platform) {
     auto parameters = std::make_unique<LinkParameters>(link.parameters->depth, link.parameters->latency_cycles);
     apply({name, "link." + link.name()}, *parameters);
     listings.push_back(
-        {name, "link", without_gpc(link.from) + " to " + without_gpc(link.to), false, std::move(parameters)});
+        {name, "", without_gpc(link.from) + " to " + without_gpc(link.to), false, std::move(parameters)});
   }
 
   listings.push_back({"state", "draw-state", "the draw's state and the precision of the fixed-function hardware", false,

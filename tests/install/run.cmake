@@ -112,6 +112,9 @@ endif()
 set(wide ${WORK_DIR}/consumer/wide_platform.so)
 expect_success("agx-orin with two GPCs" ${vrpipe} platforms --plugin ${wide})
 expect_success("" ${vrpipe} run ${draw} --fidelity lt --plugin ${wide} --platform wide)
+expect_success("\"tgc.bins\": *32" ${vrpipe} run ${draw} --fidelity lt --plugin ${wide} --variant qm-small --json -)
+expect_success("qm-small" ${vrpipe} compare ${draw} --fidelity lt --plugin ${wide} --platform wide)
+expect_refusal("did you mean qm-small" ${vrpipe} run ${draw} --plugin ${wide} --variant qm-smal)
 
 # The slot: it counts at every fidelity what RASTER makes, and is listed with its parameter.
 set(tally --plugin ${WORK_DIR}/consumer/tally_slot.so)

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/error.h>
+#include <vrpipe/platforms/configuration.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/registry.h>
 #include <vrpipe/timed.h>
@@ -87,6 +88,29 @@ TEST(Platforms, WiringThatThrowsIsAFaultThatNamesThePlatform) {
   } catch (const SimulationFault& fault) {
     EXPECT_EQ(std::string(fault.what()), "platform broken at cycle 0: its wiring throws no such thing");
   }
+}
+
+TEST(Variants, MayBeAddedWithUnitsAndSettingsOfTheirOwn) {
+  Variant tiny = variant_named("qm");
+  EXPECT_THROW(add_variant(tiny), UserError);
+  tiny.name = "";
+  EXPECT_THROW(add_variant(tiny), UserError);
+  tiny.name = "tiny";
+  tiny.units = {{"qru", "pass-through"}};
+  tiny.settings = {{"tc", "bins", "7"}, {"tc", "bin_quads", "16"}};
+  add_variant(tiny);
+  RunRequest request = request_of("tiny", Fidelity::functional);
+  request.settings = {{"tc", "bins", "9"}};
+  const Draw draw = draw_of(16, 16);
+  const Configuration configuration(request, draw);
+  EXPECT_EQ(configuration.implementation(*configuration.netlist().find("gpc0.qru")).name, "pass-through");
+  const auto parameters = configuration.parameters();
+  const auto has = [&](const char* name, const char* value) {
+    return std::find(parameters.begin(), parameters.end(), std::pair<std::string, std::string>(name, value)) !=
+           parameters.end();
+  };
+  EXPECT_TRUE(has("tc.bins", "9")) << "the run's own settings come last";
+  EXPECT_TRUE(has("tc.bin_quads", "16"));
 }
 
 TEST(Modules, AreNotReplaced) {

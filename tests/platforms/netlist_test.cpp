@@ -142,7 +142,9 @@ TEST(Instances, ParametersNameAnInstanceOrAllOfAKind) {
   const Draw draw = random_draw(64, 64, 50, 4);
   RunRequest request = request_of("qm", Fidelity::functional);
   request.platform = &platform_named("desktop");
-  request.settings = {{"crop", "cache_bytes", "8192"}, {"gpc1.crop", "cache_bytes", "4096"}, {"link.tc.bins", "depth", "3"},
+  request.settings = {{"crop", "cache_bytes", "8192"},
+                      {"gpc1.crop", "cache_bytes", "4096"},
+                      {"link.tc.bins", "depth", "3"},
                       {"link.gpc2.tc.bins", "depth", "5"}};
   const Configuration configuration(request, draw);
   const auto bytes = [&](const std::string& path) {
@@ -176,7 +178,7 @@ TEST(Instances, UnknownPathsAndLinksGetTheNearestName) {
   const auto text = [&](const Setting& setting) { return refusal_of(desktop, Fidelity::functional, {setting}); };
   EXPECT_NE(text({"gpc9.crop", "cache_bytes", "4096"}).find("did you mean gpc"), std::string::npos);
   EXPECT_NE(text({"link.tc.bin", "depth", "4"}).find("link.tc.bins"), std::string::npos);
-  EXPECT_NE(text({"link.tc.bins", "deepth", "4"}).find("did you mean depth"), std::string::npos);
+  EXPECT_NE(text({"link.tc.bins", "deepth", "4"}).find("did you mean link.tc.bins.depth"), std::string::npos);
   EXPECT_NE(text({"link.tc.bins", "depth", "0"}).find("1 to 65536"), std::string::npos);
   const Platform none = edited("agx-orin", [](Netlist& netlist) { netlist.remove("gpc0.tgc"); });
   EXPECT_NE(refusal_of(none, Fidelity::functional, {{"tgc", "bins", "4"}}).find("has none"), std::string::npos);

@@ -55,8 +55,13 @@ std::string with_unit(const std::string& value, const Parameter& parameter) {
   return value + " " + unit;
 }
 
+std::string heading(const ParameterListing& unit) {
+  return unit.implementation.empty() ? unit.unit : unit.unit + "=" + unit.implementation;
+}
+
 /// How a heading calls the unit's part in a run; starts with a blank unless it is empty.
 std::string role(const ParameterListing& unit) {
+  if (unit.implementation.empty()) return "";
   return is_default(unit) ? " (default)" : unit.pass_through ? " (where a variant does without the unit)" : "";
 }
 
@@ -64,8 +69,7 @@ std::string as_text(const std::vector<ParameterListing>& units, const std::strin
   std::string text;
   for (const ParameterListing& unit : units) {
     if (!text.empty()) text += '\n';
-    text += style.bold(printable(unit.unit + "=" + unit.implementation)) + role(unit) + "\n  " +
-            printable(unit.description) + "\n";
+    text += style.bold(printable(heading(unit))) + role(unit) + "\n  " + printable(unit.description) + "\n";
     for (const Parameter* parameter : unit.parameters->parameters()) {
       text += fmt::format("  {} = {}", style.bold(unit.unit + "." + parameter->name()),
                           with_unit(parameter->value(), *parameter));
@@ -98,12 +102,12 @@ std::string as_markdown(const std::vector<ParameterListing>& units) {
   std::string slot;
   for (const ParameterListing& unit : units) {
     if (!text.empty()) text += '\n';
-    if (unit.unit != slot) {
-      slot = unit.unit;
+    const std::string chapter = unit.implementation.empty() ? "links" : unit.unit;
+    if (chapter != slot) {
+      slot = chapter;
       text += "## " + slot + "\n\n";
     }
-    text +=
-        fmt::format("### `{}={}`{}\n\n{}.\n", unit.unit, unit.implementation, role(unit), escaped(unit.description));
+    text += fmt::format("### `{}`{}\n\n{}.\n", heading(unit), role(unit), escaped(unit.description));
     if (!unit.parameters->parameters().empty()) {
       text += "\n| parameter | default | unit | allowed | meaning | default from |\n|---|---|---|---|---|---|\n";
     }

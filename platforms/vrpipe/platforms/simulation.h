@@ -29,16 +29,6 @@ const std::vector<Fidelity>& fidelities();
 /// Throws UserError naming those that exist.
 Fidelity fidelity_named(const std::string& name);
 
-/// Which of the paper's two extensions a run has.
-struct Variant {
-  std::string name;  ///< baseline, qm, het, het+qm
-  bool quad_merging = false;
-  bool early_termination = false;
-};
-const std::vector<Variant>& variants();
-/// Throws UserError naming those that exist.
-const Variant& variant_named(const std::string& name);
-
 /// `--set UNIT.PARAMETER=VALUE`.
 struct Setting {
   std::string unit;  ///< a slot, or a unit's path; link.NAME; l2; state
@@ -51,6 +41,22 @@ struct UnitChoice {
   std::string slot;  ///< or a unit's path
   std::string implementation;
 };
+
+/// Which of the paper's two extensions a run has, and perhaps units and settings of its own, which come before those of
+/// the run.
+struct Variant {
+  std::string name;  ///< baseline, qm, het, het+qm, or of a plugin
+  bool quad_merging = false;
+  bool early_termination = false;
+  std::vector<UnitChoice> units = {};
+  std::vector<Setting> settings = {};
+};
+/// The paper's four, then those that were added.
+const std::vector<Variant>& variants();
+/// Adds one of your own, as `add_platform` does a platform. Throws UserError for a name that is empty or taken.
+void add_variant(Variant variant);
+/// Throws UserError naming those that exist.
+const Variant& variant_named(const std::string& name);
 
 /// A GPU: units and the links between them.
 struct Platform {
@@ -166,8 +172,8 @@ void check_configuration(const RunRequest& request);
 
 /// What can be set by --set, per unit, with the platform's settings applied. For `vrpipe units` and the reference.
 struct ParameterListing {
-  std::string unit;
-  std::string implementation;
+  std::string unit;            ///< a slot, l2, state, or link.NAME
+  std::string implementation;  ///< empty for a link
   std::string description;
   bool pass_through = false;
   std::unique_ptr<ParameterSet> parameters;

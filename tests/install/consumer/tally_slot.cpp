@@ -23,8 +23,8 @@ class TallyBehaviour : public Behaviour {
 class QuadTally : public TallyBehaviour {
  public:
   struct Parameters : ParameterSet {
-    Integer beats_per_cycle{*this,   "beats_per_cycle", 4, 1, 64, "beats",
-                            "as many as RASTER makes fine tiles", "passed in a cycle"};
+    Integer beats_per_cycle{
+        *this, "beats_per_cycle", 4, 1, 64, "beats", "as many as RASTER makes fine tiles", "passed in a cycle"};
   };
   QuadTally(const Parameters& parameters, const RenderState&) : cost_{parameters.beats_per_cycle, 1} {}
   void pass(const QuadBeat& beat) override {
@@ -65,9 +65,9 @@ class UntimedTally : public UntimedUnit {
 /// At `lt` and `at`: an item is given with the cycle in which it becomes visible; the handler returns when it leaves.
 class TimedTally : public TimedUnit {
  public:
-  TimedTally(const std::string& name, ClockDomain& domain, std::unique_ptr<TallyBehaviour> behaviour,
+  TimedTally(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TallyBehaviour> behaviour,
              Transport transport)
-      : TimedUnit(name.c_str(), domain, kinds(behaviour->cost()), transport),
+      : TimedUnit(name, domain, kinds(behaviour->cost()), transport),
         out_(*this, "out_quads"),
         in_(*this, "in_quads", [this](const QuadBeat& beat, Span visible) { return pass(beat, visible.first); },
             {&out_}),
@@ -97,8 +97,8 @@ class TimedTally : public TimedUnit {
 /// At `cycle`: what the unit can do in one cycle.
 class TallyUnit : public Unit {
  public:
-  TallyUnit(const std::string& name, ClockDomain& domain, std::unique_ptr<TallyBehaviour> behaviour)
-      : Unit(name.c_str(), domain, kinds(behaviour->cost())),
+  TallyUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TallyBehaviour> behaviour)
+      : Unit(name, domain, kinds(behaviour->cost())),
         in_(*this, "in_quads"),
         out_(*this, "out_quads"),
         behaviour_(std::move(behaviour)),
@@ -152,11 +152,12 @@ const Registrar<QuadTally, TallyBehaviour> unit("tally", "quad-tally", "counts t
   register_timed_unit_maker("tally", [](const std::string& name, ClockDomain& domain,
                                         std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
                                         Transport transport) {
-    return std::make_unique<TimedTally>(name, domain, behaviour_as<TallyBehaviour>(std::move(behaviour)), transport);
+    return std::make_unique<TimedTally>(name.c_str(), domain, behaviour_as<TallyBehaviour>(std::move(behaviour)),
+                                        transport);
   });
   register_unit_maker("tally", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                   const RenderState&, unsigned) {
-    return std::make_unique<TallyUnit>(name, domain, behaviour_as<TallyBehaviour>(std::move(behaviour)));
+    return std::make_unique<TallyUnit>(name.c_str(), domain, behaviour_as<TallyBehaviour>(std::move(behaviour)));
   });
   add_platform(tallied());
   return true;

@@ -1,4 +1,5 @@
-// A platform as a plugin: `vrpipe compare --plugin wide_platform.so --platform wide`.
+// A platform and a variant as a plugin: `vrpipe compare --plugin wide_platform.so --platform wide`, whose table has the
+// variant beside the others.
 #include <vrpipe/platforms/wiring.h>
 #include <vrpipe/registry.h>
 
@@ -17,8 +18,18 @@ vrpipe::Platform wide() {
   return platform;
 }
 
+/// Quad merging with a quarter of the tile-grid bins.
+vrpipe::Variant small_bins() {
+  vrpipe::Variant variant;
+  variant.name = "qm-small";
+  variant.quad_merging = true;
+  variant.settings = {{"tgc", "bins", "32"}};
+  return variant;
+}
+
 [[maybe_unused]] const bool added = [] {
   vrpipe::add_platform(wide());
+  vrpipe::add_variant(small_bins());
   return true;
 }();
 
