@@ -99,7 +99,8 @@ TEST_F(CommandLine, ScenesPlatformsAndUnitsListEverything) {
   const nlohmann::json units_json = json_of({"units"});
   std::size_t index = 0;
   for (const ParameterListing& unit : tools::all_parameters(&platforms().front())) {
-    expect_in(units, {unit.unit + "=" + unit.implementation, unit.description});
+    expect_in(units,
+              {unit.implementation.empty() ? unit.unit : unit.unit + "=" + unit.implementation, unit.description});
     const nlohmann::json& entry = units_json["units"][index++];
     EXPECT_EQ(entry["slot"], unit.unit);
     EXPECT_EQ(entry["implementation"], unit.implementation);
