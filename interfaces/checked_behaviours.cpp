@@ -620,6 +620,13 @@ class CheckedUnit<CropBehaviour> final : public CheckedSlot<CropBehaviour> {
     }
     for (unsigned i = from; out.count > 0 && i < to; ++i) {
       if (out.line_of[i] >= out.count) fault("look_up", "quad {} needs line {} of {}", i, out.line_of[i], out.count);
+      ++line_accesses_;
+      sector_accesses_ += bits(out.sectors_of[i]);
+    }
+    for (unsigned i = 0; i < out.count; ++i) {
+      line_misses_ += out.lines[i].replaced ? 1 : 0;
+      sector_misses_ += bits(out.lines[i].filled);
+      written_back_ += bits(out.lines[i].written_back);
     }
   }
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override {
@@ -646,6 +653,21 @@ class CheckedUnit<CropBehaviour> final : public CheckedSlot<CropBehaviour> {
                       checked_->fragments_late_failed.value(),
                   fragments_, "fragments came in");
     check_counter("termination_signals", checked_->termination_signals.value(), signalled_, "signals went out");
+    if (line_accesses_ == 0) return;  // no cache, or one of the timing model's
+    const SectoredCacheStatistics& cache = checked_->cache_statistics;
+    check_counter("cache.line_accesses", cache.line_accesses.value(), line_accesses_, "quads needed a line");
+    check_counter("cache.line_hits", cache.line_hits.value(), line_accesses_ - line_misses_, "lines were held");
+    check_counter("cache.line_misses", cache.line_misses.value(), line_misses_, "lines were replaced");
+    check_counter("cache.sector_accesses", cache.sector_accesses.value(), sector_accesses_, "sectors were needed");
+    check_counter("cache.sector_hits", cache.sector_hits.value(), sector_accesses_ - sector_misses_,
+                  "sectors were there");
+    check_counter("cache.sector_misses", cache.sector_misses.value(), sector_misses_, "sectors were filled");
+    check_counter("cache.sectors_written_back", cache.sectors_written_back.value(), written_back_,
+                  "sectors were written back");
+    const std::uint64_t sector_bytes = cost().sector_bytes;
+    check_counter("cache.bytes_filled", cache.bytes_filled.value(), sector_bytes * sector_misses_, "bytes were filled");
+    check_counter("cache.bytes_written_back", cache.bytes_written_back.value(), sector_bytes * written_back_,
+                  "bytes were written back");
   }
 
  private:
@@ -661,8 +683,15 @@ class CheckedUnit<CropBehaviour> final : public CheckedSlot<CropBehaviour> {
     }
   }
 
+  static unsigned bits(std::uint32_t sectors) { return static_cast<unsigned>(__builtin_popcount(sectors)); }
+
   const bool signals_;
   const ColorFormat format_;
+  std::uint64_t line_accesses_ = 0;
+  std::uint64_t line_misses_ = 0;
+  std::uint64_t sector_accesses_ = 0;
+  std::uint64_t sector_misses_ = 0;
+  std::uint64_t written_back_ = 0;
   std::uint64_t quads_ = 0;
   std::uint64_t fragments_ = 0;
   std::uint64_t signalled_ = 0;

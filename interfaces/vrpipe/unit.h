@@ -11,13 +11,15 @@
 #include <vrpipe/clock_domain.h>
 #include <vrpipe/link.h>
 #include <vrpipe/occupancy.h>
+#include <vrpipe/statistic.h>
 #include <vrpipe/units.h>
 
 namespace vrpipe {
 
 /// A unit of a platform, at any fidelity: a functional model with ports. Ports are found by name, so that a platform wires
-/// units without knowing their classes.
-class Component : public PortOwner {
+/// units without knowing their classes. Its own statistics are those that the functional model cannot have, since they
+/// depend on time; reports show both together.
+class Component : public PortOwner, public StatisticSet {
  public:
   using PortOwner::PortOwner;
   /// Throws UserError naming the nearest port.

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include <vrpipe/cache_statistics.h>
 #include <vrpipe/payload.h>
 #include <vrpipe/rate.h>
 #include <vrpipe/render_state.h>
@@ -303,6 +304,9 @@ class CropBehaviour : public Behaviour {
   Counter quads_late_failed{*this, "quads_late_failed", "quads", "that fail a late depth or stencil test"};
   Counter fragments_late_failed{*this, "fragments_late_failed", "fragments", "that fail a late depth or stencil test"};
   Counter termination_signals{*this, "termination_signals", "signals", "sent to ZROP, one for a quad's pixels"};
+  /// Of the colour cache; its accesses are quads. Whoever simulates it counts: the unit in `look_up`, or the timing model
+  /// that follows fills through the cache.
+  SectoredCacheStatistics cache_statistics{*this, "cache"};
 
  protected:
   ColorSurface* surface_ = nullptr;

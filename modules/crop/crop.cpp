@@ -33,7 +33,7 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
 template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
   if (!cache_) {
-    cache_ = make_crop_cache(cost_, *surface_);
+    cache_ = make_crop_cache(cost_, *surface_, cache_statistics);
     sectors_of_quads_ = sectors_of_quads(cost_, *surface_);
   }
   const std::uint64_t tile = surface_->address(warp.tile, 0);
@@ -62,6 +62,9 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
     out.lines[place].sectors = sectors_at[place];
     cache_->access(out.lines[place]);
   }
+  // All quads need as many sectors.
+  const std::uint32_t of_a_quad = sectors_of_quads_.front().sectors;
+  cache_->accessed(to - from, (to - from) * static_cast<unsigned>(__builtin_popcount(of_a_quad)));
 }
 
 // Out of line, so that the common case stays short.

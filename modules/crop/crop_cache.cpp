@@ -3,13 +3,17 @@
 
 namespace vrpipe {
 
-CropCache::CropCache(std::uint32_t cache_bytes, std::uint32_t line_bytes, std::uint64_t surface_bytes)
-    : line_shift_(static_cast<unsigned>(__builtin_ctz(line_bytes))),
-      lines_(cache_bytes / line_bytes),
-      line_of_tag_((surface_bytes + line_bytes - 1) / line_bytes, no_line) {}
+CropCache::CropCache(const Sizes& sizes, std::uint64_t surface_bytes, SectoredCacheStatistics& statistics)
+    : line_shift_(static_cast<unsigned>(__builtin_ctz(sizes.line_bytes))),
+      sector_bytes_(sizes.sector_bytes),
+      statistics_(&statistics),
+      lines_(sizes.cache_bytes / sizes.line_bytes),
+      line_of_tag_((surface_bytes + sizes.line_bytes - 1) / sizes.line_bytes, no_line) {}
 
 CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dirty, std::uint64_t& evicted_address) {
   evicted_dirty = 0;
+  ++allocated_;
+  ++statistics_->line_misses;
   Line line = used_;
   if (used_ < lines_.size()) {
     ++used_;
@@ -17,6 +21,10 @@ CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dir
     line = oldest_;
     evicted_dirty = lines_[line].dirty;
     evicted_address = lines_[line].tag << line_shift_;
+    const auto sectors = static_cast<unsigned>(__builtin_popcount(evicted_dirty));
+    ++statistics_->lines_evicted;
+    statistics_->sectors_written_back += sectors;
+    statistics_->bytes_written_back += sectors * sector_bytes_;
     line_of_tag_[lines_[line].tag] = no_line;
     unlink(line);
   }
@@ -30,9 +38,10 @@ CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dir
   return line;
 }
 
-CropCache make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface) {
+CropCache make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface,
+                          SectoredCacheStatistics& statistics) {
   cost.check_cache(surface.format());
-  return {cost.cache_bytes, cost.line_bytes, surface.size_bytes()};
+  return {{cost.cache_bytes, cost.line_bytes, cost.sector_bytes}, surface.size_bytes(), statistics};
 }
 
 std::array<QuadSectors, positions_per_tile> sectors_of_quads(const CropBehaviour::Cost& cost,

@@ -16,7 +16,11 @@ class CropCache {
   using Line = std::uint32_t;
   static constexpr Line no_line = ~0U;
 
-  CropCache(std::uint32_t cache_bytes, std::uint32_t line_bytes, std::uint64_t surface_bytes);
+  struct Sizes {
+    std::uint32_t cache_bytes, line_bytes, sector_bytes;
+  };
+  /// What happens in it is counted in `statistics`, which outlive it.
+  CropCache(const Sizes& sizes, std::uint64_t surface_bytes, SectoredCacheStatistics& statistics);
 
   /// The line that holds the address; `no_line` when none does.
   Line find(std::uint64_t address) const { return line_of_tag_[address >> line_shift_]; }
@@ -36,15 +40,29 @@ class CropCache {
   // Sectors are a bit each.
   std::uint32_t filling(Line line) const { return lines_[line].filling; }  ///< those on their way
   std::uint32_t absent(Line line) const { return ~(lines_[line].present | lines_[line].filling); }
-  void start_fill(Line line, unsigned sector) { lines_[line].filling |= 1U << sector; }
+  void start_fill(Line line, unsigned sector) {
+    lines_[line].filling |= 1U << sector;
+    count_fills(1);
+  }
   void finish_fill(Line line, unsigned sector) {
     lines_[line].filling &= ~(1U << sector);
     lines_[line].present |= 1U << sector;
   }
   void dirty(Line line, std::uint32_t sectors) { lines_[line].dirty |= sectors; }
+  /// Ends the accesses of so many quads, which need so many sectors: those for which nothing was allocated or filled
+  /// since the accesses before were hits.
+  void accessed(std::uint64_t quads, std::uint64_t sectors) {
+    statistics_->line_accesses += quads;
+    statistics_->line_hits += quads - allocated_;
+    statistics_->sector_accesses += sectors;
+    statistics_->sector_hits += sectors - asked_for_;
+    allocated_ = 0;
+    asked_for_ = 0;
+  }
 
   /// All at once for sectors of a line (`address` and `sectors` are given): looks it up, allocates and fills. Lines go
   /// in the same order as with pins, since the line that was looked up the longest ago is the first to lose its last pin.
+  /// `accessed` follows.
   void access(CropBehaviour::LineAccess& access) {
     access.line = find(access.address);
     access.written_back = 0;
@@ -58,6 +76,7 @@ class CropCache {
     Entry& entry = lines_[access.line];
     access.filled = access.sectors & ~entry.present;
     entry.present |= access.sectors;
+    count_fills(static_cast<unsigned>(__builtin_popcount(access.filled)));
   }
 
  private:
@@ -70,6 +89,11 @@ class CropCache {
     Line newer = no_line;
     Line older = no_line;
   };
+  void count_fills(unsigned sectors) {
+    asked_for_ += sectors;
+    statistics_->sector_misses += sectors;
+    statistics_->bytes_filled += sectors * sector_bytes_;
+  }
   void unlink(Line line) {
     const Entry& entry = lines_[line];
     (entry.newer == no_line ? newest_ : lines_[entry.newer].older) = entry.older;
@@ -84,6 +108,10 @@ class CropCache {
   }
 
   unsigned line_shift_;  ///< log2 of the bytes of a line
+  std::uint64_t sector_bytes_;
+  SectoredCacheStatistics* statistics_;
+  std::uint64_t allocated_ = 0;  ///< lines, in the accesses under way
+  std::uint64_t asked_for_ = 0;  ///< sectors to fill, in these
   std::uint32_t used_ = 0;
   Line newest_ = no_line;  ///< of the lines that are not pinned
   Line oldest_ = no_line;
@@ -92,7 +120,8 @@ class CropCache {
 };
 
 /// The cache of a CROP for its surface. Throws UserError for sizes that cannot be.
-CropCache make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface);
+CropCache make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface,
+                          SectoredCacheStatistics& statistics);
 
 /// Where a quad stands in the modelled memory.
 struct QuadSectors {

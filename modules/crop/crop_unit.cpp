@@ -60,8 +60,9 @@ class CropUnit : public Unit {
     if (surface_ == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     sector_shift_ = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
     line_shift_ = static_cast<unsigned>(__builtin_ctz(cost_.line_bytes));
-    cache_ = make_crop_cache(cost_, *surface_);
+    cache_ = make_crop_cache(cost_, *surface_, dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics);
     sectors_of_quads_ = sectors_of_quads(cost_, *surface_);
+    sectors_of_a_quad_ = static_cast<unsigned>(__builtin_popcount(sectors_of_quads_.front().sectors));
     monitor_.emplace(surface_->width(), surface_->height());
   }
 
@@ -113,11 +114,16 @@ class CropUnit : public Unit {
       const auto sector = static_cast<unsigned>(__builtin_ctz(missing));
       memory_.read(address + (std::uint64_t{sector} << sector_shift_), cost_.sector_bytes, fill_tag(line, sector));
       cache_->start_fill(line, sector);
+      asked_for_ |= 1U << sector;
       ++fills_in_flight_;
       tokens_ -= sector_price_;
       did(CropWork::sectors, 1, now());
     }
     cache_->pin(line);
+    if (const std::uint32_t on_their_way = cache_->filling(line) & sectors & ~asked_for_; on_their_way != 0) {
+      hits_on_their_way_ += static_cast<unsigned>(__builtin_popcount(on_their_way));
+    }
+    asked_for_ = 0;
     // In place: a temporary of narrow stores would be waited for when it is copied.
     Entry& entry = queue_.push();
     entry.quad = quad;
@@ -134,6 +140,9 @@ class CropUnit : public Unit {
       const ColorBeat& beat = in_.front();
       if (beat.end_of_draw) {
         ending_ = true;
+        // Once a draw: counting every quad would show.
+        cache_->accessed(looked_up_, looked_up_ * sectors_of_a_quad_);
+        looked_up_ = 0;
         in_.pop();
         return true;
       }
@@ -142,6 +151,7 @@ class CropUnit : public Unit {
         moved = true;
       }
       if (at_ == beat.count) {
+        looked_up_ += at_;
         in_.pop();
         at_ = 0;
       }
@@ -267,6 +277,7 @@ class CropUnit : public Unit {
   Ring<Entry> queue_;          ///< looked up and waiting to be blended
   unsigned at_ = 0;            ///< quads taken of the beat at the link
   unsigned fills_in_flight_ = 0;
+  std::uint32_t asked_for_ = 0;   ///< sectors of its line that the quad at the link had filled
   std::uint32_t write_back_ = 0;  ///< dirty sectors of an evicted line yet to be sent
   std::uint64_t write_back_address_ = 0;
   std::int64_t tokens_ = 0;
@@ -277,6 +288,11 @@ class CropUnit : public Unit {
   Cycle last_blend_ = 0;
   Cycle end_ = never;
   bool any_blended_ = false;
+  std::uint64_t looked_up_ = 0;  ///< quads of the draw
+  unsigned sectors_of_a_quad_ = 0;
+  StatisticSet cache_statistics_{*this, "cache"};
+  Counter hits_on_their_way_{cache_statistics_, "sector_hits_on_their_way", "sectors",
+                             "hit while they are still being filled, at cycle"};
 };
 
 [[maybe_unused]] const bool registered = [] {

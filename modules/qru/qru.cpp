@@ -16,6 +16,7 @@ PairingQru::PairingQru(const Parameters& parameters, const RenderState&)
 }
 
 void PairingQru::launch(Warp& out) {
+  warp_sizes.see(warp_.count);
   out = warp_;
   warp_.count = 0;
   warp_.merge_pairs = 0;
@@ -85,6 +86,7 @@ std::uint64_t PairingQru::storage_bytes() const {
 }
 
 void QruPassThrough::launch(Warp& out) {
+  warp_sizes.see(warp_.count);
   out = warp_;
   warp_.count = 0;
   ++warps;

@@ -5,6 +5,9 @@
 
 namespace vrpipe {
 
+/// A bucket for each number of quads.
+inline constexpr Histogram::Buckets warp_size_buckets = Histogram::Buckets::linear(1, quads_per_warp + 2);
+
 /// Quad reorder unit (paper 5.3): 64 position registers pair overlapping quads of a bin, a 128-bit bitmap tells which
 /// are left for the end. A register that holds a quad means a pair, and is then empty again.
 class PairingQru : public QruBehaviour {
@@ -46,6 +49,7 @@ class PairingQru : public QruBehaviour {
   Counter warps{*this, "warps", "warps", "launched"};
   Counter pairs{*this, "pairs", "pairs", "of overlapping quads marked for merging"};
   Counter quads_examined{*this, "quads", "quads", "examined"};
+  Histogram warp_sizes{*this, warp_size_buckets, "quads_per_warp", "quads", "in a warp launched"};
 
  private:
   static constexpr std::uint16_t no_quad = 0xffff;
@@ -76,6 +80,7 @@ class QruPassThrough : public QruBehaviour {
 
   Counter warps{*this, "warps", "warps", "launched"};
   Counter quads_examined{*this, "quads", "quads", "examined"};
+  Histogram warp_sizes{*this, warp_size_buckets, "quads_per_warp", "quads", "in a warp launched"};
 
  private:
   void launch(Warp& out);

@@ -23,6 +23,7 @@ void TileCoalescing::flush_bin(std::uint32_t index, FlushReason reason, Flush& o
   Bin& bin = bins_[index];
   out.tile = bin.tile;
   out.reason = reason;
+  flush_sizes.see(bin.quads.size());
   out.quads.clear();
   std::swap(out.quads, bin.quads);
   bin.quads.reserve(bin_quads_);

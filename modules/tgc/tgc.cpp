@@ -65,6 +65,7 @@ void TileGridCoalescing::flush_bin(std::uint32_t index, Flush& out) {
   const auto x = static_cast<std::int32_t>(bin.grid % grids_x_);
   const auto y = static_cast<std::int32_t>(bin.grid / grids_x_);
   out.clip = {x * grid_pixels_, y * grid_pixels_, (x + 1) * grid_pixels_, (y + 1) * grid_pixels_};
+  flush_sizes.see(bin.primitives.size());
   out.primitives.clear();
   std::swap(out.primitives, bin.primitives);
   bin_of_grid_[bin.grid] = -1;

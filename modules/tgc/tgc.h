@@ -52,6 +52,7 @@ class TileGridCoalescing : public TgcBehaviour {
 
   Counter entries{*this, "entries", "entries", "primitives entered into bins; one for each grid touched"};
   Counter evictions{*this, "evictions", "flushes", "of these, to make room"};
+  Histogram flush_sizes{*this, Histogram::Buckets::log2(), "primitives_per_flush", "primitives", "in a flushed bin"};
 
  private:
   struct Bin {

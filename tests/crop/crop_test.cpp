@@ -1,11 +1,16 @@
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <deque>
+#include <list>
 #include <memory>
+#include <set>
 
 #include <gtest/gtest.h>
 
 #include <vrpipe/error.h>
 #include <vrpipe/half.h>
+#include <vrpipe/random.h>
 #include <vrpipe/registry.h>
 
 #include "crop/crop_cache.h"
@@ -269,8 +274,13 @@ TEST_F(ColorRopTest, QuadsPerCycleFollowTheFormat) {
   }
 }
 
+struct Counted : StatisticSet {
+  SectoredCacheStatistics statistics{*this, "cache"};
+};
+
 TEST(CropCache, HoldsItsLinesAndThenLetsTheOldestUnneededGo) {
-  CropCache cache(512, 128, 4096);
+  Counted counted;
+  CropCache cache({512, 128, 32}, 4096, counted.statistics);
   unsigned dirty = 0;
   std::uint64_t evicted = 0;
   CropCache::Line lines[4];
@@ -291,7 +301,8 @@ TEST(CropCache, HoldsItsLinesAndThenLetsTheOldestUnneededGo) {
 }
 
 TEST(CropCache, NoLineCanBeHadWhileAllAreNeeded) {
-  CropCache cache(256, 128, 4096);
+  Counted counted;
+  CropCache cache({256, 128, 32}, 4096, counted.statistics);
   unsigned dirty = 0;
   std::uint64_t evicted = 0;
   const CropCache::Line a = cache.allocate(0, dirty, evicted);
@@ -307,7 +318,8 @@ TEST(CropCache, NoLineCanBeHadWhileAllAreNeeded) {
 }
 
 TEST(CropCache, SectorsComeOneByOneAndGoWithTheirLine) {
-  CropCache cache(128, 128, 4096);
+  Counted counted;
+  CropCache cache({128, 128, 32}, 4096, counted.statistics);
   unsigned dirty = 0;
   std::uint64_t evicted = 0;
   CropCache::Line line = cache.allocate(0, dirty, evicted);
@@ -321,6 +333,162 @@ TEST(CropCache, SectorsComeOneByOneAndGoWithTheirLine) {
   line = cache.allocate(256, dirty, evicted);
   EXPECT_EQ(cache.absent(line) & 15U, 0b1111U);
   EXPECT_EQ(dirty, 0U);
+}
+
+/// A cache as a list of lines, the one needed the longest ago first, and what it should count.
+class LruOracle {
+ public:
+  LruOracle(std::size_t lines, std::uint64_t line_bytes) : lines_(lines), line_bytes_(line_bytes) {}
+
+  struct Line {
+    std::uint64_t tag;
+    std::set<unsigned> present, dirty;
+    unsigned pins = 0;
+  };
+  /// A quad needs sectors of a line; null when no line can be had for it.
+  Line* access(std::uint64_t address, const std::vector<unsigned>& needed) {
+    const std::uint64_t tag = address / line_bytes_;
+    auto found = std::find_if(held.begin(), held.end(), [&](const Line& line) { return line.tag == tag; });
+    const bool hit = found != held.end();
+    if (!hit) {
+      if (held.size() == lines_) {
+        const auto oldest = std::find_if(held.begin(), held.end(), [](const Line& line) { return line.pins == 0; });
+        if (oldest == held.end()) return nullptr;
+        written_back += oldest->dirty.size();
+        ++evicted;
+        held.erase(oldest);
+      }
+      found = held.insert(held.end(), Line{tag, {}, {}});
+    }
+    ++(hit ? line_hits : line_misses);
+    for (const unsigned sector : needed) ++(found->present.insert(sector).second ? sector_misses : sector_hits);
+    held.splice(held.end(), held, found);
+    return &held.back();
+  }
+  void needed_last(Line* line) {
+    const auto at = std::find_if(held.begin(), held.end(), [&](const Line& other) { return &other == line; });
+    held.splice(held.end(), held, at);
+  }
+  void expect_equal(const SectoredCacheStatistics& actual, std::uint64_t sector_bytes) const {
+    EXPECT_EQ(actual.line_hits.value(), line_hits);
+    EXPECT_EQ(actual.line_misses.value(), line_misses);
+    EXPECT_EQ(actual.line_accesses.value(), line_hits + line_misses);
+    EXPECT_EQ(actual.lines_evicted.value(), evicted);
+    EXPECT_EQ(actual.sector_hits.value(), sector_hits);
+    EXPECT_EQ(actual.sector_misses.value(), sector_misses);
+    EXPECT_EQ(actual.sector_accesses.value(), sector_hits + sector_misses);
+    EXPECT_EQ(actual.sectors_written_back.value(), written_back);
+    EXPECT_EQ(actual.bytes_filled.value(), sector_bytes * sector_misses);
+    EXPECT_EQ(actual.bytes_written_back.value(), sector_bytes * written_back);
+  }
+
+  std::list<Line> held;
+  std::uint64_t line_hits = 0, line_misses = 0, evicted = 0, sector_hits = 0, sector_misses = 0, written_back = 0;
+
+ private:
+  const std::size_t lines_;
+  const std::uint64_t line_bytes_;
+};
+
+/// Random accesses, most of them near the one before.
+struct RandomAccess {
+  std::uint64_t address;  ///< of the line
+  std::vector<unsigned> needed;
+  std::uint32_t sectors = 0;
+  RandomAccess(std::uint64_t seed, std::uint64_t line_bytes, unsigned sectors_of_line, std::uint64_t lines) {
+    const std::uint64_t near = seed / 20 % lines;
+    address = line_bytes * (mix(seed) % 4 == 0 ? mix(seed + 1) % lines : (near + mix(seed + 2) % 6) % lines);
+    for (unsigned sector = 0; sector < sectors_of_line; ++sector) {
+      if (mix(seed + 3) >> sector & 1U) needed.push_back(sector), sectors |= 1U << sector;
+    }
+  }
+};
+
+struct CacheShape {
+  std::uint32_t lines, line_bytes, sector_bytes;
+};
+class CropCacheOfShape : public ::testing::TestWithParam<CacheShape> {};
+INSTANTIATE_TEST_SUITE_P(Shapes, CropCacheOfShape,
+                         ::testing::Values(CacheShape{1, 128, 32}, CacheShape{2, 128, 128}, CacheShape{8, 128, 32},
+                                           CacheShape{16, 1024, 32}, CacheShape{32, 64, 16}));
+
+TEST_P(CropCacheOfShape, CountsAsAListOfLinesDoes) {
+  const auto [lines, line_bytes, sector_bytes] = GetParam();
+  constexpr std::uint64_t lines_of_surface = 64;
+  Counted counted;
+  CropCache cache({lines * line_bytes, line_bytes, sector_bytes}, lines_of_surface * line_bytes, counted.statistics);
+  LruOracle oracle(lines, line_bytes);
+  for (std::uint64_t i = 0; i < 20000; ++i) {
+    const RandomAccess random(10 * i, line_bytes, line_bytes / sector_bytes, lines_of_surface);
+    CropBehaviour::LineAccess access;
+    access.address = random.address;
+    access.sectors = random.sectors;
+    cache.access(access);
+    cache.accessed(1, static_cast<unsigned>(random.needed.size()));
+    LruOracle::Line* const line = oracle.access(random.address, random.needed);
+    if (mix(i) % 3 != 0) continue;
+    cache.dirty(access.line, random.sectors);
+    line->dirty.insert(random.needed.begin(), random.needed.end());
+  }
+  oracle.expect_equal(counted.statistics, sector_bytes);
+  EXPECT_GT(oracle.sector_hits, 100U);
+  EXPECT_GT(oracle.evicted, 100U);
+}
+
+// As CROP does at cycle: lines of queued quads stay, fills take their time, a look-up goes on where it had to stop.
+TEST_P(CropCacheOfShape, CountsTheSameWhileFillsAreOnTheirWay) {
+  const auto [lines, line_bytes, sector_bytes] = GetParam();
+  constexpr std::uint64_t lines_of_surface = 64;
+  Counted counted;
+  CropCache cache({lines * line_bytes, line_bytes, sector_bytes}, lines_of_surface * line_bytes, counted.statistics);
+  LruOracle oracle(lines, line_bytes);
+  struct Queued {
+    CropCache::Line line;
+    std::uint32_t sectors;
+    LruOracle::Line* expected;
+    std::vector<unsigned> needed;
+  };
+  std::deque<Queued> queue;
+  std::deque<std::pair<CropCache::Line, unsigned>> fills;
+  const auto finish_fill = [&] {
+    cache.finish_fill(fills.front().first, fills.front().second);
+    fills.pop_front();
+  };
+  const auto blend = [&](std::uint64_t seed) {
+    const Queued quad = queue.front();
+    queue.pop_front();
+    while ((cache.filling(quad.line) & quad.sectors) != 0) finish_fill();
+    if (mix(seed) % 2 == 0) {
+      cache.dirty(quad.line, quad.sectors);
+      quad.expected->dirty.insert(quad.needed.begin(), quad.needed.end());
+    }
+    cache.unpin(quad.line);
+    if (--quad.expected->pins == 0) oracle.needed_last(quad.expected);
+  };
+  for (std::uint64_t i = 0; i < 20000; ++i) {
+    const RandomAccess random(10 * i, line_bytes, line_bytes / sector_bytes, lines_of_surface);
+    while (queue.size() > mix(i) % (2 * lines)) blend(i);
+    CropCache::Line line = cache.find(random.address);
+    while (line == CropCache::no_line && !cache.can_allocate()) blend(i);
+    LruOracle::Line* const expected = oracle.access(random.address, random.needed);
+    ASSERT_NE(expected, nullptr);
+    if (line == CropCache::no_line) {
+      unsigned dirty = 0;
+      std::uint64_t evicted = 0;
+      line = cache.allocate(random.address, dirty, evicted);
+    }
+    for (std::uint32_t missing = random.sectors & cache.absent(line); missing != 0; missing &= missing - 1) {
+      const auto sector = static_cast<unsigned>(__builtin_ctz(missing));
+      cache.start_fill(line, sector);
+      fills.emplace_back(line, sector);
+      if (mix(i + sector) % 4 == 0) finish_fill();
+    }
+    cache.pin(line);
+    cache.accessed(1, static_cast<unsigned>(random.needed.size()));
+    ++expected->pins;
+    queue.push_back({line, random.sectors, expected, random.needed});
+  }
+  oracle.expect_equal(counted.statistics, sector_bytes);
 }
 
 TEST(CropCache, SectorsMoveInTheLongestNaturallyAlignedRuns) {

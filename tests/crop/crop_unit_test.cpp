@@ -170,6 +170,52 @@ TEST_F(CropUnitTest, QuadsInTheSameSectorAskForItOnce) {
   EXPECT_EQ(crop.memory.bytes_read, 32U);
 }
 
+std::uint64_t hits_on_their_way(CropBench& crop) { return crop.bench.unit().parts().at(0)->counters().at(0)->value(); }
+
+TEST_F(CropUnitTest, HitsOnASectorThatIsStillBeingFilledAreCountedApart) {
+  CropBench crop(state, {}, 100);
+  for (unsigned i = 0; i < 20; ++i) crop.quad({0, 0}, 5);
+  crop.flush();
+  for (unsigned i = 0; i < 7; ++i) crop.quad({0, 0}, 5, 0.01F, all_lanes, 1000);
+  crop.run();
+  const SectoredCacheStatistics& cache = crop.bench.behaviour<CropBehaviour>().cache_statistics;
+  EXPECT_EQ(cache.line_accesses.value(), 27U);
+  EXPECT_EQ(cache.line_misses.value(), 1U);
+  EXPECT_EQ(cache.sector_misses.value(), 1U);
+  EXPECT_EQ(cache.sector_hits.value(), 26U);
+  EXPECT_EQ(hits_on_their_way(crop), 19U);
+}
+
+TEST_F(CropUnitTest, TheCacheCountsWhatTheMemorySeesUnderAnyStalls) {
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    state.format = seed % 3 == 0 ? ColorFormat::rgba8 : seed % 3 == 1 ? ColorFormat::rgba16f : ColorFormat::rgba32f;
+    CropBench crop(state,
+                   {{"cache_bytes", seed % 2 == 0 ? "512" : "4096"},
+                    {"mshrs", seed % 4 == 0 ? "1" : "16"},
+                    {"input_quads", seed % 5 == 0 ? "1" : "64"}},
+                   static_cast<unsigned>(1 + seed * 7 % 300));
+    constexpr unsigned quads = 600;
+    for (std::uint64_t i = 0; i < quads; ++i) {
+      crop.quad({static_cast<std::uint16_t>(mix(i) % 3), 0}, static_cast<unsigned>(mix(i + 999) % 64), 0.3F);
+    }
+    crop.bench.stall_randomly(seed, 90);
+    ASSERT_NE(crop.run(), never) << seed;
+    const SectoredCacheStatistics& cache = crop.bench.behaviour<CropBehaviour>().cache_statistics;
+    const unsigned sectors_of_a_quad = state.format == ColorFormat::rgba32f ? 2 : 1;
+    EXPECT_EQ(cache.line_accesses.value(), quads);
+    EXPECT_EQ(cache.line_hits.value() + cache.line_misses.value(), quads);
+    EXPECT_EQ(cache.sector_accesses.value(), quads * sectors_of_a_quad);
+    EXPECT_EQ(cache.sector_hits.value() + cache.sector_misses.value(), quads * sectors_of_a_quad);
+    EXPECT_LE(hits_on_their_way(crop), cache.sector_hits.value());
+    EXPECT_EQ(cache.bytes_filled.value(), 32 * cache.sector_misses.value());
+    EXPECT_EQ(cache.bytes_written_back.value(), 32 * cache.sectors_written_back.value());
+    EXPECT_EQ(cache.bytes_filled.value(), crop.memory.bytes_read) << seed;
+    // The line evicted last waits for the next quad.
+    EXPECT_GE(cache.bytes_written_back.value(), crop.memory.bytes_written) << seed;
+    EXPECT_LE(cache.bytes_written_back.value(), crop.memory.bytes_written + 128) << seed;
+  }
+}
+
 TEST_F(CropUnitTest, MovingSectorsTakesCyclesFromBlending) {
   // 4096 quads, each of its own sector: CROP cycles = quads / 2 + sectors / 8.
   CropBench crop(state, {{"sectors_per_cycle", "8"}, {"cache_bytes", "1048576"}}, 20);
