@@ -6,6 +6,7 @@
 #include <ctime>
 #include <map>
 
+#include "statistics.h"
 #include "untimed_gpu.h"
 #include "work_counter.h"
 
@@ -108,39 +109,27 @@ std::string hash_of(const RunResult& result) {
 
 const std::string l2 = "l2";
 
-/// The functional models of all units, and their slots.
+/// The functional models of all units.
 struct BehaviourList {
-  std::vector<std::pair<std::string, const Behaviour*>> of_slot;
+  std::vector<std::pair<const Instance*, const Behaviour*>> of_instance;
 };
 
-/// Counters of all units, summed over GPCs, and extremes over them, in the order of the pipeline.
-std::vector<StatisticReport> collect(const BehaviourList& behaviours) {
-  std::vector<StatisticReport> reports;
-  std::map<std::string, std::size_t> index;
-  for (const auto& [slot, behaviour] : behaviours.of_slot) {
-    for (const Counter* counter : behaviour->unit().counters()) {
-      const std::string name = slot + "." + counter->name();
-      const auto place = index.emplace(name, reports.size());
-      if (place.second) reports.push_back({name, counter->unit(), counter->meaning(), 0});
-      reports[place.first->second].value += counter->value();
-    }
-    for (const Extreme* extreme : behaviour->unit().extremes()) {
-      if (!extreme->seen()) continue;
-      const std::string name = slot + "." + extreme->name();
-      const auto place = index.emplace(name, reports.size());
-      if (place.second) reports.push_back({name, extreme->unit(), extreme->meaning(), extreme->value()});
-      std::uint64_t& value = reports[place.first->second].value;
-      const bool largest = extreme->of() == Extreme::Of::largest;
-      value = largest ? std::max(value, extreme->value()) : std::min(value, extreme->value());
-    }
-  }
-  return reports;
+/// Those of a unit: of its functional model, and of the one that gives it ports and time.
+void add_statistics(const Instance& instance, const Behaviour& behaviour, const Component& unit,
+                    StatisticCollector& statistics) {
+  statistics.add(instance.slot, instance.path, behaviour.unit());
+  statistics.add(instance.slot, instance.path, unit);
+}
+
+/// Those of a memory that has any.
+void add_statistics(const sc_core::sc_module& memory, StatisticCollector& statistics) {
+  if (const auto* const set = dynamic_cast<const StatisticSet*>(&memory)) statistics.add(l2, l2, *set);
 }
 
 /// The counters that every unit of a slot has, summed over GPCs.
 Counts counts_from(const BehaviourList& behaviours) {
   Counts c;
-  for (const auto& [slot, behaviour] : behaviours.of_slot) {
+  for (const auto& [instance, behaviour] : behaviours.of_instance) {
     const Behaviour& unit = behaviour->unit();
     if (const auto* const vpo = dynamic_cast<const VpoBehaviour*>(&unit)) {
       c.primitives += vpo->primitives.value();
@@ -178,9 +167,9 @@ Counts counts_from(const BehaviourList& behaviours) {
 }
 
 /// What the units counted, once a checked unit's counters are what went through it.
-void report_counts(const BehaviourList& behaviours, RunResult& result) {
-  for (const auto& [slot, behaviour] : behaviours.of_slot) check_counters(*behaviour);
-  result.statistics = collect(behaviours);
+void report_counts(const BehaviourList& behaviours, const StatisticCollector& statistics, RunResult& result) {
+  for (const auto& [instance, behaviour] : behaviours.of_instance) check_counters(*behaviour);
+  result.statistics = statistics.reports();
   result.counts = counts_from(behaviours);
 }
 
@@ -298,9 +287,11 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
   result.kernel_events = gpu.clock().activations();
 
   BehaviourList behaviours;
+  StatisticCollector statistics;
   OccupancyReport occupancy(static_cast<double>(cycles), result);
   for (const Gpu::Placed& placed : gpu.units()) {
-    behaviours.of_slot.emplace_back(placed.instance->slot, placed.behaviour);
+    behaviours.of_instance.emplace_back(placed.instance, placed.behaviour);
+    add_statistics(*placed.instance, *placed.behaviour, *placed.unit, statistics);
     UnitReport report;
     report.name = placed.instance->path;
     for (unsigned state = 0; state < unit_states; ++state) {
@@ -313,9 +304,10 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
     report.name = l2;
     occupancy.add(std::move(report), l2,
                   {{"bytes", 0, static_cast<double>(gpu.l2()->bytes(cycles)) / gpu.l2()->peak_rate(), true}});
+    add_statistics(*gpu.l2(), statistics);
   }
   occupancy.finish();
-  report_counts(behaviours, result);
+  report_counts(behaviours, statistics, result);
 }
 
 /// The bounds of all GPCs: the longest is the draw's.
@@ -366,10 +358,13 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
   timer.stop(result);
 
   BehaviourList behaviours;
+  StatisticCollector statistics;
   for (const UntimedGpu::Placed& placed : gpu.units()) {
-    behaviours.of_slot.emplace_back(placed.instance->slot, &placed.unit->behaviour());
+    const Behaviour& behaviour = placed.unit->behaviour();
+    behaviours.of_instance.emplace_back(placed.instance, &behaviour);
+    add_statistics(*placed.instance, behaviour, *placed.unit, statistics);
   }
-  report_counts(behaviours, result);
+  report_counts(behaviours, statistics, result);
   if (!bounds.empty()) report_bound(configuration, gpu, bounds, result);
 }
 

@@ -47,7 +47,18 @@ RunResult full_result() {
   unit.parts = {{"blend", 0.5}, {"sectors", 0.125}};
   result.units = {unit, {}};
   result.bottleneck = {"l2", 0.625, {{"reads", 0.375}}};
-  result.statistics = {{"crop.hits", "sectors", "found in the \"cache\"\n", 7}, {"crop.misses", "%", "µ", 8}};
+  result.statistics.resize(2);
+  StatisticReport& statistic = result.statistics.front();
+  statistic.name = "crop.hits";
+  statistic.unit = "sectors";
+  statistic.meaning = "found in the \"cache\"\n";
+  statistic.value = 7;
+  statistic.kind = "histogram";
+  statistic.formula = "hits / accesses";
+  statistic.denominator = huge - 100;
+  statistic.histogram = HistogramReport{10, huge - 101, {{12, 13, 14}, {16, std::nullopt, 17}}};
+  statistic.instances = {{"gpc0.crop", 18, 19}, {"gpc1.crop", 20, std::nullopt}};
+  result.statistics.back().meaning = "µ";
   result.implementations = {{"qru", "caf\xe9"}, {"tc", std::string("\0\xff", 2)}};
   result.parameters = {{"tc.bins", "32"}, {"state.exponential", "exact"}};
   result.outside_validated_range = {"\xc3", ""};
@@ -64,12 +75,37 @@ void expect_equal_units(const UnitReport& actual, const UnitReport& expected) {
   EXPECT_EQ(parts, expected.parts);
 }
 
+void expect_equal_histograms(const HistogramReport& actual, const HistogramReport& expected) {
+  const auto& [smallest, largest, buckets] = actual;
+  EXPECT_EQ(smallest, expected.smallest);
+  EXPECT_EQ(largest, expected.largest);
+  ASSERT_EQ(buckets.size(), expected.buckets.size());
+  for (std::size_t i = 0; i < buckets.size(); ++i) {
+    const auto& [from, to, count] = buckets[i];
+    EXPECT_EQ(from, expected.buckets[i].from);
+    EXPECT_EQ(to, expected.buckets[i].to);
+    EXPECT_EQ(count, expected.buckets[i].count);
+  }
+}
+
 void expect_equal_statistics(const StatisticReport& actual, const StatisticReport& expected) {
-  const auto& [name, unit, meaning, value] = actual;
+  const auto& [name, unit, meaning, value, kind, formula, denominator, histogram, instances] = actual;
   EXPECT_EQ(name, expected.name);
   EXPECT_EQ(unit, expected.unit);
   EXPECT_EQ(meaning, expected.meaning);
   EXPECT_EQ(value, expected.value);
+  EXPECT_EQ(kind, expected.kind);
+  EXPECT_EQ(formula, expected.formula);
+  EXPECT_EQ(denominator, expected.denominator);
+  ASSERT_EQ(histogram.has_value(), expected.histogram.has_value());
+  if (histogram) expect_equal_histograms(*histogram, *expected.histogram);
+  ASSERT_EQ(instances.size(), expected.instances.size());
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    const auto& [path, value_there, denominator_there] = instances[i];
+    EXPECT_EQ(path, expected.instances[i].path);
+    EXPECT_EQ(value_there, expected.instances[i].value);
+    EXPECT_EQ(denominator_there, expected.instances[i].denominator);
+  }
 }
 
 /// All but the request and the surface. A new member has to be named here, and compared.
@@ -155,7 +191,16 @@ TEST(ResultEncoding, EveryFieldHasItsOwnName) {
   EXPECT_EQ(json["statistics"][0], Json({{"name", statistic.name},
                                          {"unit", statistic.unit},
                                          {"meaning", statistic.meaning},
-                                         {"value", statistic.value}}));
+                                         {"value", statistic.value},
+                                         {"kind", statistic.kind},
+                                         {"formula", statistic.formula},
+                                         {"denominator", *statistic.denominator},
+                                         {"histogram", json["statistics"][0]["histogram"]},
+                                         {"instances", json["statistics"][0]["instances"]}}));
+  EXPECT_EQ(json["statistics"][0]["histogram"]["smallest"], 10U);
+  EXPECT_EQ(json["statistics"][0]["histogram"]["largest"], *statistic.histogram->largest);
+  EXPECT_EQ(json["statistics"][0]["histogram"]["buckets"][0], Json({{"from", 12U}, {"to", 13U}, {"count", 14U}}));
+  EXPECT_EQ(json["statistics"][0]["instances"][0], Json({{"path", "gpc0.crop"}, {"value", 18U}, {"denominator", 19U}}));
   EXPECT_EQ(json["implementations"][0][0], "qru");
   EXPECT_EQ(json["parameters"], Json(result.parameters));
   EXPECT_EQ(json["outside_validated_range"][1], "");

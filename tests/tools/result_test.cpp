@@ -45,6 +45,30 @@ const std::vector<std::string> count_names{"primitives",
                                            "tc_flushes",
                                            "termination_updates"};
 
+void check_statistic(const json& statistic) {
+  SCOPED_TRACE(statistic["name"].dump());
+  EXPECT_TRUE(statistic["name"].is_string() && statistic["unit"].is_string() && statistic["meaning"].is_string());
+  const json& value = statistic["value"];
+  const std::string kind = statistic["kind"];
+  const bool is_quotient = kind == "ratio" || kind == "histogram";
+  EXPECT_TRUE(is_quotient ? value.is_number_float() || value.is_null() : value.is_number_unsigned()) << value;
+  EXPECT_EQ(statistic["formula"].is_string(), kind == "ratio");
+  EXPECT_EQ(statistic["histogram"].is_object(), kind == "histogram");
+  EXPECT_TRUE(statistic["instances"].is_null()) << "one GPC";
+  if (kind != "histogram") return;
+  const json& histogram = statistic["histogram"];
+  std::uint64_t count = 0;
+  for (const json& bucket : histogram["buckets"]) {
+    count += bucket["count"].get<std::uint64_t>();
+    EXPECT_TRUE(bucket["to"].is_null() || bucket["to"] >= bucket["from"]);
+  }
+  EXPECT_EQ(count, histogram["count"]);
+  if (count == 0) return;
+  EXPECT_DOUBLE_EQ(value.get<double>(), histogram["sum"].get<double>() / static_cast<double>(count));
+  EXPECT_LE(histogram["smallest"], value);
+  EXPECT_GE(histogram["largest"], value);
+}
+
 void check_run(const json& run, bool timed) {
   SCOPED_TRACE(run["variant"].dump());
   EXPECT_EQ(run["cycles"].is_number_unsigned(), timed);
@@ -70,10 +94,7 @@ void check_run(const json& run, bool timed) {
     for (const auto& state : unit["cycles"].items()) sum += state.value().get<std::uint64_t>();
     EXPECT_EQ(sum, run["cycles"].get<std::uint64_t>()) << unit["name"];
   }
-  for (const json& statistic : run["statistics"]) {
-    EXPECT_TRUE(statistic["name"].is_string() && statistic["value"].is_number_unsigned() &&
-                statistic["unit"].is_string() && statistic["meaning"].is_string());
-  }
+  for (const json& statistic : run["statistics"]) check_statistic(statistic);
   const auto count = [&](const std::string& name) { return run["counts"][name].get<std::uint64_t>(); };
   for (const std::string what : {"quads_", "fragments_"}) {
     EXPECT_EQ(count(what + "rasterized"),
@@ -425,8 +446,9 @@ TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
     EXPECT_EQ(only_in(found, expected), std::vector<std::string>()) << "are not documented";
     EXPECT_EQ(only_in(expected, found), std::vector<std::string>()) << "do not exist";
   };
-  check("Of `run` and `compare`", {of_scene({"run"}), of_scene({"compare"}),
-                                   json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional"})});
+  check("Of `run` and `compare`",
+        {of_scene({"run"}), of_scene({"compare"}), json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional"}),
+         json_of({"run", "--scene", "tiny.spl", "--platform", "desktop"})});
   check("Of `accuracy`", {of_scene({"accuracy", "--quick"}), json_of({"accuracy", "--quick", "--scene", "tiny.spl"})});
 }
 

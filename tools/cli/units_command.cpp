@@ -26,26 +26,9 @@ bool is_default(const ParameterListing& unit) {
   return default_implementation(registry.slot(unit.unit), variant_named("het+qm")).name == unit.implementation;
 }
 
-struct Statistic {
-  std::string name, unit, meaning;
-};
-
-/// What a unit counts; nothing for what is no slot.
-std::vector<Statistic> statistics_of(const ParameterListing& unit) {
-  if (!Registry::instance().has_slot(unit.unit)) return {};
-  Draw draw;
-  draw.width = draw.height = 1;
-  RenderState state;
-  state.draw = &draw;
-  const Implementation& implementation = Registry::instance().find(unit.unit, unit.implementation);
-  const std::unique_ptr<Behaviour> behaviour = implementation.make_behaviour(*unit.parameters, state);
-  std::vector<Statistic> all;
-  const auto add = [&](const auto& statistics) {
-    for (const auto* one : statistics) all.push_back({unit.unit + "." + one->name(), one->unit(), one->meaning()});
-  };
-  add(behaviour->unit().counters());
-  add(behaviour->unit().extremes());
-  return all;
+/// With the formula, where it has one.
+std::string meaning_of(const StatisticReport& statistic) {
+  return statistic.meaning + (statistic.formula.empty() ? "" : ": " + statistic.formula);
 }
 
 std::string with_unit(const std::string& value, const Parameter& parameter) {
@@ -79,9 +62,10 @@ std::string as_text(const std::vector<ParameterListing>& units, const std::strin
       text += fmt::format("; {}\n      {}\n      default from: {}\n", parameter->range(),
                           printable(parameter->meaning()), printable(parameter->source()));
     }
-    for (const Statistic& statistic : statistics_of(unit)) {
-      text += fmt::format("  counts {}: {}, {}\n", style.bold(printable(statistic.name)), printable(statistic.unit),
-                          printable(statistic.meaning));
+    for (const StatisticReport& statistic : list_statistics(unit)) {
+      text += fmt::format("  {} {}: {}, {}\n", statistic.kind == "counter" ? "counts" : statistic.kind,
+                          style.bold(printable(statistic.name)), printable(statistic.unit),
+                          printable(meaning_of(statistic)));
     }
   }
   return text;
@@ -116,10 +100,11 @@ std::string as_markdown(const std::vector<ParameterListing>& units) {
                           parameter->default_value(), escaped(parameter->unit()), escaped(parameter->range()),
                           escaped(parameter->meaning()), escaped(parameter->source()));
     }
-    const std::vector<Statistic> statistics = statistics_of(unit);
-    if (!statistics.empty()) text += "\n| statistic | unit | meaning |\n|---|---|---|\n";
-    for (const Statistic& statistic : statistics) {
-      text += fmt::format("| `{}` | {} | {} |\n", statistic.name, statistic.unit, escaped(statistic.meaning));
+    const std::vector<StatisticReport> statistics = list_statistics(unit);
+    if (!statistics.empty()) text += "\n| statistic | kind | unit | meaning |\n|---|---|---|---|\n";
+    for (const StatisticReport& statistic : statistics) {
+      text += fmt::format("| `{}` | {} | {} | {} |\n", statistic.name, statistic.kind, escaped(statistic.unit),
+                          escaped(meaning_of(statistic)));
     }
   }
   return text;
@@ -139,8 +124,12 @@ Json as_json(const std::vector<ParameterListing>& units, const std::string& plat
                             {"source", parameter->source()}});
     }
     Json statistics = Json::array();
-    for (const Statistic& statistic : statistics_of(unit)) {
-      statistics.push_back({{"name", statistic.name}, {"unit", statistic.unit}, {"meaning", statistic.meaning}});
+    for (const StatisticReport& statistic : list_statistics(unit)) {
+      statistics.push_back({{"name", statistic.name},
+                            {"kind", statistic.kind},
+                            {"unit", statistic.unit},
+                            {"meaning", statistic.meaning},
+                            {"formula", statistic.formula.empty() ? Json() : Json(statistic.formula)}});
     }
     list.push_back({{"slot", unit.unit},
                     {"implementation", unit.implementation},

@@ -45,7 +45,10 @@ VRPIPE_MEMBERS(Counts, primitives, quads_rasterized, fragments_rasterized, quads
                warps, tgc_flushes, tc_flushes, termination_updates)
 VRPIPE_MEMBERS(UnitReport, name, cycles, occupancy, parts)
 VRPIPE_MEMBERS(Bottleneck, unit, occupancy, parts)
-VRPIPE_MEMBERS(StatisticReport, name, unit, meaning, value)
+VRPIPE_MEMBERS(HistogramBucket, from, to, count)
+VRPIPE_MEMBERS(HistogramReport, smallest, largest, buckets)
+VRPIPE_MEMBERS(InstanceStatistic, path, value, denominator)
+VRPIPE_MEMBERS(StatisticReport, name, unit, meaning, value, kind, formula, denominator, histogram, instances)
 VRPIPE_MEMBERS(RunResult, request, cycles, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
                bottleneck, statistics, implementations, parameters, outside_validated_range, result_hash, kernel_events,
                surface)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -152,6 +153,24 @@ void add_utilization(RunTable& table, const std::vector<RunResult>& runs) {
     if (name == "dram" && share <= 0) continue;
     table.row(name, [i](const RunResult& run) { return percent(run.utilization[i].second); });
   }
+}
+
+/// A ratio of a run; none where it did not have what it is of.
+std::optional<double> ratio_of(const RunResult& run, const std::string& name) {
+  for (const StatisticReport& report : run.statistics) {
+    if (report.name == name) return report.quotient();
+  }
+  return std::nullopt;
+}
+
+void add_cache(RunTable& table, const std::vector<RunResult>& runs) {
+  const auto hits = [](const RunResult& run) { return ratio_of(run, "crop.cache.sector_hit_rate"); };
+  if (std::none_of(runs.begin(), runs.end(), hits)) return;
+  table.group("colour cache");
+  table.row("sectors hit, %", [&](const RunResult& run) {
+    const std::optional<double> rate = hits(run);
+    return rate ? percent(*rate) : std::string("-");
+  });
 }
 
 /// What each unit spent its cycles on.
@@ -333,6 +352,7 @@ std::string report(const JobResult& result, const TextStyle& style) {
   table.counts("TC flushes", &Counts::tc_flushes, exact);
   table.counts("termination updates", &Counts::termination_updates, exact);
   add_utilization(table, runs);
+  add_cache(table, runs);
 
   std::string text = heading(result, style) + table.text(style) + "\n";
   if (runs.size() == 1 && !runs.front().units.empty()) text += unit_states_text(runs.front(), style) + "\n";

@@ -106,13 +106,41 @@ Json units_json(const RunResult& run) {
   return units;
 }
 
+/// Of a statistic, or of one at an instance: a count, or a quotient where there is one.
+template <class Statistic>
+Json value_json(const Statistic& statistic) {
+  if (!statistic.denominator) return statistic.value;
+  const std::optional<double> quotient = statistic.quotient();
+  return quotient ? Json(*quotient) : Json();
+}
+
+Json histogram_json(const StatisticReport& statistic) {
+  if (!statistic.histogram) return {};
+  const auto number = [](const std::optional<std::uint64_t>& value) { return value ? Json(*value) : Json(); };
+  Json buckets = Json::array();
+  for (const HistogramBucket& bucket : statistic.histogram->buckets) {
+    buckets.push_back({{"from", bucket.from}, {"to", number(bucket.to)}, {"count", bucket.count}});
+  }
+  return {{"count", number(statistic.denominator)},
+          {"sum", statistic.value},
+          {"smallest", number(statistic.histogram->smallest)},
+          {"largest", number(statistic.histogram->largest)},
+          {"buckets", std::move(buckets)}};
+}
+
 Json statistics_json(const RunResult& run) {
   Json statistics = Json::array();
   for (const StatisticReport& statistic : run.statistics) {
+    Json instances;
+    for (const InstanceStatistic& instance : statistic.instances) instances[instance.path] = value_json(instance);
     statistics.push_back({{"name", statistic.name},
-                          {"value", statistic.value},
+                          {"kind", statistic.kind},
+                          {"value", value_json(statistic)},
                           {"unit", statistic.unit},
-                          {"meaning", statistic.meaning}});
+                          {"meaning", statistic.meaning},
+                          {"formula", statistic.formula.empty() ? Json() : Json(statistic.formula)},
+                          {"histogram", histogram_json(statistic)},
+                          {"instances", std::move(instances)}});
   }
   return statistics;
 }

@@ -130,12 +130,39 @@ struct Bottleneck {
   std::vector<std::pair<std::string, double>> parts;
 };
 
-/// A counter that a unit declared, summed over GPCs, or an extreme, over all of them.
+/// What a histogram says of values from one to another, both included.
+struct HistogramBucket {
+  std::uint64_t from = 0;
+  std::optional<std::uint64_t> to;  ///< none for the last, which takes whatever is larger
+  std::uint64_t count = 0;
+};
+struct HistogramReport {
+  std::optional<std::uint64_t> smallest, largest;  ///< of the values seen; none if there were none
+  std::vector<HistogramBucket> buckets;            ///< without gap, from that of the smallest to that of the largest
+};
+
+/// A statistic of one component. Value and denominator are as in StatisticReport.
+struct InstanceStatistic {
+  std::string path;  ///< of the component, e.g. gpc1.crop, or of its part: gpc1.crop.cache
+  std::uint64_t value = 0;
+  std::optional<std::uint64_t> denominator;
+  std::optional<double> quotient() const;
+};
+
+/// What components of a kind declared, over all of them: counters summed, the largest or smallest of extremes, all that
+/// histograms saw, quotients of the sums.
 struct StatisticReport {
-  std::string name;  ///< UNIT.COUNTER
+  std::string name;  ///< e.g. crop.quads_blended; crop.cache.sector_hits, in a part of the component
   std::string unit;
   std::string meaning;
-  std::uint64_t value = 0;
+  std::uint64_t value = 0;  ///< of a ratio the numerator, of a histogram the sum of the values seen
+  std::string kind;         ///< counter, largest, smallest, histogram, ratio
+  std::string formula;      ///< of a ratio, by the names of counters: "hits / (hits + misses)"; empty otherwise
+  std::optional<std::uint64_t> denominator;  ///< of a ratio, of a histogram the number of values seen; none otherwise
+  std::optional<HistogramReport> histogram;
+  std::vector<InstanceStatistic> instances;  ///< where the platform has several components of the kind
+  /// Of a ratio, or the mean of a histogram: value over denominator; none where there is none, or it is 0.
+  std::optional<double> quotient() const;
 };
 
 struct RunResult {
@@ -179,6 +206,8 @@ struct ParameterListing {
   std::unique_ptr<ParameterSet> parameters;
 };
 std::vector<ParameterListing> list_parameters(const Platform* platform);
+/// What the component of a listing counts, at any fidelity. Not while a simulation of this process is elaborated.
+std::vector<StatisticReport> list_statistics(const ParameterListing& listing);
 
 /// The hardware that QM adds, from the configured sizes.
 struct StorageReport {
