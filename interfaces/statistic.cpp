@@ -25,6 +25,29 @@ Histogram::Histogram(StatisticSet& owner, Buckets buckets, const char* name, con
   owner.histograms_.push_back(this);
 }
 
+std::uint64_t Histogram::sum() const {
+  std::uint64_t sum = sum_;
+  for (std::uint32_t bucket = 0; bucket < counts_.size(); ++bucket) {
+    if (buckets_.is_one_value(bucket)) sum += counts_[bucket] * bucket;
+  }
+  return sum;
+}
+
+std::uint64_t Histogram::smallest() const {
+  for (std::uint32_t bucket = 0; bucket < counts_.size(); ++bucket) {
+    if (buckets_.is_one_value(bucket) && counts_[bucket] > 0) return bucket;
+  }
+  return smallest_;
+}
+
+std::uint64_t Histogram::largest() const {
+  std::uint64_t largest = largest_;
+  for (std::uint32_t bucket = 0; bucket < counts_.size(); ++bucket) {
+    if (buckets_.is_one_value(bucket) && counts_[bucket] > 0) largest = std::max<std::uint64_t>(largest, bucket);
+  }
+  return largest;
+}
+
 std::uint64_t Histogram::count() const { return std::accumulate(counts_.begin(), counts_.end(), std::uint64_t{0}); }
 
 std::uint64_t CounterSum::value() const {

@@ -5,7 +5,6 @@
 #include <map>
 
 #include "elaborate.h"
-#include "untimed_gpu.h"
 
 namespace vrpipe {
 
@@ -252,7 +251,7 @@ RunAhead::RunAhead(const Configuration& configuration, unsigned gpc, ColorSurfac
       if (!port->connected()) port->stub();
     }
   }
-  if (qru != nullptr) prefetcher_ = prefetch_ahead(*qru, *crop);
+  if (qru != nullptr) qru->prefetch_for(*crop);
 }
 
 RunAhead::~RunAhead() = default;

@@ -36,7 +36,6 @@ class RunAhead final : public FunctionalRunAhead {
   std::unique_ptr<Record> record_;
   std::unique_ptr<Signals> signals_;
   std::vector<std::unique_ptr<UntimedUnit>> units_;
-  std::unique_ptr<UntimedTarget<Warp>> prefetcher_;
   UntimedIn<BinItem>* entry_ = nullptr;
   SmBehaviour* sm_ = nullptr;
   CropBehaviour* crop_ = nullptr;

@@ -6,34 +6,6 @@
 
 namespace vrpipe {
 
-namespace {
-
-class Prefetcher final : public UntimedTarget<Warp> {
- public:
-  Prefetcher(UntimedTarget<Warp>& next, UntimedUnit& crop) : next_(next), crop_(crop) {}
-  void take(const Warp& warp) override {
-    crop_.prefetch(warp);
-    next_.take(warp);
-  }
-
- private:
-  UntimedTarget<Warp>& next_;
-  UntimedUnit& crop_;
-};
-
-}  // namespace
-
-std::unique_ptr<UntimedTarget<Warp>> prefetch_ahead(UntimedUnit& qru, UntimedUnit& crop) {
-  for (OutPort* port : qru.out_ports) {
-    auto* const warps = dynamic_cast<UntimedOut<Warp>*>(port);
-    if (warps == nullptr || warps->target() == nullptr) continue;
-    auto prefetcher = std::make_unique<Prefetcher>(*warps->target(), crop);
-    warps->attach(*prefetcher);
-    return prefetcher;
-  }
-  return nullptr;
-}
-
 UntimedGpu::UntimedGpu(const Configuration& configuration, ColorSurface& surface) : configuration_(configuration) {
   const Netlist& netlist = configuration.netlist();
   for (const Instance& instance : netlist.instances()) {
@@ -53,7 +25,7 @@ UntimedGpu::UntimedGpu(const Configuration& configuration, ColorSurface& surface
   for (unsigned gpc = 0; gpc < netlist.gpcs(); ++gpc) {
     UntimedUnit* const qru = of_slot("qru", gpc);
     UntimedUnit* const crop = of_slot("crop", gpc);
-    if (qru != nullptr && crop != nullptr) prefetchers_.push_back(prefetch_ahead(*qru, *crop));
+    if (qru != nullptr && crop != nullptr) qru->prefetch_for(*crop);
   }
 }
 

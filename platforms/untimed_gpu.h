@@ -31,11 +31,6 @@ class UntimedGpu {
  private:
   const Configuration& configuration_;
   std::vector<Placed> units_;
-  std::vector<std::unique_ptr<UntimedTarget<Warp>>> prefetchers_;
 };
-
-/// Lets the blender of a part of a platform know of the warps that a QRU launches: what they blend into is then in the
-/// host's cache.
-std::unique_ptr<UntimedTarget<Warp>> prefetch_ahead(UntimedUnit& qru, UntimedUnit& crop);
 
 }  // namespace vrpipe

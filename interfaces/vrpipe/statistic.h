@@ -88,6 +88,7 @@ class Histogram : public Statistic {
       if (width_ == 0) return bucket == 0 ? 0U : std::uint64_t{1} << (bucket - 1);
       return std::uint64_t{bucket} * width_;
     }
+    bool is_one_value(std::uint32_t bucket) const { return width_ == 1 && bucket + 1 < count_; }
     /// And the largest.
     std::uint64_t last(std::uint32_t bucket) const {
       return bucket + 1 == count_ ? ~std::uint64_t{0} : first(bucket + 1) - 1;
@@ -102,17 +103,19 @@ class Histogram : public Statistic {
   Histogram(StatisticSet& owner, Buckets buckets, const char* name, const char* unit, const char* meaning);
 
   void see(std::uint64_t value) {
-    ++counts_[buckets_.of(value)];
+    const std::uint32_t bucket = buckets_.of(value);
+    ++counts_[bucket];
+    if (buckets_.is_one_value(bucket)) return;  // its count says it all
     sum_ += value;
     smallest_ = std::min(smallest_, value);
     largest_ = std::max(largest_, value);
   }
   /// Values seen.
   std::uint64_t count() const;
-  std::uint64_t sum() const { return sum_; }
+  std::uint64_t sum() const;
   /// Where nothing was seen, `smallest` is larger than `largest`.
-  std::uint64_t smallest() const { return smallest_; }
-  std::uint64_t largest() const { return largest_; }
+  std::uint64_t smallest() const;
+  std::uint64_t largest() const;
   const Buckets& buckets() const { return buckets_; }
   /// By bucket.
   const std::vector<std::uint64_t>& counts() const { return counts_; }
@@ -120,6 +123,7 @@ class Histogram : public Statistic {
  private:
   Buckets buckets_;
   std::vector<std::uint64_t> counts_;
+  // Of buckets of several values.
   std::uint64_t sum_ = 0;
   std::uint64_t smallest_ = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t largest_ = 0;

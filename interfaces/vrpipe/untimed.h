@@ -127,8 +127,10 @@ class UntimedUnit : public Component {
 
   /// For the unit that begins a draw: does a piece of it; false after the last.
   virtual bool run_piece() { return false; }
-  /// For the unit that blends: quads that will come before long.
+  /// For the unit that blends: quads that will come before long. Then what they are blended into is in the host's cache.
   virtual void prefetch(const Warp&) {}
+  /// For the unit that launches warps: who is to know of them. It outlives this one.
+  virtual void prefetch_for(UntimedUnit& /*blender*/) {}
   /// For the unit that blends: it looks its colour cache up from now on. The observer outlives it.
   virtual void observe(BlendObserver&) {}
 

@@ -18,6 +18,7 @@ class UntimedQru : public UntimedUnit {
         numbering_(state) {}
 
   Behaviour& behaviour() override { return *behaviour_; }
+  void prefetch_for(UntimedUnit& blender) override { blender_ = &blender; }
 
  private:
   void examine(const BinItem& item) {
@@ -38,6 +39,7 @@ class UntimedQru : public UntimedUnit {
 
   void launch() {
     did(QruWork::launches, 1);
+    if (blender_ != nullptr) blender_->prefetch(warp_);
     numbering_.number(warp_);
     out_.send(warp_);
   }
@@ -45,6 +47,7 @@ class UntimedQru : public UntimedUnit {
   UntimedOut<Warp> out_;
   std::unique_ptr<UntimedIn<BinItem>> in_;
   std::unique_ptr<QruBehaviour> behaviour_;
+  UntimedUnit* blender_ = nullptr;
   WarpNumbering numbering_;
   Warp warp_;
 };
