@@ -91,6 +91,7 @@ void Gpu::add_memory(const MemoryInstance& memory) {
     if (sockets.size() == 1) sockets.resize(std::max(units, 1U), sockets.front());
   } else {
     if (l2_ != nullptr) refuse(memory.path, "the platform has an L2 already", "connect its units to that");
+    if (units == 0) return;  // all were connected to something else
     l2_ = std::make_unique<FixedLatencyMemory>(memory.path.c_str(), *clock_, configuration_.l2().latency_cycles,
                                                configuration_.l2().bytes_per_cycle, units);
     for (unsigned index = 0; index < units; ++index) sockets.push_back(&l2_->port(index));

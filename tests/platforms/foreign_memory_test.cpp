@@ -186,6 +186,7 @@ TEST(ForeignMemory, ADeadlockIsFoundAndNamedThoughATimerGoesOn) {
   EXPECT_GT(dram.refreshes, 0U);
 }
 
+#ifndef VRPIPE_SANITIZED  // by what loses sight of the stack when a coroutine of SystemC's has run before a throw
 TEST(ForeignMemory, ThatFallsSilentIsNamedWithItsPortAndTheOldestRequest) {
   const Draw draw = testing::random_draw(64, 64, 300, 8);
   for (const bool refreshes : {true, false}) {
@@ -202,6 +203,7 @@ TEST(ForeignMemory, ThatFallsSilentIsNamedWithItsPortAndTheOldestRequest) {
     EXPECT_NE(message.find("no answer to the read of 32 bytes at address"), std::string::npos) << message;
   }
 }
+#endif
 
 /// A memory with a refresh that is counted in cycles of the units' clock, which then never comes to rest.
 class TickingMemory : public FixedLatencyMemory, public Clocked {

@@ -271,6 +271,22 @@ TEST(ForeignMemories, TakeThePlaceOfTheL2) {
   }
 }
 
+// The L2 that nobody uses any more is not there.
+TEST(ForeignMemories, MayStandBesideTheL2) {
+  const Draw draw = random_draw(64, 64, 100, 7);
+  const Platform platform = edited("agx-orin", [](Netlist& netlist) {
+    netlist.add_memory("other", make_other);
+    netlist.connect_memory("gpc0.crop", "other");
+  });
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+    RunRequest request = request_of("baseline", fidelity);
+    request.platform = &platform;
+    const RunResult result = run(request, draw);
+    EXPECT_GT(*result.cycles, 0U);
+    for (const auto& [unit, share] : result.utilization) EXPECT_LE(share, 1.0) << unit;
+  }
+}
+
 TEST(ForeignMemories, WithoutEnoughSocketsAreRefused) {
   const Platform platform = edited("desktop", [](Netlist& netlist) {
     netlist.replace_memory("l2", [](const std::string& name, unsigned) { return make_other(name, 2); });
