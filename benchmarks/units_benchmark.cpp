@@ -54,7 +54,7 @@ const Frame& frame() {
     SceneRequest scene;
     scene.size = ImageSize{400, 400};
     f.scene = load_scene(scene);
-    const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
+    const Configuration configuration(request_for(ColorFormat::rgba16f), *vrpipe::Frame::of(f.scene.draw));
 
     const auto vpo = make_as<VpoBehaviour>(configuration, "vpo");
     const auto tgc = make_as<TgcBehaviour>(configuration, "tgc");
@@ -81,7 +81,7 @@ const Frame& frame() {
     };
     std::array<Primitive, 2> visible;
     for (std::uint32_t splat = 0; splat < f.scene.draw.splats.size(); ++splat) {
-      const unsigned count = vpo->assemble(splat, visible);
+      const unsigned count = vpo->assemble(0, splat, visible);
       for (unsigned i = 0; i < count; ++i) {
         f.primitives.push_back(visible[i]);
         tgc->begin(visible[i]);
@@ -128,7 +128,7 @@ std::uint64_t quads_of(const std::vector<QuadBeat>& beats) {
 
 void rasterize(benchmark::State& state) {
   const Frame& f = frame();
-  const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
+  const Configuration configuration(request_for(ColorFormat::rgba16f), *vrpipe::Frame::of(f.scene.draw));
   std::uint64_t quads = 0;
   for (auto _ : state) {
     const auto raster = make_as<RasterBehaviour>(configuration, "raster");
@@ -147,7 +147,7 @@ BENCHMARK(rasterize)->Unit(benchmark::kMillisecond);
 
 void coalesce_tiles(benchmark::State& state) {
   const Frame& f = frame();
-  const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
+  const Configuration configuration(request_for(ColorFormat::rgba16f), *vrpipe::Frame::of(f.scene.draw));
   for (auto _ : state) {
     const auto tc = make_as<TcBehaviour>(configuration, "tc");
     TcBehaviour::Flush bin;
@@ -163,7 +163,7 @@ BENCHMARK(coalesce_tiles)->Unit(benchmark::kMillisecond);
 
 void test_termination(benchmark::State& state) {
   const Frame& f = frame();
-  const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
+  const Configuration configuration(request_for(ColorFormat::rgba16f), *vrpipe::Frame::of(f.scene.draw));
   for (auto _ : state) {
     const auto zrop = make_as<ZropBehaviour>(configuration, "zrop");
     for (const QuadBeat& beat : f.bins) {
@@ -178,7 +178,7 @@ BENCHMARK(test_termination)->Unit(benchmark::kMillisecond);
 
 void reorder_quads(benchmark::State& state) {
   const Frame& f = frame();
-  const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
+  const Configuration configuration(request_for(ColorFormat::rgba16f), *vrpipe::Frame::of(f.scene.draw));
   for (auto _ : state) {
     const auto qru = make_as<QruBehaviour>(configuration, "qru");
     Warp warp;
@@ -195,7 +195,7 @@ BENCHMARK(reorder_quads)->Unit(benchmark::kMillisecond);
 
 void shade_warps(benchmark::State& state) {
   const Frame& f = frame();
-  const Configuration configuration(request_for(ColorFormat::rgba16f), f.scene.draw);
+  const Configuration configuration(request_for(ColorFormat::rgba16f), *vrpipe::Frame::of(f.scene.draw));
   std::uint64_t quads = 0;
   for (auto _ : state) {
     const auto sm = make_as<SmBehaviour>(configuration, "sm");
@@ -213,7 +213,7 @@ BENCHMARK(shade_warps)->Unit(benchmark::kMillisecond);
 
 void blend_quads(benchmark::State& state, ColorFormat format) {
   const Frame& f = frame();
-  const Configuration configuration(request_for(format), f.scene.draw);
+  const Configuration configuration(request_for(format), *vrpipe::Frame::of(f.scene.draw));
   std::uint64_t quads = 0;
   for (auto _ : state) {
     ColorSurface surface(f.scene.draw.width, f.scene.draw.height, format);
@@ -222,7 +222,7 @@ void blend_quads(benchmark::State& state, ColorFormat format) {
     quads = 0;
     for (const ShadedWarp& warp : f.shaded) {
       const std::size_t tile = surface.grid().place(warp.tile, 0);
-      for (unsigned i = 0; i < warp.count; ++i) crop->blend(tile + warp.position[i], warp.live[i], warp.color[i]);
+      for (unsigned i = 0; i < warp.count; ++i) crop->blend(0, tile + warp.position[i], warp.live[i], warp.color[i]);
       quads += warp.count;
     }
   }

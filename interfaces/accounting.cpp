@@ -14,7 +14,7 @@ const char* name_of(UnitState state) {
 }
 
 void StateAccount::settle() {
-  for (; !changes_.empty() && changes_.front().until <= draw_end_->so_far(); changes_.pop()) {
+  for (; !changes_.empty() && changes_.front().until <= frame_end_->so_far(); changes_.pop()) {
     charge(changes_.front().state, changes_.front().until);
   }
   most_changes_ = std::max(fewest_changes, 2 * changes_.size());
@@ -32,7 +32,7 @@ void WorkTally::note(std::uint64_t items, Cycle from, Cycle until) {
   }
   late_.push({items, from, until});
   if (late_.size() < most_spans_) return;
-  while (!late_.empty() && late_.front().until <= draw_end_->so_far()) late_.pop();
+  while (!late_.empty() && late_.front().until <= frame_end_->so_far()) late_.pop();
   most_spans_ = std::max(fewest_spans, 2 * late_.size());
 }
 

@@ -35,16 +35,14 @@ std::string words_of(TileId tile) { return fmt::format("screen tile {},{}", tile
 /// What the checked behaviours of all slots share.
 class Checks {
  public:
-  Checks(std::string name, const RenderState& state)
+  Checks(std::string name, const RenderContext& context)
       : name_(std::move(name)),
-        grid_(state.draw->width, state.draw->height),
-        tiles_x_((state.draw->width + screen_tile_pixels - 1) / screen_tile_pixels),
-        width_(static_cast<std::int32_t>(state.draw->width)),
-        height_(static_cast<std::int32_t>(state.draw->height)),
-        // The quads of a testbench need no splats behind them.
-        splats_(state.draw->splats.empty() ? ~std::size_t{0} : state.draw->splats.size()),
-        gpcs_(state.gpcs),
-        gpc_(state.gpc) {}
+        frame_(*context.frame),
+        grid_(frame_.width(), frame_.height()),
+        tiles_x_((frame_.width() + screen_tile_pixels - 1) / screen_tile_pixels),
+        width_(static_cast<std::int32_t>(frame_.width())),
+        height_(static_cast<std::int32_t>(frame_.height())),
+        placement_(context.placement) {}
   virtual ~Checks() = default;
   Checks(const Checks&) = delete;
   Checks& operator=(const Checks&) = delete;
@@ -53,6 +51,15 @@ class Checks {
   /// Asks for all costs, which are checked: what cannot be is told before anything runs, at every fidelity.
   virtual void check_costs() const = 0;
   virtual void check_counters() const = 0;
+  /// What is counted by draw has to be counted for a draw.
+  void check_draws(const StatisticSet& counted) const {
+    for (const DrawCounter* counter : counted.draw_counters()) {
+      if (counter->of_draw().empty()) continue;
+      std::uint64_t sum = 0;
+      for (const std::uint64_t of_draw : counter->of_draw()) sum += of_draw;
+      check_counter(counter->name(), counter->value(), sum, "are counted for draws");
+    }
+  }
 
  protected:
   template <class... Arguments>
@@ -82,7 +89,7 @@ class Checks {
     if (tile.x >= tiles_x_ || grid_.index(tile) >= grid_.tiles()) {
       fault(call, "{} lies outside the frame", words_of(tile));
     }
-    if (owner_of(tile, gpcs_) != gpc_) fault(call, "{} belongs to another GPC", words_of(tile));
+    if (!placement_.owns(tile)) fault(call, "{} belongs to another GPC", words_of(tile));
   }
   void check_quads(const char* call, TileId tile, const Quad* quads, std::size_t count) const {
     for (std::size_t i = 0; i < count; ++i) {
@@ -92,12 +99,19 @@ class Checks {
       };
       if (quad.position >= positions_per_tile) wrong("position", quad.position, "a tile has 64");
       if (quad.coverage == 0 || quad.coverage > 0xf) wrong("coverage", quad.coverage, "1 to 15 are live samples");
-      if (quad.splat >= splats_) wrong("splat", quad.splat, fmt::format("the draw has {}", splats_));
-      if (quad.triangle > 1) wrong("triangle", quad.triangle, "a splat has two");
+      check_splat(call, quad.draw, quad.splat);
     }
   }
+  /// That a splat is one of a draw's. The quads of a testbench need no splats behind them.
+  void check_splat(const char* call, DrawIndex draw, std::uint32_t splat) const {
+    if (frame_.splats() == 0) return;
+    if (draw >= frame_.draws().size()) fault(call, "draw {} of a frame of {}", draw, frame_.draws().size());
+    const DrawCall& drawn = frame_.draw_call(draw);
+    if (splat - drawn.base < drawn.splats) return;
+    fault(call, "splat {} for draw {}, which has {} from {} on", splat, draw, drawn.splats, drawn.base);
+  }
   void check_primitive(const char* call, const Primitive& primitive) const {
-    if (primitive.splat >= splats_) fault(call, "splat {} of a draw of {}", primitive.splat, splats_);
+    check_splat(call, primitive.draw, primitive.splat);
     if (primitive.triangle > 1) fault(call, "triangle {} of splat {}", primitive.triangle, primitive.splat);
     const PixelRect& bounds = primitive.bounds;
     if (bounds.empty() || bounds.x0 < 0 || bounds.y0 < 0 || bounds.x1 > width_ || bounds.y1 > height_) {
@@ -110,19 +124,18 @@ class Checks {
     throw SimulationFault(name_, cycle(), fmt::format("{} counts {}, but {} {}", counters, counted, seen, of));
   }
   std::size_t tiles() const { return grid_.tiles(); }
-  std::size_t splats() const { return splats_; }
+  const Frame& frame() const { return frame_; }
 
  private:
   Cycle cycle() const { return clock_ == nullptr ? 0 : clock_->now(); }
 
   const std::string name_;  ///< slot=implementation
+  const Frame& frame_;
   const TileGrid grid_;
   const std::uint32_t tiles_x_;
   const std::int32_t width_;
   const std::int32_t height_;
-  const std::size_t splats_;
-  const unsigned gpcs_;
-  const unsigned gpc_;
+  const Placement placement_;
   const ClockDomain* clock_ = nullptr;
 };
 
@@ -130,8 +143,8 @@ class Checks {
 template <class SlotBehaviour>
 class CheckedSlot : public SlotBehaviour, public Checks {
  public:
-  CheckedSlot(std::string name, const RenderState& state, std::unique_ptr<SlotBehaviour> checked)
-      : Checks(std::move(name), state), checked_(std::move(checked)) {}
+  CheckedSlot(std::string name, const RenderContext& context, std::unique_ptr<SlotBehaviour> checked)
+      : Checks(std::move(name), context), checked_(std::move(checked)) {}
   const Behaviour& unit() const override { return *checked_; }
 
  protected:
@@ -148,12 +161,21 @@ class CheckedUnit<DrawBehaviour> final : public CheckedSlot<DrawBehaviour> {
 
   bool next(VertexWarp& out) override {
     if (!ask("next", [&] { return checked_->next(out); })) return false;
-    if (out.splats == 0 || out.splats > splats_per_vertex_warp) fault("next", "a warp of {} splats", out.splats);
-    if (out.first_splat < issued_ || out.first_splat + std::uint64_t{out.splats} > splats()) {
-      fault("next", "a warp of splats {} to {}, after {} of {}", out.first_splat,
-            out.first_splat + std::uint64_t{out.splats} - 1, issued_, splats());
+    if (out.mark != Mark::none) {
+      if (out.mark <= last_mark_ || static_cast<std::size_t>(out.mark) > frame().commands().size()) {
+        fault("next", "a mark of command {}, after that of {} of {}", static_cast<unsigned>(out.mark),
+              static_cast<unsigned>(last_mark_), frame().commands().size());
+      }
+      last_mark_ = out.mark;
+      return true;
     }
-    if (out.end_of_draw) fault("next", "a warp of {} splats that ends the draw", out.splats);
+    if (out.splats == 0 || out.splats > splats_per_vertex_warp) fault("next", "a warp of {} splats", out.splats);
+    const std::uint64_t end = out.first_splat + std::uint64_t{out.splats};
+    if (out.first_splat < issued_ || end > frame().splats()) {
+      fault("next", "a warp of splats {} to {}, after {} of {}", out.first_splat, end - 1, issued_, frame().splats());
+    }
+    check_splat("next", out.draw, out.first_splat);
+    check_splat("next", out.draw, static_cast<std::uint32_t>(end - 1));
     issued_ = out.first_splat + out.splats;
     return true;
   }
@@ -167,6 +189,7 @@ class CheckedUnit<DrawBehaviour> final : public CheckedSlot<DrawBehaviour> {
 
  private:
   std::uint32_t issued_ = 0;  ///< up to this splat
+  Mark last_mark_ = Mark::none;
 };
 
 template <>
@@ -174,12 +197,15 @@ class CheckedUnit<VpoBehaviour> final : public CheckedSlot<VpoBehaviour> {
  public:
   using CheckedSlot::CheckedSlot;
 
-  unsigned assemble(std::uint32_t splat, std::array<Primitive, 2>& out) override {
-    const unsigned count = ask("assemble", [&] { return checked_->assemble(splat, out); });
+  unsigned assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) override {
+    const unsigned count = ask("assemble", [&] { return checked_->assemble(draw, splat, out); });
     if (count > out.size()) fault("assemble", "{} triangles of splat {}", count, splat);
     for (unsigned i = 0; i < count; ++i) {
       check_primitive("assemble", out[i]);
-      if (out[i].splat != splat) fault("assemble", "a triangle of splat {} for splat {}", out[i].splat, splat);
+      if (out[i].splat != splat || out[i].draw != draw) {
+        fault("assemble", "a triangle of splat {} of draw {} for splat {} of draw {}", out[i].splat, out[i].draw, splat,
+              draw);
+      }
     }
     assembled_ += count;
     return count;
@@ -282,12 +308,12 @@ class CheckedUnit<RasterBehaviour> final : public CheckedSlot<RasterBehaviour> {
     if (++kept_ > raster_tiles())
       fault("next", "splat {} covers more raster tiles than the frame has", primitive_.splat);
     if (out.count > QuadBeat::capacity) fault("next", "{} quads in a raster tile", out.count);
-    if (out.end_of_draw || out.last_of_bin) fault("next", "a raster tile with marks that are not its own");
+    if (out.mark != Mark::none || out.last_of_bin) fault("next", "a raster tile with marks that are not its own");
     check_tile("next", out.tile);
     check_quads("next", out.tile, out.quads.data(), out.count);
     for (unsigned i = 0; i < out.count; ++i) {
       const Quad& quad = out.quads[i];
-      if (quad.splat != primitive_.splat || quad.triangle != primitive_.triangle) {
+      if (quad.splat != primitive_.splat || quad.triangle != primitive_.triangle || quad.draw != primitive_.draw) {
         fault("next", "a quad of splat {}.{} for splat {}.{}", quad.splat, quad.triangle, primitive_.splat,
               primitive_.triangle);
       }
@@ -401,18 +427,26 @@ class CheckedUnit<ZropBehaviour> final : public CheckedSlot<ZropBehaviour> {
     const TileId tile = beat.tile;
     const unsigned count = beat.count;
     const bool last_of_bin = beat.last_of_bin;
-    const bool end_of_draw = beat.end_of_draw;
-    tested_ += count;
+    if (count > 0 && !frame().draws().empty() && frame().draw_call(beat.quads[0].draw).state.early_termination) {
+      tested_ += count;
+    }
     lost_quads_ += count;
     lost_fragments_ += fragments_of(beat);
     ask("test", [&] { checked_->test(beat); });
     if (beat.count > count) fault("test", "{} quads of {} in {} passed", beat.count, count, words_of(tile));
-    if (beat.tile != tile || beat.last_of_bin != last_of_bin || beat.end_of_draw != end_of_draw) {
+    if (beat.tile != tile || beat.last_of_bin != last_of_bin || beat.mark != Mark::none) {
       fault("test", "a beat of {} with a tile or marks that are not its own", words_of(tile));
     }
     check_quads("test", tile, beat.quads.data(), beat.count);
     lost_quads_ -= beat.count;
     lost_fragments_ -= fragments_of(beat);
+  }
+  void attach(DepthStencilSurface& surface) override {
+    ZropBehaviour::attach(surface);
+    ask("attach", [&] { checked_->attach(surface); });
+  }
+  void pass(Mark mark) override {
+    ask("pass", [&] { checked_->pass(mark); });
   }
   void update(const TerminationSignal& signal) override {
     ++updates_;
@@ -494,7 +528,7 @@ class CheckedUnit<QruBehaviour> final : public CheckedSlot<QruBehaviour> {
     if (warp.count == 0 || warp.count > quads_per_warp) {
       fault(call, "a warp of {} quads in {}, and it has 1 to {}", warp.count, words_of(tile_), quads_per_warp);
     }
-    if (warp.end_of_draw) fault(call, "a warp of {} that ends the draw", words_of(tile_));
+    if (warp.mark != Mark::none) fault(call, "a warp of {} that is a mark", words_of(tile_));
     check_quads(call, tile_, warp.quads.data(), warp.count);
     for (unsigned pair = 0; 2 * pair < 8; ++pair) {
       if ((warp.merge_pairs >> pair & 1U) == 0) continue;
@@ -524,7 +558,7 @@ class CheckedUnit<SmBehaviour> final : public CheckedSlot<SmBehaviour> {
     out.pool = pool;
     if (out.count > warp.count) fault("shade", "{} quads of {} in {} left", out.count, warp.count, words_of(warp.tile));
     if (out.tile != warp.tile || out.sequence != warp.sequence || out.tile_sequence != warp.tile_sequence ||
-        out.end_of_draw) {
+        out.mark != Mark::none) {
       fault("shade", "a warp of {} with a tile, numbers or a mark that are not its own", words_of(warp.tile));
     }
     ++warps_;
@@ -540,6 +574,7 @@ class CheckedUnit<SmBehaviour> final : public CheckedSlot<SmBehaviour> {
               out.position[i], out.live[i]);
       }
       lost_fragments_ -= popcount(out.live[i]);
+      if (frame().splats() > 0) check_splat("shade", out.draw[i], out.first_primitive[i] / 2);
     }
     lost_quads_ -= out.count;
   }
@@ -590,23 +625,29 @@ class CheckedUnit<SmBehaviour> final : public CheckedSlot<SmBehaviour> {
 template <>
 class CheckedUnit<CropBehaviour> final : public CheckedSlot<CropBehaviour> {
  public:
-  CheckedUnit(std::string name, const RenderState& state, std::unique_ptr<CropBehaviour> checked)
-      : CheckedSlot(std::move(name), state, std::move(checked)),
-        signals_(state.early_termination),
-        format_(state.format) {}
+  CheckedUnit(std::string name, const RenderContext& context, std::unique_ptr<CropBehaviour> checked)
+      : CheckedSlot(std::move(name), context, std::move(checked)), format_(context.format) {}
 
   void attach(ColorSurface& surface) override {
     CropBehaviour::attach(surface);
     ask("attach", [&] { checked_->attach(surface); });
   }
-  Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) override {
-    const Outcome outcome = ask("blend", [&] { return checked_->blend(place, live, color); });
-    take(static_cast<unsigned>(place % positions_per_tile), live, outcome);
+  void pass(Mark mark) override {
+    ask("pass", [&] { checked_->pass(mark); });
+  }
+  Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) override {
+    const Outcome outcome = ask("blend", [&] { return checked_->blend(draw, place, live, color); });
+    take(draw, static_cast<unsigned>(place % positions_per_tile), live, outcome);
+    return outcome;
+  }
+  Outcome blend_quad(std::size_t place, const ShadedWarp& warp, unsigned index) override {
+    const Outcome outcome = ask("blend_quad", [&] { return checked_->blend_quad(place, warp, index); });
+    take(warp.draw[index], warp.position[index], warp.live[index], outcome);
     return outcome;
   }
   void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) override {
     ask("blend_quads", [&] { checked_->blend_quads(warp, from, to, outcomes); });
-    for (unsigned i = from; i < to; ++i) take(warp.position[i], warp.live[i], outcomes[i]);
+    for (unsigned i = from; i < to; ++i) take(warp.draw[i], warp.position[i], warp.live[i], outcomes[i]);
   }
   void look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) override {
     ask("look_up", [&] { checked_->look_up(warp, from, to, out); });
@@ -671,12 +712,13 @@ class CheckedUnit<CropBehaviour> final : public CheckedSlot<CropBehaviour> {
   }
 
  private:
-  void take(unsigned position, LaneMask live, const Outcome& outcome) {
+  void take(DrawIndex draw, unsigned position, LaneMask live, const Outcome& outcome) {
     ++quads_;
     fragments_ += popcount(live);
     if (outcome.terminated == 0) return;
     ++signalled_;
-    if (!signals_) fault("blend", "position {} of a tile is signalled without early termination", position);
+    if (!frame().draw_call(draw).state.early_termination)
+      fault("blend", "position {} of a tile is signalled without early termination", position);
     if ((outcome.terminated & ~live) != 0) {
       fault("blend", "position {} of a tile: pixels {:#x} terminated by fragments {:#x}", position, outcome.terminated,
             live);
@@ -685,7 +727,6 @@ class CheckedUnit<CropBehaviour> final : public CheckedSlot<CropBehaviour> {
 
   static unsigned bits(std::uint32_t sectors) { return static_cast<unsigned>(__builtin_popcount(sectors)); }
 
-  const bool signals_;
   const ColorFormat format_;
   std::uint64_t line_accesses_ = 0;
   std::uint64_t line_misses_ = 0;
@@ -698,17 +739,17 @@ class CheckedUnit<CropBehaviour> final : public CheckedSlot<CropBehaviour> {
 };
 
 template <class SlotBehaviour>
-std::unique_ptr<Behaviour> check(const std::string& name, const RenderState& state,
+std::unique_ptr<Behaviour> check(const std::string& name, const RenderContext& context,
                                  std::unique_ptr<Behaviour> behaviour) {
   auto* const typed = dynamic_cast<SlotBehaviour*>(behaviour.get());
   if (typed == nullptr) throw SimulationFault(name, 0, "make_behaviour makes a unit of another slot");
   static_cast<void>(behaviour.release());
-  auto checked = std::make_unique<CheckedUnit<SlotBehaviour>>(name, state, std::unique_ptr<SlotBehaviour>(typed));
+  auto checked = std::make_unique<CheckedUnit<SlotBehaviour>>(name, context, std::unique_ptr<SlotBehaviour>(typed));
   checked->check_costs();
   return checked;
 }
 
-using Check = std::unique_ptr<Behaviour> (*)(const std::string&, const RenderState&, std::unique_ptr<Behaviour>);
+using Check = std::unique_ptr<Behaviour> (*)(const std::string&, const RenderContext&, std::unique_ptr<Behaviour>);
 
 Check check_of_slot(const std::string& slot) {
   if (slot == "draw") return check<DrawBehaviour>;
@@ -722,7 +763,7 @@ Check check_of_slot(const std::string& slot) {
   if (slot == "sm") return check<SmBehaviour>;
   if (slot == "crop") return check<CropBehaviour>;
   // What a slot of a plugin's returns, only that plugin knows.
-  return [](const std::string&, const RenderState&, std::unique_ptr<Behaviour> behaviour) { return behaviour; };
+  return [](const std::string&, const RenderContext&, std::unique_ptr<Behaviour> behaviour) { return behaviour; };
 }
 
 }  // namespace
@@ -736,10 +777,10 @@ void check_calls(Implementation& implementation) {
   };
   implementation.make_behaviour = [name, make = std::move(implementation.make_behaviour),
                                    check = check_of_slot(implementation.slot)](const ParameterSet& parameters,
-                                                                               const RenderState& state) {
-    auto behaviour = call_foreign(name, "make_behaviour", 0, [&] { return make(parameters, state); });
+                                                                               const RenderContext& context) {
+    auto behaviour = call_foreign(name, "make_behaviour", 0, [&] { return make(parameters, context); });
     if (behaviour == nullptr) throw SimulationFault(name, 0, "make_behaviour makes nothing");
-    return check(name, state, std::move(behaviour));
+    return check(name, context, std::move(behaviour));
   };
 }
 
@@ -748,7 +789,10 @@ void follow_clock(Behaviour& unit, const ClockDomain& clock) {
 }
 
 void check_counters(const Behaviour& unit) {
-  if (const auto* const checks = dynamic_cast<const Checks*>(&unit)) checks->check_counters();
+  if (const auto* const checks = dynamic_cast<const Checks*>(&unit)) {
+    checks->check_counters();
+    checks->check_draws(unit.unit());
+  }
 }
 
 ForeignCode foreign_code_running() { return running; }

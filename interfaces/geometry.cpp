@@ -30,7 +30,8 @@ void cut_axis(const Point& center, const Point& axis, const Point& view_center, 
   high = std::max(std::min(high, middle + view_radius / length), -1.0);
 }
 
-bool box_corners(const RenderState& state, const Splat& splat, std::array<Point, 4>& corners) {
+bool box_corners(const RenderContext& context, const DrawState& state, const Splat& splat,
+                 std::array<Point, 4>& corners) {
   const Point center{splat.cx, splat.cy};
   Point a{splat.ax, splat.ay};
   Point b{splat.bx, splat.by};
@@ -44,7 +45,8 @@ bool box_corners(const RenderState& state, const Splat& splat, std::array<Point,
     a = {a.x * scale, a.y * scale};
     b = {b.x * scale, b.y * scale};
   }
-  const double padding = static_cast<double>(state.obb_padding) / static_cast<double>(1U << state.subpixel_bits);
+  const double padding =
+      static_cast<double>(state.obb_padding) / static_cast<double>(1U << context.precision.subpixel_bits);
   for (Point* axis : {&a, &b}) {
     const double length = std::sqrt(axis->x * axis->x + axis->y * axis->y);
     if (length > 0) {
@@ -68,8 +70,8 @@ bool box_corners(const RenderState& state, const Splat& splat, std::array<Point,
   const auto set_corners = [&] { corners = {corner(a0, b0), corner(a1, b0), corner(a0, b1), corner(a1, b1)}; };
   set_corners();
   if (!std::all_of(corners.begin(), corners.end(), in_guard_band)) {
-    const double width = state.draw->width;
-    const double height = state.draw->height;
+    const double width = context.frame->width();
+    const double height = context.frame->height();
     const Point view_center{width / 2, height / 2};
     const double view_radius = 0.5 * std::sqrt(width * width + height * height) + 2.0;
     cut_axis(center, a, view_center, view_radius, a0, a1);
@@ -82,12 +84,13 @@ bool box_corners(const RenderState& state, const Splat& splat, std::array<Point,
 
 }  // namespace
 
-bool snap_triangle(const RenderState& state, std::uint32_t splat, unsigned triangle, SnappedTriangle& out) {
-  const auto steps = static_cast<double>(1U << state.subpixel_bits);
-  if (!state.draw->triangles.empty()) {
-    const ScreenTriangle& given = state.draw->triangles[splat];
+bool snap_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
+                   SnappedTriangle& out) {
+  const DrawCall& call = context.draw(draw);
+  const auto steps = static_cast<double>(1U << context.precision.subpixel_bits);
+  if (const ScreenTriangle* const given = call.triangle(splat)) {
     for (unsigned vertex = 0; vertex < 3; ++vertex) {
-      const Point point{given.x[vertex], given.y[vertex]};
+      const Point point{given->x[vertex], given->y[vertex]};
       if (!in_guard_band(point)) return false;
       out.x[vertex] = snap(point.x, steps);
       out.y[vertex] = snap(point.y, steps);
@@ -95,7 +98,7 @@ bool snap_triangle(const RenderState& state, std::uint32_t splat, unsigned trian
     return true;
   }
   std::array<Point, 4> corners;
-  if (!box_corners(state, state.draw->splats[splat], corners)) return false;
+  if (!box_corners(context, call.state, call.splat(splat), corners)) return false;
   constexpr unsigned order[2][3] = {{0, 1, 2}, {1, 3, 2}};
   for (unsigned vertex = 0; vertex < 3; ++vertex) {
     const Point& point = corners[order[triangle][vertex]];

@@ -15,6 +15,15 @@ Counter::Counter(StatisticSet& owner, const char* name, const char* unit, const 
   owner.counters_.push_back(this);
 }
 
+DrawCounter::DrawCounter(StatisticSet& owner, const char* name, const char* unit, const char* meaning)
+    : Counter(owner, name, unit, meaning) {
+  owner.draw_counters_.push_back(this);
+}
+
+void StatisticSet::set_draws(std::size_t draws) {
+  for (DrawCounter* counter : draw_counters_) counter->of_draw_.assign(draws > 1 ? draws : 0, 0);
+}
+
 Extreme::Extreme(StatisticSet& owner, Of of, const char* name, const char* unit, const char* meaning)
     : Statistic(owner, name, unit, meaning), of_(of) {
   owner.extremes_.push_back(this);

@@ -1,5 +1,8 @@
 #include <vrpipe/surface.h>
 
+#include <algorithm>
+#include <cstddef>
+
 namespace vrpipe {
 
 ColorSurface::ColorSurface(std::uint32_t width, std::uint32_t height, ColorFormat format)
@@ -9,6 +12,15 @@ ColorSurface::ColorSurface(std::uint32_t width, std::uint32_t height, ColorForma
       grid_(width, height),
       bytes_per_quad_(4 * bytes_per_pixel(format)),
       quads_(grid_.quads()) {}
+
+std::uint64_t ColorSurface::size_bytes(std::uint32_t width, std::uint32_t height, ColorFormat format) {
+  return std::uint64_t{TileGrid(width, height).quads()} * 4 * bytes_per_pixel(format);
+}
+
+void ColorSurface::clear(TileId tile) {
+  const auto first = quads_.begin() + static_cast<std::ptrdiff_t>(grid_.place(tile, 0));
+  std::fill_n(first, positions_per_tile, QuadColor{});
+}
 
 std::uint64_t ColorSurface::size_bytes() const { return std::uint64_t{quads_.size()} * bytes_per_quad_; }
 

@@ -31,8 +31,8 @@ std::map<std::string, UnitMaker>& makers() {
 Unit::Unit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector<WorkKind> work)
     : sc_module(name),
       Component({&domain, domain.attach(*this)}),
-      occupancy_(domain.draw_end(), std::move(work)),
-      account_(domain.draw_end()) {}
+      occupancy_(domain.frame_end(), std::move(work)),
+      account_(domain.frame_end()) {}
 
 InPort& Component::in(const std::string& name) { return port_named(in_ports, label(), name); }
 OutPort& Component::out(const std::string& name) { return port_named(out_ports, label(), name); }

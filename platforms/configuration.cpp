@@ -24,7 +24,32 @@ const Implementation& default_implementation(const Slot& slot, const Variant& va
   return Registry::instance().find(slot.name, absent ? slot.stand_in : slot.implementation);
 }
 
-Configuration::Configuration(const RunRequest& request, const Draw& draw)
+namespace {
+
+DrawState draw_state_from(const StateParameters& parameters) {
+  DrawState state;
+  state.early_termination = true;
+  state.termination_threshold = static_cast<float>(static_cast<double>(parameters.termination_threshold));
+  state.termination_inclusive = parameters.termination_compare == 0U;
+  state.pruning_threshold = static_cast<float>(static_cast<double>(parameters.pruning_threshold));
+  state.splat_extent = static_cast<SplatExtent>(static_cast<unsigned>(parameters.splat_extent));
+  state.obb_padding = static_cast<float>(static_cast<double>(parameters.obb_padding));
+  return state;
+}
+
+}  // namespace
+
+DrawState draw_state_of(const RunRequest& request, const std::vector<Setting>& own) {
+  StateParameters parameters;
+  for (const auto* settings : {&request.platform->settings, &request.variant.settings, &request.settings, &own}) {
+    for (const Setting& setting : *settings) {
+      if (setting.unit == "state") parameters.set(setting.unit, setting.parameter, setting.value);
+    }
+  }
+  return draw_state_from(parameters);
+}
+
+Configuration::Configuration(const RunRequest& request, const Frame& frame)
     : request_(request), netlist_(request.platform->gpcs) {
   // Of the program itself; a plugin's are reported when it is loaded.
   const std::vector<Registry::Problem> problems = Registry::instance().take_problems();
@@ -40,24 +65,20 @@ Configuration::Configuration(const RunRequest& request, const Draw& draw)
   for (const Setting& setting : request.settings) apply(setting);
   if (request.observers != nullptr) request.observers->check(netlist_);
 
-  states_.resize(request.platform->gpcs);
-  for (unsigned gpc = 0; gpc < states_.size(); ++gpc) {
-    RenderState& state = states_[gpc];
-    state.draw = &draw;
-    state.format = request.format;
-    state.blend_rounding = static_cast<BlendRounding>(static_cast<unsigned>(state_parameters_.blend_rounding));
-    state.termination = request.termination;
-    state.early_termination = request.variant.early_termination;
-    state.termination_threshold = static_cast<float>(static_cast<double>(state_parameters_.termination_threshold));
-    state.termination_inclusive = state_parameters_.termination_compare == 0U;
-    state.pruning_threshold = static_cast<float>(static_cast<double>(state_parameters_.pruning_threshold));
-    state.exponential = static_cast<Exponential>(static_cast<unsigned>(state_parameters_.exponential));
-    state.splat_extent = static_cast<SplatExtent>(static_cast<unsigned>(state_parameters_.splat_extent));
-    state.subpixel_bits = state_parameters_.subpixel_bits;
-    state.obb_padding = static_cast<float>(static_cast<double>(state_parameters_.obb_padding));
-    state.gpcs = static_cast<unsigned>(states_.size());
-    state.gpc = gpc;
-  }
+  auto drawn = std::make_shared<Frame>(frame);
+  drawn->change_states([&](DrawState& state) {
+    state.early_termination = state.early_termination && request.variant.early_termination;
+  });
+  RenderContext context;
+  context.frame = std::move(drawn);
+  context.format = request.format;
+  context.termination = request.termination;
+  context.precision.blend_rounding =
+      static_cast<BlendRounding>(static_cast<unsigned>(state_parameters_.blend_rounding));
+  context.precision.exponential = static_cast<Exponential>(static_cast<unsigned>(state_parameters_.exponential));
+  context.precision.subpixel_bits = state_parameters_.subpixel_bits;
+  context.placement.gpcs = request.platform->gpcs;
+  for (unsigned& gpc = context.placement.gpc; gpc < request.platform->gpcs; ++gpc) contexts_.push_back(context);
 }
 
 void Configuration::wire() {
@@ -190,7 +211,9 @@ void Configuration::set_link(const Setting& setting) {
 
 std::unique_ptr<Behaviour> Configuration::make(const Instance& instance) const {
   const UnitChoices& unit = units_.at(instance.path);
-  return unit.chosen->make_behaviour(*unit.chosen_parameters, states_[instance.gpc]);
+  std::unique_ptr<Behaviour> behaviour = unit.chosen->make_behaviour(*unit.chosen_parameters, contexts_[instance.gpc]);
+  behaviour->unit().set_draws(frame().draws().size());
+  return behaviour;
 }
 
 std::vector<std::pair<std::string, std::string>> Configuration::parameters() const {

@@ -16,18 +16,18 @@
 
 namespace vrpipe {
 
-Gpu::Gpu(const Configuration& configuration, ColorSurface& surface)
+Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
     : configuration_(configuration),
       clock_(std::make_unique<ClockDomain>("clock", static_cast<std::uint64_t>(
                                                         std::llround(1e6 / configuration.platform().frequency_mhz)))) {
   const Netlist& netlist = configuration.netlist();
   const RunRequest& request = configuration.request();
   for (const Instance& instance : netlist.instances()) {
-    const bool runs_ahead =
-        instance.slot == "zrop" && request.termination == Termination::strict && request.variant.early_termination;
-    if (runs_ahead) ahead_[instance.gpc] = std::make_unique<RunAhead>(configuration, instance.gpc, surface);
+    const bool runs_ahead = instance.slot == "zrop" && request.termination == Termination::strict &&
+                            configuration.frame().terminates_early();
+    if (runs_ahead) ahead_[instance.gpc] = std::make_unique<RunAhead>(configuration, instance.gpc, framebuffer.color);
   }
-  for (const Instance& instance : netlist.instances()) add(instance, surface);
+  for (const Instance& instance : netlist.instances()) add(instance, framebuffer);
   connect_units(netlist, request.observers.get(), [&](const std::string& path) { return find(path); });
   for (const MemoryInstance& memory : netlist.memories()) add_memory(memory);
   check();
@@ -42,9 +42,9 @@ Unit* Gpu::find(const std::string& path) const {
   return nullptr;
 }
 
-void Gpu::add(const Instance& instance, ColorSurface& surface) {
+void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
   const std::string& slot = instance.slot;
-  const RenderState& state = configuration_.state_of(instance.gpc);
+  const RenderContext& context = configuration_.context_of(instance.gpc);
   const auto ahead = ahead_.find(instance.gpc);
   std::unique_ptr<Behaviour> behaviour;
   Behaviour* counting = nullptr;
@@ -56,9 +56,10 @@ void Gpu::add(const Instance& instance, ColorSurface& surface) {
     counting = behaviour.get();
   }
   follow_clock(*counting, *clock_);
-  if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(surface);
-  if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get()); zrop != nullptr && ahead != ahead_.end()) {
-    zrop->follow(*ahead->second);
+  if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(framebuffer.color);
+  if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get()); zrop != nullptr) {
+    zrop->attach(framebuffer.depth_stencil);
+    if (ahead != ahead_.end()) zrop->follow(*ahead->second);
   }
   std::string module = instance.path;
   std::replace(module.begin(), module.end(), '.', '_');
@@ -66,10 +67,10 @@ void Gpu::add(const Instance& instance, ColorSurface& surface) {
   const Fidelity fidelity = configuration_.request().fidelity;
   std::unique_ptr<Unit> unit;
   if (fidelity == Fidelity::cycle) {
-    unit = unit_maker(slot)(module, *clock_, std::move(behaviour), state, gpcs);
+    unit = unit_maker(slot)(module, *clock_, std::move(behaviour), context, gpcs);
   } else {
     const Transport transport = fidelity == Fidelity::lt ? Transport::blocking : Transport::non_blocking;
-    unit = timed_unit_maker(slot)(module, *clock_, std::move(behaviour), state, gpcs, transport);
+    unit = timed_unit_maker(slot)(module, *clock_, std::move(behaviour), context, gpcs, transport);
   }
   if (Observers* const observers = configuration_.request().observers.get()) {
     if (StateObserver* const states = observers->of_unit(instance.path)) unit->observe_states(*states);
@@ -121,9 +122,9 @@ void Gpu::check() const {
   }
 }
 
-bool Gpu::draw_is_over() const {
+bool Gpu::frame_is_over() const {
   return !clock_->awaits_answers() && std::all_of(units_.begin(), units_.end(), [](const Placed& placed) {
-    return placed.unit->idle() && (!placed.unit->ends_draw() || placed.unit->end_of_draw() != never);
+    return placed.unit->idle() && (!placed.unit->ends_frame() || placed.unit->end_of_frame() != never);
   });
 }
 
@@ -150,7 +151,7 @@ Cycle Gpu::run(std::atomic<float>* progress) {
 
   // In slices, so that progress shows.
   const sc_core::sc_time slice = sc_core::sc_time::from_value(clock_->period().value() * 50000);
-  const auto splats = static_cast<float>(std::max<std::size_t>(configuration_.draw().splats.size(), 1));
+  const auto splats = static_cast<float>(std::max<std::uint32_t>(configuration_.frame().splats(), 1));
   const auto issued = [&] {
     std::uint64_t warps = 0;
     for (const OutPort* port : units_.front().unit->out_ports) warps += port->transferred();
@@ -162,7 +163,7 @@ Cycle Gpu::run(std::atomic<float>* progress) {
   while (!clock_->run_to_rest(slice)) {
     if (progress != nullptr) *progress = std::min(1.0F, issued() / splats);
     const bool was_over = over;
-    over = draw_is_over();
+    over = frame_is_over();
     if (was_over && over) break;
   }
 
@@ -170,12 +171,12 @@ Cycle Gpu::run(std::atomic<float>* progress) {
   bool any_end = false;
   bool ended = true;
   for (const Placed& placed : units_) {
-    if (!placed.unit->ends_draw()) continue;
+    if (!placed.unit->ends_frame()) continue;
     any_end = true;
-    if (placed.unit->end_of_draw() == never) {
+    if (placed.unit->end_of_frame() == never) {
       ended = false;
     } else {
-      passed = std::max(passed, placed.unit->end_of_draw());
+      passed = std::max(passed, placed.unit->end_of_frame());
     }
   }
   // A platform whose pipeline ends elsewhere is done when all have come to rest.
@@ -198,7 +199,7 @@ Cycle Gpu::run(std::atomic<float>* progress) {
     throw SimulationFault("deadlock", clock_->now(), "units with work left that wait for each other: " + waiting);
   }
   // A draw without quads ends when its end has passed through.
-  const Cycle last_quad = clock_->draw_end().so_far();
+  const Cycle last_quad = clock_->frame_end().so_far();
   const Cycle end = last_quad > 0 ? last_quad : passed;
   for (const Placed& placed : units_) placed.unit->close_account(end);
   if (progress != nullptr) *progress = 1;

@@ -22,6 +22,7 @@ class RunAhead::Record {
     entry.live = warp.live;
     entry.first_primitive = warp.first_primitive;
     entry.last_primitive = warp.last_primitive;
+    entry.draw = warp.draw;
   }
   void blended(const ShadedWarp& warp, unsigned from, unsigned to, const CropBehaviour::Outcomes& outcomes) {
     Entry& entry = find(warp.sequence);
@@ -34,11 +35,12 @@ class RunAhead::Record {
     out.sequence = warp.sequence;
     out.tile_sequence = entry.tile_sequence;
     out.count = entry.count;
-    out.end_of_draw = false;
+    out.mark = Mark::none;
     out.position = entry.position;
     out.live = entry.live;
     out.first_primitive = entry.first_primitive;
     out.last_primitive = entry.last_primitive;
+    out.draw = entry.draw;
     entry.left = entry.count;
     forget();
   }
@@ -66,6 +68,7 @@ class RunAhead::Record {
     std::array<LaneMask, quads_per_warp> live;
     std::array<std::uint32_t, quads_per_warp> first_primitive;
     std::array<std::uint32_t, quads_per_warp> last_primitive;
+    std::array<DrawIndex, quads_per_warp> draw;
     CropBehaviour::Outcomes outcomes;
     unsigned left = not_shaded;  ///< quads that the timing model has not blended yet
   };
@@ -106,8 +109,9 @@ class RunAhead::RecordingCrop final : public CropBehaviour {
     CropBehaviour::attach(surface);
     crop_->attach(surface);
   }
-  Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) override {
-    return crop_->blend(place, live, color);
+  void pass(Mark mark) override { crop_->pass(mark); }
+  Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) override {
+    return crop_->blend(draw, place, live, color);
   }
   void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, CropBehaviour::Outcomes& outcomes) override {
     crop_->blend_quads(warp, from, to, outcomes);
@@ -138,7 +142,8 @@ class RunAhead::RepeatingCrop final : public CropBehaviour {
  public:
   RepeatingCrop(CropBehaviour& crop, Record& record) : crop_(crop), record_(record) {}
   const Behaviour& unit() const override { return crop_.unit(); }
-  Outcome blend(std::size_t, LaneMask, const QuadColor&) override {
+  void pass(Mark) override {}  ///< what is cleared was cleared ahead of time
+  Outcome blend(DrawIndex, std::size_t, LaneMask, const QuadColor&) override {
     throw SimulationFault("crop", 0, "a quad was blended without its warp");
   }
   Outcome blend_quad(std::size_t, const ShadedWarp& warp, unsigned index) override {
@@ -226,7 +231,7 @@ RunAhead::RunAhead(const Configuration& configuration, unsigned gpc, ColorSurfac
       behaviour = std::move(recording);
     }
     units_.push_back(untimed_unit_maker(instance->slot)(instance->path, std::move(behaviour),
-                                                        configuration.state_of(gpc), netlist.gpcs()));
+                                                        configuration.context_of(gpc), netlist.gpcs()));
     placed[instance->path] = units_.back().get();
     if (instance->slot == "qru") qru = units_.back().get();
     if (instance->slot == "crop") crop = units_.back().get();
@@ -255,6 +260,12 @@ RunAhead::RunAhead(const Configuration& configuration, unsigned gpc, ColorSurfac
 }
 
 RunAhead::~RunAhead() = default;
+
+void RunAhead::pass(Mark mark) {
+  BinItem item;
+  item.mark = mark;
+  entry_->take(item);
+}
 
 void RunAhead::tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) {
   signals_->terminated = &terminated;

@@ -18,6 +18,7 @@ class RunAhead final : public FunctionalRunAhead {
   RunAhead(const Configuration& configuration, unsigned gpc, ColorSurface& surface);
   ~RunAhead() override;
 
+  void pass(Mark mark) override;
   void tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) override;
 
   /// For the timing model of the GPC's SM array or CROP: gives each warp the outcome that it had here.

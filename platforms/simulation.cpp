@@ -5,6 +5,7 @@
 #include <cstring>
 #include <ctime>
 #include <map>
+#include <set>
 
 #include "statistics.h"
 #include "untimed_gpu.h"
@@ -94,7 +95,7 @@ std::string hash_of(const RunResult& result) {
   std::uint64_t hash = 0xcbf29ce484222325ULL;
   for (const auto& count : result.counts.named()) fnv1a(hash, count.second);
   fnv1a(hash, result.cycles.value_or(0));
-  const ColorSurface& surface = result.surface;
+  const ColorSurface& surface = result.framebuffer.color;
   for (std::uint32_t y = 0; y < surface.height(); ++y) {
     for (std::uint32_t x = 0; x < surface.width(); ++x) {
       const std::array<float, 4> pixel = surface.pixel(x, y);
@@ -126,51 +127,77 @@ void add_statistics(const sc_core::sc_module& memory, StatisticCollector& statis
   if (const auto* const set = dynamic_cast<const StatisticSet*>(&memory)) statistics.add(l2, l2, *set);
 }
 
-/// The counters that every unit of a slot has, summed over GPCs.
-Counts counts_from(const BehaviourList& behaviours) {
+/// The counters that every unit of a slot has, summed over GPCs. `value` gives what of one is counted.
+template <class Value>
+Counts counts_from(const BehaviourList& behaviours, const Value& value) {
   Counts c;
   for (const auto& [instance, behaviour] : behaviours.of_instance) {
     const Behaviour& unit = behaviour->unit();
     if (const auto* const vpo = dynamic_cast<const VpoBehaviour*>(&unit)) {
-      c.primitives += vpo->primitives.value();
+      c.primitives += value(vpo->primitives);
     } else if (const auto* const tgc = dynamic_cast<const TgcBehaviour*>(&unit)) {
-      c.tgc_flushes += tgc->flushes.value();
+      c.tgc_flushes += value(tgc->flushes);
     } else if (const auto* const raster = dynamic_cast<const RasterBehaviour*>(&unit)) {
-      c.quads_rasterized += raster->quads_rasterized.value();
-      c.fragments_rasterized += raster->fragments_rasterized.value();
+      c.quads_rasterized += value(raster->quads_rasterized);
+      c.fragments_rasterized += value(raster->fragments_rasterized);
     } else if (const auto* const tc = dynamic_cast<const TcBehaviour*>(&unit)) {
-      c.tc_flushes += tc->flushes.value();
+      c.tc_flushes += value(tc->flushes);
     } else if (const auto* const zrop = dynamic_cast<const ZropBehaviour*>(&unit)) {
-      c.quads_depth_stencil_failed += zrop->quads_depth_stencil_failed.value();
-      c.fragments_depth_stencil_failed += zrop->fragments_depth_stencil_failed.value();
-      c.quads_terminated += zrop->quads_terminated.value();
-      c.fragments_terminated += zrop->fragments_terminated.value();
+      c.quads_depth_stencil_failed += value(zrop->quads_depth_stencil_failed);
+      c.fragments_depth_stencil_failed += value(zrop->fragments_depth_stencil_failed);
+      c.quads_terminated += value(zrop->quads_terminated);
+      c.fragments_terminated += value(zrop->fragments_terminated);
     } else if (const auto* const sm = dynamic_cast<const SmBehaviour*>(&unit)) {
-      c.quads_shaded += sm->quads_shaded.value();
-      c.fragments_shaded += sm->fragments_shaded.value();
-      c.quads_pruned += sm->quads_pruned.value();
-      c.fragments_pruned += sm->fragments_pruned.value();
-      c.quads_merged += sm->quads_merged.value();
-      c.fragments_merged += sm->fragments_merged.value();
-      c.warps += sm->fragment_warps.value();
+      c.quads_shaded += value(sm->quads_shaded);
+      c.fragments_shaded += value(sm->fragments_shaded);
+      c.quads_pruned += value(sm->quads_pruned);
+      c.fragments_pruned += value(sm->fragments_pruned);
+      c.quads_merged += value(sm->quads_merged);
+      c.fragments_merged += value(sm->fragments_merged);
+      c.warps += value(sm->fragment_warps);
     } else if (const auto* const crop = dynamic_cast<const CropBehaviour*>(&unit)) {
-      c.quads_dropped_late += crop->quads_dropped_late.value();
-      c.fragments_dropped_late += crop->fragments_dropped_late.value();
-      c.quads_late_failed += crop->quads_late_failed.value();
-      c.fragments_late_failed += crop->fragments_late_failed.value();
-      c.quads_blended += crop->quads_blended.value();
-      c.fragments_blended += crop->fragments_blended.value();
-      c.termination_updates += crop->termination_signals.value();
+      c.quads_dropped_late += value(crop->quads_dropped_late);
+      c.fragments_dropped_late += value(crop->fragments_dropped_late);
+      c.quads_late_failed += value(crop->quads_late_failed);
+      c.fragments_late_failed += value(crop->fragments_late_failed);
+      c.quads_blended += value(crop->quads_blended);
+      c.fragments_blended += value(crop->fragments_blended);
+      c.termination_updates += value(crop->termination_signals);
     }
   }
   return c;
 }
 
+struct OfDraw {
+  std::size_t draw;
+  std::uint64_t operator()(const DrawCounter& counter) const { return counter.of_draw()[draw]; }
+  std::uint64_t operator()(const Counter&) const { return 0; }
+};
+
+/// By draw, in a frame of several.
+std::vector<DrawReport> draw_reports(const Frame& frame, const BehaviourList& behaviours) {
+  // What several draws may share is nobody's own.
+  static const std::set<std::string> shared{"warps", "tgc_flushes", "tc_flushes"};
+  std::vector<DrawReport> reports;
+  if (frame.draws().size() < 2) return reports;
+  for (std::size_t draw = 0; draw < frame.draws().size(); ++draw) {
+    DrawReport& report = reports.emplace_back();
+    report.name = frame.draws()[draw].name;
+    const Counts counts = counts_from(behaviours, OfDraw{draw});
+    for (const auto& count : counts.named()) {
+      if (shared.count(count.first) == 0) report.counts.push_back(count);
+    }
+  }
+  return reports;
+}
+
 /// What the units counted, once a checked unit's counters are what went through it.
-void report_counts(const BehaviourList& behaviours, const StatisticCollector& statistics, RunResult& result) {
+void report_counts(const Configuration& configuration, const BehaviourList& behaviours,
+                   const StatisticCollector& statistics, RunResult& result) {
   for (const auto& [instance, behaviour] : behaviours.of_instance) check_counters(*behaviour);
   result.statistics = statistics.reports();
-  result.counts = counts_from(behaviours);
+  result.counts = counts_from(behaviours, [](const Counter& counter) { return counter.value(); });
+  result.draws = draw_reports(configuration.frame(), behaviours);
 }
 
 void check_conservation(const Counts& c) {
@@ -279,7 +306,7 @@ void set_time(const Configuration& configuration, Cycle cycles, RunResult& resul
 }
 
 void run_clocked(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
-  Gpu gpu(configuration, result.surface);
+  Gpu gpu(configuration, result.framebuffer);
   const HostTimer timer;
   const Cycle cycles = gpu.run(progress);
   timer.stop(result);
@@ -307,7 +334,7 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
     add_statistics(*gpu.l2(), statistics);
   }
   occupancy.finish();
-  report_counts(behaviours, statistics, result);
+  report_counts(configuration, behaviours, statistics, result);
 }
 
 /// The bounds of all GPCs: the longest is the draw's.
@@ -342,7 +369,7 @@ void report_bound(const Configuration& configuration, const UntimedGpu& gpu, con
 
 /// Without time, or with the bound that follows from the work.
 void run_untimed(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
-  UntimedGpu gpu(configuration, result.surface);
+  UntimedGpu gpu(configuration, result.framebuffer);
   std::vector<PhaseBound> bounds;
   std::vector<std::unique_ptr<WorkCounter>> counters;
   if (result.request.fidelity == Fidelity::bound) {
@@ -364,7 +391,7 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
     behaviours.of_instance.emplace_back(placed.instance, &behaviour);
     add_statistics(*placed.instance, behaviour, *placed.unit, statistics);
   }
-  report_counts(behaviours, statistics, result);
+  report_counts(configuration, behaviours, statistics, result);
   if (!bounds.empty()) report_bound(configuration, gpu, bounds, result);
 }
 
@@ -397,17 +424,14 @@ std::vector<std::pair<std::string, std::uint64_t>> Counts::named() const {
 }
 
 RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<float>* progress) {
-  if (draw.width == 0 || draw.height == 0 || draw.width > 16384 || draw.height > 16384) {
-    throw UserError("unusable size " + std::to_string(draw.width) + "x" + std::to_string(draw.height), "draw",
-                    "a side is 0 or beyond 16384 pixels", "use 1 to 16384");
-  }
-  if (!draw.triangles.empty() && draw.triangles.size() != draw.splats.size()) {
-    throw SimulationFault("draw", 0, "explicit triangles and splats differ in number");
-  }
-  const Configuration configuration(request, draw);
+  return simulate(request, *Frame::of(draw, draw_state_of(request)), progress);
+}
+
+RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
+  const Configuration configuration(request, frame);
   RunResult result;
   result.request = request;
-  result.surface = ColorSurface(draw.width, draw.height, request.format);
+  result.framebuffer = Framebuffer(configuration.frame(), request.format);
   result.implementations = configuration.implementations();
   result.parameters = configuration.parameters();
   if (request.fidelity == Fidelity::lt || request.fidelity == Fidelity::at) {
@@ -424,9 +448,7 @@ RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<floa
 }
 
 void check_configuration(const RunRequest& request) {
-  Draw empty;
-  empty.width = 1;
-  empty.height = 1;
+  const Frame empty(1, 1);
   const Configuration configuration(request, empty);
   for (const Instance& instance : configuration.netlist().instances()) configuration.make(instance);
 }
@@ -474,9 +496,7 @@ std::vector<ParameterListing> list_parameters(const Platform* platform) {
 }
 
 StorageReport quad_merging_storage(const RunRequest& request) {
-  Draw empty;
-  empty.width = 1;
-  empty.height = 1;
+  const Frame empty(1, 1);
   RunRequest merging = request;
   merging.variant.quad_merging = true;
   const Configuration configuration(merging, empty);

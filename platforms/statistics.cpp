@@ -138,17 +138,15 @@ std::vector<StatisticReport> list_statistics(const ParameterListing& listing) {
         collector.add(listing.unit, listing.unit, *set);
       }
     } else if (Registry::instance().has_slot(listing.unit)) {
-      Draw draw;
-      draw.width = draw.height = 1;
-      RenderState state;
-      state.draw = &draw;
+      RenderContext context;
+      context.frame = std::make_shared<Frame>(1, 1);
       const Implementation& implementation = Registry::instance().find(listing.unit, listing.implementation);
-      const auto make = [&] { return implementation.make_behaviour(*listing.parameters, state); };
+      const auto make = [&] { return implementation.make_behaviour(*listing.parameters, context); };
       collector.add(listing.unit, "functional", make()->unit());
-      collector.add(listing.unit, "untimed", *untimed_unit_maker(listing.unit)("untimed", make(), state, 1));
+      collector.add(listing.unit, "untimed", *untimed_unit_maker(listing.unit)("untimed", make(), context, 1));
       collector.add(listing.unit, "timed",
-                    *timed_unit_maker(listing.unit)("timed", clock, make(), state, 1, Transport::blocking));
-      collector.add(listing.unit, "cycle", *unit_maker(listing.unit)("cycle", clock, make(), state, 1));
+                    *timed_unit_maker(listing.unit)("timed", clock, make(), context, 1, Transport::blocking));
+      collector.add(listing.unit, "cycle", *unit_maker(listing.unit)("cycle", clock, make(), context, 1));
     }
   }
   fresh_simulation();

@@ -6,14 +6,15 @@
 
 namespace vrpipe {
 
-UntimedGpu::UntimedGpu(const Configuration& configuration, ColorSurface& surface) : configuration_(configuration) {
+UntimedGpu::UntimedGpu(const Configuration& configuration, Framebuffer& framebuffer) : configuration_(configuration) {
   const Netlist& netlist = configuration.netlist();
   for (const Instance& instance : netlist.instances()) {
     std::unique_ptr<Behaviour> behaviour = configuration.make(instance);
-    if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(surface);
+    if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(framebuffer.color);
+    if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get())) zrop->attach(framebuffer.depth_stencil);
     units_.push_back(
         {&instance, untimed_unit_maker(instance.slot)(instance.path, std::move(behaviour),
-                                                      configuration.state_of(instance.gpc), netlist.gpcs())});
+                                                      configuration.context_of(instance.gpc), netlist.gpcs())});
   }
   connect_units(netlist, configuration.request().observers.get(), [&](const std::string& path) -> Component* {
     for (const Placed& placed : units_) {
@@ -38,7 +39,7 @@ UntimedUnit* UntimedGpu::of_slot(const std::string& slot, unsigned gpc) const {
 }
 
 void UntimedGpu::run(std::atomic<float>* progress) {
-  const auto splats = static_cast<float>(std::max<std::size_t>(configuration_.draw().splats.size(), 1));
+  const auto splats = static_cast<float>(std::max<std::uint32_t>(configuration_.frame().splats(), 1));
   for (const Placed& placed : units_) {
     for (std::uint64_t pieces = 1; placed.unit->run_piece(); ++pieces) {
       if (progress != nullptr && pieces % 128 == 0) {

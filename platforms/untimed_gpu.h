@@ -18,8 +18,8 @@ class UntimedGpu {
     std::unique_ptr<UntimedUnit> unit;
   };
 
-  /// CROP blends into the surface.
-  UntimedGpu(const Configuration& configuration, ColorSurface& surface);
+  /// ROPs draw into the framebuffer.
+  UntimedGpu(const Configuration& configuration, Framebuffer& framebuffer);
 
   const std::vector<Placed>& units() const { return units_; }
   /// A slot's unit in a GPC; in a slot of the front end it serves all. Null for none.

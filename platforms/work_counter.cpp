@@ -1,5 +1,7 @@
 #include "work_counter.h"
 
+#include <algorithm>
+
 #include <vrpipe/batch.h>
 #include <vrpipe/occupancy.h>
 
@@ -20,10 +22,16 @@ std::uint64_t items(const UntimedUnit* unit, unsigned kind) { return unit == nul
 /// From the survivors of a test to the colour cache.
 class WorkCounter::Blends final : public BlendObserver {
  public:
-  Blends(Work& work, const ColorSurface& surface, const CropBehaviour::Cost& crop, bool only_needed, bool any_order)
-      : work_(work), grid_(surface.grid()), line_bytes_(crop.line_bytes) {
+  Blends(Work& work, const Frame& frame, const ColorSurface& surface, const CropBehaviour::Cost& crop, bool only_needed,
+         bool any_order)
+      : work_(work), frame_(frame), grid_(surface.grid()), line_bytes_(crop.line_bytes) {
     if (only_needed) terminated_.resize(grid_.quads());
     if (any_order) filled_.resize(surface.size_bytes() / line_bytes_ + 1);
+  }
+
+  void passed(Mark mark) {
+    const Clear* const clear = frame_.clear_of(mark);
+    if (clear != nullptr && clear->termination) std::fill(terminated_.begin(), terminated_.end(), LaneMask{0});
   }
 
   void survived(const BinItem& item) {
@@ -36,7 +44,7 @@ class WorkCounter::Blends final : public BlendObserver {
   }
 
   void launched(const Warp& warp) {
-    if (warp.end_of_draw) return;
+    if (warp.mark != Mark::none) return;
     if (terminated_.empty()) {
       ++work_.warps;
       work_.merging_warps += warp.merge_pairs != 0 ? 1U : 0U;
@@ -79,17 +87,19 @@ class WorkCounter::Blends final : public BlendObserver {
       return;
     }
     LaneMask& before = terminated_[grid_.place(warp.tile, warp.position[index])];
-    work_.color_quads += (warp.live[index] & ~before) != 0 ? 1U : 0U;
+    work_.color_quads += !terminates(warp.draw[index]) || (warp.live[index] & ~before) != 0 ? 1U : 0U;
     work_.updates += before == 0 && outcome.terminated != 0 ? 1U : 0U;
     before = static_cast<LaneMask>(before | outcome.terminated);
   }
 
  private:
   bool is_needed(std::size_t tile, const Quad& quad) const {
-    return (quad.coverage & ~terminated_[tile + quad.position]) != 0;
+    return !terminates(quad.draw) || (quad.coverage & ~terminated_[tile + quad.position]) != 0;
   }
+  bool terminates(DrawIndex draw) const { return frame_.draw_call(draw).state.early_termination; }
 
   Work& work_;
+  const Frame& frame_;
   const TileGrid grid_;
   const std::uint32_t line_bytes_;
   std::vector<LaneMask> terminated_;   ///< by quad of the surface; empty if all work counts
@@ -131,11 +141,16 @@ WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& g
     // A time-out flushes bins when this run does not, and quads of theirs may terminate those that are with them here.
     const bool times_out = bound.times_out();
     const bool any_order = times_out || bound.tiles_may_overtake();
-    const bool only_needed = configuration.state_of(gpc).early_termination && times_out;
-    blends_ = std::make_unique<Blends>(bound.work, *colors->surface(), colors->cost(), only_needed, any_order);
+    const bool only_needed = configuration.frame().terminates_early() && times_out;
+    blends_ = std::make_unique<Blends>(bound.work, configuration.frame(), *colors->surface(), colors->cost(),
+                                       only_needed, any_order);
     crop->observe(*blends_);
     tap<BinItem>(prop, "out_survivors", [this](const BinItem& item, UntimedTarget<BinItem>& next) {
-      if (!item.end_of_draw) blends_->survived(item);
+      if (item.mark == Mark::none) {
+        blends_->survived(item);
+      } else {
+        blends_->passed(item.mark);
+      }
       next.take(item);
     });
     tap<Warp>(gpu.of_slot("qru", gpc), "out_warps", [this](const Warp& warp, UntimedTarget<Warp>& next) {
@@ -152,7 +167,7 @@ WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& g
   });
   tap<BinItem>(tc_, "out_bins", [this](const BinItem& item, UntimedTarget<BinItem>& next) {
     next.take(item);
-    if (item.end_of_draw) return;
+    if (item.mark != Mark::none) return;
     count();
     bound_.quads_ended();
     if (bound_.phase_is_full()) end_phase();

@@ -23,8 +23,8 @@ constexpr unsigned unit_states = 5;
 const char* name_of(UnitState state);
 
 /// Where a draw ends: in the cycle after the last of its quads has been blended, or dropped by a test, by pruning or by
-/// a merge. Known only once all of the draw has passed; until then units say what it cannot be earlier than.
-class DrawEnd {
+/// a merge. Known only once all of the frame has passed; until then units say what it cannot be earlier than.
+class FrameEnd {
  public:
   /// A quad ends in the cycle before `cycle`, or later.
   void not_before(Cycle cycle) { so_far_ = std::max(so_far_, cycle); }
@@ -43,12 +43,12 @@ class StateObserver {
   virtual void entered(UnitState state, Cycle from) = 0;
 };
 
-/// Charges cycles to states; a state holds until the next one is entered. What a unit does after the end of the draw is
+/// Charges cycles to states; a state holds until the next one is entered. What a unit does after the end of the frame is
 /// not charged, so changes are kept until the draw is known to last as long.
 class StateAccount {
  public:
-  /// `draw_end` outlives the account.
-  explicit StateAccount(const DrawEnd& draw_end) : draw_end_(&draw_end) {}
+  /// `frame_end` outlives the account.
+  explicit StateAccount(const FrameEnd& frame_end) : frame_end_(&frame_end) {}
 
   /// `now` is not before that of the call before.
   void enter(UnitState state, Cycle now) {
@@ -59,7 +59,7 @@ class StateAccount {
     if (changes_.size() >= most_changes_) settle();
   }
 
-  /// Charges exactly the `end` cycles of the run; not before `draw_end.so_far()`.
+  /// Charges exactly the `end` cycles of the run; not before `frame_end.so_far()`.
   void close(Cycle end);
 
   /// The observer outlives the account.
@@ -80,7 +80,7 @@ class StateAccount {
   }
 
   static constexpr std::size_t fewest_changes = 64;
-  const DrawEnd* draw_end_;
+  const FrameEnd* frame_end_;
   StateObserver* observer_ = nullptr;
   UnitState state_ = UnitState::starved;
   Ring<Change> changes_;  ///< not charged yet
@@ -89,22 +89,22 @@ class StateAccount {
   std::array<std::uint64_t, unit_states> cycles_{};
 };
 
-/// Work of one kind, in items. What is done after the end of the draw is not counted.
+/// Work of one kind, in items. What is done after the end of the frame is not counted.
 class WorkTally {
  public:
-  /// `draw_end` outlives the tally.
-  explicit WorkTally(const DrawEnd& draw_end) : draw_end_(&draw_end) {}
+  /// `frame_end` outlives the tally.
+  explicit WorkTally(const FrameEnd& frame_end) : frame_end_(&frame_end) {}
 
   /// Items that keep the unit from cycle `from` to `until` - 1.
   void add(std::uint64_t items, Cycle from, Cycle until) {
     items_ += items;
-    if (until > draw_end_->so_far()) note(items, from, until);
+    if (until > frame_end_->so_far()) note(items, from, until);
   }
   /// Items that keep it for a cycle.
   void add(std::uint64_t items, Cycle at) { add(items, at, at + 1); }
 
   /// Those done before cycle `end`, and of those under way then the share that is done; `end` is not before
-  /// `draw_end.so_far()`. Without an end, all.
+  /// `frame_end.so_far()`. Without an end, all.
   double items(Cycle end = never) const;
 
  private:
@@ -115,7 +115,7 @@ class WorkTally {
   void note(std::uint64_t items, Cycle from, Cycle until);
 
   static constexpr std::size_t fewest_spans = 64;
-  const DrawEnd* draw_end_;
+  const FrameEnd* frame_end_;
   std::uint64_t items_ = 0;
   Ring<Span> late_;  ///< of `items_`, those that may be after the end
   std::size_t most_spans_ = fewest_spans;

@@ -17,12 +17,12 @@ struct BinStorage {
   bool in_use = false;
 };
 
-/// A flushed bin, or the end of the draw.
+/// A flushed bin, or a mark.
 struct BinItem {
   BinStorage* storage = nullptr;  ///< its first `quads` quads; the test takes the dead ones out
   TileId tile;
   std::uint32_t quads = 0;
-  bool end_of_draw = false;
+  Mark mark = Mark::none;
   bool last_part = true;  ///< closes the bin; what runs ahead of time has a bin in parts
 };
 

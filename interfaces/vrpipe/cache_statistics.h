@@ -18,7 +18,7 @@ struct SectoredCacheStatistics : StatisticSet {
   Counter sector_hits{*this, "sector_hits", "sectors", "needed that are there or on their way"};
   Counter sector_misses{*this, "sector_misses", "sectors", "needed that have to be filled"};
   Counter sectors_written_back{*this, "sectors_written_back", "sectors",
-                               "dirty in evicted lines; those left at the end of the draw stay"};
+                               "dirty in evicted lines; those left at the end of the frame stay"};
   Counter bytes_filled{*this, "bytes_filled", "bytes", "read from the memory below"};
   Counter bytes_written_back{*this, "bytes_written_back", "bytes", "written to it"};
   Ratio line_hit_rate{*this, line_hits, line_accesses, "line_hit_rate", "hits per access", "of accesses"};

@@ -96,7 +96,7 @@ class ClockDomain : public sc_core::sc_module {
   void fail(std::exception_ptr thrown);
 
   /// Where the draw ends that the units of this clock work on; they say what they know.
-  DrawEnd& draw_end() { return draw_end_; }
+  FrameEnd& frame_end() { return frame_end_; }
 
   /// Whether the first edge has come.
   bool running() const { return running_; }
@@ -132,7 +132,7 @@ class ClockDomain : public sc_core::sc_module {
   std::vector<Clocked*> units_;       ///< by handle
   std::vector<Cycle> due_;            ///< the edge that each wants; filled up with `never` to whole vectors
   std::vector<unsigned> tick_order_;  ///< of handles; empty for their own order
-  DrawEnd draw_end_;
+  FrameEnd frame_end_;
   Cycle now_ = 0;
   Cycle next_ = 0;  ///< the edge that is armed; `never` for none
   unsigned cycles_per_activation_ = 1;

@@ -5,7 +5,7 @@
 
 #include <vrpipe/half.h>
 #include <vrpipe/lanes.h>
-#include <vrpipe/render_state.h>
+#include <vrpipe/render_context.h>
 
 namespace vrpipe {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include <vrpipe/payload.h>
-#include <vrpipe/render_state.h>
+#include <vrpipe/render_context.h>
 
 namespace vrpipe {
 
@@ -15,10 +15,11 @@ struct SnappedTriangle {
 
 constexpr double guard_band_pixels = 32768.0;
 
-/// The snapped triangle of a primitive, as vertex shading and the viewport transform give it. A box that exceeds the
+/// The snapped triangle of a primitive of a draw, as vertex shading and the viewport transform give it. A box that exceeds the
 /// guard band is cut across its axes outside the viewport, so that no edge that can be seen turns.
 /// Returns false when the splat is not finite.
-bool snap_triangle(const RenderState& state, std::uint32_t splat, unsigned triangle, SnappedTriangle& out);
+bool snap_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
+                   SnappedTriangle& out);
 
 /// Twice the signed area, in squared sub-pixel steps; 0 is culled.
 std::int64_t doubled_area(const SnappedTriangle& triangle);
@@ -27,7 +28,7 @@ std::int64_t doubled_area(const SnappedTriangle& triangle);
 PixelRect covered_bounds(const SnappedTriangle& triangle, unsigned subpixel_bits, std::uint32_t width,
                          std::uint32_t height);
 
-/// How many triangles a splat of this draw is.
+/// How many triangles a splat of this geometry is.
 inline unsigned triangles_per_splat(const Draw& draw) { return draw.triangles.empty() ? 2U : 1U; }
 
 }  // namespace vrpipe

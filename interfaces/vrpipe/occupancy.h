@@ -29,9 +29,9 @@ struct OccupancyPart {
 /// the cycles of a resource's kinds are at most those of the run.
 class Occupancy {
  public:
-  /// `draw_end` outlives it.
-  Occupancy(const DrawEnd& draw_end, std::vector<WorkKind> kinds)
-      : kinds_(std::move(kinds)), tallies_(kinds_.size(), WorkTally(draw_end)) {}
+  /// `frame_end` outlives it.
+  Occupancy(const FrameEnd& frame_end, std::vector<WorkKind> kinds)
+      : kinds_(std::move(kinds)), tallies_(kinds_.size(), WorkTally(frame_end)) {}
 
   /// Items of a kind, an index into the kinds, that keep the unit from cycle `from` to `until` - 1, or for a cycle.
   void add(unsigned kind, std::uint64_t items, Cycle from, Cycle until) { tallies_[kind].add(items, from, until); }
@@ -39,7 +39,7 @@ class Occupancy {
 
   /// Items of a kind so far.
   std::uint64_t items(unsigned kind) const { return static_cast<std::uint64_t>(tallies_[kind].items()); }
-  /// One for each kind, up to the end of the draw.
+  /// One for each kind, up to the end of the frame.
   std::vector<OccupancyPart> parts(Cycle end) const {
     std::vector<OccupancyPart> parts;
     for (std::size_t i = 0; i < kinds_.size(); ++i) {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <vrpipe/parameter.h>
-#include <vrpipe/render_state.h>
+#include <vrpipe/render_context.h>
 #include <vrpipe/units.h>
 
 namespace vrpipe {
@@ -33,7 +33,7 @@ struct Implementation {
   bool pass_through = false;  ///< stands in for a unit that a variant does not have
   Trust trust = Trust::checked;
   std::function<std::unique_ptr<ParameterSet>()> make_parameters;
-  std::function<std::unique_ptr<Behaviour>(const ParameterSet&, const RenderState&)> make_behaviour;
+  std::function<std::unique_ptr<Behaviour>(const ParameterSet&, const RenderContext&)> make_behaviour;
 };
 
 /// All implementations that are linked in or loaded. Filled by static registrars; there is one per process.
@@ -83,7 +83,7 @@ struct SlotRegistrar {
 };
 
 /// Registers a behaviour class at program or plugin load. `Unit` has a nested `Parameters` (a ParameterSet) and a
-/// constructor (const Parameters&, const RenderState&), and derives from the slot's behaviour.
+/// constructor (const Parameters&, const RenderContext&), and derives from the slot's behaviour.
 template <class Unit, class SlotBehaviour>
 class Registrar {
   static_assert(std::is_base_of<SlotBehaviour, Unit>::value, "a unit implements the behaviour of its slot");
@@ -98,8 +98,8 @@ class Registrar {
     implementation.pass_through = pass_through;
     implementation.trust = trust;
     implementation.make_parameters = [] { return std::make_unique<typename Unit::Parameters>(); };
-    implementation.make_behaviour = [](const ParameterSet& parameters, const RenderState& state) {
-      return std::make_unique<Unit>(dynamic_cast<const typename Unit::Parameters&>(parameters), state);
+    implementation.make_behaviour = [](const ParameterSet& parameters, const RenderContext& context) {
+      return std::make_unique<Unit>(dynamic_cast<const typename Unit::Parameters&>(parameters), context);
     };
     Registry::instance().add(std::move(implementation));
   }

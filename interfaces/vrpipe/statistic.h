@@ -45,6 +45,26 @@ class Counter : public Statistic {
   std::uint64_t value_ = 0;
 };
 
+/// A counter of what belongs to a draw: counted for all, and draw by draw in a frame of several.
+class DrawCounter : public Counter {
+ public:
+  DrawCounter(StatisticSet& owner, const char* name, const char* unit, const char* meaning);
+
+  /// @param draw  its number in the frame
+  void add(unsigned draw, std::uint64_t amount) {
+    Counter::operator+=(amount);
+    if (!of_draw_.empty()) of_draw_[draw] += amount;
+  }
+  void operator++() = delete;
+  void operator+=(std::uint64_t) = delete;
+  /// By draw; empty in a frame of one.
+  const std::vector<std::uint64_t>& of_draw() const { return of_draw_; }
+
+ private:
+  friend class StatisticSet;
+  std::vector<std::uint64_t> of_draw_;
+};
+
 /// The largest or the smallest of what a unit saw. Over several units: the largest or smallest of theirs.
 class Extreme : public Statistic {
  public:
@@ -176,6 +196,9 @@ class StatisticSet {
   StatisticSet(const StatisticSet&) = delete;
   StatisticSet& operator=(const StatisticSet&) = delete;
 
+  /// Before anything is counted: in a frame of so many draws.
+  void set_draws(std::size_t draws);
+  const std::vector<DrawCounter*>& draw_counters() const { return draw_counters_; }
   /// Of a part; empty otherwise.
   const char* part_name() const { return name_; }
   const std::vector<Counter*>& counters() const { return counters_; }
@@ -189,6 +212,7 @@ class StatisticSet {
  private:
   friend class Statistic;
   friend class Counter;
+  friend class DrawCounter;
   friend class Extreme;
   friend class Histogram;
   friend class Ratio;
@@ -196,6 +220,7 @@ class StatisticSet {
 
   const char* name_ = "";
   std::vector<Counter*> counters_;
+  std::vector<DrawCounter*> draw_counters_;  ///< which are among the counters
   std::vector<Extreme*> extremes_;
   std::vector<Histogram*> histograms_;
   std::vector<Ratio*> ratios_;

@@ -23,12 +23,20 @@ inline constexpr std::array<std::uint8_t, positions_per_tile> morton_order = [] 
   return order;
 }();
 
+/// Where a quad at a place of the grid comes in memory: screen tile by screen tile, in each in Morton order, so that four
+/// quads in a row are 4x4 pixels.
+inline std::uint64_t block_linear(std::size_t place) {
+  const std::size_t position = place % positions_per_tile;
+  return std::uint64_t{place} - position + morton_order[position];
+}
+
 /// A colour target, block-linear: screen tile by screen tile, quad by quad, so that a quad is one 32-byte sector of
 /// RGBA16F and four quads (4x4 pixels) are one 128-byte line. Holds the stored values as floats.
 class ColorSurface {
  public:
   /// Cleared to (0, 0, 0, 0). width and height in pixels.
   ColorSurface(std::uint32_t width, std::uint32_t height, ColorFormat format);
+  static std::uint64_t size_bytes(std::uint32_t width, std::uint32_t height, ColorFormat format);
 
   std::uint32_t width() const { return width_; }
   std::uint32_t height() const { return height_; }
@@ -40,12 +48,12 @@ class ColorSurface {
   QuadColor& quad(TileId tile, unsigned position) { return quads_[grid_.place(tile, position)]; }
   const QuadColor& quad(TileId tile, unsigned position) const { return quads_[grid_.place(tile, position)]; }
 
-  /// Byte address of a quad in the modelled memory. Tiles, and quads in them, are naturally aligned; quads of a tile
-  /// follow in Morton order, 4x4 pixels a 4-quad group.
-  std::uint64_t address(std::size_t place) const {
-    const std::size_t position = place % positions_per_tile;
-    return (std::uint64_t{place} - position + morton_order[position]) * bytes_per_quad_;
-  }
+  /// To (0, 0, 0, 0), one screen tile.
+  void clear(TileId tile);
+
+  /// Byte address of a quad in the modelled memory, where colour is at 0 (AddressMap). Tiles, and quads in them, are
+  /// naturally aligned.
+  std::uint64_t address(std::size_t place) const { return block_linear(place) * bytes_per_quad_; }
   std::uint64_t address(TileId tile, unsigned position) const { return address(grid_.place(tile, position)); }
   std::uint64_t size_bytes() const;
 

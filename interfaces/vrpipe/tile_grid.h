@@ -16,6 +16,9 @@ class TileGrid {
       : tiles_x_(tiles_along(width)), tiles_(std::size_t{tiles_x_} * tiles_along(height)) {}
   std::size_t tiles() const { return tiles_; }
   std::size_t index(TileId tile) const { return std::size_t{tile.y} * tiles_x_ + tile.x; }
+  TileId tile(std::size_t index) const {
+    return {static_cast<std::uint16_t>(index % tiles_x_), static_cast<std::uint16_t>(index / tiles_x_)};
+  }
   std::size_t quads() const { return tiles_ * positions_per_tile; }
   std::size_t place(TileId tile, unsigned position) const { return index(tile) * positions_per_tile + position; }
 

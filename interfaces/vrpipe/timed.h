@@ -579,8 +579,8 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<>, private OutsidePort 
 /// Makes the timing model of a slot for `lt` or `at` around a functional model.
 using TimedUnitMaker =
     std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain,
-                                        std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned gpcs,
-                                        Transport transport)>;
+                                        std::unique_ptr<Behaviour> behaviour, const RenderContext& context,
+                                        unsigned gpcs, Transport transport)>;
 
 /// Registered by each timing model for its slot. A second one for a slot is a problem of the registry's.
 void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker);

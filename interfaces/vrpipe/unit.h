@@ -44,9 +44,9 @@ class Unit : public Clocked, public sc_core::sc_module, public Component {
   /// For a unit with a memory port; null otherwise.
   virtual tlm::tlm_initiator_socket<32>* memory_socket() { return nullptr; }
   /// Whether the draw is done when this unit, with others of the kind, is done: those at the end of the pipeline.
-  virtual bool ends_draw() const { return false; }
-  /// For such a unit: the cycle in which the end of the draw has come there and all before it is done; `never` before that.
-  virtual Cycle end_of_draw() const { return never; }
+  virtual bool ends_frame() const { return false; }
+  /// For such a unit: the cycle in which the end of the frame has come there and all before it is done; `never` before that.
+  virtual Cycle end_of_frame() const { return never; }
 
   const Occupancy& occupancy() const { return occupancy_; }
   const StateAccount& account() const { return account_; }
@@ -60,7 +60,7 @@ class Unit : public Clocked, public sc_core::sc_module, public Component {
   void did(unsigned kind, std::uint64_t items, Cycle at) { occupancy_.add(kind, items, at); }
   void did(unsigned kind, std::uint64_t items, Cycle from, Cycle until) { occupancy_.add(kind, items, from, until); }
   /// A quad is blended or dropped in the cycle before `cycle`, or later: the draw does not end earlier.
-  void draw_lasts(Cycle cycle) { clock.domain->draw_end().not_before(cycle); }
+  void frame_lasts(Cycle cycle) { clock.domain->frame_end().not_before(cycle); }
 
  private:
   Occupancy occupancy_;
@@ -68,9 +68,9 @@ class Unit : public Clocked, public sc_core::sc_module, public Component {
 };
 
 /// Makes the timing model of `cycle` around a functional model of a slot. `gpcs` is how many GPCs the front end serves.
-using UnitMaker =
-    std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain,
-                                        std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned gpcs)>;
+using UnitMaker = std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain,
+                                                      std::unique_ptr<Behaviour> behaviour,
+                                                      const RenderContext& context, unsigned gpcs)>;
 
 /// Registered by each timing model for its slot. A second one for a slot is a problem of the registry's.
 void register_unit_maker(const std::string& slot, UnitMaker maker);

@@ -5,11 +5,11 @@
 #include <vector>
 
 #include <vrpipe/cache_statistics.h>
+#include <vrpipe/framebuffer.h>
 #include <vrpipe/payload.h>
 #include <vrpipe/rate.h>
-#include <vrpipe/render_state.h>
+#include <vrpipe/render_context.h>
 #include <vrpipe/statistic.h>
-#include <vrpipe/surface.h>
 
 /// The slots of the pipeline. Each is a *functional model* (a Behaviour): what a unit does and at which rates, without
 /// SystemC and without time. Timing models (modules/<unit>/) give it sockets and time; see docs/glossary.md.
@@ -35,10 +35,11 @@ class Behaviour : public StatisticSet {
   Behaviour& unit() { return const_cast<Behaviour&>(static_cast<const Behaviour*>(this)->unit()); }
 };
 
-/// Slot `draw`: issues the splats of a draw as vertex warps.
+/// Slot `draw`: issues the splats of a frame's draws as vertex warps.
 class DrawBehaviour : public Behaviour {
  public:
-  /// The next warp; false after the last.
+  /// The next warp, of one draw, or the mark before a clear and before a draw of another state (Frame::commands); false
+  /// after the last.
   virtual bool next(VertexWarp& out) = 0;
   /// Vertex warps in 1024 cycles.
   virtual std::uint32_t warps_per_1024_cycles() const = 0;
@@ -47,11 +48,11 @@ class DrawBehaviour : public Behaviour {
 /// Slot `vpo`: primitive assembly, culling, clipping to the viewport, bounding boxes.
 class VpoBehaviour : public Behaviour {
  public:
-  /// The visible triangles of a splat, in order. Returns how many of `out` are set (0 to 2).
-  virtual unsigned assemble(std::uint32_t splat, std::array<Primitive, 2>& out) = 0;
+  /// The visible triangles of a splat of a draw, in order. Returns how many of `out` are set (0 to 2).
+  virtual unsigned assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) = 0;
   virtual Throughput cost() const = 0;  ///< items: triangles
 
-  Counter primitives{*this, "primitives", "triangles", "triangles handed to the GPCs"};
+  DrawCounter primitives{*this, "primitives", "triangles", "triangles handed to the GPCs"};
 };
 
 /// Slot `tgc`: collects primitives per tile grid.
@@ -96,8 +97,8 @@ class RasterBehaviour : public Behaviour {
   };
   virtual Cost cost() const = 0;
 
-  Counter quads_rasterized{*this, "quads_rasterized", "quads", "with at least one covered sample"};
-  Counter fragments_rasterized{*this, "fragments_rasterized", "fragments", "covered samples"};
+  DrawCounter quads_rasterized{*this, "quads_rasterized", "quads", "with at least one covered sample"};
+  DrawCounter fragments_rasterized{*this, "fragments_rasterized", "fragments", "covered samples"};
 };
 
 /// Slot `tc`: collects quads per screen tile.
@@ -147,6 +148,8 @@ class PropBehaviour : public Behaviour {
 class FunctionalRunAhead {
  public:
   virtual ~FunctionalRunAhead() = default;
+  /// A mark has come by, after all bins before it.
+  virtual void pass(Mark mark) = 0;
   /// Takes the survivors of a part of a bin, as soon as that is tested, through merging, shading and blending; with the
   /// last of a bin, `terminated` has what all of them newly terminate.
   virtual void tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) = 0;
@@ -155,10 +158,17 @@ class FunctionalRunAhead {
 /// Slot `zrop`: depth and stencil test, termination test and update.
 class ZropBehaviour : public Behaviour {
  public:
-  /// Removes dead samples, and quads without a live one, from the beat; its tile and marks stay.
+  /// Before the first test. One that overrides it calls it.
+  virtual void attach(DepthStencilSurface& surface) { surface_ = &surface; }
+  const DepthStencilSurface* surface() const { return surface_; }
+  /// Removes dead samples, and quads without a live one, from the beat; its tile and `last_of_bin` stay. Of its quads all
+  /// are of one state; they may be of several draws.
   virtual void test(QuadBeat& beat) = 0;
-  /// Sets the termination bit (stencil MSB) of the signalled pixels.
+  /// Sets the termination bit (stencil MSB) of the signalled pixels, unless they have been cleared since: then the
+  /// signal's epoch has passed.
   virtual void update(const TerminationSignal& signal) = 0;
+  /// A mark comes by, after all tests before it: a clear of termination is done (Frame::clear_of), for this GPC's tiles.
+  virtual void pass(Mark mark) = 0;
   /// Strict mode at fidelities with time: termination comes from `run_ahead`, and `update` only costs time.
   virtual void follow(FunctionalRunAhead& run_ahead) = 0;
   struct Cost {
@@ -168,14 +178,18 @@ class ZropBehaviour : public Behaviour {
   };
   virtual Cost cost() const = 0;
 
-  Counter quads_tested{*this, "quads_tested", "quads", "that entered the termination test"};
-  Counter quads_depth_stencil_failed{*this, "quads_depth_stencil_failed", "quads",
-                                     "that lost their last fragment to the depth or stencil test"};
-  Counter fragments_depth_stencil_failed{*this, "fragments_depth_stencil_failed", "fragments",
-                                         "that failed the depth or stencil test"};
-  Counter quads_terminated{*this, "quads_terminated", "quads", "that lost their last fragment to the termination test"};
-  Counter fragments_terminated{*this, "fragments_terminated", "fragments", "that failed the termination test"};
+  DrawCounter quads_tested{*this, "quads_tested", "quads", "that entered the termination test"};
+  DrawCounter quads_depth_stencil_failed{*this, "quads_depth_stencil_failed", "quads",
+                                         "that lost their last fragment to the depth or stencil test"};
+  DrawCounter fragments_depth_stencil_failed{*this, "fragments_depth_stencil_failed", "fragments",
+                                             "that failed the depth or stencil test"};
+  DrawCounter quads_terminated{*this, "quads_terminated", "quads",
+                               "that lost their last fragment to the termination test"};
+  DrawCounter fragments_terminated{*this, "fragments_terminated", "fragments", "that failed the termination test"};
   Counter termination_updates{*this, "termination_updates", "signals", "received from CROP, one for a quad's pixels"};
+
+ protected:
+  DepthStencilSurface* surface_ = nullptr;
 };
 
 /// Slot `qru`: forms warps from the surviving quads of a bin.
@@ -221,12 +235,13 @@ class SmBehaviour : public Behaviour {
   };
   virtual Cost cost() const = 0;
 
-  Counter quads_shaded{*this, "quads_shaded", "quads", "launched in fragment warps"};
-  Counter fragments_shaded{*this, "fragments_shaded", "fragments", "live samples launched"};
-  Counter quads_pruned{*this, "quads_pruned", "quads", "that lost their last fragment to alpha pruning"};
-  Counter fragments_pruned{*this, "fragments_pruned", "fragments", "with alpha below the threshold"};
-  Counter quads_merged{*this, "quads_merged", "quads", "taken away by merging, one a pair with two live quads"};
-  Counter fragments_merged{*this, "fragments_merged", "fragments", "taken away by merging, where both are live"};
+  DrawCounter quads_shaded{*this, "quads_shaded", "quads", "launched in fragment warps"};
+  DrawCounter fragments_shaded{*this, "fragments_shaded", "fragments", "live samples launched"};
+  DrawCounter quads_pruned{*this, "quads_pruned", "quads", "that lost their last fragment to alpha pruning"};
+  DrawCounter fragments_pruned{*this, "fragments_pruned", "fragments", "with alpha below the threshold"};
+  /// Of a pair, its back quad's draw; what is left is its front quad's.
+  DrawCounter quads_merged{*this, "quads_merged", "quads", "taken away by merging, one a pair with two live quads"};
+  DrawCounter fragments_merged{*this, "fragments_merged", "fragments", "taken away by merging, where both are live"};
   Counter fragment_warps{*this, "fragment_warps", "warps", "of fragments"};
 };
 
@@ -236,22 +251,24 @@ class CropBehaviour : public Behaviour {
   /// Before the first blend. One that overrides it calls it.
   virtual void attach(ColorSurface& surface) { surface_ = &surface; }
   const ColorSurface* surface() const { return surface_; }
+  /// A mark comes by, after all blends before it: a clear is done (Frame::clear_of), for this GPC's tiles.
+  virtual void pass(Mark mark) = 0;
   struct Outcome {
     LaneMask terminated;  ///< pixels to signal: those that newly passed the termination threshold (HET only)
     bool changed;         ///< whether a stored value is another one than before
   };
-  /// Blends the live samples of a quad into the one at a place of the surface's grid.
-  virtual Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) = 0;
+  /// Blends the live samples of a quad of a draw into the one at a place of the surface's grid.
+  virtual Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) = 0;
   /// The same for a quad of a warp, which timing models that blend quad by quad call.
   virtual Outcome blend_quad(std::size_t place, const ShadedWarp& warp, unsigned index) {
-    return blend(place, warp.live[index], warp.color[index]);
+    return blend(warp.draw[index], place, warp.live[index], warp.color[index]);
   }
   /// By quad of a warp.
   using Outcomes = std::array<Outcome, quads_per_warp>;
   /// Blends quads `from` to `to` - 1 of a warp, in this order.
   virtual void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
     for (unsigned i = from; i < to; ++i) {
-      outcomes[i] = blend(surface_->grid().place(warp.tile, warp.position[i]), warp.live[i], warp.color[i]);
+      outcomes[i] = blend_quad(surface_->grid().place(warp.tile, warp.position[i]), warp, i);
     }
   }
 
@@ -295,15 +312,16 @@ class CropBehaviour : public Behaviour {
   };
   virtual Cost cost() const = 0;
 
-  Counter quads_blended{*this, "quads_blended", "quads", "blended"};
-  Counter fragments_blended{*this, "fragments_blended", "fragments", "blended"};
-  Counter quads_dropped_late{*this, "quads_dropped_late", "quads",
-                             "of which CROP finds every pixel terminated (strict)"};
-  Counter fragments_dropped_late{*this, "fragments_dropped_late", "fragments",
-                                 "whose pixel CROP finds terminated (strict)"};
-  Counter quads_late_failed{*this, "quads_late_failed", "quads", "that fail a late depth or stencil test"};
-  Counter fragments_late_failed{*this, "fragments_late_failed", "fragments", "that fail a late depth or stencil test"};
-  Counter termination_signals{*this, "termination_signals", "signals", "sent to ZROP, one for a quad's pixels"};
+  DrawCounter quads_blended{*this, "quads_blended", "quads", "blended"};
+  DrawCounter fragments_blended{*this, "fragments_blended", "fragments", "blended"};
+  DrawCounter quads_dropped_late{*this, "quads_dropped_late", "quads",
+                                 "of which CROP finds every pixel terminated (strict)"};
+  DrawCounter fragments_dropped_late{*this, "fragments_dropped_late", "fragments",
+                                     "whose pixel CROP finds terminated (strict)"};
+  DrawCounter quads_late_failed{*this, "quads_late_failed", "quads", "that fail a late depth or stencil test"};
+  DrawCounter fragments_late_failed{*this, "fragments_late_failed", "fragments",
+                                    "that fail a late depth or stencil test"};
+  DrawCounter termination_signals{*this, "termination_signals", "signals", "sent to ZROP, one for a quad's pixels"};
   /// Of the colour cache; its accesses are quads. Whoever simulates it counts: the unit in `look_up`, or the timing model
   /// that follows fills through the cache.
   SectoredCacheStatistics cache_statistics{*this, "cache"};

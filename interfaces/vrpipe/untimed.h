@@ -9,7 +9,7 @@
 
 #include <vrpipe/batch.h>
 #include <vrpipe/link.h>
-#include <vrpipe/render_state.h>
+#include <vrpipe/render_context.h>
 #include <vrpipe/unit.h>
 
 /// Units and ports without time: the fidelities `functional` and `bound`, and what strict termination runs ahead. They
@@ -150,7 +150,7 @@ class UntimedUnit : public Component {
 /// Makes the unit without time around a functional model of a slot. `gpcs` is how many GPCs the front end serves.
 using UntimedUnitMaker =
     std::function<std::unique_ptr<UntimedUnit>(const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                               const RenderState& state, unsigned gpcs)>;
+                                               const RenderContext& context, unsigned gpcs)>;
 
 /// Registered by each unit without time for its slot. A second one for a slot is a problem of the registry's.
 void register_untimed_unit_maker(const std::string& slot, UntimedUnitMaker maker);

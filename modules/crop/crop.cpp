@@ -9,13 +9,8 @@
 namespace vrpipe {
 
 template <ColorFormat Format, BlendRounding Rounding>
-ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const RenderState& state)
-    : signals_(state.early_termination),
-      // Passing an exclusive threshold is reaching the next float.
-      threshold_(state.termination_inclusive
-                     ? state.termination_threshold
-                     : std::nextafter(state.termination_threshold, std::numeric_limits<float>::infinity())),
-      drops_late_(state.early_termination && state.termination == Termination::strict),
+ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const RenderContext& context)
+    : context_(context),
       checks_previous_(parameters.previous_alpha_check),
       cost_{Rate::of_bytes(parameters.bytes_per_cycle, 4 * bytes_per_pixel(Format)),
             parameters.input_quads,
@@ -28,6 +23,53 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
             parameters.sectors_per_cycle,
             parameters.writes_unchanged} {
   cost_.check_cache(Format);
+  if (!context.frame->draws().empty()) set_draw(0);
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
+void ColorRop<Format, Rounding>::set_draw(DrawIndex draw) {
+  const DrawState& state = context_.state(draw);
+  draw_ = draw;
+  signals_ = state.early_termination;
+  // Passing an exclusive threshold is reaching the next float.
+  threshold_ = state.termination_inclusive
+                   ? state.termination_threshold
+                   : std::nextafter(state.termination_threshold, std::numeric_limits<float>::infinity());
+  drops_late_ = state.early_termination && context_.termination == Termination::strict;
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
+void ColorRop<Format, Rounding>::attach(ColorSurface& surface) {
+  CropBehaviour::attach(surface);
+  const bool drops_late = context_.termination == Termination::strict && context_.frame->terminates_early();
+  if (drops_late) terminated_.assign(surface.grid().quads(), 0);
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
+void ColorRop<Format, Rounding>::pass(Mark mark) {
+  const Clear* const clear = context_.frame->clear_of(mark);
+  if (clear == nullptr) return;
+  const TileGrid& grid = surface_->grid();
+  for (std::size_t tile = 0; tile < grid.tiles(); ++tile) {
+    if (!context_.placement.owns(grid.tile(tile))) continue;
+    const auto first = static_cast<std::ptrdiff_t>(tile * positions_per_tile);
+    if (clear->color) {
+      surface_->clear(grid.tile(tile));
+      if (!swallowed_.empty()) std::fill_n(swallowed_.begin() + first, positions_per_tile, splat_lanes(1.0F));
+    }
+    if (clear->termination && !terminated_.empty()) {
+      std::fill_n(terminated_.begin() + first, positions_per_tile, LaneMask{0});
+    }
+  }
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
+void ColorRop<Format, Rounding>::count(DrawIndex draw, const Tally& tally) {
+  quads_blended.add(draw, tally.quads_blended);
+  fragments_blended.add(draw, tally.fragments_blended);
+  quads_dropped_late.add(draw, tally.quads_dropped);
+  fragments_dropped_late.add(draw, tally.fragments_dropped);
+  termination_signals.add(draw, tally.signals);
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
@@ -93,21 +135,19 @@ void ColorRop<Format, Rounding>::count_trouble(std::size_t place, LaneMask live,
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
-[[gnu::always_inline]] inline CropBehaviour::Outcome ColorRop<Format, Rounding>::blend_into(QuadColor& destination,
-                                                                                            std::size_t place,
-                                                                                            LaneMask live,
-                                                                                            const QuadColor& color) {
+[[gnu::always_inline]] inline CropBehaviour::Outcome ColorRop<Format, Rounding>::blend_into(
+    QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally) {
   if (drops_late_) {
-    const auto closed = static_cast<LaneMask>(live & sign_mask(passes(destination.alpha)));
-    fragments_dropped_late += popcount(closed);
+    const auto closed = static_cast<LaneMask>(live & terminated_[place]);
+    tally.fragments_dropped += popcount(closed);
     live = static_cast<LaneMask>(live ^ closed);
     if (live == 0) {
-      ++quads_dropped_late;
+      ++tally.quads_dropped;
       return {0, false};
     }
   }
-  ++quads_blended;
-  fragments_blended += popcount(live);
+  ++tally.quads_blended;
+  tally.fragments_blended += popcount(live);
   const ChannelPairs before = channel_pairs(destination);
   ChannelPairs blended;
   if constexpr (Rounding == BlendRounding::measured) {
@@ -129,7 +169,10 @@ template <ColorFormat Format, BlendRounding Rounding>
   if (signals_) {
     signalled = passed & live;
     if (checks_previous_) signalled &= ~static_cast<unsigned>(sign_mask(passes(previous)));
-    if (signalled != 0) ++termination_signals;
+    if (signalled != 0) {
+      ++tally.signals;
+      if (drops_late_) terminated_[place] = static_cast<LaneMask>(terminated_[place] | signalled);
+    }
   }
   unsigned trouble = sign_mask(alpha == previous) & ~passed;
   if constexpr (largest_color < std::numeric_limits<float>::infinity()) {
@@ -142,17 +185,28 @@ template <ColorFormat Format, BlendRounding Rounding>
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
-CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(std::size_t place, LaneMask live, const QuadColor& color) {
-  return blend_into(surface_->quad(place), place, live, color);
+CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(DrawIndex draw, std::size_t place, LaneMask live,
+                                                         const QuadColor& color) {
+  if (draw != draw_) set_draw(draw);
+  Tally tally;
+  const Outcome outcome = blend_into(surface_->quad(place), place, live, color, tally);
+  count(draw, tally);
+  return outcome;
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
   const std::size_t tile = surface_->grid().place(warp.tile, 0);
   QuadColor* const quads = &surface_->quad(tile);
-  for (unsigned i = from; i < to; ++i) {
-    const unsigned position = warp.position[i];
-    outcomes[i] = blend_into(quads[position], tile + position, warp.live[i], warp.color[i]);
+  for (unsigned i = from; i < to;) {
+    const DrawIndex draw = warp.draw[i];
+    if (draw != draw_) set_draw(draw);
+    Tally tally;
+    for (; i < to && warp.draw[i] == draw; ++i) {
+      const unsigned position = warp.position[i];
+      outcomes[i] = blend_into(quads[position], tile + position, warp.live[i], warp.color[i], tally);
+    }
+    count(draw, tally);
   }
 }
 

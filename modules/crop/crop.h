@@ -73,9 +73,11 @@ template <ColorFormat Format, BlendRounding Rounding>
 class ColorRop : public CropBehaviour {
  public:
   /// Throws UserError for a cache that cannot be.
-  ColorRop(const CropParameters& parameters, const RenderState& state);
+  ColorRop(const CropParameters& parameters, const RenderContext& context);
 
-  Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) override;
+  void attach(ColorSurface& surface) override;
+  void pass(Mark mark) override;
+  Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) override;
   void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) override;
   void look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) override;
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override { cache_->dirty(line, sectors); }
@@ -92,17 +94,28 @@ class ColorRop : public CropBehaviour {
                                          : Format == ColorFormat::rgba16f ? half_max
                                                                           : std::numeric_limits<float>::infinity();
 
-  Outcome blend_into(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color);
+  /// What was done, to be counted for a draw.
+  struct Tally {
+    unsigned quads_blended = 0, fragments_blended = 0, quads_dropped = 0, fragments_dropped = 0, signals = 0;
+  };
+  void count(DrawIndex draw, const Tally& tally);
+  /// Blends for a draw from here on.
+  void set_draw(DrawIndex draw);
+  Outcome blend_into(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);
   LaneBits passes(Lanes alpha) const { return alpha >= threshold_; }
   /// After a blend of `color` into a quad that held the channels given.
   [[gnu::noinline]] void count_trouble(std::size_t place, LaneMask live, const QuadColor& color, LanePair red_green,
                                        LanePair blue_alpha);
 
-  const bool signals_;
-  const float threshold_;  ///< that alpha reaches to be terminated
+  const RenderContext& context_;
+  DrawIndex draw_ = 0;  ///< that is blended, with its state:
+  bool signals_ = false;
+  float threshold_ = 0;  ///< that alpha reaches to be terminated
+  bool drops_late_ = false;
+  /// By quad, in strict termination: the pixels that were signalled.
+  std::vector<LaneMask> terminated_;
   /// By quad, once a fragment was swallowed: transmittance of those swallowed; negative once counted as stuck.
   std::vector<Lanes> swallowed_;
-  const bool drops_late_;
   const bool checks_previous_;
   Cost cost_;
   std::optional<CropCache> cache_;  ///< once looked up here; the timing model of `cycle` has one of its own
@@ -113,12 +126,12 @@ class ColorRop : public CropBehaviour {
 template <template <ColorFormat, BlendRounding> class Rop>
 class CropMaker {
  public:
-  static std::unique_ptr<Behaviour> make(const ParameterSet& set, const RenderState& state) {
+  static std::unique_ptr<Behaviour> make(const ParameterSet& set, const RenderContext& context) {
     const auto& parameters = dynamic_cast<const CropParameters&>(set);
-    switch (state.format) {
-      case ColorFormat::rgba8: return make_for<ColorFormat::rgba8>(parameters, state);
-      case ColorFormat::rgba16f: return make_for<ColorFormat::rgba16f>(parameters, state);
-      case ColorFormat::rgba32f: return make_for<ColorFormat::rgba32f>(parameters, state);
+    switch (context.format) {
+      case ColorFormat::rgba8: return make_for<ColorFormat::rgba8>(parameters, context);
+      case ColorFormat::rgba16f: return make_for<ColorFormat::rgba16f>(parameters, context);
+      case ColorFormat::rgba32f: return make_for<ColorFormat::rgba32f>(parameters, context);
     }
     return nullptr;
   }
@@ -135,11 +148,11 @@ class CropMaker {
 
  private:
   template <ColorFormat Format>
-  static std::unique_ptr<Behaviour> make_for(const CropParameters& parameters, const RenderState& state) {
-    switch (state.blend_rounding) {
-      case BlendRounding::rne: return std::make_unique<Rop<Format, BlendRounding::rne>>(parameters, state);
-      case BlendRounding::rtz: return std::make_unique<Rop<Format, BlendRounding::rtz>>(parameters, state);
-      case BlendRounding::measured: return std::make_unique<Rop<Format, BlendRounding::measured>>(parameters, state);
+  static std::unique_ptr<Behaviour> make_for(const CropParameters& parameters, const RenderContext& context) {
+    switch (context.precision.blend_rounding) {
+      case BlendRounding::rne: return std::make_unique<Rop<Format, BlendRounding::rne>>(parameters, context);
+      case BlendRounding::rtz: return std::make_unique<Rop<Format, BlendRounding::rtz>>(parameters, context);
+      case BlendRounding::measured: return std::make_unique<Rop<Format, BlendRounding::measured>>(parameters, context);
     }
     return nullptr;
   }

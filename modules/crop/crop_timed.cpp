@@ -42,8 +42,9 @@ class Places {
 class TimedCrop : public TimedUnit {
  public:
   TimedCrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
-            const RenderState& state, Transport transport)
+            const RenderContext& context, Transport transport)
       : TimedUnit(name, domain, CropWork::kinds(behaviour->cost()), transport),
+        context_(context),
         out_(*this, "out_terminations"),
         in_(*this, "in_color", [this](const ShadedWarpItem& item, Span visible) { return take(*item.warp, visible); },
             {&out_}),
@@ -51,7 +52,7 @@ class TimedCrop : public TimedUnit {
         cost_(behaviour_->cost()),
         // A hazard is one of quads.
         at_once_(cost_.forwards ? quads_looked_up_at_once(cost_) : 1),
-        memory_(*this, "memory", {MemoryTraffic::color, static_cast<std::uint16_t>(state.gpc)}),
+        memory_(*this, "memory", {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}),
         look_ups_(cost_.blend_rate.most_in_a_cycle()),
         queue_(cost_.input_quads),
         mshrs_(cost_.mshrs),
@@ -65,8 +66,8 @@ class TimedCrop : public TimedUnit {
 
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket; }
-  bool ends_draw() const override { return true; }
-  Cycle end_of_draw() const override { return end_; }
+  bool ends_frame() const override { return true; }
+  Cycle end_of_frame() const override { return end_; }
 
  private:
   void end_of_elaboration() override {
@@ -77,8 +78,10 @@ class TimedCrop : public TimedUnit {
 
   Span take(const ShadedWarp& warp, Span visible) {
     Span left = visible;
-    if (warp.end_of_draw) {
+    if (warp.mark == Mark::end_of_frame) {
       end_ = !any_blended_ ? visible.first : last_blend_ + cost_.latency_cycles;
+    } else if (warp.mark != Mark::none) {
+      behaviour_->pass(warp.mark);
     } else if (at_once_ >= warp.count) {
       left = pass(warp, 0, warp.count, visible);
     } else {
@@ -146,7 +149,7 @@ class TimedCrop : public TimedUnit {
     queue_.take(quads, blended.last);
     last_blend_ = blended.last;
     any_blended_ = true;
-    draw_lasts(blended.last + cost_.latency_cycles);
+    frame_lasts(blended.last + cost_.latency_cycles);
     did(CropWork::blend, quads, blended.first, blended.last + 1);
     if (!cost_.forwards) recent_.push({warp.tile, warp.position[from], blended.last});
     blend(warp, from, to, blended);
@@ -176,7 +179,8 @@ class TimedCrop : public TimedUnit {
     TerminationBeat beat;
     for (unsigned i = from; i < to; ++i) {
       if (outcomes[i].terminated == 0) continue;
-      beat.signals[beat.count++] = {warp.tile, warp.position[i], outcomes[i].terminated};
+      beat.signals[beat.count++] = {warp.tile, warp.position[i], outcomes[i].terminated,
+                                    context_.draw(warp.draw[i]).epoch};
       if (beat.count < TerminationBeat::capacity) continue;
       out_.send(beat, at.of_part(i - from, to - from));
       beat.count = 0;
@@ -233,6 +237,7 @@ class TimedCrop : public TimedUnit {
     Cycle at = 0;
   };
 
+  const RenderContext& context_;
   TimedOut<TerminationBeat> out_;
   TimedIn<ShadedWarpItem> in_;
   std::unique_ptr<CropBehaviour> behaviour_;
@@ -259,9 +264,9 @@ class TimedCrop : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("crop", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned,
+                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
                                        Transport transport) {
-    return std::make_unique<TimedCrop>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)), state,
+    return std::make_unique<TimedCrop>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)), context,
                                        transport);
   });
   return true;

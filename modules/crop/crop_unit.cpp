@@ -20,27 +20,29 @@ namespace {
 class CropUnit : public Unit {
  public:
   CropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
-           const RenderState& state)
+           const RenderContext& context)
       : Unit(name, domain, CropWork::kinds(behaviour->cost())),
+        context_(context),
         in_(*this, "in_color"),
         out_(*this, "out_terminations"),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
-        signals_(state.early_termination),
+        signals_(context.frame->terminates_early()),
         price_(std::int64_t{cost_.blend_rate.cycles} * cost_.sectors_per_cycle),
         sector_price_(cost_.blend_rate.items),
         income_(static_cast<std::int64_t>(CropWork::parts_of_a_cycle(cost_))),
         most_in_a_cycle_(cost_.blend_rate.most_in_a_cycle()),
         longest_run_(cost_.line_bytes / cost_.sector_bytes),
-        memory_(*this, "memory", 2 * cost_.mshrs, {MemoryTraffic::color, static_cast<std::uint16_t>(state.gpc)}) {
+        memory_(*this, "memory", 2 * cost_.mshrs,
+                {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
     out_.set_pipeline(cost_.latency_cycles - 1, ColorBeat::in_a_cycle(cost_.blend_rate));
   }
 
   bool idle() const override { return in_.empty() && queue_.empty(); }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket; }
-  bool ends_draw() const override { return true; }
-  Cycle end_of_draw() const override { return end_; }
+  bool ends_frame() const override { return true; }
+  Cycle end_of_frame() const override { return end_; }
 
  private:
   static constexpr std::size_t quads_ahead = 8;
@@ -136,10 +138,10 @@ class CropUnit : public Unit {
   bool accept() {
     bool moved = false;
     auto budget = static_cast<unsigned>(std::min<std::size_t>(most_in_a_cycle_, cost_.input_quads - queue_.size()));
-    while (budget > 0 && in_.ready()) {
+    while (budget > 0 && in_.ready() && mark_ == Mark::none) {
       const ColorBeat& beat = in_.front();
-      if (beat.end_of_draw) {
-        ending_ = true;
+      if (beat.mark != Mark::none) {
+        mark_ = beat.mark;
         // Once a draw: counting every quad would show.
         cache_->accessed(looked_up_, looked_up_ * sectors_of_a_quad_);
         looked_up_ = 0;
@@ -219,7 +221,8 @@ class CropUnit : public Unit {
           out_.push(beat);
           beat.count = 0;
         }
-        beat.signals[beat.count++] = {quad.warp->tile, static_cast<std::uint8_t>(quad.position()), outcome.terminated};
+        beat.signals[beat.count++] = {quad.warp->tile, static_cast<std::uint8_t>(quad.position()), outcome.terminated,
+                                      context_.draw(quad.warp->draw[quad.index]).epoch};
       }
       if (quad.is_last()) quad.warp->release();
       if (outcome.changed || cost_.writes_unchanged) cache_->dirty(entry.line, entry.sectors);
@@ -231,23 +234,30 @@ class CropUnit : public Unit {
     if (beat.count > 0) out_.push(beat);
     const unsigned blended = most_in_a_cycle_ - budget;
     if (blended == 0) return false;
-    draw_lasts(now + cost_.latency_cycles);
+    frame_lasts(now + cost_.latency_cycles);
     did(CropWork::blend, blended, now);
     last_blend_ = now;
     any_blended_ = true;
     return true;
   }
 
+  [[gnu::noinline]] void pass_mark(Cycle now) {
+    if (mark_ == Mark::end_of_frame) {
+      end_ = !any_blended_ ? now : last_blend_ + cost_.latency_cycles;
+    } else {
+      behaviour_->pass(mark_);
+    }
+    mark_ = Mark::none;
+  }
+
   Cycle tick(Cycle now) override {
     finish_fills();
     const bool blended = blend(now);
     const bool accepted = accept();
-    if (ending_ && queue_.empty()) {
-      end_ = !any_blended_ ? now : last_blend_ + cost_.latency_cycles;
-      ending_ = false;
-    }
+    const bool marked = mark_ != Mark::none && queue_.empty();
+    if (marked) pass_mark(now);
     enter(blended ? UnitState::busy : !queue_.empty() ? stop_ : UnitState::starved, now);
-    if (blended || accepted ||
+    if (blended || accepted || marked ||
         (!queue_.empty() && stop_ != UnitState::blocked && (stop_ == UnitState::latency || tokens_ < price_))) {
       return now + 1;
     }
@@ -257,6 +267,7 @@ class CropUnit : public Unit {
     return next;
   }
 
+  const RenderContext& context_;
   StreamIn<ColorBeat> in_;
   StreamOut<TerminationBeat> out_;
   std::unique_ptr<CropBehaviour> behaviour_;
@@ -284,7 +295,7 @@ class CropUnit : public Unit {
   Cycle refilled_ = 0;
   std::deque<std::pair<std::uint32_t, Cycle>> recent_;  ///< blends in the pipeline, without forwarding
   UnitState stop_ = UnitState::starved;
-  bool ending_ = false;
+  Mark mark_ = Mark::none;  ///< that has arrived; the quads before it are not all blended
   Cycle last_blend_ = 0;
   Cycle end_ = never;
   bool any_blended_ = false;
@@ -297,8 +308,8 @@ class CropUnit : public Unit {
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("crop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                 const RenderState& state, unsigned) {
-    return std::make_unique<CropUnit>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)), state);
+                                 const RenderContext& context, unsigned) {
+    return std::make_unique<CropUnit>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

@@ -12,8 +12,9 @@ namespace {
 /// CROP without time. It signals quad by quad. Ports as in crop_timed.cpp, but for the memory.
 class UntimedCrop : public UntimedUnit {
  public:
-  UntimedCrop(const std::string& name, std::unique_ptr<CropBehaviour> behaviour)
+  UntimedCrop(const std::string& name, std::unique_ptr<CropBehaviour> behaviour, const RenderContext& context)
       : UntimedUnit(name),
+        context_(context),
         out_(*this, "out_terminations"),
         in_(input<ShadedWarpItem>("in_color", [this](const ShadedWarpItem& item) { take(*item.warp); })),
         behaviour_(std::move(behaviour)) {}
@@ -40,6 +41,10 @@ class UntimedCrop : public UntimedUnit {
 
  private:
   void take(const ShadedWarp& warp) {
+    if (warp.mark != Mark::none) {
+      behaviour_->pass(warp.mark);
+      return warp.release();
+    }
     if (!monitor_) {
       const ColorSurface& surface = *behaviour_->surface();
       monitor_.emplace(surface.width(), surface.height());
@@ -67,7 +72,7 @@ class UntimedCrop : public UntimedUnit {
       if (outcome.terminated == 0) continue;
       TerminationBeat beat;
       beat.count = 1;
-      beat.signals[0] = {warp.tile, warp.position[i], outcome.terminated};
+      beat.signals[0] = {warp.tile, warp.position[i], outcome.terminated, context_.draw(warp.draw[i]).epoch};
       out_.send(beat);
     }
   }
@@ -79,6 +84,7 @@ class UntimedCrop : public UntimedUnit {
     observer_->blended(warp, index, outcome);
   }
 
+  const RenderContext& context_;
   UntimedOut<TerminationBeat> out_;
   std::unique_ptr<UntimedIn<ShadedWarpItem>> in_;
   std::unique_ptr<CropBehaviour> behaviour_;
@@ -91,8 +97,8 @@ class UntimedCrop : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("crop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                         const RenderState&, unsigned) {
-    return std::make_unique<UntimedCrop>(name, behaviour_as<CropBehaviour>(std::move(behaviour)));
+                                         const RenderContext& context, unsigned) {
+    return std::make_unique<UntimedCrop>(name, behaviour_as<CropBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

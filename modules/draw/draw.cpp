@@ -6,17 +6,29 @@
 
 namespace vrpipe {
 
-VertexIssue::VertexIssue(const Parameters& parameters, const RenderState& state)
-    : total_(static_cast<std::uint32_t>(state.draw->splats.size())), rate_(parameters.warps_per_1024_cycles) {}
+VertexIssue::VertexIssue(const Parameters& parameters, const RenderContext& context)
+    : frame_(*context.frame), rate_(parameters.warps_per_1024_cycles) {}
 
 bool VertexIssue::next(VertexWarp& out) {
-  if (next_ == total_) return false;
-  out.first_splat = next_;
-  out.splats = std::min(splats_per_vertex_warp, total_ - next_);
-  out.end_of_draw = false;
-  next_ += out.splats;
-  splats += out.splats;
-  return true;
+  for (; command_ < frame_.commands().size(); ++command_, marked_ = false, issued_ = 0) {
+    const Frame::Command& command = frame_.commands()[command_];
+    out = {};
+    if (!marked_ && (!command.is_draw || command.changes_state)) {
+      out.mark = Frame::mark_of(command_);
+      marked_ = true;
+      return true;
+    }
+    if (!command.is_draw) continue;
+    const DrawCall& call = frame_.draw_call(command.draw);
+    if (issued_ == call.splats) continue;
+    out.draw = command.draw;
+    out.first_splat = call.base + issued_;
+    out.splats = std::min(splats_per_vertex_warp, call.splats - issued_);
+    issued_ += out.splats;
+    splats += out.splats;
+    return true;
+  }
+  return false;
 }
 
 namespace {

@@ -5,7 +5,7 @@
 
 namespace vrpipe {
 
-/// Issues the sorted splats of a draw, eight a warp, for vertex shading.
+/// Issues the sorted splats of the frame's draws, up to eight of a draw a warp, for vertex shading.
 class VertexIssue : public DrawBehaviour {
  public:
   struct Parameters : ParameterSet {
@@ -18,7 +18,7 @@ class VertexIssue : public DrawBehaviour {
                                   "measured on a GH100 graphics GPC: 5.8 cycles a splat with 2 TPCs, scaled to 8",
                                   "vertex warps issued in 1024 cycles: vertex fetch and attribute set-up"};
   };
-  VertexIssue(const Parameters& parameters, const RenderState& state);
+  VertexIssue(const Parameters& parameters, const RenderContext& context);
 
   bool next(VertexWarp& out) override;
   std::uint32_t warps_per_1024_cycles() const override { return rate_; }
@@ -26,9 +26,11 @@ class VertexIssue : public DrawBehaviour {
   Counter splats{*this, "splats", "splats", "splats issued"};
 
  private:
-  const std::uint32_t total_;
+  const Frame& frame_;
   const std::uint32_t rate_;
-  std::uint32_t next_ = 0;
+  std::size_t command_ = 0;   ///< of the frame
+  bool marked_ = false;       ///< its mark has been issued
+  std::uint32_t issued_ = 0;  ///< splats of the draw
 };
 
 }  // namespace vrpipe

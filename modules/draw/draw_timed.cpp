@@ -21,7 +21,7 @@ class TimedDraw : public TimedUnit {
 
  private:
   Cycle due(std::uint64_t warp) const { return warp * 1024 / behaviour_->warps_per_1024_cycles(); }
-  Cycle due() const { return have_ ? due(issued_) : 0; }
+  Cycle due() const { return have_ && warp_.mark == Mark::none ? due(issued_) : 0; }
 
   Cycle tick(Cycle now) override {
     if (last_ != nullptr) {
@@ -35,14 +35,19 @@ class TimedDraw : public TimedUnit {
     if (at > now) return at;
     TimedOut<VertexWarp>& out = *outs_[turn_];
     charge(UnitState::latency, at);
-    if (!have_) warp_.end_of_draw = true;
+    if (!have_) {
+      warp_ = {};
+      warp_.mark = Mark::end_of_frame;
+    }
     const Cycle taken = out.send(warp_, at).first;
     charge(UnitState::blocked, taken);
     charge(UnitState::busy, out.last() + 1);
     if (have_) {
-      const Cycle interval = due(issued_ + 1) - due(issued_);
-      if (interval > 0) did(DrawWork::warps, interval, taken, taken + interval);
-      ++issued_;
+      if (warp_.mark == Mark::none) {
+        const Cycle interval = due(issued_ + 1) - due(issued_);
+        if (interval > 0) did(DrawWork::warps, interval, taken, taken + interval);
+        ++issued_;
+      }
       have_ = behaviour_->next(warp_);
     } else {
       ++ended_;
@@ -64,7 +69,7 @@ class TimedDraw : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("draw", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned gpcs,
+                                       std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned gpcs,
                                        Transport transport) {
     return std::make_unique<TimedDraw>(name.c_str(), domain, behaviour_as<DrawBehaviour>(std::move(behaviour)), gpcs,
                                        transport);

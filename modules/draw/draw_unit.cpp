@@ -29,7 +29,7 @@ class DrawUnit : public Unit {
       enter(UnitState::starved, now);
       return never;
     }
-    if (have_ && now < due(issued_)) {
+    if (have_ && warp_.mark == Mark::none && now < due(issued_)) {
       enter(UnitState::latency, now);
       return due(issued_);
     }
@@ -42,13 +42,15 @@ class DrawUnit : public Unit {
     turn_ = (turn_ + 1) % outs_.size();
     if (have_) {
       out.push(warp_);
-      const Cycle interval = due(issued_ + 1) - due(issued_);
-      if (interval > 0) did(DrawWork::warps, interval, now, now + interval);
-      ++issued_;
+      if (warp_.mark == Mark::none) {
+        const Cycle interval = due(issued_ + 1) - due(issued_);
+        if (interval > 0) did(DrawWork::warps, interval, now, now + interval);
+        ++issued_;
+      }
       have_ = behaviour_->next(warp_);
     } else {
       VertexWarp end;
-      end.end_of_draw = true;
+      end.mark = Mark::end_of_frame;
       out.push(end);
       ++ended_;
     }
@@ -66,7 +68,7 @@ class DrawUnit : public Unit {
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("draw", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                 const RenderState&, unsigned gpcs) {
+                                 const RenderContext&, unsigned gpcs) {
     return std::make_unique<DrawUnit>(name.c_str(), domain, behaviour_as<DrawBehaviour>(std::move(behaviour)), gpcs);
   });
   return true;

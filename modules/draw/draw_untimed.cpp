@@ -20,13 +20,13 @@ class UntimedDraw : public UntimedUnit {
   bool run_piece() override {
     VertexWarp warp;
     if (behaviour_->next(warp)) {
-      did(DrawWork::warps, 1);
+      if (warp.mark == Mark::none) did(DrawWork::warps, 1);
       outs_[turn_]->send(warp);
       turn_ = turn_ + 1 == outs_.size() ? 0 : turn_ + 1;
       return true;
     }
     VertexWarp end;
-    end.end_of_draw = true;
+    end.mark = Mark::end_of_frame;
     for (const auto& out : outs_) out->send(end);
     return false;
   }
@@ -39,7 +39,7 @@ class UntimedDraw : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("draw", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                         const RenderState&, unsigned gpcs) {
+                                         const RenderContext&, unsigned gpcs) {
     return std::make_unique<UntimedDraw>(name, behaviour_as<DrawBehaviour>(std::move(behaviour)), gpcs);
   });
   return true;

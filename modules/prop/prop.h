@@ -33,7 +33,7 @@ class PreRop : public PropBehaviour {
         *this, "order",          {"draw", "tile"},
         1,     source::measured, "shaded warps leave in launch order of the whole draw, or of their screen tile"};
   };
-  PreRop(const Parameters& parameters, const RenderState& state);
+  PreRop(const Parameters& parameters, const RenderContext& context);
 
   Cost cost() const override { return cost_; }
 

@@ -15,11 +15,11 @@ namespace {
 class TimedProp : public TimedUnit {
  public:
   TimedProp(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
-            const RenderState& state, Transport transport)
+            const RenderContext& context, Transport transport)
       : TimedUnit(name, domain, PropWork::kinds(behaviour->cost()), transport),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
-        tests_(state.early_termination),
+        tests_(context.frame->terminates_early()),
         out_test_(*this, "out_test"),
         out_survivors_(*this, "out_survivors"),
         out_release_(*this, "out_release"),
@@ -36,7 +36,7 @@ class TimedProp : public TimedUnit {
                  {tests_ ? &out_test_ : &out_survivors_}),
         in_shaded_(*this, "in_shaded",
                    [this](const ShadedWarpItem& item, Span visible) { return collect(*item.warp, visible.first); }),
-        order_(cost_.order, state),
+        order_(cost_.order, context),
         there_(cost_.quads_per_cycle),
         back_(cost_.quads_per_cycle),
         color_(cost_.color_rate.items) {
@@ -45,7 +45,7 @@ class TimedProp : public TimedUnit {
     out_color_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
 
-  bool idle() const override { return TimedUnit::idle() && order_.empty() && end_ == nullptr; }
+  bool idle() const override { return TimedUnit::idle() && order_.empty(); }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -60,9 +60,8 @@ class TimedProp : public TimedUnit {
 
   Cycle collect(const ShadedWarp& warp, Cycle visible) {
     leave_until(visible);
-    if (warp.end_of_draw) {
-      end_ = &warp;
-      end_from_ = visible + 1;
+    if (warp.mark != Mark::none) {
+      order_.arrive_mark(warp, visible + 1);
     } else {
       order_.arrive(warp, visible + 1);
     }
@@ -79,20 +78,27 @@ class TimedProp : public TimedUnit {
 
   /// Lets those warps leave whose time comes up to a cycle.
   void leave_until(Cycle until) {
-    while (order_.has_next() && can_send()) {
-      // A warp begins to leave once its release has room.
-      const Cycle room = out_release_.room_from();
-      if (room == never || std::max(room, color_.next()) > until) break;
-      color_.hold(room);
-      leave(order_.take());
-    }
-    if (end_ == nullptr || end_->sequence != order_.left() || !can_send()) return;
-    const Cycle at = color_.take(end_from_, cost_.color_rate.items).first;
-    const WarpRelease release{end_->slot};
-    out_color_.send({end_}, at);
+    do {
+      while (order_.has_next() && can_send()) {
+        // A warp begins to leave once its release has room.
+        const Cycle room = out_release_.room_from();
+        if (room == never || std::max(room, color_.next()) > until) break;
+        color_.hold(room);
+        leave(order_.take());
+      }
+    } while (pass_mark());
+  }
+
+  bool pass_mark() {
+    const WarpOrder::Waiting* const mark = order_.next_mark();
+    if (mark == nullptr || !can_send()) return false;
+    const Cycle at = color_.take(mark->from, cost_.color_rate.items).first;
+    const ShadedWarp& warp = *mark->warp;
+    const WarpRelease release{warp.slot};
+    order_.leave_mark();
+    out_color_.send({&warp}, at);
     out_release_.send(release, at);
-    end_ = nullptr;
-    order_.restart();
+    return true;
   }
 
   /// Hands a warp to CROP.
@@ -134,15 +140,13 @@ class TimedProp : public TimedUnit {
   Passage there_;  ///< to the tests, or past them
   Passage back_;   ///< from the tests
   Flow color_;     ///< in parts of a cycle and of a quad: a cycle passes `color_rate.items`
-  const ShadedWarp* end_ = nullptr;
-  Cycle end_from_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("prop", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned,
+                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
                                        Transport transport) {
-    return std::make_unique<TimedProp>(name.c_str(), domain, behaviour_as<PropBehaviour>(std::move(behaviour)), state,
+    return std::make_unique<TimedProp>(name.c_str(), domain, behaviour_as<PropBehaviour>(std::move(behaviour)), context,
                                        transport);
   });
   return true;

@@ -13,7 +13,7 @@ namespace {
 class PropUnit : public Unit {
  public:
   PropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
-           const RenderState& state)
+           const RenderContext& context)
       : Unit(name, domain, PropWork::kinds(behaviour->cost())),
         in_bins_(*this, "in_bins"),
         out_test_(*this, "out_test"),
@@ -24,10 +24,10 @@ class PropUnit : public Unit {
         out_color_(*this, "out_color"),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
-        tests_(state.early_termination),
+        tests_(context.frame->terminates_early()),
         there_{PropWork::bins, BatchLimit(cost_.quads_per_cycle)},
         back_{PropWork::tested, BatchLimit(cost_.quads_per_cycle)},
-        order_(cost_.order, state),
+        order_(cost_.order, context),
         color_limit_(cost_.color_rate) {
     out_test_.set_pipeline(cost_.latency_cycles - 1, 1);
     out_survivors_.set_pipeline(cost_.latency_cycles - 1, 1);
@@ -35,8 +35,7 @@ class PropUnit : public Unit {
   }
 
   bool idle() const override {
-    return in_bins_.empty() && in_tested_.empty() && in_shaded_.empty() && current_.warp == nullptr && order_.empty() &&
-           end_ == nullptr;
+    return in_bins_.empty() && in_tested_.empty() && in_shaded_.empty() && current_.warp == nullptr && order_.empty();
   }
   Behaviour& behaviour() override { return *behaviour_; }
 
@@ -74,8 +73,8 @@ class PropUnit : public Unit {
       const ShadedWarp* const warp = in_shaded_.front().warp;
       in_shaded_.pop();
       moved = true;
-      if (warp->end_of_draw) {
-        end_ = warp;
+      if (warp->mark != Mark::none) {
+        order_.arrive_mark(*warp);
       } else {
         order_.arrive(*warp);
       }
@@ -86,7 +85,7 @@ class PropUnit : public Unit {
   bool send_color(Cycle now) {
     waits_for_rate_ = false;
     if (current_.warp == nullptr && !order_.has_next()) {
-      return end_ != nullptr && out_color_.credits() > 0 && pass_end_of_draw();
+      return out_color_.credits() > 0 && pass_mark();
     }
     if (out_color_.credits() == 0) return false;
     ColorBeat beat;
@@ -129,18 +128,18 @@ class PropUnit : public Unit {
       color_limit_.take(sent);
     }
     if (beat.count > 0) out_color_.push(beat);
-    return sent > 0 || moved || (end_ != nullptr && pass_end_of_draw());
+    return sent > 0 || moved || pass_mark();
   }
 
-  [[gnu::noinline]] bool pass_end_of_draw() {
-    if (end_->sequence != order_.left() || out_release_.credits() == 0) return false;
+  bool pass_mark() {
+    const WarpOrder::Waiting* const mark = order_.next_mark();
+    if (mark == nullptr || out_release_.credits() == 0) return false;
     ColorBeat beat;
-    beat.end_of_draw = true;
+    beat.mark = mark->warp->mark;
     out_color_.push(beat);
-    out_release_.push({end_->slot});
-    end_->release();
-    end_ = nullptr;
-    order_.restart();
+    out_release_.push({mark->warp->slot});
+    mark->warp->release();
+    order_.leave_mark();
     return true;
   }
 
@@ -184,13 +183,12 @@ class PropUnit : public Unit {
   WarpOrder::Waiting current_;  ///< being handed to CROP, from `index_` on; none without a warp
   std::uint32_t index_ = 0;
   bool waits_for_rate_ = false;  ///< of quads to CROP, below one a cycle
-  const ShadedWarp* end_ = nullptr;
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("prop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                 const RenderState& state, unsigned) {
-    return std::make_unique<PropUnit>(name.c_str(), domain, behaviour_as<PropBehaviour>(std::move(behaviour)), state);
+                                 const RenderContext& context, unsigned) {
+    return std::make_unique<PropUnit>(name.c_str(), domain, behaviour_as<PropBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

@@ -8,14 +8,14 @@ namespace {
 /// PROP without time: warps come and go in launch order. Ports as in prop_timed.cpp; slots are not released.
 class UntimedProp : public UntimedUnit {
  public:
-  UntimedProp(const std::string& name, std::unique_ptr<PropBehaviour> behaviour, const RenderState& state)
+  UntimedProp(const std::string& name, std::unique_ptr<PropBehaviour> behaviour, const RenderContext& context)
       : UntimedUnit(name),
         out_test_(*this, "out_test"),
         out_survivors_(*this, "out_survivors"),
         out_release_(*this, "out_release"),
         out_color_(*this, "out_color"),
         in_tested_(input<BinItem>("in_tested", [this](const BinItem& item) { forward(item); })),
-        in_bins_(input<BinItem>("in_bins", [this, tests = state.early_termination](
+        in_bins_(input<BinItem>("in_bins", [this, tests = context.frame->terminates_early()](
                                                const BinItem& item) { tests ? out_test_.send(item) : forward(item); })),
         in_shaded_(input<ShadedWarpItem>("in_shaded", [this](const ShadedWarpItem& item) { leave(item); })),
         behaviour_(std::move(behaviour)) {}
@@ -25,7 +25,7 @@ class UntimedProp : public UntimedUnit {
  private:
   void forward(const BinItem& item) { out_survivors_.send(item); }
   void leave(const ShadedWarpItem& item) {
-    if (item.warp->count == 0 && !item.warp->end_of_draw) return item.warp->release();
+    if (item.warp->count == 0 && item.warp->mark == Mark::none) return item.warp->release();
     out_color_.send(item);
   }
 
@@ -41,8 +41,8 @@ class UntimedProp : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("prop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                         const RenderState& state, unsigned) {
-    return std::make_unique<UntimedProp>(name, behaviour_as<PropBehaviour>(std::move(behaviour)), state);
+                                         const RenderContext& context, unsigned) {
+    return std::make_unique<UntimedProp>(name, behaviour_as<PropBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

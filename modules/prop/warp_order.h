@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/accounting.h>
+#include <vrpipe/ring.h>
 #include <vrpipe/tile_grid.h>
 #include <vrpipe/units.h>
 
@@ -12,6 +14,7 @@ namespace vrpipe {
 
 /// Shaded warps that wait to leave PROP. A warp's turn comes when the one before it, of the draw or of its screen tile,
 /// has left; of those whose turn has come the oldest goes first, which keeps a tile's quads together in the colour cache.
+/// A mark leaves between the warps that were launched before it and those after.
 class WarpOrder {
  public:
   /// A warp leaves when the warps of smaller number in its line have left: a line for the draw, or for each screen tile.
@@ -26,19 +29,32 @@ class WarpOrder {
     Cycle from = 0;  ///< the first cycle in which it can leave, for timing models that know it ahead
   };
 
-  WarpOrder(PropBehaviour::Order order, const RenderState& state)
+  WarpOrder(PropBehaviour::Order order, const RenderContext& context)
       : by_draw_(order == PropBehaviour::Order::draw),
-        grid_(state.draw->width, state.draw->height),
+        grid_(context.frame->width(), context.frame->height()),
         next_of_line_(by_draw_ ? 1 : grid_.tiles()) {}
 
   void arrive(const ShadedWarp& warp, Cycle from = 0) {
     const Turn turn = turn_of(warp);
     const Waiting waiting{&warp, warp.sequence, turn, from};
-    if (turn.number == next_of_line_[turn.line]) {
+    if (!marks_.empty() && warp.sequence >= marks_.front().warp->sequence) {
+      behind_.push_back(waiting);
+    } else if (turn.number == next_of_line_[turn.line]) {
       in_turn_.push(waiting);
     } else {
       early_.push(waiting);
     }
+  }
+
+  /// A mark, which comes before the warps that were launched after it.
+  void arrive_mark(const ShadedWarp& mark, Cycle from = 0) { marks_.push({&mark, mark.sequence, {}, from}); }
+  /// The mark whose turn it is; null if it is not a mark's.
+  const Waiting* next_mark() const {
+    return !marks_.empty() && marks_.front().sequence == left_ ? &marks_.front() : nullptr;
+  }
+  void leave_mark() {
+    marks_.pop();
+    for (const Waiting& waiting : std::exchange(behind_, {})) arrive(*waiting.warp, waiting.from);
   }
 
   bool has_next() const { return !in_turn_.empty(); }
@@ -55,14 +71,8 @@ class WarpOrder {
     }
   }
 
-  bool empty() const { return in_turn_.empty() && early_.empty(); }
+  bool empty() const { return in_turn_.empty() && early_.empty() && marks_.empty(); }
   bool has_early() const { return !early_.empty(); }
-  /// Warps that have left since the draw began.
-  std::uint32_t left() const { return left_; }
-  void restart() {
-    left_ = 0;
-    std::fill(next_of_line_.begin(), next_of_line_.end(), 0);
-  }
 
  private:
   /// By sequence, in a ring that holds all from the oldest to the newest: a window on the launch order.
@@ -172,9 +182,11 @@ class WarpOrder {
   const bool by_draw_;
   const TileGrid grid_;
   std::vector<std::uint32_t> next_of_line_;
-  std::uint32_t left_ = 0;
+  std::uint32_t left_ = 0;  ///< warps
   Window in_turn_;
   EarlyWarps early_;
+  Ring<Waiting> marks_;
+  std::vector<Waiting> behind_;  ///< the first of the marks
 };
 
 }  // namespace vrpipe

@@ -6,7 +6,7 @@
 
 namespace vrpipe {
 
-PairingQru::PairingQru(const Parameters& parameters, const RenderState&)
+PairingQru::PairingQru(const Parameters& parameters, const RenderContext&)
     : bin_quads_(parameters.bin_quads),
       quads_per_cycle_(parameters.quads_per_cycle),
       latency_cycles_(parameters.latency_cycles),

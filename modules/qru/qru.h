@@ -38,7 +38,7 @@ class PairingQru : public QruBehaviour {
                            source::open,
                            "from the quad that completes a warp to its launch"};
   };
-  PairingQru(const Parameters& parameters, const RenderState&);
+  PairingQru(const Parameters& parameters, const RenderContext&);
 
   unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) override;
   bool finish_bin(Warp& out) override;
@@ -71,7 +71,7 @@ class PairingQru : public QruBehaviour {
 class QruPassThrough : public QruBehaviour {
  public:
   struct Parameters : ParameterSet {};
-  QruPassThrough(const Parameters&, const RenderState&) {}
+  QruPassThrough(const Parameters&, const RenderContext&) {}
 
   unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) override;
   bool finish_bin(Warp& out) override;

@@ -13,13 +13,13 @@ namespace {
 class TimedQru : public TimedUnit {
  public:
   TimedQru(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour,
-           const RenderState& state, Transport transport)
+           const RenderContext& context, Transport transport)
       : TimedUnit(name, domain, QruWork::kinds(behaviour->cost()), transport),
         out_(*this, "out_warps"),
         in_(*this, "in_quads", [this](const BinItem& item, Span visible) { return examine(item, visible); }, {&out_}),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
-        numbering_(state),
+        numbering_(context),
         budget_(cost_.items_per_cycle) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
@@ -51,11 +51,11 @@ class TimedQru : public TimedUnit {
     charge(UnitState::starved, cycle_);
     const Cycle begin = cycle_;
     left_ = cycle_;
-    if (item.end_of_draw) {
-      Warp end;
-      end.end_of_draw = true;
-      numbering_.number_end(end);
-      launch(end);
+    if (item.mark != Mark::none) {
+      Warp mark;
+      mark.mark = item.mark;
+      numbering_.number_mark(mark);
+      launch(mark);
       return {begin, left_};
     }
     const std::vector<Quad>& quads = item.storage->flush.quads;
@@ -100,9 +100,9 @@ class TimedQru : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("qru", [](const std::string& name, ClockDomain& domain,
-                                      std::unique_ptr<Behaviour> behaviour, const RenderState& state, unsigned,
+                                      std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
                                       Transport transport) {
-    return std::make_unique<TimedQru>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)), state,
+    return std::make_unique<TimedQru>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)), context,
                                       transport);
   });
   return true;

@@ -13,13 +13,13 @@ namespace {
 class QruUnit : public Unit {
  public:
   QruUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour,
-          const RenderState& state)
+          const RenderContext& context)
       : Unit(name, domain, QruWork::kinds(behaviour->cost())),
         in_(*this, "in_quads"),
         out_(*this, "out_warps"),
         behaviour_(std::move(behaviour)),
         cost_(behaviour_->cost()),
-        numbering_(state) {
+        numbering_(context) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
 
@@ -38,8 +38,8 @@ class QruUnit : public Unit {
         blocked = true;
         break;
       }
-      if (beat.end_of_draw) {
-        pass_end_of_draw();
+      if (beat.mark != Mark::none) {
+        pass_mark();
         moved = true;
         break;
       }
@@ -82,11 +82,11 @@ class QruUnit : public Unit {
     return blocked ? never : in_.next_ready();
   }
 
-  [[gnu::noinline]] void pass_end_of_draw() {
-    Warp end;
-    end.end_of_draw = true;
-    numbering_.number_end(end);
-    out_.push(end);
+  [[gnu::noinline]] void pass_mark() {
+    Warp mark;
+    mark.mark = in_.front().mark;
+    numbering_.number_mark(mark);
+    out_.push(mark);
     in_.pop();
   }
 
@@ -101,8 +101,8 @@ class QruUnit : public Unit {
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("qru", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                const RenderState& state, unsigned) {
-    return std::make_unique<QruUnit>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)), state);
+                                const RenderContext& context, unsigned) {
+    return std::make_unique<QruUnit>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

@@ -10,23 +10,23 @@ namespace {
 /// QRU without time. Ports as in qru_timed.cpp.
 class UntimedQru : public UntimedUnit {
  public:
-  UntimedQru(const std::string& name, std::unique_ptr<QruBehaviour> behaviour, const RenderState& state)
+  UntimedQru(const std::string& name, std::unique_ptr<QruBehaviour> behaviour, const RenderContext& context)
       : UntimedUnit(name),
         out_(*this, "out_warps"),
         in_(input<BinItem>("in_quads", [this](const BinItem& item) { examine(item); })),
         behaviour_(std::move(behaviour)),
-        numbering_(state) {}
+        numbering_(context) {}
 
   Behaviour& behaviour() override { return *behaviour_; }
   void prefetch_for(UntimedUnit& blender) override { blender_ = &blender; }
 
  private:
   void examine(const BinItem& item) {
-    if (item.end_of_draw) {
-      Warp end;
-      end.end_of_draw = true;
-      numbering_.number_end(end);
-      return out_.send(end);
+    if (item.mark != Mark::none) {
+      Warp mark;
+      mark.mark = item.mark;
+      numbering_.number_mark(mark);
+      return out_.send(mark);
     }
     const Quad* const quads = item.storage->flush.quads.data();
     for (unsigned from = 0; from < item.quads;) {
@@ -54,8 +54,8 @@ class UntimedQru : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("qru", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                        const RenderState& state, unsigned) {
-    return std::make_unique<UntimedQru>(name, behaviour_as<QruBehaviour>(std::move(behaviour)), state);
+                                        const RenderContext& context, unsigned) {
+    return std::make_unique<UntimedQru>(name, behaviour_as<QruBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

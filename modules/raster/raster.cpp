@@ -18,11 +18,12 @@ constexpr auto raster_side = static_cast<std::int32_t>(raster_tile_pixels);
 constexpr std::int64_t narrow_gradient = (std::int64_t{1} << 30) / 7;
 constexpr std::int64_t narrow_limit = std::int64_t{1} << 30;
 
-static_assert(offsetof(Quad, position) == 4 && offsetof(Quad, coverage) == 5 && offsetof(Quad, triangle) == 6);
+static_assert(offsetof(Quad, position) == 4 && offsetof(Quad, coverage) == 5);
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
 constexpr unsigned position_shift = 32;
 constexpr unsigned coverage_shift = 40;
 constexpr unsigned triangle_shift = 48;
+constexpr unsigned draw_shift = 49;
 
 /// Puts those of four quads in a row of the raster tile that are covered, 4 bits each, one after the other; returns how
 /// many. A quad is one word, since one of narrow stores would be waited for when it is copied. All four are written,
@@ -62,10 +63,10 @@ unsigned put_covered(Quad* out, Words quads, std::uint64_t coverage) {
 }
 }  // namespace
 
-TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderState& state)
-    : state_(state), cost_{parameters.setup_latency_cycles,        parameters.setup_interval_cycles,
-                           parameters.coarse_tiles_per_cycle,      parameters.fine_tiles_per_cycle,
-                           parameters.screen_tile_interval_cycles, parameters.quads_per_cycle} {}
+TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderContext& context)
+    : context_(context), cost_{parameters.setup_latency_cycles,        parameters.setup_interval_cycles,
+                               parameters.coarse_tiles_per_cycle,      parameters.fine_tiles_per_cycle,
+                               parameters.screen_tile_interval_cycles, parameters.quads_per_cycle} {}
 
 void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   ++setups;
@@ -75,8 +76,8 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   // A primitive covers nothing outside its bounds, so those need no masking.
   const bool whole = clip.x0 <= primitive.bounds.x0 && clip.y0 <= primitive.bounds.y0 &&
                      clip.x1 >= primitive.bounds.x1 && clip.y1 >= primitive.bounds.y1;
-  const auto width = static_cast<std::int32_t>(state_.draw->width);
-  const auto height = static_cast<std::int32_t>(state_.draw->height);
+  const auto width = static_cast<std::int32_t>(context_.frame->width());
+  const auto height = static_cast<std::int32_t>(context_.frame->height());
   mask_area_ = {0, 0, width, height};
   if (!whole)
     mask_area_ = {std::max(clip.x0, 0), std::max(clip.y0, 0), std::min(clip.x1, width), std::min(clip.y1, height)};
@@ -89,14 +90,14 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   tile_counted_ = false;
 
   SnappedTriangle t;
-  if (!snap_triangle(state_, primitive.splat, primitive.triangle, t)) {
+  if (!snap_triangle(context_, primitive.draw, primitive.splat, primitive.triangle, t)) {
     throw SimulationFault("raster", 0, "primitive of splat " + std::to_string(primitive.splat) + " has no vertices");
   }
   if (doubled_area(t) < 0) {
     std::swap(t.x[1], t.x[2]);
     std::swap(t.y[1], t.y[2]);
   }
-  const std::int64_t step = std::int64_t{1} << state_.subpixel_bits;
+  const std::int64_t step = std::int64_t{1} << context_.precision.subpixel_bits;
   const std::int64_t half = step / 2;
   wide_ = false;
   std::int64_t magnitudes = 1;  // the bits of all of them together are those of the largest
@@ -137,7 +138,7 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
     const std::int32_t y = tile_y_ * tile_side + static_cast<std::int32_t>(part_ >> 1U) * raster_side;
     if (x >= area_.x1 || y >= area_.y1 || x + raster_side <= area_.x0 || y + raster_side <= area_.y0) continue;
     const TileId tile{static_cast<std::uint16_t>(tile_x_), static_cast<std::uint16_t>(tile_y_)};
-    if (state_.gpcs > 1 && owner_of(tile, state_.gpcs) != state_.gpc) continue;
+    if (!context_.placement.owns(tile)) continue;
     ++coarse_tests;
     std::int64_t value[3];
     bool rejected = false;
@@ -154,10 +155,10 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
     out.tile = tile;
     out.count = 0;
     out.last_of_bin = false;
-    out.end_of_draw = false;
+    out.mark = Mark::none;
     const unsigned fragments = wide_ ? fill_wide(out, x, y, value) : fill_narrow(out, x, y, value);
-    quads_rasterized += out.count;
-    fragments_rasterized += fragments;
+    quads_rasterized.add(primitive_.draw, out.count);
+    fragments_rasterized.add(primitive_.draw, fragments);
     raster_tiles_tested += coarse_tests;
     ++raster_tiles_kept;
     new_screen_tile = !tile_counted_;
@@ -209,8 +210,9 @@ unsigned TileRasterizer::fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t
   }
   const unsigned first =
       static_cast<unsigned>((y % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) + (x % tile_side) / 2);
-  const std::uint64_t upper_left =
-      primitive_.splat | std::uint64_t{first} << position_shift | std::uint64_t{primitive_.triangle} << triangle_shift;
+  const std::uint64_t upper_left = primitive_.splat | std::uint64_t{first} << position_shift |
+                                   std::uint64_t{primitive_.triangle} << triangle_shift |
+                                   std::uint64_t{primitive_.draw} << draw_shift;
   constexpr std::uint64_t to_the_right = std::uint64_t{1} << position_shift;
   Words quads = upper_left + Words{0, to_the_right, 2 * to_the_right, 3 * to_the_right};
   unsigned count = 0;
@@ -241,8 +243,8 @@ unsigned TileRasterizer::fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y
       quad.position = static_cast<std::uint8_t>(
           ((y + row) % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) + ((x + column) % tile_side) / 2);
       quad.coverage = static_cast<LaneMask>(mask);
-      quad.triangle = primitive_.triangle;
-      quad.reserved = 0;
+      quad.triangle = primitive_.triangle & 1U;
+      quad.draw = primitive_.draw & most_draws;
       fragments += popcount(quad.coverage);
     }
   }

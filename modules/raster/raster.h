@@ -61,7 +61,7 @@ class TileRasterizer : public RasterBehaviour {
                             "measured on a GH100 graphics GPC: 64 pixels a cycle",
                             "quads handed to TC in a cycle"};
   };
-  TileRasterizer(const Parameters& parameters, const RenderState& state);
+  TileRasterizer(const Parameters& parameters, const RenderContext& context);
 
   void begin(const Primitive& primitive, const PixelRect& clip) override;
   bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override;
@@ -85,7 +85,7 @@ class TileRasterizer : public RasterBehaviour {
   LaneMask in_area(std::int32_t x, std::int32_t y) const;
   bool advance();
 
-  const RenderState& state_;
+  const RenderContext& context_;
   Cost cost_;
   Edge edges_[3];
   bool wide_ = false;

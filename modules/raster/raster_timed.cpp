@@ -28,10 +28,10 @@ class TimedRaster : public TimedUnit {
     now_ = std::max({now_, visible, out_.last()});
     charge(UnitState::blocked, out_.last());
     charge(UnitState::starved, now_);
-    if (job.end_of_draw) {
-      QuadBeat end;
-      end.end_of_draw = true;
-      return now_ = out_.send(end, now_).first;
+    if (job.mark != Mark::none) {
+      QuadBeat mark;
+      mark.mark = job.mark;
+      return now_ = out_.send(mark, now_).first;
     }
     now_ = std::max(now_, next_setup_);
     const Cycle setup = now_;
@@ -54,7 +54,7 @@ class TimedRaster : public TimedUnit {
       }
       if (tile.count == 0) continue;
       now_ = quads_out_.take(now_, tile.count).last;
-      draw_lasts(now_ + 1);
+      frame_lasts(now_ + 1);
       did(RasterWork::quads, tile.count, now_);
       charge(UnitState::busy, now_);
       now_ = out_.send(tile, now_).first;
@@ -87,7 +87,7 @@ class TimedRaster : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("raster", [](const std::string& name, ClockDomain& domain,
-                                         std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
+                                         std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned,
                                          Transport transport) {
     return std::make_unique<TimedRaster>(name.c_str(), domain, behaviour_as<RasterBehaviour>(std::move(behaviour)),
                                          transport);

@@ -46,10 +46,10 @@ class RasterUnit : public Unit {
     out_.push(beat);
   }
 
-  [[gnu::noinline]] void pass_end_of_draw() {
-    QuadBeat end;
-    end.end_of_draw = true;
-    out_.push(end);
+  [[gnu::noinline]] void pass_mark() {
+    QuadBeat mark;
+    mark.mark = in_.front().mark;
+    out_.push(mark);
     in_.pop();
   }
 
@@ -73,7 +73,7 @@ class RasterUnit : public Unit {
         const bool taken = send(quad_budget);
         if (quad_budget != before) {
           moved = true;
-          draw_lasts(now + 1);
+          frame_lasts(now + 1);
           did(RasterWork::quads, before - quad_budget, now);
         }
         if (!taken && !moved) {
@@ -89,13 +89,13 @@ class RasterUnit : public Unit {
           enter(UnitState::starved, now);
           return in_.next_ready();
         }
-        if (in_.front().end_of_draw) {
+        if (in_.front().mark != Mark::none) {
           if (out_.credits() == 0) {
             if (moved) break;
             enter(UnitState::blocked, now);
             return never;
           }
-          pass_end_of_draw();
+          pass_mark();
           moved = true;
           break;
         }
@@ -140,7 +140,7 @@ class RasterUnit : public Unit {
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("raster", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                   const RenderState&, unsigned) {
+                                   const RenderContext&, unsigned) {
     return std::make_unique<RasterUnit>(name.c_str(), domain, behaviour_as<RasterBehaviour>(std::move(behaviour)));
   });
   return true;

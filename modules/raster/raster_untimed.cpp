@@ -18,10 +18,10 @@ class UntimedRaster : public UntimedUnit {
 
  private:
   void rasterize(const RasterJob& job) {
-    if (job.end_of_draw) {
-      QuadBeat end;
-      end.end_of_draw = true;
-      return out_.send(end);
+    if (job.mark != Mark::none) {
+      QuadBeat mark;
+      mark.mark = job.mark;
+      return out_.send(mark);
     }
     did(RasterWork::setup, 1);
     behaviour_->begin(job.primitive, job.clip);
@@ -45,7 +45,7 @@ class UntimedRaster : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("raster", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                           const RenderState&, unsigned) {
+                                           const RenderContext&, unsigned) {
     return std::make_unique<UntimedRaster>(name, behaviour_as<RasterBehaviour>(std::move(behaviour)));
   });
   return true;

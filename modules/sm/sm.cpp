@@ -33,9 +33,17 @@ float clamp_color(float value) { return std::min(std::max(0.0F, value), half_max
 
 /// Threads of a warp whose bit is set.
 unsigned threads_in(std::uint32_t mask) { return static_cast<unsigned>(__builtin_popcount(mask)); }
+
+/// The threads of a warp whose quads are of a draw, a bit each.
+std::uint32_t threads_of(const Warp& warp, DrawIndex draw) {
+  std::uint32_t threads = 0;
+  for (unsigned i = 0; i < warp.count; ++i) threads |= warp.quads[i].draw == draw ? 0xfU << (4 * i) : 0U;
+  return threads;
+}
 }  // namespace
 
-SplatShader::SplatShader(const Parameters& parameters, const RenderState& state) : state_(state) {
+SplatShader::SplatShader(const Parameters& parameters, const RenderContext& context)
+    : context_(context), several_draws_(context.frame->draws().size() > 1) {
   cost_.cores = parameters.cores;
   cost_.schedulers_per_core = parameters.schedulers_per_core;
   cost_.lanes_per_scheduler = parameters.lanes_per_scheduler;
@@ -59,15 +67,15 @@ SplatShader::SplatShader(const Parameters& parameters, const RenderState& state)
   cost_.merge = {{parameters.merge_instructions, parameters.merge_latency_cycles}};
 }
 
-void SplatShader::set_up(Attributes& attributes, std::uint32_t index) {
-  const Splat& splat = state_.draw->splats[index];
+void SplatShader::set_up(Attributes& attributes, const Quad& quad) {
+  const Splat& splat = context_.draw(quad.draw).splat(quad.splat);
   const float determinant = splat.ax * splat.by - splat.ay * splat.bx;
   // A splat without extent has alpha = opacity wherever it is rasterised at all.
   const float scale = std::fabs(determinant) >= smallest_determinant ? splat.r / determinant : 0.0F;
   const float largest = std::max({splat.red, splat.green, splat.blue});
   const float least = std::min({splat.red, splat.green, splat.blue});
   if (!(least >= 0.0F && largest <= half_max)) ++colors_clamped;
-  attributes = {index,
+  attributes = {quad.splat,
                 splat_lanes(splat.cx),
                 splat_lanes(splat.cy),
                 splat_lanes(splat.by * scale),
@@ -80,9 +88,9 @@ void SplatShader::set_up(Attributes& attributes, std::uint32_t index) {
                 splat_lanes(clamp_color(splat.blue))};
 }
 
-const SplatShader::Attributes& SplatShader::attributes_of(AttributeTable& table, std::uint32_t splat) {
-  Attributes& attributes = table[splat % table.size()];
-  if (attributes.splat != splat) set_up(attributes, splat);
+const SplatShader::Attributes& SplatShader::attributes_of(AttributeTable& table, const Quad& quad) {
+  Attributes& attributes = table[quad.splat % table.size()];
+  if (attributes.splat != quad.splat) set_up(attributes, quad);
   return attributes;
 }
 
@@ -99,7 +107,7 @@ inline LanePair SplatShader::alpha_at(LanePair x, LanePair y, const AttributePai
 }
 
 void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
-  switch (state_.exponential) {
+  switch (context_.precision.exponential) {
     case Exponential::exact: return shade_warp<Exponential::exact>(warp, out);
     case Exponential::ex2: return shade_warp<Exponential::ex2>(warp, out);
     case Exponential::fp16: return shade_warp<Exponential::fp16>(warp, out);
@@ -113,9 +121,9 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
   out.tile = warp.tile;
   out.sequence = warp.sequence;
   out.tile_sequence = warp.tile_sequence;
-  out.end_of_draw = false;
+  out.mark = Mark::none;
   ++fragment_warps;
-  quads_shaded += warp.count;
+  const float pruning_threshold = context_.state(warp.quads[0].draw).pruning_threshold;  // all quads' state
   // Sample positions are sums of small integers and halves: exact.
   const auto x = static_cast<float>(warp.tile.x * screen_tile_pixels);
   const auto y = static_cast<float>(warp.tile.y * screen_tile_pixels);
@@ -130,17 +138,17 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
   for (unsigned i = 0; i < warp.count; i += 2) {
     const Quad& first = warp.quads[i];
     const Quad& second = warp.quads[i + (i < last)];
-    const Attributes& of_first = attributes_of(attributes_of_first_, first.splat);
+    const Attributes& of_first = attributes_of(attributes_of_first_, first);
     const AttributePair splats = first.splat == second.splat
                                      ? AttributePair(of_first, of_first)
-                                     : AttributePair(of_first, attributes_of(attributes_of_second_, second.splat));
+                                     : AttributePair(of_first, attributes_of(attributes_of_second_, second));
     const std::uint32_t covered = first.coverage | (i == last ? 0U : static_cast<unsigned>(second.coverage) << 4U);
     const LanePair alpha = alpha_at<Kind>(x + join(samples.x[first.position % quads_per_tile_row],
                                                    samples.x[second.position % quads_per_tile_row]),
                                           y + join(samples.y[first.position / quads_per_tile_row],
                                                    samples.y[second.position / quads_per_tile_row]),
                                           splats);
-    const LanePairBits kept = (alpha >= state_.pruning_threshold) & expand_mask_pair(covered);
+    const LanePairBits kept = (alpha >= pruning_threshold) & expand_mask_pair(covered);
     const LanePair visible = floats_of<LanePair>(bits_of(alpha) & kept);
     colors[i / 2] = {visible * splats.red, visible * splats.green, visible * splats.blue, visible};
     covered_of_warp |= covered << (4 * i);
@@ -148,12 +156,15 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
   }
 
   unsigned count = 0;
+  std::uint32_t merged = 0;  // a bit a thread of a back quad that its front takes up, where both are live
+  std::uint32_t merged_quads = 0;
   // Written whether the quad lives or not, since a branch would be mispredicted too often.
   const auto put = [&](const Quad& quad, LaneMask live, const QuadColor& color) {
     out.color[count] = color;
     out.position[count] = quad.position;
     out.live[count] = live;
     out.first_primitive[count] = out.last_primitive[count] = primitive_order(quad);
+    out.draw[count] = quad.draw;
     count += live != 0;
   };
   for (unsigned i = 0; i < warp.count; i += 2) {
@@ -165,18 +176,30 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
     if ((warp.merge_pairs >> (i / 2) & 1U) != 0 && live_front != 0 && live_back != 0) {
       put(warp.quads[i], static_cast<LaneMask>(live_front | live_back), blend_front_to_back(front, back));
       out.last_primitive[count - 1] = primitive_order(warp.quads[i + 1]);
-      fragments_merged += popcount(static_cast<LaneMask>(live_front & live_back));
-      ++quads_merged;
+      merged |= (unsigned{live_front} & live_back) << (4 * i + 4);
+      merged_quads |= 1U << (4 * i + 4);
     } else {
       put(warp.quads[i], live_front, front);
       put(warp.quads[i + (i < last)], live_back, back);
     }
   }
-  fragments_shaded += threads_in(covered_of_warp);
-  fragments_pruned += threads_in(covered_of_warp & ~live_of_warp);
-  const std::uint32_t dead = ~(live_of_warp | live_of_warp >> 1U | live_of_warp >> 2U | live_of_warp >> 3U);
-  quads_pruned += threads_in(dead & 0x11111111U) - (quads_per_warp - warp.count);
   out.count = static_cast<std::uint8_t>(count);
+  // The threads of each draw, most often of one.
+  for (std::uint32_t left = ~0U >> (4 * (quads_per_warp - warp.count)); left != 0;) {
+    const DrawIndex draw = warp.quads[static_cast<unsigned>(__builtin_ctz(left)) / 4].draw;
+    const std::uint32_t threads = several_draws_ ? threads_of(warp, draw) : left;
+    const std::uint32_t covered = covered_of_warp & threads;
+    const std::uint32_t live = live_of_warp & threads;
+    const std::uint32_t quads = threads & 0x11111111U;  // a bit a quad
+    const std::uint32_t live_quads = (live | live >> 1U | live >> 2U | live >> 3U) & quads;
+    quads_shaded.add(draw, threads_in(quads));
+    fragments_shaded.add(draw, threads_in(covered));
+    quads_pruned.add(draw, threads_in(quads & ~live_quads));
+    fragments_pruned.add(draw, threads_in(covered & ~live));
+    quads_merged.add(draw, threads_in(merged_quads & threads));
+    fragments_merged.add(draw, threads_in(merged & threads));
+    left &= ~threads;
+  }
 }
 
 void SplatShader::shade_vertices(const VertexWarp&) { ++vertex_warps; }

@@ -73,7 +73,7 @@ class SplatShader : public SmBehaviour {
                                  10000,        "cycles",
                                  source::open, "of shuffle and partial blend beyond their issue slots"};
   };
-  SplatShader(const Parameters& parameters, const RenderState& state);
+  SplatShader(const Parameters& parameters, const RenderContext& context);
 
   void shade(const Warp& warp, ShadedWarp& out) override;
   void shade_vertices(const VertexWarp& warp) override;
@@ -106,16 +106,17 @@ class SplatShader : public SmBehaviour {
           green(join(a.green, b.green)),
           blue(join(a.blue, b.blue)) {}
   };
-  void set_up(Attributes& attributes, std::uint32_t splat);
+  void set_up(Attributes& attributes, const Quad& quad);
   using AttributeTable = std::array<Attributes, 32>;
-  const Attributes& attributes_of(AttributeTable& table, std::uint32_t splat);
+  const Attributes& attributes_of(AttributeTable& table, const Quad& quad);
   template <Exponential Kind>
   void shade_warp(const Warp& warp, ShadedWarp& out);
   /// Alpha at the samples of two quads.
   template <Exponential Kind>
   static LanePair alpha_at(LanePair x, LanePair y, const AttributePair& splats);
 
-  const RenderState& state_;
+  const RenderContext& context_;
+  const bool several_draws_;
   Cost cost_;
   /// Of the splats last set up, by the low bits of their number; two tables, so that the two quads' are there at once.
   AttributeTable attributes_of_first_;

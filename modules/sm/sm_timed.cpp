@@ -106,9 +106,11 @@ class TimedSm : public TimedUnit {
 
   Cycle launch(const Warp& warp, Cycle visible) {
     Cycle launch = std::max(visible, next_launch_);
-    if (warp.end_of_draw) {
-      issue_until(never);
-      done_.push_in_order({std::max(launch, last_done_), take_flight(warp)}, &Event::at);
+    if (warp.mark != Mark::none) {
+      // Another mark than the last goes at once, before any warp after it is done; PROP keeps it behind those before it.
+      const bool waits = blocking() || warp.mark == Mark::end_of_frame;
+      if (waits) issue_until(never);
+      done_.push_in_order({waits ? std::max(launch, last_done_) : launch, take_flight(warp)}, &Event::at);
       if (blocking()) hand_on_until(never);
       return launch;
     }
@@ -168,7 +170,7 @@ class TimedSm : public TimedUnit {
     const Cycle begin = std::max(free_at, from);
     const Cycle merge = begin + segment.instructions * cycles_per_instruction_;
     free_at = merge + segment.merge_instructions * cycles_per_instruction_;
-    draw_lasts(free_at);  // the warp's quads end after that
+    frame_lasts(free_at);  // the warp's quads end after that
     if (segment.instructions > 0) did(SmWork::fragment, segment.instructions, begin, merge);
     if (segment.merge_instructions > 0) did(SmWork::merge, segment.merge_instructions, merge, free_at);
     charge(UnitState::busy, free_at);
@@ -217,14 +219,14 @@ class TimedSm : public TimedUnit {
 
   void shade(const Warp& warp, std::uint32_t core, Cycle done) {
     ShadedWarp& shaded = pool_.take();
-    if (warp.end_of_draw) {
-      shaded.end_of_draw = true;
+    if (warp.mark != Mark::none) {
+      shaded.mark = warp.mark;
       shaded.sequence = warp.sequence;
       shaded.count = 0;
       shaded.slot = no_slot;
     } else {
       behaviour_->shade(warp, shaded);
-      if (shaded.count < warp.count) draw_lasts(done + 1);
+      if (shaded.count < warp.count) frame_lasts(done + 1);
       shaded.slot = static_cast<std::uint16_t>(core);
     }
     out_shaded_.send({&shaded}, done);
@@ -238,7 +240,7 @@ class TimedSm : public TimedUnit {
 
   Cycle shade_vertices(const VertexWarp& warp, Cycle visible) {
     Cycle launch = std::max(visible, next_vertex_launch_);
-    if (!warp.end_of_draw) {
+    if (warp.mark == Mark::none) {
       launch = std::max(launch, vertex_slots_[vertex_turn_]);
       Cycle& free_at = scheduler_free_at_[vertex_scheduler_++ % scheduler_free_at_.size()];
       const Cycle issue = vertex_.instructions * cycles_per_instruction_;
@@ -301,7 +303,7 @@ class TimedSm : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("sm", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                     const RenderState&, unsigned, Transport transport) {
+                                     const RenderContext&, unsigned, Transport transport) {
     return std::make_unique<TimedSm>(name.c_str(), domain, behaviour_as<SmBehaviour>(std::move(behaviour)), transport);
   });
   return true;

@@ -138,7 +138,7 @@ class SmUnit : public Unit {
     const Cycle busy = Cycle{segment.instructions} * cycles_per_instruction_;
     scheduler.free_at = now + busy;
     busy_until_ = std::max(busy_until_, scheduler.free_at);
-    if (slot < fragment_slots_) draw_lasts(now + busy);  // its quads end after that
+    if (slot < fragment_slots_) frame_lasts(now + busy);  // its quads end after that
     if (segment.instructions > 0) did(kind_of_work(slot, flight), segment.instructions, now, now + busy);
     wheel_.add(std::max(now + busy + segment.stall_cycles, now + 1), slot, next_);
   }
@@ -173,7 +173,7 @@ class SmUnit : public Unit {
     --running_;
     ShadedWarp& shaded = pool_.take();
     behaviour_->shade(warps_[slot], shaded);
-    if (shaded.count < warps_[slot].count) draw_lasts(now + 1);
+    if (shaded.count < warps_[slot].count) frame_lasts(now + 1);
     shaded.slot = static_cast<std::uint16_t>(slot);
     completed_.push(&shaded);
   }
@@ -239,13 +239,13 @@ class SmUnit : public Unit {
     return true;
   }
 
-  [[gnu::noinline]] void pass_end_of_draw() {
-    ShadedWarp& end = pool_.take();
-    end.end_of_draw = true;
-    end.sequence = in_warps_.front().sequence;
-    end.count = 0;
-    end.slot = no_slot;
-    completed_.push(&end);
+  [[gnu::noinline]] void pass_mark() {
+    ShadedWarp& mark = pool_.take();
+    mark.mark = in_warps_.front().mark;
+    mark.sequence = in_warps_.front().sequence;
+    mark.count = 0;
+    mark.slot = no_slot;
+    completed_.push(&mark);
     in_warps_.pop();
   }
 
@@ -253,7 +253,7 @@ class SmUnit : public Unit {
     slots_full_ = false;
     if (!in_warps_.ready()) return;
     const Warp& warp = in_warps_.front();
-    if (warp.end_of_draw) return pass_end_of_draw();
+    if (warp.mark != Mark::none) return pass_mark();
     if (!choose_core(warp.tile)) {
       slots_full_ = true;
       return;
@@ -282,7 +282,7 @@ class SmUnit : public Unit {
     vertices_[turn] = in_vertices_.front();
     in_vertices_.pop();
     Flight& flight = flights_[slot];
-    flight.done = vertices_[turn].end_of_draw;
+    flight.done = vertices_[turn].mark != Mark::none;
     if (flight.done) return;
     flight.program = &cost_.vertex;
     flight.segment = 0;
@@ -354,7 +354,7 @@ class SmUnit : public Unit {
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("sm", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                               const RenderState&, unsigned) {
+                               const RenderContext&, unsigned) {
     return std::make_unique<SmUnit>(name.c_str(), domain, behaviour_as<SmBehaviour>(std::move(behaviour)));
   });
   return true;

@@ -21,14 +21,14 @@ class UntimedSm : public UntimedUnit {
 
  private:
   void shade(const Warp& warp) {
-    shaded_.end_of_draw = warp.end_of_draw;
+    shaded_.mark = warp.mark;
     shaded_.sequence = warp.sequence;
     shaded_.count = 0;
-    if (!warp.end_of_draw) behaviour_->shade(warp, shaded_);
+    if (warp.mark == Mark::none) behaviour_->shade(warp, shaded_);
     out_shaded_.send({&shaded_});
   }
   void shade_vertices(const VertexWarp& warp) {
-    if (!warp.end_of_draw) {
+    if (warp.mark == Mark::none) {
       did(SmWork::vertex, 1);
       behaviour_->shade_vertices(warp);
     }
@@ -46,7 +46,7 @@ class UntimedSm : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("sm", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                       const RenderState&, unsigned) {
+                                       const RenderContext&, unsigned) {
     return std::make_unique<UntimedSm>(name, behaviour_as<SmBehaviour>(std::move(behaviour)));
   });
   return true;

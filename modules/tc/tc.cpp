@@ -6,9 +6,9 @@
 
 namespace vrpipe {
 
-TileCoalescing::TileCoalescing(const Parameters& parameters, const RenderState& state)
+TileCoalescing::TileCoalescing(const Parameters& parameters, const RenderContext& context)
     : bin_quads_(parameters.bin_quads),
-      grid_(state.draw->width, state.draw->height),
+      grid_(context.frame->width(), context.frame->height()),
       cost_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.idle_timeout_cycles,
             parameters.flush_queue_bins},
       bins_(parameters.bins),

@@ -37,7 +37,7 @@ class TileCoalescing : public TcBehaviour {
     Integer flush_queue_bins{
         *this, "flush_queue_bins", 2, 1, 1024, "bins", source::open, "flushed bins that wait for PROP before TC stops"};
   };
-  TileCoalescing(const Parameters& parameters, const RenderState& state);
+  TileCoalescing(const Parameters& parameters, const RenderContext& context);
 
   unsigned insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) override;
   bool flush_oldest(FlushReason reason, Flush& out) override;
@@ -64,5 +64,10 @@ class TileCoalescing : public TcBehaviour {
   std::deque<std::uint32_t> allocation_order_;
   std::vector<std::int32_t> bin_of_tile_;  ///< -1: none
 };
+
+/// Whether TC hands a mark on. Behind it a bin, and so a warp, is of one state, and a change of state has nothing to stop.
+inline bool goes_on(const Frame& frame, Mark mark) {
+  return mark == Mark::end_of_frame || frame.clear_of(mark) != nullptr;
+}
 
 }  // namespace vrpipe

@@ -1,5 +1,7 @@
 #include <deque>
 
+#include "tc/tc.h"
+
 #include <vrpipe/timed.h>
 
 namespace vrpipe {
@@ -11,14 +13,15 @@ namespace {
 class TimedTc : public TimedUnit {
  public:
   TimedTc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour,
-          const RenderState& state, Transport transport)
+          const RenderContext& context, Transport transport)
       : TimedUnit(name, domain, TcWork::kinds(behaviour->cost()), transport),
         out_(*this, "out_bins"),
         in_(*this, "in_quads", [this](const QuadBeat& beat, Span visible) { return collect(beat, visible.first); },
             {&out_}),
         behaviour_(std::move(behaviour)),
+        frame_(*context.frame),
         cost_(behaviour_->cost()),
-        idle_timeout_cycles_(cost_.timeout_in(state.termination)),
+        idle_timeout_cycles_(cost_.timeout_in(context.termination)),
         entries_(cost_.quads_per_cycle),
         sent_at_(cost_.flush_queue_bins, 0) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
@@ -32,7 +35,7 @@ class TimedTc : public TimedUnit {
 
   Cycle collect(const QuadBeat& beat, Cycle visible) {
     flush_idle(visible);
-    if (beat.end_of_draw) return drain(visible);
+    if (beat.mark != Mark::none) return drain(beat.mark, visible);
     charge(UnitState::starved, visible);
     Cycle at = visible;
     for (unsigned from = 0; from < beat.count;) {
@@ -103,16 +106,17 @@ class TimedTc : public TimedUnit {
     }
   }
 
-  Cycle drain(Cycle visible) {
+  Cycle drain(Mark mark, Cycle visible) {
     Cycle at = visible + 1;
     while (behaviour_->flush_oldest(Reason::end_of_draw, next_storage().flush)) {
       at = std::max(at, place_free_at());
       send(at++);
     }
     holds_quads_ = false;
-    BinItem end;
-    end.end_of_draw = true;
-    out_.send(end, std::max({at, sent_ + 1, out_.last() + 1}));
+    if (!goes_on(frame_, mark)) return visible;
+    BinItem item;
+    item.mark = mark;
+    out_.send(item, std::max({at, sent_ + 1, out_.last() + 1}));
     return visible;
   }
 
@@ -124,6 +128,7 @@ class TimedTc : public TimedUnit {
   TimedOut<BinItem> out_;
   TimedIn<QuadBeat> in_;
   std::unique_ptr<TcBehaviour> behaviour_;
+  const Frame& frame_;
   const TcBehaviour::Cost cost_;
   const std::uint32_t idle_timeout_cycles_;  ///< 0: never
   std::deque<BinStorage> storage_ = std::deque<BinStorage>(1);
@@ -140,8 +145,8 @@ class TimedTc : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("tc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                     const RenderState& state, unsigned, Transport transport) {
-    return std::make_unique<TimedTc>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)), state,
+                                     const RenderContext& context, unsigned, Transport transport) {
+    return std::make_unique<TimedTc>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)), context,
                                      transport);
   });
   return true;

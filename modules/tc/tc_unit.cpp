@@ -1,5 +1,7 @@
 #include <deque>
 
+#include "tc/tc.h"
+
 #include <vrpipe/unit.h>
 
 namespace vrpipe {
@@ -11,18 +13,19 @@ namespace {
 class TcUnit : public Unit {
  public:
   TcUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour,
-         const RenderState& state)
+         const RenderContext& context)
       : Unit(name, domain, TcWork::kinds(behaviour->cost())),
         in_(*this, "in_quads"),
         out_(*this, "out_bins"),
         behaviour_(std::move(behaviour)),
+        frame_(*context.frame),
         cost_(behaviour_->cost()),
-        idle_timeout_cycles_(cost_.timeout_in(state.termination)),
+        idle_timeout_cycles_(cost_.timeout_in(context.termination)),
         queue_(cost_.flush_queue_bins) {
     out_.set_pipeline(cost_.latency_cycles - 1, 1);
   }
 
-  bool idle() const override { return in_.empty() && queued_ == 0 && !ending_ && !holds_quads_; }
+  bool idle() const override { return in_.empty() && queued_ == 0 && mark_ == Mark::none && !holds_quads_; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -32,10 +35,10 @@ class TcUnit : public Unit {
 
   bool collect(Cycle now) {
     bool moved = false;
-    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && !ending_ && in_.ready() && has_room();) {
+    for (unsigned budget = cost_.quads_per_cycle; budget > 0 && mark_ == Mark::none && in_.ready() && has_room();) {
       const QuadBeat& beat = in_.front();
-      if (beat.end_of_draw) {
-        ending_ = true;
+      if (beat.mark != Mark::none) {
+        mark_ = beat.mark;
         in_.pop();
         return true;
       }
@@ -65,7 +68,7 @@ class TcUnit : public Unit {
 
   bool flush_idle_or_ending(Cycle now) {
     if (!has_room()) return false;
-    if (ending_ && !drained_) {
+    if (mark_ != Mark::none && !drained_) {
       if (behaviour_->flush_oldest(TcBehaviour::FlushReason::end_of_draw, next_place())) {
         ++queued_;
       } else {
@@ -74,7 +77,7 @@ class TcUnit : public Unit {
       }
       return true;
     }
-    if (!ending_ && holds_quads_ && timeout_due() <= now) {
+    if (mark_ == Mark::none && holds_quads_ && timeout_due() <= now) {
       if (behaviour_->flush_oldest(TcBehaviour::FlushReason::timed_out, next_place())) {
         ++queued_;
       } else {
@@ -89,20 +92,21 @@ class TcUnit : public Unit {
     return idle_timeout_cycles_ == 0 || !holds_quads_ ? never : last_arrival_ + idle_timeout_cycles_;
   }
 
-  [[gnu::noinline]] void pass_end_of_draw() {
-    QuadBeat end;
-    end.end_of_draw = true;
-    out_.push(end);
-    ending_ = false;
+  /// Once all bins before the mark have gone; false while there is no room for it.
+  [[gnu::noinline]] bool pass_mark() {
+    if (goes_on(frame_, mark_)) {
+      if (out_.credits() == 0) return false;
+      QuadBeat beat;
+      beat.mark = mark_;
+      out_.push(beat);
+    }
+    mark_ = Mark::none;
     drained_ = false;
+    return true;
   }
 
   bool send(Cycle now) {
-    if (queued_ == 0) {
-      if (!drained_ || out_.credits() == 0) return false;
-      pass_end_of_draw();
-      return true;
-    }
+    if (queued_ == 0) return drained_ && pass_mark();
     if (out_.credits() == 0) return false;
     const Flush& flush = queue_[first_];
     QuadBeat beat;
@@ -132,7 +136,7 @@ class TcUnit : public Unit {
     }
     if (queued_ > 0 || drained_) {
       enter(UnitState::blocked, now);
-      return has_room() ? std::min(in_.next_ready(), timeout_due()) : never;
+      return has_room() && mark_ == Mark::none ? std::min(in_.next_ready(), timeout_due()) : never;
     }
     enter(UnitState::starved, now);
     return std::min(in_.next_ready(), timeout_due());
@@ -141,6 +145,7 @@ class TcUnit : public Unit {
   StreamIn<QuadBeat> in_;
   StreamOut<QuadBeat> out_;
   std::unique_ptr<TcBehaviour> behaviour_;
+  const Frame& frame_;
   const TcBehaviour::Cost cost_;
   const std::uint32_t idle_timeout_cycles_;  ///< 0: never
   std::vector<Flush> queue_;                 ///< flushed bins, a ring
@@ -149,15 +154,15 @@ class TcUnit : public Unit {
   unsigned sent_ = 0;  ///< quads of the first bin
   unsigned from_ = 0;  ///< quads taken of the beat at the head
   bool holds_quads_ = false;
-  bool ending_ = false;
-  bool drained_ = false;
+  Mark mark_ = Mark::none;  ///< that has arrived
+  bool drained_ = false;    ///< and all bins before it are flushed
   Cycle last_arrival_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("tc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                               const RenderState& state, unsigned) {
-    return std::make_unique<TcUnit>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)), state);
+                               const RenderContext& context, unsigned) {
+    return std::make_unique<TcUnit>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

@@ -1,3 +1,5 @@
+#include "tc/tc.h"
+
 #include <vrpipe/occupancy.h>
 #include <vrpipe/untimed.h>
 
@@ -8,8 +10,9 @@ namespace {
 /// TC without time: no time-out. Ports as in tc_timed.cpp.
 class UntimedTc : public UntimedUnit {
  public:
-  UntimedTc(const std::string& name, std::unique_ptr<TcBehaviour> behaviour)
+  UntimedTc(const std::string& name, std::unique_ptr<TcBehaviour> behaviour, const RenderContext& context)
       : UntimedUnit(name),
+        frame_(*context.frame),
         out_(*this, "out_bins"),
         in_(input<QuadBeat>("in_quads", [this](const QuadBeat& beat) { collect(beat); })),
         behaviour_(std::move(behaviour)) {}
@@ -18,7 +21,7 @@ class UntimedTc : public UntimedUnit {
 
  private:
   void collect(const QuadBeat& beat) {
-    if (beat.end_of_draw) return drain();
+    if (beat.mark != Mark::none) return drain(beat.mark);
     did(TcWork::quads, beat.count);
     for (unsigned from = 0; from < beat.count;) {
       bool flushed = false;
@@ -27,11 +30,12 @@ class UntimedTc : public UntimedUnit {
     }
   }
 
-  void drain() {
+  void drain(Mark mark) {
     while (behaviour_->flush_oldest(TcBehaviour::FlushReason::end_of_draw, storage_.flush)) send();
-    BinItem end;
-    end.end_of_draw = true;
-    out_.send(end);
+    if (!goes_on(frame_, mark)) return;
+    BinItem item;
+    item.mark = mark;
+    out_.send(item);
   }
 
   void send() {
@@ -43,6 +47,7 @@ class UntimedTc : public UntimedUnit {
     out_.send(item);
   }
 
+  const Frame& frame_;
   UntimedOut<BinItem> out_;
   std::unique_ptr<UntimedIn<QuadBeat>> in_;
   std::unique_ptr<TcBehaviour> behaviour_;
@@ -51,8 +56,8 @@ class UntimedTc : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("tc", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                       const RenderState&, unsigned) {
-    return std::make_unique<UntimedTc>(name, behaviour_as<TcBehaviour>(std::move(behaviour)));
+                                       const RenderContext& context, unsigned) {
+    return std::make_unique<UntimedTc>(name, behaviour_as<TcBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

@@ -6,18 +6,18 @@
 
 namespace vrpipe {
 
-TileGridCoalescing::TileGridCoalescing(const Parameters& parameters, const RenderState& state)
-    : state_(state),
+TileGridCoalescing::TileGridCoalescing(const Parameters& parameters, const RenderContext& context)
+    : context_(context),
       bins_limit_(parameters.bins),
       bin_primitives_(parameters.bin_primitives),
       grid_pixels_(static_cast<std::int32_t>(parameters.grid_tiles * screen_tile_pixels)),
-      grids_x_((state.draw->width + static_cast<std::uint32_t>(grid_pixels_) - 1) /
+      grids_x_((context.frame->width() + static_cast<std::uint32_t>(grid_pixels_) - 1) /
                static_cast<std::uint32_t>(grid_pixels_)),
       entries_per_cycle_(parameters.entries_per_cycle),
       latency_cycles_(parameters.latency_cycles),
       bins_(bins_limit_) {
-  const std::uint32_t grids_y =
-      (state.draw->height + static_cast<std::uint32_t>(grid_pixels_) - 1) / static_cast<std::uint32_t>(grid_pixels_);
+  const std::uint32_t grids_y = (context.frame->height() + static_cast<std::uint32_t>(grid_pixels_) - 1) /
+                                static_cast<std::uint32_t>(grid_pixels_);
   bin_of_grid_.assign(std::size_t{grids_x_} * grids_y, -1);
   for (std::uint32_t bin = bins_limit_; bin-- > 0;) {
     bins_[bin].primitives.reserve(bin_primitives_);
@@ -46,15 +46,14 @@ bool TileGridCoalescing::owns_tile_of_grid(std::uint32_t grid_x, std::uint32_t g
   const auto tiles = static_cast<std::uint32_t>(grid_pixels_) / screen_tile_pixels;
   for (std::uint32_t y = grid_y * tiles; y < (grid_y + 1) * tiles; ++y) {
     for (std::uint32_t x = grid_x * tiles; x < (grid_x + 1) * tiles; ++x) {
-      if (owner_of({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, state_.gpcs) == state_.gpc)
-        return true;
+      if (context_.placement.owns({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)})) return true;
     }
   }
   return false;
 }
 
 void TileGridCoalescing::skip_foreign_grids() {
-  if (state_.gpcs == 1) return;
+  if (context_.placement.gpcs == 1) return;
   while (entering() && !owns_tile_of_grid(static_cast<std::uint32_t>(grid_x_), static_cast<std::uint32_t>(grid_y_))) {
     advance();
   }
@@ -117,7 +116,7 @@ std::uint64_t TileGridCoalescing::storage_bytes() const {
   return (pointer_bytes * vertices * bin_primitives_ + grid_id_bytes) * bins_limit_;
 }
 
-TgcPassThrough::TgcPassThrough(const Parameters&, const RenderState&) {}
+TgcPassThrough::TgcPassThrough(const Parameters&, const RenderContext&) {}
 
 void TgcPassThrough::begin(const Primitive& primitive) {
   primitive_ = primitive;

@@ -39,7 +39,7 @@ class TileGridCoalescing : public TgcBehaviour {
                            source::open,
                            "from the flush decision to the first primitive at the rasteriser"};
   };
-  TileGridCoalescing(const Parameters& parameters, const RenderState& state);
+  TileGridCoalescing(const Parameters& parameters, const RenderContext& context);
 
   void begin(const Primitive& primitive) override;
   bool entering() const override { return grid_y_ < grid_y_end_; }
@@ -64,7 +64,7 @@ class TileGridCoalescing : public TgcBehaviour {
   void skip_foreign_grids();
   void advance();
 
-  const RenderState& state_;
+  const RenderContext& context_;
   const std::uint32_t bins_limit_;
   const std::uint32_t bin_primitives_;
   const std::int32_t grid_pixels_;
@@ -89,7 +89,7 @@ class TileGridCoalescing : public TgcBehaviour {
 class TgcPassThrough : public TgcBehaviour {
  public:
   struct Parameters : ParameterSet {};
-  TgcPassThrough(const Parameters&, const RenderState& state);
+  TgcPassThrough(const Parameters&, const RenderContext& context);
 
   void begin(const Primitive& primitive) override;
   bool entering() const override { return pending_; }

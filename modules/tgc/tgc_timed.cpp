@@ -13,7 +13,7 @@ class TimedTgc : public TimedUnit {
         out_(*this, "out_jobs"),
         in_(*this, "in_primitives",
             [this](const PrimitiveItem& item, Span visible) {
-              return item.end_of_draw ? drain(visible.first) : enter_bins(item, visible.first);
+              return item.mark != Mark::none ? drain(item.mark, visible.first) : enter_bins(item, visible.first);
             },
             {&out_}),
         behaviour_(std::move(behaviour)),
@@ -60,13 +60,13 @@ class TimedTgc : public TimedUnit {
     read_ = at;
   }
 
-  Cycle drain(Cycle visible) {
+  Cycle drain(Mark mark, Cycle visible) {
     const Cycle left = entries_.take(visible);
     entries_.hold(left + 1);
     while (behaviour_->drain(flush_)) read_out(entries_.take(left));
-    RasterJob end;
-    end.end_of_draw = true;
-    out_.send(end, std::max(read_, left + 1));
+    RasterJob job;
+    job.mark = mark;
+    out_.send(job, std::max(read_, left + 1));
     return left;
   }
 
@@ -81,7 +81,7 @@ class TimedTgc : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("tgc", [](const std::string& name, ClockDomain& domain,
-                                      std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
+                                      std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned,
                                       Transport transport) {
     return std::make_unique<TimedTgc>(name.c_str(), domain, behaviour_as<TgcBehaviour>(std::move(behaviour)),
                                       transport);

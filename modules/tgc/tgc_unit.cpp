@@ -18,7 +18,7 @@ class TgcUnit : public Unit {
   }
 
   bool idle() const override {
-    return in_.empty() && !behaviour_->entering() && !reading_out() && !waiting_ && !ending_;
+    return in_.empty() && !behaviour_->entering() && !reading_out() && !waiting_ && mark_ == Mark::none;
   }
   Behaviour& behaviour() override { return *behaviour_; }
 
@@ -30,9 +30,9 @@ class TgcUnit : public Unit {
     bool moved = false;
     for (unsigned budget = cost_.items_per_cycle; budget > 0 && !waiting_; --budget) {
       if (!behaviour_->entering()) {
-        if (ending_ || !in_.ready()) break;
-        if (in_.front().end_of_draw) {
-          ending_ = true;
+        if (mark_ != Mark::none || !in_.ready()) break;
+        if (in_.front().mark != Mark::none) {
+          mark_ = in_.front().mark;
         } else {
           behaviour_->begin(in_.front().primitive);
         }
@@ -45,7 +45,7 @@ class TgcUnit : public Unit {
         moved = true;
       }
     }
-    if (ending_ && !drained_ && !waiting_ && !behaviour_->entering()) {
+    if (mark_ != Mark::none && !drained_ && !waiting_ && !behaviour_->entering()) {
       waiting_ = behaviour_->drain(next_);
       drained_ = !waiting_;
       moved = true;
@@ -53,19 +53,19 @@ class TgcUnit : public Unit {
     return moved;
   }
 
-  /// Hands on one primitive, or the end of the draw; true when something moved.
+  /// Hands on one primitive, or a mark; true when something moved.
   bool read_out(Cycle now) {
     if (!reading_out() && waiting_) {
       std::swap(current_, next_);
       at_ = 0;
       waiting_ = false;
     }
-    const bool end = drained_ && !reading_out();
-    if (!(reading_out() || end) || out_.credits() == 0) return false;
+    const bool marks = drained_ && !reading_out();
+    if (!(reading_out() || marks) || out_.credits() == 0) return false;
     RasterJob job;
-    job.end_of_draw = end;
-    if (end) {
-      ending_ = false;
+    if (marks) {
+      job.mark = mark_;
+      mark_ = Mark::none;
       drained_ = false;
     } else {
       job.primitive = current_.primitives[at_++];
@@ -96,13 +96,13 @@ class TgcUnit : public Unit {
   TgcBehaviour::Flush next_;     ///< flushed and waiting for the read-out, if `waiting_`
   std::size_t at_ = 0;
   bool waiting_ = false;
-  bool ending_ = false;   ///< the end of the draw has arrived
-  bool drained_ = false;  ///< and all bins are flushed
+  Mark mark_ = Mark::none;  ///< that has arrived
+  bool drained_ = false;    ///< and all bins before it are flushed
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("tgc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                const RenderState&, unsigned) {
+                                const RenderContext&, unsigned) {
     return std::make_unique<TgcUnit>(name.c_str(), domain, behaviour_as<TgcBehaviour>(std::move(behaviour)));
   });
   return true;

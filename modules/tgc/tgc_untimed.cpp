@@ -18,7 +18,7 @@ class UntimedTgc : public UntimedUnit {
 
  private:
   void enter_bins(const PrimitiveItem& item) {
-    if (item.end_of_draw) return drain();
+    if (item.mark != Mark::none) return drain(item.mark);
     behaviour_->begin(item.primitive);
     while (behaviour_->entering()) {
       did(TgcWork::entries, 1);
@@ -26,11 +26,11 @@ class UntimedTgc : public UntimedUnit {
     }
   }
 
-  void drain() {
+  void drain(Mark mark) {
     while (behaviour_->drain(flush_)) read_out();
-    RasterJob end;
-    end.end_of_draw = true;
-    out_.send(end);
+    RasterJob job;
+    job.mark = mark;
+    out_.send(job);
   }
 
   void read_out() {
@@ -51,7 +51,7 @@ class UntimedTgc : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("tgc", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                        const RenderState&, unsigned) {
+                                        const RenderContext&, unsigned) {
     return std::make_unique<UntimedTgc>(name, behaviour_as<TgcBehaviour>(std::move(behaviour)));
   });
   return true;

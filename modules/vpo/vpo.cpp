@@ -29,21 +29,24 @@ std::uint64_t determinant(const Splat& splat) {
 
 }  // namespace
 
-PrimitiveAssembly::PrimitiveAssembly(const Parameters& parameters, const RenderState& state)
-    : state_(state), triangles_per_cycle_(parameters.triangles_per_cycle), latency_cycles_(parameters.latency_cycles) {}
+PrimitiveAssembly::PrimitiveAssembly(const Parameters& parameters, const RenderContext& context)
+    : context_(context),
+      triangles_per_cycle_(parameters.triangles_per_cycle),
+      latency_cycles_(parameters.latency_cycles) {}
 
-unsigned PrimitiveAssembly::assemble(std::uint32_t splat, std::array<Primitive, 2>& out) {
-  const Splat& given = state_.draw->splats[splat];
+unsigned PrimitiveAssembly::assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) {
+  const DrawCall& call = context_.draw(draw);
+  const Splat& given = call.splat(splat);
   if (!is_finite(given)) {
     ++dropped_not_finite;
     return 0;
   }
   // A splat at opacity 1/255 has no extent by design, and triangles of their own have no axes.
-  if (given.r > 0 && state_.draw->triangles.empty()) smallest_determinant.see(determinant(given));
+  if (given.r > 0 && call.geometry->triangles.empty()) smallest_determinant.see(determinant(given));
   unsigned count = 0;
-  for (unsigned triangle = 0; triangle < triangles_per_splat(*state_.draw); ++triangle) {
+  for (unsigned triangle = 0; triangle < triangles_per_splat(*call.geometry); ++triangle) {
     SnappedTriangle snapped;
-    if (!snap_triangle(state_, splat, triangle, snapped)) {
+    if (!snap_triangle(context_, draw, splat, triangle, snapped)) {
       ++dropped_not_finite;
       return 0;
     }
@@ -51,17 +54,19 @@ unsigned PrimitiveAssembly::assemble(std::uint32_t splat, std::array<Primitive, 
       ++culled_zero_area;
       continue;
     }
-    const PixelRect bounds = covered_bounds(snapped, state_.subpixel_bits, state_.draw->width, state_.draw->height);
+    const PixelRect bounds =
+        covered_bounds(snapped, context_.precision.subpixel_bits, context_.frame->width(), context_.frame->height());
     if (bounds.empty()) {
       ++culled_outside;
       continue;
     }
     out[count].splat = splat;
     out[count].triangle = static_cast<std::uint8_t>(triangle);
+    out[count].draw = draw;
     out[count].bounds = bounds;
     ++count;
-    ++primitives;
   }
+  primitives.add(draw, count);
   return count;
 }
 

@@ -26,9 +26,9 @@ class PrimitiveAssembly : public VpoBehaviour {
                            "Emerald: bounding box 4 cycles; ATTILA: clipper 6 cycles",
                            "from the last vertex to the primitive at the GPC"};
   };
-  PrimitiveAssembly(const Parameters& parameters, const RenderState& state);
+  PrimitiveAssembly(const Parameters& parameters, const RenderContext& context);
 
-  unsigned assemble(std::uint32_t splat, std::array<Primitive, 2>& out) override;
+  unsigned assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) override;
   Throughput cost() const override { return {triangles_per_cycle_, latency_cycles_}; }
 
   Counter culled_zero_area{*this, "culled_zero_area", "triangles", "without area after snapping"};
@@ -40,7 +40,7 @@ class PrimitiveAssembly : public VpoBehaviour {
                                "dilation leaves 300000 or more, 0 is a splat without area"};
 
  private:
-  const RenderState& state_;
+  const RenderContext& context_;
   const std::uint32_t triangles_per_cycle_;
   const std::uint32_t latency_cycles_;
 };

@@ -35,7 +35,7 @@ class TimedVpo : public TimedUnit {
   Cycle send(const PrimitiveItem& item, Cycle at) {
     Cycle taken = at;
     for (unsigned gpc = 0; gpc < gpcs_; ++gpc) {
-      if (item.end_of_draw || concerns(item.primitive, gpcs_, gpc))
+      if (item.mark != Mark::none || concerns(item.primitive, gpcs_, gpc))
         taken = std::max(taken, outs_[gpc]->send(item, at).first);
     }
     return taken;
@@ -47,21 +47,21 @@ class TimedVpo : public TimedUnit {
       lane_.hold(out->last());
       charge(UnitState::blocked, out->last());
     }
-    if (warp.end_of_draw) {
+    if (warp.mark != Mark::none) {
       // The GPCs' ends follow one another; the first stands for all, since no warp comes after it.
       const Cycle at = lane_.take(visible);
       if (!ended_) {
-        PrimitiveItem end;
-        end.end_of_draw = true;
-        send(end, at);
-        ended_ = true;
+        PrimitiveItem mark;
+        mark.mark = warp.mark;
+        send(mark, at);
+        ended_ = warp.mark == Mark::end_of_frame;
       }
       return at;
     }
     Cycle left = never;
     for (std::uint32_t splat = warp.first_splat; splat < warp.first_splat + warp.splats; ++splat) {
       std::array<Primitive, 2> primitives;
-      const unsigned count = behaviour_->assemble(splat, primitives);
+      const unsigned count = behaviour_->assemble(warp.draw, splat, primitives);
       // Culled triangles take their turn as well.
       for (unsigned i = 0; i < std::max(count, 1U); ++i) {
         const Cycle at = lane_.take(visible);
@@ -93,7 +93,7 @@ class TimedVpo : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("vpo", [](const std::string& name, ClockDomain& domain,
-                                      std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned gpcs,
+                                      std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned gpcs,
                                       Transport transport) {
     return std::make_unique<TimedVpo>(name.c_str(), domain, behaviour_as<VpoBehaviour>(std::move(behaviour)), gpcs,
                                       transport);

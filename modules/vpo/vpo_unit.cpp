@@ -37,7 +37,7 @@ class VpoUnit : public Unit {
     return true;
   }
   bool wanted(const PrimitiveItem& item, unsigned gpc) const {
-    return item.end_of_draw || concerns(item.primitive, gpcs_, gpc);
+    return item.mark != Mark::none || concerns(item.primitive, gpcs_, gpc);
   }
 
   Cycle tick(Cycle now) override {
@@ -60,7 +60,7 @@ class VpoUnit : public Unit {
       if (splat_ < last_splat_) {
         // Culled triangles take their turn as well.
         at_ = 0;
-        count_ = behaviour_->assemble(splat_++, primitives_);
+        count_ = behaviour_->assemble(draw_, splat_++, primitives_);
         if (count_ == 0) {
           --budget;
           did(VpoWork::triangles, 1, now);
@@ -74,16 +74,16 @@ class VpoUnit : public Unit {
         return moved ? now + 1 : in.next_ready();
       }
       const VertexWarp warp = in.front();
-      if (warp.end_of_draw) {
+      if (warp.mark != Mark::none) {
         // The GPCs' ends follow one another; the first stands for all, since no warp comes after it.
         if (!ended_) {
-          PrimitiveItem end;
-          end.end_of_draw = true;
-          if (!send(end)) {
+          PrimitiveItem mark;
+          mark.mark = warp.mark;
+          if (!send(mark)) {
             enter(UnitState::blocked, now);
             return never;
           }
-          ended_ = true;
+          ended_ = warp.mark == Mark::end_of_frame;
         }
         in.pop();
         turn_ = (turn_ + 1) % gpcs_;
@@ -91,6 +91,7 @@ class VpoUnit : public Unit {
       }
       in.pop();
       turn_ = (turn_ + 1) % gpcs_;
+      draw_ = warp.draw;
       splat_ = warp.first_splat;
       last_splat_ = warp.first_splat + warp.splats;
     }
@@ -106,6 +107,7 @@ class VpoUnit : public Unit {
   std::array<Primitive, 2> primitives_;
   unsigned at_ = 0;
   unsigned count_ = 0;
+  DrawIndex draw_ = 0;
   std::uint32_t splat_ = 0;
   std::uint32_t last_splat_ = 0;
   unsigned turn_ = 0;
@@ -114,7 +116,7 @@ class VpoUnit : public Unit {
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("vpo", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                const RenderState&, unsigned gpcs) {
+                                const RenderContext&, unsigned gpcs) {
     return std::make_unique<VpoUnit>(name.c_str(), domain, behaviour_as<VpoBehaviour>(std::move(behaviour)), gpcs);
   });
   return true;

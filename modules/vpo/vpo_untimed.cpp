@@ -25,17 +25,17 @@ class UntimedVpo : public UntimedUnit {
  private:
   void assemble(const VertexWarp& warp) {
     PrimitiveItem item;
-    if (warp.end_of_draw) {
-      // One for each GPC; no warp comes after the first.
-      item.end_of_draw = true;
-      if (ends_++ == 0) {
-        for (const auto& out : outs_) out->send(item);
-      }
+    if (warp.mark != Mark::none) {
+      // One end for each GPC; no warp comes after the first.
+      if (ended_) return;
+      ended_ = warp.mark == Mark::end_of_frame;
+      item.mark = warp.mark;
+      for (const auto& out : outs_) out->send(item);
       return;
     }
     for (std::uint32_t splat = warp.first_splat; splat < warp.first_splat + warp.splats; ++splat) {
       std::array<Primitive, 2> primitives;
-      const unsigned count = behaviour_->assemble(splat, primitives);
+      const unsigned count = behaviour_->assemble(warp.draw, splat, primitives);
       did(VpoWork::triangles, std::max(count, 1U));  // culled ones take their turn as well
       for (unsigned i = 0; i < count; ++i) {
         item.primitive = primitives[i];
@@ -50,12 +50,12 @@ class UntimedVpo : public UntimedUnit {
   const unsigned gpcs_;
   std::vector<std::unique_ptr<UntimedOut<PrimitiveItem>>> outs_;
   std::vector<std::unique_ptr<UntimedIn<VertexWarp>>> ins_;
-  unsigned ends_ = 0;
+  bool ended_ = false;
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("vpo", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                        const RenderState&, unsigned gpcs) {
+                                        const RenderContext&, unsigned gpcs) {
     return std::make_unique<UntimedVpo>(name, behaviour_as<VpoBehaviour>(std::move(behaviour)), gpcs);
   });
   return true;

@@ -31,22 +31,26 @@ class DepthStencilRop : public ZropBehaviour {
         source::open,
         "termination updates, each a read-modify-write of the z-cache; such a cycle tests nothing"};
   };
-  DepthStencilRop(const Parameters& parameters, const RenderState& state);
+  DepthStencilRop(const Parameters& parameters, const RenderContext& context);
 
   void test(QuadBeat& beat) override;
   void update(const TerminationSignal& signal) override;
+  void pass(Mark mark) override;
   void follow(FunctionalRunAhead& run_ahead) override { run_ahead_ = &run_ahead; }
   Cost cost() const override { return cost_; }
 
+  Counter updates_void{*this, "updates_void", "signals",
+                       "received after a clear of what they were for; they take time"};
+
  private:
   void mark(const TerminationSignal& signal) {
-    std::uint8_t& bits = terminated_[grid_.place(signal.tile, signal.position)];
+    std::uint8_t& bits = surface_->terminated(surface_->grid().place(signal.tile, signal.position));
     bits = static_cast<std::uint8_t>(bits | signal.pixels);
   }
 
+  const RenderContext& context_;
   const Cost cost_;
-  const TileGrid grid_;
-  std::vector<std::uint8_t> terminated_;  ///< the stencil MSBs of a quad position's four pixels
+  std::uint16_t epoch_ = 0;  ///< clears of termination so far
   FunctionalRunAhead* run_ahead_ = nullptr;
   std::vector<TerminationSignal> ahead_;  ///< of the bin under test
 };

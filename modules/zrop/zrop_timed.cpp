@@ -51,8 +51,12 @@ class TimedZrop : public TimedUnit {
     BinItem item = incoming;
     tests_.hold(out_.last());
     charge(UnitState::blocked, out_.last());
-    if (item.end_of_draw) {
+    if (item.mark != Mark::none) {
       const Cycle at = tests_.take(visible.first);
+      if (item.mark != Mark::end_of_frame) {
+        while (!pending_.empty() && pending_.front().at <= at) apply_update();
+      }
+      behaviour_->pass(item.mark);
       const Cycle taken = out_.send(item, at).first;
       tests_.hold(taken);
       return {at, taken};
@@ -76,7 +80,7 @@ class TimedZrop : public TimedUnit {
       port_free_at_ = at + (tested_quads + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
       did(ZropWork::tests, tested_quads, at, port_free_at_);
       behaviour_->test(beat);
-      if (beat.count < tested_quads) draw_lasts(at + cost_.latency_cycles);
+      if (beat.count < tested_quads) frame_lasts(at + cost_.latency_cycles);
       tested.first = std::min(tested.first, at);
       tested.last = at;
       // A part without survivors goes no further, but for the mark that closes the bin.
@@ -131,7 +135,7 @@ class TimedZrop : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("zrop", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
+                                       std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned,
                                        Transport transport) {
     return std::make_unique<TimedZrop>(name.c_str(), domain, behaviour_as<ZropBehaviour>(std::move(behaviour)),
                                        transport);

@@ -52,11 +52,15 @@ class ZropUnit : public Unit {
       tested_until_ = now + (width + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
       did(ZropWork::tests, beat.count, now, tested_until_);
       const unsigned tested = beat.count;
-      behaviour_->test(beat);
-      if (beat.count < tested) draw_lasts(now + cost_.latency_cycles);
+      if (beat.mark == Mark::none) {
+        behaviour_->test(beat);
+      } else {
+        behaviour_->pass(beat.mark);
+      }
+      if (beat.count < tested) frame_lasts(now + cost_.latency_cycles);
       moved = true;
       // A beat without survivors goes no further, but for the mark that closes a bin.
-      if (beat.count > 0 || beat.last_of_bin || beat.end_of_draw) out_.push(beat);
+      if (beat.count > 0 || beat.last_of_bin || beat.mark != Mark::none) out_.push(beat);
       limit_.take(width);
     }
     if (moved) free_at_ = limit_.next(now);
@@ -93,7 +97,7 @@ class ZropUnit : public Unit {
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("zrop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                 const RenderState&, unsigned) {
+                                 const RenderContext&, unsigned) {
     return std::make_unique<ZropUnit>(name.c_str(), domain, behaviour_as<ZropBehaviour>(std::move(behaviour)));
   });
   return true;

@@ -25,7 +25,10 @@ class UntimedZrop : public UntimedUnit {
 
  private:
   void test(const BinItem& incoming) {
-    if (incoming.end_of_draw) return out_.send(incoming);
+    if (incoming.mark != Mark::none) {
+      behaviour_->pass(incoming.mark);
+      return out_.send(incoming);
+    }
     BinItem item = incoming;
     std::vector<Quad>& quads = item.storage->flush.quads;
     did(ZropWork::tests, item.quads);
@@ -52,7 +55,7 @@ class UntimedZrop : public UntimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("zrop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                         const RenderState&, unsigned) {
+                                         const RenderContext&, unsigned) {
     return std::make_unique<UntimedZrop>(name, behaviour_as<ZropBehaviour>(std::move(behaviour)));
   });
   return true;

@@ -24,15 +24,17 @@ using testing::color_of;
 
 class ColorRopTest : public ::testing::Test {
  protected:
-  ColorRopTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) { state.early_termination = true; }
+  ColorRopTest() : draw(testing::draw_of(64, 64)), context(testing::context_of(draw)) {
+    testing::terminate_early(context);
+  }
 
   void make(const std::vector<std::pair<std::string, std::string>>& settings = {}) {
     const Implementation& implementation = Registry::instance().find("crop", "color-rop");
     const std::unique_ptr<ParameterSet> parameters = implementation.make_parameters();
     for (const auto& [name, value] : settings) parameters->set("crop", name, value);
-    behaviour = implementation.make_behaviour(*parameters, state);
+    behaviour = implementation.make_behaviour(*parameters, context);
     crop = dynamic_cast<CropBehaviour*>(behaviour.get());
-    surface = std::make_unique<ColorSurface>(draw.width, draw.height, state.format);
+    surface = std::make_unique<ColorSurface>(draw.width, draw.height, context.format);
     crop->attach(*surface);
   }
   std::uint64_t count(const std::string& name) const {
@@ -43,13 +45,13 @@ class ColorRopTest : public ::testing::Test {
     return 0;
   }
   LaneMask blend(float alpha, LaneMask live = all_lanes, unsigned position = 0, float grey = 1) {
-    return crop->blend(position, live, color_of(alpha * grey, alpha * grey, alpha * grey, alpha)).terminated;
+    return crop->blend(0, position, live, color_of(alpha * grey, alpha * grey, alpha * grey, alpha)).terminated;
   }
   void set_alpha(float alpha) { surface->quad({0, 0}, 0).alpha = splat_lanes(alpha); }
   float alpha(unsigned lane = 0) const { return surface->quad({0, 0}, 0).alpha[lane]; }
 
   Draw draw;
-  RenderState state;
+  RenderContext context;
   std::unique_ptr<Behaviour> behaviour;
   CropBehaviour* crop = nullptr;
   std::unique_ptr<ColorSurface> surface;
@@ -100,13 +102,13 @@ TEST_F(ColorRopTest, PixelsThatTerminateTogetherAreOneSignal) {
 TEST_F(ColorRopTest, AMergedQuadThatTerminatesItsPixelsSignalsOnce) {
   make();
   const QuadColor merged = blend_front_to_back(color_of(0, 0, 0, 0.99F), color_of(0, 0, 0, 0.99F));
-  EXPECT_EQ(crop->blend(0, all_lanes, merged).terminated, all_lanes);
+  EXPECT_EQ(crop->blend(0, 0, all_lanes, merged).terminated, all_lanes);
   EXPECT_EQ(count("termination_signals"), 1U);
   EXPECT_EQ(half_bits(alpha()), 0x3C00);
 }
 
 TEST_F(ColorRopTest, WithoutEarlyTerminationNothingIsSignalled) {
-  state.early_termination = false;
+  testing::terminate_early(context, false);
   make();
   for (unsigned i = 0; i < 5; ++i) EXPECT_EQ(blend(0.99F), 0);
 }
@@ -114,12 +116,12 @@ TEST_F(ColorRopTest, WithoutEarlyTerminationNothingIsSignalled) {
 // case B03
 TEST_F(ColorRopTest, TheThresholdIsPassedAtTheFirstStoredAlphaNotBelowIt) {
   const auto passes = [&](ColorFormat format, bool inclusive, float stored) {
-    state.format = format;
-    state.termination_inclusive = inclusive;
+    context.format = format;
+    testing::change_state(context, [&](DrawState& drawn) { drawn.termination_inclusive = inclusive; });
     make();
     QuadColor fragment{};
     fragment.alpha = splat_lanes(stored);
-    return crop->blend(0, all_lanes, fragment).terminated != 0;
+    return crop->blend(0, 0, all_lanes, fragment).terminated != 0;
   };
   for (const bool inclusive : {true, false}) {
     EXPECT_TRUE(passes(ColorFormat::rgba16f, inclusive, half_value(0x3BF8)));
@@ -134,8 +136,8 @@ TEST_F(ColorRopTest, TheThresholdIsPassedAtTheFirstStoredAlphaNotBelowIt) {
 
 // case M11
 TEST_F(ColorRopTest, AcrossTheThresholdAPairDiffersFromItsPartsByTheMissingTransmittanceAtMost) {
-  state.format = ColorFormat::rgba32f;
-  state.termination = Termination::strict;
+  context.format = ColorFormat::rgba32f;
+  context.termination = Termination::strict;
   make();
   set_alpha(0.995F);
   blend(0.5F);
@@ -145,24 +147,24 @@ TEST_F(ColorRopTest, AcrossTheThresholdAPairDiffersFromItsPartsByTheMissingTrans
   make();
   set_alpha(0.995F);
   const QuadColor pair = blend_front_to_back(color_of(0.5F, 0, 0, 0.5F), color_of(0.5F, 0, 0, 0.5F));
-  crop->blend(0, all_lanes, pair);
+  crop->blend(0, 0, all_lanes, pair);
   EXPECT_NEAR(static_cast<double>(alpha()), 0.99875, 1e-6);
   EXPECT_LE(alpha() - unmerged, 0.004F);
 }
 
 TEST_F(ColorRopTest, StrictlyAFragmentOfATerminatedPixelIsDropped) {
-  state.termination = Termination::strict;
+  context.termination = Termination::strict;
   make();
   blend(0.99F, 0b0011);
   blend(0.9F, 0b0011);
   const float before = alpha(0);
-  const CropBehaviour::Outcome part = crop->blend(0, 0b0110, color_of(0.5F, 0.5F, 0.5F, 0.5F));
+  const CropBehaviour::Outcome part = crop->blend(0, 0, 0b0110, color_of(0.5F, 0.5F, 0.5F, 0.5F));
   EXPECT_TRUE(part.changed);
   EXPECT_EQ(alpha(1), before);
   EXPECT_EQ(alpha(2), 0.5F);
   EXPECT_EQ(count("fragments_dropped_late"), 1U);
   EXPECT_EQ(count("quads_dropped_late"), 0U);
-  const CropBehaviour::Outcome all = crop->blend(0, 0b0001, color_of(0.5F, 0.5F, 0.5F, 0.5F));
+  const CropBehaviour::Outcome all = crop->blend(0, 0, 0b0001, color_of(0.5F, 0.5F, 0.5F, 0.5F));
   EXPECT_FALSE(all.changed);
   EXPECT_EQ(count("fragments_dropped_late"), 2U);
   EXPECT_EQ(count("quads_dropped_late"), 1U);
@@ -181,23 +183,23 @@ TEST_F(ColorRopTest, InPaperTerminationALateFragmentStillBlendsByWhatIsLeftAtMos
 
 TEST_F(ColorRopTest, TellsWhetherAValueChanged) {
   make();
-  EXPECT_TRUE(crop->blend(0, all_lanes, color_of(0.5F, 0, 0, 0.5F)).changed);
-  EXPECT_FALSE(crop->blend(0, all_lanes, color_of(0, 0, 0, 0)).changed);
+  EXPECT_TRUE(crop->blend(0, 0, all_lanes, color_of(0.5F, 0, 0, 0.5F)).changed);
+  EXPECT_FALSE(crop->blend(0, 0, all_lanes, color_of(0, 0, 0, 0)).changed);
   set_alpha(1.0F);
-  EXPECT_FALSE(crop->blend(0, all_lanes, color_of(0.5F, 0.5F, 0.5F, 0.5F)).changed);
+  EXPECT_FALSE(crop->blend(0, 0, all_lanes, color_of(0.5F, 0.5F, 0.5F, 0.5F)).changed);
 }
 
 // case B10
 TEST_F(ColorRopTest, AThousandQuadsOnOnePositionAreTheSequentialResult) {
   for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
-    state.format = format;
+    context.format = format;
     make();
     QuadColor expected{};
     const BlendFunction reference = blend_function(format, BlendRounding::rne);
     for (std::uint64_t i = 0; i < 1000; ++i) {
       const float a = testing::uniform(9, i, 0.001F, 0.02F);
       const QuadColor fragment = color_of(a * 0.3F, a * 0.9F, a, a);
-      crop->blend(surface->grid().place({1, 1}, 7), all_lanes, fragment);
+      crop->blend(0, surface->grid().place({1, 1}, 7), all_lanes, fragment);
       expected = reference(expected, fragment);
     }
     EXPECT_EQ(std::memcmp(&surface->quad({1, 1}, 7), &expected, sizeof expected), 0) << name_of(format);
@@ -236,7 +238,7 @@ TEST_F(ColorRopTest, QuadsOfAWarpAreBlendedAsOneByOne) {
       } else {
         for (unsigned i = from; i < warp.count; ++i) {
           const std::size_t place = surface->grid().place(warp.tile, warp.position[i]);
-          outcomes[i] = crop->blend(place, warp.live[i], warp.color[i]);
+          outcomes[i] = crop->blend(0, place, warp.live[i], warp.color[i]);
         }
       }
       for (const CropBehaviour::Outcome outcome : outcomes) {
@@ -250,8 +252,8 @@ TEST_F(ColorRopTest, QuadsOfAWarpAreBlendedAsOneByOne) {
   };
   for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
     for (const Termination termination : {Termination::paper, Termination::strict}) {
-      state.format = format;
-      state.termination = termination;
+      context.format = format;
+      context.termination = termination;
       const Result alone = blend_warps(false);
       const Result together = blend_warps(true);
       EXPECT_EQ(std::memcmp(alone.image.data(), together.image.data(), 4 * sizeof(QuadColor)), 0) << name_of(format);
@@ -268,7 +270,7 @@ TEST_F(ColorRopTest, QuadsPerCycleFollowTheFormat) {
                                                        {ColorFormat::rgba16f, 2},
                                                        {ColorFormat::rgba32f, 1}};
   for (const auto& [format, quads] : expected) {
-    state.format = format;
+    context.format = format;
     make();
     EXPECT_EQ(crop->cost().blend_rate, (Rate{quads, 1}));
   }
@@ -556,7 +558,7 @@ TEST_F(ColorRopTest, ShapesThatMakeNoCacheAreRefusedWhenTheUnitIsMade) {
   refused({{"sector_bytes", "256"}}, "crop.sector_bytes, crop.line_bytes");
   refused({{"line_bytes", "1024"}, {"sector_bytes", "16"}}, "crop.line_bytes, crop.sector_bytes");
   make({{"line_bytes", "32"}});
-  state.format = ColorFormat::rgba32f;
+  context.format = ColorFormat::rgba32f;
   refused({{"line_bytes", "32"}}, "crop.line_bytes, --format");
 }
 

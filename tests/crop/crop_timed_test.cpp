@@ -15,12 +15,12 @@ using testkit::Source;
 struct CropBench {
   /// `latency`: of a fill, in cycles, at least 2. `depth`: of less than eight, since deeper queues are served up to so many
   /// cycles late at `at`, and the first access goes through the memory's socket, which knows no past.
-  CropBench(Fidelity fidelity, const RenderState& state, const Bench::Settings& settings = {}, unsigned latency = 100,
-            unsigned depth = 7, unsigned signal_depth = 64)
-      : bench(fidelity, "crop", "color-rop", state, settings),
+  CropBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {},
+            unsigned latency = 100, unsigned depth = 7, unsigned signal_depth = 64)
+      : bench(fidelity, "crop", "color-rop", context, settings),
         memory("memory", bench.clock(), latency - 1, 4096, 1),  // the last cycle moves the bytes
         signals(bench.sink<TerminationBeat>("out_terminations", signal_depth)),
-        width(static_cast<unsigned>(64 / (4 * bytes_per_pixel(state.format)))) {
+        width(static_cast<unsigned>(64 / (4 * bytes_per_pixel(context.format)))) {
     bench.bind_memory(memory.port(0));
     if (fidelity == Fidelity::cycle) {
       beats = &bench.source<ColorBeat>("in_color", depth);
@@ -38,7 +38,7 @@ struct CropBench {
       ++taken;
       warp->tile = tile;
       warp->count = 0;
-      warp->end_of_draw = false;
+      warp->mark = Mark::none;
     }
     const unsigned i = warp->count++;
     warp->position[i] = static_cast<std::uint8_t>(position);
@@ -62,13 +62,13 @@ struct CropBench {
   /// The cycles of the draw, `never` if it did not end.
   Cycle run() {
     flush();
-    end_mark.end_of_draw = true;
+    end_mark.mark = Mark::end_of_frame;
     ColorBeat last;
-    last.end_of_draw = true;
+    last.mark = Mark::end_of_frame;
     if (items != nullptr) items->add({&end_mark});
     if (beats != nullptr) beats->add(last);
     bench.run();
-    return bench.unit().end_of_draw();
+    return bench.unit().end_of_frame();
   }
 
   Bench bench;
@@ -86,9 +86,9 @@ struct CropBench {
 
 class CropTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
-  CropTimedTest() : draw(testing::draw_of(1024, 1024)), state(testing::state_of(draw)) {}
+  CropTimedTest() : draw(testing::draw_of(1024, 1024)), context(testing::context_of(draw)) {}
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 INSTANTIATE_TEST_SUITE_P(Fidelities, CropTimedTest, ::testing::ValuesIn(testing::fidelities_with_time()),
@@ -99,19 +99,19 @@ TEST_P(CropTimedTest, ResidentQuadsBlendAtTheRateOfTheFormat) {
                                                       {ColorFormat::rgba16f, 2},
                                                       {ColorFormat::rgba32f, 1}};
   for (const auto& [format, rate] : formats) {
-    state.format = format;
-    CropBench crop(GetParam(), state, {{"latency_cycles", "8"}});
+    context.format = format;
+    CropBench crop(GetParam(), context, {{"latency_cycles", "8"}});
     for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i % 2 + 8 * (i / 2 % 2));
     for (unsigned i = 0; i < 400; ++i) crop.quad({0, 0}, i % 2 + 8 * (i / 2 % 2), 0.01F, 0b0110, 1000);
     // In hand and in the queue from 1001 on, blended from 1002 on; 8 cycles of latency behind the last.
     EXPECT_EQ(crop.run(), 1001 + 400 / rate + 8) << name_of(format);
     EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::blend), 408.0 / rate);
-    EXPECT_EQ(testing::charged(crop.bench.unit(), UnitState::busy, crop.bench.unit().end_of_draw()), 408 / rate);
+    EXPECT_EQ(testing::charged(crop.bench.unit(), UnitState::busy, crop.bench.unit().end_of_frame()), 408 / rate);
   }
 }
 
 TEST_P(CropTimedTest, AMissWaitsForTheMemoryAndAHitDoesNot) {
-  CropBench crop(GetParam(), state, {{"latency_cycles", "8"}, {"sectors_per_cycle", "8"}}, 100);
+  CropBench crop(GetParam(), context, {{"latency_cycles", "8"}, {"sectors_per_cycle", "8"}}, 100);
   crop.quad({0, 0}, 0);
   crop.flush();
   // In hand at 1, its sector asked for at 1, there at 101, blended then.
@@ -122,7 +122,7 @@ TEST_P(CropTimedTest, AMissWaitsForTheMemoryAndAHitDoesNot) {
 }
 
 TEST_P(CropTimedTest, FillsOfAWarpAndOfThoseBehindItOverlap) {
-  CropBench crop(GetParam(), state, {{"latency_cycles", "8"}, {"sectors_per_cycle", "8"}}, 100);
+  CropBench crop(GetParam(), context, {{"latency_cycles", "8"}, {"sectors_per_cycle", "8"}}, 100);
   for (unsigned i = 0; i < 64; ++i) crop.quad({0, 0}, i);
   // One latency, 32 cycles of blending and 8 of moving sectors. A warp is blended once the sectors of all its quads are
   // there, which it asks for in its last cycle.
@@ -134,14 +134,14 @@ TEST_P(CropTimedTest, FillsOfAWarpAndOfThoseBehindItOverlap) {
 }
 
 TEST_P(CropTimedTest, QuadsInTheSameSectorAskForItOnce) {
-  CropBench crop(GetParam(), state);
+  CropBench crop(GetParam(), context);
   for (unsigned i = 0; i < 20; ++i) crop.quad({0, 0}, 5);
   crop.run();
   EXPECT_EQ(crop.memory.bytes(), 32U);
 }
 
 TEST_P(CropTimedTest, MovingSectorsTakesCyclesFromBlending) {
-  CropBench crop(GetParam(), state, {{"sectors_per_cycle", "8"}, {"cache_bytes", "1048576"}}, 20);
+  CropBench crop(GetParam(), context, {{"sectors_per_cycle", "8"}, {"cache_bytes", "1048576"}}, 20);
   for (std::uint16_t tile = 0; tile < 64; ++tile) {
     for (unsigned i = 0; i < 64; ++i) crop.quad({tile, 0}, i);
   }
@@ -153,7 +153,7 @@ TEST_P(CropTimedTest, MovingSectorsTakesCyclesFromBlending) {
 
 TEST_P(CropTimedTest, NoMoreFillsAreInFlightThanItHasMissRegisters) {
   for (const unsigned mshrs : {1U, 2U, 4U, 8U}) {
-    CropBench crop(GetParam(), state, {{"mshrs", std::to_string(mshrs)}, {"latency_cycles", "8"}}, 100);
+    CropBench crop(GetParam(), context, {{"mshrs", std::to_string(mshrs)}, {"latency_cycles", "8"}}, 100);
     for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i);
     // A round of the memory for each so many sectors, each from the cycle in which the one before is complete; the first
     // begins in cycles 1 to 4 as the quads come, two a cycle.
@@ -166,7 +166,7 @@ TEST_P(CropTimedTest, NoMoreFillsAreInFlightThanItHasMissRegisters) {
 // case B10
 TEST_P(CropTimedTest, WithoutForwardingAQuadWaitsForTheOneBeforeAtItsPosition) {
   for (const bool forwarding : {true, false}) {
-    CropBench crop(GetParam(), state, {{"forwarding", forwarding ? "on" : "off"}, {"latency_cycles", "8"}});
+    CropBench crop(GetParam(), context, {{"forwarding", forwarding ? "on" : "off"}, {"latency_cycles", "8"}});
     crop.quad({0, 0}, 0);
     crop.flush();
     for (unsigned i = 0; i < 96; ++i) crop.quad({0, 0}, 0, 0.01F, all_lanes, 1000);
@@ -179,16 +179,16 @@ TEST_P(CropTimedTest, WithoutForwardingAQuadWaitsForTheOneBeforeAtItsPosition) {
 
 // case B10
 TEST_P(CropTimedTest, WithoutForwardingOtherPositionsDoNotWait) {
-  CropBench crop(GetParam(), state, {{"forwarding", "off"}, {"latency_cycles", "8"}});
+  CropBench crop(GetParam(), context, {{"forwarding", "off"}, {"latency_cycles", "8"}});
   for (unsigned i = 0; i < 64; ++i) crop.quad({0, 0}, i);
   for (unsigned i = 0; i < 256; ++i) crop.quad({0, 0}, i % 64, 0.01F, all_lanes, 1000);
   EXPECT_EQ(crop.run(), 1001U + 128 + 8);
 }
 
 TEST_P(CropTimedTest, ATerminationIsSeenTheLatencyAfterItsBlend) {
-  state.early_termination = true;
+  testing::terminate_early(context);
   for (const unsigned latency : {1U, 8U}) {
-    CropBench crop(GetParam(), state, {{"latency_cycles", std::to_string(latency)}});
+    CropBench crop(GetParam(), context, {{"latency_cycles", std::to_string(latency)}});
     crop.quad({2, 1}, 9, 0.5F);
     crop.flush();
     crop.quad({2, 1}, 9, 0.999F, 0b0101, 1000);
@@ -205,8 +205,8 @@ TEST_P(CropTimedTest, ATerminationIsSeenTheLatencyAfterItsBlend) {
 }
 
 TEST_P(CropTimedTest, TheSignalsOfAWarpComeNoLaterThanTheLatencyAfterItsLastBlend) {
-  state.early_termination = true;
-  CropBench crop(GetParam(), state, {{"latency_cycles", "8"}});
+  testing::terminate_early(context);
+  CropBench crop(GetParam(), context, {{"latency_cycles", "8"}});
   for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i, 0.5F);
   for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i, 0.999F, all_lanes, 1000);
   crop.run();
@@ -222,8 +222,8 @@ TEST_P(CropTimedTest, TheSignalsOfAWarpComeNoLaterThanTheLatencyAfterItsLastBlen
 }
 
 TEST_P(CropTimedTest, SignalsThatNobodyTakesStopTheBlending) {
-  state.early_termination = true;
-  CropBench crop(GetParam(), state, {{"latency_cycles", "1"}}, 2, 8, 1);
+  testing::terminate_early(context);
+  CropBench crop(GetParam(), context, {{"latency_cycles", "1"}}, 2, 8, 1);
   crop.signals.close(0, 500);
   for (unsigned i = 0; i < 8; ++i) {
     crop.quad({0, 0}, i, 0.999F);
@@ -233,18 +233,18 @@ TEST_P(CropTimedTest, SignalsThatNobodyTakesStopTheBlending) {
   std::size_t received = 0;
   for (const auto& record : crop.signals.records()) received += record.item.count;
   EXPECT_EQ(received, 8U);
-  EXPECT_GT(testing::charged(crop.bench.unit(), UnitState::blocked, crop.bench.unit().end_of_draw()), 400U);
+  EXPECT_GT(testing::charged(crop.bench.unit(), UnitState::blocked, crop.bench.unit().end_of_frame()), 400U);
 }
 
 // case T05
 TEST_P(CropTimedTest, AnEmptyDrawEndsWithItsMark) {
-  CropBench crop(GetParam(), state);
+  CropBench crop(GetParam(), context);
   EXPECT_EQ(crop.run(), 1U);
 }
 
 TEST_P(CropTimedTest, DirtySectorsAreWrittenBackWhenTheirLineGoesAndCleanOnesAreNot) {
   for (const bool changes : {true, false}) {
-    CropBench crop(GetParam(), state, {{"cache_bytes", "1024"}}, 10);  // 8 lines, 32 quads
+    CropBench crop(GetParam(), context, {{"cache_bytes", "1024"}}, 10);  // 8 lines, 32 quads
     for (std::uint16_t tile = 0; tile < 4; ++tile) {
       for (unsigned i = 0; i < 64; ++i) crop.quad({tile, 0}, i, changes ? 0.5F : 0.0F);
     }
@@ -257,7 +257,7 @@ TEST_P(CropTimedTest, DirtySectorsAreWrittenBackWhenTheirLineGoesAndCleanOnesAre
 TEST_P(CropTimedTest, ALineIsNotReplacedBeforeItsQuadsAreBlended) {
   // One line, memory of 100 cycles: every second warp needs another, and a fill can only begin once the quads before are
   // blended.
-  CropBench crop(GetParam(), state, {{"cache_bytes", "128"}, {"latency_cycles", "8"}}, 100);
+  CropBench crop(GetParam(), context, {{"cache_bytes", "128"}, {"latency_cycles", "8"}}, 100);
   for (std::uint16_t i = 0; i < 6; ++i) {
     crop.quad({static_cast<std::uint16_t>(i % 2), 0}, 0);
     crop.flush();
@@ -269,12 +269,12 @@ TEST_P(CropTimedTest, ALineIsNotReplacedBeforeItsQuadsAreBlended) {
 }
 
 TEST_P(CropTimedTest, ImageAndSignalsAreThoseOfCycleUnderAnyStallsAndMemory) {
-  state.early_termination = true;
-  state.termination = Termination::strict;
+  testing::terminate_early(context);
+  context.termination = Termination::strict;
   std::vector<float> expected;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     // What is to come out is what cycle makes of it undisturbed.
-    CropBench crop(seed == 0 ? Fidelity::cycle : GetParam(), state,
+    CropBench crop(seed == 0 ? Fidelity::cycle : GetParam(), context,
                    {{"cache_bytes", seed % 2 == 0 ? "1024" : "16384"},
                     {"mshrs", seed % 3 == 0 ? "2" : "16"},
                     {"input_quads", seed % 5 == 0 ? "1" : "64"}},

@@ -51,12 +51,12 @@ class CountingMemory : public sc_core::sc_module, private tlm::tlm_fw_transport_
 
 /// CROP with a source of quads and a memory around it.
 struct CropBench {
-  explicit CropBench(const RenderState& state, const Bench::Settings& settings = {}, unsigned latency = 146)
-      : bench("crop", "color-rop", state, settings),
+  explicit CropBench(const RenderContext& context, const Bench::Settings& settings = {}, unsigned latency = 146)
+      : bench("crop", "color-rop", context, settings),
         memory("counting_memory", bench.clock(), latency),
         color(bench.source<ColorBeat>("in_color", 8)),
         signals(bench.sink<TerminationBeat>("out_terminations", 64)),
-        width(static_cast<unsigned>(64 / (4 * bytes_per_pixel(state.format)))) {
+        width(static_cast<unsigned>(64 / (4 * bytes_per_pixel(context.format)))) {
     bench.bind_memory(memory.socket);
   }
 
@@ -80,14 +80,14 @@ struct CropBench {
   void end() {
     flush();
     ColorBeat last;
-    last.end_of_draw = true;
+    last.mark = Mark::end_of_frame;
     color.add(last);
   }
   /// The cycles of the draw, `never` if it did not end.
   Cycle run() {
     end();
     bench.run();
-    return bench.unit().end_of_draw();
+    return bench.unit().end_of_frame();
   }
 
   Bench bench;
@@ -102,20 +102,20 @@ struct CropBench {
 
 class CropUnitTest : public ::testing::Test {
  protected:
-  CropUnitTest() : draw(testing::draw_of(1024, 1024)), state(testing::state_of(draw)) {}
+  CropUnitTest() : draw(testing::draw_of(1024, 1024)), context(testing::context_of(draw)) {}
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 // The format decides how many quads of a resident line blend in a cycle.
 class CropRate : public CropUnitTest, public ::testing::WithParamInterface<std::pair<ColorFormat, unsigned>> {};
 
 TEST_P(CropRate, ResidentQuadsBlendAtExactlyTheRateOfTheFormat) {
-  state.format = GetParam().first;
+  context.format = GetParam().first;
   const unsigned rate = GetParam().second;
   for (const LaneMask live :
        {LaneMask{0b1111}, LaneMask{0b0001}, LaneMask{0b0110}}) {  // case Q07: partial quads cost as much
-    CropBench crop(state);
+    CropBench crop(context);
     for (unsigned i = 0; i < 4; ++i) crop.quad({0, 0}, i % 2 + 8 * (i / 2));
     crop.flush();
     for (unsigned i = 0; i < 400; ++i) crop.quad({0, 0}, i % 2 + 8 * (i / 2 % 2), 0.01F, live, 1000);
@@ -128,11 +128,11 @@ TEST_P(CropRate, ResidentQuadsBlendAtExactlyTheRateOfTheFormat) {
 TEST_F(CropUnitTest, BytesThatAreNoWholeQuadsBlendAtTheirRateExactly) {
   for (const unsigned bytes : {16U, 17U, 24U, 48U, 64U, 96U, 128U, 200U, 256U}) {
     for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
-      state.format = format;
+      context.format = format;
       const Rate rate = Rate::of_bytes(bytes, 4 * bytes_per_pixel(format));
       // All wait in the queue for the line of the first.
       const auto cycles = [&](unsigned quads) {
-        CropBench crop(state, {{"bytes_per_cycle", std::to_string(bytes)}, {"input_quads", "65536"}}, 40000);
+        CropBench crop(context, {{"bytes_per_cycle", std::to_string(bytes)}, {"input_quads", "65536"}}, 40000);
         for (unsigned i = 0; i < quads; ++i) crop.quad({0, 0}, 0);
         return crop.run();
       };
@@ -148,7 +148,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, CropRate,
                          [](const auto& format) { return std::string(name_of(format.param.first)); });
 
 TEST_F(CropUnitTest, AMissWaitsForTheMemoryAndAHitDoesNot) {
-  CropBench crop(state, {}, 100);
+  CropBench crop(context, {}, 100);
   crop.quad({0, 0}, 0);
   crop.flush();
   // In hand at 1, its sector asked for at 1, there at 101, blended then; the end is 8 cycles of latency later.
@@ -157,14 +157,14 @@ TEST_F(CropUnitTest, AMissWaitsForTheMemoryAndAHitDoesNot) {
 }
 
 TEST_F(CropUnitTest, MissesOverlap) {
-  CropBench crop(state, {}, 100);
+  CropBench crop(context, {}, 100);
   for (unsigned i = 0; i < 64; ++i) crop.quad({0, 0}, i);
   EXPECT_LT(crop.run(), 101U + 64 + 8) << "one latency, not 64";
   EXPECT_EQ(crop.memory.bytes_read, 64U * 32);
 }
 
 TEST_F(CropUnitTest, QuadsInTheSameSectorAskForItOnce) {
-  CropBench crop(state, {}, 100);
+  CropBench crop(context, {}, 100);
   for (unsigned i = 0; i < 20; ++i) crop.quad({0, 0}, 5);
   crop.run();
   EXPECT_EQ(crop.memory.bytes_read, 32U);
@@ -173,7 +173,7 @@ TEST_F(CropUnitTest, QuadsInTheSameSectorAskForItOnce) {
 std::uint64_t hits_on_their_way(CropBench& crop) { return crop.bench.unit().parts().at(0)->counters().at(0)->value(); }
 
 TEST_F(CropUnitTest, HitsOnASectorThatIsStillBeingFilledAreCountedApart) {
-  CropBench crop(state, {}, 100);
+  CropBench crop(context, {}, 100);
   for (unsigned i = 0; i < 20; ++i) crop.quad({0, 0}, 5);
   crop.flush();
   for (unsigned i = 0; i < 7; ++i) crop.quad({0, 0}, 5, 0.01F, all_lanes, 1000);
@@ -188,8 +188,8 @@ TEST_F(CropUnitTest, HitsOnASectorThatIsStillBeingFilledAreCountedApart) {
 
 TEST_F(CropUnitTest, TheCacheCountsWhatTheMemorySeesUnderAnyStalls) {
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    state.format = seed % 3 == 0 ? ColorFormat::rgba8 : seed % 3 == 1 ? ColorFormat::rgba16f : ColorFormat::rgba32f;
-    CropBench crop(state,
+    context.format = seed % 3 == 0 ? ColorFormat::rgba8 : seed % 3 == 1 ? ColorFormat::rgba16f : ColorFormat::rgba32f;
+    CropBench crop(context,
                    {{"cache_bytes", seed % 2 == 0 ? "512" : "4096"},
                     {"mshrs", seed % 4 == 0 ? "1" : "16"},
                     {"input_quads", seed % 5 == 0 ? "1" : "64"}},
@@ -201,7 +201,7 @@ TEST_F(CropUnitTest, TheCacheCountsWhatTheMemorySeesUnderAnyStalls) {
     crop.bench.stall_randomly(seed, 90);
     ASSERT_NE(crop.run(), never) << seed;
     const SectoredCacheStatistics& cache = crop.bench.behaviour<CropBehaviour>().cache_statistics;
-    const unsigned sectors_of_a_quad = state.format == ColorFormat::rgba32f ? 2 : 1;
+    const unsigned sectors_of_a_quad = context.format == ColorFormat::rgba32f ? 2 : 1;
     EXPECT_EQ(cache.line_accesses.value(), quads);
     EXPECT_EQ(cache.line_hits.value() + cache.line_misses.value(), quads);
     EXPECT_EQ(cache.sector_accesses.value(), quads * sectors_of_a_quad);
@@ -218,7 +218,7 @@ TEST_F(CropUnitTest, TheCacheCountsWhatTheMemorySeesUnderAnyStalls) {
 
 TEST_F(CropUnitTest, MovingSectorsTakesCyclesFromBlending) {
   // 4096 quads, each of its own sector: CROP cycles = quads / 2 + sectors / 8.
-  CropBench crop(state, {{"sectors_per_cycle", "8"}, {"cache_bytes", "1048576"}}, 20);
+  CropBench crop(context, {{"sectors_per_cycle", "8"}, {"cache_bytes", "1048576"}}, 20);
   for (std::uint16_t tile = 0; tile < 64; ++tile) {
     for (unsigned i = 0; i < 64; ++i) crop.quad({tile, 0}, i);
   }
@@ -229,12 +229,12 @@ TEST_F(CropUnitTest, MovingSectorsTakesCyclesFromBlending) {
 // case B10
 TEST_F(CropUnitTest, WithoutForwardingAQuadWaitsForTheOneBeforeAtItsPosition) {
   for (const bool forwarding : {true, false}) {
-    CropBench crop(state, {{"forwarding", forwarding ? "on" : "off"}, {"latency_cycles", "8"}});
+    CropBench crop(context, {{"forwarding", forwarding ? "on" : "off"}, {"latency_cycles", "8"}});
     crop.quad({0, 0}, 0);
     crop.flush();
     for (unsigned i = 0; i < 100; ++i) crop.quad({0, 0}, 0, 0.01F, all_lanes, 1000);
     EXPECT_EQ(crop.run(), forwarding ? 1001U + 50 + 8 : 1002U + 99 * 8 + 8);
-    crop.bench.unit().close_account(crop.bench.unit().end_of_draw());
+    crop.bench.unit().close_account(crop.bench.unit().end_of_frame());
     const std::uint64_t stalled = crop.bench.unit().account().cycles(UnitState::latency);
     EXPECT_EQ(stalled > 0, !forwarding);
   }
@@ -242,7 +242,7 @@ TEST_F(CropUnitTest, WithoutForwardingAQuadWaitsForTheOneBeforeAtItsPosition) {
 
 // case B10
 TEST_F(CropUnitTest, WithoutForwardingOtherPositionsDoNotWait) {
-  CropBench crop(state, {{"forwarding", "off"}, {"latency_cycles", "8"}});
+  CropBench crop(context, {{"forwarding", "off"}, {"latency_cycles", "8"}});
   for (unsigned i = 0; i < 64; ++i) crop.quad({0, 0}, i);
   for (unsigned i = 0; i < 256; ++i) crop.quad({0, 0}, i % 64, 0.01F, all_lanes, 1000);
   EXPECT_EQ(crop.run(), 1001U + 128 + 8);
@@ -252,7 +252,7 @@ TEST_F(CropUnitTest, WithoutForwardingOtherPositionsDoNotWait) {
 TEST_F(CropUnitTest, AHazardMakesNoDifferenceToTheImage) {
   Lanes alpha[2];
   for (const bool forwarding : {true, false}) {
-    CropBench crop(state, {{"forwarding", forwarding ? "on" : "off"}});
+    CropBench crop(context, {{"forwarding", forwarding ? "on" : "off"}});
     for (unsigned i = 0; i < 1000; ++i) crop.quad({0, 0}, 9, 0.003F + 0.00001F * static_cast<float>(i));
     crop.run();
     alpha[forwarding] = crop.bench.surface().quad({0, 0}, 9).alpha;
@@ -262,8 +262,8 @@ TEST_F(CropUnitTest, AHazardMakesNoDifferenceToTheImage) {
 }
 
 TEST_F(CropUnitTest, ATerminationIsSeenTheLatencyAfterItsBlend) {
-  state.early_termination = true;
-  CropBench crop(state, {{"latency_cycles", "8"}});
+  testing::terminate_early(context);
+  CropBench crop(context, {{"latency_cycles", "8"}});
   crop.quad({2, 1}, 9, 0.5F);
   crop.flush();
   crop.quad({2, 1}, 9, 0.999F, 0b0101, 1000);
@@ -279,8 +279,8 @@ TEST_F(CropUnitTest, ATerminationIsSeenTheLatencyAfterItsBlend) {
 }
 
 TEST_F(CropUnitTest, SignalsThatNobodyTakesStopTheBlending) {
-  state.early_termination = true;
-  Bench bench("crop", "color-rop", state, {{"latency_cycles", "1"}});
+  testing::terminate_early(context);
+  Bench bench("crop", "color-rop", context, {{"latency_cycles", "1"}});
   bench.set_memory(1, 4096);
   Source<ColorBeat>& color = bench.source<ColorBeat>("in_color", 64);
   Sink<TerminationBeat>& signals = bench.sink<TerminationBeat>("out_terminations", 1);
@@ -308,13 +308,13 @@ TEST_F(CropUnitTest, SignalsThatNobodyTakesStopTheBlending) {
 
 // case T05
 TEST_F(CropUnitTest, AnEmptyDrawEndsWithItsMark) {
-  CropBench crop(state);
+  CropBench crop(context);
   EXPECT_EQ(crop.run(), 1U);
 }
 
 TEST_F(CropUnitTest, DirtySectorsAreWrittenBackWhenTheirLineGoesAndCleanOnesAreNot) {
   for (const bool changes : {true, false}) {
-    CropBench crop(state, {{"cache_bytes", "1024"}}, 10);  // 8 lines, 32 quads
+    CropBench crop(context, {{"cache_bytes", "1024"}}, 10);  // 8 lines, 32 quads
     for (std::uint16_t tile = 0; tile < 4; ++tile) {
       for (unsigned i = 0; i < 64; ++i) crop.quad({tile, 0}, i, changes ? 0.5F : 0.0F);
     }
@@ -325,8 +325,9 @@ TEST_F(CropUnitTest, DirtySectorsAreWrittenBackWhenTheirLineGoesAndCleanOnesAreN
 }
 
 /// Rectangles of pixels drawn one after another, round after round; the bytes read beyond the first round's.
-std::uint64_t reads_beyond_compulsory(const RenderState& state, unsigned width, unsigned height, unsigned rectangles) {
-  CropBench crop(state, {}, 20);
+std::uint64_t reads_beyond_compulsory(const RenderContext& context, unsigned width, unsigned height,
+                                      unsigned rectangles) {
+  CropBench crop(context, {}, 20);
   // Rectangles follow one another in tile order: one to each 16x16 tile, the larger over several.
   const unsigned tiles_x = (width + 15) / 16;
   for (unsigned round = 0; round < 6; ++round) {
@@ -343,7 +344,7 @@ std::uint64_t reads_beyond_compulsory(const RenderState& state, unsigned width, 
     }
   }
   crop.run();
-  const std::uint64_t compulsory = std::uint64_t{width} * height * rectangles * bytes_per_pixel(state.format);
+  const std::uint64_t compulsory = std::uint64_t{width} * height * rectangles * bytes_per_pixel(context.format);
   EXPECT_GE(crop.memory.bytes_read, compulsory);
   return crop.memory.bytes_read - compulsory;
 }
@@ -357,10 +358,10 @@ class CropKnee : public CropUnitTest, public ::testing::WithParamInterface<KneeS
 
 TEST_P(CropKnee, ReadsStartAbove16KiloBytesWhateverTheShape) {
   const KneeShape& shape = GetParam();
-  state.format = shape.format;
+  context.format = shape.format;
   EXPECT_EQ(shape.width * shape.height * shape.rectangles * bytes_per_pixel(shape.format), 16384U);
-  EXPECT_EQ(reads_beyond_compulsory(state, shape.width, shape.height, shape.rectangles), 0U);
-  EXPECT_GT(reads_beyond_compulsory(state, shape.width, shape.height, shape.rectangles + 1), 0U);
+  EXPECT_EQ(reads_beyond_compulsory(context, shape.width, shape.height, shape.rectangles), 0U);
+  EXPECT_GT(reads_beyond_compulsory(context, shape.width, shape.height, shape.rectangles + 1), 0U);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -376,11 +377,11 @@ INSTANTIATE_TEST_SUITE_P(
     });
 
 TEST_F(CropUnitTest, ImageAndSignalsAreTheSameUnderAnyStallsAndMemory) {
-  state.early_termination = true;
-  state.termination = Termination::strict;
+  testing::terminate_early(context);
+  context.termination = Termination::strict;
   std::vector<float> expected;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    CropBench crop(state,
+    CropBench crop(context,
                    {{"cache_bytes", seed % 2 == 0 ? "1024" : "16384"},
                     {"mshrs", seed % 3 == 0 ? "2" : "16"},
                     {"input_quads", seed % 5 == 0 ? "1" : "64"}},
@@ -416,7 +417,7 @@ TEST_F(CropUnitTest, ImageAndSignalsAreTheSameUnderAnyStallsAndMemory) {
 }
 
 TEST_F(CropUnitTest, AMemoryOfAnotherMakeIsServedToTheEndWhateverItsRefresh) {
-  Bench bench("crop", "color-rop", state, {{"cache_bytes", "1024"}});
+  Bench bench("crop", "color-rop", context, {{"cache_bytes", "1024"}});
   foreign::Dram dram("dram", sc_core::sc_time(1.5, sc_core::SC_NS), sc_core::sc_time(30, sc_core::SC_NS),
                      sc_core::sc_time(75, sc_core::SC_NS));
   bench.bind_memory(dram.socket);
@@ -436,10 +437,10 @@ TEST_F(CropUnitTest, AMemoryOfAnotherMakeIsServedToTheEndWhateverItsRefresh) {
     color.add(beat);
   }
   ColorBeat last;
-  last.end_of_draw = true;
+  last.mark = Mark::end_of_frame;
   color.add(last);
   bench.run();
-  EXPECT_NE(bench.unit().end_of_draw(), never);
+  EXPECT_NE(bench.unit().end_of_frame(), never);
   EXPECT_EQ(bench.unit().occupancy().items(CropWork::blend), 2000U);
   EXPECT_GE(dram.requests, 2000U);
   EXPECT_EQ(dram.responses, dram.requests);
@@ -449,7 +450,7 @@ TEST_F(CropUnitTest, AMemoryOfAnotherMakeIsServedToTheEndWhateverItsRefresh) {
 
 #ifndef VRPIPE_SANITIZED  // by what loses sight of the stack when a coroutine of SystemC's has run before a throw
 TEST_F(CropUnitTest, ABenchNamesAMemoryThatFallsSilent) {
-  Bench bench("crop", "color-rop", state);
+  Bench bench("crop", "color-rop", context);
   foreign::Dram dram("dram", sc_core::sc_time(1.5, sc_core::SC_NS), sc_core::sc_time(30, sc_core::SC_NS),
                      sc_core::sc_time(75, sc_core::SC_NS));
   dram.fall_silent_after(0);

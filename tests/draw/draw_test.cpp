@@ -9,9 +9,9 @@ namespace {
 
 std::vector<VertexWarp> warps_of(std::uint32_t splats) {
   const Draw draw = testing::draw_of(16, 16, std::vector<Splat>(splats));
-  const RenderState state = testing::state_of(draw);
+  const RenderContext context = testing::context_of(draw);
   const VertexIssue::Parameters parameters;
-  VertexIssue issue(parameters, state);
+  VertexIssue issue(parameters, context);
   std::vector<VertexWarp> warps;
   for (VertexWarp warp; issue.next(warp);) warps.push_back(warp);
   EXPECT_EQ(issue.splats.value(), splats);
@@ -24,7 +24,7 @@ TEST(VertexIssue, EverySplatIsInOneWarpInOrder) {
     for (const VertexWarp& warp : warps_of(splats)) {
       EXPECT_EQ(warp.first_splat, next);
       EXPECT_GE(warp.splats, 1U);
-      EXPECT_FALSE(warp.end_of_draw);
+      EXPECT_FALSE(warp.mark == Mark::end_of_frame);
       next += warp.splats;
     }
     EXPECT_EQ(next, splats);

@@ -12,9 +12,9 @@ using testkit::Sink;
 
 class DrawTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
-  DrawTimedTest() : draw(testing::draw_of(16, 16, std::vector<Splat>(40))), state(testing::state_of(draw)) {}
+  DrawTimedTest() : draw(testing::draw_of(16, 16, std::vector<Splat>(40))), context(testing::context_of(draw)) {}
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 INSTANTIATE_TEST_SUITE_P(Fidelities, DrawTimedTest, ::testing::ValuesIn(testing::fidelities_with_time()),
@@ -22,7 +22,7 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, DrawTimedTest, ::testing::ValuesIn(testing:
 
 TEST_P(DrawTimedTest, WarpNGoesInCycle1024NOverItsRateAndTheEndAfterTheLast) {
   for (const unsigned rate : {1U, 88U, 256U, 300U, 1000U, 1024U}) {
-    Bench bench(GetParam(), "draw", "vertex-issue", state, {{"warps_per_1024_cycles", std::to_string(rate)}});
+    Bench bench(GetParam(), "draw", "vertex-issue", context, {{"warps_per_1024_cycles", std::to_string(rate)}});
     Sink<VertexWarp>& warps = bench.sink<VertexWarp>("out_vertices_0");
     bench.run();
     ASSERT_EQ(warps.records().size(), 6U);
@@ -31,14 +31,14 @@ TEST_P(DrawTimedTest, WarpNGoesInCycle1024NOverItsRateAndTheEndAfterTheLast) {
       EXPECT_EQ(warps.records()[i].item.first_splat, 8 * i);
       EXPECT_EQ(warps.records()[i].item.splats, 8U);
     }
-    EXPECT_TRUE(warps.records()[5].item.end_of_draw);
+    EXPECT_TRUE(warps.records()[5].item.mark == Mark::end_of_frame);
     EXPECT_EQ(warps.records()[5].cycle, warps.records()[4].cycle + 1);
     EXPECT_TRUE(bench.unit().idle());
   }
 }
 
 TEST_P(DrawTimedTest, AnIntervalIsBusyWithItsWarpAndLatencyAfterThat) {
-  Bench bench(GetParam(), "draw", "vertex-issue", state, {{"warps_per_1024_cycles", "256"}});
+  Bench bench(GetParam(), "draw", "vertex-issue", context, {{"warps_per_1024_cycles", "256"}});
   bench.sink<VertexWarp>("out_vertices_0");
   bench.run();
   EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), DrawWork::warps), 5 * 4) << "until the next could go";
@@ -50,16 +50,17 @@ TEST_P(DrawTimedTest, AnIntervalIsBusyWithItsWarpAndLatencyAfterThat) {
 // case Z01
 TEST_P(DrawTimedTest, AnEmptyDrawIsOnlyItsEnd) {
   draw.splats.clear();
-  Bench bench(GetParam(), "draw", "vertex-issue", state);
+  context = testing::context_of(draw);
+  Bench bench(GetParam(), "draw", "vertex-issue", context);
   Sink<VertexWarp>& warps = bench.sink<VertexWarp>("out_vertices_0");
   bench.run();
   ASSERT_EQ(warps.records().size(), 1U);
-  EXPECT_TRUE(warps.records()[0].item.end_of_draw);
+  EXPECT_TRUE(warps.records()[0].item.mark == Mark::end_of_frame);
   EXPECT_EQ(warps.records()[0].cycle, 1U);
 }
 
 TEST_P(DrawTimedTest, GpcsGetWarpsInTurnAndEachAnEnd) {
-  Bench bench(GetParam(), "draw", "vertex-issue", state, {{"warps_per_1024_cycles", "1024"}}, 3);
+  Bench bench(GetParam(), "draw", "vertex-issue", context, {{"warps_per_1024_cycles", "1024"}}, 3);
   const Sink<VertexWarp>* sinks[3];
   for (unsigned gpc = 0; gpc < 3; ++gpc) sinks[gpc] = &bench.sink<VertexWarp>("out_vertices_" + std::to_string(gpc));
   bench.run();
@@ -67,11 +68,11 @@ TEST_P(DrawTimedTest, GpcsGetWarpsInTurnAndEachAnEnd) {
   EXPECT_EQ(cycles_of(*sinks[0]), (std::vector<Cycle>{1, 4, 7}));
   EXPECT_EQ(cycles_of(*sinks[1]), (std::vector<Cycle>{2, 5, 8}));
   EXPECT_EQ(cycles_of(*sinks[2]), (std::vector<Cycle>{3, 6}));
-  for (const auto* sink : sinks) EXPECT_TRUE(sink->records().back().item.end_of_draw);
+  for (const auto* sink : sinks) EXPECT_TRUE(sink->records().back().item.mark == Mark::end_of_frame);
 }
 
 TEST_P(DrawTimedTest, AFullReceiverBlocksItUntilACycleAfterItTakes) {
-  Bench bench(GetParam(), "draw", "vertex-issue", state, {{"warps_per_1024_cycles", "1024"}});
+  Bench bench(GetParam(), "draw", "vertex-issue", context, {{"warps_per_1024_cycles", "1024"}});
   Sink<VertexWarp>& warps = bench.sink<VertexWarp>("out_vertices_0", 2);
   warps.close(0, 50);
   bench.run();
@@ -81,7 +82,7 @@ TEST_P(DrawTimedTest, AFullReceiverBlocksItUntilACycleAfterItTakes) {
 }
 
 TEST_P(DrawTimedTest, OneGpcThatTakesNothingHoldsUpTheOthers) {
-  Bench bench(GetParam(), "draw", "vertex-issue", state, {{"warps_per_1024_cycles", "1024"}}, 2);
+  Bench bench(GetParam(), "draw", "vertex-issue", context, {{"warps_per_1024_cycles", "1024"}}, 2);
   Sink<VertexWarp>& open = bench.sink<VertexWarp>("out_vertices_0", 8);
   Sink<VertexWarp>& closed = bench.sink<VertexWarp>("out_vertices_1", 1);
   closed.close(0, 100);
@@ -93,13 +94,13 @@ TEST_P(DrawTimedTest, OneGpcThatTakesNothingHoldsUpTheOthers) {
 
 TEST_P(DrawTimedTest, StallsLoseAndAddNothing) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    Bench bench(GetParam(), "draw", "vertex-issue", state, {{"warps_per_1024_cycles", "1024"}});
+    Bench bench(GetParam(), "draw", "vertex-issue", context, {{"warps_per_1024_cycles", "1024"}});
     Sink<VertexWarp>& warps = bench.sink<VertexWarp>("out_vertices_0", static_cast<unsigned>(1 + seed % 10));
     bench.stall_randomly(seed, 100);
     bench.run();
     ASSERT_EQ(warps.records().size(), 6U) << seed;
     for (std::size_t i = 0; i < 5; ++i) ASSERT_EQ(warps.records()[i].item.first_splat, 8 * i) << seed;
-    ASSERT_TRUE(warps.records()[5].item.end_of_draw) << seed;
+    ASSERT_TRUE(warps.records()[5].item.mark == Mark::end_of_frame) << seed;
     ASSERT_TRUE(bench.unit().idle()) << seed;
   }
 }

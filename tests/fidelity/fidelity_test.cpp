@@ -34,7 +34,7 @@ void expect_same_on_every_rung(RunRequest request, const Draw& draw) {
     request.fidelity = fidelity;
     const RunResult result = run(request, draw);
     EXPECT_EQ(result.counts.named(), functional.counts.named()) << what(request);
-    EXPECT_TRUE(same_image(result.surface, functional.surface)) << what(request);
+    EXPECT_TRUE(same_image(result.framebuffer.color, functional.framebuffer.color)) << what(request);
     ASSERT_TRUE(result.cycles.has_value()) << what(request);
     if (fidelity == Fidelity::bound) bound = *result.cycles;
     if (fidelity == Fidelity::cycle) {
@@ -142,7 +142,8 @@ TEST(Fidelity, RandomStallsChangeNothingButTime) {
         request.stall_per_256 = 96;
         const RunResult result = run(request, draw);
         EXPECT_EQ(result.counts.named(), functional.counts.named()) << what(request) << ", seed " << seed;
-        EXPECT_TRUE(same_image(result.surface, functional.surface)) << what(request) << ", seed " << seed;
+        EXPECT_TRUE(same_image(result.framebuffer.color, functional.framebuffer.color))
+            << what(request) << ", seed " << seed;
         EXPECT_GT(*result.cycles, unstalled) << what(request) << ", seed " << seed;
       }
     }

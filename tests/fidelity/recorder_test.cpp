@@ -21,9 +21,9 @@ using namespace testing;
 struct Seen {
   TileId tile;
   unsigned quads;
-  bool end_of_draw;
+  bool is_end;
   bool operator==(const Seen& other) const {
-    return tile == other.tile && quads == other.quads && end_of_draw == other.end_of_draw;
+    return tile == other.tile && quads == other.quads && is_end == other.is_end;
   }
 };
 
@@ -78,15 +78,15 @@ TEST(LinkObservers, SeeTheSameBinsAtEveryFidelityAndChangeNothing) {
       seen = seen_in<Beat>(
           beats, *recorded.cycles,
           [](const Beat& beat) {
-            return Seen{beat.item.tile, beat.item.count, beat.item.end_of_draw};
+            return Seen{beat.item.tile, beat.item.count, beat.item.mark == Mark::end_of_frame};
           },
-          [](const Beat& beat) { return beat.item.last_of_bin || beat.item.end_of_draw; });
+          [](const Beat& beat) { return beat.item.last_of_bin || beat.item.mark == Mark::end_of_frame; });
       reference = seen;
     } else {
       seen = seen_in<Bin>(
           bins, recorded.cycles.value_or(0),
           [](const Bin& bin) {
-            return Seen{bin.item.tile, bin.item.quads, bin.item.end_of_draw};
+            return Seen{bin.item.tile, bin.item.quads, bin.item.mark == Mark::end_of_frame};
           },
           [](const Bin&) { return true; });
     }

@@ -15,8 +15,8 @@ std::uint64_t sum(const StateAccount& account) {
   return total;
 }
 
-TEST(DrawEnd, IsTheLatestOfWhatIsKnown) {
-  DrawEnd end;
+TEST(FrameEnd, IsTheLatestOfWhatIsKnown) {
+  FrameEnd end;
   EXPECT_EQ(end.so_far(), 0u);
   end.not_before(12);
   end.not_before(7);
@@ -24,8 +24,8 @@ TEST(DrawEnd, IsTheLatestOfWhatIsKnown) {
 }
 
 TEST(StateAccount, AStateHoldsUntilTheNextIsEntered) {
-  const DrawEnd draw_end;
-  StateAccount account(draw_end);
+  const FrameEnd frame_end;
+  StateAccount account(frame_end);
   account.enter(UnitState::busy, 10);
   account.enter(UnitState::busy, 12);
   account.enter(UnitState::blocked, 15);
@@ -37,8 +37,8 @@ TEST(StateAccount, AStateHoldsUntilTheNextIsEntered) {
 }
 
 TEST(StateAccount, WhatLiesBeyondTheEndIsNotCharged) {
-  const DrawEnd draw_end;
-  StateAccount account(draw_end);
+  const FrameEnd frame_end;
+  StateAccount account(frame_end);
   account.enter(UnitState::busy, 10);
   account.enter(UnitState::memory, 20);
   account.enter(UnitState::busy, 30);
@@ -50,8 +50,8 @@ TEST(StateAccount, WhatLiesBeyondTheEndIsNotCharged) {
 }
 
 TEST(StateAccount, ADrawOfNoCyclesChargesNone) {
-  const DrawEnd draw_end;
-  StateAccount account(draw_end);
+  const FrameEnd frame_end;
+  StateAccount account(frame_end);
   account.enter(UnitState::busy, 5);
   account.enter(UnitState::starved, 8);
   account.close(0);
@@ -61,8 +61,8 @@ TEST(StateAccount, ADrawOfNoCyclesChargesNone) {
 /// Charges every cycle by itself.
 TEST(StateAccount, HoweverLongAUnitGoesOnAfterTheEndNothingOfItIsCharged) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
-    DrawEnd draw_end;
-    StateAccount account(draw_end);
+    FrameEnd frame_end;
+    StateAccount account(frame_end);
     std::vector<UnitState> states;  // by cycle
     UnitState state = UnitState::starved;
     const std::uint64_t changes = 100 + mix(seed) % 3000;
@@ -75,10 +75,10 @@ TEST(StateAccount, HoweverLongAUnitGoesOnAfterTheEndNothingOfItIsCharged) {
       states.insert(states.end(), mix(seed + i) % 5, state);
       if (i < changes / 2 && mix(i) % 3 == 0) {
         last_known = states.size() - std::min<Cycle>(states.size(), known_late);
-        draw_end.not_before(last_known);
+        frame_end.not_before(last_known);
       }
     }
-    const Cycle end = draw_end.so_far() + mix(seed) % 20;
+    const Cycle end = frame_end.so_far() + mix(seed) % 20;
     account.close(end);
     std::vector<std::uint64_t> expected(unit_states);
     for (Cycle cycle = 0; cycle < end; ++cycle) {
@@ -99,8 +99,8 @@ TEST(StateAccount, StatesHaveNames) {
 }
 
 TEST(WorkTally, CountsWhatIsDoneBeforeTheEnd) {
-  DrawEnd draw_end;
-  WorkTally tally(draw_end);
+  FrameEnd frame_end;
+  WorkTally tally(frame_end);
   tally.add(3, 4);
   tally.add(5, 9);
   tally.add(7, 10);
@@ -110,8 +110,8 @@ TEST(WorkTally, CountsWhatIsDoneBeforeTheEnd) {
 }
 
 TEST(WorkTally, WhatIsUnderWayAtTheEndCountsByItsShare) {
-  const DrawEnd draw_end;
-  WorkTally tally(draw_end);
+  const FrameEnd frame_end;
+  WorkTally tally(frame_end);
   tally.add(1, 100, 1100);
   EXPECT_DOUBLE_EQ(tally.items(350), 0.25);
   EXPECT_DOUBLE_EQ(tally.items(2000), 1);
@@ -119,15 +119,15 @@ TEST(WorkTally, WhatIsUnderWayAtTheEndCountsByItsShare) {
 
 TEST(WorkTally, CountsTheSameWheneverTheEndBecomesKnown) {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
-    DrawEnd draw_end;
-    WorkTally tally(draw_end);
+    FrameEnd frame_end;
+    WorkTally tally(frame_end);
     std::vector<std::uint64_t> done(3000);
     for (Cycle at = 0; at < done.size(); ++at) {
       done[at] = mix(seed ^ mix(at)) % 4;
       if (done[at] > 0) tally.add(done[at], at);
-      if (at < 1500 && mix(seed + at) % 7 == 0) draw_end.not_before(at - std::min<Cycle>(at, mix(at) % 300));
+      if (at < 1500 && mix(seed + at) % 7 == 0) frame_end.not_before(at - std::min<Cycle>(at, mix(at) % 300));
     }
-    const Cycle end = draw_end.so_far() + mix(seed) % 100;
+    const Cycle end = frame_end.so_far() + mix(seed) % 100;
     double expected = 0;
     for (Cycle at = 0; at < end; ++at) expected += static_cast<double>(done[at]);
     ASSERT_DOUBLE_EQ(tally.items(end), expected) << seed;

@@ -10,27 +10,27 @@
 namespace vrpipe {
 namespace {
 
+using testing::context_of;
 using testing::draw_of;
 using testing::flat_box;
-using testing::state_of;
 
 TEST(SnapTriangle, RoundsVerticesToTheSubpixelGrid) {
   Draw draw = draw_of(64, 64, {Splat{}});
   draw.triangles = {{{1.0F, 2.5F, 3.00390625F}, {0.0F, 1.001953125F, -7.25F}}};
-  const RenderState state = state_of(draw);
+  const RenderContext context = context_of(draw);
   SnappedTriangle t;
-  ASSERT_TRUE(snap_triangle(state, 0, 0, t));
+  ASSERT_TRUE(snap_triangle(context, 0, 0, 0, t));
   EXPECT_EQ(t.x, (std::array<std::int32_t, 3>{256, 640, 769}));
   EXPECT_EQ(t.y, (std::array<std::int32_t, 3>{0, 257, -1856})) << "half a step goes up";
 }
 
 TEST(SnapTriangle, TheTwoTrianglesOfABoxShareItsDiagonal) {
   const Draw draw = draw_of(64, 64, {testing::splat_at(20, 30, 5, 2, 0.7F, 0.8F)});
-  const RenderState state = state_of(draw);
+  const RenderContext context = context_of(draw);
   SnappedTriangle first;
   SnappedTriangle second;
-  ASSERT_TRUE(snap_triangle(state, 0, 0, first));
-  ASSERT_TRUE(snap_triangle(state, 0, 1, second));
+  ASSERT_TRUE(snap_triangle(context, 0, 0, 0, first));
+  ASSERT_TRUE(snap_triangle(context, 0, 0, 1, second));
   EXPECT_EQ(first.x[1], second.x[0]);
   EXPECT_EQ(first.y[1], second.y[0]);
   EXPECT_EQ(first.x[2], second.x[2]);
@@ -39,12 +39,12 @@ TEST(SnapTriangle, TheTwoTrianglesOfABoxShareItsDiagonal) {
 
 TEST(SnapTriangle, PaddingPushesTheCornersOutward) {
   const Draw draw = draw_of(64, 64, {flat_box(10, 10, 20, 20, 0.5F)});
-  RenderState state = state_of(draw);
+  RenderContext context = context_of(draw);
   SnappedTriangle padded;
   SnappedTriangle plain;
-  ASSERT_TRUE(snap_triangle(state, 0, 0, padded));
-  state.obb_padding = 0;
-  ASSERT_TRUE(snap_triangle(state, 0, 0, plain));
+  ASSERT_TRUE(snap_triangle(context, 0, 0, 0, padded));
+  testing::change_state(context, [&](DrawState& drawn) { drawn.obb_padding = 0; });
+  ASSERT_TRUE(snap_triangle(context, 0, 0, 0, plain));
   EXPECT_EQ(plain.x[0], 2560);
   EXPECT_EQ(padded.x[0], 2559);
 }
@@ -58,7 +58,7 @@ TEST(SnapTriangle, WhatIsNotFiniteHasNoVertices) {
       *fields[field] = bad;
       const Draw draw = draw_of(64, 64, {splat});
       SnappedTriangle t;
-      EXPECT_FALSE(snap_triangle(state_of(draw), 0, 0, t)) << bad << " in field " << field;
+      EXPECT_FALSE(snap_triangle(context_of(draw), 0, 0, 0, t)) << bad << " in field " << field;
     }
   }
 }
@@ -70,10 +70,10 @@ TEST(SnapTriangle, VerticesStayInTheGuardBandForBoxesOfAnySize) {
       const float c = std::cos(angle) * half;
       const float s = std::sin(angle) * half;
       const Draw draw = draw_of(64, 64, {Splat{32, 32, c, s, -s, c, 3, 0, 1, 1, 1, 1}});
-      const RenderState state = state_of(draw);
+      const RenderContext context = context_of(draw);
       for (unsigned triangle = 0; triangle < 2; ++triangle) {
         SnappedTriangle t;
-        ASSERT_TRUE(snap_triangle(state, 0, triangle, t)) << half << " " << angle;
+        ASSERT_TRUE(snap_triangle(context, 0, 0, triangle, t)) << half << " " << angle;
         for (unsigned i = 0; i < 3; ++i) {
           EXPECT_LE(std::abs(t.x[i]), 32768 * 256);
           EXPECT_LE(std::abs(t.y[i]), 32768 * 256);

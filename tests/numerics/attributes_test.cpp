@@ -30,7 +30,7 @@ TEST(Attributes, AScaleOf1e30CoversEveryPixelWithOneAlpha) {
     const RunResult result = simulate(untimed("baseline", ColorFormat::rgba32f), projected({huge}));
     const float expected = std::fmin(0.99F, static_cast<float>(sigmoid(static_cast<double>(logit))));
     for (std::uint32_t y = 0; y < 64; ++y) {
-      for (std::uint32_t x = 0; x < 64; ++x) ASSERT_NEAR(result.surface.pixel(x, y)[3], expected, 1e-7F);
+      for (std::uint32_t x = 0; x < 64; ++x) ASSERT_NEAR(result.framebuffer.color.pixel(x, y)[3], expected, 1e-7F);
     }
   }
 }
@@ -52,10 +52,11 @@ TEST(Attributes, DenormalsChangeNothingAndFlushingThemDoesNotEither) {
     zero.f_rest = {};
     const Draw draw = projected({g}, plain_camera(), 3);
     const RunResult normal = simulate(untimed(), draw);
-    EXPECT_TRUE(same_bits(simulate(untimed(), projected({zero}, plain_camera(), 3)).surface, normal.surface));
+    EXPECT_TRUE(same_bits(simulate(untimed(), projected({zero}, plain_camera(), 3)).framebuffer.color,
+                          normal.framebuffer.color));
     const FlushDenormals flushing;
     const RunResult flushed = simulate(untimed(), projected({g}, plain_camera(), 3));
-    EXPECT_TRUE(same_bits(normal.surface, flushed.surface));
+    EXPECT_TRUE(same_bits(normal.framebuffer.color, flushed.framebuffer.color));
     EXPECT_EQ(normal.counts.named(), flushed.counts.named());
   }
 }
@@ -66,7 +67,7 @@ TEST(Attributes, ADenormalColourOfBinary16SurvivesInItsTarget) {
   const auto red = [&] {
     return simulate(untimed("baseline", ColorFormat::rgba16f, {{"state", "exponential", "exact"}}),
                     draw_of(16, 16, {splat}))
-        .surface.pixel(8, 8)[0];
+        .framebuffer.color.pixel(8, 8)[0];
   };
   EXPECT_EQ(red(), 0x1p-24F);
   // Denormal in binary16, normal in single precision, in which it is computed.
@@ -129,7 +130,7 @@ TEST(Attributes, OpacitiesOutOfRangeAreClampedPrunedOrDropped) {
     return simulate(untimed("baseline", ColorFormat::rgba32f), draw_of(16, 16, {flat_box(4, 4, 8, 8, opacity)}));
   };
   for (const float opacity : {1.5F, 100.0F, 3e38F}) {
-    EXPECT_EQ(run(opacity).surface.pixel(5, 5)[3], 0.99F) << opacity;
+    EXPECT_EQ(run(opacity).framebuffer.color.pixel(5, 5)[3], 0.99F) << opacity;
   }
   for (const float opacity : {-0.0F, -1.0F, -3e38F, 1e-40F}) {
     const RunResult result = run(opacity);
@@ -152,7 +153,7 @@ TEST(Attributes, AnOpacityBeyondOneHasAPlateauOfTheCap) {
   const double plateau = static_cast<double>(sigma) * std::sqrt(2 * std::log(4 / 0.99));
   for (std::uint32_t x = 0; x < 64; ++x) {
     const double distance = std::hypot(x + 0.5 - 32, 0.5);
-    const float alpha = result.surface.pixel(x, 32)[3];
+    const float alpha = result.framebuffer.color.pixel(x, 32)[3];
     if (distance < plateau - 1e-3) {
       ASSERT_EQ(alpha, 0.99F) << x;
     }
@@ -170,7 +171,7 @@ TEST(Attributes, ColoursBeyondTheLargestHalfAreClampedAndCounted) {
       const RunResult result =
           simulate(untimed("baseline", ColorFormat::rgba16f, {{"state", "blend_rounding", rounding}}),
                    draw_of(16, 16, std::move(splats)));
-      const std::array<float, 4> pixel = result.surface.pixel(3, 3);
+      const std::array<float, 4> pixel = result.framebuffer.color.pixel(3, 3);
       EXPECT_LE(pixel[0], half_max);
       EXPECT_GT(pixel[0], 0.98F * half_max);
       EXPECT_GT(statistic(result, "sm.colors_clamped"), 0U);
@@ -189,12 +190,12 @@ TEST(Attributes, ColoursBeyondOneAreKeptByFloatTargetsAndClampedByUnorm) {
   const Splat splat = flat_box(0, 0, 8, 8, 0.5F, color[0], color[1], color[2]);
   const Draw draw = draw_of(16, 16, {splat, splat});
   const RunResult wide = simulate(untimed("baseline", ColorFormat::rgba32f), draw);
-  for (unsigned i = 0; i < 3; ++i) EXPECT_NEAR(wide.surface.pixel(3, 3)[i], 0.75F * color[i], 1e-6F);
-  EXPECT_EQ(wide.surface.pixel(3, 3)[3], 0.75F);
+  for (unsigned i = 0; i < 3; ++i) EXPECT_NEAR(wide.framebuffer.color.pixel(3, 3)[i], 0.75F * color[i], 1e-6F);
+  EXPECT_EQ(wide.framebuffer.color.pixel(3, 3)[3], 0.75F);
   const RunResult unorm = simulate(untimed("baseline", ColorFormat::rgba8), draw);
-  EXPECT_NEAR(unorm.surface.pixel(3, 3)[0], 0.80F, 1.0F / 255.0F);
-  EXPECT_EQ(unorm.surface.pixel(3, 3)[1], 1.0F);
-  EXPECT_EQ(unorm.surface.pixel(3, 3)[2], 1.0F);
+  EXPECT_NEAR(unorm.framebuffer.color.pixel(3, 3)[0], 0.80F, 1.0F / 255.0F);
+  EXPECT_EQ(unorm.framebuffer.color.pixel(3, 3)[1], 1.0F);
+  EXPECT_EQ(unorm.framebuffer.color.pixel(3, 3)[2], 1.0F);
   EXPECT_EQ(statistic(wide, "sm.colors_clamped"), 0U);
   EXPECT_GT(statistic(unorm, "crop.colors_saturated"), 0U);
 }

@@ -47,8 +47,8 @@ TEST(Environment, FlushingDenormalsChangesNoBitAndNoCount) {
     // A target of single precision holds denormals; they are the one thing that flushing takes.
     for (std::uint32_t y = 0; y < draw.height; ++y) {
       for (std::uint32_t x = 0; x < draw.width; ++x) {
-        const std::array<float, 4> p = plain.surface.pixel(x, y);
-        const std::array<float, 4> q = flushed.surface.pixel(x, y);
+        const std::array<float, 4> p = plain.framebuffer.color.pixel(x, y);
+        const std::array<float, 4> q = flushed.framebuffer.color.pixel(x, y);
         for (unsigned i = 0; i < 4; ++i) {
           if (request.format == ColorFormat::rgba32f && std::fpclassify(p[i]) != FP_NORMAL) continue;
           ASSERT_EQ(std::memcmp(&p[i], &q[i], sizeof p[i]), 0) << x << "," << y << " channel " << i;

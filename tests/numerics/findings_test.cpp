@@ -42,10 +42,10 @@ TEST(Findings, F3WhatAStuckAlphaLeaksStaysWithinTheRunningBound) {
   splats[0] = flat_box(-4, -4, 4, 4, 0.99F, 0, 0, 0);
   const Draw draw = draw_of(1, 1, std::move(splats));
   for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
-    RenderState state = state_of(draw);
-    state.format = format;
-    const OraclePixel exact = blend_exactly(fragments_of(state).at(0), state);
-    const std::array<float, 4> pixel = simulate(untimed("baseline", format), draw).surface.pixel(0, 0);
+    RenderContext context = context_of(draw);
+    context.format = format;
+    const OraclePixel exact = blend_exactly(fragments_of(context).at(0), context);
+    const std::array<float, 4> pixel = simulate(untimed("baseline", format), draw).framebuffer.color.pixel(0, 0);
     EXPECT_LE(std::fabs(static_cast<double>(pixel[0]) - exact.rgba[0]), exact.color_bound[0]);
     EXPECT_LE(exact.rgba[0], 0.0101);
     if (format == ColorFormat::rgba16f) {
@@ -63,14 +63,14 @@ TEST(Findings, F5WithoutPaddingSnappingLosesFragmentsAndWithItNone) {
                                  uniform(seed, 8 * i + 2, 0.55F, 6), uniform(seed, 8 * i + 3, 0.55F, 6),
                                  uniform(seed, 8 * i + 4, 0, 6), uniform(seed, 8 * i + 5, 0.01F, 1));
     const Draw draw = draw_of(64, 64, {splat});
-    RenderState state = state_of(draw);
+    RenderContext context = context_of(draw);
     // Far too much, so that nothing is lost: which fragments there are to lose.
-    state.subpixel_bits = 4;
-    state.obb_padding = 16;
-    const auto all = fragments_of(state);
+    context.precision.subpixel_bits = 4;
+    testing::change_state(context, [&](DrawState& drawn) { drawn.obb_padding = 16; });
+    const auto all = fragments_of(context);
     for (const bool padded : {false, true}) {
-      state.obb_padding = padded ? 0.75F : 0.0F;
-      const auto kept = fragments_of(state);
+      testing::change_state(context, [&](DrawState& drawn) { drawn.obb_padding = padded ? 0.75F : 0.0F; });
+      const auto kept = fragments_of(context);
       for (std::size_t pixel = 0; pixel < all.size(); ++pixel)
         lost[padded ? 1 : 0] += all[pixel].size() - kept[pixel].size();
     }
@@ -83,15 +83,15 @@ TEST(Findings, F5WithoutPaddingSnappingLosesFragmentsAndWithItNone) {
 
 TEST(Findings, F12MergingMakesLowPrecisionTargetsMoreAccurate) {
   const Draw draw = random_draw(96, 96, 1500, 12);
-  RenderState state = state_of(draw);
-  const auto fragments = fragments_of(state);
+  RenderContext context = context_of(draw);
+  const auto fragments = fragments_of(context);
   const auto squared_error = [&](const RunResult& result) {
     double sum = 0;
     for (std::uint32_t y = 0; y < 96; ++y) {
       for (std::uint32_t x = 0; x < 96; ++x) {
-        const OraclePixel exact = blend_exactly(fragments[std::size_t{y} * 96 + x], state);
+        const OraclePixel exact = blend_exactly(fragments[std::size_t{y} * 96 + x], context);
         for (unsigned i = 0; i < 3; ++i) {
-          sum += std::pow(static_cast<double>(result.surface.pixel(x, y)[i]) - exact.rgba[i], 2);
+          sum += std::pow(static_cast<double>(result.framebuffer.color.pixel(x, y)[i]) - exact.rgba[i], 2);
         }
       }
     }

@@ -47,9 +47,9 @@ TEST(Interval, WithPaddingEverySampleThatIsCertainlyVisibleIsBlended) {
                                  uniform(seed, 8 * i + 4, 0, 6), uniform(seed, 8 * i + 5, 0.005F, 1));
     const Draw draw = draw_of(64, 64, {splat});
     for (const unsigned bits : {4U, 8U, 12U}) {
-      RenderState state = state_of(draw);
-      state.subpixel_bits = bits;
-      const auto fragments = fragments_of(state);
+      RenderContext context = context_of(draw);
+      context.precision.subpixel_bits = bits;
+      const auto fragments = fragments_of(context);
       for (std::uint32_t y = 0; y < 64; ++y) {
         for (std::uint32_t x = 0; x < 64; ++x) {
           using I = Interval<double>;

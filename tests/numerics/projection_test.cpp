@@ -36,8 +36,8 @@ TEST(Needle, AlphaIsWithin1eMinus4OfFiftyDigits) {
     for (const float angle : {0.7853982F, 0.3F, 2.5F}) {
       const Splat splat = splat_at(40.3F, 21.7F, length, 0.5477F, angle, 0.95F);
       const Draw draw = draw_of(64, 64, {splat});
-      RenderState state = state_of(draw);
-      const auto fragments = fragments_of(state);
+      RenderContext context = context_of(draw);
+      const auto fragments = fragments_of(context);
       unsigned compared = 0;
       for (std::uint32_t y = 0; y < 64; ++y) {
         for (std::uint32_t x = 0; x < 64; ++x) {
@@ -67,7 +67,7 @@ TEST(Needle, TheExponentIsNeverAboveZero) {
     const Splat splat = splat_at(32 + 30 * any(random), 32 + 30 * any(random), length,
                                  0.3F * length * std::fabs(any(random)) + 1e-3F, 3 * any(random), 0.9F);
     const Draw draw = draw_of(64, 64, {splat});
-    for (const auto& list : fragments_of(state_of(draw))) {
+    for (const auto& list : fragments_of(context_of(draw))) {
       for (const OracleFragment& fragment : list) ASSERT_LE(fragment.alpha, 0.9F);
     }
   }
@@ -131,7 +131,8 @@ TEST(Projection, MirroredSplatsGiveTheMirroredImageBitForBit) {
     const RunResult b = simulate(untimed("baseline", format), mirrored);
     unsigned different = 0;
     for (std::uint32_t y = 0; y < 64; ++y) {
-      for (std::uint32_t x = 0; x < 64; ++x) different += a.surface.pixel(x, y) != b.surface.pixel(63 - x, y) ? 1U : 0U;
+      for (std::uint32_t x = 0; x < 64; ++x)
+        different += a.framebuffer.color.pixel(x, y) != b.framebuffer.color.pixel(63 - x, y) ? 1U : 0U;
     }
     EXPECT_GT(a.counts.fragments_blended, 5000U);
     EXPECT_EQ(different, 0U);
@@ -148,7 +149,7 @@ TEST(Splat, DepositsItsIntegralFlatOrTurned) {
       const RunResult result = simulate(untimed("baseline", ColorFormat::rgba32f), draw);
       double sum = 0;
       for (std::uint32_t y = 0; y < 96; ++y) {
-        for (std::uint32_t x = 0; x < 96; ++x) sum += static_cast<double>(result.surface.pixel(x, y)[3]);
+        for (std::uint32_t x = 0; x < 96; ++x) sum += static_cast<double>(result.framebuffer.color.pixel(x, y)[3]);
       }
       EXPECT_NEAR(sum, expected, 0.01 * expected);
       if (angle == 0) flat = sum;
@@ -169,7 +170,7 @@ TEST(Splat, ARoundOneCoversTheSameHoweverItsAxesAreTurned) {
     EXPECT_EQ(flat.counts.fragments_blended, turned.counts.fragments_blended);
     for (std::uint32_t y = 0; y < 32; ++y) {
       for (std::uint32_t x = 0; x < 32; ++x) {
-        ASSERT_NEAR(flat.surface.pixel(x, y)[3], turned.surface.pixel(x, y)[3], 2e-6F);
+        ASSERT_NEAR(flat.framebuffer.color.pixel(x, y)[3], turned.framebuffer.color.pixel(x, y)[3], 2e-6F);
       }
     }
   }

@@ -48,7 +48,7 @@ TEST(Trouble, WhatIsNotFiniteIsDroppedWholeWhicheverFieldItIs) {
       std::memcpy(reinterpret_cast<char*>(&bad) + 4 * field, &value, sizeof value);
       const RunResult result = simulate(untimed(), draw_of(16, 16, {bad, good}));
       EXPECT_EQ(statistic(result, "vpo.dropped_not_finite"), 1U) << field;
-      EXPECT_TRUE(same_bits(plain.surface, result.surface)) << field;
+      EXPECT_TRUE(same_bits(plain.framebuffer.color, result.framebuffer.color)) << field;
     }
   }
 }

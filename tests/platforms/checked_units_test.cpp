@@ -38,19 +38,20 @@ struct DrawBeyondTheSplats : VertexIssue {
 struct DrawOverAndOver : VertexIssue {
   using VertexIssue::VertexIssue;
   bool next(VertexWarp& out) override {
-    out = VertexWarp{0, 8, false};
+    out = VertexWarp{0, 8, 0, Mark::none};
     return true;
   }
 };
 struct VpoOfThree : PrimitiveAssembly {
   using PrimitiveAssembly::PrimitiveAssembly;
-  unsigned assemble(std::uint32_t splat, std::array<Primitive, 2>& out) override {
-    PrimitiveAssembly::assemble(splat, out);
+  unsigned assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) override {
+    PrimitiveAssembly::assemble(draw, splat, out);
     return 3;
   }
 };
 struct VpoThatThrowsWhenMade : PrimitiveAssembly {
-  VpoThatThrowsWhenMade(const Parameters& parameters, const RenderState& state) : PrimitiveAssembly(parameters, state) {
+  VpoThatThrowsWhenMade(const Parameters& parameters, const RenderContext& context)
+      : PrimitiveAssembly(parameters, context) {
     throw std::runtime_error("no table");
   }
 };
@@ -60,9 +61,9 @@ struct VpoWithoutRate : PrimitiveAssembly {
 };
 struct VpoThatCountsTwice : PrimitiveAssembly {
   using PrimitiveAssembly::PrimitiveAssembly;
-  unsigned assemble(std::uint32_t splat, std::array<Primitive, 2>& out) override {
-    const unsigned count = PrimitiveAssembly::assemble(splat, out);
-    primitives += count;
+  unsigned assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) override {
+    const unsigned count = PrimitiveAssembly::assemble(draw, splat, out);
+    primitives.add(draw, count);
     return count;
   }
 };
@@ -201,8 +202,8 @@ struct CropWithoutMshrs : ColorRop<Format, Rounding> {
 template <ColorFormat Format, BlendRounding Rounding>
 struct CropThatKillsTheDead : ColorRop<Format, Rounding> {
   using ColorRop<Format, Rounding>::ColorRop;
-  CropBehaviour::Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) override {
-    CropBehaviour::Outcome outcome = ColorRop<Format, Rounding>::blend(place, live, color);
+  CropBehaviour::Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) override {
+    CropBehaviour::Outcome outcome = ColorRop<Format, Rounding>::blend(draw, place, live, color);
     outcome.terminated = 0x1f;
     return outcome;
   }
@@ -213,13 +214,14 @@ struct CropThatKillsTheDead : ColorRop<Format, Rounding> {
 /// Blends, and counts nothing.
 struct CropWithoutCounts : CropBehaviour {
   struct Parameters : CropParameters {};
-  CropWithoutCounts(const Parameters& parameters, const RenderState& state) : rop(parameters, state) {}
+  CropWithoutCounts(const Parameters& parameters, const RenderContext& context) : rop(parameters, context) {}
   void attach(ColorSurface& surface) override {
     CropBehaviour::attach(surface);
     rop.attach(surface);
   }
-  Outcome blend(std::size_t place, LaneMask live, const QuadColor& color) override {
-    return rop.blend(place, live, color);
+  void pass(Mark mark) override { rop.pass(mark); }
+  Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) override {
+    return rop.blend(draw, place, live, color);
   }
   Cost cost() const override { return rop.cost(); }
   ColorRop<ColorFormat::rgba16f, BlendRounding::rne> rop;
@@ -272,7 +274,7 @@ const Add<QruOf<0>, QruBehaviour> qru_0("qru", "warps-of-0", "a warp of 0 quads"
 const Add<QruOf<9>, QruBehaviour> qru_9("qru", "warps-of-9", "a warp of 9 quads");
 const Add<QruOf<255>, QruBehaviour> qru_255("qru", "warps-of-255", "a warp of 255 quads");
 const Add<QruThatNeverFinishes, QruBehaviour> qru_ends("qru", "endless", "finish_bin: a warp of");
-const Add<QruOfAnotherSplat, QruBehaviour> qru_splat("qru", "other-splat", "splat 123456789, the draw has");
+const Add<QruOfAnotherSplat, QruBehaviour> qru_splat("qru", "other-splat", "splat 123456789 for draw 0, which has");
 const Add<SmWithoutCores, SmBehaviour> sm_cores("sm", "no-cores", "cores is 0");
 const Add<SmThatForgetsAWarp, SmBehaviour> sm_warp("sm", "forgets", "quads_pruned + quads_merged counts");
 const Add<CropWithoutCounts, CropBehaviour> crop_counts("crop", "no-counts", "quads_late_failed counts 0, but");
@@ -282,7 +284,7 @@ const AddCrop crop_dead(CropMaker<CropThatKillsTheDead>::implementation("kills-t
 const AddCrop crop_null(
     [] {
       Implementation implementation = CropMaker<ColorRop>::implementation("null", "makes nothing");
-      implementation.make_behaviour = [](const ParameterSet&, const RenderState&) { return nullptr; };
+      implementation.make_behaviour = [](const ParameterSet&, const RenderContext&) { return nullptr; };
       return implementation;
     }(),
     "make_behaviour makes nothing");

@@ -21,7 +21,7 @@ using namespace testing;
 /// QRUs of another make: without parameters, and with one of the default's.
 struct PlainQru : PairingQru {
   struct Parameters : ParameterSet {};
-  PlainQru(const Parameters&, const RenderState& state) : PairingQru(PairingQru::Parameters(), state) {}
+  PlainQru(const Parameters&, const RenderContext& context) : PairingQru(PairingQru::Parameters(), context) {}
 };
 struct SmallQru : PairingQru {
   struct Parameters : PairingQru::Parameters {};
@@ -102,7 +102,7 @@ TEST(Variants, MayBeAddedWithUnitsAndSettingsOfTheirOwn) {
   RunRequest request = request_of("tiny", Fidelity::functional);
   request.settings = {{"tc", "bins", "9"}};
   const Draw draw = draw_of(16, 16);
-  const Configuration configuration(request, draw);
+  const Configuration configuration(request, *Frame::of(draw));
   EXPECT_EQ(configuration.implementation(*configuration.netlist().find("gpc0.qru")).name, "pass-through");
   const auto parameters = configuration.parameters();
   const auto has = [&](const char* name, const char* value) {

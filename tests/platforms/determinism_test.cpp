@@ -60,7 +60,7 @@ TEST(Determinism, StrictlyStallsChangeNeitherImageNorCounts) {
                                                  r.stall_per_256 = static_cast<unsigned>(16 + seed % 100);
                                                }),
                                     draw);
-      ASSERT_TRUE(same_image(stalled.surface, expected.surface)) << variant.name << " " << seed;
+      ASSERT_TRUE(same_image(stalled.framebuffer.color, expected.framebuffer.color)) << variant.name << " " << seed;
       ASSERT_EQ(stalled.counts.named(), expected.counts.named()) << variant.name << " " << seed;
       ASSERT_GT(*stalled.cycles, *expected.cycles);
     }
@@ -97,7 +97,7 @@ TEST(Determinism, TheLatenciesOfShadersChangeNoImage) {
       if (std::string(latency) == "0") {
         expected = result;
       } else {
-        EXPECT_TRUE(same_image(result.surface, expected.surface)) << latency;
+        EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color)) << latency;
         EXPECT_EQ(result.counts.named(), expected.counts.named());
       }
     }
@@ -123,7 +123,7 @@ TEST(QueuesOfOnePlace, CompleteWithTheSameImageAndAreNotFaster) {
     };
     const RunResult deep = run(on(&platform_named("agx-orin")), draw);
     const RunResult one = run(on(&shallow), draw);
-    EXPECT_TRUE(same_image(deep.surface, one.surface)) << variant.name;
+    EXPECT_TRUE(same_image(deep.framebuffer.color, one.framebuffer.color)) << variant.name;
     EXPECT_EQ(deep.counts.named(), one.counts.named()) << variant.name;
     EXPECT_GE(*one.cycles, *deep.cycles) << variant.name;
   }
@@ -136,7 +136,7 @@ class Wall : public Unit {
       : Unit(name, domain, {}), in_(*this, "in_color"), behaviour_(std::move(behaviour)) {}
   bool idle() const override { return true; }
   Behaviour& behaviour() override { return *behaviour_; }
-  bool ends_draw() const override { return true; }
+  bool ends_frame() const override { return true; }
 
  private:
   Cycle tick(Cycle) override { return never; }
@@ -146,7 +146,7 @@ class Wall : public Unit {
 
 struct WallBehaviour : Behaviour {
   struct Parameters : ParameterSet {};
-  WallBehaviour(const Parameters&, const RenderState&) {}
+  WallBehaviour(const Parameters&, const RenderContext&) {}
 };
 
 void register_wall() {
@@ -154,7 +154,7 @@ void register_wall() {
   const Registrar<WallBehaviour, Behaviour> wall("wall", "wall", "takes nothing");
   register_unit_maker("wall",
                       [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                         const RenderState&, unsigned) -> std::unique_ptr<Unit> {
+                         const RenderContext&, unsigned) -> std::unique_ptr<Unit> {
                         return std::make_unique<Wall>(name.c_str(), domain, std::move(behaviour));
                       });
 }
@@ -241,7 +241,7 @@ TEST(StrictTermination, DoesNotDependOnHowFastBinsAreTested) {
                                                   r.settings = {{"zrop", "quads_per_cycle", quads}};
                                                 }),
                                      draw);
-        EXPECT_TRUE(same_image(result.surface, expected.surface))
+        EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color))
             << variant << " " << name_of(fidelity) << " " << quads;
         EXPECT_EQ(result.counts.named(), expected.counts.named())
             << variant << " " << name_of(fidelity) << " " << quads;

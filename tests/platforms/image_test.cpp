@@ -58,7 +58,7 @@ TEST_P(RandomScene, StrictlyFunctionalAndCycleHaveTheSameImageAndCounts) {
       };
       const RunResult functional = run(request_of(variant.name, Fidelity::functional, change), draw);
       const RunResult cycle = run(request_of(variant.name, Fidelity::cycle, change), draw);
-      EXPECT_TRUE(same_image(functional.surface, cycle.surface));
+      EXPECT_TRUE(same_image(functional.framebuffer.color, cycle.framebuffer.color));
       EXPECT_EQ(functional.counts.named(), cycle.counts.named());
       EXPECT_FALSE(functional.cycles.has_value());
       EXPECT_TRUE(cycle.cycles.has_value());
@@ -117,8 +117,8 @@ TEST(DesktopPlatform, HasTheImageOfAgxOrinBitForBit) {
     const RunResult orin = run(request_of(variant, Fidelity::cycle, on("agx-orin")), draw);
     const RunResult desktop = run(request_of(variant, Fidelity::cycle, on("desktop")), draw);
     const RunResult functional = run(request_of(variant, Fidelity::functional, on("desktop")), draw);
-    EXPECT_TRUE(same_image(orin.surface, desktop.surface)) << variant;
-    EXPECT_TRUE(same_image(functional.surface, desktop.surface)) << variant;
+    EXPECT_TRUE(same_image(orin.framebuffer.color, desktop.framebuffer.color)) << variant;
+    EXPECT_TRUE(same_image(functional.framebuffer.color, desktop.framebuffer.color)) << variant;
     EXPECT_EQ(functional.counts.named(), desktop.counts.named()) << variant;
     EXPECT_EQ(orin.counts.fragments_rasterized, desktop.counts.fragments_rasterized) << variant;
     EXPECT_EQ(orin.counts.fragments_blended, desktop.counts.fragments_blended) << variant;
@@ -130,7 +130,7 @@ TEST(MobilePlatform, HasTheImageOfAgxOrinBitForBitAndTakesLonger) {
   const RunResult orin = run(request_of("baseline"), draw);
   const RunResult mobile =
       run(request_of("baseline", Fidelity::cycle, [](RunRequest& r) { r.platform = &platform_named("mobile"); }), draw);
-  EXPECT_TRUE(same_image(orin.surface, mobile.surface));
+  EXPECT_TRUE(same_image(orin.framebuffer.color, mobile.framebuffer.color));
   EXPECT_GT(*mobile.cycles, *orin.cycles);
 }
 
@@ -151,7 +151,7 @@ TEST(EmptyDraw, HasOnlyItsFixedOverheadAndNoNumberThatIsNone) {
     EXPECT_LT(*result.cycles, 200U);
     for (const auto& [name, value] : result.counts.named()) EXPECT_EQ(value, 0U) << name;
     for (const auto& [unit, share] : result.utilization) EXPECT_EQ(share, 0.0) << unit;
-    EXPECT_EQ(result.surface.pixel(33, 7), (std::array<float, 4>{0, 0, 0, 0}));
+    EXPECT_EQ(result.framebuffer.color.pixel(33, 7), (std::array<float, 4>{0, 0, 0, 0}));
   }
 }
 
@@ -162,7 +162,7 @@ TEST(AllOutside, HasTheImageOfNothing) {
     draw.splats.push_back(testing::round_splat(-500.0F - static_cast<float>(i), 900, 5, 0.8F));
   const RunResult result = run(request_of("het+qm"), draw);
   EXPECT_EQ(result.counts.primitives, 0U);
-  EXPECT_TRUE(same_image(result.surface, ColorSurface(64, 64, ColorFormat::rgba16f)));
+  EXPECT_TRUE(same_image(result.framebuffer.color, ColorSurface(64, 64, ColorFormat::rgba16f)));
 }
 
 // case Z03
@@ -177,8 +177,8 @@ TEST(OneSplat, IsItsClosedFormAtEveryPixel) {
       double alpha = static_cast<double>(0.8F) * std::exp(-(dx * dx + dy * dy) / 18);
       if (std::fabs(alpha - 1.0 / 255) < 1e-6) continue;
       if (alpha < 1.0 / 255) alpha = 0;
-      EXPECT_NEAR(static_cast<double>(result.surface.pixel(x, y)[3]), alpha, 1e-5);
-      EXPECT_NEAR(static_cast<double>(result.surface.pixel(x, y)[0]), 0.5 * alpha, 1e-5);
+      EXPECT_NEAR(static_cast<double>(result.framebuffer.color.pixel(x, y)[3]), alpha, 1e-5);
+      EXPECT_NEAR(static_cast<double>(result.framebuffer.color.pixel(x, y)[0]), 0.5 * alpha, 1e-5);
     }
   }
 }
@@ -189,7 +189,8 @@ TEST(EqualSplats, FillUpAsAPower) {
   for (const char* variant : {"baseline", "qm"}) {
     const RunResult result =
         run(request_of(variant, Fidelity::cycle, [](RunRequest& r) { r.format = ColorFormat::rgba32f; }), draw);
-    EXPECT_NEAR(static_cast<double>(result.surface.pixel(11, 21)[3]), 1 - std::pow(0.75, 20), 1e-6) << variant;
+    EXPECT_NEAR(static_cast<double>(result.framebuffer.color.pixel(11, 21)[3]), 1 - std::pow(0.75, 20), 1e-6)
+        << variant;
   }
 }
 
@@ -202,7 +203,7 @@ TEST(SplatsThatAreNotSeen, DoNotPerturbTheImage) {
     const auto request = request_of(variant.name, Fidelity::functional, strictly);
     const RunResult plain = run(request, draw);
     const RunResult prefixed = run(request, with_prefix);
-    EXPECT_TRUE(same_image(plain.surface, prefixed.surface)) << variant.name;
+    EXPECT_TRUE(same_image(plain.framebuffer.color, prefixed.framebuffer.color)) << variant.name;
     EXPECT_EQ(plain.counts.named(), prefixed.counts.named()) << variant.name;
   }
 }
@@ -218,7 +219,7 @@ TEST(FullScreenSplats, LoseNoTile) {
     const RunResult result = run(request_of(variant), draw);
     EXPECT_EQ(result.counts.fragments_rasterized, 150U * 200 * 120) << variant;
     for (std::uint32_t y = 0; y < 120; y += 4) {
-      for (std::uint32_t x = 0; x < 200; x += 4) EXPECT_GT(result.surface.pixel(x, y)[3], 0.9F);
+      for (std::uint32_t x = 0; x < 200; x += 4) EXPECT_GT(result.framebuffer.color.pixel(x, y)[3], 0.9F);
     }
   }
 }
@@ -245,7 +246,7 @@ TEST(AnOpaqueWall, HidesAllThatLiesBehindIt) {
   const RunResult alone =
       run(request_of("het", Fidelity::cycle, strictly),
           testing::draw_of(64, 64, {draw.splats.begin(), draw.splats.begin() + static_cast<std::ptrdiff_t>(wall)}));
-  EXPECT_TRUE(same_image(result.surface, alone.surface));
+  EXPECT_TRUE(same_image(result.framebuffer.color, alone.framebuffer.color));
 }
 
 // case Z09
@@ -263,7 +264,8 @@ TEST(ACheckerboardOfTerminatingPixels, TerminatesThoseAndOnlyThose) {
   draw.splats.push_back(testing::flat_box(0, 0, 32, 32, 0.5F, 0, 1, 0));
   const RunResult result = run(request_of("het", Fidelity::cycle, strictly), draw);
   for (std::uint32_t y = 0; y < 32; ++y) {
-    for (std::uint32_t x = 0; x < 32; ++x) EXPECT_EQ(result.surface.pixel(x, y)[3] >= 0.996F, (x + y) % 2 == 0);
+    for (std::uint32_t x = 0; x < 32; ++x)
+      EXPECT_EQ(result.framebuffer.color.pixel(x, y)[3] >= 0.996F, (x + y) % 2 == 0);
   }
   EXPECT_EQ(testing::statistic(result, "crop.termination_signals"), result.counts.termination_updates);
   EXPECT_EQ(result.counts.termination_updates, 512U) << "one for each pixel";
@@ -284,7 +286,7 @@ TEST(TerminationSignals, AreAsManyAsPixelsThatPassTheThreshold) {
         run(request_of("het", Fidelity::cycle, [&](RunRequest& r) { r.termination = termination; }), draw);
     std::uint64_t terminated = 0;
     for (std::uint32_t y = 0; y < 48; ++y) {
-      for (std::uint32_t x = 0; x < 48; ++x) terminated += result.surface.pixel(x, y)[3] >= 0.996F;
+      for (std::uint32_t x = 0; x < 48; ++x) terminated += result.framebuffer.color.pixel(x, y)[3] >= 0.996F;
     }
     EXPECT_GT(terminated, 50U);
     EXPECT_EQ(result.counts.termination_updates, terminated);
@@ -308,8 +310,8 @@ TEST(UpdateLatency, LengthensTheTimeInWhichLateFragmentsBlendAndStrictlyChangesN
     blended = paper.counts.fragments_blended;
     testing::expect_near_reference(paper, draw, 0.004);
     const RunResult now = run(request_of("het", Fidelity::cycle, with(Termination::strict)), draw);
-    if (strict.surface.width() > 1) {
-      EXPECT_TRUE(same_image(now.surface, strict.surface)) << latency;
+    if (strict.framebuffer.color.width() > 1) {
+      EXPECT_TRUE(same_image(now.framebuffer.color, strict.framebuffer.color)) << latency;
       EXPECT_EQ(now.counts.named(), strict.counts.named()) << latency;
     }
     strict = now;
@@ -326,7 +328,7 @@ TEST(EarlyTermination, ThatCannotFireChangesNeitherImageNorBlends) {
                                                  r.settings.push_back({"state", "termination_compare", "gt"});
                                                }),
                                     draw);
-  EXPECT_TRUE(same_image(off.surface, never_fires.surface));
+  EXPECT_TRUE(same_image(off.framebuffer.color, never_fires.framebuffer.color));
   EXPECT_EQ(off.counts.fragments_blended, never_fires.counts.fragments_blended);
   EXPECT_EQ(never_fires.counts.termination_updates, 0U);
 }
@@ -337,7 +339,7 @@ TEST(SplatsBehindTerminatedPixels, ChangeNeitherImageNorBlends) {
   const RunResult before = run(request_of("het", Fidelity::cycle, strictly), draw);
   for (const Splat& splat : testing::random_draw(64, 64, 300, 4).splats) draw.splats.push_back(splat);
   const RunResult after = run(request_of("het", Fidelity::cycle, strictly), draw);
-  EXPECT_TRUE(same_image(before.surface, after.surface));
+  EXPECT_TRUE(same_image(before.framebuffer.color, after.framebuffer.color));
   EXPECT_EQ(before.counts.fragments_blended, after.counts.fragments_blended);
 }
 
@@ -375,7 +377,7 @@ TEST(EnlargedBoxes, BlendTheSameFragments) {
   const auto request = request_of("baseline", Fidelity::functional);
   const RunResult a = run(request, draw);
   const RunResult b = run(request, enlarged);
-  EXPECT_TRUE(same_image(a.surface, b.surface));
+  EXPECT_TRUE(same_image(a.framebuffer.color, b.framebuffer.color));
   EXPECT_EQ(a.counts.fragments_blended, b.counts.fragments_blended);
   EXPECT_GT(b.counts.fragments_rasterized, 2 * a.counts.fragments_rasterized);
 }
@@ -389,7 +391,7 @@ TEST(GreySplats, GiveAGreyImageInEveryFormat) {
         run(request_of("het+qm", Fidelity::cycle, [&](RunRequest& r) { r.format = format; }), draw);
     for (std::uint32_t y = 0; y < 64; ++y) {
       for (std::uint32_t x = 0; x < 64; ++x) {
-        const auto pixel = result.surface.pixel(x, y);
+        const auto pixel = result.framebuffer.color.pixel(x, y);
         ASSERT_TRUE(pixel[0] == pixel[1] && pixel[1] == pixel[2]);
       }
     }

@@ -146,7 +146,7 @@ TEST(Instances, ParametersNameAnInstanceOrAllOfAKind) {
                       {"gpc1.crop", "cache_bytes", "4096"},
                       {"link.tc.bins", "depth", "3"},
                       {"link.gpc2.tc.bins", "depth", "5"}};
-  const Configuration configuration(request, draw);
+  const Configuration configuration(request, *Frame::of(draw));
   const auto bytes = [&](const std::string& path) {
     return configuration.make_as<CropBehaviour>(*configuration.netlist().find(path))->cost().cache_bytes;
   };
@@ -265,7 +265,7 @@ TEST(ForeignMemories, TakeThePlaceOfTheL2) {
       request.platform = &platform;
       const RunResult other = run(request, draw);
       EXPECT_EQ(own.counts.named(), other.counts.named()) << base << " " << name_of(fidelity);
-      EXPECT_TRUE(same_image(own.surface, other.surface)) << base << " " << name_of(fidelity);
+      EXPECT_TRUE(same_image(own.framebuffer.color, other.framebuffer.color)) << base << " " << name_of(fidelity);
     }
     EXPECT_NE(refusal_of(platform, Fidelity::lt, {{"l2", "latency_cycles", "9"}}).find("has none"), std::string::npos);
   }

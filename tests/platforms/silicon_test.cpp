@@ -44,7 +44,7 @@ TEST_F(MeasuredDraw, PrunesAsTheGpu) {
 TEST_F(MeasuredDraw, LaunchesTheWarpsOfTheGpu) { expect_within(result->counts.warps, 2'397'186, 0.005); }
 
 TEST_F(MeasuredDraw, HasTheImageOfTheGpuAt50Decibel) {
-  const ColorSurface& surface = result->surface;
+  const ColorSurface& surface = result->framebuffer.color;
   const std::string bytes = testing::unpacked("measured_image.rgba16f");  // of its rows 0, 2, 4, ...
   std::vector<std::uint16_t> halves(std::size_t{4} * surface.width() * (surface.height() / 2));
   ASSERT_EQ(bytes.size(), halves.size() * sizeof(std::uint16_t));

@@ -17,7 +17,7 @@ using testkit::Source;
 
 class PropTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
-  PropTimedTest() : draw(testing::draw_of(256, 256)), state(testing::state_of(draw)) {}
+  PropTimedTest() : draw(testing::draw_of(256, 256)), context(testing::context_of(draw)) {}
 
   ShadedWarp* warp(std::uint32_t sequence, TileId tile = {0, 0}, std::uint32_t tile_sequence = ~0U,
                    std::uint8_t count = 8) {
@@ -27,18 +27,18 @@ class PropTimedTest : public ::testing::TestWithParam<Fidelity> {
     made.tile_sequence = tile_sequence == ~0U ? sequence : tile_sequence;
     made.count = count;
     made.slot = static_cast<std::uint16_t>(sequence);
-    made.end_of_draw = false;
+    made.mark = Mark::none;
     return &made;
   }
   const ShadedWarp* end(std::uint32_t warps) {
     ShadedWarp* const made = warp(warps, {0, 0}, 0, 0);
-    made->end_of_draw = true;
+    made->mark = Mark::end_of_frame;
     made->slot = no_slot;
     return made;
   }
 
   Draw draw;
-  RenderState state;
+  RenderContext context;
   Bins bins;
   ShadedWarpPool pool;
 };
@@ -48,9 +48,9 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, PropTimedTest, ::testing::ValuesIn(testing:
 
 /// The ways of shaded warps through PROP.
 struct ColorBench {
-  ColorBench(Fidelity fidelity, const RenderState& state, const Bench::Settings& settings = {}, unsigned depth = 64,
+  ColorBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {}, unsigned depth = 64,
              unsigned release_depth = 64)
-      : bench(fidelity, "prop", "pre-rop", state, settings),
+      : bench(fidelity, "prop", "pre-rop", context, settings),
         shaded(bench.source<ShadedWarpItem>("in_shaded", 64)),
         color(bench.sink<ShadedWarpItem>("out_color", depth)),
         release(bench.sink<WarpRelease>("out_release", release_depth)) {}
@@ -59,7 +59,7 @@ struct ColorBench {
   std::vector<std::uint32_t> sequences() const {
     std::vector<std::uint32_t> all;
     for (const auto& record : color.records()) {
-      all.push_back(record.item.warp->end_of_draw ? ~0U : record.item.warp->sequence);
+      all.push_back(record.item.warp->mark == Mark::end_of_frame ? ~0U : record.item.warp->sequence);
     }
     return all;
   }
@@ -71,7 +71,7 @@ struct ColorBench {
 };
 
 TEST_P(PropTimedTest, WithoutTestsBinsGoStraightToTheQru) {
-  Bench bench(GetParam(), "prop", "pre-rop", state, {{"latency_cycles", "4"}});
+  Bench bench(GetParam(), "prop", "pre-rop", context, {{"latency_cycles", "4"}});
   Source<BinItem>& in = bench.source<BinItem>("in_bins", 8);
   Sink<BinItem>& survivors = bench.sink<BinItem>("out_survivors", 8);
   Sink<BinItem>& test = bench.sink<BinItem>("out_test");
@@ -82,8 +82,8 @@ TEST_P(PropTimedTest, WithoutTestsBinsGoStraightToTheQru) {
 }
 
 TEST_P(PropTimedTest, WithTestsBinsGoToZropAndWhatComesBackToTheQru) {
-  state.early_termination = true;
-  Bench bench(GetParam(), "prop", "pre-rop", state, {{"latency_cycles", "4"}});
+  testing::terminate_early(context);
+  Bench bench(GetParam(), "prop", "pre-rop", context, {{"latency_cycles", "4"}});
   Source<BinItem>& in = bench.source<BinItem>("in_bins", 8);
   Source<BinItem>& tested = bench.source<BinItem>("in_tested", 8);
   Sink<BinItem>& survivors = bench.sink<BinItem>("out_survivors", 8);
@@ -96,9 +96,9 @@ TEST_P(PropTimedTest, WithTestsBinsGoToZropAndWhatComesBackToTheQru) {
 }
 
 TEST_P(PropTimedTest, MovesItsQuadsPerCycleEachWayAsTheyCome) {
-  state.early_termination = true;
+  testing::terminate_early(context);
   for (const unsigned rate : {8U, 16U}) {
-    Bench bench(GetParam(), "prop", "pre-rop", state,
+    Bench bench(GetParam(), "prop", "pre-rop", context,
                 {{"quads_per_cycle", std::to_string(rate)}, {"latency_cycles", "4"}});
     Source<BinItem>& in = bench.source<BinItem>("in_bins", 64);
     Source<BinItem>& tested = bench.source<BinItem>("in_tested", 64);
@@ -126,7 +126,7 @@ TEST_P(PropTimedTest, BinsOfAnySizePassInTheCyclesOfCycle) {
   const Bench::Settings settings{{"quads_per_cycle", "16"}, {"latency_cycles", "4"}};
   std::vector<Cycle> expected;  // of the last beat of each bin
   {
-    Bench cycle("prop", "pre-rop", state, settings);
+    Bench cycle("prop", "pre-rop", context, settings);
     Source<QuadBeat>& in = cycle.source<QuadBeat>("in_bins", 64);
     in.set_rate(1);
     for (unsigned i = 0; i < 30; ++i) {
@@ -142,7 +142,7 @@ TEST_P(PropTimedTest, BinsOfAnySizePassInTheCyclesOfCycle) {
       if (record.item.last_of_bin) expected.push_back(record.cycle);
     }
   }
-  Bench bench(GetParam(), "prop", "pre-rop", state, settings);
+  Bench bench(GetParam(), "prop", "pre-rop", context, settings);
   Source<BinItem>& in = bench.source<BinItem>("in_bins", 64);
   in.set_rate(1);
   const Sink<BinItem>& out = bench.sink<BinItem>("out_survivors", 64);
@@ -158,7 +158,7 @@ TEST_P(PropTimedTest, BinsOfAnySizePassInTheCyclesOfCycle) {
 }
 
 TEST_P(PropTimedTest, ABinThatComesSlowlyTakesAsLongToPass) {
-  Bench bench(GetParam(), "prop", "pre-rop", state, {{"quads_per_cycle", "16"}, {"latency_cycles", "4"}});
+  Bench bench(GetParam(), "prop", "pre-rop", context, {{"quads_per_cycle", "16"}, {"latency_cycles", "4"}});
   Source<BinItem>& in = bench.source<BinItem>("in_bins", 8);
   Sink<BinItem>& survivors = bench.sink<BinItem>("out_survivors", 8);
   in.add(bins.at({0, 0}, testing::numbers(64)), {10, 40}, 4);
@@ -173,8 +173,8 @@ TEST_P(PropTimedTest, HandsItsColourQuadsPerCycleToCrop) {
                                                       {ColorFormat::rgba16f, 2},
                                                       {ColorFormat::rgba32f, 1}};
   for (const auto& [format, rate] : formats) {
-    state.format = format;
-    ColorBench prop(GetParam(), state, {{"latency_cycles", "4"}}, 256);
+    context.format = format;
+    ColorBench prop(GetParam(), context, {{"latency_cycles", "4"}}, 256);
     for (std::uint32_t i = 0; i < 16; ++i) prop.shaded.add({warp(i)}, 10);
     prop.bench.run();
     ASSERT_EQ(prop.color.records().size(), 16U);
@@ -192,9 +192,9 @@ TEST_P(PropTimedTest, HandsItsColourQuadsPerCycleToCrop) {
 TEST_P(PropTimedTest, ColourBytesThatAreNoWholeQuadsPassAtTheirRateExactly) {
   for (const unsigned bytes : {16U, 17U, 48U, 64U, 96U, 200U, 256U}) {
     for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
-      state.format = format;
+      context.format = format;
       const Rate rate = Rate::of_bytes(bytes, 4 * bytes_per_pixel(format));
-      ColorBench prop(GetParam(), state, {{"color_bytes_per_cycle", std::to_string(bytes)}, {"latency_cycles", "4"}},
+      ColorBench prop(GetParam(), context, {{"color_bytes_per_cycle", std::to_string(bytes)}, {"latency_cycles", "4"}},
                       4096);
       // All wait for the first, so that the rate decides.
       for (std::uint32_t i = 1; i < 60; ++i) prop.shaded.add({warp(i)});
@@ -210,7 +210,7 @@ TEST_P(PropTimedTest, ColourBytesThatAreNoWholeQuadsPassAtTheirRateExactly) {
 
 TEST_P(PropTimedTest, ShadedOutOfOrderWarpsLeaveInTheOrderOfTheirTile) {
   for (const char* order : {"draw", "tile"}) {
-    ColorBench prop(GetParam(), state, {{"order", order}});
+    ColorBench prop(GetParam(), context, {{"order", order}});
     for (const std::uint32_t sequence : {3U, 1U, 2U, 0U}) prop.shaded.add({warp(sequence)});
     prop.bench.run();
     EXPECT_EQ(prop.sequences(), (std::vector<std::uint32_t>{0, 1, 2, 3}));
@@ -219,7 +219,7 @@ TEST_P(PropTimedTest, ShadedOutOfOrderWarpsLeaveInTheOrderOfTheirTile) {
 
 TEST_P(PropTimedTest, InTileOrderAnotherTileDoesNotWait) {
   for (const bool tile_order : {true, false}) {
-    ColorBench prop(GetParam(), state, {{"order", tile_order ? "tile" : "draw"}, {"latency_cycles", "4"}});
+    ColorBench prop(GetParam(), context, {{"order", tile_order ? "tile" : "draw"}, {"latency_cycles", "4"}});
     prop.shaded.add({warp(1, {1, 0}, 0)});        // of another tile
     prop.shaded.add({warp(0, {0, 0}, 0)}, 1000);  // launched first, shaded late
     prop.bench.run();
@@ -230,7 +230,7 @@ TEST_P(PropTimedTest, InTileOrderAnotherTileDoesNotWait) {
 }
 
 TEST_P(PropTimedTest, AWarpIsReleasedWithItsLastQuad) {
-  ColorBench prop(GetParam(), state, {{"latency_cycles", "4"}});
+  ColorBench prop(GetParam(), context, {{"latency_cycles", "4"}});
   const ShadedWarp* const only = warp(7, {0, 0}, 0);
   prop.shaded.add({only}, 10);
   prop.bench.run();
@@ -240,7 +240,7 @@ TEST_P(PropTimedTest, AWarpIsReleasedWithItsLastQuad) {
 }
 
 TEST_P(PropTimedTest, AWarpBeginsToLeaveOnceItsReleaseHasRoom) {
-  ColorBench prop(GetParam(), state, {{"latency_cycles", "4"}}, 64, 1);
+  ColorBench prop(GetParam(), context, {{"latency_cycles", "4"}}, 64, 1);
   prop.release.close(0, 500);
   for (std::uint32_t i = 0; i < 3; ++i) prop.shaded.add({warp(i)});
   prop.bench.run();
@@ -249,7 +249,7 @@ TEST_P(PropTimedTest, AWarpBeginsToLeaveOnceItsReleaseHasRoom) {
 }
 
 TEST_P(PropTimedTest, AWarpWithoutSurvivorsIsReleasedAndPassedOverInACycle) {
-  ColorBench prop(GetParam(), state, {{"latency_cycles", "4"}});
+  ColorBench prop(GetParam(), context, {{"latency_cycles", "4"}});
   const ShadedWarp* const empty = warp(0, {0, 0}, 0, 0);
   prop.shaded.add({empty});
   prop.shaded.add({warp(1, {0, 0}, 1, 2)});
@@ -262,7 +262,7 @@ TEST_P(PropTimedTest, AWarpWithoutSurvivorsIsReleasedAndPassedOverInACycle) {
 }
 
 TEST_P(PropTimedTest, TheEndWaitsForAllWarpsOfTheDraw) {
-  ColorBench prop(GetParam(), state);
+  ColorBench prop(GetParam(), context);
   prop.shaded.add({end(2)});
   prop.shaded.add({warp(1, {3, 0}, 0)}, 500);
   prop.shaded.add({warp(0, {0, 0}, 0)}, 1000);
@@ -274,7 +274,7 @@ TEST_P(PropTimedTest, TheEndWaitsForAllWarpsOfTheDraw) {
 }
 
 TEST_P(PropTimedTest, ACropThatTakesNothingStopsIt) {
-  ColorBench prop(GetParam(), state, {{"latency_cycles", "1"}}, 8);
+  ColorBench prop(GetParam(), context, {{"latency_cycles", "1"}}, 8);
   prop.color.close(0, 300);
   for (std::uint32_t i = 0; i < 6; ++i) prop.shaded.add({warp(i)});
   prop.shaded.add({end(6)});
@@ -292,7 +292,7 @@ TEST_P(PropTimedTest, ACropThatTakesNothingStopsIt) {
 TEST_P(PropTimedTest, OrderHoldsPerTileUnderAnyArrivalAndStalls) {
   for (const char* order : {"draw", "tile"}) {
     for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-      ColorBench prop(GetParam(), state, {{"order", order}}, static_cast<unsigned>(1 + seed % 12),
+      ColorBench prop(GetParam(), context, {{"order", order}}, static_cast<unsigned>(1 + seed % 12),
                       static_cast<unsigned>(1 + seed % 9));
       std::vector<const ShadedWarp*> all;
       std::map<unsigned, std::uint32_t> in_tile;
@@ -315,7 +315,7 @@ TEST_P(PropTimedTest, OrderHoldsPerTileUnderAnyArrivalAndStalls) {
       ASSERT_TRUE(std::string(order) == "tile" || std::is_sorted(got.begin(), got.end())) << seed;
       std::map<unsigned, std::uint32_t> next;
       for (const auto& record : prop.color.records()) {
-        if (record.item.warp->end_of_draw) continue;
+        if (record.item.warp->mark == Mark::end_of_frame) continue;
         std::uint32_t& least = next[record.item.warp->tile.x];
         ASSERT_GE(record.item.warp->tile_sequence, least) << seed;
         least = record.item.warp->tile_sequence + 1;

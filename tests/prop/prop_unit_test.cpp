@@ -19,7 +19,7 @@ using testkit::Source;
 
 class PropUnitTest : public ::testing::Test {
  protected:
-  PropUnitTest() : draw(testing::draw_of(256, 256)), state(testing::state_of(draw)) {}
+  PropUnitTest() : draw(testing::draw_of(256, 256)), context(testing::context_of(draw)) {}
 
   /// A shaded warp; quads are told apart by their first primitive, sequence * 8 + index.
   ShadedWarp* warp(std::uint32_t sequence, TileId tile, std::uint32_t tile_sequence, std::uint8_t count = 8) {
@@ -29,7 +29,7 @@ class PropUnitTest : public ::testing::Test {
     made.tile_sequence = tile_sequence;
     made.count = count;
     made.slot = static_cast<std::uint16_t>(sequence);
-    made.end_of_draw = false;
+    made.mark = Mark::none;
     for (unsigned i = 0; i < count; ++i) {
       made.position[i] = static_cast<std::uint8_t>(i);
       made.first_primitive[i] = made.last_primitive[i] = sequence * 8 + i;
@@ -39,13 +39,13 @@ class PropUnitTest : public ::testing::Test {
   }
   const ShadedWarp* end(std::uint32_t warps) {
     ShadedWarp* const made = warp(warps, {}, 0, 0);
-    made->end_of_draw = true;
+    made->mark = Mark::end_of_frame;
     made->slot = no_slot;
     return made;
   }
 
   Draw draw;
-  RenderState state;
+  RenderContext context;
   ShadedWarpPool pool_;
 };
 
@@ -59,7 +59,7 @@ std::vector<std::uint32_t> quads_of(const Sink<ColorBeat>& sink) {
 }
 
 TEST_F(PropUnitTest, WithoutTestsBinsGoStraightToTheQru) {
-  Bench bench("prop", "pre-rop", state, {{"latency_cycles", "4"}});
+  Bench bench("prop", "pre-rop", context, {{"latency_cycles", "4"}});
   Source<QuadBeat>& bins = bench.source<QuadBeat>("in_bins");
   Sink<QuadBeat>& survivors = bench.sink<QuadBeat>("out_survivors");
   Sink<QuadBeat>& test = bench.sink<QuadBeat>("out_test");
@@ -71,8 +71,8 @@ TEST_F(PropUnitTest, WithoutTestsBinsGoStraightToTheQru) {
 }
 
 TEST_F(PropUnitTest, WithTestsBinsGoToZropAndWhatComesBackToTheQru) {
-  state.early_termination = true;
-  Bench bench("prop", "pre-rop", state, {{"latency_cycles", "4"}});
+  testing::terminate_early(context);
+  Bench bench("prop", "pre-rop", context, {{"latency_cycles", "4"}});
   Source<QuadBeat>& bins = bench.source<QuadBeat>("in_bins");
   Source<QuadBeat>& tested = bench.source<QuadBeat>("in_tested");
   Sink<QuadBeat>& survivors = bench.sink<QuadBeat>("out_survivors");
@@ -87,9 +87,9 @@ TEST_F(PropUnitTest, WithTestsBinsGoToZropAndWhatComesBackToTheQru) {
 }
 
 TEST_F(PropUnitTest, MovesItsQuadsPerCycleEachWay) {
-  state.early_termination = true;
+  testing::terminate_early(context);
   for (const unsigned rate : {8U, 16U}) {
-    Bench bench("prop", "pre-rop", state, {{"quads_per_cycle", std::to_string(rate)}});
+    Bench bench("prop", "pre-rop", context, {{"quads_per_cycle", std::to_string(rate)}});
     Source<QuadBeat>& bins = bench.source<QuadBeat>("in_bins", 64);
     Source<QuadBeat>& tested = bench.source<QuadBeat>("in_tested", 64);
     Sink<QuadBeat>& survivors = bench.sink<QuadBeat>("out_survivors", 64);
@@ -111,8 +111,8 @@ TEST_F(PropUnitTest, HandsItsColourQuadsPerCycleToCrop) {
                                                       {ColorFormat::rgba16f, 2},
                                                       {ColorFormat::rgba32f, 1}};
   for (const auto& [format, rate] : formats) {
-    state.format = format;
-    Bench bench("prop", "pre-rop", state, {{"latency_cycles", "4"}});
+    context.format = format;
+    Bench bench("prop", "pre-rop", context, {{"latency_cycles", "4"}});
     Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded", 64);
     Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color", 64);
     for (std::uint32_t i = 0; i < 16; ++i) shaded.add({warp(i, {0, 0}, i)}, 10);
@@ -126,9 +126,9 @@ TEST_F(PropUnitTest, HandsItsColourQuadsPerCycleToCrop) {
 TEST_F(PropUnitTest, ColourBytesThatAreNoWholeQuadsPassAtTheirRateExactly) {
   for (const unsigned bytes : {16U, 17U, 48U, 64U, 96U, 200U, 256U}) {
     for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
-      state.format = format;
+      context.format = format;
       const Rate rate = Rate::of_bytes(bytes, 4 * bytes_per_pixel(format));
-      Bench bench("prop", "pre-rop", state, {{"color_bytes_per_cycle", std::to_string(bytes)}});
+      Bench bench("prop", "pre-rop", context, {{"color_bytes_per_cycle", std::to_string(bytes)}});
       Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded", 64);
       Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color", 64);
       // All wait for the first, so that the rate decides, and not the one warp a cycle that the link brings.
@@ -149,7 +149,7 @@ TEST_F(PropUnitTest, ColourBytesThatAreNoWholeQuadsPassAtTheirRateExactly) {
 
 TEST_F(PropUnitTest, BeatsWiderThanTheUnitTakeExactlyTheirShare) {
   for (const unsigned rate : {3U, 5U, 12U}) {
-    Bench bench("prop", "pre-rop", state, {{"quads_per_cycle", std::to_string(rate)}});
+    Bench bench("prop", "pre-rop", context, {{"quads_per_cycle", std::to_string(rate)}});
     Source<QuadBeat>& bins = bench.source<QuadBeat>("in_bins", 64);
     Sink<QuadBeat>& survivors = bench.sink<QuadBeat>("out_survivors", 64);
     for (unsigned i = 0; i < 61; ++i) bins.add(beat_of({0, 0}, std::vector<unsigned>(16, 1), 16 * i));
@@ -161,7 +161,7 @@ TEST_F(PropUnitTest, BeatsWiderThanTheUnitTakeExactlyTheirShare) {
 
 TEST_F(PropUnitTest, ShadedOutOfOrderQuadsLeaveInTheOrderOfTheirTile) {
   for (const char* order : {"draw", "tile"}) {
-    Bench bench("prop", "pre-rop", state, {{"order", order}});
+    Bench bench("prop", "pre-rop", context, {{"order", order}});
     Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded", 64);
     Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color", 64);
     for (const std::uint32_t sequence : {3U, 1U, 2U, 0U}) shaded.add({warp(sequence, {0, 0}, sequence)});
@@ -174,7 +174,7 @@ TEST_F(PropUnitTest, ShadedOutOfOrderQuadsLeaveInTheOrderOfTheirTile) {
 
 TEST_F(PropUnitTest, InTileOrderAnotherTileDoesNotWait) {
   for (const bool tile_order : {true, false}) {
-    Bench bench("prop", "pre-rop", state, {{"order", tile_order ? "tile" : "draw"}});
+    Bench bench("prop", "pre-rop", context, {{"order", tile_order ? "tile" : "draw"}});
     Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded", 64);
     Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color", 64);
     shaded.add({warp(1, {1, 0}, 0)});        // of another tile
@@ -186,7 +186,7 @@ TEST_F(PropUnitTest, InTileOrderAnotherTileDoesNotWait) {
 }
 
 TEST_F(PropUnitTest, AWarpIsReleasedWithItsLastQuad) {
-  Bench bench("prop", "pre-rop", state);
+  Bench bench("prop", "pre-rop", context);
   Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded");
   Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color");
   Sink<WarpRelease>& release = bench.sink<WarpRelease>("out_release");
@@ -201,7 +201,7 @@ TEST_F(PropUnitTest, AWarpIsReleasedWithItsLastQuad) {
 }
 
 TEST_F(PropUnitTest, AWarpWithoutSurvivorsIsReleasedAndPassedOver) {
-  Bench bench("prop", "pre-rop", state);
+  Bench bench("prop", "pre-rop", context);
   Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded");
   Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color");
   Sink<WarpRelease>& release = bench.sink<WarpRelease>("out_release");
@@ -215,14 +215,14 @@ TEST_F(PropUnitTest, AWarpWithoutSurvivorsIsReleasedAndPassedOver) {
 }
 
 TEST_F(PropUnitTest, TheEndWaitsForAllWarpsOfTheDraw) {
-  Bench bench("prop", "pre-rop", state);
+  Bench bench("prop", "pre-rop", context);
   Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded");
   Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color");
   shaded.add({end(2)});
   shaded.add({warp(1, {3, 0}, 0)}, 500);
   shaded.add({warp(0, {0, 0}, 0)}, 1000);
   bench.run();
-  EXPECT_TRUE(color.records().back().item.end_of_draw);
+  EXPECT_TRUE(color.records().back().item.mark == Mark::end_of_frame);
   EXPECT_GT(color.records().back().cycle, 1000U);
   EXPECT_EQ(quads_of(color).size(), 16U);
   EXPECT_TRUE(bench.unit().idle());
@@ -232,7 +232,7 @@ TEST_F(PropUnitTest, TheEndWaitsForAllWarpsOfTheDraw) {
 TEST_F(PropUnitTest, OrderHoldsPerTileUnderAnyArrivalAndStalls) {
   for (const char* order : {"draw", "tile"}) {
     for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-      Bench bench("prop", "pre-rop", state, {{"order", order}});
+      Bench bench("prop", "pre-rop", context, {{"order", order}});
       Source<ShadedWarpItem>& shaded = bench.source<ShadedWarpItem>("in_shaded", static_cast<unsigned>(1 + seed % 8));
       Sink<ColorBeat>& color = bench.sink<ColorBeat>("out_color", static_cast<unsigned>(1 + seed % 3));
       Sink<WarpRelease>& release = bench.sink<WarpRelease>("out_release");

@@ -47,7 +47,7 @@ RC_GTEST_PROP(Pipeline, NoNanAndNoInfinityReachesTheTarget, ()) {
   bool overflowed = false;
   for (std::uint32_t y = 0; y < draw.height; ++y) {
     for (std::uint32_t x = 0; x < draw.width; ++x) {
-      const std::array<float, 4> pixel = result.surface.pixel(x, y);
+      const std::array<float, 4> pixel = result.framebuffer.color.pixel(x, y);
       for (const float value : pixel) {
         RC_ASSERT(!std::isnan(value));
         RC_ASSERT(value >= 0.0F);
@@ -67,10 +67,10 @@ RC_GTEST_PROP(Pipeline, WithoutTerminationEveryVariantIsWithinTheRunningBound, (
   const Draw draw = *scene(50, 1.0F);
   const ColorFormat target = *format();
   const char* const rounds = *rc::gen::element("rne", "rtz");
-  RenderState state = state_of(draw);
-  state.format = target;
-  if (rounds[1] == 't') state.blend_rounding = BlendRounding::rtz;
-  const auto fragments = fragments_of(state);
+  RenderContext context = context_of(draw);
+  context.format = target;
+  if (rounds[1] == 't') context.precision.blend_rounding = BlendRounding::rtz;
+  const auto fragments = fragments_of(context);
   const std::vector<Setting> sizes = *bins();
   for (const char* name : {"baseline", "qm"}) {
     RunRequest r = request(variant_named(name), target);
@@ -80,8 +80,8 @@ RC_GTEST_PROP(Pipeline, WithoutTerminationEveryVariantIsWithinTheRunningBound, (
     std::uint64_t total = 0;
     for (std::uint32_t y = 0; y < draw.height; ++y) {
       for (std::uint32_t x = 0; x < draw.width; ++x) {
-        const OraclePixel exact = blend_exactly(fragments[std::size_t{y} * draw.width + x], state);
-        const std::array<float, 4> pixel = result.surface.pixel(x, y);
+        const OraclePixel exact = blend_exactly(fragments[std::size_t{y} * draw.width + x], context);
+        const std::array<float, 4> pixel = result.framebuffer.color.pixel(x, y);
         for (unsigned i = 0; i < 3; ++i) RC_ASSERT(std::fabs(pixel[i] - exact.rgba[i]) <= exact.color_bound[i]);
         RC_ASSERT(std::fabs(pixel[3] - exact.rgba[3]) <= exact.alpha_bound);
         total += exact.fragments;
@@ -94,9 +94,9 @@ RC_GTEST_PROP(Pipeline, WithoutTerminationEveryVariantIsWithinTheRunningBound, (
 RC_GTEST_PROP(Pipeline, TerminationChangesAPixelByAtMostWhatTheThresholdLeaves, ()) {
   const Draw draw = *scene(80, 1.0F);
   const ColorFormat target = *format();
-  RenderState state = state_of(draw);
-  state.format = target;
-  const auto fragments = fragments_of(state);
+  RenderContext context = context_of(draw);
+  context.format = target;
+  const auto fragments = fragments_of(context);
   const double brightest = largest_color(draw);
   const std::vector<Setting> sizes = *bins();
   bool terminates = false;
@@ -108,8 +108,8 @@ RC_GTEST_PROP(Pipeline, TerminationChangesAPixelByAtMostWhatTheThresholdLeaves, 
       const RunResult result = run(r, draw);
       for (std::uint32_t y = 0; y < draw.height; ++y) {
         for (std::uint32_t x = 0; x < draw.width; ++x) {
-          const OraclePixel exact = blend_exactly(fragments[std::size_t{y} * draw.width + x], state);
-          const std::array<float, 4> pixel = result.surface.pixel(x, y);
+          const OraclePixel exact = blend_exactly(fragments[std::size_t{y} * draw.width + x], context);
+          const std::array<float, 4> pixel = result.framebuffer.color.pixel(x, y);
           const double left = (1.0 - 0.996 + exact.alpha_bound) * brightest + 1e-6;
           for (unsigned i = 0; i < 3; ++i) {
             RC_ASSERT(std::fabs(pixel[i] - exact.rgba[i]) <= exact.color_bound[i] + left);
@@ -135,7 +135,7 @@ RC_GTEST_PROP(Pipeline, WhereOrderAloneDecidesBinSizesChangeNoBit, ()) {
     const RunResult plain = run(r, draw);
     r.settings = *bins();
     const RunResult other = run(r, draw);
-    RC_ASSERT(same_bits(plain.surface, other.surface));
+    RC_ASSERT(same_bits(plain.framebuffer.color, other.framebuffer.color));
     RC_ASSERT(plain.counts.fragments_blended == other.counts.fragments_blended);
   }
 }
@@ -169,7 +169,7 @@ RC_GTEST_PROP(Pipeline, InStrictModeEveryFidelityIsTheUntimedOneBitForBit, ()) {
     r.stall_seed = static_cast<std::uint64_t>(*whole(1, 1000));
     r.stall_per_256 = *rc::gen::element(0U, 64U);
     const RunResult timed = run(r, draw);
-    RC_ASSERT(same_bits(untimed.surface, timed.surface));
+    RC_ASSERT(same_bits(untimed.framebuffer.color, timed.framebuffer.color));
     RC_ASSERT(untimed.counts.named() == timed.counts.named());
   }
 }
@@ -177,9 +177,9 @@ RC_GTEST_PROP(Pipeline, InStrictModeEveryFidelityIsTheUntimedOneBitForBit, ()) {
 RC_GTEST_PROP(Pipeline, AtCycleFidelityThePapersModeStaysWithinTheBound, ()) {
   const Draw draw = *scene(40, 1.0F);
   const ColorFormat target = *format();
-  RenderState state = state_of(draw);
-  state.format = target;
-  const auto fragments = fragments_of(state);
+  RenderContext context = context_of(draw);
+  context.format = target;
+  const auto fragments = fragments_of(context);
   RunRequest r = request(variant_named(*rc::gen::element("het", "het+qm")), target, Fidelity::cycle);
   r.settings = *bins();
   r.stall_seed = static_cast<std::uint64_t>(*whole(1, 1000));
@@ -187,8 +187,8 @@ RC_GTEST_PROP(Pipeline, AtCycleFidelityThePapersModeStaysWithinTheBound, ()) {
   const RunResult result = run(r, draw);
   for (std::uint32_t y = 0; y < draw.height; ++y) {
     for (std::uint32_t x = 0; x < draw.width; ++x) {
-      const OraclePixel exact = blend_exactly(fragments[std::size_t{y} * draw.width + x], state);
-      const std::array<float, 4> pixel = result.surface.pixel(x, y);
+      const OraclePixel exact = blend_exactly(fragments[std::size_t{y} * draw.width + x], context);
+      const std::array<float, 4> pixel = result.framebuffer.color.pixel(x, y);
       const double left = (1.0 - 0.996 + exact.alpha_bound) * static_cast<double>(largest_color(draw)) + 1e-6;
       for (unsigned i = 0; i < 3; ++i) RC_ASSERT(std::fabs(pixel[i] - exact.rgba[i]) <= exact.color_bound[i] + left);
     }
@@ -211,7 +211,7 @@ RC_GTEST_PROP(Pipeline, SplatsThatShowNothingChangeNoBit, ()) {
   }
   fresh_simulation();
   const RunResult result = simulate(r, padded);
-  RC_ASSERT(same_bits(plain.surface, result.surface));
+  RC_ASSERT(same_bits(plain.framebuffer.color, result.framebuffer.color));
   RC_ASSERT(statistic(result, "vpo.dropped_not_finite") == statistic(plain, "vpo.dropped_not_finite") + 1);
 }
 

@@ -36,18 +36,18 @@ RC_GTEST_PROP(Raster, EachSampleOfASplatIsProducedExactlyOnce, ()) {
   const std::uint32_t width = *rc::gen::element(1U, 16U, 17U, 64U);
   const std::uint32_t height = *rc::gen::element(1U, 15U, 33U);
   const Draw draw = draw_of(width, height, {*splat_in(width, height, 1.0F)});
-  RenderState state = state_of(draw);
-  state.subpixel_bits = *rc::gen::element(8U, 4U, 12U);
+  RenderContext context = context_of(draw);
+  context.precision.subpixel_bits = *rc::gen::element(8U, 4U, 12U);
 
   const auto make = [&](const char* slot, const char* name) {
     const Implementation& found = Registry::instance().find(slot, name);
-    return found.make_behaviour(*found.make_parameters(), state);
+    return found.make_behaviour(*found.make_parameters(), context);
   };
   const auto vpo = make("vpo", "primitive-assembly");
   const auto raster = make("raster", "tile-rasterizer");
   auto& rasterizer = dynamic_cast<RasterBehaviour&>(*raster);
   std::array<Primitive, 2> primitives;
-  const unsigned count = dynamic_cast<VpoBehaviour&>(*vpo).assemble(0, primitives);
+  const unsigned count = dynamic_cast<VpoBehaviour&>(*vpo).assemble(0, 0, primitives);
 
   // In one piece or cut into grids, whichever.
   const std::int32_t grid = *rc::gen::element(16384, 64, 16, 7);
@@ -76,12 +76,12 @@ RC_GTEST_PROP(Raster, EachSampleOfASplatIsProducedExactlyOnce, ()) {
     }
   }
   std::array<SnappedTriangle, 2> snapped;
-  const bool finite = snap_triangle(state, 0, 0, snapped[0]) && snap_triangle(state, 0, 1, snapped[1]);
+  const bool finite = snap_triangle(context, 0, 0, 0, snapped[0]) && snap_triangle(context, 0, 0, 1, snapped[1]);
   for (std::uint32_t y = 0; y < height; ++y) {
     for (std::uint32_t x = 0; x < width; ++x) {
       unsigned expected = 0;
       for (unsigned i = 0; finite && i < 2; ++i) {
-        if (doubled_area(snapped[i]) != 0 && covers(snapped[i], state.subpixel_bits, x, y)) ++expected;
+        if (doubled_area(snapped[i]) != 0 && covers(snapped[i], context.precision.subpixel_bits, x, y)) ++expected;
       }
       RC_ASSERT(hits[std::size_t{y} * width + x] == expected);
       RC_ASSERT(expected <= 1U);

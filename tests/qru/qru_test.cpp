@@ -39,7 +39,7 @@ void collect(const Warp& warp, Outcome& outcome) {
 
 class QruTest : public ::testing::Test {
  protected:
-  QruTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) {}
+  QruTest() : draw(testing::draw_of(64, 64)), context(testing::context_of(draw)) {}
 
   /// One bin of quads at these positions, numbered from `first`.
   Outcome run(QruBehaviour& qru, const std::vector<unsigned>& positions, std::uint32_t first = 0,
@@ -61,14 +61,14 @@ class QruTest : public ::testing::Test {
     return outcome;
   }
   Outcome run(const std::vector<unsigned>& positions) {
-    PairingQru qru(parameters, state);
+    PairingQru qru(parameters, context);
     return run(qru, positions);
   }
 
   using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
   using Singles = std::vector<std::uint32_t>;
   Draw draw;
-  RenderState state;
+  RenderContext context;
   PairingQru::Parameters parameters;
 };
 
@@ -149,7 +149,7 @@ TEST_F(QruTest, OneAndThreeQuadsLeaveAsOneWarp) {
 
 // case M14
 TEST_F(QruTest, QuadsOfDifferentBinsNeverPair) {
-  PairingQru qru(parameters, state);
+  PairingQru qru(parameters, context);
   const Outcome first = run(qru, {7}, 0);
   const Outcome second = run(qru, {7}, 1);
   EXPECT_TRUE(first.pairs.empty());
@@ -163,7 +163,7 @@ TEST_F(QruTest, QuadsOfOneSplatPairAsAnyOthers) {
   beat.quads[0].coverage = 0b0011;
   beat.quads[1].coverage = 0b1100;
   beat.quads[1].triangle = 1;
-  PairingQru qru(parameters, state);
+  PairingQru qru(parameters, context);
   Warp warp;
   bool launched = false;
   ASSERT_EQ(qru.examine(beat.tile, beat.quads.data(), 2, warp, launched), 2U);
@@ -186,7 +186,7 @@ TEST_F(QruTest, WarpsOfPairsAreFullBeforeTheLeftOversCome) {
 
 TEST_F(QruTest, WarpsAreNumberedInTheDrawAndInTheirTile) {
   const Draw two_tiles = testing::draw_of(32, 16);
-  WarpNumbering numbering(testing::state_of(two_tiles));
+  WarpNumbering numbering(testing::context_of(two_tiles));
   const std::uint32_t in_tile[] = {0, 1, 0, 1, 2, 3};
   std::uint32_t launched = 0;
   for (const unsigned x : {0U, 0U, 1U, 1U, 0U, 0U}) {
@@ -199,23 +199,23 @@ TEST_F(QruTest, WarpsAreNumberedInTheDrawAndInTheirTile) {
   }
 }
 
-TEST_F(QruTest, TheEndOfADrawCarriesItsWarpsAndTheNextDrawCountsFromZero) {
+TEST_F(QruTest, AMarkHasTheNumberOfTheWarpThatFollows) {
   const Draw two_tiles = testing::draw_of(32, 16);
-  WarpNumbering numbering(testing::state_of(two_tiles));
+  WarpNumbering numbering(testing::context_of(two_tiles));
   Warp warp;
   numbering.number(warp);
   numbering.number(warp);
-  Warp end;
-  numbering.number_end(end);
-  EXPECT_EQ(end.sequence, 2U);
+  Warp mark;
+  numbering.number_mark(mark);
+  EXPECT_EQ(mark.sequence, 2U);
   numbering.number(warp);
-  EXPECT_EQ(warp.sequence, 0U);
-  EXPECT_EQ(warp.tile_sequence, 0U);
+  EXPECT_EQ(warp.sequence, 2U);
+  EXPECT_EQ(warp.tile_sequence, 2U);
 }
 
 // case T06
 TEST_F(QruTest, NoQuadIsLostOrDoubledAndEachPositionKeepsItsOrder) {
-  PairingQru qru(parameters, state);
+  PairingQru qru(parameters, context);
   std::uint32_t first = 0;
   for (std::uint64_t bin = 0; bin < 300; ++bin) {
     std::vector<unsigned> positions;
@@ -239,11 +239,11 @@ TEST_F(QruTest, NoQuadIsLostOrDoubledAndEachPositionKeepsItsOrder) {
   EXPECT_EQ(qru.quads_examined.value(), first);
 }
 
-TEST_F(QruTest, StorageIsThatOfThePapersTable) { EXPECT_EQ(PairingQru(parameters, state).storage_bytes(), 688U); }
+TEST_F(QruTest, StorageIsThatOfThePapersTable) { EXPECT_EQ(PairingQru(parameters, context).storage_bytes(), 688U); }
 
 TEST_F(QruTest, PassingThroughQuadsBecomeWarpsOfEightInTheirOrder) {
   const QruPassThrough::Parameters none;
-  QruPassThrough qru(none, state);
+  QruPassThrough qru(none, context);
   std::vector<unsigned> positions;
   for (unsigned i = 0; i < 19; ++i) positions.push_back(i / 2);
   const Outcome outcome = run(qru, positions);
@@ -255,7 +255,7 @@ TEST_F(QruTest, PassingThroughQuadsBecomeWarpsOfEightInTheirOrder) {
 
 TEST_F(QruTest, PassingThroughABinEndsItsWarp) {
   const QruPassThrough::Parameters none;
-  QruPassThrough qru(none, state);
+  QruPassThrough qru(none, context);
   EXPECT_EQ(run(qru, {1, 2}).warps.size(), 1U);
   EXPECT_EQ(run(qru, {1, 2}).warps.size(), 1U);
   EXPECT_EQ(qru.warps.value(), 2U);

@@ -16,7 +16,7 @@ const std::vector<unsigned> four_pairs{1, 1, 2, 2, 3, 3, 4, 4};
 
 class QruTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
-  QruTimedTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) {}
+  QruTimedTest() : draw(testing::draw_of(64, 64)), context(testing::context_of(draw)) {}
 
   /// So many quads that pair as they come: a warp every eight.
   BinItem pairs(unsigned quads, TileId tile = {0, 0}) {
@@ -26,7 +26,7 @@ class QruTimedTest : public ::testing::TestWithParam<Fidelity> {
   }
 
   Draw draw;
-  RenderState state;
+  RenderContext context;
   Bins bins;
 };
 
@@ -35,7 +35,7 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, QruTimedTest, ::testing::ValuesIn(testing::
 
 TEST_P(QruTimedTest, AWarpIsSeenTheLatencyAfterItsLastQuad) {
   for (const unsigned latency : {1U, 6U}) {
-    Bench bench(GetParam(), "qru", "pairing", state, {{"latency_cycles", std::to_string(latency)}});
+    Bench bench(GetParam(), "qru", "pairing", context, {{"latency_cycles", std::to_string(latency)}});
     Source<BinItem>& in = bench.source<BinItem>("in_quads");
     Sink<Warp>& out = bench.sink<Warp>("out_warps");
     in.add(pairs(8), 10);
@@ -47,7 +47,7 @@ TEST_P(QruTimedTest, AWarpIsSeenTheLatencyAfterItsLastQuad) {
 
 TEST_P(QruTimedTest, ExaminesItsQuadsPerCycle) {
   for (const unsigned rate : {1U, 2U, 4U, 8U}) {
-    Bench bench(GetParam(), "qru", "pairing", state,
+    Bench bench(GetParam(), "qru", "pairing", context,
                 {{"quads_per_cycle", std::to_string(rate)}, {"latency_cycles", "4"}});
     Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
     Sink<Warp>& out = bench.sink<Warp>("out_warps", 64);
@@ -62,7 +62,7 @@ TEST_P(QruTimedTest, ExaminesItsQuadsPerCycle) {
 }
 
 TEST_P(QruTimedTest, ALaunchEndsACycleHoweverManyQuadsItMayExamine) {
-  Bench bench(GetParam(), "qru", "pairing", state, {{"quads_per_cycle", "16"}, {"latency_cycles", "4"}});
+  Bench bench(GetParam(), "qru", "pairing", context, {{"quads_per_cycle", "16"}, {"latency_cycles", "4"}});
   Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
   Sink<Warp>& out = bench.sink<Warp>("out_warps", 64);
   in.add(pairs(128));
@@ -72,7 +72,7 @@ TEST_P(QruTimedTest, ALaunchEndsACycleHoweverManyQuadsItMayExamine) {
 }
 
 TEST_P(QruTimedTest, ABinWhosePartsComeLateIsExaminedAsTheyCome) {
-  Bench bench(GetParam(), "qru", "pairing", state, {{"quads_per_cycle", "8"}, {"latency_cycles", "4"}});
+  Bench bench(GetParam(), "qru", "pairing", context, {{"quads_per_cycle", "8"}, {"latency_cycles", "4"}});
   Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
   Sink<Warp>& out = bench.sink<Warp>("out_warps", 64);
   in.add(pairs(32), {10, 41}, 4);
@@ -83,7 +83,7 @@ TEST_P(QruTimedTest, ABinWhosePartsComeLateIsExaminedAsTheyCome) {
 }
 
 TEST_P(QruTimedTest, LeftOversOfABinGoOneACycleBeforeTheNext) {
-  Bench bench(GetParam(), "qru", "pairing", state, {{"quads_per_cycle", "8"}, {"latency_cycles", "1"}});
+  Bench bench(GetParam(), "qru", "pairing", context, {{"quads_per_cycle", "8"}, {"latency_cycles", "1"}});
   Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
   Sink<Warp>& out = bench.sink<Warp>("out_warps", 64);
   in.add(bins.at({0, 0}, testing::numbers(32)), {0, 3}, 4);  // none pairs
@@ -101,7 +101,7 @@ TEST_P(QruTimedTest, LeftOversOfABinGoOneACycleBeforeTheNext) {
 
 TEST_P(QruTimedTest, TheEndCarriesTheNumberOfWarpsAndBinsGoBackToTc) {
   for (const char* implementation : {"pairing", "pass-through"}) {
-    Bench bench(GetParam(), "qru", implementation, state);
+    Bench bench(GetParam(), "qru", implementation, context);
     Source<BinItem>& in = bench.source<BinItem>("in_quads");
     Sink<Warp>& out = bench.sink<Warp>("out_warps");
     std::vector<BinItem> all;
@@ -110,7 +110,7 @@ TEST_P(QruTimedTest, TheEndCarriesTheNumberOfWarpsAndBinsGoBackToTc) {
     in.add(Bins::end());
     bench.run();
     ASSERT_EQ(out.records().size(), 8U);
-    EXPECT_TRUE(out.records()[7].item.end_of_draw);
+    EXPECT_TRUE(out.records()[7].item.mark == Mark::end_of_frame);
     EXPECT_EQ(out.records()[7].item.sequence, 7U);
     for (const BinItem& bin : all) EXPECT_FALSE(bin.storage->in_use);
     EXPECT_TRUE(bench.unit().idle());
@@ -119,7 +119,7 @@ TEST_P(QruTimedTest, TheEndCarriesTheNumberOfWarpsAndBinsGoBackToTc) {
 
 // case M13
 TEST_P(QruTimedTest, ABinThatDiedInTheTestsLaunchesNothing) {
-  Bench bench(GetParam(), "qru", "pairing", state);
+  Bench bench(GetParam(), "qru", "pairing", context);
   Source<BinItem>& in = bench.source<BinItem>("in_quads");
   Sink<Warp>& out = bench.sink<Warp>("out_warps");
   in.add(bins.of({0, 0}, {}));
@@ -130,7 +130,7 @@ TEST_P(QruTimedTest, ABinThatDiedInTheTestsLaunchesNothing) {
 }
 
 TEST_P(QruTimedTest, ABlockedReceiverStopsItUntilACycleAfterItTakes) {
-  Bench bench(GetParam(), "qru", "pairing", state, {{"quads_per_cycle", "8"}, {"latency_cycles", "1"}});
+  Bench bench(GetParam(), "qru", "pairing", context, {{"quads_per_cycle", "8"}, {"latency_cycles", "1"}});
   Source<BinItem>& in = bench.source<BinItem>("in_quads", 16);
   Sink<Warp>& out = bench.sink<Warp>("out_warps", 1);
   for (unsigned i = 0; i < 3; ++i) in.add(pairs(8));
@@ -148,7 +148,8 @@ std::vector<std::uint32_t> contents(const Sink<Warp>& sink) {
   std::vector<std::uint32_t> all;
   for (const auto& record : sink.records()) {
     const Warp& warp = record.item;
-    all.insert(all.end(), {warp.sequence, warp.tile_sequence, warp.merge_pairs, warp.tile.x, warp.end_of_draw});
+    all.insert(all.end(),
+               {warp.sequence, warp.tile_sequence, warp.merge_pairs, warp.tile.x, warp.mark == Mark::end_of_frame});
     for (unsigned i = 0; i < warp.count; ++i) all.push_back(warp.quads[i].splat);
   }
   return all;
@@ -190,12 +191,12 @@ class ManyBins {
 
 TEST_P(QruTimedTest, WithRoomToSpareWarpsLeaveWhenTheyDoAtCycle) {
   for (const char* implementation : {"pairing", "pass-through"}) {
-    Bench cycle("qru", implementation, state);
+    Bench cycle("qru", implementation, context);
     ManyBins().add_to(cycle.source<QuadBeat>("in_quads", 128));
     const Sink<Warp>& expected = cycle.sink<Warp>("out_warps", 256);
     cycle.run();
     const std::vector<Cycle> cycles = cycles_of(expected);
-    Bench bench(GetParam(), "qru", implementation, state);
+    Bench bench(GetParam(), "qru", implementation, context);
     ManyBins().add_to(bench.source<BinItem>("in_quads", 128), bins);
     const Sink<Warp>& out = bench.sink<Warp>("out_warps", 256);
     bench.run();
@@ -207,14 +208,14 @@ TEST_P(QruTimedTest, WarpsAreThoseOfCycleUnderAnyStalls) {
   for (const char* implementation : {"pairing", "pass-through"}) {
     std::vector<std::uint32_t> expected;
     {
-      Bench cycle("qru", implementation, state);
+      Bench cycle("qru", implementation, context);
       ManyBins().add_to(cycle.source<QuadBeat>("in_quads"));
       const Sink<Warp>& out = cycle.sink<Warp>("out_warps");
       cycle.run();
       expected = contents(out);
     }
     for (std::uint64_t seed = 0; seed < 100; ++seed) {
-      Bench bench(GetParam(), "qru", implementation, state);
+      Bench bench(GetParam(), "qru", implementation, context);
       Source<BinItem>& in = bench.source<BinItem>("in_quads", static_cast<unsigned>(1 + seed % 10));
       Sink<Warp>& out = bench.sink<Warp>("out_warps", static_cast<unsigned>(1 + seed % 9));
       ManyBins().add_to(in, bins);

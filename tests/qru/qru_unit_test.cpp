@@ -17,13 +17,13 @@ const std::vector<unsigned> eight{0, 1, 2, 3, 4, 5, 6, 7};
 
 class QruUnitTest : public ::testing::Test {
  protected:
-  QruUnitTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) {}
+  QruUnitTest() : draw(testing::draw_of(64, 64)), context(testing::context_of(draw)) {}
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 TEST_F(QruUnitTest, AWarpIsSeenTheLatencyAfterItsLastQuad) {
-  Bench bench("qru", "pairing", state, {{"latency_cycles", "6"}});
+  Bench bench("qru", "pairing", context, {{"latency_cycles", "6"}});
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
   Sink<Warp>& out = bench.sink<Warp>("out_warps");
   in.add(beat_of({0, 0}, {1, 1, 2, 2, 3, 3, 4, 4}), 10);
@@ -34,7 +34,7 @@ TEST_F(QruUnitTest, AWarpIsSeenTheLatencyAfterItsLastQuad) {
 
 TEST_F(QruUnitTest, ExaminesItsQuadsPerCycle) {
   for (const unsigned rate : {1U, 2U, 4U, 8U}) {
-    Bench bench("qru", "pairing", state, {{"quads_per_cycle", std::to_string(rate)}});
+    Bench bench("qru", "pairing", context, {{"quads_per_cycle", std::to_string(rate)}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 64);
     Sink<Warp>& out = bench.sink<Warp>("out_warps", 64);
     // Pairs as they come: a warp every 8 quads.
@@ -46,7 +46,7 @@ TEST_F(QruUnitTest, ExaminesItsQuadsPerCycle) {
 }
 
 TEST_F(QruUnitTest, LaunchesOneWarpACycleAndTheLeftOversOfABinBeforeTheNext) {
-  Bench bench("qru", "pairing", state, {{"latency_cycles", "1"}});
+  Bench bench("qru", "pairing", context, {{"latency_cycles", "1"}});
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 64);
   Sink<Warp>& out = bench.sink<Warp>("out_warps", 64);
   for (unsigned i = 0; i < 4; ++i) {
@@ -63,14 +63,14 @@ TEST_F(QruUnitTest, LaunchesOneWarpACycleAndTheLeftOversOfABinBeforeTheNext) {
 
 TEST_F(QruUnitTest, TheEndCarriesTheNumberOfWarps) {
   for (const char* implementation : {"pairing", "pass-through"}) {
-    Bench bench("qru", implementation, state);
+    Bench bench("qru", implementation, context);
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
     Sink<Warp>& out = bench.sink<Warp>("out_warps");
     for (unsigned i = 0; i < 7; ++i) in.add(beat_of({0, 0}, eight, 8 * i, true));
     in.add(end_beat());
     bench.run();
     ASSERT_EQ(out.records().size(), 8U);
-    EXPECT_TRUE(out.records()[7].item.end_of_draw);
+    EXPECT_TRUE(out.records()[7].item.mark == Mark::end_of_frame);
     EXPECT_EQ(out.records()[7].item.sequence, 7U);
     EXPECT_TRUE(bench.unit().idle());
   }
@@ -78,7 +78,7 @@ TEST_F(QruUnitTest, TheEndCarriesTheNumberOfWarps) {
 
 // case M13
 TEST_F(QruUnitTest, ABinThatDiedInTheTestsLaunchesNothing) {
-  Bench bench("qru", "pairing", state);
+  Bench bench("qru", "pairing", context);
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
   Sink<Warp>& out = bench.sink<Warp>("out_warps");
   in.add(beat_of({0, 0}, {}, 0, true));
@@ -89,7 +89,7 @@ TEST_F(QruUnitTest, ABinThatDiedInTheTestsLaunchesNothing) {
 }
 
 TEST_F(QruUnitTest, ABlockedReceiverStopsItUntilACycleAfterItTakes) {
-  Bench bench("qru", "pairing", state, {{"latency_cycles", "1"}});
+  Bench bench("qru", "pairing", context, {{"latency_cycles", "1"}});
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 16);
   Sink<Warp>& out = bench.sink<Warp>("out_warps", 1);
   for (unsigned i = 0; i < 3; ++i) in.add(beat_of({0, 0}, {1, 1, 2, 2, 3, 3, 4, 4}, 8 * i, i == 2));
@@ -103,7 +103,7 @@ TEST_F(QruUnitTest, WarpsAreTheSameUnderAnyStalls) {
   for (const char* implementation : {"pairing", "pass-through"}) {
     std::vector<std::uint32_t> expected;
     for (std::uint64_t seed = 0; seed < 100; ++seed) {
-      Bench bench("qru", implementation, state);
+      Bench bench("qru", implementation, context);
       Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", static_cast<unsigned>(1 + seed % 4));
       Sink<Warp>& out = bench.sink<Warp>("out_warps", static_cast<unsigned>(1 + seed % 3));
       std::uint32_t next = 0;
@@ -121,7 +121,8 @@ TEST_F(QruUnitTest, WarpsAreTheSameUnderAnyStalls) {
       std::vector<std::uint32_t> got;
       for (const auto& record : out.records()) {
         const Warp& warp = record.item;
-        got.insert(got.end(), {warp.sequence, warp.tile_sequence, warp.merge_pairs, warp.tile.x, warp.end_of_draw});
+        got.insert(got.end(),
+                   {warp.sequence, warp.tile_sequence, warp.merge_pairs, warp.tile.x, warp.mark == Mark::end_of_frame});
         for (unsigned i = 0; i < warp.count; ++i) got.push_back(warp.quads[i].splat);
       }
       if (seed == 0) expected = got;

@@ -12,16 +12,16 @@
 namespace vrpipe {
 namespace {
 
+using testing::context_of;
 using testing::Coverage;
 using testing::draw_of;
 using testing::flat_box;
 using testing::rasterize;
-using testing::state_of;
 
-RenderState unpadded(const Draw& draw) {
-  RenderState state = state_of(draw);
-  state.obb_padding = 0;
-  return state;
+RenderContext unpadded(const Draw& draw) {
+  RenderContext context = context_of(draw);
+  testing::change_state(context, [&](DrawState& drawn) { drawn.obb_padding = 0; });
+  return context;
 }
 
 Coverage cover(const Draw& draw) { return rasterize(unpadded(draw)); }
@@ -105,7 +105,7 @@ TEST(TileRasterizer, ADiagonalThroughSampleCentresGivesEachSampleToOneTriangle) 
 TEST(TileRasterizer, TheTwoTrianglesOfASplatNeverShareASample) {
   const Draw all = testing::random_draw(64, 64, 400, 11);
   for (const Splat& splat : all.splats) {
-    const Coverage coverage = rasterize(state_of(draw_of(64, 64, {splat})));
+    const Coverage coverage = rasterize(context_of(draw_of(64, 64, {splat})));
     ASSERT_LE(*std::max_element(coverage.times.begin(), coverage.times.end()), 1U);
   }
 }
@@ -200,9 +200,9 @@ TEST(TileRasterizer, FewerSubpixelBitsMoveEdgesByLessThanAStep) {
         t.y[v] = testing::uniform(i, 30 + v, 0, 64);
       }
       const Draw draw = triangles_of(64, 64, {t});
-      RenderState state = unpadded(draw);
-      state.subpixel_bits = bits;
-      const Coverage coverage = rasterize(state);
+      RenderContext context = unpadded(draw);
+      context.precision.subpixel_bits = bits;
+      const Coverage coverage = rasterize(context);
       for (std::uint32_t y = 0; y < 64; ++y) {
         for (std::uint32_t x = 0; x < 64; ++x) {
           // Signed distance to the nearest edge of the unsnapped triangle, in double.
@@ -236,9 +236,9 @@ TEST(TileRasterizer, AtTheImagesEdgeThereIsNoSampleOutside) {
   for (const std::uint32_t width : {1U, 2U, 15U, 16U, 17U, 63U, 64U, 65U}) {
     for (const std::uint32_t height : {1U, 2U, 15U, 16U, 17U, 65U}) {
       const Draw draw = testing::random_draw(width, height, 30, width * 100 + height);
-      const RenderState state = state_of(draw);
-      const Coverage coverage = rasterize(state);  // .at() throws outside
-      const Coverage exact = testing::cover_exactly(state);
+      const RenderContext context = context_of(draw);
+      const Coverage coverage = rasterize(context);  // .at() throws outside
+      const Coverage exact = testing::cover_exactly(context);
       ASSERT_EQ(coverage.times, exact.times) << width << "x" << height;
       ASSERT_EQ(coverage.quads, exact.quads) << width << "x" << height;
     }
@@ -261,13 +261,13 @@ TEST(TileRasterizer, AnImageOfOnePixelIsOneQuadWithOneSample) {
 // case R12
 TEST(TileRasterizer, TheLastPixelOfTheLargestImageIsReached) {
   const Draw draw = draw_of(16384, 16384, {flat_box(16383.1F, 16383.1F, 16383.9F, 16383.9F, 0.5F)});
-  const RenderState state = unpadded(draw);
+  const RenderContext context = unpadded(draw);
   const PrimitiveAssembly::Parameters vpo_parameters;
   const TileRasterizer::Parameters raster_parameters;
-  PrimitiveAssembly vpo(vpo_parameters, state);
-  TileRasterizer raster(raster_parameters, state);
+  PrimitiveAssembly vpo(vpo_parameters, context);
+  TileRasterizer raster(raster_parameters, context);
   std::array<Primitive, 2> primitives;
-  const unsigned count = vpo.assemble(0, primitives);
+  const unsigned count = vpo.assemble(0, 0, primitives);
   QuadBeat beat;
   unsigned tests = 0;
   bool new_screen_tile = false;
@@ -294,8 +294,8 @@ TEST(TileRasterizer, ThinDiagonalsThroughTileCornersAreCoveredExactly) {
   }
   for (const ScreenTriangle& sliver : slivers) {
     const Draw draw = triangles_of(128, 128, {sliver});
-    const RenderState state = unpadded(draw);
-    ASSERT_EQ(rasterize(state).times, testing::cover_exactly(state).times);
+    const RenderContext context = unpadded(draw);
+    ASSERT_EQ(rasterize(context).times, testing::cover_exactly(context).times);
   }
 }
 
@@ -314,10 +314,10 @@ TEST(TileRasterizer, RandomTrianglesOfEverySizeAreCoveredExactly) {
     }
     const Draw draw = triangles_of(64, 64, {t});
     for (const unsigned bits : {4U, 8U, 12U}) {
-      RenderState state = unpadded(draw);
-      state.subpixel_bits = bits;
-      const Coverage got = rasterize(state);
-      const Coverage want = testing::cover_exactly(state);
+      RenderContext context = unpadded(draw);
+      context.precision.subpixel_bits = bits;
+      const Coverage got = rasterize(context);
+      const Coverage want = testing::cover_exactly(context);
       ASSERT_EQ(got.times, want.times) << i << " at " << bits << " bits";
       ASSERT_EQ(got.quads, want.quads);
     }
@@ -345,31 +345,31 @@ TEST(TileRasterizer, EdgesJustShortOfNeeding64BitsAreCoveredExactlyAndWithoutOve
 
 TEST(TileRasterizer, AClipCutsAtItsPixelsAndClipsThatTileTheScreenLoseNothing) {
   const Draw draw = testing::random_draw(128, 128, 60, 5);
-  const RenderState state = state_of(draw);
-  Coverage sum = rasterize(state, {0, 0, 0, 0});
+  const RenderContext context = context_of(draw);
+  Coverage sum = rasterize(context, {0, 0, 0, 0});
   EXPECT_EQ(sum.fragments, 0U);
   for (std::int32_t y = 0; y < 128; y += 64) {
     for (std::int32_t x = 0; x < 128; x += 64) {
-      const Coverage part = rasterize(state, {x, y, x + 64, y + 64});
+      const Coverage part = rasterize(context, {x, y, x + 64, y + 64});
       for (std::size_t i = 0; i < sum.times.size(); ++i) sum.times[i] += part.times[i];
     }
   }
-  EXPECT_EQ(sum.times, rasterize(state).times);
+  EXPECT_EQ(sum.times, rasterize(context).times);
 }
 
 TEST(TileRasterizer, GpcsShareTheSamplesOutAmongThem) {
   const Draw draw = testing::random_draw(128, 128, 60, 6);
-  RenderState state = state_of(draw);
-  const Coverage whole = rasterize(state);
+  RenderContext context = context_of(draw);
+  const Coverage whole = rasterize(context);
   std::vector<unsigned> sum(whole.times.size());
-  state.gpcs = 4;
-  for (state.gpc = 0; state.gpc < 4; ++state.gpc) {
-    const Coverage part = rasterize(state);
+  context.placement.gpcs = 4;
+  for (context.placement.gpc = 0; context.placement.gpc < 4; ++context.placement.gpc) {
+    const Coverage part = rasterize(context);
     for (std::size_t i = 0; i < sum.size(); ++i) {
       sum[i] += part.times[i];
       const TileId tile{static_cast<std::uint16_t>(i % 128 / 16), static_cast<std::uint16_t>(i / 128 / 16)};
       if (part.times[i] > 0) {
-        ASSERT_EQ(owner_of(tile, 4), state.gpc);
+        ASSERT_EQ(owner_of(tile, 4), context.placement.gpc);
       }
     }
   }
@@ -380,7 +380,7 @@ TEST(TileRasterizer, GpcsShareTheSamplesOutAmongThem) {
 TEST(TileRasterizer, ABoxWithoutExtentCoversASampleOnItsCentreWhenPaddedAndNothingElse) {
   for (const float x : {3.5F, 3.52F}) {
     const Draw draw = draw_of(16, 16, {Splat{x, 3.5F, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1.0F / 255.0F}});
-    EXPECT_EQ(rasterize(state_of(draw)).fragments, x == 3.5F ? 1U : 0U);
+    EXPECT_EQ(rasterize(context_of(draw)).fragments, x == 3.5F ? 1U : 0U);
     EXPECT_EQ(rasterize(unpadded(draw)).fragments, 0U);
   }
 }
@@ -388,7 +388,7 @@ TEST(TileRasterizer, ABoxWithoutExtentCoversASampleOnItsCentreWhenPaddedAndNothi
 // case O04
 TEST(TileRasterizer, ABoxJustAboveOne255thCoversASampleOnItsCentre) {
   const Draw draw = draw_of(16, 16, {testing::round_splat(3.5F, 3.5F, 0.55F, std::nextafter(1.0F / 255.0F, 1.0F))});
-  EXPECT_EQ(rasterize(state_of(draw)).fragments, 1U);
+  EXPECT_EQ(rasterize(context_of(draw)).fragments, 1U);
 }
 
 // case O07
@@ -401,10 +401,10 @@ TEST(TileRasterizer, BoxesThinnerThanASubpixelCoverNoSampleTwice) {
     const Draw draw = draw_of(64, 64,
                               {Splat{testing::uniform(i, 62, 10, 50), testing::uniform(i, 63, 10, 50), c, s, -s * thin,
                                      c * thin, 3, 0, 1, 1, 1, 1}});
-    for (const RenderState& state : {state_of(draw), unpadded(draw)}) {
-      const Coverage coverage = rasterize(state);
+    for (const RenderContext& context : {context_of(draw), unpadded(draw)}) {
+      const Coverage coverage = rasterize(context);
       ASSERT_LE(*std::max_element(coverage.times.begin(), coverage.times.end()), 1U);
-      ASSERT_EQ(coverage.times, testing::cover_exactly(state).times);
+      ASSERT_EQ(coverage.times, testing::cover_exactly(context).times);
     }
   }
 }
@@ -415,7 +415,7 @@ TEST(TileRasterizer, WithPaddingNoSampleInsideABoxIsLost) {
   for (const Splat& splat : all.splats) {
     if (splat.r == 0) continue;
     const Draw draw = draw_of(64, 64, {splat});
-    const Coverage coverage = rasterize(state_of(draw));
+    const Coverage coverage = rasterize(context_of(draw));
     for (std::uint32_t y = 0; y < 64; ++y) {
       for (std::uint32_t x = 0; x < 64; ++x) {
         const double dx = x + 0.5 - static_cast<double>(splat.cx);
@@ -439,11 +439,11 @@ TEST(TileRasterizer, AnAlignedEvenRectangleHasOnlyFullQuadsButOnItsDiagonal) {
   Draw draw = draw_of(64, 64, std::vector<Splat>(1));
   // One triangle twice the rectangle covers it without a diagonal.
   draw.triangles = {{{8, 8 + 32, 8}, {8, 8, 8 + 32}}};
-  const RenderState state = unpadded(draw);
-  const Coverage coverage = rasterize(state, {8, 8, 24, 24});
+  const RenderContext context = unpadded(draw);
+  const Coverage coverage = rasterize(context, {8, 8, 24, 24});
   EXPECT_EQ(coverage.fragments, 256U);
   EXPECT_EQ(coverage.quads, 64U);
-  const Coverage random = rasterize(state_of(testing::random_draw(64, 64, 100, 3)));
+  const Coverage random = rasterize(context_of(testing::random_draw(64, 64, 100, 3)));
   EXPECT_GE(4 * random.quads, random.fragments);
 }
 

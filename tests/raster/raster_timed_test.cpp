@@ -16,7 +16,9 @@ using testkit::Source;
 
 class RasterTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
-  RasterTimedTest() : draw(testing::draw_of(128, 128)), state(testing::state_of(draw)) { state.obb_padding = 0; }
+  RasterTimedTest() : draw(testing::draw_of(128, 128)), context(testing::context_of(draw)) {
+    testing::change_state(context, [&](DrawState& drawn) { drawn.obb_padding = 0; });
+  }
 
   /// The jobs of all triangles of the draw, unclipped.
   std::vector<RasterJob> jobs() const {
@@ -24,11 +26,11 @@ class RasterTimedTest : public ::testing::TestWithParam<Fidelity> {
     for (std::uint32_t splat = 0; splat < draw.splats.size(); ++splat) {
       for (unsigned triangle = 0; triangle < triangles_per_splat(draw); ++triangle) {
         SnappedTriangle snapped;
-        if (!snap_triangle(state, splat, triangle, snapped) || doubled_area(snapped) == 0) continue;
+        if (!snap_triangle(context, 0, splat, triangle, snapped) || doubled_area(snapped) == 0) continue;
         RasterJob job;
         job.primitive.splat = splat;
         job.primitive.triangle = static_cast<std::uint8_t>(triangle);
-        job.primitive.bounds = covered_bounds(snapped, state.subpixel_bits, draw.width, draw.height);
+        job.primitive.bounds = covered_bounds(snapped, context.precision.subpixel_bits, draw.width, draw.height);
         job.clip = job.primitive.bounds;
         if (!job.primitive.bounds.empty()) all.push_back(job);
       }
@@ -44,15 +46,15 @@ class RasterTimedTest : public ::testing::TestWithParam<Fidelity> {
   void add_one_quad(float x) { add_triangle(testing::one_quad_triangle(x, 4)); }
 
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 INSTANTIATE_TEST_SUITE_P(Fidelities, RasterTimedTest, ::testing::ValuesIn(testing::fidelities_with_time()),
                          testing::name_of_fidelity);
 
-RasterJob end_of_draw() {
+RasterJob end_of_frame() {
   RasterJob job;
-  job.end_of_draw = true;
+  job.mark = Mark::end_of_frame;
   return job;
 }
 
@@ -65,7 +67,7 @@ std::uint64_t quads_in(const Sink<QuadBeat>& sink) {
 TEST_P(RasterTimedTest, TheFirstQuadIsSeenTheSetUpLatencyAfterTheJob) {
   add_one_quad(4);
   for (const unsigned latency : {1U, 10U}) {
-    Bench bench(GetParam(), "raster", "tile-rasterizer", state, {{"setup_latency_cycles", std::to_string(latency)}});
+    Bench bench(GetParam(), "raster", "tile-rasterizer", context, {{"setup_latency_cycles", std::to_string(latency)}});
     Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads");
     in.add(jobs()[0], 10);
@@ -77,7 +79,7 @@ TEST_P(RasterTimedTest, TheFirstQuadIsSeenTheSetUpLatencyAfterTheJob) {
 TEST_P(RasterTimedTest, HandsOverItsQuadsPerCycle) {
   add_full();
   for (const unsigned rate : {1U, 3U, 4U, 8U, 16U}) {
-    Bench bench(GetParam(), "raster", "tile-rasterizer", state,
+    Bench bench(GetParam(), "raster", "tile-rasterizer", context,
                 {{"quads_per_cycle", std::to_string(rate)},
                  {"setup_latency_cycles", "10"},
                  {"coarse_tiles_per_cycle", "64"}});
@@ -97,7 +99,7 @@ TEST_P(RasterTimedTest, MakesItsFineTilesPerCycle) {
   // cycle.
   add_triangle({{-1, 200, -1}, {3.9F, 4.6F, 5.3F}});
   for (const unsigned rate : {1U, 2U}) {
-    Bench bench(GetParam(), "raster", "tile-rasterizer", state,
+    Bench bench(GetParam(), "raster", "tile-rasterizer", context,
                 {{"fine_tiles_per_cycle", std::to_string(rate)}, {"coarse_tiles_per_cycle", "64"}});
     Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 64);
@@ -111,7 +113,7 @@ TEST_P(RasterTimedTest, MakesItsFineTilesPerCycle) {
 
 TEST_P(RasterTimedTest, PrimitiveAndScreenTilePairsComeAtTheirInterval) {
   for (float x = 0; x < 128; x += 16) add_one_quad(x + 4);
-  Bench bench(GetParam(), "raster", "tile-rasterizer", state,
+  Bench bench(GetParam(), "raster", "tile-rasterizer", context,
               {{"screen_tile_interval_cycles", "5"}, {"setup_latency_cycles", "10"}});
   Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", 16);
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 16);
@@ -124,7 +126,7 @@ TEST_P(RasterTimedTest, PrimitiveAndScreenTilePairsComeAtTheirInterval) {
 
 TEST_P(RasterTimedTest, SetUpsComeAtTheirInterval) {
   for (int i = 0; i < 8; ++i) add_one_quad(4);
-  Bench bench(GetParam(), "raster", "tile-rasterizer", state,
+  Bench bench(GetParam(), "raster", "tile-rasterizer", context,
               {{"setup_interval_cycles", "7"}, {"setup_latency_cycles", "10"}});
   Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", 16);
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 16);
@@ -141,7 +143,7 @@ TEST_P(RasterTimedTest, APrimitiveWithoutSamplesCostsItsCoarseTests) {
   add_triangle({{0.7F, 128, 128}, {0.2F, 127.2F, 127.3F}});
   add_one_quad(4);
   for (const unsigned rate : {1U, 4U, 16U}) {
-    Bench bench(GetParam(), "raster", "tile-rasterizer", state,
+    Bench bench(GetParam(), "raster", "tile-rasterizer", context,
                 {{"coarse_tiles_per_cycle", std::to_string(rate)}, {"setup_latency_cycles", "10"}});
     Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 64);
@@ -154,20 +156,20 @@ TEST_P(RasterTimedTest, APrimitiveWithoutSamplesCostsItsCoarseTests) {
 
 TEST_P(RasterTimedTest, TheEndComesLast) {
   add_full();
-  Bench bench(GetParam(), "raster", "tile-rasterizer", state);
+  Bench bench(GetParam(), "raster", "tile-rasterizer", context);
   Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 1);
   in.add(jobs()[0]);
-  in.add(end_of_draw());
+  in.add(end_of_frame());
   bench.run();
-  EXPECT_TRUE(out.records().back().item.end_of_draw);
+  EXPECT_TRUE(out.records().back().item.mark == Mark::end_of_frame);
   EXPECT_EQ(quads_in(out), 4096U);
   EXPECT_TRUE(bench.unit().idle());
 }
 
 TEST_P(RasterTimedTest, ABlockedReceiverStopsItUntilACycleAfterItTakes) {
   add_full();
-  Bench bench(GetParam(), "raster", "tile-rasterizer", state, {{"setup_latency_cycles", "1"}});
+  Bench bench(GetParam(), "raster", "tile-rasterizer", context, {{"setup_latency_cycles", "1"}});
   Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 4);
   in.add(jobs()[0]);
@@ -195,11 +197,11 @@ TEST_P(RasterTimedTest, QuadsAndTheirOrderAreTheSameUnderAnyStalls) {
   std::vector<std::uint64_t> expected;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     // What is to come out is what cycle makes of it undisturbed.
-    Bench bench(seed == 0 ? Fidelity::cycle : GetParam(), "raster", "tile-rasterizer", state);
+    Bench bench(seed == 0 ? Fidelity::cycle : GetParam(), "raster", "tile-rasterizer", context);
     Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", static_cast<unsigned>(1 + seed % 10));
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", static_cast<unsigned>(1 + seed % 9));
     for (const RasterJob& job : all) in.add(job);
-    in.add(end_of_draw());
+    in.add(end_of_frame());
     if (seed > 0) bench.stall_randomly(seed, 80);
     bench.run();
     std::vector<std::uint64_t> quads;

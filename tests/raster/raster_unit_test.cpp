@@ -16,7 +16,9 @@ using testkit::Source;
 
 class RasterUnitTest : public ::testing::Test {
  protected:
-  RasterUnitTest() : draw(testing::draw_of(128, 128)), state(testing::state_of(draw)) { state.obb_padding = 0; }
+  RasterUnitTest() : draw(testing::draw_of(128, 128)), context(testing::context_of(draw)) {
+    testing::change_state(context, [&](DrawState& drawn) { drawn.obb_padding = 0; });
+  }
 
   /// The jobs of all triangles of the draw, unclipped.
   std::vector<RasterJob> jobs() const {
@@ -24,11 +26,11 @@ class RasterUnitTest : public ::testing::Test {
     for (std::uint32_t splat = 0; splat < draw.splats.size(); ++splat) {
       for (unsigned triangle = 0; triangle < triangles_per_splat(draw); ++triangle) {
         SnappedTriangle snapped;
-        if (!snap_triangle(state, splat, triangle, snapped) || doubled_area(snapped) == 0) continue;
+        if (!snap_triangle(context, 0, splat, triangle, snapped) || doubled_area(snapped) == 0) continue;
         RasterJob job;
         job.primitive.splat = splat;
         job.primitive.triangle = static_cast<std::uint8_t>(triangle);
-        job.primitive.bounds = covered_bounds(snapped, state.subpixel_bits, draw.width, draw.height);
+        job.primitive.bounds = covered_bounds(snapped, context.precision.subpixel_bits, draw.width, draw.height);
         job.clip = job.primitive.bounds;
         if (!job.primitive.bounds.empty()) all.push_back(job);
       }
@@ -43,12 +45,12 @@ class RasterUnitTest : public ::testing::Test {
   void add_full() { add_triangle({{-1, 300, -1}, {-1, -1, 300}}); }
 
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
-RasterJob end_of_draw() {
+RasterJob end_of_frame() {
   RasterJob job;
-  job.end_of_draw = true;
+  job.mark = Mark::end_of_frame;
   return job;
 }
 
@@ -60,7 +62,7 @@ std::uint64_t quads_in(const Sink<QuadBeat>& sink) {
 
 TEST_F(RasterUnitTest, TheFirstQuadIsSeenTheSetUpLatencyAfterTheJob) {
   add_triangle(testing::one_quad_triangle(4, 4));
-  Bench bench("raster", "tile-rasterizer", state);
+  Bench bench("raster", "tile-rasterizer", context);
   Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads");
   in.add(jobs()[0], 10);
@@ -72,7 +74,7 @@ TEST_F(RasterUnitTest, TheFirstQuadIsSeenTheSetUpLatencyAfterTheJob) {
 TEST_F(RasterUnitTest, MakesItsFineTilesPerCycle) {
   add_full();
   for (const unsigned rate : {1U, 2U}) {
-    Bench bench("raster", "tile-rasterizer", state,
+    Bench bench("raster", "tile-rasterizer", context,
                 {{"fine_tiles_per_cycle", std::to_string(rate)},
                  {"quads_per_cycle", "16"},
                  {"coarse_tiles_per_cycle", "64"}});
@@ -89,7 +91,7 @@ TEST_F(RasterUnitTest, MakesItsFineTilesPerCycle) {
 TEST_F(RasterUnitTest, HandsOverItsQuadsPerCycle) {
   add_full();
   for (const unsigned rate : {1U, 4U, 8U, 16U}) {
-    Bench bench("raster", "tile-rasterizer", state, {{"quads_per_cycle", std::to_string(rate)}});
+    Bench bench("raster", "tile-rasterizer", context, {{"quads_per_cycle", std::to_string(rate)}});
     Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 64);
     in.add(jobs()[0]);
@@ -102,7 +104,7 @@ TEST_F(RasterUnitTest, HandsOverItsQuadsPerCycle) {
 
 TEST_F(RasterUnitTest, PrimitiveAndScreenTilePairsComeAtTheirInterval) {
   for (float x = 0; x < 128; x += 16) add_triangle(testing::one_quad_triangle(x + 4, 4));
-  Bench bench("raster", "tile-rasterizer", state, {{"screen_tile_interval_cycles", "5"}});
+  Bench bench("raster", "tile-rasterizer", context, {{"screen_tile_interval_cycles", "5"}});
   Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", 16);
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 16);
   for (const RasterJob& job : jobs()) in.add(job);
@@ -113,7 +115,7 @@ TEST_F(RasterUnitTest, PrimitiveAndScreenTilePairsComeAtTheirInterval) {
 
 TEST_F(RasterUnitTest, SetUpsComeAtTheirInterval) {
   for (int i = 0; i < 8; ++i) add_triangle(testing::one_quad_triangle(4, 4));
-  Bench bench("raster", "tile-rasterizer", state, {{"setup_interval_cycles", "7"}});
+  Bench bench("raster", "tile-rasterizer", context, {{"setup_interval_cycles", "7"}});
   Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", 16);
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 16);
   for (const RasterJob& job : jobs()) in.add(job);
@@ -127,7 +129,7 @@ TEST_F(RasterUnitTest, APrimitiveWithoutSamplesCostsItsCoarseTests) {
   add_triangle({{0.7F, 128, 128}, {0.2F, 127.2F, 127.3F}});
   add_triangle(testing::one_quad_triangle(4, 4));
   for (const unsigned rate : {1U, 4U}) {
-    Bench bench("raster", "tile-rasterizer", state, {{"coarse_tiles_per_cycle", std::to_string(rate)}});
+    Bench bench("raster", "tile-rasterizer", context, {{"coarse_tiles_per_cycle", std::to_string(rate)}});
     Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 64);
     for (const RasterJob& job : jobs()) in.add(job);
@@ -139,20 +141,20 @@ TEST_F(RasterUnitTest, APrimitiveWithoutSamplesCostsItsCoarseTests) {
 
 TEST_F(RasterUnitTest, TheEndComesLast) {
   add_full();
-  Bench bench("raster", "tile-rasterizer", state);
+  Bench bench("raster", "tile-rasterizer", context);
   Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 1);
   in.add(jobs()[0]);
-  in.add(end_of_draw());
+  in.add(end_of_frame());
   bench.run();
-  EXPECT_TRUE(out.records().back().item.end_of_draw);
+  EXPECT_TRUE(out.records().back().item.mark == Mark::end_of_frame);
   EXPECT_EQ(quads_in(out), 4096U);
   EXPECT_TRUE(bench.unit().idle());
 }
 
 TEST_F(RasterUnitTest, ABlockedReceiverStopsItUntilACycleAfterItTakes) {
   add_full();
-  Bench bench("raster", "tile-rasterizer", state, {{"setup_latency_cycles", "1"}});
+  Bench bench("raster", "tile-rasterizer", context, {{"setup_latency_cycles", "1"}});
   Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 2);
   in.add(jobs()[0]);
@@ -168,11 +170,11 @@ TEST_F(RasterUnitTest, QuadsAndTheirOrderAreTheSameUnderAnyStalls) {
   const std::vector<RasterJob> all = jobs();
   std::vector<std::uint64_t> expected;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    Bench bench("raster", "tile-rasterizer", state);
+    Bench bench("raster", "tile-rasterizer", context);
     Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", static_cast<unsigned>(1 + seed % 4));
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", static_cast<unsigned>(1 + seed % 3));
     for (const RasterJob& job : all) in.add(job);
-    in.add(end_of_draw());
+    in.add(end_of_frame());
     if (seed > 0) bench.stall_randomly(seed, 80);
     bench.run();
     std::vector<std::uint64_t> quads;

@@ -19,7 +19,7 @@ using testing::round_splat;
 /// A shader for a few splats, one quad or pair at a time.
 struct Shader {
   explicit Shader(std::vector<Splat> splats, std::uint32_t width = 64, std::uint32_t height = 64)
-      : draw(draw_of(width, height, std::move(splats))), state(testing::state_of(draw)), sm(parameters, state) {}
+      : draw(draw_of(width, height, std::move(splats))), context(testing::context_of(draw)), sm(parameters, context) {}
 
   ShadedWarp shade(std::vector<Quad> quads, std::uint8_t merge_pairs = 0, TileId tile = {0, 0}) {
     Warp warp;
@@ -32,13 +32,13 @@ struct Shader {
   }
 
   Draw draw;
-  RenderState state;
+  RenderContext context;
   SplatShader::Parameters parameters;
   SplatShader sm;
 };
 
 Quad quad_of(std::uint32_t splat, unsigned position = 0, LaneMask coverage = all_lanes, std::uint8_t triangle = 0) {
-  return {splat, static_cast<std::uint8_t>(position), coverage, triangle, 0};
+  return {splat, static_cast<std::uint8_t>(position), coverage, static_cast<std::uint16_t>(triangle & 1U), 0};
 }
 
 /// Alpha of a splat at a point, in double.
@@ -54,13 +54,13 @@ double alpha_at(const Splat& splat, double x, double y) {
 // case R15
 TEST(SplatShader, MoreWarpsThanSlotsHaveNumbersAreRefused) {
   const Draw draw = draw_of(64, 64, {});
-  const RenderState state = testing::state_of(draw);
+  const RenderContext context = testing::context_of(draw);
   SplatShader::Parameters parameters;
   parameters.cores = 255;
   parameters.warps_per_core = 256;
-  EXPECT_NO_THROW(SplatShader(parameters, state));
+  EXPECT_NO_THROW(SplatShader(parameters, context));
   parameters.cores = 256;
-  EXPECT_THROW(SplatShader(parameters, state), UserError);
+  EXPECT_THROW(SplatShader(parameters, context), UserError);
 }
 
 TEST(SplatShader, OneSplatIsItsClosedFormAtEverySample) {
@@ -69,7 +69,7 @@ TEST(SplatShader, OneSplatIsItsClosedFormAtEverySample) {
                                           testing::uniform(i, 2, 0.6F, 8), testing::uniform(i, 3, 0.6F, 8),
                                           testing::uniform(i, 4, 0, 6.2F), testing::uniform(i, 5, 0.1F, 1));
     Shader shader({splat});
-    shader.state.pruning_threshold = 0;
+    testing::change_state(shader.context, [](DrawState& state) { state.pruning_threshold = 0; });
     for (unsigned position = 0; position < 64; position += 9) {
       const ShadedWarp out = shader.shade({quad_of(0, position)});
       ASSERT_EQ(out.count, 1);
@@ -89,7 +89,7 @@ TEST(SplatShader, AtTheCornersOfItsBoxASplatIsROneSigmasOutAlongBothAxes) {
   Splat splat = flat_box(4.5F, 6.5F, 12.5F, 10.5F, 0.5F);
   splat.r = std::sqrt(2 * std::log(255 * 0.5F));
   Shader shader({splat});
-  shader.state.pruning_threshold = 0;
+  testing::change_state(shader.context, [](DrawState& state) { state.pruning_threshold = 0; });
   const ShadedWarp out = shader.shade({quad_of(0, 8 * 5 + 6)});
   EXPECT_NEAR(static_cast<double>(out.color[0].alpha[0]), 1 / (255.0 * 255.0 * 0.5), 1e-9);
 }

@@ -17,7 +17,7 @@ class SmTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
   SmTimedTest()
       : draw(testing::draw_of(64, 64, std::vector<Splat>(64, testing::flat_box(0, 0, 64, 64, 0.5F)))),
-        state(testing::state_of(draw)) {}
+        context(testing::context_of(draw)) {}
 
   Warp warp(std::uint32_t sequence, TileId tile = {0, 0}, std::uint8_t merge_pairs = 0) const {
     Warp result;
@@ -32,7 +32,7 @@ class SmTimedTest : public ::testing::TestWithParam<Fidelity> {
   }
 
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 INSTANTIATE_TEST_SUITE_P(Fidelities, SmTimedTest, ::testing::ValuesIn(testing::fidelities_with_time()),
@@ -40,14 +40,14 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, SmTimedTest, ::testing::ValuesIn(testing::f
 
 /// The unit with everything around it: what is shaded is noted and its slot released at once, or later.
 struct SmBench {
-  SmBench(Fidelity fidelity, const RenderState& state, const Bench::Settings& settings = {}, unsigned in_depth = 64,
+  SmBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {}, unsigned in_depth = 64,
           unsigned out_depth = 64)
-      : bench(fidelity, "sm", "splat-shader", state, settings),
+      : bench(fidelity, "sm", "splat-shader", context, settings),
         warps(bench.source<Warp>("in_warps", in_depth)),
         release(bench.source<WarpRelease>("in_release", 4096)),
         shaded(bench.sink<ShadedWarpItem>("out_shaded", out_depth)) {
     shaded.on_take([this](const ShadedWarpItem& item, Cycle now) {
-      if (item.warp->end_of_draw) {
+      if (item.warp->mark == Mark::end_of_frame) {
         ++ends;
       } else {
         cycles[item.warp->sequence] = now;
@@ -60,7 +60,7 @@ struct SmBench {
   /// With the end of the draw behind the warps: at lt an array hands on what is done when something comes.
   void run() {
     Warp end;
-    end.end_of_draw = true;
+    end.mark = Mark::end_of_frame;
     end.sequence = 1000;
     warps.add(end);
     bench.run();
@@ -83,7 +83,7 @@ constexpr Cycle vertex_cycles = (4 + 16) * 2 + 146 + 75;
 
 TEST_P(SmTimedTest, AWarpAloneTakesItsInstructionsAndLatencies) {
   for (const bool pairs : {false, true}) {
-    SmBench sm(GetParam(), state);
+    SmBench sm(GetParam(), context);
     sm.warps.add(warp(0, {0, 0}, pairs ? 0b0001 : 0), 10);
     sm.run();
     // In hand at 11, seen a link later.
@@ -92,14 +92,14 @@ TEST_P(SmTimedTest, AWarpAloneTakesItsInstructionsAndLatencies) {
 }
 
 TEST_P(SmTimedTest, FewerLanesMakeAnInstructionIssueLonger) {
-  SmBench sm(GetParam(), state, {{"lanes_per_scheduler", "8"}});
+  SmBench sm(GetParam(), context, {{"lanes_per_scheduler", "8"}});
   sm.warps.add(warp(0), 10);
   sm.run();
   EXPECT_EQ(sm.cycles[0], 11 + fragment_cycles + issue_cycles + 1);
 }
 
 TEST_P(SmTimedTest, AnArrayWithRoomToSpareLaunchesAWarpACycle) {
-  SmBench sm(GetParam(), state, {{"warps_to_one_core", "8"}}, 256, 256);
+  SmBench sm(GetParam(), context, {{"warps_to_one_core", "8"}}, 256, 256);
   for (std::uint32_t i = 0; i < 200; ++i) sm.warps.add(warp(i));
   sm.run();
   ASSERT_EQ(sm.cycles.size(), 200U);
@@ -119,7 +119,7 @@ TEST_P(SmTimedTest, AnArrayWithRoomToSpareLaunchesAWarpACycle) {
 }
 
 TEST_P(SmTimedTest, WarpsOfOneSchedulerHideOneAnothersLatencies) {
-  SmBench sm(GetParam(), state, {{"cores", "1"}, {"schedulers_per_core", "1"}});
+  SmBench sm(GetParam(), context, {{"cores", "1"}, {"schedulers_per_core", "1"}});
   for (std::uint32_t i = 0; i < 48; ++i) sm.warps.add(warp(i));
   sm.run();
   ASSERT_EQ(sm.cycles.size(), 48U);
@@ -129,7 +129,7 @@ TEST_P(SmTimedTest, WarpsOfOneSchedulerHideOneAnothersLatencies) {
 }
 
 TEST_P(SmTimedTest, SchedulersWorkSideBySide) {
-  SmBench sm(GetParam(), state, {{"cores", "1"}, {"schedulers_per_core", "4"}});
+  SmBench sm(GetParam(), context, {{"cores", "1"}, {"schedulers_per_core", "4"}});
   for (std::uint32_t i = 0; i < 48; ++i) sm.warps.add(warp(i));
   sm.run();
   // Twelve warps each, the first of which is launched in cycles 1 to 4; a quarter of the time but for the latencies.
@@ -140,7 +140,7 @@ TEST_P(SmTimedTest, SchedulersWorkSideBySide) {
 }
 
 TEST_P(SmTimedTest, AWarpWaitsForASlotUntilACycleAfterItsRelease) {
-  SmBench sm(GetParam(), state, {{"cores", "1"}, {"warps_per_core", "1"}});
+  SmBench sm(GetParam(), context, {{"cores", "1"}, {"warps_per_core", "1"}});
   sm.release_after = 500;
   sm.warps.add(warp(0));
   sm.warps.add(warp(1));
@@ -154,7 +154,7 @@ TEST_P(SmTimedTest, AWarpWaitsForASlotUntilACycleAfterItsRelease) {
 }
 
 TEST_P(SmTimedTest, WarpsWithoutASlotStayOutside) {
-  SmBench sm(GetParam(), state, {{"cores", "1"}, {"warps_per_core", "2"}}, 1);
+  SmBench sm(GetParam(), context, {{"cores", "1"}, {"warps_per_core", "2"}}, 1);
   sm.release_after = never;
   for (std::uint32_t i = 0; i < 5; ++i) sm.warps.add(warp(i));
   if (GetParam() == Fidelity::lt) {
@@ -169,7 +169,7 @@ TEST_P(SmTimedTest, WarpsWithoutASlotStayOutside) {
 TEST_P(SmTimedTest, ConsecutiveWarpsOfATileGoToOneCore) {
   // Two cores of one scheduler: whether two warps share it tells.
   for (const bool together : {false, true}) {
-    SmBench sm(GetParam(), state,
+    SmBench sm(GetParam(), context,
                {{"cores", "2"}, {"schedulers_per_core", "1"}, {"warps_to_one_core", together ? "8" : "1"}});
     for (std::uint32_t i = 0; i < 2; ++i) sm.warps.add(warp(i), 10);
     sm.run();
@@ -181,26 +181,26 @@ TEST_P(SmTimedTest, ConsecutiveWarpsOfATileGoToOneCore) {
 }
 
 TEST_P(SmTimedTest, VerticesComeBackInOrderAfterTheirShader) {
-  Bench bench(GetParam(), "sm", "splat-shader", state);
+  Bench bench(GetParam(), "sm", "splat-shader", context);
   Source<VertexWarp>& in = bench.source<VertexWarp>("in_vertices");
   Sink<VertexWarp>& out = bench.sink<VertexWarp>("out_vertices");
-  for (std::uint32_t i = 0; i < 100; ++i) in.add({8 * i, 8, false}, 10 + 20 * i);
-  in.add({0, 0, true});
+  for (std::uint32_t i = 0; i < 100; ++i) in.add({8 * i, 8}, 10 + 20 * i);
+  in.add({0, 0, 0, Mark::end_of_frame});
   bench.run();
   ASSERT_EQ(out.records().size(), 101U);
   for (std::uint32_t i = 0; i < 100; ++i) {
     EXPECT_EQ(out.records()[i].item.first_splat, 8 * i);
     EXPECT_EQ(out.records()[i].cycle, 11 + 20 * i + vertex_cycles + 1);
   }
-  EXPECT_TRUE(out.records()[100].item.end_of_draw);
+  EXPECT_TRUE(out.records()[100].item.mark == Mark::end_of_frame);
   EXPECT_TRUE(bench.unit().idle());
 }
 
 TEST_P(SmTimedTest, NoMoreVertexWarpsAreInFlightThanItHasPlaces) {
-  Bench bench(GetParam(), "sm", "splat-shader", state, {{"vertex_warps", "4"}});
+  Bench bench(GetParam(), "sm", "splat-shader", context, {{"vertex_warps", "4"}});
   Source<VertexWarp>& in = bench.source<VertexWarp>("in_vertices", 64);
   Sink<VertexWarp>& out = bench.sink<VertexWarp>("out_vertices", 64);
-  for (std::uint32_t i = 0; i < 8; ++i) in.add({8 * i, 8, false});
+  for (std::uint32_t i = 0; i < 8; ++i) in.add({8 * i, 8});
   bench.run();
   ASSERT_EQ(out.records().size(), 8U);
   // The fifth is launched in the cycle after the first has left.
@@ -211,7 +211,7 @@ TEST_P(SmTimedTest, NoMoreVertexWarpsAreInFlightThanItHasPlaces) {
 }
 
 TEST_P(SmTimedTest, FragmentsThatFillAllSlotsDoNotHoldUpVertices) {
-  SmBench sm(GetParam(), state, {{"cores", "1"}, {"warps_per_core", "2"}});
+  SmBench sm(GetParam(), context, {{"cores", "1"}, {"warps_per_core", "2"}});
   Source<VertexWarp>& vertices = sm.bench.source<VertexWarp>("in_vertices");
   Sink<VertexWarp>& out = sm.bench.sink<VertexWarp>("out_vertices");
   sm.release_after = 1'000'000;
@@ -224,7 +224,7 @@ TEST_P(SmTimedTest, FragmentsThatFillAllSlotsDoNotHoldUpVertices) {
 
 TEST_P(SmTimedTest, VerticesTakeIssueSlotsFromFragments) {
   // One scheduler: a vertex warp's 20 instructions, or its first 4, go before the fragment warp's.
-  SmBench sm(GetParam(), state, {{"cores", "1"}, {"schedulers_per_core", "1"}});
+  SmBench sm(GetParam(), context, {{"cores", "1"}, {"schedulers_per_core", "1"}});
   Source<VertexWarp>& vertices = sm.bench.source<VertexWarp>("in_vertices");
   sm.bench.sink<VertexWarp>("out_vertices");
   vertices.add({0, 8, false}, 5);
@@ -237,7 +237,7 @@ TEST_P(SmTimedTest, VerticesTakeIssueSlotsFromFragments) {
 // case M06
 TEST_P(SmTimedTest, EveryWarpComesOutOnceUnderAnyStallsInWhateverOrder) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    SmBench sm(GetParam(), state, {{"cores", "2"}, {"warps_per_core", "6"}, {"vertex_warps", "3"}},
+    SmBench sm(GetParam(), context, {{"cores", "2"}, {"warps_per_core", "6"}, {"vertex_warps", "3"}},
                static_cast<unsigned>(1 + seed % 9), static_cast<unsigned>(1 + seed % 10));
     Source<VertexWarp>& vertices = sm.bench.source<VertexWarp>("in_vertices");
     Sink<VertexWarp>& shaded_vertices = sm.bench.sink<VertexWarp>("out_vertices");

@@ -17,7 +17,7 @@ class SmUnitTest : public ::testing::Test {
  protected:
   SmUnitTest()
       : draw(testing::draw_of(64, 64, std::vector<Splat>(64, testing::flat_box(0, 0, 64, 64, 0.5F)))),
-        state(testing::state_of(draw)) {}
+        context(testing::context_of(draw)) {}
 
   Warp warp(std::uint32_t sequence, TileId tile = {0, 0}, std::uint8_t merge_pairs = 0) const {
     Warp result;
@@ -32,25 +32,25 @@ class SmUnitTest : public ::testing::Test {
   }
   Warp end(std::uint32_t warps) const {
     Warp result;
-    result.end_of_draw = true;
+    result.mark = Mark::end_of_frame;
     result.sequence = warps;
     return result;
   }
 
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 /// The unit with everything around it: what is shaded is noted and its slot released at once, or later.
 struct SmBench {
-  SmBench(const RenderState& state, const Bench::Settings& settings = {}, unsigned in_depth = 8,
+  SmBench(const RenderContext& context, const Bench::Settings& settings = {}, unsigned in_depth = 8,
           unsigned out_depth = 64)
-      : bench("sm", "splat-shader", state, settings),
+      : bench("sm", "splat-shader", context, settings),
         warps(bench.source<Warp>("in_warps", in_depth)),
         release(bench.source<WarpRelease>("in_release", 4096)),
         shaded(bench.sink<ShadedWarpItem>("out_shaded", out_depth)) {
     shaded.on_take([this](const ShadedWarpItem& item, Cycle now) {
-      sequences.push_back(item.warp->end_of_draw ? ~0U : item.warp->sequence);
+      sequences.push_back(item.warp->mark == Mark::end_of_frame ? ~0U : item.warp->sequence);
       quads += item.warp->count;
       cycles.push_back(now);
       item.warp->release();
@@ -72,7 +72,7 @@ constexpr Cycle fragment_cycles = 4 * 2 + 146 + 20 * 2 + 75;
 constexpr Cycle merge_cycles = 13 * 2 + 30;
 
 TEST_F(SmUnitTest, AWarpAloneTakesItsInstructionsAndLatencies) {
-  SmBench sm(state);
+  SmBench sm(context);
   sm.warps.add(warp(0), 10);
   sm.bench.run();
   ASSERT_EQ(sm.cycles.size(), 1U);
@@ -80,21 +80,21 @@ TEST_F(SmUnitTest, AWarpAloneTakesItsInstructionsAndLatencies) {
 }
 
 TEST_F(SmUnitTest, AWarpWithPairsTakesTheMergeAsWell) {
-  SmBench sm(state);
+  SmBench sm(context);
   sm.warps.add(warp(0, {0, 0}, 0b0001), 10);
   sm.bench.run();
   EXPECT_EQ(sm.cycles.at(0), 11 + fragment_cycles + merge_cycles + 1);
 }
 
 TEST_F(SmUnitTest, FewerLanesMakeAnInstructionIssueLonger) {
-  SmBench sm(state, {{"lanes_per_scheduler", "8"}});
+  SmBench sm(context, {{"lanes_per_scheduler", "8"}});
   sm.warps.add(warp(0), 10);
   sm.bench.run();
   EXPECT_EQ(sm.cycles.at(0), 11 + fragment_cycles + 24 * 2 + 1);
 }
 
 TEST_F(SmUnitTest, WarpsOfOneSchedulerHideOneAnothersLatencies) {
-  SmBench sm(state, {{"cores", "1"}, {"schedulers_per_core", "1"}}, 64);
+  SmBench sm(context, {{"cores", "1"}, {"schedulers_per_core", "1"}}, 64);
   for (std::uint32_t i = 0; i < 48; ++i) sm.warps.add(warp(i));
   sm.bench.run();
   ASSERT_EQ(sm.cycles.size(), 48U);
@@ -104,17 +104,17 @@ TEST_F(SmUnitTest, WarpsOfOneSchedulerHideOneAnothersLatencies) {
 }
 
 TEST_F(SmUnitTest, SchedulersWorkSideBySide) {
-  SmBench one(state, {{"cores", "1"}, {"schedulers_per_core", "1"}}, 64);
+  SmBench one(context, {{"cores", "1"}, {"schedulers_per_core", "1"}}, 64);
   for (std::uint32_t i = 0; i < 48; ++i) one.warps.add(warp(i));
   one.bench.run();
-  SmBench four(state, {{"cores", "1"}, {"schedulers_per_core", "4"}}, 64);
+  SmBench four(context, {{"cores", "1"}, {"schedulers_per_core", "4"}}, 64);
   for (std::uint32_t i = 0; i < 48; ++i) four.warps.add(warp(i));
   four.bench.run();
   EXPECT_LT(four.cycles.back() - fragment_cycles, (one.cycles.back() - fragment_cycles) / 3);
 }
 
 TEST_F(SmUnitTest, AWarpWaitsForASlotUntilACycleAfterItsRelease) {
-  SmBench sm(state, {{"cores", "1"}, {"warps_per_core", "1"}});
+  SmBench sm(context, {{"cores", "1"}, {"warps_per_core", "1"}});
   sm.release_after = 500;
   sm.warps.add(warp(0));
   sm.warps.add(warp(1));
@@ -128,7 +128,7 @@ TEST_F(SmUnitTest, ConsecutiveWarpsOfATileGoToOneCore) {
   // Two cores of one slot: with 1 warp to one core the second warp finds the other core, with 8 of them too since the
   // first is full; with two slots each, whether they share a scheduler tells.
   const auto last = [&](const char* to_one_core) {
-    SmBench sm(state, {{"cores", "2"}, {"schedulers_per_core", "1"}, {"warps_to_one_core", to_one_core}});
+    SmBench sm(context, {{"cores", "2"}, {"schedulers_per_core", "1"}, {"warps_to_one_core", to_one_core}});
     for (std::uint32_t i = 0; i < 2; ++i) sm.warps.add(warp(i), 10);
     sm.bench.run();
     return sm.cycles.back();
@@ -138,24 +138,24 @@ TEST_F(SmUnitTest, ConsecutiveWarpsOfATileGoToOneCore) {
 }
 
 TEST_F(SmUnitTest, VerticesComeBackInOrderAfterTheirShader) {
-  Bench bench("sm", "splat-shader", state);
+  Bench bench("sm", "splat-shader", context);
   Source<VertexWarp>& in = bench.source<VertexWarp>("in_vertices");
   Sink<VertexWarp>& out = bench.sink<VertexWarp>("out_vertices");
-  for (std::uint32_t i = 0; i < 100; ++i) in.add({8 * i, 8, false}, 10);
-  in.add({0, 0, true});
+  for (std::uint32_t i = 0; i < 100; ++i) in.add({8 * i, 8}, 10);
+  in.add({0, 0, 0, Mark::end_of_frame});
   bench.run();
   ASSERT_EQ(out.records().size(), 101U);
   EXPECT_EQ(out.records()[0].cycle, 11U + 4 * 2 + 146 + 16 * 2 + 75 + 1) << "20 instructions";
   for (std::uint32_t i = 0; i < 100; ++i) EXPECT_EQ(out.records()[i].item.first_splat, 8 * i);
-  EXPECT_TRUE(out.records()[100].item.end_of_draw);
+  EXPECT_TRUE(out.records()[100].item.mark == Mark::end_of_frame);
   EXPECT_TRUE(bench.unit().idle());
 }
 
 TEST_F(SmUnitTest, NoMoreVertexWarpsAreInFlightThanItHasPlaces) {
-  Bench bench("sm", "splat-shader", state, {{"vertex_warps", "4"}});
+  Bench bench("sm", "splat-shader", context, {{"vertex_warps", "4"}});
   Source<VertexWarp>& in = bench.source<VertexWarp>("in_vertices", 64);
   Sink<VertexWarp>& out = bench.sink<VertexWarp>("out_vertices");
-  for (std::uint32_t i = 0; i < 8; ++i) in.add({8 * i, 8, false});
+  for (std::uint32_t i = 0; i < 8; ++i) in.add({8 * i, 8});
   bench.run();
   const Cycle program = 4 * 2 + 146 + 16 * 2 + 75;
   EXPECT_GE(out.records()[4].cycle, 2 * program) << "the fifth waits for the first to leave";
@@ -163,7 +163,7 @@ TEST_F(SmUnitTest, NoMoreVertexWarpsAreInFlightThanItHasPlaces) {
 }
 
 TEST_F(SmUnitTest, FragmentsThatFillAllSlotsDoNotHoldUpVertices) {
-  SmBench sm(state, {{"cores", "1"}, {"warps_per_core", "2"}});
+  SmBench sm(context, {{"cores", "1"}, {"warps_per_core", "2"}});
   Source<VertexWarp>& vertices = sm.bench.source<VertexWarp>("in_vertices");
   Sink<VertexWarp>& out = sm.bench.sink<VertexWarp>("out_vertices");
   sm.release_after = 1'000'000;
@@ -177,7 +177,7 @@ TEST_F(SmUnitTest, FragmentsThatFillAllSlotsDoNotHoldUpVertices) {
 // case M06
 TEST_F(SmUnitTest, EveryWarpComesOutOnceUnderAnyStallsInWhateverOrder) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    SmBench sm(state, {{"cores", "2"}, {"warps_per_core", "6"}, {"vertex_warps", "3"}},
+    SmBench sm(context, {{"cores", "2"}, {"warps_per_core", "6"}, {"vertex_warps", "3"}},
                static_cast<unsigned>(1 + seed % 4), static_cast<unsigned>(1 + seed % 5));
     Source<VertexWarp>& vertices = sm.bench.source<VertexWarp>("in_vertices");
     Sink<VertexWarp>& shaded_vertices = sm.bench.sink<VertexWarp>("out_vertices");

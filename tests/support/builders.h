@@ -2,13 +2,16 @@
 
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <initializer_list>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/draw.h>
 #include <vrpipe/payload.h>
 #include <vrpipe/random.h>
-#include <vrpipe/render_state.h>
+#include <vrpipe/render_context.h>
 
 namespace vrpipe::testing {
 
@@ -40,10 +43,21 @@ inline Draw draw_of(std::uint32_t width, std::uint32_t height, std::vector<Splat
   return draw;
 }
 
-inline RenderState state_of(const Draw& draw) {
-  RenderState state;
-  state.draw = &draw;
-  return state;
+/// A frame of this draw alone, which it refers to.
+inline RenderContext context_of(const Draw& draw, const DrawState& state = {}) {
+  RenderContext context;
+  context.frame = Frame::of(draw, state);
+  return context;
+}
+
+/// Gives the context a frame whose draws have another state.
+inline void change_state(RenderContext& context, const std::function<void(DrawState&)>& change) {
+  auto changed = std::make_shared<Frame>(*context.frame);
+  changed->change_states(change);
+  context.frame = std::move(changed);
+}
+inline void terminate_early(RenderContext& context, bool on = true) {
+  change_state(context, [on](DrawState& state) { state.early_termination = on; });
 }
 
 /// A number in [low, high) from a seed and an index.
@@ -87,7 +101,7 @@ inline QuadBeat beat_of(TileId tile, const std::vector<unsigned>& positions, std
 
 inline QuadBeat end_beat() {
   QuadBeat beat;
-  beat.end_of_draw = true;
+  beat.mark = Mark::end_of_frame;
   return beat;
 }
 

@@ -24,16 +24,16 @@ struct Coverage {
 };
 
 /// What the units cover: vertex operations, then the rasteriser, over the whole draw.
-inline Coverage rasterize(const RenderState& state, const PixelRect& clip = {0, 0, 16384, 16384}) {
-  const Draw& draw = *state.draw;
+inline Coverage rasterize(const RenderContext& context, const PixelRect& clip = {0, 0, 16384, 16384}) {
+  const Draw& draw = *context.draw(0).geometry;
   Coverage coverage{draw.width, draw.height, std::vector<unsigned>(std::size_t{draw.width} * draw.height), 0, 0};
   const PrimitiveAssembly::Parameters vpo_parameters;
   const TileRasterizer::Parameters raster_parameters;
-  PrimitiveAssembly vpo(vpo_parameters, state);
-  TileRasterizer raster(raster_parameters, state);
+  PrimitiveAssembly vpo(vpo_parameters, context);
+  TileRasterizer raster(raster_parameters, context);
   std::array<Primitive, 2> primitives;
   for (std::uint32_t splat = 0; splat < draw.splats.size(); ++splat) {
-    const unsigned count = vpo.assemble(splat, primitives);
+    const unsigned count = vpo.assemble(0, splat, primitives);
     for (unsigned i = 0; i < count; ++i) {
       raster.begin(primitives[i], clip);
       QuadBeat beat;
@@ -78,20 +78,21 @@ inline bool covers(const SnappedTriangle& t, unsigned subpixel_bits, std::int64_
 }
 
 /// The same, brute force: every sample against every snapped triangle.
-inline Coverage cover_exactly(const RenderState& state) {
-  const Draw& draw = *state.draw;
+inline Coverage cover_exactly(const RenderContext& context) {
+  const Draw& draw = *context.draw(0).geometry;
   Coverage coverage{draw.width, draw.height, std::vector<unsigned>(std::size_t{draw.width} * draw.height), 0, 0};
   for (std::uint32_t splat = 0; splat < draw.splats.size(); ++splat) {
     for (unsigned triangle = 0; triangle < triangles_per_splat(draw); ++triangle) {
       SnappedTriangle snapped;
-      if (!snap_triangle(state, splat, triangle, snapped)) continue;
+      if (!snap_triangle(context, 0, splat, triangle, snapped)) continue;
       for (std::uint32_t y = 0; y < draw.height; y += 2) {
         for (std::uint32_t x = 0; x < draw.width; x += 2) {
           bool any = false;
           for (unsigned lane = 0; lane < 4; ++lane) {
             const std::uint32_t sx = x + lane % 2;
             const std::uint32_t sy = y + lane / 2;
-            if (sx >= draw.width || sy >= draw.height || !covers(snapped, state.subpixel_bits, sx, sy)) continue;
+            if (sx >= draw.width || sy >= draw.height || !covers(snapped, context.precision.subpixel_bits, sx, sy))
+              continue;
             ++coverage.times[std::size_t{sy} * draw.width + sx];
             ++coverage.fragments;
             any = true;

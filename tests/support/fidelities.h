@@ -72,7 +72,7 @@ class Bins {
   }
   static BinItem end() {
     BinItem item;
-    item.end_of_draw = true;
+    item.mark = Mark::end_of_frame;
     return item;
   }
 

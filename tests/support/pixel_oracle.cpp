@@ -11,43 +11,43 @@ namespace vrpipe::testing {
 namespace {
 
 template <class SlotBehaviour>
-std::unique_ptr<Behaviour> make(const char* slot, const char* name, const RenderState& state, SlotBehaviour*& out) {
+std::unique_ptr<Behaviour> make(const char* slot, const char* name, const RenderContext& context, SlotBehaviour*& out) {
   const Implementation& implementation = Registry::instance().find(slot, name);
   const std::unique_ptr<ParameterSet> parameters = implementation.make_parameters();
-  std::unique_ptr<Behaviour> behaviour = implementation.make_behaviour(*parameters, state);
+  std::unique_ptr<Behaviour> behaviour = implementation.make_behaviour(*parameters, context);
   out = dynamic_cast<SlotBehaviour*>(behaviour.get());
   return behaviour;
 }
 
 /// The most that one rounding to the format is off at a magnitude: half an ulp, or one where it truncates.
-double rounding_error(const RenderState& state, double magnitude) {
+double rounding_error(const RenderContext& context, double magnitude) {
   double error = 0;
-  if (state.format == ColorFormat::rgba8) {
+  if (context.format == ColorFormat::rgba8) {
     error = 0.5 / 255.0;
   } else {
-    const int significand_bits = state.format == ColorFormat::rgba16f ? 11 : 24;
-    const int least_exponent = state.format == ColorFormat::rgba16f ? -13 : -125;
+    const int significand_bits = context.format == ColorFormat::rgba16f ? 11 : 24;
+    const int least_exponent = context.format == ColorFormat::rgba16f ? -13 : -125;
     int exponent = 0;
     std::frexp(magnitude, &exponent);
     error = std::ldexp(0.5, std::max(exponent, least_exponent) - significand_bits);
   }
-  return state.blend_rounding == BlendRounding::rne ? error : 2 * error;
+  return context.precision.blend_rounding == BlendRounding::rne ? error : 2 * error;
 }
 
 }  // namespace
 
-std::vector<std::vector<OracleFragment>> fragments_of(const RenderState& state) {
+std::vector<std::vector<OracleFragment>> fragments_of(const RenderContext& context) {
   VpoBehaviour* vpo = nullptr;
   RasterBehaviour* raster = nullptr;
   SmBehaviour* sm = nullptr;
-  const auto owned_vpo = make("vpo", "primitive-assembly", state, vpo);
-  const auto owned_raster = make("raster", "tile-rasterizer", state, raster);
-  const auto owned_sm = make("sm", "splat-shader", state, sm);
+  const auto owned_vpo = make("vpo", "primitive-assembly", context, vpo);
+  const auto owned_raster = make("raster", "tile-rasterizer", context, raster);
+  const auto owned_sm = make("sm", "splat-shader", context, sm);
 
-  std::vector<std::vector<OracleFragment>> pixels(std::size_t{state.draw->width} * state.draw->height);
+  std::vector<std::vector<OracleFragment>> pixels(std::size_t{context.frame->width()} * context.frame->height());
   std::array<Primitive, 2> primitives;
-  for (std::uint32_t splat = 0; splat < state.draw->splats.size(); ++splat) {
-    const unsigned count = vpo->assemble(splat, primitives);
+  for (std::uint32_t splat = 0; splat < context.frame->splats(); ++splat) {
+    const unsigned count = vpo->assemble(0, splat, primitives);
     for (unsigned i = 0; i < count; ++i) {
       raster->begin(primitives[i], primitives[i].bounds);
       QuadBeat beat;
@@ -67,7 +67,7 @@ std::vector<std::vector<OracleFragment>> fragments_of(const RenderState& state) 
             const std::uint32_t x = beat.tile.x * screen_tile_pixels + beat.quads[q].position % 8U * 2 + (lane & 1U);
             const std::uint32_t y = beat.tile.y * screen_tile_pixels + beat.quads[q].position / 8U * 2 + (lane >> 1U);
             const QuadColor& c = shaded.color[0];
-            pixels[std::size_t{y} * state.draw->width + x].push_back(
+            pixels[std::size_t{y} * context.frame->width() + x].push_back(
                 {{c.red[lane], c.green[lane], c.blue[lane]}, c.alpha[lane]});
           }
         }
@@ -77,7 +77,7 @@ std::vector<std::vector<OracleFragment>> fragments_of(const RenderState& state) 
   return pixels;
 }
 
-OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const RenderState& state) {
+OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const RenderContext& context) {
   // Of multiply, add and 1 - alpha in single precision, and as many again for merging.
   constexpr double arithmetic = 8.0 / 16777216.0;
   OraclePixel pixel;
@@ -89,11 +89,11 @@ OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const Re
       const double color = fragment.color[i];
       pixel.rgba[i] += transmittance * color;
       const double reach = std::fabs(pixel.rgba[i]) + pixel.color_bound[i];
-      pixel.color_bound[i] += color * alpha_error + rounding_error(state, reach) + arithmetic * std::max(1.0, reach);
+      pixel.color_bound[i] += color * alpha_error + rounding_error(context, reach) + arithmetic * std::max(1.0, reach);
     }
     pixel.rgba[3] += transmittance * alpha;
     alpha_error =
-        (1.0 - alpha) * alpha_error + rounding_error(state, std::min(1.0, pixel.rgba[3] + alpha_error)) + arithmetic;
+        (1.0 - alpha) * alpha_error + rounding_error(context, std::min(1.0, pixel.rgba[3] + alpha_error)) + arithmetic;
     pixel.alpha_bound = std::max(pixel.alpha_bound, alpha_error);
     ++pixel.fragments;
   }

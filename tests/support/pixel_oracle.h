@@ -4,7 +4,7 @@
 #include <vector>
 
 #include <vrpipe/draw.h>
-#include <vrpipe/render_state.h>
+#include <vrpipe/render_context.h>
 
 namespace vrpipe::testing {
 
@@ -24,11 +24,11 @@ struct OraclePixel {
 
 /// Every sample's fragments in draw order, from the vpo, raster and sm behaviours alone: no bins, no merging, no
 /// termination, no blending.
-std::vector<std::vector<OracleFragment>> fragments_of(const RenderState& state);
+std::vector<std::vector<OracleFragment>> fragments_of(const RenderContext& context);
 
 /// Blends them in double. The bound is the running one for a blender with single-precision arithmetic and one rounding
 /// to the format of `state` after a fragment or after a merged pair.
-OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const RenderState& state);
+OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const RenderContext& context);
 
 /// The largest colour, not premultiplied, of a draw.
 float largest_color(const Draw& draw);

@@ -82,7 +82,7 @@ inline void expect_near_reference(const RunResult& result, const Draw& draw, dou
   for (std::uint32_t y = 0; y < draw.height; ++y) {
     for (std::uint32_t x = 0; x < draw.width; ++x) {
       const std::size_t index = std::size_t{y} * draw.width + x;
-      const auto pixel = result.surface.pixel(x, y);
+      const auto pixel = result.framebuffer.color.pixel(x, y);
       const auto& exact = reference.rgba[index];
       // The shader's alpha is off by some ulps of u, v and the exponential; 2e-5 of what is blended covers them.
       const double shader = 2e-5 * largest;

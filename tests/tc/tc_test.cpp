@@ -18,7 +18,7 @@ TileId tile(unsigned index) { return {static_cast<std::uint16_t>(index % 40), st
 
 class TileCoalescingTest : public ::testing::Test {
  protected:
-  TileCoalescingTest() : draw(testing::draw_of(640, 640)), state(testing::state_of(draw)) {}
+  TileCoalescingTest() : draw(testing::draw_of(640, 640)), context(testing::context_of(draw)) {}
 
   std::vector<Flush> insert(TcBehaviour& tc, const QuadBeat& beat) {
     std::vector<Flush> flushes;
@@ -37,12 +37,12 @@ class TileCoalescingTest : public ::testing::Test {
   }
 
   Draw draw;
-  RenderState state;
+  RenderContext context;
   TileCoalescing::Parameters parameters;
 };
 
 TEST_F(TileCoalescingTest, ABinFlushesWithItsLastQuadAndNotBefore) {
-  TileCoalescing tc(parameters, state);
+  TileCoalescing tc(parameters, context);
   for (std::uint32_t i = 0; i < 127; ++i) ASSERT_TRUE(insert(tc, beat_of(tile(3), {i % 64}, i)).empty()) << i;
   const auto flushes = insert(tc, beat_of(tile(3), {9}, 127));
   ASSERT_EQ(flushes.size(), 1U);
@@ -55,7 +55,7 @@ TEST_F(TileCoalescingTest, ABinFlushesWithItsLastQuadAndNotBefore) {
 
 TEST_F(TileCoalescingTest, ABeatThatOverflowsABinFlushesItInTheMiddle) {
   parameters.set("tc", "bin_quads", "5");
-  TileCoalescing tc(parameters, state);
+  TileCoalescing tc(parameters, context);
   const QuadBeat beat = beat_of(tile(0), {0, 1, 2, 3, 4, 5, 6, 7}, 0);
   Flush flush;
   bool flushed = false;
@@ -68,7 +68,7 @@ TEST_F(TileCoalescingTest, ABeatThatOverflowsABinFlushesItInTheMiddle) {
 
 // case T01
 TEST_F(TileCoalescingTest, The33rdTileEvictsTheBinAllocatedFirstHoweverRecentlyUsed) {
-  TileCoalescing tc(parameters, state);
+  TileCoalescing tc(parameters, context);
   for (unsigned i = 0; i < 32; ++i) ASSERT_TRUE(insert(tc, beat_of(tile(i), {0}, i)).empty());
   ASSERT_TRUE(insert(tc, beat_of(tile(0), {1, 2, 3}, 100)).empty());
   const auto flushes = insert(tc, beat_of(tile(32), {0}, 32));
@@ -84,7 +84,7 @@ TEST_F(TileCoalescingTest, The33rdTileEvictsTheBinAllocatedFirstHoweverRecentlyU
 
 TEST_F(TileCoalescingTest, ATileThatComesBackAfterItsFlushIsTheYoungest) {
   parameters.set("tc", "bins", "2");
-  TileCoalescing tc(parameters, state);
+  TileCoalescing tc(parameters, context);
   insert(tc, beat_of(tile(0), {0}));
   insert(tc, beat_of(tile(1), {0}));
   ASSERT_EQ(insert(tc, beat_of(tile(2), {0}))[0].tile, tile(0));
@@ -97,7 +97,7 @@ TEST_F(TileCoalescingTest, ATileThatComesBackAfterItsFlushIsTheYoungest) {
 
 // case T03
 TEST_F(TileCoalescingTest, MoreAllocationsThan16BitsCountKeepTheOrder) {
-  TileCoalescing tc(parameters, state);
+  TileCoalescing tc(parameters, context);
   std::uint32_t expected = 0;
   for (std::uint32_t i = 0; i < 70'000; ++i) {
     for (const Flush& flush : insert(tc, beat_of(tile(i % 65), {0}, i))) {
@@ -111,7 +111,7 @@ TEST_F(TileCoalescingTest, MoreAllocationsThan16BitsCountKeepTheOrder) {
 // case T05
 TEST_F(TileCoalescingTest, TheDrainFlushesNoneOneOrAllBins) {
   for (const unsigned bins : {0U, 1U, 32U}) {
-    TileCoalescing tc(parameters, state);
+    TileCoalescing tc(parameters, context);
     for (unsigned i = 0; i < bins; ++i) insert(tc, beat_of(tile(i), {0}, i));
     const auto flushes = drain(tc);
     ASSERT_EQ(flushes.size(), bins);
@@ -128,7 +128,7 @@ TEST_F(TileCoalescingTest, TheDrainFlushesNoneOneOrAllBins) {
 TEST_F(TileCoalescingTest, NoQuadIsLostDoubledOrReorderedWithinItsTile) {
   parameters.set("tc", "bins", "4");
   parameters.set("tc", "bin_quads", "11");
-  TileCoalescing tc(parameters, state);
+  TileCoalescing tc(parameters, context);
   std::vector<Flush> flushes;
   std::uint32_t next = 0;
   for (std::uint64_t i = 0; i < 2000; ++i) {
@@ -158,7 +158,7 @@ TEST_F(TileCoalescingTest, NoQuadIsLostDoubledOrReorderedWithinItsTile) {
 }
 
 TEST_F(TileCoalescingTest, StrictTerminationHasNoTimeOut) {
-  const TcBehaviour::Cost cost = TileCoalescing(parameters, state).cost();
+  const TcBehaviour::Cost cost = TileCoalescing(parameters, context).cost();
   EXPECT_EQ(cost.timeout_in(Termination::paper), 150U);
   EXPECT_EQ(cost.timeout_in(Termination::strict), 0U);
 }

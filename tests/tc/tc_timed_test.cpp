@@ -22,9 +22,9 @@ const std::vector<unsigned> sixteen = testing::numbers(16);
 
 class TcTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
-  TcTimedTest() : draw(testing::draw_of(640, 640)), state(testing::state_of(draw)) {}
+  TcTimedTest() : draw(testing::draw_of(640, 640)), context(testing::context_of(draw)) {}
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 INSTANTIATE_TEST_SUITE_P(Fidelities, TcTimedTest, ::testing::ValuesIn(testing::timed_fidelities()),
@@ -32,16 +32,16 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, TcTimedTest, ::testing::ValuesIn(testing::t
 
 /// TC with its ports.
 struct TcBench {
-  TcBench(Fidelity fidelity, const RenderState& state, const Bench::Settings& settings = {}, unsigned in_depth = 4,
+  TcBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {}, unsigned in_depth = 4,
           unsigned out_depth = 64)
-      : bench(fidelity, "tc", "tile-coalescing", state, settings),
+      : bench(fidelity, "tc", "tile-coalescing", context, settings),
         in(bench.source<QuadBeat>("in_quads", in_depth)),
         out(bench.sink<BinItem>("out_bins", out_depth)) {}
 
   std::vector<std::uint32_t> splats() const {
     std::vector<std::uint32_t> all;
     for (const auto& record : out.records()) {
-      if (record.item.end_of_draw) continue;
+      if (record.item.mark == Mark::end_of_frame) continue;
       for (const std::uint32_t splat : splats_of(record.item)) all.push_back(splat);
     }
     return all;
@@ -53,7 +53,7 @@ struct TcBench {
 };
 
 TEST_P(TcTimedTest, AFullBinIsSeenFromTheCycleAfterItFilledPlusTheLatencyOnABeatACycle) {
-  TcBench tc(GetParam(), state, {{"bin_quads", "64"}, {"latency_cycles", "4"}});
+  TcBench tc(GetParam(), context, {{"bin_quads", "64"}, {"latency_cycles", "4"}});
   for (unsigned i = 0; i < 4; ++i) tc.in.add(beat_of(tile(3), sixteen, 16 * i), 10 + i);
   tc.bench.run();
   ASSERT_EQ(tc.out.records().size(), 1U);
@@ -66,7 +66,7 @@ TEST_P(TcTimedTest, AFullBinIsSeenFromTheCycleAfterItFilledPlusTheLatencyOnABeat
 
 TEST_P(TcTimedTest, TakesItsQuadsPerCycleAndHandsBinsOnAtTheSameRate) {
   for (const unsigned rate : {4U, 8U, 16U}) {
-    TcBench tc(GetParam(), state,
+    TcBench tc(GetParam(), context,
                {{"quads_per_cycle", std::to_string(rate)}, {"bin_quads", "256"}, {"latency_cycles", "4"}}, 64, 256);
     for (unsigned i = 0; i < 64; ++i) tc.in.add(beat_of(tile(0), sixteen, 16 * i));
     tc.bench.run();
@@ -82,14 +82,14 @@ TEST_P(TcTimedTest, TakesItsQuadsPerCycleAndHandsBinsOnAtTheSameRate) {
 }
 
 TEST_P(TcTimedTest, SmallBeatsShareACycle) {
-  TcBench tc(GetParam(), state, {{"quads_per_cycle", "16"}, {"bin_quads", "64"}, {"latency_cycles", "4"}}, 64);
+  TcBench tc(GetParam(), context, {{"quads_per_cycle", "16"}, {"bin_quads", "64"}, {"latency_cycles", "4"}}, 64);
   for (unsigned i = 0; i < 64; ++i) tc.in.add(beat_of(tile(0), {i}, i));
   tc.bench.run();
   EXPECT_EQ(tc.out.records().at(0).cycle, 4U + 1 + 4) << "64 beats of one quad enter in four cycles";
 }
 
 TEST_P(TcTimedTest, ATileWithoutABinEvictsTheOldestInTheCycleOfItsQuads) {
-  TcBench tc(GetParam(), state, {{"bins", "2"}, {"latency_cycles", "4"}});
+  TcBench tc(GetParam(), context, {{"bins", "2"}, {"latency_cycles", "4"}});
   tc.in.add(beat_of(tile(0), {1, 2}, 0), 10);
   tc.in.add(beat_of(tile(1), {1}, 10), 20);
   tc.in.add(beat_of(tile(2), {1}, 20), 30);
@@ -102,7 +102,7 @@ TEST_P(TcTimedTest, ATileWithoutABinEvictsTheOldestInTheCycleOfItsQuads) {
 
 TEST_P(TcTimedTest, TheIdleTimeOutFiresExactlyItsCyclesAfterTheLastArrival) {
   for (const unsigned timeout : {1U, 150U, 151U}) {
-    TcBench tc(GetParam(), state, {{"idle_timeout_cycles", std::to_string(timeout)}, {"latency_cycles", "4"}});
+    TcBench tc(GetParam(), context, {{"idle_timeout_cycles", std::to_string(timeout)}, {"latency_cycles", "4"}});
     tc.in.add(beat_of(tile(0), {1}), 10);
     tc.in.add(beat_of(tile(1), {1}), 1000);  // at lt it is what comes next that finds a bin's time out
     tc.in.add(end_beat(), 2000);
@@ -116,7 +116,7 @@ TEST_P(TcTimedTest, TheIdleTimeOutFiresExactlyItsCyclesAfterTheLastArrival) {
 }
 
 TEST_P(TcTimedTest, BinsWhoseTimeIsOutGoOneACycle) {
-  TcBench tc(GetParam(), state, {{"idle_timeout_cycles", "20"}, {"latency_cycles", "4"}, {"flush_queue_bins", "16"}},
+  TcBench tc(GetParam(), context, {{"idle_timeout_cycles", "20"}, {"latency_cycles", "4"}, {"flush_queue_bins", "16"}},
              16);
   for (unsigned i = 0; i < 5; ++i) tc.in.add(beat_of(tile(i), {1}, i), 10);
   tc.in.add(end_beat(), 1000);
@@ -130,7 +130,7 @@ TEST_P(TcTimedTest, BinsWhoseTimeIsOutGoOneACycle) {
 
 TEST_P(TcTimedTest, AnArrivalInTheCycleOfTheTimeOutPutsItOff) {
   for (const Cycle gap : {149U, 150U, 151U}) {
-    TcBench tc(GetParam(), state, {{"idle_timeout_cycles", "150"}});
+    TcBench tc(GetParam(), context, {{"idle_timeout_cycles", "150"}});
     tc.in.add(beat_of(tile(0), {1}), 10);
     tc.in.add(beat_of(tile(0), {2}), 10 + gap);
     tc.in.add(end_beat(), 5000);
@@ -141,28 +141,28 @@ TEST_P(TcTimedTest, AnArrivalInTheCycleOfTheTimeOutPutsItOff) {
 }
 
 TEST_P(TcTimedTest, InStrictTerminationABinWaitsForTheEndOfTheDraw) {
-  state.termination = Termination::strict;
-  TcBench tc(GetParam(), state, {{"idle_timeout_cycles", "150"}, {"latency_cycles", "4"}});
+  context.termination = Termination::strict;
+  TcBench tc(GetParam(), context, {{"idle_timeout_cycles", "150"}, {"latency_cycles", "4"}});
   tc.in.add(beat_of(tile(0), {1}));
   tc.in.add(end_beat(), 100'000);
   tc.bench.run();
   ASSERT_EQ(tc.out.records().size(), 2U);
   EXPECT_EQ(tc.out.records()[0].cycle, 100'001U + 2 + 4) << "the end takes a cycle of its own";
-  EXPECT_TRUE(tc.out.records()[1].item.end_of_draw);
+  EXPECT_TRUE(tc.out.records()[1].item.mark == Mark::end_of_frame);
   EXPECT_EQ(tc.out.records()[1].cycle, 100'001U + 3 + 4);
 }
 
 // case T05
 TEST_P(TcTimedTest, TheEndOfAnEmptyDrawGoesThroughAlone) {
-  TcBench tc(GetParam(), state);
+  TcBench tc(GetParam(), context);
   tc.in.add(end_beat());
   tc.bench.run();
   ASSERT_EQ(tc.out.records().size(), 1U);
-  EXPECT_TRUE(tc.out.records()[0].item.end_of_draw);
+  EXPECT_TRUE(tc.out.records()[0].item.mark == Mark::end_of_frame);
 }
 
 TEST_P(TcTimedTest, FlushedBinsThatNobodyTakesStopItAtTheQueuesDepth) {
-  TcBench tc(GetParam(), state, {{"bin_quads", "16"}, {"flush_queue_bins", "3"}, {"latency_cycles", "1"}}, 1, 1);
+  TcBench tc(GetParam(), context, {{"bin_quads", "16"}, {"flush_queue_bins", "3"}, {"latency_cycles", "1"}}, 1, 1);
   for (unsigned i = 0; i < 10; ++i) tc.in.add(beat_of(tile(0), sixteen, 16 * i));
   tc.out.close(0, 1000);
   tc.bench.run();
@@ -181,7 +181,7 @@ TEST_P(TcTimedTest, FlushedBinsThatNobodyTakesStopItAtTheQueuesDepth) {
 std::vector<std::uint64_t> contents(const Sink<BinItem>& sink) {
   std::vector<std::uint64_t> all;
   for (const auto& record : sink.records()) {
-    if (record.item.end_of_draw) {
+    if (record.item.mark == Mark::end_of_frame) {
       all.push_back(2'000'000);
       continue;
     }
@@ -195,7 +195,7 @@ std::vector<std::uint64_t> contents(const Sink<QuadBeat>& sink) {
   for (const auto& record : sink.records()) {
     for (unsigned i = 0; i < record.item.count; ++i) all.push_back(record.item.quads[i].splat);
     if (record.item.last_of_bin) all.push_back(1'000'000 + record.item.tile.x);
-    if (record.item.end_of_draw) all.push_back(2'000'000);
+    if (record.item.mark == Mark::end_of_frame) all.push_back(2'000'000);
   }
   return all;
 }
@@ -211,18 +211,19 @@ void add_many(Source<QuadBeat>& in) {
 }
 
 TEST_P(TcTimedTest, BinsAreThoseOfCycleUnderAnyStallsWithoutTimeOut) {
-  state.termination = Termination::strict;
+  context.termination = Termination::strict;
   const Bench::Settings settings{{"bins", "4"}, {"bin_quads", "24"}};
   std::vector<std::uint64_t> expected;
   {
-    Bench cycle("tc", "tile-coalescing", state, settings);
+    Bench cycle("tc", "tile-coalescing", context, settings);
     add_many(cycle.source<QuadBeat>("in_quads"));
     const Sink<QuadBeat>& out = cycle.sink<QuadBeat>("out_bins");
     cycle.run();
     expected = contents(out);
   }
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    TcBench tc(GetParam(), state, settings, static_cast<unsigned>(1 + seed % 10), static_cast<unsigned>(1 + seed % 9));
+    TcBench tc(GetParam(), context, settings, static_cast<unsigned>(1 + seed % 10),
+               static_cast<unsigned>(1 + seed % 9));
     add_many(tc.in);
     tc.bench.stall_randomly(seed, seed == 0 ? 0 : 100);
     tc.bench.run();
@@ -235,15 +236,15 @@ TEST_P(TcTimedTest, WithRoomToSpareBinsLeaveWhenTheyDoAtCycle) {
   const Bench::Settings settings{{"bins", "4"}, {"bin_quads", "24"}, {"idle_timeout_cycles", "0"}};
   std::vector<Cycle> expected;  // of the last beat of each bin
   {
-    Bench cycle("tc", "tile-coalescing", state, settings);
+    Bench cycle("tc", "tile-coalescing", context, settings);
     add_many(cycle.source<QuadBeat>("in_quads"));
     const Sink<QuadBeat>& out = cycle.sink<QuadBeat>("out_bins", 64);
     cycle.run();
     for (const auto& record : out.records()) {
-      if (record.item.last_of_bin || record.item.end_of_draw) expected.push_back(record.cycle);
+      if (record.item.last_of_bin || record.item.mark == Mark::end_of_frame) expected.push_back(record.cycle);
     }
   }
-  TcBench tc(GetParam(), state, settings);
+  TcBench tc(GetParam(), context, settings);
   add_many(tc.in);
   tc.bench.run();
   // The end of the draw takes a cycle of its own: the four bins that it flushes, and itself, are a cycle late.
@@ -255,7 +256,7 @@ TEST_P(TcTimedTest, WithRoomToSpareBinsLeaveWhenTheyDoAtCycle) {
 
 TEST_P(TcTimedTest, WithTimeOutsStallsMayCutBinsButLoseNoQuad) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-    TcBench tc(GetParam(), state, {{"idle_timeout_cycles", "3"}});
+    TcBench tc(GetParam(), context, {{"idle_timeout_cycles", "3"}});
     for (unsigned i = 0; i < 200; ++i) tc.in.add(beat_of(tile(i % 5), {i % 64}, i));
     tc.in.add(end_beat());
     tc.bench.stall_randomly(seed, 150);
@@ -263,7 +264,7 @@ TEST_P(TcTimedTest, WithTimeOutsStallsMayCutBinsButLoseNoQuad) {
     ASSERT_EQ(tc.splats().size(), 200U);
     std::map<unsigned, std::uint32_t> last;
     for (const auto& record : tc.out.records()) {
-      if (record.item.end_of_draw) continue;
+      if (record.item.mark == Mark::end_of_frame) continue;
       for (const std::uint32_t splat : splats_of(record.item)) {
         ASSERT_GE(splat, last[record.item.tile.x]);
         last[record.item.tile.x] = splat;

@@ -22,9 +22,9 @@ const std::vector<unsigned> sixteen{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13
 
 class TcUnitTest : public ::testing::Test {
  protected:
-  TcUnitTest() : draw(testing::draw_of(640, 640)), state(testing::state_of(draw)) {}
+  TcUnitTest() : draw(testing::draw_of(640, 640)), context(testing::context_of(draw)) {}
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 std::size_t quads_in(const Sink<QuadBeat>& sink) {
@@ -41,7 +41,7 @@ std::size_t bins_in(const Sink<QuadBeat>& sink) {
 
 TEST_F(TcUnitTest, TheIdleTimeOutFiresExactlyItsCyclesAfterTheLastArrival) {
   for (const unsigned timeout : {1U, 150U, 151U}) {
-    Bench bench("tc", "tile-coalescing", state,
+    Bench bench("tc", "tile-coalescing", context,
                 {{"idle_timeout_cycles", std::to_string(timeout)}, {"latency_cycles", "4"}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins");
@@ -56,7 +56,7 @@ TEST_F(TcUnitTest, TheIdleTimeOutFiresExactlyItsCyclesAfterTheLastArrival) {
 
 TEST_F(TcUnitTest, AnArrivalACycleBeforeTheTimeOutPutsItOff) {
   for (const Cycle gap : {149U, 150U, 151U}) {
-    Bench bench("tc", "tile-coalescing", state);
+    Bench bench("tc", "tile-coalescing", context);
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins");
     in.add(beat_of(tile(0), {1}), 10);
@@ -70,7 +70,7 @@ TEST_F(TcUnitTest, AnArrivalACycleBeforeTheTimeOutPutsItOff) {
 
 TEST_F(TcUnitTest, WithoutATimeOutABinWaitsForTheEndOfTheDraw) {
   for (const bool strict : {false, true}) {
-    RenderState own = state;
+    RenderContext own = context;
     if (strict) own.termination = Termination::strict;
     Bench bench("tc", "tile-coalescing", own, {{"idle_timeout_cycles", strict ? "150" : "0"}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
@@ -80,14 +80,14 @@ TEST_F(TcUnitTest, WithoutATimeOutABinWaitsForTheEndOfTheDraw) {
     bench.run();
     ASSERT_EQ(out.records().size(), 2U);
     EXPECT_GT(out.records()[0].cycle, 100'000U);
-    EXPECT_TRUE(out.records()[1].item.end_of_draw);
+    EXPECT_TRUE(out.records()[1].item.mark == Mark::end_of_frame);
   }
 }
 
 // case T04
 TEST_F(TcUnitTest, ABinThatFillsInTheCycleOfItsTimeOutIsFlushedOnceAsFull) {
   for (const Cycle gap : {149U, 150U}) {
-    Bench bench("tc", "tile-coalescing", state, {{"bin_quads", "2"}});
+    Bench bench("tc", "tile-coalescing", context, {{"bin_quads", "2"}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins");
     in.add(beat_of(tile(0), {1}), 10);
@@ -102,7 +102,7 @@ TEST_F(TcUnitTest, ABinThatFillsInTheCycleOfItsTimeOutIsFlushedOnceAsFull) {
 
 TEST_F(TcUnitTest, TakesItsQuadsPerCycle) {
   for (const unsigned rate : {4U, 8U, 16U}) {
-    Bench bench("tc", "tile-coalescing", state, {{"quads_per_cycle", std::to_string(rate)}, {"bin_quads", "1024"}});
+    Bench bench("tc", "tile-coalescing", context, {{"quads_per_cycle", std::to_string(rate)}, {"bin_quads", "1024"}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 64);
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins", 8);
     for (unsigned i = 0; i < 64; ++i) in.add(beat_of(tile(0), sixteen, 16 * i));
@@ -115,7 +115,7 @@ TEST_F(TcUnitTest, TakesItsQuadsPerCycle) {
 }
 
 TEST_F(TcUnitTest, SmallBeatsShareACycle) {
-  Bench bench("tc", "tile-coalescing", state, {{"quads_per_cycle", "16"}, {"bin_quads", "64"}});
+  Bench bench("tc", "tile-coalescing", context, {{"quads_per_cycle", "16"}, {"bin_quads", "64"}});
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 64);
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins", 8);
   for (unsigned i = 0; i < 64; ++i) in.add(beat_of(tile(0), {i}, i));
@@ -125,18 +125,18 @@ TEST_F(TcUnitTest, SmallBeatsShareACycle) {
 
 // case T05
 TEST_F(TcUnitTest, TheEndOfAnEmptyDrawGoesThroughAlone) {
-  Bench bench("tc", "tile-coalescing", state);
+  Bench bench("tc", "tile-coalescing", context);
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins");
   in.add(end_beat());
   bench.run();
   ASSERT_EQ(out.records().size(), 1U);
-  EXPECT_TRUE(out.records()[0].item.end_of_draw);
+  EXPECT_TRUE(out.records()[0].item.mark == Mark::end_of_frame);
   EXPECT_EQ(out.records()[0].item.count, 0);
 }
 
 TEST_F(TcUnitTest, FlushedBinsThatNobodyTakesStopItAtTheQueuesDepth) {
-  Bench bench("tc", "tile-coalescing", state,
+  Bench bench("tc", "tile-coalescing", context,
               {{"bin_quads", "16"}, {"flush_queue_bins", "3"}, {"latency_cycles", "1"}});
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 1);
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins", 1);
@@ -150,10 +150,10 @@ TEST_F(TcUnitTest, FlushedBinsThatNobodyTakesStopItAtTheQueuesDepth) {
 }
 
 TEST_F(TcUnitTest, BinsAreTheSameUnderAnyStallsWithoutTimeOut) {
-  state.termination = Termination::strict;
+  context.termination = Termination::strict;
   std::vector<std::uint64_t> expected;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    Bench bench("tc", "tile-coalescing", state, {{"bins", "4"}, {"bin_quads", "24"}});
+    Bench bench("tc", "tile-coalescing", context, {{"bins", "4"}, {"bin_quads", "24"}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", static_cast<unsigned>(1 + seed % 5));
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins", static_cast<unsigned>(1 + seed % 3));
     std::uint32_t next = 0;
@@ -170,7 +170,7 @@ TEST_F(TcUnitTest, BinsAreTheSameUnderAnyStallsWithoutTimeOut) {
     for (const auto& record : out.records()) {
       for (unsigned i = 0; i < record.item.count; ++i) got.push_back(record.item.quads[i].splat);
       if (record.item.last_of_bin) got.push_back(1'000'000 + record.item.tile.x);
-      if (record.item.end_of_draw) got.push_back(2'000'000);
+      if (record.item.mark == Mark::end_of_frame) got.push_back(2'000'000);
     }
     if (seed == 0) expected = got;
     ASSERT_EQ(got, expected) << seed;
@@ -180,7 +180,7 @@ TEST_F(TcUnitTest, BinsAreTheSameUnderAnyStallsWithoutTimeOut) {
 
 TEST_F(TcUnitTest, WithTimeOutsStallsMayCutBinsButLoseNoQuad) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-    Bench bench("tc", "tile-coalescing", state, {{"idle_timeout_cycles", "3"}});
+    Bench bench("tc", "tile-coalescing", context, {{"idle_timeout_cycles", "3"}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins");
     for (unsigned i = 0; i < 200; ++i) in.add(beat_of(tile(i % 5), {i % 64}, i));

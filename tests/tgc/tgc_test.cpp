@@ -28,7 +28,7 @@ PixelRect in_grid(std::int32_t grid, std::int32_t grids_x) {
 
 class TileGridCoalescingTest : public ::testing::Test {
  protected:
-  TileGridCoalescingTest() : draw(testing::draw_of(1024, 1024)), state(testing::state_of(draw)) {}
+  TileGridCoalescingTest() : draw(testing::draw_of(1024, 1024)), context(testing::context_of(draw)) {}
 
   /// Enters primitives; the flushes come in order.
   std::vector<TgcBehaviour::Flush> enter(TgcBehaviour& tgc, const std::vector<Primitive>& primitives) {
@@ -49,13 +49,13 @@ class TileGridCoalescingTest : public ::testing::Test {
   }
 
   Draw draw;
-  RenderState state;
+  RenderContext context;
   TileGridCoalescing::Parameters parameters;
 };
 
 // case T02
 TEST_F(TileGridCoalescingTest, ABinFlushesWithItsSixteenthPrimitiveAndNotBefore) {
-  TileGridCoalescing tgc(parameters, state);
+  TileGridCoalescing tgc(parameters, context);
   std::vector<Primitive> primitives;
   for (std::uint32_t i = 0; i < 15; ++i) primitives.push_back(primitive_in(i, in_grid(3, 16)));
   EXPECT_TRUE(enter(tgc, primitives).empty());
@@ -72,7 +72,7 @@ TEST_F(TileGridCoalescingTest, ABinFlushesWithItsSixteenthPrimitiveAndNotBefore)
 
 // case T02
 TEST_F(TileGridCoalescingTest, SeventeenPrimitivesOfAGridAreTwoFlushes) {
-  TileGridCoalescing tgc(parameters, state);
+  TileGridCoalescing tgc(parameters, context);
   std::vector<Primitive> primitives;
   for (std::uint32_t i = 0; i < 17; ++i) primitives.push_back(primitive_in(i, in_grid(3, 16)));
   EXPECT_EQ(enter(tgc, primitives).size(), 1U);
@@ -83,7 +83,7 @@ TEST_F(TileGridCoalescingTest, SeventeenPrimitivesOfAGridAreTwoFlushes) {
 
 // case T02
 TEST_F(TileGridCoalescingTest, All128BinsCanBeTakenAndThe129thGridEvictsTheFirstAllocated) {
-  TileGridCoalescing tgc(parameters, state);
+  TileGridCoalescing tgc(parameters, context);
   std::vector<Primitive> primitives;
   for (std::int32_t i = 0; i < 128; ++i)
     primitives.push_back(primitive_in(static_cast<std::uint32_t>(i), in_grid(i, 16)));
@@ -100,7 +100,7 @@ TEST_F(TileGridCoalescingTest, All128BinsCanBeTakenAndThe129thGridEvictsTheFirst
 
 // case T05
 TEST_F(TileGridCoalescingTest, TheDrainFlushesInTheOrderOfAllocation) {
-  TileGridCoalescing tgc(parameters, state);
+  TileGridCoalescing tgc(parameters, context);
   enter(tgc, {primitive_in(0, in_grid(9, 16)), primitive_in(1, in_grid(2, 16)), primitive_in(2, in_grid(5, 16)),
               primitive_in(3, in_grid(2, 16))});
   const auto flushes = drain(tgc);
@@ -113,7 +113,7 @@ TEST_F(TileGridCoalescingTest, TheDrainFlushesInTheOrderOfAllocation) {
 }
 
 TEST_F(TileGridCoalescingTest, APrimitiveEntersEveryGridOfItsBoundsOnce) {
-  TileGridCoalescing tgc(parameters, state);
+  TileGridCoalescing tgc(parameters, context);
   enter(tgc, {primitive_in(0, {60, 100, 200, 129})});  // grids x 0..3, y 1..2
   const auto flushes = drain(tgc);
   ASSERT_EQ(flushes.size(), 8U);
@@ -130,17 +130,17 @@ TEST_F(TileGridCoalescingTest, AThinDiagonalEntersTheGridsOfItsBounds) {
   draw.splats = {Splat{}};
   draw.triangles = {{{10, 500, 500.5F}, {10, 499.5F, 500}}};
   SnappedTriangle snapped;
-  ASSERT_TRUE(snap_triangle(state, 0, 0, snapped));
+  ASSERT_TRUE(snap_triangle(context, 0, 0, 0, snapped));
   Primitive sliver;
   sliver.bounds = covered_bounds(snapped, 8, draw.width, draw.height);
-  TileGridCoalescing tgc(parameters, state);
+  TileGridCoalescing tgc(parameters, context);
   enter(tgc, {sliver});
   EXPECT_EQ(tgc.entries.value(), 64U);
 }
 
 // case T03
 TEST_F(TileGridCoalescingTest, MoreAllocationsThan16BitsCountKeepTheOrder) {
-  TileGridCoalescing tgc(parameters, state);
+  TileGridCoalescing tgc(parameters, context);
   std::uint32_t expected = 0;
   TgcBehaviour::Flush flush;
   for (std::uint32_t i = 0; i < 70'000; ++i) {
@@ -157,7 +157,8 @@ TEST_F(TileGridCoalescingTest, MoreAllocationsThan16BitsCountKeepTheOrder) {
 // case R12
 TEST_F(TileGridCoalescingTest, The65536thGridOfTheLargestImageIsAGridLikeAnyOther) {
   draw.width = draw.height = 16384;
-  TileGridCoalescing tgc(parameters, state);
+  context = testing::context_of(draw);
+  TileGridCoalescing tgc(parameters, context);
   enter(tgc, {primitive_in(1, {16383, 16383, 16384, 16384}), primitive_in(2, {0, 0, 1, 1})});
   const auto flushes = drain(tgc);
   ASSERT_EQ(flushes.size(), 2U);
@@ -169,7 +170,7 @@ TEST_F(TileGridCoalescingTest, The65536thGridOfTheLargestImageIsAGridLikeAnyOthe
 TEST_F(TileGridCoalescingTest, NoEntryIsLostOrDoubled) {
   parameters.set("tgc", "bins", "5");
   parameters.set("tgc", "bin_primitives", "3");
-  TileGridCoalescing tgc(parameters, state);
+  TileGridCoalescing tgc(parameters, context);
   std::map<std::uint32_t, unsigned> entered;
   std::vector<Primitive> primitives;
   for (std::uint32_t i = 0; i < 3000; ++i) {
@@ -194,7 +195,7 @@ TEST_F(TileGridCoalescingTest, NoEntryIsLostOrDoubled) {
 }
 
 TEST_F(TileGridCoalescingTest, StorageIsThatOfThePapersTable) {
-  const TileGridCoalescing tgc(parameters, state);
+  const TileGridCoalescing tgc(parameters, context);
   EXPECT_EQ(tgc.storage_bytes(), 24'832U) << "24.25 KB";
 }
 
@@ -202,9 +203,9 @@ TEST_F(TileGridCoalescingTest, AGpcSkipsGridsInWhichItOwnsNoTile) {
   parameters.set("tgc", "grid_tiles", "1");
   unsigned entries = 0;
   for (unsigned gpc = 0; gpc < 4; ++gpc) {
-    state.gpcs = 4;
-    state.gpc = gpc;
-    TileGridCoalescing tgc(parameters, state);
+    context.placement.gpcs = 4;
+    context.placement.gpc = gpc;
+    TileGridCoalescing tgc(parameters, context);
     enter(tgc, {primitive_in(0, {0, 0, 256, 256})});
     for (const auto& flush : drain(tgc)) {
       EXPECT_EQ(
@@ -218,7 +219,7 @@ TEST_F(TileGridCoalescingTest, AGpcSkipsGridsInWhichItOwnsNoTile) {
 
 TEST_F(TileGridCoalescingTest, PassingThroughEveryPrimitiveIsAFlushOfItsBounds) {
   const TgcPassThrough::Parameters none;
-  TgcPassThrough tgc(none, state);
+  TgcPassThrough tgc(none, context);
   const auto flushes = enter(tgc, {primitive_in(4, {3, 4, 500, 600}), primitive_in(5, {7, 8, 9, 10})});
   ASSERT_EQ(flushes.size(), 2U);
   EXPECT_EQ(flushes[0].primitives.at(0).splat, 4U);

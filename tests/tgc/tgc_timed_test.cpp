@@ -17,24 +17,24 @@ PrimitiveItem item_in(std::uint32_t splat, PixelRect bounds) {
   item.primitive.bounds = bounds;
   return item;
 }
-PrimitiveItem end_of_draw() {
+PrimitiveItem end_of_frame() {
   PrimitiveItem item;
-  item.end_of_draw = true;
+  item.mark = Mark::end_of_frame;
   return item;
 }
 
 class TgcTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
-  TgcTimedTest() : draw(testing::draw_of(1024, 1024)), state(testing::state_of(draw)) {}
+  TgcTimedTest() : draw(testing::draw_of(1024, 1024)), context(testing::context_of(draw)) {}
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 INSTANTIATE_TEST_SUITE_P(Fidelities, TgcTimedTest, ::testing::ValuesIn(testing::fidelities_with_time()),
                          testing::name_of_fidelity);
 
 TEST_P(TgcTimedTest, AFlushedPrimitiveIsSeenItsLatencyAfterTheDecision) {
-  Bench bench(GetParam(), "tgc", "tile-grid-coalescing", state, {{"bin_primitives", "1"}, {"latency_cycles", "7"}});
+  Bench bench(GetParam(), "tgc", "tile-grid-coalescing", context, {{"bin_primitives", "1"}, {"latency_cycles", "7"}});
   Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives");
   Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs");
   in.add(item_in(0, {0, 0, 4, 4}), 10);
@@ -44,7 +44,7 @@ TEST_P(TgcTimedTest, AFlushedPrimitiveIsSeenItsLatencyAfterTheDecision) {
 
 TEST_P(TgcTimedTest, TakesItsEntriesPerCycleAndReadsOutOnePrimitiveACycle) {
   for (const unsigned rate : {1U, 2U, 8U}) {
-    Bench bench(GetParam(), "tgc", "tile-grid-coalescing", state,
+    Bench bench(GetParam(), "tgc", "tile-grid-coalescing", context,
                 {{"entries_per_cycle", std::to_string(rate)}, {"bin_primitives", "32"}, {"latency_cycles", "4"}});
     Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 64);
     Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 64);
@@ -62,7 +62,7 @@ TEST_P(TgcTimedTest, TakesItsEntriesPerCycleAndReadsOutOnePrimitiveACycle) {
 }
 
 TEST_P(TgcTimedTest, BinsFillWhileAnotherIsReadOut) {
-  Bench bench(GetParam(), "tgc", "tile-grid-coalescing", state,
+  Bench bench(GetParam(), "tgc", "tile-grid-coalescing", context,
               {{"entries_per_cycle", "1"}, {"bin_primitives", "16"}, {"latency_cycles", "1"}});
   Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 128);
   Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 128);
@@ -73,21 +73,21 @@ TEST_P(TgcTimedTest, BinsFillWhileAnotherIsReadOut) {
 }
 
 TEST_P(TgcTimedTest, PassingThroughHandsOnOneJobACycle) {
-  Bench bench(GetParam(), "tgc", "pass-through", state);
+  Bench bench(GetParam(), "tgc", "pass-through", context);
   Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 32);
   Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 32);
   for (std::uint32_t i = 0; i < 16; ++i) in.add(item_in(i, {0, 0, 4, 4}));
-  in.add(end_of_draw());
+  in.add(end_of_frame());
   bench.run();
   ASSERT_EQ(out.records().size(), 17U);
   for (std::size_t i = 1; i < 16; ++i) EXPECT_EQ(out.records()[i].cycle, out.records()[0].cycle + i);
-  EXPECT_TRUE(out.records()[16].item.end_of_draw);
+  EXPECT_TRUE(out.records()[16].item.mark == Mark::end_of_frame);
 }
 
 // case T05
 TEST_P(TgcTimedTest, TheEndFlushesAllBinsAndComesLast) {
   for (const unsigned bins : {0U, 1U, 128U}) {
-    Bench bench(GetParam(), "tgc", "tile-grid-coalescing", state);
+    Bench bench(GetParam(), "tgc", "tile-grid-coalescing", context);
     Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives");
     Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs");
     for (std::uint32_t i = 0; i < bins; ++i) {
@@ -95,21 +95,21 @@ TEST_P(TgcTimedTest, TheEndFlushesAllBinsAndComesLast) {
       const auto y = static_cast<std::int32_t>(i / 16 * 64);
       in.add(item_in(i, {x, y, x + 1, y + 1}));
     }
-    in.add(end_of_draw());
+    in.add(end_of_frame());
     bench.run();
     ASSERT_EQ(out.records().size(), bins + 1);
     for (std::uint32_t i = 0; i < bins; ++i) EXPECT_EQ(out.records()[i].item.primitive.splat, i);
-    EXPECT_TRUE(out.records()[bins].item.end_of_draw);
+    EXPECT_TRUE(out.records()[bins].item.mark == Mark::end_of_frame);
     EXPECT_TRUE(bench.unit().idle());
   }
 }
 
 TEST_P(TgcTimedTest, BinsThatTheEndFlushesFollowOneAnotherWithoutAGap) {
-  Bench bench(GetParam(), "tgc", "tile-grid-coalescing", state, {{"latency_cycles", "4"}});
+  Bench bench(GetParam(), "tgc", "tile-grid-coalescing", context, {{"latency_cycles", "4"}});
   Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 32);
   Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 32);
   for (std::int32_t i = 0; i < 10; ++i) in.add(item_in(static_cast<std::uint32_t>(i), {64 * i, 0, 64 * i + 1, 1}));
-  in.add(end_of_draw(), 100);
+  in.add(end_of_frame(), 100);
   bench.run();
   ASSERT_EQ(out.records().size(), 11U);
   // The end is in hand at 101, and the first bin is read out from 102 on. At lt and at the end takes a cycle of its own.
@@ -118,7 +118,7 @@ TEST_P(TgcTimedTest, BinsThatTheEndFlushesFollowOneAnotherWithoutAGap) {
 }
 
 TEST_P(TgcTimedTest, AFullReceiverStopsItUntilACycleAfterItTakes) {
-  Bench bench(GetParam(), "tgc", "tile-grid-coalescing", state, {{"bin_primitives", "4"}, {"latency_cycles", "1"}});
+  Bench bench(GetParam(), "tgc", "tile-grid-coalescing", context, {{"bin_primitives", "4"}, {"latency_cycles", "1"}});
   Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 64);
   Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 2);
   out.close(0, 100);
@@ -140,7 +140,7 @@ TEST_P(TgcTimedTest, FlushesAreTheSameUnderAnyStalls) {
   std::vector<std::uint32_t> expected;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     // What is to come out is what cycle makes of it undisturbed.
-    Bench bench(seed == 0 ? Fidelity::cycle : GetParam(), "tgc", "tile-grid-coalescing", state,
+    Bench bench(seed == 0 ? Fidelity::cycle : GetParam(), "tgc", "tile-grid-coalescing", context,
                 {{"bins", "4"}, {"bin_primitives", "3"}});
     Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", static_cast<unsigned>(1 + seed % 10));
     Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", static_cast<unsigned>(1 + seed % 7));
@@ -148,12 +148,12 @@ TEST_P(TgcTimedTest, FlushesAreTheSameUnderAnyStalls) {
       const auto x = static_cast<std::int32_t>(mix(i) % 500);
       in.add(item_in(i, {x, 30, x + 70, 66}));
     }
-    in.add(end_of_draw());
+    in.add(end_of_frame());
     if (seed > 0) bench.stall_randomly(seed, 100);
     bench.run();
     std::vector<std::uint32_t> jobs;
     for (const auto& record : out.records()) {
-      jobs.push_back(record.item.end_of_draw
+      jobs.push_back(record.item.mark == Mark::end_of_frame
                          ? ~0U
                          : record.item.primitive.splat << 8U |
                                static_cast<std::uint32_t>(record.item.clip.x0 / 64 + 16 * (record.item.clip.y0 / 64)));

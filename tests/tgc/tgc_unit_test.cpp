@@ -17,21 +17,21 @@ PrimitiveItem item_in(std::uint32_t splat, PixelRect bounds) {
   item.primitive.bounds = bounds;
   return item;
 }
-PrimitiveItem end_of_draw() {
+PrimitiveItem end_of_frame() {
   PrimitiveItem item;
-  item.end_of_draw = true;
+  item.mark = Mark::end_of_frame;
   return item;
 }
 
 class TgcUnitTest : public ::testing::Test {
  protected:
-  TgcUnitTest() : draw(testing::draw_of(1024, 1024)), state(testing::state_of(draw)) {}
+  TgcUnitTest() : draw(testing::draw_of(1024, 1024)), context(testing::context_of(draw)) {}
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 TEST_F(TgcUnitTest, AFlushedPrimitiveIsSeenItsLatencyAfterTheDecision) {
-  Bench bench("tgc", "tile-grid-coalescing", state, {{"bin_primitives", "1"}, {"latency_cycles", "7"}});
+  Bench bench("tgc", "tile-grid-coalescing", context, {{"bin_primitives", "1"}, {"latency_cycles", "7"}});
   Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives");
   Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs");
   in.add(item_in(0, {0, 0, 4, 4}), 10);
@@ -42,7 +42,7 @@ TEST_F(TgcUnitTest, AFlushedPrimitiveIsSeenItsLatencyAfterTheDecision) {
 }
 
 TEST_F(TgcUnitTest, AFlushIsReadOutOnePrimitiveACycleInOrder) {
-  Bench bench("tgc", "tile-grid-coalescing", state);
+  Bench bench("tgc", "tile-grid-coalescing", context);
   Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 32);
   Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 32);
   for (std::uint32_t i = 0; i < 16; ++i) in.add(item_in(i, {0, 0, 4, 4}));
@@ -56,7 +56,7 @@ TEST_F(TgcUnitTest, AFlushIsReadOutOnePrimitiveACycleInOrder) {
 
 TEST_F(TgcUnitTest, TakesItsEntriesPerCycle) {
   for (const unsigned rate : {1U, 2U, 8U}) {
-    Bench bench("tgc", "tile-grid-coalescing", state,
+    Bench bench("tgc", "tile-grid-coalescing", context,
                 {{"entries_per_cycle", std::to_string(rate)}, {"bin_primitives", "32"}});
     Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 64);
     Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 64);
@@ -68,21 +68,21 @@ TEST_F(TgcUnitTest, TakesItsEntriesPerCycle) {
 }
 
 TEST_F(TgcUnitTest, PassingThroughTakesTwoPrimitivesInAndOneJobOutACycle) {
-  Bench bench("tgc", "pass-through", state);
+  Bench bench("tgc", "pass-through", context);
   Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 16);
   Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 16);
   for (std::uint32_t i = 0; i < 16; ++i) in.add(item_in(i, {0, 0, 4, 4}));
-  in.add(end_of_draw());
+  in.add(end_of_frame());
   bench.run();
   ASSERT_EQ(out.records().size(), 17U);
   EXPECT_EQ(out.records()[15].cycle - out.records()[0].cycle, 15U);
-  EXPECT_TRUE(out.records()[16].item.end_of_draw);
+  EXPECT_TRUE(out.records()[16].item.mark == Mark::end_of_frame);
 }
 
 // case T05
 TEST_F(TgcUnitTest, TheEndFlushesAllBinsAndComesLast) {
   for (const unsigned bins : {0U, 1U, 128U}) {
-    Bench bench("tgc", "tile-grid-coalescing", state);
+    Bench bench("tgc", "tile-grid-coalescing", context);
     Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives");
     Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs");
     for (std::uint32_t i = 0; i < bins; ++i) {
@@ -90,11 +90,11 @@ TEST_F(TgcUnitTest, TheEndFlushesAllBinsAndComesLast) {
       const auto y = static_cast<std::int32_t>(i / 16 * 64);
       in.add(item_in(i, {x, y, x + 1, y + 1}));
     }
-    in.add(end_of_draw());
+    in.add(end_of_frame());
     bench.run();
     ASSERT_EQ(out.records().size(), bins + 1);
     for (std::uint32_t i = 0; i < bins; ++i) EXPECT_EQ(out.records()[i].item.primitive.splat, i);
-    EXPECT_TRUE(out.records()[bins].item.end_of_draw);
+    EXPECT_TRUE(out.records()[bins].item.mark == Mark::end_of_frame);
     EXPECT_TRUE(bench.unit().idle());
   }
 }
@@ -102,19 +102,19 @@ TEST_F(TgcUnitTest, TheEndFlushesAllBinsAndComesLast) {
 TEST_F(TgcUnitTest, FlushesAreTheSameUnderAnyStalls) {
   std::vector<std::uint32_t> expected;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    Bench bench("tgc", "tile-grid-coalescing", state, {{"bins", "4"}, {"bin_primitives", "3"}});
+    Bench bench("tgc", "tile-grid-coalescing", context, {{"bins", "4"}, {"bin_primitives", "3"}});
     Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", static_cast<unsigned>(1 + seed % 4));
     Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", static_cast<unsigned>(1 + seed % 7));
     for (std::uint32_t i = 0; i < 100; ++i) {
       const auto x = static_cast<std::int32_t>(mix(i) % 500);
       in.add(item_in(i, {x, 30, x + 70, 66}));
     }
-    in.add(end_of_draw());
+    in.add(end_of_frame());
     if (seed > 0) bench.stall_randomly(seed, 100);
     bench.run();
     std::vector<std::uint32_t> jobs;
     for (const auto& record : out.records()) {
-      jobs.push_back(record.item.end_of_draw
+      jobs.push_back(record.item.mark == Mark::end_of_frame
                          ? ~0U
                          : record.item.primitive.splat << 8U |
                                static_cast<std::uint32_t>(record.item.clip.x0 / 64 + 16 * (record.item.clip.y0 / 64)));

@@ -136,7 +136,7 @@ TEST_F(Images, CompareWritesFourPairsThatTheJsonNames) {
     const float background[] = {0.25F, 0.5F, 1.0F};
     for (std::uint32_t y = 0; y < 40; ++y) {
       for (std::uint32_t x = 0; x < 48; ++x) {
-        const std::array<float, 4> pixel = expected.surface.pixel(x, y);
+        const std::array<float, 4> pixel = expected.framebuffer.color.pixel(x, y);
         const std::size_t place = std::size_t{y} * 48 + x;
         wrong += !std::equal(pixel.begin(), pixel.end(), &exr.rgba[4 * place]);
         for (std::size_t channel = 0; channel < 3; ++channel) {

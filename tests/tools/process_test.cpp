@@ -65,10 +65,10 @@ TEST_F(Process, WithoutStandardStreamsFilesAreWholeAndTheLostReportIsAMistake) {
 TEST_F(Process, WhatAPluginPrintsIsNoResult) {
   Implementation chatty = Registry::instance().find("qru", "pairing");
   chatty.name = "chatty";
-  chatty.make_behaviour = [make = chatty.make_behaviour](const ParameterSet& parameters, const RenderState& state) {
+  chatty.make_behaviour = [make = chatty.make_behaviour](const ParameterSet& parameters, const RenderContext& context) {
     std::puts("here I am");
     std::cout << "and here\n";
-    return make(parameters, state);
+    return make(parameters, context);
   };
   for (const std::vector<const char*>& command : {std::vector<const char*>{"units"},
                                                   {"run", "--scene", "tiny.spl", "--unit", "qru=chatty"},

@@ -64,6 +64,8 @@ RunResult full_result() {
   result.outside_validated_range = {"\xc3", ""};
   result.result_hash = "0123456789abcdef";
   result.kernel_events = 9;
+  result.framebuffer.addresses.attributes = {0x10000, 123};
+  result.draws = {{"first", {{"quads_blended", 7}}}, {"", {}}};
   return result;
 }
 
@@ -108,11 +110,19 @@ void expect_equal_statistics(const StatisticReport& actual, const StatisticRepor
   }
 }
 
-/// All but the request and the surface. A new member has to be named here, and compared.
+/// All but the request and the surfaces. A new member has to be named here, and compared.
 void expect_equal(const RunResult& actual, const RunResult& expected) {
   const auto& [request, cycles, milliseconds, host_seconds, cpu_seconds, counts, utilization, units, bottleneck,
-               statistics, implementations, parameters, outside_validated_range, result_hash, kernel_events, surface] =
-      actual;
+               statistics, implementations, parameters, outside_validated_range, result_hash, kernel_events,
+               framebuffer, draws] = actual;
+  EXPECT_EQ(framebuffer.addresses.attributes.address, expected.framebuffer.addresses.attributes.address);
+  EXPECT_EQ(framebuffer.addresses.attributes.bytes, expected.framebuffer.addresses.attributes.bytes);
+  ASSERT_EQ(draws.size(), expected.draws.size());
+  for (std::size_t i = 0; i < draws.size(); ++i) {
+    const auto& [name, counts_of_draw] = draws[i];
+    EXPECT_EQ(name, expected.draws[i].name);
+    EXPECT_EQ(counts_of_draw, expected.draws[i].counts);
+  }
   EXPECT_EQ(cycles, expected.cycles);
   EXPECT_EQ(milliseconds, expected.milliseconds);
   EXPECT_EQ(host_seconds, expected.host_seconds);

@@ -16,8 +16,8 @@ using testing::flat_box;
 
 struct Assembled {
   explicit Assembled(const Draw& draw, std::uint32_t splat = 0)
-      : state(testing::state_of(draw)), vpo(parameters, state), count(vpo.assemble(splat, primitives)) {}
-  RenderState state;
+      : context(testing::context_of(draw)), vpo(parameters, context), count(vpo.assemble(0, splat, primitives)) {}
+  RenderContext context;
   PrimitiveAssembly::Parameters parameters;
   PrimitiveAssembly vpo;
   std::array<Primitive, 2> primitives;

@@ -12,11 +12,11 @@ using testkit::Sink;
 using testkit::Source;
 
 VertexWarp warp_at(std::uint32_t first, std::uint32_t splats) { return {first, splats, false}; }
-VertexWarp end_of_draw() { return {0, 0, true}; }
+VertexWarp end_of_frame() { return {0, 0, 0, Mark::end_of_frame}; }
 
 class VpoTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
-  VpoTimedTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) {
+  VpoTimedTest() : draw(testing::draw_of(64, 64)), context(testing::context_of(draw)) {
     for (unsigned i = 0; i < 32; ++i) {
       const auto x = static_cast<float>(i % 8 * 8);
       const auto y = static_cast<float>(i / 8 * 16);
@@ -28,10 +28,10 @@ class VpoTimedTest : public ::testing::TestWithParam<Fidelity> {
     for (std::uint32_t i = 0; i < 64; ++i) {
       ASSERT_EQ(2 * sink.records()[i].item.primitive.splat + sink.records()[i].item.primitive.triangle, i);
     }
-    EXPECT_TRUE(sink.records()[64].item.end_of_draw);
+    EXPECT_TRUE(sink.records()[64].item.mark == Mark::end_of_frame);
   }
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 INSTANTIATE_TEST_SUITE_P(Fidelities, VpoTimedTest, ::testing::ValuesIn(testing::fidelities_with_time()),
@@ -39,7 +39,7 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, VpoTimedTest, ::testing::ValuesIn(testing::
 
 TEST_P(VpoTimedTest, APrimitiveIsSeenTheLatencyAfterItsVertices) {
   for (const unsigned latency : {1U, 10U}) {
-    Bench bench(GetParam(), "vpo", "primitive-assembly", state,
+    Bench bench(GetParam(), "vpo", "primitive-assembly", context,
                 {{"latency_cycles", std::to_string(latency)}, {"triangles_per_cycle", "1"}});
     Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
     Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
@@ -51,7 +51,7 @@ TEST_P(VpoTimedTest, APrimitiveIsSeenTheLatencyAfterItsVertices) {
 
 TEST_P(VpoTimedTest, AssemblesItsTrianglesPerCycle) {
   for (const unsigned rate : {1U, 2U, 4U}) {
-    Bench bench(GetParam(), "vpo", "primitive-assembly", state,
+    Bench bench(GetParam(), "vpo", "primitive-assembly", context,
                 {{"triangles_per_cycle", std::to_string(rate)}, {"latency_cycles", "10"}});
     Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", 8);
     Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
@@ -65,7 +65,8 @@ TEST_P(VpoTimedTest, AssemblesItsTrianglesPerCycle) {
 
 TEST_P(VpoTimedTest, CulledTrianglesTakeTheirTurn) {
   for (unsigned i = 0; i < 8; ++i) draw.splats[i] = testing::flat_box(-40, -40, -30, -30, 0.5F);
-  Bench bench(GetParam(), "vpo", "primitive-assembly", state, {{"triangles_per_cycle", "1"}, {"latency_cycles", "1"}});
+  Bench bench(GetParam(), "vpo", "primitive-assembly", context,
+              {{"triangles_per_cycle", "1"}, {"latency_cycles", "1"}});
   Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
   Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
   vertices.add(warp_at(0, 8));
@@ -76,11 +77,11 @@ TEST_P(VpoTimedTest, CulledTrianglesTakeTheirTurn) {
 }
 
 TEST_P(VpoTimedTest, PrimitivesComeInDrawOrderAndTheEndLast) {
-  Bench bench(GetParam(), "vpo", "primitive-assembly", state);
+  Bench bench(GetParam(), "vpo", "primitive-assembly", context);
   Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
   Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
   for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
-  vertices.add(end_of_draw());
+  vertices.add(end_of_frame());
   bench.run();
   expect_in_draw_order(primitives);
   EXPECT_TRUE(bench.unit().idle());
@@ -90,7 +91,7 @@ TEST_P(VpoTimedTest, TakesTheGpcsVerticesInTurn) {
   // At lt vertices come in draw order, since a warp and all that it leads to is a call from DRAW; elsewhere one that
   // comes before its turn waits in its queue.
   const bool in_order = GetParam() == Fidelity::lt;
-  Bench bench(GetParam(), "vpo", "primitive-assembly", state, {}, 2);
+  Bench bench(GetParam(), "vpo", "primitive-assembly", context, {}, 2);
   Source<VertexWarp>& even = bench.source<VertexWarp>("in_vertices_0");
   Source<VertexWarp>& odd = bench.source<VertexWarp>("in_vertices_1");
   Sink<PrimitiveItem>& first = bench.sink<PrimitiveItem>("out_primitives_0");
@@ -99,21 +100,21 @@ TEST_P(VpoTimedTest, TakesTheGpcsVerticesInTurn) {
   odd.add(warp_at(8, 8), in_order ? 600 : 0);
   even.add(warp_at(16, 8), 700);
   odd.add(warp_at(24, 8), in_order ? 800 : 0);
-  even.add(end_of_draw(), 900);
-  odd.add(end_of_draw(), in_order ? 901 : 0);
+  even.add(end_of_frame(), 900);
+  odd.add(end_of_frame(), in_order ? 901 : 0);
   bench.run();
   std::size_t primitives = 0;
   for (const Sink<PrimitiveItem>* sink : {&first, &second}) {
     std::uint32_t last = 0;
     for (const auto& record : sink->records()) {
-      if (record.item.end_of_draw) continue;
+      if (record.item.mark == Mark::end_of_frame) continue;
       const std::uint32_t order = 2 * record.item.primitive.splat + record.item.primitive.triangle;
       EXPECT_GE(order, last);
       EXPECT_GE(record.cycle, 500U);
       last = order;
       ++primitives;
     }
-    EXPECT_TRUE(sink->records().back().item.end_of_draw);
+    EXPECT_TRUE(sink->records().back().item.mark == Mark::end_of_frame);
   }
   EXPECT_EQ(primitives, 64U) << "no box is in tiles of both";
   EXPECT_TRUE(bench.unit().idle());
@@ -121,7 +122,7 @@ TEST_P(VpoTimedTest, TakesTheGpcsVerticesInTurn) {
 
 TEST_P(VpoTimedTest, APrimitiveGoesToEveryGpcThatOwnsATileOfItsBoundsAndToNoOther) {
   draw.splats.push_back(testing::flat_box(1, 1, 30, 5, 0.5F));  // tiles (0,0) and (1,0)
-  Bench bench(GetParam(), "vpo", "primitive-assembly", state, {}, 4);
+  Bench bench(GetParam(), "vpo", "primitive-assembly", context, {}, 4);
   Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
   const Sink<PrimitiveItem>* sinks[4];
   for (unsigned gpc = 0; gpc < 4; ++gpc) {
@@ -136,12 +137,13 @@ TEST_P(VpoTimedTest, APrimitiveGoesToEveryGpcThatOwnsATileOfItsBoundsAndToNoOthe
 }
 
 TEST_P(VpoTimedTest, AFullReceiverStopsItUntilACycleAfterItTakes) {
-  Bench bench(GetParam(), "vpo", "primitive-assembly", state, {{"triangles_per_cycle", "1"}, {"latency_cycles", "1"}});
+  Bench bench(GetParam(), "vpo", "primitive-assembly", context,
+              {{"triangles_per_cycle", "1"}, {"latency_cycles", "1"}});
   Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
   Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 2);
   primitives.close(0, 50);
   vertices.add(warp_at(0, 2));
-  vertices.add(end_of_draw());
+  vertices.add(end_of_frame());
   bench.run();
   // At lt and at the one that waited goes beside the next.
   const Cycle fourth = GetParam() == Fidelity::cycle ? 53 : 52;
@@ -157,12 +159,12 @@ TEST_P(VpoTimedTest, AFullReceiverStopsItUntilACycleAfterItTakes) {
 
 TEST_P(VpoTimedTest, StallsChangeNeitherPrimitivesNorOrder) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    Bench bench(GetParam(), "vpo", "primitive-assembly", state);
+    Bench bench(GetParam(), "vpo", "primitive-assembly", context);
     Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", static_cast<unsigned>(1 + seed % 2));
     Sink<PrimitiveItem>& primitives =
         bench.sink<PrimitiveItem>("out_primitives_0", static_cast<unsigned>(1 + seed % 10));
     for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
-    vertices.add(end_of_draw());
+    vertices.add(end_of_frame());
     bench.stall_randomly(seed, 100);
     bench.run();
     expect_in_draw_order(primitives);

@@ -12,11 +12,11 @@ using testkit::Sink;
 using testkit::Source;
 
 VertexWarp warp_at(std::uint32_t first, std::uint32_t splats) { return {first, splats, false}; }
-VertexWarp end_of_draw() { return {0, 0, true}; }
+VertexWarp end_of_frame() { return {0, 0, 0, Mark::end_of_frame}; }
 
 class VpoUnitTest : public ::testing::Test {
  protected:
-  VpoUnitTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) {
+  VpoUnitTest() : draw(testing::draw_of(64, 64)), context(testing::context_of(draw)) {
     for (unsigned i = 0; i < 32; ++i) {
       const auto x = static_cast<float>(i % 8 * 8);
       const auto y = static_cast<float>(i / 8 * 16);
@@ -24,11 +24,11 @@ class VpoUnitTest : public ::testing::Test {
     }
   }
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 TEST_F(VpoUnitTest, APrimitiveIsSeenItsLatencyAfterTheVertices) {
-  Bench bench("vpo", "primitive-assembly", state);
+  Bench bench("vpo", "primitive-assembly", context);
   Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
   Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
   vertices.add(warp_at(0, 1), 20);
@@ -39,7 +39,7 @@ TEST_F(VpoUnitTest, APrimitiveIsSeenItsLatencyAfterTheVertices) {
 
 TEST_F(VpoUnitTest, AssemblesItsTrianglesPerCycle) {
   for (const unsigned rate : {1U, 2U, 4U}) {
-    Bench bench("vpo", "primitive-assembly", state, {{"triangles_per_cycle", std::to_string(rate)}});
+    Bench bench("vpo", "primitive-assembly", context, {{"triangles_per_cycle", std::to_string(rate)}});
     Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", 8);
     Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
     for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
@@ -50,23 +50,23 @@ TEST_F(VpoUnitTest, AssemblesItsTrianglesPerCycle) {
 }
 
 TEST_F(VpoUnitTest, PrimitivesComeInDrawOrderAndTheEndLast) {
-  Bench bench("vpo", "primitive-assembly", state);
+  Bench bench("vpo", "primitive-assembly", context);
   Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
   Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
   for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
-  vertices.add(end_of_draw());
+  vertices.add(end_of_frame());
   bench.run();
   ASSERT_EQ(primitives.records().size(), 65U);
   for (std::uint32_t i = 0; i < 64; ++i) {
     EXPECT_EQ(primitives.records()[i].item.primitive.splat, i / 2);
     EXPECT_EQ(primitives.records()[i].item.primitive.triangle, i % 2);
   }
-  EXPECT_TRUE(primitives.records()[64].item.end_of_draw);
+  EXPECT_TRUE(primitives.records()[64].item.mark == Mark::end_of_frame);
   EXPECT_TRUE(bench.unit().idle());
 }
 
 TEST_F(VpoUnitTest, TakesTheGpcsVerticesInTurnHoweverLateOneIs) {
-  Bench bench("vpo", "primitive-assembly", state, {}, 2);
+  Bench bench("vpo", "primitive-assembly", context, {}, 2);
   Source<VertexWarp>& even = bench.source<VertexWarp>("in_vertices_0");
   Source<VertexWarp>& odd = bench.source<VertexWarp>("in_vertices_1");
   Sink<PrimitiveItem>& first = bench.sink<PrimitiveItem>("out_primitives_0");
@@ -75,25 +75,25 @@ TEST_F(VpoUnitTest, TakesTheGpcsVerticesInTurnHoweverLateOneIs) {
   odd.add(warp_at(8, 8));
   even.add(warp_at(16, 8), 700);
   odd.add(warp_at(24, 8));
-  even.add(end_of_draw());
-  odd.add(end_of_draw());
+  even.add(end_of_frame());
+  odd.add(end_of_frame());
   bench.run();
   for (const Sink<PrimitiveItem>* sink : {&first, &second}) {
     std::uint32_t last = 0;
     for (const auto& record : sink->records()) {
-      if (record.item.end_of_draw) continue;
+      if (record.item.mark == Mark::end_of_frame) continue;
       const std::uint32_t order = 2 * record.item.primitive.splat + record.item.primitive.triangle;
       EXPECT_GE(order, last);
       last = order;
     }
-    EXPECT_TRUE(sink->records().back().item.end_of_draw);
+    EXPECT_TRUE(sink->records().back().item.mark == Mark::end_of_frame);
   }
   EXPECT_TRUE(bench.unit().idle());
 }
 
 TEST_F(VpoUnitTest, APrimitiveGoesToEveryGpcThatOwnsATileOfItsBoundsAndToNoOther) {
   draw.splats.push_back(testing::flat_box(1, 1, 30, 5, 0.5F));  // tiles (0,0) and (1,0)
-  Bench bench("vpo", "primitive-assembly", state, {}, 4);
+  Bench bench("vpo", "primitive-assembly", context, {}, 4);
   Source<VertexWarp>* sources[4];
   Sink<PrimitiveItem>* sinks[4];
   for (unsigned gpc = 0; gpc < 4; ++gpc) {
@@ -110,12 +110,12 @@ TEST_F(VpoUnitTest, APrimitiveGoesToEveryGpcThatOwnsATileOfItsBoundsAndToNoOther
 
 TEST_F(VpoUnitTest, StallsChangeNeitherPrimitivesNorOrder) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    Bench bench("vpo", "primitive-assembly", state);
+    Bench bench("vpo", "primitive-assembly", context);
     Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", static_cast<unsigned>(1 + seed % 2));
     Sink<PrimitiveItem>& primitives =
         bench.sink<PrimitiveItem>("out_primitives_0", static_cast<unsigned>(1 + seed % 5));
     for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
-    vertices.add(end_of_draw());
+    vertices.add(end_of_frame());
     bench.stall_randomly(seed, 100);
     bench.shuffle_ticks(seed);
     bench.run();

@@ -165,7 +165,7 @@ class Judge {
     const bool order_decides = !case_.variant.early_termination || case_.termination == Termination::strict;
     if (case_.variant.quad_merging || !order_decides) return;
     const auto other = simulated("another machine", on_another_machine(case_).request(Fidelity::functional));
-    if (other && !same_image(other->surface, untimed.surface)) {
+    if (other && !same_image(other->framebuffer.color, untimed.framebuffer.color)) {
       find("another machine", {"the machine does not change the picture", "the images differ"});
     }
   }
@@ -253,7 +253,7 @@ std::vector<Finding> broken_rules(const RunResult& untimed, const RunResult& tim
   }
   const Variant& variant = timed.request.variant;
   const bool order_decides = strict || (!variant.early_termination && !variant.quad_merging);
-  if (order_decides && !same_image(untimed.surface, timed.surface)) {
+  if (order_decides && !same_image(untimed.framebuffer.color, timed.framebuffer.color)) {
     findings.push_back({"order alone decides the picture", "the image differs from the untimed one"});
   }
   return findings;
@@ -276,7 +276,8 @@ std::vector<Finding> broken_repetition(const RunResult& once, const RunResult& a
     return true;
   };
   const bool equal = once.result_hash == again.result_hash && once.cycles == again.cycles &&
-                     once.counts.named() == again.counts.named() && same_image(once.surface, again.surface) &&
+                     once.counts.named() == again.counts.named() &&
+                     same_image(once.framebuffer.color, again.framebuffer.color) &&
                      once.utilization == again.utilization && units_equal() && statistics_equal();
   if (equal) return {};
   return {{"equal requests, equal results", once.result_hash + " and " + again.result_hash}};

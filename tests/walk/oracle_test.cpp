@@ -91,7 +91,8 @@ TEST_F(Oracle, SeesAQuadOfFiveFragments) {
 
 TEST_F(Oracle, SeesAStrictCountOrPictureThatTimeChanges) {
   expect_rule(broken_rules(*result, changed([](RunResult& r) { ++r.counts.warps; })), "strict counts are the same");
-  const RunResult other = changed([](RunResult& r) { r.surface = ColorSurface(48, 40, ColorFormat::rgba16f); });
+  const RunResult other =
+      changed([](RunResult& r) { r.framebuffer.color = ColorSurface(48, 40, ColorFormat::rgba16f); });
   expect_rule(broken_rules(*result, other), "order alone decides the picture");
 }
 

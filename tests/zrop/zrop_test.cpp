@@ -9,19 +9,28 @@ namespace {
 
 using testing::beat_of;
 
+/// With a surface of its own.
+struct Rop : DepthStencilRop {
+  Rop(const Parameters& parameters, const RenderContext& context)
+      : DepthStencilRop(parameters, context), stencil(context.frame->width(), context.frame->height()) {
+    attach(stencil);
+  }
+  DepthStencilSurface stencil;
+};
+
 class DepthStencilRopTest : public ::testing::Test {
  protected:
-  DepthStencilRopTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) {
-    state.early_termination = true;
+  DepthStencilRopTest() : draw(testing::draw_of(64, 64)), context(testing::context_of(draw)) {
+    testing::terminate_early(context);
   }
   Draw draw;
-  RenderState state;
+  RenderContext context;
   DepthStencilRop::Parameters parameters;
 };
 
 // case H03
 TEST_F(DepthStencilRopTest, WithoutAnUpdateEveryQuadPasses) {
-  DepthStencilRop zrop(parameters, state);
+  Rop zrop(parameters, context);
   QuadBeat beat = beat_of({1, 1}, {0, 5, 63});
   zrop.test(beat);
   EXPECT_EQ(beat.count, 3);
@@ -32,7 +41,7 @@ TEST_F(DepthStencilRopTest, WithoutAnUpdateEveryQuadPasses) {
 
 // case H10
 TEST_F(DepthStencilRopTest, AQuadLivesUntilItsFourthPixelIsTerminated) {
-  DepthStencilRop zrop(parameters, state);
+  Rop zrop(parameters, context);
   for (unsigned lane = 0; lane < 4; ++lane) {
     QuadBeat beat = beat_of({1, 1}, {7});
     zrop.test(beat);
@@ -49,7 +58,7 @@ TEST_F(DepthStencilRopTest, AQuadLivesUntilItsFourthPixelIsTerminated) {
 
 // case H06
 TEST_F(DepthStencilRopTest, OneSignalCanTerminateSeveralPixelsOfAQuad) {
-  DepthStencilRop zrop(parameters, state);
+  Rop zrop(parameters, context);
   zrop.update({{0, 0}, 3, 0b1010});
   QuadBeat beat = beat_of({0, 0}, {3});
   zrop.test(beat);
@@ -59,7 +68,7 @@ TEST_F(DepthStencilRopTest, OneSignalCanTerminateSeveralPixelsOfAQuad) {
 // case H05
 TEST_F(DepthStencilRopTest, SignalsForOneLineAreOredInAnyOrder) {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
-    DepthStencilRop zrop(parameters, state);
+    Rop zrop(parameters, context);
     unsigned expected[64] = {};
     for (std::uint64_t i = 0; i < 300; ++i) {
       const auto position = static_cast<std::uint8_t>(mix(seed + i) % 64);
@@ -77,7 +86,7 @@ TEST_F(DepthStencilRopTest, SignalsForOneLineAreOredInAnyOrder) {
 }
 
 TEST_F(DepthStencilRopTest, AnUpdateIsForItsTileAndPositionAlone) {
-  DepthStencilRop zrop(parameters, state);
+  Rop zrop(parameters, context);
   zrop.update({{1, 2}, 9, all_lanes});
   for (std::uint16_t y = 0; y < 4; ++y) {
     for (std::uint16_t x = 0; x < 4; ++x) {
@@ -91,7 +100,7 @@ TEST_F(DepthStencilRopTest, AnUpdateIsForItsTileAndPositionAlone) {
 }
 
 TEST_F(DepthStencilRopTest, SurvivorsKeepTheirOrder) {
-  DepthStencilRop zrop(parameters, state);
+  Rop zrop(parameters, context);
   zrop.update({{0, 0}, 1, all_lanes});
   zrop.update({{0, 0}, 4, all_lanes});
   QuadBeat beat = beat_of({0, 0}, {0, 1, 2, 3, 4, 5}, 10);
@@ -103,16 +112,18 @@ TEST_F(DepthStencilRopTest, SurvivorsKeepTheirOrder) {
 
 /// Terminates what it is told to, bin by bin.
 struct Ahead : FunctionalRunAhead {
+  void pass(Mark mark) override { marks.push_back(mark); }
   void tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) override {
     beats.push_back(survivors);
     if (beats.size() == 1) terminated.push_back({{0, 0}, 5, all_lanes});
   }
   std::vector<QuadBeat> beats;
+  std::vector<Mark> marks;
 };
 
 TEST_F(DepthStencilRopTest, StrictlyABinsTestSeesWhatEarlierBinsTerminateAndNoUpdate) {
-  state.termination = Termination::strict;
-  DepthStencilRop zrop(parameters, state);
+  context.termination = Termination::strict;
+  Rop zrop(parameters, context);
   Ahead ahead;
   zrop.follow(ahead);
   zrop.update({{0, 0}, 6, all_lanes});  // costs time, decides nothing

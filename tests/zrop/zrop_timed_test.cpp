@@ -23,9 +23,11 @@ TerminationBeat signals(std::initializer_list<unsigned> positions, LaneMask pixe
 
 class ZropTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
-  ZropTimedTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) { state.early_termination = true; }
+  ZropTimedTest() : draw(testing::draw_of(64, 64)), context(testing::context_of(draw)) {
+    testing::terminate_early(context);
+  }
   Draw draw;
-  RenderState state;
+  RenderContext context;
   Bins bins;
 };
 
@@ -34,8 +36,8 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, ZropTimedTest, ::testing::ValuesIn(testing:
 
 /// ZROP with its ports; updates of a cycle are there before the bins of it.
 struct ZropBench {
-  ZropBench(Fidelity fidelity, const RenderState& state, const Bench::Settings& settings = {}, unsigned depth = 64)
-      : bench(fidelity, "zrop", "depth-stencil-rop", state, settings),
+  ZropBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {}, unsigned depth = 64)
+      : bench(fidelity, "zrop", "depth-stencil-rop", context, settings),
         updates(bench.source<TerminationBeat>("in_terminations")),
         in(bench.source<BinItem>("in_quads", depth)),
         out(bench.sink<BinItem>("out_quads", depth)) {}
@@ -47,7 +49,7 @@ struct ZropBench {
 
 TEST_P(ZropTimedTest, ATestTakesItsLatency) {
   for (const unsigned latency : {1U, 8U}) {
-    ZropBench zrop(GetParam(), state, {{"latency_cycles", std::to_string(latency)}});
+    ZropBench zrop(GetParam(), context, {{"latency_cycles", std::to_string(latency)}});
     zrop.in.add(bins.at({0, 0}, {1}), 10);
     zrop.bench.run();
     EXPECT_EQ(cycles_of(zrop.out), (std::vector<Cycle>{11 + latency}));
@@ -56,7 +58,7 @@ TEST_P(ZropTimedTest, ATestTakesItsLatency) {
 
 TEST_P(ZropTimedTest, TestsItsQuadsPerCycle) {
   for (const unsigned rate : {4U, 8U, 16U}) {
-    ZropBench zrop(GetParam(), state, {{"quads_per_cycle", std::to_string(rate)}, {"latency_cycles", "8"}}, 512);
+    ZropBench zrop(GetParam(), context, {{"quads_per_cycle", std::to_string(rate)}, {"latency_cycles", "8"}}, 512);
     for (unsigned i = 0; i < 8; ++i) zrop.in.add(bins.at({0, 0}, testing::numbers(64), 64 * i), {0, 3}, 4);
     zrop.bench.run();
     ASSERT_EQ(zrop.out.records().size(), 8U);
@@ -75,7 +77,7 @@ TEST_P(ZropTimedTest, BinsOfAnySizeAreTestedInTheCyclesOfCycle) {
     const Bench::Settings settings{{"quads_per_cycle", std::to_string(rate)}, {"latency_cycles", "8"}};
     std::vector<Cycle> expected;  // of the last beat of each bin
     {
-      Bench cycle("zrop", "depth-stencil-rop", state, settings);
+      Bench cycle("zrop", "depth-stencil-rop", context, settings);
       Source<QuadBeat>& in = cycle.source<QuadBeat>("in_quads", 128);
       in.set_rate(1);
       for (unsigned i = 0; i < 30; ++i) {
@@ -91,7 +93,7 @@ TEST_P(ZropTimedTest, BinsOfAnySizeAreTestedInTheCyclesOfCycle) {
         if (record.item.last_of_bin) expected.push_back(record.cycle);
       }
     }
-    ZropBench zrop(GetParam(), state, settings, 128);
+    ZropBench zrop(GetParam(), context, settings, 128);
     zrop.in.set_rate(1);
     for (unsigned i = 0; i < 30; ++i) {
       const auto quads = static_cast<unsigned>(1 + mix(i) % 60);
@@ -108,7 +110,7 @@ TEST_P(ZropTimedTest, BinsOfAnySizeAreTestedInTheCyclesOfCycle) {
 TEST_P(ZropTimedTest, ATestSeesAnUpdateOfTheCycleBeforeAndNotOfItsOwn) {
   // The update is applied in cycle 21 and keeps the test from the z-cache in it.
   for (const Cycle pushed : {19U, 20U, 21U}) {
-    ZropBench zrop(GetParam(), state, {{"latency_cycles", "1"}}, 4);
+    ZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}}, 4);
     zrop.in.add(bins.at({0, 0}, {7}), pushed);  // in hand a cycle later
     zrop.updates.add(signals({7}), 20);
     zrop.bench.run();
@@ -121,7 +123,7 @@ TEST_P(ZropTimedTest, ATestSeesAnUpdateOfTheCycleBeforeAndNotOfItsOwn) {
 TEST_P(ZropTimedTest, AnUpdateMeetsThePartOfABinThatIsTestedLater) {
   // Sixteen quads a cycle from 11 on; position 40 is tested in 13.
   for (const Cycle pushed : {11U, 12U, 13U}) {
-    ZropBench zrop(GetParam(), state, {{"quads_per_cycle", "16"}});
+    ZropBench zrop(GetParam(), context, {{"quads_per_cycle", "16"}});
     zrop.updates.add(signals({40}), pushed);  // applied a cycle later
     zrop.in.add(bins.at({0, 0}, testing::numbers(64)), {10, 13}, 4);
     zrop.in.add(bins.at({0, 0}, {40}, 64), 100);
@@ -136,7 +138,7 @@ TEST_P(ZropTimedTest, AnUpdateMeetsThePartOfABinThatIsTestedLater) {
 
 TEST_P(ZropTimedTest, ACycleWithAnUpdateTestsNothing) {
   for (const unsigned updates_at_once : {0U, 1U, 3U}) {
-    ZropBench zrop(GetParam(), state, {{"latency_cycles", "1"}, {"updates_per_cycle", "1"}}, 4);
+    ZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}, {"updates_per_cycle", "1"}}, 4);
     for (unsigned i = 0; i < 6; ++i) zrop.in.add(bins.at({0, 0}, testing::numbers(16), 16 * i), i);
     if (updates_at_once == 1) zrop.updates.add(signals({60}), 2);
     if (updates_at_once == 3) zrop.updates.add(signals({60, 61, 62}), 2);
@@ -152,7 +154,7 @@ TEST_P(ZropTimedTest, ACycleWithAnUpdateTestsNothing) {
 }
 
 TEST_P(ZropTimedTest, AppliesItsUpdatesPerCycle) {
-  ZropBench zrop(GetParam(), state, {{"latency_cycles", "1"}, {"updates_per_cycle", "4"}}, 4);
+  ZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}, {"updates_per_cycle", "4"}}, 4);
   for (unsigned i = 0; i < 3; ++i) zrop.in.add(bins.at({0, 0}, testing::numbers(16), 16 * i), i);
   zrop.updates.add(signals({60, 61, 62, 63}), 1);
   zrop.bench.run();
@@ -161,7 +163,7 @@ TEST_P(ZropTimedTest, AppliesItsUpdatesPerCycle) {
 }
 
 TEST_P(ZropTimedTest, UpdatesAfterTheLastTestAreCountedWithTheDraw) {
-  ZropBench zrop(GetParam(), state);
+  ZropBench zrop(GetParam(), context);
   zrop.in.add(bins.at({0, 0}, {1}));
   zrop.updates.add(signals({1, 2}), 50);
   zrop.bench.run();
@@ -170,7 +172,7 @@ TEST_P(ZropTimedTest, UpdatesAfterTheLastTestAreCountedWithTheDraw) {
 }
 
 TEST_P(ZropTimedTest, SurvivorsKeepTheirOrderAndTheDeadAreTakenOut) {
-  ZropBench zrop(GetParam(), state);
+  ZropBench zrop(GetParam(), context);
   zrop.updates.add(signals({1, 3}));
   zrop.updates.add(signals({4}, 0b0011));
   zrop.in.add(bins.at({0, 0}, {0, 1, 2, 3, 4, 5}, 100), 50);
@@ -182,7 +184,7 @@ TEST_P(ZropTimedTest, SurvivorsKeepTheirOrderAndTheDeadAreTakenOut) {
 
 TEST_P(ZropTimedTest, WhatIsLeftOfABinTakesItsOwnBeats) {
   // Of four cycles of tests the second and third leave nothing.
-  ZropBench zrop(GetParam(), state, {{"quads_per_cycle", "16"}, {"latency_cycles", "8"}});
+  ZropBench zrop(GetParam(), context, {{"quads_per_cycle", "16"}, {"latency_cycles", "8"}});
   for (unsigned i = 16; i < 48; i += 4) zrop.updates.add(signals({i, i + 1, i + 2, i + 3}));
   zrop.in.add(bins.at({0, 0}, testing::numbers(64)), {100, 103}, 4);
   zrop.in.add(Bins::end());
@@ -191,13 +193,13 @@ TEST_P(ZropTimedTest, WhatIsLeftOfABinTakesItsOwnBeats) {
   EXPECT_EQ(zrop.out.records()[0].item.quads, 32U);
   EXPECT_EQ(zrop.out.records()[0].cycle, 101U + 8);
   EXPECT_EQ(zrop.out.records()[0].last, 104U + 8);
-  EXPECT_TRUE(zrop.out.records()[1].item.end_of_draw);
+  EXPECT_TRUE(zrop.out.records()[1].item.mark == Mark::end_of_frame);
   EXPECT_EQ(zrop.out.records()[1].cycle, 105U + 8);
   EXPECT_TRUE(zrop.bench.unit().idle());
 }
 
 TEST_P(ZropTimedTest, AReceiverThatTakesNothingStopsIt) {
-  ZropBench zrop(GetParam(), state, {{"latency_cycles", "1"}, {"quads_per_cycle", "16"}}, 2);
+  ZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}, {"quads_per_cycle", "16"}}, 2);
   zrop.out.close(0, 200);
   for (unsigned i = 0; i < 5; ++i) zrop.in.add(bins.at({0, 0}, testing::numbers(16), 16 * i));
   zrop.in.add(Bins::end());
@@ -210,7 +212,7 @@ TEST_P(ZropTimedTest, AReceiverThatTakesNothingStopsIt) {
 // case H05
 TEST_P(ZropTimedTest, NoUpdateIsLostUnderAnyStallsAndEveryQuadIsAccountedFor) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    ZropBench zrop(GetParam(), state, {}, static_cast<unsigned>(1 + seed % 10));
+    ZropBench zrop(GetParam(), context, {}, static_cast<unsigned>(1 + seed % 10));
     for (unsigned i = 0; i < 60; ++i) {
       zrop.in.add(bins.at({0, 0}, {i, (i + 1) % 64, (i + 2) % 64}, 3 * i));
       zrop.updates.add(signals({i, (7 * i) % 64}, static_cast<LaneMask>(1U << i % 4)));

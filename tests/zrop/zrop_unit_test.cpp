@@ -25,13 +25,15 @@ TerminationBeat signals(std::initializer_list<unsigned> positions, LaneMask pixe
 
 class ZropUnitTest : public ::testing::Test {
  protected:
-  ZropUnitTest() : draw(testing::draw_of(64, 64)), state(testing::state_of(draw)) { state.early_termination = true; }
+  ZropUnitTest() : draw(testing::draw_of(64, 64)), context(testing::context_of(draw)) {
+    testing::terminate_early(context);
+  }
   Draw draw;
-  RenderState state;
+  RenderContext context;
 };
 
 TEST_F(ZropUnitTest, ATestTakesItsLatency) {
-  Bench bench("zrop", "depth-stencil-rop", state, {{"latency_cycles", "8"}});
+  Bench bench("zrop", "depth-stencil-rop", context, {{"latency_cycles", "8"}});
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads");
   in.add(beat_of({0, 0}, {1}), 10);
@@ -42,7 +44,7 @@ TEST_F(ZropUnitTest, ATestTakesItsLatency) {
 
 TEST_F(ZropUnitTest, TestsItsQuadsPerCycle) {
   for (const unsigned rate : {4U, 8U, 16U}) {
-    Bench bench("zrop", "depth-stencil-rop", state, {{"quads_per_cycle", std::to_string(rate)}});
+    Bench bench("zrop", "depth-stencil-rop", context, {{"quads_per_cycle", std::to_string(rate)}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 32);
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 32);
     for (unsigned i = 0; i < 32; ++i) in.add(beat_of({0, 0}, sixteen, 16 * i));
@@ -55,7 +57,7 @@ TEST_F(ZropUnitTest, TestsItsQuadsPerCycle) {
 TEST_F(ZropUnitTest, ATestSeesAnUpdateOfTheCycleBeforeAndNotOfItsOwn) {
   // The update is applied in cycle 21 and keeps the test from the z-cache in it.
   for (const Cycle pushed : {19U, 20U, 21U}) {
-    Bench bench("zrop", "depth-stencil-rop", state, {{"latency_cycles", "1"}});
+    Bench bench("zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
     Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads");
@@ -71,7 +73,7 @@ TEST_F(ZropUnitTest, ATestSeesAnUpdateOfTheCycleBeforeAndNotOfItsOwn) {
 
 TEST_F(ZropUnitTest, ACycleWithAnUpdateTestsNothing) {
   for (const unsigned updates_at_once : {0U, 1U, 3U}) {
-    Bench bench("zrop", "depth-stencil-rop", state, {{"latency_cycles", "1"}});
+    Bench bench("zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 8);
     Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 8);
@@ -88,7 +90,7 @@ TEST_F(ZropUnitTest, ACycleWithAnUpdateTestsNothing) {
 }
 
 TEST_F(ZropUnitTest, AppliesItsUpdatesPerCycle) {
-  Bench bench("zrop", "depth-stencil-rop", state, {{"latency_cycles", "1"}, {"updates_per_cycle", "4"}});
+  Bench bench("zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"updates_per_cycle", "4"}});
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 8);
   Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations");
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 8);
@@ -100,7 +102,7 @@ TEST_F(ZropUnitTest, AppliesItsUpdatesPerCycle) {
 }
 
 TEST_F(ZropUnitTest, ADeadBeatStaysButForTheMarkThatClosesItsBin) {
-  Bench bench("zrop", "depth-stencil-rop", state);
+  Bench bench("zrop", "depth-stencil-rop", context);
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads");
   Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations");
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads");
@@ -112,14 +114,14 @@ TEST_F(ZropUnitTest, ADeadBeatStaysButForTheMarkThatClosesItsBin) {
   ASSERT_EQ(out.records().size(), 2U);
   EXPECT_TRUE(out.records()[0].item.last_of_bin);
   EXPECT_EQ(out.records()[0].item.count, 0);
-  EXPECT_TRUE(out.records()[1].item.end_of_draw);
+  EXPECT_TRUE(out.records()[1].item.mark == Mark::end_of_frame);
   EXPECT_TRUE(bench.unit().idle());
 }
 
 // case H05
 TEST_F(ZropUnitTest, NoUpdateIsLostUnderAnyStallsAndEveryQuadIsAccountedFor) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    Bench bench("zrop", "depth-stencil-rop", state);
+    Bench bench("zrop", "depth-stencil-rop", context);
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", static_cast<unsigned>(1 + seed % 3));
     Source<TerminationBeat>& updates =
         bench.source<TerminationBeat>("in_terminations", static_cast<unsigned>(1 + seed % 4));

@@ -14,7 +14,6 @@
 #include "host/output_file.h"
 #include "host/stdout_to_stderr.h"
 #include "jobs/settings.h"
-#include "jobs/termination.h"
 
 namespace vrpipe::tools {
 namespace {

@@ -8,8 +8,6 @@
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/workloads/preprocess_parameters.h>
 
-#include "jobs/termination.h"
-
 namespace vrpipe::tools {
 namespace {
 

@@ -207,7 +207,7 @@ class Worker {
     std::string message;
     try {
       const RunResult result = simulate(request_, draw, &progress);
-      if (image != nullptr) image->copy_from(result.surface);
+      if (image != nullptr) image->copy_from(result.framebuffer.color);
       message = char{outcome_result} + to_bytes(result);
     } catch (const UserError& error) {
       message = char{outcome_user_error} + std::string(error.what());
@@ -254,9 +254,10 @@ Simulated simulate_here(const RunRequest& request, const Draw& draw, bool with_i
   progress.erase();
   if (with_image) {
     simulated.image.emplace(draw.width, draw.height);
-    simulated.image->copy_from(simulated.result.surface);
+    simulated.image->copy_from(simulated.result.framebuffer.color);
   }
-  simulated.result.surface = ColorSurface(1, 1, request.format);
+  simulated.result.framebuffer.color = ColorSurface(1, 1, request.format);
+  simulated.result.framebuffer.depth_stencil = DepthStencilSurface(1, 1);
   return simulated;
 }
 

@@ -15,7 +15,7 @@
 
 namespace vrpipe::tools {
 
-/// A simulation's result; its pixels are in `image`, when images were asked for, and not in `result.surface`.
+/// A simulation's result; its pixels are in `image`, when images were asked for, and not in `result.framebuffer.color`.
 struct Simulated {
   RunResult result;
   std::optional<SharedImage> image;

@@ -49,13 +49,18 @@ VRPIPE_MEMBERS(HistogramBucket, from, to, count)
 VRPIPE_MEMBERS(HistogramReport, smallest, largest, buckets)
 VRPIPE_MEMBERS(InstanceStatistic, path, value, denominator)
 VRPIPE_MEMBERS(StatisticReport, name, unit, meaning, value, kind, formula, denominator, histogram, instances)
+VRPIPE_MEMBERS(MemoryRegion, address, bytes)
+VRPIPE_MEMBERS(AddressMap, color, depth_stencil, vertices, primitives, attributes)
+VRPIPE_MEMBERS(Framebuffer, color, depth_stencil, addresses)
+VRPIPE_MEMBERS(DrawReport, name, counts)
 VRPIPE_MEMBERS(RunResult, request, cycles, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
                bottleneck, statistics, implementations, parameters, outside_validated_range, result_hash, kernel_events,
-               surface)
+               framebuffer, draws)
 
 /// Types of members that stay behind.
 template <class Member>
-constexpr bool stays = std::is_same<Member, RunRequest>::value || std::is_same<Member, ColorSurface>::value;
+constexpr bool stays = std::is_same<Member, RunRequest>::value || std::is_same<Member, ColorSurface>::value ||
+                       std::is_same<Member, DepthStencilSurface>::value;
 
 struct Writer {
   static Json of(std::uint64_t value) { return value; }

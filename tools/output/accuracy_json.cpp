@@ -6,8 +6,6 @@
 
 #include <vrpipe/blend.h>
 
-#include "jobs/termination.h"
-
 namespace vrpipe::tools {
 namespace {
 

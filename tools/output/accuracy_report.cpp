@@ -9,7 +9,6 @@
 #include <vrpipe/blend.h>
 #include <vrpipe/printable.h>
 
-#include "jobs/termination.h"
 #include "output/report.h"
 #include "output/text_table.h"
 

@@ -12,7 +12,6 @@
 #include <vrpipe/printable.h>
 
 #include "jobs/comparison.h"
-#include "jobs/termination.h"
 #include "output/text_table.h"
 
 namespace vrpipe::tools {

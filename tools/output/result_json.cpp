@@ -13,7 +13,6 @@
 
 #include "jobs/comparison.h"
 #include "jobs/settings.h"
-#include "jobs/termination.h"
 #include "output/report.h"
 
 namespace vrpipe::tools {

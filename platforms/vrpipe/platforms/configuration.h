@@ -14,7 +14,7 @@
 
 namespace vrpipe {
 
-/// Parameters of the draw's state and the precision of fixed-function hardware, set as `state.NAME`.
+/// Parameters of a draw's state, unless the draw says otherwise, and of the hardware's precision, set as `state.NAME`.
 struct StateParameters : ParameterSet {
   Real termination_threshold{*this,
                              "termination_threshold",
@@ -69,7 +69,7 @@ class Configuration {
  public:
   /// Throws UserError for an unknown unit, link, parameter or value, and SimulationFault for a platform whose wiring
   /// throws something else.
-  Configuration(const RunRequest& request, const Draw& draw);
+  Configuration(const RunRequest& request, const Frame& frame);
 
   /// The functional model of an instance. This configuration outlives it.
   std::unique_ptr<Behaviour> make(const Instance& instance) const;
@@ -81,8 +81,9 @@ class Configuration {
   const RunRequest& request() const { return request_; }
   const Platform& platform() const { return *request_.platform; }
   const Netlist& netlist() const { return netlist_; }
-  const RenderState& state_of(unsigned gpc) const { return states_[gpc]; }
-  const Draw& draw() const { return *states_.front().draw; }
+  const RenderContext& context_of(unsigned gpc) const { return contexts_[gpc]; }
+  /// What is drawn, in this variant: without the units for it no draw terminates early.
+  const Frame& frame() const { return *contexts_.front().frame; }
   /// What is in an instance, in this variant.
   const Implementation& implementation(const Instance& instance) const { return *units_.at(instance.path).chosen; }
   const L2Parameters& l2() const { return l2_; }
@@ -114,7 +115,7 @@ class Configuration {
   std::map<std::string, UnitChoices> units_;  ///< by path
   StateParameters state_parameters_;
   L2Parameters l2_;
-  std::vector<RenderState> states_;  ///< by GPC
+  std::vector<RenderContext> contexts_;  ///< by GPC
 };
 
 /// The default implementation of a slot; what stands in where the variant does without the unit.

@@ -24,7 +24,7 @@ class Gpu {
     Behaviour* behaviour;  ///< whose counters count
   };
 
-  Gpu(const Configuration& configuration, ColorSurface& surface);
+  Gpu(const Configuration& configuration, Framebuffer& framebuffer);
   ~Gpu();
 
   /// In the order of the netlist.
@@ -37,11 +37,11 @@ class Gpu {
   Cycle run(std::atomic<float>* progress);
 
  private:
-  void add(const Instance& instance, ColorSurface& surface);
+  void add(const Instance& instance, Framebuffer& framebuffer);
   void add_memory(const MemoryInstance& memory);
   void check() const;
   /// Whether the draw has ended everywhere, no unit has work left and no access to memory is under way.
-  bool draw_is_over() const;
+  bool frame_is_over() const;
   Unit* find(const std::string& path) const;
 
   const Configuration& configuration_;

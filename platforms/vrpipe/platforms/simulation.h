@@ -12,9 +12,10 @@
 
 #include <vrpipe/accounting.h>
 #include <vrpipe/draw.h>
+#include <vrpipe/frame.h>
+#include <vrpipe/framebuffer.h>
 #include <vrpipe/parameter.h>
-#include <vrpipe/render_state.h>
-#include <vrpipe/surface.h>
+#include <vrpipe/render_context.h>
 
 namespace vrpipe {
 
@@ -96,7 +97,7 @@ struct RunRequest {
   std::uint64_t tick_order_seed = 0;
 };
 
-/// Exact integers, per draw; the names and rules are those of the contract.
+/// Exact integers, of a frame; the names and rules are those of the contract.
 struct Counts {
   std::uint64_t primitives = 0;
   std::uint64_t quads_rasterized = 0, fragments_rasterized = 0;
@@ -165,6 +166,13 @@ struct StatisticReport {
   std::optional<double> quotient() const;
 };
 
+/// What was counted of one draw: of `Counts`, what is a draw's own. Over all draws of a frame each sums to the frame's.
+/// A merged quad is blended for the draw of its front quad, and counted as merged for that of its back quad.
+struct DrawReport {
+  std::string name;
+  std::vector<std::pair<std::string, std::uint64_t>> counts;
+};
+
 struct RunResult {
   RunRequest request;
   std::optional<std::uint64_t> cycles;  ///< none where the fidelity has no time
@@ -185,13 +193,21 @@ struct RunResult {
   std::vector<std::string> outside_validated_range;
   std::string result_hash;          ///< of counts, cycles and the stored bits of the image, 16 hex digits
   std::uint64_t kernel_events = 0;  ///< activations of the SystemC kernel's processes
-  ColorSurface surface{1, 1, ColorFormat::rgba16f};
+  Framebuffer framebuffer;
+  std::vector<DrawReport> draws;  ///< in a frame of several
 };
+
+/// The state that a request gives to a draw with these settings of its own, of unit `state`; what is the hardware's
+/// precision among them is not used. Early termination is on: it takes the variant's units to have it.
+/// Throws UserError for an unknown parameter or value.
+DrawState draw_state_of(const RunRequest& request, const std::vector<Setting>& own = {});
 
 /// Runs one variant. Checks conservation, order per pixel and that the states of each unit sum to the cycles; throws
 /// SimulationFault if one is broken and UserError for a configuration that does not exist. With time, one simulation
 /// per process is the safe way; tests run several with `fresh_simulation()`.
 /// `progress`, if given, goes from 0 to 1.
+RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress = nullptr);
+/// A frame of one draw, of the state that the request gives.
 RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<float>* progress = nullptr);
 
 /// Checks settings and unit choices against a platform without running anything; throws UserError.

@@ -12,11 +12,11 @@
 #include <vrpipe/checked_behaviours.h>
 #include <vrpipe/clock_domain.h>
 #include <vrpipe/error.h>
+#include <vrpipe/framebuffer.h>
 #include <vrpipe/memory_port.h>
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/random.h>
 #include <vrpipe/registry.h>
-#include <vrpipe/surface.h>
 #include <vrpipe/testkit/sink.h>
 #include <vrpipe/testkit/source.h>
 #include <vrpipe/timed.h>
@@ -28,10 +28,10 @@ namespace vrpipe::testkit {
 ///
 ///     Draw draw;
 ///     draw.width = draw.height = 64;
-///     RenderState state;
-///     state.draw = &draw;
+///     RenderContext context;
+///     context.frame = Frame::of(draw);
 ///
-///     Bench bench("qru", "pairing", state, {{"quads_per_cycle", "4"}});   // a plugin's: load_plugin("my.so") first
+///     Bench bench("qru", "pairing", context, {{"quads_per_cycle", "4"}});   // a plugin's: load_plugin("my.so") first
 ///     Source<QuadBeat>& quads = bench.source<QuadBeat>("in_quads");
 ///     Sink<Warp>& warps = bench.sink<Warp>("out_warps");
 ///     quads.add(beat);                  // as soon as there is room
@@ -62,26 +62,26 @@ class Bench {
     clock_ = std::make_unique<ClockDomain>("clock", period_ps);
   }
 
-  /// @param state  copied; its draw is not. @param gpcs  that a front-end unit serves.
+  /// @param context  copied. @param gpcs  that a front-end unit serves.
   /// Throws UserError for an unknown slot, implementation, parameter or value.
-  Bench(const std::string& slot, const std::string& implementation, const RenderState& state,
+  Bench(const std::string& slot, const std::string& implementation, const RenderContext& context,
         const Settings& settings = {}, unsigned gpcs = 1)
-      : Bench(Fidelity::cycle, slot, implementation, state, settings, gpcs) {}
-  Bench(Fidelity fidelity, const std::string& slot, const std::string& implementation, const RenderState& state,
+      : Bench(Fidelity::cycle, slot, implementation, context, settings, gpcs) {}
+  Bench(Fidelity fidelity, const std::string& slot, const std::string& implementation, const RenderContext& context,
         const Settings& settings = {}, unsigned gpcs = 1)
       : Bench(fidelity) {
-    state_ = state;
+    context_ = context;
+    framebuffer_ = Framebuffer(*context.frame, context.format);
     const Implementation& found = Registry::instance().find(slot, implementation);
     const std::unique_ptr<ParameterSet> parameters = found.make_parameters();
     for (const auto& [name, value] : settings) parameters->set(slot, name, value);
-    std::unique_ptr<Behaviour> behaviour = found.make_behaviour(*parameters, state_);
-    if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) {
-      surface_ = std::make_unique<ColorSurface>(state.draw->width, state.draw->height, state.format);
-      crop->attach(*surface_);
-    }
+    std::unique_ptr<Behaviour> behaviour = found.make_behaviour(*parameters, context_);
+    if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(framebuffer_.color);
+    if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get())) zrop->attach(framebuffer_.depth_stencil);
+    behaviour->unit().set_draws(context.frame->draws().size());
     follow_clock(*behaviour, *clock_);
-    unit_ = clocked() ? unit_maker(slot)(slot, *clock_, std::move(behaviour), state_, gpcs)
-                      : timed_unit_maker(slot)(slot, *clock_, std::move(behaviour), state_, gpcs, transport());
+    unit_ = clocked() ? unit_maker(slot)(slot, *clock_, std::move(behaviour), context_, gpcs)
+                      : timed_unit_maker(slot)(slot, *clock_, std::move(behaviour), context_, gpcs, transport());
   }
   Bench(const Bench&) = delete;
   Bench& operator=(const Bench&) = delete;
@@ -97,7 +97,7 @@ class Bench {
     return dynamic_cast<Type&>(unit_->behaviour().unit());
   }
   /// What a CROP blends into.
-  ColorSurface& surface() { return *surface_; }
+  ColorSurface& surface() { return framebuffer_.color; }
 
   /// A source connected to an input of the unit, or, without a port's name, to nothing yet.
   template <class Item>
@@ -196,8 +196,8 @@ class Bench {
 
   const Fidelity fidelity_;
   std::unique_ptr<ClockDomain> clock_;
-  RenderState state_;
-  std::unique_ptr<ColorSurface> surface_;
+  RenderContext context_;
+  Framebuffer framebuffer_;
   std::unique_ptr<FixedLatencyMemory> memory_;
   std::unique_ptr<Unit> unit_;
   std::vector<std::unique_ptr<sc_core::sc_module>> modules_;

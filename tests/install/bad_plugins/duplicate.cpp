@@ -7,7 +7,7 @@ namespace {
 class Draws : public vrpipe::DrawBehaviour {
  public:
   struct Parameters : vrpipe::ParameterSet {};
-  Draws(const Parameters&, const vrpipe::RenderState&) {}
+  Draws(const Parameters&, const vrpipe::RenderContext&) {}
   bool next(vrpipe::VertexWarp&) override { return false; }
   std::uint32_t warps_per_1024_cycles() const override { return 1; }
 };

@@ -32,8 +32,8 @@ struct Exits : vrpipe::TileCoalescing {
   bool flush_oldest(FlushReason, Flush&) override { std::exit(0); }
 };
 struct CrashesWhenMade : vrpipe::PrimitiveAssembly {
-  CrashesWhenMade(const Parameters& parameters, const vrpipe::RenderState& state)
-      : PrimitiveAssembly(parameters, state) {
+  CrashesWhenMade(const Parameters& parameters, const vrpipe::RenderContext& context)
+      : PrimitiveAssembly(parameters, context) {
     std::raise(SIGFPE);
   }
 };

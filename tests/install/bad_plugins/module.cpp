@@ -8,7 +8,7 @@ namespace {
 [[maybe_unused]] const bool registered = [] {
   vrpipe::register_unit_maker("zrop",
                               [](const std::string&, vrpipe::ClockDomain&, std::unique_ptr<vrpipe::Behaviour>,
-                                 const vrpipe::RenderState&,
+                                 const vrpipe::RenderContext&,
                                  unsigned) -> std::unique_ptr<vrpipe::Unit> { return nullptr; });
   return true;
 }();

@@ -14,8 +14,9 @@ class CountingRop : public vrpipe::ColorRop<Format, Rounding> {
   using Shipped::Shipped;
 
   // A quad comes by one of the two, at cycle by the first, elsewhere by the second.
-  Outcome blend(std::size_t place, vrpipe::LaneMask live, const vrpipe::QuadColor& color) override {
-    const Outcome outcome = Shipped::blend(place, live, color);
+  Outcome blend(vrpipe::DrawIndex draw, std::size_t place, vrpipe::LaneMask live,
+                const vrpipe::QuadColor& color) override {
+    const Outcome outcome = Shipped::blend(draw, place, live, color);
     count(outcome);
     return outcome;
   }

@@ -9,9 +9,9 @@
 int main() try {
   vrpipe::Draw draw;
   draw.width = draw.height = 16;
-  vrpipe::RenderState state;
-  state.draw = &draw;
-  vrpipe::testkit::Bench bench("crop", "counting-rop", state, {{"cache_bytes", "8192"}});
+  vrpipe::RenderContext context;
+  context.frame = Frame::of(draw);
+  vrpipe::testkit::Bench bench("crop", "counting-rop", context, {{"cache_bytes", "8192"}});
 
   // The same opaque quad twice: the second changes nothing.
   vrpipe::ShadedWarp warp;

@@ -5,7 +5,7 @@
 
 #include <vrpipe/registry.h>
 
-SameSplatQru::SameSplatQru(const Parameters& parameters, const vrpipe::RenderState&)
+SameSplatQru::SameSplatQru(const Parameters& parameters, const vrpipe::RenderContext&)
     : cost_{parameters.quads_per_cycle, parameters.latency_cycles} {}
 
 unsigned SameSplatQru::examine(vrpipe::TileId tile, const vrpipe::Quad* quads, unsigned count, vrpipe::Warp& out,

@@ -25,7 +25,7 @@ class SameSplatQru : public vrpipe::QruBehaviour {
                                    "same as unit pairing",
                                    "from the quad that completes a warp to its launch"};
   };
-  SameSplatQru(const Parameters& parameters, const vrpipe::RenderState& state);
+  SameSplatQru(const Parameters& parameters, const vrpipe::RenderContext& context);
 
   unsigned examine(vrpipe::TileId tile, const vrpipe::Quad* quads, unsigned count, vrpipe::Warp& out,
                    bool& launched) override;

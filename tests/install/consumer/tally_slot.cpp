@@ -26,7 +26,7 @@ class QuadTally : public TallyBehaviour {
     Integer beats_per_cycle{
         *this, "beats_per_cycle", 4, 1, 64, "beats", "as many as RASTER makes fine tiles", "passed in a cycle"};
   };
-  QuadTally(const Parameters& parameters, const RenderState&) : cost_{parameters.beats_per_cycle, 1} {}
+  QuadTally(const Parameters& parameters, const RenderContext&) : cost_{parameters.beats_per_cycle, 1} {}
   void pass(const QuadBeat& beat) override {
     quads += beat.count;
     single_quads += beat.count == 1 ? 1U : 0U;
@@ -146,17 +146,17 @@ const SlotRegistrar slot{{"tally", 45, "quad-tally"}};
 const Registrar<QuadTally, TallyBehaviour> unit("tally", "quad-tally", "counts the quads that pass");
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("tally", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                          const RenderState&, unsigned) {
+                                          const RenderContext&, unsigned) {
     return std::make_unique<UntimedTally>(name, behaviour_as<TallyBehaviour>(std::move(behaviour)));
   });
   register_timed_unit_maker("tally", [](const std::string& name, ClockDomain& domain,
-                                        std::unique_ptr<Behaviour> behaviour, const RenderState&, unsigned,
+                                        std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned,
                                         Transport transport) {
     return std::make_unique<TimedTally>(name.c_str(), domain, behaviour_as<TallyBehaviour>(std::move(behaviour)),
                                         transport);
   });
   register_unit_maker("tally", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                  const RenderState&, unsigned) {
+                                  const RenderContext&, unsigned) {
     return std::make_unique<TallyUnit>(name.c_str(), domain, behaviour_as<TallyBehaviour>(std::move(behaviour)));
   });
   add_platform(tallied());
