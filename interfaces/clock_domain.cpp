@@ -88,7 +88,8 @@ void ClockDomain::check_answers() const {
   const sc_core::sc_time silence = sc_core::sc_time_stamp() - sc_core::sc_time::from_value(now_ * period_.value());
   if (silence < longest_silence() && sc_core::sc_pending_activity()) return;
   OutsidePort::Unanswered oldest{never, name(), "something outside the clock"};
-  for (const OutsidePort* port : outside_ports_) {
+  for (OutsidePort* port : outside_ports_) {
+    if (!port->meets_own_time()) continue;  // what it is bound to waits for another port's answer
     OutsidePort::Unanswered request = port->oldest_unanswered();
     if (request.since < oldest.since) oldest = std::move(request);
   }

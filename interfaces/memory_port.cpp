@@ -1,5 +1,9 @@
 #include <vrpipe/memory_port.h>
 
+#include <stdexcept>
+
+#include "sector_fills.h"
+
 #include <vrpipe/error.h>
 
 namespace vrpipe {
@@ -14,13 +18,23 @@ void fault_of_response(const sc_core::sc_object& port, Cycle now, const tlm::tlm
   throw SimulationFault(port.name(), now, "the memory answered " + access.get_response_string());
 }
 
-EarlyCompletionMemory* early_completion_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
+namespace {
+
+/// What a socket is bound to, if it works in the cycles of this clock; null otherwise.
+EarlyCompletionMemory* memory_of_clock(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
   auto* const memory = dynamic_cast<EarlyCompletionMemory*>(socket.operator->());
   return memory != nullptr && &memory->clock() == &clock ? memory : nullptr;
 }
 
+}  // namespace
+
+EarlyCompletionMemory* early_completion_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
+  EarlyCompletionMemory* const memory = memory_of_clock(socket, clock);
+  return memory != nullptr && memory->completes_early() ? memory : nullptr;
+}
+
 bool meets_own_time(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
-  const EarlyCompletionMemory* const memory = early_completion_memory_of(socket, clock);
+  const EarlyCompletionMemory* const memory = memory_of_clock(socket, clock);
   return memory == nullptr || memory->has_own_time();
 }
 
@@ -135,11 +149,17 @@ OutsidePort::Unanswered MemoryPort::oldest_unanswered() const {
   return oldest;
 }
 
-class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>, public EarlyCompletionMemory {
+class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>,
+                                               public EarlyCompletionMemory,
+                                               public ClockedFills::Port {
  public:
-  MemoryTarget(const std::string& name, FixedLatencyMemory& memory)
-      : socket(name.c_str()), memory_(memory), bandwidth_(memory.bytes_per_cycle_) {
+  MemoryTarget(unsigned index, FixedLatencyMemory& memory)
+      : socket(("port_" + std::to_string(index)).c_str()),
+        memory_(memory),
+        index_(index),
+        bandwidth_(memory.bytes_per_cycle_) {
     socket.bind(*this);
+    if (memory_.clocked_ != nullptr) memory_.clocked_->attach(*this);
   }
   tlm::tlm_target_socket<32, tlm::tlm_base_protocol_types, 1, sc_core::SC_ZERO_OR_MORE_BOUND> socket;
 
@@ -149,14 +169,20 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
 
  private:
   Cycle serve(const MemoryRequest& request, Cycle arrival) override {
+    if (memory_.annotated_ != nullptr) arrival = memory_.annotated_->filled(request, arrival);
     memory_.traffic_.count(request);
     bytes_ += request.bytes;
     return memory_.latency_cycles_ + bandwidth_.take(arrival, request.bytes, clock().now());
   }
   const ClockDomain& clock() const override { return memory_.domain_; }
+  bool completes_early() const override { return memory_.clocked_ == nullptr; }
 
   // The delay that comes in says how far ahead of the clock the access is.
   void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) override {
+    if (!completes_early()) {
+      throw SimulationFault(socket.name(), clock().now(),
+                            "b_transport at cycle, where it may wait for the memory below");
+    }
     Cycle arrival = clock().now() + clock().whole_cycles(delay);
     if (const auto* const extension = payload.get_extension<MemoryRequestExtension>())
       arrival -= extension->late_cycles;
@@ -166,30 +192,74 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
   }
   tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override {
+    if (!completes_early()) return take(payload, phase, delay);
     if (phase == tlm::BEGIN_REQ) b_transport(payload, delay);
     return tlm::TLM_COMPLETED;
   }
   bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
   unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
 
+  // With a memory below, at `cycle`.
+  tlm::tlm_sync_enum take(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase, const sc_core::sc_time& delay) {
+    if (phase == tlm::BEGIN_REQ) {
+      memory_.clocked_->arrive(index_, payload, delay);
+      phase = tlm::END_REQ;
+      return tlm::TLM_UPDATED;
+    }
+    if (phase != tlm::END_RESP) return tlm::TLM_ACCEPTED;  // ignorable ones of the initiator's
+    responding_ = false;
+    memory_.clocked_->wake();
+    return tlm::TLM_COMPLETED;
+  }
+  void filled(tlm::tlm_generic_payload& payload, Cycle from) override {
+    responses_.push({&payload, serve(request_of(payload), from)});
+  }
+  void respond() override {
+    while (!responses_.empty() && !responding_) {
+      const Response response = responses_.front();
+      responses_.pop();
+      const Cycle ahead = std::max(response.at, clock().now() + 1) - clock().now();
+      auto delay = sc_core::sc_time::from_value(ahead * clock().period().value());
+      tlm::tlm_phase phase = tlm::BEGIN_RESP;
+      response.payload->set_response_status(tlm::TLM_OK_RESPONSE);
+      responding_ = true;  // until the initiator says otherwise, perhaps from within the call
+      if (socket->nb_transport_bw(*response.payload, phase, delay) != tlm::TLM_ACCEPTED) responding_ = false;
+      response.payload->release();
+    }
+  }
+
+  struct Response {
+    tlm::tlm_generic_payload* payload;
+    Cycle at;
+  };
   FixedLatencyMemory& memory_;
+  const unsigned index_;
   BandwidthReservation bandwidth_;
   std::uint64_t bytes_ = 0;
+  Ring<Response> responses_;  ///< not sent yet
+  bool responding_ = false;   ///< BEGIN_RESP without END_RESP yet
 };
 
-FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, const ClockDomain& domain,
-                                       unsigned latency_cycles, unsigned bytes_per_cycle, unsigned ports)
+FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain,
+                                       unsigned latency_cycles, unsigned bytes_per_cycle, unsigned ports,
+                                       MemoryBelow below)
     : sc_module(name),
       domain_(domain),
       latency_cycles_(latency_cycles),
       bytes_per_cycle_(bytes_per_cycle),
       traffic_(*this) {
-  for (unsigned index = 0; index < ports; ++index) {
-    ports_.push_back(std::make_unique<MemoryTarget>("port_" + std::to_string(index), *this));
-  }
+  if (below == MemoryBelow::annotated) annotated_ = std::make_unique<AnnotatedFills>(domain, cache_);
+  if (below == MemoryBelow::clocked) clocked_ = std::make_unique<ClockedFills>(domain, cache_);
+  for (unsigned index = 0; index < ports; ++index) ports_.push_back(std::make_unique<MemoryTarget>(index, *this));
 }
 
 FixedLatencyMemory::~FixedLatencyMemory() = default;
+
+tlm::tlm_initiator_socket<32>& FixedLatencyMemory::below() {
+  if (annotated_ != nullptr) return annotated_->socket();
+  if (clocked_ != nullptr) return clocked_->socket();
+  throw std::logic_error(std::string(name()) + " was made without a memory below");
+}
 
 tlm::tlm_base_target_socket_b<32>& FixedLatencyMemory::port(unsigned index) { return ports_.at(index)->socket; }
 

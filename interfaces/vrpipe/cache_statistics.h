@@ -31,4 +31,24 @@ struct SectoredCacheStatistics : StatisticSet {
                          "moved for a sector needed"};
 };
 
+/// What a cache counts that holds whatever was accessed once. Every access is of one or more sectors:
+///     accesses = hits + misses.
+struct CompulsoryMissStatistics : StatisticSet {
+  /// The part `name` of a component.
+  CompulsoryMissStatistics(StatisticSet& owner, const char* name) : StatisticSet(owner, name) {}
+
+  void count(bool hit) {
+    ++sector_accesses;
+    ++(hit ? sector_hits : sector_misses);
+  }
+
+  Counter sector_accesses{*this, "sector_accesses", "sectors", "read or written, by one access each"};
+  Counter sector_hits{*this, "sector_hits", "sectors", "accessed that are there or on their way"};
+  Counter sector_misses{*this, "sector_misses", "sectors", "accessed for the first time"};
+  Counter bytes_filled{*this, "bytes_filled", "bytes",
+                       "read from the memory below; for a sector that is first written whole none are"};
+  Ratio sector_hit_rate{
+      *this, sector_hits, sector_accesses, "sector_hit_rate", "hits per sector", "of sectors accessed"};
+};
+
 }  // namespace vrpipe

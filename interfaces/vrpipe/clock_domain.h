@@ -26,8 +26,8 @@ class Clocked {
 class OutsidePort {
  public:
   virtual ~OutsidePort() = default;
-  /// Whether what it is bound to has time of its own, so that the kernel's must keep step with the clock. Asked once all
-  /// is bound, before the first edge.
+  /// Whether what it is bound to has time of its own, so that the kernel's must keep step with the clock. Asked
+  /// when all is bound.
   virtual bool meets_own_time() = 0;
   struct Unanswered {
     Cycle since = never;
@@ -48,6 +48,8 @@ class ClockDomain : public sc_core::sc_module {
 
   /// Returns the handle for `wake`. Units tick in the order of attachment; the order does not change results.
   unsigned attach(Clocked& unit);
+  /// How many units are attached.
+  std::size_t attached() const { return units_.size(); }
   /// The cycle of this edge; between edges, of the last one.
   Cycle now() const { return now_; }
   sc_core::sc_time period() const { return period_; }

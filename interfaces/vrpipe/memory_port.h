@@ -10,6 +10,7 @@
 #include <tlm>
 
 #include <vrpipe/bandwidth.h>
+#include <vrpipe/cache_statistics.h>
 #include <vrpipe/clock_domain.h>
 #include <vrpipe/link.h>
 #include <vrpipe/memory_request.h>
@@ -42,11 +43,13 @@ class EarlyCompletionMemory {
   virtual const ClockDomain& clock() const = 0;
   /// Whether its answers depend on anything but the requests and their cycles: on sc_time, or timers.
   virtual bool has_own_time() const { return false; }
+  /// Whether it can say so. If not, it answers in the cycles of its clock, through the sockets.
+  virtual bool completes_early() const { return true; }
 };
 
 /// The memory that a socket is bound to, if it completes early and counts the cycles of this clock; null otherwise.
 EarlyCompletionMemory* early_completion_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock);
-/// Whether what a socket is bound to has time of its own, as everything may that is no early-completion memory.
+/// Whether what a socket is bound to has time of its own, as everything may but an EarlyCompletionMemory.
 bool meets_own_time(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock);
 
 /// An initiator on the unmodified TLM-2.0 base protocol, for timing only: payloads carry addresses and lengths, data
@@ -133,21 +136,45 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
 };
 
+/// Whether a memory has another one below it, and how it asks that.
+enum class MemoryBelow : std::uint8_t {
+  none,
+  annotated,  ///< at `lt` and `at`: by calls of b_transport, which annotates its time
+  clocked,    ///< at `cycle`: in the phases of the base protocol
+};
+
+class AnnotatedFills;
+class ClockedFills;
+
 /// A memory that answers every access after the same time; each port moves a number of bytes per cycle. Ports may stay
 /// unbound.
+///
+/// With a memory below it, it is a cache of unbounded capacity, which has compulsory misses only. What is read, or
+/// written in part, is fetched from below a sector at a time unless it is there or on its way already; the request
+/// leaves a cycle after the access has arrived, and keeps its origin. Then the access is served as if it arrived when
+/// the last of its sectors came. A write of whole sectors needs no fill, nothing is written back, and an access to what
+/// is there takes as long as without a memory below. Any number of fills may be under way.
 class FixedLatencyMemory : public sc_core::sc_module, public StatisticSet {
  public:
-  FixedLatencyMemory(const sc_core::sc_module_name& name, const ClockDomain& domain, unsigned latency_cycles,
-                     unsigned bytes_per_cycle, unsigned ports);
+  /// Of a fill.
+  static constexpr unsigned sector_bytes = 32;
+
+  /// @param domain  outlives it
+  FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned latency_cycles,
+                     unsigned bytes_per_cycle, unsigned ports, MemoryBelow below = MemoryBelow::none);
   ~FixedLatencyMemory() override;
   /// Each port is for one initiator.
   tlm::tlm_base_target_socket_b<32>& port(unsigned index);
+  /// To be bound to the memory below. Throws std::logic_error if it was made to have none.
+  tlm::tlm_initiator_socket<32>& below();
   /// Moved in all, or before cycle `end`.
   std::uint64_t bytes(Cycle end = never) const;
   /// Bytes per cycle of all ports.
   double peak_rate() const;
   /// Of all ports.
   const MemoryTrafficCounters& traffic() const { return traffic_; }
+  /// With a memory below it.
+  const CompulsoryMissStatistics& cache() const { return cache_; }
 
  private:
   class MemoryTarget;
@@ -155,6 +182,9 @@ class FixedLatencyMemory : public sc_core::sc_module, public StatisticSet {
   unsigned latency_cycles_;
   unsigned bytes_per_cycle_;
   MemoryTrafficCounters traffic_;
+  CompulsoryMissStatistics cache_{*this, "cache"};
+  std::unique_ptr<AnnotatedFills> annotated_;  ///< of MemoryBelow::annotated
+  std::unique_ptr<ClockedFills> clocked_;      ///< of MemoryBelow::clocked
   std::vector<std::unique_ptr<MemoryTarget>> ports_;
 };
 
