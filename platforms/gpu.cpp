@@ -16,6 +16,14 @@
 
 namespace vrpipe {
 
+namespace {
+
+[[noreturn]] void refuse_memory(const std::string& where, const std::string& why, const std::string& remedy) {
+  throw UserError("cannot connect memory", where, why, remedy);
+}
+
+}  // namespace
+
 Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
     : configuration_(configuration),
       clock_(std::make_unique<ClockDomain>("clock", static_cast<std::uint64_t>(
@@ -29,7 +37,7 @@ Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
   }
   for (const Instance& instance : netlist.instances()) add(instance, framebuffer);
   connect_units(netlist, request.observers.get(), [&](const std::string& path) { return find(path); });
-  for (const MemoryInstance& memory : netlist.memories()) add_memory(memory);
+  add_memories();
   check();
 }
 
@@ -78,32 +86,55 @@ void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
   units_.push_back({&instance, std::move(unit), counting});
 }
 
-void Gpu::add_memory(const MemoryInstance& memory) {
+void Gpu::add_memories() {
+  const std::vector<MemoryInstance>& memories = configuration_.netlist().memories();
+  std::vector<TargetSockets> sockets;
+  for (const MemoryInstance& memory : memories) sockets.push_back(make_memory(memory));
+  for (std::size_t i = 0; i < memories.size(); ++i) bind_memory(memories[i], sockets[i]);
+}
+
+Gpu::TargetSockets Gpu::make_memory(const MemoryInstance& memory) {
   const auto units = static_cast<unsigned>(memory.units.size());
-  const auto refuse = [&](const std::string& where, const std::string& why, const std::string& remedy) {
-    throw UserError("cannot connect memory", where, why, remedy);
-  };
-  std::vector<tlm::tlm_base_target_socket_b<32>*> sockets;
+  TargetSockets sockets;
+  if (units == 0) return sockets;  // all were connected to something else
   if (memory.make) {
     ForeignMemory made = memory.make(memory.path, units);
-    if (made.module == nullptr) refuse(memory.path, "nothing was made", "return a module and its sockets");
-    memories_.push_back(std::move(made.module));
+    if (made.module == nullptr) refuse_memory(memory.path, "nothing was made", "return a module and its sockets");
+    memories_.push_back({&memory, std::move(made.module)});
     sockets = std::move(made.sockets);
-    if (sockets.size() == 1) sockets.resize(std::max(units, 1U), sockets.front());
+    if (sockets.size() == 1) sockets.resize(units, sockets.front());
   } else {
-    if (l2_ != nullptr) refuse(memory.path, "the platform has an L2 already", "connect its units to that");
-    if (units == 0) return;  // all were connected to something else
-    l2_ = std::make_unique<FixedLatencyMemory>(memory.path.c_str(), *clock_, configuration_.l2().latency_cycles,
-                                               configuration_.l2().bytes_per_cycle, units);
+    make_l2(memory);
     for (unsigned index = 0; index < units; ++index) sockets.push_back(&l2_->port(index));
   }
-  if (sockets.size() < units) {
-    refuse(memory.path, fmt::format("{} units are connected to {} sockets", units, sockets.size()),
-           "give one for each, or one that takes many");
+  return sockets;
+}
+
+void Gpu::make_l2(const MemoryInstance& memory) {
+  if (l2_ != nullptr) refuse_memory(memory.path, "the platform has an L2 already", "connect its units to that");
+  MemoryBelow below = MemoryBelow::none;
+  for (const MemoryInstance& other : configuration_.netlist().memories()) {
+    if (std::find(other.units.begin(), other.units.end(), memory.path) == other.units.end()) continue;
+    below = configuration_.request().fidelity == Fidelity::cycle ? MemoryBelow::clocked : MemoryBelow::annotated;
   }
-  for (unsigned index = 0; index < units; ++index) {
-    tlm::tlm_initiator_socket<32>* const socket = find(memory.units[index])->memory_socket();
-    if (socket == nullptr) refuse(memory.units[index], "the unit has no memory port", "leave it out");
+  const L2Parameters& parameters = configuration_.l2();
+  l2_ = std::make_unique<FixedLatencyMemory>(memory.path.c_str(), *clock_, parameters.latency_cycles,
+                                             parameters.bytes_per_cycle, static_cast<unsigned>(memory.units.size()),
+                                             below);
+}
+
+void Gpu::bind_memory(const MemoryInstance& memory, const TargetSockets& sockets) {
+  const std::size_t units = memory.units.size();
+  if (sockets.size() < units) {
+    refuse_memory(memory.path, fmt::format("{} units are connected to {} sockets", units, sockets.size()),
+                  "give one for each, or one that takes many");
+  }
+  for (std::size_t index = 0; index < units; ++index) {
+    const std::string& path = memory.units[index];
+    Unit* const unit = find(path);
+    if (unit == nullptr && l2_ == nullptr) refuse_memory(path, "no unit is connected to it", "leave it out");
+    tlm::tlm_initiator_socket<32>* const socket = unit != nullptr ? unit->memory_socket() : &l2_->below();
+    if (socket == nullptr) refuse_memory(path, "the unit has no memory port", "leave it out");
     socket->bind(*sockets[index]);
   }
 }
@@ -139,7 +170,7 @@ Cycle Gpu::run(std::atomic<float>* progress) {
     for (OutPort* port : placed.unit->out_ports) port->stall_randomly(mix(++seed), request.stall_per_256);
   }
   if (request.tick_order_seed != 0) {
-    std::vector<unsigned> order(units_.size());
+    std::vector<unsigned> order(clock_->attached());
     std::iota(order.begin(), order.end(), 0U);
     for (std::size_t i = order.size(); i > 1; --i) {
       std::swap(order[i - 1], order[mix(request.tick_order_seed + i) % i]);

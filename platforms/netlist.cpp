@@ -87,15 +87,28 @@ void Netlist::add_memory(const std::string& path, MemoryMaker make) {
 }
 
 void Netlist::connect_memory(const std::string& unit, const std::string& memory) {
-  static_cast<void>(instance(unit));
-  for (MemoryInstance& known : memories_) {
-    const auto found = std::find(known.units.begin(), known.units.end(), unit);
-    if (found != known.units.end()) known.units.erase(found);  // it is moved
+  MemoryInstance& target = this->memory(memory);
+  const bool is_l2 = std::any_of(memories_.begin(), memories_.end(),
+                                 [&](const auto& each) { return each.path == unit && !each.make; });
+  if (!is_l2) static_cast<void>(instance(unit));
+  if (is_l2 && !target.make) {
+    refuse("cannot connect", unit + " to " + memory, "below the L2 lies a memory of another make",
+           "add it with add_memory and what makes it");
   }
-  this->memory(memory).units.push_back(unit);
+  disconnect_memory(unit);  // it may be moved
+  target.units.push_back(unit);
 }
 
-void Netlist::replace_memory(const std::string& path, MemoryMaker make) { memory(path).make = std::move(make); }
+void Netlist::disconnect_memory(const std::string& unit) {
+  for (MemoryInstance& memory : memories_) {
+    memory.units.erase(std::remove(memory.units.begin(), memory.units.end(), unit), memory.units.end());
+  }
+}
+
+void Netlist::replace_memory(const std::string& path, MemoryMaker make) {
+  memory(path).make = std::move(make);
+  disconnect_memory(path);
+}
 
 void Netlist::replace(const std::string& path, const std::string& implementation) {
   instance(path).implementation = implementation;
@@ -124,9 +137,7 @@ void Netlist::remove(const std::string& path) {
   }
   const auto of_it = [&](const std::string& port) { return split_port(port).first == path; };
   stubs_.erase(std::remove_if(stubs_.begin(), stubs_.end(), of_it), stubs_.end());
-  for (MemoryInstance& memory : memories_) {
-    memory.units.erase(std::remove(memory.units.begin(), memory.units.end(), path), memory.units.end());
-  }
+  disconnect_memory(path);
   instances_.erase(
       std::find_if(instances_.begin(), instances_.end(), [&](const Instance& i) { return i.path == path; }));
 }

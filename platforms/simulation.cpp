@@ -122,9 +122,10 @@ void add_statistics(const Instance& instance, const Behaviour& behaviour, const 
   statistics.add(instance.slot, instance.path, unit);
 }
 
-/// Those of a memory that has any.
-void add_statistics(const sc_core::sc_module& memory, StatisticCollector& statistics) {
-  if (const auto* const set = dynamic_cast<const StatisticSet*>(&memory)) statistics.add(l2, l2, *set);
+/// Those of a memory of another make that has any.
+void add_statistics(const Gpu::PlacedMemory& memory, StatisticCollector& statistics) {
+  const std::string& path = memory.instance->path;
+  if (const auto* const set = dynamic_cast<const StatisticSet*>(memory.module.get())) statistics.add(path, path, *set);
 }
 
 /// The counters that every unit of a slot has, summed over GPCs. `value` gives what of one is counted.
@@ -331,8 +332,9 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
     report.name = l2;
     occupancy.add(std::move(report), l2,
                   {{"bytes", 0, static_cast<double>(gpu.l2()->bytes(cycles)) / gpu.l2()->peak_rate(), true}});
-    add_statistics(*gpu.l2(), statistics);
+    statistics.add(l2, l2, *gpu.l2());
   }
+  for (const Gpu::PlacedMemory& memory : gpu.memories()) add_statistics(memory, statistics);
   occupancy.finish();
   report_counts(configuration, behaviours, statistics, result);
 }

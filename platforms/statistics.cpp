@@ -133,10 +133,7 @@ std::vector<StatisticReport> list_statistics(const ParameterListing& listing) {
   {
     ClockDomain clock("clock", 1000);
     if (listing.unit == "l2") {
-      const FixedLatencyMemory memory("memory", clock, 1, 1, 1);
-      if (const auto* const set = dynamic_cast<const StatisticSet*>(static_cast<const sc_core::sc_module*>(&memory))) {
-        collector.add(listing.unit, listing.unit, *set);
-      }
+      collector.add(listing.unit, listing.unit, FixedLatencyMemory("memory", clock, 1, 1, 1));
     } else if (Registry::instance().has_slot(listing.unit)) {
       RenderContext context;
       context.frame = std::make_shared<Frame>(1, 1);

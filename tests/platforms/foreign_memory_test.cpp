@@ -1,4 +1,4 @@
-// A memory of another make in place of the L2, with times and timers of its own.
+// A memory of another make in place of the L2 or below it, with times and timers of its own.
 
 #include <gtest/gtest.h>
 
@@ -15,6 +15,7 @@ namespace {
 using testing::request_of;
 using testing::run;
 using testing::same_image;
+using testing::statistic;
 using testing::strictly;
 
 using Socket = tlm::tlm_base_target_socket_b<32>;
@@ -32,6 +33,18 @@ Platform with_memory(MemoryMaker make) {
   return platform;
 }
 
+/// agx-orin with a memory of another make below its L2.
+Platform with_memory_below(MemoryMaker make) {
+  Platform platform = platform_named("agx-orin");
+  platform.name = "foreign";
+  platform.wire = [make = std::move(make)](Netlist& netlist) {
+    wire_pipeline(netlist);
+    netlist.add_memory("dram", make);
+    netlist.connect_memory("l2", "dram");
+  };
+  return platform;
+}
+
 /// The clock of the units, for what is not of another make.
 ClockDomain& clock_of_units() { return dynamic_cast<ClockDomain&>(*sc_core::sc_find_object("clock")); }
 
@@ -39,13 +52,13 @@ sc_core::sc_time ns(double nanoseconds) { return sc_core::sc_time(nanoseconds, s
 
 /// What a DRAM did, beyond its life, which ends with the run.
 struct Counts {
-  std::uint64_t requests = 0, responses = 0, refreshes = 0;
+  std::uint64_t requests = 0, responses = 0, out_of_order = 0, refreshes = 0;
 };
 
 class CountedDram : public foreign::Dram {
  public:
   CountedDram(const std::string& name, Counts& counts) : Dram(name.c_str(), ns(1), ns(40), ns(70)), counts_(counts) {}
-  ~CountedDram() override { counts_ = {requests, responses, refreshes}; }
+  ~CountedDram() override { counts_ = {requests, responses, out_of_order, refreshes}; }
 
  private:
   Counts& counts_;
@@ -91,6 +104,105 @@ TEST(ForeignMemory, TakesThePlaceOfTheL2ThoughItsRefreshNeverEnds) {
       // At lt what a warp leads to is annotated ahead of the kernel's time, which hardly passes.
       EXPECT_GT(dram.refreshes, fidelity == Fidelity::lt ? 0U : 1U) << variant << " " << name_of(fidelity);
     }
+  }
+}
+
+TEST(ForeignMemory, BelowTheL2DelaysARunAndChangesNothingElse) {
+  const Draw draw = testing::random_draw(96, 96, 600, 21);
+  Counts dram;
+  const Platform platform = with_memory_below(
+      [&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
+  for (const char* variant : {"baseline", "het+qm"}) {
+    for (const Fidelity fidelity : with_time) {
+      RunRequest request = request_of(variant, fidelity, strictly);
+      request.settings = {{"crop", "cache_bytes", "2048"}};
+      const RunResult without = run(request, draw);
+      request.platform = &platform;
+      const RunResult with = run(request, draw);
+      const std::string what = std::string(variant) + " " + name_of(fidelity);
+      EXPECT_TRUE(same_image(with.surface, without.surface)) << what;
+      EXPECT_EQ(with.counts.named(), without.counts.named()) << what;
+      EXPECT_GT(*with.cycles, *without.cycles) << what;
+
+      // CROP reads a sector before it writes it; each of the picture is fetched once, however often CROP comes back.
+      EXPECT_EQ(dram.requests, statistic(with, "l2.cache.sector_misses")) << what;
+      EXPECT_LE(dram.requests, 96U * 96U * 8U / 32U) << what;
+      EXPECT_GT(dram.requests, 1000U) << what;
+      EXPECT_GT(statistic(with, "l2.cache.sector_hits"), 1000U) << what;
+      EXPECT_EQ(statistic(with, "l2.cache.bytes_filled"), 32 * dram.requests) << what;
+      EXPECT_EQ(32 * statistic(with, "l2.cache.sector_accesses"),
+                statistic(with, "l2.color_bytes_read") + statistic(with, "l2.color_bytes_written"))
+          << what;
+      EXPECT_EQ(dram.responses, dram.requests) << what;
+      EXPECT_EQ(dram.out_of_order > 0, fidelity == Fidelity::cycle) << what;
+      EXPECT_GT(dram.refreshes, fidelity == Fidelity::lt ? 0U : 1U) << what;
+    }
+  }
+}
+
+TEST(ForeignMemory, WithoutOneBelowTheL2HasNoStatisticsOfACache) {
+  const RunResult result = run(request_of("baseline", Fidelity::lt), testing::random_draw(64, 64, 100, 7));
+  for (const StatisticReport& report : result.statistics) EXPECT_EQ(report.name.find("l2.cache"), std::string::npos);
+}
+
+/// Random stalls and another order of ticks change no decision, and the run ends.
+TEST(ForeignMemory, BelowTheL2ChangesNothingUnderStallsEither) {
+  const Draw draw = testing::random_draw(96, 96, 300, 23);
+  Counts dram;
+  const Platform platform = with_memory_below(
+      [&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
+  RunRequest request = request_of("het+qm", Fidelity::cycle, strictly);
+  request.platform = &platform;
+  const RunResult expected = run(request, draw);
+  request.tick_order_seed = 5;
+  EXPECT_EQ(run(request, draw).result_hash, expected.result_hash);
+  request.stall_seed = 3;
+  request.stall_per_256 = 60;
+  const RunResult stalled = run(request, draw);
+  EXPECT_TRUE(same_image(stalled.surface, expected.surface));
+  EXPECT_EQ(stalled.counts.named(), expected.counts.named());
+}
+
+/// Declares what it counts, as a unit does.
+class CountingMemory : public sc_core::sc_module, public StatisticSet {
+ public:
+  explicit CountingMemory(const sc_core::sc_module_name& name) : sc_module(name), socket("socket") {
+    socket.register_b_transport(this, &CountingMemory::access);
+    socket.register_nb_transport_fw(this, &CountingMemory::request);
+  }
+  tlm_utils::simple_target_socket<CountingMemory> socket;
+
+ private:
+  void access(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) {
+    ++accesses;
+    largest.see(payload.get_data_length());
+    delay += ns(100);
+    payload.set_response_status(tlm::TLM_OK_RESPONSE);
+  }
+  tlm::tlm_sync_enum request(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase, sc_core::sc_time& delay) {
+    if (phase == tlm::BEGIN_REQ) access(payload, delay);
+    return tlm::TLM_COMPLETED;
+  }
+  Counter accesses{*this, "accesses", "accesses", "taken"};
+  Extreme largest{*this, Extreme::Of::largest, "largest", "bytes", "of an access"};
+};
+
+TEST(ForeignMemory, ShowsItsStatisticsUnderItsPath) {
+  const Draw draw = testing::random_draw(64, 64, 300, 10);
+  const MemoryMaker make = [](const std::string& name, unsigned) {
+    return as_memory(std::make_unique<CountingMemory>(name.c_str()));
+  };
+  for (const Fidelity fidelity : with_time) {
+    const Platform below = with_memory_below(make);
+    RunRequest request = request_of("baseline", fidelity);
+    request.platform = &below;
+    const RunResult with_l2 = run(request, draw);
+    EXPECT_EQ(32 * statistic(with_l2, "dram.accesses"), statistic(with_l2, "l2.cache.bytes_filled"));
+    EXPECT_EQ(statistic(with_l2, "dram.largest"), 32U);
+
+    const Platform instead = with_memory(make);
+    request.platform = &instead;
+    EXPECT_GT(statistic(run(request, draw), "dram.accesses"), 0U) << name_of(fidelity);
   }
 }
 
@@ -169,22 +281,24 @@ TEST(ForeignMemory, ThroughSocketsAloneARunIsTheSameAsWithDirectCalls) {
 
 TEST(ForeignMemory, ADeadlockIsFoundAndNamedThoughATimerGoesOn) {
   const Draw draw = testing::random_draw(64, 64, 300, 7);
-  Counts dram;
-  Platform platform = with_memory(
-      [&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
-  platform.wire = [wire = platform.wire](Netlist& netlist) {
-    wire(netlist);
-    netlist.disconnect("gpc0.prop.out_release");  // the SMs run out of room for warps
-  };
-  const std::string message = fault_of(request_of("het", Fidelity::cycle,
-                                                  [&](RunRequest& r) {
-                                                    r.platform = &platform;
-                                                    r.settings = {{"sm", "cores", "1"}};
-                                                  }),
-                                       draw);
-  EXPECT_NE(message.find("deadlock"), std::string::npos) << message;
-  EXPECT_NE(message.find("gpc0.sm"), std::string::npos) << message;
-  EXPECT_GT(dram.refreshes, 0U);
+  for (Platform (*const place)(MemoryMaker) : {with_memory, with_memory_below}) {
+    Counts dram;
+    Platform platform =
+        place([&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
+    platform.wire = [wire = platform.wire](Netlist& netlist) {
+      wire(netlist);
+      netlist.disconnect("gpc0.prop.out_release");  // the SMs run out of room for warps
+    };
+    const std::string message = fault_of(request_of("het", Fidelity::cycle,
+                                                    [&](RunRequest& r) {
+                                                      r.platform = &platform;
+                                                      r.settings = {{"sm", "cores", "1"}};
+                                                    }),
+                                         draw);
+    EXPECT_NE(message.find("deadlock"), std::string::npos) << message;
+    EXPECT_NE(message.find("gpc0.sm"), std::string::npos) << message;
+    EXPECT_GT(dram.refreshes, 0U);
+  }
 }
 
 #ifndef VRPIPE_SANITIZED  // by what loses sight of the stack when a coroutine of SystemC's has run before a throw
@@ -192,16 +306,21 @@ TEST(ForeignMemory, ThatFallsSilentIsNamedWithItsPortAndTheOldestRequest) {
   const Draw draw = testing::random_draw(64, 64, 300, 8);
   for (const bool refreshes : {true, false}) {
     Counts counts;
-    const Platform platform = with_memory([&](const std::string& name, unsigned) {
+    const MemoryMaker make = [&](const std::string& name, unsigned) {
       auto dram = std::make_unique<CountedDram>(name, counts);
       dram->fall_silent_after(20);
       if (!refreshes) dram->never_refresh();
       return as_memory(std::move(dram));
-    });
-    const std::string message =
-        fault_of(request_of("baseline", Fidelity::cycle, [&](RunRequest& r) { r.platform = &platform; }), draw);
-    EXPECT_NE(message.find("gpc0_crop.memory"), std::string::npos) << message;
-    EXPECT_NE(message.find("no answer to the read of 32 bytes at address"), std::string::npos) << message;
+    };
+    const std::pair<Platform, const char*> places[] = {{with_memory(make), "gpc0_crop.memory"},
+                                                       {with_memory_below(make), "l2.below"}};
+    for (const auto& [platform, port] : places) {
+      RunRequest request = request_of("baseline", Fidelity::cycle);
+      request.platform = &platform;
+      const std::string message = fault_of(request, draw);
+      EXPECT_NE(message.find(port), std::string::npos) << message;
+      EXPECT_NE(message.find("no answer to the read of 32 bytes at address"), std::string::npos) << message;
+    }
   }
 }
 #endif

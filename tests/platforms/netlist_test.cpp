@@ -47,6 +47,42 @@ std::string refusal_of(const Platform& platform, Fidelity fidelity, const std::v
   return "no error";
 }
 
+/// 100 ns for any access; a refresh that never stops, if it is asked for.
+class OtherMemory : public sc_core::sc_module, private tlm::tlm_fw_transport_if<> {
+ public:
+  OtherMemory(const sc_core::sc_module_name& name, unsigned units) : sc_module(name) {
+    for (unsigned unit = 0; unit < units; ++unit) {
+      sockets.push_back(std::make_unique<tlm::tlm_target_socket<32>>(("port" + std::to_string(unit)).c_str()));
+      sockets.back()->bind(*this);
+    }
+    SC_HAS_PROCESS(OtherMemory);
+    SC_METHOD(refresh);
+  }
+  std::vector<std::unique_ptr<tlm::tlm_target_socket<32>>> sockets;
+
+ private:
+  void refresh() { next_trigger(3900, sc_core::SC_NS); }
+  void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) override {
+    delay += sc_core::sc_time(100, sc_core::SC_NS);
+    payload.set_response_status(tlm::TLM_OK_RESPONSE);
+  }
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                                     sc_core::sc_time& delay) override {
+    if (phase == tlm::BEGIN_REQ) b_transport(payload, delay);
+    return tlm::TLM_COMPLETED;
+  }
+  bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
+};
+
+ForeignMemory make_other(const std::string& name, unsigned units) {
+  auto memory = std::make_unique<OtherMemory>(name.c_str(), units);
+  ForeignMemory made;
+  for (const auto& socket : memory->sockets) made.sockets.push_back(socket.get());
+  made.module = std::move(memory);
+  return made;
+}
+
 TEST(Netlist, IsWhatThePlatformsWire) {
   Netlist netlist(4);
   platform_named("desktop").wire(netlist);
@@ -88,6 +124,11 @@ TEST(Netlist, EditsThatCannotBeAreRefused) {
   refused([](Netlist& n) { n.connect_memory("gpc0.crop", "l3"); });
   refused([](Netlist& n) { n.add_memory("l2"); });
   refused([](Netlist& n) { n.replace_memory("l3", nullptr); });
+  refused([](Netlist& n) { n.connect_memory("l2", "l2"); });
+  refused([](Netlist& n) {
+    n.add_memory("dram", make_other);
+    n.connect_memory("dram", "l2");
+  });
 }
 
 // A platform that leaves the colour ROPs out draws nothing, whoever asks.
@@ -217,42 +258,6 @@ TEST(Links, TheirParametersDecideAtEveryFidelityWithTime) {
   }
 }
 
-/// 100 ns for any access; a refresh that never stops, if it is asked for.
-class OtherMemory : public sc_core::sc_module, private tlm::tlm_fw_transport_if<> {
- public:
-  OtherMemory(const std::string& name, unsigned units) : sc_module(name.c_str()) {
-    for (unsigned unit = 0; unit < units; ++unit) {
-      sockets.push_back(std::make_unique<tlm::tlm_target_socket<32>>(("port" + std::to_string(unit)).c_str()));
-      sockets.back()->bind(*this);
-    }
-    SC_HAS_PROCESS(OtherMemory);
-    SC_METHOD(refresh);
-  }
-  std::vector<std::unique_ptr<tlm::tlm_target_socket<32>>> sockets;
-
- private:
-  void refresh() { next_trigger(3900, sc_core::SC_NS); }
-  void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) override {
-    delay += sc_core::sc_time(100, sc_core::SC_NS);
-    payload.set_response_status(tlm::TLM_OK_RESPONSE);
-  }
-  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
-                                     sc_core::sc_time& delay) override {
-    if (phase == tlm::BEGIN_REQ) b_transport(payload, delay);
-    return tlm::TLM_COMPLETED;
-  }
-  bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
-  unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
-};
-
-ForeignMemory make_other(const std::string& name, unsigned units) {
-  auto memory = std::make_unique<OtherMemory>(name, units);
-  ForeignMemory made;
-  for (const auto& socket : memory->sockets) made.sockets.push_back(socket.get());
-  made.module = std::move(memory);
-  return made;
-}
-
 // Its time goes on after the draw, and the run ends all the same.
 TEST(ForeignMemories, TakeThePlaceOfTheL2) {
   const Draw draw = random_draw(96, 96, 200, 7);
@@ -285,6 +290,58 @@ TEST(ForeignMemories, MayStandBesideTheL2) {
     EXPECT_GT(*result.cycles, 0U);
     for (const auto& [unit, share] : result.utilization) EXPECT_LE(share, 1.0) << unit;
   }
+}
+
+// However the wiring goes about it.
+TEST(ForeignMemories, MayLieBelowTheL2) {
+  const Draw draw = random_draw(64, 64, 100, 7);
+  const Platform after = edited("desktop", [](Netlist& netlist) {
+    netlist.add_memory("dram", make_other);
+    netlist.connect_memory("l2", "dram");
+  });
+  Platform before = after;
+  before.wire = [](Netlist& netlist) {
+    netlist.add("draw");
+    netlist.add("vpo");
+    netlist.add_memory("dram", make_other);
+    netlist.add_memory("l2");
+    netlist.connect_memory("l2", "dram");
+    for (unsigned gpc = 0; gpc < netlist.gpcs(); ++gpc) wire_gpc(netlist, gpc);
+  };
+  for (const Fidelity fidelity : fidelities()) {
+    RunRequest request = request_of("het+qm", fidelity, strictly);
+    request.platform = &platform_named("desktop");
+    const RunResult own = run(request, draw);
+    request.platform = &after;
+    const RunResult result = run(request, draw);
+    EXPECT_EQ(own.counts.named(), result.counts.named()) << name_of(fidelity);
+    EXPECT_TRUE(same_image(own.surface, result.surface)) << name_of(fidelity);
+    const bool has_memory_timing = fidelity != Fidelity::functional && fidelity != Fidelity::bound;
+    EXPECT_EQ(result.cycles > own.cycles, has_memory_timing) << name_of(fidelity);
+    request.platform = &before;
+    EXPECT_EQ(run(request, draw).result_hash, result.result_hash) << name_of(fidelity);
+  }
+}
+
+TEST(ForeignMemories, BelowAnL2ThatIsReplacedAreNotMade) {
+  const Platform platform = edited("agx-orin", [](Netlist& netlist) {
+    netlist.add_memory("dram", [](const std::string&, unsigned) -> ForeignMemory { throw std::logic_error("made"); });
+    netlist.connect_memory("l2", "dram");
+    netlist.replace_memory("l2", make_other);
+  });
+  RunRequest request = request_of("baseline", Fidelity::lt);
+  request.platform = &platform;
+  EXPECT_GT(*run(request, random_draw(64, 64, 100, 7)).cycles, 0U);
+}
+
+TEST(ForeignMemories, BelowAnL2ThatNoUnitUsesAreRefused) {
+  const Platform platform = edited("agx-orin", [](Netlist& netlist) {
+    netlist.add_memory("dram", make_other);
+    netlist.connect_memory("l2", "dram");
+    netlist.add_memory("other", make_other);
+    netlist.connect_memory("gpc0.crop", "other");
+  });
+  EXPECT_NE(refusal_of(platform, Fidelity::lt).find("no unit is connected to it"), std::string::npos);
 }
 
 TEST(ForeignMemories, WithoutEnoughSocketsAreRefused) {

@@ -24,6 +24,12 @@ class Gpu {
     Behaviour* behaviour;  ///< whose counters count
   };
 
+  /// A memory of another make.
+  struct PlacedMemory {
+    const MemoryInstance* instance;
+    std::unique_ptr<sc_core::sc_module> module;
+  };
+
   Gpu(const Configuration& configuration, Framebuffer& framebuffer);
   ~Gpu();
 
@@ -31,6 +37,7 @@ class Gpu {
   const std::vector<Placed>& units() const { return units_; }
   /// The L2 of this library; null if the platform has none.
   const FixedLatencyMemory* l2() const { return l2_.get(); }
+  const std::vector<PlacedMemory>& memories() const { return memories_; }
   ClockDomain& clock() { return *clock_; }
 
   /// Runs the draw to its end; returns the cycles. `progress` goes to 1.
@@ -38,7 +45,11 @@ class Gpu {
 
  private:
   void add(const Instance& instance, Framebuffer& framebuffer);
-  void add_memory(const MemoryInstance& memory);
+  using TargetSockets = std::vector<tlm::tlm_base_target_socket_b<32>*>;
+  void add_memories();
+  TargetSockets make_memory(const MemoryInstance& memory);
+  void make_l2(const MemoryInstance& memory);
+  void bind_memory(const MemoryInstance& memory, const TargetSockets& sockets);
   void check() const;
   /// Whether the draw has ended everywhere, no unit has work left and no access to memory is under way.
   bool frame_is_over() const;
@@ -47,8 +58,8 @@ class Gpu {
   const Configuration& configuration_;
   std::unique_ptr<ClockDomain> clock_;
   std::unique_ptr<FixedLatencyMemory> l2_;
-  std::vector<std::unique_ptr<sc_core::sc_module>> memories_;  ///< of another make
-  std::map<unsigned, std::unique_ptr<RunAhead>> ahead_;        ///< by GPC, in strict termination
+  std::vector<PlacedMemory> memories_;
+  std::map<unsigned, std::unique_ptr<RunAhead>> ahead_;  ///< by GPC, in strict termination
   std::vector<Placed> units_;
 };
 

@@ -52,7 +52,7 @@ using MemoryMaker = std::function<ForeignMemory(const std::string& name, unsigne
 struct MemoryInstance {
   std::string path;
   MemoryMaker make;                ///< none for the L2 of this library
-  std::vector<std::string> units;  ///< connected to it
+  std::vector<std::string> units;  ///< connected to it; the L2 may be among them, which then lies above
 };
 
 /// A GPU as a list of units and links, which every fidelity elaborates: what is missing here is missing everywhere. A
@@ -72,9 +72,9 @@ class Netlist {
 
   /// Adds the L2 of this library, with the parameters `l2`, or a memory of another make in its place.
   void add_memory(const std::string& path, MemoryMaker make = nullptr);
-  /// Puts a memory of another make in the place of one.
+  /// Puts a memory of another make in the place of one. It has nothing below.
   void replace_memory(const std::string& path, MemoryMaker make);
-  /// Binds the memory port of a unit.
+  /// Binds the memory port of a unit; or puts a memory of another make below the L2, given as `unit`.
   void connect_memory(const std::string& unit, const std::string& memory);
 
   /// Puts another implementation into an instance.
@@ -102,6 +102,7 @@ class Netlist {
  private:
   Instance& instance(const std::string& path);
   MemoryInstance& memory(const std::string& path);
+  void disconnect_memory(const std::string& unit);
   std::vector<Link>::iterator link_at(const std::string& port);
 
   unsigned gpcs_;
