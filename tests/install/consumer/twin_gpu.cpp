@@ -1,5 +1,5 @@
 // A platform of one's own: two GPCs, the second with twice the colour cache and a deeper queue in front of its colour ROP,
-// and a memory of another make in the place of the L2; drawn in every variant.
+// and a memory of another make below the L2; drawn in every variant.
 #include <cstdint>
 #include <cstdio>
 #include <memory>
@@ -42,7 +42,7 @@ class Dram : public sc_core::sc_module {
 vrpipe::Platform twin() {
   vrpipe::Platform platform;
   platform.name = "twin";
-  platform.description = "two GPCs of agx-orin with different colour caches, and a memory of another make";
+  platform.description = "two GPCs of agx-orin with different colour caches, and a memory of another make below the L2";
   platform.gpcs = 2;
   platform.frequency_mhz = 612;
   platform.settings = {{"draw", "warps_per_1024_cycles", "176"},
@@ -51,11 +51,12 @@ vrpipe::Platform twin() {
                        {"link.gpc1.prop.color", "depth", "256"}};
   platform.wire = [](vrpipe::Netlist& netlist) {
     vrpipe::wire_pipeline(netlist);
-    netlist.replace_memory("l2", [](const std::string& name, unsigned) {
+    netlist.add_memory("dram", [](const std::string& name, unsigned) {
       auto dram = std::make_unique<Dram>(name.c_str());
       tlm::tlm_base_target_socket_b<32>* const socket = &dram->socket;
       return vrpipe::ForeignMemory{std::move(dram), {socket}};
     });
+    netlist.connect_memory("l2", "dram");
   };
   return platform;
 }
