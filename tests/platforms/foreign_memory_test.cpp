@@ -120,7 +120,7 @@ TEST(ForeignMemory, BelowTheL2DelaysARunAndChangesNothingElse) {
       request.platform = &platform;
       const RunResult with = run(request, draw);
       const std::string what = std::string(variant) + " " + name_of(fidelity);
-      EXPECT_TRUE(same_image(with.surface, without.surface)) << what;
+      EXPECT_TRUE(same_image(with.framebuffer.color, without.framebuffer.color)) << what;
       EXPECT_EQ(with.counts.named(), without.counts.named()) << what;
       EXPECT_GT(*with.cycles, *without.cycles) << what;
 
@@ -159,7 +159,7 @@ TEST(ForeignMemory, BelowTheL2ChangesNothingUnderStallsEither) {
   request.stall_seed = 3;
   request.stall_per_256 = 60;
   const RunResult stalled = run(request, draw);
-  EXPECT_TRUE(same_image(stalled.surface, expected.surface));
+  EXPECT_TRUE(same_image(stalled.framebuffer.color, expected.framebuffer.color));
   EXPECT_EQ(stalled.counts.named(), expected.counts.named());
 }
 

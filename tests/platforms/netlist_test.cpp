@@ -315,7 +315,7 @@ TEST(ForeignMemories, MayLieBelowTheL2) {
     request.platform = &after;
     const RunResult result = run(request, draw);
     EXPECT_EQ(own.counts.named(), result.counts.named()) << name_of(fidelity);
-    EXPECT_TRUE(same_image(own.surface, result.surface)) << name_of(fidelity);
+    EXPECT_TRUE(same_image(own.framebuffer.color, result.framebuffer.color)) << name_of(fidelity);
     const bool has_memory_timing = fidelity != Fidelity::functional && fidelity != Fidelity::bound;
     EXPECT_EQ(result.cycles > own.cycles, has_memory_timing) << name_of(fidelity);
     request.platform = &before;
