@@ -113,11 +113,15 @@ void ClockDomain::edge() {
   const Cycle present = next_;
   // Through the kernel an exception would come out as a report of the kernel's.
   try {
-    // Mostly someone wants the very next cycle.
-    for (Cycle cycle = present; !finished_ && cycle - present < cycles_per_activation_;) {
-      const bool ticked = tick_order_.empty() ? tick_due(cycle) : tick_due_in_order(cycle);
-      if (ticked) ++edges_;
-      cycle = ticked ? cycle + 1 : *std::min_element(due_.begin(), due_.end());
+    const Cycle end = present + cycles_per_activation_;
+    for (Cycle cycle = present; !finished_ && cycle < end;) {
+      if (cycle >= look_at_) look_at_ = look_(cycle);
+      // Mostly someone wants the very next cycle.
+      for (const Cycle until = std::min(end, look_at_); !finished_ && cycle < until;) {
+        const bool ticked = tick_order_.empty() ? tick_due(cycle) : tick_due_in_order(cycle);
+        if (ticked) ++edges_;
+        cycle = ticked ? cycle + 1 : *std::min_element(due_.begin(), due_.end());
+      }
     }
     next_ = *std::min_element(due_.begin(), due_.end());
     if (next_ <= now_) throw SimulationFault(name(), now_, "a unit was woken for an edge in the past");

@@ -20,6 +20,18 @@ class Observers::States final : public StateObserver {
   const std::vector<std::function<void(const std::string&, UnitState, Cycle)>>& see_;
 };
 
+std::optional<double> Observers::Sampled::quotient() const {
+  if (!value || denominator.value_or(0) == 0) return std::nullopt;
+  return static_cast<double>(*value) / static_cast<double>(*denominator);
+}
+
+void Observers::on_statistics(Cycle every, std::vector<std::string> names, SeeStatistics see) {
+  if (every == 0) {
+    throw UserError("cannot sample statistics", "observers", "the interval is 0 cycles", "give at least 1");
+  }
+  statistics_.push_back({every, std::move(names), std::move(see)});
+}
+
 void Observers::check(const Netlist& netlist) const {
   for (const OnLink& wanted : links_) {
     std::vector<std::string> names;

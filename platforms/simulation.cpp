@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "statistic_sampler.h"
 #include "statistics.h"
 #include "untimed_gpu.h"
 #include "work_counter.h"
@@ -16,6 +17,7 @@
 #include <vrpipe/checked_behaviours.h>
 #include <vrpipe/error.h>
 #include <vrpipe/platforms/gpu.h>
+#include <vrpipe/platforms/observers.h>
 #include <vrpipe/platforms/validated_range.h>
 
 namespace vrpipe {
@@ -115,17 +117,45 @@ struct BehaviourList {
   std::vector<std::pair<const Instance*, const Behaviour*>> of_instance;
 };
 
+// Statistics go to a StatisticCollector at the end of a run, to a StatisticSampler in its course.
+
 /// Those of a unit: of its functional model, and of the one that gives it ports and time.
+template <class Statistics>
 void add_statistics(const Instance& instance, const Behaviour& behaviour, const Component& unit,
-                    StatisticCollector& statistics) {
+                    Statistics& statistics) {
   statistics.add(instance.slot, instance.path, behaviour.unit());
   statistics.add(instance.slot, instance.path, unit);
 }
 
-/// Those of a memory of another make that has any.
-void add_statistics(const Gpu::PlacedMemory& memory, StatisticCollector& statistics) {
-  const std::string& path = memory.instance->path;
-  if (const auto* const set = dynamic_cast<const StatisticSet*>(memory.module.get())) statistics.add(path, path, *set);
+/// Those of a memory that has any.
+template <class Statistics>
+void add_statistics(const std::string& path, const sc_core::sc_module& memory, Statistics& statistics) {
+  if (const auto* const set = dynamic_cast<const StatisticSet*>(&memory)) statistics.add(path, path, *set);
+}
+
+template <class Statistics>
+void add_statistics(const Gpu& gpu, Statistics& statistics) {
+  for (const Gpu::Placed& placed : gpu.units()) {
+    add_statistics(*placed.instance, *placed.behaviour, *placed.unit, statistics);
+  }
+  if (gpu.l2() != nullptr) add_statistics(l2, *gpu.l2(), statistics);
+  for (const Gpu::PlacedMemory& memory : gpu.memories()) {
+    add_statistics(memory.instance->path, *memory.module, statistics);
+  }
+}
+
+bool has_time(Fidelity fidelity) { return fidelity != Fidelity::functional && fidelity != Fidelity::bound; }
+
+bool samples_statistics(const RunRequest& request) {
+  return request.observers != nullptr && !request.observers->of_statistics().empty();
+}
+
+void check_sampling_has_time(const RunRequest& request) {
+  if (!samples_statistics(request) || has_time(request.fidelity)) return;
+  throw UserError("cannot sample statistics", std::string("--fidelity ") + name_of(request.fidelity),
+                  request.fidelity == Fidelity::bound ? "its cycles follow from all the work, no work has a cycle"
+                                                      : "it has no time",
+                  "use lt, at or cycle");
 }
 
 /// The counters that every unit of a slot has, summed over GPCs. `value` gives what of one is counted.
@@ -308,18 +338,25 @@ void set_time(const Configuration& configuration, Cycle cycles, RunResult& resul
 
 void run_clocked(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
   Gpu gpu(configuration, result.framebuffer);
+  StatisticSampler sampler;
+  if (samples_statistics(configuration.request())) {
+    add_statistics(gpu, sampler);
+    sampler.find(*configuration.request().observers);
+    sampler.watch(gpu.clock());
+  }
   const HostTimer timer;
   const Cycle cycles = gpu.run(progress);
   timer.stop(result);
+  sampler.finish(cycles);
   set_time(configuration, cycles, result);
   result.kernel_events = gpu.clock().activations();
 
   BehaviourList behaviours;
   StatisticCollector statistics;
+  add_statistics(gpu, statistics);
   OccupancyReport occupancy(static_cast<double>(cycles), result);
   for (const Gpu::Placed& placed : gpu.units()) {
     behaviours.of_instance.emplace_back(placed.instance, placed.behaviour);
-    add_statistics(*placed.instance, *placed.behaviour, *placed.unit, statistics);
     UnitReport report;
     report.name = placed.instance->path;
     for (unsigned state = 0; state < unit_states; ++state) {
@@ -332,9 +369,7 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
     report.name = l2;
     occupancy.add(std::move(report), l2,
                   {{"bytes", 0, static_cast<double>(gpu.l2()->bytes(cycles)) / gpu.l2()->peak_rate(), true}});
-    statistics.add(l2, l2, *gpu.l2());
   }
-  for (const Gpu::PlacedMemory& memory : gpu.memories()) add_statistics(memory, statistics);
   occupancy.finish();
   report_counts(configuration, behaviours, statistics, result);
 }
@@ -430,6 +465,7 @@ RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<floa
 }
 
 RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
+  check_sampling_has_time(request);
   const Configuration configuration(request, frame);
   RunResult result;
   result.request = request;
@@ -439,20 +475,48 @@ RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<fl
   if (request.fidelity == Fidelity::lt || request.fidelity == Fidelity::at) {
     result.outside_validated_range = outside_validated_range(result.parameters);
   }
-  if (request.fidelity == Fidelity::functional || request.fidelity == Fidelity::bound) {
-    run_untimed(configuration, progress, result);
-  } else {
+  if (has_time(request.fidelity)) {
     run_clocked(configuration, progress, result);
+  } else {
+    run_untimed(configuration, progress, result);
   }
   check_conservation(result.counts);
   result.result_hash = hash_of(result);
   return result;
 }
 
+namespace {
+/// Gives a function the sampler of a platform that is elaborated for it alone.
+template <class Look>
+void with_sampler(const Configuration& configuration, Look&& look) {
+  fresh_simulation();
+  {
+    Framebuffer framebuffer(configuration.frame(), configuration.request().format);
+    const Gpu gpu(configuration, framebuffer);
+    StatisticSampler sampler;
+    add_statistics(gpu, sampler);
+    look(sampler);
+  }
+  fresh_simulation();
+}
+}  // namespace
+
 void check_configuration(const RunRequest& request) {
   const Frame empty(1, 1);
+  check_sampling_has_time(request);
   const Configuration configuration(request, empty);
   for (const Instance& instance : configuration.netlist().instances()) configuration.make(instance);
+  if (!samples_statistics(request)) return;
+  with_sampler(configuration, [&](StatisticSampler& sampler) { sampler.find(*request.observers); });
+}
+
+std::vector<std::string> sampled_statistics(const RunRequest& request) {
+  std::vector<std::string> names;
+  if (!has_time(request.fidelity)) return names;
+  const Frame empty(1, 1);
+  const Configuration configuration(request, empty);
+  with_sampler(configuration, [&](const StatisticSampler& sampler) { names = sampler.names(); });
+  return names;
 }
 
 std::vector<ParameterListing> list_parameters(const Platform* platform) {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <systemc>
@@ -107,6 +109,14 @@ class ClockDomain : public sc_core::sc_module {
   /// behind now() by as much, so it stays 1 where an outside port meets time of its own. At first 1.
   void set_cycles_per_activation(unsigned cycles) { cycles_per_activation_ = cycles; }
 
+  /// Calls `look` between two edges, those of the cycles before `at` and of `at` or later: with the first cycle whose
+  /// edge may still come. It returns the next `at`, later than that. Neither edges nor activations depend on it. Where
+  /// no edge comes any more there may be no call.
+  void look_between_edges(Cycle at, std::function<Cycle(Cycle next_edge)> look) {
+    look_at_ = at;
+    look_ = std::move(look);
+  }
+
   /// Ends the simulation after this cycle.
   void finish() { finished_ = true; }
   bool finished() const { return finished_; }
@@ -142,6 +152,8 @@ class ClockDomain : public sc_core::sc_module {
   std::uint64_t activations_ = 0;
   std::vector<OutsidePort*> outside_ports_;
   std::uint64_t awaited_ = 0;
+  Cycle look_at_ = never;
+  std::function<Cycle(Cycle)> look_;
   std::exception_ptr thrown_;
   bool in_edge_ = false;
   bool running_ = false;

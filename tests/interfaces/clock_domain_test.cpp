@@ -70,6 +70,27 @@ TEST_F(ClockDomainTest, SeveralCyclesOfAnActivationAreTheSameCycles) {
   }
 }
 
+TEST_F(ClockDomainTest, LooksBetweenEdgesAndChangesNone) {
+  for (const unsigned cycles : {1U, 4U, 64U}) {
+    fresh_simulation();
+    ClockDomain domain("clock", 1000);
+    domain.set_cycles_per_activation(cycles);
+    Ticker a(domain, {1, 2, 3, 4, 9, 100});
+    std::vector<std::size_t> edges_before;  // those of cycles 2, 4, 6, ...
+    domain.look_between_edges(2, [&](Cycle cycle) {
+      while (2 * (edges_before.size() + 1) <= cycle) edges_before.push_back(a.ticks.size());
+      return 2 * (edges_before.size() + 1);
+    });
+    sc_core::sc_start();
+    EXPECT_EQ(a.ticks, (std::vector<Cycle>{0, 1, 2, 3, 4, 9, 100}));
+    EXPECT_EQ(domain.activations(), cycles == 1 ? 7U : cycles == 4 ? 4U : 2U);
+    ASSERT_GE(edges_before.size(), 50U);
+    EXPECT_EQ((std::vector<std::size_t>(edges_before.begin(), edges_before.begin() + 5)),
+              (std::vector<std::size_t>{2, 4, 5, 5, 6}));
+    EXPECT_EQ(edges_before[49], 6U) << "that of cycle 100 is to come";
+  }
+}
+
 // case T08
 TEST_F(ClockDomainTest, TimeIsAWholeNumberOfPeriodsHoweverLongItRuns) {
   Ticker a(*clock, {125'000, 1'000'000'000'000});

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +21,7 @@ class Netlist;
 ///     auto observers = std::make_shared<Observers>();
 ///     observers->on_link<BinItem>("tc.bins", [&](const auto& passed) { ++bins[passed.link]; });
 ///     observers->on_states([&](const std::string& unit, UnitState state, Cycle from) { ... });
+///     observers->on_statistics(1000, {"crop.quads_blended"}, [&](Cycle cycle, const auto& values) { ... });
 ///     request.observers = observers;
 class Observers {
  public:
@@ -51,6 +54,38 @@ class Observers {
     states_.push_back(std::move(see));
   }
 
+  /// A statistic in the course of a run.
+  struct Sampled {
+    std::string name;  ///< crop.quads_blended; gpc1.crop.quads_blended
+    std::string kind;  ///< as in StatisticReport: counter, largest, smallest, histogram, ratio
+    /// Of a ratio the numerator, of a histogram the sum of the values seen; none of an extreme that saw nothing yet.
+    std::optional<std::uint64_t> value;
+    std::optional<std::uint64_t> denominator;  ///< of a ratio, of a histogram the number of values seen; none otherwise
+    /// Of a ratio, or the mean of a histogram; none where there is none, or the denominator is 0.
+    std::optional<double> quotient() const;
+  };
+  using SeeStatistics = std::function<void(Cycle cycle, const std::vector<Sampled>& values)>;
+
+  /// Samples statistics at the cycles `every`, 2 `every`, ... before the end of the draw, and at its end, where the
+  /// values are those of the result. With time alone: at the other fidelities it is a UserError.
+  ///
+  /// @param every  cycles, at least 1; otherwise a UserError
+  /// @param names  as in the results, over all components of a kind (crop.quads_blended), or of one component, by its
+  ///               path (gpc1.crop.cache.sector_hits). A `*` stands for any text without a dot: crop.*, gpc*.tc.quads.
+  ///               One that names nothing is a UserError when the run begins.
+  /// @param see    is called in the order of cycles, perhaps later than in them: what comes after the end of the draw
+  ///               is in the last sample, and the end is known late. `values` are in the order of the names.
+  ///
+  /// A sample has what was counted at the edges of all earlier cycles, and nothing of its own. Not every counter is at
+  /// the time of what it counts (figures: builtin:object, 400x400, agx-orin):
+  /// - At `cycle` all are, but for accesses and hits of CROP's cache, which are counted once, at the end of the draw.
+  /// - At `at` they are at most 60 cycles ahead, and up to 700 late where a unit had to wait for room.
+  /// - At both, in strict termination with early termination, SM and CROP count a bin when it is tested: 1,000 cycles
+  ///   ahead on average, at most 4,000.
+  /// - At `lt` all that a vertex warp leads to is counted when the warp is issued: 4,000 to 8,000 cycles before its time
+  ///   on average, at most 31,000. Samples tell the share of the work that has been done, not when.
+  void on_statistics(Cycle every, std::vector<std::string> names, SeeStatistics see);
+
   // For the elaboration of a run.
 
   /// Throws UserError for a link that is asked for and not there.
@@ -58,6 +93,12 @@ class Observers {
   LinkObservers of_link(const std::string& name);
   /// Null if nobody looks.
   StateObserver* of_unit(const std::string& path);
+  struct OnStatistics {
+    Cycle every;
+    std::vector<std::string> names;
+    SeeStatistics see;
+  };
+  const std::vector<OnStatistics>& of_statistics() const { return statistics_; }
 
  private:
   struct OnLink {
@@ -67,6 +108,7 @@ class Observers {
   class States;
   std::vector<OnLink> links_;
   std::vector<std::function<void(const std::string&, UnitState, Cycle)>> states_;
+  std::vector<OnStatistics> statistics_;
   std::vector<std::shared_ptr<LinkObserver>> made_;
   std::vector<std::shared_ptr<StateObserver>> made_states_;
 };

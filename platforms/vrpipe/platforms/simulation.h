@@ -210,8 +210,13 @@ RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<fl
 /// A frame of one draw, of the state that the request gives.
 RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<float>* progress = nullptr);
 
-/// Checks settings and unit choices against a platform without running anything; throws UserError.
+/// Checks settings, unit choices and what is to be observed against a platform without running anything; throws
+/// UserError. With statistics to be sampled, not while a simulation of this process is elaborated.
 void check_configuration(const RunRequest& request);
+
+/// The names that Observers::on_statistics takes in a run of this request; none where it has no time. Throws UserError.
+/// Not while a simulation of this process is elaborated.
+std::vector<std::string> sampled_statistics(const RunRequest& request);
 
 /// What can be set by --set, per unit, with the platform's settings applied. For `vrpipe units` and the reference.
 struct ParameterListing {
