@@ -64,6 +64,7 @@ TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
     expect_in(help.out, shared);
     expect_in(help.out, {std::string(command) == "run" ? "--variant" : "--jobs"});
   }
+  expect_in(vrpipe({"run", "--help"}).out, {"--trace FILE.csv", "--trace-every CYCLES", "--trace-statistics NAME,..."});
   expect_in(vrpipe({"accuracy", "--help"}).out, {"--quick", "--repeat", "--html", "--markdown"});
   expect_in(vrpipe({"units", "--help"}).out, {"--slot", "--platform", "--plugin", "--json", "--markdown"});
   expect_in(vrpipe({"platforms", "--help"}).out, {"--plugin", "--json"});

@@ -36,6 +36,7 @@ TEST_F(Paths, AnOutputIsNeverAnInput) {
   write("c.json", "[]");
   run_refused({"--camera", "c.json#3", "--json", "c.json"}, {"(--json c.json): --camera c.json is the same file"});
   refused({"accuracy", "--scene", "tiny.spl", "--html", "tiny.spl"}, same);
+  refused({"run", "--scene", "tiny.spl", "--trace", "tiny.spl"}, same);
   refused({"compare", "--scene", "tiny.spl", "--save-draw", "tiny.spl"}, same);
   std::filesystem::create_symlink("tiny.spl", folder() / "link.spl");
   run_refused({"--scene", "tiny.spl", "--json", "link.spl"}, same);
@@ -56,6 +57,7 @@ TEST_F(Paths, AListingIsNeverWrittenOverAPlugin) {
 TEST_F(Paths, TwoOutputsAreNeverOneFile) {
   run_refused({"--scene", "tiny.spl", "--json", "x", "--save-draw", "./x"}, {"(--save-draw ./x): --json x"});
   refused({"accuracy", "--quick", "--scene", "tiny.spl", "--json", "x", "--html", "x"}, {"is the same file"});
+  refused({"run", "--scene", "tiny.spl", "--json", "x", "--trace", "x"}, {"(--trace x): --json x is the same file"});
   run_refused({"--scene", "tiny.spl", "--output", "o", "--json", "o/tiny-het+qm.png"},
               {"--json o/tiny-het+qm.png is the same file"});
   run_refused({"--scene", "tiny.spl", "--variant", "qm", "--output", "o", "--json", "o/../o/tiny-qm.exr"},
@@ -71,6 +73,7 @@ TEST_F(Paths, TwoOutputsAreNeverOneFile) {
 TEST_F(Paths, OnlyJsonGoesToStdout) {
   run_refused({"--scene", "tiny.spl", "--save-draw", "-"}, {"(--save-draw -): only --json can go to stdout", "./-"});
   refused({"accuracy", "--scene", "tiny.spl", "--html", "-"}, {"(--html -): only --json"});
+  refused({"run", "--scene", "tiny.spl", "--trace", "-"}, {"(--trace -): only --json"});
   run_refused({"--scene", "tiny.spl", "--output", "-"}, {"(--output -): images cannot go to stdout"});
   EXPECT_EQ(vrpipe({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--save-draw", "./-"}).code, 0);
   EXPECT_EQ(read_file(folder() / "-"), read_file(folder() / "tiny.spl"));

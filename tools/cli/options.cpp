@@ -155,6 +155,21 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              result_group);
   add_option(app, "--save-draw", save_draw_, "FILE.spl",
              "writes the draw after preprocessing; --scene FILE.spl takes it in again", result_group);
+  if (variants == Variants::one) {
+    add_option(app, Trace::option, trace_, "FILE.csv",
+               "writes statistics in the course of the run there, at the fidelities lt, at\n"
+               "and cycle: a row every so many cycles, a column for each statistic",
+               result_group);
+    add_option(app, "--trace-every", trace_every_, "CYCLES",
+               "between rows (default: " + std::to_string(Trace::default_every) +
+                   "); the last is at the end of the draw",
+               result_group);
+    add_option(app, "--trace-statistics", trace_statistics_, "NAME,...",
+               "which statistics (default: where quads go, and what CROP moves): over all\n"
+               "GPCs, tc.flushes; of one, gpc1.tc.flushes; several, gpc*.tc.flushes or\n"
+               "'tc.*' (`vrpipe units` lists all)",
+               result_group);
+  }
   if (variants == Variants::all) {
     add_option(app, "--jobs", jobs_, "N",
                "simulations at a time, each a process of its own (default: one for each\n"
@@ -182,6 +197,22 @@ std::vector<NamedFile> SimulationArguments::inputs() const {
   for (const std::string& camera : camera_) files.push_back({"--camera", camera.substr(0, camera.rfind('#'))});
   for (const std::string& plugin : plugins_) files.push_back({"--plugin", plugin});
   return files;
+}
+
+std::shared_ptr<Trace> SimulationArguments::trace(const RunRequest& request) const {
+  const auto file = single(trace_, Trace::option);
+  const auto every = single(trace_every_, "--trace-every");
+  const auto names = single(trace_statistics_, "--trace-statistics");
+  if (!file) {
+    if (every || names) {
+      throw UserError("nothing to trace to", every ? "--trace-every" : "--trace-statistics", "no file is named",
+                      "add --trace FILE.csv");
+    }
+    return nullptr;
+  }
+  const Cycle cycles = every ? parse_count(*every, "--trace-every", 1'000'000'000) : Trace::default_every;
+  return std::make_shared<Trace>(*file, cycles,
+                                 names ? parse_names(*names, "--trace-statistics") : Trace::default_names(request));
 }
 
 SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<std::string>& command) const {
@@ -216,6 +247,10 @@ SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<
     job.requests.push_back(request);
     job.requests.back().variant = variant;
     const StdoutToStderr redirected;
+    if (variants == Variants::one) {
+      job.trace = trace(job.requests.back());
+      if (job.trace) job.requests.back().observers = job.trace->observers();
+    }
     check_configuration(job.requests.back());
   }
 

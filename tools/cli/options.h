@@ -42,11 +42,13 @@ class SimulationArguments {
  private:
   SceneRequest scene_request() const;
   std::vector<NamedFile> inputs() const;
+  std::shared_ptr<Trace> trace(const RunRequest& request) const;
 
   Values scene_, size_, camera_, eye_, look_at_, up_, fovy_;
   Values platform_, settings_, variant_, units_, plugins_;
   Values fidelity_, format_, termination_;
   Values background_, output_, json_, save_draw_, jobs_;
+  Values trace_, trace_every_, trace_statistics_;
 };
 
 /// `--plugin` for commands that only list things.

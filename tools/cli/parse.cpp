@@ -1,5 +1,6 @@
 #include "cli/parse.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -90,6 +91,14 @@ std::array<float, 3> parse_background(const std::string& text, const std::string
     }
   }
   return {static_cast<float>(values[0]), static_cast<float>(values[1]), static_cast<float>(values[2])};
+}
+
+std::vector<std::string> parse_names(const std::string& text, const std::string& option) {
+  std::vector<std::string> names = split(text, ',');
+  if (std::find(names.begin(), names.end(), "") != names.end()) {
+    throw UserError("bad value '" + text + "'", option, "a name is missing", "give names with commas between them");
+  }
+  return names;
 }
 
 Setting parse_setting(const std::string& text) {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <string>
+#include <vector>
 
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/camera.h>
@@ -26,6 +27,9 @@ ImageSize parse_size(const std::string& text, const std::string& option);
 
 /// "R,G,B", each 0 to 1.
 std::array<float, 3> parse_background(const std::string& text, const std::string& option);
+
+/// "NAME,...": at least one, none of them empty.
+std::vector<std::string> parse_names(const std::string& text, const std::string& option);
 
 /// "UNIT.PARAMETER=VALUE".
 Setting parse_setting(const std::string& text);

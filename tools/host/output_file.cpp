@@ -12,7 +12,6 @@
 
 #include <vrpipe/error.h>
 
-#include "file_io.h"
 #include "host/process_setup.h"
 
 namespace vrpipe::tools {
@@ -119,10 +118,14 @@ void create_output_folder(const fs::path& path, const std::string& option) {
   }
 }
 
+std::unique_ptr<AtomicFile> open_output_file(const fs::path& path, const std::string& option) {
+  return std::make_unique<AtomicFile>(path, cannot_write, place(path, option));
+}
+
 void write_output_file(const fs::path& path, const std::string& bytes, const std::string& option) {
-  AtomicFile file(path, cannot_write, place(path, option));
-  file.write(bytes.data(), bytes.size());
-  file.commit();
+  const std::unique_ptr<AtomicFile> file = open_output_file(path, option);
+  file->write(bytes.data(), bytes.size());
+  file->commit();
   note_written(path.string());
 }
 

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "file_io.h"
 
 namespace vrpipe::tools {
 
@@ -30,6 +33,9 @@ void check_output_folder(const std::filesystem::path& path, const std::string& o
 
 /// Makes the folder, with the folders above it, unless it is there.
 void create_output_folder(const std::filesystem::path& path, const std::string& option);
+
+/// For a file that is written in pieces; it appears with commit().
+std::unique_ptr<AtomicFile> open_output_file(const std::filesystem::path& path, const std::string& option);
 
 /// Writes a file as AtomicFile does.
 void write_output_file(const std::filesystem::path& path, const std::string& bytes, const std::string& option);

@@ -50,6 +50,7 @@ ImageFiles image_files(const SimulationJob& job, const std::string& name) {
 void check_outputs(const SimulationJob& job, const std::vector<std::string>& images, std::vector<NamedFile> outputs) {
   if (job.json && *job.json != "-") outputs.push_back({"--json", *job.json});
   if (job.save_draw) outputs.push_back({"--save-draw", *job.save_draw});
+  if (job.trace) outputs.push_back({Trace::option, job.trace->path()});
   if (job.output) {
     for (const std::string& name : images) {
       const ImageFiles files = image_files(job, name);
@@ -101,6 +102,7 @@ JobResult perform(const SimulationJob& job) {
       simulated = simulate_in_processes(job.requests, loaded.draw, job.output.has_value(), job.processes, progress);
     }
     result.simulate_seconds = seconds_since(simulation_start);
+    if (job.trace) job.trace->finish();
     result.processes = std::min(job.processes, static_cast<unsigned>(job.requests.size()));
   }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@
 
 #include "host/output_file.h"
 #include "host/provenance.h"
+#include "jobs/trace.h"
 
 namespace vrpipe::tools {
 
@@ -31,6 +33,7 @@ struct SimulationJob {
   std::optional<std::filesystem::path> output;     ///< folder for images
   std::optional<std::string> json;                 ///< file, or "-" for stdout
   std::optional<std::filesystem::path> save_draw;  ///< file
+  std::shared_ptr<Trace> trace;                    ///< of the only request, which has its observers; null for none
   unsigned processes = 1;                          ///< simulations at a time
 };
 
