@@ -115,7 +115,7 @@ Cycle StatisticSampler::sample_until(Cycle cycle) {
   Cycle next = never;
   for (Series& series : series_) {
     for (; series.next <= cycle; series.next += series.asked->every) take(series, series.next);
-    give_before(series, clock_->draw_end().so_far());
+    give_before(series, clock_->frame_end().so_far());
     next = std::min(next, series.next);
   }
   return next;
