@@ -160,12 +160,18 @@ std::string lower_case(std::string text) {
   return text;
 }
 
+std::string extension_of(const std::string& scene) {
+  return lower_case(std::filesystem::path(scene).extension().string());
+}
+
 }  // namespace
 
 std::string scene_name(const std::string& scene) {
   if (scene.empty()) return kBuiltinPrefix + kDefaultBuiltinScene;
   return is_builtin(scene) ? scene : std::filesystem::path(scene).filename().string();
 }
+
+bool is_draw_list(const std::string& scene) { return !is_builtin(scene) && extension_of(scene) == ".spl"; }
 
 OpenedScene open_scene(const SceneRequest& request) {
   if (request.size) check_image_size(request.size->width, request.size->height, "--size");
@@ -176,8 +182,8 @@ OpenedScene open_scene(const SceneRequest& request) {
     open_builtin(scene.name.substr(kBuiltinPrefix.size()), request, scene);
     return scene;
   }
-  const std::string extension = lower_case(std::filesystem::path(request.scene).extension().string());
-  if (extension == ".spl") {
+  const std::string extension = extension_of(request.scene);
+  if (is_draw_list(request.scene)) {
     scene.draw_list = load_draw_list(request.scene, request);
   } else if (extension == ".ply") {
     check_view_options(request);

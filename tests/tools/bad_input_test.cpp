@@ -8,7 +8,6 @@
 namespace vrpipe::testing {
 namespace {
 
-/// The contract for a mistake of the user: exit code 2, one line on stderr, nothing on stdout, nothing written.
 class BadInput : public ToolTest {
  protected:
   void SetUp() override {
@@ -39,28 +38,7 @@ class BadInput : public ToolTest {
     std::filesystem::create_directory(folder() / "folder.ply");
   }
 
-  /// `parts`: what the message has to name.
-  void refused(const std::vector<std::string>& arguments, const std::vector<std::string>& parts) {
-    const std::vector<std::string> before = files();
-    const Finished finished = vrpipe(arguments);
-    std::string command = "vrpipe";
-    for (const std::string& argument : arguments) command += " " + argument;
-    SCOPED_TRACE(command + "\n" + finished.err);
-    EXPECT_EQ(finished.code, 2);
-    EXPECT_EQ(finished.out, "");
-    EXPECT_EQ(finished.err.rfind("vrpipe: error: ", 0), 0U);
-    EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1);
-    EXPECT_EQ(finished.err.back(), '\n');
-    // WHAT (WHERE): WHY; WHAT TO DO
-    const std::size_t where = finished.err.find(" (");
-    const std::size_t why = finished.err.find("): ", where);
-    const std::size_t remedy = finished.err.find("; ", why);
-    EXPECT_TRUE(where != std::string::npos && why != std::string::npos && remedy != std::string::npos);
-    for (const std::string& part : parts) EXPECT_NE(finished.err.find(part), std::string::npos) << part;
-    EXPECT_EQ(files(), before);
-  }
-
-  /// The same with every kind of output asked for, which must not appear.
+  /// With every kind of output asked for, which must not appear.
   void refused_with_outputs(std::vector<std::string> arguments, const std::vector<std::string>& parts) {
     arguments.insert(arguments.end(), {"--output", "images/deep", "--json", "result.json", "--save-draw", "draw.spl"});
     refused(arguments, parts);

@@ -34,12 +34,18 @@ std::vector<RunRequest> all_variants(const Platform& platform) {
   return requests;
 }
 
+/// The same geometry for every request.
+tools::FrameSource frames_of(const Draw& draw) {
+  return [&draw](const RunRequest& request) { return Frame::of(draw, draw_state_of(request)); };
+}
+
 CommandFailure failure_of(void (*wire)(Netlist&)) {
   fresh_simulation();  // other tests may have left one in this process
   const Platform platform = failing(wire);
+  const Draw draw = tiny_draw();
   tools::ProgressLine progress;
   try {
-    tools::simulate_in_processes(all_variants(platform), tiny_draw(), false, 2, progress);
+    tools::simulate_in_processes(all_variants(platform), frames_of(draw), false, 2, progress);
   } catch (const CommandFailure& failure) {
     return failure;
   }
@@ -93,8 +99,8 @@ TEST(Processes, CpuSecondsDoNotCountWaiting) {
   const itimerval off{};
   ::setitimer(ITIMER_VIRTUAL, &ticks, nullptr);
   tools::ProgressLine progress;
-  const RunResult result =
-      tools::simulate_here(all_variants(platforms().front()).front(), draw, false, progress).result;
+  const RunRequest request = all_variants(platforms().front()).front();
+  const RunResult result = tools::simulate_here(request, *frames_of(draw)(request), false, progress).result;
   ::setitimer(ITIMER_VIRTUAL, &off, nullptr);
   ::sigaction(SIGVTALRM, &before, nullptr);
   EXPECT_GT(result.cpu_seconds, 0.004) << "the draw is too small to say anything";
@@ -106,11 +112,12 @@ TEST(Processes, ResultsComeBackWhole) {
   const Draw draw = tiny_draw();
   const std::vector<RunRequest> requests = all_variants(platforms().front());
   tools::ProgressLine progress;
-  const std::vector<tools::Simulated> apart = tools::simulate_in_processes(requests, draw, true, 3, progress);
+  const std::vector<tools::Simulated> apart =
+      tools::simulate_in_processes(requests, frames_of(draw), true, 3, progress);
   ASSERT_EQ(apart.size(), 4U);
   for (std::size_t i = 0; i < requests.size(); ++i) {
     fresh_simulation();
-    const tools::Simulated here = tools::simulate_here(requests[i], draw, true, progress);
+    const tools::Simulated here = tools::simulate_here(requests[i], *frames_of(draw)(requests[i]), true, progress);
     const RunResult& a = apart[i].result;
     const RunResult& b = here.result;
     EXPECT_EQ(a.request.variant.name, b.request.variant.name);

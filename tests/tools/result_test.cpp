@@ -430,6 +430,7 @@ TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
   gaussian.opacity_logit = 2;
   builder.add(gaussian);
   write_gaussian_ply(folder() / "scene.ply", builder.build());
+  write("frame.json", R"({"commands": [{"draw": "tiny.spl"}, {"draw": "tiny.spl"}]})");
   const std::string page = read_file(RESULTS_PAGE);
   const auto of_scene = [&](std::vector<std::string> command) {
     command.insert(command.end(), {"--scene", "scene.ply", "--size", "16x16", "--plugin", TEST_PLUGIN});
@@ -448,7 +449,7 @@ TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
   };
   check("Of `run` and `compare`",
         {of_scene({"run"}), of_scene({"compare"}), json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional"}),
-         json_of({"run", "--scene", "tiny.spl", "--platform", "desktop"})});
+         json_of({"run", "--scene", "tiny.spl", "--platform", "desktop"}), json_of({"run", "--frame", "frame.json"})});
   check("Of `accuracy`", {of_scene({"accuracy", "--quick"}), json_of({"accuracy", "--quick", "--scene", "tiny.spl"})});
 }
 

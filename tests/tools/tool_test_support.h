@@ -132,6 +132,28 @@ class ToolTest : public ::testing::Test {
     return nlohmann::json::parse(finished.out, nullptr, false);
   }
 
+  /// The contract for a mistake of the user: exit code 2, one line on stderr, nothing on stdout, nothing written.
+  /// `parts`: what the message has to name.
+  void refused(const std::vector<std::string>& arguments, const std::vector<std::string>& parts) const {
+    const std::vector<std::string> before = files();
+    const Finished finished = vrpipe(arguments);
+    std::string command = "vrpipe";
+    for (const std::string& argument : arguments) command += " " + argument;
+    SCOPED_TRACE(command + "\n" + finished.err);
+    EXPECT_EQ(finished.code, 2);
+    EXPECT_EQ(finished.out, "");
+    EXPECT_EQ(finished.err.rfind("vrpipe: error: ", 0), 0U);
+    EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1);
+    EXPECT_EQ(finished.err.back(), '\n');
+    // WHAT (WHERE): WHY; WHAT TO DO
+    const std::size_t where = finished.err.find(" (");
+    const std::size_t why = finished.err.find("): ", where);
+    const std::size_t remedy = finished.err.find("; ", why);
+    EXPECT_TRUE(where != std::string::npos && why != std::string::npos && remedy != std::string::npos);
+    for (const std::string& part : parts) EXPECT_NE(finished.err.find(part), std::string::npos) << part;
+    EXPECT_EQ(files(), before);
+  }
+
  private:
   std::filesystem::path base_;
 };

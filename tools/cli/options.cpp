@@ -162,7 +162,7 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
                result_group);
     add_option(app, "--trace-every", trace_every_, "CYCLES",
                "between rows (default: " + std::to_string(Trace::default_every) +
-                   "); the last is at the end of the draw",
+                   "); the last is at the end of the frame",
                result_group);
     add_option(app, "--trace-statistics", trace_statistics_, "NAME,...",
                "which statistics (default: where quads go, and what CROP moves): over all\n"
@@ -178,6 +178,13 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
   }
 }
 
+void SimulationArguments::declare_frame(CLI::App& app) {
+  add_option(app, "--frame", frame_, "FILE.json",
+             "in place of --scene: clears and draws of scenes, each with a state of its\n"
+             "own (docs/frames.md)",
+             scene_group);
+}
+
 SceneRequest SimulationArguments::scene_request() const {
   SceneRequest request;
   request.scene = single(scene_, "--scene").value_or("");
@@ -191,9 +198,23 @@ SceneRequest SimulationArguments::scene_request() const {
   return request;
 }
 
-std::vector<NamedFile> SimulationArguments::inputs() const {
+FrameDescription SimulationArguments::frame() const {
+  const auto file = single(frame_, "--frame");
+  if (!file) return frame_of_scene(single(scene_, "--scene").value_or(""));
+  const auto refuse_with_frame = [](const Values& given, const char* option, const char* why) {
+    if (!given.empty()) throw UserError("cannot use option", option, why, "leave out this or --frame");
+  };
+  refuse_with_frame(scene_, "--scene", "--frame says what is drawn");
+  refuse_with_frame(save_draw_, "--save-draw", "a draw list has one draw, and a frame may have several");
+  return read_frame_file(*file);
+}
+
+std::vector<NamedFile> SimulationArguments::inputs(const FrameDescription& frame) const {
   std::vector<NamedFile> files;
-  for (const std::string& scene : scene_) files.push_back({"--scene", scene});
+  for (const FrameCommand& command : frame.commands) {
+    if (command.draw) files.push_back({command.where, command.draw->scene});
+  }
+  for (const std::string& file : frame_) files.push_back({"--frame", file});
   for (const std::string& camera : camera_) files.push_back({"--camera", camera.substr(0, camera.rfind('#'))});
   for (const std::string& plugin : plugins_) files.push_back({"--plugin", plugin});
   return files;
@@ -223,6 +244,7 @@ SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<
   job.schema = variants == Variants::one ? "vrpipe.run/1" : "vrpipe.compare/1";
   job.provenance = make_provenance(command, plugins_);
   job.scene = scene_request();
+  job.frame = frame();
 
   RunRequest request;
   const auto platform = single(platform_, "--platform");
@@ -261,7 +283,7 @@ SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<
   }
   job.json = single(json_, "--json");
   if (const auto file = single(save_draw_, "--save-draw")) job.save_draw = *file;
-  job.inputs = inputs();
+  job.inputs = inputs(job.frame);
 
   const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
   const auto jobs = single(jobs_, "--jobs");

@@ -15,6 +15,7 @@ class RunCommand : public Command {
 
   void declare(CLI::App& app) override {
     arguments_.declare(app, SimulationArguments::Variants::one);
+    arguments_.declare_frame(app);
     app.footer(
         "Prints cycles, counts, utilization and what each unit spent its cycles on.\n"
         "\n"
@@ -22,6 +23,7 @@ class RunCommand : public Command {
         "  vrpipe run\n"
         "  vrpipe run --variant baseline --size 640x360 --output images\n"
         "  vrpipe run --scene point_cloud.ply --eye 0,1.5,-4 --look-at 0,0,0 --fovy 45\n"
+        "  vrpipe run --frame frame.json --variant het\n"
         "  vrpipe run --set crop.cache_bytes=32768 --set tc.bins=64 --json -\n"
         "  vrpipe run --trace run.csv --trace-every 10000 --trace-statistics 'crop.quads_blended,l2.*'\n"
         "  vrpipe run --plugin my_qru.so --unit qru=my-qru\n"

@@ -66,6 +66,12 @@ struct Workload {
   }
 };
 
+std::shared_ptr<const Frame> frame_of(const RunRequest& request, std::shared_ptr<const Draw> geometry) {
+  auto frame = std::make_shared<Frame>(geometry->width, geometry->height);
+  frame->draw(std::move(geometry), draw_state_of(request));
+  return frame;
+}
+
 Workload load(const AccuracyJob& job, AccuracyResult& result) {
   Workload workload;
   workload.scene = open_scene(job.simulation.scene);
@@ -184,7 +190,7 @@ void climb_fidelities(const AccuracyJob& job, const Workload& workload, const st
   for (unsigned round = 0; round < job.repeat; ++round) {
     for (const RunRequest& request : requests) {
       tasks.push_back({request.variant.name + " " + vrpipe::name_of(request.fidelity), request,
-                       [&workload] { return workload.draw; }});
+                       [&workload](const RunRequest& own) { return frame_of(own, workload.draw); }});
     }
   }
   result.fidelity.resize(requests.size());
@@ -236,7 +242,7 @@ std::vector<Task> stress_tasks(const AccuracyJob& job, const Workload& workload,
       for (const Fidelity fidelity : stress_rungs) {
         request.fidelity = fidelity;
         tasks.push_back({configuration.name + " " + vrpipe::name_of(fidelity), request,
-                         [&workload] { return workload.stress_draw; }});
+                         [&workload](const RunRequest& own) { return frame_of(own, workload.stress_draw); }});
       }
     }
   }
@@ -294,8 +300,9 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const st
   std::vector<Task> tasks;
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const PreprocessOptions options = settings[i].preprocess;
-    tasks.push_back(
-        {result.runs[i].name, settings[i].request, [&workload, options] { return workload.draw_with(options); }});
+    tasks.push_back({result.runs[i].name, settings[i].request, [&workload, options](const RunRequest& own) {
+                       return frame_of(own, workload.draw_with(options));
+                     }});
   }
   result.processes = std::min(job.simulation.processes, static_cast<unsigned>(tasks.size()));
   run_tasks(tasks, true, result.processes, place, progress, [&](std::size_t index, Simulated&& simulated) {

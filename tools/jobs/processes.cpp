@@ -132,8 +132,8 @@ class Worker {
   std::size_t index() const { return index_; }
   int pipe() const { return pipe_; }
 
-  void start(const Draw& draw, bool with_image, std::atomic<float>& progress) {
-    if (with_image) image_.emplace(draw.width, draw.height);
+  void start(const Frame& frame, bool with_image, std::atomic<float>& progress) {
+    if (with_image) image_.emplace(frame.width(), frame.height());
     int ends[2];
     if (::pipe(ends) != 0) system_failure("cannot open a pipe to a simulation");
     std::cout.flush();
@@ -151,7 +151,7 @@ class Worker {
       ::prctl(PR_SET_PDEATHSIG, SIGKILL);
       if (::getppid() != parent) ::_exit(exit_fault);
       ::close(ends[0]);
-      work(ends[1], draw, image_ ? &*image_ : nullptr, progress);
+      work(ends[1], frame, image_ ? &*image_ : nullptr, progress);
     }
     ::close(ends[1]);
     pipe_ = ends[0];
@@ -201,12 +201,12 @@ class Worker {
     throw CommandFailure(code, "variant " + variant + (name_ == variant ? "" : ", " + name_) + ": " + text);
   }
 
-  [[noreturn]] void work(int out, const Draw& draw, SharedImage* image, std::atomic<float>& progress) const {
+  [[noreturn]] void work(int out, const Frame& frame, SharedImage* image, std::atomic<float>& progress) const {
     ::dup2(STDERR_FILENO, STDOUT_FILENO);
     if (!loaded_plugins().empty()) report_crashes_to(out, outcome_fault);
     std::string message;
     try {
-      const RunResult result = simulate(request_, draw, &progress);
+      const RunResult result = simulate(request_, frame, &progress);
       if (image != nullptr) image->copy_from(result.framebuffer.color);
       message = char{outcome_result} + to_bytes(result);
     } catch (const UserError& error) {
@@ -242,18 +242,18 @@ class Worker {
 
 }  // namespace
 
-Simulated simulate_here(const RunRequest& request, const Draw& draw, bool with_image, ProgressLine& progress) {
+Simulated simulate_here(const RunRequest& request, const Frame& frame, bool with_image, ProgressLine& progress) {
   Simulated simulated;
   {
     const StdoutToStderr redirected;
     std::atomic<float> done{0.0F};
     const ProgressThread drawing(request.variant.name, done, progress);
     if (!loaded_plugins().empty()) report_crashes("variant " + request.variant.name + ": ");
-    simulated.result = simulate(request, draw, &done);
+    simulated.result = simulate(request, frame, &done);
   }
   progress.erase();
   if (with_image) {
-    simulated.image.emplace(draw.width, draw.height);
+    simulated.image.emplace(frame.width(), frame.height());
     simulated.image->copy_from(simulated.result.framebuffer.color);
   }
   simulated.result.framebuffer.color = ColorSurface(1, 1, request.format);
@@ -273,11 +273,11 @@ void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned proces
   std::size_t next = 0;
   while (next < tasks.size() || !workers.empty()) {
     while (next < tasks.size() && workers.size() < processes) {
-      const std::shared_ptr<const Draw> draw = tasks[next].draw();
+      const std::shared_ptr<const Frame> frame = tasks[next].frame(tasks[next].request);
       auto worker = std::make_unique<Worker>(next, tasks[next]);
       done[next] = 0.0F;
       try {
-        worker->start(*draw, with_images, done[next]);
+        worker->start(*frame, with_images, done[next]);
       } catch (const std::system_error&) {
         if (workers.empty()) throw;
         processes = static_cast<unsigned>(workers.size());  // the system gives no more at a time
@@ -310,11 +310,10 @@ void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned proces
   progress.erase();
 }
 
-std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requests, const Draw& draw,
+std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requests, const FrameSource& frame,
                                              bool with_images, unsigned processes, ProgressLine& progress) {
-  std::shared_ptr<const Draw> shared(std::shared_ptr<const Draw>(), &draw);  // the caller's
   std::vector<Task> tasks;
-  for (const RunRequest& request : requests) tasks.push_back({request.variant.name, request, [&] { return shared; }});
+  for (const RunRequest& request : requests) tasks.push_back({request.variant.name, request, frame});
   std::vector<Simulated> results(requests.size());
   run_tasks(tasks, with_images, processes, {}, progress,
             [&](std::size_t index, Simulated&& simulated) { results[index] = std::move(simulated); });

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include <vrpipe/draw.h>
+#include <vrpipe/frame.h>
 #include <vrpipe/platforms/simulation.h>
 
 #include "host/progress_line.h"
@@ -22,14 +22,16 @@ struct Simulated {
 };
 
 /// Runs one simulation in this process. Whatever is printed to stdout meanwhile goes to stderr.
-Simulated simulate_here(const RunRequest& request, const Draw& draw, bool with_image, ProgressLine& progress);
+Simulated simulate_here(const RunRequest& request, const Frame& frame, bool with_image, ProgressLine& progress);
+
+/// Gives the frame of a request, when its simulation is about to start; that may let go of it afterwards.
+using FrameSource = std::function<std::shared_ptr<const Frame>(const RunRequest& request)>;
 
 /// One of several simulations.
 struct Task {
   std::string name;  ///< in progress and messages
   RunRequest request;
-  /// Gives the draw when the simulation's process is about to start. It may let go of it afterwards.
-  std::function<std::shared_ptr<const Draw>()> draw;
+  FrameSource frame;
 };
 
 /// Where some simulations stand among all that a command runs, for the progress.
@@ -47,8 +49,8 @@ struct BatchPlace {
 void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned processes, const BatchPlace& place,
                ProgressLine& progress, const std::function<void(std::size_t index, Simulated&& simulated)>& finished);
 
-/// The same for simulations of one draw, which is shared, not copied; results in the order of the requests.
-std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requests, const Draw& draw,
+/// The same for requests that share a source of frames; results in the order of the requests.
+std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requests, const FrameSource& frame,
                                              bool with_images, unsigned processes, ProgressLine& progress);
 
 }  // namespace vrpipe::tools

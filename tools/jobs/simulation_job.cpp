@@ -6,12 +6,12 @@
 #include <utility>
 
 #include <vrpipe/workloads/draw_list.h>
-#include <vrpipe/workloads/scene.h>
 
 #include "for_each_chunk.h"
 #include "host/output_file.h"
 #include "host/process_setup.h"
 #include "host/progress_line.h"
+#include "jobs/loaded_frame.h"
 #include "jobs/processes.h"
 
 namespace vrpipe::tools {
@@ -71,7 +71,7 @@ void save_draw(const SimulationJob& job, const Draw& draw) {
 JobResult perform(const SimulationJob& job) {
   std::vector<std::string> images;
   for (const RunRequest& request : job.requests) {
-    images.push_back(image_name(scene_name(job.scene.scene), request.variant.name));
+    images.push_back(image_name(job.frame.name, request.variant.name));
   }
   check_outputs(job, images);
   JobResult result;
@@ -81,25 +81,28 @@ JobResult perform(const SimulationJob& job) {
   std::vector<Simulated> simulated;
   bool preprocessed_here = false;
   {
-    progress.show("loading " + (job.scene.scene.empty() ? std::string("the built-in scene") : job.scene.scene));
+    progress.show("loading " + job.frame.name);
     const auto start = std::chrono::steady_clock::now();
-    LoadedScene loaded = load_scene(job.scene);
+    const LoadedFrame loaded = load_frame(job.frame, job.scene);
     result.load_seconds = seconds_since(start);
     progress.erase();
     result.scene = loaded.summary;
     result.viewpoint = loaded.viewpoint;
     result.preprocessing = job.preprocessing;
     preprocessed_here = loaded.preprocessed_here;
-    result.width = loaded.draw.width;
-    result.height = loaded.draw.height;
+    result.width = loaded.width;
+    result.height = loaded.height;
     if (job.output) create_output_folder(*job.output, "--output");
-    save_draw(job, loaded.draw);
+    if (job.save_draw) save_draw(job, *loaded.geometry.front());
 
     const auto simulation_start = std::chrono::steady_clock::now();
+    const auto frame_of = [&](const RunRequest& request) { return make_frame(request, job.frame, loaded); };
+    const bool with_images = job.output.has_value();
     if (job.requests.size() == 1) {
-      simulated.push_back(simulate_here(job.requests.front(), loaded.draw, job.output.has_value(), progress));
+      const RunRequest& request = job.requests.front();
+      simulated.push_back(simulate_here(request, *frame_of(request), with_images, progress));
     } else {
-      simulated = simulate_in_processes(job.requests, loaded.draw, job.output.has_value(), job.processes, progress);
+      simulated = simulate_in_processes(job.requests, frame_of, with_images, job.processes, progress);
     }
     result.simulate_seconds = seconds_since(simulation_start);
     if (job.trace) job.trace->finish();

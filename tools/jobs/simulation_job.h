@@ -15,15 +15,17 @@
 
 #include "host/output_file.h"
 #include "host/provenance.h"
+#include "jobs/frame_file.h"
 #include "jobs/trace.h"
 
 namespace vrpipe::tools {
 
-/// Everything that `run` or `compare` is asked to do, checked as far as that is possible without reading the scene.
+/// Everything that `run` or `compare` is asked to do, checked as far as that is possible without reading scenes.
 struct SimulationJob {
   std::string schema;  ///< of the JSON of `run` or `compare`
   Provenance provenance;
-  SceneRequest scene;
+  SceneRequest scene;                  ///< --scene, and how scenes are looked at
+  FrameDescription frame;              ///< of --frame, or --scene as its one draw
   std::vector<RunRequest> requests;    ///< one for each variant, alike in everything else
   std::vector<Setting> preprocessing;  ///< of --set, for the report; `scene` has them
   /// `preprocess.NAME` and value of every parameter of preprocessing.
@@ -48,14 +50,14 @@ struct JobResult {
   std::string schema;  ///< of the JSON
   Provenance provenance;
   SceneSummary scene;
-  std::optional<Viewpoint> viewpoint;  ///< none for a draw list
+  std::optional<Viewpoint> viewpoint;  ///< none for draw lists
   std::vector<Setting> preprocessing;  ///< what --set changed of it
   std::uint32_t width = 0;
   std::uint32_t height = 0;
   std::vector<RunResult> runs;
   std::vector<std::optional<ImageFiles>> images;  ///< one for each run
   unsigned processes = 1;
-  double load_seconds = 0;      ///< wall time of reading and preprocessing the scene
+  double load_seconds = 0;      ///< wall time of reading and preprocessing scenes
   double simulate_seconds = 0;  ///< wall time of all simulations together
 };
 
@@ -76,8 +78,8 @@ ImageFiles image_files(const SimulationJob& job, const std::string& name);
 /// Writes the draw list of --save-draw, if there is one. Throws UserError.
 void save_draw(const SimulationJob& job, const Draw& draw);
 
-/// Loads the scene, simulates, and writes the images and the draw list that the user asked for. One request is simulated
-/// in this process, several in processes of their own. Throws UserError, CommandFailure or a fault.
+/// Loads what is drawn, simulates, and writes the images and the draw list that the user asked for. One request is
+/// simulated in this process, several in processes of their own. Throws UserError, CommandFailure or a fault.
 JobResult perform(const SimulationJob& job);
 
 }  // namespace vrpipe::tools

@@ -188,6 +188,34 @@ std::string unit_states_text(const RunResult& run, const TextStyle& style) {
   return table.text(style);
 }
 
+/// What became of the quads of each draw, in every run.
+std::string draws_text(const std::vector<RunResult>& runs, const TextStyle& style) {
+  constexpr std::size_t most_shown = 20;
+  const std::vector<DrawReport>& draws = runs.front().draws;
+  if (draws.empty()) return {};
+  TextTable table({"quads by draw", "rasterized", "terminated", "shaded", "blended"});
+  const auto row = [&](const std::string& label, const DrawReport& draw) {
+    std::vector<std::string> cells{label};
+    for (const char* name : {"quads_rasterized", "quads_terminated", "quads_shaded", "quads_blended"}) {
+      const auto found =
+          std::find_if(draw.counts.begin(), draw.counts.end(), [&](const auto& count) { return count.first == name; });
+      cells.push_back(grouped(found->second));
+    }
+    table.row(std::move(cells));
+  };
+  for (std::size_t i = 0; i < std::min(draws.size(), most_shown); ++i) {
+    if (runs.size() == 1) {
+      row(printable(draws[i].name), draws[i]);
+      continue;
+    }
+    table.group(printable(draws[i].name));
+    for (const RunResult& run : runs) row(run.request.variant.name, run.draws[i]);
+  }
+  std::string text = table.text(style);
+  if (draws.size() > most_shown) text += fmt::format("and {} more draws: see --json\n", draws.size() - most_shown);
+  return text + "\n";
+}
+
 std::string heading(const JobResult& result, const TextStyle& style) {
   const RunRequest& request = result.runs.front().request;
   const Platform& platform = *request.platform;
@@ -353,7 +381,7 @@ std::string report(const JobResult& result, const TextStyle& style) {
   add_utilization(table, runs);
   add_cache(table, runs);
 
-  std::string text = heading(result, style) + table.text(style) + "\n";
+  std::string text = heading(result, style) + table.text(style) + "\n" + draws_text(runs, style);
   if (runs.size() == 1 && !runs.front().units.empty()) text += unit_states_text(runs.front(), style) + "\n";
   return text + remarks(result);
 }

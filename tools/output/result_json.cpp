@@ -144,9 +144,32 @@ Json statistics_json(const RunResult& run) {
   return statistics;
 }
 
+Json counts_json(const std::vector<std::pair<std::string, std::uint64_t>>& counts) {
+  Json json = Json::object();
+  for (const auto& [name, value] : counts) json[name] = value;
+  return json;
+}
+
+Json draws_json(const RunResult& run) {
+  Json draws;
+  for (const DrawReport& draw : run.draws) {
+    draws.push_back({{"name", draw.name}, {"counts", counts_json(draw.counts)}});
+  }
+  return draws;
+}
+
+Json addresses_json(const AddressMap& addresses) {
+  const auto region = [](const MemoryRegion& memory) {
+    return Json{{"address", memory.address}, {"bytes", memory.bytes}};
+  };
+  return {{"color", region(addresses.color)},
+          {"depth_stencil", region(addresses.depth_stencil)},
+          {"vertices", region(addresses.vertices)},
+          {"primitives", region(addresses.primitives)},
+          {"attributes", region(addresses.attributes)}};
+}
+
 Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
-  Json counts = Json::object();
-  for (const auto& [name, value] : run.counts.named()) counts[name] = value;
   // Without time there is no utilization, and the keys are still there.
   Json utilization = Json::object();
   for (const char* unit : {"raster", "zrop", "prop", "sm", "crop", "l2", "dram"}) utilization[unit] = nullptr;
@@ -158,7 +181,8 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
           {"host_seconds", run.host_seconds},
           {"cpu_seconds", run.cpu_seconds},
           {"implementations", implementations_json(run)},
-          {"counts", std::move(counts)},
+          {"counts", counts_json(run.counts.named())},
+          {"draws", draws_json(run)},
           {"bottleneck", bottleneck_json(run)},
           {"utilization", std::move(utilization)},
           {"effects", Json::array()},
@@ -251,6 +275,7 @@ Json result_json(const JobResult& result) {
                {"fidelity", vrpipe::name_of(request.fidelity)},
                {"format", vrpipe::name_of(request.format)},
                {"termination", name_of(request.termination)},
+               {"addresses", addresses_json(result.runs.front().framebuffer.addresses)},
                {"runs", std::move(runs)}});
   if (result.runs.size() > 1) {
     Json speedups = Json::object();

@@ -54,6 +54,11 @@ struct StateParameters : ParameterSet {
                    0.75,         0.0,
                    16.0,         "sub-pixel steps",
                    source::open, "added to half axes so that snapping loses no fragment above the pruning threshold"};
+
+  /// What each draw may set for itself; the others are the hardware's precision.
+  std::vector<Parameter*> of_draws() {
+    return {&termination_threshold, &termination_compare, &pruning_threshold, &splat_extent, &obb_padding};
+  }
 };
 
 /// Parameters of the L2, set as `l2.NAME`.

@@ -51,6 +51,9 @@ struct OpenedScene {
 /// The name that results give to the scene of SceneRequest::scene: the file's without folder, or builtin:NAME.
 std::string scene_name(const std::string& scene);
 
+/// Whether a scene is a draw list (.spl), which has a size and no camera.
+bool is_draw_list(const std::string& scene);
+
 /// Opens a scene.
 /// Built-in: its own camera and size; view options replace what they name, the rest stays.
 /// .ply: the camera of the file given, or the view options. What is not given comes from an automatic view: it looks

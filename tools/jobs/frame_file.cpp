@@ -1,0 +1,216 @@
+#include "jobs/frame_file.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <vrpipe/error.h>
+#include <vrpipe/platforms/configuration.h>
+#include <vrpipe/workloads/scene.h>
+
+#include "file_io.h"
+
+namespace vrpipe::tools {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr const char* cannot_use = "cannot use frame file";
+constexpr const char* early_termination_key = "early_termination";
+constexpr const char* command_remedy = "give {\"draw\": SCENE} or {\"clear\": [...]}";
+
+[[noreturn]] void refuse(const std::string& where, const std::string& why, const std::string& remedy) {
+  throw UserError(cannot_use, where, why, remedy);
+}
+
+/// For a name that is none of those known.
+[[noreturn]] void refuse_unknown(const std::string& where, const std::string& kind, const std::string& name,
+                                 const std::vector<std::string>& known) {
+  const std::string all = known.size() > 1 ? fmt::format(" there are {}", fmt::join(known, ", ")) : "";
+  refuse(where, fmt::format("unknown {} '{}'", kind, name),
+         fmt::format("did you mean {}?{}", nearest_name(name, known), all));
+}
+
+void check_keys(const Json& object, const std::vector<std::string>& known, const std::string& where) {
+  for (const auto& entry : object.items()) {
+    if (std::find(known.begin(), known.end(), entry.key()) == known.end()) {
+      refuse_unknown(where, "key", entry.key(), known);
+    }
+  }
+}
+
+const std::string& text_of(const Json& value, const std::string& where) {
+  if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
+    refuse(where, "it is " + value.dump() + ", not a text", "write a text in quotes");
+  }
+  return value.get_ref<const std::string&>();
+}
+
+/// Parses JSON. The library would take the last of two keys of one name, and a draw would be missing.
+Json parse(const std::string& text, const std::string& where) {
+  std::vector<std::set<std::string>> keys;  // of the objects that the parser is in
+  const auto check = [&](int, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::object_start) keys.emplace_back();
+    if (event == Json::parse_event_t::object_end) keys.pop_back();
+    if (event == Json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second) {
+      refuse(where, "an object has the key " + parsed.dump() + " twice", "keep one of the two");
+    }
+    return true;
+  };
+  try {
+    return Json::parse(text, check);
+  } catch (const Json::exception& error) {
+    const std::string why = error.what();
+    refuse(where, "it is not valid JSON: " + why.substr(why.find("] ") + 2), "correct the file");
+  }
+}
+
+Clear read_clear(const Json& value, const std::string& where) {
+  const std::string remedy = "give [\"color\"], [\"termination\"] or both";
+  if (!value.is_array() || value.empty()) refuse(where, "it is " + value.dump() + ", not what is cleared", remedy);
+  Clear clear;
+  for (const Json& part : value) {
+    const std::string& name = text_of(part, where);
+    if (name == "color") {
+      clear.color = true;
+    } else if (name == "termination") {
+      clear.termination = true;
+    } else {
+      refuse_unknown(where, "part of the framebuffer", name, {"color", "termination"});
+    }
+  }
+  return clear;
+}
+
+void read_splats(const Json& value, const std::string& where, SceneDraw& draw) {
+  constexpr std::uint64_t most = 0x80000000;
+  const auto is_count = [](const Json& number) {
+    return number.is_number_unsigned() && number.get<std::uint64_t>() <= most;
+  };
+  if (!value.is_array() || value.size() != 2 || !is_count(value[0]) || !is_count(value[1])) {
+    refuse(where, "it is " + value.dump() + ", not two whole numbers", "give [FIRST, COUNT]");
+  }
+  draw.first = value[0].get<std::uint32_t>();
+  draw.splats = value[1].get<std::uint32_t>();
+}
+
+/// A parameter's value as --set would have it. Numbers are numbers and choices are texts, as in results.
+std::string value_text(const Parameter& parameter, const Json& value, const std::string& where) {
+  if (dynamic_cast<const Choice*>(&parameter) != nullptr) return text_of(value, where);
+  if (!value.is_number()) refuse(where, "it is " + value.dump() + ", not a number", "give " + parameter.range());
+  return value.dump();
+}
+
+void read_state(const Json& value, const std::string& where, SceneDraw& draw) {
+  if (!value.is_object()) refuse(where, "it is not an object", "give {\"PARAMETER\": VALUE, ...}");
+  StateParameters parameters;
+  const std::vector<Parameter*> of_draws = parameters.of_draws();
+  std::vector<std::string> known{early_termination_key};
+  for (const Parameter* parameter : of_draws) known.emplace_back(parameter->name());
+  for (const auto& entry : value.items()) {
+    const std::string& key = entry.key();
+    const std::string here = where + "." + key;
+    if (key == early_termination_key) {
+      if (!entry.value().is_boolean()) refuse(here, "it is " + entry.value().dump(), "give true or false");
+      draw.early_termination = entry.value().get<bool>();
+      continue;
+    }
+    const auto is_named = [&](const Parameter* parameter) { return key == parameter->name(); };
+    const auto found = std::find_if(of_draws.begin(), of_draws.end(), is_named);
+    if (found == of_draws.end()) {
+      const std::vector<Parameter*>& all = parameters.parameters();
+      if (std::none_of(all.begin(), all.end(), is_named)) refuse_unknown(where, "parameter", key, known);
+      refuse(here, "it is the precision of the hardware, which all draws share", "use --set state." + key + "=VALUE");
+    }
+    const std::string text = value_text(**found, entry.value(), here);
+    (*found)->set(text, here);
+    draw.settings.push_back({"state", key, text});
+  }
+}
+
+SceneDraw read_draw(const Json& command, const std::string& where, const std::filesystem::path& folder) {
+  SceneDraw draw;
+  draw.scene = text_of(command["draw"], where + ", draw");
+  const bool is_file = draw.scene.rfind("builtin:", 0) != 0;
+  if (is_file) draw.scene = (folder / draw.scene).lexically_normal().string();
+  if (command.contains("name")) draw.name = text_of(command["name"], where + ", name");
+  if (command.contains("splats")) read_splats(command["splats"], where + ", splats", draw);
+  if (command.contains("state")) read_state(command["state"], where + ", state", draw);
+  return draw;
+}
+
+FrameCommand read_command(const Json& json, const std::string& where, const std::filesystem::path& folder) {
+  if (!json.is_object()) refuse(where, "it is not an object", command_remedy);
+  FrameCommand command;
+  command.where = where;
+  if (json.contains("clear")) {
+    if (json.size() > 1) refuse(where, "it has other keys beside \"clear\"", "make another command of them");
+    command.clear = read_clear(json["clear"], where + ", clear");
+    return command;
+  }
+  check_keys(json, {"draw", "name", "splats", "state", "clear"}, where);
+  if (!json.contains("draw")) refuse(where, "it has neither \"draw\" nor \"clear\"", command_remedy);
+  command.draw = read_draw(json, where, folder);
+  return command;
+}
+
+/// A draw without a name is called what it draws, with a number where several are.
+void name_draws(std::vector<FrameCommand>& commands) {
+  std::map<std::string, unsigned> unnamed;
+  for (const FrameCommand& command : commands) {
+    if (command.draw && command.draw->name.empty()) ++unnamed[scene_name(command.draw->scene)];
+  }
+  std::map<std::string, unsigned> named;
+  for (FrameCommand& command : commands) {
+    if (!command.draw || !command.draw->name.empty()) continue;
+    const std::string name = scene_name(command.draw->scene);
+    command.draw->name = unnamed[name] > 1 ? fmt::format("{} {}", name, ++named[name]) : name;
+  }
+}
+
+}  // namespace
+
+FrameDescription frame_of_scene(const std::string& scene) {
+  FrameDescription frame;
+  frame.name = scene_name(scene);
+  frame.commands.resize(1);
+  frame.commands.front().where = "--scene";
+  SceneDraw& draw = frame.commands.front().draw.emplace();
+  draw.scene = scene;
+  draw.name = frame.name;
+  return frame;
+}
+
+FrameDescription read_frame_file(const std::filesystem::path& path) {
+  const std::string where = path.string();
+  const InputFile file(path, "cannot read frame file");
+  std::string text(static_cast<std::size_t>(file.size()), '\0');
+  file.read(0, text.data(), text.size());
+  file.check_unchanged();
+  const Json json = parse(text, where);
+  const std::string layout = "give {\"commands\": [{\"draw\": SCENE}, ...]}";
+  if (!json.is_object()) refuse(where, "it is not an object", layout);
+  check_keys(json, {"commands"}, where);
+  if (!json.contains("commands")) refuse(where, "it has no \"commands\"", layout);
+  const Json& commands = json["commands"];
+  if (!commands.is_array()) refuse(where + ", commands", "it is not an array", layout);
+
+  FrameDescription frame;
+  frame.name = path.filename().string();
+  for (const Json& command : commands) {
+    frame.commands.push_back(
+        read_command(command, fmt::format("{}, command {}", where, frame.commands.size() + 1), path.parent_path()));
+  }
+  const auto draws = [](const FrameCommand& command) { return command.draw.has_value(); };
+  if (std::none_of(frame.commands.begin(), frame.commands.end(), draws)) {
+    refuse(where + ", commands", "nothing is drawn", layout);
+  }
+  name_draws(frame.commands);
+  return frame;
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vrpipe/frame.h>
+#include <vrpipe/platforms/simulation.h>
+
+namespace vrpipe::tools {
+
+/// A scene, or some of its splats, drawn with a state of its own.
+struct SceneDraw {
+  std::string scene;  ///< as SceneRequest has it
+  std::string name;   ///< for reports
+  // As Frame::draw takes them: in draw order, of the splats that are visible.
+  std::uint32_t first = 0;
+  std::uint32_t splats = ~0U;
+  bool early_termination = true;
+  std::vector<Setting> settings;  ///< of unit `state`: those that draws may have of their own
+};
+
+struct FrameCommand {
+  std::string where;              ///< for messages: the file and the command's number
+  std::optional<SceneDraw> draw;  ///< none: a clear
+  Clear clear;
+};
+
+/// What a frame draws, before anything is loaded.
+struct FrameDescription {
+  std::string name;  ///< in results: the scene's, or the file's without folder
+  std::vector<FrameCommand> commands;
+};
+
+/// A frame of one draw.
+FrameDescription frame_of_scene(const std::string& scene);
+
+/// Reads a frame file, which docs/frames.md describes. Names of files in it are relative to its folder.
+/// Throws UserError naming the file, the command and the key for whatever cannot be used.
+FrameDescription read_frame_file(const std::filesystem::path& path);
+
+}  // namespace vrpipe::tools

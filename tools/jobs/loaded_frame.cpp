@@ -1,0 +1,102 @@
+#include "jobs/loaded_frame.h"
+
+#include <map>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <vrpipe/error.h>
+
+namespace vrpipe::tools {
+namespace {
+
+/// The same options with all of a camera, so that it is the same for every scene.
+SceneRequest seen_from(const Viewpoint& viewpoint, SceneRequest options) {
+  options.size = ImageSize{viewpoint.camera.width, viewpoint.camera.height};
+  if (viewpoint.view) {
+    options.eye = viewpoint.view->eye;
+    options.look_at = viewpoint.view->look_at;
+    options.up = viewpoint.view->up;
+    options.fovy_degrees = viewpoint.view->fovy_degrees;
+  }
+  return options;
+}
+
+void add(const SceneSummary& scene, SceneSummary& sum) {
+  sum.gaussians_total += scene.gaussians_total;
+  sum.gaussians_visible += scene.gaussians_visible;
+  sum.rejected.not_finite += scene.rejected.not_finite;
+  sum.rejected.zero_quaternion += scene.rejected.zero_quaternion;
+}
+
+void check(const FrameCommand& command, const Draw& geometry, const LoadedFrame& frame) {
+  const SceneDraw& draw = *command.draw;
+  if (geometry.width != frame.width || geometry.height != frame.height) {
+    throw UserError("cannot draw " + draw.scene, command.where,
+                    fmt::format("it is a draw list for {}x{} pixels, and the frame has {}x{}", geometry.width,
+                                geometry.height, frame.width, frame.height),
+                    frame.viewpoint ? fmt::format("give --size {}x{}", geometry.width, geometry.height)
+                                    : "use draw lists of one size");
+  }
+  const std::size_t there = geometry.splats.size();
+  const bool is_part = draw.splats != ~0U;
+  if (is_part && (draw.first > there || draw.splats > there - draw.first)) {
+    throw UserError("cannot draw " + draw.scene, command.where + ", splats",
+                    fmt::format("{} from {} on are not there: {} are visible", draw.splats, draw.first, there),
+                    "draw what is there");
+  }
+}
+
+}  // namespace
+
+LoadedFrame load_frame(const FrameDescription& frame, const SceneRequest& options) {
+  LoadedFrame loaded;
+  std::map<std::string, std::shared_ptr<const Draw>> scenes;
+  SceneRequest view = options;
+  // Draw lists come last: whether the options of a camera have a meaning is known by then.
+  for (const bool draw_lists : {false, true}) {
+    for (const FrameCommand& command : frame.commands) {
+      if (!command.draw || is_draw_list(command.draw->scene) != draw_lists || scenes.count(command.draw->scene) > 0) {
+        continue;
+      }
+      SceneRequest request = draw_lists && loaded.viewpoint ? SceneRequest() : view;
+      request.scene = command.draw->scene;
+      LoadedScene scene = load_scene(request);
+      if (scenes.empty()) {
+        loaded.width = scene.draw.width;
+        loaded.height = scene.draw.height;
+        loaded.viewpoint = scene.viewpoint;
+        loaded.preprocessed_here = scene.preprocessed_here;
+        if (scene.viewpoint) view = seen_from(*scene.viewpoint, options);
+      }
+      add(scene.summary, loaded.summary);
+      scenes[request.scene] = std::make_shared<const Draw>(std::move(scene.draw));
+    }
+  }
+  loaded.summary.name = frame.name;
+  for (const FrameCommand& command : frame.commands) {
+    loaded.geometry.push_back(command.draw ? scenes.at(command.draw->scene) : nullptr);
+    if (command.draw) check(command, *loaded.geometry.back(), loaded);
+  }
+  return loaded;
+}
+
+std::shared_ptr<const Frame> make_frame(const RunRequest& request, const FrameDescription& description,
+                                        const LoadedFrame& loaded) {
+  auto frame = std::make_shared<Frame>(loaded.width, loaded.height);
+  for (std::size_t i = 0; i < description.commands.size(); ++i) {
+    const FrameCommand& command = description.commands[i];
+    if (!command.draw) {
+      frame->clear(command.clear);
+      continue;
+    }
+    const SceneDraw& draw = *command.draw;
+    DrawState state = draw_state_of(request, draw.settings);
+    state.early_termination = draw.early_termination;
+    frame->draw(loaded.geometry[i], state, draw.name, draw.first, draw.splats);
+  }
+  return frame;
+}
+
+}  // namespace vrpipe::tools
