@@ -31,7 +31,7 @@ class PreRop : public PropBehaviour {
     Integer latency_cycles{*this, "latency_cycles", 4, 1, 1000, "cycles", source::open, "of each passage"};
     Choice order{
         *this, "order",          {"draw", "tile"},
-        1,     source::measured, "shaded warps leave in launch order of the whole draw, or of their screen tile"};
+        1,     source::measured, "shaded warps leave in launch order of the whole frame, or of their screen tile"};
   };
   PreRop(const Parameters& parameters, const RenderContext& context);
 

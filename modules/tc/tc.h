@@ -46,7 +46,8 @@ class TileCoalescing : public TcBehaviour {
   Counter flushes_full{*this, "flushes_full", "flushes", "because the bin was full"};
   Counter flushes_evicted{*this, "flushes_evicted", "flushes", "because another tile needed the bin"};
   Counter flushes_timed_out{*this, "flushes_timed_out", "flushes", "because no quad came for the time-out"};
-  Counter flushes_end_of_draw{*this, "flushes_end_of_draw", "flushes", "at the end of the draw"};
+  Counter flushes_end_of_draw{*this, "flushes_end_of_draw", "flushes",
+                              "before a clear or a draw of another state, and at the end of the frame"};
   Histogram flush_sizes{*this, Histogram::Buckets::log2(), "quads_per_flush", "quads", "in a flushed bin"};
 
  private:

@@ -8,7 +8,7 @@
 namespace vrpipe {
 
 /// Tile grid coalescing (paper 5.3): bins of primitives, a bin per tile grid. A bin is flushed when it is full, when a
-/// primitive of a new grid finds all bins taken (the one allocated first goes), and at the end of the draw.
+/// primitive of a new grid finds all bins taken (the one allocated first goes), and at a mark.
 class TileGridCoalescing : public TgcBehaviour {
  public:
   struct Parameters : ParameterSet {

@@ -108,6 +108,9 @@ if(NOT two LESS one)
   message(FATAL_ERROR "two GPCs take ${two} cycles, one takes ${one}")
 endif()
 
+# The frame: both of its draws blend.
+expect_success("near: [1-9][0-9]* quads blended\nfar: [1-9][0-9]* quads blended" ${WORK_DIR}/consumer/layers)
+
 # And as a plugin that brings nothing else.
 set(wide ${WORK_DIR}/consumer/wide_platform.so)
 expect_success("agx-orin with two GPCs" ${vrpipe} platforms --plugin ${wide})
