@@ -10,7 +10,7 @@ int main() try {
   vrpipe::Draw draw;
   draw.width = draw.height = 16;
   vrpipe::RenderContext context;
-  context.frame = Frame::of(draw);
+  context.frame = vrpipe::Frame::of(draw);
   vrpipe::testkit::Bench bench("crop", "counting-rop", context, {{"cache_bytes", "8192"}});
 
   // The same opaque quad twice: the second changes nothing.

@@ -35,7 +35,7 @@ std::string launched(Fidelity fidelity, const QuadBeat& bin, std::uint64_t stall
   vrpipe::Draw draw;
   draw.width = draw.height = 64;
   vrpipe::RenderContext context;
-  context.frame = Frame::of(draw);
+  context.frame = vrpipe::Frame::of(draw);
   vrpipe::testkit::Bench bench(fidelity, "qru", "same-splat", context);
   auto& sink = bench.sink<Warp>("out_warps");
   if (closed_until > 0) sink.close(0, closed_until);
@@ -46,7 +46,7 @@ std::string launched(Fidelity fidelity, const QuadBeat& bin, std::uint64_t stall
     auto& source = bench.source<QuadBeat>("in_quads");
     source.add(bin);
     QuadBeat end;
-    end.mark = Mark::end_of_frame;
+    end.mark = vrpipe::Mark::end_of_frame;
     source.add(end);
   } else {
     // At lt and at a bin comes in one piece: batch.h.
@@ -58,7 +58,7 @@ std::string launched(Fidelity fidelity, const QuadBeat& bin, std::uint64_t stall
     item.quads = bin.count;
     source.add(item);
     BinItem end;
-    end.mark = Mark::end_of_frame;
+    end.mark = vrpipe::Mark::end_of_frame;
     source.add(end);
   }
   bench.run();
@@ -73,7 +73,7 @@ std::string launched(Fidelity fidelity, const QuadBeat& bin, std::uint64_t stall
       text += (back ? "+" : " ") + std::to_string(q.position) + ":" + std::to_string(q.splat) + "." +
               std::to_string(q.triangle);
     }
-    text += record.item.mark == Mark::end_of_frame ? " end" : " |";
+    text += record.item.mark == vrpipe::Mark::end_of_frame ? " end" : " |";
   }
   return text;
 }
