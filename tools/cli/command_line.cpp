@@ -60,17 +60,17 @@ std::string likely_name(const std::string& given, const std::vector<std::string>
                                 const std::vector<CLI::App*>& commands) {
   const std::string option = given.substr(0, given.find('='));
   const std::string help = "`" + where + " --help` lists all options";
-  const std::string nearest = likely_name(option, option_names(app));
-  if (!nearest.empty() && nearest != option) {
-    throw UserError("unknown option '" + option + "'", where, "there is no such option",
-                    "did you mean " + nearest + "? " + help);
-  }
   for (const CLI::App* command : commands) {
     const std::vector<std::string> known = option_names(*command);
     if (std::find(known.begin(), known.end(), option) == known.end()) continue;
     const std::string owner = "`vrpipe " + command->get_name() + "`";
     throw UserError("unknown option '" + option + "'", where, "it is an option of " + owner,
                     app.get_parent() == nullptr ? "write it after the command" : help);
+  }
+  const std::string nearest = likely_name(option, option_names(app));
+  if (!nearest.empty() && nearest != option) {
+    throw UserError("unknown option '" + option + "'", where, "there is no such option",
+                    "did you mean " + nearest + "? " + help);
   }
   throw UserError("unknown option '" + option + "'", where, "there is no such option", help);
 }
