@@ -183,6 +183,8 @@ TEST_F(FrameFile, BadCommands) {
   bad_command(R"({"draw": "tiny.spl", "splat": [0, 1]})", {"unknown key 'splat'", "did you mean splats?"});
   bad_command(R"({"draw": "tiny.spl", "clear": ["color"]})", {"other keys beside \"clear\""});
   bad_command(R"({"draw": 1})", {"draw): it is 1, not a text"});
+  bad_command(R"({"draw": )" + std::string(100000, '[') + std::string(100000, ']') + "}",
+              {"it is an array, not a text"});
   bad_command(R"({"draw": ""})", {"draw): ", "not a text"});
   bad_command(R"({"draw": "tiny.spl", "name": []})", {"name): ", "not a text"});
   bad_command(R"({"clear": "color"})", {"clear): ", "[\"color\"]"});

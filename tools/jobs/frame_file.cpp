@@ -43,9 +43,15 @@ void check_keys(const Json& object, const std::vector<std::string>& known, const
   }
 }
 
+/// A value in a message; of an array or an object only that it is one.
+std::string shown(const Json& value) {
+  if (value.is_array()) return "an array";
+  return value.is_object() ? "an object" : value.dump();
+}
+
 const std::string& text_of(const Json& value, const std::string& where) {
   if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-    refuse(where, "it is " + value.dump() + ", not a text", "write a text in quotes");
+    refuse(where, "it is " + shown(value) + ", not a text", "write a text in quotes");
   }
   return value.get_ref<const std::string&>();
 }
@@ -71,7 +77,7 @@ Json parse(const std::string& text, const std::string& where) {
 
 Clear read_clear(const Json& value, const std::string& where) {
   const std::string remedy = "give [\"color\"], [\"termination\"] or both";
-  if (!value.is_array() || value.empty()) refuse(where, "it is " + value.dump() + ", not what is cleared", remedy);
+  if (!value.is_array() || value.empty()) refuse(where, "it does not say what is cleared", remedy);
   Clear clear;
   for (const Json& part : value) {
     const std::string& name = text_of(part, where);
@@ -92,7 +98,7 @@ void read_splats(const Json& value, const std::string& where, SceneDraw& draw) {
     return number.is_number_unsigned() && number.get<std::uint64_t>() <= most;
   };
   if (!value.is_array() || value.size() != 2 || !is_count(value[0]) || !is_count(value[1])) {
-    refuse(where, "it is " + value.dump() + ", not two whole numbers", "give [FIRST, COUNT]");
+    refuse(where, "it is not an array of two whole numbers from 0 to 2^31", "give [FIRST, COUNT]");
   }
   draw.first = value[0].get<std::uint32_t>();
   draw.splats = value[1].get<std::uint32_t>();
@@ -101,7 +107,7 @@ void read_splats(const Json& value, const std::string& where, SceneDraw& draw) {
 /// A parameter's value as --set would have it. Numbers are numbers and choices are texts, as in results.
 std::string value_text(const Parameter& parameter, const Json& value, const std::string& where) {
   if (dynamic_cast<const Choice*>(&parameter) != nullptr) return text_of(value, where);
-  if (!value.is_number()) refuse(where, "it is " + value.dump() + ", not a number", "give " + parameter.range());
+  if (!value.is_number()) refuse(where, "it is " + shown(value) + ", not a number", "give " + parameter.range());
   return value.dump();
 }
 
@@ -115,7 +121,7 @@ void read_state(const Json& value, const std::string& where, SceneDraw& draw) {
     const std::string& key = entry.key();
     const std::string here = where + "." + key;
     if (key == early_termination_key) {
-      if (!entry.value().is_boolean()) refuse(here, "it is " + entry.value().dump(), "give true or false");
+      if (!entry.value().is_boolean()) refuse(here, "it is " + shown(entry.value()), "give true or false");
       draw.early_termination = entry.value().get<bool>();
       continue;
     }
