@@ -63,6 +63,7 @@ TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
     EXPECT_EQ(help.code, 0);
     expect_in(help.out, shared);
     expect_in(help.out, {std::string(command) == "run" ? "--variant" : "--jobs"});
+    EXPECT_EQ(help.out.find("--frame") != std::string::npos, std::string(command) != "accuracy");
   }
   expect_in(vrpipe({"run", "--help"}).out, {"--trace FILE.csv", "--trace-every CYCLES", "--trace-statistics NAME,..."});
   expect_in(vrpipe({"accuracy", "--help"}).out, {"--quick", "--repeat", "--html", "--markdown"});

@@ -23,9 +23,9 @@ struct LoadedFrame {
   bool preprocessed_here = false;                     ///< false if there are only draw lists
 };
 
-/// Loads every scene of a frame once. All are drawn with one camera and size: those of `options`, in which `scene` is not
-/// used, and what these leave open as the first scene has it that is no draw list. A draw list has no camera, and must be
-/// of the frame's size.
+/// Loads every scene of a frame once. All are drawn with one camera and size: those of `options`, in which `scene` is
+/// not used, and what these leave open as the first scene has it that is no draw list. A draw list has no camera, and
+/// must be of the frame's size.
 /// Throws UserError as load_scene(), and for splats that a scene does not have.
 LoadedFrame load_frame(const FrameDescription& frame, const SceneRequest& options);
 
