@@ -142,9 +142,6 @@ class CropUnit : public Unit {
       const ColorBeat& beat = in_.front();
       if (beat.mark != Mark::none) {
         mark_ = beat.mark;
-        // Once a draw: counting every quad would show.
-        cache_->accessed(looked_up_, looked_up_ * sectors_of_a_quad_);
-        looked_up_ = 0;
         in_.pop();
         return true;
       }
@@ -153,7 +150,7 @@ class CropUnit : public Unit {
         moved = true;
       }
       if (at_ == beat.count) {
-        looked_up_ += at_;
+        cache_->accessed(at_, at_ * sectors_of_a_quad_);
         in_.pop();
         at_ = 0;
       }
@@ -299,7 +296,6 @@ class CropUnit : public Unit {
   Cycle last_blend_ = 0;
   Cycle end_ = never;
   bool any_blended_ = false;
-  std::uint64_t looked_up_ = 0;  ///< quads of the draw
   unsigned sectors_of_a_quad_ = 0;
   StatisticSet cache_statistics_{*this, "cache"};
   Counter hits_on_their_way_{cache_statistics_, "sector_hits_on_their_way", "sectors",

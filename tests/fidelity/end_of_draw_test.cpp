@@ -73,7 +73,7 @@ TEST(EndOfDraw, IsTheSameWhetherTheLastQuadIsBlendedOrPruned) {
 // Quads alone keep a draw going: the vertices and triangles behind the last of them do not.
 TEST(EndOfDraw, IsNotPutOffByWhatCoversNothing) {
   for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
-    for (const char* variant : {"baseline", "het"}) {  // TGC would keep primitives until the end of the draw
+    for (const char* variant : {"baseline", "het"}) {  // TGC would keep primitives until the end of the frame
       Draw draw = draw_of(64, 64, {flat_box(4, 4, 60, 60, 0.5F)});
       const RunResult alone = run(request_of(variant, fidelity), draw);
       for (unsigned i = 0; i < 5000; ++i) draw.splats.push_back(flat_box(-90, -90, -80, -80, 0.5F));

@@ -145,7 +145,7 @@ TEST(Netlist, WhatAPlatformLeavesOutIsMissingAtEveryFidelity) {
     EXPECT_TRUE(std::none_of(result.units.begin(), result.units.end(),
                              [](const UnitReport& unit) { return unit.name == "gpc0.raster"; }));
   }
-  // With time the end of the draw never comes to CROP.
+  // With time the end of the frame never comes to CROP.
   for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
     RunRequest request = request_of("baseline", fidelity);
     request.platform = &half;

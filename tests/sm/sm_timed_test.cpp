@@ -57,7 +57,7 @@ struct SmBench {
       if (release_after != never) release.add({item.warp->slot}, now + release_after);
     });
   }
-  /// With the end of the draw behind the warps: at lt an array hands on what is done when something comes.
+  /// With the end of the frame behind the warps: at lt an array hands on what is done when something comes.
   void run() {
     Warp end;
     end.mark = Mark::end_of_frame;

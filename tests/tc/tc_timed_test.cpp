@@ -247,7 +247,7 @@ TEST_P(TcTimedTest, WithRoomToSpareBinsLeaveWhenTheyDoAtCycle) {
   TcBench tc(GetParam(), context, settings);
   add_many(tc.in);
   tc.bench.run();
-  // The end of the draw takes a cycle of its own: the four bins that it flushes, and itself, are a cycle late.
+  // The end of the frame takes a cycle of its own: the four bins that it flushes, and itself, are a cycle late.
   for (std::size_t i = expected.size() - 5; i < expected.size(); ++i) ++expected[i];
   std::vector<Cycle> got;
   for (const auto& record : tc.out.records()) got.push_back(record.last);

@@ -66,19 +66,19 @@ class Observers {
   };
   using SeeStatistics = std::function<void(Cycle cycle, const std::vector<Sampled>& values)>;
 
-  /// Samples statistics at the cycles `every`, 2 `every`, ... before the end of the draw, and at its end, where the
+  /// Samples statistics at the cycles `every`, 2 `every`, ... before the end of the frame, and at its end, where the
   /// values are those of the result. With time alone: at the other fidelities it is a UserError.
   ///
   /// @param every  cycles, at least 1; otherwise a UserError
   /// @param names  as in the results, over all components of a kind (crop.quads_blended), or of one component, by its
   ///               path (gpc1.crop.cache.sector_hits). A `*` stands for any text without a dot: crop.*, gpc*.tc.quads.
   ///               One that names nothing is a UserError when the run begins.
-  /// @param see    is called in the order of cycles, perhaps later than in them: what comes after the end of the draw
+  /// @param see    is called in the order of cycles, perhaps later than in them: what comes after the end of the frame
   ///               is in the last sample, and the end is known late. `values` are in the order of the names.
   ///
   /// A sample has what was counted at the edges of all earlier cycles, and nothing of its own. Not every counter is at
   /// the time of what it counts (figures: builtin:object, 400x400, agx-orin):
-  /// - At `cycle` all are, but for accesses and hits of CROP's cache, which are counted once, at the end of the draw.
+  /// - At `cycle` all are.
   /// - At `at` they are at most 60 cycles ahead, and up to 700 late where a unit had to wait for room.
   /// - At both, in strict termination with early termination, SM and CROP count a bin when it is tested: 1,000 cycles
   ///   ahead on average, at most 4,000.
