@@ -1,0 +1,243 @@
+// Frames by themselves: what clears and draws are numbered, and what a frame refuses.
+#include <vrpipe/frame.h>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/error.h>
+
+#include "support/builders.h"
+
+namespace vrpipe {
+namespace {
+
+std::shared_ptr<const Draw> geometry_of(std::uint32_t splats, std::uint32_t width = 64, std::uint32_t height = 48) {
+  auto draw = std::make_shared<Draw>(testing::draw_of(width, height, std::vector<Splat>(splats)));
+  for (std::uint32_t i = 0; i < splats; ++i) draw->splats[i].cx = static_cast<float>(i);
+  return draw;
+}
+
+DrawState pruned_at(float threshold) {
+  DrawState state;
+  state.pruning_threshold = threshold;
+  return state;
+}
+
+std::vector<bool> changes_in(const Frame& frame) {
+  std::vector<bool> changes;
+  for (const Frame::Command& command : frame.commands()) changes.push_back(command.changes_state);
+  return changes;
+}
+
+template <class Action>
+std::string refusal_of(Action&& action) {
+  try {
+    action();
+  } catch (const UserError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(Frame, NumbersSplatsThroughAllDraws) {
+  const auto geometry = geometry_of(20);
+  Frame frame(64, 48);
+  frame.draw(geometry, {}, "whole");
+  frame.draw(geometry, {}, "none of it", 7, 0);
+  frame.draw(geometry, {}, "middle", 5, 10);
+  frame.draw(geometry, {}, "rest", 18);
+  ASSERT_EQ(frame.draws().size(), 4U);
+  const std::uint32_t bases[] = {0, 20, 20, 30};
+  const std::uint32_t counts[] = {20, 0, 10, 2};
+  for (DrawIndex draw = 0; draw < 4; ++draw) {
+    EXPECT_EQ(frame.draw_call(draw).base, bases[draw]);
+    EXPECT_EQ(frame.draw_call(draw).splats, counts[draw]);
+  }
+  EXPECT_EQ(frame.splats(), 32U);
+  EXPECT_EQ(frame.draw_call(2).splat(20).cx, 5.0F);
+  EXPECT_EQ(frame.draw_call(2).splat(29).cx, 14.0F);
+  EXPECT_EQ(frame.draw_call(3).splat(31).cx, 19.0F);
+}
+
+TEST(Frame, ASplatHasTheTriangleOfItsPlaceInTheGeometry) {
+  auto geometry = std::make_shared<Draw>(testing::draw_of(64, 48, std::vector<Splat>(4)));
+  for (unsigned i = 0; i < 4; ++i) {
+    geometry->triangles.push_back(testing::one_quad_triangle(2.0F * static_cast<float>(i), 0));
+  }
+  Frame frame(64, 48);
+  frame.draw(geometry_of(3), {});
+  frame.draw(geometry, {}, "", 2, 2);
+  EXPECT_EQ(frame.draw_call(0).triangle(1), nullptr);
+  EXPECT_EQ(frame.draw_call(1).triangle(4), &geometry->triangles[3]);
+}
+
+TEST(Frame, OnlyClearsOfTerminationBeginAnEpoch) {
+  const auto geometry = geometry_of(1);
+  Frame frame(64, 48);
+  frame.clear({false, true});
+  frame.draw(geometry, {});
+  frame.clear({true, false});
+  frame.draw(geometry, {});
+  frame.clear({true, true});
+  frame.clear({false, true});
+  frame.draw(geometry, {});
+  EXPECT_EQ(frame.draw_call(0).epoch, 1);
+  EXPECT_EQ(frame.draw_call(1).epoch, 1);
+  EXPECT_EQ(frame.draw_call(2).epoch, 3);
+}
+
+TEST(Frame, ADrawChangesStateIfTheDrawBeforeItHadAnother) {
+  const auto geometry = geometry_of(1);
+  Frame frame(64, 48);
+  frame.draw(geometry, pruned_at(0.1F));
+  frame.draw(geometry, pruned_at(0.1F));
+  frame.draw(geometry, pruned_at(0.2F));
+  frame.clear({true, true});
+  frame.draw(geometry, pruned_at(0.2F));
+  frame.draw(geometry, pruned_at(0.1F));
+  EXPECT_EQ(changes_in(frame), (std::vector<bool>{false, false, true, false, false, true}));
+}
+
+TEST(Frame, EveryFieldOfAStateTellsItFromAnother) {
+  const std::vector<std::function<void(DrawState&)>> changes{
+      [](DrawState& state) { state.early_termination = true; },
+      [](DrawState& state) { state.termination_threshold = 0.5F; },
+      [](DrawState& state) { state.termination_inclusive = false; },
+      [](DrawState& state) { state.pruning_threshold = 0; },
+      [](DrawState& state) { state.splat_extent = SplatExtent::three_sigma; },
+      [](DrawState& state) { state.obb_padding = 0; },
+  };
+  for (const auto& change : changes) {
+    DrawState changed;
+    change(changed);
+    EXPECT_TRUE(changed != DrawState{});
+    EXPECT_TRUE(changed == changed);
+  }
+}
+
+TEST(Frame, StatesThatBecomeEqualChangeNoMore) {
+  const auto geometry = geometry_of(1);
+  Frame frame(64, 48);
+  frame.draw(geometry, pruned_at(0.1F));
+  frame.clear({true, true});
+  frame.draw(geometry, pruned_at(0.2F));
+  frame.change_states([](DrawState& state) { state.pruning_threshold = 0.3F; });
+  EXPECT_EQ(changes_in(frame), (std::vector<bool>{false, false, false}));
+  EXPECT_EQ(frame.draw_call(1).state.pruning_threshold, 0.3F);
+}
+
+TEST(Frame, TerminatesEarlyIfAnyDrawDoes) {
+  const auto geometry = geometry_of(1);
+  DrawState terminates;
+  terminates.early_termination = true;
+  Frame frame(64, 48);
+  EXPECT_FALSE(frame.terminates_early());
+  frame.draw(geometry, {});
+  EXPECT_FALSE(frame.terminates_early());
+  frame.draw(geometry, terminates);
+  frame.draw(geometry, {});
+  EXPECT_TRUE(frame.terminates_early());
+}
+
+TEST(Frame, AMarkOfAClearGivesItAndNoOtherDoes) {
+  const auto geometry = geometry_of(1);
+  Frame frame(64, 48);
+  frame.draw(geometry, {});
+  frame.clear({true, false});
+  frame.draw(geometry, pruned_at(0.5F));
+  frame.clear({false, true});
+  EXPECT_EQ(frame.clear_of(Mark::none), nullptr);
+  EXPECT_EQ(frame.clear_of(Mark::end_of_frame), nullptr);
+  EXPECT_EQ(frame.clear_of(Frame::mark_of(0)), nullptr);
+  EXPECT_EQ(frame.clear_of(Frame::mark_of(2)), nullptr);
+  ASSERT_NE(frame.clear_of(Frame::mark_of(1)), nullptr);
+  EXPECT_TRUE(frame.clear_of(Frame::mark_of(1))->color);
+  EXPECT_FALSE(frame.clear_of(Frame::mark_of(1))->termination);
+  ASSERT_NE(frame.clear_of(Frame::mark_of(3)), nullptr);
+  EXPECT_TRUE(frame.clear_of(Frame::mark_of(3))->termination);
+}
+
+TEST(Frame, ASideIs1To16384) {
+  for (const std::uint32_t side : {0U, 16385U, ~0U}) {
+    EXPECT_NE(refusal_of([&] { Frame(side, 1); }).find("unusable size"), std::string::npos) << side;
+    EXPECT_NE(refusal_of([&] { Frame(1, side); }).find("unusable size"), std::string::npos) << side;
+  }
+  EXPECT_EQ(Frame(16384, 1).width(), 16384U);
+}
+
+TEST(Frame, ADrawOfAnotherSizeIsRefusedByName) {
+  Frame frame(64, 48);
+  for (const auto& other : {geometry_of(1, 63, 48), geometry_of(1, 64, 49)}) {
+    const std::string refusal = refusal_of([&] { frame.draw(other, {}, "roof"); });
+    EXPECT_NE(refusal.find("cannot draw 'roof'"), std::string::npos) << refusal;
+    EXPECT_NE(refusal.find("the frame has 64x48"), std::string::npos) << refusal;
+  }
+}
+
+TEST(Frame, TrianglesThatAreNotAsManyAsSplatsAreRefused) {
+  auto geometry = std::make_shared<Draw>(testing::draw_of(64, 48, std::vector<Splat>(4)));
+  geometry->triangles.resize(3);
+  Frame frame(64, 48);
+  EXPECT_NE(refusal_of([&] { frame.draw(geometry, {}); }).find("3 triangles for 4 splats"), std::string::npos);
+}
+
+TEST(Frame, SplatsThatAreNotThereAreRefused) {
+  const auto geometry = geometry_of(20);
+  const std::pair<std::uint32_t, std::uint32_t> wrong[] = {{0, 21},   {20, 1},      {21, 0},
+                                                           {21, ~0U}, {5, ~0U - 1}, {~0U, 1}};
+  for (const auto& [first, splats] : wrong) {
+    Frame frame(64, 48);
+    EXPECT_NE(refusal_of([&] { frame.draw(geometry, {}, "", first, splats); }).find("draw what is there"),
+              std::string::npos)
+        << first << " " << splats;
+    EXPECT_TRUE(frame.commands().empty() && frame.draws().empty() && frame.splats() == 0) << "it is left as it was";
+  }
+  Frame frame(64, 48);
+  frame.draw(geometry, {}, "", 20);
+  EXPECT_EQ(frame.draw_call(0).splats, 0U) << "behind the last is nothing, and that is there";
+}
+
+TEST(Frame, Has32767DrawsAtMost) {
+  const auto geometry = geometry_of(1);
+  Frame frame(64, 48);
+  for (unsigned i = 0; i < 32767; ++i) frame.draw(geometry, {});
+  EXPECT_NE(refusal_of([&] { frame.draw(geometry, {}); }).find("32767 draws at most"), std::string::npos);
+  EXPECT_EQ(frame.draws().size(), 32767U);
+  Quad quad{};
+  quad.draw = static_cast<std::uint16_t>(frame.draws().size() - 1) & 0x7fffU;
+  EXPECT_EQ(quad.draw, 32766) << "a quad can say it";
+}
+
+TEST(Frame, Has65534CommandsAtMostAndEachAMarkOfItsOwn) {
+  Frame frame(64, 48);
+  for (unsigned i = 0; i < 65534; ++i) frame.clear({false, true});
+  EXPECT_NE(refusal_of([&] { frame.clear({true, true}); }).find("65534 commands"), std::string::npos);
+  EXPECT_NE(refusal_of([&] { frame.draw(geometry_of(1), {}); }).find("65534 commands"), std::string::npos);
+  EXPECT_EQ(frame.commands().size(), 65534U);
+  EXPECT_TRUE(frame.draws().empty());
+  EXPECT_EQ(frame.splats(), 0U);
+  EXPECT_NE(Frame::mark_of(0), Mark::none);
+  EXPECT_NE(Frame::mark_of(65533), Mark::end_of_frame);
+}
+
+TEST(Frame, HasTwoToThe31SplatsAtMost) {
+  const auto geometry = geometry_of(1U << 17U);
+  Frame frame(64, 48);
+  for (unsigned i = 0; i < 1U << 14U; ++i) frame.draw(geometry, {});
+  EXPECT_EQ(frame.splats(), 1U << 31U);
+  EXPECT_NE(refusal_of([&] { frame.draw(geometry, {}, "", 0, 1); }).find("2^31 splats"), std::string::npos);
+  frame.draw(geometry, {}, "", 0, 0);
+}
+
+TEST(Frame, OfADrawIsThatDrawAlone) {
+  const Draw draw = testing::draw_of(64, 48, std::vector<Splat>(3));
+  const auto frame = Frame::of(draw, pruned_at(0.5F));
+  EXPECT_EQ(frame->width(), 64U);
+  EXPECT_EQ(frame->height(), 48U);
+  ASSERT_EQ(frame->commands().size(), 1U);
+  EXPECT_EQ(frame->draw_call(0).splats, 3U);
+  EXPECT_EQ(frame->draw_call(0).state.pruning_threshold, 0.5F);
+  EXPECT_EQ(&frame->draw_call(0).splat(1), &draw.splats[1]);
+}
+
+}  // namespace
+}  // namespace vrpipe
