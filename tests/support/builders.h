@@ -50,6 +50,22 @@ inline RenderContext context_of(const Draw& draw, const DrawState& state = {}) {
   return context;
 }
 
+inline RenderContext context_of(const Frame& frame) {
+  RenderContext context;
+  context.frame = std::make_shared<Frame>(frame);
+  return context;
+}
+/// A draw that a frame can keep.
+inline std::shared_ptr<const Draw> geometry_of(std::uint32_t width, std::uint32_t height,
+                                               std::vector<Splat> splats = {}) {
+  return std::make_shared<Draw>(draw_of(width, height, std::move(splats)));
+}
+inline DrawState pruned_at(float threshold) {
+  DrawState state;
+  state.pruning_threshold = threshold;
+  return state;
+}
+
 /// Gives the context a frame whose draws have another state.
 inline void change_state(RenderContext& context, const std::function<void(DrawState&)>& change) {
   auto changed = std::make_shared<Frame>(*context.frame);
