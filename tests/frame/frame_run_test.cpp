@@ -18,7 +18,6 @@
 namespace vrpipe {
 namespace {
 
-using testing::context_of;
 using testing::request_of;
 using testing::same_image;
 using testing::strictly;
@@ -149,39 +148,9 @@ TEST_P(EveryFidelity, DrawsWithAllClearedBetweenThemAreTwoRuns) {
   }
 }
 
-/// Every pixel of a frame as order alone makes it, of a target that does not round: bit for bit what CROP stores.
-std::vector<std::array<float, 4>> pixels_in_order(const Frame& frame, bool terminates) {
-  std::vector<std::array<float, 4>> pixels(std::size_t{frame.width()} * frame.height());
-  std::vector<bool> terminated(pixels.size());
-  for (const Frame::Command& command : frame.commands()) {
-    if (!command.is_draw) {
-      if (command.clear.color) pixels.assign(pixels.size(), {});
-      if (command.clear.termination) terminated.assign(pixels.size(), false);
-      continue;
-    }
-    const DrawCall& call = frame.draw_call(command.draw);
-    Draw part = *call.geometry;
-    part.splats.assign(part.splats.begin() + call.first, part.splats.begin() + call.first + call.splats);
-    const auto fragments = testing::fragments_of(context_of(part, call.state));
-    const float threshold = call.state.termination_threshold;
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      for (const testing::OracleFragment& fragment : fragments[i]) {
-        if (terminates && call.state.early_termination && terminated[i]) continue;
-        const float before = pixels[i][3];
-        const float transmittance = 1.0F - before;
-        for (unsigned channel = 0; channel < 3; ++channel)
-          pixels[i][channel] += transmittance * fragment.color[channel];
-        pixels[i][3] += transmittance * fragment.alpha;
-        if (call.state.early_termination && before < threshold && pixels[i][3] >= threshold) terminated[i] = true;
-      }
-    }
-  }
-  return pixels;
-}
-
 void expect_in_order(const RunRequest& request, const Frame& frame) {
   const RunResult result = run(request, frame);
-  const auto expected = pixels_in_order(frame, request.variant.early_termination);
+  const auto expected = testing::pixels_in_order(frame, request.variant.early_termination);
   std::size_t wrong = 0;
   for (std::size_t i = 0; i < expected.size(); ++i) {
     const auto got = result.framebuffer.color.pixel(static_cast<std::uint32_t>(i % frame.width()),

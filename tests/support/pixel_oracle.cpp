@@ -6,6 +6,8 @@
 #include <vrpipe/registry.h>
 #include <vrpipe/units.h>
 
+#include "builders.h"
+
 namespace vrpipe::testing {
 
 namespace {
@@ -98,6 +100,39 @@ OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const Re
     ++pixel.fragments;
   }
   return pixel;
+}
+
+std::vector<std::array<float, 4>> pixels_in_order(const Frame& frame, bool terminates) {
+  std::vector<std::array<float, 4>> pixels(std::size_t{frame.width()} * frame.height());
+  std::vector<bool> terminated(pixels.size());
+  for (const Frame::Command& command : frame.commands()) {
+    if (!command.is_draw) {
+      if (command.clear.color) pixels.assign(pixels.size(), {});
+      if (command.clear.termination) terminated.assign(pixels.size(), false);
+      continue;
+    }
+    const DrawCall& call = frame.draw_call(command.draw);
+    Draw part = *call.geometry;
+    part.splats.assign(part.splats.begin() + call.first, part.splats.begin() + call.first + call.splats);
+    const auto fragments = fragments_of(context_of(part, call.state));
+    const bool terminates_here = terminates && call.state.early_termination;
+    const auto passes = [&](float alpha) {
+      const float threshold = call.state.termination_threshold;
+      return call.state.termination_inclusive ? alpha >= threshold : alpha > threshold;
+    };
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      for (const OracleFragment& fragment : fragments[i]) {
+        if (terminates_here && terminated[i]) continue;
+        const float before = pixels[i][3];
+        const float transmittance = 1.0F - before;
+        for (unsigned channel = 0; channel < 3; ++channel)
+          pixels[i][channel] += transmittance * fragment.color[channel];
+        pixels[i][3] += transmittance * fragment.alpha;
+        if (terminates_here && !passes(before) && passes(pixels[i][3])) terminated[i] = true;
+      }
+    }
+  }
+  return pixels;
 }
 
 float largest_color(const Draw& draw) {

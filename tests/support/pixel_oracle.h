@@ -30,6 +30,10 @@ std::vector<std::vector<OracleFragment>> fragments_of(const RenderContext& conte
 /// to the format of `state` after a fragment or after a merged pair.
 OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const RenderContext& context);
 
+/// Every pixel of a frame as order alone makes it, of a target that does not round: bit for bit what CROP stores if
+/// nothing is merged.
+std::vector<std::array<float, 4>> pixels_in_order(const Frame& frame, bool terminates);
+
 /// The largest colour, not premultiplied, of a draw.
 float largest_color(const Draw& draw);
 

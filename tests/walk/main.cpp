@@ -46,6 +46,12 @@ Case shrunk(Case c, const std::string& rule, const Limits& limits) {
   if (c.platform != &platforms().front()) without([](Case& x) { x.platform = &platforms().front(); });
   if (c.format != ColorFormat::rgba16f) without([](Case& x) { x.format = ColorFormat::rgba16f; });
   if (c.termination != Termination::paper) without([](Case& x) { x.termination = Termination::paper; });
+  for (std::size_t i = c.parts.size(); i-- > 0;) {
+    without([&](Case& x) { x.parts[i].own.clear(); });
+    without([&](Case& x) { x.parts[i].terminates_early = true; });
+    without([&](Case& x) { x.parts[i].clear = {}; });
+    without([&](Case& x) { x.parts.erase(x.parts.begin() + static_cast<std::ptrdiff_t>(i)); });
+  }
   for (std::size_t part = c.draw.splats.size() / 2; part > 0; part /= 2) {
     for (std::size_t first = 0; first + part <= c.draw.splats.size();) {
       const auto begin = static_cast<std::ptrdiff_t>(first);
@@ -73,6 +79,9 @@ void print(const Case& c, const std::vector<Finding>& findings) {
   fmt::print("  {}\n", describe(c));
   for (const Finding& finding : findings) fmt::print("  {}: {}\n", finding.rule, finding.detail);
   const Fidelity fidelity = findings.empty() ? Fidelity::cycle : fidelity_in(findings.front().detail);
+  if (!c.parts.empty()) {
+    fmt::print("  --seed {} --only {} says all of it; a command line, but for the draws:\n", c.seed, c.index);
+  }
   fmt::print("  {}\n", command_line(c, fidelity, scene));
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <optional>
 
@@ -10,6 +11,7 @@
 #include <vrpipe/error.h>
 
 #include "support/floating_point.h"
+#include "support/pixel_oracle.h"
 #include "support/simulate.h"
 
 namespace vrpipe::walk {
@@ -60,6 +62,43 @@ std::vector<Finding> broken_occupancies(const RunResult& result) {
   return findings;
 }
 
+using DrawCounts = std::map<std::string, std::uint64_t>;
+
+/// Of a draw alone in its frame, the frame's.
+DrawCounts counts_of_draw(const RunResult& result, std::size_t draw) {
+  const auto named = result.draws.empty() ? result.counts.named() : result.draws[draw].counts;
+  return {named.begin(), named.end()};
+}
+
+/// What is counted by draw against what is counted in all.
+std::vector<Finding> broken_draws(const RunResult& result) {
+  std::vector<Finding> findings;
+  DrawCounts sum;
+  for (const DrawReport& draw : result.draws) {
+    DrawCounts n(draw.counts.begin(), draw.counts.end());
+    for (const auto& [name, count] : n) sum[name] += count;
+    const auto conserved = [&](const char* what, std::uint64_t in, std::uint64_t out) {
+      if (in == out) return;
+      findings.push_back(
+          {"conservation in a draw", fmt::format("{}, {}: {} went in, {} came out", draw.name, what, in, out)});
+    };
+    conserved("quads rasterized", n["quads_rasterized"], n["quads_terminated"] + n["quads_shaded"]);
+    conserved("quads shaded", n["quads_shaded"],
+              n["quads_pruned"] + n["quads_merged"] + n["quads_dropped_late"] + n["quads_blended"]);
+    conserved("fragments rasterized", n["fragments_rasterized"], n["fragments_terminated"] + n["fragments_shaded"]);
+    // A merged quad's fragments are blended for its front's draw.
+    if (result.request.variant.quad_merging) continue;
+    conserved("fragments shaded", n["fragments_shaded"],
+              n["fragments_pruned"] + n["fragments_dropped_late"] + n["fragments_blended"]);
+  }
+  for (const auto& [name, count] : result.counts.named()) {
+    if (sum.count(name) != 0 && sum[name] != count) {
+      findings.push_back({"draws sum to the frame", fmt::format("{}: {} of {}", name, sum[name], count)});
+    }
+  }
+  return findings;
+}
+
 /// Sizes, rates and latencies of the machine left out: the draw's state decides the picture alone.
 Case on_another_machine(const Case& c) {
   Case other = c;
@@ -82,11 +121,17 @@ class Judge {
   }
 
   std::optional<RunResult> simulated(const std::string& stage, const RunRequest& request) {
+    if (case_.parts.empty()) return simulated(stage, request, nullptr);
+    const Frame frame = case_.frame();
+    return simulated(stage, request, &frame);
+  }
+  /// Without a frame, the scene as a single draw.
+  std::optional<RunResult> simulated(const std::string& stage, const RunRequest& request, const Frame* frame) {
     verdict_.stage(stage);
     fresh_simulation();
     try {
       const testing::TrapInvalid trap;
-      RunResult result = simulate(request, case_.draw);
+      RunResult result = frame == nullptr ? simulate(request, case_.draw) : simulate(request, *frame);
       for (const Finding& finding : broken_rules(result)) find(stage, finding);
       return result;
     } catch (const UserError& error) {
@@ -148,6 +193,9 @@ class Judge {
     }
     repetition();
     machine(*untimed);
+    split(*untimed);
+    beginnings(*untimed);
+    pixels(*untimed);
   }
 
   /// At cycle fidelity the order in which units tick must not matter either.
@@ -159,6 +207,44 @@ class Judge {
     const auto again = simulated(stage, request);
     if (!once || !again) return;
     for (const Finding& finding : broken_repetition(*once, *again)) find(stage, finding);
+  }
+
+  void split(const RunResult& untimed) {
+    if (case_.parts.empty() || !case_.is_mere_split()) return;
+    const auto whole = simulated("one draw", case_.request(Fidelity::functional), nullptr);
+    if (!whole) return;
+    for (const Finding& finding : broken_split(untimed, *whole)) find("functional", finding);
+  }
+
+  /// A target that does not round, without merging: every bit is known.
+  void pixels(const RunResult& untimed) {
+    const bool order_decides = !case_.variant.early_termination || case_.termination == Termination::strict;
+    if (case_.parts.empty() || case_.variant.quad_merging || !order_decides) return;
+    if (case_.format != ColorFormat::rgba32f) return;
+    for (const Setting& setting : case_.settings) {
+      for (const char* other : {"exponential", "blend_rounding", "subpixel_bits", "previous_alpha_check"}) {
+        if (setting.parameter == other) return;
+      }
+    }
+    verdict_.stage("pixels");
+    const auto expected = testing::pixels_in_order(case_.frame(), case_.variant.early_termination);
+    std::size_t wrong = 0;
+    for (std::uint32_t i = 0; i < expected.size(); ++i) {
+      const auto got = untimed.framebuffer.color.pixel(i % case_.draw.width, i / case_.draw.width);
+      wrong += std::memcmp(got.data(), expected[i].data(), sizeof got) != 0;
+    }
+    if (wrong > 0) find("pixels", {"every pixel is as order makes it", fmt::format("{} are not", wrong)});
+  }
+
+  void beginnings(const RunResult& untimed) {
+    for (std::size_t i = 0; i < case_.parts.size(); ++i) {
+      if (!case_.parts[i].clear.color || !case_.parts[i].clear.termination) continue;
+      const Frame frame = case_.frame(i);
+      const auto rest =
+          simulated("from part " + std::to_string(i) + " on", case_.request(Fidelity::functional), &frame);
+      if (!rest) return;
+      for (const Finding& finding : broken_beginning(untimed, i, *rest)) find("functional", finding);
+    }
   }
 
   void machine(const RunResult& untimed) {
@@ -233,8 +319,9 @@ std::vector<Finding> broken_rules(const RunResult& result) {
   for (const auto& [unit, share] : result.utilization) {
     if (!is_a_share(share)) findings.push_back({"utilization is a share", fmt::format("{} {}", unit, share)});
   }
-  const std::vector<Finding> occupancies = broken_occupancies(result);
-  findings.insert(findings.end(), occupancies.begin(), occupancies.end());
+  for (const auto& broken : {broken_occupancies(result), broken_draws(result)}) {
+    findings.insert(findings.end(), broken.begin(), broken.end());
+  }
   return findings;
 }
 
@@ -251,10 +338,46 @@ std::vector<Finding> broken_rules(const RunResult& untimed, const RunResult& tim
                           fmt::format("{} {}, untimed {}", name, got[i].second, expected[i].second)});
     }
   }
+  for (std::size_t draw = 0; strict && draw < untimed.draws.size(); ++draw) {
+    if (counts_of_draw(timed, draw) == counts_of_draw(untimed, draw)) continue;
+    findings.push_back({"strict counts are the same", "they are not in " + untimed.draws[draw].name});
+  }
   const Variant& variant = timed.request.variant;
   const bool order_decides = strict || (!variant.early_termination && !variant.quad_merging);
   if (order_decides && !same_image(untimed.framebuffer.color, timed.framebuffer.color)) {
     findings.push_back({"order alone decides the picture", "the image differs from the untimed one"});
+  }
+  return findings;
+}
+
+std::vector<Finding> broken_split(const RunResult& split, const RunResult& whole) {
+  std::vector<Finding> findings;
+  if (!same_image(split.framebuffer.color, whole.framebuffer.color)) {
+    findings.push_back({"a split changes nothing", "the images differ"});
+  }
+  const auto expected = whole.counts.named();
+  const auto got = split.counts.named();
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    if (got[i] == expected[i]) continue;
+    findings.push_back({"a split changes nothing",
+                        fmt::format("{} {}, of one draw {}", got[i].first, got[i].second, expected[i].second)});
+  }
+  return findings;
+}
+
+std::vector<Finding> broken_beginning(const RunResult& frame, std::size_t draw, const RunResult& rest) {
+  std::vector<Finding> findings;
+  if (!same_image(frame.framebuffer.color, rest.framebuffer.color)) {
+    findings.push_back({"what is cleared is gone", "the images differ"});
+  }
+  const std::size_t draws = std::max<std::size_t>(rest.draws.size(), 1);
+  for (std::size_t i = 0; i < draws; ++i) {
+    const DrawCounts expected = counts_of_draw(rest, i);
+    for (const auto& [name, count] : counts_of_draw(frame, draw + i)) {
+      if (expected.at(name) == count) continue;
+      findings.push_back({"what is cleared is gone", fmt::format("draw {}: {} {}, without what was before {}", draw + i,
+                                                                 name, count, expected.at(name))});
+    }
   }
   return findings;
 }
@@ -275,10 +398,16 @@ std::vector<Finding> broken_repetition(const RunResult& once, const RunResult& a
     }
     return true;
   };
+  const auto draws_equal = [&] {
+    for (std::size_t i = 0; i < once.draws.size() && i < again.draws.size(); ++i) {
+      if (once.draws[i].counts != again.draws[i].counts) return false;
+    }
+    return once.draws.size() == again.draws.size();
+  };
   const bool equal = once.result_hash == again.result_hash && once.cycles == again.cycles &&
                      once.counts.named() == again.counts.named() &&
                      same_image(once.framebuffer.color, again.framebuffer.color) &&
-                     once.utilization == again.utilization && units_equal() && statistics_equal();
+                     once.utilization == again.utilization && units_equal() && statistics_equal() && draws_equal();
   if (equal) return {};
   return {{"equal requests, equal results", once.result_hash + " and " + again.result_hash}};
 }

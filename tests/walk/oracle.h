@@ -28,6 +28,12 @@ std::vector<Finding> broken_rules(const RunResult& result);
 /// The rules between two results of one case: `timed` at any fidelity, `untimed` at functional.
 std::vector<Finding> broken_rules(const RunResult& untimed, const RunResult& timed);
 
+/// The rules between two runs without time: of a frame that splits a draw, and of that draw.
+std::vector<Finding> broken_split(const RunResult& split, const RunResult& whole);
+
+/// The rules between two runs without time: of a frame in which all is cleared before a draw, and from that draw on.
+std::vector<Finding> broken_beginning(const RunResult& frame, std::size_t draw, const RunResult& rest);
+
 /// The rules between two runs of the same request.
 std::vector<Finding> broken_repetition(const RunResult& once, const RunResult& again);
 

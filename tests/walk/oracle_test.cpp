@@ -103,5 +103,67 @@ TEST_F(Oracle, SeesARepetitionThatDiffersInOneStatistic) {
               "equal requests, equal results");
 }
 
+/// Two draws, the second behind a clear of all.
+class OracleOfFrames : public Oracle {
+ protected:
+  static void SetUpTestSuite() {
+    const auto draw = std::make_shared<Draw>(testing::random_draw(48, 40, 200, 7));
+    const RunRequest request = testing::request_of("het", Fidelity::functional, testing::strictly);
+    Frame frame(48, 40);
+    frame.draw(draw, draw_state_of(request), "first", 0, 100);
+    frame.clear({true, true});
+    frame.draw(draw, draw_state_of(request), "second", 100);
+    Frame second(48, 40);
+    second.draw(draw, draw_state_of(request), "second", 100);
+    fresh_simulation();
+    result = std::make_unique<RunResult>(simulate(request, frame));
+    fresh_simulation();
+    rest = std::make_unique<RunResult>(simulate(request, second));
+  }
+  static void TearDownTestSuite() {
+    result.reset();
+    rest.reset();
+  }
+  /// Changes a count of the second draw.
+  RunResult miscounted(const std::string& name) const {
+    return changed([&](RunResult& r) {
+      for (auto& [each, count] : r.draws[1].counts) count += each == name ? 1 : 0;
+    });
+  }
+  static std::unique_ptr<RunResult> rest;
+};
+std::unique_ptr<RunResult> OracleOfFrames::rest;
+
+TEST_F(OracleOfFrames, HasNothingAgainstARightFrame) {
+  EXPECT_TRUE(broken_rules(*result).empty());
+  EXPECT_TRUE(broken_rules(*result, *result).empty());
+  EXPECT_TRUE(broken_repetition(*result, *result).empty());
+  EXPECT_TRUE(broken_beginning(*result, 1, *rest).empty());
+  EXPECT_TRUE(broken_split(*result, *result).empty());
+}
+
+TEST_F(OracleOfFrames, SeesDrawsThatDoNotSumToTheFrameAndADrawThatLosesAQuad) {
+  expect_rule(broken_rules(miscounted("primitives")), "draws sum to the frame");
+  expect_rule(broken_rules(miscounted("quads_shaded")), "conservation in a draw");
+  expect_rule(broken_rules(miscounted("fragments_blended")), "conservation in a draw");
+}
+
+TEST_F(OracleOfFrames, SeesADrawThatTimeCountsOtherwise) {
+  expect_rule(broken_rules(*result, miscounted("quads_shaded")), "strict counts are the same");
+  expect_rule(broken_repetition(*result, miscounted("quads_shaded")), "equal requests, equal results");
+}
+
+TEST_F(OracleOfFrames, SeesWhatAClearLeaves) {
+  expect_rule(broken_beginning(miscounted("quads_terminated"), 1, *rest), "what is cleared is gone");
+  const RunResult other =
+      changed([](RunResult& r) { r.framebuffer.color = ColorSurface(48, 40, ColorFormat::rgba16f); });
+  expect_rule(broken_beginning(other, 1, *rest), "what is cleared is gone");
+}
+
+TEST_F(OracleOfFrames, SeesASplitThatChangesACountOrThePicture) {
+  expect_rule(broken_split(*result, changed([](RunResult& r) { ++r.counts.warps; })), "a split changes nothing");
+  expect_rule(broken_split(*result, *rest), "a split changes nothing");
+}
+
 }  // namespace
 }  // namespace vrpipe::walk

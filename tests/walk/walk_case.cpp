@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <limits>
 #include <map>
+#include <memory>
 
 #include <fmt/format.h>
 
@@ -243,6 +244,35 @@ std::vector<Setting> draw_settings(Dice& dice, const Platform& platform, bool& r
   return settings;
 }
 
+// Frames.
+
+Setting draw_own_setting(Dice& dice) {
+  switch (dice.below(3)) {
+    case 0: return {"state", "pruning_threshold", text_of(dice.chance(30) ? 0.0 : dice.real(0.0, 0.3))};
+    case 1: return {"state", "termination_threshold", text_of(dice.real(0.3, 1.0))};
+    default: return {"state", "splat_extent", dice.chance(50) ? "aabb" : "three_sigma"};
+  }
+}
+
+std::vector<Part> draw_parts(Dice& dice, std::size_t splats) {
+  std::vector<Part> parts;
+  if (!dice.chance(45)) return parts;
+  const bool differ = dice.chance(60);
+  const bool clears = dice.chance(40);
+  const unsigned count = 2 + dice.below(4);
+  std::vector<std::uint32_t> cuts{0};
+  for (unsigned i = 1; i < count; ++i) cuts.push_back(dice.below(splats + 1));
+  std::sort(cuts.begin(), cuts.end());
+  for (const std::uint32_t first : cuts) {
+    Part& part = parts.emplace_back();
+    part.first = first;
+    if (differ && dice.chance(50)) part.own.push_back(draw_own_setting(dice));
+    if (differ) part.terminates_early = !dice.chance(20);
+    if (clears && dice.chance(60)) part.clear = {dice.chance(60), dice.chance(60)};
+  }
+  return parts;
+}
+
 const char* word_for(Termination termination) { return termination == Termination::strict ? "strict" : "paper"; }
 
 }  // namespace
@@ -257,6 +287,29 @@ RunRequest Case::request(Fidelity fidelity) const {
   r.settings = settings;
   r.units = units;
   return r;
+}
+
+Frame Case::frame(std::size_t from) const {
+  Frame frame(draw.width, draw.height);
+  const std::shared_ptr<const Draw> scene(&draw, [](const Draw*) {});
+  if (parts.empty()) frame.draw(scene, draw_state_of(request(Fidelity::functional)));
+  const auto splats = static_cast<std::uint32_t>(draw.splats.size());
+  for (std::size_t i = from; i < parts.size(); ++i) {
+    const Part& part = parts[i];
+    if (part.clear.color || part.clear.termination) frame.clear(part.clear);
+    DrawState state = draw_state_of(request(Fidelity::functional), part.own);
+    state.early_termination = part.terminates_early;
+    const std::uint32_t first = i == 0 ? 0 : std::min(part.first, splats);
+    const std::uint32_t end = i + 1 < parts.size() ? std::min(parts[i + 1].first, splats) : splats;
+    frame.draw(scene, state, fmt::format("part {}", i), first, end - first);
+  }
+  return frame;
+}
+
+bool Case::is_mere_split() const {
+  return std::all_of(parts.begin(), parts.end(), [](const Part& part) {
+    return part.own.empty() && part.terminates_early && !part.clear.color && !part.clear.termination;
+  });
 }
 
 Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
@@ -280,6 +333,7 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   c.stalled = dice.one_of(timed);
   c.stall_seed = dice.next() | 1U;
   c.draw = draw_scene(dice, real);
+  c.parts = draw_parts(dice, c.draw.splats.size());
   return c;
 }
 
@@ -289,6 +343,14 @@ std::string describe(const Case& c) {
   for (const UnitChoice& unit : c.units) text += fmt::format(" {}={}", unit.slot, unit.implementation);
   for (const Setting& setting : c.settings) {
     text += fmt::format(" {}.{}={}", setting.unit, setting.parameter, setting.value);
+  }
+  for (const Part& part : c.parts) {
+    if (part.clear.color || part.clear.termination) {
+      text += fmt::format("\n    clear{}{}", part.clear.color ? " color" : "",
+                          part.clear.termination ? " termination" : "");
+    }
+    text += fmt::format("\n    draw from splat {} on{}", part.first, part.terminates_early ? "" : ", not terminated");
+    for (const Setting& setting : part.own) text += fmt::format(", {}={}", setting.parameter, setting.value);
   }
   return text;
 }

@@ -4,9 +4,18 @@
 #include <string>
 #include <vector>
 
+#include <vrpipe/frame.h>
 #include <vrpipe/platforms/simulation.h>
 
 namespace vrpipe::walk {
+
+/// A draw of a frame: splats of the scene up to the next part's, and what comes before them.
+struct Part {
+  std::uint32_t first = 0;       ///< splat of the scene, perhaps beyond its last; 0 in the first part
+  std::vector<Setting> own;      ///< of unit `state`, beyond those of the case
+  bool terminates_early = true;  ///< where the variant does
+  Clear clear;                   ///< before it
+};
 
 /// One configuration and one scene of the random walk.
 struct Case {
@@ -20,6 +29,7 @@ struct Case {
   std::vector<UnitChoice> units;
   bool refused = false;  ///< the last setting lies outside its declared range
   Draw draw;
+  std::vector<Part> parts;  ///< the scene in several draws; none for a single one
 
   /// What is run twice, and once with stalls.
   Fidelity repeated = Fidelity::cycle;
@@ -27,13 +37,17 @@ struct Case {
   std::uint64_t stall_seed = 1;
 
   RunRequest request(Fidelity fidelity) const;
+  /// The draws from a part on, which refer to the case's scene.
+  Frame frame(std::size_t from = 0) const;
+  /// Whether a single draw says the same.
+  bool is_mere_split() const;
 };
 
 /// The case of a seed and an index: always the same, whichever were drawn before. `real` is a large draw of a trained
 /// scene, windows of which are among the scenes.
 Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real);
 
-/// The case in words, and as a `vrpipe run` of the draw list `scene`.
+/// The case in words, and as a `vrpipe run` of the draw list `scene`, which knows nothing of parts.
 std::string describe(const Case& c);
 std::string command_line(const Case& c, Fidelity fidelity, const std::string& scene);
 
