@@ -1,6 +1,8 @@
 #include <vrpipe/checked_behaviours.h>
 
+#include <initializer_list>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -31,6 +33,24 @@ decltype(auto) call_foreign(const std::string& name, const char* what, Cycle cyc
 }
 
 std::string words_of(TileId tile) { return fmt::format("screen tile {},{}", tile.x, tile.y); }
+
+/// What a unit saw, by draw.
+class Seen {
+ public:
+  void add(DrawIndex draw, std::uint64_t amount) {
+    if (draw >= of_draw_.size()) of_draw_.resize(draw + std::size_t{1});
+    of_draw_[draw] += amount;
+    all_ += amount;
+  }
+  /// What came in, and came out after all.
+  void take_back(DrawIndex draw, std::uint64_t amount) { add(draw, ~amount + 1); }
+  std::uint64_t of(std::size_t draw) const { return draw < of_draw_.size() ? of_draw_[draw] : 0; }
+  std::uint64_t all() const { return all_; }
+
+ private:
+  std::vector<std::uint64_t> of_draw_;
+  std::uint64_t all_ = 0;
+};
 
 /// What the checked behaviours of all slots share.
 class Checks {
@@ -123,6 +143,22 @@ class Checks {
     if (counted == seen) return;
     throw SimulationFault(name_, cycle(), fmt::format("{} counts {}, but {} {}", counters, counted, seen, of));
   }
+  /// In all, and for each draw.
+  void check_by_draw(const char* names, std::initializer_list<const DrawCounter*> counters, const Seen& seen,
+                     const char* of) const {
+    std::uint64_t counted = 0;
+    for (const DrawCounter* counter : counters) counted += counter->value();
+    check_counter(names, counted, seen.all(), of);
+    for (std::size_t draw = 0; draw < (*counters.begin())->of_draw().size(); ++draw) {
+      counted = 0;
+      for (const DrawCounter* counter : counters) counted += counter->of_draw()[draw];
+      if (counted != seen.of(draw)) {
+        throw SimulationFault(name_, cycle(),
+                              fmt::format("{} counts {} for draw {}, but {} {}", names, counted, draw, seen.of(draw),
+                                          of));
+      }
+    }
+  }
   std::size_t tiles() const { return grid_.tiles(); }
   const Frame& frame() const { return frame_; }
 
@@ -157,16 +193,25 @@ class CheckedUnit;
 template <>
 class CheckedUnit<DrawBehaviour> final : public CheckedSlot<DrawBehaviour> {
  public:
-  using CheckedSlot::CheckedSlot;
+  CheckedUnit(std::string name, const RenderContext& context, std::unique_ptr<DrawBehaviour> checked)
+      : CheckedSlot(std::move(name), context, std::move(checked)) {
+    for (std::size_t command = 0; command < frame().commands().size(); ++command) {
+      if (frame().commands()[command].is_draw) command_of_draw_.push_back(command);
+    }
+  }
 
   bool next(VertexWarp& out) override {
-    if (!ask("next", [&] { return checked_->next(out); })) return false;
+    if (!ask("next", [&] { return checked_->next(out); })) {
+      pass(frame().commands().size());
+      return false;
+    }
     if (out.mark != Mark::none) {
-      if (out.mark <= last_mark_ || static_cast<std::size_t>(out.mark) > frame().commands().size()) {
-        fault("next", "a mark of command {}, after that of {} of {}", static_cast<unsigned>(out.mark),
-              static_cast<unsigned>(last_mark_), frame().commands().size());
+      const std::size_t command = static_cast<std::size_t>(out.mark) - 1;
+      if (command < passed_ || command >= frame().commands().size()) {
+        fault("next", "a mark of command {}, of which {} of {} have passed", command, passed_,
+              frame().commands().size());
       }
-      last_mark_ = out.mark;
+      pass(command);
       return true;
     }
     if (out.splats == 0 || out.splats > splats_per_vertex_warp) fault("next", "a warp of {} splats", out.splats);
@@ -177,6 +222,14 @@ class CheckedUnit<DrawBehaviour> final : public CheckedSlot<DrawBehaviour> {
     check_splat("next", out.draw, out.first_splat);
     check_splat("next", out.draw, static_cast<std::uint32_t>(end - 1));
     issued_ = out.first_splat + out.splats;
+    const std::size_t command = command_of_draw_[out.draw];
+    if (command + 1 < passed_) {
+      fault("next", "a warp of draw {}, command {}, behind the mark of command {}", out.draw, command, passed_ - 1);
+    }
+    if (command + 1 > passed_) {
+      if (needs_mark(command)) fault("next", "a warp of draw {} without the mark of command {}", out.draw, command);
+      pass(command);
+    }
     return true;
   }
   std::uint32_t warps_per_1024_cycles() const override {
@@ -188,8 +241,21 @@ class CheckedUnit<DrawBehaviour> final : public CheckedSlot<DrawBehaviour> {
   void check_counters() const override {}
 
  private:
+  bool needs_mark(std::size_t command) const {
+    const Frame::Command& of = frame().commands()[command];
+    return !of.is_draw || of.changes_state;
+  }
+  /// A command and those before it, whose marks have to have come.
+  void pass(std::size_t command) {
+    for (; passed_ < command; ++passed_) {
+      if (needs_mark(passed_)) fault("next", "no mark of command {}", passed_);
+    }
+    passed_ = command + 1;
+  }
+
   std::uint32_t issued_ = 0;  ///< up to this splat
-  Mark last_mark_ = Mark::none;
+  std::size_t passed_ = 0;    ///< commands
+  std::vector<std::size_t> command_of_draw_;
 };
 
 template <>
@@ -207,7 +273,7 @@ class CheckedUnit<VpoBehaviour> final : public CheckedSlot<VpoBehaviour> {
               draw);
       }
     }
-    assembled_ += count;
+    assembled_.add(draw, count);
     return count;
   }
   Throughput cost() const override {
@@ -216,12 +282,10 @@ class CheckedUnit<VpoBehaviour> final : public CheckedSlot<VpoBehaviour> {
     return cost;
   }
   void check_costs() const override { cost(); }
-  void check_counters() const override {
-    check_counter("primitives", checked_->primitives.value(), assembled_, "came out");
-  }
+  void check_counters() const override { check_by_draw("primitives", {&checked_->primitives}, assembled_, "came out"); }
 
  private:
-  std::uint64_t assembled_ = 0;
+  Seen assembled_;
 };
 
 template <>
@@ -317,9 +381,9 @@ class CheckedUnit<RasterBehaviour> final : public CheckedSlot<RasterBehaviour> {
         fault("next", "a quad of splat {}.{} for splat {}.{}", quad.splat, quad.triangle, primitive_.splat,
               primitive_.triangle);
       }
-      fragments_ += popcount(quad.coverage);
+      fragments_.add(primitive_.draw, popcount(quad.coverage));
     }
-    quads_ += out.count;
+    quads_.add(primitive_.draw, out.count);
     return true;
   }
   Cost cost() const override {
@@ -334,8 +398,8 @@ class CheckedUnit<RasterBehaviour> final : public CheckedSlot<RasterBehaviour> {
   }
   void check_costs() const override { cost(); }
   void check_counters() const override {
-    check_counter("quads_rasterized", checked_->quads_rasterized.value(), quads_, "quads came out");
-    check_counter("fragments_rasterized", checked_->fragments_rasterized.value(), fragments_, "fragments came out");
+    check_by_draw("quads_rasterized", {&checked_->quads_rasterized}, quads_, "quads came out");
+    check_by_draw("fragments_rasterized", {&checked_->fragments_rasterized}, fragments_, "fragments came out");
   }
 
  private:
@@ -343,8 +407,8 @@ class CheckedUnit<RasterBehaviour> final : public CheckedSlot<RasterBehaviour> {
 
   Primitive primitive_;
   std::uint64_t kept_ = 0;  ///< raster tiles of the primitive
-  std::uint64_t quads_ = 0;
-  std::uint64_t fragments_ = 0;
+  Seen quads_;
+  Seen fragments_;
 };
 
 template <>
@@ -427,19 +491,25 @@ class CheckedUnit<ZropBehaviour> final : public CheckedSlot<ZropBehaviour> {
     const TileId tile = beat.tile;
     const unsigned count = beat.count;
     const bool last_of_bin = beat.last_of_bin;
-    if (count > 0 && !frame().draws().empty() && frame().draw_call(beat.quads[0].draw).state.early_termination) {
-      tested_ += count;
+    const bool tests =
+        count > 0 && !frame().draws().empty() && frame().draw_call(beat.quads[0].draw).state.early_termination;
+    for (unsigned i = 0; i < count; ++i) {
+      const Quad& quad = beat.quads[i];
+      if (tests) tested_.add(quad.draw, 1);
+      lost_quads_.add(quad.draw, 1);
+      lost_fragments_.add(quad.draw, popcount(quad.coverage));
     }
-    lost_quads_ += count;
-    lost_fragments_ += fragments_of(beat);
     ask("test", [&] { checked_->test(beat); });
     if (beat.count > count) fault("test", "{} quads of {} in {} passed", beat.count, count, words_of(tile));
     if (beat.tile != tile || beat.last_of_bin != last_of_bin || beat.mark != Mark::none) {
       fault("test", "a beat of {} with a tile or marks that are not its own", words_of(tile));
     }
     check_quads("test", tile, beat.quads.data(), beat.count);
-    lost_quads_ -= beat.count;
-    lost_fragments_ -= fragments_of(beat);
+    for (unsigned i = 0; i < beat.count; ++i) {
+      const Quad& quad = beat.quads[i];
+      lost_quads_.take_back(quad.draw, 1);
+      lost_fragments_.take_back(quad.draw, popcount(quad.coverage));
+    }
   }
   void attach(DepthStencilSurface& surface) override {
     ZropBehaviour::attach(surface);
@@ -464,26 +534,20 @@ class CheckedUnit<ZropBehaviour> final : public CheckedSlot<ZropBehaviour> {
   }
   void check_costs() const override { cost(); }
   void check_counters() const override {
-    check_counter("quads_tested", checked_->quads_tested.value(), tested_, "quads came in");
-    check_counter("quads_terminated + quads_depth_stencil_failed",
-                  checked_->quads_terminated.value() + checked_->quads_depth_stencil_failed.value(), lost_quads_,
+    check_by_draw("quads_tested", {&checked_->quads_tested}, tested_, "quads came in");
+    check_by_draw("quads_terminated + quads_depth_stencil_failed",
+                  {&checked_->quads_terminated, &checked_->quads_depth_stencil_failed}, lost_quads_,
                   "quads did not come out");
-    check_counter("fragments_terminated + fragments_depth_stencil_failed",
-                  checked_->fragments_terminated.value() + checked_->fragments_depth_stencil_failed.value(),
-                  lost_fragments_, "fragments did not come out");
+    check_by_draw("fragments_terminated + fragments_depth_stencil_failed",
+                  {&checked_->fragments_terminated, &checked_->fragments_depth_stencil_failed}, lost_fragments_,
+                  "fragments did not come out");
     check_counter("termination_updates", checked_->termination_updates.value(), updates_, "signals came in");
   }
 
  private:
-  static std::uint64_t fragments_of(const QuadBeat& beat) {
-    std::uint64_t fragments = 0;
-    for (unsigned i = 0; i < beat.count; ++i) fragments += popcount(beat.quads[i].coverage);
-    return fragments;
-  }
-
-  std::uint64_t tested_ = 0;
-  std::uint64_t lost_quads_ = 0;
-  std::uint64_t lost_fragments_ = 0;
+  Seen tested_;
+  Seen lost_quads_;
+  Seen lost_fragments_;
   std::uint64_t updates_ = 0;
 };
 
@@ -562,12 +626,13 @@ class CheckedUnit<SmBehaviour> final : public CheckedSlot<SmBehaviour> {
       fault("shade", "a warp of {} with a tile, numbers or a mark that are not its own", words_of(warp.tile));
     }
     ++warps_;
-    shaded_ += warp.count;
-    lost_quads_ += warp.count;
-    std::uint64_t fragments = 0;
-    for (unsigned i = 0; i < warp.count; ++i) fragments += popcount(warp.quads[i].coverage);
-    shaded_fragments_ += fragments;
-    lost_fragments_ += fragments;
+    for (unsigned i = 0; i < warp.count; ++i) {
+      const Quad& quad = warp.quads[i];
+      shaded_.add(quad.draw, 1);
+      shaded_fragments_.add(quad.draw, popcount(quad.coverage));
+      lost_quads_.add(quad.draw, 1);
+      lost_fragments_ += popcount(quad.coverage);
+    }
     for (unsigned i = 0; i < out.count; ++i) {
       if (out.position[i] >= positions_per_tile || out.live[i] == 0 || out.live[i] > 0xf) {
         fault("shade", "quad {} of a warp of {}: position {} and live samples {}", i, words_of(warp.tile),
@@ -575,8 +640,8 @@ class CheckedUnit<SmBehaviour> final : public CheckedSlot<SmBehaviour> {
       }
       lost_fragments_ -= popcount(out.live[i]);
       if (frame().splats() > 0) check_splat("shade", out.draw[i], out.first_primitive[i] / 2);
+      lost_quads_.take_back(out.draw[i], 1);
     }
-    lost_quads_ -= out.count;
   }
   void shade_vertices(const VertexWarp& warp) override {
     ask("shade_vertices", [&] { checked_->shade_vertices(warp); });
@@ -605,10 +670,10 @@ class CheckedUnit<SmBehaviour> final : public CheckedSlot<SmBehaviour> {
   void check_costs() const override { cost(); }
   void check_counters() const override {
     check_counter("fragment_warps", checked_->fragment_warps.value(), warps_, "warps came in");
-    check_counter("quads_shaded", checked_->quads_shaded.value(), shaded_, "quads came in");
-    check_counter("fragments_shaded", checked_->fragments_shaded.value(), shaded_fragments_, "fragments came in");
-    check_counter("quads_pruned + quads_merged", checked_->quads_pruned.value() + checked_->quads_merged.value(),
-                  lost_quads_, "quads did not come out");
+    check_by_draw("quads_shaded", {&checked_->quads_shaded}, shaded_, "quads came in");
+    check_by_draw("fragments_shaded", {&checked_->fragments_shaded}, shaded_fragments_, "fragments came in");
+    check_by_draw("quads_pruned + quads_merged", {&checked_->quads_pruned, &checked_->quads_merged}, lost_quads_,
+                  "quads did not come out");
     check_counter("fragments_pruned + fragments_merged",
                   checked_->fragments_pruned.value() + checked_->fragments_merged.value(), lost_fragments_,
                   "fragments did not come out");
@@ -616,10 +681,10 @@ class CheckedUnit<SmBehaviour> final : public CheckedSlot<SmBehaviour> {
 
  private:
   std::uint64_t warps_ = 0;
-  std::uint64_t shaded_ = 0;
-  std::uint64_t shaded_fragments_ = 0;
-  std::uint64_t lost_quads_ = 0;
-  std::uint64_t lost_fragments_ = 0;
+  Seen shaded_;
+  Seen shaded_fragments_;
+  Seen lost_quads_;
+  std::uint64_t lost_fragments_ = 0;  ///< a merged quad has fragments of two draws
 };
 
 template <>
@@ -685,15 +750,13 @@ class CheckedUnit<CropBehaviour> final : public CheckedSlot<CropBehaviour> {
   }
   void check_costs() const override { cost(); }
   void check_counters() const override {
-    check_counter("quads_blended + quads_dropped_late + quads_late_failed",
-                  checked_->quads_blended.value() + checked_->quads_dropped_late.value() +
-                      checked_->quads_late_failed.value(),
-                  quads_, "quads came in");
-    check_counter("fragments_blended + fragments_dropped_late + fragments_late_failed",
-                  checked_->fragments_blended.value() + checked_->fragments_dropped_late.value() +
-                      checked_->fragments_late_failed.value(),
+    check_by_draw("quads_blended + quads_dropped_late + quads_late_failed",
+                  {&checked_->quads_blended, &checked_->quads_dropped_late, &checked_->quads_late_failed}, quads_,
+                  "quads came in");
+    check_by_draw("fragments_blended + fragments_dropped_late + fragments_late_failed",
+                  {&checked_->fragments_blended, &checked_->fragments_dropped_late, &checked_->fragments_late_failed},
                   fragments_, "fragments came in");
-    check_counter("termination_signals", checked_->termination_signals.value(), signalled_, "signals went out");
+    check_by_draw("termination_signals", {&checked_->termination_signals}, signalled_, "signals went out");
     if (line_accesses_ == 0) return;  // no cache, or one of the timing model's
     const SectoredCacheStatistics& cache = checked_->cache_statistics;
     check_counter("cache.line_accesses", cache.line_accesses.value(), line_accesses_, "quads needed a line");
@@ -713,10 +776,10 @@ class CheckedUnit<CropBehaviour> final : public CheckedSlot<CropBehaviour> {
 
  private:
   void take(DrawIndex draw, unsigned position, LaneMask live, const Outcome& outcome) {
-    ++quads_;
-    fragments_ += popcount(live);
+    quads_.add(draw, 1);
+    fragments_.add(draw, popcount(live));
     if (outcome.terminated == 0) return;
-    ++signalled_;
+    signalled_.add(draw, 1);
     if (!frame().draw_call(draw).state.early_termination)
       fault("blend", "position {} of a tile is signalled without early termination", position);
     if ((outcome.terminated & ~live) != 0) {
@@ -733,9 +796,9 @@ class CheckedUnit<CropBehaviour> final : public CheckedSlot<CropBehaviour> {
   std::uint64_t sector_accesses_ = 0;
   std::uint64_t sector_misses_ = 0;
   std::uint64_t written_back_ = 0;
-  std::uint64_t quads_ = 0;
-  std::uint64_t fragments_ = 0;
-  std::uint64_t signalled_ = 0;
+  Seen quads_;
+  Seen fragments_;
+  Seen signalled_;
 };
 
 template <class SlotBehaviour>

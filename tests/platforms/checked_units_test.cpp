@@ -1,5 +1,6 @@
 // Units that are not trusted: each breaks one rule of its slot, and the run ends in a fault that names it, at every
 // fidelity.
+#include <algorithm>
 #include <stdexcept>
 
 #include <vrpipe/error.h>
@@ -289,16 +290,20 @@ const AddCrop crop_null(
     }(),
     "make_behaviour makes nothing");
 
-std::string fault_of(const Case& broken, Fidelity fidelity, const Draw& draw) {
+std::string fault_of(const Case& broken, Fidelity fidelity, const Frame& frame) {
   const RunRequest request = request_of("het+qm", fidelity, [&](RunRequest& r) {
     r.units = {{broken.slot, broken.name}};
   });
+  fresh_simulation();
   try {
-    run(request, draw);
+    simulate(request, frame);
   } catch (const SimulationFault& fault) {
     return fault.what();
   }
   return "none";
+}
+std::string fault_of(const Case& broken, Fidelity fidelity, const Draw& draw) {
+  return fault_of(broken, fidelity, *Frame::of(draw, draw_state_of(request_of("het+qm"))));
 }
 
 TEST(CheckedUnits, ABrokenRuleIsAFaultThatNamesTheUnitAtEveryFidelity) {
@@ -319,6 +324,209 @@ TEST(CheckedUnits, AFaultNamesTheCycle) {
   EXPECT_NE(fault_of(late, Fidelity::functional, draw).find("at cycle 0:"), std::string::npos);
   for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     EXPECT_EQ(fault_of(late, fidelity, draw).find("at cycle 0:"), std::string::npos) << name_of(fidelity);
+  }
+}
+
+// In frames of several draws.
+
+/// DRAW whose marks go wrong; commands are told apart from 0 on.
+template <class Change>
+struct DrawOfOtherMarks : VertexIssue {
+  using VertexIssue::VertexIssue;
+  bool next(VertexWarp& out) override {
+    while (VertexIssue::next(out)) {
+      if (out.mark == Mark::none || Change()(out.mark)) return true;
+    }
+    return false;
+  }
+};
+struct WithoutTheFirst {
+  bool operator()(Mark& mark) const { return mark != Frame::mark_of(1); }
+};
+struct WithoutTheLast {
+  bool operator()(Mark& mark) const { return mark != Frame::mark_of(4); }
+};
+struct TheFirstAgain {
+  bool operator()(Mark& mark) const {
+    mark = Frame::mark_of(1);
+    return true;
+  }
+};
+struct BeyondTheFrame {
+  bool operator()(Mark& mark) const {
+    mark = Frame::mark_of(70);
+    return true;
+  }
+};
+/// Hands on each mark before the warp in front of it.
+struct DrawOfEarlyMarks : VertexIssue {
+  using VertexIssue::VertexIssue;
+  bool next(VertexWarp& out) override {
+    if (have_) {
+      have_ = false;
+      out = kept_;
+      return true;
+    }
+    if (!VertexIssue::next(out)) return false;
+    kept_ = out;
+    VertexWarp after;
+    if (out.mark != Mark::none || out.first_splat != 96 || !VertexIssue::next(after)) return true;
+    have_ = true;
+    out = after;
+    return true;
+  }
+  VertexWarp kept_;
+  bool have_ = false;
+};
+
+/// Brings counters to what others of the same names count, all for draw 0.
+void count_for_draw_0(StatisticSet& own, const StatisticSet& other) {
+  const auto of_name = [](const auto& counters, const std::string& name) {
+    return *std::find_if(counters.begin(), counters.end(), [&](const auto* each) { return name == each->name(); });
+  };
+  for (Counter* counter : own.counters()) {
+    const std::uint64_t more = of_name(other.counters(), counter->name())->value() - counter->value();
+    const auto& of_draws = own.draw_counters();
+    const auto found = std::find(of_draws.begin(), of_draws.end(), counter);
+    if (found != of_draws.end()) {
+      (*found)->add(0, more);
+    } else {
+      *counter += more;
+    }
+  }
+}
+/// Does as the shipped unit, and counts everything for draw 0.
+struct VpoForDraw0 : VpoBehaviour {
+  using Parameters = PrimitiveAssembly::Parameters;
+  VpoForDraw0(const Parameters& parameters, const RenderContext& context) : unit_(parameters, context) {}
+  unsigned assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) override {
+    const unsigned count = unit_.assemble(draw, splat, out);
+    count_for_draw_0(*this, unit_);
+    return count;
+  }
+  Throughput cost() const override { return unit_.cost(); }
+  PrimitiveAssembly unit_;
+};
+struct RasterForDraw0 : RasterBehaviour {
+  using Parameters = TileRasterizer::Parameters;
+  RasterForDraw0(const Parameters& parameters, const RenderContext& context) : unit_(parameters, context) {}
+  void begin(const Primitive& primitive, const PixelRect& clip) override { unit_.begin(primitive, clip); }
+  bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override {
+    const bool more = unit_.next(out, coarse_tests, new_screen_tile);
+    count_for_draw_0(*this, unit_);
+    return more;
+  }
+  Cost cost() const override { return unit_.cost(); }
+  TileRasterizer unit_;
+};
+struct ZropForDraw0 : ZropBehaviour {
+  using Parameters = DepthStencilRop::Parameters;
+  ZropForDraw0(const Parameters& parameters, const RenderContext& context) : unit_(parameters, context) {}
+  void attach(DepthStencilSurface& surface) override { unit_.attach(surface); }
+  void test(QuadBeat& beat) override {
+    unit_.test(beat);
+    count_for_draw_0(*this, unit_);
+  }
+  void update(const TerminationSignal& signal) override {
+    unit_.update(signal);
+    count_for_draw_0(*this, unit_);
+  }
+  void pass(Mark mark) override { unit_.pass(mark); }
+  void follow(FunctionalRunAhead& run_ahead) override { unit_.follow(run_ahead); }
+  Cost cost() const override { return unit_.cost(); }
+  DepthStencilRop unit_;
+};
+struct SmForDraw0 : SmBehaviour {
+  using Parameters = SplatShader::Parameters;
+  SmForDraw0(const Parameters& parameters, const RenderContext& context) : unit_(parameters, context) {}
+  void shade(const Warp& warp, ShadedWarp& out) override {
+    unit_.shade(warp, out);
+    count_for_draw_0(*this, unit_);
+  }
+  void shade_vertices(const VertexWarp& warp) override { unit_.shade_vertices(warp); }
+  Cost cost() const override { return unit_.cost(); }
+  SplatShader unit_;
+};
+/// Shades a draw's quads as if they were of the first.
+struct SmOfDraw0 : SplatShader {
+  using SplatShader::SplatShader;
+  void shade(const Warp& warp, ShadedWarp& out) override {
+    SplatShader::shade(warp, out);
+    out.draw.fill(0);
+  }
+};
+struct CropForDraw0 : CropBehaviour {
+  struct Parameters : CropParameters {};
+  CropForDraw0(const Parameters& parameters, const RenderContext& context) : rop(parameters, context) {}
+  void attach(ColorSurface& surface) override {
+    CropBehaviour::attach(surface);
+    rop.attach(surface);
+  }
+  void pass(Mark mark) override { rop.pass(mark); }
+  Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) override {
+    const Outcome outcome = rop.blend(draw, place, live, color);
+    count_for_draw_0(*this, rop);
+    return outcome;
+  }
+  Cost cost() const override { return rop.cost(); }
+  ColorRop<ColorFormat::rgba16f, BlendRounding::rne> rop;
+};
+/// Adds to a draw's counter as to one that knows no draws.
+struct VpoForNoDraw : VpoForDraw0 {
+  using VpoForDraw0::VpoForDraw0;
+  unsigned assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) override {
+    const unsigned count = unit_.assemble(draw, splat, out);
+    static_cast<Counter&>(primitives) += count;
+    return count;
+  }
+};
+
+std::vector<Case>& cases_of_frames() {
+  static std::vector<Case> all;
+  return all;
+}
+template <class Unit, class SlotBehaviour>
+struct AddOfFrames {
+  AddOfFrames(const char* slot, const char* name, const char* expected) {
+    const Registrar<Unit, SlotBehaviour> registrar(slot, name, "breaks a rule in a frame of several draws");
+    cases_of_frames().push_back({slot, name, expected});
+  }
+};
+const AddOfFrames<DrawOfOtherMarks<WithoutTheFirst>, DrawBehaviour> draw_first("draw", "no-first",
+                                                                               "next: no mark of command 1");
+const AddOfFrames<DrawOfOtherMarks<WithoutTheLast>, DrawBehaviour> draw_last("draw", "no-last",
+                                                                             "next: no mark of command 4");
+const AddOfFrames<DrawOfOtherMarks<TheFirstAgain>, DrawBehaviour> draw_twice(
+    "draw", "first-again", "next: a mark of command 1, of which 3 of 5 have passed");
+const AddOfFrames<DrawOfOtherMarks<BeyondTheFrame>, DrawBehaviour> draw_beyond("draw", "mark-beyond",
+                                                                               "next: a mark of command 70");
+const AddOfFrames<DrawOfEarlyMarks, DrawBehaviour> draw_early(
+    "draw", "early-mark", "next: a warp of draw 0, command 0, behind the mark of command 1");
+const AddOfFrames<VpoForDraw0, VpoBehaviour> vpo_first("vpo", "for-draw-0", "primitives counts");
+const AddOfFrames<VpoForNoDraw, VpoBehaviour> vpo_none("vpo", "for-no-draw", "primitives counts");
+const AddOfFrames<RasterForDraw0, RasterBehaviour> raster_first("raster", "for-draw-0", "quads_rasterized counts");
+const AddOfFrames<ZropForDraw0, ZropBehaviour> zrop_first("zrop", "for-draw-0", "quads_tested counts");
+const AddOfFrames<SmForDraw0, SmBehaviour> sm_first("sm", "for-draw-0", "quads_shaded counts");
+const AddOfFrames<SmOfDraw0, SmBehaviour> sm_of_first("sm", "of-draw-0", "for draw 0, which has 100 from 0 on");
+const AddOfFrames<CropForDraw0, CropBehaviour> crop_first("crop", "for-draw-0", "quads_late_failed counts");
+
+TEST(CheckedUnits, AMarkOrACountOfTheWrongDrawIsAFaultThatNamesTheUnitAtEveryFidelity) {
+  const auto draw = std::make_shared<Draw>(random_draw(100, 60, 200, 1));
+  for (const Case& broken : cases_of_frames()) {
+    for (const Fidelity fidelity : fidelities()) {
+      SCOPED_TRACE(broken.slot + "=" + broken.name + " at " + name_of(fidelity));
+      DrawState state = draw_state_of(request_of("het+qm"));
+      Frame frame(100, 60);
+      frame.draw(draw, state, "first", 0, 100);    // 0
+      frame.clear({true, true});                   // 1
+      frame.draw(draw, state, "second", 100, 50);  // 2
+      state.pruning_threshold = 0.1F;
+      frame.draw(draw, state, "third", 150);  // 3
+      frame.clear({false, true});             // 4
+      const std::string fault = fault_of(broken, fidelity, frame);
+      EXPECT_EQ(fault.rfind(broken.slot + "=" + broken.name + " at cycle ", 0), 0U) << fault;
+      EXPECT_NE(fault.find(broken.expected), std::string::npos) << fault;
+    }
   }
 }
 
@@ -350,6 +558,38 @@ TEST(CheckedUnits, ChecksChangeNothing) {
           EXPECT_EQ(checked.result_hash, trusted.result_hash) << platform << variant << name_of(fidelity);
           EXPECT_EQ(checked.statistics.size(), trusted.statistics.size());
         }
+      }
+    }
+  }
+}
+
+TEST(CheckedUnits, ChecksChangeNothingInAFrame) {
+  const auto draw = std::make_shared<Draw>(random_draw(100, 60, 300, 3));
+  for (const char* platform : {"agx-orin", "desktop"}) {
+    for (const Fidelity fidelity : fidelities()) {
+      for (const Termination termination : {Termination::paper, Termination::strict}) {
+        RunRequest request = request_of("het+qm", fidelity, [&](RunRequest& r) {
+          r.platform = &platform_named(platform);
+          r.termination = termination;
+        });
+        DrawState state = draw_state_of(request);
+        Frame frame(100, 60);
+        frame.draw(draw, state, "first", 0, 100);
+        frame.draw(draw, state, "second", 100, 60);
+        frame.clear({true, true});
+        state.early_termination = false;
+        frame.draw(draw, state, "third", 160, 60);
+        state.early_termination = true;
+        state.pruning_threshold = 0.1F;
+        frame.draw(draw, state, "fourth", 220);
+        fresh_simulation();
+        const RunResult trusted = simulate(request, frame);
+        for (const std::string& slot : Registry::instance().slot_names()) request.units.push_back({slot, "checked"});
+        fresh_simulation();
+        const RunResult checked = simulate(request, frame);
+        EXPECT_EQ(checked.result_hash, trusted.result_hash) << platform << name_of(fidelity);
+        ASSERT_EQ(checked.draws.size(), 4U);
+        for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(checked.draws[i].counts, trusted.draws[i].counts);
       }
     }
   }

@@ -99,14 +99,16 @@ std::vector<Finding> broken_draws(const RunResult& result) {
   return findings;
 }
 
-/// Sizes, rates and latencies of the machine left out: the draw's state decides the picture alone.
+/// Sizes, rates and latencies of the machine left out: the draws' states decide the picture alone. A pixel past the
+/// threshold that no draw has signalled yet is signalled at its next blend only without the check of the previous alpha.
 Case on_another_machine(const Case& c) {
   Case other = c;
   other.platform = &platforms().front();
   other.units.clear();
   other.settings.clear();
   for (const Setting& setting : c.settings) {
-    if (setting.unit == "state") other.settings.push_back(setting);
+    const bool of_frames = setting.parameter == "previous_alpha_check" && !c.parts.empty();
+    if (setting.unit == "state" || of_frames) other.settings.push_back(setting);
   }
   return other;
 }
