@@ -38,7 +38,7 @@ class CropUnit : public Unit {
     out_.set_pipeline(cost_.latency_cycles - 1, ColorBeat::in_a_cycle(cost_.blend_rate));
   }
 
-  bool idle() const override { return in_.empty() && queue_.empty(); }
+  bool idle() const override { return in_.empty() && queue_.empty() && marks_.empty(); }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket; }
   bool ends_frame() const override { return true; }
@@ -138,12 +138,13 @@ class CropUnit : public Unit {
   bool accept() {
     bool moved = false;
     auto budget = static_cast<unsigned>(std::min<std::size_t>(most_in_a_cycle_, cost_.input_quads - queue_.size()));
-    while (budget > 0 && in_.ready() && mark_ == Mark::none) {
+    while (budget > 0 && in_.ready()) {
       const ColorBeat& beat = in_.front();
       if (beat.mark != Mark::none) {
-        mark_ = beat.mark;
+        queue_mark(beat.mark);
         in_.pop();
-        return true;
+        moved = true;
+        continue;
       }
       for (; at_ < beat.count && budget > 0; ++at_, --budget) {
         if (!look_up(beat.quads[at_])) return moved;
@@ -189,6 +190,7 @@ class CropUnit : public Unit {
     stop_ = UnitState::starved;
     unsigned budget = most_in_a_cycle_;
     for (; budget > 0 && !queue_.empty(); --budget) {
+      if (!marks_.empty()) pass_marks(now);
       const Entry& entry = queue_.front();
       // In the same cycle a beat that is full may go before this one.
       if (signals_ && out_.credits() < (beat.count == TerminationBeat::capacity ? 2U : 1U)) {
@@ -226,6 +228,7 @@ class CropUnit : public Unit {
       cache_->unpin(entry.line);
       tokens_ -= price_;
       queue_.pop();
+      if (!marks_.empty()) --marks_.front().quads;
       if (queue_.size() > quads_ahead) prefetch(queue_[quads_ahead]);
     }
     if (beat.count > 0) out_.push(beat);
@@ -238,21 +241,32 @@ class CropUnit : public Unit {
     return true;
   }
 
-  [[gnu::noinline]] void pass_mark(Cycle now) {
-    if (mark_ == Mark::end_of_frame) {
-      end_ = !any_blended_ ? now : last_blend_ + cost_.latency_cycles;
-    } else {
-      behaviour_->pass(mark_);
+  /// Behind the quads in the queue.
+  [[gnu::noinline]] void queue_mark(Mark mark) {
+    std::size_t behind = queue_.size();
+    for (std::size_t i = 0; i < marks_.size(); ++i) behind -= marks_[i].quads;
+    marks_.push({mark, behind});
+  }
+
+  /// Those whose turn it is; true if there was one. Quads behind a mark fill their sectors meanwhile.
+  [[gnu::noinline]] bool pass_marks(Cycle now) {
+    bool passed = false;
+    for (; !marks_.empty() && marks_.front().quads == 0; marks_.pop()) {
+      passed = true;
+      if (marks_.front().mark != Mark::end_of_frame) {
+        behaviour_->pass(marks_.front().mark);
+      } else {
+        end_ = !any_blended_ ? now : last_blend_ + cost_.latency_cycles;
+      }
     }
-    mark_ = Mark::none;
+    return passed;
   }
 
   Cycle tick(Cycle now) override {
     finish_fills();
     const bool blended = blend(now);
     const bool accepted = accept();
-    const bool marked = mark_ != Mark::none && queue_.empty();
-    if (marked) pass_mark(now);
+    const bool marked = !marks_.empty() && pass_marks(now);
     enter(blended ? UnitState::busy : !queue_.empty() ? stop_ : UnitState::starved, now);
     if (blended || accepted || marked ||
         (!queue_.empty() && stop_ != UnitState::blocked && (stop_ == UnitState::latency || tokens_ < price_))) {
@@ -292,7 +306,11 @@ class CropUnit : public Unit {
   Cycle refilled_ = 0;
   std::deque<std::pair<std::uint32_t, Cycle>> recent_;  ///< blends in the pipeline, without forwarding
   UnitState stop_ = UnitState::starved;
-  Mark mark_ = Mark::none;  ///< that has arrived; the quads before it are not all blended
+  struct QueuedMark {
+    Mark mark = Mark::none;
+    std::size_t quads = 0;  ///< of the queue, behind the mark before it and in front of it
+  };
+  Ring<QueuedMark> marks_;
   Cycle last_blend_ = 0;
   Cycle end_ = never;
   bool any_blended_ = false;

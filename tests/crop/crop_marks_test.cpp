@@ -293,6 +293,18 @@ TEST_P(CropMarksTest, ASignalHasTheEpochOfItsDraw) {
   EXPECT_EQ(seen, (std::vector<std::pair<unsigned, unsigned>>{{1, 0}, {2, 1}, {3, 2}}));
 }
 
+TEST_P(CropMarksTest, QuadsBehindAClearFillTheirSectorsWhileThoseBeforeItWaitForTheirs) {
+  CropBench crop(GetParam(), cleared_between(6));
+  for (DrawIndex draw = 0; draw < 6; ++draw) {
+    if (draw > 0) crop.mark(Frame::mark_of(2 * std::size_t{draw} - 1));
+    crop.quad(draw, {draw, 0}, 0, 0.5F);
+  }
+  crop.mark(Mark::end_of_frame);
+  crop.bench.run();
+  EXPECT_GT(crop.bench.unit().end_of_frame(), 300U) << "a fill";
+  EXPECT_LT(crop.bench.unit().end_of_frame(), 450U) << "and not two one after the other";
+}
+
 TEST_P(CropMarksTest, ClearsAloneEndTheFrame) {
   CropBench crop(GetParam(), cleared_between(3));
   crop.mark(Frame::mark_of(1));

@@ -251,6 +251,19 @@ TEST_P(EveryFidelityWithTime, DrawsOverlap) {
   EXPECT_GT(cycles(both), std::max(cycles(first), cycles(second)));
 }
 
+TEST_P(EveryFidelityWithTime, ClearsTakeNextToNoTime) {
+  const auto draw = std::make_shared<const Draw>(testing::random_draw(320, 240, 600, 5));
+  const RunRequest request = request_of("baseline", GetParam());
+  const DrawState state = draw_state_of(request);
+  Frame frame(320, 240);
+  for (std::uint32_t part = 0; part < 60; ++part) {
+    frame.draw(draw, state, "", 10 * part, 10);
+    frame.clear({false, true});
+  }
+  const auto alone = static_cast<double>(testing::run(request, *draw).cycles.value());
+  EXPECT_NEAR(static_cast<double>(run(request, frame).cycles.value()), alone, 0.01 * alone);
+}
+
 TEST_P(EveryFidelityWithTime, AFrameOfNothingButClearsEnds) {
   Frame frame(32, 32);
   frame.clear({true, true});
