@@ -182,13 +182,14 @@ TEST(Frame, TrianglesThatAreNotAsManyAsSplatsAreRefused) {
 
 TEST(Frame, SplatsThatAreNotThereAreRefused) {
   const auto geometry = geometry_of(20);
-  const std::pair<std::uint32_t, std::uint32_t> wrong[] = {{0, 21},   {20, 1},      {21, 0},
-                                                           {21, ~0U}, {5, ~0U - 1}, {~0U, 1}};
-  for (const auto& [first, splats] : wrong) {
+  struct Range {
+    std::uint32_t first, splats;
+  };
+  for (const Range wrong : {Range{0, 21}, {20, 1}, {21, 0}, {21, ~0U}, {5, ~0U - 1}, {~0U, 1}}) {
     Frame frame(64, 48);
-    EXPECT_NE(refusal_of([&] { frame.draw(geometry, {}, "", first, splats); }).find("draw what is there"),
+    EXPECT_NE(refusal_of([&] { frame.draw(geometry, {}, "", wrong.first, wrong.splats); }).find("draw what is there"),
               std::string::npos)
-        << first << " " << splats;
+        << wrong.first << " " << wrong.splats;
     EXPECT_TRUE(frame.commands().empty() && frame.draws().empty() && frame.splats() == 0) << "it is left as it was";
   }
   Frame frame(64, 48);
