@@ -17,7 +17,7 @@ using testkit::Source;
 constexpr DrawIndex draws = 3;
 constexpr std::uint32_t splats_of_draw = 8;
 
-/// Draws of equal state: splats 0, 1, ... of the frame, each eight of a draw. Round ones, so that some lanes are pruned.
+/// Draws of equal state: splats 0, 1, ... of the frame, eight of each. Round ones, so that some lanes are pruned.
 RenderContext three_draws() {
   std::vector<Splat> splats;
   for (std::uint32_t i = 0; i < splats_of_draw; ++i) {

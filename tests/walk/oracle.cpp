@@ -99,8 +99,8 @@ std::vector<Finding> broken_draws(const RunResult& result) {
   return findings;
 }
 
-/// Sizes, rates and latencies of the machine left out: the draws' states decide the picture alone. A pixel past the
-/// threshold that no draw has signalled yet is signalled at its next blend only without the check of the previous alpha.
+/// Sizes, rates and latencies of the machine left out: the draws' states decide the picture alone. Without the check of
+/// the previous alpha a pixel is signalled that a draw which does not terminate has taken past the threshold.
 Case on_another_machine(const Case& c) {
   Case other = c;
   other.platform = &platforms().front();
