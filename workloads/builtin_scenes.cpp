@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 #include "scene_painter.h"
 

@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 #include <vrpipe/workloads/portable_math.h>
 
 #include "file_io.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 #include <vrpipe/workloads/camera.h>
 
 #include "file_io.h"

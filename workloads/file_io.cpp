@@ -10,7 +10,7 @@
 #include <climits>
 #include <system_error>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 namespace vrpipe {
 namespace {

@@ -11,7 +11,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 #include "file_io.h"
 

@@ -9,7 +9,7 @@
 
 #include <glm/geometric.hpp>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 #include <vrpipe/workloads/portable_math.h>
 
 #include "for_each_chunk.h"

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/gaussian_scene.h>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
 

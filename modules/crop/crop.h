@@ -6,9 +6,9 @@
 
 #include "crop_cache.h"
 
-#include <vrpipe/parameter.h>
-#include <vrpipe/registry.h>
-#include <vrpipe/units.h>
+#include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/registry.h>
+#include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include <vrpipe/units.h>
+#include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
 

@@ -3,8 +3,8 @@
 
 #include "crop/sectors.h"
 
-#include <vrpipe/order_monitor.h>
-#include <vrpipe/timed.h>
+#include <vrpipe/model/timed.h>
+#include <vrpipe/pipeline/order_monitor.h>
 
 namespace vrpipe {
 

@@ -4,10 +4,10 @@
 #include "crop/crop_cache.h"
 #include "crop/sectors.h"
 
-#include <vrpipe/memory_port.h>
-#include <vrpipe/order_monitor.h>
-#include <vrpipe/ring.h>
-#include <vrpipe/unit.h>
+#include <vrpipe/kernel/ring.h>
+#include <vrpipe/memory/memory_port.h>
+#include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/order_monitor.h>
 
 namespace vrpipe {
 

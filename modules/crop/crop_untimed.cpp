@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <optional>
 
-#include <vrpipe/occupancy.h>
-#include <vrpipe/order_monitor.h>
-#include <vrpipe/untimed.h>
+#include <vrpipe/model/occupancy.h>
+#include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/order_monitor.h>
 
 namespace vrpipe {
 

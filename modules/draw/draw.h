@@ -1,7 +1,7 @@
 #pragma once
 
-#include <vrpipe/parameter.h>
-#include <vrpipe/units.h>
+#include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
 

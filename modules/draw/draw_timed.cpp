@@ -1,4 +1,4 @@
-#include <vrpipe/timed.h>
+#include <vrpipe/model/timed.h>
 
 namespace vrpipe {
 

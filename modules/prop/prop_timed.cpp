@@ -2,7 +2,7 @@
 
 #include "prop/warp_order.h"
 
-#include <vrpipe/timed.h>
+#include <vrpipe/model/timed.h>
 
 namespace vrpipe {
 

@@ -2,7 +2,7 @@
 
 #include "prop/warp_order.h"
 
-#include <vrpipe/unit.h>
+#include <vrpipe/model/unit.h>
 
 namespace vrpipe {
 

@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
-#include <vrpipe/accounting.h>
-#include <vrpipe/ring.h>
-#include <vrpipe/tile_grid.h>
-#include <vrpipe/units.h>
+#include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/ring.h>
+#include <vrpipe/pipeline/tile_grid.h>
+#include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
 

@@ -3,7 +3,7 @@
 
 #include "qru/warp_numbering.h"
 
-#include <vrpipe/timed.h>
+#include <vrpipe/model/timed.h>
 
 namespace vrpipe {
 

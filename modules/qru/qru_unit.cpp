@@ -2,7 +2,7 @@
 
 #include "qru/warp_numbering.h"
 
-#include <vrpipe/unit.h>
+#include <vrpipe/model/unit.h>
 
 namespace vrpipe {
 

@@ -2,10 +2,10 @@
 
 #include <vector>
 
-#include <vrpipe/draw.h>
-#include <vrpipe/payload.h>
-#include <vrpipe/render_context.h>
-#include <vrpipe/tile_grid.h>
+#include <vrpipe/pipeline/draw.h>
+#include <vrpipe/pipeline/payload.h>
+#include <vrpipe/pipeline/render_context.h>
+#include <vrpipe/pipeline/tile_grid.h>
 
 namespace vrpipe {
 

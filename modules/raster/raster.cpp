@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstring>
 
-#include <vrpipe/error.h>
-#include <vrpipe/registry.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
 

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <vrpipe/geometry.h>
-#include <vrpipe/parameter.h>
-#include <vrpipe/units.h>
+#include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/geometry.h>
+#include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
 

@@ -1,5 +1,5 @@
-#include <vrpipe/occupancy.h>
-#include <vrpipe/untimed.h>
+#include <vrpipe/model/occupancy.h>
+#include <vrpipe/model/untimed.h>
 
 namespace vrpipe {
 

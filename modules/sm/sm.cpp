@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <vrpipe/error.h>
-#include <vrpipe/exp2.h>
-#include <vrpipe/registry.h>
+#include <vrpipe/arithmetic/exp2.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
 

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include <vrpipe/timed.h>
+#include <vrpipe/model/timed.h>
 
 namespace vrpipe {
 

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <utility>
 
-#include <vrpipe/divisor.h>
-#include <vrpipe/ring.h>
-#include <vrpipe/unit.h>
+#include <vrpipe/arithmetic/divisor.h>
+#include <vrpipe/kernel/ring.h>
+#include <vrpipe/model/unit.h>
 
 namespace vrpipe {
 

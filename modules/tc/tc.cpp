@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
 

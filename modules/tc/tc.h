@@ -2,9 +2,9 @@
 
 #include <deque>
 
-#include <vrpipe/parameter.h>
-#include <vrpipe/tile_grid.h>
-#include <vrpipe/units.h>
+#include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/tile_grid.h>
+#include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
 

@@ -2,7 +2,7 @@
 
 #include "tc/tc.h"
 
-#include <vrpipe/timed.h>
+#include <vrpipe/model/timed.h>
 
 namespace vrpipe {
 

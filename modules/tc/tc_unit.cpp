@@ -2,7 +2,7 @@
 
 #include "tc/tc.h"
 
-#include <vrpipe/unit.h>
+#include <vrpipe/model/unit.h>
 
 namespace vrpipe {
 

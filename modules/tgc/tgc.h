@@ -2,8 +2,8 @@
 
 #include <deque>
 
-#include <vrpipe/parameter.h>
-#include <vrpipe/units.h>
+#include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <iterator>
 
-#include <vrpipe/geometry.h>
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/geometry.h>
+#include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
 

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <array>
 
-#include <vrpipe/occupancy.h>
-#include <vrpipe/untimed.h>
+#include <vrpipe/model/occupancy.h>
+#include <vrpipe/model/untimed.h>
 
 namespace vrpipe {
 

@@ -1,6 +1,6 @@
 #include "zrop/zrop.h"
 
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
 

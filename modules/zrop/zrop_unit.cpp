@@ -1,4 +1,4 @@
-#include <vrpipe/unit.h>
+#include <vrpipe/model/unit.h>
 
 namespace vrpipe {
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 
-#include <vrpipe/occupancy.h>
-#include <vrpipe/untimed.h>
+#include <vrpipe/model/occupancy.h>
+#include <vrpipe/model/untimed.h>
 
 namespace vrpipe {
 

@@ -1,7 +1,7 @@
 // CROP in a frame of several draws: each is blended with its state, and a clear waits for what is before it.
 #include <gtest/gtest.h>
 
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 #include "support/fidelities.h"
 

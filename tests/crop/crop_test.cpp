@@ -8,10 +8,10 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
-#include <vrpipe/half.h>
-#include <vrpipe/random.h>
-#include <vrpipe/registry.h>
+#include <vrpipe/arithmetic/half.h>
+#include <vrpipe/arithmetic/random.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
 
 #include "crop/crop_cache.h"
 #include "crop/sectors.h"

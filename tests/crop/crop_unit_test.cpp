@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/half.h>
+#include <vrpipe/arithmetic/half.h>
 #include <vrpipe/testkit/bench.h>
 
 #include "support/builders.h"

@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/registry.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/scene.h>
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include <vrpipe/batch.h>
-#include <vrpipe/error.h>
-#include <vrpipe/link.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/kernel/link.h>
+#include <vrpipe/pipeline/batch.h>
 #include <vrpipe/platforms/observers.h>
 
 #include "support/simulate.h"

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/frame.h>
+#include <vrpipe/pipeline/frame.h>
 #include <vrpipe/platforms/simulation.h>
 
 #include "support/builders.h"

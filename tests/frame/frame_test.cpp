@@ -1,9 +1,9 @@
 // Frames by themselves: what clears and draws are numbered, and what a frame refuses.
-#include <vrpipe/frame.h>
+#include <vrpipe/pipeline/frame.h>
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 #include "support/builders.h"
 

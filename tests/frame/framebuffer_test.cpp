@@ -1,5 +1,5 @@
 // What a frame is drawn into, and where it is in memory.
-#include <vrpipe/framebuffer.h>
+#include <vrpipe/pipeline/framebuffer.h>
 
 #include <gtest/gtest.h>
 

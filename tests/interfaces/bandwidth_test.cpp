@@ -1,11 +1,11 @@
-#include <vrpipe/bandwidth.h>
+#include <vrpipe/memory/bandwidth.h>
 
 #include <algorithm>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/random.h>
+#include <vrpipe/arithmetic/random.h>
 
 namespace vrpipe {
 namespace {

@@ -1,4 +1,4 @@
-#include <vrpipe/blend.h>
+#include <vrpipe/arithmetic/blend.h>
 
 #include <cmath>
 #include <cstring>
@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
-#include <vrpipe/random.h>
+#include <vrpipe/arithmetic/random.h>
+#include <vrpipe/component/error.h>
 
 #include "support/builders.h"
 #include "support/data.h"

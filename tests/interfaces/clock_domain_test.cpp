@@ -1,11 +1,11 @@
-#include <vrpipe/clock_domain.h>
+#include <vrpipe/kernel/clock_domain.h>
 
 #include <memory>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 #include <vrpipe/platforms/simulation.h>
 
 namespace vrpipe {

@@ -1,8 +1,8 @@
-#include <vrpipe/divisor.h>
+#include <vrpipe/arithmetic/divisor.h>
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/random.h>
+#include <vrpipe/arithmetic/random.h>
 
 namespace vrpipe {
 namespace {

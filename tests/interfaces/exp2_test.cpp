@@ -1,4 +1,4 @@
-#include <vrpipe/exp2.h>
+#include <vrpipe/arithmetic/exp2.h>
 
 #include <cmath>
 #include <cstring>

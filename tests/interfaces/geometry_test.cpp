@@ -1,4 +1,4 @@
-#include <vrpipe/geometry.h>
+#include <vrpipe/pipeline/geometry.h>
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include <vrpipe/half.h>
+#include <vrpipe/arithmetic/half.h>
 
 #include <cmath>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include <vrpipe/link.h>
+#include <vrpipe/kernel/link.h>
 
 #include <memory>
 #include <vector>

@@ -10,11 +10,11 @@
 #include <gtest/gtest.h>
 #include <tlm_utils/simple_initiator_socket.h>
 
-#include <vrpipe/error.h>
-#include <vrpipe/memory_port.h>
+#include <vrpipe/arithmetic/random.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/memory/memory_port.h>
+#include <vrpipe/model/timed.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/random.h>
-#include <vrpipe/timed.h>
 
 #include "support/foreign_memory.h"
 

@@ -1,4 +1,4 @@
-#include <vrpipe/memory_port.h>
+#include <vrpipe/memory/memory_port.h>
 
 #include <deque>
 #include <memory>
@@ -6,10 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/arithmetic/random.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/model/timed.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/random.h>
-#include <vrpipe/timed.h>
 
 #include "support/foreign_memory.h"
 

@@ -1,13 +1,13 @@
-#include <vrpipe/parameter.h>
+#include <vrpipe/component/parameter.h>
 
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
-#include <vrpipe/registry.h>
-#include <vrpipe/statistic.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/component/statistic.h>
+#include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
 namespace {

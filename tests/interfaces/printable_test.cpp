@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
-#include <vrpipe/printable.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/component/printable.h>
 
 namespace vrpipe {
 namespace {

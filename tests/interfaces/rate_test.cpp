@@ -1,10 +1,10 @@
-#include <vrpipe/rate.h>
+#include <vrpipe/kernel/rate.h>
 
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/random.h>
+#include <vrpipe/arithmetic/random.h>
 
 namespace vrpipe {
 namespace {

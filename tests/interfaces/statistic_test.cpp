@@ -1,11 +1,11 @@
-#include <vrpipe/statistic.h>
+#include <vrpipe/component/statistic.h>
 
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <stdexcept>
 
-#include <vrpipe/random.h>
+#include <vrpipe/arithmetic/random.h>
 
 namespace vrpipe {
 namespace {

@@ -1,11 +1,11 @@
-#include <vrpipe/surface.h>
+#include <vrpipe/pipeline/surface.h>
 
 #include <set>
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/order_monitor.h>
-#include <vrpipe/random.h>
+#include <vrpipe/arithmetic/random.h>
+#include <vrpipe/pipeline/order_monitor.h>
 
 namespace vrpipe {
 namespace {

@@ -1,5 +1,5 @@
 // Ports and resources of the fidelities lt and at.
-#include <vrpipe/timed.h>
+#include <vrpipe/model/timed.h>
 
 #include <functional>
 #include <memory>
@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/arithmetic/random.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/random.h>
 
 namespace vrpipe {
 namespace {

@@ -1,8 +1,8 @@
 // Findings that decide how the pipeline computes; docs/numerics.md names them F1 to F13.
 #include <algorithm>
 
-#include <vrpipe/clock_domain.h>
-#include <vrpipe/geometry.h>
+#include <vrpipe/kernel/clock_domain.h>
+#include <vrpipe/pipeline/geometry.h>
 
 #include "numerics_test_support.h"
 #include "support/pixel_oracle.h"

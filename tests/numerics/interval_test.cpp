@@ -1,8 +1,8 @@
 // What interval arithmetic proves. Its exponential and logarithm are not rounded outwards here, so each is widened.
 #include <boost/numeric/interval.hpp>
 
-#include <vrpipe/registry.h>
-#include <vrpipe/units.h>
+#include <vrpipe/pipeline/registry.h>
+#include <vrpipe/pipeline/units.h>
 
 #include "numerics_test_support.h"
 #include "support/pixel_oracle.h"

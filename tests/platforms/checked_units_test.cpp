@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/configuration.h>
-#include <vrpipe/registry.h>
 
 #include "crop/crop.h"
 #include "draw/draw.h"

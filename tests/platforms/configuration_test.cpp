@@ -4,11 +4,11 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/model/timed.h>
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/platforms/netlist.h>
-#include <vrpipe/registry.h>
-#include <vrpipe/timed.h>
 
 #include "qru/qru.h"
 #include "support/simulate.h"

@@ -6,10 +6,10 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/netlist.h>
-#include <vrpipe/registry.h>
-#include <vrpipe/unit.h>
 
 #include "support/simulate.h"
 

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
-#include <vrpipe/memory_port.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/memory/memory_port.h>
 #include <vrpipe/platforms/wiring.h>
 
 #include "support/foreign_memory.h"

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/observers.h>
 

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/half.h>
+#include <vrpipe/arithmetic/half.h>
 #include <vrpipe/workloads/draw_list.h>
 
 #include "support/data.h"

@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/cache_statistics.h>
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/memory/cache_statistics.h>
 
-#include "statistics.h"
+#include "run/statistics.h"
 #include "support/simulate.h"
 
 namespace vrpipe {

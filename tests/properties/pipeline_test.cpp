@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <iostream>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 #include "scenes.h"
 #include "support/pixel_oracle.h"

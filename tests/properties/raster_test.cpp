@@ -1,8 +1,8 @@
 #include <boost/multiprecision/cpp_int.hpp>
 
-#include <vrpipe/geometry.h>
-#include <vrpipe/registry.h>
-#include <vrpipe/units.h>
+#include <vrpipe/pipeline/geometry.h>
+#include <vrpipe/pipeline/registry.h>
+#include <vrpipe/pipeline/units.h>
 
 #include "scenes.h"
 

@@ -1,7 +1,7 @@
 // RASTER in a frame of several draws: quads and marks keep the order of jobs.
 #include <gtest/gtest.h>
 
-#include <vrpipe/geometry.h>
+#include <vrpipe/pipeline/geometry.h>
 
 #include "raster/raster.h"
 #include "support/fidelities.h"

@@ -2,7 +2,7 @@
 // tile goes in one piece, in the cycle of its last quad.
 #include <gtest/gtest.h>
 
-#include <vrpipe/geometry.h>
+#include <vrpipe/pipeline/geometry.h>
 
 #include "support/fidelities.h"
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/geometry.h>
+#include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/testkit/bench.h>
 
 #include "support/builders.h"

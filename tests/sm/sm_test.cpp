@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 #include "support/builders.h"
 

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include <vrpipe/draw.h>
-#include <vrpipe/payload.h>
-#include <vrpipe/random.h>
-#include <vrpipe/render_context.h>
+#include <vrpipe/arithmetic/random.h>
+#include <vrpipe/pipeline/draw.h>
+#include <vrpipe/pipeline/payload.h>
+#include <vrpipe/pipeline/render_context.h>
 
 namespace vrpipe::testing {
 

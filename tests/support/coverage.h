@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include <vrpipe/geometry.h>
+#include <vrpipe/pipeline/geometry.h>
 
 #include "raster/raster.h"
 #include "vpo/vpo.h"

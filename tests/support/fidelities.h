@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/batch.h>
+#include <vrpipe/pipeline/batch.h>
 #include <vrpipe/testkit/bench.h>
 
 #include "support/builders.h"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <vrpipe/registry.h>
-#include <vrpipe/units.h>
+#include <vrpipe/pipeline/registry.h>
+#include <vrpipe/pipeline/units.h>
 
 #include "builders.h"
 

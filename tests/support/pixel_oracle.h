@@ -3,8 +3,8 @@
 #include <array>
 #include <vector>
 
-#include <vrpipe/draw.h>
-#include <vrpipe/render_context.h>
+#include <vrpipe/pipeline/draw.h>
+#include <vrpipe/pipeline/render_context.h>
 
 namespace vrpipe::testing {
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include <vrpipe/draw.h>
+#include <vrpipe/pipeline/draw.h>
 
 namespace vrpipe::testing {
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include <vrpipe/geometry.h>
+#include <vrpipe/pipeline/geometry.h>
 
 #include "support/builders.h"
 

@@ -4,8 +4,8 @@
 
 #include <csignal>
 
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/registry.h>
 
 #include "cli/command_line.h"
 #include "file_io.h"

@@ -5,7 +5,7 @@
 #include <csignal>
 #include <stdexcept>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 #include "host/command_failure.h"
 #include "jobs/processes.h"

@@ -8,8 +8,8 @@
 #include <set>
 #include <sstream>
 
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/registry.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
 #include "jobs/settings.h"

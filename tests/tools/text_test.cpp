@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 #include "cli/parse.h"
 #include "host/progress_line.h"

@@ -17,7 +17,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include <vrpipe/draw.h>
+#include <vrpipe/pipeline/draw.h>
 #include <vrpipe/workloads/draw_list.h>
 
 namespace vrpipe::testing {

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 #include "support/floating_point.h"
 #include "support/pixel_oracle.h"

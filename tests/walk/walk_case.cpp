@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/blend.h>
-#include <vrpipe/random.h>
+#include <vrpipe/arithmetic/blend.h>
+#include <vrpipe/arithmetic/random.h>
 
 #include "support/builders.h"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <vrpipe/frame.h>
+#include <vrpipe/pipeline/frame.h>
 #include <vrpipe/platforms/simulation.h>
 
 namespace vrpipe::walk {

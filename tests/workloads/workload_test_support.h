@@ -12,7 +12,7 @@
 
 #include <unistd.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
 #include "support/data.h"

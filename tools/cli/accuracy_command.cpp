@@ -2,7 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include <vrpipe/printable.h>
+#include <vrpipe/component/printable.h>
 
 #include "cli/command_line.h"
 #include "cli/options.h"

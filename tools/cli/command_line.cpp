@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <vrpipe/error.h>
-#include <vrpipe/printable.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/component/printable.h>
 
 #include "cli/options.h"
 #include "host/command_failure.h"

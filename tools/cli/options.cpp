@@ -6,8 +6,8 @@
 
 #include <CLI/CLI.hpp>
 
-#include <vrpipe/error.h>
-#include <vrpipe/registry.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
 
 #include "cli/parse.h"
 #include "host/crash_report.h"

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 namespace vrpipe::tools {
 namespace {

@@ -3,7 +3,7 @@
 #include <iostream>
 #include <string>
 
-#include <vrpipe/printable.h>
+#include <vrpipe/component/printable.h>
 
 #include "host/output_file.h"
 #include "host/stdout_to_stderr.h"

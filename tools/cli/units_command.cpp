@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/component/printable.h>
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/printable.h>
 
 #include "cli/command_line.h"
 #include "cli/listing.h"

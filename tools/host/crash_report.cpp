@@ -9,8 +9,8 @@
 #include <exception>
 #include <initializer_list>
 
-#include <vrpipe/checked_behaviours.h>
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/checked_behaviours.h>
+#include <vrpipe/pipeline/registry.h>
 
 #include "host/command_failure.h"
 

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 #include "host/process_setup.h"
 

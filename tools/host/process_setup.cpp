@@ -14,7 +14,7 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/printable.h>
+#include <vrpipe/component/printable.h>
 
 #include "file_io.h"
 

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/printable.h>
+#include <vrpipe/component/printable.h>
 
 #include "host/process_setup.h"
 #include "host/terminal.h"

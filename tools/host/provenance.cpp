@@ -8,7 +8,7 @@
 #include <cstring>
 #include <utility>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 namespace vrpipe::tools {
 namespace {

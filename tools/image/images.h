@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <vrpipe/surface.h>
+#include <vrpipe/pipeline/surface.h>
 
 namespace vrpipe::tools {
 

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 
 namespace vrpipe::tools {
 namespace {

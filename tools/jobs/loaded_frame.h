@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include <vrpipe/draw.h>
-#include <vrpipe/frame.h>
+#include <vrpipe/pipeline/draw.h>
+#include <vrpipe/pipeline/frame.h>
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/scene.h>
 

@@ -26,8 +26,8 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/error.h>
-#include <vrpipe/registry.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
 
 #include "host/command_failure.h"
 #include "host/crash_report.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include <vrpipe/frame.h>
+#include <vrpipe/pipeline/frame.h>
 #include <vrpipe/platforms/simulation.h>
 
 #include "host/progress_line.h"

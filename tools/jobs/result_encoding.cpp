@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include <vrpipe/printable.h>
+#include <vrpipe/component/printable.h>
 
 namespace vrpipe::tools {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 #include <vrpipe/workloads/preprocess_parameters.h>
 
 namespace vrpipe::tools {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include <vrpipe/draw.h>
+#include <vrpipe/pipeline/draw.h>
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/scene.h>
 

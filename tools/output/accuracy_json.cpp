@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include <vrpipe/blend.h>
+#include <vrpipe/arithmetic/blend.h>
 
 namespace vrpipe::tools {
 namespace {

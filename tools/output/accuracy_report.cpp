@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/blend.h>
-#include <vrpipe/printable.h>
+#include <vrpipe/arithmetic/blend.h>
+#include <vrpipe/component/printable.h>
 
 #include "output/report.h"
 #include "output/text_table.h"

@@ -1,6 +1,6 @@
 #include "output/json_text.h"
 
-#include <vrpipe/printable.h>
+#include <vrpipe/component/printable.h>
 
 namespace vrpipe::tools {
 namespace {

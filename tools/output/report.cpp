@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/accounting.h>
-#include <vrpipe/blend.h>
-#include <vrpipe/printable.h>
+#include <vrpipe/arithmetic/blend.h>
+#include <vrpipe/component/printable.h>
+#include <vrpipe/kernel/accounting.h>
 
 #include "jobs/comparison.h"
 #include "output/text_table.h"

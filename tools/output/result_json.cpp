@@ -7,8 +7,8 @@
 #include <optional>
 #include <utility>
 
-#include <vrpipe/accounting.h>
-#include <vrpipe/blend.h>
+#include <vrpipe/arithmetic/blend.h>
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/platforms/netlist.h>
 
 #include "jobs/comparison.h"

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include <vrpipe/printable.h>
+#include <vrpipe/component/printable.h>
 
 namespace vrpipe::tools {
 namespace {

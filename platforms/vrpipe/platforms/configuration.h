@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include <vrpipe/parameter.h>
+#include <vrpipe/component/parameter.h>
+#include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/registry.h>
-#include <vrpipe/unit.h>
 
 namespace vrpipe {
 

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include <vrpipe/clock_domain.h>
-#include <vrpipe/memory_port.h>
+#include <vrpipe/kernel/clock_domain.h>
+#include <vrpipe/memory/memory_port.h>
+#include <vrpipe/model/unit.h>
 #include <vrpipe/platforms/configuration.h>
-#include <vrpipe/unit.h>
 
 namespace vrpipe {
 

@@ -10,7 +10,7 @@
 #include <systemc>
 #include <tlm>
 
-#include <vrpipe/parameter.h>
+#include <vrpipe/component/parameter.h>
 
 namespace vrpipe {
 

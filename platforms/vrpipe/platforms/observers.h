@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include <vrpipe/accounting.h>
-#include <vrpipe/link.h>
+#include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/link.h>
 
 namespace vrpipe {
 

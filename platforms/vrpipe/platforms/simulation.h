@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
-#include <vrpipe/accounting.h>
-#include <vrpipe/draw.h>
-#include <vrpipe/frame.h>
-#include <vrpipe/framebuffer.h>
-#include <vrpipe/parameter.h>
-#include <vrpipe/render_context.h>
+#include <vrpipe/component/parameter.h>
+#include <vrpipe/kernel/accounting.h>
+#include <vrpipe/pipeline/draw.h>
+#include <vrpipe/pipeline/frame.h>
+#include <vrpipe/pipeline/framebuffer.h>
+#include <vrpipe/pipeline/render_context.h>
 
 namespace vrpipe {
 

@@ -9,18 +9,18 @@
 
 #include <systemc>
 
-#include <vrpipe/checked_behaviours.h>
-#include <vrpipe/clock_domain.h>
-#include <vrpipe/error.h>
-#include <vrpipe/framebuffer.h>
-#include <vrpipe/memory_port.h>
+#include <vrpipe/arithmetic/random.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/kernel/clock_domain.h>
+#include <vrpipe/memory/memory_port.h>
+#include <vrpipe/model/timed.h>
+#include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/checked_behaviours.h>
+#include <vrpipe/pipeline/framebuffer.h>
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/random.h>
-#include <vrpipe/registry.h>
 #include <vrpipe/testkit/sink.h>
 #include <vrpipe/testkit/source.h>
-#include <vrpipe/timed.h>
-#include <vrpipe/unit.h>
 
 namespace vrpipe::testkit {
 

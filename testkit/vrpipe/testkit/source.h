@@ -6,10 +6,10 @@
 
 #include <systemc>
 
-#include <vrpipe/clock_domain.h>
-#include <vrpipe/error.h>
-#include <vrpipe/link.h>
-#include <vrpipe/timed.h>
+#include <vrpipe/component/error.h>
+#include <vrpipe/kernel/clock_domain.h>
+#include <vrpipe/kernel/link.h>
+#include <vrpipe/model/timed.h>
 
 namespace vrpipe::testkit {
 

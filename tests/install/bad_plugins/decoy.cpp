@@ -1,6 +1,6 @@
 // A good plugin that mentions another's tag before its own.
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/wiring.h>
-#include <vrpipe/registry.h>
 
 extern "C" __attribute__((visibility("default"), used)) const char a_note[] = "unlike vrpipe-plugin/0.0.1/itanium-abi";
 VRPIPE_PLUGIN

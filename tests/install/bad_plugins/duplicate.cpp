@@ -1,4 +1,4 @@
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 VRPIPE_PLUGIN
 

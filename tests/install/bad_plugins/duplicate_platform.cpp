@@ -1,5 +1,5 @@
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/registry.h>
 
 VRPIPE_PLUGIN
 

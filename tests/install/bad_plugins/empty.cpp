@@ -1,3 +1,3 @@
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 VRPIPE_PLUGIN

@@ -1,6 +1,6 @@
 #include <cstdlib>
 
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 VRPIPE_PLUGIN
 

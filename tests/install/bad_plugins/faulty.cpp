@@ -5,7 +5,7 @@
 
 #include <vrpipe/modules/tc/tc.h>
 #include <vrpipe/modules/vpo/vpo.h>
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 VRPIPE_PLUGIN
 

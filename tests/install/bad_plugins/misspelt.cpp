@@ -1,5 +1,5 @@
 #include <vrpipe/modules/tc/tc.h>
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 VRPIPE_PLUGIN
 

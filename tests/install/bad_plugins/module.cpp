@@ -1,6 +1,6 @@
 // A module in the place of a shipped one.
-#include <vrpipe/registry.h>
-#include <vrpipe/unit.h>
+#include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/registry.h>
 
 VRPIPE_PLUGIN
 

@@ -1,6 +1,6 @@
 #include <cstdlib>
 
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 #undef VRPIPE_PLUGIN_TAG
 #define VRPIPE_PLUGIN_TAG "vrpipe-plugin/0.0.1/itanium-abi"

@@ -1,6 +1,6 @@
 #include <csignal>
 
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 VRPIPE_PLUGIN
 

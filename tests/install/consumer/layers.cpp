@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <memory>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/scene.h>
 

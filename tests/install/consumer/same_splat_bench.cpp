@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include <vrpipe/batch.h>
+#include <vrpipe/pipeline/batch.h>
 #include <vrpipe/testkit/bench.h>
 
 #include "same_splat_qru.h"

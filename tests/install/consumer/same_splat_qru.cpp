@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include <vrpipe/registry.h>
+#include <vrpipe/pipeline/registry.h>
 
 SameSplatQru::SameSplatQru(const Parameters& parameters, const vrpipe::RenderContext&)
     : cost_{parameters.quads_per_cycle, parameters.latency_cycles} {}

@@ -3,8 +3,8 @@
 #include <array>
 #include <vector>
 
-#include <vrpipe/parameter.h>
-#include <vrpipe/units.h>
+#include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/units.h>
 
 /// A QRU that pairs only quads of the same splat: those of its two triangles along the diagonal of the box.
 ///

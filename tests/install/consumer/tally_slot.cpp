@@ -1,10 +1,10 @@
 // A slot of one's own as a plugin, and a platform that has a unit of it: it counts the quads on their way from RASTER to
 // TC. `vrpipe run --plugin tally_slot.so --platform tallied`.
+#include <vrpipe/model/timed.h>
+#include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/simulation.h>
-#include <vrpipe/registry.h>
-#include <vrpipe/timed.h>
-#include <vrpipe/untimed.h>
 
 VRPIPE_PLUGIN
 

@@ -9,7 +9,7 @@
 #include <systemc>
 #include <tlm>
 
-#include <vrpipe/error.h>
+#include <vrpipe/component/error.h>
 #include <vrpipe/platforms/wiring.h>
 #include <vrpipe/workloads/scene.h>
 

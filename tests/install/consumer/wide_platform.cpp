@@ -1,7 +1,7 @@
 // A platform and a variant as a plugin: `vrpipe compare --plugin wide_platform.so --platform wide`, whose table has the
 // variant beside the others.
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/wiring.h>
-#include <vrpipe/registry.h>
 
 VRPIPE_PLUGIN
 

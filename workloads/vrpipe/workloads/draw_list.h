@@ -1,6 +1,6 @@
 #pragma once
 
-#include <vrpipe/draw.h>
+#include <vrpipe/pipeline/draw.h>
 #include <cstdint>
 #include <filesystem>
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include <vrpipe/draw.h>
+#include <vrpipe/pipeline/draw.h>
 
 namespace vrpipe {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include <vrpipe/draw.h>
+#include <vrpipe/pipeline/draw.h>
 #include <vrpipe/workloads/camera.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 

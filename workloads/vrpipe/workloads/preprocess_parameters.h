@@ -1,6 +1,6 @@
 #pragma once
 
-#include <vrpipe/parameter.h>
+#include <vrpipe/component/parameter.h>
 #include <vrpipe/workloads/preprocess.h>
 
 namespace vrpipe {

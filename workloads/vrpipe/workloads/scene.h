@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include <vrpipe/draw.h>
+#include <vrpipe/pipeline/draw.h>
 #include <vrpipe/workloads/camera.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 #include <vrpipe/workloads/preprocess.h>

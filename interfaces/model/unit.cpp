@@ -1,0 +1,55 @@
+#include <vrpipe/model/unit.h>
+
+#include <algorithm>
+#include <map>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
+
+namespace vrpipe {
+
+namespace {
+
+template <class Port>
+Port& port_named(const std::vector<Port*>& ports, const std::string& unit, const std::string& name) {
+  std::vector<std::string> names;
+  for (Port* port : ports) {
+    if (port->name() == name) return *port;
+    names.push_back(port->name());
+  }
+  throw UserError("unknown port '" + name + "'", "unit " + unit, "the unit has no such port",
+                  names.empty() ? "it has none in this direction" : "did you mean " + nearest_name(name, names) + "?");
+}
+
+std::map<std::string, UnitMaker>& makers() {
+  static std::map<std::string, UnitMaker> all;
+  return all;
+}
+
+}  // namespace
+
+Unit::Unit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector<WorkKind> work)
+    : sc_module(name),
+      Component({&domain, domain.attach(*this)}),
+      occupancy_(domain.frame_end(), std::move(work)),
+      account_(domain.frame_end()) {}
+
+InPort& Component::in(const std::string& name) { return port_named(in_ports, label(), name); }
+OutPort& Component::out(const std::string& name) { return port_named(out_ports, label(), name); }
+bool Component::has_out(const std::string& name) const {
+  return std::any_of(out_ports.begin(), out_ports.end(), [&](const OutPort* port) { return port->name() == name; });
+}
+
+void register_unit_maker(const std::string& slot, UnitMaker maker) {
+  if (makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();
+  Registry::instance().add_problem(
+      {"slot " + slot + " has a module for cycle already", "write a behaviour for the slot instead"});
+}
+
+const UnitMaker& unit_maker(const std::string& slot) {
+  const auto found = makers().find(slot);
+  if (found == makers().end()) throw SimulationFault("registry", 0, "slot " + slot + " has no module");
+  return found->second;
+}
+
+}  // namespace vrpipe

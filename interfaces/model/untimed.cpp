@@ -1,0 +1,31 @@
+#include <vrpipe/model/untimed.h>
+
+#include <map>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
+
+namespace vrpipe {
+
+namespace {
+
+std::map<std::string, UntimedUnitMaker>& makers() {
+  static std::map<std::string, UntimedUnitMaker> all;
+  return all;
+}
+
+}  // namespace
+
+void register_untimed_unit_maker(const std::string& slot, UntimedUnitMaker maker) {
+  if (makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();
+  Registry::instance().add_problem(
+      {"slot " + slot + " has a unit without time already", "write a behaviour for the slot instead"});
+}
+
+const UntimedUnitMaker& untimed_unit_maker(const std::string& slot) {
+  const auto found = makers().find(slot);
+  if (found == makers().end()) throw SimulationFault("registry", 0, "slot " + slot + " has no unit without time");
+  return found->second;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,117 @@
+#include <vrpipe/pipeline/frame.h>
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/render_context.h>
+
+namespace vrpipe {
+
+namespace {
+
+constexpr std::uint32_t largest_side = 16384;
+constexpr std::uint64_t most_splats = std::uint64_t{1} << 31;  // primitives are numbered in 32 bits
+
+auto fields_of(const DrawState& state) {
+  return std::tie(state.early_termination, state.termination_threshold, state.termination_inclusive,
+                  state.pruning_threshold, state.splat_extent, state.obb_padding);
+}
+
+}  // namespace
+
+bool operator==(const DrawState& a, const DrawState& b) { return fields_of(a) == fields_of(b); }
+
+const char* name_of(Termination termination) { return termination == Termination::strict ? "strict" : "paper"; }
+
+Termination termination_named(const std::string& name) {
+  for (const Termination termination : {Termination::paper, Termination::strict}) {
+    if (name == name_of(termination)) return termination;
+  }
+  throw UserError("unknown termination '" + name + "'", "--termination", "there is no such rule",
+                  "use paper or strict");
+}
+
+Frame::Frame(std::uint32_t width, std::uint32_t height) : width_(width), height_(height) {
+  if (width == 0 || height == 0 || width > largest_side || height > largest_side) {
+    throw UserError(fmt::format("unusable size {}x{}", width, height), "frame",
+                    fmt::format("a side is 0 or beyond {} pixels", largest_side),
+                    fmt::format("use 1 to {}", largest_side));
+  }
+}
+
+std::shared_ptr<Frame> Frame::of(const Draw& draw, const DrawState& state) {
+  auto frame = std::make_shared<Frame>(draw.width, draw.height);
+  frame->draw(std::shared_ptr<const Draw>(&draw, [](const Draw*) {}), state);
+  return frame;
+}
+
+void Frame::draw(std::shared_ptr<const Draw> geometry, const DrawState& state, std::string name, std::uint32_t first,
+                 std::uint32_t splats) {
+  const auto refuse = [&](const std::string& why, const std::string& remedy) {
+    throw UserError(fmt::format("cannot draw '{}'", name), fmt::format("draw {} of the frame", draws_.size()), why,
+                    remedy);
+  };
+  if (geometry->width != width_ || geometry->height != height_) {
+    refuse(fmt::format("it is made for {}x{} pixels, the frame has {}x{}", geometry->width, geometry->height, width_,
+                       height_),
+           "make all draws for one size");
+  }
+  const std::size_t there = geometry->splats.size();
+  if (!geometry->triangles.empty() && geometry->triangles.size() != there) {
+    refuse(fmt::format("it has {} triangles for {} splats", geometry->triangles.size(), there),
+           "give one for each splat, or none");
+  }
+  if (splats == ~0U && first <= there) splats = static_cast<std::uint32_t>(there - first);
+  if (first > there || splats > there - first) {
+    refuse(fmt::format("splats {} to {} of {}", first, std::uint64_t{first} + splats, there), "draw what is there");
+  }
+  if (draws_.size() == most_draws) refuse(fmt::format("a frame has {} draws at most", most_draws), "use fewer");
+  if (std::uint64_t{splats_} + splats > most_splats) refuse("a frame has 2^31 splats at most", "use fewer");
+  Command command;
+  command.is_draw = true;
+  command.draw = static_cast<DrawIndex>(draws_.size());
+  command.changes_state = !draws_.empty() && draws_.back().state != state;
+  add(command);
+  draws_.push_back({std::move(name), state, std::move(geometry), first, splats, splats_, epoch_});
+  splats_ += splats;
+}
+
+void Frame::clear(Clear clear) {
+  Command command;
+  command.clear = clear;
+  add(command);
+  if (clear.termination) ++epoch_;
+}
+
+void Frame::add(const Command& command) {
+  constexpr std::size_t most_commands = 0xfffe;  // marks have 16 bits
+  if (commands_.size() == most_commands) {
+    throw UserError("cannot draw the frame", "frame", fmt::format("it has more than {} commands", most_commands),
+                    "use fewer");
+  }
+  commands_.push_back(command);
+}
+
+void Frame::change_states(const std::function<void(DrawState&)>& change) {
+  for (DrawCall& call : draws_) change(call.state);
+  for (Command& command : commands_) {
+    command.changes_state = command.is_draw && command.draw > 0 &&
+                            draws_[command.draw].state != draws_[command.draw - std::size_t{1}].state;
+  }
+}
+
+bool Frame::terminates_early() const {
+  return std::any_of(draws_.begin(), draws_.end(), [](const DrawCall& call) { return call.state.early_termination; });
+}
+
+const Clear* Frame::clear_of(Mark mark) const {
+  if (mark == Mark::none || mark == Mark::end_of_frame) return nullptr;
+  const Command& command = commands_[static_cast<std::size_t>(mark) - 1];
+  return command.is_draw ? nullptr : &command.clear;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,134 @@
+#include <vrpipe/pipeline/geometry.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace vrpipe {
+
+namespace {
+
+struct Point {
+  double x, y;
+};
+
+std::int32_t snap(double pixels, double steps_per_pixel) {
+  return static_cast<std::int32_t>(std::floor(pixels * steps_per_pixel + 0.5));
+}
+
+bool in_guard_band(const Point& point) {
+  return std::fabs(point.x) <= guard_band_pixels && std::fabs(point.y) <= guard_band_pixels;
+}
+
+/// The part of [-1, 1] along an axis that can reach the viewport's circumcircle.
+void cut_axis(const Point& center, const Point& axis, const Point& view_center, double view_radius, double& low,
+              double& high) {
+  const double squared = axis.x * axis.x + axis.y * axis.y;
+  if (!(squared > 0)) return;
+  const double length = std::sqrt(squared);
+  const double middle = ((view_center.x - center.x) * axis.x + (view_center.y - center.y) * axis.y) / squared;
+  low = std::min(std::max(low, middle - view_radius / length), 1.0);
+  high = std::max(std::min(high, middle + view_radius / length), -1.0);
+}
+
+bool box_corners(const RenderContext& context, const DrawState& state, const Splat& splat,
+                 std::array<Point, 4>& corners) {
+  const Point center{splat.cx, splat.cy};
+  Point a{splat.ax, splat.ay};
+  Point b{splat.bx, splat.by};
+  if (state.splat_extent == SplatExtent::axis_aligned_box) {
+    const double half_width = std::sqrt(a.x * a.x + b.x * b.x);
+    const double half_height = std::sqrt(a.y * a.y + b.y * b.y);
+    a = {half_width, 0.0};
+    b = {0.0, half_height};
+  } else if (state.splat_extent == SplatExtent::three_sigma && splat.r > 0) {
+    const double scale = 3.0 / static_cast<double>(splat.r);
+    a = {a.x * scale, a.y * scale};
+    b = {b.x * scale, b.y * scale};
+  }
+  const double padding =
+      static_cast<double>(state.obb_padding) / static_cast<double>(1U << context.precision.subpixel_bits);
+  for (Point* axis : {&a, &b}) {
+    const double length = std::sqrt(axis->x * axis->x + axis->y * axis->y);
+    if (length > 0) {
+      const double scale = (length + padding) / length;
+      axis->x *= scale;
+      axis->y *= scale;
+    }
+  }
+  // A box of no extent has no direction; it still covers a sample that lies on its centre.
+  if (a.x == 0 && a.y == 0 && b.x == 0 && b.y == 0) {
+    a.x = padding;
+    b.y = padding;
+  }
+  double a0 = -1;
+  double a1 = 1;
+  double b0 = -1;
+  double b1 = 1;
+  const auto corner = [&](double u, double v) {
+    return Point{center.x + u * a.x + v * b.x, center.y + u * a.y + v * b.y};
+  };
+  const auto set_corners = [&] { corners = {corner(a0, b0), corner(a1, b0), corner(a0, b1), corner(a1, b1)}; };
+  set_corners();
+  if (!std::all_of(corners.begin(), corners.end(), in_guard_band)) {
+    const double width = context.frame->width();
+    const double height = context.frame->height();
+    const Point view_center{width / 2, height / 2};
+    const double view_radius = 0.5 * std::sqrt(width * width + height * height) + 2.0;
+    cut_axis(center, a, view_center, view_radius, a0, a1);
+    cut_axis(center, b, view_center, view_radius, b0, b1);
+    set_corners();
+  }
+  // Also false for NaN; a box off to one side of the screen keeps a far corner only when it misses the viewport.
+  return std::all_of(corners.begin(), corners.end(), in_guard_band);
+}
+
+}  // namespace
+
+bool snap_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
+                   SnappedTriangle& out) {
+  const DrawCall& call = context.draw(draw);
+  const auto steps = static_cast<double>(1U << context.precision.subpixel_bits);
+  if (const ScreenTriangle* const given = call.triangle(splat)) {
+    for (unsigned vertex = 0; vertex < 3; ++vertex) {
+      const Point point{given->x[vertex], given->y[vertex]};
+      if (!in_guard_band(point)) return false;
+      out.x[vertex] = snap(point.x, steps);
+      out.y[vertex] = snap(point.y, steps);
+    }
+    return true;
+  }
+  std::array<Point, 4> corners;
+  if (!box_corners(context, call.state, call.splat(splat), corners)) return false;
+  constexpr unsigned order[2][3] = {{0, 1, 2}, {1, 3, 2}};
+  for (unsigned vertex = 0; vertex < 3; ++vertex) {
+    const Point& point = corners[order[triangle][vertex]];
+    out.x[vertex] = snap(point.x, steps);
+    out.y[vertex] = snap(point.y, steps);
+  }
+  return true;
+}
+
+std::int64_t doubled_area(const SnappedTriangle& t) {
+  const std::int64_t x1 = std::int64_t{t.x[1]} - t.x[0];
+  const std::int64_t y1 = std::int64_t{t.y[1]} - t.y[0];
+  const std::int64_t x2 = std::int64_t{t.x[2]} - t.x[0];
+  const std::int64_t y2 = std::int64_t{t.y[2]} - t.y[0];
+  return x1 * y2 - x2 * y1;
+}
+
+PixelRect covered_bounds(const SnappedTriangle& t, unsigned subpixel_bits, std::uint32_t width, std::uint32_t height) {
+  const std::int32_t half = std::int32_t{1} << (subpixel_bits - 1);
+  // The sample of pixel p is at p + 1/2: the first at or right of x is ceil(x - 1/2), the last at or left is floor.
+  const auto first = [&](std::int32_t v) {
+    return (v - half + (std::int32_t{1} << subpixel_bits) - 1) >> subpixel_bits;
+  };
+  const auto last = [&](std::int32_t v) { return (v - half) >> subpixel_bits; };
+  PixelRect bounds;
+  bounds.x0 = std::max(first(*std::min_element(t.x.begin(), t.x.end())), 0);
+  bounds.y0 = std::max(first(*std::min_element(t.y.begin(), t.y.end())), 0);
+  bounds.x1 = std::min(last(*std::max_element(t.x.begin(), t.x.end())) + 1, static_cast<std::int32_t>(width));
+  bounds.y1 = std::min(last(*std::max_element(t.y.begin(), t.y.end())) + 1, static_cast<std::int32_t>(height));
+  return bounds;
+}
+
+}  // namespace vrpipe

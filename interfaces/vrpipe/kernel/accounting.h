@@ -1,0 +1,124 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include <vrpipe/kernel/ring.h>
+
+namespace vrpipe {
+
+using Cycle = std::uint64_t;
+constexpr Cycle never = ~Cycle{0};
+
+/// What a unit does with a cycle; each cycle of a run is charged to exactly one.
+enum class UnitState : std::uint8_t {
+  busy,     ///< moved at least one item
+  starved,  ///< has nothing to work on
+  blocked,  ///< has work, but the next unit takes none
+  memory,   ///< waits for memory
+  latency,  ///< waits for its own pipeline or a hazard
+};
+constexpr unsigned unit_states = 5;
+const char* name_of(UnitState state);
+
+/// Where a draw ends: in the cycle after the last of its quads has been blended, or dropped by a test, by pruning or by
+/// a merge. Known only once all of the frame has passed; until then units say what it cannot be earlier than.
+class FrameEnd {
+ public:
+  /// A quad ends in the cycle before `cycle`, or later.
+  void not_before(Cycle cycle) { so_far_ = std::max(so_far_, cycle); }
+  /// The end, as far as it is known: it is this or later. 0 before the first quad.
+  Cycle so_far() const { return so_far_; }
+
+ private:
+  Cycle so_far_ = 0;
+};
+
+/// Sees the states of a unit, from outside.
+class StateObserver {
+ public:
+  virtual ~StateObserver() = default;
+  /// The unit is in a state from a cycle on; before the first call it is starved. At `lt` and `at` the cycle may be ahead of the clock.
+  virtual void entered(UnitState state, Cycle from) = 0;
+};
+
+/// Charges cycles to states; a state holds until the next one is entered. What a unit does after the end of the frame is
+/// not charged, so changes are kept until the draw is known to last as long.
+class StateAccount {
+ public:
+  /// `frame_end` outlives the account.
+  explicit StateAccount(const FrameEnd& frame_end) : frame_end_(&frame_end) {}
+
+  /// `now` is not before that of the call before.
+  void enter(UnitState state, Cycle now) {
+    if (state == state_) return;
+    if (observer_ != nullptr) observer_->entered(state, now);
+    changes_.push({state_, now});
+    state_ = state;
+    if (changes_.size() >= most_changes_) settle();
+  }
+
+  /// Charges exactly the `end` cycles of the run; not before `frame_end.so_far()`.
+  void close(Cycle end);
+
+  /// The observer outlives the account.
+  void observe(StateObserver& observer) { observer_ = &observer; }
+
+  UnitState state() const { return state_; }
+  std::uint64_t cycles(UnitState state) const { return cycles_[static_cast<unsigned>(state)]; }
+
+ private:
+  struct Change {
+    UnitState state;  ///< which held until
+    Cycle until;
+  };
+  void settle();
+  void charge(UnitState state, Cycle until) {
+    cycles_[static_cast<unsigned>(state)] += until - charged_;
+    charged_ = until;
+  }
+
+  static constexpr std::size_t fewest_changes = 64;
+  const FrameEnd* frame_end_;
+  StateObserver* observer_ = nullptr;
+  UnitState state_ = UnitState::starved;
+  Ring<Change> changes_;  ///< not charged yet
+  std::size_t most_changes_ = fewest_changes;
+  Cycle charged_ = 0;  ///< cycles charged so far
+  std::array<std::uint64_t, unit_states> cycles_{};
+};
+
+/// Work of one kind, in items. What is done after the end of the frame is not counted.
+class WorkTally {
+ public:
+  /// `frame_end` outlives the tally.
+  explicit WorkTally(const FrameEnd& frame_end) : frame_end_(&frame_end) {}
+
+  /// Items that keep the unit from cycle `from` to `until` - 1.
+  void add(std::uint64_t items, Cycle from, Cycle until) {
+    items_ += items;
+    if (until > frame_end_->so_far()) note(items, from, until);
+  }
+  /// Items that keep it for a cycle.
+  void add(std::uint64_t items, Cycle at) { add(items, at, at + 1); }
+
+  /// Those done before cycle `end`, and of those under way then the share that is done; `end` is not before
+  /// `frame_end.so_far()`. Without an end, all.
+  double items(Cycle end = never) const;
+
+ private:
+  struct Span {
+    std::uint64_t items;
+    Cycle from, until;
+  };
+  void note(std::uint64_t items, Cycle from, Cycle until);
+
+  static constexpr std::size_t fewest_spans = 64;
+  const FrameEnd* frame_end_;
+  std::uint64_t items_ = 0;
+  Ring<Span> late_;  ///< of `items_`, those that may be after the end
+  std::size_t most_spans_ = fewest_spans;
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <vrpipe/component/statistic.h>
+
+namespace vrpipe {
+
+/// What a sectored cache counts. Every access is of one line, and of one or more of its sectors:
+///     accesses = hits + misses, of lines and of sectors.
+struct SectoredCacheStatistics : StatisticSet {
+  /// The part `name` of a component.
+  SectoredCacheStatistics(StatisticSet& owner, const char* name) : StatisticSet(owner, name) {}
+
+  Counter line_accesses{*this, "line_accesses", "accesses", "one for each item that needs sectors of a line"};
+  Counter line_hits{*this, "line_hits", "accesses", "to a line that is held, its sectors there or not"};
+  Counter line_misses{*this, "line_misses", "accesses", "that allocate the line"};
+  Counter lines_evicted{*this, "lines_evicted", "lines", "that went for another"};
+  Counter sector_accesses{*this, "sector_accesses", "sectors", "needed, by one access each"};
+  Counter sector_hits{*this, "sector_hits", "sectors", "needed that are there or on their way"};
+  Counter sector_misses{*this, "sector_misses", "sectors", "needed that have to be filled"};
+  Counter sectors_written_back{*this, "sectors_written_back", "sectors",
+                               "dirty in evicted lines; those left at the end of the frame stay"};
+  Counter bytes_filled{*this, "bytes_filled", "bytes", "read from the memory below"};
+  Counter bytes_written_back{*this, "bytes_written_back", "bytes", "written to it"};
+  Ratio line_hit_rate{*this, line_hits, line_accesses, "line_hit_rate", "hits per access", "of accesses"};
+  Ratio sector_hit_rate{*this, sector_hits, sector_accesses, "sector_hit_rate", "hits per sector", "of sectors needed"};
+  Ratio bytes_per_sector{*this,
+                         bytes_filled + bytes_written_back,
+                         sector_accesses,
+                         "bytes_per_sector",
+                         "bytes per sector",
+                         "moved for a sector needed"};
+};
+
+/// What a cache counts that holds whatever was accessed once. Every access is of one or more sectors:
+///     accesses = hits + misses.
+struct CompulsoryMissStatistics : StatisticSet {
+  /// The part `name` of a component.
+  CompulsoryMissStatistics(StatisticSet& owner, const char* name) : StatisticSet(owner, name) {}
+
+  void count(bool hit) {
+    ++sector_accesses;
+    ++(hit ? sector_hits : sector_misses);
+  }
+
+  Counter sector_accesses{*this, "sector_accesses", "sectors", "read or written, by one access each"};
+  Counter sector_hits{*this, "sector_hits", "sectors", "accessed that are there or on their way"};
+  Counter sector_misses{*this, "sector_misses", "sectors", "accessed for the first time"};
+  Counter bytes_filled{*this, "bytes_filled", "bytes",
+                       "read from the memory below; for a sector that is first written whole none are"};
+  Ratio sector_hit_rate{
+      *this, sector_hits, sector_accesses, "sector_hit_rate", "hits per sector", "of sectors accessed"};
+};
+
+}  // namespace vrpipe

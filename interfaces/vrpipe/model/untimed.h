@@ -1,0 +1,159 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <vrpipe/kernel/link.h>
+#include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/batch.h>
+#include <vrpipe/pipeline/render_context.h>
+
+/// Units and ports without time: the fidelities `functional` and `bound`, and what strict termination runs ahead. They
+/// have the ports of `lt` and `at` (batch.h) and no SystemC. Sending is a call: it returns when all that the item leads to
+/// has been done, down to the last blend.
+
+namespace vrpipe {
+
+template <class Item>
+class UntimedIn;
+
+/// Whatever takes items: the receiving end of a unit, or a tap on a link.
+template <class Item>
+class UntimedTarget {
+ public:
+  virtual ~UntimedTarget() = default;
+  virtual void take(const Item& item) = 0;
+};
+
+/// The sending end.
+template <class Item>
+class UntimedOut : public OutPort {
+ public:
+  UntimedOut(PortOwner& owner, const std::string& name) : OutPort(name, owner.clock) {
+    owner.out_ports.push_back(this);
+  }
+  void send(const Item& item) const { target_->take(item); }
+
+  using OutPort::connect;
+  /// Throws UserError as between other ports; depth, latency and rate mean nothing without time.
+  void connect(InPort& in, const LinkOptions& options) override;
+  /// What is sent is lost.
+  void stub() override {
+    struct Sink final : UntimedTarget<Item> {
+      void take(const Item&) override {}
+    };
+    static Sink sink;
+    attach(sink);
+  }
+  /// Sends to something else than a unit's port.
+  void attach(UntimedTarget<Item>& target) {
+    target_ = &target;
+    mark_connected();
+  }
+  /// Where it goes, for a tap that is put before that; null before it is connected.
+  UntimedTarget<Item>* target() const { return target_; }
+  std::uint64_t transferred() const override { return 0; }
+
+ private:
+  UntimedTarget<Item>* target_ = nullptr;
+  std::unique_ptr<UntimedTarget<Item>> tap_;
+};
+
+/// The receiving end of a unit.
+template <class Item>
+class UntimedIn : public UntimedTarget<Item>, public InPort {
+ public:
+  UntimedIn(PortOwner& owner, const std::string& name) : InPort(name, owner.clock) { owner.in_ports.push_back(this); }
+  void taken() { mark_connected(); }
+  void open() override {}
+  bool empty() const override { return true; }
+  void stub() override { mark_connected(); }
+};
+
+/// The same around the unit's handler, a lambda, so that taking an item is one call.
+template <class Item, class Function>
+class UntimedHandler final : public UntimedIn<Item> {
+ public:
+  UntimedHandler(PortOwner& owner, const std::string& name, Function function)
+      : UntimedIn<Item>(owner, name), function_(function) {}
+  void take(const Item& item) override { function_(item); }
+
+ private:
+  Function function_;
+};
+
+template <class Item>
+void UntimedOut<Item>::connect(InPort& in, const LinkOptions& options) {
+  struct Tap final : UntimedTarget<Item> {
+    Tap(UntimedTarget<Item>& end, ItemObserver<Item>& observing) : next(end), observer(observing) {}
+    void take(const Item& item) override {
+      next.take(item);
+      observer.passed(item, 0, 0);
+    }
+    UntimedTarget<Item>& next;
+    ItemObserver<Item>& observer;
+  };
+  auto* const typed = dynamic_cast<UntimedIn<Item>*>(&in);
+  check_ends(*this, in, typed != nullptr);
+  typed->taken();
+  attach(*typed);
+  if (ItemObserver<Item>* const observer = observer_of<Item>(options.observers, *this)) {
+    tap_ = std::make_unique<Tap>(*typed, *observer);
+    attach(*tap_);
+  }
+}
+
+/// Told of what the colour cache and the blender do for each quad: for the bound.
+class BlendObserver {
+ public:
+  virtual ~BlendObserver() = default;
+  virtual void looked_up(const CropBehaviour::LineAccess& access) = 0;
+  virtual void blended(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) = 0;
+};
+
+/// A unit without time: a functional model with ports.
+class UntimedUnit : public Component {
+ public:
+  explicit UntimedUnit(std::string name) : Component(ClockHandle()), name_(std::move(name)) {}
+
+  std::string label() const override { return name_; }
+  /// Of a kind of work of its slot (occupancy.h), so far: the items that it is counted in, but whole warps where that is
+  /// cycles or instructions.
+  std::uint64_t items(unsigned kind) const { return items_[kind]; }
+
+  /// For the unit that begins a draw: does a piece of it; false after the last.
+  virtual bool run_piece() { return false; }
+  /// For the unit that blends: quads that will come before long. Then what they are blended into is in the host's cache.
+  virtual void prefetch(const Warp&) {}
+  /// For the unit that launches warps: who is to know of them. It outlives this one.
+  virtual void prefetch_for(UntimedUnit& /*blender*/) {}
+  /// For the unit that blends: it looks its colour cache up from now on. The observer outlives it.
+  virtual void observe(BlendObserver&) {}
+
+ protected:
+  template <class Item, class Function>
+  std::unique_ptr<UntimedIn<Item>> input(const std::string& name, Function function) {
+    return std::make_unique<UntimedHandler<Item, Function>>(*this, name, function);
+  }
+  void did(unsigned kind, std::uint64_t items) { items_[kind] += items; }
+
+ private:
+  std::string name_;
+  static constexpr unsigned most_kinds = 8;
+  std::array<std::uint64_t, most_kinds> items_{};
+};
+
+/// Makes the unit without time around a functional model of a slot. `gpcs` is how many GPCs the front end serves.
+using UntimedUnitMaker =
+    std::function<std::unique_ptr<UntimedUnit>(const std::string& name, std::unique_ptr<Behaviour> behaviour,
+                                               const RenderContext& context, unsigned gpcs)>;
+
+/// Registered by each unit without time for its slot. A second one for a slot is a problem of the registry's.
+void register_untimed_unit_maker(const std::string& slot, UntimedUnitMaker maker);
+const UntimedUnitMaker& untimed_unit_maker(const std::string& slot);
+
+}  // namespace vrpipe

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <vrpipe/pipeline/draw.h>
+#include <vrpipe/pipeline/draw_state.h>
+#include <vrpipe/pipeline/payload.h>
+
+namespace vrpipe {
+
+/// What is set to 0 between draws, for the whole framebuffer.
+struct Clear {
+  bool color = false;
+  bool termination = false;  ///< the termination bits of the stencil: every pixel is open again
+};
+
+/// Splats drawn with one state.
+struct DrawCall {
+  std::string name;  ///< for reports
+  DrawState state;
+  std::shared_ptr<const Draw> geometry;
+  std::uint32_t first = 0;   ///< splat of the geometry that is drawn first
+  std::uint32_t splats = 0;  ///< drawn from there on
+  /// What the first one is called in the frame, where splats are numbered through all draws; set by the frame.
+  std::uint32_t base = 0;
+  std::uint16_t epoch = 0;  ///< clears of termination before this draw; set by the frame
+
+  const Splat& splat(std::uint32_t number) const { return geometry->splats[first + (number - base)]; }
+  /// Null where the splat is drawn as its box.
+  const ScreenTriangle* triangle(std::uint32_t number) const {
+    return geometry->triangles.empty() ? nullptr : &geometry->triangles[first + (number - base)];
+  }
+};
+
+/// What an application has drawn into one framebuffer: clears and draws, in order. The framebuffer is cleared at first.
+///
+/// Draws overlap in the pipeline. Those that follow one another with equal state share bins, warps and merging, as if
+/// they were one; before a draw of another state, and before a clear, TGC and TC hand on what they hold.
+class Frame {
+ public:
+  /// width and height in pixels. Throws UserError for a side that is 0 or beyond 16384.
+  Frame(std::uint32_t width, std::uint32_t height);
+  /// A frame of one draw, which it refers to and which outlives it.
+  static std::shared_ptr<Frame> of(const Draw& draw, const DrawState& state = {});
+
+  std::uint32_t width() const { return width_; }
+  std::uint32_t height() const { return height_; }
+
+  /// Splats `first` to `first` + `splats` - 1 of a geometry, all of it by default. Throws UserError for one of another
+  /// size than the frame's, splats that it does not have, triangles that are not as many as its splats, and more than 32767
+  /// draws, 65534 commands or 2^31 splats.
+  void draw(std::shared_ptr<const Draw> geometry, const DrawState& state, std::string name = {},
+            std::uint32_t first = 0, std::uint32_t splats = ~0U);
+  /// Throws UserError for more than 65534 commands.
+  void clear(Clear clear);
+
+  /// A clear or a draw.
+  struct Command {
+    bool is_draw = false;
+    DrawIndex draw = 0;
+    Clear clear = {};
+    bool changes_state = false;  ///< of a draw: the one before has another state
+  };
+  const std::vector<Command>& commands() const { return commands_; }
+  const std::vector<DrawCall>& draws() const { return draws_; }
+  const DrawCall& draw_call(DrawIndex draw) const { return draws_[draw]; }
+  /// Changes the state of every draw.
+  void change_states(const std::function<void(DrawState&)>& change);
+  std::uint32_t splats() const { return splats_; }  ///< of all draws
+  /// Whether any draw terminates early: then all bins pass through ZROP, so that none overtakes another.
+  bool terminates_early() const;
+
+  /// The mark before a command.
+  static Mark mark_of(std::size_t command) { return static_cast<Mark>(command + 1); }
+  /// The clear that a mark stands for; null for another mark.
+  const Clear* clear_of(Mark mark) const;
+
+ private:
+  void add(const Command& command);
+
+  std::uint32_t width_;
+  std::uint32_t height_;
+  std::uint32_t splats_ = 0;
+  std::uint16_t epoch_ = 0;
+  std::vector<Command> commands_;
+  std::vector<DrawCall> draws_;
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/payload.h>
+#include <vrpipe/pipeline/tile_grid.h>
+
+namespace vrpipe {
+
+/// Watches that the quads of every position are blended in draw order. On in every run.
+class BlendOrderMonitor {
+ public:
+  BlendOrderMonitor(std::uint32_t width, std::uint32_t height) : grid_(width, height), next_(grid_.quads()) {}
+
+  /// Quads `from` to `to` - 1 of a warp. Throws SimulationFault when a primitive comes after a later one.
+  void blended(const ShadedWarp& warp, unsigned from, unsigned to, std::uint64_t cycle) {
+    const std::size_t tile = grid_.place(warp.tile, 0);
+    for (unsigned i = from; i < to; ++i) blended(tile + warp.position[i], warp, i, cycle);
+  }
+  /// A quad of a warp, whose place in the grid is known.
+  void blended(std::size_t place, const ShadedWarp& warp, unsigned index, std::uint64_t cycle) {
+    std::uint32_t& next = next_[place];
+    const std::uint32_t last = warp.last_primitive[index];
+    if (warp.first_primitive[index] < next || last < warp.first_primitive[index]) fault(warp, index, next, cycle);
+    next = last + 1;
+  }
+  /// A quad of this place will be blended before long. Inlined, or GCC drops the call.
+  [[gnu::always_inline]] void prefetch(std::size_t place) const { __builtin_prefetch(&next_[place], 1); }
+
+ private:
+  [[noreturn]] static void fault(const ShadedWarp& warp, unsigned index, std::uint32_t next, std::uint64_t cycle);
+
+  TileGrid grid_;
+  std::vector<std::uint32_t> next_;
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include <vrpipe/pipeline/frame.h>
+
+namespace vrpipe {
+
+/// See the contract: `paper`, an update of the termination bit carries its time; `strict`, order alone decides.
+enum class Termination : std::uint8_t { paper, strict };
+const char* name_of(Termination termination);
+/// Throws UserError naming those that exist.
+Termination termination_named(const std::string& name);
+
+/// Where a unit sits.
+struct Placement {
+  unsigned gpcs = 1;  ///< of the platform
+  unsigned gpc = 0;   ///< that the unit belongs to; it owns the screen tiles with owner_of(tile, gpcs) == gpc
+  bool owns(TileId tile) const { return gpcs == 1 || owner_of(tile, gpcs) == gpc; }
+};
+
+/// What a unit knows of the frame that it takes part in, of the hardware and of its own place.
+struct RenderContext {
+  std::shared_ptr<const Frame> frame;
+  ColorFormat format = ColorFormat::rgba16f;  ///< of the colour target
+  DevicePrecision precision;
+  Termination termination = Termination::paper;
+  Placement placement;
+
+  const DrawCall& draw(DrawIndex draw) const { return frame->draw_call(draw); }
+  const DrawState& state(DrawIndex draw) const { return frame->draw_call(draw).state; }
+};
+
+}  // namespace vrpipe

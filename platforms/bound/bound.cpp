@@ -1,0 +1,220 @@
+#include "bound/bound.h"
+
+#include <algorithm>
+#include <map>
+#include <type_traits>
+
+namespace vrpipe {
+
+namespace {
+
+double ratio(std::uint64_t items, std::uint64_t per_cycle) {
+  return items == 0 ? 0.0 : static_cast<double>(items) / static_cast<double>(per_cycle);
+}
+
+/// Cycles of so many items, each so long after the one before; if they are the last of the draw, up to the last item.
+double spaced(std::uint64_t items, double cycles, bool to_last) {
+  if (items == 0) return 0;
+  return to_last ? static_cast<double>(items - 1) * cycles + 1 : static_cast<double>(items) * cycles;
+}
+
+std::uint64_t instructions_of(const std::vector<ShaderSegment>& program) {
+  std::uint64_t sum = 0;
+  for (const ShaderSegment& segment : program) sum += segment.instructions;
+  return sum;
+}
+
+}  // namespace
+
+void Work::add(const Work& other) {
+  vertex_warps_issued += other.vertex_warps_issued;
+  triangles += other.triangles;
+  bin_entries += other.bin_entries;
+  setups += other.setups;
+  coarse_tiles += other.coarse_tiles;
+  fine_tiles += other.fine_tiles;
+  tile_pairs += other.tile_pairs;
+  quads_rasterized += other.quads_rasterized;
+  bin_beats += other.bin_beats;
+  quads_tested += other.quads_tested;
+  updates += other.updates;
+  survivors += other.survivors;
+  vertex_warps += other.vertex_warps;
+  warps += other.warps;
+  merging_warps += other.merging_warps;
+  color_quads += other.color_quads;
+  sectors += other.sectors;
+  sectors_filled += other.sectors_filled;
+  lines_filled += other.lines_filled;
+}
+
+PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc) {
+  const auto cost_of = [&](const char* slot, auto* of_slot, const auto& take) {
+    for (const Instance& instance : configuration.netlist().instances()) {
+      if (instance.slot != slot || (instance.gpc != gpc && !instance.in_front_end)) continue;
+      return take(*configuration.make_as<std::remove_pointer_t<decltype(of_slot)>>(instance));
+    }
+  };
+  cost_of("draw", static_cast<DrawBehaviour*>(nullptr),
+          [&](const auto& unit) { vertex_warps_per_cycle_ = unit.warps_per_1024_cycles() / 1024.0; });
+  cost_of("vpo", static_cast<VpoBehaviour*>(nullptr), [&](const auto& unit) { vpo_ = unit.cost(); });
+  cost_of("tgc", static_cast<TgcBehaviour*>(nullptr), [&](const auto& unit) { tgc_ = unit.cost(); });
+  cost_of("raster", static_cast<RasterBehaviour*>(nullptr), [&](const auto& unit) { raster_ = unit.cost(); });
+  cost_of("tc", static_cast<TcBehaviour*>(nullptr), [&](const auto& unit) { tc_ = unit.cost(); });
+  cost_of("prop", static_cast<PropBehaviour*>(nullptr), [&](const auto& unit) { prop_ = unit.cost(); });
+  cost_of("zrop", static_cast<ZropBehaviour*>(nullptr), [&](const auto& unit) { zrop_ = unit.cost(); });
+  cost_of("qru", static_cast<QruBehaviour*>(nullptr), [&](const auto& unit) { qru_ = unit.cost(); });
+  cost_of("sm", static_cast<SmBehaviour*>(nullptr), [&](const auto& unit) { sm_ = unit.cost(); });
+  cost_of("crop", static_cast<CropBehaviour*>(nullptr), [&](const auto& unit) { crop_ = unit.cost(); });
+  // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
+  warps_in_phase_ = 2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads);
+  times_out_ = tc_.timeout_in(configuration.request().termination) > 0;
+  const std::vector<MemoryInstance>& memories = configuration.netlist().memories();
+  if (std::any_of(memories.begin(), memories.end(), [](const MemoryInstance& memory) { return !memory.make; })) {
+    l2_bytes_per_cycle_ = configuration.l2().bytes_per_cycle;
+    l2_latency_cycles_ = configuration.l2().latency_cycles;
+  }
+}
+
+double PhaseBound::instructions(const Work& done) const {
+  return static_cast<double>(done.vertex_warps * instructions_of(sm_.vertex) +
+                             done.warps * instructions_of(sm_.fragment) +
+                             done.merging_warps * instructions_of(sm_.merge));
+}
+
+std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, bool to_last) const {
+  std::array<double, stages> cycles{};
+  cycles[draw] = spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_, to_last);
+  cycles[vpo] = ratio(done.triangles, vpo_.items_per_cycle);
+  cycles[tgc] = std::max(ratio(done.bin_entries, tgc_.items_per_cycle), ratio(done.setups, 1));
+  cycles[raster] = std::max({spaced(done.setups, raster_.setup_interval_cycles, to_last),
+                             ratio(done.coarse_tiles, raster_.coarse_tiles_per_cycle),
+                             ratio(done.fine_tiles, raster_.fine_tiles_per_cycle),
+                             spaced(done.tile_pairs, raster_.screen_tile_interval_cycles, to_last),
+                             ratio(done.quads_rasterized, raster_.quads_per_cycle)});
+  cycles[tc] = std::max(ratio(done.quads_rasterized, tc_.quads_per_cycle), ratio(done.bin_beats, 1));
+  cycles[test] = std::max(ratio(done.quads_tested, zrop_.quads_per_cycle) + update_cycles(done),
+                          ratio(done.quads_rasterized, prop_.quads_per_cycle));
+  cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
+  cycles[sm] = instructions(done) / sm_.instructions_per_cycle();
+  cycles[color] = static_cast<double>(done.color_quads) / prop_.color_rate.per_cycle();
+  cycles[l2] = l2_bytes_per_cycle_ == 0 ? 0.0 : ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_);
+  // A line, and a miss register, is taken for as long as a fill is under way; those of a phase's beginning may have been
+  // asked for before it.
+  const auto turns = [&](std::uint64_t fills, std::uint64_t places) {
+    return fills <= places ? 0.0 : ratio(fills - places, places) * l2_latency_cycles_;
+  };
+  cycles[crop] = std::max({static_cast<double>(done.color_quads) / crop_.blend_rate.per_cycle() +
+                               ratio(done.sectors, crop_.sectors_per_cycle),
+                           turns(done.lines_filled, std::max(crop_.cache_bytes / crop_.line_bytes, 1U)),
+                           turns(done.sectors_filled, crop_.mshrs)});
+  return cycles;
+}
+
+double PhaseBound::update_cycles(const Work& done) const {
+  const double updates = ratio(done.updates, zrop_.updates_per_cycle);
+  if (zrop_.quads_per_cycle >= QuadBeat::capacity) return updates;
+  // Beside a beat that takes several cycles updates take nothing of their own.
+  return std::max(0.0, updates - ratio(done.quads_tested, zrop_.quads_per_cycle));
+}
+
+double PhaseBound::idle_after_last(unsigned stage) const {
+  const double interval = stage == draw ? 1 / vertex_warps_per_cycle_
+                          : stage == raster
+                              ? std::max(raster_.setup_interval_cycles, raster_.screen_tile_interval_cycles)
+                              : 1.0;
+  return std::max(0.0, interval - 1);
+}
+
+std::array<double, PhaseBound::stages> PhaseBound::end_of(const Work& done, bool to_last) const {
+  const std::array<double, stages> cycles = cycles_of(done, to_last);
+  std::array<double, stages> end{};
+  for (unsigned stage = 0; stage < stages; ++stage) {
+    double begin = 0;
+    for (unsigned before = 0; before < stage; ++before) begin = std::max(begin, end_[before] - idle_after_last(before));
+    begin = std::max(begin, end_[stage]);
+    for (unsigned after = stage + 1; stage >= raster && after < stages; ++after)
+      begin = std::max(begin, end_before_[after]);
+    end[stage] = begin + cycles[stage];
+    if (stage > 0) end[stage] = std::max(end[stage], end[stage - 1] - (to_last ? 0 : idle_after_last(stage - 1)));
+  }
+  return end;
+}
+
+void PhaseBound::end_phase() {
+  if (up_to_quads_.quads_rasterized > 0) {
+    const std::array<double, stages> end = end_of(up_to_quads_, true);
+    last_quad_ = *std::max_element(end.begin(), end.end());
+    ended_ = total_;
+    ended_.add(up_to_quads_);
+  } else if (!has_quads()) {
+    Work passed = work;
+    passed.tile_pairs = 0;  // for a pair without quads nobody waits
+    const std::array<double, stages> end = end_of(passed, true);
+    last_quad_ = *std::max_element(end.begin(), end.end());
+  }
+  const std::array<double, stages> end = end_of(work, false);
+  end_before_ = end_;
+  end_ = end;
+  total_.add(work);
+  work = Work();
+  up_to_quads_ = Work();
+  up_to_quad_ = FrontEndWork();
+}
+
+double PhaseBound::busy_cycles(const std::string& slot) const {
+  double longest = 0;
+  std::map<unsigned, double> resources;
+  for (const OccupancyPart& part : parts(slot)) {
+    longest = std::max(longest, resources[part.resource] += part.cycles);
+  }
+  return longest;
+}
+
+std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
+  const Work& done = ended_;
+  const auto priced = [](const std::vector<WorkKind>& kinds, const std::vector<double>& items) {
+    std::vector<OccupancyPart> parts;
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      const WorkKind& kind = kinds[i];
+      parts.push_back({kind.name, kind.resource, items[i] * kind.cycles_per_item, kind.is_throughput});
+    }
+    return parts;
+  };
+  const auto count = [](std::uint64_t items) { return static_cast<double>(items); };
+  if (slot == "draw")
+    return priced(DrawWork::kinds(), {spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_, true)});
+  if (slot == "vpo") return priced(VpoWork::kinds(vpo_), {count(done.triangles)});
+  if (slot == "tgc") return priced(TgcWork::kinds(tgc_), {count(done.bin_entries), count(done.setups)});
+  if (slot == "raster") {
+    const double setups = spaced(done.setups, raster_.setup_interval_cycles, true) / raster_.setup_interval_cycles;
+    const double pairs =
+        spaced(done.tile_pairs, raster_.screen_tile_interval_cycles, true) / raster_.screen_tile_interval_cycles;
+    return priced(RasterWork::kinds(raster_),
+                  {setups, count(done.coarse_tiles), count(done.fine_tiles), pairs, count(done.quads_rasterized)});
+  }
+  if (slot == "tc") return priced(TcWork::kinds(tc_), {count(done.quads_rasterized), count(done.bin_beats)});
+  if (slot == "prop") {
+    return priced(PropWork::kinds(prop_),
+                  {count(done.quads_rasterized), done.quads_tested > 0 ? count(done.survivors) : 0.0,
+                   count(done.color_quads)});
+  }
+  if (slot == "zrop") {
+    return priced(ZropWork::kinds(zrop_), {count(done.quads_tested), update_cycles(done)});
+  }
+  if (slot == "qru") {
+    const double quads = count(done.survivors) - count(done.warps) * qru_.items_per_cycle;
+    return priced(QruWork::kinds(qru_), {std::max(quads, 0.0), count(done.warps)});
+  }
+  if (slot == "sm") {
+    return priced(SmWork::kinds(sm_), {count(done.vertex_warps * instructions_of(sm_.vertex)),
+                                       count(done.warps * instructions_of(sm_.fragment)),
+                                       count(done.merging_warps * instructions_of(sm_.merge))});
+  }
+  if (slot == "crop") return priced(CropWork::kinds(crop_), {count(done.color_quads), count(done.sectors)});
+  if (slot == "l2" && l2_bytes_per_cycle_ > 0)
+    return {{"bytes", 0, ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_), true}};
+  return {};
+}
+
+}  // namespace vrpipe

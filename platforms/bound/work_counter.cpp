@@ -1,0 +1,203 @@
+#include "bound/work_counter.h"
+
+#include <algorithm>
+
+#include <vrpipe/model/occupancy.h>
+#include <vrpipe/pipeline/batch.h>
+
+namespace vrpipe {
+
+namespace {
+
+unsigned bits_of_mask(std::uint32_t mask) {
+  unsigned count = 0;
+  for (; mask != 0; mask &= mask - 1) ++count;
+  return count;
+}
+
+std::uint64_t items(const UntimedUnit* unit, unsigned kind) { return unit == nullptr ? 0 : unit->items(kind); }
+
+}  // namespace
+
+/// From the survivors of a test to the colour cache.
+class WorkCounter::Blends final : public BlendObserver {
+ public:
+  Blends(Work& work, const Frame& frame, const ColorSurface& surface, const CropBehaviour::Cost& crop, bool only_needed,
+         bool any_order)
+      : work_(work), frame_(frame), grid_(surface.grid()), line_bytes_(crop.line_bytes) {
+    if (only_needed) terminated_.resize(grid_.quads());
+    if (any_order) filled_.resize(surface.size_bytes() / line_bytes_ + 1);
+  }
+
+  void passed(Mark mark) {
+    const Clear* const clear = frame_.clear_of(mark);
+    if (clear != nullptr && clear->termination) std::fill(terminated_.begin(), terminated_.end(), LaneMask{0});
+  }
+
+  void survived(const BinItem& item) {
+    work_.survivors += item.quads;
+    if (terminated_.empty() || item.quads == 0) return;
+    const std::size_t tile = grid_.place(item.tile, 0);
+    for (unsigned i = 0; i < item.quads; ++i) {
+      work_.survivors -= is_needed(tile, item.storage->flush.quads[i]) ? 0U : 1U;
+    }
+  }
+
+  void launched(const Warp& warp) {
+    if (warp.mark != Mark::none) return;
+    if (terminated_.empty()) {
+      ++work_.warps;
+      work_.merging_warps += warp.merge_pairs != 0 ? 1U : 0U;
+      return;
+    }
+    // In warps that are full: flushed at other times, these quads may find other company.
+    const std::size_t tile = grid_.place(warp.tile, 0);
+    for (unsigned i = 0; i < warp.count; ++i) {
+      if (!is_needed(tile, warp.quads[i])) continue;
+      ++needed_quads_;
+      const bool pair = i % 2 == 1 && (warp.merge_pairs >> (i / 2) & 1U) != 0;
+      needed_pairs_ += pair && is_needed(tile, warp.quads[i - 1]) ? 1U : 0U;
+    }
+    work_.warps += needed_quads_ / quads_per_warp;
+    needed_quads_ %= quads_per_warp;
+    work_.merging_warps += needed_pairs_ / (quads_per_warp / 2);
+    needed_pairs_ %= quads_per_warp / 2;
+  }
+
+  void looked_up(const CropBehaviour::LineAccess& access) override {
+    std::uint32_t fills = access.filled;
+    std::uint32_t written_back = access.written_back;
+    bool fills_line = access.replaced && fills != 0;
+    if (!filled_.empty()) {
+      std::uint32_t& before = filled_[access.address / line_bytes_];
+      fills_line = before == 0 && fills != 0;
+      fills &= ~before;
+      before |= fills;
+      written_back = 0;
+    }
+    work_.sectors += bits_of_mask(fills) + bits_of_mask(written_back);
+    work_.sectors_filled += bits_of_mask(fills);
+    work_.lines_filled += fills_line ? 1U : 0U;
+  }
+
+  void blended(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) override {
+    if (terminated_.empty()) {
+      ++work_.color_quads;
+      work_.updates += outcome.terminated != 0 ? 1U : 0U;
+      return;
+    }
+    LaneMask& before = terminated_[grid_.place(warp.tile, warp.position[index])];
+    work_.color_quads += !terminates(warp.draw[index]) || (warp.live[index] & ~before) != 0 ? 1U : 0U;
+    work_.updates += before == 0 && outcome.terminated != 0 ? 1U : 0U;
+    before = static_cast<LaneMask>(before | outcome.terminated);
+  }
+
+ private:
+  bool is_needed(std::size_t tile, const Quad& quad) const {
+    return !terminates(quad.draw) || (quad.coverage & ~terminated_[tile + quad.position]) != 0;
+  }
+  bool terminates(DrawIndex draw) const { return frame_.draw_call(draw).state.early_termination; }
+
+  Work& work_;
+  const Frame& frame_;
+  const TileGrid grid_;
+  const std::uint32_t line_bytes_;
+  std::vector<LaneMask> terminated_;   ///< by quad of the surface; empty if all work counts
+  std::vector<std::uint32_t> filled_;  ///< sectors so far, by line of the surface; empty if all moves count
+  unsigned needed_quads_ = 0;          ///< less than a warp
+  unsigned needed_pairs_ = 0;
+};
+
+/// Puts a function in the way of what a unit sends; it is given what comes next as well.
+template <class Item, class Function>
+void WorkCounter::tap(UntimedUnit* unit, const char* port, Function function) {
+  struct Made final : UntimedTarget<Item> {
+    Made(UntimedTarget<Item>& target, Function call) : next(target), function(call) {}
+    void take(const Item& item) override { function(item, next); }
+    UntimedTarget<Item>& next;
+    Function function;
+  };
+  if (unit == nullptr || !unit->has_out(port)) return;
+  auto* const out = dynamic_cast<UntimedOut<Item>*>(&unit->out(port));
+  if (out == nullptr || out->target() == nullptr) return;
+  auto made = std::make_shared<Made>(*out->target(), function);
+  out->attach(*made);
+  taps_.push_back(std::move(made));
+}
+
+WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc, PhaseBound& bound)
+    : bound_(bound),
+      draw_(gpu.of_slot("draw", gpc)),
+      vpo_(gpu.of_slot("vpo", gpc)),
+      tgc_(gpu.of_slot("tgc", gpc)),
+      raster_(gpu.of_slot("raster", gpc)),
+      tc_(gpu.of_slot("tc", gpc)),
+      zrop_(gpu.of_slot("zrop", gpc)),
+      sm_(gpu.of_slot("sm", gpc)) {
+  UntimedUnit* const prop = gpu.of_slot("prop", gpc);
+  UntimedUnit* const crop = gpu.of_slot("crop", gpc);
+  if (crop != nullptr) {
+    const auto* const colors = dynamic_cast<const CropBehaviour*>(&crop->behaviour());
+    // A time-out flushes bins when this run does not, and quads of theirs may terminate those that are with them here.
+    const bool times_out = bound.times_out();
+    const bool any_order = times_out || bound.tiles_may_overtake();
+    const bool only_needed = configuration.frame().terminates_early() && times_out;
+    blends_ = std::make_unique<Blends>(bound.work, configuration.frame(), *colors->surface(), colors->cost(),
+                                       only_needed, any_order);
+    crop->observe(*blends_);
+    tap<BinItem>(prop, "out_survivors", [this](const BinItem& item, UntimedTarget<BinItem>& next) {
+      if (item.mark == Mark::none) {
+        blends_->survived(item);
+      } else {
+        blends_->passed(item.mark);
+      }
+      next.take(item);
+    });
+    tap<Warp>(gpu.of_slot("qru", gpc), "out_warps", [this](const Warp& warp, UntimedTarget<Warp>& next) {
+      blends_->launched(warp);
+      next.take(warp);
+    });
+  }
+  tap<QuadBeat>(raster_, "out_quads", [this](const QuadBeat& beat, UntimedTarget<QuadBeat>& next) {
+    if (beat.count > 0) {
+      count_front_end(bound_.work);
+      bound_.quad_rasterized();
+    }
+    next.take(beat);
+  });
+  tap<BinItem>(tc_, "out_bins", [this](const BinItem& item, UntimedTarget<BinItem>& next) {
+    next.take(item);
+    if (item.mark != Mark::none) return;
+    count();
+    bound_.quads_ended();
+    if (bound_.phase_is_full()) end_phase();
+  });
+}
+
+WorkCounter::~WorkCounter() = default;
+
+void WorkCounter::count_front_end(FrontEndWork& work) const {
+  work.vertex_warps_issued = items(draw_, DrawWork::warps) - before_.vertex_warps_issued;
+  work.vertex_warps = items(sm_, SmWork::vertex) - before_.vertex_warps;
+  work.triangles = items(vpo_, VpoWork::triangles) - before_.triangles;
+  work.bin_entries = items(tgc_, TgcWork::entries) - before_.bin_entries;
+  work.setups = items(raster_, RasterWork::setup) - before_.setups;
+  work.coarse_tiles = items(raster_, RasterWork::coarse) - before_.coarse_tiles;
+  work.fine_tiles = items(raster_, RasterWork::fine) - before_.fine_tiles;
+  work.tile_pairs = items(raster_, RasterWork::pairs) - before_.tile_pairs;
+  work.quads_rasterized = items(raster_, RasterWork::quads) - before_.quads_rasterized;
+}
+
+void WorkCounter::count() {
+  count_front_end(bound_.work);
+  bound_.work.bin_beats = items(tc_, TcWork::beats) - before_.bin_beats;
+  bound_.work.quads_tested = items(zrop_, ZropWork::tests) - before_.quads_tested;
+}
+
+void WorkCounter::end_phase() {
+  count();
+  before_.add(bound_.work);
+  bound_.end_phase();
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "bound/bound.h"
+#include "elaboration/untimed_gpu.h"
+
+namespace vrpipe {
+
+/// Counts what the units of a GPC do in a run without time, for its bound: by taps on the links and at the blender.
+///
+/// Where `cycle` may flush bins at other times, what a quad terminates may spare others later than here; so only quads are
+/// counted whose pixels are not all terminated by what was blended before: no run is spared these, however early it
+/// flushes its bins. And where screen tiles may be blended in another order each sector is filled once: the cache may miss
+/// it no more often.
+class WorkCounter {
+ public:
+  /// The GPU and the bound outlive it.
+  WorkCounter(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc, PhaseBound& bound);
+  ~WorkCounter();
+  /// With what has been done so far; after the run as well.
+  void end_phase();
+
+ private:
+  class Blends;
+  template <class Item, class Function>
+  void tap(UntimedUnit* unit, const char* port, Function function);
+  /// Of the phase.
+  void count_front_end(FrontEndWork& work) const;
+  void count();
+
+  PhaseBound& bound_;
+  std::unique_ptr<Blends> blends_;
+  std::vector<std::shared_ptr<void>> taps_;
+  UntimedUnit *draw_, *vpo_, *tgc_, *raster_, *tc_, *zrop_, *sm_;  ///< null for none
+  Work before_;                                                    ///< of the phases before
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <string>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/model/unit.h>
+#include <vrpipe/platforms/netlist.h>
+#include <vrpipe/platforms/observers.h>
+
+namespace vrpipe {
+
+/// Connects the units of a netlist, or of a part of it, and stubs what is to be. `find` gives the Component* of a path;
+/// null for one that is not there, whose links are left out.
+/// @param observers  null for none
+template <class Find>
+void connect_units(const Netlist& netlist, Observers* observers, Find&& find) {
+  for (const Link& link : netlist.links()) {
+    const auto [from, out] = split_port(link.from);
+    const auto [to, in] = split_port(link.to);
+    Component* const sender = find(from);
+    Component* const receiver = find(to);
+    if (sender == nullptr || receiver == nullptr) continue;
+    LinkOptions options{link.parameters->depth, link.parameters->latency_cycles, link.parameters->items_per_cycle};
+    if (observers != nullptr) options.observers = observers->of_link(link.name());
+    sender->out(out).connect(receiver->in(in), options);
+  }
+  for (const std::string& port : netlist.stubs()) {
+    const auto [path, name] = split_port(port);
+    Component* const unit = find(path);
+    if (unit == nullptr) continue;
+    if (unit->has_out(name)) {
+      unit->out(name).stub();
+    } else {
+      unit->in(name).stub();
+    }
+  }
+}
+
+/// Throws UserError for a port that is neither connected nor stubbed.
+inline void check_ports(const Component& unit, const std::string& path, const std::string& platform) {
+  const auto check = [&](const auto& ports) {
+    for (const auto* port : ports) {
+      if (port->connected()) continue;
+      throw UserError("incomplete platform " + platform, path + "." + port->name(), "the port is not connected",
+                      "connect or stub it");
+    }
+  };
+  check(unit.in_ports);
+  check(unit.out_ports);
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <vrpipe/model/untimed.h>
+#include <vrpipe/platforms/configuration.h>
+
+namespace vrpipe {
+
+/// Strict termination where there is time: what comes behind ZROP in a GPC, elaborated without time. It takes each bin
+/// as it is tested, in order, through merging, shading and blending, and knows what that terminates before the
+/// next bin is tested, whenever the timing models get there. They get units that repeat what has been done here.
+class RunAhead final : public FunctionalRunAhead {
+ public:
+  /// Makes units of the GPC; CROP blends into the surface. Throws UserError where no way leads from PROP to CROP.
+  RunAhead(const Configuration& configuration, unsigned gpc, ColorSurface& surface);
+  ~RunAhead() override;
+
+  void pass(Mark mark) override;
+  void tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) override;
+
+  /// For the timing model of the GPC's SM array or CROP: gives each warp the outcome that it had here.
+  std::unique_ptr<Behaviour> make_repeating(const std::string& slot);
+  /// The unit proper, whose counters count: of the SM array or CROP.
+  Behaviour& unit(const std::string& slot);
+
+ private:
+  class Record;
+  class RecordingSm;
+  class RepeatingSm;
+  class RecordingCrop;
+  class RepeatingCrop;
+  class Signals;
+
+  std::unique_ptr<Record> record_;
+  std::unique_ptr<Signals> signals_;
+  std::vector<std::unique_ptr<UntimedUnit>> units_;
+  UntimedIn<BinItem>* entry_ = nullptr;
+  SmBehaviour* sm_ = nullptr;
+  CropBehaviour* crop_ = nullptr;
+  BinStorage bin_;
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,53 @@
+#include "elaboration/untimed_gpu.h"
+
+#include <algorithm>
+
+#include "elaboration/elaborate.h"
+
+namespace vrpipe {
+
+UntimedGpu::UntimedGpu(const Configuration& configuration, Framebuffer& framebuffer) : configuration_(configuration) {
+  const Netlist& netlist = configuration.netlist();
+  for (const Instance& instance : netlist.instances()) {
+    std::unique_ptr<Behaviour> behaviour = configuration.make(instance);
+    if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(framebuffer.color);
+    if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get())) zrop->attach(framebuffer.depth_stencil);
+    units_.push_back(
+        {&instance, untimed_unit_maker(instance.slot)(instance.path, std::move(behaviour),
+                                                      configuration.context_of(instance.gpc), netlist.gpcs())});
+  }
+  connect_units(netlist, configuration.request().observers.get(), [&](const std::string& path) -> Component* {
+    for (const Placed& placed : units_) {
+      if (placed.instance->path == path) return placed.unit.get();
+    }
+    return nullptr;
+  });
+  for (const Placed& placed : units_) check_ports(*placed.unit, placed.instance->path, configuration.platform().name);
+  for (unsigned gpc = 0; gpc < netlist.gpcs(); ++gpc) {
+    UntimedUnit* const qru = of_slot("qru", gpc);
+    UntimedUnit* const crop = of_slot("crop", gpc);
+    if (qru != nullptr && crop != nullptr) qru->prefetch_for(*crop);
+  }
+}
+
+UntimedUnit* UntimedGpu::of_slot(const std::string& slot, unsigned gpc) const {
+  for (const Placed& placed : units_) {
+    const Instance& instance = *placed.instance;
+    if (instance.slot == slot && (instance.gpc == gpc || instance.in_front_end)) return placed.unit.get();
+  }
+  return nullptr;
+}
+
+void UntimedGpu::run(std::atomic<float>* progress) {
+  const auto splats = static_cast<float>(std::max<std::uint32_t>(configuration_.frame().splats(), 1));
+  for (const Placed& placed : units_) {
+    for (std::uint64_t pieces = 1; placed.unit->run_piece(); ++pieces) {
+      if (progress != nullptr && pieces % 128 == 0) {
+        *progress = std::min(1.0F, static_cast<float>(pieces * splats_per_vertex_warp) / splats);
+      }
+    }
+  }
+  if (progress != nullptr) *progress = 1;
+}
+
+}  // namespace vrpipe

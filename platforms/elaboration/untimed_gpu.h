@@ -1,0 +1,36 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <vrpipe/model/untimed.h>
+#include <vrpipe/platforms/configuration.h>
+
+namespace vrpipe {
+
+/// A platform without time: its netlist, elaborated.
+class UntimedGpu {
+ public:
+  struct Placed {
+    const Instance* instance;
+    std::unique_ptr<UntimedUnit> unit;
+  };
+
+  /// ROPs draw into the framebuffer.
+  UntimedGpu(const Configuration& configuration, Framebuffer& framebuffer);
+
+  const std::vector<Placed>& units() const { return units_; }
+  /// A slot's unit in a GPC; in a slot of the front end it serves all. Null for none.
+  UntimedUnit* of_slot(const std::string& slot, unsigned gpc) const;
+
+  /// `progress`, if given, goes from 0 to 1.
+  void run(std::atomic<float>* progress);
+
+ private:
+  const Configuration& configuration_;
+  std::vector<Placed> units_;
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,263 @@
+#include <vrpipe/platforms/configuration.h>
+
+#include <algorithm>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/checked_behaviours.h>
+#include <vrpipe/platforms/observers.h>
+
+namespace vrpipe {
+
+namespace {
+
+const std::string link_prefix = "link.";
+
+bool declares(const ParameterSet& set, const std::string& parameter) {
+  const std::vector<Parameter*>& all = set.parameters();
+  return std::any_of(all.begin(), all.end(), [&](const Parameter* each) { return parameter == each->name(); });
+}
+
+}  // namespace
+
+const Implementation& default_implementation(const Slot& slot, const Variant& variant) {
+  const bool absent = !variant.quad_merging && !slot.stand_in.empty();
+  return Registry::instance().find(slot.name, absent ? slot.stand_in : slot.implementation);
+}
+
+namespace {
+
+DrawState draw_state_from(const StateParameters& parameters) {
+  DrawState state;
+  state.early_termination = true;
+  state.termination_threshold = static_cast<float>(static_cast<double>(parameters.termination_threshold));
+  state.termination_inclusive = parameters.termination_compare == 0U;
+  state.pruning_threshold = static_cast<float>(static_cast<double>(parameters.pruning_threshold));
+  state.splat_extent = static_cast<SplatExtent>(static_cast<unsigned>(parameters.splat_extent));
+  state.obb_padding = static_cast<float>(static_cast<double>(parameters.obb_padding));
+  return state;
+}
+
+}  // namespace
+
+DrawState draw_state_of(const RunRequest& request, const std::vector<Setting>& own) {
+  StateParameters parameters;
+  for (const auto* settings : {&request.platform->settings, &request.variant.settings, &request.settings, &own}) {
+    for (const Setting& setting : *settings) {
+      if (setting.unit == "state") parameters.set(setting.unit, setting.parameter, setting.value);
+    }
+  }
+  return draw_state_from(parameters);
+}
+
+Configuration::Configuration(const RunRequest& request, const Frame& frame)
+    : request_(request), netlist_(request.platform->gpcs) {
+  // Of the program itself; a plugin's are reported when it is loaded.
+  const std::vector<Registry::Problem> problems = Registry::instance().take_problems();
+  if (!problems.empty()) {
+    throw UserError("cannot use all units of this program", "registry", problems.front().why, problems.front().remedy);
+  }
+  wire();
+  choose_implementations();
+  for (const Setting& setting : request.platform->settings) {
+    if (concerns_chosen_unit(setting)) apply(setting);
+  }
+  for (const Setting& setting : request.variant.settings) apply(setting);
+  for (const Setting& setting : request.settings) apply(setting);
+  if (request.observers != nullptr) request.observers->check(netlist_);
+
+  auto drawn = std::make_shared<Frame>(frame);
+  drawn->change_states([&](DrawState& state) {
+    state.early_termination = state.early_termination && request.variant.early_termination;
+  });
+  RenderContext context;
+  context.frame = std::move(drawn);
+  context.format = request.format;
+  context.termination = request.termination;
+  context.precision.blend_rounding =
+      static_cast<BlendRounding>(static_cast<unsigned>(state_parameters_.blend_rounding));
+  context.precision.exponential = static_cast<Exponential>(static_cast<unsigned>(state_parameters_.exponential));
+  context.precision.subpixel_bits = state_parameters_.subpixel_bits;
+  context.placement.gpcs = request.platform->gpcs;
+  for (unsigned& gpc = context.placement.gpc; gpc < request.platform->gpcs; ++gpc) contexts_.push_back(context);
+}
+
+void Configuration::wire() {
+  const Platform& platform = *request_.platform;
+  call_with_fault([&] { platform.wire(netlist_); },
+                  [&](const char* text) {
+                    throw SimulationFault("platform " + platform.name, 0,
+                                          std::string("its wiring throws ") +
+                                              (text != nullptr ? text : "an exception of unknown type"));
+                  });
+  if (netlist_.instances().empty()) {
+    throw UserError("incomplete platform " + platform.name, "its wiring", "it adds no unit",
+                    "add units, as platforms/catalogue/agx_orin.cpp does");
+  }
+}
+
+void Configuration::choose_implementations() {
+  const Registry& registry = Registry::instance();
+  Variant with_all = request_.variant;
+  with_all.quad_merging = true;
+  for (const Instance& instance : netlist_.instances()) {
+    const Slot& slot = registry.slot(instance.slot);
+    UnitChoices& unit = units_[instance.path];
+    unit.chosen = &default_implementation(slot, request_.variant);
+    unit.real = &default_implementation(slot, with_all);
+    if (instance.implementation.empty()) continue;
+    unit.real = &registry.find(slot.name, instance.implementation);
+    if (!unit.chosen->pass_through) unit.chosen = unit.real;
+  }
+  std::vector<UnitChoice> choices = request_.variant.units;
+  choices.insert(choices.end(), request_.units.begin(), request_.units.end());
+  for (const UnitChoice& choice : choices) {
+    const std::vector<const Instance*> named = instances_named(choice.slot);
+    const std::string& slot = named.empty() ? choice.slot : named.front()->slot;
+    const Implementation& implementation = registry.find(slot, choice.implementation);
+    if (named.empty()) {
+      throw UserError("cannot choose a unit for '" + choice.slot + "'", "--unit",
+                      "platform " + request_.platform->name + " has none", "take another platform");
+    }
+    for (const Instance* instance : named) {
+      UnitChoices& unit = units_[instance->path];
+      if (!unit.chosen->pass_through) unit.chosen = &implementation;
+      unit.real = &implementation;
+    }
+  }
+  for (auto& [path, unit] : units_) {
+    unit.real_parameters = unit.real->make_parameters();
+    unit.chosen_parameters = unit.chosen->make_parameters();
+  }
+}
+
+std::vector<const Instance*> Configuration::instances_named(const std::string& name) const {
+  std::vector<const Instance*> found;
+  for (const Instance& instance : netlist_.instances()) {
+    if (name == instance.slot || names_path(name, instance.path)) found.push_back(&instance);
+  }
+  return found;
+}
+
+std::vector<const Instance*> Configuration::instances_of(const std::string& slot) const {
+  std::vector<const Instance*> found;
+  for (const Instance& instance : netlist_.instances()) {
+    if (instance.slot == slot) found.push_back(&instance);
+  }
+  return found;
+}
+
+bool Configuration::has_l2() const {
+  const std::vector<MemoryInstance>& memories = netlist_.memories();
+  return std::any_of(memories.begin(), memories.end(), [](const MemoryInstance& memory) { return !memory.make; });
+}
+
+/// A platform's settings are for the units that it was made with: another one in a slot takes those that it declares.
+bool Configuration::concerns_chosen_unit(const Setting& setting) const {
+  if (setting.unit == "l2") return has_l2();
+  const std::vector<const Instance*> named = instances_named(setting.unit);
+  if (named.empty()) return true;
+  Variant with_all = request_.variant;
+  with_all.quad_merging = true;
+  for (const Instance* instance : named) {
+    if (declares(*units_.at(instance->path).real_parameters, setting.parameter)) return true;
+  }
+  // What no unit declares is a mistake of the platform's.
+  const Slot& slot = Registry::instance().slot(named.front()->slot);
+  return !declares(*default_implementation(slot, with_all).make_parameters(), setting.parameter);
+}
+
+void Configuration::apply(const Setting& setting) {
+  if (setting.unit == "state") return state_parameters_.set(setting.unit, setting.parameter, setting.value);
+  if (setting.unit == "l2" && has_l2()) return l2_.set(setting.unit, setting.parameter, setting.value);
+  if (setting.unit.compare(0, link_prefix.size(), link_prefix) == 0) return set_link(setting);
+  const std::vector<const Instance*> named = instances_named(setting.unit);
+  if (named.empty()) {
+    std::vector<std::string> known{"state"};
+    if (has_l2()) known.emplace_back("l2");
+    for (const Instance& instance : netlist_.instances()) {
+      known.push_back(instance.slot);
+      known.push_back(instance.path);
+    }
+    const bool elsewhere = Registry::instance().has_slot(setting.unit) || setting.unit == "l2";
+    throw UserError("unknown unit '" + setting.unit + "'", "--set " + setting.unit + "." + setting.parameter,
+                    elsewhere ? "platform " + request_.platform->name + " has none" : "no such unit",
+                    "did you mean " + nearest_name(setting.unit, known) + "? `vrpipe units` lists all");
+  }
+  for (const Instance* instance : named) {
+    UnitChoices& unit = units_[instance->path];
+    // A setting is for the unit proper; the pass-through of a variant without it has nothing to set.
+    unit.real_parameters->set(setting.unit, setting.parameter, setting.value);
+    if (unit.chosen == unit.real) unit.chosen_parameters->set(setting.unit, setting.parameter, setting.value);
+  }
+}
+
+void Configuration::set_link(const Setting& setting) {
+  const std::string name = setting.unit.substr(link_prefix.size());
+  bool found = false;
+  std::vector<std::string> known;
+  for (const Link& link : netlist_.links()) {
+    known.push_back(link.name());
+    known.push_back(without_gpc(link.name()));
+    if (!names_path(name, link.name())) continue;
+    link.parameters->set(setting.unit, setting.parameter, setting.value);
+    found = true;
+  }
+  if (found) return;
+  throw UserError("unknown link '" + name + "'", "--set " + setting.unit + "." + setting.parameter, "no such link",
+                  known.empty()
+                      ? "the platform has none"
+                      : "did you mean " + link_prefix + nearest_name(name, known) + "? `vrpipe units` lists all");
+}
+
+std::unique_ptr<Behaviour> Configuration::make(const Instance& instance) const {
+  const UnitChoices& unit = units_.at(instance.path);
+  std::unique_ptr<Behaviour> behaviour = unit.chosen->make_behaviour(*unit.chosen_parameters, contexts_[instance.gpc]);
+  behaviour->unit().set_draws(frame().draws().size());
+  return behaviour;
+}
+
+std::vector<std::pair<std::string, std::string>> Configuration::parameters() const {
+  std::vector<std::pair<std::string, std::string>> all;
+  std::map<std::string, std::string> first;  // by the name that stands for all
+  const auto add = [&](const std::string& shared, const std::string& path, const ParameterSet& set) {
+    for (const Parameter* parameter : set.parameters()) {
+      const std::string name = shared + "." + parameter->name();
+      const std::string value = parameter->value();
+      const auto place = first.emplace(name, value);
+      if (place.second) {
+        all.emplace_back(name, value);
+      } else if (place.first->second != value) {
+        all.emplace_back(path + "." + parameter->name(), value);
+      }
+    }
+  };
+  for (const Slot& slot : Registry::instance().slots()) {
+    for (const Instance* instance : instances_of(slot.name)) {
+      add(slot.name, instance->path, *units_.at(instance->path).real_parameters);
+    }
+  }
+  if (has_l2()) add("l2", "l2", l2_);
+  for (const Link& link : netlist_.links()) {
+    add(link_prefix + without_gpc(link.name()), link_prefix + link.name(), *link.parameters);
+  }
+  add("state", "state", state_parameters_);
+  return all;
+}
+
+std::vector<std::pair<std::string, std::string>> Configuration::implementations() const {
+  std::vector<std::pair<std::string, std::string>> all;
+  for (const Slot& slot : Registry::instance().slots()) {
+    const std::vector<const Instance*> instances = instances_of(slot.name);
+    for (const Instance* instance : instances) {
+      const std::string& name = implementation(*instance).name;
+      if (instance == instances.front()) {
+        all.emplace_back(slot.name, name);
+      } else if (name != implementation(*instances.front()).name) {
+        all.emplace_back(instance->path, name);
+      }
+    }
+  }
+  return all;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,583 @@
+#include <vrpipe/platforms/simulation.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <ctime>
+#include <map>
+#include <set>
+
+#include "bound/work_counter.h"
+#include "elaboration/untimed_gpu.h"
+#include "run/statistic_sampler.h"
+#include "run/statistics.h"
+
+#include <fmt/format.h>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/checked_behaviours.h>
+#include <vrpipe/platforms/gpu.h>
+#include <vrpipe/platforms/observers.h>
+#include <vrpipe/platforms/validated_range.h>
+
+namespace vrpipe {
+
+const char* name_of(Fidelity fidelity) {
+  switch (fidelity) {
+    case Fidelity::functional: return "functional";
+    case Fidelity::bound: return "bound";
+    case Fidelity::lt: return "lt";
+    case Fidelity::at: return "at";
+    case Fidelity::cycle: return "cycle";
+  }
+  return "";
+}
+
+const std::vector<Fidelity>& fidelities() {
+  static const std::vector<Fidelity> all{Fidelity::functional, Fidelity::bound, Fidelity::lt, Fidelity::at,
+                                         Fidelity::cycle};
+  return all;
+}
+
+Fidelity fidelity_named(const std::string& name) {
+  std::vector<std::string> names;
+  for (const Fidelity fidelity : fidelities()) {
+    if (name == name_of(fidelity)) return fidelity;
+    names.emplace_back(name_of(fidelity));
+  }
+  throw UserError("unknown fidelity '" + name + "'", "--fidelity", "this build has no such fidelity",
+                  fmt::format("did you mean {}? There are {}", nearest_name(name, names), fmt::join(names, ", ")));
+}
+
+namespace {
+std::vector<Variant>& variant_list() {
+  static std::vector<Variant> all{{"baseline", false, false},
+                                  {"qm", true, false},
+                                  {"het", false, true},
+                                  {"het+qm", true, true}};
+  return all;
+}
+}  // namespace
+
+const std::vector<Variant>& variants() { return variant_list(); }
+
+void add_variant(Variant variant) {
+  const std::vector<Variant>& known = variants();
+  const bool taken =
+      std::any_of(known.begin(), known.end(), [&](const Variant& each) { return each.name == variant.name; });
+  if (taken || variant.name.empty()) {
+    const std::string why = taken ? "there is one of that name" : "it has no name";
+    if (!is_loading_plugin())
+      throw UserError("cannot add variant '" + variant.name + "'", "add_variant", why, "choose another name");
+    return Registry::instance().add_problem({"variant '" + variant.name + "': " + why, "choose another name"});
+  }
+  variant_list().push_back(std::move(variant));
+  Registry::instance().count_registration();
+}
+
+const Variant& variant_named(const std::string& name) {
+  std::vector<std::string> names;
+  for (const Variant& variant : variants()) {
+    if (variant.name == name) return variant;
+    names.push_back(variant.name);
+  }
+  throw UserError("unknown variant '" + name + "'", "--variant", "there is no such variant",
+                  fmt::format("did you mean {}? There are {}", nearest_name(name, names), fmt::join(names, ", ")));
+}
+
+namespace {
+
+void fnv1a(std::uint64_t& hash, std::uint64_t value) {
+  for (unsigned byte = 0; byte < 8; ++byte) {
+    hash = (hash ^ ((value >> (8 * byte)) & 0xffU)) * 0x100000001b3ULL;
+  }
+}
+
+std::string hash_of(const RunResult& result) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  for (const auto& count : result.counts.named()) fnv1a(hash, count.second);
+  fnv1a(hash, result.cycles.value_or(0));
+  const ColorSurface& surface = result.framebuffer.color;
+  for (std::uint32_t y = 0; y < surface.height(); ++y) {
+    for (std::uint32_t x = 0; x < surface.width(); ++x) {
+      const std::array<float, 4> pixel = surface.pixel(x, y);
+      std::array<std::uint64_t, 2> bits;
+      std::memcpy(bits.data(), pixel.data(), sizeof bits);
+      fnv1a(hash, bits[0]);
+      fnv1a(hash, bits[1]);
+    }
+  }
+  return fmt::format("{:016x}", hash);
+}
+
+const std::string l2 = "l2";
+
+/// The functional models of all units.
+struct BehaviourList {
+  std::vector<std::pair<const Instance*, const Behaviour*>> of_instance;
+};
+
+// Statistics go to a StatisticCollector at the end of a run, to a StatisticSampler in its course.
+
+/// Those of a unit: of its functional model, and of the one that gives it ports and time.
+template <class Statistics>
+void add_statistics(const Instance& instance, const Behaviour& behaviour, const Component& unit,
+                    Statistics& statistics) {
+  statistics.add(instance.slot, instance.path, behaviour.unit());
+  statistics.add(instance.slot, instance.path, unit);
+}
+
+/// Those of a memory that has any.
+template <class Statistics>
+void add_statistics(const std::string& path, const sc_core::sc_module& memory, Statistics& statistics) {
+  if (const auto* const set = dynamic_cast<const StatisticSet*>(&memory)) statistics.add(path, path, *set);
+}
+
+template <class Statistics>
+void add_statistics(const Gpu& gpu, Statistics& statistics) {
+  for (const Gpu::Placed& placed : gpu.units()) {
+    add_statistics(*placed.instance, *placed.behaviour, *placed.unit, statistics);
+  }
+  if (gpu.l2() != nullptr) add_statistics(l2, *gpu.l2(), statistics);
+  for (const Gpu::PlacedMemory& memory : gpu.memories()) {
+    add_statistics(memory.instance->path, *memory.module, statistics);
+  }
+}
+
+bool has_time(Fidelity fidelity) { return fidelity != Fidelity::functional && fidelity != Fidelity::bound; }
+
+bool samples_statistics(const RunRequest& request) {
+  return request.observers != nullptr && !request.observers->of_statistics().empty();
+}
+
+void check_sampling_has_time(const RunRequest& request) {
+  if (!samples_statistics(request) || has_time(request.fidelity)) return;
+  throw UserError("cannot sample statistics", std::string("--fidelity ") + name_of(request.fidelity),
+                  request.fidelity == Fidelity::bound ? "its cycles follow from all the work, no work has a cycle"
+                                                      : "it has no time",
+                  "use lt, at or cycle");
+}
+
+/// The counters that every unit of a slot has, summed over GPCs. `value` gives what of one is counted.
+template <class Value>
+Counts counts_from(const BehaviourList& behaviours, const Value& value) {
+  Counts c;
+  for (const auto& [instance, behaviour] : behaviours.of_instance) {
+    const Behaviour& unit = behaviour->unit();
+    if (const auto* const vpo = dynamic_cast<const VpoBehaviour*>(&unit)) {
+      c.primitives += value(vpo->primitives);
+    } else if (const auto* const tgc = dynamic_cast<const TgcBehaviour*>(&unit)) {
+      c.tgc_flushes += value(tgc->flushes);
+    } else if (const auto* const raster = dynamic_cast<const RasterBehaviour*>(&unit)) {
+      c.quads_rasterized += value(raster->quads_rasterized);
+      c.fragments_rasterized += value(raster->fragments_rasterized);
+    } else if (const auto* const tc = dynamic_cast<const TcBehaviour*>(&unit)) {
+      c.tc_flushes += value(tc->flushes);
+    } else if (const auto* const zrop = dynamic_cast<const ZropBehaviour*>(&unit)) {
+      c.quads_depth_stencil_failed += value(zrop->quads_depth_stencil_failed);
+      c.fragments_depth_stencil_failed += value(zrop->fragments_depth_stencil_failed);
+      c.quads_terminated += value(zrop->quads_terminated);
+      c.fragments_terminated += value(zrop->fragments_terminated);
+    } else if (const auto* const sm = dynamic_cast<const SmBehaviour*>(&unit)) {
+      c.quads_shaded += value(sm->quads_shaded);
+      c.fragments_shaded += value(sm->fragments_shaded);
+      c.quads_pruned += value(sm->quads_pruned);
+      c.fragments_pruned += value(sm->fragments_pruned);
+      c.quads_merged += value(sm->quads_merged);
+      c.fragments_merged += value(sm->fragments_merged);
+      c.warps += value(sm->fragment_warps);
+    } else if (const auto* const crop = dynamic_cast<const CropBehaviour*>(&unit)) {
+      c.quads_dropped_late += value(crop->quads_dropped_late);
+      c.fragments_dropped_late += value(crop->fragments_dropped_late);
+      c.quads_late_failed += value(crop->quads_late_failed);
+      c.fragments_late_failed += value(crop->fragments_late_failed);
+      c.quads_blended += value(crop->quads_blended);
+      c.fragments_blended += value(crop->fragments_blended);
+      c.termination_updates += value(crop->termination_signals);
+    }
+  }
+  return c;
+}
+
+struct OfDraw {
+  std::size_t draw;
+  std::uint64_t operator()(const DrawCounter& counter) const { return counter.of_draw()[draw]; }
+  std::uint64_t operator()(const Counter&) const { return 0; }
+};
+
+/// By draw, in a frame of several.
+std::vector<DrawReport> draw_reports(const Frame& frame, const BehaviourList& behaviours) {
+  // What several draws may share is nobody's own.
+  static const std::set<std::string> shared{"warps", "tgc_flushes", "tc_flushes"};
+  std::vector<DrawReport> reports;
+  if (frame.draws().size() < 2) return reports;
+  for (std::size_t draw = 0; draw < frame.draws().size(); ++draw) {
+    DrawReport& report = reports.emplace_back();
+    report.name = frame.draws()[draw].name;
+    const Counts counts = counts_from(behaviours, OfDraw{draw});
+    for (const auto& count : counts.named()) {
+      if (shared.count(count.first) == 0) report.counts.push_back(count);
+    }
+  }
+  return reports;
+}
+
+/// What the units counted, once a checked unit's counters are what went through it.
+void report_counts(const Configuration& configuration, const BehaviourList& behaviours,
+                   const StatisticCollector& statistics, RunResult& result) {
+  for (const auto& [instance, behaviour] : behaviours.of_instance) check_counters(*behaviour);
+  result.statistics = statistics.reports();
+  result.counts = counts_from(behaviours, [](const Counter& counter) { return counter.value(); });
+  result.draws = draw_reports(configuration.frame(), behaviours);
+}
+
+void check_conservation(const Counts& c) {
+  const auto check = [](const char* what, std::uint64_t in, std::uint64_t out) {
+    if (in == out) return;
+    throw SimulationFault("conservation", 0, fmt::format("{}: {} went in, {} came out", what, in, out));
+  };
+  check("quads rasterized = depth_stencil_failed + terminated + shaded", c.quads_rasterized,
+        c.quads_depth_stencil_failed + c.quads_terminated + c.quads_shaded);
+  check("fragments rasterized = depth_stencil_failed + terminated + shaded", c.fragments_rasterized,
+        c.fragments_depth_stencil_failed + c.fragments_terminated + c.fragments_shaded);
+  check("quads shaded = pruned + merged + dropped_late + late_failed + blended", c.quads_shaded,
+        c.quads_pruned + c.quads_merged + c.quads_dropped_late + c.quads_late_failed + c.quads_blended);
+  check("fragments shaded = pruned + merged + dropped_late + late_failed + blended", c.fragments_shaded,
+        c.fragments_pruned + c.fragments_merged + c.fragments_dropped_late + c.fragments_late_failed +
+            c.fragments_blended);
+}
+
+/// Units and what occupied them in a run of `cycles`. Also the bottleneck, and the utilization of the slots that have
+/// one: the share of their throughput's time, over all GPCs.
+class OccupancyReport {
+ public:
+  OccupancyReport(double cycles, RunResult& result) : cycles_(cycles), result_(result) {}
+
+  /// @param slot  of the unit; or `l2`
+  void add(UnitReport report, const std::string& slot, const std::vector<OccupancyPart>& parts) {
+    std::map<unsigned, Bottleneck> resources;
+    double throughput = 0;
+    for (const OccupancyPart& part : parts) {
+      const double share = cycles_ > 0 ? part.cycles / cycles_ : 0.0;
+      if (part.is_throughput) throughput += share;
+      report.parts.emplace_back(part.name, share);
+      Bottleneck& resource = resources[part.resource];
+      resource.occupancy += share;
+      if (share > 0) resource.parts.emplace_back(part.name, share);
+    }
+    for (auto& [index, resource] : resources) {
+      report.occupancy = std::max(report.occupancy, resource.occupancy);
+      resource.unit = report.name;
+      if (resource.occupancy > (result_.bottleneck ? result_.bottleneck->occupancy : 0.0)) {
+        result_.bottleneck = std::move(resource);
+      }
+    }
+    check(report);
+    auto& [units, sum] = throughput_of_[slot];
+    ++units;
+    sum += throughput;
+    if (slot != l2) result_.units.push_back(std::move(report));
+  }
+
+  void finish() {
+    const auto report = [&](const std::string& slot) {
+      const auto& [units, sum] = throughput_of_[slot];
+      result_.utilization.emplace_back(slot, units > 0 ? sum / units : 0.0);
+    };
+    for (const Slot& slot : Registry::instance().slots()) {
+      if (slot.reports_utilization) report(slot.name);
+    }
+    report(l2);
+    result_.utilization.emplace_back("dram", 0.0);
+  }
+
+ private:
+  void check(const UnitReport& report) const {
+    const auto cycles = static_cast<Cycle>(cycles_);
+    std::uint64_t sum = 0;
+    for (const std::uint64_t spent : report.cycles) {
+      if (spent > cycles) throw SimulationFault(report.name, cycles, fmt::format("{} cycles in one state", spent));
+      sum += spent;
+    }
+    if (sum != cycles && report.name != l2) {
+      throw SimulationFault(report.name, cycles, fmt::format("its states sum to {} cycles", sum));
+    }
+    // But for rounding of the shares themselves.
+    if (report.occupancy > 1 + 1e-9) {
+      throw SimulationFault(report.name, cycles, fmt::format("it is occupied {} of its time", report.occupancy));
+    }
+  }
+
+  double cycles_;
+  RunResult& result_;
+  std::map<std::string, std::pair<unsigned, double>> throughput_of_;
+};
+
+/// Takes the time of a simulation on the host. Wall time counts what else the machine does; processor time does not.
+class HostTimer {
+ public:
+  void stop(RunResult& result) const {
+    result.host_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_).count();
+    result.cpu_seconds = processor_seconds() - processor_;
+  }
+
+ private:
+  static double processor_seconds() {
+    timespec now{};
+    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  }
+  std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
+  double processor_ = processor_seconds();
+};
+
+void set_time(const Configuration& configuration, Cycle cycles, RunResult& result) {
+  result.cycles = cycles;
+  result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
+}
+
+void run_clocked(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
+  Gpu gpu(configuration, result.framebuffer);
+  StatisticSampler sampler;
+  if (samples_statistics(configuration.request())) {
+    add_statistics(gpu, sampler);
+    sampler.find(*configuration.request().observers);
+    sampler.watch(gpu.clock());
+  }
+  const HostTimer timer;
+  const Cycle cycles = gpu.run(progress);
+  timer.stop(result);
+  sampler.finish(cycles);
+  set_time(configuration, cycles, result);
+  result.kernel_events = gpu.clock().activations();
+
+  BehaviourList behaviours;
+  StatisticCollector statistics;
+  add_statistics(gpu, statistics);
+  OccupancyReport occupancy(static_cast<double>(cycles), result);
+  for (const Gpu::Placed& placed : gpu.units()) {
+    behaviours.of_instance.emplace_back(placed.instance, placed.behaviour);
+    UnitReport report;
+    report.name = placed.instance->path;
+    for (unsigned state = 0; state < unit_states; ++state) {
+      report.cycles[state] = placed.unit->account().cycles(static_cast<UnitState>(state));
+    }
+    occupancy.add(std::move(report), placed.instance->slot, placed.unit->occupancy().parts(cycles));
+  }
+  if (gpu.l2() != nullptr) {
+    UnitReport report;
+    report.name = l2;
+    occupancy.add(std::move(report), l2,
+                  {{"bytes", 0, static_cast<double>(gpu.l2()->bytes(cycles)) / gpu.l2()->peak_rate(), true}});
+  }
+  occupancy.finish();
+  report_counts(configuration, behaviours, statistics, result);
+}
+
+/// The bounds of all GPCs: the longest is the draw's.
+void report_bound(const Configuration& configuration, const UntimedGpu& gpu, const std::vector<PhaseBound>& bounds,
+                  RunResult& result) {
+  double longest = 0;
+  // A GPC without quads does not keep the draw up, unless there is none at all.
+  const bool any_quads = std::any_of(bounds.begin(), bounds.end(), [](const auto& bound) { return bound.has_quads(); });
+  for (const PhaseBound& bound : bounds) {
+    if (bound.has_quads() || !any_quads) longest = std::max(longest, bound.cycles());
+  }
+  const auto cycles = static_cast<Cycle>(longest);
+  set_time(configuration, cycles, result);
+  OccupancyReport occupancy(longest, result);
+  for (const UntimedGpu::Placed& placed : gpu.units()) {
+    const Instance& instance = *placed.instance;
+    const PhaseBound& bound = bounds[instance.gpc];
+    UnitReport unit;
+    unit.name = instance.path;
+    const Cycle busy = std::min(cycles, static_cast<Cycle>(bound.busy_cycles(instance.slot)));
+    unit.cycles[static_cast<unsigned>(UnitState::busy)] = busy;
+    unit.cycles[static_cast<unsigned>(UnitState::starved)] = cycles - busy;
+    occupancy.add(std::move(unit), instance.slot, bound.parts(instance.slot));
+  }
+  UnitReport report;
+  report.name = l2;
+  double moved = 0;
+  for (const PhaseBound& bound : bounds) moved += bound.busy_cycles(l2) / static_cast<double>(bounds.size());
+  occupancy.add(std::move(report), l2, {{"bytes", 0, moved, true}});
+  occupancy.finish();
+}
+
+/// Without time, or with the bound that follows from the work.
+void run_untimed(const Configuration& configuration, std::atomic<float>* progress, RunResult& result) {
+  UntimedGpu gpu(configuration, result.framebuffer);
+  std::vector<PhaseBound> bounds;
+  std::vector<std::unique_ptr<WorkCounter>> counters;
+  if (result.request.fidelity == Fidelity::bound) {
+    const unsigned gpcs = configuration.netlist().gpcs();
+    for (unsigned gpc = 0; gpc < gpcs; ++gpc) bounds.emplace_back(configuration, gpc);
+    for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
+      counters.push_back(std::make_unique<WorkCounter>(configuration, gpu, gpc, bounds[gpc]));
+    }
+  }
+  const HostTimer timer;
+  gpu.run(progress);
+  for (const auto& counter : counters) counter->end_phase();
+  timer.stop(result);
+
+  BehaviourList behaviours;
+  StatisticCollector statistics;
+  for (const UntimedGpu::Placed& placed : gpu.units()) {
+    const Behaviour& behaviour = placed.unit->behaviour();
+    behaviours.of_instance.emplace_back(placed.instance, &behaviour);
+    add_statistics(*placed.instance, behaviour, *placed.unit, statistics);
+  }
+  report_counts(configuration, behaviours, statistics, result);
+  if (!bounds.empty()) report_bound(configuration, gpu, bounds, result);
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::uint64_t>> Counts::named() const {
+  return {{"primitives", primitives},
+          {"quads_rasterized", quads_rasterized},
+          {"fragments_rasterized", fragments_rasterized},
+          {"quads_depth_stencil_failed", quads_depth_stencil_failed},
+          {"fragments_depth_stencil_failed", fragments_depth_stencil_failed},
+          {"quads_terminated", quads_terminated},
+          {"fragments_terminated", fragments_terminated},
+          {"quads_shaded", quads_shaded},
+          {"fragments_shaded", fragments_shaded},
+          {"quads_pruned", quads_pruned},
+          {"fragments_pruned", fragments_pruned},
+          {"quads_merged", quads_merged},
+          {"fragments_merged", fragments_merged},
+          {"quads_dropped_late", quads_dropped_late},
+          {"fragments_dropped_late", fragments_dropped_late},
+          {"quads_late_failed", quads_late_failed},
+          {"fragments_late_failed", fragments_late_failed},
+          {"quads_blended", quads_blended},
+          {"fragments_blended", fragments_blended},
+          {"warps", warps},
+          {"tgc_flushes", tgc_flushes},
+          {"tc_flushes", tc_flushes},
+          {"termination_updates", termination_updates}};
+}
+
+RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<float>* progress) {
+  return simulate(request, *Frame::of(draw, draw_state_of(request)), progress);
+}
+
+RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
+  check_sampling_has_time(request);
+  const Configuration configuration(request, frame);
+  RunResult result;
+  result.request = request;
+  result.framebuffer = Framebuffer(configuration.frame(), request.format);
+  result.implementations = configuration.implementations();
+  result.parameters = configuration.parameters();
+  if (request.fidelity == Fidelity::lt || request.fidelity == Fidelity::at) {
+    result.outside_validated_range = outside_validated_range(result.parameters);
+  }
+  if (has_time(request.fidelity)) {
+    run_clocked(configuration, progress, result);
+  } else {
+    run_untimed(configuration, progress, result);
+  }
+  check_conservation(result.counts);
+  result.result_hash = hash_of(result);
+  return result;
+}
+
+namespace {
+/// Gives a function the sampler of a platform that is elaborated for it alone.
+template <class Look>
+void with_sampler(const Configuration& configuration, Look&& look) {
+  fresh_simulation();
+  {
+    Framebuffer framebuffer(configuration.frame(), configuration.request().format);
+    const Gpu gpu(configuration, framebuffer);
+    StatisticSampler sampler;
+    add_statistics(gpu, sampler);
+    look(sampler);
+  }
+  fresh_simulation();
+}
+}  // namespace
+
+void check_configuration(const RunRequest& request) {
+  const Frame empty(1, 1);
+  check_sampling_has_time(request);
+  const Configuration configuration(request, empty);
+  for (const Instance& instance : configuration.netlist().instances()) configuration.make(instance);
+  if (!samples_statistics(request)) return;
+  with_sampler(configuration, [&](StatisticSampler& sampler) { sampler.find(*request.observers); });
+}
+
+std::vector<std::string> sampled_statistics(const RunRequest& request) {
+  std::vector<std::string> names;
+  if (!has_time(request.fidelity)) return names;
+  const Frame empty(1, 1);
+  const Configuration configuration(request, empty);
+  with_sampler(configuration, [&](const StatisticSampler& sampler) { names = sampler.names(); });
+  return names;
+}
+
+std::vector<ParameterListing> list_parameters(const Platform* platform) {
+  std::vector<ParameterListing> listings;
+  const auto apply = [&](const std::vector<std::string>& names, ParameterSet& set) {
+    if (platform == nullptr) return;
+    for (const Setting& setting : platform->settings) {
+      if (std::find(names.begin(), names.end(), setting.unit) != names.end())
+        set.set(setting.unit, setting.parameter, setting.value);
+    }
+  };
+  for (const Implementation* implementation : Registry::instance().all()) {
+    ParameterListing listing{implementation->slot, implementation->name, implementation->description,
+                             implementation->pass_through, implementation->make_parameters()};
+    const Slot& slot = Registry::instance().slot(implementation->slot);
+    if (implementation == &default_implementation(slot, variant_named("het+qm"))) {
+      apply({implementation->slot}, *listing.parameters);
+    }
+    listings.push_back(std::move(listing));
+  }
+  listings.push_back({l2, "fixed-latency", "the shared L2: fixed latency, a number of bytes a cycle for each GPC",
+                      false, std::make_unique<L2Parameters>()});
+  apply({l2}, *listings.back().parameters);
+
+  const Platform& wired = platform != nullptr ? *platform : platforms().front();
+  Netlist netlist(wired.gpcs);
+  wired.wire(netlist);
+  std::vector<std::string> listed;
+  for (const Link& link : netlist.links()) {
+    const std::string name = "link." + without_gpc(link.name());
+    if (std::find(listed.begin(), listed.end(), name) != listed.end()) continue;
+    listed.push_back(name);
+    auto parameters = std::make_unique<LinkParameters>(link.parameters->depth, link.parameters->latency_cycles);
+    apply({name, "link." + link.name()}, *parameters);
+    listings.push_back(
+        {name, "", without_gpc(link.from) + " to " + without_gpc(link.to), false, std::move(parameters)});
+  }
+
+  listings.push_back({"state", "draw-state", "the draw's state and the precision of the fixed-function hardware", false,
+                      std::make_unique<StateParameters>()});
+  apply({"state"}, *listings.back().parameters);
+  return listings;
+}
+
+StorageReport quad_merging_storage(const RunRequest& request) {
+  const Frame empty(1, 1);
+  RunRequest merging = request;
+  merging.variant.quad_merging = true;
+  const Configuration configuration(merging, empty);
+  StorageReport report;
+  for (const Instance& instance : configuration.netlist().instances()) {
+    if (instance.gpc != 0) continue;
+    if (instance.slot == "tgc") report.tgc_bytes += configuration.make_as<TgcBehaviour>(instance)->storage_bytes();
+    if (instance.slot == "qru") report.qru_bytes += configuration.make_as<QruBehaviour>(instance)->storage_bytes();
+  }
+  return report;
+}
+
+void fresh_simulation() {
+  sc_core::sc_curr_simcontext = new sc_core::sc_simcontext();
+  sc_core::sc_default_global_context = sc_core::sc_curr_simcontext;
+}
+
+}  // namespace vrpipe
