@@ -222,7 +222,7 @@ template class ColorRop<ColorFormat::rgba32f, BlendRounding::rtz>;
 template class ColorRop<ColorFormat::rgba32f, BlendRounding::measured>;
 
 namespace {
-const SlotRegistrar slot{{"crop", 100, "color-rop", "", true}};
+const SlotRegistrar slot{{"crop", 100, "color-rop", "", true, check_crop}};
 
 [[maybe_unused]] const bool registered = [] {
   Implementation implementation =

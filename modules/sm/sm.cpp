@@ -205,7 +205,7 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
 void SplatShader::shade_vertices(const VertexWarp&) { ++vertex_warps; }
 
 namespace {
-const SlotRegistrar slot{{"sm", 90, "splat-shader", "", true}};
+const SlotRegistrar slot{{"sm", 90, "splat-shader", "", true, check_sm}};
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
                                                     "Gaussian splatting shaders with alpha pruning and quad merging",
                                                     false, Trust::trusted);

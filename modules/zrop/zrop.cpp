@@ -57,7 +57,7 @@ void DepthStencilRop::pass(Mark mark) {
 }
 
 namespace {
-const SlotRegistrar slot{{"zrop", 70, "depth-stencil-rop", "", true}};
+const SlotRegistrar slot{{"zrop", 70, "depth-stencil-rop", "", true, check_zrop}};
 const Registrar<DepthStencilRop, ZropBehaviour> registrar("zrop", "depth-stencil-rop",
                                                           "termination test and update on the stencil MSB", false,
                                                           Trust::trusted);

@@ -23,6 +23,7 @@ struct Slot {
   std::string implementation;  ///< what is in it, unless a user or a platform says otherwise
   std::string stand_in = {};   ///< what is there in a variant without quad merging; empty if that changes nothing
   bool reports_utilization = false;
+  SlotCheck check = nullptr;  ///< for units that are not trusted; null if nothing of theirs is checked
 };
 
 /// An implementation of a slot: a unit that a platform can be built with.

@@ -1,0 +1,72 @@
+#include "pipeline/slots/checks.h"
+
+#include <vrpipe/pipeline/slots/raster.h>
+
+namespace vrpipe {
+
+namespace {
+
+class CheckedRaster final : public CheckedSlot<RasterBehaviour> {
+ public:
+  using CheckedSlot::CheckedSlot;
+
+  void begin(const Primitive& primitive, const PixelRect& clip) override {
+    primitive_ = primitive;
+    kept_ = 0;
+    ask("begin", [&] { checked_->begin(primitive, clip); });
+  }
+  bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override {
+    const bool more = ask("next", [&] { return checked_->next(out, coarse_tests, new_screen_tile); });
+    if (coarse_tests > raster_tiles())
+      fault("next", "{} raster tiles tested, the frame has {}", coarse_tests, raster_tiles());
+    if (!more) return false;
+    if (++kept_ > raster_tiles())
+      fault("next", "splat {} covers more raster tiles than the frame has", primitive_.splat);
+    if (out.count > QuadBeat::capacity) fault("next", "{} quads in a raster tile", out.count);
+    if (out.mark != Mark::none || out.last_of_bin) fault("next", "a raster tile with marks that are not its own");
+    check_tile("next", out.tile);
+    check_quads("next", out.tile, out.quads.data(), out.count);
+    for (unsigned i = 0; i < out.count; ++i) {
+      const Quad& quad = out.quads[i];
+      if (quad.splat != primitive_.splat || quad.triangle != primitive_.triangle || quad.draw != primitive_.draw) {
+        fault("next", "a quad of splat {}.{} for splat {}.{}", quad.splat, quad.triangle, primitive_.splat,
+              primitive_.triangle);
+      }
+      fragments_.add(primitive_.draw, popcount(quad.coverage));
+    }
+    quads_.add(primitive_.draw, out.count);
+    return true;
+  }
+  Cost cost() const override {
+    const Cost cost = ask("cost", [&] { return checked_->cost(); });
+    check_latency("setup_latency_cycles", cost.setup_latency_cycles);
+    check_latency("setup_interval_cycles", cost.setup_interval_cycles);
+    check_rate("coarse_tiles_per_cycle", cost.coarse_tiles_per_cycle);
+    check_rate("fine_tiles_per_cycle", cost.fine_tiles_per_cycle);
+    check_latency("screen_tile_interval_cycles", cost.screen_tile_interval_cycles);
+    check_rate("quads_per_cycle", cost.quads_per_cycle);
+    return cost;
+  }
+  void check_costs() const override { cost(); }
+  void check_counters() const override {
+    check_by_draw("quads_rasterized", {&checked_->quads_rasterized}, quads_, "quads came out");
+    check_by_draw("fragments_rasterized", {&checked_->fragments_rasterized}, fragments_, "fragments came out");
+  }
+
+ private:
+  std::uint64_t raster_tiles() const { return 4 * tiles(); }
+
+  Primitive primitive_;
+  std::uint64_t kept_ = 0;  ///< raster tiles of the primitive
+  Seen quads_;
+  Seen fragments_;
+};
+
+}  // namespace
+
+std::unique_ptr<Behaviour> check_raster(const std::string& name, const RenderContext& context,
+                                        std::unique_ptr<Behaviour> behaviour) {
+  return make_checked<CheckedRaster, RasterBehaviour>(name, context, std::move(behaviour));
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,84 @@
+#include "pipeline/slots/checks.h"
+
+#include <vrpipe/pipeline/slots/zrop.h>
+
+namespace vrpipe {
+
+namespace {
+
+class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
+ public:
+  using CheckedSlot::CheckedSlot;
+
+  void test(QuadBeat& beat) override {
+    const TileId tile = beat.tile;
+    const unsigned count = beat.count;
+    const bool last_of_bin = beat.last_of_bin;
+    const bool tests =
+        count > 0 && !frame().draws().empty() && frame().draw_call(beat.quads[0].draw).state.early_termination;
+    for (unsigned i = 0; i < count; ++i) {
+      const Quad& quad = beat.quads[i];
+      if (tests) tested_.add(quad.draw, 1);
+      lost_quads_.add(quad.draw, 1);
+      lost_fragments_.add(quad.draw, popcount(quad.coverage));
+    }
+    ask("test", [&] { checked_->test(beat); });
+    if (beat.count > count) fault("test", "{} quads of {} in {} passed", beat.count, count, words_of(tile));
+    if (beat.tile != tile || beat.last_of_bin != last_of_bin || beat.mark != Mark::none) {
+      fault("test", "a beat of {} with a tile or marks that are not its own", words_of(tile));
+    }
+    check_quads("test", tile, beat.quads.data(), beat.count);
+    for (unsigned i = 0; i < beat.count; ++i) {
+      const Quad& quad = beat.quads[i];
+      lost_quads_.take_back(quad.draw, 1);
+      lost_fragments_.take_back(quad.draw, popcount(quad.coverage));
+    }
+  }
+  void attach(DepthStencilSurface& surface) override {
+    ZropBehaviour::attach(surface);
+    ask("attach", [&] { checked_->attach(surface); });
+  }
+  void pass(Mark mark) override {
+    ask("pass", [&] { checked_->pass(mark); });
+  }
+  void update(const TerminationSignal& signal) override {
+    ++updates_;
+    ask("update", [&] { checked_->update(signal); });
+  }
+  void follow(FunctionalRunAhead& run_ahead) override {
+    ask("follow", [&] { checked_->follow(run_ahead); });
+  }
+  Cost cost() const override {
+    const Cost cost = ask("cost", [&] { return checked_->cost(); });
+    check_rate("quads_per_cycle", cost.quads_per_cycle);
+    check_latency("latency_cycles", cost.latency_cycles);
+    check_rate("updates_per_cycle", cost.updates_per_cycle);
+    return cost;
+  }
+  void check_costs() const override { cost(); }
+  void check_counters() const override {
+    check_by_draw("quads_tested", {&checked_->quads_tested}, tested_, "quads came in");
+    check_by_draw("quads_terminated + quads_depth_stencil_failed",
+                  {&checked_->quads_terminated, &checked_->quads_depth_stencil_failed}, lost_quads_,
+                  "quads did not come out");
+    check_by_draw("fragments_terminated + fragments_depth_stencil_failed",
+                  {&checked_->fragments_terminated, &checked_->fragments_depth_stencil_failed}, lost_fragments_,
+                  "fragments did not come out");
+    check_counter("termination_updates", checked_->termination_updates.value(), updates_, "signals came in");
+  }
+
+ private:
+  Seen tested_;
+  Seen lost_quads_;
+  Seen lost_fragments_;
+  std::uint64_t updates_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Behaviour> check_zrop(const std::string& name, const RenderContext& context,
+                                      std::unique_ptr<Behaviour> behaviour) {
+  return make_checked<CheckedZrop, ZropBehaviour>(name, context, std::move(behaviour));
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include <vrpipe/component/statistic.h>
+#include <vrpipe/pipeline/payload.h>
+#include <vrpipe/pipeline/render_context.h>
+
+namespace vrpipe {
+
+/// How fast a unit works: what its timing model asks for.
+struct Throughput {
+  std::uint32_t items_per_cycle = 1;  ///< peak rate
+  std::uint32_t latency_cycles = 1;   ///< from the last item in to the first item out
+};
+
+/// A slot's class declares the counters that reports and the checks of conservation need; every unit of the slot counts
+/// them. Others are its own.
+class Behaviour : public StatisticSet {
+ public:
+  virtual ~Behaviour() = default;
+  /// The unit as its author wrote it: itself, or what stands behind the checks (checked_behaviours.h).
+  virtual const Behaviour& unit() const { return *this; }
+  Behaviour& unit() { return const_cast<Behaviour&>(static_cast<const Behaviour*>(this)->unit()); }
+};
+
+/// Puts a unit of a slot behind checks of all that it returns (checked_behaviours.h). `name` is SLOT=IMPLEMENTATION.
+/// Throws SimulationFault for a unit of another slot.
+using SlotCheck = std::unique_ptr<Behaviour> (*)(const std::string& name, const RenderContext& context,
+                                                 std::unique_ptr<Behaviour> behaviour);
+
+}  // namespace vrpipe

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include <vrpipe/kernel/rate.h>
+#include <vrpipe/memory/cache_statistics.h>
+#include <vrpipe/pipeline/framebuffer.h>
+#include <vrpipe/pipeline/slots/behaviour.h>
+
+namespace vrpipe {
+
+/// Slot `crop`: blends quads into the colour target and tests for termination.
+class CropBehaviour : public Behaviour {
+ public:
+  /// Before the first blend. One that overrides it calls it.
+  virtual void attach(ColorSurface& surface) { surface_ = &surface; }
+  const ColorSurface* surface() const { return surface_; }
+  /// A mark comes by, after all blends before it: a clear is done (Frame::clear_of), for this GPC's tiles.
+  virtual void pass(Mark mark) = 0;
+  struct Outcome {
+    LaneMask terminated;  ///< pixels to signal: those that newly passed the termination threshold (HET only)
+    bool changed;         ///< whether a stored value is another one than before
+  };
+  /// Blends the live samples of a quad of a draw into the one at a place of the surface's grid.
+  virtual Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) = 0;
+  /// The same for a quad of a warp, which timing models that blend quad by quad call.
+  virtual Outcome blend_quad(std::size_t place, const ShadedWarp& warp, unsigned index) {
+    return blend(warp.draw[index], place, warp.live[index], warp.color[index]);
+  }
+  /// By quad of a warp.
+  using Outcomes = std::array<Outcome, quads_per_warp>;
+  /// Blends quads `from` to `to` - 1 of a warp, in this order.
+  virtual void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
+    for (unsigned i = from; i < to; ++i) {
+      outcomes[i] = blend_quad(surface_->grid().place(warp.tile, warp.position[i]), warp, i);
+    }
+  }
+
+  /// What the colour cache does for a line that quads need.
+  struct LineAccess {
+    std::uint32_t line = 0;          ///< of the cache, from 0
+    std::uint32_t sectors = 0;       ///< of the line that the quads need, a bit each
+    std::uint32_t filled = 0;        ///< of these, not there yet
+    std::uint32_t written_back = 0;  ///< dirty sectors of what the line held
+    bool replaced = false;           ///< the line held something else, or nothing, before
+    std::uint64_t address = 0;       ///< of the line, bytes
+    std::uint64_t old_address = 0;   ///< of what it held
+  };
+  /// And for quads of a warp; quad `i` needs `sectors_of[i]` of the line in `lines[line_of[i]]`.
+  struct CacheLookUp {
+    unsigned count = 0;  ///< of lines, in the order in which they are needed first
+    std::array<LineAccess, quads_per_warp> lines;
+    std::array<std::uint8_t, quads_per_warp> line_of{};
+    std::array<std::uint32_t, quads_per_warp> sectors_of{};
+  };
+  /// Looks quads `from` to `to` - 1 of a warp up, before their `blend`, in the order of blending. The cache sees this
+  /// order alone, so that which sectors move does not depend on when; for timing models that do not follow fills through the
+  /// cache themselves. Without a cache, no line is needed.
+  virtual void look_up(const ShadedWarp&, unsigned /*from*/, unsigned /*to*/, CacheLookUp& out) { out.count = 0; }
+  /// After a `blend` whose sectors are dirty for it.
+  virtual void make_dirty(std::uint32_t /*line*/, std::uint32_t /*sectors*/) {}
+  struct Cost {
+    Rate blend_rate;               ///< of quads, of this draw's format
+    std::uint32_t input_quads;     ///< queue between tag look-up and blending
+    std::uint32_t latency_cycles;  ///< of blending, termination test included
+    bool forwards;                 ///< overlapping quads need not wait for `latency_cycles`
+    std::uint32_t cache_bytes;
+    std::uint32_t line_bytes;
+    std::uint32_t sector_bytes;
+    std::uint32_t mshrs;              ///< sectors in flight
+    std::uint32_t sectors_per_cycle;  ///< filled or written back
+    bool writes_unchanged;            ///< a blend that changes no value makes its sector dirty all the same
+    /// Throws UserError for a cache that cannot be: sizes are powers of two, quad <= line <= cache, sector <= line, at
+    /// most 32 sectors a line.
+    void check_cache(ColorFormat format) const;
+  };
+  virtual Cost cost() const = 0;
+
+  DrawCounter quads_blended{*this, "quads_blended", "quads", "blended"};
+  DrawCounter fragments_blended{*this, "fragments_blended", "fragments", "blended"};
+  DrawCounter quads_dropped_late{*this, "quads_dropped_late", "quads",
+                                 "of which CROP finds every pixel terminated (strict)"};
+  DrawCounter fragments_dropped_late{*this, "fragments_dropped_late", "fragments",
+                                     "whose pixel CROP finds terminated (strict)"};
+  DrawCounter quads_late_failed{*this, "quads_late_failed", "quads", "that fail a late depth or stencil test"};
+  DrawCounter fragments_late_failed{*this, "fragments_late_failed", "fragments",
+                                    "that fail a late depth or stencil test"};
+  DrawCounter termination_signals{*this, "termination_signals", "signals", "sent to ZROP, one for a quad's pixels"};
+  /// Of the colour cache; its accesses are quads. Whoever simulates it counts: the unit in `look_up`, or the timing model
+  /// that follows fills through the cache.
+  SectoredCacheStatistics cache_statistics{*this, "cache"};
+
+ protected:
+  ColorSurface* surface_ = nullptr;
+};
+
+/// The slot's SlotCheck.
+std::unique_ptr<Behaviour> check_crop(const std::string& name, const RenderContext& context,
+                                      std::unique_ptr<Behaviour> behaviour);
+
+}  // namespace vrpipe

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include <vrpipe/pipeline/slots/behaviour.h>
+
+namespace vrpipe {
+
+/// Slot `draw`: issues the splats of a frame's draws as vertex warps.
+class DrawBehaviour : public Behaviour {
+ public:
+  /// The next warp, of one draw, or the mark before a clear and before a draw of another state (Frame::commands); false
+  /// after the last.
+  virtual bool next(VertexWarp& out) = 0;
+  /// Vertex warps in 1024 cycles.
+  virtual std::uint32_t warps_per_1024_cycles() const = 0;
+};
+
+/// The slot's SlotCheck.
+std::unique_ptr<Behaviour> check_draw(const std::string& name, const RenderContext& context,
+                                      std::unique_ptr<Behaviour> behaviour);
+
+}  // namespace vrpipe

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include <vrpipe/kernel/rate.h>
+#include <vrpipe/pipeline/slots/behaviour.h>
+
+namespace vrpipe {
+
+/// Slot `prop`: hands bins to ZROP and on to QRU, and shaded warps to CROP in order.
+class PropBehaviour : public Behaviour {
+ public:
+  enum class Order : std::uint8_t { draw, tile };
+  struct Cost {
+    std::uint32_t quads_per_cycle;  ///< TC to ZROP to QRU
+    Rate color_rate;                ///< of quads to CROP, of this draw's format
+    std::uint32_t latency_cycles;
+    Order order;
+  };
+  virtual Cost cost() const = 0;
+};
+
+/// The slot's SlotCheck.
+std::unique_ptr<Behaviour> check_prop(const std::string& name, const RenderContext& context,
+                                      std::unique_ptr<Behaviour> behaviour);
+
+}  // namespace vrpipe

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include <vrpipe/pipeline/slots/behaviour.h>
+
+namespace vrpipe {
+
+/// Slot `qru`: forms warps from the surviving quads of a bin.
+class QruBehaviour : public Behaviour {
+ public:
+  /// Examines quads of a bin, until all `count` are examined or a warp is complete. Returns the number examined, 0 only
+  /// together with a launch; `launched` tells whether `out` was filled.
+  virtual unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) = 0;
+  /// At the end of a bin: the next warp of what is left; false when nothing is.
+  virtual bool finish_bin(Warp& out) = 0;
+  virtual Throughput cost() const = 0;              ///< items: quads examined
+  virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
+};
+
+/// The slot's SlotCheck.
+std::unique_ptr<Behaviour> check_qru(const std::string& name, const RenderContext& context,
+                                     std::unique_ptr<Behaviour> behaviour);
+
+}  // namespace vrpipe

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include <vrpipe/pipeline/slots/behaviour.h>
+
+namespace vrpipe {
+
+/// Slot `raster`: setup, coarse and fine rasterisation of one primitive at a time.
+class RasterBehaviour : public Behaviour {
+ public:
+  /// Sets up a primitive, to be rasterised in `clip`.
+  virtual void begin(const Primitive& primitive, const PixelRect& clip) = 0;
+  /// Advances to the next raster tile that coarse rasterisation keeps, and gives its quads (0 to 16).
+  /// `coarse_tests` counts the raster tiles tested on the way; `new_screen_tile` tells whether it is the first raster
+  /// tile kept of its screen tile. False, with `coarse_tests` set, when the primitive is done.
+  virtual bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) = 0;
+  struct Cost {
+    std::uint32_t setup_latency_cycles;
+    std::uint32_t setup_interval_cycles;        ///< between primitives
+    std::uint32_t coarse_tiles_per_cycle;       ///< raster tiles tested
+    std::uint32_t fine_tiles_per_cycle;         ///< raster tiles made into quads
+    std::uint32_t screen_tile_interval_cycles;  ///< between (primitive, screen tile) pairs
+    std::uint32_t quads_per_cycle;              ///< handed to TC
+  };
+  virtual Cost cost() const = 0;
+
+  DrawCounter quads_rasterized{*this, "quads_rasterized", "quads", "with at least one covered sample"};
+  DrawCounter fragments_rasterized{*this, "fragments_rasterized", "fragments", "covered samples"};
+};
+
+/// The slot's SlotCheck.
+std::unique_ptr<Behaviour> check_raster(const std::string& name, const RenderContext& context,
+                                        std::unique_ptr<Behaviour> behaviour);
+
+}  // namespace vrpipe

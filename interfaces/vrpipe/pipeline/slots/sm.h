@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <vrpipe/pipeline/slots/behaviour.h>
+
+namespace vrpipe {
+
+/// A shader as its scheduler sees it: instructions to issue, then cycles until the next can issue.
+struct ShaderSegment {
+  std::uint32_t instructions;
+  std::uint32_t stall_cycles;
+};
+
+/// Slot `sm`: vertex and fragment shading, alpha pruning, quad merging.
+class SmBehaviour : public Behaviour {
+ public:
+  /// Shades, prunes and merges: fills `out` but for its slot and its pool, which are the module's.
+  virtual void shade(const Warp& warp, ShadedWarp& out) = 0;
+  virtual void shade_vertices(const VertexWarp& warp) = 0;
+  struct Cost {
+    std::uint32_t cores;
+    std::uint32_t schedulers_per_core;
+    std::uint32_t lanes_per_scheduler;  ///< a divisor of 32
+    std::uint32_t warps_per_core;
+    std::uint32_t vertex_warps;       ///< of the array that may be in flight
+    std::uint32_t warps_to_one_core;  ///< consecutive warps of a tile that go to one core
+    std::vector<ShaderSegment> vertex;
+    std::vector<ShaderSegment> fragment;
+    std::vector<ShaderSegment> merge;  ///< appended for a warp with pairs
+    /// Fragment warps in flight in the array. Throws UserError if they are more than slots have numbers.
+    std::uint32_t fragment_slots() const;
+    /// Cycles for which an instruction of a warp has its scheduler.
+    std::uint32_t cycles_per_instruction() const { return 32 / lanes_per_scheduler; }
+    /// Warp instructions that the array issues at most.
+    double instructions_per_cycle() const { return double{1} * cores * schedulers_per_core / cycles_per_instruction(); }
+  };
+  virtual Cost cost() const = 0;
+
+  DrawCounter quads_shaded{*this, "quads_shaded", "quads", "launched in fragment warps"};
+  DrawCounter fragments_shaded{*this, "fragments_shaded", "fragments", "live samples launched"};
+  DrawCounter quads_pruned{*this, "quads_pruned", "quads", "that lost their last fragment to alpha pruning"};
+  DrawCounter fragments_pruned{*this, "fragments_pruned", "fragments", "with alpha below the threshold"};
+  /// Of a pair, its back quad's draw; what is left is its front quad's.
+  DrawCounter quads_merged{*this, "quads_merged", "quads", "taken away by merging, one a pair with two live quads"};
+  DrawCounter fragments_merged{*this, "fragments_merged", "fragments", "taken away by merging, where both are live"};
+  Counter fragment_warps{*this, "fragment_warps", "warps", "of fragments"};
+};
+
+/// The slot's SlotCheck.
+std::unique_ptr<Behaviour> check_sm(const std::string& name, const RenderContext& context,
+                                    std::unique_ptr<Behaviour> behaviour);
+
+}  // namespace vrpipe

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include <vrpipe/pipeline/slots/behaviour.h>
+
+namespace vrpipe {
+
+/// Slot `vpo`: primitive assembly, culling, clipping to the viewport, bounding boxes.
+class VpoBehaviour : public Behaviour {
+ public:
+  /// The visible triangles of a splat of a draw, in order. Returns how many of `out` are set (0 to 2).
+  virtual unsigned assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) = 0;
+  virtual Throughput cost() const = 0;  ///< items: triangles
+
+  DrawCounter primitives{*this, "primitives", "triangles", "triangles handed to the GPCs"};
+};
+
+/// The slot's SlotCheck.
+std::unique_ptr<Behaviour> check_vpo(const std::string& name, const RenderContext& context,
+                                     std::unique_ptr<Behaviour> behaviour);
+
+}  // namespace vrpipe

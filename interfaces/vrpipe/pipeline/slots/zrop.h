@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <vrpipe/pipeline/framebuffer.h>
+#include <vrpipe/pipeline/slots/behaviour.h>
+
+namespace vrpipe {
+
+/// Strict termination: what the bins tested so far will have terminated, whenever their quads reach CROP.
+class FunctionalRunAhead {
+ public:
+  virtual ~FunctionalRunAhead() = default;
+  /// A mark has come by, after all bins before it.
+  virtual void pass(Mark mark) = 0;
+  /// Takes the survivors of a part of a bin, as soon as that is tested, through merging, shading and blending; with the
+  /// last of a bin, `terminated` has what all of them newly terminate.
+  virtual void tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) = 0;
+};
+
+/// Slot `zrop`: depth and stencil test, termination test and update.
+class ZropBehaviour : public Behaviour {
+ public:
+  /// Before the first test. One that overrides it calls it.
+  virtual void attach(DepthStencilSurface& surface) { surface_ = &surface; }
+  const DepthStencilSurface* surface() const { return surface_; }
+  /// Removes dead samples, and quads without a live one, from the beat; its tile and `last_of_bin` stay. Of its quads all
+  /// are of one state; they may be of several draws.
+  virtual void test(QuadBeat& beat) = 0;
+  /// Sets the termination bit (stencil MSB) of the signalled pixels, unless they have been cleared since: then the
+  /// signal's epoch has passed.
+  virtual void update(const TerminationSignal& signal) = 0;
+  /// A mark comes by, after all tests before it: a clear of termination is done (Frame::clear_of), for this GPC's tiles.
+  virtual void pass(Mark mark) = 0;
+  /// Strict mode at fidelities with time: termination comes from `run_ahead`, and `update` only costs time.
+  virtual void follow(FunctionalRunAhead& run_ahead) = 0;
+  struct Cost {
+    std::uint32_t quads_per_cycle;
+    std::uint32_t latency_cycles;
+    std::uint32_t updates_per_cycle;  ///< signals; a cycle with updates tests no quads: one z-cache port
+  };
+  virtual Cost cost() const = 0;
+
+  DrawCounter quads_tested{*this, "quads_tested", "quads", "that entered the termination test"};
+  DrawCounter quads_depth_stencil_failed{*this, "quads_depth_stencil_failed", "quads",
+                                         "that lost their last fragment to the depth or stencil test"};
+  DrawCounter fragments_depth_stencil_failed{*this, "fragments_depth_stencil_failed", "fragments",
+                                             "that failed the depth or stencil test"};
+  DrawCounter quads_terminated{*this, "quads_terminated", "quads",
+                               "that lost their last fragment to the termination test"};
+  DrawCounter fragments_terminated{*this, "fragments_terminated", "fragments", "that failed the termination test"};
+  Counter termination_updates{*this, "termination_updates", "signals", "received from CROP, one for a quad's pixels"};
+
+ protected:
+  DepthStencilSurface* surface_ = nullptr;
+};
+
+/// The slot's SlotCheck.
+std::unique_ptr<Behaviour> check_zrop(const std::string& name, const RenderContext& context,
+                                      std::unique_ptr<Behaviour> behaviour);
+
+}  // namespace vrpipe
