@@ -1,7 +1,7 @@
 // What each fidelity costs in accuracy and brings in speed: measured beside wanted, against `cycle`.
 //   fidelity_ladder [--repeat N] [SCENE ...]
 // A SCENE is a file or builtin:NAME; without one, the built-in scenes and the robot of tests/data.
-// Accuracy: every rung and variant of every scene, once. Rates: of one large frame, every rung and variant in turn, N times
+// Accuracy: every level and variant of every scene, once. Rates: of one large frame, every level and variant in turn, N times
 // (default: 5), the median: of the measured draw of tests/data, or of the first SCENE. The slowest variant counts.
 // Rates are rasterised quads per second of processor time of the simulation alone.
 #include <algorithm>
@@ -23,17 +23,17 @@ namespace vrpipe {
 
 namespace {
 
-struct Rung {
+struct Level {
   Fidelity fidelity;
   double cycles_percent;    ///< wanted: error of the cycles at most; 0: no mark
   double speedup_percent;   ///< wanted: error of the speed-up over the baseline at most
   double quads_per_second;  ///< wanted: at least
 };
-constexpr std::array<Rung, 5> rungs{{{Fidelity::functional, 0, 0, 10e6},
-                                     {Fidelity::bound, 25, 15, 9e6},
-                                     {Fidelity::lt, 10, 5, 8e6},
-                                     {Fidelity::at, 3, 2, 6e6},
-                                     {Fidelity::cycle, 0, 0, 4e6}}};
+constexpr std::array<Level, 5> levels{{{Fidelity::functional, 0, 0, 10e6},
+                                       {Fidelity::bound, 25, 15, 9e6},
+                                       {Fidelity::lt, 10, 5, 8e6},
+                                       {Fidelity::at, 3, 2, 6e6},
+                                       {Fidelity::cycle, 0, 0, 4e6}}};
 
 struct Run {
   double cycles = 0;
@@ -63,32 +63,32 @@ Run run_once(const Draw& draw, const Variant& variant, Fidelity fidelity) {
           static_cast<double>(result.counts.quads_rasterized) / result.cpu_seconds};
 }
 
-/// The rungs with time that one of the others beats in error and rate; `cycle` has no error.
-std::string dominated_by(std::size_t rung, const std::array<double, rungs.size()>& error,
-                         const std::array<double, rungs.size()>& rate) {
+/// The levels with time that one of the others beats in error and rate; `cycle` has no error.
+std::string dominated_by(std::size_t level, const std::array<double, levels.size()>& error,
+                         const std::array<double, levels.size()>& rate) {
   std::string names;
-  for (std::size_t other = 1; other < rungs.size() && rung > 0; ++other) {
-    if (error[other] >= error[rung] || rate[other] <= rate[rung]) continue;
-    names += std::string(names.empty() ? "dominated by " : ", ") + name_of(rungs[other].fidelity);
+  for (std::size_t other = 1; other < levels.size() && level > 0; ++other) {
+    if (error[other] >= error[level] || rate[other] <= rate[level]) continue;
+    names += std::string(names.empty() ? "dominated by " : ", ") + name_of(levels[other].fidelity);
   }
   return names;
 }
 
-void measure_accuracy(const SceneRequest& request, std::array<Worst, rungs.size()>& worst) {
+void measure_accuracy(const SceneRequest& request, std::array<Worst, levels.size()>& worst) {
   const LoadedScene scene = load_scene(request);
-  std::array<double, rungs.size()> baseline{};
+  std::array<double, levels.size()> baseline{};
   for (const Variant& variant : variants()) {
-    std::array<Run, rungs.size()> runs;
-    for (std::size_t i = 0; i < rungs.size(); ++i) runs[i] = run_once(scene.draw, variant, rungs[i].fidelity);
-    std::array<double, rungs.size()> error{};
-    std::array<double, rungs.size()> rate{};
-    for (std::size_t i = 0; i < rungs.size(); ++i) {
+    std::array<Run, levels.size()> runs;
+    for (std::size_t i = 0; i < levels.size(); ++i) runs[i] = run_once(scene.draw, variant, levels[i].fidelity);
+    std::array<double, levels.size()> error{};
+    std::array<double, levels.size()> rate{};
+    for (std::size_t i = 0; i < levels.size(); ++i) {
       if (!variant.quad_merging && !variant.early_termination) baseline[i] = runs[i].cycles;
       error[i] = std::fabs(percent(runs[i].cycles, runs.back().cycles));
       rate[i] = runs[i].quads_per_second;
     }
-    for (std::size_t i = 0; i < rungs.size(); ++i) {
-      std::printf("%-28s %-9s %-11s", scene.summary.name.c_str(), variant.name.c_str(), name_of(rungs[i].fidelity));
+    for (std::size_t i = 0; i < levels.size(); ++i) {
+      std::printf("%-28s %-9s %-11s", scene.summary.name.c_str(), variant.name.c_str(), name_of(levels[i].fidelity));
       if (runs[i].cycles == 0) {
         std::printf(" %12s %9s %9s %12s %9.1f\n", "", "", "", "", rate[i] / 1e6);
         continue;
@@ -106,22 +106,22 @@ void measure_accuracy(const SceneRequest& request, std::array<Worst, rungs.size(
 }
 
 /// Prints every variant's; returns the lowest.
-std::array<double, rungs.size()> measure_rates(const SceneRequest& request, int repeat) {
+std::array<double, levels.size()> measure_rates(const SceneRequest& request, int repeat) {
   const LoadedScene scene = load_scene(request);
-  std::array<std::vector<std::vector<double>>, rungs.size()> rates;  // by variant and run
+  std::array<std::vector<std::vector<double>>, levels.size()> rates;  // by variant and run
   rates.fill(std::vector<std::vector<double>>(variants().size()));
   for (int run = 0; run < repeat; ++run) {
-    for (std::size_t i = 0; i < rungs.size(); ++i) {
+    for (std::size_t i = 0; i < levels.size(); ++i) {
       for (std::size_t v = 0; v < variants().size(); ++v) {
-        rates[i][v].push_back(run_once(scene.draw, variants()[v], rungs[i].fidelity).quads_per_second);
+        rates[i][v].push_back(run_once(scene.draw, variants()[v], levels[i].fidelity).quads_per_second);
       }
     }
   }
   std::printf("\nMquads/s: medians of %d runs of %s\n%-11s", repeat, scene.summary.name.c_str(), "fidelity");
   for (const Variant& variant : variants()) std::printf(" %9s", variant.name.c_str());
-  std::array<double, rungs.size()> lowest{};
-  for (std::size_t i = 0; i < rungs.size(); ++i) {
-    std::printf("\n%-11s", name_of(rungs[i].fidelity));
+  std::array<double, levels.size()> lowest{};
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    std::printf("\n%-11s", name_of(levels[i].fidelity));
     std::vector<double> medians;
     for (const std::vector<double>& runs : rates[i]) medians.push_back(median(runs));
     for (const double rate : medians) std::printf(" %9.1f", rate / 1e6);
@@ -160,7 +160,7 @@ int run(const std::vector<std::string>& arguments) {
   }
   std::printf("%-28s %-9s %-11s %12s %9s %9s %12s %9s\n", "scene", "variant", "fidelity", "cycles", "error", "speed-up",
               "error", "Mquads/s");
-  std::array<Worst, rungs.size()> worst;
+  std::array<Worst, levels.size()> worst;
   for (const SceneRequest& scene : scenes) measure_accuracy(scene, worst);
 
   SceneRequest frame = scenes.front();
@@ -169,26 +169,26 @@ int run(const std::vector<std::string>& arguments) {
     frame = SceneRequest();
     frame.scene = measured_draw.path().string();
   }
-  const std::array<double, rungs.size()> rates = measure_rates(frame, repeat);
+  const std::array<double, levels.size()> rates = measure_rates(frame, repeat);
 
   std::printf("\n\nerrors: the worst of all scenes and variants; rates: the slowest variant\n");
   std::printf("%-11s %9s %9s %12s %9s %9s %9s\n", "fidelity", "cycles", "wanted", "speed-up", "wanted", "Mquads/s",
               "wanted");
-  std::array<double, rungs.size()> errors{};
-  for (std::size_t i = 0; i < rungs.size(); ++i) errors[i] = worst[i].cycles_percent;
-  for (std::size_t i = 0; i < rungs.size(); ++i) {
-    const Rung& rung = rungs[i];
-    std::printf("%-11s", name_of(rung.fidelity));
-    if (rung.cycles_percent > 0) {
-      std::printf(" %8.2f%% %8.0f%% %11.2f%% %8.0f%%", worst[i].cycles_percent, rung.cycles_percent,
-                  worst[i].speedup_percent, rung.speedup_percent);
+  std::array<double, levels.size()> errors{};
+  for (std::size_t i = 0; i < levels.size(); ++i) errors[i] = worst[i].cycles_percent;
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    const Level& level = levels[i];
+    std::printf("%-11s", name_of(level.fidelity));
+    if (level.cycles_percent > 0) {
+      std::printf(" %8.2f%% %8.0f%% %11.2f%% %8.0f%%", worst[i].cycles_percent, level.cycles_percent,
+                  worst[i].speedup_percent, level.speedup_percent);
     } else {
       std::printf(" %9s %9s %12s %9s", "", "", "", "");
     }
-    const bool met = (rung.cycles_percent == 0 || (worst[i].cycles_percent <= rung.cycles_percent &&
-                                                   worst[i].speedup_percent <= rung.speedup_percent)) &&
-                     rates[i] >= rung.quads_per_second;
-    std::printf(" %9.1f %9.0f  %s  %s\n", rates[i] / 1e6, rung.quads_per_second / 1e6, met ? "met" : "MISSED",
+    const bool met = (level.cycles_percent == 0 || (worst[i].cycles_percent <= level.cycles_percent &&
+                                                    worst[i].speedup_percent <= level.speedup_percent)) &&
+                     rates[i] >= level.quads_per_second;
+    std::printf(" %9.1f %9.0f  %s  %s\n", rates[i] / 1e6, level.quads_per_second / 1e6, met ? "met" : "MISSED",
                 dominated_by(i, errors, rates).c_str());
   }
   return 0;

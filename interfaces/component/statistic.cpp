@@ -24,9 +24,9 @@ void StatisticSet::set_draws(std::size_t draws) {
   for (DrawCounter* counter : draw_counters_) counter->of_draw_.assign(draws > 1 ? draws : 0, 0);
 }
 
-Extreme::Extreme(StatisticSet& owner, Of of, const char* name, const char* unit, const char* meaning)
+MinMax::MinMax(StatisticSet& owner, Of of, const char* name, const char* unit, const char* meaning)
     : Statistic(owner, name, unit, meaning), of_(of) {
-  owner.extremes_.push_back(this);
+  owner.min_max_.push_back(this);
 }
 
 Histogram::Histogram(StatisticSet& owner, Buckets buckets, const char* name, const char* unit, const char* meaning)
@@ -104,7 +104,7 @@ bool StatisticSet::has(const std::string& name) const {
   const auto is_named = [&](const auto& list) {
     return std::any_of(list.begin(), list.end(), [&](const auto* each) { return name == each->name(); });
   };
-  return is_named(counters_) || is_named(extremes_) || is_named(histograms_) || is_named(ratios_) ||
+  return is_named(counters_) || is_named(min_max_) || is_named(histograms_) || is_named(ratios_) ||
          std::any_of(parts_.begin(), parts_.end(), [&](const auto* part) { return name == part->name_; });
 }
 

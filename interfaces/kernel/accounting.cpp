@@ -39,7 +39,7 @@ void WorkTally::note(std::uint64_t items, Cycle from, Cycle until) {
 double WorkTally::items(Cycle end) const {
   auto sum = static_cast<double>(items_);
   for (std::size_t i = 0; i < late_.size(); ++i) {
-    const Span& span = late_[i];
+    const CycleInterval& span = late_[i];
     if (span.until <= end) continue;
     const double after = static_cast<double>(span.until - std::max(span.from, end));
     sum -= static_cast<double>(span.items) * (after / static_cast<double>(span.until - span.from));

@@ -44,7 +44,7 @@ void DepthStencilSurface::clear_termination(const Placement& placement) {
 
 std::uint64_t DepthStencilSurface::size_bytes(std::uint32_t width, std::uint32_t height) {
   constexpr std::uint64_t bytes_per_quad = 16;
-  return TileGrid(width, height).quads() * bytes_per_quad;
+  return ScreenTiling(width, height).quads() * bytes_per_quad;
 }
 
 Framebuffer::Framebuffer(const Frame& frame, ColorFormat format)

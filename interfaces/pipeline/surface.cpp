@@ -14,7 +14,7 @@ ColorSurface::ColorSurface(std::uint32_t width, std::uint32_t height, ColorForma
       quads_(grid_.quads()) {}
 
 std::uint64_t ColorSurface::size_bytes(std::uint32_t width, std::uint32_t height, ColorFormat format) {
-  return std::uint64_t{TileGrid(width, height).quads()} * 4 * bytes_per_pixel(format);
+  return std::uint64_t{ScreenTiling(width, height).quads()} * 4 * bytes_per_pixel(format);
 }
 
 void ColorSurface::clear(TileId tile) {

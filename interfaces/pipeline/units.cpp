@@ -6,7 +6,7 @@
 
 namespace vrpipe {
 
-std::uint32_t SmBehaviour::Cost::fragment_slots() const {
+std::uint32_t SmBehaviour::TimingParameters::fragment_slots() const {
   const std::uint64_t slots = std::uint64_t{cores} * warps_per_core;
   if (slots > no_slot) {
     throw UserError("unusable SM array", "sm.cores, sm.warps_per_core",
@@ -16,7 +16,7 @@ std::uint32_t SmBehaviour::Cost::fragment_slots() const {
   return static_cast<std::uint32_t>(slots);
 }
 
-void CropBehaviour::Cost::check_cache(ColorFormat format) const {
+void CropBehaviour::TimingParameters::check_cache(ColorFormat format) const {
   const auto power_of_two = [](const char* name, std::uint32_t value) {
     if (value != 0 && (value & (value - 1)) == 0) return;
     throw UserError("unusable CROP cache", name, fmt::format("{} is no power of two", value), "use a power of two");

@@ -12,17 +12,17 @@ template <ColorFormat Format, BlendRounding Rounding>
 ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const RenderContext& context)
     : context_(context),
       checks_previous_(parameters.previous_alpha_check),
-      cost_{Rate::of_bytes(parameters.bytes_per_cycle, 4 * bytes_per_pixel(Format)),
-            parameters.input_quads,
-            parameters.latency_cycles,
-            parameters.forwarding,
-            parameters.cache_bytes,
-            parameters.line_bytes,
-            parameters.sector_bytes,
-            parameters.mshrs,
-            parameters.sectors_per_cycle,
-            parameters.writes_unchanged} {
-  cost_.check_cache(Format);
+      timing_{Rate::of_bytes(parameters.bytes_per_cycle, 4 * bytes_per_pixel(Format)),
+              parameters.input_quads,
+              parameters.latency_cycles,
+              parameters.forwarding,
+              parameters.cache_bytes,
+              parameters.line_bytes,
+              parameters.sector_bytes,
+              parameters.mshrs,
+              parameters.sectors_per_cycle,
+              parameters.writes_unchanged} {
+  timing_.check_cache(Format);
   if (!context.frame->draws().empty()) set_draw(0);
 }
 
@@ -49,13 +49,14 @@ template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::pass(Mark mark) {
   const Clear* const clear = context_.frame->clear_of(mark);
   if (clear == nullptr) return;
-  const TileGrid& grid = surface_->grid();
+  const ScreenTiling& grid = surface_->grid();
   for (std::size_t tile = 0; tile < grid.tiles(); ++tile) {
     if (!context_.placement.owns(grid.tile(tile))) continue;
     const auto first = static_cast<std::ptrdiff_t>(tile * positions_per_tile);
     if (clear->color) {
       surface_->clear(grid.tile(tile));
-      if (!swallowed_.empty()) std::fill_n(swallowed_.begin() + first, positions_per_tile, splat_lanes(1.0F));
+      if (!lost_to_rounding_.empty())
+        std::fill_n(lost_to_rounding_.begin() + first, positions_per_tile, splat_lanes(1.0F));
     }
     if (clear->termination && !terminated_.empty()) {
       std::fill_n(terminated_.begin() + first, positions_per_tile, LaneMask{0});
@@ -75,8 +76,8 @@ void ColorRop<Format, Rounding>::count(DrawIndex draw, const Tally& tally) {
 template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
   if (!cache_) {
-    cache_ = make_crop_cache(cost_, *surface_, cache_statistics);
-    sectors_of_quads_ = sectors_of_quads(cost_, *surface_);
+    cache_ = make_crop_cache(timing_, *surface_, cache_statistics);
+    sectors_of_quads_ = sectors_of_quads(timing_, *surface_);
   }
   const std::uint64_t tile = surface_->address(warp.tile, 0);
   // Where a line of the tile is in `out.lines`, if it is there. Without branches, which would be mispredicted.
@@ -100,7 +101,7 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   }
   out.count = count;
   for (unsigned place = 0; place < count; ++place) {
-    out.lines[place].address = tile + std::uint64_t{line_at[place]} * cost_.line_bytes;
+    out.lines[place].address = tile + std::uint64_t{line_at[place]} * timing_.line_bytes;
     out.lines[place].sectors = sectors_at[place];
     cache_->access(out.lines[place]);
   }
@@ -111,8 +112,8 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
 
 // Out of line, so that the common case stays short.
 template <ColorFormat Format, BlendRounding Rounding>
-void ColorRop<Format, Rounding>::count_trouble(std::size_t place, LaneMask live, const QuadColor& color,
-                                               LanePair red_green, LanePair blue_alpha) {
+void ColorRop<Format, Rounding>::count_anomalies(std::size_t place, LaneMask live, const QuadColor& color,
+                                                 LanePair red_green, LanePair blue_alpha) {
   const QuadColor& stored = surface_->quad(place);
   QuadColor destination;
   store({red_green, blue_alpha}, destination);
@@ -122,13 +123,13 @@ void ColorRop<Format, Rounding>::count_trouble(std::size_t place, LaneMask live,
       lanes & ((sum.red > largest_color) | (sum.green > largest_color) | (sum.blue > largest_color));
   colors_saturated += popcount(sign_mask(saturated));
 
-  const LaneBits swallowed = lanes & (stored.alpha == destination.alpha) & ~passes(stored.alpha);
-  if (sign_mask(swallowed) == 0) return;
-  if (swallowed_.empty()) swallowed_.assign(surface_->grid().quads(), splat_lanes(1.0F));
-  Lanes& transmittance = swallowed_[place];
-  fragments_swallowed += popcount(sign_mask(swallowed));
-  transmittance = select(swallowed, transmittance * (1.0F - color.alpha), transmittance);
-  const LaneBits stuck = passes(1.0F - (1.0F - stored.alpha) * transmittance) & (transmittance >= 0.0F) & swallowed;
+  const LaneBits lost = lanes & (stored.alpha == destination.alpha) & ~passes(stored.alpha);
+  if (sign_mask(lost) == 0) return;
+  if (lost_to_rounding_.empty()) lost_to_rounding_.assign(surface_->grid().quads(), splat_lanes(1.0F));
+  Lanes& transmittance = lost_to_rounding_[place];
+  fragments_lost_to_rounding += popcount(sign_mask(lost));
+  transmittance = select(lost, transmittance * (1.0F - color.alpha), transmittance);
+  const LaneBits stuck = passes(1.0F - (1.0F - stored.alpha) * transmittance) & (transmittance >= 0.0F) & lost;
   if (sign_mask(stuck) == 0) return;
   pixels_stuck += popcount(sign_mask(stuck));
   transmittance = select(stuck, splat_lanes(-1.0F), transmittance);
@@ -174,13 +175,13 @@ template <ColorFormat Format, BlendRounding Rounding>
       if (drops_late_) terminated_[place] = static_cast<LaneMask>(terminated_[place] | signalled);
     }
   }
-  unsigned trouble = sign_mask(alpha == previous) & ~passed;
+  unsigned anomaly = sign_mask(alpha == previous) & ~passed;
   if constexpr (largest_color < std::numeric_limits<float>::infinity()) {
     const unsigned red_green = sign_mask(blended.red_green >= largest_color);
     const unsigned blue = sign_mask(blended.blue_alpha >= largest_color);
-    trouble |= red_green | red_green >> 4U | blue;  // alpha, in the upper bits, is none of it
+    anomaly |= red_green | red_green >> 4U | blue;  // alpha, in the upper bits, is none of it
   }
-  if ((trouble & live) != 0) count_trouble(place, live, color, before.red_green, before.blue_alpha);
+  if ((anomaly & live) != 0) count_anomalies(place, live, color, before.red_green, before.blue_alpha);
   return {static_cast<LaneMask>(signalled), changed};
 }
 

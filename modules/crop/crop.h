@@ -81,10 +81,11 @@ class ColorRop : public CropBehaviour {
   void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) override;
   void look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) override;
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override { cache_->dirty(line, sectors); }
-  Cost cost() const override { return cost_; }
+  TimingParameters timing() const override { return timing_; }
 
-  Counter fragments_swallowed{*this, "fragments_swallowed", "fragments",
-                              "blended below the threshold whose alpha is lost to rounding: the pixel keeps its own"};
+  Counter fragments_lost_to_rounding{
+      *this, "fragments_lost_to_rounding", "fragments",
+      "blended below the threshold whose alpha is lost to rounding: the pixel keeps its own"};
   Counter pixels_stuck{*this, "pixels_stuck", "pixels",
                        "kept below the threshold by rounding: the alpha lost would have taken them past it"};
   Counter colors_saturated{*this, "colors_saturated", "fragments", "that took a colour beyond the format's largest"};
@@ -104,8 +105,8 @@ class ColorRop : public CropBehaviour {
   Outcome blend_into(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);
   LaneBits passes(Lanes alpha) const { return alpha >= threshold_; }
   /// After a blend of `color` into a quad that held the channels given.
-  [[gnu::noinline]] void count_trouble(std::size_t place, LaneMask live, const QuadColor& color, LanePair red_green,
-                                       LanePair blue_alpha);
+  [[gnu::noinline]] void count_anomalies(std::size_t place, LaneMask live, const QuadColor& color, LanePair red_green,
+                                         LanePair blue_alpha);
 
   const RenderContext& context_;
   DrawIndex draw_ = 0;  ///< that is blended, with its state:
@@ -114,10 +115,10 @@ class ColorRop : public CropBehaviour {
   bool drops_late_ = false;
   /// By quad, in strict termination: the pixels that were signalled.
   std::vector<LaneMask> terminated_;
-  /// By quad, once a fragment was swallowed: transmittance of those swallowed; negative once counted as stuck.
-  std::vector<Lanes> swallowed_;
+  /// By quad, once a fragment was lost to rounding: transmittance of those lost to rounding; negative once counted as stuck.
+  std::vector<Lanes> lost_to_rounding_;
   const bool checks_previous_;
-  Cost cost_;
+  TimingParameters timing_;
   std::optional<CropCache> cache_;  ///< once looked up here; the timing model of `cycle` has one of its own
   std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
 };

@@ -38,22 +38,22 @@ CropCache::Line CropCache::allocate(std::uint64_t address, unsigned& evicted_dir
   return line;
 }
 
-CropCache make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface,
+CropCache make_crop_cache(const CropBehaviour::TimingParameters& timing, const ColorSurface& surface,
                           SectoredCacheStatistics& statistics) {
-  cost.check_cache(surface.format());
-  return {{cost.cache_bytes, cost.line_bytes, cost.sector_bytes}, surface.size_bytes(), statistics};
+  timing.check_cache(surface.format());
+  return {{timing.cache_bytes, timing.line_bytes, timing.sector_bytes}, surface.size_bytes(), statistics};
 }
 
-std::array<QuadSectors, positions_per_tile> sectors_of_quads(const CropBehaviour::Cost& cost,
+std::array<QuadSectors, positions_per_tile> sectors_of_quads(const CropBehaviour::TimingParameters& timing,
                                                              const ColorSurface& surface) {
   const std::uint32_t bytes_per_quad = 4 * bytes_per_pixel(surface.format());
   std::array<QuadSectors, positions_per_tile> places{};
   for (unsigned position = 0; position < positions_per_tile; ++position) {
     const auto address = static_cast<std::uint32_t>(surface.address({0, 0}, position));
-    const std::uint32_t offset = address % cost.line_bytes;
-    const std::uint32_t first = offset / cost.sector_bytes;
-    const std::uint32_t last = (offset + bytes_per_quad - 1) / cost.sector_bytes;
-    places[position] = {address / cost.line_bytes, sector_mask(first, last - first + 1)};
+    const std::uint32_t offset = address % timing.line_bytes;
+    const std::uint32_t first = offset / timing.sector_bytes;
+    const std::uint32_t last = (offset + bytes_per_quad - 1) / timing.sector_bytes;
+    places[position] = {address / timing.line_bytes, sector_mask(first, last - first + 1)};
   }
   return places;
 }

@@ -120,7 +120,7 @@ class CropCache {
 };
 
 /// The cache of a CROP for its surface. Throws UserError for sizes that cannot be.
-CropCache make_crop_cache(const CropBehaviour::Cost& cost, const ColorSurface& surface,
+CropCache make_crop_cache(const CropBehaviour::TimingParameters& timing, const ColorSurface& surface,
                           SectoredCacheStatistics& statistics);
 
 /// Where a quad stands in the modelled memory.
@@ -129,7 +129,7 @@ struct QuadSectors {
   std::uint32_t sectors;  ///< of this line, a bit each
 };
 /// By position in a screen tile; every tile is the same, since they are naturally aligned. For sizes that a cache has.
-std::array<QuadSectors, positions_per_tile> sectors_of_quads(const CropBehaviour::Cost& cost,
+std::array<QuadSectors, positions_per_tile> sectors_of_quads(const CropBehaviour::TimingParameters& timing,
                                                              const ColorSurface& surface);
 
 }  // namespace vrpipe

@@ -11,9 +11,9 @@ namespace vrpipe {
 namespace {
 
 /// So many places, each taken until a cycle that is known, and freed in the order in which they were taken.
-class Places {
+class SlotPool {
  public:
-  explicit Places(unsigned places) : free_(places) {}
+  explicit SlotPool(unsigned places) : free_(places) {}
   /// The first cycle from `at` on in which so many are free, at most as many as there are.
   Cycle free_from(Cycle at, unsigned places) {
     for (; free_ < places; taken_.pop()) {
@@ -43,25 +43,25 @@ class TimedCrop : public TimedUnit {
  public:
   TimedCrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
             const RenderContext& context, Transport transport)
-      : TimedUnit(name, domain, CropWork::kinds(behaviour->cost()), transport),
+      : TimedUnit(name, domain, CropWork::kinds(behaviour->timing()), transport),
         context_(context),
         out_(*this, "out_terminations"),
-        in_(*this, "in_color", [this](const ShadedWarpItem& item, Span visible) { return take(*item.warp, visible); },
-            {&out_}),
+        in_(*this, "in_color",
+            [this](const ShadedWarpItem& item, CycleInterval visible) { return take(*item.warp, visible); }, {&out_}),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
+        timing_(behaviour_->timing()),
         // A hazard is one of quads.
-        at_once_(cost_.forwards ? quads_looked_up_at_once(cost_) : 1),
+        at_once_(timing_.forwards ? quads_looked_up_at_once(timing_) : 1),
         memory_(*this, "memory", {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}),
-        look_ups_(cost_.blend_rate.most_in_a_cycle()),
-        queue_(cost_.input_quads),
-        mshrs_(cost_.mshrs),
-        blending_(static_cast<unsigned>(CropWork::parts_of_a_cycle(cost_))),
-        price_(cost_.blend_rate.cycles * cost_.sectors_per_cycle),
-        lines_(std::max(cost_.cache_bytes / cost_.line_bytes, 1U)),
-        longest_run_(at_once_ == 1 ? 1 : std::min(cost_.line_bytes / cost_.sector_bytes, cost_.mshrs)),
-        sector_shift_(static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes))) {
-    out_.set_pipeline(cost_.latency_cycles - 1, ColorBeat::in_a_cycle(cost_.blend_rate));
+        look_ups_(timing_.blend_rate.most_in_a_cycle()),
+        queue_(timing_.input_quads),
+        mshrs_(timing_.mshrs),
+        blending_(static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_))),
+        price_(timing_.blend_rate.cycles * timing_.sectors_per_cycle),
+        lines_(std::max(timing_.cache_bytes / timing_.line_bytes, 1U)),
+        longest_run_(at_once_ == 1 ? 1 : std::min(timing_.line_bytes / timing_.sector_bytes, timing_.mshrs)),
+        sector_shift_(static_cast<unsigned>(__builtin_ctz(timing_.sector_bytes))) {
+    out_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.blend_rate));
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -76,10 +76,10 @@ class TimedCrop : public TimedUnit {
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
   }
 
-  Span take(const ShadedWarp& warp, Span visible) {
-    Span left = visible;
+  CycleInterval take(const ShadedWarp& warp, CycleInterval visible) {
+    CycleInterval left = visible;
     if (warp.mark == Mark::end_of_frame) {
-      end_ = !any_blended_ ? visible.first : last_blend_ + cost_.latency_cycles;
+      end_ = !any_blended_ ? visible.first : last_blend_ + timing_.latency_cycles;
     } else if (warp.mark != Mark::none) {
       behaviour_->pass(warp.mark);
     } else if (at_once_ >= warp.count) {
@@ -87,7 +87,7 @@ class TimedCrop : public TimedUnit {
     } else {
       left.first = never;
       for (unsigned i = 0; i < warp.count; ++i) {
-        const Span at = pass(warp, i, i + 1, visible.of_part(i, warp.count));
+        const CycleInterval at = pass(warp, i, i + 1, visible.of_part(i, warp.count));
         left.first = std::min(left.first, at.first);
         left.last = at.last;
       }
@@ -97,7 +97,7 @@ class TimedCrop : public TimedUnit {
   }
 
   /// Looks quads of a warp up and blends them; returns the cycles of the look-ups.
-  Span pass(const ShadedWarp& warp, unsigned from, unsigned to, Span visible) {
+  CycleInterval pass(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval visible) {
     const unsigned quads = to - from;
     const ColorSurface& surface = *behaviour_->surface();
     const std::size_t tile = surface.grid().place(warp.tile, 0);
@@ -113,7 +113,7 @@ class TimedCrop : public TimedUnit {
     for (unsigned line = 0; line < cache_.count; ++line) {
       if (cache_.lines[line].replaced) at = std::max(at, lines_[cache_.lines[line].line]);
     }
-    Span looked_up = look_ups_.take(at, quads);
+    CycleInterval looked_up = look_ups_.take(at, quads);
     looked_up.last = std::max(looked_up.last, visible.last);
     Cycle there = looked_up.first + 1;
     moved_ = 0;
@@ -131,32 +131,32 @@ class TimedCrop : public TimedUnit {
       charge(UnitState::blocked, out_.last());
       there = out_.last();
     }
-    const Cycle hazard = cost_.forwards ? 0 : hazard_until(warp.tile, warp.position[from]);
+    const Cycle hazard = timing_.forwards ? 0 : hazard_until(warp.tile, warp.position[from]);
     // Moving a sector takes time from blending, from when it moves.
     for (; !moves_.empty() && moves_.front().at <= std::max({there, hazard, blending_.next()}); moves_.pop()) {
-      blending_.take(moves_.front().at, moves_.front().sectors * cost_.blend_rate.items);
+      blending_.take(moves_.front().at, moves_.front().sectors * timing_.blend_rate.items);
       did(CropWork::sectors, moves_.front().sectors, moves_.front().at);
     }
     there = std::max(there, blending_.next());
     if (hazard > there) {
-      const std::uint64_t wasted = (hazard - there) * CropWork::parts_of_a_cycle(cost_) - blending_.taken_of(there);
+      const std::uint64_t wasted = (hazard - there) * CropWork::parts_of_a_cycle(timing_) - blending_.taken_of(there);
       did(CropWork::forwarding, wasted, there, hazard);
       there = hazard;
     }
-    const Span blended = blending_.take(there, quads * price_);
+    const CycleInterval blended = blending_.take(there, quads * price_);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
     queue_.take(quads, blended.last);
     last_blend_ = blended.last;
     any_blended_ = true;
-    frame_lasts(blended.last + cost_.latency_cycles);
+    frame_lasts(blended.last + timing_.latency_cycles);
     did(CropWork::blend, quads, blended.first, blended.last + 1);
-    if (!cost_.forwards) recent_.push({warp.tile, warp.position[from], blended.last});
+    if (!timing_.forwards) recent_.push({warp.tile, warp.position[from], blended.last});
     blend(warp, from, to, blended);
     return looked_up;
   }
 
-  void blend(const ShadedWarp& warp, unsigned from, unsigned to, Span at) {
+  void blend(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval at) {
     monitor_->blended(warp, from, to, at.last);
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
@@ -164,7 +164,7 @@ class TimedCrop : public TimedUnit {
     unsigned terminated = 0;
     for (unsigned i = from; i < to; ++i) {
       const CropBehaviour::Outcome outcome = outcomes[i];
-      dirty[cache_.line_of[i]] |= outcome.changed || cost_.writes_unchanged ? cache_.sectors_of[i] : 0U;
+      dirty[cache_.line_of[i]] |= outcome.changed || timing_.writes_unchanged ? cache_.sectors_of[i] : 0U;
       terminated |= outcome.terminated;
     }
     if (terminated != 0) signal(warp, from, to, outcomes, at);
@@ -175,7 +175,8 @@ class TimedCrop : public TimedUnit {
     }
   }
 
-  void signal(const ShadedWarp& warp, unsigned from, unsigned to, const CropBehaviour::Outcomes& outcomes, Span at) {
+  void signal(const ShadedWarp& warp, unsigned from, unsigned to, const CropBehaviour::Outcomes& outcomes,
+              CycleInterval at) {
     TerminationBeat beat;
     for (unsigned i = from; i < to; ++i) {
       if (outcomes[i].terminated == 0) continue;
@@ -218,11 +219,11 @@ class TimedCrop : public TimedUnit {
 
   /// The cycle in which a quad of the same position has left the blending pipeline.
   [[gnu::noinline]] Cycle hazard_until(TileId tile, std::uint8_t position) {
-    while (!recent_.empty() && recent_.front().at + cost_.latency_cycles <= last_blend_) recent_.pop();
+    while (!recent_.empty() && recent_.front().at + timing_.latency_cycles <= last_blend_) recent_.pop();
     Cycle until = 0;
     for (std::size_t i = 0; i < recent_.size(); ++i) {
       const Recent& blend = recent_[i];
-      if (blend.tile == tile && blend.position == position) until = blend.at + cost_.latency_cycles;
+      if (blend.tile == tile && blend.position == position) until = blend.at + timing_.latency_cycles;
     }
     return until;
   }
@@ -241,15 +242,15 @@ class TimedCrop : public TimedUnit {
   TimedOut<TerminationBeat> out_;
   TimedIn<ShadedWarpItem> in_;
   std::unique_ptr<CropBehaviour> behaviour_;
-  const CropBehaviour::Cost cost_;
+  const CropBehaviour::TimingParameters timing_;
   const unsigned at_once_;  ///< quads looked up before the first of them is blended
   TimedMemoryPort memory_;
   std::unique_ptr<BlendOrderMonitor> monitor_;
   CropBehaviour::CacheLookUp cache_;
-  Flow look_ups_;
-  Places queue_;              ///< quads between look-up and blending
-  Places mshrs_;              ///< sectors being filled
-  Flow blending_;             ///< in parts of a cycle that both a quad and a sector are whole numbers of
+  ThroughputPort look_ups_;
+  SlotPool queue_;            ///< quads between look-up and blending
+  SlotPool mshrs_;            ///< sectors being filled
+  ThroughputPort blending_;   ///< in parts of a cycle that both a quad and a sector are whole numbers of
   const unsigned price_;      ///< of blending a quad, in these
   unsigned moved_ = 0;        ///< sectors, for the quads in hand
   Ring<Move> moves_;          ///< of sectors, that blending has not given its time to yet

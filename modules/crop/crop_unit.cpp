@@ -21,21 +21,21 @@ class CropUnit : public Unit {
  public:
   CropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
            const RenderContext& context)
-      : Unit(name, domain, CropWork::kinds(behaviour->cost())),
+      : Unit(name, domain, CropWork::kinds(behaviour->timing())),
         context_(context),
         in_(*this, "in_color"),
         out_(*this, "out_terminations"),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
+        timing_(behaviour_->timing()),
         signals_(context.frame->terminates_early()),
-        price_(std::int64_t{cost_.blend_rate.cycles} * cost_.sectors_per_cycle),
-        sector_price_(cost_.blend_rate.items),
-        income_(static_cast<std::int64_t>(CropWork::parts_of_a_cycle(cost_))),
-        most_in_a_cycle_(cost_.blend_rate.most_in_a_cycle()),
-        longest_run_(cost_.line_bytes / cost_.sector_bytes),
-        memory_(*this, "memory", 2 * cost_.mshrs,
+        price_(std::int64_t{timing_.blend_rate.cycles} * timing_.sectors_per_cycle),
+        sector_price_(timing_.blend_rate.items),
+        income_(static_cast<std::int64_t>(CropWork::parts_of_a_cycle(timing_))),
+        most_in_a_cycle_(timing_.blend_rate.most_in_a_cycle()),
+        longest_run_(timing_.line_bytes / timing_.sector_bytes),
+        memory_(*this, "memory", 2 * timing_.mshrs,
                 {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
-    out_.set_pipeline(cost_.latency_cycles - 1, ColorBeat::in_a_cycle(cost_.blend_rate));
+    out_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.blend_rate));
   }
 
   bool idle() const override { return in_.empty() && queue_.empty() && marks_.empty(); }
@@ -60,10 +60,10 @@ class CropUnit : public Unit {
   void end_of_elaboration() override {
     surface_ = behaviour_->surface();
     if (surface_ == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
-    sector_shift_ = static_cast<unsigned>(__builtin_ctz(cost_.sector_bytes));
-    line_shift_ = static_cast<unsigned>(__builtin_ctz(cost_.line_bytes));
-    cache_ = make_crop_cache(cost_, *surface_, dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics);
-    sectors_of_quads_ = sectors_of_quads(cost_, *surface_);
+    sector_shift_ = static_cast<unsigned>(__builtin_ctz(timing_.sector_bytes));
+    line_shift_ = static_cast<unsigned>(__builtin_ctz(timing_.line_bytes));
+    cache_ = make_crop_cache(timing_, *surface_, dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics);
+    sectors_of_quads_ = sectors_of_quads(timing_, *surface_);
     sectors_of_a_quad_ = static_cast<unsigned>(__builtin_popcount(sectors_of_quads_.front().sectors));
     monitor_.emplace(surface_->width(), surface_->height());
   }
@@ -112,9 +112,9 @@ class CropUnit : public Unit {
     const CropCache::Line line = line_of(address);
     if (line == CropCache::no_line) return false;
     for (std::uint32_t missing = sectors & cache_->absent(line); missing != 0; missing &= missing - 1) {
-      if (!memory_.available() || fills_in_flight_ == cost_.mshrs) return false;
+      if (!memory_.available() || fills_in_flight_ == timing_.mshrs) return false;
       const auto sector = static_cast<unsigned>(__builtin_ctz(missing));
-      memory_.read(address + (std::uint64_t{sector} << sector_shift_), cost_.sector_bytes, fill_tag(line, sector));
+      memory_.read(address + (std::uint64_t{sector} << sector_shift_), timing_.sector_bytes, fill_tag(line, sector));
       cache_->start_fill(line, sector);
       asked_for_ |= 1U << sector;
       ++fills_in_flight_;
@@ -137,7 +137,7 @@ class CropUnit : public Unit {
 
   bool accept() {
     bool moved = false;
-    auto budget = static_cast<unsigned>(std::min<std::size_t>(most_in_a_cycle_, cost_.input_quads - queue_.size()));
+    auto budget = static_cast<unsigned>(std::min<std::size_t>(most_in_a_cycle_, timing_.input_quads - queue_.size()));
     while (budget > 0 && in_.ready()) {
       const ColorBeat& beat = in_.front();
       if (beat.mark != Mark::none) {
@@ -161,7 +161,7 @@ class CropUnit : public Unit {
 
   /// Whether a quad of the same position is still in the blending pipeline.
   bool hazard(std::uint32_t place, Cycle now) {
-    while (!recent_.empty() && recent_.front().second + cost_.latency_cycles <= now) recent_.pop_front();
+    while (!recent_.empty() && recent_.front().second + timing_.latency_cycles <= now) recent_.pop_front();
     return std::any_of(recent_.begin(), recent_.end(), [&](const auto& blend) { return blend.first == place; });
   }
 
@@ -205,7 +205,7 @@ class CropUnit : public Unit {
         stop_ = UnitState::busy;  // with the quads before it, or with moving sectors
         break;
       }
-      if (!cost_.forwards) {
+      if (!timing_.forwards) {
         if (hazard(entry.place, now)) {
           stop_ = UnitState::latency;
           break;
@@ -224,7 +224,7 @@ class CropUnit : public Unit {
                                       context_.draw(quad.warp->draw[quad.index]).epoch};
       }
       if (quad.is_last()) quad.warp->release();
-      if (outcome.changed || cost_.writes_unchanged) cache_->dirty(entry.line, entry.sectors);
+      if (outcome.changed || timing_.writes_unchanged) cache_->dirty(entry.line, entry.sectors);
       cache_->unpin(entry.line);
       tokens_ -= price_;
       queue_.pop();
@@ -234,7 +234,7 @@ class CropUnit : public Unit {
     if (beat.count > 0) out_.push(beat);
     const unsigned blended = most_in_a_cycle_ - budget;
     if (blended == 0) return false;
-    frame_lasts(now + cost_.latency_cycles);
+    frame_lasts(now + timing_.latency_cycles);
     did(CropWork::blend, blended, now);
     last_blend_ = now;
     any_blended_ = true;
@@ -256,7 +256,7 @@ class CropUnit : public Unit {
       if (marks_.front().mark != Mark::end_of_frame) {
         behaviour_->pass(marks_.front().mark);
       } else {
-        end_ = !any_blended_ ? now : last_blend_ + cost_.latency_cycles;
+        end_ = !any_blended_ ? now : last_blend_ + timing_.latency_cycles;
       }
     }
     return passed;
@@ -282,7 +282,7 @@ class CropUnit : public Unit {
   StreamIn<ColorBeat> in_;
   StreamOut<TerminationBeat> out_;
   std::unique_ptr<CropBehaviour> behaviour_;
-  const CropBehaviour::Cost cost_;
+  const CropBehaviour::TimingParameters timing_;
   const bool signals_;
   const std::int64_t price_;         ///< of blending a quad, in tokens
   const std::int64_t sector_price_;  ///< of moving a sector

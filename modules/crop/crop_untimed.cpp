@@ -34,9 +34,9 @@ class UntimedCrop : public UntimedUnit {
 
   void observe(BlendObserver& observer) override {
     observer_ = &observer;
-    const CropBehaviour::Cost cost = behaviour_->cost();
-    writes_unchanged_ = cost.writes_unchanged;
-    looked_up_at_once_ = quads_looked_up_at_once(cost);
+    const CropBehaviour::TimingParameters timing = behaviour_->timing();
+    writes_unchanged_ = timing.writes_unchanged;
+    looked_up_at_once_ = quads_looked_up_at_once(timing);
   }
 
  private:

@@ -5,9 +5,9 @@
 namespace vrpipe {
 
 PreRop::PreRop(const Parameters& parameters, const RenderContext& context)
-    : cost_{parameters.quads_per_cycle,
-            Rate::of_bytes(parameters.color_bytes_per_cycle, 4 * bytes_per_pixel(context.format)),
-            parameters.latency_cycles, static_cast<Order>(static_cast<unsigned>(parameters.order))} {}
+    : timing_{parameters.quads_per_cycle,
+              Rate::of_bytes(parameters.color_bytes_per_cycle, 4 * bytes_per_pixel(context.format)),
+              parameters.latency_cycles, static_cast<Order>(static_cast<unsigned>(parameters.order))} {}
 
 namespace {
 const SlotRegistrar slot{{"prop", 60, "pre-rop", "", true, check_prop}};

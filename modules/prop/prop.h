@@ -35,10 +35,10 @@ class PreRop : public PropBehaviour {
   };
   PreRop(const Parameters& parameters, const RenderContext& context);
 
-  Cost cost() const override { return cost_; }
+  TimingParameters timing() const override { return timing_; }
 
  private:
-  Cost cost_;
+  TimingParameters timing_;
 };
 
 }  // namespace vrpipe

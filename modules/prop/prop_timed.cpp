@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "prop/warp_order.h"
+#include "prop/reorder_buffer.h"
 
 #include <vrpipe/model/timed.h>
 
@@ -16,43 +16,46 @@ class TimedProp : public TimedUnit {
  public:
   TimedProp(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
             const RenderContext& context, Transport transport)
-      : TimedUnit(name, domain, PropWork::kinds(behaviour->cost()), transport),
+      : TimedUnit(name, domain, PropWork::kinds(behaviour->timing()), transport),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
+        timing_(behaviour_->timing()),
         tests_(context.frame->terminates_early()),
         out_test_(*this, "out_test"),
         out_survivors_(*this, "out_survivors"),
         out_release_(*this, "out_release"),
         out_color_(*this, "out_color"),
         in_tested_(*this, "in_tested",
-                   [this](const BinItem& item, Span visible) {
+                   [this](const BinItem& item, CycleInterval visible) {
                      return forward(PropWork::tested, item, visible, back_, out_survivors_);
                    },
                    {&out_survivors_}),
         in_bins_(*this, "in_bins",
-                 [this](const BinItem& item, Span visible) {
+                 [this](const BinItem& item, CycleInterval visible) {
                    return forward(PropWork::bins, item, visible, there_, tests_ ? out_test_ : out_survivors_);
                  },
                  {tests_ ? &out_test_ : &out_survivors_}),
         in_shaded_(*this, "in_shaded",
-                   [this](const ShadedWarpItem& item, Span visible) { return collect(*item.warp, visible.first); }),
-        order_(cost_.order, context),
-        there_(cost_.quads_per_cycle),
-        back_(cost_.quads_per_cycle),
-        color_(cost_.color_rate.items) {
-    out_test_.set_pipeline(cost_.latency_cycles - 1, 1);
-    out_survivors_.set_pipeline(cost_.latency_cycles - 1, 1);
-    out_color_.set_pipeline(cost_.latency_cycles - 1, 1);
+                   [this](const ShadedWarpItem& item, CycleInterval visible) {
+                     return collect(*item.warp, visible.first);
+                   }),
+        order_(timing_.order, context),
+        there_(timing_.quads_per_cycle),
+        back_(timing_.quads_per_cycle),
+        color_(timing_.color_rate.items) {
+    out_test_.set_pipeline(timing_.latency_cycles - 1, 1);
+    out_survivors_.set_pipeline(timing_.latency_cycles - 1, 1);
+    out_color_.set_pipeline(timing_.latency_cycles - 1, 1);
   }
 
   bool idle() const override { return TimedUnit::idle() && order_.empty(); }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  Span forward(unsigned work, const BinItem& item, Span visible, Passage& passage, TimedOut<BinItem>& out) {
+  CycleInterval forward(unsigned work, const BinItem& item, CycleInterval visible, BatchServer& passage,
+                        TimedOut<BinItem>& out) {
     passage.hold(out.last());
-    const Span at = passage.take(visible, item.quads);
-    const Span taken = out.send(item, at, passage.cycles(item.quads));
+    const CycleInterval at = passage.take(visible, item.quads);
+    const CycleInterval taken = out.send(item, at, passage.cycles(item.quads));
     passage.hold(taken.last + 1);
     did(work, item.quads, taken.last);
     return taken;
@@ -90,9 +93,9 @@ class TimedProp : public TimedUnit {
   }
 
   bool pass_mark() {
-    const WarpOrder::Waiting* const mark = order_.next_mark();
+    const ReorderBuffer::Waiting* const mark = order_.next_mark();
     if (mark == nullptr || !can_send()) return false;
-    const Cycle at = color_.take(mark->from, cost_.color_rate.items).first;
+    const Cycle at = color_.take(mark->from, timing_.color_rate.items).first;
     const ShadedWarp& warp = *mark->warp;
     const WarpRelease release{warp.slot};
     order_.leave_mark();
@@ -102,23 +105,23 @@ class TimedProp : public TimedUnit {
   }
 
   /// Hands a warp to CROP.
-  void leave(const WarpOrder::Waiting& next) {
+  void leave(const ReorderBuffer::Waiting& next) {
     const ShadedWarp& warp = *next.warp;
     const WarpRelease release{warp.slot};
     color_.hold(out_color_.last());
     charge(UnitState::blocked, out_color_.last());
     Cycle left = 0;
     if (warp.count > 0) {
-      const Span at = color_.take(next.from, warp.count * cost_.color_rate.cycles);
+      const CycleInterval at = color_.take(next.from, warp.count * timing_.color_rate.cycles);
       charge(UnitState::starved, at.first);
       charge(UnitState::busy, at.last + 1);
       did(PropWork::color, warp.count, at.first, at.last + 1);
-      left = out_color_.send({&warp}, at, color_.cycles(warp.count * cost_.color_rate.cycles)).last;
+      left = out_color_.send({&warp}, at, color_.cycles(warp.count * timing_.color_rate.cycles)).last;
       charge(UnitState::blocked, left);
       color_.hold(left);
     } else {
       // A warp without survivors takes the cycle in which it is passed over.
-      left = color_.take(next.from, cost_.color_rate.items).last;
+      left = color_.take(next.from, timing_.color_rate.items).last;
       did(PropWork::empty_warps, 1, left);
       warp.release();
     }
@@ -127,7 +130,7 @@ class TimedProp : public TimedUnit {
   }
 
   std::unique_ptr<PropBehaviour> behaviour_;
-  const PropBehaviour::Cost cost_;
+  const PropBehaviour::TimingParameters timing_;
   const bool tests_;
   TimedOut<BinItem> out_test_;
   TimedOut<BinItem> out_survivors_;
@@ -136,10 +139,10 @@ class TimedProp : public TimedUnit {
   TimedIn<BinItem> in_tested_;
   TimedIn<BinItem> in_bins_;
   TimedIn<ShadedWarpItem> in_shaded_;
-  WarpOrder order_;
-  Passage there_;  ///< to the tests, or past them
-  Passage back_;   ///< from the tests
-  Flow color_;     ///< in parts of a cycle and of a quad: a cycle passes `color_rate.items`
+  ReorderBuffer order_;
+  BatchServer there_;     ///< to the tests, or past them
+  BatchServer back_;      ///< from the tests
+  ThroughputPort color_;  ///< in parts of a cycle and of a quad: a cycle passes `color_rate.items`
 };
 
 [[maybe_unused]] const bool registered = [] {

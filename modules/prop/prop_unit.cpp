@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "prop/warp_order.h"
+#include "prop/reorder_buffer.h"
 
 #include <vrpipe/model/unit.h>
 
@@ -14,7 +14,7 @@ class PropUnit : public Unit {
  public:
   PropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
            const RenderContext& context)
-      : Unit(name, domain, PropWork::kinds(behaviour->cost())),
+      : Unit(name, domain, PropWork::kinds(behaviour->timing())),
         in_bins_(*this, "in_bins"),
         out_test_(*this, "out_test"),
         in_tested_(*this, "in_tested"),
@@ -23,15 +23,15 @@ class PropUnit : public Unit {
         out_release_(*this, "out_release"),
         out_color_(*this, "out_color"),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
+        timing_(behaviour_->timing()),
         tests_(context.frame->terminates_early()),
-        there_{PropWork::bins, BatchLimit(cost_.quads_per_cycle)},
-        back_{PropWork::tested, BatchLimit(cost_.quads_per_cycle)},
-        order_(cost_.order, context),
-        color_limit_(cost_.color_rate) {
-    out_test_.set_pipeline(cost_.latency_cycles - 1, 1);
-    out_survivors_.set_pipeline(cost_.latency_cycles - 1, 1);
-    out_color_.set_pipeline(cost_.latency_cycles - 1, ColorBeat::in_a_cycle(cost_.color_rate));
+        there_{PropWork::bins, BatchLimit(timing_.quads_per_cycle)},
+        back_{PropWork::tested, BatchLimit(timing_.quads_per_cycle)},
+        order_(timing_.order, context),
+        color_limit_(timing_.color_rate) {
+    out_test_.set_pipeline(timing_.latency_cycles - 1, 1);
+    out_survivors_.set_pipeline(timing_.latency_cycles - 1, 1);
+    out_color_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.color_rate));
   }
 
   bool idle() const override {
@@ -41,20 +41,21 @@ class PropUnit : public Unit {
 
  private:
   /// A way through the unit, `quads_per_cycle` wide.
-  struct Passage {
+  struct BatchServer {
     unsigned work;
     BatchLimit limit;
     Cycle free_at = 0;
   };
 
   /// Moves beats from one port to the next; a beat wider than the unit takes several cycles.
-  bool forward(Passage& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to, Cycle now) {
+  bool forward(BatchServer& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to, Cycle now) {
     if (now < passage.free_at || !from.ready() || to.credits() == 0) return false;
     forward_beats(passage, from, to, now);
     return true;
   }
   // Out of line: in most cycles nothing can move.
-  [[gnu::noinline]] void forward_beats(Passage& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to, Cycle now) {
+  [[gnu::noinline]] void forward_beats(BatchServer& passage, StreamIn<QuadBeat>& from, StreamOut<QuadBeat>& to,
+                                       Cycle now) {
     while (from.ready() && to.credits() > 0) {
       const QuadBeat& beat = from.front();
       const unsigned width = std::max<unsigned>(beat.count, 1);
@@ -132,7 +133,7 @@ class PropUnit : public Unit {
   }
 
   bool pass_mark() {
-    const WarpOrder::Waiting* const mark = order_.next_mark();
+    const ReorderBuffer::Waiting* const mark = order_.next_mark();
     if (mark == nullptr || out_release_.credits() == 0) return false;
     ColorBeat beat;
     beat.mark = mark->warp->mark;
@@ -174,13 +175,13 @@ class PropUnit : public Unit {
   StreamOut<WarpRelease> out_release_;
   StreamOut<ColorBeat> out_color_;
   std::unique_ptr<PropBehaviour> behaviour_;
-  const PropBehaviour::Cost cost_;
+  const PropBehaviour::TimingParameters timing_;
   const bool tests_;
-  Passage there_;  ///< to the tests, or past them
-  Passage back_;   ///< from the tests
-  WarpOrder order_;
+  BatchServer there_;  ///< to the tests, or past them
+  BatchServer back_;   ///< from the tests
+  ReorderBuffer order_;
   RateLimit color_limit_;
-  WarpOrder::Waiting current_;  ///< being handed to CROP, from `index_` on; none without a warp
+  ReorderBuffer::Waiting current_;  ///< being handed to CROP, from `index_` on; none without a warp
   std::uint32_t index_ = 0;
   bool waits_for_rate_ = false;  ///< of quads to CROP, below one a cycle
 };

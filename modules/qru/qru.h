@@ -42,7 +42,7 @@ class PairingQru : public QruBehaviour {
 
   unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) override;
   bool finish_bin(Warp& out) override;
-  Throughput cost() const override { return {quads_per_cycle_, latency_cycles_}; }
+  Throughput timing() const override { return {quads_per_cycle_, latency_cycles_}; }
   /// (4 B pointer + 6-bit position) x quads + 64 x 1 B register + bitmap (paper, table of hardware cost).
   std::uint64_t storage_bytes() const override;
 
@@ -75,7 +75,7 @@ class QruPassThrough : public QruBehaviour {
 
   unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) override;
   bool finish_bin(Warp& out) override;
-  Throughput cost() const override { return {QuadBeat::capacity, 1}; }
+  Throughput timing() const override { return {QuadBeat::capacity, 1}; }
   std::uint64_t storage_bytes() const override { return 0; }
 
   Counter warps{*this, "warps", "warps", "launched"};

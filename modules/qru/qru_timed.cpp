@@ -14,14 +14,15 @@ class TimedQru : public TimedUnit {
  public:
   TimedQru(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour,
            const RenderContext& context, Transport transport)
-      : TimedUnit(name, domain, QruWork::kinds(behaviour->cost()), transport),
+      : TimedUnit(name, domain, QruWork::kinds(behaviour->timing()), transport),
         out_(*this, "out_warps"),
-        in_(*this, "in_quads", [this](const BinItem& item, Span visible) { return examine(item, visible); }, {&out_}),
+        in_(*this, "in_quads", [this](const BinItem& item, CycleInterval visible) { return examine(item, visible); },
+            {&out_}),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
+        timing_(behaviour_->timing()),
         numbering_(context),
-        budget_(cost_.items_per_cycle) {
-    out_.set_pipeline(cost_.latency_cycles - 1, 1);
+        budget_(timing_.items_per_cycle) {
+    out_.set_pipeline(timing_.latency_cycles - 1, 1);
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -31,7 +32,7 @@ class TimedQru : public TimedUnit {
     if (cycle <= cycle_) return;
     if (examined_ > 0) did(QruWork::quads, std::exchange(examined_, 0), cycle_);
     cycle_ = cycle;
-    budget_ = cost_.items_per_cycle;
+    budget_ = timing_.items_per_cycle;
   }
 
   /// A launch ends the cycle.
@@ -45,7 +46,7 @@ class TimedQru : public TimedUnit {
     go_to(taken + 1);
   }
 
-  Span examine(const BinItem& item, Span visible) {
+  CycleInterval examine(const BinItem& item, CycleInterval visible) {
     go_to(std::max(visible.first, out_.last() + 1));
     charge(UnitState::blocked, out_.last());
     charge(UnitState::starved, cycle_);
@@ -89,7 +90,7 @@ class TimedQru : public TimedUnit {
   TimedOut<Warp> out_;
   TimedIn<BinItem> in_;
   std::unique_ptr<QruBehaviour> behaviour_;
-  const Throughput cost_;
+  const Throughput timing_;
   WarpNumbering numbering_;
   Warp warp_;
   Cycle cycle_ = 0;

@@ -14,13 +14,13 @@ class QruUnit : public Unit {
  public:
   QruUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour,
           const RenderContext& context)
-      : Unit(name, domain, QruWork::kinds(behaviour->cost())),
+      : Unit(name, domain, QruWork::kinds(behaviour->timing())),
         in_(*this, "in_quads"),
         out_(*this, "out_warps"),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
+        timing_(behaviour_->timing()),
         numbering_(context) {
-    out_.set_pipeline(cost_.latency_cycles - 1, 1);
+    out_.set_pipeline(timing_.latency_cycles - 1, 1);
   }
 
   bool idle() const override { return in_.empty(); }
@@ -28,7 +28,7 @@ class QruUnit : public Unit {
 
  private:
   Cycle tick(Cycle now) override {
-    unsigned budget = cost_.items_per_cycle;
+    unsigned budget = timing_.items_per_cycle;
     bool moved = false;
     bool blocked = false;
     unsigned examined = 0;
@@ -93,7 +93,7 @@ class QruUnit : public Unit {
   StreamIn<QuadBeat> in_;
   StreamOut<Warp> out_;
   std::unique_ptr<QruBehaviour> behaviour_;
-  const Throughput cost_;
+  const Throughput timing_;
   unsigned from_ = 0;
   bool done_ = false;
   WarpNumbering numbering_;

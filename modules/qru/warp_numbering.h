@@ -5,7 +5,7 @@
 #include <vrpipe/pipeline/draw.h>
 #include <vrpipe/pipeline/payload.h>
 #include <vrpipe/pipeline/render_context.h>
-#include <vrpipe/pipeline/tile_grid.h>
+#include <vrpipe/pipeline/screen_tiling.h>
 
 namespace vrpipe {
 
@@ -23,7 +23,7 @@ class WarpNumbering {
   void number_mark(Warp& mark) const { mark.sequence = next_; }
 
  private:
-  TileGrid grid_;
+  ScreenTiling grid_;
   std::uint32_t next_ = 0;
   std::vector<std::uint32_t> next_of_tile_;
 };

@@ -64,9 +64,9 @@ unsigned put_covered(Quad* out, Words quads, std::uint64_t coverage) {
 }  // namespace
 
 TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderContext& context)
-    : context_(context), cost_{parameters.setup_latency_cycles,        parameters.setup_interval_cycles,
-                               parameters.coarse_tiles_per_cycle,      parameters.fine_tiles_per_cycle,
-                               parameters.screen_tile_interval_cycles, parameters.quads_per_cycle} {}
+    : context_(context), timing_{parameters.setup_latency_cycles,        parameters.setup_interval_cycles,
+                                 parameters.coarse_tiles_per_cycle,      parameters.fine_tiles_per_cycle,
+                                 parameters.screen_tile_interval_cycles, parameters.quads_per_cycle} {}
 
 void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   ++setups;

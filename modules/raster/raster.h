@@ -65,14 +65,14 @@ class TileRasterizer : public RasterBehaviour {
 
   void begin(const Primitive& primitive, const PixelRect& clip) override;
   bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override;
-  Cost cost() const override { return cost_; }
+  TimingParameters timing() const override { return timing_; }
 
   Counter setups{*this, "setups", "primitives", "set up; again for each flush that a primitive is in"};
   Counter raster_tiles_tested{*this, "raster_tiles_tested", "raster tiles", "by coarse rasterisation"};
   Counter raster_tiles_kept{*this, "raster_tiles_kept", "raster tiles", "handed to fine rasterisation"};
   Counter screen_tile_pairs{*this, "screen_tile_pairs", "pairs", "of a primitive and a screen tile that it may cover"};
-  Extreme widest_edge{*this, Extreme::Of::largest, "widest_edge", "bits",
-                      "sign included, that the largest edge function needs over the samples of the viewport"};
+  MinMax widest_edge{*this, MinMax::Of::largest, "widest_edge", "bits",
+                     "sign included, that the largest edge function needs over the samples of the viewport"};
   Counter wide_edges{*this, "wide_edges", "primitives", "that need 64-bit edge functions inside a raster tile"};
 
  private:
@@ -86,7 +86,7 @@ class TileRasterizer : public RasterBehaviour {
   bool advance();
 
   const RenderContext& context_;
-  Cost cost_;
+  TimingParameters timing_;
   Edge edges_[3];
   bool wide_ = false;
   Primitive primitive_;

@@ -9,16 +9,16 @@ class TimedRaster : public TimedUnit {
  public:
   TimedRaster(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour,
               Transport transport)
-      : TimedUnit(name, domain, RasterWork::kinds(behaviour->cost()), transport),
+      : TimedUnit(name, domain, RasterWork::kinds(behaviour->timing()), transport),
         out_(*this, "out_quads"),
-        in_(*this, "in_jobs", [this](const RasterJob& job, Span visible) { return rasterize(job, visible.first); },
-            {&out_}),
+        in_(*this, "in_jobs",
+            [this](const RasterJob& job, CycleInterval visible) { return rasterize(job, visible.first); }, {&out_}),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
-        coarse_(cost_.coarse_tiles_per_cycle),
-        fine_(cost_.fine_tiles_per_cycle),
-        quads_out_(cost_.quads_per_cycle) {
-    out_.set_pipeline(cost_.setup_latency_cycles - 1, cost_.fine_tiles_per_cycle);
+        timing_(behaviour_->timing()),
+        coarse_(timing_.coarse_tiles_per_cycle),
+        fine_(timing_.fine_tiles_per_cycle),
+        quads_out_(timing_.quads_per_cycle) {
+    out_.set_pipeline(timing_.setup_latency_cycles - 1, timing_.fine_tiles_per_cycle);
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -35,7 +35,7 @@ class TimedRaster : public TimedUnit {
     }
     now_ = std::max(now_, next_setup_);
     const Cycle setup = now_;
-    next_setup_ = setup + cost_.setup_interval_cycles;
+    next_setup_ = setup + timing_.setup_interval_cycles;
     did(RasterWork::setup, 1, setup, std::max(next_setup_, setup + 1));
     charge(UnitState::busy, setup + 1);
     behaviour_->begin(job.primitive, job.clip);
@@ -49,7 +49,7 @@ class TimedRaster : public TimedUnit {
       now_ = std::max(coarse_done_, fine);
       if (new_screen_tile) {
         now_ = std::max(now_, next_pair_);
-        next_pair_ = now_ + cost_.screen_tile_interval_cycles;
+        next_pair_ = now_ + timing_.screen_tile_interval_cycles;
         did(RasterWork::pairs, 1, now_, std::max(next_pair_, now_ + 1));
       }
       if (tile.count == 0) continue;
@@ -67,7 +67,7 @@ class TimedRaster : public TimedUnit {
 
   /// Coarse tests, which may take several cycles.
   void test_tiles(unsigned tests) {
-    const Span at = coarse_.take(now_, tests);
+    const CycleInterval at = coarse_.take(now_, tests);
     did(RasterWork::coarse, tests, at.first, at.last + 1);
     coarse_done_ = at.last;
   }
@@ -75,10 +75,10 @@ class TimedRaster : public TimedUnit {
   TimedOut<QuadBeat> out_;
   TimedIn<RasterJob> in_;
   std::unique_ptr<RasterBehaviour> behaviour_;
-  const RasterBehaviour::Cost cost_;
-  Flow coarse_;
-  Lane fine_;
-  Flow quads_out_;
+  const RasterBehaviour::TimingParameters timing_;
+  ThroughputPort coarse_;
+  IssuePort fine_;
+  ThroughputPort quads_out_;
   Cycle now_ = 0;  ///< how far the primitive in hand has come
   Cycle next_pair_ = 0;
   Cycle next_setup_ = 0;

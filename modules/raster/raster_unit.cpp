@@ -9,12 +9,12 @@ namespace {
 class RasterUnit : public Unit {
  public:
   RasterUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour)
-      : Unit(name, domain, RasterWork::kinds(behaviour->cost())),
+      : Unit(name, domain, RasterWork::kinds(behaviour->timing())),
         in_(*this, "in_jobs"),
         out_(*this, "out_quads"),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()) {
-    out_.set_pipeline(cost_.setup_latency_cycles - 1, cost_.fine_tiles_per_cycle);
+        timing_(behaviour_->timing()) {
+    out_.set_pipeline(timing_.setup_latency_cycles - 1, timing_.fine_tiles_per_cycle);
   }
 
   bool idle() const override { return in_.empty() && !active_ && at_ == tile_.count; }
@@ -54,9 +54,9 @@ class RasterUnit : public Unit {
   }
 
   Cycle tick(Cycle now) override {
-    unsigned quad_budget = cost_.quads_per_cycle;
-    unsigned fine_budget = cost_.fine_tiles_per_cycle;
-    unsigned coarse_budget = cost_.coarse_tiles_per_cycle;
+    unsigned quad_budget = timing_.quads_per_cycle;
+    unsigned fine_budget = timing_.fine_tiles_per_cycle;
+    unsigned coarse_budget = timing_.coarse_tiles_per_cycle;
     bool moved = false;
     while (true) {
       if (coarse_debt_ > 0) {
@@ -102,7 +102,7 @@ class RasterUnit : public Unit {
         if (now < next_setup_) break;
         behaviour_->begin(in_.front().primitive, in_.front().clip);
         in_.pop();
-        next_setup_ = now + cost_.setup_interval_cycles;
+        next_setup_ = now + timing_.setup_interval_cycles;
         did(RasterWork::setup, 1, now, std::max(next_setup_, now + 1));
       }
       unsigned tests = 0;
@@ -115,7 +115,7 @@ class RasterUnit : public Unit {
         did(RasterWork::fine, 1, now);
         if (new_screen_tile) {
           tile_due_ = std::max(now, next_pair_);
-          next_pair_ = tile_due_ + cost_.screen_tile_interval_cycles;
+          next_pair_ = tile_due_ + timing_.screen_tile_interval_cycles;
           did(RasterWork::pairs, 1, tile_due_, std::max(next_pair_, tile_due_ + 1));
         }
       }
@@ -128,7 +128,7 @@ class RasterUnit : public Unit {
   StreamIn<RasterJob> in_;
   StreamOut<QuadBeat> out_;
   std::unique_ptr<RasterBehaviour> behaviour_;
-  const RasterBehaviour::Cost cost_;
+  const RasterBehaviour::TimingParameters timing_;
   bool active_ = false;
   QuadBeat tile_;  ///< quads of the raster tile in hand, sent up to `at_`
   unsigned at_ = 0;

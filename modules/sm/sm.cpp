@@ -44,27 +44,27 @@ std::uint32_t threads_of(const Warp& warp, DrawIndex draw) {
 
 SplatShader::SplatShader(const Parameters& parameters, const RenderContext& context)
     : context_(context), several_draws_(context.frame->draws().size() > 1) {
-  cost_.cores = parameters.cores;
-  cost_.schedulers_per_core = parameters.schedulers_per_core;
-  cost_.lanes_per_scheduler = parameters.lanes_per_scheduler;
-  if (32 % cost_.lanes_per_scheduler != 0) {
+  timing_.cores = parameters.cores;
+  timing_.schedulers_per_core = parameters.schedulers_per_core;
+  timing_.lanes_per_scheduler = parameters.lanes_per_scheduler;
+  if (32 % timing_.lanes_per_scheduler != 0) {
     throw UserError("unusable SM array", "sm.lanes_per_scheduler",
                     "a warp of 32 threads does not issue in whole cycles on " +
-                        std::to_string(cost_.lanes_per_scheduler) + " lanes",
+                        std::to_string(timing_.lanes_per_scheduler) + " lanes",
                     "use 1, 2, 4, 8, 16 or 32");
   }
-  cost_.warps_per_core = parameters.warps_per_core;
-  static_cast<void>(cost_.fragment_slots());  // refused at every fidelity, also where slots have no numbers
-  cost_.vertex_warps = parameters.vertex_warps;
-  cost_.warps_to_one_core = parameters.warps_to_one_core;
+  timing_.warps_per_core = parameters.warps_per_core;
+  static_cast<void>(timing_.fragment_slots());  // refused at every fidelity, also where slots have no numbers
+  timing_.vertex_warps = parameters.vertex_warps;
+  timing_.warps_to_one_core = parameters.warps_to_one_core;
   // The first instructions compute addresses and load; the rest waits for the attributes.
   const auto program = [&](std::uint32_t instructions, std::uint32_t latency) {
     const std::uint32_t loads = std::min(instructions, 4U);
     return std::vector<ShaderSegment>{{loads, parameters.attribute_latency_cycles}, {instructions - loads, latency}};
   };
-  cost_.vertex = program(parameters.vertex_instructions, parameters.fragment_latency_cycles);
-  cost_.fragment = program(parameters.fragment_instructions, parameters.fragment_latency_cycles);
-  cost_.merge = {{parameters.merge_instructions, parameters.merge_latency_cycles}};
+  timing_.vertex = program(parameters.vertex_instructions, parameters.fragment_latency_cycles);
+  timing_.fragment = program(parameters.fragment_instructions, parameters.fragment_latency_cycles);
+  timing_.merge = {{parameters.merge_instructions, parameters.merge_latency_cycles}};
 }
 
 void SplatShader::set_up(Attributes& attributes, const Quad& quad) {

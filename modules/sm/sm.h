@@ -77,7 +77,7 @@ class SplatShader : public SmBehaviour {
 
   void shade(const Warp& warp, ShadedWarp& out) override;
   void shade_vertices(const VertexWarp& warp) override;
-  Cost cost() const override { return cost_; }
+  TimingParameters timing() const override { return timing_; }
 
   Counter vertex_warps{*this, "vertex_warps", "warps", "of vertices"};
   Counter colors_clamped{*this, "colors_clamped", "splats",
@@ -117,7 +117,7 @@ class SplatShader : public SmBehaviour {
 
   const RenderContext& context_;
   const bool several_draws_;
-  Cost cost_;
+  TimingParameters timing_;
   /// Of the splats last set up, by the low bits of their number; two tables, so that the two quads' are there at once.
   AttributeTable attributes_of_first_;
   AttributeTable attributes_of_second_;

@@ -14,27 +14,30 @@ class TimedSm : public TimedUnit {
  public:
   TimedSm(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour,
           Transport transport)
-      : TimedUnit(name, domain, SmWork::kinds(behaviour->cost()), transport),
+      : TimedUnit(name, domain, SmWork::kinds(behaviour->timing()), transport),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
-        cycles_per_instruction_(cost_.cycles_per_instruction()),
-        roomy_(is_roomy(cost_)),
-        vertex_(program(cost_.vertex, {}, true).front()),
-        fragment_(program(cost_.fragment, {}, roomy_)),
-        merged_(program(cost_.fragment, cost_.merge, roomy_)),
+        timing_(behaviour_->timing()),
+        cycles_per_instruction_(timing_.cycles_per_instruction()),
+        roomy_(is_roomy(timing_)),
+        vertex_(program(timing_.vertex, {}, true).front()),
+        fragment_(program(timing_.fragment, {}, roomy_)),
+        merged_(program(timing_.fragment, timing_.merge, roomy_)),
         out_vertices_(*this, "out_vertices"),
         out_shaded_(*this, "out_shaded"),
         in_release_(*this, "in_release",
-                    [this](const WarpRelease& release, Span visible) { return free(release, visible.first); }),
-        in_warps_(*this, "in_warps", [this](const Warp& warp, Span visible) { return launch(warp, visible.first); }),
+                    [this](const WarpRelease& release, CycleInterval visible) { return free(release, visible.first); }),
+        in_warps_(*this, "in_warps",
+                  [this](const Warp& warp, CycleInterval visible) { return launch(warp, visible.first); }),
         in_vertices_(*this, "in_vertices",
-                     [this](const VertexWarp& warp, Span visible) { return shade_vertices(warp, visible.first); },
+                     [this](const VertexWarp& warp, CycleInterval visible) {
+                       return shade_vertices(warp, visible.first);
+                     },
                      {&out_vertices_}),
-        scheduler_free_at_(std::size_t{cost_.cores} * cost_.schedulers_per_core, 0),
-        free_of_core_(cost_.cores, cost_.warps_per_core),
-        vertex_slots_(cost_.vertex_warps, 0) {
+        scheduler_free_at_(std::size_t{timing_.cores} * timing_.schedulers_per_core, 0),
+        free_of_core_(timing_.cores, timing_.warps_per_core),
+        vertex_slots_(timing_.vertex_warps, 0) {
     waiting_.resize(merged_.size());
-    free_slots_ = cost_.fragment_slots();
+    free_slots_ = timing_.fragment_slots();
     in_warps_.set_gate([this] { return has_slot(); });
   }
 
@@ -67,13 +70,14 @@ class TimedSm : public TimedUnit {
   }
 
   /// Whether a warp can be launched in every cycle, and consecutive ones find schedulers that differ.
-  static bool is_roomy(const SmBehaviour::Cost& cost) {
-    const Cycle cycles_per_instruction = cost.cycles_per_instruction();
-    const Segment fragment = program(cost.fragment, {}, true).front();
-    const Segment merged = program(cost.fragment, cost.merge, true).front();
-    return std::uint64_t{cost.cores} * cost.schedulers_per_core >= fragment.all() * cycles_per_instruction &&
-           cost.fragment_slots() >= 2 * (merged.all() * cycles_per_instruction + merged.stall_cycles) &&
-           cost.warps_to_one_core >= cost.schedulers_per_core && 2 * cost.warps_to_one_core <= cost.warps_per_core;
+  static bool is_roomy(const SmBehaviour::TimingParameters& timing) {
+    const Cycle cycles_per_instruction = timing.cycles_per_instruction();
+    const Segment fragment = program(timing.fragment, {}, true).front();
+    const Segment merged = program(timing.fragment, timing.merge, true).front();
+    return std::uint64_t{timing.cores} * timing.schedulers_per_core >= fragment.all() * cycles_per_instruction &&
+           timing.fragment_slots() >= 2 * (merged.all() * cycles_per_instruction + merged.stall_cycles) &&
+           timing.warps_to_one_core >= timing.schedulers_per_core &&
+           2 * timing.warps_to_one_core <= timing.warps_per_core;
   }
 
   bool has_slot() const { return free_slots_ > 0 || !releases_.empty(); }
@@ -85,9 +89,9 @@ class TimedSm : public TimedUnit {
       ++free_of_core_[releases_.front().core];
       ++free_slots_;
     }
-    if (!(tile == last_tile_ && sent_to_core_ < cost_.warps_to_one_core && free_of_core_[core_] > 0)) {
+    if (!(tile == last_tile_ && sent_to_core_ < timing_.warps_to_one_core && free_of_core_[core_] > 0)) {
       do {
-        core_ = core_ + 1 == cost_.cores ? 0 : core_ + 1;
+        core_ = core_ + 1 == timing_.cores ? 0 : core_ + 1;
       } while (free_of_core_[core_] == 0);
       sent_to_core_ = 0;
     }
@@ -99,8 +103,8 @@ class TimedSm : public TimedUnit {
   }
 
   std::size_t next_scheduler() {
-    const std::size_t next = std::size_t{core_} * cost_.schedulers_per_core + turn_of_scheduler_;
-    turn_of_scheduler_ = turn_of_scheduler_ + 1 == cost_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
+    const std::size_t next = std::size_t{core_} * timing_.schedulers_per_core + turn_of_scheduler_;
+    turn_of_scheduler_ = turn_of_scheduler_ + 1 == timing_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
     return next;
   }
 
@@ -253,7 +257,7 @@ class TimedSm : public TimedUnit {
     // Vertex warps leave in order.
     const Cycle taken = out_vertices_.send(warp, std::max(vertices_done_, launch)).first;
     vertex_slots_[vertex_turn_] = taken + 1;
-    vertex_turn_ = vertex_turn_ + 1 == cost_.vertex_warps ? 0 : vertex_turn_ + 1;
+    vertex_turn_ = vertex_turn_ + 1 == timing_.vertex_warps ? 0 : vertex_turn_ + 1;
     return launch;
   }
 
@@ -263,7 +267,7 @@ class TimedSm : public TimedUnit {
   }
 
   std::unique_ptr<SmBehaviour> behaviour_;
-  const SmBehaviour::Cost cost_;
+  const SmBehaviour::TimingParameters timing_;
   const Cycle cycles_per_instruction_;
   const bool roomy_;
   const Segment vertex_;

@@ -78,32 +78,32 @@ class Wheel {
 class SmUnit : public Unit {
  public:
   SmUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour)
-      : Unit(name, domain, SmWork::kinds(behaviour->cost())),
+      : Unit(name, domain, SmWork::kinds(behaviour->timing())),
         in_vertices_(*this, "in_vertices"),
         out_vertices_(*this, "out_vertices"),
         in_warps_(*this, "in_warps"),
         out_shaded_(*this, "out_shaded"),
         in_release_(*this, "in_release"),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
-        cycles_per_instruction_(cost_.cycles_per_instruction()),
-        warps_per_core_(cost_.warps_per_core),
+        timing_(behaviour_->timing()),
+        cycles_per_instruction_(timing_.cycles_per_instruction()),
+        warps_per_core_(timing_.warps_per_core),
         wheel_(horizon()),
-        schedulers_(std::size_t{cost_.cores} * cost_.schedulers_per_core) {
-    fragment_slots_ = cost_.fragment_slots();
+        schedulers_(std::size_t{timing_.cores} * timing_.schedulers_per_core) {
+    fragment_slots_ = timing_.fragment_slots();
     free_slots_ = fragment_slots_;
-    flights_.resize(fragment_slots_ + cost_.vertex_warps);
+    flights_.resize(fragment_slots_ + timing_.vertex_warps);
     next_.resize(flights_.size() + schedulers_.size());
     warps_.resize(fragment_slots_);
-    vertices_.resize(cost_.vertex_warps);
-    free_of_core_.resize(cost_.cores);
-    for (std::uint32_t core = 0; core < cost_.cores; ++core) {
-      for (std::uint32_t slot = cost_.warps_per_core; slot-- > 0;) {
-        free_of_core_[core].push_back(core * cost_.warps_per_core + slot);
+    vertices_.resize(timing_.vertex_warps);
+    free_of_core_.resize(timing_.cores);
+    for (std::uint32_t core = 0; core < timing_.cores; ++core) {
+      for (std::uint32_t slot = timing_.warps_per_core; slot-- > 0;) {
+        free_of_core_[core].push_back(core * timing_.warps_per_core + slot);
       }
     }
-    merged_ = cost_.fragment;
-    merged_.insert(merged_.end(), cost_.merge.begin(), cost_.merge.end());
+    merged_ = timing_.fragment;
+    merged_.insert(merged_.end(), timing_.merge.begin(), timing_.merge.end());
   }
 
   bool idle() const override {
@@ -122,7 +122,7 @@ class SmUnit : public Unit {
 
   std::uint32_t horizon() const {
     std::uint32_t longest = 1;
-    for (const auto* program : {&cost_.vertex, &cost_.fragment, &cost_.merge}) {
+    for (const auto* program : {&timing_.vertex, &timing_.fragment, &timing_.merge}) {
       for (const ShaderSegment& segment : *program) {
         longest = std::max(longest, segment.instructions * cycles_per_instruction_ + segment.stall_cycles);
       }
@@ -146,7 +146,7 @@ class SmUnit : public Unit {
   /// Of the segment that a flight has just issued.
   unsigned kind_of_work(std::uint32_t slot, const Flight& flight) const {
     if (slot >= fragment_slots_) return SmWork::vertex;
-    return flight.segment > cost_.fragment.size() ? SmWork::merge : SmWork::fragment;
+    return flight.segment > timing_.fragment.size() ? SmWork::merge : SmWork::fragment;
   }
 
   void arm(std::uint32_t index, Cycle now) {
@@ -225,15 +225,15 @@ class SmUnit : public Unit {
   // Vertex warps are few, so what they need is kept out of the way of the others.
   [[gnu::noinline]] void send_vertex_warp() {
     out_vertices_.push(vertices_[vertex_first_]);
-    vertex_first_ = vertex_first_ + 1 == cost_.vertex_warps ? 0 : vertex_first_ + 1;
+    vertex_first_ = vertex_first_ + 1 == timing_.vertex_warps ? 0 : vertex_first_ + 1;
     --vertex_count_;
   }
 
   bool choose_core(TileId tile) {
-    if (tile == last_tile_ && sent_to_core_ < cost_.warps_to_one_core && !free_of_core_[core_].empty()) return true;
+    if (tile == last_tile_ && sent_to_core_ < timing_.warps_to_one_core && !free_of_core_[core_].empty()) return true;
     if (free_slots_ == 0) return false;
     do {
-      core_ = core_ + 1 == cost_.cores ? 0 : core_ + 1;
+      core_ = core_ + 1 == timing_.cores ? 0 : core_ + 1;
     } while (free_of_core_[core_].empty());
     sent_to_core_ = 0;
     return true;
@@ -264,10 +264,10 @@ class SmUnit : public Unit {
     free_of_core_[core_].pop_back();
     --free_slots_;
     Flight& flight = flights_[slot];
-    flight.program = warp.merge_pairs != 0 ? &merged_ : &cost_.fragment;
+    flight.program = warp.merge_pairs != 0 ? &merged_ : &timing_.fragment;
     flight.segment = 0;
-    flight.scheduler = static_cast<std::uint16_t>(core_ * cost_.schedulers_per_core + turn_of_scheduler_);
-    turn_of_scheduler_ = turn_of_scheduler_ + 1 == cost_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
+    flight.scheduler = static_cast<std::uint16_t>(core_ * timing_.schedulers_per_core + turn_of_scheduler_);
+    turn_of_scheduler_ = turn_of_scheduler_ + 1 == timing_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
     warps_[slot] = warp;
     in_warps_.pop();
     ++in_flight_;
@@ -277,14 +277,14 @@ class SmUnit : public Unit {
 
   [[gnu::noinline]] void launch_vertex_warp(Cycle now) {
     std::uint32_t turn = vertex_first_ + vertex_count_++;
-    if (turn >= cost_.vertex_warps) turn -= cost_.vertex_warps;
+    if (turn >= timing_.vertex_warps) turn -= timing_.vertex_warps;
     const std::uint32_t slot = fragment_slots_ + turn;
     vertices_[turn] = in_vertices_.front();
     in_vertices_.pop();
     Flight& flight = flights_[slot];
     flight.done = vertices_[turn].mark != Mark::none;
     if (flight.done) return;
-    flight.program = &cost_.vertex;
+    flight.program = &timing_.vertex;
     flight.segment = 0;
     flight.scheduler = static_cast<std::uint16_t>(vertex_scheduler_++ % schedulers_.size());
     make_ready(slot, now);
@@ -294,7 +294,7 @@ class SmUnit : public Unit {
     release_slots();
     run_events(now);
     launch_fragments(now);
-    if (in_vertices_.ready() && vertex_count_ < cost_.vertex_warps) launch_vertex_warp(now);
+    if (in_vertices_.ready() && vertex_count_ < timing_.vertex_warps) launch_vertex_warp(now);
     send();
 
     const Cycle next_event = wheel_.next_after(now);
@@ -314,7 +314,7 @@ class SmUnit : public Unit {
     if (next == now + 1) return next;
     // What could not be taken for want of a slot or a credit waits for the port that brings one.
     if (!slots_full_) next = std::min(next, std::max(in_warps_.next_ready(), now + 1));
-    if (vertex_count_ < cost_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
+    if (vertex_count_ < timing_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
     return std::min(next, in_release_.next_ready());
   }
 
@@ -324,7 +324,7 @@ class SmUnit : public Unit {
   StreamOut<ShadedWarpItem> out_shaded_;
   StreamIn<WarpRelease> in_release_;
   std::unique_ptr<SmBehaviour> behaviour_;
-  const SmBehaviour::Cost cost_;
+  const SmBehaviour::TimingParameters timing_;
   std::vector<ShaderSegment> merged_;  ///< the fragment program with the merge extension
   const std::uint32_t cycles_per_instruction_;
   const Divisor warps_per_core_;

@@ -9,8 +9,8 @@ namespace vrpipe {
 TileCoalescing::TileCoalescing(const Parameters& parameters, const RenderContext& context)
     : bin_quads_(parameters.bin_quads),
       grid_(context.frame->width(), context.frame->height()),
-      cost_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.idle_timeout_cycles,
-            parameters.flush_queue_bins},
+      timing_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.idle_timeout_cycles,
+              parameters.flush_queue_bins},
       bins_(parameters.bins),
       bin_of_tile_(grid_.tiles(), -1) {
   for (auto bin = static_cast<std::uint32_t>(bins_.size()); bin-- > 0;) {

@@ -3,7 +3,7 @@
 #include <deque>
 
 #include <vrpipe/component/parameter.h>
-#include <vrpipe/pipeline/tile_grid.h>
+#include <vrpipe/pipeline/screen_tiling.h>
 #include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
@@ -41,7 +41,7 @@ class TileCoalescing : public TcBehaviour {
 
   unsigned insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) override;
   bool flush_oldest(FlushReason reason, Flush& out) override;
-  Cost cost() const override { return cost_; }
+  TimingParameters timing() const override { return timing_; }
 
   Counter flushes_full{*this, "flushes_full", "flushes", "because the bin was full"};
   Counter flushes_evicted{*this, "flushes_evicted", "flushes", "because another tile needed the bin"};
@@ -58,8 +58,8 @@ class TileCoalescing : public TcBehaviour {
   void flush_bin(std::uint32_t bin, FlushReason reason, Flush& out);
 
   const std::uint32_t bin_quads_;
-  const TileGrid grid_;
-  const Cost cost_;
+  const ScreenTiling grid_;
+  const TimingParameters timing_;
   std::vector<Bin> bins_;
   std::vector<std::uint32_t> free_;
   std::deque<std::uint32_t> allocation_order_;

@@ -14,18 +14,18 @@ class TimedTc : public TimedUnit {
  public:
   TimedTc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour,
           const RenderContext& context, Transport transport)
-      : TimedUnit(name, domain, TcWork::kinds(behaviour->cost()), transport),
+      : TimedUnit(name, domain, TcWork::kinds(behaviour->timing()), transport),
         out_(*this, "out_bins"),
-        in_(*this, "in_quads", [this](const QuadBeat& beat, Span visible) { return collect(beat, visible.first); },
-            {&out_}),
+        in_(*this, "in_quads",
+            [this](const QuadBeat& beat, CycleInterval visible) { return collect(beat, visible.first); }, {&out_}),
         behaviour_(std::move(behaviour)),
         frame_(*context.frame),
-        cost_(behaviour_->cost()),
-        idle_timeout_cycles_(cost_.timeout_in(context.termination)),
-        entries_(cost_.quads_per_cycle),
-        sent_at_(cost_.flush_queue_bins, 0) {
-    out_.set_pipeline(cost_.latency_cycles - 1, 1);
-    out_.set_buffer(cost_.flush_queue_bins - 1);
+        timing_(behaviour_->timing()),
+        idle_timeout_cycles_(timing_.timeout_in(context.termination)),
+        entries_(timing_.quads_per_cycle),
+        sent_at_(timing_.flush_queue_bins, 0) {
+    out_.set_pipeline(timing_.latency_cycles - 1, 1);
+    out_.set_buffer(timing_.flush_queue_bins - 1);
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -76,7 +76,7 @@ class TimedTc : public TimedUnit {
     item.storage = &storage;
     item.tile = storage.flush.tile;
     item.quads = static_cast<std::uint32_t>(storage.flush.quads.size());
-    const unsigned beats = (item.quads + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
+    const unsigned beats = (item.quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
     const Cycle begin = std::max({flushed, sent_, out_.last()}) + 1;
     sent_ = out_.send(item, {begin, begin + beats - 1}, beats).last;
     did(TcWork::beats, beats, sent_);
@@ -129,12 +129,12 @@ class TimedTc : public TimedUnit {
   TimedIn<QuadBeat> in_;
   std::unique_ptr<TcBehaviour> behaviour_;
   const Frame& frame_;
-  const TcBehaviour::Cost cost_;
+  const TcBehaviour::TimingParameters timing_;
   const std::uint32_t idle_timeout_cycles_;  ///< 0: never
   std::deque<BinStorage> storage_ = std::deque<BinStorage>(1);
   std::size_t storage_at_ = 0;
   BinStorage* next_storage_ = &storage_[0];
-  Flow entries_;
+  ThroughputPort entries_;
   std::vector<Cycle> sent_at_;  ///< the last beat of the last bins, a ring
   std::size_t place_ = 0;       ///< of the bin that has to have gone before the next is flushed
   Cycle sent_ = 0;              ///< the last beat

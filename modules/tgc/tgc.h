@@ -45,7 +45,7 @@ class TileGridCoalescing : public TgcBehaviour {
   bool entering() const override { return grid_y_ < grid_y_end_; }
   bool step(Flush& out) override;
   bool drain(Flush& out) override;
-  Throughput cost() const override { return {entries_per_cycle_, latency_cycles_}; }
+  Throughput timing() const override { return {entries_per_cycle_, latency_cycles_}; }
   std::uint32_t largest_flush() const override { return bin_primitives_; }
   /// (4 B pointer x 3 vertices x primitives + 2 B grid id) x bins (paper, table of hardware cost).
   std::uint64_t storage_bytes() const override;
@@ -95,7 +95,7 @@ class TgcPassThrough : public TgcBehaviour {
   bool entering() const override { return pending_; }
   bool step(Flush& out) override;
   bool drain(Flush&) override { return false; }
-  Throughput cost() const override { return {2, 1}; }
+  Throughput timing() const override { return {2, 1}; }
   std::uint32_t largest_flush() const override { return 1; }
   std::uint64_t storage_bytes() const override { return 0; }
 

@@ -9,17 +9,17 @@ class TimedTgc : public TimedUnit {
  public:
   TimedTgc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TgcBehaviour> behaviour,
            Transport transport)
-      : TimedUnit(name, domain, TgcWork::kinds(behaviour->cost()), transport),
+      : TimedUnit(name, domain, TgcWork::kinds(behaviour->timing()), transport),
         out_(*this, "out_jobs"),
         in_(*this, "in_primitives",
-            [this](const PrimitiveItem& item, Span visible) {
+            [this](const PrimitiveItem& item, CycleInterval visible) {
               return item.mark != Mark::none ? drain(item.mark, visible.first) : enter_bins(item, visible.first);
             },
             {&out_}),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
-        entries_(cost_.items_per_cycle) {
-    out_.set_pipeline(cost_.latency_cycles - 1, 1);
+        timing_(behaviour_->timing()),
+        entries_(timing_.items_per_cycle) {
+    out_.set_pipeline(timing_.latency_cycles - 1, 1);
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -73,9 +73,9 @@ class TimedTgc : public TimedUnit {
   TimedOut<RasterJob> out_;
   TimedIn<PrimitiveItem> in_;
   std::unique_ptr<TgcBehaviour> behaviour_;
-  const Throughput cost_;
+  const Throughput timing_;
   TgcBehaviour::Flush flush_;
-  Lane entries_;
+  IssuePort entries_;
   Cycle read_ = 0;  ///< the last flush has been read out
 };
 

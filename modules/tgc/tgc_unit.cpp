@@ -9,12 +9,12 @@ namespace {
 class TgcUnit : public Unit {
  public:
   TgcUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TgcBehaviour> behaviour)
-      : Unit(name, domain, TgcWork::kinds(behaviour->cost())),
+      : Unit(name, domain, TgcWork::kinds(behaviour->timing())),
         in_(*this, "in_primitives"),
         out_(*this, "out_jobs"),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()) {
-    out_.set_pipeline(cost_.latency_cycles - 1, 1);
+        timing_(behaviour_->timing()) {
+    out_.set_pipeline(timing_.latency_cycles - 1, 1);
   }
 
   bool idle() const override {
@@ -28,7 +28,7 @@ class TgcUnit : public Unit {
   /// Enters bins; true when something moved.
   bool collect(Cycle now) {
     bool moved = false;
-    for (unsigned budget = cost_.items_per_cycle; budget > 0 && !waiting_; --budget) {
+    for (unsigned budget = timing_.items_per_cycle; budget > 0 && !waiting_; --budget) {
       if (!behaviour_->entering()) {
         if (mark_ != Mark::none || !in_.ready()) break;
         if (in_.front().mark != Mark::none) {
@@ -91,7 +91,7 @@ class TgcUnit : public Unit {
   StreamIn<PrimitiveItem> in_;
   StreamOut<RasterJob> out_;
   std::unique_ptr<TgcBehaviour> behaviour_;
-  const Throughput cost_;
+  const Throughput timing_;
   TgcBehaviour::Flush current_;  ///< being read out, from `at_` on
   TgcBehaviour::Flush next_;     ///< flushed and waiting for the read-out, if `waiting_`
   std::size_t at_ = 0;

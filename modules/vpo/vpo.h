@@ -29,15 +29,15 @@ class PrimitiveAssembly : public VpoBehaviour {
   PrimitiveAssembly(const Parameters& parameters, const RenderContext& context);
 
   unsigned assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) override;
-  Throughput cost() const override { return {triangles_per_cycle_, latency_cycles_}; }
+  Throughput timing() const override { return {triangles_per_cycle_, latency_cycles_}; }
 
   Counter culled_zero_area{*this, "culled_zero_area", "triangles", "without area after snapping"};
   Counter culled_outside{*this, "culled_outside", "triangles", "that cover no sample of the viewport's pixels"};
   Counter dropped_not_finite{*this, "dropped_not_finite", "splats",
                              "with a NaN or infinite attribute, or a vertex that cannot be cut to the guard band"};
-  Extreme smallest_determinant{*this, Extreme::Of::smallest, "smallest_determinant", "1e-6 px^2",
-                               "of a splat's axes in sigmas, the product of its standard deviations; the projection's "
-                               "dilation leaves 300000 or more, 0 is a splat without area"};
+  MinMax smallest_determinant{*this, MinMax::Of::smallest, "smallest_determinant", "1e-6 px^2",
+                              "of a splat's axes in sigmas, the product of its standard deviations; the projection's "
+                              "dilation leaves 300000 or more, 0 is a splat without area"};
 
  private:
   const RenderContext& context_;

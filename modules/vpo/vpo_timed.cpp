@@ -9,21 +9,21 @@ class TimedVpo : public TimedUnit {
  public:
   TimedVpo(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<VpoBehaviour> behaviour,
            unsigned gpcs, Transport transport)
-      : TimedUnit(name, domain, VpoWork::kinds(behaviour->cost()), transport),
+      : TimedUnit(name, domain, VpoWork::kinds(behaviour->timing()), transport),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
+        timing_(behaviour_->timing()),
         gpcs_(gpcs),
-        lane_(cost_.items_per_cycle) {
+        lane_(timing_.items_per_cycle) {
     std::vector<TimedOutput*> sends_to;
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<TimedOut<PrimitiveItem>>(*this, "out_primitives_" + std::to_string(gpc)));
-      outs_.back()->set_pipeline(cost_.latency_cycles - 1, cost_.items_per_cycle);
+      outs_.back()->set_pipeline(timing_.latency_cycles - 1, timing_.items_per_cycle);
       sends_to.push_back(outs_.back().get());
     }
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       ins_.push_back(std::make_unique<TimedIn<VertexWarp>>(
           *this, "in_vertices_" + std::to_string(gpc),
-          [this](const VertexWarp& warp, Span visible) { return assemble(warp, visible.first); }, sends_to));
+          [this](const VertexWarp& warp, CycleInterval visible) { return assemble(warp, visible.first); }, sends_to));
       ins_.back()->set_gate([this, gpc] { return turn_ == gpc; });
     }
   }
@@ -82,11 +82,11 @@ class TimedVpo : public TimedUnit {
   }
 
   std::unique_ptr<VpoBehaviour> behaviour_;
-  const Throughput cost_;
+  const Throughput timing_;
   const unsigned gpcs_;
   std::vector<std::unique_ptr<TimedOut<PrimitiveItem>>> outs_;
   std::vector<std::unique_ptr<TimedIn<VertexWarp>>> ins_;
-  Lane lane_;
+  IssuePort lane_;
   unsigned turn_ = 0;
   bool ended_ = false;
 };

@@ -11,14 +11,14 @@ class VpoUnit : public Unit {
  public:
   VpoUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<VpoBehaviour> behaviour,
           unsigned gpcs)
-      : Unit(name, domain, VpoWork::kinds(behaviour->cost())),
+      : Unit(name, domain, VpoWork::kinds(behaviour->timing())),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
+        timing_(behaviour_->timing()),
         gpcs_(gpcs) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       ins_.push_back(std::make_unique<StreamIn<VertexWarp>>(*this, "in_vertices_" + std::to_string(gpc)));
       outs_.push_back(std::make_unique<StreamOut<PrimitiveItem>>(*this, "out_primitives_" + std::to_string(gpc)));
-      outs_.back()->set_pipeline(cost_.latency_cycles - 1, cost_.items_per_cycle);
+      outs_.back()->set_pipeline(timing_.latency_cycles - 1, timing_.items_per_cycle);
     }
   }
 
@@ -41,7 +41,7 @@ class VpoUnit : public Unit {
   }
 
   Cycle tick(Cycle now) override {
-    unsigned budget = cost_.items_per_cycle;
+    unsigned budget = timing_.items_per_cycle;
     bool moved = false;
     while (budget > 0) {
       if (at_ < count_) {
@@ -100,7 +100,7 @@ class VpoUnit : public Unit {
   }
 
   std::unique_ptr<VpoBehaviour> behaviour_;
-  const Throughput cost_;
+  const Throughput timing_;
   const unsigned gpcs_;
   std::vector<std::unique_ptr<StreamIn<VertexWarp>>> ins_;
   std::vector<std::unique_ptr<StreamOut<PrimitiveItem>>> outs_;

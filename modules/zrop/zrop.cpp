@@ -5,7 +5,7 @@
 namespace vrpipe {
 
 DepthStencilRop::DepthStencilRop(const Parameters& parameters, const RenderContext& context)
-    : context_(context), cost_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.updates_per_cycle} {}
+    : context_(context), timing_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.updates_per_cycle} {}
 
 void DepthStencilRop::test(QuadBeat& beat) {
   // All are of one state.

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <vrpipe/component/parameter.h>
-#include <vrpipe/pipeline/tile_grid.h>
+#include <vrpipe/pipeline/screen_tiling.h>
 #include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
@@ -37,7 +37,7 @@ class DepthStencilRop : public ZropBehaviour {
   void update(const TerminationSignal& signal) override;
   void pass(Mark mark) override;
   void follow(FunctionalRunAhead& run_ahead) override { run_ahead_ = &run_ahead; }
-  Cost cost() const override { return cost_; }
+  TimingParameters timing() const override { return timing_; }
 
   Counter updates_void{*this, "updates_void", "signals",
                        "received after a clear of what they were for; they take time"};
@@ -49,7 +49,7 @@ class DepthStencilRop : public ZropBehaviour {
   }
 
   const RenderContext& context_;
-  const Cost cost_;
+  const TimingParameters timing_;
   std::uint16_t epoch_ = 0;  ///< clears of termination so far
   FunctionalRunAhead* run_ahead_ = nullptr;
   std::vector<TerminationSignal> ahead_;  ///< of the bin under test

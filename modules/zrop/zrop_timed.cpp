@@ -12,17 +12,20 @@ class TimedZrop : public TimedUnit {
  public:
   TimedZrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
             Transport transport)
-      : TimedUnit(name, domain, ZropWork::kinds(behaviour->cost()), transport),
+      : TimedUnit(name, domain, ZropWork::kinds(behaviour->timing()), transport),
         out_(*this, "out_quads"),
         in_terminations_(*this, "in_terminations",
-                         [this](const TerminationBeat& beat, Span visible) { return update(beat, visible.first); }),
-        in_(*this, "in_quads", [this](const BinItem& item, Span visible) { return test(item, visible); }, {&out_}),
+                         [this](const TerminationBeat& beat, CycleInterval visible) {
+                           return update(beat, visible.first);
+                         }),
+        in_(*this, "in_quads", [this](const BinItem& item, CycleInterval visible) { return test(item, visible); },
+            {&out_}),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
-        at_once_(std::min(cost_.quads_per_cycle, QuadBeat::capacity)),
-        tests_(cost_.quads_per_cycle),
-        updates_(cost_.updates_per_cycle) {
-    out_.set_pipeline(cost_.latency_cycles - 1, cost_.quads_per_cycle);
+        timing_(behaviour_->timing()),
+        at_once_(std::min(timing_.quads_per_cycle, QuadBeat::capacity)),
+        tests_(timing_.quads_per_cycle),
+        updates_(timing_.updates_per_cycle) {
+    out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -47,7 +50,7 @@ class TimedZrop : public TimedUnit {
     return at;
   }
 
-  Span test(const BinItem& incoming, Span visible) {
+  CycleInterval test(const BinItem& incoming, CycleInterval visible) {
     BinItem item = incoming;
     tests_.hold(out_.last());
     charge(UnitState::blocked, out_.last());
@@ -64,8 +67,8 @@ class TimedZrop : public TimedUnit {
     std::vector<Quad>& quads = item.storage->flush.quads;
     const unsigned total = item.quads;
     const unsigned parts = (total + at_once_ - 1) / at_once_;
-    Span tested(never, 0);
-    Span left(never, 0);
+    CycleInterval tested(never, 0);
+    CycleInterval left(never, 0);
     unsigned beats_left = 0;
     QuadBeat beat;
     beat.tile = item.tile;
@@ -77,10 +80,10 @@ class TimedZrop : public TimedUnit {
       std::copy_n(quads.begin() + from, beat.count, beat.quads.begin());
       const Cycle at = take(visible.of_part(part, parts), beat.count);
       const unsigned tested_quads = beat.count;
-      port_free_at_ = at + (tested_quads + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
+      port_free_at_ = at + (tested_quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       did(ZropWork::tests, tested_quads, at, port_free_at_);
       behaviour_->test(beat);
-      if (beat.count < tested_quads) frame_lasts(at + cost_.latency_cycles);
+      if (beat.count < tested_quads) frame_lasts(at + timing_.latency_cycles);
       tested.first = std::min(tested.first, at);
       tested.last = at;
       // A part without survivors goes no further, but for the mark that closes the bin.
@@ -92,7 +95,7 @@ class TimedZrop : public TimedUnit {
       ++beats_left;
     }
     charge(UnitState::starved, tested.first);
-    const Span taken = out_.send(item, left, beats_left);
+    const CycleInterval taken = out_.send(item, left, beats_left);
     charge(UnitState::busy, tested.last + 1);
     charge(UnitState::blocked, taken.last);
     tests_.hold(taken.last);
@@ -125,10 +128,10 @@ class TimedZrop : public TimedUnit {
   TimedIn<TerminationBeat> in_terminations_;
   TimedIn<BinItem> in_;
   std::unique_ptr<ZropBehaviour> behaviour_;
-  const ZropBehaviour::Cost cost_;
+  const ZropBehaviour::TimingParameters timing_;
   const unsigned at_once_;
-  Lane tests_;
-  Lane updates_;
+  IssuePort tests_;
+  IssuePort updates_;
   Ring<Pending> pending_;   ///< updates not applied yet, by cycle
   Cycle port_free_at_ = 0;  ///< of the z-cache, after the last test or update
 };

@@ -9,14 +9,14 @@ namespace {
 class ZropUnit : public Unit {
  public:
   ZropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour)
-      : Unit(name, domain, ZropWork::kinds(behaviour->cost())),
+      : Unit(name, domain, ZropWork::kinds(behaviour->timing())),
         in_(*this, "in_quads"),
         out_(*this, "out_quads"),
         in_terminations_(*this, "in_terminations"),
         behaviour_(std::move(behaviour)),
-        cost_(behaviour_->cost()),
-        limit_(cost_.quads_per_cycle) {
-    out_.set_pipeline(cost_.latency_cycles - 1, cost_.quads_per_cycle);
+        timing_(behaviour_->timing()),
+        limit_(timing_.quads_per_cycle) {
+    out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
   }
 
   bool idle() const override { return in_.empty() && in_terminations_.empty(); }
@@ -24,7 +24,7 @@ class ZropUnit : public Unit {
 
  private:
   bool update(Cycle now) {
-    unsigned budget = cost_.updates_per_cycle;
+    unsigned budget = timing_.updates_per_cycle;
     bool moved = false;
     while (budget > 0 && in_terminations_.ready()) {
       const TerminationBeat& beat = in_terminations_.front();
@@ -49,7 +49,7 @@ class ZropUnit : public Unit {
       if (!limit_.allows(width, now)) break;
       QuadBeat beat = in_.front();
       in_.pop();
-      tested_until_ = now + (width + cost_.quads_per_cycle - 1) / cost_.quads_per_cycle;
+      tested_until_ = now + (width + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       did(ZropWork::tests, beat.count, now, tested_until_);
       const unsigned tested = beat.count;
       if (beat.mark == Mark::none) {
@@ -57,7 +57,7 @@ class ZropUnit : public Unit {
       } else {
         behaviour_->pass(beat.mark);
       }
-      if (beat.count < tested) frame_lasts(now + cost_.latency_cycles);
+      if (beat.count < tested) frame_lasts(now + timing_.latency_cycles);
       moved = true;
       // A beat without survivors goes no further, but for the mark that closes a bin.
       if (beat.count > 0 || beat.last_of_bin || beat.mark != Mark::none) out_.push(beat);
@@ -88,7 +88,7 @@ class ZropUnit : public Unit {
   StreamOut<QuadBeat> out_;
   StreamIn<TerminationBeat> in_terminations_;
   std::unique_ptr<ZropBehaviour> behaviour_;
-  const ZropBehaviour::Cost cost_;
+  const ZropBehaviour::TimingParameters timing_;
   unsigned signal_ = 0;
   BatchLimit limit_;
   Cycle tested_until_ = 0;  ///< the last beat, rounded up to whole cycles

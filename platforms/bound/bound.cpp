@@ -57,15 +57,15 @@ PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc) {
   };
   cost_of("draw", static_cast<DrawBehaviour*>(nullptr),
           [&](const auto& unit) { vertex_warps_per_cycle_ = unit.warps_per_1024_cycles() / 1024.0; });
-  cost_of("vpo", static_cast<VpoBehaviour*>(nullptr), [&](const auto& unit) { vpo_ = unit.cost(); });
-  cost_of("tgc", static_cast<TgcBehaviour*>(nullptr), [&](const auto& unit) { tgc_ = unit.cost(); });
-  cost_of("raster", static_cast<RasterBehaviour*>(nullptr), [&](const auto& unit) { raster_ = unit.cost(); });
-  cost_of("tc", static_cast<TcBehaviour*>(nullptr), [&](const auto& unit) { tc_ = unit.cost(); });
-  cost_of("prop", static_cast<PropBehaviour*>(nullptr), [&](const auto& unit) { prop_ = unit.cost(); });
-  cost_of("zrop", static_cast<ZropBehaviour*>(nullptr), [&](const auto& unit) { zrop_ = unit.cost(); });
-  cost_of("qru", static_cast<QruBehaviour*>(nullptr), [&](const auto& unit) { qru_ = unit.cost(); });
-  cost_of("sm", static_cast<SmBehaviour*>(nullptr), [&](const auto& unit) { sm_ = unit.cost(); });
-  cost_of("crop", static_cast<CropBehaviour*>(nullptr), [&](const auto& unit) { crop_ = unit.cost(); });
+  cost_of("vpo", static_cast<VpoBehaviour*>(nullptr), [&](const auto& unit) { vpo_ = unit.timing(); });
+  cost_of("tgc", static_cast<TgcBehaviour*>(nullptr), [&](const auto& unit) { tgc_ = unit.timing(); });
+  cost_of("raster", static_cast<RasterBehaviour*>(nullptr), [&](const auto& unit) { raster_ = unit.timing(); });
+  cost_of("tc", static_cast<TcBehaviour*>(nullptr), [&](const auto& unit) { tc_ = unit.timing(); });
+  cost_of("prop", static_cast<PropBehaviour*>(nullptr), [&](const auto& unit) { prop_ = unit.timing(); });
+  cost_of("zrop", static_cast<ZropBehaviour*>(nullptr), [&](const auto& unit) { zrop_ = unit.timing(); });
+  cost_of("qru", static_cast<QruBehaviour*>(nullptr), [&](const auto& unit) { qru_ = unit.timing(); });
+  cost_of("sm", static_cast<SmBehaviour*>(nullptr), [&](const auto& unit) { sm_ = unit.timing(); });
+  cost_of("crop", static_cast<CropBehaviour*>(nullptr), [&](const auto& unit) { crop_ = unit.timing(); });
   // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
   warps_in_phase_ = 2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads);
   times_out_ = tc_.timeout_in(configuration.request().termination) > 0;

@@ -91,13 +91,13 @@ class PhaseBound {
   double vertex_warps_per_cycle_ = 1;
   Throughput vpo_;
   Throughput tgc_;
-  RasterBehaviour::Cost raster_{1, 1, 1, 1, 1, 1};
-  TcBehaviour::Cost tc_{1, 1, 0, 1};
-  PropBehaviour::Cost prop_{1, {}, 1, PropBehaviour::Order::tile};
-  ZropBehaviour::Cost zrop_{1, 1, 1};
+  RasterBehaviour::TimingParameters raster_{1, 1, 1, 1, 1, 1};
+  TcBehaviour::TimingParameters tc_{1, 1, 0, 1};
+  PropBehaviour::TimingParameters prop_{1, {}, 1, PropBehaviour::Order::tile};
+  ZropBehaviour::TimingParameters zrop_{1, 1, 1};
   Throughput qru_;
-  SmBehaviour::Cost sm_{1, 1, 32, 1, 1, 1, {}, {}, {}};
-  CropBehaviour::Cost crop_{{}, 1, 1, true, 0, 1, 1, 1, 1, false};
+  SmBehaviour::TimingParameters sm_{1, 1, 32, 1, 1, 1, {}, {}, {}};
+  CropBehaviour::TimingParameters crop_{{}, 1, 1, true, 0, 1, 1, 1, 1, false};
   std::uint32_t l2_bytes_per_cycle_ = 0;  ///< 0: a memory of which nothing is known
   std::uint32_t l2_latency_cycles_ = 0;
   std::uint64_t warps_in_phase_ = 0;

@@ -22,8 +22,8 @@ std::uint64_t items(const UntimedUnit* unit, unsigned kind) { return unit == nul
 /// From the survivors of a test to the colour cache.
 class WorkCounter::Blends final : public BlendObserver {
  public:
-  Blends(Work& work, const Frame& frame, const ColorSurface& surface, const CropBehaviour::Cost& crop, bool only_needed,
-         bool any_order)
+  Blends(Work& work, const Frame& frame, const ColorSurface& surface, const CropBehaviour::TimingParameters& crop,
+         bool only_needed, bool any_order)
       : work_(work), frame_(frame), grid_(surface.grid()), line_bytes_(crop.line_bytes) {
     if (only_needed) terminated_.resize(grid_.quads());
     if (any_order) filled_.resize(surface.size_bytes() / line_bytes_ + 1);
@@ -100,7 +100,7 @@ class WorkCounter::Blends final : public BlendObserver {
 
   Work& work_;
   const Frame& frame_;
-  const TileGrid grid_;
+  const ScreenTiling grid_;
   const std::uint32_t line_bytes_;
   std::vector<LaneMask> terminated_;   ///< by quad of the surface; empty if all work counts
   std::vector<std::uint32_t> filled_;  ///< sectors so far, by line of the surface; empty if all moves count
@@ -142,7 +142,7 @@ WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& g
     const bool times_out = bound.times_out();
     const bool any_order = times_out || bound.tiles_may_overtake();
     const bool only_needed = configuration.frame().terminates_early() && times_out;
-    blends_ = std::make_unique<Blends>(bound.work, configuration.frame(), *colors->surface(), colors->cost(),
+    blends_ = std::make_unique<Blends>(bound.work, configuration.frame(), *colors->surface(), colors->timing(),
                                        only_needed, any_order);
     crop->observe(*blends_);
     tap<BinItem>(prop, "out_survivors", [this](const BinItem& item, UntimedTarget<BinItem>& next) {

@@ -94,7 +94,7 @@ class RunAhead::RecordingSm final : public SmBehaviour {
     record_.shaded(out);
   }
   void shade_vertices(const VertexWarp& warp) override { sm_->shade_vertices(warp); }
-  Cost cost() const override { return sm_->cost(); }
+  TimingParameters timing() const override { return sm_->timing(); }
 
  private:
   std::unique_ptr<SmBehaviour> sm_;
@@ -117,7 +117,7 @@ class RunAhead::RecordingCrop final : public CropBehaviour {
     crop_->blend_quads(warp, from, to, outcomes);
     record_.blended(warp, from, to, outcomes);
   }
-  Cost cost() const override { return crop_->cost(); }
+  TimingParameters timing() const override { return crop_->timing(); }
 
  private:
   std::unique_ptr<CropBehaviour> crop_;
@@ -130,7 +130,7 @@ class RunAhead::RepeatingSm final : public SmBehaviour {
   const Behaviour& unit() const override { return sm_.unit(); }
   void shade(const Warp& warp, ShadedWarp& out) override { record_.repeat(warp, out); }
   void shade_vertices(const VertexWarp& warp) override { sm_.shade_vertices(warp); }
-  Cost cost() const override { return sm_.cost(); }
+  TimingParameters timing() const override { return sm_.timing(); }
 
  private:
   SmBehaviour& sm_;
@@ -156,7 +156,7 @@ class RunAhead::RepeatingCrop final : public CropBehaviour {
     crop_.look_up(warp, from, to, out);
   }
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override { crop_.make_dirty(line, sectors); }
-  Cost cost() const override { return crop_.cost(); }
+  TimingParameters timing() const override { return crop_.timing(); }
 
  private:
   CropBehaviour& crop_;

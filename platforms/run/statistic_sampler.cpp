@@ -25,10 +25,10 @@ void StatisticSampler::add(const std::string& name, const std::string& path, con
   for (const Counter* counter : set.counters()) {
     add_statistic(name, path, *counter, "counter", "", [counter] { return Value{counter->value(), {}}; });
   }
-  for (const Extreme* extreme : set.extremes()) {
-    const char* const kind = extreme->of() == Extreme::Of::largest ? "largest" : "smallest";
-    add_statistic(name, path, *extreme, kind, "", [extreme] {
-      return extreme->seen() ? Value{extreme->value(), {}} : Value{};
+  for (const MinMax* min_max : set.min_max()) {
+    const char* const kind = min_max->of() == MinMax::Of::largest ? "largest" : "smallest";
+    add_statistic(name, path, *min_max, kind, "", [min_max] {
+      return min_max->seen() ? Value{min_max->value(), {}} : Value{};
     });
   }
   for (const Histogram* histogram : set.histograms()) {

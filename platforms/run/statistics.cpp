@@ -71,10 +71,10 @@ void StatisticCollector::add_set(const std::string& kind, const std::string& nam
   };
 
   for (const Counter* counter : set.counters()) take(gathered(declared(*counter, "counter"), kind), counter->value());
-  for (const Extreme* extreme : set.extremes()) {
-    if (!extreme->seen() && take_ != Take::all) continue;
-    const char* const how = extreme->of() == Extreme::Of::largest ? "largest" : "smallest";
-    take(gathered(declared(*extreme, how), kind), extreme->value());
+  for (const MinMax* min_max : set.min_max()) {
+    if (!min_max->seen() && take_ != Take::all) continue;
+    const char* const how = min_max->of() == MinMax::Of::largest ? "largest" : "smallest";
+    take(gathered(declared(*min_max, how), kind), min_max->value());
   }
   for (const Histogram* histogram : set.histograms()) {
     Gathered& into = gathered(declared(*histogram, "histogram"), kind, histogram->buckets());

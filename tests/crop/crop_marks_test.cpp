@@ -139,7 +139,7 @@ TEST(ColorRopOfAFrame, AGpcClearsItsOwnTilesAlone) {
   frame.clear({true, true});
   const Placement placement{3, 1};
   Rop rop(frame, Termination::paper, ColorFormat::rgba16f, placement);
-  const TileGrid& grid = rop.surface.grid();
+  const ScreenTiling& grid = rop.surface.grid();
   for (std::size_t place = 0; place < grid.quads(); ++place) rop.surface.quad(place) = color_of(1, 1, 1, 1);
   rop.crop->pass(Frame::mark_of(0));
   for (std::size_t place = 0; place < grid.quads(); ++place) {
@@ -148,7 +148,7 @@ TEST(ColorRopOfAFrame, AGpcClearsItsOwnTilesAlone) {
   }
 }
 
-TEST(ColorRopOfAFrame, WhatRoundingHasSwallowedIsForgottenWithTheColor) {
+TEST(ColorRopOfAFrame, WhatRoundingHasLostIsForgottenWithTheColor) {
   Frame frame(64, 64);
   frame.draw(geometry_of(64, 64), {});
   frame.clear({true, false});
@@ -158,12 +158,12 @@ TEST(ColorRopOfAFrame, WhatRoundingHasSwallowedIsForgottenWithTheColor) {
     for (unsigned i = 0; i < 3000; ++i) rop.blend(draw, 0.005F);
   };
   fill(0);
-  const std::uint64_t swallowed = rop.count("fragments_swallowed");
-  ASSERT_GT(swallowed, 0U);
+  const std::uint64_t lost = rop.count("fragments_lost_to_rounding");
+  ASSERT_GT(lost, 0U);
   ASSERT_EQ(rop.count("pixels_stuck"), 4U) << "the four of the quad, each once";
   rop.crop->pass(Frame::mark_of(1));
   fill(1);
-  EXPECT_EQ(rop.count("fragments_swallowed"), 2 * swallowed);
+  EXPECT_EQ(rop.count("fragments_lost_to_rounding"), 2 * lost);
   EXPECT_EQ(rop.count("pixels_stuck"), 8U) << "once more after the clear";
 }
 

@@ -272,7 +272,7 @@ TEST_F(ColorRopTest, QuadsPerCycleFollowTheFormat) {
   for (const auto& [format, quads] : expected) {
     context.format = format;
     make();
-    EXPECT_EQ(crop->cost().blend_rate, (Rate{quads, 1}));
+    EXPECT_EQ(crop->timing().blend_rate, (Rate{quads, 1}));
   }
 }
 
@@ -521,19 +521,19 @@ TEST(CropCache, SectorsMoveInTheLongestNaturallyAlignedRuns) {
 TEST(CropCache, AQuadsSectorsAreThoseThatHoldItsBytes) {
   for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
     const ColorSurface surface(32, 32, format);
-    CropBehaviour::Cost cost{};
-    for (cost.line_bytes = 64; cost.line_bytes <= 1024; cost.line_bytes *= 2) {
-      for (cost.sector_bytes = std::max(16U, cost.line_bytes / 32); cost.sector_bytes <= cost.line_bytes;
-           cost.sector_bytes *= 2) {
-        const auto quads = sectors_of_quads(cost, surface);
+    CropBehaviour::TimingParameters timing{};
+    for (timing.line_bytes = 64; timing.line_bytes <= 1024; timing.line_bytes *= 2) {
+      for (timing.sector_bytes = std::max(16U, timing.line_bytes / 32); timing.sector_bytes <= timing.line_bytes;
+           timing.sector_bytes *= 2) {
+        const auto quads = sectors_of_quads(timing, surface);
         for (unsigned position = 0; position < positions_per_tile; ++position) {
           const std::uint64_t tile = surface.address({1, 1}, 0);
-          const std::uint64_t line = tile + std::uint64_t{quads[position].line} * cost.line_bytes;
+          const std::uint64_t line = tile + std::uint64_t{quads[position].line} * timing.line_bytes;
           std::uint32_t expected = 0;
           for (std::uint64_t byte = 0; byte < 4 * bytes_per_pixel(format); ++byte) {
             const std::uint64_t offset = surface.address({1, 1}, position) + byte - line;
-            ASSERT_LT(offset, cost.line_bytes) << position;
-            expected |= 1U << (offset / cost.sector_bytes);
+            ASSERT_LT(offset, timing.line_bytes) << position;
+            expected |= 1U << (offset / timing.sector_bytes);
           }
           ASSERT_EQ(quads[position].sectors, expected) << position;
         }

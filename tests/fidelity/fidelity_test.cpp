@@ -105,10 +105,10 @@ TEST(Fidelity, AnEmptyDrawTakesNoWorkOnAnyRung) {
 /// A TC of another make, which has its time-out in every mode.
 struct ImpatientTc : TileCoalescing {
   using TileCoalescing::TileCoalescing;
-  Cost cost() const override {
-    Cost cost = TileCoalescing::cost();
-    cost.idle_timeout_cycles = 3;
-    return cost;
+  TimingParameters timing() const override {
+    TimingParameters timing = TileCoalescing::timing();
+    timing.idle_timeout_cycles = 3;
+    return timing;
   }
 };
 const Registrar<ImpatientTc, TcBehaviour> impatient("tc", "impatient", "flushes bins after three idle cycles");

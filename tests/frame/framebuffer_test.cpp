@@ -14,9 +14,9 @@ std::shared_ptr<const Draw> geometry_of(std::uint32_t splats, bool triangles = f
   return draw;
 }
 
-TEST(TileGrid, ATileAndItsIndexGiveEachOther) {
+TEST(ScreenTiling, ATileAndItsIndexGiveEachOther) {
   for (const auto& [width, height] : {std::pair{1U, 1U}, {100U, 40U}, {16U, 64U}, {16384U, 16384U}}) {
-    const TileGrid grid(width, height);
+    const ScreenTiling grid(width, height);
     EXPECT_EQ(grid.tiles(), std::size_t{(width + 15) / 16} * ((height + 15) / 16));
     for (std::size_t index = 0; index < grid.tiles(); ++index) {
       const TileId tile = grid.tile(index);
@@ -114,7 +114,7 @@ TEST(DepthStencilSurface, AGpcAloneClearsAll) {
 
 TEST(ColorSurface, ClearsOneScreenTile) {
   ColorSurface surface(48, 48, ColorFormat::rgba16f);
-  const TileGrid& grid = surface.grid();
+  const ScreenTiling& grid = surface.grid();
   for (std::size_t place = 0; place < grid.quads(); ++place)
     surface.quad(place) = testing::color_of(0.1F, 0.2F, 0.3F, 1);
   surface.clear({1, 2});

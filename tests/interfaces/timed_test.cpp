@@ -33,14 +33,14 @@ class Sender : public Plain {
   Sender(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport)
       : Plain(name, domain, transport), out(*this, "out") {}
   TimedOut<int> out;
-  std::vector<Span> at;         ///< of each item
-  std::vector<unsigned> beats;  ///< of each item; 1 where there is none
-  std::vector<Span> taken;      ///< as known when it was sent
+  std::vector<CycleInterval> at;     ///< of each item
+  std::vector<unsigned> beats;       ///< of each item; 1 where there is none
+  std::vector<CycleInterval> taken;  ///< as known when it was sent
 
  private:
   Cycle tick(Cycle now) override {
     while (sent_ < at.size() && !out.blocked()) {
-      const Span when = at[sent_];
+      const CycleInterval when = at[sent_];
       const Cycle earliest = std::max(when.first, sent_ == 0 ? 0 : out.last() + 1);
       taken.push_back(out.send(static_cast<int>(sent_), {earliest, earliest + (when.last - when.first)},
                                sent_ < beats.size() ? beats[sent_] : 1));
@@ -55,18 +55,19 @@ class Sender : public Plain {
 class Taker : public Plain {
  public:
   Taker(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport, Cycle cycles_per_item)
-      : Plain(name, domain, transport), in(*this, "in", [this, cycles_per_item](const int& item, Span visible) {
+      : Plain(name, domain, transport),
+        in(*this, "in", [this, cycles_per_item](const int& item, CycleInterval visible) {
           const Cycle at = std::max(visible.first, free_at_);
           free_at_ = std::max(at + cycles_per_item, visible.last + 1);
           items.push_back(item);
           came.push_back(visible);
           left.push_back(at);
-          return Span(at, std::max(at, visible.last));
+          return CycleInterval(at, std::max(at, visible.last));
         }) {}
   TimedIn<int> in;
   std::vector<int> items;
-  std::vector<Span> came;   ///< visible
-  std::vector<Cycle> left;  ///< the queue
+  std::vector<CycleInterval> came;  ///< visible
+  std::vector<Cycle> left;          ///< the queue
 
  private:
   Cycle free_at_ = 0;
@@ -101,9 +102,9 @@ struct Pair {
   LinkRecorder<int> recorder;
 };
 
-std::vector<Cycle> firsts(const std::vector<Span>& spans) {
+std::vector<Cycle> firsts(const std::vector<CycleInterval>& spans) {
   std::vector<Cycle> cycles;
-  for (const Span& span : spans) cycles.push_back(span.first);
+  for (const CycleInterval& span : spans) cycles.push_back(span.first);
   return cycles;
 }
 
@@ -153,7 +154,7 @@ TEST_P(TimedLink, AQueueHoldsItsDepthAndNoMore) {
 
 TEST_P(TimedLink, ABatchTakesItsCyclesAndAsManyPlaces) {
   Pair pair(GetParam(), 8, 2, 1);
-  pair.sender->at = {Span(10, 14), Span(15, 15)};
+  pair.sender->at = {CycleInterval(10, 14), CycleInterval(15, 15)};
   pair.sender->beats = {5, 1};
   pair.run();
   ASSERT_EQ(pair.taker->came.size(), 2U);
@@ -164,7 +165,7 @@ TEST_P(TimedLink, ABatchTakesItsCyclesAndAsManyPlaces) {
 
 TEST_P(TimedLink, ABatchLargerThanTheQueuePassesAllTheSame) {
   Pair pair(GetParam(), 2, 1, 1);
-  pair.sender->at = {Span(0, 15), Span(16, 31), Span(32, 32)};
+  pair.sender->at = {CycleInterval(0, 15), CycleInterval(16, 31), CycleInterval(32, 32)};
   pair.sender->beats = {16, 16, 1};
   pair.run();
   EXPECT_EQ(pair.taker->items, (std::vector<int>{0, 1, 2}));
@@ -184,7 +185,7 @@ TEST_P(TimedLink, ItemsComeInOrderEachOnceUnderAnyStallsAndLater) {
       pair.run();
       ASSERT_EQ(pair.taker->items.size(), 100U) << seed;
       for (int i = 0; i < 100; ++i) ASSERT_EQ(pair.taker->items[static_cast<std::size_t>(i)], i) << seed;
-      for (const Span& span : pair.taker->came) {
+      for (const CycleInterval& span : pair.taker->came) {
         ASSERT_FALSE(stalls && stall_at(seed + 1000, span.first, 96)) << "a stalled port shows nothing, seed " << seed;
       }
       if (!stalls) unstalled = pair.taker->left.back();
@@ -222,8 +223,8 @@ TEST(TimedLink, AGateKeepsItemsInTheQueue) {
   EXPECT_FALSE(pair.taker->idle());
 }
 
-TEST(Lane, TakesSoManyACycleInOrder) {
-  Lane lane(4);
+TEST(IssuePort, TakesSoManyACycleInOrder) {
+  IssuePort lane(4);
   EXPECT_EQ(lane.take(10, 2), 10U);
   EXPECT_EQ(lane.take(10, 2), 10U);
   EXPECT_EQ(lane.take(10, 1), 11U);
@@ -234,10 +235,10 @@ TEST(Lane, TakesSoManyACycleInOrder) {
   EXPECT_EQ(lane.take(0, 1), 20U);
 }
 
-TEST(Flow, PartsOfAnItemMayGoInNeighbouringCycles) {
-  Flow flow(4);
+TEST(ThroughputPort, PartsOfAnItemMayGoInNeighbouringCycles) {
+  ThroughputPort flow(4);
   const auto taken = [&](Cycle earliest, unsigned parts) {
-    const Span span = flow.take(earliest, parts);
+    const CycleInterval span = flow.take(earliest, parts);
     return std::pair(span.first, span.last);
   };
   EXPECT_EQ(taken(10, 3), (std::pair<Cycle, Cycle>(10, 10)));
@@ -249,10 +250,10 @@ TEST(Flow, PartsOfAnItemMayGoInNeighbouringCycles) {
   EXPECT_EQ(taken(50, 0), (std::pair<Cycle, Cycle>(50, 50))) << "nothing takes nothing";
 }
 
-TEST(Passage, ABatchBeginsWithItsFirstItemsAndEndsNoEarlierThanItsLastCome) {
-  Passage passage(8);
-  const auto taken = [&](Span visible, unsigned items) {
-    const Span span = passage.take(visible, items);
+TEST(BatchServer, ABatchBeginsWithItsFirstItemsAndEndsNoEarlierThanItsLastCome) {
+  BatchServer passage(8);
+  const auto taken = [&](CycleInterval visible, unsigned items) {
+    const CycleInterval span = passage.take(visible, items);
     return std::pair(span.first, span.last);
   };
   EXPECT_EQ(taken({10, 13}, 27), (std::pair<Cycle, Cycle>(10, 13)));
@@ -261,14 +262,14 @@ TEST(Passage, ABatchBeginsWithItsFirstItemsAndEndsNoEarlierThanItsLastCome) {
   EXPECT_EQ(taken({20, 20}, 17), (std::pair<Cycle, Cycle>(31, 33)));
 }
 
-TEST(Span, SpreadsPartsEvenly) {
-  const Span dense(10, 13);
+TEST(CycleInterval, SpreadsPartsEvenly) {
+  const CycleInterval dense(10, 13);
   EXPECT_EQ(dense.of_part(0, 4), 10U);
   EXPECT_EQ(dense.of_part(2, 4), 12U);
-  const Span sparse(10, 40);
+  const CycleInterval sparse(10, 40);
   EXPECT_EQ(sparse.of_part(1, 4), 20U);
   EXPECT_EQ(sparse.of_part(3, 4), 40U);
-  EXPECT_EQ(Span(7).of_part(3, 4), 7U);
+  EXPECT_EQ(CycleInterval(7).of_part(3, 4), 7U);
 }
 
 }  // namespace

@@ -12,22 +12,22 @@ namespace {
 using namespace testing;
 
 /// A cost, and the setting that halves it.
-struct Cost {
+struct TimingParameters {
   const char* unit;
   const char* part;
   Setting halved;
 };
 
-const std::vector<Cost>& costs() {
-  static const std::vector<Cost> all{{"draw", "warps", {"draw", "warps_per_1024_cycles", "176"}},
-                                     {"vpo", "triangles", {"vpo", "triangles_per_cycle", "4"}},
-                                     {"raster", "coarse tests", {"raster", "coarse_tiles_per_cycle", "16"}},
-                                     {"raster", "fine tiles", {"raster", "fine_tiles_per_cycle", "4"}},
-                                     {"prop", "colours", {"prop", "color_bytes_per_cycle", "128"}},
-                                     {"sm", "fragments", {"sm", "cores", "32"}},
-                                     {"crop", "blend", {"crop", "bytes_per_cycle", "128"}},
-                                     {"crop", "sectors", {"crop", "sectors_per_cycle", "32"}},
-                                     {"l2", "bytes", {"l2", "bytes_per_cycle", "256"}}};
+const std::vector<TimingParameters>& timings() {
+  static const std::vector<TimingParameters> all{{"draw", "warps", {"draw", "warps_per_1024_cycles", "176"}},
+                                                 {"vpo", "triangles", {"vpo", "triangles_per_cycle", "4"}},
+                                                 {"raster", "coarse tests", {"raster", "coarse_tiles_per_cycle", "16"}},
+                                                 {"raster", "fine tiles", {"raster", "fine_tiles_per_cycle", "4"}},
+                                                 {"prop", "colours", {"prop", "color_bytes_per_cycle", "128"}},
+                                                 {"sm", "fragments", {"sm", "cores", "32"}},
+                                                 {"crop", "blend", {"crop", "bytes_per_cycle", "128"}},
+                                                 {"crop", "sectors", {"crop", "sectors_per_cycle", "32"}},
+                                                 {"l2", "bytes", {"l2", "bytes_per_cycle", "256"}}};
   return all;
 }
 
@@ -81,7 +81,7 @@ void expect_bound_by(const std::string& unit, const std::string& part, const Run
   const double faster = cycles_with(request, scene(), {halved});
   // All that hides behind it comes to light, so it need not be the half.
   EXPECT_LT(faster, before * 0.95) << what << ": " << halved.unit << "." << halved.parameter;
-  for (const Cost& other : costs()) {
+  for (const TimingParameters& other : timings()) {
     if (other.unit == unit) continue;
     const double stays = cycles_with(request, scene(), {other.halved});
     EXPECT_GT(stays, before * 0.98) << what << ": " << other.unit << " " << other.part;

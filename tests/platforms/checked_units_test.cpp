@@ -58,7 +58,7 @@ struct VpoThatThrowsWhenMade : PrimitiveAssembly {
 };
 struct VpoWithoutRate : PrimitiveAssembly {
   using PrimitiveAssembly::PrimitiveAssembly;
-  Throughput cost() const override { return {0, 1}; }
+  Throughput timing() const override { return {0, 1}; }
 };
 struct VpoThatCountsTwice : PrimitiveAssembly {
   using PrimitiveAssembly::PrimitiveAssembly;
@@ -70,7 +70,7 @@ struct VpoThatCountsTwice : PrimitiveAssembly {
 };
 struct TgcWithoutLatency : TileGridCoalescing {
   using TileGridCoalescing::TileGridCoalescing;
-  Throughput cost() const override { return {2, 0}; }
+  Throughput timing() const override { return {2, 0}; }
 };
 struct TgcThatDrainsForEver : TileGridCoalescing {
   using TileGridCoalescing::TileGridCoalescing;
@@ -132,10 +132,10 @@ struct TcOfAnotherPosition : TileCoalescing {
 };
 struct PropWithoutLatency : PreRop {
   using PreRop::PreRop;
-  Cost cost() const override {
-    Cost cost = PreRop::cost();
-    cost.latency_cycles = 0;
-    return cost;
+  TimingParameters timing() const override {
+    TimingParameters timing = PreRop::timing();
+    timing.latency_cycles = 0;
+    return timing;
   }
 };
 struct ZropOfAnotherTile : DepthStencilRop {
@@ -178,10 +178,10 @@ struct QruOfAnotherSplat : PairingQru {
 };
 struct SmWithoutCores : SplatShader {
   using SplatShader::SplatShader;
-  Cost cost() const override {
-    Cost cost = SplatShader::cost();
-    cost.cores = 0;
-    return cost;
+  TimingParameters timing() const override {
+    TimingParameters timing = SplatShader::timing();
+    timing.cores = 0;
+    return timing;
   }
 };
 struct SmThatForgetsAWarp : SplatShader {
@@ -194,10 +194,10 @@ struct SmThatForgetsAWarp : SplatShader {
 template <ColorFormat Format, BlendRounding Rounding>
 struct CropWithoutMshrs : ColorRop<Format, Rounding> {
   using ColorRop<Format, Rounding>::ColorRop;
-  CropBehaviour::Cost cost() const override {
-    CropBehaviour::Cost cost = ColorRop<Format, Rounding>::cost();
-    cost.mshrs = 0;
-    return cost;
+  CropBehaviour::TimingParameters timing() const override {
+    CropBehaviour::TimingParameters timing = ColorRop<Format, Rounding>::timing();
+    timing.mshrs = 0;
+    return timing;
   }
 };
 template <ColorFormat Format, BlendRounding Rounding>
@@ -224,7 +224,7 @@ struct CropWithoutCounts : CropBehaviour {
   Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) override {
     return rop.blend(draw, place, live, color);
   }
-  Cost cost() const override { return rop.cost(); }
+  TimingParameters timing() const override { return rop.timing(); }
   ColorRop<ColorFormat::rgba16f, BlendRounding::rne> rop;
 };
 
@@ -404,7 +404,7 @@ struct VpoForDraw0 : VpoBehaviour {
     count_for_draw_0(*this, unit_);
     return count;
   }
-  Throughput cost() const override { return unit_.cost(); }
+  Throughput timing() const override { return unit_.timing(); }
   PrimitiveAssembly unit_;
 };
 struct RasterForDraw0 : RasterBehaviour {
@@ -416,7 +416,7 @@ struct RasterForDraw0 : RasterBehaviour {
     count_for_draw_0(*this, unit_);
     return more;
   }
-  Cost cost() const override { return unit_.cost(); }
+  TimingParameters timing() const override { return unit_.timing(); }
   TileRasterizer unit_;
 };
 struct ZropForDraw0 : ZropBehaviour {
@@ -433,7 +433,7 @@ struct ZropForDraw0 : ZropBehaviour {
   }
   void pass(Mark mark) override { unit_.pass(mark); }
   void follow(FunctionalRunAhead& run_ahead) override { unit_.follow(run_ahead); }
-  Cost cost() const override { return unit_.cost(); }
+  TimingParameters timing() const override { return unit_.timing(); }
   DepthStencilRop unit_;
 };
 struct SmForDraw0 : SmBehaviour {
@@ -444,7 +444,7 @@ struct SmForDraw0 : SmBehaviour {
     count_for_draw_0(*this, unit_);
   }
   void shade_vertices(const VertexWarp& warp) override { unit_.shade_vertices(warp); }
-  Cost cost() const override { return unit_.cost(); }
+  TimingParameters timing() const override { return unit_.timing(); }
   SplatShader unit_;
 };
 /// Shades a draw's quads as if they were of the first.
@@ -468,7 +468,7 @@ struct CropForDraw0 : CropBehaviour {
     count_for_draw_0(*this, rop);
     return outcome;
   }
-  Cost cost() const override { return rop.cost(); }
+  TimingParameters timing() const override { return rop.timing(); }
   ColorRop<ColorFormat::rgba16f, BlendRounding::rne> rop;
 };
 /// Adds to a draw's counter as to one that knows no draws.

@@ -184,7 +184,7 @@ class CountingMemory : public sc_core::sc_module, public StatisticSet {
     return tlm::TLM_COMPLETED;
   }
   Counter accesses{*this, "accesses", "accesses", "taken"};
-  Extreme largest{*this, Extreme::Of::largest, "largest", "bytes", "of an access"};
+  MinMax largest{*this, MinMax::Of::largest, "largest", "bytes", "of an access"};
 };
 
 TEST(ForeignMemory, ShowsItsStatisticsUnderItsPath) {

@@ -189,7 +189,7 @@ TEST(Instances, ParametersNameAnInstanceOrAllOfAKind) {
                       {"link.gpc2.tc.bins", "depth", "5"}};
   const Configuration configuration(request, *Frame::of(draw));
   const auto bytes = [&](const std::string& path) {
-    return configuration.make_as<CropBehaviour>(*configuration.netlist().find(path))->cost().cache_bytes;
+    return configuration.make_as<CropBehaviour>(*configuration.netlist().find(path))->timing().cache_bytes;
   };
   EXPECT_EQ(bytes("gpc0.crop"), 8192U);
   EXPECT_EQ(bytes("gpc1.crop"), 4096U);

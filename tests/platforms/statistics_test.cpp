@@ -29,8 +29,8 @@ struct Memory : StatisticSet {
   Counter reads{*this, "reads", "accesses", "taken"};
   Counter hits{*this, "hits", "accesses", "found"};
   Ratio hit_rate{*this, hits, reads, "hit_rate", "hits per access", "of reads"};
-  Extreme longest{*this, Extreme::Of::largest, "longest", "cycles", "of waits"};
-  Extreme shortest{*this, Extreme::Of::smallest, "shortest", "cycles", "of waits"};
+  MinMax longest{*this, MinMax::Of::largest, "longest", "cycles", "of waits"};
+  MinMax shortest{*this, MinMax::Of::smallest, "shortest", "cycles", "of waits"};
   Histogram waits{*this, Histogram::Buckets::linear(10, 10), "waits", "cycles", "until served"};
   SectoredCacheStatistics cache{*this, "cache"};
 

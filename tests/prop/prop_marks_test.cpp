@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "prop/warp_order.h"
+#include "prop/reorder_buffer.h"
 #include "support/fidelities.h"
 
 namespace vrpipe {
@@ -195,7 +195,7 @@ TEST_P(PropMarksTest, NoOrderOfCompletionAndNoStallMovesAWarpPastAMark) {
 TEST(WarpOrderOfAFrame, IsEmptyOnlyWhenTheMarkHasLeftToo) {
   const Draw draw = testing::draw_of(64, 64);
   const RenderContext context = testing::context_of(draw);
-  WarpOrder order(PropBehaviour::Order::tile, context);
+  ReorderBuffer order(PropBehaviour::Order::tile, context);
   ShadedWarp mark;
   mark.sequence = 0;
   mark.mark = Frame::mark_of(0);

@@ -127,7 +127,7 @@ TEST_P(TcMarksTest, MarksThatFindNothingGoOnOrNotAllTheSame) {
   EXPECT_TRUE(tc.bench.unit().idle());
 }
 
-TEST_P(TcMarksTest, ASwallowedMarkLeavesNothingForTheTimeOut) {
+TEST_P(TcMarksTest, ALostMarkLeavesNothingForTheTimeOut) {
   TcBench tc(GetParam(), context, {{"idle_timeout_cycles", "50"}});
   tc.in.add(beat_of(tile(0), {1}, 0));
   tc.mark(change);

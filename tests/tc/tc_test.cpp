@@ -158,9 +158,9 @@ TEST_F(TileCoalescingTest, NoQuadIsLostDoubledOrReorderedWithinItsTile) {
 }
 
 TEST_F(TileCoalescingTest, StrictTerminationHasNoTimeOut) {
-  const TcBehaviour::Cost cost = TileCoalescing(parameters, context).cost();
-  EXPECT_EQ(cost.timeout_in(Termination::paper), 150U);
-  EXPECT_EQ(cost.timeout_in(Termination::strict), 0U);
+  const TcBehaviour::TimingParameters timing = TileCoalescing(parameters, context).timing();
+  EXPECT_EQ(timing.timeout_in(Termination::paper), 150U);
+  EXPECT_EQ(timing.timeout_in(Termination::strict), 0U);
 }
 
 }  // namespace

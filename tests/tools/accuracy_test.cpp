@@ -77,20 +77,20 @@ tools::AccuracyResult large_result() {
   result.base.variant = variant_named("het+qm");
   for (const Variant& variant : variants()) {
     for (const Fidelity fidelity : fidelities()) {
-      tools::FidelityRung rung;
-      rung.run.request.variant = variant;
-      rung.run.request.fidelity = fidelity;
-      rung.run.cycles = 1234567890;
-      rung.run.kernel_events = 123456789;
-      rung.cpu_seconds = 999.99;
-      rung.times_as_fast = 12.34;
-      rung.quads_per_second = 123.4e6;
-      rung.cycles_error_percent = rung.speedup_error_percent = -12.345;
-      rung.fragments_blended_error_percent = 0.00012;
-      rung.speedup = 12.345;
-      rung.image.psnr_db = 101.23;
-      rung.dominated = true;
-      result.fidelity.push_back(rung);
+      tools::FidelityLevel level;
+      level.run.request.variant = variant;
+      level.run.request.fidelity = fidelity;
+      level.run.cycles = 1234567890;
+      level.run.kernel_events = 123456789;
+      level.cpu_seconds = 999.99;
+      level.times_as_fast = 12.34;
+      level.quads_per_second = 123.4e6;
+      level.cycles_error_percent = level.speedup_error_percent = -12.345;
+      level.fragments_blended_error_percent = 0.00012;
+      level.speedup = 12.345;
+      level.image.psnr_db = 101.23;
+      level.dominated = true;
+      result.fidelity.push_back(level);
     }
   }
   tools::PrecisionRun run;
@@ -146,12 +146,12 @@ TEST(AccuracyText, SaysWhatBoundsTheDrawWherePricesCollapse) {
 
 TEST(AccuracyText, SaysWhatAccuracyCosts) {
   tools::AccuracyResult result = large_result();
-  for (tools::FidelityRung& rung : result.fidelity) {
-    const bool is_baseline = rung.run.request.variant.name == "baseline";
-    if (rung.run.request.fidelity == Fidelity::functional) rung.run.cycles.reset();
-    if (rung.run.request.fidelity != Fidelity::lt) continue;
-    rung.times_as_fast = is_baseline ? 1.7 : 2.31;
-    rung.cycles_error_percent = is_baseline ? -0.1 : 0.04;
+  for (tools::FidelityLevel& level : result.fidelity) {
+    const bool is_baseline = level.run.request.variant.name == "baseline";
+    if (level.run.request.fidelity == Fidelity::functional) level.run.cycles.reset();
+    if (level.run.request.fidelity != Fidelity::lt) continue;
+    level.times_as_fast = is_baseline ? 1.7 : 2.31;
+    level.cycles_error_percent = is_baseline ? -0.1 : 0.04;
   }
   EXPECT_EQ(tools::fidelity_verdict(result),
             "at: 12.3 times as fast as cycle, cycles within 12.4 %; lt: 1.7 to 2.3 times, cycles within 0.1 %; "
@@ -329,38 +329,38 @@ TEST_F(Accuracy, FidelityHasEveryVariantAtEveryRung) {
   ASSERT_EQ(ladder.size(), variants().size() * fidelities().size());
   std::map<std::string, double> baseline;
   std::map<std::string, double> exact;
-  for (const json& rung : ladder) {
-    if (rung["variant"] == "baseline" && rung["cycles"].is_number()) baseline[rung["fidelity"]] = rung["cycles"];
-    if (rung["fidelity"] == "cycle") exact[rung["variant"]] = rung["cycles"];
+  for (const json& level : ladder) {
+    if (level["variant"] == "baseline" && level["cycles"].is_number()) baseline[level["fidelity"]] = level["cycles"];
+    if (level["fidelity"] == "cycle") exact[level["variant"]] = level["cycles"];
   }
   std::size_t i = 0;
   for (const Variant& variant : variants()) {
     std::vector<tools::TradeOff> timed;
     std::vector<bool> said;
     for (const Fidelity fidelity : fidelities()) {
-      const json& rung = ladder[i++];
-      SCOPED_TRACE(rung.dump());
-      EXPECT_EQ(rung["variant"], variant.name);
-      EXPECT_EQ(rung["fidelity"], name_of(fidelity));
-      EXPECT_GT(rung["host_seconds"].get<double>(), 0);
-      EXPECT_GT(rung["quads_per_second"].get<double>(), 0);
-      EXPECT_TRUE(rung["kernel_events"].is_number_unsigned());
-      EXPECT_TRUE(rung["dominated"].is_boolean());
+      const json& level = ladder[i++];
+      SCOPED_TRACE(level.dump());
+      EXPECT_EQ(level["variant"], variant.name);
+      EXPECT_EQ(level["fidelity"], name_of(fidelity));
+      EXPECT_GT(level["host_seconds"].get<double>(), 0);
+      EXPECT_GT(level["quads_per_second"].get<double>(), 0);
+      EXPECT_TRUE(level["kernel_events"].is_number_unsigned());
+      EXPECT_TRUE(level["dominated"].is_boolean());
       if (fidelity == Fidelity::functional) {
         for (const char* key : {"cycles", "cycles_error_percent", "speedup", "speedup_error_percent"}) {
-          EXPECT_TRUE(rung[key].is_null()) << key;
+          EXPECT_TRUE(level[key].is_null()) << key;
         }
-        EXPECT_FALSE(rung["dominated"].get<bool>());
+        EXPECT_FALSE(level["dominated"].get<bool>());
         continue;
       }
-      const double cycles = rung["cycles"];
-      const double error = rung["cycles_error_percent"];
+      const double cycles = level["cycles"];
+      const double error = level["cycles_error_percent"];
       EXPECT_NEAR(error, 100 * (cycles / exact[variant.name] - 1), 1e-9);
-      EXPECT_NEAR(rung["speedup"].get<double>(), baseline[name_of(fidelity)] / cycles, 1e-9);
-      EXPECT_NEAR(rung["speedup_error_percent"].get<double>(),
-                  100 * (rung["speedup"].get<double>() / (baseline["cycle"] / exact[variant.name]) - 1), 1e-9);
-      timed.push_back({rung["cpu_seconds"], std::fabs(error)});
-      said.push_back(rung["dominated"]);
+      EXPECT_NEAR(level["speedup"].get<double>(), baseline[name_of(fidelity)] / cycles, 1e-9);
+      EXPECT_NEAR(level["speedup_error_percent"].get<double>(),
+                  100 * (level["speedup"].get<double>() / (baseline["cycle"] / exact[variant.name]) - 1), 1e-9);
+      timed.push_back({level["cpu_seconds"], std::fabs(error)});
+      said.push_back(level["dominated"]);
     }
     std::vector<bool> expected = tools::dominated(timed, tools::fidelity_tolerance);
     expected.back() = false;  // what the others are measured against
@@ -379,10 +379,10 @@ TEST_F(Accuracy, FidelityHasEveryVariantAtEveryRung) {
 TEST_F(Accuracy, InStrictTerminationEveryRungHasTheSameImage) {
   const json result = accuracy({"--termination", "strict", "--quick"});
   ASSERT_FALSE(result["fidelity"].empty());
-  for (const json& rung : result["fidelity"]) {
-    EXPECT_TRUE(rung["image_equal"].get<bool>()) << rung;
-    EXPECT_EQ(rung["image_max_abs_difference"], 0);
-    EXPECT_EQ(rung["fragments_blended_error_percent"], 0);
+  for (const json& level : result["fidelity"]) {
+    EXPECT_TRUE(level["image_equal"].get<bool>()) << level;
+    EXPECT_EQ(level["image_max_abs_difference"], 0);
+    EXPECT_EQ(level["fragments_blended_error_percent"], 0);
   }
 }
 

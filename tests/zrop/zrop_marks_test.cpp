@@ -127,7 +127,7 @@ TEST(DepthStencilRopOfAFrame, AGpcClearsItsOwnTilesAlone) {
   RenderContext context = three_draws(128);
   context.placement = {2, 1};
   Rop zrop(context);
-  const TileGrid& grid = zrop.stencil.grid();
+  const ScreenTiling& grid = zrop.stencil.grid();
   for (std::size_t place = 0; place < grid.quads(); ++place) zrop.stencil.terminated(place) = all_lanes;
   zrop.pass(Frame::mark_of(termination_clear));
   for (std::size_t tile = 0; tile < grid.tiles(); ++tile) {

@@ -149,20 +149,20 @@ std::vector<std::string> images_of(const AccuracyJob& job) {
   return images;
 }
 
-/// Compares the rungs of a variant, the first of which is the most exact.
-void compare_rungs(FidelityRung* rungs, std::size_t count) {
-  const FidelityRung& exact = rungs[0];
-  std::vector<FidelityRung*> timed;
+/// Compares the levels of a variant, the first of which is the most exact.
+void compare_rungs(FidelityLevel* levels, std::size_t count) {
+  const FidelityLevel& exact = levels[0];
+  std::vector<FidelityLevel*> timed;
   std::vector<TradeOff> trade_offs;
-  for (FidelityRung* rung = rungs; rung != rungs + count; ++rung) {
-    rung->fragments_blended_error_percent = percent_above(static_cast<double>(rung->run.counts.fragments_blended),
-                                                          static_cast<double>(exact.run.counts.fragments_blended));
-    rung->cycles_error_percent = error_percent(cycles_of(rung->run), cycles_of(exact.run));
-    rung->speedup_error_percent = error_percent(rung->speedup, exact.speedup);
-    if (rung->cpu_seconds > 0) rung->times_as_fast = exact.cpu_seconds / rung->cpu_seconds;
-    if (!rung->run.cycles) continue;
-    timed.push_back(rung);
-    trade_offs.push_back({rung->cpu_seconds, std::fabs(rung->cycles_error_percent.value_or(0))});
+  for (FidelityLevel* level = levels; level != levels + count; ++level) {
+    level->fragments_blended_error_percent = percent_above(static_cast<double>(level->run.counts.fragments_blended),
+                                                           static_cast<double>(exact.run.counts.fragments_blended));
+    level->cycles_error_percent = error_percent(cycles_of(level->run), cycles_of(exact.run));
+    level->speedup_error_percent = error_percent(level->speedup, exact.speedup);
+    if (level->cpu_seconds > 0) level->times_as_fast = exact.cpu_seconds / level->cpu_seconds;
+    if (!level->run.cycles) continue;
+    timed.push_back(level);
+    trade_offs.push_back({level->cpu_seconds, std::fabs(level->cycles_error_percent.value_or(0))});
   }
   const std::vector<bool> beaten = dominated(trade_offs, fidelity_tolerance);
   // Without the most exact, nobody knows how exact the others are.
@@ -203,26 +203,26 @@ void climb_fidelities(const AccuracyJob& job, const Workload& workload, const st
     host_seconds[rung_index].push_back(simulated.result.host_seconds);
     cpu_seconds[rung_index].push_back(simulated.result.cpu_seconds);
     if (index >= requests.size()) return;
-    FidelityRung& rung = result.fidelity[rung_index];
-    rung.run = std::move(simulated.result);
+    FidelityLevel& level = result.fidelity[rung_index];
+    level.run = std::move(simulated.result);
     ShownImage image = shown(*simulated.image, job.simulation.background);
-    if (rung.run.request.fidelity == fidelities().back()) most_exact = image;
-    rung.image = image_error(image, most_exact);
+    if (level.run.request.fidelity == fidelities().back()) most_exact = image;
+    level.image = image_error(image, most_exact);
   });
 
-  const std::size_t rungs = fidelities().size();
+  const std::size_t levels = fidelities().size();
   for (std::size_t i = 0; i < requests.size(); ++i) {
-    FidelityRung& rung = result.fidelity[i];
-    rung.host_seconds = median(host_seconds[i]);
-    rung.cpu_seconds = median(cpu_seconds[i]);
-    const auto quads = static_cast<double>(rung.run.counts.quads_rasterized);
-    rung.quads_per_second = rung.cpu_seconds > 0 ? quads / rung.cpu_seconds : 0;
-    rung.speedup = speedup(result.fidelity[i % rungs].run, rung.run);
+    FidelityLevel& level = result.fidelity[i];
+    level.host_seconds = median(host_seconds[i]);
+    level.cpu_seconds = median(cpu_seconds[i]);
+    const auto quads = static_cast<double>(level.run.counts.quads_rasterized);
+    level.quads_per_second = level.cpu_seconds > 0 ? quads / level.cpu_seconds : 0;
+    level.speedup = speedup(result.fidelity[i % levels].run, level.run);
   }
-  for (std::size_t first = 0; first < requests.size(); first += rungs) {
-    compare_rungs(&result.fidelity[first], rungs);
+  for (std::size_t first = 0; first < requests.size(); first += levels) {
+    compare_rungs(&result.fidelity[first], levels);
     std::reverse(result.fidelity.begin() + static_cast<std::ptrdiff_t>(first),
-                 result.fidelity.begin() + static_cast<std::ptrdiff_t>(first + rungs));
+                 result.fidelity.begin() + static_cast<std::ptrdiff_t>(first + levels));
   }
 }
 
@@ -259,8 +259,8 @@ void climb_stress(const AccuracyJob& job, const std::vector<Task>& tasks, const 
     const double* const of_row = &cycles[i * stress_rungs.size()];
     const double exact = of_row[stress_rungs.size() - 1];
     result.stress[i].cycles = static_cast<std::uint64_t>(exact);
-    for (std::size_t rung = 0; rung + 1 < stress_rungs.size(); ++rung) {
-      result.stress[i].error_percent.emplace_back(stress_rungs[rung], percent_above(of_row[rung], exact));
+    for (std::size_t level = 0; level + 1 < stress_rungs.size(); ++level) {
+      result.stress[i].error_percent.emplace_back(stress_rungs[level], percent_above(of_row[level], exact));
     }
   }
 }
@@ -351,12 +351,12 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   progress.show("rendering the exact image");
   const ShownImage reference = make_reference(job, workload, result);
 
-  const std::vector<RunRequest> rungs = fidelity_requests(job);
+  const std::vector<RunRequest> levels = fidelity_requests(job);
   const std::vector<PrecisionSettings> values = choose_values(job, workload.scene.draw_list.has_value(), result);
   const std::vector<Task> stress = stress_tasks(job, workload, result);
-  const std::size_t climbs = job.repeat * rungs.size();
+  const std::size_t climbs = job.repeat * levels.size();
   const Stopwatch ladders;
-  climb_fidelities(job, workload, rungs, {"fidelity ", 0, stress.size() + values.size(), 0}, result, progress);
+  climb_fidelities(job, workload, levels, {"fidelity ", 0, stress.size() + values.size(), 0}, result, progress);
   climb_stress(job, stress, {"stress ", climbs, values.size(), ladders.seconds()}, result, progress);
   climb_precisions(job, workload, values, reference, {"precision ", climbs + stress.size(), 0, ladders.seconds()},
                    result, progress);

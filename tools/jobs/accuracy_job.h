@@ -21,7 +21,7 @@ namespace vrpipe::tools {
 struct AccuracyJob {
   SimulationJob simulation;
   bool quick = false;                         ///< the middle of the image, fewer variants and values
-  unsigned repeat = 1;                        ///< times that each rung of the fidelity ladder is measured
+  unsigned repeat = 1;                        ///< times that each level of the fidelity ladder is measured
   std::optional<std::filesystem::path> html;  ///< file
   bool markdown = false;                      ///< the tables for documentation in place of the report
 };
@@ -31,7 +31,7 @@ constexpr Tolerance fidelity_tolerance{0.05, 0.01};
 constexpr Tolerance precision_tolerance{0.001, 0.1};
 
 /// One variant at one fidelity, beside the most exact fidelity.
-struct FidelityRung {
+struct FidelityLevel {
   RunResult run;
   double host_seconds = 0;                     ///< the median
   double cpu_seconds = 0;                      ///< the median
@@ -42,7 +42,7 @@ struct FidelityRung {
   double quads_per_second = 0;  ///< rasterised, per CPU second
   double fragments_blended_error_percent = 0;
   ImageError image;        ///< against the most exact fidelity's
-  bool dominated = false;  ///< by another rung of the variant, in CPU seconds and error; the most exact never is
+  bool dominated = false;  ///< by another level of the variant, in CPU seconds and error; the most exact never is
 };
 
 /// A run of the precision ladder.
@@ -82,7 +82,7 @@ struct AccuracyResult {
   unsigned processes = 1;                   ///< of the precision ladder
   std::vector<Setting> preprocessing;       ///< what --set changed of it
   RunRequest base;                          ///< what the precision ladder varies
-  std::vector<FidelityRung> fidelity;       ///< by variant, then from the least exact to the most
+  std::vector<FidelityLevel> fidelity;      ///< by variant, then from the least exact to the most
   std::vector<PrecisionRun> runs;           ///< the default first
   std::vector<PrecisionRow> precision;      ///< by knob
   std::vector<std::string> knobs_left_out;  ///< those that mean nothing for a draw list

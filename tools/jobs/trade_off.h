@@ -8,7 +8,7 @@ namespace vrpipe::tools {
 
 /// What something costs, and how wrong it is; the less of each, the better.
 struct TradeOff {
-  double cost;
+  double timing;
   double error;
 };
 
@@ -17,7 +17,7 @@ struct Tolerance {
   double cost_share = 0;  ///< of the cost
   double error = 0;
 
-  bool cheaper(const TradeOff& a, const TradeOff& b) const { return a.cost * (1 + cost_share) < b.cost; }
+  bool cheaper(const TradeOff& a, const TradeOff& b) const { return a.timing * (1 + cost_share) < b.timing; }
   bool closer(const TradeOff& a, const TradeOff& b) const { return a.error + error < b.error; }
   /// Better in one, and no worse in the other.
   bool dominates(const TradeOff& a, const TradeOff& b) const {

@@ -13,25 +13,25 @@ Json optional_json(const std::optional<double>& value) { return value ? Json(*va
 Json cycles_json(const RunResult& run) { return run.cycles ? Json(*run.cycles) : Json(); }
 Json decibels_json(double psnr) { return std::isinf(psnr) ? Json() : Json(psnr); }
 
-Json fidelity_json(const FidelityRung& rung) {
-  return {{"fidelity", vrpipe::name_of(rung.run.request.fidelity)},
-          {"variant", rung.run.request.variant.name},
-          {"cycles", cycles_json(rung.run)},
-          {"cycles_error_percent", optional_json(rung.cycles_error_percent)},
-          {"speedup", optional_json(rung.speedup)},
-          {"speedup_error_percent", optional_json(rung.speedup_error_percent)},
-          {"host_seconds", rung.host_seconds},
-          {"cpu_seconds", rung.cpu_seconds},
-          {"times_as_fast", rung.times_as_fast},
-          {"quads_per_second", rung.quads_per_second},
-          {"kernel_events", rung.run.kernel_events},
-          {"dominated", rung.dominated},
-          {"fragments_blended", rung.run.counts.fragments_blended},
-          {"fragments_blended_error_percent", rung.fragments_blended_error_percent},
-          {"image_equal", std::isinf(rung.image.psnr_db)},
-          {"image_psnr_db", decibels_json(rung.image.psnr_db)},
-          {"image_max_abs_difference", rung.image.max_abs_error},
-          {"result_hash", rung.run.result_hash}};
+Json fidelity_json(const FidelityLevel& level) {
+  return {{"fidelity", vrpipe::name_of(level.run.request.fidelity)},
+          {"variant", level.run.request.variant.name},
+          {"cycles", cycles_json(level.run)},
+          {"cycles_error_percent", optional_json(level.cycles_error_percent)},
+          {"speedup", optional_json(level.speedup)},
+          {"speedup_error_percent", optional_json(level.speedup_error_percent)},
+          {"host_seconds", level.host_seconds},
+          {"cpu_seconds", level.cpu_seconds},
+          {"times_as_fast", level.times_as_fast},
+          {"quads_per_second", level.quads_per_second},
+          {"kernel_events", level.run.kernel_events},
+          {"dominated", level.dominated},
+          {"fragments_blended", level.run.counts.fragments_blended},
+          {"fragments_blended_error_percent", level.fragments_blended_error_percent},
+          {"image_equal", std::isinf(level.image.psnr_db)},
+          {"image_psnr_db", decibels_json(level.image.psnr_db)},
+          {"image_max_abs_difference", level.image.max_abs_error},
+          {"result_hash", level.run.result_hash}};
 }
 
 Json precision_json(const PrecisionRow& row, const PrecisionRun& run) {
@@ -62,12 +62,12 @@ Json precision_json(const PrecisionRow& row, const PrecisionRun& run) {
 
 Json accuracy_json(const AccuracyResult& result) {
   Json fidelity = Json::array();
-  for (const FidelityRung& rung : result.fidelity) fidelity.push_back(fidelity_json(rung));
+  for (const FidelityLevel& level : result.fidelity) fidelity.push_back(fidelity_json(level));
   Json stress = Json::array();
   for (const StressRow& row : result.stress) {
     stress.push_back({{"configuration", row.configuration}, {"variant", row.variant}, {"cycles", row.cycles}});
-    for (const auto& [rung, error] : row.error_percent) {
-      stress.back()[std::string(vrpipe::name_of(rung)) + "_error_percent"] = error;
+    for (const auto& [level, error] : row.error_percent) {
+      stress.back()[std::string(vrpipe::name_of(level)) + "_error_percent"] = error;
     }
   }
   Json precision = Json::array();

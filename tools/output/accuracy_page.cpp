@@ -115,9 +115,9 @@ std::string fidelity_plot(const AccuracyResult& result) {
   std::vector<std::string> variants_seen;
   std::vector<Fidelity> fidelities_seen;
   bool any_dominated = false;
-  for (const FidelityRung& rung : result.fidelity) {
-    const RunRequest& request = rung.run.request;
-    if (!rung.cycles_error_percent) continue;
+  for (const FidelityLevel& level : result.fidelity) {
+    const RunRequest& request = level.run.request;
+    if (!level.cycles_error_percent) continue;
     const auto index_of = [](auto& seen, const auto& what) {
       const auto place = std::find(seen.begin(), seen.end(), what);
       if (place != seen.end()) return static_cast<std::size_t>(place - seen.begin());
@@ -127,15 +127,15 @@ std::string fidelity_plot(const AccuracyResult& result) {
     const std::size_t variant = index_of(variants_seen, request.variant.name);
     index_of(fidelities_seen, request.fidelity);
     const std::string name = fmt::format("{} {}", request.variant.name, vrpipe::name_of(request.fidelity));
-    const double error = std::fabs(*rung.cycles_error_percent);
+    const double error = std::fabs(*level.cycles_error_percent);
     const char* const color = colors[variant % colors.size()];
-    plot.points.push_back({rung.cpu_seconds, error, color, markers[static_cast<unsigned>(request.fidelity)],
-                           rung.dominated, name,
-                           fmt::format("{}: {:.2g} % in {:.2f} s{}", name, error, rung.cpu_seconds,
-                                       rung.dominated ? ", dominated" : "")});
-    any_dominated |= rung.dominated;
+    plot.points.push_back({level.cpu_seconds, error, color, markers[static_cast<unsigned>(request.fidelity)],
+                           level.dominated, name,
+                           fmt::format("{}: {:.2g} % in {:.2f} s{}", name, error, level.cpu_seconds,
+                                       level.dominated ? ", dominated" : "")});
+    any_dominated |= level.dominated;
     if (variant >= plot.lines.size()) plot.lines.push_back({{}, color, true});
-    if (!rung.dominated) plot.lines[variant].points.emplace_back(rung.cpu_seconds, error);
+    if (!level.dominated) plot.lines[variant].points.emplace_back(level.cpu_seconds, error);
   }
   for (PlotLine& line : plot.lines) std::sort(line.points.begin(), line.points.end());
   for (std::size_t i = 0; i < variants_seen.size(); ++i) {
@@ -229,9 +229,9 @@ std::string figures(const AccuracyResult& result) {
 
 std::string functional_note(const AccuracyResult& result) {
   std::string text;
-  for (const FidelityRung& rung : result.fidelity) {
-    if (rung.run.cycles) continue;
-    text += fmt::format("{}{} {:.2f} s", text.empty() ? "" : ", ", rung.run.request.variant.name, rung.cpu_seconds);
+  for (const FidelityLevel& level : result.fidelity) {
+    if (level.run.cycles) continue;
+    text += fmt::format("{}{} {:.2f} s", text.empty() ? "" : ", ", level.run.request.variant.name, level.cpu_seconds);
   }
   if (text.empty()) return {};
   return "<p class=\"subtle\">Without time, and so not in the plot: functional (" + html_escaped(text) + ").</p>\n";

@@ -134,16 +134,16 @@ struct FidelityRange {
 
 FidelityRange range_of(const AccuracyResult& result, Fidelity fidelity) {
   FidelityRange range;
-  for (const FidelityRung& rung : result.fidelity) {
-    if (rung.run.request.fidelity != fidelity) continue;
-    range.timed = rung.run.cycles.has_value();
-    range.always_dominated &= rung.dominated;
-    range.slowest = std::min(range.slowest, rung.times_as_fast);
-    range.fastest = std::max(range.fastest, rung.times_as_fast);
-    range.cycles_percent = std::max(range.cycles_percent, std::fabs(rung.cycles_error_percent.value_or(0)));
-    range.speedup_percent = std::max(range.speedup_percent, std::fabs(rung.speedup_error_percent.value_or(0)));
-    range.quads_per_second = std::min(range.quads_per_second, rung.quads_per_second);
-    range.worst_image_db = std::min(range.worst_image_db, rung.image.psnr_db);
+  for (const FidelityLevel& level : result.fidelity) {
+    if (level.run.request.fidelity != fidelity) continue;
+    range.timed = level.run.cycles.has_value();
+    range.always_dominated &= level.dominated;
+    range.slowest = std::min(range.slowest, level.times_as_fast);
+    range.fastest = std::max(range.fastest, level.times_as_fast);
+    range.cycles_percent = std::max(range.cycles_percent, std::fabs(level.cycles_error_percent.value_or(0)));
+    range.speedup_percent = std::max(range.speedup_percent, std::fabs(level.speedup_error_percent.value_or(0)));
+    range.quads_per_second = std::min(range.quads_per_second, level.quads_per_second);
+    range.worst_image_db = std::min(range.worst_image_db, level.image.psnr_db);
   }
   return range;
 }
@@ -180,15 +180,16 @@ AccuracyTable fidelity_table(const AccuracyResult& result) {
                    "events",
                    "blended +- %",
                    "image PSNR, dB"};
-  for (const FidelityRung& rung : result.fidelity) {
-    const RunResult& run = rung.run;
+  for (const FidelityLevel& level : result.fidelity) {
+    const RunResult& run = level.run;
     table.rows.push_back(
         {run.request.variant.name,
-         {vrpipe::name_of(run.request.fidelity), cycles_text(run), signed_percent(rung.cycles_error_percent),
-          rung.speedup ? fmt::format("{:.3f}", *rung.speedup) : "-", signed_percent(rung.speedup_error_percent),
-          fmt::format("{:.2f}", rung.cpu_seconds), fmt::format("{:.2f}x", rung.times_as_fast),
-          rung.dominated ? "yes" : "", fmt::format("{:.2f}", rung.quads_per_second * 1e-6), grouped(run.kernel_events),
-          signed_percent(rung.fragments_blended_error_percent), decibels(rung.image.psnr_db)},
+         {vrpipe::name_of(run.request.fidelity), cycles_text(run), signed_percent(level.cycles_error_percent),
+          level.speedup ? fmt::format("{:.3f}", *level.speedup) : "-", signed_percent(level.speedup_error_percent),
+          fmt::format("{:.2f}", level.cpu_seconds), fmt::format("{:.2f}x", level.times_as_fast),
+          level.dominated ? "yes" : "", fmt::format("{:.2f}", level.quads_per_second * 1e-6),
+          grouped(run.kernel_events), signed_percent(level.fragments_blended_error_percent),
+          decibels(level.image.psnr_db)},
          false});
   }
   return table;

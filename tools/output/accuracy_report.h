@@ -38,7 +38,7 @@ std::string precision_definition();  ///< of "front"
 /// A bound on an error, percent, rounded up: 0 only for 0.
 std::string within(double percent);
 
-/// What the rungs of the fidelity ladder are good for, one line each.
+/// What the levels of the fidelity ladder are good for, one line each.
 std::vector<std::string> fidelity_summary(const AccuracyResult& result);
 /// What knobs cost nothing, and what else the precision ladder says; one line each.
 std::vector<std::string> precision_summary(const AccuracyResult& result);

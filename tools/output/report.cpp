@@ -253,7 +253,7 @@ std::uint64_t largest_statistic(const std::vector<RunResult>& runs, const std::s
 }
 
 /// One line on numbers that went wrong, where any did.
-std::string trouble_text(const std::vector<RunResult>& runs) {
+std::string anomaly_text(const std::vector<RunResult>& runs) {
   std::vector<std::string> parts;
   const auto add = [&](const char* statistic, const char* meaning) {
     const std::uint64_t value = largest_statistic(runs, statistic);
@@ -310,7 +310,7 @@ std::string remarks(const JobResult& result) {
     text += fmt::format("rejected {} Gaussians: {} with a NaN or infinite value, {} without an orientation\n",
                         grouped(rejected.total()), grouped(rejected.not_finite), grouped(rejected.zero_quaternion));
   }
-  text += trouble_text(runs);
+  text += anomaly_text(runs);
   text += fmt::format("took {:.1f} s to load the scene, {:.1f} s to simulate", result.load_seconds,
                       result.simulate_seconds);
   if (runs.size() > 1) {

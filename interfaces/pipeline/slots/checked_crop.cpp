@@ -36,7 +36,7 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
     ask("look_up", [&] { checked_->look_up(warp, from, to, out); });
     if (out.count > to - from)
       fault("look_up", "{} lines for {} quads in {}", out.count, to - from, words_of(warp.tile));
-    const Cost shape = cost();
+    const TimingParameters shape = timing();
     for (unsigned i = 0; i < out.count; ++i) {
       if (out.lines[i].line >= shape.cache_bytes / shape.line_bytes) {
         fault("look_up", "line {} of a cache of {}", out.lines[i].line, shape.cache_bytes / shape.line_bytes);
@@ -56,17 +56,17 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override {
     ask("make_dirty", [&] { checked_->make_dirty(line, sectors); });
   }
-  Cost cost() const override {
-    const Cost cost = ask("cost", [&] { return checked_->cost(); });
-    check_rate("blend_rate", cost.blend_rate, TerminationBeat::capacity);
-    check_rate("input_quads", cost.input_quads);
-    check_latency("latency_cycles", cost.latency_cycles);
-    check_rate("mshrs", cost.mshrs);
-    check_rate("sectors_per_cycle", cost.sectors_per_cycle);
-    cost.check_cache(format_);
-    return cost;
+  TimingParameters timing() const override {
+    const TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
+    check_rate("blend_rate", timing.blend_rate, TerminationBeat::capacity);
+    check_rate("input_quads", timing.input_quads);
+    check_latency("latency_cycles", timing.latency_cycles);
+    check_rate("mshrs", timing.mshrs);
+    check_rate("sectors_per_cycle", timing.sectors_per_cycle);
+    timing.check_cache(format_);
+    return timing;
   }
-  void check_costs() const override { cost(); }
+  void check_timing() const override { timing(); }
   void check_counters() const override {
     check_by_draw("quads_blended + quads_dropped_late + quads_late_failed",
                   {&checked_->quads_blended, &checked_->quads_dropped_late, &checked_->quads_late_failed}, quads_,
@@ -86,7 +86,7 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
     check_counter("cache.sector_misses", cache.sector_misses.value(), sector_misses_, "sectors were filled");
     check_counter("cache.sectors_written_back", cache.sectors_written_back.value(), written_back_,
                   "sectors were written back");
-    const std::uint64_t sector_bytes = cost().sector_bytes;
+    const std::uint64_t sector_bytes = timing().sector_bytes;
     check_counter("cache.bytes_filled", cache.bytes_filled.value(), sector_bytes * sector_misses_, "bytes were filled");
     check_counter("cache.bytes_written_back", cache.bytes_written_back.value(), sector_bytes * written_back_,
                   "bytes were written back");

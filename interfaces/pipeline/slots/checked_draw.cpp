@@ -52,7 +52,7 @@ class CheckedDraw final : public CheckedSlot<DrawBehaviour> {
     check_rate("warps_per_1024_cycles", rate);
     return rate;
   }
-  void check_costs() const override { warps_per_1024_cycles(); }
+  void check_timing() const override { warps_per_1024_cycles(); }
   void check_counters() const override {}
 
  private:

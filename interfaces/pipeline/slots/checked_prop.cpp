@@ -10,15 +10,16 @@ class CheckedProp final : public CheckedSlot<PropBehaviour> {
  public:
   using CheckedSlot::CheckedSlot;
 
-  Cost cost() const override {
-    const Cost cost = ask("cost", [&] { return checked_->cost(); });
-    check_rate("quads_per_cycle", cost.quads_per_cycle);
-    check_rate("color_rate", cost.color_rate, ColorBeat::capacity);
-    check_latency("latency_cycles", cost.latency_cycles);
-    if (cost.order > Order::tile) fault("cost", "order {} is neither draw nor tile", static_cast<unsigned>(cost.order));
-    return cost;
+  TimingParameters timing() const override {
+    const TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
+    check_rate("quads_per_cycle", timing.quads_per_cycle);
+    check_rate("color_rate", timing.color_rate, ColorBeat::capacity);
+    check_latency("latency_cycles", timing.latency_cycles);
+    if (timing.order > Order::tile)
+      fault("timing", "order {} is neither draw nor tile", static_cast<unsigned>(timing.order));
+    return timing;
   }
-  void check_costs() const override { cost(); }
+  void check_timing() const override { timing(); }
   void check_counters() const override {}
 };
 

@@ -29,15 +29,15 @@ class CheckedQru final : public CheckedSlot<QruBehaviour> {
     check_warp("finish_bin", out);
     return true;
   }
-  Throughput cost() const override {
-    const Throughput cost = ask("cost", [&] { return checked_->cost(); });
-    check_throughput(cost);
-    return cost;
+  Throughput timing() const override {
+    const Throughput timing = ask("timing", [&] { return checked_->timing(); });
+    check_throughput(timing);
+    return timing;
   }
   std::uint64_t storage_bytes() const override {
     return ask("storage_bytes", [&] { return checked_->storage_bytes(); });
   }
-  void check_costs() const override { cost(); }
+  void check_timing() const override { timing(); }
   void check_counters() const override {}
 
  private:

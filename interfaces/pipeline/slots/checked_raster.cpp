@@ -37,17 +37,17 @@ class CheckedRaster final : public CheckedSlot<RasterBehaviour> {
     quads_.add(primitive_.draw, out.count);
     return true;
   }
-  Cost cost() const override {
-    const Cost cost = ask("cost", [&] { return checked_->cost(); });
-    check_latency("setup_latency_cycles", cost.setup_latency_cycles);
-    check_latency("setup_interval_cycles", cost.setup_interval_cycles);
-    check_rate("coarse_tiles_per_cycle", cost.coarse_tiles_per_cycle);
-    check_rate("fine_tiles_per_cycle", cost.fine_tiles_per_cycle);
-    check_latency("screen_tile_interval_cycles", cost.screen_tile_interval_cycles);
-    check_rate("quads_per_cycle", cost.quads_per_cycle);
-    return cost;
+  TimingParameters timing() const override {
+    const TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
+    check_latency("setup_latency_cycles", timing.setup_latency_cycles);
+    check_latency("setup_interval_cycles", timing.setup_interval_cycles);
+    check_rate("coarse_tiles_per_cycle", timing.coarse_tiles_per_cycle);
+    check_rate("fine_tiles_per_cycle", timing.fine_tiles_per_cycle);
+    check_latency("screen_tile_interval_cycles", timing.screen_tile_interval_cycles);
+    check_rate("quads_per_cycle", timing.quads_per_cycle);
+    return timing;
   }
-  void check_costs() const override { cost(); }
+  void check_timing() const override { timing(); }
   void check_counters() const override {
     check_by_draw("quads_rasterized", {&checked_->quads_rasterized}, quads_, "quads came out");
     check_by_draw("fragments_rasterized", {&checked_->fragments_rasterized}, fragments_, "fragments came out");

@@ -40,28 +40,28 @@ class CheckedSm final : public CheckedSlot<SmBehaviour> {
   void shade_vertices(const VertexWarp& warp) override {
     ask("shade_vertices", [&] { checked_->shade_vertices(warp); });
   }
-  Cost cost() const override {
-    Cost cost = ask("cost", [&] { return checked_->cost(); });
-    check_rate("cores", cost.cores);
-    check_rate("schedulers_per_core", cost.schedulers_per_core);
-    check_rate("lanes_per_scheduler", cost.lanes_per_scheduler, 32);
-    if (32 % cost.lanes_per_scheduler != 0) {
-      fault("cost", "lanes_per_scheduler is {}, no divisor of 32", cost.lanes_per_scheduler);
+  TimingParameters timing() const override {
+    TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
+    check_rate("cores", timing.cores);
+    check_rate("schedulers_per_core", timing.schedulers_per_core);
+    check_rate("lanes_per_scheduler", timing.lanes_per_scheduler, 32);
+    if (32 % timing.lanes_per_scheduler != 0) {
+      fault("timing", "lanes_per_scheduler is {}, no divisor of 32", timing.lanes_per_scheduler);
     }
-    check_rate("warps_per_core", cost.warps_per_core);
-    check_rate("vertex_warps", cost.vertex_warps);
-    check_rate("warps_to_one_core", cost.warps_to_one_core, ~0U);
-    if (cost.vertex.empty() || cost.fragment.empty()) fault("cost", "a shader program without a segment");
-    for (const auto* program : {&cost.vertex, &cost.fragment, &cost.merge}) {
+    check_rate("warps_per_core", timing.warps_per_core);
+    check_rate("vertex_warps", timing.vertex_warps);
+    check_rate("warps_to_one_core", timing.warps_to_one_core, ~0U);
+    if (timing.vertex.empty() || timing.fragment.empty()) fault("timing", "a shader program without a segment");
+    for (const auto* program : {&timing.vertex, &timing.fragment, &timing.merge}) {
       for (const ShaderSegment& segment : *program) {
         if (segment.instructions > longest_latency || segment.stall_cycles > longest_latency) {
-          fault("cost", "a segment of {} instructions and {} cycles", segment.instructions, segment.stall_cycles);
+          fault("timing", "a segment of {} instructions and {} cycles", segment.instructions, segment.stall_cycles);
         }
       }
     }
-    return cost;
+    return timing;
   }
-  void check_costs() const override { cost(); }
+  void check_timing() const override { timing(); }
   void check_counters() const override {
     check_counter("fragment_warps", checked_->fragment_warps.value(), warps_, "warps came in");
     check_by_draw("quads_shaded", {&checked_->quads_shaded}, shaded_, "quads came in");

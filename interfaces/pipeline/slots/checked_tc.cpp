@@ -31,14 +31,14 @@ class CheckedTc final : public CheckedSlot<TcBehaviour> {
     check_flush("flush_oldest", out);
     return true;
   }
-  Cost cost() const override {
-    const Cost cost = ask("cost", [&] { return checked_->cost(); });
-    check_rate("quads_per_cycle", cost.quads_per_cycle, QuadBeat::capacity);
-    check_latency("latency_cycles", cost.latency_cycles);
-    check_rate("flush_queue_bins", cost.flush_queue_bins);
-    return cost;
+  TimingParameters timing() const override {
+    const TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
+    check_rate("quads_per_cycle", timing.quads_per_cycle, QuadBeat::capacity);
+    check_latency("latency_cycles", timing.latency_cycles);
+    check_rate("flush_queue_bins", timing.flush_queue_bins);
+    return timing;
   }
-  void check_costs() const override { cost(); }
+  void check_timing() const override { timing(); }
   void check_counters() const override {
     check_counter("quads", checked_->quads.value(), taken_, "quads came in");
     check_counter("flushes", checked_->flushes.value(), flushes_, "bins came out");

@@ -27,10 +27,10 @@ class CheckedTgc final : public CheckedSlot<TgcBehaviour> {
   bool drain(Flush& out) override {
     return flushed("drain", out, ask("drain", [&] { return checked_->drain(out); }));
   }
-  Throughput cost() const override {
-    const Throughput cost = ask("cost", [&] { return checked_->cost(); });
-    check_throughput(cost);
-    return cost;
+  Throughput timing() const override {
+    const Throughput timing = ask("timing", [&] { return checked_->timing(); });
+    check_throughput(timing);
+    return timing;
   }
   std::uint32_t largest_flush() const override {
     const std::uint32_t largest = ask("largest_flush", [&] { return checked_->largest_flush(); });
@@ -40,8 +40,8 @@ class CheckedTgc final : public CheckedSlot<TgcBehaviour> {
   std::uint64_t storage_bytes() const override {
     return ask("storage_bytes", [&] { return checked_->storage_bytes(); });
   }
-  void check_costs() const override {
-    cost();
+  void check_timing() const override {
+    timing();
     largest_flush();
   }
   void check_counters() const override {

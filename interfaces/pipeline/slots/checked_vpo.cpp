@@ -25,12 +25,12 @@ class CheckedVpo final : public CheckedSlot<VpoBehaviour> {
     assembled_.add(draw, count);
     return count;
   }
-  Throughput cost() const override {
-    const Throughput cost = ask("cost", [&] { return checked_->cost(); });
-    check_throughput(cost);
-    return cost;
+  Throughput timing() const override {
+    const Throughput timing = ask("timing", [&] { return checked_->timing(); });
+    check_throughput(timing);
+    return timing;
   }
-  void check_costs() const override { cost(); }
+  void check_timing() const override { timing(); }
   void check_counters() const override { check_by_draw("primitives", {&checked_->primitives}, assembled_, "came out"); }
 
  private:

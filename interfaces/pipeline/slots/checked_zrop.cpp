@@ -48,14 +48,14 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
   void follow(FunctionalRunAhead& run_ahead) override {
     ask("follow", [&] { checked_->follow(run_ahead); });
   }
-  Cost cost() const override {
-    const Cost cost = ask("cost", [&] { return checked_->cost(); });
-    check_rate("quads_per_cycle", cost.quads_per_cycle);
-    check_latency("latency_cycles", cost.latency_cycles);
-    check_rate("updates_per_cycle", cost.updates_per_cycle);
-    return cost;
+  TimingParameters timing() const override {
+    const TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
+    check_rate("quads_per_cycle", timing.quads_per_cycle);
+    check_latency("latency_cycles", timing.latency_cycles);
+    check_rate("updates_per_cycle", timing.updates_per_cycle);
+    return timing;
   }
-  void check_costs() const override { cost(); }
+  void check_timing() const override { timing(); }
   void check_counters() const override {
     check_by_draw("quads_tested", {&checked_->quads_tested}, tested_, "quads came in");
     check_by_draw("quads_terminated + quads_depth_stencil_failed",

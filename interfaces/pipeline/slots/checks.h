@@ -12,8 +12,8 @@
 #include <vrpipe/kernel/clock_domain.h>
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/pipeline/checked_behaviours.h>
+#include <vrpipe/pipeline/screen_tiling.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
-#include <vrpipe/pipeline/tile_grid.h>
 
 /// What the checks of all slots have in common.
 
@@ -71,7 +71,7 @@ class Checks {
 
   void follow(const ClockDomain& clock) { clock_ = &clock; }
   /// Asks for all costs, which are checked: what cannot be is told before anything runs, at every fidelity.
-  virtual void check_costs() const = 0;
+  virtual void check_timing() const = 0;
   virtual void check_counters() const = 0;
   /// What is counted by draw has to be counted for a draw.
   void check_draws(const StatisticSet& counted) const {
@@ -95,7 +95,7 @@ class Checks {
   }
 
   void check_rate(const char* what, std::uint32_t value, std::uint32_t largest = largest_rate) const {
-    if (value == 0 || value > largest) fault("cost", "{} is {}, and must be 1 to {}", what, value, largest);
+    if (value == 0 || value > largest) fault("timing", "{} is {}, and must be 1 to {}", what, value, largest);
   }
   void check_rate(const char* what, Rate rate, std::uint32_t most_in_a_cycle) const {
     check_rate(what, rate.items);
@@ -103,9 +103,9 @@ class Checks {
     check_rate(what, rate.most_in_a_cycle(), most_in_a_cycle);
   }
   void check_latency(const char* what, std::uint32_t value) const { check_rate(what, value, longest_latency); }
-  void check_throughput(const Throughput& cost) const {
-    check_rate("items_per_cycle", cost.items_per_cycle);
-    check_latency("latency_cycles", cost.latency_cycles);
+  void check_throughput(const Throughput& timing) const {
+    check_rate("items_per_cycle", timing.items_per_cycle);
+    check_latency("latency_cycles", timing.latency_cycles);
   }
   void check_tile(const char* call, TileId tile) const {
     if (tile.x >= tiles_x_ || grid_.index(tile) >= grid_.tiles()) {
@@ -169,7 +169,7 @@ class Checks {
 
   const std::string name_;  ///< slot=implementation
   const Frame& frame_;
-  const TileGrid grid_;
+  const ScreenTiling grid_;
   const std::uint32_t tiles_x_;
   const std::int32_t width_;
   const std::int32_t height_;
@@ -197,7 +197,7 @@ std::unique_ptr<Behaviour> make_checked(const std::string& name, const RenderCon
   if (typed == nullptr) throw SimulationFault(name, 0, "make_behaviour makes a unit of another slot");
   static_cast<void>(behaviour.release());
   auto checked = std::make_unique<Checked>(name, context, std::unique_ptr<SlotBehaviour>(typed));
-  checked->check_costs();
+  checked->check_timing();
   return checked;
 }
 

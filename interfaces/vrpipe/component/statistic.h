@@ -66,10 +66,10 @@ class DrawCounter : public Counter {
 };
 
 /// The largest or the smallest of what a unit saw. Over several units: the largest or smallest of theirs.
-class Extreme : public Statistic {
+class MinMax : public Statistic {
  public:
   enum class Of : std::uint8_t { largest, smallest };
-  Extreme(StatisticSet& owner, Of of, const char* name, const char* unit, const char* meaning);
+  MinMax(StatisticSet& owner, Of of, const char* name, const char* unit, const char* meaning);
 
   void see(std::uint64_t value) {
     if (!seen_ || (of_ == Of::largest ? value > value_ : value < value_)) value_ = value;
@@ -202,7 +202,7 @@ class StatisticSet {
   /// Of a part; empty otherwise.
   const char* part_name() const { return name_; }
   const std::vector<Counter*>& counters() const { return counters_; }
-  const std::vector<Extreme*>& extremes() const { return extremes_; }
+  const std::vector<MinMax*>& min_max() const { return min_max_; }
   const std::vector<Histogram*>& histograms() const { return histograms_; }
   const std::vector<Ratio*>& ratios() const { return ratios_; }
   const std::vector<StatisticSet*>& parts() const { return parts_; }
@@ -213,7 +213,7 @@ class StatisticSet {
   friend class Statistic;
   friend class Counter;
   friend class DrawCounter;
-  friend class Extreme;
+  friend class MinMax;
   friend class Histogram;
   friend class Ratio;
   bool has(const std::string& name) const;
@@ -221,7 +221,7 @@ class StatisticSet {
   const char* name_ = "";
   std::vector<Counter*> counters_;
   std::vector<DrawCounter*> draw_counters_;  ///< which are among the counters
-  std::vector<Extreme*> extremes_;
+  std::vector<MinMax*> min_max_;
   std::vector<Histogram*> histograms_;
   std::vector<Ratio*> ratios_;
   std::vector<StatisticSet*> parts_;

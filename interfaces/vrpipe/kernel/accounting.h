@@ -108,7 +108,7 @@ class WorkTally {
   double items(Cycle end = never) const;
 
  private:
-  struct Span {
+  struct CycleInterval {
     std::uint64_t items;
     Cycle from, until;
   };
@@ -117,7 +117,7 @@ class WorkTally {
   static constexpr std::size_t fewest_spans = 64;
   const FrameEnd* frame_end_;
   std::uint64_t items_ = 0;
-  Ring<Span> late_;  ///< of `items_`, those that may be after the end
+  Ring<CycleInterval> late_;  ///< of `items_`, those that may be after the end
   std::size_t most_spans_ = fewest_spans;
 };
 

@@ -62,44 +62,44 @@ struct DrawWork {
 };
 struct VpoWork {
   enum : unsigned { triangles };
-  static std::vector<WorkKind> kinds(const Throughput& cost);
+  static std::vector<WorkKind> kinds(const Throughput& timing);
 };
 struct TgcWork {
   enum : unsigned { entries, primitives };
-  static std::vector<WorkKind> kinds(const Throughput& cost);
+  static std::vector<WorkKind> kinds(const Throughput& timing);
 };
 struct RasterWork {
   enum : unsigned { setup, coarse, fine, pairs, quads };
-  static std::vector<WorkKind> kinds(const RasterBehaviour::Cost& cost);
+  static std::vector<WorkKind> kinds(const RasterBehaviour::TimingParameters& timing);
 };
 struct TcWork {
   enum : unsigned { quads, beats };
-  static std::vector<WorkKind> kinds(const TcBehaviour::Cost& cost);
+  static std::vector<WorkKind> kinds(const TcBehaviour::TimingParameters& timing);
 };
 struct PropWork {
   enum : unsigned { bins, tested, color, empty_warps };
-  static std::vector<WorkKind> kinds(const PropBehaviour::Cost& cost);
+  static std::vector<WorkKind> kinds(const PropBehaviour::TimingParameters& timing);
 };
 struct ZropWork {
   enum : unsigned { tests, updates };  ///< quads tested, cycles with updates
-  static std::vector<WorkKind> kinds(const ZropBehaviour::Cost& cost);
+  static std::vector<WorkKind> kinds(const ZropBehaviour::TimingParameters& timing);
 };
 struct QruWork {
   enum : unsigned { quads, launches };  ///< quads examined in cycles without a launch, which ends a cycle
-  static std::vector<WorkKind> kinds(const Throughput& cost);
+  static std::vector<WorkKind> kinds(const Throughput& timing);
 };
 struct SmWork {
   enum : unsigned { vertex, fragment, merge };  ///< warp instructions
-  static std::vector<WorkKind> kinds(const SmBehaviour::Cost& cost);
+  static std::vector<WorkKind> kinds(const SmBehaviour::TimingParameters& timing);
 };
 struct CropWork {
   /// Quads blended, sectors moved, and what hazards waste of the blender: shares of a cycle, of which one has
   /// `parts_of_a_cycle`.
   enum : unsigned { blend, sectors, forwarding };
-  static std::uint64_t parts_of_a_cycle(const CropBehaviour::Cost& cost) {
-    return std::uint64_t{cost.blend_rate.items} * cost.sectors_per_cycle;
+  static std::uint64_t parts_of_a_cycle(const CropBehaviour::TimingParameters& timing) {
+    return std::uint64_t{timing.blend_rate.items} * timing.sectors_per_cycle;
   }
-  static std::vector<WorkKind> kinds(const CropBehaviour::Cost& cost);
+  static std::vector<WorkKind> kinds(const CropBehaviour::TimingParameters& timing);
 };
 
 }  // namespace vrpipe

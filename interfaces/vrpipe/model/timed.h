@@ -43,10 +43,10 @@ constexpr Cycle activation_for(Cycle wanted, Cycle now) {
 }
 
 /// The cycles in which the first and the last part of an item move.
-struct Span {
-  Span() = default;
-  Span(Cycle cycle) : first(cycle), last(cycle) {}  ///< an item that moves in one cycle
-  Span(Cycle begin, Cycle end) : first(begin), last(end) {}
+struct CycleInterval {
+  CycleInterval() = default;
+  CycleInterval(Cycle cycle) : first(cycle), last(cycle) {}  ///< an item that moves in one cycle
+  CycleInterval(Cycle begin, Cycle end) : first(begin), last(end) {}
   /// When part `index` of `parts` moves, if they are spread evenly.
   Cycle of_part(unsigned index, unsigned parts) const {
     if (last == first || index == 0) return first;
@@ -58,9 +58,9 @@ struct Span {
 };
 
 /// A resource that takes so many items a cycle, in order. An item that is wider than a cycle takes several.
-class Lane {
+class IssuePort {
  public:
-  explicit Lane(unsigned per_cycle = 1) : per_cycle_(std::max(per_cycle, 1U)), left_(per_cycle_.value()) {}
+  explicit IssuePort(unsigned per_cycle = 1) : per_cycle_(std::max(per_cycle, 1U)), left_(per_cycle_.value()) {}
   /// Reserves; returns the cycle in which the item goes.
   Cycle take(Cycle earliest, unsigned width = 1) {
     hold(earliest);
@@ -89,11 +89,11 @@ class Lane {
 };
 
 /// A resource that takes so many parts a cycle; the parts of an item may go in neighbouring cycles.
-class Flow {
+class ThroughputPort {
  public:
-  explicit Flow(unsigned per_cycle) : per_cycle_(std::max(per_cycle, 1U)) {}
+  explicit ThroughputPort(unsigned per_cycle) : per_cycle_(std::max(per_cycle, 1U)) {}
   /// Reserves; returns the cycles in which the first and the last part go.
-  Span take(Cycle earliest, unsigned parts) {
+  CycleInterval take(Cycle earliest, unsigned parts) {
     hold(earliest);
     if (parts == 0) return cycle_;
     const Cycle first = next();
@@ -124,14 +124,14 @@ class Flow {
 
 /// The way of batches through a unit, so many items a cycle: a batch begins in a cycle of its own, when its first items
 /// have come, and does not end before its last.
-class Passage {
+class BatchServer {
  public:
-  explicit Passage(unsigned per_cycle) : per_cycle_(std::max(per_cycle, 1U)) {}
+  explicit BatchServer(unsigned per_cycle) : per_cycle_(std::max(per_cycle, 1U)) {}
   /// Cycles that so many items take.
   unsigned cycles(unsigned items) const { return std::max(static_cast<unsigned>(per_cycle_.quotient_up(items)), 1U); }
-  Span take(Span visible, unsigned items) {
+  CycleInterval take(CycleInterval visible, unsigned items) {
     const Cycle first = std::max(visible.first, free_at_);
-    const Span span(first, std::max(first + cycles(items) - 1, visible.last));
+    const CycleInterval span(first, std::max(first + cycles(items) - 1, visible.last));
     free_at_ = span.last + 1;
     return span;
   }
@@ -229,7 +229,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
 
   /// Sends an item whose parts are there in the cycles `at`, and which takes the link for so many. Returns the cycles in
   /// which it is taken; `at`, if it has to wait and nobody knows yet how long: then the port is not `clear`.
-  Span send(const Item& item, Span at, unsigned beats = 1) {
+  CycleInterval send(const Item& item, CycleInterval at, unsigned beats = 1) {
     for (; this->stalled_at(at.first); ++at.first) at.last = std::max(at.last, at.first + 1);
     if (rate_) at = limited(at, beats);
     if (!blocking_ && !unlimited_ && (waiting_items_ > 0 || credits_.empty())) {
@@ -257,7 +257,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
   friend class TimedIn<Item>;
   using OutEnd<Item>::clock_;
 
-  Span transfer(const Item& item, Span at, unsigned beats) {
+  CycleInterval transfer(const Item& item, CycleInterval at, unsigned beats) {
     ++this->transferred_;
     if (blocking_) {
       at = direct_ != nullptr ? direct_->offer(item, at, beats, this->pipeline_) : call(item, at, beats);
@@ -289,7 +289,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     return at;
   }
   /// Through the socket; returns, from a blocking call, when it is taken.
-  Span call(const Item& item, Span at, unsigned beats) {
+  CycleInterval call(const Item& item, CycleInterval at, unsigned beats) {
     StreamPayload<Item> payload;
     payload.item = &item;
     payload.latency = this->pipeline_;
@@ -310,7 +310,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     give(payload.credits, {payload.at, payload.last});
     return tlm::TLM_ACCEPTED;
   }
-  void give(unsigned credits, Span at) {
+  void give(unsigned credits, CycleInterval at) {
     const bool was_waiting = waiting_items_ > 0 || room_wanted_;
     for (unsigned credit = 0; credit < credits; ++credit) {
       const Cycle cycle = at.of_part(credit, credits);
@@ -338,19 +338,19 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
   }
   void unlimited() override { unlimited_ = true; }
   /// When the link passes an item, at its rate.
-  Span limited(Span at, unsigned beats) {
-    const Span passes = rate_->take(at.first, beats);
+  CycleInterval limited(CycleInterval at, unsigned beats) {
+    const CycleInterval passes = rate_->take(at.first, beats);
     return {passes.first, std::max(passes.last, at.last + (passes.first - at.first))};
   }
 
   struct Waiting {
     Item item;
-    Span at;
+    CycleInterval at;
     unsigned beats;
   };
   const bool blocking_;
   TimedIn<Item>* direct_ = nullptr;
-  std::optional<Flow> rate_;
+  std::optional<ThroughputPort> rate_;
   bool unlimited_ = false;
   bool prompt_ = false;
   bool room_wanted_ = false;
@@ -371,17 +371,17 @@ class TimedIn : public InEnd<Item>, public TimedInput {
    public:
     template <class Function>
     Handler(Function function)
-        : call_([](const void* captured, const Item& item, Span visible) -> Span {
+        : call_([](const void* captured, const Item& item, CycleInterval visible) -> CycleInterval {
             return (*static_cast<const Function*>(captured))(item, visible);
           }) {
       static_assert(sizeof(Function) <= sizeof(captured_) && std::is_trivially_copyable_v<Function>);
       new (captured_) Function(function);
     }
-    Span operator()(const Item& item, Span visible) const { return call_(captured_, item, visible); }
+    CycleInterval operator()(const Item& item, CycleInterval visible) const { return call_(captured_, item, visible); }
 
    private:
     alignas(void*) unsigned char captured_[2 * sizeof(void*)];
-    Span (*call_)(const void*, const Item&, Span);
+    CycleInterval (*call_)(const void*, const Item&, CycleInterval);
   };
 
   /// @param sends_to  the handler is called while none of these is blocked
@@ -414,11 +414,11 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     while (front_ <= until && TimedIn::may_serve()) {
       const Entry& entry = queue_.front();
       const unsigned beats = entry.beats;
-      const Span left = handler_(entry.item, entry.visible);
+      const CycleInterval left = handler_(entry.item, entry.visible);
       queue_.pop();
       front_ = queue_.empty() ? never : queue_.front().visible.first;
       queued_beats_ -= beats;
-      grant(beats, beats == 1 ? Span(left.last + 1) : Span(left.first + 1, left.last + 1));
+      grant(beats, beats == 1 ? CycleInterval(left.last + 1) : CycleInterval(left.first + 1, left.last + 1));
       served = true;
     }
     return served;
@@ -434,19 +434,19 @@ class TimedIn : public InEnd<Item>, public TimedInput {
   friend class TimedOut<Item>;
   using InEnd<Item>::clock_;
   struct Entry {
-    Span visible;
+    CycleInterval visible;
     unsigned beats = 1;
     Item item;
   };
 
-  Span visible(Span at, Cycle pipeline) const {
+  CycleInterval visible(CycleInterval at, Cycle pipeline) const {
     const Cycle latency = latency_ + pipeline;
-    Span span(at.first + latency, at.last + latency);
+    CycleInterval span(at.first + latency, at.last + latency);
     for (; this->stalled_at(span.first); ++span.first) span.last = std::max(span.last, span.first + 1);
     return span;
   }
 
-  void grant(unsigned credits, Span at) {
+  void grant(unsigned credits, CycleInterval at) {
     if (direct_ != nullptr) return direct_->give(credits, at);
     StreamPayload<Item> payload;
     payload.credits = credits;
@@ -458,12 +458,12 @@ class TimedIn : public InEnd<Item>, public TimedInput {
   }
 
   void b_transport(StreamPayload<Item>& payload, sc_core::sc_time&) override {
-    const Span taken = offer(*payload.item, {payload.at, payload.last}, payload.beats, payload.latency);
+    const CycleInterval taken = offer(*payload.item, {payload.at, payload.last}, payload.beats, payload.latency);
     payload.at = taken.first;
     payload.last = taken.last;
   }
   /// Blocking: takes an item; returns when.
-  Span offer(const Item& item, Span at, unsigned beats, Cycle pipeline) {
+  CycleInterval offer(const Item& item, CycleInterval at, unsigned beats, Cycle pipeline) {
     std::size_t place = place_;
     if (free_at_[place] > at.first) {
       at.last += free_at_[place] - at.first;
@@ -478,7 +478,7 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     std::size_t last_place = place + std::min(beats, depth_) - 1;
     if (last_place >= depth_) last_place -= depth_;
     at.last = std::max(at.last, free_at_[last_place]);
-    const Span left = handler_(item, visible(at, pipeline));
+    const CycleInterval left = handler_(item, visible(at, pipeline));
     for (unsigned beat = 0; beat < beats; ++beat) {
       free_at_[place] = left.of_part(beat, beats) + 1;
       place = place + 1 == depth_ ? 0 : place + 1;
@@ -493,10 +493,10 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     return tlm::TLM_ACCEPTED;
   }
   /// Non-blocking: queues an item.
-  void accept(const Item& item, Span at, unsigned beats, Cycle pipeline) {
+  void accept(const Item& item, CycleInterval at, unsigned beats, Cycle pipeline) {
     if (queued_beats_ >= depth_) this->fault(this->socket, "an item arrived at a full queue");
     queued_beats_ += beats;
-    const Span seen = visible(at, pipeline);
+    const CycleInterval seen = visible(at, pipeline);
     Entry& entry = queue_.push();
     entry.visible = seen;
     entry.beats = beats;

@@ -28,7 +28,7 @@ struct BinItem {
 
 /// Quads of a warp that are looked up before the first of them is blended. Where places in CROP's queue, lines of the
 /// cache or miss registers are few, one that is taken a few cycles longer than it need be tells; then quads go one by one.
-inline unsigned quads_looked_up_at_once(const CropBehaviour::Cost& crop) {
+inline unsigned quads_looked_up_at_once(const CropBehaviour::TimingParameters& crop) {
   constexpr std::uint32_t enough = 16 * quads_per_warp;
   const bool roomy =
       crop.cache_bytes / crop.line_bytes >= enough && crop.input_quads >= 3 * enough && crop.mshrs >= enough;

@@ -35,7 +35,7 @@ class DepthStencilSurface {
   /// Cleared. width and height in pixels.
   DepthStencilSurface(std::uint32_t width, std::uint32_t height);
 
-  const TileGrid& grid() const { return grid_; }
+  const ScreenTiling& grid() const { return grid_; }
   /// The termination bits of a quad's four pixels, at a place of the grid.
   std::uint8_t& terminated(std::size_t place) { return terminated_[place]; }
   std::uint8_t terminated(std::size_t place) const { return terminated_[place]; }
@@ -44,7 +44,7 @@ class DepthStencilSurface {
   static std::uint64_t size_bytes(std::uint32_t width, std::uint32_t height);
 
  private:
-  TileGrid grid_;
+  ScreenTiling grid_;
   std::vector<std::uint8_t> terminated_;
 };
 

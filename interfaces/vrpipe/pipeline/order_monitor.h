@@ -6,7 +6,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/payload.h>
-#include <vrpipe/pipeline/tile_grid.h>
+#include <vrpipe/pipeline/screen_tiling.h>
 
 namespace vrpipe {
 
@@ -33,7 +33,7 @@ class BlendOrderMonitor {
  private:
   [[noreturn]] static void fault(const ShadedWarp& warp, unsigned index, std::uint32_t next, std::uint64_t cycle);
 
-  TileGrid grid_;
+  ScreenTiling grid_;
   std::vector<std::uint32_t> next_;
 };
 

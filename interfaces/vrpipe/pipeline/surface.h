@@ -6,7 +6,7 @@
 
 #include <vrpipe/arithmetic/blend.h>
 #include <vrpipe/pipeline/payload.h>
-#include <vrpipe/pipeline/tile_grid.h>
+#include <vrpipe/pipeline/screen_tiling.h>
 
 namespace vrpipe {
 
@@ -42,7 +42,7 @@ class ColorSurface {
   std::uint32_t height() const { return height_; }
   ColorFormat format() const { return format_; }
 
-  const TileGrid& grid() const { return grid_; }
+  const ScreenTiling& grid() const { return grid_; }
   QuadColor& quad(std::size_t place) { return quads_[place]; }
   const QuadColor& quad(std::size_t place) const { return quads_[place]; }
   QuadColor& quad(TileId tile, unsigned position) { return quads_[grid_.place(tile, position)]; }
@@ -64,7 +64,7 @@ class ColorSurface {
   std::uint32_t width_;
   std::uint32_t height_;
   ColorFormat format_;
-  TileGrid grid_;
+  ScreenTiling grid_;
   std::uint32_t bytes_per_quad_;
   std::vector<QuadColor> quads_;
 };

@@ -52,7 +52,7 @@ class Sink {
     }
     return cycle;
   }
-  void record(const Item& item, Span at) {
+  void record(const Item& item, CycleInterval at) {
     records_.push_back({at.first, item, at.last});
     if (action_) action_(item, at.last);
   }
@@ -98,7 +98,7 @@ class TimedSink : public TimedUnit, public Sink<Item> {
  public:
   TimedSink(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport)
       : TimedUnit(name, domain, {}, transport),
-        in_(*this, "in", [this](const Item& item, Span visible) { return take(item, visible); }) {
+        in_(*this, "in", [this](const Item& item, CycleInterval visible) { return take(item, visible); }) {
     // Items that come to a closed sink stay in its queue, so that nobody knows before when there will be room.
     in_.set_gate([this] { return taken_from(in_.front()) <= now() + activation_cycles; });
   }
@@ -113,8 +113,8 @@ class TimedSink : public TimedUnit, public Sink<Item> {
     const Cycle last = this->records_.back().last;
     return this->open_from(std::max(visible, in_cycle_ == this->rate_ ? last + 1 : last));
   }
-  Span take(const Item& item, Span visible) {
-    Span at(taken_from(visible.first));
+  CycleInterval take(const Item& item, CycleInterval visible) {
+    CycleInterval at(taken_from(visible.first));
     if (at.first == never) {
       throw SimulationFault(name(), visible.first, "a blocking call comes to a sink that is closed for good");
     }

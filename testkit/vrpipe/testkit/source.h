@@ -25,7 +25,7 @@ class Source {
   /// Adds an item that goes at cycle `at.first` or later. At `lt` and `at` a batch takes the link for several `beats`, the
   /// last of which is there `at.last - at.first` cycles after the first. Also while the simulation runs: `at` is later
   /// then; at `lt` the item goes at once, by a call that is annotated with its cycle, as the answers of units do.
-  void add(const Item& item, Span at = Cycle{0}, unsigned beats = 1) {
+  void add(const Item& item, CycleInterval at = Cycle{0}, unsigned beats = 1) {
     items_.push_back({item, at, beats});
     added(at.first);
   }
@@ -41,7 +41,7 @@ class Source {
  protected:
   struct Entry {
     Item item;
-    Span at;
+    CycleInterval at;
     unsigned beats;
   };
   Source() = default;

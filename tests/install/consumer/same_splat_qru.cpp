@@ -6,7 +6,7 @@
 #include <vrpipe/pipeline/registry.h>
 
 SameSplatQru::SameSplatQru(const Parameters& parameters, const vrpipe::RenderContext&)
-    : cost_{parameters.quads_per_cycle, parameters.latency_cycles} {}
+    : timing_{parameters.quads_per_cycle, parameters.latency_cycles} {}
 
 unsigned SameSplatQru::examine(vrpipe::TileId tile, const vrpipe::Quad* quads, unsigned count, vrpipe::Warp& out,
                                bool& launched) {

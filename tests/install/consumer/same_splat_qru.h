@@ -30,7 +30,7 @@ class SameSplatQru : public vrpipe::QruBehaviour {
   unsigned examine(vrpipe::TileId tile, const vrpipe::Quad* quads, unsigned count, vrpipe::Warp& out,
                    bool& launched) override;
   bool finish_bin(vrpipe::Warp& out) override;
-  vrpipe::Throughput cost() const override { return cost_; }
+  vrpipe::Throughput timing() const override { return timing_; }
   /// 64 registers of a 4 B pointer and the quad's 4 B, and one for the single that waits.
   std::uint64_t storage_bytes() const override { return (vrpipe::positions_per_tile + 1) * sizeof(vrpipe::Quad); }
 
@@ -45,7 +45,7 @@ class SameSplatQru : public vrpipe::QruBehaviour {
   bool launch_when_full(vrpipe::Warp& out);
   void launch(vrpipe::Warp& out);
 
-  const vrpipe::Throughput cost_;
+  const vrpipe::Throughput timing_;
   std::array<vrpipe::Quad, vrpipe::positions_per_tile> registers_{};  ///< empty where the coverage is 0
   vrpipe::Quad waiting_{};                                            ///< the single; none when its coverage is 0
   vrpipe::Warp warp_;                                                 ///< being filled

@@ -16,7 +16,7 @@ using namespace vrpipe;
 class TallyBehaviour : public Behaviour {
  public:
   virtual void pass(const QuadBeat& beat) = 0;
-  virtual Throughput cost() const = 0;  ///< items: beats
+  virtual Throughput timing() const = 0;  ///< items: beats
 };
 
 /// And one of them.
@@ -26,21 +26,21 @@ class QuadTally : public TallyBehaviour {
     Integer beats_per_cycle{
         *this, "beats_per_cycle", 4, 1, 64, "beats", "as many as RASTER makes fine tiles", "passed in a cycle"};
   };
-  QuadTally(const Parameters& parameters, const RenderContext&) : cost_{parameters.beats_per_cycle, 1} {}
+  QuadTally(const Parameters& parameters, const RenderContext&) : timing_{parameters.beats_per_cycle, 1} {}
   void pass(const QuadBeat& beat) override {
     quads += beat.count;
     single_quads += beat.count == 1 ? 1U : 0U;
   }
-  Throughput cost() const override { return cost_; }
+  Throughput timing() const override { return timing_; }
 
   Counter quads{*this, "quads", "quads", "that passed"};
   Counter single_quads{*this, "single_quads", "quads", "that came alone"};
 
  private:
-  const Throughput cost_;
+  const Throughput timing_;
 };
 
-std::vector<WorkKind> kinds(const Throughput& cost) { return {{"beats", 0, 1.0 / cost.items_per_cycle, true}}; }
+std::vector<WorkKind> kinds(const Throughput& timing) { return {{"beats", 0, 1.0 / timing.items_per_cycle, true}}; }
 
 /// At `functional` and `bound`.
 class UntimedTally : public UntimedUnit {
@@ -67,12 +67,12 @@ class TimedTally : public TimedUnit {
  public:
   TimedTally(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TallyBehaviour> behaviour,
              Transport transport)
-      : TimedUnit(name, domain, kinds(behaviour->cost()), transport),
+      : TimedUnit(name, domain, kinds(behaviour->timing()), transport),
         out_(*this, "out_quads"),
-        in_(*this, "in_quads", [this](const QuadBeat& beat, Span visible) { return pass(beat, visible.first); },
-            {&out_}),
+        in_(*this, "in_quads",
+            [this](const QuadBeat& beat, CycleInterval visible) { return pass(beat, visible.first); }, {&out_}),
         behaviour_(std::move(behaviour)),
-        lane_(behaviour_->cost().items_per_cycle) {}
+        lane_(behaviour_->timing().items_per_cycle) {}
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -91,18 +91,18 @@ class TimedTally : public TimedUnit {
   TimedOut<QuadBeat> out_;
   TimedIn<QuadBeat> in_;
   std::unique_ptr<TallyBehaviour> behaviour_;
-  Lane lane_;
+  IssuePort lane_;
 };
 
 /// At `cycle`: what the unit can do in one cycle.
 class TallyUnit : public Unit {
  public:
   TallyUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TallyBehaviour> behaviour)
-      : Unit(name, domain, kinds(behaviour->cost())),
+      : Unit(name, domain, kinds(behaviour->timing())),
         in_(*this, "in_quads"),
         out_(*this, "out_quads"),
         behaviour_(std::move(behaviour)),
-        beats_per_cycle_(behaviour_->cost().items_per_cycle) {}
+        beats_per_cycle_(behaviour_->timing().items_per_cycle) {}
   bool idle() const override { return in_.empty(); }
   Behaviour& behaviour() override { return *behaviour_; }
 

@@ -63,7 +63,7 @@ class CropBehaviour : public Behaviour {
   virtual void look_up(const ShadedWarp&, unsigned /*from*/, unsigned /*to*/, CacheLookUp& out) { out.count = 0; }
   /// After a `blend` whose sectors are dirty for it.
   virtual void make_dirty(std::uint32_t /*line*/, std::uint32_t /*sectors*/) {}
-  struct Cost {
+  struct TimingParameters {
     Rate blend_rate;               ///< of quads, of this draw's format
     std::uint32_t input_quads;     ///< queue between tag look-up and blending
     std::uint32_t latency_cycles;  ///< of blending, termination test included
@@ -78,7 +78,7 @@ class CropBehaviour : public Behaviour {
     /// most 32 sectors a line.
     void check_cache(ColorFormat format) const;
   };
-  virtual Cost cost() const = 0;
+  virtual TimingParameters timing() const = 0;
 
   DrawCounter quads_blended{*this, "quads_blended", "quads", "blended"};
   DrawCounter fragments_blended{*this, "fragments_blended", "fragments", "blended"};

@@ -13,13 +13,13 @@ namespace vrpipe {
 class PropBehaviour : public Behaviour {
  public:
   enum class Order : std::uint8_t { draw, tile };
-  struct Cost {
+  struct TimingParameters {
     std::uint32_t quads_per_cycle;  ///< TC to ZROP to QRU
     Rate color_rate;                ///< of quads to CROP, of this draw's format
     std::uint32_t latency_cycles;
     Order order;
   };
-  virtual Cost cost() const = 0;
+  virtual TimingParameters timing() const = 0;
 };
 
 /// The slot's SlotCheck.

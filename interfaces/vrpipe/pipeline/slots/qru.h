@@ -16,7 +16,7 @@ class QruBehaviour : public Behaviour {
   virtual unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) = 0;
   /// At the end of a bin: the next warp of what is left; false when nothing is.
   virtual bool finish_bin(Warp& out) = 0;
-  virtual Throughput cost() const = 0;              ///< items: quads examined
+  virtual Throughput timing() const = 0;            ///< items: quads examined
   virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
 };
 

@@ -17,7 +17,7 @@ class RasterBehaviour : public Behaviour {
   /// `coarse_tests` counts the raster tiles tested on the way; `new_screen_tile` tells whether it is the first raster
   /// tile kept of its screen tile. False, with `coarse_tests` set, when the primitive is done.
   virtual bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) = 0;
-  struct Cost {
+  struct TimingParameters {
     std::uint32_t setup_latency_cycles;
     std::uint32_t setup_interval_cycles;        ///< between primitives
     std::uint32_t coarse_tiles_per_cycle;       ///< raster tiles tested
@@ -25,7 +25,7 @@ class RasterBehaviour : public Behaviour {
     std::uint32_t screen_tile_interval_cycles;  ///< between (primitive, screen tile) pairs
     std::uint32_t quads_per_cycle;              ///< handed to TC
   };
-  virtual Cost cost() const = 0;
+  virtual TimingParameters timing() const = 0;
 
   DrawCounter quads_rasterized{*this, "quads_rasterized", "quads", "with at least one covered sample"};
   DrawCounter fragments_rasterized{*this, "fragments_rasterized", "fragments", "covered samples"};

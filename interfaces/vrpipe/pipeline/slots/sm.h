@@ -21,7 +21,7 @@ class SmBehaviour : public Behaviour {
   /// Shades, prunes and merges: fills `out` but for its slot and its pool, which are the module's.
   virtual void shade(const Warp& warp, ShadedWarp& out) = 0;
   virtual void shade_vertices(const VertexWarp& warp) = 0;
-  struct Cost {
+  struct TimingParameters {
     std::uint32_t cores;
     std::uint32_t schedulers_per_core;
     std::uint32_t lanes_per_scheduler;  ///< a divisor of 32
@@ -38,7 +38,7 @@ class SmBehaviour : public Behaviour {
     /// Warp instructions that the array issues at most.
     double instructions_per_cycle() const { return double{1} * cores * schedulers_per_core / cycles_per_instruction(); }
   };
-  virtual Cost cost() const = 0;
+  virtual TimingParameters timing() const = 0;
 
   DrawCounter quads_shaded{*this, "quads_shaded", "quads", "launched in fragment warps"};
   DrawCounter fragments_shaded{*this, "fragments_shaded", "fragments", "live samples launched"};

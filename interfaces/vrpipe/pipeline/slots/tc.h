@@ -23,7 +23,7 @@ class TcBehaviour : public Behaviour {
   virtual unsigned insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) = 0;
   /// Flushes the bin whose turn it is (the shipped unit's: allocated first); false when all are empty.
   virtual bool flush_oldest(FlushReason reason, Flush& out) = 0;
-  struct Cost {
+  struct TimingParameters {
     std::uint32_t quads_per_cycle;
     std::uint32_t latency_cycles;
     std::uint32_t idle_timeout_cycles;  ///< without an incoming quad until bins are flushed; 0: never
@@ -33,7 +33,7 @@ class TcBehaviour : public Behaviour {
       return termination == Termination::strict ? 0 : idle_timeout_cycles;
     }
   };
-  virtual Cost cost() const = 0;
+  virtual TimingParameters timing() const = 0;
 
   Counter quads{*this, "quads", "quads", "taken into bins"};
   Counter flushes{*this, "flushes", "flushes", "bins handed to PROP"};

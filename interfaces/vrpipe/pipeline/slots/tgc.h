@@ -25,7 +25,7 @@ class TgcBehaviour : public Behaviour {
   virtual bool step(Flush& out) = 0;
   /// Flushes what is left, the bin allocated first going first; false when nothing is.
   virtual bool drain(Flush& out) = 0;
-  virtual Throughput cost() const = 0;              ///< items: bin entries
+  virtual Throughput timing() const = 0;            ///< items: bin entries
   virtual std::uint32_t largest_flush() const = 0;  ///< primitives
   virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
 

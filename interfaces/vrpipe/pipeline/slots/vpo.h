@@ -14,7 +14,7 @@ class VpoBehaviour : public Behaviour {
  public:
   /// The visible triangles of a splat of a draw, in order. Returns how many of `out` are set (0 to 2).
   virtual unsigned assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) = 0;
-  virtual Throughput cost() const = 0;  ///< items: triangles
+  virtual Throughput timing() const = 0;  ///< items: triangles
 
   DrawCounter primitives{*this, "primitives", "triangles", "triangles handed to the GPCs"};
 };

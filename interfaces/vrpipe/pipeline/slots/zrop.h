@@ -37,12 +37,12 @@ class ZropBehaviour : public Behaviour {
   virtual void pass(Mark mark) = 0;
   /// Strict mode at fidelities with time: termination comes from `run_ahead`, and `update` only costs time.
   virtual void follow(FunctionalRunAhead& run_ahead) = 0;
-  struct Cost {
+  struct TimingParameters {
     std::uint32_t quads_per_cycle;
     std::uint32_t latency_cycles;
     std::uint32_t updates_per_cycle;  ///< signals; a cycle with updates tests no quads: one z-cache port
   };
-  virtual Cost cost() const = 0;
+  virtual TimingParameters timing() const = 0;
 
   DrawCounter quads_tested{*this, "quads_tested", "quads", "that entered the termination test"};
   DrawCounter quads_depth_stencil_failed{*this, "quads_depth_stencil_failed", "quads",

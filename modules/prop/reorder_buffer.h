@@ -7,7 +7,7 @@
 
 #include <vrpipe/kernel/accounting.h>
 #include <vrpipe/kernel/ring.h>
-#include <vrpipe/pipeline/tile_grid.h>
+#include <vrpipe/pipeline/screen_tiling.h>
 #include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
@@ -15,7 +15,7 @@ namespace vrpipe {
 /// Shaded warps that wait to leave PROP. A warp's turn comes when the one before it, of the draw or of its screen tile,
 /// has left; of those whose turn has come the oldest goes first, which keeps a tile's quads together in the colour cache.
 /// A mark leaves between the warps that were launched before it and those after.
-class WarpOrder {
+class ReorderBuffer {
  public:
   /// A warp leaves when the warps of smaller number in its line have left: a line for the draw, or for each screen tile.
   struct Turn {
@@ -29,7 +29,7 @@ class WarpOrder {
     Cycle from = 0;  ///< the first cycle in which it can leave, for timing models that know it ahead
   };
 
-  WarpOrder(PropBehaviour::Order order, const RenderContext& context)
+  ReorderBuffer(PropBehaviour::Order order, const RenderContext& context)
       : by_draw_(order == PropBehaviour::Order::draw),
         grid_(context.frame->width(), context.frame->height()),
         next_of_line_(by_draw_ ? 1 : grid_.tiles()) {}
@@ -180,7 +180,7 @@ class WarpOrder {
   }
 
   const bool by_draw_;
-  const TileGrid grid_;
+  const ScreenTiling grid_;
   std::vector<std::uint32_t> next_of_line_;
   std::uint32_t left_ = 0;  ///< warps
   Window in_turn_;

@@ -11,12 +11,12 @@ Draw stack(unsigned count, float alpha, float color = 1) {
   return draw_of(1, 1, std::vector<Splat>(count, flat_box(-4, -4, 4, 4, alpha, color, color, color)));
 }
 
-TEST(Trouble, APixelIsStuckOnceWhatRoundingSwallowedWouldHavePassedTheThreshold) {
+TEST(Anomalies, APixelIsStuckOnceWhatRoundingLostWouldHavePassedTheThreshold) {
   // alpha 1/255 in binary16 freezes at 0x3B81 = 0.938 after 676; 0.996 then takes (1 - 1/255)^k <= 0.004 / 0.062.
   const auto until = static_cast<unsigned>(std::ceil(std::log(0.004 / (1 - 0.937988)) / std::log(1 - 1.0 / 255)));
   const RunResult before = simulate(untimed(), stack(676 + until - 2, one_255th));
   EXPECT_EQ(statistic(before, "crop.pixels_stuck"), 0U);
-  EXPECT_NEAR(static_cast<double>(statistic(before, "crop.fragments_swallowed")), until - 2, 1);
+  EXPECT_NEAR(static_cast<double>(statistic(before, "crop.fragments_lost_to_rounding")), until - 2, 1);
   const RunResult after = simulate(untimed(), stack(676 + until + 2, one_255th));
   EXPECT_EQ(statistic(after, "crop.pixels_stuck"), 1U);
   const RunResult long_after = simulate(untimed(), stack(5000, one_255th));
@@ -24,21 +24,21 @@ TEST(Trouble, APixelIsStuckOnceWhatRoundingSwallowedWouldHavePassedTheThreshold)
   EXPECT_EQ(long_after.counts.termination_updates, 0U);
 }
 
-TEST(Trouble, NothingIsStuckInSinglePrecision) {
+TEST(Anomalies, NothingIsStuckInSinglePrecision) {
   const RunResult result = simulate(untimed("het", ColorFormat::rgba32f), stack(2000, one_255th));
   EXPECT_EQ(statistic(result, "crop.pixels_stuck"), 0U);
-  EXPECT_EQ(statistic(result, "crop.fragments_swallowed"), 0U);
+  EXPECT_EQ(statistic(result, "crop.fragments_lost_to_rounding"), 0U);
   EXPECT_EQ(result.counts.termination_updates, 1U);
 }
 
-TEST(Trouble, ADifferentColourFormatSwallowsFromItsOwnLimitOn) {
+TEST(Anomalies, ADifferentColourFormatLosesFromItsOwnLimitOn) {
   EXPECT_EQ(statistic(simulate(untimed("het", ColorFormat::rgba8), stack(300, 0.25F)), "crop.pixels_stuck"), 0U);
   EXPECT_EQ(statistic(simulate(untimed("het", ColorFormat::rgba8), stack(300, 0.24F)), "crop.pixels_stuck"), 1U);
   // F2: merging pairs halves the limit.
   EXPECT_EQ(statistic(simulate(untimed("het+qm", ColorFormat::rgba8), stack(300, 0.24F)), "crop.pixels_stuck"), 0U);
 }
 
-TEST(Trouble, WhatIsNotFiniteIsDroppedWholeWhicheverFieldItIs) {
+TEST(Anomalies, WhatIsNotFiniteIsDroppedWholeWhicheverFieldItIs) {
   const Splat good = round_splat(8, 8, 3, 0.5F);
   const RunResult plain = simulate(untimed(), draw_of(16, 16, {good}));
   for (unsigned field = 0; field < 12; ++field) {
@@ -53,7 +53,7 @@ TEST(Trouble, WhatIsNotFiniteIsDroppedWholeWhicheverFieldItIs) {
   }
 }
 
-TEST(Trouble, TheWidestEdgeFunctionIsReportedInBits) {
+TEST(Anomalies, TheWidestEdgeFunctionIsReportedInBits) {
   const auto widest = [](float half_extent, const char* bits) {
     return statistic(simulate(untimed("baseline", ColorFormat::rgba16f, {{"state", "subpixel_bits", bits}}),
                               draw_of(64, 64,
@@ -67,7 +67,7 @@ TEST(Trouble, TheWidestEdgeFunctionIsReportedInBits) {
   EXPECT_LE(widest(1e6F, "12"), 63U);
 }
 
-TEST(Trouble, TheSmallestDeterminantIsThatOfTheThinnestSplat) {
+TEST(Anomalies, TheSmallestDeterminantIsThatOfTheThinnestSplat) {
   const RunResult result =
       simulate(untimed(), draw_of(64, 64, {round_splat(8, 8, 3, 0.5F), splat_at(30, 30, 10, 0.02F, 0.4F, 0.9F)}));
   EXPECT_NEAR(static_cast<double>(statistic(result, "vpo.smallest_determinant")), 0.2e6, 2);
@@ -80,7 +80,7 @@ TEST(Trouble, TheSmallestDeterminantIsThatOfTheThinnestSplat) {
   }
 }
 
-TEST(Trouble, ExtremesOfSeveralGpcsAreTheLargestOfThem) {
+TEST(Anomalies, ExtremesOfSeveralGpcsAreTheLargestOfThem) {
   RunRequest request = untimed();
   const RunResult one = simulate(request, random_draw(128, 128, 50, 3));
   request.platform = &platform_named("desktop");

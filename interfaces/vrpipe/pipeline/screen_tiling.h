@@ -9,10 +9,10 @@ namespace vrpipe {
 
 /// The screen tiles of a frame, numbered row by row, and its quads, tile by tile: what is kept for each has its place in
 /// a vector.
-class TileGrid {
+class ScreenTiling {
  public:
   /// width and height in pixels; tiles at the right and the lower edge count whole.
-  TileGrid(std::uint32_t width, std::uint32_t height)
+  ScreenTiling(std::uint32_t width, std::uint32_t height)
       : tiles_x_(tiles_along(width)), tiles_(std::size_t{tiles_x_} * tiles_along(height)) {}
   std::size_t tiles() const { return tiles_; }
   std::size_t index(TileId tile) const { return std::size_t{tile.y} * tiles_x_ + tile.x; }

@@ -4,7 +4,7 @@
 namespace vrpipe::testing {
 namespace {
 
-using Trouble = ToolTest;
+using Anomalies = ToolTest;
 
 std::string line_with(const std::string& text, const std::string& start) {
   const std::size_t at = text.find("\n" + start);
@@ -19,7 +19,7 @@ std::uint64_t value_of(const nlohmann::json& run, const std::string& name) {
   return 0;
 }
 
-TEST_F(Trouble, IsOneLineOfTheReportAndInTheStatistics) {
+TEST_F(Anomalies, IsOneLineOfTheReportAndInTheStatistics) {
   Draw draw = draw_of(16, 16, std::vector<Splat>(1500, flat_box(0, 0, 16, 16, 1.0F / 255.0F)));
   draw.splats.push_back(flat_box(-40, -40, 60, 60, 0.5F, 70000.0F));
   draw.splats.push_back(splat_at(8, 8, 900, 900, 0.5F, 0.9F));
@@ -36,7 +36,7 @@ TEST_F(Trouble, IsOneLineOfTheReportAndInTheStatistics) {
   EXPECT_EQ(value_of(run, "vpo.dropped_not_finite"), 0U);
 }
 
-TEST_F(Trouble, IsNotMentionedWhereThereIsNone) {
+TEST_F(Anomalies, IsNotMentionedWhereThereIsNone) {
   const Finished run = vrpipe({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--format", "rgba32f"});
   EXPECT_EQ(run.code, 0) << run.err;
   EXPECT_EQ(line_with(run.out, "numbers to watch: "), "");
