@@ -12,7 +12,7 @@
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_statistics.h>
 #include <vrpipe/memory/memory_port.h>
-#include <vrpipe/model/timed.h>
+#include <vrpipe/memory/timed_memory_port.h>
 
 /// What a cache of unbounded capacity fetches from the memory below it: each sector that was neither read nor written
 /// whole before, once, in a request of its own that keeps the origin of who asked. Nothing is written back.
