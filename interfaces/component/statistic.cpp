@@ -21,7 +21,10 @@ DrawCounter::DrawCounter(StatisticSet& owner, const char* name, const char* unit
 }
 
 void StatisticSet::set_draws(std::size_t draws) {
-  for (DrawCounter* counter : draw_counters_) counter->of_draw_.assign(draws > 1 ? draws : 0, 0);
+  for (DrawCounter* counter : draw_counters_) {
+    counter->of_draw_.assign(draws > 1 ? draws : 0, 0);
+    counter->counts_ = draws > 1 ? counter->of_draw_.data() : nullptr;
+  }
 }
 
 MinMax::MinMax(StatisticSet& owner, Of of, const char* name, const char* unit, const char* meaning)

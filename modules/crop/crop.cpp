@@ -11,6 +11,7 @@ namespace vrpipe {
 template <ColorFormat Format, BlendRounding Rounding>
 ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const RenderContext& context)
     : context_(context),
+      several_draws_(context.frame->draws().size() > 1),
       checks_previous_(parameters.previous_alpha_check),
       timing_{Rate::of_bytes(parameters.bytes_per_cycle, 4 * bytes_per_pixel(Format)),
               parameters.input_quads,
@@ -62,15 +63,6 @@ void ColorRop<Format, Rounding>::pass(Mark mark) {
       std::fill_n(terminated_.begin() + first, positions_per_tile, LaneMask{0});
     }
   }
-}
-
-template <ColorFormat Format, BlendRounding Rounding>
-void ColorRop<Format, Rounding>::count(DrawIndex draw, const Tally& tally) {
-  quads_blended.add(draw, tally.quads_blended);
-  fragments_blended.add(draw, tally.fragments_blended);
-  quads_dropped_late.add(draw, tally.quads_dropped);
-  fragments_dropped_late.add(draw, tally.fragments_dropped);
-  termination_signals.add(draw, tally.signals);
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
@@ -203,7 +195,12 @@ void ColorRop<Format, Rounding>::blend_quads(const ShadedWarp& warp, unsigned fr
     const DrawIndex draw = warp.draw[i];
     if (draw != draw_) set_draw(draw);
     Tally tally;
-    for (; i < to && warp.draw[i] == draw; ++i) {
+    unsigned end = to;
+    if (several_draws_)
+      end = static_cast<unsigned>(
+          std::find_if(warp.draw.begin() + i, warp.draw.begin() + to, [&](DrawIndex other) { return other != draw; }) -
+          warp.draw.begin());
+    for (; i < end; ++i) {
       const unsigned position = warp.position[i];
       outcomes[i] = blend_into(quads[position], tile + position, warp.live[i], warp.color[i], tally);
     }

@@ -99,7 +99,13 @@ class ColorRop : public CropBehaviour {
   struct Tally {
     unsigned quads_blended = 0, fragments_blended = 0, quads_dropped = 0, fragments_dropped = 0, signals = 0;
   };
-  void count(DrawIndex draw, const Tally& tally);
+  [[gnu::always_inline]] void count(DrawIndex draw, const Tally& tally) {
+    quads_blended.add(draw, tally.quads_blended);
+    fragments_blended.add(draw, tally.fragments_blended);
+    quads_dropped_late.add(draw, tally.quads_dropped);
+    fragments_dropped_late.add(draw, tally.fragments_dropped);
+    termination_signals.add(draw, tally.signals);
+  }
   /// Blends for a draw from here on.
   void set_draw(DrawIndex draw);
   Outcome blend_into(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);
@@ -109,6 +115,7 @@ class ColorRop : public CropBehaviour {
                                          LanePair blue_alpha);
 
   const RenderContext& context_;
+  const bool several_draws_;
   DrawIndex draw_ = 0;  ///< that is blended, with its state:
   bool signals_ = false;
   float threshold_ = 0;  ///< that alpha reaches to be terminated

@@ -164,7 +164,7 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
     out.position[count] = quad.position;
     out.live[count] = live;
     out.first_primitive[count] = out.last_primitive[count] = primitive_order(quad);
-    out.draw[count] = quad.draw;
+    if (several_draws_) out.draw[count] = quad.draw;
     count += live != 0;
   };
   for (unsigned i = 0; i < warp.count; i += 2) {

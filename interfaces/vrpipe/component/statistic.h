@@ -53,7 +53,7 @@ class DrawCounter : public Counter {
   /// @param draw  its number in the frame
   void add(unsigned draw, std::uint64_t amount) {
     Counter::operator+=(amount);
-    if (!of_draw_.empty()) of_draw_[draw] += amount;
+    if (counts_ != nullptr) counts_[draw] += amount;
   }
   void operator++() = delete;
   void operator+=(std::uint64_t) = delete;
@@ -63,6 +63,7 @@ class DrawCounter : public Counter {
  private:
   friend class StatisticSet;
   std::vector<std::uint64_t> of_draw_;
+  std::uint64_t* counts_ = nullptr;  ///< those of draws, or null
 };
 
 /// The largest or the smallest of what a unit saw. Over several units: the largest or smallest of theirs.
