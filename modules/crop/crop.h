@@ -122,7 +122,7 @@ class ColorRop : public CropBehaviour {
   bool drops_late_ = false;
   /// By quad, in strict termination: the pixels that were signalled.
   std::vector<LaneMask> terminated_;
-  /// By quad, once a fragment was lost to rounding: transmittance of those lost to rounding; negative once counted as stuck.
+  /// By quad, once a fragment was lost to rounding: transmittance of those that were; negative once counted as stuck.
   std::vector<Lanes> lost_to_rounding_;
   const bool checks_previous_;
   TimingParameters timing_;

@@ -181,8 +181,12 @@ TEST_F(RasterUnitTest, QuadsAndTheirOrderAreTheSameUnderAnyStalls) {
     for (const auto& record : out.records()) {
       for (unsigned i = 0; i < record.item.count; ++i) {
         const Quad& quad = record.item.quads[i];
-        quads.push_back((std::uint64_t{quad.splat} << 32U) | (quad.triangle << 28U) | (record.item.tile.x << 20U) |
-                        (record.item.tile.y << 12U) | (quad.position << 4U) | quad.coverage);
+        const std::uint64_t triangle = quad.triangle;
+        const std::uint64_t x = record.item.tile.x;
+        const std::uint64_t y = record.item.tile.y;
+        const std::uint64_t position = quad.position;
+        quads.push_back((std::uint64_t{quad.splat} << 32U) | (triangle << 28U) | (x << 20U) | (y << 12U) |
+                        (position << 4U) | quad.coverage);
       }
     }
     if (seed == 0) expected = quads;

@@ -75,7 +75,7 @@ std::string likely_name(const std::string& given, const std::vector<std::string>
   throw UserError("unknown option '" + option + "'", where, "there is no such option", help);
 }
 
-/// An option that lost to rounding the next one, or was given nothing.
+/// An option that swallowed the next one, or was given nothing.
 void refuse_missing_values(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options()) {
     for (const std::string& value : option->results()) {
