@@ -102,9 +102,9 @@ class ColorRop : public CropBehaviour {
   [[gnu::always_inline]] void count(DrawIndex draw, const Tally& tally) {
     quads_blended.add(draw, tally.quads_blended);
     fragments_blended.add(draw, tally.fragments_blended);
-    quads_dropped_late.add(draw, tally.quads_dropped);
-    fragments_dropped_late.add(draw, tally.fragments_dropped);
-    termination_signals.add(draw, tally.signals);
+    if (tally.quads_dropped != 0) quads_dropped_late.add(draw, tally.quads_dropped);
+    if (tally.fragments_dropped != 0) fragments_dropped_late.add(draw, tally.fragments_dropped);
+    if (tally.signals != 0) termination_signals.add(draw, tally.signals);
   }
   /// Blends for a draw from here on.
   void set_draw(DrawIndex draw);
