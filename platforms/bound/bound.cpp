@@ -69,11 +69,10 @@ PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc) {
   // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
   warps_in_phase_ = 2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads);
   times_out_ = tc_.timeout_in(configuration.request().termination) > 0;
-  const std::vector<MemoryInstance>& memories = configuration.netlist().memories();
-  if (std::any_of(memories.begin(), memories.end(), [](const MemoryInstance& memory) { return !memory.make; })) {
-    l2_bytes_per_cycle_ = configuration.l2().bytes_per_cycle;
-    l2_latency_cycles_ = configuration.l2().latency_cycles;
-  }
+  cost_of("l2", static_cast<MemoryBehaviour*>(nullptr), [&](const auto& memory) {
+    l2_bytes_per_cycle_ = memory.timing().bytes_per_cycle;
+    l2_latency_cycles_ = memory.timing().latency_cycles;
+  });
 }
 
 double PhaseBound::instructions(const Work& done) const {

@@ -35,7 +35,9 @@ Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
                             configuration.frame().terminates_early();
     if (runs_ahead) ahead_[instance.gpc] = std::make_unique<RunAhead>(configuration, instance.gpc, framebuffer.color);
   }
-  for (const Instance& instance : netlist.instances()) add(instance, framebuffer);
+  for (const Instance& instance : netlist.instances()) {
+    if (!netlist.is_memory(instance)) add(instance, framebuffer);
+  }
   connect_units(netlist, request.observers.get(), [&](const std::string& path) { return find(path); });
   add_memories();
   check();
@@ -87,67 +89,88 @@ void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
 }
 
 void Gpu::add_memories() {
-  const std::vector<MemoryInstance>& memories = configuration_.netlist().memories();
-  std::vector<TargetSockets> sockets;
-  for (const MemoryInstance& memory : memories) sockets.push_back(make_memory(memory));
-  for (std::size_t i = 0; i < memories.size(); ++i) bind_memory(memories[i], sockets[i]);
+  const Netlist& netlist = configuration_.netlist();
+  struct Made {
+    std::string path;
+    std::vector<std::string> bound;
+    TargetSockets sockets;
+  };
+  std::vector<Made> made;
+  // Of what a memory that nobody uses would be bound to, nothing is needed either.
+  const std::vector<std::string> used = netlist.used_memories();
+  const auto bound_to = [&](const std::string& path) {
+    std::vector<std::string> bound = netlist.bound_to(path);
+    const auto is_unused = [&](const std::string& from) {
+      const Instance* const above = netlist.find(from);
+      return above != nullptr && netlist.is_memory(*above) && std::find(used.begin(), used.end(), from) == used.end();
+    };
+    bound.erase(std::remove_if(bound.begin(), bound.end(), is_unused), bound.end());
+    return bound;
+  };
+  for (const std::string& path : used) {
+    std::vector<std::string> bound = bound_to(path);
+    const auto ports = static_cast<unsigned>(bound.size());
+    const Instance* const instance = netlist.find(path);
+    made.push_back({path, std::move(bound), {}});
+    if (instance != nullptr) {
+      made.back().sockets = make_memory(*instance, ports);
+      continue;
+    }
+    for (const ForeignInstance& foreign : netlist.foreign_memories()) {
+      if (foreign.path == path) made.back().sockets = make_foreign(foreign, ports);
+    }
+  }
+  for (const Made& each : made) bind_memory(each.path, each.bound, each.sockets);
 }
 
-Gpu::TargetSockets Gpu::make_memory(const MemoryInstance& memory) {
-  const auto units = static_cast<unsigned>(memory.units.size());
+Gpu::TargetSockets Gpu::make_memory(const Instance& instance, unsigned ports) {
+  const std::vector<MemoryLink>& links = configuration_.netlist().memory_links();
+  const bool has_below =
+      std::any_of(links.begin(), links.end(), [&](const MemoryLink& link) { return link.from == instance.path; });
+  const MemoryPlace place{ports, has_below, configuration_.request().fidelity == Fidelity::cycle};
+  memories_.push_back(
+      {&instance, memory_unit_maker(instance.slot)(instance.path, *clock_, configuration_.make(instance), place)});
   TargetSockets sockets;
-  if (units == 0) return sockets;  // all were connected to something else
-  if (memory.make) {
-    ForeignMemory made = memory.make(memory.path, units);
-    if (made.module == nullptr) refuse_memory(memory.path, "nothing was made", "return a module and its sockets");
-    memories_.push_back({&memory, std::move(made.module)});
-    sockets = std::move(made.sockets);
-    if (sockets.size() == 1) sockets.resize(units, sockets.front());
-  } else {
-    make_l2(memory);
-    for (unsigned index = 0; index < units; ++index) sockets.push_back(&l2_->port(index));
-  }
+  for (unsigned index = 0; index < ports; ++index) sockets.push_back(&memories_.back().memory->target(index));
   return sockets;
 }
 
-void Gpu::make_l2(const MemoryInstance& memory) {
-  if (l2_ != nullptr) refuse_memory(memory.path, "the platform has an L2 already", "connect its units to that");
-  MemoryBelow below = MemoryBelow::none;
-  for (const MemoryInstance& other : configuration_.netlist().memories()) {
-    if (std::find(other.units.begin(), other.units.end(), memory.path) == other.units.end()) continue;
-    below = configuration_.request().fidelity == Fidelity::cycle ? MemoryBelow::clocked : MemoryBelow::annotated;
-  }
-  const L2Parameters& parameters = configuration_.l2();
-  l2_ = std::make_unique<FixedLatencyMemory>(memory.path.c_str(), *clock_, parameters.latency_cycles,
-                                             parameters.bytes_per_cycle, static_cast<unsigned>(memory.units.size()),
-                                             below);
+Gpu::TargetSockets Gpu::make_foreign(const ForeignInstance& foreign, unsigned ports) {
+  ForeignMemory made = foreign.make(foreign.path, ports);
+  if (made.module == nullptr) refuse_memory(foreign.path, "nothing was made", "return a module and its sockets");
+  foreign_memories_.push_back({&foreign, std::move(made.module)});
+  TargetSockets sockets = std::move(made.sockets);
+  if (sockets.size() == 1) sockets.resize(ports, sockets.front());
+  return sockets;
 }
 
-void Gpu::bind_memory(const MemoryInstance& memory, const TargetSockets& sockets) {
-  const std::size_t units = memory.units.size();
-  if (sockets.size() < units) {
-    refuse_memory(memory.path, fmt::format("{} units are connected to {} sockets", units, sockets.size()),
+void Gpu::bind_memory(const std::string& path, const std::vector<std::string>& bound, const TargetSockets& sockets) {
+  if (sockets.size() < bound.size()) {
+    refuse_memory(path, fmt::format("{} units are connected to {} sockets", bound.size(), sockets.size()),
                   "give one for each, or one that takes many");
   }
-  for (std::size_t index = 0; index < units; ++index) {
-    const std::string& path = memory.units[index];
-    Unit* const unit = find(path);
-    if (unit == nullptr && l2_ == nullptr) refuse_memory(path, "no unit is connected to it", "leave it out");
-    tlm::tlm_initiator_socket<32>* const socket = unit != nullptr ? unit->memory_socket() : &l2_->below();
-    if (socket == nullptr) refuse_memory(path, "the unit has no memory port", "leave it out");
+  for (std::size_t index = 0; index < bound.size(); ++index) {
+    tlm::tlm_initiator_socket<32>* socket = nullptr;
+    if (Unit* const unit = find(bound[index])) {
+      socket = unit->memory_socket();
+    } else {
+      for (const PlacedMemory& above : memories_) {
+        if (above.instance->path == bound[index]) socket = above.memory->below();
+      }
+    }
+    if (socket == nullptr) refuse_memory(bound[index], "it has no memory port", "leave it out");
     socket->bind(*sockets[index]);
   }
 }
 
 void Gpu::check() const {
   const std::string& platform = configuration_.platform().name;
-  const std::vector<MemoryInstance>& memories = configuration_.netlist().memories();
+  const std::vector<MemoryLink>& links = configuration_.netlist().memory_links();
   for (const Placed& placed : units_) {
     const std::string& path = placed.instance->path;
     check_ports(*placed.unit, path, platform);
-    const bool has_memory = std::any_of(memories.begin(), memories.end(), [&](const MemoryInstance& memory) {
-      return std::find(memory.units.begin(), memory.units.end(), path) != memory.units.end();
-    });
+    const bool has_memory =
+        std::any_of(links.begin(), links.end(), [&](const MemoryLink& link) { return link.from == path; });
     if (placed.unit->memory_socket() == nullptr || has_memory) continue;
     throw UserError("incomplete platform " + platform, path, "its memory port is not connected", "use connect_memory");
   }

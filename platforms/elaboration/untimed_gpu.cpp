@@ -9,6 +9,7 @@ namespace vrpipe {
 UntimedGpu::UntimedGpu(const Configuration& configuration, Framebuffer& framebuffer) : configuration_(configuration) {
   const Netlist& netlist = configuration.netlist();
   for (const Instance& instance : netlist.instances()) {
+    if (Netlist::is_memory(instance)) continue;
     std::unique_ptr<Behaviour> behaviour = configuration.make(instance);
     if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(framebuffer.color);
     if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get())) zrop->attach(framebuffer.depth_stencil);

@@ -146,16 +146,10 @@ std::vector<const Instance*> Configuration::instances_of(const std::string& slot
   return found;
 }
 
-bool Configuration::has_l2() const {
-  const std::vector<MemoryInstance>& memories = netlist_.memories();
-  return std::any_of(memories.begin(), memories.end(), [](const MemoryInstance& memory) { return !memory.make; });
-}
-
 /// A platform's settings are for the units that it was made with: another one in a slot takes those that it declares.
 bool Configuration::concerns_chosen_unit(const Setting& setting) const {
-  if (setting.unit == "l2") return has_l2();
   const std::vector<const Instance*> named = instances_named(setting.unit);
-  if (named.empty()) return true;
+  if (named.empty()) return !netlist_.has_foreign(setting.unit);
   Variant with_all = request_.variant;
   with_all.quad_merging = true;
   for (const Instance* instance : named) {
@@ -168,17 +162,15 @@ bool Configuration::concerns_chosen_unit(const Setting& setting) const {
 
 void Configuration::apply(const Setting& setting) {
   if (setting.unit == "state") return state_parameters_.set(setting.unit, setting.parameter, setting.value);
-  if (setting.unit == "l2" && has_l2()) return l2_.set(setting.unit, setting.parameter, setting.value);
   if (setting.unit.compare(0, link_prefix.size(), link_prefix) == 0) return set_link(setting);
   const std::vector<const Instance*> named = instances_named(setting.unit);
   if (named.empty()) {
     std::vector<std::string> known{"state"};
-    if (has_l2()) known.emplace_back("l2");
     for (const Instance& instance : netlist_.instances()) {
       known.push_back(instance.slot);
       known.push_back(instance.path);
     }
-    const bool elsewhere = Registry::instance().has_slot(setting.unit) || setting.unit == "l2";
+    const bool elsewhere = Registry::instance().has_slot(setting.unit);
     throw UserError("unknown unit '" + setting.unit + "'", "--set " + setting.unit + "." + setting.parameter,
                     elsewhere ? "platform " + request_.platform->name + " has none" : "no such unit",
                     "did you mean " + nearest_name(setting.unit, known) + "? `vrpipe units` lists all");
@@ -236,7 +228,6 @@ std::vector<std::pair<std::string, std::string>> Configuration::parameters() con
       add(slot.name, instance->path, *units_.at(instance->path).real_parameters);
     }
   }
-  if (has_l2()) add("l2", "l2", l2_);
   for (const Link& link : netlist_.links()) {
     add(link_prefix + without_gpc(link.name()), link_prefix + link.name(), *link.parameters);
   }

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cctype>
+#include <set>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
 
@@ -58,7 +60,7 @@ std::string Link::name() const {
 }
 
 void Netlist::add(const std::string& path, const std::string& slot, const std::string& implementation) {
-  if (find(path) != nullptr) refuse("cannot add " + path, path, "the platform has it already", "choose another path");
+  check_is_new(path);
   Instance added{path, slot.empty() ? path.substr(path.rfind('.') + 1) : slot, implementation};
   added.in_front_end = !gpc_of(path, added.gpc);
   if (added.gpc >= gpcs_) {
@@ -80,34 +82,47 @@ void Netlist::connect(const std::string& from, const std::string& to, unsigned d
 }
 
 void Netlist::add_memory(const std::string& path, MemoryMaker make) {
-  for (const MemoryInstance& memory : memories_) {
-    if (memory.path == path) refuse("cannot add " + path, path, "the platform has it already", "choose another path");
-  }
-  memories_.push_back({path, std::move(make), {}});
+  check_is_new(path);
+  foreign_memories_.push_back({path, std::move(make)});
 }
 
-void Netlist::connect_memory(const std::string& unit, const std::string& memory) {
-  MemoryInstance& target = this->memory(memory);
-  const bool is_l2 = std::any_of(memories_.begin(), memories_.end(),
-                                 [&](const auto& each) { return each.path == unit && !each.make; });
-  if (!is_l2) static_cast<void>(instance(unit));
-  if (is_l2 && !target.make) {
-    refuse("cannot connect", unit + " to " + memory, "below the L2 lies a memory of another make",
-           "add it with add_memory and what makes it");
+void Netlist::connect_memory(const std::string& from, const std::string& memory) {
+  static_cast<void>(instance(from));
+  check_memory(memory);
+  for (std::string above = memory; !above.empty();) {
+    if (above == from) refuse("cannot connect", from + " to " + memory, "it would lie below itself", "connect another");
+    const auto next = std::find_if(memory_links_.begin(), memory_links_.end(),
+                                   [&](const MemoryLink& link) { return link.from == above; });
+    above = next == memory_links_.end() ? std::string() : next->to;
   }
-  disconnect_memory(unit);  // it may be moved
-  target.units.push_back(unit);
+  disconnect_memory(from);
+  memory_links_.push_back({from, memory});
 }
 
-void Netlist::disconnect_memory(const std::string& unit) {
-  for (MemoryInstance& memory : memories_) {
-    memory.units.erase(std::remove(memory.units.begin(), memory.units.end(), unit), memory.units.end());
-  }
+void Netlist::disconnect_memory(const std::string& from) {
+  memory_links_.erase(std::remove_if(memory_links_.begin(), memory_links_.end(),
+                                     [&](const MemoryLink& link) { return link.from == from; }),
+                      memory_links_.end());
 }
 
 void Netlist::replace_memory(const std::string& path, MemoryMaker make) {
-  memory(path).make = std::move(make);
+  check_memory(path);
   disconnect_memory(path);
+  instances_.erase(std::remove_if(instances_.begin(), instances_.end(),
+                                  [&](const Instance& instance) { return instance.path == path; }),
+                   instances_.end());
+  foreign_memories_.erase(std::remove_if(foreign_memories_.begin(), foreign_memories_.end(),
+                                         [&](const ForeignInstance& foreign) { return foreign.path == path; }),
+                          foreign_memories_.end());
+  foreign_memories_.push_back({path, std::move(make)});
+}
+
+std::vector<std::string> Netlist::bound_to(const std::string& memory) const {
+  std::vector<std::string> bound;
+  for (const MemoryLink& link : memory_links_) {
+    if (link.to == memory) bound.push_back(link.from);
+  }
+  return bound;
 }
 
 void Netlist::replace(const std::string& path, const std::string& implementation) {
@@ -138,6 +153,10 @@ void Netlist::remove(const std::string& path) {
   const auto of_it = [&](const std::string& port) { return split_port(port).first == path; };
   stubs_.erase(std::remove_if(stubs_.begin(), stubs_.end(), of_it), stubs_.end());
   disconnect_memory(path);
+  if (const std::vector<std::string> above = bound_to(path); !above.empty()) {
+    refuse("cannot remove " + path, path, "the memory port of " + above.front() + " is bound to it",
+           "connect that to another memory first, or use replace_memory");
+  }
   instances_.erase(
       std::find_if(instances_.begin(), instances_.end(), [&](const Instance& i) { return i.path == path; }));
 }
@@ -178,14 +197,53 @@ Instance& Netlist::instance(const std::string& path) {
          paths.empty() ? "add it first" : "did you mean " + nearest_name(path, paths) + "?");
 }
 
-MemoryInstance& Netlist::memory(const std::string& path) {
+std::vector<std::string> Netlist::used_memories() const {
+  std::set<std::string> used;
+  for (const Instance& instance : instances_) {
+    std::string from = is_memory(instance) ? std::string() : instance.path;
+    while (!from.empty()) {
+      const auto link = std::find_if(memory_links_.begin(), memory_links_.end(),
+                                     [&](const MemoryLink& each) { return each.from == from; });
+      from = link == memory_links_.end() ? std::string() : link->to;
+      if (!from.empty()) used.insert(from);
+    }
+  }
   std::vector<std::string> paths;
-  for (MemoryInstance& memory : memories_) {
-    if (memory.path == path) return memory;
-    paths.push_back(memory.path);
+  for (const Instance& instance : instances_) {
+    if (used.count(instance.path) > 0) paths.push_back(instance.path);
+  }
+  for (const ForeignInstance& foreign : foreign_memories_) {
+    if (used.count(foreign.path) > 0) paths.push_back(foreign.path);
+  }
+  return paths;
+}
+
+bool Netlist::has_foreign(const std::string& path) const {
+  return std::any_of(foreign_memories_.begin(), foreign_memories_.end(),
+                     [&](const ForeignInstance& foreign) { return foreign.path == path; });
+}
+
+bool Netlist::is_memory(const Instance& instance) {
+  const Registry& registry = Registry::instance();
+  return registry.has_slot(instance.slot) && registry.slot(instance.slot).is_memory;
+}
+
+void Netlist::check_memory(const std::string& path) const {
+  if (has_foreign(path)) return;
+  std::vector<std::string> paths;
+  for (const ForeignInstance& foreign : foreign_memories_) paths.push_back(foreign.path);
+  for (const Instance& instance : instances_) {
+    if (!is_memory(instance)) continue;
+    if (instance.path == path) return;
+    paths.push_back(instance.path);
   }
   refuse("unknown memory '" + path + "'", "platform", "it was not added",
-         paths.empty() ? "add it with add_memory" : "did you mean " + nearest_name(path, paths) + "?");
+         paths.empty() ? "add it first" : "did you mean " + nearest_name(path, paths) + "?");
+}
+
+void Netlist::check_is_new(const std::string& path) const {
+  if (find(path) == nullptr && !has_foreign(path)) return;
+  refuse("cannot add " + path, path, "the platform has it already", "choose another path");
 }
 
 std::vector<Link>::iterator Netlist::link_at(const std::string& port) {

@@ -40,7 +40,7 @@ void wire_gpc(Netlist& netlist, unsigned gpc, const std::string& memory) {
 void wire_pipeline(Netlist& netlist) {
   netlist.add("draw");
   netlist.add("vpo");
-  netlist.add_memory("l2");
+  netlist.add("l2");
   for (unsigned gpc = 0; gpc < netlist.gpcs(); ++gpc) wire_gpc(netlist, gpc);
 }
 

@@ -127,7 +127,7 @@ void add_statistics(const Instance& instance, const Behaviour& behaviour, const 
   statistics.add(instance.slot, instance.path, unit);
 }
 
-/// Those of a memory that has any.
+/// Those of a memory of another make that has any.
 template <class Statistics>
 void add_statistics(const std::string& path, const sc_core::sc_module& memory, Statistics& statistics) {
   if (const auto* const set = dynamic_cast<const StatisticSet*>(&memory)) statistics.add(path, path, *set);
@@ -138,9 +138,13 @@ void add_statistics(const Gpu& gpu, Statistics& statistics) {
   for (const Gpu::Placed& placed : gpu.units()) {
     add_statistics(*placed.instance, *placed.behaviour, *placed.unit, statistics);
   }
-  if (gpu.l2() != nullptr) add_statistics(l2, *gpu.l2(), statistics);
-  for (const Gpu::PlacedMemory& memory : gpu.memories()) {
-    add_statistics(memory.instance->path, *memory.module, statistics);
+  for (const Gpu::PlacedMemory& placed : gpu.memories()) {
+    const Instance& instance = *placed.instance;
+    statistics.add(instance.slot, instance.path, placed.memory->behaviour().unit());
+    statistics.add(instance.slot, instance.path, placed.memory->statistics());
+  }
+  for (const Gpu::PlacedForeign& placed : gpu.foreign_memories()) {
+    add_statistics(placed.instance->path, *placed.module, statistics);
   }
 }
 
@@ -253,8 +257,27 @@ class OccupancyReport {
  public:
   OccupancyReport(double cycles, RunResult& result) : cycles_(cycles), result_(result) {}
 
-  /// @param slot  of the unit; or `l2`
   void add(UnitReport report, const std::string& slot, const std::vector<OccupancyPart>& parts) {
+    count(report, slot, parts);
+    check_states(report);
+    result_.units.push_back(std::move(report));
+  }
+  /// A memory has no states.
+  void add_memory(UnitReport report, const std::string& slot, const std::vector<OccupancyPart>& parts) {
+    count(report, slot, parts);
+  }
+
+  void finish() {
+    for (const Slot& slot : Registry::instance().slots()) {
+      if (!slot.reports_utilization) continue;
+      const auto& [units, sum] = throughput_of_[slot.name];
+      result_.utilization.emplace_back(slot.name, units > 0 ? sum / units : 0.0);
+    }
+    if (!Registry::instance().has_slot("dram")) result_.utilization.emplace_back("dram", 0.0);
+  }
+
+ private:
+  void count(UnitReport& report, const std::string& slot, const std::vector<OccupancyPart>& parts) {
     std::map<unsigned, Bottleneck> resources;
     double throughput = 0;
     for (const OccupancyPart& part : parts) {
@@ -272,40 +295,23 @@ class OccupancyReport {
         result_.bottleneck = std::move(resource);
       }
     }
-    check(report);
+    // But for rounding of the shares themselves.
+    if (report.occupancy > 1 + 1e-9) {
+      throw SimulationFault(report.name, static_cast<Cycle>(cycles_),
+                            fmt::format("it is occupied {} of its time", report.occupancy));
+    }
     auto& [units, sum] = throughput_of_[slot];
     ++units;
     sum += throughput;
-    if (slot != l2) result_.units.push_back(std::move(report));
   }
-
-  void finish() {
-    const auto report = [&](const std::string& slot) {
-      const auto& [units, sum] = throughput_of_[slot];
-      result_.utilization.emplace_back(slot, units > 0 ? sum / units : 0.0);
-    };
-    for (const Slot& slot : Registry::instance().slots()) {
-      if (slot.reports_utilization) report(slot.name);
-    }
-    report(l2);
-    result_.utilization.emplace_back("dram", 0.0);
-  }
-
- private:
-  void check(const UnitReport& report) const {
+  void check_states(const UnitReport& report) const {
     const auto cycles = static_cast<Cycle>(cycles_);
     std::uint64_t sum = 0;
     for (const std::uint64_t spent : report.cycles) {
       if (spent > cycles) throw SimulationFault(report.name, cycles, fmt::format("{} cycles in one state", spent));
       sum += spent;
     }
-    if (sum != cycles && report.name != l2) {
-      throw SimulationFault(report.name, cycles, fmt::format("its states sum to {} cycles", sum));
-    }
-    // But for rounding of the shares themselves.
-    if (report.occupancy > 1 + 1e-9) {
-      throw SimulationFault(report.name, cycles, fmt::format("it is occupied {} of its time", report.occupancy));
-    }
+    if (sum != cycles) throw SimulationFault(report.name, cycles, fmt::format("its states sum to {} cycles", sum));
   }
 
   double cycles_;
@@ -364,11 +370,10 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
     }
     occupancy.add(std::move(report), placed.instance->slot, placed.unit->occupancy().parts(cycles));
   }
-  if (gpu.l2() != nullptr) {
+  for (const Gpu::PlacedMemory& placed : gpu.memories()) {
     UnitReport report;
-    report.name = l2;
-    occupancy.add(std::move(report), l2,
-                  {{"bytes", 0, static_cast<double>(gpu.l2()->bytes(cycles)) / gpu.l2()->peak_rate(), true}});
+    report.name = placed.instance->path;
+    occupancy.add_memory(std::move(report), placed.instance->slot, placed.memory->parts(cycles));
   }
   occupancy.finish();
   report_counts(configuration, behaviours, statistics, result);
@@ -400,7 +405,7 @@ void report_bound(const Configuration& configuration, const UntimedGpu& gpu, con
   report.name = l2;
   double moved = 0;
   for (const PhaseBound& bound : bounds) moved += bound.busy_cycles(l2) / static_cast<double>(bounds.size());
-  occupancy.add(std::move(report), l2, {{"bytes", 0, moved, true}});
+  occupancy.add_memory(std::move(report), l2, {{"bytes", 0, moved, true}});
   occupancy.finish();
 }
 
@@ -537,10 +542,6 @@ std::vector<ParameterListing> list_parameters(const Platform* platform) {
     }
     listings.push_back(std::move(listing));
   }
-  listings.push_back({l2, "fixed-latency", "the shared L2: fixed latency, a number of bytes a cycle for each GPC",
-                      false, std::make_unique<L2Parameters>()});
-  apply({l2}, *listings.back().parameters);
-
   const Platform& wired = platform != nullptr ? *platform : platforms().front();
   Netlist netlist(wired.gpcs);
   wired.wire(netlist);

@@ -5,7 +5,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/kernel/clock_domain.h>
-#include <vrpipe/memory/memory_port.h>
+#include <vrpipe/model/memory_unit.h>
 #include <vrpipe/model/timed.h>
 #include <vrpipe/model/unit.h>
 #include <vrpipe/model/untimed.h>
@@ -132,18 +132,23 @@ std::vector<StatisticReport> list_statistics(const ParameterListing& listing) {
   fresh_simulation();
   {
     ClockDomain clock("clock", 1000);
-    if (listing.unit == "l2") {
-      collector.add(listing.unit, listing.unit, FixedLatencyMemory("memory", clock, 1, 1, 1));
-    } else if (Registry::instance().has_slot(listing.unit)) {
+    if (Registry::instance().has_slot(listing.unit)) {
       RenderContext context;
       context.frame = std::make_shared<Frame>(1, 1);
       const Implementation& implementation = Registry::instance().find(listing.unit, listing.implementation);
       const auto make = [&] { return implementation.make_behaviour(*listing.parameters, context); };
       collector.add(listing.unit, "functional", make()->unit());
-      collector.add(listing.unit, "untimed", *untimed_unit_maker(listing.unit)("untimed", make(), context, 1));
-      collector.add(listing.unit, "timed",
-                    *timed_unit_maker(listing.unit)("timed", clock, make(), context, 1, Transport::blocking));
-      collector.add(listing.unit, "cycle", *unit_maker(listing.unit)("cycle", clock, make(), context, 1));
+      if (Registry::instance().slot(listing.unit).is_memory) {
+        for (const bool is_clocked : {false, true}) {
+          const auto memory = memory_unit_maker(listing.unit)("memory", clock, make(), {1, false, is_clocked});
+          collector.add(listing.unit, is_clocked ? "cycle" : "timed", memory->statistics());
+        }
+      } else {
+        collector.add(listing.unit, "untimed", *untimed_unit_maker(listing.unit)("untimed", make(), context, 1));
+        collector.add(listing.unit, "timed",
+                      *timed_unit_maker(listing.unit)("timed", clock, make(), context, 1, Transport::blocking));
+        collector.add(listing.unit, "cycle", *unit_maker(listing.unit)("cycle", clock, make(), context, 1));
+      }
     }
   }
   fresh_simulation();

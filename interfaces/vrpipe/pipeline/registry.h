@@ -24,6 +24,7 @@ struct Slot {
   std::string stand_in = {};   ///< what is there in a variant without quad merging; empty if that changes nothing
   bool reports_utilization = false;
   SlotCheck check = nullptr;  ///< for units that are not trusted; null if nothing of theirs is checked
+  bool is_memory = false;     ///< of memories (MemoryBehaviour), which have no streams but are bound to memory ports
 };
 
 /// An implementation of a slot: a unit that a platform can be built with.

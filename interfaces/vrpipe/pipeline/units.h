@@ -9,6 +9,7 @@
 #include <vrpipe/pipeline/slots/behaviour.h>
 #include <vrpipe/pipeline/slots/crop.h>
 #include <vrpipe/pipeline/slots/draw.h>
+#include <vrpipe/pipeline/slots/memory.h>
 #include <vrpipe/pipeline/slots/prop.h>
 #include <vrpipe/pipeline/slots/qru.h>
 #include <vrpipe/pipeline/slots/raster.h>

@@ -61,14 +61,6 @@ struct StateParameters : ParameterSet {
   }
 };
 
-/// Parameters of the L2, set as `l2.NAME`.
-struct L2Parameters : ParameterSet {
-  Integer latency_cycles{
-      *this, "latency_cycles", 146, 1, 100000, "cycles", "Accel-Sim, SM87_ORIN: L2 latency", "from request to data"};
-  Integer bytes_per_cycle{*this, "bytes_per_cycle", 128,          32,
-                          4096,  "bytes",           source::open, "moved for each GPC: four sectors"};
-};
-
 /// A run's choices made final: the platform's netlist, an implementation and parameters for every unit and link of it.
 class Configuration {
  public:
@@ -91,7 +83,6 @@ class Configuration {
   const Frame& frame() const { return *contexts_.front().frame; }
   /// What is in an instance, in this variant.
   const Implementation& implementation(const Instance& instance) const { return *units_.at(instance.path).chosen; }
-  const L2Parameters& l2() const { return l2_; }
   /// PATH.PARAMETER and value: the slot's where all its instances agree, otherwise also those of the instances that
   /// differ from the first.
   std::vector<std::pair<std::string, std::string>> parameters() const;
@@ -113,13 +104,11 @@ class Configuration {
   bool concerns_chosen_unit(const Setting& setting) const;
   std::vector<const Instance*> instances_named(const std::string& name) const;
   std::vector<const Instance*> instances_of(const std::string& slot) const;
-  bool has_l2() const;
 
   RunRequest request_;
   Netlist netlist_;
   std::map<std::string, UnitChoices> units_;  ///< by path
   StateParameters state_parameters_;
-  L2Parameters l2_;
   std::vector<RenderContext> contexts_;  ///< by GPC
 };
 

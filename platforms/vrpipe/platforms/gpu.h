@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <vrpipe/kernel/clock_domain.h>
-#include <vrpipe/memory/memory_port.h>
+#include <vrpipe/model/memory_unit.h>
 #include <vrpipe/model/unit.h>
 #include <vrpipe/platforms/configuration.h>
 
@@ -24,9 +24,13 @@ class Gpu {
     Behaviour* behaviour;  ///< whose counters count
   };
 
-  /// A memory of another make.
   struct PlacedMemory {
-    const MemoryInstance* instance;
+    const Instance* instance;
+    std::unique_ptr<MemoryUnit> memory;
+  };
+  /// A memory of another make.
+  struct PlacedForeign {
+    const ForeignInstance* instance;
     std::unique_ptr<sc_core::sc_module> module;
   };
 
@@ -35,9 +39,9 @@ class Gpu {
 
   /// In the order of the netlist.
   const std::vector<Placed>& units() const { return units_; }
-  /// The L2 of this library; null if the platform has none.
-  const FixedLatencyMemory* l2() const { return l2_.get(); }
+  /// Those that a memory port is bound to.
   const std::vector<PlacedMemory>& memories() const { return memories_; }
+  const std::vector<PlacedForeign>& foreign_memories() const { return foreign_memories_; }
   ClockDomain& clock() { return *clock_; }
 
   /// Runs the draw to its end; returns the cycles. `progress` goes to 1.
@@ -47,9 +51,9 @@ class Gpu {
   void add(const Instance& instance, Framebuffer& framebuffer);
   using TargetSockets = std::vector<tlm::tlm_base_target_socket_b<32>*>;
   void add_memories();
-  TargetSockets make_memory(const MemoryInstance& memory);
-  void make_l2(const MemoryInstance& memory);
-  void bind_memory(const MemoryInstance& memory, const TargetSockets& sockets);
+  TargetSockets make_memory(const Instance& instance, unsigned ports);
+  TargetSockets make_foreign(const ForeignInstance& foreign, unsigned ports);
+  void bind_memory(const std::string& path, const std::vector<std::string>& bound, const TargetSockets& sockets);
   void check() const;
   /// Whether the draw has ended everywhere, no unit has work left and no access to memory is under way.
   bool frame_is_over() const;
@@ -57,8 +61,8 @@ class Gpu {
 
   const Configuration& configuration_;
   std::unique_ptr<ClockDomain> clock_;
-  std::unique_ptr<FixedLatencyMemory> l2_;
   std::vector<PlacedMemory> memories_;
+  std::vector<PlacedForeign> foreign_memories_;
   std::map<unsigned, std::unique_ptr<RunAhead>> ahead_;  ///< by GPC, in strict termination
   std::vector<Placed> units_;
 };

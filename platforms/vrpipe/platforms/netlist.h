@@ -23,7 +23,7 @@ struct LinkParameters : ParameterSet {
   Integer items_per_cycle;
 };
 
-/// A unit of a platform.
+/// A unit or a memory of a platform.
 struct Instance {
   std::string path;            ///< gpc0.tc; vpo, which serves all GPCs
   std::string slot;            ///< the kind of unit: tc
@@ -49,10 +49,15 @@ struct ForeignMemory {
 /// Makes the module of a name for so many units. At fidelities without time there are no accesses, and it is not called.
 using MemoryMaker = std::function<ForeignMemory(const std::string& name, unsigned units)>;
 
-struct MemoryInstance {
+struct ForeignInstance {
   std::string path;
-  MemoryMaker make;                ///< none for the L2 of this library
-  std::vector<std::string> units;  ///< connected to it; the L2 may be among them, which then lies above
+  MemoryMaker make;
+};
+
+/// From the memory port of a unit, or of a memory above, to a memory. Each is the path of an instance.
+struct MemoryLink {
+  std::string from;
+  std::string to;
 };
 
 /// A GPU as a list of units and links, which every fidelity elaborates: what is missing here is missing everywhere. A
@@ -64,18 +69,19 @@ class Netlist {
   explicit Netlist(unsigned gpcs) : gpcs_(gpcs) {}
   unsigned gpcs() const { return gpcs_; }
 
-  /// Adds a unit. The path ends in its slot, or `slot` says what it is; gpcN. at its beginning puts it in a GPC.
+  /// Adds a unit, or a memory of this library. The path ends in its slot, or `slot` says what it is; gpcN. at its
+  /// beginning puts it in a GPC.
   void add(const std::string& path, const std::string& slot = "", const std::string& implementation = "");
   /// Connects two ports, PATH.PORT each. `depth`: items that the receiver's queue holds; `latency`: cycles from push to
   /// visibility, at least 1. Ports are checked when the netlist is elaborated.
   void connect(const std::string& from, const std::string& to, unsigned depth = 4, unsigned latency = 1);
 
-  /// Adds the L2 of this library, with the parameters `l2`, or a memory of another make in its place.
-  void add_memory(const std::string& path, MemoryMaker make = nullptr);
-  /// Puts a memory of another make in the place of one. It has nothing below.
+  /// Adds a memory of another make.
+  void add_memory(const std::string& path, MemoryMaker make);
+  /// Puts a memory of another make in the place of a memory. It has nothing below.
   void replace_memory(const std::string& path, MemoryMaker make);
-  /// Binds the memory port of a unit; or puts a memory of another make below the L2, given as `unit`.
-  void connect_memory(const std::string& unit, const std::string& memory);
+  /// Binds the memory port of a unit to a memory; or of a memory, which then lies above. It is moved if it was bound.
+  void connect_memory(const std::string& from, const std::string& memory);
 
   /// Puts another implementation into an instance.
   void replace(const std::string& path, const std::string& implementation);
@@ -92,23 +98,35 @@ class Netlist {
 
   const std::vector<Instance>& instances() const { return instances_; }
   const std::vector<Link>& links() const { return links_; }
-  const std::vector<MemoryInstance>& memories() const { return memories_; }
+  const std::vector<ForeignInstance>& foreign_memories() const { return foreign_memories_; }
+  const std::vector<MemoryLink>& memory_links() const { return memory_links_; }
+  /// The paths of what is bound to a memory, in the order of its ports.
+  std::vector<std::string> bound_to(const std::string& memory) const;
+  /// The paths of the memories that a unit's port is bound to, or one of these; in the order in which they were added,
+  /// those of another make at the end.
+  std::vector<std::string> used_memories() const;
+  /// Whether an instance is a memory of this library.
+  static bool is_memory(const Instance& instance);
   const std::vector<std::string>& stubs() const { return stubs_; }
 
+  /// Whether a memory of another make is there.
+  bool has_foreign(const std::string& path) const;
   /// Null for none.
   const Instance* find(const std::string& path) const;
   const Link* link_from(const std::string& port) const;
 
  private:
   Instance& instance(const std::string& path);
-  MemoryInstance& memory(const std::string& path);
-  void disconnect_memory(const std::string& unit);
+  void check_is_new(const std::string& path) const;
+  void check_memory(const std::string& path) const;
+  void disconnect_memory(const std::string& from);
   std::vector<Link>::iterator link_at(const std::string& port);
 
   unsigned gpcs_;
   std::vector<Instance> instances_;
   std::vector<Link> links_;
-  std::vector<MemoryInstance> memories_;
+  std::vector<ForeignInstance> foreign_memories_;
+  std::vector<MemoryLink> memory_links_;
   std::vector<std::string> stubs_;
 };
 

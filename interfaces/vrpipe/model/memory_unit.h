@@ -1,0 +1,48 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <systemc>
+#include <tlm>
+
+#include <vrpipe/component/statistic.h>
+#include <vrpipe/kernel/clock_domain.h>
+#include <vrpipe/model/occupancy.h>
+#include <vrpipe/pipeline/slots/memory.h>
+
+namespace vrpipe {
+
+/// The timing model of a memory: SystemC modules with sockets of the unmodified TLM-2.0 base protocol.
+class MemoryUnit {
+ public:
+  virtual ~MemoryUnit() = default;
+  /// What a memory port is bound to: port `index`, from 0.
+  virtual tlm::tlm_base_target_socket_b<32>& target(unsigned index) = 0;
+  /// To be bound to the memory below; null for a memory that has none.
+  virtual tlm::tlm_initiator_socket<32>* below() { return nullptr; }
+  virtual MemoryBehaviour& behaviour() = 0;
+  /// That depend on time; those of the functional model are reported with them.
+  virtual const StatisticSet& statistics() const = 0;
+  /// What its time went on, up to the end of the frame.
+  virtual std::vector<OccupancyPart> parts(Cycle end) const = 0;
+};
+
+/// Where a memory stands in its platform.
+struct MemoryPlace {
+  unsigned ports;   ///< memory ports that are bound to it
+  bool has_below;   ///< there is a memory below it
+  bool is_clocked;  ///< `cycle`; at `lt` and `at` its time is annotated
+};
+/// Makes the timing model of a slot around a functional model. Throws UserError for a place that it cannot take.
+using MemoryUnitMaker =
+    std::function<std::unique_ptr<MemoryUnit>(const std::string& name, ClockDomain& domain,
+                                              std::unique_ptr<Behaviour> behaviour, const MemoryPlace& place)>;
+
+/// Registered by each timing model for its slot. A second one for a slot is a problem of the registry's.
+void register_memory_unit_maker(const std::string& slot, MemoryUnitMaker maker);
+const MemoryUnitMaker& memory_unit_maker(const std::string& slot);
+
+}  // namespace vrpipe

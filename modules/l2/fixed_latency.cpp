@@ -1,0 +1,73 @@
+#include <vrpipe/component/parameter.h>
+#include <vrpipe/memory/memory_port.h>
+#include <vrpipe/model/memory_unit.h>
+#include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/registry.h>
+
+namespace vrpipe {
+
+namespace {
+
+/// An L2 that answers every access after the same time.
+class FixedLatency final : public MemoryBehaviour {
+ public:
+  struct Parameters : ParameterSet {
+    Integer latency_cycles{
+        *this, "latency_cycles", 146, 1, 100000, "cycles", "Accel-Sim, SM87_ORIN: L2 latency", "from request to data"};
+    Integer bytes_per_cycle{*this, "bytes_per_cycle", 128,          32,
+                            4096,  "bytes",           source::open, "moved for each GPC: four sectors"};
+  };
+  FixedLatency(const Parameters& parameters, const RenderContext&)
+      : timing_{parameters.latency_cycles, parameters.bytes_per_cycle} {}
+
+  void access(const MemoryRequest&) override {}
+  bool follows_accesses() const override { return false; }
+  TimingParameters timing() const override { return timing_; }
+
+ private:
+  TimingParameters timing_;
+};
+
+/// The same at `lt`, `at` and `cycle`.
+class FixedLatencyUnit final : public MemoryUnit {
+ public:
+  FixedLatencyUnit(const std::string& name, ClockDomain& domain, std::unique_ptr<FixedLatency> behaviour,
+                   const MemoryPlace& place)
+      : behaviour_(std::move(behaviour)),
+        memory_(name.c_str(), domain, behaviour_->timing().latency_cycles, behaviour_->timing().bytes_per_cycle,
+                place.ports, below_of(place)) {}
+
+  tlm::tlm_base_target_socket_b<32>& target(unsigned index) override { return memory_.port(index); }
+  tlm::tlm_initiator_socket<32>* below() override { return &memory_.below(); }
+  MemoryBehaviour& behaviour() override { return *behaviour_; }
+  const StatisticSet& statistics() const override { return memory_; }
+  std::vector<OccupancyPart> parts(Cycle end) const override {
+    return {{"bytes", 0, static_cast<double>(memory_.bytes(end)) / memory_.peak_rate(), true}};
+  }
+
+ private:
+  static MemoryBelow below_of(const MemoryPlace& place) {
+    if (!place.has_below) return MemoryBelow::none;
+    return place.is_clocked ? MemoryBelow::clocked : MemoryBelow::annotated;
+  }
+
+  std::unique_ptr<FixedLatency> behaviour_;
+  FixedLatencyMemory memory_;
+};
+
+const SlotRegistrar slot{{"l2", 110, "fixed-latency", "", true, nullptr, true}};
+const Registrar<FixedLatency, MemoryBehaviour> registrar(
+    "l2", "fixed-latency", "holds everything: a fixed latency, a number of bytes a cycle for each GPC", false,
+    Trust::trusted);
+
+[[maybe_unused]] const bool registered = [] {
+  register_memory_unit_maker("l2", [](const std::string& name, ClockDomain& domain,
+                                      std::unique_ptr<Behaviour> behaviour, const MemoryPlace& place) {
+    return std::make_unique<FixedLatencyUnit>(name, domain, behaviour_as<FixedLatency>(std::move(behaviour)), place);
+  });
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe
