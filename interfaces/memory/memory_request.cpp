@@ -39,4 +39,10 @@ MemoryTrafficCounters::MemoryTrafficCounters(StatisticSet& owner)
              made(owner, {"attribute_reads", "attribute_bytes_read", "attribute_writes", "attribute_bytes_written"},
                   "of the attributes of shaded vertices")} {}
 
+MemoryBytes MemoryTrafficCounters::bytes() const {
+  MemoryBytes sum;
+  for (const OfTraffic& traffic : moved_) sum += {traffic[false].bytes.value(), traffic[true].bytes.value()};
+  return sum;
+}
+
 }  // namespace vrpipe

@@ -41,6 +41,7 @@ class CropUnit : public Unit {
   bool idle() const override { return in_.empty() && queue_.empty() && marks_.empty(); }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket; }
+  MemoryBytes memory_bytes() const override { return memory_.moved(); }
   bool ends_frame() const override { return true; }
   Cycle end_of_frame() const override { return end_; }
 

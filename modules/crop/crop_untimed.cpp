@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "crop/sectors.h"
+
 #include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/order_monitor.h>
@@ -9,7 +11,7 @@ namespace vrpipe {
 
 namespace {
 
-/// CROP without time. It signals quad by quad. Ports as in crop_timed.cpp, but for the memory.
+/// CROP without time. It signals quad by quad. Ports as in crop_timed.cpp.
 class UntimedCrop : public UntimedUnit {
  public:
   UntimedCrop(const std::string& name, std::unique_ptr<CropBehaviour> behaviour, const RenderContext& context)
@@ -17,9 +19,13 @@ class UntimedCrop : public UntimedUnit {
         context_(context),
         out_(*this, "out_terminations"),
         in_(input<ShadedWarpItem>("in_color", [this](const ShadedWarpItem& item) { take(*item.warp); })),
-        behaviour_(std::move(behaviour)) {}
+        behaviour_(std::move(behaviour)),
+        timing_(behaviour_->timing()),
+        looked_up_at_once_(quads_looked_up_at_once(timing_)),
+        memory_({MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {}
 
   Behaviour& behaviour() override { return *behaviour_; }
+  UntimedMemoryPort* memory_port() override { return &memory_; }
 
   void prefetch(const Warp& warp) override {
     if (warp.count == 0) return;
@@ -32,12 +38,7 @@ class UntimedCrop : public UntimedUnit {
     }
   }
 
-  void observe(BlendObserver& observer) override {
-    observer_ = &observer;
-    const CropBehaviour::TimingParameters timing = behaviour_->timing();
-    writes_unchanged_ = timing.writes_unchanged;
-    looked_up_at_once_ = quads_looked_up_at_once(timing);
-  }
+  void observe(BlendObserver& observer) override { observer_ = &observer; }
 
  private:
   void take(const ShadedWarp& warp) {
@@ -49,17 +50,36 @@ class UntimedCrop : public UntimedUnit {
       const ColorSurface& surface = *behaviour_->surface();
       monitor_.emplace(surface.width(), surface.height());
     }
-    if (observer_ == nullptr) {
+    if (!follows_cache()) {
       blend(warp, 0, warp.count);
     } else {
       for (unsigned from = 0; from < warp.count; from += looked_up_at_once_) {
         const unsigned to = std::min<unsigned>(from + looked_up_at_once_, warp.count);
         behaviour_->look_up(warp, from, to, cache_);
-        for (unsigned line = 0; line < cache_.count; ++line) observer_->looked_up(cache_.lines[line]);
+        for (unsigned line = 0; line < cache_.count; ++line) {
+          if (observer_ != nullptr) observer_->looked_up(cache_.lines[line]);
+          if (memory_.connected()) move_sectors(cache_.lines[line]);
+        }
         blend(warp, from, to);
       }
     }
     warp.release();
+  }
+
+  /// Whether anybody wants to know what the colour cache does.
+  bool follows_cache() const { return observer_ != nullptr || memory_.connected(); }
+
+  void move_sectors(const CropBehaviour::LineAccess& access) {
+    const auto for_each_run = [&](std::uint32_t mask, std::uint64_t line, const auto& move) {
+      while (mask != 0) {
+        const SectorRun run = take_sector_run(mask, timing_.line_bytes / timing_.sector_bytes);
+        move(line + std::uint64_t{run.first} * timing_.sector_bytes, run.count * timing_.sector_bytes);
+      }
+    };
+    for_each_run(access.written_back, access.old_address,
+                 [&](std::uint64_t address, unsigned bytes) { memory_.write(address, bytes); });
+    for_each_run(access.filled, access.address,
+                 [&](std::uint64_t address, unsigned bytes) { memory_.read(address, bytes); });
   }
 
   void blend(const ShadedWarp& warp, unsigned from, unsigned to) {
@@ -68,7 +88,7 @@ class UntimedCrop : public UntimedUnit {
     behaviour_->blend_quads(warp, from, to, outcomes);
     for (unsigned i = from; i < to; ++i) {
       const CropBehaviour::Outcome outcome = outcomes[i];
-      if (observer_ != nullptr) account(warp, i, outcome);
+      if (follows_cache()) account(warp, i, outcome);
       if (outcome.terminated == 0) continue;
       TerminationBeat beat;
       beat.count = 1;
@@ -78,10 +98,10 @@ class UntimedCrop : public UntimedUnit {
   }
 
   void account(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) {
-    if (cache_.count > 0 && (outcome.changed || writes_unchanged_)) {
+    if (cache_.count > 0 && (outcome.changed || timing_.writes_unchanged)) {
       behaviour_->make_dirty(cache_.lines[cache_.line_of[index]].line, cache_.sectors_of[index]);
     }
-    observer_->blended(warp, index, outcome);
+    if (observer_ != nullptr) observer_->blended(warp, index, outcome);
   }
 
   const RenderContext& context_;
@@ -90,8 +110,9 @@ class UntimedCrop : public UntimedUnit {
   std::unique_ptr<CropBehaviour> behaviour_;
   std::optional<BlendOrderMonitor> monitor_;
   BlendObserver* observer_ = nullptr;
-  bool writes_unchanged_ = false;
-  unsigned looked_up_at_once_ = quads_per_warp;
+  const CropBehaviour::TimingParameters timing_;
+  const unsigned looked_up_at_once_;
+  UntimedMemoryPort memory_;
   CropBehaviour::CacheLookUp cache_;
 };
 

@@ -39,6 +39,8 @@ class FixedLatencyUnit final : public MemoryUnit {
 
   tlm::tlm_base_target_socket_b<32>& target(unsigned index) override { return memory_.port(index); }
   tlm::tlm_initiator_socket<32>* below() override { return &memory_.below(); }
+  MemoryBytes delivered() const override { return memory_.traffic().bytes(); }
+  MemoryBytes memory_bytes() const override { return {memory_.cache().bytes_filled.value(), 0}; }
   MemoryBehaviour& behaviour() override { return *behaviour_; }
   const StatisticSet& statistics() const override { return memory_; }
   std::vector<OccupancyPart> parts(Cycle end) const override {

@@ -24,11 +24,38 @@ UntimedGpu::UntimedGpu(const Configuration& configuration, Framebuffer& framebuf
     return nullptr;
   });
   for (const Placed& placed : units_) check_ports(*placed.unit, placed.instance->path, configuration.platform().name);
+  add_memories();
   for (unsigned gpc = 0; gpc < netlist.gpcs(); ++gpc) {
     UntimedUnit* const qru = of_slot("qru", gpc);
     UntimedUnit* const crop = of_slot("crop", gpc);
     if (qru != nullptr && crop != nullptr) qru->prefetch_for(*crop);
   }
+}
+
+void UntimedGpu::add_memories() {
+  const Netlist& netlist = configuration_.netlist();
+  for (const std::string& path : netlist.used_memories()) {
+    const Instance* const instance = netlist.find(path);
+    if (instance == nullptr) continue;  // of another make: it has sockets alone
+    auto made = configuration_.make_as<MemoryBehaviour>(*instance);
+    if (made->follows_accesses()) memories_.push_back({instance, std::move(made)});
+  }
+  for (const MemoryLink& link : netlist.memory_links()) {
+    MemoryBehaviour* const below = memory(link.to);
+    if (below == nullptr) continue;
+    if (MemoryBehaviour* const above = memory(link.from)) above->set_below(*below);
+    for (const Placed& placed : units_) {
+      if (placed.instance->path != link.from) continue;
+      if (UntimedMemoryPort* const port = placed.unit->memory_port()) port->connect(*below);
+    }
+  }
+}
+
+MemoryBehaviour* UntimedGpu::memory(const std::string& path) const {
+  for (const PlacedMemory& placed : memories_) {
+    if (placed.instance->path == path) return placed.memory.get();
+  }
+  return nullptr;
 }
 
 UntimedUnit* UntimedGpu::of_slot(const std::string& slot, unsigned gpc) const {

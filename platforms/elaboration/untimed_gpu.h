@@ -18,10 +18,17 @@ class UntimedGpu {
     std::unique_ptr<UntimedUnit> unit;
   };
 
+  struct PlacedMemory {
+    const Instance* instance;
+    std::unique_ptr<MemoryBehaviour> memory;
+  };
+
   /// ROPs draw into the framebuffer.
   UntimedGpu(const Configuration& configuration, Framebuffer& framebuffer);
 
   const std::vector<Placed>& units() const { return units_; }
+  /// Those that find out what is accessed.
+  const std::vector<PlacedMemory>& memories() const { return memories_; }
   /// A slot's unit in a GPC; in a slot of the front end it serves all. Null for none.
   UntimedUnit* of_slot(const std::string& slot, unsigned gpc) const;
 
@@ -29,8 +36,12 @@ class UntimedGpu {
   void run(std::atomic<float>* progress);
 
  private:
+  void add_memories();
+  MemoryBehaviour* memory(const std::string& path) const;
+
   const Configuration& configuration_;
   std::vector<Placed> units_;
+  std::vector<PlacedMemory> memories_;
 };
 
 }  // namespace vrpipe

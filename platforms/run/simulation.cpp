@@ -251,6 +251,52 @@ void check_conservation(const Counts& c) {
             c.fragments_blended);
 }
 
+/// What units and memories have asked a memory for is what it delivered. `asked_by` gives that of a path.
+template <class AskedBy>
+void check_conservation(const Netlist& netlist, const std::string& memory, const MemoryBytes& delivered,
+                        const AskedBy& asked_by) {
+  MemoryBytes asked;
+  for (const std::string& path : netlist.bound_to(memory)) asked += asked_by(path);
+  const auto check = [&](const char* what, std::uint64_t wanted, std::uint64_t moved) {
+    if (wanted == moved) return;
+    throw SimulationFault("conservation", 0,
+                          fmt::format("bytes {} {}: {} asked for, {} delivered", what, memory, wanted, moved));
+  };
+  check("read from", asked.read, delivered.read);
+  check("written to", asked.written, delivered.written);
+}
+
+void check_conservation(const Gpu& gpu, const Netlist& netlist) {
+  const auto asked_by = [&](const std::string& path) -> MemoryBytes {
+    for (const Gpu::Placed& placed : gpu.units()) {
+      if (placed.instance->path == path) return placed.unit->memory_bytes();
+    }
+    for (const Gpu::PlacedMemory& placed : gpu.memories()) {
+      if (placed.instance->path == path) return placed.memory->memory_bytes();
+    }
+    return {};
+  };
+  for (const Gpu::PlacedMemory& placed : gpu.memories()) {
+    check_conservation(netlist, placed.instance->path, placed.memory->delivered(), asked_by);
+  }
+}
+
+void check_conservation(const UntimedGpu& gpu, const Netlist& netlist) {
+  const auto asked_by = [&](const std::string& path) -> MemoryBytes {
+    for (const UntimedGpu::Placed& placed : gpu.units()) {
+      if (placed.instance->path == path && placed.unit->memory_port() != nullptr)
+        return placed.unit->memory_port()->moved();
+    }
+    for (const UntimedGpu::PlacedMemory& placed : gpu.memories()) {
+      if (placed.instance->path == path) return placed.memory->memory_bytes();
+    }
+    return {};
+  };
+  for (const UntimedGpu::PlacedMemory& placed : gpu.memories()) {
+    check_conservation(netlist, placed.instance->path, placed.memory->delivered(), asked_by);
+  }
+}
+
 /// Units and what occupied them in a run of `cycles`. Also the bottleneck, and the utilization of the slots that have
 /// one: the share of their throughput's time, over all GPCs.
 class OccupancyReport {
@@ -376,7 +422,13 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
     occupancy.add_memory(std::move(report), placed.instance->slot, placed.memory->parts(cycles));
   }
   occupancy.finish();
+  check_conservation(gpu, configuration.netlist());
   report_counts(configuration, behaviours, statistics, result);
+}
+
+bool follows_accesses(const UntimedGpu& gpu, const std::string& slot) {
+  return std::any_of(gpu.memories().begin(), gpu.memories().end(),
+                     [&](const UntimedGpu::PlacedMemory& placed) { return placed.instance->slot == slot; });
 }
 
 /// The bounds of all GPCs: the longest is the draw's.
@@ -387,6 +439,14 @@ void report_bound(const Configuration& configuration, const UntimedGpu& gpu, con
   const bool any_quads = std::any_of(bounds.begin(), bounds.end(), [](const auto& bound) { return bound.has_quads(); });
   for (const PhaseBound& bound : bounds) {
     if (bound.has_quads() || !any_quads) longest = std::max(longest, bound.cycles());
+  }
+  // A memory works side by side with the units.
+  const double period_ps = 1e6 / configuration.platform().frequency_mhz;
+  for (const UntimedGpu::PlacedMemory& placed : gpu.memories()) {
+    std::map<unsigned, double> resources;
+    for (const OccupancyPart& part : placed.memory->least_occupancy(period_ps)) {
+      longest = std::max(longest, resources[part.resource] += part.cycles);
+    }
   }
   const auto cycles = static_cast<Cycle>(longest);
   set_time(configuration, cycles, result);
@@ -401,11 +461,18 @@ void report_bound(const Configuration& configuration, const UntimedGpu& gpu, con
     unit.cycles[static_cast<unsigned>(UnitState::starved)] = cycles - busy;
     occupancy.add(std::move(unit), instance.slot, bound.parts(instance.slot));
   }
-  UnitReport report;
-  report.name = l2;
-  double moved = 0;
-  for (const PhaseBound& bound : bounds) moved += bound.busy_cycles(l2) / static_cast<double>(bounds.size());
-  occupancy.add_memory(std::move(report), l2, {{"bytes", 0, moved, true}});
+  for (const UntimedGpu::PlacedMemory& placed : gpu.memories()) {
+    UnitReport report;
+    report.name = placed.instance->path;
+    occupancy.add_memory(std::move(report), placed.instance->slot, placed.memory->least_occupancy(period_ps));
+  }
+  if (!follows_accesses(gpu, l2)) {
+    UnitReport report;
+    report.name = l2;
+    double moved = 0;
+    for (const PhaseBound& bound : bounds) moved += bound.busy_cycles(l2) / static_cast<double>(bounds.size());
+    occupancy.add_memory(std::move(report), l2, {{"bytes", 0, moved, true}});
+  }
   occupancy.finish();
 }
 
@@ -433,6 +500,10 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
     behaviours.of_instance.emplace_back(placed.instance, &behaviour);
     add_statistics(*placed.instance, behaviour, *placed.unit, statistics);
   }
+  for (const UntimedGpu::PlacedMemory& placed : gpu.memories()) {
+    statistics.add(placed.instance->slot, placed.instance->path, placed.memory->unit());
+  }
+  check_conservation(gpu, configuration.netlist());
   report_counts(configuration, behaviours, statistics, result);
   if (!bounds.empty()) report_bound(configuration, gpu, bounds, result);
 }

@@ -22,6 +22,14 @@ enum class UnitState : std::uint8_t {
 constexpr unsigned unit_states = 5;
 const char* name_of(UnitState state);
 
+/// How long a kind of work kept its resource.
+struct OccupancyPart {
+  const char* name;
+  unsigned resource;
+  double cycles;
+  bool is_throughput;
+};
+
 /// Where a draw ends: in the cycle after the last of its quads has been blended, or dropped by a test, by pruning or by
 /// a merge. Known only once all of the frame has passed; until then units say what it cannot be earlier than.
 class FrameEnd {

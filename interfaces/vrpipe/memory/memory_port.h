@@ -78,6 +78,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
     const Cycle now = clock_.domain->now();
     check_alignment(socket, now, request.address, request.bytes);
     ++in_flight_;
+    moved_.count(request);
     if (memory_ == nullptr) return send(request, tag);
     complete(std::max(memory_->serve(request, now), now + 1), tag);
   }
@@ -90,6 +91,8 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
     --in_flight_;
     return true;
   }
+  /// Asked for so far.
+  const MemoryBytes& moved() const { return moved_; }
   /// When the next known completion is due; `never` for none.
   Cycle next_completion() const { return next_completion_; }
 
@@ -131,6 +134,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   const MemoryOrigin origin_;
   const unsigned most_in_flight_;
   unsigned in_flight_ = 0;
+  MemoryBytes moved_;
   Ring<Completion> completions_;  ///< by cycle
   Cycle next_completion_ = never;
   const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet

@@ -42,6 +42,21 @@ struct MemoryRequestExtension : tlm::tlm_extension<MemoryRequestExtension> {
   }
 };
 
+/// Bytes that passed between two levels of memory.
+struct MemoryBytes {
+  std::uint64_t read = 0;
+  std::uint64_t written = 0;
+
+  void count(const MemoryRequest& request) {
+    (request.command == tlm::TLM_WRITE_COMMAND ? written : read) += request.bytes;
+  }
+  MemoryBytes& operator+=(const MemoryBytes& other) {
+    read += other.read;
+    written += other.written;
+    return *this;
+  }
+};
+
 /// The request that a payload carries; of an unknown origin if its initiator is of another make.
 MemoryRequest request_of(const tlm::tlm_generic_payload& payload);
 
@@ -55,6 +70,8 @@ class MemoryTrafficCounters {
     ++moved.accesses;
     moved.bytes += request.bytes;
   }
+  /// Of all traffic.
+  MemoryBytes bytes() const;
   std::uint64_t accesses(MemoryTraffic traffic, bool written) const { return of(traffic, written).accesses.value(); }
   std::uint64_t bytes(MemoryTraffic traffic, bool written) const { return of(traffic, written).bytes.value(); }
 

@@ -35,8 +35,11 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<>, private OutsidePort 
   /// On behalf of another origin than the port's, as a cache does.
   Cycle access(const MemoryRequest& request, Cycle at) {
     check_alignment(socket, at, request.address, request.bytes);
+    moved_.count(request);
     return memory_ == nullptr ? send(request, at) : memory_->serve(request, at);
   }
+  /// Asked for so far.
+  const MemoryBytes& moved() const { return moved_; }
 
  private:
   [[gnu::noinline]] Cycle send(const MemoryRequest& request, Cycle at);
@@ -51,6 +54,7 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<>, private OutsidePort 
   const ClockHandle clock_;
   EarlyCompletionMemory* memory_ = nullptr;  ///< if it can be asked directly
   const MemoryOrigin origin_;
+  MemoryBytes moved_;
   MemoryRequestExtension* const extension_;  ///< the payload's
   tlm::tlm_generic_payload payload_;
   std::vector<unsigned char> data_;  ///< empty before the first access

@@ -23,6 +23,9 @@ class MemoryUnit {
   virtual tlm::tlm_base_target_socket_b<32>& target(unsigned index) = 0;
   /// To be bound to the memory below; null for a memory that has none.
   virtual tlm::tlm_initiator_socket<32>* below() { return nullptr; }
+  /// By the sockets: to those above, and from the memory below.
+  virtual MemoryBytes delivered() const = 0;
+  virtual MemoryBytes memory_bytes() const { return {}; }
   virtual MemoryBehaviour& behaviour() = 0;
   /// That depend on time; those of the functional model are reported with them.
   virtual const StatisticSet& statistics() const = 0;

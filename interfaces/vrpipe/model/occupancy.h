@@ -17,14 +17,6 @@ struct WorkKind {
   bool is_throughput;      ///< utilization, work over peak rate, counts this kind
 };
 
-/// How long a kind of work kept its resource.
-struct OccupancyPart {
-  const char* name;
-  unsigned resource;
-  double cycles;
-  bool is_throughput;
-};
-
 /// What a unit's time goes on: tallies of its kinds of work. A unit can do no more than fill its busiest resource, so
 /// the cycles of a resource's kinds are at most those of the run.
 class Occupancy {

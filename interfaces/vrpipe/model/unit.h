@@ -11,6 +11,7 @@
 #include <vrpipe/kernel/accounting.h>
 #include <vrpipe/kernel/clock_domain.h>
 #include <vrpipe/kernel/link.h>
+#include <vrpipe/memory/memory_request.h>
 #include <vrpipe/model/occupancy.h>
 #include <vrpipe/pipeline/units.h>
 
@@ -43,6 +44,8 @@ class Unit : public Clocked, public sc_core::sc_module, public Component {
   virtual bool idle() const = 0;
   /// For a unit with a memory port; null otherwise.
   virtual tlm::tlm_initiator_socket<32>* memory_socket() { return nullptr; }
+  /// What it has asked for there.
+  virtual MemoryBytes memory_bytes() const { return {}; }
   /// Whether the draw is done when this unit, with others of the kind, is done: those at the end of the pipeline.
   virtual bool ends_frame() const { return false; }
   /// For such a unit: the cycle in which the end of the frame has come there and all before it is done; `never` before that.

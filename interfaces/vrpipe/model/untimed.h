@@ -115,6 +115,31 @@ class BlendObserver {
   virtual void blended(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) = 0;
 };
 
+/// A memory port without time: an access is a call of the memory's functional model.
+class UntimedMemoryPort {
+ public:
+  /// @param origin  of reads and writes
+  explicit UntimedMemoryPort(MemoryOrigin origin) : origin_(origin) {}
+
+  /// The memory outlives the port.
+  void connect(MemoryBehaviour& memory) { memory_ = &memory; }
+  /// Where it is not, accesses need not be found out.
+  bool connected() const { return memory_ != nullptr; }
+  void read(std::uint64_t address, unsigned bytes) { access({address, bytes, tlm::TLM_READ_COMMAND, origin_}); }
+  void write(std::uint64_t address, unsigned bytes) { access({address, bytes, tlm::TLM_WRITE_COMMAND, origin_}); }
+  /// On behalf of another origin than the port's. Connected.
+  void access(const MemoryRequest& request) {
+    moved_.count(request);
+    memory_->access(request);
+  }
+  const MemoryBytes& moved() const { return moved_; }
+
+ private:
+  MemoryBehaviour* memory_ = nullptr;
+  MemoryOrigin origin_;
+  MemoryBytes moved_;
+};
+
 /// A unit without time: a functional model with ports.
 class UntimedUnit : public Component {
  public:
@@ -125,6 +150,8 @@ class UntimedUnit : public Component {
   /// cycles or instructions.
   std::uint64_t items(unsigned kind) const { return items_[kind]; }
 
+  /// For a unit with a memory port; null otherwise.
+  virtual UntimedMemoryPort* memory_port() { return nullptr; }
   /// For the unit that begins a draw: does a piece of it; false after the last.
   virtual bool run_piece() { return false; }
   /// For the unit that blends: quads that will come before long. Then what they are blended into is in the host's cache.

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/memory/memory_request.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
@@ -18,6 +20,12 @@ class MemoryBehaviour : public Behaviour {
   virtual bool follows_accesses() const { return true; }
   /// The memory below, which outlives this one.
   void set_below(MemoryBehaviour& below) { below_ = &below; }
+
+  /// By `access`: to those above, and from the memory below.
+  virtual MemoryBytes delivered() const { return {}; }
+  virtual MemoryBytes memory_bytes() const { return {}; }
+  /// How long what was accessed keeps it busy at least, in cycles of a period in picoseconds: for `bound`.
+  virtual std::vector<OccupancyPart> least_occupancy(double /*period_ps*/) const { return {}; }
 
   struct TimingParameters {
     std::uint32_t latency_cycles;   ///< at least, from request to data
