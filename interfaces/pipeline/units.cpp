@@ -16,26 +16,26 @@ std::uint32_t SmBehaviour::TimingParameters::fragment_slots() const {
   return static_cast<std::uint32_t>(slots);
 }
 
+CacheOrganization CropBehaviour::TimingParameters::cache() const {
+  CacheOrganization made;
+  made.bytes = cache_bytes;
+  made.line_bytes = line_bytes;
+  made.sector_bytes = sector_bytes;
+  made.ways = ways;
+  made.replacement = replacement;
+  made.random_seed = random_seed;
+  made.hashes_sets = hashes_sets;
+  made.tells_conflicts = tells_conflicts;
+  return made;
+}
+
 void CropBehaviour::TimingParameters::check_cache(ColorFormat format) const {
-  const auto power_of_two = [](const char* name, std::uint32_t value) {
-    if (value != 0 && (value & (value - 1)) == 0) return;
-    throw UserError("unusable CROP cache", name, fmt::format("{} is no power of two", value), "use a power of two");
-  };
-  power_of_two("crop.cache_bytes", cache_bytes);
-  power_of_two("crop.line_bytes", line_bytes);
-  power_of_two("crop.sector_bytes", sector_bytes);
-  const auto at_most = [](const char* names, std::uint32_t part, const char* of, std::uint32_t whole) {
-    if (part <= whole) return;
-    throw UserError("unusable CROP cache", names, fmt::format("{} bytes do not fit into {} of {}", part, of, whole),
-                    "use powers of two: sector <= line <= cache");
-  };
-  at_most("crop.line_bytes, crop.cache_bytes", line_bytes, "a cache", cache_bytes);
-  at_most("crop.sector_bytes, crop.line_bytes", sector_bytes, "a line", line_bytes);
-  at_most("crop.line_bytes, --format", 4 * bytes_per_pixel(format), "a line", line_bytes);
-  if (line_bytes / sector_bytes > 32) {
-    throw UserError("unusable CROP cache", "crop.line_bytes, crop.sector_bytes",
-                    fmt::format("a line has {} sectors", line_bytes / sector_bytes), "use at most 32 sectors a line");
-  }
+  cache().check("CROP cache", "crop", "cache_bytes");
+  const std::uint32_t quad = 4 * bytes_per_pixel(format);
+  if (quad <= line_bytes) return;
+  throw UserError("unusable CROP cache", "crop.line_bytes, --format",
+                  fmt::format("a quad of {} bytes does not fit into a line of {}", quad, line_bytes),
+                  "use longer lines");
 }
 
 }  // namespace vrpipe

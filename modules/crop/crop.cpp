@@ -17,12 +17,17 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
               parameters.input_quads,
               parameters.latency_cycles,
               parameters.forwarding,
-              parameters.cache_bytes,
-              parameters.line_bytes,
-              parameters.sector_bytes,
+              parameters.cache.bytes,
+              parameters.cache.line_bytes,
+              parameters.cache.sector_bytes,
               parameters.mshrs,
               parameters.sectors_per_cycle,
-              parameters.writes_unchanged} {
+              parameters.writes_unchanged,
+              parameters.cache.ways,
+              parameters.cache.organization().replacement,
+              parameters.cache.random_seed,
+              parameters.cache.hash_sets,
+              parameters.cache.tell_conflicts} {
   timing_.check_cache(Format);
   if (!context.frame->draws().empty()) set_draw(0);
 }
@@ -68,7 +73,7 @@ void ColorRop<Format, Rounding>::pass(Mark mark) {
 template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
   if (!cache_) {
-    cache_ = make_crop_cache(timing_, *surface_, cache_statistics);
+    cache_.emplace(timing_.cache(), cache_statistics);
     sectors_of_quads_ = sectors_of_quads(timing_, *surface_);
   }
   const std::uint64_t tile = surface_->address(warp.tile, 0);
@@ -95,7 +100,7 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   for (unsigned place = 0; place < count; ++place) {
     out.lines[place].address = tile + std::uint64_t{line_at[place]} * timing_.line_bytes;
     out.lines[place].sectors = sectors_at[place];
-    cache_->access(out.lines[place]);
+    cache_->look_up(out.lines[place]);
   }
   // All quads need as many sectors.
   const std::uint32_t of_a_quad = sectors_of_quads_.front().sectors;

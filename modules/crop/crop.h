@@ -4,9 +4,11 @@
 #include <optional>
 #include <vector>
 
-#include "crop_cache.h"
+#include "quad_sectors.h"
 
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/memory/cache_organization.h>
+#include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/pipeline/units.h>
 
@@ -44,9 +46,7 @@ struct CropParameters : ParameterSet {
                     "flatters QM"};
   Switch previous_alpha_check{*this, "previous_alpha_check", true, source::paper_text,
                               "signal only pixels that newly pass the threshold (paper 5.2)"};
-  Integer cache_bytes{*this, "cache_bytes", 16384, 128, 1 << 24, "bytes", source::paper_table, "CROP cache"};
-  Integer line_bytes{*this, "line_bytes", 128, 32, 1024, "bytes", source::paper_table, "of a cache line"};
-  Integer sector_bytes{*this, "sector_bytes", 32, 16, 1024, "bytes", source::paper_table, "of a cache sector"};
+  CacheParameters cache{*this, {"cache_bytes", 16384, 1 << 24, "CROP cache", 0, source::measured}};
   Integer mshrs{*this,
                 "mshrs",
                 384,
@@ -80,7 +80,7 @@ class ColorRop : public CropBehaviour {
   Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) override;
   void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) override;
   void look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) override;
-  void make_dirty(std::uint32_t line, std::uint32_t sectors) override { cache_->dirty(line, sectors); }
+  void make_dirty(std::uint32_t line, std::uint32_t sectors) override { cache_->make_dirty(line, sectors); }
   TimingParameters timing() const override { return timing_; }
 
   Counter fragments_lost_to_rounding{
@@ -126,7 +126,7 @@ class ColorRop : public CropBehaviour {
   std::vector<Lanes> lost_to_rounding_;
   const bool checks_previous_;
   TimingParameters timing_;
-  std::optional<CropCache> cache_;  ///< once looked up here; the timing model of `cycle` has one of its own
+  std::optional<SectoredCache> cache_;  ///< once looked up here; the timing model of `cycle` has one of its own
   std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
 };
 

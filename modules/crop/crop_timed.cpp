@@ -1,8 +1,7 @@
 #include <algorithm>
 #include <array>
 
-#include "crop/sectors.h"
-
+#include <vrpipe/memory/sectors.h>
 #include <vrpipe/model/timed.h>
 #include <vrpipe/pipeline/order_monitor.h>
 
@@ -49,6 +48,7 @@ class TimedCrop : public TimedUnit {
         in_(*this, "in_color",
             [this](const ShadedWarpItem& item, CycleInterval visible) { return take(*item.warp, visible); }, {&out_}),
         behaviour_(std::move(behaviour)),
+        cache_statistics_(dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics),
         timing_(behaviour_->timing()),
         // A hazard is one of quads.
         at_once_(timing_.forwards ? quads_looked_up_at_once(timing_) : 1),
@@ -196,6 +196,7 @@ class TimedCrop : public TimedUnit {
     for_each_run(access.filled, [&](unsigned sector, unsigned sectors) {
       at = mshrs_.free_from(at, sectors);
       there = memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
+      for (unsigned i = 0; i < sectors; ++i) cache_statistics_.fill_cycles.see(there - at);
       mshrs_.take(sectors, there);
       moved_ += sectors;
     });
@@ -243,6 +244,7 @@ class TimedCrop : public TimedUnit {
   TimedOut<TerminationBeat> out_;
   TimedIn<ShadedWarpItem> in_;
   std::unique_ptr<CropBehaviour> behaviour_;
+  SectoredCacheStatistics& cache_statistics_;
   const CropBehaviour::TimingParameters timing_;
   const unsigned at_once_;  ///< quads looked up before the first of them is blended
   TimedMemoryPort memory_;

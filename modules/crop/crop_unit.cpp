@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <optional>
 
-#include "crop/crop_cache.h"
-#include "crop/sectors.h"
+#include "crop/quad_sectors.h"
 
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/memory_port.h>
+#include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/unit.h>
 #include <vrpipe/pipeline/order_monitor.h>
 
@@ -49,45 +49,55 @@ class CropUnit : public Unit {
   static constexpr std::size_t quads_ahead = 8;
   struct Entry {
     ColorQuad quad;
-    CropCache::Line line = CropCache::no_line;
+    SectoredCache::Line line = SectoredCache::no_line;
     std::uint32_t sectors = 0;  ///< of the line, a bit each
     std::uint32_t place = 0;    ///< in the surface's grid
   };
   // What a memory access is for: a sector of a line, or nothing that anyone waits for.
   static constexpr std::uint32_t write_back_tag = ~0U;
   static constexpr unsigned sector_bits = 5;
-  static std::uint32_t fill_tag(CropCache::Line line, unsigned sector) { return line << sector_bits | sector; }
+  static std::uint32_t fill_tag(SectoredCache::Line line, unsigned sector) { return line << sector_bits | sector; }
 
   void end_of_elaboration() override {
     surface_ = behaviour_->surface();
     if (surface_ == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     sector_shift_ = static_cast<unsigned>(__builtin_ctz(timing_.sector_bytes));
     line_shift_ = static_cast<unsigned>(__builtin_ctz(timing_.line_bytes));
-    cache_ = make_crop_cache(timing_, *surface_, dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics);
+    timing_.check_cache(surface_->format());
+    cache_statistics_ = &dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics;
+    cache_.emplace(timing_.cache(), *cache_statistics_);
+    asked_at_.resize(std::size_t{timing_.cache().lines()} * longest_run_);
     sectors_of_quads_ = sectors_of_quads(timing_, *surface_);
     sectors_of_a_quad_ = static_cast<unsigned>(__builtin_popcount(sectors_of_quads_.front().sectors));
     monitor_.emplace(surface_->width(), surface_->height());
+  }
+
+  /// The cycle in which a sector that is on its way was asked for.
+  Cycle& asked_at(SectoredCache::Line line, unsigned sector) {
+    return asked_at_[std::size_t{line} * longest_run_ + sector];
   }
 
   void finish_fills() {
     std::uint32_t tag = 0;
     while (memory_.next_completed(tag)) {
       if (tag == write_back_tag) continue;
-      cache_->finish_fill(tag >> sector_bits, tag & ((1U << sector_bits) - 1));
+      const SectoredCache::Line line = tag >> sector_bits;
+      const unsigned sector = tag & ((1U << sector_bits) - 1);
+      cache_->finish_fill(line, sector);
+      cache_statistics_->fill_cycles.see(now() - asked_at(line, sector));
       --fills_in_flight_;
     }
   }
 
   /// The line of a quad, allocated if need be; `no_line` when that has to wait.
-  CropCache::Line line_of(std::uint64_t address) {
-    const CropCache::Line found = cache_->find(address);
-    if (found != CropCache::no_line) return found;
-    if (!cache_->can_allocate() || !memory_.available()) return CropCache::no_line;
-    unsigned dirty = 0;
-    std::uint64_t old_address = 0;
-    const CropCache::Line line = cache_->allocate(address, dirty, old_address);
-    write_back_ = dirty;
-    write_back_address_ = old_address;
+  SectoredCache::Line line_of(std::uint64_t address) {
+    const SectoredCache::Line found = cache_->find(address);
+    if (found != SectoredCache::no_line) return found;
+    if (!cache_->can_allocate(address) || !memory_.available()) return SectoredCache::no_line;
+    SectoredCache::Evicted evicted;
+    const SectoredCache::Line line = cache_->allocate(address, evicted);
+    write_back_ = evicted.dirty;
+    write_back_address_ = evicted.address;
     return line;
   }
 
@@ -110,19 +120,21 @@ class CropUnit : public Unit {
     const std::size_t tile = surface_->grid().place(quad.warp->tile, 0);
     const auto [line_of_tile, sectors] = sectors_of_quads_[position];
     const std::uint64_t address = surface_->address(tile) + (std::uint64_t{line_of_tile} << line_shift_);
-    const CropCache::Line line = line_of(address);
-    if (line == CropCache::no_line) return false;
+    const SectoredCache::Line line = line_of(address);
+    if (line == SectoredCache::no_line) return false;
     for (std::uint32_t missing = sectors & cache_->absent(line); missing != 0; missing &= missing - 1) {
       if (!memory_.available() || fills_in_flight_ == timing_.mshrs) return false;
       const auto sector = static_cast<unsigned>(__builtin_ctz(missing));
       memory_.read(address + (std::uint64_t{sector} << sector_shift_), timing_.sector_bytes, fill_tag(line, sector));
       cache_->start_fill(line, sector);
+      asked_at(line, sector) = now();
       asked_for_ |= 1U << sector;
       ++fills_in_flight_;
       tokens_ -= sector_price_;
       did(CropWork::sectors, 1, now());
     }
     cache_->pin(line);
+    cache_->looked_up(line, sectors);
     if (const std::uint32_t on_their_way = cache_->filling(line) & sectors & ~asked_for_; on_their_way != 0) {
       hits_on_their_way_ += static_cast<unsigned>(__builtin_popcount(on_their_way));
     }
@@ -225,7 +237,7 @@ class CropUnit : public Unit {
                                       context_.draw(quad.warp->draw[quad.index]).epoch};
       }
       if (quad.is_last()) quad.warp->release();
-      if (outcome.changed || timing_.writes_unchanged) cache_->dirty(entry.line, entry.sectors);
+      if (outcome.changed || timing_.writes_unchanged) cache_->make_dirty(entry.line, entry.sectors);
       cache_->unpin(entry.line);
       tokens_ -= price_;
       queue_.pop();
@@ -292,7 +304,9 @@ class CropUnit : public Unit {
   const unsigned longest_run_;       ///< sectors of a line
   MemoryPort memory_;
   const ColorSurface* surface_ = nullptr;
-  std::optional<CropCache> cache_;
+  std::optional<SectoredCache> cache_;
+  SectoredCacheStatistics* cache_statistics_ = nullptr;
+  std::vector<Cycle> asked_at_;  ///< by sector of the cache
   std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
   std::optional<BlendOrderMonitor> monitor_;
   unsigned sector_shift_ = 0;  ///< log2 of the bytes of a sector
@@ -316,8 +330,8 @@ class CropUnit : public Unit {
   Cycle end_ = never;
   bool any_blended_ = false;
   unsigned sectors_of_a_quad_ = 0;
-  StatisticSet cache_statistics_{*this, "cache"};
-  Counter hits_on_their_way_{cache_statistics_, "sector_hits_on_their_way", "sectors",
+  StatisticSet more_cache_statistics_{*this, "cache"};
+  Counter hits_on_their_way_{more_cache_statistics_, "sector_hits_on_their_way", "sectors",
                              "hit while they are still being filled, at cycle"};
 };
 

@@ -1,8 +1,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "crop/sectors.h"
-
+#include <vrpipe/memory/sectors.h>
 #include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/order_monitor.h>

@@ -140,7 +140,9 @@ WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& g
     const auto* const colors = dynamic_cast<const CropBehaviour*>(&crop->behaviour());
     // A time-out flushes bins when this run does not, and quads of theirs may terminate those that are with them here.
     const bool times_out = bound.times_out();
-    const bool any_order = times_out || bound.tiles_may_overtake();
+    // Of lines that go in another order than they are used, which one goes depends on those that are waited for.
+    const bool any_line = colors->timing().replacement != Replacement::lru;
+    const bool any_order = times_out || bound.tiles_may_overtake() || any_line;
     const bool only_needed = configuration.frame().terminates_early() && times_out;
     blends_ = std::make_unique<Blends>(bound.work, configuration.frame(), *colors->surface(), colors->timing(),
                                        only_needed, any_order);

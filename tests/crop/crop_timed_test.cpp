@@ -1,5 +1,7 @@
 // CROP at lt and at, where a warp goes in one piece; what has one closed form at every fidelity is compared with cycle by
 // it.
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "support/fidelities.h"
@@ -164,6 +166,65 @@ TEST_P(CropTimedTest, NoMoreFillsAreInFlightThanItHasMissRegisters) {
 }
 
 // case B10
+/// Sectors missed when so many lines, one quad each, are drawn in turn, so many rounds.
+std::uint64_t misses_of_rounds(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings,
+                               unsigned lines, unsigned rounds, std::vector<unsigned> order = {}) {
+  CropBench crop(fidelity, context, settings);
+  if (order.empty()) {
+    for (unsigned line = 0; line < lines; ++line) order.push_back(line);
+  }
+  for (unsigned round = 0; round < rounds; ++round) {
+    // A line of RGBA16F is 4x4 pixels, 16 lines a tile, in Morton order.
+    for (const unsigned line : order) {
+      const unsigned x = (line & 1U) | (line >> 1U & 2U);
+      const unsigned y = (line >> 1U & 1U) | (line >> 2U & 2U);
+      crop.quad({static_cast<std::uint16_t>(line / 16), 0}, 16 * y + 2 * x);
+    }
+  }
+  EXPECT_NE(crop.run(), never);
+  const SectoredCacheStatistics& counts = crop.bench.behaviour<CropBehaviour>().cache_statistics;
+  EXPECT_EQ(counts.sector_accesses.value(), rounds * order.size());
+  EXPECT_EQ(counts.fill_cycles.count(), counts.sector_misses.value());
+  EXPECT_EQ(counts.sector_misses.value(), counts.sector_misses_compulsory.value() +
+                                              counts.sector_misses_capacity.value() +
+                                              counts.sector_misses_conflict.value());
+  EXPECT_EQ(counts.sector_misses_compulsory.value(), lines);
+  return counts.sector_misses.value();
+}
+
+// Published: the table's 16 KB; and a real GPU's colour cache has its knee there whatever the shape.
+TEST_P(CropTimedTest, TheKneeOfTheDefaultCacheIsAt16Kilobytes) {
+  constexpr unsigned rounds = 4;
+  for (const unsigned kilobytes : {4U, 8U, 12U, 15U, 16U, 17U, 20U, 32U}) {
+    const unsigned lines = kilobytes * 1024 / 128;
+    EXPECT_EQ(misses_of_rounds(GetParam(), context, {}, lines, rounds), kilobytes <= 16 ? lines : rounds * lines)
+        << kilobytes << " KB";
+  }
+}
+
+TEST_P(CropTimedTest, LinesOfOneSetMissInACacheOfFewWays) {
+  const std::vector<unsigned> of_one_set = {0, 16, 32, 48, 64};  // of 16 sets of 4 ways
+  const auto misses = [&](const Bench::Settings& more) {
+    Bench::Settings settings = {{"cache_bytes", "8192"}, {"tell_conflicts", "on"}};
+    settings.insert(settings.end(), more.begin(), more.end());
+    return misses_of_rounds(GetParam(), context, settings, 5, 10, of_one_set);
+  };
+  EXPECT_EQ(misses({}), 5U);
+  EXPECT_EQ(misses({{"ways", "8"}}), 5U);
+  EXPECT_EQ(misses({{"ways", "4"}}), 50U);
+  EXPECT_EQ(misses({{"ways", "4"}, {"hash_sets", "on"}}), 5U);
+}
+
+TEST_P(CropTimedTest, AFillIsSeenToTakeAsLongAsTheMemory) {
+  CropBench crop(GetParam(), context, {}, 77);
+  for (unsigned i = 0; i < 10; ++i) crop.quad({static_cast<std::uint16_t>(i), 0}, 0);
+  crop.run();
+  const Histogram& fills = crop.bench.behaviour<CropBehaviour>().cache_statistics.fill_cycles;
+  EXPECT_EQ(fills.count(), 10U);
+  EXPECT_EQ(fills.smallest(), 77U);
+  EXPECT_EQ(fills.largest(), 77U);
+}
+
 TEST_P(CropTimedTest, WithoutForwardingAQuadWaitsForTheOneBeforeAtItsPosition) {
   for (const bool forwarding : {true, false}) {
     CropBench crop(GetParam(), context, {{"forwarding", forwarding ? "on" : "off"}, {"latency_cycles", "8"}});

@@ -84,6 +84,10 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
     check_counter("cache.sector_hits", cache.sector_hits.value(), sector_accesses_ - sector_misses_,
                   "sectors were there");
     check_counter("cache.sector_misses", cache.sector_misses.value(), sector_misses_, "sectors were filled");
+    check_counter("cache.sector_misses_compulsory + _capacity + _conflict",
+                  cache.sector_misses_compulsory.value() + cache.sector_misses_capacity.value() +
+                      cache.sector_misses_conflict.value(),
+                  sector_misses_, "sectors were filled");
     check_counter("cache.sectors_written_back", cache.sectors_written_back.value(), written_back_,
                   "sectors were written back");
     const std::uint64_t sector_bytes = timing().sector_bytes;

@@ -5,7 +5,12 @@
 namespace vrpipe {
 
 /// What a sectored cache counts. Every access is of one line, and of one or more of its sectors:
-///     accesses = hits + misses, of lines and of sectors.
+///     accesses = hits + misses, of lines and of sectors;
+///     sector_misses = compulsory + capacity + conflict.
+/// A compulsory miss is of a sector that was never there, or, as a cache with masks of bytes may read it, never wholly.
+/// Of the others, a capacity miss is one that a fully associative cache of the same size has too that lets the least
+/// recently used line go; the rest are conflicts, which a fully associative cache has none of (Hill, "Aspects of Cache
+/// Memory and Instruction Buffer Performance", 1987).
 struct SectoredCacheStatistics : StatisticSet {
   /// The part `name` of a component.
   SectoredCacheStatistics(StatisticSet& owner, const char* name) : StatisticSet(owner, name) {}
@@ -16,11 +21,22 @@ struct SectoredCacheStatistics : StatisticSet {
   Counter lines_evicted{*this, "lines_evicted", "lines", "that went for another"};
   Counter sector_accesses{*this, "sector_accesses", "sectors", "needed, by one access each"};
   Counter sector_hits{*this, "sector_hits", "sectors", "needed that are there or on their way"};
-  Counter sector_misses{*this, "sector_misses", "sectors", "needed that have to be filled"};
+  Counter sector_misses{*this, "sector_misses", "sectors", "needed that are neither"};
+  Counter sector_misses_compulsory{*this, "sector_misses_compulsory", "sectors", "missed by the first access to them"};
+  Counter sector_misses_capacity{*this, "sector_misses_capacity", "sectors",
+                                 "missed that a fully associative cache misses too; where that is not looked into, all "
+                                 "but compulsory misses"};
+  Counter sector_misses_conflict{*this, "sector_misses_conflict", "sectors", "missed because their set was full"};
   Counter sectors_written_back{*this, "sectors_written_back", "sectors",
                                "dirty in evicted lines; those left at the end of the frame stay"};
   Counter bytes_filled{*this, "bytes_filled", "bytes", "read from the memory below"};
   Counter bytes_written_back{*this, "bytes_written_back", "bytes", "written to it"};
+  MinMax most_lines_held{*this, MinMax::Of::largest, "most_lines_held", "lines", "at a time"};
+  Histogram lines_pinned{*this, Histogram::Buckets::log2(), "lines_pinned", "lines",
+                         "of a set that are waited for when another line of it is allocated"};
+  /// Seen by timing models.
+  Histogram fill_cycles{*this, Histogram::Buckets::log2(), "fill_cycles", "cycles",
+                        "from asking for a sector until it is there"};
   Ratio line_hit_rate{*this, line_hits, line_accesses, "line_hit_rate", "hits per access", "of accesses"};
   Ratio sector_hit_rate{*this, sector_hits, sector_accesses, "sector_hit_rate", "hits per sector", "of sectors needed"};
   Ratio bytes_per_sector{*this,

@@ -27,12 +27,14 @@ struct BinItem {
 };
 
 /// Quads of a warp that are looked up before the first of them is blended. Where places in CROP's queue, lines of the
-/// cache or miss registers are few, one that is taken a few cycles longer than it need be tells; then quads go one by one.
+/// cache or miss registers are few, one that is taken a few cycles longer than it need be tells; then quads go one by one,
+/// as they do where a line could go for another one of the same warp.
 inline unsigned quads_looked_up_at_once(const CropBehaviour::TimingParameters& crop) {
   constexpr std::uint32_t enough = 16 * quads_per_warp;
   const bool roomy =
       crop.cache_bytes / crop.line_bytes >= enough && crop.input_quads >= 3 * enough && crop.mshrs >= enough;
-  return roomy ? quads_per_warp : 1;
+  const bool keeps_a_warp = crop.replacement == Replacement::lru && (crop.ways == 0 || crop.ways >= quads_per_warp);
+  return roomy && keeps_a_warp ? quads_per_warp : 1;
 }
 
 }  // namespace vrpipe

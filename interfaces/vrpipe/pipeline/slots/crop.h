@@ -8,6 +8,7 @@
 
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/memory/cache_statistics.h>
+#include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
@@ -41,15 +42,7 @@ class CropBehaviour : public Behaviour {
   }
 
   /// What the colour cache does for a line that quads need.
-  struct LineAccess {
-    std::uint32_t line = 0;          ///< of the cache, from 0
-    std::uint32_t sectors = 0;       ///< of the line that the quads need, a bit each
-    std::uint32_t filled = 0;        ///< of these, not there yet
-    std::uint32_t written_back = 0;  ///< dirty sectors of what the line held
-    bool replaced = false;           ///< the line held something else, or nothing, before
-    std::uint64_t address = 0;       ///< of the line, bytes
-    std::uint64_t old_address = 0;   ///< of what it held
-  };
+  using LineAccess = vrpipe::LineAccess;
   /// And for quads of a warp; quad `i` needs `sectors_of[i]` of the line in `lines[line_of[i]]`.
   struct CacheLookUp {
     unsigned count = 0;  ///< of lines, in the order in which they are needed first
@@ -74,8 +67,13 @@ class CropBehaviour : public Behaviour {
     std::uint32_t mshrs;              ///< sectors in flight
     std::uint32_t sectors_per_cycle;  ///< filled or written back
     bool writes_unchanged;            ///< a blend that changes no value makes its sector dirty all the same
-    /// Throws UserError for a cache that cannot be: sizes are powers of two, quad <= line <= cache, sector <= line, at
-    /// most 32 sectors a line.
+    std::uint32_t ways = 0;           ///< of a set of the cache; 0: fully associative
+    Replacement replacement = Replacement::lru;
+    std::uint32_t random_seed = 0;  ///< of random replacement
+    bool hashes_sets = false;
+    bool tells_conflicts = false;  ///< conflict misses are counted apart from capacity misses
+    CacheOrganization cache() const;
+    /// Throws UserError for a cache that cannot be (CacheOrganization::check), or whose lines do not hold a quad.
     void check_cache(ColorFormat format) const;
   };
   virtual TimingParameters timing() const = 0;

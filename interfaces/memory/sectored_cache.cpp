@@ -1,0 +1,295 @@
+#include <vrpipe/memory/sectored_cache.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include <vrpipe/arithmetic/random.h>
+
+namespace vrpipe {
+
+namespace {
+
+unsigned log2_of(std::uint64_t power_of_two) { return static_cast<unsigned>(__builtin_ctzll(power_of_two)); }
+
+unsigned count_of(std::uint32_t sectors) { return static_cast<unsigned>(__builtin_popcount(sectors)); }
+
+/// Bits of the hash for four places a line, so that chains are short.
+unsigned chain_bits(std::uint32_t lines) {
+  unsigned bits = 2;
+  while ((std::uint64_t{1} << bits) < std::uint64_t{4} * lines) ++bits;
+  return bits;
+}
+
+constexpr unsigned word_bits = 64;
+std::size_t mask_words(const CacheOrganization& organization) {
+  return (organization.line_bytes + word_bits - 1) / word_bits;
+}
+
+}  // namespace
+
+/// What a fully associative cache does with the same accesses.
+struct SectoredCache::Shadow {
+  explicit Shadow(const CacheOrganization& organization) : cache(organization, statistics) {}
+  StatisticSet owner;
+  SectoredCacheStatistics statistics{owner, "shadow"};
+  SectoredCache cache;
+};
+
+SectoredCache::SectoredCache(const CacheOrganization& organization, SectoredCacheStatistics& statistics)
+    : organization_(organization), replacement_(organization.replacement), statistics_(&statistics) {
+  organization.check("cache", "cache", "bytes");
+  ways_ = organization.ways_of_a_set();
+  line_shift_ = log2_of(organization.line_bytes);
+  sector_shift_ = log2_of(organization.sector_bytes);
+  sector_bytes_ = organization.sector_bytes;
+  set_bits_ = log2_of(organization.sets());
+  lines_.resize(organization.lines());
+  for (Line line = 0; line < lines_.size(); ++line) lines_[line].set = line / ways_;
+  sets_.resize(organization.sets());
+  const unsigned bits = chain_bits(organization.lines());
+  chain_shift_ = 64 - bits;
+  chains_.assign(std::size_t{1} << bits, no_line);
+  if (organization.write_allocate == WriteAllocate::byte_mask) {
+    byte_masks_.resize(lines_.size() * mask_words(organization));
+  }
+  if (organization.tells_conflicts && organization.sets() > 1) {
+    CacheOrganization of_one_set = organization;
+    of_one_set.ways = 0;
+    of_one_set.replacement = Replacement::lru;
+    of_one_set.tells_conflicts = false;
+    shadow_ = std::make_unique<Shadow>(of_one_set);
+  }
+}
+
+SectoredCache::~SectoredCache() = default;
+SectoredCache::SectoredCache(SectoredCache&& other) noexcept = default;
+
+SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evicted) {
+  const std::uint64_t tag = address >> line_shift_;
+  const std::uint32_t index = set_of_tag(tag);
+  Set& set = sets_[index];
+  if (set.pinned == ways_) throw std::logic_error("a line was allocated in a set of which every line is pinned");
+  ++allocated_;
+  ++statistics_->line_misses;
+  statistics_->lines_pinned.see(set.pinned);
+  evicted = {};
+  Line line;
+  if (set.held < ways_) {
+    line = free_line(index);
+  } else {
+    line = victim(index);
+    const Entry& entry = lines_[line];
+    evicted = {entry.tag << line_shift_, entry.dirty, entry.dirty & ~entry.present};
+    ++statistics_->lines_evicted;
+    count_written_back(evicted.dirty);
+    forget(line);
+    ++evictions_;
+  }
+  ++set.held;
+  statistics_->most_lines_held.see(++held_);
+  Entry& entry = lines_[line];
+  entry.tag = tag;
+  Line& chain = chains_[chain_of(tag)];
+  entry.next = chain;
+  chain = line;
+  if (is_masked()) {
+    const std::size_t words = mask_words(organization_);
+    std::fill_n(byte_masks_.begin() + static_cast<std::ptrdiff_t>(line * words), words, 0);
+  }
+  if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) {
+    make_newest(set, line);
+  } else {
+    use(line);
+  }
+  return line;
+}
+
+SectoredCache::Line SectoredCache::free_line(std::uint32_t set) {
+  std::uint32_t& way = sets_[set].lowest_free;
+  while (lines_[set * ways_ + way].tag != no_tag) ++way;
+  return set * ways_ + way++;
+}
+
+SectoredCache::Line SectoredCache::victim(std::uint32_t set) {
+  switch (replacement_) {
+    case Replacement::lru: break;
+    case Replacement::fifo: {
+      Line line = sets_[set].oldest;
+      while (lines_[line].pins != 0) line = lines_[line].newer;
+      return line;
+    }
+    case Replacement::random: {
+      std::uint64_t before = mix(organization_.random_seed + evictions_) % (ways_ - sets_[set].pinned);
+      Line line = set * ways_;
+      if (sets_[set].pinned == 0) return line + static_cast<Line>(before);
+      for (;; ++line) {
+        if (lines_[line].pins == 0 && before-- == 0) return line;
+      }
+    }
+    case Replacement::tree_plru: return victim_of_tree(set);
+  }
+  return sets_[set].oldest;
+}
+
+// Inner node n has children 2n and 2n + 1; way w is leaf `ways` + w.
+
+void SectoredCache::point_away(Set& set, Line line) {
+  for (std::uint32_t node = ways_ + line % ways_; node > 1; node /= 2) {
+    const std::uint64_t bit = std::uint64_t{1} << (node / 2);
+    set.tree = node % 2 == 0 ? set.tree | bit : set.tree & ~bit;
+  }
+}
+
+SectoredCache::Line SectoredCache::victim_of_tree(std::uint32_t set) const {
+  // Whether a node has a leaf that is not pinned.
+  const auto can_go = [&](std::uint32_t node) {
+    std::uint32_t end = node + 1;
+    for (; node < ways_; node *= 2) end *= 2;
+    for (; node < end; ++node) {
+      if (lines_[set * ways_ + node - ways_].pins == 0) return true;
+    }
+    return false;
+  };
+  std::uint32_t node = 1;
+  while (node < ways_) {
+    node = 2 * node + (sets_[set].tree >> node & 1U);
+    if (sets_[set].pinned != 0 && !can_go(node)) node ^= 1U;
+  }
+  return set * ways_ + node - ways_;
+}
+
+void SectoredCache::forget(Line line) {
+  Entry& entry = lines_[line];
+  Set& set = sets_[entry.set];
+  if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) unlink(set, line);
+  Line* at = &chains_[chain_of(entry.tag)];
+  while (*at != line) at = &lines_[*at].next;
+  *at = entry.next;
+  entry.tag = no_tag;
+  entry.present = entry.filling = entry.dirty = 0;
+  --set.held;
+  --held_;
+}
+
+void SectoredCache::invalidate(Line line) {
+  const Entry& entry = lines_[line];
+  if (entry.pins != 0) throw std::logic_error("a line was invalidated that is pinned");
+  if (shadow_ != nullptr) {
+    const Line shadow = shadow_->cache.find(address(line));
+    if (shadow != no_line) shadow_->cache.invalidate(shadow);
+  }
+  forget(line);
+  std::uint32_t& lowest = sets_[entry.set].lowest_free;
+  lowest = std::min(lowest, line % ways_);
+}
+
+void SectoredCache::invalidate() {
+  for (Line line = 0; line < lines_.size(); ++line) {
+    if (lines_[line].tag != no_tag) invalidate(line);
+  }
+  if (shadow_ != nullptr) shadow_->cache.invalidate();
+}
+
+bool SectoredCache::has_byte(Line line, unsigned byte) const {
+  const std::uint64_t word = byte_masks_[line * mask_words(organization_) + byte / word_bits];
+  return (word >> (byte % word_bits) & 1U) != 0;
+}
+
+std::uint32_t SectoredCache::read(Line line, unsigned first, unsigned bytes) const {
+  std::uint32_t missing = touched(first, bytes) & absent(line);
+  if (!is_masked()) return missing;
+  for (std::uint32_t rest = missing; rest != 0; rest &= rest - 1) {
+    const auto sector = static_cast<unsigned>(__builtin_ctz(rest));
+    unsigned byte = std::max(first, sector << sector_shift_);
+    const unsigned end = std::min(first + bytes, (sector + 1) << sector_shift_);
+    while (byte < end && has_byte(line, byte)) ++byte;
+    if (byte == end) missing &= ~(1U << sector);
+  }
+  return missing;
+}
+
+std::uint32_t SectoredCache::write(Line line, unsigned first, unsigned bytes) {
+  if (is_masked()) return write_masked(line, first, bytes);
+  Entry& entry = lines_[line];
+  const std::uint32_t written = touched(first, bytes);
+  const std::uint32_t missing = written & absent(line);
+  const unsigned from = (first + organization_.sector_bytes - 1) >> sector_shift_;
+  const unsigned to = (first + bytes) >> sector_shift_;
+  const std::uint32_t whole = from < to ? sector_mask(from, to - from) : 0;
+  entry.dirty |= written;
+  entry.present |= whole;
+  if (const std::uint32_t missed = missing & whole; missed != 0) {
+    count_misses(missed, whole_before_.add(entry.tag, missed));
+  }
+  return missing & ~whole;
+}
+
+std::uint32_t SectoredCache::write_masked(Line line, unsigned first, unsigned bytes) {
+  Entry& entry = lines_[line];
+  std::uint64_t* const mask = &byte_masks_[line * mask_words(organization_)];
+  std::uint32_t missed = 0;
+  std::uint32_t completed = 0;
+  const std::uint32_t written = touched(first, bytes);
+  for (std::uint32_t rest = written & ~entry.present; rest != 0; rest &= rest - 1) {
+    const auto sector = static_cast<unsigned>(__builtin_ctz(rest));
+    const unsigned begin = sector << sector_shift_;
+    const unsigned end = begin + organization_.sector_bytes;
+    unsigned before = 0;
+    unsigned after = 0;
+    for (unsigned byte = begin; byte < end; ++byte) {
+      const std::uint64_t bit = std::uint64_t{1} << (byte % word_bits);
+      std::uint64_t& word = mask[byte / word_bits];
+      before += (word & bit) != 0 ? 1U : 0U;
+      if (byte >= first && byte < first + bytes) word |= bit;
+      after += (word & bit) != 0 ? 1U : 0U;
+    }
+    if (before == 0 && (entry.filling >> sector & 1U) == 0) missed |= 1U << sector;
+    if (after == organization_.sector_bytes) completed |= 1U << sector;
+  }
+  entry.dirty |= written;
+  entry.present |= completed;
+  if (missed != 0) count_misses(missed, touched_before_.add(entry.tag, missed));
+  if (completed != 0) whole_before_.add(entry.tag, completed);
+  return 0;
+}
+
+LineAccess SectoredCache::access(std::uint64_t address, std::uint32_t bytes, bool writes) {
+  const unsigned first = static_cast<unsigned>(address) & (organization_.line_bytes - 1);
+  LineAccess access;
+  access.address = address - first;
+  access.sectors = touched(first, bytes);
+  take_line(access);
+  access.filled = writes ? write(access.line, first, bytes) : read(access.line, first, bytes);
+  Entry& entry = lines_[access.line];
+  if (access.filled != 0) {
+    entry.present |= access.filled;
+    count_fills(entry.tag, access.filled);
+  }
+  if (shadow_ != nullptr) follow(address, bytes, writes);
+  accessed(1, count_of(access.sectors));
+  return access;
+}
+
+void SectoredCache::follow(std::uint64_t line_address, std::uint32_t sectors) {
+  LineAccess access;
+  access.address = line_address;
+  access.sectors = sectors;
+  shadow_->cache.missed_sectors_ = 0;
+  shadow_->cache.look_up(access);
+  find_cause(shadow_->cache.missed_sectors_);
+}
+
+void SectoredCache::follow(std::uint64_t address, unsigned bytes, bool writes) {
+  shadow_->cache.missed_sectors_ = 0;
+  shadow_->cache.access(address, bytes, writes);
+  find_cause(shadow_->cache.missed_sectors_);
+}
+
+void SectoredCache::find_cause(std::uint32_t missed_by_shadow) {
+  const unsigned capacity = count_of(of_unknown_cause_ & missed_by_shadow);
+  statistics_->sector_misses_capacity += capacity;
+  statistics_->sector_misses_conflict += count_of(of_unknown_cause_) - capacity;
+  of_unknown_cause_ = 0;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,287 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <vrpipe/memory/cache_organization.h>
+#include <vrpipe/memory/cache_statistics.h>
+#include <vrpipe/memory/sector_history.h>
+#include <vrpipe/memory/sectors.h>
+
+namespace vrpipe {
+
+/// An access to sectors of one line, and what a cache does for it.
+struct LineAccess {
+  std::uint32_t line = 0;          ///< of the cache, from 0
+  std::uint32_t sectors = 0;       ///< of the line that are needed, a bit each
+  std::uint32_t filled = 0;        ///< of these, to be read from below
+  std::uint32_t written_back = 0;  ///< dirty sectors of what the line held
+  bool replaced = false;           ///< the line held something else, or nothing, before
+  std::uint64_t address = 0;       ///< of the line, bytes
+  std::uint64_t old_address = 0;   ///< of what it held
+};
+
+/// The tags of a cache of sectored lines, write-back; data stays elsewhere. A way that is free is taken first, the lowest
+/// one; then a line goes that is not pinned, by the replacement policy. Sectors of a line are a bit each.
+///
+/// An access is made in steps by models that follow fills through the cache: find, or can_allocate and allocate; read
+/// or write, and start_fill for what they return; pin; looked_up; later finish_fill, make_dirty and unpin. Others call
+/// look_up or access, which do it all at once. A line counts as used when it is allocated, when it loses its last pin,
+/// and when it is accessed at once; so both ways give the same order while those who pin a line first unpin it first.
+class SectoredCache {
+ public:
+  using Line = std::uint32_t;
+  static constexpr Line no_line = ~0U;
+
+  /// What happens in it is counted in `statistics`, which outlive it. Throws UserError for what cannot be.
+  SectoredCache(const CacheOrganization& organization, SectoredCacheStatistics& statistics);
+  ~SectoredCache();
+  SectoredCache(SectoredCache&& other) noexcept;
+  SectoredCache& operator=(SectoredCache&&) = delete;
+
+  const CacheOrganization& organization() const { return organization_; }
+  /// The set of an address, from 0.
+  std::uint32_t set_of(std::uint64_t address) const { return set_of_tag(address >> line_shift_); }
+
+  /// The line that holds the address; `no_line` when none does.
+  Line find(std::uint64_t address) const {
+    const std::uint64_t tag = address >> line_shift_;
+    Line line = chains_[chain_of(tag)];
+    while (line != no_line && lines_[line].tag != tag) line = lines_[line].next;
+    return line;
+  }
+  /// Of a line that is held: the first byte of what it holds.
+  std::uint64_t address(Line line) const { return lines_[line].tag << line_shift_; }
+  /// Whether a line can be had for an address that is not held: its set has one that is free or not pinned.
+  bool can_allocate(std::uint64_t address) const { return sets_[set_of(address)].pinned < ways_; }
+  /// What a line held before.
+  struct Evicted {
+    std::uint64_t address = 0;
+    std::uint32_t dirty = 0;   ///< to be written back
+    std::uint32_t masked = 0;  ///< of these, only the bytes that were written
+  };
+  /// Takes a line for an address that is not held. Throws std::logic_error if none can be had.
+  Line allocate(std::uint64_t address, Evicted& evicted);
+
+  /// Keeps a line, as one with fills on their way has to be kept.
+  void pin(Line line) {
+    Entry& entry = lines_[line];
+    if (entry.pins++ != 0) return;
+    Set& set = sets_[entry.set];
+    ++set.pinned;
+    if (replacement_ == Replacement::lru) unlink(set, line);
+  }
+  void unpin(Line line) {
+    Entry& entry = lines_[line];
+    if (--entry.pins != 0) return;
+    Set& set = sets_[entry.set];
+    --set.pinned;
+    if (replacement_ == Replacement::lru) return make_newest(set, line);
+    use(line);
+  }
+
+  std::uint32_t present(Line line) const { return lines_[line].present; }
+  /// Those on their way.
+  std::uint32_t filling(Line line) const { return lines_[line].filling; }
+  std::uint32_t absent(Line line) const { return ~(lines_[line].present | lines_[line].filling); }
+  std::uint32_t dirty(Line line) const { return lines_[line].dirty; }
+  /// Sectors to be filled for a read of bytes `first` to `first + bytes` - 1 of a line.
+  std::uint32_t read(Line line, unsigned first, unsigned bytes) const;
+  /// And for a write, which makes its sectors dirty, and those present that it completes.
+  std::uint32_t write(Line line, unsigned first, unsigned bytes);
+  void start_fill(Line line, unsigned sector) {
+    Entry& entry = lines_[line];
+    entry.filling |= 1U << sector;
+    count_fills(entry.tag, 1U << sector);
+  }
+  /// Ends what start_fill began, while the line still holds the same.
+  void finish_fill(Line line, unsigned sector) {
+    Entry& entry = lines_[line];
+    entry.filling &= ~(1U << sector);
+    entry.present |= 1U << sector;
+  }
+  void make_dirty(Line line, std::uint32_t sectors) { lines_[line].dirty |= sectors; }
+  /// After each access in steps, in their order: finds the causes of its misses.
+  void looked_up(Line line, std::uint32_t sectors) {
+    if (shadow_ != nullptr) follow(address(line), sectors);
+  }
+  void looked_up(Line line, unsigned first, unsigned bytes, bool writes) {
+    if (shadow_ != nullptr) follow(address(line) + first, bytes, writes);
+  }
+  /// Ends so many accesses, which need so many sectors: those for which nothing was allocated or missed since the
+  /// accesses before were hits.
+  void accessed(std::uint64_t accesses, std::uint64_t sectors) {
+    statistics_->line_accesses += accesses;
+    statistics_->line_hits += accesses - allocated_;
+    statistics_->sector_accesses += sectors;
+    statistics_->sector_hits += sectors - missed_;
+    allocated_ = 0;
+    missed_ = 0;
+  }
+
+  /// All at once for sectors of a line (`address` and `sectors` are given): looks it up, allocates and fills. `accessed`
+  /// follows.
+  void look_up(LineAccess& access) {
+    take_line(access);
+    Entry& entry = lines_[access.line];
+    access.filled = access.sectors & ~entry.present;
+    if (access.filled != 0) {
+      entry.present |= access.filled;
+      count_fills(entry.tag, access.filled);
+    }
+    if (shadow_ != nullptr) follow(access.address, access.sectors);
+  }
+  /// All at once for bytes of a line, as one access.
+  LineAccess access(std::uint64_t address, std::uint32_t bytes, bool writes);
+
+  /// Takes all dirty sectors: `write_back(address of the line, sectors)`, by line.
+  template <class WriteBack>
+  void flush(WriteBack&& write_back) {
+    for (Entry& entry : lines_) {
+      if (entry.dirty == 0) continue;
+      count_written_back(entry.dirty);
+      write_back(entry.tag << line_shift_, entry.dirty);
+      entry.dirty = 0;
+    }
+  }
+  /// Forgets what a line holds, which is not pinned; dirty sectors are lost.
+  void invalidate(Line line);
+  /// And what all hold.
+  void invalidate();
+  std::uint32_t lines_held() const { return held_; }
+
+ private:
+  static constexpr std::uint64_t no_tag = ~std::uint64_t{0};
+  struct Entry {
+    std::uint64_t tag = no_tag;
+    std::uint32_t present = 0;
+    std::uint32_t filling = 0;
+    std::uint32_t dirty = 0;
+    std::uint32_t pins = 0;
+    Line newer = no_line;
+    Line older = no_line;
+    Line next = no_line;  ///< of the chain
+    std::uint32_t set = 0;
+  };
+  struct Set {
+    Line newest = no_line;  ///< lru: of the lines that are not pinned, by use; fifo: of all, by allocation
+    Line oldest = no_line;
+    std::uint32_t pinned = 0;
+    std::uint32_t held = 0;
+    std::uint32_t lowest_free = 0;  ///< no way below is free
+    std::uint64_t tree = 0;         ///< tree_plru: a bit for each inner node, from 1; set: to the higher ways
+  };
+  struct Shadow;
+
+  std::size_t chain_of(std::uint64_t tag) const { return (tag * 0x9e3779b97f4a7c15ULL) >> chain_shift_; }
+  std::uint32_t set_of_tag(std::uint64_t tag) const {
+    std::uint64_t set = tag;
+    if (set_bits_ > 0 && organization_.hashes_sets) {
+      for (std::uint64_t rest = tag >> set_bits_; rest != 0; rest >>= set_bits_) set ^= rest;
+    }
+    return static_cast<std::uint32_t>(set & ((std::uint64_t{1} << set_bits_) - 1));
+  }
+  void take_line(LineAccess& access) {
+    access.line = find(access.address);
+    access.written_back = 0;
+    access.replaced = access.line == no_line;
+    if (access.replaced) {
+      Evicted evicted;
+      access.line = allocate(access.address, evicted);
+      access.written_back = evicted.dirty;
+      access.old_address = evicted.address;
+    } else {
+      use(access.line);
+    }
+  }
+  /// A line that is not pinned, or no longer.
+  void use(Line line) {
+    Set& set = sets_[lines_[line].set];
+    if (replacement_ == Replacement::lru) {
+      if (line == set.newest || lines_[line].pins != 0) return;
+      unlink(set, line);
+      make_newest(set, line);
+    } else if (replacement_ == Replacement::tree_plru) {
+      point_away(set, line);
+    }
+  }
+  void unlink(Set& set, Line line) {
+    const Entry& entry = lines_[line];
+    (entry.newer == no_line ? set.newest : lines_[entry.newer].older) = entry.older;
+    (entry.older == no_line ? set.oldest : lines_[entry.older].newer) = entry.newer;
+  }
+  void make_newest(Set& set, Line line) {
+    Entry& entry = lines_[line];
+    entry.newer = no_line;
+    entry.older = set.newest;
+    (set.newest == no_line ? set.oldest : lines_[set.newest].newer) = line;
+    set.newest = line;
+  }
+  void point_away(Set& set, Line line);
+  Line free_line(std::uint32_t set);
+  Line victim(std::uint32_t set);
+  Line victim_of_tree(std::uint32_t set) const;
+  void forget(Line line);
+  /// Those that bytes `first` to `first + bytes` - 1 of a line lie in.
+  std::uint32_t touched(unsigned first, unsigned bytes) const {
+    const unsigned from = first >> sector_shift_;
+    return sector_mask(from, ((first + bytes - 1) >> sector_shift_) - from + 1);
+  }
+  std::uint32_t write_masked(Line line, unsigned first, unsigned bytes);
+  bool has_byte(Line line, unsigned byte) const;
+  bool is_masked() const { return !byte_masks_.empty(); }
+
+  void count_fills(std::uint64_t tag, std::uint32_t sectors) {
+    statistics_->bytes_filled += static_cast<unsigned>(__builtin_popcount(sectors)) * sector_bytes_;
+    if (is_masked()) touched_before_.add(tag, sectors);
+    count_misses(sectors, whole_before_.add(tag, sectors));
+  }
+  /// Of which `compulsory`.
+  void count_misses(std::uint32_t sectors, std::uint32_t compulsory) {
+    const auto count = static_cast<unsigned>(__builtin_popcount(sectors));
+    const auto first = static_cast<unsigned>(__builtin_popcount(compulsory));
+    missed_ += count;
+    missed_sectors_ |= sectors;
+    statistics_->sector_misses += count;
+    statistics_->sector_misses_compulsory += first;
+    if (shadow_ == nullptr) {
+      statistics_->sector_misses_capacity += count - first;
+    } else {
+      of_unknown_cause_ |= sectors & ~compulsory;
+    }
+  }
+  void count_written_back(std::uint32_t sectors) {
+    const auto count = static_cast<unsigned>(__builtin_popcount(sectors));
+    statistics_->sectors_written_back += count;
+    statistics_->bytes_written_back += count * sector_bytes_;
+  }
+  void follow(std::uint64_t line_address, std::uint32_t sectors);
+  void follow(std::uint64_t address, unsigned bytes, bool writes);
+  void find_cause(std::uint32_t missed_by_shadow);
+
+  CacheOrganization organization_;
+  Replacement replacement_;
+  std::uint32_t ways_;
+  unsigned line_shift_;    ///< log2 of the bytes of a line
+  unsigned sector_shift_;  ///< log2 of the bytes of a sector
+  unsigned set_bits_;      ///< log2 of the sets
+  unsigned chain_shift_;
+  std::uint64_t sector_bytes_;
+  SectoredCacheStatistics* statistics_;
+  std::uint64_t allocated_ = 0;         ///< lines, in the accesses under way
+  std::uint64_t missed_ = 0;            ///< sectors, in these
+  std::uint32_t of_unknown_cause_ = 0;  ///< sectors missed in the access under way
+  std::uint32_t missed_sectors_ = 0;    ///< of a shadow: in its last access
+  std::uint64_t evictions_ = 0;         ///< so far, for random replacement
+  std::uint32_t held_ = 0;
+  std::vector<Entry> lines_;  ///< ways of set 0, of set 1, ...
+  std::vector<Set> sets_;
+  std::vector<Line> chains_;               ///< the first of the lines whose tags hash to a place
+  std::vector<std::uint64_t> byte_masks_;  ///< WriteAllocate::byte_mask: bytes that are there, a bit each, by line
+  SectorHistory whole_before_;             ///< sectors that were there
+  SectorHistory touched_before_;           ///< with byte masks: and those of which bytes were
+  std::unique_ptr<Shadow> shadow_;         ///< fully associative, of the same size
+};
+
+}  // namespace vrpipe
