@@ -1,9 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/slots/memory.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/observers.h>
 
@@ -34,6 +37,17 @@ void connect_units(const Netlist& netlist, Observers* observers, Find&& find) {
       unit->in(name).stub();
     }
   }
+}
+
+/// Throws UserError for a memory that cannot do without another one below, and has none.
+inline void check_below(const Netlist& netlist, const std::string& path, const MemoryBehaviour& memory,
+                        const std::string& platform) {
+  const std::vector<MemoryLink>& links = netlist.memory_links();
+  const auto is_from = [&](const MemoryLink& link) { return link.from == path; };
+  if (!memory.needs_below() || std::any_of(links.begin(), links.end(), is_from)) return;
+  throw UserError("incomplete platform " + platform, path,
+                  "it fetches what it does not hold, and no memory is below it",
+                  "add one and use connect_memory, or choose --unit " + path + "=fixed-latency");
 }
 
 /// Throws UserError for a port that is neither connected nor stubbed.

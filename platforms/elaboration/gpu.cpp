@@ -128,8 +128,10 @@ Gpu::TargetSockets Gpu::make_memory(const Instance& instance, unsigned ports) {
   const bool has_below =
       std::any_of(links.begin(), links.end(), [&](const MemoryLink& link) { return link.from == instance.path; });
   const MemoryPlace place{ports, has_below, configuration_.request().fidelity == Fidelity::cycle};
+  auto behaviour = configuration_.make_as<MemoryBehaviour>(instance);
+  check_below(configuration_.netlist(), instance.path, *behaviour, configuration_.platform().name);
   memories_.push_back(
-      {&instance, memory_unit_maker(instance.slot)(instance.path, *clock_, configuration_.make(instance), place)});
+      {&instance, memory_unit_maker(instance.slot)(instance.path, *clock_, std::move(behaviour), place)});
   TargetSockets sockets;
   for (unsigned index = 0; index < ports; ++index) sockets.push_back(&memories_.back().memory->target(index));
   return sockets;

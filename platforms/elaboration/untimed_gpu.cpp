@@ -38,6 +38,7 @@ void UntimedGpu::add_memories() {
     const Instance* const instance = netlist.find(path);
     if (instance == nullptr) continue;  // of another make: it has sockets alone
     auto made = configuration_.make_as<MemoryBehaviour>(*instance);
+    check_below(netlist, path, *made, configuration_.platform().name);
     if (made->follows_accesses()) memories_.push_back({instance, std::move(made)});
   }
   for (const MemoryLink& link : netlist.memory_links()) {

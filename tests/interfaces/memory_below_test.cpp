@@ -17,58 +17,10 @@
 #include <vrpipe/platforms/simulation.h>
 
 #include "support/foreign_memory.h"
+#include "support/memory_initiators.h"
 
 namespace vrpipe {
 namespace {
-
-struct Access {
-  Cycle at;
-  MemoryRequest request;
-};
-
-constexpr MemoryOrigin color{MemoryTraffic::color, 1};
-
-Access read(Cycle at, std::uint64_t address, unsigned bytes = 32) {
-  return {at, {address, bytes, tlm::TLM_READ_COMMAND, color}};
-}
-Access write(Cycle at, std::uint64_t address, unsigned bytes = 32) {
-  return {at, {address, bytes, tlm::TLM_WRITE_COMMAND, color}};
-}
-
-/// A unit of `cycle` that makes accesses in their cycles, and keeps when each completes.
-class ClockedInitiator : public sc_core::sc_module, public Clocked, public PortOwner {
- public:
-  ClockedInitiator(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector<Access> accesses)
-      : sc_module(name),
-        PortOwner({&domain, domain.attach(*this)}),
-        memory(*this, "memory", 1000),
-        completed(accesses.size(), never),
-        accesses_(std::move(accesses)) {}
-
-  MemoryPort memory;
-  std::vector<Cycle> completed;
-
- private:
-  Cycle tick(Cycle now) override {
-    std::uint32_t tag = 0;
-    while (memory.next_completed(tag)) completed[tag] = now;
-    for (; next_ < accesses_.size() && accesses_[next_].at <= now; ++next_) {
-      EXPECT_TRUE(memory.available());
-      memory.access(accesses_[next_].request, static_cast<std::uint32_t>(next_));
-    }
-    return std::min(memory.next_completion(), next_ < accesses_.size() ? accesses_[next_].at : never);
-  }
-  const std::vector<Access> accesses_;
-  std::size_t next_ = 0;
-};
-
-/// A unit of `lt` or `at`, as far as its memory port is concerned.
-class TimedInitiator : public sc_core::sc_module, public PortOwner {
- public:
-  TimedInitiator(const sc_core::sc_module_name& name, ClockDomain& domain)
-      : sc_module(name), PortOwner({&domain, 0}), memory(*this, "memory") {}
-  TimedMemoryPort memory;
-};
 
 /// A memory of another make that keeps what it was asked; 50 ns for each.
 class Recorder : public sc_core::sc_module {

@@ -18,6 +18,8 @@ class MemoryBehaviour : public Behaviour {
   virtual void access(const MemoryRequest& request) = 0;
   /// Whether `access` finds anything out. Without time an ideal memory is not worth asking.
   virtual bool follows_accesses() const { return true; }
+  /// Whether it cannot do without a memory below.
+  virtual bool needs_below() const { return false; }
   /// The memory below, which outlives this one.
   void set_below(MemoryBehaviour& below) { below_ = &below; }
 

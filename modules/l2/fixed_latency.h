@@ -1,12 +1,15 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/memory/memory_port.h>
 #include <vrpipe/model/memory_unit.h>
-#include <vrpipe/model/unit.h>
-#include <vrpipe/pipeline/registry.h>
+#include <vrpipe/pipeline/render_context.h>
 
 namespace vrpipe {
-
-namespace {
 
 /// An L2 that answers every access after the same time.
 class FixedLatency final : public MemoryBehaviour {
@@ -56,20 +59,5 @@ class FixedLatencyUnit final : public MemoryUnit {
   std::unique_ptr<FixedLatency> behaviour_;
   FixedLatencyMemory memory_;
 };
-
-const SlotRegistrar slot{{"l2", 110, "fixed-latency", "", true, nullptr, true}};
-const Registrar<FixedLatency, MemoryBehaviour> registrar(
-    "l2", "fixed-latency", "holds everything: a fixed latency, a number of bytes a cycle for each GPC", false,
-    Trust::trusted);
-
-[[maybe_unused]] const bool registered = [] {
-  register_memory_unit_maker("l2", [](const std::string& name, ClockDomain& domain,
-                                      std::unique_ptr<Behaviour> behaviour, const MemoryPlace& place) {
-    return std::make_unique<FixedLatencyUnit>(name, domain, behaviour_as<FixedLatency>(std::move(behaviour)), place);
-  });
-  return true;
-}();
-
-}  // namespace
 
 }  // namespace vrpipe

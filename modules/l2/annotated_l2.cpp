@@ -1,0 +1,144 @@
+#include "l2/annotated_l2.h"
+
+#include <algorithm>
+
+namespace vrpipe {
+
+/// A port of the crossbar.
+class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCompletionMemory {
+ public:
+  Port(unsigned index, AnnotatedL2& l2)
+      : socket(("port_" + std::to_string(index)).c_str()),
+        l2_(l2),
+        requests_(l2.sizes_.bytes_per_cycle),
+        responses_(l2.sizes_.bytes_per_cycle) {
+    socket.bind(*this);
+  }
+  tlm::tlm_target_socket<32, tlm::tlm_base_protocol_types, 1, sc_core::SC_ZERO_OR_MORE_BOUND> socket;
+
+  std::uint64_t bytes_in(Cycle end) const { return bytes_in_ - std::min(bytes_in_, requests_.reserved_from(end)); }
+  std::uint64_t bytes_out(Cycle end) const { return bytes_out_ - std::min(bytes_out_, responses_.reserved_from(end)); }
+
+ private:
+  Cycle serve(const MemoryRequest& request, Cycle arrival) override {
+    SectoredL2& l2 = *l2_.behaviour_;
+    l2.count(request);
+    const Cycle now = clock().now();
+    Cycle complete = 0;
+    l2.for_each_line(request, [&](std::uint64_t address, std::uint32_t bytes) {
+      const MemoryRequest part{address, bytes, request.command, request.origin};
+      const std::uint32_t in = l2.request_bytes(part);
+      const std::uint32_t out = l2.response_bytes(part);
+      bytes_in_ += in;
+      bytes_out_ += out;
+      // A request goes to its bank while its last bytes come in.
+      Cycle from = std::max(arrival, requests_.take(arrival, in, now) - 1);
+      const Cycle there = l2_.look_up(part, from, from);
+      complete = std::max({complete, responses_.take(from, out, now), there});
+    });
+    return l2_.sizes_.latency_cycles + complete;
+  }
+  const ClockDomain& clock() const override { return *l2_.clock.domain; }
+
+  // The delay that comes in says how far ahead of the clock the access is.
+  void b_transport(tlm::tlm_generic_payload& payload, sc_core::sc_time& delay) override {
+    Cycle arrival = clock().now() + clock().whole_cycles(delay);
+    if (const auto* const extension = payload.get_extension<MemoryRequestExtension>())
+      arrival -= extension->late_cycles;
+    const Cycle taken = serve(request_of(payload), arrival) - arrival;
+    delay += sc_core::sc_time::from_value(taken * clock().period().value());
+    payload.set_response_status(tlm::TLM_OK_RESPONSE);
+  }
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                                     sc_core::sc_time& delay) override {
+    if (phase == tlm::BEGIN_REQ) b_transport(payload, delay);
+    return tlm::TLM_COMPLETED;
+  }
+  bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
+
+  AnnotatedL2& l2_;
+  BandwidthReservation requests_;
+  BandwidthReservation responses_;
+  std::uint64_t bytes_in_ = 0;
+  std::uint64_t bytes_out_ = 0;
+};
+
+AnnotatedL2::AnnotatedL2(const sc_core::sc_module_name& name, ClockDomain& domain,
+                         std::unique_ptr<SectoredL2> behaviour, unsigned ports)
+    : sc_module(name),
+      PortOwner({&domain, 0}),
+      behaviour_(std::move(behaviour)),
+      sizes_(behaviour_->sizes()),
+      cache_(behaviour_->cache()),
+      memory_(*this, "below"),
+      banks_(sizes_.banks, BandwidthReservation(sizes_.bank_bytes_per_cycle)),
+      bank_bytes_(sizes_.banks),
+      fills_(std::size_t{cache_.organization().lines()} * cache_.organization().sectors_of_a_line()) {
+  for (unsigned index = 0; index < ports; ++index) ports_.push_back(std::make_unique<Port>(index, *this));
+}
+
+AnnotatedL2::~AnnotatedL2() = default;
+
+tlm::tlm_base_target_socket_b<32>& AnnotatedL2::target(unsigned index) { return ports_.at(index)->socket; }
+
+Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& from) {
+  const Cycle now = clock.domain->now();
+  const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
+  const LineAccess done = cache_.access(access.address, access.bytes, writes);
+  std::uint64_t moved = access.bytes;
+  const Cycle asks = arrival + 1;
+  behaviour_->for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, behaviour_->origin(done.line),
+                           [&](const MemoryRequest& write, const SectorRun&) {
+                             memory_.access(write, asks);
+                             moved += write.bytes;
+                           });
+  Fill* const fills = &fills_[std::size_t{done.line} * cache_.organization().sectors_of_a_line()];
+  if (done.replaced) {
+    behaviour_->origin(done.line) = access.origin;
+    std::fill_n(fills, cache_.organization().sectors_of_a_line(), Fill());
+  }
+  behaviour_->for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, access.origin,
+                           [&](const MemoryRequest& read, const SectorRun& run) {
+                             const Cycle there = memory_.access(read, asks);
+                             std::fill_n(fills + run.first, run.count, Fill{asks, there});
+                             behaviour_->statistics().fill_cycles.see(there - asks);
+                             moved += read.bytes;
+                           });
+  Cycle all_there = arrival;
+  for (std::uint32_t left = done.sectors; left != 0; left &= left - 1) {
+    Fill& fill = fills[__builtin_ctz(left)];
+    if (fill.there == 0) continue;
+    // Who ran ahead of time has asked, but this access would have been the first: it takes as long from here.
+    if (asks < fill.asked) fill = {asks, asks + (fill.there - fill.asked)};
+    all_there = std::max(all_there, fill.there);
+  }
+  const std::uint32_t bank = behaviour_->bank_of(access.address);
+  const std::uint32_t cycles = behaviour_->bank_cycles(moved);
+  const std::uint32_t bytes = cycles * sizes_.bank_bytes_per_cycle;
+  const Cycle free_at = banks_[bank].take(arrival, bytes, now);
+  bank_bytes_[bank] += bytes;
+  behaviour_->count_bank(bank, moved);
+  from = std::max(all_there, free_at - cycles);
+  return from + behaviour_->bank_cycles(access.bytes);
+}
+
+std::vector<OccupancyPart> AnnotatedL2::parts(Cycle end) const {
+  std::uint64_t in = 0;
+  std::uint64_t out = 0;
+  for (const auto& port : ports_) {
+    in += port->bytes_in(end);
+    out += port->bytes_out(end);
+  }
+  std::uint64_t banks = 0;
+  for (std::size_t bank = 0; bank < banks_.size(); ++bank) {
+    banks += bank_bytes_[bank] - std::min(bank_bytes_[bank], banks_[bank].reserved_from(end));
+  }
+  const double width = static_cast<double>(sizes_.bytes_per_cycle) * static_cast<double>(ports_.size());
+  const double of_banks = static_cast<double>(sizes_.bank_bytes_per_cycle) * sizes_.banks;
+  return {{"responses", 1, static_cast<double>(out) / width, true},
+          {"requests", 2, static_cast<double>(in) / width, false},
+          {"banks", 0, static_cast<double>(banks) / of_banks, false}};
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "l2/sectored_l2.h"
+
+#include <vrpipe/kernel/clock_domain.h>
+#include <vrpipe/memory/bandwidth.h>
+#include <vrpipe/memory/memory_port.h>
+#include <vrpipe/memory/timed_memory_port.h>
+#include <vrpipe/model/memory_unit.h>
+
+namespace vrpipe {
+
+/// The sectored L2 at `lt` and `at`: it is looked up in the order of the calls, and says at once when an access is
+/// complete. Ports and banks are reserved in time; MSHRs and places for what is evicted are not counted.
+class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private PortOwner {
+ public:
+  AnnotatedL2(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SectoredL2> behaviour,
+              unsigned ports);
+  ~AnnotatedL2() override;
+
+  tlm::tlm_base_target_socket_b<32>& target(unsigned index) override;
+  tlm::tlm_initiator_socket<32>* below() override { return &memory_.socket; }
+  MemoryBytes delivered() const override { return behaviour_->delivered(); }
+  MemoryBytes memory_bytes() const override { return memory_.moved(); }
+  MemoryBehaviour& behaviour() override { return *behaviour_; }
+  const StatisticSet& statistics() const override { return statistics_; }
+  std::vector<OccupancyPart> parts(Cycle end) const override;
+
+ private:
+  class Port;
+  /// When a sector of a line of the cache was asked for from below, and is there.
+  struct Fill {
+    Cycle asked = 0;
+    Cycle there = 0;
+  };
+  /// The first cycle in which a request in one line has its data; `from` gets when its bank has begun on it.
+  Cycle look_up(const MemoryRequest& access, Cycle arrival, Cycle& from);
+
+  std::unique_ptr<SectoredL2> behaviour_;
+  const SectoredL2::Sizes& sizes_;
+  SectoredCache& cache_;
+  TimedMemoryPort memory_;
+  std::vector<std::unique_ptr<Port>> ports_;
+  std::vector<BandwidthReservation> banks_;
+  std::vector<std::uint64_t> bank_bytes_;
+  std::vector<Fill> fills_;  ///< by line of the cache and sector
+  StatisticSet statistics_;
+};
+
+}  // namespace vrpipe

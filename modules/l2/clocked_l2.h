@@ -1,0 +1,112 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "l2/sectored_l2.h"
+
+#include <vrpipe/kernel/clock_domain.h>
+#include <vrpipe/kernel/ring.h>
+#include <vrpipe/memory/bandwidth.h>
+#include <vrpipe/memory/memory_port.h>
+#include <vrpipe/model/memory_unit.h>
+#include <vrpipe/model/occupancy.h>
+
+namespace vrpipe {
+
+/// The sectored L2 at `cycle`. A request waits at its port of the crossbar, by bank; each bank takes one at a time. There
+/// it looks up its lines, starts their fills, and waits for them among the MSHRs; then its data takes its turn on the
+/// way back. A bank whose request cannot go on, for want of an MSHR, a line or a place for what it evicts, takes no
+/// other.
+///
+/// A request that arrives in cycle t and meets nobody is taken at t + 1, which counts as t, and answered at t + 1 +
+/// latency; a fill leaves at t + 1.
+class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Clocked, private PortOwner {
+ public:
+  ClockedL2(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SectoredL2> behaviour,
+            unsigned ports);
+  ~ClockedL2() override;
+
+  tlm::tlm_base_target_socket_b<32>& target(unsigned index) override;
+  tlm::tlm_initiator_socket<32>* below() override { return &memory_.socket; }
+  MemoryBytes delivered() const override { return behaviour_->delivered(); }
+  MemoryBytes memory_bytes() const override { return memory_.moved(); }
+  MemoryBehaviour& behaviour() override { return *behaviour_; }
+  const StatisticSet& statistics() const override { return statistics_; }
+  std::vector<OccupancyPart> parts(Cycle end) const override;
+
+ private:
+  class Port;
+  static constexpr std::uint32_t nobody = ~0U;
+  /// A request, or the part of it in one line.
+  struct Request {
+    tlm::tlm_generic_payload* payload = nullptr;
+    MemoryRequest access;
+    Cycle arrival = 0;
+    std::uint32_t port = 0;
+    std::uint32_t waits_for = 0;   ///< sectors of its line
+    std::uint32_t next = nobody;   ///< that waits for the same line
+    std::uint32_t whole = nobody;  ///< what it is a part of; nobody if it is all
+    std::uint32_t parts = 0;       ///< of a whole, that are not answered yet
+    Cycle answered = 0;            ///< those that are
+  };
+  struct Bank {
+    Cycle free_at = 0;
+    std::uint32_t turn = 0;  ///< the port that is asked first
+    std::uint32_t mshrs = 0;
+    std::uint32_t write_backs = 0;
+    std::uint32_t queued = 0;  ///< requests, at all ports
+    bool stuck = false;        ///< its request waits for a fill or the memory below
+  };
+  struct Below {
+    MemoryRequest access;
+    std::uint32_t bank = 0;
+    SectoredCache::Line line = 0;
+    std::uint32_t sectors = 0;
+    Cycle since = 0;
+  };
+
+  Cycle tick(Cycle now) override;
+  std::uint32_t make_request();
+  void queue(std::uint32_t request);
+  void finish_fills(Cycle now);
+  void take_requests(Cycle now);
+  bool take_one(std::uint32_t index, Cycle now);
+  /// Whether a request finds an MSHR, a line and a place for what that evicts, as far as it may need them.
+  bool can_go_on(std::uint32_t index, const MemoryRequest& access) const;
+  void look_up(std::uint32_t index, std::uint32_t request, Cycle now);
+  void ask_below();
+  void respond(std::uint32_t request, Cycle from);
+  void answer(std::uint32_t request, Cycle at);
+  void occupy(std::uint32_t bank, std::uint64_t bytes, Cycle now);
+
+  std::unique_ptr<SectoredL2> behaviour_;
+  const SectoredL2::Sizes& sizes_;
+  SectoredCache& cache_;
+  Occupancy occupancy_;  ///< of the banks
+  MemoryPort memory_;
+  std::vector<std::unique_ptr<Port>> ports_;
+  std::vector<Bank> banks_;
+  std::uint64_t banks_with_requests_ = 0;                 ///< a bit each
+  std::vector<std::vector<Ring<std::uint32_t>>> queues_;  ///< of requests, by bank and port
+  std::vector<Request> requests_;
+  std::vector<std::uint32_t> free_requests_;
+  std::vector<std::uint32_t> waiting_;  ///< the first that waits for a line of the cache
+  Ring<Below> reads_;                   ///< that the memory below has not taken
+  Ring<Below> writes_;
+  std::vector<Below> asked_;  ///< by tag
+  std::vector<std::uint32_t> free_tags_;
+
+  StatisticSet statistics_;
+  Histogram queue_cycles_{statistics_, Histogram::Buckets::log2(), "queue_cycles", "cycles",
+                          "that a request waits for its turn at a bank"};
+  Histogram mshrs_used_{statistics_, Histogram::Buckets::log2(), "mshrs_used", "requests",
+                        "of its bank that wait for fills when another one begins to"};
+  Counter bank_stalls_{statistics_, "bank_stalls", "requests",
+                       "that had to wait in a bank for an MSHR, a line or the memory below"};
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,63 @@
+#include "l2/sectored_l2.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include <vrpipe/component/error.h>
+
+namespace vrpipe {
+
+namespace {
+
+SectoredL2::Sizes sizes_of(const SectoredL2Parameters& parameters) {
+  return {parameters.banks,        parameters.bank_bytes_per_cycle, parameters.mshrs,
+          parameters.write_backs,  parameters.latency_cycles,       parameters.bytes_per_cycle,
+          parameters.header_bytes, parameters.port_requests,        parameters.arbitration == 1U};
+}
+
+CacheOrganization checked(const SectoredL2Parameters& parameters) {
+  const CacheOrganization organization = parameters.cache.organization();
+  organization.check("L2", "l2", "bytes");
+  const std::uint32_t banks = parameters.banks;
+  if ((banks & (banks - 1)) != 0) {
+    throw UserError("impossible L2", "l2.banks", fmt::format("{} is no power of two", banks), "use a power of two");
+  }
+  if (banks > organization.sets()) {
+    throw UserError("impossible L2", "l2.banks, l2.ways",
+                    fmt::format("{} sets cannot be dealt out to {} banks", organization.sets(), banks),
+                    fmt::format("use at most {} banks, or fewer ways", organization.sets()));
+  }
+  return organization;
+}
+
+}  // namespace
+
+SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderContext&)
+    : sizes_(sizes_of(parameters)),
+      cache_(checked(parameters), statistics_),
+      origins_(cache_.organization().lines()),
+      bank_cycles_(sizes_.banks) {}
+
+void SectoredL2::access(const MemoryRequest& request) {
+  traffic_.count(request);
+  const bool writes = request.command == tlm::TLM_WRITE_COMMAND;
+  for_each_line(request, [&](std::uint64_t address, std::uint32_t bytes) {
+    const LineAccess done = cache_.access(address, bytes, writes);
+    const auto below = [&](const MemoryRequest& moved, const SectorRun&) {
+      if (below_ != nullptr) below_->access(moved);
+    };
+    for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, origins_[done.line], below);
+    if (done.replaced) origins_[done.line] = request.origin;
+    for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, request.origin, below);
+    const auto moved = static_cast<unsigned>(__builtin_popcount(done.filled) + __builtin_popcount(done.written_back));
+    count_bank(bank_of(address), bytes + std::uint64_t{moved} * cache_.organization().sector_bytes);
+  });
+}
+
+std::vector<OccupancyPart> SectoredL2::least_occupancy(double /*period_ps*/) const {
+  const std::uint64_t busiest = *std::max_element(bank_cycles_.begin(), bank_cycles_.end());
+  return {{"banks", 0, static_cast<double>(busiest), true}};
+}
+
+}  // namespace vrpipe

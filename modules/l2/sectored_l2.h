@@ -1,0 +1,150 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include <vrpipe/component/parameter.h>
+#include <vrpipe/memory/memory_request.h>
+#include <vrpipe/memory/sectored_cache.h>
+#include <vrpipe/pipeline/render_context.h>
+#include <vrpipe/pipeline/slots/memory.h>
+
+namespace vrpipe {
+
+struct SectoredL2Parameters : ParameterSet {
+  CacheParameters cache{*this,
+                        {"bytes", 4 << 20, 1U << 30, "shared by all GPCs", 16,
+                         "Accel-Sim, SM87_ORIN: 32 sub-partitions of 64 sets of 16 ways of 128 bytes"}};
+  Integer banks{*this,
+                "banks",
+                32,
+                1,
+                64,
+                "banks",
+                "Accel-Sim, SM87_ORIN: 16 partitions of 2 sub-partitions",
+                "among which the sets are dealt out"};
+  Integer bank_bytes_per_cycle{*this,
+                               "bank_bytes_per_cycle",
+                               32,
+                               16,
+                               1024,
+                               "bytes",
+                               "Accel-Sim: a sector a cycle",
+                               "read, written or filled in a bank"};
+  Integer mshrs{*this, "mshrs", 64, 1, 65536, "requests", source::open, "of a bank: that wait for fills"};
+  Integer write_backs{*this, "write_backs", 32,           1,
+                      65536, "accesses",    source::open, "of a bank, that wait for the memory below"};
+  Integer latency_cycles{
+      *this, "latency_cycles", 146, 1, 100000, "cycles", "Accel-Sim, SM87_ORIN: L2 latency", "from request to data"};
+  Integer bytes_per_cycle{
+      *this,        "bytes_per_cycle",
+      128,          32,
+      4096,         "bytes",
+      source::open, "that the crossbar moves for each of its ports, in each direction: four sectors"};
+  Integer header_bytes{*this,
+                       "header_bytes",
+                       8,
+                       1,
+                       128,
+                       "bytes",
+                       "Accel-Sim, SM87_ORIN: flits of 40 bytes carry 32",
+                       "a read, or what acknowledges a write, takes of the crossbar"};
+  Integer port_requests{*this,
+                        "port_requests",
+                        512,
+                        1,
+                        65536,
+                        "requests",
+                        "Accel-Sim, SM87_ORIN: buffers of 512 at the crossbar",
+                        "that wait at a port of the crossbar"};
+  Choice arbitration{*this, "arbitration", {"round-robin", "oldest"},
+                     0,     source::open,  "of the ports that have requests for a bank"};
+};
+
+/// The L2 that all GPCs share: a sectored cache in banks, write-back, behind a crossbar. A request of several lines is an
+/// access to each.
+class SectoredL2 final : public MemoryBehaviour {
+ public:
+  /// Throws UserError for a cache that cannot be, more banks than sets, or a port or bank narrower than a sector.
+  SectoredL2(const SectoredL2Parameters& parameters, const RenderContext& context);
+
+  void access(const MemoryRequest& request) override;
+  bool needs_below() const override { return true; }
+  MemoryBytes delivered() const override { return traffic_.bytes(); }
+  MemoryBytes memory_bytes() const override {
+    return {statistics_.bytes_filled.value(), statistics_.bytes_written_back.value()};
+  }
+  std::vector<OccupancyPart> least_occupancy(double period_ps) const override;
+  TimingParameters timing() const override { return {sizes_.latency_cycles, sizes_.bytes_per_cycle}; }
+
+  struct Sizes {
+    std::uint32_t banks, bank_bytes_per_cycle, mshrs, write_backs;
+    std::uint32_t latency_cycles, bytes_per_cycle, header_bytes, port_requests;
+    bool oldest_first;
+  };
+  const Sizes& sizes() const { return sizes_; }
+
+  // For timing models.
+
+  /// Of a piece of a request.
+  std::uint32_t bank_of(std::uint64_t address) const { return cache_.set_of(address) & (sizes_.banks - 1); }
+  SectoredCache& cache() { return cache_; }
+  SectoredCacheStatistics& statistics() { return statistics_; }
+  /// At a port.
+  void count(const MemoryRequest& request) { traffic_.count(request); }
+  /// In a bank.
+  void count_bank(std::uint32_t bank, std::uint64_t bytes) { bank_cycles_[bank] += bank_cycles(bytes); }
+  /// How long so many bytes keep a bank.
+  std::uint32_t bank_cycles(std::uint64_t bytes) const {
+    return static_cast<std::uint32_t>((bytes + sizes_.bank_bytes_per_cycle - 1) / sizes_.bank_bytes_per_cycle);
+  }
+  /// Whose data a line of the cache holds, set when it is allocated: what is written back has its origin.
+  MemoryOrigin& origin(SectoredCache::Line line) { return origins_[line]; }
+  /// Of a request in one line.
+  std::uint32_t sectors_of(const MemoryRequest& request) const {
+    const CacheOrganization& organization = cache_.organization();
+    const std::uint32_t first = static_cast<std::uint32_t>(request.address & (organization.line_bytes - 1));
+    const std::uint32_t from = first / organization.sector_bytes;
+    return sector_mask(from, (first + request.bytes - 1) / organization.sector_bytes - from + 1);
+  }
+  /// Bytes on the way in and on the way out.
+  std::uint32_t request_bytes(const MemoryRequest& request) const {
+    return request.command == tlm::TLM_WRITE_COMMAND ? request.bytes : sizes_.header_bytes;
+  }
+  std::uint32_t response_bytes(const MemoryRequest& request) const {
+    return request.command == tlm::TLM_WRITE_COMMAND ? sizes_.header_bytes : request.bytes;
+  }
+  /// Calls `piece(address, bytes)` with the part of a request in each line.
+  template <class Piece>
+  void for_each_line(const MemoryRequest& request, Piece&& piece) const {
+    const std::uint64_t line_bytes = cache_.organization().line_bytes;
+    for (std::uint64_t address = request.address; address < request.address + request.bytes;) {
+      const std::uint64_t end = std::min(request.address + request.bytes, (address / line_bytes + 1) * line_bytes);
+      piece(address, static_cast<std::uint32_t>(end - address));
+      address = end;
+    }
+  }
+  /// Calls `access(request)` for sectors of a line, in as few accesses as their alignment allows.
+  template <class Access>
+  void for_each_run(std::uint64_t line_address, std::uint32_t sectors, tlm::tlm_command command,
+                    const MemoryOrigin& origin, Access&& access) const {
+    const CacheOrganization& organization = cache_.organization();
+    while (sectors != 0) {
+      const SectorRun run = take_sector_run(sectors, organization.sectors_of_a_line());
+      access(MemoryRequest{line_address + std::uint64_t{run.first} * organization.sector_bytes,
+                           run.count * organization.sector_bytes, command, origin},
+             run);
+    }
+  }
+
+ private:
+  const Sizes sizes_;
+  MemoryTrafficCounters traffic_{*this};
+  SectoredCacheStatistics statistics_{*this, "cache"};
+  SectoredCache cache_;
+  std::vector<MemoryOrigin> origins_;       ///< by line of the cache
+  std::vector<std::uint64_t> bank_cycles_;  ///< by bank
+};
+
+}  // namespace vrpipe

@@ -1,0 +1,279 @@
+// The sectored L2 in time, at `lt` and `at` (annotated) and at `cycle` (clocked), with a memory of fixed latency below.
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "l2/annotated_l2.h"
+#include "l2/clocked_l2.h"
+
+#include <vrpipe/arithmetic/random.h>
+#include <vrpipe/platforms/simulation.h>
+
+#include "support/memory_initiators.h"
+
+namespace vrpipe {
+namespace {
+
+constexpr Cycle latency = 10;
+/// Of a sector, from the memory below: 40 cycles and two to move it.
+constexpr Cycle fill = 40 + 2;
+constexpr Cycle hit = latency + 1;
+constexpr Cycle miss = 1 + fill + hit;
+constexpr std::uint64_t line = 128;
+
+enum class Time { annotated, clocked };
+
+class L2Test : public ::testing::Test {
+ protected:
+  L2Test() {
+    start();
+    // 32 lines in 16 sets of 2 ways; a line's bank is its number's lowest bit.
+    set("bytes", "4096");
+    set("ways", "2");
+    set("banks", "2");
+    set("latency_cycles", "10");
+    set("bytes_per_cycle", "32");
+  }
+  /// Another simulation.
+  void start() {
+    units.clear();
+    l2.reset();
+    below.reset();
+    fresh_simulation();
+    clock = std::make_unique<ClockDomain>("clock", 1000);
+  }
+  void set(const std::string& name, const std::string& value) { parameters.set("l2", name, value); }
+
+  void make(Time time, unsigned ports = 1) {
+    auto behaviour = std::make_unique<SectoredL2>(parameters, RenderContext());
+    model = behaviour.get();
+    if (time == Time::clocked) {
+      l2 = std::make_unique<ClockedL2>("l2", *clock, std::move(behaviour), ports);
+    } else {
+      l2 = std::make_unique<AnnotatedL2>("l2", *clock, std::move(behaviour), ports);
+    }
+    below = std::make_unique<FixedLatencyMemory>("below", *clock, 40, 16, 1);
+    l2->below()->bind(below->port(0));
+  }
+  /// When each access of each port completes.
+  std::vector<std::vector<Cycle>> run(Time time, const std::vector<std::vector<Access>>& accesses) {
+    make(time, static_cast<unsigned>(accesses.size()));
+    std::vector<std::vector<Cycle>> completed;
+    if (time == Time::clocked) {
+      for (std::size_t port = 0; port < accesses.size(); ++port) {
+        units.push_back(
+            std::make_unique<ClockedInitiator>(("unit_" + std::to_string(port)).c_str(), *clock, accesses[port]));
+        units.back()->memory.socket.bind(l2->target(static_cast<unsigned>(port)));
+      }
+      while (!clock->run_to_rest(sc_core::sc_time(1, sc_core::SC_US))) {}
+      for (const auto& unit : units) completed.push_back(unit->completed);
+      return completed;
+    }
+    std::vector<std::unique_ptr<TimedInitiator>> ports;
+    for (std::size_t port = 0; port < accesses.size(); ++port) {
+      ports.push_back(std::make_unique<TimedInitiator>(("unit_" + std::to_string(port)).c_str(), *clock));
+      ports.back()->memory.socket.bind(l2->target(static_cast<unsigned>(port)));
+      completed.emplace_back();
+    }
+    clock->run(sc_core::sc_time(1, sc_core::SC_NS));
+    for (std::size_t port = 0; port < accesses.size(); ++port) {
+      for (const Access& access : accesses[port])
+        completed[port].push_back(ports[port]->memory.access(access.request, access.at));
+    }
+    return completed;
+  }
+  std::vector<Cycle> run(Time time, const std::vector<Access>& accesses) {
+    return run(time, std::vector<std::vector<Access>>{accesses}).front();
+  }
+  std::uint64_t bytes_below(bool written) const { return below->traffic().bytes(MemoryTraffic::color, written); }
+
+  std::unique_ptr<ClockDomain> clock;
+  SectoredL2Parameters parameters;
+  std::unique_ptr<FixedLatencyMemory> below;
+  std::unique_ptr<MemoryUnit> l2;
+  SectoredL2* model = nullptr;
+  std::vector<std::unique_ptr<ClockedInitiator>> units;
+};
+
+class L2AtEachFidelity : public L2Test, public ::testing::WithParamInterface<Time> {};
+INSTANTIATE_TEST_SUITE_P(With, L2AtEachFidelity, ::testing::Values(Time::annotated, Time::clocked),
+                         [](const auto& time) {
+                           return std::string(time.param == Time::clocked ? "Clocked" : "Annotated");
+                         });
+
+TEST_P(L2AtEachFidelity, ASectorIsFetchedWhenItIsFirstRead) {
+  EXPECT_EQ(run(GetParam(), {read(100, 64), read(300, 64)}), (std::vector<Cycle>{100 + miss, 300 + hit}));
+  EXPECT_EQ(bytes_below(false), 32U);
+}
+
+TEST_P(L2AtEachFidelity, AReadOfASectorOnItsWayWaitsForThatFill) {
+  const Cycle there = 100 + 1 + fill;
+  EXPECT_EQ(run(GetParam(), {read(100, 64), read(120, 64)}), (std::vector<Cycle>{there + hit, there + 1 + hit}));
+  EXPECT_EQ(bytes_below(false), 32U);
+}
+
+TEST_P(L2AtEachFidelity, NeighbouringSectorsAreFetchedInOneAccess) {
+  // Eight cycles to move 128 bytes from below; the bank passes a sector a cycle, as does the port.
+  EXPECT_EQ(run(GetParam(), {read(100, 0, 128)}), (std::vector<Cycle>{100 + 1 + 40 + 8 + 4 + latency}));
+  EXPECT_EQ(below->traffic().accesses(MemoryTraffic::color, false), 1U);
+}
+
+TEST_P(L2AtEachFidelity, AWriteOfWholeSectorsNeedsNoFill) {
+  const std::vector<Cycle> completed = run(GetParam(), {write(100, 64, 64), read(200, 64), read(300, 96)});
+  EXPECT_EQ(completed[1], 200 + hit);
+  EXPECT_EQ(completed[2], 300 + hit);
+  EXPECT_EQ(bytes_below(false), 0U);
+}
+
+TEST_P(L2AtEachFidelity, AWriteOfPartOfASectorFetchesIt) {
+  EXPECT_EQ(run(GetParam(), {write(100, 80, 16), read(300, 64, 16)}), (std::vector<Cycle>{100 + miss, 300 + hit}));
+  EXPECT_EQ(bytes_below(false), 32U);
+}
+
+// Sets are 16 lines apart.
+TEST_P(L2AtEachFidelity, DirtySectorsOfALineThatGoesAreWrittenBackInTheNameOfWhoWroteThem) {
+  constexpr MemoryOrigin depth{MemoryTraffic::depth_stencil, 0};
+  std::vector<Access> accesses = {write(100, 32), write(110, 64), read(200, 16 * line), read(300, 32 * line)};
+  accesses[0].request.origin = depth;
+  accesses[1].request.origin = depth;
+  run(GetParam(), accesses);
+  EXPECT_EQ(below->traffic().bytes(MemoryTraffic::depth_stencil, true), 64U);
+  EXPECT_EQ(below->traffic().accesses(MemoryTraffic::depth_stencil, true), 2U) << "32 bytes each: at 32 and at 64";
+  EXPECT_EQ(bytes_below(true), 0U);
+}
+
+TEST_P(L2AtEachFidelity, BanksWorkSideBySideAndOneAfterTheOtherInThemselves) {
+  const auto second = [&](std::uint64_t address) {
+    start();
+    // Written before, so that all hit.
+    const auto completed =
+        run(GetParam(), {{write(10, 0), write(20, line), write(30, 2 * line), read(200, 0)}, {read(200, address)}});
+    return std::max(completed[0].back(), completed[1].back());
+  };
+  EXPECT_EQ(second(line), 200 + hit);
+  EXPECT_EQ(second(2 * line), 200 + hit + 1);
+}
+
+TEST_P(L2AtEachFidelity, APortPassesItsBytesACycle) {
+  const std::vector<Cycle> completed = run(GetParam(), {write(10, 0), write(20, line), read(200, 0), read(200, line)});
+  EXPECT_EQ(completed[2], 200 + hit);
+  EXPECT_EQ(completed[3], 200 + hit + 1);
+}
+
+// Its parts go to their banks on their own; it is answered with the last.
+TEST_P(L2AtEachFidelity, ARequestOfSeveralLinesIsAnAccessToEach) {
+  run(GetParam(), {read(100, 0, 512)});
+  EXPECT_EQ(model->statistics().line_accesses.value(), 4U);
+  EXPECT_EQ(model->statistics().sector_misses.value(), 16U);
+  EXPECT_EQ(bytes_below(false), 512U);
+  EXPECT_EQ(l2->delivered().read, 512U);
+}
+
+// "Blocked at t - 1, ready at t".
+TEST_F(L2Test, AMissWithoutAnMshrWaitsForAFillOfItsBank) {
+  set("mshrs", "1");
+  const Cycle there = 100 + 1 + fill;
+  const std::vector<Cycle> completed = run(Time::clocked, {read(100, 0), read(101, 2 * line), read(102, line)});
+  EXPECT_EQ(completed[0], there + hit);
+  // Taken when the first fill has passed the bank, a cycle; its own fill leaves then.
+  EXPECT_EQ(completed[1], there + 1 + fill + hit);
+  EXPECT_EQ(completed[2], 102 + miss) << "another bank has its own";
+}
+
+TEST_F(L2Test, AHitBehindAMissWithoutAnMshrWaitsInItsBank) {
+  set("mshrs", "1");
+  const std::vector<Cycle> completed =
+      run(Time::clocked, {write(10, 4 * line), read(100, 0), read(101, 2 * line), read(102, 4 * line)});
+  EXPECT_GT(completed[3], 100 + 1 + fill + latency);
+}
+
+TEST_F(L2Test, ALineThatIsBeingFilledDoesNotGo) {
+  // Both ways of a set are on their way when a third line wants one.
+  const std::vector<Cycle> completed =
+      run(Time::clocked, {read(100, 0), read(101, 16 * line), read(102, 32 * line), read(400, 16 * line)});
+  EXPECT_EQ(completed[0], 100 + miss);
+  EXPECT_GT(completed[2], 100 + 1 + fill + fill + hit);
+  EXPECT_EQ(completed[3], 400 + hit) << "the first line went";
+}
+
+TEST_F(L2Test, AFullPortHoldsRequestsBack) {
+  set("port_requests", "1");
+  set("mshrs", "1");
+  run(Time::clocked, {read(100, 0), read(100, 2 * line), read(100, 4 * line), read(100, 6 * line)});
+  // The first is taken by its bank at 101, the second waits there for the MSHR and takes the port's place.
+  EXPECT_EQ(units[0]->issued[0], 100U);
+  EXPECT_GT(units[0]->issued[2], 101U);
+  EXPECT_GT(units[0]->issued[3], 100 + fill);
+}
+
+TEST_F(L2Test, TheOldestRequestOrTheNextPortGoesFirst) {
+  // Three ports want bank 0, which is busy for four cycles with 128 bytes from 99 on; that of port 2 has come first.
+  const auto order = [&](const char* arbitration) {
+    start();
+    set("arbitration", arbitration);
+    return run(Time::clocked, {{write(10, 0, 128), read(99, 0, 128)}, {read(101, 0)}, {read(100, 0)}});
+  };
+  const auto oldest = order("oldest");
+  EXPECT_LT(oldest[2][0], oldest[1][0]);
+  const auto in_turn = order("round-robin");
+  EXPECT_LT(in_turn[1][0], in_turn[2][0]);
+}
+
+/// Random accesses of three ports to 64 lines, twice what the L2 holds.
+std::vector<std::vector<Access>> random_accesses(std::uint64_t seed, Cycle apart) {
+  std::vector<std::vector<Access>> accesses(3);
+  Cycle at = 100;
+  for (std::uint64_t i = 0; i < 600; ++i) {
+    const std::uint64_t bits = mix(seed + i);
+    const unsigned bytes = 16U << (bits % 4);
+    const std::uint64_t address = (bits >> 8) % (64 * line) / bytes * bytes;
+    accesses[bits >> 32 & 1].push_back((bits >> 40) % 3 == 0 ? write(at, address, bytes) : read(at, address, bytes));
+    at += apart;
+  }
+  return accesses;
+}
+
+// Far apart, so that each finds the fills of those before it done: then order is all that counts.
+TEST_P(L2AtEachFidelity, CountsWhatItCountsWithoutTime) {
+  const std::vector<std::vector<Access>> accesses = random_accesses(1, 200);
+  std::vector<Access> in_order;
+  for (const auto& of_port : accesses) in_order.insert(in_order.end(), of_port.begin(), of_port.end());
+  std::stable_sort(in_order.begin(), in_order.end(), [](const auto& a, const auto& b) { return a.at < b.at; });
+  SectoredL2 untimed(parameters, RenderContext());
+  for (const Access& access : in_order) untimed.access(access.request);
+  if (GetParam() == Time::clocked) {
+    run(GetParam(), accesses);
+  } else {
+    run(GetParam(), in_order);
+  }
+  const std::vector<Counter*>& counters = model->statistics().counters();
+  for (std::size_t i = 0; i < counters.size(); ++i) {
+    EXPECT_EQ(counters[i]->value(), untimed.statistics().counters()[i]->value()) << counters[i]->name();
+  }
+  EXPECT_GT(untimed.statistics().sectors_written_back.value(), 0U);
+}
+
+// Close together, so that they are in one another's way.
+TEST_P(L2AtEachFidelity, WhatItAsksForIsWhatTheMemoryBelowDelivers) {
+  for (const char* mshrs : {"1", "2", "64"}) {
+    start();
+    set("mshrs", mshrs);
+    set("write_backs", mshrs);
+    set("port_requests", "4");
+    const auto completed = run(GetParam(), random_accesses(7, 1));
+    for (const auto& of_port : completed) {
+      for (const Cycle cycle : of_port) EXPECT_NE(cycle, never);
+    }
+    EXPECT_EQ(l2->memory_bytes().read, below->traffic().bytes().read);
+    EXPECT_EQ(l2->memory_bytes().written, below->traffic().bytes().written);
+    EXPECT_EQ(l2->memory_bytes().read, model->statistics().bytes_filled.value());
+    EXPECT_EQ(l2->memory_bytes().written, model->statistics().bytes_written_back.value());
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe
