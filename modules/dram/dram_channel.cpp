@@ -1,0 +1,334 @@
+#include "dram/dram_channel.h"
+
+#include <algorithm>
+
+namespace vrpipe {
+
+using Kind = DramCommand::Kind;
+
+DramChannel::Queue::Queue(unsigned capacity) : entries(capacity) {
+  for (std::size_t i = 0; i < capacity; ++i) entries[i].next = static_cast<std::uint16_t>(i + 1);
+}
+
+DramChannel::DramChannel(const DramTiming& timing, DramStatistics& statistics)
+    : timing_(timing),
+      statistics_(statistics),
+      reads_(timing.read_queue),
+      writes_(timing.write_queue),
+      next_refresh_(timing.refresh ? timing.refi : never) {}
+
+std::uint16_t DramChannel::take_place(Queue& queue, const DramAddress& place, Cycle now) {
+  const std::uint16_t index = queue.free;
+  Entry& entry = queue.entries[index];
+  queue.free = entry.next;
+  ++queue.count;
+  entry.row = place.row;
+  entry.sequence = sequence_++;
+  entry.arrived = now;
+  entry.column = place.column;
+  entry.follower = none;
+  entry.bank = static_cast<std::uint8_t>(place.bank);
+  entry.cause = Cause::hit;
+  return index;
+}
+
+void DramChannel::append(Queue& queue, std::uint16_t index) {
+  Entry& entry = queue.entries[index];
+  List& list = queue.of_bank[entry.bank];
+  entry.next = none;
+  entry.previous = list.last;
+  (list.last == none ? list.first : queue.entries[list.last].next) = index;
+  list.last = index;
+  ++queue.linked;
+  queue.banks |= 1U << entry.bank;
+  const Bank& bank = banks_[entry.bank];
+  if (list.hit == none && bank.open && bank.row == entry.row) list.hit = index;
+}
+
+void DramChannel::remove(Queue& queue, std::uint16_t index) {
+  Entry& entry = queue.entries[index];
+  List& list = queue.of_bank[entry.bank];
+  (entry.previous == none ? list.first : queue.entries[entry.previous].next) = entry.next;
+  (entry.next == none ? list.last : queue.entries[entry.next].previous) = entry.previous;
+  if (list.first == none) queue.banks &= ~(1U << entry.bank);
+  if (list.hit == index) find_hit(queue, entry.bank, entry.next);
+  --queue.linked;
+  --queue.count;
+  entry.next = queue.free;
+  queue.free = index;
+}
+
+void DramChannel::find_hit(Queue& queue, unsigned bank, std::uint16_t from) {
+  while (from != none && queue.entries[from].row != banks_[bank].row) from = queue.entries[from].next;
+  queue.of_bank[bank].hit = from;
+}
+
+std::uint16_t DramChannel::find(const Queue& queue, std::uint16_t from, const DramAddress& place) const {
+  while (from != none && (queue.entries[from].row != place.row || queue.entries[from].column != place.column))
+    from = queue.entries[from].next;
+  return from;
+}
+
+void DramChannel::read(const DramAddress& place, std::uint32_t tag, Cycle now) {
+  statistics_.reads_queued.see(reads_.count);
+  const bool is_queued = find(writes_, writes_.of_bank[place.bank].first, place) != none ||
+                         find(writes_, held_[place.bank].first, place) != none;
+  if (is_queued) {
+    ++statistics_.reads_forwarded;
+    statistics_.read_cycles.see(1);
+    completions_.push_in_order({now + 1, tag}, &Completion::at);
+    return;
+  }
+  now_ = now;
+  const std::uint16_t index = take_place(reads_, place, now);
+  reads_.entries[index].tag = tag;
+  append(reads_, index);
+  choose_mode();
+  chosen_ = false;
+}
+
+void DramChannel::write(const DramAddress& place, Cycle now) {
+  statistics_.writes_queued.see(writes_.count);
+  List& held = held_[place.bank];
+  if (find(writes_, writes_.of_bank[place.bank].first, place) != none || find(writes_, held.first, place) != none) {
+    ++statistics_.writes_merged;
+    return;
+  }
+  now_ = now;
+  const std::uint16_t index = take_place(writes_, place, now);
+  // Of several older reads the youngest is served last.
+  std::uint16_t older = none;
+  for (std::uint16_t read = reads_.of_bank[place.bank].first; (read = find(reads_, read, place)) != none;
+       read = reads_.entries[read].next)
+    older = read;
+  if (older == none) {
+    append(writes_, index);
+  } else {
+    reads_.entries[older].follower = index;
+    Entry& entry = writes_.entries[index];
+    entry.next = none;
+    entry.previous = held.last;
+    (held.last == none ? held.first : writes_.entries[held.last].next) = index;
+    held.last = index;
+  }
+  choose_mode();
+  chosen_ = false;
+}
+
+void DramChannel::choose_mode() {
+  const bool reads_wait = reads_.linked > 0;
+  if (draining_) {
+    const bool has_had_its_turn = reads_wait && drained_ >= timing_.write_queue;
+    if (writes_.linked > timing_.write_low && !has_had_its_turn) return;
+    draining_ = false;
+    read_ = 0;
+    statistics_.drain_cycles += now_ - drains_since_;
+    return;
+  }
+  // After a drain, reads have as long a turn as it had at least.
+  const bool reads_had_theirs = !reads_wait || drained_ == 0 || read_ >= timing_.write_high - timing_.write_low;
+  const unsigned from = reads_wait ? timing_.write_high : timing_.write_low + 1;
+  if (writes_.linked < from || !reads_had_theirs) return;
+  draining_ = true;
+  drained_ = 0;
+  drains_since_ = now_;
+}
+
+void DramChannel::choose() {
+  chosen_ = true;
+  next_.at = never;
+  serves_ = none;
+  const Queue& queue = draining_ ? writes_ : reads_;
+  const Cycle from = std::max(now_, command_bus_);
+  // Which of the entries has waited too long, if any has.
+  std::uint16_t aged = none;
+  std::uint64_t oldest = ~std::uint64_t{0};
+  for (std::uint32_t banks = queue.banks; banks != 0; banks &= banks - 1) {
+    const std::uint16_t first = queue.of_bank[static_cast<unsigned>(__builtin_ctz(banks))].first;
+    const Entry& entry = queue.entries[first];
+    if (entry.sequence >= oldest) continue;
+    oldest = entry.sequence;
+    aged = now_ - entry.arrived > timing_.age_cap ? first : none;
+  }
+  // Ranks of what can be given in the same cycle.
+  constexpr unsigned for_the_aged = 0;
+  constexpr unsigned for_a_hit = 1;
+  constexpr unsigned for_another_row = 2;
+  constexpr unsigned for_nobody = 3;
+  unsigned best_rank = 0;
+  std::uint64_t best_sequence = 0;
+  const auto consider = [&](Cycle at, unsigned rank, std::uint64_t sequence, Kind kind, unsigned bank,
+                            std::uint16_t entry) {
+    at = std::max(at, from);
+    if (at > next_.at) return;
+    if (at == next_.at && (rank > best_rank || (rank == best_rank && sequence > best_sequence))) return;
+    next_.at = at;
+    next_.kind = kind;
+    next_.bank = bank;
+    serves_ = entry;
+    best_rank = rank;
+    best_sequence = sequence;
+  };
+  for (std::uint32_t banks = queue.banks; banks != 0; banks &= banks - 1) {
+    const auto number = static_cast<unsigned>(__builtin_ctz(banks));
+    const Bank& bank = banks_[number];
+    const List& list = queue.of_bank[number];
+    const bool is_aged = aged != none && list.first == aged;
+    const std::uint16_t hit = is_aged     ? (bank.open && queue.entries[aged].row == bank.row ? aged : none)
+                              : bank.open ? list.hit
+                                          : none;
+    const unsigned group = group_of(number);
+    if (hit != none) {
+      const Cycle bus = draining_ ? next_write_[group] : next_read_[group];
+      consider(std::max(bus, bank.next_column), is_aged ? for_the_aged : for_a_hit, queue.entries[hit].sequence,
+               draining_ ? Kind::write : Kind::read, number, hit);
+      continue;
+    }
+    const unsigned rank = is_aged ? for_the_aged : for_another_row;
+    const std::uint64_t sequence = queue.entries[list.first].sequence;
+    if (bank.open) {
+      consider(bank.next_precharge, rank, sequence, Kind::precharge, number, list.first);
+    } else {
+      const Cycle at = std::max({bank.next_activate, next_activate_[group], activated_[oldest_activate_]});
+      consider(at, rank, sequence, Kind::activate, number, list.first);
+    }
+  }
+  if (timing_.closes_rows) {
+    for (std::uint32_t banks = open_banks_; banks != 0; banks &= banks - 1) {
+      const auto number = static_cast<unsigned>(__builtin_ctz(banks));
+      if (reads_.of_bank[number].hit != none || writes_.of_bank[number].hit != none) continue;
+      if ((queue.banks >> number & 1U) != 0) continue;  // closed for who needs another
+      consider(banks_[number].next_precharge, for_nobody, number, Kind::precharge, number, none);
+    }
+  }
+  if (next_.at >= next_refresh_) choose_refresh();
+}
+
+void DramChannel::choose_refresh() {
+  serves_ = none;
+  next_.bank = 0;
+  next_.at = std::max(next_refresh_, command_bus_);
+  if (open_banks_ == 0) {
+    next_.kind = Kind::refresh;
+    next_.at = std::max(next_.at, all_precharged_);
+    return;
+  }
+  next_.kind = Kind::precharge_all;
+  for (std::uint32_t banks = open_banks_; banks != 0; banks &= banks - 1)
+    next_.at = std::max(next_.at, banks_[static_cast<unsigned>(__builtin_ctz(banks))].next_precharge);
+}
+
+void DramChannel::issue() {
+  const Cycle at = next_.at;
+  chosen_ = false;
+  now_ = std::max(now_, at);
+  command_bus_ = at + (next_.kind == Kind::activate ? timing_.activate : 1);
+  switch (next_.kind) {
+    case Kind::activate: activate(at); break;
+    case Kind::read:
+    case Kind::write: move_data(at); break;
+    case Kind::precharge:
+      ++statistics_.precharges;
+      banks_[next_.bank].conflict = serves_ != none;
+      open_banks_ &= ~(1U << next_.bank);
+      close_bank(banks_[next_.bank], at, timing_.rp);
+      break;
+    case Kind::precharge_all:
+      ++statistics_.precharges;
+      for (Bank& bank : banks_) {
+        bank.conflict = false;
+        close_bank(bank, at, timing_.rp_all);
+      }
+      open_banks_ = 0;
+      break;
+    case Kind::refresh: refresh(at); break;
+  }
+  if (observer_ != nullptr) observer_->issued(next_);
+}
+
+void DramChannel::activate(Cycle at) {
+  ++statistics_.activates;
+  Queue& queue = draining_ ? writes_ : reads_;
+  Entry& entry = queue.entries[serves_];
+  Bank& bank = banks_[next_.bank];
+  entry.cause = bank.conflict ? Cause::conflict : Cause::miss;
+  bank.open = true;
+  bank.conflict = false;
+  bank.row = next_.row = entry.row;
+  open_banks_ |= 1U << next_.bank;
+  const Cycle last = at + timing_.activate - 1;
+  bank.next_column = last + timing_.rcd;
+  bank.next_precharge = last + timing_.ras;
+  bank.next_activate = at + timing_.rc;
+  const unsigned group = group_of(next_.bank);
+  for (unsigned other = 0; other < timing_.groups; ++other)
+    next_activate_[other] = std::max(next_activate_[other], at + (other == group ? timing_.rrd_l : timing_.rrd));
+  activated_[oldest_activate_] = at + timing_.faw;
+  oldest_activate_ = (oldest_activate_ + 1) & 3U;
+  find_hit(reads_, next_.bank, reads_.of_bank[next_.bank].first);
+  find_hit(writes_, next_.bank, writes_.of_bank[next_.bank].first);
+}
+
+void DramChannel::move_data(Cycle at) {
+  Queue& queue = draining_ ? writes_ : reads_;
+  const Entry entry = queue.entries[serves_];
+  Bank& bank = banks_[entry.bank];
+  next_.row = entry.row;
+  next_.column = entry.column;
+  const unsigned group = group_of(entry.bank);
+  auto& same = draining_ ? next_write_ : next_read_;
+  auto& turned = draining_ ? next_read_ : next_write_;
+  const Cycle written = at + timing_.cwl + timing_.dqss + timing_.burst;  // the last of its data, at the latest
+  for (unsigned other = 0; other < timing_.groups; ++other) {
+    same[other] = std::max(same[other], at + (other == group ? timing_.ccd_l : timing_.ccd));
+    const Cycle turn = draining_ ? written + (other == group ? timing_.wtr_l : timing_.wtr)
+                                 : at + timing_.cl + timing_.burst + timing_.rtw - timing_.cwl;
+    turned[other] = std::max(turned[other], turn);
+  }
+  bank.next_precharge = std::max(bank.next_precharge, draining_ ? written + timing_.wr : at + timing_.rtp);
+  ++(entry.cause == Cause::hit    ? statistics_.row_hits
+     : entry.cause == Cause::miss ? statistics_.row_misses
+                                  : statistics_.row_conflicts);
+  statistics_.data_cycles += timing_.burst;
+  remove(queue, serves_);
+  if (draining_) {
+    ++statistics_.writes;
+    ++drained_;
+  } else {
+    ++statistics_.reads;
+    ++read_;
+    const Cycle done = at + timing_.cl + timing_.burst;
+    statistics_.read_cycles.see(done - entry.arrived);
+    completions_.push_in_order({done, entry.tag}, &Completion::at);
+    if (entry.follower != none) {
+      Entry& write = writes_.entries[entry.follower];
+      List& held = held_[entry.bank];
+      (write.previous == none ? held.first : writes_.entries[write.previous].next) = write.next;
+      (write.next == none ? held.last : writes_.entries[write.next].previous) = write.previous;
+      append(writes_, entry.follower);
+    }
+  }
+  choose_mode();
+}
+
+void DramChannel::close_bank(Bank& bank, Cycle at, Cycle distance) {
+  bank.open = false;
+  bank.next_activate = std::max(bank.next_activate, at + distance);
+  all_precharged_ = std::max(all_precharged_, at + distance);
+  const auto number = static_cast<std::size_t>(&bank - banks_.data());
+  reads_.of_bank[number].hit = none;
+  writes_.of_bank[number].hit = none;
+}
+
+void DramChannel::refresh(Cycle at) {
+  ++statistics_.refreshes;
+  next_refresh_ += timing_.refi;
+  for (unsigned bank = 0; bank < timing_.banks; ++bank) banks_[bank].next_activate = at + timing_.rfc;
+}
+
+void DramChannel::close(Cycle end) {
+  statistics_.channel_cycles += end;
+  if (draining_) statistics_.drain_cycles += end - std::min(end, drains_since_);
+}
+
+}  // namespace vrpipe
