@@ -180,7 +180,7 @@ void DramChannel::choose() {
     const unsigned group = group_of(number);
     if (hit != none) {
       const Cycle bus = draining_ ? next_write_[group] : next_read_[group];
-      consider(std::max(bus, bank.next_column), is_aged ? for_the_aged : for_a_hit, queue.entries[hit].sequence,
+      consider(std::max(bus, bank.next_column), for_a_hit, queue.entries[hit].sequence,
                draining_ ? Kind::write : Kind::read, number, hit);
       continue;
     }
@@ -197,7 +197,6 @@ void DramChannel::choose() {
     for (std::uint32_t banks = open_banks_; banks != 0; banks &= banks - 1) {
       const auto number = static_cast<unsigned>(__builtin_ctz(banks));
       if (reads_.of_bank[number].hit != none || writes_.of_bank[number].hit != none) continue;
-      if ((queue.banks >> number & 1U) != 0) continue;  // closed for who needs another
       consider(banks_[number].next_precharge, for_nobody, number, Kind::precharge, number, none);
     }
   }
@@ -315,9 +314,6 @@ void DramChannel::close_bank(Bank& bank, Cycle at, Cycle distance) {
   bank.open = false;
   bank.next_activate = std::max(bank.next_activate, at + distance);
   all_precharged_ = std::max(all_precharged_, at + distance);
-  const auto number = static_cast<std::size_t>(&bank - banks_.data());
-  reads_.of_bank[number].hit = none;
-  writes_.of_bank[number].hit = none;
 }
 
 void DramChannel::refresh(Cycle at) {

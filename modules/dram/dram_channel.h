@@ -99,7 +99,7 @@ class DramChannel {
   /// In the order of age.
   struct List {
     std::uint16_t first = none, last = none;
-    std::uint16_t hit = none;  ///< the oldest for the open row
+    std::uint16_t hit = none;  ///< the oldest for the open row, if one is open
   };
   struct Queue {
     explicit Queue(unsigned capacity);
