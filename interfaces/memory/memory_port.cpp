@@ -112,7 +112,10 @@ tlm::tlm_sync_enum MemoryPort::nb_transport_bw(tlm::tlm_generic_payload& payload
                                                sc_core::sc_time& delay) {
   auto& access = static_cast<Access&>(payload);
   if (phase != tlm::END_REQ && phase != tlm::BEGIN_RESP) return tlm::TLM_ACCEPTED;  // ignorable ones of the memory's
-  if (requesting_ == &access) requesting_ = nullptr;                                // BEGIN_RESP implies END_REQ
+  if (requesting_ == &access) {                                                     // BEGIN_RESP implies END_REQ
+    requesting_ = nullptr;
+    requesting_until_ = clock_.domain->now() + 1;
+  }
   if (phase == tlm::END_REQ) {
     clock_.domain->wake(clock_.unit, clock_.domain->now() + 1);
     return tlm::TLM_ACCEPTED;

@@ -8,7 +8,7 @@ unsigned log2_of(std::uint32_t power_of_two) { return static_cast<unsigned>(__bu
 
 }  // namespace
 
-AddressMap::AddressMap(const DramParameters& p)
+DramAddressMap::DramAddressMap(const DramParameters& p)
     : burst_bits_(log2_of(burst_bytes(p))),
       low_column_bits_(log2_of(p.interleave_bytes / burst_bytes(p))),
       channel_bits_(log2_of(p.channels)),

@@ -15,9 +15,9 @@ struct DramAddress {
 };
 
 /// The place of each address: one burst of addresses for each place.
-class AddressMap {
+class DramAddressMap {
  public:
-  explicit AddressMap(const DramParameters& parameters);
+  explicit DramAddressMap(const DramParameters& parameters);
 
   DramAddress place_of(std::uint64_t address) const {
     std::uint64_t rest = address >> burst_bits_;

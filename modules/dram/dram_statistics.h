@@ -35,4 +35,12 @@ struct DramStatistics : StatisticSet {
                         "from a read's entry into a channel's queue to its data"};
 };
 
+/// Of the timing models, in cycles of the GPU.
+struct DramUnitStatistics : StatisticSet {
+  DramStatistics channels{*this, "channels"};
+  Counter requests_held{*this, "requests_held", "requests", "that had to wait at their port's entrance, at cycle"};
+  Histogram read_latency{*this, Histogram::Buckets::log2(), "read_latency", "cycles",
+                         "of the GPU, from a read's arrival to its answer"};
+};
+
 }  // namespace vrpipe

@@ -1,7 +1,6 @@
 #include <vrpipe/platforms/gpu.h>
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 
 #include "elaboration/elaborate.h"
@@ -26,8 +25,7 @@ namespace {
 
 Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
     : configuration_(configuration),
-      clock_(std::make_unique<ClockDomain>("clock", static_cast<std::uint64_t>(
-                                                        std::llround(1e6 / configuration.platform().frequency_mhz)))) {
+      clock_(std::make_unique<ClockDomain>("clock", configuration.context_of(0).clock_ps)) {
   const Netlist& netlist = configuration.netlist();
   const RunRequest& request = configuration.request();
   for (const Instance& instance : netlist.instances()) {
@@ -258,6 +256,7 @@ Cycle Gpu::run(std::atomic<float>* progress) {
   const Cycle last_quad = clock_->frame_end().so_far();
   const Cycle end = last_quad > 0 ? last_quad : passed;
   for (const Placed& placed : units_) placed.unit->close_account(end);
+  for (const PlacedMemory& placed : memories_) placed.memory->close(end);
   if (progress != nullptr) *progress = 1;
   return end;
 }

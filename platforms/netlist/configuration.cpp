@@ -1,6 +1,7 @@
 #include <vrpipe/platforms/configuration.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/checked_behaviours.h>
@@ -77,6 +78,8 @@ Configuration::Configuration(const RunRequest& request, const Frame& frame)
       static_cast<BlendRounding>(static_cast<unsigned>(state_parameters_.blend_rounding));
   context.precision.exponential = static_cast<Exponential>(static_cast<unsigned>(state_parameters_.exponential));
   context.precision.subpixel_bits = state_parameters_.subpixel_bits;
+  context.clock_ps =
+      std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(1e6 / request.platform->frequency_mhz)));
   context.placement.gpcs = request.platform->gpcs;
   for (unsigned& gpc = context.placement.gpc; gpc < request.platform->gpcs; ++gpc) contexts_.push_back(context);
 }

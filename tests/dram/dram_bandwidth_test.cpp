@@ -62,7 +62,7 @@ INSTANTIATE_TEST_SUITE_P(Of, DramBandwidthTest,
                          });
 
 TEST_P(DramBandwidthTest, AStreamMovesABurstAfterTheOther) {
-  const AddressMap map(parameters);
+  const DramAddressMap map(parameters);
   std::uint64_t address = 0;
   const auto next = [&](std::uint64_t) {
     while (map.place_of(address += 32).channel != 0) {}

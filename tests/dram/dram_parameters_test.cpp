@@ -93,7 +93,7 @@ TEST(DramParameters, WhatIsJustPossibleIsTaken) {
 
 class AddressMapTest : public ::testing::Test {
  protected:
-  DramAddress place_of(std::uint64_t address) { return AddressMap(parameters).place_of(address); }
+  DramAddress place_of(std::uint64_t address) { return DramAddressMap(parameters).place_of(address); }
   DramParameters parameters{lpddr3_1600};
 };
 

@@ -141,7 +141,7 @@ TEST(Jedec, EveryDistanceIsKeptOverStreams) {
       for (const unsigned written_of_4 : {0U, 1U, 4U}) {
         DramParameters parameters(*device);
         set(parameters, "mapping", mapping);
-        const AddressMap map(parameters);
+        const DramAddressMap map(parameters);
         std::uint64_t address = 0;
         Cycle from = 0;
         check_traffic(

@@ -65,7 +65,9 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   tlm::tlm_initiator_socket<32> socket;
 
   /// Whether another access can be issued now.
-  bool available() const { return in_flight_ < most_in_flight_ && requesting_ == nullptr; }
+  bool available() const {
+    return in_flight_ < most_in_flight_ && requesting_ == nullptr && requesting_until_ <= clock_.domain->now();
+  }
   /// Issues an access, in an edge of its unit. Its tag comes back from `next_completed`.
   void read(std::uint64_t address, unsigned bytes, std::uint32_t tag) {
     access({address, bytes, tlm::TLM_READ_COMMAND, origin_}, tag);
@@ -138,6 +140,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   Ring<Completion> completions_;  ///< by cycle
   Cycle next_completion_ = never;
   const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
+  Cycle requesting_until_ = 0;          ///< after a late END_REQ, the next cycle: the order of ticks does not matter
 };
 
 /// Whether a memory has another one below it, and how it asks that.

@@ -27,6 +27,8 @@ class MemoryUnit {
   virtual MemoryBytes delivered() const = 0;
   virtual MemoryBytes memory_bytes() const { return {}; }
   virtual MemoryBehaviour& behaviour() = 0;
+  /// Called once, at the end of the frame: a memory that does things late does what is due before cycle `end`.
+  virtual void close(Cycle end) { static_cast<void>(end); }
   /// That depend on time; those of the functional model are reported with them.
   virtual const StatisticSet& statistics() const = 0;
   /// What its time went on, up to the end of the frame.

@@ -28,6 +28,7 @@ struct RenderContext {
   DevicePrecision precision;
   Termination termination = Termination::paper;
   Placement placement;
+  std::uint64_t clock_ps = 1000;  ///< period of the units' clock, for what has a clock of its own
 
   const DrawCall& draw(DrawIndex draw) const { return frame->draw_call(draw); }
   const DrawState& state(DrawIndex draw) const { return frame->draw_call(draw).state; }

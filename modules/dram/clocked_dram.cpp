@@ -1,0 +1,215 @@
+#include "dram/clocked_dram.h"
+
+#include <algorithm>
+#include <string>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/kernel/ring.h>
+
+namespace vrpipe {
+
+class ClockedDram::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCompletionMemory {
+ public:
+  Port(unsigned index, ClockedDram& dram)
+      : socket(("port_" + std::to_string(index)).c_str()), dram_(dram), index_(index) {
+    socket.bind(*this);
+  }
+  tlm::tlm_target_socket<32, tlm::tlm_base_protocol_types, 1, sc_core::SC_ZERO_OR_MORE_BOUND> socket;
+
+  Ring<Waiting>& waiting() { return waiting_; }
+  Cycle arrival_of_first() const { return dram_.pending_[waiting_.front().tag].arrived; }
+
+  /// The first request has entered the queues of its channels.
+  void pop(Cycle now) {
+    if (popped_at_ != now) popped_ = 0;
+    popped_at_ = now;
+    ++popped_;
+    waiting_.pop();
+    if (held_ == nullptr || waiting_.size() > dram_.settings_.port_requests) return;
+    tlm::tlm_phase phase = tlm::END_REQ;
+    sc_core::sc_time delay = sc_core::SC_ZERO_TIME;
+    tlm::tlm_generic_payload& payload = *held_;
+    held_ = nullptr;
+    socket->nb_transport_bw(payload, phase, delay);
+  }
+  void push_answer(tlm::tlm_generic_payload& payload, Cycle at) { answers_.push_in_order({at, &payload}, &Answer::at); }
+  void respond(Cycle now) {
+    while (!answers_.empty() && !responding_) {
+      const Answer answer = answers_.front();
+      answers_.pop();
+      const Cycle ahead = std::max(answer.at, now + 1) - now;
+      auto delay = sc_core::sc_time::from_value(ahead * clock().period().value());
+      tlm::tlm_phase phase = tlm::BEGIN_RESP;
+      tlm::tlm_generic_payload& payload = *answer.payload;
+      payload.set_response_status(tlm::TLM_OK_RESPONSE);
+      responding_ = true;  // until the initiator says otherwise, perhaps from within the call
+      if (socket->nb_transport_bw(payload, phase, delay) != tlm::TLM_ACCEPTED) responding_ = false;
+      payload.release();
+    }
+  }
+
+ private:
+  Cycle serve(const MemoryRequest&, Cycle arrival) override {
+    throw SimulationFault(socket.name(), arrival, "an access outside the phases of the base protocol");
+  }
+  const ClockDomain& clock() const override { return dram_.domain_; }
+  bool completes_early() const override { return false; }
+
+  void b_transport(tlm::tlm_generic_payload&, sc_core::sc_time&) override {
+    throw SimulationFault(socket.name(), clock().now(), "b_transport at cycle, where it would have to wait");
+  }
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                                     sc_core::sc_time& delay) override {
+    if (phase == tlm::END_RESP) {
+      responding_ = false;
+      dram_.domain_.wake(dram_.handle_, clock().edge_after(sc_core::SC_ZERO_TIME));
+      return tlm::TLM_COMPLETED;
+    }
+    if (phase != tlm::BEGIN_REQ) return tlm::TLM_ACCEPTED;  // ignorable ones of the initiator's
+    // Also from outside an edge, by what has time of its own.
+    const Cycle arrived = clock().edge_after(sc_core::SC_ZERO_TIME) - 1 + clock().whole_cycles(delay);
+    last_arrival_ = std::max(last_arrival_, arrived);
+    const MemoryRequest request = request_of(payload);
+    check_alignment(socket, arrived, request.address, request.bytes);
+    payload.acquire();
+    dram_.behaviour_.access(request);
+    const unsigned bursts = dram_.settings_.bursts(request.bytes);
+    const bool reads = request.command != tlm::TLM_WRITE_COMMAND;
+    const std::uint32_t tag = dram_.take(index_, payload, last_arrival_, bursts, reads);
+    // What has left in this cycle leaves room from the next on.
+    const std::size_t left = popped_at_ == arrived ? popped_ : 0;
+    const bool has_room = waiting_.size() + left < dram_.settings_.port_requests;
+    waiting_.push({tag, request.address, static_cast<std::uint16_t>(bursts), 0});
+    dram_.domain_.wake(dram_.handle_, last_arrival_ + 1);
+    if (has_room) {
+      phase = tlm::END_REQ;
+      return tlm::TLM_UPDATED;
+    }
+    ++dram_.statistics.requests_held;
+    held_ = &payload;
+    return tlm::TLM_ACCEPTED;
+  }
+  bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
+
+  struct Answer {
+    Cycle at;
+    tlm::tlm_generic_payload* payload;
+  };
+  ClockedDram& dram_;
+  const unsigned index_;
+  Ring<Waiting> waiting_;
+  Ring<Answer> answers_;                      ///< not sent yet, by cycle
+  tlm::tlm_generic_payload* held_ = nullptr;  ///< the last of those that wait, if it has no END_REQ yet
+  Cycle last_arrival_ = 0;
+  Cycle popped_at_ = never;
+  std::size_t popped_ = 0;
+  bool responding_ = false;  ///< BEGIN_RESP without END_RESP yet
+};
+
+ClockedDram::ClockedDram(const sc_core::sc_module_name& name, ClockDomain& domain, Dram& behaviour, unsigned ports)
+    : sc_module(name),
+      domain_(domain),
+      handle_(domain.attach(*this)),
+      behaviour_(behaviour),
+      settings_(behaviour.settings()),
+      clock_(domain, settings_.tck_ps, settings_.controller_ps),
+      due_(settings_.channels, never) {
+  for (unsigned index = 0; index < settings_.channels; ++index)
+    channels_.emplace_back(settings_.timing, statistics.channels);
+  for (unsigned index = 0; index < ports; ++index) ports_.push_back(std::make_unique<Port>(index, *this));
+}
+
+ClockedDram::~ClockedDram() = default;
+
+tlm::tlm_base_target_socket_b<32>& ClockedDram::port(unsigned index) { return ports_.at(index)->socket; }
+
+std::uint32_t ClockedDram::take(unsigned port, tlm::tlm_generic_payload& payload, Cycle arrived, unsigned bursts,
+                                bool reads) {
+  if (free_tags_.empty()) {
+    free_tags_.push_back(static_cast<std::uint32_t>(pending_.size()));
+    pending_.emplace_back();
+  }
+  const std::uint32_t tag = free_tags_.back();
+  free_tags_.pop_back();
+  pending_[tag] = {&payload, arrived, 0, static_cast<std::uint16_t>(port), static_cast<std::uint16_t>(bursts), reads};
+  return tag;
+}
+
+Cycle ClockedDram::tick(Cycle now) {
+  const Cycle edge = clock_.edge_of(now);
+  Cycle next = never;
+  // Whose turn it is to be first changes from cycle to cycle.
+  const std::size_t count = ports_.size();
+  const std::size_t first = count < 2 ? 0 : now % count;
+  for (std::size_t i = 0; i < count; ++i)
+    next = std::min(next, enter(*ports_[first + i < count ? first + i : first + i - count], now, edge));
+  for (std::size_t index = 0; index < channels_.size(); ++index) {
+    if (due_[index] > now) {
+      next = std::min(next, due_[index]);
+      continue;
+    }
+    DramChannel& channel = channels_[index];
+    channel.advance(edge);
+    collect(channel);
+    due_[index] = never;
+    if (!channel.awaits_reads()) continue;
+    // The next data is not seen earlier, and is to be answered in a cycle before.
+    due_[index] = std::max(now + 1, clock_.seen(channel.next_command() + channel.data_cycles()) - 1);
+    next = std::min(next, due_[index]);
+  }
+  for (const auto& port : ports_) port->respond(now);
+  return next;
+}
+
+Cycle ClockedDram::enter(Port& port, Cycle now, Cycle edge) {
+  while (!port.waiting().empty()) {
+    if (port.arrival_of_first() >= now) return port.arrival_of_first() + 1;
+    Waiting& waiting = port.waiting().front();
+    Pending& pending = pending_[waiting.tag];
+    for (; waiting.entered < waiting.bursts; ++waiting.entered) {
+      const DramAddress place = settings_.map.place_of(waiting.address + waiting.entered * settings_.burst_bytes);
+      DramChannel& channel = channels_[place.channel];
+      channel.advance(edge);
+      if (!(pending.reads ? channel.can_read() : channel.can_write()))
+        return std::max(now + 1, clock_.after(channel.next_command()));
+      if (pending.reads) {
+        channel.read(place, waiting.tag, edge);
+      } else {
+        channel.write(place, edge);
+        --pending.bursts;
+        pending.done = edge;
+      }
+      due_[place.channel] = now;
+    }
+    if (!pending.reads) answer(waiting.tag);
+    port.pop(now);
+  }
+  return never;
+}
+
+void ClockedDram::collect(DramChannel& channel) {
+  for (Ring<DramChannel::Completion>& done = channel.completions(); !done.empty(); done.pop()) {
+    Pending& pending = pending_[done.front().tag];
+    pending.done = std::max(pending.done, done.front().at);
+    if (--pending.bursts > 0) continue;
+    statistics.read_latency.see(std::max(clock_.seen(pending.done), domain_.now() + 1) - pending.arrived);
+    answer(done.front().tag);
+  }
+}
+
+void ClockedDram::answer(std::uint32_t tag) {
+  const Pending& pending = pending_[tag];
+  ports_[pending.port]->push_answer(*pending.payload, clock_.seen(pending.done));
+  free_tags_.push_back(tag);
+}
+
+void ClockedDram::close(Cycle end) {
+  const Cycle edge = clock_.edge_of(end);
+  for (DramChannel& channel : channels_) {
+    channel.advance(edge);
+    channel.close(edge);
+  }
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,54 @@
+#include "dram/dram.h"
+
+#include <cmath>
+
+#include <vrpipe/pipeline/registry.h>
+
+namespace vrpipe {
+
+DramSettings::DramSettings(const DramParameters& parameters)
+    : timing(timing_of(parameters)),
+      map(parameters),
+      channels(parameters.channels),
+      burst_bytes(vrpipe::burst_bytes(parameters)),
+      port_requests(parameters.port_requests),
+      tck_ps(parameters.tck_ps),
+      controller_ps(parameters.controller_ps) {}
+
+Dram::Dram(const DramParameters& parameters, const RenderContext& context) : settings_(parameters), timing_{} {
+  const DramTiming& t = settings_.timing;
+  // That of a row hit.
+  const std::uint64_t least_ps = (t.cl + t.burst) * settings_.tck_ps + settings_.controller_ps;
+  timing_.latency_cycles = static_cast<std::uint32_t>(least_ps / context.clock_ps);
+  timing_.bytes_per_cycle =
+      static_cast<std::uint32_t>(std::ceil(peak_bytes(parameters, static_cast<double>(context.clock_ps))));
+}
+
+namespace {
+
+Implementation implementation(const char* name, const char* description, const DramDevice& device) {
+  Implementation made;
+  made.slot = "dram";
+  made.name = name;
+  made.description = description;
+  made.trust = Trust::trusted;
+  made.make_parameters = [&device] { return std::make_unique<DramParameters>(device); };
+  made.make_behaviour = [](const ParameterSet& parameters, const RenderContext& context) {
+    return std::make_unique<Dram>(dynamic_cast<const DramParameters&>(parameters), context);
+  };
+  return made;
+}
+
+const SlotRegistrar slot{{"dram", 120, "lpddr3-1600", "", true, nullptr, true}};
+
+[[maybe_unused]] const bool registered = [] {
+  Registry::instance().add(
+      implementation("lpddr3-1600", "16 channels of LPDDR3-1600, the paper's: 102.4 GB/s", lpddr3_1600));
+  Registry::instance().add(
+      implementation("lpddr5-6400", "16 channels of LPDDR5-6400, the Jetson AGX Orin's: 204.8 GB/s", lpddr5_6400));
+  return true;
+}();
+
+}  // namespace
+
+}  // namespace vrpipe

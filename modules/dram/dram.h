@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+
+#include "address_map.h"
+#include "dram_parameters.h"
+
+#include <vrpipe/memory/memory_request.h>
+#include <vrpipe/pipeline/render_context.h>
+#include <vrpipe/pipeline/slots/memory.h>
+
+namespace vrpipe {
+
+/// What timing models need of the parameters.
+struct DramSettings {
+  explicit DramSettings(const DramParameters& parameters);
+  /// The bursts of a request, at least one.
+  unsigned bursts(unsigned bytes) const { return bytes <= burst_bytes ? 1 : bytes / burst_bytes; }
+
+  DramTiming timing;
+  DramAddressMap map;
+  unsigned channels, burst_bytes, port_requests;
+  std::uint64_t tck_ps, controller_ps;
+};
+
+/// A DRAM without time: counts what is asked of it. Data stays with the functional models, so that is all.
+class Dram final : public MemoryBehaviour {
+ public:
+  /// Throws UserError for a DRAM that cannot be.
+  Dram(const DramParameters& parameters, const RenderContext& context);
+
+  void access(const MemoryRequest& request) override { traffic_.count(request); }
+  TimingParameters timing() const override { return timing_; }
+
+  const MemoryTrafficCounters& traffic() const { return traffic_; }
+  const DramSettings& settings() const { return settings_; }
+
+ private:
+  const DramSettings settings_;
+  TimingParameters timing_;
+  MemoryTrafficCounters traffic_{*this};
+};
+
+}  // namespace vrpipe
