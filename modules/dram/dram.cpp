@@ -22,6 +22,12 @@ Dram::Dram(const DramParameters& parameters, const RenderContext& context) : set
   timing_.latency_cycles = static_cast<std::uint32_t>(least_ps / context.clock_ps);
   timing_.bytes_per_cycle =
       static_cast<std::uint32_t>(std::ceil(peak_bytes(parameters, static_cast<double>(context.clock_ps))));
+  peak_bytes_per_ps_ = peak_bytes(parameters, 1.0);
+}
+
+std::vector<OccupancyPart> Dram::least_occupancy(double period_ps) const {
+  const MemoryBytes moved = traffic_.bytes();
+  return {{"data", 0, static_cast<double>(moved.read + moved.written) / (peak_bytes_per_ps_ * period_ps), true}};
 }
 
 namespace {

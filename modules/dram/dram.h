@@ -30,6 +30,8 @@ class Dram final : public MemoryBehaviour {
   Dram(const DramParameters& parameters, const RenderContext& context);
 
   void access(const MemoryRequest& request) override { traffic_.count(request); }
+  MemoryBytes delivered() const override { return traffic_.bytes(); }
+  std::vector<OccupancyPart> least_occupancy(double period_ps) const override;
   TimingParameters timing() const override { return timing_; }
 
   const MemoryTrafficCounters& traffic() const { return traffic_; }
@@ -38,6 +40,7 @@ class Dram final : public MemoryBehaviour {
  private:
   const DramSettings settings_;
   TimingParameters timing_;
+  double peak_bytes_per_ps_;
   MemoryTrafficCounters traffic_{*this};
 };
 

@@ -19,6 +19,7 @@ class DramUnit final : public MemoryUnit {
         timed_(name.c_str(), domain, *behaviour_, ports) {}
 
   tlm::tlm_base_target_socket_b<32>& target(unsigned index) override { return timed_.port(index); }
+  MemoryBytes delivered() const override { return behaviour_->delivered(); }
   MemoryBehaviour& behaviour() override { return *behaviour_; }
   const StatisticSet& statistics() const override { return timed_.statistics; }
   void close(Cycle end) override { timed_.close(end); }

@@ -14,4 +14,29 @@ Platform agx_orin() {
   return platform;
 }
 
+/// The table's memory: 16 channels of LPDDR3-1600, as published 32 bits wide.
+Platform agx_orin_lpddr3() {
+  Platform platform = agx_orin();
+  platform.name = "agx-orin-lpddr3";
+  platform.description = "agx-orin with a 4 MB L2 that misses and the paper's DRAM, LPDDR3-1600 at 102.4 GB/s";
+  platform.wire = [](Netlist& netlist) {
+    wire_pipeline(netlist);
+    wire_dram(netlist, "lpddr3-1600");
+  };
+  return platform;
+}
+
+/// The memory of the GPU that the table is after.
+Platform agx_orin_lpddr5() {
+  Platform platform = agx_orin();
+  platform.name = "agx-orin-lpddr5";
+  platform.description =
+      "agx-orin with a 4 MB L2 that misses and the Jetson AGX Orin's DRAM, LPDDR5-6400 at 204.8 GB/s";
+  platform.wire = [](Netlist& netlist) {
+    wire_pipeline(netlist);
+    wire_dram(netlist, "lpddr5-6400");
+  };
+  return platform;
+}
+
 }  // namespace vrpipe

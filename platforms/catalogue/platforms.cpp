@@ -7,12 +7,14 @@
 namespace vrpipe {
 
 Platform agx_orin();
+Platform agx_orin_lpddr3();
+Platform agx_orin_lpddr5();
 Platform mobile();
 Platform desktop();
 
 namespace {
 std::vector<Platform>& list() {
-  static std::vector<Platform> all{agx_orin(), mobile(), desktop()};
+  static std::vector<Platform> all{agx_orin(), mobile(), desktop(), agx_orin_lpddr3(), agx_orin_lpddr5()};
   return all;
 }
 }  // namespace

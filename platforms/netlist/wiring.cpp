@@ -44,4 +44,10 @@ void wire_pipeline(Netlist& netlist) {
   for (unsigned gpc = 0; gpc < netlist.gpcs(); ++gpc) wire_gpc(netlist, gpc);
 }
 
+void wire_dram(Netlist& netlist, const std::string& dram) {
+  netlist.replace("l2", "sectored-cache");
+  netlist.add("dram", "dram", dram);
+  netlist.connect_memory("l2", "dram");
+}
+
 }  // namespace vrpipe

@@ -9,7 +9,10 @@ namespace vrpipe {
 /// `memory`, which is there already. Building block for platforms of several GPCs.
 void wire_gpc(Netlist& netlist, unsigned gpc, const std::string& memory = "l2");
 
-/// The same for all GPCs, with a front end and an L2.
+/// The same for all GPCs, with a front end and an L2 that holds everything.
 void wire_pipeline(Netlist& netlist);
+
+/// Behind such a pipeline, makes the L2 a cache and puts a DRAM below it, of an implementation of slot `dram`.
+void wire_dram(Netlist& netlist, const std::string& dram);
 
 }  // namespace vrpipe
