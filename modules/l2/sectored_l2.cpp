@@ -21,10 +21,10 @@ CacheOrganization checked(const SectoredL2Parameters& parameters) {
   organization.check("L2", "l2", "bytes");
   const std::uint32_t banks = parameters.banks;
   if ((banks & (banks - 1)) != 0) {
-    throw UserError("impossible L2", "l2.banks", fmt::format("{} is no power of two", banks), "use a power of two");
+    throw UserError("unusable L2", "l2.banks", fmt::format("{} is no power of two", banks), "use a power of two");
   }
   if (banks > organization.sets()) {
-    throw UserError("impossible L2", "l2.banks, l2.ways",
+    throw UserError("unusable L2", "l2.banks, l2.ways",
                     fmt::format("{} sets cannot be dealt out to {} banks", organization.sets(), banks),
                     fmt::format("use at most {} banks, or fewer ways", organization.sets()));
   }

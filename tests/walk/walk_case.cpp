@@ -11,6 +11,8 @@
 
 #include <vrpipe/arithmetic/blend.h>
 #include <vrpipe/arithmetic/random.h>
+#include <vrpipe/pipeline/registry.h>
+#include <vrpipe/platforms/netlist.h>
 
 #include "support/builders.h"
 
@@ -203,11 +205,24 @@ std::string refused_value(Dice& dice, const Parameter& parameter) {
   return dice.one_of(nonsense);
 }
 
+/// Whether the platform has memory of a kind: most have an L2 alone.
+bool is_of(const Platform& platform, const ParameterListing& listing) {
+  const Registry& registry = Registry::instance();
+  if (!registry.has_slot(listing.unit) || !registry.slot(listing.unit).is_memory) return true;
+  Netlist netlist(platform.gpcs);
+  platform.wire(netlist);
+  const std::string& usual = registry.slot(listing.unit).implementation;
+  return std::any_of(netlist.instances().begin(), netlist.instances().end(), [&](const Instance& instance) {
+    return instance.slot == listing.unit &&
+           listing.implementation == (instance.implementation.empty() ? usual : instance.implementation);
+  });
+}
+
 /// Whether a machine can hold it: some declared maxima fit only one at a time.
 bool fits(const Platform& platform, const std::vector<Setting>& settings) {
   std::map<std::string, double> value;
   for (const ParameterListing& listing : list_parameters(&platform)) {
-    if (listing.pass_through) continue;
+    if (listing.pass_through || !is_of(platform, listing)) continue;
     for (const Parameter* parameter : listing.parameters->parameters()) {
       char* end = nullptr;
       const std::string text = parameter->value();
@@ -226,7 +241,7 @@ std::vector<Setting> draw_settings(Dice& dice, const Platform& platform, bool& r
   std::vector<std::pair<std::string, const Parameter*>> all;
   const std::vector<ParameterListing> listings = list_parameters(&platform);
   for (const ParameterListing& listing : listings) {
-    if (listing.pass_through) continue;
+    if (listing.pass_through || !is_of(platform, listing)) continue;
     for (const Parameter* parameter : listing.parameters->parameters()) all.emplace_back(listing.unit, parameter);
   }
   const unsigned counts[] = {0, 1, 1, 1, 1, 2, 2, 3, 4, 7};
