@@ -382,33 +382,32 @@ std::vector<Finding> broken_beginning(const RunResult& frame, std::size_t draw, 
 }
 
 std::vector<Finding> broken_repetition(const RunResult& once, const RunResult& again) {
-  const auto units_equal = [&] {
-    if (once.units.size() != again.units.size()) return false;
-    for (std::size_t i = 0; i < once.units.size(); ++i) {
-      if (once.units[i].name != again.units[i].name || once.units[i].cycles != again.units[i].cycles) return false;
-    }
-    return true;
+  std::vector<Finding> findings;
+  const auto find = [&](const std::string& what, bool equal) {
+    if (!equal) findings.push_back({"equal requests, equal results", what + " differ"});
   };
-  const auto statistics_equal = [&] {
-    if (once.statistics.size() != again.statistics.size()) return false;
-    for (std::size_t i = 0; i < once.statistics.size(); ++i) {
-      if (once.statistics[i].name != again.statistics[i].name) return false;
-      if (once.statistics[i].value != again.statistics[i].value) return false;
-    }
-    return true;
-  };
-  const auto draws_equal = [&] {
-    for (std::size_t i = 0; i < once.draws.size() && i < again.draws.size(); ++i) {
-      if (once.draws[i].counts != again.draws[i].counts) return false;
-    }
-    return once.draws.size() == again.draws.size();
-  };
-  const bool equal = once.result_hash == again.result_hash && once.cycles == again.cycles &&
-                     once.counts.named() == again.counts.named() &&
-                     same_image(once.framebuffer.color, again.framebuffer.color) &&
-                     once.utilization == again.utilization && units_equal() && statistics_equal() && draws_equal();
-  if (equal) return {};
-  return {{"equal requests, equal results", once.result_hash + " and " + again.result_hash}};
+  find(once.result_hash + " and " + again.result_hash, once.result_hash == again.result_hash);
+  find("cycles", once.cycles == again.cycles);
+  find("counts", once.counts.named() == again.counts.named());
+  find("images", same_image(once.framebuffer.color, again.framebuffer.color));
+  find("utilizations", once.utilization == again.utilization);
+  find("units", once.units.size() == again.units.size());
+  for (std::size_t i = 0; i < std::min(once.units.size(), again.units.size()); ++i) {
+    const UnitReport& unit = once.units[i];
+    find("states of " + unit.name, unit.name == again.units[i].name && unit.cycles == again.units[i].cycles);
+  }
+  find("numbers of statistics", once.statistics.size() == again.statistics.size());
+  for (std::size_t i = 0; i < std::min(once.statistics.size(), again.statistics.size()); ++i) {
+    const StatisticReport& one = once.statistics[i];
+    const StatisticReport& other = again.statistics[i];
+    find(fmt::format("{} {} and {} {}", one.name, one.value, other.name, other.value),
+         one.name == other.name && one.value == other.value);
+  }
+  find("draws", once.draws.size() == again.draws.size());
+  for (std::size_t i = 0; i < std::min(once.draws.size(), again.draws.size()); ++i) {
+    find("counts of draw " + std::to_string(i), once.draws[i].counts == again.draws[i].counts);
+  }
+  return findings;
 }
 
 void judge(const Case& c, Verdict& verdict) {
