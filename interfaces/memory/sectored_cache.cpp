@@ -76,19 +76,20 @@ SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evic
   Line line;
   if (set.held < ways_) {
     line = free_line(index);
+    ++set.held;
+    statistics_->most_lines_held.see(++held_);
   } else {
     line = victim(index);
-    const Entry& entry = lines_[line];
-    evicted = {entry.tag << line_shift_, entry.dirty, entry.dirty & ~entry.present};
+    const Entry& old = lines_[line];
+    evicted = {old.tag << line_shift_, old.dirty, old.dirty & ~old.present};
     ++statistics_->lines_evicted;
     count_written_back(evicted.dirty);
-    forget(line);
+    take_out(line);
     ++evictions_;
   }
-  ++set.held;
-  statistics_->most_lines_held.see(++held_);
   Entry& entry = lines_[line];
   entry.tag = tag;
+  entry.were_there = &were_there_.of(tag);
   Line& chain = chains_[chain_of(tag)];
   entry.next = chain;
   chain = line;
@@ -158,29 +159,28 @@ SectoredCache::Line SectoredCache::victim_of_tree(std::uint32_t set) const {
   return set * ways_ + node - ways_;
 }
 
-void SectoredCache::forget(Line line) {
+void SectoredCache::take_out(Line line) {
   Entry& entry = lines_[line];
-  Set& set = sets_[entry.set];
-  if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) unlink(set, line);
+  if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) unlink(sets_[entry.set], line);
   Line* at = &chains_[chain_of(entry.tag)];
   while (*at != line) at = &lines_[*at].next;
   *at = entry.next;
-  entry.tag = no_tag;
   entry.present = entry.filling = entry.dirty = 0;
-  --set.held;
-  --held_;
 }
 
 void SectoredCache::invalidate(Line line) {
-  const Entry& entry = lines_[line];
+  Entry& entry = lines_[line];
   if (entry.pins != 0) throw std::logic_error("a line was invalidated that is pinned");
   if (shadow_ != nullptr) {
     const Line shadow = shadow_->cache.find(address(line));
     if (shadow != no_line) shadow_->cache.invalidate(shadow);
   }
-  forget(line);
-  std::uint32_t& lowest = sets_[entry.set].lowest_free;
-  lowest = std::min(lowest, line % ways_);
+  take_out(line);
+  entry.tag = no_tag;
+  --held_;
+  Set& set = sets_[entry.set];
+  --set.held;
+  set.lowest_free = std::min(set.lowest_free, line % ways_);
 }
 
 void SectoredCache::invalidate() {
@@ -218,9 +218,7 @@ std::uint32_t SectoredCache::write(Line line, unsigned first, unsigned bytes) {
   const std::uint32_t whole = from < to ? sector_mask(from, to - from) : 0;
   entry.dirty |= written;
   entry.present |= whole;
-  if (const std::uint32_t missed = missing & whole; missed != 0) {
-    count_misses(missed, whole_before_.add(entry.tag, missed));
-  }
+  count_unfilled(missing & whole, *entry.were_there);
   return missing & ~whole;
 }
 
@@ -248,8 +246,8 @@ std::uint32_t SectoredCache::write_masked(Line line, unsigned first, unsigned by
   }
   entry.dirty |= written;
   entry.present |= completed;
-  if (missed != 0) count_misses(missed, touched_before_.add(entry.tag, missed));
-  if (completed != 0) whole_before_.add(entry.tag, completed);
+  count_unfilled(missed, were_touched_.of(entry.tag));
+  *entry.were_there |= completed;
   return 0;
 }
 
@@ -263,11 +261,31 @@ LineAccess SectoredCache::access(std::uint64_t address, std::uint32_t bytes, boo
   Entry& entry = lines_[access.line];
   if (access.filled != 0) {
     entry.present |= access.filled;
-    count_fills(entry.tag, access.filled);
+    count_misses(entry, access.filled);
   }
   if (shadow_ != nullptr) follow(address, bytes, writes);
   accessed(1, count_of(access.sectors));
   return access;
+}
+
+void SectoredCache::count_compulsory(std::uint32_t sectors) {
+  statistics_->sector_misses_compulsory += count_of(sectors);
+  of_other_cause_ += count_of(sectors);
+  first_time_ |= sectors;
+}
+
+void SectoredCache::fill_for_the_first_time(Entry& entry, std::uint32_t sectors) {
+  count_compulsory(sectors);
+  *entry.were_there |= sectors;
+  if (is_masked()) were_touched_.of(entry.tag) |= sectors;
+}
+
+void SectoredCache::count_unfilled(std::uint32_t sectors, std::uint32_t& before) {
+  missed_ += count_of(sectors);
+  not_filled_ += count_of(sectors);
+  missed_sectors_ |= sectors;
+  count_compulsory(sectors & ~before);
+  before |= sectors;
 }
 
 void SectoredCache::follow(std::uint64_t line_address, std::uint32_t sectors) {
@@ -276,20 +294,20 @@ void SectoredCache::follow(std::uint64_t line_address, std::uint32_t sectors) {
   access.sectors = sectors;
   shadow_->cache.missed_sectors_ = 0;
   shadow_->cache.look_up(access);
-  find_cause(shadow_->cache.missed_sectors_);
+  find_conflicts(shadow_->cache.missed_sectors_);
 }
 
 void SectoredCache::follow(std::uint64_t address, unsigned bytes, bool writes) {
   shadow_->cache.missed_sectors_ = 0;
   shadow_->cache.access(address, bytes, writes);
-  find_cause(shadow_->cache.missed_sectors_);
+  find_conflicts(shadow_->cache.missed_sectors_);
 }
 
-void SectoredCache::find_cause(std::uint32_t missed_by_shadow) {
-  const unsigned capacity = count_of(of_unknown_cause_ & missed_by_shadow);
-  statistics_->sector_misses_capacity += capacity;
-  statistics_->sector_misses_conflict += count_of(of_unknown_cause_) - capacity;
-  of_unknown_cause_ = 0;
+void SectoredCache::find_conflicts(std::uint32_t missed_by_shadow) {
+  const unsigned conflicts = count_of(missed_sectors_ & ~first_time_ & ~missed_by_shadow);
+  statistics_->sector_misses_conflict += conflicts;
+  of_other_cause_ += conflicts;
+  missed_sectors_ = first_time_ = 0;
 }
 
 }  // namespace vrpipe

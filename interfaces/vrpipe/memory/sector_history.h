@@ -10,17 +10,15 @@ namespace vrpipe {
 /// Which sectors of which lines there ever were. Lines may be anywhere; memory is taken in pages of them.
 class SectorHistory {
  public:
-  /// Adds sectors of a line, a bit each; returns those that are new.
-  std::uint32_t add(std::uint64_t line, std::uint32_t sectors) {
+  /// Of a line, a bit each; stays where it is.
+  std::uint32_t& of(std::uint64_t line) {
     const std::uint64_t number = line / lines_of_a_page;
-    if (number != last_number_) {
-      last_ = &page(number);
-      last_number_ = number;
+    const std::size_t mask = places_.size() - 1;
+    std::size_t at = home_of(number);
+    for (; places_[at].number != number; at = (at + 1) & mask) {
+      if (places_[at].number == no_page) return add_page(number)[line % lines_of_a_page];
     }
-    std::uint32_t& there = (*last_)[line % lines_of_a_page];
-    const std::uint32_t added = sectors & ~there;
-    there |= sectors;
-    return added;
+    return (*places_[at].page)[line % lines_of_a_page];
   }
 
  private:
@@ -32,20 +30,11 @@ class SectorHistory {
     std::unique_ptr<Page> page;
   };
   std::size_t home_of(std::uint64_t number) const { return (number * 0x9e3779b97f4a7c15ULL) >> shift_; }
-  Page& page(std::uint64_t number) {
-    const std::size_t mask = places_.size() - 1;
-    for (std::size_t at = home_of(number);; at = (at + 1) & mask) {
-      if (places_[at].number == number) return *places_[at].page;
-      if (places_[at].number == no_page) return add_page(number);
-    }
-  }
-  Page& add_page(std::uint64_t number);
+  [[gnu::noinline]] Page& add_page(std::uint64_t number);
 
   unsigned shift_ = 64 - 6;
   std::vector<Place> places_ = std::vector<Place>(64);  ///< open addressing, at most half of them taken
   std::size_t pages_ = 0;
-  std::uint64_t last_number_ = no_page;
-  Page* last_ = nullptr;
 };
 
 }  // namespace vrpipe

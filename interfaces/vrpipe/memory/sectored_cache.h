@@ -93,7 +93,7 @@ class SectoredCache {
   void start_fill(Line line, unsigned sector) {
     Entry& entry = lines_[line];
     entry.filling |= 1U << sector;
-    count_fills(entry.tag, 1U << sector);
+    count_misses(entry, 1U << sector);
   }
   /// Ends what start_fill began, while the line still holds the same.
   void finish_fill(Line line, unsigned sector) {
@@ -116,8 +116,10 @@ class SectoredCache {
     statistics_->line_hits += accesses - allocated_;
     statistics_->sector_accesses += sectors;
     statistics_->sector_hits += sectors - missed_;
-    allocated_ = 0;
-    missed_ = 0;
+    statistics_->sector_misses += missed_;
+    statistics_->sector_misses_capacity += missed_ - of_other_cause_;
+    statistics_->bytes_filled += (missed_ - not_filled_) * sector_bytes_;
+    allocated_ = missed_ = of_other_cause_ = not_filled_ = 0;
   }
 
   /// All at once for sectors of a line (`address` and `sectors` are given): looks it up, allocates and fills. `accessed`
@@ -128,7 +130,7 @@ class SectoredCache {
     access.filled = access.sectors & ~entry.present;
     if (access.filled != 0) {
       entry.present |= access.filled;
-      count_fills(entry.tag, access.filled);
+      count_misses(entry, access.filled);
     }
     if (shadow_ != nullptr) follow(access.address, access.sectors);
   }
@@ -163,6 +165,7 @@ class SectoredCache {
     Line older = no_line;
     Line next = no_line;  ///< of the chain
     std::uint32_t set = 0;
+    std::uint32_t* were_there = nullptr;  ///< sectors of what it holds, so far
   };
   struct Set {
     Line newest = no_line;  ///< lru: of the lines that are not pinned, by use; fifo: of all, by allocation
@@ -222,7 +225,7 @@ class SectoredCache {
   Line free_line(std::uint32_t set);
   Line victim(std::uint32_t set);
   Line victim_of_tree(std::uint32_t set) const;
-  void forget(Line line);
+  void take_out(Line line);
   /// Those that bytes `first` to `first + bytes` - 1 of a line lie in.
   std::uint32_t touched(unsigned first, unsigned bytes) const {
     const unsigned from = first >> sector_shift_;
@@ -232,25 +235,18 @@ class SectoredCache {
   bool has_byte(Line line, unsigned byte) const;
   bool is_masked() const { return !byte_masks_.empty(); }
 
-  void count_fills(std::uint64_t tag, std::uint32_t sectors) {
-    statistics_->bytes_filled += static_cast<unsigned>(__builtin_popcount(sectors)) * sector_bytes_;
-    if (is_masked()) touched_before_.add(tag, sectors);
-    count_misses(sectors, whole_before_.add(tag, sectors));
-  }
-  /// Of which `compulsory`.
-  void count_misses(std::uint32_t sectors, std::uint32_t compulsory) {
-    const auto count = static_cast<unsigned>(__builtin_popcount(sectors));
-    const auto first = static_cast<unsigned>(__builtin_popcount(compulsory));
-    missed_ += count;
+  /// Of sectors that are filled.
+  void count_misses(Entry& entry, std::uint32_t sectors) {
+    missed_ += static_cast<unsigned>(__builtin_popcount(sectors));
     missed_sectors_ |= sectors;
-    statistics_->sector_misses += count;
-    statistics_->sector_misses_compulsory += first;
-    if (shadow_ == nullptr) {
-      statistics_->sector_misses_capacity += count - first;
-    } else {
-      of_unknown_cause_ |= sectors & ~compulsory;
+    if (const std::uint32_t first = sectors & ~*entry.were_there; __builtin_expect(first != 0, 0)) {
+      fill_for_the_first_time(entry, first);
     }
   }
+  void fill_for_the_first_time(Entry& entry, std::uint32_t sectors);
+  void count_compulsory(std::uint32_t sectors);
+  /// Of sectors that are written whole, or masked. `before`: those that were there, to which they are added.
+  void count_unfilled(std::uint32_t sectors, std::uint32_t& before);
   void count_written_back(std::uint32_t sectors) {
     const auto count = static_cast<unsigned>(__builtin_popcount(sectors));
     statistics_->sectors_written_back += count;
@@ -258,7 +254,7 @@ class SectoredCache {
   }
   void follow(std::uint64_t line_address, std::uint32_t sectors);
   void follow(std::uint64_t address, unsigned bytes, bool writes);
-  void find_cause(std::uint32_t missed_by_shadow);
+  void find_conflicts(std::uint32_t missed_by_shadow);
 
   CacheOrganization organization_;
   Replacement replacement_;
@@ -269,18 +265,21 @@ class SectoredCache {
   unsigned chain_shift_;
   std::uint64_t sector_bytes_;
   SectoredCacheStatistics* statistics_;
-  std::uint64_t allocated_ = 0;         ///< lines, in the accesses under way
-  std::uint64_t missed_ = 0;            ///< sectors, in these
-  std::uint32_t of_unknown_cause_ = 0;  ///< sectors missed in the access under way
-  std::uint32_t missed_sectors_ = 0;    ///< of a shadow: in its last access
-  std::uint64_t evictions_ = 0;         ///< so far, for random replacement
+  // In the accesses under way:
+  std::uint64_t allocated_ = 0;       ///< lines
+  std::uint64_t missed_ = 0;          ///< sectors
+  std::uint64_t of_other_cause_ = 0;  ///< of these: not for capacity
+  std::uint64_t not_filled_ = 0;      ///< of these: since they were written
+  std::uint32_t missed_sectors_ = 0;  ///< of the access under way, where conflicts are told
+  std::uint32_t first_time_ = 0;      ///< of these, compulsory
+  std::uint64_t evictions_ = 0;       ///< so far, for random replacement
   std::uint32_t held_ = 0;
   std::vector<Entry> lines_;  ///< ways of set 0, of set 1, ...
   std::vector<Set> sets_;
   std::vector<Line> chains_;               ///< the first of the lines whose tags hash to a place
   std::vector<std::uint64_t> byte_masks_;  ///< WriteAllocate::byte_mask: bytes that are there, a bit each, by line
-  SectorHistory whole_before_;             ///< sectors that were there
-  SectorHistory touched_before_;           ///< with byte masks: and those of which bytes were
+  SectorHistory were_there_;               ///< whole sectors
+  SectorHistory were_touched_;             ///< with byte masks: and those of which bytes were there
   std::unique_ptr<Shadow> shadow_;         ///< fully associative, of the same size
 };
 
