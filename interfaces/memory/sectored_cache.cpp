@@ -257,12 +257,14 @@ LineAccess SectoredCache::access(std::uint64_t address, std::uint32_t bytes, boo
   access.address = address - first;
   access.sectors = touched(first, bytes);
   take_line(access);
+  missed_sectors_ = 0;
   access.filled = writes ? write(access.line, first, bytes) : read(access.line, first, bytes);
   Entry& entry = lines_[access.line];
   if (access.filled != 0) {
     entry.present |= access.filled;
     count_misses(entry, access.filled);
   }
+  access.missed = missed_sectors_;
   if (shadow_ != nullptr) follow(address, bytes, writes);
   accessed(1, count_of(access.sectors));
   return access;

@@ -349,7 +349,9 @@ void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, Cycle now) {
                              cache_.pin(line);
                            });
   cache_.looked_up(line, first, access.bytes, writes);
-  cache_.accessed(1, static_cast<unsigned>(__builtin_popcount(sectors)));
+  const auto needed = static_cast<unsigned>(__builtin_popcount(sectors));
+  behaviour_->count_sectors(access.origin.traffic, needed, cache_.missed());
+  cache_.accessed(1, needed);
   occupy(index, moved, now);
   Request& taken = requests_[request];
   taken.waits_for = cache_.filling(line) & sectors;

@@ -17,7 +17,8 @@ SectoredL2::Sizes sizes_of(const SectoredL2Parameters& parameters) {
 }
 
 CacheOrganization checked(const SectoredL2Parameters& parameters) {
-  const CacheOrganization organization = parameters.cache.organization();
+  CacheOrganization organization = parameters.cache.organization();
+  organization.write_allocate = static_cast<WriteAllocate>(static_cast<unsigned>(parameters.write_allocate));
   organization.check("L2", "l2", "bytes");
   const std::uint32_t banks = parameters.banks;
   if ((banks & (banks - 1)) != 0) {
@@ -35,6 +36,16 @@ CacheOrganization checked(const SectoredL2Parameters& parameters) {
 
 SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderContext&)
     : sizes_(sizes_of(parameters)),
+      of_traffic_{{{{*this, "other_sectors", "sectors", "accessed by initiators that do not say what for"},
+                    {*this, "other_sector_misses", "sectors", "missed by these"}},
+                   {{*this, "color_sectors", "sectors", "accessed of the colour target"},
+                    {*this, "color_sector_misses", "sectors", "missed of it"}},
+                   {{*this, "depth_stencil_sectors", "sectors", "accessed of the depth and stencil target"},
+                    {*this, "depth_stencil_sector_misses", "sectors", "missed of it"}},
+                   {{*this, "vertex_sectors", "sectors", "accessed of the splats or vertices of a draw"},
+                    {*this, "vertex_sector_misses", "sectors", "missed of these"}},
+                   {{*this, "attribute_sectors", "sectors", "accessed of the attributes of shaded vertices"},
+                    {*this, "attribute_sector_misses", "sectors", "missed of these"}}}},
       cache_(checked(parameters), statistics_),
       origins_(cache_.organization().lines()),
       bank_cycles_(sizes_.banks) {}
@@ -44,6 +55,8 @@ void SectoredL2::access(const MemoryRequest& request) {
   const bool writes = request.command == tlm::TLM_WRITE_COMMAND;
   for_each_line(request, [&](std::uint64_t address, std::uint32_t bytes) {
     const LineAccess done = cache_.access(address, bytes, writes);
+    count_sectors(request.origin.traffic, static_cast<unsigned>(__builtin_popcount(done.sectors)),
+                  static_cast<unsigned>(__builtin_popcount(done.missed)));
     const auto below = [&](const MemoryRequest& moved, const SectorRun&) {
       if (below_ != nullptr) below_->access(moved);
     };

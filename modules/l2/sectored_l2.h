@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -16,6 +17,12 @@ struct SectoredL2Parameters : ParameterSet {
   CacheParameters cache{*this,
                         {"bytes", 4 << 20, 1U << 30, "shared by all GPCs", 16,
                          "Accel-Sim, SM87_ORIN: 32 sub-partitions of 64 sets of 16 ways of 128 bytes"}};
+  Choice write_allocate{*this,
+                        "write_allocate",
+                        {"fill", "byte-mask"},
+                        0,
+                        source::open,
+                        "what a write of a part of a sector does that is not there: has it filled, or marks its bytes"};
   Integer banks{*this,
                 "banks",
                 32,
@@ -93,6 +100,12 @@ class SectoredL2 final : public MemoryBehaviour {
   SectoredCacheStatistics& statistics() { return statistics_; }
   /// At a port.
   void count(const MemoryRequest& request) { traffic_.count(request); }
+  /// In a line: so many sectors, of which so many were missed.
+  void count_sectors(MemoryTraffic traffic, std::uint64_t sectors, std::uint64_t missed) {
+    OfTraffic& counted = of_traffic_[static_cast<unsigned>(traffic)];
+    counted.sectors += sectors;
+    counted.misses += missed;
+  }
   /// In a bank.
   void count_bank(std::uint32_t bank, std::uint64_t bytes) { bank_cycles_[bank] += bank_cycles(bytes); }
   /// How long so many bytes keep a bank.
@@ -139,8 +152,13 @@ class SectoredL2 final : public MemoryBehaviour {
   }
 
  private:
+  struct OfTraffic {
+    Counter sectors, misses;
+  };
+
   const Sizes sizes_;
   MemoryTrafficCounters traffic_{*this};
+  std::array<OfTraffic, memory_traffics> of_traffic_;
   SectoredCacheStatistics statistics_{*this, "cache"};
   SectoredCache cache_;
   std::vector<MemoryOrigin> origins_;       ///< by line of the cache

@@ -11,17 +11,6 @@
 
 namespace vrpipe {
 
-/// An access to sectors of one line, and what a cache does for it.
-struct LineAccess {
-  std::uint32_t line = 0;          ///< of the cache, from 0
-  std::uint32_t sectors = 0;       ///< of the line that are needed, a bit each
-  std::uint32_t filled = 0;        ///< of these, to be read from below
-  std::uint32_t written_back = 0;  ///< dirty sectors of what the line held
-  bool replaced = false;           ///< the line held something else, or nothing, before
-  std::uint64_t address = 0;       ///< of the line, bytes
-  std::uint64_t old_address = 0;   ///< of what it held
-};
-
 /// The tags of a cache of sectored lines, write-back; data stays elsewhere. A way that is free is taken first, the lowest
 /// one; then a line goes that is not pinned, by the replacement policy. Sectors of a line are a bit each.
 ///
@@ -109,6 +98,8 @@ class SectoredCache {
   void looked_up(Line line, unsigned first, unsigned bytes, bool writes) {
     if (shadow_ != nullptr) follow(address(line) + first, bytes, writes);
   }
+  /// Sectors missed in the accesses that `accessed` has not ended yet.
+  std::uint64_t missed() const { return missed_; }
   /// Ends so many accesses, which need so many sectors: those for which nothing was allocated or missed since the
   /// accesses before were hits.
   void accessed(std::uint64_t accesses, std::uint64_t sectors) {
@@ -127,7 +118,7 @@ class SectoredCache {
   void look_up(LineAccess& access) {
     take_line(access);
     Entry& entry = lines_[access.line];
-    access.filled = access.sectors & ~entry.present;
+    access.filled = access.missed = access.sectors & ~entry.present;
     if (access.filled != 0) {
       entry.present |= access.filled;
       count_misses(entry, access.filled);

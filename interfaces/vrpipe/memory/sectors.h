@@ -45,4 +45,25 @@ inline SectorRun take_sector_run(std::uint32_t& mask, unsigned longest) {
   return {first, count};
 }
 
+/// Takes all of a mask: `move(first, count)` for each run.
+template <class Move>
+void for_each_sector_run(std::uint32_t mask, unsigned longest, Move&& move) {
+  while (mask != 0) {
+    const SectorRun run = take_sector_run(mask, longest);
+    move(run.first, run.count);
+  }
+}
+
+/// An access to sectors of one line, and what a cache does for it.
+struct LineAccess {
+  std::uint32_t line = 0;          ///< of the cache, from 0
+  std::uint32_t sectors = 0;       ///< of the line that are needed, a bit each
+  std::uint32_t missed = 0;        ///< of these, neither there nor on their way
+  std::uint32_t filled = 0;        ///< of these, to be read from below
+  std::uint32_t written_back = 0;  ///< dirty sectors of what the line held
+  bool replaced = false;           ///< the line held something else, or nothing, before
+  std::uint64_t address = 0;       ///< of the line, bytes
+  std::uint64_t old_address = 0;   ///< of what it held
+};
+
 }  // namespace vrpipe

@@ -7,8 +7,9 @@
 #include <string>
 
 #include <vrpipe/kernel/rate.h>
+#include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/memory/cache_statistics.h>
-#include <vrpipe/memory/sectored_cache.h>
+#include <vrpipe/memory/sectors.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 

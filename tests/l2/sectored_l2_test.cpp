@@ -1,0 +1,286 @@
+#include "l2/sectored_l2.h"
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/component/error.h>
+
+#include "support/builders.h"
+#include "support/reference_cache.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::ReferenceCache;
+
+/// A memory that keeps what it was asked.
+class Recorder final : public MemoryBehaviour {
+ public:
+  void access(const MemoryRequest& request) override {
+    requests.push_back(request);
+    bytes.count(request);
+  }
+  TimingParameters timing() const override { return {1, 32}; }
+
+  std::vector<MemoryRequest> requests;
+  MemoryBytes bytes;
+};
+
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+class L2 {
+ public:
+  explicit L2(const Settings& settings = {}) : draw_(testing::draw_of(16, 16)), context_(testing::context_of(draw_)) {
+    SectoredL2Parameters parameters;
+    for (const auto& [name, value] : settings) parameters.set("l2", name, value);
+    behaviour = std::make_unique<SectoredL2>(parameters, context_);
+    behaviour->set_below(below);
+  }
+  void read(std::uint64_t address, std::uint32_t bytes, MemoryOrigin origin = {}) {
+    behaviour->access({address, bytes, tlm::TLM_READ_COMMAND, origin});
+  }
+  void write(std::uint64_t address, std::uint32_t bytes, MemoryOrigin origin = {}) {
+    behaviour->access({address, bytes, tlm::TLM_WRITE_COMMAND, origin});
+  }
+  std::uint64_t count(const std::string& name) const {
+    const std::size_t dot = name.find('.');
+    const StatisticSet* set = behaviour.get();
+    if (dot != std::string::npos) {
+      for (const StatisticSet* part : behaviour->parts()) {
+        if (name.substr(0, dot) == part->part_name()) set = part;
+      }
+    }
+    for (const Counter* counter : set->counters()) {
+      if (name.substr(dot + 1) == counter->name()) return counter->value();
+    }
+    ADD_FAILURE() << "no counter " << name;
+    return 0;
+  }
+
+  std::unique_ptr<SectoredL2> behaviour;
+  Recorder below;
+
+ private:
+  Draw draw_;
+  RenderContext context_;
+};
+
+constexpr MemoryOrigin color{MemoryTraffic::color, 1};
+constexpr MemoryOrigin attribute{MemoryTraffic::attribute, 2};
+
+TEST(SectoredL2, AMissFetchesItsSectorsInOneRequestOfItsOriginAndAHitNothing) {
+  L2 l2;
+  l2.read(0x1000'0000'0080, 64, color);
+  ASSERT_EQ(l2.below.requests.size(), 1U);
+  const MemoryRequest& fill = l2.below.requests.front();
+  EXPECT_EQ(fill.address, 0x1000'0000'0080U);
+  EXPECT_EQ(fill.bytes, 64U);
+  EXPECT_EQ(fill.command, tlm::TLM_READ_COMMAND);
+  EXPECT_EQ(fill.origin.traffic, MemoryTraffic::color);
+  EXPECT_EQ(fill.origin.gpc, 1U);
+  l2.read(0x1000'0000'0080, 32, attribute);
+  EXPECT_EQ(l2.below.requests.size(), 1U);
+  l2.read(0x1000'0000'0080, 128, attribute);
+  EXPECT_EQ(l2.below.requests.size(), 2U);
+  EXPECT_EQ(l2.count("color_sectors"), 2U);
+  EXPECT_EQ(l2.count("color_sector_misses"), 2U);
+  EXPECT_EQ(l2.count("attribute_sectors"), 5U);
+  EXPECT_EQ(l2.count("attribute_sector_misses"), 2U);
+  EXPECT_EQ(l2.count("color_bytes_read"), 64U);
+  EXPECT_EQ(l2.below.requests.back().origin.traffic, MemoryTraffic::attribute);
+}
+
+TEST(SectoredL2, WhatWasWrittenGoesBelowWithTheOriginOfItsLineWhenThatGoes) {
+  L2 l2(Settings{{"bytes", "1024"}, {"ways", "0"}, {"banks", "1"}});  // 8 lines
+  l2.write(0, 128, attribute);
+  l2.write(128 + 32, 32, color);
+  for (std::uint64_t line = 2; line < 9; ++line) l2.read(128 * line, 32, color);
+  ASSERT_EQ(l2.below.bytes.written, 128U) << "the first line alone";
+  MemoryRequest written;
+  for (const MemoryRequest& request : l2.below.requests) {
+    if (request.command == tlm::TLM_WRITE_COMMAND) written = request;
+  }
+  EXPECT_EQ(written.address, 0U);
+  EXPECT_EQ(written.bytes, 128U);
+  EXPECT_EQ(written.origin.traffic, MemoryTraffic::attribute);
+  EXPECT_EQ(written.origin.gpc, 2U);
+}
+
+TEST(SectoredL2, ARequestLongerThanALineIsOneForEachLine) {
+  L2 l2(Settings{{"line_bytes", "64"}});
+  l2.read(4096, 256, color);
+  EXPECT_EQ(l2.below.requests.size(), 4U);
+  EXPECT_EQ(l2.below.bytes.read, 256U);
+  EXPECT_EQ(l2.count("cache.line_misses"), 4U);
+  EXPECT_EQ(l2.count("color_reads"), 1U);
+}
+
+std::set<std::pair<std::uint64_t, bool>> sectors_of(const std::vector<MemoryRequest>& requests, std::size_t from) {
+  std::set<std::pair<std::uint64_t, bool>> sectors;
+  for (std::size_t i = from; i < requests.size(); ++i) {
+    const MemoryRequest& request = requests[i];
+    EXPECT_EQ(request.bytes & (request.bytes - 1), 0U);
+    EXPECT_EQ(request.address % request.bytes, 0U);
+    EXPECT_LE(request.bytes, 128U);
+    for (std::uint64_t address = request.address; address < request.address + request.bytes; address += 32) {
+      EXPECT_TRUE(sectors.insert({address, request.command == tlm::TLM_WRITE_COMMAND}).second);
+    }
+  }
+  return sectors;
+}
+
+// Colour, attributes, and reads of vertices that come once; some of them parts of a sector.
+MemoryRequest random_request(std::uint64_t seed) {
+  MemoryRequest request;
+  request.bytes = 4U << mix(seed) % 6;
+  const std::uint64_t kind = mix(seed + 1) % 3;
+  request.origin.traffic = kind == 0   ? MemoryTraffic::color
+                           : kind == 1 ? MemoryTraffic::attribute
+                                       : MemoryTraffic::vertex;
+  request.origin.gpc = static_cast<std::uint16_t>(mix(seed + 2) % 4);
+  request.command = kind < 2 && mix(seed + 3) % 2 == 0 ? tlm::TLM_WRITE_COMMAND : tlm::TLM_READ_COMMAND;
+  const std::uint64_t span = kind == 0 ? 40'000 : kind == 1 ? 9'000 : 1'000'000'000;
+  const std::uint64_t offset = mix(seed + 4) % span;
+  request.address = (kind << 32U) + offset - offset % request.bytes;
+  return request;
+}
+
+TEST(SectoredL2, ReadsAndWritesBelowWhatACacheByItsDefinitionWould) {
+  const Settings variants[] = {{{"ways", "4"}},
+                               {{"ways", "4"}, {"write_allocate", "fill"}},
+                               {{"ways", "2"}, {"hash_sets", "off"}, {"tell_conflicts", "on"}},
+                               {{"ways", "8"}, {"replacement", "tree-plru"}},
+                               {{"ways", "0"}, {"replacement", "random"}, {"banks", "1"}}};
+  for (Settings settings : variants) {
+    settings.insert(settings.begin(), {{"bytes", "32K"}, {"banks", "8"}});
+    L2 l2(settings);
+    CacheOrganization organization = l2.behaviour->cache().organization();
+    ReferenceCache reference(organization);
+    std::map<std::uint64_t, unsigned> gpc_of;  // that brought a line in
+    std::map<MemoryTraffic, std::uint64_t> misses;
+    for (std::uint64_t i = 0; i < 20'000; ++i) {
+      const MemoryRequest request = random_request(10 * i);
+      const bool writes = request.command == tlm::TLM_WRITE_COMMAND;
+      const std::size_t before = l2.below.requests.size();
+      l2.behaviour->access(request);
+      const ReferenceCache::Outcome expected = reference.access(request.address, request.bytes, writes);
+      std::set<std::pair<std::uint64_t, bool>> sectors;
+      const std::uint64_t line = request.address - request.address % 128;
+      for (const unsigned sector : expected.filled) sectors.insert({line + 32 * sector, false});
+      for (const unsigned sector : expected.written_back) sectors.insert({expected.old_address + 32 * sector, true});
+      ASSERT_EQ(sectors_of(l2.below.requests, before), sectors) << i;
+      for (std::size_t asked = before; asked < l2.below.requests.size(); ++asked) {
+        const MemoryRequest& below = l2.below.requests[asked];
+        const bool written = below.command == tlm::TLM_WRITE_COMMAND;
+        ASSERT_EQ(below.origin.gpc, written ? gpc_of[below.address - below.address % 128] : request.origin.gpc);
+        ASSERT_EQ(static_cast<unsigned>(below.origin.traffic),
+                  written ? 1 + 3 * (below.address >> 32U) : static_cast<unsigned>(request.origin.traffic));
+      }
+      misses[request.origin.traffic] += expected.missed.size();
+      if (expected.replaced) gpc_of[line] = request.origin.gpc;
+    }
+    const SectoredCacheStatistics& statistics = l2.behaviour->statistics();
+    if (!organization.tells_conflicts) {
+      reference.capacity += reference.conflict;
+      reference.conflict = 0;
+    }
+    reference.expect_equal(statistics);
+    EXPECT_EQ(l2.below.bytes.read, statistics.bytes_filled.value());
+    EXPECT_EQ(l2.below.bytes.written, statistics.bytes_written_back.value());
+    EXPECT_EQ(l2.behaviour->memory_bytes().read, l2.below.bytes.read);
+    EXPECT_EQ(l2.behaviour->memory_bytes().written, l2.below.bytes.written);
+    EXPECT_EQ(l2.count("color_sector_misses"), misses[MemoryTraffic::color]);
+    EXPECT_EQ(l2.count("attribute_sector_misses"), misses[MemoryTraffic::attribute]);
+    EXPECT_EQ(l2.count("vertex_sector_misses"), misses[MemoryTraffic::vertex]);
+    EXPECT_GT(misses[MemoryTraffic::color], 100U);
+    EXPECT_GT(misses[MemoryTraffic::attribute], 100U);
+    EXPECT_GT(l2.below.bytes.written, 10'000U);
+  }
+}
+
+/// Sectors read from below when a surface is read and written, sector by sector, so many times.
+std::uint64_t filled(L2& l2, std::uint64_t bytes, unsigned rounds) {
+  for (unsigned round = 0; round < rounds; ++round) {
+    for (std::uint64_t address = 0; address < bytes; address += 32) {
+      l2.read(address, 32, color);
+      l2.write(address, 32, color);
+    }
+  }
+  return l2.below.bytes.read / 32;
+}
+
+TEST(SectoredL2, ASurfaceThatFitsIsFetchedOnceAndStays) {
+  L2 l2;
+  constexpr std::uint64_t bytes = 3 << 20;
+  EXPECT_EQ(filled(l2, bytes, 5), bytes / 32);
+  EXPECT_EQ(l2.below.bytes.written, 0U) << "dirty at the end of the frame";
+  EXPECT_EQ(l2.count("cache.sector_misses_compulsory"), bytes / 32);
+  EXPECT_EQ(l2.count("cache.sector_misses"), bytes / 32);
+}
+
+TEST(SectoredL2, TheKneeIsAtItsSize) {
+  constexpr unsigned rounds = 3;
+  for (const char* hashed : {"on", "off"}) {
+    for (const std::uint64_t eighths : {1U, 4U, 7U, 8U, 9U, 12U, 16U}) {
+      L2 l2(Settings{{"bytes", "512K"}, {"hash_sets", hashed}});
+      const std::uint64_t lines = eighths * 512;
+      const std::uint64_t missed = filled(l2, 128 * lines, rounds) / 4;
+      // In turn, more lines than a set has ways all miss; each set has its share of them.
+      EXPECT_EQ(missed, eighths <= 8 ? lines : rounds * lines) << eighths << "/8 of the cache";
+    }
+  }
+}
+
+TEST(SectoredL2, NeighbouringLinesAreInOtherBanksAndAllBanksHaveTheirShare) {
+  for (const char* hashed : {"on", "off"}) {
+    const L2 l2(Settings{{"hash_sets", hashed}});
+    std::map<std::uint32_t, unsigned> lines;
+    for (std::uint64_t line = 0; line < 32 * 64; ++line) {
+      ++lines[l2.behaviour->bank_of(128 * line)];
+      EXPECT_NE(l2.behaviour->bank_of(128 * line), l2.behaviour->bank_of(128 * (line + 1)));
+    }
+    EXPECT_EQ(lines.size(), 32U);
+    for (const auto& [bank, count] : lines) EXPECT_EQ(count, 64U) << bank;
+  }
+  // A column of a surface whose rows are a power of two of lines.
+  for (const char* hashed : {"on", "off"}) {
+    const L2 l2(Settings{{"hash_sets", hashed}});
+    std::set<std::uint32_t> banks;
+    for (std::uint64_t row = 0; row < 64; ++row) banks.insert(l2.behaviour->bank_of(row * 128 * 2048));
+    EXPECT_EQ(banks.size(), hashed == std::string("on") ? 32U : 1U);
+  }
+}
+
+TEST(SectoredL2, ItsBanksAreBusyForTheBytesThatTheyMove) {
+  L2 l2(Settings{{"bank_bytes_per_cycle", "32"}});
+  for (std::uint64_t line = 0; line < 32; ++line) l2.read(128 * line, 128);
+  l2.read(0, 64);
+  const std::vector<OccupancyPart> parts = l2.behaviour->least_occupancy(1000);
+  ASSERT_EQ(parts.size(), 1U);
+  EXPECT_DOUBLE_EQ(parts[0].cycles, 4 + 4 + 2) << "of the busiest: a line and its fill, and half a line";
+}
+
+TEST(SectoredL2, RefusesBanksThatCannotBe) {
+  const auto refusal = [](const Settings& settings) {
+    try {
+      L2 made(settings);
+    } catch (const UserError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_NE(refusal({{"banks", "3"}}).find("impossible L2 (l2.banks): 3 is no power of two"), std::string::npos);
+  EXPECT_NE(refusal({{"bytes", "64K"}, {"banks", "64"}}).find("32 sets cannot be dealt out to 64 banks"),
+            std::string::npos);
+  EXPECT_NE(refusal({{"ways", "5"}}).find("unusable L2 (l2.ways, l2.bytes)"), std::string::npos);
+  EXPECT_EQ(refusal({}), "accepted");
+}
+
+}  // namespace
+}  // namespace vrpipe
