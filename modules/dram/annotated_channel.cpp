@@ -8,6 +8,9 @@ namespace {
 
 /// Parts of a cycle in which the bus, and activates, are reserved.
 constexpr unsigned parts = 16;
+constexpr std::uint64_t no_row = ~std::uint64_t{0};
+
+Cycle beyond(Cycle cycles, Cycle hidden) { return parts * (cycles - std::min(cycles, hidden)); }
 
 }  // namespace
 
@@ -15,10 +18,20 @@ AnnotatedChannel::AnnotatedChannel(const DramTiming& timing, DramStatistics& sta
     : timing_(timing),
       statistics_(statistics),
       refresh_cycles_(timing.refresh ? timing.rp_all + timing.rfc : 0),
+      read_row_cycle_(std::max(timing.rc, timing.ras + timing.rp + timing.activate - 1)),
+      write_row_cycle_(std::max(read_row_cycle_, timing.activate - 1 + timing.rcd + timing.cwl + timing.dqss +
+                                                     timing.burst + timing.wr + timing.rp)),
+      activate_overhead_(beyond(timing.activate + 1, timing.burst)),
+      turn_overhead_(parts * (timing.rtw + timing.dqss + timing.wtr + timing.cl) /
+                     (timing.write_high - timing.write_low)),
+      drain_overhead_(beyond(timing.rp + timing.rcd, timing.cl + timing.burst + timing.rtw - timing.cwl)),
+      return_overhead_(beyond(timing.wr + timing.rp + timing.rcd, timing.wtr)),
       bus_(parts),
       activates_(parts),
       groups_(timing.groups, BandwidthReservation(1)),
       banks_(timing.banks, Bank(1)),
+      read_places_(timing.read_queue),
+      write_places_(timing.write_queue),
       batch_(timing.write_high - timing.write_low) {}
 
 Cycle AnnotatedChannel::working(Cycle cycle) const {
@@ -34,89 +47,117 @@ Cycle AnnotatedChannel::real(Cycle working) const {
   return (rest / between + 1) * timing_.refi + refresh_cycles_ + rest % between;
 }
 
-Cycle AnnotatedChannel::open_row(Bank& bank, const DramAddress& place, Cycle now, Cycle present,
-                                 std::uint64_t refreshes, unsigned queue) {
-  Row& newest = bank.rows[bank.newest];
-  const bool is_open = newest.refreshes == refreshes && newest.row != ~std::uint64_t{0};
-  for (Row& row : bank.rows) {
-    if (row.row != place.row || row.refreshes != refreshes) continue;
-    const bool waits = row.last > now && sequence_ - row.sequence <= queue;
-    if (&row != &newest && !waits) continue;
+AnnotatedChannel::Row& AnnotatedChannel::open_row(Bank& bank, std::uint64_t number, Cycle now, Cycle present,
+                                                  std::uint64_t refreshes, bool writes) {
+  Rows& rows = writes ? bank.written : bank.read;
+  const std::uint64_t sequence = writes ? writes_ : reads_;
+  Row& newest = rows.rows[rows.newest];
+  for (Row& row : rows.rows) {
+    if (row.row != number || row.refreshes != refreshes) continue;
+    // Writes are served a drain at a time; reads in the order in which they come, but for those that still wait.
+    const bool is_near = writes ? sequence - row.sequence <= batch_
+                                : &row == &newest || (row.last > now && sequence - row.sequence <= timing_.read_queue);
+    if (!is_near) continue;
     ++statistics_.row_hits;
-    row.sequence = sequence_;
-    // Hits beyond those that fit into the time that a row is open anyway.
+    row.sequence = sequence;
+    // Beyond those that fit into the time that a row is open anyway, bursts take the bank's.
     const Cycle in_time = (timing_.ras - timing_.rcd) / timing_.ccd;
-    if (++bank.hits <= in_time) return now;
+    if (++bank.hits <= in_time) return row;
     const auto cycles = static_cast<unsigned>(timing_.ccd);
-    return std::max(now, bank.time.take(now, cycles, present) - cycles);
+    row.ready = std::max(row.ready, bank.time.take(std::max(now, row.ready), cycles, present) - cycles);
+    return row;
   }
   ++statistics_.activates;
+  const bool is_open = newest.refreshes == refreshes && newest.row != no_row;
   const bool conflicts = is_open && !timing_.closes_rows;
   if (is_open) ++statistics_.precharges;
   ++(conflicts ? statistics_.row_conflicts : statistics_.row_misses);
-  const auto row_cycle = static_cast<unsigned>(std::max(timing_.rc, timing_.ras + timing_.rp + timing_.activate - 1));
+  const auto row_cycle = static_cast<unsigned>(writes ? write_row_cycle_ : read_row_cycle_);
   const Cycle free = bank.time.take(now + (conflicts ? timing_.rp : 0), row_cycle, present) - row_cycle;
   const auto apart = static_cast<unsigned>(std::max(parts * timing_.rrd, parts * timing_.faw / 4));
   const Cycle activated = activates_.take(free, apart, present) - (apart + parts - 1) / parts;
-  bank.newest = (bank.newest + 1) % rows_kept;
   bank.hits = 0;
-  Row& opened = bank.rows[bank.newest];
-  opened = {place.row, 0, sequence_, refreshes};
-  return activated + timing_.activate - 1 + timing_.rcd;
+  rows.newest = (rows.newest + 1) % rows_kept;
+  Row& opened = rows.rows[rows.newest];
+  opened = {number, now, activated + timing_.activate - 1 + timing_.rcd, 0, sequence, refreshes};
+  return opened;
 }
 
-Cycle AnnotatedChannel::move(Bank& bank, const DramAddress& place, Cycle column, Cycle latency, Cycle present,
+Cycle AnnotatedChannel::move(const DramAddress& place, Row& row, Cycle now, Cycle latency, Cycle present,
                              Cycle overhead) {
   statistics_.data_cycles += timing_.burst;
+  // Who opened the row may have run ahead of time: then it would have taken as long from here.
+  Cycle column = now >= row.asked ? std::max(now, row.ready) : now + (row.ready - row.asked);
   if (timing_.groups > 1 || timing_.ccd_l > timing_.burst) {
     const auto apart = static_cast<unsigned>(timing_.ccd_l);
     column = groups_[place.bank & (timing_.groups - 1)].take(column, apart, present) - apart;
   }
   const auto taken = static_cast<unsigned>(parts * timing_.burst + overhead);
   const Cycle there = bus_.take(column + latency, taken, present);
-  for (Row& row : bank.rows) {
-    if (row.row == place.row) row.last = std::max(row.last, there);
-  }
+  row.last = std::max(row.last, there);
   return there;
 }
 
 Cycle AnnotatedChannel::read(const DramAddress& place, Cycle now, Cycle present) {
   ++statistics_.reads;
-  ++sequence_;
+  ++reads_;
   reads_ago_ = 0;
   const Cycle from = working(now);
   present = working(present);
+  const Cycle queued = read_places_.room(from);
+  const std::uint64_t activates = statistics_.activates.value();
   Bank& bank = banks_[place.bank];
-  const Cycle column = open_row(bank, place, from, present, refreshes_before(now), timing_.read_queue);
-  const Cycle there = real(move(bank, place, column, timing_.cl, present, 0));
+  bank.is_read = true;
+  Row& row = open_row(bank, place.row, queued, present, refreshes_before(now), false);
+  Cycle overhead = 0;
+  if (statistics_.activates.value() > activates) {
+    overhead = activate_overhead_;
+    if (reads_return_ > 0 && --reads_return_ == 0) overhead += return_overhead_;
+  } else {
+    reads_return_ = 0;
+  }
+  const Cycle done = move(place, row, queued, timing_.cl, present, overhead);
+  read_places_.push(from, done - timing_.cl - timing_.burst);
+  const Cycle there = real(done);
   statistics_.read_cycles.see(there - now);
   return there;
 }
 
 Cycle AnnotatedChannel::write(const DramAddress& place, Cycle now, Cycle present) {
   ++statistics_.writes;
-  ++sequence_;
+  ++writes_;
   const Cycle from = working(now);
   present = working(present);
   Bank& bank = banks_[place.bank];
   bank.is_written = true;
-  const Cycle column = open_row(bank, place, from, present, refreshes_before(now), timing_.write_queue);
-  Cycle overhead = 0;
+  const std::uint64_t activates = statistics_.activates.value();
+  Row& row = open_row(bank, place.row, from, present, refreshes_before(now), true);
+  const bool opens = statistics_.activates.value() > activates;
+  Cycle overhead = opens ? activate_overhead_ : 0;
   if (reads_ago_ < 2 * batch_) {
     ++reads_ago_;
-    overhead = parts * (timing_.rtw + timing_.dqss + timing_.wtr + timing_.cl + timing_.rcd) / batch_;
+    overhead += turn_overhead_;
+    if (opens && !drain_opens_) overhead += drain_overhead_;
+    drain_opens_ = drain_opens_ || opens;
   }
-  const Cycle there = move(bank, place, column, timing_.cwl, present, overhead);
+  const Cycle done = move(place, row, from, timing_.cwl, present, overhead);
   if (++written_ >= batch_) drain();
-  const Cycle queued = timing_.write_queue * timing_.burst;
-  return real(std::max(from, there - std::min(there, queued)));
+  const Cycle queued = write_places_.room(from);
+  write_places_.push(from, done - timing_.cwl - timing_.burst);
+  return queued > from ? real(queued) : now;
 }
 
 void AnnotatedChannel::drain() {
   written_ = 0;
+  drain_opens_ = false;
+  reads_return_ = 2;
   for (Bank& bank : banks_) {
-    if (bank.is_written && reads_ago_ < 2 * batch_) bank.rows[bank.newest].row = ~std::uint64_t{0};
-    bank.is_written = false;
+    // Of reads and writes in a bank each closes the rows of the other.
+    if (bank.is_written) bank.read.rows[bank.read.newest].row = no_row;
+    if (bank.is_read) {
+      for (Row& row : bank.written.rows) row.row = no_row;
+    }
+    bank.is_read = bank.is_written = false;
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -35,40 +36,74 @@ class AnnotatedChannel {
   /// Of a row that was opened lately.
   struct Row {
     std::uint64_t row = ~std::uint64_t{0};
+    Cycle asked = 0;             ///< when it was needed first
+    Cycle ready = 0;             ///< when its bursts may be read or written
     Cycle last = 0;              ///< data of it, as far as is known
-    std::uint64_t sequence = 0;  ///< of the last burst of it
+    std::uint64_t sequence = 0;  ///< of the last burst of it, among reads or writes
     std::uint64_t refreshes = 0;
   };
   static constexpr unsigned rows_kept = 4;
+  struct Rows {
+    std::array<Row, rows_kept> rows;
+    unsigned newest = 0;
+  };
   struct Bank {
     explicit Bank(unsigned width) : time(width) {}
     BandwidthReservation time;  ///< a byte a cycle
-    std::array<Row, rows_kept> rows;
-    unsigned newest = 0;
-    unsigned hits = 0;        ///< since the newest was opened
-    bool is_written = false;  ///< in this drain
+    Rows read, written;
+    unsigned hits = 0;                         ///< since a row was opened
+    bool is_read = false, is_written = false;  ///< since the last drain
   };
 
   std::uint64_t refreshes_before(Cycle cycle) const { return timing_.refresh ? cycle / timing_.refi : 0; }
   /// Cycles without those of refreshes, and back.
   Cycle working(Cycle cycle) const;
   Cycle real(Cycle working) const;
-  /// When the column command of a burst may be given, in working time.
-  Cycle open_row(Bank& bank, const DramAddress& place, Cycle now, Cycle present, std::uint64_t refreshes,
-                 unsigned queue);
-  Cycle move(Bank& bank, const DramAddress& place, Cycle column, Cycle latency, Cycle present, Cycle overhead);
+  /// The row of a burst, opened if it is not. All that follows is in working time.
+  Row& open_row(Bank& bank, std::uint64_t number, Cycle now, Cycle present, std::uint64_t refreshes, bool writes);
+  /// When the data of a burst has moved whose row is there; `overhead` of the bus in parts of a cycle.
+  Cycle move(const DramAddress& place, Row& row, Cycle now, Cycle latency, Cycle present, Cycle overhead);
   void drain();
 
   const DramTiming timing_;
   DramStatistics& statistics_;
-  Cycle refresh_cycles_;  ///< of a period, in which nothing else happens
+  Cycle refresh_cycles_;                    ///< of a period, in which nothing else happens
+  Cycle read_row_cycle_, write_row_cycle_;  ///< that a bank is taken by a row, at least
+  // What the bus idles for, in parts of a cycle.
+  Cycle activate_overhead_;  ///< an activate that does not fit between two bursts
+  Cycle turn_overhead_;      ///< the turns of a drain, for each of its writes
+  Cycle drain_overhead_;     ///< a drain that begins with another row
+  Cycle return_overhead_;    ///< reads that go on after it with a row each, in banks that recover from writes
   BandwidthReservation bus_, activates_;
   std::vector<BandwidthReservation> groups_;
   std::vector<Bank> banks_;
-  std::uint64_t sequence_ = 0;
-  unsigned batch_;            ///< writes of a drain
-  unsigned written_ = 0;      ///< of this one
-  unsigned reads_ago_ = ~0U;  ///< bursts since the last read, as far as it matters
+  /// The last bursts, as they were asked for, in a ring: as many as have places in a queue.
+  class Places {
+   public:
+    explicit Places(unsigned count) : places_(count) {}
+    /// When there is room for one that is asked for in a cycle. Those that ran ahead of it do not hold it up.
+    Cycle room(Cycle asked) const {
+      return places_[next_].asked <= asked ? std::max(asked, places_[next_].served) : asked;
+    }
+    void push(Cycle asked, Cycle served) {
+      places_[next_] = {asked, served};
+      next_ = next_ + 1 < places_.size() ? next_ + 1 : 0;
+    }
+
+   private:
+    struct Place {
+      Cycle asked = 0, served = 0;
+    };
+    std::vector<Place> places_;
+    std::size_t next_ = 0;
+  };
+  Places read_places_, write_places_;
+  std::uint64_t reads_ = 0, writes_ = 0;
+  unsigned batch_;             ///< writes of a drain
+  unsigned written_ = 0;       ///< of this one
+  bool drain_opens_ = false;   ///< it has opened a row
+  unsigned reads_return_ = 0;  ///< so many of the first reads after a drain are still to open a row each
+  unsigned reads_ago_ = ~0U;   ///< bursts since the last read, as far as it matters
 };
 
 }  // namespace vrpipe

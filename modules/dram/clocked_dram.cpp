@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/kernel/ring.h>
@@ -16,20 +17,19 @@ class ClockedDram::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
   }
   tlm::tlm_target_socket<32, tlm::tlm_base_protocol_types, 1, sc_core::SC_ZERO_OR_MORE_BOUND> socket;
 
-  Ring<Waiting>& waiting() { return waiting_; }
-  Cycle arrival_of_first() const { return dram_.pending_[waiting_.front().tag].arrived; }
-
-  /// The first request has entered the queues of its channels.
-  void pop(Cycle now) {
-    if (popped_at_ != now) popped_ = 0;
-    popped_at_ = now;
-    ++popped_;
-    waiting_.pop();
-    if (held_ == nullptr || waiting_.size() > dram_.settings_.port_requests) return;
+  std::vector<Waiting>& waiting() { return waiting_; }
+  /// Of the requests `left` have entered the queues of their channels. What leaves in a cycle leaves room from the next
+  /// on, so that the order of ticks does not matter.
+  void leave(std::size_t left, Cycle now) {
+    left_ = left;
+    left_at_ = now;
+  }
+  /// Whether a request that was held up can be let in.
+  bool admits() const { return held_ != nullptr && waiting_.size() <= dram_.settings_.port_requests; }
+  void admit() {
     tlm::tlm_phase phase = tlm::END_REQ;
     sc_core::sc_time delay = sc_core::SC_ZERO_TIME;
-    tlm::tlm_generic_payload& payload = *held_;
-    held_ = nullptr;
+    tlm::tlm_generic_payload& payload = *std::exchange(held_, nullptr);
     socket->nb_transport_bw(payload, phase, delay);
   }
   void push_answer(tlm::tlm_generic_payload& payload, Cycle at) { answers_.push_in_order({at, &payload}, &Answer::at); }
@@ -67,7 +67,8 @@ class ClockedDram::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
     }
     if (phase != tlm::BEGIN_REQ) return tlm::TLM_ACCEPTED;  // ignorable ones of the initiator's
     // Also from outside an edge, by what has time of its own.
-    const Cycle arrived = clock().edge_after(sc_core::SC_ZERO_TIME) - 1 + clock().whole_cycles(delay);
+    const Cycle present = clock().edge_after(sc_core::SC_ZERO_TIME) - 1;
+    const Cycle arrived = present + clock().whole_cycles(delay);
     last_arrival_ = std::max(last_arrival_, arrived);
     const MemoryRequest request = request_of(payload);
     check_alignment(socket, arrived, request.address, request.bytes);
@@ -76,10 +77,9 @@ class ClockedDram::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
     const unsigned bursts = dram_.settings_.bursts(request.bytes);
     const bool reads = request.command != tlm::TLM_WRITE_COMMAND;
     const std::uint32_t tag = dram_.take(index_, payload, last_arrival_, bursts, reads);
-    // What has left in this cycle leaves room from the next on.
-    const std::size_t left = popped_at_ == arrived ? popped_ : 0;
+    const std::size_t left = left_at_ == present ? left_ : 0;
     const bool has_room = waiting_.size() + left < dram_.settings_.port_requests;
-    waiting_.push({tag, request.address, static_cast<std::uint16_t>(bursts), 0});
+    waiting_.push_back({tag, request.address, static_cast<std::uint16_t>(bursts), 0});
     dram_.domain_.wake(dram_.handle_, last_arrival_ + 1);
     if (has_room) {
       phase = tlm::END_REQ;
@@ -98,12 +98,12 @@ class ClockedDram::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
   };
   ClockedDram& dram_;
   const unsigned index_;
-  Ring<Waiting> waiting_;
+  std::vector<Waiting> waiting_;
   Ring<Answer> answers_;                      ///< not sent yet, by cycle
   tlm::tlm_generic_payload* held_ = nullptr;  ///< the last of those that wait, if it has no END_REQ yet
   Cycle last_arrival_ = 0;
-  Cycle popped_at_ = never;
-  std::size_t popped_ = 0;
+  Cycle left_at_ = never;
+  std::size_t left_ = 0;
   bool responding_ = false;  ///< BEGIN_RESP without END_RESP yet
 };
 
@@ -138,12 +138,18 @@ std::uint32_t ClockedDram::take(unsigned port, tlm::tlm_generic_payload& payload
 
 Cycle ClockedDram::tick(Cycle now) {
   const Cycle edge = clock_.edge_of(now);
+  for (const auto& port : ports_) {
+    if (port->admits()) port->admit();
+  }
   Cycle next = never;
   // Whose turn it is to be first changes from cycle to cycle.
   const std::size_t count = ports_.size();
   const std::size_t first = count < 2 ? 0 : now % count;
-  for (std::size_t i = 0; i < count; ++i)
-    next = std::min(next, enter(*ports_[first + i < count ? first + i : first + i - count], now, edge));
+  for (std::size_t i = 0; i < count; ++i) {
+    Port& port = *ports_[first + i < count ? first + i : first + i - count];
+    next = std::min(next, enter(port, now, edge));
+    if (port.admits()) next = now + 1;
+  }
   for (std::size_t index = 0; index < channels_.size(); ++index) {
     if (due_[index] > now) {
       next = std::min(next, due_[index]);
@@ -163,29 +169,48 @@ Cycle ClockedDram::tick(Cycle now) {
 }
 
 Cycle ClockedDram::enter(Port& port, Cycle now, Cycle edge) {
-  while (!port.waiting().empty()) {
-    if (port.arrival_of_first() >= now) return port.arrival_of_first() + 1;
-    Waiting& waiting = port.waiting().front();
-    Pending& pending = pending_[waiting.tag];
-    for (; waiting.entered < waiting.bursts; ++waiting.entered) {
-      const DramAddress place = settings_.map.place_of(waiting.address + waiting.entered * settings_.burst_bytes);
-      DramChannel& channel = channels_[place.channel];
-      channel.advance(edge);
-      if (!(pending.reads ? channel.can_read() : channel.can_write()))
-        return std::max(now + 1, clock_.after(channel.next_command()));
-      if (pending.reads) {
-        channel.read(place, waiting.tag, edge);
-      } else {
-        channel.write(place, edge);
-        --pending.bursts;
-        pending.done = edge;
-      }
-      due_[place.channel] = now;
-    }
-    if (!pending.reads) answer(waiting.tag);
-    port.pop(now);
+  std::vector<Waiting>& waiting = port.waiting();
+  std::uint64_t full = 0;
+  Cycle again = never;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < waiting.size(); ++i) {
+    const Cycle arrived = pending_[waiting[i].tag].arrived;
+    if (arrived >= now) again = std::min(again, arrived + 1);
+    if (arrived < now && enter(waiting[i], now, edge, full)) continue;
+    waiting[kept++] = waiting[i];
   }
-  return never;
+  port.leave(waiting.size() - kept, now);
+  waiting.resize(kept);
+  for (; full != 0; full &= full - 1) {
+    DramChannel& channel = channels_[static_cast<unsigned>(__builtin_ctzll(full))];
+    again = std::min(again, std::max(now + 1, clock_.after(channel.next_command())));
+  }
+  return again;
+}
+
+bool ClockedDram::enter(Waiting& waiting, Cycle now, Cycle edge, std::uint64_t& full) {
+  Pending& pending = pending_[waiting.tag];
+  for (; waiting.entered < waiting.bursts; ++waiting.entered) {
+    const DramAddress place = settings_.map.place_of(waiting.address + waiting.entered * settings_.burst_bytes);
+    // Requests for a channel do not overtake one another, and so stay in order where they are for the same bytes.
+    if ((full >> place.channel & 1U) != 0) return false;
+    DramChannel& channel = channels_[place.channel];
+    channel.advance(edge);
+    if (!(pending.reads ? channel.can_read() : channel.can_write())) {
+      full |= std::uint64_t{1} << place.channel;
+      return false;
+    }
+    if (pending.reads) {
+      channel.read(place, waiting.tag, edge);
+    } else {
+      channel.write(place, edge);
+      --pending.bursts;
+      pending.done = edge;
+    }
+    due_[place.channel] = now;
+  }
+  if (!pending.reads) answer(waiting.tag);
+  return true;
 }
 
 void ClockedDram::collect(DramChannel& channel) {

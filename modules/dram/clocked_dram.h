@@ -17,9 +17,10 @@ namespace vrpipe {
 
 /// A DRAM at `cycle`, as a module in the clock of the units: ports of the base protocol in front of channels that count
 /// cycles of their own. A request that comes in cycle c enters the queues of its channels at the first edge of the DRAM
-/// at or after cycle c + 1, a burst at a time, in the order of its port; while a queue is full it is tried again in each
-/// cycle. A port holds a number of such requests; the next one has no END_REQ until there is room. Writes are answered
-/// once they are queued, reads with the last of their data, in any order, and each the controller's latency later.
+/// at or after cycle c + 1, a burst at a time; while a queue is full it is tried again in each cycle, and those behind
+/// it that need no full queue overtake it. A port holds a number of such requests; the next one has no END_REQ until
+/// the cycle after that in which there is room. Writes are answered once they are queued, reads with the last of their
+/// data, in any order, and each the controller's latency later.
 class ClockedDram : public Clocked, public sc_core::sc_module {
  public:
   /// `domain` and `behaviour` outlive it.
@@ -51,8 +52,10 @@ class ClockedDram : public Clocked, public sc_core::sc_module {
   };
   Cycle tick(Cycle now) override;
   std::uint32_t take(unsigned port, tlm::tlm_generic_payload& payload, Cycle arrived, unsigned bursts, bool reads);
-  /// Enters bursts of a port's requests while there is room; returns the next cycle to try again.
+  /// Enters bursts of a port's requests where there is room; returns the next cycle to try again.
   Cycle enter(Port& port, Cycle now, Cycle edge);
+  /// The same of a request; false if it has to wait for a channel, which `full` then has, a bit each.
+  bool enter(Waiting& waiting, Cycle now, Cycle edge, std::uint64_t& full);
   void collect(DramChannel& channel);
   void answer(std::uint32_t tag);
 

@@ -87,7 +87,7 @@ const DramDevice lpddr5_6400 = {
     {1250, lpddr5_gem5},
     {210000, lpddr5_gem5},
     {3900000, lpddr5_gem5},
-    {2, "JESD209-5: ACTIVATE-1 and ACTIVATE-2"},
+    {1, "JESD209-5: two, which may be apart (tAAD) and fit between reads"},
     {64, "gem5: read_buffer_size of LPDDR5"},
 };
 

@@ -172,14 +172,10 @@ class DramParameters : public ParameterSet {
                         "ps",
                         "gem5: static_frontend_latency, static_backend_latency, 10 ns each",
                         "that controller and interface add to a read or write, both ways together"};
-  Integer port_requests{*this,
-                        "port_requests",
-                        8,
-                        1,
-                        1024,
-                        "requests",
-                        source::open,
-                        "that a port holds while the queues of their channels are full"};
+  Integer port_requests{*this,        "port_requests",
+                        64,           1,
+                        1024,         "requests",
+                        source::open, "that a port holds while the queues of their channels are full"};
 };
 
 /// Distances between commands, in cycles of the DRAM, and what the controller of a channel decides by.
