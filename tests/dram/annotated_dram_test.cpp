@@ -1,5 +1,6 @@
 // The DRAM with annotated time, of `lt` and `at`: where nothing is guessed it is that of `cycle`.
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -57,6 +58,25 @@ TEST_P(AnnotatedDramTest, AccessesThatRanAheadDoNotDelayEarlierOnes) {
   const Cycle alone = bench.annotated_answers({read(100, 4096)})[0];
   accesses.push_back(read(100, 4096));
   EXPECT_EQ(bench.annotated_answers(accesses).back(), alone);
+}
+
+TEST_P(AnnotatedDramTest, ARowThatWasOpenedAheadOfTimeTakesAsLongFromAnEarlierAccess) {
+  const Cycle alone = bench.annotated_answers({read(100, far_row + 32)})[0];
+  EXPECT_EQ(bench.annotated_answers({read(2000, far_row), read(100, far_row + 32)})[1], alone);
+}
+
+TEST_P(AnnotatedDramTest, ReadsAndWritesByTurnsLoseTheTurnsOfTheBus) {
+  const auto cycles = [&](bool writes) {
+    std::vector<Access> accesses;
+    for (std::uint64_t i = 0; i < 4000; ++i) {
+      // Bursts of two banks by turns, in a row each.
+      const std::uint64_t address = i % 2 * 4096 + i / 2 % 32 * 32;
+      accesses.push_back(writes && i % 2 == 1 ? write(0, address) : read(0, address));
+    }
+    const std::vector<Cycle> answered = bench.annotated_answers(accesses, 64);
+    return static_cast<double>(*std::max_element(answered.begin(), answered.end()));
+  };
+  EXPECT_GT(cycles(true), 1.08 * cycles(false));
 }
 
 TEST_P(AnnotatedDramTest, CountsWhatItDoes) {

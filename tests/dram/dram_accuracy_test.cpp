@@ -42,7 +42,7 @@ std::vector<Pattern> patterns() {
          const std::uint64_t address = i / 4 * 32 + i % 4 * (5U << 20U) + i % 4 * 4352;
          return i % 4 < 3 ? read(0, address) : write(0, address);
        },
-       0.08},
+       0.06},
       {"RandomAThirdWritten",
        [](std::uint64_t i) { return mix(i + 77) % 3 > 0 ? read(0, random_sector(i)) : write(0, random_sector(i)); },
        0.12},

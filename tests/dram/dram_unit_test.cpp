@@ -87,6 +87,26 @@ TEST(DramUnit, RequestsForOtherChannelsOvertakeThoseForAFullOne) {
   EXPECT_LT(answered[1], answered[2]);
 }
 
+TEST(DramUnit, RequestsForAChannelDoNotOvertakeOneAnother) {
+  // The second read waits for a place; the write of the same bytes behind it has one.
+  DramBench bench(lpddr3, {{"channels", "1"}, {"read_queue", "1"}});
+  bench.answered({read(10, 0), read(10, 64), write(10, 64)});
+  EXPECT_EQ(bench.clocked->statistics.channels.reads_forwarded.value(), 0U) << "it would see what is written later";
+}
+
+TEST(DramUnit, PortsTakeTurns) {
+  DramBench bench(lpddr3, {{"channels", "1"}, {"read_queue", "1"}});
+  ClockedDram dram("dram", *bench.clock, *bench.behaviour, 2);
+  const std::vector<Access> accesses(200, read(0, 0));
+  ClockedInitiator one("one", *bench.clock, accesses);
+  ClockedInitiator other("other", *bench.clock, accesses);
+  one.memory.socket.bind(dram.port(0));
+  other.memory.socket.bind(dram.port(1));
+  while (!bench.clock->run_to_rest(bench.cycles(1000))) {}
+  const auto last_of_one = static_cast<double>(one.answered.back());
+  EXPECT_NEAR(static_cast<double>(other.answered.back()), last_of_one, 0.1 * last_of_one);
+}
+
 TEST(DramUnit, AnswersEveryRequestOnce) {
   for (const Settings& settings : {Settings{}, Settings{{"read_queue", "2"},
                                                         {"write_queue", "2"},
@@ -116,8 +136,8 @@ TEST(DramUnit, AnswersEveryRequestOnce) {
 }
 
 TEST(DramUnit, TheOrderOfTicksDoesNotMatter) {
-  const auto answers = [](const std::vector<unsigned>& order) {
-    DramBench bench(lpddr3, {{"channels", "2"}, {"read_queue", "4"}, {"port_requests", "2"}});
+  const auto answers = [](const Settings& settings, const std::vector<unsigned>& order) {
+    DramBench bench(lpddr3, settings);
     std::vector<std::unique_ptr<ClockedInitiator>> units;
     std::unique_ptr<ClockedDram> dram;
     for (unsigned unit = 0; unit < 3; ++unit) {
@@ -137,10 +157,14 @@ TEST(DramUnit, TheOrderOfTicksDoesNotMatter) {
     EXPECT_GT(dram->statistics.requests_held.value(), 100U);
     return found;
   };
-  const std::vector<Cycle> first = answers({});
-  EXPECT_EQ(answers({3, 2, 1, 0}), first);
-  EXPECT_EQ(answers({1, 0, 3, 2}), first);
-  EXPECT_EQ(answers({2, 3, 0, 1}), first);
+  // Queues are full, or ports alone.
+  for (const Settings& settings :
+       {Settings{{"channels", "2"}, {"read_queue", "4"}, {"port_requests", "2"}}, Settings{{"port_requests", "1"}}}) {
+    const std::vector<Cycle> first = answers(settings, {});
+    EXPECT_EQ(answers(settings, {3, 2, 1, 0}), first);
+    EXPECT_EQ(answers(settings, {1, 0, 3, 2}), first);
+    EXPECT_EQ(answers(settings, {2, 3, 0, 1}), first);
+  }
 }
 
 TEST(DramUnit, ComesToRestThoughItRefreshesForEver) {
@@ -223,6 +247,54 @@ TEST(DramUnit, AnswersAnInitiatorOfAnotherMakeOneByOne) {
   for (std::size_t i = 1; i < 4; ++i) {
     EXPECT_GE(initiator.responses[i], initiator.responses[i - 1] + sc_core::sc_time(30, sc_core::SC_NS));
   }
+}
+
+/// An initiator of another make whose only request is annotated ahead.
+class EarlyInitiator : public sc_core::sc_module {
+ public:
+  SC_HAS_PROCESS(EarlyInitiator);
+  EarlyInitiator(const sc_core::sc_module_name& name, const sc_core::sc_time& ahead)
+      : sc_module(name), socket("socket"), ahead_(ahead) {
+    socket.register_nb_transport_bw(this, &EarlyInitiator::nb_transport_bw);
+    SC_THREAD(ask);
+  }
+  tlm_utils::simple_initiator_socket<EarlyInitiator> socket;
+  sc_core::sc_time answered;
+
+ private:
+  void ask() {
+    wait(5, sc_core::SC_NS);
+    payload_.set_address(4096);
+    payload_.set_data_length(32);
+    payload_.set_read();
+    payload_.set_mm(&memory_);
+    payload_.acquire();
+    tlm::tlm_phase phase = tlm::BEGIN_REQ;
+    socket->nb_transport_fw(payload_, phase, ahead_);
+  }
+  tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload&, tlm::tlm_phase& phase, sc_core::sc_time& delay) {
+    if (phase != tlm::BEGIN_RESP) return tlm::TLM_ACCEPTED;
+    answered = sc_core::sc_time_stamp() + delay;
+    return tlm::TLM_COMPLETED;
+  }
+  struct Memory : tlm::tlm_mm_interface {
+    void free(tlm::tlm_generic_payload*) override {}
+  };
+  Memory memory_;
+  tlm::tlm_generic_payload payload_;
+  sc_core::sc_time ahead_;
+};
+
+TEST(DramUnit, ARequestThatIsAnnotatedAheadComesThen) {
+  DramBench bench(lpddr3, {{"controller_ps", "0"}});
+  ClockedDram dram("dram", *bench.clock, *bench.behaviour, 2);
+  ClockedInitiator busy("busy", *bench.clock, {read(6, 0), read(20, 32), read(60, 64)});
+  EarlyInitiator early("early", bench.cycles(200));
+  busy.memory.socket.bind(dram.port(0));
+  early.socket.bind(dram.port(1));
+  bench.clock->run(bench.cycles(1000));
+  // Cycle 205, seen from 206 on, at the 165th edge; there 31 cycles later, at 245 ns.
+  EXPECT_EQ(early.answered, sc_core::sc_time(245, sc_core::SC_NS));
 }
 
 TEST(DramUnit, IsMadeByItsSlot) {
