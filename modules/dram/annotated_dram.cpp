@@ -54,7 +54,7 @@ AnnotatedDram::~AnnotatedDram() = default;
 tlm::tlm_base_target_socket_b<32>& AnnotatedDram::port(unsigned index) { return ports_.at(index)->socket; }
 
 Cycle AnnotatedDram::serve(const MemoryRequest& request, Cycle arrival) {
-  behaviour_.access(request);
+  behaviour_.count(request);
   const bool writes = request.command == tlm::TLM_WRITE_COMMAND;
   const Cycle now = clock_.edge_of(arrival + 1);
   const Cycle present = clock_.edge_of(domain_.now());

@@ -73,7 +73,7 @@ class ClockedDram::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
     const MemoryRequest request = request_of(payload);
     check_alignment(socket, arrived, request.address, request.bytes);
     payload.acquire();
-    dram_.behaviour_.access(request);
+    dram_.behaviour_.count(request);
     const unsigned bursts = dram_.settings_.bursts(request.bytes);
     const bool reads = request.command != tlm::TLM_WRITE_COMMAND;
     const std::uint32_t tag = dram_.take(index_, payload, last_arrival_, bursts, reads);

@@ -1,5 +1,6 @@
 #include "dram/dram.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <vrpipe/pipeline/registry.h>
@@ -22,12 +23,38 @@ Dram::Dram(const DramParameters& parameters, const RenderContext& context) : set
   timing_.latency_cycles = static_cast<std::uint32_t>(least_ps / context.clock_ps);
   timing_.bytes_per_cycle =
       static_cast<std::uint32_t>(std::ceil(peak_bytes(parameters, static_cast<double>(context.clock_ps))));
-  peak_bytes_per_ps_ = peak_bytes(parameters, 1.0);
+}
+
+void Dram::access(const MemoryRequest& request) {
+  count(request);
+  if (channels_.empty()) {
+    channels_.resize(settings_.channels);
+    for (Channel& channel : channels_) channel.written.assign(settings_.timing.write_queue, ~std::uint64_t{0});
+  }
+  const unsigned bursts = settings_.bursts(request.bytes);
+  for (unsigned i = 0; i < bursts; ++i) {
+    const std::uint64_t address = request.address + i * settings_.burst_bytes;
+    const std::uint64_t burst = address / settings_.burst_bytes;
+    Channel& channel = channels_[settings_.map.place_of(address).channel];
+    // What is queued to be written is read from there, and written over there.
+    if (std::find(channel.written.begin(), channel.written.end(), burst) != channel.written.end()) continue;
+    ++channel.bursts;
+    if (request.command != tlm::TLM_WRITE_COMMAND) continue;
+    channel.written[channel.next] = burst;
+    channel.next = channel.next + 1 < channel.written.size() ? channel.next + 1 : 0;
+  }
 }
 
 std::vector<OccupancyPart> Dram::least_occupancy(double period_ps) const {
-  const MemoryBytes moved = traffic_.bytes();
-  return {{"data", 0, static_cast<double>(moved.read + moved.written) / (peak_bytes_per_ps_ * period_ps), true}};
+  const DramTiming& t = settings_.timing;
+  Cycle most = 0;
+  for (const Channel& channel : channels_) {
+    // The last of what is written may stay in the queue.
+    Cycle cycles = (channel.bursts - std::min<std::uint64_t>(channel.bursts, t.write_queue)) * t.burst;
+    if (t.refresh) cycles += cycles / t.refi * t.rfc;
+    most = std::max(most, cycles);
+  }
+  return {{"data", 0, static_cast<double>(most * settings_.tck_ps) / period_ps, true}};
 }
 
 namespace {

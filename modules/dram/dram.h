@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "address_map.h"
 #include "dram_parameters.h"
@@ -23,14 +24,18 @@ struct DramSettings {
   std::uint64_t tck_ps, controller_ps;
 };
 
-/// A DRAM without time: counts what is asked of it. Data stays with the functional models, so that is all.
+/// A DRAM without time: counts what is asked of it, and how much of it every order of time has to move. Data stays with
+/// the functional models.
 class Dram final : public MemoryBehaviour {
  public:
   /// Throws UserError for a DRAM that cannot be.
   Dram(const DramParameters& parameters, const RenderContext& context);
 
-  void access(const MemoryRequest& request) override { traffic_.count(request); }
+  void access(const MemoryRequest& request) override;
+  /// Of an access with time: what it costs is found out elsewhere.
+  void count(const MemoryRequest& request) { traffic_.count(request); }
   MemoryBytes delivered() const override { return traffic_.bytes(); }
+  /// The data bus of the channel that moves the most.
   std::vector<OccupancyPart> least_occupancy(double period_ps) const override;
   TimingParameters timing() const override { return timing_; }
 
@@ -38,9 +43,14 @@ class Dram final : public MemoryBehaviour {
   const DramSettings& settings() const { return settings_; }
 
  private:
+  struct Channel {
+    std::uint64_t bursts = 0;            ///< that have to be moved
+    std::vector<std::uint64_t> written;  ///< lately, in a ring: they may still be in the queue
+    std::size_t next = 0;
+  };
   const DramSettings settings_;
   TimingParameters timing_;
-  double peak_bytes_per_ps_;
+  std::vector<Channel> channels_;  ///< without time
   MemoryTrafficCounters traffic_{*this};
 };
 

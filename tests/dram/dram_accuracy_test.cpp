@@ -72,6 +72,13 @@ TEST_P(DramAccuracy, OfThroughput) {
     const double cycles = last(bench.answered(all, in_flight));
     const double annotated = last(bench.annotated_answers(all, in_flight));
     EXPECT_NEAR(annotated / cycles, 1.0, pattern.tolerance) << pattern.name;
+    // Without time: never more.
+    for (const Access& access : all) bench.behaviour->access(access.request);
+    const double bound = bench.behaviour->least_occupancy(1000).front().cycles;
+    EXPECT_LE(bound, cycles) << pattern.name;
+    if (in_flight > 100 && pattern.tolerance < 0.04) {
+      EXPECT_GE(bound, 0.9 * cycles) << pattern.name;
+    }
   }
 }
 

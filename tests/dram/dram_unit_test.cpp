@@ -297,6 +297,22 @@ TEST(DramUnit, ARequestThatIsAnnotatedAheadComesThen) {
   EXPECT_EQ(early.answered, sc_core::sc_time(245, sc_core::SC_NS));
 }
 
+TEST(DramUnit, WithoutTimeCountsWhatEveryOrderHasToMove) {
+  // A channel, whose queue of 64 writes may keep the last; bursts of 5 ns, in cycles of 1 ns. Written twice and read
+  // back, a burst may be moved once.
+  DramBench bench(lpddr3, {{"channels", "1"}, {"refresh", "off"}});
+  const auto cycles = [&] { return bench.behaviour->least_occupancy(1000).front().cycles; };
+  EXPECT_EQ(cycles(), 0);
+  for (std::uint64_t i = 0; i < 100; ++i) bench.behaviour->access(read(0, i * 64, 64).request);
+  EXPECT_EQ(cycles(), (200 - 64) * 5);
+  for (std::uint64_t i = 0; i < 10; ++i) bench.behaviour->access(write(0, 0).request);
+  bench.behaviour->access(read(0, 0).request);
+  EXPECT_EQ(cycles(), (201 - 64) * 5);
+  DramBench refreshed(lpddr3, {{"channels", "1"}});
+  for (std::uint64_t i = 0; i < 2000 + 64; ++i) refreshed.behaviour->access(read(0, i * 32).request);
+  EXPECT_EQ(refreshed.behaviour->least_occupancy(1000).front().cycles, 2000 * 5 + 2 * 130) << "two in 10 us";
+}
+
 TEST(DramUnit, IsMadeByItsSlot) {
   DramBench bench(lpddr3);
   const Implementation& implementation = Registry::instance().find("dram", "lpddr5-6400");
@@ -310,6 +326,8 @@ TEST(DramUnit, IsMadeByItsSlot) {
   EXPECT_EQ(memory.timing().latency_cycles, 21U);
   memory.access({64, 32, tlm::TLM_WRITE_COMMAND, {MemoryTraffic::depth_stencil, 0}});
   EXPECT_EQ(dynamic_cast<Dram&>(memory).traffic().bytes(MemoryTraffic::depth_stencil, true), 32U);
+  EXPECT_EQ(memory.delivered().written, 32U);
+  EXPECT_EQ(memory.delivered().read, 0U);
   EXPECT_THROW(memory_unit_maker("dram")("below", *bench.clock, std::move(behaviour), {1, true, true}), UserError);
 }
 
