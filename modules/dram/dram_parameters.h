@@ -24,8 +24,8 @@ struct DramDevice {
 extern const DramDevice lpddr3_1600;
 extern const DramDevice lpddr5_6400;
 
-/// In which order the fields of an address stand, from the highest bits to the lowest. Below them all is the place in an
-/// interleaved piece: the low bits of the column, and the byte in a burst.
+/// In which order the fields of an address stand, from the highest bits to the lowest. Below them all is the place in
+/// an interleaved piece: the low bits of the column, and the byte in a burst.
 enum class DramMapping : std::uint8_t {
   row_bank_column_channel,
   row_column_bank_channel,

@@ -53,7 +53,8 @@ class DramBandwidthTest : public ::testing::TestWithParam<Device> {
 };
 
 // LPDDR3: tRC 60 / 1.25, but 34 + 15 cycles of tRAS and tRP; tRRD 8, tFAW 40 / 4, tRC / 8 banks.
-// LPDDR5: likewise; tRRD 4, tFAW 16 / 4, tRC / 16. An activate, a read and a precharge take 3 cycles of the command bus.
+// LPDDR5: likewise; tRRD 4, tFAW 16 / 4, tRC / 16. An activate, a read and a precharge take 3 cycles of the command
+// bus.
 INSTANTIATE_TEST_SUITE_P(Of, DramBandwidthTest,
                          ::testing::Values(Device{lpddr3_1600, 4, 49, 10, 3}, Device{lpddr5_6400, 2, 49, 4, 3}),
                          [](const auto& device) {

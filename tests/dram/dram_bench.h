@@ -30,7 +30,8 @@ inline Access write(Cycle at, std::uint64_t address, unsigned bytes = 32) {
   return {at, {address, bytes, tlm::TLM_WRITE_COMMAND, {MemoryTraffic::color, 0}}};
 }
 
-/// A unit of `cycle` that makes accesses in their order, each as soon as it may; keeps when each was issued and answered.
+/// A unit of `cycle` that makes accesses in their order, each as soon as it may; keeps when it issued each and when it
+/// was answered.
 class ClockedInitiator : public sc_core::sc_module, public Clocked, public PortOwner {
  public:
   ClockedInitiator(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector<Access> accesses,

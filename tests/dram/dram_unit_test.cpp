@@ -70,9 +70,9 @@ TEST(DramUnit, AnswersOutOfOrder) {
 
 TEST(DramUnit, AFullQueueHoldsItsPortUp) {
   // A place in the queue and one at the port. The first read enters in cycle 11, at the ninth edge; the second, held up
-  // behind it, is let in in cycle 12, so that in 13 the third may be asked for, which is held up in turn. The command of
-  // the first is at the 24th edge; cycle 31 is the first with a later one. Then the second enters, and the third is let
-  // in in cycle 32.
+  // behind it, is let in in cycle 12, so that in 13 the third may be asked for, which is held up in turn. The command
+  // of the first is at the 24th edge; cycle 31 is the first with a later one. Then the second enters, and the third is
+  // let in in cycle 32.
   DramBench bench(lpddr3, {{"channels", "1"}, {"read_queue", "1"}, {"port_requests", "1"}});
   bench.answered({read(10, 0), read(10, 32), read(10, 64), read(10, 96)});
   EXPECT_EQ(bench.issued, (std::vector<Cycle>{10, 10, 13, 33}));
