@@ -1,6 +1,7 @@
 #include "dram/annotated_channel.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace vrpipe {
 
@@ -8,7 +9,7 @@ namespace {
 
 /// Parts of a cycle in which the bus, and activates, are reserved.
 constexpr unsigned parts = 16;
-constexpr std::uint64_t no_row = ~std::uint64_t{0};
+constexpr std::uint64_t no_row = ~std::uint64_t{0};  ///< and no burst
 
 Cycle beyond(Cycle cycles, Cycle hidden) { return parts * (cycles - std::min(cycles, hidden)); }
 
@@ -32,6 +33,8 @@ AnnotatedChannel::AnnotatedChannel(const DramTiming& timing, DramStatistics& sta
       banks_(timing.banks, Bank(1)),
       read_places_(timing.read_queue),
       write_places_(timing.write_queue),
+      queued_(timing.write_low, no_row),
+      queued_places_(timing.write_low),
       batch_(timing.write_high - timing.write_low) {}
 
 Cycle AnnotatedChannel::working(Cycle cycle) const {
@@ -99,6 +102,11 @@ Cycle AnnotatedChannel::move(const DramAddress& place, Row& row, Cycle now, Cycl
 }
 
 Cycle AnnotatedChannel::read(const DramAddress& place, Cycle now, Cycle present) {
+  if (is_queued(number_of(place))) {
+    ++statistics_.reads_forwarded;
+    statistics_.read_cycles.see(1);
+    return now + 1;
+  }
   ++statistics_.reads;
   ++reads_;
   reads_ago_ = 0;
@@ -123,7 +131,20 @@ Cycle AnnotatedChannel::read(const DramAddress& place, Cycle now, Cycle present)
   return there;
 }
 
-Cycle AnnotatedChannel::write(const DramAddress& place, Cycle now, Cycle present) {
+Cycle AnnotatedChannel::write(const DramAddress& queued_now, Cycle now, Cycle present) {
+  std::uint64_t burst = number_of(queued_now);
+  if (is_queued(burst)) {
+    ++statistics_.writes_merged;
+    return now;
+  }
+  DramAddress place = queued_now;
+  if (!queued_.empty()) {
+    // It stays, and the oldest of those that stayed is written.
+    std::swap(place, queued_places_[next_queued_]);
+    std::swap(burst, queued_[next_queued_]);
+    next_queued_ = next_queued_ + 1 < queued_.size() ? next_queued_ + 1 : 0;
+    if (burst == no_row) return now;
+  }
   ++statistics_.writes;
   ++writes_;
   const Cycle from = working(now);

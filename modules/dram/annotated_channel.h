@@ -64,6 +64,13 @@ class AnnotatedChannel {
   /// When the data of a burst has moved whose row is there; `overhead` of the bus in parts of a cycle.
   Cycle move(const DramAddress& place, Row& row, Cycle now, Cycle latency, Cycle present, Cycle overhead);
   void drain();
+  /// Whether a burst is still queued to be written. As a rule the last `write_low` are.
+  bool is_queued(std::uint64_t burst) const {
+    return std::find(queued_.begin(), queued_.end(), burst) != queued_.end();
+  }
+  static std::uint64_t number_of(const DramAddress& place) {
+    return place.row << 18U | std::uint64_t{place.bank} << 13U | place.column;
+  }
 
   const DramTiming timing_;
   DramStatistics& statistics_;
@@ -98,6 +105,9 @@ class AnnotatedChannel {
     std::size_t next_ = 0;
   };
   Places read_places_, write_places_;
+  std::vector<std::uint64_t> queued_;       ///< numbers of bursts, in a ring
+  std::vector<DramAddress> queued_places_;  ///< and where they are
+  std::size_t next_queued_ = 0;
   std::uint64_t reads_ = 0, writes_ = 0;
   unsigned batch_;             ///< writes of a drain
   unsigned written_ = 0;       ///< of this one

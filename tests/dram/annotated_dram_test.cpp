@@ -42,6 +42,21 @@ TEST_P(AnnotatedDramTest, ARowIsNotClosedBeforeItMay) { expect_as_at_cycle({read
 
 TEST_P(AnnotatedDramTest, AWriteIsAnsweredOnceItIsQueued) { expect_as_at_cycle({write(10, 0), write(11, far_row)}); }
 
+TEST_P(AnnotatedDramTest, AReadOfWhatIsQueuedToBeWrittenIsAnsweredFromThere) {
+  expect_as_at_cycle({write(10, 0), read(40, 0), write(50, 0), read(60, far_row)});
+  EXPECT_EQ(bench.annotated->statistics.channels.reads_forwarded.value(), 1U);
+  EXPECT_EQ(bench.annotated->statistics.channels.writes_merged.value(), 1U);
+  // Of more writes the first are no longer queued: 32 stay.
+  std::vector<Access> accesses;
+  for (std::uint64_t i = 0; i < 40; ++i) accesses.push_back(write(10, i * 32));
+  accesses.push_back(read(1000, 0));
+  accesses.push_back(read(1000, 39 * 32));
+  bench.answered(accesses);
+  EXPECT_EQ(bench.clocked->statistics.channels.reads_forwarded.value(), 1U);
+  bench.annotated_answers(accesses);
+  EXPECT_EQ(bench.annotated->statistics.channels.reads_forwarded.value(), 1U);
+}
+
 TEST_P(AnnotatedDramTest, ARefreshIsInTheWay) {
   // Refreshes fall due every 3.9 us; rows are closed, refreshed, and opened again.
   const std::vector<Access> accesses = {read(10, 0), read(3950, 0)};
@@ -69,14 +84,14 @@ TEST_P(AnnotatedDramTest, ReadsAndWritesByTurnsLoseTheTurnsOfTheBus) {
   const auto cycles = [&](bool writes) {
     std::vector<Access> accesses;
     for (std::uint64_t i = 0; i < 4000; ++i) {
-      // Bursts of two banks by turns, in a row each.
-      const std::uint64_t address = i % 2 * 4096 + i / 2 % 32 * 32;
+      // Bursts of two banks by turns, row after row.
+      const std::uint64_t address = i % 2 * 4096 + i / 2 % 64 * 32 + i / 128 * 32768;
       accesses.push_back(writes && i % 2 == 1 ? write(0, address) : read(0, address));
     }
     const std::vector<Cycle> answered = bench.annotated_answers(accesses, 64);
     return static_cast<double>(*std::max_element(answered.begin(), answered.end()));
   };
-  EXPECT_GT(cycles(true), 1.08 * cycles(false));
+  EXPECT_GT(cycles(true), 1.04 * cycles(false));
 }
 
 TEST_P(AnnotatedDramTest, CountsWhatItDoes) {
@@ -88,8 +103,10 @@ TEST_P(AnnotatedDramTest, CountsWhatItDoes) {
   bench.annotated_answers(accesses);
   bench.annotated->close(7000);
   const DramStatistics& s = bench.annotated->statistics.channels;
-  EXPECT_EQ(32 * s.reads.value(), bench.behaviour->traffic().bytes(MemoryTraffic::color, false));
-  EXPECT_EQ(32 * s.writes.value(), bench.behaviour->traffic().bytes(MemoryTraffic::color, true));
+  EXPECT_EQ(32 * (s.reads.value() + s.reads_forwarded.value()),
+            bench.behaviour->traffic().bytes(MemoryTraffic::color, false));
+  EXPECT_EQ(32 * (s.writes.value() + s.writes_merged.value() + 32),
+            bench.behaviour->traffic().bytes(MemoryTraffic::color, true));
   EXPECT_EQ(s.row_hits.value() + s.row_misses.value() + s.row_conflicts.value(), s.reads.value() + s.writes.value());
   EXPECT_EQ(s.activates.value(), s.row_misses.value() + s.row_conflicts.value());
   EXPECT_EQ(bench.annotated->statistics.read_latency.count(), 1500U);
