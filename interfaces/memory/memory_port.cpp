@@ -93,6 +93,7 @@ void MemoryPort::send(const MemoryRequest& request, std::uint32_t tag) {
   requesting_ = &access;  // until the memory says otherwise, perhaps from within the call
   const tlm::tlm_sync_enum status = socket->nb_transport_fw(access, phase, delay);
   if (status != tlm::TLM_ACCEPTED) requesting_ = nullptr;
+  if (requesting_ == nullptr) requesting_until_ = 0;  // it ended from within the call
   if (status == tlm::TLM_COMPLETED || (status == tlm::TLM_UPDATED && phase == tlm::BEGIN_RESP)) {
     answer(access, delay);
     if (status == tlm::TLM_UPDATED) {
