@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace vrpipe {
 
@@ -129,6 +130,21 @@ PixelRect covered_bounds(const SnappedTriangle& t, unsigned subpixel_bits, std::
   bounds.x1 = std::min(last(*std::max_element(t.x.begin(), t.x.end())) + 1, static_cast<std::int32_t>(width));
   bounds.y1 = std::min(last(*std::max_element(t.y.begin(), t.y.end())) + 1, static_cast<std::int32_t>(height));
   return bounds;
+}
+
+bool is_finite(const Splat& splat) {
+  const float fields[] = {splat.cx, splat.cy,  splat.ax,    splat.ay,   splat.bx,     splat.by,
+                          splat.r,  splat.red, splat.green, splat.blue, splat.opacity};
+  return std::all_of(std::begin(fields), std::end(fields), [](float field) { return std::isfinite(field); });
+}
+
+Culling cull_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
+                      PixelRect& bounds) {
+  SnappedTriangle snapped;
+  if (!snap_triangle(context, draw, splat, triangle, snapped)) return Culling::not_finite;
+  if (doubled_area(snapped) == 0) return Culling::zero_area;
+  bounds = covered_bounds(snapped, context.precision.subpixel_bits, context.frame->width(), context.frame->height());
+  return bounds.empty() ? Culling::outside : Culling::none;
 }
 
 }  // namespace vrpipe

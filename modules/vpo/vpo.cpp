@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/pipeline/registry.h>
@@ -10,13 +9,6 @@
 namespace vrpipe {
 
 namespace {
-
-/// The positions alone would let a NaN colour or opacity through to the colour target.
-bool is_finite(const Splat& splat) {
-  const float fields[] = {splat.cx, splat.cy,  splat.ax,    splat.ay,   splat.bx,     splat.by,
-                          splat.r,  splat.red, splat.green, splat.blue, splat.opacity};
-  return std::all_of(std::begin(fields), std::end(fields), [](float field) { return std::isfinite(field); });
-}
 
 /// In millionths of a square pixel.
 std::uint64_t determinant(const Splat& splat) {
@@ -45,20 +37,12 @@ unsigned PrimitiveAssembly::assemble(DrawIndex draw, std::uint32_t splat, std::a
   if (given.r > 0 && call.geometry->triangles.empty()) smallest_determinant.see(determinant(given));
   unsigned count = 0;
   for (unsigned triangle = 0; triangle < triangles_per_splat(*call.geometry); ++triangle) {
-    SnappedTriangle snapped;
-    if (!snap_triangle(context_, draw, splat, triangle, snapped)) {
-      ++dropped_not_finite;
-      return 0;
-    }
-    if (doubled_area(snapped) == 0) {
-      ++culled_zero_area;
-      continue;
-    }
-    const PixelRect bounds =
-        covered_bounds(snapped, context_.precision.subpixel_bits, context_.frame->width(), context_.frame->height());
-    if (bounds.empty()) {
-      ++culled_outside;
-      continue;
+    PixelRect bounds;
+    switch (cull_triangle(context_, draw, splat, triangle, bounds)) {
+      case Culling::not_finite: ++dropped_not_finite; return 0;
+      case Culling::zero_area: ++culled_zero_area; continue;
+      case Culling::outside: ++culled_outside; continue;
+      case Culling::none: break;
     }
     out[count].splat = splat;
     out[count].triangle = static_cast<std::uint8_t>(triangle);

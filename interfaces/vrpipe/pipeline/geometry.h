@@ -28,6 +28,21 @@ std::int64_t doubled_area(const SnappedTriangle& triangle);
 PixelRect covered_bounds(const SnappedTriangle& triangle, unsigned subpixel_bits, std::uint32_t width,
                          std::uint32_t height);
 
+/// Whether all that is used of a splat is finite. Its positions alone would let a NaN colour or opacity through to the
+/// colour target.
+bool is_finite(const Splat& splat);
+
+/// Why primitive assembly passes a triangle on, or does not.
+enum class Culling : std::uint8_t {
+  none,        ///< it is passed on
+  not_finite,  ///< a vertex is not finite, or cannot be cut to the guard band
+  zero_area,   ///< after snapping
+  outside,     ///< it covers no sample of the viewport's pixels
+};
+/// `bounds` gets those of a triangle that is not culled.
+Culling cull_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
+                      PixelRect& bounds);
+
 /// How many triangles a splat of this geometry is.
 inline unsigned triangles_per_splat(const Draw& draw) { return draw.triangles.empty() ? 2U : 1U; }
 
