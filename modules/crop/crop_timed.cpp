@@ -9,32 +9,6 @@ namespace vrpipe {
 
 namespace {
 
-/// So many places, each taken until a cycle that is known, and freed in the order in which they were taken.
-class SlotPool {
- public:
-  explicit SlotPool(unsigned places) : free_(places) {}
-  /// The first cycle from `at` on in which so many are free, at most as many as there are.
-  Cycle free_from(Cycle at, unsigned places) {
-    for (; free_ < places; taken_.pop()) {
-      free_ += taken_.front().places;
-      at = std::max(at, taken_.front().until);
-    }
-    return at;
-  }
-  void take(unsigned places, Cycle until) {
-    free_ -= places;
-    taken_.push({places, until});
-  }
-
- private:
-  struct Taken {
-    unsigned places = 0;
-    Cycle until = 0;
-  };
-  unsigned free_;
-  Ring<Taken> taken_;
-};
-
 /// CROP at lt and at: as crop_unit.cpp, but a warp is taken in one piece: its quads look up the colour cache, and are
 /// blended once the sectors of all are there. Neighbouring sectors are filled in one access.
 /// Ports: in_color (ShadedWarpItem), out_terminations (TerminationBeat), memory (TLM-2.0 base protocol).

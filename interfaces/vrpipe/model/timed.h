@@ -143,6 +143,32 @@ class BatchServer {
   Cycle free_at_ = 0;
 };
 
+/// So many places, each taken until a cycle that is known, and freed in the order in which they were taken.
+class SlotPool {
+ public:
+  explicit SlotPool(unsigned places) : free_(places) {}
+  /// The first cycle from `at` on in which so many are free, at most as many as there are.
+  Cycle free_from(Cycle at, unsigned places) {
+    for (; free_ < places; taken_.pop()) {
+      free_ += taken_.front().places;
+      at = std::max(at, taken_.front().until);
+    }
+    return at;
+  }
+  void take(unsigned places, Cycle until) {
+    free_ -= places;
+    taken_.push({places, until});
+  }
+
+ private:
+  struct Taken {
+    unsigned places = 0;
+    Cycle until = 0;
+  };
+  unsigned free_;
+  Ring<Taken> taken_;
+};
+
 /// What a unit's activation sees of its inputs.
 class TimedInput {
  public:
