@@ -277,4 +277,11 @@ double FixedLatencyMemory::peak_rate() const {
   return static_cast<double>(bytes_per_cycle_) * static_cast<double>(ports_.size());
 }
 
+std::unique_ptr<FixedLatencyMemory> stub_unbound(tlm::tlm_initiator_socket<32>& socket, ClockDomain& domain) {
+  if (socket.bind_count() > 0) return nullptr;
+  auto stub = std::make_unique<FixedLatencyMemory>("no_memory", domain, 1, 1, 1);
+  socket.bind(stub->port(0));
+  return stub;
+}
+
 }  // namespace vrpipe

@@ -7,7 +7,6 @@ namespace vrpipe {
 
 AddressMap address_map(const Frame& frame, ColorFormat format) {
   constexpr std::uint64_t page_bytes = 64 * 1024;
-  constexpr std::uint64_t attribute_bytes_per_splat = 704;
   std::uint64_t next = 0;
   const auto region = [&](std::uint64_t bytes) {
     const MemoryRegion made{next, bytes};

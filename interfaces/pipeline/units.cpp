@@ -16,6 +16,31 @@ std::uint32_t SmBehaviour::TimingParameters::fragment_slots() const {
   return static_cast<std::uint32_t>(slots);
 }
 
+void AttributeFetch::check() const {
+  constexpr std::uint32_t primitive_bytes = attribute_bytes_per_splat / 2;
+  if (attribute_bytes == 0 || attribute_bytes > primitive_bytes) {
+    throw UserError("unusable SM array", "sm.attribute_bytes",
+                    fmt::format("a primitive has {} bytes of attributes, not {}", primitive_bytes, attribute_bytes),
+                    "read some of them");
+  }
+  if (attribute_writes == 0 || l1_mshrs == 0) {
+    throw UserError("unusable SM array", attribute_writes == 0 ? "sm.attribute_writes" : "sm.l1_mshrs",
+                    "nothing could ever be under way", "use 1 or more");
+  }
+  if (l1.line_bytes != CacheOrganization().line_bytes || l1.sector_bytes != CacheOrganization().sector_bytes) {
+    throw UserError("unusable L1 of an SM", "its lines", "they are other than those of attributes",
+                    "use lines of 128 bytes, and sectors of 32");
+  }
+  const std::uint32_t ways = l1.ways_of_a_set();
+  const std::uint32_t sets = ways <= l1.lines() ? l1.lines() / ways : 0;
+  if (sets * ways != l1.lines() || (sets & (sets - 1)) != 0) {
+    throw UserError("unusable L1 of an SM", "sm.l1_ways, sm.l1_bytes",
+                    fmt::format("{} lines in sets of {} are no power of two of sets", l1.lines(), ways),
+                    "use bytes = a power of two x ways x line, or 0 ways for a fully associative cache");
+  }
+  l1.check("L1 of an SM", "sm", "l1_bytes");
+}
+
 CacheOrganization CropBehaviour::TimingParameters::cache() const {
   CacheOrganization made;
   made.bytes = cache_bytes;

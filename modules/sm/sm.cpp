@@ -57,6 +57,14 @@ SplatShader::SplatShader(const Parameters& parameters, const RenderContext& cont
   static_cast<void>(timing_.fragment_slots());  // refused at every fidelity, also where slots have no numbers
   timing_.vertex_warps = parameters.vertex_warps;
   timing_.warps_to_one_core = parameters.warps_to_one_core;
+  AttributeFetch& fetch = timing_.fetch;
+  fetch.attribute_bytes = parameters.attribute_bytes;
+  fetch.attribute_writes = parameters.attribute_writes;
+  fetch.l1_latency_cycles = parameters.l1_latency_cycles;
+  fetch.l1_mshrs = parameters.l1_mshrs;
+  fetch.l1.bytes = parameters.l1_bytes;
+  fetch.l1.ways = parameters.l1_ways;
+  fetch.check();
   // The first instructions compute addresses and load; the rest waits for the attributes.
   const auto program = [&](std::uint32_t instructions, std::uint32_t latency) {
     const std::uint32_t loads = std::min(instructions, 4U);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "attribute_traffic.h"
+
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/pipeline/units.h>
 
@@ -59,7 +61,45 @@ class SplatShader : public SmBehaviour {
                                      10000,
                                      "cycles",
                                      "Accel-Sim, SM87_ORIN: L2 latency",
-                                     "of fetching attributes from L2"};
+                                     "of fetching vertices, or attributes, where the memory port is not connected"};
+    Integer attribute_bytes{*this,
+                            "attribute_bytes",
+                            40,
+                            4,
+                            attribute_bytes_per_splat / 2,
+                            "bytes",
+                            "the fragment shader's 10 values: centre, 2x2 matrix, opacity, colour",
+                            "of its attributes that are read for a primitive, where the memory port is connected"};
+    Integer attribute_writes{*this,        "attribute_writes",
+                             640,          1,
+                             65536,        "accesses",
+                             source::open, "of attributes in flight; enough for what draw issues at the latency of L2"};
+    Integer l1_bytes{*this,
+                     "l1_bytes",
+                     49152,
+                     AttributeTraffic::line_bytes,
+                     1 << 20,
+                     "bytes",
+                     source::paper_table,
+                     "L1 of a core, through which attributes are read; lines of 128 bytes, sectors of 32"};
+    Integer l1_ways{*this, "l1_ways", 0, 0, 1 << 13, "ways", source::open, "of a set of an L1; 0: fully associative"};
+    Integer l1_mshrs{*this,
+                     "l1_mshrs",
+                     384,
+                     1,
+                     65536,
+                     "sectors",
+                     "Accel-Sim, SM87_ORIN: 384 MSHRs of a first-level cache",
+                     "that an L1 has asked for and not got"};
+    Integer l1_latency_cycles{*this,
+                              "l1_latency_cycles",
+                              38,
+                              0,
+                              10000,
+                              "cycles",
+                              "Accel-Sim, SM87_ORIN: L1 latency",
+                              "from the launch until what the L1 holds is there; what it lacks takes as long as memory "
+                              "says, and not less"};
     Integer fragment_latency_cycles{*this,
                                     "fragment_latency_cycles",
                                     75,
@@ -73,6 +113,7 @@ class SplatShader : public SmBehaviour {
                                  10000,        "cycles",
                                  source::open, "of shuffle and partial blend beyond their issue slots"};
   };
+  /// Throws UserError for an array that cannot be.
   SplatShader(const Parameters& parameters, const RenderContext& context);
 
   void shade(const Warp& warp, ShadedWarp& out) override;

@@ -1,5 +1,7 @@
 #include <algorithm>
 
+#include "sm/timed_sm_memory.h"
+
 #include <vrpipe/model/timed.h>
 
 namespace vrpipe {
@@ -10,15 +12,18 @@ namespace {
 /// and go to PROP as they are done. An array with room to spare has a scheduler for all of a warp's instructions at once
 /// and waits for all its latencies after that, at lt in launch order: nothing waits for what that makes late.
 /// Vertex warps take issue slots from fragment warps but do not wait for them: they are few.
+/// With the memory port connected a warp fetches what it reads when it is launched, as in sm_unit.cpp.
 class TimedSm : public TimedUnit {
  public:
   TimedSm(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour,
-          Transport transport)
+          const RenderContext& context, Transport transport)
       : TimedUnit(name, domain, SmWork::kinds(behaviour->timing()), transport),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         cycles_per_instruction_(timing_.cycles_per_instruction()),
         roomy_(is_roomy(timing_)),
+        memory_(*this, context, timing_, l1_statistics_),
+        fetch_cycles_(timing_.fragment.front().instructions * cycles_per_instruction_),
         vertex_(program(timing_.vertex, {}, true).front()),
         fragment_(program(timing_.fragment, {}, roomy_)),
         merged_(program(timing_.fragment, timing_.merge, roomy_)),
@@ -41,10 +46,26 @@ class TimedSm : public TimedUnit {
     in_warps_.set_gate([this] { return has_slot(); });
   }
 
-  bool idle() const override { return TimedUnit::idle() && next_event() == never; }
+  bool idle() const override { return TimedUnit::idle() && next_event() == never && shaded_vertices_.empty(); }
   Behaviour& behaviour() override { return *behaviour_; }
+  tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket(); }
+  bool memory_is_optional() const override { return true; }
+  MemoryBytes memory_bytes() const override { return memory_.moved(); }
 
  private:
+  void before_end_of_elaboration() override {
+    no_memory_ = stub_unbound(memory_.socket(), *clock.domain);
+    fetches_ = no_memory_ == nullptr;
+    if (!fetches_) return;
+    memory_.connect();
+    // As at cycle; otherwise times alone say when a place is free.
+    if (!blocking()) in_vertices_.set_gate([this] { return shaded_vertices_.size() < timing_.vertex_warps; });
+    // What memory says stands for the first stall.
+    vertex_.stall_cycles -= timing_.vertex.front().stall_cycles;
+    fragment_.front().stall_cycles -= timing_.fragment.front().stall_cycles;
+    merged_.front().stall_cycles -= timing_.fragment.front().stall_cycles;
+  }
+
   struct Segment {
     std::uint32_t instructions = 0;
     std::uint32_t merge_instructions = 0;  ///< after these
@@ -127,11 +148,18 @@ class TimedSm : public TimedUnit {
     }
     launch = take_slot(warp.tile, launch);
     charge(UnitState::blocked, launch);
+    Cycle there = 0;
+    if (fetches_) {
+      const TimedSmMemory::Fetch fetch = memory_.fetch_attributes(warp, core_, launch);
+      charge(UnitState::memory, fetch.looked_up);
+      launch = fetch.looked_up;
+      there = fetch.there;
+    }
     next_launch_ = launch + 1;
 
     const Program& needed = warp.merge_pairs != 0 ? merged_ : fragment_;
     if (blocking() && roomy_) {
-      const Cycle done = issue(needed.front(), next_scheduler(), launch);
+      const Cycle done = issue(needed.front(), next_scheduler(), launch, there);
       last_done_ = std::max(last_done_, done);
       shade(warp, core_, done);
       return launch;
@@ -141,6 +169,7 @@ class TimedSm : public TimedUnit {
     flights_[flight].program = &needed;
     flights_[flight].scheduler = next_scheduler();
     flights_[flight].core = core_;
+    flights_[flight].there = there;
     issue({launch, flight}, 0);
     return launch;
   }
@@ -151,6 +180,7 @@ class TimedSm : public TimedUnit {
     const Program* program = nullptr;
     std::size_t scheduler = 0;
     std::uint32_t core = 0;
+    Cycle there = 0;  ///< its attributes
   };
   std::uint32_t take_flight(const Warp& warp) {
     if (free_flights_.empty()) {
@@ -168,8 +198,9 @@ class TimedSm : public TimedUnit {
     std::uint32_t flight = 0;
   };
 
-  /// Issues a segment on a scheduler; returns when the next can issue.
-  Cycle issue(const Segment& segment, std::size_t scheduler, Cycle from) {
+  /// Issues a segment on a scheduler; returns when the next can issue. If it is the first, `there` is when its attributes
+  /// are, for which what comes behind the fetching instructions waits.
+  Cycle issue(const Segment& segment, std::size_t scheduler, Cycle from, Cycle there = 0) {
     Cycle& free_at = scheduler_free_at_[scheduler];
     const Cycle begin = std::max(free_at, from);
     const Cycle merge = begin + segment.instructions * cycles_per_instruction_;
@@ -178,12 +209,13 @@ class TimedSm : public TimedUnit {
     if (segment.instructions > 0) did(SmWork::fragment, segment.instructions, begin, merge);
     if (segment.merge_instructions > 0) did(SmWork::merge, segment.merge_instructions, merge, free_at);
     charge(UnitState::busy, free_at);
-    return free_at + segment.stall_cycles;
+    const Cycle fetched = begin + fetch_cycles_;
+    return free_at + segment.stall_cycles + (std::max(fetched, there) - fetched);
   }
   /// The same for a warp that waits; those that waited for its scheduler before it have issued.
   void issue(const Event& warp, std::size_t segment) {
     const Flight& flight = flights_[warp.flight];
-    const Cycle next = issue((*flight.program)[segment], flight.scheduler, warp.at);
+    const Cycle next = issue((*flight.program)[segment], flight.scheduler, warp.at, segment == 0 ? flight.there : 0);
     if (++segment < flight.program->size()) {
       waiting_[segment].push_in_order({next, warp.flight}, &Event::at);
       next_issue_ = std::min(next_issue_, next);
@@ -239,11 +271,13 @@ class TimedSm : public TimedUnit {
   Cycle advance(Cycle until) override {
     if (blocking()) return never;
     hand_on_until(until);
-    return out_shaded_.clear() ? next_event() : never;
+    const Cycle next = out_shaded_.clear() ? next_event() : never;
+    return shaded_vertices_.empty() ? next : std::min(next, hand_on_vertices_until(until));
   }
 
   Cycle shade_vertices(const VertexWarp& warp, Cycle visible) {
     Cycle launch = std::max(visible, next_vertex_launch_);
+    Cycle done = 0;
     if (warp.mark == Mark::none) {
       launch = std::max(launch, vertex_slots_[vertex_turn_]);
       Cycle& free_at = scheduler_free_at_[vertex_scheduler_++ % scheduler_free_at_.size()];
@@ -251,14 +285,45 @@ class TimedSm : public TimedUnit {
       free_at = std::max(free_at, launch) + issue;
       did(SmWork::vertex, vertex_.instructions, free_at - issue, free_at);
       behaviour_->shade_vertices(warp);
-      vertices_done_ = std::max(vertices_done_, launch + issue + vertex_.stall_cycles);
+      done = (fetches_ ? memory_.fetch_vertices(warp, launch) : launch) + issue + vertex_.stall_cycles;
     }
     next_vertex_launch_ = launch + 1;
-    // Vertex warps leave in order.
-    const Cycle taken = out_vertices_.send(warp, std::max(vertices_done_, launch)).first;
-    vertex_slots_[vertex_turn_] = taken + 1;
+    if (fetches_ && !blocking()) {
+      shaded_vertices_.push({std::max(done, launch), vertex_turn_, warp});
+    } else {
+      vertex_slots_[vertex_turn_] = hand_on_vertices(warp, std::max(done, launch)) + 1;
+    }
     vertex_turn_ = vertex_turn_ + 1 == timing_.vertex_warps ? 0 : vertex_turn_ + 1;
     return launch;
+  }
+
+  /// Sends a vertex warp that is shaded, in order, once its attributes have been sent; returns when it is taken.
+  Cycle hand_on_vertices(const VertexWarp& warp, Cycle done) {
+    if (fetches_) {
+      if (warp.mark == Mark::none) done = memory_.write_attributes(warp, done);
+      if (warp.mark != Mark::none || !blocking()) memory_.send_until(never);
+    }
+    vertices_done_ = std::max(vertices_done_, done);
+    return out_vertices_.send(warp, vertices_done_).first;
+  }
+
+  /// At `at`, where attributes are written in the order of time: as many as VPO takes; returns when to go on.
+  Cycle hand_on_vertices_until(Cycle until) {
+    while (!shaded_vertices_.empty() && out_vertices_.clear()) {
+      const ShadedVertices& next = shaded_vertices_.front();
+      if (leaves_) {  // one that has had to wait
+        vertex_slots_[next.slot] = out_vertices_.gone() + 1;
+        leaves_ = false;
+        shaded_vertices_.pop();
+        continue;
+      }
+      if (next.done > until) return next.done;
+      const Cycle taken = hand_on_vertices(next.warp, next.done);
+      vertex_slots_[next.slot] = taken + 1;
+      leaves_ = !out_vertices_.clear();
+      if (!leaves_) shaded_vertices_.pop();
+    }
+    return never;
   }
 
   Cycle free(const WarpRelease& release, Cycle visible) {
@@ -270,9 +335,14 @@ class TimedSm : public TimedUnit {
   const SmBehaviour::TimingParameters timing_;
   const Cycle cycles_per_instruction_;
   const bool roomy_;
-  const Segment vertex_;
-  const Program fragment_;
-  const Program merged_;
+  SectoredCacheStatistics l1_statistics_{*this, "l1"};
+  TimedSmMemory memory_;
+  std::unique_ptr<FixedLatencyMemory> no_memory_;
+  bool fetches_ = false;      ///< the memory port is connected
+  const Cycle fetch_cycles_;  ///< of the instructions that fetch attributes
+  Segment vertex_;
+  Program fragment_;
+  Program merged_;
   TimedOut<VertexWarp> out_vertices_;
   TimedOut<ShadedWarpItem> out_shaded_;
   TimedIn<WarpRelease> in_release_;
@@ -296,6 +366,13 @@ class TimedSm : public TimedUnit {
   std::uint64_t vertex_scheduler_ = 0;
   Cycle next_vertex_launch_ = 0;
   Cycle vertices_done_ = 0;
+  struct ShadedVertices {
+    Cycle done = 0;
+    std::uint32_t slot = 0;
+    VertexWarp warp;
+  };
+  Ring<ShadedVertices> shaded_vertices_;  ///< or to be, with memory at `at`; in order
+  bool leaves_ = false;                   ///< the first of them was sent and waits for room
   Cycle next_launch_ = 0;
   Cycle last_done_ = 0;
   TileId last_tile_;
@@ -307,8 +384,9 @@ class TimedSm : public TimedUnit {
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("sm", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                     const RenderContext&, unsigned, Transport transport) {
-    return std::make_unique<TimedSm>(name.c_str(), domain, behaviour_as<SmBehaviour>(std::move(behaviour)), transport);
+                                     const RenderContext& context, unsigned, Transport transport) {
+    return std::make_unique<TimedSm>(name.c_str(), domain, behaviour_as<SmBehaviour>(std::move(behaviour)), context,
+                                     transport);
   });
   return true;
 }();

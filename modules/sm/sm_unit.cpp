@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "sm/sm_memory.h"
+
 #include <vrpipe/arithmetic/divisor.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/model/unit.h>
@@ -74,10 +76,16 @@ class Wheel {
 
 /// The SM array at cycle fidelity: warps issue on their scheduler segment by segment, oldest ready first, and hide one
 /// another's latencies. A fragment warp keeps its slot until PROP releases it; vertex warps leave in order.
-/// Ports: in_vertices, out_vertices (VertexWarp), in_warps (Warp), out_shaded (ShadedWarpItem), in_release (WarpRelease).
+///
+/// With its memory port connected, a vertex warp fetches its vertices when it is launched, begins when they are there,
+/// and leaves when its attributes have been sent; a fragment warp is launched when its attributes have been looked up,
+/// and waits for them behind its first segment.
+/// Ports: in_vertices, out_vertices (VertexWarp), in_warps (Warp), out_shaded (ShadedWarpItem), in_release (WarpRelease),
+/// memory (TLM-2.0 base protocol; optional).
 class SmUnit : public Unit {
  public:
-  SmUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour)
+  SmUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour,
+         const RenderContext& context)
       : Unit(name, domain, SmWork::kinds(behaviour->timing())),
         in_vertices_(*this, "in_vertices"),
         out_vertices_(*this, "out_vertices"),
@@ -88,6 +96,9 @@ class SmUnit : public Unit {
         timing_(behaviour_->timing()),
         cycles_per_instruction_(timing_.cycles_per_instruction()),
         warps_per_core_(timing_.warps_per_core),
+        memory_(*this, context, timing_, l1_statistics_),
+        vertex_(timing_.vertex),
+        fragment_(timing_.fragment),
         wheel_(horizon()),
         schedulers_(std::size_t{timing_.cores} * timing_.schedulers_per_core) {
     fragment_slots_ = timing_.fragment_slots();
@@ -102,14 +113,16 @@ class SmUnit : public Unit {
         free_of_core_[core].push_back(core * timing_.warps_per_core + slot);
       }
     }
-    merged_ = timing_.fragment;
-    merged_.insert(merged_.end(), timing_.merge.begin(), timing_.merge.end());
+    set_merged();
   }
 
   bool idle() const override {
     return in_vertices_.empty() && in_warps_.empty() && in_flight_ == 0 && vertex_count_ == 0 && completed_.empty();
   }
   Behaviour& behaviour() override { return *behaviour_; }
+  tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket(); }
+  bool memory_is_optional() const override { return true; }
+  MemoryBytes memory_bytes() const override { return memory_.moved(); }
 
  private:
   /// A warp on its way through a program; what it shades is kept apart, being needed at the ends alone.
@@ -117,11 +130,27 @@ class SmUnit : public Unit {
     const std::vector<ShaderSegment>* program = nullptr;
     std::uint16_t segment = 0;
     std::uint16_t scheduler = 0;
-    bool done = false;  ///< vertex warps only
+    bool done = false;   ///< vertex warps only
+    bool waits = false;  ///< fragment warps only: has issued its first segment and has no attributes
   };
 
+  void before_end_of_elaboration() override {
+    no_memory_ = stub_unbound(memory_.socket(), *clock.domain);
+    fetches_ = no_memory_ == nullptr;
+    if (!fetches_) return;
+    memory_.connect();
+    there_.resize(fragment_slots_);
+    vertex_.front().stall_cycles = 0;
+    fragment_.front().stall_cycles = 0;
+    set_merged();
+  }
+  void set_merged() {
+    merged_ = fragment_;
+    merged_.insert(merged_.end(), timing_.merge.begin(), timing_.merge.end());
+  }
+
   std::uint32_t horizon() const {
-    std::uint32_t longest = 1;
+    std::uint32_t longest = timing_.fetch.l1_latency_cycles + 1;
     for (const auto* program : {&timing_.vertex, &timing_.fragment, &timing_.merge}) {
       for (const ShaderSegment& segment : *program) {
         longest = std::max(longest, segment.instructions * cycles_per_instruction_ + segment.stall_cycles);
@@ -166,8 +195,9 @@ class SmUnit : public Unit {
 
   void complete(std::uint32_t slot, Cycle now) {
     if (slot >= fragment_slots_) {
-      behaviour_->shade_vertices(vertices_[slot - fragment_slots_]);
-      flights_[slot].done = true;
+      const std::uint32_t turn = slot - fragment_slots_;
+      behaviour_->shade_vertices(vertices_[turn]);
+      flights_[slot].done = !fetches_ || !memory_.write_attributes(turn, vertices_[turn]);
       return;
     }
     --running_;
@@ -187,10 +217,8 @@ class SmUnit : public Unit {
         schedulers_[index].event_pending = false;
         issue(schedulers_[index], now);
         arm(index, now);
-      } else if (flights_[who].segment == flights_[who].program->size()) {
-        complete(who, now);
-      } else {
-        make_ready(who, now);
+      } else if (!fetches_ || who >= fragment_slots_ || flights_[who].segment != 1 || has_attributes(who, now)) {
+        go_on(who, now);
       }
     }
     // What was launched long ago is no longer in the host's first cache.
@@ -199,6 +227,41 @@ class SmUnit : public Unit {
       __builtin_prefetch(&warps_[soon]);
       __builtin_prefetch(&warps_[soon].quads[quads_per_warp - 1]);
     }
+  }
+
+  /// With what follows the segment that a warp has issued.
+  void go_on(std::uint32_t slot, Cycle now) {
+    if (flights_[slot].segment == flights_[slot].program->size()) {
+      complete(slot, now);
+    } else {
+      make_ready(slot, now);
+    }
+  }
+
+  /// Whether a fragment warp that has issued its first segment can go on; if not, it will.
+  bool has_attributes(std::uint32_t slot, Cycle now) {
+    if (memory_.fills_awaited(slot) > 0) {
+      flights_[slot].waits = true;
+      ++waiting_;
+      return false;
+    }
+    if (there_[slot] > now) wheel_.add(there_[slot], slot, next_);
+    return there_[slot] <= now;
+  }
+
+  [[gnu::noinline]] void take_answers(Cycle now) {
+    memory_.finish(
+        now,
+        [&](std::uint32_t turn) {
+          --waiting_;
+          make_ready(fragment_slots_ + turn, now);
+        },
+        [&](std::uint32_t slot) {
+          if (!flights_[slot].waits) return;
+          flights_[slot].waits = false;
+          --waiting_;
+          if (has_attributes(slot, now)) go_on(slot, now);
+        });
   }
 
   void release_slots() {
@@ -254,17 +317,21 @@ class SmUnit : public Unit {
     if (!in_warps_.ready()) return;
     const Warp& warp = in_warps_.front();
     if (warp.mark != Mark::none) return pass_mark();
-    if (!choose_core(warp.tile)) {
-      slots_full_ = true;
-      return;
+    if (!looks_up_) {
+      if (!choose_core(warp.tile)) {
+        slots_full_ = true;
+        return;
+      }
+      last_tile_ = warp.tile;
+      ++sent_to_core_;
+      slot_ = free_of_core_[core_].back();
+      free_of_core_[core_].pop_back();
+      --free_slots_;
     }
-    last_tile_ = warp.tile;
-    ++sent_to_core_;
-    const std::uint32_t slot = free_of_core_[core_].back();
-    free_of_core_[core_].pop_back();
-    --free_slots_;
+    const std::uint32_t slot = slot_;
+    if (fetches_ && !look_up(slot, warp, now)) return;
     Flight& flight = flights_[slot];
-    flight.program = warp.merge_pairs != 0 ? &merged_ : &timing_.fragment;
+    flight.program = warp.merge_pairs != 0 ? &merged_ : &fragment_;
     flight.segment = 0;
     flight.scheduler = static_cast<std::uint16_t>(core_ * timing_.schedulers_per_core + turn_of_scheduler_);
     turn_of_scheduler_ = turn_of_scheduler_ + 1 == timing_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
@@ -273,6 +340,14 @@ class SmUnit : public Unit {
     ++in_flight_;
     ++running_;
     make_ready(slot, now);
+  }
+
+  /// Looks a warp's attributes up; false if that takes longer than this cycle.
+  [[gnu::noinline]] bool look_up(std::uint32_t slot, const Warp& warp, Cycle now) {
+    if (!looks_up_) memory_.begin_look_up(slot, core_, warp);
+    looks_up_ = !memory_.look_up(now);
+    there_[slot] = now + timing_.fetch.l1_latency_cycles;
+    return !looks_up_;
   }
 
   [[gnu::noinline]] void launch_vertex_warp(Cycle now) {
@@ -284,17 +359,21 @@ class SmUnit : public Unit {
     Flight& flight = flights_[slot];
     flight.done = vertices_[turn].mark != Mark::none;
     if (flight.done) return;
-    flight.program = &timing_.vertex;
+    flight.program = &vertex_;
     flight.segment = 0;
     flight.scheduler = static_cast<std::uint16_t>(vertex_scheduler_++ % schedulers_.size());
-    make_ready(slot, now);
+    if (!fetches_) return make_ready(slot, now);
+    memory_.fetch_vertices(turn, vertices_[turn]);
+    ++waiting_;
   }
 
   Cycle tick(Cycle now) override {
+    if (fetches_) take_answers(now);
     release_slots();
     run_events(now);
     launch_fragments(now);
     if (in_vertices_.ready() && vertex_count_ < timing_.vertex_warps) launch_vertex_warp(now);
+    if (fetches_) memory_.send([this](std::uint32_t turn) { flights_[fragment_slots_ + turn].done = true; });
     send();
 
     const Cycle next_event = wheel_.next_after(now);
@@ -304,16 +383,19 @@ class SmUnit : public Unit {
       enter(UnitState::busy, now);
     } else if (held_up || slots_full_ || !completed_.empty()) {
       enter(UnitState::blocked, now);
-    } else if (next_event != never) {
+    } else if (next_event != never || waiting_ > 0 || looks_up_ || (fetches_ && memory_.holds_writes())) {
       enter(UnitState::memory, now);
     } else {
       enter(UnitState::starved, now);
     }
     Cycle next = next_event;
     if (busy_until_ > now) next = std::min(next, busy_until_);
+    if (fetches_) next = std::min(next, memory_.next_completion());
     if (next == now + 1) return next;
-    // What could not be taken for want of a slot or a credit waits for the port that brings one.
-    if (!slots_full_) next = std::min(next, std::max(in_warps_.next_ready(), now + 1));
+    // What could not be taken for want of a slot, a credit or an answer waits for the port that brings one.
+    if (!slots_full_ && !(looks_up_ && in_warps_.ready())) {
+      next = std::min(next, std::max(in_warps_.next_ready(), now + 1));
+    }
     if (vertex_count_ < timing_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
     return std::min(next, in_release_.next_ready());
   }
@@ -325,13 +407,21 @@ class SmUnit : public Unit {
   StreamIn<WarpRelease> in_release_;
   std::unique_ptr<SmBehaviour> behaviour_;
   const SmBehaviour::TimingParameters timing_;
-  std::vector<ShaderSegment> merged_;  ///< the fragment program with the merge extension
   const std::uint32_t cycles_per_instruction_;
   const Divisor warps_per_core_;
+  SectoredCacheStatistics l1_statistics_{*this, "l1"};
+  SmMemory memory_;
+  std::unique_ptr<FixedLatencyMemory> no_memory_;
+  bool fetches_ = false;  ///< the memory port is connected
+  // The programs, in whose first segments nothing stands for memory where that is connected.
+  std::vector<ShaderSegment> vertex_;
+  std::vector<ShaderSegment> fragment_;
+  std::vector<ShaderSegment> merged_;  ///< with the merge extension
   Wheel wheel_;
   std::vector<Scheduler> schedulers_;
   std::uint32_t fragment_slots_ = 0;
   std::vector<Flight> flights_;       ///< fragment slots, core by core, then vertex slots
+  std::vector<Cycle> there_;          ///< by fragment slot: before it no attributes are there
   std::vector<std::uint32_t> next_;   ///< in a chain, of slots and then of schedulers
   std::vector<Warp> warps_;           ///< of fragment slots
   std::vector<VertexWarp> vertices_;  ///< of vertex slots
@@ -343,19 +433,22 @@ class SmUnit : public Unit {
   ShadedWarpPool pool_;
   TileId last_tile_;
   std::uint32_t core_ = 0;
+  std::uint32_t slot_ = 0;
   std::uint32_t sent_to_core_ = 0;
   std::uint32_t turn_of_scheduler_ = 0;
   std::uint64_t vertex_scheduler_ = 0;
   std::uint32_t in_flight_ = 0;  ///< fragment warps, up to their release
   std::uint32_t running_ = 0;    ///< of these, not shaded yet
+  std::uint32_t waiting_ = 0;    ///< warps that can do nothing before memory answers
+  bool looks_up_ = false;        ///< the warp at the link, for which `slot_` is taken
   bool slots_full_ = false;
   Cycle busy_until_ = 0;
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("sm", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                               const RenderContext&, unsigned) {
-    return std::make_unique<SmUnit>(name.c_str(), domain, behaviour_as<SmBehaviour>(std::move(behaviour)));
+                               const RenderContext& context, unsigned) {
+    return std::make_unique<SmUnit>(name.c_str(), domain, behaviour_as<SmBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

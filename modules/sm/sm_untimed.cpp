@@ -1,3 +1,6 @@
+#include "sm/attribute_traffic.h"
+
+#include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
 
@@ -5,34 +8,73 @@ namespace vrpipe {
 
 namespace {
 
-/// The SM array without time. Ports as in sm_timed.cpp.
+/// The SM array without time. Ports as in sm_timed.cpp. Where its memory wants to know, warps go to cores in turn, as if
+/// each had a slot, and what they read of attributes goes through its L1.
 class UntimedSm : public UntimedUnit {
  public:
-  UntimedSm(const std::string& name, std::unique_ptr<SmBehaviour> behaviour)
+  UntimedSm(const std::string& name, std::unique_ptr<SmBehaviour> behaviour, const RenderContext& context)
       : UntimedUnit(name),
         out_vertices_(*this, "out_vertices"),
         out_shaded_(*this, "out_shaded"),
         in_release_(input<WarpRelease>("in_release", [](const WarpRelease&) {})),
         in_warps_(input<Warp>("in_warps", [this](const Warp& warp) { shade(warp); })),
         in_vertices_(input<VertexWarp>("in_vertices", [this](const VertexWarp& warp) { shade_vertices(warp); })),
-        behaviour_(std::move(behaviour)) {}
+        behaviour_(std::move(behaviour)),
+        timing_(behaviour_->timing()),
+        traffic_(context, timing_.fetch.attribute_bytes),
+        memory_(traffic_.origin(MemoryTraffic::attribute)) {}
 
   Behaviour& behaviour() override { return *behaviour_; }
+  UntimedMemoryPort* memory_port() override { return &memory_; }
 
  private:
   void shade(const Warp& warp) {
     shaded_.mark = warp.mark;
     shaded_.sequence = warp.sequence;
     shaded_.count = 0;
-    if (warp.mark == Mark::none) behaviour_->shade(warp, shaded_);
+    if (warp.mark == Mark::none) {
+      if (memory_.connected()) read_attributes(warp);
+      behaviour_->shade(warp, shaded_);
+    }
     out_shaded_.send({&shaded_});
   }
   void shade_vertices(const VertexWarp& warp) {
     if (warp.mark == Mark::none) {
       did(SmWork::vertex, 1);
+      const auto access = [this](const MemoryRequest& request) { memory_.access(request); };
+      if (memory_.connected()) traffic_.read_vertices(warp, access);
       behaviour_->shade_vertices(warp);
+      if (memory_.connected()) traffic_.write_attributes(warp, access);
     }
     out_vertices_.send(warp);
+  }
+
+  [[gnu::noinline]] void read_attributes(const Warp& warp) {
+    if (l1s_.empty()) {
+      for (std::uint32_t core = 0; core < timing_.cores; ++core) l1s_.emplace_back(timing_.fetch.l1, l1_statistics_);
+    }
+    if (warp.tile != last_tile_ || sent_to_core_ == timing_.warps_to_one_core) {
+      core_ = core_ + 1 == timing_.cores ? 0 : core_ + 1;
+      sent_to_core_ = 0;
+    }
+    last_tile_ = warp.tile;
+    ++sent_to_core_;
+    SectoredCache& l1 = l1s_[core_];
+    traffic_.read_attributes(warp, reads_);
+    unsigned sectors = 0;
+    for (unsigned i = 0; i < reads_.count; ++i) {
+      LineAccess access;
+      access.address = reads_.lines[i].address;
+      access.sectors = reads_.lines[i].sectors;
+      l1.look_up(access);
+      sectors += static_cast<unsigned>(__builtin_popcount(access.sectors));
+      for (std::uint32_t missing = access.filled; missing != 0;) {
+        const SectorRun run = take_sector_run(missing, AttributeTraffic::line_bytes / AttributeTraffic::sector_bytes);
+        memory_.read(access.address + run.first * AttributeTraffic::sector_bytes,
+                     run.count * AttributeTraffic::sector_bytes);
+      }
+    }
+    l1.accessed(reads_.count, sectors);
   }
 
   UntimedOut<VertexWarp> out_vertices_;
@@ -41,13 +83,22 @@ class UntimedSm : public UntimedUnit {
   std::unique_ptr<UntimedIn<Warp>> in_warps_;
   std::unique_ptr<UntimedIn<VertexWarp>> in_vertices_;
   std::unique_ptr<SmBehaviour> behaviour_;
+  const SmBehaviour::TimingParameters timing_;
+  const AttributeTraffic traffic_;
+  UntimedMemoryPort memory_;
+  SectoredCacheStatistics l1_statistics_{*this, "l1"};
+  std::vector<SectoredCache> l1s_;  ///< by core; none before the first warp
+  AttributeTraffic::FragmentReads reads_;
+  TileId last_tile_;
+  std::uint32_t core_ = 0;
+  std::uint32_t sent_to_core_ = 0;
   ShadedWarp shaded_;
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("sm", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                       const RenderContext&, unsigned) {
-    return std::make_unique<UntimedSm>(name, behaviour_as<SmBehaviour>(std::move(behaviour)));
+                                       const RenderContext& context, unsigned) {
+    return std::make_unique<UntimedSm>(name, behaviour_as<SmBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

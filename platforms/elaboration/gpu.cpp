@@ -171,7 +171,7 @@ void Gpu::check() const {
     check_ports(*placed.unit, path, platform);
     const bool has_memory =
         std::any_of(links.begin(), links.end(), [&](const MemoryLink& link) { return link.from == path; });
-    if (placed.unit->memory_socket() == nullptr || has_memory) continue;
+    if (placed.unit->memory_socket() == nullptr || placed.unit->memory_is_optional() || has_memory) continue;
     throw UserError("incomplete platform " + platform, path, "its memory port is not connected", "use connect_memory");
   }
 }

@@ -50,4 +50,12 @@ void wire_dram(Netlist& netlist, const std::string& dram) {
   netlist.connect_memory("l2", "dram");
 }
 
+void connect_attribute_traffic(Netlist& netlist, const std::string& memory) {
+  std::vector<std::string> arrays;
+  for (const Instance& instance : netlist.instances()) {
+    if (instance.slot == "sm") arrays.push_back(instance.path);
+  }
+  for (const std::string& array : arrays) netlist.connect_memory(array, memory);
+}
+
 }  // namespace vrpipe

@@ -59,6 +59,7 @@ class CheckedSm final : public CheckedSlot<SmBehaviour> {
         }
       }
     }
+    timing.fetch.check();
     return timing;
   }
   void check_timing() const override { timing(); }

@@ -195,4 +195,8 @@ class FixedLatencyMemory : public sc_core::sc_module, public StatisticSet {
   std::vector<std::unique_ptr<MemoryTarget>> ports_;
 };
 
+/// For a memory port that may stay unconnected, before the end of elaboration: binds its socket, if nothing was bound to
+/// it, to a memory that is never asked. Null if something was.
+std::unique_ptr<FixedLatencyMemory> stub_unbound(tlm::tlm_initiator_socket<32>& socket, ClockDomain& domain);
+
 }  // namespace vrpipe

@@ -16,6 +16,9 @@ struct MemoryRegion {
   std::uint64_t end() const { return address + bytes; }
 };
 
+/// What vertex shading writes for a splat; its two triangles take half of it each (measured on a GH100: 650 to 730).
+inline constexpr std::uint32_t attribute_bytes_per_splat = 704;
+
 /// Where in the modelled memory a frame's surfaces and buffers are. Regions begin at multiples of 64 KiB, as pages of
 /// GPUs do, and do not overlap; colour is at 0.
 struct AddressMap {
@@ -24,7 +27,6 @@ struct AddressMap {
   MemoryRegion vertices;    ///< what vertex fetch reads: 48 bytes a splat of each geometry, as in a `.spl` file
   MemoryRegion primitives;  ///< explicit triangles: 24 bytes each
   MemoryRegion attributes;  ///< what vertex shading writes and fragment shading reads: 704 bytes a splat of each draw
-                            ///< (measured on a GH100: 650 to 730)
 };
 AddressMap address_map(const Frame& frame, ColorFormat format);
 

@@ -15,4 +15,8 @@ void wire_pipeline(Netlist& netlist);
 /// Behind such a pipeline, makes the L2 a cache and puts a DRAM below it, of an implementation of slot `dram`.
 void wire_dram(Netlist& netlist, const std::string& dram);
 
+/// Binds the memory port of every SM array, so that vertices and attributes are fetched from a memory instead of by a fixed
+/// latency.
+void connect_attribute_traffic(Netlist& netlist, const std::string& memory = "l2");
+
 }  // namespace vrpipe

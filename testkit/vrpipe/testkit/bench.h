@@ -120,7 +120,8 @@ class Bench {
     return made;
   }
 
-  /// Binds the unit's memory port to a memory of your own; without it, a FixedLatencyMemory is made.
+  /// Binds the unit's memory port to a memory of your own; without it, a FixedLatencyMemory is made, for a port that may
+  /// stay unconnected only once `set_memory` is called.
   void bind_memory(tlm::tlm_base_target_socket_b<32>& memory) {
     unit_->memory_socket()->bind(memory);
     memory_bound_ = true;
@@ -129,6 +130,7 @@ class Bench {
   void set_memory(unsigned latency_cycles, unsigned bytes_per_cycle) {
     memory_latency_ = latency_cycles;
     memory_bytes_per_cycle_ = bytes_per_cycle;
+    memory_wanted_ = true;
   }
 
   /// Every port stalls at random in `per_256` of 256 cycles, each differently.
@@ -182,7 +184,9 @@ class Bench {
         port->stall_randomly(mix(++seed), stall_per_256_);
       }
     }
-    if (unit_ && unit_->memory_socket() != nullptr && !memory_bound_) {
+    const bool needs_memory = unit_ && unit_->memory_socket() != nullptr && !memory_bound_ &&
+                              (memory_wanted_ || !unit_->memory_is_optional());
+    if (needs_memory) {
       memory_ = std::make_unique<FixedLatencyMemory>("memory", *clock_, memory_latency_, memory_bytes_per_cycle_, 1);
       bind_memory(memory_->port(0));
     }
@@ -205,6 +209,7 @@ class Bench {
   unsigned memory_latency_ = 146;
   unsigned memory_bytes_per_cycle_ = 128;
   bool memory_bound_ = false;
+  bool memory_wanted_ = false;
   std::uint64_t stall_seed_ = 0;
   unsigned stall_per_256_ = 0;
   std::uint64_t tick_seed_ = 0;

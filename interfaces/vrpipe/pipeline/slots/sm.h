@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
@@ -13,6 +14,17 @@ namespace vrpipe {
 struct ShaderSegment {
   std::uint32_t instructions;
   std::uint32_t stall_cycles;
+};
+
+/// How an SM array fetches vertices and attributes where its memory port is connected.
+struct AttributeFetch {
+  std::uint32_t attribute_bytes = 40;    ///< of a primitive, that the fragment shader reads
+  std::uint32_t attribute_writes = 640;  ///< of the array in flight: what comes behind waits
+  std::uint32_t l1_latency_cycles = 38;  ///< until what a core's L1 holds is there
+  std::uint32_t l1_mshrs = 384;          ///< sectors that a core's L1 may have asked for
+  CacheOrganization l1{49152};           ///< lines of 128 bytes, sectors of 32
+  /// Throws UserError for what cannot be.
+  void check() const;
 };
 
 /// Slot `sm`: vertex and fragment shading, alpha pruning, quad merging.
@@ -28,9 +40,12 @@ class SmBehaviour : public Behaviour {
     std::uint32_t warps_per_core;
     std::uint32_t vertex_warps;       ///< of the array that may be in flight
     std::uint32_t warps_to_one_core;  ///< consecutive warps of a tile that go to one core
+    /// The first stall of the vertex and of the fragment program is that of fetching what it reads; where the memory port
+    /// is connected the memory says how long that takes.
     std::vector<ShaderSegment> vertex;
     std::vector<ShaderSegment> fragment;
     std::vector<ShaderSegment> merge;  ///< appended for a warp with pairs
+    AttributeFetch fetch = {};
     /// Fragment warps in flight in the array. Throws UserError if they are more than slots have numbers.
     std::uint32_t fragment_slots() const;
     /// Cycles for which an instruction of a warp has its scheduler.

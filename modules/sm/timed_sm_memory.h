@@ -1,0 +1,143 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "attribute_traffic.h"
+
+#include <vrpipe/memory/sectored_cache.h>
+#include <vrpipe/memory/timed_memory_port.h>
+#include <vrpipe/model/timed.h>
+
+namespace vrpipe {
+
+/// As sm_memory.h, at lt and at: each access gets its cycle when its warp is launched or shaded. L1 sees the launches
+/// in their order.
+class TimedSmMemory {
+ public:
+  TimedSmMemory(PortOwner& owner, const RenderContext& context, const SmBehaviour::TimingParameters& timing,
+                SectoredCacheStatistics& statistics)
+      : timing_(timing.fetch),
+        traffic_(context, timing.fetch.attribute_bytes),
+        port_(owner, "memory"),
+        fill_origin_(traffic_.origin(MemoryTraffic::attribute)),
+        statistics_(statistics),
+        cores_(timing.cores),
+        answered_(timing_.attribute_writes, 0) {}
+
+  tlm::tlm_initiator_socket<32>& socket() { return port_.socket; }
+  const MemoryBytes& moved() const { return port_.moved(); }
+  /// Before the first access.
+  void connect() {
+    for (std::uint32_t core = 0; core < cores_; ++core) l1s_.emplace_back(timing_, statistics_);
+  }
+
+  /// When what a vertex warp reads is there, asked for in cycle `at`.
+  Cycle fetch_vertices(const VertexWarp& warp, Cycle at) {
+    send_until(at);
+    Cycle there = at;
+    traffic_.read_vertices(warp,
+                           [&](const MemoryRequest& request) { there = std::max(there, port_.access(request, at)); });
+    return there;
+  }
+  /// When the last of what it writes is sent, from cycle `at` on: each once the one as many before it as may be in flight
+  /// has been answered. The memory gets them with `send_until`: at lt the next warp comes later, and reads earlier.
+  Cycle write_attributes(const VertexWarp& warp, Cycle at) {
+    traffic_.write_attributes(warp, [&](const MemoryRequest& request) {
+      if (unsent_.size() == answered_.size()) send();
+      at = std::max(at, answered_[next_write_]);
+      next_write_ = next_write_ + 1 == answered_.size() ? 0 : next_write_ + 1;
+      unsent_.push({request, at});
+    });
+    return at;
+  }
+  /// Sends what is to be written up to a cycle.
+  void send_until(Cycle until) {
+    while (!unsent_.empty() && unsent_.front().at <= until) send();
+  }
+  struct Fetch {
+    Cycle looked_up;  ///< the warp can be launched
+    Cycle there;      ///< the last of its attributes
+  };
+  /// Looks a fragment warp up in the L1 of a core, in cycle `at` or as soon as there is room.
+  Fetch fetch_attributes(const Warp& warp, std::uint32_t core, Cycle at) {
+    traffic_.read_attributes(warp, reads_);
+    L1& l1 = l1s_[core];
+    Cycle there = 0;
+    std::uint64_t sectors = 0;
+    for (unsigned i = 0; i < reads_.count; ++i) {
+      LineAccess access;
+      access.address = reads_.lines[i].address;
+      access.sectors = reads_.lines[i].sectors;
+      l1.cache.look_up(access);
+      std::array<Cycle, sectors_of_a_line>& line = l1.there[access.line];
+      if (access.replaced) {
+        // It stays until what it waits for has come.
+        at = std::max(at, *std::max_element(line.begin(), line.end()));
+        line = {};
+      }
+      for (std::uint32_t missing = access.filled; missing != 0;) at = fill(l1, access, missing, line, at);
+      for (std::uint32_t needed = access.sectors; needed != 0; needed &= needed - 1) {
+        there = std::max(there, line[static_cast<unsigned>(__builtin_ctz(needed))]);
+        ++sectors;
+      }
+    }
+    l1.cache.accessed(reads_.count, sectors);
+    return {at, std::max(there, at + timing_.l1_latency_cycles)};
+  }
+
+ private:
+  static constexpr unsigned sectors_of_a_line = AttributeTraffic::line_bytes / AttributeTraffic::sector_bytes;
+
+  struct L1 {
+    L1(const AttributeFetch& timing, SectoredCacheStatistics& statistics)
+        : cache(timing.l1, statistics), mshrs(timing.l1_mshrs), there(timing.l1.lines()) {}
+    SectoredCache cache;
+    SlotPool mshrs;
+    std::vector<std::array<Cycle, sectors_of_a_line>> there;  ///< by line and sector: since when
+  };
+
+  /// Sends the next write.
+  void send() {
+    answered_[next_sent_] = port_.access(unsent_.front().request, unsent_.front().at);
+    next_sent_ = next_sent_ + 1 == answered_.size() ? 0 : next_sent_ + 1;
+    unsent_.pop();
+  }
+
+  /// Asks for the first of the sectors that are missing; returns when.
+  Cycle fill(L1& l1, const LineAccess& access, std::uint32_t& missing, std::array<Cycle, sectors_of_a_line>& line,
+             Cycle at) {
+    const SectorRun run = take_sector_run(missing, std::min(sectors_of_a_line, timing_.l1_mshrs));
+    at = l1.mshrs.free_from(at, run.count);
+    const Cycle there = port_.access({access.address + run.first * AttributeTraffic::sector_bytes,
+                                      run.count * AttributeTraffic::sector_bytes, tlm::TLM_READ_COMMAND, fill_origin_},
+                                     at);
+    l1.mshrs.take(run.count, there);
+    for (unsigned i = 0; i < run.count; ++i) {
+      line[run.first + i] = there;
+      statistics_.fill_cycles.see(there - at);
+    }
+    return at;
+  }
+
+  const AttributeFetch timing_;
+  const AttributeTraffic traffic_;
+  TimedMemoryPort port_;
+  const MemoryOrigin fill_origin_;
+  SectoredCacheStatistics& statistics_;
+  const std::uint32_t cores_;
+  std::vector<Cycle> answered_;  ///< the last writes, as many as may be in flight: a ring
+  struct Write {
+    MemoryRequest request;
+    Cycle at = 0;
+  };
+  Ring<Write> unsent_;
+  std::size_t next_write_ = 0;  ///< in the ring of answers
+  std::size_t next_sent_ = 0;
+  std::vector<L1> l1s_;  ///< by core
+  AttributeTraffic::FragmentReads reads_;
+};
+
+}  // namespace vrpipe
