@@ -194,6 +194,31 @@ TEST(AttributeTrafficOfAFrame, TakesAMemoryOfAnotherMake) {
   }
 }
 
+/// Behind an L2 that misses lies a DRAM; without time both count what is asked of them.
+TEST(AttributeTrafficOfAFrame, GoesThroughAnL2ThatMissesAtEveryFidelity) {
+  const std::uint32_t splats = 800;
+  const Draw draw = testing::random_draw(96, 96, splats, 38);
+  const Platform platform = with_attribute_traffic("agx-orin-lpddr3");
+  for (const char* variant : {"baseline", "het+qm"}) {
+    const RunResult expected = run(request_of(variant, Fidelity::functional, strictly), draw);
+    const RunResult clocked = run(with_traffic(platform, variant, Fidelity::cycle, strictly), draw);
+    for (const Fidelity fidelity : fidelities()) {
+      const std::string what = std::string(variant) + " " + name_of(fidelity);
+      const RunResult result = run(with_traffic(platform, variant, fidelity, strictly), draw);
+      EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color)) << what;
+      EXPECT_EQ(result.counts.named(), expected.counts.named()) << what;
+      EXPECT_EQ(statistic(result, "l2.vertex_bytes_read"), splats * 48) << what;
+      EXPECT_EQ(statistic(result, "l2.attribute_bytes_written"), result.counts.primitives * 352) << what;
+      EXPECT_EQ(statistic(result, "l2.attribute_bytes_read"), statistic(result, "sm.l1.bytes_filled")) << what;
+      // Cores take other warps where slots are full; but not many.
+      const auto read = static_cast<double>(statistic(clocked, "l2.attribute_bytes_read"));
+      EXPECT_NEAR(static_cast<double>(statistic(result, "l2.attribute_bytes_read")) / read, 1, 0.1) << what;
+      if (fidelity != Fidelity::bound) continue;
+      EXPECT_LE(*result.cycles, *clocked.cycles) << what;
+    }
+  }
+}
+
 TEST(AttributeTrafficOfAFrame, MayStayUnconnected) {
   const Draw draw = testing::random_draw(64, 64, 300, 37);
   for (const Fidelity fidelity : with_time) {
