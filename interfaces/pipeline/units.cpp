@@ -23,6 +23,11 @@ void AttributeFetch::check() const {
                     fmt::format("a primitive has {} bytes of attributes, not {}", primitive_bytes, attribute_bytes),
                     "read some of them");
   }
+  if (buffer_bytes == 0 || buffer_bytes % CacheOrganization().line_bytes != 0) {
+    throw UserError("unusable SM array", "sm.attribute_buffer_bytes",
+                    fmt::format("{} bytes are no whole lines", buffer_bytes),
+                    fmt::format("use a multiple of {}", CacheOrganization().line_bytes));
+  }
   if (attribute_writes == 0 || l1_mshrs == 0) {
     throw UserError("unusable SM array", attribute_writes == 0 ? "sm.attribute_writes" : "sm.l1_mshrs",
                     "nothing could ever be under way", "use 1 or more");

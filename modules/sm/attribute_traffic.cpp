@@ -7,8 +7,8 @@
 
 namespace vrpipe {
 
-AttributeTraffic::AttributeTraffic(const RenderContext& context, std::uint32_t attribute_bytes)
-    : context_(context), attribute_bytes_(attribute_bytes) {
+AttributeTraffic::AttributeTraffic(const RenderContext& context, const AttributeFetch& fetch)
+    : context_(context), attribute_bytes_(fetch.attribute_bytes), buffer_bytes_(fetch.buffer_bytes) {
   const Frame& frame = *context.frame;
   const AddressMap map = address_map(frame, context.format);
   attributes_ = map.attributes.address;

@@ -16,6 +16,9 @@ namespace vrpipe {
 /// writes the attributes of each triangle that primitive assembly will not cull: as on a GH100, where they come from
 /// the PolyMorph engine, and none for culled ones. A fragment warp reads the first bytes of the attributes of each of its
 /// quads' primitives once.
+///
+/// Attributes go round in a buffer of L2 (the Circular Buffer, paper 3.1). Who keeps them knows them by addresses that do
+/// not come again; `in_buffer` is where such a one is.
 class AttributeTraffic {
  public:
   // Of the lines and sectors of L1 and L2 (paper, table).
@@ -38,9 +41,8 @@ class AttributeTraffic {
   /// Requests of a vertex warp for what it reads are at most so many.
   static constexpr unsigned most_vertex_reads = 16;
 
-  /// @param context         outlives it
-  /// @param attribute_bytes that the fragment shader reads of a primitive, at most primitive_bytes
-  AttributeTraffic(const RenderContext& context, std::uint32_t attribute_bytes);
+  /// @param context  outlives it
+  AttributeTraffic(const RenderContext& context, const AttributeFetch& fetch);
 
   /// Calls `access(MemoryRequest)` for each read before a vertex warp is shaded.
   template <class Access>
@@ -64,12 +66,17 @@ class AttributeTraffic {
     for (unsigned i = 0; i < 2 * warp.splats;) {
       unsigned end = i;
       while (end < 2 * warp.splats && (visible >> end & 1U) != 0) ++end;
-      in_sectors(base + i * primitive_bytes, (end - i) * primitive_bytes, request, access);
+      in_sectors(base + i * primitive_bytes, (end - i) * primitive_bytes, request, [&](MemoryRequest write) {
+        write.address = in_buffer(write.address);
+        access(static_cast<const MemoryRequest&>(write));
+      });
       i = end + 1;
     }
   }
 
-  /// What a fragment warp reads.
+  /// Where in memory an attribute is.
+  std::uint64_t in_buffer(std::uint64_t address) const { return attributes_ + (address - attributes_) % buffer_bytes_; }
+  /// What a fragment warp reads; not in the buffer yet.
   void read_attributes(const Warp& warp, FragmentReads& reads) const;
   /// Of these reads.
   MemoryOrigin origin(MemoryTraffic traffic) const {
@@ -100,6 +107,7 @@ class AttributeTraffic {
 
   const RenderContext& context_;
   const std::uint32_t attribute_bytes_;
+  const std::uint32_t buffer_bytes_;  ///< whole lines
   std::uint64_t attributes_;
   std::vector<Region> regions_;  ///< by draw
 };

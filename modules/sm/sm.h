@@ -70,6 +70,15 @@ class SplatShader : public SmBehaviour {
                             "bytes",
                             "the fragment shader's 10 values: centre, 2x2 matrix, opacity, colour",
                             "of its attributes that are read for a primitive, where the memory port is connected"};
+    Integer attribute_buffer_bytes{*this,
+                                   "attribute_buffer_bytes",
+                                   1 << 20,
+                                   1 << 16,
+                                   1 << 30,
+                                   "bytes",
+                                   source::open,
+                                   "of the circular buffer that attributes are written to; what is overwritten is "
+                                   "taken to be needed no more"};
     Integer attribute_writes{*this,        "attribute_writes",
                              640,          1,
                              65536,        "accesses",

@@ -24,7 +24,7 @@ class SmMemory {
   SmMemory(PortOwner& owner, const RenderContext& context, const SmBehaviour::TimingParameters& timing,
            SectoredCacheStatistics& statistics)
       : timing_(timing.fetch),
-        traffic_(context, timing.fetch.attribute_bytes),
+        traffic_(context, timing.fetch),
         port_(owner, "memory",
               timing.vertex_warps * AttributeTraffic::most_vertex_reads + timing_.attribute_writes +
                   timing.cores * timing_.l1_mshrs),
@@ -178,7 +178,7 @@ class SmMemory {
       l1.free_mshrs -= run.count;
       seen_ |= sector_mask(run.first, run.count);
       await(fill);
-      port_.access({needed.address + run.first * AttributeTraffic::sector_bytes,
+      port_.access({traffic_.in_buffer(needed.address) + run.first * AttributeTraffic::sector_bytes,
                     run.count * AttributeTraffic::sector_bytes, tlm::TLM_READ_COMMAND, fill_origin_},
                    fill);
     }

@@ -21,7 +21,7 @@ class UntimedSm : public UntimedUnit {
         in_vertices_(input<VertexWarp>("in_vertices", [this](const VertexWarp& warp) { shade_vertices(warp); })),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
-        traffic_(context, timing_.fetch.attribute_bytes),
+        traffic_(context, timing_.fetch),
         memory_(traffic_.origin(MemoryTraffic::attribute)) {}
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -70,7 +70,7 @@ class UntimedSm : public UntimedUnit {
       sectors += static_cast<unsigned>(__builtin_popcount(access.sectors));
       for (std::uint32_t missing = access.filled; missing != 0;) {
         const SectorRun run = take_sector_run(missing, AttributeTraffic::line_bytes / AttributeTraffic::sector_bytes);
-        memory_.read(access.address + run.first * AttributeTraffic::sector_bytes,
+        memory_.read(traffic_.in_buffer(access.address) + run.first * AttributeTraffic::sector_bytes,
                      run.count * AttributeTraffic::sector_bytes);
       }
     }

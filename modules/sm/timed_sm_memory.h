@@ -20,7 +20,7 @@ class TimedSmMemory {
   TimedSmMemory(PortOwner& owner, const RenderContext& context, const SmBehaviour::TimingParameters& timing,
                 SectoredCacheStatistics& statistics)
       : timing_(timing.fetch),
-        traffic_(context, timing.fetch.attribute_bytes),
+        traffic_(context, timing.fetch),
         port_(owner, "memory"),
         fill_origin_(traffic_.origin(MemoryTraffic::attribute)),
         statistics_(statistics),
@@ -111,7 +111,8 @@ class TimedSmMemory {
              Cycle at) {
     const SectorRun run = take_sector_run(missing, std::min(sectors_of_a_line, timing_.l1_mshrs));
     at = l1.mshrs.free_from(at, run.count);
-    const Cycle there = port_.access({access.address + run.first * AttributeTraffic::sector_bytes,
+    const std::uint64_t line_address = traffic_.in_buffer(access.address);
+    const Cycle there = port_.access({line_address + run.first * AttributeTraffic::sector_bytes,
                                       run.count * AttributeTraffic::sector_bytes, tlm::TLM_READ_COMMAND, fill_origin_},
                                      at);
     l1.mshrs.take(run.count, there);

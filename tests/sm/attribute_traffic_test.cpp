@@ -17,8 +17,6 @@ namespace {
 using testing::draw_of;
 using testing::flat_box;
 
-constexpr std::uint32_t shader_bytes = 40;
-
 /// Splats that all can be seen.
 std::vector<Splat> boxes(std::uint32_t count) { return std::vector<Splat>(count, flat_box(8, 8, 24, 24, 0.5F)); }
 
@@ -57,7 +55,7 @@ Requests writes_of(const AttributeTraffic& traffic, const VertexWarp& warp) {
 TEST(AttributeTraffic, AVertexWarpReadsItsSplatsLineByLine) {
   const Draw draw = draw_of(64, 64, boxes(24));
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, shader_bytes);
+  const AttributeTraffic traffic(context, AttributeFetch());
   const AddressMap map = address_map(*context.frame, context.format);
   for (std::uint32_t first = 0; first < 24; first += 8) {
     const Requests reads = reads_of(traffic, {first, 8});
@@ -74,7 +72,7 @@ TEST(AttributeTraffic, AVertexWarpReadsItsSplatsLineByLine) {
 TEST(AttributeTraffic, AVertexWarpThatBeginsInASectorReadsAllOfIt) {
   const Draw draw = draw_of(64, 64, boxes(24));
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, shader_bytes);
+  const AttributeTraffic traffic(context, AttributeFetch());
   const std::uint64_t vertices = address_map(*context.frame, context.format).vertices.address;
   // Bytes 240 to 479 of the splats.
   const Requests reads = reads_of(traffic, {5, 5});
@@ -91,7 +89,7 @@ TEST(AttributeTraffic, AGeometryIsReadWhereItIsHoweverOftenItIsDrawn) {
   frame.draw(second, {});
   frame.draw(first, {}, "", 8, 8);
   const RenderContext context = testing::context_of(frame);
-  const AttributeTraffic traffic(context, shader_bytes);
+  const AttributeTraffic traffic(context, AttributeFetch());
   const AddressMap map = address_map(frame, context.format);
   const auto vertices = [&](std::uint32_t splat, DrawIndex draw) {
     return reads_of(traffic, {splat, 8, draw}).begin - map.vertices.address;
@@ -106,7 +104,7 @@ TEST(AttributeTraffic, TrianglesOfTheirOwnAreReadAsWell) {
   Draw draw = draw_of(64, 64, boxes(16));
   draw.triangles.assign(16, testing::one_quad_triangle(10, 10));
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, shader_bytes);
+  const AttributeTraffic traffic(context, AttributeFetch());
   const AddressMap map = address_map(*context.frame, context.format);
   const Requests reads = reads_of(traffic, {8, 8});
   EXPECT_EQ(reads.bytes, 8U * 48 + 8 * 24);
@@ -118,7 +116,7 @@ TEST(AttributeTraffic, TrianglesOfTheirOwnAreReadAsWell) {
 TEST(AttributeTraffic, AVertexWarpWrites704BytesASplat) {
   const Draw draw = draw_of(64, 64, boxes(16));
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, shader_bytes);
+  const AttributeTraffic traffic(context, AttributeFetch());
   const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
   const Requests writes = writes_of(traffic, {8, 8});
   EXPECT_EQ(writes.all.size(), 44U) << "whole lines";
@@ -131,6 +129,27 @@ TEST(AttributeTraffic, AVertexWarpWrites704BytesASplat) {
   }
 }
 
+// The paper's circular buffer: what comes later is written over what came first.
+TEST(AttributeTraffic, AttributesGoRoundInTheirBuffer) {
+  const Draw draw = draw_of(64, 64, boxes(32));
+  const RenderContext context = testing::context_of(draw);
+  AttributeFetch fetch;
+  fetch.buffer_bytes = 16 * 704;
+  const AttributeTraffic traffic(context, fetch);
+  const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
+  for (const std::uint32_t splat : {0U, 16U}) {
+    const Requests writes = writes_of(traffic, {splat, 8});
+    EXPECT_EQ(writes.begin, attributes);
+    EXPECT_EQ(writes.end, attributes + 8 * 704);
+  }
+  // A warp at the end goes on at the beginning.
+  const Requests across = writes_of(traffic, {12, 8});
+  EXPECT_EQ(across.bytes, 8U * 704);
+  EXPECT_EQ(across.begin, attributes);
+  EXPECT_EQ(across.end, attributes + 16 * 704);
+  EXPECT_EQ(traffic.in_buffer(attributes + 17 * 704 + 32), attributes + 704 + 32);
+}
+
 TEST(AttributeTraffic, OfWhatIsCulledNothingIsWritten) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   std::vector<Splat> splats = boxes(8);
@@ -140,7 +159,7 @@ TEST(AttributeTraffic, OfWhatIsCulledNothingIsWritten) {
   splats[6].cx = 1e9F;                                 // beyond the guard band
   const Draw draw = draw_of(64, 64, splats);
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, shader_bytes);
+  const AttributeTraffic traffic(context, AttributeFetch());
   const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
   const Requests writes = writes_of(traffic, {0, 8});
   EXPECT_EQ(writes.bytes, 4U * 704);
@@ -156,7 +175,7 @@ TEST(AttributeTraffic, WritesTheHalfOfEachPrimitiveThatIsAssembledOnce) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Draw draw = testing::random_draw(96, 64, 300, seed);
     const RenderContext context = testing::context_of(draw);
-    const AttributeTraffic traffic(context, shader_bytes);
+    const AttributeTraffic traffic(context, AttributeFetch());
     const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
     PrimitiveAssembly vpo(PrimitiveAssembly::Parameters(), context);
     std::set<std::uint64_t> expected;
@@ -196,7 +215,7 @@ Warp warp_of(const std::vector<std::pair<std::uint32_t, unsigned>>& primitives) 
 TEST(AttributeTraffic, AFragmentWarpReadsEachPrimitiveOnce) {
   const Draw draw = draw_of(64, 64, boxes(16));
   const RenderContext context = testing::context_of(draw);
-  const AttributeTraffic traffic(context, shader_bytes);
+  const AttributeTraffic traffic(context, AttributeFetch());
   const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
   AttributeTraffic::FragmentReads reads;
   traffic.read_attributes(warp_of({{3, 0}, {3, 0}, {4, 0}, {3, 0}, {4, 0}, {4, 1}, {3, 0}, {4, 1}}), reads);

@@ -19,6 +19,7 @@ struct ShaderSegment {
 /// How an SM array fetches vertices and attributes where its memory port is connected.
 struct AttributeFetch {
   std::uint32_t attribute_bytes = 40;    ///< of a primitive, that the fragment shader reads
+  std::uint32_t buffer_bytes = 1 << 20;  ///< of memory, in which attributes go round
   std::uint32_t attribute_writes = 640;  ///< of the array in flight: what comes behind waits
   std::uint32_t l1_latency_cycles = 38;  ///< until what a core's L1 holds is there
   std::uint32_t l1_mshrs = 384;          ///< sectors that a core's L1 may have asked for
