@@ -57,7 +57,7 @@ class AttributeTraffic {
                access);
   }
 
-  /// And for each write after.
+  /// And for each write after, in the order of addresses that are not in the buffer yet.
   template <class Access>
   void write_attributes(const VertexWarp& warp, Access&& access) const {
     const MemoryRequest request{0, 0, tlm::TLM_WRITE_COMMAND, origin(MemoryTraffic::attribute)};
@@ -66,14 +66,16 @@ class AttributeTraffic {
     for (unsigned i = 0; i < 2 * warp.splats;) {
       unsigned end = i;
       while (end < 2 * warp.splats && (visible >> end & 1U) != 0) ++end;
-      in_sectors(base + i * primitive_bytes, (end - i) * primitive_bytes, request, [&](MemoryRequest write) {
-        write.address = in_buffer(write.address);
-        access(static_cast<const MemoryRequest&>(write));
-      });
+      in_sectors(base + i * primitive_bytes, (end - i) * primitive_bytes, request, access);
       i = end + 1;
     }
   }
 
+  /// The same request where in memory it is.
+  MemoryRequest in_buffer(MemoryRequest request) const {
+    request.address = in_buffer(request.address);
+    return request;
+  }
   /// Where in memory an attribute is.
   std::uint64_t in_buffer(std::uint64_t address) const { return attributes_ + (address - attributes_) % buffer_bytes_; }
   /// What a fragment warp reads; not in the buffer yet.

@@ -55,7 +55,7 @@ class SmMemory {
   /// And for what it writes; `send` says when it has been sent. False if it is nothing.
   bool write_attributes(std::uint32_t slot, const VertexWarp& warp) {
     traffic_.write_attributes(warp, [&](const MemoryRequest& request) {
-      writes_.push({request, slot});
+      writes_.push({traffic_.in_buffer(request), slot});
       ++writes_left_[slot];
     });
     return writes_left_[slot] > 0;

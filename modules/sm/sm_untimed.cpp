@@ -44,7 +44,11 @@ class UntimedSm : public UntimedUnit {
       const auto access = [this](const MemoryRequest& request) { memory_.access(request); };
       if (memory_.connected()) traffic_.read_vertices(warp, access);
       behaviour_->shade_vertices(warp);
-      if (memory_.connected()) traffic_.write_attributes(warp, access);
+      if (memory_.connected()) {
+        traffic_.write_attributes(warp, [this](const MemoryRequest& request) {
+          memory_.access(traffic_.in_buffer(request));
+        });
+      }
     }
     out_vertices_.send(warp);
   }

@@ -25,7 +25,8 @@ class TimedSmMemory {
         fill_origin_(traffic_.origin(MemoryTraffic::attribute)),
         statistics_(statistics),
         cores_(timing.cores),
-        answered_(timing_.attribute_writes, 0) {}
+        answered_(timing_.attribute_writes, 0),
+        sends_at_once_(context.placement.gpcs > 1) {}
 
   tlm::tlm_initiator_socket<32>& socket() { return port_.socket; }
   const MemoryBytes& moved() const { return port_.moved(); }
@@ -43,7 +44,8 @@ class TimedSmMemory {
     return there;
   }
   /// When the last of what it writes is sent, from cycle `at` on: each once the one as many before it as may be in flight
-  /// has been answered. The memory gets them with `send_until`: at lt the next warp comes later, and reads earlier.
+  /// has been answered. The memory gets them with `send_until`, or when they are read: at lt the next warp comes later,
+  /// and reads its vertices earlier. Where the arrays of other GPCs may read them, it gets them at once.
   Cycle write_attributes(const VertexWarp& warp, Cycle at) {
     traffic_.write_attributes(warp, [&](const MemoryRequest& request) {
       if (unsent_.size() == answered_.size()) send();
@@ -51,6 +53,7 @@ class TimedSmMemory {
       next_write_ = next_write_ + 1 == answered_.size() ? 0 : next_write_ + 1;
       unsent_.push({request, at});
     });
+    if (sends_at_once_) send_until(never);
     return at;
   }
   /// Sends what is to be written up to a cycle.
@@ -101,7 +104,7 @@ class TimedSmMemory {
 
   /// Sends the next write.
   void send() {
-    answered_[next_sent_] = port_.access(unsent_.front().request, unsent_.front().at);
+    answered_[next_sent_] = port_.access(traffic_.in_buffer(unsent_.front().request), unsent_.front().at);
     next_sent_ = next_sent_ + 1 == answered_.size() ? 0 : next_sent_ + 1;
     unsent_.pop();
   }
@@ -111,6 +114,8 @@ class TimedSmMemory {
              Cycle at) {
     const SectorRun run = take_sector_run(missing, std::min(sectors_of_a_line, timing_.l1_mshrs));
     at = l1.mshrs.free_from(at, run.count);
+    // Addresses of writes increase.
+    while (!unsent_.empty() && unsent_.front().request.address < access.address + AttributeTraffic::line_bytes) send();
     const std::uint64_t line_address = traffic_.in_buffer(access.address);
     const Cycle there = port_.access({line_address + run.first * AttributeTraffic::sector_bytes,
                                       run.count * AttributeTraffic::sector_bytes, tlm::TLM_READ_COMMAND, fill_origin_},
@@ -137,6 +142,7 @@ class TimedSmMemory {
   Ring<Write> unsent_;
   std::size_t next_write_ = 0;  ///< in the ring of answers
   std::size_t next_sent_ = 0;
+  const bool sends_at_once_;
   std::vector<L1> l1s_;  ///< by core
   AttributeTraffic::FragmentReads reads_;
 };

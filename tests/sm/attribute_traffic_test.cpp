@@ -137,13 +137,18 @@ TEST(AttributeTraffic, AttributesGoRoundInTheirBuffer) {
   fetch.buffer_bytes = 16 * 704;
   const AttributeTraffic traffic(context, fetch);
   const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
+  const auto writes_in_buffer = [&](const VertexWarp& warp) {
+    Requests requests;
+    for (const MemoryRequest& request : writes_of(traffic, warp).all) requests(traffic.in_buffer(request));
+    return requests;
+  };
   for (const std::uint32_t splat : {0U, 16U}) {
-    const Requests writes = writes_of(traffic, {splat, 8});
+    const Requests writes = writes_in_buffer({splat, 8});
     EXPECT_EQ(writes.begin, attributes);
     EXPECT_EQ(writes.end, attributes + 8 * 704);
   }
   // A warp at the end goes on at the beginning.
-  const Requests across = writes_of(traffic, {12, 8});
+  const Requests across = writes_in_buffer({12, 8});
   EXPECT_EQ(across.bytes, 8U * 704);
   EXPECT_EQ(across.begin, attributes);
   EXPECT_EQ(across.end, attributes + 16 * 704);

@@ -128,7 +128,7 @@ TEST_F(BadInput, Machines) {
   refused_with_outputs({"compare", "--set", "tcc.bins=1"}, {"'tcc'", "did you mean"});
   refused_with_outputs({"compare", "--set", "tc.bin=1"}, {"'bin'", "did you mean tc.bins?"});
   refused_with_outputs({"run", "--set", "crop.cache_bytes=5000", "--fidelity", "functional"},
-                       {"crop.cache_bytes", "5000 is no power of two"});
+                       {"crop.cache_bytes", "5000 bytes are no whole lines of 128"});
   refused_with_outputs({"compare", "--format", "rgba32f", "--set", "crop.line_bytes=32"},
                        {"crop.line_bytes, --format"});
   refused_with_outputs({"compare", "--set", "tc.bins=0"}, {"'0'", "tc.bins", "1 to"});
