@@ -21,7 +21,6 @@ Platform agx_orin_lpddr3() {
   platform.description = "agx-orin with a 4 MB L2 that misses and the paper's DRAM, LPDDR3-1600 at 102.4 GB/s";
   platform.wire = [](Netlist& netlist) {
     wire_pipeline(netlist);
-    connect_attribute_traffic(netlist);
     wire_dram(netlist, "lpddr3-1600");
   };
   return platform;
@@ -35,7 +34,6 @@ Platform agx_orin_lpddr5() {
       "agx-orin with a 4 MB L2 that misses and the Jetson AGX Orin's DRAM, LPDDR5-6400 at 204.8 GB/s";
   platform.wire = [](Netlist& netlist) {
     wire_pipeline(netlist);
-    connect_attribute_traffic(netlist);
     wire_dram(netlist, "lpddr5-6400");
   };
   return platform;

@@ -242,7 +242,9 @@ TEST(AttributeTraffic, ReadsTheSectorsOfAsManyBytesAsTheShaderWants) {
   const RenderContext context = testing::context_of(draw);
   const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
   for (std::uint32_t bytes = 4; bytes <= 352; bytes += 4) {
-    const AttributeTraffic traffic(context, bytes);
+    AttributeFetch fetch;
+    fetch.attribute_bytes = bytes;
+    const AttributeTraffic traffic(context, fetch);
     AttributeTraffic::FragmentReads reads;
     std::vector<std::pair<std::uint32_t, unsigned>> primitives;
     std::set<std::uint64_t> expected;
