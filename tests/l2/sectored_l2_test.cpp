@@ -275,7 +275,7 @@ TEST(SectoredL2, RefusesBanksThatCannotBe) {
     }
     return std::string("accepted");
   };
-  EXPECT_NE(refusal({{"banks", "3"}}).find("impossible L2 (l2.banks): 3 is no power of two"), std::string::npos);
+  EXPECT_NE(refusal({{"banks", "3"}}).find("unusable L2 (l2.banks): 3 is no power of two"), std::string::npos);
   EXPECT_NE(refusal({{"bytes", "64K"}, {"banks", "64"}}).find("32 sets cannot be dealt out to 64 banks"),
             std::string::npos);
   EXPECT_NE(refusal({{"ways", "5"}}).find("unusable L2 (l2.ways, l2.bytes)"), std::string::npos);
