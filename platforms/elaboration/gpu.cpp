@@ -34,7 +34,7 @@ Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
     if (runs_ahead) ahead_[instance.gpc] = std::make_unique<RunAhead>(configuration, instance.gpc, framebuffer.color);
   }
   for (const Instance& instance : netlist.instances()) {
-    if (!netlist.is_memory(instance)) add(instance, framebuffer);
+    if (!Netlist::is_memory(instance)) add(instance, framebuffer);
   }
   connect_units(netlist, request.observers.get(), [&](const std::string& path) { return find(path); });
   add_memories();
@@ -100,7 +100,7 @@ void Gpu::add_memories() {
     std::vector<std::string> bound = netlist.bound_to(path);
     const auto is_unused = [&](const std::string& from) {
       const Instance* const above = netlist.find(from);
-      return above != nullptr && netlist.is_memory(*above) && std::find(used.begin(), used.end(), from) == used.end();
+      return above != nullptr && Netlist::is_memory(*above) && std::find(used.begin(), used.end(), from) == used.end();
     };
     bound.erase(std::remove_if(bound.begin(), bound.end(), is_unused), bound.end());
     return bound;

@@ -107,6 +107,45 @@ TEST(ForeignMemory, TakesThePlaceOfTheL2ThoughItsRefreshNeverEnds) {
   }
 }
 
+// An L2 of 64 lines, so that it reads again what it had, and writes back.
+TEST(ForeignMemory, LiesBelowAnL2ThatMisses) {
+  const Draw draw = testing::random_draw(96, 96, 600, 21);
+  Counts dram;
+  Platform platform = with_memory_below(
+      [&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
+  platform.wire = [wire = platform.wire](Netlist& netlist) {
+    wire(netlist);
+    netlist.replace("l2", "sectored-cache");
+  };
+  for (const char* variant : {"baseline", "het+qm"}) {
+    const RunResult expected = run(request_of(variant, Fidelity::functional, strictly), draw);
+    for (const Fidelity fidelity : with_time) {
+      const std::string what = std::string(variant) + " " + name_of(fidelity);
+      const RunResult result = run(request_of(variant, fidelity,
+                                              [&](RunRequest& r) {
+                                                strictly(r);
+                                                r.platform = &platform;
+                                                r.settings = {{"crop", "cache_bytes", "2048"},
+                                                              {"l2", "bytes", "8192"},
+                                                              {"l2", "ways", "4"},
+                                                              {"l2", "banks", "4"}};
+                                              }),
+                                   draw);
+      EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color)) << what;
+      EXPECT_EQ(result.counts.named(), expected.counts.named()) << what;
+      EXPECT_EQ(dram.responses, dram.requests) << what;
+      EXPECT_EQ(dram.out_of_order > 0, fidelity == Fidelity::cycle) << what;
+      EXPECT_GT(statistic(result, "l2.cache.sector_misses_capacity"), 1000U) << what;
+      EXPECT_GT(statistic(result, "l2.cache.bytes_written_back"), 32000U) << what;
+      // A line at most in a request, and a sector at least.
+      const std::uint64_t bytes =
+          statistic(result, "l2.cache.bytes_filled") + statistic(result, "l2.cache.bytes_written_back");
+      EXPECT_LE(dram.requests, bytes / 32) << what;
+      EXPECT_GE(dram.requests, bytes / 128) << what;
+    }
+  }
+}
+
 TEST(ForeignMemory, BelowTheL2DelaysARunAndChangesNothingElse) {
   const Draw draw = testing::random_draw(96, 96, 600, 21);
   Counts dram;
