@@ -72,7 +72,9 @@ std::function<bool(Burst&)> random_traffic(const DramParameters& p, std::uint64_
   const std::uint32_t gap = choose(5, {1, 1, 4, 16, 300});
   auto state = std::make_shared<std::pair<std::uint64_t, Cycle>>(mix(seed), 0);
   return [=](Burst& burst) {
-    auto& [random, from] = *state;
+    // Bindings are nothing that a lambda can capture in C++17.
+    std::uint64_t& random = state->first;
+    Cycle& from = state->second;
     const auto draw = [&random](std::uint32_t below) {
       random = mix(random);
       return static_cast<std::uint32_t>(random >> 33U) % below;
