@@ -157,16 +157,14 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
                                                public EarlyCompletionMemory,
                                                public ClockedFills::Port {
  public:
-  MemoryTarget(unsigned index, FixedLatencyMemory& memory)
-      : socket(("port_" + std::to_string(index)).c_str()),
-        memory_(memory),
-        index_(index),
-        bandwidth_(memory.bytes_per_cycle_) {
+  MemoryTarget(unsigned index, FixedLatencyMemory& memory, unsigned bytes_per_cycle)
+      : socket(("port_" + std::to_string(index)).c_str()), memory_(memory), index_(index), bandwidth_(bytes_per_cycle) {
     socket.bind(*this);
     if (memory_.clocked_ != nullptr) memory_.clocked_->attach(*this);
   }
   tlm::tlm_target_socket<32, tlm::tlm_base_protocol_types, 1, sc_core::SC_ZERO_OR_MORE_BOUND> socket;
 
+  unsigned bytes_per_cycle() const { return bandwidth_.bytes_per_cycle(); }
   std::uint64_t bytes_before(Cycle end) const {
     return end == never ? bytes_ : bytes_ - std::min(bytes_, bandwidth_.reserved_from(end));
   }
@@ -247,14 +245,17 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
 FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain,
                                        unsigned latency_cycles, unsigned bytes_per_cycle, unsigned ports,
                                        MemoryBelow below)
-    : sc_module(name),
-      domain_(domain),
-      latency_cycles_(latency_cycles),
-      bytes_per_cycle_(bytes_per_cycle),
-      traffic_(*this) {
+    : FixedLatencyMemory(name, domain, latency_cycles, std::vector<unsigned>(ports, bytes_per_cycle), below) {}
+
+FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain,
+                                       unsigned latency_cycles, const std::vector<unsigned>& bytes_per_cycle,
+                                       MemoryBelow below)
+    : sc_module(name), domain_(domain), latency_cycles_(latency_cycles), traffic_(*this) {
   if (below == MemoryBelow::annotated) annotated_ = std::make_unique<AnnotatedFills>(domain, cache_);
   if (below == MemoryBelow::clocked) clocked_ = std::make_unique<ClockedFills>(domain, cache_);
-  for (unsigned index = 0; index < ports; ++index) ports_.push_back(std::make_unique<MemoryTarget>(index, *this));
+  for (const unsigned bytes : bytes_per_cycle) {
+    ports_.push_back(std::make_unique<MemoryTarget>(static_cast<unsigned>(ports_.size()), *this, bytes));
+  }
 }
 
 FixedLatencyMemory::~FixedLatencyMemory() = default;
@@ -274,7 +275,9 @@ std::uint64_t FixedLatencyMemory::bytes(Cycle end) const {
 }
 
 double FixedLatencyMemory::peak_rate() const {
-  return static_cast<double>(bytes_per_cycle_) * static_cast<double>(ports_.size());
+  double sum = 0;
+  for (const auto& port : ports_) sum += port->bytes_per_cycle();
+  return sum;
 }
 
 std::unique_ptr<FixedLatencyMemory> stub_unbound(tlm::tlm_initiator_socket<32>& socket, ClockDomain& domain) {

@@ -36,21 +36,22 @@ class DramUnit final : public MemoryUnit {
 };
 
 [[maybe_unused]] const bool registered = [] {
-  register_memory_unit_maker("dram",
-                             [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                const MemoryPlace& place) -> std::unique_ptr<MemoryUnit> {
-                               if (place.has_below) {
-                                 throw UserError("cannot connect memory", name, "nothing lies below a DRAM",
-                                                 "connect its memory port to nothing");
-                               }
-                               auto dram = behaviour_as<Dram>(std::move(behaviour));
-                               if (place.is_clocked) {
-                                 return std::make_unique<DramUnit<ClockedDram>>(name, domain, std::move(dram),
-                                                                                place.ports);
-                               }
-                               return std::make_unique<DramUnit<AnnotatedDram>>(name, domain, std::move(dram),
-                                                                                place.ports);
-                             });
+  register_memory_unit_maker(
+      "dram",
+      [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+         const MemoryPlace& place) -> std::unique_ptr<MemoryUnit> {
+        if (place.has_below) {
+          throw UserError("cannot connect memory", name, "nothing lies below a DRAM",
+                          "connect its memory port to nothing");
+        }
+        auto dram = behaviour_as<Dram>(std::move(behaviour));
+        if (place.is_clocked) {
+          return std::make_unique<DramUnit<ClockedDram>>(name, domain, std::move(dram),
+                                                         static_cast<unsigned>(place.ports.size()));
+        }
+        return std::make_unique<DramUnit<AnnotatedDram>>(name, domain, std::move(dram),
+                                                         static_cast<unsigned>(place.ports.size()));
+      });
   return true;
 }();
 

@@ -7,15 +7,16 @@ namespace vrpipe {
 /// A port of the crossbar.
 class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCompletionMemory {
  public:
-  Port(unsigned index, AnnotatedL2& l2)
+  Port(unsigned index, AnnotatedL2& l2, unsigned bytes_per_cycle)
       : socket(("port_" + std::to_string(index)).c_str()),
         l2_(l2),
-        requests_(l2.sizes_.bytes_per_cycle),
-        responses_(l2.sizes_.bytes_per_cycle) {
+        requests_(bytes_per_cycle),
+        responses_(bytes_per_cycle) {
     socket.bind(*this);
   }
   tlm::tlm_target_socket<32, tlm::tlm_base_protocol_types, 1, sc_core::SC_ZERO_OR_MORE_BOUND> socket;
 
+  std::uint64_t bytes_per_cycle() const { return requests_.bytes_per_cycle(); }
   std::uint64_t bytes_in(Cycle end) const { return bytes_in_ - std::min(bytes_in_, requests_.reserved_from(end)); }
   std::uint64_t bytes_out(Cycle end) const { return bytes_out_ - std::min(bytes_out_, responses_.reserved_from(end)); }
 
@@ -65,7 +66,7 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
 };
 
 AnnotatedL2::AnnotatedL2(const sc_core::sc_module_name& name, ClockDomain& domain,
-                         std::unique_ptr<SectoredL2> behaviour, unsigned ports)
+                         std::unique_ptr<SectoredL2> behaviour, const std::vector<unsigned>& ports)
     : sc_module(name),
       PortOwner({&domain, 0}),
       behaviour_(std::move(behaviour)),
@@ -75,7 +76,9 @@ AnnotatedL2::AnnotatedL2(const sc_core::sc_module_name& name, ClockDomain& domai
       banks_(sizes_.banks, BandwidthReservation(sizes_.bank_bytes_per_cycle)),
       bank_bytes_(sizes_.banks),
       fills_(std::size_t{cache_.organization().lines()} * cache_.organization().sectors_of_a_line()) {
-  for (unsigned index = 0; index < ports; ++index) ports_.push_back(std::make_unique<Port>(index, *this));
+  for (const unsigned bytes : ports) {
+    ports_.push_back(std::make_unique<Port>(static_cast<unsigned>(ports_.size()), *this, bytes));
+  }
 }
 
 AnnotatedL2::~AnnotatedL2() = default;
@@ -128,7 +131,9 @@ Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& fr
 std::vector<OccupancyPart> AnnotatedL2::parts(Cycle end) const {
   std::uint64_t in = 0;
   std::uint64_t out = 0;
+  double width = 0;
   for (const auto& port : ports_) {
+    width += static_cast<double>(port->bytes_per_cycle());
     in += port->bytes_in(end);
     out += port->bytes_out(end);
   }
@@ -136,7 +141,6 @@ std::vector<OccupancyPart> AnnotatedL2::parts(Cycle end) const {
   for (std::size_t bank = 0; bank < banks_.size(); ++bank) {
     banks += bank_bytes_[bank] - std::min(bank_bytes_[bank], banks_[bank].reserved_from(end));
   }
-  const double width = static_cast<double>(sizes_.bytes_per_cycle) * static_cast<double>(ports_.size());
   const double of_banks = static_cast<double>(sizes_.bank_bytes_per_cycle) * sizes_.banks;
   return {{"responses", 1, static_cast<double>(out) / width, true},
           {"requests", 2, static_cast<double>(in) / width, false},

@@ -19,7 +19,7 @@ namespace vrpipe {
 class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private PortOwner {
  public:
   AnnotatedL2(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SectoredL2> behaviour,
-              unsigned ports);
+              const std::vector<unsigned>& ports);
   ~AnnotatedL2() override;
 
   tlm::tlm_base_target_socket_b<32>& target(unsigned index) override;

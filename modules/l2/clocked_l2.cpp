@@ -17,12 +17,13 @@ std::vector<WorkKind> kinds_of(const SectoredL2::Sizes& sizes) { return {{"banks
 /// A port of the crossbar.
 class ClockedL2::Port final : public tlm::tlm_fw_transport_if<> {
  public:
-  Port(unsigned index, ClockedL2& l2)
+  Port(unsigned index, ClockedL2& l2, unsigned bytes_per_cycle)
       : socket(("port_" + std::to_string(index)).c_str()),
         l2_(l2),
         index_(index),
+        bytes_per_cycle_(bytes_per_cycle),
         free_(l2.sizes_.port_requests),
-        responses_(l2.sizes_.bytes_per_cycle) {
+        responses_(bytes_per_cycle) {
     socket.bind(*this);
   }
   tlm::tlm_target_socket<32, tlm::tlm_base_protocol_types, 1, sc_core::SC_ZERO_OR_MORE_BOUND> socket;
@@ -46,10 +47,10 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<> {
   }
 
   /// Whether the way in has room for another request in this cycle.
-  bool can_send(Cycle now) const { return sent_ < (now + 1) * l2_.sizes_.bytes_per_cycle; }
+  bool can_send(Cycle now) const { return sent_ < (now + 1) * bytes_per_cycle_; }
   /// A bank takes one.
   void send(std::uint32_t bytes, Cycle now) {
-    sent_ = std::max(sent_, now * l2_.sizes_.bytes_per_cycle) + bytes;
+    sent_ = std::max(sent_, now * bytes_per_cycle_) + bytes;
     bytes_in_ += bytes;
     // Seen from the next cycle on, so that it does not matter who ticks first.
     if (freed_in_ != now) give_back(now);
@@ -61,9 +62,10 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<> {
     bytes_out_ += bytes;
     return responses_.take(from, bytes, now);
   }
+  std::uint64_t bytes_per_cycle() const { return bytes_per_cycle_; }
   /// Before a cycle.
   std::uint64_t bytes_in(Cycle end) const {
-    const std::uint64_t at_end = end * l2_.sizes_.bytes_per_cycle;
+    const std::uint64_t at_end = end * bytes_per_cycle_;
     return bytes_in_ - std::min(bytes_in_, sent_ - std::min(sent_, at_end));
   }
   std::uint64_t bytes_out(Cycle end) const { return bytes_out_ - std::min(bytes_out_, responses_.reserved_from(end)); }
@@ -142,13 +144,14 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<> {
 
   ClockedL2& l2_;
   const std::uint32_t index_;
+  const std::uint64_t bytes_per_cycle_;
   std::uint32_t free_;  ///< places for requests
   std::uint32_t freed_ = 0;
   Cycle freed_in_ = 0;
   tlm::tlm_generic_payload* held_back_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
   Cycle held_back_arrival_ = 0;
   Ring<Arrival> arrived_;
-  std::uint64_t sent_ = 0;  ///< to the banks; the way in is taken up to this byte, bytes_per_cycle for each cycle
+  std::uint64_t sent_ = 0;  ///< to the banks; the way in is taken up to this byte, bytes_per_cycle_ for each cycle
   std::uint64_t bytes_in_ = 0;
   BandwidthReservation responses_;
   std::uint64_t bytes_out_ = 0;
@@ -157,7 +160,7 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<> {
 };
 
 ClockedL2::ClockedL2(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SectoredL2> behaviour,
-                     unsigned ports)
+                     const std::vector<unsigned>& ports)
     : sc_module(name),
       PortOwner({&domain, domain.attach(*this)}),
       behaviour_(std::move(behaviour)),
@@ -168,8 +171,10 @@ ClockedL2::ClockedL2(const sc_core::sc_module_name& name, ClockDomain& domain, s
       banks_(sizes_.banks),
       queues_(sizes_.banks),
       waiting_(cache_.organization().lines(), nobody) {
-  for (unsigned index = 0; index < ports; ++index) ports_.push_back(std::make_unique<Port>(index, *this));
-  for (auto& of_bank : queues_) of_bank.resize(ports);
+  for (const unsigned bytes : ports) {
+    ports_.push_back(std::make_unique<Port>(static_cast<unsigned>(ports_.size()), *this, bytes));
+  }
+  for (auto& of_bank : queues_) of_bank.resize(ports.size());
 }
 
 ClockedL2::~ClockedL2() = default;
@@ -407,11 +412,12 @@ void ClockedL2::answer(std::uint32_t request, Cycle at) {
 std::vector<OccupancyPart> ClockedL2::parts(Cycle end) const {
   std::uint64_t in = 0;
   std::uint64_t out = 0;
+  double width = 0;
   for (const auto& port : ports_) {
+    width += static_cast<double>(port->bytes_per_cycle());
     in += port->bytes_in(end);
     out += port->bytes_out(end);
   }
-  const double width = static_cast<double>(sizes_.bytes_per_cycle) * static_cast<double>(ports_.size());
   std::vector<OccupancyPart> parts = {{"responses", 1, static_cast<double>(out) / width, true},
                                       {"requests", 2, static_cast<double>(in) / width, false}};
   for (const OccupancyPart& banks : occupancy_.parts(end)) parts.push_back(banks);

@@ -26,8 +26,9 @@ namespace vrpipe {
 /// latency; a fill leaves at t + 1.
 class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Clocked, private PortOwner {
  public:
+  /// @param ports  bytes a cycle of each
   ClockedL2(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SectoredL2> behaviour,
-            unsigned ports);
+            const std::vector<unsigned>& ports);
   ~ClockedL2() override;
 
   tlm::tlm_base_target_socket_b<32>& target(unsigned index) override;

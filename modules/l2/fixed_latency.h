@@ -37,8 +37,8 @@ class FixedLatencyUnit final : public MemoryUnit {
   FixedLatencyUnit(const std::string& name, ClockDomain& domain, std::unique_ptr<FixedLatency> behaviour,
                    const MemoryPlace& place)
       : behaviour_(std::move(behaviour)),
-        memory_(name.c_str(), domain, behaviour_->timing().latency_cycles, behaviour_->timing().bytes_per_cycle,
-                place.ports, below_of(place)) {}
+        memory_(name.c_str(), domain, behaviour_->timing().latency_cycles,
+                place.port_bytes(behaviour_->timing().bytes_per_cycle), below_of(place)) {}
 
   tlm::tlm_base_target_socket_b<32>& target(unsigned index) override { return memory_.port(index); }
   tlm::tlm_initiator_socket<32>* below() override { return &memory_.below(); }

@@ -41,8 +41,9 @@ std::unique_ptr<MemoryUnit> make(const std::string& name, ClockDomain& domain, s
     throw SimulationFault(name, 0, "there is no timing model for a functional model of its kind");
   }
   std::unique_ptr<SectoredL2> l2(sectored);
-  if (place.is_clocked) return std::make_unique<ClockedL2>(name.c_str(), domain, std::move(l2), place.ports);
-  return std::make_unique<AnnotatedL2>(name.c_str(), domain, std::move(l2), place.ports);
+  const std::vector<unsigned> ports = place.port_bytes(l2->sizes().bytes_per_cycle);
+  if (place.is_clocked) return std::make_unique<ClockedL2>(name.c_str(), domain, std::move(l2), ports);
+  return std::make_unique<AnnotatedL2>(name.c_str(), domain, std::move(l2), ports);
 }
 
 [[maybe_unused]] const bool registered = [] {

@@ -59,6 +59,7 @@ SplatShader::SplatShader(const Parameters& parameters, const RenderContext& cont
   timing_.warps_to_one_core = parameters.warps_to_one_core;
   AttributeFetch& fetch = timing_.fetch;
   fetch.attribute_bytes = parameters.attribute_bytes;
+  fetch.core_bytes = parameters.memory_bytes_per_cycle;
   fetch.buffer_bytes = parameters.attribute_buffer_bytes;
   fetch.attribute_writes = parameters.attribute_writes;
   fetch.l1_latency_cycles = parameters.l1_latency_cycles;

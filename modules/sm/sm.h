@@ -83,6 +83,14 @@ class SplatShader : public SmBehaviour {
                              640,          1,
                              65536,        "accesses",
                              source::open, "of attributes in flight; enough for what draw issues at the latency of L2"};
+    Integer memory_bytes_per_cycle{*this,
+                                   "memory_bytes_per_cycle",
+                                   32,
+                                   32,
+                                   1024,
+                                   "bytes",
+                                   "Accel-Sim, SM87_ORIN: flits of 40 bytes carry 32, for each cluster",
+                                   "that the memory port has in each direction for each core"};
     Integer l1_bytes{*this,
                      "l1_bytes",
                      49152,

@@ -121,6 +121,7 @@ class SmUnit : public Unit {
   }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket(); }
+  unsigned memory_bytes_per_cycle() const override { return timing_.cores * timing_.fetch.core_bytes; }
   bool memory_is_optional() const override { return true; }
   MemoryBytes memory_bytes() const override { return memory_.moved(); }
 

@@ -22,6 +22,7 @@ Platform agx_orin_lpddr3() {
   platform.wire = [](Netlist& netlist) {
     wire_pipeline(netlist);
     wire_dram(netlist, "lpddr3-1600");
+    connect_attribute_traffic(netlist);
   };
   return platform;
 }
@@ -35,6 +36,7 @@ Platform agx_orin_lpddr5() {
   platform.wire = [](Netlist& netlist) {
     wire_pipeline(netlist);
     wire_dram(netlist, "lpddr5-6400");
+    connect_attribute_traffic(netlist);
   };
   return platform;
 }

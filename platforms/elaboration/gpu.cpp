@@ -107,21 +107,25 @@ void Gpu::add_memories() {
   };
   for (const std::string& path : used) {
     std::vector<std::string> bound = bound_to(path);
-    const auto ports = static_cast<unsigned>(bound.size());
     const Instance* const instance = netlist.find(path);
+    std::vector<unsigned> ports;
+    for (const std::string& from : bound) {
+      const Unit* const unit = find(from);
+      ports.push_back(unit == nullptr ? 0 : unit->memory_bytes_per_cycle());
+    }
     made.push_back({path, std::move(bound), {}});
     if (instance != nullptr) {
       made.back().sockets = make_memory(*instance, ports);
       continue;
     }
     for (const ForeignInstance& foreign : netlist.foreign_memories()) {
-      if (foreign.path == path) made.back().sockets = make_foreign(foreign, ports);
+      if (foreign.path == path) made.back().sockets = make_foreign(foreign, static_cast<unsigned>(ports.size()));
     }
   }
   for (const Made& each : made) bind_memory(each.path, each.bound, each.sockets);
 }
 
-Gpu::TargetSockets Gpu::make_memory(const Instance& instance, unsigned ports) {
+Gpu::TargetSockets Gpu::make_memory(const Instance& instance, const std::vector<unsigned>& ports) {
   const std::vector<MemoryLink>& links = configuration_.netlist().memory_links();
   const bool has_below =
       std::any_of(links.begin(), links.end(), [&](const MemoryLink& link) { return link.from == instance.path; });
@@ -131,7 +135,7 @@ Gpu::TargetSockets Gpu::make_memory(const Instance& instance, unsigned ports) {
   memories_.push_back(
       {&instance, memory_unit_maker(instance.slot)(instance.path, *clock_, std::move(behaviour), place)});
   TargetSockets sockets;
-  for (unsigned index = 0; index < ports; ++index) sockets.push_back(&memories_.back().memory->target(index));
+  for (unsigned index = 0; index < ports.size(); ++index) sockets.push_back(&memories_.back().memory->target(index));
   return sockets;
 }
 

@@ -140,7 +140,7 @@ std::vector<StatisticReport> list_statistics(const ParameterListing& listing) {
       collector.add(listing.unit, "functional", make()->unit());
       if (Registry::instance().slot(listing.unit).is_memory) {
         for (const bool is_clocked : {false, true}) {
-          const auto memory = memory_unit_maker(listing.unit)("memory", clock, make(), {1, false, is_clocked});
+          const auto memory = memory_unit_maker(listing.unit)("memory", clock, make(), {{0}, false, is_clocked});
           collector.add(listing.unit, is_clocked ? "cycle" : "timed", memory->statistics());
         }
       } else {

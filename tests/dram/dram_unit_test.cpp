@@ -328,7 +328,7 @@ TEST(DramUnit, IsMadeByItsSlot) {
   EXPECT_EQ(dynamic_cast<Dram&>(memory).traffic().bytes(MemoryTraffic::depth_stencil, true), 32U);
   EXPECT_EQ(memory.delivered().written, 32U);
   EXPECT_EQ(memory.delivered().read, 0U);
-  EXPECT_THROW(memory_unit_maker("dram")("below", *bench.clock, std::move(behaviour), {1, true, true}), UserError);
+  EXPECT_THROW(memory_unit_maker("dram")("below", *bench.clock, std::move(behaviour), {{0}, true, true}), UserError);
 }
 
 }  // namespace

@@ -51,10 +51,11 @@ class L2Test : public ::testing::Test {
   void make(Time time, unsigned ports = 1) {
     auto behaviour = std::make_unique<SectoredL2>(parameters, RenderContext());
     model = behaviour.get();
+    const std::vector<unsigned> port_bytes(ports, port_width * behaviour->sizes().bytes_per_cycle);
     if (time == Time::clocked) {
-      l2 = std::make_unique<ClockedL2>("l2", *clock, std::move(behaviour), ports);
+      l2 = std::make_unique<ClockedL2>("l2", *clock, std::move(behaviour), port_bytes);
     } else {
-      l2 = std::make_unique<AnnotatedL2>("l2", *clock, std::move(behaviour), ports);
+      l2 = std::make_unique<AnnotatedL2>("l2", *clock, std::move(behaviour), port_bytes);
     }
     below = std::make_unique<FixedLatencyMemory>("below", *clock, 40, 16, 1);
     l2->below()->bind(below->port(0));
@@ -91,6 +92,7 @@ class L2Test : public ::testing::Test {
   }
   std::uint64_t bytes_below(bool written) const { return below->traffic().bytes(MemoryTraffic::color, written); }
 
+  unsigned port_width = 1;  ///< in ports of the crossbar
   std::unique_ptr<ClockDomain> clock;
   SectoredL2Parameters parameters;
   std::unique_ptr<FixedLatencyMemory> below;
@@ -162,6 +164,13 @@ TEST_P(L2AtEachFidelity, APortPassesItsBytesACycle) {
   const std::vector<Cycle> completed = run(GetParam(), {write(10, 0), write(20, line), read(200, 0), read(200, line)});
   EXPECT_EQ(completed[2], 200 + hit);
   EXPECT_EQ(completed[3], 200 + hit + 1);
+}
+
+TEST_P(L2AtEachFidelity, AWiderPortPassesMore) {
+  port_width = 2;
+  const std::vector<Cycle> completed = run(GetParam(), {write(10, 0), write(20, line), read(200, 0), read(200, line)});
+  EXPECT_EQ(completed[2], 200 + hit);
+  EXPECT_EQ(completed[3], 200 + hit);
 }
 
 // Its parts go to their banks on their own; it is answered with the last.

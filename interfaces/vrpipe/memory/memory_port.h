@@ -169,6 +169,9 @@ class FixedLatencyMemory : public sc_core::sc_module, public StatisticSet {
   /// @param domain  outlives it
   FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned latency_cycles,
                      unsigned bytes_per_cycle, unsigned ports, MemoryBelow below = MemoryBelow::none);
+  /// @param bytes_per_cycle  of each port
+  FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned latency_cycles,
+                     const std::vector<unsigned>& bytes_per_cycle, MemoryBelow below = MemoryBelow::none);
   ~FixedLatencyMemory() override;
   /// Each port is for one initiator.
   tlm::tlm_base_target_socket_b<32>& port(unsigned index);
@@ -187,7 +190,6 @@ class FixedLatencyMemory : public sc_core::sc_module, public StatisticSet {
   class MemoryTarget;
   const ClockDomain& domain_;
   unsigned latency_cycles_;
-  unsigned bytes_per_cycle_;
   MemoryTrafficCounters traffic_;
   CompulsoryMissStatistics cache_{*this, "cache"};
   std::unique_ptr<AnnotatedFills> annotated_;  ///< of MemoryBelow::annotated

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
@@ -37,9 +38,18 @@ class MemoryUnit {
 
 /// Where a memory stands in its platform.
 struct MemoryPlace {
-  unsigned ports;   ///< memory ports that are bound to it
+  /// Of each memory port that is bound to it: bytes that it moves in a cycle, in each direction; 0 leaves that to the
+  /// memory.
+  std::vector<unsigned> ports;
   bool has_below;   ///< there is a memory below it
   bool is_clocked;  ///< `cycle`; at `lt` and `at` its time is annotated
+
+  /// The same, with what a memory gives to a port.
+  std::vector<unsigned> port_bytes(unsigned own) const {
+    std::vector<unsigned> bytes = ports;
+    std::replace(bytes.begin(), bytes.end(), 0U, own);
+    return bytes;
+  }
 };
 /// Makes the timing model of a slot around a functional model. Throws UserError for a place that it cannot take.
 using MemoryUnitMaker =

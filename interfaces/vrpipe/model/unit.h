@@ -46,6 +46,8 @@ class Unit : public Clocked, public sc_core::sc_module, public Component {
   virtual tlm::tlm_initiator_socket<32>* memory_socket() { return nullptr; }
   /// What it has asked for there.
   virtual MemoryBytes memory_bytes() const { return {}; }
+  /// That the port moves at most, in each direction; 0 leaves that to the memory.
+  virtual unsigned memory_bytes_per_cycle() const { return 0; }
   /// Whether that port may stay unconnected: then the unit knows what its accesses take.
   virtual bool memory_is_optional() const { return false; }
   /// Whether the draw is done when this unit, with others of the kind, is done: those at the end of the pipeline.

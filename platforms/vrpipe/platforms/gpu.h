@@ -51,7 +51,8 @@ class Gpu {
   void add(const Instance& instance, Framebuffer& framebuffer);
   using TargetSockets = std::vector<tlm::tlm_base_target_socket_b<32>*>;
   void add_memories();
-  TargetSockets make_memory(const Instance& instance, unsigned ports);
+  /// @param ports  as MemoryPlace has them
+  TargetSockets make_memory(const Instance& instance, const std::vector<unsigned>& ports);
   TargetSockets make_foreign(const ForeignInstance& foreign, unsigned ports);
   void bind_memory(const std::string& path, const std::vector<std::string>& bound, const TargetSockets& sockets);
   void check() const;
