@@ -124,6 +124,7 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<> {
       if (free_ == 0) {
         held_back_ = &payload;
         held_back_arrival_ = arrival;
+        if (freed_ > 0) l2_.clock.domain->wake(l2_.clock.unit, now + 1);
         return tlm::TLM_ACCEPTED;
       }
       admit(payload, arrival);

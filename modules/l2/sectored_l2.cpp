@@ -34,8 +34,9 @@ CacheOrganization checked(const SectoredL2Parameters& parameters) {
 
 }  // namespace
 
-SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderContext&)
+SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderContext& context)
     : sizes_(sizes_of(parameters)),
+      gpcs_(context.placement.gpcs),
       of_traffic_{{{{*this, "other_sectors", "sectors", "accessed by initiators that do not say what for"},
                     {*this, "other_sector_misses", "sectors", "missed by these"}},
                    {{*this, "color_sectors", "sectors", "accessed of the colour target"},
@@ -64,13 +65,17 @@ void SectoredL2::access(const MemoryRequest& request) {
     if (done.replaced) origins_[done.line] = request.origin;
     for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, request.origin, below);
     const auto moved = static_cast<unsigned>(__builtin_popcount(done.filled) + __builtin_popcount(done.written_back));
+    if (!is_for_quads(request)) return;
     count_bank(bank_of(address), bytes + std::uint64_t{moved} * cache_.organization().sector_bytes);
   });
 }
 
 std::vector<OccupancyPart> SectoredL2::least_occupancy(double /*period_ps*/) const {
   const std::uint64_t busiest = *std::max_element(bank_cycles_.begin(), bank_cycles_.end());
-  return {{"banks", 0, static_cast<double>(busiest), true}};
+  // The last that CROP writes back may wait at its port.
+  const std::uint64_t waiting =
+      std::uint64_t{sizes_.port_requests} * bank_cycles(cache_.organization().line_bytes) * gpcs_;
+  return {{"banks", 0, static_cast<double>(busiest - std::min(busiest, waiting)), true}};
 }
 
 }  // namespace vrpipe

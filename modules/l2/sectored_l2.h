@@ -157,6 +157,7 @@ class SectoredL2 final : public MemoryBehaviour {
   };
 
   const Sizes sizes_;
+  const unsigned gpcs_;
   MemoryTrafficCounters traffic_{*this};
   std::array<OfTraffic, memory_traffics> of_traffic_;
   SectoredCacheStatistics statistics_{*this, "cache"};

@@ -40,6 +40,7 @@ void Work::add(const Work& other) {
   updates += other.updates;
   survivors += other.survivors;
   vertex_warps += other.vertex_warps;
+  attribute_bytes_written += other.attribute_bytes_written;
   warps += other.warps;
   merging_warps += other.merging_warps;
   color_quads += other.color_quads;
@@ -84,7 +85,11 @@ double PhaseBound::instructions(const Work& done) const {
 std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, bool to_last) const {
   std::array<double, stages> cycles{};
   cycles[draw] = spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_, to_last);
-  cycles[vpo] = ratio(done.triangles, vpo_.items_per_cycle);
+  // Vertices are assembled once their attributes are sent; so many of these may still be on their way.
+  const std::uint64_t sent = std::uint64_t{sm_.fetch.attribute_writes} * crop_.line_bytes;
+  cycles[vpo] = std::max(ratio(done.triangles, vpo_.items_per_cycle),
+                         ratio(done.attribute_bytes_written - std::min(done.attribute_bytes_written, sent),
+                               std::uint64_t{sm_.cores} * sm_.fetch.core_bytes));
   cycles[tgc] = std::max(ratio(done.bin_entries, tgc_.items_per_cycle), ratio(done.setups, 1));
   cycles[raster] = std::max({spaced(done.setups, raster_.setup_interval_cycles, to_last),
                              ratio(done.coarse_tiles, raster_.coarse_tiles_per_cycle),

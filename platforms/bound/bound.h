@@ -14,6 +14,7 @@ namespace vrpipe {
 struct FrontEndWork {
   std::uint64_t vertex_warps_issued = 0;
   std::uint64_t vertex_warps = 0;  ///< shaded
+  std::uint64_t attribute_bytes_written = 0;
   std::uint64_t triangles = 0;
   std::uint64_t bin_entries = 0;
   std::uint64_t setups = 0;

@@ -181,6 +181,9 @@ WorkCounter::~WorkCounter() = default;
 void WorkCounter::count_front_end(FrontEndWork& work) const {
   work.vertex_warps_issued = items(draw_, DrawWork::warps) - before_.vertex_warps_issued;
   work.vertex_warps = items(sm_, SmWork::vertex) - before_.vertex_warps;
+  if (sm_ != nullptr && sm_->memory_port() != nullptr) {
+    work.attribute_bytes_written = sm_->memory_port()->moved().written - before_.attribute_bytes_written;
+  }
   work.triangles = items(vpo_, VpoWork::triangles) - before_.triangles;
   work.bin_entries = items(tgc_, TgcWork::entries) - before_.bin_entries;
   work.setups = items(raster_, RasterWork::setup) - before_.setups;

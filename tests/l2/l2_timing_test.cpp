@@ -70,6 +70,7 @@ class L2Test : public ::testing::Test {
             std::make_unique<ClockedInitiator>(("unit_" + std::to_string(port)).c_str(), *clock, accesses[port]));
         units.back()->memory.socket.bind(l2->target(static_cast<unsigned>(port)));
       }
+      if (!tick_order.empty()) clock->set_tick_order(tick_order);
       while (!clock->run_to_rest(sc_core::sc_time(1, sc_core::SC_US))) {}
       for (const auto& unit : units) completed.push_back(unit->completed);
       return completed;
@@ -92,7 +93,8 @@ class L2Test : public ::testing::Test {
   }
   std::uint64_t bytes_below(bool written) const { return below->traffic().bytes(MemoryTraffic::color, written); }
 
-  unsigned port_width = 1;  ///< in ports of the crossbar
+  std::vector<unsigned> tick_order;  ///< of the L2 and its initiators; as they were made if empty
+  unsigned port_width = 1;           ///< in ports of the crossbar
   std::unique_ptr<ClockDomain> clock;
   SectoredL2Parameters parameters;
   std::unique_ptr<FixedLatencyMemory> below;
@@ -217,6 +219,18 @@ TEST_F(L2Test, AFullPortHoldsRequestsBack) {
   EXPECT_EQ(units[0]->issued[0], 100U);
   EXPECT_GT(units[0]->issued[2], 101U);
   EXPECT_GT(units[0]->issued[3], 100 + fill);
+}
+
+// The first leaves its place in cycle 101, in which the second comes, before or after.
+TEST_F(L2Test, APlaceIsFreeFromTheNextCycleOnWhoeverTicksFirst) {
+  for (const std::vector<unsigned>& order : {std::vector<unsigned>{0, 1}, std::vector<unsigned>{1, 0}}) {
+    start();
+    set("port_requests", "1");
+    tick_order = order;
+    const std::vector<Cycle> completed = run(Time::clocked, {read(100, 0), read(101, line)});
+    EXPECT_EQ(completed[0], 100 + miss);
+    EXPECT_EQ(completed[1], 102 + miss);
+  }
 }
 
 TEST_F(L2Test, TheOldestRequestOrTheNextPortGoesFirst) {

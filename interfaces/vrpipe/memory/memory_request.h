@@ -29,6 +29,13 @@ struct MemoryRequest {
   MemoryOrigin origin;
 };
 
+/// Whether some quad may have to wait for it. Vertices are read, and attributes written, also of what makes no quad any
+/// more; so a frame may end before that is done.
+constexpr bool is_for_quads(const MemoryRequest& request) {
+  return request.origin.traffic != MemoryTraffic::vertex &&
+         (request.origin.traffic != MemoryTraffic::attribute || request.command == tlm::TLM_READ_COMMAND);
+}
+
 /// What a payload of the base protocol has no place for. Ignorable: a memory that does not know it serves the access.
 struct MemoryRequestExtension : tlm::tlm_extension<MemoryRequestExtension> {
   MemoryOrigin origin;
