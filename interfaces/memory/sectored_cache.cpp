@@ -80,8 +80,15 @@ SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evic
     statistics_->most_lines_held.see(++held_);
   } else {
     line = victim(index);
+    if (set.kept != 0 && kept_[line]) {
+      const Line other = victim_not_kept(index);
+      evicted.spared = other != no_line;
+      if (evicted.spared) line = other;
+    }
     const Entry& old = lines_[line];
-    evicted = {old.tag << line_shift_, old.dirty, old.dirty & ~old.present};
+    evicted.address = old.tag << line_shift_;
+    evicted.dirty = old.dirty;
+    evicted.masked = old.dirty & ~old.present;
     ++statistics_->lines_evicted;
     count_written_back(evicted.dirty);
     take_out(line);
@@ -127,7 +134,10 @@ SectoredCache::Line SectoredCache::victim(std::uint32_t set) {
         if (lines_[line].pins == 0 && before-- == 0) return line;
       }
     }
-    case Replacement::tree_plru: return victim_of_tree(set);
+    case Replacement::tree_plru: {
+      const bool all_can = sets_[set].pinned == 0;
+      return victim_of_tree(set, [&](Line line) { return all_can || lines_[line].pins == 0; });
+    }
   }
   return sets_[set].oldest;
 }
@@ -141,26 +151,55 @@ void SectoredCache::point_away(Set& set, Line line) {
   }
 }
 
-SectoredCache::Line SectoredCache::victim_of_tree(std::uint32_t set) const {
-  // Whether a node has a leaf that is not pinned.
-  const auto can_go = [&](std::uint32_t node) {
+template <class CanGo>
+SectoredCache::Line SectoredCache::victim_of_tree(std::uint32_t set, CanGo&& can_go) const {
+  const auto has_one = [&](std::uint32_t node) {
     std::uint32_t end = node + 1;
     for (; node < ways_; node *= 2) end *= 2;
     for (; node < end; ++node) {
-      if (lines_[set * ways_ + node - ways_].pins == 0) return true;
+      if (can_go(set * ways_ + node - ways_)) return true;
     }
     return false;
   };
   std::uint32_t node = 1;
   while (node < ways_) {
     node = 2 * node + (sets_[set].tree >> node & 1U);
-    if (sets_[set].pinned != 0 && !can_go(node)) node ^= 1U;
+    if (!has_one(node)) node ^= 1U;
   }
   return set * ways_ + node - ways_;
 }
 
+SectoredCache::Line SectoredCache::victim_not_kept(std::uint32_t set) const {
+  const auto can_go = [&](Line line) { return lines_[line].pins == 0 && !kept_[line]; };
+  if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) {
+    Line line = sets_[set].oldest;
+    while (line != no_line && !can_go(line)) line = lines_[line].newer;
+    return line;
+  }
+  const Line first = set * ways_;
+  std::uint32_t others = 0;
+  for (Line line = first; line < first + ways_; ++line) others += can_go(line) ? 1U : 0U;
+  if (others == 0) return no_line;
+  if (replacement_ == Replacement::tree_plru) return victim_of_tree(set, can_go);
+  std::uint64_t before = mix(organization_.random_seed + evictions_) % others;
+  for (Line line = first;; ++line) {
+    if (can_go(line) && before-- == 0) return line;
+  }
+}
+
+void SectoredCache::keep(Line line) {
+  if (kept_.empty()) kept_.resize(lines_.size());
+  if (kept_[line]) return;
+  kept_[line] = true;
+  ++sets_[lines_[line].set].kept;
+}
+
 void SectoredCache::take_out(Line line) {
   Entry& entry = lines_[line];
+  if (Set& set = sets_[entry.set]; set.kept != 0 && kept_[line]) {
+    kept_[line] = false;
+    --set.kept;
+  }
   if (replacement_ == Replacement::lru || replacement_ == Replacement::fifo) unlink(sets_[entry.set], line);
   Line* at = &chains_[chain_of(entry.tag)];
   while (*at != line) at = &lines_[*at].next;

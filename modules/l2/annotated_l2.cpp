@@ -100,7 +100,7 @@ Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& fr
                            });
   Fill* const fills = &fills_[std::size_t{done.line} * cache_.organization().sectors_of_a_line()];
   if (done.replaced) {
-    behaviour_->origin(done.line) = access.origin;
+    behaviour_->allocated(done.line, access.origin, done.spared);
     std::fill_n(fills, cache_.organization().sectors_of_a_line(), Fill());
   }
   behaviour_->for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, access.origin,

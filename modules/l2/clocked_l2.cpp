@@ -341,7 +341,7 @@ void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, Cycle now) {
                                ++bank.write_backs;
                                moved += write.bytes;
                              });
-    behaviour_->origin(line) = access.origin;
+    behaviour_->allocated(line, access.origin, evicted.spared);
   }
   cache_.pin(line);
   const std::uint32_t missing =

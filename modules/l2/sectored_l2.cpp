@@ -37,6 +37,7 @@ CacheOrganization checked(const SectoredL2Parameters& parameters) {
 SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderContext& context)
     : sizes_(sizes_of(parameters)),
       gpcs_(context.placement.gpcs),
+      holds_attributes_(parameters.hold_attributes),
       of_traffic_{{{{*this, "other_sectors", "sectors", "accessed by initiators that do not say what for"},
                     {*this, "other_sector_misses", "sectors", "missed by these"}},
                    {{*this, "color_sectors", "sectors", "accessed of the colour target"},
@@ -62,7 +63,7 @@ void SectoredL2::access(const MemoryRequest& request) {
       if (below_ != nullptr) below_->access(moved);
     };
     for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, origins_[done.line], below);
-    if (done.replaced) origins_[done.line] = request.origin;
+    if (done.replaced) allocated(done.line, request.origin, done.spared);
     for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, request.origin, below);
     const auto moved = static_cast<unsigned>(__builtin_popcount(done.filled) + __builtin_popcount(done.written_back));
     if (!is_for_quads(request)) return;

@@ -23,6 +23,8 @@ struct SectoredL2Parameters : ParameterSet {
                         0,
                         source::open,
                         "what a write of a part of a sector does that is not there: has it filled, or marks its bytes"};
+  Switch hold_attributes{*this, "hold_attributes", true, source::paper_text,
+                         "a line of attributes goes only where its set has no other that can"};
   Integer banks{*this,
                 "banks",
                 32,
@@ -112,8 +114,14 @@ class SectoredL2 final : public MemoryBehaviour {
   std::uint32_t bank_cycles(std::uint64_t bytes) const {
     return static_cast<std::uint32_t>((bytes + sizes_.bank_bytes_per_cycle - 1) / sizes_.bank_bytes_per_cycle);
   }
-  /// Whose data a line of the cache holds, set when it is allocated: what is written back has its origin.
-  MemoryOrigin& origin(SectoredCache::Line line) { return origins_[line]; }
+  /// Whose data a line of the cache holds: what is written back has its origin.
+  const MemoryOrigin& origin(SectoredCache::Line line) const { return origins_[line]; }
+  /// A line was allocated for someone; `spared`: another one went instead of one that is kept.
+  void allocated(SectoredCache::Line line, const MemoryOrigin& origin, bool spared) {
+    origins_[line] = origin;
+    if (holds_attributes_ && origin.traffic == MemoryTraffic::attribute) cache_.keep(line);
+    if (spared) ++attribute_lines_held_;
+  }
   /// Of a request in one line.
   std::uint32_t sectors_of(const MemoryRequest& request) const {
     const CacheOrganization& organization = cache_.organization();
@@ -158,8 +166,11 @@ class SectoredL2 final : public MemoryBehaviour {
 
   const Sizes sizes_;
   const unsigned gpcs_;
+  const bool holds_attributes_;
   MemoryTrafficCounters traffic_{*this};
   std::array<OfTraffic, memory_traffics> of_traffic_;
+  Counter attribute_lines_held_{*this, "attribute_lines_held", "lines",
+                                "of attributes that another line went instead of"};
   SectoredCacheStatistics statistics_{*this, "cache"};
   SectoredCache cache_;
   std::vector<MemoryOrigin> origins_;       ///< by line of the cache

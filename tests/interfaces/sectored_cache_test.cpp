@@ -37,6 +37,8 @@ class Reader {
   SectoredCache cache;
 };
 
+constexpr Replacement policies[] = {Replacement::lru, Replacement::fifo, Replacement::random, Replacement::tree_plru};
+
 std::vector<std::uint64_t> rounds_over(std::uint64_t lines, unsigned rounds) {
   std::vector<std::uint64_t> made;
   for (unsigned round = 0; round < rounds; ++round) {
@@ -132,8 +134,7 @@ TEST(SectoredCache, HashedSetsSpreadAPowerOfTwoStride) {
 }
 
 TEST(SectoredCache, APinnedLineStaysAndWithoutOthersNoneCanBeHad) {
-  for (const Replacement replacement :
-       {Replacement::lru, Replacement::fifo, Replacement::random, Replacement::tree_plru}) {
+  for (const Replacement replacement : policies) {
     Counted counted;
     SectoredCache cache(of_lines(4, 2, replacement), counted.statistics);
     SectoredCache::Evicted evicted;
@@ -158,6 +159,62 @@ TEST(SectoredCache, APinnedLineStaysAndWithoutOthersNoneCanBeHad) {
     EXPECT_EQ(cache.find(256), b);
     EXPECT_THROW(cache.invalidate(b), std::logic_error);
   }
+}
+
+TEST(SectoredCache, AStreamPassesByALineThatIsKept) {
+  for (const Replacement replacement : policies) {
+    Reader reader(of_lines(8, 4, replacement));
+    for (const std::uint64_t line : {0U, 2U, 4U}) {
+      reader.misses(line);
+      reader.cache.keep(reader.cache.find(line * 128));
+    }
+    for (std::uint64_t line = 100; line < 200; ++line) EXPECT_TRUE(reader.misses(line));
+    EXPECT_EQ(reader.misses_of({0, 2, 4}), 0U);
+    // The other set keeps nothing: its last four are there. In this one the last of them took the place left.
+    EXPECT_FALSE(reader.misses(199));
+    EXPECT_FALSE(reader.misses(198));
+    EXPECT_TRUE(reader.misses(196));
+  }
+}
+
+TEST(SectoredCache, OfLinesThatAreAllKeptThePolicyChoosesAndWhatComesIsNotKept) {
+  for (const Replacement replacement : policies) {
+    Reader reader(of_lines(4, 0, replacement));
+    Reader without(of_lines(4, 0, replacement));
+    for (std::uint64_t line = 0; line < 4; ++line) {
+      reader.misses(line);
+      without.misses(line);
+      reader.cache.keep(reader.cache.find(line * 128));
+    }
+    SectoredCache::Evicted evicted;
+    SectoredCache::Evicted expected;
+    const SectoredCache::Line taken = reader.cache.allocate(10 * 128, evicted);
+    EXPECT_EQ(taken, without.cache.allocate(10 * 128, expected));
+    EXPECT_EQ(evicted.address, expected.address);
+    EXPECT_FALSE(evicted.spared) << "no other could go";
+    EXPECT_EQ(reader.cache.allocate(11 * 128, evicted), taken);
+    EXPECT_EQ(reader.cache.allocate(12 * 128, evicted), taken);
+    EXPECT_EQ(evicted.address, 11 * 128U);
+    // Pinned, it cannot; then one of those goes that are kept.
+    reader.cache.pin(taken);
+    EXPECT_NE(reader.cache.allocate(13 * 128, evicted), taken);
+    EXPECT_FALSE(evicted.spared);
+  }
+}
+
+TEST(SectoredCache, ALineIsKeptForAsLongAsItHoldsTheSame) {
+  Reader reader(of_lines(2));
+  reader.misses(0);
+  reader.cache.keep(reader.cache.find(0));
+  reader.misses_of({1, 2});
+  SectoredCache::Evicted evicted;
+  reader.cache.allocate(3 * 128, evicted);
+  EXPECT_EQ(evicted.address, 2 * 128U);
+  EXPECT_TRUE(evicted.spared) << "line 0 was used last before it";
+  reader.cache.invalidate(reader.cache.find(0));
+  EXPECT_EQ(reader.misses_of({0, 4}), 2U);
+  EXPECT_EQ(reader.cache.find(3 * 128), SectoredCache::no_line) << "the oldest, and nothing is kept any more";
+  EXPECT_NE(reader.cache.find(0), SectoredCache::no_line);
 }
 
 TEST(SectoredCache, SectorsComeOneByOneAndGoWithTheirLine) {

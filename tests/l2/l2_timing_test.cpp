@@ -246,7 +246,7 @@ TEST_F(L2Test, TheOldestRequestOrTheNextPortGoesFirst) {
   EXPECT_LT(in_turn[1][0], in_turn[2][0]);
 }
 
-/// Random accesses of three ports to 64 lines, twice what the L2 holds.
+/// Random accesses of three ports to 64 lines, twice what the L2 holds, a seventh of them of attributes.
 std::vector<std::vector<Access>> random_accesses(std::uint64_t seed, Cycle apart) {
   std::vector<std::vector<Access>> accesses(3);
   Cycle at = 100;
@@ -254,10 +254,20 @@ std::vector<std::vector<Access>> random_accesses(std::uint64_t seed, Cycle apart
     const std::uint64_t bits = mix(seed + i);
     const unsigned bytes = 16U << (bits % 4);
     const std::uint64_t address = (bits >> 8) % (64 * line) / bytes * bytes;
-    accesses[bits >> 32 & 1].push_back((bits >> 40) % 3 == 0 ? write(at, address, bytes) : read(at, address, bytes));
+    Access access = (bits >> 40) % 3 == 0 ? write(at, address, bytes) : read(at, address, bytes);
+    if (address / line % 7 == 0) access.request.origin.traffic = MemoryTraffic::attribute;
+    accesses[bits >> 32 & 1].push_back(access);
     at += apart;
   }
   return accesses;
+}
+
+std::uint64_t value_of(const StatisticSet& set, const std::string& name) {
+  for (const Counter* const counter : set.counters()) {
+    if (counter->name() == name) return counter->value();
+  }
+  ADD_FAILURE() << "no counter " << name;
+  return 0;
 }
 
 // Far apart, so that each finds the fills of those before it done: then order is all that counts.
@@ -273,11 +283,16 @@ TEST_P(L2AtEachFidelity, CountsWhatItCountsWithoutTime) {
   } else {
     run(GetParam(), in_order);
   }
-  const std::vector<Counter*>& counters = model->statistics().counters();
-  for (std::size_t i = 0; i < counters.size(); ++i) {
-    EXPECT_EQ(counters[i]->value(), untimed.statistics().counters()[i]->value()) << counters[i]->name();
-  }
+  const auto expect_equal = [](const StatisticSet& actual, const StatisticSet& expected) {
+    for (std::size_t i = 0; i < actual.counters().size(); ++i) {
+      const Counter& counter = *actual.counters()[i];
+      EXPECT_EQ(counter.value(), expected.counters()[i]->value()) << counter.name();
+    }
+  };
+  expect_equal(*model, untimed);
+  expect_equal(model->statistics(), untimed.statistics());
   EXPECT_GT(untimed.statistics().sectors_written_back.value(), 0U);
+  EXPECT_GT(value_of(untimed, "attribute_lines_held"), 50U);
 }
 
 // Close together, so that they are in one another's way.

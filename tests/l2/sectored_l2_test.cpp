@@ -1,5 +1,6 @@
 #include "l2/sectored_l2.h"
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <set>
@@ -97,7 +98,7 @@ TEST(SectoredL2, AMissFetchesItsSectorsInOneRequestOfItsOriginAndAHitNothing) {
 }
 
 TEST(SectoredL2, WhatWasWrittenGoesBelowWithTheOriginOfItsLineWhenThatGoes) {
-  L2 l2(Settings{{"bytes", "1024"}, {"ways", "0"}, {"banks", "1"}});  // 8 lines
+  L2 l2(Settings{{"bytes", "1024"}, {"ways", "0"}, {"banks", "1"}, {"hold_attributes", "off"}});  // 8 lines
   l2.write(0, 128, attribute);
   l2.write(128 + 32, 32, color);
   for (std::uint64_t line = 2; line < 9; ++line) l2.read(128 * line, 32, color);
@@ -110,6 +111,26 @@ TEST(SectoredL2, WhatWasWrittenGoesBelowWithTheOriginOfItsLineWhenThatGoes) {
   EXPECT_EQ(written.bytes, 128U);
   EXPECT_EQ(written.origin.traffic, MemoryTraffic::attribute);
   EXPECT_EQ(written.origin.gpc, 2U);
+}
+
+TEST(SectoredL2, ColourStreamsThroughAndAttributesStay) {
+  for (const bool held : {true, false}) {
+    L2 l2(Settings{{"bytes", "64K"}, {"hold_attributes", held ? "on" : "off"}, {"hash_sets", "on"}});
+    constexpr std::uint64_t lines = 256;  // of attributes: half of it
+    for (std::uint64_t line = 0; line < lines; ++line) l2.write(128 * line, 128, attribute);
+    for (std::uint64_t line = 0; line < 4096; ++line) l2.read((1U << 30U) + 128 * line, 128, color);
+    EXPECT_EQ(l2.below.bytes.written, held ? 0 : 128 * lines);
+    for (std::uint64_t line = 0; line < lines; ++line) l2.read(128 * line, 128, attribute);
+    EXPECT_EQ(l2.count("attribute_sector_misses"), 4 * (held ? lines : 2 * lines));
+    EXPECT_EQ(l2.count("attribute_lines_held") > 0, held);
+  }
+}
+
+TEST(SectoredL2, AttributesThatAreMoreThanItHoldsGoAsOthersDo) {
+  L2 l2(Settings{{"bytes", "64K"}});
+  for (std::uint64_t line = 0; line < 1024; ++line) l2.write(128 * line, 128, attribute);
+  EXPECT_EQ(l2.below.bytes.written, 64U * 1024);
+  EXPECT_EQ(l2.count("attribute_lines_held"), 0U);
 }
 
 TEST(SectoredL2, ARequestLongerThanALineIsOneForEachLine) {
@@ -151,9 +172,11 @@ MemoryRequest random_request(std::uint64_t seed) {
   return request;
 }
 
+const std::pair<std::string, std::string> unheld{"hold_attributes", "off"};
+
 TEST(SectoredL2, ReadsAndWritesBelowWhatACacheByItsDefinitionWould) {
   const Settings variants[] = {{{"ways", "4"}},
-                               {{"ways", "4"}, {"write_allocate", "fill"}},
+                               {{"ways", "4"}, unheld},
                                {{"ways", "2"}, {"hash_sets", "off"}, {"tell_conflicts", "on"}},
                                {{"ways", "8"}, {"replacement", "tree-plru"}},
                                {{"ways", "0"}, {"replacement", "random"}, {"banks", "1"}}};
@@ -162,6 +185,8 @@ TEST(SectoredL2, ReadsAndWritesBelowWhatACacheByItsDefinitionWould) {
     L2 l2(settings);
     CacheOrganization organization = l2.behaviour->cache().organization();
     ReferenceCache reference(organization);
+    const bool holds = std::find(settings.begin(), settings.end(), unheld) == settings.end();
+    std::uint64_t held = 0;
     std::map<std::uint64_t, unsigned> gpc_of;  // that brought a line in
     std::map<MemoryTraffic, std::uint64_t> misses;
     for (std::uint64_t i = 0; i < 20'000; ++i) {
@@ -170,6 +195,10 @@ TEST(SectoredL2, ReadsAndWritesBelowWhatACacheByItsDefinitionWould) {
       const std::size_t before = l2.below.requests.size();
       l2.behaviour->access(request);
       const ReferenceCache::Outcome expected = reference.access(request.address, request.bytes, writes);
+      if (holds && expected.replaced && request.origin.traffic == MemoryTraffic::attribute) {
+        reference.keep(request.address);
+      }
+      held += expected.spared ? 1 : 0;
       std::set<std::pair<std::uint64_t, bool>> sectors;
       const std::uint64_t line = request.address - request.address % 128;
       for (const unsigned sector : expected.filled) sectors.insert({line + 32 * sector, false});
@@ -191,6 +220,8 @@ TEST(SectoredL2, ReadsAndWritesBelowWhatACacheByItsDefinitionWould) {
       reference.conflict = 0;
     }
     reference.expect_equal(statistics);
+    EXPECT_EQ(l2.count("attribute_lines_held"), held);
+    EXPECT_EQ(held > 100, holds) << held;
     EXPECT_EQ(l2.below.bytes.read, statistics.bytes_filled.value());
     EXPECT_EQ(l2.below.bytes.written, statistics.bytes_written_back.value());
     EXPECT_EQ(l2.behaviour->memory_bytes().read, l2.below.bytes.read);

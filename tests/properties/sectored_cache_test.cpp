@@ -79,7 +79,13 @@ std::set<unsigned> set_of(std::uint32_t mask) {
 }
 
 ReferenceCache::Outcome outcome_of(const LineAccess& access) {
-  return {access.line, access.replaced, set_of(access.filled), {}, set_of(access.written_back), access.old_address};
+  return {access.line,
+          access.replaced,
+          set_of(access.filled),
+          {},
+          set_of(access.written_back),
+          access.old_address,
+          access.replaced && access.spared};
 }
 
 struct Counted : StatisticSet {
@@ -89,6 +95,7 @@ struct Counted : StatisticSet {
 RC_GTEST_PROP(SectoredCache, DoesAccessByAccessWhatTheDefinitionSays, ()) {
   const CacheOrganization shape = some_organization();
   const auto seed = *rc::gen::arbitrary<std::uint64_t>();
+  const auto one_in = *rc::gen::inRange<std::uint64_t>(1, 9);  // is a line that is kept
   Counted counted;
   SectoredCache cache(shape, counted.statistics);
   ReferenceCache reference(shape);
@@ -97,6 +104,10 @@ RC_GTEST_PROP(SectoredCache, DoesAccessByAccessWhatTheDefinitionSays, ()) {
     RC_ASSERT((cache.find(access.address) != SectoredCache::no_line) == reference.holds(access.address));
     const LineAccess done = cache.access(access.address, access.bytes, access.writes);
     RC_ASSERT(outcome_of(done) == reference.access(access.address, access.bytes, access.writes));
+    if (mix(access.address / shape.line_bytes) % one_in == 0) {
+      cache.keep(done.line);
+      reference.keep(access.address);
+    }
     if (mix(seed + i) % 100 == 0) {
       cache.invalidate(done.line);
       reference.invalidate(access.address);
@@ -115,6 +126,7 @@ RC_GTEST_PROP(SectoredCache, DoesAccessByAccessWhatTheDefinitionSays, ()) {
 RC_GTEST_PROP(SectoredCache, DoesTheSameInStepsWithLinesThatAreKept, ()) {
   const CacheOrganization shape = some_organization();
   const auto seed = *rc::gen::arbitrary<std::uint64_t>();
+  const auto one_in = *rc::gen::inRange<std::uint64_t>(1, 9);
   const auto most_queued = *rc::gen::inRange<std::size_t>(1, 2 * shape.lines() + 1);
   Counted counted;
   SectoredCache cache(shape, counted.statistics);
@@ -155,6 +167,7 @@ RC_GTEST_PROP(SectoredCache, DoesTheSameInStepsWithLinesThatAreKept, ()) {
       line = cache.allocate(access.address, evicted);
       done.written_back = set_of(evicted.dirty);
       done.old_address = evicted.address;
+      done.spared = evicted.spared;
     }
     done.line = line;
     const auto first = static_cast<unsigned>(access.address % shape.line_bytes);
@@ -171,6 +184,10 @@ RC_GTEST_PROP(SectoredCache, DoesTheSameInStepsWithLinesThatAreKept, ()) {
     const unsigned last = first + access.bytes - 1;
     cache.accessed(1, last / shape.sector_bytes - first / shape.sector_bytes + 1);
     RC_ASSERT(done == reference.access_and_pin(access.address, access.bytes, access.writes));
+    if (mix(access.address / shape.line_bytes) % one_in == 0) {
+      cache.keep(line);
+      reference.keep(access.address);
+    }
     queue.push_back({access.address, line});
   }
   reference.expect_equal(counted.statistics);

@@ -36,9 +36,11 @@ class ReferenceCache {
     bool replaced = false;
     std::set<unsigned> filled, missed, written_back;  ///< sectors
     std::uint64_t old_address = 0;
+    bool spared = false;  ///< it went instead of a line that is kept
     bool operator==(const Outcome& other) const {
       return line == other.line && replaced == other.replaced && filled == other.filled &&
-             written_back == other.written_back && (written_back.empty() || old_address == other.old_address);
+             written_back == other.written_back && spared == other.spared &&
+             (written_back.empty() || old_address == other.old_address);
     }
   };
 
@@ -63,6 +65,8 @@ class ReferenceCache {
     Way* const way = way_of(address);
     if (--way->pins == 0) use(address);
   }
+  /// It goes only where its set has no other that can.
+  void keep(std::uint64_t address) { way_of(address)->kept = true; }
   void make_dirty(std::uint64_t address, const std::set<unsigned>& sectors) {
     way_of(address)->dirty.insert(sectors.begin(), sectors.end());
   }
@@ -110,6 +114,7 @@ class ReferenceCache {
     std::vector<bool> there;  ///< bytes
     std::set<unsigned> dirty;
     unsigned pins = 0;
+    bool kept = false;
     std::uint64_t used = 0, allocated = 0;  ///< when
   };
   using Set = std::vector<Way>;
@@ -137,14 +142,14 @@ class ReferenceCache {
     outcome.replaced = way == nullptr;
     ++(outcome.replaced ? line_misses : line_hits);
     if (way == nullptr) {
-      way = &set[room_in(set, set_of(address))];
+      way = &set[room_in(set, set_of(address), outcome.spared)];
       if (way->address) {
         ++evicted;
         written_back += way->dirty.size();
         outcome.written_back = way->dirty;
         outcome.old_address = *way->address;
       }
-      *way = {line_of(address), std::vector<bool>(shape_.line_bytes), {}, 0, ++time_, time_};
+      *way = {line_of(address), std::vector<bool>(shape_.line_bytes), {}, 0, false, ++time_, time_};
       turn_away(set_of(address), static_cast<std::size_t>(way - set.data()));
     }
     outcome.line = set_of(address) * ways_ + static_cast<std::size_t>(way - set.data());
@@ -192,12 +197,19 @@ class ReferenceCache {
     return outcome;
   }
 
-  std::size_t room_in(const Set& set, std::size_t set_number) {
-    std::vector<std::size_t> can_go;
+  std::size_t room_in(const Set& set, std::size_t set_number, bool& spared) {
+    std::vector<std::size_t> can_go, not_kept;
     for (std::size_t way = 0; way < set.size(); ++way) {
       if (!set[way].address) return way;
-      if (set[way].pins == 0) can_go.push_back(way);
+      if (set[way].pins != 0) continue;
+      can_go.push_back(way);
+      if (!set[way].kept) not_kept.push_back(way);
     }
+    const std::size_t way = choose(set, set_number, can_go);
+    spared = set[way].kept && !not_kept.empty();
+    return spared ? choose(set, set_number, not_kept) : way;
+  }
+  std::size_t choose(const Set& set, std::size_t set_number, const std::vector<std::size_t>& can_go) {
     const auto first_by = [&](std::uint64_t Way::*when) {
       return *std::min_element(can_go.begin(), can_go.end(),
                                [&](std::size_t a, std::size_t b) { return set[a].*when < set[b].*when; });

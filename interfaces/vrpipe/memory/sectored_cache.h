@@ -12,7 +12,8 @@
 namespace vrpipe {
 
 /// The tags of a cache of sectored lines, write-back; data stays elsewhere. A way that is free is taken first, the lowest
-/// one; then a line goes that is not pinned, by the replacement policy. Sectors of a line are a bit each.
+/// one; then a line goes that is not pinned, by the replacement policy. If that is one to be kept, the policy chooses
+/// again among those that are not, if any is neither kept nor pinned. Sectors of a line are a bit each.
 ///
 /// An access is made in steps by models that follow fills through the cache: find, or can_allocate and allocate; read
 /// or write, and start_fill for what they return; pin; looked_up; later finish_fill, make_dirty and unpin. Others call
@@ -49,11 +50,16 @@ class SectoredCache {
     std::uint64_t address = 0;
     std::uint32_t dirty = 0;   ///< to be written back
     std::uint32_t masked = 0;  ///< of these, only the bytes that were written
+    bool spared = false;       ///< it went instead of a line that is kept
   };
   /// Takes a line for an address that is not held. Throws std::logic_error if none can be had.
   Line allocate(std::uint64_t address, Evicted& evicted);
 
-  /// Keeps a line, as one with fills on their way has to be kept.
+  /// Marks a line as one to be kept for as long as it holds the same: it goes only where no other can. Unlike one that
+  /// is pinned, which never does.
+  void keep(Line line);
+
+  /// Holds a line fast, as one with fills on their way has to be.
   void pin(Line line) {
     Entry& entry = lines_[line];
     if (entry.pins++ != 0) return;
@@ -164,7 +170,8 @@ class SectoredCache {
     std::uint32_t pinned = 0;
     std::uint32_t held = 0;
     std::uint32_t lowest_free = 0;  ///< no way below is free
-    std::uint64_t tree = 0;         ///< tree_plru: a bit for each inner node, from 1; set: to the higher ways
+    std::uint32_t kept = 0;
+    std::uint64_t tree = 0;  ///< tree_plru: a bit for each inner node, from 1; set: to the higher ways
   };
   struct Shadow;
 
@@ -185,6 +192,7 @@ class SectoredCache {
       access.line = allocate(access.address, evicted);
       access.written_back = evicted.dirty;
       access.old_address = evicted.address;
+      access.spared = evicted.spared;
     } else {
       use(access.line);
     }
@@ -215,7 +223,9 @@ class SectoredCache {
   void point_away(Set& set, Line line);
   Line free_line(std::uint32_t set);
   Line victim(std::uint32_t set);
-  Line victim_of_tree(std::uint32_t set) const;
+  Line victim_not_kept(std::uint32_t set) const;
+  template <class CanGo>
+  Line victim_of_tree(std::uint32_t set, CanGo&& can_go) const;
   void take_out(Line line);
   /// Those that bytes `first` to `first + bytes` - 1 of a line lie in.
   std::uint32_t touched(unsigned first, unsigned bytes) const {
@@ -268,6 +278,7 @@ class SectoredCache {
   std::vector<Entry> lines_;  ///< ways of set 0, of set 1, ...
   std::vector<Set> sets_;
   std::vector<Line> chains_;               ///< the first of the lines whose tags hash to a place
+  std::vector<bool> kept_;                 ///< by line; empty before the first
   std::vector<std::uint64_t> byte_masks_;  ///< WriteAllocate::byte_mask: bytes that are there, a bit each, by line
   SectorHistory were_there_;               ///< whole sectors
   SectorHistory were_touched_;             ///< with byte masks: and those of which bytes were there

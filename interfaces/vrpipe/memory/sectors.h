@@ -62,6 +62,7 @@ struct LineAccess {
   std::uint32_t filled = 0;        ///< of these, to be read from below
   std::uint32_t written_back = 0;  ///< dirty sectors of what the line held
   bool replaced = false;           ///< the line held something else, or nothing, before
+  bool spared = false;             ///< and it went instead of one that is kept
   std::uint64_t address = 0;       ///< of the line, bytes
   std::uint64_t old_address = 0;   ///< of what it held
 };
