@@ -89,8 +89,8 @@ Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& fr
   const Cycle now = clock.domain->now();
   const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
   const LineAccess done = cache_.access(access.address, access.bytes, writes);
-  behaviour_->count_sectors(access.origin.traffic, static_cast<unsigned>(__builtin_popcount(done.sectors)),
-                            static_cast<unsigned>(__builtin_popcount(done.missed)));
+  behaviour_->looked_up(access, static_cast<unsigned>(__builtin_popcount(done.sectors)),
+                        static_cast<unsigned>(__builtin_popcount(done.missed)));
   std::uint64_t moved = access.bytes;
   const Cycle asks = arrival + 1;
   behaviour_->for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, behaviour_->origin(done.line),

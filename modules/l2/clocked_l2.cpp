@@ -356,7 +356,7 @@ void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, Cycle now) {
                            });
   cache_.looked_up(line, first, access.bytes, writes);
   const auto needed = static_cast<unsigned>(__builtin_popcount(sectors));
-  behaviour_->count_sectors(access.origin.traffic, needed, cache_.missed());
+  behaviour_->looked_up(access, needed, cache_.missed());
   cache_.accessed(1, needed);
   occupy(index, moved, now);
   Request& taken = requests_[request];
@@ -395,6 +395,7 @@ void ClockedL2::ask_below() {
 void ClockedL2::respond(std::uint32_t request, Cycle from) {
   const Request& done = requests_[request];
   const Cycle now = clock.domain->now();
+  behaviour_->served(done.access);
   const Cycle left = ports_[done.port]->leave(from, behaviour_->response_bytes(done.access), now);
   answer(request, sizes_.latency_cycles + std::max(left, from + behaviour_->bank_cycles(done.access.bytes)));
 }

@@ -57,8 +57,9 @@ void SectoredL2::access(const MemoryRequest& request) {
   const bool writes = request.command == tlm::TLM_WRITE_COMMAND;
   for_each_line(request, [&](std::uint64_t address, std::uint32_t bytes) {
     const LineAccess done = cache_.access(address, bytes, writes);
-    count_sectors(request.origin.traffic, static_cast<unsigned>(__builtin_popcount(done.sectors)),
-                  static_cast<unsigned>(__builtin_popcount(done.missed)));
+    looked_up({address, bytes, request.command, request.origin},
+              static_cast<unsigned>(__builtin_popcount(done.sectors)),
+              static_cast<unsigned>(__builtin_popcount(done.missed)));
     const auto below = [&](const MemoryRequest& moved, const SectorRun&) {
       if (below_ != nullptr) below_->access(moved);
     };

@@ -71,6 +71,16 @@ struct SectoredL2Parameters : ParameterSet {
                      0,     source::open,  "of the ports that have requests for a bank"};
 };
 
+/// Sees the look-ups of an L2, in their order.
+class L2Observer {
+ public:
+  virtual ~L2Observer() = default;
+  /// @param part  of a request: what lies in one line
+  virtual void looked_up(const MemoryRequest& part) = 0;
+  /// At `cycle`: what it needed is there, and its line, which was pinned from the look-up on, may go.
+  virtual void served(const MemoryRequest& part) = 0;
+};
+
 /// The L2 that all GPCs share: a sectored cache in banks, write-back, behind a crossbar. A request of several lines is an
 /// access to each.
 class SectoredL2 final : public MemoryBehaviour {
@@ -86,6 +96,8 @@ class SectoredL2 final : public MemoryBehaviour {
   }
   std::vector<OccupancyPart> least_occupancy(double period_ps) const override;
   TimingParameters timing() const override { return {sizes_.latency_cycles, sizes_.bytes_per_cycle}; }
+
+  void observe(L2Observer& observer) { observer_ = &observer; }
 
   struct Sizes {
     std::uint32_t banks, bank_bytes_per_cycle, mshrs, write_backs;
@@ -103,10 +115,14 @@ class SectoredL2 final : public MemoryBehaviour {
   /// At a port.
   void count(const MemoryRequest& request) { traffic_.count(request); }
   /// In a line: so many sectors, of which so many were missed.
-  void count_sectors(MemoryTraffic traffic, std::uint64_t sectors, std::uint64_t missed) {
-    OfTraffic& counted = of_traffic_[static_cast<unsigned>(traffic)];
+  void looked_up(const MemoryRequest& part, std::uint64_t sectors, std::uint64_t missed) {
+    OfTraffic& counted = of_traffic_[static_cast<unsigned>(part.origin.traffic)];
     counted.sectors += sectors;
     counted.misses += missed;
+    if (observer_ != nullptr) observer_->looked_up(part);
+  }
+  void served(const MemoryRequest& part) {
+    if (observer_ != nullptr) observer_->served(part);
   }
   /// In a bank.
   void count_bank(std::uint32_t bank, std::uint64_t bytes) { bank_cycles_[bank] += bank_cycles(bytes); }
@@ -173,6 +189,7 @@ class SectoredL2 final : public MemoryBehaviour {
                                 "of attributes that another line went instead of"};
   SectoredCacheStatistics statistics_{*this, "cache"};
   SectoredCache cache_;
+  L2Observer* observer_ = nullptr;
   std::vector<MemoryOrigin> origins_;       ///< by line of the cache
   std::vector<std::uint64_t> bank_cycles_;  ///< by bank
 };

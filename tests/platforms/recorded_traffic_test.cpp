@@ -1,0 +1,299 @@
+// What caches count in whole runs, against caches by their definition that are fed with what those were asked for, in the
+// order in which they looked it up.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "l2/sectored_l2.h"
+
+#include <vrpipe/pipeline/payload.h>
+#include <vrpipe/pipeline/registry.h>
+#include <vrpipe/platforms/observers.h>
+#include <vrpipe/platforms/wiring.h>
+
+#include "support/reference_cache.h"
+#include "support/simulate.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::ReferenceCache;
+using testing::request_of;
+using testing::run;
+using testing::statistic;
+
+struct Recorder final : L2Observer {
+  struct Event {
+    MemoryRequest part;
+    bool served = false;  ///< or looked up
+  };
+  void looked_up(const MemoryRequest& part) override { events.push_back({part, false}); }
+  void served(const MemoryRequest& part) override { events.push_back({part, true}); }
+  std::vector<Event> events;
+};
+Recorder recorder;
+
+/// An implementation of slot l2: a sectored cache that is observed.
+void register_recorded_l2() {
+  static const bool registered = [] {
+    Implementation recorded = Registry::instance().find("l2", "sectored-cache");
+    recorded.name = "recorded";
+    recorded.make_behaviour = [make = recorded.make_behaviour](const ParameterSet& set, const RenderContext& context) {
+      auto made = make(set, context);
+      dynamic_cast<SectoredL2&>(*made).observe(recorder);
+      return made;
+    };
+    Registry::instance().add(std::move(recorded));
+    return true;
+  }();
+  static_cast<void>(registered);
+}
+
+/// Vertices and attributes from memory, as colour.
+Platform with_attributes(const char* name) {
+  Platform platform = platform_named(name);
+  platform.wire = [wire = platform.wire](Netlist& netlist) {
+    wire(netlist);
+    connect_attribute_traffic(netlist);
+  };
+  return platform;
+}
+
+/// By traffic, in sectors.
+struct Counted {
+  std::uint64_t needed = 0, missed = 0, filled = 0, written_back = 0;
+};
+struct Replayed {
+  std::map<MemoryTraffic, Counted> of;
+  std::uint64_t held = 0;
+};
+
+/// What a cache by its definition does for these. `pins`: a line stays from its look-up until that is served.
+Replayed replay(const CacheOrganization& organization, const std::vector<Recorder::Event>& events, bool pins) {
+  ReferenceCache cache(organization);
+  Replayed counted;
+  std::map<std::uint64_t, MemoryTraffic> brought_in_by;
+  for (const auto& [part, served] : events) {
+    if (served) {
+      if (pins) cache.unpin(part.address);
+      continue;
+    }
+    const bool writes = part.command == tlm::TLM_WRITE_COMMAND;
+    const auto done =
+        pins ? cache.access_and_pin(part.address, part.bytes, writes) : cache.access(part.address, part.bytes, writes);
+    const std::uint64_t last = (part.address + part.bytes - 1) / organization.sector_bytes;
+    Counted& of = counted.of[part.origin.traffic];
+    of.needed += last - part.address / organization.sector_bytes + 1;
+    of.missed += done.missed.size();
+    of.filled += done.filled.size();
+    counted.held += done.spared ? 1 : 0;
+    if (!done.written_back.empty()) {
+      counted.of[brought_in_by.at(done.old_address)].written_back += done.written_back.size();
+    }
+    if (!done.replaced) continue;
+    brought_in_by[part.address - part.address % organization.line_bytes] = part.origin.traffic;
+    if (part.origin.traffic == MemoryTraffic::attribute) cache.keep(part.address);
+  }
+  return counted;
+}
+
+struct Pressure {
+  const char* platform;
+  const char* variant;
+  Replacement replacement;
+  std::uint32_t bytes;
+  std::string text() const { return fmt::format("{} {} {} KB", platform, variant, bytes / 1024); }
+};
+// Attributes alone go round in 64 KB.
+constexpr Pressure pressures[] = {{"agx-orin-lpddr3", "baseline", Replacement::lru, 65536},
+                                  {"agx-orin-lpddr3", "baseline", Replacement::fifo, 262144},
+                                  {"agx-orin-lpddr3", "het+qm", Replacement::lru, 262144},
+                                  {"agx-orin-lpddr5", "baseline", Replacement::lru, 262144}};
+
+CacheOrganization organization_of(const Pressure& pressure) {
+  CacheOrganization organization;
+  organization.bytes = pressure.bytes;
+  organization.ways = 16;
+  organization.replacement = pressure.replacement;
+  return organization;
+}
+
+/// A run at `cycle` whose L2 holds a part of what is asked for.
+RunResult record(const Pressure& pressure) {
+  register_recorded_l2();
+  const Platform platform = with_attributes(pressure.platform);
+  RunRequest request = request_of(pressure.variant, Fidelity::cycle);
+  request.platform = &platform;
+  request.units = {{"l2", "recorded"}};
+  request.settings = {{"l2", "bytes", std::to_string(pressure.bytes)},
+                      {"l2", "replacement", pressure.replacement == Replacement::fifo ? "fifo" : "lru"},
+                      {"sm", "attribute_buffer_bytes", "65536"},
+                      {"crop", "cache_bytes", "2048"}};
+  recorder.events.clear();
+  return run(request, testing::random_draw(384, 256, 1200, 31));
+}
+
+const std::map<MemoryTraffic, std::string> names = {{MemoryTraffic::color, "color"},
+                                                    {MemoryTraffic::vertex, "vertex"},
+                                                    {MemoryTraffic::attribute, "attribute"}};
+
+TEST(RecordedTraffic, OfTheL2MakesTheHitsMissesAndWriteBacksOfACacheByItsDefinition) {
+  for (const Pressure& pressure : pressures) {
+    const RunResult result = record(pressure);
+    const Replayed expected = replay(organization_of(pressure), recorder.events, true);
+    std::uint64_t looked_up = 0;
+    for (const auto& [part, served] : recorder.events) looked_up += served ? 0 : part.bytes;
+    std::uint64_t asked = 0;
+    for (const auto& [traffic, name] : names) {
+      const Counted& counted = expected.of.at(traffic);
+      const std::string what = pressure.text() + " " + name;
+      EXPECT_EQ(statistic(result, "l2." + name + "_sectors"), counted.needed) << what;
+      EXPECT_EQ(statistic(result, "l2." + name + "_sector_misses"), counted.missed) << what;
+      EXPECT_EQ(statistic(result, "dram." + name + "_bytes_read"), 32 * counted.filled) << what;
+      EXPECT_EQ(statistic(result, "dram." + name + "_bytes_written"), 32 * counted.written_back) << what;
+      asked += statistic(result, "l2." + name + "_bytes_read") + statistic(result, "l2." + name + "_bytes_written");
+      EXPECT_GT(counted.missed, 500U) << what;
+    }
+    EXPECT_EQ(looked_up, asked) << pressure.text();
+    EXPECT_EQ(statistic(result, "l2.attribute_lines_held"), expected.held) << pressure.text();
+    EXPECT_GT(expected.held, 1000U) << pressure.text();
+    EXPECT_GT(expected.of.at(MemoryTraffic::color).written_back, 10'000U) << pressure.text();
+  }
+}
+
+// Without them what differs is which line goes where one is waited for: little, where a set has others.
+TEST(RecordedTraffic, OfTheL2MissesNearlyAsMuchInACacheWithoutPins) {
+  for (const Pressure& pressure : pressures) {
+    if (pressure.bytes == 65536) continue;
+    const RunResult result = record(pressure);
+    for (const auto& [traffic, counted] : replay(organization_of(pressure), recorder.events, false).of) {
+      const auto missed = static_cast<double>(statistic(result, "l2." + names.at(traffic) + "_sector_misses"));
+      EXPECT_NEAR(missed / static_cast<double>(counted.missed), 1, 0.005) << pressure.text() << names.at(traffic);
+    }
+  }
+}
+
+TEST(RecordedTraffic, OfTheColourCacheMakesTheHitsAndMissesOfACacheWithoutTime) {
+  constexpr std::uint32_t width = 192;
+  constexpr std::uint32_t height = 128;
+  const Draw draw = testing::random_draw(width, height, 700, 33);
+  const ColorSurface surface(width, height, ColorFormat::rgba16f);
+  for (const char* platform : {"agx-orin", "desktop", "agx-orin-lpddr3"}) {
+    for (const char* variant : {"baseline", "het+qm"}) {
+      for (const std::uint32_t bytes : {2048U, 16384U}) {
+        CacheOrganization organization;
+        organization.bytes = bytes;
+        std::map<std::string, ReferenceCache> caches;  // by link
+        auto observers = std::make_shared<Observers>();
+        observers->on_link<ColorBeat>("prop.color", [&](const auto& passed) {
+          ReferenceCache& cache = caches.try_emplace(passed.link, organization).first->second;
+          for (unsigned i = 0; i < passed.item.count; ++i) {
+            const ColorQuad& quad = passed.item.quads[i];
+            cache.access(surface.address(quad.warp->tile, quad.position()), 32, false);
+          }
+        });
+        RunRequest request = request_of(variant);
+        request.platform = &platform_named(platform);
+        request.settings = {{"crop", "cache_bytes", std::to_string(bytes)}};
+        request.observers = observers;
+        const RunResult result = run(request, draw);
+        std::uint64_t hits = 0;
+        std::uint64_t compulsory = 0;
+        std::uint64_t capacity = 0;
+        std::uint64_t evicted = 0;
+        for (const auto& [link, cache] : caches) {
+          hits += cache.hits;
+          compulsory += cache.compulsory;
+          capacity += cache.capacity;
+          evicted += cache.evicted;
+        }
+        const std::string what = std::string(platform) + " " + variant + " " + std::to_string(bytes);
+        EXPECT_EQ(statistic(result, "crop.cache.sector_hits"), hits) << what;
+        EXPECT_EQ(statistic(result, "crop.cache.sector_misses_compulsory"), compulsory) << what;
+        EXPECT_EQ(statistic(result, "crop.cache.sector_misses_capacity"), capacity) << what;
+        EXPECT_EQ(statistic(result, "crop.cache.lines_evicted"), evicted) << what;
+        EXPECT_EQ(statistic(result, "l2.color_bytes_read"), 32 * (compulsory + capacity)) << what;
+        EXPECT_GT(capacity, bytes == 2048 ? 1000U : 0U) << what;
+      }
+    }
+  }
+}
+
+TEST(TrafficToDram, IsWhatIsTouchedForTheFirstTimeWhereAllFitsIntoL2) {
+  const std::uint32_t width = 128;
+  const std::uint32_t height = 96;
+  auto splats = testing::random_draw(width, height, 500, 34).splats;
+  const auto geometry = testing::geometry_of(width, height, splats);
+  for (const char* name : {"agx-orin-lpddr3", "agx-orin-lpddr5"}) {
+    const Platform platform = with_attributes(name);
+    for (const char* variant : {"baseline", "het+qm"}) {
+      for (const Fidelity fidelity : fidelities()) {
+        RunRequest request = request_of(variant, fidelity);
+        request.platform = &platform;
+        request.settings = {{"crop", "cache_bytes", "2048"}};
+        std::uint64_t of_color = 0;
+        for (const unsigned draws : {1U, 3U}) {
+          Frame frame(width, height);
+          for (unsigned i = 0; i < draws; ++i) frame.draw(geometry, draw_state_of(request));
+          fresh_simulation();
+          const RunResult result = simulate(request, frame);
+          const std::string what =
+              std::string(name) + " " + variant + " " + name_of(fidelity) + " " + std::to_string(draws) + " draws";
+          const std::uint64_t first = statistic(result, "l2.cache.sector_misses_compulsory");
+          EXPECT_EQ(statistic(result, "l2.cache.sector_misses"), first) << what;
+          EXPECT_GT(statistic(result, "l2.cache.sector_hits"), first) << what;
+          EXPECT_EQ(statistic(result, "l2.cache.bytes_written_back"), 0U) << what;
+          EXPECT_EQ(statistic(result, "dram.attribute_bytes_read"), 0U) << what << ": they were written";
+          const std::uint64_t color = statistic(result, "dram.color_bytes_read");
+          EXPECT_LE(color, ColorSurface::size_bytes(width, height, ColorFormat::rgba16f)) << what;
+          EXPECT_EQ(color + statistic(result, "dram.vertex_bytes_read"), statistic(result, "l2.cache.bytes_filled"))
+              << what;
+          if (draws > 1) {
+            EXPECT_EQ(color, of_color) << what << ": the first has fetched it";
+          }
+          of_color = color;
+          for (const MemoryTraffic traffic : {MemoryTraffic::color, MemoryTraffic::vertex, MemoryTraffic::attribute}) {
+            EXPECT_EQ(statistic(result, "dram." + names.at(traffic) + "_bytes_written"), 0U) << what;
+          }
+        }
+        EXPECT_GT(of_color, 50'000U);
+      }
+    }
+  }
+}
+
+// 16 splats over all of 128x128 pixels, so that the surface is gone over again and again: 1024 lines, 16 in each of 64
+// sets.
+TEST(TrafficToDram, OfColourHasItsKneeWhereTheSurfaceFitsIntoL2) {
+  constexpr std::uint64_t surface = 128 * 1024;
+  const Draw draw = testing::draw_of(128, 128, std::vector<Splat>(16, testing::flat_box(-1, -1, 130, 130, 0.05F)));
+  for (const Fidelity fidelity : fidelities()) {
+    for (const unsigned ways : {8U, 12U, 14U, 16U, 18U, 32U}) {
+      RunRequest request = request_of("baseline", fidelity);
+      request.platform = &platform_named("agx-orin-lpddr3");
+      request.settings = {{"l2", "bytes", std::to_string(ways * 64 * 128)},
+                          {"l2", "ways", std::to_string(ways)},
+                          {"crop", "cache_bytes", "2048"}};
+      const RunResult result = run(request, draw);
+      const std::string what = std::string(name_of(fidelity)) + " " + std::to_string(ways * 8) + " KB";
+      const std::uint64_t read = statistic(result, "dram.color_bytes_read");
+      const std::uint64_t written = statistic(result, "dram.color_bytes_written");
+      if (ways >= 16) {
+        EXPECT_EQ(read, surface) << what;
+        EXPECT_EQ(written, 0U) << what;
+      } else {
+        EXPECT_GT(read, 3 * surface) << what;
+        EXPECT_GT(written, 2 * surface) << what;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe
