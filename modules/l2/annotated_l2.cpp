@@ -73,8 +73,7 @@ AnnotatedL2::AnnotatedL2(const sc_core::sc_module_name& name, ClockDomain& domai
       sizes_(behaviour_->sizes()),
       cache_(behaviour_->cache()),
       memory_(*this, "below"),
-      banks_(sizes_.banks, BandwidthReservation(sizes_.bank_bytes_per_cycle)),
-      bank_bytes_(sizes_.banks),
+      banks_(sizes_.banks, Bank(sizes_)),
       fills_(std::size_t{cache_.organization().lines()} * cache_.organization().sectors_of_a_line()) {
   for (const unsigned bytes : ports) {
     ports_.push_back(std::make_unique<Port>(static_cast<unsigned>(ports_.size()), *this, bytes));
@@ -85,23 +84,58 @@ AnnotatedL2::~AnnotatedL2() = default;
 
 tlm::tlm_base_target_socket_b<32>& AnnotatedL2::target(unsigned index) { return ports_.at(index)->socket; }
 
+bool AnnotatedL2::awaits(const Fill* fills, std::uint32_t sectors, Cycle at) {
+  for (std::uint32_t left = sectors; left != 0; left &= left - 1) {
+    if (fills[__builtin_ctz(left)].there > at) return true;
+  }
+  return false;
+}
+
+std::uint64_t AnnotatedL2::write_back(const LineAccess& done, Bank& bank, Cycle at) {
+  const Cycle now = clock.domain->now();
+  std::uint64_t moved = 0;
+  behaviour_->for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, behaviour_->origin(done.line),
+                           [&](const MemoryRequest& write, const SectorRun&) {
+                             const Cycle taken = memory_.access(write, at) - at;
+                             quickest_write_ = std::min(quickest_write_, taken);
+                             bank.write_backs.take(at, at + (taken - quickest_write_), now);
+                             moved += write.bytes;
+                           });
+  return moved;
+}
+
+Cycle AnnotatedL2::occupy(Bank& bank, Cycle from, Cycle begin, std::uint32_t bytes) {
+  std::uint64_t waits = 0;
+  if (begin > from) {
+    const std::uint64_t reserved = bank.time.reserved_from(from) - bank.time.reserved_from(begin);
+    waits = (begin - from) * sizes_.bank_bytes_per_cycle - reserved;
+  }
+  bank.bytes += bytes;
+  return bank.time.take(from, static_cast<unsigned>(waits) + bytes, clock.domain->now());
+}
+
 Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& from) {
   const Cycle now = clock.domain->now();
   const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
   const LineAccess done = cache_.access(access.address, access.bytes, writes);
   behaviour_->looked_up(access, static_cast<unsigned>(__builtin_popcount(done.sectors)),
                         static_cast<unsigned>(__builtin_popcount(done.missed)));
-  std::uint64_t moved = access.bytes;
-  const Cycle asks = arrival + 1;
-  behaviour_->for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, behaviour_->origin(done.line),
-                           [&](const MemoryRequest& write, const SectorRun&) {
-                             memory_.access(write, asks);
-                             moved += write.bytes;
-                           });
+  const std::uint32_t index = behaviour_->bank_of(access.address);
+  Bank& bank = banks_[index];
   Fill* const fills = &fills_[std::size_t{done.line} * cache_.organization().sectors_of_a_line()];
+  // When it has what it needs to go on.
+  Cycle begin = arrival;
+  std::uint64_t moved = access.bytes;
   if (done.replaced) {
-    behaviour_->allocated(done.line, access.origin, done.spared);
+    begin = bank.write_backs.free_from(begin);
     std::fill_n(fills, cache_.organization().sectors_of_a_line(), Fill());
+  }
+  const bool waits = done.filled != 0 || awaits(fills, done.sectors, arrival);
+  if (waits) begin = bank.mshrs.free_from(begin);
+  const Cycle asks = begin + 1;
+  if (done.replaced) {
+    moved += write_back(done, bank, asks);
+    behaviour_->allocated(done.line, access.origin, done.spared);
   }
   behaviour_->for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, access.origin,
                            [&](const MemoryRequest& read, const SectorRun& run) {
@@ -110,20 +144,18 @@ Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& fr
                              behaviour_->statistics().fill_cycles.see(there - asks);
                              moved += read.bytes;
                            });
-  Cycle all_there = arrival;
-  for (std::uint32_t left = done.sectors; left != 0; left &= left - 1) {
+  Cycle all_there = begin;
+  for (std::uint32_t left = done.sectors; waits && left != 0; left &= left - 1) {
     Fill& fill = fills[__builtin_ctz(left)];
     if (fill.there == 0) continue;
     // Who ran ahead of time has asked, but this access would have been the first: it takes as long from here.
     if (asks < fill.asked) fill = {asks, asks + (fill.there - fill.asked)};
     all_there = std::max(all_there, fill.there);
   }
-  const std::uint32_t bank = behaviour_->bank_of(access.address);
+  if (waits) bank.mshrs.take(begin, all_there, now);
   const std::uint32_t cycles = behaviour_->bank_cycles(moved);
-  const std::uint32_t bytes = cycles * sizes_.bank_bytes_per_cycle;
-  const Cycle free_at = banks_[bank].take(arrival, bytes, now);
-  bank_bytes_[bank] += bytes;
-  behaviour_->count_bank(bank, moved);
+  const Cycle free_at = occupy(bank, arrival, begin, cycles * sizes_.bank_bytes_per_cycle);
+  behaviour_->count_bank(index, moved);
   from = std::max(all_there, free_at - cycles);
   return from + behaviour_->bank_cycles(access.bytes);
 }
@@ -138,9 +170,7 @@ std::vector<OccupancyPart> AnnotatedL2::parts(Cycle end) const {
     out += port->bytes_out(end);
   }
   std::uint64_t banks = 0;
-  for (std::size_t bank = 0; bank < banks_.size(); ++bank) {
-    banks += bank_bytes_[bank] - std::min(bank_bytes_[bank], banks_[bank].reserved_from(end));
-  }
+  for (const Bank& bank : banks_) banks += bank.bytes - std::min(bank.bytes, bank.time.reserved_from(end));
   const double of_banks = static_cast<double>(sizes_.bank_bytes_per_cycle) * sizes_.banks;
   return {{"responses", 1, static_cast<double>(out) / width, true},
           {"requests", 2, static_cast<double>(in) / width, false},

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -9,13 +10,15 @@
 #include <vrpipe/kernel/clock_domain.h>
 #include <vrpipe/memory/bandwidth.h>
 #include <vrpipe/memory/memory_port.h>
+#include <vrpipe/memory/place_reservation.h>
 #include <vrpipe/memory/timed_memory_port.h>
 #include <vrpipe/model/memory_unit.h>
 
 namespace vrpipe {
 
 /// The sectored L2 at `lt` and `at`: it is looked up in the order of the calls, and says at once when an access is
-/// complete. Ports and banks are reserved in time; MSHRs and places for what is evicted are not counted.
+/// complete. Ports, banks, their MSHRs and their places for what is evicted are reserved in time. A bank whose request
+/// has to wait for one takes no other meanwhile.
 class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private PortOwner {
  public:
   AnnotatedL2(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SectoredL2> behaviour,
@@ -37,6 +40,21 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
     Cycle asked = 0;
     Cycle there = 0;
   };
+  struct Bank {
+    static std::uint32_t most(std::uint32_t places) { return std::min(places, 65535U); }
+    explicit Bank(const SectoredL2::Sizes& sizes)
+        : time(sizes.bank_bytes_per_cycle), mshrs(most(sizes.mshrs)), write_backs(most(sizes.write_backs)) {}
+    BandwidthReservation time;
+    PlaceReservation mshrs, write_backs;
+    std::uint64_t bytes = 0;
+  };
+  /// Whether a request needs sectors of a line that are on their way in a cycle.
+  static bool awaits(const Fill* fills, std::uint32_t sectors, Cycle at);
+  /// Writes what a line held that goes; returns the bytes.
+  std::uint64_t write_back(const LineAccess& done, Bank& bank, Cycle at);
+  /// Keeps a bank for so many bytes from a cycle on, and for the time until `begin` before; the first in which all have
+  /// moved.
+  Cycle occupy(Bank& bank, Cycle from, Cycle begin, std::uint32_t bytes);
   /// The first cycle in which a request in one line has its data; `from` gets when its bank has begun on it.
   Cycle look_up(const MemoryRequest& access, Cycle arrival, Cycle& from);
 
@@ -45,9 +63,9 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
   SectoredCache& cache_;
   TimedMemoryPort memory_;
   std::vector<std::unique_ptr<Port>> ports_;
-  std::vector<BandwidthReservation> banks_;
-  std::vector<std::uint64_t> bank_bytes_;
-  std::vector<Fill> fills_;  ///< by line of the cache and sector
+  std::vector<Bank> banks_;
+  std::vector<Fill> fills_;       ///< by line of the cache and sector
+  Cycle quickest_write_ = never;  ///< below, in cycles: what takes longer waits for its turn
   StatisticSet statistics_;
 };
 

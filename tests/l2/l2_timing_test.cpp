@@ -11,6 +11,7 @@
 #include "l2/clocked_l2.h"
 
 #include <vrpipe/arithmetic/random.h>
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/simulation.h>
 
 #include "support/memory_initiators.h"
@@ -43,6 +44,7 @@ class L2Test : public ::testing::Test {
     units.clear();
     l2.reset();
     below.reset();
+    dram.reset();
     fresh_simulation();
     clock = std::make_unique<ClockDomain>("clock", 1000);
   }
@@ -57,8 +59,20 @@ class L2Test : public ::testing::Test {
     } else {
       l2 = std::make_unique<AnnotatedL2>("l2", *clock, std::move(behaviour), port_bytes);
     }
+    if (over_dram) {
+      dram = memory_unit_maker("dram")("dram", *clock, dram_behaviour(), {1, false, time == Time::clocked});
+      l2->below()->bind(dram->target(0));
+      return;
+    }
     below = std::make_unique<FixedLatencyMemory>("below", *clock, 40, 16, 1);
     l2->below()->bind(below->port(0));
+  }
+  /// Two channels of LPDDR3, 12.8 GB/s at the L2's 1 GHz.
+  static std::unique_ptr<Behaviour> dram_behaviour() {
+    const Implementation& implementation = Registry::instance().find("dram", "lpddr3-1600");
+    const auto parameters = implementation.make_parameters();
+    parameters->set("dram", "channels", "2");
+    return implementation.make_behaviour(*parameters, RenderContext());
   }
   /// When each access of each port completes.
   std::vector<std::vector<Cycle>> run(Time time, const std::vector<std::vector<Access>>& accesses) {
@@ -98,6 +112,8 @@ class L2Test : public ::testing::Test {
   std::unique_ptr<ClockDomain> clock;
   SectoredL2Parameters parameters;
   std::unique_ptr<FixedLatencyMemory> below;
+  bool over_dram = false;  ///< instead
+  std::unique_ptr<MemoryUnit> dram;
   std::unique_ptr<MemoryUnit> l2;
   SectoredL2* model = nullptr;
   std::vector<std::unique_ptr<ClockedInitiator>> units;
@@ -246,14 +262,15 @@ TEST_F(L2Test, TheOldestRequestOrTheNextPortGoesFirst) {
   EXPECT_LT(in_turn[1][0], in_turn[2][0]);
 }
 
-/// Random accesses of three ports to 64 lines, twice what the L2 holds, a seventh of them of attributes.
-std::vector<std::vector<Access>> random_accesses(std::uint64_t seed, Cycle apart) {
+/// Random accesses of three ports to so many lines, 64 of which are twice what the L2 holds; a seventh of them are of
+/// attributes.
+std::vector<std::vector<Access>> random_accesses(std::uint64_t seed, Cycle apart, std::uint64_t lines = 64) {
   std::vector<std::vector<Access>> accesses(3);
   Cycle at = 100;
   for (std::uint64_t i = 0; i < 600; ++i) {
     const std::uint64_t bits = mix(seed + i);
     const unsigned bytes = 16U << (bits % 4);
-    const std::uint64_t address = (bits >> 8) % (64 * line) / bytes * bytes;
+    const std::uint64_t address = (bits >> 8) % (lines * line) / bytes * bytes;
     Access access = (bits >> 40) % 3 == 0 ? write(at, address, bytes) : read(at, address, bytes);
     if (address / line % 7 == 0) access.request.origin.traffic = MemoryTraffic::attribute;
     accesses[bits >> 32 & 1].push_back(access);
@@ -310,6 +327,49 @@ TEST_P(L2AtEachFidelity, WhatItAsksForIsWhatTheMemoryBelowDelivers) {
     EXPECT_EQ(l2->memory_bytes().written, below->traffic().bytes().written);
     EXPECT_EQ(l2->memory_bytes().read, model->statistics().bytes_filled.value());
     EXPECT_EQ(l2->memory_bytes().written, model->statistics().bytes_written_back.value());
+  }
+}
+
+/// Accesses to lines one after the other, a sector of each, by two ports.
+std::vector<std::vector<Access>> stream(bool writes) {
+  std::vector<std::vector<Access>> accesses(2);
+  for (std::uint64_t i = 0; i < 800; ++i) {
+    accesses[i % 2].push_back(writes ? write(100 + i, i * line) : read(100 + i, i * line));
+  }
+  return accesses;
+}
+
+// Over a DRAM. Annotated, the ports ask one after the other, each for all of its time.
+TEST_F(L2Test, AnnotatedItTakesAsLongAsClockedWithFewMshrsAndPlacesForWriteBacks) {
+  struct Pattern {
+    const char* name;
+    std::vector<std::vector<Access>> accesses;
+    double tolerance;  ///< of the time that all of it takes
+  };
+  const Pattern patterns[] = {{"a stream that is read", stream(false), 0.1},
+                              {"a stream that is written", stream(true), 0.15},
+                              {"random", random_accesses(3, 1, 4096), 0.1},
+                              {"random, with pauses", random_accesses(4, 6, 4096), 0.1}};
+  set("bytes", "32768");
+  set("ways", "16");
+  over_dram = true;
+  for (const Pattern& pattern : patterns) {
+    const auto cycles = [&](Time time) {
+      start();
+      Cycle last = 0;
+      for (const auto& of_port : run(time, pattern.accesses)) {
+        for (const Cycle cycle : of_port) last = std::max(last, cycle);
+      }
+      return static_cast<double>(last - 100);
+    };
+    std::vector<double> with;  // so many MSHRs
+    for (const char* places : {"1", "2", "4", "64"}) {
+      set("mshrs", places);
+      set("write_backs", places);
+      with.push_back(cycles(Time::clocked));
+      EXPECT_NEAR(cycles(Time::annotated) / with.back(), 1, pattern.tolerance) << pattern.name << ", " << places;
+    }
+    EXPECT_GT(with[0], (&pattern == &patterns[1] ? 1.2 : 4) * with[3]) << pattern.name << ": writes need no fills";
   }
 }
 
