@@ -43,6 +43,7 @@ void DramChannel::append(Queue& queue, std::uint16_t index) {
   queue.banks |= 1U << entry.bank;
   const Bank& bank = banks_[entry.bank];
   if (list.hit == none && bank.open && bank.row == entry.row) list.hit = index;
+  update(queue, entry.bank);
 }
 
 void DramChannel::remove(Queue& queue, std::uint16_t index) {
@@ -52,6 +53,7 @@ void DramChannel::remove(Queue& queue, std::uint16_t index) {
   (entry.next == none ? list.last : queue.entries[entry.next].previous) = entry.previous;
   if (list.first == none) queue.banks &= ~(1U << entry.bank);
   if (list.hit == index) find_hit(queue, entry.bank, entry.next);
+  update(queue, entry.bank);
   --queue.linked;
   --queue.count;
   entry.next = queue.free;
@@ -83,8 +85,7 @@ void DramChannel::read(const DramAddress& place, std::uint32_t tag, Cycle now) {
   const std::uint16_t index = take_place(reads_, place, now);
   reads_.entries[index].tag = tag;
   append(reads_, index);
-  choose_mode();
-  chosen_ = false;
+  choose_again(reads_, place.bank);
 }
 
 void DramChannel::write(const DramAddress& place, Cycle now) {
@@ -111,8 +112,7 @@ void DramChannel::write(const DramAddress& place, Cycle now) {
     (held.last == none ? held.first : writes_.entries[held.last].next) = index;
     held.last = index;
   }
-  choose_mode();
-  chosen_ = false;
+  choose_again(writes_, place.bank);
 }
 
 void DramChannel::choose_mode() {
@@ -134,73 +134,169 @@ void DramChannel::choose_mode() {
   drains_since_ = now_;
 }
 
-void DramChannel::choose() {
-  chosen_ = true;
-  next_.at = never;
-  serves_ = none;
-  const Queue& queue = draining_ ? writes_ : reads_;
-  const Cycle from = std::max(now_, command_bus_);
-  // Which of the entries has waited too long, if any has.
-  std::uint16_t aged = none;
-  std::uint64_t oldest = ~std::uint64_t{0};
+namespace {
+
+// Turns of what can be given in the same cycle: ranks, then age.
+constexpr unsigned rank_shift = 62;
+constexpr unsigned bank_bits = 5;
+constexpr std::uint64_t for_the_aged = 0;
+constexpr std::uint64_t for_a_hit = std::uint64_t{1} << rank_shift;
+constexpr std::uint64_t for_another_row = std::uint64_t{2} << rank_shift;
+
+constexpr std::uint64_t turn_of(std::uint64_t rank, std::uint64_t sequence, unsigned bank) {
+  return rank | sequence << bank_bits | bank;
+}
+constexpr unsigned bank_of_turn(std::uint64_t turn) { return turn & ((1U << bank_bits) - 1); }
+
+}  // namespace
+
+void DramChannel::update(Queue& queue, unsigned bank) {
+  const List& list = queue.of_bank[bank];
+  if (list.first == none) return;
+  const Bank& state = banks_[bank];
+  const unsigned group = group_of(bank);
+  queue.ages_at = std::min(queue.ages_at, queue.entries[list.first].arrived + timing_.age_cap + 1);
+  if (state.open && list.hit != none) {
+    queue.turn[bank] = turn_of(for_a_hit, queue.entries[list.hit].sequence, bank);
+    queue.ready[bank] = state.next_column;
+    queue.limit[bank] = static_cast<std::uint8_t>(limit_of_data + group);
+    return;
+  }
+  queue.turn[bank] = turn_of(for_another_row, queue.entries[list.first].sequence, bank);
+  queue.ready[bank] = state.open ? state.next_precharge : state.next_activate;
+  queue.limit[bank] = static_cast<std::uint8_t>(state.open ? 0 : limit_of_activate + group);
+}
+
+DramChannel::Limits DramChannel::limits_of(Cycle from) const {
+  Limits limits;
+  limits[0] = from;
+  const auto& bus = draining_ ? next_write_ : next_read_;
+  const Cycle activate = std::max(from, activated_[oldest_activate_]);
+  for (unsigned group = 0; group < timing_.groups; ++group) {
+    limits[limit_of_data + group] = std::max(from, bus[group]);
+    limits[limit_of_activate + group] = std::max(activate, next_activate_[group]);
+  }
+  return limits;
+}
+
+// In two passes of minima: branches on what is random would be mispredicted.
+DramChannel::Candidate DramChannel::choose_of(const Queue& queue, std::uint32_t banks, const Limits& limits) const {
+  std::array<Cycle, most_banks> cycles;
+  Candidate best;
+  for (std::uint32_t left = banks; left != 0; left &= left - 1) {
+    const auto bank = static_cast<unsigned>(__builtin_ctz(left));
+    cycles[bank] = std::max(queue.ready[bank], limits[queue.limit[bank]]);
+    best.at = std::min(best.at, cycles[bank]);
+  }
+  for (std::uint32_t left = banks; left != 0; left &= left - 1) {
+    const auto bank = static_cast<unsigned>(__builtin_ctz(left));
+    const std::uint64_t others = cycles[bank] == best.at ? 0 : ~std::uint64_t{0};
+    best.turn = std::min(best.turn, queue.turn[bank] | others);
+  }
+  return best;
+}
+
+// Bursts come in the order of their sequence, so the oldest has waited for the longest time.
+std::uint16_t DramChannel::aged(Queue& queue) const {
+  if (now_ < queue.ages_at) return none;
+  std::uint16_t oldest = none;
   for (std::uint32_t banks = queue.banks; banks != 0; banks &= banks - 1) {
     const std::uint16_t first = queue.of_bank[static_cast<unsigned>(__builtin_ctz(banks))].first;
-    const Entry& entry = queue.entries[first];
-    if (entry.sequence >= oldest) continue;
-    oldest = entry.sequence;
-    aged = now_ - entry.arrived > timing_.age_cap ? first : none;
+    if (oldest == none || queue.entries[first].sequence < queue.entries[oldest].sequence) oldest = first;
   }
-  // Ranks of what can be given in the same cycle.
-  constexpr unsigned for_the_aged = 0;
-  constexpr unsigned for_a_hit = 1;
-  constexpr unsigned for_another_row = 2;
-  constexpr unsigned for_nobody = 3;
-  unsigned best_rank = 0;
-  std::uint64_t best_sequence = 0;
-  const auto consider = [&](Cycle at, unsigned rank, std::uint64_t sequence, Kind kind, unsigned bank,
-                            std::uint16_t entry) {
-    at = std::max(at, from);
-    if (at > next_.at) return;
-    if (at == next_.at && (rank > best_rank || (rank == best_rank && sequence > best_sequence))) return;
-    next_.at = at;
-    next_.kind = kind;
-    next_.bank = bank;
-    serves_ = entry;
-    best_rank = rank;
-    best_sequence = sequence;
-  };
-  for (std::uint32_t banks = queue.banks; banks != 0; banks &= banks - 1) {
-    const auto number = static_cast<unsigned>(__builtin_ctz(banks));
-    const Bank& bank = banks_[number];
-    const List& list = queue.of_bank[number];
-    const bool is_aged = aged != none && list.first == aged;
-    const std::uint16_t hit = is_aged     ? (bank.open && queue.entries[aged].row == bank.row ? aged : none)
-                              : bank.open ? list.hit
-                                          : none;
-    const unsigned group = group_of(number);
-    if (hit != none) {
-      const Cycle bus = draining_ ? next_write_[group] : next_read_[group];
-      consider(std::max(bus, bank.next_column), for_a_hit, queue.entries[hit].sequence,
-               draining_ ? Kind::write : Kind::read, number, hit);
-      continue;
-    }
-    const unsigned rank = is_aged ? for_the_aged : for_another_row;
-    const std::uint64_t sequence = queue.entries[list.first].sequence;
-    if (bank.open) {
-      consider(bank.next_precharge, rank, sequence, Kind::precharge, number, list.first);
-    } else {
-      const Cycle at = std::max({bank.next_activate, next_activate_[group], activated_[oldest_activate_]});
-      consider(at, rank, sequence, Kind::activate, number, list.first);
-    }
+  queue.ages_at = oldest == none ? never : queue.entries[oldest].arrived + timing_.age_cap + 1;
+  return now_ < queue.ages_at ? none : oldest;
+}
+
+// The channel has advanced to its cycle, so that nothing that was not chosen could be given before what was.
+void DramChannel::choose_again(Queue& queue, unsigned bank) {
+  const bool drained = draining_;
+  choose_mode();
+  Queue& served = draining_ ? writes_ : reads_;
+  if (!chosen_ || !is_best_ || draining_ != drained || now_ >= served.ages_at) {
+    chosen_ = false;
+    return;
   }
-  if (timing_.closes_rows) {
-    for (std::uint32_t banks = open_banks_; banks != 0; banks &= banks - 1) {
-      const auto number = static_cast<unsigned>(__builtin_ctz(banks));
-      if (reads_.of_bank[number].hit != none || writes_.of_bank[number].hit != none) continue;
-      consider(banks_[number].next_precharge, for_nobody, number, Kind::precharge, number, none);
-    }
+  if (&queue != &served || queue.of_bank[bank].first == none) return;
+  if (best_.at != never && bank == bank_of_turn(best_.turn)) {
+    chosen_ = false;
+    return;
   }
+  const Cycle from = std::max(now_, command_bus_);
+  const Candidate candidate{std::max({from, queue.ready[bank], limit_of(queue.limit[bank])}), queue.turn[bank]};
+  if (!candidate.goes_before(best_)) return;
+  best_ = candidate;
+  take(queue, candidate);
+  if (next_.at < next_refresh_) return;
+  is_best_ = false;
+  choose_refresh();
+}
+
+Cycle DramChannel::limit_of(unsigned limit) const {
+  if (limit >= limit_of_activate)
+    return std::max(next_activate_[limit - limit_of_activate], activated_[oldest_activate_]);
+  if (limit >= limit_of_data) return (draining_ ? next_write_ : next_read_)[limit - limit_of_data];
+  return 0;
+}
+
+void DramChannel::choose() {
+  chosen_ = true;
+  Queue& queue = draining_ ? writes_ : reads_;
+  const Cycle from = std::max(now_, command_bus_);
+  const Limits limits = limits_of(from);
+  const std::uint16_t waited_too_long = aged(queue);
+  if (waited_too_long != none) {
+    choose_for(queue, waited_too_long, limits);
+  } else {
+    best_ = choose_of(queue, queue.banks, limits);
+    take(queue, best_);
+  }
+  is_best_ = waited_too_long == none && !timing_.closes_rows && next_.at < next_refresh_;
+  if (timing_.closes_rows) choose_to_close(from);
   if (next_.at >= next_refresh_) choose_refresh();
+}
+
+void DramChannel::take(const Queue& queue, const Candidate& candidate) {
+  next_.at = candidate.at;
+  serves_ = none;
+  if (candidate.at == never) return;
+  next_.bank = bank_of_turn(candidate.turn);
+  const List& list = queue.of_bank[next_.bank];
+  const Bank& bank = banks_[next_.bank];
+  const bool hits = bank.open && list.hit != none;
+  serves_ = hits ? list.hit : list.first;
+  next_.kind = !hits ? (bank.open ? Kind::precharge : Kind::activate) : draining_ ? Kind::write : Kind::read;
+}
+
+// The bank of who has waited too long serves nobody else.
+void DramChannel::choose_for(const Queue& queue, std::uint16_t aged, const Limits& limits) {
+  const Entry& entry = queue.entries[aged];
+  const Bank& bank = banks_[entry.bank];
+  const unsigned group = group_of(entry.bank);
+  const bool hits = bank.open && entry.row == bank.row;
+  const Cycle ready = hits ? bank.next_column : bank.open ? bank.next_precharge : bank.next_activate;
+  const Cycle limit = limits[hits ? limit_of_data + group : bank.open ? 0 : limit_of_activate + group];
+  const Candidate of_aged{std::max(ready, limit), turn_of(hits ? for_a_hit : for_the_aged, entry.sequence, entry.bank)};
+  const Candidate of_others = choose_of(queue, queue.banks & ~(1U << entry.bank), limits);
+  if (of_others.goes_before(of_aged)) return take(queue, of_others);
+  next_.at = of_aged.at;
+  next_.bank = entry.bank;
+  next_.kind = !hits ? (bank.open ? Kind::precharge : Kind::activate) : draining_ ? Kind::write : Kind::read;
+  serves_ = aged;
+}
+
+// What somebody waits for goes before it.
+void DramChannel::choose_to_close(Cycle from) {
+  for (std::uint32_t banks = open_banks_; banks != 0; banks &= banks - 1) {
+    const auto bank = static_cast<unsigned>(__builtin_ctz(banks));
+    if (reads_.of_bank[bank].hit != none || writes_.of_bank[bank].hit != none) continue;
+    const Cycle at = std::max(from, banks_[bank].next_precharge);
+    if (at >= next_.at) continue;
+    next_.at = at;
+    next_.bank = bank;
+    next_.kind = Kind::precharge;
+    serves_ = none;
+  }
 }
 
 void DramChannel::choose_refresh() {
@@ -231,6 +327,7 @@ void DramChannel::issue() {
       banks_[next_.bank].conflict = serves_ != none;
       open_banks_ &= ~(1U << next_.bank);
       close_bank(banks_[next_.bank], at, timing_.rp);
+      update(next_.bank);
       break;
     case Kind::precharge_all:
       ++statistics_.precharges;
@@ -239,6 +336,7 @@ void DramChannel::issue() {
         close_bank(bank, at, timing_.rp_all);
       }
       open_banks_ = 0;
+      for (unsigned bank = 0; bank < timing_.banks; ++bank) update(bank);
       break;
     case Kind::refresh: refresh(at); break;
   }
@@ -266,6 +364,7 @@ void DramChannel::activate(Cycle at) {
   oldest_activate_ = (oldest_activate_ + 1) & 3U;
   find_hit(reads_, next_.bank, reads_.of_bank[next_.bank].first);
   find_hit(writes_, next_.bank, writes_.of_bank[next_.bank].first);
+  update(next_.bank);
 }
 
 void DramChannel::move_data(Cycle at) {
@@ -290,6 +389,7 @@ void DramChannel::move_data(Cycle at) {
                                   : statistics_.row_conflicts);
   statistics_.data_cycles += timing_.burst;
   remove(queue, serves_);
+  update(draining_ ? reads_ : writes_, entry.bank);
   if (draining_) {
     ++statistics_.writes;
     ++drained_;
@@ -319,7 +419,10 @@ void DramChannel::close_bank(Bank& bank, Cycle at, Cycle distance) {
 void DramChannel::refresh(Cycle at) {
   ++statistics_.refreshes;
   next_refresh_ += timing_.refi;
-  for (unsigned bank = 0; bank < timing_.banks; ++bank) banks_[bank].next_activate = at + timing_.rfc;
+  for (unsigned bank = 0; bank < timing_.banks; ++bank) {
+    banks_[bank].next_activate = at + timing_.rfc;
+    update(bank);
+  }
 }
 
 void DramChannel::close(Cycle end) {

@@ -105,10 +105,15 @@ class DramChannel {
     explicit Queue(unsigned capacity);
     std::vector<Entry> entries;
     std::array<List, most_banks> of_bank{};
-    std::uint32_t banks = 0;  ///< that have any, a bit each
-    unsigned count = 0;       ///< of places taken
-    unsigned linked = 0;      ///< of entries in the lists: those that may be served
-    std::uint16_t free = 0;   ///< the first of the free places
+    // What each bank wants next, kept as it changes.
+    std::array<Cycle, most_banks> ready{};         ///< as far as the bank is concerned
+    std::array<std::uint8_t, most_banks> limit{};  ///< as far as others are: of `Limits`
+    std::array<std::uint64_t, most_banks> turn{};  ///< among those of the same cycle: rank, sequence, bank
+    Cycle ages_at = never;                         ///< before it nobody has waited too long
+    std::uint32_t banks = 0;                       ///< that have any, a bit each
+    unsigned count = 0;                            ///< of places taken
+    unsigned linked = 0;                           ///< of entries in the lists: those that may be served
+    std::uint16_t free = 0;                        ///< the first of the free places
   };
   struct Bank {
     bool open = false;
@@ -125,6 +130,31 @@ class DramChannel {
   void choose_mode();
   void choose();
   void choose_refresh();
+  /// Bounds of the cycles of commands, by what they need: nothing but the bus, to move data in a group, to activate in
+  /// one.
+  using Limits = std::array<Cycle, 1 + 2 * most_groups>;
+  static constexpr unsigned limit_of_data = 1;
+  static constexpr unsigned limit_of_activate = 1 + most_groups;
+  Limits limits_of(Cycle from) const;
+  Cycle limit_of(unsigned limit) const;
+  /// A command that may be given, and its turn.
+  struct Candidate {
+    Cycle at = never;
+    std::uint64_t turn = ~std::uint64_t{0};
+    bool goes_before(const Candidate& other) const { return at < other.at || (at == other.at && turn < other.turn); }
+  };
+  Candidate choose_of(const Queue& queue, std::uint32_t banks, const Limits& limits) const;
+  std::uint16_t aged(Queue& queue) const;
+  void choose_for(const Queue& queue, std::uint16_t aged, const Limits& limits);
+  void take(const Queue& queue, const Candidate& candidate);
+  void choose_to_close(Cycle from);
+  /// After a burst has come: chooses again, if that may change what was chosen.
+  void choose_again(Queue& queue, unsigned bank);
+  void update(Queue& queue, unsigned bank);
+  void update(unsigned bank) {
+    update(reads_, bank);
+    update(writes_, bank);
+  }
   void issue();
   void activate(Cycle at);
   void move_data(Cycle at);
@@ -155,7 +185,9 @@ class DramChannel {
   Cycle command_bus_ = 0;     ///< is free from then on
   Cycle now_ = 0;             ///< of the last command or burst
 
-  bool chosen_ = false;  ///< `next_` and
+  bool chosen_ = false;   ///< `next_` and
+  bool is_best_ = false;  ///< it is for `best_`: nobody has waited too long, nothing is refreshed or closed
+  Candidate best_;
   DramCommand next_;
   std::uint16_t serves_ = none;  ///< the entry that it is for
   Ring<Completion> completions_;
