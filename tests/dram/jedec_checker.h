@@ -16,7 +16,7 @@ class JedecChecker : public DramCommandObserver {
  public:
   explicit JedecChecker(const DramParameters& parameters) : p_(parameters) {
     const double longest = p_.tcwl_ps + p_.tdqss_ps + p_.twr_ps + p_.trfc_ps + p_.trc_ps + p_.tfaw_ps + p_.tcl_ps;
-    window_ = cycles(static_cast<std::uint64_t>(longest)) + 64;
+    window_ = static_cast<Cycle>(cycles(static_cast<std::uint64_t>(longest))) + 64;
   }
 
   void issued(const DramCommand& command) override { check(command); }

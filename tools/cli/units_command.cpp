@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <map>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -26,6 +27,23 @@ bool is_default(const ParameterListing& unit) {
   return default_implementation(registry.slot(unit.unit), variant_named("het+qm")).name == unit.implementation;
 }
 
+/// A platform, and what it has in its slots.
+struct Used {
+  explicit Used(const Platform& of) : platform(of) {
+    RunRequest request;
+    request.platform = &of;
+    request.variant = variant_named("het+qm");
+    for (auto& [slot, name] : Configuration(request, Frame(16, 16)).implementations()) names[slot] = std::move(name);
+  }
+  /// Whether the unit is in its slot; of a slot that the platform is without, whether it is the default.
+  bool has(const ParameterListing& unit) const {
+    const auto found = names.find(unit.unit);
+    return found == names.end() ? is_default(unit) : found->second == unit.implementation;
+  }
+  const Platform& platform;
+  std::map<std::string, std::string> names;  ///< of implementations, by slot
+};
+
 /// With the formula, where it has one.
 std::string meaning_of(const StatisticReport& statistic) {
   return statistic.meaning + (statistic.formula.empty() ? "" : ": " + statistic.formula);
@@ -43,21 +61,24 @@ std::string heading(const ParameterListing& unit) {
 }
 
 /// How a heading calls the unit's part in a run; starts with a blank unless it is empty.
-std::string role(const ParameterListing& unit) {
+std::string role(const ParameterListing& unit, const Used& used) {
   if (unit.implementation.empty()) return "";
-  return is_default(unit) ? " (default)" : unit.pass_through ? " (where a variant does without the unit)" : "";
+  if (used.has(unit)) return is_default(unit) ? " (default)" : " (on " + used.platform.name + ")";
+  if (is_default(unit)) return " (default on other platforms)";
+  return unit.pass_through ? " (where a variant does without the unit)" : "";
 }
 
-std::string as_text(const std::vector<ParameterListing>& units, const std::string& platform, const TextStyle& style) {
+std::string as_text(const std::vector<ParameterListing>& units, const Used& used, const TextStyle& style) {
   std::string text;
   for (const ParameterListing& unit : units) {
     if (!text.empty()) text += '\n';
-    text += style.bold(printable(heading(unit))) + role(unit) + "\n  " + printable(unit.description) + "\n";
+    text += style.bold(printable(heading(unit))) + printable(role(unit, used)) + "\n  " + printable(unit.description) +
+            "\n";
     for (const Parameter* parameter : unit.parameters->parameters()) {
       text += fmt::format("  {} = {}", style.bold(unit.unit + "." + parameter->name()),
                           with_unit(parameter->value(), *parameter));
       if (parameter->value() != parameter->default_value()) {
-        text += fmt::format(" on {}, by default {}", platform, parameter->default_value());
+        text += fmt::format(" on {}, by default {}", used.platform.name, parameter->default_value());
       }
       text += fmt::format("; {}\n      {}\n      default from: {}\n", parameter->range(),
                           printable(parameter->meaning()), printable(parameter->source()));
@@ -81,7 +102,7 @@ std::string escaped(const std::string& text) {
 }
 
 /// The reference that the documentation holds, a table for each implementation.
-std::string as_markdown(const std::vector<ParameterListing>& units) {
+std::string as_markdown(const std::vector<ParameterListing>& units, const Used& used) {
   std::string text;
   std::string slot;
   for (const ParameterListing& unit : units) {
@@ -91,7 +112,7 @@ std::string as_markdown(const std::vector<ParameterListing>& units) {
       slot = chapter;
       text += "## " + slot + "\n\n";
     }
-    text += fmt::format("### `{}`{}\n\n{}.\n", heading(unit), role(unit), escaped(unit.description));
+    text += fmt::format("### `{}`{}\n\n{}.\n", heading(unit), role(unit, used), escaped(unit.description));
     if (!unit.parameters->parameters().empty()) {
       text += "\n| parameter | default | unit | allowed | meaning | default from |\n|---|---|---|---|---|---|\n";
     }
@@ -110,7 +131,7 @@ std::string as_markdown(const std::vector<ParameterListing>& units) {
   return text;
 }
 
-Json as_json(const std::vector<ParameterListing>& units, const std::string& platform) {
+Json as_json(const std::vector<ParameterListing>& units, const Used& used) {
   Json list = Json::array();
   for (const ParameterListing& unit : units) {
     Json parameters = Json::array();
@@ -135,11 +156,12 @@ Json as_json(const std::vector<ParameterListing>& units, const std::string& plat
                     {"implementation", unit.implementation},
                     {"description", unit.description},
                     {"default", is_default(unit)},
+                    {"used", used.has(unit)},
                     {"pass_through", unit.pass_through},
                     {"parameters", std::move(parameters)},
                     {"statistics", std::move(statistics)}});
   }
-  return {{"schema", "vrpipe.units/1"}, {"platform", platform}, {"units", std::move(list)}};
+  return {{"schema", "vrpipe.units/1"}, {"platform", used.platform.name}, {"units", std::move(list)}};
 }
 
 class UnitsCommand : public Command {
@@ -183,8 +205,9 @@ class UnitsCommand : public Command {
     std::string text;
     {
       const StdoutToStderr redirected;  // plugins may print while their units are made
-      json = as_json(units, platform.name);
-      text = markdown_ ? as_markdown(units) : as_text(units, platform.name, style);
+      const Used used(platform);
+      json = as_json(units, used);
+      text = markdown_ ? as_markdown(units, used) : as_text(units, used, style);
     }
     print_listing(json, text, json_, plugins_);
   }
