@@ -30,8 +30,8 @@ AddressMap address_map(const Frame& frame, ColorFormat format) {
   return map;
 }
 
-DepthStencilSurface::DepthStencilSurface(std::uint32_t width, std::uint32_t height)
-    : grid_(width, height), terminated_(grid_.quads()) {}
+DepthStencilSurface::DepthStencilSurface(std::uint32_t width, std::uint32_t height, std::uint64_t address)
+    : grid_(width, height), address_(address), terminated_(grid_.quads()) {}
 
 void DepthStencilSurface::clear_termination(const Placement& placement) {
   for (std::size_t tile = 0; tile < grid_.tiles(); ++tile) {
@@ -42,13 +42,12 @@ void DepthStencilSurface::clear_termination(const Placement& placement) {
 }
 
 std::uint64_t DepthStencilSurface::size_bytes(std::uint32_t width, std::uint32_t height) {
-  constexpr std::uint64_t bytes_per_quad = 16;
   return ScreenTiling(width, height).quads() * bytes_per_quad;
 }
 
 Framebuffer::Framebuffer(const Frame& frame, ColorFormat format)
-    : color(frame.width(), frame.height(), format),
-      depth_stencil(frame.width(), frame.height()),
-      addresses(address_map(frame, format)) {}
+    : addresses(address_map(frame, format)),
+      color(frame.width(), frame.height(), format),
+      depth_stencil(frame.width(), frame.height(), addresses.depth_stencil.address) {}
 
 }  // namespace vrpipe

@@ -46,6 +46,22 @@ void AttributeFetch::check() const {
   l1.check("L1 of an SM", "sm", "l1_bytes");
 }
 
+void ZCache::check() const {
+  organization.check("z-cache", "zrop", "cache_bytes");
+  if (organization.line_bytes > DepthStencilSurface::bytes_per_tile) {
+    throw UserError("unusable z-cache", "zrop.line_bytes",
+                    fmt::format("a line of {} bytes is of several screen tiles, which may be other GPCs'",
+                                organization.line_bytes),
+                    fmt::format("use lines of at most {}", DepthStencilSurface::bytes_per_tile));
+  }
+  if (organization.sector_bytes < DepthStencilSurface::bytes_per_quad) {
+    throw UserError("unusable z-cache", "zrop.sector_bytes",
+                    fmt::format("a quad of {} bytes does not fit into a sector of {}",
+                                DepthStencilSurface::bytes_per_quad, organization.sector_bytes),
+                    "use larger sectors");
+  }
+}
+
 CacheOrganization CropBehaviour::TimingParameters::cache() const {
   CacheOrganization made;
   made.bytes = cache_bytes;

@@ -74,7 +74,7 @@ template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
   if (!cache_) {
     cache_.emplace(timing_.cache(), cache_statistics);
-    sectors_of_quads_ = sectors_of_quads(timing_, *surface_);
+    sectors_of_quads_ = sectors_of_quads(timing_.cache(), 4 * bytes_per_pixel(Format));
   }
   const std::uint64_t tile = surface_->address(warp.tile, 0);
   // Where a line of the tile is in `out.lines`, if it is there. Without branches, which would be mispredicted.

@@ -4,11 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "quad_sectors.h"
-
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/memory/sectored_cache.h>
+#include <vrpipe/pipeline/quad_sectors.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/pipeline/units.h>
 

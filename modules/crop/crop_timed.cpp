@@ -1,8 +1,7 @@
 #include <algorithm>
 #include <array>
 
-#include <vrpipe/memory/sectors.h>
-#include <vrpipe/model/timed.h>
+#include <vrpipe/model/timed_cache_port.h>
 #include <vrpipe/pipeline/order_monitor.h>
 
 namespace vrpipe {
@@ -22,24 +21,23 @@ class TimedCrop : public TimedUnit {
         in_(*this, "in_color",
             [this](const ShadedWarpItem& item, CycleInterval visible) { return take(*item.warp, visible); }, {&out_}),
         behaviour_(std::move(behaviour)),
-        cache_statistics_(dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics),
         timing_(behaviour_->timing()),
         // A hazard is one of quads.
         at_once_(timing_.forwards ? quads_looked_up_at_once(timing_) : 1),
-        memory_(*this, "memory", {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}),
+        memory_(*this, "memory", timing_.mshrs,
+                at_once_ == 1 ? 1 : std::min(timing_.line_bytes / timing_.sector_bytes, timing_.mshrs),
+                timing_.sector_bytes, dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics,
+                {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}),
         look_ups_(timing_.blend_rate.most_in_a_cycle()),
         queue_(timing_.input_quads),
-        mshrs_(timing_.mshrs),
         blending_(static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_))),
         price_(timing_.blend_rate.cycles * timing_.sectors_per_cycle),
-        lines_(std::max(timing_.cache_bytes / timing_.line_bytes, 1U)),
-        longest_run_(at_once_ == 1 ? 1 : std::min(timing_.line_bytes / timing_.sector_bytes, timing_.mshrs)),
-        sector_shift_(static_cast<unsigned>(__builtin_ctz(timing_.sector_bytes))) {
+        lines_(std::max(timing_.cache_bytes / timing_.line_bytes, 1U)) {
     out_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.blend_rate));
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
-  tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket; }
+  tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket(); }
   MemoryBytes memory_bytes() const override { return memory_.moved(); }
   bool ends_frame() const override { return true; }
   Cycle end_of_frame() const override { return end_; }
@@ -91,14 +89,13 @@ class TimedCrop : public TimedUnit {
     CycleInterval looked_up = look_ups_.take(at, quads);
     looked_up.last = std::max(looked_up.last, visible.last);
     Cycle there = looked_up.first + 1;
-    moved_ = 0;
     for (unsigned line = 0; line < cache_.count; ++line) {
       const CropBehaviour::LineAccess& access = cache_.lines[line];
-      if (access.written_back != 0) write_back(access, looked_up.last);
-      if (access.filled != 0) there = std::max(there, fill(access, looked_up.last));
+      if (access.written_back != 0) memory_.write_back(access, looked_up.last);
+      if (access.filled != 0) there = std::max(there, memory_.fill(access, looked_up.last));
     }
     look_ups_.hold(looked_up.last);
-    if (moved_ > 0) moves_.push({looked_up.last, moved_});
+    if (const unsigned moved = memory_.take_moved(); moved > 0) moves_.push({looked_up.last, moved});
 
     charge(UnitState::starved, looked_up.first + 1);
     if (out_.last() > there) {
@@ -164,35 +161,6 @@ class TimedCrop : public TimedUnit {
     if (beat.count > 0) out_.send(beat, at.last);
   }
 
-  /// Reads the sectors that a line does without; returns when they are there, and in `at` when the last was asked for.
-  Cycle fill(const CropBehaviour::LineAccess& access, Cycle& at) {
-    Cycle there = 0;
-    for_each_run(access.filled, [&](unsigned sector, unsigned sectors) {
-      at = mshrs_.free_from(at, sectors);
-      there = memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
-      for (unsigned i = 0; i < sectors; ++i) cache_statistics_.fill_cycles.see(there - at);
-      mshrs_.take(sectors, there);
-      moved_ += sectors;
-    });
-    return there;
-  }
-
-  void write_back(const CropBehaviour::LineAccess& access, Cycle at) {
-    for_each_run(access.written_back, [&](unsigned sector, unsigned sectors) {
-      memory_.write(access.old_address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
-      moved_ += sectors;
-    });
-  }
-
-  /// Neighbouring sectors of a line, as many as one naturally aligned access takes.
-  template <class Access>
-  void for_each_run(std::uint32_t mask, Access&& access) const {
-    while (mask != 0) {
-      const SectorRun run = take_sector_run(mask, longest_run_);
-      access(run.first, run.count);
-    }
-  }
-
   /// The cycle in which a quad of the same position has left the blending pipeline.
   [[gnu::noinline]] Cycle hazard_until(TileId tile, std::uint8_t position) {
     while (!recent_.empty() && recent_.front().at + timing_.latency_cycles <= last_blend_) recent_.pop();
@@ -218,23 +186,18 @@ class TimedCrop : public TimedUnit {
   TimedOut<TerminationBeat> out_;
   TimedIn<ShadedWarpItem> in_;
   std::unique_ptr<CropBehaviour> behaviour_;
-  SectoredCacheStatistics& cache_statistics_;
   const CropBehaviour::TimingParameters timing_;
   const unsigned at_once_;  ///< quads looked up before the first of them is blended
-  TimedMemoryPort memory_;
+  TimedCachePort memory_;
   std::unique_ptr<BlendOrderMonitor> monitor_;
   CropBehaviour::CacheLookUp cache_;
   ThroughputPort look_ups_;
   SlotPool queue_;            ///< quads between look-up and blending
-  SlotPool mshrs_;            ///< sectors being filled
   ThroughputPort blending_;   ///< in parts of a cycle that both a quad and a sector are whole numbers of
   const unsigned price_;      ///< of blending a quad, in these
-  unsigned moved_ = 0;        ///< sectors, for the quads in hand
   Ring<Move> moves_;          ///< of sectors, that blending has not given its time to yet
   std::vector<Cycle> lines_;  ///< of the cache: the last blend of a quad that needed it
-  const unsigned longest_run_;
-  const unsigned sector_shift_;
-  Ring<Recent> recent_;  ///< blends in the pipeline, without forwarding
+  Ring<Recent> recent_;       ///< blends in the pipeline, without forwarding
   Cycle last_blend_ = 0;
   Cycle end_ = never;
   bool any_blended_ = false;

@@ -1,13 +1,11 @@
 #include <algorithm>
 #include <optional>
 
-#include "crop/quad_sectors.h"
-
 #include <vrpipe/kernel/ring.h>
-#include <vrpipe/memory/memory_port.h>
-#include <vrpipe/memory/sectored_cache.h>
+#include <vrpipe/memory/cache_port.h>
 #include <vrpipe/model/unit.h>
 #include <vrpipe/pipeline/order_monitor.h>
+#include <vrpipe/pipeline/quad_sectors.h>
 
 namespace vrpipe {
 
@@ -32,16 +30,15 @@ class CropUnit : public Unit {
         sector_price_(timing_.blend_rate.items),
         income_(static_cast<std::int64_t>(CropWork::parts_of_a_cycle(timing_))),
         most_in_a_cycle_(timing_.blend_rate.most_in_a_cycle()),
-        longest_run_(timing_.line_bytes / timing_.sector_bytes),
-        memory_(*this, "memory", 2 * timing_.mshrs,
-                {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
+        port_(*this, "memory", timing_.mshrs,
+              {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
     out_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.blend_rate));
   }
 
   bool idle() const override { return in_.empty() && queue_.empty() && marks_.empty(); }
   Behaviour& behaviour() override { return *behaviour_; }
-  tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket; }
-  MemoryBytes memory_bytes() const override { return memory_.moved(); }
+  tlm::tlm_initiator_socket<32>* memory_socket() override { return &port_.socket(); }
+  MemoryBytes memory_bytes() const override { return port_.moved(); }
   bool ends_frame() const override { return true; }
   Cycle end_of_frame() const override { return end_; }
 
@@ -53,92 +50,36 @@ class CropUnit : public Unit {
     std::uint32_t sectors = 0;  ///< of the line, a bit each
     std::uint32_t place = 0;    ///< in the surface's grid
   };
-  // What a memory access is for: a sector of a line, or nothing that anyone waits for.
-  static constexpr std::uint32_t write_back_tag = ~0U;
-  static constexpr unsigned sector_bits = 5;
-  static std::uint32_t fill_tag(SectoredCache::Line line, unsigned sector) { return line << sector_bits | sector; }
 
   void end_of_elaboration() override {
     surface_ = behaviour_->surface();
     if (surface_ == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
-    sector_shift_ = static_cast<unsigned>(__builtin_ctz(timing_.sector_bytes));
     line_shift_ = static_cast<unsigned>(__builtin_ctz(timing_.line_bytes));
     timing_.check_cache(surface_->format());
-    cache_statistics_ = &dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics;
-    cache_.emplace(timing_.cache(), *cache_statistics_);
-    asked_at_.resize(std::size_t{timing_.cache().lines()} * longest_run_);
-    sectors_of_quads_ = sectors_of_quads(timing_, *surface_);
+    port_.make_cache(timing_.cache(), dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics);
+    sectors_of_quads_ = sectors_of_quads(timing_.cache(), 4 * bytes_per_pixel(surface_->format()));
     sectors_of_a_quad_ = static_cast<unsigned>(__builtin_popcount(sectors_of_quads_.front().sectors));
     monitor_.emplace(surface_->width(), surface_->height());
   }
 
-  /// The cycle in which a sector that is on its way was asked for.
-  Cycle& asked_at(SectoredCache::Line line, unsigned sector) {
-    return asked_at_[std::size_t{line} * longest_run_ + sector];
-  }
-
-  void finish_fills() {
-    std::uint32_t tag = 0;
-    while (memory_.next_completed(tag)) {
-      if (tag == write_back_tag) continue;
-      const SectoredCache::Line line = tag >> sector_bits;
-      const unsigned sector = tag & ((1U << sector_bits) - 1);
-      cache_->finish_fill(line, sector);
-      cache_statistics_->fill_cycles.see(now() - asked_at(line, sector));
-      --fills_in_flight_;
-    }
-  }
-
-  /// The line of a quad, allocated if need be; `no_line` when that has to wait.
-  SectoredCache::Line line_of(std::uint64_t address) {
-    const SectoredCache::Line found = cache_->find(address);
-    if (found != SectoredCache::no_line) return found;
-    if (!cache_->can_allocate(address) || !memory_.available()) return SectoredCache::no_line;
-    SectoredCache::Evicted evicted;
-    const SectoredCache::Line line = cache_->allocate(address, evicted);
-    write_back_ = evicted.dirty;
-    write_back_address_ = evicted.address;
-    return line;
-  }
-
-  /// Sends the dirty sectors of an evicted line; false while some are left.
-  bool write_back() {
-    while (write_back_ != 0 && memory_.available()) {
-      const SectorRun run = take_sector_run(write_back_, longest_run_);
-      memory_.write(write_back_address_ + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_,
-                    write_back_tag);
-      tokens_ -= run.count * sector_price_;
-      did(CropWork::sectors, run.count, now());
-    }
-    return write_back_ == 0;
-  }
-
   /// Takes a quad from the link into the queue; false when it has to wait.
   bool look_up(const ColorQuad& quad) {
-    if (!write_back()) return false;
     const unsigned position = quad.position();
     const std::size_t tile = surface_->grid().place(quad.warp->tile, 0);
     const auto [line_of_tile, sectors] = sectors_of_quads_[position];
-    const std::uint64_t address = surface_->address(tile) + (std::uint64_t{line_of_tile} << line_shift_);
-    const SectoredCache::Line line = line_of(address);
-    if (line == SectoredCache::no_line) return false;
-    for (std::uint32_t missing = sectors & cache_->absent(line); missing != 0; missing &= missing - 1) {
-      if (!memory_.available() || fills_in_flight_ == timing_.mshrs) return false;
-      const auto sector = static_cast<unsigned>(__builtin_ctz(missing));
-      memory_.read(address + (std::uint64_t{sector} << sector_shift_), timing_.sector_bytes, fill_tag(line, sector));
-      cache_->start_fill(line, sector);
-      asked_at(line, sector) = now();
-      asked_for_ |= 1U << sector;
-      ++fills_in_flight_;
-      tokens_ -= sector_price_;
-      did(CropWork::sectors, 1, now());
-    }
-    cache_->pin(line);
-    cache_->looked_up(line, sectors);
-    if (const std::uint32_t on_their_way = cache_->filling(line) & sectors & ~asked_for_; on_their_way != 0) {
+    wanted_.address = surface_->address(tile) + (std::uint64_t{line_of_tile} << line_shift_);
+    wanted_.sectors = sectors;
+    const bool done = port_.look_up(wanted_, now(), [this](unsigned moved) {
+      tokens_ -= moved * sector_price_;
+      did(CropWork::sectors, moved, now());
+    });
+    if (!done) return false;
+    const SectoredCache::Line line = wanted_.line;
+    if (const std::uint32_t on_their_way = port_.awaited(line, sectors) & ~wanted_.asked_for; on_their_way != 0) {
       hits_on_their_way_ += static_cast<unsigned>(__builtin_popcount(on_their_way));
     }
-    asked_for_ = 0;
+    wanted_.line = SectoredCache::no_line;
+    wanted_.asked_for = 0;
     // In place: a temporary of narrow stores would be waited for when it is copied.
     Entry& entry = queue_.push();
     entry.quad = quad;
@@ -164,7 +105,7 @@ class CropUnit : public Unit {
         moved = true;
       }
       if (at_ == beat.count) {
-        cache_->accessed(at_, at_ * sectors_of_a_quad_);
+        port_.cache().accessed(at_, at_ * sectors_of_a_quad_);
         in_.pop();
         at_ = 0;
       }
@@ -210,7 +151,7 @@ class CropUnit : public Unit {
         stop_ = UnitState::blocked;
         break;
       }
-      if ((cache_->filling(entry.line) & entry.sectors) != 0) {
+      if (port_.awaited(entry.line, entry.sectors) != 0) {
         stop_ = UnitState::memory;
         break;
       }
@@ -237,8 +178,8 @@ class CropUnit : public Unit {
                                       context_.draw(quad.warp->draw[quad.index]).epoch};
       }
       if (quad.is_last()) quad.warp->release();
-      if (outcome.changed || timing_.writes_unchanged) cache_->make_dirty(entry.line, entry.sectors);
-      cache_->unpin(entry.line);
+      if (outcome.changed || timing_.writes_unchanged) port_.cache().make_dirty(entry.line, entry.sectors);
+      port_.cache().unpin(entry.line);
       tokens_ -= price_;
       queue_.pop();
       if (!marks_.empty()) --marks_.front().quads;
@@ -276,7 +217,7 @@ class CropUnit : public Unit {
   }
 
   Cycle tick(Cycle now) override {
-    finish_fills();
+    port_.finish_fills(now);
     const bool blended = blend(now);
     const bool accepted = accept();
     const bool marked = !marks_.empty() && pass_marks(now);
@@ -286,7 +227,7 @@ class CropUnit : public Unit {
       return now + 1;
     }
     // A quad at the link that could not be looked up waits for a completion or for the queue to move.
-    Cycle next = memory_.next_completion();
+    Cycle next = port_.next_completion();
     if (in_.next_ready() > now) next = std::min(next, in_.next_ready());
     return next;
   }
@@ -301,22 +242,14 @@ class CropUnit : public Unit {
   const std::int64_t sector_price_;  ///< of moving a sector
   const std::int64_t income_;        ///< of a cycle: what so many quads, or so many sectors, cost
   const unsigned most_in_a_cycle_;   ///< quads looked up or blended
-  const unsigned longest_run_;       ///< sectors of a line
-  MemoryPort memory_;
+  CachePort port_;
   const ColorSurface* surface_ = nullptr;
-  std::optional<SectoredCache> cache_;
-  SectoredCacheStatistics* cache_statistics_ = nullptr;
-  std::vector<Cycle> asked_at_;  ///< by sector of the cache
   std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
   std::optional<BlendOrderMonitor> monitor_;
-  unsigned sector_shift_ = 0;  ///< log2 of the bytes of a sector
-  unsigned line_shift_ = 0;    ///< log2 of the bytes of a line
-  Ring<Entry> queue_;          ///< looked up and waiting to be blended
-  unsigned at_ = 0;            ///< quads taken of the beat at the link
-  unsigned fills_in_flight_ = 0;
-  std::uint32_t asked_for_ = 0;   ///< sectors of its line that the quad at the link had filled
-  std::uint32_t write_back_ = 0;  ///< dirty sectors of an evicted line yet to be sent
-  std::uint64_t write_back_address_ = 0;
+  unsigned line_shift_ = 0;   ///< log2 of the bytes of a line
+  Ring<Entry> queue_;         ///< looked up and waiting to be blended
+  unsigned at_ = 0;           ///< quads taken of the beat at the link
+  CachePort::LookUp wanted_;  ///< of the quad at the link
   std::int64_t tokens_ = 0;
   Cycle refilled_ = 0;
   std::deque<std::pair<std::uint32_t, Cycle>> recent_;  ///< blends in the pipeline, without forwarding

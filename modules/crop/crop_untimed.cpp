@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <optional>
 
-#include <vrpipe/memory/sectors.h>
 #include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/order_monitor.h>
@@ -20,6 +19,7 @@ class UntimedCrop : public UntimedUnit {
         in_(input<ShadedWarpItem>("in_color", [this](const ShadedWarpItem& item) { take(*item.warp); })),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
+        organization_(timing_.cache()),
         looked_up_at_once_(quads_looked_up_at_once(timing_)),
         memory_({MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {}
 
@@ -57,7 +57,7 @@ class UntimedCrop : public UntimedUnit {
         behaviour_->look_up(warp, from, to, cache_);
         for (unsigned line = 0; line < cache_.count; ++line) {
           if (observer_ != nullptr) observer_->looked_up(cache_.lines[line]);
-          if (memory_.connected()) move_sectors(cache_.lines[line]);
+          if (memory_.connected()) memory_.move(cache_.lines[line], organization_);
         }
         blend(warp, from, to);
       }
@@ -67,19 +67,6 @@ class UntimedCrop : public UntimedUnit {
 
   /// Whether anybody wants to know what the colour cache does.
   bool follows_cache() const { return observer_ != nullptr || memory_.connected(); }
-
-  void move_sectors(const CropBehaviour::LineAccess& access) {
-    const auto for_each_run = [&](std::uint32_t mask, std::uint64_t line, const auto& move) {
-      while (mask != 0) {
-        const SectorRun run = take_sector_run(mask, timing_.line_bytes / timing_.sector_bytes);
-        move(line + std::uint64_t{run.first} * timing_.sector_bytes, run.count * timing_.sector_bytes);
-      }
-    };
-    for_each_run(access.written_back, access.old_address,
-                 [&](std::uint64_t address, unsigned bytes) { memory_.write(address, bytes); });
-    for_each_run(access.filled, access.address,
-                 [&](std::uint64_t address, unsigned bytes) { memory_.read(address, bytes); });
-  }
 
   void blend(const ShadedWarp& warp, unsigned from, unsigned to) {
     monitor_->blended(warp, from, to, 0);
@@ -110,6 +97,7 @@ class UntimedCrop : public UntimedUnit {
   std::optional<BlendOrderMonitor> monitor_;
   BlendObserver* observer_ = nullptr;
   const CropBehaviour::TimingParameters timing_;
+  const CacheOrganization organization_;
   const unsigned looked_up_at_once_;
   UntimedMemoryPort memory_;
   CropBehaviour::CacheLookUp cache_;

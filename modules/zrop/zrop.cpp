@@ -5,7 +5,14 @@
 namespace vrpipe {
 
 DepthStencilRop::DepthStencilRop(const Parameters& parameters, const RenderContext& context)
-    : context_(context), timing_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.updates_per_cycle} {}
+    : context_(context),
+      timing_{parameters.quads_per_cycle,
+              parameters.latency_cycles,
+              parameters.updates_per_cycle,
+              {parameters.cache.organization(), parameters.mshrs, parameters.input_quads, parameters.input_updates,
+               parameters.sectors_per_cycle}} {
+  timing_.z_cache.check();
+}
 
 void DepthStencilRop::test(QuadBeat& beat) {
   // All are of one state.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/pipeline/screen_tiling.h>
 #include <vrpipe/pipeline/units.h>
 
@@ -30,7 +31,39 @@ class DepthStencilRop : public ZropBehaviour {
         "signals",
         source::open,
         "termination updates, each a read-modify-write of the z-cache; such a cycle tests nothing"};
+    CacheParameters cache{*this,
+                          {"cache_bytes", 16384, 1 << 24, "z-cache, where memory is connected", 0,
+                           "ATTILA: 4 ways of 16 lines of 256 bytes for each ROP"}};
+    Integer mshrs{*this,
+                  "mshrs",
+                  384,
+                  1,
+                  65536,
+                  "sectors",
+                  "Accel-Sim, SM87_ORIN: 384 MSHRs of a first-level cache",
+                  "fills in flight, and as many write-backs"};
+    Integer input_quads{*this,
+                        "input_quads",
+                        4096,
+                        1,
+                        65536,
+                        "quads",
+                        "ATTILA: fetch queue of 256 stamps for each that a ROP tests in a cycle",
+                        "between z-cache look-up and test; hides the latency of fills; at least a beat"};
+    Integer input_updates{*this,        "input_updates",
+                          64,           1,
+                          65536,        "signals",
+                          source::open, "between z-cache look-up and update; hides the latency of fills"};
+    Integer sectors_per_cycle{*this,
+                              "sectors_per_cycle",
+                              16,
+                              1,
+                              64,
+                              "sectors",
+                              "measured on a GH100 graphics GPC: 8 a cycle and ROP partition; the paper's GPC has two",
+                              "filled or written back in a cycle in which nothing is tested or updated"};
   };
+  /// Throws UserError for a z-cache that cannot be.
   DepthStencilRop(const Parameters& parameters, const RenderContext& context);
 
   void test(QuadBeat& beat) override;

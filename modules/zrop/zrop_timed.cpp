@@ -1,4 +1,9 @@
 #include <algorithm>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "zrop/timed_z_cache.h"
 
 #include <vrpipe/model/timed.h>
 
@@ -7,12 +12,14 @@ namespace vrpipe {
 namespace {
 
 /// ZROP at lt and at. Updates go first, so that the cycle of one is known when it arrives; a test applies those of its
-/// past. Ports: in_quads, out_quads (BinItem), in_terminations (TerminationBeat).
+/// past. With the memory port connected, quads and updates are looked up in the z-cache first (timed_z_cache.h).
+/// Ports: in_quads, out_quads (BinItem), in_terminations (TerminationBeat), memory (TLM-2.0 base protocol; optional).
 class TimedZrop : public TimedUnit {
  public:
   TimedZrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
-            Transport transport)
+            const RenderContext& context, Transport transport)
       : TimedUnit(name, domain, ZropWork::kinds(behaviour->timing()), transport),
+        context_(context),
         out_(*this, "out_quads"),
         in_terminations_(*this, "in_terminations",
                          [this](const TerminationBeat& beat, CycleInterval visible) {
@@ -24,13 +31,18 @@ class TimedZrop : public TimedUnit {
         timing_(behaviour_->timing()),
         at_once_(std::min(timing_.quads_per_cycle, QuadBeat::capacity)),
         tests_(timing_.quads_per_cycle),
-        updates_(timing_.updates_per_cycle) {
+        updates_(timing_.updates_per_cycle),
+        z_(*this, timing_, context.placement, cache_statistics_) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
+  tlm::tlm_initiator_socket<32>* memory_socket() override { return &z_.socket(); }
+  bool memory_is_optional() const override { return true; }
+  MemoryBytes memory_bytes() const override { return z_.moved(); }
 
   void close_account(Cycle end) override {
+    if (has_cache_) look_up_updates(never);
     while (!pending_.empty()) apply_update();
     TimedUnit::close_account(end);
   }
@@ -41,13 +53,41 @@ class TimedZrop : public TimedUnit {
     Cycle at = 0;
   };
 
+  void before_end_of_elaboration() override {
+    no_memory_ = stub_unbound(z_.socket(), *clock.domain);
+    has_cache_ = no_memory_ == nullptr;
+    if (!has_cache_) return;
+    const DepthStencilSurface* const surface = behaviour_->surface();
+    if (surface == nullptr) throw SimulationFault(this->name(), 0, "no depth-stencil surface is attached");
+    z_.make_cache(*surface);
+  }
+
   Cycle update(const TerminationBeat& beat, Cycle visible) {
     Cycle at = visible;
     for (unsigned i = 0; i < beat.count; ++i) {
       at = updates_.take(visible);
+      if (has_cache_) {
+        arrived_.push({beat.signals[i], at});
+        if (!blocking()) look_up_updates(at);
+        continue;
+      }
       pending_.push({beat.signals[i], at});
     }
     return at;
+  }
+
+  /// Updates that have arrived up to a cycle. At `lt` they come long before their time, so they wait for it.
+  [[gnu::noinline]] void look_up_updates(Cycle until) {
+    for (; !arrived_.empty() && arrived_.front().at <= until; arrived_.pop()) {
+      const TerminationSignal signal = arrived_.front().signal;
+      pending_.push({signal, z_.update(signal, arrived_.front().at)});
+      note_moves();
+    }
+  }
+  void note_moves() {
+    if (const auto [at, cycles] = z_.take_moves(); cycles > 0) {
+      for (unsigned cycle = 0; cycle < cycles; ++cycle) moves_.push(at);
+    }
   }
 
   CycleInterval test(const BinItem& incoming, CycleInterval visible) {
@@ -56,12 +96,15 @@ class TimedZrop : public TimedUnit {
     charge(UnitState::blocked, out_.last());
     if (item.mark != Mark::none) {
       const Cycle at = tests_.take(visible.first);
+      if (has_cache_) look_up_updates(at);
       if (item.mark != Mark::end_of_frame) {
         while (!pending_.empty() && pending_.front().at <= at) apply_update();
       }
       behaviour_->pass(item.mark);
       const Cycle taken = out_.send(item, at).first;
       tests_.hold(taken);
+      // What they are caused by has gone before.
+      if (has_cache_ && blocking() && item.mark == Mark::end_of_frame) look_up_updates(never);
       return {at, taken};
     }
     std::vector<Quad>& quads = item.storage->flush.quads;
@@ -69,6 +112,9 @@ class TimedZrop : public TimedUnit {
     const unsigned parts = (total + at_once_ - 1) / at_once_;
     CycleInterval tested(never, 0);
     CycleInterval left(never, 0);
+    CycleInterval looked_up(never, 0);
+    // All are of one state.
+    const bool needs_stencil = has_cache_ && total > 0 && context_.state(quads.front().draw).early_termination;
     unsigned beats_left = 0;
     QuadBeat beat;
     beat.tile = item.tile;
@@ -78,7 +124,10 @@ class TimedZrop : public TimedUnit {
       beat.count = static_cast<std::uint8_t>(std::min(total - from, at_once_));
       beat.last_of_bin = part + 1 == parts;
       std::copy_n(quads.begin() + from, beat.count, beat.quads.begin());
-      const Cycle at = take(visible.of_part(part, parts), beat.count);
+      Cycle ready = visible.of_part(part, parts);
+      if (has_cache_) ready = look_up(beat, ready, needs_stencil, looked_up);
+      const Cycle at = take(ready, beat.count);
+      if (has_cache_) z_.tested(beat.count, at);
       const unsigned tested_quads = beat.count;
       port_free_at_ = at + (tested_quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       did(ZropWork::tests, tested_quads, at, port_free_at_);
@@ -94,16 +143,22 @@ class TimedZrop : public TimedUnit {
       left.last = at;
       ++beats_left;
     }
+    if (has_cache_) {
+      charge(UnitState::starved, looked_up.first);
+      charge(UnitState::memory, tested.first);
+    }
     charge(UnitState::starved, tested.first);
     const CycleInterval taken = out_.send(item, left, beats_left);
     charge(UnitState::busy, tested.last + 1);
     charge(UnitState::blocked, taken.last);
     tests_.hold(taken.last);
+    if (has_cache_) return looked_up;
     return {tested.first, std::max(tested.last, taken.last)};
   }
 
   /// The cycle in which so many quads are tested; applies the updates of its past.
   Cycle take(Cycle visible, unsigned quads) {
+    if (has_cache_) move_sectors(visible);
     Cycle at = tests_.take(visible, quads);
     while (!pending_.empty() && pending_.front().at <= at) {
       // One z-cache port: a cycle with updates tests nothing.
@@ -111,6 +166,25 @@ class TimedZrop : public TimedUnit {
       apply_update();
     }
     return at;
+  }
+
+  /// When a part of a bin can be tested; extends the cycles of its bin's look-ups.
+  Cycle look_up(const QuadBeat& beat, Cycle visible, bool needs_stencil, CycleInterval& looked_up) {
+    const Cycle turn = z_.turn(beat.count, visible);
+    look_up_updates(turn);
+    const TimedZCache::Times times = z_.look_up(beat, turn, needs_stencil);
+    note_moves();
+    looked_up.first = std::min(looked_up.first, times.at);
+    looked_up.last = times.at;
+    return times.there;
+  }
+  /// Those that are to move before a test of a cycle can take place: one z-cache port.
+  void move_sectors(Cycle test) {
+    for (; !moves_.empty() && moves_.front() <= std::max(test, tests_.next_free()); moves_.pop()) {
+      const Cycle at = tests_.take_cycle(moves_.front());
+      port_free_at_ = at + 1;
+      did(ZropWork::sectors, timing_.z_cache.sectors_per_cycle, at);
+    }
   }
 
   /// The first of those pending. Beside a test, or other updates of its cycle, it takes nothing of its own.
@@ -124,6 +198,7 @@ class TimedZrop : public TimedUnit {
     pending_.pop();
   }
 
+  const RenderContext& context_;
   TimedOut<BinItem> out_;
   TimedIn<TerminationBeat> in_terminations_;
   TimedIn<BinItem> in_;
@@ -133,14 +208,20 @@ class TimedZrop : public TimedUnit {
   IssuePort tests_;
   IssuePort updates_;
   Ring<Pending> pending_;   ///< updates not applied yet, by cycle
-  Cycle port_free_at_ = 0;  ///< of the z-cache, after the last test or update
+  Cycle port_free_at_ = 0;  ///< of the z-cache, after the last test, update or move
+  SectoredCacheStatistics cache_statistics_{*this, "cache"};
+  TimedZCache z_;
+  bool has_cache_ = false;
+  std::unique_ptr<FixedLatencyMemory> no_memory_;  ///< behind a port that is not connected
+  Ring<Pending> arrived_;                          ///< updates not looked up yet
+  Ring<Cycle> moves_;                              ///< of a cycle's worth of sectors each, not moved yet
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("zrop", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned,
+                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
                                        Transport transport) {
-    return std::make_unique<TimedZrop>(name.c_str(), domain, behaviour_as<ZropBehaviour>(std::move(behaviour)),
+    return std::make_unique<TimedZrop>(name.c_str(), domain, behaviour_as<ZropBehaviour>(std::move(behaviour)), context,
                                        transport);
   });
   return true;

@@ -1,28 +1,48 @@
+#include <algorithm>
+#include <memory>
+
+#include "zrop/z_port.h"
+
 #include <vrpipe/model/unit.h>
 
 namespace vrpipe {
 
 namespace {
 
-/// ZROP at cycle fidelity. One z-cache port: a cycle either applies updates, which go first, or tests.
-/// Ports: in_quads, out_quads (QuadBeat), in_terminations (TerminationBeat).
+/// ZROP at cycle fidelity. One port into the z-cache: a cycle either moves sectors, a whole cycle's worth of them, or
+/// applies updates, or tests, in this order. Without memory the z-cache holds everything.
+/// Ports: in_quads, out_quads (QuadBeat), in_terminations (TerminationBeat), memory (TLM-2.0 base protocol; optional).
 class ZropUnit : public Unit {
  public:
-  ZropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour)
+  ZropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
+           const RenderContext& context)
       : Unit(name, domain, ZropWork::kinds(behaviour->timing())),
         in_(*this, "in_quads"),
         out_(*this, "out_quads"),
         in_terminations_(*this, "in_terminations"),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
+        z_(*this, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context),
         limit_(timing_.quads_per_cycle) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
   }
 
-  bool idle() const override { return in_.empty() && in_terminations_.empty(); }
+  bool idle() const override { return in_.empty() && in_terminations_.empty() && z_.idle(); }
   Behaviour& behaviour() override { return *behaviour_; }
+  tlm::tlm_initiator_socket<32>* memory_socket() override { return &z_.socket(); }
+  bool memory_is_optional() const override { return true; }
+  MemoryBytes memory_bytes() const override { return z_.moved(); }
 
  private:
+  void before_end_of_elaboration() override {
+    no_memory_ = stub_unbound(z_.socket(), *clock.domain);
+    has_cache_ = no_memory_ == nullptr;
+    if (!has_cache_) return;
+    const DepthStencilSurface* const surface = behaviour_->surface();
+    if (surface == nullptr) throw SimulationFault(this->name(), 0, "no depth-stencil surface is attached");
+    z_.make_cache(*surface, cache_statistics_);
+  }
+
   bool update(Cycle now) {
     unsigned budget = timing_.updates_per_cycle;
     bool moved = false;
@@ -37,18 +57,41 @@ class ZropUnit : public Unit {
       in_terminations_.pop();
       signal_ = 0;
     }
+    return count_updates(moved, now);
+  }
+  bool count_updates(bool moved, Cycle now) {
     // Beside a beat that takes several cycles an update takes nothing of its own.
     if (moved && now >= tested_until_) did(ZropWork::updates, 1, now);
     return moved;
   }
 
+  /// Those that were looked up.
+  bool apply_updates(Cycle now) {
+    bool moved = false;
+    for (unsigned budget = timing_.updates_per_cycle; budget > 0 && z_.update_is_there(); --budget) {
+      behaviour_->update(z_.front_update());
+      z_.pop_update();
+      moved = true;
+    }
+    return count_updates(moved, now);
+  }
+
+  bool move_sectors(Cycle now) {
+    const unsigned sectors = timing_.z_cache.sectors_per_cycle;
+    if (z_.owed_sectors() < sectors || now < free_at_) return false;
+    z_.pay_sectors(sectors);
+    did(ZropWork::sectors, sectors, now);
+    return true;
+  }
+
   bool test(Cycle now) {
     bool moved = false;
-    while (in_.ready() && out_.credits() > 0) {
-      const unsigned width = std::max<unsigned>(in_.front().count, 1);
+    while ((has_cache_ ? z_.beat_is_there() : in_.ready()) && out_.credits() > 0) {
+      const QuadBeat& next = has_cache_ ? z_.front() : in_.front();
+      const unsigned width = std::max<unsigned>(next.count, 1);
       if (!limit_.allows(width, now)) break;
-      QuadBeat beat = in_.front();
-      in_.pop();
+      QuadBeat beat = next;
+      has_cache_ ? z_.pop() : in_.pop();
       tested_until_ = now + (width + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       did(ZropWork::tests, beat.count, now, tested_until_);
       const unsigned tested = beat.count;
@@ -68,6 +111,7 @@ class ZropUnit : public Unit {
   }
 
   Cycle tick(Cycle now) override {
+    if (has_cache_) return tick_cache(now);
     if (update(now) || (now >= free_at_ && test(now))) {
       enter(UnitState::busy, now);
       return now + 1;
@@ -84,21 +128,38 @@ class ZropUnit : public Unit {
     return std::min(in_.next_ready(), in_terminations_.next_ready());
   }
 
+  [[gnu::noinline]] Cycle tick_cache(Cycle now) {
+    const bool looked_up = z_.advance(now, in_, in_terminations_);
+    const bool worked = move_sectors(now) || apply_updates(now) || (now >= free_at_ && test(now));
+    enter(worked || now < free_at_         ? UnitState::busy
+          : !z_.has_beats() && in_.empty() ? UnitState::starved
+          : z_.beat_is_there()             ? UnitState::blocked
+                                           : UnitState::memory,
+          now);
+    if (looked_up || worked || z_.owed_sectors() >= timing_.z_cache.sectors_per_cycle) return now + 1;
+    const Cycle next = z_.next(now, in_, in_terminations_);
+    return now < free_at_ ? std::min(next, free_at_) : next;
+  }
+
   StreamIn<QuadBeat> in_;
   StreamOut<QuadBeat> out_;
   StreamIn<TerminationBeat> in_terminations_;
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZropBehaviour::TimingParameters timing_;
+  ZPort z_;
+  bool has_cache_ = false;
+  std::unique_ptr<FixedLatencyMemory> no_memory_;  ///< behind a port that is not connected
   unsigned signal_ = 0;
   BatchLimit limit_;
   Cycle tested_until_ = 0;  ///< the last beat, rounded up to whole cycles
   Cycle free_at_ = 0;       ///< after a beat wider than the unit
+  SectoredCacheStatistics cache_statistics_{*this, "cache"};
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_unit_maker("zrop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                 const RenderContext&, unsigned) {
-    return std::make_unique<ZropUnit>(name.c_str(), domain, behaviour_as<ZropBehaviour>(std::move(behaviour)));
+                                 const RenderContext& context, unsigned) {
+    return std::make_unique<ZropUnit>(name.c_str(), domain, behaviour_as<ZropBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

@@ -1,5 +1,9 @@
 #include <algorithm>
+#include <optional>
 
+#include "zrop/beat_lines.h"
+
+#include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
 
@@ -7,23 +11,36 @@ namespace vrpipe {
 
 namespace {
 
-/// ZROP without time: a bin's test sees what the bins before it have terminated. Ports as in zrop_timed.cpp.
+/// ZROP without time: a bin's test sees what the bins before it have terminated. Where its memory wants to know, tests and
+/// updates go through the z-cache. Ports as in zrop_timed.cpp.
 class UntimedZrop : public UntimedUnit {
  public:
-  UntimedZrop(const std::string& name, std::unique_ptr<ZropBehaviour> behaviour)
+  UntimedZrop(const std::string& name, std::unique_ptr<ZropBehaviour> behaviour, const RenderContext& context)
       : UntimedUnit(name),
+        context_(context),
         out_(*this, "out_quads"),
         in_(input<BinItem>("in_quads", [this](const BinItem& item) { test(item); })),
         in_terminations_(input<TerminationBeat>("in_terminations",
                                                 [this](const TerminationBeat& beat) {
-                                                  for (unsigned i = 0; i < beat.count; ++i)
-                                                    behaviour_->update(beat.signals[i]);
+                                                  for (unsigned i = 0; i < beat.count; ++i) update(beat.signals[i]);
                                                 })),
-        behaviour_(std::move(behaviour)) {}
+        behaviour_(std::move(behaviour)),
+        z_cache_(behaviour_->timing().z_cache),
+        memory_({MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)}) {}
 
   Behaviour& behaviour() override { return *behaviour_; }
+  UntimedMemoryPort* memory_port() override { return &memory_; }
 
  private:
+  void update(const TerminationSignal& signal) {
+    if (memory_.connected()) {
+      needed_.count = 1;
+      needed_.lines[0] = lines().find(signal);
+      look_up(1);
+      cache_->make_dirty(line_, needed_.lines[0].sectors);
+    }
+    behaviour_->update(signal);
+  }
   void test(const BinItem& incoming) {
     if (incoming.mark != Mark::none) {
       behaviour_->pass(incoming.mark);
@@ -39,6 +56,11 @@ class UntimedZrop : public UntimedUnit {
       std::copy_n(quads.begin() + from, beat_.count, beat_.quads.begin());
       from += beat_.count;
       beat_.last_of_bin = from == incoming.quads;
+      // All are of one state.
+      if (memory_.connected() && context_.state(beat_.quads[0].draw).early_termination) {
+        lines().find(beat_.tile, beat_.quads.data(), beat_.count, needed_);
+        look_up(beat_.count);
+      }
       behaviour_->test(beat_);
       std::copy_n(beat_.quads.begin(), beat_.count, quads.begin() + item.quads);
       item.quads += beat_.count;
@@ -46,17 +68,48 @@ class UntimedZrop : public UntimedUnit {
     out_.send(item);
   }
 
+  const BeatLines& lines() {
+    if (!lines_) {
+      lines_.emplace(z_cache_, *behaviour_->surface());
+      cache_.emplace(z_cache_.organization, cache_statistics_);
+    }
+    return *lines_;
+  }
+  /// What so many quads or updates need.
+  void look_up(unsigned accesses) {
+    const std::uint64_t before = cache_statistics_.sector_misses_compulsory.value();
+    for (unsigned i = 0; i < needed_.count; ++i) {
+      LineAccess access;
+      access.address = needed_.lines[i].address;
+      access.sectors = needed_.lines[i].sectors;
+      cache_->look_up(access);
+      line_ = access.line;
+      memory_.move(access, z_cache_.organization);
+    }
+    cache_->accessed(accesses, accesses);
+    // Those that no run is spared, whatever its order: for the bound.
+    did(ZropWork::sectors, cache_statistics_.sector_misses_compulsory.value() - before);
+  }
+
+  const RenderContext& context_;
   UntimedOut<BinItem> out_;
   std::unique_ptr<UntimedIn<BinItem>> in_;
   std::unique_ptr<UntimedIn<TerminationBeat>> in_terminations_;
   std::unique_ptr<ZropBehaviour> behaviour_;
+  const ZCache z_cache_;
+  UntimedMemoryPort memory_;
+  SectoredCacheStatistics cache_statistics_{*this, "cache"};
+  std::optional<BeatLines> lines_;      ///< once looked up
+  std::optional<SectoredCache> cache_;  ///< the same
+  BeatLines::Needed needed_;
+  SectoredCache::Line line_ = SectoredCache::no_line;  ///< that was looked up last
   QuadBeat beat_;
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_untimed_unit_maker("zrop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                         const RenderContext&, unsigned) {
-    return std::make_unique<UntimedZrop>(name, behaviour_as<ZropBehaviour>(std::move(behaviour)));
+                                         const RenderContext& context, unsigned) {
+    return std::make_unique<UntimedZrop>(name, behaviour_as<ZropBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

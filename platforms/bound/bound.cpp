@@ -38,6 +38,7 @@ void Work::add(const Work& other) {
   bin_beats += other.bin_beats;
   quads_tested += other.quads_tested;
   updates += other.updates;
+  z_sectors += other.z_sectors;
   survivors += other.survivors;
   vertex_warps += other.vertex_warps;
   attribute_bytes_written += other.attribute_bytes_written;
@@ -97,12 +98,17 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
                              spaced(done.tile_pairs, raster_.screen_tile_interval_cycles, to_last),
                              ratio(done.quads_rasterized, raster_.quads_per_cycle)});
   cycles[tc] = std::max(ratio(done.quads_rasterized, tc_.quads_per_cycle), ratio(done.bin_beats, 1));
-  cycles[test] = std::max(ratio(done.quads_tested, zrop_.quads_per_cycle) + update_cycles(done),
-                          ratio(done.quads_rasterized, prop_.quads_per_cycle));
+  const auto from_l2 = [&](std::uint64_t bytes) {
+    return l2_bytes_per_cycle_ == 0 ? 0.0 : ratio(bytes, l2_bytes_per_cycle_);
+  };
+  cycles[test] = std::max({ratio(done.quads_tested, zrop_.quads_per_cycle) + update_cycles(done) +
+                               ratio(done.z_sectors, zrop_.z_cache.sectors_per_cycle),
+                           ratio(done.quads_rasterized, prop_.quads_per_cycle),
+                           from_l2(done.z_sectors * zrop_.z_cache.organization.sector_bytes)});
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
   cycles[sm] = instructions(done) / sm_.instructions_per_cycle();
   cycles[color] = static_cast<double>(done.color_quads) / prop_.color_rate.per_cycle();
-  cycles[l2] = l2_bytes_per_cycle_ == 0 ? 0.0 : ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_);
+  cycles[l2] = from_l2(done.sectors * crop_.sector_bytes);
   // A line, and a miss register, is taken for as long as a fill is under way; those of a phase's beginning may have been
   // asked for before it.
   const auto turns = [&](std::uint64_t fills, std::uint64_t places) {
@@ -113,6 +119,12 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
                            turns(done.lines_filled, std::max(crop_.cache_bytes / crop_.line_bytes, 1U)),
                            turns(done.sectors_filled, crop_.mshrs)});
   return cycles;
+}
+
+std::uint64_t PhaseBound::z_sectors_of(std::uint64_t filled) const {
+  const std::uint64_t ahead = zrop_.z_cache.input_quads;
+  const std::uint64_t sectors = filled > ahead ? filled - ahead : 0;
+  return sectors - sectors % zrop_.z_cache.sectors_per_cycle;
 }
 
 double PhaseBound::update_cycles(const Work& done) const {
@@ -204,7 +216,7 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
                    count(done.color_quads)});
   }
   if (slot == "zrop") {
-    return priced(ZropWork::kinds(zrop_), {count(done.quads_tested), update_cycles(done)});
+    return priced(ZropWork::kinds(zrop_), {count(done.quads_tested), update_cycles(done), count(done.z_sectors)});
   }
   if (slot == "qru") {
     const double quads = count(done.survivors) - count(done.warps) * qru_.items_per_cycle;

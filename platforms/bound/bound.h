@@ -29,6 +29,7 @@ struct Work : FrontEndWork {
   std::uint64_t bin_beats = 0;
   std::uint64_t quads_tested = 0;
   std::uint64_t updates = 0;
+  std::uint64_t z_sectors = 0;  ///< filled into the z-cache, in whole cycles of it
   std::uint64_t survivors = 0;
   std::uint64_t warps = 0;
   std::uint64_t merging_warps = 0;
@@ -71,6 +72,9 @@ class PhaseBound {
   bool has_quads() const { return ended_.quads_rasterized > 0; }
   /// In time, bins may be flushed that are not full.
   bool times_out() const { return times_out_; }
+  /// Of so many sectors that every run fills into the z-cache in a phase, those that no earlier phase can have filled for it:
+  /// look-ups run ahead by the quads of a queue.
+  std::uint64_t z_sectors_of(std::uint64_t filled) const;
   /// Screen tiles may be blended in another order than they were flushed in.
   bool tiles_may_overtake() const { return prop_.order == PropBehaviour::Order::tile; }
 

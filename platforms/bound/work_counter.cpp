@@ -197,11 +197,13 @@ void WorkCounter::count() {
   count_front_end(bound_.work);
   bound_.work.bin_beats = items(tc_, TcWork::beats) - before_.bin_beats;
   bound_.work.quads_tested = items(zrop_, ZropWork::tests) - before_.quads_tested;
+  bound_.work.z_sectors = bound_.z_sectors_of(items(zrop_, ZropWork::sectors) - z_sectors_before_);
 }
 
 void WorkCounter::end_phase() {
   count();
   before_.add(bound_.work);
+  z_sectors_before_ = items(zrop_, ZropWork::sectors);
   bound_.end_phase();
 }
 

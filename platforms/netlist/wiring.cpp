@@ -50,12 +50,20 @@ void wire_dram(Netlist& netlist, const std::string& dram) {
   netlist.connect_memory("l2", "dram");
 }
 
-void connect_attribute_traffic(Netlist& netlist, const std::string& memory) {
-  std::vector<std::string> arrays;
+namespace {
+void connect_all(Netlist& netlist, const std::string& slot, const std::string& memory) {
+  std::vector<std::string> units;
   for (const Instance& instance : netlist.instances()) {
-    if (instance.slot == "sm") arrays.push_back(instance.path);
+    if (instance.slot == slot) units.push_back(instance.path);
   }
-  for (const std::string& array : arrays) netlist.connect_memory(array, memory);
+  for (const std::string& unit : units) netlist.connect_memory(unit, memory);
+}
+}  // namespace
+
+void connect_attribute_traffic(Netlist& netlist, const std::string& memory) { connect_all(netlist, "sm", memory); }
+
+void connect_depth_stencil_traffic(Netlist& netlist, const std::string& memory) {
+  connect_all(netlist, "zrop", memory);
 }
 
 }  // namespace vrpipe

@@ -8,9 +8,9 @@
 #include <vrpipe/arithmetic/half.h>
 #include <vrpipe/arithmetic/random.h>
 #include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/quad_sectors.h>
 #include <vrpipe/pipeline/registry.h>
 
-#include "crop/quad_sectors.h"
 #include "support/builders.h"
 
 namespace vrpipe {
@@ -279,7 +279,7 @@ TEST(CropQuads, AQuadsSectorsAreThoseThatHoldItsBytes) {
     for (timing.line_bytes = 64; timing.line_bytes <= 1024; timing.line_bytes *= 2) {
       for (timing.sector_bytes = std::max(16U, timing.line_bytes / 32); timing.sector_bytes <= timing.line_bytes;
            timing.sector_bytes *= 2) {
-        const auto quads = sectors_of_quads(timing, surface);
+        const auto quads = sectors_of_quads(timing.cache(), 4 * bytes_per_pixel(format));
         for (unsigned position = 0; position < positions_per_tile; ++position) {
           const std::uint64_t tile = surface.address({1, 1}, 0);
           const std::uint64_t line = tile + std::uint64_t{quads[position].line} * timing.line_bytes;

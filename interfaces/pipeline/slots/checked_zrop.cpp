@@ -53,6 +53,11 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
     check_rate("quads_per_cycle", timing.quads_per_cycle);
     check_latency("latency_cycles", timing.latency_cycles);
     check_rate("updates_per_cycle", timing.updates_per_cycle);
+    check_rate("mshrs", timing.z_cache.mshrs);
+    check_rate("input_quads", timing.z_cache.input_quads);
+    check_rate("input_updates", timing.z_cache.input_updates);
+    check_rate("sectors_per_cycle", timing.z_cache.sectors_per_cycle);
+    timing.z_cache.check();
     return timing;
   }
   void check_timing() const override { timing(); }

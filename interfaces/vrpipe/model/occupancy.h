@@ -73,7 +73,7 @@ struct PropWork {
   static std::vector<WorkKind> kinds(const PropBehaviour::TimingParameters& timing);
 };
 struct ZropWork {
-  enum : unsigned { tests, updates };  ///< quads tested, cycles with updates
+  enum : unsigned { tests, updates, sectors };  ///< quads tested, cycles with updates, sectors moved
   static std::vector<WorkKind> kinds(const ZropBehaviour::TimingParameters& timing);
 };
 struct QruWork {

@@ -77,6 +77,10 @@ class IssuePort {
   void hold(Cycle cycle) {
     if (cycle > cycle_) next_cycle(cycle - cycle_);
   }
+  /// Reserves a whole cycle; returns it.
+  Cycle take_cycle(Cycle earliest) { return take(earliest, static_cast<unsigned>(per_cycle_.value())); }
+  /// The first cycle of which nothing is taken.
+  Cycle next_free() const { return cycle_ + (left_ < per_cycle_.value() ? 1 : 0); }
 
  private:
   void next_cycle(Cycle cycles) {

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include <vrpipe/kernel/link.h>
+#include <vrpipe/memory/cache_organization.h>
+#include <vrpipe/memory/sectors.h>
 #include <vrpipe/model/unit.h>
 #include <vrpipe/pipeline/batch.h>
 #include <vrpipe/pipeline/render_context.h>
@@ -127,6 +129,16 @@ class UntimedMemoryPort {
   bool connected() const { return memory_ != nullptr; }
   void read(std::uint64_t address, unsigned bytes) { access({address, bytes, tlm::TLM_READ_COMMAND, origin_}); }
   void write(std::uint64_t address, unsigned bytes) { access({address, bytes, tlm::TLM_WRITE_COMMAND, origin_}); }
+  /// What a cache moves for a line, in naturally aligned runs of sectors. Connected.
+  void move(const LineAccess& line, const CacheOrganization& cache) {
+    const auto each = [&](std::uint32_t mask, std::uint64_t address, tlm::tlm_command command) {
+      for_each_sector_run(mask, cache.sectors_of_a_line(), [&](unsigned first, unsigned count) {
+        access({address + std::uint64_t{first} * cache.sector_bytes, count * cache.sector_bytes, command, origin_});
+      });
+    };
+    each(line.written_back, line.old_address, tlm::TLM_WRITE_COMMAND);
+    each(line.filled, line.address, tlm::TLM_READ_COMMAND);
+  }
   /// On behalf of another origin than the port's. Connected.
   void access(const MemoryRequest& request) {
     moved_.count(request);

@@ -19,4 +19,7 @@ void wire_dram(Netlist& netlist, const std::string& dram);
 /// latency.
 void connect_attribute_traffic(Netlist& netlist, const std::string& memory = "l2");
 
+/// Binds the memory port of every ZROP, so that its z-cache is one that misses.
+void connect_depth_stencil_traffic(Netlist& netlist, const std::string& memory = "l2");
+
 }  // namespace vrpipe

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
@@ -19,6 +20,17 @@ class FunctionalRunAhead {
   /// Takes the survivors of a part of a bin, as soon as that is tested, through merging, shading and blending; with the
   /// last of a bin, `terminated` has what all of them newly terminate.
   virtual void tested(const QuadBeat& survivors, std::vector<TerminationSignal>& terminated) = 0;
+};
+
+/// The z-cache, of a ZROP with a memory port. Where that is not connected it holds everything, and nothing is moved.
+struct ZCache {
+  CacheOrganization organization{16384};  ///< of whole sectors for a quad, in lines of one screen tile
+  std::uint32_t mshrs = 384;              ///< sectors that are filled at a time
+  std::uint32_t input_quads = 4096;       ///< queue between look-up and test
+  std::uint32_t input_updates = 64;       ///< the same of updates, signals
+  std::uint32_t sectors_per_cycle = 16;   ///< filled or written back in a cycle in which nothing is tested or updated
+  /// Throws UserError for one that cannot be: CacheOrganization::check, a sector is 16 bytes or more, a line 1 KiB at most.
+  void check() const;
 };
 
 /// Slot `zrop`: depth and stencil test, termination test and update.
@@ -41,6 +53,7 @@ class ZropBehaviour : public Behaviour {
     std::uint32_t quads_per_cycle;
     std::uint32_t latency_cycles;
     std::uint32_t updates_per_cycle;  ///< signals; a cycle with updates tests no quads: one z-cache port
+    ZCache z_cache = {};
   };
   virtual TimingParameters timing() const = 0;
 

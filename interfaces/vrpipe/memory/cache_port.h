@@ -1,0 +1,130 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vrpipe/memory/memory_port.h>
+#include <vrpipe/memory/sectored_cache.h>
+
+namespace vrpipe {
+
+/// A sectored cache in front of a memory port, at `cycle`, for a unit that looks lines up early and uses them once their
+/// sectors are there: asks for what is absent, sector by sector, and writes dirty sectors of evicted lines back.
+class CachePort {
+ public:
+  /// A look-up, which is given the first two members and may take several cycles.
+  struct LookUp {
+    std::uint64_t address = 0;  ///< of the line
+    std::uint32_t sectors = 0;  ///< of the line that are needed, a bit each
+    SectoredCache::Line line = SectoredCache::no_line;
+    std::uint32_t asked_for = 0;  ///< sectors, by this look-up
+  };
+
+  /// @param mshrs  sectors that are filled at a time
+  CachePort(PortOwner& owner, const std::string& name, unsigned mshrs, MemoryOrigin origin)
+      : memory_(owner, name, 2 * mshrs, origin), mshrs_(mshrs) {}
+
+  tlm::tlm_initiator_socket<32>& socket() { return memory_.socket; }
+  /// Before the first look-up. The statistics outlive it.
+  void make_cache(const CacheOrganization& organization, SectoredCacheStatistics& statistics) {
+    sectors_of_a_line_ = organization.sectors_of_a_line();
+    sector_shift_ = static_cast<unsigned>(__builtin_ctz(organization.sector_bytes));
+    cache_.emplace(organization, statistics);
+    statistics_ = &statistics;
+    asked_at_.resize(std::size_t{organization.lines()} * sectors_of_a_line_);
+  }
+  SectoredCache& cache() { return *cache_; }
+  const MemoryBytes& moved() const { return memory_.moved(); }
+  Cycle next_completion() const { return memory_.next_completion(); }
+
+  /// Takes the sectors that have come; true if there were any.
+  bool finish_fills(Cycle now) {
+    bool any = false;
+    std::uint32_t tag = 0;
+    while (memory_.next_completed(tag)) {
+      any = true;
+      if (tag == write_back_tag) continue;
+      const SectoredCache::Line line = tag >> sector_bits;
+      const unsigned sector = tag & ((1U << sector_bits) - 1);
+      cache_->finish_fill(line, sector);
+      statistics_->fill_cycles.see(now - asked_at(line, sector));
+      --fills_in_flight_;
+    }
+    return any;
+  }
+
+  /// Goes on with a look-up; false while it has to wait: for a line, a miss register, or the memory to take an access. Then
+  /// its line is pinned. `moved(sectors)` is called for what it moves.
+  template <class Moved>
+  bool look_up(LookUp& wanted, Cycle now, Moved&& moved) {
+    if (!write_back(moved)) return false;
+    if (wanted.line == SectoredCache::no_line && !take_line(wanted)) return false;
+    for (std::uint32_t missing = wanted.sectors & cache_->absent(wanted.line); missing != 0; missing &= missing - 1) {
+      if (!memory_.available() || fills_in_flight_ == mshrs_) return false;
+      const auto sector = static_cast<unsigned>(__builtin_ctz(missing));
+      memory_.read(wanted.address + (std::uint64_t{sector} << sector_shift_), 1U << sector_shift_,
+                   wanted.line << sector_bits | sector);
+      cache_->start_fill(wanted.line, sector);
+      asked_at(wanted.line, sector) = now;
+      wanted.asked_for |= 1U << sector;
+      ++fills_in_flight_;
+      moved(1U);
+    }
+    cache_->looked_up(wanted.line, wanted.sectors);
+    return true;
+  }
+  /// Of what a look-up needs, what is still on its way.
+  std::uint32_t awaited(SectoredCache::Line line, std::uint32_t sectors) const {
+    return cache_->filling(line) & sectors;
+  }
+
+  /// Sends dirty sectors of an evicted line, as each look-up does that follows the eviction; false while some are left.
+  template <class Moved>
+  bool write_back(Moved&& moved) {
+    while (write_back_ != 0 && memory_.available()) {
+      const SectorRun run = take_sector_run(write_back_, sectors_of_a_line_);
+      memory_.write(write_back_address_ + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_,
+                    write_back_tag);
+      moved(run.count);
+    }
+    return write_back_ == 0;
+  }
+  bool has_written_back() const { return write_back_ == 0; }
+
+ private:
+  // What a memory access is for: a sector of a line, or nothing that anyone waits for.
+  static constexpr std::uint32_t write_back_tag = ~0U;
+  static constexpr unsigned sector_bits = 5;
+
+  /// The cycle in which a sector that is on its way was asked for.
+  Cycle& asked_at(SectoredCache::Line line, unsigned sector) {
+    return asked_at_[std::size_t{line} * sectors_of_a_line_ + sector];
+  }
+
+  bool take_line(LookUp& wanted) {
+    wanted.line = cache_->find(wanted.address);
+    if (wanted.line == SectoredCache::no_line) {
+      if (!cache_->can_allocate(wanted.address) || !memory_.available()) return false;
+      SectoredCache::Evicted evicted;
+      wanted.line = cache_->allocate(wanted.address, evicted);
+      write_back_ = evicted.dirty;
+      write_back_address_ = evicted.address;
+    }
+    cache_->pin(wanted.line);
+    return true;
+  }
+
+  MemoryPort memory_;
+  const unsigned mshrs_;
+  std::optional<SectoredCache> cache_;
+  SectoredCacheStatistics* statistics_ = nullptr;
+  std::vector<Cycle> asked_at_;  ///< by sector of the cache
+  unsigned sectors_of_a_line_ = 1;
+  unsigned sector_shift_ = 0;  ///< log2 of the bytes of a sector
+  unsigned fills_in_flight_ = 0;
+  std::uint32_t write_back_ = 0;  ///< dirty sectors of an evicted line yet to be sent
+  std::uint64_t write_back_address_ = 0;
+};
+
+}  // namespace vrpipe

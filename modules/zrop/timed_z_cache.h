@@ -1,0 +1,133 @@
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "beat_lines.h"
+
+#include <vrpipe/memory/sectored_cache.h>
+#include <vrpipe/model/timed_cache_port.h>
+
+namespace vrpipe {
+
+/// The z-cache at lt and at, in front of ZROP's memory port: as z_port.h, but what is looked up is there for the cache at
+/// once, and the times are kept beside it.
+class TimedZCache {
+ public:
+  TimedZCache(TimedUnit& owner, const ZropBehaviour::TimingParameters& timing, Placement placement,
+              SectoredCacheStatistics& statistics)
+      : timing_(timing.z_cache),
+        sectors_of_a_line_(timing_.organization.sectors_of_a_line()),
+        statistics_(statistics),
+        port_(owner, "memory", timing_.mshrs, std::min(sectors_of_a_line_, timing_.mshrs),
+              timing_.organization.sector_bytes, statistics,
+              {MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(placement.gpc)}),
+        look_ups_(timing.quads_per_cycle),
+        queue_(std::max(timing_.input_quads, QuadBeat::capacity)),
+        updates_(timing.updates_per_cycle),
+        queued_updates_(timing_.input_updates) {}
+
+  tlm::tlm_initiator_socket<32>& socket() { return port_.socket(); }
+  const MemoryBytes& moved() const { return port_.moved(); }
+  /// Before the first look-up. The surface outlives it.
+  void make_cache(const DepthStencilSurface& surface) {
+    lines_.emplace(timing_, surface);
+    cache_.emplace(timing_.organization, statistics_);
+    kept_until_.resize(timing_.organization.lines());
+    there_.resize(std::size_t{timing_.organization.lines()} * sectors_of_a_line_);
+  }
+
+  struct Times {
+    Cycle at = 0;     ///< looked up
+    Cycle there = 0;  ///< can be tested
+  };
+  /// When so many quads that become visible in a cycle are looked up.
+  Cycle turn(unsigned quads, Cycle visible) { return look_ups_.take(queue_.free_from(visible, quads), quads); }
+  /// In its turn; `tested` follows.
+  Times look_up(const QuadBeat& beat, Cycle turn, bool needs_stencil) {
+    Times times;
+    times.at = turn;
+    if (!needs_stencil) return {times.at, times.at};
+    lines_->find(beat.tile, beat.quads.data(), beat.count, needed_);
+    for (unsigned i = 0; i < needed_.count; ++i) {
+      const SectoredCache::Line line = look_up(needed_.lines[i], times);
+      // Lines are read in order, and may go then.
+      read_ = std::max(read_, times.there);
+      kept_until_[line] = std::max(kept_until_[line], read_);
+    }
+    cache_->accessed(beat.count, beat.count);
+    look_ups_.hold(times.at);
+    owe(times.at);
+    return {times.at, std::max(times.at, times.there)};
+  }
+  void tested(unsigned quads, Cycle at) { queue_.take(quads, at); }
+
+  /// The cycle in which an update is applied that arrives in a cycle.
+  Cycle update(const TerminationSignal& signal, Cycle arrived) {
+    Times times;
+    times.at = queued_updates_.free_from(arrived, 1);
+    const BeatLines::Needed::Line needed = lines_->find(signal);
+    const SectoredCache::Line line = look_up(needed, times);
+    cache_->accessed(1, 1);
+    cache_->make_dirty(line, needed.sectors);
+    owe(times.at);
+    const Cycle applied = updates_.take(std::max(times.at, times.there));
+    kept_until_[line] = std::max(kept_until_[line], applied);
+    queued_updates_.take(1, applied);
+    return applied;
+  }
+
+  /// Cycles that moving sectors takes from the z-cache and that were not asked for yet, and from when on.
+  std::pair<Cycle, std::uint64_t> take_moves() {
+    const std::uint64_t cycles = owed_ / timing_.sectors_per_cycle;
+    owed_ -= cycles * timing_.sectors_per_cycle;
+    return {owed_at_, cycles};
+  }
+
+ private:
+  /// Sets when its sectors are there, and when it could be looked up, if that has to wait.
+  SectoredCache::Line look_up(const BeatLines::Needed::Line& needed, Times& times) {
+    LineAccess access;
+    access.address = needed.address;
+    access.sectors = needed.sectors;
+    cache_->look_up(access);
+    Cycle* const there = &there_[std::size_t{access.line} * sectors_of_a_line_];
+    if (access.replaced) {
+      times.at = std::max(times.at, kept_until_[access.line]);
+      if (access.written_back != 0) port_.write_back(access, times.at);
+    }
+    if (access.filled != 0) {
+      port_.fill(access, times.at,
+                 [&](unsigned first, unsigned count, Cycle cycle) { std::fill_n(there + first, count, cycle); });
+    }
+    for (std::uint32_t left = access.sectors; left != 0; left &= left - 1) {
+      times.there = std::max(times.there, there[__builtin_ctz(left)]);
+    }
+    return access.line;
+  }
+  void owe(Cycle at) {
+    owed_ += port_.take_moved();
+    owed_at_ = at;
+  }
+
+  const ZCache timing_;
+  const unsigned sectors_of_a_line_;
+  SectoredCacheStatistics& statistics_;
+  TimedCachePort port_;
+  IssuePort look_ups_;
+  SlotPool queue_;  ///< quads between look-up and test
+  IssuePort updates_;
+  SlotPool queued_updates_;
+  std::optional<BeatLines> lines_;
+  std::optional<SectoredCache> cache_;
+  BeatLines::Needed needed_;
+  Cycle read_ = 0;                 ///< the last line looked up for a test
+  std::vector<Cycle> kept_until_;  ///< by line of the cache
+  std::vector<Cycle> there_;       ///< by sector
+  std::uint64_t owed_ = 0;         ///< sectors
+  Cycle owed_at_ = 0;
+};
+
+}  // namespace vrpipe
