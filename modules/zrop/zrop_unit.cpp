@@ -131,10 +131,10 @@ class ZropUnit : public Unit {
   [[gnu::noinline]] Cycle tick_cache(Cycle now) {
     const bool looked_up = z_.advance(now, in_, in_terminations_);
     const bool worked = move_sectors(now) || apply_updates(now) || (now >= free_at_ && test(now));
-    enter(worked || now < free_at_         ? UnitState::busy
-          : !z_.has_beats() && in_.empty() ? UnitState::starved
-          : z_.beat_is_there()             ? UnitState::blocked
-                                           : UnitState::memory,
+    enter(worked || now < free_at_          ? UnitState::busy
+          : !z_.has_beats() && !in_.ready() ? UnitState::starved
+          : z_.beat_is_there()              ? UnitState::blocked
+                                            : UnitState::memory,
           now);
     if (looked_up || worked || z_.owed_sectors() >= timing_.z_cache.sectors_per_cycle) return now + 1;
     const Cycle next = z_.next(now, in_, in_terminations_);

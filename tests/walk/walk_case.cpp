@@ -13,6 +13,7 @@
 #include <vrpipe/arithmetic/random.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/netlist.h>
+#include <vrpipe/platforms/wiring.h>
 
 #include "support/builders.h"
 
@@ -288,6 +289,32 @@ std::vector<Part> draw_parts(Dice& dice, std::size_t splats) {
   return parts;
 }
 
+/// A platform with its z-caches connected; it keeps its name and stays where it is.
+const Platform& with_z_caches(const Platform& platform) {
+  static std::map<std::string, Platform> made;
+  const auto [at, is_new] = made.emplace(platform.name, platform);
+  if (is_new) {
+    at->second.wire = [wire = platform.wire](Netlist& netlist) {
+      wire(netlist);
+      connect_depth_stencil_traffic(netlist);
+    };
+  }
+  return at->second;
+}
+bool is_of_catalogue(const Platform* platform) {
+  return std::any_of(platforms().begin(), platforms().end(), [&](const Platform& other) { return &other == platform; });
+}
+
+/// Caches and queues in which everybody waits for everybody.
+void draw_small_z_cache(Dice& dice, std::vector<Setting>& settings) {
+  const char* const bytes[] = {"128", "256", "1024", "16384"};
+  const char* const few[] = {"1", "2", "5", "64"};
+  settings.push_back({"zrop", "cache_bytes", dice.one_of(bytes)});
+  for (const char* parameter : {"mshrs", "input_quads", "input_updates", "sectors_per_cycle"}) {
+    if (dice.chance(50)) settings.push_back({"zrop", parameter, dice.one_of(few)});
+  }
+}
+
 const char* word_for(Termination termination) { return termination == Termination::strict ? "strict" : "paper"; }
 
 }  // namespace
@@ -349,12 +376,17 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   c.stall_seed = dice.next() | 1U;
   c.draw = draw_scene(dice, real);
   c.parts = draw_parts(dice, c.draw.splats.size());
+  if (dice.chance(40)) {
+    c.platform = &with_z_caches(*c.platform);
+    if (!c.refused && dice.chance(60)) draw_small_z_cache(dice, c.settings);
+  }
   return c;
 }
 
 std::string describe(const Case& c) {
   std::string text = fmt::format("{} {} {} {} {}x{}, {} splats", c.platform->name, c.variant.name, name_of(c.format),
                                  word_for(c.termination), c.draw.width, c.draw.height, c.draw.splats.size());
+  if (!is_of_catalogue(c.platform)) text += ", z-caches connected,";
   for (const UnitChoice& unit : c.units) text += fmt::format(" {}={}", unit.slot, unit.implementation);
   for (const Setting& setting : c.settings) {
     text += fmt::format(" {}.{}={}", setting.unit, setting.parameter, setting.value);
