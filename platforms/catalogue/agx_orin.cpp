@@ -23,6 +23,7 @@ Platform agx_orin_lpddr3() {
     wire_pipeline(netlist);
     wire_dram(netlist, "lpddr3-1600");
     connect_attribute_traffic(netlist);
+    connect_depth_stencil_traffic(netlist);
   };
   return platform;
 }
@@ -37,6 +38,7 @@ Platform agx_orin_lpddr5() {
     wire_pipeline(netlist);
     wire_dram(netlist, "lpddr5-6400");
     connect_attribute_traffic(netlist);
+    connect_depth_stencil_traffic(netlist);
   };
   return platform;
 }

@@ -60,7 +60,7 @@ class L2Test : public ::testing::Test {
       l2 = std::make_unique<AnnotatedL2>("l2", *clock, std::move(behaviour), port_bytes);
     }
     if (over_dram) {
-      dram = memory_unit_maker("dram")("dram", *clock, dram_behaviour(), {1, false, time == Time::clocked});
+      dram = memory_unit_maker("dram")("dram", *clock, dram_behaviour(), {{0}, false, time == Time::clocked});
       l2->below()->bind(dram->target(0));
       return;
     }

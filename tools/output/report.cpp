@@ -172,6 +172,34 @@ void add_cache(RunTable& table, const std::vector<RunResult>& runs) {
   });
 }
 
+/// What passed between the levels, by what it was for, on a platform whose L2 misses.
+void add_memory(RunTable& table, const std::vector<RunResult>& runs) {
+  const auto megabytes = [](const RunResult& run, const std::string& memory, const std::string& traffic) {
+    std::uint64_t bytes = 0;
+    for (const StatisticReport& report : run.statistics) {
+      for (const char* direction : {"read", "written"}) {
+        if (report.name == memory + "." + traffic + "_bytes_" + direction) bytes += report.value;
+      }
+    }
+    return static_cast<double>(bytes) / 1e6;
+  };
+  const auto misses = [](const RunResult& run) { return ratio_of(run, "l2.cache.sector_hit_rate").has_value(); };
+  if (std::none_of(runs.begin(), runs.end(), misses)) return;
+  table.group("moved to and from memory, MB");
+  for (const auto& [memory, shown] : {std::pair{"l2", "L2"}, std::pair{"dram", "DRAM"}}) {
+    for (const auto& [traffic, what] :
+         {std::pair{"color", "colour"}, std::pair{"depth_stencil", "depth-stencil"}, std::pair{"vertex", "vertices"},
+          std::pair{"attribute", "attributes"}, std::pair{"other", "other"}}) {
+      const auto cell = [&megabytes, memory = memory, traffic = traffic](const RunResult& run) {
+        return megabytes(run, memory, traffic);
+      };
+      if (std::none_of(runs.begin(), runs.end(), [&](const RunResult& run) { return cell(run) > 0; })) continue;
+      table.row(fmt::format("{}, {}", shown, what),
+                [&](const RunResult& run) { return fmt::format("{:.2f}", cell(run)); });
+    }
+  }
+}
+
 /// What each unit spent its cycles on.
 std::string unit_states_text(const RunResult& run, const TextStyle& style) {
   std::vector<std::string> heading{"unit cycles, %"};
@@ -380,6 +408,7 @@ std::string report(const JobResult& result, const TextStyle& style) {
   table.counts("termination updates", &Counts::termination_updates, exact);
   add_utilization(table, runs);
   add_cache(table, runs);
+  add_memory(table, runs);
 
   std::string text = heading(result, style) + table.text(style) + "\n" + draws_text(runs, style);
   if (runs.size() == 1 && !runs.front().units.empty()) text += unit_states_text(runs.front(), style) + "\n";
