@@ -40,7 +40,8 @@ std::vector<WorkKind> PropWork::kinds(const PropBehaviour::TimingParameters& tim
 }
 
 std::vector<WorkKind> ZropWork::kinds(const ZropBehaviour::TimingParameters& timing) {
-  return {{"tests", 0, per(timing.quads_per_cycle), throughput}, {"updates", 0, 1.0, false},
+  return {{"tests", 0, per(timing.quads_per_cycle), throughput},
+          {"updates", 0, 1.0, false},
           {"sectors", 0, per(timing.z_cache.sectors_per_cycle), false}};
 }
 
