@@ -97,6 +97,7 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<> {
     made.access = request_of(payload);
     made.arrival = arrival;
     made.port = index_;
+    l2_.cache_.prefetch(made.access.address);
     arrived_.push_in_order({arrival, request}, &Arrival::at);
     l2_.clock.domain->wake(l2_.clock.unit, std::max(arrival, l2_.clock.domain->now()) + 1);
   }
@@ -196,6 +197,7 @@ std::uint32_t ClockedL2::make_request() {
 void ClockedL2::queue(std::uint32_t request) {
   const MemoryRequest access = requests_[request].access;
   behaviour_->count(access);
+  cache_.prefetch_line(access.address);
   const std::uint64_t line_bytes = cache_.organization().line_bytes;
   const bool is_whole = access.address / line_bytes == (access.address + access.bytes - 1) / line_bytes;
   const auto add = [&](std::uint32_t part) {

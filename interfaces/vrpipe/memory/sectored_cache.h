@@ -41,6 +41,13 @@ class SectoredCache {
     while (line != no_line && lines_[line].tag != tag) line = lines_[line].next;
     return line;
   }
+  /// Brings what `find` reads first of an address to the host's cache, or, once that is there, what it reads then. Tags of
+  /// a large cache are beyond the host's first caches.
+  void prefetch(std::uint64_t address) const { __builtin_prefetch(&chains_[chain_of(address >> line_shift_)]); }
+  void prefetch_line(std::uint64_t address) const {
+    const Line line = chains_[chain_of(address >> line_shift_)];
+    if (line != no_line) __builtin_prefetch(&lines_[line]);
+  }
   /// Of a line that is held: the first byte of what it holds.
   std::uint64_t address(Line line) const { return lines_[line].tag << line_shift_; }
   /// Whether a line can be had for an address that is not held: its set has one that is free or not pinned.
