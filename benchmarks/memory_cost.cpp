@@ -30,7 +30,7 @@ void add_ideal_dram(Netlist& netlist) {
   netlist.connect_memory("l2", "dram");
 }
 
-// Each has what is above it; the traffic of depth and stencil would be the next.
+// Each has what is above it; the last is agx-orin-lpddr3.
 const std::vector<Part>& parts() {
   static const std::vector<Part> made = {
       {"ideal memory", wire_pipeline},
@@ -50,6 +50,13 @@ const std::vector<Part>& parts() {
          wire_pipeline(netlist);
          wire_dram(netlist, "lpddr3-1600");
          connect_attribute_traffic(netlist);
+       }},
+      {"+ depth-stencil",
+       [](Netlist& netlist) {
+         wire_pipeline(netlist);
+         wire_dram(netlist, "lpddr3-1600");
+         connect_attribute_traffic(netlist);
+         connect_depth_stencil_traffic(netlist);
        }},
   };
   return made;
@@ -82,7 +89,7 @@ void measure(const Draw& draw, const Variant& variant, Fidelity fidelity, int re
   }
   const double ideal = median(runs.front());
   std::printf("%-9s %-11s %9.3f", variant.name.c_str(), name_of(fidelity), ideal);
-  for (const std::vector<double>& of_part : runs) std::printf(" %14.3f", median(of_part) / ideal);
+  for (const std::vector<double>& of_part : runs) std::printf(" %15.3f", median(of_part) / ideal);
   std::printf("\n");
   std::fflush(stdout);
 }
@@ -116,7 +123,7 @@ int run(const std::vector<std::string>& arguments) {
   scene.draw.splats.resize(std::min(scene.draw.splats.size(), most_splats));
   std::printf("CPU seconds with ideal memory, and ratios to it; medians of %d runs in turn\n%-9s %-11s %9s", repeat,
               "variant", "fidelity", "seconds");
-  for (const Part& part : parts()) std::printf(" %14s", part.name);
+  for (const Part& part : parts()) std::printf(" %15s", part.name);
   std::printf("\n");
   for (const char* variant : {"baseline", "het+qm"}) {
     for (const Fidelity fidelity : measured) measure(scene.draw, variant_named(variant), fidelity, repeat);
