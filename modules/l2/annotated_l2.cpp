@@ -74,7 +74,8 @@ AnnotatedL2::AnnotatedL2(const sc_core::sc_module_name& name, ClockDomain& domai
       cache_(behaviour_->cache()),
       memory_(*this, "below"),
       banks_(sizes_.banks, Bank(sizes_)),
-      fills_(std::size_t{cache_.organization().lines()} * cache_.organization().sectors_of_a_line()) {
+      fills_(std::size_t{cache_.organization().lines()} * cache_.organization().sectors_of_a_line()),
+      counted_fills_(behaviour_->statistics()) {
   for (const unsigned bytes : ports) {
     ports_.push_back(std::make_unique<Port>(static_cast<unsigned>(ports_.size()), *this, bytes));
   }
@@ -141,7 +142,7 @@ Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& fr
                            [&](const MemoryRequest& read, const SectorRun& run) {
                              const Cycle there = memory_.access(read, asks);
                              std::fill_n(fills + run.first, run.count, Fill{asks, there});
-                             behaviour_->statistics().fill_cycles.see(there - asks);
+                             counted_fills_.ask(run.count, asks, there);
                              moved += read.bytes;
                            });
   Cycle all_there = begin;

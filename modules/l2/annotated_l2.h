@@ -64,7 +64,8 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
   TimedMemoryPort memory_;
   std::vector<std::unique_ptr<Port>> ports_;
   std::vector<Bank> banks_;
-  std::vector<Fill> fills_;       ///< by line of the cache and sector
+  std::vector<Fill> fills_;  ///< by line of the cache and sector
+  AnnotatedFillCounter counted_fills_;
   Cycle quickest_write_ = never;  ///< below, in cycles: what takes longer waits for its turn
   StatisticSet statistics_;
 };

@@ -248,8 +248,8 @@ void ClockedL2::finish_fills(Cycle now) {
     const Below done = asked_[tag];
     free_tags_.push_back(tag);
     if (done.access.command == tlm::TLM_WRITE_COMMAND) continue;
-    behaviour_->statistics().fill_cycles.see(now - done.since);
     for (std::uint32_t left = done.sectors; left != 0; left &= left - 1) {
+      behaviour_->statistics().fill_cycles.see(now - done.since);
       cache_.finish_fill(done.line, static_cast<unsigned>(__builtin_ctz(left)));
     }
     occupy(done.bank, done.access.bytes, now);

@@ -96,9 +96,10 @@ class TimedSmMemory {
 
   struct L1 {
     L1(const AttributeFetch& timing, SectoredCacheStatistics& statistics)
-        : cache(timing.l1, statistics), mshrs(timing.l1_mshrs), there(timing.l1.lines()) {}
+        : cache(timing.l1, statistics), mshrs(timing.l1_mshrs), fills(statistics), there(timing.l1.lines()) {}
     SectoredCache cache;
     SlotPool mshrs;
+    AnnotatedFillCounter fills;
     std::vector<std::array<Cycle, sectors_of_a_line>> there;  ///< by line and sector: since when
   };
 
@@ -121,10 +122,8 @@ class TimedSmMemory {
                                       run.count * AttributeTraffic::sector_bytes, tlm::TLM_READ_COMMAND, fill_origin_},
                                      at);
     l1.mshrs.take(run.count, there);
-    for (unsigned i = 0; i < run.count; ++i) {
-      line[run.first + i] = there;
-      statistics_.fill_cycles.see(there - at);
-    }
+    l1.fills.ask(run.count, at, there);
+    for (unsigned i = 0; i < run.count; ++i) line[run.first + i] = there;
     return at;
   }
 

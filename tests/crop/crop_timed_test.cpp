@@ -223,6 +223,11 @@ TEST_P(CropTimedTest, AFillIsSeenToTakeAsLongAsTheMemory) {
   EXPECT_EQ(fills.count(), 10U);
   EXPECT_EQ(fills.smallest(), 77U);
   EXPECT_EQ(fills.largest(), 77U);
+  // All ten are on their way together; each finds those before it.
+  const Histogram& filling = crop.bench.behaviour<CropBehaviour>().cache_statistics.sectors_filling;
+  EXPECT_EQ(filling.count(), 10U);
+  EXPECT_EQ(filling.largest(), 9U);
+  EXPECT_EQ(filling.sum(), 45U);
 }
 
 TEST_P(CropTimedTest, WithoutForwardingAQuadWaitsForTheOneBeforeAtItsPosition) {

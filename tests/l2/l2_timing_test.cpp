@@ -154,6 +154,19 @@ TEST_P(L2AtEachFidelity, AWriteOfPartOfASectorFetchesIt) {
   EXPECT_EQ(bytes_below(false), 32U);
 }
 
+TEST_P(L2AtEachFidelity, SeesHowLongFillsTakeAndHowManyAreOnTheirWay) {
+  run(GetParam(), {read(100, 0, 64), read(110, line), read(500, 2 * line)});
+  const Histogram& filling = model->statistics().sectors_filling;
+  const Histogram& fills = model->statistics().fill_cycles;
+  // Of the first access the second sector finds the first, the second access both, the third nobody.
+  EXPECT_EQ(filling.count(), 4U);
+  EXPECT_EQ(filling.sum(), 0U + 1 + 2 + 0);
+  EXPECT_EQ(filling.largest(), 2U);
+  // Of a run of sectors each is seen.
+  EXPECT_EQ(fills.count(), 4U);
+  EXPECT_EQ(fills.sum(), 2 * (40U + 4) + 2 * fill);
+}
+
 // Sets are 16 lines apart.
 TEST_P(L2AtEachFidelity, DirtySectorsOfALineThatGoesAreWrittenBackInTheNameOfWhoWroteThem) {
   constexpr MemoryOrigin depth{MemoryTraffic::depth_stencil, 0};

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <cstdint>
+
 #include <vrpipe/component/statistic.h>
+#include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/ring.h>
 
 namespace vrpipe {
 
@@ -34,9 +38,11 @@ struct SectoredCacheStatistics : StatisticSet {
   MinMax most_lines_held{*this, MinMax::Of::largest, "most_lines_held", "lines", "at a time"};
   Histogram lines_pinned{*this, Histogram::Buckets::log2(), "lines_pinned", "lines",
                          "of a set that are waited for when another line of it is allocated"};
-  /// Seen by timing models.
+  /// Both seen by timing models, for each sector.
   Histogram fill_cycles{*this, Histogram::Buckets::log2(), "fill_cycles", "cycles",
                         "from asking for a sector until it is there"};
+  Histogram sectors_filling{*this, Histogram::Buckets::log2(), "sectors_filling", "sectors",
+                            "of the cache that are on their way when another one is asked for"};
   Ratio line_hit_rate{*this, line_hits, line_accesses, "line_hit_rate", "hits per access", "of accesses"};
   Ratio sector_hit_rate{*this, sector_hits, sector_accesses, "sector_hit_rate", "hits per sector", "of sectors needed"};
   Ratio bytes_per_sector{*this,
@@ -45,6 +51,33 @@ struct SectoredCacheStatistics : StatisticSet {
                          "bytes_per_sector",
                          "bytes per sector",
                          "moved for a sector needed"};
+};
+
+/// Counts the fills of a cache at `lt` and `at`, where memory says at once when a sector is there. Asked for in another
+/// order than that of time, as at `lt`, those that have come by a later cycle are no longer on their way in an earlier.
+class AnnotatedFillCounter {
+ public:
+  /// @param statistics  outlive it
+  explicit AnnotatedFillCounter(SectoredCacheStatistics& statistics) : statistics_(&statistics) {}
+
+  /// So many sectors are asked for in cycle `at`.
+  void ask(std::uint32_t sectors, Cycle at, Cycle there) {
+    for (; !fills_.empty() && fills_.front().there <= at; fills_.pop()) on_their_way_ -= fills_.front().sectors;
+    for (std::uint32_t i = 0; i < sectors; ++i) {
+      statistics_->fill_cycles.see(there - at);
+      statistics_->sectors_filling.see(on_their_way_++);
+    }
+    fills_.push_in_order({there, sectors}, &Fill::there);
+  }
+
+ private:
+  struct Fill {
+    Cycle there = 0;
+    std::uint32_t sectors = 0;
+  };
+  SectoredCacheStatistics* statistics_;
+  Ring<Fill> fills_;
+  std::uint32_t on_their_way_ = 0;
 };
 
 /// What a cache counts that holds whatever was accessed once. Every access is of one or more sectors:

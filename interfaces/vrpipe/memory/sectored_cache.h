@@ -95,12 +95,14 @@ class SectoredCache {
   void start_fill(Line line, unsigned sector) {
     Entry& entry = lines_[line];
     entry.filling |= 1U << sector;
+    statistics_->sectors_filling.see(filling_++);
     count_misses(entry, 1U << sector);
   }
   /// Ends what start_fill began, while the line still holds the same.
   void finish_fill(Line line, unsigned sector) {
     Entry& entry = lines_[line];
     entry.filling &= ~(1U << sector);
+    --filling_;
     entry.present |= 1U << sector;
   }
   void make_dirty(Line line, std::uint32_t sectors) { lines_[line].dirty |= sectors; }
@@ -282,7 +284,8 @@ class SectoredCache {
   std::uint32_t first_time_ = 0;      ///< of these, compulsory
   std::uint64_t evictions_ = 0;       ///< so far, for random replacement
   std::uint32_t held_ = 0;
-  std::vector<Entry> lines_;  ///< ways of set 0, of set 1, ...
+  std::uint32_t filling_ = 0;  ///< sectors
+  std::vector<Entry> lines_;   ///< ways of set 0, of set 1, ...
   std::vector<Set> sets_;
   std::vector<Line> chains_;               ///< the first of the lines whose tags hash to a place
   std::vector<bool> kept_;                 ///< by line; empty before the first

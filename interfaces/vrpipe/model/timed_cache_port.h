@@ -19,7 +19,7 @@ class TimedCachePort {
   TimedCachePort(TimedUnit& owner, const std::string& name, unsigned mshrs, unsigned longest_run, unsigned sector_bytes,
                  SectoredCacheStatistics& statistics, MemoryOrigin origin)
       : memory_(owner, name, origin),
-        statistics_(statistics),
+        fills_(statistics),
         mshrs_(mshrs),
         longest_run_(longest_run),
         sector_shift_(static_cast<unsigned>(__builtin_ctz(sector_bytes))) {}
@@ -35,7 +35,7 @@ class TimedCachePort {
     for_each_sector_run(access.filled, longest_run_, [&](unsigned sector, unsigned sectors) {
       at = mshrs_.free_from(at, sectors);
       there = memory_.read(access.address + (std::uint64_t{sector} << sector_shift_), sectors << sector_shift_, at);
-      for (unsigned i = 0; i < sectors; ++i) statistics_.fill_cycles.see(there - at);
+      fills_.ask(sectors, at, there);
       mshrs_.take(sectors, there);
       sectors_moved_ += sectors;
       filled(sector, sectors, there);
@@ -57,7 +57,7 @@ class TimedCachePort {
 
  private:
   TimedMemoryPort memory_;
-  SectoredCacheStatistics& statistics_;
+  AnnotatedFillCounter fills_;
   SlotPool mshrs_;
   const unsigned longest_run_;
   const unsigned sector_shift_;
