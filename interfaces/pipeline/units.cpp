@@ -36,6 +36,7 @@ void AttributeFetch::check() const {
     throw UserError("unusable L1 of an SM", "its lines", "they are other than those of attributes",
                     "use lines of 128 bytes, and sectors of 32");
   }
+  if (!has_l1()) return;
   const std::uint32_t ways = l1.ways_of_a_set();
   const std::uint32_t sets = ways <= l1.lines() ? l1.lines() / ways : 0;
   if (sets * ways != l1.lines() || (sets & (sets - 1)) != 0) {

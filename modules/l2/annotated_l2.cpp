@@ -34,7 +34,7 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
       bytes_out_ += out;
       // A request goes to its bank while its last bytes come in.
       Cycle from = std::max(arrival, requests_.take(arrival, in, now) - 1);
-      const Cycle there = l2_.look_up(part, from, from);
+      const Cycle there = l2.passes(part) ? l2_.pass(part, from, from) : l2_.look_up(part, from, from);
       complete = std::max({complete, responses_.take(from, out, now), there});
     });
     return l2_.sizes_.latency_cycles + complete;
@@ -92,15 +92,19 @@ bool AnnotatedL2::awaits(const Fill* fills, std::uint32_t sectors, Cycle at) {
   return false;
 }
 
+Cycle AnnotatedL2::write(const MemoryRequest& access, Bank& bank, Cycle at) {
+  const Cycle done = memory_.access(access, at);
+  quickest_write_ = std::min(quickest_write_, done - at);
+  bank.write_backs.take(at, at + (done - at - quickest_write_), clock.domain->now());
+  return done;
+}
+
 std::uint64_t AnnotatedL2::write_back(const LineAccess& done, Bank& bank, Cycle at) {
-  const Cycle now = clock.domain->now();
   std::uint64_t moved = 0;
   behaviour_->for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, behaviour_->origin(done.line),
-                           [&](const MemoryRequest& write, const SectorRun&) {
-                             const Cycle taken = memory_.access(write, at) - at;
-                             quickest_write_ = std::min(quickest_write_, taken);
-                             bank.write_backs.take(at, at + (taken - quickest_write_), now);
-                             moved += write.bytes;
+                           [&](const MemoryRequest& written, const SectorRun&) {
+                             write(written, bank, at);
+                             moved += written.bytes;
                            });
   return moved;
 }
@@ -113,6 +117,18 @@ Cycle AnnotatedL2::occupy(Bank& bank, Cycle from, Cycle begin, std::uint32_t byt
   }
   bank.bytes += bytes;
   return bank.time.take(from, static_cast<unsigned>(waits) + bytes, clock.domain->now());
+}
+
+Cycle AnnotatedL2::pass(const MemoryRequest& access, Cycle arrival, Cycle& from) {
+  const std::uint32_t index = behaviour_->bank_of(access.address);
+  Bank& bank = banks_[index];
+  const Cycle begin = bank.write_backs.free_from(arrival);
+  const Cycle done = write(access, bank, begin + 1);
+  const std::uint32_t cycles = behaviour_->bank_cycles(access.bytes);
+  const Cycle free_at = occupy(bank, arrival, begin, cycles * sizes_.bank_bytes_per_cycle);
+  behaviour_->count_bank(index, access.bytes);
+  from = std::max(done, free_at - cycles);
+  return from + cycles;
 }
 
 Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& from) {

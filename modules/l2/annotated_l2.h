@@ -57,6 +57,10 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
   Cycle occupy(Bank& bank, Cycle from, Cycle begin, std::uint32_t bytes);
   /// The first cycle in which a request in one line has its data; `from` gets when its bank has begun on it.
   Cycle look_up(const MemoryRequest& access, Cycle arrival, Cycle& from);
+  /// The same for one that goes below without a look-up, and is served when that has it.
+  Cycle pass(const MemoryRequest& access, Cycle arrival, Cycle& from);
+  /// Writes to the memory below, from a cycle on.
+  Cycle write(const MemoryRequest& access, Bank& bank, Cycle at);
 
   std::unique_ptr<SectoredL2> behaviour_;
   const SectoredL2::Sizes& sizes_;

@@ -247,7 +247,10 @@ void ClockedL2::finish_fills(Cycle now) {
   while (memory_.next_completed(tag)) {
     const Below done = asked_[tag];
     free_tags_.push_back(tag);
-    if (done.access.command == tlm::TLM_WRITE_COMMAND) continue;
+    if (done.access.command == tlm::TLM_WRITE_COMMAND) {
+      if (done.request != nobody) respond(done.request, now);
+      continue;
+    }
     for (std::uint32_t left = done.sectors; left != 0; left &= left - 1) {
       behaviour_->statistics().fill_cycles.see(now - done.since);
       cache_.finish_fill(done.line, static_cast<unsigned>(__builtin_ctz(left)));
@@ -311,17 +314,29 @@ bool ClockedL2::take_one(std::uint32_t index, Cycle now) {
   bank.turn = chosen + 1 == ports ? 0 : chosen + 1;
   ports_[chosen]->send(behaviour_->request_bytes(requests_[request].access), now);
   queue_cycles_.see(now - 1 - requests_[request].arrival);
-  look_up(index, request, now);
+  if (behaviour_->passes(requests_[request].access)) {
+    pass(index, request, now);
+  } else {
+    look_up(index, request, now);
+  }
   return true;
 }
 
 bool ClockedL2::can_go_on(std::uint32_t index, const MemoryRequest& access) const {
+  if (behaviour_->passes(access)) return banks_[index].write_backs < sizes_.write_backs;
   const SectoredCache::Line line = cache_.find(access.address);
   if (line == SectoredCache::no_line) {
     const Bank& bank = banks_[index];
     return bank.mshrs < sizes_.mshrs && bank.write_backs < sizes_.write_backs && cache_.can_allocate(access.address);
   }
   return banks_[index].mshrs < sizes_.mshrs || (~cache_.present(line) & behaviour_->sectors_of(access)) == 0;
+}
+
+void ClockedL2::pass(std::uint32_t index, std::uint32_t request, Cycle now) {
+  const MemoryRequest& access = requests_[request].access;
+  writes_.push({access, index, SectoredCache::no_line, 0, now, request});
+  ++banks_[index].write_backs;
+  occupy(index, access.bytes, now);
 }
 
 void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, Cycle now) {
@@ -339,7 +354,7 @@ void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, Cycle now) {
     line = cache_.allocate(access.address, evicted);
     behaviour_->for_each_run(evicted.address, evicted.dirty, tlm::TLM_WRITE_COMMAND, behaviour_->origin(line),
                              [&](const MemoryRequest& write, const SectorRun&) {
-                               writes_.push({write, index, line, 0, now});
+                               writes_.push({write, index, line, 0, now, nobody});
                                ++bank.write_backs;
                                moved += write.bytes;
                              });
@@ -353,7 +368,7 @@ void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, Cycle now) {
   }
   behaviour_->for_each_run(line_address, missing, tlm::TLM_READ_COMMAND, access.origin,
                            [&](const MemoryRequest& read, const SectorRun& run) {
-                             reads_.push({read, index, line, sector_mask(run.first, run.count), now});
+                             reads_.push({read, index, line, sector_mask(run.first, run.count), now, nobody});
                              cache_.pin(line);
                            });
   cache_.looked_up(line, first, access.bytes, writes);
@@ -374,7 +389,8 @@ void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, Cycle now) {
 }
 
 void ClockedL2::ask_below() {
-  const std::size_t many = std::size_t{3} * sizes_.banks * sizes_.write_backs / 4;
+  // What is written through goes first: who reads it asks for it later.
+  const std::size_t many = behaviour_->writes_through() ? 0 : std::size_t{3} * sizes_.banks * sizes_.write_backs / 4;
   while (memory_.available() && !(reads_.empty() && writes_.empty())) {
     Ring<Below>& from = !reads_.empty() && writes_.size() < many ? reads_ : writes_.empty() ? reads_ : writes_;
     if (free_tags_.empty()) {

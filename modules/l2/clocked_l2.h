@@ -68,6 +68,7 @@ class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Cl
     SectoredCache::Line line = 0;
     std::uint32_t sectors = 0;
     Cycle since = 0;
+    std::uint32_t request = nobody;  ///< that is served with it
   };
 
   Cycle tick(Cycle now) override;
@@ -79,6 +80,7 @@ class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Cl
   /// Whether a request finds an MSHR, a line and a place for what that evicts, as far as it may need them.
   bool can_go_on(std::uint32_t index, const MemoryRequest& access) const;
   void look_up(std::uint32_t index, std::uint32_t request, Cycle now);
+  void pass(std::uint32_t index, std::uint32_t request, Cycle now);
   void ask_below();
   void respond(std::uint32_t request, Cycle from);
   void answer(std::uint32_t request, Cycle at);

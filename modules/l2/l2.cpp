@@ -11,18 +11,19 @@ namespace vrpipe {
 
 namespace {
 
-const SlotRegistrar slot{{"l2", 110, "fixed-latency", "", true, nullptr, true}};
+const SlotRegistrar slot_of_l1{{"l1", 105, "sectored-cache", "", false, nullptr, true}};
+const SlotRegistrar slot_of_l2{{"l2", 110, "fixed-latency", "", true, nullptr, true}};
 const Registrar<FixedLatency, MemoryBehaviour> fixed_latency(
     "l2", "fixed-latency", "holds everything: a fixed latency, a number of bytes a cycle for each GPC", false,
     Trust::trusted);
 
-Implementation sectored_cache() {
+Implementation sectored_cache(const CacheLevel& level) {
   Implementation implementation;
-  implementation.slot = "l2";
+  implementation.slot = level.slot;
   implementation.name = "sectored-cache";
   implementation.description = "a cache of sectored lines in banks behind a crossbar, with a memory below it";
   implementation.trust = Trust::trusted;
-  implementation.make_parameters = [] { return std::make_unique<SectoredL2Parameters>(); };
+  implementation.make_parameters = [&level] { return std::make_unique<SectoredL2Parameters>(level); };
   implementation.make_behaviour = [](const ParameterSet& parameters, const RenderContext& context) {
     return std::make_unique<SectoredL2>(dynamic_cast<const SectoredL2Parameters&>(parameters), context);
   };
@@ -47,8 +48,10 @@ std::unique_ptr<MemoryUnit> make(const std::string& name, ClockDomain& domain, s
 }
 
 [[maybe_unused]] const bool registered = [] {
-  Registry::instance().add(sectored_cache());
-  register_memory_unit_maker("l2", make);
+  for (const CacheLevel* level : {&level_of_l1, &level_of_l2}) {
+    Registry::instance().add(sectored_cache(*level));
+    register_memory_unit_maker(level->slot, make);
+  }
   return true;
 }();
 

@@ -8,6 +8,40 @@
 
 namespace vrpipe {
 
+// Of the 16 cores of the paper's GPC, whose L1s one of an array stands for.
+const CacheLevel level_of_l1{"l1",
+                             "L1",
+                             {"bytes", 16 * 49152, 1U << 30, "48 KB for each of 16 cores", 96,
+                              "Accel-Sim, QV100: 4 sets in the L1 of a core, whatever its size"},
+                             true,
+                             "Accel-Sim, SM87_ORIN: an L1 writes through",
+                             false,
+                             source::open,
+                             64,
+                             "Accel-Sim, SM87_ORIN: 4 in the L1 of a core",
+                             "Accel-Sim: a sector a cycle",
+                             96,
+                             "Accel-Sim, SM87_ORIN: 384 in the L1 of a core",
+                             38,
+                             "Accel-Sim, SM87_ORIN: L1 latency",
+                             source::open};
+const CacheLevel level_of_l2{"l2",
+                             "L2",
+                             {"bytes", 4 << 20, 1U << 30, "shared by all GPCs", 16,
+                              "Accel-Sim, SM87_ORIN: 32 sub-partitions of 64 sets of 16 ways of 128 bytes"},
+                             false,
+                             source::open,
+                             true,
+                             source::paper_text,
+                             32,
+                             "Accel-Sim, SM87_ORIN: 16 partitions of 2 sub-partitions",
+                             "Accel-Sim: a sector a cycle",
+                             64,
+                             source::open,
+                             146,
+                             "Accel-Sim, SM87_ORIN: L2 latency",
+                             "Accel-Sim, SM87_ORIN: buffers of 512 at the crossbar"};
+
 namespace {
 
 SectoredL2::Sizes sizes_of(const SectoredL2Parameters& parameters) {
@@ -19,13 +53,16 @@ SectoredL2::Sizes sizes_of(const SectoredL2Parameters& parameters) {
 CacheOrganization checked(const SectoredL2Parameters& parameters) {
   CacheOrganization organization = parameters.cache.organization();
   organization.write_allocate = static_cast<WriteAllocate>(static_cast<unsigned>(parameters.write_allocate));
-  organization.check("L2", "l2", "bytes");
+  const std::string name = parameters.level.name;
+  const std::string slot = parameters.level.slot;
+  organization.check(name, slot, "bytes");
   const std::uint32_t banks = parameters.banks;
   if ((banks & (banks - 1)) != 0) {
-    throw UserError("unusable L2", "l2.banks", fmt::format("{} is no power of two", banks), "use a power of two");
+    throw UserError("unusable " + name, slot + ".banks", fmt::format("{} is no power of two", banks),
+                    "use a power of two");
   }
   if (banks > organization.sets()) {
-    throw UserError("unusable L2", "l2.banks, l2.ways",
+    throw UserError("unusable " + name, slot + ".banks, " + slot + ".ways",
                     fmt::format("{} sets cannot be dealt out to {} banks", organization.sets(), banks),
                     fmt::format("use at most {} banks, or fewer ways", organization.sets()));
   }
@@ -37,6 +74,7 @@ CacheOrganization checked(const SectoredL2Parameters& parameters) {
 SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderContext& context)
     : sizes_(sizes_of(parameters)),
       gpcs_(context.placement.gpcs),
+      writes_through_(parameters.write_policy == 1U),
       holds_attributes_(parameters.hold_attributes),
       of_traffic_{{{{*this, "other_sectors", "sectors", "accessed by initiators that do not say what for"},
                     {*this, "other_sector_misses", "sectors", "missed by these"}},
@@ -56,6 +94,11 @@ void SectoredL2::access(const MemoryRequest& request) {
   traffic_.count(request);
   const bool writes = request.command == tlm::TLM_WRITE_COMMAND;
   for_each_line(request, [&](std::uint64_t address, std::uint32_t bytes) {
+    if (passes(request)) {
+      if (below_ != nullptr) below_->access({address, bytes, request.command, request.origin});
+      if (is_for_quads(request)) count_bank(bank_of(address), bytes);
+      return;
+    }
     const LineAccess done = cache_.access(address, bytes, writes);
     looked_up({address, bytes, request.command, request.origin},
               static_cast<unsigned>(__builtin_popcount(done.sectors)),

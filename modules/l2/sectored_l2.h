@@ -13,39 +13,61 @@
 
 namespace vrpipe {
 
+/// Where a cache stands: what it is called, and what is other there than in other places by default.
+struct CacheLevel {
+  const char* slot;
+  const char* name;
+  CacheParameters::Defaults cache;
+  bool writes_through;
+  const char* writes_source;
+  bool holds_attributes;
+  const char* holds_source;
+  std::uint32_t banks;
+  const char* banks_source;
+  const char* bank_bytes_source;
+  std::uint32_t mshrs;
+  const char* mshrs_source;
+  std::uint32_t latency_cycles;
+  const char* latency_source;
+  const char* port_requests_source;
+};
+extern const CacheLevel level_of_l1;
+extern const CacheLevel level_of_l2;
+
 struct SectoredL2Parameters : ParameterSet {
-  CacheParameters cache{*this,
-                        {"bytes", 4 << 20, 1U << 30, "shared by all GPCs", 16,
-                         "Accel-Sim, SM87_ORIN: 32 sub-partitions of 64 sets of 16 ways of 128 bytes"}};
+  explicit SectoredL2Parameters(const CacheLevel& of = level_of_l2) : level(of) {}
+
+  const CacheLevel& level;
+  CacheParameters cache{*this, level.cache};
+  Choice write_policy{*this,
+                      "write_policy",
+                      {"write-back", "write-through"},
+                      level.writes_through ? 1U : 0U,
+                      level.writes_source,
+                      "what is written stays until its line goes, or goes below at once, past the cache"};
   Choice write_allocate{*this,
                         "write_allocate",
                         {"fill", "byte-mask"},
                         0,
                         source::open,
                         "what a write of a part of a sector does that is not there: has it filled, or marks its bytes"};
-  Switch hold_attributes{*this, "hold_attributes", true, source::paper_text,
+  Switch hold_attributes{*this, "hold_attributes", level.holds_attributes, level.holds_source,
                          "a line of attributes goes only where its set has no other that can"};
-  Integer banks{*this,
-                "banks",
-                32,
-                1,
-                64,
-                "banks",
-                "Accel-Sim, SM87_ORIN: 16 partitions of 2 sub-partitions",
-                "among which the sets are dealt out"};
+  Integer banks{*this, "banks", level.banks, 1, 64, "banks", level.banks_source, "among which the sets are dealt out"};
   Integer bank_bytes_per_cycle{*this,
                                "bank_bytes_per_cycle",
                                32,
                                16,
                                1024,
                                "bytes",
-                               "Accel-Sim: a sector a cycle",
+                               level.bank_bytes_source,
                                "read, written or filled in a bank"};
-  Integer mshrs{*this, "mshrs", 64, 1, 65536, "requests", source::open, "of a bank: that wait for fills"};
+  Integer mshrs{*this, "mshrs",    level.mshrs,        1,
+                65536, "requests", level.mshrs_source, "of a bank: that wait for fills"};
   Integer write_backs{*this, "write_backs", 32,           1,
                       65536, "accesses",    source::open, "of a bank, that wait for the memory below"};
-  Integer latency_cycles{
-      *this, "latency_cycles", 146, 1, 100000, "cycles", "Accel-Sim, SM87_ORIN: L2 latency", "from request to data"};
+  Integer latency_cycles{*this,  "latency_cycles", level.latency_cycles, 1,
+                         100000, "cycles",         level.latency_source, "from request to data"};
   Integer bytes_per_cycle{
       *this,        "bytes_per_cycle",
       128,          32,
@@ -65,7 +87,7 @@ struct SectoredL2Parameters : ParameterSet {
                         1,
                         65536,
                         "requests",
-                        "Accel-Sim, SM87_ORIN: buffers of 512 at the crossbar",
+                        level.port_requests_source,
                         "that wait at a port of the crossbar"};
   Choice arbitration{*this, "arbitration", {"round-robin", "oldest"},
                      0,     source::open,  "of the ports that have requests for a bank"};
@@ -81,8 +103,9 @@ class L2Observer {
   virtual void served(const MemoryRequest& part) = 0;
 };
 
-/// The L2 that all GPCs share: a sectored cache in banks, write-back, behind a crossbar. A request of several lines is an
-/// access to each.
+/// The L2 that all GPCs share, or an L1 of an SM array: a sectored cache in banks behind a crossbar. A request of several
+/// lines is an access to each. It writes back, or through: then a write changes no tags, and what is there of its sectors
+/// stays there.
 class SectoredL2 final : public MemoryBehaviour {
  public:
   /// Throws UserError for a cache that cannot be, more banks than sets, or a port or bank narrower than a sector.
@@ -92,7 +115,8 @@ class SectoredL2 final : public MemoryBehaviour {
   bool needs_below() const override { return true; }
   MemoryBytes delivered() const override { return traffic_.bytes(); }
   MemoryBytes memory_bytes() const override {
-    return {statistics_.bytes_filled.value(), statistics_.bytes_written_back.value()};
+    const MemoryBytes of_lines{statistics_.bytes_filled.value(), statistics_.bytes_written_back.value()};
+    return {of_lines.read, of_lines.written + (writes_through_ ? traffic_.bytes().written : 0)};
   }
   std::vector<OccupancyPart> least_occupancy(double period_ps) const override;
   TimingParameters timing() const override { return {sizes_.latency_cycles, sizes_.bytes_per_cycle}; }
@@ -108,6 +132,11 @@ class SectoredL2 final : public MemoryBehaviour {
 
   // For timing models.
 
+  bool writes_through() const { return writes_through_; }
+  /// Whether a request goes below without a look-up.
+  bool passes(const MemoryRequest& request) const {
+    return writes_through_ && request.command == tlm::TLM_WRITE_COMMAND;
+  }
   /// Of a piece of a request.
   std::uint32_t bank_of(std::uint64_t address) const { return cache_.set_of(address) & (sizes_.banks - 1); }
   SectoredCache& cache() { return cache_; }
@@ -122,7 +151,7 @@ class SectoredL2 final : public MemoryBehaviour {
     if (observer_ != nullptr) observer_->looked_up(part);
   }
   void served(const MemoryRequest& part) {
-    if (observer_ != nullptr) observer_->served(part);
+    if (observer_ != nullptr && !passes(part)) observer_->served(part);
   }
   /// In a bank.
   void count_bank(std::uint32_t bank, std::uint64_t bytes) { bank_cycles_[bank] += bank_cycles(bytes); }
@@ -182,6 +211,7 @@ class SectoredL2 final : public MemoryBehaviour {
 
   const Sizes sizes_;
   const unsigned gpcs_;
+  const bool writes_through_;
   const bool holds_attributes_;
   MemoryTrafficCounters traffic_{*this};
   std::array<OfTraffic, memory_traffics> of_traffic_;

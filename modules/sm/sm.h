@@ -91,14 +91,16 @@ class SplatShader : public SmBehaviour {
                                    "bytes",
                                    "Accel-Sim, SM87_ORIN: flits of 40 bytes carry 32, for each cluster",
                                    "that the memory port has in each direction for each core"};
-    Integer l1_bytes{*this,
-                     "l1_bytes",
-                     49152,
-                     AttributeTraffic::line_bytes,
-                     1 << 20,
-                     "bytes",
-                     source::paper_table,
-                     "L1 of a core, through which attributes are read; lines of 128 bytes, sectors of 32"};
+    Integer l1_bytes{
+        *this,
+        "l1_bytes",
+        49152,
+        0,
+        1 << 20,
+        "bytes",
+        source::paper_table,
+        "L1 of a core, through which attributes are read; lines of 128 bytes, sectors of 32; 0: none, they "
+        "are read from what the memory port is bound to"};
     Integer l1_ways{*this, "l1_ways", 0, 0, 1 << 13, "ways", source::open, "of a set of an L1; 0: fully associative"};
     Integer l1_mshrs{*this,
                      "l1_mshrs",
@@ -107,7 +109,7 @@ class SplatShader : public SmBehaviour {
                      65536,
                      "sectors",
                      "Accel-Sim, SM87_ORIN: 384 MSHRs of a first-level cache",
-                     "that an L1 has asked for and not got"};
+                     "that an L1, or a core without one, has asked for and not got"};
     Integer l1_latency_cycles{*this,
                               "l1_latency_cycles",
                               38,

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "attribute_traffic.h"
@@ -18,7 +19,8 @@ namespace vrpipe {
 ///
 /// Reads of vertices are sent at once. Attributes are written without waiting for an answer; `attribute_writes` may be
 /// without one, and what comes behind them waits. Fills are sent as a warp is looked up, which waits while all miss
-/// registers of its core are taken, or no line of its set can go: one whose fill is on its way stays.
+/// registers of its core are taken, or no line of its set can go: one whose fill is on its way stays. Where cores have
+/// no L1s, a warp asks for all that it reads.
 class SmMemory {
  public:
   SmMemory(PortOwner& owner, const RenderContext& context, const SmBehaviour::TimingParameters& timing,
@@ -71,7 +73,8 @@ class SmMemory {
   }
   /// Goes on with it; false while it has to wait.
   bool look_up(Cycle now) {
-    SectoredCache& cache = l1s_[core_].cache;
+    if (!l1s_[core_].cache) return ask_for_all(now);
+    SectoredCache& cache = *l1s_[core_].cache;
     std::uint64_t sectors = 0;
     for (; at_ < look_up_.count; ++at_, seen_ = 0) {
       const AttributeTraffic::LineSectors& needed = look_up_.lines[at_];
@@ -135,17 +138,20 @@ class SmMemory {
     MemoryRequest request;
     std::uint32_t slot = 0;
   };
+  /// Of a core.
   struct L1 {
     L1(const AttributeFetch& timing, SectoredCacheStatistics& statistics)
-        : cache(timing.l1, statistics), free_mshrs(timing.l1_mshrs), fills(timing.l1.lines()) {}
-    SectoredCache cache;
+        : free_mshrs(timing.l1_mshrs), fills(timing.l1.lines()) {
+      if (timing.has_l1()) cache.emplace(timing.l1, statistics);
+    }
+    std::optional<SectoredCache> cache;                               ///< none where memory has it all
     std::uint32_t free_mshrs;                                         ///< sectors
     std::vector<std::array<std::uint32_t, sectors_of_a_line>> fills;  ///< by line and sector, of those on their way
   };
   /// Neighbouring sectors of a line that were asked for together.
   struct Fill {
     std::uint32_t core = 0;
-    SectoredCache::Line line = 0;
+    SectoredCache::Line line = SectoredCache::no_line;  ///< of the L1, if there is one
     SectorRun sectors;
     std::uint32_t waiters = none;  ///< a chain
     Cycle asked = 0;
@@ -155,32 +161,53 @@ class SmMemory {
     std::uint32_t next = none;
   };
 
+  /// As `look_up`, without an L1.
+  bool ask_for_all(Cycle now) {
+    for (; at_ < look_up_.count; ++at_, seen_ = 0) {
+      const AttributeTraffic::LineSectors& needed = look_up_.lines[at_];
+      for (std::uint32_t left = needed.sectors & ~seen_; left != 0;) {
+        std::uint32_t fill = none;
+        if (!ask(needed, left, SectoredCache::no_line, now, fill)) return false;
+      }
+    }
+    return true;
+  }
+  /// Asks for the first of the missing sectors of a line, for which the warp then waits; false if that has to wait.
+  bool ask(const AttributeTraffic::LineSectors& needed, std::uint32_t& missing, SectoredCache::Line line, Cycle now,
+           std::uint32_t& fill) {
+    L1& l1 = l1s_[core_];
+    if (l1.free_mshrs == 0 || !port_.available()) return false;
+    const SectorRun run = take_sector_run(missing, l1.free_mshrs);
+    fill = new_fill({core_, line, run, none, now});
+    l1.free_mshrs -= run.count;
+    seen_ |= sector_mask(run.first, run.count);
+    await(fill);
+    port_.access({traffic_.in_buffer(needed.address) + run.first * AttributeTraffic::sector_bytes,
+                  run.count * AttributeTraffic::sector_bytes, tlm::TLM_READ_COMMAND, fill_origin_},
+                 fill);
+    return true;
+  }
+
   /// Goes on with a line; sectors once seen are not looked at again.
   bool look_up_line(const AttributeTraffic::LineSectors& needed, SectoredCache::Line line, Cycle now) {
     L1& l1 = l1s_[core_];
-    for (std::uint32_t coming = needed.sectors & l1.cache.filling(line) & ~seen_; coming != 0;) {
+    for (std::uint32_t coming = needed.sectors & l1.cache->filling(line) & ~seen_; coming != 0;) {
       const std::uint32_t fill = l1.fills[line][static_cast<unsigned>(__builtin_ctz(coming))];
       const SectorRun run = fills_[fill].sectors;
       coming &= ~sector_mask(run.first, run.count);
       seen_ |= sector_mask(run.first, run.count);
       await(fill);
     }
-    std::uint32_t missing = needed.sectors & l1.cache.absent(line) & ~seen_;
+    std::uint32_t missing = needed.sectors & l1.cache->absent(line) & ~seen_;
     while (missing != 0) {
-      if (l1.free_mshrs == 0 || !port_.available()) return false;
-      const SectorRun run = take_sector_run(missing, l1.free_mshrs);
-      const std::uint32_t fill = new_fill({core_, line, run, none, now});
+      std::uint32_t fill = none;
+      if (!ask(needed, missing, line, now, fill)) return false;
+      const SectorRun run = fills_[fill].sectors;
       for (unsigned sector = run.first; sector < run.first + run.count; ++sector) {
-        l1.cache.start_fill(line, sector);
+        l1.cache->start_fill(line, sector);
         l1.fills[line][sector] = fill;
       }
-      l1.cache.pin(line);
-      l1.free_mshrs -= run.count;
-      seen_ |= sector_mask(run.first, run.count);
-      await(fill);
-      port_.access({traffic_.in_buffer(needed.address) + run.first * AttributeTraffic::sector_bytes,
-                    run.count * AttributeTraffic::sector_bytes, tlm::TLM_READ_COMMAND, fill_origin_},
-                   fill);
+      l1.cache->pin(line);
     }
     return true;
   }
@@ -190,12 +217,14 @@ class SmMemory {
     const Fill fill = fills_[index];
     free_fills_.push_back(index);
     L1& l1 = l1s_[fill.core];
-    for (unsigned i = 0; i < fill.sectors.count; ++i) {
-      l1.cache.finish_fill(fill.line, fill.sectors.first + i);
-      statistics_.fill_cycles.see(now - fill.asked);
-    }
-    l1.cache.unpin(fill.line);
     l1.free_mshrs += fill.sectors.count;
+    if (l1.cache) {
+      for (unsigned i = 0; i < fill.sectors.count; ++i) {
+        l1.cache->finish_fill(fill.line, fill.sectors.first + i);
+        statistics_.fill_cycles.see(now - fill.asked);
+      }
+      l1.cache->unpin(fill.line);
+    }
     for (std::uint32_t waiter = fill.waiters; waiter != none;) {
       const Waiter waiting = waiters_[waiter];
       free_waiters_.push_back(waiter);

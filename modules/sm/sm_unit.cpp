@@ -347,7 +347,7 @@ class SmUnit : public Unit {
   [[gnu::noinline]] bool look_up(std::uint32_t slot, const Warp& warp, Cycle now) {
     if (!looks_up_) memory_.begin_look_up(slot, core_, warp);
     looks_up_ = !memory_.look_up(now);
-    there_[slot] = now + timing_.fetch.l1_latency_cycles;
+    there_[slot] = timing_.fetch.has_l1() ? now + timing_.fetch.l1_latency_cycles : now;
     return !looks_up_;
   }
 

@@ -9,7 +9,7 @@ namespace vrpipe {
 namespace {
 
 /// The SM array without time. Ports as in sm_timed.cpp. Where its memory wants to know, warps go to cores in turn, as if
-/// each had a slot, and what they read of attributes goes through its L1.
+/// each had a slot, and what they read of attributes goes through its L1, if it has one.
 class UntimedSm : public UntimedUnit {
  public:
   UntimedSm(const std::string& name, std::unique_ptr<SmBehaviour> behaviour, const RenderContext& context)
@@ -54,6 +54,11 @@ class UntimedSm : public UntimedUnit {
   }
 
   [[gnu::noinline]] void read_attributes(const Warp& warp) {
+    traffic_.read_attributes(warp, reads_);
+    if (!timing_.fetch.has_l1()) {
+      for (unsigned i = 0; i < reads_.count; ++i) ask(reads_.lines[i].address, reads_.lines[i].sectors);
+      return;
+    }
     if (l1s_.empty()) {
       for (std::uint32_t core = 0; core < timing_.cores; ++core) l1s_.emplace_back(timing_.fetch.l1, l1_statistics_);
     }
@@ -64,7 +69,6 @@ class UntimedSm : public UntimedUnit {
     last_tile_ = warp.tile;
     ++sent_to_core_;
     SectoredCache& l1 = l1s_[core_];
-    traffic_.read_attributes(warp, reads_);
     unsigned sectors = 0;
     for (unsigned i = 0; i < reads_.count; ++i) {
       LineAccess access;
@@ -72,13 +76,17 @@ class UntimedSm : public UntimedUnit {
       access.sectors = reads_.lines[i].sectors;
       l1.look_up(access);
       sectors += static_cast<unsigned>(__builtin_popcount(access.sectors));
-      for (std::uint32_t missing = access.filled; missing != 0;) {
-        const SectorRun run = take_sector_run(missing, AttributeTraffic::line_bytes / AttributeTraffic::sector_bytes);
-        memory_.read(traffic_.in_buffer(access.address) + run.first * AttributeTraffic::sector_bytes,
-                     run.count * AttributeTraffic::sector_bytes);
-      }
+      ask(access.address, access.filled);
     }
     l1.accessed(reads_.count, sectors);
+  }
+  /// For sectors of a line, in as few accesses as their alignment allows.
+  void ask(std::uint64_t line_address, std::uint32_t sectors) {
+    while (sectors != 0) {
+      const SectorRun run = take_sector_run(sectors, AttributeTraffic::line_bytes / AttributeTraffic::sector_bytes);
+      memory_.read(traffic_.in_buffer(line_address) + run.first * AttributeTraffic::sector_bytes,
+                   run.count * AttributeTraffic::sector_bytes);
+    }
   }
 
   UntimedOut<VertexWarp> out_vertices_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "attribute_traffic.h"
@@ -13,7 +14,7 @@
 
 namespace vrpipe {
 
-/// As sm_memory.h, at lt and at: each access gets its cycle when its warp is launched or shaded. L1 sees the launches
+/// As sm_memory.h, at lt and at: each access gets its cycle when its warp is launched or shaded. L1s see the launches
 /// in their order.
 class TimedSmMemory {
  public:
@@ -68,13 +69,14 @@ class TimedSmMemory {
   Fetch fetch_attributes(const Warp& warp, std::uint32_t core, Cycle at) {
     traffic_.read_attributes(warp, reads_);
     L1& l1 = l1s_[core];
+    if (!l1.cache) return fetch_past(l1, at);
     Cycle there = 0;
     std::uint64_t sectors = 0;
     for (unsigned i = 0; i < reads_.count; ++i) {
       LineAccess access;
       access.address = reads_.lines[i].address;
       access.sectors = reads_.lines[i].sectors;
-      l1.cache.look_up(access);
+      l1.cache->look_up(access);
       std::array<Cycle, sectors_of_a_line>& line = l1.there[access.line];
       if (access.replaced) {
         // It stays until what it waits for has come.
@@ -87,17 +89,20 @@ class TimedSmMemory {
         ++sectors;
       }
     }
-    l1.cache.accessed(reads_.count, sectors);
+    l1.cache->accessed(reads_.count, sectors);
     return {at, std::max(there, at + timing_.l1_latency_cycles)};
   }
 
  private:
   static constexpr unsigned sectors_of_a_line = AttributeTraffic::line_bytes / AttributeTraffic::sector_bytes;
 
+  /// Of a core.
   struct L1 {
     L1(const AttributeFetch& timing, SectoredCacheStatistics& statistics)
-        : cache(timing.l1, statistics), mshrs(timing.l1_mshrs), fills(statistics), there(timing.l1.lines()) {}
-    SectoredCache cache;
+        : mshrs(timing.l1_mshrs), fills(statistics), there(timing.l1.lines()) {
+      if (timing.has_l1()) cache.emplace(timing.l1, statistics);
+    }
+    std::optional<SectoredCache> cache;  ///< none where memory has it all
     SlotPool mshrs;
     AnnotatedFillCounter fills;
     std::vector<std::array<Cycle, sectors_of_a_line>> there;  ///< by line and sector: since when
@@ -110,18 +115,35 @@ class TimedSmMemory {
     unsent_.pop();
   }
 
-  /// Asks for the first of the sectors that are missing; returns when.
-  Cycle fill(L1& l1, const LineAccess& access, std::uint32_t& missing, std::array<Cycle, sectors_of_a_line>& line,
-             Cycle at) {
-    const SectorRun run = take_sector_run(missing, std::min(sectors_of_a_line, timing_.l1_mshrs));
+  /// The same where the core has none: each warp asks for all that it reads.
+  Fetch fetch_past(L1& l1, Cycle at) {
+    Cycle there = 0;
+    for (unsigned i = 0; i < reads_.count; ++i) {
+      for (std::uint32_t left = reads_.lines[i].sectors; left != 0;) {
+        SectorRun run;
+        there = std::max(there, ask(l1, reads_.lines[i].address, left, run, at));
+      }
+    }
+    return {at, there};
+  }
+  /// Asks for the first of the sectors that are missing in a line, from cycle `at` on, and says when and for which;
+  /// returns when these are there.
+  Cycle ask(L1& l1, std::uint64_t line, std::uint32_t& missing, SectorRun& run, Cycle& at) {
+    run = take_sector_run(missing, std::min(sectors_of_a_line, timing_.l1_mshrs));
     at = l1.mshrs.free_from(at, run.count);
     // Addresses of writes increase.
-    while (!unsent_.empty() && unsent_.front().request.address < access.address + AttributeTraffic::line_bytes) send();
-    const std::uint64_t line_address = traffic_.in_buffer(access.address);
-    const Cycle there = port_.access({line_address + run.first * AttributeTraffic::sector_bytes,
+    while (!unsent_.empty() && unsent_.front().request.address < line + AttributeTraffic::line_bytes) send();
+    const Cycle there = port_.access({traffic_.in_buffer(line) + run.first * AttributeTraffic::sector_bytes,
                                       run.count * AttributeTraffic::sector_bytes, tlm::TLM_READ_COMMAND, fill_origin_},
                                      at);
     l1.mshrs.take(run.count, there);
+    return there;
+  }
+  /// The same for a line of the L1; returns when.
+  Cycle fill(L1& l1, const LineAccess& access, std::uint32_t& missing, std::array<Cycle, sectors_of_a_line>& line,
+             Cycle at) {
+    SectorRun run;
+    const Cycle there = ask(l1, access.address, missing, run, at);
     l1.fills.ask(run.count, at, there);
     for (unsigned i = 0; i < run.count; ++i) line[run.first + i] = there;
     return at;

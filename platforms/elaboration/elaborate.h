@@ -47,7 +47,7 @@ inline void check_below(const Netlist& netlist, const std::string& path, const M
   if (!memory.needs_below() || std::any_of(links.begin(), links.end(), is_from)) return;
   throw UserError("incomplete platform " + platform, path,
                   "it fetches what it does not hold, and no memory is below it",
-                  "add one and use connect_memory, or choose --unit " + path + "=fixed-latency");
+                  "add one and use connect_memory, or put a memory there that needs none");
 }
 
 /// Throws UserError for a port that is neither connected nor stubbed.

@@ -17,6 +17,12 @@ namespace vrpipe {
 
 namespace {
 
+/// What SystemC calls what has a path: that has no points.
+std::string module_name(std::string path) {
+  std::replace(path.begin(), path.end(), '.', '_');
+  return path;
+}
+
 [[noreturn]] void refuse_memory(const std::string& where, const std::string& why, const std::string& remedy) {
   throw UserError("cannot connect memory", where, why, remedy);
 }
@@ -69,8 +75,7 @@ void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
     zrop->attach(framebuffer.depth_stencil);
     if (ahead != ahead_.end()) zrop->follow(*ahead->second);
   }
-  std::string module = instance.path;
-  std::replace(module.begin(), module.end(), '.', '_');
+  const std::string module = module_name(instance.path);
   const unsigned gpcs = configuration_.netlist().gpcs();
   const Fidelity fidelity = configuration_.request().fidelity;
   std::unique_ptr<Unit> unit;
@@ -109,10 +114,7 @@ void Gpu::add_memories() {
     std::vector<std::string> bound = bound_to(path);
     const Instance* const instance = netlist.find(path);
     std::vector<unsigned> ports;
-    for (const std::string& from : bound) {
-      const Unit* const unit = find(from);
-      ports.push_back(unit == nullptr ? 0 : unit->memory_bytes_per_cycle());
-    }
+    for (const std::string& from : bound) ports.push_back(memory_bytes_per_cycle(from));
     made.push_back({path, std::move(bound), {}});
     if (instance != nullptr) {
       made.back().sockets = make_memory(*instance, ports);
@@ -125,6 +127,17 @@ void Gpu::add_memories() {
   for (const Made& each : made) bind_memory(each.path, each.bound, each.sockets);
 }
 
+unsigned Gpu::memory_bytes_per_cycle(const std::string& path) const {
+  if (const Unit* const unit = find(path)) return unit->memory_bytes_per_cycle();
+  unsigned sum = 0;
+  for (const std::string& above : configuration_.netlist().bound_to(path)) {
+    const unsigned bytes = memory_bytes_per_cycle(above);
+    if (bytes == 0) return 0;
+    sum += bytes;
+  }
+  return sum;
+}
+
 Gpu::TargetSockets Gpu::make_memory(const Instance& instance, const std::vector<unsigned>& ports) {
   const std::vector<MemoryLink>& links = configuration_.netlist().memory_links();
   const bool has_below =
@@ -133,14 +146,14 @@ Gpu::TargetSockets Gpu::make_memory(const Instance& instance, const std::vector<
   auto behaviour = configuration_.make_as<MemoryBehaviour>(instance);
   check_below(configuration_.netlist(), instance.path, *behaviour, configuration_.platform().name);
   memories_.push_back(
-      {&instance, memory_unit_maker(instance.slot)(instance.path, *clock_, std::move(behaviour), place)});
+      {&instance, memory_unit_maker(instance.slot)(module_name(instance.path), *clock_, std::move(behaviour), place)});
   TargetSockets sockets;
   for (unsigned index = 0; index < ports.size(); ++index) sockets.push_back(&memories_.back().memory->target(index));
   return sockets;
 }
 
 Gpu::TargetSockets Gpu::make_foreign(const ForeignInstance& foreign, unsigned ports) {
-  ForeignMemory made = foreign.make(foreign.path, ports);
+  ForeignMemory made = foreign.make(module_name(foreign.path), ports);
   if (made.module == nullptr) refuse_memory(foreign.path, "nothing was made", "return a module and its sockets");
   foreign_memories_.push_back({&foreign, std::move(made.module)});
   TargetSockets sockets = std::move(made.sockets);

@@ -99,6 +99,17 @@ void Netlist::connect_memory(const std::string& from, const std::string& memory)
   memory_links_.push_back({from, memory});
 }
 
+void Netlist::insert_memory(const std::string& from, const std::string& memory) {
+  const auto bound = std::find_if(memory_links_.begin(), memory_links_.end(),
+                                  [&](const MemoryLink& link) { return link.from == from; });
+  if (bound == memory_links_.end()) {
+    refuse("cannot insert " + memory, from, "its memory port is bound to nothing", "use connect_memory");
+  }
+  const std::string below = bound->to;
+  connect_memory(memory, below);
+  connect_memory(from, memory);
+}
+
 void Netlist::disconnect_memory(const std::string& from) {
   memory_links_.erase(std::remove_if(memory_links_.begin(), memory_links_.end(),
                                      [&](const MemoryLink& link) { return link.from == from; }),

@@ -51,16 +51,27 @@ void wire_dram(Netlist& netlist, const std::string& dram) {
 }
 
 namespace {
-void connect_all(Netlist& netlist, const std::string& slot, const std::string& memory) {
+std::vector<std::string> units_of(const Netlist& netlist, const std::string& slot) {
   std::vector<std::string> units;
   for (const Instance& instance : netlist.instances()) {
     if (instance.slot == slot) units.push_back(instance.path);
   }
-  for (const std::string& unit : units) netlist.connect_memory(unit, memory);
+  return units;
+}
+void connect_all(Netlist& netlist, const std::string& slot, const std::string& memory) {
+  for (const std::string& unit : units_of(netlist, slot)) netlist.connect_memory(unit, memory);
 }
 }  // namespace
 
 void connect_attribute_traffic(Netlist& netlist, const std::string& memory) { connect_all(netlist, "sm", memory); }
+
+void insert_l1(Netlist& netlist, const std::string& implementation) {
+  for (const std::string& sm : units_of(netlist, "sm")) {
+    const std::string l1 = sm.substr(0, sm.rfind('.') + 1) + "l1";
+    netlist.add(l1, "l1", implementation);
+    netlist.insert_memory(sm, l1);
+  }
+}
 
 void connect_depth_stencil_traffic(Netlist& netlist, const std::string& memory) {
   connect_all(netlist, "zrop", memory);

@@ -315,8 +315,9 @@ class OccupancyReport {
 
   void finish() {
     for (const Slot& slot : Registry::instance().slots()) {
-      if (!slot.reports_utilization) continue;
       const auto& [units, sum] = throughput_of_[slot.name];
+      const bool is_there = slot.is_memory && units > 0;
+      if (!slot.reports_utilization && !is_there) continue;
       result_.utilization.emplace_back(slot.name, units > 0 ? sum / units : 0.0);
     }
     if (!Registry::instance().has_slot("dram")) result_.utilization.emplace_back("dram", 0.0);

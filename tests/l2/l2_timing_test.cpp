@@ -154,6 +154,30 @@ TEST_P(L2AtEachFidelity, AWriteOfPartOfASectorFetchesIt) {
   EXPECT_EQ(bytes_below(false), 32U);
 }
 
+TEST_P(L2AtEachFidelity, WrittenThroughItIsServedWithTheMemoryBelowAndLeavesWhatIsThere) {
+  set("write_policy", "write-through");
+  EXPECT_EQ(run(GetParam(), {read(100, 64), write(300, 64), read(500, 64)}),
+            (std::vector<Cycle>{100 + miss, 300 + miss, 500 + hit}));
+  EXPECT_EQ(bytes_below(true), 32U);
+  EXPECT_EQ(bytes_below(false), 32U);
+  EXPECT_EQ(model->statistics().sector_accesses.value(), 2U) << "the reads";
+  EXPECT_EQ(l2->delivered().written, l2->memory_bytes().written);
+}
+
+TEST_P(L2AtEachFidelity, WrittenThroughWhatIsNotThereIsNotKept) {
+  set("write_policy", "write-through");
+  EXPECT_EQ(run(GetParam(), {write(100, 0, 128), read(300, 0)})[1], 300 + miss);
+  EXPECT_EQ(bytes_below(true), 128U);
+}
+
+// A read does not overtake a write to the same place, though both wait for the memory below.
+TEST_P(L2AtEachFidelity, WrittenThroughGoesBelowInTheOrderOfItsBank) {
+  set("write_policy", "write-through");
+  const std::vector<Cycle> completed = run(GetParam(), {write(100, 64), read(100, 64)});
+  EXPECT_EQ(completed[0], 100 + miss);
+  EXPECT_GT(completed[1], completed[0]);
+}
+
 TEST_P(L2AtEachFidelity, SeesHowLongFillsTakeAndHowManyAreOnTheirWay) {
   run(GetParam(), {read(100, 0, 64), read(110, line), read(500, 2 * line)});
   const Histogram& filling = model->statistics().sectors_filling;

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/arithmetic/random.h>
 #include <vrpipe/component/error.h>
 
 #include "support/builders.h"
@@ -111,6 +112,30 @@ TEST(SectoredL2, WhatWasWrittenGoesBelowWithTheOriginOfItsLineWhenThatGoes) {
   EXPECT_EQ(written.bytes, 128U);
   EXPECT_EQ(written.origin.traffic, MemoryTraffic::attribute);
   EXPECT_EQ(written.origin.gpc, 2U);
+}
+
+TEST(SectoredL2, WritingThroughItPassesOnEveryWriteAndReadsWhatItWouldWithoutThem) {
+  L2 through(Settings{{"write_policy", "write-through"}, {"bytes", "4096"}, {"ways", "2"}, {"banks", "1"}});
+  L2 reads(Settings{{"bytes", "4096"}, {"ways", "2"}, {"banks", "1"}});
+  std::uint64_t written = 0;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    const std::uint64_t line = mix(i) % 64;
+    if (mix(i + 5000) % 3 != 0) {
+      for (L2* l2 : {&through, &reads}) l2->read(128 * line, 64, color);
+    } else {
+      through.write(128 * line + 32, 16, attribute);
+      written += 16;
+    }
+  }
+  EXPECT_EQ(through.below.bytes.written, written);
+  EXPECT_EQ(through.behaviour->memory_bytes().written, written);
+  EXPECT_EQ(through.below.bytes.read, reads.below.bytes.read);
+  EXPECT_EQ(through.count("cache.sector_misses"), reads.count("cache.sector_misses"));
+  EXPECT_EQ(through.count("cache.sectors_written_back"), 0U);
+  const auto is_write = [](const MemoryRequest& request) { return request.command == tlm::TLM_WRITE_COMMAND; };
+  const auto first = std::find_if(through.below.requests.begin(), through.below.requests.end(), is_write);
+  EXPECT_EQ(first->origin.traffic, MemoryTraffic::attribute);
+  EXPECT_EQ(first->bytes, 16U);
 }
 
 TEST(SectoredL2, ColourStreamsThroughAndAttributesStay) {
@@ -306,6 +331,24 @@ TEST(SectoredL2, NoQuadWaitsForVerticesOrForAttributesToBeWritten) {
     l2.behaviour->access({128 * (2048 + line), 128, tlm::TLM_WRITE_COMMAND, {MemoryTraffic::attribute, 0}});
   }
   EXPECT_DOUBLE_EQ(l2.behaviour->least_occupancy(1000)[0].cycles, 0);
+}
+
+TEST(L1, IsAsLargeAsThoseOf16CoresAndWritesThrough) {
+  const SectoredL2Parameters parameters(level_of_l1);
+  const Draw draw = testing::draw_of(16, 16);
+  const RenderContext context = testing::context_of(draw);
+  SectoredL2 l1(parameters, context);
+  EXPECT_EQ(l1.cache().organization().bytes, 16U * 48 * 1024);
+  EXPECT_EQ(l1.cache().organization().sets(), 64U) << "4 of each core";
+  EXPECT_TRUE(l1.writes_through());
+  SectoredL2Parameters refused(level_of_l1);
+  refused.set("l1", "banks", "3");
+  try {
+    SectoredL2 made(refused, context);
+    FAIL() << "accepted";
+  } catch (const UserError& error) {
+    EXPECT_NE(std::string(error.what()).find("unusable L1 (l1.banks): 3 is no power of two"), std::string::npos);
+  }
 }
 
 TEST(SectoredL2, RefusesBanksThatCannotBe) {

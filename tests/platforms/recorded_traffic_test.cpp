@@ -3,95 +3,30 @@
 
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "l2/sectored_l2.h"
-
 #include <vrpipe/pipeline/payload.h>
-#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/observers.h>
 #include <vrpipe/platforms/wiring.h>
 
-#include "support/reference_cache.h"
+#include "support/recorded_traffic.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::Counted;
+using testing::LookUps;
 using testing::ReferenceCache;
+using testing::replay;
+using testing::Replayed;
 using testing::request_of;
 using testing::run;
 using testing::statistic;
-
-struct Recorder final : L2Observer {
-  struct Event {
-    MemoryRequest part;
-    bool served = false;  ///< or looked up
-  };
-  void looked_up(const MemoryRequest& part) override { events.push_back({part, false}); }
-  void served(const MemoryRequest& part) override { events.push_back({part, true}); }
-  std::vector<Event> events;
-};
-Recorder recorder;
-
-/// An implementation of slot l2: a sectored cache that is observed.
-void register_recorded_l2() {
-  static const bool registered = [] {
-    Implementation recorded = Registry::instance().find("l2", "sectored-cache");
-    recorded.name = "recorded";
-    recorded.make_behaviour = [make = recorded.make_behaviour](const ParameterSet& set, const RenderContext& context) {
-      auto made = make(set, context);
-      dynamic_cast<SectoredL2&>(*made).observe(recorder);
-      return made;
-    };
-    Registry::instance().add(std::move(recorded));
-    return true;
-  }();
-  static_cast<void>(registered);
-}
-
-/// By traffic, in sectors.
-struct Counted {
-  std::uint64_t needed = 0, missed = 0, filled = 0, written_back = 0;
-};
-struct Replayed {
-  std::map<MemoryTraffic, Counted> of;
-  std::uint64_t held = 0;
-};
-
-/// What a cache by its definition does for these. `pins`: a line stays from its look-up until that is served.
-Replayed replay(const CacheOrganization& organization, const std::vector<Recorder::Event>& events, bool pins) {
-  ReferenceCache cache(organization);
-  Replayed counted;
-  std::map<std::uint64_t, MemoryTraffic> brought_in_by;
-  for (const auto& [part, served] : events) {
-    if (served) {
-      if (pins) cache.unpin(part.address);
-      continue;
-    }
-    const bool writes = part.command == tlm::TLM_WRITE_COMMAND;
-    const auto done =
-        pins ? cache.access_and_pin(part.address, part.bytes, writes) : cache.access(part.address, part.bytes, writes);
-    const std::uint64_t last = (part.address + part.bytes - 1) / organization.sector_bytes;
-    Counted& of = counted.of[part.origin.traffic];
-    of.needed += last - part.address / organization.sector_bytes + 1;
-    of.missed += done.missed.size();
-    of.filled += done.filled.size();
-    counted.held += done.spared ? 1 : 0;
-    if (!done.written_back.empty()) {
-      counted.of[brought_in_by.at(done.old_address)].written_back += done.written_back.size();
-    }
-    if (!done.replaced) continue;
-    brought_in_by[part.address - part.address % organization.line_bytes] = part.origin.traffic;
-    if (part.origin.traffic == MemoryTraffic::attribute) cache.keep(part.address);
-  }
-  return counted;
-}
 
 struct Pressure {
   const char* platform;
@@ -114,9 +49,11 @@ CacheOrganization organization_of(const Pressure& pressure) {
   return organization;
 }
 
+LookUps& of_l2() { return testing::record_look_ups("l2"); }
+
 /// A run at `cycle` whose L2 holds a part of what is asked for.
 RunResult record(const Pressure& pressure) {
-  register_recorded_l2();
+  of_l2().events.clear();
   RunRequest request = request_of(pressure.variant, Fidelity::cycle);
   request.platform = &platform_named(pressure.platform);
   request.units = {{"l2", "recorded"}};
@@ -124,7 +61,6 @@ RunResult record(const Pressure& pressure) {
                       {"l2", "replacement", pressure.replacement == Replacement::fifo ? "fifo" : "lru"},
                       {"sm", "attribute_buffer_bytes", "65536"},
                       {"crop", "cache_bytes", "2048"}};
-  recorder.events.clear();
   return run(request, testing::random_draw(384, 256, 1200, 31));
 }
 
@@ -136,9 +72,9 @@ const std::map<MemoryTraffic, std::string> names = {{MemoryTraffic::color, "colo
 TEST(RecordedTraffic, OfTheL2MakesTheHitsMissesAndWriteBacksOfACacheByItsDefinition) {
   for (const Pressure& pressure : pressures) {
     const RunResult result = record(pressure);
-    Replayed expected = replay(organization_of(pressure), recorder.events, true);
+    Replayed expected = replay(organization_of(pressure), of_l2().events, true);
     std::uint64_t looked_up = 0;
-    for (const auto& [part, served] : recorder.events) looked_up += served ? 0 : part.bytes;
+    for (const auto& [part, served] : of_l2().events) looked_up += served ? 0 : part.bytes;
     std::uint64_t asked = 0;
     for (const auto& [traffic, name] : names) {
       const Counted& counted = expected.of[traffic];
@@ -163,7 +99,7 @@ TEST(RecordedTraffic, OfTheL2MissesNearlyAsMuchInACacheWithoutPins) {
   for (const Pressure& pressure : pressures) {
     if (pressure.bytes == 65536) continue;
     const RunResult result = record(pressure);
-    for (const auto& [traffic, counted] : replay(organization_of(pressure), recorder.events, false).of) {
+    for (const auto& [traffic, counted] : replay(organization_of(pressure), of_l2().events, false).of) {
       const auto missed = static_cast<double>(statistic(result, "l2." + names.at(traffic) + "_sector_misses"));
       EXPECT_NEAR(missed / static_cast<double>(counted.missed), 1, 0.005) << pressure.text() << names.at(traffic);
     }

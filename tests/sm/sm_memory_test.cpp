@@ -44,8 +44,10 @@ class SmMemoryTest : public VisibleSplats, public ::testing::WithParamInterface<
 
 class SmMemoryWithoutTimeTest : public VisibleSplats {
  protected:
-  std::unique_ptr<UntimedUnit> make() {
-    auto behaviour = std::make_unique<SplatShader>(SplatShader::Parameters(), context);
+  std::unique_ptr<UntimedUnit> make(const char* l1_bytes = "49152") {
+    SplatShader::Parameters parameters;
+    parameters.set("sm", "l1_bytes", l1_bytes);
+    auto behaviour = std::make_unique<SplatShader>(parameters, context);
     std::unique_ptr<UntimedUnit> sm = untimed_unit_maker("sm")("sm", std::move(behaviour), context, 1);
     for (OutPort* port : sm->out_ports) port->stub();
     return sm;
@@ -206,6 +208,37 @@ TEST_P(SmMemoryTest, AnL1OfOneLineWaitsForItBeforeItGoesForAnother) {
   EXPECT_EQ(sm.l1("lines_evicted"), 1U);
 }
 
+TEST_P(SmMemoryTest, WithoutAnL1EachWarpAsksForAllThatItReads) {
+  SmBench sm(GetParam(), context, {{"l1_bytes", "0"}});
+  sm.warps.add(warp(0, 0), 10);
+  sm.warps.add(warp(1, 0), 10);
+  sm.warps.add(warp(2, 0), 299);
+  sm.run();
+  EXPECT_EQ(sm.cycles[0], 11 + memory_latency + 1 + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[1], 12 + memory_latency + 1 + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[2], 300 + memory_latency + 1 + fragment_cycles + 1);
+  EXPECT_EQ(sm.bench_unit().memory_bytes().read, 3 * 64U);
+  EXPECT_EQ(sm.l1("line_accesses"), 0U);
+  EXPECT_EQ(sm.l1("sector_misses"), 0U);
+}
+
+TEST_P(SmMemoryTest, WithoutAnL1MemorySaysHowLongItTakes) {
+  SmBench sm(GetParam(), context, {{"l1_bytes", "0"}});
+  sm.bench.set_memory(1, line_bytes);
+  sm.warps.add(warp(0, 0), 10);
+  sm.run();
+  EXPECT_EQ(sm.cycles[0], 11 + first_cycles + fragment_cycles + 1) << "before its first instructions have been issued";
+}
+
+TEST_P(SmMemoryTest, WithoutAnL1ACoreHasNoMoreSectorsInFlight) {
+  SmBench sm(GetParam(), context, {{"l1_bytes", "0"}, {"l1_mshrs", "1"}});
+  sm.warps.add(warp(0, 0, 2), 10);
+  sm.run();
+  const Cycle launched = 11 + 3 * (memory_latency + 1);
+  EXPECT_EQ(sm.cycles[0], launched + memory_latency + 1 + fragment_cycles + 1);
+  EXPECT_EQ(sm.bench_unit().memory_bytes().read, 4 * 32U);
+}
+
 TEST_P(SmMemoryTest, CyclesOfWaitingForMemoryAreChargedToIt) {
   SmBench sm(GetParam(), context);
   sm.warps.add(warp(0, 0), 10);
@@ -300,6 +333,16 @@ TEST_F(SmMemoryWithoutTimeTest, AsksForWhatItAsksForAtCycle) {
   EXPECT_EQ(sectors, 2U * (3 + 7 * 2 + 3 + 3 * 2));
 }
 
+TEST_F(SmMemoryWithoutTimeTest, WithoutAnL1AsksForAllThatWarpsRead) {
+  std::unique_ptr<UntimedUnit> sm = make("0");
+  RecordingMemory memory;
+  sm->memory_port()->connect(memory);
+  auto& warps = dynamic_cast<UntimedIn<Warp>&>(sm->in("in_warps"));
+  for (std::uint32_t i = 0; i < 4; ++i) warps.take(warp(i, 0, 3));
+  EXPECT_EQ(sm->memory_port()->moved().read, 4U * 3 * 64);
+  for (const StatisticSet* part : sm->parts()) EXPECT_FALSE(part->counted());
+}
+
 TEST_F(SmMemoryWithoutTimeTest, LooksNothingUpForNobody) {
   std::unique_ptr<UntimedUnit> sm = make();
   dynamic_cast<UntimedIn<Warp>&>(sm->in("in_warps")).take(warp(0, 0));
@@ -318,6 +361,7 @@ TEST(SmMemory, RefusesWhatCannotBe) {
   EXPECT_THROW(make("l1_bytes", "200"), UserError) << "not whole lines";
   EXPECT_THROW(make("l1_ways", "128"), UserError) << "three sets";
   EXPECT_NO_THROW(make("l1_ways", "96"));
+  EXPECT_NO_THROW(make("l1_bytes", "0")) << "none";
 }
 
 }  // namespace

@@ -43,7 +43,11 @@ Case shrunk(Case c, const std::string& rule, const Limits& limits) {
     without([&](Case& x) { x.settings.erase(x.settings.begin() + static_cast<std::ptrdiff_t>(i)); });
   }
   if (!c.units.empty()) without([](Case& x) { x.units.clear(); });
-  if (c.platform != &platforms().front()) without([](Case& x) { x.platform = &platforms().front(); });
+  if (c.platform != &platforms().front())
+    without([](Case& x) {
+      x.platform = &platforms().front();
+      x.connects_z_caches = x.inserts_l1s = false;
+    });
   if (c.format != ColorFormat::rgba16f) without([](Case& x) { x.format = ColorFormat::rgba16f; });
   if (c.termination != Termination::paper) without([](Case& x) { x.termination = Termination::paper; });
   for (std::size_t i = c.parts.size(); i-- > 0;) {

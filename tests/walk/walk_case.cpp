@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -289,20 +290,21 @@ std::vector<Part> draw_parts(Dice& dice, std::size_t splats) {
   return parts;
 }
 
-/// A platform with its z-caches connected; it keeps its name and stays where it is.
-const Platform& with_z_caches(const Platform& platform) {
-  static std::map<std::string, Platform> made;
-  const auto [at, is_new] = made.emplace(platform.name, platform);
+/// A platform with its z-caches connected, or with an L1 between each SM array and the L2; it keeps its name and stays
+/// where it is.
+const Platform& edited(const Platform& platform, bool z_caches, bool l1s) {
+  static std::map<std::tuple<std::string, bool, bool>, Platform> made;
+  const auto [at, is_new] = made.emplace(std::tuple{platform.name, z_caches, l1s}, platform);
   if (is_new) {
-    at->second.wire = [wire = platform.wire](Netlist& netlist) {
+    at->second.wire = [wire = platform.wire, z_caches, l1s](Netlist& netlist) {
       wire(netlist);
-      connect_depth_stencil_traffic(netlist);
+      if (z_caches) connect_depth_stencil_traffic(netlist);
+      if (!l1s) return;
+      connect_attribute_traffic(netlist);
+      insert_l1(netlist);
     };
   }
   return at->second;
-}
-bool is_of_catalogue(const Platform* platform) {
-  return std::any_of(platforms().begin(), platforms().end(), [&](const Platform& other) { return &other == platform; });
 }
 
 /// Caches and queues in which everybody waits for everybody.
@@ -313,6 +315,21 @@ void draw_small_z_cache(Dice& dice, std::vector<Setting>& settings) {
   for (const char* parameter : {"mshrs", "input_quads", "input_updates", "sectors_per_cycle"}) {
     if (dice.chance(50)) settings.push_back({"zrop", parameter, dice.one_of(few)});
   }
+}
+
+/// The same for L1s, whose arrays most often have none of their own.
+void draw_l1(Dice& dice, std::vector<Setting>& settings) {
+  if (dice.chance(80)) settings.push_back({"sm", "l1_bytes", "0"});
+  const char* const bytes[] = {"512", "1024", "16384", "1048576"};
+  const char* const few[] = {"1", "2", "5", "64"};
+  settings.push_back({"l1", "bytes", dice.one_of(bytes)});
+  settings.push_back({"l1", "ways", "2"});
+  settings.push_back({"l1", "banks", dice.chance(50) ? "1" : "2"});
+  for (const char* parameter : {"mshrs", "write_backs", "port_requests", "latency_cycles"}) {
+    if (dice.chance(50)) settings.push_back({"l1", parameter, dice.one_of(few)});
+  }
+  if (dice.chance(30)) settings.push_back({"l1", "write_policy", "write-back"});
+  if (dice.chance(30)) settings.push_back({"l1", "write_allocate", "byte-mask"});
 }
 
 const char* word_for(Termination termination) { return termination == Termination::strict ? "strict" : "paper"; }
@@ -376,17 +393,19 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   c.stall_seed = dice.next() | 1U;
   c.draw = draw_scene(dice, real);
   c.parts = draw_parts(dice, c.draw.splats.size());
-  if (dice.chance(40)) {
-    c.platform = &with_z_caches(*c.platform);
-    if (!c.refused && dice.chance(60)) draw_small_z_cache(dice, c.settings);
-  }
+  c.connects_z_caches = dice.chance(40);
+  if (c.connects_z_caches && !c.refused && dice.chance(60)) draw_small_z_cache(dice, c.settings);
+  c.inserts_l1s = dice.chance(25);
+  if (c.inserts_l1s && !c.refused) draw_l1(dice, c.settings);
+  if (c.connects_z_caches || c.inserts_l1s) c.platform = &edited(*c.platform, c.connects_z_caches, c.inserts_l1s);
   return c;
 }
 
 std::string describe(const Case& c) {
   std::string text = fmt::format("{} {} {} {} {}x{}, {} splats", c.platform->name, c.variant.name, name_of(c.format),
                                  word_for(c.termination), c.draw.width, c.draw.height, c.draw.splats.size());
-  if (!is_of_catalogue(c.platform)) text += ", z-caches connected,";
+  if (c.connects_z_caches) text += ", z-caches connected,";
+  if (c.inserts_l1s) text += ", L1s inserted,";
   for (const UnitChoice& unit : c.units) text += fmt::format(" {}={}", unit.slot, unit.implementation);
   for (const Setting& setting : c.settings) {
     text += fmt::format(" {}.{}={}", setting.unit, setting.parameter, setting.value);

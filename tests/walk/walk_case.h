@@ -21,7 +21,9 @@ struct Part {
 struct Case {
   std::uint64_t seed = 0;
   std::uint64_t index = 0;
-  const Platform* platform = nullptr;  ///< of the catalogue, or one of them with its z-caches connected
+  const Platform* platform = nullptr;  ///< of the catalogue, or one of them edited
+  bool connects_z_caches = false;
+  bool inserts_l1s = false;
   Variant variant;
   ColorFormat format = ColorFormat::rgba16f;
   Termination termination = Termination::paper;

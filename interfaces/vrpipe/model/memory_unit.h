@@ -39,7 +39,7 @@ class MemoryUnit {
 /// Where a memory stands in its platform.
 struct MemoryPlace {
   /// Of each memory port that is bound to it: bytes that it moves in a cycle, in each direction; 0 leaves that to the
-  /// memory.
+  /// memory. The port of a memory above has what those that are bound to that have in all.
   std::vector<unsigned> ports;
   bool has_below;   ///< there is a memory below it
   bool is_clocked;  ///< `cycle`; at `lt` and `at` its time is annotated

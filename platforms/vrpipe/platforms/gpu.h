@@ -52,6 +52,8 @@ class Gpu {
   using TargetSockets = std::vector<tlm::tlm_base_target_socket_b<32>*>;
   void add_memories();
   /// @param ports  as MemoryPlace has them
+  /// Of a unit's memory port, or of all that are bound to a memory above; 0 if not all say.
+  unsigned memory_bytes_per_cycle(const std::string& path) const;
   TargetSockets make_memory(const Instance& instance, const std::vector<unsigned>& ports);
   TargetSockets make_foreign(const ForeignInstance& foreign, unsigned ports);
   void bind_memory(const std::string& path, const std::vector<std::string>& bound, const TargetSockets& sockets);

@@ -82,6 +82,8 @@ class Netlist {
   void replace_memory(const std::string& path, MemoryMaker make);
   /// Binds the memory port of a unit to a memory; or of a memory, which then lies above. It is moved if it was bound.
   void connect_memory(const std::string& from, const std::string& memory);
+  /// Puts a memory of this library, which is there, between the memory port of a unit and what that is bound to.
+  void insert_memory(const std::string& from, const std::string& memory);
 
   /// Puts another implementation into an instance.
   void replace(const std::string& path, const std::string& implementation);

@@ -19,6 +19,11 @@ void wire_dram(Netlist& netlist, const std::string& dram);
 /// latency.
 void connect_attribute_traffic(Netlist& netlist, const std::string& memory = "l2");
 
+/// Puts an L1, of an implementation of slot `l1`, between the memory port of every SM array and what that is bound to:
+/// gpcN.l1, which the array's cores share. The arrays want `sm.l1_bytes=0`; if not, theirs are above it. Throws UserError
+/// where an array's port is bound to nothing.
+void insert_l1(Netlist& netlist, const std::string& implementation = "");
+
 /// Binds the memory port of every ZROP, so that its z-cache is one that misses.
 void connect_depth_stencil_traffic(Netlist& netlist, const std::string& memory = "l2");
 

@@ -23,8 +23,9 @@ struct AttributeFetch {
   std::uint32_t attribute_writes = 640;  ///< of the array in flight: what comes behind waits
   std::uint32_t core_bytes = 32;         ///< a cycle, of a core's share of the array's memory port
   std::uint32_t l1_latency_cycles = 38;  ///< until what a core's L1 holds is there
-  std::uint32_t l1_mshrs = 384;          ///< sectors that a core's L1 may have asked for
-  CacheOrganization l1{49152};           ///< lines of 128 bytes, sectors of 32
+  std::uint32_t l1_mshrs = 384;          ///< sectors that a core may have asked for
+  CacheOrganization l1{49152};           ///< lines of 128 bytes, sectors of 32; of 0 bytes: none
+  bool has_l1() const { return l1.bytes != 0; }
   /// Throws UserError for what cannot be.
   void check() const;
 };
