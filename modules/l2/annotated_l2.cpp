@@ -26,7 +26,7 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
     l2.count(request);
     const Cycle now = clock().now();
     Cycle complete = 0;
-    l2.for_each_line(request, [&](std::uint64_t address, std::uint32_t bytes) {
+    l2.for_each_line(l2.looked_up_as(request), [&](std::uint64_t address, std::uint32_t bytes) {
       const MemoryRequest part{address, bytes, request.command, request.origin};
       const std::uint32_t in = l2.request_bytes(part);
       const std::uint32_t out = l2.response_bytes(part);
@@ -123,7 +123,7 @@ Cycle AnnotatedL2::pass(const MemoryRequest& access, Cycle arrival, Cycle& from)
   const std::uint32_t index = behaviour_->bank_of(access.address);
   Bank& bank = banks_[index];
   const Cycle begin = bank.write_backs.free_from(arrival);
-  const Cycle done = write(access, bank, begin + 1);
+  const Cycle done = write(behaviour_->below_as(access), bank, begin + 1);
   const std::uint32_t cycles = behaviour_->bank_cycles(access.bytes);
   const Cycle free_at = occupy(bank, arrival, begin, cycles * sizes_.bank_bytes_per_cycle);
   behaviour_->count_bank(index, access.bytes);

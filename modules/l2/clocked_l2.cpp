@@ -94,7 +94,7 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<> {
     const std::uint32_t request = l2_.make_request();
     Request& made = l2_.requests_[request];
     made.payload = &payload;
-    made.access = request_of(payload);
+    made.access = l2_.behaviour_->looked_up_as(request_of(payload));
     made.arrival = arrival;
     made.port = index_;
     l2_.cache_.prefetch(made.access.address);
@@ -334,7 +334,7 @@ bool ClockedL2::can_go_on(std::uint32_t index, const MemoryRequest& access) cons
 
 void ClockedL2::pass(std::uint32_t index, std::uint32_t request, Cycle now) {
   const MemoryRequest& access = requests_[request].access;
-  writes_.push({access, index, SectoredCache::no_line, 0, now, request});
+  writes_.push({behaviour_->below_as(access), index, SectoredCache::no_line, 0, now, request});
   ++banks_[index].write_backs;
   occupy(index, access.bytes, now);
 }

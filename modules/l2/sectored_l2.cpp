@@ -24,7 +24,8 @@ const CacheLevel level_of_l1{"l1",
                              "Accel-Sim, SM87_ORIN: 384 in the L1 of a core",
                              38,
                              "Accel-Sim, SM87_ORIN: L1 latency",
-                             source::open};
+                             source::open,
+                             false};
 const CacheLevel level_of_l2{"l2",
                              "L2",
                              {"bytes", 4 << 20, 1U << 30, "shared by all GPCs", 16,
@@ -40,7 +41,8 @@ const CacheLevel level_of_l2{"l2",
                              source::open,
                              146,
                              "Accel-Sim, SM87_ORIN: L2 latency",
-                             "Accel-Sim, SM87_ORIN: buffers of 512 at the crossbar"};
+                             "Accel-Sim, SM87_ORIN: buffers of 512 at the crossbar",
+                             true};
 
 namespace {
 
@@ -74,6 +76,7 @@ CacheOrganization checked(const SectoredL2Parameters& parameters) {
 SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderContext& context)
     : sizes_(sizes_of(parameters)),
       gpcs_(context.placement.gpcs),
+      sees_all_writes_(parameters.level.sees_all_writes),
       writes_through_(parameters.write_policy == 1U),
       holds_attributes_(parameters.hold_attributes),
       of_traffic_{{{{*this, "other_sectors", "sectors", "accessed by initiators that do not say what for"},
@@ -93,9 +96,9 @@ SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderConte
 void SectoredL2::access(const MemoryRequest& request) {
   traffic_.count(request);
   const bool writes = request.command == tlm::TLM_WRITE_COMMAND;
-  for_each_line(request, [&](std::uint64_t address, std::uint32_t bytes) {
+  for_each_line(looked_up_as(request), [&](std::uint64_t address, std::uint32_t bytes) {
     if (passes(request)) {
-      if (below_ != nullptr) below_->access({address, bytes, request.command, request.origin});
+      if (below_ != nullptr) below_->access(below_as({address, bytes, request.command, request.origin}));
       if (is_for_quads(request)) count_bank(bank_of(address), bytes);
       return;
     }

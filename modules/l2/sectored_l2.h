@@ -30,6 +30,7 @@ struct CacheLevel {
   std::uint32_t latency_cycles;
   const char* latency_source;
   const char* port_requests_source;
+  bool sees_all_writes;  ///< to what it holds
 };
 extern const CacheLevel level_of_l1;
 extern const CacheLevel level_of_l2;
@@ -132,6 +133,16 @@ class SectoredL2 final : public MemoryBehaviour {
 
   // For timing models.
 
+  /// The request that its look-up is for: where it does not see all writes, addresses of other contents are others.
+  MemoryRequest looked_up_as(MemoryRequest request) const {
+    if (!sees_all_writes_) request.address |= std::uint64_t{request.origin.round} << round_shift;
+    return request;
+  }
+  /// And the one that goes below.
+  MemoryRequest below_as(MemoryRequest request) const {
+    if (!sees_all_writes_) request.address &= (std::uint64_t{1} << round_shift) - 1;
+    return request;
+  }
   bool writes_through() const { return writes_through_; }
   /// Whether a request goes below without a look-up.
   bool passes(const MemoryRequest& request) const {
@@ -198,8 +209,8 @@ class SectoredL2 final : public MemoryBehaviour {
     const CacheOrganization& organization = cache_.organization();
     while (sectors != 0) {
       const SectorRun run = take_sector_run(sectors, organization.sectors_of_a_line());
-      access(MemoryRequest{line_address + std::uint64_t{run.first} * organization.sector_bytes,
-                           run.count * organization.sector_bytes, command, origin},
+      access(below_as({line_address + std::uint64_t{run.first} * organization.sector_bytes,
+                       run.count * organization.sector_bytes, command, origin}),
              run);
     }
   }
@@ -208,9 +219,11 @@ class SectoredL2 final : public MemoryBehaviour {
   struct OfTraffic {
     Counter sectors, misses;
   };
+  static constexpr unsigned round_shift = 48;  ///< beyond all addresses
 
   const Sizes sizes_;
   const unsigned gpcs_;
+  const bool sees_all_writes_;
   const bool writes_through_;
   const bool holds_attributes_;
   MemoryTrafficCounters traffic_{*this};

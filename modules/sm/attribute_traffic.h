@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <vrpipe/memory/memory_request.h>
+#include <vrpipe/memory/sectors.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/units.h>
 
@@ -73,8 +74,14 @@ class AttributeTraffic {
 
   /// The same request where in memory it is.
   MemoryRequest in_buffer(MemoryRequest request) const {
+    request.origin.round = static_cast<std::uint16_t>((request.address - attributes_) / buffer_bytes_);
     request.address = in_buffer(request.address);
     return request;
+  }
+  /// For a run of sectors of a line that is not in the buffer yet; where in memory they are.
+  MemoryRequest read(std::uint64_t line, const SectorRun& run) const {
+    return in_buffer({line + std::uint64_t{run.first} * sector_bytes, run.count * sector_bytes, tlm::TLM_READ_COMMAND,
+                      origin(MemoryTraffic::attribute)});
   }
   /// Where in memory an attribute is.
   std::uint64_t in_buffer(std::uint64_t address) const { return attributes_ + (address - attributes_) % buffer_bytes_; }

@@ -30,7 +30,6 @@ class SmMemory {
         port_(owner, "memory",
               timing.vertex_warps * AttributeTraffic::most_vertex_reads + timing_.attribute_writes +
                   timing.cores * timing_.l1_mshrs),
-        fill_origin_(traffic_.origin(MemoryTraffic::attribute)),
         statistics_(statistics),
         reads_left_(timing.vertex_warps, 0),
         writes_left_(timing.vertex_warps, 0),
@@ -182,9 +181,7 @@ class SmMemory {
     l1.free_mshrs -= run.count;
     seen_ |= sector_mask(run.first, run.count);
     await(fill);
-    port_.access({traffic_.in_buffer(needed.address) + run.first * AttributeTraffic::sector_bytes,
-                  run.count * AttributeTraffic::sector_bytes, tlm::TLM_READ_COMMAND, fill_origin_},
-                 fill);
+    port_.access(traffic_.read(needed.address, run), fill);
     return true;
   }
 
@@ -253,7 +250,6 @@ class SmMemory {
   const AttributeFetch timing_;
   const AttributeTraffic traffic_;
   MemoryPort port_;
-  const MemoryOrigin fill_origin_;
   SectoredCacheStatistics& statistics_;
   Ring<VertexAccess> reads_;   ///< to be sent
   Ring<VertexAccess> writes_;  ///< to be sent

@@ -84,8 +84,7 @@ class UntimedSm : public UntimedUnit {
   void ask(std::uint64_t line_address, std::uint32_t sectors) {
     while (sectors != 0) {
       const SectorRun run = take_sector_run(sectors, AttributeTraffic::line_bytes / AttributeTraffic::sector_bytes);
-      memory_.read(traffic_.in_buffer(line_address) + run.first * AttributeTraffic::sector_bytes,
-                   run.count * AttributeTraffic::sector_bytes);
+      memory_.access(traffic_.read(line_address, run));
     }
   }
 

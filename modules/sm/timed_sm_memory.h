@@ -23,7 +23,6 @@ class TimedSmMemory {
       : timing_(timing.fetch),
         traffic_(context, timing.fetch),
         port_(owner, "memory"),
-        fill_origin_(traffic_.origin(MemoryTraffic::attribute)),
         statistics_(statistics),
         cores_(timing.cores),
         answered_(timing_.attribute_writes, 0),
@@ -133,9 +132,7 @@ class TimedSmMemory {
     at = l1.mshrs.free_from(at, run.count);
     // Addresses of writes increase.
     while (!unsent_.empty() && unsent_.front().request.address < line + AttributeTraffic::line_bytes) send();
-    const Cycle there = port_.access({traffic_.in_buffer(line) + run.first * AttributeTraffic::sector_bytes,
-                                      run.count * AttributeTraffic::sector_bytes, tlm::TLM_READ_COMMAND, fill_origin_},
-                                     at);
+    const Cycle there = port_.access(traffic_.read(line, run), at);
     l1.mshrs.take(run.count, there);
     return there;
   }
@@ -152,7 +149,6 @@ class TimedSmMemory {
   const AttributeFetch timing_;
   const AttributeTraffic traffic_;
   TimedMemoryPort port_;
-  const MemoryOrigin fill_origin_;
   SectoredCacheStatistics& statistics_;
   const std::uint32_t cores_;
   std::vector<Cycle> answered_;  ///< the last writes, as many as may be in flight: a ring

@@ -351,6 +351,30 @@ TEST(L1, IsAsLargeAsThoseOf16CoresAndWritesThrough) {
   }
 }
 
+TEST(L1, HoldsEachRoundOfABufferForItselfAndTheL2TheLast) {
+  const Draw draw = testing::draw_of(16, 16);
+  const RenderContext context = testing::context_of(draw);
+  for (const CacheLevel* level : {&level_of_l1, &level_of_l2}) {
+    const bool is_l1 = level == &level_of_l1;
+    const SectoredL2Parameters parameters(*level);
+    SectoredL2 cache(parameters, context);
+    Recorder below;
+    cache.set_below(below);
+    const auto access = [&](tlm::tlm_command command, std::uint16_t round) {
+      cache.access({4096, 64, command, {MemoryTraffic::attribute, 0, round}});
+      return cache.statistics().sector_misses.value();
+    };
+    EXPECT_EQ(access(tlm::TLM_READ_COMMAND, 0), 2U);
+    EXPECT_EQ(access(tlm::TLM_READ_COMMAND, 0), 2U);
+    EXPECT_EQ(access(tlm::TLM_READ_COMMAND, 1), is_l1 ? 4U : 2U);
+    EXPECT_EQ(access(tlm::TLM_READ_COMMAND, 1), is_l1 ? 4U : 2U);
+    access(tlm::TLM_WRITE_COMMAND, 2);
+    ASSERT_EQ(below.requests.size(), is_l1 ? 3U : 1U);
+    for (const MemoryRequest& request : below.requests) EXPECT_EQ(request.address, 4096U);
+    EXPECT_EQ(below.requests.back().origin.round, is_l1 ? 2 : 0);
+  }
+}
+
 TEST(SectoredL2, RefusesBanksThatCannotBe) {
   const auto refusal = [](const Settings& settings) {
     try {

@@ -123,6 +123,25 @@ TEST(L1OfAnArray, ThatHoldsThemAllReadsEachSectorOfAttributesOnce) {
   }
 }
 
+// The L2 of desktop takes as long for any address, so the buffer's size decides nothing else.
+TEST(L1OfAnArray, HitsNothingThatAnotherArrayHasOverwritten) {
+  const Draw draw = testing::random_draw(128, 96, 1500, 50);
+  const Platform platform = with_l1("desktop");
+  for (const char* variant : {"baseline", "het+qm"}) {
+    for (const Fidelity fidelity : fidelities()) {
+      const std::string what = std::string(variant) + " " + name_of(fidelity);
+      const RunResult rounds = run(on(platform, variant, fidelity, {{"sm", "attribute_buffer_bytes", "65536"}}), draw);
+      const RunResult none = run(on(platform, variant, fidelity, {{"sm", "attribute_buffer_bytes", "67108864"}}), draw);
+      ASSERT_GT(statistic(rounds, "l1.attribute_bytes_written"), 8U * 65536) << what;
+      EXPECT_EQ(rounds.result_hash, none.result_hash) << what;
+      EXPECT_EQ(statistic(rounds, "l1.attribute_sector_misses"), statistic(none, "l1.attribute_sector_misses")) << what;
+      EXPECT_EQ(statistic(rounds, "l1.cache.sector_misses_compulsory"),
+                statistic(none, "l1.cache.sector_misses_compulsory"))
+          << what;
+    }
+  }
+}
+
 TEST(L1OfAnArray, MissesWhatACacheByItsDefinitionMisses) {
   LookUps& look_ups = testing::record_look_ups("l1");
   const Platform platform = without_own_l1s("agx-orin-lpddr3", "recorded");

@@ -153,6 +153,13 @@ TEST(AttributeTraffic, AttributesGoRoundInTheirBuffer) {
   EXPECT_EQ(across.begin, attributes);
   EXPECT_EQ(across.end, attributes + 16 * 704);
   EXPECT_EQ(traffic.in_buffer(attributes + 17 * 704 + 32), attributes + 704 + 32);
+  // Who reads says which round it means.
+  for (const std::uint64_t round : {0U, 1U, 5U}) {
+    const MemoryRequest read = traffic.read(attributes + (round * 16 + 2) * 704, {1, 2});
+    EXPECT_EQ(read.address, attributes + 2 * 704 + 32);
+    EXPECT_EQ(read.bytes, 64U);
+    EXPECT_EQ(read.origin.round, round);
+  }
 }
 
 TEST(AttributeTraffic, OfWhatIsCulledNothingIsWritten) {

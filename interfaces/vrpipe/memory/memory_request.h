@@ -19,6 +19,9 @@ const char* name_of(MemoryTraffic traffic);
 struct MemoryOrigin {
   MemoryTraffic traffic = MemoryTraffic::other;
   std::uint16_t gpc = 0;  ///< that the unit belongs to; 0 for the front end
+  /// Of a buffer that is written round and round: which round the contents are of. A cache that does not see all writes
+  /// tells them apart by it, as who keeps it coherent would.
+  std::uint16_t round = 0;
 };
 
 /// An access to memory. Data stays with the functional models, so it carries none.
