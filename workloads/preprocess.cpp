@@ -135,7 +135,7 @@ class Projector {
     splat.bx = static_cast<float>(bx);
     splat.by = static_cast<float>(by);
     splat.r = static_cast<float>(r);
-    splat.reserved = 0;
+    splat.depth = 0;
     splat.opacity = opacity;
     depth = to_float(z);
     return true;

@@ -4,12 +4,32 @@
 
 #include <vrpipe/arithmetic/blend.h>
 #include <vrpipe/arithmetic/exp2.h>
+#include <vrpipe/pipeline/depth_stencil.h>
 
 namespace vrpipe {
 
 /// What is rasterised for a splat: the oriented box where alpha falls to 1/255, the axis-aligned box of that ellipse, or
 /// the oriented box at three sigmas.
 enum class SplatExtent : std::uint8_t { oriented_box, axis_aligned_box, three_sigma };
+
+/// The program for a draw's fragments.
+enum class FragmentShader : std::uint8_t {
+  splat,   ///< a Gaussian's alpha and colour; discards below the pruning threshold
+  vertex,  ///< a mesh's interpolated vertex colours
+  lit,     ///< the same, lit by a directional light
+  none     ///< nothing is shaded: depth and stencil alone are written
+};
+
+/// Of the shader `lit`: colour times (ambient + (1 - ambient) max(0, n . l)).
+struct Light {
+  float x = 0, y = 0, z = 0;  ///< towards the light, of unit length
+  float ambient = 1;          ///< 0 to 1
+};
+bool operator==(const Light& a, const Light& b);
+
+/// Which triangles primitive assembly drops. Those of a mesh whose vertices go counter-clockwise, as one sees them, face the
+/// viewer (OpenGL's default); splats and triangles of their own always do.
+enum class CullMode : std::uint8_t { none, back, front };
 
 /// What an application sets for a draw through the graphics API, its shaders included.
 struct DrawState {
@@ -20,6 +40,11 @@ struct DrawState {
   SplatExtent splat_extent = SplatExtent::oriented_box;
   /// Half axes grow by this many sub-pixel steps, so that snapping loses no fragment at the pruning threshold.
   float obb_padding = 0.75F;
+  DepthState depth;
+  StencilState stencil;
+  CullMode cull = CullMode::none;
+  FragmentShader shader = FragmentShader::splat;
+  Light light;
 };
 bool operator==(const DrawState& a, const DrawState& b);
 inline bool operator!=(const DrawState& a, const DrawState& b) { return !(a == b); }
