@@ -1,5 +1,6 @@
 #include <vrpipe/workloads/camera.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <string_view>
@@ -18,6 +19,8 @@ namespace {
 
 constexpr char kCannotUse[] = "cannot use camera";
 constexpr char kCannotRead[] = "cannot read camera file";
+/// With this, no product of a projection overflows a double.
+constexpr float kMinNearPlane = 1e-6f;
 constexpr char kLayoutRemedy[] =
     "an INRIA cameras.json is an array of {\"width\", \"height\", \"position\": [3], \"rotation\": [3][3], \"fx\", "
     "\"fy\"}";
@@ -109,6 +112,39 @@ void check_image_size(std::uint64_t width, std::uint64_t height, const std::stri
   if (width >= 1 && width <= kMaxImageSize && height >= 1 && height <= kMaxImageSize) return;
   throw UserError("cannot use image size", where, "it is " + std::to_string(width) + "x" + std::to_string(height),
                   "both sides must be 1 to " + std::to_string(kMaxImageSize));
+}
+
+void check_camera(const Camera& camera, const std::string& what) {
+  check_image_size(camera.width, camera.height, "camera");
+  const float near_plane = camera.near_plane, far_plane = camera.far_plane;
+  bool good = camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy);
+  good = good && near_plane >= kMinNearPlane && near_plane < far_plane && std::isfinite(far_plane);
+  for (std::size_t i = 0; i < 3; ++i) {
+    good = good && std::isfinite(camera.eye[i]);
+    for (std::size_t k = 0; k < 3; ++k) good = good && std::fabs(camera.rotation[i][k]) <= 2;
+  }
+  if (!good) {
+    throw UserError(what, "camera",
+                    "an element is not finite, a focal length is not above 0, the near plane is below 1e-6, or the far "
+                    "plane is not beyond it",
+                    "make it with look_at or load_cameras");
+  }
+}
+
+Vec3 camera_space(const Camera& camera, const Vec3& world) {
+  // The eye is subtracted in double, so a scene far from the origin loses nothing.
+  const Vec3 offset = world - camera.eye;
+  Vec3 seen;
+  for (std::size_t i = 0; i < 3; ++i) {
+    seen[i] = dot(Vec3{camera.rotation[0][i], camera.rotation[1][i], camera.rotation[2][i]}, offset);
+  }
+  return seen;
+}
+
+double window_depth(const Camera& camera, double z) {
+  const double near_plane = camera.near_plane, far_plane = camera.far_plane;
+  const double depth = far_plane / (far_plane - near_plane) * (1.0 - near_plane / z);
+  return std::min(1.0, std::max(0.0, depth));
 }
 
 Camera look_at(const Vec3& eye, const Vec3& target, const Vec3& up, double fovy_degrees, std::uint32_t width,

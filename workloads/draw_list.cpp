@@ -75,13 +75,15 @@ DrawList read_draw_list(const std::filesystem::path& path) {
   const auto is_broken = [](const Splat& splat) { return !is_finite(splat); };
   splats.erase(std::remove_if(splats.begin(), splats.end(), is_broken), splats.end());
   list.dropped_not_finite = list.splats_in_file - splats.size();
+  for (Splat& splat : splats) splat.depth = 0;
   return list;
 }
 
 void write_draw_list(const std::filesystem::path& path, const Draw& draw) {
   constexpr char kCannotWrite[] = "cannot write draw list";
-  if (!draw.triangles.empty()) {
-    throw UserError(kCannotWrite, path.string(), "the draw has triangles of its own",
+  if (!draw.triangles.empty() || draw.is_mesh()) {
+    throw UserError(kCannotWrite, path.string(),
+                    draw.is_mesh() ? "the draw is a mesh" : "the draw has triangles of its own",
                     "a .spl holds splats only; save a draw that comes from a scene");
   }
   if (draw.splats.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
@@ -93,7 +95,10 @@ void write_draw_list(const std::filesystem::path& path, const Draw& draw) {
                               static_cast<std::int32_t>(draw.width), static_cast<std::int32_t>(draw.height)};
   AtomicFile file(path, kCannotWrite, path.string());
   file.write(&header, sizeof header);
-  file.write(draw.splats.data(), draw.splats.size() * sizeof(Splat));
+  for (Splat splat : draw.splats) {
+    splat.depth = 0;
+    file.write(&splat, sizeof splat);
+  }
   file.commit();
 }
 

@@ -21,8 +21,6 @@ namespace {
 constexpr std::uint64_t kChunk = 4096;
 /// Larger log scales are taken as this one: e^100 times any focal length, to the fourth power, still fits a double.
 constexpr double kMaxLogScale = 100.0;
-/// With this, no product of a projection overflows a double.
-constexpr float kMinNearPlane = 1e-6f;
 constexpr float kMaxFloat = std::numeric_limits<float>::max();
 constexpr float kPruneThreshold = 1.0f / 255.0f;
 
@@ -135,7 +133,7 @@ class Projector {
     splat.bx = static_cast<float>(bx);
     splat.by = static_cast<float>(by);
     splat.r = static_cast<float>(r);
-    splat.depth = 0;
+    splat.depth = static_cast<float>(window_depth(camera_, z));
     splat.opacity = opacity;
     depth = to_float(z);
     return true;
@@ -201,19 +199,7 @@ void check_options(const GaussianScene& scene, const Camera& camera, const Prepr
   if (scene.size() > std::numeric_limits<std::uint32_t>::max()) {
     throw UserError(kCannot, "scene", "it has " + std::to_string(scene.size()) + " Gaussians", "use at most 2^32-1");
   }
-  check_image_size(camera.width, camera.height, "camera");
-  const float near_plane = camera.near_plane;
-  bool good = camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy);
-  good = good && near_plane >= kMinNearPlane && std::isfinite(near_plane);
-  for (std::size_t i = 0; i < 3; ++i) {
-    good = good && std::isfinite(camera.eye[i]);
-    for (std::size_t k = 0; k < 3; ++k) good = good && std::fabs(camera.rotation[i][k]) <= 2;
-  }
-  if (!good) {
-    throw UserError(kCannot, "camera",
-                    "an element is not finite, a focal length is not above 0, or the near plane is below 1e-6",
-                    "make it with look_at or load_cameras");
-  }
+  check_camera(camera, kCannot);
 }
 
 void reduce_keys(std::vector<std::uint64_t>& entries, int bits) {

@@ -55,9 +55,11 @@ std::uint64_t hash_of(const GaussianScene& scene) {
   return hash;
 }
 
+/// Of all that an image without a depth test depends on.
 std::uint64_t hash_of(const Draw& draw) {
   std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const Splat& splat : draw.splats) {
+  for (Splat splat : draw.splats) {
+    splat.depth = 0;
     std::uint32_t words[12];
     std::memcpy(words, &splat, sizeof words);
     for (const std::uint32_t word : words) hash = (hash ^ word) * 0x100000001b3u;

@@ -56,6 +56,30 @@ TEST_F(DrawListFile, BytesAreThoseOfTheContract) {
   EXPECT_EQ(bytes.substr(0, 4), "1SPL");
 }
 
+TEST_F(DrawListFile, HasNoDepthWhateverADrawOrAFileHoldsThere) {
+  Draw draw = small_draw();
+  write_draw_list(in_folder("without.spl"), draw);
+  for (Splat& splat : draw.splats) splat.depth = 0.5f;
+  write_draw_list(in_folder("draw.spl"), draw);
+  const std::string bytes = testing::read_bytes(in_folder("draw.spl"));
+  EXPECT_EQ(bytes, testing::read_bytes(in_folder("without.spl")));
+
+  std::string strange = bytes;
+  const float depth = 0.25f;
+  std::memcpy(&strange[16 + 7 * 4], &depth, sizeof depth);
+  const DrawList list = read_draw_list(write("strange.spl", strange));
+  ASSERT_EQ(list.draw.splats.size(), 3u);
+  EXPECT_EQ(list.draw.splats[0].depth, 0);
+  EXPECT_EQ(list.dropped_not_finite, 0u);
+}
+
+TEST_F(DrawListFile, AMeshIsRefused) {
+  Draw draw;
+  draw.width = draw.height = 4;
+  draw.mesh.resize(1);
+  expect_user_error([&] { write_draw_list(in_folder("draw.spl"), draw); }, {"cannot write draw list", "splats only"});
+}
+
 TEST_F(DrawListFile, NoSplatsIsValid) {
   EXPECT_TRUE(read_draw_list(write("draw.spl", header(kDrawListMagic, 0, 4, 4))).draw.splats.empty());
 }

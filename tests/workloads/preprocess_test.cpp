@@ -258,6 +258,20 @@ TEST(PreprocessProjection, P02OnlyDepthsBeyondTheNearPlaneAreKept) {
   EXPECT_EQ(kept, 1);
 }
 
+TEST(PreprocessProjection, DepthIsThatOfTheCentreAndGrowsInTheOrderOfTheDraw) {
+  std::vector<GaussianAttributes> gaussians;
+  for (const float z : {900.0f, 0.25f, 3.0f, 7.5f, 2000.0f, 0.21f}) {
+    gaussians.push_back(ordinary_gaussian());
+    gaussians.back().position = {0, 0, z};
+  }
+  const Draw draw = run(gaussians);
+  ASSERT_EQ(draw.splats.size(), gaussians.size());
+  for (std::size_t i = 1; i < draw.splats.size(); ++i) EXPECT_LT(draw.splats[i - 1].depth, draw.splats[i].depth);
+  // Near 0.2 and far 1000: 1000 / 999.8 (1 - 0.2 / z).
+  EXPECT_NEAR(draw.splats[2].depth, 1.0002 * (1 - 0.2 / 3), 1e-6);
+  EXPECT_EQ(draw.splats[5].depth, 1) << "beyond the far plane";
+}
+
 TEST(PreprocessProjection, P03JustBehindTheCameraIsCulled) {
   for (const float z : {-1e-7f, -1e-30f, -0.0f, -5.0f}) {
     GaussianAttributes g = ordinary_gaussian();

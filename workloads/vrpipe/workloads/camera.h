@@ -27,8 +27,17 @@ struct Camera {
       {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  ///< camera to world, rows; columns right, down, forward
   double fx = 1, fy = 1;                   ///< focal lengths, pixels
   std::uint32_t width = 1, height = 1;     ///< pixels
-  float near_plane = 0.2f;  ///< world units, >= 1e-6; Gaussians at camera z <= near_plane are culled (0.2 as INRIA)
+  float near_plane = 0.2f;    ///< world units, >= 1e-6; Gaussians at camera z <= near_plane are culled (0.2 as INRIA)
+  float far_plane = 1000.0f;  ///< world units, above near_plane, finite; meshes end here, Gaussians do not
 };
+
+/// A point of the world, as the camera sees it: right, down and forward of the eye, world units. Its window position is
+/// width / 2 + fx x / z, height / 2 + fy y / z.
+Vec3 camera_space(const Camera& camera, const Vec3& world);
+
+/// Window depth at camera z, of meshes and of splats: 0 at the near plane, 1 at the far plane, linear in 1 / z, as OpenGL's
+/// perspective with a clip volume of 0 to 1. What is not between the planes is clamped to them.
+double window_depth(const Camera& camera, double z);
 
 /// Where a camera stands and what it looks at, without the image.
 struct View {
@@ -68,6 +77,11 @@ CameraName camera_name(const std::string& text);
 /// The camera that `text` names.
 /// @throws UserError as camera_name and load_cameras, and when there is no such index
 Camera camera_from_file(const std::string& text, const std::optional<ImageSize>& size = std::nullopt);
+
+/// Checks all that projections need of a camera: the image's size, finite elements, focal lengths above 0, and
+/// 1e-6 <= near_plane < far_plane.
+/// @throws UserError that begins with `what`, e.g. "cannot preprocess the scene"
+void check_camera(const Camera& camera, const std::string& what);
 
 /// @throws UserError unless both sides are 1 to kMaxImageSize; `where` names the option or file
 void check_image_size(std::uint64_t width, std::uint64_t height, const std::string& where);

@@ -16,12 +16,13 @@ struct DrawList {
 };
 
 /// Reads a .spl draw list (little-endian int32 magic, count, width, height; then 12 float32 per splat, see Splat).
-/// Splats come in as they are, bit for bit, but for non-finite ones, which are dropped. Trailing bytes are ignored.
+/// Splats come in as they are, bit for bit, but for non-finite ones, which are dropped; their depth, which the format does not
+/// have, is 0 whatever the file holds in its place. Trailing bytes are ignored.
 /// @throws UserError when the file cannot be read, is cut short, is written meanwhile, or is not a draw list
 DrawList read_draw_list(const std::filesystem::path& path);
 
-/// Writes a .spl draw list. The file appears complete or not at all.
-/// @throws UserError when it cannot be written, or the draw has triangles (the format holds only splats)
+/// Writes a .spl draw list, with 0 in the place of the depth. The file appears complete or not at all.
+/// @throws UserError when it cannot be written, or the draw has triangles or is a mesh (the format holds only splats)
 void write_draw_list(const std::filesystem::path& path, const Draw& draw);
 
 }  // namespace vrpipe
