@@ -1,0 +1,128 @@
+#include <algorithm>
+#include <cctype>
+#include <exception>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <assimp/BaseImporter.h>
+#include <assimp/importerdesc.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+#include <assimp/Importer.hpp>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/workloads/mesh.h>
+
+#include "../file_io.h"
+#include "../ply_header.h"
+#include "asset_files.h"
+#include "gltf_document.h"
+#include "import_asset.h"
+#include "ply_records.h"
+
+namespace vrpipe {
+namespace {
+
+constexpr char kCannotRead[] = "cannot read mesh";
+
+std::string extension_of(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
+}
+
+PlyHeader header_of(const std::filesystem::path& path, const std::string& what) {
+  return read_ply_header(InputFile(path, what), what, path.string(), "export the mesh as a .ply");
+}
+
+/// Leaves assimp the reader of one format: another one would be taken for a file that only looks like it.
+void keep_one_reader(Assimp::Importer& importer, const std::string& extension) {
+  const std::string name = extension == ".obj"   ? "Wavefront Object Importer"
+                           : extension == ".ply" ? "Stanford Polygon Library (PLY) Importer"
+                                                 : "glTF2 Importer";
+  for (std::size_t i = importer.GetImporterCount(); i-- > 0;) {
+    if (importer.GetImporterInfo(i)->mName == name) continue;
+    Assimp::BaseImporter* const reader = importer.GetImporter(i);
+    importer.UnregisterLoader(reader);
+    delete reader;
+  }
+}
+
+[[noreturn]] void fail(const std::string& where, const std::string& why) {
+  constexpr std::size_t kLongest = 300;
+  throw UserError(kCannotRead, where, why.empty() ? "it is not a mesh of its type" : why.substr(0, kLongest),
+                  "export it again as .obj, .ply, .gltf or .glb");
+}
+
+Mesh import_mesh(const std::string& path, const std::string& extension, std::string bytes,
+                 RejectedTriangles& rejected) {
+  const bool is_gltf = extension == ".gltf" || extension == ".glb";
+  std::vector<std::uint64_t> triangles;
+  if (is_gltf) bytes = reduced_gltf(bytes, path, triangles);
+  Assimp::Importer importer;
+  keep_one_reader(importer, extension);
+  auto* files = new AssetFiles(path, std::move(bytes));  // the importer deletes it
+  importer.SetIOHandler(files);
+  if (importer.ReadFile(path, 0) == nullptr) {
+    fail(path, files->failure().empty() ? importer.GetErrorString() : files->failure());
+  }
+  ColourRule rule = ColourRule::as_they_are;
+  if (is_gltf) rule = ColourRule::linear_and_product;
+  if (extension == ".obj" && files->others_read() == 0) rule = ColourRule::white_material;
+  if (is_gltf) rejected.index_out_of_range += triangles_left_out(*importer.GetScene(), triangles);
+  // The importer's scene is its own, and const for others alone.
+  remove_bad_faces(const_cast<aiScene&>(*importer.GetScene()), path, rejected);
+  const aiScene* const scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
+  if (scene == nullptr) fail(path, importer.GetErrorString());
+  return mesh_of_scene(*scene, rule, path);
+}
+
+}  // namespace
+
+bool is_mesh_file(const std::filesystem::path& path) {
+  const std::string extension = extension_of(path);
+  if (extension == ".obj" || extension == ".gltf" || extension == ".glb") return true;
+  if (extension != ".ply") return false;
+  const PlyHeader header = header_of(path, "cannot read scene");
+  const PlyElement* const vertex = header.element("vertex");
+  const bool gaussians = vertex != nullptr && std::any_of(vertex->properties.begin(), vertex->properties.end(),
+                                                          [](const PlyProperty& p) { return p.name == "f_dc_0"; });
+  return header.element("face") != nullptr && !gaussians;
+}
+
+Mesh read_mesh(const std::filesystem::path& path, RejectedTriangles& rejected) {
+  const std::string where = path.string(), extension = extension_of(path);
+  if (extension != ".obj" && extension != ".ply" && extension != ".gltf" && extension != ".glb") {
+    throw UserError(kCannotRead, where,
+                    extension.empty() ? "it has no extension" : "meshes of type `" + extension + "` are not supported",
+                    "give an .obj, .ply, .gltf or .glb");
+  }
+  std::string bytes = read_mesh_file(where);
+  if (extension == ".ply") check_ply_records(header_of(path, kCannotRead), bytes, where);
+  RejectedTriangles here;
+  Mesh mesh;
+  try {
+    mesh = import_mesh(where, extension, std::move(bytes), here);
+  } catch (const UserError&) {
+    throw;
+  } catch (const std::exception& error) {
+    fail(where, error.what());
+  }
+  reject_triangles(mesh, here);
+  if (mesh.empty()) {
+    throw UserError(kCannotRead, where,
+                    "no triangle of it can be drawn: " + std::to_string(here.not_finite) + " are not finite, " +
+                        std::to_string(here.index_out_of_range) + " have indices beyond the vertices, " +
+                        std::to_string(here.degenerate) + " have no area; " + std::to_string(here.lines_and_points) +
+                        " lines and points",
+                    "export it again, with faces");
+  }
+  rejected.not_finite += here.not_finite;
+  rejected.index_out_of_range += here.index_out_of_range;
+  rejected.degenerate += here.degenerate;
+  rejected.lines_and_points += here.lines_and_points;
+  return mesh;
+}
+
+}  // namespace vrpipe
