@@ -215,7 +215,9 @@ TEST_F(MeshFile, FilesThatAreNoMeshesAreRefused) {
   expect_refused("empty.obj", "", {"empty"});
   expect_refused("points.obj", "v 0 0 0\nv 1 0 0\np 1 2\n", {});
   expect_refused("degenerate.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", {"no triangle", "1 have no area"});
-  expect_refused("lying.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", {});
+  expect_refused("lying.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", {"no triangle", "1 have indices beyond"});
+  expect_refused("words.obj", "v 0 zero 0\n", {"`v 0` is malformed"});
+  expect_refused("words.obj", "v 0 0 0\nf 1 1/2/3/4 1\n", {"`f 1` is malformed"});
   expect_refused("text.gltf", "hello", {"not valid JSON"});
   expect_refused("text.glb", "hello", {"not valid JSON"});
   expect_refused("text.ply", "hello", {"does not begin with a line `ply`"});
@@ -239,6 +241,24 @@ TEST_F(MeshFile, GaussiansAreNoMeshAndAMeshIsNoGaussians) {
   expect_user_error([&] { is_mesh_file(write("bad.ply", "hello")); }, {"line `ply`"});
 }
 
+TEST_F(MeshFile, AnObjMayCountBackwardsGoOnInTheNextLineAndHoldWhatMeshesDoNotNeed) {
+  const Mesh mesh = read("odd.obj",
+                         "o thing\ng a b\ns 1\nvt 0 0\nvp 1 2\nv 0 0 5 1.0\nv +1 0 5 # a comment\r\nv 1 1 5e0 # \\\n"
+                         "v 0 1 5\nf -4/1 -3/1 \\\n-2/1\ncstype bezier\nf 1 3/1/ 4\nv 4e-60 7 7\n");
+  expect_square(mesh);
+  EXPECT_EQ(rejected_.total(), 0u);
+}
+
+TEST_F(MeshFile, APlyMayHoldWhatMeshesDoNotNeed) {
+  expect_square(read("rich.ply",
+                     "ply\nformat ascii 1.0\ncomment TextureFile x.png\nobj_info y\nelement camera 1\nproperty int q\n"
+                     "element vertex 4\nproperty float quality\nproperty double x\nproperty list uchar int more\n"
+                     "property int y\nproperty float z\nproperty float s\nelement face 1\nproperty uchar flags\n"
+                     "property list uchar uint vertex_index\nproperty list uchar float texcoord\nelement edge 1\n"
+                     "property int vertex1\nend_header\n8\n1 0 0 0 5 0\n1 1 1 9 0 5 0\n\n1 1 2 9 9 1 5 0\n1 0 0 1 5 0\n"
+                     "255 4 0 1 2 3 8 0 0 0 0 0 0 0 0\n77\n"));
+}
+
 TEST_F(MeshFile, RecordsOfAPlyThatLieAreRefused) {
   const std::string ascii = testing::square_ply_ascii();
   const auto with = [](std::string text, const std::string& from, const std::string& to) {
@@ -251,7 +271,7 @@ TEST_F(MeshFile, RecordsOfAPlyThatLieAreRefused) {
   expect_refused("a.ply", with(ascii, "4 0 1 2 3", "5 0 1 2 3"), {"too few values"});
   expect_refused("a.ply", with(ascii, "4 0 1 2 3", "-4 0 1 2 3"), {"not the length of a list"});
   expect_refused("a.ply", with(ascii, "4 0 1 2 3", "4000000000 0 1 2 3"), {"4000000000 values"});
-  expect_refused("a.ply", with(ascii, "1 0 5 255", "1 zero 5 255"), {"`zero` is not a number"});
+  expect_refused("a.ply", with(ascii, "1 0 5 255", "1 zero 5 255"), {"`zero` is not a number of its type"});
   expect_refused("a.ply", with(ascii, "ascii 1.0", "ascii 2.0"), {"`ascii 2.0`"});
   expect_refused("a.ply", with(ascii, "element face 1", "element vertex 1"), {"no faces"});
   expect_refused("a.ply", with(ascii, "uchar red", "purple red"), {"unknown type"});

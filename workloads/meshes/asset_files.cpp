@@ -10,7 +10,8 @@
 
 #include <vrpipe/component/error.h>
 
-#include "file_io.h"
+#include "../file_io.h"
+#include "obj_document.h"
 
 namespace vrpipe {
 namespace {
@@ -79,7 +80,9 @@ Assimp::IOStream* AssetFiles::Open(const char* name, const char* mode) {
   if (std::strpbrk(mode, "wa+") != nullptr) return nullptr;
   if (path_ == name) return new MemoryStream(bytes_);
   try {
-    auto* stream = new MemoryStream(read_mesh_file(name));
+    std::string bytes = read_mesh_file(name);
+    // The other files of an .obj are materials.
+    auto* stream = new MemoryStream(obj_ ? reduced_mtl(bytes) : std::move(bytes));
     ++others_read_;
     return stream;
   } catch (const UserError& error) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 
 #include <assimp/IOSystem.hpp>
 
@@ -14,7 +15,8 @@ std::string read_mesh_file(const std::string& path);
 /// regular ones, so that no pipe blocks.
 class AssetFiles : public Assimp::IOSystem {
  public:
-  AssetFiles(std::string path, std::string bytes) : path_(std::move(path)), bytes_(std::move(bytes)) {}
+  AssetFiles(std::string path, std::string bytes, bool obj)
+      : path_(std::move(path)), bytes_(std::move(bytes)), obj_(obj) {}
 
   bool Exists(const char* name) const override;
   char getOsSeparator() const override { return '/'; }
@@ -27,6 +29,7 @@ class AssetFiles : public Assimp::IOSystem {
 
  private:
   std::string path_, bytes_;
+  bool obj_;  ///< what it names are materials, of which assimp gets reduced_mtl()
   unsigned others_read_ = 0;
   std::string failure_;
 };

@@ -19,7 +19,8 @@
 #include "asset_files.h"
 #include "gltf_document.h"
 #include "import_asset.h"
-#include "ply_records.h"
+#include "obj_document.h"
+#include "ply_document.h"
 
 namespace vrpipe {
 namespace {
@@ -60,9 +61,11 @@ Mesh import_mesh(const std::string& path, const std::string& extension, std::str
   const bool is_gltf = extension == ".gltf" || extension == ".glb";
   std::vector<std::uint64_t> triangles;
   if (is_gltf) bytes = reduced_gltf(bytes, path, triangles);
+  if (extension == ".obj") bytes = reduced_obj(bytes, path, rejected);
+  if (extension == ".ply") bytes = reduced_ply(header_of(path, kCannotRead), bytes, path);
   Assimp::Importer importer;
   keep_one_reader(importer, extension);
-  auto* files = new AssetFiles(path, std::move(bytes));  // the importer deletes it
+  auto* files = new AssetFiles(path, std::move(bytes), extension == ".obj");  // the importer deletes it
   importer.SetIOHandler(files);
   if (importer.ReadFile(path, 0) == nullptr) {
     fail(path, files->failure().empty() ? importer.GetErrorString() : files->failure());
@@ -99,7 +102,6 @@ Mesh read_mesh(const std::filesystem::path& path, RejectedTriangles& rejected) {
                     "give an .obj, .ply, .gltf or .glb");
   }
   std::string bytes = read_mesh_file(where);
-  if (extension == ".ply") check_ply_records(header_of(path, kCannotRead), bytes, where);
   RejectedTriangles here;
   Mesh mesh;
   try {
