@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include <vrpipe/component/error.h>
 
+#include "courtyard.h"
 #include "scene_painter.h"
 
 namespace vrpipe {
@@ -707,11 +709,13 @@ using Painting = void (*)(ScenePainter&);
 struct Entry {
   std::uint64_t seed;
   Painting paint;
+  Mesh (*mesh)() = nullptr;  ///< null: splats alone
 };
 
 constexpr Entry kEntries[] = {{0x6f626a656374, paint_locomotive},
                               {0x696e646f6f72, paint_room},
-                              {0x6f7574646f6f72, paint_street}};
+                              {0x6f7574646f6f72, paint_street},
+                              {0x636f757274, paint_courtyard, courtyard_mesh}};
 
 }  // namespace
 
@@ -728,7 +732,11 @@ const std::vector<BuiltinSceneInfo>& builtin_scenes() {
       {"outdoor",
        "a street with houses and trees under a wide sky, 980x545, as the outdoor captures",
        {980, 545},
-       {{-0.9, -1.9, -0.6}, {0.35, -2.2, 12}, {0, -1, 0}, 52}}};
+       {{-0.9, -1.9, -0.6}, {0.35, -2.2, 12}, {0, -1, 0}, 52}},
+      {"courtyard",
+       "a courtyard of triangles with splats before and behind its walls, 960x540",
+       {960, 540},
+       {{1.4, -2.1, -5.6}, {-0.25, -1.35, 3.0}, {0, -1, 0}, 48}}};
   return scenes;
 }
 
@@ -744,7 +752,9 @@ BuiltinScene make_builtin_scene(const std::string& name) {
     if (scenes[i].name != name) continue;
     ScenePainter painter(kEntries[i].seed, scenes[i].view, scenes[i].size);
     kEntries[i].paint(painter);
-    return {scenes[i], painter.build()};
+    BuiltinScene scene{scenes[i], painter.build(), {}};
+    if (kEntries[i].mesh != nullptr) scene.meshes.push_back(std::make_shared<const Mesh>(kEntries[i].mesh()));
+    return scene;
   }
   std::string all;
   for (const BuiltinSceneInfo& info : scenes) all += (all.empty() ? "" : ", ") + info.name;

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <vector>
 
 #include <fmt/format.h>
@@ -119,6 +120,7 @@ LoadedScene load_draw_list(const std::string& path, const SceneRequest& request)
   refuse(request.look_at.has_value(), "--look-at", why, remedy);
   refuse(request.up.has_value(), "--up", why, remedy);
   refuse(request.fovy_degrees.has_value(), "--fovy", why, remedy);
+  refuse(!request.meshes.empty(), "--mesh", "a .spl is a draw list, which has no camera and no depth", remedy);
   const std::string preprocessed = "a .spl is a draw list, preprocessed already";
   const PreprocessOptions untouched;
   refuse(request.preprocess.sh_degree != untouched.sh_degree, "--set preprocess.sh_degree", preprocessed, remedy);
@@ -141,16 +143,30 @@ Viewpoint viewpoint(const SceneRequest& request, ImageSize default_size, const M
   return {look_at(view, request.size.value_or(default_size)), view, {}};
 }
 
+/// A mesh in the place of Gaussians, which it lacks in more than one way.
+void refuse_mesh(const std::string& path) {
+  if (!is_mesh_file(path)) return;
+  throw UserError("cannot read scene", path, "it is a triangle mesh, no Gaussians", "draw it with a scene, as a mesh");
+}
+
 void open_builtin(const std::string& name, const SceneRequest& request, OpenedScene& scene) {
   const BuiltinScene builtin = make_builtin_scene(name);
   scene.gaussians = builtin.gaussians;
+  scene.meshes = builtin.meshes;
   scene.viewpoint = viewpoint(request, builtin.info.size, [&] { return with_options(builtin.info.view, request); });
 }
 
 void open_ply(const std::string& path, const SceneRequest& request, OpenedScene& scene) {
+  refuse_mesh(path);
   scene.gaussians = open_gaussian_ply(path);
   scene.viewpoint =
       viewpoint(request, kDefaultImageSize, [&] { return automatic_view(path, scene.gaussians, request); });
+}
+
+void read_meshes(const SceneRequest& request, OpenedScene& scene) {
+  for (const std::string& file : request.meshes) {
+    scene.meshes.push_back(std::make_shared<const Mesh>(read_mesh(file, scene.rejected_triangles)));
+  }
 }
 
 bool is_builtin(const std::string& scene) { return scene.rfind(kBuiltinPrefix, 0) == 0; }
@@ -180,6 +196,7 @@ OpenedScene open_scene(const SceneRequest& request) {
   if (is_builtin(scene.name)) {
     check_view_options(request);
     open_builtin(scene.name.substr(kBuiltinPrefix.size()), request, scene);
+    read_meshes(request, scene);
     return scene;
   }
   const std::string extension = extension_of(request.scene);
@@ -188,7 +205,9 @@ OpenedScene open_scene(const SceneRequest& request) {
   } else if (extension == ".ply") {
     check_view_options(request);
     open_ply(request.scene, request, scene);
+    read_meshes(request, scene);
   } else {
+    refuse_mesh(request.scene);
     throw UserError("cannot read scene", request.scene,
                     extension.empty() ? "it has no extension" : "scenes of type `" + extension + "` are not supported",
                     "give an INRIA .ply, a .spl draw list, or builtin:NAME");
@@ -202,6 +221,11 @@ LoadedScene preprocess_scene(const OpenedScene& scene, const PreprocessOptions& 
     loaded = *scene.draw_list;
   } else {
     loaded.draw = preprocess(scene.gaussians, scene.viewpoint.camera, options, loaded.summary);
+    // What cannot be drawn was left out when they were read, or made without.
+    loaded.rejected_triangles = scene.rejected_triangles;
+    for (const auto& mesh : scene.meshes) {
+      loaded.meshes.push_back(project_mesh(*mesh, scene.viewpoint.camera, loaded.rejected_triangles));
+    }
     loaded.viewpoint = scene.viewpoint;
     loaded.preprocessed_here = true;
   }

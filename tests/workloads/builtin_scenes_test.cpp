@@ -14,8 +14,8 @@ namespace {
 
 TEST(BuiltinScenes, AreNamedAndDescribedAndSizedAsInThePaper) {
   const auto& scenes = builtin_scenes();
-  ASSERT_EQ(scenes.size(), 3u);
-  EXPECT_EQ(builtin_scene_names(), (std::vector<std::string>{"object", "indoor", "outdoor"}));
+  ASSERT_EQ(scenes.size(), 4u);
+  EXPECT_EQ(builtin_scene_names(), (std::vector<std::string>{"object", "indoor", "outdoor", "courtyard"}));
   EXPECT_EQ(scenes.front().name, kDefaultBuiltinScene);
   for (const BuiltinSceneInfo& info : scenes) {
     EXPECT_FALSE(info.description.empty());
@@ -27,8 +27,9 @@ TEST(BuiltinScenes, AreNamedAndDescribedAndSizedAsInThePaper) {
 }
 
 TEST(BuiltinScenes, AnUnknownNameGetsTheNearestOne) {
-  testing::expect_user_error([] { make_builtin_scene("outdor"); }, {"unknown built-in scene (builtin:outdor)",
-                                                                    "builtin:outdoor?", "object, indoor, outdoor"});
+  testing::expect_user_error([] { make_builtin_scene("outdor"); },
+                             {"unknown built-in scene (builtin:outdor)", "builtin:outdoor?",
+                              "object, indoor, outdoor, courtyard"});
   testing::expect_user_error([] { make_builtin_scene(""); }, {"builtin:"});
 }
 

@@ -1,17 +1,19 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <vrpipe/workloads/camera.h>
 #include <vrpipe/workloads/gaussian_scene.h>
+#include <vrpipe/workloads/mesh.h>
 
 namespace vrpipe {
 
 struct BuiltinSceneInfo {
   std::string name;         ///< without "builtin:"
   std::string description;  ///< one line
-  ImageSize size;           ///< default image size, one of the paper's
+  ImageSize size;           ///< default image size; of the first three, one of the paper's
   View view;                ///< default camera
 };
 
@@ -19,6 +21,7 @@ struct BuiltinSceneInfo {
 struct BuiltinScene {
   BuiltinSceneInfo info;
   GaussianScene gaussians;
+  std::vector<std::shared_ptr<const Mesh>> meshes;  ///< drawn with it; of `courtyard`
 };
 
 /// The scene that is drawn when none is named.

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <vrpipe/pipeline/draw.h>
 #include <vrpipe/workloads/camera.h>
 #include <vrpipe/workloads/gaussian_scene.h>
+#include <vrpipe/workloads/mesh.h>
 #include <vrpipe/workloads/preprocess.h>
 
 namespace vrpipe {
@@ -20,6 +23,7 @@ struct SceneRequest {
   std::optional<Vec3> up;
   std::optional<double> fovy_degrees;
   PreprocessOptions preprocess;
+  std::vector<std::string> meshes;  ///< files of meshes that are drawn with the scene, in this order; see read_mesh()
 };
 
 /// The camera of a draw, and where it comes from.
@@ -31,9 +35,11 @@ struct Viewpoint {
 
 struct LoadedScene {
   Draw draw;
-  SceneSummary summary;                ///< name: the file's name without folder, or builtin:NAME
-  std::optional<Viewpoint> viewpoint;  ///< none for a draw list
-  bool preprocessed_here = false;      ///< false for a draw list
+  std::vector<Draw> meshes;              ///< those of the built-in scene, then those of the files; see mixed_frame()
+  RejectedTriangles rejected_triangles;  ///< of all meshes
+  SceneSummary summary;                  ///< name: the file's name without folder, or builtin:NAME
+  std::optional<Viewpoint> viewpoint;    ///< none for a draw list
+  bool preprocessed_here = false;        ///< false for a draw list
 };
 
 /// Image size of a .ply that is drawn without a camera file or a size.
@@ -45,6 +51,8 @@ struct OpenedScene {
   std::string name;  ///< as SceneSummary has it
   GaussianScene gaussians;
   Viewpoint viewpoint;
+  std::vector<std::shared_ptr<const Mesh>> meshes;
+  RejectedTriangles rejected_triangles;  ///< when they were read
   std::optional<LoadedScene> draw_list;
 };
 
@@ -61,12 +69,13 @@ bool is_draw_list(const std::string& scene);
 /// three median sigmas at least), from the front (-z), 30 degrees to the left and 20 degrees above, with the world's
 /// up at 0,-1,0 (y points down, as in INRIA and COLMAP worlds; give --up 0,1,0 for y-up files) and a vertical field of
 /// view of 50 degrees. A scene so far out that a camera beside it rounds to where it is gets none.
-/// .spl: the draw as it is; size, camera, view options and preprocessing other than the default are refused.
+/// .spl: the draw as it is; size, camera, view options, meshes and preprocessing other than the default are
+/// refused.
 /// @throws UserError for whatever cannot be used
 OpenedScene open_scene(const SceneRequest& request);
 
-/// Preprocesses an opened scene; of a draw list, a copy.
-/// @throws UserError as preprocess()
+/// Preprocesses an opened scene, its meshes included; of a draw list, a copy.
+/// @throws UserError as preprocess() and project_mesh()
 LoadedScene preprocess_scene(const OpenedScene& scene, const PreprocessOptions& options);
 
 /// Opens a scene and preprocesses it. Throws as these do.
