@@ -51,6 +51,31 @@ std::string square_ply_binary(bool big_endian) {
   return bytes;
 }
 
+std::string rich_obj() {
+  return "mtllib rich.mtl\no thing\nv 0 0 5 1 0 0\nv 1 0 5 0 1 0\nv 1 1 5 1 1 1\nv 0 1 5 .5 .5 .5\nvt 0 0\nvt 1 0 "
+         "0\nvn 0 0 -1\n"
+         "g a b\nusemtl paint\ns 1\nf 1/1/1 2/2/1 3/1/1 4/2/1\nf -4 -3 -2\nf 1//1 2//1 \\\n 3//1\nl 1 2 3\np 1 2\n"
+         "usemtl other\nf 1/1 2/2 3/1\nvp 1 2\nmg 1 2\ncstype bezier\n";
+}
+
+std::string rich_mtl() {
+  return "newmtl paint\nKd 0.25 0.5 0.75\nKa 1 1 1\nNs 10\nd 0.5\nTr 0.1\nillum 2\nmap_Kd -o 1 1 1 -clamp on x.png\n"
+         "bump -bm 2 y.png\nnewmtl other\nKd spectral\nKe 1 1 1\nPr 0.5\nrefl -type sphere z.png\n";
+}
+
+std::string rich_ply() {
+  return "ply\nformat ascii 1.0\ncomment TextureFile x.png\nobj_info hey\nelement vertex 4\nproperty double x\n"
+         "property float y\nproperty float z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float "
+         "s\n"
+         "property float t\nproperty float red\nproperty float green\nproperty float blue\nproperty float alpha\n"
+         "element face 2\nproperty uchar flags\nproperty list uchar int vertex_indices\n"
+         "property list uchar float texcoord\nelement edge 1\nproperty int vertex1\nproperty int vertex2\n"
+         "element tristrips 1\nproperty list int int vertex_indices\nelement material 1\nproperty uchar diffuse_red\n"
+         "property float specular_power\nend_header\n"
+         "0 0 5 0 0 1 0 0 1 0 0 1\n1 0 5 0 0 1 0 0 1 0 0 1\n1 1 5 0 0 1 0 0 1 0 0 1\n0 1 5 0 0 1 0 0 1 0 0 1\n"
+         "7 3 0 1 2 6 0 0 0 0 0 0\n7 4 0 1 2 3 0\n0 1\n5 0 1 2 -1 3\n255 3.5\n";
+}
+
 std::string square_buffer() {
   return bytes_of<float>({0, 0, 5, 1, 0, 5, 1, 1, 5, 0, 1, 5}) + bytes_of<std::uint16_t>({0, 1, 2, 0, 2, 3});
 }

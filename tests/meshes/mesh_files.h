@@ -22,6 +22,11 @@ std::string square_ply_binary(bool big_endian);
 std::string square_gltf(const std::string& node = R"("mesh": 0)");
 std::string square_glb();
 
+/// What files of modelling programs hold beside a mesh, and meshes do not need. On some of this, broken, Assimp crashes.
+std::string rich_obj();  ///< names rich.mtl
+std::string rich_mtl();
+std::string rich_ply();
+
 /// The JSON of square_gltf with this URI (with its key and a comma), or without any.
 std::string square_json(const std::string& uri, const std::string& node);
 std::string square_buffer();

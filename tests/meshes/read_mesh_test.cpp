@@ -213,7 +213,7 @@ TEST_F(MeshFile, IndicesBeyondTheVerticesOfAGltfAreLeftOut) {
 
 TEST_F(MeshFile, FilesThatAreNoMeshesAreRefused) {
   expect_refused("empty.obj", "", {"empty"});
-  expect_refused("points.obj", "v 0 0 0\nv 1 0 0\np 1 2\n", {});
+  expect_refused("points.obj", "v 0 0 0\nv 1 0 0\np 1 2\n", {"no triangle", "1 lines and points"});
   expect_refused("degenerate.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", {"no triangle", "1 have no area"});
   expect_refused("lying.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", {"no triangle", "1 have indices beyond"});
   expect_refused("words.obj", "v 0 zero 0\n", {"`v 0` is malformed"});
@@ -242,9 +242,10 @@ TEST_F(MeshFile, GaussiansAreNoMeshAndAMeshIsNoGaussians) {
 }
 
 TEST_F(MeshFile, AnObjMayCountBackwardsGoOnInTheNextLineAndHoldWhatMeshesDoNotNeed) {
-  const Mesh mesh = read("odd.obj",
-                         "o thing\ng a b\ns 1\nvt 0 0\nvp 1 2\nv 0 0 5 1.0\nv +1 0 5 # a comment\r\nv 1 1 5e0 # \\\n"
-                         "v 0 1 5\nf -4/1 -3/1 \\\n-2/1\ncstype bezier\nf 1 3/1/ 4\nv 4e-60 7 7\n");
+  const Mesh mesh =
+      read("odd.obj",
+           "\xef\xbb\xbfo thing\ng a b\ns 1\nvt 0 0\nvp 1 2\nv 0 0 5 1.0\nv +1 0 5 # a comment\r\nv 1 1 5e0 # \\\n"
+           "v 0 1 5\nf -4/1 -3/1 \\\n-2/1\ncstype bezier\nf 1 3/1/ 4\nv 4e-60 7 7\n");
   expect_square(mesh);
   EXPECT_EQ(rejected_.total(), 0u);
 }
@@ -358,6 +359,23 @@ class BrokenMeshFile : public MeshFile, public ::testing::WithParamInterface<std
   int refused_ = 0, read_ = 0;
 };
 
+TEST_F(MeshFile, AMaterialFileIsReadHoweverBroken) {
+  const std::string whole = testing::rich_mtl();
+  write("rich.mtl", whole);
+  EXPECT_EQ(read("rich.obj", testing::rich_obj()).triangles.size(), 5u);
+  for (std::size_t at = 0; at < whole.size(); ++at) {
+    for (const char replacement : {'\0', '\xff', '-', '\n'}) {
+      std::string broken = whole;
+      broken[at] = replacement;
+      std::filesystem::remove(in_folder("rich.mtl"));
+      write("rich.mtl", broken);
+      const Mesh mesh = read_mesh(in_folder("rich.obj"), rejected_);
+      EXPECT_EQ(mesh.triangles.size(), 5u);
+      for (const Floats& colour : mesh.colours) ASSERT_TRUE(std::isfinite(colour[0]) && colour[0] >= 0);
+    }
+  }
+}
+
 TEST_P(BrokenMeshFile, CutAtEveryByte) {
   const std::string& whole = GetParam().second;
   for (std::size_t length = 0; length < whole.size(); ++length) expect_sound_or_refused(whole.substr(0, length));
@@ -379,18 +397,18 @@ TEST_P(BrokenMeshFile, WithEveryByteReplaced) {
   EXPECT_GT(read_, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, BrokenMeshFile,
-                         ::testing::Values(std::pair{"mesh.obj", testing::square_obj()},
-                                           std::pair{"ascii.ply", testing::square_ply_ascii()},
-                                           std::pair{"little.ply", testing::square_ply_binary(false)},
-                                           std::pair{"big.ply", testing::square_ply_binary(true)},
-                                           std::pair{"mesh.gltf", testing::square_gltf()},
-                                           std::pair{"mesh.glb", testing::square_glb()}),
-                         [](const auto& parameter) {
-                           std::string name = parameter.param.first;
-                           name[name.find('.')] = '_';
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    All, BrokenMeshFile,
+    ::testing::Values(std::pair{"mesh.obj", testing::square_obj()}, std::pair{"rich.obj", testing::rich_obj()},
+                      std::pair{"rich.ply", testing::rich_ply()}, std::pair{"ascii.ply", testing::square_ply_ascii()},
+                      std::pair{"little.ply", testing::square_ply_binary(false)},
+                      std::pair{"big.ply", testing::square_ply_binary(true)},
+                      std::pair{"mesh.gltf", testing::square_gltf()}, std::pair{"mesh.glb", testing::square_glb()}),
+    [](const auto& parameter) {
+      std::string name = parameter.param.first;
+      name[name.find('.')] = '_';
+      return name;
+    });
 
 }  // namespace
 }  // namespace vrpipe

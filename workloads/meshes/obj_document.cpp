@@ -23,8 +23,9 @@ constexpr std::size_t kMaxNameBytes = 200;
 /// Calls `use(words, line)` for every statement; a backslash at the end of a line joins it with the next.
 template <class Use>
 void for_each_statement(const std::string& text, const Use& use) {
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   std::string statement;
-  for (std::size_t begin = 0; begin < text.size();) {
+  for (std::size_t begin = text.compare(0, 3, kByteOrderMark) == 0 ? 3 : 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
     std::string_view line = std::string_view(text).substr(begin, end - begin);
     begin = end + 1;
@@ -85,7 +86,7 @@ class Reducer {
   std::string reduce(const std::string& text) {
     for_each_statement(text, [&](const auto& words, const auto&) { count(words); });
     for_each_statement(text, [&](const auto& words, const std::string& statement) { copy(words, statement); });
-    return std::move(result_);
+    return has_faces_ ? std::move(result_) : std::string{};
   }
 
  private:
@@ -166,13 +167,14 @@ class Reducer {
       }
       line += has_normals_ ? fmt::format(" {}//{}", position, normal) : fmt::format(" {}", position);
     }
+    has_faces_ = true;
     result_ += line + '\n';
   }
 
   const std::string& where_;
   RejectedTriangles& rejected_;
   std::int64_t all_positions_ = 0, all_normals_ = 0, positions_ = 0, normals_ = 0;
-  bool has_normals_ = true;
+  bool has_normals_ = true, has_faces_ = false;
   std::string result_;
 };
 

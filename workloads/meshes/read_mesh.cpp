@@ -62,6 +62,7 @@ Mesh import_mesh(const std::string& path, const std::string& extension, std::str
   std::vector<std::uint64_t> triangles;
   if (is_gltf) bytes = reduced_gltf(bytes, path, triangles);
   if (extension == ".obj") bytes = reduced_obj(bytes, path, rejected);
+  if (bytes.empty()) return {};
   if (extension == ".ply") bytes = reduced_ply(header_of(path, kCannotRead), bytes, path);
   Assimp::Importer importer;
   keep_one_reader(importer, extension);
