@@ -125,7 +125,7 @@ Bands sort_into_bands(const Draw& draw) {
 }  // namespace
 
 ExactImage render_exactly(const Draw& draw, unsigned threads) {
-  if (!draw.triangles.empty()) throw std::invalid_argument("only splats can be rendered exactly");
+  if (!draw.triangles.empty() || draw.is_mesh()) throw std::invalid_argument("only splats can be rendered exactly");
   if (threads == 0) threads = std::max(1U, std::thread::hardware_concurrency());
   ExactImage image;
   image.width = draw.width;

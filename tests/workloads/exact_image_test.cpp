@@ -98,6 +98,10 @@ TEST(ExactImage, RefusesTriangles) {
   Draw draw = mixed_draw(4, 4, 1);
   draw.triangles.resize(1);
   EXPECT_THROW(render_exactly(draw), std::invalid_argument);
+  Draw mesh;
+  mesh.width = mesh.height = 4;
+  mesh.mesh.resize(1);
+  EXPECT_THROW(render_exactly(mesh), std::invalid_argument);
 }
 
 }  // namespace

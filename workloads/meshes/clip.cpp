@@ -44,7 +44,7 @@ ClipPolygon ClipVolume::clip(const std::array<ClipVertex, 3>& triangle) const {
   ClipPolygon polygon;
   for (const ClipVertex& vertex : triangle) polygon.add(vertex);
   for (std::size_t p = 0; p < planes_.size() && polygon.size() > 0; ++p) {
-    std::array<double, 10> distance{};
+    std::array<double, ClipPolygon::most_vertices + 1> distance{};
     bool all_inside = true;
     for (std::size_t i = 0; i < polygon.size(); ++i) {
       distance[i] = glm::dot(planes_[p].normal, polygon[i].position) + planes_[p].offset;

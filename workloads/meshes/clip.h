@@ -17,13 +17,17 @@ struct ClipVertex {
 /// A convex polygon: a triangle that six planes have cut at most.
 class ClipPolygon {
  public:
+  /// 9, were it not for rounding, which may leave a polygon not quite convex: then a plane takes every other vertex and makes
+  /// two for each. From 3: 4, 6, 9, 13, 19, 28.
+  static constexpr std::size_t most_vertices = 28;
+
   std::size_t size() const { return size_; }
   const ClipVertex& operator[](std::size_t i) const { return vertices_[i]; }
   const ClipVertex& cyclic(std::size_t i) const { return vertices_[i == size_ ? 0 : i]; }
   void add(const ClipVertex& vertex) { vertices_[size_++] = vertex; }
 
  private:
-  std::array<ClipVertex, 9> vertices_{};
+  std::array<ClipVertex, most_vertices> vertices_;
   std::size_t size_ = 0;
 };
 

@@ -25,7 +25,7 @@ struct ExactImage {
 /// alpha below 1/255 is pruned. No tiles, no quads, no fixed point, no termination; the exponential and all sums are
 /// in double. The same bits for any number of threads.
 /// @param threads  0: one per hardware thread
-/// @throws std::invalid_argument when the draw has triangles
+/// @throws std::invalid_argument when the draw has triangles or is a mesh
 ExactImage render_exactly(const Draw& draw, unsigned threads = 0);
 
 }  // namespace vrpipe
