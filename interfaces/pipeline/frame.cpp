@@ -18,10 +18,15 @@ constexpr std::uint64_t most_splats = std::uint64_t{1} << 31;  // primitives are
 
 auto fields_of(const DrawState& state) {
   return std::tie(state.early_termination, state.termination_threshold, state.termination_inclusive,
-                  state.pruning_threshold, state.splat_extent, state.obb_padding);
+                  state.pruning_threshold, state.splat_extent, state.obb_padding, state.depth, state.stencil,
+                  state.cull, state.shader, state.light);
 }
 
 }  // namespace
+
+bool operator==(const Light& a, const Light& b) {
+  return std::tie(a.x, a.y, a.z, a.ambient) == std::tie(b.x, b.y, b.z, b.ambient);
+}
 
 bool operator==(const DrawState& a, const DrawState& b) { return fields_of(a) == fields_of(b); }
 
@@ -60,7 +65,21 @@ void Frame::draw(std::shared_ptr<const Draw> geometry, const DrawState& state, s
                        height_),
            "make all draws for one size");
   }
-  const std::size_t there = geometry->splats.size();
+  const std::size_t there = geometry->size();
+  if (geometry->is_mesh()) {
+    if (!geometry->splats.empty() || !geometry->triangles.empty()) {
+      refuse("it is a mesh that has splats as well", "draw them apart");
+    }
+    if (state.shader == FragmentShader::splat) refuse("it is a mesh, and its shader is that of splats", "use another");
+  } else if (there > 0 && (state.shader == FragmentShader::vertex || state.shader == FragmentShader::lit)) {
+    refuse("it has splats, and its shader is that of a mesh", "use that of splats");
+  }
+  for (const StencilFace* face : {&state.stencil.front, &state.stencil.back}) {
+    if (face->reference > stencil_bits) {
+      refuse(fmt::format("its stencil reference is {}", face->reference),
+             "use 0 to 127: the highest bit is termination's");
+    }
+  }
   if (!geometry->triangles.empty() && geometry->triangles.size() != there) {
     refuse(fmt::format("it has {} triangles for {} splats", geometry->triangles.size(), there),
            "give one for each splat, or none");
@@ -81,6 +100,11 @@ void Frame::draw(std::shared_ptr<const Draw> geometry, const DrawState& state, s
 }
 
 void Frame::clear(Clear clear) {
+  if (!(clear.depth_value >= 0 && clear.depth_value <= 1) || clear.stencil_value > stencil_bits) {
+    throw UserError("cannot clear", "frame",
+                    fmt::format("depth {} or stencil {} is out of range", clear.depth_value, clear.stencil_value),
+                    "clear depth to 0 to 1, stencil to 0 to 127");
+  }
   Command command;
   command.clear = clear;
   add(command);
@@ -106,6 +130,17 @@ void Frame::change_states(const std::function<void(DrawState&)>& change) {
 
 bool Frame::terminates_early() const {
   return std::any_of(draws_.begin(), draws_.end(), [](const DrawCall& call) { return call.state.early_termination; });
+}
+
+bool Frame::tests_depth_stencil() const {
+  return std::any_of(draws_.begin(), draws_.end(),
+                     [](const DrawCall& call) { return call.state.tests_depth_stencil(); });
+}
+
+bool Frame::needs_zrop() const {
+  return std::any_of(draws_.begin(), draws_.end(), [](const DrawCall& call) {
+    return call.state.reads_depth_stencil() || call.state.shader == FragmentShader::none;
+  });
 }
 
 const Clear* Frame::clear_of(Mark mark) const {

@@ -15,39 +15,54 @@ AddressMap address_map(const Frame& frame, ColorFormat format) {
   };
   std::set<const Draw*> geometries;
   for (const DrawCall& call : frame.draws()) geometries.insert(call.geometry.get());
-  std::uint64_t splats = 0;
+  std::uint64_t vertices = 0;
   std::uint64_t triangles = 0;
   for (const Draw* geometry : geometries) {
-    splats += geometry->splats.size();
+    vertices += vertex_bytes(*geometry);
     triangles += geometry->triangles.size();
   }
   AddressMap map;
   map.color = region(ColorSurface::size_bytes(frame.width(), frame.height(), format));
-  map.depth_stencil = region(DepthStencilSurface::size_bytes(frame.width(), frame.height()));
-  map.vertices = region(splats * sizeof(Splat));
+  map.depth_stencil = region(DepthStencilSurface::size_bytes(frame.width(), frame.height(), frame.depth_format()));
+  map.vertices = region(vertices);
   map.primitives = region(triangles * sizeof(ScreenTriangle));
   map.attributes = region(std::uint64_t{frame.splats()} * attribute_bytes_per_splat);
   return map;
 }
 
-DepthStencilSurface::DepthStencilSurface(std::uint32_t width, std::uint32_t height, std::uint64_t address)
-    : grid_(width, height), address_(address), terminated_(grid_.quads()) {}
+DepthStencilSurface::DepthStencilSurface(std::uint32_t width, std::uint32_t height, std::uint64_t address,
+                                         DepthFormat format, bool stores_depth_stencil)
+    : grid_(width, height), address_(address), format_(format), terminated_(grid_.quads()) {
+  if (!stores_depth_stencil) return;
+  quads_.resize(grid_.quads());
+  Clear all;
+  all.depth = true;
+  all.stencil = true;
+  clear(all, {});
+}
 
-void DepthStencilSurface::clear_termination(const Placement& placement) {
+void DepthStencilSurface::clear(const Clear& clear, const Placement& placement) {
+  const std::uint32_t depth = store_depth(format_, static_cast<double>(clear.depth_value));
   for (std::size_t tile = 0; tile < grid_.tiles(); ++tile) {
     if (!placement.owns(grid_.tile(tile))) continue;
-    const auto first = terminated_.begin() + static_cast<std::ptrdiff_t>(tile * positions_per_tile);
-    std::fill_n(first, positions_per_tile, std::uint8_t{0});
+    const std::size_t first = tile * positions_per_tile;
+    for (std::size_t place = first; place < first + positions_per_tile; ++place) {
+      if (clear.termination) terminated_[place] = 0;
+      if (quads_.empty()) continue;
+      if (clear.depth) quads_[place].depth.fill(depth);
+      if (clear.stencil) quads_[place].stencil.fill(clear.stencil_value);
+    }
   }
 }
 
-std::uint64_t DepthStencilSurface::size_bytes(std::uint32_t width, std::uint32_t height) {
-  return ScreenTiling(width, height).quads() * bytes_per_quad;
+std::uint64_t DepthStencilSurface::size_bytes(std::uint32_t width, std::uint32_t height, DepthFormat format) {
+  return ScreenTiling(width, height).quads() * bytes_per_quad(format);
 }
 
 Framebuffer::Framebuffer(const Frame& frame, ColorFormat format)
     : addresses(address_map(frame, format)),
       color(frame.width(), frame.height(), format),
-      depth_stencil(frame.width(), frame.height(), addresses.depth_stencil.address) {}
+      depth_stencil(frame.width(), frame.height(), addresses.depth_stencil.address, frame.depth_format(),
+                    frame.tests_depth_stencil()) {}
 
 }  // namespace vrpipe

@@ -89,6 +89,16 @@ bool snap_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t s
                    SnappedTriangle& out) {
   const DrawCall& call = context.draw(draw);
   const auto steps = static_cast<double>(1U << context.precision.subpixel_bits);
+  if (call.geometry->is_mesh()) {
+    const MeshTriangle& given = call.mesh_triangle(splat);
+    for (unsigned vertex = 0; vertex < 3; ++vertex) {
+      const Point point{given.vertices[vertex].x, given.vertices[vertex].y};
+      if (!in_guard_band(point)) return false;
+      out.x[vertex] = snap(point.x, steps);
+      out.y[vertex] = snap(point.y, steps);
+    }
+    return true;
+  }
   if (const ScreenTriangle* const given = call.triangle(splat)) {
     for (unsigned vertex = 0; vertex < 3; ++vertex) {
       const Point point{given->x[vertex], given->y[vertex]};
@@ -138,11 +148,32 @@ bool is_finite(const Splat& splat) {
   return std::all_of(std::begin(fields), std::end(fields), [](float field) { return std::isfinite(field); });
 }
 
+bool is_finite(const MeshTriangle& triangle) {
+  return std::all_of(triangle.vertices.begin(), triangle.vertices.end(), [](const MeshVertex& vertex) {
+    const float fields[] = {vertex.x,     vertex.y,    vertex.depth, vertex.inverse_w, vertex.red,
+                            vertex.green, vertex.blue, vertex.nx,    vertex.ny,        vertex.nz};
+    return std::all_of(std::begin(fields), std::end(fields), [](float field) { return std::isfinite(field); });
+  });
+}
+
+bool is_finite(const DrawCall& draw, std::uint32_t splat) {
+  return draw.geometry->is_mesh() ? is_finite(draw.mesh_triangle(splat)) : is_finite(draw.splat(splat));
+}
+
+bool is_back_face(const Draw& draw, const SnappedTriangle& triangle) {
+  return draw.is_mesh() && doubled_area(triangle) > 0;
+}
+
 Culling cull_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
                       PixelRect& bounds) {
   SnappedTriangle snapped;
   if (!snap_triangle(context, draw, splat, triangle, snapped)) return Culling::not_finite;
   if (doubled_area(snapped) == 0) return Culling::zero_area;
+  const DrawCall& call = context.draw(draw);
+  if (call.state.cull != CullMode::none &&
+      is_back_face(*call.geometry, snapped) == (call.state.cull == CullMode::back) && call.geometry->is_mesh()) {
+    return Culling::facing;
+  }
   bounds = covered_bounds(snapped, context.precision.subpixel_bits, context.frame->width(), context.frame->height());
   return bounds.empty() ? Culling::outside : Culling::none;
 }

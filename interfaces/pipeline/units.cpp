@@ -47,18 +47,19 @@ void AttributeFetch::check() const {
   l1.check("L1 of an SM", "sm", "l1_bytes");
 }
 
-void ZCache::check() const {
+void ZCache::check(DepthFormat format) const {
+  const std::uint32_t quad = DepthStencilSurface::bytes_per_quad(format);
+  const std::uint32_t tile = positions_per_tile * quad;
   organization.check("z-cache", "zrop", "cache_bytes");
-  if (organization.line_bytes > DepthStencilSurface::bytes_per_tile) {
+  if (organization.line_bytes > tile) {
     throw UserError("unusable z-cache", "zrop.line_bytes",
                     fmt::format("a line of {} bytes is of several screen tiles, which may be other GPCs'",
                                 organization.line_bytes),
-                    fmt::format("use lines of at most {}", DepthStencilSurface::bytes_per_tile));
+                    fmt::format("use lines of at most {}", tile));
   }
-  if (organization.sector_bytes < DepthStencilSurface::bytes_per_quad) {
+  if (organization.sector_bytes < quad) {
     throw UserError("unusable z-cache", "zrop.sector_bytes",
-                    fmt::format("a quad of {} bytes does not fit into a sector of {}",
-                                DepthStencilSurface::bytes_per_quad, organization.sector_bytes),
+                    fmt::format("a quad of {} bytes does not fit into a sector of {}", quad, organization.sector_bytes),
                     "use larger sectors");
   }
 }

@@ -19,7 +19,7 @@ class TimedProp : public TimedUnit {
       : TimedUnit(name, domain, PropWork::kinds(behaviour->timing()), transport),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
-        tests_(context.frame->terminates_early()),
+        tests_(context.frame->needs_zrop()),
         out_test_(*this, "out_test"),
         out_survivors_(*this, "out_survivors"),
         out_release_(*this, "out_release"),

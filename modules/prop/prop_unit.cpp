@@ -24,7 +24,7 @@ class PropUnit : public Unit {
         out_color_(*this, "out_color"),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
-        tests_(context.frame->terminates_early()),
+        tests_(context.frame->needs_zrop()),
         there_{PropWork::bins, BatchLimit(timing_.quads_per_cycle)},
         back_{PropWork::tested, BatchLimit(timing_.quads_per_cycle)},
         order_(timing_.order, context),

@@ -15,7 +15,7 @@ class UntimedProp : public UntimedUnit {
         out_release_(*this, "out_release"),
         out_color_(*this, "out_color"),
         in_tested_(input<BinItem>("in_tested", [this](const BinItem& item) { forward(item); })),
-        in_bins_(input<BinItem>("in_bins", [this, tests = context.frame->terminates_early()](
+        in_bins_(input<BinItem>("in_bins", [this, tests = context.frame->needs_zrop()](
                                                const BinItem& item) { tests ? out_test_.send(item) : forward(item); })),
         in_shaded_(input<ShadedWarpItem>("in_shaded", [this](const ShadedWarpItem& item) { leave(item); })),
         behaviour_(std::move(behaviour)) {}

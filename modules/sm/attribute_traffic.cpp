@@ -19,7 +19,7 @@ AttributeTraffic::AttributeTraffic(const RenderContext& context, const Attribute
     const Draw& geometry = *call.geometry;
     const auto [place, is_new] = of_geometry.emplace(&geometry, next);
     if (is_new) {
-      next.splats += geometry.splats.size() * sizeof(Splat);
+      next.splats += vertex_bytes(geometry);
       next.triangles += geometry.triangles.size() * sizeof(ScreenTriangle);
     }
     regions_.push_back(place->second);
@@ -33,7 +33,7 @@ std::uint32_t AttributeTraffic::visible_triangles(const VertexWarp& warp) const 
   PixelRect bounds;
   for (unsigned i = 0; i < warp.splats; ++i) {
     const std::uint32_t splat = warp.first_splat + i;
-    if (!is_finite(call.splat(splat))) continue;
+    if (!is_finite(call, splat)) continue;
     for (unsigned triangle = 0; triangle < triangles; ++triangle) {
       const bool drawn = cull_triangle(context_, warp.draw, splat, triangle, bounds) == Culling::none;
       visible |= (drawn ? 1U : 0U) << (2 * i + triangle);

@@ -52,7 +52,8 @@ class AttributeTraffic {
     const std::uint64_t first = call.first + (warp.first_splat - call.base);
     const Region& region = regions_[warp.draw];
     const MemoryRequest request{0, 0, tlm::TLM_READ_COMMAND, origin(MemoryTraffic::vertex)};
-    in_sectors(region.splats + first * sizeof(Splat), warp.splats * sizeof(Splat), request, access);
+    const std::uint64_t each = vertex_bytes_of_each(*call.geometry);
+    in_sectors(region.splats + first * each, warp.splats * each, request, access);
     if (call.geometry->triangles.empty()) return;
     in_sectors(region.triangles + first * sizeof(ScreenTriangle), warp.splats * sizeof(ScreenTriangle), request,
                access);

@@ -43,7 +43,7 @@ std::uint32_t threads_of(const Warp& warp, DrawIndex draw) {
 }  // namespace
 
 SplatShader::SplatShader(const Parameters& parameters, const RenderContext& context)
-    : context_(context), several_draws_(context.frame->draws().size() > 1) {
+    : context_(context), several_draws_(context.frame->draws().size() > 1), mesh_(context) {
   timing_.cores = parameters.cores;
   timing_.schedulers_per_core = parameters.schedulers_per_core;
   timing_.lanes_per_scheduler = parameters.lanes_per_scheduler;
@@ -117,34 +117,48 @@ inline LanePair SplatShader::alpha_at(LanePair x, LanePair y, const AttributePai
 }
 
 void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
-  switch (context_.precision.exponential) {
-    case Exponential::exact: return shade_warp<Exponential::exact>(warp, out);
-    case Exponential::ex2: return shade_warp<Exponential::ex2>(warp, out);
-    case Exponential::fp16: return shade_warp<Exponential::fp16>(warp, out);
-    case Exponential::table256: return shade_warp<Exponential::table256>(warp, out);
-    case Exponential::table16: return shade_warp<Exponential::table16>(warp, out);
+  ++fragment_warps;
+  WarpColors colors;
+  const bool is_mesh = context_.state(warp.quads[0].draw).shader != FragmentShader::splat;  // all quads' state
+  if (__builtin_expect(is_mesh, 0)) {
+    shade_mesh(warp, colors);
+  } else {
+    switch (context_.precision.exponential) {
+      case Exponential::exact: shade_splats<Exponential::exact>(warp, colors); break;
+      case Exponential::ex2: shade_splats<Exponential::ex2>(warp, colors); break;
+      case Exponential::fp16: shade_splats<Exponential::fp16>(warp, colors); break;
+      case Exponential::table256: shade_splats<Exponential::table256>(warp, colors); break;
+      case Exponential::table16: shade_splats<Exponential::table16>(warp, colors); break;
+    }
   }
+  put_out(warp, colors, out);
+}
+
+void SplatShader::shade_mesh(const Warp& warp, WarpColors& colors) {
+  constexpr auto row = static_cast<std::int32_t>(quads_per_tile_row);
+  const auto color_of = [&](const Quad& quad) {
+    return mesh_.shade(quad, static_cast<std::int32_t>(warp.tile.x * screen_tile_pixels) + 2 * (quad.position % row),
+                       static_cast<std::int32_t>(warp.tile.y * screen_tile_pixels) + 2 * (quad.position / row));
+  };
+  for (unsigned i = 0; i < warp.count; i += 2) {
+    const QuadColor first = color_of(warp.quads[i]);
+    const QuadColor second = i + 1U < warp.count ? color_of(warp.quads[i + 1]) : QuadColor{};
+    colors.pairs[i / 2] = {join(first.red, second.red), join(first.green, second.green), join(first.blue, second.blue),
+                           join(first.alpha, second.alpha)};
+  }
+  for (unsigned i = 0; i < warp.count; ++i) colors.covered |= static_cast<unsigned>(warp.quads[i].coverage) << (4 * i);
+  colors.live = colors.covered;
 }
 
 template <Exponential Kind>
-void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
-  out.tile = warp.tile;
-  out.sequence = warp.sequence;
-  out.tile_sequence = warp.tile_sequence;
-  out.mark = Mark::none;
-  ++fragment_warps;
+void SplatShader::shade_splats(const Warp& warp, WarpColors& colors) {
   const float pruning_threshold = context_.state(warp.quads[0].draw).pruning_threshold;  // all quads' state
   // Sample positions are sums of small integers and halves: exact.
   const auto x = static_cast<float>(warp.tile.x * screen_tile_pixels);
   const auto y = static_cast<float>(warp.tile.y * screen_tile_pixels);
   // Two quads at a time, which may be a pair; of an odd number the last is its own neighbour, not covered. First the
   // colours of all, then what becomes of them: a branch on that waits for the exponential.
-  struct {
-    LanePair red, green, blue, alpha;
-  } colors[quads_per_warp / 2];
   const unsigned last = warp.count - 1U;
-  std::uint32_t covered_of_warp = 0;  // a bit a thread
-  std::uint32_t live_of_warp = 0;
   for (unsigned i = 0; i < warp.count; i += 2) {
     const Quad& first = warp.quads[i];
     const Quad& second = warp.quads[i + (i < last)];
@@ -160,11 +174,20 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
                                           splats);
     const LanePairBits kept = (alpha >= pruning_threshold) & expand_mask_pair(covered);
     const LanePair visible = floats_of<LanePair>(bits_of(alpha) & kept);
-    colors[i / 2] = {visible * splats.red, visible * splats.green, visible * splats.blue, visible};
-    covered_of_warp |= covered << (4 * i);
-    live_of_warp |= sign_mask(kept) << (4 * i);
+    colors.pairs[i / 2] = {visible * splats.red, visible * splats.green, visible * splats.blue, visible};
+    colors.covered |= covered << (4 * i);
+    colors.live |= sign_mask(kept) << (4 * i);
   }
+}
 
+void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp& out) {
+  out.tile = warp.tile;
+  out.sequence = warp.sequence;
+  out.tile_sequence = warp.tile_sequence;
+  out.mark = Mark::none;
+  const unsigned last = warp.count - 1U;
+  const std::uint32_t covered_of_warp = colors.covered;
+  const std::uint32_t live_of_warp = colors.live;
   unsigned count = 0;
   std::uint32_t merged = 0;  // a bit a thread of a back quad that its front takes up, where both are live
   std::uint32_t merged_quads = 0;
@@ -178,7 +201,7 @@ void SplatShader::shade_warp(const Warp& warp, ShadedWarp& out) {
     count += live != 0;
   };
   for (unsigned i = 0; i < warp.count; i += 2) {
-    const auto& [red, green, blue, alpha] = colors[i / 2];
+    const auto& [red, green, blue, alpha] = colors.pairs[i / 2];
     const QuadColor front{first_of(red), first_of(green), first_of(blue), first_of(alpha)};
     const QuadColor back{second_of(red), second_of(green), second_of(blue), second_of(alpha)};
     const auto live_front = static_cast<LaneMask>(live_of_warp >> (4 * i) & all_lanes);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "attribute_traffic.h"
+#include "mesh_shader.h"
 
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/pipeline/units.h>
@@ -169,8 +170,19 @@ class SplatShader : public SmBehaviour {
   void set_up(Attributes& attributes, const Quad& quad);
   using AttributeTable = std::array<Attributes, 32>;
   const Attributes& attributes_of(AttributeTable& table, const Quad& quad);
+  /// The colours of a warp's quads, two at a time, before merging.
+  struct WarpColors {
+    struct {
+      LanePair red, green, blue, alpha;
+    } pairs[quads_per_warp / 2];
+    std::uint32_t covered = 0;  ///< threads, a bit each
+    std::uint32_t live = 0;     ///< of these, not pruned
+  };
   template <Exponential Kind>
-  void shade_warp(const Warp& warp, ShadedWarp& out);
+  void shade_splats(const Warp& warp, WarpColors& colors);
+  void shade_mesh(const Warp& warp, WarpColors& colors);
+  /// Merges, counts, and hands on what is live.
+  void put_out(const Warp& warp, const WarpColors& colors, ShadedWarp& out);
   /// Alpha at the samples of two quads.
   template <Exponential Kind>
   static LanePair alpha_at(LanePair x, LanePair y, const AttributePair& splats);
@@ -181,6 +193,7 @@ class SplatShader : public SmBehaviour {
   /// Of the splats last set up, by the low bits of their number; two tables, so that the two quads' are there at once.
   AttributeTable attributes_of_first_;
   AttributeTable attributes_of_second_;
+  MeshShader mesh_;
 };
 
 }  // namespace vrpipe

@@ -28,19 +28,22 @@ PrimitiveAssembly::PrimitiveAssembly(const Parameters& parameters, const RenderC
 
 unsigned PrimitiveAssembly::assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) {
   const DrawCall& call = context_.draw(draw);
-  const Splat& given = call.splat(splat);
-  if (!is_finite(given)) {
+  if (!is_finite(call, splat)) {
     ++dropped_not_finite;
     return 0;
   }
   // A splat at opacity 1/255 has no extent by design, and triangles of their own have no axes.
-  if (given.r > 0 && call.geometry->triangles.empty()) smallest_determinant.see(determinant(given));
+  if (call.geometry->triangles.empty() && !call.geometry->is_mesh()) {
+    const Splat& given = call.splat(splat);
+    if (given.r > 0) smallest_determinant.see(determinant(given));
+  }
   unsigned count = 0;
   for (unsigned triangle = 0; triangle < triangles_per_splat(*call.geometry); ++triangle) {
     PixelRect bounds;
     switch (cull_triangle(context_, draw, splat, triangle, bounds)) {
       case Culling::not_finite: ++dropped_not_finite; return 0;
       case Culling::zero_area: ++culled_zero_area; continue;
+      case Culling::facing: ++culled_facing; continue;
       case Culling::outside: ++culled_outside; continue;
       case Culling::none: break;
     }

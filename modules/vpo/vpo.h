@@ -32,6 +32,7 @@ class PrimitiveAssembly : public VpoBehaviour {
   Throughput timing() const override { return {triangles_per_cycle_, latency_cycles_}; }
 
   Counter culled_zero_area{*this, "culled_zero_area", "triangles", "without area after snapping"};
+  Counter culled_facing{*this, "culled_facing", "triangles", "that face the way their draw culls"};
   Counter culled_outside{*this, "culled_outside", "triangles", "that cover no sample of the viewport's pixels"};
   Counter dropped_not_finite{*this, "dropped_not_finite", "splats",
                              "with a NaN or infinite attribute, or a vertex that cannot be cut to the guard band"};

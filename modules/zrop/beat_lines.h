@@ -16,7 +16,7 @@ class BeatLines {
   BeatLines(const ZCache& cache, const DepthStencilSurface& surface)
       : surface_(surface),
         line_bytes_(cache.organization.line_bytes),
-        places_(sectors_of_quads(cache.organization, DepthStencilSurface::bytes_per_quad)) {}
+        places_(sectors_of_quads(cache.organization, DepthStencilSurface::bytes_per_quad(surface.format()))) {}
 
   /// Lines, in the order in which they are needed first.
   struct Needed {

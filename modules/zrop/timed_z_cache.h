@@ -63,6 +63,29 @@ class TimedZCache {
     return {times.at, std::max(times.at, times.there)};
   }
   void tested(unsigned quads, Cycle at) { queue_.take(quads, at); }
+  /// Quads of a beat have changed depth or stencil in the cycle of their test, a bit each; `beat` is that before the test.
+  void change(const QuadBeat& beat, std::uint32_t quads, Cycle at) {
+    changed_quads_.clear();
+    for (; quads != 0; quads &= quads - 1)
+      changed_quads_.push_back(beat.quads[static_cast<unsigned>(__builtin_ctz(quads))]);
+    lines_->find(beat.tile, changed_quads_.data(), static_cast<unsigned>(changed_quads_.size()), needed_);
+    for (unsigned i = 0; i < needed_.count; ++i) {
+      const BeatLines::Needed::Line& changed = needed_.lines[i];
+      LineAccess access;
+      access.line = cache_->find(changed.address);
+      if (access.line == SectoredCache::no_line) {
+        // It went when another line of the same beat came.
+        const unsigned sector_bytes = timing_.organization.sector_bytes;
+        for_each_sector_run(changed.sectors, sectors_of_a_line_, [&](unsigned first, unsigned count) {
+          access = cache_->access(changed.address + std::uint64_t{first} * sector_bytes, count * sector_bytes, true);
+          if (access.written_back != 0) port_.write_back(access, at);
+        });
+        owe(at);
+      }
+      cache_->make_dirty(access.line, changed.sectors);
+      kept_until_[access.line] = std::max(kept_until_[access.line], at);
+    }
+  }
 
   /// The cycle in which an update is applied that arrives in a cycle.
   Cycle update(const TerminationSignal& signal, Cycle arrived) {
@@ -123,10 +146,11 @@ class TimedZCache {
   std::optional<BeatLines> lines_;
   std::optional<SectoredCache> cache_;
   BeatLines::Needed needed_;
-  Cycle read_ = 0;                 ///< the last line looked up for a test
-  std::vector<Cycle> kept_until_;  ///< by line of the cache
-  std::vector<Cycle> there_;       ///< by sector
-  std::uint64_t owed_ = 0;         ///< sectors
+  std::vector<Quad> changed_quads_;  ///< of the beat tested last
+  Cycle read_ = 0;                   ///< the last line looked up for a test
+  std::vector<Cycle> kept_until_;    ///< by line of the cache
+  std::vector<Cycle> there_;         ///< by sector
+  std::uint64_t owed_ = 0;           ///< sectors
   Cycle owed_at_ = 0;
 };
 

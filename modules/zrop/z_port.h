@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "beat_lines.h"
 
@@ -16,7 +17,8 @@ namespace vrpipe {
 /// Beats and updates are looked up as they arrive, each in their order, which starts the fills that they need. What a
 /// beat needs is read into its queue in order, as soon as it is there, and then its line may go: so a line is kept no
 /// longer than the memory takes, whatever becomes of the tests, and updates come by when lines or miss registers are
-/// few. The queue's values follow updates. An update keeps its line until it is applied.
+/// few. The queue's values follow updates. An update keeps its line until it is applied. What a test changes is put back, in
+/// whole sectors; nothing is tested while that waits for a line.
 class ZPort {
  public:
   ZPort(PortOwner& owner, const ZCache& timing, unsigned quads_per_cycle, unsigned updates_per_cycle,
@@ -35,13 +37,14 @@ class ZPort {
     port_.make_cache(timing_.organization, statistics);
     lines_.emplace(timing_, surface);
   }
-  bool idle() const { return beats_.empty() && updates_.empty() && port_.has_written_back(); }
+  bool idle() const { return beats_.empty() && updates_.empty() && changed_.empty() && port_.has_written_back(); }
 
   /// Takes what has come, and looks up what is at the links; true if anything moved.
   bool advance(Cycle now, StreamIn<QuadBeat>& quads, StreamIn<TerminationBeat>& updates) {
     now_ = now;
     bool moved = port_.finish_fills(now);
     port_.write_back(Moved{owed_});
+    moved |= put_changed();
     moved |= take_updates(updates);
     moved |= take_beats(quads);
     moved |= read();
@@ -69,6 +72,19 @@ class ZPort {
     queued_quads_ -= beats_.front().beat.count;
     beats_.pop();
   }
+
+  /// Quads of the beat tested last have changed depth or stencil, a bit each; `beat` is that before the test.
+  void change(const QuadBeat& beat, std::uint32_t quads) {
+    changed_quads_.clear();
+    for (; quads != 0; quads &= quads - 1)
+      changed_quads_.push_back(beat.quads[static_cast<unsigned>(__builtin_ctz(quads))]);
+    BeatLines::Needed changed;
+    lines_->find(beat.tile, changed_quads_.data(), static_cast<unsigned>(changed_quads_.size()), changed);
+    for (unsigned i = 0; i < changed.count; ++i) changed_.push(changed.lines[i]);
+    put_changed();
+  }
+  /// Whether what was changed waits for a line.
+  bool holds_changed() const { return !changed_.empty(); }
 
   bool update_is_there() const {
     return !updates_.empty() && port_.awaited(updates_.front().line, updates_.front().sectors) == 0;
@@ -160,7 +176,7 @@ class ZPort {
     needed_.count = 0;
     at_ = 0;
     // All are of one state.
-    if (beat.count > 0 && context_.state(beat.quads[0].draw).early_termination) {
+    if (beat.count > 0 && context_.state(beat.quads[0].draw).reads_depth_stencil()) {
       lines_->find(beat.tile, beat.quads.data(), beat.count, needed_);
       begin_line(0);
     }
@@ -169,6 +185,19 @@ class ZPort {
   }
   void begin_line(unsigned at) {
     line_ = {needed_.lines[at].address, needed_.lines[at].sectors, SectoredCache::no_line, 0};
+  }
+
+  bool put_changed() {
+    bool any = false;
+    for (; !changed_.empty(); changed_.pop()) {
+      const BeatLines::Needed::Line& line = changed_.front();
+      const bool is_held = port_.cache().find(line.address) != SectoredCache::no_line;
+      if (!port_.put(line.address, line.sectors, Moved{owed_})) break;
+      // What went in the meantime is accessed anew.
+      if (!is_held) count_accesses(static_cast<unsigned>(__builtin_popcount(line.sectors)));
+      any = true;
+    }
+    return any;
   }
 
   /// Reads what has come into the queue.
@@ -210,7 +239,9 @@ class ZPort {
   unsigned signal_ = 0;
   CachePort::LookUp update_;
 
-  Ring<Beat> beats_;  ///< looked up, and not tested
+  Ring<BeatLines::Needed::Line> changed_;  ///< by tests, and not put back yet
+  std::vector<Quad> changed_quads_;        ///< of the beat tested last
+  Ring<Beat> beats_;                       ///< looked up, and not tested
   unsigned queued_quads_ = 0;
   Ring<Read> reads_;  ///< lines of these, that are not read yet
   std::uint64_t reads_asked_ = 0;

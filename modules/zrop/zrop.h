@@ -1,5 +1,7 @@
 #pragma once
 
+#include "depth_stencil_test.h"
+
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/pipeline/screen_tiling.h>
@@ -7,7 +9,9 @@
 
 namespace vrpipe {
 
-/// Depth-stencil ROP: the termination test and update on the stencil's most significant bit (paper 5.2).
+/// Depth-stencil ROP: the tests of depth and stencil, then the termination test, and the termination update on the stencil's
+/// most significant bit (paper 5.2). Depth and stencil are written whether or not a pixel has terminated: that only says that
+/// nothing of it can be seen any more.
 class DepthStencilRop : public ZropBehaviour {
  public:
   struct Parameters : ParameterSet {
@@ -66,7 +70,7 @@ class DepthStencilRop : public ZropBehaviour {
   /// Throws UserError for a z-cache that cannot be.
   DepthStencilRop(const Parameters& parameters, const RenderContext& context);
 
-  void test(QuadBeat& beat) override;
+  std::uint32_t test(QuadBeat& beat) override;
   void update(const TerminationSignal& signal) override;
   void pass(Mark mark) override;
   void follow(FunctionalRunAhead& run_ahead) override { run_ahead_ = &run_ahead; }
@@ -76,6 +80,11 @@ class DepthStencilRop : public ZropBehaviour {
                        "received after a clear of what they were for; they take time"};
 
  private:
+  /// Take failed samples and quads out of a beat.
+  std::uint32_t test_depth_stencil(QuadBeat& beat);
+  void test_termination(QuadBeat& beat, bool is_first);
+  /// Nothing shades them.
+  void end_unshaded(QuadBeat& beat);
   void mark(const TerminationSignal& signal) {
     std::uint8_t& bits = surface_->terminated(surface_->grid().place(signal.tile, signal.position));
     bits = static_cast<std::uint8_t>(bits | signal.pixels);
@@ -83,6 +92,7 @@ class DepthStencilRop : public ZropBehaviour {
 
   const RenderContext& context_;
   const TimingParameters timing_;
+  DepthStencilTest depth_stencil_;
   std::uint16_t epoch_ = 0;  ///< clears of termination so far
   FunctionalRunAhead* run_ahead_ = nullptr;
   std::vector<TerminationSignal> ahead_;  ///< of the bin under test

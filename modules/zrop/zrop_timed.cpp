@@ -114,7 +114,9 @@ class TimedZrop : public TimedUnit {
     CycleInterval left(never, 0);
     CycleInterval looked_up(never, 0);
     // All are of one state.
-    const bool needs_stencil = has_cache_ && total > 0 && context_.state(quads.front().draw).early_termination;
+    const DrawState* const state = total > 0 ? &context_.state(quads.front().draw) : nullptr;
+    const bool needs_stencil = has_cache_ && state != nullptr && state->reads_depth_stencil();
+    const bool may_change = needs_stencil && state->writes_depth_stencil();
     unsigned beats_left = 0;
     QuadBeat beat;
     beat.tile = item.tile;
@@ -131,7 +133,13 @@ class TimedZrop : public TimedUnit {
       const unsigned tested_quads = beat.count;
       port_free_at_ = at + (tested_quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       did(ZropWork::tests, tested_quads, at, port_free_at_);
-      behaviour_->test(beat);
+      QuadBeat before;
+      if (may_change) before = beat;
+      const std::uint32_t changed = behaviour_->test(beat);
+      if (may_change && changed != 0) {
+        z_.change(before, changed, at);
+        note_moves();
+      }
       if (beat.count < tested_quads) frame_lasts(at + timing_.latency_cycles);
       tested.first = std::min(tested.first, at);
       tested.last = at;

@@ -20,6 +20,7 @@ class ZropUnit : public Unit {
         in_(*this, "in_quads"),
         out_(*this, "out_quads"),
         in_terminations_(*this, "in_terminations"),
+        context_(context),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         z_(*this, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context),
@@ -86,7 +87,7 @@ class ZropUnit : public Unit {
 
   bool test(Cycle now) {
     bool moved = false;
-    while ((has_cache_ ? z_.beat_is_there() : in_.ready()) && out_.credits() > 0) {
+    while ((has_cache_ ? z_.beat_is_there() && !z_.holds_changed() : in_.ready()) && out_.credits() > 0) {
       const QuadBeat& next = has_cache_ ? z_.front() : in_.front();
       const unsigned width = std::max<unsigned>(next.count, 1);
       if (!limit_.allows(width, now)) break;
@@ -95,8 +96,12 @@ class ZropUnit : public Unit {
       tested_until_ = now + (width + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       did(ZropWork::tests, beat.count, now, tested_until_);
       const unsigned tested = beat.count;
+      // Of what may write, the quads that come in.
+      QuadBeat before;
+      if (has_cache_ && tested > 0 && context_.state(beat.quads[0].draw).writes_depth_stencil()) before = beat;
       if (beat.mark == Mark::none) {
-        behaviour_->test(beat);
+        const std::uint32_t changed = behaviour_->test(beat);
+        if (has_cache_ && changed != 0) z_.change(before, changed);
       } else {
         behaviour_->pass(beat.mark);
       }
@@ -144,6 +149,7 @@ class ZropUnit : public Unit {
   StreamIn<QuadBeat> in_;
   StreamOut<QuadBeat> out_;
   StreamIn<TerminationBeat> in_terminations_;
+  const RenderContext& context_;
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZropBehaviour::TimingParameters timing_;
   ZPort z_;

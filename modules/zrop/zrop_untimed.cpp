@@ -57,17 +57,34 @@ class UntimedZrop : public UntimedUnit {
       from += beat_.count;
       beat_.last_of_bin = from == incoming.quads;
       // All are of one state.
-      if (memory_.connected() && context_.state(beat_.quads[0].draw).early_termination) {
+      const DrawState& state = context_.state(beat_.quads[0].draw);
+      if (memory_.connected() && state.reads_depth_stencil()) {
         lines().find(beat_.tile, beat_.quads.data(), beat_.count, needed_);
         look_up(beat_.count);
       }
-      behaviour_->test(beat_);
+      QuadBeat before;
+      const bool may_change = memory_.connected() && state.writes_depth_stencil();
+      if (may_change) before = beat_;
+      const std::uint32_t changed = behaviour_->test(beat_);
+      if (may_change && changed != 0) change(before, changed);
       std::copy_n(beat_.quads.begin(), beat_.count, quads.begin() + item.quads);
       item.quads += beat_.count;
     }
     out_.send(item);
   }
 
+  /// Quads of a beat have changed depth or stencil, a bit each.
+  void change(const QuadBeat& beat, std::uint32_t quads) {
+    for (; quads != 0; quads &= quads - 1) {
+      const Quad& quad = beat.quads[static_cast<unsigned>(__builtin_ctz(quads))];
+      lines().find(beat.tile, &quad, 1, needed_);
+      const BeatLines::Needed::Line& changed = needed_.lines[0];
+      line_ = cache_->find(changed.address);
+      // It may have gone when another line of the same beat came.
+      if (line_ == SectoredCache::no_line) look_up(1);
+      cache_->make_dirty(line_, changed.sectors);
+    }
+  }
   const BeatLines& lines() {
     if (!lines_) {
       lines_.emplace(z_cache_, *behaviour_->surface());

@@ -8,6 +8,12 @@
 namespace vrpipe {
 namespace {
 
+Clear of_termination() {
+  Clear clear;
+  clear.termination = true;
+  return clear;
+}
+
 std::shared_ptr<const Draw> geometry_of(std::uint32_t splats, bool triangles = false) {
   auto draw = std::make_shared<Draw>(testing::draw_of(100, 40, std::vector<Splat>(splats)));
   if (triangles) draw->triangles.resize(splats);
@@ -92,7 +98,7 @@ TEST(DepthStencilSurface, AGpcClearsTheTerminationOfItsOwnTiles) {
   for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
     DepthStencilSurface surface(100, 40);
     for (std::size_t place = 0; place < surface.grid().quads(); ++place) surface.terminated(place) = 0xa;
-    surface.clear_termination({gpcs, gpc});
+    surface.clear(of_termination(), {gpcs, gpc});
     std::size_t cleared = 0;
     for (std::size_t place = 0; place < surface.grid().quads(); ++place) {
       const TileId tile = surface.grid().tile(place / positions_per_tile);
@@ -107,9 +113,39 @@ TEST(DepthStencilSurface, AGpcClearsTheTerminationOfItsOwnTiles) {
 TEST(DepthStencilSurface, AGpcAloneClearsAll) {
   DepthStencilSurface surface(100, 40);
   surface.terminated(0) = surface.terminated(surface.grid().quads() - 1) = all_lanes;
-  surface.clear_termination({1, 0});
+  surface.clear(of_termination(), {1, 0});
   EXPECT_EQ(surface.terminated(0), 0);
   EXPECT_EQ(surface.terminated(surface.grid().quads() - 1), 0);
+}
+
+TEST(DepthStencilSurface, AClearChangesWhatItNamesAndNothingElse) {
+  for (const DepthFormat format : {DepthFormat::d16, DepthFormat::d24, DepthFormat::d32f}) {
+    for (unsigned which = 0; which < 8; ++which) {
+      DepthStencilSurface surface(20, 20, 0, format);
+      EXPECT_EQ(surface.quad(7).depth[3], store_depth(format, 1)) << "at first";
+      EXPECT_EQ(surface.quad(7).stencil[3], 0) << "at first";
+      surface.quad(7) = {{1, 2, 3, 4}, {5, 6, 7, 8}};
+      surface.terminated(7) = 0b0101;
+      Clear clear;
+      clear.termination = (which & 1U) != 0;
+      clear.depth = (which & 2U) != 0;
+      clear.stencil = (which & 4U) != 0;
+      clear.depth_value = 0.25F;
+      clear.stencil_value = 77;
+      surface.clear(clear, {});
+      EXPECT_EQ(surface.terminated(7), clear.termination ? 0 : 0b0101);
+      EXPECT_EQ(surface.quad(7).depth[1], clear.depth ? store_depth(format, 0.25) : 2);
+      EXPECT_EQ(surface.quad(7).stencil[2], clear.stencil ? 77 : 7);
+    }
+  }
+}
+
+TEST(DepthStencilSurface, AQuadIsHalfASectorOrAWholeOne) {
+  EXPECT_EQ(DepthStencilSurface::bytes_per_quad(DepthFormat::d16), 16U);
+  EXPECT_EQ(DepthStencilSurface::bytes_per_quad(DepthFormat::d24), 16U);
+  EXPECT_EQ(DepthStencilSurface::bytes_per_quad(DepthFormat::d32f), 32U);
+  EXPECT_EQ(DepthStencilSurface::size_bytes(100, 40, DepthFormat::d24), 7U * 3 * 1024);
+  EXPECT_EQ(DepthStencilSurface::size_bytes(100, 40, DepthFormat::d32f), 7U * 3 * 2048);
 }
 
 TEST(ColorSurface, ClearsOneScreenTile) {

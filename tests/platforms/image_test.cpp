@@ -73,7 +73,8 @@ TEST_P(RandomScene, WhatGoesInComesOutAndStatesSumToTheCycles) {
       const RunResult result =
           run(request_of(variant.name, Fidelity::cycle, [&](RunRequest& r) { r.termination = termination; }), draw);
       const Counts& c = result.counts;
-      EXPECT_EQ(c.quads_rasterized, c.quads_depth_stencil_failed + c.quads_terminated + c.quads_shaded);
+      EXPECT_EQ(c.quads_rasterized,
+                c.quads_depth_stencil_failed + c.quads_terminated + c.quads_unshaded + c.quads_shaded);
       EXPECT_EQ(c.fragments_rasterized, c.fragments_depth_stencil_failed + c.fragments_terminated + c.fragments_shaded);
       EXPECT_EQ(c.quads_shaded,
                 c.quads_pruned + c.quads_merged + c.quads_dropped_late + c.quads_late_failed + c.quads_blended);

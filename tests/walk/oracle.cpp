@@ -79,10 +79,13 @@ std::vector<Finding> broken_draws(const RunResult& result) {
       findings.push_back(
           {"conservation in a draw", fmt::format("{}, {}: {} went in, {} came out", draw.name, what, in, out)});
     };
-    conserved("quads rasterized", n["quads_rasterized"], n["quads_terminated"] + n["quads_shaded"]);
+    conserved("quads rasterized", n["quads_rasterized"],
+              n["quads_depth_stencil_failed"] + n["quads_terminated"] + n["quads_unshaded"] + n["quads_shaded"]);
     conserved("quads shaded", n["quads_shaded"],
               n["quads_pruned"] + n["quads_merged"] + n["quads_dropped_late"] + n["quads_blended"]);
-    conserved("fragments rasterized", n["fragments_rasterized"], n["fragments_terminated"] + n["fragments_shaded"]);
+    conserved("fragments rasterized", n["fragments_rasterized"],
+              n["fragments_depth_stencil_failed"] + n["fragments_terminated"] + n["fragments_unshaded"] +
+                  n["fragments_shaded"]);
     // A merged quad's fragments are blended for its front's draw.
     if (result.request.variant.quad_merging) continue;
     conserved("fragments shaded", n["fragments_shaded"],
@@ -268,7 +271,8 @@ std::vector<Finding> broken_rules(const RunResult& result) {
   const auto conserved = [&](const char* what, std::uint64_t in, std::uint64_t out) {
     if (in != out) findings.push_back({"conservation", fmt::format("{}: {} went in, {} came out", what, in, out)});
   };
-  conserved("quads rasterized", n.quads_rasterized, n.quads_depth_stencil_failed + n.quads_terminated + n.quads_shaded);
+  conserved("quads rasterized", n.quads_rasterized,
+            n.quads_depth_stencil_failed + n.quads_terminated + n.quads_unshaded + n.quads_shaded);
   conserved("fragments rasterized", n.fragments_rasterized,
             n.fragments_depth_stencil_failed + n.fragments_terminated + n.fragments_shaded);
   conserved("quads shaded", n.quads_shaded,

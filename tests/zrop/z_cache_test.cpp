@@ -443,10 +443,10 @@ TEST_F(ZCacheTest, WhatMakesNoCacheIsRefusedWhenTheUnitIsMade) {
   ZCache z_cache;
   z_cache.organization.line_bytes = 2048;
   z_cache.organization.sector_bytes = 64;
-  EXPECT_THROW(z_cache.check(), UserError) << "of two screen tiles";
+  EXPECT_THROW(z_cache.check(DepthFormat::d24), UserError) << "of two screen tiles";
   z_cache.organization.line_bytes = 128;
   z_cache.organization.sector_bytes = 8;
-  EXPECT_THROW(z_cache.check(), UserError) << "of half a quad";
+  EXPECT_THROW(z_cache.check(DepthFormat::d24), UserError) << "of half a quad";
 }
 
 /// At lt and at a bin waits for its fills as its beats do at cycle.

@@ -39,10 +39,10 @@ void visit_all(std::string names, const Visit& visit, Members&... members) {
 }
 
 VRPIPE_MEMBERS(Counts, primitives, quads_rasterized, fragments_rasterized, quads_depth_stencil_failed,
-               fragments_depth_stencil_failed, quads_terminated, fragments_terminated, quads_shaded, fragments_shaded,
-               quads_pruned, fragments_pruned, quads_merged, fragments_merged, quads_dropped_late,
-               fragments_dropped_late, quads_late_failed, fragments_late_failed, quads_blended, fragments_blended,
-               warps, tgc_flushes, tc_flushes, termination_updates)
+               fragments_depth_stencil_failed, quads_terminated, fragments_terminated, quads_unshaded,
+               fragments_unshaded, quads_shaded, fragments_shaded, quads_pruned, fragments_pruned, quads_merged,
+               fragments_merged, quads_dropped_late, fragments_dropped_late, quads_late_failed, fragments_late_failed,
+               quads_blended, fragments_blended, warps, tgc_flushes, tc_flushes, termination_updates)
 VRPIPE_MEMBERS(UnitReport, name, cycles, occupancy, parts)
 VRPIPE_MEMBERS(Bottleneck, unit, occupancy, parts)
 VRPIPE_MEMBERS(HistogramBucket, from, to, count)

@@ -85,6 +85,7 @@ struct Fates {
   std::uint64_t Counts::*rasterized;
   std::uint64_t Counts::*depth_stencil_failed;
   std::uint64_t Counts::*terminated;
+  std::uint64_t Counts::*unshaded;
   std::uint64_t Counts::*shaded;
   std::uint64_t Counts::*pruned;
   std::uint64_t Counts::*merged;
@@ -93,16 +94,16 @@ struct Fates {
   std::uint64_t Counts::*blended;
 };
 
-constexpr Fates quad_fates{&Counts::quads_rasterized,   &Counts::quads_depth_stencil_failed,
-                           &Counts::quads_terminated,   &Counts::quads_shaded,
-                           &Counts::quads_pruned,       &Counts::quads_merged,
-                           &Counts::quads_dropped_late, &Counts::quads_late_failed,
-                           &Counts::quads_blended};
-constexpr Fates fragment_fates{&Counts::fragments_rasterized,   &Counts::fragments_depth_stencil_failed,
-                               &Counts::fragments_terminated,   &Counts::fragments_shaded,
-                               &Counts::fragments_pruned,       &Counts::fragments_merged,
-                               &Counts::fragments_dropped_late, &Counts::fragments_late_failed,
-                               &Counts::fragments_blended};
+constexpr Fates quad_fates{&Counts::quads_rasterized,  &Counts::quads_depth_stencil_failed,
+                           &Counts::quads_terminated,  &Counts::quads_unshaded,
+                           &Counts::quads_shaded,      &Counts::quads_pruned,
+                           &Counts::quads_merged,      &Counts::quads_dropped_late,
+                           &Counts::quads_late_failed, &Counts::quads_blended};
+constexpr Fates fragment_fates{&Counts::fragments_rasterized,  &Counts::fragments_depth_stencil_failed,
+                               &Counts::fragments_terminated,  &Counts::fragments_unshaded,
+                               &Counts::fragments_shaded,      &Counts::fragments_pruned,
+                               &Counts::fragments_merged,      &Counts::fragments_dropped_late,
+                               &Counts::fragments_late_failed, &Counts::fragments_blended};
 
 void add_fates(RunTable& table, const std::string& title, const Fates& fates, const std::vector<RunResult>& runs) {
   std::uint64_t largest = 0;
@@ -112,6 +113,7 @@ void add_fates(RunTable& table, const std::string& title, const Fates& fates, co
   table.counts("rasterized", fates.rasterized, scale);
   table.counts("depth/stencil failed", fates.depth_stencil_failed, scale, false);
   table.counts("terminated", fates.terminated, scale);
+  table.counts("not shaded (depth alone)", fates.unshaded, scale, false);
   table.counts("shaded", fates.shaded, scale);
   table.counts("pruned (alpha < 1/255)", fates.pruned, scale);
   table.counts("merged away", fates.merged, scale);

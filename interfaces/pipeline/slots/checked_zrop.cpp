@@ -10,19 +10,20 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
  public:
   using CheckedSlot::CheckedSlot;
 
-  void test(QuadBeat& beat) override {
+  std::uint32_t test(QuadBeat& beat) override {
     const TileId tile = beat.tile;
     const unsigned count = beat.count;
     const bool last_of_bin = beat.last_of_bin;
     const bool tests =
-        count > 0 && !frame().draws().empty() && frame().draw_call(beat.quads[0].draw).state.early_termination;
+        count > 0 && !frame().draws().empty() && frame().draw_call(beat.quads[0].draw).state.reads_depth_stencil();
     for (unsigned i = 0; i < count; ++i) {
       const Quad& quad = beat.quads[i];
       if (tests) tested_.add(quad.draw, 1);
       lost_quads_.add(quad.draw, 1);
       lost_fragments_.add(quad.draw, popcount(quad.coverage));
     }
-    ask("test", [&] { checked_->test(beat); });
+    const std::uint32_t changed = ask("test", [&] { return checked_->test(beat); });
+    if (changed >> count != 0) fault("test", "quads {:#x} of {} have changed something", changed, count);
     if (beat.count > count) fault("test", "{} quads of {} in {} passed", beat.count, count, words_of(tile));
     if (beat.tile != tile || beat.last_of_bin != last_of_bin || beat.mark != Mark::none) {
       fault("test", "a beat of {} with a tile or marks that are not its own", words_of(tile));
@@ -33,6 +34,7 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
       lost_quads_.take_back(quad.draw, 1);
       lost_fragments_.take_back(quad.draw, popcount(quad.coverage));
     }
+    return changed;
   }
   void attach(DepthStencilSurface& surface) override {
     ZropBehaviour::attach(surface);
@@ -57,18 +59,19 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
     check_rate("input_quads", timing.z_cache.input_quads);
     check_rate("input_updates", timing.z_cache.input_updates);
     check_rate("sectors_per_cycle", timing.z_cache.sectors_per_cycle);
-    timing.z_cache.check();
+    timing.z_cache.check(frame().depth_format());
     return timing;
   }
   void check_timing() const override { timing(); }
   void check_counters() const override {
     check_by_draw("quads_tested", {&checked_->quads_tested}, tested_, "quads came in");
-    check_by_draw("quads_terminated + quads_depth_stencil_failed",
-                  {&checked_->quads_terminated, &checked_->quads_depth_stencil_failed}, lost_quads_,
-                  "quads did not come out");
-    check_by_draw("fragments_terminated + fragments_depth_stencil_failed",
-                  {&checked_->fragments_terminated, &checked_->fragments_depth_stencil_failed}, lost_fragments_,
-                  "fragments did not come out");
+    check_by_draw("quads_terminated + quads_depth_stencil_failed + quads_unshaded",
+                  {&checked_->quads_terminated, &checked_->quads_depth_stencil_failed, &checked_->quads_unshaded},
+                  lost_quads_, "quads did not come out");
+    check_by_draw("fragments_terminated + fragments_depth_stencil_failed + fragments_unshaded",
+                  {&checked_->fragments_terminated, &checked_->fragments_depth_stencil_failed,
+                   &checked_->fragments_unshaded},
+                  lost_fragments_, "fragments did not come out");
     check_counter("termination_updates", checked_->termination_updates.value(), updates_, "signals came in");
   }
 

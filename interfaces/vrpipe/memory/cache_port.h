@@ -74,6 +74,22 @@ class CachePort {
     cache_->looked_up(wanted.line, wanted.sectors);
     return true;
   }
+  /// Puts whole sectors of a line in, which are dirty then; what the cache lacks of them is not read. False while it has to
+  /// wait, as `look_up`.
+  template <class Moved>
+  bool put(std::uint64_t address, std::uint32_t sectors, Moved&& moved) {
+    if (!write_back(moved)) return false;
+    LookUp whole{address, sectors, cache_->find(address), 0};
+    if (whole.line == SectoredCache::no_line) {
+      if (!take_line(whole)) return false;
+      cache_->unpin(whole.line);
+    }
+    cache_->make_dirty(whole.line, sectors);
+    for (std::uint32_t missing = sectors & cache_->absent(whole.line); missing != 0; missing &= missing - 1) {
+      cache_->write(whole.line, static_cast<unsigned>(__builtin_ctz(missing)) << sector_shift_, 1U << sector_shift_);
+    }
+    return true;
+  }
   /// Of what a look-up needs, what is still on its way.
   std::uint32_t awaited(SectoredCache::Line line, std::uint32_t sectors) const {
     return cache_->filling(line) & sectors;

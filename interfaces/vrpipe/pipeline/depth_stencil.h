@@ -5,14 +5,15 @@
 
 namespace vrpipe {
 
-/// How a tested value compares with a stored one (OpenGL 4.6, 17.3.5 and 17.3.6): LESS passes if it is less than that.
-enum class Compare : std::uint8_t { never, less, equal, less_equal, greater, not_equal, greater_equal, always };
+/// How a tested value compares with a stored one (OpenGL 4.6, 17.3.5 and 17.3.6): LESS passes if it is less than that. NEVER is
+/// `none` here.
+enum class Compare : std::uint8_t { none, less, equal, less_equal, greater, not_equal, greater_equal, always };
 inline constexpr unsigned compares = 8;
 
 template <class Value>
 constexpr bool passes(Compare compare, Value tested, Value stored) {
   switch (compare) {
-    case Compare::never: return false;
+    case Compare::none: return false;
     case Compare::less: return tested < stored;
     case Compare::equal: return tested == stored;
     case Compare::less_equal: return tested <= stored;
@@ -78,7 +79,7 @@ struct DepthState {
   bool test = false;  ///< otherwise all pass, and nothing is written
   Compare compare = Compare::less;
   bool write = true;  ///< of what passes
-  bool writes() const { return test && write && compare != Compare::never; }
+  bool writes() const { return test && write && compare != Compare::none; }
 };
 bool operator==(const DepthState& a, const DepthState& b);
 

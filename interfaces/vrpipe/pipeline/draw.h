@@ -56,6 +56,12 @@ struct Draw {
   std::size_t size() const { return is_mesh() ? mesh.size() : splats.size(); }  ///< splats, or triangles of a mesh
 };
 
+/// What vertex fetch reads for one of them.
+inline std::uint64_t vertex_bytes_of_each(const Draw& draw) {
+  return draw.is_mesh() ? sizeof(MeshTriangle) : sizeof(Splat);
+}
+inline std::uint64_t vertex_bytes(const Draw& draw) { return draw.size() * vertex_bytes_of_each(draw); }
+
 /// Gaussians that preprocessing dropped, by reason. A dropped Gaussian never reaches the pipeline.
 struct RejectedGaussians {
   std::uint64_t not_finite = 0;       ///< a value that preprocess() cannot use; see there

@@ -45,6 +45,11 @@ struct DrawState {
   CullMode cull = CullMode::none;
   FragmentShader shader = FragmentShader::splat;
   Light light;
+
+  bool tests_depth_stencil() const { return depth.test || stencil.test; }
+  bool writes_depth_stencil() const { return depth.writes() || stencil.writes(); }
+  /// Whether ZROP reads the depth-stencil target for it.
+  bool reads_depth_stencil() const { return early_termination || tests_depth_stencil(); }
 };
 bool operator==(const DrawState& a, const DrawState& b);
 inline bool operator!=(const DrawState& a, const DrawState& b) { return !(a == b); }

@@ -12,13 +12,17 @@
 
 namespace vrpipe {
 
-/// What is set to 0 between draws, for the whole framebuffer.
+/// What is cleared between draws, for the whole framebuffer.
 struct Clear {
-  bool color = false;
-  bool termination = false;  ///< the termination bits of the stencil: every pixel is open again
+  bool color = false;        ///< to 0
+  bool termination = false;  ///< the termination bits of the stencil, to 0: every pixel is open again
+  bool depth = false;
+  bool stencil = false;  ///< all bits but that of termination
+  float depth_value = 1;
+  std::uint8_t stencil_value = 0;
 };
 
-/// Splats drawn with one state.
+/// Splats, or triangles of a mesh, drawn with one state.
 struct DrawCall {
   std::string name;  ///< for reports
   DrawState state;
@@ -34,9 +38,12 @@ struct DrawCall {
   const ScreenTriangle* triangle(std::uint32_t number) const {
     return geometry->triangles.empty() ? nullptr : &geometry->triangles[first + (number - base)];
   }
+  /// Of a mesh.
+  const MeshTriangle& mesh_triangle(std::uint32_t number) const { return geometry->mesh[first + (number - base)]; }
 };
 
-/// What an application has drawn into one framebuffer: clears and draws, in order. The framebuffer is cleared at first.
+/// What an application has drawn into one framebuffer: clears and draws, in order. The framebuffer is cleared at first: to 0,
+/// its depth to 1.
 ///
 /// Draws overlap in the pipeline. Those that follow one another with equal state share bins, warps and merging, as if
 /// they were one; before a draw of another state, and before a clear, TGC and TC hand on what they hold.
@@ -49,13 +56,16 @@ class Frame {
 
   std::uint32_t width() const { return width_; }
   std::uint32_t height() const { return height_; }
+  /// Of its depth target.
+  DepthFormat depth_format() const { return depth_format_; }
+  void set_depth_format(DepthFormat format) { depth_format_ = format; }
 
   /// Splats `first` to `first` + `splats` - 1 of a geometry, all of it by default. Throws UserError for one of another
-  /// size than the frame's, splats that it does not have, triangles that are not as many as its splats, and more than 32767
-  /// draws, 65534 commands or 2^31 splats.
+  /// size than the frame's, splats that it does not have, triangles that are not as many as its splats, a mesh that has splats,
+  /// a shader for what it is not, a stencil reference beyond 127, and more than 32767 draws, 65534 commands or 2^31 splats.
   void draw(std::shared_ptr<const Draw> geometry, const DrawState& state, std::string name = {},
             std::uint32_t first = 0, std::uint32_t splats = ~0U);
-  /// Throws UserError for more than 65534 commands.
+  /// Throws UserError for more than 65534 commands, a depth outside [0, 1] and a stencil value beyond 127.
   void clear(Clear clear);
 
   /// A clear or a draw.
@@ -71,8 +81,12 @@ class Frame {
   /// Changes the state of every draw.
   void change_states(const std::function<void(DrawState&)>& change);
   std::uint32_t splats() const { return splats_; }  ///< of all draws
-  /// Whether any draw terminates early: then all bins pass through ZROP, so that none overtakes another.
+  /// Whether any draw terminates early.
   bool terminates_early() const;
+  /// Whether any draw tests depth or stencil: then the depth target has values.
+  bool tests_depth_stencil() const;
+  /// Whether ZROP does anything for any draw: then all bins pass through it, so that none overtakes another.
+  bool needs_zrop() const;
 
   /// The mark before a command.
   static Mark mark_of(std::size_t command) { return static_cast<Mark>(command + 1); }
@@ -84,6 +98,7 @@ class Frame {
 
   std::uint32_t width_;
   std::uint32_t height_;
+  DepthFormat depth_format_ = DepthFormat::d24;
   std::uint32_t splats_ = 0;
   std::uint16_t epoch_ = 0;
   std::vector<Command> commands_;

@@ -24,40 +24,51 @@ inline constexpr std::uint32_t attribute_bytes_per_splat = 704;
 struct AddressMap {
   MemoryRegion color;
   MemoryRegion depth_stencil;
-  MemoryRegion vertices;    ///< what vertex fetch reads: 48 bytes a splat of each geometry, as in a `.spl` file
+  MemoryRegion vertices;  ///< what vertex fetch reads: 48 bytes a splat, as in a `.spl` file, 120 a triangle of a mesh
   MemoryRegion primitives;  ///< explicit triangles: 24 bytes each
   MemoryRegion attributes;  ///< what vertex shading writes and fragment shading reads: 704 bytes a splat of each draw
 };
 AddressMap address_map(const Frame& frame, ColorFormat format);
 
-/// A depth-stencil target of 24 bits depth and 8 bits stencil, block-linear as a ColorSurface is: two quads (4x2 pixels) are
-/// one 32-byte sector, eight (8x4 pixels) are one 128-byte line, and a screen tile is 1 KiB. So far it holds of the stencil
-/// the most significant bits, which early termination uses (paper 5.2).
+/// Depth and stencil of a quad's four pixels.
+struct DepthStencilQuad {
+  std::array<std::uint32_t, 4> depth;   ///< as store_depth has it
+  std::array<std::uint8_t, 4> stencil;  ///< without the termination bit
+};
+
+/// A depth-stencil target, block-linear as a ColorSurface is: of 4 bytes a pixel two quads (4x2 pixels) are one 32-byte
+/// sector, eight (8x4 pixels) are one 128-byte line, and a screen tile is 1 KiB; D32F has twice as many bytes. The most
+/// significant bits of the stencil are early termination's (paper 5.2), and kept apart.
 class DepthStencilSurface {
  public:
-  static constexpr std::uint32_t bytes_per_quad = 4 * 4;
-  static constexpr std::uint32_t bytes_per_tile = positions_per_tile * bytes_per_quad;
+  static constexpr std::uint32_t bytes_per_quad(DepthFormat format) { return 4 * bytes_per_pixel(format); }
 
-  /// Cleared. width and height in pixels; `address` is that of its first byte in the modelled memory, a multiple of a tile's
-  /// bytes.
-  DepthStencilSurface(std::uint32_t width, std::uint32_t height, std::uint64_t address = 0);
+  /// Cleared: depth 1, stencil 0. width and height in pixels; `address` is that of its first byte in the modelled memory, a
+  /// multiple of a tile's bytes. Where nothing is tested but termination, depth and stencil need not be stored.
+  DepthStencilSurface(std::uint32_t width, std::uint32_t height, std::uint64_t address = 0,
+                      DepthFormat format = DepthFormat::d24, bool stores_depth_stencil = true);
+  DepthFormat format() const { return format_; }
 
   const ScreenTiling& grid() const { return grid_; }
   /// The termination bits of a quad's four pixels, at a place of the grid.
   std::uint8_t& terminated(std::size_t place) { return terminated_[place]; }
   std::uint8_t terminated(std::size_t place) const { return terminated_[place]; }
+  DepthStencilQuad& quad(std::size_t place) { return quads_[place]; }
+  const DepthStencilQuad& quad(std::size_t place) const { return quads_[place]; }
   /// In the screen tiles of a GPC.
-  void clear_termination(const Placement& placement);
+  void clear(const Clear& clear, const Placement& placement);
   /// Byte address of a quad in the modelled memory. Tiles, and quads in them, are naturally aligned.
-  std::uint64_t address(std::size_t place) const { return address_ + block_linear(place) * bytes_per_quad; }
+  std::uint64_t address(std::size_t place) const { return address_ + block_linear(place) * bytes_per_quad(format_); }
   std::uint64_t address(TileId tile, unsigned position) const { return address(grid_.place(tile, position)); }
   /// Of whole screen tiles.
-  static std::uint64_t size_bytes(std::uint32_t width, std::uint32_t height);
+  static std::uint64_t size_bytes(std::uint32_t width, std::uint32_t height, DepthFormat format = DepthFormat::d24);
 
  private:
   ScreenTiling grid_;
   std::uint64_t address_;
+  DepthFormat format_;
   std::vector<std::uint8_t> terminated_;
+  std::vector<DepthStencilQuad> quads_;  ///< or none
 };
 
 /// What a frame is drawn into.

@@ -103,6 +103,7 @@ struct Counts {
   std::uint64_t quads_rasterized = 0, fragments_rasterized = 0;
   std::uint64_t quads_depth_stencil_failed = 0, fragments_depth_stencil_failed = 0;
   std::uint64_t quads_terminated = 0, fragments_terminated = 0;
+  std::uint64_t quads_unshaded = 0, fragments_unshaded = 0;  ///< passed in draws that shade nothing
   std::uint64_t quads_shaded = 0, fragments_shaded = 0;
   std::uint64_t quads_pruned = 0, fragments_pruned = 0;
   std::uint64_t quads_merged = 0, fragments_merged = 0;

@@ -29,8 +29,9 @@ struct ZCache {
   std::uint32_t input_quads = 4096;       ///< queue between look-up and test
   std::uint32_t input_updates = 64;       ///< the same of updates, signals
   std::uint32_t sectors_per_cycle = 16;   ///< filled or written back in a cycle in which nothing is tested or updated
-  /// Throws UserError for one that cannot be: CacheOrganization::check, a sector is 16 bytes or more, a line 1 KiB at most.
-  void check() const;
+  /// Throws UserError for one that cannot be: CacheOrganization::check; a sector holds a quad of the target, a line is of one
+  /// screen tile.
+  void check(DepthFormat format) const;
 };
 
 /// Slot `zrop`: depth and stencil test, termination test and update.
@@ -40,8 +41,9 @@ class ZropBehaviour : public Behaviour {
   virtual void attach(DepthStencilSurface& surface) { surface_ = &surface; }
   const DepthStencilSurface* surface() const { return surface_; }
   /// Removes dead samples, and quads without a live one, from the beat; its tile and `last_of_bin` stay. Of its quads all
-  /// are of one state; they may be of several draws.
-  virtual void test(QuadBeat& beat) = 0;
+  /// are of one state; they may be of several draws. Where nothing is shaded (FragmentShader::none) all are removed.
+  /// Returns which quads of the incoming beat have changed depth or stencil, a bit each.
+  virtual std::uint32_t test(QuadBeat& beat) = 0;
   /// Sets the termination bit (stencil MSB) of the signalled pixels, unless they have been cleared since: then the
   /// signal's epoch has passed.
   virtual void update(const TerminationSignal& signal) = 0;
@@ -57,7 +59,7 @@ class ZropBehaviour : public Behaviour {
   };
   virtual TimingParameters timing() const = 0;
 
-  DrawCounter quads_tested{*this, "quads_tested", "quads", "that entered the termination test"};
+  DrawCounter quads_tested{*this, "quads_tested", "quads", "that entered a test: of depth, stencil or termination"};
   DrawCounter quads_depth_stencil_failed{*this, "quads_depth_stencil_failed", "quads",
                                          "that lost their last fragment to the depth or stencil test"};
   DrawCounter fragments_depth_stencil_failed{*this, "fragments_depth_stencil_failed", "fragments",
@@ -65,6 +67,9 @@ class ZropBehaviour : public Behaviour {
   DrawCounter quads_terminated{*this, "quads_terminated", "quads",
                                "that lost their last fragment to the termination test"};
   DrawCounter fragments_terminated{*this, "fragments_terminated", "fragments", "that failed the termination test"};
+  DrawCounter quads_unshaded{*this, "quads_unshaded", "quads",
+                             "that passed in a draw that shades nothing: they end here"};
+  DrawCounter fragments_unshaded{*this, "fragments_unshaded", "fragments", "that passed in such a draw"};
   Counter termination_updates{*this, "termination_updates", "signals", "received from CROP, one for a quad's pixels"};
 
  protected:

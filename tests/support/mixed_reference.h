@@ -1,0 +1,34 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <vrpipe/pipeline/render_context.h>
+
+namespace vrpipe::testing {
+
+/// Whether a value passes, from a table of the OpenGL specification: by whether it is less, equal or greater.
+bool passes_by_table(Compare compare, double tested, double stored);
+/// What a stencil operation makes of a value of 7 bits, from the same specification.
+unsigned stencil_by_table(StencilOperation operation, unsigned stored, unsigned reference);
+
+/// What became of a draw's fragments, where no pixel terminates.
+struct MixedCounts {
+  std::uint64_t rasterized = 0, failed = 0, unshaded = 0, pruned = 0, blended = 0;
+};
+
+/// A frame as order alone makes it: sample by sample, without tiles, quads, queues, merging or termination. Coverage and depth
+/// of triangles are exact but for one rounding, all else is in double. The bound is that of render_reference().
+struct MixedReference {
+  std::uint32_t width = 0, height = 0;
+  std::vector<std::array<double, 4>> rgba;   ///< row by row, premultiplied
+  std::vector<std::array<double, 2>> bound;  ///< of a colour channel, of alpha
+  std::vector<std::uint32_t> depth;          ///< as stored
+  std::vector<unsigned> stencil;
+  std::vector<MixedCounts> of_draw;
+  std::uint64_t near_prune_edge = 0;  ///< fragments whose fate rounding may decide
+};
+MixedReference render_mixed(const RenderContext& context);
+
+}  // namespace vrpipe::testing
