@@ -225,7 +225,9 @@ LoadedScene preprocess_scene(const OpenedScene& scene, const PreprocessOptions& 
     loaded.rejected_triangles = scene.rejected_triangles;
     for (const auto& mesh : scene.meshes) {
       loaded.meshes.push_back(project_mesh(*mesh, scene.viewpoint.camera, loaded.rejected_triangles));
+      loaded.summary.triangles += loaded.meshes.back().mesh.size();
     }
+    loaded.summary.triangles_rejected = loaded.rejected_triangles.total();
     loaded.viewpoint = scene.viewpoint;
     loaded.preprocessed_here = true;
   }

@@ -40,14 +40,26 @@ DrawState draw_state_from(const StateParameters& parameters) {
 
 }  // namespace
 
-DrawState draw_state_of(const RunRequest& request, const std::vector<Setting>& own) {
-  StateParameters parameters;
+namespace {
+void set_state(StateParameters& parameters, const RunRequest& request, const std::vector<Setting>& own) {
   for (const auto* settings : {&request.platform->settings, &request.variant.settings, &request.settings, &own}) {
     for (const Setting& setting : *settings) {
       if (setting.unit == "state") parameters.set(setting.unit, setting.parameter, setting.value);
     }
   }
+}
+}  // namespace
+
+DrawState draw_state_of(const RunRequest& request, const std::vector<Setting>& own) {
+  StateParameters parameters;
+  set_state(parameters, request, own);
   return draw_state_from(parameters);
+}
+
+DepthFormat depth_format_of(const RunRequest& request) {
+  StateParameters parameters;
+  set_state(parameters, request, {});
+  return static_cast<DepthFormat>(static_cast<unsigned>(parameters.depth_format));
 }
 
 Configuration::Configuration(const RunRequest& request, const Frame& frame)

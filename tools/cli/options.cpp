@@ -98,6 +98,10 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              "an INRIA .ply of trained Gaussians, a .spl draw list, or a built-in scene\n"
              "(default: builtin:object; `vrpipe scenes` lists them)",
              scene_group);
+  add_option(app, "--mesh", meshes_, "FILE",
+             "an opaque triangle mesh that is drawn with the scene: .obj, .ply, .gltf or\n"
+             ".glb, in the world of its Gaussians; can be repeated (docs/meshes.md)",
+             scene_group);
   add_option(app, "--size", size_, "WxH",
              "image size, pixels, each side 1 to 16384 (default: the scene's or the\n"
              "camera's own, 1280x720 for a .ply without a camera)",
@@ -189,6 +193,7 @@ SceneRequest SimulationArguments::scene_request() const {
   SceneRequest request;
   request.scene = single(scene_, "--scene").value_or("");
   if (const auto text = single(size_, "--size")) request.size = parse_size(*text, "--size");
+  request.meshes = meshes_;
   request.camera = single(camera_, "--camera");
   if (const auto text = single(eye_, "--eye")) request.eye = parse_triple(*text, "--eye", "X,Y,Z", "2,-1.5,-4");
   if (const auto text = single(look_at_, "--look-at"))
@@ -205,6 +210,7 @@ FrameDescription SimulationArguments::frame() const {
     if (!given.empty()) throw UserError("cannot use option", option, why, "leave out this or --frame");
   };
   refuse_with_frame(scene_, "--scene", "--frame says what is drawn");
+  refuse_with_frame(meshes_, "--mesh", "--frame says what is drawn");
   refuse_with_frame(save_draw_, "--save-draw", "a draw list has one draw, and a frame may have several");
   return read_frame_file(*file);
 }
@@ -214,6 +220,7 @@ std::vector<NamedFile> SimulationArguments::inputs(const FrameDescription& frame
   for (const FrameCommand& command : frame.commands) {
     if (command.draw) files.push_back({command.where, command.draw->scene});
   }
+  for (const std::string& file : meshes_) files.push_back({"--mesh", file});
   for (const std::string& file : frame_) files.push_back({"--frame", file});
   for (const std::string& camera : camera_) files.push_back({"--camera", camera.substr(0, camera.rfind('#'))});
   for (const std::string& plugin : plugins_) files.push_back({"--plugin", plugin});

@@ -47,6 +47,7 @@ class SimulationArguments {
   std::vector<NamedFile> inputs(const FrameDescription& frame) const;
   std::shared_ptr<Trace> trace(const RunRequest& request) const;
 
+  Values meshes_;
   Values scene_, frame_, size_, camera_, eye_, look_at_, up_, fovy_;
   Values platform_, settings_, variant_, units_, plugins_;
   Values fidelity_, format_, termination_;

@@ -75,6 +75,10 @@ std::shared_ptr<const Frame> frame_of(const RunRequest& request, std::shared_ptr
 Workload load(const AccuracyJob& job, AccuracyResult& result) {
   Workload workload;
   workload.scene = open_scene(job.simulation.scene);
+  if (!workload.scene.meshes.empty()) {
+    throw UserError("cannot measure accuracy", "--scene, --mesh",
+                    "it is measured against an exact image of splats alone", "take a scene without meshes");
+  }
   workload.options = job.simulation.scene.preprocess;
   if (workload.scene.draw_list) {
     result.full_width = workload.scene.draw_list->draw.width;

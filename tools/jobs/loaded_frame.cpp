@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/workloads/mixed_frame.h>
 
 namespace vrpipe::tools {
 namespace {
@@ -28,6 +29,8 @@ void add(const SceneSummary& scene, SceneSummary& sum) {
   sum.gaussians_visible += scene.gaussians_visible;
   sum.rejected.not_finite += scene.rejected.not_finite;
   sum.rejected.zero_quaternion += scene.rejected.zero_quaternion;
+  sum.triangles += scene.triangles;
+  sum.triangles_rejected += scene.triangles_rejected;
 }
 
 void check(const FrameCommand& command, const Draw& geometry, const LoadedFrame& frame) {
@@ -52,7 +55,11 @@ void check(const FrameCommand& command, const Draw& geometry, const LoadedFrame&
 
 LoadedFrame load_frame(const FrameDescription& frame, const SceneRequest& options) {
   LoadedFrame loaded;
-  std::map<std::string, std::shared_ptr<const Draw>> scenes;
+  struct Scene {
+    std::shared_ptr<const Draw> splats;
+    std::vector<std::shared_ptr<const Draw>> meshes;
+  };
+  std::map<std::string, Scene> scenes;
   SceneRequest view = options;
   // Draw lists come last: whether the options of a camera have a meaning is known by then.
   for (const bool draw_lists : {false, true}) {
@@ -71,12 +78,16 @@ LoadedFrame load_frame(const FrameDescription& frame, const SceneRequest& option
         if (scene.viewpoint) view = seen_from(*scene.viewpoint, options);
       }
       add(scene.summary, loaded.summary);
-      scenes[request.scene] = std::make_shared<const Draw>(std::move(scene.draw));
+      Scene& added = scenes[request.scene];
+      added.splats = std::make_shared<const Draw>(std::move(scene.draw));
+      for (Draw& mesh : scene.meshes) added.meshes.push_back(std::make_shared<const Draw>(std::move(mesh)));
     }
   }
   loaded.summary.name = frame.name;
   for (const FrameCommand& command : frame.commands) {
-    loaded.geometry.push_back(command.draw ? scenes.at(command.draw->scene) : nullptr);
+    const Scene scene = command.draw ? scenes.at(command.draw->scene) : Scene{};
+    loaded.geometry.push_back(scene.splats);
+    loaded.meshes.push_back(scene.meshes);
     if (command.draw) check(command, *loaded.geometry.back(), loaded);
   }
   return loaded;
@@ -85,6 +96,7 @@ LoadedFrame load_frame(const FrameDescription& frame, const SceneRequest& option
 std::shared_ptr<const Frame> make_frame(const RunRequest& request, const FrameDescription& description,
                                         const LoadedFrame& loaded) {
   auto frame = std::make_shared<Frame>(loaded.width, loaded.height);
+  frame->set_depth_format(depth_format_of(request));
   for (std::size_t i = 0; i < description.commands.size(); ++i) {
     const FrameCommand& command = description.commands[i];
     if (!command.draw) {
@@ -92,9 +104,12 @@ std::shared_ptr<const Frame> make_frame(const RunRequest& request, const FrameDe
       continue;
     }
     const SceneDraw& draw = *command.draw;
-    DrawState state = draw_state_of(request, draw.settings);
-    state.early_termination = draw.early_termination;
-    frame->draw(loaded.geometry[i], state, draw.name, draw.first, draw.splats);
+    MixedFrameOptions options;
+    options.splats = draw_state_of(request, draw.settings);
+    options.splats.early_termination = draw.early_termination;
+    const bool is_mixed_scene = description.commands.size() == 1 && !loaded.meshes[i].empty();
+    draw_mixed(*frame, loaded.geometry[i], loaded.meshes[i], options, is_mixed_scene ? "splats" : draw.name, draw.first,
+               draw.splats);
   }
   return frame;
 }

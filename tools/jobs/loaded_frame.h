@@ -16,11 +16,12 @@ namespace vrpipe::tools {
 
 /// A frame's scenes, preprocessed for one camera.
 struct LoadedFrame {
-  std::uint32_t width = 0, height = 0;                ///< pixels
-  std::vector<std::shared_ptr<const Draw>> geometry;  ///< of each command; null for a clear
-  SceneSummary summary;                               ///< sums over the scenes, each of which counts once
-  std::optional<Viewpoint> viewpoint;                 ///< none if there are only draw lists
-  bool preprocessed_here = false;                     ///< false if there are only draw lists
+  std::uint32_t width = 0, height = 0;                           ///< pixels
+  std::vector<std::shared_ptr<const Draw>> geometry;             ///< of each command; null for a clear
+  std::vector<std::vector<std::shared_ptr<const Draw>>> meshes;  ///< of the scene of each command
+  SceneSummary summary;                                          ///< sums over the scenes, each of which counts once
+  std::optional<Viewpoint> viewpoint;                            ///< none if there are only draw lists
+  bool preprocessed_here = false;                                ///< false if there are only draw lists
 };
 
 /// Loads every scene of a frame once. All are drawn with one camera and size: those of `options`, in which `scene` is

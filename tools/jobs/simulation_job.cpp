@@ -93,7 +93,13 @@ JobResult perform(const SimulationJob& job) {
     result.width = loaded.width;
     result.height = loaded.height;
     if (job.output) create_output_folder(*job.output, "--output");
-    if (job.save_draw) save_draw(job, *loaded.geometry.front());
+    if (job.save_draw) {
+      if (!loaded.meshes.front().empty()) {
+        throw UserError("cannot save the draw", "--save-draw", "a draw list has splats alone, and the scene has meshes",
+                        "leave out --save-draw, or take a scene without meshes");
+      }
+      save_draw(job, *loaded.geometry.front());
+    }
 
     const auto simulation_start = std::chrono::steady_clock::now();
     const auto frame_of = [&](const RunRequest& request) { return make_frame(request, job.frame, loaded); };

@@ -223,10 +223,21 @@ std::string draws_text(const std::vector<RunResult>& runs, const TextStyle& styl
   constexpr std::size_t most_shown = 20;
   const std::vector<DrawReport>& draws = runs.front().draws;
   if (draws.empty()) return {};
-  TextTable table({"quads by draw", "rasterized", "terminated", "shaded", "blended"});
+  const bool tests = std::any_of(runs.begin(), runs.end(), [](const RunResult& run) {
+    return run.counts.quads_depth_stencil_failed + run.counts.quads_unshaded > 0;
+  });
+  std::vector<std::string> columns{"quads_rasterized", "quads_terminated", "quads_shaded", "quads_blended"};
+  std::vector<std::string> names{"quads by draw", "rasterized", "terminated", "shaded", "blended"};
+  if (tests) {
+    columns.insert(columns.begin() + 1, "quads_depth_stencil_failed");
+    names.insert(names.begin() + 2, "depth/stencil failed");
+    columns.insert(columns.begin() + 3, "quads_unshaded");
+    names.insert(names.begin() + 4, "not shaded");
+  }
+  TextTable table(std::move(names));
   const auto row = [&](const std::string& label, const DrawReport& draw) {
     std::vector<std::string> cells{label};
-    for (const char* name : {"quads_rasterized", "quads_terminated", "quads_shaded", "quads_blended"}) {
+    for (const std::string& name : columns) {
       const auto found =
           std::find_if(draw.counts.begin(), draw.counts.end(), [&](const auto& count) { return count.first == name; });
       cells.push_back(grouped(found->second));
@@ -252,6 +263,13 @@ std::string heading(const JobResult& result, const TextStyle& style) {
   std::string text = style.bold(fmt::format("{}, {}x{}", printable(result.scene.name), result.width, result.height));
   text += fmt::format(": {} of {} Gaussians visible\n", grouped(result.scene.gaussians_visible),
                       grouped(result.scene.gaussians_total));
+  if (result.scene.triangles + result.scene.triangles_rejected > 0) {
+    text.pop_back();
+    text += fmt::format(", {} triangles of meshes", grouped(result.scene.triangles));
+    if (result.scene.triangles_rejected > 0)
+      text += fmt::format(", {} left out", grouped(result.scene.triangles_rejected));
+    text += "\n";
+  }
   text += style.bold(platform.name) + " (" + platform.description + ")\n";
   text += fmt::format("{} fidelity, {} colour, {} termination", vrpipe::name_of(request.fidelity),
                       vrpipe::name_of(request.format), name_of(request.termination));

@@ -246,6 +246,8 @@ Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t he
           {"gaussians_total", scene.gaussians_total},
           {"gaussians_visible", scene.gaussians_visible},
           {"gaussians_rejected", scene.rejected.total()},
+          {"triangles", scene.triangles},
+          {"triangles_rejected", scene.triangles_rejected},
           {"width", width},
           {"height", height},
           {"rejected_by_reason",

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include <vrpipe/component/error.h>
 
@@ -36,23 +37,31 @@ DrawState mesh_state(FragmentShader shader, DepthState depth) {
 
 std::shared_ptr<Frame> mixed_frame(const Draw& splats, const std::vector<Draw>& meshes,
                                    const MixedFrameOptions& options) {
-  if (meshes.empty()) return Frame::of(splats, options.splats);
-  check(options);
-  auto frame = std::make_shared<Frame>(splats.width, splats.height);
   const auto shared = [](const Draw& draw) { return std::shared_ptr<const Draw>(&draw, [](const Draw*) {}); };
-  const auto draw_meshes = [&](const DrawState& state, const std::string& name) {
+  auto frame = std::make_shared<Frame>(splats.width, splats.height);
+  std::vector<std::shared_ptr<const Draw>> of_meshes;
+  for (const Draw& mesh : meshes) of_meshes.push_back(shared(mesh));
+  draw_mixed(*frame, shared(splats), of_meshes, options, meshes.empty() ? "" : "splats");
+  return frame;
+}
+
+void draw_mixed(Frame& frame, std::shared_ptr<const Draw> splats,
+                const std::vector<std::shared_ptr<const Draw>>& meshes, const MixedFrameOptions& options,
+                const std::string& name, std::uint32_t first, std::uint32_t count) {
+  if (meshes.empty()) return frame.draw(std::move(splats), options.splats, name, first, count);
+  check(options);
+  const auto draw_meshes = [&](const DrawState& state, const std::string& what) {
     for (std::size_t i = 0; i < meshes.size(); ++i) {
-      if (meshes[i].is_mesh()) frame->draw(shared(meshes[i]), state, name + " of mesh " + std::to_string(i));
+      if (meshes[i]->is_mesh()) frame.draw(meshes[i], state, what + " of mesh " + std::to_string(i));
     }
   };
   draw_meshes(mesh_state(FragmentShader::none, {true, Compare::less, true}), "depth");
   DrawState splat_state = options.splats;
   splat_state.depth = {true, Compare::less, false};
-  frame->draw(shared(splats), splat_state, "splats");
+  frame.draw(std::move(splats), splat_state, name, first, count);
   DrawState colour = mesh_state(options.mesh_shader, {true, Compare::equal, false});
   if (options.mesh_shader == FragmentShader::lit) colour.light = options.light;
   draw_meshes(colour, "colour");
-  return frame;
 }
 
 }  // namespace vrpipe

@@ -75,6 +75,8 @@ struct SceneSummary {
   std::uint64_t gaussians_total = 0;
   std::uint64_t gaussians_visible = 0;  ///< in the draw
   RejectedGaussians rejected;
+  std::uint64_t triangles = 0;           ///< of meshes, in the draws of each, clipped
+  std::uint64_t triangles_rejected = 0;  ///< that cannot be drawn
 };
 
 }  // namespace vrpipe

@@ -42,6 +42,12 @@ struct StateParameters : ParameterSet {
                      1,     source::open,  "the fragment shader's exponential"};
   Choice blend_rounding{*this, "blend_rounding", {"rne", "rtz", "measured"},
                         0,     source::open,     "of the blender into the target format"};
+  Choice depth_format{*this,
+                      "depth_format",
+                      {"d16", "d24", "d32f"},
+                      1,
+                      "the format that graphics APIs demand with a stencil",
+                      "of the depth target, beside 8 bits of stencil"};
   Choice splat_extent{
       *this,
       "splat_extent",

@@ -202,6 +202,8 @@ struct RunResult {
 /// precision among them is not used. Early termination is on: it takes the variant's units to have it.
 /// Throws UserError for an unknown parameter or value.
 DrawState draw_state_of(const RunRequest& request, const std::vector<Setting>& own = {});
+/// Of the depth target of a frame that is made for a request: `state.depth_format`.
+DepthFormat depth_format_of(const RunRequest& request);
 
 /// Runs one variant. Checks conservation, order per pixel and that the states of each unit sum to the cycles; throws
 /// SimulationFault if one is broken and UserError for a configuration that does not exist. With time, one simulation

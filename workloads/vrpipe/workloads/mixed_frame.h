@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <vrpipe/pipeline/draw.h>
@@ -24,5 +26,10 @@ struct MixedFrameOptions {
 ///         Frame::draw()
 std::shared_ptr<Frame> mixed_frame(const Draw& splats, const std::vector<Draw>& meshes,
                                    const MixedFrameOptions& options = {});
+
+/// The same as draws of a frame: splats `first` to `first` + `count` - 1, called `name`. Without meshes, that draw alone.
+void draw_mixed(Frame& frame, std::shared_ptr<const Draw> splats,
+                const std::vector<std::shared_ptr<const Draw>>& meshes, const MixedFrameOptions& options,
+                const std::string& name = {}, std::uint32_t first = 0, std::uint32_t count = ~0U);
 
 }  // namespace vrpipe
