@@ -1,5 +1,6 @@
 // Frames by themselves: what clears and draws are numbered, and what a frame refuses.
 #include <vrpipe/pipeline/frame.h>
+#include <cmath>
 
 #include <gtest/gtest.h>
 
@@ -105,6 +106,23 @@ TEST(Frame, EveryFieldOfAStateTellsItFromAnother) {
       [](DrawState& state) { state.pruning_threshold = 0; },
       [](DrawState& state) { state.splat_extent = SplatExtent::three_sigma; },
       [](DrawState& state) { state.obb_padding = 0; },
+      [](DrawState& state) { state.depth.test = true; },
+      [](DrawState& state) { state.depth.compare = Compare::greater; },
+      [](DrawState& state) { state.depth.write = false; },
+      [](DrawState& state) { state.stencil.test = true; },
+      [](DrawState& state) { state.stencil.front.compare = Compare::equal; },
+      [](DrawState& state) { state.stencil.front.stencil_fail = StencilOperation::zero; },
+      [](DrawState& state) { state.stencil.front.depth_fail = StencilOperation::zero; },
+      [](DrawState& state) { state.stencil.back.pass = StencilOperation::zero; },
+      [](DrawState& state) { state.stencil.back.reference = 1; },
+      [](DrawState& state) { state.stencil.back.read_mask = 1; },
+      [](DrawState& state) { state.stencil.back.write_mask = 1; },
+      [](DrawState& state) { state.cull = CullMode::front; },
+      [](DrawState& state) { state.shader = FragmentShader::lit; },
+      [](DrawState& state) { state.light.x = 1; },
+      [](DrawState& state) { state.light.y = 1; },
+      [](DrawState& state) { state.light.z = 1; },
+      [](DrawState& state) { state.light.ambient = 0.5F; },
   };
   for (const auto& change : changes) {
     DrawState changed;
@@ -136,6 +154,62 @@ TEST(Frame, TerminatesEarlyIfAnyDrawDoes) {
   frame.draw(geometry, terminates);
   frame.draw(geometry, {});
   EXPECT_TRUE(frame.terminates_early());
+}
+
+TEST(Frame, NeedsZropIfAnyDrawTestsAnythingOrShadesNothing) {
+  const auto geometry = geometry_of(1);
+  const std::vector<std::function<void(DrawState&)>> changes{[](DrawState& state) { state.early_termination = true; },
+                                                             [](DrawState& state) { state.depth.test = true; },
+                                                             [](DrawState& state) { state.stencil.test = true; },
+                                                             [](DrawState& state) {
+                                                               state.shader = FragmentShader::none;
+                                                             }};
+  for (const auto& change : changes) {
+    Frame frame(64, 48);
+    frame.draw(geometry, {});
+    EXPECT_FALSE(frame.needs_zrop());
+    DrawState state;
+    change(state);
+    frame.draw(geometry, state);
+    EXPECT_TRUE(frame.needs_zrop());
+    EXPECT_EQ(frame.tests_depth_stencil(), state.depth.test || state.stencil.test);
+  }
+}
+
+TEST(Frame, AMeshAndItsStateBelongTogether) {
+  const auto splats = geometry_of(1);
+  const auto mesh = std::make_shared<Draw>(testing::draw_of(64, 48));
+  mesh->mesh.resize(3);
+  const auto both = std::make_shared<Draw>(*mesh);
+  both->splats.resize(3);
+  DrawState lit;
+  lit.shader = FragmentShader::lit;
+  Frame frame(64, 48);
+  frame.draw(mesh, lit);
+  frame.draw(mesh, lit, "a part", 1, 2);
+  EXPECT_EQ(frame.splats(), 5U);
+  EXPECT_EQ(&frame.draw_call(1).mesh_triangle(3), &mesh->mesh[1]);
+  EXPECT_THROW(frame.draw(mesh, {}), UserError) << "the shader of splats";
+  EXPECT_THROW(frame.draw(splats, lit), UserError) << "the shader of meshes";
+  EXPECT_THROW(frame.draw(both, lit), UserError) << "splats as well";
+  EXPECT_THROW(frame.draw(mesh, lit, "", 2, 2), UserError) << "triangles that are not there";
+  DrawState marked = lit;
+  marked.stencil.back.reference = 128;
+  EXPECT_THROW(frame.draw(mesh, marked), UserError) << "the bit of termination";
+}
+
+TEST(Frame, ClearsAreOfWhatATargetHolds) {
+  Frame frame(64, 48);
+  Clear clear;
+  clear.depth_value = 1.5F;
+  EXPECT_THROW(frame.clear(clear), UserError);
+  clear.depth_value = std::nanf("");
+  EXPECT_THROW(frame.clear(clear), UserError);
+  clear.depth_value = 0;
+  clear.stencil_value = 128;
+  EXPECT_THROW(frame.clear(clear), UserError);
+  clear.stencil_value = 127;
+  EXPECT_NO_THROW(frame.clear(clear));
 }
 
 TEST(Frame, AMarkOfAClearGivesItAndNoOtherDoes) {

@@ -113,6 +113,27 @@ TEST(AttributeTraffic, TrianglesOfTheirOwnAreReadAsWell) {
   EXPECT_EQ(writes_of(traffic, {8, 1}).bytes, 352U) << "one triangle";
 }
 
+TEST(AttributeTraffic, AMeshIsReadByTrianglesOf120Bytes) {
+  Draw draw = draw_of(64, 64);
+  draw.mesh.resize(24);
+  for (MeshTriangle& triangle : draw.mesh) {
+    const float x[] = {10, 10, 40};
+    const float y[] = {10, 40, 10};
+    for (unsigned i = 0; i < 3; ++i) triangle.vertices[i] = {x[i], y[i], 0.5F, 1, 1, 1, 1, 0, 0, 1};
+  }
+  DrawState state;
+  state.shader = FragmentShader::lit;
+  const RenderContext context = testing::context_of(draw, state);
+  const AttributeTraffic traffic(context, AttributeFetch());
+  const AddressMap map = address_map(*context.frame, context.format);
+  EXPECT_EQ(map.vertices.bytes, 24U * 120);
+  const Requests reads = reads_of(traffic, {8, 8});
+  EXPECT_EQ(reads.begin, map.vertices.address + 8 * 120);
+  EXPECT_EQ(reads.bytes, 8U * 120);
+  EXPECT_LE(reads.all.size(), std::size_t{AttributeTraffic::most_vertex_reads});
+  EXPECT_EQ(writes_of(traffic, {8, 1}).bytes, 352U) << "one triangle";
+}
+
 TEST(AttributeTraffic, AVertexWarpWrites704BytesASplat) {
   const Draw draw = draw_of(64, 64, boxes(16));
   const RenderContext context = testing::context_of(draw);

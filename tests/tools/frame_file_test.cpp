@@ -22,6 +22,8 @@ class FrameFile : public ToolTest {
       builder.add(gaussian);
     }
     write_gaussian_ply(folder() / "four.ply", builder.build());
+    // A wall across the view, in front of the last two Gaussians.
+    write("wall.obj", "v -9 -9 4.5\nv 9 -9 4.5\nv 9 9 4.5\nv -9 9 4.5\nf 1 2 3 4\n");
   }
 
   /// What `run` finds of a frame.
@@ -117,6 +119,94 @@ TEST_F(FrameFile, AClearMakesTheNextDrawTheFirst) {
   EXPECT_GT(count(draws[0], "quads_terminated"), 0U);
   EXPECT_EQ(draws[0]["counts"], draws[1]["counts"]);
   EXPECT_LT(count(draws[2], "fragments_blended"), count(draws[1], "fragments_blended")) << "pixels stay closed";
+}
+
+const std::vector<std::string> from_the_origin{"--eye", "0,0,0", "--look-at", "0,0,1", "--size", "64x48"};
+
+// Whichever way it goes around, one of its sides faces the camera.
+TEST_F(FrameFile, AMeshHidesWhatIsBehindIt) {
+  const json result = run(R"({"commands": [
+      {"draw": "wall.obj", "name": "depth", "state": {"depth": {}, "shader": "none", "cull": "none"}},
+      {"draw": "four.ply", "name": "splats", "state": {"depth": {"compare": "less", "write": false}}},
+      {"draw": "four.ply", "name": "behind", "state": {"depth": {"compare": "greater", "write": false}}},
+      {"draw": "wall.obj", "name": "wall",
+       "state": {"depth": {"compare": "equal", "write": false}, "shader": "vertex", "cull": "none"}}]})",
+                          from_the_origin);
+  const json& draws = result["draws"];
+  ASSERT_EQ(draws.size(), 4U);
+  EXPECT_EQ(count(draws[0], "fragments_rasterized"), 64U * 48) << "all that the camera sees";
+  EXPECT_EQ(count(draws[0], "fragments_unshaded"), 64U * 48);
+  EXPECT_GT(count(draws[1], "fragments_shaded"), 0U);
+  EXPECT_EQ(count(draws[1], "fragments_depth_stencil_failed"), count(draws[2], "fragments_shaded"))
+      << "what is not in front is behind";
+  EXPECT_EQ(count(draws[3], "fragments_shaded"), 64U * 48);
+}
+
+TEST_F(FrameFile, AMeshDrawsTheSidesThatItsStateDoesNotCull) {
+  std::vector<std::uint64_t> drawn;
+  for (const char* side : {"none", "back", "front"}) {
+    const json result =
+        run(std::string(R"({"commands": [{"draw": "four.ply"}, {"draw": "wall.obj", "state": {"cull": ")") + side +
+                R"("}}]})",
+            from_the_origin);
+    drawn.push_back(count(result["draws"][1], "primitives"));
+  }
+  EXPECT_EQ(drawn[0], 2U);
+  EXPECT_EQ(drawn[1] + drawn[2], 2U);
+  EXPECT_TRUE(drawn[1] == 0 || drawn[2] == 0);
+}
+
+// A splat marks the stencil where it is; what is drawn next is drawn there alone, or everywhere else.
+TEST_F(FrameFile, AStencilCutsOutWhatADrawHasMarked) {
+  const auto fragments = [&](const std::string& compare, const std::string& between) {
+    const json result = run(R"({"commands": [
+        {"draw": "four.ply", "splats": [0, 1], "state": {"shader": "none", "stencil": {"pass": "replace", "reference": 5}}},
+        )" + between + R"(
+        {"draw": "wall.obj", "state": {"cull": "none", "stencil": {"compare": ")" +
+                                compare + R"(", "reference": 5}}}]})",
+                            from_the_origin);
+    return count(result["draws"][1], "fragments_shaded");
+  };
+  const std::uint64_t marked = fragments("equal", "");
+  EXPECT_GT(marked, 50U);
+  EXPECT_EQ(marked + fragments("not_equal", ""), 64U * 48);
+  EXPECT_EQ(fragments("equal", R"({"clear": ["stencil"]},)"), 0U);
+  EXPECT_EQ(fragments("equal", R"({"clear": ["stencil"], "stencil": 5},)"), 64U * 48);
+  EXPECT_EQ(fragments("equal", R"({"clear": ["depth", "termination"], "depth": 0.5},)"), marked);
+}
+
+TEST_F(FrameFile, BadDepthStencilAndMeshes) {
+  const auto of_wall = [](const std::string& state) {
+    return R"({"commands": [{"draw": "four.ply"}, {"draw": "wall.obj", "state": )" + state + "}]}";
+  };
+  bad(of_wall(R"({"depth": "less"})"), {"state.depth", "not an object"});
+  bad(of_wall(R"({"depth": {"compare": "lesser"}})"), {"state.depth.compare", "did you mean less?"});
+  bad(of_wall(R"({"depth": {"write": 1}})"), {"state.depth.write", "true or false"});
+  bad(of_wall(R"({"stencil": {"pass": "set"}})"), {"state.stencil.pass", "unknown operation"});
+  bad(of_wall(R"({"stencil": {"reference": 128}})"), {"state.stencil.reference", "0 to 127"});
+  bad(of_wall(R"({"stencil": {"front": {}, "pass": "keep"}})"), {"state.stencil", "unknown key 'pass'"});
+  bad(of_wall(R"({"shader": "splat"})"), {"its shader is that of splats"}, from_the_origin);
+  bad(of_wall(R"({"cull": "both"})"), {"state.cull", "back"});
+  bad(R"({"commands": [{"draw": "four.ply", "state": {"shader": "lit"}}]})", {"that of a mesh"}, from_the_origin);
+  bad(R"({"commands": [{"draw": "wall.obj", "splats": [0, 1]}]})", {"splats", "a mesh"});
+  bad(R"({"commands": [{"draw": "wall.obj"}, {"draw": "tiny.spl"}]})", {"no scene that has a camera"});
+  bad(R"({"commands": [{"clear": ["depth"], "depth": 2}, {"draw": "tiny.spl"}]})", {"depth", "0 to 1"});
+  bad(R"({"commands": [{"clear": ["depth"], "stencil": 2}, {"draw": "tiny.spl"}]})", {"stencil", "not cleared"});
+}
+
+TEST_F(FrameFile, AMeshOfTheCommandLineMakesAMixedFrame) {
+  std::vector<std::string> options{"run", "--scene", "four.ply", "--mesh", "wall.obj"};
+  options.insert(options.end(), from_the_origin.begin(), from_the_origin.end());
+  const json result = json_of(options);
+  EXPECT_GT(result["scene"]["triangles"], 0);
+  EXPECT_EQ(result["scene"]["triangles_rejected"], 0);
+  EXPECT_EQ(result["platform"]["parameters"]["state.depth_format"], "d24");
+  refused({"run", "--frame", "frame.json", "--mesh", "wall.obj"}, {"--mesh"});
+  refused({"run", "--scene", "tiny.spl", "--mesh", "wall.obj"}, {"--mesh", "draw list"});
+  refused({"run", "--scene", "four.ply", "--mesh", "missing.obj"}, {"missing.obj"});
+  refused({"run", "--scene", "four.ply", "--mesh", "wall.obj", "--save-draw", "draw.spl"}, {"--save-draw", "meshes"});
+  refused({"accuracy", "--scene", "four.ply", "--mesh", "wall.obj"}, {"--mesh"});
+  refused({"run", "--scene", "four.ply", "--mesh", "wall.obj", "--json", "wall.obj"}, {"--mesh", "same file"});
 }
 
 TEST_F(FrameFile, ScenesShareACameraAndAreRelativeToTheFile) {

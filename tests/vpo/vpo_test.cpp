@@ -1,6 +1,10 @@
 #include "vpo/vpo.h"
 
+#include <array>
 #include <cmath>
+#include <cstring>
+#include <limits>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -51,6 +55,54 @@ TEST(PrimitiveAssembly, BoundsHoldEverySampleInTheViewport) {
     EXPECT_EQ(primitive.bounds.x1, 64);
     EXPECT_EQ(primitive.bounds.y0, 30);
     EXPECT_EQ(primitive.bounds.y1, 48);
+  }
+}
+
+/// A triangle of a mesh; as one sees it, y down, its vertices go counter-clockwise.
+Draw front_face() {
+  Draw draw = draw_of(64, 64);
+  MeshTriangle triangle{};
+  const float x[] = {10, 10, 40};
+  const float y[] = {10, 40, 10};
+  for (unsigned i = 0; i < 3; ++i) triangle.vertices[i] = {x[i], y[i], 0.5F, 1, 1, 1, 1, 0, 0, 1};
+  draw.mesh.push_back(triangle);
+  return draw;
+}
+
+TEST(PrimitiveAssembly, CullsTheSidesOfAMeshThatItsDrawSays) {
+  for (const bool is_back : {false, true}) {
+    Draw draw = front_face();
+    if (is_back) std::swap(draw.mesh[0].vertices[1], draw.mesh[0].vertices[2]);
+    for (const CullMode cull : {CullMode::none, CullMode::back, CullMode::front}) {
+      DrawState state;
+      state.shader = FragmentShader::vertex;
+      state.cull = cull;
+      const RenderContext context = testing::context_of(draw, state);
+      const PrimitiveAssembly::Parameters parameters;
+      PrimitiveAssembly vpo(parameters, context);
+      std::array<Primitive, 2> primitives;
+      const bool culled = cull == (is_back ? CullMode::back : CullMode::front);
+      EXPECT_EQ(vpo.assemble(0, 0, primitives), culled ? 0U : 1U);
+      EXPECT_EQ(vpo.culled_facing.value(), culled ? 1U : 0U);
+    }
+  }
+}
+
+TEST(PrimitiveAssembly, ATriangleOfAMeshThatIsNotFiniteIsDropped) {
+  for (unsigned field = 0; field < 30; ++field) {
+    Draw draw = front_face();
+    float values[30];
+    std::memcpy(values, draw.mesh.data(), sizeof values);
+    values[field] = std::numeric_limits<float>::infinity();
+    std::memcpy(static_cast<void*>(draw.mesh.data()), values, sizeof values);
+    DrawState state;
+    state.shader = FragmentShader::vertex;
+    const RenderContext context = testing::context_of(draw, state);
+    const PrimitiveAssembly::Parameters parameters;
+    PrimitiveAssembly vpo(parameters, context);
+    std::array<Primitive, 2> primitives;
+    EXPECT_EQ(vpo.assemble(0, 0, primitives), 0U);
+    EXPECT_EQ(vpo.dropped_not_finite.value(), 1U) << "field " << field;
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/platforms/configuration.h>
+#include <vrpipe/workloads/mesh.h>
 #include <vrpipe/workloads/scene.h>
 
 #include "file_io.h"
@@ -75,8 +76,83 @@ Json parse(const std::string& text, const std::string& where) {
   }
 }
 
+/// One of several names, in the order of an enumeration.
+template <class Enumeration>
+Enumeration read_choice(const Json& value, const std::vector<std::string>& names, const std::string& kind,
+                        const std::string& where) {
+  const std::string& name = text_of(value, where);
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) refuse_unknown(where, kind, name, names);
+  return static_cast<Enumeration>(found - names.begin());
+}
+
+// As the graphics APIs have them; LESS passes what is less than what is stored.
+const std::vector<std::string> compare_names{"never",   "less",      "equal",         "less_equal",
+                                             "greater", "not_equal", "greater_equal", "always"};
+const std::vector<std::string> operation_names{"keep",      "zero",   "replace",        "increment",
+                                               "decrement", "invert", "increment_wrap", "decrement_wrap"};
+const std::vector<std::string> shader_names{"splat", "vertex", "lit", "none"};
+const std::vector<std::string> cull_names{"none", "back", "front"};
+
+bool read_switch(const Json& value, const std::string& where) {
+  if (!value.is_boolean()) refuse(where, "it is " + shown(value), "give true or false");
+  return value.get<bool>();
+}
+
+std::uint8_t read_stencil_value(const Json& value, const std::string& where) {
+  if (!value.is_number_unsigned() || value.get<std::uint64_t>() > stencil_bits) {
+    refuse(where, "it is " + shown(value), "give 0 to 127: the highest bit is termination's");
+  }
+  return value.get<std::uint8_t>();
+}
+
+DepthState read_depth(const Json& value, const std::string& where) {
+  if (!value.is_object()) refuse(where, "it is not an object", "give {\"compare\": \"less\", \"write\": true}");
+  check_keys(value, {"compare", "write"}, where);
+  DepthState depth;
+  depth.test = true;
+  if (value.contains("compare")) {
+    depth.compare = read_choice<Compare>(value["compare"], compare_names, "function", where + ".compare");
+  }
+  if (value.contains("write")) depth.write = read_switch(value["write"], where + ".write");
+  return depth;
+}
+
+StencilFace read_face(const Json& value, const std::string& where) {
+  if (!value.is_object()) refuse(where, "it is not an object", "give {\"compare\": \"equal\", \"reference\": 1, ...}");
+  check_keys(value, {"compare", "stencil_fail", "depth_fail", "pass", "reference", "read_mask", "write_mask"}, where);
+  StencilFace face;
+  if (value.contains("compare")) {
+    face.compare = read_choice<Compare>(value["compare"], compare_names, "function", where + ".compare");
+  }
+  for (const auto& [key, operation] : {std::pair{"stencil_fail", &face.stencil_fail},
+                                       std::pair{"depth_fail", &face.depth_fail}, std::pair{"pass", &face.pass}}) {
+    if (!value.contains(key)) continue;
+    *operation = read_choice<StencilOperation>(value[key], operation_names, "operation", where + "." + key);
+  }
+  for (const auto& [key, member] : {std::pair{"reference", &face.reference}, std::pair{"read_mask", &face.read_mask},
+                                    std::pair{"write_mask", &face.write_mask}}) {
+    if (value.contains(key)) *member = read_stencil_value(value[key], where + "." + key);
+  }
+  return face;
+}
+
+/// Of both faces alike, or of each.
+StencilState read_stencil(const Json& value, const std::string& where) {
+  StencilState stencil;
+  stencil.test = true;
+  if (!value.is_object() || (!value.contains("front") && !value.contains("back"))) {
+    stencil.front = stencil.back = read_face(value, where);
+    return stencil;
+  }
+  check_keys(value, {"front", "back"}, where);
+  if (value.contains("front")) stencil.front = read_face(value["front"], where + ".front");
+  if (value.contains("back")) stencil.back = read_face(value["back"], where + ".back");
+  return stencil;
+}
+
 Clear read_clear(const Json& value, const std::string& where) {
-  const std::string remedy = "give [\"color\"], [\"termination\"] or both";
+  const std::string remedy = "give a list of \"color\", \"termination\", \"depth\", \"stencil\"";
   if (!value.is_array() || value.empty()) refuse(where, "it does not say what is cleared", remedy);
   Clear clear;
   for (const Json& part : value) {
@@ -85,8 +161,12 @@ Clear read_clear(const Json& value, const std::string& where) {
       clear.color = true;
     } else if (name == "termination") {
       clear.termination = true;
+    } else if (name == "depth") {
+      clear.depth = true;
+    } else if (name == "stencil") {
+      clear.stencil = true;
     } else {
-      refuse_unknown(where, "part of the framebuffer", name, {"color", "termination"});
+      refuse_unknown(where, "part of the framebuffer", name, {"color", "termination", "depth", "stencil"});
     }
   }
   return clear;
@@ -115,14 +195,29 @@ void read_state(const Json& value, const std::string& where, SceneDraw& draw) {
   if (!value.is_object()) refuse(where, "it is not an object", "give {\"PARAMETER\": VALUE, ...}");
   StateParameters parameters;
   const std::vector<Parameter*> of_draws = parameters.of_draws();
-  std::vector<std::string> known{early_termination_key};
+  std::vector<std::string> known{early_termination_key, "depth", "stencil", "shader", "cull"};
   for (const Parameter* parameter : of_draws) known.emplace_back(parameter->name());
   for (const auto& entry : value.items()) {
     const std::string& key = entry.key();
     const std::string here = where + "." + key;
     if (key == early_termination_key) {
-      if (!entry.value().is_boolean()) refuse(here, "it is " + shown(entry.value()), "give true or false");
-      draw.early_termination = entry.value().get<bool>();
+      draw.early_termination = read_switch(entry.value(), here);
+      continue;
+    }
+    if (key == "depth") {
+      draw.depth = read_depth(entry.value(), here);
+      continue;
+    }
+    if (key == "stencil") {
+      draw.stencil = read_stencil(entry.value(), here);
+      continue;
+    }
+    if (key == "shader") {
+      draw.shader = read_choice<FragmentShader>(entry.value(), shader_names, "shader", here);
+      continue;
+    }
+    if (key == "cull") {
+      draw.cull = read_choice<CullMode>(entry.value(), cull_names, "side", here);
       continue;
     }
     const auto is_named = [&](const Parameter* parameter) { return key == parameter->name(); };
@@ -143,6 +238,11 @@ SceneDraw read_draw(const Json& command, const std::string& where, const std::fi
   draw.scene = text_of(command["draw"], where + ", draw");
   const bool is_file = draw.scene.rfind("builtin:", 0) != 0;
   if (is_file) draw.scene = (folder / draw.scene).lexically_normal().string();
+  draw.is_mesh =
+      is_file && !is_draw_list(draw.scene) && std::filesystem::is_regular_file(draw.scene) && is_mesh_file(draw.scene);
+  if (draw.is_mesh && command.contains("splats")) {
+    refuse(where + ", splats", "it is a mesh, which has none", "leave it out");
+  }
   if (command.contains("name")) draw.name = text_of(command["name"], where + ", name");
   if (command.contains("splats")) read_splats(command["splats"], where + ", splats", draw);
   if (command.contains("state")) read_state(command["state"], where + ", state", draw);
@@ -154,8 +254,25 @@ FrameCommand read_command(const Json& json, const std::string& where, const std:
   FrameCommand command;
   command.where = where;
   if (json.contains("clear")) {
-    if (json.size() > 1) refuse(where, "it has other keys beside \"clear\"", "make another command of them");
+    check_keys(json, {"clear", "depth", "stencil"}, where);
     command.clear = read_clear(json["clear"], where + ", clear");
+    const auto value_of = [&](const char* key, bool is_cleared) {
+      if (json.contains(key) && !is_cleared) {
+        refuse(where, fmt::format("it has a value for {}, which is not cleared", key),
+               "add it to the list, or leave it out");
+      }
+      return json.contains(key);
+    };
+    if (value_of("depth", command.clear.depth)) {
+      const Json& depth = json["depth"];
+      if (!depth.is_number() || !(depth.get<double>() >= 0 && depth.get<double>() <= 1)) {
+        refuse(where + ", depth", "it is " + shown(depth), "give 0 to 1");
+      }
+      command.clear.depth_value = depth.get<float>();
+    }
+    if (value_of("stencil", command.clear.stencil)) {
+      command.clear.stencil_value = read_stencil_value(json["stencil"], where + ", stencil");
+    }
     return command;
   }
   check_keys(json, {"draw", "name", "splats", "state", "clear"}, where);

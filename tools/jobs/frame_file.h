@@ -11,15 +11,21 @@
 
 namespace vrpipe::tools {
 
-/// A scene, or some of its splats, drawn with a state of its own.
+/// A scene, some of its splats, or a mesh, drawn with a state of its own.
 struct SceneDraw {
-  std::string scene;  ///< as SceneRequest has it
-  std::string name;   ///< for reports
+  std::string scene;     ///< as SceneRequest has it, or the file of a mesh
+  bool is_mesh = false;  ///< the latter
+  std::string name;      ///< for reports
   // As Frame::draw takes them: in draw order, of the splats that are visible.
   std::uint32_t first = 0;
   std::uint32_t splats = ~0U;
   bool early_termination = true;
   std::vector<Setting> settings;  ///< of unit `state`: those that draws may have of their own
+  // Those of DrawState; none where the draw does not say.
+  std::optional<DepthState> depth;
+  std::optional<StencilState> stencil;
+  std::optional<FragmentShader> shader;
+  std::optional<CullMode> cull;
 };
 
 struct FrameCommand {

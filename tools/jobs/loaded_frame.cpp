@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/workloads/mesh.h>
 #include <vrpipe/workloads/mixed_frame.h>
 
 namespace vrpipe::tools {
@@ -64,7 +65,9 @@ LoadedFrame load_frame(const FrameDescription& frame, const SceneRequest& option
   // Draw lists come last: whether the options of a camera have a meaning is known by then.
   for (const bool draw_lists : {false, true}) {
     for (const FrameCommand& command : frame.commands) {
-      if (!command.draw || is_draw_list(command.draw->scene) != draw_lists || scenes.count(command.draw->scene) > 0) {
+      const SceneDraw* const draw = command.draw ? &*command.draw : nullptr;
+      if (draw == nullptr || draw->is_mesh || is_draw_list(draw->scene) != draw_lists ||
+          scenes.count(draw->scene) > 0) {
         continue;
       }
       SceneRequest request = draw_lists && loaded.viewpoint ? SceneRequest() : view;
@@ -82,6 +85,20 @@ LoadedFrame load_frame(const FrameDescription& frame, const SceneRequest& option
       added.splats = std::make_shared<const Draw>(std::move(scene.draw));
       for (Draw& mesh : scene.meshes) added.meshes.push_back(std::make_shared<const Draw>(std::move(mesh)));
     }
+  }
+  // A mesh has no camera of its own.
+  for (const FrameCommand& command : frame.commands) {
+    if (!command.draw || !command.draw->is_mesh || scenes.count(command.draw->scene) > 0) continue;
+    if (!loaded.viewpoint) {
+      throw UserError("cannot draw " + command.draw->scene, command.where,
+                      "it is a mesh, and the frame draws no scene that has a camera", "draw a scene as well");
+    }
+    RejectedTriangles rejected;
+    const Mesh mesh = read_mesh(command.draw->scene, rejected);
+    const auto draw = std::make_shared<const Draw>(project_mesh(mesh, loaded.viewpoint->camera, rejected));
+    loaded.summary.triangles += draw->mesh.size();
+    loaded.summary.triangles_rejected += rejected.total();
+    scenes[command.draw->scene].splats = draw;
   }
   loaded.summary.name = frame.name;
   for (const FrameCommand& command : frame.commands) {
@@ -107,6 +124,16 @@ std::shared_ptr<const Frame> make_frame(const RunRequest& request, const FrameDe
     MixedFrameOptions options;
     options.splats = draw_state_of(request, draw.settings);
     options.splats.early_termination = draw.early_termination;
+    if (draw.depth) options.splats.depth = *draw.depth;
+    if (draw.stencil) options.splats.stencil = *draw.stencil;
+    options.splats.cull = draw.cull.value_or(draw.is_mesh ? CullMode::back : CullMode::none);
+    if (draw.is_mesh) {
+      options.splats.shader = draw.shader.value_or(FragmentShader::lit);
+      options.splats.light = MixedFrameOptions().light;
+      options.splats.early_termination = false;
+    } else if (draw.shader) {
+      options.splats.shader = *draw.shader;
+    }
     const bool is_mixed_scene = description.commands.size() == 1 && !loaded.meshes[i].empty();
     draw_mixed(*frame, loaded.geometry[i], loaded.meshes[i], options, is_mixed_scene ? "splats" : draw.name, draw.first,
                draw.splats);
