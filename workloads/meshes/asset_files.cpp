@@ -21,7 +21,12 @@ constexpr std::uint64_t kMaxFileBytes = std::uint64_t{1} << 30;
 /// A file in memory.
 class MemoryStream : public Assimp::IOStream {
  public:
-  explicit MemoryStream(std::string bytes) : bytes_(std::move(bytes)) {}
+  MemoryStream(std::string bytes, std::set<Assimp::IOStream*>& open) : bytes_(std::move(bytes)), open_(open) {
+    open_.insert(this);
+  }
+  ~MemoryStream() override { open_.erase(this); }
+  MemoryStream(const MemoryStream&) = delete;
+  MemoryStream& operator=(const MemoryStream&) = delete;
 
   std::size_t Read(void* buffer, std::size_t size, std::size_t count) override {
     if (size == 0 || count == 0) return 0;
@@ -43,6 +48,7 @@ class MemoryStream : public Assimp::IOStream {
 
  private:
   std::string bytes_;
+  std::set<Assimp::IOStream*>& open_;
   std::size_t position_ = 0;
 };
 
@@ -66,6 +72,10 @@ std::string read_mesh_file(const std::string& path) {
   }
 }
 
+AssetFiles::~AssetFiles() {
+  while (!open_.empty()) delete *open_.begin();
+}
+
 bool AssetFiles::Exists(const char* name) const {
   if (path_ == name) return true;
   try {
@@ -78,11 +88,11 @@ bool AssetFiles::Exists(const char* name) const {
 
 Assimp::IOStream* AssetFiles::Open(const char* name, const char* mode) {
   if (std::strpbrk(mode, "wa+") != nullptr) return nullptr;
-  if (path_ == name) return new MemoryStream(bytes_);
+  if (path_ == name) return new MemoryStream(bytes_, open_);
   try {
     std::string bytes = read_mesh_file(name);
     // The other files of an .obj are materials.
-    auto* stream = new MemoryStream(obj_ ? reduced_mtl(bytes) : std::move(bytes));
+    auto* stream = new MemoryStream(obj_ ? reduced_mtl(bytes) : std::move(bytes), open_);
     ++others_read_;
     return stream;
   } catch (const UserError& error) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <set>
 #include <string>
 #include <utility>
 
@@ -18,6 +19,10 @@ class AssetFiles : public Assimp::IOSystem {
   AssetFiles(std::string path, std::string bytes, bool obj)
       : path_(std::move(path)), bytes_(std::move(bytes)), obj_(obj) {}
 
+  ~AssetFiles() override;
+  AssetFiles(const AssetFiles&) = delete;
+  AssetFiles& operator=(const AssetFiles&) = delete;
+
   bool Exists(const char* name) const override;
   char getOsSeparator() const override { return '/'; }
   Assimp::IOStream* Open(const char* name, const char* mode) override;
@@ -30,6 +35,8 @@ class AssetFiles : public Assimp::IOSystem {
  private:
   std::string path_, bytes_;
   bool obj_;  ///< what it names are materials, of which assimp gets reduced_mtl()
+  /// Those that are open. Assimp closes some, deletes others, and forgets those at which it gives up.
+  std::set<Assimp::IOStream*> open_;
   unsigned others_read_ = 0;
   std::string failure_;
 };

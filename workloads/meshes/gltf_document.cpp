@@ -196,7 +196,8 @@ class Reducer {
 
   /// An accessor whose data are in a buffer.
   const Json& data_of(const Json& value, const std::string& place) const {
-    const Json& accessor = result_["accessors"][index_of(value, "accessors", place)];
+    const std::uint64_t i = index_of(value, "accessors", place);  // first: without accessors there is no such member
+    const Json& accessor = result_["accessors"][i];
     if (!accessor.contains("bufferView")) fail(place + " has a sparse accessor, or one without data");
     return accessor;
   }
