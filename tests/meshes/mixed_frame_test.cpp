@@ -62,6 +62,7 @@ TEST(MixedFrame, IsDepthThenSplatsThenColour) {
   for (const std::size_t i : {0U, 1U}) {
     const DrawCall& depth = frame->draws()[i];
     EXPECT_EQ(depth.geometry.get(), &meshes[i]);
+    EXPECT_EQ(depth.splats, meshes[i].mesh.size());
     expect_test(depth.state.depth, Compare::less, true);
     EXPECT_EQ(depth.state.shader, FragmentShader::none);
     EXPECT_EQ(depth.state.cull, CullMode::back);
