@@ -245,6 +245,25 @@ TEST_P(MixedFrame, OfRandomDepthAndStencilIsThatOfTheReference) {
   }
 }
 
+TEST_P(MixedFrame, IsTheSameOnSeveralGpcsAndUnderStalls) {
+  for (std::uint64_t seed = 100; seed < 104; ++seed) {
+    const Frame frame = random_frame(seed, request());
+    const RunResult calm = run(request(), frame);
+    for (const char* platform : {"agx-orin", "desktop"}) {
+      RunRequest stalled = request();
+      stalled.platform = &platform_named(platform);
+      stalled.stall_seed = seed;
+      stalled.stall_per_256 = 80;
+      const RunResult result = run(stalled, frame);
+      SCOPED_TRACE(std::string(platform) + ", seed " + std::to_string(seed));
+      EXPECT_TRUE(testing::same_image(calm.framebuffer.color, result.framebuffer.color));
+      EXPECT_EQ(calm.counts.fragments_depth_stencil_failed, result.counts.fragments_depth_stencil_failed);
+      EXPECT_EQ(calm.counts.fragments_unshaded, result.counts.fragments_unshaded);
+      EXPECT_EQ(calm.counts.quads_rasterized, result.counts.quads_rasterized);
+    }
+  }
+}
+
 // Depth, stencil and termination share one z-cache, of few lines here; conservation of bytes is checked in every run.
 TEST_P(MixedFrame, ThroughAZCacheIsTheSame) {
   RunRequest through_memory = request();
