@@ -140,9 +140,18 @@ struct PropWithoutLatency : PreRop {
 };
 struct ZropOfAnotherTile : DepthStencilRop {
   using DepthStencilRop::DepthStencilRop;
-  void test(QuadBeat& beat) override {
-    DepthStencilRop::test(beat);
+  std::uint32_t test(QuadBeat& beat) override {
+    const std::uint32_t changed = DepthStencilRop::test(beat);
     ++beat.tile.x;
+    return changed;
+  }
+};
+struct ZropThatChangesQuadsThatAreNotThere : DepthStencilRop {
+  using DepthStencilRop::DepthStencilRop;
+  std::uint32_t test(QuadBeat& beat) override {
+    const unsigned count = beat.count;
+    DepthStencilRop::test(beat);
+    return 1U << count;
   }
 };
 template <unsigned Count>
@@ -271,6 +280,8 @@ const Add<TcThatKeepsQuads, TcBehaviour> tc_keeps("tc", "keeps", "flush_oldest: 
 const Add<TcOfAnotherPosition, TcBehaviour> tc_position("tc", "position", "position 64, a tile has 64");
 const Add<PropWithoutLatency, PropBehaviour> prop_latency("prop", "no-latency", "latency_cycles is 0");
 const Add<ZropOfAnotherTile, ZropBehaviour> zrop_tile("zrop", "other-tile", "test: a beat of screen tile");
+const Add<ZropThatChangesQuadsThatAreNotThere, ZropBehaviour> zrop_changes("zrop", "changes-more",
+                                                                           "have changed something");
 const Add<QruOf<0>, QruBehaviour> qru_0("qru", "warps-of-0", "a warp of 0 quads");
 const Add<QruOf<9>, QruBehaviour> qru_9("qru", "warps-of-9", "a warp of 9 quads");
 const Add<QruOf<255>, QruBehaviour> qru_255("qru", "warps-of-255", "a warp of 255 quads");
@@ -423,9 +434,10 @@ struct ZropForDraw0 : ZropBehaviour {
   using Parameters = DepthStencilRop::Parameters;
   ZropForDraw0(const Parameters& parameters, const RenderContext& context) : unit_(parameters, context) {}
   void attach(DepthStencilSurface& surface) override { unit_.attach(surface); }
-  void test(QuadBeat& beat) override {
-    unit_.test(beat);
+  std::uint32_t test(QuadBeat& beat) override {
+    const std::uint32_t changed = unit_.test(beat);
     count_for_draw_0(*this, unit_);
+    return changed;
   }
   void update(const TerminationSignal& signal) override {
     unit_.update(signal);

@@ -185,9 +185,9 @@ TEST_F(FrameFile, BadDepthStencilAndMeshes) {
   bad(of_wall(R"({"stencil": {"pass": "set"}})"), {"state.stencil.pass", "unknown operation"});
   bad(of_wall(R"({"stencil": {"reference": 128}})"), {"state.stencil.reference", "0 to 127"});
   bad(of_wall(R"({"stencil": {"front": {}, "pass": "keep"}})"), {"state.stencil", "unknown key 'pass'"});
-  bad(of_wall(R"({"shader": "splat"})"), {"its shader is that of splats"}, from_the_origin);
+  bad(of_wall(R"({"shader": "splat"})"), {"state.shader", "that of splats"});
   bad(of_wall(R"({"cull": "both"})"), {"state.cull", "back"});
-  bad(R"({"commands": [{"draw": "four.ply", "state": {"shader": "lit"}}]})", {"that of a mesh"}, from_the_origin);
+  bad(R"({"commands": [{"draw": "four.ply", "state": {"shader": "lit"}}]})", {"state.shader", "that of a mesh"});
   bad(R"({"commands": [{"draw": "wall.obj", "splats": [0, 1]}]})", {"splats", "a mesh"});
   bad(R"({"commands": [{"draw": "wall.obj"}, {"draw": "tiny.spl"}]})", {"no scene that has a camera"});
   bad(R"({"commands": [{"clear": ["depth"], "depth": 2}, {"draw": "tiny.spl"}]})", {"depth", "0 to 1"});

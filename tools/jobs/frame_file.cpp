@@ -152,7 +152,7 @@ StencilState read_stencil(const Json& value, const std::string& where) {
 }
 
 Clear read_clear(const Json& value, const std::string& where) {
-  const std::string remedy = "give a list of \"color\", \"termination\", \"depth\", \"stencil\"";
+  const std::string remedy = "give [\"color\"], or several of color, termination, depth, stencil";
   if (!value.is_array() || value.empty()) refuse(where, "it does not say what is cleared", remedy);
   Clear clear;
   for (const Json& part : value) {
@@ -246,6 +246,11 @@ SceneDraw read_draw(const Json& command, const std::string& where, const std::fi
   if (command.contains("name")) draw.name = text_of(command["name"], where + ", name");
   if (command.contains("splats")) read_splats(command["splats"], where + ", splats", draw);
   if (command.contains("state")) read_state(command["state"], where + ", state", draw);
+  const FragmentShader shader = draw.shader.value_or(FragmentShader::none);
+  if (shader != FragmentShader::none && draw.is_mesh == (shader == FragmentShader::splat)) {
+    refuse(where + ", state.shader", draw.is_mesh ? "it is that of splats" : "it is that of a mesh",
+           draw.is_mesh ? "use lit, vertex or none" : "use splat or none");
+  }
   return draw;
 }
 
@@ -254,6 +259,7 @@ FrameCommand read_command(const Json& json, const std::string& where, const std:
   FrameCommand command;
   command.where = where;
   if (json.contains("clear")) {
+    if (json.contains("draw")) refuse(where, "it has other keys beside \"clear\"", "make another command of them");
     check_keys(json, {"clear", "depth", "stencil"}, where);
     command.clear = read_clear(json["clear"], where + ", clear");
     const auto value_of = [&](const char* key, bool is_cleared) {
