@@ -37,6 +37,10 @@ void AttributeFetch::check() const {
                     "use lines of 128 bytes, and sectors of 32");
   }
   if (!has_l1()) return;
+  if (l1.bytes < l1.line_bytes) {
+    throw UserError("unusable L1 of an SM", "sm.l1_bytes",
+                    fmt::format("a line of {} bytes does not fit", l1.line_bytes), "use whole lines, or 0 for none");
+  }
   const std::uint32_t ways = l1.ways_of_a_set();
   const std::uint32_t sets = ways <= l1.lines() ? l1.lines() / ways : 0;
   if (sets * ways != l1.lines() || (sets & (sets - 1)) != 0) {
