@@ -88,33 +88,23 @@ bool box_corners(const RenderContext& context, const DrawState& state, const Spl
 bool snap_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
                    SnappedTriangle& out) {
   const DrawCall& call = context.draw(draw);
-  const auto steps = static_cast<double>(1U << context.precision.subpixel_bits);
+  std::array<Point, 3> points;
   if (call.geometry->is_mesh()) {
-    const MeshTriangle& given = call.mesh_triangle(splat);
-    for (unsigned vertex = 0; vertex < 3; ++vertex) {
-      const Point point{given.vertices[vertex].x, given.vertices[vertex].y};
-      if (!in_guard_band(point)) return false;
-      out.x[vertex] = snap(point.x, steps);
-      out.y[vertex] = snap(point.y, steps);
-    }
-    return true;
+    const std::array<MeshVertex, 3>& given = call.mesh_triangle(splat).vertices;
+    for (unsigned vertex = 0; vertex < 3; ++vertex) points[vertex] = {given[vertex].x, given[vertex].y};
+  } else if (const ScreenTriangle* const given = call.triangle(splat)) {
+    for (unsigned vertex = 0; vertex < 3; ++vertex) points[vertex] = {given->x[vertex], given->y[vertex]};
+  } else {
+    std::array<Point, 4> corners;
+    if (!box_corners(context, call.state, call.splat(splat), corners)) return false;
+    constexpr unsigned order[2][3] = {{0, 1, 2}, {1, 3, 2}};
+    for (unsigned vertex = 0; vertex < 3; ++vertex) points[vertex] = corners[order[triangle][vertex]];
   }
-  if (const ScreenTriangle* const given = call.triangle(splat)) {
-    for (unsigned vertex = 0; vertex < 3; ++vertex) {
-      const Point point{given->x[vertex], given->y[vertex]};
-      if (!in_guard_band(point)) return false;
-      out.x[vertex] = snap(point.x, steps);
-      out.y[vertex] = snap(point.y, steps);
-    }
-    return true;
-  }
-  std::array<Point, 4> corners;
-  if (!box_corners(context, call.state, call.splat(splat), corners)) return false;
-  constexpr unsigned order[2][3] = {{0, 1, 2}, {1, 3, 2}};
+  if (!std::all_of(points.begin(), points.end(), in_guard_band)) return false;
+  const auto steps = static_cast<double>(1U << context.precision.subpixel_bits);
   for (unsigned vertex = 0; vertex < 3; ++vertex) {
-    const Point& point = corners[order[triangle][vertex]];
-    out.x[vertex] = snap(point.x, steps);
-    out.y[vertex] = snap(point.y, steps);
+    out.x[vertex] = snap(points[vertex].x, steps);
+    out.y[vertex] = snap(points[vertex].y, steps);
   }
   return true;
 }

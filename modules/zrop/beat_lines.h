@@ -41,6 +41,13 @@ class BeatLines {
       out.lines[place[line] - 1U].sectors |= sectors;
     }
   }
+  /// Of some quads of a beat, a bit each.
+  void find(const QuadBeat& beat, std::uint32_t quads, Needed& out) const {
+    std::array<Quad, QuadBeat::capacity> some;
+    unsigned count = 0;
+    for (; quads != 0; quads &= quads - 1) some[count++] = beat.quads[static_cast<unsigned>(__builtin_ctz(quads))];
+    find(beat.tile, some.data(), count, out);
+  }
   /// Of an update.
   Needed::Line find(const TerminationSignal& signal) const {
     const auto [line, sectors] = places_[signal.position];

@@ -65,10 +65,7 @@ class TimedZCache {
   void tested(unsigned quads, Cycle at) { queue_.take(quads, at); }
   /// Quads of a beat have changed depth or stencil in the cycle of their test, a bit each; `beat` is that before the test.
   void change(const QuadBeat& beat, std::uint32_t quads, Cycle at) {
-    changed_quads_.clear();
-    for (; quads != 0; quads &= quads - 1)
-      changed_quads_.push_back(beat.quads[static_cast<unsigned>(__builtin_ctz(quads))]);
-    lines_->find(beat.tile, changed_quads_.data(), static_cast<unsigned>(changed_quads_.size()), needed_);
+    lines_->find(beat, quads, needed_);
     for (unsigned i = 0; i < needed_.count; ++i) {
       const BeatLines::Needed::Line& changed = needed_.lines[i];
       LineAccess access;
@@ -146,11 +143,10 @@ class TimedZCache {
   std::optional<BeatLines> lines_;
   std::optional<SectoredCache> cache_;
   BeatLines::Needed needed_;
-  std::vector<Quad> changed_quads_;  ///< of the beat tested last
-  Cycle read_ = 0;                   ///< the last line looked up for a test
-  std::vector<Cycle> kept_until_;    ///< by line of the cache
-  std::vector<Cycle> there_;         ///< by sector
-  std::uint64_t owed_ = 0;           ///< sectors
+  Cycle read_ = 0;                 ///< the last line looked up for a test
+  std::vector<Cycle> kept_until_;  ///< by line of the cache
+  std::vector<Cycle> there_;       ///< by sector
+  std::uint64_t owed_ = 0;         ///< sectors
   Cycle owed_at_ = 0;
 };
 

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <optional>
-#include <vector>
 
 #include "beat_lines.h"
 
@@ -75,11 +74,8 @@ class ZPort {
 
   /// Quads of the beat tested last have changed depth or stencil, a bit each; `beat` is that before the test.
   void change(const QuadBeat& beat, std::uint32_t quads) {
-    changed_quads_.clear();
-    for (; quads != 0; quads &= quads - 1)
-      changed_quads_.push_back(beat.quads[static_cast<unsigned>(__builtin_ctz(quads))]);
     BeatLines::Needed changed;
-    lines_->find(beat.tile, changed_quads_.data(), static_cast<unsigned>(changed_quads_.size()), changed);
+    lines_->find(beat, quads, changed);
     for (unsigned i = 0; i < changed.count; ++i) changed_.push(changed.lines[i]);
     put_changed();
   }
@@ -240,7 +236,6 @@ class ZPort {
   CachePort::LookUp update_;
 
   Ring<BeatLines::Needed::Line> changed_;  ///< by tests, and not put back yet
-  std::vector<Quad> changed_quads_;        ///< of the beat tested last
   Ring<Beat> beats_;                       ///< looked up, and not tested
   unsigned queued_quads_ = 0;
   Ring<Read> reads_;  ///< lines of these, that are not read yet

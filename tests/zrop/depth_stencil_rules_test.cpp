@@ -195,18 +195,29 @@ TEST(StencilTest, NoOperationTouchesTheTerminationBit) {
   }
 }
 
+/// ZROP in a frame of one draw of such a triangle, with a surface of its own.
+struct RopOfOneDraw {
+  explicit RopOfOneDraw(const DrawState& state) {
+    Frame frame(16, 16);
+    frame.draw(triangle_of(0.5F), state);
+    context = testing::context_of(frame);
+    rop = std::make_unique<DepthStencilRop>(parameters, context);
+    rop->attach(surface);
+  }
+  const DepthStencilRop::Parameters parameters;
+  RenderContext context;
+  DepthStencilSurface surface{16, 16};
+  std::unique_ptr<DepthStencilRop> rop;
+};
+
 TEST(DepthStencilCounts, AFragmentThatFailsBothTestsFailedTheFirst) {
-  Frame frame(16, 16);
   DrawState state;
   state.shader = FragmentShader::vertex;
   state.early_termination = true;
   state.depth = {true, Compare::less, false};
-  frame.draw(triangle_of(0.5F), state);
-  const RenderContext context = testing::context_of(frame);
-  const DepthStencilRop::Parameters parameters;
-  DepthStencilRop rop(parameters, context);
-  DepthStencilSurface surface(16, 16);
-  rop.attach(surface);
+  RopOfOneDraw one(state);
+  DepthStencilRop& rop = *one.rop;
+  DepthStencilSurface& surface = one.surface;
   // Lanes 0 and 1 fail the depth test, lanes 1 and 2 have terminated.
   surface.quad(3).depth[0] = surface.quad(3).depth[1] = 0;
   surface.terminated(3) = 0b0110;
@@ -224,16 +235,12 @@ TEST(DepthStencilCounts, AFragmentThatFailsBothTestsFailedTheFirst) {
 }
 
 TEST(DepthStencilCounts, WhatIsNotShadedEndsHere) {
-  Frame frame(16, 16);
   DrawState state;
   state.shader = FragmentShader::none;
   state.depth.test = true;
-  frame.draw(triangle_of(0.5F), state);
-  const RenderContext context = testing::context_of(frame);
-  const DepthStencilRop::Parameters parameters;
-  DepthStencilRop rop(parameters, context);
-  DepthStencilSurface surface(16, 16);
-  rop.attach(surface);
+  RopOfOneDraw one(state);
+  DepthStencilRop& rop = *one.rop;
+  DepthStencilSurface& surface = one.surface;
   surface.quad(3).depth[0] = 0;
   QuadBeat beat = testing::beat_of({0, 0}, {3});
   EXPECT_EQ(rop.test(beat), 1U);
