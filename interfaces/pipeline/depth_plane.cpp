@@ -1,6 +1,7 @@
 #include <vrpipe/pipeline/depth_plane.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include <vrpipe/component/error.h>
@@ -24,6 +25,27 @@ DepthPlane::DepthPlane(const RenderContext& context, DrawIndex draw, std::uint32
   }
   nearest_ = *std::min_element(depth_.begin(), depth_.end());
   farthest_ = *std::max_element(depth_.begin(), depth_.end());
+}
+
+double DepthPlane::nearest_in(const PixelRect& area) const {
+  if (is_flat()) return nearest_;
+  // A plane is nearest at a corner. A weight has three roundings, a product one and their sum two: together they are off by
+  // less than 8 * 2^-53 of the magnitudes that are added, here as at a covered sample, where no weight exceeds 1.
+  constexpr double rounding = 1.0 / (1ULL << 49U);
+  double nearest = farthest_;
+  for (const std::int32_t y : {area.y0, area.y1 - 1}) {
+    for (const std::int32_t x : {area.x0, area.x1 - 1}) {
+      const std::array<double, 3> weights = weights_.at(x, y);
+      double depth = 0;
+      double magnitude = 0;
+      for (unsigned i = 0; i < 3; ++i) {
+        depth += weights[i] * depth_[i];
+        magnitude += (std::fabs(weights[i]) + 1) * std::fabs(depth_[i]);
+      }
+      nearest = std::min(nearest, depth - magnitude * rounding);
+    }
+  }
+  return std::max(nearest, nearest_);
 }
 
 }  // namespace vrpipe

@@ -66,7 +66,17 @@ unsigned put_covered(Quad* out, Words quads, std::uint64_t coverage) {
 TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderContext& context)
     : context_(context), timing_{parameters.setup_latency_cycles,        parameters.setup_interval_cycles,
                                  parameters.coarse_tiles_per_cycle,      parameters.fine_tiles_per_cycle,
-                                 parameters.screen_tile_interval_cycles, parameters.quads_per_cycle} {}
+                                 parameters.screen_tile_interval_cycles, parameters.quads_per_cycle} {
+  if (!parameters.hi_z) return;
+  hi_z_ = std::make_unique<HiZ>(context, parameters.hi_z_bits);
+  if (!hi_z_->is_used()) hi_z_.reset();
+}
+
+void TileRasterizer::update(const HiZUpdate& update) {
+  if (hi_z_ == nullptr) return;
+  hi_z_updates += update.mark == Mark::none ? 1 : 0;
+  hi_z_->update(update);
+}
 
 void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   ++setups;
@@ -116,6 +126,7 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
     if (std::abs(edge.dx) + std::abs(edge.dy) > narrow_gradient) wide_ = true;
     magnitudes |= std::abs(edge.origin) + std::abs(edge.dx) * width + std::abs(edge.dy) * height;
   }
+  tests_hi_z_ = hi_z_ != nullptr && hi_z_->begin(primitive);
   if (wide_) ++wide_edges;
   widest_edge.see(static_cast<std::uint64_t>(65 - __builtin_clzll(static_cast<unsigned long long>(magnitudes))));
 }
@@ -150,7 +161,7 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
           value[i] + 7 * (std::max<std::int64_t>(edge.dx, 0) + std::max<std::int64_t>(edge.dy, 0));
       rejected = rejected || most < 0;
     }
-    if (rejected) continue;
+    if (rejected || (tests_hi_z_ && is_hidden(tile, x, y))) continue;
 
     out.tile = tile;
     out.count = 0;
@@ -169,6 +180,15 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
   }
   raster_tiles_tested += coarse_tests;
   return false;
+}
+
+bool TileRasterizer::is_hidden(TileId tile, std::int32_t x, std::int32_t y) {
+  ++hi_z_tests;
+  const PixelRect area{std::max(x, area_.x0), std::max(y, area_.y0), std::min(x + raster_side, area_.x1),
+                       std::min(y + raster_side, area_.y1)};
+  const bool is_hidden = hi_z_->hides(tile, part_, area);
+  hi_z_culled += is_hidden ? 1 : 0;
+  return is_hidden;
 }
 
 LaneMask TileRasterizer::in_area(std::int32_t x, std::int32_t y) const {

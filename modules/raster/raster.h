@@ -1,5 +1,9 @@
 #pragma once
 
+#include <memory>
+
+#include "hi_z.h"
+
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/pipeline/units.h>
@@ -60,11 +64,23 @@ class TileRasterizer : public RasterBehaviour {
                             "quads",
                             "measured on a GH100 graphics GPC: 64 pixels a cycle",
                             "quads handed to TC in a cycle"};
+    Switch hi_z{*this, "hi_z", true, "GPUs have had it since 2000",
+                "raster tiles behind all that is stored there are dropped before fine rasterisation"};
+    Integer hi_z_bits{*this,
+                      "hi_z_bits",
+                      14,
+                      1,
+                      24,
+                      "bits",
+                      "AMD's HTILE: 14 bits of an 8x8 tile's farthest depth",
+                      "that Hi-Z keeps of a raster tile's farthest depth, rounded up"};
   };
   TileRasterizer(const Parameters& parameters, const RenderContext& context);
 
   void begin(const Primitive& primitive, const PixelRect& clip) override;
   bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override;
+  void update(const HiZUpdate& update) override;
+  bool waits_at(Mark mark) const override { return hi_z_ != nullptr && hi_z_->waits_at(mark); }
   TimingParameters timing() const override { return timing_; }
 
   Counter setups{*this, "setups", "primitives", "set up; again for each flush that a primitive is in"};
@@ -73,6 +89,9 @@ class TileRasterizer : public RasterBehaviour {
   Counter screen_tile_pairs{*this, "screen_tile_pairs", "pairs", "of a primitive and a screen tile that it may cover"};
   MinMax widest_edge{*this, MinMax::Of::largest, "widest_edge", "bits",
                      "sign included, that the largest edge function needs over the samples of the viewport"};
+  Counter hi_z_tests{*this, "hi_z_tests", "raster tiles", "that coarse rasterisation keeps and Hi-Z looks at"};
+  Counter hi_z_culled{*this, "hi_z_culled", "raster tiles", "dropped: they lie behind all that is stored there"};
+  Counter hi_z_updates{*this, "hi_z_updates", "raster tiles", "whose farthest depth came from ZROP"};
   Counter wide_edges{*this, "wide_edges", "primitives", "that need 64-bit edge functions inside a raster tile"};
 
  private:
@@ -84,6 +103,8 @@ class TileRasterizer : public RasterBehaviour {
   unsigned fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]);
   LaneMask in_area(std::int32_t x, std::int32_t y) const;
   bool advance();
+  /// Whether Hi-Z culls the raster tile that begins at a pixel.
+  bool is_hidden(TileId tile, std::int32_t x, std::int32_t y);
 
   const RenderContext& context_;
   TimingParameters timing_;
@@ -99,6 +120,8 @@ class TileRasterizer : public RasterBehaviour {
   std::int32_t tile_y_end_ = 0;
   unsigned part_ = 0;  ///< raster tile in the screen tile, 0 to 3
   bool tile_counted_ = false;
+  std::unique_ptr<HiZ> hi_z_;  ///< where it can cull anything
+  bool tests_hi_z_ = false;    ///< for the primitive
 };
 
 }  // namespace vrpipe

@@ -4,13 +4,16 @@ namespace vrpipe {
 
 namespace {
 
-/// RASTER at lt and at. Ports as in raster_unit.cpp.
+/// RASTER at lt and at. What ZROP has stored comes with its time, at `lt` long before that, and counts from then on. Ports as
+/// in raster_unit.cpp.
 class TimedRaster : public TimedUnit {
  public:
   TimedRaster(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour,
               Transport transport)
       : TimedUnit(name, domain, RasterWork::kinds(behaviour->timing()), transport),
         out_(*this, "out_quads"),
+        in_hi_z_(*this, "in_hi_z",
+                 [this](const HiZUpdate& update, CycleInterval visible) { return take(update, visible.first); }),
         in_(*this, "in_jobs",
             [this](const RasterJob& job, CycleInterval visible) { return rasterize(job, visible.first); }, {&out_}),
         behaviour_(std::move(behaviour)),
@@ -19,11 +22,38 @@ class TimedRaster : public TimedUnit {
         fine_(timing_.fine_tiles_per_cycle),
         quads_out_(timing_.quads_per_cycle) {
     out_.set_pipeline(timing_.setup_latency_cycles - 1, timing_.fine_tiles_per_cycle);
+    in_hi_z_.set_optional();
+    if (!blocking()) in_.set_gate([this] { return !waits_; });
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
+  void close_account(Cycle end) override {
+    apply_updates(never);
+    TimedUnit::close_account(end);
+  }
 
  private:
+  struct Update {
+    HiZUpdate update;
+    Cycle at = 0;
+  };
+  Cycle take(const HiZUpdate& update, Cycle visible) {
+    updates_.push({update, visible});
+    if (update.mark == Mark::none) return visible;
+    // Of what was waited for.
+    apply_updates(never);
+    waits_ = false;
+    charge(UnitState::starved, now_);
+    now_ = std::max(now_, visible);
+    charge(UnitState::latency, now_);
+    return visible;
+  }
+  void apply_updates(Cycle until) {
+    for (; !updates_.empty() && updates_.front().at <= until; updates_.pop()) {
+      behaviour_->update(updates_.front().update);
+    }
+  }
+
   Cycle rasterize(const RasterJob& job, Cycle visible) {
     now_ = std::max({now_, visible, out_.last()});
     charge(UnitState::blocked, out_.last());
@@ -31,13 +61,19 @@ class TimedRaster : public TimedUnit {
     if (job.mark != Mark::none) {
       QuadBeat mark;
       mark.mark = job.mark;
-      return now_ = out_.send(mark, now_).first;
+      waits_ = !in_hi_z_.is_stub() && behaviour_->waits_at(job.mark);
+      // At `lt` it comes back meanwhile.
+      const Cycle sent = out_.send(mark, now_).first;
+      now_ = std::max(now_, sent);
+      if (waits_ && blocking()) throw SimulationFault(name(), now_, "ZROP has not passed a mark that Hi-Z waits for");
+      return sent;
     }
     now_ = std::max(now_, next_setup_);
     const Cycle setup = now_;
     next_setup_ = setup + timing_.setup_interval_cycles;
     did(RasterWork::setup, 1, setup, std::max(next_setup_, setup + 1));
     charge(UnitState::busy, setup + 1);
+    apply_updates(now_);
     behaviour_->begin(job.primitive, job.clip);
     QuadBeat tile;
     unsigned tests = 0;
@@ -60,6 +96,7 @@ class TimedRaster : public TimedUnit {
       now_ = out_.send(tile, now_).first;
       charge(UnitState::blocked, now_);
       charge(UnitState::busy, now_ + 1);
+      apply_updates(now_);
     }
     test_tiles(tests);
     return setup;
@@ -73,13 +110,16 @@ class TimedRaster : public TimedUnit {
   }
 
   TimedOut<QuadBeat> out_;
+  TimedIn<HiZUpdate> in_hi_z_;
   TimedIn<RasterJob> in_;
   std::unique_ptr<RasterBehaviour> behaviour_;
   const RasterBehaviour::TimingParameters timing_;
   ThroughputPort coarse_;
   IssuePort fine_;
   ThroughputPort quads_out_;
-  Cycle now_ = 0;  ///< how far the primitive in hand has come
+  Ring<Update> updates_;  ///< whose time has not come
+  bool waits_ = false;    ///< for a mark to come back from ZROP
+  Cycle now_ = 0;         ///< how far the primitive in hand has come
   Cycle next_pair_ = 0;
   Cycle next_setup_ = 0;
   Cycle coarse_done_ = 0;

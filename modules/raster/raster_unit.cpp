@@ -5,19 +5,22 @@ namespace vrpipe {
 namespace {
 
 /// RASTER at cycle fidelity: set-up, coarse tests and fine tiles at their rates, quads to TC as they come out.
-/// Ports: in_jobs (RasterJob), out_quads (QuadBeat).
+/// What ZROP has stored is known in the cycle in which it comes.
+/// Ports: in_jobs (RasterJob), out_quads (QuadBeat), in_hi_z (HiZUpdate; optional).
 class RasterUnit : public Unit {
  public:
   RasterUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour)
       : Unit(name, domain, RasterWork::kinds(behaviour->timing())),
         in_(*this, "in_jobs"),
         out_(*this, "out_quads"),
+        in_hi_z_(*this, "in_hi_z"),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()) {
     out_.set_pipeline(timing_.setup_latency_cycles - 1, timing_.fine_tiles_per_cycle);
+    in_hi_z_.set_optional();
   }
 
-  bool idle() const override { return in_.empty() && !active_ && at_ == tile_.count; }
+  bool idle() const override { return in_.empty() && in_hi_z_.empty() && !active_ && at_ == tile_.count; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -51,9 +54,20 @@ class RasterUnit : public Unit {
     mark.mark = in_.front().mark;
     out_.push(mark);
     in_.pop();
+    waits_ = !in_hi_z_.is_stub() && behaviour_->waits_at(mark.mark);
+  }
+  [[gnu::noinline]] void take_updates() {
+    for (; in_hi_z_.ready(); in_hi_z_.pop()) {
+      behaviour_->update(in_hi_z_.front());
+      if (in_hi_z_.front().mark != Mark::none) waits_ = false;
+    }
   }
 
   Cycle tick(Cycle now) override {
+    if (!in_hi_z_.empty()) take_updates();
+    return std::min(work(now), in_hi_z_.next_ready());
+  }
+  Cycle work(Cycle now) {
     unsigned quad_budget = timing_.quads_per_cycle;
     unsigned fine_budget = timing_.fine_tiles_per_cycle;
     unsigned coarse_budget = timing_.coarse_tiles_per_cycle;
@@ -84,6 +98,11 @@ class RasterUnit : public Unit {
       }
       if (fine_budget == 0) break;
       if (!active_) {
+        if (waits_) {
+          if (moved) break;
+          enter(UnitState::latency, now);
+          return never;
+        }
         if (!in_.ready()) {
           if (moved) break;
           enter(UnitState::starved, now);
@@ -127,10 +146,12 @@ class RasterUnit : public Unit {
 
   StreamIn<RasterJob> in_;
   StreamOut<QuadBeat> out_;
+  StreamIn<HiZUpdate> in_hi_z_;
   std::unique_ptr<RasterBehaviour> behaviour_;
   const RasterBehaviour::TimingParameters timing_;
   bool active_ = false;
-  QuadBeat tile_;  ///< quads of the raster tile in hand, sent up to `at_`
+  bool waits_ = false;  ///< for a mark to come back from ZROP
+  QuadBeat tile_;       ///< quads of the raster tile in hand, sent up to `at_`
   unsigned at_ = 0;
   unsigned coarse_debt_ = 0;  ///< raster tiles tested ahead of the coarse rasteriser's rate
   Cycle tile_due_ = 0;

@@ -12,7 +12,10 @@ class UntimedRaster : public UntimedUnit {
       : UntimedUnit(name),
         out_(*this, "out_quads"),
         in_(input<RasterJob>("in_jobs", [this](const RasterJob& job) { rasterize(job); })),
-        behaviour_(std::move(behaviour)) {}
+        in_hi_z_(input<HiZUpdate>("in_hi_z", [this](const HiZUpdate& update) { behaviour_->update(update); })),
+        behaviour_(std::move(behaviour)) {
+    in_hi_z_->set_optional();
+  }
 
   Behaviour& behaviour() override { return *behaviour_; }
 
@@ -39,6 +42,7 @@ class UntimedRaster : public UntimedUnit {
 
   UntimedOut<QuadBeat> out_;
   std::unique_ptr<UntimedIn<RasterJob>> in_;
+  std::unique_ptr<UntimedIn<HiZUpdate>> in_hi_z_;
   std::unique_ptr<RasterBehaviour> behaviour_;
   QuadBeat tile_;
 };

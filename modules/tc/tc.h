@@ -3,6 +3,7 @@
 #include <deque>
 
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/hi_z_plan.h>
 #include <vrpipe/pipeline/screen_tiling.h>
 #include <vrpipe/pipeline/units.h>
 
@@ -66,9 +67,18 @@ class TileCoalescing : public TcBehaviour {
   std::vector<std::int32_t> bin_of_tile_;  ///< -1: none
 };
 
-/// Whether TC hands a mark on. Behind it a bin, and so a warp, is of one state, and a change of state has nothing to stop.
-inline bool goes_on(const Frame& frame, Mark mark) {
-  return mark == Mark::end_of_frame || frame.clear_of(mark) != nullptr;
-}
+/// The marks that TC hands on. Behind it a bin, and so a warp, is of one state, and a change of state has nothing to stop; but
+/// Hi-Z may wait for one to come to ZROP.
+class PassingMarks {
+ public:
+  explicit PassingMarks(const RenderContext& context) : frame_(*context.frame), hi_z_(context) {}
+  bool has(Mark mark) const {
+    return mark == Mark::end_of_frame || frame_.clear_of(mark) != nullptr || hi_z_.waits_at(mark);
+  }
+
+ private:
+  const Frame& frame_;
+  const HiZPlan hi_z_;
+};
 
 }  // namespace vrpipe

@@ -19,7 +19,7 @@ class TimedTc : public TimedUnit {
         in_(*this, "in_quads",
             [this](const QuadBeat& beat, CycleInterval visible) { return collect(beat, visible.first); }, {&out_}),
         behaviour_(std::move(behaviour)),
-        frame_(*context.frame),
+        passing_(context),
         timing_(behaviour_->timing()),
         idle_timeout_cycles_(timing_.timeout_in(context.termination)),
         entries_(timing_.quads_per_cycle),
@@ -113,7 +113,7 @@ class TimedTc : public TimedUnit {
       send(at++);
     }
     holds_quads_ = false;
-    if (!goes_on(frame_, mark)) return visible;
+    if (!passing_.has(mark)) return visible;
     BinItem item;
     item.mark = mark;
     out_.send(item, std::max({at, sent_ + 1, out_.last() + 1}));
@@ -128,7 +128,7 @@ class TimedTc : public TimedUnit {
   TimedOut<BinItem> out_;
   TimedIn<QuadBeat> in_;
   std::unique_ptr<TcBehaviour> behaviour_;
-  const Frame& frame_;
+  const PassingMarks passing_;
   const TcBehaviour::TimingParameters timing_;
   const std::uint32_t idle_timeout_cycles_;  ///< 0: never
   std::deque<BinStorage> storage_ = std::deque<BinStorage>(1);

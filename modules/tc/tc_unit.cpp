@@ -18,7 +18,7 @@ class TcUnit : public Unit {
         in_(*this, "in_quads"),
         out_(*this, "out_bins"),
         behaviour_(std::move(behaviour)),
-        frame_(*context.frame),
+        passing_(context),
         timing_(behaviour_->timing()),
         idle_timeout_cycles_(timing_.timeout_in(context.termination)),
         queue_(timing_.flush_queue_bins) {
@@ -94,7 +94,7 @@ class TcUnit : public Unit {
 
   /// Once all bins before the mark have gone; false while there is no room for it.
   [[gnu::noinline]] bool pass_mark() {
-    if (goes_on(frame_, mark_)) {
+    if (passing_.has(mark_)) {
       if (out_.credits() == 0) return false;
       QuadBeat beat;
       beat.mark = mark_;
@@ -145,7 +145,7 @@ class TcUnit : public Unit {
   StreamIn<QuadBeat> in_;
   StreamOut<QuadBeat> out_;
   std::unique_ptr<TcBehaviour> behaviour_;
-  const Frame& frame_;
+  const PassingMarks passing_;
   const TcBehaviour::TimingParameters timing_;
   const std::uint32_t idle_timeout_cycles_;  ///< 0: never
   std::vector<Flush> queue_;                 ///< flushed bins, a ring

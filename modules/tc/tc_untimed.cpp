@@ -12,7 +12,7 @@ class UntimedTc : public UntimedUnit {
  public:
   UntimedTc(const std::string& name, std::unique_ptr<TcBehaviour> behaviour, const RenderContext& context)
       : UntimedUnit(name),
-        frame_(*context.frame),
+        passing_(context),
         out_(*this, "out_bins"),
         in_(input<QuadBeat>("in_quads", [this](const QuadBeat& beat) { collect(beat); })),
         behaviour_(std::move(behaviour)) {}
@@ -32,7 +32,7 @@ class UntimedTc : public UntimedUnit {
 
   void drain(Mark mark) {
     while (behaviour_->flush_oldest(TcBehaviour::FlushReason::end_of_draw, storage_.flush)) send();
-    if (!goes_on(frame_, mark)) return;
+    if (!passing_.has(mark)) return;
     BinItem item;
     item.mark = mark;
     out_.send(item);
@@ -47,7 +47,7 @@ class UntimedTc : public UntimedUnit {
     out_.send(item);
   }
 
-  const Frame& frame_;
+  const PassingMarks passing_;
   UntimedOut<BinItem> out_;
   std::unique_ptr<UntimedIn<QuadBeat>> in_;
   std::unique_ptr<TcBehaviour> behaviour_;

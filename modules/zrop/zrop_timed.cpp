@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "zrop/hi_z_reports.h"
 #include "zrop/timed_z_cache.h"
 
 #include <vrpipe/model/timed.h>
@@ -13,7 +14,8 @@ namespace {
 
 /// ZROP at lt and at. Updates go first, so that the cycle of one is known when it arrives; a test applies those of its
 /// past. With the memory port connected, quads and updates are looked up in the z-cache first (timed_z_cache.h).
-/// Ports: in_quads, out_quads (BinItem), in_terminations (TerminationBeat), memory (TLM-2.0 base protocol; optional).
+/// Ports: in_quads, out_quads (BinItem), in_terminations (TerminationBeat), out_hi_z (HiZUpdate; optional), memory
+/// (TLM-2.0 base protocol; optional).
 class TimedZrop : public TimedUnit {
  public:
   TimedZrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
@@ -21,6 +23,7 @@ class TimedZrop : public TimedUnit {
       : TimedUnit(name, domain, ZropWork::kinds(behaviour->timing()), transport),
         context_(context),
         out_(*this, "out_quads"),
+        out_hi_z_(*this, "out_hi_z"),
         in_terminations_(*this, "in_terminations",
                          [this](const TerminationBeat& beat, CycleInterval visible) {
                            return update(beat, visible.first);
@@ -32,8 +35,11 @@ class TimedZrop : public TimedUnit {
         at_once_(std::min(timing_.quads_per_cycle, QuadBeat::capacity)),
         tests_(timing_.quads_per_cycle),
         updates_(timing_.updates_per_cycle),
-        z_(*this, timing_, context.placement, cache_statistics_) {
+        z_(*this, timing_, context.placement, cache_statistics_),
+        hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_hi_z_.set_optional();
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -101,6 +107,7 @@ class TimedZrop : public TimedUnit {
         while (!pending_.empty() && pending_.front().at <= at) apply_update();
       }
       behaviour_->pass(item.mark);
+      if (hi_z_.returns(item.mark)) out_hi_z_.send(HiZReports::of_mark(item.mark), at);
       const Cycle taken = out_.send(item, at).first;
       tests_.hold(taken);
       // What they are caused by has gone before.
@@ -117,6 +124,7 @@ class TimedZrop : public TimedUnit {
     const DrawState* const state = total > 0 ? &context_.state(quads.front().draw) : nullptr;
     const bool needs_stencil = has_cache_ && state != nullptr && state->reads_depth_stencil();
     const bool may_change = needs_stencil && state->writes_depth_stencil();
+    const bool hi_z = total > 0 && hi_z_.wanted(quads.front().draw);
     unsigned beats_left = 0;
     QuadBeat beat;
     beat.tile = item.tile;
@@ -134,11 +142,15 @@ class TimedZrop : public TimedUnit {
       port_free_at_ = at + (tested_quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       did(ZropWork::tests, tested_quads, at, port_free_at_);
       QuadBeat before;
-      if (may_change) before = beat;
+      if (may_change || hi_z) before = beat;
       const std::uint32_t changed = behaviour_->test(beat);
       if (may_change && changed != 0) {
         z_.change(before, changed, at);
         note_moves();
+      }
+      if (hi_z && changed != 0) {
+        hi_z_.changed(before, changed, *behaviour_->surface(),
+                      [&](const HiZUpdate& update) { out_hi_z_.send(update, at); });
       }
       if (beat.count < tested_quads) frame_lasts(at + timing_.latency_cycles);
       tested.first = std::min(tested.first, at);
@@ -208,6 +220,7 @@ class TimedZrop : public TimedUnit {
 
   const RenderContext& context_;
   TimedOut<BinItem> out_;
+  TimedOut<HiZUpdate> out_hi_z_;
   TimedIn<TerminationBeat> in_terminations_;
   TimedIn<BinItem> in_;
   std::unique_ptr<ZropBehaviour> behaviour_;
@@ -223,6 +236,7 @@ class TimedZrop : public TimedUnit {
   std::unique_ptr<FixedLatencyMemory> no_memory_;  ///< behind a port that is not connected
   Ring<Pending> arrived_;                          ///< updates not looked up yet
   Ring<Cycle> moves_;                              ///< of a cycle's worth of sectors each, not moved yet
+  HiZReports hi_z_;
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "zrop/hi_z_reports.h"
 #include "zrop/z_port.h"
 
 #include <vrpipe/model/unit.h>
@@ -11,7 +12,8 @@ namespace {
 
 /// ZROP at cycle fidelity. One port into the z-cache: a cycle either moves sectors, a whole cycle's worth of them, or
 /// applies updates, or tests, in this order. Without memory the z-cache holds everything.
-/// Ports: in_quads, out_quads (QuadBeat), in_terminations (TerminationBeat), memory (TLM-2.0 base protocol; optional).
+/// Ports: in_quads, out_quads (QuadBeat), in_terminations (TerminationBeat), out_hi_z (HiZUpdate; optional), memory
+/// (TLM-2.0 base protocol; optional).
 class ZropUnit : public Unit {
  public:
   ZropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
@@ -19,16 +21,20 @@ class ZropUnit : public Unit {
       : Unit(name, domain, ZropWork::kinds(behaviour->timing())),
         in_(*this, "in_quads"),
         out_(*this, "out_quads"),
+        out_hi_z_(*this, "out_hi_z"),
         in_terminations_(*this, "in_terminations"),
         context_(context),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         z_(*this, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context),
-        limit_(timing_.quads_per_cycle) {
+        limit_(timing_.quads_per_cycle),
+        hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_hi_z_.set_optional();
   }
 
-  bool idle() const override { return in_.empty() && in_terminations_.empty() && z_.idle(); }
+  bool idle() const override { return in_.empty() && in_terminations_.empty() && told_.empty() && z_.idle(); }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &z_.socket(); }
   bool memory_is_optional() const override { return true; }
@@ -98,12 +104,18 @@ class ZropUnit : public Unit {
       const unsigned tested = beat.count;
       // Of what may write, the quads that come in.
       QuadBeat before;
-      if (has_cache_ && tested > 0 && context_.state(beat.quads[0].draw).writes_depth_stencil()) before = beat;
+      const bool hi_z = tested > 0 && hi_z_.wanted(beat.quads[0].draw);
+      if (hi_z || (has_cache_ && tested > 0 && context_.state(beat.quads[0].draw).writes_depth_stencil()))
+        before = beat;
       if (beat.mark == Mark::none) {
         const std::uint32_t changed = behaviour_->test(beat);
         if (has_cache_ && changed != 0) z_.change(before, changed);
+        if (hi_z && changed != 0) {
+          hi_z_.changed(before, changed, *behaviour_->surface(),
+                        [this](const HiZUpdate& update) { told_.push(update); });
+        }
       } else {
-        behaviour_->pass(beat.mark);
+        pass(beat.mark);
       }
       if (beat.count < tested) frame_lasts(now + timing_.latency_cycles);
       moved = true;
@@ -115,8 +127,21 @@ class ZropUnit : public Unit {
     return moved;
   }
 
+  void pass(Mark mark) {
+    behaviour_->pass(mark);
+    if (hi_z_.returns(mark)) told_.push(HiZReports::of_mark(mark));
+  }
+  /// To Hi-Z, which may take it later: tests do not wait for that.
+  [[gnu::noinline]] void tell() {
+    for (; !told_.empty() && out_hi_z_.credits() > 0; told_.pop()) out_hi_z_.push(told_.front());
+  }
+
   Cycle tick(Cycle now) override {
-    if (has_cache_) return tick_cache(now);
+    const Cycle next = has_cache_ ? tick_cache(now) : work(now);
+    if (!told_.empty()) tell();
+    return next;
+  }
+  Cycle work(Cycle now) {
     if (update(now) || (now >= free_at_ && test(now))) {
       enter(UnitState::busy, now);
       return now + 1;
@@ -148,6 +173,7 @@ class ZropUnit : public Unit {
 
   StreamIn<QuadBeat> in_;
   StreamOut<QuadBeat> out_;
+  StreamOut<HiZUpdate> out_hi_z_;
   StreamIn<TerminationBeat> in_terminations_;
   const RenderContext& context_;
   std::unique_ptr<ZropBehaviour> behaviour_;
@@ -159,6 +185,8 @@ class ZropUnit : public Unit {
   BatchLimit limit_;
   Cycle tested_until_ = 0;  ///< the last beat, rounded up to whole cycles
   Cycle free_at_ = 0;       ///< after a beat wider than the unit
+  HiZReports hi_z_;
+  Ring<HiZUpdate> told_;  ///< and not sent yet
   SectoredCacheStatistics cache_statistics_{*this, "cache"};
 };
 

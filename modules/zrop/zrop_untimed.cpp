@@ -2,6 +2,7 @@
 #include <optional>
 
 #include "zrop/beat_lines.h"
+#include "zrop/hi_z_reports.h"
 
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/occupancy.h>
@@ -19,6 +20,7 @@ class UntimedZrop : public UntimedUnit {
       : UntimedUnit(name),
         context_(context),
         out_(*this, "out_quads"),
+        out_hi_z_(*this, "out_hi_z"),
         in_(input<BinItem>("in_quads", [this](const BinItem& item) { test(item); })),
         in_terminations_(input<TerminationBeat>("in_terminations",
                                                 [this](const TerminationBeat& beat) {
@@ -26,7 +28,10 @@ class UntimedZrop : public UntimedUnit {
                                                 })),
         behaviour_(std::move(behaviour)),
         z_cache_(behaviour_->timing().z_cache),
-        memory_({MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)}) {}
+        memory_({MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)}),
+        hi_z_(context) {
+    out_hi_z_.set_optional();
+  }
 
   Behaviour& behaviour() override { return *behaviour_; }
   UntimedMemoryPort* memory_port() override { return &memory_; }
@@ -44,6 +49,7 @@ class UntimedZrop : public UntimedUnit {
   void test(const BinItem& incoming) {
     if (incoming.mark != Mark::none) {
       behaviour_->pass(incoming.mark);
+      if (hi_z_.returns(incoming.mark)) out_hi_z_.send(HiZReports::of_mark(incoming.mark));
       return out_.send(incoming);
     }
     BinItem item = incoming;
@@ -64,9 +70,14 @@ class UntimedZrop : public UntimedUnit {
       }
       QuadBeat before;
       const bool may_change = memory_.connected() && state.writes_depth_stencil();
-      if (may_change) before = beat_;
+      const bool hi_z = hi_z_.wanted(beat_.quads[0].draw);
+      if (may_change || hi_z) before = beat_;
       const std::uint32_t changed = behaviour_->test(beat_);
       if (may_change && changed != 0) change(before, changed);
+      if (hi_z && changed != 0) {
+        hi_z_.changed(before, changed, *behaviour_->surface(),
+                      [this](const HiZUpdate& update) { out_hi_z_.send(update); });
+      }
       std::copy_n(beat_.quads.begin(), beat_.count, quads.begin() + item.quads);
       item.quads += beat_.count;
     }
@@ -110,6 +121,7 @@ class UntimedZrop : public UntimedUnit {
 
   const RenderContext& context_;
   UntimedOut<BinItem> out_;
+  UntimedOut<HiZUpdate> out_hi_z_;
   std::unique_ptr<UntimedIn<BinItem>> in_;
   std::unique_ptr<UntimedIn<TerminationBeat>> in_terminations_;
   std::unique_ptr<ZropBehaviour> behaviour_;
@@ -121,6 +133,7 @@ class UntimedZrop : public UntimedUnit {
   BeatLines::Needed needed_;
   SectoredCache::Line line_ = SectoredCache::no_line;  ///< that was looked up last
   QuadBeat beat_;
+  HiZReports hi_z_;
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -50,10 +50,11 @@ inline void check_below(const Netlist& netlist, const std::string& path, const M
                   "add one and use connect_memory, or put a memory there that needs none");
 }
 
-/// Throws UserError for a port that is neither connected nor stubbed.
+/// Stubs optional ports that are not connected. Throws UserError for another that is neither connected nor stubbed.
 inline void check_ports(const Component& unit, const std::string& path, const std::string& platform) {
   const auto check = [&](const auto& ports) {
-    for (const auto* port : ports) {
+    for (auto* port : ports) {
+      if (!port->connected() && port->is_optional()) port->stub();
       if (port->connected()) continue;
       throw UserError("incomplete platform " + platform, path + "." + port->name(), "the port is not connected",
                       "connect or stub it");

@@ -34,6 +34,9 @@ void wire_gpc(Netlist& netlist, unsigned gpc, const std::string& memory) {
   // Early termination: from the alpha test back to the stencil.
   connect(self + "crop.out_terminations", self + "zrop.in_terminations", 16);
 
+  // Hi-Z: from what depth tests store back to coarse rasterisation.
+  connect(self + "zrop.out_hi_z", self + "raster.in_hi_z", 16);
+
   netlist.connect_memory(self + "crop", memory);
 }
 

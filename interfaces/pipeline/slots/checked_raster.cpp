@@ -37,6 +37,16 @@ class CheckedRaster final : public CheckedSlot<RasterBehaviour> {
     quads_.add(primitive_.draw, out.count);
     return true;
   }
+  void update(const HiZUpdate& update) override {
+    if (update.mark == Mark::none) {
+      check_tile("update", update.tile);
+      if (update.part > 3) fault("update", "raster tile {} of {}", update.part, words_of(update.tile));
+    }
+    ask("update", [&] { checked_->update(update); });
+  }
+  bool waits_at(Mark mark) const override {
+    return ask("waits_at", [&] { return checked_->waits_at(mark); });
+  }
   TimingParameters timing() const override {
     const TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
     check_latency("setup_latency_cycles", timing.setup_latency_cycles);

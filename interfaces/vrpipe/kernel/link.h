@@ -64,6 +64,9 @@ class Port {
   bool connected() const { return connected_; }
   /// Leaves the port legally unconnected.
   virtual void stub() = 0;
+  /// A platform need not mention it: it is a stub then.
+  void set_optional() { optional_ = true; }
+  bool is_optional() const { return optional_; }
   /// For tests: in a random part of the cycles (`per_256` of 256) the port pretends that nothing moves. Results of a
   /// strict run do not depend on it.
   void stall_randomly(std::uint64_t seed, unsigned per_256) {
@@ -88,6 +91,7 @@ class Port {
 
   std::string name_;
   bool connected_ = false;
+  bool optional_ = false;
   std::uint64_t stall_seed_ = 0;
   unsigned stall_per_256_ = 0;
 };
@@ -324,7 +328,6 @@ class InEnd : public InPort, protected tlm::tlm_fw_transport_if<StreamProtocol<I
     mark_connected();
   }
 
- protected:
   bool is_stub() const { return stub_ != nullptr; }
 
  private:

@@ -23,6 +23,8 @@ class DepthPlane {
     const double depth = weights[0] * depth_[0] + weights[1] * depth_[1] + weights[2] * depth_[2];
     return depth < nearest_ ? nearest_ : (depth > farthest_ ? farthest_ : depth);
   }
+  /// A bound: nothing in a rectangle of pixels is nearer, as `at` has it.
+  double nearest_in(const PixelRect& area) const;
   bool is_flat() const { return nearest_ == farthest_; }
   double nearest() const { return nearest_; }
   double farthest() const { return farthest_; }

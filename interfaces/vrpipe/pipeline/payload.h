@@ -198,6 +198,15 @@ struct TerminationSignal {
   std::uint16_t epoch = 0;  ///< of the draw (DrawCall::epoch): once that has passed, the signal is void
 };
 
+/// ZROP to RASTER: what Hi-Z is to know of a raster tile, or a mark.
+struct HiZUpdate {
+  TileId tile;
+  std::uint8_t part = 0;    ///< raster tile of the screen tile: 2 * row + column, 0 to 3
+  Mark mark = Mark::none;   ///< or a mark, behind the updates of what was drawn before it; then there is no raster tile
+  std::uint16_t epoch = 0;  ///< of the draw (HiZPlan::epoch): once that has passed, the update is void
+  std::uint32_t farthest = 0;  ///< depth stored at any of its pixels in the frame, as store_depth has it
+};
+
 /// The GPC that owns a screen tile: neighbours go to different GPCs.
 constexpr unsigned owner_of(TileId tile, unsigned gpcs) {
   return gpcs == 1 ? 0 : (tile.x + tile.y * (gpcs / 2 + 1U)) % gpcs;

@@ -17,6 +17,11 @@ class RasterBehaviour : public Behaviour {
   /// `coarse_tests` counts the raster tiles tested on the way; `new_screen_tile` tells whether it is the first raster
   /// tile kept of its screen tile. False, with `coarse_tests` set, when the primitive is done.
   virtual bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) = 0;
+  /// What ZROP has stored, or a mark that ZROP has passed. One without Hi-Z has no use for it.
+  virtual void update(const HiZUpdate& /*update*/) {}
+  /// Whether, once it has passed a mark on, it begins no primitive before that comes back as an update: with strict
+  /// termination, where time decides nothing.
+  virtual bool waits_at(Mark /*mark*/) const { return false; }
   struct TimingParameters {
     std::uint32_t setup_latency_cycles;
     std::uint32_t setup_interval_cycles;        ///< between primitives
