@@ -13,7 +13,7 @@ std::uint32_t top_of_step(DepthFormat format, unsigned bits, std::uint32_t store
   // The last float below the next step; exact, since a float has 24 bits.
   const auto steps = static_cast<double>(1U << bits);
   const double next = std::floor(depth_of(format, stored) * steps) + 1;
-  return next > steps ? store_depth(format, 1) : std::max(stored, store_depth(format, next / steps) - 1);
+  return next >= steps ? store_depth(format, 1) : std::max(stored, store_depth(format, next / steps) - 1);
 }
 
 HiZ::HiZ(const RenderContext& context, unsigned bits)

@@ -64,7 +64,7 @@ class TileRasterizer : public RasterBehaviour {
                             "quads",
                             "measured on a GH100 graphics GPC: 64 pixels a cycle",
                             "quads handed to TC in a cycle"};
-    Switch hi_z{*this, "hi_z", true, "GPUs have had it since 2000",
+    Switch hi_z{*this, "hi_z", true, "all GPUs since HyperZ (ATI, 2000)",
                 "raster tiles behind all that is stored there are dropped before fine rasterisation"};
     Integer hi_z_bits{*this,
                       "hi_z_bits",
