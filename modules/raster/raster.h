@@ -104,7 +104,7 @@ class TileRasterizer : public RasterBehaviour {
   LaneMask in_area(std::int32_t x, std::int32_t y) const;
   bool advance();
   /// Whether Hi-Z culls the raster tile that begins at a pixel.
-  bool is_hidden(TileId tile, std::int32_t x, std::int32_t y);
+  [[gnu::noinline]] bool is_hidden(TileId tile, std::int32_t x, std::int32_t y);
 
   const RenderContext& context_;
   TimingParameters timing_;

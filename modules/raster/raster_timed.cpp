@@ -15,7 +15,8 @@ class TimedRaster : public TimedUnit {
         in_hi_z_(*this, "in_hi_z",
                  [this](const HiZUpdate& update, CycleInterval visible) { return take(update, visible.first); }),
         in_(*this, "in_jobs",
-            [this](const RasterJob& job, CycleInterval visible) { return rasterize(job, visible.first); }, {&out_}),
+            [this](const RasterJob& job, CycleInterval visible) { return rasterize(job, visible.first); },
+            {&out_, &hold_}),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         coarse_(timing_.coarse_tiles_per_cycle),
@@ -23,7 +24,6 @@ class TimedRaster : public TimedUnit {
         quads_out_(timing_.quads_per_cycle) {
     out_.set_pipeline(timing_.setup_latency_cycles - 1, timing_.fine_tiles_per_cycle);
     in_hi_z_.set_optional();
-    if (!blocking()) in_.set_gate([this] { return !waits_; });
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -33,6 +33,12 @@ class TimedRaster : public TimedUnit {
   }
 
  private:
+  /// Jobs wait while it is on.
+  class Hold : public TimedOutput {
+   public:
+    void set(bool on) { waiting_items_ = on ? 1 : 0; }
+    bool is_on() const { return waiting_items_ > 0; }
+  };
   struct Update {
     HiZUpdate update;
     Cycle at = 0;
@@ -42,7 +48,7 @@ class TimedRaster : public TimedUnit {
     if (update.mark == Mark::none) return visible;
     // Of what was waited for.
     apply_updates(never);
-    waits_ = false;
+    hold_.set(false);
     charge(UnitState::starved, now_);
     now_ = std::max(now_, visible);
     charge(UnitState::latency, now_);
@@ -61,11 +67,12 @@ class TimedRaster : public TimedUnit {
     if (job.mark != Mark::none) {
       QuadBeat mark;
       mark.mark = job.mark;
-      waits_ = !in_hi_z_.is_stub() && behaviour_->waits_at(job.mark);
+      hold_.set(!in_hi_z_.is_stub() && behaviour_->waits_at(job.mark));
       // At `lt` it comes back meanwhile.
       const Cycle sent = out_.send(mark, now_).first;
       now_ = std::max(now_, sent);
-      if (waits_ && blocking()) throw SimulationFault(name(), now_, "ZROP has not passed a mark that Hi-Z waits for");
+      if (hold_.is_on() && blocking())
+        throw SimulationFault(name(), now_, "ZROP has not passed a mark that Hi-Z waits for");
       return sent;
     }
     now_ = std::max(now_, next_setup_);
@@ -111,6 +118,7 @@ class TimedRaster : public TimedUnit {
 
   TimedOut<QuadBeat> out_;
   TimedIn<HiZUpdate> in_hi_z_;
+  Hold hold_;  ///< while a mark has not come back from ZROP
   TimedIn<RasterJob> in_;
   std::unique_ptr<RasterBehaviour> behaviour_;
   const RasterBehaviour::TimingParameters timing_;
@@ -118,7 +126,6 @@ class TimedRaster : public TimedUnit {
   IssuePort fine_;
   ThroughputPort quads_out_;
   Ring<Update> updates_;  ///< whose time has not come
-  bool waits_ = false;    ///< for a mark to come back from ZROP
   Cycle now_ = 0;         ///< how far the primitive in hand has come
   Cycle next_pair_ = 0;
   Cycle next_setup_ = 0;

@@ -148,10 +148,7 @@ class TimedZrop : public TimedUnit {
         z_.change(before, changed, at);
         note_moves();
       }
-      if (hi_z && changed != 0) {
-        hi_z_.changed(before, changed, *behaviour_->surface(),
-                      [&](const HiZUpdate& update) { out_hi_z_.send(update, at); });
-      }
+      if (hi_z && changed != 0) tell(before, changed, at);
       if (beat.count < tested_quads) frame_lasts(at + timing_.latency_cycles);
       tested.first = std::min(tested.first, at);
       tested.last = at;
@@ -174,6 +171,11 @@ class TimedZrop : public TimedUnit {
     tests_.hold(taken.last);
     if (has_cache_) return looked_up;
     return {tested.first, std::max(tested.last, taken.last)};
+  }
+
+  /// To Hi-Z; tests do not wait for its room.
+  [[gnu::noinline]] void tell(const QuadBeat& beat, std::uint32_t changed, Cycle at) {
+    hi_z_.changed(beat, changed, *behaviour_->surface(), [&](const HiZUpdate& update) { out_hi_z_.send(update, at); });
   }
 
   /// The cycle in which so many quads are tested; applies the updates of its past.

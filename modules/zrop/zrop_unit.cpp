@@ -110,10 +110,7 @@ class ZropUnit : public Unit {
       if (beat.mark == Mark::none) {
         const std::uint32_t changed = behaviour_->test(beat);
         if (has_cache_ && changed != 0) z_.change(before, changed);
-        if (hi_z && changed != 0) {
-          hi_z_.changed(before, changed, *behaviour_->surface(),
-                        [this](const HiZUpdate& update) { told_.push(update); });
-        }
+        if (hi_z && changed != 0) tell_later(before, changed);
       } else {
         pass(beat.mark);
       }
@@ -130,6 +127,9 @@ class ZropUnit : public Unit {
   void pass(Mark mark) {
     behaviour_->pass(mark);
     if (hi_z_.returns(mark)) told_.push(HiZReports::of_mark(mark));
+  }
+  [[gnu::noinline]] void tell_later(const QuadBeat& beat, std::uint32_t changed) {
+    hi_z_.changed(beat, changed, *behaviour_->surface(), [this](const HiZUpdate& update) { told_.push(update); });
   }
   /// To Hi-Z, which may take it later: tests do not wait for that.
   [[gnu::noinline]] void tell() {

@@ -74,14 +74,15 @@ class UntimedZrop : public UntimedUnit {
       if (may_change || hi_z) before = beat_;
       const std::uint32_t changed = behaviour_->test(beat_);
       if (may_change && changed != 0) change(before, changed);
-      if (hi_z && changed != 0) {
-        hi_z_.changed(before, changed, *behaviour_->surface(),
-                      [this](const HiZUpdate& update) { out_hi_z_.send(update); });
-      }
+      if (hi_z && changed != 0) tell(before, changed);
       std::copy_n(beat_.quads.begin(), beat_.count, quads.begin() + item.quads);
       item.quads += beat_.count;
     }
     out_.send(item);
+  }
+
+  [[gnu::noinline]] void tell(const QuadBeat& beat, std::uint32_t changed) {
+    hi_z_.changed(beat, changed, *behaviour_->surface(), [this](const HiZUpdate& update) { out_hi_z_.send(update); });
   }
 
   /// Quads of a beat have changed depth or stencil, a bit each.
