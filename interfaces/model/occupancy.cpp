@@ -36,13 +36,15 @@ std::vector<WorkKind> PropWork::kinds(const PropBehaviour::TimingParameters& tim
   return {{"bins", 0, per(timing.quads_per_cycle), false},
           {"survivors", 1, per(timing.quads_per_cycle), false},
           {"colours", 2, per(timing.color_rate.per_cycle()), throughput},
-          {"empty warps", 2, 1.0, false}};
+          {"empty warps", 2, 1.0, false},
+          {"late tests", 3, per(timing.quads_per_cycle), false}};
 }
 
 std::vector<WorkKind> ZropWork::kinds(const ZropBehaviour::TimingParameters& timing) {
   return {{"tests", 0, per(timing.quads_per_cycle), throughput},
           {"updates", 0, 1.0, false},
-          {"sectors", 0, per(timing.z_cache.sectors_per_cycle), false}};
+          {"sectors", 0, per(timing.z_cache.sectors_per_cycle), false},
+          {"late tests", 0, per(timing.quads_per_cycle), throughput}};
 }
 
 std::vector<WorkKind> QruWork::kinds(const Throughput& timing) {

@@ -19,7 +19,7 @@ constexpr std::uint64_t most_splats = std::uint64_t{1} << 31;  // primitives are
 auto fields_of(const DrawState& state) {
   return std::tie(state.early_termination, state.termination_threshold, state.termination_inclusive,
                   state.pruning_threshold, state.splat_extent, state.obb_padding, state.depth, state.stencil,
-                  state.cull, state.shader, state.light);
+                  state.late_tests, state.cull, state.shader, state.light);
 }
 
 }  // namespace
@@ -73,6 +73,9 @@ void Frame::draw(std::shared_ptr<const Draw> geometry, const DrawState& state, s
     if (state.shader == FragmentShader::splat) refuse("it is a mesh, and its shader is that of splats", "use another");
   } else if (there > 0 && (state.shader == FragmentShader::vertex || state.shader == FragmentShader::lit)) {
     refuse("it has splats, and its shader is that of a mesh", "use that of splats");
+  }
+  if (state.late_tests && state.shader == FragmentShader::none) {
+    refuse("its tests are to come after shading, and it shades nothing", "leave late_tests out, or shade it");
   }
   for (const StencilFace* face : {&state.stencil.front, &state.stencil.back}) {
     if (face->reference > stencil_bits) {
@@ -135,6 +138,10 @@ bool Frame::terminates_early() const {
 bool Frame::tests_depth_stencil() const {
   return std::any_of(draws_.begin(), draws_.end(),
                      [](const DrawCall& call) { return call.state.tests_depth_stencil(); });
+}
+
+bool Frame::tests_late() const {
+  return std::any_of(draws_.begin(), draws_.end(), [](const DrawCall& call) { return call.state.tests_late(); });
 }
 
 bool Frame::needs_zrop() const {

@@ -1,8 +1,10 @@
 #include <algorithm>
+#include <utility>
 
 #include "prop/reorder_buffer.h"
 
 #include <vrpipe/model/timed.h>
+#include <vrpipe/pipeline/late_plan.h>
 
 namespace vrpipe {
 
@@ -11,7 +13,7 @@ namespace {
 /// PROP at lt and at: as prop_unit.cpp, but bins and warps go in one piece. Of the warps whose turn has come the oldest
 /// of those that are there goes when the way to CROP is free; at lt all are there in launch order.
 /// Ports: in_bins, out_test, in_tested, out_survivors (BinItem), in_shaded, out_color (ShadedWarpItem),
-/// out_release (WarpRelease).
+/// out_release (WarpRelease), out_late, in_late (ShadedWarpItem; optional).
 class TimedProp : public TimedUnit {
  public:
   TimedProp(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
@@ -20,10 +22,12 @@ class TimedProp : public TimedUnit {
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         tests_(context.frame->needs_zrop()),
+        plan_(context),
         out_test_(*this, "out_test"),
         out_survivors_(*this, "out_survivors"),
         out_release_(*this, "out_release"),
         out_color_(*this, "out_color"),
+        out_late_(*this, "out_late"),
         in_tested_(*this, "in_tested",
                    [this](const BinItem& item, CycleInterval visible) {
                      return forward(PropWork::tested, item, visible, back_, out_survivors_);
@@ -34,6 +38,11 @@ class TimedProp : public TimedUnit {
                    return forward(PropWork::bins, item, visible, there_, tests_ ? out_test_ : out_survivors_);
                  },
                  {tests_ ? &out_test_ : &out_survivors_}),
+        in_late_(*this, "in_late",
+                 [this](const ShadedWarpItem& item, CycleInterval visible) {
+                   return take_back(*item.warp, visible.first);
+                 },
+                 {&out_color_, &out_release_}),
         in_shaded_(*this, "in_shaded",
                    [this](const ShadedWarpItem& item, CycleInterval visible) {
                      return collect(*item.warp, visible.first);
@@ -41,13 +50,19 @@ class TimedProp : public TimedUnit {
         order_(timing_.order, context),
         there_(timing_.quads_per_cycle),
         back_(timing_.quads_per_cycle),
-        color_(timing_.color_rate.items) {
+        color_(timing_.color_rate.items),
+        late_(timing_.quads_per_cycle) {
     out_test_.set_pipeline(timing_.latency_cycles - 1, 1);
     out_survivors_.set_pipeline(timing_.latency_cycles - 1, 1);
     out_color_.set_pipeline(timing_.latency_cycles - 1, 1);
+    out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_late_.set_optional();
+    in_late_.set_optional();
   }
 
-  bool idle() const override { return TimedUnit::idle() && order_.empty(); }
+  bool idle() const override {
+    return TimedUnit::idle() && order_.empty() && in_turn_.warp == nullptr && on_late_way_ == 0;
+  }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -74,6 +89,7 @@ class TimedProp : public TimedUnit {
 
   Cycle advance(Cycle until) override {
     leave_until(until);
+    if (plan_.is_used()) return next_;
     return order_.has_next() && can_send() ? color_.next() : never;
   }
 
@@ -81,6 +97,7 @@ class TimedProp : public TimedUnit {
 
   /// Lets those warps leave whose time comes up to a cycle.
   void leave_until(Cycle until) {
+    if (plan_.is_used()) return leave_beside_late(until);
     do {
       while (order_.has_next() && can_send()) {
         // A warp begins to leave once its release has room.
@@ -95,24 +112,32 @@ class TimedProp : public TimedUnit {
   bool pass_mark() {
     const ReorderBuffer::Waiting* const mark = order_.next_mark();
     if (mark == nullptr || !can_send()) return false;
-    const Cycle at = color_.take(mark->from, timing_.color_rate.items).first;
-    const ShadedWarp& warp = *mark->warp;
-    const WarpRelease release{warp.slot};
+    const ReorderBuffer::Waiting next = *mark;
     order_.leave_mark();
-    out_color_.send({&warp}, at);
-    out_release_.send(release, at);
+    hand_on_mark(*next.warp, next.from);
     return true;
   }
+  Cycle hand_on_mark(const ShadedWarp& mark, Cycle from) {
+    const Cycle at = color_.take(from, timing_.color_rate.items).first;
+    const WarpRelease release{mark.slot};
+    out_color_.send({&mark}, at);
+    out_release_.send(release, at);
+    return at;
+  }
 
-  /// Hands a warp to CROP.
   void leave(const ReorderBuffer::Waiting& next) {
-    const ShadedWarp& warp = *next.warp;
-    const WarpRelease release{warp.slot};
+    const WarpRelease release{next.warp->slot};
+    const Cycle left = hand_on(*next.warp, next.from);
+    order_.leave(next.turn, left);
+    out_release_.send(release, left);
+  }
+  /// Hands a warp to CROP; returns when it has left.
+  Cycle hand_on(const ShadedWarp& warp, Cycle from) {
     color_.hold(out_color_.last());
     charge(UnitState::blocked, out_color_.last());
     Cycle left = 0;
     if (warp.count > 0) {
-      const CycleInterval at = color_.take(next.from, warp.count * timing_.color_rate.cycles);
+      const CycleInterval at = color_.take(from, warp.count * timing_.color_rate.cycles);
       charge(UnitState::starved, at.first);
       charge(UnitState::busy, at.last + 1);
       did(PropWork::color, warp.count, at.first, at.last + 1);
@@ -121,28 +146,88 @@ class TimedProp : public TimedUnit {
       color_.hold(left);
     } else {
       // A warp without survivors takes the cycle in which it is passed over.
-      left = color_.take(next.from, timing_.color_rate.items).last;
+      left = color_.take(from, timing_.color_rate.items).last;
       did(PropWork::empty_warps, 1, left);
       warp.release();
     }
-    order_.leave(next.turn, left);
+    return left;
+  }
+
+  bool is_late(const ShadedWarp& warp) const { return warp.count > 0 && plan_.is_late(warp.draw[0]); }
+  /// In a frame with late tests: either way. `next_` is when to go on.
+  [[gnu::noinline]] void leave_beside_late(Cycle until) {
+    next_ = never;
+    bool left = true;
+    while (left) {
+      if (in_turn_.warp == nullptr && order_.has_next()) in_turn_ = order_.take();
+      const bool is_mark = in_turn_.warp == nullptr;
+      const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &in_turn_;
+      if (next == nullptr) return;
+      const bool goes_late = is_mark ? plan_.waits_at(next->warp->mark) : is_late(*next->warp);
+      left = goes_late ? send_late(*next, is_mark, until) : leave_behind_late(is_mark, until);
+    }
+  }
+  bool send_late(const ReorderBuffer::Waiting next, bool is_mark, Cycle until) {
+    const Cycle room = out_late_.clear() ? out_late_.room_from() : never;
+    if (room == never) return false;
+    next_ = std::max(room, late_.next_free());
+    if (next_ > until) return false;
+    const unsigned quads = next.warp->count;
+    const Cycle at = late_.take(std::max({next.from, room, out_late_.last()}), std::max(quads, 1U));
+    if (is_mark) {
+      order_.leave_mark();
+    } else {
+      did(PropWork::late, quads, at, at + (quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle);
+      in_turn_.warp = nullptr;
+      order_.leave(next.turn, at);
+    }
+    ++on_late_way_;
+    late_.hold(out_late_.send({next.warp}, at).first);
+    return true;
+  }
+  /// What is not tested late goes on when nothing is on that way.
+  bool leave_behind_late(bool is_mark, Cycle until) {
+    if (on_late_way_ > 0 || !can_send()) return false;
+    if (is_mark) return pass_mark();
+    const Cycle room = out_release_.room_from();
+    next_ = room == never ? never : std::max(room, color_.next());
+    if (room == never || next_ > until) return false;
+    color_.hold(room);
+    leave(std::exchange(in_turn_, {}));
+    return true;
+  }
+  /// What has been tested late, or has come around.
+  Cycle take_back(const ShadedWarp& warp, Cycle visible) {
+    --on_late_way_;
+    if (warp.mark != Mark::none) return hand_on_mark(warp, visible);
+    const WarpRelease release{warp.slot};
+    const Cycle left = hand_on(warp, visible);
     out_release_.send(release, left);
+    return left;
   }
 
   std::unique_ptr<PropBehaviour> behaviour_;
   const PropBehaviour::TimingParameters timing_;
   const bool tests_;
+  const LatePlan plan_;
   TimedOut<BinItem> out_test_;
   TimedOut<BinItem> out_survivors_;
   TimedOut<WarpRelease> out_release_;
   TimedOut<ShadedWarpItem> out_color_;
+  TimedOut<ShadedWarpItem> out_late_;
   TimedIn<BinItem> in_tested_;
   TimedIn<BinItem> in_bins_;
+  TimedIn<ShadedWarpItem> in_late_;
   TimedIn<ShadedWarpItem> in_shaded_;
   ReorderBuffer order_;
   BatchServer there_;     ///< to the tests, or past them
   BatchServer back_;      ///< from the tests
   ThroughputPort color_;  ///< in parts of a cycle and of a quad: a cycle passes `color_rate.items`
+  // In a frame with late tests:
+  IssuePort late_;
+  ReorderBuffer::Waiting in_turn_;  ///< the warp whose turn it is to go either way; none without a warp
+  unsigned on_late_way_ = 0;        ///< warps and marks that were sent to be tested late and are not back
+  Cycle next_ = never;
 };
 
 [[maybe_unused]] const bool registered = [] {

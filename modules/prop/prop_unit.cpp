@@ -1,15 +1,19 @@
 #include <algorithm>
+#include <utility>
 
 #include "prop/reorder_buffer.h"
 
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/late_plan.h>
 
 namespace vrpipe {
 
 namespace {
 
 /// PROP at cycle fidelity. Ports: in_bins, out_test, in_tested, out_survivors (QuadBeat), in_shaded (ShadedWarpItem),
-/// out_release (WarpRelease), out_color (ColorBeat). Without any test enabled bins bypass ZROP.
+/// out_release (WarpRelease), out_color (ColorBeat), out_late, in_late (ShadedWarpItem; optional). Without any test enabled
+/// bins bypass ZROP. Warps to be tested late go to ZROP in their turn and come back in this order; what is not, and marks that
+/// nobody waits for, go on to CROP when none of these is on its way.
 class PropUnit : public Unit {
  public:
   PropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
@@ -22,20 +26,28 @@ class PropUnit : public Unit {
         in_shaded_(*this, "in_shaded"),
         out_release_(*this, "out_release"),
         out_color_(*this, "out_color"),
+        out_late_(*this, "out_late"),
+        in_late_(*this, "in_late"),
+        plan_(context),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         tests_(context.frame->needs_zrop()),
         there_{PropWork::bins, BatchLimit(timing_.quads_per_cycle)},
         back_{PropWork::tested, BatchLimit(timing_.quads_per_cycle)},
         order_(timing_.order, context),
-        color_limit_(timing_.color_rate) {
+        color_limit_(timing_.color_rate),
+        late_limit_(timing_.quads_per_cycle) {
     out_test_.set_pipeline(timing_.latency_cycles - 1, 1);
     out_survivors_.set_pipeline(timing_.latency_cycles - 1, 1);
     out_color_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.color_rate));
+    out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_late_.set_optional();
+    in_late_.set_optional();
   }
 
   bool idle() const override {
-    return in_bins_.empty() && in_tested_.empty() && in_shaded_.empty() && current_.warp == nullptr && order_.empty();
+    return in_bins_.empty() && in_tested_.empty() && in_shaded_.empty() && current_.warp == nullptr && order_.empty() &&
+           in_turn_.warp == nullptr && on_late_way_ == 0;
   }
   Behaviour& behaviour() override { return *behaviour_; }
 
@@ -85,7 +97,7 @@ class PropUnit : public Unit {
 
   bool send_color(Cycle now) {
     waits_for_rate_ = false;
-    if (current_.warp == nullptr && !order_.has_next()) {
+    if (current_.warp == nullptr && !has_next()) {
       return out_color_.credits() > 0 && pass_mark();
     }
     if (out_color_.credits() == 0) return false;
@@ -100,9 +112,9 @@ class PropUnit : public Unit {
         if (out_color_.credits() == 0) break;
       }
       if (current_.warp == nullptr) {
-        if (!order_.has_next()) break;
+        if (!has_next()) break;
         if (out_release_.credits() == 0) break;
-        current_ = order_.take();
+        current_ = plan_.is_used() ? take_next() : order_.take();
         index_ = 0;
       }
       const ShadedWarp& warp = *current_.warp;
@@ -112,7 +124,7 @@ class PropUnit : public Unit {
       }
       if (index_ == warp.count) {
         current_.warp = nullptr;
-        order_.leave(current_.turn);
+        if (!is_back_) order_.leave(current_.turn);
         out_release_.push({warp.slot});
         moved = true;
         // A warp without survivors takes the cycle in which it is passed over.
@@ -123,7 +135,7 @@ class PropUnit : public Unit {
         }
       }
     }
-    waits_for_rate_ = allowance == 0 && (current_.warp != nullptr || order_.has_next());
+    waits_for_rate_ = allowance == 0 && (current_.warp != nullptr || has_next());
     if (sent > 0) {
       did(PropWork::color, sent, now);
       color_limit_.take(sent);
@@ -132,20 +144,78 @@ class PropUnit : public Unit {
     return sent > 0 || moved || pass_mark();
   }
 
+  /// Whether there is a warp to hand to CROP.
+  bool has_next() { return plan_.is_used() ? has_next_beside_late() : order_.has_next(); }
+  [[gnu::noinline]] bool has_next_beside_late() {
+    if (on_late_way_ > 0) return in_late_.ready() && in_late_.front().warp->mark == Mark::none;
+    if (in_turn_.warp == nullptr && order_.has_next()) in_turn_ = order_.take();
+    return in_turn_.warp != nullptr && !is_late(*in_turn_.warp);
+  }
+  [[gnu::noinline]] ReorderBuffer::Waiting take_next() {
+    is_back_ = on_late_way_ > 0;
+    if (!is_back_) return std::exchange(in_turn_, {});
+    ReorderBuffer::Waiting back;
+    back.warp = in_late_.front().warp;
+    in_late_.pop();
+    --on_late_way_;
+    return back;
+  }
+  bool is_late(const ShadedWarp& warp) const { return warp.count > 0 && plan_.is_late(warp.draw[0]); }
+
+  /// Sends warps to be tested late, and marks that wait for these.
+  [[gnu::noinline]] bool send_late(Cycle now) {
+    bool moved = false;
+    for (; out_late_.credits() > 0; moved = true) {
+      if (in_turn_.warp == nullptr && order_.has_next()) in_turn_ = order_.take();
+      const bool is_mark = in_turn_.warp == nullptr;
+      const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &in_turn_;
+      if (next == nullptr || !(is_mark ? plan_.waits_at(next->warp->mark) : is_late(*next->warp))) break;
+      const unsigned width = std::max<unsigned>(next->warp->count, 1);
+      if (!late_limit_.allows(width, now)) break;
+      late_limit_.take(width);
+      out_late_.push({next->warp});
+      ++on_late_way_;
+      if (is_mark) {
+        order_.leave_mark();
+      } else {
+        did(PropWork::late, width, now);
+        order_.leave(in_turn_.turn);
+        in_turn_.warp = nullptr;
+      }
+    }
+    late_free_at_ = late_limit_.next(now);
+    return moved;
+  }
+
   bool pass_mark() {
+    if (on_late_way_ > 0) return pass_mark_back();
     const ReorderBuffer::Waiting* const mark = order_.next_mark();
     if (mark == nullptr || out_release_.credits() == 0) return false;
-    ColorBeat beat;
-    beat.mark = mark->warp->mark;
-    out_color_.push(beat);
-    out_release_.push({mark->warp->slot});
-    mark->warp->release();
+    // It goes the late way.
+    if (plan_.is_used() && plan_.waits_at(mark->warp->mark)) return false;
+    hand_on_mark(*mark->warp);
     order_.leave_mark();
     return true;
+  }
+  /// One that has come around.
+  [[gnu::noinline]] bool pass_mark_back() {
+    if (!in_late_.ready() || in_late_.front().warp->mark == Mark::none || out_release_.credits() == 0) return false;
+    hand_on_mark(*in_late_.front().warp);
+    in_late_.pop();
+    --on_late_way_;
+    return true;
+  }
+  void hand_on_mark(const ShadedWarp& mark) {
+    ColorBeat beat;
+    beat.mark = mark.mark;
+    out_color_.push(beat);
+    out_release_.push({mark.slot});
+    mark.release();
   }
 
   Cycle tick(Cycle now) override {
     bool moved = send_color(now);
+    if (plan_.is_used()) moved = send_late(now) || moved;
     moved = collect() || moved;
     if (tests_) {
       moved = forward(back_, in_tested_, out_survivors_, now) || moved;
@@ -157,9 +227,12 @@ class PropUnit : public Unit {
       enter(UnitState::busy, now);
       return now + 1;
     }
-    const bool has_work = current_.warp != nullptr || order_.has_next() || in_bins_.ready() || in_tested_.ready();
-    enter(has_work ? UnitState::blocked : order_.has_early() ? UnitState::latency : UnitState::starved, now);
-    Cycle next = never;
+    const bool has_work = current_.warp != nullptr || order_.has_next() || in_bins_.ready() || in_tested_.ready() ||
+                          in_late_.ready() || (in_turn_.warp != nullptr && on_late_way_ == 0);
+    const bool waits = order_.has_early() || on_late_way_ > 0;
+    enter(has_work ? UnitState::blocked : waits ? UnitState::latency : UnitState::starved, now);
+    Cycle next = in_late_.next_ready() > now ? in_late_.next_ready() : never;
+    if (plan_.is_used() && late_free_at_ > now) next = std::min(next, late_free_at_);
     for (const Cycle at :
          {there_.free_at, back_.free_at, in_bins_.next_ready(), in_tested_.next_ready(), in_shaded_.next_ready()}) {
       if (at > now) next = std::min(next, at);
@@ -174,6 +247,9 @@ class PropUnit : public Unit {
   StreamIn<ShadedWarpItem> in_shaded_;
   StreamOut<WarpRelease> out_release_;
   StreamOut<ColorBeat> out_color_;
+  StreamOut<ShadedWarpItem> out_late_;
+  StreamIn<ShadedWarpItem> in_late_;
+  const LatePlan plan_;
   std::unique_ptr<PropBehaviour> behaviour_;
   const PropBehaviour::TimingParameters timing_;
   const bool tests_;
@@ -184,6 +260,12 @@ class PropUnit : public Unit {
   ReorderBuffer::Waiting current_;  ///< being handed to CROP, from `index_` on; none without a warp
   std::uint32_t index_ = 0;
   bool waits_for_rate_ = false;  ///< of quads to CROP, below one a cycle
+  // In a frame with late tests:
+  BatchLimit late_limit_;
+  Cycle late_free_at_ = 0;
+  ReorderBuffer::Waiting in_turn_;  ///< the warp whose turn it is to go either way; none without a warp
+  unsigned on_late_way_ = 0;        ///< warps and marks that were sent to be tested late and have not left for CROP
+  bool is_back_ = false;            ///< `current_` comes from there
 };
 
 [[maybe_unused]] const bool registered = [] {

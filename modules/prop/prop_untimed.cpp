@@ -1,5 +1,6 @@
 #include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/late_plan.h>
 
 namespace vrpipe {
 
@@ -14,17 +15,27 @@ class UntimedProp : public UntimedUnit {
         out_survivors_(*this, "out_survivors"),
         out_release_(*this, "out_release"),
         out_color_(*this, "out_color"),
+        out_late_(*this, "out_late"),
+        in_late_(input<ShadedWarpItem>("in_late", [this](const ShadedWarpItem& item) { hand_on(item); })),
         in_tested_(input<BinItem>("in_tested", [this](const BinItem& item) { forward(item); })),
         in_bins_(input<BinItem>("in_bins", [this, tests = context.frame->needs_zrop()](
                                                const BinItem& item) { tests ? out_test_.send(item) : forward(item); })),
         in_shaded_(input<ShadedWarpItem>("in_shaded", [this](const ShadedWarpItem& item) { leave(item); })),
-        behaviour_(std::move(behaviour)) {}
+        plan_(context),
+        behaviour_(std::move(behaviour)) {
+    out_late_.set_optional();
+    in_late_->set_optional();
+  }
 
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
   void forward(const BinItem& item) { out_survivors_.send(item); }
   void leave(const ShadedWarpItem& item) {
+    if (item.warp->count > 0 && plan_.is_late(item.warp->draw[0])) return out_late_.send(item);
+    hand_on(item);
+  }
+  void hand_on(const ShadedWarpItem& item) {
     if (item.warp->count == 0 && item.warp->mark == Mark::none) return item.warp->release();
     out_color_.send(item);
   }
@@ -33,9 +44,12 @@ class UntimedProp : public UntimedUnit {
   UntimedOut<BinItem> out_survivors_;
   UntimedOut<WarpRelease> out_release_;
   UntimedOut<ShadedWarpItem> out_color_;
+  UntimedOut<ShadedWarpItem> out_late_;
+  std::unique_ptr<UntimedIn<ShadedWarpItem>> in_late_;
   std::unique_ptr<UntimedIn<BinItem>> in_tested_;
   std::unique_ptr<UntimedIn<BinItem>> in_bins_;
   std::unique_ptr<UntimedIn<ShadedWarpItem>> in_shaded_;
+  const LatePlan plan_;
   std::unique_ptr<PropBehaviour> behaviour_;
 };
 

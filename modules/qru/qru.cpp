@@ -6,8 +6,10 @@
 
 namespace vrpipe {
 
-PairingQru::PairingQru(const Parameters& parameters, const RenderContext&)
-    : bin_quads_(parameters.bin_quads),
+PairingQru::PairingQru(const Parameters& parameters, const RenderContext& context)
+    : context_(context),
+      any_late_(context.frame->tests_late()),
+      bin_quads_(parameters.bin_quads),
       quads_per_cycle_(parameters.quads_per_cycle),
       latency_cycles_(parameters.latency_cycles),
       buffer_(bin_quads_),
@@ -26,6 +28,8 @@ void PairingQru::launch(Warp& out) {
 unsigned PairingQru::examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) {
   warp_.tile = tile;
   launched = false;
+  // All of a bin are of one state.
+  if (any_late_ && count > 0 && context_.state(quads[0].draw).tests_late()) return pass_by(quads, count, out, launched);
   unsigned at = 0;
   while (at < count && !launched) {
     if (buffered_ == bin_quads_) {
@@ -57,6 +61,16 @@ unsigned PairingQru::examine(TileId tile, const Quad* quads, unsigned count, War
   }
   quads_examined += at;
   return at;
+}
+
+unsigned PairingQru::pass_by(const Quad* quads, unsigned count, Warp& out, bool& launched) {
+  const unsigned examined = std::min<unsigned>(count, quads_per_warp - warp_.count);
+  std::copy_n(quads, examined, warp_.quads.begin() + warp_.count);
+  warp_.count = static_cast<std::uint8_t>(warp_.count + examined);
+  quads_examined += examined;
+  launched = warp_.count == quads_per_warp;
+  if (launched) launch(out);
+  return examined;
 }
 
 bool PairingQru::finish_bin(Warp& out) {

@@ -9,7 +9,8 @@ namespace vrpipe {
 inline constexpr Histogram::Buckets warp_size_buckets = Histogram::Buckets::linear(1, quads_per_warp + 2);
 
 /// Quad reorder unit (paper 5.3): 64 position registers pair overlapping quads of a bin, a 128-bit bitmap tells which
-/// are left for the end. A register that holds a quad means a pair, and is then empty again.
+/// are left for the end. A register that holds a quad means a pair, and is then empty again. Quads of draws that are tested
+/// late pass by the registers.
 class PairingQru : public QruBehaviour {
  public:
   struct Parameters : ParameterSet {
@@ -38,7 +39,7 @@ class PairingQru : public QruBehaviour {
                            source::open,
                            "from the quad that completes a warp to its launch"};
   };
-  PairingQru(const Parameters& parameters, const RenderContext&);
+  PairingQru(const Parameters& parameters, const RenderContext& context);
 
   unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) override;
   bool finish_bin(Warp& out) override;
@@ -55,7 +56,10 @@ class PairingQru : public QruBehaviour {
   static constexpr std::uint16_t no_quad = 0xffff;
   static constexpr unsigned bits_per_word = 64;
   void launch(Warp& out);
+  unsigned pass_by(const Quad* quads, unsigned count, Warp& out, bool& launched);
 
+  const RenderContext& context_;
+  const bool any_late_;
   const std::uint32_t bin_quads_;
   const std::uint32_t quads_per_cycle_;
   const std::uint32_t latency_cycles_;

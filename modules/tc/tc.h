@@ -4,6 +4,7 @@
 
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/pipeline/hi_z_plan.h>
+#include <vrpipe/pipeline/late_plan.h>
 #include <vrpipe/pipeline/screen_tiling.h>
 #include <vrpipe/pipeline/units.h>
 
@@ -68,17 +69,19 @@ class TileCoalescing : public TcBehaviour {
 };
 
 /// The marks that TC hands on. Behind it a bin, and so a warp, is of one state, and a change of state has nothing to stop; but
-/// Hi-Z may wait for one to come to ZROP.
+/// Hi-Z may wait for one to come to ZROP, and ZROP for one behind late tests.
 class PassingMarks {
  public:
-  explicit PassingMarks(const RenderContext& context) : frame_(*context.frame), hi_z_(context) {}
+  explicit PassingMarks(const RenderContext& context) : frame_(*context.frame), hi_z_(context), late_(context) {}
   bool has(Mark mark) const {
-    return mark == Mark::end_of_frame || frame_.clear_of(mark) != nullptr || hi_z_.waits_at(mark);
+    return mark == Mark::end_of_frame || frame_.clear_of(mark) != nullptr || hi_z_.waits_at(mark) ||
+           late_.waits_at(mark);
   }
 
  private:
   const Frame& frame_;
   const HiZPlan hi_z_;
+  const LatePlan late_;
 };
 
 }  // namespace vrpipe

@@ -24,8 +24,8 @@ class TimedZCache {
         port_(owner, "memory", timing_.mshrs, std::min(sectors_of_a_line_, timing_.mshrs),
               timing_.organization.sector_bytes, statistics,
               {MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(placement.gpc)}),
-        look_ups_(timing.quads_per_cycle),
-        queue_(std::max(timing_.input_quads, QuadBeat::capacity)),
+        early_(timing.quads_per_cycle, std::max(timing_.input_quads, QuadBeat::capacity)),
+        late_(timing.quads_per_cycle, std::max(timing_.input_quads, quads_per_warp)),
         updates_(timing.updates_per_cycle),
         queued_updates_(timing_.input_updates) {}
 
@@ -44,25 +44,18 @@ class TimedZCache {
     Cycle there = 0;  ///< can be tested
   };
   /// When so many quads that become visible in a cycle are looked up.
-  Cycle turn(unsigned quads, Cycle visible) { return look_ups_.take(queue_.free_from(visible, quads), quads); }
+  Cycle turn(unsigned quads, Cycle visible) { return early_.turn(quads, visible); }
   /// In its turn; `tested` follows.
   Times look_up(const QuadBeat& beat, Cycle turn, bool needs_stencil) {
-    Times times;
-    times.at = turn;
-    if (!needs_stencil) return {times.at, times.at};
-    lines_->find(beat.tile, beat.quads.data(), beat.count, needed_);
-    for (unsigned i = 0; i < needed_.count; ++i) {
-      const SectoredCache::Line line = look_up(needed_.lines[i], times);
-      // Lines are read in order, and may go then.
-      read_ = std::max(read_, times.there);
-      kept_until_[line] = std::max(kept_until_[line], read_);
-    }
-    cache_->accessed(beat.count, beat.count);
-    look_ups_.hold(times.at);
-    owe(times.at);
-    return {times.at, std::max(times.at, times.there)};
+    if (!needs_stencil) return {turn, turn};
+    return look_up(beat, turn, early_);
   }
-  void tested(unsigned quads, Cycle at) { queue_.take(quads, at); }
+  void tested(unsigned quads, Cycle at) { early_.queue.take(quads, at); }
+  /// The same of quads to be tested late, which become visible in a cycle; `tested_late` follows.
+  Times look_up_late(const QuadBeat& quads, Cycle visible) {
+    return look_up(quads, late_.turn(quads.count, visible), late_);
+  }
+  void tested_late(unsigned quads, Cycle at) { late_.queue.take(quads, at); }
   /// Quads of a beat have changed depth or stencil in the cycle of their test, a bit each; `beat` is that before the test.
   void change(const QuadBeat& beat, std::uint32_t quads, Cycle at) {
     lines_->find(beat, quads, needed_);
@@ -107,6 +100,29 @@ class TimedZCache {
   }
 
  private:
+  /// From the look-up of quads to their test, in order.
+  struct Way {
+    Way(unsigned quads_per_cycle, unsigned places) : look_ups(quads_per_cycle), queue(places) {}
+    Cycle turn(unsigned quads, Cycle visible) { return look_ups.take(queue.free_from(visible, quads), quads); }
+    IssuePort look_ups;
+    SlotPool queue;  ///< quads between look-up and test
+    Cycle read = 0;  ///< the last line looked up for a test
+  };
+  Times look_up(const QuadBeat& beat, Cycle turn, Way& way) {
+    Times times;
+    times.at = turn;
+    lines_->find(beat.tile, beat.quads.data(), beat.count, needed_);
+    for (unsigned i = 0; i < needed_.count; ++i) {
+      const SectoredCache::Line line = look_up(needed_.lines[i], times);
+      // Lines are read in order, and may go then.
+      way.read = std::max(way.read, times.there);
+      kept_until_[line] = std::max(kept_until_[line], way.read);
+    }
+    cache_->accessed(beat.count, beat.count);
+    way.look_ups.hold(times.at);
+    owe(times.at);
+    return {times.at, std::max(times.at, times.there)};
+  }
   /// Sets when its sectors are there, and when it could be looked up, if that has to wait.
   SectoredCache::Line look_up(const BeatLines::Needed::Line& needed, Times& times) {
     LineAccess access;
@@ -136,14 +152,13 @@ class TimedZCache {
   const unsigned sectors_of_a_line_;
   SectoredCacheStatistics& statistics_;
   TimedCachePort port_;
-  IssuePort look_ups_;
-  SlotPool queue_;  ///< quads between look-up and test
+  Way early_;
+  Way late_;
   IssuePort updates_;
   SlotPool queued_updates_;
   std::optional<BeatLines> lines_;
   std::optional<SectoredCache> cache_;
   BeatLines::Needed needed_;
-  Cycle read_ = 0;                 ///< the last line looked up for a test
   std::vector<Cycle> kept_until_;  ///< by line of the cache
   std::vector<Cycle> there_;       ///< by sector
   std::uint64_t owed_ = 0;         ///< sectors

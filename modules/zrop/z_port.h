@@ -4,9 +4,11 @@
 #include <optional>
 
 #include "beat_lines.h"
+#include "late_look_ups.h"
 
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
+#include <vrpipe/pipeline/late_plan.h>
 #include <vrpipe/pipeline/render_context.h>
 
 namespace vrpipe {
@@ -17,17 +19,20 @@ namespace vrpipe {
 /// beat needs is read into its queue in order, as soon as it is there, and then its line may go: so a line is kept no
 /// longer than the memory takes, whatever becomes of the tests, and updates come by when lines or miss registers are
 /// few. The queue's values follow updates. An update keeps its line until it is applied. What a test changes is put back, in
-/// whole sectors; nothing is tested while that waits for a line.
+/// whole sectors; nothing is tested while that waits for a line. Warps that are tested late have a queue of their own. Nothing is
+/// looked up behind a mark that has to come around first (LatePlan).
 class ZPort {
  public:
   ZPort(PortOwner& owner, const ZCache& timing, unsigned quads_per_cycle, unsigned updates_per_cycle,
-        const RenderContext& context)
+        const RenderContext& context, const LatePlan& plan)
       : context_(context),
+        plan_(plan),
         timing_(timing),
         updates_per_cycle_(updates_per_cycle),
         port_(owner, "memory", timing.mshrs,
               {MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)}),
-        look_ups_(quads_per_cycle) {}
+        look_ups_(quads_per_cycle),
+        late_(quads_per_cycle, timing.input_quads) {}
 
   tlm::tlm_initiator_socket<32>& socket() { return port_.socket(); }
   const MemoryBytes& moved() const { return port_.moved(); }
@@ -36,24 +41,29 @@ class ZPort {
     port_.make_cache(timing_.organization, statistics);
     lines_.emplace(timing_, surface);
   }
-  bool idle() const { return beats_.empty() && updates_.empty() && changed_.empty() && port_.has_written_back(); }
+  bool idle() const {
+    return beats_.empty() && updates_.empty() && late_.empty() && changed_.empty() && port_.has_written_back();
+  }
 
   /// Takes what has come, and looks up what is at the links; true if anything moved.
-  bool advance(Cycle now, StreamIn<QuadBeat>& quads, StreamIn<TerminationBeat>& updates) {
+  bool advance(Cycle now, StreamIn<QuadBeat>& quads, StreamIn<TerminationBeat>& updates,
+               StreamIn<ShadedWarpItem>& late) {
     now_ = now;
     bool moved = port_.finish_fills(now);
     port_.write_back(Moved{owed_});
     moved |= put_changed();
     moved |= take_updates(updates);
+    if (plan_.is_used()) moved |= take_late(late);
     moved |= take_beats(quads);
     moved |= read();
     return moved;
   }
   /// When it has to do so next, if nothing of its queues moves before.
-  Cycle next(Cycle now, const StreamIn<QuadBeat>& quads, const StreamIn<TerminationBeat>& updates) const {
+  Cycle next(Cycle now, const StreamIn<QuadBeat>& quads, const StreamIn<TerminationBeat>& updates,
+             const StreamIn<ShadedWarpItem>& late) const {
     Cycle next = port_.next_completion();
     // What could not be looked up waits for a completion, for the queue to move or for its turn.
-    for (const Cycle at : {quads.next_ready(), updates.next_ready(), next_look_up_}) {
+    for (const Cycle at : {quads.next_ready(), updates.next_ready(), late.next_ready(), next_look_up_, late_.next()}) {
       if (at > now) next = std::min(next, at);
     }
     return next;
@@ -81,6 +91,14 @@ class ZPort {
   }
   /// Whether what was changed waits for a line.
   bool holds_changed() const { return !changed_.empty(); }
+
+  /// The same of warps that are tested late.
+  bool has_late() const { return !late_.empty(); }
+  bool late_is_there() const { return late_.is_there(); }
+  const ShadedWarpItem& front_late() const { return late_.front(); }
+  void pop_late() { late_.pop(); }
+  /// A mark has come around: what is behind it may be looked up.
+  void mark_is_back() { waits_ = false; }
 
   bool update_is_there() const {
     return !updates_.empty() && port_.awaited(updates_.front().line, updates_.front().sectors) == 0;
@@ -141,7 +159,7 @@ class ZPort {
 
   bool take_beats(StreamIn<QuadBeat>& in) {
     bool moved = false;
-    while (in.ready()) {
+    while (!waits_ && in.ready()) {
       const QuadBeat& beat = in.front();
       if (!beat_begun_ && !begin(beat)) break;
       for (; at_ < needed_.count; ++at_) {
@@ -157,10 +175,16 @@ class ZPort {
       queued.beat = beat;
       queued.reads = reads_asked_;
       queued_quads_ += beat.count;
+      waits_ = beat.mark != Mark::none && plan_.waits_at(beat.mark);
       in.pop();
       moved = true;
     }
     return moved;
+  }
+  [[gnu::noinline]] bool take_late(StreamIn<ShadedWarpItem>& in) {
+    const bool moved =
+        late_.take(in, port_, *lines_, now_, Moved{owed_}, [this](unsigned quads) { count_accesses(quads); });
+    return late_.read(port_) || moved;
   }
   /// To look a beat up; false if that has to wait.
   bool begin(const QuadBeat& beat) {
@@ -172,7 +196,7 @@ class ZPort {
     needed_.count = 0;
     at_ = 0;
     // All are of one state.
-    if (beat.count > 0 && context_.state(beat.quads[0].draw).reads_depth_stencil()) {
+    if (beat.count > 0 && context_.state(beat.quads[0].draw).reads_depth_stencil_early()) {
       lines_->find(beat.tile, beat.quads.data(), beat.count, needed_);
       begin_line(0);
     }
@@ -210,12 +234,13 @@ class ZPort {
   /// Of quads or updates. What the look-ups under way have missed is theirs, so that they end together.
   void count_accesses(unsigned accesses) {
     accesses_ += accesses;
-    if (beat_begun_ || update_begun_) return;
+    if (beat_begun_ || update_begun_ || late_.has_begun()) return;
     port_.cache().accessed(accesses_, accesses_);
     accesses_ = 0;
   }
 
   const RenderContext& context_;
+  const LatePlan& plan_;
   const ZCache timing_;
   const unsigned updates_per_cycle_;
   CachePort port_;
@@ -242,6 +267,8 @@ class ZPort {
   std::uint64_t reads_asked_ = 0;
   std::uint64_t reads_done_ = 0;
   Ring<Update> updates_;  ///< looked up, and not applied
+  LateLookUps late_;
+  bool waits_ = false;  ///< for a mark to come around
 };
 
 }  // namespace vrpipe

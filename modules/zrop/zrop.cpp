@@ -1,5 +1,7 @@
 #include "zrop/zrop.h"
 
+#include "zrop/late_quads.h"
+
 #include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
@@ -42,18 +44,20 @@ void take_out(QuadBeat& beat, Dead&& dead, Count&& count) {
 
 }  // namespace
 
-std::uint32_t DepthStencilRop::test_depth_stencil(QuadBeat& beat) {
+DepthStencilTest::Outcome DepthStencilRop::test_quad(const Quad& quad, TileId tile) {
   constexpr auto row = static_cast<std::int32_t>(quads_per_tile_row);
+  const auto x = static_cast<std::int32_t>(tile.x * screen_tile_pixels) + 2 * (quad.position % row);
+  const auto y = static_cast<std::int32_t>(tile.y * screen_tile_pixels) + 2 * (quad.position / row);
+  return depth_stencil_.test(quad, x, y, surface_->format(),
+                             surface_->quad(surface_->grid().place(tile, quad.position)));
+}
+
+std::uint32_t DepthStencilRop::test_depth_stencil(QuadBeat& beat) {
   std::uint32_t changed = 0;
-  const std::size_t tile = surface_->grid().place(beat.tile, 0);
-  const auto x = static_cast<std::int32_t>(beat.tile.x * screen_tile_pixels);
-  const auto y = static_cast<std::int32_t>(beat.tile.y * screen_tile_pixels);
   take_out(
       beat,
       [&](const Quad& quad, unsigned index) {
-        const DepthStencilTest::Outcome outcome =
-            depth_stencil_.test(quad, x + 2 * (quad.position % row), y + 2 * (quad.position / row), surface_->format(),
-                                surface_->quad(tile + quad.position));
+        const DepthStencilTest::Outcome outcome = test_quad(quad, beat.tile);
         changed |= (outcome.wrote ? 1U : 0U) << index;
         return static_cast<unsigned>(quad.coverage & ~outcome.passed);
       },
@@ -93,8 +97,9 @@ std::uint32_t DepthStencilRop::test(QuadBeat& beat) {
   if (beat.count > 0) {
     // All are of one state.
     const DrawState& state = context_.state(beat.quads[0].draw);
-    if (state.tests_depth_stencil()) changed = test_depth_stencil(beat);
-    if (state.early_termination) test_termination(beat, !state.tests_depth_stencil());
+    const bool tests_early = state.tests_early();
+    if (tests_early) changed = test_depth_stencil(beat);
+    if (state.tests_termination()) test_termination(beat, !tests_early);
     if (state.shader == FragmentShader::none) end_unshaded(beat);
   }
   if (run_ahead_ == nullptr) return changed;
@@ -102,6 +107,23 @@ std::uint32_t DepthStencilRop::test(QuadBeat& beat) {
   if (!beat.last_of_bin) return changed;
   for (const TerminationSignal& signal : ahead_) mark(signal);
   ahead_.clear();
+  return changed;
+}
+
+std::uint32_t DepthStencilRop::test_late(ShadedWarp& warp) {
+  const QuadBeat beat = quads_of(warp);
+  std::array<LaneMask, quads_per_warp> passed{};
+  std::uint32_t changed = 0;
+  for (unsigned i = 0; i < beat.count; ++i) {
+    const Quad& quad = beat.quads[i];
+    const DepthStencilTest::Outcome outcome = test_quad(quad, beat.tile);
+    passed[i] = outcome.passed;
+    changed |= (outcome.wrote ? 1U : 0U) << i;
+    quads_tested_late.add(quad.draw, 1);
+    quads_late_failed.add(quad.draw, outcome.passed == 0 ? 1 : 0);
+    fragments_late_failed.add(quad.draw, popcount(static_cast<LaneMask>(quad.coverage & ~outcome.passed)));
+  }
+  warp.keep(passed);
   return changed;
 }
 

@@ -10,8 +10,8 @@
 namespace vrpipe {
 
 /// Depth-stencil ROP: the tests of depth and stencil, then the termination test, and the termination update on the stencil's
-/// most significant bit (paper 5.2). Depth and stencil are written whether or not a pixel has terminated: that only says that
-/// nothing of it can be seen any more.
+/// most significant bit (paper 5.2); or those of depth and stencil after shading. Depth and stencil are written whether or not a
+/// pixel has terminated: that only says that nothing of it can be seen any more.
 class DepthStencilRop : public ZropBehaviour {
  public:
   struct Parameters : ParameterSet {
@@ -71,6 +71,7 @@ class DepthStencilRop : public ZropBehaviour {
   DepthStencilRop(const Parameters& parameters, const RenderContext& context);
 
   std::uint32_t test(QuadBeat& beat) override;
+  std::uint32_t test_late(ShadedWarp& warp) override;
   void update(const TerminationSignal& signal) override;
   void pass(Mark mark) override;
   void follow(FunctionalRunAhead& run_ahead) override { run_ahead_ = &run_ahead; }
@@ -80,6 +81,7 @@ class DepthStencilRop : public ZropBehaviour {
                        "received after a clear of what they were for; they take time"};
 
  private:
+  DepthStencilTest::Outcome test_quad(const Quad& quad, TileId tile);
   /// Take failed samples and quads out of a beat.
   std::uint32_t test_depth_stencil(QuadBeat& beat);
   void test_termination(QuadBeat& beat, bool is_first);

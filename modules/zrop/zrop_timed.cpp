@@ -4,42 +4,55 @@
 #include <vector>
 
 #include "zrop/hi_z_reports.h"
+#include "zrop/late_quads.h"
 #include "zrop/timed_z_cache.h"
 
 #include <vrpipe/model/timed.h>
+#include <vrpipe/pipeline/late_plan.h>
 
 namespace vrpipe {
 
 namespace {
 
 /// ZROP at lt and at. Updates go first, so that the cycle of one is known when it arrives; a test applies those of its
-/// past. With the memory port connected, quads and updates are looked up in the z-cache first (timed_z_cache.h).
-/// Ports: in_quads, out_quads (BinItem), in_terminations (TerminationBeat), out_hi_z (HiZUpdate; optional), memory
-/// (TLM-2.0 base protocol; optional).
+/// past. Late tests, too, go first: at `lt` they come long before their time, and what they take of the z-cache's one port is
+/// kept for the tests that are to make way. With the memory port connected, quads and updates are looked up in the z-cache first
+/// (timed_z_cache.h).
+/// Ports: in_quads, out_quads (BinItem), in_terminations (TerminationBeat), in_late, out_late (ShadedWarpItem; optional),
+/// out_hi_z (HiZUpdate; optional), memory (TLM-2.0 base protocol; optional).
 class TimedZrop : public TimedUnit {
  public:
   TimedZrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
             const RenderContext& context, Transport transport)
       : TimedUnit(name, domain, ZropWork::kinds(behaviour->timing()), transport),
         context_(context),
+        plan_(context),
         out_(*this, "out_quads"),
         out_hi_z_(*this, "out_hi_z"),
+        out_late_(*this, "out_late"),
         in_terminations_(*this, "in_terminations",
                          [this](const TerminationBeat& beat, CycleInterval visible) {
                            return update(beat, visible.first);
                          }),
+        in_late_(*this, "in_late",
+                 [this](const ShadedWarpItem& item, CycleInterval visible) { return test_late(item, visible.first); },
+                 {&out_late_}),
         in_(*this, "in_quads", [this](const BinItem& item, CycleInterval visible) { return test(item, visible); },
-            {&out_}),
+            {&out_, &hold_}),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         at_once_(std::min(timing_.quads_per_cycle, QuadBeat::capacity)),
         tests_(timing_.quads_per_cycle),
+        late_tests_(timing_.quads_per_cycle),
         updates_(timing_.updates_per_cycle),
         z_(*this, timing_, context.placement, cache_statistics_),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_optional();
+    out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_late_.set_optional();
+    in_late_.set_optional();
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -50,6 +63,7 @@ class TimedZrop : public TimedUnit {
   void close_account(Cycle end) override {
     if (has_cache_) look_up_updates(never);
     while (!pending_.empty()) apply_update();
+    make_way(never);
     TimedUnit::close_account(end);
   }
 
@@ -57,6 +71,16 @@ class TimedZrop : public TimedUnit {
   struct Pending {
     TerminationSignal signal;
     Cycle at = 0;
+  };
+  struct LateTest {
+    unsigned quads = 0;
+    Cycle at = 0;
+  };
+  /// Bins wait while it is on.
+  class Hold : public TimedOutput {
+   public:
+    void set(bool on) { waiting_items_ = on ? 1 : 0; }
+    bool is_on() const { return waiting_items_ > 0; }
   };
 
   void before_end_of_elaboration() override {
@@ -102,12 +126,9 @@ class TimedZrop : public TimedUnit {
     charge(UnitState::blocked, out_.last());
     if (item.mark != Mark::none) {
       const Cycle at = tests_.take(visible.first);
+      if (plan_.waits_at(item.mark)) return send_around(item, at);
       if (has_cache_) look_up_updates(at);
-      if (item.mark != Mark::end_of_frame) {
-        while (!pending_.empty() && pending_.front().at <= at) apply_update();
-      }
-      behaviour_->pass(item.mark);
-      if (hi_z_.returns(item.mark)) out_hi_z_.send(HiZReports::of_mark(item.mark), at);
+      pass(item.mark, at);
       const Cycle taken = out_.send(item, at).first;
       tests_.hold(taken);
       // What they are caused by has gone before.
@@ -122,8 +143,8 @@ class TimedZrop : public TimedUnit {
     CycleInterval looked_up(never, 0);
     // All are of one state.
     const DrawState* const state = total > 0 ? &context_.state(quads.front().draw) : nullptr;
-    const bool needs_stencil = has_cache_ && state != nullptr && state->reads_depth_stencil();
-    const bool may_change = needs_stencil && state->writes_depth_stencil();
+    const bool needs_stencil = has_cache_ && state != nullptr && state->reads_depth_stencil_early();
+    const bool may_change = needs_stencil && state->tests_early() && state->writes_depth_stencil();
     const bool hi_z = total > 0 && hi_z_.wanted(quads.front().draw);
     unsigned beats_left = 0;
     QuadBeat beat;
@@ -173,6 +194,67 @@ class TimedZrop : public TimedUnit {
     return {tested.first, std::max(tested.last, taken.last)};
   }
 
+  void pass(Mark mark, Cycle at) {
+    if (mark != Mark::end_of_frame) {
+      while (!pending_.empty() && pending_.front().at <= at) apply_update();
+    }
+    behaviour_->pass(mark);
+    if (hi_z_.returns(mark)) out_hi_z_.send(HiZReports::of_mark(mark), at);
+  }
+
+  /// A mark that is passed when it has come around. At `lt` it does so meanwhile.
+  [[gnu::noinline]] CycleInterval send_around(const BinItem& mark, Cycle at) {
+    hold_.set(true);
+    const Cycle taken = out_.send(mark, at).first;
+    tests_.hold(taken);
+    if (hold_.is_on() && blocking()) throw SimulationFault(name(), taken, "a mark has not come around");
+    return {at, taken};
+  }
+
+  [[gnu::noinline]] Cycle test_late(const ShadedWarpItem& item, Cycle visible) {
+    ShadedWarp& warp = item.warp->editable();
+    late_tests_.hold(out_late_.last());
+    if (warp.mark != Mark::none) {
+      const Cycle at = late_tests_.take(visible);
+      if (has_cache_ && !blocking()) look_up_updates(at);
+      pass(warp.mark, at);
+      hold_.set(false);
+      tests_.hold(at + 1);
+      charge(UnitState::latency, at);
+      late_tests_.hold(out_late_.send(item, at).first);
+      return at;
+    }
+    const QuadBeat before = quads_of(warp);
+    TimedZCache::Times times{visible, visible};
+    if (has_cache_) {
+      times = z_.look_up_late(before, visible);
+      note_moves();
+    }
+    const Cycle at = late_tests_.take(times.there, before.count);
+    if (has_cache_) z_.tested_late(before.count, at);
+    late_.push({before.count, at});
+    const std::uint32_t changed = behaviour_->test_late(warp);
+    if (has_cache_ && changed != 0) {
+      z_.change(before, changed, at);
+      note_moves();
+    }
+    if (changed != 0 && hi_z_.wanted(before.quads[0].draw)) tell(before, changed, at);
+    if (warp.count < before.count) frame_lasts(at + timing_.latency_cycles);
+    const Cycle taken = out_late_.send(item, at).first;
+    late_tests_.hold(taken);
+    return has_cache_ ? times.at : std::max(at, taken);
+  }
+  /// To the late tests up to a test of a cycle.
+  [[gnu::noinline]] void make_way(Cycle test) {
+    for (; !late_.empty() && late_.front().at <= std::max(test, tests_.next_free()); late_.pop()) {
+      const unsigned quads = late_.front().quads;
+      const Cycle at = tests_.take(late_.front().at, quads);
+      const Cycle until = at + (quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
+      did(ZropWork::late_tests, quads, at, until);
+      port_free_at_ = std::max(port_free_at_, until);
+    }
+  }
+
   /// To Hi-Z; tests do not wait for its room.
   [[gnu::noinline]] void tell(const QuadBeat& beat, std::uint32_t changed, Cycle at) {
     hi_z_.changed(beat, changed, *behaviour_->surface(), [&](const HiZUpdate& update) { out_hi_z_.send(update, at); });
@@ -180,6 +262,7 @@ class TimedZrop : public TimedUnit {
 
   /// The cycle in which so many quads are tested; applies the updates of its past.
   Cycle take(Cycle visible, unsigned quads) {
+    if (!late_.empty()) make_way(visible);
     if (has_cache_) move_sectors(visible);
     Cycle at = tests_.take(visible, quads);
     while (!pending_.empty() && pending_.front().at <= at) {
@@ -221,14 +304,20 @@ class TimedZrop : public TimedUnit {
   }
 
   const RenderContext& context_;
+  const LatePlan plan_;
   TimedOut<BinItem> out_;
   TimedOut<HiZUpdate> out_hi_z_;
+  TimedOut<ShadedWarpItem> out_late_;
+  Hold hold_;  ///< while a mark has not come around
   TimedIn<TerminationBeat> in_terminations_;
+  TimedIn<ShadedWarpItem> in_late_;
   TimedIn<BinItem> in_;
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZropBehaviour::TimingParameters timing_;
   const unsigned at_once_;
   IssuePort tests_;
+  IssuePort late_tests_;
+  Ring<LateTest> late_;  ///< that tests have not made way to yet
   IssuePort updates_;
   Ring<Pending> pending_;   ///< updates not applied yet, by cycle
   Cycle port_free_at_ = 0;  ///< of the z-cache, after the last test, update or move

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "zrop/hi_z_reports.h"
+#include "zrop/late_quads.h"
 #include "zrop/z_port.h"
 
 #include <vrpipe/model/unit.h>
@@ -11,9 +12,9 @@ namespace vrpipe {
 namespace {
 
 /// ZROP at cycle fidelity. One port into the z-cache: a cycle either moves sectors, a whole cycle's worth of them, or
-/// applies updates, or tests, in this order. Without memory the z-cache holds everything.
-/// Ports: in_quads, out_quads (QuadBeat), in_terminations (TerminationBeat), out_hi_z (HiZUpdate; optional), memory
-/// (TLM-2.0 base protocol; optional).
+/// applies updates, or tests, in this order; late tests go before others. Without memory the z-cache holds everything.
+/// Ports: in_quads, out_quads (QuadBeat), in_terminations (TerminationBeat), in_late, out_late (ShadedWarpItem; optional),
+/// out_hi_z (HiZUpdate; optional), memory (TLM-2.0 base protocol; optional).
 class ZropUnit : public Unit {
  public:
   ZropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
@@ -23,18 +24,26 @@ class ZropUnit : public Unit {
         out_(*this, "out_quads"),
         out_hi_z_(*this, "out_hi_z"),
         in_terminations_(*this, "in_terminations"),
+        in_late_(*this, "in_late"),
+        out_late_(*this, "out_late"),
         context_(context),
+        plan_(context),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
-        z_(*this, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context),
+        z_(*this, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context, plan_),
         limit_(timing_.quads_per_cycle),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_optional();
+    out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    out_late_.set_optional();
+    in_late_.set_optional();
   }
 
-  bool idle() const override { return in_.empty() && in_terminations_.empty() && told_.empty() && z_.idle(); }
+  bool idle() const override {
+    return in_.empty() && in_terminations_.empty() && in_late_.empty() && told_.empty() && z_.idle();
+  }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &z_.socket(); }
   bool memory_is_optional() const override { return true; }
@@ -93,7 +102,7 @@ class ZropUnit : public Unit {
 
   bool test(Cycle now) {
     bool moved = false;
-    while ((has_cache_ ? z_.beat_is_there() && !z_.holds_changed() : in_.ready()) && out_.credits() > 0) {
+    while (!waits_ && (has_cache_ ? z_.beat_is_there() && !z_.holds_changed() : in_.ready()) && out_.credits() > 0) {
       const QuadBeat& next = has_cache_ ? z_.front() : in_.front();
       const unsigned width = std::max<unsigned>(next.count, 1);
       if (!limit_.allows(width, now)) break;
@@ -111,6 +120,8 @@ class ZropUnit : public Unit {
         const std::uint32_t changed = behaviour_->test(beat);
         if (has_cache_ && changed != 0) z_.change(before, changed);
         if (hi_z && changed != 0) tell_later(before, changed);
+      } else if (plan_.waits_at(beat.mark)) {
+        waits_ = true;
       } else {
         pass(beat.mark);
       }
@@ -122,6 +133,41 @@ class ZropUnit : public Unit {
     }
     if (moved) free_at_ = limit_.next(now);
     return moved;
+  }
+
+  bool test_all(Cycle now) {
+    const bool late = plan_.is_used() && test_late(now);
+    return test(now) || late;
+  }
+  [[gnu::noinline]] bool test_late(Cycle now) {
+    bool moved = false;
+    while ((has_cache_ ? z_.late_is_there() && !z_.holds_changed() : in_late_.ready()) && out_late_.credits() > 0) {
+      const ShadedWarpItem item = has_cache_ ? z_.front_late() : in_late_.front();
+      const unsigned width = std::max<unsigned>(item.warp->count, 1);
+      if (!limit_.allows(width, now)) break;
+      has_cache_ ? z_.pop_late() : in_late_.pop();
+      limit_.take(width);
+      tested_until_ = now + (width + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
+      if (item.warp->mark == Mark::none) {
+        test_late(item.warp->editable(), now);
+      } else {
+        pass(item.warp->mark);
+        waits_ = false;
+        z_.mark_is_back();
+      }
+      out_late_.push(item);
+      moved = true;
+    }
+    if (moved) free_at_ = limit_.next(now);
+    return moved;
+  }
+  void test_late(ShadedWarp& warp, Cycle now) {
+    const QuadBeat before = quads_of(warp);
+    const std::uint32_t changed = behaviour_->test_late(warp);
+    did(ZropWork::late_tests, before.count, now, tested_until_);
+    if (has_cache_ && changed != 0) z_.change(before, changed);
+    if (changed != 0 && hi_z_.wanted(before.quads[0].draw)) tell_later(before, changed);
+    if (warp.count < before.count) frame_lasts(now + timing_.latency_cycles);
   }
 
   void pass(Mark mark) {
@@ -142,7 +188,7 @@ class ZropUnit : public Unit {
     return next;
   }
   Cycle work(Cycle now) {
-    if (update(now) || (now >= free_at_ && test(now))) {
+    if (update(now) || (now >= free_at_ && test_all(now))) {
       enter(UnitState::busy, now);
       return now + 1;
     }
@@ -150,6 +196,7 @@ class ZropUnit : public Unit {
       enter(UnitState::busy, now);
       return free_at_;
     }
+    if (plan_.is_used()) return wait(now);
     if (in_.ready()) {
       enter(UnitState::blocked, now);
       return in_terminations_.next_ready();
@@ -158,16 +205,29 @@ class ZropUnit : public Unit {
     return std::min(in_.next_ready(), in_terminations_.next_ready());
   }
 
+  /// In a frame with late tests, that nothing could be done.
+  [[gnu::noinline]] Cycle wait(Cycle now) {
+    const bool is_blocked = in_late_.ready() || (in_.ready() && !waits_);
+    enter(is_blocked ? UnitState::blocked : waits_ ? UnitState::latency : UnitState::starved, now);
+    Cycle next = in_terminations_.next_ready();
+    for (const Cycle at : {in_.next_ready(), in_late_.next_ready()}) {
+      if (at > now) next = std::min(next, at);
+    }
+    return next;
+  }
+
   [[gnu::noinline]] Cycle tick_cache(Cycle now) {
-    const bool looked_up = z_.advance(now, in_, in_terminations_);
-    const bool worked = move_sectors(now) || apply_updates(now) || (now >= free_at_ && test(now));
-    enter(worked || now < free_at_          ? UnitState::busy
-          : !z_.has_beats() && !in_.ready() ? UnitState::starved
-          : z_.beat_is_there()              ? UnitState::blocked
-                                            : UnitState::memory,
+    const bool looked_up = z_.advance(now, in_, in_terminations_, in_late_);
+    const bool worked = move_sectors(now) || apply_updates(now) || (now >= free_at_ && test_all(now));
+    const bool has_work = z_.has_beats() || in_.ready() || z_.has_late() || in_late_.ready();
+    enter(worked || now < free_at_                                ? UnitState::busy
+          : waits_ && !z_.has_late() && !in_late_.ready()         ? UnitState::latency
+          : !has_work                                             ? UnitState::starved
+          : z_.late_is_there() || (z_.beat_is_there() && !waits_) ? UnitState::blocked
+                                                                  : UnitState::memory,
           now);
     if (looked_up || worked || z_.owed_sectors() >= timing_.z_cache.sectors_per_cycle) return now + 1;
-    const Cycle next = z_.next(now, in_, in_terminations_);
+    const Cycle next = z_.next(now, in_, in_terminations_, in_late_);
     return now < free_at_ ? std::min(next, free_at_) : next;
   }
 
@@ -175,7 +235,10 @@ class ZropUnit : public Unit {
   StreamOut<QuadBeat> out_;
   StreamOut<HiZUpdate> out_hi_z_;
   StreamIn<TerminationBeat> in_terminations_;
+  StreamIn<ShadedWarpItem> in_late_;
+  StreamOut<ShadedWarpItem> out_late_;
   const RenderContext& context_;
+  const LatePlan plan_;
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZropBehaviour::TimingParameters timing_;
   ZPort z_;
@@ -185,6 +248,7 @@ class ZropUnit : public Unit {
   BatchLimit limit_;
   Cycle tested_until_ = 0;  ///< the last beat, rounded up to whole cycles
   Cycle free_at_ = 0;       ///< after a beat wider than the unit
+  bool waits_ = false;      ///< for a mark to come around
   HiZReports hi_z_;
   Ring<HiZUpdate> told_;  ///< and not sent yet
   SectoredCacheStatistics cache_statistics_{*this, "cache"};

@@ -3,6 +3,7 @@
 
 #include "zrop/beat_lines.h"
 #include "zrop/hi_z_reports.h"
+#include "zrop/late_quads.h"
 
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/occupancy.h>
@@ -12,8 +13,8 @@ namespace vrpipe {
 
 namespace {
 
-/// ZROP without time: a bin's test sees what the bins before it have terminated. Where its memory wants to know, tests and
-/// updates go through the z-cache. Ports as in zrop_timed.cpp.
+/// ZROP without time: a bin's test sees what the bins before it have terminated and what their late tests have stored, so no mark
+/// need come around. Where its memory wants to know, tests and updates go through the z-cache. Ports as in zrop_timed.cpp.
 class UntimedZrop : public UntimedUnit {
  public:
   UntimedZrop(const std::string& name, std::unique_ptr<ZropBehaviour> behaviour, const RenderContext& context)
@@ -21,6 +22,8 @@ class UntimedZrop : public UntimedUnit {
         context_(context),
         out_(*this, "out_quads"),
         out_hi_z_(*this, "out_hi_z"),
+        out_late_(*this, "out_late"),
+        in_late_(input<ShadedWarpItem>("in_late", [this](const ShadedWarpItem& item) { test_late(item); })),
         in_(input<BinItem>("in_quads", [this](const BinItem& item) { test(item); })),
         in_terminations_(input<TerminationBeat>("in_terminations",
                                                 [this](const TerminationBeat& beat) {
@@ -31,6 +34,8 @@ class UntimedZrop : public UntimedUnit {
         memory_({MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)}),
         hi_z_(context) {
     out_hi_z_.set_optional();
+    out_late_.set_optional();
+    in_late_->set_optional();
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -41,7 +46,7 @@ class UntimedZrop : public UntimedUnit {
     if (memory_.connected()) {
       needed_.count = 1;
       needed_.lines[0] = lines().find(signal);
-      look_up(1);
+      did(ZropWork::sectors, look_up(1));
       cache_->make_dirty(line_, needed_.lines[0].sectors);
     }
     behaviour_->update(signal);
@@ -64,12 +69,12 @@ class UntimedZrop : public UntimedUnit {
       beat_.last_of_bin = from == incoming.quads;
       // All are of one state.
       const DrawState& state = context_.state(beat_.quads[0].draw);
-      if (memory_.connected() && state.reads_depth_stencil()) {
+      if (memory_.connected() && state.reads_depth_stencil_early()) {
         lines().find(beat_.tile, beat_.quads.data(), beat_.count, needed_);
-        look_up(beat_.count);
+        did(ZropWork::sectors, look_up(beat_.count));
       }
       QuadBeat before;
-      const bool may_change = memory_.connected() && state.writes_depth_stencil();
+      const bool may_change = memory_.connected() && state.tests_early() && state.writes_depth_stencil();
       const bool hi_z = hi_z_.wanted(beat_.quads[0].draw);
       if (may_change || hi_z) before = beat_;
       const std::uint32_t changed = behaviour_->test(beat_);
@@ -79,6 +84,21 @@ class UntimedZrop : public UntimedUnit {
       item.quads += beat_.count;
     }
     out_.send(item);
+  }
+
+  [[gnu::noinline]] void test_late(const ShadedWarpItem& item) {
+    ShadedWarp& warp = item.warp->editable();
+    const QuadBeat before = quads_of(warp);
+    did(ZropWork::late_tests, before.count);
+    if (memory_.connected()) {
+      // The bound does not know what time these sectors take from other tests.
+      lines().find(before.tile, before.quads.data(), before.count, needed_);
+      look_up(before.count);
+    }
+    const std::uint32_t changed = behaviour_->test_late(warp);
+    if (memory_.connected() && changed != 0) change(before, changed);
+    if (changed != 0 && hi_z_.wanted(before.quads[0].draw)) tell(before, changed);
+    out_late_.send(item);
   }
 
   [[gnu::noinline]] void tell(const QuadBeat& beat, std::uint32_t changed) {
@@ -93,7 +113,7 @@ class UntimedZrop : public UntimedUnit {
       const BeatLines::Needed::Line& changed = needed_.lines[0];
       line_ = cache_->find(changed.address);
       // It may have gone when another line of the same beat came.
-      if (line_ == SectoredCache::no_line) look_up(1);
+      if (line_ == SectoredCache::no_line) did(ZropWork::sectors, look_up(1));
       cache_->make_dirty(line_, changed.sectors);
     }
   }
@@ -104,8 +124,8 @@ class UntimedZrop : public UntimedUnit {
     }
     return *lines_;
   }
-  /// What so many quads or updates need.
-  void look_up(unsigned accesses) {
+  /// What so many quads or updates need. Returns the sectors that no run is spared, whatever its order: for the bound.
+  std::uint64_t look_up(unsigned accesses) {
     const std::uint64_t before = cache_statistics_.sector_misses_compulsory.value();
     for (unsigned i = 0; i < needed_.count; ++i) {
       LineAccess access;
@@ -116,13 +136,14 @@ class UntimedZrop : public UntimedUnit {
       memory_.move(access, z_cache_.organization);
     }
     cache_->accessed(accesses, accesses);
-    // Those that no run is spared, whatever its order: for the bound.
-    did(ZropWork::sectors, cache_statistics_.sector_misses_compulsory.value() - before);
+    return cache_statistics_.sector_misses_compulsory.value() - before;
   }
 
   const RenderContext& context_;
   UntimedOut<BinItem> out_;
   UntimedOut<HiZUpdate> out_hi_z_;
+  UntimedOut<ShadedWarpItem> out_late_;
+  std::unique_ptr<UntimedIn<ShadedWarpItem>> in_late_;
   std::unique_ptr<UntimedIn<BinItem>> in_;
   std::unique_ptr<UntimedIn<TerminationBeat>> in_terminations_;
   std::unique_ptr<ZropBehaviour> behaviour_;

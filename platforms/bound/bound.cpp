@@ -40,6 +40,7 @@ void Work::add(const Work& other) {
   updates += other.updates;
   z_sectors += other.z_sectors;
   survivors += other.survivors;
+  late_quads += other.late_quads;
   vertex_warps += other.vertex_warps;
   attribute_bytes_written += other.attribute_bytes_written;
   warps += other.warps;
@@ -107,6 +108,7 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
                            from_l2(done.z_sectors * zrop_.z_cache.organization.sector_bytes)});
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
   cycles[sm] = instructions(done) / sm_.instructions_per_cycle();
+  cycles[late] = ratio(done.late_quads, std::min(zrop_.quads_per_cycle, prop_.quads_per_cycle));
   cycles[color] = static_cast<double>(done.color_quads) / prop_.color_rate.per_cycle();
   cycles[l2] = from_l2(done.sectors * crop_.sector_bytes);
   // A line, and a miss register, is taken for as long as a fill is under way; those of a phase's beginning may have been
@@ -163,6 +165,10 @@ void PhaseBound::end_phase() {
     last_quad_ = *std::max_element(end.begin(), end.end());
     ended_ = total_;
     ended_.add(up_to_quads_);
+    // The tests before shading and those after it have one port.
+    if (ended_.late_quads > 0) {
+      last_quad_ = std::max(last_quad_, ratio(ended_.quads_tested + ended_.late_quads, zrop_.quads_per_cycle));
+    }
   } else if (!has_quads()) {
     Work passed = work;
     passed.tile_pairs = 0;  // for a pair without quads nobody waits
@@ -213,10 +219,11 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
   if (slot == "prop") {
     return priced(PropWork::kinds(prop_),
                   {count(done.quads_rasterized), done.quads_tested > 0 ? count(done.survivors) : 0.0,
-                   count(done.color_quads)});
+                   count(done.color_quads), 0.0, count(done.late_quads)});
   }
   if (slot == "zrop") {
-    return priced(ZropWork::kinds(zrop_), {count(done.quads_tested), update_cycles(done), count(done.z_sectors)});
+    return priced(ZropWork::kinds(zrop_),
+                  {count(done.quads_tested), update_cycles(done), count(done.z_sectors), count(done.late_quads)});
   }
   if (slot == "qru") {
     const double quads = count(done.survivors) - count(done.warps) * qru_.items_per_cycle;

@@ -31,6 +31,7 @@ struct Work : FrontEndWork {
   std::uint64_t updates = 0;
   std::uint64_t z_sectors = 0;  ///< filled into the z-cache, in whole cycles of it
   std::uint64_t survivors = 0;
+  std::uint64_t late_quads = 0;  ///< tested after shading
   std::uint64_t warps = 0;
   std::uint64_t merging_warps = 0;
   std::uint64_t color_quads = 0;
@@ -85,7 +86,7 @@ class PhaseBound {
 
  private:
   /// In the order of the pipeline; PROP is there twice.
-  enum Stage : unsigned { draw, vpo, tgc, raster, tc, test, qru, sm, color, l2, crop, stages };
+  enum Stage : unsigned { draw, vpo, tgc, raster, tc, test, qru, sm, late, color, l2, crop, stages };
   std::array<double, stages> cycles_of(const Work& done, bool to_last) const;
   std::array<double, stages> end_of(const Work& done, bool to_last) const;
   double instructions(const Work& done) const;

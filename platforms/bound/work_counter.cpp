@@ -127,6 +127,7 @@ void WorkCounter::tap(UntimedUnit* unit, const char* port, Function function) {
 
 WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc, PhaseBound& bound)
     : bound_(bound),
+      counts_late_(!(bound.times_out() && configuration.frame().terminates_early())),
       draw_(gpu.of_slot("draw", gpc)),
       vpo_(gpu.of_slot("vpo", gpc)),
       tgc_(gpu.of_slot("tgc", gpc)),
@@ -197,6 +198,7 @@ void WorkCounter::count() {
   count_front_end(bound_.work);
   bound_.work.bin_beats = items(tc_, TcWork::beats) - before_.bin_beats;
   bound_.work.quads_tested = items(zrop_, ZropWork::tests) - before_.quads_tested;
+  if (counts_late_) bound_.work.late_quads = items(zrop_, ZropWork::late_tests) - before_.late_quads;
   bound_.work.z_sectors = bound_.z_sectors_of(items(zrop_, ZropWork::sectors) - z_sectors_before_);
 }
 

@@ -13,7 +13,7 @@ namespace vrpipe {
 /// Where `cycle` may flush bins at other times, what a quad terminates may spare others later than here; so only quads are
 /// counted whose pixels are not all terminated by what was blended before: no run is spared these, however early it
 /// flushes its bins. And where screen tiles may be blended in another order each sector is filled once: the cache may miss
-/// it no more often. The same holds of the z-cache, always.
+/// it no more often. The same holds of the z-cache, always, of which what late tests fill is left out.
 class WorkCounter {
  public:
   /// The GPU and the bound outlive it.
@@ -31,6 +31,7 @@ class WorkCounter {
   void count();
 
   PhaseBound& bound_;
+  const bool counts_late_;  ///< late tests, unless some run may be spared them
   std::unique_ptr<Blends> blends_;
   std::vector<std::shared_ptr<void>> taps_;
   UntimedUnit *draw_, *vpo_, *tgc_, *raster_, *tc_, *zrop_, *sm_;  ///< null for none

@@ -64,4 +64,17 @@ inline void check_ports(const Component& unit, const std::string& path, const st
   check(unit.out_ports);
 }
 
+/// Throws UserError for a frame with tests after shading, where PROP has no way to ZROP and back for them.
+inline void check_late_way(const Netlist& netlist, const Frame& frame, const std::string& platform) {
+  if (!frame.tests_late()) return;
+  for (const Instance& instance : netlist.instances()) {
+    if (instance.slot != "prop" && instance.slot != "zrop") continue;
+    const std::string port = instance.path + ".out_late";
+    if (netlist.link_from(port) != nullptr) continue;
+    throw UserError("platform " + platform + " cannot draw the frame", port,
+                    "depth or stencil of a draw is tested after shading, and the port is not connected",
+                    "connect prop.out_late to zrop.in_late, and zrop.out_late to prop.in_late");
+  }
+}
+
 }  // namespace vrpipe

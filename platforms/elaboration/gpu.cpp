@@ -42,6 +42,7 @@ Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
   for (const Instance& instance : netlist.instances()) {
     if (!Netlist::is_memory(instance)) add(instance, framebuffer);
   }
+  check_late_way(netlist, configuration.frame(), configuration.platform().name);
   connect_units(netlist, request.observers.get(), [&](const std::string& path) { return find(path); });
   add_memories();
   check();
@@ -68,6 +69,9 @@ void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
   } else {
     behaviour = configuration_.make(instance);
     counting = behaviour.get();
+    if (ahead != ahead_.end() && slot == "zrop" && configuration_.frame().tests_late()) {
+      behaviour = ahead->second->repeat_late_tests(std::move(behaviour));
+    }
   }
   follow_clock(*counting, *clock_);
   if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(framebuffer.color);

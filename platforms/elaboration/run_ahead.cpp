@@ -24,6 +24,12 @@ class RunAhead::Record {
     entry.last_primitive = warp.last_primitive;
     entry.draw = warp.draw;
   }
+  /// It has been tested late, which left these samples of its quads.
+  void tested_late(std::uint32_t sequence, const std::array<LaneMask, quads_per_warp>& left, std::uint32_t changed) {
+    Entry& entry = find(sequence);
+    entry.left_by_test = left;
+    entry.changed_by_test = changed;
+  }
   void blended(const ShadedWarp& warp, unsigned from, unsigned to, const CropBehaviour::Outcomes& outcomes) {
     Entry& entry = find(warp.sequence);
     std::copy(outcomes.begin() + from, outcomes.begin() + to, entry.outcomes.begin() + from);
@@ -43,6 +49,14 @@ class RunAhead::Record {
     out.draw = entry.draw;
     entry.left = entry.count;
     forget();
+  }
+  std::uint32_t repeat_late_test(ShadedWarp& warp) {
+    Entry& entry = find(warp.sequence);
+    const std::uint32_t changed = entry.changed_by_test;
+    warp.keep(entry.left_by_test);
+    entry.left = warp.count;
+    forget();
+    return changed;
   }
   CropBehaviour::Outcome repeat(const ShadedWarp& warp, unsigned index) {
     Entry& entry = find(warp.sequence);
@@ -70,6 +84,8 @@ class RunAhead::Record {
     std::array<std::uint32_t, quads_per_warp> last_primitive;
     std::array<DrawIndex, quads_per_warp> draw;
     CropBehaviour::Outcomes outcomes;
+    std::array<LaneMask, quads_per_warp> left_by_test;  ///< where it was tested late
+    std::uint32_t changed_by_test;
     unsigned left = not_shaded;  ///< quads that the timing model has not blended yet
   };
   Entry& find(std::uint32_t sequence) {
@@ -163,6 +179,51 @@ class RunAhead::RepeatingCrop final : public CropBehaviour {
   Record& record_;
 };
 
+/// Stands for ZROP behind PROP.
+class RunAhead::LateTests final : public UntimedTarget<ShadedWarpItem> {
+ public:
+  LateTests(Record& record, UntimedTarget<ShadedWarpItem>& back) : record_(record), back_(back) {}
+  void take(const ShadedWarpItem& item) override {
+    ShadedWarp& warp = item.warp->editable();
+    const ShadedWarp before = warp;
+    const std::uint32_t changed = zrop->test_late(warp);
+    // Quads that are left are in order, and none is there twice.
+    std::array<LaneMask, quads_per_warp> left{};
+    for (unsigned i = 0, at = 0; i < before.count && at < warp.count; ++i) {
+      const bool stays =
+          warp.position[at] == before.position[i] && warp.first_primitive[at] == before.first_primitive[i];
+      if (stays) left[i] = warp.live[at++];
+    }
+    record_.tested_late(warp.sequence, left, changed);
+    back_.take(item);
+  }
+  ZropBehaviour* zrop = nullptr;
+
+ private:
+  Record& record_;
+  UntimedTarget<ShadedWarpItem>& back_;
+};
+
+class RunAhead::RepeatingZrop final : public ZropBehaviour {
+ public:
+  RepeatingZrop(std::unique_ptr<ZropBehaviour> zrop, Record& record) : zrop_(std::move(zrop)), record_(record) {}
+  const Behaviour& unit() const override { return zrop_->unit(); }
+  void attach(DepthStencilSurface& surface) override {
+    ZropBehaviour::attach(surface);
+    zrop_->attach(surface);
+  }
+  std::uint32_t test(QuadBeat& beat) override { return zrop_->test(beat); }
+  std::uint32_t test_late(ShadedWarp& warp) override { return record_.repeat_late_test(warp); }
+  void update(const TerminationSignal& signal) override { zrop_->update(signal); }
+  void pass(Mark mark) override { zrop_->pass(mark); }
+  void follow(FunctionalRunAhead& run_ahead) override { zrop_->follow(run_ahead); }
+  TimingParameters timing() const override { return zrop_->timing(); }
+
+ private:
+  std::unique_ptr<ZropBehaviour> zrop_;
+  Record& record_;
+};
+
 class RunAhead::Signals final : public UntimedTarget<TerminationBeat> {
  public:
   void take(const TerminationBeat& beat) override {
@@ -217,6 +278,7 @@ RunAhead::RunAhead(const Configuration& configuration, unsigned gpc, ColorSurfac
   std::map<std::string, UntimedUnit*> placed;
   UntimedUnit* qru = nullptr;
   UntimedUnit* crop = nullptr;
+  UntimedUnit* order = nullptr;
   for (const Instance* instance : units_behind(netlist, first->from)) {
     std::unique_ptr<Behaviour> behaviour = configuration.make(*instance);
     if (instance->slot == "sm") {
@@ -235,6 +297,7 @@ RunAhead::RunAhead(const Configuration& configuration, unsigned gpc, ColorSurfac
     placed[instance->path] = units_.back().get();
     if (instance->slot == "qru") qru = units_.back().get();
     if (instance->slot == "crop") crop = units_.back().get();
+    if (instance->slot == "prop") order = units_.back().get();
   }
   if (sm_ == nullptr || crop_ == nullptr) missing("survivors do not reach an SM array and CROP");
 
@@ -248,6 +311,13 @@ RunAhead::RunAhead(const Configuration& configuration, unsigned gpc, ColorSurfac
   auto* const terminations = dynamic_cast<UntimedOut<TerminationBeat>*>(&crop->out("out_terminations"));
   if (terminations == nullptr) missing("CROP signals no terminations");
   terminations->attach(*signals_);
+  if (configuration.frame().tests_late()) {
+    auto* const late = order == nullptr ? nullptr : dynamic_cast<UntimedOut<ShadedWarpItem>*>(&order->out("out_late"));
+    auto* const back = order == nullptr ? nullptr : dynamic_cast<UntimedIn<ShadedWarpItem>*>(&order->in("in_late"));
+    if (late == nullptr || back == nullptr) missing("shaded warps do not go through PROP");
+    late_tests_ = std::make_unique<LateTests>(*record_, *back);
+    late->attach(*late_tests_);
+  }
   for (const auto& unit : units_) {
     for (InPort* port : unit->in_ports) {
       if (!port->connected()) port->stub();
@@ -281,6 +351,12 @@ void RunAhead::tested(const QuadBeat& survivors, std::vector<TerminationSignal>&
 std::unique_ptr<Behaviour> RunAhead::make_repeating(const std::string& slot) {
   if (slot == "sm") return std::make_unique<RepeatingSm>(*sm_, *record_);
   return std::make_unique<RepeatingCrop>(*crop_, *record_);
+}
+
+std::unique_ptr<Behaviour> RunAhead::repeat_late_tests(std::unique_ptr<Behaviour> zrop) {
+  auto real = behaviour_as<ZropBehaviour>(std::move(zrop));
+  late_tests_->zrop = real.get();
+  return std::make_unique<RepeatingZrop>(std::move(real), *record_);
 }
 
 Behaviour& RunAhead::unit(const std::string& slot) {

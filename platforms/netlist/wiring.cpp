@@ -31,6 +31,10 @@ void wire_gpc(Netlist& netlist, unsigned gpc, const std::string& memory) {
   connect(self + "prop.out_release", self + "sm.in_release", 8);
   connect(self + "prop.out_color", self + "crop.in_color", 8);
 
+  // Tests after shading, and back.
+  connect(self + "prop.out_late", self + "zrop.in_late", 8);
+  connect(self + "zrop.out_late", self + "prop.in_late", 8);
+
   // Early termination: from the alpha test back to the stencil.
   connect(self + "crop.out_terminations", self + "zrop.in_terminations", 16);
 

@@ -188,6 +188,8 @@ Counts counts_from(const BehaviourList& behaviours, const Value& value) {
       c.fragments_terminated += value(zrop->fragments_terminated);
       c.quads_unshaded += value(zrop->quads_unshaded);
       c.fragments_unshaded += value(zrop->fragments_unshaded);
+      c.quads_late_failed += value(zrop->quads_late_failed);
+      c.fragments_late_failed += value(zrop->fragments_late_failed);
     } else if (const auto* const sm = dynamic_cast<const SmBehaviour*>(&unit)) {
       c.quads_shaded += value(sm->quads_shaded);
       c.fragments_shaded += value(sm->fragments_shaded);
@@ -199,8 +201,6 @@ Counts counts_from(const BehaviourList& behaviours, const Value& value) {
     } else if (const auto* const crop = dynamic_cast<const CropBehaviour*>(&unit)) {
       c.quads_dropped_late += value(crop->quads_dropped_late);
       c.fragments_dropped_late += value(crop->fragments_dropped_late);
-      c.quads_late_failed += value(crop->quads_late_failed);
-      c.fragments_late_failed += value(crop->fragments_late_failed);
       c.quads_blended += value(crop->quads_blended);
       c.fragments_blended += value(crop->fragments_blended);
       c.termination_updates += value(crop->termination_signals);

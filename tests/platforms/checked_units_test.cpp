@@ -1,6 +1,7 @@
 // Units that are not trusted: each breaks one rule of its slot, and the run ends in a fault that names it, at every
 // fidelity.
 #include <algorithm>
+#include <deque>
 #include <stdexcept>
 
 #include <vrpipe/component/error.h>
@@ -289,7 +290,7 @@ const Add<QruThatNeverFinishes, QruBehaviour> qru_ends("qru", "endless", "finish
 const Add<QruOfAnotherSplat, QruBehaviour> qru_splat("qru", "other-splat", "splat 123456789 for draw 0, which has");
 const Add<SmWithoutCores, SmBehaviour> sm_cores("sm", "no-cores", "cores is 0");
 const Add<SmThatForgetsAWarp, SmBehaviour> sm_warp("sm", "forgets", "quads_pruned + quads_merged counts");
-const Add<CropWithoutCounts, CropBehaviour> crop_counts("crop", "no-counts", "quads_late_failed counts 0, but");
+const Add<CropWithoutCounts, CropBehaviour> crop_counts("crop", "no-counts", "quads_dropped_late counts 0, but");
 const AddCrop crop_mshrs(CropMaker<CropWithoutMshrs>::implementation("no-mshrs", "breaks a rule"), "mshrs is 0");
 const AddCrop crop_dead(CropMaker<CropThatKillsTheDead>::implementation("kills-the-dead", "breaks a rule"),
                         "pixels 0x1f terminated by fragments");
@@ -439,6 +440,11 @@ struct ZropForDraw0 : ZropBehaviour {
     count_for_draw_0(*this, unit_);
     return changed;
   }
+  std::uint32_t test_late(ShadedWarp& warp) override {
+    const std::uint32_t changed = unit_.test_late(warp);
+    count_for_draw_0(*this, unit_);
+    return changed;
+  }
   void update(const TerminationSignal& signal) override {
     unit_.update(signal);
     count_for_draw_0(*this, unit_);
@@ -520,7 +526,7 @@ const AddOfFrames<RasterForDraw0, RasterBehaviour> raster_first("raster", "for-d
 const AddOfFrames<ZropForDraw0, ZropBehaviour> zrop_first("zrop", "for-draw-0", "quads_tested counts");
 const AddOfFrames<SmForDraw0, SmBehaviour> sm_first("sm", "for-draw-0", "quads_shaded counts");
 const AddOfFrames<SmOfDraw0, SmBehaviour> sm_of_first("sm", "of-draw-0", "for draw 0, which has 100 from 0 on");
-const AddOfFrames<CropForDraw0, CropBehaviour> crop_first("crop", "for-draw-0", "quads_late_failed counts");
+const AddOfFrames<CropForDraw0, CropBehaviour> crop_first("crop", "for-draw-0", "quads_dropped_late counts");
 
 TEST(CheckedUnits, AMarkOrACountOfTheWrongDrawIsAFaultThatNamesTheUnitAtEveryFidelity) {
   const auto draw = std::make_shared<Draw>(random_draw(100, 60, 200, 1));
@@ -535,6 +541,74 @@ TEST(CheckedUnits, AMarkOrACountOfTheWrongDrawIsAFaultThatNamesTheUnitAtEveryFid
       state.pruning_threshold = 0.1F;
       frame.draw(draw, state, "third", 150);  // 3
       frame.clear({false, true});             // 4
+      const std::string fault = fault_of(broken, fidelity, frame);
+      EXPECT_EQ(fault.rfind(broken.slot + "=" + broken.name + " at cycle ", 0), 0U) << fault;
+      EXPECT_NE(fault.find(broken.expected), std::string::npos) << fault;
+    }
+  }
+}
+
+struct ZropThatLetsTheDeadPass : DepthStencilRop {
+  using DepthStencilRop::DepthStencilRop;
+  std::uint32_t test_late(ShadedWarp& warp) override {
+    const std::uint32_t changed = DepthStencilRop::test_late(warp);
+    warp.live[0] = all_lanes;
+    return changed;
+  }
+};
+struct ZropThatTurnsQuadsAround : DepthStencilRop {
+  using DepthStencilRop::DepthStencilRop;
+  std::uint32_t test_late(ShadedWarp& warp) override {
+    std::swap(warp.position[0], warp.position[warp.count - 1]);
+    return 0;
+  }
+};
+struct ZropThatCountsNothingLate : DepthStencilRop {
+  using DepthStencilRop::DepthStencilRop;
+  std::uint32_t test_late(ShadedWarp& warp) override {
+    warp.count = 0;
+    return 0;
+  }
+};
+/// Pairs what it should not.
+struct QruThatAlwaysPairs : PairingQru {
+  QruThatAlwaysPairs(const Parameters& parameters, const RenderContext& context)
+      : PairingQru(parameters, untested(context)) {}
+  static const RenderContext& untested(const RenderContext& context) {
+    static std::deque<RenderContext> kept;
+    kept.push_back(context);
+    auto frame = std::make_shared<Frame>(*context.frame);
+    frame->change_states([](DrawState& state) { state.depth.test = false; });
+    kept.back().frame = std::move(frame);
+    return kept.back();
+  }
+};
+std::vector<Case>& cases_of_late_tests() {
+  static std::vector<Case> all;
+  return all;
+}
+template <class Unit, class SlotBehaviour>
+struct AddLate {
+  AddLate(const char* slot, const char* name, const char* expected) {
+    const Registrar<Unit, SlotBehaviour> registrar(slot, name, "breaks a rule");
+    cases_of_late_tests().push_back({slot, name, expected});
+  }
+};
+const AddLate<ZropThatLetsTheDeadPass, ZropBehaviour> zrop_dead("zrop", "revives", "not among these in this order");
+const AddLate<ZropThatTurnsQuadsAround, ZropBehaviour> zrop_order("zrop", "turns", "not among these in this order");
+const AddLate<ZropThatCountsNothingLate, ZropBehaviour> zrop_late("zrop", "no-late-counts",
+                                                                  "quads_tested_late counts 0");
+const AddLate<QruThatAlwaysPairs, QruBehaviour> qru_late("qru", "always-pairs", "a draw that is tested late");
+
+TEST(CheckedUnits, ABrokenRuleOfLateTestsIsAFaultThatNamesTheUnitAtEveryFidelity) {
+  const auto draw = std::make_shared<Draw>(random_draw(100, 60, 200, 1));
+  for (const Case& broken : cases_of_late_tests()) {
+    for (const Fidelity fidelity : fidelities()) {
+      SCOPED_TRACE(broken.slot + "=" + broken.name + " at " + name_of(fidelity));
+      DrawState state = draw_state_of(request_of("het+qm"));
+      state.depth = {true, Compare::less, true};
+      Frame frame(100, 60);
+      frame.draw(draw, state);
       const std::string fault = fault_of(broken, fidelity, frame);
       EXPECT_EQ(fault.rfind(broken.slot + "=" + broken.name + " at cycle ", 0), 0U) << fault;
       EXPECT_NE(fault.find(broken.expected), std::string::npos) << fault;
@@ -584,6 +658,7 @@ TEST(CheckedUnits, ChecksChangeNothing) {
 
 TEST(CheckedUnits, ChecksChangeNothingInAFrame) {
   const auto draw = std::make_shared<Draw>(random_draw(100, 60, 300, 3));
+  for (std::uint32_t i = 0; i < 300; ++i) draw->splats[i].depth = testing::uniform(4, i, 0, 1);
   for (const char* platform : {"agx-orin", "desktop"}) {
     for (const Fidelity fidelity : fidelities()) {
       for (const Termination termination : {Termination::paper, Termination::strict}) {
@@ -597,7 +672,9 @@ TEST(CheckedUnits, ChecksChangeNothingInAFrame) {
         frame.draw(draw, state, "second", 100, 60);
         frame.clear({true, true});
         state.early_termination = false;
+        state.depth = {true, Compare::less_equal, true};  // tested after shading
         frame.draw(draw, state, "third", 160, 60);
+        state.depth.write = false;
         state.early_termination = true;
         state.pruning_threshold = 0.1F;
         frame.draw(draw, state, "fourth", 220);
@@ -607,6 +684,7 @@ TEST(CheckedUnits, ChecksChangeNothingInAFrame) {
         fresh_simulation();
         const RunResult checked = simulate(request, frame);
         EXPECT_EQ(checked.result_hash, trusted.result_hash) << platform << name_of(fidelity);
+        EXPECT_GT(checked.counts.quads_late_failed, 0U);
         ASSERT_EQ(checked.draws.size(), 4U);
         for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(checked.draws[i].counts, trusted.draws[i].counts);
       }

@@ -261,5 +261,34 @@ TEST_F(QruTest, PassingThroughABinEndsItsWarp) {
   EXPECT_EQ(qru.warps.value(), 2U);
 }
 
+// A fragment of a pair that failed its test would have been blended with the other.
+TEST_F(QruTest, QuadsOfADrawThatIsTestedLateFillWarpsInOrderAndNeverPair) {
+  DrawState late;
+  late.depth = {true, Compare::less, true};
+  Frame frame(64, 64);
+  frame.draw(testing::geometry_of(64, 64), DrawState());
+  frame.draw(testing::geometry_of(64, 64), late);
+  const RenderContext of_both = testing::context_of(frame);
+  PairingQru pairing(PairingQru::Parameters(), of_both);
+  for (const unsigned draw : {0U, 1U, 0U}) {
+    QuadBeat bin = beat_of({0, 0}, {5, 5, 5, 7, 9, 7, 5, 9, 5, 5, 6});
+    for (unsigned i = 0; i < bin.count; ++i) bin.quads[i].draw = draw & 0x7fffU;
+    Outcome outcome;
+    Warp warp;
+    for (unsigned from = 0; from < bin.count;) {
+      bool launched = false;
+      from += pairing.examine(bin.tile, &bin.quads[from], bin.count - from, warp, launched);
+      if (launched) collect(warp, outcome);
+    }
+    while (pairing.finish_bin(warp)) collect(warp, outcome);
+    ASSERT_EQ(outcome.warps.size(), 2U);
+    EXPECT_EQ(outcome.pairs.size(), draw == 0 ? 5U : 0U);
+    if (draw == 0) continue;
+    EXPECT_EQ(outcome.warps[0].count, 8);
+    EXPECT_EQ(outcome.singles, (std::vector<std::uint32_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}));
+  }
+  EXPECT_EQ(pairing.quads_examined.value(), 33U);
+}
+
 }  // namespace
 }  // namespace vrpipe

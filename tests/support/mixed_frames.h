@@ -86,7 +86,7 @@ inline Frame mixed_frame(std::uint64_t seed, const RunRequest& request) {
   return frame;
 }
 
-/// Stencil and depth of any kind, in several draws and clears.
+/// Stencil and depth of any kind, tested before shading and after it, in several draws and clears.
 inline Frame random_frame(std::uint64_t seed, const RunRequest& request) {
   Frame frame(mixed_frame_width, mixed_frame_height);
   frame.set_depth_format(static_cast<DepthFormat>(mix(seed) % 3));
@@ -125,6 +125,7 @@ inline Frame random_frame(std::uint64_t seed, const RunRequest& request) {
     } else if (pick(4) == 0) {
       state.shader = FragmentShader::none;
     }
+    state.late_tests = state.shader != FragmentShader::none && mix(31 * seed + i) % 3 == 0;
     frame.draw(is_mesh ? random_mesh(1 + pick(10), seed + i) : random_splats(1 + pick(40), seed + i), state,
                "draw " + std::to_string(i));
   }

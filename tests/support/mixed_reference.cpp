@@ -30,6 +30,22 @@ unsigned stencil_by_table(StencilOperation operation, unsigned stored, unsigned 
   return stored;
 }
 
+bool is_tested_late(const DrawState& state) {
+  if (state.shader == FragmentShader::none) return false;
+  bool tests = state.depth.test;
+  bool writes = state.depth.test && state.depth.write && state.depth.compare != Compare::none;
+  if (state.stencil.test) {
+    tests = true;
+    for (const StencilFace& face : {state.stencil.front, state.stencil.back}) {
+      for (const StencilOperation operation : {face.stencil_fail, face.depth_fail, face.pass}) {
+        writes = writes || (operation != StencilOperation::keep && face.write_mask % 128 != 0);
+      }
+    }
+  }
+  const bool may_discard = state.shader == FragmentShader::splat && state.pruning_threshold > 0;
+  return tests && (state.late_tests || (may_discard && writes));
+}
+
 namespace {
 
 using Exact = long double;
@@ -127,7 +143,9 @@ class Renderer {
     for (unsigned i = 0; is_mesh && i < 3; ++i) {
       depth += weights[i] * static_cast<Exact>(call.mesh_triangle(splat).vertices[i].depth);
     }
-    if (!tested(call.state, is_back, quantized(frame_.depth_format(), depth), pixel)) {
+    const bool is_late = is_tested_late(call.state);
+    const auto passes = [&] { return tested(call.state, is_back, quantized(frame_.depth_format(), depth), pixel); };
+    if (!is_late && !passes()) {
       ++counts.failed;
       return;
     }
@@ -140,6 +158,10 @@ class Renderer {
       color = mesh_color(call, splat, weights);
     } else if (!splat_color(call, call.splat(splat), x, y, color)) {
       ++counts.pruned;
+      return;
+    }
+    if (is_late && !passes()) {
+      ++counts.late_failed;
       return;
     }
     ++counts.blended;

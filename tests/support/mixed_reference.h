@@ -13,9 +13,13 @@ bool passes_by_table(Compare compare, double tested, double stored);
 /// What a stencil operation makes of a value of 7 bits, from the same specification.
 unsigned stencil_by_table(StencilOperation operation, unsigned stored, unsigned reference);
 
+/// Whether a draw's tests come after its shader: it asks for that, or the shader discards and the tests write something. By the
+/// rules of OpenGL (4.6, 14.9 and 17.3).
+bool is_tested_late(const DrawState& state);
+
 /// What became of a draw's fragments, where no pixel terminates.
 struct MixedCounts {
-  std::uint64_t rasterized = 0, failed = 0, unshaded = 0, pruned = 0, blended = 0;
+  std::uint64_t rasterized = 0, failed = 0, unshaded = 0, pruned = 0, late_failed = 0, blended = 0;
 };
 
 /// A frame as order alone makes it: sample by sample, without tiles, quads, queues, merging or termination. Coverage and depth

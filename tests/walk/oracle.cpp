@@ -82,14 +82,16 @@ std::vector<Finding> broken_draws(const RunResult& result) {
     conserved("quads rasterized", n["quads_rasterized"],
               n["quads_depth_stencil_failed"] + n["quads_terminated"] + n["quads_unshaded"] + n["quads_shaded"]);
     conserved("quads shaded", n["quads_shaded"],
-              n["quads_pruned"] + n["quads_merged"] + n["quads_dropped_late"] + n["quads_blended"]);
+              n["quads_pruned"] + n["quads_merged"] + n["quads_dropped_late"] + n["quads_late_failed"] +
+                  n["quads_blended"]);
     conserved("fragments rasterized", n["fragments_rasterized"],
               n["fragments_depth_stencil_failed"] + n["fragments_terminated"] + n["fragments_unshaded"] +
                   n["fragments_shaded"]);
     // A merged quad's fragments are blended for its front's draw.
     if (result.request.variant.quad_merging) continue;
     conserved("fragments shaded", n["fragments_shaded"],
-              n["fragments_pruned"] + n["fragments_dropped_late"] + n["fragments_blended"]);
+              n["fragments_pruned"] + n["fragments_dropped_late"] + n["fragments_late_failed"] +
+                  n["fragments_blended"]);
   }
   for (const auto& [name, count] : result.counts.named()) {
     if (sum.count(name) != 0 && sum[name] != count) {

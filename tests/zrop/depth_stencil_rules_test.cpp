@@ -40,9 +40,28 @@ struct Tested {
   bool terminated;  ///< after the test, as before it
 };
 
+enum class When { early, late };
+
+/// A shaded warp of these quads.
+ShadedWarp shaded_warp_of(const QuadBeat& beat) {
+  ShadedWarp warp{};
+  warp.tile = beat.tile;
+  warp.count = beat.count;
+  for (unsigned i = 0; i < beat.count; ++i) {
+    const Quad& quad = beat.quads[i];
+    warp.position[i] = quad.position;
+    warp.live[i] = quad.coverage;
+    warp.first_primitive[i] = warp.last_primitive[i] = primitive_order(quad);
+    warp.draw[i] = quad.draw;
+    warp.color[i] = testing::color_of(1, 0.5F, 0.25F, 1);
+  }
+  return warp;
+}
+
 /// The test of a quad with one live sample, of which this is stored; its pixel has terminated, or not.
-Tested test_one(const DrawState& state, float depth, bool is_back, float stored_depth, unsigned stored_stencil,
+Tested test_one(When when, DrawState state, float depth, bool is_back, float stored_depth, unsigned stored_stencil,
                 bool terminated, DepthFormat format = DepthFormat::d24) {
+  state.late_tests = when == When::late;
   const std::shared_ptr<Draw> draw = triangle_of(depth, is_back);
   Frame frame(16, 16);
   frame.set_depth_format(format);
@@ -60,7 +79,14 @@ Tested test_one(const DrawState& state, float depth, bool is_back, float stored_
   surface.terminated(position) = terminated ? 1U << lane : 0;
   QuadBeat beat = testing::beat_of({0, 0}, {position});
   beat.quads[0].coverage = 1U << lane;
-  const std::uint32_t changed = rop.test(beat);
+  std::uint32_t changed = 0;
+  if (when == When::early) {
+    changed = rop.test(beat);
+  } else {
+    ShadedWarp warp = shaded_warp_of(beat);
+    changed = rop.test_late(warp);
+    beat.count = warp.count;
+  }
   EXPECT_EQ(changed & ~1U, 0U);
   for (unsigned other = 0; other < 4; ++other) {
     if (other == lane) continue;
@@ -69,6 +95,20 @@ Tested test_one(const DrawState& state, float depth, bool is_back, float stored_
   }
   return {beat.count == 1, stored.depth[lane], stored.stencil[lane], changed == 1,
           (surface.terminated(position) >> lane & 1U) != 0};
+}
+/// Before shading; after it the same comes out.
+Tested test_one(const DrawState& state, float depth, bool is_back, float stored_depth, unsigned stored_stencil,
+                bool terminated, DepthFormat format = DepthFormat::d24) {
+  const Tested early = test_one(When::early, state, depth, is_back, stored_depth, stored_stencil, terminated, format);
+  const Tested late = test_one(When::late, state, depth, is_back, stored_depth, stored_stencil, terminated, format);
+  if (!(terminated && state.early_termination)) {
+    EXPECT_EQ(late.passed, early.passed);
+  }
+  EXPECT_EQ(late.depth, early.depth);
+  EXPECT_EQ(late.stencil, early.stencil);
+  EXPECT_EQ(late.changed, early.changed);
+  EXPECT_EQ(late.terminated, early.terminated);
+  return early;
 }
 
 TEST(DepthTest, FollowsTheTableForEveryFunctionAndFormat) {
@@ -250,6 +290,60 @@ TEST(DepthStencilCounts, WhatIsNotShadedEndsHere) {
   EXPECT_EQ(rop.fragments_depth_stencil_failed.value(), 1U);
   EXPECT_EQ(rop.quads_depth_stencil_failed.value(), 0U);
   EXPECT_EQ(surface.quad(3).depth[1], store_depth(DepthFormat::d24, 0.5));
+}
+
+TEST(DepthStencilCounts, WhatIsTestedLateCountsAsFailedLate) {
+  DrawState state;
+  state.shader = FragmentShader::vertex;
+  state.depth = {true, Compare::less, true};
+  state.late_tests = true;
+  RopOfOneDraw one(state);
+  DepthStencilRop& rop = *one.rop;
+  one.surface.quad(3).depth[0] = 0;
+  one.surface.quad(4).depth = {0, 0, 0, 0};
+  QuadBeat beat = testing::beat_of({0, 0}, {3, 4, 5});
+  for (unsigned i = 0; i < beat.count; ++i) beat.quads[i].splat = 0;
+  beat.quads[2].coverage = 0b0110;
+  EXPECT_EQ(rop.test(beat), 0U) << "not before it is shaded";
+  ASSERT_EQ(beat.count, 3);
+  EXPECT_EQ(rop.quads_tested.value(), 0U);
+  ShadedWarp warp = shaded_warp_of(beat);
+  EXPECT_EQ(rop.test_late(warp), 0b101U);
+  ASSERT_EQ(warp.count, 2);
+  EXPECT_EQ(warp.position[0], 3);
+  EXPECT_EQ(warp.live[0], 0b1110);
+  EXPECT_EQ(warp.position[1], 5);
+  EXPECT_EQ(warp.live[1], 0b0110);
+  for (int lane = 0; lane < 4; ++lane) {
+    EXPECT_EQ(warp.color[0].alpha[lane], lane == 0 ? 0.0F : 1.0F) << "dead lanes have no colour";
+    EXPECT_EQ(warp.color[1].green[lane], lane == 1 || lane == 2 ? 0.5F : 0.0F);
+  }
+  EXPECT_EQ(rop.quads_tested_late.value(), 3U);
+  EXPECT_EQ(rop.quads_late_failed.value(), 1U);
+  EXPECT_EQ(rop.fragments_late_failed.value(), 5U);
+  EXPECT_EQ(rop.fragments_depth_stencil_failed.value(), 0U);
+  const std::uint32_t half = store_depth(DepthFormat::d24, 0.5);
+  EXPECT_EQ(one.surface.quad(3).depth[1], half);
+  EXPECT_EQ(one.surface.quad(5).depth[0], store_depth(DepthFormat::d24, 1)) << "the shader has dropped it";
+  EXPECT_EQ(one.surface.quad(5).depth[1], half);
+}
+
+// What a fragment writes depends on whether the shader keeps it, not on what can be seen.
+TEST(DepthStencilCounts, WhereTestsThatWriteComeAfterShadingTerminationDropsNothingBefore) {
+  for (const bool write : {false, true}) {
+    DrawState state;
+    state.shader = FragmentShader::vertex;
+    state.early_termination = true;
+    state.depth = {true, Compare::less, write};
+    state.late_tests = true;
+    RopOfOneDraw one(state);
+    one.surface.terminated(3) = all_lanes;
+    QuadBeat beat = testing::beat_of({0, 0}, {3});
+    one.rop->test(beat);
+    EXPECT_EQ(beat.count, write ? 1 : 0);
+    EXPECT_EQ(one.rop->quads_terminated.value(), write ? 0U : 1U);
+    EXPECT_EQ(one.rop->quads_tested.value(), write ? 0U : 1U);
+  }
 }
 
 }  // namespace

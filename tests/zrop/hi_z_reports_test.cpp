@@ -34,6 +34,7 @@ class HiZReportsTest : public ::testing::Test {
   static RenderContext of(const Draw& draw) {
     DrawState state;
     state.depth = {true, Compare::less, true};
+    state.pruning_threshold = 0;  // nothing is discarded, so tests come before shading
     return testing::context_of(draw, state);
   }
   /// Up to 16 quads of a splat in a screen tile, of any coverage within the frame.

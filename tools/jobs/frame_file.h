@@ -20,6 +20,7 @@ struct SceneDraw {
   std::uint32_t first = 0;
   std::uint32_t splats = ~0U;
   bool early_termination = true;
+  bool late_tests = false;
   std::vector<Setting> settings;  ///< of unit `state`: those that draws may have of their own
   // Those of DrawState; none where the draw does not say.
   std::optional<DepthState> depth;

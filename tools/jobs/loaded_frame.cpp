@@ -124,6 +124,7 @@ std::shared_ptr<const Frame> make_frame(const RunRequest& request, const FrameDe
     MixedFrameOptions options;
     options.splats = draw_state_of(request, draw.settings);
     options.splats.early_termination = draw.early_termination;
+    options.splats.late_tests = draw.late_tests;
     if (draw.depth) options.splats.depth = *draw.depth;
     if (draw.stencil) options.splats.stencil = *draw.stencil;
     options.splats.cull = draw.cull.value_or(draw.is_mesh ? CullMode::back : CullMode::none);

@@ -68,12 +68,10 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
   }
   void check_timing() const override { timing(); }
   void check_counters() const override {
-    check_by_draw("quads_blended + quads_dropped_late + quads_late_failed",
-                  {&checked_->quads_blended, &checked_->quads_dropped_late, &checked_->quads_late_failed}, quads_,
-                  "quads came in");
-    check_by_draw("fragments_blended + fragments_dropped_late + fragments_late_failed",
-                  {&checked_->fragments_blended, &checked_->fragments_dropped_late, &checked_->fragments_late_failed},
-                  fragments_, "fragments came in");
+    check_by_draw("quads_blended + quads_dropped_late", {&checked_->quads_blended, &checked_->quads_dropped_late},
+                  quads_, "quads came in");
+    check_by_draw("fragments_blended + fragments_dropped_late",
+                  {&checked_->fragments_blended, &checked_->fragments_dropped_late}, fragments_, "fragments came in");
     check_by_draw("termination_signals", {&checked_->termination_signals}, signalled_, "signals went out");
     if (line_accesses_ == 0) return;  // no cache, or one of the timing model's
     const SectoredCacheStatistics& cache = checked_->cache_statistics;

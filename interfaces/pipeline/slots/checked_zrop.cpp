@@ -14,8 +14,8 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
     const TileId tile = beat.tile;
     const unsigned count = beat.count;
     const bool last_of_bin = beat.last_of_bin;
-    const bool tests =
-        count > 0 && !frame().draws().empty() && frame().draw_call(beat.quads[0].draw).state.reads_depth_stencil();
+    const bool tests = count > 0 && !frame().draws().empty() &&
+                       frame().draw_call(beat.quads[0].draw).state.reads_depth_stencil_early();
     for (unsigned i = 0; i < count; ++i) {
       const Quad& quad = beat.quads[i];
       if (tests) tested_.add(quad.draw, 1);
@@ -33,6 +33,34 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
       const Quad& quad = beat.quads[i];
       lost_quads_.take_back(quad.draw, 1);
       lost_fragments_.take_back(quad.draw, popcount(quad.coverage));
+    }
+    return changed;
+  }
+  std::uint32_t test_late(ShadedWarp& warp) override {
+    const ShadedWarp before = warp;
+    const std::uint32_t changed = ask("test_late", [&] { return checked_->test_late(warp); });
+    warp.pool = before.pool;
+    if (changed >> before.count != 0) {
+      fault("test_late", "quads {:#x} of {} have changed something", changed, before.count);
+    }
+    if (warp.tile != before.tile || warp.sequence != before.sequence || warp.tile_sequence != before.tile_sequence ||
+        warp.slot != before.slot || warp.mark != Mark::none) {
+      fault("test_late", "a warp of {} with a tile, numbers or a mark that are not its own", words_of(before.tile));
+    }
+    unsigned at = 0;
+    for (unsigned i = 0; i < before.count; ++i) {
+      const DrawIndex draw = before.draw[i];
+      tested_late_.add(draw, 1);
+      const bool stays = at < warp.count && warp.live[at] != 0 && (warp.live[at] & ~before.live[i]) == 0 &&
+                         warp.position[at] == before.position[i] &&
+                         warp.first_primitive[at] == before.first_primitive[i];
+      if (!stays) late_failed_.add(draw, 1);
+      late_failed_fragments_.add(draw, popcount(before.live[i]) - (stays ? popcount(warp.live[at]) : 0U));
+      at += stays ? 1U : 0U;
+    }
+    if (at != warp.count) {
+      fault("test_late", "{} quads of {} in {} left, and {} of them are not among these in this order", warp.count,
+            before.count, words_of(before.tile), warp.count - at);
     }
     return changed;
   }
@@ -72,6 +100,10 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
                   {&checked_->fragments_terminated, &checked_->fragments_depth_stencil_failed,
                    &checked_->fragments_unshaded},
                   lost_fragments_, "fragments did not come out");
+    check_by_draw("quads_tested_late", {&checked_->quads_tested_late}, tested_late_, "quads came in");
+    check_by_draw("quads_late_failed", {&checked_->quads_late_failed}, late_failed_, "quads did not come out");
+    check_by_draw("fragments_late_failed", {&checked_->fragments_late_failed}, late_failed_fragments_,
+                  "fragments did not come out");
     check_counter("termination_updates", checked_->termination_updates.value(), updates_, "signals came in");
   }
 
@@ -79,6 +111,9 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
   Seen tested_;
   Seen lost_quads_;
   Seen lost_fragments_;
+  Seen tested_late_;
+  Seen late_failed_;
+  Seen late_failed_fragments_;
   std::uint64_t updates_ = 0;
 };
 

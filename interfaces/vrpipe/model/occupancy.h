@@ -69,11 +69,12 @@ struct TcWork {
   static std::vector<WorkKind> kinds(const TcBehaviour::TimingParameters& timing);
 };
 struct PropWork {
-  enum : unsigned { bins, tested, color, empty_warps };
+  enum : unsigned { bins, tested, color, empty_warps, late };  ///< `late`: quads to be tested late
   static std::vector<WorkKind> kinds(const PropBehaviour::TimingParameters& timing);
 };
 struct ZropWork {
-  enum : unsigned { tests, updates, sectors };  ///< quads tested, cycles with updates, sectors moved
+  /// Quads tested before shading, cycles with updates, sectors moved, quads tested after shading.
+  enum : unsigned { tests, updates, sectors, late_tests };
   static std::vector<WorkKind> kinds(const ZropBehaviour::TimingParameters& timing);
 };
 struct QruWork {

@@ -42,14 +42,27 @@ struct DrawState {
   float obb_padding = 0.75F;
   DepthState depth;
   StencilState stencil;
+  bool late_tests = false;  ///< depth and stencil are tested after shading, also where they might be before it
   CullMode cull = CullMode::none;
   FragmentShader shader = FragmentShader::splat;
   Light light;
 
   bool tests_depth_stencil() const { return depth.test || stencil.test; }
   bool writes_depth_stencil() const { return depth.writes() || stencil.writes(); }
-  /// Whether ZROP reads the depth-stencil target for it.
+  /// Whether the shader may drop fragments.
+  bool discards() const { return shader == FragmentShader::splat && pruning_threshold > 0; }
+  /// Whether depth and stencil are tested after shading: a fragment that the shader drops leaves no trace in them.
+  bool tests_late() const {
+    return tests_depth_stencil() && shader != FragmentShader::none &&
+           (late_tests || (discards() && writes_depth_stencil()));
+  }
+  bool tests_early() const { return tests_depth_stencil() && !tests_late(); }
+  /// Whether fragments of terminated pixels are dropped before they are shaded. Not where it takes shading to know what they
+  /// write: depth and stencil do not depend on termination.
+  bool tests_termination() const { return early_termination && !(tests_late() && writes_depth_stencil()); }
+  /// Whether ZROP reads the depth-stencil target for it, and whether it does so before shading.
   bool reads_depth_stencil() const { return early_termination || tests_depth_stencil(); }
+  bool reads_depth_stencil_early() const { return tests_termination() || tests_early(); }
 };
 bool operator==(const DrawState& a, const DrawState& b);
 inline bool operator!=(const DrawState& a, const DrawState& b) { return !(a == b); }

@@ -129,6 +129,10 @@ struct ShadedWarp {
   std::array<DrawIndex, quads_per_warp> draw{};  ///< of each quad; of a merged one, that of its front
   std::array<QuadColor, quads_per_warp> color;   ///< premultiplied; (0,0,0,0) in dead lanes
 
+  /// Takes samples out: of each quad those of `left` stay, and quads without any go.
+  void keep(const std::array<LaneMask, quads_per_warp>& left);
+  /// For ZROP, which tests it late: has it alone meanwhile, and takes samples out. Warps are not made const.
+  inline ShadedWarp& editable() const { return const_cast<ShadedWarp&>(*this); }
   /// Back to its pool: by whoever takes its last quad off the pipeline, or passes it over if it has none.
   inline void release() const;
 };
@@ -160,7 +164,7 @@ void ShadedWarp::release() const {
 /// Draw order of a quad's primitive, through all draws of the frame.
 inline std::uint32_t primitive_order(const Quad& quad) { return 2 * quad.splat + quad.triangle; }
 
-/// SM to PROP: registers stay in the SM until PROP releases the slot.
+/// SM to PROP, and to ZROP and back to be tested late: registers stay in the SM until PROP releases the slot.
 struct ShadedWarpItem {
   const ShadedWarp* warp = nullptr;
 };

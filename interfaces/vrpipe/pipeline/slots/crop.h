@@ -85,9 +85,6 @@ class CropBehaviour : public Behaviour {
                                  "of which CROP finds every pixel terminated (strict)"};
   DrawCounter fragments_dropped_late{*this, "fragments_dropped_late", "fragments",
                                      "whose pixel CROP finds terminated (strict)"};
-  DrawCounter quads_late_failed{*this, "quads_late_failed", "quads", "that fail a late depth or stencil test"};
-  DrawCounter fragments_late_failed{*this, "fragments_late_failed", "fragments",
-                                    "that fail a late depth or stencil test"};
   DrawCounter termination_signals{*this, "termination_signals", "signals", "sent to ZROP, one for a quad's pixels"};
   /// Of the colour cache; its accesses are quads. Whoever simulates it counts: the unit in `look_up`, or the timing model
   /// that follows fills through the cache.

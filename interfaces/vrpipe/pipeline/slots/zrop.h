@@ -34,22 +34,28 @@ struct ZCache {
   void check(DepthFormat format) const;
 };
 
-/// Slot `zrop`: depth and stencil test, termination test and update.
+/// Slot `zrop`: depth and stencil test, before or after shading, termination test and update.
 class ZropBehaviour : public Behaviour {
  public:
   /// Before the first test. One that overrides it calls it.
   virtual void attach(DepthStencilSurface& surface) { surface_ = &surface; }
   const DepthStencilSurface* surface() const { return surface_; }
-  /// Removes dead samples, and quads without a live one, from the beat; its tile and `last_of_bin` stay. Of its quads all
-  /// are of one state; they may be of several draws. Where nothing is shaded (FragmentShader::none) all are removed.
+  /// The tests before shading (DrawState::tests_early, tests_termination). Removes dead samples, and quads without a live
+  /// one, from the beat; its tile and `last_of_bin` stay. Of its quads all are of one state; they may be of several draws.
+  /// Where nothing is shaded (FragmentShader::none) all are removed.
   /// Returns which quads of the incoming beat have changed depth or stencil, a bit each.
   virtual std::uint32_t test(QuadBeat& beat) = 0;
+  /// The test of depth and stencil after shading (DrawState::tests_late), of a warp whose live samples the shader has kept;
+  /// its quads are of one state and not merged. Removes samples that fail (ShadedWarp::keep).
+  /// Returns which quads of the incoming warp have changed depth or stencil, a bit each.
+  virtual std::uint32_t test_late(ShadedWarp& warp) = 0;
   /// Sets the termination bit (stencil MSB) of the signalled pixels, unless they have been cleared since: then the
   /// signal's epoch has passed.
   virtual void update(const TerminationSignal& signal) = 0;
   /// A mark comes by, after all tests before it: a clear of termination is done (Frame::clear_of), for this GPC's tiles.
   virtual void pass(Mark mark) = 0;
   /// Strict mode at fidelities with time: termination comes from `run_ahead`, and `update` only costs time.
+  /// Late tests are run ahead as well: `test_late` is called from within `run_ahead.tested`, and not when time comes.
   virtual void follow(FunctionalRunAhead& run_ahead) = 0;
   struct TimingParameters {
     std::uint32_t quads_per_cycle;
@@ -59,7 +65,8 @@ class ZropBehaviour : public Behaviour {
   };
   virtual TimingParameters timing() const = 0;
 
-  DrawCounter quads_tested{*this, "quads_tested", "quads", "that entered a test: of depth, stencil or termination"};
+  DrawCounter quads_tested{*this, "quads_tested", "quads",
+                           "that entered a test before shading: of depth, stencil or termination"};
   DrawCounter quads_depth_stencil_failed{*this, "quads_depth_stencil_failed", "quads",
                                          "that lost their last fragment to the depth or stencil test"};
   DrawCounter fragments_depth_stencil_failed{*this, "fragments_depth_stencil_failed", "fragments",
@@ -67,6 +74,10 @@ class ZropBehaviour : public Behaviour {
   DrawCounter quads_terminated{*this, "quads_terminated", "quads",
                                "that lost their last fragment to the termination test"};
   DrawCounter fragments_terminated{*this, "fragments_terminated", "fragments", "that failed the termination test"};
+  DrawCounter quads_tested_late{*this, "quads_tested_late", "quads",
+                                "that entered a test of depth or stencil after shading"};
+  DrawCounter quads_late_failed{*this, "quads_late_failed", "quads", "that lost their last fragment to such a test"};
+  DrawCounter fragments_late_failed{*this, "fragments_late_failed", "fragments", "that failed such a test"};
   DrawCounter quads_unshaded{*this, "quads_unshaded", "quads",
                              "that passed in a draw that shades nothing: they end here"};
   DrawCounter fragments_unshaded{*this, "fragments_unshaded", "fragments", "that passed in such a draw"};
