@@ -141,7 +141,7 @@ class PropUnit : public Unit {
       color_limit_.take(sent);
     }
     if (beat.count > 0) out_color_.push(beat);
-    return sent > 0 || moved || pass_mark();
+    return sent > 0 || moved || (current_.warp == nullptr && pass_mark());
   }
 
   /// Whether there is a warp to hand to CROP.
@@ -171,7 +171,10 @@ class PropUnit : public Unit {
       const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &in_turn_;
       if (next == nullptr || !(is_mark ? plan_.waits_at(next->warp->mark) : is_late(*next->warp))) break;
       const unsigned width = std::max<unsigned>(next->warp->count, 1);
-      if (!late_limit_.allows(width, now)) break;
+      if (!late_limit_.allows(width, now)) {
+        late_free_at_ = late_limit_.next(now);
+        break;
+      }
       late_limit_.take(width);
       out_late_.push({next->warp});
       ++on_late_way_;
@@ -183,7 +186,6 @@ class PropUnit : public Unit {
         in_turn_.warp = nullptr;
       }
     }
-    late_free_at_ = late_limit_.next(now);
     return moved;
   }
 

@@ -165,10 +165,8 @@ void PhaseBound::end_phase() {
     last_quad_ = *std::max_element(end.begin(), end.end());
     ended_ = total_;
     ended_.add(up_to_quads_);
-    // The tests before shading and those after it have one port.
-    if (ended_.late_quads > 0) {
-      last_quad_ = std::max(last_quad_, ratio(ended_.quads_tested + ended_.late_quads, zrop_.quads_per_cycle));
-    }
+    // Late tests share the port of the others, which are a stage of their own.
+    if (ended_.late_quads > 0) last_quad_ = std::max(last_quad_, busy_cycles("zrop"));
   } else if (!has_quads()) {
     Work passed = work;
     passed.tile_pairs = 0;  // for a pair without quads nobody waits

@@ -270,9 +270,9 @@ TEST_F(QruTest, QuadsOfADrawThatIsTestedLateFillWarpsInOrderAndNeverPair) {
   frame.draw(testing::geometry_of(64, 64), late);
   const RenderContext of_both = testing::context_of(frame);
   PairingQru pairing(PairingQru::Parameters(), of_both);
-  for (const unsigned draw : {0U, 1U, 0U}) {
+  for (const unsigned of_draw : {0U, 1U, 0U}) {
     QuadBeat bin = beat_of({0, 0}, {5, 5, 5, 7, 9, 7, 5, 9, 5, 5, 6});
-    for (unsigned i = 0; i < bin.count; ++i) bin.quads[i].draw = draw & 0x7fffU;
+    for (unsigned i = 0; i < bin.count; ++i) bin.quads[i].draw = of_draw & 0x7fffU;
     Outcome outcome;
     Warp warp;
     for (unsigned from = 0; from < bin.count;) {
@@ -282,8 +282,8 @@ TEST_F(QruTest, QuadsOfADrawThatIsTestedLateFillWarpsInOrderAndNeverPair) {
     }
     while (pairing.finish_bin(warp)) collect(warp, outcome);
     ASSERT_EQ(outcome.warps.size(), 2U);
-    EXPECT_EQ(outcome.pairs.size(), draw == 0 ? 5U : 0U);
-    if (draw == 0) continue;
+    EXPECT_EQ(outcome.pairs.size(), of_draw == 0 ? 5U : 0U);
+    if (of_draw == 0) continue;
     EXPECT_EQ(outcome.warps[0].count, 8);
     EXPECT_EQ(outcome.singles, (std::vector<std::uint32_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}));
   }

@@ -176,6 +176,26 @@ TEST_F(FrameFile, AStencilCutsOutWhatADrawHasMarked) {
   EXPECT_EQ(fragments("equal", R"({"clear": ["depth", "termination"], "depth": 0.5},)"), marked);
 }
 
+// What a splat's shader discards leaves no mark, so it marks less than its whole box.
+TEST_F(FrameFile, AStencilIsMarkedAfterShadingWhereTheShaderDiscards) {
+  const json result = run(R"({"commands": [
+      {"draw": "four.ply", "name": "marks", "splats": [0, 1],
+       "state": {"pruning_threshold": 0.3, "stencil": {"pass": "replace", "reference": 5}}},
+      {"draw": "wall.obj", "name": "early",
+       "state": {"cull": "none", "stencil": {"compare": "equal", "reference": 5}}},
+      {"draw": "wall.obj", "name": "late",
+       "state": {"cull": "none", "late_tests": true, "stencil": {"compare": "equal", "reference": 5}}}]})",
+                          from_the_origin);
+  const json& draws = result["draws"];
+  const std::uint64_t kept = count(draws[0], "fragments_blended");
+  EXPECT_GT(kept, 0U);
+  EXPECT_GT(count(draws[0], "fragments_pruned"), 0U);
+  EXPECT_EQ(count(draws[1], "fragments_shaded"), kept);
+  EXPECT_EQ(count(draws[1], "fragments_late_failed"), 0U);
+  EXPECT_EQ(count(draws[2], "fragments_shaded"), 64U * 48);
+  EXPECT_EQ(count(draws[2], "fragments_late_failed"), 64U * 48 - kept);
+}
+
 TEST_F(FrameFile, BadDepthStencilAndMeshes) {
   const auto of_wall = [](const std::string& state) {
     return R"({"commands": [{"draw": "four.ply"}, {"draw": "wall.obj", "state": )" + state + "}]}";
@@ -187,6 +207,8 @@ TEST_F(FrameFile, BadDepthStencilAndMeshes) {
   bad(of_wall(R"({"stencil": {"reference": 128}})"), {"state.stencil.reference", "0 to 127"});
   bad(of_wall(R"({"stencil": {"front": {}, "pass": "keep"}})"), {"state.stencil", "unknown key 'pass'"});
   bad(of_wall(R"({"shader": "splat"})"), {"state.shader", "that of splats"});
+  bad(of_wall(R"({"late_tests": 1})"), {"state.late_tests", "true or false"});
+  bad(of_wall(R"({"late_tests": true, "shader": "none"})"), {"state.late_tests", "its shader is none"});
   bad(of_wall(R"({"cull": "both"})"), {"state.cull", "back"});
   bad(R"({"commands": [{"draw": "four.ply", "state": {"shader": "lit"}}]})", {"state.shader", "that of a mesh"});
   bad(R"({"commands": [{"draw": "wall.obj", "splats": [0, 1]}]})", {"splats", "a mesh"});

@@ -59,6 +59,14 @@ std::vector<Finding> broken_occupancies(const RunResult& result) {
   return findings;
 }
 
+/// Of surfaces of one frame.
+bool same_stencil(const DepthStencilSurface& a, const DepthStencilSurface& b) {
+  for (std::size_t place = 0; place < a.grid().quads(); ++place) {
+    if (a.quad(place).stencil != b.quad(place).stencil) return false;
+  }
+  return true;
+}
+
 using DrawCounts = std::map<std::string, std::uint64_t>;
 
 /// Of a draw alone in its frame, the frame's.
@@ -184,6 +192,7 @@ class Judge {
       }
       if (untimed) {
         for (const Finding& finding : broken_rules(*untimed, *result)) find(stage, finding);
+        compare_stencils(stage, *untimed, *result);
       } else {
         untimed = std::move(result);
       }
@@ -194,12 +203,20 @@ class Judge {
     const std::string stage = std::string(name_of(case_.stalled)) + " with stalls";
     if (const auto result = simulated(stage, stalled)) {
       for (const Finding& finding : broken_rules(*untimed, *result)) find(stage, finding);
+      compare_stencils(stage, *untimed, *result);
     }
     repetition();
     machine(*untimed);
     split(*untimed);
     beginnings(*untimed);
     pixels(*untimed);
+  }
+
+  void compare_stencils(const std::string& stage, const RunResult& untimed, const RunResult& timed) {
+    const bool any = std::any_of(case_.parts.begin(), case_.parts.end(),
+                                 [](const Part& part) { return part.stencil != Part::Stencil::untested; });
+    if (!any || same_stencil(untimed.framebuffer.depth_stencil, timed.framebuffer.depth_stencil)) return;
+    find(stage, {"order alone decides what is stored", "the stencil differs from the untimed one"});
   }
 
   /// At cycle fidelity the order in which units tick must not matter either.

@@ -290,6 +290,18 @@ std::vector<Part> draw_parts(Dice& dice, std::size_t splats) {
   return parts;
 }
 
+void draw_stencils(Dice& dice, std::vector<Part>& parts) {
+  if (!dice.chance(60)) return;
+  const StencilOperation operations[] = {StencilOperation::increment_wrap, StencilOperation::replace,
+                                         StencilOperation::invert, StencilOperation::zero};
+  for (Part& part : parts) {
+    part.stencil = static_cast<Part::Stencil>(dice.below(4));
+    if (part.stencil == Part::Stencil::written_late) part.operation = dice.one_of(operations);
+    part.clear.stencil = dice.chance(25);
+    part.clear.stencil_value = 5;
+  }
+}
+
 /// A platform with its z-caches connected, or with an L1 between each SM array and the L2; it keeps its name and stays
 /// where it is.
 const Platform& edited(const Platform& platform, bool z_caches, bool l1s) {
@@ -355,9 +367,13 @@ Frame Case::frame(std::size_t from) const {
   const auto splats = static_cast<std::uint32_t>(draw.splats.size());
   for (std::size_t i = from; i < parts.size(); ++i) {
     const Part& part = parts[i];
-    if (part.clear.color || part.clear.termination) frame.clear(part.clear);
+    if (part.clear.color || part.clear.termination || part.clear.stencil) frame.clear(part.clear);
     DrawState state = draw_state_of(request(Fidelity::functional), part.own);
     state.early_termination = part.terminates_early;
+    state.stencil.test = part.stencil != Part::Stencil::untested;
+    state.late_tests = part.stencil == Part::Stencil::read_late || part.stencil == Part::Stencil::written_late;
+    state.stencil.front.pass = part.operation;
+    if (state.stencil.test) state.stencil.front.reference = static_cast<std::uint8_t>(i);
     const std::uint32_t first = i == 0 ? 0 : std::min(part.first, splats);
     const std::uint32_t end = i + 1 < parts.size() ? std::min(parts[i + 1].first, splats) : splats;
     frame.draw(scene, state, fmt::format("part {}", i), first, end - first);
@@ -367,7 +383,8 @@ Frame Case::frame(std::size_t from) const {
 
 bool Case::is_mere_split() const {
   return std::all_of(parts.begin(), parts.end(), [](const Part& part) {
-    return part.own.empty() && part.terminates_early && !part.clear.color && !part.clear.termination;
+    return part.own.empty() && part.terminates_early && !part.clear.color && !part.clear.termination &&
+           !part.clear.stencil && part.stencil == Part::Stencil::untested;
   });
 }
 
@@ -393,6 +410,8 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   c.stall_seed = dice.next() | 1U;
   c.draw = draw_scene(dice, real);
   c.parts = draw_parts(dice, c.draw.splats.size());
+  Dice of_stencils(mix(mix(seed + 1) ^ index));
+  draw_stencils(of_stencils, c.parts);
   c.connects_z_caches = dice.chance(40);
   if (c.connects_z_caches && !c.refused && dice.chance(60)) draw_small_z_cache(dice, c.settings);
   c.inserts_l1s = dice.chance(25);
@@ -411,12 +430,16 @@ std::string describe(const Case& c) {
     text += fmt::format(" {}.{}={}", setting.unit, setting.parameter, setting.value);
   }
   for (const Part& part : c.parts) {
-    if (part.clear.color || part.clear.termination) {
-      text += fmt::format("\n    clear{}{}", part.clear.color ? " color" : "",
-                          part.clear.termination ? " termination" : "");
+    if (part.clear.color || part.clear.termination || part.clear.stencil) {
+      text += fmt::format("\n    clear{}{}{}", part.clear.color ? " color" : "",
+                          part.clear.termination ? " termination" : "", part.clear.stencil ? " stencil" : "");
     }
     text += fmt::format("\n    draw from splat {} on{}", part.first, part.terminates_early ? "" : ", not terminated");
     for (const Setting& setting : part.own) text += fmt::format(", {}={}", setting.parameter, setting.value);
+    const char* const stencils[] = {"", ", stencil tested early", ", stencil tested late",
+                                    ", stencil written late by "};
+    text += stencils[static_cast<unsigned>(part.stencil)];
+    if (part.operation != StencilOperation::keep) text += fmt::format("{}", static_cast<unsigned>(part.operation));
   }
   return text;
 }

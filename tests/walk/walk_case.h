@@ -15,6 +15,10 @@ struct Part {
   std::vector<Setting> own;      ///< of unit `state`, beyond those of the case
   bool terminates_early = true;  ///< where the variant does
   Clear clear;                   ///< before it
+  /// A stencil test that passes everywhere: what it writes tells whether the order was kept, and the picture is as without.
+  enum class Stencil : std::uint8_t { untested, read_early, read_late, written_late };
+  Stencil stencil = Stencil::untested;
+  StencilOperation operation = StencilOperation::keep;  ///< that writes
 };
 
 /// One configuration and one scene of the random walk.

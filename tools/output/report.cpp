@@ -234,6 +234,10 @@ std::string draws_text(const std::vector<RunResult>& runs, const TextStyle& styl
     columns.insert(columns.begin() + 3, "quads_unshaded");
     names.insert(names.begin() + 4, "not shaded");
   }
+  if (std::any_of(runs.begin(), runs.end(), [](const RunResult& run) { return run.counts.quads_late_failed > 0; })) {
+    columns.insert(columns.end() - 1, "quads_late_failed");
+    names.insert(names.end() - 1, "late failed");
+  }
   TextTable table(std::move(names));
   const auto row = [&](const std::string& label, const DrawReport& draw) {
     std::vector<std::string> cells{label};
