@@ -29,6 +29,7 @@ class PropUnit : public Unit {
         out_late_(*this, "out_late"),
         in_late_(*this, "in_late"),
         plan_(context),
+        tests_late_(plan_.is_used()),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         tests_(context.frame->needs_zrop()),
@@ -114,7 +115,7 @@ class PropUnit : public Unit {
       if (current_.warp == nullptr) {
         if (!has_next()) break;
         if (out_release_.credits() == 0) break;
-        current_ = plan_.is_used() ? take_next() : order_.take();
+        current_ = tests_late_ ? take_next() : order_.take();
         index_ = 0;
       }
       const ShadedWarp& warp = *current_.warp;
@@ -145,7 +146,7 @@ class PropUnit : public Unit {
   }
 
   /// Whether there is a warp to hand to CROP.
-  bool has_next() { return plan_.is_used() ? has_next_beside_late() : order_.has_next(); }
+  bool has_next() { return tests_late_ ? has_next_beside_late() : order_.has_next(); }
   [[gnu::noinline]] bool has_next_beside_late() {
     if (on_late_way_ > 0) return in_late_.ready() && in_late_.front().warp->mark == Mark::none;
     if (in_turn_.warp == nullptr && order_.has_next()) in_turn_ = order_.take();
@@ -189,12 +190,23 @@ class PropUnit : public Unit {
     return moved;
   }
 
+  [[gnu::noinline]] bool has_late_work() const {
+    return in_late_.ready() || (in_turn_.warp != nullptr && on_late_way_ == 0);
+  }
+  [[gnu::noinline]] Cycle next_late(Cycle now) const {
+    Cycle next = never;
+    for (const Cycle at : {late_free_at_, in_late_.next_ready()}) {
+      if (at > now) next = std::min(next, at);
+    }
+    return next;
+  }
+
   bool pass_mark() {
     if (on_late_way_ > 0) return pass_mark_back();
     const ReorderBuffer::Waiting* const mark = order_.next_mark();
     if (mark == nullptr || out_release_.credits() == 0) return false;
     // It goes the late way.
-    if (plan_.is_used() && plan_.waits_at(mark->warp->mark)) return false;
+    if (tests_late_ && plan_.waits_at(mark->warp->mark)) return false;
     hand_on_mark(*mark->warp);
     order_.leave_mark();
     return true;
@@ -217,7 +229,7 @@ class PropUnit : public Unit {
 
   Cycle tick(Cycle now) override {
     bool moved = send_color(now);
-    if (plan_.is_used()) moved = send_late(now) || moved;
+    if (tests_late_) moved = send_late(now) || moved;
     moved = collect() || moved;
     if (tests_) {
       moved = forward(back_, in_tested_, out_survivors_, now) || moved;
@@ -230,11 +242,10 @@ class PropUnit : public Unit {
       return now + 1;
     }
     const bool has_work = current_.warp != nullptr || order_.has_next() || in_bins_.ready() || in_tested_.ready() ||
-                          in_late_.ready() || (in_turn_.warp != nullptr && on_late_way_ == 0);
+                          (tests_late_ && has_late_work());
     const bool waits = order_.has_early() || on_late_way_ > 0;
     enter(has_work ? UnitState::blocked : waits ? UnitState::latency : UnitState::starved, now);
-    Cycle next = in_late_.next_ready() > now ? in_late_.next_ready() : never;
-    if (plan_.is_used() && late_free_at_ > now) next = std::min(next, late_free_at_);
+    Cycle next = tests_late_ ? next_late(now) : never;
     for (const Cycle at :
          {there_.free_at, back_.free_at, in_bins_.next_ready(), in_tested_.next_ready(), in_shaded_.next_ready()}) {
       if (at > now) next = std::min(next, at);
@@ -252,6 +263,7 @@ class PropUnit : public Unit {
   StreamOut<ShadedWarpItem> out_late_;
   StreamIn<ShadedWarpItem> in_late_;
   const LatePlan plan_;
+  const bool tests_late_;  ///< any draw
   std::unique_ptr<PropBehaviour> behaviour_;
   const PropBehaviour::TimingParameters timing_;
   const bool tests_;

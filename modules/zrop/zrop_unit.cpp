@@ -28,6 +28,7 @@ class ZropUnit : public Unit {
         out_late_(*this, "out_late"),
         context_(context),
         plan_(context),
+        tests_late_(plan_.is_used()),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         z_(*this, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context, plan_),
@@ -136,7 +137,7 @@ class ZropUnit : public Unit {
   }
 
   bool test_all(Cycle now) {
-    const bool late = plan_.is_used() && test_late(now);
+    const bool late = tests_late_ && test_late(now);
     return test(now) || late;
   }
   [[gnu::noinline]] bool test_late(Cycle now) {
@@ -196,7 +197,7 @@ class ZropUnit : public Unit {
       enter(UnitState::busy, now);
       return free_at_;
     }
-    if (plan_.is_used()) return wait(now);
+    if (tests_late_) return wait(now);
     if (in_.ready()) {
       enter(UnitState::blocked, now);
       return in_terminations_.next_ready();
@@ -239,6 +240,7 @@ class ZropUnit : public Unit {
   StreamOut<ShadedWarpItem> out_late_;
   const RenderContext& context_;
   const LatePlan plan_;
+  const bool tests_late_;  ///< any draw
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZropBehaviour::TimingParameters timing_;
   ZPort z_;

@@ -19,7 +19,6 @@ namespace {
 
 using testing::mixed_frame_height;
 using testing::mixed_frame_width;
-using testing::random_frame;
 using testing::random_mesh;
 using testing::random_splats;
 using testing::request_of;
@@ -130,7 +129,7 @@ TEST_P(LateFrame, IsThatOfTheReference) {
         expect_depth_stencil(result, reference);
         testing::expect_image(result, reference, terminates ? 1 - 0.996 : 0);
         EXPECT_GT(result.counts.fragments_late_failed, 0U);
-        for (const std::size_t draw : {1, 3, 4}) EXPECT_EQ(count(result, draw, "quads_merged"), 0U);
+        for (const std::size_t draw : {1U, 3U, 4U}) EXPECT_EQ(count(result, draw, "quads_merged"), 0U);
         if (terminates || std::string(hi_z) == "on") continue;
         for (std::size_t draw = 0; draw < reference.of_draw.size(); ++draw) {
           EXPECT_EQ(count(result, draw, "fragments_late_failed"), reference.of_draw[draw].late_failed);

@@ -117,7 +117,7 @@ TEST_F(LateZropTest, HasThePortBeforeOtherTests) {
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 8);
   Sink<ShadedWarpItem>& back = bench.sink<ShadedWarpItem>("out_late", 8);
   for (unsigned i = 0; i < 6; ++i) early.add(quads_of_draw(1, sixteen));
-  for (const Cycle at : {2, 3}) late.add(warp(eight, 0), at);
+  for (const Cycle at : {2U, 3U}) late.add(warp(eight, 0), at);
   bench.run();
   // A beat of 16 quads in each cycle from 1 on; beside a warp of 8 there is no room for one.
   ASSERT_EQ(back.records().size(), 2U);
