@@ -30,7 +30,8 @@ class ZPort {
         timing_(timing),
         updates_per_cycle_(updates_per_cycle),
         port_(owner, "memory", timing.mshrs,
-              {MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)}),
+              {MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)},
+              timing.organization.sectors_of_a_line()),
         look_ups_(quads_per_cycle),
         late_(quads_per_cycle, timing.input_quads) {}
 

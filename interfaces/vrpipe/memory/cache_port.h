@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,7 +11,7 @@
 namespace vrpipe {
 
 /// A sectored cache in front of a memory port, at `cycle`, for a unit that looks lines up early and uses them once their
-/// sectors are there: asks for what is absent, sector by sector, and writes dirty sectors of evicted lines back.
+/// sectors are there: asks for what is absent, and writes dirty sectors of evicted lines back.
 class CachePort {
  public:
   /// A look-up, which is given the first two members and may take several cycles.
@@ -21,9 +22,10 @@ class CachePort {
     std::uint32_t asked_for = 0;  ///< sectors, by this look-up
   };
 
-  /// @param mshrs  sectors that are filled at a time
-  CachePort(PortOwner& owner, const std::string& name, unsigned mshrs, MemoryOrigin origin)
-      : memory_(owner, name, 2 * mshrs, origin), mshrs_(mshrs) {}
+  /// @param mshrs        sectors that are filled at a time
+  /// @param longest_run  neighbouring sectors that are asked for in one access, where they are aligned
+  CachePort(PortOwner& owner, const std::string& name, unsigned mshrs, MemoryOrigin origin, unsigned longest_run = 1)
+      : memory_(owner, name, 2 * mshrs, origin), mshrs_(mshrs), longest_run_(longest_run) {}
 
   tlm::tlm_initiator_socket<32>& socket() { return memory_.socket; }
   /// Before the first look-up. The statistics outlive it.
@@ -45,11 +47,14 @@ class CachePort {
     while (memory_.next_completed(tag)) {
       any = true;
       if (tag == write_back_tag) continue;
-      const SectoredCache::Line line = tag >> sector_bits;
-      const unsigned sector = tag & ((1U << sector_bits) - 1);
-      cache_->finish_fill(line, sector);
-      statistics_->fill_cycles.see(now - asked_at(line, sector));
-      --fills_in_flight_;
+      const SectoredCache::Line line = tag >> (2 * sector_bits);
+      const unsigned first = tag & (sectors_at_most - 1);
+      const unsigned count = (tag >> sector_bits & (sectors_at_most - 1)) + 1;
+      for (unsigned sector = first; sector < first + count; ++sector) {
+        cache_->finish_fill(line, sector);
+        statistics_->fill_cycles.see(now - asked_at(line, sector));
+      }
+      fills_in_flight_ -= count;
     }
     return any;
   }
@@ -60,16 +65,18 @@ class CachePort {
   bool look_up(LookUp& wanted, Cycle now, Moved&& moved) {
     if (!write_back(moved)) return false;
     if (wanted.line == SectoredCache::no_line && !take_line(wanted)) return false;
-    for (std::uint32_t missing = wanted.sectors & cache_->absent(wanted.line); missing != 0; missing &= missing - 1) {
+    for (std::uint32_t missing = wanted.sectors & cache_->absent(wanted.line); missing != 0;) {
       if (!memory_.available() || fills_in_flight_ == mshrs_) return false;
-      const auto sector = static_cast<unsigned>(__builtin_ctz(missing));
-      memory_.read(wanted.address + (std::uint64_t{sector} << sector_shift_), 1U << sector_shift_,
-                   wanted.line << sector_bits | sector);
-      cache_->start_fill(wanted.line, sector);
-      asked_at(wanted.line, sector) = now;
-      wanted.asked_for |= 1U << sector;
-      ++fills_in_flight_;
-      moved(1U);
+      const SectorRun run = take_sector_run(missing, std::min(longest_run_, mshrs_ - fills_in_flight_));
+      memory_.read(wanted.address + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_,
+                   (wanted.line << sector_bits | (run.count - 1)) << sector_bits | run.first);
+      for (unsigned sector = run.first; sector < run.first + run.count; ++sector) {
+        cache_->start_fill(wanted.line, sector);
+        asked_at(wanted.line, sector) = now;
+      }
+      wanted.asked_for |= sector_mask(run.first, run.count);
+      fills_in_flight_ += run.count;
+      moved(run.count);
     }
     cache_->looked_up(wanted.line, wanted.sectors);
     return true;
@@ -112,6 +119,7 @@ class CachePort {
   // What a memory access is for: a sector of a line, or nothing that anyone waits for.
   static constexpr std::uint32_t write_back_tag = ~0U;
   static constexpr unsigned sector_bits = 5;
+  static constexpr unsigned sectors_at_most = 1U << sector_bits;
 
   /// The cycle in which a sector that is on its way was asked for.
   Cycle& asked_at(SectoredCache::Line line, unsigned sector) {
@@ -133,6 +141,7 @@ class CachePort {
 
   MemoryPort memory_;
   const unsigned mshrs_;
+  const unsigned longest_run_;
   std::optional<SectoredCache> cache_;
   SectoredCacheStatistics* statistics_ = nullptr;
   std::vector<Cycle> asked_at_;  ///< by sector of the cache
