@@ -171,12 +171,11 @@ ClockedL2::ClockedL2(const sc_core::sc_module_name& name, ClockDomain& domain, s
       occupancy_(domain.frame_end(), kinds_of(sizes_)),
       memory_(*this, "below", std::numeric_limits<unsigned>::max()),
       banks_(sizes_.banks),
-      queues_(sizes_.banks),
+      queues_(sizes_.banks * ports.size()),
       waiting_(cache_.organization().lines(), nobody) {
   for (const unsigned bytes : ports) {
     ports_.push_back(std::make_unique<Port>(static_cast<unsigned>(ports_.size()), *this, bytes));
   }
-  for (auto& of_bank : queues_) of_bank.resize(ports.size());
 }
 
 ClockedL2::~ClockedL2() = default;
@@ -198,15 +197,13 @@ void ClockedL2::queue(std::uint32_t request) {
   const MemoryRequest access = requests_[request].access;
   behaviour_->count(access);
   cache_.prefetch_line(access.address);
-  const std::uint64_t line_bytes = cache_.organization().line_bytes;
-  const bool is_whole = access.address / line_bytes == (access.address + access.bytes - 1) / line_bytes;
   const auto add = [&](std::uint32_t part) {
     const std::uint32_t bank = behaviour_->bank_of(requests_[part].access.address);
-    queues_[bank][requests_[part].port].push(part);
+    queue_of(bank, requests_[part].port).push(part);
     ++banks_[bank].queued;
     banks_with_requests_ |= std::uint64_t{1} << bank;
   };
-  if (is_whole) return add(request);
+  if (behaviour_->is_in_one_line(access)) return add(request);
   behaviour_->for_each_line(access, [&](std::uint64_t address, std::uint32_t bytes) {
     const std::uint32_t part = make_request();
     Request& made = requests_[part];
@@ -292,7 +289,7 @@ void ClockedL2::take_requests(Cycle now) {
 
 bool ClockedL2::take_one(std::uint32_t index, Cycle now) {
   Bank& bank = banks_[index];
-  std::vector<Ring<std::uint32_t>>& queues = queues_[index];
+  Ring<std::uint32_t>* const queues = &queue_of(index, 0);
   const auto ports = static_cast<std::uint32_t>(ports_.size());
   std::uint32_t chosen = nobody;
   for (std::uint32_t i = 0; i < ports; ++i) {
@@ -305,26 +302,27 @@ bool ClockedL2::take_one(std::uint32_t index, Cycle now) {
   }
   if (chosen == nobody) return false;
   const std::uint32_t request = queues[chosen].front();
-  if (!can_go_on(index, requests_[request].access)) {
+  const MemoryRequest& access = requests_[request].access;
+  const bool passes = behaviour_->passes(access);
+  const SectoredCache::Line line = passes ? SectoredCache::no_line : cache_.find(access.address);
+  if (passes ? bank.write_backs == sizes_.write_backs : !can_go_on(index, access, line)) {
     bank.stuck = true;
     ++bank_stalls_;
     return false;
   }
   queues[chosen].pop();
   bank.turn = chosen + 1 == ports ? 0 : chosen + 1;
-  ports_[chosen]->send(behaviour_->request_bytes(requests_[request].access), now);
+  ports_[chosen]->send(behaviour_->request_bytes(access), now);
   queue_cycles_.see(now - 1 - requests_[request].arrival);
-  if (behaviour_->passes(requests_[request].access)) {
+  if (passes) {
     pass(index, request, now);
   } else {
-    look_up(index, request, now);
+    look_up(index, request, line, now);
   }
   return true;
 }
 
-bool ClockedL2::can_go_on(std::uint32_t index, const MemoryRequest& access) const {
-  if (behaviour_->passes(access)) return banks_[index].write_backs < sizes_.write_backs;
-  const SectoredCache::Line line = cache_.find(access.address);
+bool ClockedL2::can_go_on(std::uint32_t index, const MemoryRequest& access, SectoredCache::Line line) const {
   if (line == SectoredCache::no_line) {
     const Bank& bank = banks_[index];
     return bank.mshrs < sizes_.mshrs && bank.write_backs < sizes_.write_backs && cache_.can_allocate(access.address);
@@ -339,7 +337,7 @@ void ClockedL2::pass(std::uint32_t index, std::uint32_t request, Cycle now) {
   occupy(index, access.bytes, now);
 }
 
-void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, Cycle now) {
+void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, SectoredCache::Line line, Cycle now) {
   Bank& bank = banks_[index];
   const MemoryRequest access = requests_[request].access;
   const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
@@ -348,7 +346,6 @@ void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, Cycle now) {
   const std::uint64_t line_address = access.address - first;
   const std::uint32_t sectors = behaviour_->sectors_of(access);
   std::uint64_t moved = access.bytes;
-  SectoredCache::Line line = cache_.find(access.address);
   if (line == SectoredCache::no_line) {
     SectoredCache::Evicted evicted;
     line = cache_.allocate(access.address, evicted);

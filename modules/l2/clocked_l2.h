@@ -77,9 +77,11 @@ class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Cl
   void finish_fills(Cycle now);
   void take_requests(Cycle now);
   bool take_one(std::uint32_t index, Cycle now);
-  /// Whether a request finds an MSHR, a line and a place for what that evicts, as far as it may need them.
-  bool can_go_on(std::uint32_t index, const MemoryRequest& access) const;
-  void look_up(std::uint32_t index, std::uint32_t request, Cycle now);
+  Ring<std::uint32_t>& queue_of(std::uint32_t bank, std::uint32_t port) { return queues_[bank * ports_.size() + port]; }
+  /// Whether a request, of a line that is held or none, finds an MSHR, a line and a place for what that evicts, as far as it
+  /// may need them.
+  bool can_go_on(std::uint32_t index, const MemoryRequest& access, SectoredCache::Line line) const;
+  void look_up(std::uint32_t index, std::uint32_t request, SectoredCache::Line line, Cycle now);
   void pass(std::uint32_t index, std::uint32_t request, Cycle now);
   void ask_below();
   void respond(std::uint32_t request, Cycle from);
@@ -93,8 +95,8 @@ class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Cl
   MemoryPort memory_;
   std::vector<std::unique_ptr<Port>> ports_;
   std::vector<Bank> banks_;
-  std::uint64_t banks_with_requests_ = 0;                 ///< a bit each
-  std::vector<std::vector<Ring<std::uint32_t>>> queues_;  ///< of requests, by bank and port
+  std::uint64_t banks_with_requests_ = 0;    ///< a bit each
+  std::vector<Ring<std::uint32_t>> queues_;  ///< of requests, by bank, then port
   std::vector<Request> requests_;
   std::vector<std::uint32_t> free_requests_;
   std::vector<std::uint32_t> waiting_;  ///< the first that waits for a line of the cache

@@ -90,6 +90,9 @@ SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderConte
                    {{*this, "attribute_sectors", "sectors", "accessed of the attributes of shaded vertices"},
                     {*this, "attribute_sector_misses", "sectors", "missed of these"}}}},
       cache_(checked(parameters), statistics_),
+      last_of_line_(cache_.organization().line_bytes - 1),
+      sector_shift_(static_cast<unsigned>(__builtin_ctz(cache_.organization().sector_bytes))),
+      bank_width_(sizes_.bank_bytes_per_cycle),
       origins_(cache_.organization().lines()),
       bank_cycles_(sizes_.banks) {}
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <vrpipe/arithmetic/divisor.h>
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/memory/memory_request.h>
 #include <vrpipe/memory/sectored_cache.h>
@@ -168,7 +169,7 @@ class SectoredL2 final : public MemoryBehaviour {
   void count_bank(std::uint32_t bank, std::uint64_t bytes) { bank_cycles_[bank] += bank_cycles(bytes); }
   /// How long so many bytes keep a bank.
   std::uint32_t bank_cycles(std::uint64_t bytes) const {
-    return static_cast<std::uint32_t>((bytes + sizes_.bank_bytes_per_cycle - 1) / sizes_.bank_bytes_per_cycle);
+    return static_cast<std::uint32_t>(bank_width_.quotient_up(bytes));
   }
   /// Whose data a line of the cache holds: what is written back has its origin.
   const MemoryOrigin& origin(SectoredCache::Line line) const { return origins_[line]; }
@@ -180,10 +181,9 @@ class SectoredL2 final : public MemoryBehaviour {
   }
   /// Of a request in one line.
   std::uint32_t sectors_of(const MemoryRequest& request) const {
-    const CacheOrganization& organization = cache_.organization();
-    const std::uint32_t first = static_cast<std::uint32_t>(request.address & (organization.line_bytes - 1));
-    const std::uint32_t from = first / organization.sector_bytes;
-    return sector_mask(from, (first + request.bytes - 1) / organization.sector_bytes - from + 1);
+    const auto first = static_cast<std::uint32_t>(request.address & last_of_line_);
+    const std::uint32_t from = first >> sector_shift_;
+    return sector_mask(from, ((first + request.bytes - 1) >> sector_shift_) - from + 1);
   }
   /// Bytes on the way in and on the way out.
   std::uint32_t request_bytes(const MemoryRequest& request) const {
@@ -192,12 +192,14 @@ class SectoredL2 final : public MemoryBehaviour {
   std::uint32_t response_bytes(const MemoryRequest& request) const {
     return request.command == tlm::TLM_WRITE_COMMAND ? sizes_.header_bytes : request.bytes;
   }
+  bool is_in_one_line(const MemoryRequest& request) const {
+    return (request.address & last_of_line_) + request.bytes <= last_of_line_ + 1;
+  }
   /// Calls `piece(address, bytes)` with the part of a request in each line.
   template <class Piece>
   void for_each_line(const MemoryRequest& request, Piece&& piece) const {
-    const std::uint64_t line_bytes = cache_.organization().line_bytes;
     for (std::uint64_t address = request.address; address < request.address + request.bytes;) {
-      const std::uint64_t end = std::min(request.address + request.bytes, (address / line_bytes + 1) * line_bytes);
+      const std::uint64_t end = std::min(request.address + request.bytes, (address | last_of_line_) + 1);
       piece(address, static_cast<std::uint32_t>(end - address));
       address = end;
     }
@@ -232,6 +234,9 @@ class SectoredL2 final : public MemoryBehaviour {
                                 "of attributes that another line went instead of"};
   SectoredCacheStatistics statistics_{*this, "cache"};
   SectoredCache cache_;
+  const std::uint64_t last_of_line_;  ///< byte
+  const unsigned sector_shift_;       ///< log2 of the bytes of a sector
+  const Divisor bank_width_;          ///< bytes a cycle
   L2Observer* observer_ = nullptr;
   std::vector<MemoryOrigin> origins_;       ///< by line of the cache
   std::vector<std::uint64_t> bank_cycles_;  ///< by bank
