@@ -83,7 +83,7 @@ void print(const Case& c, const std::vector<Finding>& findings) {
   fmt::print("  {}\n", describe(c));
   for (const Finding& finding : findings) fmt::print("  {}: {}\n", finding.rule, finding.detail);
   const Fidelity fidelity = findings.empty() ? Fidelity::cycle : fidelity_in(findings.front().detail);
-  if (!c.parts.empty()) {
+  if (!c.is_single_draw()) {
     fmt::print("  --seed {} --only {} says all of it; a command line, but for the draws:\n", c.seed, c.index);
   }
   fmt::print("  {}\n", command_line(c, fidelity, scene));

@@ -17,6 +17,7 @@
 #include <vrpipe/platforms/wiring.h>
 
 #include "support/builders.h"
+#include "support/mixed_frames.h"
 
 namespace vrpipe::walk {
 
@@ -361,6 +362,10 @@ RunRequest Case::request(Fidelity fidelity) const {
 }
 
 Frame Case::frame(std::size_t from) const {
+  if (mixed_seed != 0) {
+    const RunRequest own = request(Fidelity::functional);
+    return mixed_seed % 4 == 0 ? testing::mixed_frame(mixed_seed, own) : testing::random_frame(mixed_seed, own);
+  }
   Frame frame(draw.width, draw.height);
   const std::shared_ptr<const Draw> scene(&draw, [](const Draw*) {});
   if (parts.empty()) frame.draw(scene, draw_state_of(request(Fidelity::functional)));
@@ -417,12 +422,18 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   c.inserts_l1s = dice.chance(25);
   if (c.inserts_l1s && !c.refused) draw_l1(dice, c.settings);
   if (c.connects_z_caches || c.inserts_l1s) c.platform = &edited(*c.platform, c.connects_z_caches, c.inserts_l1s);
+  if (!c.refused && dice.chance(20)) {
+    c.mixed_seed = 1 + dice.below(1000000);
+    c.draw = draw_of(testing::mixed_frame_width, testing::mixed_frame_height);
+    c.parts.clear();
+  }
   return c;
 }
 
 std::string describe(const Case& c) {
   std::string text = fmt::format("{} {} {} {} {}x{}, {} splats", c.platform->name, c.variant.name, name_of(c.format),
                                  word_for(c.termination), c.draw.width, c.draw.height, c.draw.splats.size());
+  if (c.mixed_seed != 0) text += fmt::format(", meshes and splats of seed {},", c.mixed_seed);
   if (c.connects_z_caches) text += ", z-caches connected,";
   if (c.inserts_l1s) text += ", L1s inserted,";
   for (const UnitChoice& unit : c.units) text += fmt::format(" {}={}", unit.slot, unit.implementation);

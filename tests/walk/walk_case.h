@@ -36,6 +36,8 @@ struct Case {
   bool refused = false;  ///< the last setting lies outside its declared range
   Draw draw;
   std::vector<Part> parts;  ///< the scene in several draws; none for a single one
+  /// Meshes and splats of a seed, of random depth and stencil states, in place of the scene; 0 for none.
+  std::uint64_t mixed_seed = 0;
 
   /// What is run twice, and once with stalls.
   Fidelity repeated = Fidelity::cycle;
@@ -45,6 +47,7 @@ struct Case {
   RunRequest request(Fidelity fidelity) const;
   /// The draws from a part on, which refer to the case's scene.
   Frame frame(std::size_t from = 0) const;
+  bool is_single_draw() const { return parts.empty() && mixed_seed == 0; }
   /// Whether a single draw says the same.
   bool is_mere_split() const;
 };
