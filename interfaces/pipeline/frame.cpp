@@ -150,6 +150,16 @@ bool Frame::needs_zrop() const {
   });
 }
 
+bool Frame::clears_depth_stencil(Mark mark) const {
+  const Clear* const clear = clear_of(mark);
+  if (clear == nullptr) return false;
+  return std::none_of(draws_.begin(), draws_.end(), [&](const DrawCall& call) {
+    const DrawState& state = call.state;
+    return (state.early_termination && !clear->termination) || (state.depth.test && !clear->depth) ||
+           (state.stencil.test && !clear->stencil);
+  });
+}
+
 const Clear* Frame::clear_of(Mark mark) const {
   if (mark == Mark::none || mark == Mark::end_of_frame) return nullptr;
   const Command& command = commands_[static_cast<std::size_t>(mark) - 1];

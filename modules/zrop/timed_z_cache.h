@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "beat_lines.h"
+#include "z_cache_statistics.h"
 
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/timed_cache_port.h>
@@ -17,7 +18,7 @@ namespace vrpipe {
 class TimedZCache {
  public:
   TimedZCache(TimedUnit& owner, const ZropBehaviour::TimingParameters& timing, Placement placement,
-              SectoredCacheStatistics& statistics)
+              ZCacheStatistics& statistics)
       : timing_(timing.z_cache),
         sectors_of_a_line_(timing_.organization.sectors_of_a_line()),
         statistics_(statistics),
@@ -35,6 +36,7 @@ class TimedZCache {
   void make_cache(const DepthStencilSurface& surface) {
     lines_.emplace(timing_, surface);
     cache_.emplace(timing_.organization, statistics_);
+    cleared_ = cleared_sectors_of(surface, timing_, statistics_);
     kept_until_.resize(timing_.organization.lines());
     there_.resize(std::size_t{timing_.organization.lines()} * sectors_of_a_line_);
   }
@@ -43,6 +45,10 @@ class TimedZCache {
     Cycle at = 0;     ///< looked up
     Cycle there = 0;  ///< can be tested
   };
+  /// The depth-stencil target is cleared, behind what was looked up before.
+  void clear() {
+    if (cleared_) cleared_->clear();
+  }
   /// When so many quads that become visible in a cycle are looked up.
   Cycle turn(unsigned quads, Cycle visible) { return early_.turn(quads, visible); }
   /// In its turn; `tested` follows.
@@ -68,7 +74,7 @@ class TimedZCache {
         const unsigned sector_bytes = timing_.organization.sector_bytes;
         for_each_sector_run(changed.sectors, sectors_of_a_line_, [&](unsigned first, unsigned count) {
           access = cache_->access(changed.address + std::uint64_t{first} * sector_bytes, count * sector_bytes, true);
-          if (access.written_back != 0) port_.write_back(access, at);
+          if (access.written_back != 0) write_back(access, at);
         });
         owe(at);
       }
@@ -128,11 +134,13 @@ class TimedZCache {
     LineAccess access;
     access.address = needed.address;
     access.sectors = needed.sectors;
+    if (cleared_) access.known = cleared_->of_line(needed.address);
     cache_->look_up(access);
+    if (cleared_) cleared_->count(access.missed & access.known);
     Cycle* const there = &there_[std::size_t{access.line} * sectors_of_a_line_];
     if (access.replaced) {
       times.at = std::max(times.at, kept_until_[access.line]);
-      if (access.written_back != 0) port_.write_back(access, times.at);
+      if (access.written_back != 0) write_back(access, times.at);
     }
     if (access.filled != 0) {
       port_.fill(access, times.at,
@@ -143,6 +151,10 @@ class TimedZCache {
     }
     return access.line;
   }
+  void write_back(const LineAccess& access, Cycle at) {
+    port_.write_back(access, at);
+    if (cleared_) cleared_->written(access.old_address, access.written_back);
+  }
   void owe(Cycle at) {
     owed_ += port_.take_moved();
     owed_at_ = at;
@@ -150,7 +162,7 @@ class TimedZCache {
 
   const ZCache timing_;
   const unsigned sectors_of_a_line_;
-  SectoredCacheStatistics& statistics_;
+  ZCacheStatistics& statistics_;
   TimedCachePort port_;
   Way early_;
   Way late_;
@@ -158,6 +170,7 @@ class TimedZCache {
   SlotPool queued_updates_;
   std::optional<BeatLines> lines_;
   std::optional<SectoredCache> cache_;
+  std::optional<ClearedSectors> cleared_;
   BeatLines::Needed needed_;
   std::vector<Cycle> kept_until_;  ///< by line of the cache
   std::vector<Cycle> there_;       ///< by sector

@@ -5,6 +5,7 @@
 
 #include "beat_lines.h"
 #include "late_look_ups.h"
+#include "z_cache_statistics.h"
 
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
@@ -38,8 +39,10 @@ class ZPort {
   tlm::tlm_initiator_socket<32>& socket() { return port_.socket(); }
   const MemoryBytes& moved() const { return port_.moved(); }
   /// Before the first look-up. Surface and statistics outlive it.
-  void make_cache(const DepthStencilSurface& surface, SectoredCacheStatistics& statistics) {
+  void make_cache(const DepthStencilSurface& surface, ZCacheStatistics& statistics) {
     port_.make_cache(timing_.organization, statistics);
+    cleared_ = cleared_sectors_of(surface, timing_, statistics);
+    if (cleared_) port_.know_cleared(*cleared_);
     lines_.emplace(timing_, surface);
   }
   bool idle() const {
@@ -99,7 +102,10 @@ class ZPort {
   const ShadedWarpItem& front_late() const { return late_.front(); }
   void pop_late() { late_.pop(); }
   /// A mark has come around: what is behind it may be looked up.
-  void mark_is_back() { waits_ = false; }
+  void mark_is_back(Mark mark) {
+    waits_ = false;
+    clear_at(mark);
+  }
 
   bool update_is_there() const {
     return !updates_.empty() && port_.awaited(updates_.front().line, updates_.front().sectors) == 0;
@@ -200,9 +206,14 @@ class ZPort {
     if (beat.count > 0 && context_.state(beat.quads[0].draw).reads_depth_stencil_early()) {
       lines_->find(beat.tile, beat.quads.data(), beat.count, needed_);
       begin_line(0);
+    } else if (beat.mark != Mark::none && !plan_.waits_at(beat.mark)) {
+      clear_at(beat.mark);
     }
     beat_begun_ = true;
     return true;
+  }
+  void clear_at(Mark mark) {
+    if (cleared_ && context_.frame->clears_depth_stencil(mark)) cleared_->clear();
   }
   void begin_line(unsigned at) {
     line_ = {needed_.lines[at].address, needed_.lines[at].sectors, SectoredCache::no_line, 0};
@@ -247,6 +258,7 @@ class ZPort {
   CachePort port_;
   BatchLimit look_ups_;
   std::optional<BeatLines> lines_;
+  std::optional<ClearedSectors> cleared_;
   Cycle now_ = 0;
   Cycle next_look_up_ = 0;  ///< after a beat wider than the unit
   std::uint64_t owed_ = 0;

@@ -12,7 +12,7 @@ DepthStencilRop::DepthStencilRop(const Parameters& parameters, const RenderConte
               parameters.latency_cycles,
               parameters.updates_per_cycle,
               {parameters.cache.organization(), parameters.mshrs, parameters.input_quads, parameters.input_updates,
-               parameters.sectors_per_cycle}},
+               parameters.sectors_per_cycle, parameters.fast_clear}},
       depth_stencil_(context) {
   timing_.z_cache.check(context.frame->depth_format());
 }

@@ -66,6 +66,8 @@ class DepthStencilRop : public ZropBehaviour {
                               "sectors",
                               "measured on a GH100 graphics GPC: 8 a cycle and ROP partition; the paper's GPC has two",
                               "filled or written back in a cycle in which nothing is tested or updated"};
+    Switch fast_clear{*this, "fast_clear", true, "ATTILA: a state for each block of the target, on the chip",
+                      "sectors to which nothing was written back after a clear are not read"};
   };
   /// Throws UserError for a z-cache that cannot be.
   DepthStencilRop(const Parameters& parameters, const RenderContext& context);

@@ -199,6 +199,7 @@ class TimedZrop : public TimedUnit {
       while (!pending_.empty() && pending_.front().at <= at) apply_update();
     }
     behaviour_->pass(mark);
+    if (has_cache_ && context_.frame->clears_depth_stencil(mark)) z_.clear();
     if (hi_z_.returns(mark)) out_hi_z_.send(HiZReports::of_mark(mark), at);
   }
 
@@ -321,7 +322,7 @@ class TimedZrop : public TimedUnit {
   IssuePort updates_;
   Ring<Pending> pending_;   ///< updates not applied yet, by cycle
   Cycle port_free_at_ = 0;  ///< of the z-cache, after the last test, update or move
-  SectoredCacheStatistics cache_statistics_{*this, "cache"};
+  ZCacheStatistics cache_statistics_{*this, "cache"};
   TimedZCache z_;
   bool has_cache_ = false;
   std::unique_ptr<FixedLatencyMemory> no_memory_;  ///< behind a port that is not connected

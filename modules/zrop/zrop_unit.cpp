@@ -154,7 +154,7 @@ class ZropUnit : public Unit {
       } else {
         pass(item.warp->mark);
         waits_ = false;
-        z_.mark_is_back();
+        z_.mark_is_back(item.warp->mark);
       }
       out_late_.push(item);
       moved = true;
@@ -253,7 +253,7 @@ class ZropUnit : public Unit {
   bool waits_ = false;      ///< for a mark to come around
   HiZReports hi_z_;
   Ring<HiZUpdate> told_;  ///< and not sent yet
-  SectoredCacheStatistics cache_statistics_{*this, "cache"};
+  ZCacheStatistics cache_statistics_{*this, "cache"};
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -4,6 +4,7 @@
 #include "zrop/beat_lines.h"
 #include "zrop/hi_z_reports.h"
 #include "zrop/late_quads.h"
+#include "zrop/z_cache_statistics.h"
 
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/occupancy.h>
@@ -54,6 +55,7 @@ class UntimedZrop : public UntimedUnit {
   void test(const BinItem& incoming) {
     if (incoming.mark != Mark::none) {
       behaviour_->pass(incoming.mark);
+      if (cleared_ && context_.frame->clears_depth_stencil(incoming.mark)) cleared_->clear();
       if (hi_z_.returns(incoming.mark)) out_hi_z_.send(HiZReports::of_mark(incoming.mark));
       return out_.send(incoming);
     }
@@ -121,6 +123,7 @@ class UntimedZrop : public UntimedUnit {
     if (!lines_) {
       lines_.emplace(z_cache_, *behaviour_->surface());
       cache_.emplace(z_cache_.organization, cache_statistics_);
+      cleared_ = cleared_sectors_of(*behaviour_->surface(), z_cache_, cache_statistics_);
     }
     return *lines_;
   }
@@ -131,12 +134,18 @@ class UntimedZrop : public UntimedUnit {
       LineAccess access;
       access.address = needed_.lines[i].address;
       access.sectors = needed_.lines[i].sectors;
+      if (cleared_) access.known = cleared_->of_line(access.address);
       cache_->look_up(access);
+      if (cleared_) {
+        cleared_->count(access.missed & access.known);
+        if (access.written_back != 0) cleared_->written(access.old_address, access.written_back);
+      }
       line_ = access.line;
       memory_.move(access, z_cache_.organization);
     }
     cache_->accessed(accesses, accesses);
-    return cache_statistics_.sector_misses_compulsory.value() - before;
+    // Cleared sectors are not read for the first time.
+    return cleared_ ? 0 : cache_statistics_.sector_misses_compulsory.value() - before;
   }
 
   const RenderContext& context_;
@@ -149,9 +158,10 @@ class UntimedZrop : public UntimedUnit {
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZCache z_cache_;
   UntimedMemoryPort memory_;
-  SectoredCacheStatistics cache_statistics_{*this, "cache"};
+  ZCacheStatistics cache_statistics_{*this, "cache"};
   std::optional<BeatLines> lines_;      ///< once looked up
   std::optional<SectoredCache> cache_;  ///< the same
+  std::optional<ClearedSectors> cleared_;
   BeatLines::Needed needed_;
   SectoredCache::Line line_ = SectoredCache::no_line;  ///< that was looked up last
   QuadBeat beat_;

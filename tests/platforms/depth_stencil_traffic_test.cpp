@@ -32,6 +32,8 @@ RunRequest with_traffic(const Platform& platform, const std::string& variant, Fi
                         const std::function<void(RunRequest&)>& change = nullptr) {
   RunRequest request = request_of(variant, fidelity, change);
   request.platform = &platform;
+  // What is missed is read, unless a test says otherwise.
+  request.settings.insert(request.settings.begin(), {"zrop", "fast_clear", "off"});
   return request;
 }
 
@@ -154,7 +156,8 @@ TEST(DepthStencilTraffic, ChangesNothingButTimeInStrictTermination) {
                                                      {"zrop", "sectors_per_cycle", pick(5, {"1", "16"})},
                                                      {"zrop", "quads_per_cycle", pick(6, {"3", "16"})},
                                                      {"zrop", "updates_per_cycle", pick(7, {"1", "4"})},
-                                                     {"zrop", "line_bytes", pick(8, {"64", "128"})}};
+                                                     {"zrop", "line_bytes", pick(8, {"64", "128"})},
+                                                     {"zrop", "fast_clear", pick(9, {"on", "off"})}};
                                  if (fidelity != Fidelity::cycle) return;
                                  request.stall_seed = seed + 1;
                                  request.stall_per_256 = 40;
@@ -180,6 +183,28 @@ TEST(DepthStencilTraffic, DoesNotDependOnTheOrderOfTicks) {
     const RunResult result = run(request, draw);
     EXPECT_EQ(result.result_hash, expected.result_hash);
     EXPECT_EQ(statistic(result, "zrop.cache.sector_misses"), statistic(expected, "zrop.cache.sector_misses"));
+  }
+}
+
+TEST(DepthStencilTraffic, AFastClearReadsOnlyWhatWasWrittenBack) {
+  const Draw draw = terminating_draw(160, 128, 600, 46);
+  for (const char* name : {"agx-orin", "desktop"}) {
+    const Platform platform = with_z_traffic(name);
+    for (const Fidelity fidelity : with_time) {
+      const RunResult result =
+          run(with_traffic(platform, "het", fidelity,
+                           [](RunRequest& request) {
+                             request.settings = {{"zrop", "cache_bytes", "1024"}, {"zrop", "fast_clear", "on"}};
+                           }),
+              draw);
+      const std::string what = std::string(name) + " " + name_of(fidelity);
+      const std::uint64_t read = statistic(result, "zrop.cache.bytes_filled");
+      const std::uint64_t spared = statistic(result, "zrop.cache.sectors_as_cleared");
+      EXPECT_EQ(read + 32 * spared, 32 * statistic(result, "zrop.cache.sector_misses")) << what;
+      EXPECT_EQ(statistic(result, "l2.depth_stencil_bytes_read"), read) << what;
+      EXPECT_GE(spared, statistic(result, "zrop.cache.sector_misses_compulsory")) << what;
+      EXPECT_GT(read, 0U) << what;
+    }
   }
 }
 

@@ -207,7 +207,8 @@ TEST_P(LateZrop, TellsHiZWhatIsStoredLate) {
 
 // Through a z-cache: what a warp needs is read first, and what it stores is written back some time.
 TEST_F(LateZropTest, WaitsForTheFillOfItsSectors) {
-  Bench bench("zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"cache_bytes", "256"}});
+  Bench bench("zrop", "depth-stencil-rop", context,
+              {{"latency_cycles", "1"}, {"cache_bytes", "256"}, {"fast_clear", "off"}});
   Source<ShadedWarpItem>& late = bench.source<ShadedWarpItem>("in_late", 8);
   Sink<ShadedWarpItem>& back = bench.sink<ShadedWarpItem>("out_late", 8);
   bench.set_memory(100, 32);

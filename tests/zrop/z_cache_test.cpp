@@ -74,7 +74,7 @@ TerminationBeat signals(std::initializer_list<unsigned> positions, TileId tile =
   return beat;
 }
 
-/// ZROP at cycle, with a latency of a cycle unless told, in front of a memory of 100 cycles.
+/// ZROP at cycle, with a latency of a cycle and without fast clears unless told, in front of a memory of 100 cycles.
 struct ZBench {
   explicit ZBench(const RenderContext& context, const Bench::Settings& settings = {}, unsigned latency = 100,
                   unsigned depth = 32)
@@ -86,7 +86,7 @@ struct ZBench {
     bench.bind_memory(memory.socket);
   }
   static Bench::Settings with_defaults(Bench::Settings settings) {
-    settings.insert(settings.begin(), {"latency_cycles", "1"});
+    settings.insert(settings.begin(), {{"latency_cycles", "1"}, {"fast_clear", "off"}});
     return settings;
   }
   /// In which beats left.
@@ -298,6 +298,57 @@ TEST_F(ZCacheTest, AClearOfTerminationMovesNothingAndWhatIsCachedStays) {
   EXPECT_EQ(zrop.bench.behaviour<DepthStencilRop>().quads_terminated.value(), 0U);
 }
 
+TEST_F(ZCacheTest, AFastClearSparesReadingWhatNothingWasWrittenBackTo) {
+  ZBench zrop(context, {{"cache_bytes", "128"}, {"fast_clear", "on"}});
+  zrop.in.add(beat_of({0, 0}, {0, 8}), 10);
+  zrop.updates.add(signals({0}), 20);
+  zrop.in.add(beat_of({0, 0}, {4}), 30);   // the sector of the update goes
+  zrop.in.add(beat_of({0, 0}, {8}), 40);   // another one of its line
+  zrop.in.add(beat_of({0, 0}, {0}), 50);   // its own
+  zrop.in.add(beat_of({0, 0}, {4}), 300);  // went as it was
+  zrop.bench.run();
+  EXPECT_EQ(zrop.left(), (std::vector<Cycle>{12, 32, 42, 302}));
+  ASSERT_EQ(zrop.memory.accesses.size(), 2U);
+  EXPECT_TRUE(zrop.memory.accesses[0].written);
+  EXPECT_EQ(zrop.memory.accesses[0].cycle, 32U) << "after the look-up";
+  EXPECT_EQ(zrop.memory.accesses[1].address, 64U * 1024);
+  EXPECT_EQ(zrop.memory.accesses[1].cycle, 51U);
+  EXPECT_EQ(zrop.bench.behaviour<DepthStencilRop>().quads_terminated.value(), 1U);
+  EXPECT_EQ(zrop.statistic("sector_misses"), 6U);
+  EXPECT_EQ(zrop.statistic("sectors_as_cleared"), 5U);
+  EXPECT_EQ(zrop.statistic("bytes_filled"), 32U);
+}
+
+/// Of what a frame keeps there: termination bits alone, or depth, too.
+TEST_F(ZCacheTest, AClearOfAllThatAFrameTestsIsFast) {
+  for (const bool tests_depth : {false, true}) {
+    for (const bool clears_depth : {false, true}) {
+      Frame frame(64, 64);
+      DrawState state;
+      state.early_termination = true;
+      state.depth.test = tests_depth;
+      state.depth.write = false;
+      frame.draw(std::make_shared<const Draw>(testing::draw_of(64, 64)), state);
+      Clear clear;
+      clear.termination = true;
+      clear.depth = clears_depth;
+      frame.clear(clear);
+      frame.draw(std::make_shared<const Draw>(testing::draw_of(64, 64)), state);
+      const RenderContext cleared = testing::context_of(frame);
+      ZBench zrop(cleared, {{"cache_bytes", "128"}, {"fast_clear", "on"}});
+      zrop.updates.add(signals({0}), 10);
+      zrop.updates.add(signals({4}), 20);
+      QuadBeat mark;
+      mark.mark = Frame::mark_of(1);
+      zrop.in.add(mark, 300);
+      zrop.updates.add(signals({0}), 400);
+      zrop.bench.run();
+      const bool is_fast = clears_depth || !tests_depth;
+      EXPECT_EQ(zrop.memory.bytes(false), is_fast ? 0U : 32U) << tests_depth << clears_depth;
+    }
+  }
+}
+
 TEST_F(ZCacheTest, ADrawThatDoesNotTerminateEarlyReadsNothing) {
   Frame frame(64, 64);
   frame.draw(std::make_shared<const Draw>(testing::draw_of(64, 64)), {});
@@ -311,13 +362,27 @@ TEST_F(ZCacheTest, ADrawThatDoesNotTerminateEarlyReadsNothing) {
 
 /// Beats of random quads of random tiles, and updates, one at a time so that their order is known.
 TEST_F(ZCacheTest, CountsAreThoseOfACacheByItsDefinition) {
-  for (const bool fifo : {false, true}) {
-    ZBench zrop(context, {{"cache_bytes", "1024"}, {"replacement", fifo ? "fifo" : "lru"}, {"tell_conflicts", "on"}});
+  for (const unsigned kind : {0U, 1U, 2U}) {
+    const bool fifo = kind == 1;
+    const bool fast_clear = kind == 2;
+    ZBench zrop(context, {{"cache_bytes", "1024"},
+                          {"replacement", fifo ? "fifo" : "lru"},
+                          {"tell_conflicts", "on"},
+                          {"fast_clear", fast_clear ? "on" : "off"}});
     CacheOrganization organization;
     organization.bytes = 1024;
     organization.replacement = fifo ? Replacement::fifo : Replacement::lru;
     testing::ReferenceCache reference(organization);
     const DepthStencilSurface surface(64, 64, 64 * 1024);
+    std::set<std::uint64_t> written;  // sectors
+    std::uint64_t read = 0;
+    const auto access = [&](std::uint64_t address) {
+      const testing::ReferenceCache::Outcome outcome = reference.access(address, 16, false);
+      for (const unsigned sector : outcome.written_back) written.insert(outcome.old_address / 32 + sector);
+      for (const unsigned sector : outcome.missed) {
+        read += !fast_clear || written.count(address / 128 * 4 + sector) > 0 ? 1U : 0U;
+      }
+    };
     Cycle at = 10;
     std::uint64_t accesses = 0;
     for (std::uint64_t i = 0; i < 600; ++i, at += 1200) {
@@ -326,7 +391,7 @@ TEST_F(ZCacheTest, CountsAreThoseOfACacheByItsDefinition) {
       if (i % 3 == 0) {
         zrop.updates.add(signals({first}, tile), at);
         const std::uint64_t address = surface.address(tile, first);
-        reference.access(address, 16, false);
+        access(address);
         reference.make_dirty(address, {static_cast<unsigned>(address % 128 / 32)});
         ++accesses;
         continue;
@@ -351,7 +416,7 @@ TEST_F(ZCacheTest, CountsAreThoseOfACacheByItsDefinition) {
       for (const std::uint64_t line : lines) {
         for (const unsigned position : positions) {
           const std::uint64_t address = surface.address(tile, position);
-          if (address / 128 == line) reference.access(address, 16, false);
+          if (address / 128 == line) access(address);
         }
       }
       accesses += positions.size();
@@ -365,7 +430,9 @@ TEST_F(ZCacheTest, CountsAreThoseOfACacheByItsDefinition) {
     EXPECT_EQ(zrop.statistic("sectors_written_back"), reference.written_back);
     EXPECT_GT(reference.capacity, 100U);
     EXPECT_GT(reference.written_back, 50U);
-    EXPECT_EQ(zrop.memory.bytes(false), 32 * (reference.compulsory + reference.capacity));
+    EXPECT_EQ(zrop.memory.bytes(false), 32 * read);
+    EXPECT_EQ(read + zrop.statistic("sectors_as_cleared"), reference.compulsory + reference.capacity);
+    EXPECT_GT(read, 100U);
     EXPECT_EQ(zrop.memory.bytes(true), 32 * reference.written_back);
   }
 }
@@ -463,7 +530,7 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, TimedZCacheTest, ::testing::ValuesIn(testin
                          testing::name_of_fidelity);
 
 TEST_P(TimedZCacheTest, AMissWaitsForItsFillAndAHitDoesNot) {
-  Bench bench(GetParam(), "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}});
+  Bench bench(GetParam(), "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
   NotingMemory memory("noting_memory", bench.clock(), 100);
   bench.bind_memory(memory.socket);
   Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
@@ -476,8 +543,27 @@ TEST_P(TimedZCacheTest, AMissWaitsForItsFillAndAHitDoesNot) {
   EXPECT_EQ(memory.accesses.size(), 2U);
 }
 
+TEST_P(TimedZCacheTest, AFastClearSparesReadingWhatNothingWasWrittenBackTo) {
+  Bench bench(GetParam(), "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"cache_bytes", "128"}});
+  NotingMemory memory("noting_memory", bench.clock(), 100);
+  bench.bind_memory(memory.socket);
+  Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
+  Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations");
+  Sink<BinItem>& out = bench.sink<BinItem>("out_quads", 64);
+  in.add(bins.at({0, 0}, {0, 8}), 10);
+  updates.add(signals({0}), 20);
+  in.add(bins.at({0, 0}, {4}, 1), 130);
+  in.add(bins.at({0, 0}, {8}, 2), 240);
+  in.add(bins.at({0, 0}, {1}, 3), 350);
+  bench.run();
+  EXPECT_EQ(testing::cycles_of(out), (std::vector<Cycle>{12, 132, 242, 452}))
+      << "the last one's sector was written back";
+  EXPECT_EQ(memory.bytes(false), 32U);
+  EXPECT_EQ(memory.bytes(true), 32U);
+}
+
 TEST_P(TimedZCacheTest, AnUpdateWaitsForItsFillAndTestsGoBy) {
-  Bench bench(GetParam(), "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}});
+  Bench bench(GetParam(), "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
   NotingMemory memory("noting_memory", bench.clock(), 100);
   bench.bind_memory(memory.socket);
   Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);

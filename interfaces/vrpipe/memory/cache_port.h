@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <vrpipe/memory/cleared_sectors.h>
 #include <vrpipe/memory/memory_port.h>
 #include <vrpipe/memory/sectored_cache.h>
 
@@ -36,6 +37,8 @@ class CachePort {
     statistics_ = &statistics;
     asked_at_.resize(std::size_t{organization.lines()} * sectors_of_a_line_);
   }
+  /// And where it is known what sectors hold that were cleared, which outlives it.
+  void know_cleared(ClearedSectors& cleared) { cleared_ = &cleared; }
   SectoredCache& cache() { return *cache_; }
   const MemoryBytes& moved() const { return memory_.moved(); }
   Cycle next_completion() const { return memory_.next_completion(); }
@@ -65,7 +68,9 @@ class CachePort {
   bool look_up(LookUp& wanted, Cycle now, Moved&& moved) {
     if (!write_back(moved)) return false;
     if (wanted.line == SectoredCache::no_line && !take_line(wanted)) return false;
-    for (std::uint32_t missing = wanted.sectors & cache_->absent(wanted.line); missing != 0;) {
+    std::uint32_t missing = wanted.sectors & cache_->absent(wanted.line);
+    if (cleared_ != nullptr && missing != 0) take_cleared(wanted, missing);
+    while (missing != 0) {
       if (!memory_.available() || fills_in_flight_ == mshrs_) return false;
       const SectorRun run = take_sector_run(missing, std::min(longest_run_, mshrs_ - fills_in_flight_));
       memory_.read(wanted.address + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_,
@@ -126,6 +131,13 @@ class CachePort {
     return asked_at_[std::size_t{line} * sectors_of_a_line_ + sector];
   }
 
+  void take_cleared(const LookUp& wanted, std::uint32_t& missing) {
+    const std::uint32_t known = missing & cleared_->of_line(wanted.address);
+    if (known == 0) return;
+    cache_->fill_unread(wanted.line, known);
+    cleared_->count(known);
+    missing &= ~known;
+  }
   bool take_line(LookUp& wanted) {
     wanted.line = cache_->find(wanted.address);
     if (wanted.line == SectoredCache::no_line) {
@@ -134,6 +146,7 @@ class CachePort {
       wanted.line = cache_->allocate(wanted.address, evicted);
       write_back_ = evicted.dirty;
       write_back_address_ = evicted.address;
+      if (cleared_ != nullptr && evicted.dirty != 0) cleared_->written(evicted.address, evicted.dirty);
     }
     cache_->pin(wanted.line);
     return true;
@@ -144,7 +157,8 @@ class CachePort {
   const unsigned longest_run_;
   std::optional<SectoredCache> cache_;
   SectoredCacheStatistics* statistics_ = nullptr;
-  std::vector<Cycle> asked_at_;  ///< by sector of the cache
+  ClearedSectors* cleared_ = nullptr;  ///< where that is known
+  std::vector<Cycle> asked_at_;        ///< by sector of the cache
   unsigned sectors_of_a_line_ = 1;
   unsigned sector_shift_ = 0;  ///< log2 of the bytes of a sector
   unsigned fills_in_flight_ = 0;

@@ -105,6 +105,13 @@ class SectoredCache {
     --filling_;
     entry.present |= 1U << sector;
   }
+  /// Of what `absent` has: it is known what sectors hold, so that they are there without a fill.
+  void fill_unread(Line line, std::uint32_t sectors) {
+    Entry& entry = lines_[line];
+    entry.present |= sectors;
+    count_misses(entry, sectors);
+    not_filled_ += static_cast<unsigned>(__builtin_popcount(sectors));
+  }
   void make_dirty(Line line, std::uint32_t sectors) { lines_[line].dirty |= sectors; }
   /// After each access in steps, in their order: finds the causes of its misses.
   void looked_up(Line line, std::uint32_t sectors) {
@@ -128,15 +135,17 @@ class SectoredCache {
     allocated_ = missed_ = of_other_cause_ = not_filled_ = 0;
   }
 
-  /// All at once for sectors of a line (`address` and `sectors` are given): looks it up, allocates and fills. `accessed`
-  /// follows.
+  /// All at once for sectors of a line (`address`, `sectors` and `known` are given): looks it up, allocates and fills.
+  /// `accessed` follows.
   void look_up(LineAccess& access) {
     take_line(access);
     Entry& entry = lines_[access.line];
-    access.filled = access.missed = access.sectors & ~entry.present;
-    if (access.filled != 0) {
-      entry.present |= access.filled;
-      count_misses(entry, access.filled);
+    access.missed = access.sectors & ~entry.present;
+    access.filled = access.missed & ~access.known;
+    if (access.missed != 0) {
+      entry.present |= access.missed;
+      count_misses(entry, access.missed);
+      not_filled_ += static_cast<unsigned>(__builtin_popcount(access.missed & access.known));
     }
     if (shadow_ != nullptr) follow(access.address, access.sectors);
   }
@@ -279,7 +288,7 @@ class SectoredCache {
   std::uint64_t allocated_ = 0;       ///< lines
   std::uint64_t missed_ = 0;          ///< sectors
   std::uint64_t of_other_cause_ = 0;  ///< of these: not for capacity
-  std::uint64_t not_filled_ = 0;      ///< of these: since they were written
+  std::uint64_t not_filled_ = 0;      ///< of these: since they were written, or are known
   std::uint32_t missed_sectors_ = 0;  ///< of the access under way, where conflicts are told
   std::uint32_t first_time_ = 0;      ///< of these, compulsory
   std::uint64_t evictions_ = 0;       ///< so far, for random replacement

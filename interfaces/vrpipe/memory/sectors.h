@@ -58,6 +58,7 @@ void for_each_sector_run(std::uint32_t mask, unsigned longest, Move&& move) {
 struct LineAccess {
   std::uint32_t line = 0;          ///< of the cache, from 0
   std::uint32_t sectors = 0;       ///< of the line that are needed, a bit each
+  std::uint32_t known = 0;         ///< of these, not to be read when they are missed
   std::uint32_t missed = 0;        ///< of these, neither there nor on their way
   std::uint32_t filled = 0;        ///< of these, to be read from below
   std::uint32_t written_back = 0;  ///< dirty sectors of what the line held

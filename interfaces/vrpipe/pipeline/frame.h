@@ -79,6 +79,8 @@ class Frame {
   const std::vector<Command>& commands() const { return commands_; }
   const std::vector<DrawCall>& draws() const { return draws_; }
   const DrawCall& draw_call(DrawIndex draw) const { return draws_[draw]; }
+  /// Whether a mark clears all that draws of the frame keep in the depth-stencil target.
+  bool clears_depth_stencil(Mark mark) const;
   /// Changes the state of every draw.
   void change_states(const std::function<void(DrawState&)>& change);
   std::uint32_t splats() const { return splats_; }  ///< of all draws

@@ -61,6 +61,9 @@ class DepthStencilSurface {
   std::uint64_t address(std::size_t place) const { return address_ + block_linear(place) * bytes_per_quad(format_); }
   std::uint64_t address(TileId tile, unsigned position) const { return address(grid_.place(tile, position)); }
   /// Of whole screen tiles.
+  std::uint64_t size_bytes() const {
+    return std::uint64_t{grid_.tiles()} * positions_per_tile * bytes_per_quad(format_);
+  }
   static std::uint64_t size_bytes(std::uint32_t width, std::uint32_t height, DepthFormat format = DepthFormat::d24);
 
  private:

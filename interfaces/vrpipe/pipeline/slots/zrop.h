@@ -29,6 +29,7 @@ struct ZCache {
   std::uint32_t input_quads = 4096;       ///< queue between look-up and test
   std::uint32_t input_updates = 64;       ///< the same of updates, signals
   std::uint32_t sectors_per_cycle = 16;   ///< filled or written back in a cycle in which nothing is tested or updated
+  bool fast_clear = true;                 ///< sectors that a clear has left as they are in memory are not read
   /// Throws UserError for one that cannot be: CacheOrganization::check; a sector holds a quad of the target, a line is of one
   /// screen tile.
   void check(DepthFormat format) const;
