@@ -1,6 +1,8 @@
 #include <vrpipe/pipeline/frame.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -29,6 +31,12 @@ bool operator==(const Light& a, const Light& b) {
 }
 
 bool operator==(const DrawState& a, const DrawState& b) { return fields_of(a) == fields_of(b); }
+
+float DrawState::terminating_alpha() const {
+  // To exceed a threshold is to reach the next float.
+  return termination_inclusive ? termination_threshold
+                               : std::nextafter(termination_threshold, std::numeric_limits<float>::infinity());
+}
 
 const char* name_of(Termination termination) { return termination == Termination::strict ? "strict" : "paper"; }
 
@@ -76,6 +84,11 @@ void Frame::draw(std::shared_ptr<const Draw> geometry, const DrawState& state, s
   }
   if (state.late_tests && state.shader == FragmentShader::none) {
     refuse("its tests are to come after shading, and it shades nothing", "leave late_tests out, or shade it");
+  }
+  if (reads_color(state.shader) && geometry->is_mesh())
+    refuse("it is a mesh, and its shader is none of a mesh", "use another");
+  if (!writes_color(state.shader) && reads_color(state.shader) && !state.writes_depth_stencil()) {
+    refuse("its shader writes no colour, and it writes neither depth nor stencil", "have it write the stencil");
   }
   for (const StencilFace* face : {&state.stencil.front, &state.stencil.back}) {
     if (face->reference > stencil_bits) {

@@ -16,6 +16,17 @@ std::uint32_t SmBehaviour::TimingParameters::fragment_slots() const {
   return static_cast<std::uint32_t>(slots);
 }
 
+const std::vector<ShaderSegment>& SmBehaviour::TimingParameters::fragment_program(FragmentShader shader) const {
+  switch (shader) {
+    case FragmentShader::vertex:
+    case FragmentShader::lit: return mesh.empty() ? fragment : mesh;
+    case FragmentShader::alpha_threshold: return alpha_threshold.empty() ? fragment : alpha_threshold;
+    case FragmentShader::splat:
+    case FragmentShader::none: break;
+  }
+  return fragment;
+}
+
 void AttributeFetch::check() const {
   constexpr std::uint32_t primitive_bytes = attribute_bytes_per_splat / 2;
   if (attribute_bytes == 0 || attribute_bytes > primitive_bytes) {

@@ -37,10 +37,7 @@ void ColorRop<Format, Rounding>::set_draw(DrawIndex draw) {
   const DrawState& state = context_.state(draw);
   draw_ = draw;
   signals_ = state.early_termination;
-  // Passing an exclusive threshold is reaching the next float.
-  threshold_ = state.termination_inclusive
-                   ? state.termination_threshold
-                   : std::nextafter(state.termination_threshold, std::numeric_limits<float>::infinity());
+  threshold_ = state.terminating_alpha();
   drops_late_ = state.early_termination && context_.termination == Termination::strict;
 }
 

@@ -2,6 +2,7 @@
 #include <array>
 
 #include <vrpipe/model/timed_cache_port.h>
+#include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
 
 namespace vrpipe {
@@ -10,7 +11,8 @@ namespace {
 
 /// CROP at lt and at: as crop_unit.cpp, but a warp is taken in one piece: its quads look up the colour cache, and are
 /// blended once the sectors of all are there. Neighbouring sectors are filled in one access.
-/// Ports: in_color (ShadedWarpItem), out_terminations (TerminationBeat), memory (TLM-2.0 base protocol).
+/// Ports: in_color (ShadedWarpItem), out_terminations (TerminationBeat), out_done (BlendsDone; optional), memory (TLM-2.0
+/// base protocol).
 class TimedCrop : public TimedUnit {
  public:
   TimedCrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
@@ -18,9 +20,11 @@ class TimedCrop : public TimedUnit {
       : TimedUnit(name, domain, CropWork::kinds(behaviour->timing()), transport),
         context_(context),
         out_(*this, "out_terminations"),
+        out_done_(*this, "out_done"),
         in_(*this, "in_color",
             [this](const ShadedWarpItem& item, CycleInterval visible) { return take(*item.warp, visible); }, {&out_}),
         behaviour_(std::move(behaviour)),
+        barriers_(*context.frame),
         timing_(behaviour_->timing()),
         // A hazard is one of quads.
         at_once_(timing_.forwards ? quads_looked_up_at_once(timing_) : 1),
@@ -34,6 +38,8 @@ class TimedCrop : public TimedUnit {
         price_(timing_.blend_rate.cycles * timing_.sectors_per_cycle),
         lines_(std::max(timing_.cache_bytes / timing_.line_bytes, 1U)) {
     out_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.blend_rate));
+    out_done_.set_pipeline(timing_.latency_cycles - 1);
+    out_done_.set_optional();
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -55,6 +61,8 @@ class TimedCrop : public TimedUnit {
       end_ = !any_blended_ ? visible.first : last_blend_ + timing_.latency_cycles;
     } else if (warp.mark != Mark::none) {
       behaviour_->pass(warp.mark);
+      if (barriers_.is_barrier(warp.mark))
+        out_done_.send({warp.mark}, any_blended_ ? std::max(visible.first, last_blend_) : visible.first);
     } else if (at_once_ >= warp.count) {
       left = pass(warp, 0, warp.count, visible);
     } else {
@@ -184,8 +192,10 @@ class TimedCrop : public TimedUnit {
 
   const RenderContext& context_;
   TimedOut<TerminationBeat> out_;
+  TimedOut<BlendsDone> out_done_;
   TimedIn<ShadedWarpItem> in_;
   std::unique_ptr<CropBehaviour> behaviour_;
+  const BarrierPlan barriers_;
   const CropBehaviour::TimingParameters timing_;
   const unsigned at_once_;  ///< quads looked up before the first of them is blended
   TimedCachePort memory_;

@@ -4,6 +4,7 @@
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
 #include <vrpipe/pipeline/quad_sectors.h>
 
@@ -14,7 +15,8 @@ namespace {
 /// CROP at cycle fidelity. A quad looks up the colour cache when it arrives and starts the fills that it needs, then
 /// waits in order; blending takes place at the head. Moving a sector takes cycles from blending (measured: CROP cycles
 /// = quads / rate + sectors / 8).
-/// Ports: in_color (ColorBeat), out_terminations (TerminationBeat), memory (TLM-2.0 base protocol).
+/// Ports: in_color (ColorBeat), out_terminations (TerminationBeat), out_done (BlendsDone; optional), memory (TLM-2.0 base
+/// protocol).
 class CropUnit : public Unit {
  public:
   CropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
@@ -23,9 +25,11 @@ class CropUnit : public Unit {
         context_(context),
         in_(*this, "in_color"),
         out_(*this, "out_terminations"),
+        out_done_(*this, "out_done"),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         signals_(context.frame->terminates_early()),
+        barriers_(*context.frame),
         price_(std::int64_t{timing_.blend_rate.cycles} * timing_.sectors_per_cycle),
         sector_price_(timing_.blend_rate.items),
         income_(static_cast<std::int64_t>(CropWork::parts_of_a_cycle(timing_))),
@@ -33,9 +37,11 @@ class CropUnit : public Unit {
         port_(*this, "memory", timing_.mshrs,
               {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
     out_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.blend_rate));
+    out_done_.set_pipeline(timing_.latency_cycles - 1);
+    out_done_.set_optional();
   }
 
-  bool idle() const override { return in_.empty() && queue_.empty() && marks_.empty(); }
+  bool idle() const override { return in_.empty() && queue_.empty() && marks_.empty() && done_.empty(); }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &port_.socket(); }
   MemoryBytes memory_bytes() const override { return port_.moved(); }
@@ -209,11 +215,15 @@ class CropUnit : public Unit {
       passed = true;
       if (marks_.front().mark != Mark::end_of_frame) {
         behaviour_->pass(marks_.front().mark);
+        if (barriers_.is_barrier(marks_.front().mark)) done_.push({marks_.front().mark});
       } else {
         end_ = !any_blended_ ? now : last_blend_ + timing_.latency_cycles;
       }
     }
     return passed;
+  }
+  [[gnu::noinline]] void send_done() {
+    for (; !done_.empty() && out_done_.credits() > 0; done_.pop()) out_done_.push(done_.front());
   }
 
   Cycle tick(Cycle now) override {
@@ -221,6 +231,7 @@ class CropUnit : public Unit {
     const bool blended = blend(now);
     const bool accepted = accept();
     const bool marked = !marks_.empty() && pass_marks(now);
+    if (!done_.empty()) send_done();
     enter(blended ? UnitState::busy : !queue_.empty() ? stop_ : UnitState::starved, now);
     if (blended || accepted || marked ||
         (!queue_.empty() && stop_ != UnitState::blocked && (stop_ == UnitState::latency || tokens_ < price_))) {
@@ -235,9 +246,11 @@ class CropUnit : public Unit {
   const RenderContext& context_;
   StreamIn<ColorBeat> in_;
   StreamOut<TerminationBeat> out_;
+  StreamOut<BlendsDone> out_done_;
   std::unique_ptr<CropBehaviour> behaviour_;
   const CropBehaviour::TimingParameters timing_;
   const bool signals_;
+  const BarrierPlan barriers_;
   const std::int64_t price_;         ///< of blending a quad, in tokens
   const std::int64_t sector_price_;  ///< of moving a sector
   const std::int64_t income_;        ///< of a cycle: what so many quads, or so many sectors, cost
@@ -259,6 +272,7 @@ class CropUnit : public Unit {
     std::size_t quads = 0;  ///< of the queue, behind the mark before it and in front of it
   };
   Ring<QueuedMark> marks_;
+  Ring<BlendsDone> done_;  ///< and not sent yet
   Cycle last_blend_ = 0;
   Cycle end_ = never;
   bool any_blended_ = false;

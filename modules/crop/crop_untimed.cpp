@@ -3,6 +3,7 @@
 
 #include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
 
 namespace vrpipe {
@@ -16,12 +17,16 @@ class UntimedCrop : public UntimedUnit {
       : UntimedUnit(name),
         context_(context),
         out_(*this, "out_terminations"),
+        out_done_(*this, "out_done"),
         in_(input<ShadedWarpItem>("in_color", [this](const ShadedWarpItem& item) { take(*item.warp); })),
         behaviour_(std::move(behaviour)),
+        barriers_(*context.frame),
         timing_(behaviour_->timing()),
         organization_(timing_.cache()),
         looked_up_at_once_(quads_looked_up_at_once(timing_)),
-        memory_({MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {}
+        memory_({MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
+    out_done_.set_optional();
+  }
 
   Behaviour& behaviour() override { return *behaviour_; }
   UntimedMemoryPort* memory_port() override { return &memory_; }
@@ -43,6 +48,7 @@ class UntimedCrop : public UntimedUnit {
   void take(const ShadedWarp& warp) {
     if (warp.mark != Mark::none) {
       behaviour_->pass(warp.mark);
+      if (barriers_.is_barrier(warp.mark)) out_done_.send({warp.mark});
       return warp.release();
     }
     if (!monitor_) {
@@ -92,8 +98,10 @@ class UntimedCrop : public UntimedUnit {
 
   const RenderContext& context_;
   UntimedOut<TerminationBeat> out_;
+  UntimedOut<BlendsDone> out_done_;
   std::unique_ptr<UntimedIn<ShadedWarpItem>> in_;
   std::unique_ptr<CropBehaviour> behaviour_;
+  const BarrierPlan barriers_;
   std::optional<BlendOrderMonitor> monitor_;
   BlendObserver* observer_ = nullptr;
   const CropBehaviour::TimingParameters timing_;

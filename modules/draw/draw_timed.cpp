@@ -1,3 +1,5 @@
+#include "draw/issue_schedule.h"
+
 #include <vrpipe/model/timed.h>
 
 namespace vrpipe {
@@ -8,10 +10,18 @@ namespace {
 class TimedDraw : public TimedUnit {
  public:
   TimedDraw(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<DrawBehaviour> behaviour,
-            unsigned gpcs, Transport transport)
-      : TimedUnit(name, domain, DrawWork::kinds(), transport), behaviour_(std::move(behaviour)) {
+            const RenderContext& context, unsigned gpcs, Transport transport)
+      : TimedUnit(name, domain, DrawWork::kinds(), transport),
+        behaviour_(std::move(behaviour)),
+        schedule_(behaviour_->warps_per_1024_cycles()),
+        barriers_(*context.frame) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<TimedOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
+      in_done_.push_back(std::make_unique<TimedIn<BlendsDone>>(*this, "in_done_" + std::to_string(gpc),
+                                                               [this](const BlendsDone&, CycleInterval visible) {
+                                                                 return take_done(visible.first);
+                                                               }));
+      in_done_.back()->set_optional();
     }
     have_ = behaviour_->next(warp_);
   }
@@ -20,10 +30,23 @@ class TimedDraw : public TimedUnit {
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  Cycle due(std::uint64_t warp) const { return warp * 1024 / behaviour_->warps_per_1024_cycles(); }
-  Cycle due() const { return have_ && warp_.mark == Mark::none ? due(issued_) : 0; }
+  Cycle due() const { return have_ && warp_.mark == Mark::none ? schedule_.due() : 0; }
+
+  Cycle take_done(Cycle visible) {
+    passed_at_ = std::max(passed_at_, visible);
+    if (--awaited_ == 0) schedule_.restart(passed_at_);
+    return visible;
+  }
 
   Cycle tick(Cycle now) override {
+    if (awaited_ == 0) return issue(now);
+    for (const auto& in : in_done_) in->serve(now);
+    if (awaited_ == 0) return issue(now);
+    Cycle next = never;
+    for (const auto& in : in_done_) next = std::min(next, in->front());
+    return next;
+  }
+  Cycle issue(Cycle now) {
     if (last_ != nullptr) {
       if (last_->blocked()) return never;
       // At `at` it is known only now when what waited was taken.
@@ -31,7 +54,7 @@ class TimedDraw : public TimedUnit {
       charge(UnitState::busy, last_->last() + 1);
     }
     if (idle()) return never;
-    const Cycle at = std::max(due(), last_ == nullptr ? 0 : last_->last() + 1);
+    const Cycle at = std::max({due(), passed_at_, last_ == nullptr ? 0 : last_->last() + 1});
     if (at > now) return at;
     TimedOut<VertexWarp>& out = *outs_[turn_];
     charge(UnitState::latency, at);
@@ -39,14 +62,16 @@ class TimedDraw : public TimedUnit {
       warp_ = {};
       warp_.mark = Mark::end_of_frame;
     }
+    const bool is_barrier = have_ && barriers_.is_barrier(warp_.mark);
+    // At `lt` all come to it meanwhile.
+    if (is_barrier) awaited_ = static_cast<unsigned>(outs_.size());
     const Cycle taken = out.send(warp_, at).first;
     charge(UnitState::blocked, taken);
     charge(UnitState::busy, out.last() + 1);
     if (have_) {
       if (warp_.mark == Mark::none) {
-        const Cycle interval = due(issued_ + 1) - due(issued_);
+        const Cycle interval = schedule_.issue();
         if (interval > 0) did(DrawWork::warps, interval, taken, taken + interval);
-        ++issued_;
       }
       have_ = behaviour_->next(warp_);
     } else {
@@ -54,25 +79,33 @@ class TimedDraw : public TimedUnit {
     }
     turn_ = (turn_ + 1) % outs_.size();
     last_ = &out;
+    if (awaited_ > 0) {
+      if (blocking()) throw SimulationFault(name(), taken, "CROP has not passed a mark that is a barrier");
+      return never;
+    }
     return out.blocked() ? never : std::max({due(), out.last() + 1, now + 1});
   }
 
   std::unique_ptr<DrawBehaviour> behaviour_;
   std::vector<std::unique_ptr<TimedOut<VertexWarp>>> outs_;
-  TimedOut<VertexWarp>* last_ = nullptr;  ///< used
+  std::vector<std::unique_ptr<TimedIn<BlendsDone>>> in_done_;  ///< by GPC
+  TimedOut<VertexWarp>* last_ = nullptr;                       ///< used
+  IssueSchedule schedule_;
+  const BarrierPlan barriers_;
   VertexWarp warp_;
   bool have_ = false;
   std::size_t turn_ = 0;
   std::size_t ended_ = 0;
-  std::uint64_t issued_ = 0;
+  unsigned awaited_ = 0;  ///< GPCs that have not come to the barrier yet
+  Cycle passed_at_ = 0;   ///< the last of them to the last barrier
 };
 
 [[maybe_unused]] const bool registered = [] {
   register_timed_unit_maker("draw", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned gpcs,
-                                       Transport transport) {
-    return std::make_unique<TimedDraw>(name.c_str(), domain, behaviour_as<DrawBehaviour>(std::move(behaviour)), gpcs,
-                                       transport);
+                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context,
+                                       unsigned gpcs, Transport transport) {
+    return std::make_unique<TimedDraw>(name.c_str(), domain, behaviour_as<DrawBehaviour>(std::move(behaviour)), context,
+                                       gpcs, transport);
   });
   return true;
 }();

@@ -12,6 +12,9 @@ class UntimedDraw : public UntimedUnit {
       : UntimedUnit(name), behaviour_(std::move(behaviour)) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<UntimedOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
+      // Here all that a warp leads to is done before the next.
+      in_done_.push_back(input<BlendsDone>("in_done_" + std::to_string(gpc), [](const BlendsDone&) {}));
+      in_done_.back()->set_optional();
     }
   }
 
@@ -34,6 +37,7 @@ class UntimedDraw : public UntimedUnit {
  private:
   std::unique_ptr<DrawBehaviour> behaviour_;
   std::vector<std::unique_ptr<UntimedOut<VertexWarp>>> outs_;
+  std::vector<std::unique_ptr<UntimedIn<BlendsDone>>> in_done_;
   std::size_t turn_ = 0;
 };
 

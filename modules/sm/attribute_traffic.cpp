@@ -8,10 +8,15 @@
 namespace vrpipe {
 
 AttributeTraffic::AttributeTraffic(const RenderContext& context, const AttributeFetch& fetch)
-    : context_(context), attribute_bytes_(fetch.attribute_bytes), buffer_bytes_(fetch.buffer_bytes) {
+    : context_(context),
+      attribute_bytes_(fetch.attribute_bytes),
+      buffer_bytes_(fetch.buffer_bytes),
+      quad_bytes_(4 * bytes_per_pixel(context.format)),
+      tiling_(context.frame->width(), context.frame->height()) {
   const Frame& frame = *context.frame;
   const AddressMap map = address_map(frame, context.format);
   attributes_ = map.attributes.address;
+  color_ = map.color.address;
   // Geometries follow one another as they are drawn first.
   std::map<const Draw*, Region> of_geometry;
   Region next{map.vertices.address, map.primitives.address};
@@ -42,9 +47,31 @@ std::uint32_t AttributeTraffic::visible_triangles(const VertexWarp& warp) const 
   return visible;
 }
 
+void AttributeTraffic::find_reads(const Warp& warp, FragmentReads& reads) const {
+  if (reads_color(context_.state(warp.quads[0].draw).shader)) return read_color(warp, reads);  // all quads' state
+  read_attributes(warp, reads);
+}
+
+void AttributeTraffic::read_color(const Warp& warp, FragmentReads& reads) const {
+  reads.traffic = MemoryTraffic::color;
+  reads.count = 0;
+  for (unsigned i = 0; i < warp.count; ++i) {
+    const std::uint64_t address = color_ + block_linear(tiling_.place(warp.tile, warp.quads[i].position)) * quad_bytes_;
+    const std::uint64_t line = address / line_bytes * line_bytes;
+    const auto first = static_cast<unsigned>((address - line) / sector_bytes);
+    const unsigned count = std::max(quad_bytes_ / sector_bytes, 1U);
+    LineSectors* const end = reads.lines.data() + reads.count;
+    LineSectors* const known =
+        std::find_if(reads.lines.data(), end, [&](const LineSectors& each) { return each.address == line; });
+    if (known == end) reads.lines[reads.count++] = {line, 0};
+    known->sectors |= sector_mask(first, count);
+  }
+}
+
 void AttributeTraffic::read_attributes(const Warp& warp, FragmentReads& reads) const {
   std::array<std::uint32_t, quads_per_warp> seen;
   unsigned primitives = 0;
+  reads.traffic = MemoryTraffic::attribute;
   reads.count = 0;
   for (unsigned i = 0; i < warp.count; ++i) {
     const std::uint32_t primitive = primitive_order(warp.quads[i]);

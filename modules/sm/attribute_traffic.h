@@ -7,6 +7,7 @@
 #include <vrpipe/memory/memory_request.h>
 #include <vrpipe/memory/sectors.h>
 #include <vrpipe/pipeline/framebuffer.h>
+#include <vrpipe/pipeline/screen_tiling.h>
 #include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
@@ -16,7 +17,7 @@ namespace vrpipe {
 /// A vertex warp reads its splats, and where they are drawn as triangles of their own these, in whole sectors. Shaded, it
 /// writes the attributes of each triangle that primitive assembly will not cull: as on a GH100, where they come from
 /// the PolyMorph engine, and none for culled ones. A fragment warp reads the first bytes of the attributes of each of its
-/// quads' primitives once.
+/// quads' primitives once; one of a draw that reads the colour target instead, its quads there.
 ///
 /// Attributes go round in a buffer of L2 (the Circular Buffer, paper 3.1). Who keeps them knows them by addresses that do
 /// not come again; `in_buffer` is where such a one is.
@@ -33,9 +34,10 @@ class AttributeTraffic {
     std::uint64_t address = 0;  ///< of the line
     std::uint32_t sectors = 0;
   };
-  /// What a fragment warp reads, by primitive, then by line.
+  /// What a fragment warp reads: attributes, by primitive, then by line; or colour, by line.
   struct FragmentReads {
     static constexpr unsigned lines_per_primitive = primitive_bytes / line_bytes + 2;
+    MemoryTraffic traffic = MemoryTraffic::attribute;
     unsigned count = 0;
     std::array<LineSectors, quads_per_warp * lines_per_primitive> lines;
   };
@@ -79,15 +81,16 @@ class AttributeTraffic {
     request.address = in_buffer(request.address);
     return request;
   }
-  /// For a run of sectors of a line that is not in the buffer yet; where in memory they are.
-  MemoryRequest read(std::uint64_t line, const SectorRun& run) const {
-    return in_buffer({line + std::uint64_t{run.first} * sector_bytes, run.count * sector_bytes, tlm::TLM_READ_COMMAND,
-                      origin(MemoryTraffic::attribute)});
+  /// For a run of sectors of a line of what a fragment warp reads, where in memory they are: attributes in the buffer.
+  MemoryRequest read(MemoryTraffic traffic, std::uint64_t line, const SectorRun& run) const {
+    const MemoryRequest request{line + std::uint64_t{run.first} * sector_bytes, run.count * sector_bytes,
+                                tlm::TLM_READ_COMMAND, origin(traffic)};
+    return traffic == MemoryTraffic::attribute ? in_buffer(request) : request;
   }
   /// Where in memory an attribute is.
   std::uint64_t in_buffer(std::uint64_t address) const { return attributes_ + (address - attributes_) % buffer_bytes_; }
-  /// What a fragment warp reads; not in the buffer yet.
-  void read_attributes(const Warp& warp, FragmentReads& reads) const;
+  /// What a fragment warp reads; attributes are not in the buffer yet.
+  void find_reads(const Warp& warp, FragmentReads& reads) const;
   /// Of these reads.
   MemoryOrigin origin(MemoryTraffic traffic) const {
     return {traffic, static_cast<std::uint16_t>(context_.placement.gpc)};
@@ -99,6 +102,8 @@ class AttributeTraffic {
     std::uint64_t splats = 0;
     std::uint64_t triangles = 0;
   };
+  void read_attributes(const Warp& warp, FragmentReads& reads) const;
+  void read_color(const Warp& warp, FragmentReads& reads) const;
   /// Of a warp's splats, two bits each, those that are not culled.
   std::uint32_t visible_triangles(const VertexWarp& warp) const;
 
@@ -119,6 +124,9 @@ class AttributeTraffic {
   const std::uint32_t attribute_bytes_;
   const std::uint32_t buffer_bytes_;  ///< whole lines
   std::uint64_t attributes_;
+  std::uint64_t color_;
+  const std::uint32_t quad_bytes_;  ///< of the colour target
+  const ScreenTiling tiling_;
   std::vector<Region> regions_;  ///< by draw
 };
 

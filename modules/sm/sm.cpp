@@ -68,12 +68,15 @@ SplatShader::SplatShader(const Parameters& parameters, const RenderContext& cont
   fetch.l1.ways = parameters.l1_ways;
   fetch.check();
   // The first instructions compute addresses and load; the rest waits for the attributes.
-  const auto program = [&](std::uint32_t instructions, std::uint32_t latency) {
-    const std::uint32_t loads = std::min(instructions, 4U);
+  const auto program = [&](std::uint32_t instructions, std::uint32_t latency, std::uint32_t first = 4) {
+    const std::uint32_t loads = std::min(instructions, first);
     return std::vector<ShaderSegment>{{loads, parameters.attribute_latency_cycles}, {instructions - loads, latency}};
   };
   timing_.vertex = program(parameters.vertex_instructions, parameters.fragment_latency_cycles);
   timing_.fragment = program(parameters.fragment_instructions, parameters.fragment_latency_cycles);
+  timing_.mesh = program(parameters.mesh_instructions, parameters.fragment_latency_cycles);
+  // What follows the load is a compare and a discard.
+  timing_.alpha_threshold = program(parameters.alpha_threshold_instructions, 0, 3);
   timing_.merge = {{parameters.merge_instructions, parameters.merge_latency_cycles}};
 }
 
@@ -119,8 +122,10 @@ inline LanePair SplatShader::alpha_at(LanePair x, LanePair y, const AttributePai
 void SplatShader::shade(const Warp& warp, ShadedWarp& out) {
   ++fragment_warps;
   WarpColors colors;
-  const bool is_mesh = context_.state(warp.quads[0].draw).shader != FragmentShader::splat;  // all quads' state
-  if (__builtin_expect(is_mesh, 0)) {
+  const FragmentShader shader = context_.state(warp.quads[0].draw).shader;  // all quads' state
+  if (__builtin_expect(shader == FragmentShader::alpha_threshold, 0)) {
+    shade_by_alpha(warp, colors);
+  } else if (__builtin_expect(shader != FragmentShader::splat, 0)) {
     shade_mesh(warp, colors);
   } else {
     switch (context_.precision.exponential) {
@@ -148,6 +153,17 @@ void SplatShader::shade_mesh(const Warp& warp, WarpColors& colors) {
   }
   for (unsigned i = 0; i < warp.count; ++i) colors.covered |= static_cast<unsigned>(warp.quads[i].coverage) << (4 * i);
   colors.live = colors.covered;
+}
+
+void SplatShader::shade_by_alpha(const Warp& warp, WarpColors& colors) const {
+  const float threshold = context_.state(warp.quads[0].draw).terminating_alpha();
+  for (unsigned i = 0; i < warp.count; ++i) {
+    const Quad& quad = warp.quads[i];
+    const Lanes alpha = surface_->quad(warp.tile, quad.position).alpha;
+    colors.covered |= static_cast<unsigned>(quad.coverage) << (4 * i);
+    colors.live |= (quad.coverage & static_cast<unsigned>(sign_mask(alpha >= threshold))) << (4 * i);
+  }
+  for (auto& pair : colors.pairs) pair.red = pair.green = pair.blue = pair.alpha = LanePair{};
 }
 
 template <Exponential Kind>

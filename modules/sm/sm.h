@@ -50,6 +50,25 @@ class SplatShader : public SmBehaviour {
                                   24,           1,
                                   1000,         "instructions",
                                   source::open, "of the fragment shader: attributes, dot product, ex2, prune, export"};
+    Integer mesh_instructions{*this,
+                              "mesh_instructions",
+                              29,
+                              1,
+                              1000,
+                              "instructions",
+                              source::open,
+                              "of the fragment shader of meshes: 4 to fetch, 1/w and its reciprocal, 6 "
+                              "attributes, 3 and a square root for the normal, 6 for the light, 3 for the "
+                              "colour, 4 to export"};
+    Integer alpha_threshold_instructions{
+        *this,
+        "alpha_threshold_instructions",
+        5,
+        1,
+        1000,
+        "instructions",
+        source::open,
+        "of the shader that discards what has not terminated: 2 for the pixel, load, compare, discard"};
     Integer merge_instructions{
         *this,        "merge_instructions",
         13,           1,
@@ -181,6 +200,7 @@ class SplatShader : public SmBehaviour {
   template <Exponential Kind>
   void shade_splats(const Warp& warp, WarpColors& colors);
   void shade_mesh(const Warp& warp, WarpColors& colors);
+  void shade_by_alpha(const Warp& warp, WarpColors& colors) const;
   /// Merges, counts, and hands on what is live.
   void put_out(const Warp& warp, const WarpColors& colors, ShadedWarp& out);
   /// Alpha at the samples of two quads.

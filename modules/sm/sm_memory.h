@@ -20,7 +20,7 @@ namespace vrpipe {
 /// Reads of vertices are sent at once. Attributes are written without waiting for an answer; `attribute_writes` may be
 /// without one, and what comes behind them waits. Fills are sent as a warp is looked up, which waits while all miss
 /// registers of its core are taken, or no line of its set can go: one whose fill is on its way stays. Where cores have
-/// no L1s, a warp asks for all that it reads.
+/// no L1s, a warp asks for all that it reads. So does one that reads colour: what an L1 held of it would be stale.
 class SmMemory {
  public:
   SmMemory(PortOwner& owner, const RenderContext& context, const SmBehaviour::TimingParameters& timing,
@@ -64,7 +64,7 @@ class SmMemory {
 
   /// Begins to look a fragment warp up in the L1 of a core.
   void begin_look_up(std::uint32_t slot, std::uint32_t core, const Warp& warp) {
-    traffic_.read_attributes(warp, look_up_);
+    traffic_.find_reads(warp, look_up_);
     core_ = core;
     slot_ = slot;
     at_ = 0;
@@ -72,7 +72,7 @@ class SmMemory {
   }
   /// Goes on with it; false while it has to wait.
   bool look_up(Cycle now) {
-    if (!l1s_[core_].cache) return ask_for_all(now);
+    if (!l1s_[core_].cache || look_up_.traffic != MemoryTraffic::attribute) return ask_for_all(now);
     SectoredCache& cache = *l1s_[core_].cache;
     std::uint64_t sectors = 0;
     for (; at_ < look_up_.count; ++at_, seen_ = 0) {
@@ -150,7 +150,7 @@ class SmMemory {
   /// Neighbouring sectors of a line that were asked for together.
   struct Fill {
     std::uint32_t core = 0;
-    SectoredCache::Line line = SectoredCache::no_line;  ///< of the L1, if there is one
+    SectoredCache::Line line = SectoredCache::no_line;  ///< of the L1, if it goes there
     SectorRun sectors;
     std::uint32_t waiters = none;  ///< a chain
     Cycle asked = 0;
@@ -160,7 +160,7 @@ class SmMemory {
     std::uint32_t next = none;
   };
 
-  /// As `look_up`, without an L1.
+  /// As `look_up`, without an L1 or past it.
   bool ask_for_all(Cycle now) {
     for (; at_ < look_up_.count; ++at_, seen_ = 0) {
       const AttributeTraffic::LineSectors& needed = look_up_.lines[at_];
@@ -181,7 +181,7 @@ class SmMemory {
     l1.free_mshrs -= run.count;
     seen_ |= sector_mask(run.first, run.count);
     await(fill);
-    port_.access(traffic_.read(needed.address, run), fill);
+    port_.access(traffic_.read(look_up_.traffic, needed.address, run), fill);
     return true;
   }
 
@@ -215,7 +215,7 @@ class SmMemory {
     free_fills_.push_back(index);
     L1& l1 = l1s_[fill.core];
     l1.free_mshrs += fill.sectors.count;
-    if (l1.cache) {
+    if (fill.line != SectoredCache::no_line) {
       for (unsigned i = 0; i < fill.sectors.count; ++i) {
         l1.cache->finish_fill(fill.line, fill.sectors.first + i);
         statistics_.fill_cycles.see(now - fill.asked);

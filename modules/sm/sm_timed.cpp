@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "sm/fragment_programs.h"
 #include "sm/timed_sm_memory.h"
 
 #include <vrpipe/model/timed.h>
@@ -21,12 +22,13 @@ class TimedSm : public TimedUnit {
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         cycles_per_instruction_(timing_.cycles_per_instruction()),
-        roomy_(is_roomy(timing_)),
+        roomy_(is_roomy(timing_, *context.frame)),
         memory_(*this, context, timing_, l1_statistics_),
-        fetch_cycles_(timing_.fragment.front().instructions * cycles_per_instruction_),
         vertex_(program(timing_.vertex, {}, true).front()),
-        fragment_(program(timing_.fragment, {}, roomy_)),
-        merged_(program(timing_.fragment, timing_.merge, roomy_)),
+        fragment_(*context.frame,
+                  [&](FragmentShader shader, bool merges) {
+                    return program(timing_.fragment_program(shader), merges ? timing_.merge : no_program, roomy_);
+                  }),
         out_vertices_(*this, "out_vertices"),
         out_shaded_(*this, "out_shaded"),
         in_release_(*this, "in_release",
@@ -41,7 +43,7 @@ class TimedSm : public TimedUnit {
         scheduler_free_at_(std::size_t{timing_.cores} * timing_.schedulers_per_core, 0),
         free_of_core_(timing_.cores, timing_.warps_per_core),
         vertex_slots_(timing_.vertex_warps, 0) {
-    waiting_.resize(merged_.size());
+    fragment_.for_each([&](const Program& each) { waiting_.resize(std::max(waiting_.size(), each.size())); });
     free_slots_ = timing_.fragment_slots();
     in_warps_.set_gate([this] { return has_slot(); });
   }
@@ -63,26 +65,29 @@ class TimedSm : public TimedUnit {
     if (!blocking()) in_vertices_.set_gate([this] { return shaded_vertices_.size() < timing_.vertex_warps; });
     // What memory says stands for the first stall.
     vertex_.stall_cycles -= timing_.vertex.front().stall_cycles;
-    fragment_.front().stall_cycles -= timing_.fragment.front().stall_cycles;
-    merged_.front().stall_cycles -= timing_.fragment.front().stall_cycles;
+    fragment_.for_each([](Program& each) { each.front().stall_cycles -= each.front().fetch.stall_cycles; });
   }
 
   struct Segment {
     std::uint32_t instructions = 0;
     std::uint32_t merge_instructions = 0;  ///< after these
     std::uint32_t stall_cycles = 0;
+    ShaderSegment fetch{0, 0};  ///< of a program's first: what fetches, and stands still for that
     std::uint32_t all() const { return instructions + merge_instructions; }
   };
   using Program = std::vector<Segment>;
+  inline static const std::vector<ShaderSegment> no_program;
 
   /// A shader and what is appended to it, perhaps as a single segment.
   static Program program(const std::vector<ShaderSegment>& shader, const std::vector<ShaderSegment>& merge,
                          bool as_one) {
     Program program;
-    for (const ShaderSegment& each : shader) program.push_back({each.instructions, 0, each.stall_cycles});
-    for (const ShaderSegment& each : merge) program.push_back({0, each.instructions, each.stall_cycles});
+    for (const ShaderSegment& each : shader) program.push_back({each.instructions, 0, each.stall_cycles, {0, 0}});
+    for (const ShaderSegment& each : merge) program.push_back({0, each.instructions, each.stall_cycles, {0, 0}});
+    program.front().fetch = shader.front();
     if (!as_one) return program;
     Segment sum;
+    sum.fetch = shader.front();
     for (const Segment& each : program) {
       sum.instructions += each.instructions;
       sum.merge_instructions += each.merge_instructions;
@@ -92,10 +97,15 @@ class TimedSm : public TimedUnit {
   }
 
   /// Whether a warp can be launched in every cycle, and consecutive ones find schedulers that differ.
-  static bool is_roomy(const SmBehaviour::TimingParameters& timing) {
+  static bool is_roomy(const SmBehaviour::TimingParameters& timing, const Frame& frame) {
+    return has_room_for(FragmentShader::splat, timing) &&
+           std::all_of(frame.draws().begin(), frame.draws().end(),
+                       [&](const DrawCall& call) { return has_room_for(call.state.shader, timing); });
+  }
+  static bool has_room_for(FragmentShader shader, const SmBehaviour::TimingParameters& timing) {
     const Cycle cycles_per_instruction = timing.cycles_per_instruction();
-    const Segment fragment = program(timing.fragment, {}, true).front();
-    const Segment merged = program(timing.fragment, timing.merge, true).front();
+    const Segment fragment = program(timing.fragment_program(shader), {}, true).front();
+    const Segment merged = program(timing.fragment_program(shader), timing.merge, true).front();
     return std::uint64_t{timing.cores} * timing.schedulers_per_core >= fragment.all() * cycles_per_instruction &&
            timing.fragment_slots() >= 2 * (merged.all() * cycles_per_instruction + merged.stall_cycles) &&
            timing.warps_to_one_core >= timing.schedulers_per_core &&
@@ -158,7 +168,7 @@ class TimedSm : public TimedUnit {
     }
     next_launch_ = launch + 1;
 
-    const Program& needed = warp.merge_pairs != 0 ? merged_ : fragment_;
+    const Program& needed = fragment_.of(warp);
     if (blocking() && roomy_) {
       const Cycle done = issue(needed.front(), next_scheduler(), launch, there);
       last_done_ = std::max(last_done_, done);
@@ -210,7 +220,7 @@ class TimedSm : public TimedUnit {
     if (segment.instructions > 0) did(SmWork::fragment, segment.instructions, begin, merge);
     if (segment.merge_instructions > 0) did(SmWork::merge, segment.merge_instructions, merge, free_at);
     charge(UnitState::busy, free_at);
-    const Cycle fetched = begin + fetch_cycles_;
+    const Cycle fetched = begin + segment.fetch.instructions * cycles_per_instruction_;
     return free_at + segment.stall_cycles + (std::max(fetched, there) - fetched);
   }
   /// The same for a warp that waits; those that waited for its scheduler before it have issued.
@@ -339,11 +349,9 @@ class TimedSm : public TimedUnit {
   SectoredCacheStatistics l1_statistics_{*this, "l1"};
   TimedSmMemory memory_;
   std::unique_ptr<FixedLatencyMemory> no_memory_;
-  bool fetches_ = false;      ///< the memory port is connected
-  const Cycle fetch_cycles_;  ///< of the instructions that fetch attributes
+  bool fetches_ = false;  ///< the memory port is connected
   Segment vertex_;
-  Program fragment_;
-  Program merged_;
+  FragmentPrograms<Program> fragment_;
   TimedOut<VertexWarp> out_vertices_;
   TimedOut<ShadedWarpItem> out_shaded_;
   TimedIn<WarpRelease> in_release_;

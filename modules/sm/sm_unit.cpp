@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "sm/fragment_programs.h"
 #include "sm/sm_memory.h"
 
 #include <vrpipe/arithmetic/divisor.h>
@@ -97,8 +98,8 @@ class SmUnit : public Unit {
         cycles_per_instruction_(timing_.cycles_per_instruction()),
         warps_per_core_(timing_.warps_per_core),
         memory_(*this, context, timing_, l1_statistics_),
-        vertex_(timing_.vertex),
-        fragment_(timing_.fragment),
+        vertex_{timing_.vertex, timing_.vertex.size()},
+        fragment_(*context.frame, [&](FragmentShader shader, bool merges) { return program(shader, merges); }),
         wheel_(horizon()),
         schedulers_(std::size_t{timing_.cores} * timing_.schedulers_per_core) {
     fragment_slots_ = timing_.fragment_slots();
@@ -113,7 +114,6 @@ class SmUnit : public Unit {
         free_of_core_[core].push_back(core * timing_.warps_per_core + slot);
       }
     }
-    set_merged();
   }
 
   bool idle() const override {
@@ -126,9 +126,13 @@ class SmUnit : public Unit {
   MemoryBytes memory_bytes() const override { return memory_.moved(); }
 
  private:
+  struct Program {
+    std::vector<ShaderSegment> segments;
+    std::size_t shading;  ///< of these; the others merge
+  };
   /// A warp on its way through a program; what it shades is kept apart, being needed at the ends alone.
   struct Flight {
-    const std::vector<ShaderSegment>* program = nullptr;
+    const Program* program = nullptr;
     std::uint16_t segment = 0;
     std::uint16_t scheduler = 0;
     bool done = false;   ///< vertex warps only
@@ -141,18 +145,20 @@ class SmUnit : public Unit {
     if (!fetches_) return;
     memory_.connect();
     there_.resize(fragment_slots_);
-    vertex_.front().stall_cycles = 0;
-    fragment_.front().stall_cycles = 0;
-    set_merged();
+    vertex_.segments.front().stall_cycles = 0;
+    fragment_.for_each([](Program& program) { program.segments.front().stall_cycles = 0; });
   }
-  void set_merged() {
-    merged_ = fragment_;
-    merged_.insert(merged_.end(), timing_.merge.begin(), timing_.merge.end());
+  Program program(FragmentShader shader, bool merges) const {
+    Program program{timing_.fragment_program(shader), 0};
+    program.shading = program.segments.size();
+    if (merges) program.segments.insert(program.segments.end(), timing_.merge.begin(), timing_.merge.end());
+    return program;
   }
 
   std::uint32_t horizon() const {
     std::uint32_t longest = timing_.fetch.l1_latency_cycles + 1;
-    for (const auto* program : {&timing_.vertex, &timing_.fragment, &timing_.merge}) {
+    for (const auto* program :
+         {&timing_.vertex, &timing_.fragment, &timing_.mesh, &timing_.alpha_threshold, &timing_.merge}) {
       for (const ShaderSegment& segment : *program) {
         longest = std::max(longest, segment.instructions * cycles_per_instruction_ + segment.stall_cycles);
       }
@@ -164,7 +170,7 @@ class SmUnit : public Unit {
     const std::uint32_t slot = scheduler.ready.first;
     scheduler.ready.first = next_[slot];
     Flight& flight = flights_[slot];
-    const ShaderSegment& segment = (*flight.program)[flight.segment++];
+    const ShaderSegment& segment = flight.program->segments[flight.segment++];
     const Cycle busy = Cycle{segment.instructions} * cycles_per_instruction_;
     scheduler.free_at = now + busy;
     busy_until_ = std::max(busy_until_, scheduler.free_at);
@@ -176,7 +182,7 @@ class SmUnit : public Unit {
   /// Of the segment that a flight has just issued.
   unsigned kind_of_work(std::uint32_t slot, const Flight& flight) const {
     if (slot >= fragment_slots_) return SmWork::vertex;
-    return flight.segment > timing_.fragment.size() ? SmWork::merge : SmWork::fragment;
+    return flight.segment > flight.program->shading ? SmWork::merge : SmWork::fragment;
   }
 
   void arm(std::uint32_t index, Cycle now) {
@@ -232,7 +238,7 @@ class SmUnit : public Unit {
 
   /// With what follows the segment that a warp has issued.
   void go_on(std::uint32_t slot, Cycle now) {
-    if (flights_[slot].segment == flights_[slot].program->size()) {
+    if (flights_[slot].segment == flights_[slot].program->segments.size()) {
       complete(slot, now);
     } else {
       make_ready(slot, now);
@@ -332,7 +338,7 @@ class SmUnit : public Unit {
     const std::uint32_t slot = slot_;
     if (fetches_ && !look_up(slot, warp, now)) return;
     Flight& flight = flights_[slot];
-    flight.program = warp.merge_pairs != 0 ? &merged_ : &fragment_;
+    flight.program = &fragment_.of(warp);
     flight.segment = 0;
     flight.scheduler = static_cast<std::uint16_t>(core_ * timing_.schedulers_per_core + turn_of_scheduler_);
     turn_of_scheduler_ = turn_of_scheduler_ + 1 == timing_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
@@ -415,9 +421,8 @@ class SmUnit : public Unit {
   std::unique_ptr<FixedLatencyMemory> no_memory_;
   bool fetches_ = false;  ///< the memory port is connected
   // The programs, in whose first segments nothing stands for memory where that is connected.
-  std::vector<ShaderSegment> vertex_;
-  std::vector<ShaderSegment> fragment_;
-  std::vector<ShaderSegment> merged_;  ///< with the merge extension
+  Program vertex_;
+  FragmentPrograms<Program> fragment_;
   Wheel wheel_;
   std::vector<Scheduler> schedulers_;
   std::uint32_t fragment_slots_ = 0;

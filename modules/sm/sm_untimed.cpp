@@ -33,7 +33,7 @@ class UntimedSm : public UntimedUnit {
     shaded_.sequence = warp.sequence;
     shaded_.count = 0;
     if (warp.mark == Mark::none) {
-      if (memory_.connected()) read_attributes(warp);
+      if (memory_.connected()) read(warp);
       behaviour_->shade(warp, shaded_);
     }
     out_shaded_.send({&shaded_});
@@ -53,9 +53,9 @@ class UntimedSm : public UntimedUnit {
     out_vertices_.send(warp);
   }
 
-  [[gnu::noinline]] void read_attributes(const Warp& warp) {
-    traffic_.read_attributes(warp, reads_);
-    if (!timing_.fetch.has_l1()) {
+  [[gnu::noinline]] void read(const Warp& warp) {
+    traffic_.find_reads(warp, reads_);
+    if (!timing_.fetch.has_l1() || reads_.traffic != MemoryTraffic::attribute) {
       for (unsigned i = 0; i < reads_.count; ++i) ask(reads_.lines[i].address, reads_.lines[i].sectors);
       return;
     }
@@ -84,7 +84,7 @@ class UntimedSm : public UntimedUnit {
   void ask(std::uint64_t line_address, std::uint32_t sectors) {
     while (sectors != 0) {
       const SectorRun run = take_sector_run(sectors, AttributeTraffic::line_bytes / AttributeTraffic::sector_bytes);
-      memory_.access(traffic_.read(line_address, run));
+      memory_.access(traffic_.read(reads_.traffic, line_address, run));
     }
   }
 

@@ -66,9 +66,9 @@ class TimedSmMemory {
   };
   /// Looks a fragment warp up in the L1 of a core, in cycle `at` or as soon as there is room.
   Fetch fetch_attributes(const Warp& warp, std::uint32_t core, Cycle at) {
-    traffic_.read_attributes(warp, reads_);
+    traffic_.find_reads(warp, reads_);
     L1& l1 = l1s_[core];
-    if (!l1.cache) return fetch_past(l1, at);
+    if (!l1.cache || reads_.traffic != MemoryTraffic::attribute) return fetch_past(l1, at);
     Cycle there = 0;
     std::uint64_t sectors = 0;
     for (unsigned i = 0; i < reads_.count; ++i) {
@@ -114,7 +114,7 @@ class TimedSmMemory {
     unsent_.pop();
   }
 
-  /// The same where the core has none: each warp asks for all that it reads.
+  /// The same where the core has none, and past it: each warp asks for all that it reads.
   Fetch fetch_past(L1& l1, Cycle at) {
     Cycle there = 0;
     for (unsigned i = 0; i < reads_.count; ++i) {
@@ -131,8 +131,10 @@ class TimedSmMemory {
     run = take_sector_run(missing, std::min(sectors_of_a_line, timing_.l1_mshrs));
     at = l1.mshrs.free_from(at, run.count);
     // Addresses of writes increase.
-    while (!unsent_.empty() && unsent_.front().request.address < line + AttributeTraffic::line_bytes) send();
-    const Cycle there = port_.access(traffic_.read(line, run), at);
+    while (reads_.traffic == MemoryTraffic::attribute && !unsent_.empty() &&
+           unsent_.front().request.address < line + AttributeTraffic::line_bytes)
+      send();
+    const Cycle there = port_.access(traffic_.read(reads_.traffic, line, run), at);
     l1.mshrs.take(run.count, there);
     return there;
   }

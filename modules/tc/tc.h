@@ -3,6 +3,7 @@
 #include <deque>
 
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/hi_z_plan.h>
 #include <vrpipe/pipeline/late_plan.h>
 #include <vrpipe/pipeline/screen_tiling.h>
@@ -69,19 +70,21 @@ class TileCoalescing : public TcBehaviour {
 };
 
 /// The marks that TC hands on. Behind it a bin, and so a warp, is of one state, and a change of state has nothing to stop; but
-/// Hi-Z may wait for one to come to ZROP, and ZROP for one behind late tests.
+/// Hi-Z may wait for one to come to ZROP, ZROP for one behind late tests, and DRAW for one to come to CROP.
 class PassingMarks {
  public:
-  explicit PassingMarks(const RenderContext& context) : frame_(*context.frame), hi_z_(context), late_(context) {}
+  explicit PassingMarks(const RenderContext& context)
+      : frame_(*context.frame), hi_z_(context), late_(context), barriers_(frame_) {}
   bool has(Mark mark) const {
     return mark == Mark::end_of_frame || frame_.clear_of(mark) != nullptr || hi_z_.waits_at(mark) ||
-           late_.waits_at(mark);
+           late_.waits_at(mark) || barriers_.is_barrier(mark);
   }
 
  private:
   const Frame& frame_;
   const HiZPlan hi_z_;
   const LatePlan late_;
+  const BarrierPlan barriers_;
 };
 
 }  // namespace vrpipe

@@ -114,6 +114,7 @@ std::uint32_t DepthStencilRop::test_late(ShadedWarp& warp) {
   const QuadBeat beat = quads_of(warp);
   std::array<LaneMask, quads_per_warp> passed{};
   std::uint32_t changed = 0;
+  const bool blends = beat.count > 0 && writes_color(context_.state(beat.quads[0].draw).shader);  // all quads' state
   for (unsigned i = 0; i < beat.count; ++i) {
     const Quad& quad = beat.quads[i];
     const DepthStencilTest::Outcome outcome = test_quad(quad, beat.tile);
@@ -122,6 +123,10 @@ std::uint32_t DepthStencilRop::test_late(ShadedWarp& warp) {
     quads_tested_late.add(quad.draw, 1);
     quads_late_failed.add(quad.draw, outcome.passed == 0 ? 1 : 0);
     fragments_late_failed.add(quad.draw, popcount(static_cast<LaneMask>(quad.coverage & ~outcome.passed)));
+    if (blends) continue;
+    quads_unblended.add(quad.draw, outcome.passed != 0 ? 1 : 0);
+    fragments_unblended.add(quad.draw, popcount(outcome.passed));
+    passed[i] = 0;
   }
   warp.keep(passed);
   return changed;

@@ -18,7 +18,7 @@ double spaced(std::uint64_t items, double cycles, bool to_last) {
   return to_last ? static_cast<double>(items - 1) * cycles + 1 : static_cast<double>(items) * cycles;
 }
 
-std::uint64_t instructions_of(const std::vector<ShaderSegment>& program) {
+std::uint64_t sum_of(const std::vector<ShaderSegment>& program) {
   std::uint64_t sum = 0;
   for (const ShaderSegment& segment : program) sum += segment.instructions;
   return sum;
@@ -44,6 +44,7 @@ void Work::add(const Work& other) {
   vertex_warps += other.vertex_warps;
   attribute_bytes_written += other.attribute_bytes_written;
   warps += other.warps;
+  fragment_instructions += other.fragment_instructions;
   merging_warps += other.merging_warps;
   color_quads += other.color_quads;
   sectors += other.sectors;
@@ -79,10 +80,11 @@ PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc) {
 }
 
 double PhaseBound::instructions(const Work& done) const {
-  return static_cast<double>(done.vertex_warps * instructions_of(sm_.vertex) +
-                             done.warps * instructions_of(sm_.fragment) +
-                             done.merging_warps * instructions_of(sm_.merge));
+  return static_cast<double>(done.vertex_warps * sum_of(sm_.vertex) + done.fragment_instructions +
+                             done.merging_warps * sum_of(sm_.merge));
 }
+
+std::uint64_t PhaseBound::instructions_of(FragmentShader shader) const { return sum_of(sm_.fragment_program(shader)); }
 
 std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, bool to_last) const {
   std::array<double, stages> cycles{};
@@ -182,6 +184,11 @@ void PhaseBound::end_phase() {
   up_to_quad_ = FrontEndWork();
 }
 
+void PhaseBound::pass_barrier() {
+  if (!has_quads()) return;
+  for (double& end : end_) end = std::max(end, last_quad_);
+}
+
 double PhaseBound::busy_cycles(const std::string& slot) const {
   double longest = 0;
   std::map<unsigned, double> resources;
@@ -228,9 +235,8 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
     return priced(QruWork::kinds(qru_), {std::max(quads, 0.0), count(done.warps)});
   }
   if (slot == "sm") {
-    return priced(SmWork::kinds(sm_), {count(done.vertex_warps * instructions_of(sm_.vertex)),
-                                       count(done.warps * instructions_of(sm_.fragment)),
-                                       count(done.merging_warps * instructions_of(sm_.merge))});
+    return priced(SmWork::kinds(sm_), {count(done.vertex_warps * sum_of(sm_.vertex)), count(done.fragment_instructions),
+                                       count(done.merging_warps * sum_of(sm_.merge))});
   }
   if (slot == "crop") return priced(CropWork::kinds(crop_), {count(done.color_quads), count(done.sectors)});
   if (slot == "l2" && l2_bytes_per_cycle_ > 0)

@@ -33,6 +33,7 @@ struct Work : FrontEndWork {
   std::uint64_t survivors = 0;
   std::uint64_t late_quads = 0;  ///< tested after shading
   std::uint64_t warps = 0;
+  std::uint64_t fragment_instructions = 0;  ///< of these warps
   std::uint64_t merging_warps = 0;
   std::uint64_t color_quads = 0;
   std::uint64_t sectors = 0;  ///< filled or written back
@@ -68,6 +69,10 @@ class PhaseBound {
     up_to_quads_.tile_pairs = up_to_quad_.tile_pairs;  // for a pair without quads nobody waits
   }
   void end_phase();
+  /// A barrier: what follows begins once the last quad of the phases so far has ended.
+  void pass_barrier();
+  /// Of a fragment warp.
+  std::uint64_t instructions_of(FragmentShader shader) const;
   /// Up to the last quad; without quads, of what the front end does all the same.
   double cycles() const { return last_quad_; }
   bool has_quads() const { return ended_.quads_rasterized > 0; }

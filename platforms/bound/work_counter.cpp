@@ -22,9 +22,9 @@ std::uint64_t items(const UntimedUnit* unit, unsigned kind) { return unit == nul
 /// From the survivors of a test to the colour cache.
 class WorkCounter::Blends final : public BlendObserver {
  public:
-  Blends(Work& work, const Frame& frame, const ColorSurface& surface, const CropBehaviour::TimingParameters& crop,
-         bool only_needed, bool any_order)
-      : work_(work), frame_(frame), grid_(surface.grid()), line_bytes_(crop.line_bytes) {
+  Blends(PhaseBound& bound, const Frame& frame, const ColorSurface& surface,
+         const CropBehaviour::TimingParameters& crop, bool only_needed, bool any_order)
+      : work_(bound.work), bound_(bound), frame_(frame), grid_(surface.grid()), line_bytes_(crop.line_bytes) {
     if (only_needed) terminated_.resize(grid_.quads());
     if (any_order) filled_.resize(surface.size_bytes() / line_bytes_ + 1);
   }
@@ -47,8 +47,14 @@ class WorkCounter::Blends final : public BlendObserver {
     if (warp.mark != Mark::none) return;
     if (terminated_.empty()) {
       ++work_.warps;
+      work_.fragment_instructions += instructions_of(warp);
       work_.merging_warps += warp.merge_pairs != 0 ? 1U : 0U;
       return;
+    }
+    // No warp runs two programs.
+    if (const std::uint64_t instructions = instructions_of(warp); instructions != instructions_) {
+      instructions_ = instructions;
+      needed_quads_ = 0;
     }
     // In warps that are full: flushed at other times, these quads may find other company.
     const std::size_t tile = grid_.place(warp.tile, 0);
@@ -59,6 +65,7 @@ class WorkCounter::Blends final : public BlendObserver {
       needed_pairs_ += pair && is_needed(tile, warp.quads[i - 1]) ? 1U : 0U;
     }
     work_.warps += needed_quads_ / quads_per_warp;
+    work_.fragment_instructions += needed_quads_ / quads_per_warp * instructions_;
     needed_quads_ %= quads_per_warp;
     work_.merging_warps += needed_pairs_ / (quads_per_warp / 2);
     needed_pairs_ %= quads_per_warp / 2;
@@ -96,14 +103,19 @@ class WorkCounter::Blends final : public BlendObserver {
   bool is_needed(std::size_t tile, const Quad& quad) const {
     return !terminates(quad.draw) || (quad.coverage & ~terminated_[tile + quad.position]) != 0;
   }
+  std::uint64_t instructions_of(const Warp& warp) const {
+    return bound_.instructions_of(frame_.draw_call(warp.quads[0].draw).state.shader);  // all quads' state
+  }
   bool terminates(DrawIndex draw) const { return frame_.draw_call(draw).state.early_termination; }
 
   Work& work_;
+  const PhaseBound& bound_;
   const Frame& frame_;
   const ScreenTiling grid_;
   const std::uint32_t line_bytes_;
   std::vector<LaneMask> terminated_;   ///< by quad of the surface; empty if all work counts
   std::vector<std::uint32_t> filled_;  ///< sectors so far, by line of the surface; empty if all moves count
+  std::uint64_t instructions_ = 0;     ///< of the last warp
   unsigned needed_quads_ = 0;          ///< less than a warp
   unsigned needed_pairs_ = 0;
 };
@@ -128,6 +140,7 @@ void WorkCounter::tap(UntimedUnit* unit, const char* port, Function function) {
 WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc, PhaseBound& bound)
     : bound_(bound),
       counts_late_(!(bound.times_out() && configuration.frame().terminates_early())),
+      barriers_(configuration.frame()),
       draw_(gpu.of_slot("draw", gpc)),
       vpo_(gpu.of_slot("vpo", gpc)),
       tgc_(gpu.of_slot("tgc", gpc)),
@@ -145,8 +158,8 @@ WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& g
     const bool any_line = colors->timing().replacement != Replacement::lru;
     const bool any_order = times_out || bound.tiles_may_overtake() || any_line;
     const bool only_needed = configuration.frame().terminates_early() && times_out;
-    blends_ = std::make_unique<Blends>(bound.work, configuration.frame(), *colors->surface(), colors->timing(),
-                                       only_needed, any_order);
+    blends_ = std::make_unique<Blends>(bound, configuration.frame(), *colors->surface(), colors->timing(), only_needed,
+                                       any_order);
     crop->observe(*blends_);
     tap<BinItem>(prop, "out_survivors", [this](const BinItem& item, UntimedTarget<BinItem>& next) {
       if (item.mark == Mark::none) {
@@ -170,6 +183,10 @@ WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& g
   });
   tap<BinItem>(tc_, "out_bins", [this](const BinItem& item, UntimedTarget<BinItem>& next) {
     next.take(item);
+    if (barriers_.is_barrier(item.mark)) {
+      end_phase();
+      bound_.pass_barrier();
+    }
     if (item.mark != Mark::none) return;
     count();
     bound_.quads_ended();

@@ -6,6 +6,8 @@
 #include "bound/bound.h"
 #include "elaboration/untimed_gpu.h"
 
+#include <vrpipe/pipeline/barrier_plan.h>
+
 namespace vrpipe {
 
 /// Counts what the units of a GPC do in a run without time, for its bound: by taps on the links and at the blender.
@@ -32,6 +34,7 @@ class WorkCounter {
 
   PhaseBound& bound_;
   const bool counts_late_;  ///< late tests, unless some run may be spared them
+  const BarrierPlan barriers_;
   std::unique_ptr<Blends> blends_;
   std::vector<std::shared_ptr<void>> taps_;
   UntimedUnit *draw_, *vpo_, *tgc_, *raster_, *tc_, *zrop_, *sm_;  ///< null for none

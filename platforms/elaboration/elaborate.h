@@ -6,7 +6,9 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/slots/memory.h>
+#include <vrpipe/platforms/configuration.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/observers.h>
 
@@ -48,6 +50,18 @@ inline void check_below(const Netlist& netlist, const std::string& path, const M
   throw UserError("incomplete platform " + platform, path,
                   "it fetches what it does not hold, and no memory is below it",
                   "add one and use connect_memory, or put a memory there that needs none");
+}
+
+/// Throws UserError for a frame with barriers on a platform where they have no way back to DRAW.
+inline void check_barriers(const Configuration& configuration) {
+  if (!BarrierPlan(configuration.frame()).is_used()) return;
+  for (const Instance& instance : configuration.netlist().instances()) {
+    const std::string port = instance.path + ".out_done";
+    if (instance.slot != "crop" || configuration.netlist().link_from(port) != nullptr) continue;
+    throw UserError("incomplete platform " + configuration.platform().name, port,
+                    "a draw of the frame reads the colour target, and nobody tells DRAW when all before it is blended",
+                    "connect it to draw.in_done_N, as wire_gpc does");
+  }
 }
 
 /// Stubs optional ports that are not connected. Throws UserError for another that is neither connected nor stubbed.

@@ -34,6 +34,7 @@ Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
       clock_(std::make_unique<ClockDomain>("clock", configuration.context_of(0).clock_ps)) {
   const Netlist& netlist = configuration.netlist();
   const RunRequest& request = configuration.request();
+  check_barriers(configuration);
   for (const Instance& instance : netlist.instances()) {
     const bool runs_ahead = instance.slot == "zrop" && request.termination == Termination::strict &&
                             configuration.frame().terminates_early();
@@ -75,6 +76,7 @@ void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
   }
   follow_clock(*counting, *clock_);
   if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(framebuffer.color);
+  if (auto* const sm = dynamic_cast<SmBehaviour*>(behaviour.get())) sm->attach(framebuffer.color);
   if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get()); zrop != nullptr) {
     zrop->attach(framebuffer.depth_stencil);
     if (ahead != ahead_.end()) zrop->follow(*ahead->second);

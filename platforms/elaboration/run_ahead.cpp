@@ -105,6 +105,7 @@ class RunAhead::RecordingSm final : public SmBehaviour {
  public:
   RecordingSm(std::unique_ptr<SmBehaviour> sm, Record& record) : sm_(std::move(sm)), record_(record) {}
   const Behaviour& unit() const override { return sm_->unit(); }
+  void attach(const ColorSurface& surface) override { sm_->attach(surface); }
   void shade(const Warp& warp, ShadedWarp& out) override {
     sm_->shade(warp, out);
     record_.shaded(out);
@@ -283,6 +284,7 @@ RunAhead::RunAhead(const Configuration& configuration, unsigned gpc, ColorSurfac
     std::unique_ptr<Behaviour> behaviour = configuration.make(*instance);
     if (instance->slot == "sm") {
       auto real = behaviour_as<SmBehaviour>(std::move(behaviour));
+      real->attach(surface);
       sm_ = real.get();
       behaviour = std::make_unique<RecordingSm>(std::move(real), *record_);
     } else if (instance->slot == "crop") {

@@ -41,6 +41,9 @@ void wire_gpc(Netlist& netlist, unsigned gpc, const std::string& memory) {
   // Hi-Z: from what depth tests store back to coarse rasterisation.
   connect(self + "zrop.out_hi_z", self + "raster.in_hi_z", 16);
 
+  // A barrier: what was drawn has been blended.
+  connect(self + "crop.out_done", "draw.in_done_" + index);
+
   netlist.connect_memory(self + "crop", memory);
 }
 

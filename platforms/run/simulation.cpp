@@ -97,7 +97,9 @@ std::string hash_of(const RunResult& result) {
   std::uint64_t hash = 0xcbf29ce484222325ULL;
   for (const auto& [name, count] : result.counts.named()) {
     // So that frames without such draws keep the hashes that they have always had.
-    if (count == 0 && (name == "quads_unshaded" || name == "fragments_unshaded")) continue;
+    static const std::set<std::string> of_such_draws{"quads_unshaded", "fragments_unshaded", "quads_unblended",
+                                                     "fragments_unblended"};
+    if (count == 0 && of_such_draws.count(name) > 0) continue;
     fnv1a(hash, count);
   }
   fnv1a(hash, result.cycles.value_or(0));
@@ -190,6 +192,8 @@ Counts counts_from(const BehaviourList& behaviours, const Value& value) {
       c.fragments_unshaded += value(zrop->fragments_unshaded);
       c.quads_late_failed += value(zrop->quads_late_failed);
       c.fragments_late_failed += value(zrop->fragments_late_failed);
+      c.quads_unblended += value(zrop->quads_unblended);
+      c.fragments_unblended += value(zrop->fragments_unblended);
     } else if (const auto* const sm = dynamic_cast<const SmBehaviour*>(&unit)) {
       c.quads_shaded += value(sm->quads_shaded);
       c.fragments_shaded += value(sm->fragments_shaded);
@@ -250,11 +254,12 @@ void check_conservation(const Counts& c) {
         c.quads_depth_stencil_failed + c.quads_terminated + c.quads_unshaded + c.quads_shaded);
   check("fragments rasterized = depth_stencil_failed + terminated + unshaded + shaded", c.fragments_rasterized,
         c.fragments_depth_stencil_failed + c.fragments_terminated + c.fragments_unshaded + c.fragments_shaded);
-  check("quads shaded = pruned + merged + dropped_late + late_failed + blended", c.quads_shaded,
-        c.quads_pruned + c.quads_merged + c.quads_dropped_late + c.quads_late_failed + c.quads_blended);
-  check("fragments shaded = pruned + merged + dropped_late + late_failed + blended", c.fragments_shaded,
+  check("quads shaded = pruned + merged + dropped_late + late_failed + unblended + blended", c.quads_shaded,
+        c.quads_pruned + c.quads_merged + c.quads_dropped_late + c.quads_late_failed + c.quads_unblended +
+            c.quads_blended);
+  check("fragments shaded = pruned + merged + dropped_late + late_failed + unblended + blended", c.fragments_shaded,
         c.fragments_pruned + c.fragments_merged + c.fragments_dropped_late + c.fragments_late_failed +
-            c.fragments_blended);
+            c.fragments_unblended + c.fragments_blended);
 }
 
 /// What units and memories have asked a memory for is what it delivered. `asked_by` gives that of a path.
@@ -537,6 +542,8 @@ std::vector<std::pair<std::string, std::uint64_t>> Counts::named() const {
           {"fragments_dropped_late", fragments_dropped_late},
           {"quads_late_failed", quads_late_failed},
           {"fragments_late_failed", fragments_late_failed},
+          {"quads_unblended", quads_unblended},
+          {"fragments_unblended", fragments_unblended},
           {"quads_blended", quads_blended},
           {"fragments_blended", fragments_blended},
           {"warps", warps},

@@ -76,10 +76,10 @@ TEST_P(RandomScene, WhatGoesInComesOutAndStatesSumToTheCycles) {
       EXPECT_EQ(c.quads_rasterized,
                 c.quads_depth_stencil_failed + c.quads_terminated + c.quads_unshaded + c.quads_shaded);
       EXPECT_EQ(c.fragments_rasterized, c.fragments_depth_stencil_failed + c.fragments_terminated + c.fragments_shaded);
-      EXPECT_EQ(c.quads_shaded,
-                c.quads_pruned + c.quads_merged + c.quads_dropped_late + c.quads_late_failed + c.quads_blended);
+      EXPECT_EQ(c.quads_shaded, c.quads_pruned + c.quads_merged + c.quads_dropped_late + c.quads_late_failed +
+                                    c.quads_unblended + c.quads_blended);
       EXPECT_EQ(c.fragments_shaded, c.fragments_pruned + c.fragments_merged + c.fragments_dropped_late +
-                                        c.fragments_late_failed + c.fragments_blended);
+                                        c.fragments_late_failed + c.fragments_unblended + c.fragments_blended);
       if (variant.quad_merging) {
         EXPECT_GT(c.quads_merged, 0U) << variant.name;
       } else {

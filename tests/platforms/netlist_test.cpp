@@ -87,7 +87,7 @@ TEST(Netlist, IsWhatThePlatformsWire) {
   Netlist netlist(4);
   platform_named("desktop").wire(netlist);
   EXPECT_EQ(netlist.instances().size(), 3U + 4 * 8);
-  EXPECT_EQ(netlist.links().size(), 4U * 17);
+  EXPECT_EQ(netlist.links().size(), 4U * 18);
   ASSERT_NE(netlist.find("gpc3.tc"), nullptr);
   EXPECT_EQ(netlist.find("gpc3.tc")->slot, "tc");
   EXPECT_EQ(netlist.find("gpc3.tc")->gpc, 3U);

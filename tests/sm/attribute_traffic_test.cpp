@@ -176,7 +176,7 @@ TEST(AttributeTraffic, AttributesGoRoundInTheirBuffer) {
   EXPECT_EQ(traffic.in_buffer(attributes + 17 * 704 + 32), attributes + 704 + 32);
   // Who reads says which round it means.
   for (const std::uint64_t round : {0U, 1U, 5U}) {
-    const MemoryRequest read = traffic.read(attributes + (round * 16 + 2) * 704, {1, 2});
+    const MemoryRequest read = traffic.read(MemoryTraffic::attribute, attributes + (round * 16 + 2) * 704, {1, 2});
     EXPECT_EQ(read.address, attributes + 2 * 704 + 32);
     EXPECT_EQ(read.bytes, 64U);
     EXPECT_EQ(read.origin.round, round);
@@ -251,7 +251,7 @@ TEST(AttributeTraffic, AFragmentWarpReadsEachPrimitiveOnce) {
   const AttributeTraffic traffic(context, AttributeFetch());
   const std::uint64_t attributes = address_map(*context.frame, context.format).attributes.address;
   AttributeTraffic::FragmentReads reads;
-  traffic.read_attributes(warp_of({{3, 0}, {3, 0}, {4, 0}, {3, 0}, {4, 0}, {4, 1}, {3, 0}, {4, 1}}), reads);
+  traffic.find_reads(warp_of({{3, 0}, {3, 0}, {4, 0}, {3, 0}, {4, 0}, {4, 1}, {3, 0}, {4, 1}}), reads);
   // 40 bytes lie in two sectors. Splat 3 begins at byte 2112 = 16 x 128 + 64; splat 4 at 2816 = 22 x 128; its second
   // triangle at 3168 = 24 x 128 + 96, in the last sector of a line.
   ASSERT_EQ(reads.count, 4U);
@@ -282,7 +282,7 @@ TEST(AttributeTraffic, ReadsTheSectorsOfAsManyBytesAsTheShaderWants) {
         expected.insert((attributes + std::uint64_t{704} * i + 352U * primitives.back().second + byte) / 32);
       }
     }
-    traffic.read_attributes(warp_of(primitives), reads);
+    traffic.find_reads(warp_of(primitives), reads);
     std::set<std::uint64_t> read;
     for (unsigned i = 0; i < reads.count; ++i) {
       ASSERT_EQ(reads.lines[i].address % 128, 0U);
@@ -295,6 +295,33 @@ TEST(AttributeTraffic, ReadsTheSectorsOfAsManyBytesAsTheShaderWants) {
     }
     ASSERT_EQ(read, expected) << bytes;
   }
+}
+
+// Colour is at 0, a quad after the other in Morton order: of RGBA16F four quads of 4x4 pixels are a line.
+TEST(AttributeTraffic, AFragmentWarpThatReadsColourReadsItsQuadsAndNoAttributes) {
+  Frame frame(64, 64);
+  frame.draw(testing::geometry_of(64, 64, boxes(2)), testing::alpha_threshold_state());
+  const RenderContext context = testing::context_of(frame);
+  const AttributeTraffic traffic(context, AttributeFetch());
+  Warp warp;
+  warp.tile = {1, 0};
+  for (const unsigned position : {0U, 9U, 2U, 1U, 63U})
+    warp.quads[warp.count++] = {0, static_cast<std::uint8_t>(position), all_lanes, 0, 0};
+  AttributeTraffic::FragmentReads reads;
+  traffic.find_reads(warp, reads);
+  EXPECT_TRUE(reads.traffic == MemoryTraffic::color);
+  ASSERT_EQ(reads.count, 3U);
+  const std::uint64_t tile = 16 * 128;
+  EXPECT_EQ(reads.lines[0].address, tile);
+  EXPECT_EQ(reads.lines[0].sectors, 0b1011U);
+  EXPECT_EQ(reads.lines[1].address, tile + 128);
+  EXPECT_EQ(reads.lines[1].sectors, 0b0001U);
+  EXPECT_EQ(reads.lines[2].address, tile + std::uint64_t{15} * 128);
+  EXPECT_EQ(reads.lines[2].sectors, 0b1000U);
+  const MemoryRequest request = traffic.read(reads.traffic, reads.lines[0].address, {0, 2});
+  EXPECT_EQ(request.address, tile);
+  EXPECT_EQ(request.bytes, 64U);
+  EXPECT_TRUE(request.origin.traffic == MemoryTraffic::color);
 }
 
 }  // namespace

@@ -66,6 +66,17 @@ inline DrawState pruned_at(float threshold) {
   return state;
 }
 
+/// Of a draw that sets the stencil to 1 where a pixel has come to the threshold.
+inline DrawState alpha_threshold_state(float threshold = 0.996F) {
+  DrawState state;
+  state.shader = FragmentShader::alpha_threshold;
+  state.termination_threshold = threshold;
+  state.stencil.test = true;
+  state.stencil.front.pass = StencilOperation::replace;
+  state.stencil.front.reference = 1;
+  return state;
+}
+
 /// Gives the context a frame whose draws have another state.
 inline void change_state(RenderContext& context, const std::function<void(DrawState&)>& change) {
   auto changed = std::make_shared<Frame>(*context.frame);

@@ -42,7 +42,8 @@ VRPIPE_MEMBERS(Counts, primitives, quads_rasterized, fragments_rasterized, quads
                fragments_depth_stencil_failed, quads_terminated, fragments_terminated, quads_unshaded,
                fragments_unshaded, quads_shaded, fragments_shaded, quads_pruned, fragments_pruned, quads_merged,
                fragments_merged, quads_dropped_late, fragments_dropped_late, quads_late_failed, fragments_late_failed,
-               quads_blended, fragments_blended, warps, tgc_flushes, tc_flushes, termination_updates)
+               quads_unblended, fragments_unblended, quads_blended, fragments_blended, warps, tgc_flushes, tc_flushes,
+               termination_updates)
 VRPIPE_MEMBERS(UnitReport, name, cycles, occupancy, parts)
 VRPIPE_MEMBERS(Bottleneck, unit, occupancy, parts)
 VRPIPE_MEMBERS(HistogramBucket, from, to, count)

@@ -91,6 +91,7 @@ struct Fates {
   std::uint64_t Counts::*merged;
   std::uint64_t Counts::*dropped_late;
   std::uint64_t Counts::*late_failed;
+  std::uint64_t Counts::*unblended;
   std::uint64_t Counts::*blended;
 };
 
@@ -98,12 +99,14 @@ constexpr Fates quad_fates{&Counts::quads_rasterized,  &Counts::quads_depth_sten
                            &Counts::quads_terminated,  &Counts::quads_unshaded,
                            &Counts::quads_shaded,      &Counts::quads_pruned,
                            &Counts::quads_merged,      &Counts::quads_dropped_late,
-                           &Counts::quads_late_failed, &Counts::quads_blended};
+                           &Counts::quads_late_failed, &Counts::quads_unblended,
+                           &Counts::quads_blended};
 constexpr Fates fragment_fates{&Counts::fragments_rasterized,  &Counts::fragments_depth_stencil_failed,
                                &Counts::fragments_terminated,  &Counts::fragments_unshaded,
                                &Counts::fragments_shaded,      &Counts::fragments_pruned,
                                &Counts::fragments_merged,      &Counts::fragments_dropped_late,
-                               &Counts::fragments_late_failed, &Counts::fragments_blended};
+                               &Counts::fragments_late_failed, &Counts::fragments_unblended,
+                               &Counts::fragments_blended};
 
 void add_fates(RunTable& table, const std::string& title, const Fates& fates, const std::vector<RunResult>& runs) {
   std::uint64_t largest = 0;
@@ -119,6 +122,7 @@ void add_fates(RunTable& table, const std::string& title, const Fates& fates, co
   table.counts("merged away", fates.merged, scale);
   table.counts("dropped late", fates.dropped_late, scale, false);
   table.counts("late failed", fates.late_failed, scale, false);
+  table.counts("not blended (no colour)", fates.unblended, scale, false);
   table.counts("blended", fates.blended, scale);
   if (runs.size() > 1) {
     const std::uint64_t before = runs.front().counts.*fates.blended;

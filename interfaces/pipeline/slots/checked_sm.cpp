@@ -10,6 +10,10 @@ class CheckedSm final : public CheckedSlot<SmBehaviour> {
  public:
   using CheckedSlot::CheckedSlot;
 
+  void attach(const ColorSurface& surface) override {
+    SmBehaviour::attach(surface);
+    ask("attach", [&] { checked_->attach(surface); });
+  }
   void shade(const Warp& warp, ShadedWarp& out) override {
     ShadedWarpPool* const pool = out.pool;
     ask("shade", [&] { checked_->shade(warp, out); });
@@ -52,7 +56,8 @@ class CheckedSm final : public CheckedSlot<SmBehaviour> {
     check_rate("vertex_warps", timing.vertex_warps);
     check_rate("warps_to_one_core", timing.warps_to_one_core, ~0U);
     if (timing.vertex.empty() || timing.fragment.empty()) fault("timing", "a shader program without a segment");
-    for (const auto* program : {&timing.vertex, &timing.fragment, &timing.merge}) {
+    for (const auto* program :
+         {&timing.vertex, &timing.fragment, &timing.mesh, &timing.alpha_threshold, &timing.merge}) {
       for (const ShaderSegment& segment : *program) {
         if (segment.instructions > longest_latency || segment.stall_cycles > longest_latency) {
           fault("timing", "a segment of {} instructions and {} cycles", segment.instructions, segment.stall_cycles);

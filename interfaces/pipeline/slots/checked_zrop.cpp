@@ -54,8 +54,12 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
       const bool stays = at < warp.count && warp.live[at] != 0 && (warp.live[at] & ~before.live[i]) == 0 &&
                          warp.position[at] == before.position[i] &&
                          warp.first_primitive[at] == before.first_primitive[i];
-      if (!stays) late_failed_.add(draw, 1);
-      late_failed_fragments_.add(draw, popcount(before.live[i]) - (stays ? popcount(warp.live[at]) : 0U));
+      if (stays && !writes_color(frame().draw_call(draw).state.shader)) {
+        fault("test_late", "position {} of {} goes on, of a draw that writes no colour", before.position[i],
+              words_of(before.tile));
+      }
+      if (!stays) lost_late_.add(draw, 1);
+      lost_late_fragments_.add(draw, popcount(before.live[i]) - (stays ? popcount(warp.live[at]) : 0U));
       at += stays ? 1U : 0U;
     }
     if (at != warp.count) {
@@ -101,8 +105,10 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
                    &checked_->fragments_unshaded},
                   lost_fragments_, "fragments did not come out");
     check_by_draw("quads_tested_late", {&checked_->quads_tested_late}, tested_late_, "quads came in");
-    check_by_draw("quads_late_failed", {&checked_->quads_late_failed}, late_failed_, "quads did not come out");
-    check_by_draw("fragments_late_failed", {&checked_->fragments_late_failed}, late_failed_fragments_,
+    check_by_draw("quads_late_failed + quads_unblended", {&checked_->quads_late_failed, &checked_->quads_unblended},
+                  lost_late_, "quads did not come out");
+    check_by_draw("fragments_late_failed + fragments_unblended",
+                  {&checked_->fragments_late_failed, &checked_->fragments_unblended}, lost_late_fragments_,
                   "fragments did not come out");
     check_counter("termination_updates", checked_->termination_updates.value(), updates_, "signals came in");
   }
@@ -112,8 +118,8 @@ class CheckedZrop final : public CheckedSlot<ZropBehaviour> {
   Seen lost_quads_;
   Seen lost_fragments_;
   Seen tested_late_;
-  Seen late_failed_;
-  Seen late_failed_fragments_;
+  Seen lost_late_;
+  Seen lost_late_fragments_;
   std::uint64_t updates_ = 0;
 };
 

@@ -17,8 +17,16 @@ enum class FragmentShader : std::uint8_t {
   splat,   ///< a Gaussian's alpha and colour; discards below the pruning threshold
   vertex,  ///< a mesh's interpolated vertex colours
   lit,     ///< the same, lit by a directional light
-  none     ///< nothing is shaded: depth and stencil alone are written
+  none,    ///< nothing is shaded: depth and stencil alone are written
+  /// Reads the alpha of the colour target at its pixel and discards where early termination would go on (paper IV-B). Writes
+  /// no colour: the stencil alone takes note of what is left.
+  alpha_threshold
 };
+/// Whether fragments read the colour target: then they see all that was blended before their draw.
+constexpr bool reads_color(FragmentShader shader) { return shader == FragmentShader::alpha_threshold; }
+constexpr bool writes_color(FragmentShader shader) {
+  return shader != FragmentShader::none && shader != FragmentShader::alpha_threshold;
+}
 
 /// Of the shader `lit`: colour times (ambient + (1 - ambient) max(0, n . l)).
 struct Light {
@@ -47,10 +55,14 @@ struct DrawState {
   FragmentShader shader = FragmentShader::splat;
   Light light;
 
+  /// The least alpha that terminates a pixel, in single precision.
+  float terminating_alpha() const;
   bool tests_depth_stencil() const { return depth.test || stencil.test; }
   bool writes_depth_stencil() const { return depth.writes() || stencil.writes(); }
   /// Whether the shader may drop fragments.
-  bool discards() const { return shader == FragmentShader::splat && pruning_threshold > 0; }
+  bool discards() const {
+    return (shader == FragmentShader::splat && pruning_threshold > 0) || shader == FragmentShader::alpha_threshold;
+  }
   /// Whether depth and stencil are tested after shading: a fragment that the shader drops leaves no trace in them.
   bool tests_late() const {
     return tests_depth_stencil() && shader != FragmentShader::none &&

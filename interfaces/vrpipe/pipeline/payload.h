@@ -211,6 +211,11 @@ struct HiZUpdate {
   std::uint32_t farthest = 0;  ///< depth stored at any of its pixels in the frame, as store_depth has it
 };
 
+/// CROP to DRAW: all that was drawn before a mark has been blended (BarrierPlan).
+struct BlendsDone {
+  Mark mark = Mark::none;
+};
+
 /// The GPC that owns a screen tile: neighbours go to different GPCs.
 constexpr unsigned owner_of(TileId tile, unsigned gpcs) {
   return gpcs == 1 ? 0 : (tile.x + tile.y * (gpcs / 2 + 1U)) % gpcs;

@@ -109,6 +109,7 @@ struct Counts {
   std::uint64_t quads_merged = 0, fragments_merged = 0;
   std::uint64_t quads_dropped_late = 0, fragments_dropped_late = 0;
   std::uint64_t quads_late_failed = 0, fragments_late_failed = 0;
+  std::uint64_t quads_unblended = 0, fragments_unblended = 0;  ///< passed late in draws that write no colour
   std::uint64_t quads_blended = 0, fragments_blended = 0;
   std::uint64_t warps = 0, tgc_flushes = 0, tc_flushes = 0, termination_updates = 0;
 

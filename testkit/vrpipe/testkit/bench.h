@@ -77,6 +77,7 @@ class Bench {
     for (const auto& [name, value] : settings) parameters->set(slot, name, value);
     std::unique_ptr<Behaviour> behaviour = found.make_behaviour(*parameters, context_);
     if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(framebuffer_.color);
+    if (auto* const sm = dynamic_cast<SmBehaviour*>(behaviour.get())) sm->attach(framebuffer_.color);
     if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get())) zrop->attach(framebuffer_.depth_stencil);
     behaviour->unit().set_draws(context.frame->draws().size());
     follow_clock(*behaviour, *clock_);
@@ -96,7 +97,7 @@ class Bench {
   Type& behaviour() {
     return dynamic_cast<Type&>(unit_->behaviour().unit());
   }
-  /// What a CROP blends into.
+  /// What a CROP blends into, and shaders read.
   ColorSurface& surface() { return framebuffer_.color; }
 
   /// A source connected to an input of the unit, or, without a port's name, to nothing yet.

@@ -7,6 +7,7 @@
 
 #include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
+#include <vrpipe/pipeline/surface.h>
 
 namespace vrpipe {
 
@@ -33,6 +34,8 @@ struct AttributeFetch {
 /// Slot `sm`: vertex and fragment shading, alpha pruning, quad merging.
 class SmBehaviour : public Behaviour {
  public:
+  /// Before the first warp: what shaders read that read colour (reads_color). One that overrides it calls it.
+  virtual void attach(const ColorSurface& surface) { surface_ = &surface; }
   /// Shades, prunes and merges: fills `out` but for its slot and its pool, which are the module's.
   virtual void shade(const Warp& warp, ShadedWarp& out) = 0;
   virtual void shade_vertices(const VertexWarp& warp) = 0;
@@ -49,6 +52,10 @@ class SmBehaviour : public Behaviour {
     std::vector<ShaderSegment> fragment;
     std::vector<ShaderSegment> merge;  ///< appended for a warp with pairs
     AttributeFetch fetch = {};
+    std::vector<ShaderSegment> mesh = {};             ///< the fragment program of meshes; none: `fragment`
+    std::vector<ShaderSegment> alpha_threshold = {};  ///< of FragmentShader::alpha_threshold; none: `fragment`
+    /// The fragment program of draws with a shader.
+    const std::vector<ShaderSegment>& fragment_program(FragmentShader shader) const;
     /// Fragment warps in flight in the array. Throws UserError if they are more than slots have numbers.
     std::uint32_t fragment_slots() const;
     /// Cycles for which an instruction of a warp has its scheduler.
@@ -66,6 +73,9 @@ class SmBehaviour : public Behaviour {
   DrawCounter quads_merged{*this, "quads_merged", "quads", "taken away by merging, one a pair with two live quads"};
   DrawCounter fragments_merged{*this, "fragments_merged", "fragments", "taken away by merging, where both are live"};
   Counter fragment_warps{*this, "fragment_warps", "warps", "of fragments"};
+
+ protected:
+  const ColorSurface* surface_ = nullptr;
 };
 
 /// The slot's SlotCheck.

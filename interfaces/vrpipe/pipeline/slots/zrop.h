@@ -47,7 +47,8 @@ class ZropBehaviour : public Behaviour {
   /// Returns which quads of the incoming beat have changed depth or stencil, a bit each.
   virtual std::uint32_t test(QuadBeat& beat) = 0;
   /// The test of depth and stencil after shading (DrawState::tests_late), of a warp whose live samples the shader has kept;
-  /// its quads are of one state and not merged. Removes samples that fail (ShadedWarp::keep).
+  /// its quads are of one state and not merged. Removes samples that fail (ShadedWarp::keep), and all where no colour is
+  /// written (writes_color): they end here.
   /// Returns which quads of the incoming warp have changed depth or stencil, a bit each.
   virtual std::uint32_t test_late(ShadedWarp& warp) = 0;
   /// Sets the termination bit (stencil MSB) of the signalled pixels, unless they have been cleared since: then the
@@ -79,6 +80,9 @@ class ZropBehaviour : public Behaviour {
                                 "that entered a test of depth or stencil after shading"};
   DrawCounter quads_late_failed{*this, "quads_late_failed", "quads", "that lost their last fragment to such a test"};
   DrawCounter fragments_late_failed{*this, "fragments_late_failed", "fragments", "that failed such a test"};
+  DrawCounter quads_unblended{*this, "quads_unblended", "quads",
+                              "that passed such a test in a draw that writes no colour: they end here"};
+  DrawCounter fragments_unblended{*this, "fragments_unblended", "fragments", "that passed such a test in such a draw"};
   DrawCounter quads_unshaded{*this, "quads_unshaded", "quads",
                              "that passed in a draw that shades nothing: they end here"};
   DrawCounter fragments_unshaded{*this, "fragments_unshaded", "fragments", "that passed in such a draw"};
