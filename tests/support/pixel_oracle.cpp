@@ -105,6 +105,7 @@ OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const Re
 std::vector<std::array<float, 4>> pixels_in_order(const Frame& frame, bool terminates) {
   std::vector<std::array<float, 4>> pixels(std::size_t{frame.width()} * frame.height());
   std::vector<bool> terminated(pixels.size());
+  std::vector<bool> ended(pixels.size());  // by a pass before
   for (const Frame::Command& command : frame.commands()) {
     if (!command.is_draw) {
       if (command.clear.color) pixels.assign(pixels.size(), {});
@@ -112,15 +113,20 @@ std::vector<std::array<float, 4>> pixels_in_order(const Frame& frame, bool termi
       continue;
     }
     const DrawCall& call = frame.draw_call(command.draw);
-    Draw part = *call.geometry;
-    part.splats.assign(part.splats.begin() + call.first, part.splats.begin() + call.first + call.splats);
-    const auto fragments = fragments_of(context_of(part, call.state));
-    const bool terminates_here = terminates && call.state.early_termination;
     const auto passes = [&](float alpha) {
       const float threshold = call.state.termination_threshold;
       return call.state.termination_inclusive ? alpha >= threshold : alpha > threshold;
     };
+    if (call.state.shader == FragmentShader::alpha_threshold) {
+      for (std::size_t i = 0; i < pixels.size(); ++i) ended[i] = ended[i] || passes(pixels[i][3]);
+      continue;
+    }
+    Draw part = *call.geometry;
+    part.splats.assign(part.splats.begin() + call.first, part.splats.begin() + call.first + call.splats);
+    const auto fragments = fragments_of(context_of(part, call.state));
+    const bool terminates_here = terminates && call.state.early_termination;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
+      if (call.state.stencil.test && ended[i]) continue;
       for (const OracleFragment& fragment : fragments[i]) {
         if (terminates_here && terminated[i]) continue;
         const float before = pixels[i][3];

@@ -31,7 +31,7 @@ std::vector<std::vector<OracleFragment>> fragments_of(const RenderContext& conte
 OraclePixel blend_exactly(const std::vector<OracleFragment>& fragments, const RenderContext& context);
 
 /// Every pixel of a frame as order alone makes it, of a target that does not round: bit for bit what CROP stores if
-/// nothing is merged.
+/// nothing is merged. Of stencils it knows those of a frame in passes (draw_in_passes).
 std::vector<std::array<float, 4>> pixels_in_order(const Frame& frame, bool terminates);
 
 /// The largest colour, not premultiplied, of a draw.

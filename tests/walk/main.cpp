@@ -56,6 +56,7 @@ Case shrunk(Case c, const std::string& rule, const Limits& limits) {
     without([&](Case& x) { x.parts[i].clear = {}; });
     without([&](Case& x) { x.parts.erase(x.parts.begin() + static_cast<std::ptrdiff_t>(i)); });
   }
+  while (c.passes > 1 && without([](Case& x) { --x.passes; })) {}
   for (std::size_t part = c.draw.splats.size() / 2; part > 0; part /= 2) {
     for (std::size_t first = 0; first + part <= c.draw.splats.size();) {
       const auto begin = static_cast<std::ptrdiff_t>(first);

@@ -91,7 +91,7 @@ std::vector<Finding> broken_draws(const RunResult& result) {
               n["quads_depth_stencil_failed"] + n["quads_terminated"] + n["quads_unshaded"] + n["quads_shaded"]);
     conserved("quads shaded", n["quads_shaded"],
               n["quads_pruned"] + n["quads_merged"] + n["quads_dropped_late"] + n["quads_late_failed"] +
-                  n["quads_blended"]);
+                  n["quads_unblended"] + n["quads_blended"]);
     conserved("fragments rasterized", n["fragments_rasterized"],
               n["fragments_depth_stencil_failed"] + n["fragments_terminated"] + n["fragments_unshaded"] +
                   n["fragments_shaded"]);
@@ -99,7 +99,7 @@ std::vector<Finding> broken_draws(const RunResult& result) {
     if (result.request.variant.quad_merging) continue;
     conserved("fragments shaded", n["fragments_shaded"],
               n["fragments_pruned"] + n["fragments_dropped_late"] + n["fragments_late_failed"] +
-                  n["fragments_blended"]);
+                  n["fragments_unblended"] + n["fragments_blended"]);
   }
   for (const auto& [name, count] : result.counts.named()) {
     if (sum.count(name) != 0 && sum[name] != count) {
@@ -242,7 +242,7 @@ class Judge {
   /// A target that does not round, without merging: every bit is known.
   void pixels(const RunResult& untimed) {
     const bool order_decides = !case_.variant.early_termination || case_.termination == Termination::strict;
-    if (case_.parts.empty() || case_.variant.quad_merging || !order_decides) return;
+    if (case_.is_single_draw() || case_.mixed_seed != 0 || case_.variant.quad_merging || !order_decides) return;
     if (case_.format != ColorFormat::rgba32f) return;
     for (const Setting& setting : case_.settings) {
       for (const char* other : {"exponential", "blend_rounding", "subpixel_bits", "previous_alpha_check"}) {
@@ -297,10 +297,11 @@ std::vector<Finding> broken_rules(const RunResult& result) {
   conserved("fragments rasterized", n.fragments_rasterized,
             n.fragments_depth_stencil_failed + n.fragments_terminated + n.fragments_unshaded + n.fragments_shaded);
   conserved("quads shaded", n.quads_shaded,
-            n.quads_pruned + n.quads_merged + n.quads_dropped_late + n.quads_late_failed + n.quads_blended);
+            n.quads_pruned + n.quads_merged + n.quads_dropped_late + n.quads_late_failed + n.quads_unblended +
+                n.quads_blended);
   conserved("fragments shaded", n.fragments_shaded,
             n.fragments_pruned + n.fragments_merged + n.fragments_dropped_late + n.fragments_late_failed +
-                n.fragments_blended);
+                n.fragments_unblended + n.fragments_blended);
 
   const auto none = [&](const char* what, std::uint64_t count) {
     if (count != 0) findings.push_back({"only what the variant does", fmt::format("{} {}", count, what)});

@@ -15,6 +15,7 @@
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/wiring.h>
+#include <vrpipe/workloads/multi_pass.h>
 
 #include "support/builders.h"
 #include "support/mixed_frames.h"
@@ -368,7 +369,7 @@ Frame Case::frame(std::size_t from) const {
   }
   Frame frame(draw.width, draw.height);
   const std::shared_ptr<const Draw> scene(&draw, [](const Draw*) {});
-  if (parts.empty()) frame.draw(scene, draw_state_of(request(Fidelity::functional)));
+  if (parts.empty()) draw_in_passes(frame, scene, draw_state_of(request(Fidelity::functional)), passes);
   const auto splats = static_cast<std::uint32_t>(draw.splats.size());
   for (std::size_t i = from; i < parts.size(); ++i) {
     const Part& part = parts[i];
@@ -421,11 +422,15 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   if (c.connects_z_caches && !c.refused && dice.chance(60)) draw_small_z_cache(dice, c.settings);
   c.inserts_l1s = dice.chance(25);
   if (c.inserts_l1s && !c.refused) draw_l1(dice, c.settings);
+  if (c.parts.empty() && c.draw.splats.size() > 1 && dice.chance(25)) {
+    c.passes = 2 + dice.below(std::min<std::size_t>(c.draw.splats.size(), 9) - 1);
+  }
   if (c.connects_z_caches || c.inserts_l1s) c.platform = &edited(*c.platform, c.connects_z_caches, c.inserts_l1s);
   if (!c.refused && dice.chance(20)) {
     c.mixed_seed = 1 + dice.below(1000000);
     c.draw = draw_of(testing::mixed_frame_width, testing::mixed_frame_height);
     c.parts.clear();
+    c.passes = 1;
   }
   return c;
 }
@@ -436,6 +441,7 @@ std::string describe(const Case& c) {
   if (c.mixed_seed != 0) text += fmt::format(", meshes and splats of seed {},", c.mixed_seed);
   if (c.connects_z_caches) text += ", z-caches connected,";
   if (c.inserts_l1s) text += ", L1s inserted,";
+  if (c.passes > 1) text += fmt::format(" {} passes", c.passes);
   for (const UnitChoice& unit : c.units) text += fmt::format(" {}={}", unit.slot, unit.implementation);
   for (const Setting& setting : c.settings) {
     text += fmt::format(" {}.{}={}", setting.unit, setting.parameter, setting.value);
@@ -459,6 +465,7 @@ std::string command_line(const Case& c, Fidelity fidelity, const std::string& sc
   std::string line =
       fmt::format("vrpipe run --scene {} --platform {} --variant {} --format {} --termination {} --fidelity {}", scene,
                   c.platform->name, c.variant.name, name_of(c.format), word_for(c.termination), name_of(fidelity));
+  if (c.passes > 1) line += fmt::format(" --multi-pass {}", c.passes);
   for (const UnitChoice& unit : c.units) line += fmt::format(" --unit {}={}", unit.slot, unit.implementation);
   for (const Setting& setting : c.settings) {
     line += fmt::format(" --set '{}.{}={}'", setting.unit, setting.parameter, setting.value);

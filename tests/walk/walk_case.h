@@ -35,7 +35,8 @@ struct Case {
   std::vector<UnitChoice> units;
   bool refused = false;  ///< the last setting lies outside its declared range
   Draw draw;
-  std::vector<Part> parts;  ///< the scene in several draws; none for a single one
+  std::vector<Part> parts;   ///< the scene in several draws; none for a single one
+  std::uint32_t passes = 1;  ///< of a single one: in which it is drawn (draw_in_passes)
   /// Meshes and splats of a seed, of random depth and stencil states, in place of the scene; 0 for none.
   std::uint64_t mixed_seed = 0;
 
@@ -45,9 +46,10 @@ struct Case {
   std::uint64_t stall_seed = 1;
 
   RunRequest request(Fidelity fidelity) const;
+  /// Whether there is nothing but the draw of the scene.
+  bool is_single_draw() const { return parts.empty() && passes == 1 && mixed_seed == 0; }
   /// The draws from a part on, which refer to the case's scene.
   Frame frame(std::size_t from = 0) const;
-  bool is_single_draw() const { return parts.empty() && mixed_seed == 0; }
   /// Whether a single draw says the same.
   bool is_mere_split() const;
 };

@@ -41,6 +41,9 @@ constexpr const char* machine_group = "On which GPU";
 constexpr const char* rules_group = "How exactly";
 constexpr const char* result_group = "Where results go";
 
+/// Each but the last is two draws.
+constexpr unsigned most_passes = most_draws / 2 + 1;
+
 const std::string variant_default = "het+qm";
 
 std::string names_of(const std::vector<Fidelity>& fidelities) {
@@ -182,10 +185,15 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
   }
 }
 
-void SimulationArguments::declare_frame(CLI::App& app) {
+void SimulationArguments::declare_frames(CLI::App& app) {
   add_option(app, "--frame", frame_, "FILE.json",
              "in place of --scene: clears and draws of scenes, each with a state of its\n"
              "own (docs/frames.md)",
+             scene_group);
+  add_option(app, "--multi-pass", passes_, "N",
+             "early termination by software: the splats in N batches, after each but the\n"
+             "last a draw that sets the stencil where a pixel has terminated (default: 1;\n"
+             "docs/early-termination.md)",
              scene_group);
 }
 
@@ -205,12 +213,18 @@ SceneRequest SimulationArguments::scene_request() const {
 
 FrameDescription SimulationArguments::frame() const {
   const auto file = single(frame_, "--frame");
-  if (!file) return frame_of_scene(single(scene_, "--scene").value_or(""));
+  if (!file) {
+    FrameDescription frame = frame_of_scene(single(scene_, "--scene").value_or(""));
+    if (const auto text = single(passes_, "--multi-pass"))
+      frame.passes = parse_count(*text, "--multi-pass", most_passes);
+    return frame;
+  }
   const auto refuse_with_frame = [](const Values& given, const char* option, const char* why) {
     if (!given.empty()) throw UserError("cannot use option", option, why, "leave out this or --frame");
   };
   refuse_with_frame(scene_, "--scene", "--frame says what is drawn");
   refuse_with_frame(meshes_, "--mesh", "--frame says what is drawn");
+  refuse_with_frame(passes_, "--multi-pass", "it splits the one draw of a scene, and --frame says what is drawn");
   refuse_with_frame(save_draw_, "--save-draw", "a draw list has one draw, and a frame may have several");
   return read_frame_file(*file);
 }

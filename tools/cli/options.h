@@ -35,8 +35,8 @@ class SimulationArguments {
   enum class Variants { one, all };
 
   void declare(CLI::App& app, Variants variants);
-  /// --frame, for commands that draw frames of several draws as well.
-  void declare_frame(CLI::App& app);
+  /// --frame and --multi-pass, for commands that draw frames of several draws as well.
+  void declare_frames(CLI::App& app);
   /// Loads the plugins and checks every option but the names of output files, which the commands know; `command` is the
   /// whole command line. Throws UserError.
   SimulationJob resolve(Variants variants, const std::vector<std::string>& command) const;
@@ -48,7 +48,7 @@ class SimulationArguments {
   std::shared_ptr<Trace> trace(const RunRequest& request) const;
 
   Values meshes_;
-  Values scene_, frame_, size_, camera_, eye_, look_at_, up_, fovy_;
+  Values scene_, frame_, passes_, size_, camera_, eye_, look_at_, up_, fovy_;
   Values platform_, settings_, variant_, units_, plugins_;
   Values fidelity_, format_, termination_;
   Values background_, output_, json_, save_draw_, jobs_;

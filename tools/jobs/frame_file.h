@@ -39,6 +39,7 @@ struct FrameCommand {
 struct FrameDescription {
   std::string name;  ///< in results: the scene's, or the file's without folder
   std::vector<FrameCommand> commands;
+  std::uint32_t passes = 1;  ///< in which the splats of a scene are drawn (draw_in_passes)
 };
 
 /// A frame of one draw.

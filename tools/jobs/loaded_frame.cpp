@@ -122,6 +122,7 @@ std::shared_ptr<const Frame> make_frame(const RunRequest& request, const FrameDe
     }
     const SceneDraw& draw = *command.draw;
     MixedFrameOptions options;
+    options.passes = description.passes;
     options.splats = draw_state_of(request, draw.settings);
     options.splats.early_termination = draw.early_termination;
     options.splats.late_tests = draw.late_tests;

@@ -92,6 +92,10 @@ JobResult perform(const SimulationJob& job) {
     preprocessed_here = loaded.preprocessed_here;
     result.width = loaded.width;
     result.height = loaded.height;
+    result.passes = job.frame.passes;
+    const auto frame_of = [&](const RunRequest& request) { return make_frame(request, job.frame, loaded); };
+    // What cannot be drawn is refused before anything is written.
+    for (const RunRequest& request : job.requests) static_cast<void>(frame_of(request));
     if (job.output) create_output_folder(*job.output, "--output");
     if (job.save_draw) {
       if (!loaded.meshes.front().empty()) {
@@ -102,7 +106,6 @@ JobResult perform(const SimulationJob& job) {
     }
 
     const auto simulation_start = std::chrono::steady_clock::now();
-    const auto frame_of = [&](const RunRequest& request) { return make_frame(request, job.frame, loaded); };
     const bool with_images = job.output.has_value();
     if (job.requests.size() == 1) {
       const RunRequest& request = job.requests.front();

@@ -54,6 +54,7 @@ struct JobResult {
   std::vector<Setting> preprocessing;  ///< what --set changed of it
   std::uint32_t width = 0;
   std::uint32_t height = 0;
+  std::uint32_t passes = 1;  ///< FrameDescription::passes
   std::vector<RunResult> runs;
   std::vector<std::optional<ImageFiles>> images;  ///< one for each run
   unsigned processes = 1;

@@ -281,6 +281,7 @@ std::string heading(const JobResult& result, const TextStyle& style) {
   text += style.bold(platform.name) + " (" + platform.description + ")\n";
   text += fmt::format("{} fidelity, {} colour, {} termination", vrpipe::name_of(request.fidelity),
                       vrpipe::name_of(request.format), name_of(request.termination));
+  if (result.passes > 1) text += fmt::format(", {} passes", result.passes);
   for (const std::vector<Setting>* settings : {&request.settings, &result.preprocessing}) {
     for (const Setting& setting : *settings) {
       text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);

@@ -277,6 +277,7 @@ Json result_json(const JobResult& result) {
                {"fidelity", vrpipe::name_of(request.fidelity)},
                {"format", vrpipe::name_of(request.format)},
                {"termination", name_of(request.termination)},
+               {"passes", result.passes},
                {"addresses", addresses_json(result.runs.front().framebuffer.addresses)},
                {"runs", std::move(runs)}});
   if (result.runs.size() > 1) {

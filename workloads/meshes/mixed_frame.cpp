@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/workloads/multi_pass.h>
 
 namespace vrpipe {
 namespace {
@@ -48,7 +49,8 @@ std::shared_ptr<Frame> mixed_frame(const Draw& splats, const std::vector<Draw>& 
 void draw_mixed(Frame& frame, std::shared_ptr<const Draw> splats,
                 const std::vector<std::shared_ptr<const Draw>>& meshes, const MixedFrameOptions& options,
                 const std::string& name, std::uint32_t first, std::uint32_t count) {
-  if (meshes.empty()) return frame.draw(std::move(splats), options.splats, name, first, count);
+  if (meshes.empty())
+    return draw_in_passes(frame, std::move(splats), options.splats, options.passes, name, first, count);
   check(options);
   const auto draw_meshes = [&](const DrawState& state, const std::string& what) {
     for (std::size_t i = 0; i < meshes.size(); ++i) {
@@ -58,7 +60,7 @@ void draw_mixed(Frame& frame, std::shared_ptr<const Draw> splats,
   draw_meshes(mesh_state(FragmentShader::none, {true, Compare::less, true}), "depth");
   DrawState splat_state = options.splats;
   splat_state.depth = {true, Compare::less, false};
-  frame.draw(std::move(splats), splat_state, name, first, count);
+  draw_in_passes(frame, std::move(splats), splat_state, options.passes, name, first, count);
   DrawState colour = mesh_state(options.mesh_shader, {true, Compare::equal, false});
   if (options.mesh_shader == FragmentShader::lit) colour.light = options.light;
   draw_meshes(colour, "colour");

@@ -13,6 +13,7 @@ namespace vrpipe {
 struct MixedFrameOptions {
   DrawState splats;                                  ///< but for its depth test, which mixed_frame() sets
   FragmentShader mesh_shader = FragmentShader::lit;  ///< `lit` or `vertex`
+  std::uint32_t passes = 1;                          ///< in which the splats are drawn (draw_in_passes)
   Light light{0.36F, -0.8F, -0.48F, 0.4F};           ///< from above right behind the viewer, where y points down
 };
 
