@@ -6,6 +6,18 @@
 
 namespace vrpipe {
 
+namespace {
+
+/// Puts quads into a warp in their order; returns how many go in.
+unsigned append(Warp& warp, const Quad* quads, unsigned count) {
+  const unsigned taken = std::min<unsigned>(count, quads_per_warp - warp.count);
+  std::copy_n(quads, taken, warp.quads.begin() + warp.count);
+  warp.count = static_cast<std::uint8_t>(warp.count + taken);
+  return taken;
+}
+
+}  // namespace
+
 PairingQru::PairingQru(const Parameters& parameters, const RenderContext& context)
     : context_(context),
       any_late_(context.frame->tests_late()),
@@ -64,9 +76,7 @@ unsigned PairingQru::examine(TileId tile, const Quad* quads, unsigned count, War
 }
 
 unsigned PairingQru::pass_by(const Quad* quads, unsigned count, Warp& out, bool& launched) {
-  const unsigned examined = std::min<unsigned>(count, quads_per_warp - warp_.count);
-  std::copy_n(quads, examined, warp_.quads.begin() + warp_.count);
-  warp_.count = static_cast<std::uint8_t>(warp_.count + examined);
+  const unsigned examined = append(warp_, quads, count);
   quads_examined += examined;
   launched = warp_.count == quads_per_warp;
   if (launched) launch(out);
@@ -108,9 +118,7 @@ void QruPassThrough::launch(Warp& out) {
 
 unsigned QruPassThrough::examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) {
   warp_.tile = tile;
-  const unsigned examined = std::min<unsigned>(count, quads_per_warp - warp_.count);
-  std::copy_n(quads, examined, warp_.quads.begin() + warp_.count);
-  warp_.count = static_cast<std::uint8_t>(warp_.count + examined);
+  const unsigned examined = append(warp_, quads, count);
   quads_examined += examined;
   launched = warp_.count == quads_per_warp;
   if (launched) launch(out);

@@ -17,32 +17,13 @@
 namespace vrpipe {
 namespace {
 
+using testing::expect_depth_stencil;
 using testing::mixed_frame_height;
 using testing::mixed_frame_width;
 using testing::random_mesh;
 using testing::random_splats;
 using testing::request_of;
 using testing::statistic;
-
-RunResult run(const RunRequest& request, const Frame& frame) {
-  fresh_simulation();
-  return simulate(request, frame);
-}
-
-void expect_depth_stencil(const RunResult& result, const testing::MixedReference& reference) {
-  const DepthStencilSurface& surface = result.framebuffer.depth_stencil;
-  unsigned wrong = 0;
-  for (std::uint32_t y = 0; y < reference.height; ++y) {
-    for (std::uint32_t x = 0; x < reference.width; ++x) {
-      const TileId tile{static_cast<std::uint16_t>(x / 16), static_cast<std::uint16_t>(y / 16)};
-      const DepthStencilQuad& quad = surface.quad(surface.grid().place(tile, (y % 16) / 2 * 8 + (x % 16) / 2));
-      const unsigned lane = y % 2 * 2 + x % 2;
-      const std::size_t index = std::size_t{y} * reference.width + x;
-      wrong += quad.depth[lane] != reference.depth[index] || quad.stencil[lane] != reference.stencil[index];
-    }
-  }
-  EXPECT_EQ(wrong, 0U);
-}
 
 std::uint64_t count(const RunResult& result, std::size_t draw, const std::string& name) {
   for (const auto& [each, value] : result.draws.at(draw).counts) {
@@ -89,23 +70,9 @@ Frame late_frame(std::uint64_t seed, const RunRequest& request) {
   return frame;
 }
 
-class LateFrame : public ::testing::TestWithParam<std::tuple<Fidelity, std::string>> {
- protected:
-  RunRequest request() const {
-    RunRequest request = request_of(std::get<1>(GetParam()), std::get<0>(GetParam()), testing::strictly);
-    // The fragment shader's, so that no fragment's fate depends on it.
-    request.settings = {{"state", "exponential", "exact"}};
-    return request;
-  }
-};
-INSTANTIATE_TEST_SUITE_P(Frame, LateFrame,
-                         ::testing::Combine(::testing::ValuesIn(fidelities()),
-                                            ::testing::Values("baseline", "qm", "het", "het+qm")),
-                         [](const auto& each) {
-                           const std::string& variant = std::get<1>(each.param);
-                           return name_of(std::get<0>(each.param)) +
-                                  ("_" + (variant == "het+qm" ? std::string("both") : variant));
-                         });
+class LateFrame : public testing::FidelityAndVariant {};
+INSTANTIATE_TEST_SUITE_P(Frame, LateFrame, testing::every_fidelity_and_variant(),
+                         testing::name_of_fidelity_and_variant);
 
 // Whatever terminates, and when: depth and stencil are the reference's to the bit.
 TEST_P(LateFrame, IsThatOfTheReference) {

@@ -17,14 +17,12 @@
 namespace vrpipe {
 namespace {
 
+using testing::expect_depth_stencil;
 using testing::expect_image;
 using testing::mixed_frame;
 using testing::MixedReference;
 using testing::random_frame;
 using testing::request_of;
-
-constexpr std::uint32_t width = testing::mixed_frame_width;
-constexpr std::uint32_t height = testing::mixed_frame_height;
 
 RenderContext context_of(const Frame& frame) { return testing::context_of(frame); }
 
@@ -34,21 +32,6 @@ std::uint64_t count(const DrawReport& draw, const std::string& name) {
   }
   ADD_FAILURE() << "no count " << name;
   return 0;
-}
-
-void expect_depth_stencil(const RunResult& result, const MixedReference& reference) {
-  const DepthStencilSurface& surface = result.framebuffer.depth_stencil;
-  unsigned wrong = 0;
-  for (std::uint32_t y = 0; y < height; ++y) {
-    for (std::uint32_t x = 0; x < width; ++x) {
-      const TileId tile{static_cast<std::uint16_t>(x / 16), static_cast<std::uint16_t>(y / 16)};
-      const DepthStencilQuad& quad = surface.quad(surface.grid().place(tile, (y % 16) / 2 * 8 + (x % 16) / 2));
-      const unsigned lane = y % 2 * 2 + x % 2;
-      const std::size_t index = std::size_t{y} * width + x;
-      wrong += quad.depth[lane] != reference.depth[index] || quad.stencil[lane] != reference.stencil[index];
-    }
-  }
-  EXPECT_EQ(wrong, 0U);
 }
 
 /// What Hi-Z culls would have failed; of a draw that is tested late it may have been pruned before.
@@ -76,28 +59,10 @@ void expect_counts(const RunResult& result, const MixedReference& reference) {
   }
 }
 
-class MixedFrame : public ::testing::TestWithParam<std::tuple<Fidelity, std::string>> {
- protected:
-  RunRequest request() const {
-    RunRequest request = request_of(std::get<1>(GetParam()), std::get<0>(GetParam()), testing::strictly);
-    // The fragment shader's, so that no fragment's fate depends on it.
-    request.settings = {{"state", "exponential", "exact"}};
-    return request;
-  }
-  static RunResult run(const RunRequest& request, const Frame& frame) {
-    fresh_simulation();
-    return simulate(request, frame);
-  }
-};
+class MixedFrame : public testing::FidelityAndVariant {};
 
-INSTANTIATE_TEST_SUITE_P(Frame, MixedFrame,
-                         ::testing::Combine(::testing::ValuesIn(fidelities()),
-                                            ::testing::Values("baseline", "qm", "het", "het+qm")),
-                         [](const auto& each) {
-                           const std::string& variant = std::get<1>(each.param);
-                           return name_of(std::get<0>(each.param)) +
-                                  ("_" + (variant == "het+qm" ? std::string("both") : variant));
-                         });
+INSTANTIATE_TEST_SUITE_P(Frame, MixedFrame, testing::every_fidelity_and_variant(),
+                         testing::name_of_fidelity_and_variant);
 
 TEST_P(MixedFrame, IsThatOfTheReference) {
   unsigned frames = 0;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -13,6 +14,7 @@
 
 #include "support/builders.h"
 #include "support/mixed_reference.h"
+#include "support/simulate.h"
 
 /// Random frames of meshes and splats, and what they come to.
 
@@ -149,6 +151,44 @@ inline void expect_image(const RunResult& result, const MixedReference& referenc
       }
     }
   }
+}
+
+/// That depth and stencil are the reference's to the bit.
+inline void expect_depth_stencil(const RunResult& result, const MixedReference& reference) {
+  const DepthStencilSurface& surface = result.framebuffer.depth_stencil;
+  unsigned wrong = 0;
+  for (std::uint32_t y = 0; y < reference.height; ++y) {
+    for (std::uint32_t x = 0; x < reference.width; ++x) {
+      const TileId tile{static_cast<std::uint16_t>(x / 16), static_cast<std::uint16_t>(y / 16)};
+      const DepthStencilQuad& quad = surface.quad(surface.grid().place(tile, (y % 16) / 2 * 8 + (x % 16) / 2));
+      const unsigned lane = y % 2 * 2 + x % 2;
+      const std::size_t index = std::size_t{y} * reference.width + x;
+      wrong += quad.depth[lane] != reference.depth[index] || quad.stencil[lane] != reference.stencil[index];
+    }
+  }
+  EXPECT_EQ(wrong, 0U);
+}
+
+/// Frames in strict termination, at each fidelity in each variant.
+class FidelityAndVariant : public ::testing::TestWithParam<std::tuple<Fidelity, std::string>> {
+ protected:
+  RunRequest request() const {
+    RunRequest request = request_of(std::get<1>(GetParam()), std::get<0>(GetParam()), strictly);
+    // The fragment shader's, so that no fragment's fate depends on it.
+    request.settings = {{"state", "exponential", "exact"}};
+    return request;
+  }
+  static RunResult run(const RunRequest& request, const Frame& frame) {
+    fresh_simulation();
+    return simulate(request, frame);
+  }
+};
+inline auto every_fidelity_and_variant() {
+  return ::testing::Combine(::testing::ValuesIn(fidelities()), ::testing::Values("baseline", "qm", "het", "het+qm"));
+}
+inline std::string name_of_fidelity_and_variant(const ::testing::TestParamInfo<FidelityAndVariant::ParamType>& each) {
+  const std::string& variant = std::get<1>(each.param);
+  return name_of(std::get<0>(each.param)) + ("_" + (variant == "het+qm" ? std::string("both") : variant));
 }
 
 }  // namespace vrpipe::testing
