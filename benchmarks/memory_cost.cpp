@@ -74,6 +74,8 @@ double seconds(const Draw& draw, const Platform& platform, const Variant& varian
   request.platform = &platform;
   request.variant = variant;
   request.fidelity = fidelity;
+  // Nothing of its result waits for them.
+  if (fidelity == Fidelity::functional) request.effects.with = {"l2.contents", "dram.accesses"};
   fresh_simulation();
   return simulate(request, draw).cpu_seconds;
 }

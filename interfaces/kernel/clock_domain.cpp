@@ -64,7 +64,7 @@ void ClockDomain::set_tick_order(std::vector<unsigned> order) {
 void ClockDomain::start_of_simulation() {
   const bool any_own_time = std::any_of(outside_ports_.begin(), outside_ports_.end(),
                                         [](OutsidePort* port) { return port->meets_own_time(); });
-  if (any_own_time) cycles_per_activation_ = 1;
+  if (any_own_time && (!keeps_step_ || keeps_step_())) cycles_per_activation_ = 1;
   event_.notify(sc_core::SC_ZERO_TIME);
 }
 

@@ -29,6 +29,7 @@ EarlyCompletionMemory* memory_of_clock(tlm::tlm_initiator_socket<32>& socket, co
 }  // namespace
 
 EarlyCompletionMemory* early_completion_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
+  if (clock.passes_sockets()) return nullptr;
   EarlyCompletionMemory* const memory = memory_of_clock(socket, clock);
   return memory != nullptr && memory->completes_early() ? memory : nullptr;
 }

@@ -36,7 +36,10 @@ struct SectoredCache::Shadow {
 };
 
 SectoredCache::SectoredCache(const CacheOrganization& organization, SectoredCacheStatistics& statistics)
-    : organization_(organization), replacement_(organization.replacement), statistics_(&statistics) {
+    : organization_(organization),
+      replacement_(organization.replacement),
+      statistics_(&statistics),
+      details_(statistics.has_details()) {
   organization.check("cache", "cache", "bytes");
   ways_ = organization.ways_of_a_set();
   line_shift_ = log2_of(organization.line_bytes);
@@ -52,7 +55,7 @@ SectoredCache::SectoredCache(const CacheOrganization& organization, SectoredCach
   if (organization.write_allocate == WriteAllocate::byte_mask) {
     byte_masks_.resize(lines_.size() * mask_words(organization));
   }
-  if (organization.tells_conflicts && organization.sets() > 1) {
+  if (organization.tells_conflicts && organization.sets() > 1 && details_) {
     CacheOrganization of_one_set = organization;
     of_one_set.ways = 0;
     of_one_set.replacement = Replacement::lru;
@@ -71,7 +74,7 @@ SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evic
   if (set.pinned == ways_) throw std::logic_error("a line was allocated in a set of which every line is pinned");
   ++allocated_;
   ++statistics_->line_misses;
-  statistics_->lines_pinned.see(set.pinned);
+  if (details_) statistics_->lines_pinned.see(set.pinned);
   evicted = {};
   Line line;
   if (set.held < ways_) {
@@ -79,6 +82,7 @@ SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evic
     ++set.held;
     statistics_->most_lines_held.see(++held_);
   } else {
+    if (before_eviction_) before_eviction_();
     line = victim(index);
     if (set.kept != 0 && kept_[line]) {
       const Line other = victim_not_kept(index);
@@ -96,7 +100,7 @@ SectoredCache::Line SectoredCache::allocate(std::uint64_t address, Evicted& evic
   }
   Entry& entry = lines_[line];
   entry.tag = tag;
-  entry.were_there = &were_there_.of(tag);
+  entry.were_there = details_ ? &were_there_.of(tag) : everything_.data();
   Line& chain = chains_[chain_of(tag)];
   entry.next = chain;
   chain = line;

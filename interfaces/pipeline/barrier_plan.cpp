@@ -4,7 +4,8 @@
 
 namespace vrpipe {
 
-BarrierPlan::BarrierPlan(const Frame& frame) {
+BarrierPlan::BarrierPlan(const RenderContext& context) {
+  const Frame& frame = *context.frame;
   Mark last = Mark::none;   // the mark before the command, or one before that
   bool is_written = false;  // since the last barrier
   for (std::size_t at = 0; at < frame.commands().size(); ++at) {
@@ -22,6 +23,7 @@ BarrierPlan::BarrierPlan(const Frame& frame) {
     }
     is_written = is_written || writes_color(shader);
   }
+  if (is_used() && !EffectGate(context, "draw.barriers").enter()) marks_.clear();
 }
 
 bool BarrierPlan::is_barrier(Mark mark) const { return std::binary_search(marks_.begin(), marks_.end(), mark); }

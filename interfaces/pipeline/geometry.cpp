@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <iterator>
 
 namespace vrpipe {
@@ -88,24 +90,25 @@ bool box_corners(const RenderContext& context, const DrawState& state, const Spl
 bool snap_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
                    SnappedTriangle& out) {
   const DrawCall& call = context.draw(draw);
-  std::array<Point, 3> points;
-  if (call.geometry->is_mesh()) {
-    const std::array<MeshVertex, 3>& given = call.mesh_triangle(splat).vertices;
-    for (unsigned vertex = 0; vertex < 3; ++vertex) points[vertex] = {given[vertex].x, given[vertex].y};
-  } else if (const ScreenTriangle* const given = call.triangle(splat)) {
-    for (unsigned vertex = 0; vertex < 3; ++vertex) points[vertex] = {given->x[vertex], given->y[vertex]};
-  } else {
-    std::array<Point, 4> corners;
-    if (!box_corners(context, call.state, call.splat(splat), corners)) return false;
-    constexpr unsigned order[2][3] = {{0, 1, 2}, {1, 3, 2}};
-    for (unsigned vertex = 0; vertex < 3; ++vertex) points[vertex] = corners[order[triangle][vertex]];
-  }
-  if (!std::all_of(points.begin(), points.end(), in_guard_band)) return false;
   const auto steps = static_cast<double>(1U << context.precision.subpixel_bits);
-  for (unsigned vertex = 0; vertex < 3; ++vertex) {
-    out.x[vertex] = snap(points[vertex].x, steps);
-    out.y[vertex] = snap(points[vertex].y, steps);
+  const auto put = [&](unsigned vertex, const Point& point) {
+    out.x[vertex] = snap(point.x, steps);
+    out.y[vertex] = snap(point.y, steps);
+  };
+  const bool is_mesh = call.geometry->is_mesh();
+  if (const ScreenTriangle* const given = call.triangle(splat); is_mesh || given != nullptr) {
+    for (unsigned vertex = 0; vertex < 3; ++vertex) {
+      const MeshVertex* const of_mesh = is_mesh ? &call.mesh_triangle(splat).vertices[vertex] : nullptr;
+      const Point point = is_mesh ? Point{of_mesh->x, of_mesh->y} : Point{given->x[vertex], given->y[vertex]};
+      if (!in_guard_band(point)) return false;
+      put(vertex, point);
+    }
+    return true;
   }
+  std::array<Point, 4> corners;
+  if (!box_corners(context, call.state, call.splat(splat), corners)) return false;
+  constexpr unsigned order[2][3] = {{0, 1, 2}, {1, 3, 2}};
+  for (unsigned vertex = 0; vertex < 3; ++vertex) put(vertex, corners[order[triangle][vertex]]);
   return true;
 }
 
@@ -133,9 +136,15 @@ PixelRect covered_bounds(const SnappedTriangle& t, unsigned subpixel_bits, std::
 }
 
 bool is_finite(const Splat& splat) {
-  const float fields[] = {splat.cx, splat.cy,  splat.ax,    splat.ay,   splat.bx,     splat.by,
-                          splat.r,  splat.red, splat.green, splat.blue, splat.opacity};
-  return std::all_of(std::begin(fields), std::end(fields), [](float field) { return std::isfinite(field); });
+  // Of all fields but the depth, by their exponents: all at once, since every splat is asked for.
+  constexpr unsigned fields = sizeof(Splat) / sizeof(std::uint32_t);
+  constexpr std::uint32_t exponent = 0x7f800000;
+  std::uint32_t bits[fields];
+  std::memcpy(bits, &splat, sizeof bits);
+  bits[offsetof(Splat, depth) / sizeof(std::uint32_t)] = 0;
+  std::uint32_t any = 0;
+  for (const std::uint32_t each : bits) any |= (each & exponent) == exponent ? 1U : 0U;
+  return any == 0;
 }
 
 bool is_finite(const MeshTriangle& triangle) {
@@ -160,11 +169,11 @@ Culling cull_triangle(const RenderContext& context, DrawIndex draw, std::uint32_
   if (!snap_triangle(context, draw, splat, triangle, snapped)) return Culling::not_finite;
   if (doubled_area(snapped) == 0) return Culling::zero_area;
   const DrawCall& call = context.draw(draw);
+  bounds = covered_bounds(snapped, context.precision.subpixel_bits, context.frame->width(), context.frame->height());
   if (call.state.cull != CullMode::none &&
       is_back_face(*call.geometry, snapped) == (call.state.cull == CullMode::back) && call.geometry->is_mesh()) {
     return Culling::facing;
   }
-  bounds = covered_bounds(snapped, context.precision.subpixel_bits, context.frame->width(), context.frame->height());
   return bounds.empty() ? Culling::outside : Culling::none;
 }
 

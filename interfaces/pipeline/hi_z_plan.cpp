@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <vrpipe/pipeline/effects.h>
+
 namespace vrpipe {
 
 namespace {
@@ -58,6 +60,10 @@ HiZPlan::HiZPlan(const RenderContext& context) {
     has_stored_since = has_stored_since || now.reports;
     any = any || now.culls;
     draws_[command.draw] = now;
+  }
+  if (any && !EffectGate(context, "raster.hi_z").enter()) {
+    any = false;
+    waits_.clear();
   }
   if (!any) draws_.clear();
   // What nobody can use any more is not reported.

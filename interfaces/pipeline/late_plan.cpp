@@ -2,13 +2,14 @@
 
 #include <algorithm>
 
+#include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/hi_z_plan.h>
 
 namespace vrpipe {
 
 LatePlan::LatePlan(const RenderContext& context) {
   const Frame& frame = *context.frame;
-  if (!frame.tests_late()) return;
+  if (!frame.tests_late() || !EffectGate(context, "zrop.late_tests").enter()) return;
   const HiZPlan hi_z(context);
   late_.resize(frame.draws().size());
   // Of late draws that nothing has waited for:

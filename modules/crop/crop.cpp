@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include <fmt/format.h>
+
+#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
@@ -11,7 +14,13 @@ namespace vrpipe {
 template <ColorFormat Format, BlendRounding Rounding>
 ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const RenderContext& context)
     : context_(context),
-      several_draws_(context.frame->draws().size() > 1),
+      termination_gate_(context, "zrop.termination"),
+      late_drops_gate_(context, "crop.late_drops"),
+      rounding_loss_gate_(context, "crop.rounding_loss"),
+      saturation_gate_(context, "crop.saturation"),
+      several_draws_gate_(context, "draw.several_draws"),
+      cache_order_gate_(context, "crop.cache_order"),
+      watches_saturation_(saturation_gate_.is_active()),
       checks_previous_(parameters.previous_alpha_check),
       timing_{Rate::of_bytes(parameters.bytes_per_cycle, 4 * bytes_per_pixel(Format)),
               parameters.input_quads,
@@ -29,6 +38,9 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
               parameters.cache.hash_sets,
               parameters.cache.tell_conflicts} {
   timing_.check_cache(Format);
+  if (!EffectGate(context, "cache.details").is_active()) cache_statistics.leave_out_details();
+  several_draws_ =
+      several_draws_gate_.is_active() || (context.frame->draws().size() > 1 && several_draws_gate_.enter());
   if (!context.frame->draws().empty()) set_draw(0);
 }
 
@@ -36,9 +48,9 @@ template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::set_draw(DrawIndex draw) {
   const DrawState& state = context_.state(draw);
   draw_ = draw;
-  signals_ = state.early_termination;
+  signals_ = state.early_termination && termination_gate_.enter();
   threshold_ = state.terminating_alpha();
-  drops_late_ = state.early_termination && context_.termination == Termination::strict;
+  drops_late_ = state.early_termination && context_.termination == Termination::strict && late_drops_gate_.enter();
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
@@ -53,6 +65,7 @@ void ColorRop<Format, Rounding>::pass(Mark mark) {
   const Clear* const clear = context_.frame->clear_of(mark);
   if (clear == nullptr) return;
   const ScreenTiling& grid = surface_->grid();
+  if (clear->color) check_end();
   for (std::size_t tile = 0; tile < grid.tiles(); ++tile) {
     if (!context_.placement.owns(grid.tile(tile))) continue;
     const auto first = static_cast<std::ptrdiff_t>(tile * positions_per_tile);
@@ -68,9 +81,25 @@ void ColorRop<Format, Rounding>::pass(Mark mark) {
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
+void ColorRop<Format, Rounding>::check_end() {
+  if constexpr (largest_color < std::numeric_limits<float>::infinity()) {
+    if (watches_saturation_ || surface_ == nullptr) return;
+    for (std::size_t place = 0; place < surface_->grid().quads(); ++place) {
+      const QuadColor& quad = surface_->quad(place);
+      const LaneBits saturated =
+          (quad.red >= largest_color) | (quad.green >= largest_color) | (quad.blue >= largest_color);
+      if (sign_mask(saturated) != 0 && !saturation_gate_.enter()) return;
+    }
+  }
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
   if (!cache_) {
-    cache_.emplace(timing_.cache(), cache_statistics);
+    CacheOrganization organization = timing_.cache();
+    if (!cache_order_gate_.is_active()) organization.replacement = Replacement::random;  // which keeps no order
+    cache_.emplace(organization, cache_statistics);
+    if (!cache_order_gate_.is_active()) cache_->before_eviction([this] { cache_order_gate_.enter(); });
     sectors_of_quads_ = sectors_of_quads(timing_.cache(), 4 * bytes_per_pixel(Format));
   }
   const std::uint64_t tile = surface_->address(warp.tile, 0);
@@ -119,6 +148,7 @@ void ColorRop<Format, Rounding>::count_anomalies(std::size_t place, LaneMask liv
 
   const LaneBits lost = lanes & (stored.alpha == destination.alpha) & ~passes(stored.alpha);
   if (sign_mask(lost) == 0) return;
+  if (lost_to_rounding_.empty() && !rounding_loss_gate_.enter()) return;
   if (lost_to_rounding_.empty()) lost_to_rounding_.assign(surface_->grid().quads(), splat_lanes(1.0F));
   Lanes& transmittance = lost_to_rounding_[place];
   fragments_lost_to_rounding += popcount(sign_mask(lost));
@@ -171,9 +201,11 @@ template <ColorFormat Format, BlendRounding Rounding>
   }
   unsigned anomaly = sign_mask(alpha == previous) & ~passed;
   if constexpr (largest_color < std::numeric_limits<float>::infinity()) {
-    const unsigned red_green = sign_mask(blended.red_green >= largest_color);
-    const unsigned blue = sign_mask(blended.blue_alpha >= largest_color);
-    anomaly |= red_green | red_green >> 4U | blue;  // alpha, in the upper bits, is none of it
+    if (watches_saturation_) {
+      const unsigned red_green = sign_mask(blended.red_green >= largest_color);
+      const unsigned blue = sign_mask(blended.blue_alpha >= largest_color);
+      anomaly |= red_green | red_green >> 4U | blue;  // alpha, in the upper bits, is none of it
+    }
   }
   if ((anomaly & live) != 0) count_anomalies(place, live, color, before.red_green, before.blue_alpha);
   return {static_cast<LaneMask>(signalled), changed};
@@ -232,6 +264,91 @@ const SlotRegistrar slot{{"crop", 100, "color-rop", "", true, check_crop}};
   Registry::instance().add(std::move(implementation));
   return true;
 }();
+
+const EffectRegistrar late_drops{
+    {"crop",
+     "late_drops",
+     "",
+     EffectKind::functional,
+     "strict termination: fragments whose pixel CROP finds terminated are dropped there",
+     "termination is not strict, or no draw terminates early",
+     "a mask of terminated pixels for each quad of the target",
+     "where a draw begins that terminates early in strict order",
+     {},
+     [](const EffectQuestion& asked) {
+       if (asked.facts.terminating == 0) return EffectDecision::omit("no draw terminates early");
+       if (asked.context.termination != Termination::strict) return EffectDecision::omit("termination is not strict");
+       return EffectDecision::keep(fmt::format("{} draws terminate early, in strict order", asked.facts.terminating));
+     }}};
+const EffectRegistrar rounding_loss{
+    {"crop",
+     "rounding_loss",
+     "color-rop",
+     EffectKind::functional,
+     "the anomaly counters of fragments and pixels whose alpha is lost to rounding",
+     "until a fragment's is",
+     "the transmittance of what was lost, for each pixel of the target",
+     "at the first such fragment",
+     {},
+     [](const EffectQuestion&) { return EffectDecision::watch("fragments whose alpha is lost to rounding"); }}};
+const EffectRegistrar saturation{
+    {"crop",
+     "saturation",
+     "color-rop",
+     EffectKind::functional,
+     "the anomaly counter of colours beyond the format's largest",
+     "no colour of the frame is larger than 1/16 of that: blending front to back sums weights up to 1, and what "
+     "rounding "
+     "adds to a pixel whose alpha is stuck ends below 4 times the largest colour",
+     "two comparisons for each quad that is blended",
+     "at the end of the frame, and before a clear: no stored colour is that large",
+     {},
+     [](const EffectQuestion& asked) {
+       if (asked.context.format == ColorFormat::rgba32f) return EffectDecision::omit("RGBA32F has no largest colour");
+       const double largest = asked.context.format == ColorFormat::rgba8 ? 1.0 : static_cast<double>(half_max);
+       const auto here = static_cast<double>(asked.facts.largest_color);
+       const std::string numbers = fmt::format("colours up to {:.3g}; the format's largest is {:g}", here, largest);
+       return here <= largest / 16 ? EffectDecision::omit(numbers) : EffectDecision::keep(numbers);
+     }}};
+const EffectRegistrar blend_hazard{
+    {"crop",
+     "blend_hazard",
+     "",
+     EffectKind::timing,
+     "a quad waits until an overlapping one has left the blending pipeline",
+     "crop.forwarding is on: it takes the value in the pipeline",
+     "a list of the quads in the pipeline, looked through for each quad",
+     "before a quad is blended without forwarding",
+     {},
+     [](const EffectQuestion& asked) {
+       const auto* const crop = dynamic_cast<const CropParameters*>(&asked.parameters);
+       if (crop == nullptr) return EffectDecision::keep("the unit is not of this library");
+       if (crop->forwarding) return EffectDecision::omit("crop.forwarding=on");
+       return EffectDecision::keep(fmt::format("crop.forwarding=off, {} cycles", std::uint32_t{crop->latency_cycles}));
+     }}};
+
+const EffectRegistrar cache_order{
+    {"crop",
+     "cache_order",
+     "color-rop",
+     EffectKind::timing,
+     "which line of the colour cache goes for another",
+     "the lines of all screen tiles that primitives touch fit in the cache, which is fully associative; or there is no "
+     "time",
+     "the order in which lines were used",
+     "where a line is to go",
+     {},
+     [](const EffectQuestion& asked) {
+       if (!asked.counts_work && !asked.memory_connected)
+         return EffectDecision::omit("nobody asks for what the cache misses");
+       if (asked.counts_work && !asked.has_time) return EffectDecision::keep("the bound follows from what goes");
+       const CacheOrganization cache = asked.as<CropParameters>().cache.organization();
+       const std::uint64_t bytes = screen_tile_pixels * screen_tile_pixels * bytes_per_pixel(asked.context.format);
+       const std::uint64_t touched = asked.facts.tiles_touched * (bytes / cache.line_bytes);
+       const std::string numbers = fmt::format("at most {} lines are touched, and {} held", touched, cache.lines());
+       if (cache.sets() > 1) return EffectDecision::keep(fmt::format("{} sets: {}", cache.sets(), numbers));
+       return touched <= cache.lines() ? EffectDecision::omit(numbers) : EffectDecision::keep(numbers);
+     }}};
 
 }  // namespace
 

@@ -79,6 +79,7 @@ class ColorRop : public CropBehaviour {
   Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) override;
   void blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) override;
   void look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) override;
+  void check_end() override;
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override { cache_->make_dirty(line, sectors); }
   TimingParameters timing() const override { return timing_; }
 
@@ -114,11 +115,18 @@ class ColorRop : public CropBehaviour {
                                          LanePair blue_alpha);
 
   const RenderContext& context_;
-  const bool several_draws_;
+  bool several_draws_ = false;
   DrawIndex draw_ = 0;  ///< that is blended, with its state:
   bool signals_ = false;
   float threshold_ = 0;  ///< that alpha reaches to be terminated
   bool drops_late_ = false;
+  EffectGate termination_gate_;
+  EffectGate late_drops_gate_;
+  EffectGate rounding_loss_gate_;
+  EffectGate saturation_gate_;
+  EffectGate several_draws_gate_;
+  EffectGate cache_order_gate_;
+  const bool watches_saturation_;
   /// By quad, in strict termination: the pixels that were signalled.
   std::vector<LaneMask> terminated_;
   /// By quad, once a fragment was lost to rounding: transmittance of those that were; negative once counted as stuck.

@@ -24,7 +24,8 @@ class TimedCrop : public TimedUnit {
         in_(*this, "in_color",
             [this](const ShadedWarpItem& item, CycleInterval visible) { return take(*item.warp, visible); }, {&out_}),
         behaviour_(std::move(behaviour)),
-        barriers_(*context.frame),
+        barriers_(context),
+        hazard_gate_(context, "crop.blend_hazard"),
         timing_(behaviour_->timing()),
         // A hazard is one of quads.
         at_once_(timing_.forwards ? quads_looked_up_at_once(timing_) : 1),
@@ -111,7 +112,7 @@ class TimedCrop : public TimedUnit {
       charge(UnitState::blocked, out_.last());
       there = out_.last();
     }
-    const Cycle hazard = timing_.forwards ? 0 : hazard_until(warp.tile, warp.position[from]);
+    const Cycle hazard = timing_.forwards || !hazard_gate_.enter() ? 0 : hazard_until(warp.tile, warp.position[from]);
     // Moving a sector takes time from blending, from when it moves.
     for (; !moves_.empty() && moves_.front().at <= std::max({there, hazard, blending_.next()}); moves_.pop()) {
       blending_.take(moves_.front().at, moves_.front().sectors * timing_.blend_rate.items);
@@ -196,6 +197,7 @@ class TimedCrop : public TimedUnit {
   TimedIn<ShadedWarpItem> in_;
   std::unique_ptr<CropBehaviour> behaviour_;
   const BarrierPlan barriers_;
+  EffectGate hazard_gate_;
   const CropBehaviour::TimingParameters timing_;
   const unsigned at_once_;  ///< quads looked up before the first of them is blended
   TimedCachePort memory_;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
@@ -29,7 +30,9 @@ class CropUnit : public Unit {
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         signals_(context.frame->terminates_early()),
-        barriers_(*context.frame),
+        barriers_(context),
+        hazard_gate_(context, "crop.blend_hazard"),
+        cache_order_gate_(context, "crop.cache_order"),
         price_(std::int64_t{timing_.blend_rate.cycles} * timing_.sectors_per_cycle),
         sector_price_(timing_.blend_rate.items),
         income_(static_cast<std::int64_t>(CropWork::parts_of_a_cycle(timing_))),
@@ -62,7 +65,10 @@ class CropUnit : public Unit {
     if (surface_ == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     line_shift_ = static_cast<unsigned>(__builtin_ctz(timing_.line_bytes));
     timing_.check_cache(surface_->format());
-    port_.make_cache(timing_.cache(), dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics);
+    CacheOrganization organization = timing_.cache();
+    if (!cache_order_gate_.is_active()) organization.replacement = Replacement::random;  // which keeps no order
+    port_.make_cache(organization, dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics);
+    if (!cache_order_gate_.is_active()) port_.cache().before_eviction([this] { cache_order_gate_.enter(); });
     sectors_of_quads_ = sectors_of_quads(timing_.cache(), 4 * bytes_per_pixel(surface_->format()));
     sectors_of_a_quad_ = static_cast<unsigned>(__builtin_popcount(sectors_of_quads_.front().sectors));
     monitor_.emplace(surface_->width(), surface_->height());
@@ -73,19 +79,17 @@ class CropUnit : public Unit {
     const unsigned position = quad.position();
     const std::size_t tile = surface_->grid().place(quad.warp->tile, 0);
     const auto [line_of_tile, sectors] = sectors_of_quads_[position];
-    wanted_.address = surface_->address(tile) + (std::uint64_t{line_of_tile} << line_shift_);
-    wanted_.sectors = sectors;
-    const bool done = port_.look_up(wanted_, now(), [this](unsigned moved) {
-      tokens_ -= moved * sector_price_;
-      did(CropWork::sectors, moved, now());
-    });
-    if (!done) return false;
-    const SectoredCache::Line line = wanted_.line;
-    if (const std::uint32_t on_their_way = port_.awaited(line, sectors) & ~wanted_.asked_for; on_their_way != 0) {
+    const std::uint64_t address = surface_->address(tile) + (std::uint64_t{line_of_tile} << line_shift_);
+    SectoredCache::Line line =
+        wanted_.line == SectoredCache::no_line ? port_.pin_held(address, sectors) : SectoredCache::no_line;
+    std::uint32_t asked_for = 0;
+    if (line == SectoredCache::no_line) {
+      line = fill(address, sectors, asked_for);
+      if (line == SectoredCache::no_line) return false;
+    }
+    if (const std::uint32_t on_their_way = port_.awaited(line, sectors) & ~asked_for; on_their_way != 0) {
       hits_on_their_way_ += static_cast<unsigned>(__builtin_popcount(on_their_way));
     }
-    wanted_.line = SectoredCache::no_line;
-    wanted_.asked_for = 0;
     // In place: a temporary of narrow stores would be waited for when it is copied.
     Entry& entry = queue_.push();
     entry.quad = quad;
@@ -93,6 +97,19 @@ class CropUnit : public Unit {
     entry.sectors = sectors;
     entry.place = static_cast<std::uint32_t>(tile + position);
     return true;
+  }
+
+  /// Goes on with the look-up of the quad at the link; `no_line` while it has to wait.
+  [[gnu::noinline]] SectoredCache::Line fill(std::uint64_t address, std::uint32_t sectors, std::uint32_t& asked_for) {
+    wanted_.address = address;
+    wanted_.sectors = sectors;
+    const bool done = port_.look_up(wanted_, now(), [this](unsigned moved) {
+      tokens_ -= moved * sector_price_;
+      did(CropWork::sectors, moved, now());
+    });
+    if (!done) return SectoredCache::no_line;
+    asked_for = std::exchange(wanted_.asked_for, 0);
+    return std::exchange(wanted_.line, SectoredCache::no_line);
   }
 
   bool accept() {
@@ -165,7 +182,7 @@ class CropUnit : public Unit {
         stop_ = UnitState::busy;  // with the quads before it, or with moving sectors
         break;
       }
-      if (!timing_.forwards) {
+      if (!timing_.forwards && hazard_gate_.enter()) {
         if (hazard(entry.place, now)) {
           stop_ = UnitState::latency;
           break;
@@ -251,6 +268,8 @@ class CropUnit : public Unit {
   const CropBehaviour::TimingParameters timing_;
   const bool signals_;
   const BarrierPlan barriers_;
+  EffectGate hazard_gate_;
+  EffectGate cache_order_gate_;
   const std::int64_t price_;         ///< of blending a quad, in tokens
   const std::int64_t sector_price_;  ///< of moving a sector
   const std::int64_t income_;        ///< of a cycle: what so many quads, or so many sectors, cost

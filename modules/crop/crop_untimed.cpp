@@ -20,7 +20,7 @@ class UntimedCrop : public UntimedUnit {
         out_done_(*this, "out_done"),
         in_(input<ShadedWarpItem>("in_color", [this](const ShadedWarpItem& item) { take(*item.warp); })),
         behaviour_(std::move(behaviour)),
-        barriers_(*context.frame),
+        barriers_(context),
         timing_(behaviour_->timing()),
         organization_(timing_.cache()),
         looked_up_at_once_(quads_looked_up_at_once(timing_)),

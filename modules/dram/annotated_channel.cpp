@@ -15,10 +15,12 @@ Cycle beyond(Cycle cycles, Cycle hidden) { return parts * (cycles - std::min(cyc
 
 }  // namespace
 
-AnnotatedChannel::AnnotatedChannel(const DramTiming& timing, DramStatistics& statistics)
+AnnotatedChannel::AnnotatedChannel(const DramTiming& timing, DramStatistics& statistics, EffectGate refresh)
     : timing_(timing),
       statistics_(statistics),
-      refresh_cycles_(timing.refresh ? timing.rp_all + timing.rfc : 0),
+      refresh_gate_(std::move(refresh)),
+      refreshes_(timing.refresh && !refresh_gate_.is_silenced()),
+      refresh_cycles_(refreshes_ ? timing.rp_all + timing.rfc : 0),
       read_row_cycle_(std::max(timing.rc, timing.ras + timing.rp + timing.activate - 1)),
       write_row_cycle_(std::max(read_row_cycle_, timing.activate - 1 + timing.rcd + timing.cwl + timing.dqss +
                                                      timing.burst + timing.wr + timing.rp)),
@@ -44,7 +46,7 @@ Cycle AnnotatedChannel::working(Cycle cycle) const {
 }
 
 Cycle AnnotatedChannel::real(Cycle working) const {
-  if (!timing_.refresh || working < timing_.refi) return working;
+  if (!refreshes_ || working < timing_.refi) return working;
   const Cycle between = timing_.refi - refresh_cycles_;
   const Cycle rest = working - timing_.refi;
   return (rest / between + 1) * timing_.refi + refresh_cycles_ + rest % between;
@@ -184,7 +186,9 @@ void AnnotatedChannel::drain() {
 
 void AnnotatedChannel::close(Cycle end) {
   statistics_.channel_cycles += end;
-  statistics_.refreshes += refreshes_before(end);
+  const std::uint64_t refreshes = refreshes_before(end);
+  if (refreshes > 0) refresh_gate_.enter();
+  statistics_.refreshes += refreshes;
 }
 
 }  // namespace vrpipe

@@ -10,6 +10,7 @@
 #include "dram_statistics.h"
 
 #include <vrpipe/memory/bandwidth.h>
+#include <vrpipe/pipeline/effects.h>
 
 namespace vrpipe {
 
@@ -23,7 +24,8 @@ namespace vrpipe {
 class AnnotatedChannel {
  public:
   /// `statistics` outlive it, and may be shared.
-  AnnotatedChannel(const DramTiming& timing, DramStatistics& statistics);
+  /// @param refresh  the gate of dram.refresh
+  AnnotatedChannel(const DramTiming& timing, DramStatistics& statistics, EffectGate refresh = {});
 
   /// The first cycle before which all data of a read has come that is asked for in a cycle. `present` never decreases,
   /// and is the cycle of the clock that the bursts' cycles may be ahead of.
@@ -55,7 +57,7 @@ class AnnotatedChannel {
     bool is_read = false, is_written = false;  ///< since the last drain
   };
 
-  std::uint64_t refreshes_before(Cycle cycle) const { return timing_.refresh ? cycle / timing_.refi : 0; }
+  std::uint64_t refreshes_before(Cycle cycle) const { return refreshes_ ? cycle / timing_.refi : 0; }
   /// Cycles without those of refreshes, and back.
   Cycle working(Cycle cycle) const;
   Cycle real(Cycle working) const;
@@ -74,6 +76,8 @@ class AnnotatedChannel {
 
   const DramTiming timing_;
   DramStatistics& statistics_;
+  EffectGate refresh_gate_;
+  bool refreshes_;
   Cycle refresh_cycles_;                    ///< of a period, in which nothing else happens
   Cycle read_row_cycle_, write_row_cycle_;  ///< that a bank is taken by a row, at least
   // What the bus idles for, in parts of a cycle.

@@ -45,7 +45,7 @@ AnnotatedDram::AnnotatedDram(const sc_core::sc_module_name& name, ClockDomain& d
       settings_(behaviour.settings()),
       clock_(domain, settings_.tck_ps, settings_.controller_ps) {
   for (unsigned index = 0; index < settings_.channels; ++index)
-    channels_.emplace_back(settings_.timing, statistics.channels);
+    channels_.emplace_back(settings_.timing, statistics.channels, behaviour.refresh_gate());
   for (unsigned index = 0; index < ports; ++index) ports_.push_back(std::make_unique<Port>(index, *this));
 }
 

@@ -116,7 +116,7 @@ ClockedDram::ClockedDram(const sc_core::sc_module_name& name, ClockDomain& domai
       clock_(domain, settings_.tck_ps, settings_.controller_ps),
       due_(settings_.channels, never) {
   for (unsigned index = 0; index < settings_.channels; ++index)
-    channels_.emplace_back(settings_.timing, statistics.channels);
+    channels_.emplace_back(settings_.timing, statistics.channels, behaviour_.refresh_gate());
   for (unsigned index = 0; index < ports; ++index) ports_.push_back(std::make_unique<Port>(index, *this));
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
@@ -16,7 +18,8 @@ DramSettings::DramSettings(const DramParameters& parameters)
       tck_ps(parameters.tck_ps),
       controller_ps(parameters.controller_ps) {}
 
-Dram::Dram(const DramParameters& parameters, const RenderContext& context) : settings_(parameters), timing_{} {
+Dram::Dram(const DramParameters& parameters, const RenderContext& context)
+    : settings_(parameters), refresh_gate_(context, "dram.refresh"), timing_{} {
   const DramTiming& t = settings_.timing;
   // That of a row hit.
   const std::uint64_t least_ps = (t.cl + t.burst) * settings_.tck_ps + settings_.controller_ps;
@@ -51,7 +54,8 @@ std::vector<OccupancyPart> Dram::least_occupancy(double period_ps) const {
   for (const Channel& channel : channels_) {
     // The last of what is written may stay in the queue.
     Cycle cycles = (channel.bursts - std::min<std::uint64_t>(channel.bursts, t.write_queue)) * t.burst;
-    if (t.refresh) cycles += cycles / t.refi * t.rfc;
+    const Cycle refreshes = t.refresh ? cycles / t.refi : 0;
+    if (refreshes > 0 && EffectGate(refresh_gate_).enter()) cycles += refreshes * t.rfc;
     most = std::max(most, cycles);
   }
   return {{"data", 0, static_cast<double>(most * settings_.tck_ps) / period_ps, true}};
@@ -72,6 +76,43 @@ Implementation implementation(const char* name, const char* description, const D
   return made;
 }
 
+const EffectRegistrar accesses{{"dram",
+                                "accesses",
+                                "",
+                                EffectKind::timing,
+                                "the DRAM: rows, banks, queues and buses of its channels",
+                                "there is no time (functional)",
+                                "the DRAM",
+                                "none is needed: without it nothing of a frame's result asks for it",
+                                {"dram"},
+                                [](const EffectQuestion& asked) {
+                                  if (!asked.counts_work)
+                                    return EffectDecision::omit("without time nothing waits for it");
+                                  return EffectDecision::keep("what the cache above has never held, is fetched");
+                                }}};
+const EffectRegistrar refresh{
+    {"dram",
+     "refresh",
+     "",
+     EffectKind::timing,
+     "refreshes, in which a channel does nothing else",
+     "dram.refresh=off, or until the first falls due; at `bound`, approximately: their share of the time",
+     "nothing: it takes a comparison to know",
+     "at the first refresh",
+     {},
+     [](const EffectQuestion& asked) {
+       const auto* const parameters = dynamic_cast<const DramParameters*>(&asked.parameters);
+       if (!asked.counts_work) return EffectDecision::omit("there is no time at this fidelity");
+       if (parameters == nullptr) return EffectDecision::keep("the DRAM is not of this library");
+       const DramParameters& dram = *parameters;
+       if (!dram.refresh) return EffectDecision::omit("dram.refresh=off");
+       const double us = 1e-6 * static_cast<double>(dram.trefi_ps);
+       if (asked.has_time) return EffectDecision::watch(fmt::format("every {:.3g} us", us));
+       const double share = 100.0 * static_cast<double>(dram.trfc_ps) / static_cast<double>(dram.trefi_ps);
+       return EffectDecision::bound(fmt::format("at most {:.2g} % of the cycles: {:.3g} us in each {:.3g} us", share,
+                                                1e-6 * static_cast<double>(dram.trfc_ps), us));
+     }}};
+
 const SlotRegistrar slot{{"dram", 120, "lpddr3-1600", "", true, nullptr, true}};
 
 [[maybe_unused]] const bool registered = [] {
@@ -82,6 +123,17 @@ const SlotRegistrar slot{{"dram", 120, "lpddr3-1600", "", true, nullptr, true}};
   return true;
 }();
 
+// Not decided: why stands in place of a predicate.
+const EffectRegistrar bank_conflicts{{"dram",
+                                      "bank_conflicts",
+                                      "",
+                                      EffectKind::timing,
+                                      "a row has to be closed before another of its bank is opened",
+                                      "which rows are open depends on the order of requests in time",
+                                      "the state of each bank",
+                                      "",
+                                      {},
+                                      nullptr}};
 }  // namespace
 
 }  // namespace vrpipe

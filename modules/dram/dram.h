@@ -41,6 +41,8 @@ class Dram final : public MemoryBehaviour {
 
   const MemoryTrafficCounters& traffic() const { return traffic_; }
   const DramSettings& settings() const { return settings_; }
+  /// Of dram.refresh, for timing models.
+  const EffectGate& refresh_gate() const { return refresh_gate_; }
 
  private:
   struct Channel {
@@ -49,6 +51,7 @@ class Dram final : public MemoryBehaviour {
     std::size_t next = 0;
   };
   const DramSettings settings_;
+  EffectGate refresh_gate_;
   TimingParameters timing_;
   std::vector<Channel> channels_;  ///< without time
   MemoryTrafficCounters traffic_{*this};

@@ -10,12 +10,13 @@ DramChannel::Queue::Queue(unsigned capacity) : entries(capacity) {
   for (std::size_t i = 0; i < capacity; ++i) entries[i].next = static_cast<std::uint16_t>(i + 1);
 }
 
-DramChannel::DramChannel(const DramTiming& timing, DramStatistics& statistics)
+DramChannel::DramChannel(const DramTiming& timing, DramStatistics& statistics, EffectGate refresh)
     : timing_(timing),
       statistics_(statistics),
       reads_(timing.read_queue),
       writes_(timing.write_queue),
-      next_refresh_(timing.refresh ? timing.refi : never) {}
+      next_refresh_(timing.refresh && !refresh.is_silenced() ? timing.refi : never),
+      refresh_gate_(std::move(refresh)) {}
 
 std::uint16_t DramChannel::take_place(Queue& queue, const DramAddress& place, Cycle now) {
   const std::uint16_t index = queue.free;
@@ -417,6 +418,7 @@ void DramChannel::close_bank(Bank& bank, Cycle at, Cycle distance) {
 }
 
 void DramChannel::refresh(Cycle at) {
+  refresh_gate_.enter();
   ++statistics_.refreshes;
   next_refresh_ += timing_.refi;
   for (unsigned bank = 0; bank < timing_.banks; ++bank) {

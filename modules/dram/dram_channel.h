@@ -9,6 +9,7 @@
 #include "dram_statistics.h"
 
 #include <vrpipe/kernel/ring.h>
+#include <vrpipe/pipeline/effects.h>
 
 namespace vrpipe {
 
@@ -45,7 +46,8 @@ class DramChannel {
     std::uint32_t tag;
   };
   /// `statistics` outlive it, and may be shared.
-  DramChannel(const DramTiming& timing, DramStatistics& statistics);
+  /// @param refresh  the gate of dram.refresh
+  DramChannel(const DramTiming& timing, DramStatistics& statistics, EffectGate refresh = {});
 
   void observe(DramCommandObserver& observer) { observer_ = &observer; }
 
@@ -181,6 +183,7 @@ class DramChannel {
       activated_{};  ///< the first cycles in which the last four allow the fourth after them, in a ring
   unsigned oldest_activate_ = 0;
   Cycle next_refresh_;
+  EffectGate refresh_gate_;
   Cycle all_precharged_ = 0;  ///< what was closed last can be refreshed
   Cycle command_bus_ = 0;     ///< is free from then on
   Cycle now_ = 0;             ///< of the last command or burst

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
+#include <vrpipe/pipeline/barrier_plan.h>
+#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
@@ -35,6 +39,35 @@ namespace {
 const SlotRegistrar slot{{"draw", 10, "vertex-issue", "", false, check_draw}};
 const Registrar<VertexIssue, DrawBehaviour> registrar("draw", "vertex-issue", "issues sorted splats as vertex warps",
                                                       false, Trust::trusted);
+const EffectRegistrar barriers{{"draw",
+                                "barriers",
+                                "",
+                                EffectKind::functional,
+                                "a draw that reads the colour target waits until all before it is blended",
+                                "no draw reads what another has written (BarrierPlan)",
+                                "the link crop.done",
+                                "in BarrierPlan, of which DRAW, TC and CROP each have one",
+                                {"crop.done"},
+                                [](const EffectQuestion& asked) {
+                                  if (BarrierPlan(asked.context).is_used())
+                                    return EffectDecision::keep(
+                                        fmt::format("{} draws read the colour target", asked.facts.reading_color));
+                                  return EffectDecision::omit("no draw reads what another has written");
+                                }}};
+const EffectRegistrar several_draws{
+    {"draw",
+     "several_draws",
+     "",
+     EffectKind::functional,
+     "quads of several draws in a warp, of a state each, and counts by draw",
+     "the frame has one draw",
+     "the number of its draw with each shaded quad",
+     "at elaboration, where there are more",
+     {},
+     [](const EffectQuestion& asked) {
+       const std::string draws = fmt::format("{} draw{}", asked.facts.draws, asked.facts.draws == 1 ? "" : "s");
+       return asked.facts.draws <= 1 ? EffectDecision::omit(draws) : EffectDecision::keep(draws);
+     }}};
 }  // namespace
 
 }  // namespace vrpipe

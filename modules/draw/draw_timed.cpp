@@ -14,7 +14,7 @@ class TimedDraw : public TimedUnit {
       : TimedUnit(name, domain, DrawWork::kinds(), transport),
         behaviour_(std::move(behaviour)),
         schedule_(behaviour_->warps_per_1024_cycles()),
-        barriers_(*context.frame) {
+        barriers_(context) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<TimedOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
       in_done_.push_back(std::make_unique<TimedIn<BlendsDone>>(*this, "in_done_" + std::to_string(gpc),

@@ -15,7 +15,7 @@ class DrawUnit : public Unit {
       : Unit(name, domain, DrawWork::kinds()),
         behaviour_(std::move(behaviour)),
         schedule_(behaviour_->warps_per_1024_cycles()),
-        barriers_(*context.frame) {
+        barriers_(context) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<StreamOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
       in_done_.push_back(std::make_unique<StreamIn<BlendsDone>>(*this, "in_done_" + std::to_string(gpc)));

@@ -3,8 +3,11 @@
 #include "l2/fixed_latency.h"
 #include "l2/sectored_l2.h"
 
+#include <fmt/format.h>
+
 #include <vrpipe/component/error.h>
 #include <vrpipe/model/memory_unit.h>
+#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
@@ -47,6 +50,30 @@ std::unique_ptr<MemoryUnit> make(const std::string& name, ClockDomain& domain, s
   return std::make_unique<AnnotatedL2>(name.c_str(), domain, std::move(l2), ports);
 }
 
+EffectDecision keep_with_surfaces(const EffectQuestion& asked, std::uint64_t bytes) {
+  if (!asked.counts_work) return EffectDecision::omit("without time nothing waits for it");
+  const AddressMap& map = asked.facts.addresses;
+  return EffectDecision::keep(fmt::format("surfaces and buffers of {:.1f} MB, a cache of {:.1f} MB",
+                                          1e-6 * static_cast<double>(map.attributes.end()),
+                                          1e-6 * static_cast<double>(bytes)));
+}
+Effect contents(const CacheLevel& level) {
+  return {level.slot,
+          "contents",
+          "sectored-cache",
+          EffectKind::timing,
+          "what the cache holds and misses, and what that costs",
+          "there is no time (functional)",
+          "the cache, and all that is looked up there",
+          "none is needed: without it nothing of a frame's result asks for it",
+          {level.slot},
+          [](const EffectQuestion& asked) {
+            return keep_with_surfaces(asked, asked.as<SectoredL2Parameters>().cache.organization().bytes);
+          }};
+}
+const EffectRegistrar l1_contents(contents(level_of_l1));
+const EffectRegistrar l2_contents(contents(level_of_l2));
+
 [[maybe_unused]] const bool registered = [] {
   for (const CacheLevel* level : {&level_of_l1, &level_of_l2}) {
     Registry::instance().add(sectored_cache(*level));
@@ -55,6 +82,27 @@ std::unique_ptr<MemoryUnit> make(const std::string& name, ClockDomain& domain, s
   return true;
 }();
 
+// Not decided: why stands in place of a predicate.
+const EffectRegistrar bank_conflicts{{"l2",
+                                      "bank_conflicts",
+                                      "sectored-cache",
+                                      EffectKind::timing,
+                                      "requests for one bank wait for one another",
+                                      "that none ever does is known only once they have been simulated",
+                                      "a queue for each bank",
+                                      "",
+                                      {},
+                                      nullptr}};
+const EffectRegistrar crossbar{{"l2",
+                                "crossbar",
+                                "sectored-cache",
+                                EffectKind::timing,
+                                "requests of several ports wait for one another",
+                                "as bank_conflicts; with one port bound, its queue and width still take time",
+                                "a queue for each port",
+                                "",
+                                {},
+                                nullptr}};
 }  // namespace
 
 }  // namespace vrpipe

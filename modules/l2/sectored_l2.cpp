@@ -52,6 +52,11 @@ SectoredL2::Sizes sizes_of(const SectoredL2Parameters& parameters) {
           parameters.header_bytes, parameters.port_requests,        parameters.arbitration == 1U};
 }
 
+SectoredCacheStatistics& followed(SectoredCacheStatistics& statistics, const RenderContext& context) {
+  if (!EffectGate(context, "cache.details").is_active()) statistics.leave_out_details();
+  return statistics;
+}
+
 CacheOrganization checked(const SectoredL2Parameters& parameters) {
   CacheOrganization organization = parameters.cache.organization();
   organization.write_allocate = static_cast<WriteAllocate>(static_cast<unsigned>(parameters.write_allocate));
@@ -89,7 +94,7 @@ SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderConte
                     {*this, "vertex_sector_misses", "sectors", "missed of these"}},
                    {{*this, "attribute_sectors", "sectors", "accessed of the attributes of shaded vertices"},
                     {*this, "attribute_sector_misses", "sectors", "missed of these"}}}},
-      cache_(checked(parameters), statistics_),
+      cache_(checked(parameters), followed(statistics_, context)),
       last_of_line_(cache_.organization().line_bytes - 1),
       sector_shift_(static_cast<unsigned>(__builtin_ctz(cache_.organization().sector_bytes))),
       bank_width_(sizes_.bank_bytes_per_cycle),

@@ -4,6 +4,7 @@
 #include "prop/reorder_buffer.h"
 
 #include <vrpipe/model/timed.h>
+#include <vrpipe/pipeline/early_tests.h>
 #include <vrpipe/pipeline/late_plan.h>
 
 namespace vrpipe {
@@ -21,7 +22,7 @@ class TimedProp : public TimedUnit {
       : TimedUnit(name, domain, PropWork::kinds(behaviour->timing()), transport),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
-        tests_(context.frame->needs_zrop()),
+        tests_(tests_before_shading(context)),
         plan_(context),
         out_test_(*this, "out_test"),
         out_survivors_(*this, "out_survivors"),

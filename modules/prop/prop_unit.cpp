@@ -4,6 +4,7 @@
 #include "prop/reorder_buffer.h"
 
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/early_tests.h>
 #include <vrpipe/pipeline/late_plan.h>
 
 namespace vrpipe {
@@ -32,7 +33,7 @@ class PropUnit : public Unit {
         tests_late_(plan_.is_used()),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
-        tests_(context.frame->needs_zrop()),
+        tests_(tests_before_shading(context)),
         there_{PropWork::bins, BatchLimit(timing_.quads_per_cycle)},
         back_{PropWork::tested, BatchLimit(timing_.quads_per_cycle)},
         order_(timing_.order, context),

@@ -1,5 +1,6 @@
 #include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/early_tests.h>
 #include <vrpipe/pipeline/late_plan.h>
 
 namespace vrpipe {
@@ -18,7 +19,7 @@ class UntimedProp : public UntimedUnit {
         out_late_(*this, "out_late"),
         in_late_(input<ShadedWarpItem>("in_late", [this](const ShadedWarpItem& item) { hand_on(item); })),
         in_tested_(input<BinItem>("in_tested", [this](const BinItem& item) { forward(item); })),
-        in_bins_(input<BinItem>("in_bins", [this, tests = context.frame->needs_zrop()](
+        in_bins_(input<BinItem>("in_bins", [this, tests = tests_before_shading(context)](
                                                const BinItem& item) { tests ? out_test_.send(item) : forward(item); })),
         in_shaded_(input<ShadedWarpItem>("in_shaded", [this](const ShadedWarpItem& item) { leave(item); })),
         plan_(context),

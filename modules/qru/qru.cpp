@@ -137,6 +137,16 @@ const Registrar<PairingQru, QruBehaviour> pairing("qru", "pairing", "pairs overl
                                                   false, Trust::trusted);
 const Registrar<QruPassThrough, QruBehaviour> pass_through("qru", "pass-through", "warps in the order of the quads",
                                                            true, Trust::trusted);
+const EffectRegistrar pairing_effect{{"qru",
+                                      "pairing",
+                                      "pairing",
+                                      EffectKind::functional,
+                                      "quad merging (QM): overlapping quads of a bin are blended as one",
+                                      "the variant does without, and its QRU passes through",
+                                      "the partial blend in the shader, and its instructions",
+                                      "in the SM array, where a warp has pairs",
+                                      {},
+                                      [](const EffectQuestion&) { return EffectDecision::keep("QRU pairs"); }}};
 }  // namespace
 
 }  // namespace vrpipe

@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
+#include <vrpipe/pipeline/frame_facts.h>
+
 namespace vrpipe {
 
 std::uint32_t top_of_step(DepthFormat format, unsigned bits, std::uint32_t stored) {
@@ -65,5 +69,26 @@ void HiZ::update(const HiZUpdate& update) {
     store(place, bound);
   }
 }
+
+namespace {
+const EffectRegistrar hi_z{
+    {"raster",
+     "hi_z",
+     "",
+     EffectKind::functional,
+     "raster tiles that lie behind all that is stored there are dropped before they are filled",
+     "no draw has its depth tested where something nearer may be stored (HiZPlan)",
+     "a bound for each raster tile, and the link zrop.hi_z that lowers them",
+     "in HiZPlan, of which DRAW, the rasteriser, TC and ZROP each have one",
+     {"zrop.hi_z"},
+     [](const EffectQuestion& asked) {
+       if (HiZPlan(asked.context).is_used())
+         return EffectDecision::keep(fmt::format("{} of {} draws test depth or stencil, and depth is stored",
+                                                 asked.facts.testing_depth_stencil, asked.facts.draws));
+       return EffectDecision::omit(asked.facts.testing_depth_stencil == 0
+                                       ? "no draw tests depth"
+                                       : "no draw tests depth where something nearer may be stored");
+     }}};
+}  // namespace
 
 }  // namespace vrpipe

@@ -5,7 +5,10 @@
 #include <cstddef>
 #include <cstring>
 
+#include <fmt/format.h>
+
 #include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
@@ -64,9 +67,14 @@ unsigned put_covered(Quad* out, Words quads, std::uint64_t coverage) {
 }  // namespace
 
 TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderContext& context)
-    : context_(context), timing_{parameters.setup_latency_cycles,        parameters.setup_interval_cycles,
-                                 parameters.coarse_tiles_per_cycle,      parameters.fine_tiles_per_cycle,
-                                 parameters.screen_tile_interval_cycles, parameters.quads_per_cycle} {
+    : context_(context),
+      timing_{parameters.setup_latency_cycles,        parameters.setup_interval_cycles,
+              parameters.coarse_tiles_per_cycle,      parameters.fine_tiles_per_cycle,
+              parameters.screen_tile_interval_cycles, parameters.quads_per_cycle},
+      wide_edges_gate_(context, "raster.wide_edges"),
+      binned_gate_(context, "tgc.binning"),
+      ownership_gate_(context, "raster.tile_ownership"),
+      shares_tiles_(context.placement.gpcs > 1 && ownership_gate_.enter()) {
   if (!parameters.hi_z) return;
   hi_z_ = std::make_unique<HiZ>(context, parameters.hi_z_bits);
   if (!hi_z_->is_used()) hi_z_.reset();
@@ -81,16 +89,18 @@ void TileRasterizer::update(const HiZUpdate& update) {
 void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   ++setups;
   primitive_ = primitive;
-  area_ = {std::max(primitive.bounds.x0, clip.x0), std::max(primitive.bounds.y0, clip.y0),
-           std::min(primitive.bounds.x1, clip.x1), std::min(primitive.bounds.y1, clip.y1)};
+  area_ = primitive.bounds;
   // A primitive covers nothing outside its bounds, so those need no masking.
   const bool whole = clip.x0 <= primitive.bounds.x0 && clip.y0 <= primitive.bounds.y0 &&
                      clip.x1 >= primitive.bounds.x1 && clip.y1 >= primitive.bounds.y1;
   const auto width = static_cast<std::int32_t>(context_.frame->width());
   const auto height = static_cast<std::int32_t>(context_.frame->height());
   mask_area_ = {0, 0, width, height};
-  if (!whole)
+  if (!whole && binned_gate_.enter()) {
+    area_ = {std::max(area_.x0, clip.x0), std::max(area_.y0, clip.y0), std::min(area_.x1, clip.x1),
+             std::min(area_.y1, clip.y1)};
     mask_area_ = {std::max(clip.x0, 0), std::max(clip.y0, 0), std::min(clip.x1, width), std::min(clip.y1, height)};
+  }
   tile_x_begin_ = area_.x0 / tile_side;
   tile_x_end_ = (area_.x1 - 1) / tile_side + 1;
   tile_y_ = area_.y0 / tile_side;
@@ -127,6 +137,7 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
     magnitudes |= std::abs(edge.origin) + std::abs(edge.dx) * width + std::abs(edge.dy) * height;
   }
   tests_hi_z_ = hi_z_ != nullptr && hi_z_->begin(primitive);
+  if (wide_ && !wide_edges_gate_.enter()) wide_ = false;
   if (wide_) ++wide_edges;
   widest_edge.see(static_cast<std::uint64_t>(65 - __builtin_clzll(static_cast<unsigned long long>(magnitudes))));
 }
@@ -149,7 +160,7 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
     const std::int32_t y = tile_y_ * tile_side + static_cast<std::int32_t>(part_ >> 1U) * raster_side;
     if (x >= area_.x1 || y >= area_.y1 || x + raster_side <= area_.x0 || y + raster_side <= area_.y0) continue;
     const TileId tile{static_cast<std::uint16_t>(tile_x_), static_cast<std::uint16_t>(tile_y_)};
-    if (!context_.placement.owns(tile)) continue;
+    if (shares_tiles_ && !context_.placement.owns(tile)) continue;
     ++coarse_tests;
     std::int64_t value[3];
     bool rejected = false;
@@ -275,6 +286,40 @@ namespace {
 const SlotRegistrar slot{{"raster", 40, "tile-rasterizer", "", true, check_raster}};
 const Registrar<TileRasterizer, RasterBehaviour> registrar(
     "raster", "tile-rasterizer", "fixed-point edge functions, 8x8 raster tiles, top-left rule", false, Trust::trusted);
+
+const EffectRegistrar wide_edges{
+    {"raster",
+     "wide_edges",
+     "tile-rasterizer",
+     EffectKind::functional,
+     "edge functions of large triangles, in 64 bits instead of 32",
+     "the largest primitive's edges change by less than 2^30 over a raster tile; else until one's do not",
+     "a sample-by-sample fill beside that of 32 bits",
+     "at set-up, where an edge is too steep for 32 bits",
+     {},
+     [](const EffectQuestion& asked) {
+       const double steps = 1U << asked.context.precision.subpixel_bits;
+       const double widest = static_cast<double>(narrow_gradient) / (steps * steps);
+       const double here = asked.facts.widest_edge;
+       const std::string numbers =
+           fmt::format("the widest edge is at most {:.0f} px; 32 bits hold {:.0f}", here, widest);
+       return here < widest ? EffectDecision::omit(numbers) : EffectDecision::watch(numbers);
+     }}};
+const EffectRegistrar tile_ownership{{"raster",
+                                      "tile_ownership",
+                                      "tile-rasterizer",
+                                      EffectKind::functional,
+                                      "screen tiles that belong to other GPCs: each rasterises its own",
+                                      "there is one GPC",
+                                      "a test of each screen tile",
+                                      "at elaboration, where there are others",
+                                      {},
+                                      [](const EffectQuestion& asked) {
+                                        const unsigned gpcs = asked.context.placement.gpcs;
+                                        if (gpcs == 1) return EffectDecision::omit("one GPC has all screen tiles");
+                                        return EffectDecision::keep(
+                                            fmt::format("{} GPCs share the screen tiles", gpcs));
+                                      }}};
 }  // namespace
 
 }  // namespace vrpipe

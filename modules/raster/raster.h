@@ -5,6 +5,7 @@
 #include "hi_z.h"
 
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/pipeline/units.h>
 
@@ -122,6 +123,10 @@ class TileRasterizer : public RasterBehaviour {
   bool tile_counted_ = false;
   std::unique_ptr<HiZ> hi_z_;  ///< where it can cull anything
   bool tests_hi_z_ = false;    ///< for the primitive
+  EffectGate wide_edges_gate_;
+  EffectGate binned_gate_;
+  EffectGate ownership_gate_;
+  const bool shares_tiles_;  ///< with other GPCs
 };
 
 }  // namespace vrpipe

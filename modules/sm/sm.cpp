@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
 #include <vrpipe/arithmetic/exp2.h>
+
 #include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
@@ -43,7 +46,14 @@ std::uint32_t threads_of(const Warp& warp, DrawIndex draw) {
 }  // namespace
 
 SplatShader::SplatShader(const Parameters& parameters, const RenderContext& context)
-    : context_(context), several_draws_(context.frame->draws().size() > 1), mesh_(context) {
+    : context_(context),
+      several_draws_gate_(context, "draw.several_draws"),
+      mesh_gate_(context, "sm.mesh_shading"),
+      color_reads_gate_(context, "sm.color_reads"),
+      pairing_gate_(context, "qru.pairing"),
+      several_draws_(several_draws_gate_.is_active() ||
+                     (context.frame->draws().size() > 1 && several_draws_gate_.enter())),
+      mesh_(context) {
   timing_.cores = parameters.cores;
   timing_.schedulers_per_core = parameters.schedulers_per_core;
   timing_.lanes_per_scheduler = parameters.lanes_per_scheduler;
@@ -145,7 +155,11 @@ void SplatShader::shade_mesh(const Warp& warp, WarpColors& colors) {
     return mesh_.shade(quad, static_cast<std::int32_t>(warp.tile.x * screen_tile_pixels) + 2 * (quad.position % row),
                        static_cast<std::int32_t>(warp.tile.y * screen_tile_pixels) + 2 * (quad.position / row));
   };
-  for (unsigned i = 0; i < warp.count; i += 2) {
+  const bool shades = mesh_gate_.enter();
+  if (!shades) {
+    for (auto& pair : colors.pairs) pair.red = pair.green = pair.blue = pair.alpha = LanePair{};
+  }
+  for (unsigned i = 0; shades && i < warp.count; i += 2) {
     const QuadColor first = color_of(warp.quads[i]);
     const QuadColor second = i + 1U < warp.count ? color_of(warp.quads[i + 1]) : QuadColor{};
     colors.pairs[i / 2] = {join(first.red, second.red), join(first.green, second.green), join(first.blue, second.blue),
@@ -155,13 +169,14 @@ void SplatShader::shade_mesh(const Warp& warp, WarpColors& colors) {
   colors.live = colors.covered;
 }
 
-void SplatShader::shade_by_alpha(const Warp& warp, WarpColors& colors) const {
+void SplatShader::shade_by_alpha(const Warp& warp, WarpColors& colors) {
+  const bool reads = color_reads_gate_.enter();
   const float threshold = context_.state(warp.quads[0].draw).terminating_alpha();
   for (unsigned i = 0; i < warp.count; ++i) {
     const Quad& quad = warp.quads[i];
     const Lanes alpha = surface_->quad(warp.tile, quad.position).alpha;
     colors.covered |= static_cast<unsigned>(quad.coverage) << (4 * i);
-    colors.live |= (quad.coverage & static_cast<unsigned>(sign_mask(alpha >= threshold))) << (4 * i);
+    colors.live |= (quad.coverage & (reads ? static_cast<unsigned>(sign_mask(alpha >= threshold)) : 0U)) << (4 * i);
   }
   for (auto& pair : colors.pairs) pair.red = pair.green = pair.blue = pair.alpha = LanePair{};
 }
@@ -202,6 +217,7 @@ void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp
   out.tile_sequence = warp.tile_sequence;
   out.mark = Mark::none;
   const unsigned last = warp.count - 1U;
+  const unsigned merge_pairs = warp.merge_pairs != 0 && pairing_gate_.enter() ? warp.merge_pairs : 0U;
   const std::uint32_t covered_of_warp = colors.covered;
   const std::uint32_t live_of_warp = colors.live;
   unsigned count = 0;
@@ -222,7 +238,7 @@ void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp
     const QuadColor back{second_of(red), second_of(green), second_of(blue), second_of(alpha)};
     const auto live_front = static_cast<LaneMask>(live_of_warp >> (4 * i) & all_lanes);
     const auto live_back = static_cast<LaneMask>(live_of_warp >> (4 * i + 4) & all_lanes);
-    if ((warp.merge_pairs >> (i / 2) & 1U) != 0 && live_front != 0 && live_back != 0) {
+    if ((merge_pairs >> (i / 2) & 1U) != 0 && live_front != 0 && live_back != 0) {
       put(warp.quads[i], static_cast<LaneMask>(live_front | live_back), blend_front_to_back(front, back));
       out.last_primitive[count - 1] = primitive_order(warp.quads[i + 1]);
       merged |= (unsigned{live_front} & live_back) << (4 * i + 4);
@@ -258,6 +274,90 @@ const SlotRegistrar slot{{"sm", 90, "splat-shader", "", true, check_sm}};
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
                                                     "Gaussian splatting shaders with alpha pruning and quad merging",
                                                     false, Trust::trusted);
+const EffectRegistrar mesh_shading{{"sm",
+                                    "mesh_shading",
+                                    "splat-shader",
+                                    EffectKind::functional,
+                                    "shaders of meshes: vertex attributes, interpolated perspective-correct, and light",
+                                    "no draw is of a mesh",
+                                    "planes of attributes for the triangles that were shaded last",
+                                    "before a warp of a mesh is shaded",
+                                    {},
+                                    [](const EffectQuestion& asked) {
+                                      const FrameFacts& facts = asked.facts;
+                                      if (facts.of_meshes == 0) return EffectDecision::omit("no draw is of a mesh");
+                                      return EffectDecision::keep(
+                                          fmt::format("{} of {} draws are of meshes", facts.of_meshes, facts.draws));
+                                    }}};
+const EffectRegistrar color_reads{{"sm",
+                                   "color_reads",
+                                   "splat-shader",
+                                   EffectKind::functional,
+                                   "shaders that read the colour target",
+                                   "no draw has one",
+                                   "a look at the target for each quad",
+                                   "before a warp with such a shader is shaded",
+                                   {},
+                                   [](const EffectQuestion& asked) {
+                                     const FrameFacts& facts = asked.facts;
+                                     if (facts.reading_color == 0)
+                                       return EffectDecision::omit("no shader reads the colour target");
+                                     return EffectDecision::keep(fmt::format("the shaders of {} of {} draws read it",
+                                                                             facts.reading_color, facts.draws));
+                                   }}};
+const EffectRegistrar attribute_fetch{
+    {"sm",
+     "attribute_fetch",
+     "",
+     EffectKind::timing,
+     "the traffic of vertices and attributes, and L1s",
+     "the SM array's memory port is bound to nothing, or at this fidelity to nothing that counts",
+     "L1s in the cores, and the memory port's accesses",
+     "before a vertex warp is shaded, where memory is connected",
+     {},
+     [](const EffectQuestion& asked) {
+       if (!asked.memory_connected)
+         return EffectDecision::omit(asked.counts_work ? "the SM array's memory port is bound to nothing"
+                                                       : "no memory is followed at this fidelity");
+       const AddressMap& map = asked.facts.addresses;
+       return EffectDecision::keep(fmt::format("{:.1f} MB of vertices, {:.1f} MB of attributes",
+                                               1e-6 * static_cast<double>(map.vertices.bytes + map.primitives.bytes),
+                                               1e-6 * static_cast<double>(map.attributes.bytes)));
+     }}};
+
+// Not decided: why stands in place of a predicate.
+const EffectRegistrar alpha_pruning{{"sm",
+                                     "alpha_pruning",
+                                     "splat-shader",
+                                     EffectKind::functional,
+                                     "fragments of a small alpha are dropped",
+                                     "a fifth of a splat's oriented box lies outside the ellipse of alpha 1/255; "
+                                     "without the comparison nothing is saved",
+                                     "a comparison for eight fragments",
+                                     "",
+                                     {},
+                                     nullptr}};
+const EffectRegistrar alpha_clamp{{"sm",
+                                   "alpha_clamp",
+                                   "splat-shader",
+                                   EffectKind::functional,
+                                   "alpha is at most 0.99",
+                                   "one instruction for eight fragments: to leave it out costs as much as it saves",
+                                   "a selection",
+                                   "",
+                                   {},
+                                   nullptr}};
+const EffectRegistrar scheduling{
+    {"sm",
+     "scheduling",
+     "",
+     EffectKind::timing,
+     "warps wait for a scheduler, and hide one another's latencies",
+     "warps leave in another order without: no bound on the cycles is known for schedulers of several servers (Graham)",
+     "schedulers and their queues",
+     "",
+     {},
+     nullptr}};
 }  // namespace
 
 }  // namespace vrpipe

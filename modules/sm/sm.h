@@ -200,7 +200,7 @@ class SplatShader : public SmBehaviour {
   template <Exponential Kind>
   void shade_splats(const Warp& warp, WarpColors& colors);
   void shade_mesh(const Warp& warp, WarpColors& colors);
-  void shade_by_alpha(const Warp& warp, WarpColors& colors) const;
+  void shade_by_alpha(const Warp& warp, WarpColors& colors);
   /// Merges, counts, and hands on what is live.
   void put_out(const Warp& warp, const WarpColors& colors, ShadedWarp& out);
   /// Alpha at the samples of two quads.
@@ -208,6 +208,10 @@ class SplatShader : public SmBehaviour {
   static LanePair alpha_at(LanePair x, LanePair y, const AttributePair& splats);
 
   const RenderContext& context_;
+  EffectGate several_draws_gate_;
+  EffectGate mesh_gate_;
+  EffectGate color_reads_gate_;
+  EffectGate pairing_gate_;
   const bool several_draws_;
   TimingParameters timing_;
   /// Of the splats last set up, by the low bits of their number; two tables, so that the two quads' are there at once.

@@ -24,6 +24,7 @@ class TimedSm : public TimedUnit {
         cycles_per_instruction_(timing_.cycles_per_instruction()),
         roomy_(is_roomy(timing_, *context.frame)),
         memory_(*this, context, timing_, l1_statistics_),
+        fetch_gate_(context, "sm.attribute_fetch"),
         vertex_(program(timing_.vertex, {}, true).front()),
         fragment_(*context.frame,
                   [&](FragmentShader shader, bool merges) {
@@ -44,6 +45,7 @@ class TimedSm : public TimedUnit {
         free_of_core_(timing_.cores, timing_.warps_per_core),
         vertex_slots_(timing_.vertex_warps, 0) {
     fragment_.for_each([&](const Program& each) { waiting_.resize(std::max(waiting_.size(), each.size())); });
+    if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
     free_slots_ = timing_.fragment_slots();
     in_warps_.set_gate([this] { return has_slot(); });
   }
@@ -58,7 +60,8 @@ class TimedSm : public TimedUnit {
  private:
   void before_end_of_elaboration() override {
     no_memory_ = stub_unbound(memory_.socket(), *clock.domain);
-    fetches_ = no_memory_ == nullptr;
+    fetches_ = no_memory_ == nullptr && fetch_gate_.is_active();
+    lacks_fetch_ = no_memory_ == nullptr && !fetches_;
     if (!fetches_) return;
     memory_.connect();
     // As at cycle; otherwise times alone say when a place is free.
@@ -295,6 +298,7 @@ class TimedSm : public TimedUnit {
       const Cycle issue = vertex_.instructions * cycles_per_instruction_;
       free_at = std::max(free_at, launch) + issue;
       did(SmWork::vertex, vertex_.instructions, free_at - issue, free_at);
+      if (lacks_fetch_) fetch_gate_.enter();
       behaviour_->shade_vertices(warp);
       done = (fetches_ ? memory_.fetch_vertices(warp, launch) : launch) + issue + vertex_.stall_cycles;
     }
@@ -349,7 +353,9 @@ class TimedSm : public TimedUnit {
   SectoredCacheStatistics l1_statistics_{*this, "l1"};
   TimedSmMemory memory_;
   std::unique_ptr<FixedLatencyMemory> no_memory_;
-  bool fetches_ = false;  ///< the memory port is connected
+  bool fetches_ = false;      ///< the memory port is connected
+  bool lacks_fetch_ = false;  ///< it is, and its traffic was left out
+  EffectGate fetch_gate_;
   Segment vertex_;
   FragmentPrograms<Program> fragment_;
   TimedOut<VertexWarp> out_vertices_;

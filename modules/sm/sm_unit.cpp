@@ -98,10 +98,12 @@ class SmUnit : public Unit {
         cycles_per_instruction_(timing_.cycles_per_instruction()),
         warps_per_core_(timing_.warps_per_core),
         memory_(*this, context, timing_, l1_statistics_),
+        fetch_gate_(context, "sm.attribute_fetch"),
         vertex_{timing_.vertex, timing_.vertex.size()},
         fragment_(*context.frame, [&](FragmentShader shader, bool merges) { return program(shader, merges); }),
         wheel_(horizon()),
         schedulers_(std::size_t{timing_.cores} * timing_.schedulers_per_core) {
+    if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
     fragment_slots_ = timing_.fragment_slots();
     free_slots_ = fragment_slots_;
     flights_.resize(fragment_slots_ + timing_.vertex_warps);
@@ -141,7 +143,8 @@ class SmUnit : public Unit {
 
   void before_end_of_elaboration() override {
     no_memory_ = stub_unbound(memory_.socket(), *clock.domain);
-    fetches_ = no_memory_ == nullptr;
+    fetches_ = no_memory_ == nullptr && fetch_gate_.is_active();
+    lacks_fetch_ = no_memory_ == nullptr && !fetches_;
     if (!fetches_) return;
     memory_.connect();
     there_.resize(fragment_slots_);
@@ -203,6 +206,7 @@ class SmUnit : public Unit {
   void complete(std::uint32_t slot, Cycle now) {
     if (slot >= fragment_slots_) {
       const std::uint32_t turn = slot - fragment_slots_;
+      if (lacks_fetch_) fetch_gate_.enter();
       behaviour_->shade_vertices(vertices_[turn]);
       flights_[slot].done = !fetches_ || !memory_.write_attributes(turn, vertices_[turn]);
       return;
@@ -419,7 +423,9 @@ class SmUnit : public Unit {
   SectoredCacheStatistics l1_statistics_{*this, "l1"};
   SmMemory memory_;
   std::unique_ptr<FixedLatencyMemory> no_memory_;
-  bool fetches_ = false;  ///< the memory port is connected
+  bool fetches_ = false;      ///< the memory port is connected
+  bool lacks_fetch_ = false;  ///< it is, and its traffic was left out
+  EffectGate fetch_gate_;
   // The programs, in whose first segments nothing stands for memory where that is connected.
   Program vertex_;
   FragmentPrograms<Program> fragment_;

@@ -22,7 +22,10 @@ class UntimedSm : public UntimedUnit {
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         traffic_(context, timing_.fetch),
-        memory_(traffic_.origin(MemoryTraffic::attribute)) {}
+        memory_(traffic_.origin(MemoryTraffic::attribute)),
+        fetch_gate_(context, "sm.attribute_fetch") {
+    if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
+  }
 
   Behaviour& behaviour() override { return *behaviour_; }
   UntimedMemoryPort* memory_port() override { return &memory_; }
@@ -33,7 +36,7 @@ class UntimedSm : public UntimedUnit {
     shaded_.sequence = warp.sequence;
     shaded_.count = 0;
     if (warp.mark == Mark::none) {
-      if (memory_.connected()) read(warp);
+      if (follows_memory()) read(warp);
       behaviour_->shade(warp, shaded_);
     }
     out_shaded_.send({&shaded_});
@@ -42,9 +45,9 @@ class UntimedSm : public UntimedUnit {
     if (warp.mark == Mark::none) {
       did(SmWork::vertex, 1);
       const auto access = [this](const MemoryRequest& request) { memory_.access(request); };
-      if (memory_.connected()) traffic_.read_vertices(warp, access);
+      if (follows_memory()) traffic_.read_vertices(warp, access);
       behaviour_->shade_vertices(warp);
-      if (memory_.connected()) {
+      if (follows_memory()) {
         traffic_.write_attributes(warp, [this](const MemoryRequest& request) {
           memory_.access(traffic_.in_buffer(request));
         });
@@ -53,6 +56,7 @@ class UntimedSm : public UntimedUnit {
     out_vertices_.send(warp);
   }
 
+  bool follows_memory() { return memory_.connected() && fetch_gate_.enter(); }
   [[gnu::noinline]] void read(const Warp& warp) {
     traffic_.find_reads(warp, reads_);
     if (!timing_.fetch.has_l1() || reads_.traffic != MemoryTraffic::attribute) {
@@ -97,6 +101,7 @@ class UntimedSm : public UntimedUnit {
   const SmBehaviour::TimingParameters timing_;
   const AttributeTraffic traffic_;
   UntimedMemoryPort memory_;
+  EffectGate fetch_gate_;
   SectoredCacheStatistics l1_statistics_{*this, "l1"};
   std::vector<SectoredCache> l1s_;  ///< by core; none before the first warp
   AttributeTraffic::FragmentReads reads_;

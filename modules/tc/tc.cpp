@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
+#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
@@ -12,7 +15,8 @@ TileCoalescing::TileCoalescing(const Parameters& parameters, const RenderContext
       timing_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.idle_timeout_cycles,
               parameters.flush_queue_bins},
       bins_(parameters.bins),
-      bin_of_tile_(grid_.tiles(), -1) {
+      bin_of_tile_(grid_.tiles(), -1),
+      eviction_gate_(context, "tc.eviction") {
   for (auto bin = static_cast<std::uint32_t>(bins_.size()); bin-- > 0;) {
     bins_[bin].quads.reserve(bin_quads_);
     free_.push_back(bin);
@@ -43,6 +47,10 @@ unsigned TileCoalescing::insert(const QuadBeat& beat, unsigned from, Flush& out,
   if (from == beat.count) return 0;
   std::int32_t index = bin_of_tile_[grid_.index(beat.tile)];
   if (index < 0) {
+    if (free_.empty() && !eviction_gate_.enter()) {
+      free_.push_back(static_cast<std::uint32_t>(bins_.size()));
+      bins_.emplace_back();
+    }
     if (free_.empty()) {
       flushed = flush_oldest(FlushReason::evicted, out);
       return 0;
@@ -79,6 +87,40 @@ namespace {
 const SlotRegistrar slot{{"tc", 50, "tile-coalescing", "", false, check_tc}};
 const Registrar<TileCoalescing, TcBehaviour> registrar("tc", "tile-coalescing", "bins of quads, one per screen tile",
                                                        false, Trust::trusted);
+const EffectRegistrar eviction{
+    {"tc",
+     "eviction",
+     "tile-coalescing",
+     EffectKind::functional,
+     "a bin that goes since another screen tile needs it",
+     "primitives touch no more tiles than there are bins; else until one goes",
+     "nothing: bins are kept in order in any case",
+     "where no bin is free",
+     {},
+     [](const EffectQuestion& asked) {
+       const std::uint32_t bins = asked.as<TileCoalescing::Parameters>().bins;
+       const std::uint32_t touched = asked.facts.tiles_touched;
+       const std::string numbers =
+           fmt::format("primitives touch at most {} of {} tiles; {} bins", touched, asked.facts.tiles, bins);
+       return touched <= bins ? EffectDecision::omit(numbers) : EffectDecision::watch(numbers);
+     }}};
+const EffectRegistrar time_out{
+    {"tc",
+     "time_out",
+     "tile-coalescing",
+     EffectKind::functional,
+     "bins that go since no quad has come for some time; what they hold depends on time from then on",
+     "there is no time-out, or termination is strict, or there is no time; else until one goes",
+     "nothing: it takes a comparison to know",
+     "where a time-out is due",
+     {},
+     [](const EffectQuestion& asked) {
+       const std::uint32_t cycles = asked.as<TileCoalescing::Parameters>().idle_timeout_cycles;
+       if (!asked.has_time) return EffectDecision::omit("there is no time at this fidelity");
+       if (asked.context.termination == Termination::strict) return EffectDecision::omit("not in strict termination");
+       if (cycles == 0) return EffectDecision::omit("tc.idle_timeout_cycles=0");
+       return EffectDecision::watch(fmt::format("{} cycles without a quad", cycles));
+     }}};
 }  // namespace
 
 }  // namespace vrpipe

@@ -67,6 +67,7 @@ class TileCoalescing : public TcBehaviour {
   std::vector<std::uint32_t> free_;
   std::deque<std::uint32_t> allocation_order_;
   std::vector<std::int32_t> bin_of_tile_;  ///< -1: none
+  EffectGate eviction_gate_;
 };
 
 /// The marks that TC hands on. Behind it a bin, and so a warp, is of one state, and a change of state has nothing to stop; but
@@ -74,7 +75,7 @@ class TileCoalescing : public TcBehaviour {
 class PassingMarks {
  public:
   explicit PassingMarks(const RenderContext& context)
-      : frame_(*context.frame), hi_z_(context), late_(context), barriers_(frame_) {}
+      : frame_(*context.frame), hi_z_(context), late_(context), barriers_(context) {}
   bool has(Mark mark) const {
     return mark == Mark::end_of_frame || frame_.clear_of(mark) != nullptr || hi_z_.waits_at(mark) ||
            late_.waits_at(mark) || barriers_.is_barrier(mark);

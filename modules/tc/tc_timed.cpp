@@ -22,6 +22,7 @@ class TimedTc : public TimedUnit {
         passing_(context),
         timing_(behaviour_->timing()),
         idle_timeout_cycles_(timing_.timeout_in(context.termination)),
+        time_out_gate_(context, "tc.time_out"),
         entries_(timing_.quads_per_cycle),
         sent_at_(timing_.flush_queue_bins, 0) {
     out_.set_pipeline(timing_.latency_cycles - 1, 1);
@@ -95,6 +96,10 @@ class TimedTc : public TimedUnit {
   /// Flushes the bins whose time is out before a quad comes.
   void flush_idle(Cycle next_arrival) {
     for (Cycle due = timeout_due(); due < next_arrival && !out_.blocked(); due = timeout_due()) {
+      if (!time_out_gate_.enter()) {
+        idle_timeout_cycles_ = 0;
+        return;
+      }
       if (!behaviour_->flush_oldest(Reason::timed_out, next_storage().flush)) {
         holds_quads_ = false;
         return;
@@ -130,7 +135,8 @@ class TimedTc : public TimedUnit {
   std::unique_ptr<TcBehaviour> behaviour_;
   const PassingMarks passing_;
   const TcBehaviour::TimingParameters timing_;
-  const std::uint32_t idle_timeout_cycles_;  ///< 0: never
+  std::uint32_t idle_timeout_cycles_;  ///< 0: never
+  EffectGate time_out_gate_;
   std::deque<BinStorage> storage_ = std::deque<BinStorage>(1);
   std::size_t storage_at_ = 0;
   BinStorage* next_storage_ = &storage_[0];

@@ -21,6 +21,7 @@ class TcUnit : public Unit {
         passing_(context),
         timing_(behaviour_->timing()),
         idle_timeout_cycles_(timing_.timeout_in(context.termination)),
+        time_out_gate_(context, "tc.time_out"),
         queue_(timing_.flush_queue_bins) {
     out_.set_pipeline(timing_.latency_cycles - 1, 1);
   }
@@ -78,6 +79,10 @@ class TcUnit : public Unit {
       return true;
     }
     if (mark_ == Mark::none && holds_quads_ && timeout_due() <= now) {
+      if (!time_out_gate_.enter()) {
+        idle_timeout_cycles_ = 0;
+        return false;
+      }
       if (behaviour_->flush_oldest(TcBehaviour::FlushReason::timed_out, next_place())) {
         ++queued_;
       } else {
@@ -147,8 +152,9 @@ class TcUnit : public Unit {
   std::unique_ptr<TcBehaviour> behaviour_;
   const PassingMarks passing_;
   const TcBehaviour::TimingParameters timing_;
-  const std::uint32_t idle_timeout_cycles_;  ///< 0: never
-  std::vector<Flush> queue_;                 ///< flushed bins, a ring
+  std::uint32_t idle_timeout_cycles_;  ///< 0: never
+  EffectGate time_out_gate_;
+  std::vector<Flush> queue_;  ///< flushed bins, a ring
   unsigned first_ = 0;
   unsigned queued_ = 0;
   unsigned sent_ = 0;  ///< quads of the first bin

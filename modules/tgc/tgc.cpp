@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
+#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
@@ -15,7 +18,8 @@ TileGridCoalescing::TileGridCoalescing(const Parameters& parameters, const Rende
                static_cast<std::uint32_t>(grid_pixels_)),
       entries_per_cycle_(parameters.entries_per_cycle),
       latency_cycles_(parameters.latency_cycles),
-      bins_(bins_limit_) {
+      bins_(bins_limit_),
+      eviction_gate_(context, "tgc.eviction") {
   const std::uint32_t grids_y = (context.frame->height() + static_cast<std::uint32_t>(grid_pixels_) - 1) /
                                 static_cast<std::uint32_t>(grid_pixels_);
   bin_of_grid_.assign(std::size_t{grids_x_} * grids_y, -1);
@@ -76,6 +80,10 @@ bool TileGridCoalescing::step(Flush& out) {
   const std::uint32_t grid = static_cast<std::uint32_t>(grid_y_) * grids_x_ + static_cast<std::uint32_t>(grid_x_);
   std::int32_t index = bin_of_grid_[grid];
   if (index < 0) {
+    if (free_.empty() && !eviction_gate_.enter()) {
+      free_.push_back(static_cast<std::uint32_t>(bins_.size()));
+      bins_.emplace_back();
+    }
     if (free_.empty()) {
       const std::uint32_t oldest = allocation_order_.front();
       allocation_order_.pop_front();
@@ -137,6 +145,34 @@ const Registrar<TileGridCoalescing, TgcBehaviour> coalescing("tgc", "tile-grid-c
                                                              Trust::trusted);
 const Registrar<TgcPassThrough, TgcBehaviour> pass_through("tgc", "pass-through", "primitives go on one by one", true,
                                                            Trust::trusted);
+const EffectRegistrar binning{{"tgc",
+                               "binning",
+                               "tile-grid-coalescing",
+                               EffectKind::functional,
+                               "primitives binned by tile grids (QM): each is set up and rasterised once for each grid",
+                               "the variant does without, and its TGC passes through",
+                               "masks of samples outside the grid",
+                               "in the rasteriser, where less than a primitive's bounds is to be filled",
+                               {},
+                               [](const EffectQuestion&) { return EffectDecision::keep("TGC bins primitives"); }}};
+const EffectRegistrar eviction{
+    {"tgc",
+     "eviction",
+     "tile-grid-coalescing",
+     EffectKind::functional,
+     "a bin that goes since another grid needs it",
+     "there are as many bins as grids; else until one goes",
+     "nothing: bins are kept in order in any case",
+     "where no bin is free",
+     {},
+     [](const EffectQuestion& asked) {
+       const auto& tgc = asked.as<TileGridCoalescing::Parameters>();
+       const std::uint32_t side = tgc.grid_tiles * screen_tile_pixels;
+       const Frame& frame = *asked.context.frame;
+       const std::uint32_t grids = ((frame.width() + side - 1) / side) * ((frame.height() + side - 1) / side);
+       const std::string numbers = fmt::format("{} tile grids, {} bins", grids, std::uint32_t{tgc.bins});
+       return grids <= tgc.bins ? EffectDecision::omit(numbers) : EffectDecision::watch(numbers);
+     }}};
 }  // namespace
 
 }  // namespace vrpipe

@@ -76,6 +76,7 @@ class TileGridCoalescing : public TgcBehaviour {
   std::vector<std::uint32_t> free_;
   std::deque<std::uint32_t> allocation_order_;
   std::vector<std::int32_t> bin_of_grid_;  ///< -1: none
+  EffectGate eviction_gate_;
 
   Primitive primitive_;
   std::int32_t grid_x_ = 0;

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
+#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/pipeline/registry.h>
 
@@ -24,7 +27,8 @@ std::uint64_t determinant(const Splat& splat) {
 PrimitiveAssembly::PrimitiveAssembly(const Parameters& parameters, const RenderContext& context)
     : context_(context),
       triangles_per_cycle_(parameters.triangles_per_cycle),
-      latency_cycles_(parameters.latency_cycles) {}
+      latency_cycles_(parameters.latency_cycles),
+      face_culling_gate_(context, "vpo.face_culling") {}
 
 unsigned PrimitiveAssembly::assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) {
   const DrawCall& call = context_.draw(draw);
@@ -43,7 +47,10 @@ unsigned PrimitiveAssembly::assemble(DrawIndex draw, std::uint32_t splat, std::a
     switch (cull_triangle(context_, draw, splat, triangle, bounds)) {
       case Culling::not_finite: ++dropped_not_finite; return 0;
       case Culling::zero_area: ++culled_zero_area; continue;
-      case Culling::facing: ++culled_facing; continue;
+      case Culling::facing:
+        if (!face_culling_gate_.enter() && !bounds.empty()) break;
+        ++culled_facing;
+        continue;
       case Culling::outside: ++culled_outside; continue;
       case Culling::none: break;
     }
@@ -62,6 +69,44 @@ const SlotRegistrar slot{{"vpo", 20, "primitive-assembly", "", false, check_vpo}
 const Registrar<PrimitiveAssembly, VpoBehaviour> registrar("vpo", "primitive-assembly",
                                                            "two triangles per splat, culled and boxed", false,
                                                            Trust::trusted);
+const EffectRegistrar face_culling{{"vpo",
+                                    "face_culling",
+                                    "",
+                                    EffectKind::functional,
+                                    "triangles of meshes that face away are dropped",
+                                    "no draw of a mesh culls",
+                                    "the facing of each triangle",
+                                    "where a triangle is to be dropped",
+                                    {},
+                                    [](const EffectQuestion& asked) {
+                                      const FrameFacts& facts = asked.facts;
+                                      if (facts.culling_faces == 0)
+                                        return EffectDecision::omit("no draw of a mesh culls");
+                                      return EffectDecision::keep(
+                                          fmt::format("{} of {} draws cull", facts.culling_faces, facts.draws));
+                                    }}};
+
+// Not decided: why stands in place of a predicate.
+const EffectRegistrar clipping{{"vpo",
+                                "clipping",
+                                "",
+                                EffectKind::functional,
+                                "splats beyond the guard band are cut to it",
+                                "whether a corner is outside is what is tested for anyway; only what is, is cut",
+                                "a comparison for each corner",
+                                "",
+                                {},
+                                nullptr}};
+const EffectRegistrar not_finite{{"vpo",
+                                  "not_finite",
+                                  "",
+                                  EffectKind::functional,
+                                  "splats with a NaN or an infinity are dropped",
+                                  "the test is the tripwire; a frame of them is rare, and a picture of them wrong",
+                                  "a test of a splat's eleven numbers",
+                                  "",
+                                  {},
+                                  nullptr}};
 }  // namespace
 
 }  // namespace vrpipe

@@ -44,6 +44,7 @@ class PrimitiveAssembly : public VpoBehaviour {
   const RenderContext& context_;
   const std::uint32_t triangles_per_cycle_;
   const std::uint32_t latency_cycles_;
+  EffectGate face_culling_gate_;
 };
 
 }  // namespace vrpipe

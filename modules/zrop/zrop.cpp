@@ -2,6 +2,11 @@
 
 #include "zrop/late_quads.h"
 
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
@@ -13,7 +18,9 @@ DepthStencilRop::DepthStencilRop(const Parameters& parameters, const RenderConte
               parameters.updates_per_cycle,
               {parameters.cache.organization(), parameters.mshrs, parameters.input_quads, parameters.input_updates,
                parameters.sectors_per_cycle, parameters.fast_clear}},
-      depth_stencil_(context) {
+      depth_stencil_(context),
+      depth_stencil_gate_(context, "zrop.depth_stencil"),
+      termination_gate_(context, "zrop.termination") {
   timing_.z_cache.check(context.frame->depth_format());
 }
 
@@ -97,9 +104,9 @@ std::uint32_t DepthStencilRop::test(QuadBeat& beat) {
   if (beat.count > 0) {
     // All are of one state.
     const DrawState& state = context_.state(beat.quads[0].draw);
-    const bool tests_early = state.tests_early();
+    const bool tests_early = state.tests_early() && depth_stencil_gate_.enter();
     if (tests_early) changed = test_depth_stencil(beat);
-    if (state.tests_termination()) test_termination(beat, !tests_early);
+    if (state.tests_termination() && termination_gate_.enter()) test_termination(beat, !tests_early);
     if (state.shader == FragmentShader::none) end_unshaded(beat);
   }
   if (run_ahead_ == nullptr) return changed;
@@ -114,10 +121,12 @@ std::uint32_t DepthStencilRop::test_late(ShadedWarp& warp) {
   const QuadBeat beat = quads_of(warp);
   std::array<LaneMask, quads_per_warp> passed{};
   std::uint32_t changed = 0;
+  const bool tests = beat.count > 0 && depth_stencil_gate_.enter();
   const bool blends = beat.count > 0 && writes_color(context_.state(beat.quads[0].draw).shader);  // all quads' state
   for (unsigned i = 0; i < beat.count; ++i) {
     const Quad& quad = beat.quads[i];
-    const DepthStencilTest::Outcome outcome = test_quad(quad, beat.tile);
+    const DepthStencilTest::Outcome outcome =
+        tests ? test_quad(quad, beat.tile) : DepthStencilTest::Outcome{quad.coverage, false};
     passed[i] = outcome.passed;
     changed |= (outcome.wrote ? 1U : 0U) << i;
     quads_tested_late.add(quad.draw, 1);
@@ -155,6 +164,87 @@ const SlotRegistrar slot{{"zrop", 70, "depth-stencil-rop", "", true, check_zrop}
 const Registrar<DepthStencilRop, ZropBehaviour> registrar(
     "zrop", "depth-stencil-rop", "depth, stencil and termination tests, termination update on the stencil MSB", false,
     Trust::trusted);
+const EffectRegistrar depth_stencil{
+    {"zrop",
+     "depth_stencil",
+     "",
+     EffectKind::functional,
+     "the tests of depth and stencil, and what they store",
+     "no draw tests depth or stencil, and none shades nothing",
+     "the depth-stencil target; ZROP, for one of its effects",
+     "before a test of depth or stencil",
+     {"zrop"},
+     [](const EffectQuestion& asked) {
+       const FrameFacts& facts = asked.facts;
+       const unsigned called = std::max(facts.testing_depth_stencil, facts.shading_nothing);
+       if (called == 0) return EffectDecision::omit("no draw tests depth or stencil");
+       return EffectDecision::keep(fmt::format("{} of {} draws test depth or stencil", called, facts.draws));
+     }}};
+const EffectRegistrar termination{
+    {"zrop",
+     "termination",
+     "",
+     EffectKind::functional,
+     "early termination (HET): its test and updates in ZROP, the alpha test in CROP and the signals between them",
+     "no draw terminates early: the variant does without, or its state",
+     "ZROP, for one of its effects; the link crop.terminations",
+     "before a termination test, and in CROP before the alpha test of a draw that terminates",
+     {"zrop", "crop.terminations"},
+     [](const EffectQuestion& asked) {
+       const FrameFacts& facts = asked.facts;
+       if (facts.terminating == 0) return EffectDecision::omit("no draw terminates early");
+       return EffectDecision::keep(fmt::format("{} of {} draws terminate early", facts.terminating, facts.draws));
+     }}};
+const EffectRegistrar late_tests{
+    {"zrop",
+     "late_tests",
+     "",
+     EffectKind::functional,
+     "tests of depth and stencil after shading",
+     "no draw is tested late: none both discards and writes depth or stencil, and none asks for it",
+     "ZROP, for one of its effects; the links prop.late and zrop.late",
+     "in LatePlan, of which PROP, TC and ZROP each have one",
+     {"zrop", "prop.late", "zrop.late"},
+     [](const EffectQuestion& asked) {
+       const FrameFacts& facts = asked.facts;
+       if (facts.tested_late == 0) return EffectDecision::omit("no draw is tested after shading");
+       return EffectDecision::keep(
+           fmt::format("{} of {} draws are tested after shading", facts.tested_late, facts.draws));
+     }}};
+const EffectRegistrar z_cache{
+    {"zrop",
+     "z_cache",
+     "",
+     EffectKind::timing,
+     "the traffic of the depth-stencil target, and the cache before it",
+     "no memory is connected, or no draw reads the target",
+     "a sectored cache, queues of look-ups and the memory port's accesses",
+     "before a test of a draw that reads the target, where memory is connected",
+     {},
+     [](const EffectQuestion& asked) {
+       const FrameFacts& facts = asked.facts;
+       if (!asked.memory_connected)
+         return EffectDecision::omit(asked.has_time ? "ZROP's memory port is bound to nothing"
+                                                    : "no memory is followed at this fidelity");
+       if (facts.terminating + facts.testing_depth_stencil + facts.shading_nothing == 0)
+         return EffectDecision::omit("no draw reads the depth-stencil target");
+       return EffectDecision::keep(fmt::format("a depth-stencil target of {:.1f} MB",
+                                               1e-6 * static_cast<double>(facts.addresses.depth_stencil.bytes)));
+     }}};
+
+// Not decided: why stands in place of a predicate.
+const EffectRegistrar update_latency{
+    {"zrop",
+     "update_latency",
+     "",
+     EffectKind::functional,
+     "an update of the termination bit takes its way from CROP; what is tested meanwhile does not see it",
+     "with termination on, every update has a way to go; strict termination is the choice of the user, not of the "
+     "frame",
+     "queues of updates",
+     "",
+     {},
+     nullptr}};
 }  // namespace
 
 }  // namespace vrpipe

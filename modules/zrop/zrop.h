@@ -97,6 +97,8 @@ class DepthStencilRop : public ZropBehaviour {
   const RenderContext& context_;
   const TimingParameters timing_;
   DepthStencilTest depth_stencil_;
+  EffectGate depth_stencil_gate_;
+  EffectGate termination_gate_;
   std::uint16_t epoch_ = 0;  ///< clears of termination so far
   FunctionalRunAhead* run_ahead_ = nullptr;
   std::vector<TerminationSignal> ahead_;  ///< of the bin under test

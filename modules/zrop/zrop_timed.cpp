@@ -46,9 +46,11 @@ class TimedZrop : public TimedUnit {
         late_tests_(timing_.quads_per_cycle),
         updates_(timing_.updates_per_cycle),
         z_(*this, timing_, context.placement, cache_statistics_),
+        z_cache_gate_(context, "zrop.z_cache"),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    if (!EffectGate(context, "cache.details").is_active()) cache_statistics_.leave_out_details();
     out_hi_z_.set_optional();
     out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_late_.set_optional();
@@ -85,7 +87,8 @@ class TimedZrop : public TimedUnit {
 
   void before_end_of_elaboration() override {
     no_memory_ = stub_unbound(z_.socket(), *clock.domain);
-    has_cache_ = no_memory_ == nullptr;
+    has_cache_ = no_memory_ == nullptr && z_cache_gate_.is_active();
+    lacks_cache_ = no_memory_ == nullptr && !has_cache_;
     if (!has_cache_) return;
     const DepthStencilSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no depth-stencil surface is attached");
@@ -143,6 +146,7 @@ class TimedZrop : public TimedUnit {
     CycleInterval looked_up(never, 0);
     // All are of one state.
     const DrawState* const state = total > 0 ? &context_.state(quads.front().draw) : nullptr;
+    if (lacks_cache_ && state != nullptr) z_cache_gate_.enter();
     const bool needs_stencil = has_cache_ && state != nullptr && state->reads_depth_stencil_early();
     const bool may_change = needs_stencil && state->tests_early() && state->writes_depth_stencil();
     const bool hi_z = total > 0 && hi_z_.wanted(quads.front().draw);
@@ -325,6 +329,8 @@ class TimedZrop : public TimedUnit {
   ZCacheStatistics cache_statistics_{*this, "cache"};
   TimedZCache z_;
   bool has_cache_ = false;
+  bool lacks_cache_ = false;  ///< memory is connected, and the cache was left out
+  EffectGate z_cache_gate_;
   std::unique_ptr<FixedLatencyMemory> no_memory_;  ///< behind a port that is not connected
   Ring<Pending> arrived_;                          ///< updates not looked up yet
   Ring<Cycle> moves_;                              ///< of a cycle's worth of sectors each, not moved yet

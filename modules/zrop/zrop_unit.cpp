@@ -32,10 +32,12 @@ class ZropUnit : public Unit {
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         z_(*this, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context, plan_),
+        z_cache_gate_(context, "zrop.z_cache"),
         limit_(timing_.quads_per_cycle),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+    if (!EffectGate(context, "cache.details").is_active()) cache_statistics_.leave_out_details();
     out_hi_z_.set_optional();
     out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_late_.set_optional();
@@ -53,7 +55,8 @@ class ZropUnit : public Unit {
  private:
   void before_end_of_elaboration() override {
     no_memory_ = stub_unbound(z_.socket(), *clock.domain);
-    has_cache_ = no_memory_ == nullptr;
+    has_cache_ = no_memory_ == nullptr && z_cache_gate_.is_active();
+    lacks_cache_ = no_memory_ == nullptr && !has_cache_;
     if (!has_cache_) return;
     const DepthStencilSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no depth-stencil surface is attached");
@@ -112,6 +115,7 @@ class ZropUnit : public Unit {
       tested_until_ = now + (width + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       did(ZropWork::tests, beat.count, now, tested_until_);
       const unsigned tested = beat.count;
+      if (lacks_cache_ && tested > 0) z_cache_gate_.enter();
       // Of what may write, the quads that come in.
       QuadBeat before;
       const bool hi_z = tested > 0 && hi_z_.wanted(beat.quads[0].draw);
@@ -245,6 +249,8 @@ class ZropUnit : public Unit {
   const ZropBehaviour::TimingParameters timing_;
   ZPort z_;
   bool has_cache_ = false;
+  bool lacks_cache_ = false;  ///< memory is connected, and the cache was left out
+  EffectGate z_cache_gate_;
   std::unique_ptr<FixedLatencyMemory> no_memory_;  ///< behind a port that is not connected
   unsigned signal_ = 0;
   BatchLimit limit_;

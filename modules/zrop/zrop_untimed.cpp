@@ -33,7 +33,9 @@ class UntimedZrop : public UntimedUnit {
         behaviour_(std::move(behaviour)),
         z_cache_(behaviour_->timing().z_cache),
         memory_({MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)}),
+        z_cache_gate_(context, "zrop.z_cache"),
         hi_z_(context) {
+    if (!EffectGate(context, "cache.details").is_active()) cache_statistics_.leave_out_details();
     out_hi_z_.set_optional();
     out_late_.set_optional();
     in_late_->set_optional();
@@ -44,7 +46,7 @@ class UntimedZrop : public UntimedUnit {
 
  private:
   void update(const TerminationSignal& signal) {
-    if (memory_.connected()) {
+    if (follows_cache()) {
       needed_.count = 1;
       needed_.lines[0] = lines().find(signal);
       did(ZropWork::sectors, look_up(1));
@@ -71,12 +73,12 @@ class UntimedZrop : public UntimedUnit {
       beat_.last_of_bin = from == incoming.quads;
       // All are of one state.
       const DrawState& state = context_.state(beat_.quads[0].draw);
-      if (memory_.connected() && state.reads_depth_stencil_early()) {
+      if (follows_cache() && state.reads_depth_stencil_early()) {
         lines().find(beat_.tile, beat_.quads.data(), beat_.count, needed_);
         did(ZropWork::sectors, look_up(beat_.count));
       }
       QuadBeat before;
-      const bool may_change = memory_.connected() && state.tests_early() && state.writes_depth_stencil();
+      const bool may_change = follows_cache() && state.tests_early() && state.writes_depth_stencil();
       const bool hi_z = hi_z_.wanted(beat_.quads[0].draw);
       if (may_change || hi_z) before = beat_;
       const std::uint32_t changed = behaviour_->test(beat_);
@@ -92,13 +94,13 @@ class UntimedZrop : public UntimedUnit {
     ShadedWarp& warp = item.warp->editable();
     const QuadBeat before = quads_of(warp);
     did(ZropWork::late_tests, before.count);
-    if (memory_.connected()) {
+    if (follows_cache()) {
       // The bound does not know what time these sectors take from other tests.
       lines().find(before.tile, before.quads.data(), before.count, needed_);
       look_up(before.count);
     }
     const std::uint32_t changed = behaviour_->test_late(warp);
-    if (memory_.connected() && changed != 0) change(before, changed);
+    if (follows_cache() && changed != 0) change(before, changed);
     if (changed != 0 && hi_z_.wanted(before.quads[0].draw)) tell(before, changed);
     out_late_.send(item);
   }
@@ -119,6 +121,8 @@ class UntimedZrop : public UntimedUnit {
       cache_->make_dirty(line_, changed.sectors);
     }
   }
+  /// Whether anybody wants to know what moves.
+  bool follows_cache() { return memory_.connected() && z_cache_gate_.enter(); }
   const BeatLines& lines() {
     if (!lines_) {
       lines_.emplace(z_cache_, *behaviour_->surface());
@@ -158,6 +162,7 @@ class UntimedZrop : public UntimedUnit {
   std::unique_ptr<ZropBehaviour> behaviour_;
   const ZCache z_cache_;
   UntimedMemoryPort memory_;
+  EffectGate z_cache_gate_;
   ZCacheStatistics cache_statistics_{*this, "cache"};
   std::optional<BeatLines> lines_;      ///< once looked up
   std::optional<SectoredCache> cache_;  ///< the same

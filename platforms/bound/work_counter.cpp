@@ -140,7 +140,7 @@ void WorkCounter::tap(UntimedUnit* unit, const char* port, Function function) {
 WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc, PhaseBound& bound)
     : bound_(bound),
       counts_late_(!(bound.times_out() && configuration.frame().terminates_early())),
-      barriers_(configuration.frame()),
+      barriers_(configuration.context_of(0)),
       draw_(gpu.of_slot("draw", gpc)),
       vpo_(gpu.of_slot("vpo", gpc)),
       tgc_(gpu.of_slot("tgc", gpc)),

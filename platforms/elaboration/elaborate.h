@@ -7,6 +7,7 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/model/unit.h>
 #include <vrpipe/pipeline/barrier_plan.h>
+#include <vrpipe/pipeline/late_plan.h>
 #include <vrpipe/pipeline/slots/memory.h>
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/platforms/netlist.h>
@@ -54,7 +55,7 @@ inline void check_below(const Netlist& netlist, const std::string& path, const M
 
 /// Throws UserError for a frame with barriers on a platform where they have no way back to DRAW.
 inline void check_barriers(const Configuration& configuration) {
-  if (!BarrierPlan(configuration.frame()).is_used()) return;
+  if (!BarrierPlan(configuration.context_of(0)).is_used()) return;
   for (const Instance& instance : configuration.netlist().instances()) {
     const std::string port = instance.path + ".out_done";
     if (instance.slot != "crop" || configuration.netlist().link_from(port) != nullptr) continue;
@@ -79,13 +80,14 @@ inline void check_ports(const Component& unit, const std::string& path, const st
 }
 
 /// Throws UserError for a frame with tests after shading, where PROP has no way to ZROP and back for them.
-inline void check_late_way(const Netlist& netlist, const Frame& frame, const std::string& platform) {
-  if (!frame.tests_late()) return;
+inline void check_late_way(const Configuration& configuration) {
+  const Netlist& netlist = configuration.netlist();
+  if (!LatePlan(configuration.context_of(0)).is_used()) return;
   for (const Instance& instance : netlist.instances()) {
     if (instance.slot != "prop" && instance.slot != "zrop") continue;
     const std::string port = instance.path + ".out_late";
     if (netlist.link_from(port) != nullptr) continue;
-    throw UserError("platform " + platform + " cannot draw the frame", port,
+    throw UserError("platform " + configuration.platform().name + " cannot draw the frame", port,
                     "depth or stencil of a draw is tested after shading, and the port is not connected",
                     "connect prop.out_late to zrop.in_late, and zrop.out_late to prop.in_late");
   }

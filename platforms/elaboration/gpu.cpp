@@ -27,11 +27,58 @@ std::string module_name(std::string path) {
   throw UserError("cannot connect memory", where, why, remedy);
 }
 
+const EffectRegistrar kernel_time{{"clock",
+                                   "kernel_time",
+                                   "",
+                                   EffectKind::timing,
+                                   "the kernel's time keeps step with the clock, cycle by cycle",
+                                   "there is no time; else unless a memory port is bound to what has time of its own",
+                                   "an activation of the kernel in each cycle, instead of one in up to 64",
+                                   "at the start, at a memory port that is bound to what has time of its own",
+                                   {},
+                                   [](const EffectQuestion& asked) {
+                                     if (!asked.has_time)
+                                       return EffectDecision::omit("there is no time at this fidelity");
+                                     return EffectDecision::watch("ports that are bound to what has time of its own");
+                                   }}};
+const EffectRegistrar sockets_effect{
+    {"link",
+     "sockets",
+     "",
+     EffectKind::timing,
+     "items and accesses pass TLM-2.0 sockets, where they can be looked at from outside",
+     "nobody observes a link, or there is no time: then links are calls",
+     "calls through sockets and payloads, instead of calls of the other end",
+     "at elaboration, where a link is observed",
+     {},
+     [](const EffectQuestion& asked) {
+       if (!asked.has_time) return EffectDecision::omit("links are calls at this fidelity");
+       if (asked.observed_links == 0) return EffectDecision::omit("nobody observes a link");
+       return EffectDecision::keep(
+           fmt::format("{} link{} observed", asked.observed_links, asked.observed_links == 1 ? " is" : "s are"));
+     }}};
+
+const EffectRegistrar back_pressure{
+    {"link",
+     "back_pressure",
+     "",
+     EffectKind::timing,
+     "queues of a limited depth, and credits for their places",
+     "a queue that never fills is as fast as one without limit: credits are counted for nothing else, and cost little",
+     "credits",
+     "",
+     {},
+     nullptr}};
+
 }  // namespace
 
 Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
     : configuration_(configuration),
-      clock_(std::make_unique<ClockDomain>("clock", configuration.context_of(0).clock_ps)) {
+      clock_(std::make_unique<ClockDomain>("clock", configuration.context_of(0).clock_ps)),
+      kernel_time_gate_(configuration.context_of(0), "clock.kernel_time") {
+  clock_->ask_about_own_time([this] { return kernel_time_gate_.enter(); });
+  EffectGate sockets(configuration.context_of(0), "link.sockets");
+  if (configuration.request().effects.elaborates_all_of("link.sockets")) clock_->set_passes_sockets();
   const Netlist& netlist = configuration.netlist();
   const RunRequest& request = configuration.request();
   check_barriers(configuration);
@@ -43,8 +90,13 @@ Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
   for (const Instance& instance : netlist.instances()) {
     if (!Netlist::is_memory(instance)) add(instance, framebuffer);
   }
-  check_late_way(netlist, configuration.frame(), configuration.platform().name);
-  connect_units(netlist, request.observers.get(), [&](const std::string& path) { return find(path); });
+  check_late_way(configuration);
+  Observers* observers = request.observers.get();
+  const bool observes_links =
+      observers != nullptr && std::any_of(netlist.links().begin(), netlist.links().end(),
+                                          [&](const Link& link) { return observers->observes_link(link.name()); });
+  connect_units(netlist, observes_links && sockets.enter() ? observers : nullptr,
+                [&](const std::string& path) { return find(path); });
   add_memories();
   check();
 }
@@ -207,8 +259,10 @@ bool Gpu::frame_is_over() const {
 
 Cycle Gpu::run(std::atomic<float>* progress) {
   const RunRequest& request = configuration_.request();
-  std::uint64_t seed = request.stall_seed;
   for (const Placed& placed : units_) {
+    // Of its own, so that a unit's stalls are the same whichever others are there.
+    std::uint64_t seed = request.stall_seed;
+    for (const char letter : placed.instance->path) seed = mix(seed ^ static_cast<unsigned char>(letter));
     for (InPort* port : placed.unit->in_ports) {
       port->stall_randomly(mix(++seed), request.stall_per_256);
       port->open();
@@ -224,7 +278,7 @@ Cycle Gpu::run(std::atomic<float>* progress) {
     clock_->set_tick_order(order);
   }
 
-  clock_->set_cycles_per_activation(64);
+  clock_->set_cycles_per_activation(configuration_.request().effects.elaborates_all_of("clock.kernel_time") ? 1 : 64);
 
   // In slices, so that progress shows.
   const sc_core::sc_time slice = sc_core::sc_time::from_value(clock_->period().value() * 50000);

@@ -19,7 +19,7 @@ UntimedGpu::UntimedGpu(const Configuration& configuration, Framebuffer& framebuf
         {&instance, untimed_unit_maker(instance.slot)(instance.path, std::move(behaviour),
                                                       configuration.context_of(instance.gpc), netlist.gpcs())});
   }
-  check_late_way(netlist, configuration.frame(), configuration.platform().name);
+  check_late_way(configuration);
   connect_units(netlist, configuration.request().observers.get(), [&](const std::string& path) -> Component* {
     for (const Placed& placed : units_) {
       if (placed.instance->path == path) return placed.unit.get();

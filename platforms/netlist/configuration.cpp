@@ -63,7 +63,7 @@ DepthFormat depth_format_of(const RunRequest& request) {
 }
 
 Configuration::Configuration(const RunRequest& request, const Frame& frame)
-    : request_(request), netlist_(request.platform->gpcs) {
+    : request_(request), netlist_(request.platform->gpcs), elaborated_(request.platform->gpcs) {
   // Of the program itself; a plugin's are reported when it is loaded.
   const std::vector<Registry::Problem> problems = Registry::instance().take_problems();
   if (!problems.empty()) {
@@ -94,6 +94,7 @@ Configuration::Configuration(const RunRequest& request, const Frame& frame)
       std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(1e6 / request.platform->frequency_mhz)));
   context.placement.gpcs = request.platform->gpcs;
   for (unsigned& gpc = context.placement.gpc; gpc < request.platform->gpcs; ++gpc) contexts_.push_back(context);
+  decide_effects();
 }
 
 void Configuration::wire() {

@@ -172,6 +172,11 @@ void Netlist::remove(const std::string& path) {
       std::find_if(instances_.begin(), instances_.end(), [&](const Instance& i) { return i.path == path; }));
 }
 
+void Netlist::remove_memory(const std::string& path) {
+  for (const std::string& above : bound_to(path)) disconnect_memory(above);
+  remove(path);
+}
+
 void Netlist::disconnect(const std::string& from) {
   const auto link = link_at(from);
   stub(link->from);

@@ -57,6 +57,10 @@ LinkObservers Observers::of_link(const std::string& name) {
   return observers;
 }
 
+bool Observers::observes_link(const std::string& name) const {
+  return std::any_of(links_.begin(), links_.end(), [&](const OnLink& wanted) { return names_path(wanted.name, name); });
+}
+
 StateObserver* Observers::of_unit(const std::string& path) {
   if (states_.empty()) return nullptr;
   made_states_.push_back(std::make_shared<States>(path, states_));

@@ -239,7 +239,10 @@ std::vector<DrawReport> draw_reports(const Frame& frame, const BehaviourList& be
 /// What the units counted, once a checked unit's counters are what went through it.
 void report_counts(const Configuration& configuration, const BehaviourList& behaviours,
                    const StatisticCollector& statistics, RunResult& result) {
-  for (const auto& [instance, behaviour] : behaviours.of_instance) check_counters(*behaviour);
+  for (const auto& [instance, behaviour] : behaviours.of_instance) {
+    check_counters(*behaviour);
+    const_cast<Behaviour&>(*behaviour).unit().check_end();
+  }
   result.statistics = statistics.reports();
   result.counts = counts_from(behaviours, [](const Counter& counter) { return counter.value(); });
   result.draws = draw_reports(configuration.frame(), behaviours);
@@ -572,6 +575,7 @@ RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<fl
   } else {
     run_untimed(configuration, progress, result);
   }
+  result.effects = configuration.effects();
   check_conservation(result.counts);
   result.result_hash = hash_of(result);
   return result;
@@ -593,10 +597,18 @@ void with_sampler(const Configuration& configuration, Look&& look) {
 }
 }  // namespace
 
+namespace {
+/// What a frame calls for that is not there yet is not known.
+RunRequest with_all_effects(RunRequest request) {
+  request.effects.base = EffectChoice::Base::all;
+  return request;
+}
+}  // namespace
+
 void check_configuration(const RunRequest& request) {
   const Frame empty(1, 1);
   check_sampling_has_time(request);
-  const Configuration configuration(request, empty);
+  const Configuration configuration(with_all_effects(request), empty);
   for (const Instance& instance : configuration.netlist().instances()) configuration.make(instance);
   if (!samples_statistics(request)) return;
   with_sampler(configuration, [&](StatisticSampler& sampler) { sampler.find(*request.observers); });
@@ -606,7 +618,7 @@ std::vector<std::string> sampled_statistics(const RunRequest& request) {
   std::vector<std::string> names;
   if (!has_time(request.fidelity)) return names;
   const Frame empty(1, 1);
-  const Configuration configuration(request, empty);
+  const Configuration configuration(with_all_effects(request), empty);
   with_sampler(configuration, [&](const StatisticSampler& sampler) { names = sampler.names(); });
   return names;
 }
@@ -653,6 +665,7 @@ StorageReport quad_merging_storage(const RunRequest& request) {
   const Frame empty(1, 1);
   RunRequest merging = request;
   merging.variant.quad_merging = true;
+  merging.effects = EffectChoice::everything();
   const Configuration configuration(merging, empty);
   StorageReport report;
   for (const Instance& instance : configuration.netlist().instances()) {

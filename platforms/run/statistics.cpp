@@ -70,13 +70,16 @@ void StatisticCollector::add_set(const std::string& kind, const std::string& nam
     if (denominator) into.report.denominator = into.report.denominator.value_or(0) + *denominator;
   };
 
-  for (const Counter* counter : set.counters()) take(gathered(declared(*counter, "counter"), kind), counter->value());
+  for (const Counter* counter : set.counters()) {
+    if (!counter->is_left_out()) take(gathered(declared(*counter, "counter"), kind), counter->value());
+  }
   for (const MinMax* min_max : set.min_max()) {
     if (!min_max->seen() && take_ != Take::all) continue;
     const char* const how = min_max->of() == MinMax::Of::largest ? "largest" : "smallest";
     take(gathered(declared(*min_max, how), kind), min_max->value());
   }
   for (const Histogram* histogram : set.histograms()) {
+    if (histogram->is_left_out()) continue;
     Gathered& into = gathered(declared(*histogram, "histogram"), kind, histogram->buckets());
     take(into, histogram->sum(), histogram->count());
     for (std::size_t i = 0; i < into.counts.size(); ++i) into.counts[i] += histogram->counts()[i];

@@ -170,6 +170,7 @@ TEST_P(LateFrame, IsTheSameOnSeveralGpcsAndUnderStalls) {
 TEST_P(LateFrame, ComesToItsEndWithTheLeastOfRoom) {
   RunRequest least = request();
   least.platform = &platform_named("agx-orin-lpddr3");
+  least.effects = EffectChoice::everything();
   for (const char* link : {"prop.late", "zrop.late", "zrop.quads", "prop.test", "prop.survivors", "prop.color",
                            "qru.warps", "sm.shaded", "crop.terminations", "tc.bins"}) {
     least.settings.push_back({std::string("link.") + link, "depth", "1"});

@@ -134,6 +134,7 @@ TEST_P(MixedFrame, IsTheSameOnSeveralGpcsAndUnderStalls) {
 TEST_P(MixedFrame, ThroughAZCacheIsTheSame) {
   RunRequest through_memory = request();
   through_memory.platform = &platform_named("agx-orin-lpddr3");
+  through_memory.effects = EffectChoice::everything();
   for (const unsigned lines : {1U, 3U, 128U}) {
     for (std::uint64_t seed = 100; seed < 104; ++seed) {
       const Frame frame = random_frame(seed, request());

@@ -285,6 +285,7 @@ TEST(MultiPass, ReadingTheTargetIsTrafficOfColour) {
     SCOPED_TRACE(name_of(fidelity));
     RunRequest request = request_of("baseline", fidelity);
     request.platform = &platform_named("agx-orin-lpddr3");
+    request.effects = EffectChoice::everything();
     const RunResult result = run_passes(request, dense_splats(11), 3);
     const std::uint64_t read = testing::statistic(result, "l2.color_bytes_read");
     const std::uint64_t by_crop = testing::statistic(result, "crop.cache.bytes_filled");

@@ -86,6 +86,25 @@ expect_refusal("same-splat" ${vrpipe} run ${draw} --plugin ${plugin} --unit qru=
 expect_success("" ${vrpipe} run ${draw} --platform mobile --fidelity lt --plugin ${plugin} --unit qru=same-splat)
 expect_refusal("bin_quads" ${vrpipe} run ${draw} --plugin ${plugin} --unit qru=same-splat --set qru.bin_quads=64)
 
+# Its effect: listed, active where splats may be merged, left out where they are not; taken in, and left out, by force.
+expect_success("effect qru.same_splat_pairs of same-splat, functional: quads of the two triangles"
+  ${vrpipe} units --plugin ${plugin} --slot qru)
+function(expect_effect pattern)
+  expect_success("." ${vrpipe} run --variant qm --plugin ${plugin} --unit qru=same-splat --json - ${ARGN})
+  string(REGEX MATCH "{[^{}]*\"name\": *\"qru.same_splat_pairs\"[^{}]*}" entry "${output}")
+  if(NOT entry MATCHES "${pattern}")
+    message(FATAL_ERROR "expected ${pattern} in\n${entry}")
+  endif()
+endfunction()
+file(WRITE ${WORK_DIR}/late.json "{\"commands\": [{\"draw\": \"draw.spl\", \"state\": {\"late_tests\": true,
+  \"depth\": {\"write\": false}}}]}")
+set(late --frame ${WORK_DIR}/late.json)
+expect_effect("\"state\": *\"active\".*\"proof\": *null.*\"reason\": *\"draws of splats: 1\"" ${draw})
+expect_effect("\"state\": *\"omitted\".*\"proof\": *\"static\".*\"reason\": *\"all draws are tested after shading\"" ${late})
+expect_effect("\"state\": *\"active\".*\"reason\": *\"asked for: all draws are tested after shading\"" ${late} --effects all)
+expect_refusal("effect qru.same_splat_pairs is called for" ${vrpipe} run ${draw} --variant qm --plugin ${plugin}
+  --unit qru=same-splat --effects auto,-qru.same_splat_pairs)
+
 # The unit that derives from a shipped one: its parameters, all counters, and the same result at every fidelity.
 set(counting ${WORK_DIR}/consumer/counting_rop.so)
 foreach(fidelity functional bound lt at cycle)

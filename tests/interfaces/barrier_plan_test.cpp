@@ -30,7 +30,9 @@ class BarrierPlanTest : public ::testing::Test {
   }
   /// The commands that have a barrier before them.
   std::vector<std::size_t> barriers() const {
-    const BarrierPlan plan(frame);
+    RenderContext context;
+    context.frame = std::make_shared<Frame>(frame);
+    const BarrierPlan plan(context);
     std::vector<std::size_t> found;
     for (std::size_t at = 0; at < frame.commands().size(); ++at) {
       if (plan.is_barrier(Frame::mark_of(at))) found.push_back(at);

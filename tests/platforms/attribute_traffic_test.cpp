@@ -31,6 +31,7 @@ RunRequest with_traffic(const Platform& platform, const std::string& variant, Fi
                         const std::function<void(RunRequest&)>& change = nullptr) {
   RunRequest request = request_of(variant, fidelity, change);
   request.platform = &platform;
+  request.effects = EffectChoice::everything();
   return request;
 }
 

@@ -32,6 +32,7 @@ RunRequest with_traffic(const Platform& platform, const std::string& variant, Fi
                         const std::function<void(RunRequest&)>& change = nullptr) {
   RunRequest request = request_of(variant, fidelity, change);
   request.platform = &platform;
+  request.effects = EffectChoice::everything();
   // What is missed is read, unless a test says otherwise.
   request.settings.insert(request.settings.begin(), {"zrop", "fast_clear", "off"});
   return request;

@@ -46,6 +46,7 @@ RunRequest on(const Platform& platform, const std::string& variant, Fidelity fid
   RunRequest request = request_of(variant, fidelity);
   request.platform = &platform;
   request.settings = std::move(settings);
+  request.effects = EffectChoice::everything();
   return request;
 }
 

@@ -163,6 +163,7 @@ TEST(TrafficToDram, IsWhatIsTouchedForTheFirstTimeWhereAllFitsIntoL2) {
       for (const Fidelity fidelity : fidelities()) {
         RunRequest request = request_of(variant, fidelity);
         request.platform = &platform_named(name);
+        request.effects = EffectChoice::everything();
         std::uint64_t of_color = 0;
         for (const unsigned draws : {1U, 3U}) {
           const bool fast_clear = draws == 3;
@@ -213,6 +214,7 @@ TEST(TrafficToDram, OfColourHasItsKneeWhereTheSurfaceFitsIntoL2) {
     for (const unsigned ways : {8U, 12U, 14U, 16U, 18U, 32U}) {
       RunRequest request = request_of("baseline", fidelity);
       request.platform = &platform;
+      request.effects = EffectChoice::everything();
       request.settings = {{"l2", "bytes", std::to_string(ways * 64 * 128)},
                           {"l2", "ways", std::to_string(ways)},
                           {"crop", "cache_bytes", "2048"}};

@@ -70,10 +70,10 @@ RC_GTEST_PROP(Bound, IsNeverAboveTheFidelitiesWithLinks, ()) {
   } catch (const UserError&) {
     RC_DISCARD("a cache that cannot be");
   }
-  const Cycle bound = *run(r, draw).cycles;
+  const Cycle bound = *run_trapped(r, draw).cycles;
   for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt, Fidelity::at}) {
     r.fidelity = fidelity;
-    const Cycle cycles = *run(r, draw).cycles;
+    const Cycle cycles = *run_trapped(r, draw).cycles;
     if (bound <= cycles) continue;
     std::string settings;
     for (const Setting& each : r.settings) settings += " " + each.unit + "." + each.parameter + "=" + each.value;

@@ -41,7 +41,7 @@ RC_GTEST_PROP(Pipeline, NoNanAndNoInfinityReachesTheTarget, ()) {
   r.settings.push_back({"state", "exponential", *rc::gen::element("ex2", "exact", "fp16", "table256", "table16")});
   r.settings.push_back({"state", "splat_extent", *rc::gen::element("obb", "aabb", "three_sigma")});
   r.settings.push_back({"state", "subpixel_bits", *rc::gen::element("8", "4", "12")});
-  const RunResult result = run(r, draw);
+  const RunResult result = run_trapped(r, draw);
   // A binary16 target keeps growing once its alpha is stuck, up to twice the colour; nearest rounding overflows.
   const bool may_overflow = r.format == ColorFormat::rgba16f && largest_color(draw) > half_max / 4;
   bool overflowed = false;
@@ -76,7 +76,7 @@ RC_GTEST_PROP(Pipeline, WithoutTerminationEveryVariantIsWithinTheRunningBound, (
     RunRequest r = request(variant_named(name), target);
     r.settings = sizes;
     r.settings.push_back({"state", "blend_rounding", rounds});
-    const RunResult result = run(r, draw);
+    const RunResult result = run_trapped(r, draw);
     std::uint64_t total = 0;
     for (std::uint32_t y = 0; y < draw.height; ++y) {
       for (std::uint32_t x = 0; x < draw.width; ++x) {
@@ -105,7 +105,7 @@ RC_GTEST_PROP(Pipeline, TerminationChangesAPixelByAtMostWhatTheThresholdLeaves, 
       RunRequest r = request(variant_named(name), target);
       r.termination = termination;
       r.settings = sizes;
-      const RunResult result = run(r, draw);
+      const RunResult result = run_trapped(r, draw);
       for (std::uint32_t y = 0; y < draw.height; ++y) {
         for (std::uint32_t x = 0; x < draw.width; ++x) {
           const OraclePixel exact = blend_exactly(fragments[std::size_t{y} * draw.width + x], context);
@@ -132,9 +132,9 @@ RC_GTEST_PROP(Pipeline, WhereOrderAloneDecidesBinSizesChangeNoBit, ()) {
   for (const char* name : {"baseline", "het"}) {
     RunRequest r = request(variant_named(name), target);
     r.termination = Termination::strict;
-    const RunResult plain = run(r, draw);
+    const RunResult plain = run_trapped(r, draw);
     r.settings = *bins();
-    const RunResult other = run(r, draw);
+    const RunResult other = run_trapped(r, draw);
     RC_ASSERT(same_bits(plain.framebuffer.color, other.framebuffer.color));
     RC_ASSERT(plain.counts.fragments_blended == other.counts.fragments_blended);
   }
@@ -143,10 +143,10 @@ RC_GTEST_PROP(Pipeline, WhereOrderAloneDecidesBinSizesChangeNoBit, ()) {
 RC_GTEST_PROP(Pipeline, MergingTakesNothingAwayAndAddsNothing, ()) {
   const Draw draw = *scene(60, 1.0F);
   const ColorFormat target = *format();
-  const RunResult plain = run(request(variant_named("baseline"), target), draw);
+  const RunResult plain = run_trapped(request(variant_named("baseline"), target), draw);
   RunRequest r = request(variant_named("qm"), target);
   r.settings = *bins();
-  const RunResult merged = run(r, draw);
+  const RunResult merged = run_trapped(r, draw);
   RC_ASSERT(plain.counts.fragments_rasterized == merged.counts.fragments_rasterized);
   RC_ASSERT(plain.counts.fragments_pruned == merged.counts.fragments_pruned);
   RC_ASSERT(plain.counts.quads_blended == merged.counts.quads_blended + merged.counts.quads_merged);
@@ -159,7 +159,7 @@ RC_GTEST_PROP(Pipeline, InStrictModeEveryFidelityIsTheUntimedOneBitForBit, ()) {
   RunRequest r = request(*variant(), *format());
   r.termination = Termination::strict;
   r.settings = *bins();
-  const RunResult untimed = run(r, draw);
+  const RunResult untimed = run_trapped(r, draw);
   for (const char* name : {"bound", "lt", "at", "cycle"}) {
     try {
       r.fidelity = fidelity_named(name);
@@ -168,7 +168,7 @@ RC_GTEST_PROP(Pipeline, InStrictModeEveryFidelityIsTheUntimedOneBitForBit, ()) {
     }
     r.stall_seed = static_cast<std::uint64_t>(*whole(1, 1000));
     r.stall_per_256 = *rc::gen::element(0U, 64U);
-    const RunResult timed = run(r, draw);
+    const RunResult timed = run_trapped(r, draw);
     RC_ASSERT(same_bits(untimed.framebuffer.color, timed.framebuffer.color));
     RC_ASSERT(untimed.counts.named() == timed.counts.named());
   }
@@ -184,7 +184,7 @@ RC_GTEST_PROP(Pipeline, AtCycleFidelityThePapersModeStaysWithinTheBound, ()) {
   r.settings = *bins();
   r.stall_seed = static_cast<std::uint64_t>(*whole(1, 1000));
   r.stall_per_256 = *rc::gen::element(0U, 64U);
-  const RunResult result = run(r, draw);
+  const RunResult result = run_trapped(r, draw);
   for (std::uint32_t y = 0; y < draw.height; ++y) {
     for (std::uint32_t x = 0; x < draw.width; ++x) {
       const OraclePixel exact = blend_exactly(fragments[std::size_t{y} * draw.width + x], context);
@@ -198,7 +198,7 @@ RC_GTEST_PROP(Pipeline, AtCycleFidelityThePapersModeStaysWithinTheBound, ()) {
 RC_GTEST_PROP(Pipeline, SplatsThatShowNothingChangeNoBit, ()) {
   const Draw draw = *scene(40, 1.0F);
   RunRequest r = request(variant_named("baseline"), *format());
-  const RunResult plain = run(r, draw);
+  const RunResult plain = run_trapped(r, draw);
   Draw padded = draw;
   Splat invisible = round_splat(8, 8, 4, 0.5F);
   invisible.opacity = 0;

@@ -143,7 +143,7 @@ inline RunRequest request(const Variant& variant, ColorFormat format, Fidelity f
 }
 
 /// Simulates; making a NaN out of numbers ends the test program.
-inline RunResult run(const RunRequest& request, const Draw& draw) {
+inline RunResult run_trapped(const RunRequest& request, const Draw& draw) {
   if (request.fidelity != Fidelity::functional) fresh_simulation();
   const TrapInvalid trap;
   return simulate(request, draw);

@@ -56,7 +56,6 @@ TEST_F(BadInput, Commands) {
 TEST_F(BadInput, Options) {
   refused({"run", "--scen", "tiny.spl"}, {"'--scen'", "vrpipe run", "did you mean --scene?"});
   refused({"run", "--formt=rgba8"}, {"'--formt'", "did you mean --format?"});
-  refused({"compare", "--effects", "all"}, {"'--effects'", "vrpipe compare", "--help"});
   refused({"compare", "--variant", "qm"}, {"'--variant'", "`vrpipe run`"});
   refused({"run", "-x"}, {"'-x'"});
   refused({"run", "extra"}, {"'extra'"});
@@ -141,6 +140,40 @@ TEST_F(BadInput, Machines) {
   refused_with_outputs({"run", "--unit", "qru=paring"}, {"'paring'", "qru", "did you mean pairing?"});
   refused_with_outputs({"run", "--unit", "qru"}, {"'qru'", "SLOT=IMPLEMENTATION"});
   refused({"units", "--slot", "tcc"}, {"'tcc'", "did you mean"});
+}
+
+TEST_F(BadInput, Effects) {
+  const std::vector<std::pair<const char*, std::vector<std::string>>> lists{
+      {"al", {"unknown effect 'al'", "`vrpipe units` lists all"}},
+      {"hi_z", {"unknown effect 'hi_z'", "did you mean raster.hi_z?"}},
+      {"all,-raster.hiz", {"unknown effect 'raster.hiz'", "did you mean raster.hi_z?"}},
+      {",", {"--effects ,", "a name is empty"}},
+      {"auto,", {"--effects auto,", "a name is empty"}},
+      {"all,,raster.hi_z", {"a name is empty"}},
+      {"all,-", {"a name is empty"}},
+      {"raster.hi_z,all", {"'all' comes after another word"}},
+      {"auto,all", {"'all' comes after another word"}},
+      {"-raster.hi_z", {"does not say of what raster.hi_z is left out", "all,-raster.hi_z"}},
+      {"all,-sm.alpha_pruning", {"sm.alpha_pruning is always active"}},
+      {"all,raster.hi_z,-raster.hi_z", {"raster.hi_z is both taken in and left out"}},
+      {"auto,-raster.hi_z,raster.hi_z", {"raster.hi_z is both taken in and left out"}},
+      {"raster.hi_z,raster.hi_z", {"raster.hi_z is named twice"}},
+      {"all,-raster.hi_z,-raster.hi_z", {"raster.hi_z is named twice"}}};
+  for (const char* command : {"run", "compare", "accuracy"}) {
+    for (const auto& [list, parts] : lists) refused_with_outputs({command, "--effects", list}, parts);
+    refused_with_outputs({command, "--effects", "all", "--effects", "auto"}, {"twice", "--effects", "'all'", "'auto'"});
+    refused_with_outputs({command, "--effects", ""}, {"--effects", "it is empty"});
+  }
+  refused({"run", "--scene", "tiny.spl", "--effects", "auto,-zrop.termination"},
+          {"zrop.termination is called for", "left out by force"});
+  for (const char* command : {"run", "compare"}) {
+    refused_with_outputs({command, "--effects", "all", "--explain-effects"}, {"nothing to explain", "--effects all"});
+    refused_with_outputs({command, "--explain-effects=2"}, {"unexpected value (--explain-effects)", "it is a switch"});
+  }
+  refused({"run", "--explain-effects", "--trace", "trace.csv"}, {"--explain-effects", "--trace"});
+  refused({"accuracy", "--explain-effects"}, {"'--explain-effects'", "it is an option of `vrpipe run`"});
+  refused({"units", "--slot", "clok"}, {"'clok'", "did you mean clock?"});
+  refused({"units", "--effects=all"}, {"unexpected value (--effects)", "it is a switch"});
 }
 
 TEST_F(BadInput, Traces) {

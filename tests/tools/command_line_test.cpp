@@ -32,42 +32,24 @@ TEST_F(CommandLine, VersionAndHelp) {
 }
 
 TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
-  const std::vector<std::string> shared{"--scene",
-                                        "--size",
-                                        "--camera",
-                                        "--eye",
-                                        "--look-at",
-                                        "--up",
-                                        "--fovy",
-                                        "--platform",
-                                        "--set",
-                                        "--unit",
-                                        "--plugin",
-                                        "--fidelity",
-                                        "--format",
-                                        "--termination",
-                                        "--background",
-                                        "--output",
-                                        "--json",
-                                        "--save-draw",
-                                        "default: agx-orin",
-                                        "default: cycle",
-                                        "default: rgba16f",
-                                        "default: paper",
-                                        "default: 0,0,0",
-                                        "pixels",
-                                        "DEGREES",
-                                        "Examples:"};
+  const std::vector<std::string> shared{
+      "--scene",        "--size",           "--camera",       "--eye",          "--look-at",
+      "--up",           "--fovy",           "--platform",     "--set",          "--unit",
+      "--plugin",       "--fidelity",       "--format",       "--effects",      "--termination",
+      "--background",   "--output",         "--json",         "--save-draw",    "default: agx-orin",
+      "default: cycle", "default: rgba16f", "default: paper", "default: 0,0,0", "pixels",
+      "DEGREES",        "Examples:"};
   for (const char* command : {"run", "compare", "accuracy"}) {
     const Finished help = vrpipe({command, "--help"});
     EXPECT_EQ(help.code, 0);
     expect_in(help.out, shared);
     expect_in(help.out, {std::string(command) == "run" ? "--variant" : "--jobs"});
     EXPECT_EQ(help.out.find("--frame") != std::string::npos, std::string(command) != "accuracy");
+    EXPECT_EQ(help.out.find("--explain-effects") != std::string::npos, std::string(command) != "accuracy");
   }
   expect_in(vrpipe({"run", "--help"}).out, {"--trace FILE.csv", "--trace-every CYCLES", "--trace-statistics NAME,..."});
   expect_in(vrpipe({"accuracy", "--help"}).out, {"--quick", "--repeat", "--html", "--markdown"});
-  expect_in(vrpipe({"units", "--help"}).out, {"--slot", "--platform", "--plugin", "--json", "--markdown"});
+  expect_in(vrpipe({"units", "--help"}).out, {"--slot", "--platform", "--plugin", "--effects", "--json", "--markdown"});
   expect_in(vrpipe({"platforms", "--help"}).out, {"--plugin", "--json"});
   expect_in(vrpipe({"scenes", "--help"}).out, {"--json"});
 }

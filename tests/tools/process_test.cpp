@@ -25,8 +25,9 @@ class Process : public ToolTest {
   Finished forked(const std::function<int()>& act) const { return in_fork(folder(), act); }
 
   /// The command with a QRU that this process brings, as a plugin would.
-  Finished with_unit(const Implementation& unit, std::vector<const char*> arguments) const {
+  Finished with_unit(Implementation unit, std::vector<const char*> arguments) const {
     arguments.insert(arguments.begin(), "vrpipe");
+    unit.trust = Trust::checked;
     return forked([&] {
       fresh_simulation();
       Registry::instance().add(unit);

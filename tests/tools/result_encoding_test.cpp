@@ -65,6 +65,8 @@ RunResult full_result() {
   result.result_hash = "0123456789abcdef";
   result.kernel_events = 9;
   result.framebuffer.addresses.attributes = {0x10000, 123};
+  result.effects = {{"crop.blend_hazard", true, EffectProof::verified, "\xe9"},
+                    {"tc.time_out", false, EffectProof::bounded, "after 150 cycles"}};
   result.draws = {{"first", {{"quads_blended", 7}}}, {"", {}}};
   return result;
 }
@@ -113,7 +115,7 @@ void expect_equal_statistics(const StatisticReport& actual, const StatisticRepor
 /// All but the request and the surfaces. A new member has to be named here, and compared.
 void expect_equal(const RunResult& actual, const RunResult& expected) {
   const auto& [request, cycles, milliseconds, host_seconds, cpu_seconds, counts, utilization, units, bottleneck,
-               statistics, implementations, parameters, outside_validated_range, result_hash, kernel_events,
+               statistics, implementations, parameters, outside_validated_range, effects, result_hash, kernel_events,
                framebuffer, draws] = actual;
   EXPECT_EQ(framebuffer.addresses.attributes.address, expected.framebuffer.addresses.attributes.address);
   EXPECT_EQ(framebuffer.addresses.attributes.bytes, expected.framebuffer.addresses.attributes.bytes);
@@ -122,6 +124,14 @@ void expect_equal(const RunResult& actual, const RunResult& expected) {
     const auto& [name, counts_of_draw] = draws[i];
     EXPECT_EQ(name, expected.draws[i].name);
     EXPECT_EQ(counts_of_draw, expected.draws[i].counts);
+  }
+  ASSERT_EQ(effects.size(), expected.effects.size());
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    const auto& [name, omitted, proof, reason] = effects[i];
+    EXPECT_EQ(name, expected.effects[i].name);
+    EXPECT_EQ(omitted, expected.effects[i].omitted);
+    EXPECT_EQ(proof, expected.effects[i].proof);
+    EXPECT_EQ(reason, expected.effects[i].reason);
   }
   EXPECT_EQ(cycles, expected.cycles);
   EXPECT_EQ(milliseconds, expected.milliseconds);
@@ -213,6 +223,8 @@ TEST(ResultEncoding, EveryFieldHasItsOwnName) {
   EXPECT_EQ(json["statistics"][0]["instances"][0], Json({{"path", "gpc0.crop"}, {"value", 18U}, {"denominator", 19U}}));
   EXPECT_EQ(json["implementations"][0][0], "qru");
   EXPECT_EQ(json["parameters"], Json(result.parameters));
+  EXPECT_EQ(json["effects"][1],
+            Json({{"name", "tc.time_out"}, {"omitted", false}, {"proof", "bounded"}, {"reason", "after 150 cycles"}}));
   EXPECT_EQ(json["outside_validated_range"][1], "");
   EXPECT_EQ(json["result_hash"], result.result_hash);
   EXPECT_EQ(json["kernel_events"], result.kernel_events);
@@ -267,7 +279,8 @@ TEST(ResultEncoding, WhatIsMissingTooMuchOrOfAnotherTypeIsRefused) {
   for_each_value(json, [&](Json& value) {
     const Json good = value;
     // A negative or broken number is no count, and a count no share.
-    for (const Json& bad : {Json(true), Json(-1), good.is_number_float() ? Json(1U) : Json(1.5), Json({{"x", 1U}})}) {
+    for (const Json& bad : {good.is_boolean() ? Json(1U) : Json(true), Json(-1),
+                            good.is_number_float() ? Json(1U) : Json(1.5), Json({{"x", 1U}})}) {
       value = bad;
       EXPECT_NE(refusal_of(json), "") << bad << " in place of " << good;
     }
@@ -285,6 +298,9 @@ TEST(ResultEncoding, WhatIsMissingTooMuchOrOfAnotherTypeIsRefused) {
   });
   json["units"][0]["cycles"].push_back(1U);
   EXPECT_NE(refusal_of(json), "") << "a unit state too many";
+  json = encode(full_result());
+  json["effects"][0]["proof"] = "likely";
+  EXPECT_NE(refusal_of(json).find("proof"), std::string::npos) << refusal_of(json);
 }
 
 TEST(ResultEncoding, ADamagedResultIsRefused) {

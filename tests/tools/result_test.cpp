@@ -90,7 +90,7 @@ void check_run(const json& run, bool timed) {
       EXPECT_TRUE(share.get<double>() >= 0 && share.get<double>() <= 1) << unit << share;
     }
   }
-  EXPECT_TRUE(run["effects"].is_array());
+  EXPECT_FALSE(run["effects"].empty());
   EXPECT_EQ(run["result_hash"].get<std::string>().size(), 16U);
   EXPECT_TRUE(run["images"].contains("png") && run["images"].contains("exr"));
   for (const json& unit : run["units"]) {
@@ -129,6 +129,7 @@ TEST_F(Result, CompareFollowsTheSchema) {
   EXPECT_EQ(result["fidelity"], "cycle");
   EXPECT_EQ(result["format"], "rgba16f");
   EXPECT_EQ(result["termination"], "paper");
+  EXPECT_EQ(result["effects"], "auto");
   ASSERT_EQ(result["runs"].size(), 4U);
   std::map<std::string, double> cycles;
   const std::vector<std::string> order{"baseline", "qm", "het", "het+qm"};
@@ -454,7 +455,8 @@ TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
   };
   check("Of `run` and `compare`",
         {of_scene({"run"}), of_scene({"compare"}), json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional"}),
-         json_of({"run", "--scene", "tiny.spl", "--platform", "desktop"}), json_of({"run", "--frame", "frame.json"})});
+         json_of({"run", "--scene", "tiny.spl", "--platform", "desktop"}), json_of({"run", "--frame", "frame.json"}),
+         json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--explain-effects"})});
   check("Of `accuracy`", {of_scene({"accuracy", "--quick"}), json_of({"accuracy", "--quick", "--scene", "tiny.spl"})});
 }
 

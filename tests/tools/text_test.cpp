@@ -42,6 +42,44 @@ TEST(Text, TablesAlign) {
   EXPECT_NE(table.text(terminal).find("\x1b[32m"), std::string::npos);
 }
 
+TEST(Text, ColumnsOfTablesGoToTheLeftIfAsked) {
+  TextTable table({"", "word", "number", "reason"});
+  table.left(1);
+  table.left(3);
+  table.row({"a", "x", "1", "because"});
+  table.row({"b", "longer", "22"});
+  table.row({"c", "", "333", "no"});
+  EXPECT_EQ(table.text({}),
+            "     word    number  reason\n"
+            "----------------------------\n"
+            "  a  x            1  because\n"
+            "  b  longer      22\n"
+            "  c             333  no\n");
+}
+
+TEST(Text, LinesBreakBetweenWords) {
+  using Lines = std::vector<std::string>;
+  EXPECT_EQ(tools::wrapped("", 5), Lines{""});
+  EXPECT_EQ(tools::wrapped("ab cd ef", 5), (Lines{"ab cd", "ef"}));
+  EXPECT_EQ(tools::wrapped("ab cd ef", 4), (Lines{"ab", "cd", "ef"}));
+  EXPECT_EQ(tools::wrapped("a longest b", 5), (Lines{"a", "longest", "b"}));
+}
+
+TEST(Text, TheLastColumnOfATableIsWrappedToItsWidth) {
+  TextTable table({"", "number", "reason"});
+  table.wrap(33);
+  table.group("a group");
+  table.row({"a", "1", "short"});
+  table.row({"b", "22", "of more words than there is room for"});
+  EXPECT_EQ(table.text({}),
+            "     number  reason\n"
+            "---------------------------------\n"
+            "a group\n"
+            "  a       1  short\n"
+            "  b      22  of more words than\n"
+            "             there is room for\n");
+}
+
 TEST(Text, ProgressFitsItsLine) {
   const std::vector<std::string> names{"baseline", "qm", "het", "het+qm"};
   for (unsigned width : {10U, 50U, 79U, 200U}) {

@@ -42,6 +42,7 @@ Case shrunk(Case c, const std::string& rule, const Limits& limits) {
   for (std::size_t i = c.settings.size() - kept; i-- > 0;) {
     without([&](Case& x) { x.settings.erase(x.settings.begin() + static_cast<std::ptrdiff_t>(i)); });
   }
+  if (!c.effects.empty()) without([](Case& x) { x.effects.clear(); });
   if (!c.units.empty()) without([](Case& x) { x.units.clear(); });
   if (c.platform != &platforms().front())
     without([](Case& x) {

@@ -230,6 +230,18 @@ class Judge {
     const auto again = simulated(stage, request);
     if (!once || !again) return;
     for (const Finding& finding : broken_repetition(*once, *again)) find(stage, finding);
+    effects(*once);
+  }
+
+  void effects(const RunResult& automatic) {
+    if (case_.effects.empty()) return;
+    RunRequest request = case_.request(case_.repeated);
+    request.effects = EffectChoice::parse(case_.effects);
+    const std::string stage = std::string(name_of(case_.repeated)) + " with effects " + case_.effects;
+    const auto other = simulated(stage, request);
+    if (!other) return;
+    for (const Finding& finding : broken_effects(automatic, *other)) find(stage, finding);
+    compare_stencils(stage, automatic, *other);
   }
 
   void split(const RunResult& untimed) {
@@ -439,6 +451,21 @@ std::vector<Finding> broken_repetition(const RunResult& once, const RunResult& a
   find("draws", once.draws.size() == again.draws.size());
   for (std::size_t i = 0; i < std::min(once.draws.size(), again.draws.size()); ++i) {
     find("counts of draw " + std::to_string(i), once.draws[i].counts == again.draws[i].counts);
+  }
+  return findings;
+}
+
+std::vector<Finding> broken_effects(const RunResult& result, const RunResult& other) {
+  std::vector<Finding> findings;
+  const auto find = [&](const std::string& what, bool same) {
+    if (!same) findings.push_back({"what a frame does not call for changes nothing", what + " differ"});
+  };
+  find("images", same_image(result.framebuffer.color, other.framebuffer.color));
+  find("counts", result.counts.named() == other.counts.named());
+  find("cycles", result.cycles == other.cycles);
+  find("hashes", result.result_hash == other.result_hash);
+  for (std::size_t i = 0; i < std::min(result.draws.size(), other.draws.size()); ++i) {
+    find("counts of draw " + std::to_string(i), result.draws[i].counts == other.draws[i].counts);
   }
   return findings;
 }

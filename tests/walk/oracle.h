@@ -37,6 +37,9 @@ std::vector<Finding> broken_beginning(const RunResult& frame, std::size_t draw, 
 /// The rules between two runs of the same request.
 std::vector<Finding> broken_repetition(const RunResult& once, const RunResult& again);
 
+/// The rules between two runs of the same request, with other effects that the frame does not call for.
+std::vector<Finding> broken_effects(const RunResult& result, const RunResult& other);
+
 /// Runs a case at every fidelity, with stalls, and twice, and checks all rules. Simulates several times in this process.
 void judge(const Case& c, Verdict& verdict);
 

@@ -103,6 +103,17 @@ TEST_F(Oracle, SeesARepetitionThatDiffersInOneStatistic) {
               "equal requests, equal results");
 }
 
+TEST_F(Oracle, SeesAnEffectThatWasMissed) {
+  const std::string rule = "what a frame does not call for changes nothing";
+  EXPECT_TRUE(broken_effects(*result, *result).empty());
+  expect_rule(broken_effects(*result, changed([](RunResult& r) { ++*r.cycles; })), rule);
+  expect_rule(broken_effects(*result, changed([](RunResult& r) { ++r.counts.warps; })), rule);
+  expect_rule(broken_effects(*result, changed([](RunResult& r) { r.result_hash.back() ^= 1; })), rule);
+  const RunResult other =
+      changed([](RunResult& r) { r.framebuffer.color = ColorSurface(48, 40, ColorFormat::rgba16f); });
+  expect_rule(broken_effects(*result, other), rule);
+}
+
 /// Two draws, the second behind a clear of all.
 class OracleOfFrames : public Oracle {
  protected:

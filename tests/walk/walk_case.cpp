@@ -1,6 +1,7 @@
 #include "walk/walk_case.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -12,6 +13,7 @@
 
 #include <vrpipe/arithmetic/blend.h>
 #include <vrpipe/arithmetic/random.h>
+#include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/wiring.h>
@@ -346,6 +348,17 @@ void draw_l1(Dice& dice, std::vector<Setting>& settings) {
   if (dice.chance(30)) settings.push_back({"l1", "write_allocate", "byte-mask"});
 }
 
+/// As for `--effects`.
+std::string draw_effects(Dice& dice) {
+  if (dice.chance(50)) return "all";
+  std::string list = "auto";
+  const unsigned percent = dice.one_of(std::array{5U, 20U, 60U});
+  for (const Effect& effect : effects()) {
+    if (dice.chance(percent)) list += "," + effect.full_name();
+  }
+  return list;
+}
+
 const char* word_for(Termination termination) { return termination == Termination::strict ? "strict" : "paper"; }
 
 }  // namespace
@@ -432,6 +445,8 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
     c.parts.clear();
     c.passes = 1;
   }
+  Dice of_effects(mix(mix(seed + 2) ^ index));
+  if (!c.refused && of_effects.chance(33)) c.effects = draw_effects(of_effects);
   return c;
 }
 
@@ -442,6 +457,7 @@ std::string describe(const Case& c) {
   if (c.connects_z_caches) text += ", z-caches connected,";
   if (c.inserts_l1s) text += ", L1s inserted,";
   if (c.passes > 1) text += fmt::format(" {} passes", c.passes);
+  if (!c.effects.empty()) text += " effects " + c.effects;
   for (const UnitChoice& unit : c.units) text += fmt::format(" {}={}", unit.slot, unit.implementation);
   for (const Setting& setting : c.settings) {
     text += fmt::format(" {}.{}={}", setting.unit, setting.parameter, setting.value);

@@ -44,6 +44,9 @@ struct Case {
   Fidelity repeated = Fidelity::cycle;
   Fidelity stalled = Fidelity::cycle;
   std::uint64_t stall_seed = 1;
+  /// What is simulated in another run of `repeated`: all effects, or some that the frame may not call for; empty for no such
+  /// run.
+  std::string effects;
 
   RunRequest request(Fidelity fidelity) const;
   /// Whether there is nothing but the draw of the scene.

@@ -18,6 +18,7 @@ class CompareCommand : public Command {
   void declare(CLI::App& app) override {
     arguments_.declare(app, SimulationArguments::Variants::all);
     arguments_.declare_frames(app);
+    arguments_.declare_explanation(app);
     app.footer(
         "Simulates four GPUs that differ only in the units swapped in, on the same draw: baseline, qm (TGC and QRU\n"
         "merge overlapping quads), het (ZROP and CROP terminate opaque pixels) and het+qm (both). Prints cycles,\n"

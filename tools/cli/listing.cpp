@@ -2,6 +2,8 @@
 
 #include <iostream>
 
+#include <vrpipe/component/printable.h>
+
 #include "host/output_file.h"
 #include "output/json_text.h"
 
@@ -10,6 +12,15 @@ namespace vrpipe::tools {
 void declare_json(CLI::App& app, Values& json) {
   add_option(app, "--json", json, "FILE|-", "writes the list as JSON; `-`: to stdout, in place of the text",
              "Where results go");
+}
+
+std::string markdown_escaped(const std::string& text) {
+  std::string result;
+  for (const char c : printable(text)) {
+    if (c == '|' || c == '<') result += '\\';
+    result += c;
+  }
+  return result;
 }
 
 void print_listing(const Json& json, const std::string& text, const Values& json_option, const Values& plugins) {

@@ -12,6 +12,9 @@ namespace vrpipe::tools {
 /// Adds `--json FILE|-`.
 void declare_json(CLI::App& app, Values& json);
 
+/// As a cell of a table, on one line.
+std::string markdown_escaped(const std::string& text);
+
 /// Prints the text, or writes the JSON to where --json says, which must not be one of the plugins. Throws UserError.
 void print_listing(const Json& json, const std::string& text, const Values& json_option, const Values& plugins = {});
 

@@ -146,6 +146,12 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              "cycle: " +
                  names_of(fidelities()) + " (default: cycle)",
              rules_group);
+  add_option(app, "--effects", effects_, "LIST",
+             "what is simulated: auto, what the frame calls for; approximate, of that\n"
+             "nothing whose absence is bounded; all; or a list, as in all,-raster.hi_z,\n"
+             "where -NAME is left out (docs/effects.md; `vrpipe units --effects` lists\n"
+             "them) (default: auto)",
+             rules_group);
   add_option(app, "--format", format_, "NAME", "colour target: rgba8, rgba16f or rgba32f (default: rgba16f)",
              rules_group);
   add_option(app, "--termination", termination_, "NAME",
@@ -195,6 +201,14 @@ void SimulationArguments::declare_frames(CLI::App& app) {
              "last a draw that sets the stencil where a pixel has terminated (default: 1;\n"
              "docs/early-termination.md)",
              scene_group);
+}
+
+void SimulationArguments::declare_explanation(CLI::App& app) {
+  app.add_flag("--explain-effects", explain_effects_,
+               "measures what each effect that was left out would cost the host: repeats\n"
+               "the run with it taken in, three times, and with all (docs/effects.md)")
+      ->disable_flag_override()
+      ->group(result_group);
 }
 
 SceneRequest SimulationArguments::scene_request() const {
@@ -257,6 +271,18 @@ std::shared_ptr<Trace> SimulationArguments::trace(const RunRequest& request) con
                                  names ? parse_names(*names, "--trace-statistics") : Trace::default_names(request));
 }
 
+void SimulationArguments::check_explanation(const EffectChoice& effects) const {
+  if (!explain_effects_) return;
+  if (effects.base == EffectChoice::Base::all && effects.without.empty()) {
+    throw UserError("nothing to explain", "--explain-effects", "--effects " + effects.text() + " leaves nothing out",
+                    "leave out this or --effects");
+  }
+  if (!trace_.empty()) {
+    throw UserError("cannot use option", "--explain-effects", "it repeats the run, and --trace writes one",
+                    "leave out this or --trace");
+  }
+}
+
 SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<std::string>& command) const {
   // Plugins first: they may bring the platform and the units that the other options name.
   load_plugins(plugins_);
@@ -271,6 +297,10 @@ SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<
   const auto platform = single(platform_, "--platform");
   request.platform = platform ? &platform_named(*platform) : &platforms().front();
   if (const auto name = single(fidelity_, "--fidelity")) request.fidelity = fidelity_named(*name);
+  if (const auto list = single(effects_, "--effects")) request.effects = EffectChoice::parse(*list);
+  check_explanation(request.effects);
+  job.explain_effects = explain_effects_;
+  request.reads_statistics = single(json_, "--json").has_value();
   if (const auto name = single(format_, "--format")) request.format = color_format_named(*name);
   if (const auto name = single(termination_, "--termination")) request.termination = termination_named(*name);
   refuse_keys_given_twice(settings_, "--set");

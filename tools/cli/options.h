@@ -37,6 +37,8 @@ class SimulationArguments {
   void declare(CLI::App& app, Variants variants);
   /// --frame and --multi-pass, for commands that draw frames of several draws as well.
   void declare_frames(CLI::App& app);
+  /// --explain-effects, for commands that report effects of each run.
+  void declare_explanation(CLI::App& app);
   /// Loads the plugins and checks every option but the names of output files, which the commands know; `command` is the
   /// whole command line. Throws UserError.
   SimulationJob resolve(Variants variants, const std::vector<std::string>& command) const;
@@ -46,13 +48,15 @@ class SimulationArguments {
   FrameDescription frame() const;
   std::vector<NamedFile> inputs(const FrameDescription& frame) const;
   std::shared_ptr<Trace> trace(const RunRequest& request) const;
+  void check_explanation(const EffectChoice& effects) const;
 
   Values meshes_;
   Values scene_, frame_, passes_, size_, camera_, eye_, look_at_, up_, fovy_;
   Values platform_, settings_, variant_, units_, plugins_;
-  Values fidelity_, format_, termination_;
+  Values fidelity_, effects_, format_, termination_;
   Values background_, output_, json_, save_draw_, jobs_;
   Values trace_, trace_every_, trace_statistics_;
+  bool explain_effects_ = false;
 };
 
 /// `--plugin` for commands that only list things.

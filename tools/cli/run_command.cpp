@@ -16,6 +16,7 @@ class RunCommand : public Command {
   void declare(CLI::App& app) override {
     arguments_.declare(app, SimulationArguments::Variants::one);
     arguments_.declare_frames(app);
+    arguments_.declare_explanation(app);
     app.footer(
         "Prints cycles, counts, utilization and what each unit spent its cycles on.\n"
         "\n"
@@ -26,6 +27,7 @@ class RunCommand : public Command {
         "  vrpipe run --frame frame.json --variant het\n"
         "  vrpipe run --set crop.cache_bytes=32768 --set tc.bins=64 --json -\n"
         "  vrpipe run --trace run.csv --trace-every 10000 --trace-statistics 'crop.quads_blended,l2.*'\n"
+        "  vrpipe run --size 320x180 --explain-effects\n"
         "  vrpipe run --plugin my_qru.so --unit qru=my-qru\n"
         "  vrpipe run --fidelity functional --termination strict");
   }

@@ -10,6 +10,7 @@
 #include <vrpipe/platforms/simulation.h>
 
 #include "cli/command_line.h"
+#include "cli/effects_listing.h"
 #include "cli/listing.h"
 #include "cli/options.h"
 #include "host/stdout_to_stderr.h"
@@ -68,9 +69,15 @@ std::string role(const ParameterListing& unit, const Used& used) {
   return unit.pass_through ? " (where a variant does without the unit)" : "";
 }
 
+/// Effects stand below all implementations of their slot.
+bool is_last_of_slot(const std::vector<ParameterListing>& units, std::size_t index) {
+  return index + 1 == units.size() || units[index + 1].unit != units[index].unit;
+}
+
 std::string as_text(const std::vector<ParameterListing>& units, const Used& used, const TextStyle& style) {
   std::string text;
-  for (const ParameterListing& unit : units) {
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const ParameterListing& unit = units[i];
     if (!text.empty()) text += '\n';
     text += style.bold(printable(heading(unit))) + printable(role(unit, used)) + "\n  " + printable(unit.description) +
             "\n";
@@ -88,50 +95,57 @@ std::string as_text(const std::vector<ParameterListing>& units, const Used& used
                           style.bold(printable(statistic.name)), printable(statistic.unit),
                           printable(meaning_of(statistic)));
     }
+    if (is_last_of_slot(units, i)) text += effects_as_text(effects_of(unit.unit), style);
   }
   return text;
-}
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : printable(text)) {
-    if (c == '|' || c == '<') result += '\\';
-    result += c;
-  }
-  return result;
 }
 
 /// The reference that the documentation holds, a table for each implementation.
 std::string as_markdown(const std::vector<ParameterListing>& units, const Used& used) {
   std::string text;
   std::string slot;
-  for (const ParameterListing& unit : units) {
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const ParameterListing& unit = units[i];
     if (!text.empty()) text += '\n';
     const std::string chapter = unit.implementation.empty() ? "links" : unit.unit;
     if (chapter != slot) {
       slot = chapter;
       text += "## " + slot + "\n\n";
     }
-    text += fmt::format("### `{}`{}\n\n{}.\n", heading(unit), role(unit, used), escaped(unit.description));
+    text += fmt::format("### `{}`{}\n\n{}.\n", heading(unit), role(unit, used), markdown_escaped(unit.description));
     if (!unit.parameters->parameters().empty()) {
       text += "\n| parameter | default | unit | allowed | meaning | default from |\n|---|---|---|---|---|---|\n";
     }
     for (const Parameter* parameter : unit.parameters->parameters()) {
       text += fmt::format("| `{}.{}` | {} | {} | {} | {} | {} |\n", unit.unit, parameter->name(),
-                          parameter->default_value(), escaped(parameter->unit()), escaped(parameter->range()),
-                          escaped(parameter->meaning()), escaped(parameter->source()));
+                          parameter->default_value(), markdown_escaped(parameter->unit()),
+                          markdown_escaped(parameter->range()), markdown_escaped(parameter->meaning()),
+                          markdown_escaped(parameter->source()));
     }
     const std::vector<StatisticReport> statistics = list_statistics(unit);
     if (!statistics.empty()) text += "\n| statistic | kind | unit | meaning |\n|---|---|---|---|\n";
     for (const StatisticReport& statistic : statistics) {
-      text += fmt::format("| `{}` | {} | {} | {} |\n", statistic.name, statistic.kind, escaped(statistic.unit),
-                          escaped(meaning_of(statistic)));
+      text += fmt::format("| `{}` | {} | {} | {} |\n", statistic.name, statistic.kind, markdown_escaped(statistic.unit),
+                          markdown_escaped(meaning_of(statistic)));
     }
+    const std::string effects = is_last_of_slot(units, i) ? effects_as_markdown(effects_of(unit.unit)) : std::string();
+    if (!effects.empty()) text += fmt::format("\n### Effects of `{}`\n\n", unit.unit) + effects;
   }
   return text;
 }
 
-Json as_json(const std::vector<ParameterListing>& units, const Used& used) {
+/// What has effects and is none of these units, such as the clock.
+std::map<std::string, EffectList> effects_of_others(const std::vector<ParameterListing>& units,
+                                                    const EffectList& effects) {
+  std::map<std::string, EffectList> others;
+  for (const Effect* effect : effects) {
+    const auto is_its = [&](const ParameterListing& unit) { return unit.unit == effect->component; };
+    if (std::none_of(units.begin(), units.end(), is_its)) others[effect->component].push_back(effect);
+  }
+  return others;
+}
+
+Json as_json(const std::vector<ParameterListing>& units, const EffectList& effects, const Used& used) {
   Json list = Json::array();
   for (const ParameterListing& unit : units) {
     Json parameters = Json::array();
@@ -161,13 +175,18 @@ Json as_json(const std::vector<ParameterListing>& units, const Used& used) {
                     {"parameters", std::move(parameters)},
                     {"statistics", std::move(statistics)}});
   }
-  return {{"schema", "vrpipe.units/1"}, {"platform", used.platform.name}, {"units", std::move(list)}};
+  return {{"schema", "vrpipe.units/1"},
+          {"platform", used.platform.name},
+          {"units", std::move(list)},
+          {"effects", effects_as_json(effects)}};
 }
 
 class UnitsCommand : public Command {
  public:
   std::string name() const override { return "units"; }
-  std::string summary() const override { return "every unit, its implementations, all parameters and statistics"; }
+  std::string summary() const override {
+    return "every unit, its implementations, all parameters, statistics and effects";
+  }
 
   void declare(CLI::App& app) override {
     add_option(app, "--slot", slot_, "NAME", "only the units of this slot, e.g. tc", "What is listed");
@@ -175,12 +194,17 @@ class UnitsCommand : public Command {
                "values as this GPU sets them (default: " + platforms().front().name + ")", "What is listed");
     add_option(app, "--plugin", plugins_, "FILE.so", "loads a plugin's units first; can be repeated", "What is listed");
     declare_json(app, json_);
+    app.add_flag("--effects", effects_only_,
+                 "only effects: what can be left out, when, and what notices (docs/effects.md)")
+        ->disable_flag_override()
+        ->group("What is listed");
     app.add_flag("--markdown", markdown_, "prints the reference as Markdown")
         ->disable_flag_override()
         ->group("Where results go");
     app.footer(
         "Examples:\n"
         "  vrpipe units --slot crop\n"
+        "  vrpipe units --effects\n"
         "  vrpipe run --set crop.cache_bytes=32768      changes a parameter\n"
         "  vrpipe run --unit qru=pass-through           puts another unit into a slot");
   }
@@ -190,31 +214,55 @@ class UnitsCommand : public Command {
     const auto named = single(platform_, "--platform");
     const Platform& platform = named ? platform_named(*named) : platforms().front();
     std::vector<ParameterListing> units = all_parameters(&platform);
-    if (const auto slot = single(slot_, "--slot")) {
-      std::vector<std::string> slots;
-      for (const ParameterListing& unit : units) slots.push_back(unit.unit);
-      const auto is_other = [&](const ParameterListing& unit) { return unit.unit != *slot; };
-      units.erase(std::remove_if(units.begin(), units.end(), is_other), units.end());
-      if (units.empty()) {
-        throw UserError("unknown slot '" + *slot + "'", "--slot", "there is no such slot",
-                        "did you mean " + nearest_name(*slot, slots) + "? `vrpipe units` lists all");
-      }
-    }
+    EffectList effects = all_effects();
+    const auto slot = single(slot_, "--slot");
+    if (slot) keep_alone(*slot, units, effects);
+    if (effects_only_) units.clear();
     const TextStyle style = stdout_style();
     Json json;
     std::string text;
     {
       const StdoutToStderr redirected;  // plugins may print while their units are made
       const Used used(platform);
-      json = as_json(units, used);
-      text = markdown_ ? as_markdown(units, used) : as_text(units, used, style);
+      json = as_json(units, effects, used);
+      text = effects_only_ ? effects_alone(effects, style) : everything(units, effects, used, style);
     }
     print_listing(json, text, json_, plugins_);
   }
 
  private:
+  std::string effects_alone(const EffectList& effects, const TextStyle& style) const {
+    if (!markdown_) return effects_as_text(effects, style);
+    return slot_.empty() ? all_effects_as_markdown() : effects_as_markdown(effects);
+  }
+  std::string everything(const std::vector<ParameterListing>& units, const EffectList& effects, const Used& used,
+                         const TextStyle& style) const {
+    std::string text = markdown_ ? as_markdown(units, used) : as_text(units, used, style);
+    for (const auto& [component, some] : effects_of_others(units, effects)) {
+      if (!text.empty()) text += '\n';
+      text += markdown_ ? fmt::format("## {}\n\n", component) + effects_as_markdown(some)
+                        : style.bold(component) + "\n" + effects_as_text(some, style);
+    }
+    return text;
+  }
+
+  /// Throws UserError for what has neither units nor effects.
+  static void keep_alone(const std::string& slot, std::vector<ParameterListing>& units, EffectList& effects) {
+    std::vector<std::string> slots;
+    for (const ParameterListing& unit : units) slots.push_back(unit.unit);
+    for (const Effect* effect : effects) slots.push_back(effect->component);
+    if (std::find(slots.begin(), slots.end(), slot) == slots.end()) {
+      throw UserError("unknown slot '" + slot + "'", "--slot", "there is no such slot",
+                      "did you mean " + nearest_name(slot, slots) + "? `vrpipe units` lists all");
+    }
+    const auto is_other = [&](const ParameterListing& unit) { return unit.unit != slot; };
+    units.erase(std::remove_if(units.begin(), units.end(), is_other), units.end());
+    effects = effects_of(slot);
+  }
+
   Values slot_, platform_, plugins_, json_;
   bool markdown_ = false;
+  bool effects_only_ = false;
 };
 
 }  // namespace

@@ -54,9 +54,10 @@ VRPIPE_MEMBERS(MemoryRegion, address, bytes)
 VRPIPE_MEMBERS(AddressMap, color, depth_stencil, vertices, primitives, attributes)
 VRPIPE_MEMBERS(Framebuffer, color, depth_stencil, addresses)
 VRPIPE_MEMBERS(DrawReport, name, counts)
+VRPIPE_MEMBERS(EffectReport, name, omitted, proof, reason)
 VRPIPE_MEMBERS(RunResult, request, cycles, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
-               bottleneck, statistics, implementations, parameters, outside_validated_range, result_hash, kernel_events,
-               framebuffer, draws)
+               bottleneck, statistics, implementations, parameters, outside_validated_range, effects, result_hash,
+               kernel_events, framebuffer, draws)
 
 /// Types of members that stay behind.
 template <class Member>
@@ -66,6 +67,8 @@ constexpr bool stays = std::is_same<Member, RunRequest>::value || std::is_same<M
 struct Writer {
   static Json of(std::uint64_t value) { return value; }
   static Json of(double value) { return value; }
+  static Json of(bool value) { return value; }
+  static Json of(EffectProof proof) { return name_of(proof); }
   /// CBOR's texts are UTF-8.
   static Json of(const std::string& text) {
     if (valid_utf8(text) == text) return text;
@@ -114,6 +117,19 @@ struct Reader {
   static void read(const Json& json, std::uint64_t& value, const std::string& where) {
     check(json.is_number_unsigned(), where);
     value = json.get<std::uint64_t>();
+  }
+  static void read(const Json& json, bool& value, const std::string& where) {
+    check(json.is_boolean(), where);
+    value = json.get<bool>();
+  }
+  static void read(const Json& json, EffectProof& value, const std::string& where) {
+    for (const EffectProof proof : {EffectProof::by_facts, EffectProof::verified, EffectProof::bounded}) {
+      if (json == name_of(proof)) {
+        value = proof;
+        return;
+      }
+    }
+    refuse(where + " is no proof");
   }
   static void read(const Json& json, double& value, const std::string& where) {
     check(json.is_number_float(), where);

@@ -23,8 +23,8 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 /// Writes the images of all runs, side by side: compression takes longer than the disk.
 void write_images(const SimulationJob& job, const std::vector<Simulated>& simulated, JobResult& result) {
-  for (const Simulated& run : simulated) {
-    result.images.emplace_back(image_files(job, image_name(result.scene.name, run.result.request.variant.name)));
+  for (const RunResult& run : result.runs) {
+    result.images.emplace_back(image_files(job, image_name(result.scene.name, run.request.variant.name)));
   }
   for_each_chunk(simulated.size(), job.processes, [&](std::uint64_t i) {
     const SharedImage& image = *simulated[i].image;
@@ -107,15 +107,17 @@ JobResult perform(const SimulationJob& job) {
 
     const auto simulation_start = std::chrono::steady_clock::now();
     const bool with_images = job.output.has_value();
-    if (job.requests.size() == 1) {
+    if (job.requests.size() == 1 && !job.explain_effects) {
       const RunRequest& request = job.requests.front();
       simulated.push_back(simulate_here(request, *frame_of(request), with_images, progress));
     } else {
       simulated = simulate_in_processes(job.requests, frame_of, with_images, job.processes, progress);
     }
+    for (Simulated& run : simulated) result.runs.push_back(std::move(run.result));
     result.simulate_seconds = seconds_since(simulation_start);
     if (job.trace) job.trace->finish();
     result.processes = std::min(job.processes, static_cast<unsigned>(job.requests.size()));
+    if (job.explain_effects) result.effect_costs = measure_effects(result.runs, frame_of, progress);
   }
 
   if (job.output) {
@@ -125,12 +127,9 @@ JobResult perform(const SimulationJob& job) {
   } else {
     result.images.resize(simulated.size());
   }
-  for (Simulated& run : simulated) {
-    if (preprocessed_here) {
-      run.result.parameters.insert(run.result.parameters.end(), job.preprocess_parameters.begin(),
-                                   job.preprocess_parameters.end());
-    }
-    result.runs.push_back(std::move(run.result));
+  for (RunResult& run : result.runs) {
+    if (!preprocessed_here) break;
+    run.parameters.insert(run.parameters.end(), job.preprocess_parameters.begin(), job.preprocess_parameters.end());
   }
   return result;
 }

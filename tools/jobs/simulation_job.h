@@ -15,6 +15,7 @@
 
 #include "host/output_file.h"
 #include "host/provenance.h"
+#include "jobs/effect_costs.h"
 #include "jobs/frame_file.h"
 #include "jobs/trace.h"
 
@@ -36,6 +37,7 @@ struct SimulationJob {
   std::optional<std::string> json;                 ///< file, or "-" for stdout
   std::optional<std::filesystem::path> save_draw;  ///< file
   std::shared_ptr<Trace> trace;                    ///< of the only request, which has its observers; null for none
+  bool explain_effects = false;                    ///< measures what each effect that a run omits would cost
   unsigned processes = 1;                          ///< simulations at a time
 };
 
@@ -57,6 +59,7 @@ struct JobResult {
   std::uint32_t passes = 1;  ///< FrameDescription::passes
   std::vector<RunResult> runs;
   std::vector<std::optional<ImageFiles>> images;  ///< one for each run
+  std::vector<EffectCosts> effect_costs;          ///< one for each run, if they were asked for
   unsigned processes = 1;
   double load_seconds = 0;      ///< wall time of reading and preprocessing scenes
   double simulate_seconds = 0;  ///< wall time of all simulations together
@@ -80,7 +83,7 @@ ImageFiles image_files(const SimulationJob& job, const std::string& name);
 void save_draw(const SimulationJob& job, const Draw& draw);
 
 /// Loads what is drawn, simulates, and writes the images and the draw list that the user asked for. One request is
-/// simulated in this process, several in processes of their own. Throws UserError, CommandFailure or a fault.
+/// simulated in this process, several, and those that measure effects, in processes of their own. Throws UserError, CommandFailure or a fault.
 JobResult perform(const SimulationJob& job);
 
 }  // namespace vrpipe::tools

@@ -79,6 +79,7 @@ Json accuracy_json(const AccuracyResult& result) {
                {"implementations", implementations_json(result.runs.front().run)},
                {"format", vrpipe::name_of(result.base.format)},
                {"termination", name_of(result.base.termination)},
+               {"effects", result.base.effects.text()},
                {"quick", result.quick},
                {"repeat", result.repeat},
                {"precision_variant", result.base.variant.name},

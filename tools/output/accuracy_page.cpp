@@ -11,6 +11,7 @@
 
 #include "image/images.h"
 #include "output/accuracy_report.h"
+#include "output/effects_page.h"
 #include "output/report.h"
 #include "output/svg_plot.h"
 
@@ -35,6 +36,7 @@ th, td { padding: 3px 9px; text-align: right; } th { border-bottom: 2px solid #a
 th:first-child, td:first-child { text-align: left; padding-left: 4px; }
 tr.group td { font-weight: 600; padding-top: 10px; border-bottom: 1px solid #e7eaee; }
 tr.marked td { background: #e6f4ea; }
+table.effects th, table.effects td { text-align: left; vertical-align: top; } td.active { font-weight: 600; }
 .cards { display: grid; grid-template-columns: repeat(auto-fill, minmax(330px, 1fr)); gap: 18px; margin-top: 14px; }
 figure { margin: 0; border: 1px solid #dfe3e8; border-radius: 6px; padding: 10px; }
 figure .pair { display: flex; gap: 8px; } figure img { width: calc(50% - 4px); height: auto; }
@@ -237,6 +239,20 @@ std::string functional_note(const AccuracyResult& result) {
   return "<p class=\"subtle\">Without time, and so not in the plot: functional (" + html_escaped(text) + ").</p>\n";
 }
 
+/// Of the most exact level of each variant.
+std::string effects_section(const AccuracyResult& result) {
+  std::vector<const RunResult*> runs;
+  for (const FidelityLevel& level : result.fidelity) {
+    if (level.run.request.fidelity == fidelities().back()) runs.push_back(&level.run);
+  }
+  return fmt::format(
+             "<h2>Effects: what is simulated</h2>\n<p>At {}, with <code>--effects {}</code>. What is not active is "
+             "omitted: <b>static</b>, since frame, camera and platform decide beforehand; <b>verified</b>, as nothing "
+             "called for it in the run; <b>bounded</b>, as an approximation; or by force.</p>\n",
+             vrpipe::name_of(fidelities().back()), html_escaped(result.base.effects.text())) +
+         effects_html(runs);
+}
+
 }  // namespace
 
 std::string accuracy_page(const AccuracyResult& result) {
@@ -276,6 +292,8 @@ std::string accuracy_page(const AccuracyResult& result) {
             definition(precision_definition());
   }
   text += list(precision_summary(result)) + table(precision_table(result));
+
+  text += effects_section(result);
 
   text += "<h2>Images and error maps</h2>\n";
   text +=

@@ -9,6 +9,7 @@
 #include <vrpipe/arithmetic/blend.h>
 #include <vrpipe/component/printable.h>
 
+#include "output/effects_report.h"
 #include "output/report.h"
 #include "output/text_table.h"
 
@@ -35,7 +36,7 @@ std::string decibels(double psnr) { return std::isinf(psnr) ? "equal" : fmt::for
 std::string cycles_text(const RunResult& run) { return run.cycles ? grouped(*run.cycles) : "-"; }
 
 std::string settings_text(const AccuracyResult& result) {
-  std::string text;
+  std::string text = effects_choice_text(result.base);
   for (const std::vector<Setting>* settings : {&result.base.settings, &result.preprocessing}) {
     for (const Setting& setting : *settings) {
       text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);

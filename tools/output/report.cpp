@@ -12,6 +12,7 @@
 #include <vrpipe/kernel/accounting.h>
 
 #include "jobs/comparison.h"
+#include "output/effects_report.h"
 #include "output/text_table.h"
 
 namespace vrpipe::tools {
@@ -282,6 +283,7 @@ std::string heading(const JobResult& result, const TextStyle& style) {
   text += fmt::format("{} fidelity, {} colour, {} termination", vrpipe::name_of(request.fidelity),
                       vrpipe::name_of(request.format), name_of(request.termination));
   if (result.passes > 1) text += fmt::format(", {} passes", result.passes);
+  text += effects_choice_text(request);
   for (const std::vector<Setting>* settings : {&request.settings, &result.preprocessing}) {
     for (const Setting& setting : *settings) {
       text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
@@ -441,7 +443,7 @@ std::string report(const JobResult& result, const TextStyle& style) {
 
   std::string text = heading(result, style) + table.text(style) + "\n" + draws_text(runs, style);
   if (runs.size() == 1 && !runs.front().units.empty()) text += unit_states_text(runs.front(), style) + "\n";
-  return text + remarks(result);
+  return text + remarks(result) + effects_text(runs, result.effect_costs, style);
 }
 
 }  // namespace vrpipe::tools

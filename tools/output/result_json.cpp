@@ -13,6 +13,7 @@
 
 #include "jobs/comparison.h"
 #include "jobs/settings.h"
+#include "output/effects_report.h"
 #include "output/report.h"
 
 namespace vrpipe::tools {
@@ -169,29 +170,48 @@ Json addresses_json(const AddressMap& addresses) {
           {"attributes", region(addresses.attributes)}};
 }
 
-Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
+/// `costs`: null where they were not asked for.
+Json effects_json(const RunResult& run, const EffectCosts* costs) {
+  const auto seconds = [&](const std::optional<double>& with) {
+    return with ? Json{{"with", *with}, {"without", costs->without}} : Json();
+  };
+  Json effects = Json::array();
+  for (const EffectReport& effect : run.effects) {
+    const std::optional<EffectProof> proof = proof_of(run, effect);
+    effects.push_back({{"name", effect.name},
+                       {"state", effect.omitted ? "omitted" : "active"},
+                       {"proof", proof ? Json(vrpipe::name_of(*proof)) : Json()},
+                       {"reason", effect.reason}});
+    if (costs != nullptr) effects.back()["host_seconds"] = seconds(costs->with_effect(effect.name));
+  }
+  return effects;
+}
+
+Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, const EffectCosts* costs) {
   // Without time there is no utilization, and the keys are still there.
   Json utilization = Json::object();
   for (const char* unit : {"raster", "zrop", "prop", "sm", "crop", "l2", "dram"}) utilization[unit] = nullptr;
   for (const auto& [name, share] : run.utilization) utilization[name] = share;
   const bool timed = run.cycles.has_value();
-  return {{"variant", run.request.variant.name},
-          {"cycles", timed ? Json(*run.cycles) : Json()},
-          {"milliseconds", timed ? Json(run.milliseconds) : Json()},
-          {"host_seconds", run.host_seconds},
-          {"cpu_seconds", run.cpu_seconds},
-          {"implementations", implementations_json(run)},
-          {"counts", counts_json(run.counts.named())},
-          {"draws", draws_json(run)},
-          {"bottleneck", bottleneck_json(run)},
-          {"utilization", std::move(utilization)},
-          {"effects", Json::array()},
-          {"result_hash", run.result_hash},
-          {"images", {{"png", images ? Json(images->png) : Json()}, {"exr", images ? Json(images->exr) : Json()}}},
-          {"units", units_json(run)},
-          {"statistics", statistics_json(run)},
-          {"kernel_events", run.kernel_events},
-          {"outside_validated_range", run.outside_validated_range}};
+  Json json = {{"variant", run.request.variant.name},
+               {"cycles", timed ? Json(*run.cycles) : Json()},
+               {"milliseconds", timed ? Json(run.milliseconds) : Json()},
+               {"host_seconds", run.host_seconds},
+               {"cpu_seconds", run.cpu_seconds},
+               {"implementations", implementations_json(run)},
+               {"counts", counts_json(run.counts.named())},
+               {"draws", draws_json(run)},
+               {"bottleneck", bottleneck_json(run)},
+               {"utilization", std::move(utilization)},
+               {"effects", effects_json(run, costs)},
+               {"result_hash", run.result_hash},
+               {"images", {{"png", images ? Json(images->png) : Json()}, {"exr", images ? Json(images->exr) : Json()}}},
+               {"units", units_json(run)},
+               {"statistics", statistics_json(run)},
+               {"kernel_events", run.kernel_events},
+               {"outside_validated_range", run.outside_validated_range}};
+  if (costs != nullptr) json["all_effects"]["host_seconds"] = {{"with", costs->with_all}, {"without", costs->without}};
+  return json;
 }
 
 }  // namespace
@@ -267,7 +287,10 @@ Json platform_json(const std::vector<RunResult>& runs, const std::vector<Setting
 Json result_json(const JobResult& result) {
   const RunRequest& request = result.runs.front().request;
   Json runs = Json::array();
-  for (std::size_t i = 0; i < result.runs.size(); ++i) runs.push_back(run_json(result.runs[i], result.images[i]));
+  for (std::size_t i = 0; i < result.runs.size(); ++i) {
+    const EffectCosts* const costs = result.effect_costs.empty() ? nullptr : &result.effect_costs[i];
+    runs.push_back(run_json(result.runs[i], result.images[i], costs));
+  }
   const StorageReport storage = quad_merging_storage(request);
   Json json = head_json(result.schema, result.provenance, result.processes);
   json.update({{"seed", request.stall_seed},
@@ -277,6 +300,7 @@ Json result_json(const JobResult& result) {
                {"fidelity", vrpipe::name_of(request.fidelity)},
                {"format", vrpipe::name_of(request.format)},
                {"termination", name_of(request.termination)},
+               {"effects", request.effects.text()},
                {"passes", result.passes},
                {"addresses", addresses_json(result.runs.front().framebuffer.addresses)},
                {"runs", std::move(runs)}});

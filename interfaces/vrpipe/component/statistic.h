@@ -20,6 +20,9 @@ class Statistic {
   const char* name() const { return name_; }
   const char* unit() const { return unit_; }
   const char* meaning() const { return meaning_; }
+  /// It is not followed, and so in no report. Before anything is counted.
+  void leave_out() { is_left_out_ = true; }
+  bool is_left_out() const { return is_left_out_; }
 
  protected:
   /// Throws std::logic_error if the set has one of this name: reports could not tell them apart.
@@ -30,6 +33,7 @@ class Statistic {
   const char* name_;
   const char* unit_;
   const char* meaning_;
+  bool is_left_out_ = false;
 };
 
 /// One declared counter; the hot path is an integer increment.

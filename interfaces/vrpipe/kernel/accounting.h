@@ -59,12 +59,8 @@ class StateAccount {
   explicit StateAccount(const FrameEnd& frame_end) : frame_end_(&frame_end) {}
 
   /// `now` is not before that of the call before.
-  void enter(UnitState state, Cycle now) {
-    if (state == state_) return;
-    if (observer_ != nullptr) observer_->entered(state, now);
-    changes_.push({state_, now});
-    state_ = state;
-    if (changes_.size() >= most_changes_) settle();
+  [[gnu::always_inline]] void enter(UnitState state, Cycle now) {
+    if (state != state_) change(state, now);
   }
 
   /// Charges exactly the `end` cycles of the run; not before `frame_end.so_far()`.
@@ -81,6 +77,12 @@ class StateAccount {
     UnitState state;  ///< which held until
     Cycle until;
   };
+  void change(UnitState state, Cycle now) {
+    if (observer_ != nullptr) observer_->entered(state, now);
+    changes_.push({state_, now});
+    state_ = state;
+    if (changes_.size() >= most_changes_) settle();
+  }
   void settle();
   void charge(UnitState state, Cycle until) {
     cycles_[static_cast<unsigned>(state)] += until - charged_;

@@ -109,6 +109,13 @@ class ClockDomain : public sc_core::sc_module {
   /// behind now() by as much, so it stays 1 where an outside port meets time of its own. At first 1.
   void set_cycles_per_activation(unsigned cycles) { cycles_per_activation_ = cycles; }
 
+  /// Whether items and accesses between units of this clock pass their TLM-2.0 sockets also where the ends could call
+  /// each other directly. The same in every cycle; it takes the host's time. Before ends are connected.
+  void set_passes_sockets() { passes_sockets_ = true; }
+  bool passes_sockets() const { return passes_sockets_; }
+  /// Called when the simulation starts, if an outside port meets time of its own: whether the kernel's is to keep step.
+  void ask_about_own_time(std::function<bool()> keeps_step) { keeps_step_ = std::move(keeps_step); }
+
   /// Calls `look` between two edges, those of the cycles before `at` and of `at` or later: with the first cycle whose
   /// edge may still come. It returns the next `at`, later than that. Neither edges nor activations depend on it. Where
   /// no edge comes any more there may be no call.
@@ -154,11 +161,13 @@ class ClockDomain : public sc_core::sc_module {
   std::uint64_t awaited_ = 0;
   Cycle look_at_ = never;
   std::function<Cycle(Cycle)> look_;
+  std::function<bool()> keeps_step_;
   std::exception_ptr thrown_;
   bool in_edge_ = false;
   bool running_ = false;
   bool finished_ = false;
   bool pauses_at_rest_ = false;
+  bool passes_sockets_ = false;
 };
 
 }  // namespace vrpipe

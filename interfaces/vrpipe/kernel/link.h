@@ -518,7 +518,7 @@ void StreamOut<Item>::connect(InPort& in, const LinkOptions& options) {
   rate_ = options.items_per_cycle;
   this->limited_ = rate_ != 0;
   auto* const end = dynamic_cast<StreamIn<Item>*>(&in);
-  if (end == nullptr || !options.observers.empty()) return;
+  if (end == nullptr || !options.observers.empty() || clock_.domain->passes_sockets()) return;
   if (rate_ == 0) direct_ = end;
   end->direct_ = this;
 }

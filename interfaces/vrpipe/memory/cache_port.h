@@ -35,7 +35,8 @@ class CachePort {
     sector_shift_ = static_cast<unsigned>(__builtin_ctz(organization.sector_bytes));
     cache_.emplace(organization, statistics);
     statistics_ = &statistics;
-    asked_at_.resize(std::size_t{organization.lines()} * sectors_of_a_line_);
+    has_details_ = statistics.has_details();
+    if (has_details_) asked_at_.resize(std::size_t{organization.lines()} * sectors_of_a_line_);
   }
   /// And where it is known what sectors hold that were cleared, which outlives it.
   void know_cleared(ClearedSectors& cleared) { cleared_ = &cleared; }
@@ -55,13 +56,23 @@ class CachePort {
       const unsigned count = (tag >> sector_bits & (sectors_at_most - 1)) + 1;
       for (unsigned sector = first; sector < first + count; ++sector) {
         cache_->finish_fill(line, sector);
-        statistics_->fill_cycles.see(now - asked_at(line, sector));
+        if (has_details_) statistics_->fill_cycles.see(now - asked_at(line, sector));
       }
       fills_in_flight_ -= count;
     }
     return any;
   }
 
+  /// The common case of a look-up: the line is held, and what is needed is there or on its way. Then it is pinned, and the
+  /// look-up done; `no_line` otherwise.
+  SectoredCache::Line pin_held(std::uint64_t address, std::uint32_t sectors) {
+    if (write_back_ != 0) return SectoredCache::no_line;
+    const SectoredCache::Line line = cache_->find(address);
+    if (line == SectoredCache::no_line || (sectors & cache_->absent(line)) != 0) return SectoredCache::no_line;
+    cache_->pin(line);
+    cache_->looked_up(line, sectors);
+    return line;
+  }
   /// Goes on with a look-up; false while it has to wait: for a line, a miss register, or the memory to take an access. Then
   /// its line is pinned. `moved(sectors)` is called for what it moves.
   template <class Moved>
@@ -72,12 +83,14 @@ class CachePort {
     if (cleared_ != nullptr && missing != 0) take_cleared(wanted, missing);
     while (missing != 0) {
       if (!memory_.available() || fills_in_flight_ == mshrs_) return false;
-      const SectorRun run = take_sector_run(missing, std::min(longest_run_, mshrs_ - fills_in_flight_));
+      const SectorRun run = longest_run_ == 1
+                                ? take_sector(missing)
+                                : take_sector_run(missing, std::min(longest_run_, mshrs_ - fills_in_flight_));
       memory_.read(wanted.address + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_,
                    (wanted.line << sector_bits | (run.count - 1)) << sector_bits | run.first);
       for (unsigned sector = run.first; sector < run.first + run.count; ++sector) {
         cache_->start_fill(wanted.line, sector);
-        asked_at(wanted.line, sector) = now;
+        if (has_details_) asked_at(wanted.line, sector) = now;
       }
       wanted.asked_for |= sector_mask(run.first, run.count);
       fills_in_flight_ += run.count;
@@ -157,6 +170,7 @@ class CachePort {
   const unsigned longest_run_;
   std::optional<SectoredCache> cache_;
   SectoredCacheStatistics* statistics_ = nullptr;
+  bool has_details_ = true;
   ClearedSectors* cleared_ = nullptr;  ///< where that is known
   std::vector<Cycle> asked_at_;        ///< by sector of the cache
   unsigned sectors_of_a_line_ = 1;

@@ -19,6 +19,14 @@ struct SectoredCacheStatistics : StatisticSet {
   /// The part `name` of a component.
   SectoredCacheStatistics(StatisticSet& owner, const char* name) : StatisticSet(owner, name) {}
 
+  /// Causes of misses and distributions, which take the host's time, are not followed. Before the cache is made.
+  void leave_out_details() {
+    for (Counter* counter : {&sector_misses_compulsory, &sector_misses_capacity, &sector_misses_conflict})
+      counter->leave_out();
+    for (Histogram* histogram : {&lines_pinned, &fill_cycles, &sectors_filling}) histogram->leave_out();
+  }
+  bool has_details() const { return !fill_cycles.is_left_out(); }
+
   Counter line_accesses{*this, "line_accesses", "accesses", "one for each item that needs sectors of a line"};
   Counter line_hits{*this, "line_hits", "accesses", "to a line that is held, its sectors there or not"};
   Counter line_misses{*this, "line_misses", "accesses", "that allocate the line"};
@@ -62,6 +70,7 @@ class AnnotatedFillCounter {
 
   /// So many sectors are asked for in cycle `at`.
   void ask(std::uint32_t sectors, Cycle at, Cycle there) {
+    if (!statistics_->has_details()) return;
     for (; !fills_.empty() && fills_.front().there <= at; fills_.pop()) on_their_way_ -= fills_.front().sectors;
     for (std::uint32_t i = 0; i < sectors; ++i) {
       statistics_->fill_cycles.see(there - at);

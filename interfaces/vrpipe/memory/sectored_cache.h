@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/memory/cache_organization.h>
@@ -62,6 +64,8 @@ class SectoredCache {
   /// Takes a line for an address that is not held. Throws std::logic_error if none can be had.
   Line allocate(std::uint64_t address, Evicted& evicted);
 
+  /// Called before a line goes for another.
+  void before_eviction(std::function<void()> call) { before_eviction_ = std::move(call); }
   /// Marks a line as one to be kept for as long as it holds the same: it goes only where no other can. Unlike one that
   /// is pinned, which never does.
   void keep(Line line);
@@ -95,7 +99,8 @@ class SectoredCache {
   void start_fill(Line line, unsigned sector) {
     Entry& entry = lines_[line];
     entry.filling |= 1U << sector;
-    statistics_->sectors_filling.see(filling_++);
+    if (details_) statistics_->sectors_filling.see(filling_);
+    ++filling_;
     count_misses(entry, 1U << sector);
   }
   /// Ends what start_fill began, while the line still holds the same.
@@ -284,6 +289,7 @@ class SectoredCache {
   unsigned chain_shift_;
   std::uint64_t sector_bytes_;
   SectoredCacheStatistics* statistics_;
+  bool details_;  ///< of the statistics
   // In the accesses under way:
   std::uint64_t allocated_ = 0;       ///< lines
   std::uint64_t missed_ = 0;          ///< sectors
@@ -300,8 +306,10 @@ class SectoredCache {
   std::vector<bool> kept_;                 ///< by line; empty before the first
   std::vector<std::uint64_t> byte_masks_;  ///< WriteAllocate::byte_mask: bytes that are there, a bit each, by line
   SectorHistory were_there_;               ///< whole sectors
-  SectorHistory were_touched_;             ///< with byte masks: and those of which bytes were there
-  std::unique_ptr<Shadow> shadow_;         ///< fully associative, of the same size
+  std::vector<std::uint32_t> everything_ = {~0U};  ///< was there, where nobody wants to know
+  SectorHistory were_touched_;                     ///< with byte masks: and those of which bytes were there
+  std::function<void()> before_eviction_;          ///< or none
+  std::unique_ptr<Shadow> shadow_;                 ///< fully associative, of the same size
 };
 
 }  // namespace vrpipe

@@ -27,6 +27,13 @@ inline constexpr std::array<SectorRun, 16> first_run_of_four = [] {
   return runs;
 }();
 
+/// Takes the first sector out of a mask that is not 0.
+inline SectorRun take_sector(std::uint32_t& mask) {
+  const auto first = static_cast<unsigned>(__builtin_ctz(mask));
+  mask &= mask - 1;
+  return {first, 1};
+}
+
 /// Takes the first sectors out of a mask that is not 0: neighbours, as many as go in one naturally aligned access of up
 /// to `longest`.
 inline SectorRun take_sector_run(std::uint32_t& mask, unsigned longest) {

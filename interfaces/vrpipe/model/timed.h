@@ -277,7 +277,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
   /// known.
   Cycle room_from() {
     if (unlimited_) return 0;
-    if (blocking_) return direct_ == nullptr ? 0 : direct_->free_at_[direct_->place_];
+    if (blocking_) return end_ == nullptr ? 0 : end_->free_at_[end_->place_];
     if (!credits_.empty()) return credits_.front();
     room_wanted_ = true;
     return never;
@@ -380,6 +380,7 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
   };
   const bool blocking_;
   TimedIn<Item>* direct_ = nullptr;
+  TimedIn<Item>* end_ = nullptr;  ///< also where a socket is between
   std::optional<ThroughputPort> rate_;
   bool unlimited_ = false;
   bool prompt_ = false;
@@ -559,7 +560,8 @@ void TimedOut<Item>::connect(InPort& in, const LinkOptions& options) {
   auto* const end = dynamic_cast<TimedIn<Item>*>(&in);
   if (end == nullptr) return;
   end->prompt_ = prompt_;
-  if (!options.observers.empty()) return;
+  end_ = end;
+  if (!options.observers.empty() || clock_.domain->passes_sockets()) return;
   direct_ = end;
   end->direct_ = this;
 }

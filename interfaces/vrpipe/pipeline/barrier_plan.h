@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include <vrpipe/pipeline/frame.h>
+#include <vrpipe/pipeline/render_context.h>
 
 namespace vrpipe {
 
@@ -11,7 +11,7 @@ namespace vrpipe {
 /// behind a barrier's mark until every CROP has seen that and said so.
 class BarrierPlan {
  public:
-  explicit BarrierPlan(const Frame& frame);
+  explicit BarrierPlan(const RenderContext& context);
   /// Whether there is any.
   bool is_used() const { return !marks_.empty(); }
   bool is_barrier(Mark mark) const;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/frame.h>
 
 namespace vrpipe {
@@ -28,10 +29,13 @@ struct RenderContext {
   DevicePrecision precision;
   Termination termination = Termination::paper;
   Placement placement;
-  std::uint64_t clock_ps = 1000;  ///< period of the units' clock, for what has a clock of its own
+  std::uint64_t clock_ps = 1000;            ///< period of the units' clock, for what has a clock of its own
+  std::shared_ptr<OmittedEffects> effects;  ///< null: none is left out
 
   const DrawCall& draw(DrawIndex draw) const { return frame->draw_call(draw); }
   const DrawState& state(DrawIndex draw) const { return frame->draw_call(draw).state; }
+  /// Whether a slot or a link is elaborated, for some effect or since it has none (Effect::parts).
+  bool has_part(const std::string& part) const { return effects == nullptr || effects->has_part(part); }
 };
 
 }  // namespace vrpipe

@@ -83,7 +83,8 @@ class Configuration {
 
   const RunRequest& request() const { return request_; }
   const Platform& platform() const { return *request_.platform; }
-  const Netlist& netlist() const { return netlist_; }
+  /// What is elaborated: the platform's, without what all its effects left out.
+  const Netlist& netlist() const { return elaborated_; }
   const RenderContext& context_of(unsigned gpc) const { return contexts_[gpc]; }
   /// What is drawn, in this variant: without the units for it no draw terminates early.
   const Frame& frame() const { return *contexts_.front().frame; }
@@ -92,6 +93,8 @@ class Configuration {
   /// PATH.PARAMETER and value: the slot's where all its instances agree, otherwise also those of the instances that
   /// differ from the first.
   std::vector<std::pair<std::string, std::string>> parameters() const;
+  /// What was decided of each effect, and what became of those that were watched.
+  std::vector<EffectReport> effects() const;
   /// Slot and name of the implementation in it, in the order of the pipeline; an instance's, by its path, where it
   /// differs from the slot's first.
   std::vector<std::pair<std::string, std::string>> implementations() const;
@@ -104,6 +107,8 @@ class Configuration {
     std::unique_ptr<ParameterSet> real_parameters;
   };
   void wire();
+  void decide_effects();
+  void leave_out_parts(OmittedEffects& omitted, bool memories);
   void choose_implementations();
   void apply(const Setting& setting);
   void set_link(const Setting& setting);
@@ -112,10 +117,12 @@ class Configuration {
   std::vector<const Instance*> instances_of(const std::string& slot) const;
 
   RunRequest request_;
-  Netlist netlist_;
+  Netlist netlist_;  ///< the platform's
+  Netlist elaborated_;
   std::map<std::string, UnitChoices> units_;  ///< by path
   StateParameters state_parameters_;
   std::vector<RenderContext> contexts_;  ///< by GPC
+  std::vector<EffectReport> effects_;    ///< before the run
 };
 
 /// The default implementation of a slot; what stands in where the variant does without the unit.

@@ -64,6 +64,7 @@ class Gpu {
 
   const Configuration& configuration_;
   std::unique_ptr<ClockDomain> clock_;
+  EffectGate kernel_time_gate_;
   std::vector<PlacedMemory> memories_;
   std::vector<PlacedForeign> foreign_memories_;
   std::map<unsigned, std::unique_ptr<RunAhead>> ahead_;  ///< by GPC, in strict termination

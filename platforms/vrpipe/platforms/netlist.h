@@ -95,6 +95,8 @@ class Netlist {
   void remove(const std::string& path);
   /// Takes a link out. Its ends are stubbed, if they are not connected again.
   void disconnect(const std::string& from);
+  /// Takes a memory out. What is bound to it is bound to nothing then.
+  void remove_memory(const std::string& path);
   /// Leaves a port legally unconnected: nothing comes, and what is sent is lost.
   void stub(const std::string& port);
 

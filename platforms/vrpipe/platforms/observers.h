@@ -91,6 +91,7 @@ class Observers {
   /// Throws UserError for a link that is asked for and not there.
   void check(const Netlist& netlist) const;
   LinkObservers of_link(const std::string& name);
+  bool observes_link(const std::string& name) const;
   /// Null if nobody looks.
   StateObserver* of_unit(const std::string& path);
   struct OnStatistics {

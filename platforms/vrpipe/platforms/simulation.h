@@ -13,6 +13,7 @@
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/kernel/accounting.h>
 #include <vrpipe/pipeline/draw.h>
+#include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/frame.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/render_context.h>
@@ -87,6 +88,10 @@ struct RunRequest {
   Termination termination = Termination::paper;
   std::vector<Setting> settings;
   std::vector<UnitChoice> units;
+  /// What is simulated of what there is: by default what the frame calls for.
+  EffectChoice effects;
+  /// Whether anybody looks at statistics that take the host's time to follow. What is sampled is followed in any case.
+  bool reads_statistics = true;
   /// Seen from outside in this process; null for nothing.
   std::shared_ptr<Observers> observers;
 
@@ -193,6 +198,8 @@ struct RunResult {
   std::vector<std::pair<std::string, std::string>> parameters;
   /// Reasons why cycles of lt or at may be farther off than documented; empty at the other fidelities.
   std::vector<std::string> outside_validated_range;
+  /// All that the platform's components declare, by name, and what became of each in this run.
+  std::vector<EffectReport> effects;
   std::string result_hash;          ///< of counts, cycles and the stored bits of the image, 16 hex digits
   std::uint64_t kernel_events = 0;  ///< activations of the SystemC kernel's processes
   Framebuffer framebuffer;

@@ -1,12 +1,16 @@
 #include "same_splat_qru.h"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 
+#include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
-SameSplatQru::SameSplatQru(const Parameters& parameters, const vrpipe::RenderContext&)
-    : timing_{parameters.quads_per_cycle, parameters.latency_cycles} {}
+SameSplatQru::SameSplatQru(const Parameters& parameters, const vrpipe::RenderContext& context)
+    : context_(context),
+      timing_{parameters.quads_per_cycle, parameters.latency_cycles},
+      pairs_gate_(context, "qru.same_splat_pairs") {}
 
 unsigned SameSplatQru::examine(vrpipe::TileId tile, const vrpipe::Quad* quads, unsigned count, vrpipe::Warp& out,
                                bool& launched) {
@@ -19,7 +23,7 @@ unsigned SameSplatQru::examine(vrpipe::TileId tile, const vrpipe::Quad* quads, u
     vrpipe::Quad& held = registers_[quad.position];
     if (held.coverage == 0) {
       held = quad;
-    } else if (held.splat == quad.splat) {
+    } else if (held.splat == quad.splat && may_merge(quad) && pairs_gate_.enter()) {
       add_pair(std::exchange(held, {}), quad);
     } else {
       add_single(std::exchange(held, quad));
@@ -40,6 +44,8 @@ bool SameSplatQru::finish_bin(vrpipe::Warp& out) {
   launch(out);
   return true;
 }
+
+bool SameSplatQru::may_merge(const vrpipe::Quad& quad) const { return !context_.state(quad.draw).tests_late(); }
 
 void SameSplatQru::add_pair(const vrpipe::Quad& front, const vrpipe::Quad& back) {
   if (waiting_.coverage != 0 && waiting_.position == front.position) {
@@ -83,4 +89,24 @@ VRPIPE_PLUGIN
 namespace {
 const vrpipe::Registrar<SameSplatQru, vrpipe::QruBehaviour> registrar("qru", "same-splat",
                                                                       "pairs only quads of the same splat");
+
+vrpipe::Effect same_splat_pairs() {
+  vrpipe::Effect effect;
+  effect.component = "qru";
+  effect.name = "same_splat_pairs";
+  effect.implementation = "same-splat";
+  effect.kind = vrpipe::EffectKind::functional;
+  effect.models = "quads of the two triangles of a splat are blended as one";
+  effect.omitted_when = "no draw is of splats, or all are tested after shading, when nothing is merged";
+  effect.elaborates = "what a pair takes in the shader";
+  effect.tripwire = "where a quad meets one of the same splat";
+  effect.decide = [](const vrpipe::EffectQuestion& asked) {
+    const vrpipe::FrameFacts& facts = asked.facts;
+    if (facts.of_splats == 0) return vrpipe::EffectDecision::omit("no draw is of splats");
+    if (facts.tested_late == facts.draws) return vrpipe::EffectDecision::omit("all draws are tested after shading");
+    return vrpipe::EffectDecision::keep("draws of splats: " + std::to_string(facts.of_splats));
+  };
+  return effect;
 }
+const vrpipe::EffectRegistrar pairs_effect(same_splat_pairs());
+}  // namespace

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/units.h>
 
 /// A QRU that pairs only quads of the same splat: those of its two triangles along the diagonal of the box.
@@ -39,13 +40,17 @@ class SameSplatQru : public vrpipe::QruBehaviour {
   vrpipe::Counter quads_examined{*this, "quads", "quads", "examined"};
 
  private:
+  /// What is tested after shading is not merged.
+  bool may_merge(const vrpipe::Quad& quad) const;
   void add_pair(const vrpipe::Quad& front, const vrpipe::Quad& back);
   void add_single(const vrpipe::Quad& quad);
   void fill_slots(const vrpipe::Quad& first, const vrpipe::Quad& second, bool merge);
   bool launch_when_full(vrpipe::Warp& out);
   void launch(vrpipe::Warp& out);
 
+  const vrpipe::RenderContext& context_;
   const vrpipe::Throughput timing_;
+  vrpipe::EffectGate pairs_gate_;
   std::array<vrpipe::Quad, vrpipe::positions_per_tile> registers_{};  ///< empty where the coverage is 0
   vrpipe::Quad waiting_{};                                            ///< the single; none when its coverage is 0
   vrpipe::Warp warp_;                                                 ///< being filled

@@ -23,6 +23,8 @@ class Behaviour : public StatisticSet {
   virtual ~Behaviour() = default;
   /// The unit as its author wrote it: itself, or what stands behind the checks (checked_behaviours.h).
   virtual const Behaviour& unit() const { return *this; }
+  /// Called when the frame has ended: what can be checked only then.
+  virtual void check_end() {}
   Behaviour& unit() { return const_cast<Behaviour&>(static_cast<const Behaviour*>(this)->unit()); }
 };
 

@@ -1,0 +1,115 @@
+#include "output/effects_report.h"
+
+#include <algorithm>
+#include <map>
+
+#include <fmt/format.h>
+
+#include <vrpipe/component/printable.h>
+
+#include "output/text_table.h"
+
+namespace vrpipe::tools {
+namespace {
+
+constexpr std::size_t report_width = 100;
+
+std::string seconds_text(double seconds) { return fmt::format("{:.2f}", seconds); }
+
+std::string ratio_text(double with, double without) {
+  return without > 0 ? fmt::format("{:.2f}x", with / without) : std::string("-");
+}
+
+/// Effect, proof, if there are costs CPU seconds without and with it and their ratio, and the reason.
+std::string run_text(const RunResult& run, const EffectCosts* costs, const TextStyle& style) {
+  std::vector<std::string> heading{"effects of " + printable(run.request.variant.name), "proof"};
+  if (costs != nullptr) heading.insert(heading.end(), {"host s without", "with", "ratio"});
+  heading.emplace_back("reason");
+  TextTable table(std::move(heading));
+  table.left(1);
+  table.wrap(report_width);
+  const auto row = [&](const std::string& name, const std::string& proof, const std::optional<double>& with,
+                       const std::string& reason) {
+    std::vector<std::string> cells{name, proof};
+    if (with) {
+      cells.insert(cells.end(), {seconds_text(costs->without), seconds_text(*with), ratio_text(*with, costs->without)});
+    } else if (costs != nullptr) {
+      cells.insert(cells.end(), 3, "");
+    }
+    cells.push_back(reason);
+    table.row(std::move(cells));
+  };
+  for (const bool omitted : {false, true}) {
+    const auto belongs = [omitted](const EffectReport& effect) { return effect.omitted == omitted; };
+    if (std::none_of(run.effects.begin(), run.effects.end(), belongs)) continue;
+    table.group(omitted ? "omitted" : "active");
+    for (const EffectReport& effect : run.effects) {
+      if (!belongs(effect)) continue;
+      row(printable(effect.name), omitted ? state_of(run, effect) : std::string(),
+          costs == nullptr ? std::nullopt : costs->with_effect(effect.name), printable(effect.reason));
+    }
+  }
+  if (costs != nullptr) {
+    table.group("together");
+    row("all effects", "", costs->with_all, "--effects all");
+  }
+  return table.text(style);
+}
+
+/// Those that differ, a column for each run; the others by name.
+std::string comparison_text(const std::vector<RunResult>& runs, const TextStyle& style) {
+  std::vector<std::string> heading{"effects that differ"};
+  for (const RunResult& run : runs) heading.push_back(printable(run.request.variant.name));
+  TextTable table(std::move(heading));
+  bool any_differs = false;
+  std::map<std::string, std::string> alike;  // names, by state
+  for (std::size_t i = 0; i < runs.front().effects.size(); ++i) {
+    std::vector<std::string> cells{printable(runs.front().effects[i].name)};
+    for (const RunResult& run : runs) cells.push_back(state_of(run, run.effects[i]));
+    if (std::all_of(cells.begin() + 1, cells.end(), [&](const std::string& cell) { return cell == cells[1]; })) {
+      std::string& names = alike[cells[1]];
+      names += (names.empty() ? "" : ", ") + cells[0];
+    } else {
+      table.row(std::move(cells));
+      any_differs = true;
+    }
+  }
+  std::string text = any_differs ? table.text(style) : std::string();
+  for (const auto& [state, names] : alike) {
+    const std::string title = state == "active" ? "effects active in all" : "omitted in all, " + state;
+    const std::vector<std::string> lines = wrapped(title + ": " + names, report_width - 2);
+    for (const std::string& line : lines) text += (&line == &lines.front() ? "" : "  ") + line + "\n";
+  }
+  return text + "reasons: --json, or `vrpipe run`; what they would cost: --explain-effects\n";
+}
+
+}  // namespace
+
+std::optional<EffectProof> proof_of(const RunResult& run, const EffectReport& effect) {
+  if (!effect.omitted || run.request.effects.forces_out(effect.name)) return std::nullopt;
+  return effect.proof;
+}
+
+std::string state_of(const RunResult& run, const EffectReport& effect) {
+  if (!effect.omitted) return "active";
+  const std::optional<EffectProof> proof = proof_of(run, effect);
+  return proof ? vrpipe::name_of(*proof) : "forced";
+}
+
+std::string effects_choice_text(const RunRequest& request) {
+  const std::string text = request.effects.text();
+  return text == EffectChoice().text() ? std::string() : ", effects " + text;
+}
+
+std::string effects_text(const std::vector<RunResult>& runs, const std::vector<EffectCosts>& costs,
+                         const TextStyle& style) {
+  if (runs.front().effects.empty()) return {};
+  if (costs.empty() && runs.size() > 1) return "\n" + comparison_text(runs, style);
+  std::string text;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    text += "\n" + run_text(runs[i], costs.empty() ? nullptr : &costs[i], style);
+  }
+  return text;
+}
+
+}  // namespace vrpipe::tools
