@@ -10,9 +10,6 @@
 namespace vrpipe {
 namespace {
 
-/// A header is some kilobytes; without this limit a foreign file would be searched to its end.
-constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 20;
-
 class HeaderParser {
  public:
   HeaderParser(const std::string& what, const std::string& where, const std::string& export_remedy,
@@ -26,7 +23,11 @@ class HeaderParser {
     next_line();
     bool format_seen = false;
     for (;;) {
-      const std::vector<std::string_view> words = split(next_line());
+      const std::string_view line = next_line();
+      const std::vector<std::string_view> words = split(line);
+      if (words.size() > 1 && words[0] == "comment") {
+        header_.comments.emplace_back(line.substr(static_cast<std::size_t>(words[1].data() - line.data())));
+      }
       if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
       if (words[0] == "end_header") break;
       if (words[0] == "format") {
@@ -52,10 +53,9 @@ class HeaderParser {
   }
 
   std::string_view next_line() {
-    const std::size_t end = bytes_.substr(0, kMaxHeaderBytes).find('\n', position_);
+    const std::size_t end = bytes_.find('\n', position_);
     if (end == std::string_view::npos) {
-      fail("the header has no `end_header` line in its first " +
-               std::to_string(std::min(bytes_.size(), kMaxHeaderBytes)) + " bytes",
+      fail("the header has no `end_header` line in its first " + std::to_string(bytes_.size()) + " bytes",
            "get the file again, it seems cut short");
     }
     std::string_view line = bytes_.substr(position_, end - position_);
@@ -137,11 +137,9 @@ const PlyElement* PlyHeader::element(std::string_view name) const {
   return found == elements.end() ? nullptr : &*found;
 }
 
-PlyHeader read_ply_header(const InputFile& file, const std::string& what, const std::string& where,
+PlyHeader read_ply_header(std::string_view head, const std::string& what, const std::string& where,
                           const std::string& export_remedy) {
-  std::string head(static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), kMaxHeaderBytes)), '\0');
-  file.read(0, head.data(), head.size());
-  return HeaderParser(what, where, export_remedy, head).parse();
+  return HeaderParser(what, where, export_remedy, head.substr(0, kMaxPlyHeaderBytes)).parse();
 }
 
 std::uint32_t ply_scalar_size(std::string_view type) {

@@ -6,8 +6,6 @@
 #include <string_view>
 #include <vector>
 
-#include "file_io.h"
-
 namespace vrpipe {
 
 struct PlyProperty {
@@ -30,15 +28,19 @@ struct PlyElement {
 struct PlyHeader {
   std::string format;  ///< as the file has it, e.g. "binary_little_endian 1.0"
   std::vector<PlyElement> elements;
+  std::vector<std::string> comments;  ///< what follows the word `comment`, in order
   std::size_t size_bytes = 0;
   /// Null for an element that it does not have.
   const PlyElement* element(std::string_view name) const;
 };
 
-/// Reads the header of a PLY file. `what` begins the message, e.g. "cannot read scene"; `export_remedy` says which file would
-/// do.
-/// @throws UserError when it is no such header, or longer than a megabyte
-PlyHeader read_ply_header(const InputFile& file, const std::string& what, const std::string& where,
+/// A header is some kilobytes; without this limit a foreign file would be searched to its end.
+constexpr std::size_t kMaxPlyHeaderBytes = std::size_t{1} << 20;
+
+/// Reads the header of a PLY file, of which `head` is the beginning. `what` begins the message, e.g. "cannot read scene";
+/// `export_remedy` says which file would do.
+/// @throws UserError when it is no such header, or longer than kMaxPlyHeaderBytes
+PlyHeader read_ply_header(std::string_view head, const std::string& what, const std::string& where,
                           const std::string& export_remedy);
 
 /// Bytes of a PLY scalar type; 0 for an unknown one.

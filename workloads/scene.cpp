@@ -13,7 +13,7 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/draw_list.h>
-#include <vrpipe/workloads/gaussian_scene.h>
+#include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/portable_math.h>
 
 namespace vrpipe {
@@ -33,9 +33,10 @@ View with_options(View view, const SceneRequest& request) {
 
 /// The automatic view that load_scene documents, for what the user did not name.
 /// @throws UserError when the Gaussians lie so far out that a camera beside them rounds to where they are
-View automatic_view(const std::string& path, const GaussianScene& scene, const SceneRequest& request) {
+View automatic_view(const std::string& path, const GaussianScene& scene, const Vec3& up_of_world,
+                    const SceneRequest& request) {
   View view;
-  if (request.up) view.up = *request.up;
+  view.up = request.up.value_or(up_of_world);
   if (request.fovy_degrees) view.fovy_degrees = *request.fovy_degrees;
   // Quantiles of a sample: trained scenes hold a few Gaussians very far out.
   constexpr std::uint64_t kSample = 100000;
@@ -156,11 +157,14 @@ void open_builtin(const std::string& name, const SceneRequest& request, OpenedSc
   scene.viewpoint = viewpoint(request, builtin.info.size, [&] { return with_options(builtin.info.view, request); });
 }
 
-void open_ply(const std::string& path, const SceneRequest& request, OpenedScene& scene) {
-  refuse_mesh(path);
-  scene.gaussians = open_gaussian_ply(path);
+void open_file(const SceneRequest& request, OpenedScene& scene) {
+  const std::string& text = request.scene;
+  refuse_mesh(gaussian_file_path(text));
+  GaussianFile file = read_gaussian_file(text);
+  scene.gaussians = std::move(file.gaussians);
+  scene.notes = std::move(file.notes);
   scene.viewpoint =
-      viewpoint(request, kDefaultImageSize, [&] { return automatic_view(path, scene.gaussians, request); });
+      viewpoint(request, kDefaultImageSize, [&] { return automatic_view(text, scene.gaussians, file.up, request); });
 }
 
 void read_meshes(const SceneRequest& request, OpenedScene& scene) {
@@ -184,7 +188,9 @@ std::string extension_of(const std::string& scene) {
 
 std::string scene_name(const std::string& scene) {
   if (scene.empty()) return kBuiltinPrefix + kDefaultBuiltinScene;
-  return is_builtin(scene) ? scene : std::filesystem::path(scene).filename().string();
+  if (is_builtin(scene)) return scene;
+  const std::filesystem::path path(scene);
+  return (path.has_filename() ? path : path.parent_path()).filename().string();
 }
 
 bool is_draw_list(const std::string& scene) { return !is_builtin(scene) && extension_of(scene) == ".spl"; }
@@ -199,19 +205,13 @@ OpenedScene open_scene(const SceneRequest& request) {
     read_meshes(request, scene);
     return scene;
   }
-  const std::string extension = extension_of(request.scene);
   if (is_draw_list(request.scene)) {
     scene.draw_list = load_draw_list(request.scene, request);
-  } else if (extension == ".ply") {
-    check_view_options(request);
-    open_ply(request.scene, request, scene);
-    read_meshes(request, scene);
-  } else {
-    refuse_mesh(request.scene);
-    throw UserError("cannot read scene", request.scene,
-                    extension.empty() ? "it has no extension" : "scenes of type `" + extension + "` are not supported",
-                    "give an INRIA .ply, a .spl draw list, or builtin:NAME");
+    return scene;
   }
+  check_view_options(request);
+  open_file(request, scene);
+  read_meshes(request, scene);
   return scene;
 }
 

@@ -1,3 +1,4 @@
+#include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/mixed_frame.h>
 
 #include <cmath>
@@ -116,7 +117,7 @@ class SceneWithMeshes : public testing::FolderTest {};
 
 TEST_F(SceneWithMeshes, MeshesAreReadOnceAndProjectedWithTheCameraOfTheSplats) {
   SceneRequest request;
-  write_gaussian_ply(in_folder("splats.ply"), testing::scene_of({testing::ordinary_gaussian()}));
+  write_gaussian_file(in_folder("splats.ply"), testing::scene_of({testing::ordinary_gaussian()}));
   request.scene = in_folder("splats.ply").string();
   request.eye = Vec3{0, 0, 0};
   request.look_at = Vec3{0, 0, 1};

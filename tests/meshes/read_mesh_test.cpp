@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/mesh.h>
 
 #include "../workloads/workload_test_support.h"
@@ -229,7 +230,7 @@ TEST_F(MeshFile, FilesThatAreNoMeshesAreRefused) {
 }
 
 TEST_F(MeshFile, GaussiansAreNoMeshAndAMeshIsNoGaussians) {
-  write_gaussian_ply(in_folder("splats.ply"), testing::scene_of({testing::ordinary_gaussian()}));
+  write_gaussian_file(in_folder("splats.ply"), testing::scene_of({testing::ordinary_gaussian()}));
   EXPECT_FALSE(is_mesh_file(in_folder("splats.ply")));
   expect_user_error([&] { read_mesh(in_folder("splats.ply"), rejected_); }, {"no faces", "Gaussians"});
   for (const char* name : {"a.obj", "a.gltf", "a.GLB", "none/at/all.Obj"}) EXPECT_TRUE(is_mesh_file(in_folder(name)));

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
 #include "image/picture.h"
@@ -459,7 +460,7 @@ void write_scene(const std::filesystem::path& path) {
   far.log_scale = {9, 9, 9};
   far.opacity_logit = 1;
   builder.add(far);
-  write_gaussian_ply(path, builder.build());
+  write_gaussian_file(path, builder.build());
 }
 
 TEST_F(Accuracy, KnobsOfPreprocessingPreprocessAgain) {

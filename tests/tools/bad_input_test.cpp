@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
 namespace vrpipe::testing {
@@ -22,7 +23,7 @@ class BadInput : public ToolTest {
     gaussian.log_scale = {-1, -1, -1};
     gaussian.opacity_logit = 3;
     for (int i = 0; i < 4; ++i) builder.add(gaussian);
-    write_gaussian_ply(folder() / "good.ply", builder.build());
+    write_gaussian_file(folder() / "good.ply", builder.build());
     std::string ply = read_file(folder() / "good.ply");
     write("cut.ply", ply.substr(0, ply.size() - 10));
     write("other.ply", ply.replace(ply.find("opacity"), 7, "opacitx"));
@@ -230,7 +231,7 @@ TEST_F(BadInput, BrokenGaussiansAreCountedNotFatal) {
   broken = gaussian;
   broken.rotation = {0, 0, 0, 0};
   builder.add(broken);
-  write_gaussian_ply(folder() / "broken.ply", builder.build());
+  write_gaussian_file(folder() / "broken.ply", builder.build());
   const std::vector<std::string> arguments{"run",   "--scene", "broken.ply", "--size", "32x32",
                                            "--eye", "0,0,0",   "--look-at",  "0,0,1"};
   const nlohmann::json json = json_of(arguments);

@@ -3,6 +3,7 @@
 
 #include <numeric>
 
+#include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
 namespace vrpipe::testing {
@@ -21,7 +22,7 @@ class FrameFile : public ToolTest {
       gaussian.position = {0.2F * static_cast<float>(i), 0, 3.0F + static_cast<float>(i)};
       builder.add(gaussian);
     }
-    write_gaussian_ply(folder() / "four.ply", builder.build());
+    write_gaussian_file(folder() / "four.ply", builder.build());
     // A wall across the view, in front of the last two Gaussians.
     write("wall.obj", "v -9 -9 4.5\nv 9 -9 4.5\nv 9 9 4.5\nv -9 9 4.5\nf 1 2 3 4\n");
   }

@@ -10,6 +10,7 @@
 
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
 #include "jobs/settings.h"
@@ -435,7 +436,7 @@ TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
   gaussian.log_scale = {-2, -2, -2};
   gaussian.opacity_logit = 2;
   builder.add(gaussian);
-  write_gaussian_ply(folder() / "scene.ply", builder.build());
+  write_gaussian_file(folder() / "scene.ply", builder.build());
   write("frame.json", R"({"commands": [{"draw": "tiny.spl"}, {"draw": "tiny.spl"}]})");
   const std::string page = read_file(RESULTS_PAGE);
   const auto of_scene = [&](std::vector<std::string> command) {

@@ -5,6 +5,8 @@
 #include <array>
 #include <thread>
 
+#include <vrpipe/workloads/gaussian_file.h>
+
 #include "workload_test_support.h"
 
 namespace vrpipe {
@@ -54,8 +56,8 @@ TEST_F(InputFiles, OneThatIsWrittenMeanwhileIsRefused) {
 
 TEST_F(InputFiles, ASceneOutlivesItsFile) {
   const std::filesystem::path path = in_folder("a.ply");
-  write_gaussian_ply(path, testing::scene_of(std::vector<GaussianAttributes>(500, testing::ordinary_gaussian())));
-  const GaussianScene scene = open_gaussian_ply(path);
+  write_gaussian_file(path, testing::scene_of(std::vector<GaussianAttributes>(500, testing::ordinary_gaussian())));
+  const GaussianScene scene = read_gaussian_file(path).gaussians;
   std::filesystem::resize_file(path, 0);
   EXPECT_EQ(scene[499].position()[2], 5.0F);
 }

@@ -1,3 +1,4 @@
+#include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
 #include <cstdint>
@@ -37,7 +38,7 @@ class GaussianPly : public testing::FolderTest {
   void expect_refused(const std::string& bytes, std::vector<std::string> parts) {
     const auto path = write("scene.ply", bytes);
     parts.push_back("cannot read scene (" + path.string());
-    expect_user_error([&] { open_gaussian_ply(path); }, parts);
+    expect_user_error([&] { read_gaussian_file(path); }, parts);
   }
 };
 
@@ -56,8 +57,8 @@ TEST_F(GaussianPly, WritesAndReadsEveryAttributeBitForBitAtEveryDegree) {
       }
     }
     originals[1].opacity_logit = -std::numeric_limits<float>::infinity();
-    write_gaussian_ply(in_folder("scene.ply"), testing::scene_of(originals, degree));
-    const GaussianScene scene = open_gaussian_ply(in_folder("scene.ply"));
+    write_gaussian_file(in_folder("scene.ply"), testing::scene_of(originals, degree));
+    const GaussianScene scene = read_gaussian_file(in_folder("scene.ply")).gaussians;
     ASSERT_EQ(scene.size(), originals.size());
     EXPECT_EQ(scene.sh_degree(), degree);
     for (std::size_t i = 0; i < originals.size(); ++i) {
@@ -77,10 +78,10 @@ TEST_F(GaussianPly, WritesAndReadsEveryAttributeBitForBitAtEveryDegree) {
 }
 
 TEST_F(GaussianPly, TheSceneOutlivesEveryCopyButTheLast) {
-  write_gaussian_ply(in_folder("scene.ply"), testing::scene_of({testing::ordinary_gaussian()}));
+  write_gaussian_file(in_folder("scene.ply"), testing::scene_of({testing::ordinary_gaussian()}));
   GaussianScene copy;
   {
-    const GaussianScene scene = open_gaussian_ply(in_folder("scene.ply"));
+    const GaussianScene scene = read_gaussian_file(in_folder("scene.ply")).gaussians;
     copy = scene;
   }
   EXPECT_EQ(copy[0].position()[2], 5);
@@ -108,7 +109,7 @@ TEST_F(GaussianPly, PropertiesAreFoundByNameAndUnknownOnesOfAnyTypeSkipped) {
     }
   }
   const auto path = write("scene.ply", header + "end_header\n" + record + record);
-  const GaussianScene scene = open_gaussian_ply(path);
+  const GaussianScene scene = read_gaussian_file(path).gaussians;
   ASSERT_EQ(scene.size(), 2u);
   for (std::uint64_t i = 0; i < 2; ++i) {
     EXPECT_EQ(scene[i].position(), (std::array<float, 3>{13, 12, 11}));
@@ -125,7 +126,8 @@ TEST_F(GaussianPly, TrailingBytesOtherElementsAndCarriageReturnsAreTolerated) {
       "ply\r\nformat binary_little_endian 1.0\r\nelement camera 3\r\nproperty uchar id\r\nelement vertex 1\r\n";
   for (const std::string& name : kRequired) header += "property float " + name + "\r\n";
   header += "element face 7\r\nproperty list uchar int vertex_indices\r\nend_header\r\n";
-  const GaussianScene scene = open_gaussian_ply(write("scene.ply", header + "abc" + body + "trailing bytes"));
+  const GaussianScene scene =
+      read_gaussian_file(write("scene.ply", header + "abc" + body + "trailing bytes")).gaussians;
   ASSERT_EQ(scene.size(), 1u);
   EXPECT_EQ(scene[0].position(), (std::array<float, 3>{1, 2, 3}));
   EXPECT_EQ(scene[0].rotation(), (std::array<float, 4>{11, 12, 13, 14}));
@@ -138,12 +140,12 @@ TEST_F(GaussianPly, NoGaussiansIsAValidScene) {
 
 TEST_F(GaussianPly, MissingFileIsNamed) {
   const auto path = in_folder("nowhere.ply");
-  expect_user_error([&] { open_gaussian_ply(path); }, {path.string(), "no such file", "check the path"});
+  expect_user_error([&] { read_gaussian_file(path); }, {path.string(), "no such file", "check the path"});
 }
 
 TEST_F(GaussianPly, DirectoryIsRefused) {
   std::filesystem::create_directory(in_folder("scene.ply"));
-  expect_user_error([&] { open_gaussian_ply(in_folder("scene.ply")); }, {"it is a directory", "name a file in it"});
+  expect_user_error([&] { read_gaussian_file(in_folder("scene.ply")); }, {"it is a directory", "name a file in it"});
 }
 
 TEST_F(GaussianPly, EmptyFileIsRefused) { expect_refused("", {"the file is empty"}); }
@@ -264,20 +266,20 @@ TEST_F(GaussianPly, ForeignNamesAreToldInPrintableTextOfModestLength) {
 
 TEST_F(GaussianPly, WritingIntoAMissingFolderSaysSoAndLeavesNothing) {
   const auto path = in_folder("nowhere/scene.ply");
-  expect_user_error([&] { write_gaussian_ply(path, GaussianScene()); },
+  expect_user_error([&] { write_gaussian_file(path, GaussianScene()); },
                     {"cannot write scene", path.string(), "folder"});
   EXPECT_EQ(files_in_folder(), 0u);
 }
 
 TEST(RealScene, AScannedRobotLoads) {
   const testing::UnpackedFile robot("robot.ply");
-  const GaussianScene scene = open_gaussian_ply(robot.path());
+  const GaussianScene scene = read_gaussian_file(robot.path()).gaussians;
   EXPECT_EQ(scene.size(), 125000u);
   EXPECT_EQ(scene.sh_degree(), 2);
 }
 
 TEST(RealScene, TrainFixtureWithIntegerAndForeignPropertiesLoads) {
-  const GaussianScene scene = open_gaussian_ply(testing::data_file("train_3_points.ply"));
+  const GaussianScene scene = read_gaussian_file(testing::data_file("train_3_points.ply")).gaussians;
   EXPECT_EQ(scene.size(), 3u);
   EXPECT_EQ(scene.sh_degree(), 3);
 }

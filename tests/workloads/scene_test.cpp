@@ -1,3 +1,4 @@
+#include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/scene.h>
 
 #include <algorithm>
@@ -22,7 +23,7 @@ class SceneFile : public testing::FolderTest {
     gaussians[1].position = {1, 0, 6};
     gaussians[2].position = {0, 1, 5};
     gaussians[3].rotation = {0, 0, 0, 0};
-    write_gaussian_ply(in_folder("four.ply"), testing::scene_of(gaussians));
+    write_gaussian_file(in_folder("four.ply"), testing::scene_of(gaussians));
     request_.scene = in_folder("four.ply").string();
   }
   SceneRequest request_;
@@ -67,8 +68,8 @@ TEST_F(SceneFile, ViewOptionsReplaceWhatTheyName) {
   request_.fovy_degrees = 90;
   request_.size = ImageSize{64, 64};
   SceneSummary summary;
-  const Draw expected =
-      preprocess(open_gaussian_ply(request_.scene), look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 90, 64, 64), {}, summary);
+  const Draw expected = preprocess(read_gaussian_file(request_.scene).gaussians,
+                                   look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 90, 64, 64), {}, summary);
   const Draw draw = load_scene(request_).draw;
   ASSERT_EQ(draw.splats.size(), expected.splats.size());
   EXPECT_EQ(std::memcmp(draw.splats.data(), expected.splats.data(), draw.splats.size() * sizeof(Splat)), 0);
@@ -160,7 +161,7 @@ TEST_F(SceneFile, SizeOutOfRangeIsRefused) {
 }
 
 TEST_F(SceneFile, AnEmptySceneIsAnEmptyDraw) {
-  write_gaussian_ply(in_folder("none.ply"), GaussianScene());
+  write_gaussian_file(in_folder("none.ply"), GaussianScene());
   request_.scene = in_folder("none.ply").string();
   EXPECT_TRUE(load_scene(request_).draw.splats.empty());
 }
@@ -168,7 +169,7 @@ TEST_F(SceneFile, AnEmptySceneIsAnEmptyDraw) {
 TEST_F(SceneFile, GaussiansTooFarOutForACameraBesideThemAreRefusedForThat) {
   GaussianAttributes far = testing::ordinary_gaussian();
   far.position = {-1e38F, -1e38F, -1e38F};
-  write_gaussian_ply(in_folder("far.ply"), testing::scene_of({far, far}));
+  write_gaussian_file(in_folder("far.ply"), testing::scene_of({far, far}));
   request_.scene = in_folder("far.ply").string();
   expect_user_error([&] { load_scene(request_); }, {"far.ply", "-1e+38,-1e+38,-1e+38", "too far out", "--camera"});
   request_.eye = Vec3{0, 0, 0};

@@ -34,7 +34,10 @@ std::string extension_of(const std::filesystem::path& path) {
 }
 
 PlyHeader header_of(const std::filesystem::path& path, const std::string& what) {
-  return read_ply_header(InputFile(path, what), what, path.string(), "export the mesh as a .ply");
+  const InputFile file(path, what);
+  std::string head(static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), kMaxPlyHeaderBytes)), '\0');
+  file.read(0, head.data(), head.size());
+  return read_ply_header(head, what, path.string(), "export the mesh as a .ply");
 }
 
 /// Leaves assimp the reader of one format: another one would be taken for a file that only looks like it.

@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <filesystem>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace vrpipe {
@@ -99,6 +99,26 @@ struct GaussianAttributes {
   std::array<std::array<float, 15>, 3> f_rest{};
 };
 
+/// Room for a known number of Gaussians, each of which is set once, on any thread.
+class GaussianArray {
+ public:
+  /// @param where  what the Gaussians are of, for the message
+  /// @throws UserError when there is not so much memory; std::invalid_argument when sh_degree is not 0 to 3
+  GaussianArray(std::uint64_t count, int sh_degree, const std::string& where);
+
+  /// @pre index < count
+  void set(std::uint64_t index, const GaussianAttributes& gaussian);
+
+  /// Hands the Gaussians over; those that were not set hold anything.
+  GaussianScene build();
+
+ private:
+  std::uint64_t count_;
+  int sh_degree_;
+  std::size_t floats_per_gaussian_;
+  std::shared_ptr<float[]> floats_;
+};
+
 /// Collects Gaussians in memory, in one block of floats.
 class GaussianSceneBuilder {
  public:
@@ -117,17 +137,5 @@ class GaussianSceneBuilder {
   std::size_t floats_per_gaussian_;
   std::vector<float> floats_;
 };
-
-/// Reads an INRIA .ply (`format binary_little_endian 1.0`). The vertices are kept in memory as they lie in the file.
-/// Properties of the element `vertex` are found by name: x y z, scale_0..2, rot_0..3, opacity, f_dc_0..2 (all float)
-/// and f_rest_* (0, 9, 24 or 45 of them: SH degree 0 to 3). Other scalar properties, other elements (also with lists
-/// behind the vertices, without lists before them) and trailing bytes are skipped. No vertices is a valid, empty scene.
-/// @throws UserError when the file cannot be read, is cut short, is written meanwhile, or is not such a file
-GaussianScene open_gaussian_ply(const std::filesystem::path& path);
-
-/// Writes an INRIA .ply: x y z nx ny nz f_dc_0..2 f_rest_* opacity scale_0..2 rot_0..3, attributes bit for bit.
-/// The file appears complete or not at all.
-/// @throws UserError when it cannot be written
-void write_gaussian_ply(const std::filesystem::path& path, const GaussianScene& scene);
 
 }  // namespace vrpipe

@@ -15,7 +15,8 @@ namespace vrpipe {
 
 /// What the user asked to draw; field by field the options --scene, --size, --camera, --eye, --look-at, --up, --fovy.
 struct SceneRequest {
-  std::string scene;  ///< FILE.ply, FILE.spl or builtin:NAME; empty: builtin:object
+  std::string
+      scene;  ///< a file of Gaussians, see read_gaussian_file(); FILE.spl; or builtin:NAME; empty: builtin:object
   std::optional<ImageSize> size;
   std::optional<std::string> camera;  ///< FILE[#INDEX]; excludes the four below
   std::optional<Vec3> eye;
@@ -42,7 +43,7 @@ struct LoadedScene {
   bool preprocessed_here = false;        ///< false for a draw list
 };
 
-/// Image size of a .ply that is drawn without a camera file or a size.
+/// Image size of a file of Gaussians that is drawn without a camera file or a size.
 constexpr ImageSize kDefaultImageSize{1280, 720};
 
 /// A scene that can be preprocessed more than once: Gaussians and a camera, or a draw list, which is preprocessed
@@ -54,6 +55,7 @@ struct OpenedScene {
   std::vector<std::shared_ptr<const Mesh>> meshes;
   RejectedTriangles rejected_triangles;  ///< when they were read
   std::optional<LoadedScene> draw_list;
+  std::vector<std::string> notes;  ///< as GaussianFile has them
 };
 
 /// The name that results give to the scene of SceneRequest::scene: the file's without folder, or builtin:NAME.
@@ -64,11 +66,11 @@ bool is_draw_list(const std::string& scene);
 
 /// Opens a scene.
 /// Built-in: its own camera and size; view options replace what they name, the rest stays.
-/// .ply: the camera of the file given, or the view options. What is not given comes from an automatic view: it looks
+/// Gaussians of a file: the camera of the file given, or the view options. What is not given comes from an automatic view: it looks
 /// at the median position from a distance at which the middle 80 % of the positions fit (a ball of radius 0.5 and of
 /// three median sigmas at least), from the front (-z), 30 degrees to the left and 20 degrees above, with the world's
-/// up at 0,-1,0 (y points down, as in INRIA and COLMAP worlds; give --up 0,1,0 for y-up files) and a vertical field of
-/// view of 50 degrees. A scene so far out that a camera beside it rounds to where it is gets none.
+/// up where the file says it is, else at 0,-1,0 (y points down, as in INRIA and COLMAP worlds; give --up 0,1,0 for y-up
+/// files), and a vertical field of view of 50 degrees. A scene so far out that a camera beside it rounds to where it is gets none.
 /// .spl: the draw as it is; size, camera, view options, meshes and preprocessing other than the default are
 /// refused.
 /// @throws UserError for whatever cannot be used

@@ -1,0 +1,156 @@
+#include "formats/scene_format.h"
+
+#include <algorithm>
+#include <cctype>
+#include <utility>
+
+#include <vrpipe/component/error.h>
+
+namespace vrpipe {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Of a built-in table, and of whatever a static object registers before main.
+std::vector<SceneFormat>& registry() {
+  static std::vector<SceneFormat> formats;
+  return formats;
+}
+
+std::string lower_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+bool exists(const std::string& path) {
+  std::error_code ignored;
+  return fs::exists(path, ignored);
+}
+
+/// A `#` may be part of a name: then there is a file of this name.
+std::size_t choice_mark(const std::string& text) { return exists(text) ? std::string::npos : text.rfind('#'); }
+
+std::map<std::string, std::string> parse_choices(const std::string& text, const std::string& where) {
+  std::map<std::string, std::string> choices;
+  std::size_t from = 0;
+  while (from <= text.size()) {
+    const std::size_t comma = std::min(text.find(',', from), text.size());
+    const std::string part = text.substr(from, comma - from);
+    const std::size_t equals = part.find('=');
+    if (equals == std::string::npos || equals == 0 || equals + 1 == part.size()) {
+      throw UserError(kCannotReadScene, where, "`" + part + "` behind # is not KEY=VALUE", "give e.g. FILE#lod=2");
+    }
+    if (!choices.emplace(part.substr(0, equals), part.substr(equals + 1)).second) {
+      throw UserError(kCannotReadScene, where, "`" + part.substr(0, equals) + "` is there twice behind #",
+                      "give it once");
+    }
+    from = comma + 1;
+  }
+  return choices;
+}
+
+/// In a folder, the file that says what the others are.
+fs::path with_index_file(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) return path;
+  for (const char* name : {"lod-meta.json", "meta.json"}) {
+    if (fs::is_regular_file(path / name, ignored)) return path / name;
+  }
+  throw UserError(kCannotReadScene, path.string(), "it is a folder without a meta.json or lod-meta.json",
+                  "name a file, or a folder in which SOG was unpacked");
+}
+
+void check_choices(const SceneFile& file, const SceneFormat& format) {
+  for (const auto& choice : file.choices) {
+    const std::string& key = choice.first;
+    const auto known = std::find_if(format.choices.begin(), format.choices.end(),
+                                    [&](const FormatChoice& allowed) { return allowed.key == key; });
+    if (known != format.choices.end()) continue;
+    std::string remedy = "leave it out";
+    for (const FormatChoice& allowed : format.choices) remedy += ", or give #" + allowed.key + "=VALUE";
+    throw UserError(kCannotReadScene, file.bytes.where(), "the format " + format.name + " has no `" + key + "`",
+                    remedy);
+  }
+}
+
+}  // namespace
+
+bool SceneFile::ends_with(const std::string& extension) const { return vrpipe::ends_with(name, extension); }
+
+SceneFormatRegistrar::SceneFormatRegistrar(SceneFormat format) {
+  // By name, since the order in which static objects come to life is not defined.
+  std::vector<SceneFormat>& formats = registry();
+  const auto place =
+      std::find_if(formats.begin(), formats.end(), [&](const SceneFormat& other) { return format.name < other.name; });
+  formats.insert(place, std::move(format));
+}
+
+const std::vector<SceneFormat>& scene_formats() { return registry(); }
+
+std::vector<GaussianFormat> gaussian_formats() {
+  std::vector<GaussianFormat> formats;
+  for (const SceneFormat& format : registry()) {
+    formats.push_back({format.name, format.files, format.meaning, format.choices, format.write != nullptr});
+  }
+  return formats;
+}
+
+GaussianFile read_scene(const SceneFile& file) {
+  const SceneFormat* best = nullptr;
+  Match match = Match::no;
+  for (const SceneFormat& format : registry()) {
+    const Match here = format.match(file);
+    if (here > match) {
+      match = here;
+      best = &format;
+    }
+  }
+  if (best == nullptr) {
+    std::string known;
+    for (const SceneFormat& format : registry()) known += (known.empty() ? "" : ", ") + format.name;
+    file.bytes.fail("neither its content nor its name is that of a known format",
+                    "known are " + known + "; draw lists (.spl) and builtin:NAME");
+  }
+  check_choices(file, *best);
+  GaussianFile scene = best->read(file);
+  scene.format = best->name;
+  return scene;
+}
+
+std::string gaussian_file_path(const std::string& text) { return text.substr(0, choice_mark(text)); }
+
+GaussianFile read_gaussian_file(const std::string& text) {
+  const std::size_t mark = choice_mark(text);
+  const fs::path path = with_index_file(text.substr(0, mark));
+  SceneFile file;
+  file.name = lower_case(path.filename().string());
+  if (mark != std::string::npos) file.choices = parse_choices(text.substr(mark + 1), path.string());
+  file.bytes = FileBytes::read(path);
+  file.neighbour = [path](const std::string& name) {
+    const fs::path relative = fs::path(name).lexically_normal();
+    if (relative.empty() || relative.is_absolute() || *relative.begin() == "..") {
+      throw UserError(kCannotReadScene, path.string(), "it names the file `" + name.substr(0, 100) + "`",
+                      "the files of a scene lie in its folder");
+    }
+    return FileBytes::read(path.parent_path() / relative);
+  };
+  return read_scene(file);
+}
+
+std::vector<std::string> write_gaussian_file(const fs::path& path, const GaussianScene& scene) {
+  const std::string name = lower_case(path.filename().string());
+  std::string known;
+  for (const SceneFormat& format : registry()) {
+    if (format.write == nullptr) continue;
+    if (ends_with(name, format.extension)) return format.write(path, scene);
+    known += (known.empty() ? "" : " or ") + format.extension;
+  }
+  throw UserError("cannot write scene", path.string(), "its extension is not that of a format that is written",
+                  "give a name that ends in " + known);
+}
+
+}  // namespace vrpipe

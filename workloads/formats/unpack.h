@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "formats/file_bytes.h"
+
+namespace vrpipe {
+
+/// Unpacks a gzip stream step by step, so that a header in it can be read before memory is given to what it announces.
+class GzipStream {
+ public:
+  /// @throws UserError when there is not enough memory
+  explicit GzipStream(const FileBytes& packed);
+  ~GzipStream();
+  GzipStream(const GzipStream&) = delete;
+  GzipStream& operator=(const GzipStream&) = delete;
+
+  /// The next `size` bytes, on top of those unpacked so far. Memory grows with what is really there.
+  /// @throws UserError that names the byte of the packed file when it ends before or is damaged
+  void unpack(std::uint64_t size);
+  /// A copy of the first `size` bytes unpacked. Messages about it name its own bytes, not those of the file.
+  FileBytes first(std::uint64_t size) const;
+  /// All that was unpacked.
+  FileBytes take();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// Unpacks the Zstandard frame in `size` bytes of `packed` from `offset` on, which holds `unpacked_size` bytes.
+/// @throws UserError when it is damaged or holds another number of bytes
+FileBytes unpack_zstd(const FileBytes& packed, std::uint64_t offset, std::uint64_t size, std::uint64_t unpacked_size,
+                      const std::string& what);
+
+/// A decoded image, 4 bytes a pixel: red, green, blue, alpha.
+struct RgbaImage {
+  FileBytes pixels;
+  std::uint64_t width = 0, height = 0;  ///< pixels
+  const std::byte* operator[](std::uint64_t pixel) const { return pixels.data() + 4 * pixel; }
+};
+
+/// Decodes a lossless WebP image.
+/// @throws UserError when it is none, is damaged, or has fewer than `least` or more than `most` pixels
+RgbaImage unpack_webp(const FileBytes& packed, std::uint64_t least, std::uint64_t most);
+
+}  // namespace vrpipe
