@@ -45,30 +45,6 @@ float to_float(double value) {
   return static_cast<float>(value);
 }
 
-enum class Fate { visible, culled, not_finite, zero_quaternion };
-
-/// What the attributes alone decide. Independent of the camera, so counts do not change with the view.
-Fate check_attributes(const GaussianRef& gaussian, int degree) {
-  if (!all_finite(gaussian.position()) || !all_finite(gaussian.rotation()) || !all_finite(gaussian.f_dc())) {
-    return Fate::not_finite;
-  }
-  for (const float log_scale : gaussian.log_scale()) {
-    // Minus infinity is scale 0.
-    if (!(log_scale <= kMaxFloat)) return Fate::not_finite;
-  }
-  if (std::isnan(gaussian.opacity_logit())) return Fate::not_finite;
-  // Bands that are not evaluated may hold anything.
-  const std::uint32_t coefficients = kShRestPerChannel[static_cast<std::size_t>(degree)];
-  for (std::uint32_t channel = 0; channel < 3; ++channel) {
-    for (std::uint32_t c = 1; c <= coefficients; ++c) {
-      if (!std::isfinite(gaussian.f_rest(channel, c))) return Fate::not_finite;
-    }
-  }
-  const std::array<float, 4> q = gaussian.rotation();
-  if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return Fate::zero_quaternion;
-  return Fate::visible;
-}
-
 /// Rotation matrix, rows, of a quaternion (w, x, y, z) of any length but zero. The squares of the smallest and of the
 /// largest float are normal doubles, so no scaling is needed.
 std::array<Vec3, 3> rotation_matrix(const std::array<float, 4>& quaternion) {
@@ -91,7 +67,7 @@ class Projector {
   }
 
   /// Fills the geometry and the opacity of `splat` and the camera z, if the Gaussian is visible.
-  /// @pre check_attributes passed
+  /// @pre rejection_of() found none
   bool project(const GaussianRef& gaussian, Splat& splat, float& depth) const {
     // The eye is subtracted in double, so a scene far from the origin loses nothing.
     const Vec3 offset = eye_to(gaussian);
@@ -217,6 +193,27 @@ void reduce_keys(std::vector<std::uint64_t>& entries, int bits) {
 }
 
 }  // namespace
+
+Rejection rejection_of(const GaussianRef& gaussian, int degree) {
+  if (!all_finite(gaussian.position()) || !all_finite(gaussian.rotation()) || !all_finite(gaussian.f_dc())) {
+    return Rejection::not_finite;
+  }
+  for (const float log_scale : gaussian.log_scale()) {
+    // Minus infinity is scale 0.
+    if (!(log_scale <= kMaxFloat)) return Rejection::not_finite;
+  }
+  if (std::isnan(gaussian.opacity_logit())) return Rejection::not_finite;
+  // Bands that are not evaluated may hold anything.
+  const std::uint32_t coefficients = kShRestPerChannel[static_cast<std::size_t>(degree)];
+  for (std::uint32_t channel = 0; channel < 3; ++channel) {
+    for (std::uint32_t c = 1; c <= coefficients; ++c) {
+      if (!std::isfinite(gaussian.f_rest(channel, c))) return Rejection::not_finite;
+    }
+  }
+  const std::array<float, 4> q = gaussian.rotation();
+  if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return Rejection::zero_quaternion;
+  return Rejection::none;
+}
 
 double covariance_determinant(const Vec3& m1, const Vec3& m2) {
   const Vec3 c = cross(m1, m2);
@@ -352,10 +349,10 @@ Draw preprocess(const GaussianScene& scene, const Camera& camera, const Preproce
     const std::uint64_t end = std::min(scene.size(), (chunk + 1) * kChunk);
     for (std::uint64_t i = chunk * kChunk; i < end; ++i) {
       const GaussianRef gaussian = scene[i];
-      const Fate fate = check_attributes(gaussian, degree);
-      rejected.not_finite += fate == Fate::not_finite;
-      rejected.zero_quaternion += fate == Fate::zero_quaternion;
-      if (fate != Fate::visible) continue;
+      const Rejection rejection = rejection_of(gaussian, degree);
+      rejected.not_finite += rejection == Rejection::not_finite;
+      rejected.zero_quaternion += rejection == Rejection::zero_quaternion;
+      if (rejection != Rejection::none) continue;
       Splat splat;
       float depth = 0;
       if (!projector.project(gaussian, splat, depth)) continue;

@@ -31,12 +31,12 @@ View with_options(View view, const SceneRequest& request) {
   return view;
 }
 
-/// The automatic view that load_scene documents, for what the user did not name.
+/// The automatic view that open_scene documents, for what the user did not name.
 /// @throws UserError when the Gaussians lie so far out that a camera beside them rounds to where they are
-View automatic_view(const std::string& path, const GaussianScene& scene, const Vec3& up_of_world,
-                    const SceneRequest& request) {
+View automatic_view(const std::string& path, const GaussianFile& file, const SceneRequest& request) {
+  const GaussianScene& scene = file.gaussians;
   View view;
-  view.up = request.up.value_or(up_of_world);
+  view.up = request.up.value_or(file.up);
   if (request.fovy_degrees) view.fovy_degrees = *request.fovy_degrees;
   // Quantiles of a sample: trained scenes hold a few Gaussians very far out.
   constexpr std::uint64_t kSample = 100000;
@@ -158,13 +158,10 @@ void open_builtin(const std::string& name, const SceneRequest& request, OpenedSc
 }
 
 void open_file(const SceneRequest& request, OpenedScene& scene) {
-  const std::string& text = request.scene;
-  refuse_mesh(gaussian_file_path(text));
-  GaussianFile file = read_gaussian_file(text);
+  GaussianFile file = open_gaussians(request.scene);
+  scene.viewpoint = viewpoint(request, kDefaultImageSize, [&] { return automatic_view(request.scene, file, request); });
   scene.gaussians = std::move(file.gaussians);
   scene.notes = std::move(file.notes);
-  scene.viewpoint =
-      viewpoint(request, kDefaultImageSize, [&] { return automatic_view(text, scene.gaussians, file.up, request); });
 }
 
 void read_meshes(const SceneRequest& request, OpenedScene& scene) {
@@ -194,6 +191,32 @@ std::string scene_name(const std::string& scene) {
 }
 
 bool is_draw_list(const std::string& scene) { return !is_builtin(scene) && extension_of(scene) == ".spl"; }
+
+GaussianFile open_gaussians(const std::string& scene) {
+  const std::string name = scene_name(scene);
+  if (is_builtin(name)) {
+    GaussianFile file;
+    file.gaussians = make_builtin_scene(name.substr(kBuiltinPrefix.size())).gaussians;
+    file.format = "built-in";
+    return file;
+  }
+  if (is_draw_list(scene)) {
+    throw UserError("cannot read scene", scene,
+                    "a .spl is a draw list: splats on a screen, without a place in the world",
+                    "give the scene that it was made from");
+  }
+  refuse_mesh(gaussian_file_path(scene));
+  return read_gaussian_file(scene);
+}
+
+View view_of(const std::string& scene, const GaussianFile& gaussians) {
+  const std::string name = scene_name(scene);
+  if (!is_builtin(name)) return automatic_view(scene, gaussians, {});
+  const auto& infos = builtin_scenes();
+  const auto info = std::find_if(infos.begin(), infos.end(),
+                                 [&](const BuiltinSceneInfo& each) { return kBuiltinPrefix + each.name == name; });
+  return info->view;
+}
 
 OpenedScene open_scene(const SceneRequest& request) {
   if (request.size) check_image_size(request.size->width, request.size->height, "--size");
@@ -228,6 +251,7 @@ LoadedScene preprocess_scene(const OpenedScene& scene, const PreprocessOptions& 
       loaded.summary.triangles += loaded.meshes.back().mesh.size();
     }
     loaded.summary.triangles_rejected = loaded.rejected_triangles.total();
+    loaded.summary.notes = scene.notes;
     loaded.viewpoint = scene.viewpoint;
     loaded.preprocessed_here = true;
   }

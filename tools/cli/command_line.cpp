@@ -181,6 +181,7 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   commands.push_back(make_run_command());
   commands.push_back(make_compare_command());
   commands.push_back(make_accuracy_command());
+  commands.push_back(make_convert_command());
   commands.push_back(make_scenes_command());
   commands.push_back(make_platforms_command());
   commands.push_back(make_units_command());

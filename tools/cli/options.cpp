@@ -8,6 +8,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/registry.h>
+#include <vrpipe/workloads/gaussian_file.h>
 
 #include "cli/parse.h"
 #include "host/crash_report.h"
@@ -98,8 +99,8 @@ void load_plugins(const Values& plugins) {
 
 void SimulationArguments::declare(CLI::App& app, Variants variants) {
   add_option(app, "--scene", scene_, "FILE|builtin:NAME",
-             "an INRIA .ply of trained Gaussians, a .spl draw list, or a built-in scene\n"
-             "(default: builtin:object; `vrpipe scenes` lists them)",
+             "trained Gaussians (.ply, .splat, .spz, .sog, .ksplat ...), a .spl draw list,\n"
+             "or a built-in scene (default: builtin:object; `vrpipe scenes` lists them)",
              scene_group);
   add_option(app, "--mesh", meshes_, "FILE",
              "an opaque triangle mesh that is drawn with the scene: .obj, .ply, .gltf or\n"
@@ -107,7 +108,7 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              scene_group);
   add_option(app, "--size", size_, "WxH",
              "image size, pixels, each side 1 to 16384 (default: the scene's or the\n"
-             "camera's own, 1280x720 for a .ply without a camera)",
+             "camera's own, 1280x720 for a file without a camera)",
              scene_group);
   add_option(app, "--camera", camera_, "FILE[#INDEX]",
              "a cameras.json in the INRIA layout, and which camera of it (default: #0)", scene_group);
@@ -118,7 +119,7 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              "the world's up direction (default: 0,-1,0, since y points down in INRIA\n"
              "scenes; 0,1,0 for y-up files)",
              scene_group);
-  add_option(app, "--fovy", fovy_, "DEGREES", "vertical field of view (default: the scene's own, 50 for a .ply)",
+  add_option(app, "--fovy", fovy_, "DEGREES", "vertical field of view (default: the scene's own, 50 for a file)",
              scene_group);
 
   add_option(app, "--platform", platform_, "NAME",
@@ -246,7 +247,7 @@ FrameDescription SimulationArguments::frame() const {
 std::vector<NamedFile> SimulationArguments::inputs(const FrameDescription& frame) const {
   std::vector<NamedFile> files;
   for (const FrameCommand& command : frame.commands) {
-    if (command.draw) files.push_back({command.where, command.draw->scene});
+    if (command.draw) files.push_back({command.where, gaussian_file_path(command.draw->scene)});
   }
   for (const std::string& file : meshes_) files.push_back({"--mesh", file});
   for (const std::string& file : frame_) files.push_back({"--frame", file});

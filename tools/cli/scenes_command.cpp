@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <vrpipe/component/error.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 
 #include "cli/command_line.h"
 #include "cli/listing.h"
 #include "cli/options.h"
+#include "cli/scene_listing.h"
+#include "host/output_file.h"
 #include "host/terminal.h"
 #include "output/result_json.h"
 
@@ -20,14 +23,40 @@ std::string triple(const Vec3& v) { return fmt::format("{},{},{}", v[0], v[1], v
 class ScenesCommand : public Command {
  public:
   std::string name() const override { return "scenes"; }
-  std::string summary() const override { return "the built-in scenes, and what else --scene takes"; }
+  std::string summary() const override {
+    return "the built-in scenes and the formats that are read; or what is in a file";
+  }
 
   void declare(CLI::App& app) override {
+    app.add_option("FILE", file_, "a file of Gaussians to look into, or builtin:NAME");
+    add_option(app, "--preview", preview_, "FILE.png", "draws the scene of FILE, 480x270 pixels", "Where results go");
     declare_json(app, json_);
-    app.footer("Example:\n  vrpipe compare --scene builtin:indoor");
+    app.footer(
+        "Of a file: how many Gaussians, their SH degree, bounds, how opacities, scales and anisotropies are\n"
+        "distributed, and a view that shows them.\n"
+        "\n"
+        "Examples:\n"
+        "  vrpipe scenes\n"
+        "  vrpipe scenes point_cloud.ply --preview preview.png\n"
+        "  vrpipe scenes folder#lod=2 --json -");
   }
 
   void run() override {
+    const auto preview = single(preview_, "--preview");
+    if (!file_.empty()) {
+      if (preview && single(json_, "--json"))
+        check_files_differ({}, {{"--preview", *preview}, {"--json", *single(json_, "--json")}});
+      const SceneListing listing = describe_scene(file_, preview, stdout_style());
+      print_listing(listing.json, listing.text, json_);
+      return;
+    }
+    if (preview)
+      throw UserError("nothing to draw", "--preview", "no file is named", "give vrpipe scenes FILE --preview FILE.png");
+    list();
+  }
+
+ private:
+  void list() {
     Json list = Json::array();
     std::string text;
     const TextStyle style = stdout_style();
@@ -48,15 +77,14 @@ class ScenesCommand : public Command {
                           scene.size.height, triple(scene.view.eye), triple(scene.view.look_at), triple(scene.view.up),
                           scene.view.fovy_degrees);
     }
-    text += style.bold("FILE.ply") +
-            "\n  trained Gaussians as the INRIA code writes them, seen from --camera, or from "
-            "--eye to --look-at, or\n  from a view that fits the scene\n";
+    text += formats_as_text(style);
     text += style.bold("FILE.spl") + "\n  a draw list that --save-draw wrote: its camera and size are part of it\n";
-    print_listing({{"schema", "vrpipe.scenes/1"}, {"scenes", std::move(list)}}, text, json_);
+    print_listing({{"schema", "vrpipe.scenes/1"}, {"scenes", std::move(list)}, {"formats", formats_as_json()}}, text,
+                  json_);
   }
 
- private:
-  Values json_;
+  std::string file_;
+  Values preview_, json_;
 };
 
 }  // namespace

@@ -32,6 +32,7 @@ void add(const SceneSummary& scene, SceneSummary& sum) {
   sum.rejected.zero_quaternion += scene.rejected.zero_quaternion;
   sum.triangles += scene.triangles;
   sum.triangles_rejected += scene.triangles_rejected;
+  sum.notes.insert(sum.notes.end(), scene.notes.begin(), scene.notes.end());
 }
 
 void check(const FrameCommand& command, const Draw& geometry, const LoadedFrame& frame) {

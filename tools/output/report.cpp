@@ -369,6 +369,7 @@ std::string remarks(const JobResult& result) {
     text += fmt::format("rejected {} Gaussians: {} with a NaN or infinite value, {} without an orientation\n",
                         grouped(rejected.total()), grouped(rejected.not_finite), grouped(rejected.zero_quaternion));
   }
+  for (const std::string& note : result.scene.notes) text += "note: " + printable(note) + "\n";
   text += anomaly_text(runs);
   text += fmt::format("took {:.1f} s to load the scene, {:.1f} s to simulate", result.load_seconds,
                       result.simulate_seconds);

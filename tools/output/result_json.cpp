@@ -270,6 +270,7 @@ Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t he
           {"triangles_rejected", scene.triangles_rejected},
           {"width", width},
           {"height", height},
+          {"notes", scene.notes},
           {"rejected_by_reason",
            {{"not_finite", scene.rejected.not_finite}, {"zero_quaternion", scene.rejected.zero_quaternion}}}};
 }

@@ -77,6 +77,7 @@ struct SceneSummary {
   RejectedGaussians rejected;
   std::uint64_t triangles = 0;           ///< of meshes, in the draws of each, clipped
   std::uint64_t triangles_rejected = 0;  ///< that cannot be drawn
+  std::vector<std::string> notes;        ///< what of its files is not used, or was assumed; a sentence each
 };
 
 }  // namespace vrpipe

@@ -40,6 +40,11 @@ Draw preprocess(const GaussianScene& scene, const Camera& camera, const Preproce
 
 // The steps, for tests and for units that need them.
 
+/// Why a Gaussian cannot be drawn; its attributes alone decide, so counts do not change with the view.
+enum class Rejection { none, not_finite, zero_quaternion };
+/// @param degree  SH bands that are looked at, at most those of the Gaussian
+Rejection rejection_of(const GaussianRef& gaussian, int degree);
+
 /// A 2-D covariance M M^T + kDilation I in factor form, decomposed. `m1`, `m2` are the rows of M, pixels.
 /// `lambda1` >= `lambda2` >= kDilation are the eigenvalues, (`axis_x`, `axis_y`) the unit eigenvector of lambda1; that of
 /// lambda2 is (-axis_y, axis_x).

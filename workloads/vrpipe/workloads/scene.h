@@ -7,6 +7,7 @@
 
 #include <vrpipe/pipeline/draw.h>
 #include <vrpipe/workloads/camera.h>
+#include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 #include <vrpipe/workloads/mesh.h>
 #include <vrpipe/workloads/preprocess.h>
@@ -63,6 +64,14 @@ std::string scene_name(const std::string& scene);
 
 /// Whether a scene is a draw list (.spl), which has a size and no camera.
 bool is_draw_list(const std::string& scene);
+
+/// The Gaussians that `scene` names: a file, or builtin:NAME.
+/// @throws UserError for what has none, a draw list or a mesh, and as read_gaussian_file()
+GaussianFile open_gaussians(const std::string& scene);
+
+/// Where open_scene() puts the camera if nothing is said about it.
+/// @throws UserError when the Gaussians lie so far out that a camera beside them rounds to where they are
+View view_of(const std::string& scene, const GaussianFile& gaussians);
 
 /// Opens a scene.
 /// Built-in: its own camera and size; view options replace what they name, the rest stays.
