@@ -66,6 +66,23 @@ class Projector {
     limit_y_ = 1.3 * (0.5 * camera.height / camera.fy);
   }
 
+  /// Whether a Gaussian is visible, and its camera z. Does without its ellipse where its centre is in the image.
+  /// @pre rejection_of() found none
+  bool is_visible(const GaussianRef& gaussian, float& depth) const {
+    const Vec3 offset = eye_to(gaussian);
+    const double z = dot(world_to_camera_[2], offset);
+    if (!(z > static_cast<double>(camera_.near_plane))) return false;
+    const double x = camera_.fx * (dot(world_to_camera_[0], offset) / z);
+    const double y = camera_.fy * (dot(world_to_camera_[1], offset) / z);
+    // An extent that is limited moves the centre less than it still reaches, so project() says the same.
+    if (std::fabs(x) < 0.5 * camera_.width && std::fabs(y) < 0.5 * camera_.height) {
+      depth = to_float(z);
+      return opacity_of(gaussian) >= kPruneThreshold;
+    }
+    Splat splat;
+    return project(gaussian, splat, depth);
+  }
+
   /// Fills the geometry and the opacity of `splat` and the camera z, if the Gaussian is visible.
   /// @pre rejection_of() found none
   bool project(const GaussianRef& gaussian, Splat& splat, float& depth) const {
@@ -73,7 +90,7 @@ class Projector {
     const Vec3 offset = eye_to(gaussian);
     const double z = dot(world_to_camera_[2], offset);
     if (!(z > static_cast<double>(camera_.near_plane))) return false;
-    const float opacity = static_cast<float>(sigmoid(static_cast<double>(gaussian.opacity_logit())));
+    const float opacity = opacity_of(gaussian);
     if (!(opacity >= kPruneThreshold)) return false;
 
     const double ray_x = dot(world_to_camera_[0], offset) / z;
@@ -126,6 +143,10 @@ class Projector {
   }
 
  private:
+  static float opacity_of(const GaussianRef& gaussian) {
+    return static_cast<float>(sigmoid(static_cast<double>(gaussian.opacity_logit())));
+  }
+
   Vec3 eye_to(const GaussianRef& gaussian) const {
     const std::array<float, 3> position = gaussian.position();
     return {static_cast<double>(position[0]) - camera_.eye[0], static_cast<double>(position[1]) - camera_.eye[1],
@@ -311,19 +332,37 @@ std::uint32_t depth_key(float depth) {
   return (bits & 0x80000000u) != 0 ? ~bits : bits | 0x80000000u;
 }
 
-void sort_by_key(std::vector<std::uint64_t>& entries) {
-  std::vector<std::uint64_t> other(entries.size());
+void sort_by_key(std::vector<std::uint64_t>& entries, unsigned threads) {
+  // Each thread has a part of the entries, and of each digit's places those that follow the earlier parts'.
+  constexpr std::size_t kLeastPart = 65536;
+  const std::size_t count = entries.size();
+  const std::size_t parts = std::min<std::size_t>(std::max(1U, threads), count / kLeastPart + 1);
+  const auto part_begin = [&](std::size_t part) { return count / parts * part + std::min(part, count % parts); };
+  std::vector<std::array<std::size_t, 256>> next(parts);
+  std::vector<std::uint64_t> other(count);
   for (unsigned shift = 32; shift < 64; shift += 8) {
-    std::array<std::size_t, 256> next{};
-    for (const std::uint64_t entry : entries) ++next[(entry >> shift) & 0xff];
-    if (!entries.empty() && next[(entries[0] >> shift) & 0xff] == entries.size()) continue;  // one value: in order
+    const auto digit = [shift](std::uint64_t entry) { return (entry >> shift) & 0xffU; };
+    for_each_chunk(parts, threads, [&](std::uint64_t part) {
+      next[part].fill(0);
+      for (std::size_t i = part_begin(part); i < part_begin(part + 1); ++i) ++next[part][digit(entries[i])];
+    });
     std::size_t sum = 0;
-    for (std::size_t& slot : next) {
-      const std::size_t count = slot;
-      slot = sum;
-      sum += count;
+    bool is_sorted = false;  // all have one value
+    for (std::size_t value = 0; value < 256; ++value) {
+      const std::size_t before = sum;
+      for (auto& places : next) {
+        const std::size_t of_part = places[value];
+        places[value] = sum;
+        sum += of_part;
+      }
+      is_sorted = is_sorted || (count > 0 && sum - before == count);
     }
-    for (const std::uint64_t entry : entries) other[next[(entry >> shift) & 0xff]++] = entry;
+    if (is_sorted) continue;
+    for_each_chunk(parts, threads, [&](std::uint64_t part) {
+      for (std::size_t i = part_begin(part); i < part_begin(part + 1); ++i) {
+        other[next[part][digit(entries[i])]++] = entries[i];
+      }
+    });
     entries.swap(other);
   }
 }
@@ -335,8 +374,8 @@ Draw preprocess(const GaussianScene& scene, const Camera& camera, const Preproce
   const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
   const Projector projector(camera);
 
-  // First which are visible, and their keys; the splats only once their places are known. Projecting twice is cheaper
-  // than a second copy of the splats, and keeps the memory per Gaussian small.
+  // First which are visible, and their keys; the splats only once their places are known. That is cheaper than a second copy
+  // of the splats, and keeps the memory per Gaussian small.
   const std::uint64_t chunks = (scene.size() + kChunk - 1) / kChunk;
   struct ChunkResult {
     std::vector<std::uint64_t> entries;  ///< key << 32 | index
@@ -353,9 +392,8 @@ Draw preprocess(const GaussianScene& scene, const Camera& camera, const Preproce
       rejected.not_finite += rejection == Rejection::not_finite;
       rejected.zero_quaternion += rejection == Rejection::zero_quaternion;
       if (rejection != Rejection::none) continue;
-      Splat splat;
       float depth = 0;
-      if (!projector.project(gaussian, splat, depth)) continue;
+      if (!projector.is_visible(gaussian, depth)) continue;
       entries.push_back((std::uint64_t{depth_key(depth)} << 32) | i);
     }
     entries.shrink_to_fit();
@@ -375,19 +413,24 @@ Draw preprocess(const GaussianScene& scene, const Camera& camera, const Preproce
   }
   results = {};
   reduce_keys(order, options.depth_key_bits);
-  sort_by_key(order);
+  sort_by_key(order, threads);
 
   Draw draw;
   draw.width = camera.width;
   draw.height = camera.height;
   draw.splats.resize(order.size());
+  constexpr std::uint64_t kAhead = 8;  // in order of depth, Gaussians lie anywhere
   for_each_chunk((order.size() + kChunk - 1) / kChunk, threads, [&](std::uint64_t chunk) {
     const std::uint64_t end = std::min<std::uint64_t>(order.size(), (chunk + 1) * kChunk);
     for (std::uint64_t rank = chunk * kChunk; rank < end; ++rank) {
+      if (rank + kAhead < end) scene.prefetch(order[static_cast<std::size_t>(rank + kAhead)] & 0xffffffffu);
       const GaussianRef gaussian = scene[order[static_cast<std::size_t>(rank)] & 0xffffffffu];
       Splat& splat = draw.splats[static_cast<std::size_t>(rank)];
       float depth = 0;
-      projector.project(gaussian, splat, depth);
+      if (!projector.project(gaussian, splat, depth)) {
+        throw SimulationFault("preprocess", 0,
+                              "a Gaussian that is visible and is not, of rank " + std::to_string(rank));
+      }
       projector.colour(gaussian, degree, splat);
     }
   });

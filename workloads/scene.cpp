@@ -205,7 +205,13 @@ GaussianFile open_gaussians(const std::string& scene) {
                     "a .spl is a draw list: splats on a screen, without a place in the world",
                     "give the scene that it was made from");
   }
-  refuse_mesh(gaussian_file_path(scene));
+  const std::filesystem::path path = gaussian_file_path(scene);
+  std::error_code ignored;
+  if (!path.has_extension() && !std::filesystem::exists(path, ignored)) {
+    throw UserError("cannot read scene", scene, "no such file",
+                    "check the path, or give " + kBuiltinPrefix + nearest_name(scene, builtin_scene_names()));
+  }
+  refuse_mesh(path.string());
   return read_gaussian_file(scene);
 }
 

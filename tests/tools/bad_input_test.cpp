@@ -47,7 +47,7 @@ class BadInput : public ToolTest {
 };
 
 TEST_F(BadInput, Commands) {
-  refused({}, {"no command", "run, compare, accuracy, scenes, platforms, units"});
+  refused({}, {"no command", "run, compare, accuracy, convert, scenes, platforms, units"});
   refused({"reproduce"}, {"'reproduce'", "compare"});
   refused({"microbench", "tile-binning"}, {"'microbench'"});
   refused({"compar"}, {"'compar'", "did you mean compare?"});

@@ -135,7 +135,7 @@ TEST_F(GaussianPly, TrailingBytesOtherElementsAndCarriageReturnsAreTolerated) {
 
 // L16, Z01: count 0.
 TEST_F(GaussianPly, NoGaussiansIsAValidScene) {
-  EXPECT_TRUE(open_gaussian_ply(write("scene.ply", header_of("0", kRequired))).empty());
+  EXPECT_TRUE(read_gaussian_file(write("scene.ply", header_of("0", kRequired))).gaussians.empty());
 }
 
 TEST_F(GaussianPly, MissingFileIsNamed) {
@@ -193,8 +193,8 @@ TEST_F(GaussianPly, MissingPropertyIsNamed) {
   }
 }
 
-TEST_F(GaussianPly, CompressedPlyGetsARemedyOfItsOwn) {
-  expect_refused(header_of("1", {"packed_position"}) + floats(1), {"this is a compressed .ply"});
+TEST_F(GaussianPly, CompressedPlyWithoutChunksIsRefusedAsSuch) {
+  expect_refused(header_of("1", {"packed_position"}) + floats(1), {"no element chunk"});
 }
 
 TEST_F(GaussianPly, WrongTypeIsNamed) {

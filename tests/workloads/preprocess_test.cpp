@@ -162,6 +162,21 @@ TEST(PreprocessAttributes, AHugeGaussianFarAsideStillCoversTheImage) {
   EXPECT_LT(std::fabs(u), 1e-3) << "the image's centre is next to the splat's centre, in half extents";
 }
 
+TEST(PreprocessAttributes, AHugeGaussianWithItsCentreInTheImageIsDrawnWhereverItsLimitedAxesTakeIt) {
+  std::mt19937 random(23);
+  std::vector<GaussianAttributes> gaussians(2000, ordinary_gaussian());
+  for (GaussianAttributes& gaussian : gaussians) {
+    const auto uniform = [&random] { return static_cast<float>(random()) / 4294967296.0f - 0.5f; };
+    // 90 degrees wide and high: all centres are in the image.
+    gaussian.position = {9.9f * uniform(), 9.9f * uniform(), 5};
+    for (float& component : gaussian.rotation) component = uniform();
+    for (float& log_scale : gaussian.log_scale) log_scale = 100 * uniform();
+  }
+  SceneSummary summary;
+  const Camera camera = look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 90, 64, 64);
+  EXPECT_EQ(preprocess(scene_of(gaussians), camera, {}, summary).splats.size(), gaussians.size());
+}
+
 TEST(PreprocessAttributes, L07ZeroQuaternionIsRejectedByName) {
   GaussianAttributes g = ordinary_gaussian();
   for (const float zero : {0.0f, -0.0f}) {
@@ -724,7 +739,7 @@ TEST(PreprocessOrder, K02KeysOrderLikeDepthsAndBothZerosTie) {
 
 TEST(PreprocessOrder, K08RadixSortEqualsAStableSortAtEverySize) {
   std::mt19937 random(17);
-  for (const std::size_t size : {0u, 1u, 2u, 255u, 256u, 257u, 65535u, 65536u, 65537u}) {
+  for (const std::size_t size : {0u, 1u, 2u, 255u, 256u, 257u, 65535u, 65536u, 65537u, 262145u}) {
     for (int pattern = 0; pattern < 5; ++pattern) {
       std::vector<std::uint64_t> entries(size);
       for (std::size_t i = 0; i < size; ++i) {
@@ -736,8 +751,11 @@ TEST(PreprocessOrder, K08RadixSortEqualsAStableSortAtEverySize) {
       std::vector<std::uint64_t> expected = entries;
       std::stable_sort(expected.begin(), expected.end(),
                        [](std::uint64_t a, std::uint64_t b) { return (a >> 32) < (b >> 32); });
-      sort_by_key(entries);
-      EXPECT_EQ(entries, expected) << size << " " << pattern;
+      for (const unsigned threads : {1U, 3U, 64U}) {
+        std::vector<std::uint64_t> sorted = entries;
+        sort_by_key(sorted, threads);
+        EXPECT_EQ(sorted, expected) << size << " " << pattern << " " << threads;
+      }
     }
   }
 }

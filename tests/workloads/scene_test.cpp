@@ -144,11 +144,11 @@ TEST_F(SceneFile, AnOpenedSceneCanBePreprocessedAgain) {
 }
 
 TEST_F(SceneFile, UnknownKindsOfFilesAreRefusedWithWhatIsSupported) {
-  request_.scene = "scene.splat";
+  request_.scene = write("scene.usd", "#usda 1.0").string();
   expect_user_error([&] { load_scene(request_); },
-                    {"scene.splat", "`.splat` are not supported", ".ply", ".spl", "builtin:NAME"});
-  request_.scene = "scene";
-  expect_user_error([&] { load_scene(request_); }, {"no extension"});
+                    {"scene.usd", "known format", ".ply", ".splat", ".spl", "builtin:NAME"});
+  request_.scene = "objct";
+  expect_user_error([&] { load_scene(request_); }, {"no such file", "builtin:object"});
   request_.scene = "builtin:objekt";
   expect_user_error([&] { load_scene(request_); }, {"builtin:object?"});
 }

@@ -1,6 +1,7 @@
 #include "formats/file_bytes.h"
 
 #include <algorithm>
+#include <limits>
 #include <new>
 #include <thread>
 
@@ -41,8 +42,11 @@ const std::byte* FileBytes::records(std::uint64_t offset, std::uint64_t count, s
                                     const std::string& what) const {
   const std::uint64_t room = offset > size_ ? 0 : size_ - offset;
   if (stride > 0 && count > room / stride) {
-    fail(what + ", " + std::to_string(count) + " records of " + std::to_string(stride) + " bytes from byte " +
-             std::to_string(offset) + " on, go beyond the end at byte " + std::to_string(size_),
+    const bool fits = count <= (std::numeric_limits<std::uint64_t>::max() - offset) / stride;
+    fail("it announces " + std::to_string(count) + " records of " + std::to_string(stride) + " bytes in " + what +
+             " from byte " + std::to_string(offset) + " on, which needs " +
+             (fits ? std::to_string(offset + count * stride) : "more than 2^64") + " bytes, and the file has " +
+             std::to_string(size_),
          kShortRemedy);
   }
   return range(offset, count * stride, what);

@@ -30,7 +30,8 @@ Match match(const SceneFile& file) {
   if (bytes.size() >= kHeaderBytes && bytes.number<std::uint16_t>(0, kHeader) == 0x0100) {
     const std::uint64_t sections = bytes.number<std::uint32_t>(4, kHeader);
     const bool level = bytes.number<std::uint16_t>(20, kHeader) < kLevels.size();
-    if (level && sections >= 1 && sections <= (bytes.size() - kHeaderBytes) / kSectionHeaderBytes) return Match::by_content;
+    if (level && sections >= 1 && sections <= (bytes.size() - kHeaderBytes) / kSectionHeaderBytes)
+      return Match::by_content;
   }
   return file.ends_with(".ksplat") ? Match::by_name : Match::no;
 }

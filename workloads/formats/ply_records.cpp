@@ -19,9 +19,11 @@ bool same_type(std::string_view a, std::string_view b) {
   return plain(a) == plain(b);
 }
 
-void refuse_lists(const FileBytes& file, const PlyElement& element, const char* remedy) {
+void refuse_lists(const FileBytes& file, const PlyElement& element, const std::string& place,
+                  const std::string& remedy) {
   if (const PlyProperty* list = element.first_list()) {
-    file.fail("element " + shortened(element.name) + " has the list property `" + shortened(list->name) + "`", remedy);
+    file.fail("element " + shortened(element.name) + place + " has the list property `" + shortened(list->name) + "`",
+              remedy);
   }
 }
 
@@ -42,11 +44,11 @@ PlyRecords::PlyRecords(const FileBytes& file, const PlyHeader& header, const std
   if (element_ == nullptr) file.fail("the header has no element " + name, kExportRemedy);
   std::uint64_t offset = header.size_bytes;
   for (const PlyElement* element = header.elements.data(); element != element_; ++element) {
-    refuse_lists(file, *element, ("write element " + name + " first").c_str());
+    refuse_lists(file, *element, " before element " + name, "write element " + name + " first");
     file.records(offset, element->count, element->stride_bytes, "element " + shortened(element->name));
     offset += element->count * element->stride_bytes;
   }
-  refuse_lists(file, *element_, "a Gaussian has scalar properties only; remove the list");
+  refuse_lists(file, *element_, "", "a Gaussian has scalar properties only; remove the list");
   for (const PlyProperty& property : element_->properties) {
     if (!properties_.emplace(property.name, &property).second) {
       file.fail("property `" + shortened(property.name) + "` occurs twice in element " + name, kExportRemedy);

@@ -60,8 +60,8 @@ fs::path with_index_file(const fs::path& path) {
   for (const char* name : {"lod-meta.json", "meta.json"}) {
     if (fs::is_regular_file(path / name, ignored)) return path / name;
   }
-  throw UserError(kCannotReadScene, path.string(), "it is a folder without a meta.json or lod-meta.json",
-                  "name a file, or a folder in which SOG was unpacked");
+  throw UserError(kCannotReadScene, path.string(), "it is a directory without a meta.json or lod-meta.json",
+                  "name a file in it, or a folder in which SOG was unpacked");
 }
 
 void check_choices(const SceneFile& file, const SceneFormat& format) {

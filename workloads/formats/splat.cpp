@@ -77,7 +77,8 @@ std::vector<std::string> write(const std::filesystem::path& path, const Gaussian
   }
   file.commit();
   if (scene.sh_degree() == 0) return {};
-  return {"spherical harmonics of degree 1 to " + std::to_string(scene.sh_degree()) + " are left out: a .splat has none"};
+  return {"spherical harmonics of degree 1 to " + std::to_string(scene.sh_degree()) +
+          " are left out: a .splat has none"};
 }
 
 const SceneFormatRegistrar registrar({"antimatter15 .splat",

@@ -69,7 +69,7 @@ std::array<float, 3> sh_colour(const GaussianRef& gaussian, const Vec3& directio
 /// Sort key: orders like the depths themselves, -0 equal to +0.
 std::uint32_t depth_key(float depth);
 
-/// (key << 32 | index) entries in stable ascending order of key; a least-significant-digit radix sort.
-void sort_by_key(std::vector<std::uint64_t>& entries);
+/// (key << 32 | index) entries in stable ascending order of key; a least-significant-digit radix sort on up to `threads` threads.
+void sort_by_key(std::vector<std::uint64_t>& entries, unsigned threads = 1);
 
 }  // namespace vrpipe
