@@ -218,11 +218,13 @@ unsigned TileRasterizer::fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t
   LanePairBits down[3];
   for (unsigned i = 0; i < 3; ++i) {
     const auto start = static_cast<std::int32_t>(std::clamp(value[i], -narrow_limit, narrow_limit));
-    const auto dx = static_cast<std::int32_t>(edges_[i].dx);
-    const auto dy = static_cast<std::int32_t>(edges_[i].dy);
-    at[i] = LanePairBits{0, dx, dy, dx + dy, 2 * dx, 3 * dx, 2 * dx + dy, 3 * dx + dy} + start;
-    right[i] = LanePairBits{} + 4 * dx;
-    down[i] = LanePairBits{} + 2 * dy;
+    // Of edges that are too wide, which are here only if that effect was left out by force, the low bits.
+    const auto step = [&edge = edges_[i]](std::int64_t columns, std::int64_t rows) {
+      return static_cast<std::int32_t>(columns * edge.dx + rows * edge.dy);
+    };
+    at[i] = LanePairBits{0, step(1, 0), step(0, 1), step(1, 1), step(2, 0), step(3, 0), step(2, 1), step(3, 1)} + start;
+    right[i] = LanePairBits{} + step(4, 0);
+    down[i] = LanePairBits{} + step(0, 2);
   }
   std::uint64_t coverage = 0;  // of the 4x4 quads, 4 bits each
   for (unsigned row = 0; row < 4; ++row) {

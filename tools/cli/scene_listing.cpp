@@ -11,6 +11,7 @@
 #include <vrpipe/workloads/scene.h>
 #include <vrpipe/workloads/scene_description.h>
 
+#include "cli/listing.h"
 #include "host/output_file.h"
 #include "host/progress_line.h"
 #include "image/images.h"
@@ -159,6 +160,19 @@ std::string formats_as_text(const TextStyle& style) {
                         format.is_written ? "; `vrpipe convert` writes it" : "");
     for (const FormatChoice& choice : format.choices)
       text += fmt::format("  #{}=VALUE  {}\n", choice.key, choice.meaning);
+  }
+  return text;
+}
+
+std::string formats_as_markdown() {
+  std::string text = "| file | format | what it holds | `#KEY=VALUE` | written |\n|---|---|---|---|---|\n";
+  for (const GaussianFormat& format : gaussian_formats()) {
+    std::string choices;
+    for (const FormatChoice& choice : format.choices) {
+      choices += fmt::format("{}`{}`: {}", choices.empty() ? "" : "; ", choice.key, markdown_escaped(choice.meaning));
+    }
+    text += fmt::format("| {} | {} | {} | {} | {} |\n", format.files, format.name, markdown_escaped(format.meaning),
+                        choices, format.is_written ? "yes" : "");
   }
   return text;
 }

@@ -21,6 +21,7 @@ SceneListing describe_scene(const std::string& scene, const std::optional<std::s
 
 /// The formats that are read, for `vrpipe scenes`.
 std::string formats_as_text(const TextStyle& style);
+std::string formats_as_markdown();
 Json formats_as_json();
 
 }  // namespace vrpipe::tools

@@ -30,6 +30,8 @@ class ScenesCommand : public Command {
   void declare(CLI::App& app) override {
     app.add_option("FILE", file_, "a file of Gaussians to look into, or builtin:NAME");
     add_option(app, "--preview", preview_, "FILE.png", "draws the scene of FILE, 480x270 pixels", "Where results go");
+    app.add_flag("--markdown", markdown_, "prints the formats that are read as a Markdown table")
+        ->group("Where results go");
     declare_json(app, json_);
     app.footer(
         "Of a file: how many Gaussians, their SH degree, bounds, how opacities, scales and anisotropies are\n"
@@ -84,6 +86,7 @@ class ScenesCommand : public Command {
   }
 
   std::string file_;
+  bool markdown_ = false;
   Values preview_, json_;
 };
 
