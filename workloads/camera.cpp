@@ -3,27 +3,23 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <string_view>
+#include <string>
+#include <system_error>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
-#include <nlohmann/json.hpp>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/workloads/portable_math.h>
 
-#include "file_io.h"
+#include "cameras/camera_format.h"
 
 namespace vrpipe {
 namespace {
 
 constexpr char kCannotUse[] = "cannot use camera";
-constexpr char kCannotRead[] = "cannot read camera file";
 /// With this, no product of a projection overflows a double.
 constexpr float kMinNearPlane = 1e-6f;
-constexpr char kLayoutRemedy[] =
-    "an INRIA cameras.json is an array of {\"width\", \"height\", \"position\": [3], \"rotation\": [3][3], \"fx\", "
-    "\"fy\"}";
 
 bool all_finite(const Vec3& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
 
@@ -35,75 +31,59 @@ Vec3 normalized(Vec3 v) {
   return v / glm::length(v);
 }
 
-double read_number(const nlohmann::json& value, const std::string& where, const std::string& name) {
-  if (!value.is_number()) throw UserError(kCannotRead, where, name + " is not a number", kLayoutRemedy);
-  const double number = value.get<double>();
-  if (!std::isfinite(number)) throw UserError(kCannotRead, where, name + " is not finite", kLayoutRemedy);
-  return number;
+/// A file's name without the folder, and without what follows its last dot.
+std::string without_folder(const std::string& name) { return name.substr(name.rfind('/') + 1); }
+std::string without_extension(const std::string& name) {
+  const std::size_t dot = name.rfind('.');
+  const bool is_extension = dot != std::string::npos && dot > name.rfind('/') + 1;
+  return is_extension ? name.substr(0, dot) : name;
 }
 
-const nlohmann::json& read_member(const nlohmann::json& camera, const std::string& where, const char* name) {
-  const auto found = camera.find(name);
-  if (found == camera.end())
-    throw UserError(kCannotRead, where, std::string("it has no \"") + name + "\"", kLayoutRemedy);
-  return *found;
+/// Whether people may mean `name` when they write `text`.
+bool is_short_for(const std::string& text, const std::string& name) {
+  return text == without_folder(name) || text == without_extension(name) ||
+         text == without_extension(without_folder(name));
 }
 
-Vec3 read_vector(const nlohmann::json& value, const std::string& where, const std::string& name) {
-  if (!value.is_array() || value.size() != 3) {
-    throw UserError(kCannotRead, where, name + " is not an array of 3 numbers", kLayoutRemedy);
+/// An index as it is written: no sign, no leading zeros.
+std::optional<std::size_t> read_index(const std::string& text) {
+  std::size_t index = 0;
+  const char* const end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, index);
+  const bool is_number = result.ec == std::errc{} && result.ptr == end;
+  return is_number && std::to_string(index) == text ? std::optional<std::size_t>(index) : std::nullopt;
+}
+
+/// What to give in place of a camera that is not there.
+std::string other_cameras(const std::vector<Camera>& cameras, const std::string& meant) {
+  if (cameras.empty()) return "use another file";
+  std::string remedy = fmt::format("give an index of 0 to {}", cameras.size() - 1);
+  std::vector<std::string> names;
+  for (const Camera& camera : cameras) {
+    if (!camera.name.empty()) names.push_back(camera.name);
   }
-  return {read_number(value[0], where, name), read_number(value[1], where, name), read_number(value[2], where, name)};
+  if (!names.empty()) remedy += fmt::format(", or a name, such as {}", nearest_name(meant, names));
+  return remedy;
 }
 
-std::uint32_t read_side(const nlohmann::json& value, const std::string& where, const std::string& name) {
-  const double side = read_number(value, where, name);
-  if (!(side >= 1 && side <= kMaxImageSize) || side != std::floor(side)) {
-    throw UserError(kCannotRead, where, name + " is not a whole number of 1 to " + std::to_string(kMaxImageSize),
-                    "correct the file");
-  }
-  return static_cast<std::uint32_t>(side);
-}
-
-void check_rotation(const Camera& camera, const std::string& where) {
-  const auto column = [&camera](std::size_t i) {
-    return Vec3{camera.rotation[0][i], camera.rotation[1][i], camera.rotation[2][i]};
-  };
-  constexpr double kTolerance = 1e-3;
-  bool good = dot(cross(column(0), column(1)), column(2)) > 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = i; j < 3; ++j) {
-      good = good && std::fabs(dot(column(i), column(j)) - (i == j ? 1.0 : 0.0)) <= kTolerance;
+std::size_t find_by_name(const std::vector<Camera>& cameras, const std::string& name, const std::string& where) {
+  for (const bool is_exact : {true, false}) {
+    std::vector<std::size_t> found;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      const std::string& image = cameras[i].name;
+      if (image.empty() || !(is_exact ? image == name : is_short_for(name, image))) continue;
+      found.push_back(i);
     }
+    if (found.size() > 1) {
+      throw UserError(kCannotUse, where,
+                      fmt::format("{} of its cameras are called {}, the first two are #{} and #{}", found.size(), name,
+                                  found[0], found[1]),
+                      "give the index of one");
+    }
+    if (!found.empty()) return found.front();
   }
-  if (!good) {
-    throw UserError(kCannotRead, where, "\"rotation\" is not a rotation matrix",
-                    "its columns must be right, down and forward: unit vectors at right angles, right-handed");
-  }
-}
-
-Camera read_camera(const nlohmann::json& json, const std::string& where) {
-  if (!json.is_object()) throw UserError(kCannotRead, where, "it is not an object", kLayoutRemedy);
-  Camera camera;
-  camera.width = read_side(read_member(json, where, "width"), where, "\"width\"");
-  camera.height = read_side(read_member(json, where, "height"), where, "\"height\"");
-  camera.eye = read_vector(read_member(json, where, "position"), where, "\"position\"");
-  const nlohmann::json& rotation = read_member(json, where, "rotation");
-  if (!rotation.is_array() || rotation.size() != 3) {
-    throw UserError(kCannotRead, where, "\"rotation\" is not an array of 3 rows", kLayoutRemedy);
-  }
-  for (std::size_t row = 0; row < 3; ++row) {
-    camera.rotation[row] = read_vector(rotation[row], where, "\"rotation\" row " + std::to_string(row));
-  }
-  check_rotation(camera, where);
-  camera.fx = read_number(read_member(json, where, "fx"), where, "\"fx\"");
-  camera.fy = read_number(read_member(json, where, "fy"), where, "\"fy\"");
-  // The same range as that of a field of view of 1e-6 to 180 - 1e-3 degrees.
-  const auto usable = [](double focal, std::uint32_t side) { return focal > 4e-6 * side && focal < 6e7 * side; };
-  if (!usable(camera.fx, camera.width) || !usable(camera.fy, camera.height)) {
-    throw UserError(kCannotRead, where, "\"fx\" or \"fy\" is not a usable focal length", "give it in pixels, above 0");
-  }
-  return camera;
+  throw UserError(kCannotUse, where, fmt::format("none of its {} cameras is called {}", cameras.size(), name),
+                  other_cameras(cameras, name));
 }
 
 }  // namespace
@@ -196,43 +176,65 @@ Camera resized(const Camera& camera, ImageSize size) {
   return result;
 }
 
+std::vector<View> orbit_views(const View& view, std::size_t count) {
+  const Vec3 up = normalized(view.up);
+  if (dot(up, up) == 0) throw UserError(kCannotUse, "--up", "it has no direction", "give e.g. 0,-1,0");
+  const Vec3 arm = view.eye - view.look_at;
+  const Vec3 upright = up * dot(up, arm);
+  const Vec3 level = arm - upright;
+  const Vec3 aside = cross(up, level);
+  std::vector<View> views(count, view);
+  for (std::size_t i = 1; i < count; ++i) {
+    const double angle = 2 * 3.14159265358979323846 * static_cast<double>(i) / static_cast<double>(count);
+    views[i].eye = view.look_at + upright + level * portable_cos(angle) + aside * portable_sin(angle);
+  }
+  return views;
+}
+
 std::vector<Camera> load_cameras(const std::string& path) {
-  const InputFile file(path, kCannotRead);
-  std::string text(static_cast<std::size_t>(file.size()), '\0');
-  file.read(0, text.data(), text.size());
-  file.check_unchanged();
-  const nlohmann::json json = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (json.is_discarded()) throw UserError(kCannotRead, path, "it is not valid JSON", kLayoutRemedy);
-  if (!json.is_array()) throw UserError(kCannotRead, path, "it is not an array of cameras", kLayoutRemedy);
-  std::vector<Camera> cameras;
-  for (std::size_t i = 0; i < json.size(); ++i) {
-    cameras.push_back(read_camera(json[i], path + " camera " + std::to_string(i)));
+  const CameraSource source(path);
+  std::string known;
+  for (const CameraFormat& format : camera_formats()) {
+    if (format.recognises(source)) return format.read(source);
+    known += fmt::format("{}{} ({})", known.empty() ? "" : ", ", format.name, format.looks_like);
   }
-  return cameras;
+  if (source.complaint()) throw UserError(*source.complaint());
+  throw UserError(kCannotReadCameras, path,
+                  source.is_folder() ? "it is a directory without a COLMAP model"
+                                     : "it is none of the kinds of camera files",
+                  "give one of these: " + known);
 }
 
-CameraName camera_name(const std::string& text) {
+std::vector<std::filesystem::path> camera_files(const std::string& path) {
+  const CameraSource source(path);
+  for (const CameraFormat& format : camera_formats()) {
+    if (format.files != nullptr && format.recognises(source)) return format.files(source);
+  }
+  return {path};
+}
+
+CameraChoice camera_choice(const std::string& text) {
   const std::size_t mark = text.rfind('#');
-  if (mark == std::string::npos) return {text, 0};
-  CameraName name{text.substr(0, mark), 0};
-  const char* end = text.data() + text.size();
-  const auto result = std::from_chars(text.data() + mark + 1, end, name.index);
-  if (result.ec != std::errc{} || result.ptr != end) {
-    throw UserError(kCannotUse, "--camera " + text, "what follows # is not an index", "give FILE#INDEX, index from 0");
-  }
-  return name;
+  std::error_code ignored;
+  if (mark == std::string::npos || std::filesystem::exists(text, ignored)) return {text, std::nullopt};
+  return {text.substr(0, mark), text.substr(mark + 1)};
 }
 
-Camera camera_from_file(const std::string& text, const std::optional<ImageSize>& size) {
-  const auto [file, index] = camera_name(text);
-  const std::vector<Camera> cameras = load_cameras(file);
-  if (index >= cameras.size()) {
-    throw UserError(kCannotUse, "--camera " + text,
-                    "there is no camera " + std::to_string(index) + ", the file has " + std::to_string(cameras.size()),
-                    cameras.empty() ? "use another file"
-                                    : "give an index of 0 to " + std::to_string(cameras.size() - 1));
+NamedCamera camera_from_file(const std::string& text, const std::optional<ImageSize>& size) {
+  const CameraChoice choice = camera_choice(text);
+  const std::vector<Camera> cameras = load_cameras(choice.file);
+  const std::string where = "--camera " + text;
+  const std::string camera = choice.camera.value_or("0");
+  if (camera.empty()) {
+    throw UserError(kCannotUse, where, "nothing follows #", "give FILE#INDEX, index from 0, or FILE#NAME");
   }
-  return size ? resized(cameras[index], *size) : cameras[index];
+  const std::optional<std::size_t> given = read_index(camera);
+  const std::size_t index = given ? *given : find_by_name(cameras, camera, where);
+  if (index >= cameras.size()) {
+    throw UserError(kCannotUse, where, fmt::format("there is no camera {}, the file has {}", index, cameras.size()),
+                    other_cameras(cameras, camera));
+  }
+  return {size ? resized(cameras[index], *size) : cameras[index], {choice.file, index, cameras[index].name}};
 }
 
 }  // namespace vrpipe

@@ -139,7 +139,10 @@ LoadedScene load_draw_list(const std::string& path, const SceneRequest& request)
 /// The camera of the file given, or that of a view, which is only asked for if there is none.
 template <class MakeView>
 Viewpoint viewpoint(const SceneRequest& request, ImageSize default_size, const MakeView& make_view) {
-  if (request.camera) return {camera_from_file(*request.camera, request.size), {}, camera_name(*request.camera)};
+  if (request.camera) {
+    NamedCamera named = camera_from_file(*request.camera, request.size);
+    return {std::move(named.camera), {}, std::move(named.name)};
+  }
   const View view = make_view();
   return {look_at(view, request.size.value_or(default_size)), view, {}};
 }

@@ -131,23 +131,29 @@ TEST_F(CameraFile, IndexSelectsAndSizeRescales) {
   nlohmann::json second = camera_json();
   second["fx"] = 70;
   const std::string path = write("cameras.json", nlohmann::json::array({camera_json(), second}).dump()).string();
-  EXPECT_EQ(camera_from_file(path).fx, 50);
-  EXPECT_EQ(camera_from_file(path + "#1").fx, 70);
-  const Camera large = camera_from_file(path + "#1", ImageSize{200, 96});
+  EXPECT_EQ(camera_from_file(path).camera.fx, 50);
+  EXPECT_EQ(camera_from_file(path + "#1").camera.fx, 70);
+  EXPECT_EQ(camera_from_file(path + "#1").name.index, 1U);
+  EXPECT_EQ(camera_from_file(path + "#1").name.file, path);
+  const Camera large = camera_from_file(path + "#1", ImageSize{200, 96}).camera;
   EXPECT_EQ(large.fx, 140);
   EXPECT_EQ(large.fy, 102);
   EXPECT_EQ(large.width, 200u);
   expect_user_error([&] { camera_from_file(path + "#2"); }, {"no camera 2", "the file has 2", "0 to 1"});
-  for (const char* index : {"#-1", "#x", "#", "#1x", "#99999999999999999999"}) {
-    expect_user_error([&] { camera_from_file(path + index); }, {path + index, "FILE#INDEX"});
+  for (const char* index : {"#-1", "#x", "#1x", "#01", "#99999999999999999999"}) {
+    expect_user_error([&] { camera_from_file(path + index); }, {path + index, "none of its 2 cameras", "0 to 1"});
   }
+  expect_user_error([&] { camera_from_file(path + "#"); }, {path + "#", "FILE#INDEX", "FILE#NAME"});
 }
 
 TEST_F(CameraFile, WhatCannotBeUsedIsNamed) {
   expect_user_error([&] { load_cameras(in_folder("none.json").string()); },
                     {"cannot read camera file", "no such file"});
-  expect_refused("[{", {"not valid JSON"});
-  expect_refused("{}", {"not an array of cameras"});
+  expect_refused("[\n{", {"line 2", "not valid JSON at byte 4"});
+  expect_refused("[1e999]", {"out of range"});
+  for (const char* text : {"{}", "3", "# cameras"}) {
+    expect_refused(text, {"none of the kinds", "INRIA cameras.json", "NeRF transforms.json", "COLMAP model"});
+  }
   expect_refused("[3]", {"camera 0", "not an object"});
   for (const char* key : {"width", "height", "position", "rotation", "fx", "fy"}) {
     nlohmann::json camera = camera_json();

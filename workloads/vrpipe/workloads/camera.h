@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +31,7 @@ struct Camera {
   std::uint32_t width = 1, height = 1;     ///< pixels
   float near_plane = 0.2f;    ///< world units, >= 1e-6; Gaussians at camera z <= near_plane are culled (0.2 as INRIA)
   float far_plane = 1000.0f;  ///< world units, above near_plane, finite; meshes end here, Gaussians do not
+  std::string name;           ///< of the image that it took, as its file has it; empty without
 };
 
 /// A point of the world, as the camera sees it: right, down and forward of the eye, world units. Its window position is
@@ -59,24 +62,54 @@ Camera look_at(const View& view, ImageSize size);
 /// @throws UserError when a side is not in 1 to kMaxImageSize
 Camera resized(const Camera& camera, ImageSize size);
 
-/// Reads a cameras.json in the INRIA layout: an array of {"width", "height", "position": [3] = camera centre,
-/// "rotation": [3][3] camera to world, "fx", "fy" in pixels}; other keys are ignored.
-/// @throws UserError when the file cannot be read or a camera in it cannot be used
+/// The views that go round `view.look_at` on a level circle through `view.eye`: `count` of them at equal angles around
+/// `view.up`, counter-clockwise as seen from above. The first is `view` itself.
+/// @throws UserError when `view` has no up
+std::vector<View> orbit_views(const View& view, std::size_t count);
+
+/// Reads all cameras of a file, or of a folder. Which of these it is, its content says:
+/// INRIA cameras.json: an array of {"width", "height", "position": [3] = camera centre, "rotation": [3][3] camera to world,
+/// "fx", "fy" in pixels, "img_name"}.
+/// NeRF transforms.json (Blender, instant-ngp, nerfstudio): {"frames": [{"transform_matrix": [4][4] camera to world of a
+/// camera whose x is right, y up and z back, "file_path"}]} with "fl_x", "fl_y", "w", "h" in pixels or "camera_angle_x",
+/// "camera_angle_y" in radians, of a frame or of all. Without a size images are 800x800, as in NeRF's synthetic data
+/// sets. A camera that is distorted or no pinhole, and a matrix that scales, are refused.
+/// COLMAP model: cameras and images, both .bin or both .txt, in a folder, in its sparse/0 or in its sparse; or the name of
+/// one of the files. Cameras are in the order of their images' names. Camera models other than SIMPLE_PINHOLE and PINHOLE
+/// are refused unless they are one, with all distortion 0.
+/// Other keys and files are ignored, as principal points are: as in the INRIA code, they are taken to be in the centre.
+/// @throws UserError naming the camera, the line or the byte when a file cannot be read or a camera in it cannot be used
 std::vector<Camera> load_cameras(const std::string& path);
 
-/// A camera of a cameras.json.
+/// The files that load_cameras(path) reads, as far as their names tell.
+std::vector<std::filesystem::path> camera_files(const std::string& path);
+
+/// A camera of a file.
 struct CameraName {
   std::string file;
-  std::size_t index = 0;
+  std::size_t index = 0;  ///< in load_cameras(file)
+  std::string image;      ///< Camera::name
 };
 
-/// What `text` names: FILE or FILE#INDEX, index from 0 (the default).
-/// @throws UserError when what follows # is no index
-CameraName camera_name(const std::string& text);
+/// FILE, or FILE#CAMERA.
+struct CameraChoice {
+  std::string file;
+  std::optional<std::string> camera;  ///< none: the text does not say
+};
 
-/// The camera that `text` names.
-/// @throws UserError as camera_name and load_cameras, and when there is no such index
-Camera camera_from_file(const std::string& text, const std::optional<ImageSize>& size = std::nullopt);
+/// What `text` says. All of it is the file's name if there is such a file.
+CameraChoice camera_choice(const std::string& text);
+
+struct NamedCamera {
+  Camera camera;
+  CameraName name;
+};
+
+/// The camera that `text` names: FILE, the first; FILE#INDEX, index from 0; or FILE#NAME, an image's name as the file has
+/// it, or, where that leaves no doubt, without its folder or its extension. A number is an index; with leading zeros it
+/// is a name.
+/// @throws UserError as load_cameras, and when there is no such camera or more than one
+NamedCamera camera_from_file(const std::string& text, const std::optional<ImageSize>& size = std::nullopt);
 
 /// Checks all that projections need of a camera: the image's size, finite elements, focal lengths above 0, and
 /// 1e-6 <= near_plane < far_plane.

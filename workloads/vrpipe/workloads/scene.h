@@ -19,7 +19,7 @@ struct SceneRequest {
   std::string
       scene;  ///< a file of Gaussians, see read_gaussian_file(); FILE.spl; or builtin:NAME; empty: builtin:object
   std::optional<ImageSize> size;
-  std::optional<std::string> camera;  ///< FILE[#INDEX]; excludes the four below
+  std::optional<std::string> camera;  ///< as camera_from_file takes it; excludes the four below
   std::optional<Vec3> eye;
   std::optional<Vec3> look_at;
   std::optional<Vec3> up;
