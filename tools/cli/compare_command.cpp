@@ -1,9 +1,12 @@
+#include <optional>
+
 #include <CLI/CLI.hpp>
 
 #include "cli/command_line.h"
 #include "cli/options.h"
 #include "cli/print_result.h"
 #include "jobs/simulation_job.h"
+#include "jobs/views_job.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -18,6 +21,7 @@ class CompareCommand : public Command {
   void declare(CLI::App& app) override {
     arguments_.declare(app, SimulationArguments::Variants::all);
     arguments_.declare_frames(app);
+    arguments_.declare_views(app);
     arguments_.declare_explanation(app);
     app.footer(
         "Simulates four GPUs that differ only in the units swapped in, on the same draw: baseline, qm (TGC and QRU\n"
@@ -28,13 +32,20 @@ class CompareCommand : public Command {
         "  vrpipe compare\n"
         "  vrpipe compare --scene builtin:outdoor --output images --json outdoor.json\n"
         "  vrpipe compare --scene point_cloud.ply --camera cameras.json#3 --size 1280x720\n"
+        "  vrpipe compare --scene point_cloud.ply --camera cameras.json --views 20 --size 1280x720\n"
+        "  vrpipe compare --scene builtin:indoor --views 8 --fidelity lt\n"
         "  vrpipe compare --platform mobile --format rgba8\n"
         "  vrpipe compare --set qru.quads_per_cycle=4 --json - | python3 -m json.tool");
   }
 
   void run() override {
+    const std::optional<ViewsChoice> views = arguments_.views();
     const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::all, command_line());
-    print_result(job, perform(job));
+    if (views) {
+      print_result(job, simulate_views(job, *views));
+    } else {
+      print_result(job, perform(job));
+    }
   }
 
  private:

@@ -4,6 +4,7 @@
 #include <map>
 #include <thread>
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include <vrpipe/component/error.h>
@@ -110,8 +111,11 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              "image size, pixels, each side 1 to 16384 (default: the scene's or the\n"
              "camera's own, 1280x720 for a file without a camera)",
              scene_group);
-  add_option(app, "--camera", camera_, "FILE[#INDEX]",
-             "a cameras.json in the INRIA layout, and which camera of it (default: #0)", scene_group);
+  add_option(app, "--camera", camera_, "FILE[#INDEX|#NAME]",
+             "a cameras.json (INRIA), a transforms.json (NeRF, nerfstudio) or the folder of\n"
+             "a COLMAP model, and which camera of it, by number or by its image's name\n"
+             "(default: #0; docs/cameras.md)",
+             scene_group);
   add_option(app, "--eye", eye_, "X,Y,Z", "where the camera stands, world units (default: chosen to fit the scene)",
              scene_group);
   add_option(app, "--look-at", look_at_, "X,Y,Z", "the point in the middle of the image, world units", scene_group);
@@ -204,6 +208,60 @@ void SimulationArguments::declare_frames(CLI::App& app) {
              scene_group);
 }
 
+void SimulationArguments::declare_views(CLI::App& app) {
+  add_option(app, ViewsChoice::option, views_, "N|all",
+             "the scene from N cameras evenly spaced among those of --camera FILE, or from\n"
+             "all of them; without a file, from N round the scene. Reports how speed-ups\n"
+             "and early-termination ratios are distributed. Goes on where it was\n"
+             "interrupted (docs/cameras.md)",
+             scene_group);
+  add_option(app, ViewsChoice::journal_option, journal_, "FILE",
+             "where --views stores what is done, and goes on from; it stays (default: a\n"
+             "file in the user's cache folder, removed at the end)",
+             result_group);
+}
+
+std::optional<ViewsChoice> SimulationArguments::views() const {
+  const auto text = single(views_, ViewsChoice::option);
+  const auto journal = single(journal_, ViewsChoice::journal_option);
+  if (!text) {
+    if (journal) {
+      throw UserError("nothing to store", ViewsChoice::journal_option, "only many views are worth it",
+                      "add --views N|all");
+    }
+    return std::nullopt;
+  }
+  const auto refuse = [](bool given, const char* option, const std::string& why) {
+    if (given) throw UserError("cannot use option", option, why, "leave out this or --views");
+  };
+  refuse(!frame_.empty(), "--frame", "--views draws one scene from many cameras");
+  refuse(!save_draw_.empty(), "--save-draw", "a draw list has one draw, and each view has another");
+  refuse(explain_effects_, "--explain-effects", "it measures the runs of one view");
+  const auto scene = single(scene_, "--scene");
+  refuse(scene && is_draw_list(*scene), "--scene", "a .spl is a draw list, of one camera");
+  const auto camera = single(camera_, "--camera");
+  refuse(camera && camera_choice(*camera).camera, "--camera", "what follows # names one camera");
+  ViewsChoice choice;
+  if (*text == "all") {
+    if (!camera) {
+      throw UserError("bad value 'all'", ViewsChoice::option,
+                      "without --camera FILE the cameras go round the scene, and there is no end of them",
+                      "give a number, or a camera file");
+    }
+  } else {
+    constexpr unsigned most_views = 100'000;
+    try {
+      choice.count = parse_count(*text, ViewsChoice::option, most_views);
+    } catch (const UserError&) {
+      throw UserError("bad value '" + *text + "'", ViewsChoice::option,
+                      fmt::format("it is neither `all` nor a whole number from 1 to {}", most_views),
+                      "give e.g. 20, or all");
+    }
+  }
+  if (journal) choice.journal = *journal;
+  return choice;
+}
+
 void SimulationArguments::declare_explanation(CLI::App& app) {
   app.add_flag("--explain-effects", explain_effects_,
                "measures what each effect that was left out would cost the host: repeats\n"
@@ -251,7 +309,9 @@ std::vector<NamedFile> SimulationArguments::inputs(const FrameDescription& frame
   }
   for (const std::string& file : meshes_) files.push_back({"--mesh", file});
   for (const std::string& file : frame_) files.push_back({"--frame", file});
-  for (const std::string& camera : camera_) files.push_back({"--camera", camera.substr(0, camera.rfind('#'))});
+  for (const std::string& camera : camera_) {
+    for (const auto& file : camera_files(camera_choice(camera).file)) files.push_back({"--camera", file});
+  }
   for (const std::string& plugin : plugins_) files.push_back({"--plugin", plugin});
   return files;
 }
@@ -289,7 +349,7 @@ SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<
   load_plugins(plugins_);
 
   SimulationJob job;
-  job.schema = variants == Variants::one ? "vrpipe.run/1" : "vrpipe.compare/1";
+  job.schema = !views_.empty() ? "vrpipe.views/1" : variants == Variants::one ? "vrpipe.run/1" : "vrpipe.compare/1";
   job.provenance = make_provenance(command, plugins_);
   job.scene = scene_request();
   job.frame = frame();
@@ -301,7 +361,7 @@ SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<
   if (const auto list = single(effects_, "--effects")) request.effects = EffectChoice::parse(*list);
   check_explanation(request.effects);
   job.explain_effects = explain_effects_;
-  request.reads_statistics = single(json_, "--json").has_value();
+  request.reads_statistics = single(json_, "--json").has_value() && views_.empty();
   if (const auto name = single(format_, "--format")) request.format = color_format_named(*name);
   if (const auto name = single(termination_, "--termination")) request.termination = termination_named(*name);
   refuse_keys_given_twice(settings_, "--set");

@@ -8,6 +8,7 @@
 #include <vrpipe/workloads/scene.h>
 
 #include "jobs/simulation_job.h"
+#include "jobs/views_job.h"
 
 namespace CLI {
 class App;
@@ -37,6 +38,10 @@ class SimulationArguments {
   void declare(CLI::App& app, Variants variants);
   /// --frame and --multi-pass, for commands that draw frames of several draws as well.
   void declare_frames(CLI::App& app);
+  /// --views and --journal, for commands that draw a scene from many cameras as well.
+  void declare_views(CLI::App& app);
+  /// What these say; none without --views. Throws UserError for options that mean nothing beside them.
+  std::optional<ViewsChoice> views() const;
   /// --explain-effects, for commands that report effects of each run.
   void declare_explanation(CLI::App& app);
   /// Loads the plugins and checks every option but the names of output files, which the commands know; `command` is the
@@ -54,6 +59,7 @@ class SimulationArguments {
   Values scene_, frame_, passes_, size_, camera_, eye_, look_at_, up_, fovy_;
   Values platform_, settings_, variant_, units_, plugins_;
   Values fidelity_, effects_, format_, termination_;
+  Values views_, journal_;
   Values background_, output_, json_, save_draw_, jobs_;
   Values trace_, trace_every_, trace_statistics_;
   bool explain_effects_ = false;

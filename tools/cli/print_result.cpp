@@ -11,28 +11,49 @@
 #include "output/json_text.h"
 #include "output/report.h"
 #include "output/result_json.h"
+#include "output/views_json.h"
+#include "output/views_report.h"
 
 namespace vrpipe::tools {
 
-void print_result(const SimulationJob& job, const JobResult& result) {
-  const TextStyle style = stdout_style();
+namespace {
+
+/// Both made and printed as the job says; false when stdout is for the JSON alone.
+template <class MakeJson, class MakeText>
+bool print(const SimulationJob& job, const MakeJson& make_json, const MakeText& make_text) {
   std::string json;
   std::string text;
   {
     const StdoutToStderr redirected;  // both make units of plugins, which may print
-    if (job.json) json = json_text(result_json(result));
-    text = report(result, style);
+    if (job.json) json = json_text(make_json());
+    text = make_text(stdout_style());
   }
   if (job.json) {
     if (*job.json == "-") {
       std::cout << json;
-      return;
+      return false;
     }
     write_output_file(*job.json, json, "--json");
   }
   std::cout << text;
   if (job.json) std::cout << "result: " << printable(*job.json) << '\n';
-  if (job.save_draw) std::cout << "draw: " << printable(job.save_draw->string()) << '\n';
+  return true;
+}
+
+}  // namespace
+
+void print_result(const SimulationJob& job, const JobResult& result) {
+  const bool has_text = print(
+      job, [&] { return result_json(result); }, [&](const TextStyle& style) { return report(result, style); });
+  if (has_text && job.save_draw) std::cout << "draw: " << printable(job.save_draw->string()) << '\n';
+}
+
+void print_result(const SimulationJob& job, const ViewsResult& result) {
+  print(
+      job, [&] { return views_json(result); }, [&](const TextStyle& style) { return views_report(result, style); });
+  // Not before all of it is safe.
+  std::cout.flush();
+  if (std::cout) result.journal->finish();
 }
 
 }  // namespace vrpipe::tools

@@ -1,10 +1,13 @@
 #pragma once
 
 #include "jobs/simulation_job.h"
+#include "jobs/views_job.h"
 
 namespace vrpipe::tools {
 
 /// Prints the report, and writes the JSON to where the job says; to stdout in place of the report. Throws UserError.
 void print_result(const SimulationJob& job, const JobResult& result);
+/// The same of many views; finishes their journal.
+void print_result(const SimulationJob& job, const ViewsResult& result);
 
 }  // namespace vrpipe::tools

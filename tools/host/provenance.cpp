@@ -1,5 +1,6 @@
 #include "host/provenance.h"
 
+#include <dlfcn.h>
 #include <sha2.h>
 
 #include <array>
@@ -9,6 +10,7 @@
 #include <utility>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/platforms/simulation.h>
 
 namespace vrpipe::tools {
 namespace {
@@ -37,6 +39,20 @@ Provenance make_provenance(std::vector<std::string> command, const std::vector<s
   for (const std::string& path : plugins) provenance.plugins.push_back({path, sha256_of(path)});
   ::getloadavg(&provenance.load_average, 1);
   return provenance;
+}
+
+std::string build_identity() {
+  // Where the program is linked with the library as one file, that is hashed twice.
+  Dl_info library{};
+  std::string digits;
+  if (::dladdr(&platforms(), &library) != 0 && library.dli_fname != nullptr) digits = library.dli_fname;
+  for (const std::string& file : {std::string("/proc/self/exe"), digits}) {
+    std::array<char, SHA256_DIGEST_STRING_LENGTH> of_file{};
+    digits += ::SHA256File(file.c_str(), of_file.data()) != nullptr ? std::string(of_file.data()) : "unknown";
+  }
+  std::array<char, SHA256_DIGEST_STRING_LENGTH> of_both{};
+  ::SHA256Data(reinterpret_cast<const std::uint8_t*>(digits.data()), digits.size(), of_both.data());
+  return of_both.data();
 }
 
 std::string command_text(const Provenance& provenance) {

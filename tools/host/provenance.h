@@ -21,6 +21,9 @@ struct Provenance {
 /// Takes note of the plugins and of the host as it is now. Throws UserError for a plugin that cannot be read.
 Provenance make_provenance(std::vector<std::string> command, const std::vector<std::string>& plugins);
 
+/// What tells this build of vrpipe from every other: of the files of program and library, 64 hex digits.
+std::string build_identity();
+
 /// The command line as a shell takes it: words in single quotes where they need them.
 std::string command_text(const Provenance& provenance);
 

@@ -111,6 +111,21 @@ LoadedFrame load_frame(const FrameDescription& frame, const SceneRequest& option
   return loaded;
 }
 
+LoadedFrame load_frame(const FrameDescription& frame, const OpenedScene& scene, const PreprocessOptions& options) {
+  LoadedScene preprocessed = preprocess_scene(scene, options);
+  LoadedFrame loaded;
+  loaded.width = preprocessed.draw.width;
+  loaded.height = preprocessed.draw.height;
+  loaded.summary = preprocessed.summary;
+  loaded.summary.name = frame.name;
+  loaded.viewpoint = preprocessed.viewpoint;
+  loaded.preprocessed_here = preprocessed.preprocessed_here;
+  loaded.geometry.push_back(std::make_shared<const Draw>(std::move(preprocessed.draw)));
+  loaded.meshes.emplace_back();
+  for (Draw& mesh : preprocessed.meshes) loaded.meshes.back().push_back(std::make_shared<const Draw>(std::move(mesh)));
+  return loaded;
+}
+
 std::shared_ptr<const Frame> make_frame(const RunRequest& request, const FrameDescription& description,
                                         const LoadedFrame& loaded) {
   auto frame = std::make_shared<Frame>(loaded.width, loaded.height);

@@ -36,7 +36,7 @@ struct Task {
 
 /// Where some simulations stand among all that a command runs, for the progress.
 struct BatchPlace {
-  std::string title;          ///< before the progress
+  std::string title;          ///< before the progress; may be changed meanwhile, by `finished`
   std::size_t before = 0;     ///< simulations done already
   std::size_t after = 0;      ///< simulations that will follow
   double seconds_before = 0;  ///< that those before took, wall time

@@ -268,7 +268,6 @@ std::string draws_text(const std::vector<RunResult>& runs, const TextStyle& styl
 
 std::string heading(const JobResult& result, const TextStyle& style) {
   const RunRequest& request = result.runs.front().request;
-  const Platform& platform = *request.platform;
   std::string text = style.bold(fmt::format("{}, {}x{}", printable(result.scene.name), result.width, result.height));
   text += fmt::format(": {} of {} Gaussians visible\n", grouped(result.scene.gaussians_visible),
                       grouped(result.scene.gaussians_total));
@@ -279,18 +278,7 @@ std::string heading(const JobResult& result, const TextStyle& style) {
       text += fmt::format(", {} left out", grouped(result.scene.triangles_rejected));
     text += "\n";
   }
-  text += style.bold(platform.name) + " (" + platform.description + ")\n";
-  text += fmt::format("{} fidelity, {} colour, {} termination", vrpipe::name_of(request.fidelity),
-                      vrpipe::name_of(request.format), name_of(request.termination));
-  if (result.passes > 1) text += fmt::format(", {} passes", result.passes);
-  text += effects_choice_text(request);
-  for (const std::vector<Setting>* settings : {&request.settings, &result.preprocessing}) {
-    for (const Setting& setting : *settings) {
-      text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
-    }
-  }
-  for (const UnitChoice& unit : request.units) text += fmt::format(", {}={}", unit.slot, unit.implementation);
-  return text + "\n\n";
+  return text + machine_text(request, result.preprocessing, result.passes, style) + "\n";
 }
 
 /// A unit as the text calls it: CROP, or gpc1.CROP where there are several.
@@ -392,6 +380,23 @@ std::string grouped(std::uint64_t value) {
     digits.insert(place, 1, ',');
   }
   return digits;
+}
+
+std::string machine_text(const RunRequest& request, const std::vector<Setting>& preprocessing, std::uint32_t passes,
+                         const TextStyle& style) {
+  const Platform& platform = *request.platform;
+  std::string text = style.bold(platform.name) + " (" + platform.description + ")\n";
+  text += fmt::format("{} fidelity, {} colour, {} termination", vrpipe::name_of(request.fidelity),
+                      vrpipe::name_of(request.format), name_of(request.termination));
+  if (passes > 1) text += fmt::format(", {} passes", passes);
+  text += effects_choice_text(request);
+  for (const std::vector<Setting>* settings : {&request.settings, &preprocessing}) {
+    for (const Setting& setting : *settings) {
+      text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
+    }
+  }
+  for (const UnitChoice& unit : request.units) text += fmt::format(", {}={}", unit.slot, unit.implementation);
+  return text + "\n";
 }
 
 std::string nothing_visible(const SceneSummary& scene, bool has_camera) {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "host/terminal.h"
 #include "jobs/simulation_job.h"
@@ -9,6 +11,10 @@ namespace vrpipe::tools {
 
 /// What a person reads: the runs side by side, and under the table what they mean.
 std::string report(const JobResult& result, const TextStyle& style);
+
+/// The platform, and what was asked of it; two lines.
+std::string machine_text(const RunRequest& request, const std::vector<Setting>& preprocessing, std::uint32_t passes,
+                         const TextStyle& style);
 
 /// What to say of a draw of which no fragment was rasterised; one line.
 std::string nothing_visible(const SceneSummary& scene, bool has_camera);

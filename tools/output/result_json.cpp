@@ -66,13 +66,6 @@ Json shares_json(const std::vector<std::pair<std::string, double>>& shares) {
   return json;
 }
 
-Json bottleneck_json(const RunResult& run) {
-  if (!run.bottleneck) return {};
-  return {{"unit", run.bottleneck->unit},
-          {"occupancy", run.bottleneck->occupancy},
-          {"parts", shares_json(run.bottleneck->parts)}};
-}
-
 /// Where the value of each of these parameters comes from. The command line comes after the platform, and wins.
 Json origins_json(const Json& parameters, const RunRequest& request, const std::vector<Setting>& preprocessing) {
   Json origins = Json::object();
@@ -145,12 +138,6 @@ Json statistics_json(const RunResult& run) {
   return statistics;
 }
 
-Json counts_json(const std::vector<std::pair<std::string, std::uint64_t>>& counts) {
-  Json json = Json::object();
-  for (const auto& [name, value] : counts) json[name] = value;
-  return json;
-}
-
 Json draws_json(const RunResult& run) {
   Json draws;
   for (const DrawReport& draw : run.draws) {
@@ -188,10 +175,6 @@ Json effects_json(const RunResult& run, const EffectCosts* costs) {
 }
 
 Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, const EffectCosts* costs) {
-  // Without time there is no utilization, and the keys are still there.
-  Json utilization = Json::object();
-  for (const char* unit : {"raster", "zrop", "prop", "sm", "crop", "l2", "dram"}) utilization[unit] = nullptr;
-  for (const auto& [name, share] : run.utilization) utilization[name] = share;
   const bool timed = run.cycles.has_value();
   Json json = {{"variant", run.request.variant.name},
                {"cycles", timed ? Json(*run.cycles) : Json()},
@@ -202,7 +185,7 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
                {"counts", counts_json(run.counts.named())},
                {"draws", draws_json(run)},
                {"bottleneck", bottleneck_json(run)},
-               {"utilization", std::move(utilization)},
+               {"utilization", utilization_json(run)},
                {"effects", effects_json(run, costs)},
                {"result_hash", run.result_hash},
                {"images", {{"png", images ? Json(images->png) : Json()}, {"exr", images ? Json(images->exr) : Json()}}},
@@ -244,6 +227,7 @@ Json camera_json(const std::optional<Viewpoint>& viewpoint) {
   constexpr double degrees = 57.29577951308232;
   return {{"file", file ? Json(file->file) : Json()},
           {"index", file ? Json(file->index) : Json()},
+          {"name", file && !file->image.empty() ? Json(file->image) : Json()},
           {"eye", triple(camera.eye)},
           {"look_at", view ? triple(view->look_at) : Json()},
           {"up", view ? triple(view->up) : Json()},
@@ -253,6 +237,27 @@ Json camera_json(const std::optional<Viewpoint>& viewpoint) {
           {"forward", column(2)},
           {"focal_pixels", {camera.fx, camera.fy}},
           {"near_plane", camera.near_plane}};
+}
+
+Json bottleneck_json(const RunResult& run) {
+  if (!run.bottleneck) return {};
+  return {{"unit", run.bottleneck->unit},
+          {"occupancy", run.bottleneck->occupancy},
+          {"parts", shares_json(run.bottleneck->parts)}};
+}
+
+Json counts_json(const std::vector<std::pair<std::string, std::uint64_t>>& counts) {
+  Json json = Json::object();
+  for (const auto& [name, value] : counts) json[name] = value;
+  return json;
+}
+
+Json utilization_json(const RunResult& run) {
+  // Without time there is no utilization, and the keys are still there.
+  Json utilization = Json::object();
+  for (const char* unit : {"raster", "zrop", "prop", "sm", "crop", "l2", "dram"}) utilization[unit] = nullptr;
+  for (const auto& [name, share] : run.utilization) utilization[name] = share;
+  return utilization;
 }
 
 Json implementations_json(const RunResult& run) {

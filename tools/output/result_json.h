@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -25,6 +26,11 @@ Json head_json(const std::string& schema, const Provenance& provenance, unsigned
 /// Null for a draw list.
 Json camera_json(const std::optional<Viewpoint>& viewpoint);
 Json implementations_json(const RunResult& run);
+/// Null where nothing has time.
+Json bottleneck_json(const RunResult& run);
+/// Of all units that the contract names; null where nothing has time.
+Json utilization_json(const RunResult& run);
+Json counts_json(const std::vector<std::pair<std::string, std::uint64_t>>& counts);
 Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t height);
 /// The parameters are those of all runs, which differ in the variant at most.
 /// @param preprocessing  what --set changed of it

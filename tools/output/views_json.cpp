@@ -1,0 +1,103 @@
+#include "output/views_json.h"
+
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "jobs/comparison.h"
+
+namespace vrpipe::tools {
+namespace {
+
+Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
+  const bool timed = run.cycles.has_value();
+  return {{"variant", run.request.variant.name},
+          {"cycles", timed ? Json(*run.cycles) : Json()},
+          {"milliseconds", timed ? Json(run.milliseconds) : Json()},
+          {"host_seconds", run.host_seconds},
+          {"cpu_seconds", run.cpu_seconds},
+          {"counts", counts_json(run.counts.named())},
+          {"bottleneck", bottleneck_json(run)},
+          {"utilization", utilization_json(run)},
+          {"result_hash", run.result_hash},
+          {"images", {{"png", images ? Json(images->png) : Json()}, {"exr", images ? Json(images->exr) : Json()}}},
+          {"outside_validated_range", run.outside_validated_range}};
+}
+
+Json view_json(const ViewResult& view) {
+  const Camera& camera = view.viewpoint.camera;
+  Json scene = scene_json(view.scene, camera.width, camera.height);
+  scene.erase("name");
+  scene.erase("gaussians_total");
+  Json runs = Json::array();
+  Json speedups = Json::object();
+  for (std::size_t i = 0; i < view.runs.size(); ++i) {
+    runs.push_back(run_json(view.runs[i], view.images[i]));
+    if (i > 0) speedups[view.runs[i].request.variant.name] = optional_json(speedup(view.runs.front(), view.runs[i]));
+  }
+  const std::optional<CameraName>& file = view.viewpoint.file;
+  return {{"index", view.index},
+          {"name", file && !file->image.empty() ? Json(file->image) : Json()},
+          {"camera", camera_json(view.viewpoint)},
+          {"scene", std::move(scene)},
+          {"runs", std::move(runs)},
+          {"speedup", std::move(speedups)},
+          {"early_termination_ratio", optional_json(early_termination_ratio(view.runs))}};
+}
+
+Json distribution_json(const std::optional<Distribution>& of, const ViewsResult& result) {
+  if (!of) return {};
+  return {{"views", of->count},
+          {"minimum", of->minimum},
+          {"lower_quartile", of->lower_quartile},
+          {"median", of->median},
+          {"upper_quartile", of->upper_quartile},
+          {"maximum", of->maximum},
+          {"geometric_mean", of->geometric_mean},
+          {"minimum_in_view", result.views[of->least].index},
+          {"maximum_in_view", result.views[of->most].index}};
+}
+
+}  // namespace
+
+Json views_json(const ViewsResult& result) {
+  std::vector<RunResult> runs = result.views.front().runs;
+  const RunRequest& request = runs.front().request;
+  for (RunResult& run : runs) {
+    run.parameters.insert(run.parameters.end(), result.preprocess_parameters.begin(),
+                          result.preprocess_parameters.end());
+  }
+  Json views = Json::array();
+  for (const ViewResult& view : result.views) views.push_back(view_json(view));
+  Json speedups = Json::object();
+  for (std::size_t i = 1; i < runs.size(); ++i) {
+    speedups[runs[i].request.variant.name] = distribution_json(speedup_distribution(result, i), result);
+  }
+  const StorageReport storage = quad_merging_storage(request);
+  Json json = head_json(result.schema, result.provenance, result.processes);
+  json.update({{"seed", request.stall_seed},
+               {"scene", {{"name", result.scene}, {"gaussians_total", result.gaussians_total}}},
+               {"cameras",
+                {{"file", result.camera_file ? Json(*result.camera_file) : Json()},
+                 {"count", result.cameras},
+                 {"orbit", !result.camera_file}}},
+               {"platform", platform_json(runs, result.preprocessing)},
+               {"implementations", Json::object()},
+               {"fidelity", vrpipe::name_of(request.fidelity)},
+               {"format", vrpipe::name_of(request.format)},
+               {"termination", name_of(request.termination)},
+               {"effects", request.effects.text()},
+               {"passes", result.passes},
+               {"views", std::move(views)},
+               {"distribution",
+                {{"speedup", std::move(speedups)},
+                 {"early_termination_ratio", distribution_json(ratio_distribution(result), result)}}},
+               {"quad_merging_storage_bytes", {{"tgc", storage.tgc_bytes}, {"qru", storage.qru_bytes}}}});
+  for (const RunResult& run : runs) json["implementations"][run.request.variant.name] = implementations_json(run);
+  return json;
+}
+
+}  // namespace vrpipe::tools
