@@ -47,6 +47,7 @@ TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
     EXPECT_EQ(help.out.find("--frame") != std::string::npos, std::string(command) != "accuracy");
     EXPECT_EQ(help.out.find("--explain-effects") != std::string::npos, std::string(command) != "accuracy");
   }
+  expect_in(vrpipe({"compare", "--help"}).out, {"--views N|all", "--journal FILE"});
   expect_in(vrpipe({"run", "--help"}).out, {"--trace FILE.csv", "--trace-every CYCLES", "--trace-statistics NAME,..."});
   expect_in(vrpipe({"accuracy", "--help"}).out, {"--quick", "--repeat", "--html", "--markdown"});
   expect_in(vrpipe({"units", "--help"}).out, {"--slot", "--platform", "--plugin", "--effects", "--json", "--markdown"});

@@ -1,4 +1,5 @@
 #include <pty.h>
+#include <sys/resource.h>
 
 #include <chrono>
 #include <cmath>
@@ -12,6 +13,7 @@
 #include "documented_keys.h"
 #include "forked.h"
 #include "jobs/distribution.h"
+#include "jobs/journal.h"
 
 namespace vrpipe::testing {
 namespace {
@@ -517,6 +519,34 @@ TEST_F(Views, AJournalThatAnotherProcessWritesIsRefused) {
   ASSERT_EQ(::fcntl(file, F_SETLK, &lock), 0);
   refused(of_file({"--views", "2", "--journal", "j.jsonl"}), {"--journal j.jsonl", "another vrpipe is writing it"});
   ::close(file);
+}
+
+TEST_F(Views, WhenTheDiskIsFullGoOnAndLaterFromThere) {
+  const std::vector<std::string> words = of_file({"--views", "all", "--journal", "j.jsonl"});
+  const Finished full = in_fork(folder(), [&] {
+    // Enough for the first line and a record, not for five.
+    const rlimit limit{60'000, 60'000};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    return become_vrpipe(words);
+  });
+  EXPECT_EQ(full.code, 0);
+  EXPECT_EQ(full.err.rfind("--journal: nothing more is stored: j.jsonl: File too large", 0), 0U) << full.err;
+  EXPECT_EQ(std::count(full.err.begin(), full.err.end(), '\n'), 1) << full.err;
+  const std::string journal = read_file(folder() / "j.jsonl");
+  const auto records = std::count(journal.begin(), journal.end(), '\n') - 1;
+  ASSERT_TRUE(records > 0 && records < 5) << records;
+  EXPECT_EQ(vrpipe(words).err, done_before(static_cast<std::size_t>(records), 5));
+}
+
+TEST(JournalText, BringsTextsOfAnyBytesBack) {
+  json record;
+  record["plain"] = "caf\xc3\xa9";
+  record["foreign"] = json::binary({'c', 'a', 'f', 0xe9});  // as results are encoded
+  record["list"] = {{1, 2.5, nullptr}, {{"bytes", 7}, {"subtype", "of its own"}}};
+  EXPECT_EQ(tools::with_binaries(json::parse(record.dump())), record);
+  json deep = 1;
+  for (int i = 0; i < 100; ++i) deep = json::array({deep});
+  EXPECT_THROW(tools::with_binaries(deep), std::runtime_error);
 }
 
 TEST_F(Views, WithoutACacheFolderGoOnAndSaySo) {
