@@ -428,6 +428,29 @@ TEST_F(CameraFiles, CountsThatLieTakeNoMemory) {
   expect_user_error([&] { load_cameras(folder); }, {"name of an image is longer than 4096 bytes"});
 }
 
+TEST_F(CameraFiles, HugeFilesOfNothingTakeNoMemory) {
+  const std::uintmax_t huge = std::uintmax_t{1} << 40U;  // all but the beginning a hole
+  std::filesystem::resize_file(write("cameras.json", "["), huge);
+  expect_user_error([&] { load_cameras(in_folder("cameras.json").string()); }, {"1099511627776 bytes, and at most"});
+  std::filesystem::resize_file(write("other", "#"), huge);
+  expect_user_error([&] { load_cameras(in_folder("other").string()); }, {"none of the kinds"});
+  const std::string folder = write_model(".txt", kCamerasText, kImagesText);
+  std::filesystem::resize_file(in_folder("images.txt"), huge);
+  expect_user_error([&] { load_cameras(folder); }, {"images.txt line 6", "longer than"});
+}
+
+TEST_F(CameraFiles, LinesOfAnyLengthAreRead) {
+  // Around the size of what is read at a time.
+  for (const std::size_t length : {65000U, 65535U, 65536U, 65537U, 200000U}) {
+    const std::string comment = "#" + std::string(length, '-') + "\n";
+    std::string points;
+    while (points.size() < length) points += "1.5 2.5 -1 ";
+    std::string images = comment + kImagesText;
+    images.replace(images.find("1.5 2.5 -1 3.5 4.5 11"), 21, points);
+    expect_same(load_cameras(write_model(".txt", comment + kCamerasText, images)), by_hand());
+  }
+}
+
 TEST_F(CameraFiles, WhateverAByteBecomesItIsReadOrRefused) {
   const std::string cameras = cameras_binary(), images = images_binary();
   const auto is_read_or_refused = [](const std::string& path) {

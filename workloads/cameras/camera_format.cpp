@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <utility>
 
@@ -17,6 +18,9 @@ std::vector<CameraFormat>& formats() {
   static std::vector<CameraFormat> all;
   return all;
 }
+
+/// Far more than any data set has cameras for; what it holds takes up to twenty times as much memory.
+constexpr std::uint64_t kMaxJsonBytes = std::uint64_t{64} << 20;
 
 /// Whether a file begins as JSON does, behind white space and a byte order mark.
 bool begins_as_json(const std::string& beginning) {
@@ -47,6 +51,12 @@ const nlohmann::json* CameraSource::json() const {
   file.read(0, text.data(), text.size());
   is_read_ = true;
   if (!begins_as_json(text)) return nullptr;
+  if (file.size() > kMaxJsonBytes) {
+    complaint_.emplace(kCannotReadCameras, path_,
+                       fmt::format("it has {} bytes, and at most {} are read", file.size(), kMaxJsonBytes),
+                       "leave out what is no camera");
+    return nullptr;
+  }
   text.resize(static_cast<std::size_t>(file.size()));
   file.read(0, text.data(), text.size());
   file.check_unchanged();

@@ -29,6 +29,8 @@ namespace fs = std::filesystem;
 constexpr char kGetAgain[] = "get or write the file again";
 /// Longer than any path.
 constexpr std::size_t kMaxNameBytes = 4096;
+/// Of the line of an image's points; a million of them.
+constexpr std::size_t kMaxLineBytes = std::size_t{64} << 20;
 
 /// Both files of a model.
 struct Model {
@@ -187,24 +189,28 @@ std::vector<Camera> by_name(std::vector<std::pair<Image, Camera>> images) {
 
 // Text.
 
-/// The lines of a file, one at a time.
+/// The lines of a file, one at a time. At most one is in memory.
 class Lines {
  public:
-  explicit Lines(const fs::path& path) : path_(path.string()) {
-    const InputFile file(path, kCannotReadCameras);
-    text_.resize(static_cast<std::size_t>(file.size()));
-    file.read(0, text_.data(), text_.size());
-    file.check_unchanged();
-  }
+  explicit Lines(const fs::path& path) : file_(path, kCannotReadCameras), path_(path.string()) {}
 
   /// False at the end.
   bool next() {
-    if (end_ >= text_.size()) return false;
-    const std::size_t end = std::min(text_.find('\n', end_), text_.size());
-    line_ = std::string_view(text_).substr(end_, end - end_);
-    if (!line_.empty() && line_.back() == '\r') line_.remove_suffix(1);
-    end_ = end + 1;
+    if (position_ == file_.size() && next_ == window_.size()) {
+      file_.check_unchanged();
+      return false;
+    }
     ++number_;
+    line_.clear();
+    for (bool is_whole = false; !is_whole;) {
+      if (next_ == window_.size() && !fill()) break;
+      const std::size_t end = std::min(window_.find('\n', next_), window_.size());
+      line_.append(window_, next_, end - next_);
+      if (line_.size() > kMaxLineBytes) refuse(fmt::format("it is longer than {} bytes", kMaxLineBytes));
+      is_whole = end < window_.size();
+      next_ = end + (is_whole ? 1 : 0);
+    }
+    if (!line_.empty() && line_.back() == '\r') line_.pop_back();
     rest_ = line_;
     return true;
   }
@@ -248,10 +254,23 @@ class Lines {
  private:
   void skip_spaces() { rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t"), rest_.size())); }
 
+  /// False at the end of the file.
+  bool fill() {
+    constexpr std::uint64_t window_bytes = 65536;
+    window_.resize(static_cast<std::size_t>(std::min(window_bytes, file_.size() - position_)));
+    file_.read(position_, window_.data(), window_.size());
+    position_ += window_.size();
+    next_ = 0;
+    return !window_.empty();
+  }
+
+  InputFile file_;
   std::string path_;
-  std::string text_;
-  std::string_view line_, rest_;
-  std::size_t end_ = 0, number_ = 0;
+  std::string window_, line_;
+  std::string_view rest_;
+  std::uint64_t position_ = 0;  ///< in the file, of the window's end
+  std::size_t next_ = 0;        ///< in the window
+  std::size_t number_ = 0;
 };
 
 Intrinsics read_cameras_text(const fs::path& path) {
