@@ -575,10 +575,12 @@ TEST_F(Views, AtATerminalTheProgressCountsViews) {
       drawn.append(buffer, static_cast<std::size_t>(count));
     }
   });
-  EXPECT_EQ(vrpipe(of_file({"--views", "3"}), slave).code, 0);
+  const Finished finished = vrpipe(of_file({"--views", "3"}), slave);
   ::close(slave);
   reader.join();
   ::close(master);
+  EXPECT_EQ(finished.code, 0);
+  EXPECT_EQ(finished.out.find('\x1b'), std::string::npos) << "stdout is a file";
   EXPECT_NE(drawn.find("0 of 3 views"), std::string::npos) << drawn;
   EXPECT_NE(drawn.find("3 of 3 views"), std::string::npos) << drawn;
   EXPECT_EQ(drawn.substr(drawn.size() - 4), "\r\x1b[J") << "it is erased at the end";

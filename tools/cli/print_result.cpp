@@ -21,12 +21,13 @@ namespace {
 /// Both made and printed as the job says; false when stdout is for the JSON alone.
 template <class MakeJson, class MakeText>
 bool print(const SimulationJob& job, const MakeJson& make_json, const MakeText& make_text) {
+  const TextStyle style = stdout_style();
   std::string json;
   std::string text;
   {
     const StdoutToStderr redirected;  // both make units of plugins, which may print
     if (job.json) json = json_text(make_json());
-    text = make_text(stdout_style());
+    text = make_text(style);
   }
   if (job.json) {
     if (*job.json == "-") {
