@@ -26,6 +26,7 @@ constexpr const char* program_footer =
     "Start here:\n"
     "  vrpipe compare                                   the four variants on the built-in scene\n"
     "  vrpipe compare --scene point_cloud.ply --camera cameras.json#3 --output images\n"
+    "  vrpipe compare --views 8                         from cameras round it, as a distribution\n"
     "  vrpipe run --variant het --set crop.cache_bytes=32768 --json result.json\n"
     "  vrpipe accuracy --quick --html accuracy.html     what accuracy costs in time\n"
     "  vrpipe units                                     every unit and parameter that can be changed\n"

@@ -26,7 +26,8 @@ class CompareCommand : public Command {
     app.footer(
         "Simulates four GPUs that differ only in the units swapped in, on the same draw: baseline, qm (TGC and QRU\n"
         "merge overlapping quads), het (ZROP and CROP terminate opaque pixels) and het+qm (both). Prints cycles,\n"
-        "speed-ups, counts and utilization side by side.\n"
+        "speed-ups, counts and utilization side by side; with --views, how speed-ups and early-termination ratios\n"
+        "are distributed over many cameras.\n"
         "\n"
         "Examples:\n"
         "  vrpipe compare\n"
