@@ -33,7 +33,7 @@ PlyHeader read_gaussian_ply_header(const FileBytes& file) {
   const std::string_view head(reinterpret_cast<const char*>(file.data()), static_cast<std::size_t>(file.size()));
   PlyHeader header = read_ply_header(head, kCannotReadScene, file.where(), kExportRemedy);
   if (header.format != "binary_little_endian 1.0") {
-    file.fail("its format is `" + header.format + "`",
+    file.fail("its format is `" + shortened(header.format) + "`",
               "convert it to `binary_little_endian 1.0`, the only one that is read");
   }
   return header;

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 
 #include "formats/file_bytes.h"
 #include "ply_header.h"
@@ -35,7 +35,8 @@ class PlyRecords {
  private:
   FileBytes file_;
   const PlyElement* element_;
-  std::unordered_map<std::string, const PlyProperty*> properties_;
+  /// Not hashed: names could be made that all have one hash.
+  std::map<std::string, const PlyProperty*> properties_;
   const std::byte* data_;
 };
 

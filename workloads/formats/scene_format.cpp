@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <new>
 #include <utility>
 
 #include <vrpipe/component/error.h>
@@ -99,7 +100,7 @@ std::vector<GaussianFormat> gaussian_formats() {
   return formats;
 }
 
-GaussianFile read_scene(const SceneFile& file) {
+GaussianFile read_scene(const SceneFile& file) try {
   const SceneFormat* best = nullptr;
   Match match = Match::no;
   for (const SceneFormat& format : registry()) {
@@ -119,6 +120,8 @@ GaussianFile read_scene(const SceneFile& file) {
   GaussianFile scene = best->read(file);
   scene.format = best->name;
   return scene;
+} catch (const std::bad_alloc&) {
+  file.bytes.fail("it needs more memory than there is", "raise the limit on memory, or use a smaller scene");
 }
 
 std::string gaussian_file_path(const std::string& text) { return text.substr(0, choice_mark(text)); }
@@ -131,7 +134,9 @@ GaussianFile read_gaussian_file(const std::string& text) {
   if (mark != std::string::npos) file.choices = parse_choices(text.substr(mark + 1), path.string());
   file.bytes = FileBytes::read(path);
   file.neighbour = [path](const std::string& name) {
-    const fs::path relative = fs::path(name).lexically_normal();
+    constexpr std::size_t kLongest = 1000;
+    const bool is_name = name.size() <= kLongest && name.find('\0') == std::string::npos;
+    const fs::path relative = is_name ? fs::path(name).lexically_normal() : fs::path();
     if (relative.empty() || relative.is_absolute() || *relative.begin() == "..") {
       throw UserError(kCannotReadScene, path.string(), "it names the file `" + name.substr(0, 100) + "`",
                       "the files of a scene lie in its folder");

@@ -41,6 +41,10 @@ std::uint64_t pixels_at_most(std::uint64_t needed) {
 
 nlohmann::json parse_scene_json(const FileBytes& bytes) {
   const auto* const text = reinterpret_cast<const char*>(bytes.data());
+  // In memory a character may become a value of 50 bytes. The tree of a streamed scene has a few bytes for each thousand Gaussians.
+  constexpr std::uint64_t kMost = std::uint64_t{64} << 20U;
+  if (bytes.size() > kMost)
+    bytes.fail("its JSON has " + std::to_string(bytes.size()) + " bytes", "up to 64 MiB are read");
   try {
     return nlohmann::json::parse(text, text + bytes.size());
   } catch (const nlohmann::json::parse_error& error) {
@@ -71,7 +75,8 @@ std::string json_text(const nlohmann::json& value, const std::string& name, cons
 
 bool is_zip(const FileBytes& file) { return file.begins_with("PK\x03\x04"); }
 
-SogScene::SogScene(const FileBytes& file, const Neighbour& neighbour) : where_(file) {
+SogScene::SogScene(const FileBytes& file, const Neighbour& neighbour)
+    : where_(file), most_bytes_(is_zip(file) ? file.size() : std::numeric_limits<std::uint64_t>::max()) {
   if (!is_zip(file)) {
     read_attributes(parse_scene_json(file), neighbour);
     return;
@@ -119,10 +124,13 @@ SogScene::Codes SogScene::range_codes(double low, double high) const {
 }
 
 FileBytes SogScene::image(const nlohmann::json& attribute, const std::string& name, std::size_t index,
-                          const Neighbour& neighbour) const {
+                          const Neighbour& neighbour) {
   const nlohmann::json& files = json_member(attribute, "files", where_);
   if (!files.is_array() || files.size() <= index) where_.fail("`" + name + ".files` names too few files", kRemedy);
-  return neighbour(json_text(files[index], name + ".files", where_));
+  const std::string file = json_text(files[index], name + ".files", where_);
+  const FileBytes bytes = neighbour(file);
+  image_bytes_[file] = bytes.size();
+  return bytes;
 }
 
 void SogScene::read_attributes(const nlohmann::json& meta, const Neighbour& neighbour) {
@@ -167,9 +175,8 @@ void SogScene::read_attributes(const nlohmann::json& meta, const Neighbour& neig
   colours_ = image(colours, "sh0", 0, neighbour);
   if (meta.contains("shN") && !meta["shN"].is_null()) read_rest(meta["shN"], neighbour);
   std::uint64_t bytes = 0;
-  for (const FileBytes* file : {&means_low_, &means_high_, &scales_, &rotations_, &colours_, &labels_})
-    bytes += file->size();
-  check_count(count_, bytes, where_);
+  for (const auto& file : image_bytes_) bytes += file.second;
+  check_count(count_, std::min(bytes, most_bytes_), where_);
 }
 
 void SogScene::read_rest(const nlohmann::json& rest, const Neighbour& neighbour) {

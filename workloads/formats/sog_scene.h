@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -57,11 +59,13 @@ class SogScene {
   std::array<double, 4> range_ends(const nlohmann::json& attribute, const std::string& name, const char* end,
                                    std::size_t count) const;
   FileBytes image(const nlohmann::json& attribute, const std::string& name, std::size_t index,
-                  const Neighbour& neighbour) const;
+                  const Neighbour& neighbour);
   void read_attributes(const nlohmann::json& meta, const Neighbour& neighbour);
   void read_rest(const nlohmann::json& rest, const Neighbour& neighbour);
 
   FileBytes where_;
+  std::uint64_t most_bytes_;                          ///< of all images, whatever they are unpacked to
+  std::map<std::string, std::uint64_t> image_bytes_;  ///< by name
   int version_ = 0;
   std::uint64_t count_ = 0;
   int sh_degree_ = 0;

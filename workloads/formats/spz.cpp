@@ -167,6 +167,7 @@ GaussianFile read(const SceneFile& file) {
     std::uint64_t size = 0;
     for (const std::uint64_t stride : block_strides(header)) size += header.count * stride;
     stream.unpack(size);
+    stream.finish();
     blocks = blocks_of_stream(header, stream.take());
   } else {
     header = read_header(bytes, bytes.size());

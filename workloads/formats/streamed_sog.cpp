@@ -2,8 +2,10 @@
 // Gaussians of one SOG scene.
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -78,19 +80,31 @@ GaussianFile read(const SceneFile& file) {
   if (levels == 0) where.fail("`lodLevels` is 0", kRemedy);
   const std::uint64_t level = chosen_level(file, levels);
 
+  // What several scenes name is read once, and counts once.
+  std::map<std::string, FileBytes> images;
+  SceneFile source = file;
+  source.neighbour = [&](const std::string& name) {
+    const std::string plain = std::filesystem::path(name).lexically_normal().string();
+    const auto found = images.find(plain);
+    return found != images.end() ? found->second : images.emplace(plain, file.neighbour(name)).first->second;
+  };
   struct Part {
     SogScene scene;
     std::vector<SogScene::Run> runs;
     std::uint64_t taken = 0;
   };
   std::map<std::uint64_t, Part> parts;
+  std::set<std::string> opened;
   std::uint64_t total = 0;
   int degree = 0;
   for (const Region& region : regions(json_member(meta, "tree", where), std::to_string(level), names.size(), where)) {
     auto part = parts.find(region.file);
     if (part == parts.end()) {
       const std::string name = json_text(names[region.file], "filenames", where);
-      part = parts.emplace(region.file, Part{open_scene(file, name), {}, 0}).first;
+      if (!opened.insert(std::filesystem::path(name).lexically_normal().string()).second) {
+        where.fail("`filenames` has `" + name.substr(0, 100) + "` twice", kRemedy);
+      }
+      part = parts.emplace(region.file, Part{open_scene(source, name), {}, 0}).first;
     }
     // A region has its Gaussians to itself, so the runs of a file are not more than it has.
     Part& of = part->second;
@@ -109,9 +123,12 @@ GaussianFile read(const SceneFile& file) {
   // What lies around everything, at every level of detail.
   std::optional<SogScene> environment;
   if (meta.contains("environment") && !meta["environment"].is_null()) {
-    environment.emplace(open_scene(file, json_text(meta["environment"], "environment", where)));
+    environment.emplace(open_scene(source, json_text(meta["environment"], "environment", where)));
     degree = std::max(degree, environment->sh_degree());
   }
+  std::uint64_t bytes = 0;
+  for (const auto& image : images) bytes += image.second.size();
+  check_count(total + (environment ? environment->count() : 0), bytes, where);
   GaussianArray gaussians(total + (environment ? environment->count() : 0), degree, where.where());
   for (const auto& part : parts) part.second.scene.decode(part.second.runs, gaussians);
   if (environment) environment->decode({{0, environment->count(), total}}, gaussians);

@@ -1,6 +1,7 @@
 #include "formats/unpack.h"
 
 #include <algorithm>
+#include <array>
 #include <new>
 #include <vector>
 
@@ -20,6 +21,7 @@ struct GzipStream::State {
   z_stream stream{};
   std::vector<std::byte> unpacked;
   std::uint64_t given = 0;  ///< bytes of `packed` that zlib has, or had
+  bool ended = false;       ///< the stream, with a checksum that is right
 
   std::uint64_t position() const { return given - stream.avail_in; }
 };
@@ -32,43 +34,66 @@ GzipStream::GzipStream(const FileBytes& packed) : state_(std::make_unique<State>
 
 GzipStream::~GzipStream() { inflateEnd(&state_->stream); }
 
+/// Unpacks until there is no more room for it, or the stream's end: Z_OK or Z_STREAM_END.
+int GzipStream::step() {
+  State& s = *state_;
+  constexpr std::uint64_t kStep = std::uint64_t{1} << 20U;
+  while (s.stream.avail_out > 0) {
+    if (s.stream.avail_in == 0) {
+      const std::uint64_t next = std::min(kStep, s.packed.size() - s.given);
+      if (next == 0) {
+        s.packed.fail("it ends at byte " + std::to_string(s.packed.size()) + ", within its gzip stream, after " +
+                          std::to_string(s.stream.total_out) + " bytes unpacked",
+                      "get the file again, it seems cut short");
+      }
+      // zlib does not write to its input.
+      s.stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(s.packed.data() + s.given));
+      s.stream.avail_in = static_cast<uInt>(next);
+      s.given += next;
+    }
+    const int status = inflate(&s.stream, Z_NO_FLUSH);
+    if (status == Z_OK) continue;
+    if (status == Z_STREAM_END) return status;
+    if (status == Z_MEM_ERROR) throw std::bad_alloc();
+    const std::string why = s.stream.msg == nullptr ? "" : std::string(": ") + s.stream.msg;
+    s.packed.fail_at(s.position(), "its gzip stream is damaged" + why, kDamagedRemedy);
+  }
+  return Z_OK;
+}
+
 void GzipStream::unpack(std::uint64_t size) {
   State& s = *state_;
   constexpr std::uint64_t kStep = std::uint64_t{1} << 20U;
   while (size > 0) {
-    const std::uint64_t before = s.unpacked.size(), step = std::min(size, kStep);
-    s.unpacked.resize(static_cast<std::size_t>(before + step));
+    const std::uint64_t before = s.unpacked.size(), now = std::min(size, kStep);
+    s.unpacked.resize(static_cast<std::size_t>(before + now));
     s.stream.next_out = reinterpret_cast<Bytef*>(s.unpacked.data() + before);
-    s.stream.avail_out = static_cast<uInt>(step);
-    while (s.stream.avail_out > 0) {
-      if (s.stream.avail_in == 0) {
-        const std::uint64_t next = std::min(kStep, s.packed.size() - s.given);
-        if (next == 0) {
-          s.packed.fail("it ends at byte " + std::to_string(s.packed.size()) + ", within its gzip stream, after " +
-                            std::to_string(before + step - s.stream.avail_out) + " bytes unpacked",
-                        "get the file again, it seems cut short");
-        }
-        // zlib does not write to its input.
-        s.stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(s.packed.data() + s.given));
-        s.stream.avail_in = static_cast<uInt>(next);
-        s.given += next;
-      }
-      const int status = inflate(&s.stream, Z_NO_FLUSH);
-      if (status == Z_OK) continue;
-      if (status == Z_STREAM_END && s.stream.avail_out == 0) break;
-      if (status == Z_STREAM_END) {
-        s.packed.fail_at(s.position(),
-                         "its gzip stream ends after " + std::to_string(before + step - s.stream.avail_out) +
-                             " bytes unpacked, and " + std::to_string(before + size) + " are needed",
-                         kDamagedRemedy);
-      }
-      if (status == Z_MEM_ERROR) throw std::bad_alloc();
+    s.stream.avail_out = static_cast<uInt>(now);
+    s.ended = s.ended || step() == Z_STREAM_END;
+    if (s.stream.avail_out > 0) {
       s.packed.fail_at(s.position(),
-                       std::string("its gzip stream is damaged") + (s.stream.msg == nullptr ? "" : ": ") +
-                           (s.stream.msg == nullptr ? "" : s.stream.msg),
+                       "its gzip stream ends after " + std::to_string(before + now - s.stream.avail_out) +
+                           " bytes unpacked, and " + std::to_string(before + size) + " are needed",
                        kDamagedRemedy);
     }
-    size -= step;
+    size -= now;
+  }
+}
+
+void GzipStream::finish() {
+  State& s = *state_;
+  std::array<std::byte, 4096> dropped{};
+  constexpr std::uint64_t kMost = std::uint64_t{16} << 20U;
+  for (std::uint64_t done = 0; !s.ended; done += dropped.size()) {
+    if (done > kMost) {
+      s.packed.fail_at(s.position(),
+                       "its gzip stream goes on, after the " + std::to_string(s.unpacked.size()) +
+                           " bytes of its Gaussians",
+                       kDamagedRemedy);
+    }
+    s.stream.next_out = reinterpret_cast<Bytef*>(dropped.data());
+    s.stream.avail_out = static_cast<uInt>(dropped.size());
+    s.ended = step() == Z_STREAM_END;
   }
 }
 
@@ -129,9 +154,21 @@ RgbaImage unpack_webp(const FileBytes& packed, std::uint64_t least, std::uint64_
                 "export the scene again");
   }
   const std::shared_ptr<std::byte[]> bytes = allocate_bytes(4 * pixels, packed.where());
-  if (WebPDecodeRGBAInto(data, size, reinterpret_cast<std::uint8_t*>(bytes.get()), static_cast<std::size_t>(4 * pixels),
-                         4 * features.width) == nullptr) {
-    packed.fail("its WebP image of " + std::to_string(size) + " bytes is cut short or damaged", kDamagedRemedy);
+  WebPDecoderConfig config;
+  if (WebPInitDecoderConfig(&config) == 0) throw std::bad_alloc();
+  config.output.colorspace = MODE_RGBA;
+  config.output.is_external_memory = 1;
+  config.output.u.RGBA.rgba = reinterpret_cast<std::uint8_t*>(bytes.get());
+  config.output.u.RGBA.stride = 4 * features.width;
+  config.output.u.RGBA.size = static_cast<std::size_t>(4 * pixels);
+  switch (WebPDecode(data, size, &config)) {
+    case VP8_STATUS_OK: break;
+    case VP8_STATUS_OUT_OF_MEMORY: throw std::bad_alloc();
+    case VP8_STATUS_SUSPENDED:
+    case VP8_STATUS_NOT_ENOUGH_DATA:
+      packed.fail("it ends at byte " + std::to_string(size) + ", within its WebP image",
+                  "get the file again, it seems cut short");
+    default: packed.fail("its WebP image of " + std::to_string(size) + " bytes is damaged", kDamagedRemedy);
   }
   image.pixels = FileBytes(bytes, 4 * pixels, packed.where());
   return image;

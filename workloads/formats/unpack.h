@@ -21,6 +21,9 @@ class GzipStream {
   /// The next `size` bytes, on top of those unpacked so far. Memory grows with what is really there.
   /// @throws UserError that names the byte of the packed file when it ends before or is damaged
   void unpack(std::uint64_t size);
+  /// Unpacks what is left and drops it: only at its end has a stream its checksum.
+  /// @throws UserError when it ends before, is damaged, or goes on much longer than what was unpacked
+  void finish();
   /// A copy of the first `size` bytes unpacked. Messages about it name its own bytes, not those of the file.
   FileBytes first(std::uint64_t size) const;
   /// All that was unpacked.
@@ -28,6 +31,7 @@ class GzipStream {
 
  private:
   struct State;
+  int step();
   std::unique_ptr<State> state_;
 };
 

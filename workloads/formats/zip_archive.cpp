@@ -56,13 +56,19 @@ FileBytes ZipArchive::read(const std::string& name) const {
   if (zip_stat_index(handle_->archive, index, 0, &status) != 0 || (status.valid & ZIP_STAT_SIZE) == 0) {
     bytes_.fail(what + " has no size", kRemedy);
   }
+  // Other methods take memory as the archive says, up to gigabytes.
+  const bool known = (status.valid & ZIP_STAT_COMP_METHOD) != 0 &&
+                     (status.comp_method == ZIP_CM_STORE || status.comp_method == ZIP_CM_DEFLATE);
+  if (!known) bytes_.fail(what + " is neither stored nor deflated", "pack the archive again, without compression");
   // Images do not shrink in a zip archive, and text not to a sixteenth.
   constexpr std::uint64_t kMostPerByte = 16, kAlways = std::uint64_t{1} << 20U;
-  if (status.size > kAlways && (status.size - kAlways) / kMostPerByte > bytes_.size()) {
+  const std::uint64_t most = kMostPerByte * bytes_.size() + kAlways;
+  if (status.size > most || status.size > most - unpacked_) {
     bytes_.fail(what + " is to have " + std::to_string(status.size) + " bytes, and the archive has " +
                     std::to_string(bytes_.size()),
                 kRemedy);
   }
+  unpacked_ += status.size;
   const std::shared_ptr<std::byte[]> unpacked = allocate_bytes(status.size, bytes_.where());
   zip_file_t* const file = zip_fopen_index(handle_->archive, index, 0);
   zip_int64_t done = file == nullptr ? -1 : zip_fread(file, unpacked.get(), status.size);

@@ -20,7 +20,8 @@ class ZipArchive {
   /// Names of its files, in their order.
   const std::vector<std::string>& names() const { return names_; }
   /// A file's bytes.
-  /// @throws UserError when there is no such file, it is damaged, or it is much larger than the whole archive
+  /// @throws UserError when there is no such file, it is damaged or packed in another way than by deflating, or all that was read
+  ///         is much larger than the whole archive
   FileBytes read(const std::string& name) const;
 
  private:
@@ -28,6 +29,7 @@ class ZipArchive {
   FileBytes bytes_;
   std::unique_ptr<Handle> handle_;
   std::vector<std::string> names_;
+  mutable std::uint64_t unpacked_ = 0;  ///< bytes, of all that was read
 };
 
 }  // namespace vrpipe

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Writes the files of this folder: one little scene in every format that is read, and what a reader must find in them.
 
-    generate.py [FOLDER]        where to (the script's own folder)
+    generate.py [FOLDER]            where to (the script's own folder)
+    generate.py --seeds FOLDER      instead the smallest ones, for the fuzzers (tests/fuzz/corpus)
 
 Python 3.8 and its standard library; the same bytes every time, but for what another zlib packs otherwise. The encoders are
 written from the formats' documents and know nothing of the readers.
@@ -233,7 +234,7 @@ def ksplat(gaussians, level, degree, sections, rest_range=(0, 0)):
             buckets.append(here[start:start + size])
             start += size
         ends = [[(min(g["position"][i] for g in b), max(g["position"][i] for g in b)) for i in range(3)] for b in buckets]
-        block = f32(1.001 * max(high - low for bucket in ends for low, high in bucket)) if level else 0.0
+        block = f32(1.001 * max([0.001] + [high - low for bucket in ends for low, high in bucket])) if level else 0.0
         centres = [[f32((low + high) / 2) for low, high in bucket] for bucket in ends]
         quantum = 1 if level == 0 else 32767
         records = b""
@@ -381,6 +382,14 @@ def webp(pixels, width):
     return b"RIFF" + struct.pack("<I", len(chunk) + 4) + b"WEBP" + chunk
 
 
+def constant_webp(width, height):
+    """Any number of equal pixels in a few bytes: codes of one symbol take no bits."""
+    small = webp([(7, 7, 7, 255)] * 4, 2)
+    sides = (width - 1) | (height - 1) << 14
+    word = struct.unpack("<I", small[21:25])[0]
+    return small[:21] + struct.pack("<I", word & ~0xFFFFFFF | sides) + small[25:]
+
+
 def image(pixels):
     width = math.ceil(math.sqrt(len(pixels)))
     height = math.ceil(len(pixels) / width)
@@ -486,12 +495,12 @@ def zipped(files, prefix="", method=zipfile.ZIP_STORED):
     return out.getvalue()
 
 
-def streamed_sog(scene):
+def streamed_sog(scene, degree=1):
     """Three levels in three files, and what lies around; {name: bytes}, and the indices of each level in order."""
     parts = {"L_0/": scene[0:16], "L_0b/": scene[16:24], "L_1/": scene[0:13], "environment/": scene[24:28]}
     files = {}
     for folder, gaussians in parts.items():
-        for name, content in sog(gaussians, 2, 1).items():
+        for name, content in sog(gaussians, 2, degree).items():
             files[folder + name] = content
     bound = {"min": [-21, -21, -21], "max": [21, 21, 21]}
     def leaf(**lods):
@@ -511,7 +520,57 @@ def streamed_sog(scene):
 
 
 # ---------------------------------------------------------------------------------------------------------------------- all
+def bundle(files, first):
+    """Several files as one, as tests/fuzz/exercise.h has it."""
+    names = [first] + sorted(name for name in files if name != first)
+    return b"\n".join(b"==> " + name.encode() + b"\n" + files[name] for name in names)
+
+
+def write_seeds(folder):
+    scene = make_scene()
+    three = scene[:3]
+    extension = struct.pack("<II", 0x11223344, 4) + b"none"
+    streamed = streamed_sog(scene, 0)[0]
+    seeds = {
+        "inria_ply": {"sh0": inria_ply(three, 0), "sh1": inria_ply(three, 1), "sh3": inria_ply(three, 3),
+                      "z_up": inria_ply(three, 0).replace(b"element", b"comment Vertical Axis: z\nelement", 1)},
+        "compressed_ply": {"12_columns": compressed_ply(three, 12, 0), "18_columns": compressed_ply(three, 18, 0),
+                           "sh1": compressed_ply(three, 18, 1)},
+        "splat": {"three": splat(three)},
+        "spz": {"v2": gzip.compress(spz(three, 2, 1), 9, mtime=0), "v2_bare": spz(three, 2, 0),
+                "v3_bare": spz(three, 3, 3), "v4": spz4(three, 0), "v4_sh4": spz4(three, 4, extension)},
+        "ksplat": {"level0": ksplat(three, 0, 0, [(0, [3], 0)]), "level1": ksplat(three, 1, 1, [(0, [2, 1], 0)]),
+                   "level2": ksplat(scene[:10], 2, 2, [(1, [1], 1), (0, [1], 0)])},
+        "sog": {"v1": bundle(sog(three, 1, 0), "meta.json"), "v1_sh1": bundle(sog(three, 1, 1), "meta.json"),
+                "v2": bundle(sog(three, 2, 0), "meta.json"), "v2_sh2": bundle(sog(three, 2, 2), "meta.json"),
+                "v1_zip": zipped(sog(three, 1, 0), "", zipfile.ZIP_DEFLATED), "v2_zip": zipped(sog(three, 2, 1))},
+        "streamed_sog": {"lod0": bundle(streamed, "lod-meta.json") + b"\0", "lod1": bundle(streamed, "lod-meta.json") + b"\1"}}
+    # Attacks; tests/formats/hostile_test.cpp says what is expected of each.
+    bomb = struct.pack("<4sIIBBBB", b"NGSP", 3, 3, 0, 12, 0, 0) + b"".join(spz_blocks(three, 3, 0)) + bytes(17 << 20)
+    seeds["spz"]["bomb"] = gzip.compress(bomb, 9, mtime=0)
+    seeds["spz"]["v4_announces_exabytes"] = spz4(three, 0).replace(
+        zstd_frame(spz_blocks(three, 4, 0)[0]), b"\x28\xb5\x2f\xfd\xe0" + struct.pack("<Q", 1 << 60) + bytes(20))
+    files = sog(three, 2, 0)
+    seeds["sog"]["webp_bomb"] = bundle(dict(files, **{"means_l.webp": constant_webp(16383, 16383)}), "meta.json")
+    seeds["sog"]["constant_images"] = bundle(
+        dict({name: constant_webp(256, 256) for name in files}, **{
+            "meta.json": files["meta.json"].replace(b'"count":3', b'"count":65536')}), "meta.json")
+    seeds["sog"]["zip_bomb"] = zipped(dict(files, **{"means_l.webp": bytes(8 << 20)}), "", zipfile.ZIP_DEFLATED)
+    seeds["sog"]["zip_lzma"] = zipped(files, "", zipfile.ZIP_LZMA)
+    archive = zipped(files)
+    entry = archive.rindex(b"PK\1\2", 0, archive.rindex(b"means_l.webp"))
+    seeds["sog"]["zip_announces_gigabytes"] = archive[:entry + 24] + b"\xfe\xff\xff\xff" + archive[entry + 28:]
+    for name, files in seeds.items():
+        os.makedirs(os.path.join(folder, name), exist_ok=True)
+        for file, content in files.items():
+            with open(os.path.join(folder, name, file), "wb") as out:
+                out.write(content)
+
+
 def main():
+    if sys.argv[1:2] == ["--seeds"]:
+        write_seeds(sys.argv[2])
+        return
     folder = sys.argv[1] if len(sys.argv) > 1 else os.path.dirname(os.path.abspath(__file__))
     scene = make_scene()
     few = scene[:FEW]
