@@ -6,6 +6,8 @@
 #include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
+#include "support/data.h"
+
 namespace vrpipe::testing {
 namespace {
 
@@ -108,6 +110,35 @@ TEST_F(BadInput, Scenes) {
   refused_with_outputs({"run", "--scene", "file"}, {"file", ".ply"});
   refused_with_outputs({"run", "--scene", "builtin:objekt"}, {"builtin:objekt", "object"});
   refused_with_outputs({"run", "--scene", "tiny.spl", "--size", "8x8"}, {"--size", ".spl"});
+}
+
+TEST_F(BadInput, ScenesOfEveryFormatThatAreCutShort) {
+  const std::vector<std::pair<const char*, std::vector<std::string>>> files{
+      {"sh3.ply", {"element vertex", "end at byte"}},
+      {"18_columns.compressed.ply", {"element vertex", "end at byte"}},
+      {"small.splat", {"at byte 736", "31 of 32 bytes"}},
+      {"v3_sh2.spz", {"it ends at byte", "within its gzip stream"}},
+      {"v3_bare_sh3.spz", {"its spherical harmonics", "end at byte"}},
+      {"v4_sh3.spz", {"it ends at byte", "its spherical harmonics"}},
+      {"level1_sh1.ksplat", {"the Gaussians of a section", "end at byte"}},
+      {"v2_sh1.sog", {"its zip archive of", "cut short"}}};
+  for (const auto& [name, parts] : files) {
+    const std::string bytes = read_file(data_file("formats") / name);
+    write(name, bytes.substr(0, bytes.size() - 1));
+    std::vector<std::string> expected = parts;
+    expected.push_back(name);
+    refused_with_outputs({"run", "--scene", name}, expected);
+    refused({"scenes", name}, expected);
+  }
+  for (const char* name : {"sog", "streamed"}) {
+    std::filesystem::copy(data_file("formats") / name, folder() / name, std::filesystem::copy_options::recursive);
+  }
+  std::filesystem::resize_file(folder() / "sog/sh0.webp", 100);
+  std::filesystem::resize_file(folder() / "streamed/L_0/quats.webp", 10);
+  refused_with_outputs({"run", "--scene", "sog"}, {"sog/sh0.webp", "it ends at byte 100, within its WebP image"});
+  refused_with_outputs({"compare", "--scene", "streamed"}, {"streamed/L_0/quats.webp", "it ends at byte 10"});
+  std::filesystem::resize_file(folder() / "sog/meta.json", 50);
+  refused({"scenes", "sog"}, {"sog/meta.json", "at byte 51", "no JSON"});
 }
 
 TEST_F(BadInput, Cameras) {

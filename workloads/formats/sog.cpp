@@ -14,6 +14,9 @@ Match match(const SceneFile& file) {
 }
 
 GaussianFile read(const SceneFile& file) {
+  if (file.ends_with(".sog") && !is_zip(file.bytes)) {
+    file.bytes.fail_at(0, "there is no zip archive, which a .sog is", "get the file again");
+  }
   const SogScene scene(file.bytes, file.neighbour);
   GaussianArray gaussians(scene.count(), scene.sh_degree(), file.bytes.where());
   scene.decode({{0, scene.count(), 0}}, gaussians);
