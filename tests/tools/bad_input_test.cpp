@@ -37,7 +37,7 @@ class BadInput : public ToolTest {
     write("words.so", std::string("\x7f"
                                   "ELF...vrpipe-plugin/0.0.0/itanium-abi") +
                           '\0' + "...");
-    write("file", "");
+    write("file", "neither Gaussians nor a mesh");
     std::filesystem::create_directory(folder() / "folder.ply");
   }
 
@@ -107,7 +107,7 @@ TEST_F(BadInput, Scenes) {
   refused_with_outputs({"run", "--scene", "cut.spl"}, {"cut.spl", "60 splats"});
   refused_with_outputs({"run", "--scene", "other.ply"}, {"other.ply", "opacity"});
   refused_with_outputs({"run", "--scene", "folder.ply"}, {"folder.ply", "directory"});
-  refused_with_outputs({"run", "--scene", "file"}, {"file", ".ply"});
+  refused_with_outputs({"run", "--scene", "file"}, {"file", "known format", ".ply"});
   refused_with_outputs({"run", "--scene", "builtin:objekt"}, {"builtin:objekt", "object"});
   refused_with_outputs({"run", "--scene", "tiny.spl", "--size", "8x8"}, {"--size", ".spl"});
 }
