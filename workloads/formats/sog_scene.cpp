@@ -128,7 +128,7 @@ FileBytes SogScene::image(const nlohmann::json& attribute, const std::string& na
   const nlohmann::json& files = json_member(attribute, "files", where_);
   if (!files.is_array() || files.size() <= index) where_.fail("`" + name + ".files` names too few files", kRemedy);
   const std::string file = json_text(files[index], name + ".files", where_);
-  const FileBytes bytes = neighbour(file);
+  FileBytes bytes = neighbour(file);
   image_bytes_[file] = bytes.size();
   return bytes;
 }

@@ -32,9 +32,12 @@ ZipArchive::ZipArchive(const FileBytes& bytes) : bytes_(bytes), handle_(std::mak
   if (source != nullptr) handle_->archive = zip_open_from_source(source, ZIP_RDONLY, &error);
   if (handle_->archive == nullptr) {
     if (source != nullptr) zip_source_free(source);
-    bytes.fail("its zip archive of " + std::to_string(bytes.size()) +
-                   " bytes is cut short or damaged: " + text_of(error),
-               kRemedy);
+    if (zip_error_code_zip(&error) == ZIP_ER_NOZIP) {
+      zip_error_fini(&error);
+      bytes.fail("it ends at byte " + std::to_string(bytes.size()) + ", without the directory that ends a zip archive",
+                 "get the file again, it seems cut short");
+    }
+    bytes.fail("its zip archive of " + std::to_string(bytes.size()) + " bytes is damaged: " + text_of(error), kRemedy);
   }
   const zip_int64_t entries = zip_get_num_entries(handle_->archive, 0);
   for (zip_int64_t i = 0; i < entries; ++i) {

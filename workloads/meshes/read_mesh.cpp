@@ -33,11 +33,11 @@ std::string extension_of(const std::filesystem::path& path) {
   return extension;
 }
 
-PlyHeader header_of(const std::filesystem::path& path, const std::string& what) {
+PlyHeader header_of(const std::filesystem::path& path, const std::string& what, const std::string& export_remedy) {
   const InputFile file(path, what);
   std::string head(static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), kMaxPlyHeaderBytes)), '\0');
   file.read(0, head.data(), head.size());
-  return read_ply_header(head, what, path.string(), "export the mesh as a .ply");
+  return read_ply_header(head, what, path.string(), export_remedy);
 }
 
 /// Leaves assimp the reader of one format: another one would be taken for a file that only looks like it.
@@ -66,7 +66,7 @@ Mesh import_mesh(const std::string& path, const std::string& extension, std::str
   if (is_gltf) bytes = reduced_gltf(bytes, path, triangles);
   if (extension == ".obj") bytes = reduced_obj(bytes, path, rejected);
   if (bytes.empty()) return {};
-  if (extension == ".ply") bytes = reduced_ply(header_of(path, kCannotRead), bytes, path);
+  if (extension == ".ply") bytes = reduced_ply(header_of(path, kCannotRead, "export the mesh as a .ply"), bytes, path);
   Assimp::Importer importer;
   keep_one_reader(importer, extension);
   auto* files = new AssetFiles(path, std::move(bytes), extension == ".obj");  // the importer deletes it
@@ -91,7 +91,7 @@ bool is_mesh_file(const std::filesystem::path& path) {
   const std::string extension = extension_of(path);
   if (extension == ".obj" || extension == ".gltf" || extension == ".glb") return true;
   if (extension != ".ply") return false;
-  const PlyHeader header = header_of(path, "cannot read scene");
+  const PlyHeader header = header_of(path, "cannot read scene", "export the scene as a .ply");
   const PlyElement* const vertex = header.element("vertex");
   const bool gaussians = vertex != nullptr && std::any_of(vertex->properties.begin(), vertex->properties.end(),
                                                           [](const PlyProperty& p) { return p.name == "f_dc_0"; });
