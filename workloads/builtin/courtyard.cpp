@@ -1,7 +1,7 @@
-#include "courtyard.h"
-
 #include <cmath>
 #include <vector>
+
+#include "scenes.h"
 
 namespace vrpipe {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <vrpipe/workloads/mesh.h>
 
-#include "scene_painter.h"
+#include "surfaces.h"
 
 namespace vrpipe {
 
