@@ -30,33 +30,8 @@ void ScenePainter::block_ball(const Vec3& centre, const Vec3& radii) { blockers_
 
 bool ScenePainter::blocked(const std::vector<Blocker>& blockers, const Vec3& from, const Vec3& direction,
                            double reach) {
-  for (const Blocker& blocker : blockers) {
-    const Vec3 o = from - blocker.centre;
-    if (blocker.ball) {
-      const Vec3 scale = {1 / blocker.half[0], 1 / blocker.half[1], 1 / blocker.half[2]};
-      const Vec3 p = o * scale, d = direction * scale;
-      const double a = dot(d, d), b = dot(p, d), c = dot(p, p) - 1;
-      if (c <= 0 || b >= 0) continue;  // inside, or turned away
-      const double discriminant = b * b - a * c;
-      if (discriminant > 0 && -b - std::sqrt(discriminant) < reach * a) return true;
-      continue;
-    }
-    double enter = 1e-4, leave = reach;
-    bool inside = true;
-    for (std::size_t i = 0; i < 3 && enter <= leave; ++i) {
-      inside = inside && std::fabs(o[i]) < blocker.half[i];
-      if (std::fabs(direction[i]) < 1e-9) {
-        if (std::fabs(o[i]) > blocker.half[i]) leave = -1;
-        continue;
-      }
-      const double near_side = (-blocker.half[i] - o[i]) / direction[i];
-      const double far_side = (blocker.half[i] - o[i]) / direction[i];
-      enter = std::max(enter, std::min(near_side, far_side));
-      leave = std::min(leave, std::max(near_side, far_side));
-    }
-    if (!inside && enter < leave) return true;
-  }
-  return false;
+  return std::any_of(blockers.begin(), blockers.end(),
+                     [&](const Blocker& blocker) { return blocker.blocks(from, direction, reach); });
 }
 
 bool ScenePainter::hidden(const Vec3& position, const Vec3& normal) const {

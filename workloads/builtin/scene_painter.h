@@ -6,6 +6,7 @@
 #include <vrpipe/workloads/camera.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
+#include "blockers.h"
 #include "surfaces.h"
 
 namespace vrpipe {
@@ -57,10 +58,6 @@ class ScenePainter {
   GaussianScene build() { return builder_.build(); }
 
  private:
-  struct Blocker {
-    Vec3 centre, half;
-    bool ball;
-  };
   static bool blocked(const std::vector<Blocker>& blockers, const Vec3& from, const Vec3& direction, double reach);
   bool hidden(const Vec3& position, const Vec3& normal) const;
   bool out_of_view(const Vec3& position) const;

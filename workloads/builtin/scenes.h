@@ -1,5 +1,6 @@
 #pragma once
 
+#include "capture_painter.h"
 #include "mesh_painter.h"
 #include "scene_painter.h"
 
@@ -15,5 +16,15 @@ void paint_outdoor(ScenePainter& painter);
 /// and the sky behind are splats.
 void paint_courtyard(ScenePainter& painter);
 Mesh courtyard_mesh();
+
+// Stand-ins for the scenes of the paper.
+void paint_kitchen(CapturePainter& painter);
+void paint_bonsai(CapturePainter& painter);
+void paint_train(CapturePainter& painter);
+void paint_truck(CapturePainter& painter);
+void paint_lego(CapturePainter& painter);
+void paint_palace(CapturePainter& painter);
+void paint_building(CapturePainter& painter);
+void paint_rubble(CapturePainter& painter);
 
 }  // namespace vrpipe
