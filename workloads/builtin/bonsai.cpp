@@ -76,11 +76,9 @@ void paint_bonsai(CapturePainter& painter) {
     painter.cylinder(trunk[i], trunk[i + 1], thick, thick - 0.0045, bark, fine);
     painter.ball(trunk[i + 1], Vec3{1, 1, 1} * (thick - 0.004), bark, fine);
   }
-  for (int i = 0; i < 5; ++i) {  // roots over the soil
-    const double angle = 1.25 * i;
-    const Vec3 out = {0.07 * (1 - 0.5 * angle * angle + angle * angle * angle * angle / 24 - 0.2), 0,
-                      0.05 * (angle - 2.5)};
-    painter.cylinder(trunk[0] + Vec3{0, 0.025, 0}, trunk[0] + out, 0.014, 0.007, bark, fine);
+  const Vec3 roots[] = {{0.07, 0, 0.02}, {-0.06, 0, 0.045}, {-0.065, 0, -0.03}, {0.03, 0, -0.06}};
+  for (const Vec3& root : roots) {
+    painter.cylinder(trunk[0] + Vec3{0, 0.025, 0}, trunk[0] + root, 0.014, 0.007, bark, fine);
   }
   struct Pad {
     int joint;

@@ -143,8 +143,8 @@ void CapturePainter::floaters(const Vec3& centre, const Vec3& half, std::uint64_
   texture.size = size;
   texture.opaque = 0;
   texture.faint = 0.9;
-  texture.emission = 0.6;
-  strokes_.push_back({Kind::floaters, {}, plain({0.6, 0.6, 0.62}), texture, centre, half, count});
+  texture.emission = 1;
+  strokes_.push_back({Kind::floaters, {}, plain({0.7, 0.7, 0.72}), texture, centre, half, count});
 }
 
 double CapturePainter::nearest_camera(const Vec3& position) const {

@@ -40,7 +40,10 @@ void paint_kitchen(CapturePainter& painter) {
     return white * (fraction(p[2] * 45) < 0.5 ? weave : weave * 0.95);
   };
   painter.surface(disc_surface({0, 0.757, 0}, {0, 1, 0}, 0, 0.5), cloth, fine);
-  bulldozer(painter, {0.02, 0.762, 0.02}, 0.27, fine);
+  Texture model = fine;
+  model.size = 0.5;
+  model.depth = 0.001;
+  bulldozer(painter, {0.02, 0.762, 0.02}, 0.30, model);
 
   // Places laid around: mats, plates, glasses; a bowl of fruit, a jug.
   for (int i = 0; i < 4; ++i) {
@@ -129,8 +132,19 @@ void paint_kitchen(CapturePainter& painter) {
     return p[1] < 0.1 ? Vec3{0.92, 0.91, 0.88} : Vec3{0.86, 0.80, 0.66} * (0.96 + 0.06 * value_noise(p * 4.0));
   };
   painter.quad({2.8, 0, -2.6}, {0, 0, 5.2}, {0, 2.5, 0}, plaster, wall);
-  painter.quad({-2.6, 0, 2.6}, {0, 0, -5.2}, {0, 2.5, 0}, plaster, wall);
-  painter.quad({-2.6, 0, -2.6}, {5.4, 0, 0}, {0, 2.5, 0}, plaster, wall);
+  // Behind the viewer, with shelves and pictures on them.
+  const Paint shelves = [=](const Vec3& p, double u, double v) {
+    const double along = std::fabs(p[2] + 2.6) < 0.01 ? p[0] : p[2];
+    if (within(p[1], 0.4, 2.1) && within(along, -1.6, 1.4)) {
+      if (fraction((p[1] - 0.4) / 0.34) < 0.08) return Vec3{0.44, 0.28, 0.16};
+      const double thing_key = std::floor(along / 0.09) + 31 * std::floor((p[1] - 0.4) / 0.34);
+      return Vec3{0.2 + 0.6 * hash_fraction(thing_key, 31), 0.2 + 0.5 * hash_fraction(thing_key, 32),
+                  0.15 + 0.5 * hash_fraction(thing_key, 33)};
+    }
+    return plaster(p, u, v);
+  };
+  painter.quad({-2.6, 0, 2.6}, {0, 0, -5.2}, {0, 2.5, 0}, shelves, thing);
+  painter.quad({-2.6, 0, -2.6}, {5.4, 0, 0}, {0, 2.5, 0}, shelves, thing);
 
   // Counters with doors and drawers, an oven, a worktop of stone, the sink and its tap.
   const auto front = [](double along, double y, double low, double high, double width, const Vec3& colour) {

@@ -12,6 +12,8 @@ void paint_train(CapturePainter& painter) {
   painter.camera({-6, 2.0, 13});
   painter.camera({6, 2.0, 14});
   painter.camera({-5, 4.5, 2});
+  painter.camera({-4, 2.0, -13});
+  painter.camera({5, 2.0, -12});
   Texture metal;
   metal.gloss = 0.16;
   Texture fine = metal;
@@ -195,11 +197,16 @@ void paint_train(CapturePainter& painter) {
          earth);
   }
   for (int i = 0; i < 8; ++i) bush(painter, {-7.5 - 3 * hash_fraction(i, 7), 0.3, 1 + 4.5 * i}, 0.9, i, leaves);
+  for (int i = 0; i < 8; ++i) {  // behind the viewer
+    tree(painter, {-24 + 7.0 * i, 0, -24 - 8 * hash_fraction(i, 9)}, 8 + 3 * hash_fraction(i, 10), i + 40, leaves,
+         earth);
+    bush(painter, {-16 + 4.5 * i, 0.3, -14 - 4 * hash_fraction(i, 8)}, 1.0, i + 9, leaves);
+  }
   house(painter, {15, 0, 24}, 3.2, 4.5, 4.2, {0.66, 0.60, 0.48}, {0.42, 0.20, 0.16}, earth);
   for (int i = 0; i < 4; ++i) {
     const double z = 4 + 13.0 * i;
-    painter.cylinder({-6, 0, z}, {-6, 8, z}, 0.14, 0.10, rough({0.25, 0.18, 0.13}, {0.44, 0.35, 0.28}, 5), earth);
-    painter.box({-6, 7.4, z}, {1.0, 0.07, 0.07}, plain({0.30, 0.22, 0.16}), earth);
+    painter.cylinder({10, 0, z}, {10, 8, z}, 0.14, 0.10, rough({0.25, 0.18, 0.13}, {0.44, 0.35, 0.28}, 5), earth);
+    painter.box({10, 7.4, z}, {1.0, 0.07, 0.07}, plain({0.30, 0.22, 0.16}), earth);
   }
   Texture far = earth;
   far.size = 2.2;
@@ -214,7 +221,7 @@ void paint_train(CapturePainter& painter) {
   sky(painter, 230, 0.55, heaven);
   heaven.layers = 14;
   sky(painter, 300, 0.3, heaven);
-  painter.floaters({0, 2.5, 8}, {8, 2.5, 10}, 500, 1.5);
+  painter.floaters({0, 2.5, 8}, {8, 2.5, 10}, 200, 1.2);
 }
 
 }  // namespace vrpipe
