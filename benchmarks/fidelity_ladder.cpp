@@ -138,9 +138,10 @@ int run(const std::vector<std::string>& arguments) {
       repeat = std::max(1, std::stoi(arguments[++i]));
     } else if (arguments[i].rfind('-', 0) == 0) {
       const bool help = arguments[i] == "--help";
-      std::fprintf(help ? stdout : stderr,
-                   "usage: fidelity_ladder [--repeat N] [SCENE ...]\n"
-                   "SCENE: a file or builtin:NAME; without one the built-in scenes and the robot of tests/data\n");
+      std::fprintf(
+          help ? stdout : stderr,
+          "usage: fidelity_ladder [--repeat N] [SCENE ...]\n"
+          "SCENE: a file or builtin:NAME; without one the small built-in scenes and the robot of tests/data\n");
       return help ? 0 : 2;
     } else {
       scenes.emplace_back().scene = arguments[i];
@@ -149,7 +150,9 @@ int run(const std::vector<std::string>& arguments) {
   const bool all = scenes.empty();
   const testing::UnpackedFile robot("robot.ply");
   if (all) {
-    for (const std::string& name : builtin_scene_names()) scenes.emplace_back().scene = "builtin:" + name;
+    for (const BuiltinSceneInfo& info : builtin_scenes()) {
+      if (!info.stands_for) scenes.emplace_back().scene = "builtin:" + info.name;
+    }
     SceneRequest& request = scenes.emplace_back();
     request.scene = robot.path().string();
     request.size = ImageSize{640, 480};

@@ -15,6 +15,7 @@
 #include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/portable_math.h>
+#include <vrpipe/workloads/scene_substitution.h>
 
 namespace vrpipe {
 namespace {
@@ -173,7 +174,7 @@ void read_meshes(const SceneRequest& request, OpenedScene& scene) {
   }
 }
 
-bool is_builtin(const std::string& scene) { return scene.rfind(kBuiltinPrefix, 0) == 0; }
+bool is_builtin(const std::string& scene) { return scene.rfind(kBuiltinPrefix, 0) == 0 && !scene_substitution(scene); }
 
 std::string lower_case(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -188,6 +189,7 @@ std::string extension_of(const std::string& scene) {
 
 std::string scene_name(const std::string& scene) {
   if (scene.empty()) return kBuiltinPrefix + kDefaultBuiltinScene;
+  if (const auto in_place = scene_substitution(scene)) return in_place->name + "=" + scene_name(in_place->file);
   if (is_builtin(scene)) return scene;
   const std::filesystem::path path(scene);
   return (path.has_filename() ? path : path.parent_path()).filename().string();
@@ -196,6 +198,7 @@ std::string scene_name(const std::string& scene) {
 bool is_draw_list(const std::string& scene) { return !is_builtin(scene) && extension_of(scene) == ".spl"; }
 
 GaussianFile open_gaussians(const std::string& scene) {
+  if (const auto in_place = scene_substitution(scene)) return open_gaussians(in_place->file);
   const std::string name = scene_name(scene);
   if (is_builtin(name)) {
     GaussianFile file;
@@ -228,6 +231,15 @@ View view_of(const std::string& scene, const GaussianFile& gaussians) {
 }
 
 OpenedScene open_scene(const SceneRequest& request) {
+  if (const auto in_place = scene_substitution(request.scene)) {
+    // The size remains; the view does not fit another model.
+    SceneRequest of_file = request;
+    of_file.scene = in_place->file;
+    if (!request.size && !is_draw_list(in_place->file)) of_file.size = builtin_scene_named(in_place->name).size;
+    OpenedScene scene = open_scene(of_file);
+    scene.name = scene_name(request.scene);
+    return scene;
+  }
   if (request.size) check_image_size(request.size->width, request.size->height, "--size");
   OpenedScene scene;
   scene.name = scene_name(request.scene);

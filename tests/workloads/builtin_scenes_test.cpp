@@ -14,8 +14,10 @@ namespace {
 
 TEST(BuiltinScenes, AreNamedAndDescribedAndSizedAsInThePaper) {
   const auto& scenes = builtin_scenes();
-  ASSERT_EQ(scenes.size(), 4u);
-  EXPECT_EQ(builtin_scene_names(), (std::vector<std::string>{"object", "indoor", "outdoor", "courtyard"}));
+  ASSERT_EQ(scenes.size(), 12u);
+  EXPECT_EQ(builtin_scene_names(),
+            (std::vector<std::string>{"object", "indoor", "outdoor", "courtyard", "kitchen", "bonsai", "train", "truck",
+                                      "lego", "palace", "building", "rubble"}));
   EXPECT_EQ(scenes.front().name, kDefaultBuiltinScene);
   for (const BuiltinSceneInfo& info : scenes) {
     EXPECT_FALSE(info.description.empty());
@@ -123,6 +125,90 @@ INSTANTIATE_TEST_SUITE_P(All, BuiltinSceneMarks,
                                            Marks{"indoor", 1.5, 2.5, 0x6f4135ccdcff3eadu, 0x5996d84f7542c595u},
                                            Marks{"outdoor", 2.5, 4.4, 0xc2439b2563c49edfu, 0x1002638defa821d8u}),
                          [](const auto& parameter) { return parameter.param.name; });
+
+// Of the paper's table of workloads, and its section VII.
+TEST(StandIns, HaveSizeNumberAndKindOfThePapersScenes) {
+  struct Row {
+    const char *name, *paper, *dataset, *kind;
+    std::uint32_t width, height;
+    std::uint64_t gaussians;
+  };
+  const Row rows[] = {{"kitchen", "Kitchen", "Mip-NeRF 360", "indoor", 1552, 1040, 1850000},
+                      {"bonsai", "Bonsai", "Mip-NeRF 360", "indoor", 1552, 1040, 1240000},
+                      {"train", "Train", "Tanks&Temples", "outdoor", 980, 545, 1030000},
+                      {"truck", "Truck", "Tanks&Temples", "outdoor", 979, 546, 2540000},
+                      {"lego", "Lego", "Synthetic-NeRF", "synthetic", 800, 800, 358000},
+                      {"palace", "Palace", "Synthetic-NSVF", "synthetic", 800, 800, 327000},
+                      {"building", "Building", "Mega-NeRF", "aerial", 1152, 864, 9060000},
+                      {"rubble", "Rubble", "Mega-NeRF", "aerial", 1152, 864, 5210000}};
+  std::size_t stand_ins = 0;
+  for (const BuiltinSceneInfo& info : builtin_scenes()) stand_ins += info.stands_for.has_value();
+  EXPECT_EQ(stand_ins, std::size(rows));
+  for (const Row& row : rows) {
+    const BuiltinSceneInfo& info = builtin_scene_named(row.name);
+    ASSERT_TRUE(info.stands_for) << row.name;
+    EXPECT_EQ(info.stands_for->name, row.paper);
+    EXPECT_EQ(info.stands_for->dataset, row.dataset);
+    EXPECT_EQ(info.stands_for->kind, row.kind);
+    EXPECT_EQ(info.stands_for->gaussians, row.gaussians);
+    EXPECT_EQ(info.size.width, row.width) << row.name;
+    EXPECT_EQ(info.size.height, row.height) << row.name;
+  }
+}
+
+struct StandInMarks {
+  std::string name;
+  std::uint64_t scene_hash;            ///< the same with every compiler, optimisation level and processor
+  double least_visible, most_visible;  ///< share of all Gaussians
+};
+
+void PrintTo(const StandInMarks& marks, std::ostream* out) { *out << marks.name; }
+
+class StandIn : public ::testing::TestWithParam<StandInMarks> {};
+
+TEST_P(StandIn, HasThePapersNumberOfGaussiansAndTerminatesEarlyAsTrainedScenesDo) {
+  const StandInMarks& marks = GetParam();
+  const BuiltinScene builtin = make_builtin_scene(marks.name);
+  ASSERT_EQ(builtin.gaussians.size(), builtin.info.stands_for->gaussians);
+  EXPECT_EQ(hash_of(builtin.gaussians), marks.scene_hash) << std::hex << hash_of(builtin.gaussians);
+
+  // A third of the size has the same fragments per pixel, about, and takes a ninth of the time.
+  SceneSummary summary;
+  const ImageSize small = {builtin.info.size.width / 3, builtin.info.size.height / 3};
+  const Draw draw = preprocess(builtin.gaussians, look_at(builtin.info.view, small), {}, summary);
+  EXPECT_EQ(summary.rejected.total(), 0u);
+  const double visible = static_cast<double>(draw.splats.size()) / static_cast<double>(builtin.gaussians.size());
+  EXPECT_GE(visible, marks.least_visible);
+  EXPECT_LE(visible, marks.most_visible);
+
+  const testing::ReferenceImage whole = testing::render_reference(draw);
+  testing::ReferenceOptions options;
+  options.termination_threshold = 0.996;
+  const testing::ReferenceImage terminated = testing::render_reference(draw, options);
+  // "every scene shows an average ratio greater than 1.5", and at most nearly 4.4.
+  const double ratio = static_cast<double>(whole.fragments_blended) / static_cast<double>(terminated.fragments_blended);
+  EXPECT_GT(ratio, 1.5);
+  EXPECT_LT(ratio, 4.4);
+  std::size_t filled = 0;
+  for (const auto& rgba : whole.rgba) filled += rgba[3] > 0.9;
+  const double share = static_cast<double>(filled) / static_cast<double>(whole.rgba.size());
+  const bool synthetic = builtin.info.stands_for->kind == "synthetic";
+  EXPECT_GT(share, synthetic ? 0.3 : 0.95);
+  EXPECT_LT(share, synthetic ? 0.85 : 1.01) << "nothing surrounds a synthetic scene";
+}
+
+INSTANTIATE_TEST_SUITE_P(OfThePaper, StandIn,
+                         ::testing::Values(StandInMarks{"kitchen", 0x0u, 0.2, 0.7},
+                                           StandInMarks{"bonsai", 0x0u, 0.2, 0.7},
+                                           StandInMarks{"train", 0x0u, 0.3, 0.8}, StandInMarks{"truck", 0x0u, 0.2, 0.6},
+                                           StandInMarks{"lego", 0x0u, 0.9, 1.0},
+                                           StandInMarks{"palace", 0x0u, 0.9, 1.0}),
+                         [](const auto& parameter) { return parameter.param.name; });
+
+TEST(StandIns, AreTheSameWithAnyNumberOfThreads) {
+  const std::uint64_t one = hash_of(make_builtin_scene("palace", 1).gaussians);
+  EXPECT_EQ(hash_of(make_builtin_scene("palace", 3).gaussians), one);
+}
 
 }  // namespace
 }  // namespace vrpipe

@@ -10,6 +10,7 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/workloads/gaussian_file.h>
+#include <vrpipe/workloads/scene_substitution.h>
 
 #include "cli/parse.h"
 #include "host/crash_report.h"
@@ -99,9 +100,11 @@ void load_plugins(const Values& plugins) {
 }
 
 void SimulationArguments::declare(CLI::App& app, Variants variants) {
-  add_option(app, "--scene", scene_, "FILE|builtin:NAME",
+  add_option(app, "--scene", scene_, "FILE|builtin:NAME|NAME=FILE",
              "trained Gaussians (.ply, .splat, .spz, .sog, .ksplat ...), a .spl draw list,\n"
-             "or a built-in scene (default: builtin:object; `vrpipe scenes` lists them)",
+             "or a built-in scene (default: builtin:object; `vrpipe scenes` lists them);\n"
+             "with NAME=FILE the file takes the place of a built-in scene and has its\n"
+             "size: train=model.ply",
              scene_group);
   add_option(app, "--mesh", meshes_, "FILE",
              "an opaque triangle mesh that is drawn with the scene: .obj, .ply, .gltf or\n"
@@ -305,7 +308,7 @@ FrameDescription SimulationArguments::frame() const {
 std::vector<NamedFile> SimulationArguments::inputs(const FrameDescription& frame) const {
   std::vector<NamedFile> files;
   for (const FrameCommand& command : frame.commands) {
-    if (command.draw) files.push_back({command.where, gaussian_file_path(command.draw->scene)});
+    if (command.draw) files.push_back({command.where, gaussian_file_path(scene_file(command.draw->scene))});
   }
   for (const std::string& file : meshes_) files.push_back({"--mesh", file});
   for (const std::string& file : frame_) files.push_back({"--frame", file});

@@ -12,6 +12,7 @@
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/workloads/mesh.h>
 #include <vrpipe/workloads/scene.h>
+#include <vrpipe/workloads/scene_substitution.h>
 
 #include "file_io.h"
 
@@ -241,9 +242,15 @@ SceneDraw read_draw(const Json& command, const std::string& where, const std::fi
   SceneDraw draw;
   draw.scene = text_of(command["draw"], where + ", draw");
   const bool is_file = draw.scene.rfind("builtin:", 0) != 0;
-  if (is_file) draw.scene = (folder / draw.scene).lexically_normal().string();
-  draw.is_mesh =
-      is_file && !is_draw_list(draw.scene) && std::filesystem::is_regular_file(draw.scene) && is_mesh_file(draw.scene);
+  const auto in_folder = [&folder](const std::string& file) { return (folder / file).lexically_normal().string(); };
+  const auto in_place = scene_substitution(draw.scene);
+  if (in_place) {
+    draw.scene = in_place->name + "=" + in_folder(in_place->file);
+  } else if (is_file) {
+    draw.scene = in_folder(draw.scene);
+  }
+  draw.is_mesh = is_file && !in_place && !is_draw_list(draw.scene) && std::filesystem::is_regular_file(draw.scene) &&
+                 is_mesh_file(draw.scene);
   if (draw.is_mesh && command.contains("splats")) {
     refuse(where + ", splats", "it is a mesh, which has none", "leave it out");
   }

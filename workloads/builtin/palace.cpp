@@ -51,7 +51,8 @@ void paint_palace(CapturePainter& painter) {
     };
   };
   const auto battlements = [&](const Vec3& from, const Vec3& step, int count, double size) {
-    for (int i = 0; i < count; ++i) painter.box(from + step * static_cast<double>(i), Vec3{1, 1.1, 1} * size, plain(sand * 1.05), fine);
+    for (int i = 0; i < count; ++i)
+      painter.box(from + step * static_cast<double>(i), Vec3{1, 1.1, 1} * size, plain(sand * 1.05), fine);
   };
   const auto dome = [&](const Vec3& foot, double radius, double height, const Vec3& colour) {
     const Surface onion = [=](double u, double v) {

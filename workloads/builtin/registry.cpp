@@ -60,10 +60,10 @@ const std::vector<Entry>& entries() {
                {{-2.3, -1.9, -2.75}, {0, -0.62, 0}, {0, -1, 0}, 39.6},
                {"Palace", "Synthetic-NSVF", "synthetic", 327'000}, paint_palace),
       stand_in("building", "a factory among yards, roads and trees, from the air, 1152x864", {1152, 864},
-               {{-95, -88, -130}, {8, -4, 6}, {0, -1, 0}, 50}, {"Building", "Mega-NeRF", "aerial", 9'060'000},
+               {{-84, -118, -108}, {6, -4, 2}, {0, -1, 0}, 50}, {"Building", "Mega-NeRF", "aerial", 9'060'000},
                paint_building, 0),
       stand_in("rubble", "a heap of rubble between excavators, trees and a road, from the air, 1152x864", {1152, 864},
-               {{-62, -52, -84}, {3, -3, 4}, {0, -1, 0}, 50}, {"Rubble", "Mega-NeRF", "aerial", 5'210'000},
+               {{-48, -60, -66}, {2, -3, 3}, {0, -1, 0}, 50}, {"Rubble", "Mega-NeRF", "aerial", 5'210'000},
                paint_rubble, 0)};
   return all;
 }

@@ -12,7 +12,11 @@ void paint_train(CapturePainter& painter) {
   painter.camera({-6, 2.0, 13});
   painter.camera({6, 2.0, 14});
   painter.camera({-5, 4.5, 2});
+  painter.camera({-13, 2.0, 12});
+  painter.camera({-12, 2.0, 26});
   painter.camera({-4, 2.0, -13});
+  painter.camera({-10, 2.0, -17});
+  painter.camera({12, 2.0, -14});
   painter.camera({5, 2.0, -12});
   Texture metal;
   metal.gloss = 0.16;
@@ -184,9 +188,9 @@ void paint_train(CapturePainter& painter) {
 
   // Trees, a shed, poles with wires, hills, sky.
   Texture leaves;
-  leaves.layers = 20;
+  leaves.layers = 28;
   leaves.opaque = 0.4;
-  leaves.size = 1.2;
+  leaves.size = 0.8;
   for (int i = 0; i < 9; ++i) {
     const double key = i;
     tree(painter, {-20 + 4.0 * hash_fraction(key, 1), 0, -6 + 7.5 * i}, 6.5 + 4 * hash_fraction(key, 2), key, leaves,

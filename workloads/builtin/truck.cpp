@@ -14,6 +14,10 @@ void paint_truck(CapturePainter& painter) {
   painter.camera({9, 1.7, -8});
   painter.camera({10, 1.7, 7});
   painter.camera({-10, 1.7, 7});
+  painter.camera({0, 1.7, -15});
+  painter.camera({-14, 1.7, -15});
+  painter.camera({14, 1.7, -15});
+  painter.camera({-17, 1.7, -2});
   Texture metal;
   metal.gloss = 0.16;
   Texture fine = metal;

@@ -16,8 +16,8 @@ namespace vrpipe {
 
 /// What the user asked to draw; field by field the options --scene, --size, --camera, --eye, --look-at, --up, --fovy.
 struct SceneRequest {
-  std::string
-      scene;  ///< a file of Gaussians, see read_gaussian_file(); FILE.spl; or builtin:NAME; empty: builtin:object
+  /// A file of Gaussians, see read_gaussian_file(); FILE.spl; builtin:NAME; or NAME=FILE. Empty: builtin:object.
+  std::string scene;
   std::optional<ImageSize> size;
   std::optional<std::string> camera;  ///< as camera_from_file takes it; excludes the four below
   std::optional<Vec3> eye;
@@ -39,7 +39,7 @@ struct LoadedScene {
   Draw draw;
   std::vector<Draw> meshes;              ///< those of the built-in scene, then those of the files; see mixed_frame()
   RejectedTriangles rejected_triangles;  ///< of all meshes
-  SceneSummary summary;                  ///< name: the file's name without folder, or builtin:NAME
+  SceneSummary summary;                  ///< name: see scene_name()
   std::optional<Viewpoint> viewpoint;    ///< none for a draw list
   bool preprocessed_here = false;        ///< false for a draw list
 };
@@ -59,7 +59,8 @@ struct OpenedScene {
   std::vector<std::string> notes;  ///< as GaussianFile has them
 };
 
-/// The name that results give to the scene of SceneRequest::scene: the file's without folder, or builtin:NAME.
+/// The name that results give to the scene of SceneRequest::scene: the file's without folder, builtin:NAME, or NAME= and
+/// the file's without folder.
 std::string scene_name(const std::string& scene);
 
 /// Whether a scene is a draw list (.spl), which has a size and no camera.
@@ -80,6 +81,8 @@ View view_of(const std::string& scene, const GaussianFile& gaussians);
 /// three median sigmas at least), from the front (-z), 30 degrees to the left and 20 degrees above, with the world's
 /// up where the file says it is, else at 0,-1,0 (y points down, as in INRIA and COLMAP worlds; give --up 0,1,0 for y-up
 /// files), and a vertical field of view of 50 degrees. A scene so far out that a camera beside it rounds to where it is gets none.
+/// NAME=FILE: the file in the place of the built-in scene NAME, whose size it has unless the request gives one; see
+/// scene_substitution(). The view is that of a file.
 /// .spl: the draw as it is; size, camera, view options, meshes and preprocessing other than the default are
 /// refused.
 /// @throws UserError for whatever cannot be used
