@@ -101,7 +101,7 @@ class Views : public ToolTest {
       gaussian.f_dc = {1, 0.2F, -0.5F};
       builder.add(gaussian);
     }
-    write_gaussian_ply(folder() / "cloud.ply", builder.build());
+    write_gaussian_file(folder() / "cloud.ply", builder.build());
     write("cameras.json", cameras().dump());
   }
 

@@ -24,7 +24,8 @@ TEST(SceneSubstitution, IsANameAndAFile) {
 }
 
 TEST(SceneSubstitution, APathWithAnEqualsSignIsAPath) {
-  for (const char* text : {"", "builtin:train", "a.ply", "./train=a.ply", "x/train=a.ply", "a.b=c.ply", "=a.ply"}) {
+  for (const char* text :
+       {"", "builtin:train", "a.ply", "./train=a.ply", "x/train=a.ply", "a.b=c.ply", "=a.ply", "scene#lod=2"}) {
     EXPECT_FALSE(scene_substitution(text)) << text;
     EXPECT_EQ(scene_file(text), text);
   }
@@ -56,7 +57,7 @@ class SubstitutedScene : public testing::FolderTest {
     std::vector<GaussianAttributes> gaussians(3, testing::ordinary_gaussian());
     gaussians[1].position = {1, 0, 6};
     gaussians[2].position = {0, 1, 5};
-    write_gaussian_ply(file_, testing::scene_of(gaussians));
+    write_gaussian_file(file_, testing::scene_of(gaussians));
   }
   const std::string file_ = in_folder("model.ply").string();
 };

@@ -17,6 +17,8 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>
+#include <vrpipe/workloads/gaussian_file.h>
+#include <vrpipe/workloads/scene_substitution.h>
 
 #include "for_each_chunk.h"
 #include "host/progress_line.h"
@@ -104,6 +106,8 @@ json file_identity(const std::string& name) {
   return all;
 }
 
+json scene_identity(const std::string& scene) { return file_identity(gaussian_file_path(scene_file(scene))); }
+
 std::string sha256(const std::string& text) {
   std::array<char, SHA256_DIGEST_STRING_LENGTH> digits{};
   ::SHA256Data(reinterpret_cast<const std::uint8_t*>(text.data()), text.size(), digits.data());
@@ -170,7 +174,8 @@ json identity(const SimulationJob& job, const ViewsResult& result) {
           {"version", VRPIPE_VERSION},
           {"build", build_identity()},
           {"plugins", plugins},
-          {"scene", is_builtin ? json(result.scene) : file_identity(job.scene.scene)},
+          {"scene",
+           is_builtin ? json(result.scene) : json{valid_utf8(job.scene.scene), scene_identity(job.scene.scene)}},
           {"meshes", meshes},
           {"cameras", cameras_identity(result)},
           {"settings", settings_identity(job)},
@@ -197,7 +202,8 @@ json to_record(const ViewResult& view) {
             {"not_finite", scene.rejected.not_finite},
             {"zero_quaternion", scene.rejected.zero_quaternion},
             {"triangles", scene.triangles},
-            {"triangles_rejected", scene.triangles_rejected}}},
+            {"triangles_rejected", scene.triangles_rejected},
+            {"notes", scene.notes}}},
           {"runs", runs}};
 }
 
@@ -213,6 +219,7 @@ void from_record(const json& record, const std::vector<RunRequest>& requests, Vi
   scene.at("zero_quaternion").get_to(summary.rejected.zero_quaternion);
   scene.at("triangles").get_to(summary.triangles);
   scene.at("triangles_rejected").get_to(summary.triangles_rejected);
+  scene.at("notes").get_to(summary.notes);
   std::vector<RunResult> results;
   for (std::size_t i = 0; i < requests.size(); ++i) {
     results.push_back(decode(with_binaries(runs[i]), requests[i]));
