@@ -52,8 +52,27 @@ TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
   expect_in(vrpipe({"accuracy", "--help"}).out, {"--quick", "--repeat", "--html", "--markdown"});
   expect_in(vrpipe({"units", "--help"}).out, {"--slot", "--platform", "--plugin", "--effects", "--json", "--markdown"});
   expect_in(vrpipe({"platforms", "--help"}).out, {"--plugin", "--json"});
-  expect_in(vrpipe({"scenes", "--help"}).out, {"[FILE]", "--preview", "--json"});
+  expect_in(vrpipe({"scenes", "--help"}).out,
+            {"[FILE]", "--preview", "--json", "--measure", "--scene NAME|NAME=FILE"});
   expect_in(vrpipe({"convert", "--help"}).out, {"IN", "OUT", ".splat"});
+}
+
+TEST_F(CommandLine, ScenesAreMeasuredByTheirCounts) {
+  const nlohmann::json measured = json_of({"scenes", "--measure", "--scene", "courtyard", "--scene", "lego=tiny.spl"});
+  EXPECT_EQ(measured["schema"], "vrpipe.scene_measurements/1");
+  ASSERT_EQ(measured["scenes"].size(), 2u);
+  const nlohmann::json& list = measured["scenes"][1];
+  EXPECT_EQ(list["name"], "lego=tiny.spl");
+  const nlohmann::json run =
+      json_of({"run", "--scene", "tiny.spl", "--variant", "baseline", "--fidelity", "functional"});
+  EXPECT_EQ(list["fragments_rasterized"], run["runs"][0]["counts"]["fragments_rasterized"]);
+  EXPECT_EQ(list["quads_rasterized"], run["runs"][0]["counts"]["quads_rasterized"]);
+  EXPECT_EQ(list["fragments_blended"], run["runs"][0]["counts"]["fragments_blended"]);
+  EXPECT_GT(measured["scenes"][0]["early_termination_ratio"], 1.0);
+  EXPECT_LT(measured["scenes"][0]["splat_side_median_pixels"], measured["scenes"][0]["splat_side_90_percent_pixels"]);
+  expect_in(vrpipe({"scenes", "--scene", "lego"}).err, {"--scene", "add --measure"});
+  expect_in(vrpipe({"scenes", "--measure", "--scene", "leggo"}).err, {"builtin:lego?"});
+  expect_in(vrpipe({"scenes", "--measure", "--scene", "lego", "--scene", "lego=tiny.spl"}).err, {"option given twice"});
 }
 
 TEST_F(CommandLine, NegativeNumbersAreValues) {
@@ -69,6 +88,9 @@ TEST_F(CommandLine, ScenesPlatformsAndUnitsListEverything) {
     expect_in(scenes, {"builtin:" + scene.name, scene.description});
     EXPECT_NE(scenes_json.dump().find("builtin:" + scene.name), std::string::npos);
   }
+  expect_in(scenes, {"stands in for the paper's Train (Tanks&Temples, outdoor), 1,030,000 Gaussians"});
+  EXPECT_EQ(scenes_json["scenes"][6]["stands_for"]["gaussians"], 1030000);
+  EXPECT_TRUE(scenes_json["scenes"][0]["stands_for"].is_null());
   EXPECT_EQ(scenes_json["schema"], "vrpipe.scenes/1");
 
   const std::string text = vrpipe({"platforms"}).out;
