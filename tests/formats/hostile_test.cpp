@@ -456,6 +456,8 @@ TEST(TarPits, AreReadInAMoment) {
   expect_refused("a.ply", "ply\ncomment " + std::string(std::size_t{4} << 20U, 'x'), {"`end_header`"});
 
   expect_refused("meta.json", std::string(1000000, '['), {"at byte 1000001", "no JSON"});
+  expect_user_error([] { read_scene(scene_file("meta.json", std::string(std::size_t{65} << 20U, ' '))); },
+                    {"its JSON has 68157440 bytes", "up to 64 MiB"});
   std::string deep;
   for (int i = 0; i < 100000; ++i) deep += "{\"children\":[";
   deep += "{}";
