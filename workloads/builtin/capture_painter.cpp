@@ -117,7 +117,7 @@ void CapturePainter::cylinder(const Vec3& base, const Vec3& top, double base_rad
   const Vec3 axis = unit(top - base);
   const double inner = 0.7 * std::min(base_radius, top_radius);
   Vec3 half = (top - base) * 0.5;
-  for (int i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; i < 3; ++i) {
     half[i] = std::fabs(half[i]) + inner * std::sqrt(std::max(0.0, 1 - axis[i] * axis[i]));
   }
   // Of a slanted one the box would be far too large.
@@ -321,7 +321,7 @@ void CapturePainter::splat(const Stroke& stroke, const Cell& cell, const Surface
   *record++ = static_cast<float>(position[0]);
   *record++ = static_cast<float>(-position[1]);
   *record++ = static_cast<float>(position[2]);
-  for (int channel = 0; channel < 3; ++channel) *record++ = static_cast<float>((colour[channel] - 0.5) / kShC0);
+  for (std::size_t channel = 0; channel < 3; ++channel) *record++ = static_cast<float>((colour[channel] - 0.5) / kShC0);
   *record++ = static_cast<float>(logit);
   *record++ = static_cast<float>(log_t);
   *record++ = static_cast<float>(log_b);
@@ -332,8 +332,8 @@ void CapturePainter::splat(const Stroke& stroke, const Cell& cell, const Surface
   const Vec3 mirrored = normal * (2 * facing) - to_sun_;
   const double strength = texture.gloss * (facing > 0 ? 1.0 : 0.3);
   const Vec3 lobe = {-strength * mirrored[1], -strength * mirrored[2], strength * mirrored[0]};
-  for (int channel = 0; channel < 3; ++channel) {
-    for (int c = 0; c < 3; ++c) *record++ = static_cast<float>((lobe[c] + 0.01 * bell(random)) / kShC1);
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    for (std::size_t c = 0; c < 3; ++c) *record++ = static_cast<float>((lobe[c] + 0.01 * bell(random)) / kShC1);
   }
 }
 
