@@ -233,6 +233,16 @@ TEST_F(FrameFile, AMeshOfTheCommandLineMakesAMixedFrame) {
   refused({"run", "--scene", "four.ply", "--mesh", "wall.obj", "--json", "wall.obj"}, {"--mesh", "same file"});
 }
 
+TEST_F(FrameFile, AFileInThePlaceOfABuiltInSceneIsRelativeToTheFileToo) {
+  std::filesystem::create_directory(folder() / "frames");
+  write("frames/lego.json", R"({"commands": [{"draw": "lego=../four.ply"}]})");
+  const json in_frame = json_of({"run", "--frame", "frames/lego.json", "--size", "48x40"});
+  const json alone = json_of({"run", "--scene", "lego=four.ply", "--size", "48x40"});
+  EXPECT_EQ(in_frame["runs"][0]["result_hash"], alone["runs"][0]["result_hash"]);
+  EXPECT_EQ(alone["scene"]["name"], "lego=four.ply");
+  refused({"run", "--scene", "lego=four.ply", "--json", "four.ply"}, {"--scene four.ply", "same file"});
+}
+
 TEST_F(FrameFile, ScenesShareACameraAndAreRelativeToTheFile) {
   std::filesystem::create_directory(folder() / "frames");
   write("frames/both.json", R"({"commands": [{"draw": "../four.ply"}, {"draw": "builtin:object"}]})");
