@@ -28,7 +28,8 @@ TEST_F(CommandLine, VersionAndHelp) {
   const Finished help = vrpipe({"--help"});
   EXPECT_EQ(help.code, 0);
   EXPECT_EQ(help.err, "");
-  expect_in(help.out, {"run", "compare", "accuracy", "convert", "scenes", "platforms", "units", "--version", "Exit code"});
+  expect_in(help.out,
+            {"run", "compare", "accuracy", "convert", "scenes", "platforms", "units", "--version", "Exit code"});
 }
 
 TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
@@ -52,8 +53,7 @@ TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
   expect_in(vrpipe({"accuracy", "--help"}).out, {"--quick", "--repeat", "--html", "--markdown"});
   expect_in(vrpipe({"units", "--help"}).out, {"--slot", "--platform", "--plugin", "--effects", "--json", "--markdown"});
   expect_in(vrpipe({"platforms", "--help"}).out, {"--plugin", "--json"});
-  expect_in(vrpipe({"scenes", "--help"}).out,
-            {"[FILE]", "--preview", "--json", "--measure", "--scene NAME|NAME=FILE"});
+  expect_in(vrpipe({"scenes", "--help"}).out, {"[FILE]", "--preview", "--json", "--measure", "--scene NAME|NAME=FILE"});
   expect_in(vrpipe({"convert", "--help"}).out, {"IN", "OUT", ".splat"});
 }
 
