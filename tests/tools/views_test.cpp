@@ -8,6 +8,7 @@
 #include <numeric>
 #include <thread>
 
+#include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 
 #include "documented_keys.h"
