@@ -22,8 +22,12 @@ class ConvertCommand : public Command {
   std::string summary() const override { return "a scene in another format"; }
 
   void declare(CLI::App& app) override {
-    app.add_option("IN", in_, "a file of Gaussians, or builtin:NAME; `vrpipe scenes` lists the formats")->required();
-    app.add_option("OUT", out_, "FILE.ply, as INRIA writes it, attributes bit for bit; or FILE.splat")->required();
+    app.add_option("IN", in_, "a file of Gaussians, or builtin:NAME; `vrpipe scenes` lists the formats")
+        ->required()
+        ->type_name("");
+    app.add_option("OUT", out_, "FILE.ply, as INRIA writes it, attributes bit for bit; or FILE.splat")
+        ->required()
+        ->type_name("");
     app.footer(
         "Reads any format and writes INRIA's .ply, or .splat, in whose bytes colours and rotations are rounded.\n"
         "\n"

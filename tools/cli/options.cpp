@@ -35,7 +35,11 @@ class HelpFormatter : public CLI::Formatter {
   }
   std::string make_usage(const CLI::App* app, std::string name) const override {
     const std::string full = name.empty() ? app->get_name() : name;
-    return "\nUsage: " + full + (app->get_subcommands({}).empty() ? " [OPTIONS]" : " COMMAND [OPTIONS]") + "\n";
+    std::string text = "\nUsage: " + full + (app->get_subcommands({}).empty() ? " [OPTIONS]" : " COMMAND [OPTIONS]");
+    for (const CLI::Option* option : app->get_options([](const CLI::Option* each) { return each->get_positional(); })) {
+      text += option->get_required() ? " " + option->get_name(true) : " [" + option->get_name(true) + "]";
+    }
+    return text + "\n";
   }
 };
 

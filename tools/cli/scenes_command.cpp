@@ -36,7 +36,7 @@ class ScenesCommand : public Command {
   }
 
   void declare(CLI::App& app) override {
-    app.add_option("FILE", file_, "a file of Gaussians to look into, or builtin:NAME");
+    app.add_option("FILE", file_, "a file of Gaussians to look into, or builtin:NAME")->type_name("");
     app.add_flag("--measure", measure_,
                  "instead of the list, a table of what each scene asks of the pipeline:\n"
                  "fragments per pixel, sizes of splats, early-termination ratio; takes a few\n"

@@ -106,7 +106,13 @@ json file_identity(const std::string& name) {
   return all;
 }
 
-json scene_identity(const std::string& scene) { return file_identity(gaussian_file_path(scene_file(scene))); }
+/// Its files, and what of them is taken.
+json scene_identity(const std::string& scene) {
+  json identity = file_identity(gaussian_file_path(scene_file(scene)));
+  if (!identity.is_object()) identity = {{"files", identity}};
+  identity["scene"] = valid_utf8(scene);
+  return identity;
+}
 
 std::string sha256(const std::string& text) {
   std::array<char, SHA256_DIGEST_STRING_LENGTH> digits{};
