@@ -77,6 +77,7 @@ TEST_F(Scenes, ThatCannotBeLookedIntoAreRefused) {
   refused({"scenes", "nowhere.ply"}, {"nowhere.ply", "no such file"});
   refused({"scenes", "--preview", "a.png"}, {"--preview", "no file is named"});
   refused({"scenes", "ball.ply", "--preview", "ball.ply"}, {"--preview", "ball.ply"});
+  refused({"scenes", "train=ball.ply", "--preview", "ball.ply"}, {"--preview", "ball.ply"});
   refused({"scenes", "ball.ply", "--preview", "a.png", "--json", "a.png"}, {"--json", "a.png"});
   refused({"scenes", "ball.ply#lod=1"}, {"INRIA .ply", "lod"});
   write_gaussian_file(folder() / "none.ply", GaussianScene());
@@ -109,6 +110,7 @@ TEST_F(Convert, RefusesWhatItCannotReadOrWrite) {
   refused({"convert", "tiny.spl", "out.ply"}, {"draw list"});
   refused({"convert", "ball.ply", "out.sog"}, {"out.sog", ".ply or .splat"});
   refused({"convert", "ball.ply", "ball.ply"}, {"ball.ply"});
+  refused({"convert", "train=ball.ply", "ball.ply"}, {"ball.ply"});
   refused({"convert", "ball.ply", "nowhere/out.ply"}, {"nowhere"});
   refused({"convert", "ball.ply"}, {"OUT"});
 }

@@ -7,6 +7,7 @@
 #include <vrpipe/component/printable.h>
 #include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/scene.h>
+#include <vrpipe/workloads/scene_substitution.h>
 
 #include "cli/command_line.h"
 #include "cli/options.h"
@@ -39,7 +40,7 @@ class ConvertCommand : public Command {
 
   void run() override {
     check_output_file(out_, "OUT");
-    check_files_differ({{"IN", gaussian_file_path(in_)}}, {{"OUT", out_}});
+    check_files_differ({{"IN", gaussian_file_path(scene_file(in_))}}, {{"OUT", out_}});
     const GaussianFile scene = open_gaussians(in_);
     for (const std::string& note : scene.notes) std::cerr << "note: " << printable(note) << "\n";
     for (const std::string& note : write_gaussian_file(out_, scene.gaussians)) {

@@ -10,6 +10,7 @@
 #include <vrpipe/component/printable.h>
 #include <vrpipe/workloads/scene.h>
 #include <vrpipe/workloads/scene_description.h>
+#include <vrpipe/workloads/scene_substitution.h>
 
 #include "cli/listing.h"
 #include "host/output_file.h"
@@ -98,9 +99,11 @@ void draw_preview(const std::string& scene, GaussianFile&& file, const View& vie
 
 SceneListing describe_scene(const std::string& scene, const std::optional<std::string>& preview,
                             const TextStyle& style) {
-  if (preview) check_output_file(*preview, "--preview");
+  if (preview) {
+    check_output_file(*preview, "--preview");
+    check_files_differ({{"FILE", gaussian_file_path(scene_file(scene))}}, {{"--preview", *preview}});
+  }
   GaussianFile file = open_gaussians(scene);
-  if (preview) check_files_differ({{"FILE", gaussian_file_path(scene)}}, {{"--preview", *preview}});
   const SceneDescription description = describe(file.gaussians);
   const std::string name = scene_name(scene);
   SceneListing listing;
