@@ -28,31 +28,6 @@ constexpr int kProbes = 6;
 /// Patches that are planned or painted at a time.
 constexpr std::size_t kPatches = 64;
 
-constexpr std::size_t kFloats = 14;
-
-/// x y z, f_dc, opacity, scale, rot, f_rest.
-GaussianLayout layout_of(int sh_degree) {
-  GaussianLayout layout;
-  std::uint32_t offset = 0;
-  const auto next = [&offset] {
-    const std::uint32_t here = offset;
-    offset += 4;
-    return here;
-  };
-  for (auto& o : layout.position) o = next();
-  for (auto& o : layout.f_dc) o = next();
-  layout.opacity = next();
-  for (auto& o : layout.log_scale) o = next();
-  for (auto& o : layout.rotation) o = next();
-  const std::size_t rest = 3 * std::size_t{kShRestPerChannel[static_cast<std::size_t>(sh_degree)]};
-  for (std::size_t i = 0; i < rest; ++i) layout.f_rest[i] = next();
-  return layout;
-}
-
-std::size_t floats_of(int sh_degree) {
-  return kFloats + 3 * std::size_t{kShRestPerChannel[static_cast<std::size_t>(sh_degree)]};
-}
-
 /// Another stream for each patch and each purpose.
 RandomStream stream_of(std::uint64_t seed, std::uint64_t purpose, std::uint64_t index) {
   RandomStream mixer(seed ^ (purpose * 0xd1342543de82ef95u + index * 0xaf251af3b0f025b5u));
@@ -240,8 +215,8 @@ void CapturePainter::weigh(Cell& cell, RandomStream& random, const Tools& tools)
   cell.partly_seen = visible > 0 && visible < kProbes;
 }
 
-void CapturePainter::splat(const Stroke& stroke, const Cell& cell, const SurfacePoint& point, double u, double v,
-                           double scale, RandomStream& random, const Tools& tools, float* record) const {
+GaussianAttributes CapturePainter::splat(const Stroke& stroke, const Cell& cell, const SurfacePoint& point, double u,
+                                         double v, double scale, RandomStream& random, const Tools& tools) const {
   const Texture& texture = stroke.texture;
   const Vec3& normal = point.normal;
   const double spacing = pixel_angle_ * cell.distance;
@@ -318,29 +293,32 @@ void CapturePainter::splat(const Stroke& stroke, const Cell& cell, const Surface
     logit = -2.6 + 0.8 * bell(random);
   }
 
-  *record++ = static_cast<float>(position[0]);
-  *record++ = static_cast<float>(-position[1]);
-  *record++ = static_cast<float>(position[2]);
-  for (std::size_t channel = 0; channel < 3; ++channel) *record++ = static_cast<float>((colour[channel] - 0.5) / kShC0);
-  *record++ = static_cast<float>(logit);
-  *record++ = static_cast<float>(log_t);
-  *record++ = static_cast<float>(log_b);
-  *record++ = static_cast<float>(log_size + portable_log(texture.thickness) + 0.4 * bell(random));
-  for (const double component : q) *record++ = static_cast<float>(component);
-  if (sh_degree_ == 0) return;
+  GaussianAttributes gaussian;
+  gaussian.position = {static_cast<float>(position[0]), static_cast<float>(-position[1]),
+                       static_cast<float>(position[2])};
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    gaussian.f_dc[channel] = static_cast<float>((colour[channel] - 0.5) / kShC0);
+  }
+  gaussian.opacity_logit = static_cast<float>(logit);
+  gaussian.log_scale = {static_cast<float>(log_t), static_cast<float>(log_b),
+                        static_cast<float>(log_size + portable_log(texture.thickness) + 0.4 * bell(random))};
+  for (std::size_t i = 0; i < q.size(); ++i) gaussian.rotation[i] = static_cast<float>(q[i]);
+  if (sh_degree_ == 0) return gaussian;
   // Degree 1: brighter when seen along the mirrored sun ray.
   const Vec3 mirrored = normal * (2 * facing) - to_sun_;
   const double strength = texture.gloss * (facing > 0 ? 1.0 : 0.3);
   const Vec3 lobe = {-strength * mirrored[1], -strength * mirrored[2], strength * mirrored[0]};
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    for (std::size_t c = 0; c < 3; ++c) *record++ = static_cast<float>((lobe[c] + 0.01 * bell(random)) / kShC1);
+    for (std::size_t c = 0; c < 3; ++c) {
+      gaussian.f_rest[channel][c] = static_cast<float>((lobe[c] + 0.01 * bell(random)) / kShC1);
+    }
   }
+  return gaussian;
 }
 
 void CapturePainter::paint(const Cell& cell, double scale, RandomStream& random, const Tools& tools,
-                           float* records) const {
+                           GaussianArray& gaussians) const {
   const Stroke& stroke = strokes_[cell.stroke];
-  const std::size_t stride = floats_of(sh_degree_);
   for (std::uint64_t i = 0; i < cell.count; ++i) {
     double u = 0, v = 0;
     SurfacePoint p{};
@@ -349,7 +327,7 @@ void CapturePainter::paint(const Cell& cell, double scale, RandomStream& random,
       p = point(stroke, cell, random, u, v);
       if (!cell.partly_seen || seen(p, tools) || random.uniform() < hidden_share_) break;
     }
-    splat(stroke, cell, p, u, v, scale, random, tools, records + i * stride);
+    gaussians.set(cell.first + i, splat(stroke, cell, p, u, v, scale, random, tools));
   }
 }
 
@@ -421,17 +399,14 @@ GaussianScene CapturePainter::build(std::uint64_t count, unsigned threads) {
   }
   const double scale = std::sqrt(total / spread);
 
-  const std::size_t stride = floats_of(sh_degree_);
-  // Not cleared first: every float is written.
-  const std::shared_ptr<float[]> records(new float[count * stride]);
+  GaussianArray gaussians(count, sh_degree_, "a built-in scene");
   for_each_chunk(chunks, threads, [&](std::uint64_t chunk) {
     of_chunk(chunk, [&](std::size_t i) {
       RandomStream random = stream_of(seed_, 2, i);
-      paint(cells[i], scale, random, tools, records.get() + cells[i].first * stride);
+      paint(cells[i], scale, random, tools, gaussians);
     });
   });
-  return GaussianScene(records, reinterpret_cast<const std::byte*>(records.get()), count, stride * sizeof(float),
-                       layout_of(sh_degree_), sh_degree_);
+  return gaussians.build();
 }
 
 }  // namespace vrpipe

@@ -101,9 +101,9 @@ class CapturePainter {
   void weigh(Cell& cell, RandomStream& random, const Tools& tools) const;
   SurfacePoint point(const Stroke& stroke, const Cell& cell, RandomStream& random, double& u, double& v) const;
   bool seen(const SurfacePoint& point, const Tools& tools) const;
-  void paint(const Cell& cell, double scale, RandomStream& random, const Tools& tools, float* records) const;
-  void splat(const Stroke& stroke, const Cell& cell, const SurfacePoint& point, double u, double v, double scale,
-             RandomStream& random, const Tools& tools, float* record) const;
+  void paint(const Cell& cell, double scale, RandomStream& random, const Tools& tools, GaussianArray& gaussians) const;
+  GaussianAttributes splat(const Stroke& stroke, const Cell& cell, const SurfacePoint& point, double u, double v,
+                           double scale, RandomStream& random, const Tools& tools) const;
 
   std::uint64_t seed_;
   RandomStream random_;
