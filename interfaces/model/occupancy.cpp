@@ -21,10 +21,10 @@ std::vector<WorkKind> TgcWork::kinds(const Throughput& timing) {
 }
 
 std::vector<WorkKind> RasterWork::kinds(const RasterBehaviour::TimingParameters& timing) {
-  return {{"set-up", 0, static_cast<double>(timing.setup_interval_cycles), false},
+  return {{"set-up", 0, timing.setup_interval_thousandths * per(1000), false},
           {"coarse tests", 1, per(timing.coarse_tiles_per_cycle), false},
           {"fine tiles", 2, per(timing.fine_tiles_per_cycle), false},
-          {"screen tiles", 3, static_cast<double>(timing.screen_tile_interval_cycles), false},
+          {"screen tiles", 3, timing.screen_tile_interval_thousandths * per(1000), false},
           {"quads", 4, per(timing.quads_per_cycle), throughput}};
 }
 
@@ -43,8 +43,10 @@ std::vector<WorkKind> PropWork::kinds(const PropBehaviour::TimingParameters& tim
 std::vector<WorkKind> ZropWork::kinds(const ZropBehaviour::TimingParameters& timing) {
   return {{"tests", 0, per(timing.quads_per_cycle), throughput},
           {"updates", 0, 1.0, false},
-          {"sectors", 0, per(timing.z_cache.sectors_per_cycle), false},
-          {"late tests", 0, per(timing.quads_per_cycle), throughput}};
+          {timing.z_cache.line_thousandths == 0 ? "sectors" : "lines", 0, per(timing.z_cache.moves_in_a_cycle()),
+           false},
+          {"late tests", 0, per(timing.quads_per_cycle), throughput},
+          {"blocks", 0, per(1000), false}};
 }
 
 std::vector<WorkKind> QruWork::kinds(const Throughput& timing) {
@@ -53,13 +55,18 @@ std::vector<WorkKind> QruWork::kinds(const Throughput& timing) {
 
 std::vector<WorkKind> SmWork::kinds(const SmBehaviour::TimingParameters& timing) {
   const double issue = per(timing.instructions_per_cycle());
-  return {{"vertices", 0, issue, throughput}, {"fragments", 0, issue, throughput}, {"merging", 0, issue, throughput}};
+  return {{"vertices", 0, issue, throughput},
+          {"fragments", 0, issue, throughput},
+          {"merging", 0, issue, throughput},
+          {"launches", 1, per(1000), false}};
 }
 
 std::vector<WorkKind> CropWork::kinds(const CropBehaviour::TimingParameters& timing) {
   return {{"blend", 0, per(timing.blend_rate.per_cycle()), throughput},
-          {"sectors", 0, per(timing.sectors_per_cycle), false},
-          {"forwarding", 0, 1.0 / static_cast<double>(parts_of_a_cycle(timing)), false}};
+          {timing.line_cycles == 0 ? "sectors" : "lines", 0, timing.parts_of_a_move() * per(timing.moves_in_a_cycle()),
+           false},
+          {"forwarding", 0, 1.0 / static_cast<double>(parts_of_a_cycle(timing)), false},
+          {"unpaired", 0, 1.0 / static_cast<double>(parts_of_a_cycle(timing)), false}};
 }
 
 }  // namespace vrpipe

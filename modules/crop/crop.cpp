@@ -36,7 +36,11 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
               parameters.cache.organization().replacement,
               parameters.cache.random_seed,
               parameters.cache.hash_sets,
-              parameters.cache.tell_conflicts} {
+              parameters.cache.tell_conflicts,
+              parameters.line_cycles,
+              parameters.fetch_ahead,
+              parameters.line_return_cycles,
+              parameters.pairs_in_sector} {
   timing_.check_cache(Format);
   if (!EffectGate(context, "cache.details").is_active()) cache_statistics.leave_out_details();
   several_draws_ =

@@ -64,6 +64,31 @@ struct CropParameters : ParameterSet {
                             "filled or written back in a cycle in which nothing is blended"};
   Switch writes_unchanged{*this, "writes_unchanged", false, source::measured,
                           "write sectors back in which no value changed"};
+  Integer line_cycles{
+      *this,
+      "line_cycles",
+      0,
+      0,
+      64,
+      "cycles",
+      "left open by the paper; measured on a GH100 graphics GPC: 1",
+      "of blending that a line takes which is written back, or fetched for a quad that changes a value, "
+      "however many of its sectors move; 0: sectors_per_cycle says what moving takes"};
+  Switch fetch_ahead{
+      *this, "fetch_ahead", false, "left open by the paper; measured on a GH100 graphics GPC: on",
+      "tags run ahead of data by input_quads: a line may go while quads wait to be blended into it, and is "
+      "fetched a second time if it is wanted again before that"};
+  Integer line_return_cycles{*this,
+                             "line_return_cycles",
+                             0,
+                             0,
+                             100000,
+                             "cycles",
+                             "left open by the paper; measured on a GH100 graphics GPC: 503",
+                             "from the last blend into a line that leaves the cache to the next one"};
+  Switch pairs_in_sector{*this, "pairs_in_sector", false,
+                         "left open by the paper; measured on a GH100 graphics GPC: on",
+                         "quads of one cycle share a sector, as two neighbours of RGBA8 do; others take a cycle each"};
 };
 
 /// Colour ROP (paper 3.1, 5.2): blends in arrival order; the alpha test unit signals terminated pixels.

@@ -1,6 +1,9 @@
 #include <algorithm>
 #include <array>
+#include <optional>
+#include <utility>
 
+#include <vrpipe/memory/line_returns.h>
 #include <vrpipe/model/timed_cache_port.h>
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
@@ -36,8 +39,12 @@ class TimedCrop : public TimedUnit {
         look_ups_(timing_.blend_rate.most_in_a_cycle()),
         queue_(timing_.input_quads),
         blending_(static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_))),
-        price_(timing_.blend_rate.cycles * timing_.sectors_per_cycle),
-        lines_(std::max(timing_.cache_bytes / timing_.line_bytes, 1U)) {
+        price_(timing_.blend_rate.cycles * timing_.moves_in_a_cycle()),
+        move_price_(timing_.blend_rate.items * timing_.parts_of_a_move()),
+        pairs_(timing_.pairs_in_sector && timing_.blend_rate.most_in_a_cycle() > 1),
+        lines_(std::max(timing_.cache_bytes / timing_.line_bytes, 1U)),
+        ready_(lines_.size()),
+        unpaid_(lines_.size()) {
     out_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.blend_rate));
     out_done_.set_pipeline(timing_.latency_cycles - 1);
     out_done_.set_optional();
@@ -54,6 +61,11 @@ class TimedCrop : public TimedUnit {
     const ColorSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
+    if (timing_.fetches_ahead || timing_.line_return_cycles > 0) {
+      returns_.emplace(surface->address(0), surface->size_bytes(), timing_.line_bytes, timing_.line_return_cycles);
+      last_uses_.resize(returns_->lines());
+      used_before_.resize(lines_.size());
+    }
   }
 
   CycleInterval take(const ShadedWarp& warp, CycleInterval visible) {
@@ -92,7 +104,7 @@ class TimedCrop : public TimedUnit {
     behaviour_->look_up(warp, from, to, cache_);
     // Places in the queue, and lines that no queued quad needs.
     Cycle at = queue_.free_from(visible.first, quads);
-    for (unsigned line = 0; line < cache_.count; ++line) {
+    for (unsigned line = 0; line < cache_.count && !timing_.fetches_ahead; ++line) {
       if (cache_.lines[line].replaced) at = std::max(at, lines_[cache_.lines[line].line]);
     }
     CycleInterval looked_up = look_ups_.take(at, quads);
@@ -100,11 +112,14 @@ class TimedCrop : public TimedUnit {
     Cycle there = looked_up.first + 1;
     for (unsigned line = 0; line < cache_.count; ++line) {
       const CropBehaviour::LineAccess& access = cache_.lines[line];
-      if (access.written_back != 0) memory_.write_back(access, looked_up.last);
-      if (access.filled != 0) there = std::max(there, memory_.fill(access, looked_up.last));
+      if (access.written_back != 0) write_back(access, looked_up.last);
+      if (returns_ && access.replaced) come_back(access);
+      if (access.filled != 0) there = std::max(there, fill(access, looked_up.last));
+      if (returns_) there = std::max(there, ready_[access.line]);
     }
     look_ups_.hold(looked_up.last);
-    if (const unsigned moved = memory_.take_moved(); moved > 0) moves_.push({looked_up.last, moved});
+    if (const unsigned moved = memory_.take_moved(); moved > 0 && timing_.line_cycles == 0)
+      moves_.push({looked_up.last, moved});
 
     charge(UnitState::starved, looked_up.first + 1);
     if (out_.last() > there) {
@@ -115,8 +130,8 @@ class TimedCrop : public TimedUnit {
     const Cycle hazard = timing_.forwards || !hazard_gate_.enter() ? 0 : hazard_until(warp.tile, warp.position[from]);
     // Moving a sector takes time from blending, from when it moves.
     for (; !moves_.empty() && moves_.front().at <= std::max({there, hazard, blending_.next()}); moves_.pop()) {
-      blending_.take(moves_.front().at, moves_.front().sectors * timing_.blend_rate.items);
-      did(CropWork::sectors, moves_.front().sectors, moves_.front().at);
+      blending_.take(moves_.front().at, moves_.front().moved * move_price_);
+      did(CropWork::sectors, moves_.front().moved, moves_.front().at);
     }
     there = std::max(there, blending_.next());
     if (hazard > there) {
@@ -124,7 +139,9 @@ class TimedCrop : public TimedUnit {
       did(CropWork::forwarding, wasted, there, hazard);
       there = hazard;
     }
-    const CycleInterval blended = blending_.take(there, quads * price_);
+    const unsigned price = price_of(from, to);
+    const CycleInterval blended = blending_.take(there, price);
+    if (pairs_) did(CropWork::unpaired, price - quads * price_, blended.first, blended.last + 1);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
     queue_.take(quads, blended.last);
@@ -137,6 +154,46 @@ class TimedCrop : public TimedUnit {
     return looked_up;
   }
 
+  void write_back(const CropBehaviour::LineAccess& access, Cycle looked_up) {
+    // Where tags run ahead, quads may still be blended into what the line held.
+    const Cycle at = timing_.fetches_ahead ? std::max(looked_up, lines_[access.line]) : looked_up;
+    memory_.write_back(access, at);
+    if (timing_.line_cycles > 0) moves_.push({at, 1});
+  }
+  /// Returns when the sectors are there. Those that are fetched before what the line held is written back are fetched again.
+  Cycle fill(const CropBehaviour::LineAccess& access, Cycle& at) {
+    if (access.replaced) unpaid_[access.line] = true;
+    Cycle there = memory_.fill(access, at);
+    if (!timing_.fetches_ahead) return there;
+    Cycle before = used_before_[access.line];
+    if (before <= at) return there;
+    fetched_again_ += static_cast<unsigned>(__builtin_popcount(access.filled));
+    there = std::max(there, memory_.fill(access, before));
+    ready_[access.line] = std::max(ready_[access.line], there);
+    return there;
+  }
+  /// A line is there for another, which may have been before.
+  void come_back(const CropBehaviour::LineAccess& access) {
+    ready_[access.line] = returns_->from(access.address);
+    used_before_[access.line] = last_uses_[returns_->index(access.address)];
+  }
+
+  /// Of quads, in parts of a cycle. Where several go in one only if they share a sector, the others take one each.
+  unsigned price_of(unsigned from, unsigned to) const {
+    if (!pairs_) return (to - from) * price_;
+    const auto cycle = static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_));
+    const unsigned most = timing_.blend_rate.most_in_a_cycle();
+    unsigned price = 0;
+    unsigned beside = most;
+    for (unsigned i = from; i < to; ++i) {
+      const bool shares = i > from && cache_.line_of[i] == cache_.line_of[i - 1] &&
+                          cache_.sectors_of[i] == cache_.sectors_of[i - 1] && beside < most;
+      beside = shares ? beside + 1 : 1;
+      price += shares ? 0 : cycle;
+    }
+    return price;
+  }
+
   void blend(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval at) {
     monitor_->blended(warp, from, to, at.last);
     CropBehaviour::Outcomes outcomes;
@@ -147,12 +204,21 @@ class TimedCrop : public TimedUnit {
       const CropBehaviour::Outcome outcome = outcomes[i];
       dirty[cache_.line_of[i]] |= outcome.changed || timing_.writes_unchanged ? cache_.sectors_of[i] : 0U;
       terminated |= outcome.terminated;
+      // A line is paid for with the quad for which it was fetched.
+      if (timing_.line_cycles > 0 && std::exchange(unpaid_[cache_.lines[cache_.line_of[i]].line], false) &&
+          (outcome.changed || timing_.writes_unchanged))
+        moves_.push({at.last, 1});
     }
     if (terminated != 0) signal(warp, from, to, outcomes, at);
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
       lines_[line] = at.last;
-      if (dirty[i] != 0) behaviour_->make_dirty(line, dirty[i]);
+      if (returns_) {
+        returns_->used(cache_.lines[i].address, at.last);
+        last_uses_[returns_->index(cache_.lines[i].address)] = at.last;
+      }
+      if (dirty[i] == 0) continue;
+      behaviour_->make_dirty(line, dirty[i]);
     }
   }
 
@@ -183,7 +249,7 @@ class TimedCrop : public TimedUnit {
 
   struct Move {
     Cycle at = 0;
-    unsigned sectors = 0;
+    unsigned moved = 0;
   };
   struct Recent {
     TileId tile;
@@ -204,15 +270,25 @@ class TimedCrop : public TimedUnit {
   std::unique_ptr<BlendOrderMonitor> monitor_;
   CropBehaviour::CacheLookUp cache_;
   ThroughputPort look_ups_;
-  SlotPool queue_;            ///< quads between look-up and blending
-  ThroughputPort blending_;   ///< in parts of a cycle that both a quad and a sector are whole numbers of
-  const unsigned price_;      ///< of blending a quad, in these
-  Ring<Move> moves_;          ///< of sectors, that blending has not given its time to yet
-  std::vector<Cycle> lines_;  ///< of the cache: the last blend of a quad that needed it
-  Ring<Recent> recent_;       ///< blends in the pipeline, without forwarding
+  SlotPool queue_;                      ///< quads between look-up and blending
+  ThroughputPort blending_;             ///< in parts of a cycle that both a quad and a sector are whole numbers of
+  const unsigned price_;                ///< of blending a quad, in these
+  const unsigned move_price_;           ///< of moving a sector, or a line
+  const bool pairs_;                    ///< several quads go in a cycle only if they share a sector
+  Ring<Move> moves_;                    ///< of sectors or lines, that blending has not given its time to yet
+  std::vector<Cycle> lines_;            ///< of the cache: the last blend of a quad that needed it
+  std::vector<Cycle> ready_;            ///< of the cache: when one that came back can be used
+  std::vector<char> unpaid_;            ///< of the cache: fetched, and nothing blended into it
+  std::optional<LineReturns> returns_;  ///< where lines that come back wait
+  std::vector<Cycle> last_uses_;        ///< by line of the surface
+  std::vector<Cycle> used_before_;      ///< by line of the cache: the last use of what it holds before it came back
+  Ring<Recent> recent_;                 ///< blends in the pipeline, without forwarding
   Cycle last_blend_ = 0;
   Cycle end_ = never;
   bool any_blended_ = false;
+  StatisticSet more_cache_statistics_{*this, "cache"};
+  Counter fetched_again_{more_cache_statistics_, "sectors_fetched_again", "sectors",
+                         "a second time, since their line came back before what it had held was written back"};
 };
 
 [[maybe_unused]] const bool registered = [] {

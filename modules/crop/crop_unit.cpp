@@ -2,6 +2,8 @@
 #include <optional>
 #include <utility>
 
+#include "crop/lines_ahead.h"
+
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
 #include <vrpipe/model/unit.h>
@@ -14,8 +16,7 @@ namespace vrpipe {
 namespace {
 
 /// CROP at cycle fidelity. A quad looks up the colour cache when it arrives and starts the fills that it needs, then
-/// waits in order; blending takes place at the head. Moving a sector takes cycles from blending (measured: CROP cycles
-/// = quads / rate + sectors / 8).
+/// waits in order; blending takes place at the head. Moving a sector, or a line, takes cycles from blending.
 /// Ports: in_color (ColorBeat), out_terminations (TerminationBeat), out_done (BlendsDone; optional), memory (TLM-2.0 base
 /// protocol).
 class CropUnit : public Unit {
@@ -33,10 +34,11 @@ class CropUnit : public Unit {
         barriers_(context),
         hazard_gate_(context, "crop.blend_hazard"),
         cache_order_gate_(context, "crop.cache_order"),
-        price_(std::int64_t{timing_.blend_rate.cycles} * timing_.sectors_per_cycle),
-        sector_price_(timing_.blend_rate.items),
+        price_(std::int64_t{timing_.blend_rate.cycles} * timing_.moves_in_a_cycle()),
+        move_price_(std::int64_t{timing_.blend_rate.items} * timing_.parts_of_a_move()),
         income_(static_cast<std::int64_t>(CropWork::parts_of_a_cycle(timing_))),
         most_in_a_cycle_(timing_.blend_rate.most_in_a_cycle()),
+        pairs_(timing_.pairs_in_sector && most_in_a_cycle_ > 1),
         port_(*this, "memory", timing_.mshrs,
               {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
     out_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.blend_rate));
@@ -55,9 +57,9 @@ class CropUnit : public Unit {
   static constexpr std::size_t quads_ahead = 8;
   struct Entry {
     ColorQuad quad;
-    SectoredCache::Line line = SectoredCache::no_line;
-    std::uint32_t sectors = 0;  ///< of the line, a bit each
-    std::uint32_t place = 0;    ///< in the surface's grid
+    SectoredCache::Line line = SectoredCache::no_line;  ///< or its stay (LinesAhead)
+    std::uint32_t sectors = 0;                          ///< of the line, a bit each
+    std::uint32_t place = 0;                            ///< in the surface's grid
   };
 
   void end_of_elaboration() override {
@@ -72,6 +74,15 @@ class CropUnit : public Unit {
     sectors_of_quads_ = sectors_of_quads(timing_.cache(), 4 * bytes_per_pixel(surface_->format()));
     sectors_of_a_quad_ = static_cast<unsigned>(__builtin_popcount(sectors_of_quads_.front().sectors));
     monitor_.emplace(surface_->width(), surface_->height());
+    if (timing_.fetches_ahead || timing_.line_return_cycles > 0) {
+      returns_.emplace(surface_->address(0), surface_->size_bytes(), timing_.line_bytes, timing_.line_return_cycles);
+      came_back_.resize(organization.lines());
+    }
+    if (timing_.fetches_ahead) {
+      ahead_.emplace(port_, dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics, *returns_,
+                     timing_.mshrs);
+    }
+    unpaid_.resize(organization.lines());
   }
 
   /// Takes a quad from the link into the queue; false when it has to wait.
@@ -80,6 +91,7 @@ class CropUnit : public Unit {
     const std::size_t tile = surface_->grid().place(quad.warp->tile, 0);
     const auto [line_of_tile, sectors] = sectors_of_quads_[position];
     const std::uint64_t address = surface_->address(tile) + (std::uint64_t{line_of_tile} << line_shift_);
+    if (ahead_) return look_up_ahead(quad, address, sectors, tile + position);
     SectoredCache::Line line =
         wanted_.line == SectoredCache::no_line ? port_.pin_held(address, sectors) : SectoredCache::no_line;
     std::uint32_t asked_for = 0;
@@ -90,23 +102,54 @@ class CropUnit : public Unit {
     if (const std::uint32_t on_their_way = port_.awaited(line, sectors) & ~asked_for; on_their_way != 0) {
       hits_on_their_way_ += static_cast<unsigned>(__builtin_popcount(on_their_way));
     }
+    queue(quad, line, sectors, tile + position);
+    return true;
+  }
+  [[gnu::always_inline]] void queue(const ColorQuad& quad, std::uint32_t line, std::uint32_t sectors,
+                                    std::size_t place) {
     // In place: a temporary of narrow stores would be waited for when it is copied.
     Entry& entry = queue_.push();
     entry.quad = quad;
     entry.line = line;
     entry.sectors = sectors;
-    entry.place = static_cast<std::uint32_t>(tile + position);
+    entry.place = static_cast<std::uint32_t>(place);
+  }
+  [[gnu::noinline]] bool look_up_ahead(const ColorQuad& quad, std::uint64_t address, std::uint32_t sectors,
+                                       std::size_t place) {
+    const LinesAhead::Stay stay = ahead_->look_up(address, sectors);
+    if (stay == LinesAhead::no_stay) return false;
+    pay_for_stays();
+    queue(quad, stay, sectors, place);
     return true;
+  }
+  void pay_for_stays() {
+    const LinesAhead::Moves moves = ahead_->take_moves();
+    const unsigned moved = timing_.line_cycles == 0 ? moves.sectors : moves.lines;
+    if (moved > 0) pay(moved);
+    fetched_again_ += ahead_->take_fetched_again();
+  }
+  /// Gives what moves its time of the blender.
+  void pay(unsigned moved) {
+    tokens_ -= moved * move_price_;
+    did(CropWork::sectors, moved, now());
   }
 
   /// Goes on with the look-up of the quad at the link; `no_line` while it has to wait.
   [[gnu::noinline]] SectoredCache::Line fill(std::uint64_t address, std::uint32_t sectors, std::uint32_t& asked_for) {
     wanted_.address = address;
     wanted_.sectors = sectors;
+    const bool had_line = wanted_.line != SectoredCache::no_line;
     const bool done = port_.look_up(wanted_, now(), [this](unsigned moved) {
-      tokens_ -= moved * sector_price_;
-      did(CropWork::sectors, moved, now());
+      if (timing_.line_cycles == 0) pay(moved);
     });
+    if (timing_.line_cycles > 0) {
+      if (const unsigned lines = port_.take_lines_moved().written_back; lines > 0) pay(lines);
+    }
+    // It has just been pinned, by nobody else if it is new.
+    if (!had_line && wanted_.line != SectoredCache::no_line && port_.cache().present(wanted_.line) == 0) {
+      unpaid_[wanted_.line] = true;
+      if (returns_) came_back_[wanted_.line] = returns_->from(wanted_.address) != 0;
+    }
     if (!done) return SectoredCache::no_line;
     asked_for = std::exchange(wanted_.asked_for, 0);
     return std::exchange(wanted_.line, SectoredCache::no_line);
@@ -166,6 +209,7 @@ class CropUnit : public Unit {
     TerminationBeat beat;
     stop_ = UnitState::starved;
     unsigned budget = most_in_a_cycle_;
+    std::int64_t unpaired = 0;
     for (; budget > 0 && !queue_.empty(); --budget) {
       if (!marks_.empty()) pass_marks(now);
       const Entry& entry = queue_.front();
@@ -174,11 +218,12 @@ class CropUnit : public Unit {
         stop_ = UnitState::blocked;
         break;
       }
-      if (port_.awaited(entry.line, entry.sectors) != 0) {
+      if (is_awaited(entry, now)) {
         stop_ = UnitState::memory;
         break;
       }
-      if (tokens_ < price_) {
+      const std::int64_t price = pairs_ ? price_beside_last(entry, most_in_a_cycle_ - budget) : price_;
+      if (tokens_ < price) {
         stop_ = UnitState::busy;  // with the quads before it, or with moving sectors
         break;
       }
@@ -201,9 +246,19 @@ class CropUnit : public Unit {
                                       context_.draw(quad.warp->draw[quad.index]).epoch};
       }
       if (quad.is_last()) quad.warp->release();
-      if (outcome.changed || timing_.writes_unchanged) port_.cache().make_dirty(entry.line, entry.sectors);
-      port_.cache().unpin(entry.line);
-      tokens_ -= price_;
+      const bool changed = outcome.changed || timing_.writes_unchanged;
+      tokens_ -= price;
+      unpaired += price - price_;
+      if (!ahead_) {
+        if (changed) port_.cache().make_dirty(entry.line, entry.sectors);
+        port_.cache().unpin(entry.line);
+        if (returns_) use(entry, now);
+        if (timing_.line_cycles > 0 && unpaid_[entry.line]) pay_for_fetch(entry.line, changed);
+      } else {
+        ahead_->blended(entry.line, entry.sectors, changed, now);
+        pay_for_stays();
+      }
+      if (pairs_) last_ = {entry.place / positions_per_tile, entry.line, entry.sectors};
       queue_.pop();
       if (!marks_.empty()) --marks_.front().quads;
       if (queue_.size() > quads_ahead) prefetch(queue_[quads_ahead]);
@@ -213,9 +268,40 @@ class CropUnit : public Unit {
     if (blended == 0) return false;
     frame_lasts(now + timing_.latency_cycles);
     did(CropWork::blend, blended, now);
+    // Two that go together cost as much as one of a cycle's two.
+    if (pairs_ && unpaired > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(unpaired), now);
     last_blend_ = now;
     any_blended_ = true;
     return true;
+  }
+
+  /// Whether the sectors of a quad whose turn it is are not there.
+  bool is_awaited(const Entry& entry, Cycle now) {
+    ready_at_ = never;
+    if (!ahead_) {
+      if (port_.awaited(entry.line, entry.sectors) != 0) return true;
+      if (!returns_ || !came_back_[entry.line]) return false;
+      const Cycle from = returns_->from(port_.cache().address(entry.line));
+      if (now < from) ready_at_ = from;
+      return now < from;
+    }
+    const LinesAhead::Wait wait = ahead_->waits(entry.line, entry.sectors, now);
+    if (wait == LinesAhead::Wait::until) ready_at_ = ahead_->ready_at(entry.line);
+    return wait != LinesAhead::Wait::none;
+  }
+  [[gnu::noinline]] void use(const Entry& entry, Cycle now) {
+    came_back_[entry.line] = false;
+    returns_->used(port_.cache().address(entry.line), now);
+  }
+  [[gnu::noinline]] void pay_for_fetch(SectoredCache::Line line, bool changed) {
+    unpaid_[line] = false;
+    if (changed) pay(1);
+  }
+  /// Of a quad, where several go in a cycle if they share a sector; `beside` have gone in this one.
+  [[gnu::noinline]] std::int64_t price_beside_last(const Entry& entry, unsigned beside) const {
+    const bool shares = beside > 0 && last_.tile == entry.place / positions_per_tile && last_.line == entry.line &&
+                        last_.sectors == entry.sectors;
+    return shares ? 0 : income_;
   }
 
   /// Behind the quads in the queue.
@@ -244,18 +330,23 @@ class CropUnit : public Unit {
   }
 
   Cycle tick(Cycle now) override {
-    port_.finish_fills(now);
+    if (!ahead_) {
+      port_.finish_fills(now);
+    } else {
+      ahead_->advance();
+    }
     const bool blended = blend(now);
     const bool accepted = accept();
     const bool marked = !marks_.empty() && pass_marks(now);
     if (!done_.empty()) send_done();
     enter(blended ? UnitState::busy : !queue_.empty() ? stop_ : UnitState::starved, now);
     if (blended || accepted || marked ||
-        (!queue_.empty() && stop_ != UnitState::blocked && (stop_ == UnitState::latency || tokens_ < price_))) {
+        (!queue_.empty() && stop_ != UnitState::blocked &&
+         (stop_ == UnitState::latency || stop_ == UnitState::busy || tokens_ < price_))) {
       return now + 1;
     }
     // A quad at the link that could not be looked up waits for a completion or for the queue to move.
-    Cycle next = port_.next_completion();
+    Cycle next = std::min(port_.next_completion(), queue_.empty() ? never : ready_at_);
     if (in_.next_ready() > now) next = std::min(next, in_.next_ready());
     return next;
   }
@@ -270,10 +361,11 @@ class CropUnit : public Unit {
   const BarrierPlan barriers_;
   EffectGate hazard_gate_;
   EffectGate cache_order_gate_;
-  const std::int64_t price_;         ///< of blending a quad, in tokens
-  const std::int64_t sector_price_;  ///< of moving a sector
-  const std::int64_t income_;        ///< of a cycle: what so many quads, or so many sectors, cost
-  const unsigned most_in_a_cycle_;   ///< quads looked up or blended
+  const std::int64_t price_;        ///< of blending a quad, in tokens
+  const std::int64_t move_price_;   ///< of moving a sector, or a line
+  const std::int64_t income_;       ///< of a cycle: what so many quads, or so many sectors, cost
+  const unsigned most_in_a_cycle_;  ///< quads looked up or blended
+  const bool pairs_;                ///< several go in a cycle only if they share a sector
   CachePort port_;
   const ColorSurface* surface_ = nullptr;
   std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
@@ -284,6 +376,14 @@ class CropUnit : public Unit {
   CachePort::LookUp wanted_;  ///< of the quad at the link
   std::int64_t tokens_ = 0;
   Cycle refilled_ = 0;
+  std::vector<bool> unpaid_;            ///< by line of the cache: nothing has been blended into it
+  std::optional<LineReturns> returns_;  ///< where lines that come back wait
+  std::vector<bool> came_back_;         ///< by line of the cache: was there before; not used since
+  std::optional<LinesAhead> ahead_;     ///< where tags run ahead of data
+  Cycle ready_at_ = never;              ///< of the quad whose turn it is, if that is known
+  struct {
+    std::uint32_t tile, line, sectors;
+  } last_{};                                            ///< blended, where quads go in pairs
   std::deque<std::pair<std::uint32_t, Cycle>> recent_;  ///< blends in the pipeline, without forwarding
   UnitState stop_ = UnitState::starved;
   struct QueuedMark {
@@ -299,6 +399,8 @@ class CropUnit : public Unit {
   StatisticSet more_cache_statistics_{*this, "cache"};
   Counter hits_on_their_way_{more_cache_statistics_, "sector_hits_on_their_way", "sectors",
                              "hit while they are still being filled, at cycle"};
+  Counter fetched_again_{more_cache_statistics_, "sectors_fetched_again", "sectors",
+                         "a second time, since their line came back before what it had held was written back"};
 };
 
 [[maybe_unused]] const bool registered = [] {

@@ -24,11 +24,11 @@ class TileRasterizer : public RasterBehaviour {
                                  "cycles",
                                  "ATTILA, Emerald: set-up latency 10",
                                  "of setting up a primitive's edge functions"};
-    Integer setup_interval_cycles{
+    Real setup_interval_cycles{
         *this,
         "setup_interval_cycles",
         1,
-        1,
+        0.001,
         1000,
         "cycles",
         source::open,
@@ -49,14 +49,14 @@ class TileRasterizer : public RasterBehaviour {
                                  "raster tiles",
                                  "Emerald: 2 fine tiles a cycle and cluster",
                                  "raster tiles made into quads in a cycle"};
-    Integer screen_tile_interval_cycles{*this,
-                                        "screen_tile_interval_cycles",
-                                        1,
-                                        1,
-                                        1000,
-                                        "cycles",
-                                        "measured on a GH100 graphics GPC: 5.5 cycles with 2 TPCs, scaled to 8",
-                                        "between (primitive, screen tile) pairs"};
+    Real screen_tile_interval_cycles{*this,
+                                     "screen_tile_interval_cycles",
+                                     1,
+                                     0.001,
+                                     1000,
+                                     "cycles",
+                                     "measured on a GH100 graphics GPC: 5.5 cycles with 2 TPCs, scaled to 8",
+                                     "between (primitive, screen tile) pairs"};
     Integer quads_per_cycle{*this,
                             "quads_per_cycle",
                             16,

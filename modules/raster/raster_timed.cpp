@@ -1,3 +1,4 @@
+#include <vrpipe/kernel/rate.h>
 #include <vrpipe/model/timed.h>
 
 namespace vrpipe {
@@ -75,10 +76,10 @@ class TimedRaster : public TimedUnit {
         throw SimulationFault(name(), now_, "ZROP has not passed a mark that Hi-Z waits for");
       return sent;
     }
-    now_ = std::max(now_, next_setup_);
+    now_ = setups_.free_from(now_);
     const Cycle setup = now_;
-    next_setup_ = setup + timing_.setup_interval_cycles;
-    did(RasterWork::setup, 1, setup, std::max(next_setup_, setup + 1));
+    const Cycle set_up = setups_.take(setup, timing_.setup_interval_thousandths);
+    did(RasterWork::setup, 1, setup, std::max(set_up, setup + 1));
     charge(UnitState::busy, setup + 1);
     apply_updates(now_);
     behaviour_->begin(job.primitive, job.clip);
@@ -91,9 +92,9 @@ class TimedRaster : public TimedUnit {
       did(RasterWork::fine, 1, fine);
       now_ = std::max(coarse_done_, fine);
       if (new_screen_tile) {
-        now_ = std::max(now_, next_pair_);
-        next_pair_ = now_ + timing_.screen_tile_interval_cycles;
-        did(RasterWork::pairs, 1, now_, std::max(next_pair_, now_ + 1));
+        now_ = pairs_.free_from(now_);
+        const Cycle over = pairs_.take(now_, timing_.screen_tile_interval_thousandths);
+        did(RasterWork::pairs, 1, now_, std::max(over, now_ + 1));
       }
       if (tile.count == 0) continue;
       now_ = quads_out_.take(now_, tile.count).last;
@@ -127,8 +128,8 @@ class TimedRaster : public TimedUnit {
   ThroughputPort quads_out_;
   Ring<Update> updates_;  ///< whose time has not come
   Cycle now_ = 0;         ///< how far the primitive in hand has come
-  Cycle next_pair_ = 0;
-  Cycle next_setup_ = 0;
+  ThousandthsPort pairs_;
+  ThousandthsPort setups_;
   Cycle coarse_done_ = 0;
 };
 

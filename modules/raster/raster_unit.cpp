@@ -1,3 +1,4 @@
+#include <vrpipe/kernel/rate.h>
 #include <vrpipe/model/unit.h>
 
 namespace vrpipe {
@@ -118,11 +119,11 @@ class RasterUnit : public Unit {
           moved = true;
           break;
         }
-        if (now < next_setup_) break;
+        if (!setups_.is_free(now)) break;
         behaviour_->begin(in_.front().primitive, in_.front().clip);
         in_.pop();
-        next_setup_ = now + timing_.setup_interval_cycles;
-        did(RasterWork::setup, 1, now, std::max(next_setup_, now + 1));
+        const Cycle set_up = setups_.take(now, timing_.setup_interval_thousandths);
+        did(RasterWork::setup, 1, now, std::max(set_up, now + 1));
       }
       unsigned tests = 0;
       bool new_screen_tile = false;
@@ -133,9 +134,9 @@ class RasterUnit : public Unit {
         --fine_budget;
         did(RasterWork::fine, 1, now);
         if (new_screen_tile) {
-          tile_due_ = std::max(now, next_pair_);
-          next_pair_ = tile_due_ + timing_.screen_tile_interval_cycles;
-          did(RasterWork::pairs, 1, tile_due_, std::max(next_pair_, tile_due_ + 1));
+          tile_due_ = pairs_.free_from(now);
+          const Cycle over = pairs_.take(tile_due_, timing_.screen_tile_interval_thousandths);
+          did(RasterWork::pairs, 1, tile_due_, std::max(over, tile_due_ + 1));
         }
       }
       moved = true;
@@ -155,8 +156,8 @@ class RasterUnit : public Unit {
   unsigned at_ = 0;
   unsigned coarse_debt_ = 0;  ///< raster tiles tested ahead of the coarse rasteriser's rate
   Cycle tile_due_ = 0;
-  Cycle next_pair_ = 0;
-  Cycle next_setup_ = 0;
+  ThousandthsPort pairs_;
+  ThousandthsPort setups_;
 };
 
 [[maybe_unused]] const bool registered = [] {

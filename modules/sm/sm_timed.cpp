@@ -1,8 +1,10 @@
 #include <algorithm>
 
 #include "sm/fragment_programs.h"
+#include "sm/hand_over.h"
 #include "sm/timed_sm_memory.h"
 
+#include <vrpipe/kernel/rate.h>
 #include <vrpipe/model/timed.h>
 
 namespace vrpipe {
@@ -41,6 +43,7 @@ class TimedSm : public TimedUnit {
                        return shade_vertices(warp, visible.first);
                      },
                      {&out_vertices_}),
+        hand_over_(timing_, context),
         scheduler_free_at_(std::size_t{timing_.cores} * timing_.schedulers_per_core, 0),
         free_of_core_(timing_.cores, timing_.warps_per_core),
         vertex_slots_(timing_.vertex_warps, 0) {
@@ -160,7 +163,7 @@ class TimedSm : public TimedUnit {
     if (!has_slot()) {
       throw SimulationFault("deadlock", launch, std::string(name()) + " has warps to launch, and no slot is released");
     }
-    launch = take_slot(warp.tile, launch);
+    launch = take_slot(warp.tile, launches_.free_from(launch));
     charge(UnitState::blocked, launch);
     Cycle there = 0;
     if (fetches_) {
@@ -170,6 +173,10 @@ class TimedSm : public TimedUnit {
       there = fetch.there;
     }
     next_launch_ = launch + 1;
+    if (hand_over_.is_on()) {
+      const std::uint64_t price = hand_over_.of(warp);
+      did(SmWork::launches, price, launch, std::max(launches_.take(launch, price), launch + 1));
+    }
 
     const Program& needed = fragment_.of(warp);
     if (blocking() && roomy_) {
@@ -363,6 +370,8 @@ class TimedSm : public TimedUnit {
   TimedIn<WarpRelease> in_release_;
   TimedIn<Warp> in_warps_;
   TimedIn<VertexWarp> in_vertices_;
+  HandOver hand_over_;
+  ThousandthsPort launches_;  ///< where handing over has a price
   std::vector<Cycle> scheduler_free_at_;
   std::vector<Flight> flights_;
   std::vector<std::uint32_t> free_flights_;

@@ -2,9 +2,11 @@
 #include <utility>
 
 #include "sm/fragment_programs.h"
+#include "sm/hand_over.h"
 #include "sm/sm_memory.h"
 
 #include <vrpipe/arithmetic/divisor.h>
+#include <vrpipe/kernel/rate.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/model/unit.h>
 
@@ -99,6 +101,7 @@ class SmUnit : public Unit {
         warps_per_core_(timing_.warps_per_core),
         memory_(*this, context, timing_, l1_statistics_),
         fetch_gate_(context, "sm.attribute_fetch"),
+        hand_over_(timing_, context),
         vertex_{timing_.vertex, timing_.vertex.size()},
         fragment_(*context.frame, [&](FragmentShader shader, bool merges) { return program(shader, merges); }),
         wheel_(horizon()),
@@ -328,6 +331,7 @@ class SmUnit : public Unit {
     if (!in_warps_.ready()) return;
     const Warp& warp = in_warps_.front();
     if (warp.mark != Mark::none) return pass_mark();
+    if (!launches_.is_free(now)) return;
     if (!looks_up_) {
       if (!choose_core(warp.tile)) {
         slots_full_ = true;
@@ -347,10 +351,16 @@ class SmUnit : public Unit {
     flight.scheduler = static_cast<std::uint16_t>(core_ * timing_.schedulers_per_core + turn_of_scheduler_);
     turn_of_scheduler_ = turn_of_scheduler_ + 1 == timing_.schedulers_per_core ? 0 : turn_of_scheduler_ + 1;
     warps_[slot] = warp;
+    if (hand_over_.is_on()) pay_for_launch(warp, now);
     in_warps_.pop();
     ++in_flight_;
     ++running_;
     make_ready(slot, now);
+  }
+
+  [[gnu::noinline]] void pay_for_launch(const Warp& warp, Cycle now) {
+    const std::uint64_t price = hand_over_.of(warp);
+    did(SmWork::launches, price, now, std::max(launches_.take(now, price), now + 1));
   }
 
   /// Looks a warp's attributes up; false if that takes longer than this cycle.
@@ -405,7 +415,7 @@ class SmUnit : public Unit {
     if (next == now + 1) return next;
     // What could not be taken for want of a slot, a credit or an answer waits for the port that brings one.
     if (!slots_full_ && !(looks_up_ && in_warps_.ready())) {
-      next = std::min(next, std::max(in_warps_.next_ready(), now + 1));
+      next = std::min(next, std::max(in_warps_.next_ready(), launches_.free_from(now + 1)));
     }
     if (vertex_count_ < timing_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
     return std::min(next, in_release_.next_ready());
@@ -426,6 +436,8 @@ class SmUnit : public Unit {
   bool fetches_ = false;      ///< the memory port is connected
   bool lacks_fetch_ = false;  ///< it is, and its traffic was left out
   EffectGate fetch_gate_;
+  HandOver hand_over_;
+  ThousandthsPort launches_;  ///< where handing over has a price
   // The programs, in whose first segments nothing stands for memory where that is connected.
   Program vertex_;
   FragmentPrograms<Program> fragment_;

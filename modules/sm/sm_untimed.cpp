@@ -1,4 +1,5 @@
 #include "sm/attribute_traffic.h"
+#include "sm/hand_over.h"
 
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/occupancy.h>
@@ -23,7 +24,8 @@ class UntimedSm : public UntimedUnit {
         timing_(behaviour_->timing()),
         traffic_(context, timing_.fetch),
         memory_(traffic_.origin(MemoryTraffic::attribute)),
-        fetch_gate_(context, "sm.attribute_fetch") {
+        fetch_gate_(context, "sm.attribute_fetch"),
+        hand_over_(timing_, context) {
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
   }
 
@@ -37,6 +39,7 @@ class UntimedSm : public UntimedUnit {
     shaded_.count = 0;
     if (warp.mark == Mark::none) {
       if (follows_memory()) read(warp);
+      if (hand_over_.is_on()) did(SmWork::launches, hand_over_.of(warp));
       behaviour_->shade(warp, shaded_);
     }
     out_shaded_.send({&shaded_});
@@ -109,6 +112,7 @@ class UntimedSm : public UntimedUnit {
   std::uint32_t core_ = 0;
   std::uint32_t sent_to_core_ = 0;
   ShadedWarp shaded_;
+  HandOver hand_over_;
 };
 
 [[maybe_unused]] const bool registered = [] {

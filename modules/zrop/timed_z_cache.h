@@ -8,6 +8,7 @@
 #include "beat_lines.h"
 #include "z_cache_statistics.h"
 
+#include <vrpipe/memory/line_returns.h>
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/timed_cache_port.h>
 
@@ -39,6 +40,10 @@ class TimedZCache {
     cleared_ = cleared_sectors_of(surface, timing_, statistics_);
     kept_until_.resize(timing_.organization.lines());
     there_.resize(std::size_t{timing_.organization.lines()} * sectors_of_a_line_);
+    if (timing_.line_return_cycles == 0) return;
+    returns_.emplace(surface.address({0, 0}, 0), surface.size_bytes(), timing_.organization.line_bytes,
+                     timing_.line_return_cycles);
+    returned_from_.resize(timing_.organization.lines());
   }
 
   struct Times {
@@ -56,7 +61,11 @@ class TimedZCache {
     if (!needs_stencil) return {turn, turn};
     return look_up(beat, turn, early_);
   }
-  void tested(unsigned quads, Cycle at) { early_.queue.take(quads, at); }
+  void tested(unsigned quads, bool needs_stencil, Cycle at) {
+    early_.queue.take(quads, at);
+    if (!returns_ || !needs_stencil) return;
+    for (unsigned i = 0; i < needed_.count; ++i) returns_->used(needed_.lines[i].address, at);
+  }
   /// The same of quads to be tested late, which become visible in a cycle; `tested_late` follows.
   Times look_up_late(const QuadBeat& quads, Cycle visible) {
     return look_up(quads, late_.turn(quads.count, visible), late_);
@@ -98,10 +107,10 @@ class TimedZCache {
     return applied;
   }
 
-  /// Cycles that moving sectors takes from the z-cache and that were not asked for yet, and from when on.
+  /// Cycles that what moves takes from the z-cache and that were not asked for yet, and from when on.
   std::pair<Cycle, std::uint64_t> take_moves() {
-    const std::uint64_t cycles = owed_ / timing_.sectors_per_cycle;
-    owed_ -= cycles * timing_.sectors_per_cycle;
+    const std::uint64_t cycles = owed_ / timing_.moves_in_a_cycle();
+    owed_ -= cycles * timing_.moves_in_a_cycle();
     return {owed_at_, cycles};
   }
 
@@ -118,8 +127,10 @@ class TimedZCache {
     Times times;
     times.at = turn;
     lines_->find(beat.tile, beat.quads.data(), beat.count, needed_);
+    Cycle returned = 0;
     for (unsigned i = 0; i < needed_.count; ++i) {
       const SectoredCache::Line line = look_up(needed_.lines[i], times);
+      if (returns_) returned = std::max(returned, returned_from_[line]);
       // Lines are read in order, and may go then.
       way.read = std::max(way.read, times.there);
       kept_until_[line] = std::max(kept_until_[line], way.read);
@@ -127,7 +138,7 @@ class TimedZCache {
     cache_->accessed(beat.count, beat.count);
     way.look_ups.hold(times.at);
     owe(times.at);
-    return {times.at, std::max(times.at, times.there)};
+    return {times.at, std::max({times.at, times.there, returned})};
   }
   /// Sets when its sectors are there, and when it could be looked up, if that has to wait.
   SectoredCache::Line look_up(const BeatLines::Needed::Line& needed, Times& times) {
@@ -139,8 +150,10 @@ class TimedZCache {
     if (cleared_) cleared_->count(access.missed & access.known);
     Cycle* const there = &there_[std::size_t{access.line} * sectors_of_a_line_];
     if (access.replaced) {
-      times.at = std::max(times.at, kept_until_[access.line]);
+      if (!timing_.fetches_ahead) times.at = std::max(times.at, kept_until_[access.line]);
+      ++lines_moved_;
       if (access.written_back != 0) write_back(access, times.at);
+      if (returns_) returned_from_[access.line] = returns_->from(access.address);
     }
     if (access.filled != 0) {
       port_.fill(access, times.at,
@@ -153,10 +166,13 @@ class TimedZCache {
   }
   void write_back(const LineAccess& access, Cycle at) {
     port_.write_back(access, at);
+    ++lines_moved_;
     if (cleared_) cleared_->written(access.old_address, access.written_back);
   }
   void owe(Cycle at) {
-    owed_ += port_.take_moved();
+    const unsigned sectors = port_.take_moved();
+    const unsigned lines = std::exchange(lines_moved_, 0);
+    owed_ += timing_.line_thousandths == 0 ? sectors : std::uint64_t{timing_.line_thousandths} * lines;
     owed_at_ = at;
   }
 
@@ -172,9 +188,12 @@ class TimedZCache {
   std::optional<SectoredCache> cache_;
   std::optional<ClearedSectors> cleared_;
   BeatLines::Needed needed_;
-  std::vector<Cycle> kept_until_;  ///< by line of the cache
-  std::vector<Cycle> there_;       ///< by sector
-  std::uint64_t owed_ = 0;         ///< sectors
+  std::vector<Cycle> kept_until_;       ///< by line of the cache
+  std::vector<Cycle> there_;            ///< by sector
+  std::optional<LineReturns> returns_;  ///< where lines that come back wait
+  std::vector<Cycle> returned_from_;    ///< by line of the cache
+  unsigned lines_moved_ = 0;
+  std::uint64_t owed_ = 0;  ///< ZCache::moves_in_a_cycle
   Cycle owed_at_ = 0;
 };
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "beat_lines.h"
 #include "late_look_ups.h"
@@ -9,6 +10,7 @@
 
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
+#include <vrpipe/memory/line_returns.h>
 #include <vrpipe/pipeline/late_plan.h>
 #include <vrpipe/pipeline/render_context.h>
 
@@ -44,6 +46,11 @@ class ZPort {
     cleared_ = cleared_sectors_of(surface, timing_, statistics);
     if (cleared_) port_.know_cleared(*cleared_);
     lines_.emplace(timing_, surface);
+    fill_of_line_.resize(timing_.organization.lines());
+    if (timing_.line_return_cycles == 0) return;
+    returns_.emplace(surface.address({0, 0}, 0), surface.size_bytes(), timing_.organization.line_bytes,
+                     timing_.line_return_cycles);
+    were_there_.resize(returns_->lines());
   }
   bool idle() const {
     return beats_.empty() && updates_.empty() && late_.empty() && changed_.empty() && port_.has_written_back();
@@ -54,12 +61,13 @@ class ZPort {
                StreamIn<ShadedWarpItem>& late) {
     now_ = now;
     bool moved = port_.finish_fills(now);
-    port_.write_back(Moved{owed_});
+    port_.write_back(moves());
     moved |= put_changed();
     moved |= take_updates(updates);
     if (plan_.is_used()) moved |= take_late(late);
     moved |= take_beats(quads);
-    moved |= read();
+    moved |= timing_.fetches_ahead ? read_ahead() : read();
+    if (timing_.line_thousandths > 0) owe_lines();
     return moved;
   }
   /// When it has to do so next, if nothing of its queues moves before.
@@ -67,21 +75,26 @@ class ZPort {
              const StreamIn<ShadedWarpItem>& late) const {
     Cycle next = port_.next_completion();
     // What could not be looked up waits for a completion, for the queue to move or for its turn.
-    for (const Cycle at : {quads.next_ready(), updates.next_ready(), late.next_ready(), next_look_up_, late_.next()}) {
+    for (const Cycle at :
+         {quads.next_ready(), updates.next_ready(), late.next_ready(), next_look_up_, late_.next(), returned_from()}) {
       if (at > now) next = std::min(next, at);
     }
     return next;
   }
 
-  /// Sectors whose time the z-cache has not given yet.
-  std::uint64_t owed_sectors() const { return owed_; }
-  void pay_sectors(unsigned sectors) { owed_ -= sectors; }
+  /// What has moved whose time the z-cache has not given yet (ZCache::moves_in_a_cycle).
+  std::uint64_t owed_moves() const { return owed_; }
+  void pay_moves(unsigned moves) { owed_ -= moves; }
 
   bool has_beats() const { return !beats_.empty(); }
   /// Whether all that the first beat needs has come.
-  bool beat_is_there() const { return !beats_.empty() && reads_done_ >= beats_.front().reads; }
+  bool beat_is_there() const {
+    if (beats_.empty() || reads_done_ < beats_.front().reads) return false;
+    return !returns_ || returned_from() <= now_;
+  }
   const QuadBeat& front() const { return beats_.front().beat; }
-  void pop() {
+  void pop(Cycle now) {
+    if (returns_) use(now);
     queued_quads_ -= beats_.front().beat.count;
     beats_.pop();
   }
@@ -127,11 +140,110 @@ class ZPort {
     SectoredCache::Line line = SectoredCache::no_line;
     std::uint32_t sectors = 0;
   };
-  /// Of sectors that move.
+  /// Of sectors that move, unless lines are what takes time.
   struct Moved {
-    void operator()(unsigned sectors) const { owed += sectors; }
+    void operator()(unsigned sectors) const { owed += takes_time ? sectors : 0; }
     std::uint64_t& owed;
+    bool takes_time;
   };
+  Moved moves() { return {owed_, timing_.line_thousandths == 0}; }
+  [[gnu::noinline]] void owe_lines() {
+    const CachePort::LinesMoved lines = port_.take_lines_moved();
+    owed_ += std::uint64_t{timing_.line_thousandths} * (lines.allocated + lines.written_back);
+  }
+  /// A line that came back to the cache, for a beat.
+  struct Returned {
+    std::uint64_t beat = 0;  ///< as many were looked up before it
+    std::uint64_t address = 0;
+  };
+  /// The same where tags run ahead of data: what is missed is read for the beat, whatever becomes of the line.
+  [[gnu::noinline]] bool look_up_ahead() {
+    if (!port_.write_back(moves())) return false;
+    if (ahead_left_ == 0) {
+      SectoredCache& cache = port_.cache();
+      const bool is_held = cache.find(line_.address) != SectoredCache::no_line;
+      if (!is_held && !cache.can_allocate(line_.address)) return false;
+      LineAccess access;
+      access.address = line_.address;
+      access.sectors = line_.sectors;
+      if (cleared_) access.known = cleared_->of_line(line_.address);
+      cache.look_up(access);
+      if (cleared_) cleared_->count(access.missed & access.known);
+      line_.line = access.line;
+      if (access.replaced) {
+        if (timing_.line_thousandths > 0) owed_ += timing_.line_thousandths;
+        fill_of_line_[access.line] = 0;
+        note_return();
+        if (access.written_back != 0) port_.evict(access);
+      }
+      ahead_left_ = access.filled;
+    }
+    while (ahead_left_ != 0) {
+      if (filling_ahead_ >= timing_.mshrs || !port_.memory_is_available()) return false;
+      const SectorRun run = take_sector_run(ahead_left_, timing_.organization.sectors_of_a_line());
+      const auto sector_bytes = std::uint64_t{timing_.organization.sector_bytes};
+      ++reads_asked_;
+      port_.read_ahead(line_.address + run.first * sector_bytes, run.count, static_cast<std::uint32_t>(reads_asked_));
+      sizes_.push(run.count);
+      filling_ahead_ += run.count;
+      moves()(run.count);
+      fill_of_line_[line_.line] = reads_asked_;
+    }
+    reads_of_beat_ = std::max(reads_of_beat_, fill_of_line_[line_.line]);
+    return true;
+  }
+  /// Takes reads that have come; in their order, as beats use them.
+  [[gnu::noinline]] bool read_ahead() {
+    std::uint32_t id = 0;
+    while (port_.next_ahead(id)) came_.push_back(id);
+    bool any = false;
+    for (auto found = came_.begin();
+         (found = std::find(came_.begin(), came_.end(), static_cast<std::uint32_t>(reads_done_ + 1))) != came_.end();) {
+      came_.erase(found);
+      ++reads_done_;
+      filling_ahead_ -= sizes_.front();
+      sizes_.pop();
+      any = true;
+    }
+    return any;
+  }
+  /// A line has been allocated for a beat: takes note if it was there before.
+  void note_return() {
+    if (!returns_) return;
+    const std::size_t line = returns_->index(line_.address);
+    if (were_there_[line]) returned_.push({beats_looked_up_, line_.address});
+    were_there_[line] = true;
+  }
+  /// Looks a line of a beat up, and takes note if it left since it was last used.
+  bool look_up_line() {
+    if (timing_.fetches_ahead) return look_up_ahead();
+    const bool is_held = !returns_ || line_.line != SectoredCache::no_line ||
+                         port_.cache().find(line_.address) != SectoredCache::no_line;
+    const bool done = port_.look_up(line_, now_, moves());
+    if (!is_held && line_.line != SectoredCache::no_line) note_return();
+    if (done) {
+      reads_.push({line_.line, line_.sectors});
+      reads_of_beat_ = ++reads_asked_;
+    }
+    return done;
+  }
+  /// The cycle from which on the lines of the first beat can be used.
+  Cycle returned_from() const {
+    Cycle from = 0;
+    for (std::size_t i = 0; i < returned_.size() && returned_[i].beat == beats_tested_; ++i)
+      from = std::max(from, returns_->from(returned_[i].address));
+    return from;
+  }
+  /// The first beat is tested.
+  [[gnu::noinline]] void use(Cycle now) {
+    while (!returned_.empty() && returned_.front().beat == beats_tested_) returned_.pop();
+    ++beats_tested_;
+    const QuadBeat& beat = beats_.front().beat;
+    if (beat.count == 0 || !context_.state(beat.quads[0].draw).reads_depth_stencil_early()) return;
+    BeatLines::Needed needed;
+    lines_->find(beat.tile, beat.quads.data(), beat.count, needed);
+    for (unsigned i = 0; i < needed.count; ++i) returns_->used(needed.lines[i].address, now);
+  }
   struct Update {
     TerminationSignal signal;
     SectoredCache::Line line = SectoredCache::no_line;
@@ -150,7 +262,7 @@ class ZPort {
           update_ = {needed.address, needed.sectors, SectoredCache::no_line, 0};
           update_begun_ = true;
         }
-        if (!port_.look_up(update_, now_, Moved{owed_})) break;
+        if (!port_.look_up(update_, now_, moves())) break;
         update_begun_ = false;
         count_accesses(1);
         updates_.push({signal, update_.line, update_.sectors});
@@ -170,9 +282,7 @@ class ZPort {
       const QuadBeat& beat = in.front();
       if (!beat_begun_ && !begin(beat)) break;
       for (; at_ < needed_.count; ++at_) {
-        if (!port_.look_up(line_, now_, Moved{owed_})) return moved;
-        reads_.push({line_.line, line_.sectors});
-        ++reads_asked_;
+        if (!look_up_line()) return moved;
         moved = true;
         if (at_ + 1 < needed_.count) begin_line(at_ + 1);
       }
@@ -180,7 +290,8 @@ class ZPort {
       if (needed_.count > 0) count_accesses(beat.count);
       Beat& queued = beats_.push();
       queued.beat = beat;
-      queued.reads = reads_asked_;
+      queued.reads = reads_of_beat_;
+      ++beats_looked_up_;
       queued_quads_ += beat.count;
       waits_ = beat.mark != Mark::none && plan_.waits_at(beat.mark);
       in.pop();
@@ -189,8 +300,7 @@ class ZPort {
     return moved;
   }
   [[gnu::noinline]] bool take_late(StreamIn<ShadedWarpItem>& in) {
-    const bool moved =
-        late_.take(in, port_, *lines_, now_, Moved{owed_}, [this](unsigned quads) { count_accesses(quads); });
+    const bool moved = late_.take(in, port_, *lines_, now_, moves(), [this](unsigned quads) { count_accesses(quads); });
     return late_.read(port_) || moved;
   }
   /// To look a beat up; false if that has to wait.
@@ -224,7 +334,7 @@ class ZPort {
     for (; !changed_.empty(); changed_.pop()) {
       const BeatLines::Needed::Line& line = changed_.front();
       const bool is_held = port_.cache().find(line.address) != SectoredCache::no_line;
-      if (!port_.put(line.address, line.sectors, Moved{owed_})) break;
+      if (!port_.put(line.address, line.sectors, moves())) break;
       // What went in the meantime is accessed anew.
       if (!is_held) count_accesses(static_cast<unsigned>(__builtin_popcount(line.sectors)));
       any = true;
@@ -259,6 +369,17 @@ class ZPort {
   BatchLimit look_ups_;
   std::optional<BeatLines> lines_;
   std::optional<ClearedSectors> cleared_;
+  std::optional<LineReturns> returns_;  ///< where lines that come back wait
+  std::vector<bool> were_there_;        ///< by line of the surface
+  // Where tags run ahead of data; reads are numbered from 1.
+  std::uint32_t ahead_left_ = 0;             ///< sectors of the line that is looked up, yet to be read
+  unsigned filling_ahead_ = 0;               ///< sectors
+  std::vector<std::uint64_t> fill_of_line_;  ///< by line of the cache: the last read for it
+  Ring<unsigned> sizes_;                     ///< of the reads under way, sectors
+  std::vector<std::uint32_t> came_;          ///< reads, before others that were asked for earlier
+  Ring<Returned> returned_;                  ///< for beats that are not tested
+  std::uint64_t beats_looked_up_ = 0;
+  std::uint64_t beats_tested_ = 0;
   Cycle now_ = 0;
   Cycle next_look_up_ = 0;  ///< after a beat wider than the unit
   std::uint64_t owed_ = 0;
@@ -278,6 +399,7 @@ class ZPort {
   unsigned queued_quads_ = 0;
   Ring<Read> reads_;  ///< lines of these, that are not read yet
   std::uint64_t reads_asked_ = 0;
+  std::uint64_t reads_of_beat_ = 0;  ///< the last that those looked up so far need
   std::uint64_t reads_done_ = 0;
   Ring<Update> updates_;  ///< looked up, and not applied
   LateLookUps late_;

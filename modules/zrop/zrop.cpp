@@ -17,7 +17,10 @@ DepthStencilRop::DepthStencilRop(const Parameters& parameters, const RenderConte
               parameters.latency_cycles,
               parameters.updates_per_cycle,
               {parameters.cache.organization(), parameters.mshrs, parameters.input_quads, parameters.input_updates,
-               parameters.sectors_per_cycle, parameters.fast_clear}},
+               parameters.sectors_per_cycle, parameters.fast_clear, parameters.line_cycles.thousandths(),
+               parameters.fetch_ahead, parameters.line_return_cycles},
+              parameters.half_block_cycles.thousandths(),
+              parameters.block_cycles.thousandths()},
       depth_stencil_(context),
       depth_stencil_gate_(context, "zrop.depth_stencil"),
       termination_gate_(context, "zrop.termination") {

@@ -66,6 +66,46 @@ class DepthStencilRop : public ZropBehaviour {
                               "sectors",
                               "measured on a GH100 graphics GPC: 8 a cycle and ROP partition; the paper's GPC has two",
                               "filled or written back in a cycle in which nothing is tested or updated"};
+    Real half_block_cycles{
+        *this,
+        "half_block_cycles",
+        0,
+        0,
+        100,
+        "cycles",
+        "left open by the paper; measured on a GH100 graphics GPC: 1",
+        "of tests for each half, 4x8 pixels, of an 8x8 block in which a primitive has quads, if that "
+        "is more than quads_per_cycle takes"};
+    Real block_cycles{*this,
+                      "block_cycles",
+                      0,
+                      0,
+                      100,
+                      "cycles",
+                      "left open by the paper; measured on a GH100 graphics GPC: 1.4",
+                      "the least that such a block takes"};
+    Real line_cycles{
+        *this,
+        "line_cycles",
+        0,
+        0,
+        100,
+        "cycles",
+        "left open by the paper; measured on a GH100 graphics GPC: 1.4",
+        "in which nothing is tested, for a line that is fetched or written back, however many of its sectors "
+        "move; 0: sectors_per_cycle says what moving takes"};
+    Switch fetch_ahead{
+        *this, "fetch_ahead", false, "left open by the paper; measured on a GH100 graphics GPC: on",
+        "tags run ahead of data by input_quads: a line may go while it is fetched for a test, so that more are "
+        "under way than the z-cache holds"};
+    Integer line_return_cycles{*this,
+                               "line_return_cycles",
+                               0,
+                               0,
+                               100000,
+                               "cycles",
+                               "left open by the paper; measured on a GH100 graphics GPC: 461",
+                               "from the last test in a line that leaves the z-cache to the next one"};
     Switch fast_clear{*this, "fast_clear", true, "ATTILA: a state for each block of the target, on the chip",
                       "sectors to which nothing was written back after a clear are not read"};
   };

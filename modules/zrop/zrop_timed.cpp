@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "zrop/block_price.h"
 #include "zrop/hi_z_reports.h"
 #include "zrop/late_quads.h"
 #include "zrop/timed_z_cache.h"
@@ -47,6 +48,7 @@ class TimedZrop : public TimedUnit {
         updates_(timing_.updates_per_cycle),
         z_(*this, timing_, context.placement, cache_statistics_),
         z_cache_gate_(context, "zrop.z_cache"),
+        blocks_(timing_.half_block_thousandths, timing_.block_thousandths),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
@@ -162,9 +164,10 @@ class TimedZrop : public TimedUnit {
       Cycle ready = visible.of_part(part, parts);
       if (has_cache_) ready = look_up(beat, ready, needs_stencil, looked_up);
       const Cycle at = take(ready, beat.count);
-      if (has_cache_) z_.tested(beat.count, at);
+      if (has_cache_) z_.tested(beat.count, needs_stencil, at);
       const unsigned tested_quads = beat.count;
       port_free_at_ = at + (tested_quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
+      if (blocks_.is_on()) pay_for_blocks(beat, at);
       did(ZropWork::tests, tested_quads, at, port_free_at_);
       QuadBeat before;
       if (may_change || hi_z) before = beat;
@@ -196,6 +199,15 @@ class TimedZrop : public TimedUnit {
     tests_.hold(taken.last);
     if (has_cache_) return looked_up;
     return {tested.first, std::max(tested.last, taken.last)};
+  }
+
+  [[gnu::noinline]] void pay_for_blocks(const QuadBeat& beat, Cycle at) {
+    const std::uint64_t price = blocks_.of(beat.tile, beat.quads.data(), beat.count);
+    paid_until_ = std::max<std::uint64_t>(paid_until_, 1000 * at) + price;
+    tests_.hold(paid_until_ / 1000);
+    port_free_at_ = std::max<Cycle>(port_free_at_, (paid_until_ + 999) / 1000);
+    const std::uint64_t of_quads = std::uint64_t{1000} * beat.count / timing_.quads_per_cycle;
+    if (price > of_quads) did(ZropWork::blocks, price - of_quads, at, port_free_at_);
   }
 
   void pass(Mark mark, Cycle at) {
@@ -293,7 +305,7 @@ class TimedZrop : public TimedUnit {
     for (; !moves_.empty() && moves_.front() <= std::max(test, tests_.next_free()); moves_.pop()) {
       const Cycle at = tests_.take_cycle(moves_.front());
       port_free_at_ = at + 1;
-      did(ZropWork::sectors, timing_.z_cache.sectors_per_cycle, at);
+      did(ZropWork::sectors, timing_.z_cache.moves_in_a_cycle(), at);
     }
   }
 
@@ -333,7 +345,9 @@ class TimedZrop : public TimedUnit {
   EffectGate z_cache_gate_;
   std::unique_ptr<FixedLatencyMemory> no_memory_;  ///< behind a port that is not connected
   Ring<Pending> arrived_;                          ///< updates not looked up yet
-  Ring<Cycle> moves_;                              ///< of a cycle's worth of sectors each, not moved yet
+  Ring<Cycle> moves_;                              ///< of a cycle's worth each, not moved yet
+  BlockPrice blocks_;
+  std::uint64_t paid_until_ = 0;  ///< blocks of tests, in thousandths of a cycle
   HiZReports hi_z_;
 };
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "zrop/block_price.h"
 #include "zrop/hi_z_reports.h"
 #include "zrop/late_quads.h"
 #include "zrop/z_port.h"
@@ -34,6 +35,7 @@ class ZropUnit : public Unit {
         z_(*this, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context, plan_),
         z_cache_gate_(context, "zrop.z_cache"),
         limit_(timing_.quads_per_cycle),
+        blocks_(timing_.half_block_thousandths, timing_.block_thousandths),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
@@ -97,10 +99,10 @@ class ZropUnit : public Unit {
   }
 
   bool move_sectors(Cycle now) {
-    const unsigned sectors = timing_.z_cache.sectors_per_cycle;
-    if (z_.owed_sectors() < sectors || now < free_at_) return false;
-    z_.pay_sectors(sectors);
-    did(ZropWork::sectors, sectors, now);
+    const unsigned moves = timing_.z_cache.moves_in_a_cycle();
+    if (z_.owed_moves() < moves || now < free_at_) return false;
+    z_.pay_moves(moves);
+    did(ZropWork::sectors, moves, now);
     return true;
   }
 
@@ -109,10 +111,11 @@ class ZropUnit : public Unit {
     while (!waits_ && (has_cache_ ? z_.beat_is_there() && !z_.holds_changed() : in_.ready()) && out_.credits() > 0) {
       const QuadBeat& next = has_cache_ ? z_.front() : in_.front();
       const unsigned width = std::max<unsigned>(next.count, 1);
-      if (!limit_.allows(width, now)) break;
+      if (!limit_.allows(width, now) || paid_until_ >= 1000 * (now + 1)) break;
       QuadBeat beat = next;
-      has_cache_ ? z_.pop() : in_.pop();
+      has_cache_ ? z_.pop(now) : in_.pop();
       tested_until_ = now + (width + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
+      if (blocks_.is_on()) pay_for_blocks(beat, now);
       did(ZropWork::tests, beat.count, now, tested_until_);
       const unsigned tested = beat.count;
       if (lacks_cache_ && tested > 0) z_cache_gate_.enter();
@@ -136,8 +139,15 @@ class ZropUnit : public Unit {
       if (beat.count > 0 || beat.last_of_bin || beat.mark != Mark::none) out_.push(beat);
       limit_.take(width);
     }
-    if (moved) free_at_ = limit_.next(now);
+    if (moved) free_at_ = std::max<Cycle>(limit_.next(now), paid_until_ / 1000);
     return moved;
+  }
+  [[gnu::noinline]] void pay_for_blocks(const QuadBeat& beat, Cycle now) {
+    const std::uint64_t price = blocks_.of(beat.tile, beat.quads.data(), beat.count);
+    paid_until_ = std::max<std::uint64_t>(paid_until_, 1000 * now) + price;
+    tested_until_ = std::max<Cycle>(tested_until_, (paid_until_ + 999) / 1000);
+    const std::uint64_t of_quads = std::uint64_t{1000} * beat.count / timing_.quads_per_cycle;
+    if (price > of_quads) did(ZropWork::blocks, price - of_quads, now, tested_until_);
   }
 
   bool test_all(Cycle now) {
@@ -231,7 +241,7 @@ class ZropUnit : public Unit {
           : z_.late_is_there() || (z_.beat_is_there() && !waits_) ? UnitState::blocked
                                                                   : UnitState::memory,
           now);
-    if (looked_up || worked || z_.owed_sectors() >= timing_.z_cache.sectors_per_cycle) return now + 1;
+    if (looked_up || worked || z_.owed_moves() >= timing_.z_cache.moves_in_a_cycle()) return now + 1;
     const Cycle next = z_.next(now, in_, in_terminations_, in_late_);
     return now < free_at_ ? std::min(next, free_at_) : next;
   }
@@ -254,9 +264,11 @@ class ZropUnit : public Unit {
   std::unique_ptr<FixedLatencyMemory> no_memory_;  ///< behind a port that is not connected
   unsigned signal_ = 0;
   BatchLimit limit_;
-  Cycle tested_until_ = 0;  ///< the last beat, rounded up to whole cycles
-  Cycle free_at_ = 0;       ///< after a beat wider than the unit
-  bool waits_ = false;      ///< for a mark to come around
+  BlockPrice blocks_;
+  std::uint64_t paid_until_ = 0;  ///< blocks of tests, in thousandths of a cycle
+  Cycle tested_until_ = 0;        ///< the last beat, rounded up to whole cycles
+  Cycle free_at_ = 0;             ///< after a beat wider than the unit
+  bool waits_ = false;            ///< for a mark to come around
   HiZReports hi_z_;
   Ring<HiZUpdate> told_;  ///< and not sent yet
   ZCacheStatistics cache_statistics_{*this, "cache"};

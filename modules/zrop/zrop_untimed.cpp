@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <optional>
+#include <vector>
 
 #include "zrop/beat_lines.h"
+#include "zrop/block_price.h"
 #include "zrop/hi_z_reports.h"
 #include "zrop/late_quads.h"
 #include "zrop/z_cache_statistics.h"
@@ -34,6 +36,8 @@ class UntimedZrop : public UntimedUnit {
         z_cache_(behaviour_->timing().z_cache),
         memory_({MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)}),
         z_cache_gate_(context, "zrop.z_cache"),
+        quads_per_cycle_(behaviour_->timing().quads_per_cycle),
+        blocks_(behaviour_->timing().half_block_thousandths, behaviour_->timing().block_thousandths),
         hi_z_(context) {
     if (!EffectGate(context, "cache.details").is_active()) cache_statistics_.leave_out_details();
     out_hi_z_.set_optional();
@@ -76,6 +80,11 @@ class UntimedZrop : public UntimedUnit {
       if (follows_cache() && state.reads_depth_stencil_early()) {
         lines().find(beat_.tile, beat_.quads.data(), beat_.count, needed_);
         did(ZropWork::sectors, look_up(beat_.count));
+      }
+      if (blocks_.is_on()) {
+        const std::uint64_t price = blocks_.of(beat_.tile, beat_.quads.data(), beat_.count);
+        const std::uint64_t of_quads = std::uint64_t{1000} * beat_.count / quads_per_cycle_;
+        did(ZropWork::blocks, price > of_quads ? price - of_quads : 0);
       }
       QuadBeat before;
       const bool may_change = follows_cache() && state.tests_early() && state.writes_depth_stencil();
@@ -131,9 +140,11 @@ class UntimedZrop : public UntimedUnit {
     }
     return *lines_;
   }
-  /// What so many quads or updates need. Returns the sectors that no run is spared, whatever its order: for the bound.
+  /// What so many quads or updates need. Returns the moves (ZCache::moves_in_a_cycle) that no run is spared, whatever its order:
+  /// for the bound.
   std::uint64_t look_up(unsigned accesses) {
     const std::uint64_t before = cache_statistics_.sector_misses_compulsory.value();
+    std::uint64_t first_lines = 0;
     for (unsigned i = 0; i < needed_.count; ++i) {
       LineAccess access;
       access.address = needed_.lines[i].address;
@@ -145,11 +156,21 @@ class UntimedZrop : public UntimedUnit {
         if (access.written_back != 0) cleared_->written(access.old_address, access.written_back);
       }
       line_ = access.line;
+      if (z_cache_.line_thousandths > 0 && access.filled != 0) first_lines += is_first(access.address) ? 1U : 0U;
       memory_.move(access, z_cache_.organization);
     }
     cache_->accessed(accesses, accesses);
     // Cleared sectors are not read for the first time.
+    if (z_cache_.line_thousandths > 0) return first_lines * z_cache_.line_thousandths;
     return cleared_ ? 0 : cache_statistics_.sector_misses_compulsory.value() - before;
+  }
+  /// Whether sectors of a line are filled for the first time.
+  bool is_first(std::uint64_t address) {
+    const std::size_t line = (address - behaviour_->surface()->address({0, 0}, 0)) / z_cache_.organization.line_bytes;
+    if (line >= filled_lines_.size()) filled_lines_.resize(line + 1);
+    const bool is_first = !filled_lines_[line];
+    filled_lines_[line] = true;
+    return is_first;
   }
 
   const RenderContext& context_;
@@ -170,6 +191,9 @@ class UntimedZrop : public UntimedUnit {
   BeatLines::Needed needed_;
   SectoredCache::Line line_ = SectoredCache::no_line;  ///< that was looked up last
   QuadBeat beat_;
+  const unsigned quads_per_cycle_;
+  BlockPrice blocks_;
+  std::vector<bool> filled_lines_;  ///< of the surface, where lines have a price
   HiZReports hi_z_;
 };
 

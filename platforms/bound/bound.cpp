@@ -39,6 +39,7 @@ void Work::add(const Work& other) {
   quads_tested += other.quads_tested;
   updates += other.updates;
   z_sectors += other.z_sectors;
+  z_blocks += other.z_blocks;
   survivors += other.survivors;
   late_quads += other.late_quads;
   vertex_warps += other.vertex_warps;
@@ -46,10 +47,12 @@ void Work::add(const Work& other) {
   warps += other.warps;
   fragment_instructions += other.fragment_instructions;
   merging_warps += other.merging_warps;
+  launches += other.launches;
   color_quads += other.color_quads;
   sectors += other.sectors;
   sectors_filled += other.sectors_filled;
   lines_filled += other.lines_filled;
+  lines_paid += other.lines_paid;
 }
 
 PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc) {
@@ -95,21 +98,22 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
                          ratio(done.attribute_bytes_written - std::min(done.attribute_bytes_written, sent),
                                std::uint64_t{sm_.cores} * sm_.fetch.core_bytes));
   cycles[tgc] = std::max(ratio(done.bin_entries, tgc_.items_per_cycle), ratio(done.setups, 1));
-  cycles[raster] = std::max({spaced(done.setups, raster_.setup_interval_cycles, to_last),
+  cycles[raster] = std::max({spaced(done.setups, raster_.setup_interval_thousandths / 1000.0, to_last),
                              ratio(done.coarse_tiles, raster_.coarse_tiles_per_cycle),
                              ratio(done.fine_tiles, raster_.fine_tiles_per_cycle),
-                             spaced(done.tile_pairs, raster_.screen_tile_interval_cycles, to_last),
+                             spaced(done.tile_pairs, raster_.screen_tile_interval_thousandths / 1000.0, to_last),
                              ratio(done.quads_rasterized, raster_.quads_per_cycle)});
   cycles[tc] = std::max(ratio(done.quads_rasterized, tc_.quads_per_cycle), ratio(done.bin_beats, 1));
   const auto from_l2 = [&](std::uint64_t bytes) {
     return l2_bytes_per_cycle_ == 0 ? 0.0 : ratio(bytes, l2_bytes_per_cycle_);
   };
-  cycles[test] = std::max({ratio(done.quads_tested, zrop_.quads_per_cycle) + update_cycles(done) +
-                               ratio(done.z_sectors, zrop_.z_cache.sectors_per_cycle),
-                           ratio(done.quads_rasterized, prop_.quads_per_cycle),
-                           from_l2(done.z_sectors * zrop_.z_cache.organization.sector_bytes)});
+  const std::uint64_t z_bytes =
+      zrop_.z_cache.line_thousandths == 0 ? done.z_sectors * zrop_.z_cache.organization.sector_bytes : 0;
+  cycles[test] = std::max({ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(done.z_blocks, 1000) +
+                               update_cycles(done) + ratio(done.z_sectors, zrop_.z_cache.moves_in_a_cycle()),
+                           ratio(done.quads_rasterized, prop_.quads_per_cycle), from_l2(z_bytes)});
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
-  cycles[sm] = instructions(done) / sm_.instructions_per_cycle();
+  cycles[sm] = std::max(instructions(done) / sm_.instructions_per_cycle(), ratio(done.launches, 1000));
   cycles[late] = ratio(done.late_quads, std::min(zrop_.quads_per_cycle, prop_.quads_per_cycle));
   cycles[color] = static_cast<double>(done.color_quads) / prop_.color_rate.per_cycle();
   cycles[l2] = from_l2(done.sectors * crop_.sector_bytes);
@@ -118,31 +122,33 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   const auto turns = [&](std::uint64_t fills, std::uint64_t places) {
     return fills <= places ? 0.0 : ratio(fills - places, places) * l2_latency_cycles_;
   };
-  cycles[crop] = std::max({static_cast<double>(done.color_quads) / crop_.blend_rate.per_cycle() +
-                               ratio(done.sectors, crop_.sectors_per_cycle),
-                           turns(done.lines_filled, std::max(crop_.cache_bytes / crop_.line_bytes, 1U)),
-                           turns(done.sectors_filled, crop_.mshrs)});
+  cycles[crop] = std::max(
+      {static_cast<double>(done.color_quads) / crop_.blend_rate.per_cycle() +
+           ratio(color_moves(done) * crop_.parts_of_a_move(), crop_.moves_in_a_cycle()),
+       crop_.fetches_ahead ? 0.0 : turns(done.lines_filled, std::max(crop_.cache_bytes / crop_.line_bytes, 1U)),
+       turns(done.sectors_filled, crop_.mshrs)});
   return cycles;
 }
 
 std::uint64_t PhaseBound::z_sectors_of(std::uint64_t filled) const {
-  const std::uint64_t ahead = zrop_.z_cache.input_quads;
-  const std::uint64_t sectors = filled > ahead ? filled - ahead : 0;
-  return sectors - sectors % zrop_.z_cache.sectors_per_cycle;
+  const std::uint64_t ahead = std::uint64_t{zrop_.z_cache.input_quads} * std::max(zrop_.z_cache.line_thousandths, 1U);
+  const std::uint64_t moves = filled > ahead ? filled - ahead : 0;
+  return moves - moves % zrop_.z_cache.moves_in_a_cycle();
 }
 
 double PhaseBound::update_cycles(const Work& done) const {
   const double updates = ratio(done.updates, zrop_.updates_per_cycle);
-  if (zrop_.quads_per_cycle >= QuadBeat::capacity) return updates;
+  if (zrop_.quads_per_cycle >= QuadBeat::capacity && zrop_.block_thousandths == 0) return updates;
   // Beside a beat that takes several cycles updates take nothing of their own.
-  return std::max(0.0, updates - ratio(done.quads_tested, zrop_.quads_per_cycle));
+  return std::max(0.0, updates - ratio(done.quads_tested, zrop_.quads_per_cycle) - ratio(done.z_blocks, 1000));
 }
 
 double PhaseBound::idle_after_last(unsigned stage) const {
-  const double interval = stage == draw ? 1 / vertex_warps_per_cycle_
-                          : stage == raster
-                              ? std::max(raster_.setup_interval_cycles, raster_.screen_tile_interval_cycles)
-                              : 1.0;
+  const double interval =
+      stage == draw ? 1 / vertex_warps_per_cycle_
+      : stage == raster
+          ? std::max(raster_.setup_interval_thousandths, raster_.screen_tile_interval_thousandths) / 1000.0
+          : 1.0;
   return std::max(0.0, interval - 1);
 }
 
@@ -214,9 +220,10 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
   if (slot == "vpo") return priced(VpoWork::kinds(vpo_), {count(done.triangles)});
   if (slot == "tgc") return priced(TgcWork::kinds(tgc_), {count(done.bin_entries), count(done.setups)});
   if (slot == "raster") {
-    const double setups = spaced(done.setups, raster_.setup_interval_cycles, true) / raster_.setup_interval_cycles;
-    const double pairs =
-        spaced(done.tile_pairs, raster_.screen_tile_interval_cycles, true) / raster_.screen_tile_interval_cycles;
+    const double setup = raster_.setup_interval_thousandths / 1000.0;
+    const double pair = raster_.screen_tile_interval_thousandths / 1000.0;
+    const double setups = spaced(done.setups, setup, true) / setup;
+    const double pairs = spaced(done.tile_pairs, pair, true) / pair;
     return priced(RasterWork::kinds(raster_),
                   {setups, count(done.coarse_tiles), count(done.fine_tiles), pairs, count(done.quads_rasterized)});
   }
@@ -227,8 +234,8 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
                    count(done.color_quads), 0.0, count(done.late_quads)});
   }
   if (slot == "zrop") {
-    return priced(ZropWork::kinds(zrop_),
-                  {count(done.quads_tested), update_cycles(done), count(done.z_sectors), count(done.late_quads)});
+    return priced(ZropWork::kinds(zrop_), {count(done.quads_tested), update_cycles(done), count(done.z_sectors),
+                                           count(done.late_quads), count(done.z_blocks)});
   }
   if (slot == "qru") {
     const double quads = count(done.survivors) - count(done.warps) * qru_.items_per_cycle;
@@ -236,9 +243,9 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
   }
   if (slot == "sm") {
     return priced(SmWork::kinds(sm_), {count(done.vertex_warps * sum_of(sm_.vertex)), count(done.fragment_instructions),
-                                       count(done.merging_warps * sum_of(sm_.merge))});
+                                       count(done.merging_warps * sum_of(sm_.merge)), count(done.launches)});
   }
-  if (slot == "crop") return priced(CropWork::kinds(crop_), {count(done.color_quads), count(done.sectors)});
+  if (slot == "crop") return priced(CropWork::kinds(crop_), {count(done.color_quads), count(color_moves(done))});
   if (slot == "l2" && l2_bytes_per_cycle_ > 0)
     return {{"bytes", 0, ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_), true}};
   return {};

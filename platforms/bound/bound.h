@@ -29,16 +29,19 @@ struct Work : FrontEndWork {
   std::uint64_t bin_beats = 0;
   std::uint64_t quads_tested = 0;
   std::uint64_t updates = 0;
-  std::uint64_t z_sectors = 0;  ///< filled into the z-cache, in whole cycles of it
+  std::uint64_t z_sectors = 0;  ///< moves of the z-cache (ZCache::moves_in_a_cycle) for what it fills, in whole cycles
+  std::uint64_t z_blocks = 0;   ///< thousandths of a cycle beyond what quads_tested take
   std::uint64_t survivors = 0;
   std::uint64_t late_quads = 0;  ///< tested after shading
   std::uint64_t warps = 0;
   std::uint64_t fragment_instructions = 0;  ///< of these warps
   std::uint64_t merging_warps = 0;
+  std::uint64_t launches = 0;  ///< of warps, thousandths of a cycle
   std::uint64_t color_quads = 0;
   std::uint64_t sectors = 0;  ///< filled or written back
   std::uint64_t sectors_filled = 0;
   std::uint64_t lines_filled = 0;  ///< of the colour cache, in the place of others
+  std::uint64_t lines_paid = 0;    ///< of it, that were written back, or fetched for a quad that changes a value
 
   void add(const Work& other);
 };
@@ -96,13 +99,15 @@ class PhaseBound {
   std::array<double, stages> end_of(const Work& done, bool to_last) const;
   double instructions(const Work& done) const;
   double update_cycles(const Work& done) const;
+  /// That take time from blending: sectors, or lines where these have a price.
+  std::uint64_t color_moves(const Work& done) const { return crop_.line_cycles == 0 ? done.sectors : done.lines_paid; }
   /// Between a stage's items are more cycles than an item takes: those after the last, for which nobody waits.
   double idle_after_last(unsigned stage) const;
 
   double vertex_warps_per_cycle_ = 1;
   Throughput vpo_;
   Throughput tgc_;
-  RasterBehaviour::TimingParameters raster_{1, 1, 1, 1, 1, 1};
+  RasterBehaviour::TimingParameters raster_{1, 1000, 1, 1, 1000, 1};
   TcBehaviour::TimingParameters tc_{1, 1, 0, 1};
   PropBehaviour::TimingParameters prop_{1, {}, 1, PropBehaviour::Order::tile};
   ZropBehaviour::TimingParameters zrop_{1, 1, 1};

@@ -24,9 +24,16 @@ class WorkCounter::Blends final : public BlendObserver {
  public:
   Blends(PhaseBound& bound, const Frame& frame, const ColorSurface& surface,
          const CropBehaviour::TimingParameters& crop, bool only_needed, bool any_order)
-      : work_(bound.work), bound_(bound), frame_(frame), grid_(surface.grid()), line_bytes_(crop.line_bytes) {
+      : work_(bound.work),
+        bound_(bound),
+        frame_(frame),
+        surface_(surface),
+        grid_(surface.grid()),
+        line_bytes_(crop.line_bytes) {
     if (only_needed) terminated_.resize(grid_.quads());
-    if (any_order) filled_.resize(surface.size_bytes() / line_bytes_ + 1);
+    const std::size_t lines = surface.size_bytes() / line_bytes_ + 1;
+    if (any_order) filled_.resize(lines);
+    if (crop.line_cycles > 0) unpaid_.resize(lines);
   }
 
   void passed(Mark mark) {
@@ -85,9 +92,14 @@ class WorkCounter::Blends final : public BlendObserver {
     work_.sectors += bits_of_mask(fills) + bits_of_mask(written_back);
     work_.sectors_filled += bits_of_mask(fills);
     work_.lines_filled += fills_line ? 1U : 0U;
+    if (unpaid_.empty()) return;
+    work_.lines_paid += written_back != 0 ? 1U : 0U;
+    // Where each sector is filled once, a line is fetched once at least.
+    if (filled_.empty() ? fills != 0 : fills_line) unpaid_[access.address / line_bytes_] = true;
   }
 
   void blended(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) override {
+    if (!unpaid_.empty()) pay(warp, index, outcome.changed);
     if (terminated_.empty()) {
       ++work_.color_quads;
       work_.updates += outcome.terminated != 0 ? 1U : 0U;
@@ -100,6 +112,13 @@ class WorkCounter::Blends final : public BlendObserver {
   }
 
  private:
+  void pay(const ShadedWarp& warp, unsigned index, bool changed) {
+    const std::size_t place = grid_.place(warp.tile, warp.position[index]);
+    if (!terminated_.empty() && terminates(warp.draw[index]) && (warp.live[index] & ~terminated_[place]) == 0) return;
+    const std::size_t line = surface_.address(place) / line_bytes_;
+    work_.lines_paid += unpaid_[line] && changed ? 1U : 0U;
+    unpaid_[line] = false;
+  }
   bool is_needed(std::size_t tile, const Quad& quad) const {
     return !terminates(quad.draw) || (quad.coverage & ~terminated_[tile + quad.position]) != 0;
   }
@@ -111,10 +130,12 @@ class WorkCounter::Blends final : public BlendObserver {
   Work& work_;
   const PhaseBound& bound_;
   const Frame& frame_;
+  const ColorSurface& surface_;
   const ScreenTiling grid_;
   const std::uint32_t line_bytes_;
   std::vector<LaneMask> terminated_;   ///< by quad of the surface; empty if all work counts
   std::vector<std::uint32_t> filled_;  ///< sectors so far, by line of the surface; empty if all moves count
+  std::vector<bool> unpaid_;           ///< by line of the surface; empty if lines have no price
   std::uint64_t instructions_ = 0;     ///< of the last warp
   unsigned needed_quads_ = 0;          ///< less than a warp
   unsigned needed_pairs_ = 0;
@@ -215,6 +236,9 @@ void WorkCounter::count() {
   count_front_end(bound_.work);
   bound_.work.bin_beats = items(tc_, TcWork::beats) - before_.bin_beats;
   bound_.work.quads_tested = items(zrop_, ZropWork::tests) - before_.quads_tested;
+  bound_.work.z_blocks = items(zrop_, ZropWork::blocks) - before_.z_blocks;
+  // Where time-outs decide what is flushed, some run may be spared warps of this one.
+  if (counts_late_) bound_.work.launches = items(sm_, SmWork::launches) - before_.launches;
   if (counts_late_) bound_.work.late_quads = items(zrop_, ZropWork::late_tests) - before_.late_quads;
   bound_.work.z_sectors = bound_.z_sectors_of(items(zrop_, ZropWork::sectors) - z_sectors_before_);
 }

@@ -9,12 +9,13 @@ namespace vrpipe {
 Platform agx_orin();
 Platform agx_orin_lpddr3();
 Platform agx_orin_lpddr5();
+Platform gh100_gpc();
 Platform mobile();
 Platform desktop();
 
 namespace {
 std::vector<Platform>& list() {
-  static std::vector<Platform> all{agx_orin(), mobile(), desktop(), agx_orin_lpddr3(), agx_orin_lpddr5()};
+  static std::vector<Platform> all{agx_orin(), mobile(), desktop(), agx_orin_lpddr3(), agx_orin_lpddr5(), gh100_gpc()};
   return all;
 }
 }  // namespace

@@ -50,10 +50,10 @@ class CheckedRaster final : public CheckedSlot<RasterBehaviour> {
   TimingParameters timing() const override {
     const TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
     check_latency("setup_latency_cycles", timing.setup_latency_cycles);
-    check_latency("setup_interval_cycles", timing.setup_interval_cycles);
+    check_latency("setup_interval_thousandths", timing.setup_interval_thousandths);
     check_rate("coarse_tiles_per_cycle", timing.coarse_tiles_per_cycle);
     check_rate("fine_tiles_per_cycle", timing.fine_tiles_per_cycle);
-    check_latency("screen_tile_interval_cycles", timing.screen_tile_interval_cycles);
+    check_latency("screen_tile_interval_thousandths", timing.screen_tile_interval_thousandths);
     check_rate("quads_per_cycle", timing.quads_per_cycle);
     return timing;
   }

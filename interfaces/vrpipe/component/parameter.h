@@ -76,6 +76,8 @@ class Real : public Parameter {
   Real(ParameterSet& owner, const char* name, double value, double minimum, double maximum, const char* unit,
        const char* source, const char* meaning);
   operator double() const { return value_; }
+  /// For integer time: rounded to thousandths.
+  std::uint32_t thousandths() const { return static_cast<std::uint32_t>(value_ * 1000 + 0.5); }
   std::string value() const override;
   std::string default_value() const override;
   std::string range() const override;

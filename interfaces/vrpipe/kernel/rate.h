@@ -76,4 +76,21 @@ class BatchLimit {
   bool first_ = true;  ///< of its cycle
 };
 
+/// A resource whose work is measured in thousandths of a cycle.
+class ThousandthsPort {
+ public:
+  /// Whether more can begin in a cycle.
+  bool is_free(Cycle now) const { return until_ < 1000 * (now + 1); }
+  /// The first such cycle from one on.
+  Cycle free_from(Cycle cycle) const { return std::max<Cycle>(cycle, until_ / 1000); }
+  /// Begins in a cycle in which it is free; returns the cycle in which it is over.
+  Cycle take(Cycle now, std::uint64_t thousandths) {
+    until_ = std::max<std::uint64_t>(until_, 1000 * now) + thousandths;
+    return (until_ + 999) / 1000;
+  }
+
+ private:
+  std::uint64_t until_ = 0;
+};
+
 }  // namespace vrpipe

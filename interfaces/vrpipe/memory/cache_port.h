@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cleared_sectors.h>
 #include <vrpipe/memory/memory_port.h>
 #include <vrpipe/memory/sectored_cache.h>
@@ -41,6 +43,7 @@ class CachePort {
   /// And where it is known what sectors hold that were cleared, which outlives it.
   void know_cleared(ClearedSectors& cleared) { cleared_ = &cleared; }
   SectoredCache& cache() { return *cache_; }
+  MemoryPort& memory() { return memory_; }
   const MemoryBytes& moved() const { return memory_.moved(); }
   Cycle next_completion() const { return memory_.next_completion(); }
 
@@ -51,6 +54,10 @@ class CachePort {
     while (memory_.next_completed(tag)) {
       any = true;
       if (tag == write_back_tag) continue;
+      if ((tag & ahead_tag) != 0) {
+        ahead_done_.push(tag & ~ahead_tag);
+        continue;
+      }
       const SectoredCache::Line line = tag >> (2 * sector_bits);
       const unsigned first = tag & (sectors_at_most - 1);
       const unsigned count = (tag >> sector_bits & (sectors_at_most - 1)) + 1;
@@ -115,11 +122,30 @@ class CachePort {
     }
     return true;
   }
+  /// Where tags run ahead of data, who looks up in the cache himself has read what it lacks: for himself, not for a line, which
+  /// may go meanwhile. Only while the memory is available; `id`, below 2^31 - 1, comes back from `next_ahead`.
+  void read_ahead(std::uint64_t address, unsigned sectors, std::uint32_t id) {
+    memory_.read(address, sectors << sector_shift_, ahead_tag | id);
+  }
+  bool memory_is_available() const { return memory_.available(); }
+  bool next_ahead(std::uint32_t& id) {
+    if (ahead_done_.empty()) return false;
+    id = ahead_done_.front();
+    ahead_done_.pop();
+    return true;
+  }
   /// Of what a look-up needs, what is still on its way.
   std::uint32_t awaited(SectoredCache::Line line, std::uint32_t sectors) const {
     return cache_->filling(line) & sectors;
   }
 
+  /// The same of a line that was evicted past the port; only while nothing waits to be sent.
+  void evict(const LineAccess& evicted) {
+    write_back_ = evicted.written_back;
+    write_back_address_ = evicted.old_address;
+    ++lines_moved_.written_back;
+    if (cleared_ != nullptr) cleared_->written(evicted.old_address, evicted.written_back);
+  }
   /// Sends dirty sectors of an evicted line, as each look-up does that follows the eviction; false while some are left.
   template <class Moved>
   bool write_back(Moved&& moved) {
@@ -132,10 +158,17 @@ class CachePort {
     return write_back_ == 0;
   }
   bool has_written_back() const { return write_back_ == 0; }
+  /// Since this was last called: lines that were allocated, and lines of which sectors were written back.
+  struct LinesMoved {
+    unsigned allocated = 0;
+    unsigned written_back = 0;
+  };
+  LinesMoved take_lines_moved() { return std::exchange(lines_moved_, {}); }
 
  private:
   // What a memory access is for: a sector of a line, or nothing that anyone waits for.
   static constexpr std::uint32_t write_back_tag = ~0U;
+  static constexpr std::uint32_t ahead_tag = 1U << 31U;
   static constexpr unsigned sector_bits = 5;
   static constexpr unsigned sectors_at_most = 1U << sector_bits;
 
@@ -158,6 +191,8 @@ class CachePort {
       SectoredCache::Evicted evicted;
       wanted.line = cache_->allocate(wanted.address, evicted);
       write_back_ = evicted.dirty;
+      ++lines_moved_.allocated;
+      lines_moved_.written_back += evicted.dirty != 0 ? 1U : 0U;
       write_back_address_ = evicted.address;
       if (cleared_ != nullptr && evicted.dirty != 0) cleared_->written(evicted.address, evicted.dirty);
     }
@@ -178,6 +213,8 @@ class CachePort {
   unsigned fills_in_flight_ = 0;
   std::uint32_t write_back_ = 0;  ///< dirty sectors of an evicted line yet to be sent
   std::uint64_t write_back_address_ = 0;
+  LinesMoved lines_moved_;
+  Ring<std::uint32_t> ahead_done_;  ///< reads
 };
 
 }  // namespace vrpipe

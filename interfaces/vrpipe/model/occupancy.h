@@ -73,8 +73,9 @@ struct PropWork {
   static std::vector<WorkKind> kinds(const PropBehaviour::TimingParameters& timing);
 };
 struct ZropWork {
-  /// Quads tested before shading, cycles with updates, sectors moved, quads tested after shading.
-  enum : unsigned { tests, updates, sectors, late_tests };
+  /// Quads tested before shading, cycles with updates, sectors moved (or lines, in thousandths of a cycle), quads tested
+  /// after shading, and what the blocks that quads touch take beyond their number, in thousandths of a cycle.
+  enum : unsigned { tests, updates, sectors, late_tests, blocks };
   static std::vector<WorkKind> kinds(const ZropBehaviour::TimingParameters& timing);
 };
 struct QruWork {
@@ -82,15 +83,17 @@ struct QruWork {
   static std::vector<WorkKind> kinds(const Throughput& timing);
 };
 struct SmWork {
-  enum : unsigned { vertex, fragment, merge };  ///< warp instructions
+  /// Warp instructions; and handing warps to cores, in thousandths of a cycle.
+  enum : unsigned { vertex, fragment, merge, launches };
   static std::vector<WorkKind> kinds(const SmBehaviour::TimingParameters& timing);
 };
 struct CropWork {
-  /// Quads blended, sectors moved, and what hazards waste of the blender: shares of a cycle, of which one has
+  /// Quads blended, what moves in its time (sectors, or lines where these have a price), and what hazards waste of the
+  /// blender, and quads that have no neighbour to go with (pairs_in_sector): shares of a cycle, of which one has
   /// `parts_of_a_cycle`.
-  enum : unsigned { blend, sectors, forwarding };
+  enum : unsigned { blend, sectors, forwarding, unpaired };
   static std::uint64_t parts_of_a_cycle(const CropBehaviour::TimingParameters& timing) {
-    return std::uint64_t{timing.blend_rate.items} * timing.sectors_per_cycle;
+    return std::uint64_t{timing.blend_rate.items} * timing.moves_in_a_cycle();
   }
   static std::vector<WorkKind> kinds(const CropBehaviour::TimingParameters& timing);
 };

@@ -72,7 +72,14 @@ class CropBehaviour : public Behaviour {
     Replacement replacement = Replacement::lru;
     std::uint32_t random_seed = 0;  ///< of random replacement
     bool hashes_sets = false;
-    bool tells_conflicts = false;  ///< conflict misses are counted apart from capacity misses
+    bool tells_conflicts = false;          ///< conflict misses are counted apart from capacity misses
+    std::uint32_t line_cycles = 0;         ///< of blending, for a line that moves; 0: sectors are what takes time
+    bool fetches_ahead = false;            ///< a line may go while quads wait to be blended into it
+    std::uint32_t line_return_cycles = 0;  ///< from a line's last use to the next, if it left in between
+    bool pairs_in_sector = false;          ///< quads blended in one cycle share a sector
+    /// Of the cycles of the blender: in how many parts what moves is paid, and how many of these a move takes.
+    std::uint32_t moves_in_a_cycle() const { return line_cycles == 0 ? sectors_per_cycle : 1; }
+    std::uint32_t parts_of_a_move() const { return line_cycles == 0 ? 1 : line_cycles; }
     CacheOrganization cache() const;
     /// Throws UserError for a cache that cannot be (CacheOrganization::check), or whose lines do not hold a quad.
     void check_cache(ColorFormat format) const;

@@ -24,11 +24,11 @@ class RasterBehaviour : public Behaviour {
   virtual bool waits_at(Mark /*mark*/) const { return false; }
   struct TimingParameters {
     std::uint32_t setup_latency_cycles;
-    std::uint32_t setup_interval_cycles;        ///< between primitives
-    std::uint32_t coarse_tiles_per_cycle;       ///< raster tiles tested
-    std::uint32_t fine_tiles_per_cycle;         ///< raster tiles made into quads
-    std::uint32_t screen_tile_interval_cycles;  ///< between (primitive, screen tile) pairs
-    std::uint32_t quads_per_cycle;              ///< handed to TC
+    std::uint32_t setup_interval_thousandths;        ///< of a cycle, between primitives
+    std::uint32_t coarse_tiles_per_cycle;            ///< raster tiles tested
+    std::uint32_t fine_tiles_per_cycle;              ///< raster tiles made into quads
+    std::uint32_t screen_tile_interval_thousandths;  ///< of a cycle, between (primitive, screen tile) pairs
+    std::uint32_t quads_per_cycle;                   ///< handed to TC
   };
   virtual TimingParameters timing() const = 0;
 

@@ -31,6 +31,14 @@ struct AttributeFetch {
   void check() const;
 };
 
+/// What handing fragment warps to cores takes beyond a cycle each, in thousandths of a cycle.
+struct HandOverPrice {
+  std::uint32_t warp_thousandths = 0;     ///< of a full warp; of another in proportion
+  std::uint32_t visit_thousandths = 0;    ///< the least for a primitive's quads in a screen tile, one after the other
+  std::uint32_t discard_thousandths = 0;  ///< on top of that, of a program that discards
+  bool is_on() const { return warp_thousandths != 0 || visit_thousandths != 0 || discard_thousandths != 0; }
+};
+
 /// Slot `sm`: vertex and fragment shading, alpha pruning, quad merging.
 class SmBehaviour : public Behaviour {
  public:
@@ -54,6 +62,7 @@ class SmBehaviour : public Behaviour {
     AttributeFetch fetch = {};
     std::vector<ShaderSegment> mesh = {};             ///< the fragment program of meshes; none: `fragment`
     std::vector<ShaderSegment> alpha_threshold = {};  ///< of FragmentShader::alpha_threshold; none: `fragment`
+    HandOverPrice hand_over = {};
     /// The fragment program of draws with a shader.
     const std::vector<ShaderSegment>& fragment_program(FragmentShader shader) const;
     /// Fragment warps in flight in the array. Throws UserError if they are more than slots have numbers.

@@ -1,0 +1,221 @@
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <vrpipe/kernel/ring.h>
+#include <vrpipe/memory/cache_port.h>
+#include <vrpipe/memory/line_returns.h>
+
+namespace vrpipe {
+
+/// The colour cache at cycle where its tags run ahead of its data (Igehy et al., "Prefetching in a texture cache
+/// architecture", 1998): a line goes for another though quads wait to be blended into it, so that more lines are under
+/// way than the cache holds. What it held is written back once the last of them has been. A line that is wanted again
+/// before that is fetched at once, and again behind what is written back (measured on a GH100 graphics GPC).
+class LinesAhead {
+ public:
+  /// A stay of a line in the cache, by number.
+  using Stay = std::uint32_t;
+  static constexpr Stay no_stay = ~0U;
+
+  /// The port's cache has been made. Port, statistics and returns outlive it.
+  LinesAhead(CachePort& port, SectoredCacheStatistics& statistics, LineReturns& returns, unsigned mshrs)
+      : port_(port),
+        statistics_(statistics),
+        returns_(returns),
+        sector_bytes_(port.cache().organization().sector_bytes),
+        sectors_of_a_line_(port.cache().organization().sectors_of_a_line()),
+        mshrs_(mshrs),
+        stay_of_line_(port.cache().organization().lines(), no_stay),
+        latest_(returns.lines(), no_stay) {}
+
+  /// Looks a quad up, which then waits to be blended; `no_stay` while it has to wait for the memory port or a register.
+  Stay look_up(std::uint64_t address, std::uint32_t sectors) {
+    const auto most = static_cast<unsigned>(__builtin_popcount(sectors));
+    if (!requests_.empty() || !port_.memory().available() || filling_ + most > mshrs_) return no_stay;
+    LineAccess access;
+    access.address = address;
+    access.sectors = sectors;
+    port_.cache().look_up(access);
+    if (access.replaced) begin(access);
+    const Stay number = stay_of_line_[access.line];
+    State& stay = stays_[number];
+    ++stay.quads;
+    if (access.filled == 0) return number;
+    stay.filling |= access.filled;
+    if (stay.waits) stay.again |= access.filled;
+    for_each_sector_run(access.filled, sectors_of_a_line_, [&](unsigned first, unsigned count) {
+      request({number, first, count, Request::fill});
+    });
+    return number;
+  }
+
+  /// Takes the sectors that have come, and sends what waits for the memory port; true if there were any.
+  bool advance() {
+    bool any = false;
+    std::uint32_t tag = 0;
+    while (port_.memory().next_completed(tag)) {
+      any = true;
+      if (tag == write_back_tag) continue;
+      State& stay = stays_[tag >> 11U];
+      const unsigned count = (tag >> 5U & 31U) + 1;
+      const std::uint32_t came = sector_mask(tag & 31U, count);
+      (((tag >> 10U) & 1U) != 0 ? stay.filling_again : stay.filling) &= ~came;
+      filling_ -= count;
+      free_if_done(tag >> 11U);
+    }
+    while (!requests_.empty() && port_.memory().available()) {
+      const Request next = requests_.front();
+      requests_.pop();
+      send(next);
+    }
+    return any;
+  }
+  bool idle() const { return requests_.empty(); }
+
+  /// What a quad whose turn it is to be blended still waits for.
+  enum class Wait : std::uint8_t { none, memory, until };
+  Wait waits(Stay number, std::uint32_t sectors, Cycle now) const {
+    const State& stay = stays_[number];
+    if (stay.waits || ((stay.filling | stay.filling_again) & sectors) != 0) return Wait::memory;
+    return stay.came_back && now < returns_.from(stay.address) ? Wait::until : Wait::none;
+  }
+  /// Of one that waits `until`.
+  Cycle ready_at(Stay number) const { return returns_.from(stays_[number].address); }
+
+  /// A quad has been blended.
+  void blended(Stay number, std::uint32_t sectors, bool changed, Cycle now) {
+    State& stay = stays_[number];
+    stay.came_back = false;
+    returns_.used(stay.address, now);
+    if (changed) stay.dirty |= sectors;
+    if (std::exchange(stay.unpaid, false) && changed) ++moves_.lines;
+    if (--stay.quads == 0 && stay.left) end(number);
+  }
+
+  /// Since this was last called: sectors, and lines that were written back, or fetched for a quad that changed a value: the first of
+  /// the stay.
+  struct Moves {
+    unsigned sectors = 0;
+    unsigned lines = 0;
+  };
+  Moves take_moves() { return std::exchange(moves_, {}); }
+  std::uint64_t take_fetched_again() { return std::exchange(fetched_again_, 0); }
+
+ private:
+  static constexpr std::uint32_t write_back_tag = ~0U;
+  struct State {
+    std::uint64_t address = 0;
+    std::uint32_t filling = 0;        ///< sectors on their way
+    std::uint32_t filling_again = 0;  ///< and of the second fetch
+    std::uint32_t again = 0;          ///< to be fetched once more
+    std::uint32_t dirty = 0;
+    std::uint32_t quads = 0;   ///< looked up and not blended
+    Stay following = no_stay;  ///< of the same line, which waits for the end of this one
+    bool left = false;         ///< the line has gone for another
+    bool ended = false;
+    bool unpaid = true;      ///< nothing has been blended into it: the quad for which it was fetched is the first
+    bool waits = false;      ///< for the stay before it to end
+    bool came_back = false;  ///< the line was there before; nothing has been blended into it since
+  };
+  struct Request {
+    enum Kind : std::uint8_t { fill, fill_again, write_back };
+    Stay stay = 0;  ///< of a write-back nothing: that has an address
+    unsigned first = 0;
+    unsigned count = 0;
+    Kind kind = fill;
+    std::uint64_t address = 0;
+  };
+
+  void begin(const LineAccess& access) {
+    if (const Stay before = stay_of_line_[access.line]; before != no_stay) {
+      stays_[before].left = true;
+      if (stays_[before].quads == 0) end(before);
+    }
+    if (free_.empty()) {
+      free_.push_back(static_cast<Stay>(stays_.size()));
+      stays_.emplace_back();
+    }
+    const Stay number = free_.back();
+    free_.pop_back();
+    State& stay = stays_[number];
+    stay = {};
+    stay.address = access.address;
+    stay.came_back = returns_.from(access.address) != 0;
+    Stay& latest = latest_[returns_.index(access.address)];
+    if (latest != no_stay) {
+      stays_[latest].following = number;
+      stay.waits = stay.came_back = true;
+    }
+    latest = number;
+    stay_of_line_[access.line] = number;
+  }
+  /// The last quad of a line that has left has been blended.
+  void end(Stay number) {
+    State& stay = stays_[number];
+    stay.ended = true;
+    Stay& latest = latest_[returns_.index(stay.address)];
+    if (latest == number) latest = no_stay;
+    if (stay.dirty != 0) {
+      const auto count = static_cast<unsigned>(__builtin_popcount(stay.dirty));
+      statistics_.sectors_written_back += count;
+      statistics_.bytes_written_back += count * sector_bytes_;
+      ++moves_.lines;
+      for_each_sector_run(stay.dirty, sectors_of_a_line_, [&](unsigned first, unsigned sectors) {
+        request({number, first, sectors, Request::write_back, stay.address});
+      });
+    }
+    if (stay.following != no_stay) {
+      State& following = stays_[stay.following];
+      following.waits = false;
+      const std::uint32_t again = std::exchange(following.again, 0);
+      following.filling_again = again;
+      fetched_again_ += static_cast<unsigned>(__builtin_popcount(again));
+      for_each_sector_run(again, sectors_of_a_line_, [&](unsigned first, unsigned sectors) {
+        request({stay.following, first, sectors, Request::fill_again});
+      });
+    }
+    free_if_done(number);
+  }
+  void free_if_done(Stay number) {
+    const State& stay = stays_[number];
+    if (stay.ended && (stay.filling | stay.filling_again) == 0) free_.push_back(number);
+  }
+
+  void request(const Request& wanted) {
+    moves_.sectors += wanted.count;
+    if (wanted.kind != Request::write_back) filling_ += wanted.count;
+    if (requests_.empty() && port_.memory().available()) {
+      send(wanted);
+    } else {
+      requests_.push(wanted);
+    }
+  }
+  void send(const Request& wanted) {
+    const std::uint64_t line = wanted.kind == Request::write_back ? wanted.address : stays_[wanted.stay].address;
+    const std::uint64_t address = line + std::uint64_t{wanted.first} * sector_bytes_;
+    const auto bytes = static_cast<unsigned>(wanted.count * sector_bytes_);
+    if (wanted.kind == Request::write_back) return port_.memory().write(address, bytes, write_back_tag);
+    const std::uint32_t again = wanted.kind == Request::fill_again ? 1U << 10U : 0U;
+    port_.memory().read(address, bytes, wanted.stay << 11U | again | (wanted.count - 1) << 5U | wanted.first);
+  }
+
+  CachePort& port_;
+  SectoredCacheStatistics& statistics_;
+  LineReturns& returns_;
+  const std::uint64_t sector_bytes_;
+  const unsigned sectors_of_a_line_;
+  const unsigned mshrs_;
+  unsigned filling_ = 0;  ///< sectors
+  std::vector<State> stays_;
+  std::vector<Stay> free_;
+  std::vector<Stay> stay_of_line_;  ///< by line of the cache
+  std::vector<Stay> latest_;        ///< by line of the surface: of those that have not ended
+  Ring<Request> requests_;          ///< that the memory port has not taken yet
+  Moves moves_;
+  std::uint64_t fetched_again_ = 0;
+};
+
+}  // namespace vrpipe

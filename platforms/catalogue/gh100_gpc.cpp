@@ -1,0 +1,60 @@
+#include <vrpipe/platforms/wiring.h>
+
+namespace vrpipe {
+
+/// The one graphics GPC of an NVIDIA H200 (Hopper GH100), as measured through OpenGL: 4 SMs in 2 TPCs and one ROP
+/// partition at 1980 MHz. Every setting is from a microbenchmark of that GPU, none from a scene of splats; where none was
+/// measured it is the unit's default. docs/silicon.md says which, and what it predicts.
+Platform gh100_gpc() {
+  Platform platform;
+  platform.name = "gh100-gpc";
+  platform.description = "a graphics GPC measured on silicon: NVIDIA H200, 4 SMs, 1 quad a cycle of RGBA16F, 1980 MHz";
+  platform.gpcs = 1;
+  platform.frequency_mhz = 1980;
+  platform.settings = {
+      // Vertices: 5.8 cycles a splat of two triangles.
+      {"draw", "warps_per_1024_cycles", "22"},
+      // 64 pixels a cycle.
+      {"raster", "fine_tiles_per_cycle", "1"},
+      // 32 bins of 16x16 pixels, first in, first out; idle time-out of 150 cycles: the defaults.
+      // 8 quads a cycle of full blocks, and each touched half of one a cycle.
+      {"zrop", "quads_per_cycle", "8"},
+      {"zrop", "half_block_cycles", "1"},
+      {"zrop", "block_cycles", "1.4"},
+      {"zrop", "cache_bytes", "8192"},
+      {"zrop", "line_bytes", "256"},
+      {"zrop", "line_cycles", "1.4"},
+      {"zrop", "fetch_ahead", "on"},
+      {"zrop", "fast_clear", "off"},
+      {"zrop", "mshrs", "2048"},
+      {"zrop", "line_return_cycles", "461"},
+      // 64 quads to an SM, SMs in turn; 3.2 quads a cycle, 4 to 5.2 cycles a primitive and screen tile.
+      {"sm", "cores", "4"},
+      {"sm", "lanes_per_scheduler", "32"},
+      {"sm", "warp_launch_cycles", "2.5"},
+      {"sm", "visit_launch_cycles", "4"},
+      {"sm", "discard_launch_cycles", "1.2"},
+      // 4 pixels a cycle of RGBA16F, 8 of RGBA8 in pairs, 0.5 of RGBA32F; lines of 256 bytes at a cycle each; the same
+      // quad again after 9 cycles.
+      {"prop", "color_bytes_per_cycle", "32"},
+      {"crop", "bytes_per_cycle", "32"},
+      {"crop", "pairs_in_sector", "on"},
+      {"crop", "forwarding", "off"},
+      {"crop", "latency_cycles", "9"},
+      {"crop", "cache_bytes", "8192"},
+      {"crop", "line_bytes", "256"},
+      {"crop", "line_cycles", "1"},
+      {"crop", "fetch_ahead", "on"},
+      {"crop", "input_quads", "1280"},
+      {"crop", "line_return_cycles", "503"},
+      {"crop", "mshrs", "2048"},
+      {"l2", "latency_cycles", "455"},
+  };
+  platform.wire = [](Netlist& netlist) {
+    wire_pipeline(netlist);
+    connect_depth_stencil_traffic(netlist);
+  };
+  return platform;
+}
+
+}  // namespace vrpipe
