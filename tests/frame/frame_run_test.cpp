@@ -174,6 +174,28 @@ INSTANTIATE_TEST_SUITE_P(Frame, EveryFidelityUnmerged,
                            return name_of(std::get<0>(each.param)) + ("_" + std::get<1>(each.param));
                          });
 
+TEST_P(EveryFidelity, FilledRectanglesAreTheAxisAlignedBoxesInFewerQuads) {
+  for (const char* platform : {"agx-orin", "desktop"}) {
+    const auto draw = half_closed(200, 31);
+    DrawState state = draw_state_of(request(platform));
+    state.splat_extent = SplatExtent::axis_aligned_box;
+    Frame boxes(draw->width, draw->height);
+    boxes.draw(draw, state);
+    state.splat_extent = SplatExtent::fill_rectangle;
+    Frame rectangles(draw->width, draw->height);
+    rectangles.draw(draw, state);
+    const RunResult two = run(request(platform), boxes);
+    const RunResult one = run(request(platform), rectangles);
+    EXPECT_EQ(one.counts.fragments_rasterized, two.counts.fragments_rasterized) << platform;
+    EXPECT_LT(one.counts.quads_rasterized, two.counts.quads_rasterized) << platform;
+    EXPECT_LT(2 * one.counts.primitives, two.counts.primitives + 200) << platform;
+    // Merging pairs other quads, and rounds otherwise.
+    if (!request().variant.quad_merging) {
+      EXPECT_TRUE(same_image(one.framebuffer.color, two.framebuffer.color)) << platform;
+    }
+  }
+}
+
 TEST_P(EveryFidelityUnmerged, ADrawIsOfItsOwnState) {
   const auto draw = half_closed(240, 21);
   Frame frame(draw->width, draw->height);

@@ -9,8 +9,9 @@
 namespace vrpipe {
 
 /// What is rasterised for a splat: the oriented box where alpha falls to 1/255, the axis-aligned box of that ellipse, or
-/// the oriented box at three sigmas.
-enum class SplatExtent : std::uint8_t { oriented_box, axis_aligned_box, three_sigma };
+/// the oriented box at three sigmas, as two triangles; or that axis-aligned box as one primitive that covers all samples in
+/// [left, right) x [top, bottom), as a triangle does with NV_fill_rectangle.
+enum class SplatExtent : std::uint8_t { oriented_box, axis_aligned_box, three_sigma, fill_rectangle };
 
 /// The program for a draw's fragments.
 enum class FragmentShader : std::uint8_t {
