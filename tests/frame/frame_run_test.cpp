@@ -213,6 +213,51 @@ TEST_P(EveryFidelityUnmerged, ADrawIsOfItsOwnState) {
   expect_in_order(exact(), frame);
 }
 
+TEST_P(EveryFidelity, WithoutBlendingTheLastFragmentStays) {
+  for (const char* platform : {"agx-orin", "desktop", "agx-orin-lpddr5"}) {
+    RunRequest exact = request(platform);
+    exact.format = ColorFormat::rgba32f;
+    const auto draw = half_closed(240, 23);
+    Frame frame(draw->width, draw->height);
+    DrawState state = draw_state_of(exact);
+    // Merging rounds otherwise, so nothing that is merged is to be seen.
+    state.blend = !exact.variant.quad_merging;
+    state.early_termination = false;
+    frame.draw(draw, state, "below", 0, 80);
+    state.blend = false;
+    frame.draw(draw, state, "in place of it", 80, 80);
+    state.pruning_threshold = 0;
+    frame.draw(draw, state, "and of its own state", 160);
+    exact.stall_seed = 3;
+    exact.stall_per_256 = 32;
+    expect_in_order(exact, frame);
+  }
+}
+
+TEST_P(EveryFidelity, WithoutBlendingColorIsWrittenAndNotRead) {
+  // Three layers, partly covered quads among them, far beyond the cache.
+  auto draw = std::make_shared<Draw>(testing::draw_of(128, 128));
+  for (unsigned layer = 0; layer < 3; ++layer) {
+    draw->splats.push_back(testing::flat_box(0.6F, 0.6F, 126.7F, 126.7F, 0.5F, 0.1F * static_cast<float>(layer), 1, 1));
+  }
+  Frame frame(128, 128);
+  DrawState state = draw_state_of(request());
+  state.early_termination = false;
+  state.splat_extent = SplatExtent::fill_rectangle;
+  state.blend = false;
+  frame.draw(draw, state);
+  const RunResult result = run(request(), frame);
+  EXPECT_EQ(result.counts.quads_blended, 3U * 64 * 64);
+  EXPECT_EQ(result.counts.quads_merged, 0U);
+  if (result.request.fidelity == Fidelity::functional || result.request.fidelity == Fidelity::bound) return;
+  EXPECT_EQ(testing::statistic(result, "crop.cache.bytes_filled"), 0U);
+  const std::uint64_t written = testing::statistic(result, "crop.cache.sectors_written_back");
+  EXPECT_LE(written, 3U * 64 * 64);
+  if (request().variant.quad_merging) return;  // TGC brings the layers of a grid together
+  EXPECT_GE(written, 3U * 64 * 64 - 512) << "but for what is left in the cache";
+  EXPECT_EQ(testing::statistic(result, "crop.cache.sector_misses"), 3U * 64 * 64);
+}
+
 TEST_P(EveryFidelityUnmerged, ClearedTerminationOpensPixelsWhoseColorStays) {
   const auto draw = half_closed(240, 22);
   Frame frame(draw->width, draw->height);
