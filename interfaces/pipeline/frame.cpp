@@ -21,7 +21,7 @@ constexpr std::uint64_t most_splats = std::uint64_t{1} << 31;  // primitives are
 auto fields_of(const DrawState& state) {
   return std::tie(state.early_termination, state.termination_threshold, state.termination_inclusive,
                   state.pruning_threshold, state.splat_extent, state.obb_padding, state.depth, state.stencil,
-                  state.late_tests, state.cull, state.shader, state.light);
+                  state.late_tests, state.cull, state.shader, state.light, state.blend);
 }
 
 }  // namespace
@@ -85,6 +85,9 @@ void Frame::draw(std::shared_ptr<const Draw> geometry, const DrawState& state, s
   if (state.late_tests && state.shader == FragmentShader::none) {
     refuse("its tests are to come after shading, and it shades nothing", "leave late_tests out, or shade it");
   }
+  if (state.early_termination && !state.blend) {
+    refuse("it terminates early, and does not blend", "leave early_termination or blend out");
+  }
   if (reads_color(state.shader) && geometry->is_mesh())
     refuse("it is a mesh, and its shader is none of a mesh", "use another");
   if (!writes_color(state.shader) && reads_color(state.shader) && !state.writes_depth_stencil()) {
@@ -146,6 +149,10 @@ void Frame::change_states(const std::function<void(DrawState&)>& change) {
 
 bool Frame::terminates_early() const {
   return std::any_of(draws_.begin(), draws_.end(), [](const DrawCall& call) { return call.state.early_termination; });
+}
+
+bool Frame::replaces_color() const {
+  return std::any_of(draws_.begin(), draws_.end(), [](const DrawCall& call) { return !call.state.blend; });
 }
 
 bool Frame::tests_depth_stencil() const {

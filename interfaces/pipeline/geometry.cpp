@@ -38,7 +38,7 @@ bool box_corners(const RenderContext& context, const DrawState& state, const Spl
   const Point center{splat.cx, splat.cy};
   Point a{splat.ax, splat.ay};
   Point b{splat.bx, splat.by};
-  if (state.splat_extent == SplatExtent::axis_aligned_box) {
+  if (state.splat_extent == SplatExtent::axis_aligned_box || state.splat_extent == SplatExtent::fill_rectangle) {
     const double half_width = std::sqrt(a.x * a.x + b.x * b.x);
     const double half_height = std::sqrt(a.y * a.y + b.y * b.y);
     a = {half_width, 0.0};
@@ -169,6 +169,11 @@ Culling cull_triangle(const RenderContext& context, DrawIndex draw, std::uint32_
   if (!snap_triangle(context, draw, splat, triangle, snapped)) return Culling::not_finite;
   if (doubled_area(snapped) == 0) return Culling::zero_area;
   const DrawCall& call = context.draw(draw);
+  if (draws_rectangles(call)) {
+    // Samples on the right and on the lower edge belong to the neighbours.
+    --snapped.x[1];
+    --snapped.y[2];
+  }
   bounds = covered_bounds(snapped, context.precision.subpixel_bits, context.frame->width(), context.frame->height());
   if (call.state.cull != CullMode::none &&
       is_back_face(*call.geometry, snapped) == (call.state.cull == CullMode::back) && call.geometry->is_mesh()) {

@@ -21,6 +21,7 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
       several_draws_gate_(context, "draw.several_draws"),
       cache_order_gate_(context, "crop.cache_order"),
       watches_saturation_(saturation_gate_.is_active()),
+      replaces_(context.frame->replaces_color()),
       checks_previous_(parameters.previous_alpha_check),
       timing_{Rate::of_bytes(parameters.bytes_per_cycle, 4 * bytes_per_pixel(Format)),
               parameters.input_quads,
@@ -52,6 +53,7 @@ template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::set_draw(DrawIndex draw) {
   const DrawState& state = context_.state(draw);
   draw_ = draw;
+  blends_ = state.blend;
   signals_ = state.early_termination && termination_gate_.enter();
   threshold_ = state.terminating_alpha();
   drops_late_ = state.early_termination && context_.termination == Termination::strict && late_drops_gate_.enter();
@@ -130,6 +132,7 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   for (unsigned place = 0; place < count; ++place) {
     out.lines[place].address = tile + std::uint64_t{line_at[place]} * timing_.line_bytes;
     out.lines[place].sectors = sectors_at[place];
+    if (replaces_) out.lines[place].known = context_.state(warp.draw[from]).blend ? 0 : ~0U;  // all quads' state
     cache_->look_up(out.lines[place]);
   }
   // All quads need as many sectors.
@@ -216,11 +219,35 @@ template <ColorFormat Format, BlendRounding Rounding>
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
+[[gnu::noinline]] CropBehaviour::Outcome ColorRop<Format, Rounding>::replace(QuadColor& destination, std::size_t place,
+                                                                             LaneMask live, const QuadColor& color,
+                                                                             Tally& tally) {
+  ++tally.quads_blended;
+  tally.fragments_blended += popcount(live);
+  // Behind nothing, so that what the format makes of a colour is the same with and without blending.
+  const QuadColor stored = blend_function(Format, Rounding)(QuadColor{}, color);
+  const LaneBits lanes = expand_mask(live);
+  if (watches_saturation_) {
+    const LaneBits saturated =
+        lanes & ((color.red > largest_color) | (color.green > largest_color) | (color.blue > largest_color));
+    colors_saturated += popcount(sign_mask(saturated));
+  }
+  if (!lost_to_rounding_.empty()) {
+    lost_to_rounding_[place] = select(lanes, splat_lanes(1.0F), lost_to_rounding_[place]);
+  }
+  destination = {select(lanes, stored.red, destination.red), select(lanes, stored.green, destination.green),
+                 select(lanes, stored.blue, destination.blue), select(lanes, stored.alpha, destination.alpha)};
+  // What was there has not been read, so nobody knows whether it is another value.
+  return {0, true};
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
 CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(DrawIndex draw, std::size_t place, LaneMask live,
                                                          const QuadColor& color) {
   if (draw != draw_) set_draw(draw);
   Tally tally;
-  const Outcome outcome = blend_into(surface_->quad(place), place, live, color, tally);
+  const Outcome outcome = blends_ ? blend_into(surface_->quad(place), place, live, color, tally)
+                                  : replace(surface_->quad(place), place, live, color, tally);
   count(draw, tally);
   return outcome;
 }
@@ -238,6 +265,10 @@ void ColorRop<Format, Rounding>::blend_quads(const ShadedWarp& warp, unsigned fr
       end = static_cast<unsigned>(
           std::find_if(warp.draw.begin() + i, warp.draw.begin() + to, [&](DrawIndex other) { return other != draw; }) -
           warp.draw.begin());
+    for (; !blends_ && i < end; ++i) {
+      const unsigned position = warp.position[i];
+      outcomes[i] = replace(quads[position], tile + position, warp.live[i], warp.color[i], tally);
+    }
     for (; i < end; ++i) {
       const unsigned position = warp.position[i];
       outcomes[i] = blend_into(quads[position], tile + position, warp.live[i], warp.color[i], tally);

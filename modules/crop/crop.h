@@ -133,6 +133,8 @@ class ColorRop : public CropBehaviour {
   }
   /// Blends for a draw from here on.
   void set_draw(DrawIndex draw);
+  /// Without blending: the colours of live samples take the places of those that are there.
+  Outcome replace(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);
   Outcome blend_into(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);
   LaneBits passes(Lanes alpha) const { return alpha >= threshold_; }
   /// After a blend of `color` into a quad that held the channels given.
@@ -142,6 +144,7 @@ class ColorRop : public CropBehaviour {
   const RenderContext& context_;
   bool several_draws_ = false;
   DrawIndex draw_ = 0;  ///< that is blended, with its state:
+  bool blends_ = true;
   bool signals_ = false;
   float threshold_ = 0;  ///< that alpha reaches to be terminated
   bool drops_late_ = false;
@@ -152,6 +155,7 @@ class ColorRop : public CropBehaviour {
   EffectGate several_draws_gate_;
   EffectGate cache_order_gate_;
   const bool watches_saturation_;
+  const bool replaces_;  ///< in any draw
   /// By quad, in strict termination: the pixels that were signalled.
   std::vector<LaneMask> terminated_;
   /// By quad, once a fragment was lost to rounding: transmittance of those that were; negative once counted as stuck.

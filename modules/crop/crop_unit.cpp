@@ -31,6 +31,7 @@ class CropUnit : public Unit {
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         signals_(context.frame->terminates_early()),
+        replaces_(context.frame->replaces_color()),
         barriers_(context),
         hazard_gate_(context, "crop.blend_hazard"),
         cache_order_gate_(context, "crop.cache_order"),
@@ -96,6 +97,7 @@ class CropUnit : public Unit {
         wanted_.line == SectoredCache::no_line ? port_.pin_held(address, sectors) : SectoredCache::no_line;
     std::uint32_t asked_for = 0;
     if (line == SectoredCache::no_line) {
+      if (replaces_) wanted_.reads = context_.state(quad.warp->draw[quad.index]).blend;
       line = fill(address, sectors, asked_for);
       if (line == SectoredCache::no_line) return false;
     }
@@ -358,6 +360,7 @@ class CropUnit : public Unit {
   std::unique_ptr<CropBehaviour> behaviour_;
   const CropBehaviour::TimingParameters timing_;
   const bool signals_;
+  const bool replaces_;  ///< colours, in any draw that does not blend
   const BarrierPlan barriers_;
   EffectGate hazard_gate_;
   EffectGate cache_order_gate_;

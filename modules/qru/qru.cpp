@@ -20,7 +20,8 @@ unsigned append(Warp& warp, const Quad* quads, unsigned count) {
 
 PairingQru::PairingQru(const Parameters& parameters, const RenderContext& context)
     : context_(context),
-      any_late_(context.frame->tests_late()),
+      any_unmerged_(std::any_of(context.frame->draws().begin(), context.frame->draws().end(),
+                                [](const DrawCall& call) { return !call.state.merges(); })),
       bin_quads_(parameters.bin_quads),
       quads_per_cycle_(parameters.quads_per_cycle),
       latency_cycles_(parameters.latency_cycles),
@@ -41,7 +42,9 @@ unsigned PairingQru::examine(TileId tile, const Quad* quads, unsigned count, War
   warp_.tile = tile;
   launched = false;
   // All of a bin are of one state.
-  if (any_late_ && count > 0 && context_.state(quads[0].draw).tests_late()) return pass_by(quads, count, out, launched);
+  if (any_unmerged_ && count > 0 && !context_.state(quads[0].draw).merges()) {
+    return pass_by(quads, count, out, launched);
+  }
   unsigned at = 0;
   while (at < count && !launched) {
     if (buffered_ == bin_quads_) {

@@ -10,7 +10,7 @@ inline constexpr Histogram::Buckets warp_size_buckets = Histogram::Buckets::line
 
 /// Quad reorder unit (paper 5.3): 64 position registers pair overlapping quads of a bin, a 128-bit bitmap tells which
 /// are left for the end. A register that holds a quad means a pair, and is then empty again. Quads of draws that are tested
-/// late pass by the registers.
+/// late or not blended pass by the registers.
 class PairingQru : public QruBehaviour {
  public:
   struct Parameters : ParameterSet {
@@ -59,7 +59,7 @@ class PairingQru : public QruBehaviour {
   unsigned pass_by(const Quad* quads, unsigned count, Warp& out, bool& launched);
 
   const RenderContext& context_;
-  const bool any_late_;
+  const bool any_unmerged_;
   const std::uint32_t bin_quads_;
   const std::uint32_t quads_per_cycle_;
   const std::uint32_t latency_cycles_;

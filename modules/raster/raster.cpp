@@ -112,6 +112,8 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   part_ = 0;
   tile_counted_ = false;
 
+  tests_hi_z_ = hi_z_ != nullptr && hi_z_->begin(primitive);
+  if (draws_rectangles(context_.draw(primitive.draw))) return set_up_rectangle();
   SnappedTriangle t;
   if (!snap_triangle(context_, primitive.draw, primitive.splat, primitive.triangle, t)) {
     throw SimulationFault("raster", 0, "primitive of splat " + std::to_string(primitive.splat) + " has no vertices");
@@ -139,10 +141,16 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
     if (std::abs(edge.dx) + std::abs(edge.dy) > narrow_gradient) wide_ = true;
     magnitudes |= std::abs(edge.origin) + std::abs(edge.dx) * width + std::abs(edge.dy) * height;
   }
-  tests_hi_z_ = hi_z_ != nullptr && hi_z_->begin(primitive);
   if (wide_ && !wide_edges_gate_.enter()) wide_ = false;
   if (wide_) ++wide_edges;
   widest_edge.see(static_cast<std::uint64_t>(65 - __builtin_clzll(static_cast<unsigned long long>(magnitudes))));
+}
+
+/// It covers its bounds: edges that have no sample outside, and all beyond the bounds masked off.
+void TileRasterizer::set_up_rectangle() {
+  for (Edge& edge : edges_) edge = {};
+  wide_ = false;
+  mask_area_ = area_;
 }
 
 bool TileRasterizer::advance() {

@@ -97,11 +97,12 @@ class TileRasterizer : public RasterBehaviour {
 
  private:
   struct Edge {
-    std::int64_t dx, dy;  ///< change of the edge function a pixel to the right and down
-    std::int64_t origin;  ///< at the sample of pixel (0, 0), top-left rule included
+    std::int64_t dx = 0, dy = 0;  ///< change of the edge function a pixel to the right and down
+    std::int64_t origin = 0;      ///< at the sample of pixel (0, 0), top-left rule included
   };
   unsigned fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]);
   unsigned fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]);
+  void set_up_rectangle();
   LaneMask in_area(std::int32_t x, std::int32_t y) const;
   bool advance();
   /// Whether Hi-Z culls the raster tile that begins at a pixel.

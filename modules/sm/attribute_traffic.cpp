@@ -33,7 +33,7 @@ AttributeTraffic::AttributeTraffic(const RenderContext& context, const Attribute
 
 std::uint32_t AttributeTraffic::visible_triangles(const VertexWarp& warp) const {
   const DrawCall& call = context_.draw(warp.draw);
-  const unsigned triangles = triangles_per_splat(*call.geometry);
+  const unsigned triangles = primitives_per_splat(call);
   std::uint32_t visible = 0;
   PixelRect bounds;
   for (unsigned i = 0; i < warp.splats; ++i) {

@@ -42,7 +42,7 @@ unsigned PrimitiveAssembly::assemble(DrawIndex draw, std::uint32_t splat, std::a
     if (given.r > 0) smallest_determinant.see(determinant(given));
   }
   unsigned count = 0;
-  for (unsigned triangle = 0; triangle < triangles_per_splat(*call.geometry); ++triangle) {
+  for (unsigned triangle = 0; triangle < primitives_per_splat(call); ++triangle) {
     PixelRect bounds;
     switch (cull_triangle(context_, draw, splat, triangle, bounds)) {
       case Culling::not_finite: ++dropped_not_finite; return 0;

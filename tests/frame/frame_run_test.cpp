@@ -174,6 +174,28 @@ INSTANTIATE_TEST_SUITE_P(Frame, EveryFidelityUnmerged,
                            return name_of(std::get<0>(each.param)) + ("_" + std::get<1>(each.param));
                          });
 
+TEST_P(EveryFidelity, FilledRectanglesAreTheAxisAlignedBoxesInFewerQuads) {
+  for (const char* platform : {"agx-orin", "desktop"}) {
+    const auto draw = half_closed(200, 31);
+    DrawState state = draw_state_of(request(platform));
+    state.splat_extent = SplatExtent::axis_aligned_box;
+    Frame boxes(draw->width, draw->height);
+    boxes.draw(draw, state);
+    state.splat_extent = SplatExtent::fill_rectangle;
+    Frame rectangles(draw->width, draw->height);
+    rectangles.draw(draw, state);
+    const RunResult two = run(request(platform), boxes);
+    const RunResult one = run(request(platform), rectangles);
+    EXPECT_EQ(one.counts.fragments_rasterized, two.counts.fragments_rasterized) << platform;
+    EXPECT_LT(one.counts.quads_rasterized, two.counts.quads_rasterized) << platform;
+    EXPECT_LT(2 * one.counts.primitives, two.counts.primitives + 200) << platform;
+    // Merging pairs other quads, and rounds otherwise.
+    if (!request().variant.quad_merging) {
+      EXPECT_TRUE(same_image(one.framebuffer.color, two.framebuffer.color)) << platform;
+    }
+  }
+}
+
 TEST_P(EveryFidelityUnmerged, ADrawIsOfItsOwnState) {
   const auto draw = half_closed(240, 21);
   Frame frame(draw->width, draw->height);
@@ -189,6 +211,51 @@ TEST_P(EveryFidelityUnmerged, ADrawIsOfItsOwnState) {
   state.termination_threshold = 0.5F;
   frame.draw(draw, state, "terminated at one half", 180);
   expect_in_order(exact(), frame);
+}
+
+TEST_P(EveryFidelity, WithoutBlendingTheLastFragmentStays) {
+  for (const char* platform : {"agx-orin", "desktop", "agx-orin-lpddr5"}) {
+    RunRequest exact = request(platform);
+    exact.format = ColorFormat::rgba32f;
+    const auto draw = half_closed(240, 23);
+    Frame frame(draw->width, draw->height);
+    DrawState state = draw_state_of(exact);
+    // Merging rounds otherwise, so nothing that is merged is to be seen.
+    state.blend = !exact.variant.quad_merging;
+    state.early_termination = false;
+    frame.draw(draw, state, "below", 0, 80);
+    state.blend = false;
+    frame.draw(draw, state, "in place of it", 80, 80);
+    state.pruning_threshold = 0;
+    frame.draw(draw, state, "and of its own state", 160);
+    exact.stall_seed = 3;
+    exact.stall_per_256 = 32;
+    expect_in_order(exact, frame);
+  }
+}
+
+TEST_P(EveryFidelity, WithoutBlendingColorIsWrittenAndNotRead) {
+  // Three layers, partly covered quads among them, far beyond the cache.
+  auto draw = std::make_shared<Draw>(testing::draw_of(128, 128));
+  for (unsigned layer = 0; layer < 3; ++layer) {
+    draw->splats.push_back(testing::flat_box(0.6F, 0.6F, 126.7F, 126.7F, 0.5F, 0.1F * static_cast<float>(layer), 1, 1));
+  }
+  Frame frame(128, 128);
+  DrawState state = draw_state_of(request());
+  state.early_termination = false;
+  state.splat_extent = SplatExtent::fill_rectangle;
+  state.blend = false;
+  frame.draw(draw, state);
+  const RunResult result = run(request(), frame);
+  EXPECT_EQ(result.counts.quads_blended, 3U * 64 * 64);
+  EXPECT_EQ(result.counts.quads_merged, 0U);
+  if (result.request.fidelity == Fidelity::functional || result.request.fidelity == Fidelity::bound) return;
+  EXPECT_EQ(testing::statistic(result, "crop.cache.bytes_filled"), 0U);
+  const std::uint64_t written = testing::statistic(result, "crop.cache.sectors_written_back");
+  EXPECT_LE(written, 3U * 64 * 64);
+  if (request().variant.quad_merging) return;  // TGC brings the layers of a grid together
+  EXPECT_GE(written, 3U * 64 * 64 - 512) << "but for what is left in the cache";
+  EXPECT_EQ(testing::statistic(result, "crop.cache.sector_misses"), 3U * 64 * 64);
 }
 
 TEST_P(EveryFidelityUnmerged, ClearedTerminationOpensPixelsWhoseColorStays) {

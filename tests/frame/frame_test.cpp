@@ -123,6 +123,7 @@ TEST(Frame, EveryFieldOfAStateTellsItFromAnother) {
       [](DrawState& state) { state.light.y = 1; },
       [](DrawState& state) { state.light.z = 1; },
       [](DrawState& state) { state.light.ambient = 0.5F; },
+      [](DrawState& state) { state.blend = false; },
   };
   for (const auto& change : changes) {
     DrawState changed;
@@ -312,6 +313,17 @@ TEST(Frame, OfADrawIsThatDrawAlone) {
   EXPECT_EQ(frame->draw_call(0).splats, 3U);
   EXPECT_EQ(frame->draw_call(0).state.pruning_threshold, 0.5F);
   EXPECT_EQ(&frame->draw_call(0).splat(1), &draw.splats[1]);
+}
+
+TEST(Frame, RefusesEarlyTerminationWithoutBlending) {
+  DrawState state;
+  state.blend = false;
+  state.early_termination = true;
+  Frame frame(64, 48);
+  const std::string refusal = refusal_of([&] { frame.draw(geometry_of(1), state, "flat"); });
+  EXPECT_NE(refusal.find("cannot draw 'flat' (draw 0 of the frame): it terminates early, and does not blend"),
+            std::string::npos)
+      << refusal;
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ std::vector<Setting> settings() {
   maybe("zrop", "fast_clear", rc::gen::element("on", "off"));
   maybe("state", "subpixel_bits", rc::gen::element("4", "12"));
   maybe("state", "blend_rounding", rc::gen::element("rtz", "measured"));
-  maybe("state", "splat_extent", rc::gen::element("aabb", "three_sigma"));
+  maybe("state", "splat_extent", rc::gen::element("aabb", "three_sigma", "fill_rectangle"));
   maybe("crop", "cache_bytes", rc::gen::element("2048", "4096"));
   for (const char* link : {"prop.release", "prop.late", "tc.bins", "qru.warps", "crop.terminations", "raster.quads"}) {
     if (*whole(0, 8) == 0) all.push_back({std::string("link.") + link, "depth", *rc::gen::element("1", "2")});

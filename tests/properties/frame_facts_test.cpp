@@ -46,7 +46,7 @@ void check(const RenderContext& context) {
     const DrawCall& call = frame.draw_call(command.draw);
     for (std::uint32_t number = call.base; number < call.base + call.splats; ++number) {
       ++primitives;
-      for (unsigned triangle = 0; triangle < triangles_per_splat(*call.geometry); ++triangle) {
+      for (unsigned triangle = 0; triangle < primitives_per_splat(call); ++triangle) {
         PixelRect bounds;
         SnappedTriangle snapped;
         if (!is_finite(call, number)) continue;
@@ -55,7 +55,7 @@ void check(const RenderContext& context) {
         RC_ASSERT(widest_edge(snapped, bits) <= facts.widest_edge);
         for (std::int32_t y = bounds.y0; y < bounds.y1; ++y) {
           for (std::int32_t x = bounds.x0; x < bounds.x1; ++x) {
-            if (covers(snapped, bits, x, y)) covered.emplace(x / 16, y / 16);
+            if (draws_rectangles(call) || covers(snapped, bits, x, y)) covered.emplace(x / 16, y / 16);
           }
         }
       }
@@ -81,8 +81,8 @@ RC_GTEST_PROP(FrameFacts, BoundSplatsOfAnyExtent, ()) {
     draw.splats.front().ax =
         *rc::gen::element(std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 3e38F);
   DrawState state;
-  state.splat_extent =
-      *rc::gen::element(SplatExtent::oriented_box, SplatExtent::axis_aligned_box, SplatExtent::three_sigma);
+  state.splat_extent = *rc::gen::element(SplatExtent::oriented_box, SplatExtent::axis_aligned_box,
+                                         SplatExtent::three_sigma, SplatExtent::fill_rectangle);
   state.obb_padding = *rc::gen::element(0.0F, 0.75F, 16.0F);
   RenderContext context = testing::context_of(draw, state);
   context.precision.subpixel_bits = *rc::gen::element(8U, 4U, 12U);

@@ -39,7 +39,7 @@ RC_GTEST_PROP(Pipeline, NoNanAndNoInfinityReachesTheTarget, ()) {
   r.settings = *bins();
   r.settings.push_back({"state", "blend_rounding", *rounding()});
   r.settings.push_back({"state", "exponential", *rc::gen::element("ex2", "exact", "fp16", "table256", "table16")});
-  r.settings.push_back({"state", "splat_extent", *rc::gen::element("obb", "aabb", "three_sigma")});
+  r.settings.push_back({"state", "splat_extent", *rc::gen::element("obb", "aabb", "three_sigma", "fill_rectangle")});
   r.settings.push_back({"state", "subpixel_bits", *rc::gen::element("8", "4", "12")});
   const RunResult result = run_trapped(r, draw);
   // A binary16 target keeps growing once its alpha is stuck, up to twice the colour; nearest rounding overflows.

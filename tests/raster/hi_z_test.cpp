@@ -120,7 +120,7 @@ class Scene {
     std::vector<Primitive> all;
     const DrawCall& call = context_.draw(1);
     for (std::uint32_t i = 0; i < primitives; ++i) {
-      for (unsigned triangle = 0; triangle < triangles_per_splat(*call.geometry); ++triangle) {
+      for (unsigned triangle = 0; triangle < primitives_per_splat(call); ++triangle) {
         Primitive primitive;
         primitive.splat = call.base + i;
         primitive.triangle = static_cast<std::uint8_t>(triangle);

@@ -82,6 +82,42 @@ TEST(TileRasterizer, AnEdgeOfABoxBeyondTheGuardBandStaysWhereItIs) {
   }
 }
 
+TEST(TileRasterizer, AFilledRectangleCoversTheSamplesFromItsLeftAndTopEdgeOn) {
+  for (unsigned i = 0; i < 200; ++i) {
+    const auto at = [&](unsigned k) { return std::round(testing::uniform(17, 8 * i + k, -6, 40) * 4) / 4; };
+    const float x0 = at(0), y0 = at(1);
+    const float x1 = x0 + std::fabs(at(2)), y1 = y0 + std::fabs(at(3));
+    const Draw draw = draw_of(48, 32, {flat_box(x0, y0, x1, y1, 0.5F)});
+    RenderContext context = unpadded(draw);
+    testing::change_state(context, [](DrawState& state) { state.splat_extent = SplatExtent::fill_rectangle; });
+    const Coverage coverage = rasterize(context);
+    std::uint64_t quads = 0;
+    for (std::uint32_t y = 0; y < 32; ++y) {
+      for (std::uint32_t x = 0; x < 48; ++x) {
+        const float sx = static_cast<float>(x) + 0.5F;
+        const float sy = static_cast<float>(y) + 0.5F;
+        ASSERT_EQ(coverage.at(x, y), x0 <= sx && sx < x1 && y0 <= sy && sy < y1 ? 1U : 0U)
+            << i << ": " << x << "," << y;
+        if (x % 2 == 0 && y % 2 == 0) {
+          const bool any =
+              coverage.at(x, y) + coverage.at(x + 1, y) + coverage.at(x, y + 1) + coverage.at(x + 1, y + 1);
+          quads += any ? 1 : 0;
+        }
+      }
+    }
+    EXPECT_EQ(coverage.quads, quads);
+  }
+}
+
+TEST(TileRasterizer, AFilledRectangleOfTwoByTwoIsOneQuad) {
+  const Draw draw = draw_of(32, 32, {flat_box(4, 6, 6, 8, 0.5F)});
+  RenderContext context = context_of(draw);
+  testing::change_state(context, [](DrawState& state) { state.splat_extent = SplatExtent::fill_rectangle; });
+  const Coverage coverage = rasterize(context);
+  EXPECT_EQ(coverage.quads, 1U);
+  EXPECT_EQ(coverage.fragments, 4U);
+}
+
 // case R03
 TEST(TileRasterizer, ASquareOnSampleCentresHasItsTopAndLeftSamplesOnly) {
   const Coverage coverage = cover(draw_of(16, 16, {flat_box(4.5F, 4.5F, 8.5F, 8.5F, 0.5F)}));

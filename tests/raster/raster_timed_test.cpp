@@ -24,7 +24,7 @@ class RasterTimedTest : public ::testing::TestWithParam<Fidelity> {
   std::vector<RasterJob> jobs() const {
     std::vector<RasterJob> all;
     for (std::uint32_t splat = 0; splat < draw.splats.size(); ++splat) {
-      for (unsigned triangle = 0; triangle < triangles_per_splat(draw); ++triangle) {
+      for (unsigned triangle = 0; triangle < primitives_per_splat(context.draw(0)); ++triangle) {
         SnappedTriangle snapped;
         if (!snap_triangle(context, 0, splat, triangle, snapped) || doubled_area(snapped) == 0) continue;
         RasterJob job;

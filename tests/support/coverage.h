@@ -82,7 +82,7 @@ inline Coverage cover_exactly(const RenderContext& context) {
   const Draw& draw = *context.draw(0).geometry;
   Coverage coverage{draw.width, draw.height, std::vector<unsigned>(std::size_t{draw.width} * draw.height), 0, 0};
   for (std::uint32_t splat = 0; splat < draw.splats.size(); ++splat) {
-    for (unsigned triangle = 0; triangle < triangles_per_splat(draw); ++triangle) {
+    for (unsigned triangle = 0; triangle < primitives_per_splat(context.draw(0)); ++triangle) {
       SnappedTriangle snapped;
       if (!snap_triangle(context, 0, splat, triangle, snapped)) continue;
       for (std::uint32_t y = 0; y < draw.height; y += 2) {

@@ -110,7 +110,7 @@ class Renderer {
     const DrawCall& call = frame_.draw_call(index);
     for (std::uint32_t i = 0; i < call.splats; ++i) {
       const std::uint32_t splat = call.base + i;
-      for (unsigned triangle = 0; triangle < triangles_per_splat(*call.geometry); ++triangle) {
+      for (unsigned triangle = 0; triangle < primitives_per_splat(call); ++triangle) {
         SnappedTriangle snapped;
         if (!snap_triangle(context_, index, splat, triangle, snapped)) continue;
         const bool is_mesh = call.geometry->is_mesh();

@@ -130,7 +130,8 @@ std::vector<std::array<float, 4>> pixels_in_order(const Frame& frame, bool termi
       for (const OracleFragment& fragment : fragments[i]) {
         if (terminates_here && terminated[i]) continue;
         const float before = pixels[i][3];
-        const float transmittance = 1.0F - before;
+        if (!call.state.blend) pixels[i] = {};
+        const float transmittance = 1.0F - pixels[i][3];
         for (unsigned channel = 0; channel < 3; ++channel)
           pixels[i][channel] += transmittance * fragment.color[channel];
         pixels[i][3] += transmittance * fragment.alpha;

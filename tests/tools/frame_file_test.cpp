@@ -112,6 +112,22 @@ TEST_F(FrameFile, DrawsHaveStatesOfTheirOwn) {
   EXPECT_EQ(count(draws[2], "quads_terminated"), 0U);
 }
 
+TEST_F(FrameFile, ADrawNeedNotBlendAndMayBeOfRectangles) {
+  const json result = run(R"({"commands": [
+      {"draw": "tiny.spl"},
+      {"draw": "tiny.spl", "state": {"splat_extent": "aabb", "blend": false}},
+      {"draw": "tiny.spl", "state": {"splat_extent": "fill_rectangle", "blend": false}}]})",
+                          {"--variant", "het+qm"});
+  const json& draws = result["draws"];
+  EXPECT_GT(count(draws[0], "quads_merged"), 0U);
+  for (const unsigned replacing : {1U, 2U}) {
+    EXPECT_EQ(count(draws[replacing], "quads_merged"), 0U);
+    EXPECT_EQ(count(draws[replacing], "quads_terminated"), 0U);
+  }
+  EXPECT_EQ(count(draws[2], "fragments_blended"), count(draws[1], "fragments_blended"));
+  EXPECT_LT(count(draws[2], "primitives"), count(draws[1], "primitives"));
+}
+
 TEST_F(FrameFile, AClearMakesTheNextDrawTheFirst) {
   const json result = run(R"({"commands": [{"draw": "tiny.spl"}, {"clear": ["color", "termination"]},
                                            {"draw": "tiny.spl"}, {"clear": ["color"]}, {"draw": "tiny.spl"}]})",
@@ -329,6 +345,8 @@ TEST_F(FrameFile, BadStates) {
   bad_state("3", {"not an object"});
   bad_state(R"({"pruning_treshold": 0.1})", {"'pruning_treshold'", "did you mean pruning_threshold?"});
   bad_state(R"({"early_terminaton": false})", {"did you mean early_termination?"});
+  bad_state(R"({"blend": 0})", {"state.blend): it is 0", "true or false"});
+  bad_state(R"({"blend": false, "early_termination": true})", {"state.early_termination): the draw does not blend"});
   bad_state(R"({"early_termination": "off"})", {"state.early_termination): it is \"off\"", "true or false"});
   bad_state(R"({"pruning_threshold": 2})", {"state.pruning_threshold): ", "'2'", "from 0 to 1"});
   bad_state(R"({"pruning_threshold": "0.1"})", {"state.pruning_threshold): ", "not a number"});

@@ -36,6 +36,38 @@ TEST(PrimitiveAssembly, ASplatIsTwoTrianglesInOrder) {
   EXPECT_EQ(a.vpo.primitives.value(), 2U);
 }
 
+TEST(PrimitiveAssembly, AFilledRectangleIsOneOfExactBounds) {
+  // The right and the lower edge pass through samples, which do not belong to it.
+  const Draw draw = draw_of(64, 64, {flat_box(10.5F, 11.5F, 20.5F, 13.5F, 0.5F)});
+  RenderContext context = testing::context_of(draw);
+  testing::change_state(context, [](DrawState& state) {
+    state.splat_extent = SplatExtent::fill_rectangle;
+    state.obb_padding = 0;
+  });
+  PrimitiveAssembly vpo(PrimitiveAssembly::Parameters{}, context);
+  std::array<Primitive, 2> primitives;
+  ASSERT_EQ(vpo.assemble(0, 0, primitives), 1U);
+  EXPECT_EQ(primitives[0].bounds.x0, 10);
+  EXPECT_EQ(primitives[0].bounds.x1, 20);
+  EXPECT_EQ(primitives[0].bounds.y0, 11);
+  EXPECT_EQ(primitives[0].bounds.y1, 13);
+  EXPECT_EQ(vpo.primitives.value(), 1U);
+}
+
+TEST(PrimitiveAssembly, AFilledRectangleBetweenSamplesIsCulled) {
+  const Draw draw = draw_of(64, 64, {flat_box(10.6F, 11, 11.4F, 20, 0.5F), flat_box(10.2F, 11, 10.2F, 20, 0.5F)});
+  RenderContext context = testing::context_of(draw);
+  testing::change_state(context, [](DrawState& state) {
+    state.splat_extent = SplatExtent::fill_rectangle;
+    state.obb_padding = 0;
+  });
+  PrimitiveAssembly vpo(PrimitiveAssembly::Parameters{}, context);
+  std::array<Primitive, 2> primitives;
+  EXPECT_EQ(vpo.assemble(0, 0, primitives), 0U);
+  EXPECT_EQ(vpo.culled_outside.value(), 1U);
+  EXPECT_EQ(vpo.assemble(0, 1, primitives), 0U);
+}
+
 TEST(PrimitiveAssembly, AnExplicitTriangleIsOne) {
   Draw draw = draw_of(64, 64, {Splat{}});
   draw.triangles = {testing::one_quad_triangle(4, 4)};

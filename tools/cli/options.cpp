@@ -133,8 +133,7 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
   add_option(app, "--fovy", fovy_, "DEGREES", "vertical field of view (default: the scene's own, 50 for a file)",
              scene_group);
 
-  add_option(app, "--platform", platform_, "NAME",
-             "the GPU (default: " + platforms().front().name + "; `vrpipe platforms` lists them)", machine_group);
+  declare_platform(app);
   if (variants == Variants::one) {
     add_option(app, "--variant", variant_, "NAME",
                "baseline, qm (quad merging), het (hardware early termination) or\n"
@@ -142,22 +141,9 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
                    variant_default + ")",
                machine_group);
   }
-  add_option(app, "--set", settings_, "UNIT.PARAMETER=VALUE",
-             "changes a parameter, e.g. tc.bins=64, or crop.cache_bytes=32K; can be\n"
-             "repeated (`vrpipe units` lists all, with units, ranges and defaults)",
-             machine_group);
-  add_option(app, "--unit", units_, "SLOT=IMPLEMENTATION",
-             "puts another unit into a slot, in every variant where the slot is not\n"
-             "pass-through; can be repeated",
-             machine_group);
-  add_option(app, "--plugin", plugins_, "FILE.so", "loads units from a plugin, for --unit; can be repeated",
-             machine_group);
+  declare_changes(app);
 
-  add_option(app, "--fidelity", fidelity_, "NAME",
-             "how exact time is, from images and counts alone to every unit in every\n"
-             "cycle: " +
-                 names_of(fidelities()) + " (default: cycle)",
-             rules_group);
+  declare_fidelity(app);
   add_option(app, "--effects", effects_, "LIST",
              "what is simulated: auto, what the frame calls for; approximate, of that\n"
              "nothing whose absence is bounded; all; or a list, as in all,-raster.hi_z,\n"
@@ -176,8 +162,7 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              "float, premultiplied, no background) there; created if missing",
              result_group);
   add_option(app, "--background", background_, "R,G,B", "behind the PNG, each 0 to 1 (default: 0,0,0)", result_group);
-  add_option(app, "--json", json_, "FILE|-", "writes the result as JSON; `-`: to stdout, and nothing else there",
-             result_group);
+  declare_json(app);
   add_option(app, "--save-draw", save_draw_, "FILE.spl",
              "writes the draw after preprocessing; --scene FILE.spl takes it in again", result_group);
   if (variants == Variants::one) {
@@ -195,12 +180,53 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
                "'tc.*' (`vrpipe units` lists all)",
                result_group);
   }
-  if (variants == Variants::all) {
-    add_option(app, "--jobs", jobs_, "N",
-               "simulations at a time, each a process of its own (default: one for each\n"
-               "processor; results do not depend on it)",
-               result_group);
-  }
+  if (variants == Variants::all) declare_jobs(app);
+}
+
+void SimulationArguments::declare_machine(CLI::App& app) {
+  declare_platform(app);
+  declare_changes(app);
+  declare_fidelity(app);
+  declare_json(app);
+  declare_jobs(app);
+}
+
+void SimulationArguments::declare_platform(CLI::App& app) {
+  add_option(app, "--platform", platform_, "NAME",
+             "the GPU (default: " + platforms().front().name + "; `vrpipe platforms` lists them)", machine_group);
+}
+
+void SimulationArguments::declare_changes(CLI::App& app) {
+  add_option(app, "--set", settings_, "UNIT.PARAMETER=VALUE",
+             "changes a parameter, e.g. tc.bins=64, or crop.cache_bytes=32K; can be\n"
+             "repeated (`vrpipe units` lists all, with units, ranges and defaults)",
+             machine_group);
+  add_option(app, "--unit", units_, "SLOT=IMPLEMENTATION",
+             "puts another unit into a slot, in every variant where the slot is not\n"
+             "pass-through; can be repeated",
+             machine_group);
+  add_option(app, "--plugin", plugins_, "FILE.so", "loads units from a plugin, for --unit; can be repeated",
+             machine_group);
+}
+
+void SimulationArguments::declare_fidelity(CLI::App& app) {
+  add_option(app, "--fidelity", fidelity_, "NAME",
+             "how exact time is, from images and counts alone to every unit in every\n"
+             "cycle: " +
+                 names_of(fidelities()) + " (default: cycle)",
+             rules_group);
+}
+
+void SimulationArguments::declare_json(CLI::App& app) {
+  add_option(app, "--json", json_, "FILE|-", "writes the result as JSON; `-`: to stdout, and nothing else there",
+             result_group);
+}
+
+void SimulationArguments::declare_jobs(CLI::App& app) {
+  add_option(app, "--jobs", jobs_, "N",
+             "simulations at a time, each a process of its own (default: one for each\n"
+             "processor; results do not depend on it)",
+             result_group);
 }
 
 void SimulationArguments::declare_frames(CLI::App& app) {
@@ -361,26 +387,17 @@ SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<
   job.scene = scene_request();
   job.frame = frame();
 
-  RunRequest request;
-  const auto platform = single(platform_, "--platform");
-  request.platform = platform ? &platform_named(*platform) : &platforms().front();
-  if (const auto name = single(fidelity_, "--fidelity")) request.fidelity = fidelity_named(*name);
+  SettingsByPart parts;
+  RunRequest request = machine(parts);
   if (const auto list = single(effects_, "--effects")) request.effects = EffectChoice::parse(*list);
   check_explanation(request.effects);
   job.explain_effects = explain_effects_;
   request.reads_statistics = single(json_, "--json").has_value() && views_.empty();
   if (const auto name = single(format_, "--format")) request.format = color_format_named(*name);
   if (const auto name = single(termination_, "--termination")) request.termination = termination_named(*name);
-  refuse_keys_given_twice(settings_, "--set");
-  refuse_keys_given_twice(units_, "--unit");
-  std::vector<Setting> settings;
-  for (const std::string& text : settings_) settings.push_back(parse_setting(text));
-  SettingsByPart parts = sort_settings(settings);
-  request.settings = std::move(parts.machine);
   job.scene.preprocess = parts.preprocess;
   job.preprocessing = std::move(parts.preprocessing);
   job.preprocess_parameters = std::move(parts.preprocess_parameters);
-  for (const std::string& text : units_) request.units.push_back(parse_unit_choice(text));
 
   std::vector<Variant> wanted = vrpipe::variants();
   if (variants == Variants::one) wanted = {variant_named(single(variant_, "--variant").value_or(variant_default))};
@@ -404,10 +421,50 @@ SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<
   if (const auto file = single(save_draw_, "--save-draw")) job.save_draw = *file;
   job.inputs = inputs(job.frame);
 
+  job.processes = processes();
+  return job;
+}
+
+MachineJob SimulationArguments::resolve_machine(const std::vector<std::string>& command) const {
+  load_plugins(plugins_);
+  MachineJob job;
+  job.provenance = make_provenance(command, plugins_);
+  SettingsByPart parts;
+  job.request = machine(parts);
+  if (!parts.preprocessing.empty()) {
+    throw UserError("cannot set 'preprocess." + parts.preprocessing.front().parameter + "'", "--set",
+                    "no scene is preprocessed", "leave it out");
+  }
+  job.request.variant = variant_named("baseline");
+  {
+    const StdoutToStderr redirected;
+    check_configuration(job.request);
+  }
+  job.json = single(json_, "--json");
+  job.processes = processes();
+  for (const std::string& plugin : plugins_) job.inputs.push_back({"--plugin", plugin});
+  return job;
+}
+
+RunRequest SimulationArguments::machine(SettingsByPart& parts) const {
+  RunRequest request;
+  const auto platform = single(platform_, "--platform");
+  request.platform = platform ? &platform_named(*platform) : &platforms().front();
+  if (const auto name = single(fidelity_, "--fidelity")) request.fidelity = fidelity_named(*name);
+  refuse_keys_given_twice(settings_, "--set");
+  refuse_keys_given_twice(units_, "--unit");
+  std::vector<Setting> settings;
+  for (const std::string& text : settings_) settings.push_back(parse_setting(text));
+  parts = sort_settings(settings);
+  request.settings = parts.machine;
+  for (const std::string& text : units_) request.units.push_back(parse_unit_choice(text));
+  return request;
+}
+
+unsigned SimulationArguments::processes() const {
   const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
   const auto jobs = single(jobs_, "--jobs");
-  job.processes = jobs ? parse_count(*jobs, "--jobs", 1024) : processors;
-  return job;
+  return jobs ? parse_count(*jobs, "--jobs", 1024) : processors;
 }
 
 }  // namespace vrpipe::tools

@@ -7,6 +7,7 @@
 
 #include <vrpipe/workloads/scene.h>
 
+#include "jobs/settings.h"
 #include "jobs/simulation_job.h"
 #include "jobs/views_job.h"
 
@@ -30,12 +31,25 @@ std::optional<std::string> single(const Values& values, const std::string& optio
 
 std::shared_ptr<CLI::FormatterBase> help_formatter();
 
+/// What a command that simulates frames of its own is asked to do it on.
+struct MachineJob {
+  Provenance provenance;
+  RunRequest request;  ///< of the baseline
+  std::optional<std::string> json;
+  unsigned processes = 1;
+  std::vector<NamedFile> inputs;
+};
+
 /// The options that all simulating commands share, as typed.
 class SimulationArguments {
  public:
   enum class Variants { one, all };
 
   void declare(CLI::App& app, Variants variants);
+  /// Those alone that say on what and how exactly it is simulated, for commands that draw frames of their own.
+  void declare_machine(CLI::App& app);
+  /// What these say; as `resolve`.
+  MachineJob resolve_machine(const std::vector<std::string>& command) const;
   /// --frame and --multi-pass, for commands that draw frames of several draws as well.
   void declare_frames(CLI::App& app);
   /// --views and --journal, for commands that draw a scene from many cameras as well.
@@ -49,6 +63,14 @@ class SimulationArguments {
   SimulationJob resolve(Variants variants, const std::vector<std::string>& command) const;
 
  private:
+  void declare_platform(CLI::App& app);
+  void declare_changes(CLI::App& app);
+  void declare_fidelity(CLI::App& app);
+  void declare_json(CLI::App& app);
+  void declare_jobs(CLI::App& app);
+  /// Platform, fidelity, settings and units.
+  RunRequest machine(SettingsByPart& parts) const;
+  unsigned processes() const;
   SceneRequest scene_request() const;
   FrameDescription frame() const;
   std::vector<NamedFile> inputs(const FrameDescription& frame) const;

@@ -196,13 +196,17 @@ void read_state(const Json& value, const std::string& where, SceneDraw& draw) {
   if (!value.is_object()) refuse(where, "it is not an object", "give {\"PARAMETER\": VALUE, ...}");
   StateParameters parameters;
   const std::vector<Parameter*> of_draws = parameters.of_draws();
-  std::vector<std::string> known{early_termination_key, "depth", "stencil", "late_tests", "shader", "cull"};
+  std::vector<std::string> known{early_termination_key, "blend", "depth", "stencil", "late_tests", "shader", "cull"};
   for (const Parameter* parameter : of_draws) known.emplace_back(parameter->name());
   for (const auto& entry : value.items()) {
     const std::string& key = entry.key();
     const std::string here = where + "." + key;
     if (key == early_termination_key) {
       draw.early_termination = read_switch(entry.value(), here);
+      continue;
+    }
+    if (key == "blend") {
+      draw.blend = read_switch(entry.value(), here);
       continue;
     }
     if (key == "depth") {
@@ -261,6 +265,10 @@ SceneDraw read_draw(const Json& command, const std::string& where, const std::fi
   if (shader != FragmentShader::none && draw.is_mesh == (shader == FragmentShader::splat)) {
     refuse(where + ", state.shader", draw.is_mesh ? "it is that of splats" : "it is that of a mesh",
            draw.is_mesh ? "use lit, vertex or none" : "use splat or none");
+  }
+  if (!draw.blend && draw.early_termination.value_or(false)) {
+    refuse(where + ", state.early_termination", "the draw does not blend, so that no pixel's alpha grows",
+           "leave it out, or blend");
   }
   if (draw.late_tests && draw.shader == FragmentShader::none) {
     refuse(where + ", state.late_tests", "its tests are to come after shading, and its shader is none",

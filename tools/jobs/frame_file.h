@@ -19,7 +19,8 @@ struct SceneDraw {
   // As Frame::draw takes them: in draw order, of the splats that are visible.
   std::uint32_t first = 0;
   std::uint32_t splats = ~0U;
-  bool early_termination = true;
+  bool blend = true;
+  std::optional<bool> early_termination;  ///< none: unless the draw does not blend
   bool late_tests = false;
   std::vector<Setting> settings;  ///< of unit `state`: those that draws may have of their own
   // Those of DrawState; none where the draw does not say.

@@ -140,7 +140,8 @@ std::shared_ptr<const Frame> make_frame(const RunRequest& request, const FrameDe
     MixedFrameOptions options;
     options.passes = description.passes;
     options.splats = draw_state_of(request, draw.settings);
-    options.splats.early_termination = draw.early_termination;
+    options.splats.blend = draw.blend;
+    options.splats.early_termination = draw.early_termination.value_or(draw.blend);
     options.splats.late_tests = draw.late_tests;
     if (draw.depth) options.splats.depth = *draw.depth;
     if (draw.stencil) options.splats.stencil = *draw.stencil;

@@ -49,7 +49,8 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
     }
     for (unsigned i = 0; i < out.count; ++i) {
       line_misses_ += out.lines[i].replaced ? 1 : 0;
-      sector_misses_ += bits(out.lines[i].filled);
+      sector_misses_ += bits(out.lines[i].missed);
+      sectors_filled_ += bits(out.lines[i].filled);
       written_back_ += bits(out.lines[i].written_back);
     }
   }
@@ -81,15 +82,16 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
     check_counter("cache.sector_accesses", cache.sector_accesses.value(), sector_accesses_, "sectors were needed");
     check_counter("cache.sector_hits", cache.sector_hits.value(), sector_accesses_ - sector_misses_,
                   "sectors were there");
-    check_counter("cache.sector_misses", cache.sector_misses.value(), sector_misses_, "sectors were filled");
+    check_counter("cache.sector_misses", cache.sector_misses.value(), sector_misses_, "sectors were missed");
     check_counter("cache.sector_misses_compulsory + _capacity + _conflict",
                   cache.sector_misses_compulsory.value() + cache.sector_misses_capacity.value() +
                       cache.sector_misses_conflict.value(),
-                  sector_misses_, "sectors were filled");
+                  sector_misses_, "sectors were missed");
     check_counter("cache.sectors_written_back", cache.sectors_written_back.value(), written_back_,
                   "sectors were written back");
     const std::uint64_t sector_bytes = timing().sector_bytes;
-    check_counter("cache.bytes_filled", cache.bytes_filled.value(), sector_bytes * sector_misses_, "bytes were filled");
+    check_counter("cache.bytes_filled", cache.bytes_filled.value(), sector_bytes * sectors_filled_,
+                  "bytes were filled");
     check_counter("cache.bytes_written_back", cache.bytes_written_back.value(), sector_bytes * written_back_,
                   "bytes were written back");
   }
@@ -115,6 +117,7 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
   std::uint64_t line_misses_ = 0;
   std::uint64_t sector_accesses_ = 0;
   std::uint64_t sector_misses_ = 0;
+  std::uint64_t sectors_filled_ = 0;  ///< the other ones are written without
   std::uint64_t written_back_ = 0;
   Seen quads_;
   Seen fragments_;

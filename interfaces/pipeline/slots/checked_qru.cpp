@@ -48,9 +48,9 @@ class CheckedQru final : public CheckedSlot<QruBehaviour> {
     }
     if (warp.mark != Mark::none) fault(call, "a warp of {} that is a mark", words_of(tile_));
     check_quads(call, tile_, warp.quads.data(), warp.count);
-    const bool may_merge = frame().draws().empty() || !frame().draw_call(warp.quads[0].draw).state.tests_late();
+    const bool may_merge = frame().draws().empty() || frame().draw_call(warp.quads[0].draw).state.merges();
     if (warp.merge_pairs != 0 && !may_merge) {
-      fault(call, "pairs in a warp of {}, which is of a draw that is tested late", words_of(tile_));
+      fault(call, "pairs in a warp of {}, which is of a draw that is tested late or not blended", words_of(tile_));
     }
     for (unsigned pair = 0; 2 * pair < 8; ++pair) {
       if ((warp.merge_pairs >> pair & 1U) == 0) continue;

@@ -17,12 +17,13 @@ namespace vrpipe {
 /// sectors are there: asks for what is absent, and writes dirty sectors of evicted lines back.
 class CachePort {
  public:
-  /// A look-up, which is given the first two members and may take several cycles.
+  /// A look-up, which is given the first two members, and may take several cycles.
   struct LookUp {
     std::uint64_t address = 0;  ///< of the line
     std::uint32_t sectors = 0;  ///< of the line that are needed, a bit each
     SectoredCache::Line line = SectoredCache::no_line;
     std::uint32_t asked_for = 0;  ///< sectors, by this look-up
+    bool reads = true;            ///< given as well: else sectors are there without a fill, since they are overwritten
   };
 
   /// @param mshrs        sectors that are filled at a time
@@ -88,6 +89,10 @@ class CachePort {
     if (wanted.line == SectoredCache::no_line && !take_line(wanted)) return false;
     std::uint32_t missing = wanted.sectors & cache_->absent(wanted.line);
     if (cleared_ != nullptr && missing != 0) take_cleared(wanted, missing);
+    if (!wanted.reads && missing != 0) {
+      cache_->fill_unread(wanted.line, missing);
+      missing = 0;
+    }
     while (missing != 0) {
       if (!memory_.available() || fills_in_flight_ == mshrs_) return false;
       const SectorRun run = longest_run_ == 1

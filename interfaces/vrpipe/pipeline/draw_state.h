@@ -9,8 +9,9 @@
 namespace vrpipe {
 
 /// What is rasterised for a splat: the oriented box where alpha falls to 1/255, the axis-aligned box of that ellipse, or
-/// the oriented box at three sigmas.
-enum class SplatExtent : std::uint8_t { oriented_box, axis_aligned_box, three_sigma };
+/// the oriented box at three sigmas, as two triangles; or that axis-aligned box as one primitive that covers all samples in
+/// [left, right) x [top, bottom), as a triangle does with NV_fill_rectangle.
+enum class SplatExtent : std::uint8_t { oriented_box, axis_aligned_box, three_sigma, fill_rectangle };
 
 /// The program for a draw's fragments.
 enum class FragmentShader : std::uint8_t {
@@ -54,6 +55,9 @@ struct DrawState {
   CullMode cull = CullMode::none;
   FragmentShader shader = FragmentShader::splat;
   Light light;
+  /// Front to back. Without, a fragment takes the place of the pixel's colour, and CROP reads nothing. Such a draw does not
+  /// terminate early.
+  bool blend = true;
 
   /// The least alpha that terminates a pixel, in single precision.
   float terminating_alpha() const;
@@ -72,6 +76,8 @@ struct DrawState {
   /// Whether fragments of terminated pixels are dropped before they are shaded. Not where it takes shading to know what they
   /// write: depth and stencil do not depend on termination.
   bool tests_termination() const { return early_termination && !(tests_late() && writes_depth_stencil()); }
+  /// Whether two quads of a position may be blended as one (QM). Not where each is tested by itself, after shading.
+  bool merges() const { return blend && !tests_late(); }
   /// Whether ZROP reads the depth-stencil target for it, and whether it does so before shading.
   bool reads_depth_stencil() const { return early_termination || tests_depth_stencil(); }
   bool reads_depth_stencil_early() const { return tests_termination() || tests_early(); }

@@ -62,7 +62,7 @@ class Frame {
 
   /// Splats `first` to `first` + `splats` - 1 of a geometry, all of it by default. Throws UserError for one of another
   /// size than the frame's, splats that it does not have, triangles that are not as many as its splats, a mesh that has splats,
-  /// a shader for what it is not, late tests where nothing is shaded, a stencil reference beyond 127, and more than
+  /// a shader for what it is not, late tests where nothing is shaded, early termination without blending, a stencil reference beyond 127, and more than
   /// 32767 draws, 65534 commands or 2^31 splats.
   void draw(std::shared_ptr<const Draw> geometry, const DrawState& state, std::string name = {},
             std::uint32_t first = 0, std::uint32_t splats = ~0U);
@@ -86,6 +86,8 @@ class Frame {
   std::uint32_t splats() const { return splats_; }  ///< of all draws
   /// Whether any draw terminates early.
   bool terminates_early() const;
+  /// Whether any draw does not blend.
+  bool replaces_color() const;
   /// Whether any draw tests depth or stencil after shading.
   bool tests_late() const;
   /// Whether any draw tests depth or stencil: then the depth target has values.

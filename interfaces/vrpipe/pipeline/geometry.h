@@ -21,6 +21,13 @@ constexpr double guard_band_pixels = 32768.0;
 bool snap_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
                    SnappedTriangle& out);
 
+/// Whether a draw's splats are a rectangle each: one primitive, which covers its bounds. Its snapped triangle has the corners
+/// upper left, upper right and lower left.
+inline bool draws_rectangles(const DrawCall& draw) {
+  return draw.state.splat_extent == SplatExtent::fill_rectangle && draw.geometry->triangles.empty() &&
+         !draw.geometry->is_mesh();
+}
+
 /// Twice the signed area, in squared sub-pixel steps; 0 is culled. Below 0 the vertices go counter-clockwise, as one sees them.
 std::int64_t doubled_area(const SnappedTriangle& triangle);
 
@@ -81,7 +88,10 @@ enum class Culling : std::uint8_t {
 Culling cull_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
                       PixelRect& bounds);
 
-/// How many triangles a splat of this geometry is.
-inline unsigned triangles_per_splat(const Draw& draw) { return draw.triangles.empty() && !draw.is_mesh() ? 2U : 1U; }
+/// How many primitives a splat of a draw is.
+inline unsigned primitives_per_splat(const DrawCall& draw) {
+  const bool is_box = draw.geometry->triangles.empty() && !draw.geometry->is_mesh();
+  return is_box && !draws_rectangles(draw) ? 2U : 1U;
+}
 
 }  // namespace vrpipe

@@ -48,13 +48,14 @@ struct StateParameters : ParameterSet {
                       1,
                       "the format that graphics APIs demand with a stencil",
                       "of the depth target, beside 8 bits of stencil"};
-  Choice splat_extent{
-      *this,
-      "splat_extent",
-      {"obb", "aabb", "three_sigma"},
-      0,
-      source::paper_text,
-      "what is rasterised for a splat: its box at alpha 1/255, oriented or axis-aligned, or at 3 sigmas"};
+  Choice splat_extent{*this,
+                      "splat_extent",
+                      {"obb", "aabb", "three_sigma", "fill_rectangle"},
+                      0,
+                      source::paper_text,
+                      "what is rasterised for a splat: its box at alpha 1/255, oriented or axis-aligned, or at 3 "
+                      "sigmas, as two triangles; "
+                      "or the axis-aligned one as one primitive (NV_fill_rectangle)"};
   Integer subpixel_bits{*this, "subpixel_bits", 8, 4, 12, "bits", "D3D11.3: 8", "of vertex coordinates"};
   Real obb_padding{*this,        "obb_padding",
                    0.75,         0.0,

@@ -45,7 +45,7 @@ bool SameSplatQru::finish_bin(vrpipe::Warp& out) {
   return true;
 }
 
-bool SameSplatQru::may_merge(const vrpipe::Quad& quad) const { return !context_.state(quad.draw).tests_late(); }
+bool SameSplatQru::may_merge(const vrpipe::Quad& quad) const { return context_.state(quad.draw).merges(); }
 
 void SameSplatQru::add_pair(const vrpipe::Quad& front, const vrpipe::Quad& back) {
   if (waiting_.coverage != 0 && waiting_.position == front.position) {

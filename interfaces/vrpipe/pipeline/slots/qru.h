@@ -12,8 +12,8 @@ namespace vrpipe {
 class QruBehaviour : public Behaviour {
  public:
   /// Examines quads of a bin, until all `count` are examined or a warp is complete. Returns the number examined, 0 only
-  /// together with a launch; `launched` tells whether `out` was filled. Quads of draws that are tested late
-  /// (DrawState::tests_late) are not to be merged: each is tested by itself.
+  /// together with a launch; `launched` tells whether `out` was filled. Quads of draws that are tested late or
+  /// not blended are not to be merged (DrawState::merges).
   virtual unsigned examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) = 0;
   /// At the end of a bin: the next warp of what is left; false when nothing is.
   virtual bool finish_bin(Warp& out) = 0;

@@ -1,0 +1,195 @@
+#include "jobs/microbench_job.h"
+
+#include <cmath>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "documented_keys.h"
+#include "jobs/published_figures.h"
+#include "output/microbench_report.h"
+#include "output/text_plot.h"
+#include "tool_test_support.h"
+
+namespace vrpipe::testing {
+namespace {
+
+using nlohmann::json;
+
+// What is published.
+
+TEST(PublishedFigures, EachIsNamedOnceAndHasASource) {
+  std::set<std::pair<std::string, std::string>> names;
+  const std::vector<std::string> known = microbench_names();
+  for (const tools::PublishedFigure& figure : tools::published_figures()) {
+    EXPECT_TRUE(names.emplace(figure.microbench, figure.name).second) << figure.name;
+    EXPECT_NE(std::find(known.begin(), known.end(), figure.microbench), known.end()) << figure.microbench;
+    EXPECT_NE(std::string(figure.source), "") << figure.name;
+    if (!figure.paper && !figure.gpu) {
+      EXPECT_LT(figure.tolerance_percent, 0) << figure.name << " has nothing to agree with";
+    }
+  }
+  EXPECT_THROW(tools::published_figure("tile-binning", "nothing"), std::logic_error);
+}
+
+// Findings.
+
+MicrobenchFigure figure_of(double measured, std::optional<double> reference, double tolerance) {
+  MicrobenchFigure figure;
+  figure.name = "rate";
+  figure.unit = "quads/clk";
+  figure.measured = measured;
+  figure.reference = reference;
+  figure.reference_is = "paper";
+  figure.tolerance_percent = tolerance;
+  return figure;
+}
+
+TEST(MicrobenchFindings, SayWhatAgreesAndByHowMuchAndWhyWhatDoesNot) {
+  EXPECT_EQ(tools::finding(figure_of(2, 2.0, 0)), "rate: 2 quads/clk, agrees with the paper's 2");
+  EXPECT_EQ(tools::finding(figure_of(2.02, 2.0, 2)), "rate: 2.020 quads/clk, agrees with the paper's 2: 1.0 % more");
+  MicrobenchFigure differs = figure_of(1, 2.0, 5);
+  EXPECT_EQ(tools::finding(differs), "rate: 1 quads/clk, differs from the paper's 2: 50 % less");
+  differs.note = "half the units";
+  EXPECT_EQ(tools::finding(differs), "rate: 1 quads/clk, differs from the paper's 2: 50 % less; half the units");
+  EXPECT_EQ(tools::finding(figure_of(1, 2.0, -1)), "rate: 1 quads/clk, beside the paper's 2");
+  MicrobenchFigure of_a_part = figure_of(4, std::nullopt, 5);
+  EXPECT_EQ(tools::finding(of_a_part), "rate: 4 quads/clk");
+  of_a_part.gpu = 2;
+  of_a_part.gpu_is_of = one_partition;
+  EXPECT_EQ(tools::finding(of_a_part), "rate: 4 quads/clk; the real GPU has 2 (one ROP partition)");
+  EXPECT_FALSE(of_a_part.agrees());
+  EXPECT_TRUE(figure_of(0, 0.0, 0).agrees());
+  EXPECT_FALSE(figure_of(3, 0.0, 0).agrees());
+  EXPECT_EQ(tools::finding(figure_of(3, 0.0, 0)), "rate: 3 quads/clk, differs from the paper's 0");
+}
+
+TEST(TextPlot, PutsPointsWhereTheyBelong) {
+  EXPECT_EQ(tools::text_plot({{'*', {{1, 0}, {3, 4}}}, {'o', {{2, 2}, {3, 4}}}}, 5, 3),
+            "4 |    *\n"
+            "  |  o\n"
+            "0 |*\n"
+            "  +-----\n"
+            "   1   3\n");
+  EXPECT_EQ(tools::text_plot({{'*', {{1, INFINITY}}}}, 5, 3), "");
+}
+
+// The command.
+
+class Microbench : public ToolTest {
+ protected:
+  static std::map<std::string, double> measured(const json& result, const std::string& name) {
+    std::map<std::string, double> values;
+    for (const json& each : result["microbenchmarks"]) {
+      if (each["name"] != name) continue;
+      for (const json& figure : each["figures"]) values[figure["name"]] = figure["measured"].get<double>();
+    }
+    return values;
+  }
+};
+
+TEST_F(Microbench, OnThePapersGpuAllThatIsPublishedOfItAgrees) {
+  const Finished finished = vrpipe({"microbench", "all", "--json", "all.json", "--html", "all.html"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  EXPECT_EQ(finished.err, "");
+  const json result = json::parse(read_file(folder() / "all.json"));
+  EXPECT_EQ(result["schema"], "vrpipe.microbench/1");
+  EXPECT_EQ(result["platform"]["name"], "agx-orin");
+  EXPECT_EQ(result["fidelity"], "cycle");
+  std::set<std::string> names;
+  std::size_t figures = 0;
+  std::size_t curves = 0;
+  unsigned agreeing = 0;
+  for (const json& each : result["microbenchmarks"]) {
+    names.insert(each["name"]);
+    figures += each["figures"].size();
+    curves += each["curves"].size();
+    for (const json& figure : each["figures"]) {
+      if (figure["agrees"].is_null()) continue;
+      EXPECT_TRUE(figure["agrees"].get<bool>()) << figure["finding"];
+      ++agreeing;
+      EXPECT_NE(finished.out.find(figure["name"].get<std::string>()), std::string::npos);
+    }
+    for (const json& curve : each["curves"]) EXPECT_GT(curve["measured"].size(), 1U) << curve["name"];
+  }
+  const std::vector<std::string> expected = microbench_names();
+  EXPECT_EQ(names, std::set<std::string>(expected.begin(), expected.end()));
+  EXPECT_EQ(figures, tools::published_figures().size());
+  EXPECT_GE(agreeing, 20U);
+
+  const auto binning = measured(result, "tile-binning");
+  EXPECT_EQ(binning.at("warps, 320 quads over 32 tiles"), 64);
+  EXPECT_EQ(binning.at("warps, 330 quads over 33 tiles"), 330);
+  EXPECT_NEAR(binning.at("gap that parts a pair"), 150, 12) << "tc.idle_timeout_cycles";
+  EXPECT_EQ(measured(result, "crop-cache").at("largest working set without reads"), 16);
+  const auto rop = measured(result, "rop-throughput");
+  EXPECT_NEAR(rop.at("RGBA16F, blending, 1024x1024"), 6.4, 0.05) << "a fill and a write-back a quad, of 16 a cycle";
+  EXPECT_NEAR(rop.at("RGBA16F, no blending, 1024x1024"), 7.11, 0.05) << "a write-back alone";
+
+  const std::string page = read_file(folder() / "all.html");
+  std::size_t plots = 0;
+  for (std::size_t at = 0; (at = page.find("<svg", at)) != std::string::npos; ++at) ++plots;
+  EXPECT_EQ(plots, curves);
+  EXPECT_EQ(page.find("src=\"http"), std::string::npos);
+  EXPECT_EQ(page.find("href=\"http"), std::string::npos);
+  EXPECT_NE(page.find("</html>"), std::string::npos);
+}
+
+TEST_F(Microbench, FollowsThePlatformsSettings) {
+  const json halved = json_of({"microbench", "rop-throughput", "--set", "crop.bytes_per_cycle=32", "--set",
+                               "crop.cache_bytes=8K", "--fidelity", "lt"});
+  EXPECT_NEAR(measured(halved, "rop-throughput").at("RGBA16F, blending, 32x32"), 4, 0.05);
+  EXPECT_EQ(halved["platform"]["parameters"]["crop.bytes_per_cycle"], 32);
+  for (const json& figure : halved["microbenchmarks"][0]["figures"]) {
+    if (figure["name"] != "RGBA16F, blending, 32x32") continue;
+    EXPECT_FALSE(figure["agrees"].get<bool>());
+    EXPECT_EQ(figure["gpu_is_of"], "one ROP partition");
+    EXPECT_NE(figure["finding"].get<std::string>().find("differs from the paper's 8: 50 % less"), std::string::npos);
+  }
+  const json small = json_of({"microbench", "crop-cache", "--set", "crop.cache_bytes=8K", "--fidelity", "at"});
+  EXPECT_EQ(measured(small, "crop-cache").at("largest working set without reads"), 8);
+  const json bins = json_of({"microbench", "tile-binning", "--set", "tc.bins=16", "--fidelity", "functional"});
+  EXPECT_EQ(measured(bins, "tile-binning").at("bins"), 16);
+  EXPECT_EQ(measured(bins, "tile-binning").count("gap that parts a pair"), 0U) << "there is no time";
+}
+
+TEST_F(Microbench, ResultsDoNotDependOnTheNumberOfProcesses) {
+  const auto figures_of = [&](const char* jobs) {
+    json result = json_of({"microbench", "front-end", "--fidelity", "lt", "--jobs", jobs});
+    return result["microbenchmarks"][0]["figures"];
+  };
+  EXPECT_EQ(figures_of("1"), figures_of("3"));
+}
+
+TEST_F(Microbench, BlendsInOrderAtEveryFidelity) {
+  for (const char* fidelity : {"functional", "bound", "lt", "at"}) {
+    const json result =
+        json_of({"microbench", "blend-order", "--fidelity", fidelity, "--set", "state.blend_rounding=rtz"});
+    for (const auto& [name, pixels] : measured(result, "blend-order")) EXPECT_EQ(pixels, 0) << fidelity << ", " << name;
+  }
+}
+
+TEST_F(Microbench, Refusals) {
+  refused({"microbench"}, {"NAME is required"});
+  refused({"microbench", "tile-bining"},
+          {"unknown microbenchmark 'tile-bining'", "did you mean tile-binning?", "and all"});
+  refused({"microbench", "all", "--fidelity", "functional"}, {"cannot measure rop-throughput", "it measures time"});
+  refused({"microbench", "kill-rate", "--platform", "agx-orion"}, {"agx-orion", "agx-orin"});
+  refused({"microbench", "kill-rate", "--set", "crop.cache_byte=1"}, {"crop.cache_bytes"});
+  refused({"microbench", "kill-rate", "--set", "preprocess.sh_degree=1"}, {"no scene is preprocessed"});
+  refused({"microbench", "kill-rate", "--set", "tc.bins=1", "--set", "tc.bins=2"}, {"given twice"});
+  refused({"microbench", "kill-rate", "--html", "none/x.html"}, {"--html", "there is no folder"});
+  refused({"microbench", "kill-rate", "--json", "x", "--html", "x"}, {"--json", "--html"});
+  refused({"microbench", "kill-rate", "--scene", "builtin:object"}, {"--scene"});
+}
+
+TEST_F(Microbench, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
+  const std::string page = read_file(std::filesystem::path(RESULTS_PAGE).parent_path() / "microbenchmarks.md");
+  expect_documented({json_of({"microbench", "tile-binning", "--fidelity", "functional"}),
+                     json_of({"microbench", "front-end", "--fidelity", "bound", "--plugin", TEST_PLUGIN, "--unit",
+                              "qru=same-splat"})},
+                    documented(page, "Keys"));
+}
+
+}  // namespace
+}  // namespace vrpipe::testing

@@ -1,0 +1,145 @@
+// That the frames of the microbenchmarks do what they claim, in numbers that are known beforehand.
+#include <vrpipe/workloads/microbench.h>
+
+#include <cstring>
+#include <set>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "support/simulate.h"
+
+namespace vrpipe::microbench {
+namespace {
+
+RunResult run(const FramePointer& frame, Fidelity fidelity = Fidelity::functional) {
+  fresh_simulation();
+  return simulate(testing::request_of("baseline", fidelity), *frame);
+}
+
+TEST(TileBinningFrames, ARoundHasAQuadInEachTile) {
+  for (const unsigned tiles : {1U, 17U, 33U}) {
+    const FramePointer frame = rounds_over_tiles(tiles, 10, 1);
+    EXPECT_EQ(frame->splats(), 10 * tiles);
+    const RunResult result = run(frame);
+    EXPECT_EQ(result.counts.primitives, 10 * tiles);
+    EXPECT_EQ(result.counts.quads_shaded, 10 * tiles);
+    EXPECT_EQ(result.counts.fragments_blended, 40 * tiles);
+    EXPECT_EQ(testing::statistic(result, "raster.screen_tile_pairs"), 10 * tiles);
+  }
+}
+
+TEST(TileBinningFrames, OfSeveralGpcsTheFirstHasAllTiles) {
+  const FramePointer frame = rounds_over_tiles(40, 1, 4);
+  std::set<std::pair<unsigned, unsigned>> tiles;
+  for (std::uint32_t i = 0; i < frame->splats(); ++i) {
+    const Splat& splat = frame->draw_call(0).splat(i);
+    const TileId tile{static_cast<std::uint16_t>(splat.cx / 16), static_cast<std::uint16_t>(splat.cy / 16)};
+    EXPECT_EQ(owner_of(tile, 4), 0U);
+    tiles.emplace(tile.x, tile.y);
+  }
+  EXPECT_EQ(tiles.size(), 40U);
+}
+
+TEST(TileBinningFrames, APairHasTwoQuadsWhateverIsCulledBetween) {
+  for (const unsigned culled : {0U, 1U, 100U}) {
+    const RunResult result = run(pair_with_gap(culled));
+    EXPECT_EQ(result.counts.primitives, 2U);
+    EXPECT_EQ(result.counts.quads_blended, 2U);
+    EXPECT_EQ(testing::statistic(result, "vpo.culled_outside"), culled);
+  }
+  EXPECT_EQ(run(pair_at_distance(14)).counts.warps, 1U);
+  EXPECT_EQ(run(pair_at_distance(16)).counts.warps, 2U);
+}
+
+TEST(RopThroughputFrames, LayersCoverTheirSide) {
+  for (const bool blend : {true, false}) {
+    const RunResult result = run(stacked_layers(64, 3, blend));
+    EXPECT_EQ(result.counts.primitives, 3U);
+    EXPECT_EQ(result.counts.quads_blended, 3U * 32 * 32);
+    EXPECT_EQ(result.counts.fragments_blended, 3U * 64 * 64);
+    const float alpha = result.framebuffer.color.pixel(63, 63)[3];
+    EXPECT_NEAR(alpha, blend ? 1 - 0.98F * 0.98F * 0.98F : 0.02F, 1e-4F);
+  }
+}
+
+TEST(QuadCoverageFrames, TheStencilLetsSoManyPixelsOfEachQuadPass) {
+  for (const LivePixels pixels : {LivePixels::four, LivePixels::three, LivePixels::two_horizontal,
+                                  LivePixels::two_vertical, LivePixels::two_diagonal, LivePixels::one}) {
+    const RunResult result = run(layers_through_stencil(pixels, 32, 5));
+    EXPECT_EQ(result.counts.quads_blended, 5U * 16 * 16) << live_of(pixels);
+    EXPECT_EQ(result.counts.fragments_blended, 5U * 16 * 16 * live_of(pixels));
+  }
+  const RunResult diagonal = run(layers_through_stencil(LivePixels::two_diagonal, 32, 1));
+  EXPECT_EQ(diagonal.framebuffer.color.pixel(4, 4)[3] > 0, diagonal.framebuffer.color.pixel(5, 5)[3] > 0);
+  EXPECT_NE(diagonal.framebuffer.color.pixel(4, 4)[3] > 0, diagonal.framebuffer.color.pixel(5, 4)[3] > 0);
+}
+
+TEST(QuadCoverageFrames, ShapesHaveTheQuadsThatTheySay) {
+  for (const Shape& shape : shapes()) {
+    const RunResult result = run(scattered(shape, 20));
+    EXPECT_EQ(result.counts.quads_blended, 20 * shape.quads()) << shape.name;
+    EXPECT_EQ(result.counts.fragments_blended, 20 * shape.width * shape.height) << shape.name;
+    EXPECT_EQ(shape.quads() * shape.live_per_quad(), shape.width * shape.height) << shape.name;
+  }
+}
+
+TEST(CropCacheFrames, ARectangleOfEachTileInTurn) {
+  const FramePointer frame = rectangles_in_turn(5, 3, 8, 16, true, 1);
+  const RunResult result = run(frame);
+  EXPECT_EQ(result.counts.quads_blended, 5U * 3 * 32);
+  for (unsigned i = 0; i < 15; ++i) {
+    EXPECT_EQ(frame->draw_call(0).splat(i).cx, static_cast<float>(16 * (i % 5) + 4));
+  }
+}
+
+TEST(BlendOrderFrames, TheSequentialReferenceIsTheImageBitForBit) {
+  const FramePointer frame = overlapping_layers(24, 48);
+  for (const auto& [rounding, name] :
+       {std::pair{BlendRounding::rne, "rne"}, {BlendRounding::rtz, "rtz"}, {BlendRounding::measured, "measured"}}) {
+    for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
+      fresh_simulation();
+      const RunResult result = simulate(testing::request_of("baseline", Fidelity::functional,
+                                                            [&, name = name](RunRequest& r) {
+                                                              r.format = format;
+                                                              r.settings = {{"state", "blend_rounding", name}};
+                                                            }),
+                                        *frame);
+      const std::array<float, 4> expected = blended_in_order(*frame, format, rounding);
+      const std::array<float, 4> pixel = result.framebuffer.color.pixel(17, 30);
+      EXPECT_EQ(std::memcmp(pixel.data(), expected.data(), sizeof expected), 0) << name << " " << name_of(format);
+    }
+  }
+}
+
+TEST(FrontEndFrames, NothingIsShaded) {
+  const RunResult culled = run(small_primitives(Small::culled, 100));
+  EXPECT_EQ(testing::statistic(culled, "vpo.culled_outside"), 100U);
+  const RunResult rectangles = run(small_primitives(Small::rectangle, 100));
+  EXPECT_EQ(rectangles.counts.primitives, 100U);
+  EXPECT_EQ(rectangles.counts.quads_depth_stencil_failed, 100U);
+  const RunResult splats = run(small_primitives(Small::two_triangles, 100));
+  EXPECT_EQ(splats.counts.primitives, 200U);
+  EXPECT_EQ(splats.counts.quads_shaded, 0U);
+  EXPECT_EQ(splats.counts.fragments_depth_stencil_failed, 400U);
+}
+
+TEST(KillRateFrames, EachIsKilledWhereItSays) {
+  constexpr unsigned quads = 16 * 32 * 32;
+  const RunResult stencil = run(killed_rectangles(KilledBy::stencil, 64, 16, 256));
+  EXPECT_EQ(stencil.counts.quads_depth_stencil_failed, quads);
+  EXPECT_EQ(testing::statistic(stencil, "raster.screen_tile_pairs"), 16U * 16);
+  const RunResult depth = run(killed_rectangles(KilledBy::depth, 64, 16, 256));
+  EXPECT_EQ(depth.counts.quads_depth_stencil_failed, quads);
+  EXPECT_EQ(testing::statistic(depth, "raster.hi_z_culled"), 0U);
+  const RunResult hi_z = run(killed_rectangles(KilledBy::hi_z, 64, 16, 256));
+  EXPECT_EQ(hi_z.counts.quads_rasterized, 0U);
+  EXPECT_EQ(testing::statistic(hi_z, "raster.hi_z_culled"), 16U * 64);
+  const RunResult shader = run(killed_rectangles(KilledBy::shader, 64, 16, 256));
+  EXPECT_EQ(shader.counts.quads_pruned, quads);
+  const RunResult across = run(killed_rectangles(KilledBy::stencil, 16, 256, 256, 8));
+  EXPECT_EQ(testing::statistic(across, "raster.screen_tile_pairs"), 256U * 4);
+}
+
+}  // namespace
+}  // namespace vrpipe::microbench

@@ -1,0 +1,85 @@
+#include <iostream>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/component/printable.h>
+
+#include "cli/command_line.h"
+#include "cli/options.h"
+#include "host/output_file.h"
+#include "host/terminal.h"
+#include "jobs/microbench_job.h"
+#include "output/json_text.h"
+#include "output/microbench_json.h"
+#include "output/microbench_page.h"
+#include "output/microbench_report.h"
+
+namespace vrpipe::tools {
+namespace {
+
+class MicrobenchCommand : public Command {
+ public:
+  std::string name() const override { return "microbench"; }
+  std::string summary() const override { return "the paper's analysis of GPUs as workloads, beside a real GPU"; }
+
+  void declare(CLI::App& app) override {
+    app.add_option("NAME", name_, fmt::format("{}, or all", fmt::join(microbench_names(), ", ")))
+        ->required()
+        ->type_name("");
+    arguments_.declare_machine(app);
+    add_option(app, "--html", html_, "FILE", "writes a page with the curves; it needs no network", "Where results go");
+    app.footer(
+        "Each draws rectangles of its own on the baseline GPU and prints what the paper found, what a real GPU (one\n"
+        "graphics GPC of a GH100) measured and what the simulator does beside one another, with its curve. Draw state\n"
+        "is the microbenchmark's: of --set state.NAME the precision of the hardware counts alone.\n"
+        "\n"
+        "Examples:\n"
+        "  vrpipe microbench tile-binning\n"
+        "  vrpipe microbench rop-throughput --set crop.bytes_per_cycle=32 --set crop.cache_bytes=8K\n"
+        "  vrpipe microbench all --json microbench.json --html microbench.html");
+  }
+
+  void run() override {
+    MachineJob job = arguments_.resolve_machine(command_line());
+    std::vector<std::string> names = microbench_names();
+    if (name_ != "all") names = {name_};
+    for (const std::string& each : names) check_microbench(each, job.request);
+    const auto html = single(html_, "--html");
+    std::vector<NamedFile> outputs;
+    if (job.json && *job.json != "-") outputs.push_back({"--json", *job.json});
+    if (html) outputs.push_back({"--html", *html});
+    for (const NamedFile& output : outputs) check_output_file(output.path, output.option);
+    check_files_differ(job.inputs, outputs);
+
+    MicrobenchRun run;
+    run.provenance = std::move(job.provenance);
+    run.request = job.request;
+    run.processes = job.processes;
+    for (const std::string& each : names) run.results.push_back(run_microbench(each, job.request, job.processes));
+    if (html) write_output_file(*html, microbench_page(run), "--html");
+    if (job.json) {
+      const std::string text = json_text(microbench_json(run));
+      if (*job.json == "-") {
+        std::cout << text;
+        return;
+      }
+      write_output_file(*job.json, text, "--json");
+    }
+    std::cout << microbench_text(run, stdout_style());
+    if (job.json) std::cout << "result: " << printable(*job.json) << '\n';
+    if (html) std::cout << "page: " << printable(*html) << '\n';
+  }
+
+ private:
+  SimulationArguments arguments_;
+  std::string name_;
+  Values html_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_microbench_command() { return std::make_unique<MicrobenchCommand>(); }
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host/provenance.h"
+#include "host/terminal.h"
+#include "jobs/microbench_job.h"
+
+namespace vrpipe::tools {
+
+/// What `vrpipe microbench` has done.
+struct MicrobenchRun {
+  Provenance provenance;
+  RunRequest request;
+  unsigned processes = 1;
+  std::vector<MicrobenchResult> results;
+};
+
+/// One plain sentence: that a figure agrees with what is published, or by how much it differs, and why where that is known.
+std::string finding(const MicrobenchFigure& figure);
+
+/// A figure's number as people read it.
+std::string number_text(double value);
+/// That of the real GPU, with what it is of; "-" for none.
+std::string gpu_text(const MicrobenchFigure& figure);
+
+/// What a person reads: for each microbenchmark the figures beside one another, its curves, and the findings.
+std::string microbench_text(const MicrobenchRun& run, const TextStyle& style);
+
+}  // namespace vrpipe::tools
