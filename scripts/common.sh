@@ -49,6 +49,9 @@ quietly() {
   rm -f "$log"
 }
 
+# What ccache knows of one checkout serves another.
+export CCACHE_BASEDIR=$project CCACHE_NOHASHDIR=true
+
 # configure BINARY_DIR OPTIONS...: a cmake run, with ccache if there is one.
 configure() {
   local options=(-S . -B "$@")

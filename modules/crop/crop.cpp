@@ -41,7 +41,8 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
               parameters.line_cycles,
               parameters.fetch_ahead,
               parameters.line_return_cycles,
-              parameters.pairs_in_sector} {
+              parameters.pairs_in_sector,
+              Format == ColorFormat::rgba32f ? parameters.rgba32f_column_cycles : 0U} {
   timing_.check_cache(Format);
   if (!EffectGate(context, "cache.details").is_active()) cache_statistics.leave_out_details();
   several_draws_ =

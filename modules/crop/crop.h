@@ -86,6 +86,16 @@ struct CropParameters : ParameterSet {
                              "cycles",
                              "left open by the paper; measured on a GH100 graphics GPC: 503",
                              "from the last blend into a line that leaves the cache to the next one"};
+  Integer rgba32f_column_cycles{
+      *this,
+      "rgba32f_column_cycles",
+      0,
+      0,
+      64,
+      "cycles",
+      "left open by the paper; measured on a GH100 graphics GPC: 4",
+      "of blending RGBA32F, for each column of two pixels of a quad that has live samples; 0: "
+      "bytes_per_cycle says what a quad takes"};
   Switch pairs_in_sector{*this, "pairs_in_sector", false,
                          "left open by the paper; measured on a GH100 graphics GPC: on",
                          "quads of one cycle share a sector, as two neighbours of RGBA8 do; others take a cycle each"};

@@ -127,7 +127,9 @@ class TimedCrop : public TimedUnit {
       charge(UnitState::blocked, out_.last());
       there = out_.last();
     }
-    const Cycle hazard = timing_.forwards || !hazard_gate_.enter() ? 0 : hazard_until(warp.tile, warp.position[from]);
+    const Cycle hazard = timing_.forwards || !hazard_gate_.enter() || !context_.state(warp.draw[from]).blend
+                             ? 0
+                             : hazard_until(warp.tile, warp.position[from]);
     // Moving a sector takes time from blending, from when it moves.
     for (; !moves_.empty() && moves_.front().at <= std::max({there, hazard, blending_.next()}); moves_.pop()) {
       blending_.take(moves_.front().at, moves_.front().moved * move_price_);
@@ -139,9 +141,9 @@ class TimedCrop : public TimedUnit {
       did(CropWork::forwarding, wasted, there, hazard);
       there = hazard;
     }
-    const unsigned price = price_of(from, to);
+    const unsigned price = price_of(warp, from, to);
     const CycleInterval blended = blending_.take(there, price);
-    if (pairs_) did(CropWork::unpaired, price - quads * price_, blended.first, blended.last + 1);
+    if (price > quads * price_) did(CropWork::unpaired, price - quads * price_, blended.first, blended.last + 1);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
     queue_.take(quads, blended.last);
@@ -174,12 +176,14 @@ class TimedCrop : public TimedUnit {
   }
   /// A line is there for another, which may have been before.
   void come_back(const CropBehaviour::LineAccess& access) {
-    ready_[access.line] = returns_->from(access.address);
+    // What replaces colours does not read them.
+    ready_[access.line] = access.filled != 0 ? returns_->from(access.address) : 0;
     used_before_[access.line] = last_uses_[returns_->index(access.address)];
   }
 
   /// Of quads, in parts of a cycle. Where several go in one only if they share a sector, the others take one each.
-  unsigned price_of(unsigned from, unsigned to) const {
+  unsigned price_of(const ShadedWarp& warp, unsigned from, unsigned to) const {
+    if (timing_.column_cycles > 0 && context_.state(warp.draw[from]).blend) return price_of_columns(warp, from, to);
     if (!pairs_) return (to - from) * price_;
     const auto cycle = static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_));
     const unsigned most = timing_.blend_rate.most_in_a_cycle();
@@ -191,6 +195,13 @@ class TimedCrop : public TimedUnit {
       beside = shares ? beside + 1 : 1;
       price += shares ? 0 : cycle;
     }
+    return price;
+  }
+
+  [[gnu::noinline]] unsigned price_of_columns(const ShadedWarp& warp, unsigned from, unsigned to) const {
+    const auto column = timing_.column_cycles * static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_));
+    unsigned price = 0;
+    for (unsigned i = from; i < to; ++i) price += std::max(price_, columns_of(warp.live[i]) * column);
     return price;
   }
 

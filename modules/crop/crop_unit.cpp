@@ -97,7 +97,7 @@ class CropUnit : public Unit {
         wanted_.line == SectoredCache::no_line ? port_.pin_held(address, sectors) : SectoredCache::no_line;
     std::uint32_t asked_for = 0;
     if (line == SectoredCache::no_line) {
-      if (replaces_) wanted_.reads = context_.state(quad.warp->draw[quad.index]).blend;
+      if (replaces_) wanted_.reads = blends(quad);
       line = fill(address, sectors, asked_for);
       if (line == SectoredCache::no_line) return false;
     }
@@ -118,12 +118,13 @@ class CropUnit : public Unit {
   }
   [[gnu::noinline]] bool look_up_ahead(const ColorQuad& quad, std::uint64_t address, std::uint32_t sectors,
                                        std::size_t place) {
-    const LinesAhead::Stay stay = ahead_->look_up(address, sectors);
+    const LinesAhead::Stay stay = ahead_->look_up(address, sectors, blends(quad));
     if (stay == LinesAhead::no_stay) return false;
     pay_for_stays();
     queue(quad, stay, sectors, place);
     return true;
   }
+  bool blends(const ColorQuad& quad) const { return !replaces_ || context_.state(quad.warp->draw[quad.index]).blend; }
   void pay_for_stays() {
     const LinesAhead::Moves moves = ahead_->take_moves();
     const unsigned moved = timing_.line_cycles == 0 ? moves.sectors : moves.lines;
@@ -149,8 +150,8 @@ class CropUnit : public Unit {
     }
     // It has just been pinned, by nobody else if it is new.
     if (!had_line && wanted_.line != SectoredCache::no_line && port_.cache().present(wanted_.line) == 0) {
-      unpaid_[wanted_.line] = true;
-      if (returns_) came_back_[wanted_.line] = returns_->from(wanted_.address) != 0;
+      unpaid_[wanted_.line] = wanted_.reads;
+      if (returns_) came_back_[wanted_.line] = wanted_.reads && returns_->from(wanted_.address) != 0;
     }
     if (!done) return SectoredCache::no_line;
     asked_for = std::exchange(wanted_.asked_for, 0);
@@ -229,7 +230,7 @@ class CropUnit : public Unit {
         stop_ = UnitState::busy;  // with the quads before it, or with moving sectors
         break;
       }
-      if (!timing_.forwards && hazard_gate_.enter()) {
+      if (!timing_.forwards && hazard_gate_.enter() && blends(entry.quad)) {
         if (hazard(entry.place, now)) {
           stop_ = UnitState::latency;
           break;
@@ -251,6 +252,7 @@ class CropUnit : public Unit {
       const bool changed = outcome.changed || timing_.writes_unchanged;
       tokens_ -= price;
       unpaired += price - price_;
+      if (timing_.column_cycles > 0 && blends(quad)) unpaired += pay_for_columns(quad.live());
       if (!ahead_) {
         if (changed) port_.cache().make_dirty(entry.line, entry.sectors);
         port_.cache().unpin(entry.line);
@@ -271,7 +273,7 @@ class CropUnit : public Unit {
     frame_lasts(now + timing_.latency_cycles);
     did(CropWork::blend, blended, now);
     // Two that go together cost as much as one of a cycle's two.
-    if (pairs_ && unpaired > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(unpaired), now);
+    if (unpaired > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(unpaired), now);
     last_blend_ = now;
     any_blended_ = true;
     return true;
@@ -298,6 +300,13 @@ class CropUnit : public Unit {
   [[gnu::noinline]] void pay_for_fetch(SectoredCache::Line line, bool changed) {
     unpaid_[line] = false;
     if (changed) pay(1);
+  }
+  /// What the columns of two pixels of a quad that have live samples take beyond its price, which is paid once it is blended.
+  [[gnu::noinline]] std::int64_t pay_for_columns(LaneMask live) {
+    const std::int64_t more = columns_of(live) * timing_.column_cycles * income_ - price_;
+    if (more <= 0) return 0;
+    tokens_ -= more;
+    return more;
   }
   /// Of a quad, where several go in a cycle if they share a sector; `beside` have gone in this one.
   [[gnu::noinline]] std::int64_t price_beside_last(const Entry& entry, unsigned beside) const {

@@ -32,12 +32,14 @@ class LinesAhead {
         latest_(returns.lines(), no_stay) {}
 
   /// Looks a quad up, which then waits to be blended; `no_stay` while it has to wait for the memory port or a register.
-  Stay look_up(std::uint64_t address, std::uint32_t sectors) {
+  /// One that replaces what is there does not read.
+  Stay look_up(std::uint64_t address, std::uint32_t sectors, bool reads) {
     const auto most = static_cast<unsigned>(__builtin_popcount(sectors));
     if (!requests_.empty() || !port_.memory().available() || filling_ + most > mshrs_) return no_stay;
     LineAccess access;
     access.address = address;
     access.sectors = sectors;
+    access.known = reads ? 0 : ~0U;
     port_.cache().look_up(access);
     if (access.replaced) begin(access);
     const Stay number = stay_of_line_[access.line];
@@ -116,7 +118,7 @@ class LinesAhead {
     Stay following = no_stay;  ///< of the same line, which waits for the end of this one
     bool left = false;         ///< the line has gone for another
     bool ended = false;
-    bool unpaid = true;      ///< nothing has been blended into it: the quad for which it was fetched is the first
+    bool unpaid = false;     ///< nothing has been blended into it: the quad for which it was fetched is the first
     bool waits = false;      ///< for the stay before it to end
     bool came_back = false;  ///< the line was there before; nothing has been blended into it since
   };
@@ -143,11 +145,12 @@ class LinesAhead {
     State& stay = stays_[number];
     stay = {};
     stay.address = access.address;
-    stay.came_back = returns_.from(access.address) != 0;
+    stay.unpaid = access.filled != 0;
+    stay.came_back = stay.unpaid && returns_.from(access.address) != 0;
     Stay& latest = latest_[returns_.index(access.address)];
     if (latest != no_stay) {
       stays_[latest].following = number;
-      stay.waits = stay.came_back = true;
+      stay.waits = stay.came_back = stay.unpaid;
     }
     latest = number;
     stay_of_line_[access.line] = number;

@@ -13,6 +13,14 @@ namespace vrpipe {
 VertexIssue::VertexIssue(const Parameters& parameters, const RenderContext& context)
     : frame_(*context.frame), rate_(parameters.warps_per_1024_cycles) {}
 
+/// Vertices fill warps; where those of a rectangle lie in two, it goes with the second.
+std::uint32_t VertexIssue::splats_that_fit(const DrawCall& call) const {
+  if (call.state.splat_extent != SplatExtent::fill_rectangle) return splats_per_vertex_warp;
+  constexpr std::uint64_t threads = std::uint64_t{splats_per_vertex_warp} * vertices_per_splat;
+  const std::uint64_t warps = (std::uint64_t{issued_} * vertices_per_rectangle + threads - 1) / threads;
+  return static_cast<std::uint32_t>((warps + 1) * threads / vertices_per_rectangle - issued_);
+}
+
 bool VertexIssue::next(VertexWarp& out) {
   for (; command_ < frame_.commands().size(); ++command_, marked_ = false, issued_ = 0) {
     const Frame::Command& command = frame_.commands()[command_];
@@ -27,7 +35,7 @@ bool VertexIssue::next(VertexWarp& out) {
     if (issued_ == call.splats) continue;
     out.draw = command.draw;
     out.first_splat = call.base + issued_;
-    out.splats = std::min(splats_per_vertex_warp, call.splats - issued_);
+    out.splats = std::min(splats_that_fit(call), call.splats - issued_);
     issued_ += out.splats;
     splats += out.splats;
     return true;

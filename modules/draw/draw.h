@@ -5,7 +5,7 @@
 
 namespace vrpipe {
 
-/// Issues the sorted splats of the frame's draws, up to eight of a draw a warp, for vertex shading.
+/// Issues the sorted splats of the frame's draws, up to eight of a draw a warp, or ten or eleven filled rectangles, for vertex shading.
 class VertexIssue : public DrawBehaviour {
  public:
   struct Parameters : ParameterSet {
@@ -26,6 +26,8 @@ class VertexIssue : public DrawBehaviour {
   Counter splats{*this, "splats", "splats", "splats issued"};
 
  private:
+  std::uint32_t splats_that_fit(const DrawCall& call) const;
+
   const Frame& frame_;
   const std::uint32_t rate_;
   std::size_t command_ = 0;   ///< of the frame

@@ -39,6 +39,7 @@ Platform gh100_gpc() {
       {"prop", "color_bytes_per_cycle", "32"},
       {"crop", "bytes_per_cycle", "32"},
       {"crop", "pairs_in_sector", "on"},
+      {"crop", "rgba32f_column_cycles", "4"},
       {"crop", "forwarding", "off"},
       {"crop", "latency_cycles", "9"},
       {"crop", "cache_bytes", "8192"},

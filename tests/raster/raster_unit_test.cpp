@@ -123,6 +123,28 @@ TEST_F(RasterUnitTest, SetUpsComeAtTheirInterval) {
   for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(out.records()[i].cycle, out.records()[0].cycle + 7 * i);
 }
 
+TEST_F(RasterUnitTest, AnIntervalNeedNotBeOfWholeCycles) {
+  for (float x = 0; x < 128; x += 16) add_triangle(testing::one_quad_triangle(x + 4, 4));
+  for (const auto& [interval, half_cycles] : {std::pair{"2.5", 5U}, std::pair{"0.5", 1U}}) {
+    for (const char* parameter : {"screen_tile_interval_cycles", "setup_interval_cycles"}) {
+      // The other one, and what follows, in no one's way.
+      const bool pairs = parameter[1] == 'c';
+      Bench bench("raster", "tile-rasterizer", context,
+                  {{pairs ? "setup_interval_cycles" : "screen_tile_interval_cycles", "0.001"},
+                   {parameter, interval},
+                   {"fine_tiles_per_cycle", "64"},
+                   {"coarse_tiles_per_cycle", "1024"}});
+      Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", 16);
+      Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 16);
+      for (const RasterJob& job : jobs()) in.add(job);
+      bench.run();
+      ASSERT_EQ(out.records().size(), 8U);
+      for (std::size_t i = 0; i < 8; ++i)
+        EXPECT_EQ(out.records()[i].cycle, out.records()[0].cycle + half_cycles * i / 2) << parameter << " " << interval;
+    }
+  }
+}
+
 // case R07
 TEST_F(RasterUnitTest, APrimitiveWithoutSamplesCostsItsCoarseTests) {
   // A sliver between samples whose bounds hold the whole diagonal: 256 raster tiles are tested.

@@ -29,7 +29,7 @@ class CheckedDraw final : public CheckedSlot<DrawBehaviour> {
       pass(command);
       return true;
     }
-    if (out.splats == 0 || out.splats > splats_per_vertex_warp) fault("next", "a warp of {} splats", out.splats);
+    if (out.splats == 0 || out.splats > most_splats(out.draw)) fault("next", "a warp of {} splats", out.splats);
     const std::uint64_t end = out.first_splat + std::uint64_t{out.splats};
     if (out.first_splat < issued_ || end > frame().splats()) {
       fault("next", "a warp of splats {} to {}, after {} of {}", out.first_splat, end - 1, issued_, frame().splats());
@@ -56,6 +56,13 @@ class CheckedDraw final : public CheckedSlot<DrawBehaviour> {
   void check_counters() const override {}
 
  private:
+  /// Of a warp, whose threads are vertices.
+  std::uint32_t most_splats(DrawIndex draw) const {
+    const bool rectangles =
+        draw < frame().draws().size() && frame().draw_call(draw).state.splat_extent == SplatExtent::fill_rectangle;
+    constexpr unsigned threads = splats_per_vertex_warp * vertices_per_splat;
+    return rectangles ? (threads + vertices_per_rectangle - 1) / vertices_per_rectangle : splats_per_vertex_warp;
+  }
   bool needs_mark(std::size_t command) const {
     const Frame::Command& of = frame().commands()[command];
     return !of.is_draw || of.changes_state;

@@ -19,6 +19,7 @@ constexpr unsigned positions_per_tile = 64;  ///< quad positions in a screen til
 constexpr unsigned quads_per_warp = 8;       ///< 32 threads
 constexpr unsigned vertices_per_splat = 4;
 constexpr unsigned splats_per_vertex_warp = 8;
+constexpr unsigned vertices_per_rectangle = 3;  ///< of a filled one, by which its box is known
 
 /// The number of a draw in its frame, from 0.
 using DrawIndex = std::uint16_t;

@@ -15,6 +15,9 @@
 
 namespace vrpipe {
 
+/// Of a quad: those of two pixels, one above the other, in which samples live.
+constexpr unsigned columns_of(LaneMask live) { return ((live & 5U) != 0 ? 1U : 0U) + ((live & 10U) != 0 ? 1U : 0U); }
+
 /// Slot `crop`: blends quads into the colour target and tests for termination.
 class CropBehaviour : public Behaviour {
  public:
@@ -77,6 +80,8 @@ class CropBehaviour : public Behaviour {
     bool fetches_ahead = false;            ///< a line may go while quads wait to be blended into it
     std::uint32_t line_return_cycles = 0;  ///< from a line's last use to the next, if it left in between
     bool pairs_in_sector = false;          ///< quads blended in one cycle share a sector
+    /// Of blending, for each column of two pixels of a quad with live samples, if that is more than the rate; 0: none.
+    std::uint32_t column_cycles = 0;
     /// Of the cycles of the blender: in how many parts what moves is paid, and how many of these a move takes.
     std::uint32_t moves_in_a_cycle() const { return line_cycles == 0 ? sectors_per_cycle : 1; }
     std::uint32_t parts_of_a_move() const { return line_cycles == 0 ? 1 : line_cycles; }

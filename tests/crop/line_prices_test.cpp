@@ -1,0 +1,204 @@
+// What CROP was measured to take on a real GPU beyond its rate: lines that move, lines that come back, quads without a
+// neighbour in their sector, columns of RGBA32F. The same closed forms at every fidelity with time.
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "crop/timed_crop_bench.h"
+
+namespace vrpipe {
+namespace {
+
+using CropBench = testing::TimedCropBench;
+using testkit::Bench;
+
+/// One quad of RGBA16F a cycle, lines of 256 bytes at a cycle each, 8 KB, as on a GH100's ROP partition.
+Bench::Settings partition(const Bench::Settings& more = {}) {
+  Bench::Settings settings{{"bytes_per_cycle", "32"}, {"cache_bytes", "8192"}, {"line_bytes", "256"},
+                           {"line_cycles", "1"},      {"mshrs", "2048"},       {"input_quads", "1280"}};
+  settings.insert(settings.end(), more.begin(), more.end());
+  return settings;
+}
+
+class CropPrices : public ::testing::TestWithParam<Fidelity> {
+ protected:
+  CropPrices() : draw(testing::draw_of(2048, 2048)), context(testing::context_of(draw)) {}
+  Draw draw;
+  RenderContext context;
+};
+
+INSTANTIATE_TEST_SUITE_P(Fidelities, CropPrices, ::testing::ValuesIn(testing::fidelities_with_time()),
+                         testing::name_of_fidelity);
+
+/// Position of the n-th quad of a screen tile in the order of memory: eight in a row are a line of 256 bytes.
+unsigned in_memory_order(unsigned n) {
+  for (unsigned position = 0; position < positions_per_tile; ++position) {
+    if (morton_order[position] == n) return position;
+  }
+  return 0;
+}
+
+/// Cycles of so many whole tiles more, each of its own place.
+double cycles_of_a_tile(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings, float alpha) {
+  const auto cycles = [&](std::uint16_t tiles) {
+    CropBench crop(fidelity, context, settings);
+    for (std::uint16_t tile = 0; tile < tiles; ++tile) {
+      for (unsigned n = 0; n < positions_per_tile; ++n)
+        crop.quad({static_cast<std::uint16_t>(tile % 128), static_cast<std::uint16_t>(tile / 128)}, in_memory_order(n),
+                  alpha);
+    }
+    return static_cast<double>(crop.run());
+  };
+  return (cycles(120) - cycles(60)) / 60;
+}
+
+TEST_P(CropPrices, AWholeTileTakesItsQuadsAndItsLinesTwice) {
+  // Measured on the GPU: 80.1 cycles.
+  for (const char* ahead : {"on", "off"})
+    EXPECT_NEAR(cycles_of_a_tile(GetParam(), context, partition({{"fetch_ahead", ahead}}), 0.5F), 64 + 8 + 8, 0.5)
+        << ahead;
+}
+
+TEST_P(CropPrices, LinesOfUnchangedValuesAreFree) {
+  for (const char* ahead : {"on", "off"})
+    EXPECT_NEAR(cycles_of_a_tile(GetParam(), context, partition({{"fetch_ahead", ahead}}), 0.0F), 64, 0.5) << ahead;
+}
+
+TEST_P(CropPrices, ALineOfWhichOneSectorMovesCostsAsMuchAsAWholeOne) {
+  const auto cycles = [&](std::uint16_t tiles) {
+    CropBench crop(GetParam(), context, partition({{"fetch_ahead", "on"}}));
+    for (std::uint16_t tile = 0; tile < tiles; ++tile) {
+      // In the first quad of each of the tile's eight lines.
+      for (unsigned n = 0; n < positions_per_tile; n += 8) crop.quad({tile, 0}, in_memory_order(n), 0.5F);
+    }
+    return static_cast<double>(crop.run());
+  };
+  EXPECT_NEAR((cycles(120) - cycles(60)) / 60, 8 + 8 + 8, 0.5);
+}
+
+/// Cycles between the visits of one quad in each of `tiles` tiles, in turn.
+double cycles_of_a_round(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings,
+                         unsigned tiles) {
+  const auto cycles = [&](unsigned rounds) {
+    CropBench crop(fidelity, context, settings);
+    for (unsigned round = 0; round < rounds; ++round) {
+      for (unsigned tile = 0; tile < tiles; ++tile) {
+        crop.quad({static_cast<std::uint16_t>(tile), 0}, 0, 0.001F);
+        crop.flush();
+      }
+    }
+    return static_cast<double>(crop.run());
+  };
+  return (cycles(12) - cycles(4)) / 8;
+}
+
+TEST_P(CropPrices, ALineThatLeftAndComesBackWaits) {
+  const Bench::Settings settings = partition({{"fetch_ahead", "on"}, {"line_return_cycles", "503"}});
+  // 32 lines are held. Of more, each leaves before its turn comes again.
+  EXPECT_LT(cycles_of_a_round(GetParam(), context, settings, 32), 64);
+  for (const unsigned tiles : {33U, 48U, 96U}) {
+    EXPECT_NEAR(cycles_of_a_round(GetParam(), context, settings, tiles), 503, 1) << tiles;
+  }
+  // A quad, a line fetched and a line written back each: what takes longer than the wait does not notice it.
+  EXPECT_NEAR(cycles_of_a_round(GetParam(), context, settings, 256), 3 * 256, 8);
+}
+
+TEST_P(CropPrices, AheadOfItsDataALineThatComesBackSoonIsFetchedTwice) {
+  const auto sectors_read = [&](unsigned tiles) {
+    CropBench crop(GetParam(), context, partition({{"fetch_ahead", "on"}}), 400);
+    for (unsigned round = 0; round < 4; ++round) {
+      for (unsigned tile = 0; tile < tiles; ++tile) {
+        crop.quad({static_cast<std::uint16_t>(tile), 0}, 0, 0.5F);
+        crop.flush();
+      }
+    }
+    crop.run();
+    return crop.bench.unit().memory_bytes().read / 32;
+  };
+  EXPECT_EQ(sectors_read(32), 32U);
+  // Once for the first visit; for each other one ahead, and again behind what the visit before has written.
+  EXPECT_EQ(sectors_read(40), 40U * (1 + 3 * 2));
+}
+
+TEST_P(CropPrices, AheadOfItsDataMoreLinesAreUnderWayThanTheCacheHolds) {
+  for (const bool ahead : {true, false}) {
+    CropBench crop(GetParam(), context, partition({{"fetch_ahead", ahead ? "on" : "off"}}), 400);
+    for (std::uint16_t tile = 0; tile < 120; ++tile) {
+      crop.quad({tile, 0}, 0, 0.5F);
+      crop.flush();
+    }
+    // 120 lines at once, or 32 at a time.
+    const Cycle cycles = crop.run();
+    if (ahead) {
+      EXPECT_LT(cycles, 400U + 3 * 120 + 60);
+    } else {
+      EXPECT_GT(cycles, 3 * 400U);
+    }
+  }
+}
+
+TEST_P(CropPrices, WhatIsBlendedIsTheSameAheadOfItsDataAndNot) {
+  const auto image = [&](const Bench::Settings& settings) {
+    CropBench crop(GetParam(), context, settings);
+    for (std::uint64_t i = 0; i < 4000; ++i) {
+      crop.quad({static_cast<std::uint16_t>(mix(i / 5) % 60), 0}, static_cast<unsigned>(mix(i + 999) % 64), 0.2F);
+    }
+    EXPECT_NE(crop.run(), never);
+    std::vector<float> alphas;
+    for (std::uint16_t tile = 0; tile < 60; ++tile) {
+      for (unsigned position = 0; position < 64; ++position)
+        alphas.push_back(crop.bench.surface().quad({tile, 0}, position).alpha[0]);
+    }
+    const SectoredCacheStatistics& cache = crop.bench.behaviour<CropBehaviour>().cache_statistics;
+    EXPECT_EQ(cache.sector_hits.value() + cache.sector_misses.value(), 4000U);
+    EXPECT_EQ(cache.bytes_written_back.value(), 32 * cache.sectors_written_back.value());
+    return alphas;
+  };
+  EXPECT_EQ(image(partition({{"fetch_ahead", "on"}, {"line_return_cycles", "503"}, {"mshrs", "8"}})), image({}));
+}
+
+/// Cycles that so many quads more of RGBA8 take, of those in `positions` in turn.
+double cycles_of_a_quad(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings,
+                        const std::vector<unsigned>& positions, LaneMask live = all_lanes) {
+  const auto cycles = [&](unsigned quads) {
+    CropBench crop(fidelity, context, settings);
+    for (unsigned i = 0; i < quads; ++i) crop.quad({0, 0}, positions[i % positions.size()], 0.001F, live);
+    return static_cast<double>(crop.run());
+  };
+  return (cycles(1600) - cycles(800)) / 800;
+}
+
+TEST_P(CropPrices, QuadsOfRgba8GoInPairsOnlyWithTheirNeighbourInTheSector) {
+  context.format = ColorFormat::rgba8;
+  const Bench::Settings pairs{{"bytes_per_cycle", "32"}, {"pairs_in_sector", "on"}};
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, pairs, {0, 1, 2, 3, 8, 9, 10, 11}), 0.5, 0.01);
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, pairs, {0, 2, 4, 6, 8, 10, 12, 14}), 1, 0.01) << "every second";
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, pairs, {0, 8, 1, 9, 2, 10, 3, 11}), 1, 0.01)
+      << "one above the other";
+  const Bench::Settings any{{"bytes_per_cycle", "32"}};
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, any, {0, 2, 4, 6, 8, 10, 12, 14}), 0.5, 0.01);
+}
+
+TEST_P(CropPrices, QuadsOfRgba32fTakeTheirColumns) {
+  context.format = ColorFormat::rgba32f;
+  const Bench::Settings columns{{"bytes_per_cycle", "32"}, {"rgba32f_column_cycles", "4"}};
+  const std::vector<unsigned> positions{0, 1, 2, 3, 8, 9, 10, 11};
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, columns, positions), 8, 0.02) << "measured: 4 px in 8 cycles";
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, columns, positions, 0b0101), 4, 0.02);
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, columns, positions, 0b0011), 8, 0.02);
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, {{"bytes_per_cycle", "32"}}, positions), 2, 0.02);
+}
+
+TEST_P(CropPrices, PartsOfTheOccupancySayWhatTookTheTime) {
+  CropBench crop(GetParam(), context, partition({{"fetch_ahead", "on"}}));
+  for (std::uint16_t tile = 0; tile < 100; ++tile) {
+    for (unsigned n = 0; n < positions_per_tile; ++n) crop.quad({tile, 0}, in_memory_order(n), 0.5F);
+  }
+  crop.run();
+  EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::blend), 6400);
+  // All were fetched; the last 32 are held still.
+  EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::sectors), 800 + 800 - 32);
+}
+
+}  // namespace
+}  // namespace vrpipe

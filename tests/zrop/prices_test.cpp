@@ -1,0 +1,186 @@
+// What ZROP was measured to take on a real GPU beyond its rate: blocks that quads touch, lines that move, lines that come
+// back.
+#include <functional>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "support/fidelities.h"
+#include "zrop/block_price.h"
+#include "zrop/zrop.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::Bins;
+using testkit::Bench;
+using testkit::Sink;
+using testkit::Source;
+
+Quad quad_at(unsigned position, std::uint32_t splat = 0, unsigned triangle = 0) {
+  Quad quad{};
+  quad.splat = splat;
+  quad.position = static_cast<std::uint8_t>(position);
+  quad.coverage = all_lanes;
+  quad.triangle = triangle & 1U;
+  return quad;
+}
+
+/// All quads of an 8x8 block, row by row, or of one of its halves.
+std::vector<Quad> block_quads(unsigned first, unsigned columns, std::uint32_t splat = 0) {
+  std::vector<Quad> quads;
+  for (unsigned row = 0; row < 4; ++row) {
+    for (unsigned column = 0; column < columns; ++column) quads.push_back(quad_at(first + 8 * row + column, splat));
+  }
+  return quads;
+}
+
+std::uint64_t price_of(const std::vector<Quad>& quads, BlockPrice price = BlockPrice(1000, 1400)) {
+  return price.of({0, 0}, quads.data(), static_cast<unsigned>(quads.size()));
+}
+
+TEST(BlockPrice, IsOfTouchedHalvesAndAtLeastThatOfTheBlock) {
+  EXPECT_EQ(price_of({quad_at(0)}), 1400U);
+  EXPECT_EQ(price_of(block_quads(0, 2)), 1400U) << "a half";
+  EXPECT_EQ(price_of(block_quads(0, 4)), 2000U) << "both: 8 quads a cycle";
+  EXPECT_EQ(price_of({quad_at(0), quad_at(3)}), 2000U) << "a quad in each";
+  EXPECT_EQ(price_of({quad_at(0), quad_at(4)}), 2800U) << "in the blocks on the left and on the right";
+  EXPECT_EQ(price_of({quad_at(0), quad_at(32)}), 2800U) << "in those above and below";
+}
+
+TEST(BlockPrice, IsPaidByEachPrimitive) {
+  EXPECT_EQ(price_of({quad_at(0, 0, 0), quad_at(1, 0, 1)}), 2800U) << "a strip of two triangles pays twice";
+  EXPECT_EQ(price_of({quad_at(0, 0), quad_at(1, 1)}), 2800U);
+}
+
+TEST(BlockPrice, DoesNotDependOnWhereBeatsEnd) {
+  const std::vector<Quad> quads = block_quads(0, 4);
+  for (unsigned cut = 1; cut < quads.size(); ++cut) {
+    BlockPrice price(1000, 1400);
+    const std::uint64_t first = price.of({0, 0}, quads.data(), cut);
+    EXPECT_EQ(first + price.of({0, 0}, quads.data() + cut, static_cast<unsigned>(quads.size()) - cut), 2000U) << cut;
+  }
+  BlockPrice price(1000, 1400);
+  price.of({0, 0}, quads.data(), 1);
+  EXPECT_EQ(price.of({1, 0}, quads.data(), 1), 1400U) << "another screen tile";
+}
+
+/// ZROP at any fidelity with time, in front of a memory or not; bins of up to a beat.
+class ZropPrices : public ::testing::TestWithParam<Fidelity> {
+ protected:
+  ZropPrices() : draw(testing::draw_of(2048, 64)), context(testing::context_of(draw)) {
+    testing::terminate_early(context);
+  }
+  struct Bin {
+    TileId tile;
+    std::vector<Quad> quads;
+  };
+  /// The cycle in which the last of the bins leaves.
+  Cycle run(const std::vector<Bin>& all, Bench::Settings settings, bool memory = false, unsigned latency = 100) {
+    settings.insert(settings.begin(), {{"latency_cycles", "1"}, {"fast_clear", "off"}, {"quads_per_cycle", "8"}});
+    Bench bench(GetParam(), "zrop", "depth-stencil-rop", context, settings);
+    FixedLatencyMemory behind("memory", bench.clock(), latency - 1, 4096, 1);
+    if (memory) bench.bind_memory(behind.port(0));
+    bench.source<TerminationBeat>("in_terminations");
+    Bins bins;
+    Cycle last = 0;
+    if (GetParam() == Fidelity::cycle) {
+      Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 32);
+      Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 8192);
+      for (const Bin& bin : all) {
+        QuadBeat beat;
+        beat.tile = bin.tile;
+        for (const Quad& quad : bin.quads) beat.quads[beat.count++] = quad;
+        beat.last_of_bin = true;
+        in.add(beat);
+      }
+      bench.run();
+      last = out.records().back().cycle;
+      reads = behind_reads(bench);
+    } else {
+      Source<BinItem>& in = bench.source<BinItem>("in_quads", 32);
+      Sink<BinItem>& out = bench.sink<BinItem>("out_quads", 8192);
+      for (const Bin& bin : all) in.add(bins.of(bin.tile, bin.quads));
+      bench.run();
+      last = out.records().back().last;
+      reads = behind_reads(bench);
+    }
+    return last;
+  }
+  static std::uint64_t behind_reads(Bench& bench) { return bench.unit().memory_bytes().read / 32; }
+  /// Of each of so many bins more.
+  double cycles_of_a_bin(const std::function<Bin(unsigned)>& make, const Bench::Settings& settings,
+                         bool memory = false) {
+    const auto cycles = [&](unsigned count) {
+      std::vector<Bin> bins;
+      for (unsigned i = 0; i < count; ++i) bins.push_back(make(i));
+      return static_cast<double>(run(bins, settings, memory));
+    };
+    return (cycles(1200) - cycles(600)) / 600;
+  }
+  Draw draw;
+  RenderContext context;
+  std::uint64_t reads = 0;  ///< sectors, of the last run
+};
+
+INSTANTIATE_TEST_SUITE_P(Fidelities, ZropPrices, ::testing::ValuesIn(testing::fidelities_with_time()),
+                         testing::name_of_fidelity);
+
+const Bench::Settings blocks{{"half_block_cycles", "1"}, {"block_cycles", "1.4"}};
+
+TEST_P(ZropPrices, FullBlocksAreTestedEightQuadsACycle) {
+  const auto full = [](unsigned i) { return Bin{{0, 0}, block_quads(0, 4, i)}; };
+  EXPECT_NEAR(cycles_of_a_bin(full, blocks), 2, 0.01);
+  EXPECT_NEAR(cycles_of_a_bin(full, {}), 2, 0.01);
+}
+
+TEST_P(ZropPrices, ASingleQuadTakesItsBlock) {
+  const auto single = [](unsigned i) { return Bin{{0, 0}, {quad_at(i % 64, i)}}; };
+  EXPECT_NEAR(cycles_of_a_bin(single, blocks), 1.4, 0.01);
+  EXPECT_LT(cycles_of_a_bin(single, {}), 1.01);
+}
+
+const Bench::Settings small_cache{{"cache_bytes", "8192"},
+                                  {"line_bytes", "256"},
+                                  {"mshrs", "2048"},
+                                  {"fetch_ahead", "on"}};
+
+TEST_P(ZropPrices, ALineThatMovesTakesItsCycles) {
+  // A block is a line of 256 bytes; its two cycles of tests and the line's.
+  const auto missing = [](unsigned i) {
+    return Bin{{static_cast<std::uint16_t>(i / 4 % 128), static_cast<std::uint16_t>(i / 512)},
+               block_quads(i % 2 * 4 + i / 2 % 2 * 32, 4, i)};
+  };
+  Bench::Settings settings = small_cache;
+  settings.push_back({"line_cycles", "1.5"});
+  EXPECT_NEAR(cycles_of_a_bin(missing, settings, true), 2 + 1.5, 0.05);
+}
+
+TEST_P(ZropPrices, AheadOfItsDataMoreLinesAreUnderWayThanTheCacheHolds) {
+  std::vector<Bin> bins;
+  for (unsigned i = 0; i < 128; ++i) bins.push_back({{static_cast<std::uint16_t>(i), 0}, {quad_at(0, i)}});
+  Bench::Settings pinned = small_cache;
+  pinned.back().second = "off";
+  EXPECT_LT(run(bins, small_cache, true, 1000), 1000U + 128 * 2 + 50);
+  EXPECT_EQ(reads, 128U);
+  EXPECT_GT(run(bins, pinned, true, 1000), 3 * 1000U) << "32 lines at a time";
+}
+
+TEST_P(ZropPrices, ALineThatLeftAndComesBackWaits) {
+  Bench::Settings settings = small_cache;
+  settings.push_back({"line_return_cycles", "461"});
+  const auto round = [&](unsigned tiles) {
+    const auto cycles = [&](unsigned rounds) {
+      std::vector<Bin> bins;
+      for (unsigned i = 0; i < rounds * tiles; ++i)
+        bins.push_back({{static_cast<std::uint16_t>(i % tiles), 0}, {quad_at(0, i)}});
+      return static_cast<double>(run(bins, settings, true));
+    };
+    return (cycles(10) - cycles(4)) / 6;
+  };
+  EXPECT_LT(round(32), 64) << "held: nothing comes back";
+  for (const unsigned tiles : {33U, 64U, 96U}) EXPECT_NEAR(round(tiles), 461, 1) << tiles;
+}
+
+}  // namespace
+}  // namespace vrpipe
