@@ -271,7 +271,8 @@ Setting draw_own_setting(Dice& dice) {
   switch (dice.below(3)) {
     case 0: return {"state", "pruning_threshold", text_of(dice.chance(30) ? 0.0 : dice.real(0.0, 0.3))};
     case 1: return {"state", "termination_threshold", text_of(dice.real(0.3, 1.0))};
-    default: return {"state", "splat_extent", dice.chance(50) ? "aabb" : "three_sigma"};
+    default:
+      return {"state", "splat_extent", dice.chance(50) ? "aabb" : dice.chance(50) ? "three_sigma" : "fill_rectangle"};
   }
 }
 

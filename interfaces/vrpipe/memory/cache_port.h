@@ -17,7 +17,7 @@ namespace vrpipe {
 /// sectors are there: asks for what is absent, and writes dirty sectors of evicted lines back.
 class CachePort {
  public:
-  /// A look-up, which is given the first two members, and may take several cycles.
+  /// A look-up, which is given the first two members and may take several cycles.
   struct LookUp {
     std::uint64_t address = 0;  ///< of the line
     std::uint32_t sectors = 0;  ///< of the line that are needed, a bit each

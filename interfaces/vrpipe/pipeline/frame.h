@@ -62,8 +62,8 @@ class Frame {
 
   /// Splats `first` to `first` + `splats` - 1 of a geometry, all of it by default. Throws UserError for one of another
   /// size than the frame's, splats that it does not have, triangles that are not as many as its splats, a mesh that has splats,
-  /// a shader for what it is not, late tests where nothing is shaded, early termination without blending, a stencil reference beyond 127, and more than
-  /// 32767 draws, 65534 commands or 2^31 splats.
+  /// a shader for what it is not, late tests where nothing is shaded, early termination without blending, a stencil
+  /// reference beyond 127, and more than 32767 draws, 65534 commands or 2^31 splats.
   void draw(std::shared_ptr<const Draw> geometry, const DrawState& state, std::string name = {},
             std::uint32_t first = 0, std::uint32_t splats = ~0U);
   /// Throws UserError for more than 65534 commands, a depth outside [0, 1] and a stencil value beyond 127.
