@@ -43,10 +43,10 @@ std::vector<WorkKind> PropWork::kinds(const PropBehaviour::TimingParameters& tim
 std::vector<WorkKind> ZropWork::kinds(const ZropBehaviour::TimingParameters& timing) {
   return {{"tests", 0, per(timing.quads_per_cycle), throughput},
           {"updates", 0, 1.0, false},
-          {timing.z_cache.line_thousandths == 0 ? "sectors" : "lines", 0, per(timing.z_cache.moves_in_a_cycle()),
-           false},
+          {"sectors", 0, per(timing.z_cache.sectors_per_cycle), false},
           {"late tests", 0, per(timing.quads_per_cycle), throughput},
-          {"blocks", 0, per(1000), false}};
+          {"blocks", 0, per(1000), false},
+          {"lines", 1, per(1000), false}};
 }
 
 std::vector<WorkKind> QruWork::kinds(const Throughput& timing) {

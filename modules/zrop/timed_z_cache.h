@@ -8,6 +8,7 @@
 #include "beat_lines.h"
 #include "z_cache_statistics.h"
 
+#include <vrpipe/kernel/rate.h>
 #include <vrpipe/memory/line_returns.h>
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/timed_cache_port.h>
@@ -107,11 +108,15 @@ class TimedZCache {
     return applied;
   }
 
-  /// Cycles that what moves takes from the z-cache and that were not asked for yet, and from when on.
+  /// Cycles that moving sectors takes from the z-cache and that were not asked for yet, and from when on.
   std::pair<Cycle, std::uint64_t> take_moves() {
-    const std::uint64_t cycles = owed_ / timing_.moves_in_a_cycle();
-    owed_ -= cycles * timing_.moves_in_a_cycle();
+    const std::uint64_t cycles = owed_ / timing_.sectors_per_cycle;
+    owed_ -= cycles * timing_.sectors_per_cycle;
     return {owed_at_, cycles};
+  }
+  /// When lines that move beside the tests are done, and their thousandths of a cycle since this was last called.
+  std::pair<Cycle, std::uint64_t> take_line_work() {
+    return {line_moves_.free_from(0) + 1, std::exchange(line_work_, 0)};
   }
 
  private:
@@ -151,7 +156,7 @@ class TimedZCache {
     Cycle* const there = &there_[std::size_t{access.line} * sectors_of_a_line_];
     if (access.replaced) {
       if (!timing_.fetches_ahead) times.at = std::max(times.at, kept_until_[access.line]);
-      ++lines_moved_;
+      move_line(times.at);
       if (access.written_back != 0) write_back(access, times.at);
       if (returns_) returned_from_[access.line] = returns_->from(access.address);
     }
@@ -166,13 +171,20 @@ class TimedZCache {
   }
   void write_back(const LineAccess& access, Cycle at) {
     port_.write_back(access, at);
-    ++lines_moved_;
+    Cycle moves = at;
+    move_line(moves);
     if (cleared_) cleared_->written(access.old_address, access.written_back);
+  }
+  /// Where lines have a price they move beside the tests, one after the other.
+  void move_line(Cycle& at) {
+    if (timing_.line_thousandths == 0) return;
+    at = line_moves_.free_from(at);
+    line_moves_.take(at, timing_.line_thousandths);
+    line_work_ += timing_.line_thousandths;
   }
   void owe(Cycle at) {
     const unsigned sectors = port_.take_moved();
-    const unsigned lines = std::exchange(lines_moved_, 0);
-    owed_ += timing_.line_thousandths == 0 ? sectors : std::uint64_t{timing_.line_thousandths} * lines;
+    owed_ += timing_.line_thousandths == 0 ? sectors : 0;
     owed_at_ = at;
   }
 
@@ -192,8 +204,9 @@ class TimedZCache {
   std::vector<Cycle> there_;            ///< by sector
   std::optional<LineReturns> returns_;  ///< where lines that come back wait
   std::vector<Cycle> returned_from_;    ///< by line of the cache
-  unsigned lines_moved_ = 0;
-  std::uint64_t owed_ = 0;  ///< ZCache::moves_in_a_cycle
+  ThousandthsPort line_moves_;
+  std::uint64_t line_work_ = 0;
+  std::uint64_t owed_ = 0;  ///< sectors
   Cycle owed_at_ = 0;
 };
 

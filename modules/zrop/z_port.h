@@ -2,12 +2,14 @@
 
 #include <array>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "beat_lines.h"
 #include "late_look_ups.h"
 #include "z_cache_statistics.h"
 
+#include <vrpipe/kernel/rate.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
 #include <vrpipe/memory/line_returns.h>
@@ -67,7 +69,6 @@ class ZPort {
     if (plan_.is_used()) moved |= take_late(late);
     moved |= take_beats(quads);
     moved |= timing_.fetches_ahead ? read_ahead() : read();
-    if (timing_.line_thousandths > 0) owe_lines();
     return moved;
   }
   /// When it has to do so next, if nothing of its queues moves before.
@@ -75,16 +76,20 @@ class ZPort {
              const StreamIn<ShadedWarpItem>& late) const {
     Cycle next = port_.next_completion();
     // What could not be looked up waits for a completion, for the queue to move or for its turn.
-    for (const Cycle at :
-         {quads.next_ready(), updates.next_ready(), late.next_ready(), next_look_up_, late_.next(), returned_from()}) {
+    for (const Cycle at : {quads.next_ready(), updates.next_ready(), late.next_ready(), next_look_up_, late_.next(),
+                           returned_from(), timing_.line_thousandths == 0 ? 0 : line_moves_.free_from(0)}) {
       if (at > now) next = std::min(next, at);
     }
     return next;
   }
 
-  /// What has moved whose time the z-cache has not given yet (ZCache::moves_in_a_cycle).
-  std::uint64_t owed_moves() const { return owed_; }
-  void pay_moves(unsigned moves) { owed_ -= moves; }
+  /// Sectors whose time the z-cache has not given yet.
+  std::uint64_t owed_sectors() const { return owed_; }
+  void pay_sectors(unsigned sectors) { owed_ -= sectors; }
+  /// Of lines that move beside the tests, thousandths of a cycle since this was last called.
+  std::uint64_t take_line_work() { return std::exchange(line_work_, 0); }
+  /// When that is over.
+  Cycle lines_done() const { return line_moves_.free_from(0) + 1; }
 
   bool has_beats() const { return !beats_.empty(); }
   /// Whether all that the first beat needs has come.
@@ -147,9 +152,12 @@ class ZPort {
     bool takes_time;
   };
   Moved moves() { return {owed_, timing_.line_thousandths == 0}; }
-  [[gnu::noinline]] void owe_lines() {
-    const CachePort::LinesMoved lines = port_.take_lines_moved();
-    owed_ += std::uint64_t{timing_.line_thousandths} * (lines.allocated + lines.written_back);
+  /// Where lines have a price they move beside the tests, one after the other: whether another may begin.
+  bool may_move_line() const { return timing_.line_thousandths == 0 || line_moves_.is_free(now_); }
+  void move_line() {
+    if (timing_.line_thousandths == 0) return;
+    line_moves_.take(now_, timing_.line_thousandths);
+    line_work_ += timing_.line_thousandths;
   }
   /// A line that came back to the cache, for a beat.
   struct Returned {
@@ -162,7 +170,7 @@ class ZPort {
     if (ahead_left_ == 0) {
       SectoredCache& cache = port_.cache();
       const bool is_held = cache.find(line_.address) != SectoredCache::no_line;
-      if (!is_held && !cache.can_allocate(line_.address)) return false;
+      if (!is_held && (!may_move_line() || !cache.can_allocate(line_.address))) return false;
       LineAccess access;
       access.address = line_.address;
       access.sectors = line_.sectors;
@@ -171,10 +179,13 @@ class ZPort {
       if (cleared_) cleared_->count(access.missed & access.known);
       line_.line = access.line;
       if (access.replaced) {
-        if (timing_.line_thousandths > 0) owed_ += timing_.line_thousandths;
+        move_line();
         fill_of_line_[access.line] = 0;
         note_return();
-        if (access.written_back != 0) port_.evict(access);
+        if (access.written_back != 0) {
+          move_line();
+          port_.evict(access);
+        }
       }
       ahead_left_ = access.filled;
     }
@@ -217,10 +228,15 @@ class ZPort {
   /// Looks a line of a beat up, and takes note if it left since it was last used.
   bool look_up_line() {
     if (timing_.fetches_ahead) return look_up_ahead();
-    const bool is_held = !returns_ || line_.line != SectoredCache::no_line ||
-                         port_.cache().find(line_.address) != SectoredCache::no_line;
+    const bool is_held =
+        line_.line != SectoredCache::no_line || port_.cache().find(line_.address) != SectoredCache::no_line;
+    if (!is_held && !may_move_line()) return false;
     const bool done = port_.look_up(line_, now_, moves());
-    if (!is_held && line_.line != SectoredCache::no_line) note_return();
+    if (!is_held && line_.line != SectoredCache::no_line) {
+      note_return();
+      const CachePort::LinesMoved lines = port_.take_lines_moved();
+      for (unsigned i = 0; i < lines.allocated + lines.written_back; ++i) move_line();
+    }
     if (done) {
       reads_.push({line_.line, line_.sectors});
       reads_of_beat_ = ++reads_asked_;
@@ -383,6 +399,8 @@ class ZPort {
   Cycle now_ = 0;
   Cycle next_look_up_ = 0;  ///< after a beat wider than the unit
   std::uint64_t owed_ = 0;
+  ThousandthsPort line_moves_;  ///< where lines have a price
+  std::uint64_t line_work_ = 0;
   unsigned accesses_ = 0;  ///< that are not counted yet
   // Of the beat at the link:
   bool beat_begun_ = false;

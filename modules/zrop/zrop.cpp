@@ -20,7 +20,8 @@ DepthStencilRop::DepthStencilRop(const Parameters& parameters, const RenderConte
                parameters.sectors_per_cycle, parameters.fast_clear, parameters.line_cycles.thousandths(),
                parameters.fetch_ahead, parameters.line_return_cycles},
               parameters.half_block_cycles.thousandths(),
-              parameters.block_cycles.thousandths()},
+              parameters.block_cycles.thousandths(),
+              parameters.primitive_cycles.thousandths()},
       depth_stencil_(context),
       depth_stencil_gate_(context, "zrop.depth_stencil"),
       termination_gate_(context, "zrop.termination") {

@@ -48,7 +48,8 @@ class TimedZrop : public TimedUnit {
         updates_(timing_.updates_per_cycle),
         z_(*this, timing_, context.placement, cache_statistics_),
         z_cache_gate_(context, "zrop.z_cache"),
-        blocks_(timing_.half_block_thousandths, timing_.block_thousandths),
+        blocks_(timing_.half_block_thousandths, timing_.block_thousandths, timing_.primitive_thousandths,
+                2 * std::uint64_t{context.frame->splats()}),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
@@ -120,6 +121,7 @@ class TimedZrop : public TimedUnit {
     }
   }
   void note_moves() {
+    if (const auto [until, lines] = z_.take_line_work(); lines > 0) did(ZropWork::lines, lines, until - 1, until);
     if (const auto [at, cycles] = z_.take_moves(); cycles > 0) {
       for (unsigned cycle = 0; cycle < cycles; ++cycle) moves_.push(at);
     }
@@ -153,6 +155,8 @@ class TimedZrop : public TimedUnit {
     const bool may_change = needs_stencil && state->tests_early() && state->writes_depth_stencil();
     const bool hi_z = total > 0 && hi_z_.wanted(quads.front().draw);
     unsigned beats_left = 0;
+    // Spread over the bin: a block whose quads are in two parts is paid for with both.
+    const std::uint64_t price = blocks_.is_on() ? blocks_.of(item.tile, quads.data(), total) : 0;
     QuadBeat beat;
     beat.tile = item.tile;
     item.quads = 0;
@@ -167,7 +171,8 @@ class TimedZrop : public TimedUnit {
       if (has_cache_) z_.tested(beat.count, needs_stencil, at);
       const unsigned tested_quads = beat.count;
       port_free_at_ = at + (tested_quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
-      if (blocks_.is_on()) pay_for_blocks(beat, at);
+      if (blocks_.is_on())
+        pay_for_blocks(price * (from + tested_quads) / total - price * from / total, tested_quads, at);
       did(ZropWork::tests, tested_quads, at, port_free_at_);
       QuadBeat before;
       if (may_change || hi_z) before = beat;
@@ -201,12 +206,11 @@ class TimedZrop : public TimedUnit {
     return {tested.first, std::max(tested.last, taken.last)};
   }
 
-  [[gnu::noinline]] void pay_for_blocks(const QuadBeat& beat, Cycle at) {
-    const std::uint64_t price = blocks_.of(beat.tile, beat.quads.data(), beat.count);
+  [[gnu::noinline]] void pay_for_blocks(std::uint64_t price, unsigned quads, Cycle at) {
     paid_until_ = std::max<std::uint64_t>(paid_until_, 1000 * at) + price;
     tests_.hold(paid_until_ / 1000);
     port_free_at_ = std::max<Cycle>(port_free_at_, (paid_until_ + 999) / 1000);
-    const std::uint64_t of_quads = std::uint64_t{1000} * beat.count / timing_.quads_per_cycle;
+    const std::uint64_t of_quads = std::uint64_t{1000} * quads / timing_.quads_per_cycle;
     if (price > of_quads) did(ZropWork::blocks, price - of_quads, at, port_free_at_);
   }
 
@@ -305,7 +309,7 @@ class TimedZrop : public TimedUnit {
     for (; !moves_.empty() && moves_.front() <= std::max(test, tests_.next_free()); moves_.pop()) {
       const Cycle at = tests_.take_cycle(moves_.front());
       port_free_at_ = at + 1;
-      did(ZropWork::sectors, timing_.z_cache.moves_in_a_cycle(), at);
+      did(ZropWork::sectors, timing_.z_cache.sectors_per_cycle, at);
     }
   }
 

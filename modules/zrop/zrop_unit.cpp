@@ -35,7 +35,8 @@ class ZropUnit : public Unit {
         z_(*this, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context, plan_),
         z_cache_gate_(context, "zrop.z_cache"),
         limit_(timing_.quads_per_cycle),
-        blocks_(timing_.half_block_thousandths, timing_.block_thousandths),
+        blocks_(timing_.half_block_thousandths, timing_.block_thousandths, timing_.primitive_thousandths,
+                2 * std::uint64_t{context.frame->splats()}),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
@@ -99,10 +100,10 @@ class ZropUnit : public Unit {
   }
 
   bool move_sectors(Cycle now) {
-    const unsigned moves = timing_.z_cache.moves_in_a_cycle();
-    if (z_.owed_moves() < moves || now < free_at_) return false;
-    z_.pay_moves(moves);
-    did(ZropWork::sectors, moves, now);
+    const unsigned sectors = timing_.z_cache.sectors_per_cycle;
+    if (z_.owed_sectors() < sectors || now < free_at_) return false;
+    z_.pay_sectors(sectors);
+    did(ZropWork::sectors, sectors, now);
     return true;
   }
 
@@ -233,6 +234,8 @@ class ZropUnit : public Unit {
 
   [[gnu::noinline]] Cycle tick_cache(Cycle now) {
     const bool looked_up = z_.advance(now, in_, in_terminations_, in_late_);
+    if (const std::uint64_t lines = z_.take_line_work(); lines > 0)
+      did(ZropWork::lines, lines, now, std::max(z_.lines_done(), now + 1));
     const bool worked = move_sectors(now) || apply_updates(now) || (now >= free_at_ && test_all(now));
     const bool has_work = z_.has_beats() || in_.ready() || z_.has_late() || in_late_.ready();
     enter(worked || now < free_at_                                ? UnitState::busy
@@ -241,7 +244,7 @@ class ZropUnit : public Unit {
           : z_.late_is_there() || (z_.beat_is_there() && !waits_) ? UnitState::blocked
                                                                   : UnitState::memory,
           now);
-    if (looked_up || worked || z_.owed_moves() >= timing_.z_cache.moves_in_a_cycle()) return now + 1;
+    if (looked_up || worked || z_.owed_sectors() >= timing_.z_cache.sectors_per_cycle) return now + 1;
     const Cycle next = z_.next(now, in_, in_terminations_, in_late_);
     return now < free_at_ ? std::min(next, free_at_) : next;
   }

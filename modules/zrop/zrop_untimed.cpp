@@ -37,7 +37,8 @@ class UntimedZrop : public UntimedUnit {
         memory_({MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)}),
         z_cache_gate_(context, "zrop.z_cache"),
         quads_per_cycle_(behaviour_->timing().quads_per_cycle),
-        blocks_(behaviour_->timing().half_block_thousandths, behaviour_->timing().block_thousandths),
+        blocks_(behaviour_->timing().half_block_thousandths, behaviour_->timing().block_thousandths,
+                behaviour_->timing().primitive_thousandths, 2 * std::uint64_t{context.frame->splats()}),
         hi_z_(context) {
     if (!EffectGate(context, "cache.details").is_active()) cache_statistics_.leave_out_details();
     out_hi_z_.set_optional();
@@ -140,8 +141,8 @@ class UntimedZrop : public UntimedUnit {
     }
     return *lines_;
   }
-  /// What so many quads or updates need. Returns the moves (ZCache::moves_in_a_cycle) that no run is spared, whatever its order:
-  /// for the bound.
+  /// What so many quads or updates need. Returns the sectors that no run is spared, whatever its order: for the bound. Lines
+  /// that none is spared are counted, where they have a price.
   std::uint64_t look_up(unsigned accesses) {
     const std::uint64_t before = cache_statistics_.sector_misses_compulsory.value();
     std::uint64_t first_lines = 0;
@@ -161,7 +162,10 @@ class UntimedZrop : public UntimedUnit {
     }
     cache_->accessed(accesses, accesses);
     // Cleared sectors are not read for the first time.
-    if (z_cache_.line_thousandths > 0) return first_lines * z_cache_.line_thousandths;
+    if (z_cache_.line_thousandths > 0) {
+      did(ZropWork::lines, first_lines * z_cache_.line_thousandths);
+      return 0;
+    }
     return cleared_ ? 0 : cache_statistics_.sector_misses_compulsory.value() - before;
   }
   /// Whether sectors of a line are filled for the first time.

@@ -40,6 +40,7 @@ void Work::add(const Work& other) {
   updates += other.updates;
   z_sectors += other.z_sectors;
   z_blocks += other.z_blocks;
+  z_lines += other.z_lines;
   survivors += other.survivors;
   late_quads += other.late_quads;
   vertex_warps += other.vertex_warps;
@@ -107,11 +108,10 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   const auto from_l2 = [&](std::uint64_t bytes) {
     return l2_bytes_per_cycle_ == 0 ? 0.0 : ratio(bytes, l2_bytes_per_cycle_);
   };
-  const std::uint64_t z_bytes =
-      zrop_.z_cache.line_thousandths == 0 ? done.z_sectors * zrop_.z_cache.organization.sector_bytes : 0;
   cycles[test] = std::max({ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(done.z_blocks, 1000) +
-                               update_cycles(done) + ratio(done.z_sectors, zrop_.z_cache.moves_in_a_cycle()),
-                           ratio(done.quads_rasterized, prop_.quads_per_cycle), from_l2(z_bytes)});
+                               update_cycles(done) + ratio(done.z_sectors, zrop_.z_cache.sectors_per_cycle),
+                           ratio(done.z_lines, 1000), ratio(done.quads_rasterized, prop_.quads_per_cycle),
+                           from_l2(done.z_sectors * zrop_.z_cache.organization.sector_bytes)});
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
   cycles[sm] = std::max(instructions(done) / sm_.instructions_per_cycle(), ratio(done.launches, 1000));
   cycles[late] = ratio(done.late_quads, std::min(zrop_.quads_per_cycle, prop_.quads_per_cycle));
@@ -131,14 +131,15 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
 }
 
 std::uint64_t PhaseBound::z_sectors_of(std::uint64_t filled) const {
-  const std::uint64_t ahead = std::uint64_t{zrop_.z_cache.input_quads} * std::max(zrop_.z_cache.line_thousandths, 1U);
-  const std::uint64_t moves = filled > ahead ? filled - ahead : 0;
-  return moves - moves % zrop_.z_cache.moves_in_a_cycle();
+  const std::uint64_t ahead = zrop_.z_cache.input_quads;
+  const std::uint64_t sectors = filled > ahead ? filled - ahead : 0;
+  return sectors - sectors % zrop_.z_cache.sectors_per_cycle;
 }
 
 double PhaseBound::update_cycles(const Work& done) const {
   const double updates = ratio(done.updates, zrop_.updates_per_cycle);
-  if (zrop_.quads_per_cycle >= QuadBeat::capacity && zrop_.block_thousandths == 0) return updates;
+  if (zrop_.quads_per_cycle >= QuadBeat::capacity && zrop_.block_thousandths == 0 && zrop_.primitive_thousandths == 0)
+    return updates;
   // Beside a beat that takes several cycles updates take nothing of their own.
   return std::max(0.0, updates - ratio(done.quads_tested, zrop_.quads_per_cycle) - ratio(done.z_blocks, 1000));
 }
@@ -235,7 +236,7 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
   }
   if (slot == "zrop") {
     return priced(ZropWork::kinds(zrop_), {count(done.quads_tested), update_cycles(done), count(done.z_sectors),
-                                           count(done.late_quads), count(done.z_blocks)});
+                                           count(done.late_quads), count(done.z_blocks), count(done.z_lines)});
   }
   if (slot == "qru") {
     const double quads = count(done.survivors) - count(done.warps) * qru_.items_per_cycle;

@@ -29,7 +29,8 @@ struct Work : FrontEndWork {
   std::uint64_t bin_beats = 0;
   std::uint64_t quads_tested = 0;
   std::uint64_t updates = 0;
-  std::uint64_t z_sectors = 0;  ///< moves of the z-cache (ZCache::moves_in_a_cycle) for what it fills, in whole cycles
+  std::uint64_t z_sectors = 0;  ///< filled into the z-cache, in whole cycles of it
+  std::uint64_t z_lines = 0;    ///< thousandths of a cycle of lines, beside the tests
   std::uint64_t z_blocks = 0;   ///< thousandths of a cycle beyond what quads_tested take
   std::uint64_t survivors = 0;
   std::uint64_t late_quads = 0;  ///< tested after shading
@@ -84,6 +85,11 @@ class PhaseBound {
   /// Of so many sectors that every run fills into the z-cache in a phase, those that no earlier phase can have filled for it:
   /// look-ups run ahead by the quads of a queue.
   std::uint64_t z_sectors_of(std::uint64_t filled) const;
+  /// The same of lines, in thousandths of a cycle.
+  std::uint64_t z_lines_of(std::uint64_t moved) const {
+    const std::uint64_t ahead = std::uint64_t{zrop_.z_cache.input_quads} * zrop_.z_cache.line_thousandths;
+    return moved > ahead ? moved - ahead : 0;
+  }
   /// Screen tiles may be blended in another order than they were flushed in.
   bool tiles_may_overtake() const { return prop_.order == PropBehaviour::Order::tile; }
 

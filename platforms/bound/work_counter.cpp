@@ -236,6 +236,7 @@ void WorkCounter::count() {
   count_front_end(bound_.work);
   bound_.work.bin_beats = items(tc_, TcWork::beats) - before_.bin_beats;
   bound_.work.quads_tested = items(zrop_, ZropWork::tests) - before_.quads_tested;
+  bound_.work.z_lines = bound_.z_lines_of(items(zrop_, ZropWork::lines) - z_lines_before_);
   bound_.work.z_blocks = items(zrop_, ZropWork::blocks) - before_.z_blocks;
   // Where time-outs decide what is flushed, some run may be spared warps of this one.
   if (counts_late_) bound_.work.launches = items(sm_, SmWork::launches) - before_.launches;
@@ -247,6 +248,7 @@ void WorkCounter::end_phase() {
   count();
   before_.add(bound_.work);
   z_sectors_before_ = items(zrop_, ZropWork::sectors);
+  z_lines_before_ = items(zrop_, ZropWork::lines);
   bound_.end_phase();
 }
 

@@ -40,6 +40,7 @@ class WorkCounter {
   UntimedUnit *draw_, *vpo_, *tgc_, *raster_, *tc_, *zrop_, *sm_;  ///< null for none
   Work before_;                                                    ///< of the phases before
   std::uint64_t z_sectors_before_ = 0;                             ///< the same, all that were filled
+  std::uint64_t z_lines_before_ = 0;
 };
 
 }  // namespace vrpipe

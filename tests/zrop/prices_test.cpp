@@ -65,10 +65,19 @@ TEST(BlockPrice, DoesNotDependOnWhereBeatsEnd) {
   EXPECT_EQ(price.of({1, 0}, quads.data(), 1), 1400U) << "another screen tile";
 }
 
+TEST(BlockPrice, OfAPrimitiveIsPaidOnceWhereverItsQuadsAre) {
+  BlockPrice price(1000, 1400, 2700, 4);
+  const Quad first[] = {quad_at(0, 0), quad_at(1, 1)};
+  EXPECT_EQ(price.of({0, 0}, first, 2), 2U * (1400 + 2700));
+  EXPECT_EQ(price.of({1, 0}, first, 2), 2U * 1400) << "in another screen tile";
+}
+
 /// ZROP at any fidelity with time, in front of a memory or not; bins of up to a beat.
 class ZropPrices : public ::testing::TestWithParam<Fidelity> {
  protected:
-  ZropPrices() : draw(testing::draw_of(2048, 64)), context(testing::context_of(draw)) {
+  ZropPrices()
+      : draw(testing::draw_of(2048, 64, std::vector<Splat>(2048, testing::flat_box(0, 0, 1, 1, 0.5F)))),
+        context(testing::context_of(draw)) {
     testing::terminate_early(context);
   }
   struct Bin {
@@ -140,20 +149,30 @@ TEST_P(ZropPrices, ASingleQuadTakesItsBlock) {
   EXPECT_LT(cycles_of_a_bin(single, {}), 1.01);
 }
 
+TEST_P(ZropPrices, RectanglesTakeWhatTheyDoOnTheGpu) {
+  Bench::Settings settings = blocks;
+  settings.push_back({"primitive_cycles", "2.7"});
+  // Killed one after the other: 2x2 pixels every 4.17 cycles, 16x16 every 10.67.
+  const auto small = [](unsigned i) { return Bin{{0, 0}, {quad_at(i % 64, i)}}; };
+  EXPECT_NEAR(cycles_of_a_bin(small, settings), 4.17, 0.1);
+  const auto block_of_tile = [](unsigned i) { return Bin{{0, 0}, block_quads(i % 2 * 4 + i / 2 % 2 * 32, 4, i / 4)}; };
+  EXPECT_NEAR(4 * cycles_of_a_bin(block_of_tile, settings), 10.67, 0.1);
+}
+
 const Bench::Settings small_cache{{"cache_bytes", "8192"},
                                   {"line_bytes", "256"},
                                   {"mshrs", "2048"},
                                   {"fetch_ahead", "on"}};
 
 TEST_P(ZropPrices, ALineThatMovesTakesItsCycles) {
-  // A block is a line of 256 bytes; its two cycles of tests and the line's.
+  // A block is a line of 256 bytes: two cycles of tests, beside which its line moves.
   const auto missing = [](unsigned i) {
     return Bin{{static_cast<std::uint16_t>(i / 4 % 128), static_cast<std::uint16_t>(i / 512)},
                block_quads(i % 2 * 4 + i / 2 % 2 * 32, 4, i)};
   };
   Bench::Settings settings = small_cache;
-  settings.push_back({"line_cycles", "1.5"});
-  EXPECT_NEAR(cycles_of_a_bin(missing, settings, true), 2 + 1.5, 0.05);
+  settings.push_back({"line_cycles", "2.5"});
+  EXPECT_NEAR(cycles_of_a_bin(missing, settings, true), 2.5, 0.05);
 }
 
 TEST_P(ZropPrices, AheadOfItsDataMoreLinesAreUnderWayThanTheCacheHolds) {
@@ -179,7 +198,7 @@ TEST_P(ZropPrices, ALineThatLeftAndComesBackWaits) {
     return (cycles(10) - cycles(4)) / 6;
   };
   EXPECT_LT(round(32), 64) << "held: nothing comes back";
-  for (const unsigned tiles : {33U, 64U, 96U}) EXPECT_NEAR(round(tiles), 461, 1) << tiles;
+  for (const unsigned tiles : {33U, 64U, 96U}) EXPECT_NEAR(round(tiles), 461, 2) << tiles;
 }
 
 }  // namespace

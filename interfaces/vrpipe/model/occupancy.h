@@ -73,9 +73,9 @@ struct PropWork {
   static std::vector<WorkKind> kinds(const PropBehaviour::TimingParameters& timing);
 };
 struct ZropWork {
-  /// Quads tested before shading, cycles with updates, sectors moved (or lines, in thousandths of a cycle), quads tested
-  /// after shading, and what the blocks that quads touch take beyond their number, in thousandths of a cycle.
-  enum : unsigned { tests, updates, sectors, late_tests, blocks };
+  /// Quads tested before shading, cycles with updates, sectors moved, quads tested after shading; in thousandths of a cycle,
+  /// what the blocks that quads touch take beyond their number, and lines that move.
+  enum : unsigned { tests, updates, sectors, late_tests, blocks, lines };
   static std::vector<WorkKind> kinds(const ZropBehaviour::TimingParameters& timing);
 };
 struct QruWork {

@@ -30,11 +30,10 @@ struct ZCache {
   std::uint32_t input_updates = 64;       ///< the same of updates, signals
   std::uint32_t sectors_per_cycle = 16;   ///< filled or written back in a cycle in which nothing is tested or updated
   bool fast_clear = true;                 ///< sectors that a clear has left as they are in memory are not read
-  std::uint32_t line_thousandths = 0;     ///< of a cycle, for a line that moves; 0: sectors are what takes time
-  bool fetches_ahead = false;             ///< a line may go while it is fetched for a test
-  std::uint32_t line_return_cycles = 0;   ///< from a line's last use to the next, if it left in between
-  /// In what a cycle is paid that something moves in: sectors, or thousandths of a cycle.
-  std::uint32_t moves_in_a_cycle() const { return line_thousandths == 0 ? sectors_per_cycle : 1000; }
+  /// Of a cycle, for a line that is allocated or written back, beside the tests; 0: sectors take time, of the tests.
+  std::uint32_t line_thousandths = 0;
+  bool fetches_ahead = false;            ///< a line may go while it is fetched for a test
+  std::uint32_t line_return_cycles = 0;  ///< from a line's last use to the next, if it left in between
   /// Throws UserError for one that cannot be: CacheOrganization::check; a sector holds a quad of the target, a line is of one
   /// screen tile.
   void check(DepthFormat format) const;
@@ -73,6 +72,7 @@ class ZropBehaviour : public Behaviour {
     /// shading, and the least of a block; both 0: quads alone take time.
     std::uint32_t half_block_thousandths = 0;
     std::uint32_t block_thousandths = 0;
+    std::uint32_t primitive_thousandths = 0;  ///< and once for each primitive of which a quad is tested so
   };
   virtual TimingParameters timing() const = 0;
 
