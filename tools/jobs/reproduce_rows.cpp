@@ -55,6 +55,7 @@ class Rows {
       RowFinding finding = found == found_.end() ? RowFinding() : found->second;
       finding.row = &row;
       if (!row.is_within_reach) finding.reason = row.how;
+      if (found == found_.end() && row.is_within_reach) finding.reason = "there is nothing to measure it by";
       if (finding.verdict == Verdict::differs && reasons().count(row.id) > 0) {
         finding.reason += (finding.reason.empty() ? "" : "; ") + reasons().at(row.id);
       }
