@@ -22,7 +22,6 @@
 namespace vrpipe::tools {
 namespace {
 
-namespace fs = std::filesystem;
 using nlohmann::json;
 using SteadyClock = std::chrono::steady_clock;
 

@@ -281,7 +281,7 @@ ReportTable cost_table(const Reproduction& of) {
 ReportTable microbench_table(const Reproduction& of) {
   ReportTable table;
   table.title = "Microbenchmarks";
-  table.heading = {"microbenchmark", "figure", "unit", "paper", "real GPU", "here", "agrees"};
+  table.heading = {"microbenchmark", "figure", "unit", "paper", "real GPU", "here", "within tolerance"};
   const auto optional = [](const std::optional<double>& value) { return value ? fmt::format("{:.4g}", *value) : "-"; };
   for (const MicrobenchResult& result : of.result.microbenches) {
     for (const MicrobenchFigure& figure : result.figures) {
