@@ -503,7 +503,7 @@ TEST_F(Views, AJournalOfSomethingElseIsRefusedAndLeftAsItIs) {
   expect_other(of_file({"--views", "all", "--journal", "j.jsonl"}), "scene.modified");
   for (const char* text : {"a thesis\n", "{}", "\n"}) {
     write("j.jsonl", text);
-    refused(of_file({"--views", "2", "--journal", "j.jsonl"}), {"--journal j.jsonl", "no journal of views"});
+    refused(of_file({"--views", "2", "--journal", "j.jsonl"}), {"--journal j.jsonl", "no journal of this command"});
     EXPECT_EQ(read_file(folder() / "j.jsonl"), text);
   }
   std::filesystem::create_directory(folder() / "d");

@@ -29,6 +29,7 @@ constexpr const char* program_footer =
     "  vrpipe compare --views 8                         from cameras round it, as a distribution\n"
     "  vrpipe run --variant het --set crop.cache_bytes=32768 --json result.json\n"
     "  vrpipe accuracy --quick --html accuracy.html     what accuracy costs in time\n"
+    "  vrpipe reproduce --quick                         the paper's numbers beside what is measured here\n"
     "  vrpipe microbench all --html microbench.html     the paper's analysis of GPUs as workloads\n"
     "  vrpipe units                                     every unit and parameter that can be changed\n"
     "\n"
@@ -183,6 +184,7 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   commands.push_back(make_run_command());
   commands.push_back(make_compare_command());
   commands.push_back(make_accuracy_command());
+  commands.push_back(make_reproduce_command());
   commands.push_back(make_microbench_command());
   commands.push_back(make_convert_command());
   commands.push_back(make_scenes_command());

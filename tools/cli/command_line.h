@@ -34,6 +34,7 @@ class Command {
 std::unique_ptr<Command> make_run_command();
 std::unique_ptr<Command> make_compare_command();
 std::unique_ptr<Command> make_accuracy_command();
+std::unique_ptr<Command> make_reproduce_command();
 std::unique_ptr<Command> make_microbench_command();
 std::unique_ptr<Command> make_convert_command();
 std::unique_ptr<Command> make_scenes_command();

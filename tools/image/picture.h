@@ -23,7 +23,16 @@ constexpr double smallest_mapped_error = 1e-5;
 constexpr double largest_mapped_error = 1e-1;
 std::array<std::uint8_t, 3> error_color(double error);
 
+// Counts of a pixel likewise, from 1 to 1000; none is black.
+constexpr double smallest_mapped_count = 1;
+constexpr double largest_mapped_count = 1000;
+std::array<std::uint8_t, 3> count_color(double count);
+
 /// The largest error of a channel at each pixel, made smaller in the same way; the largest error is what remains.
 Picture error_map(const ShownImage& image, const ShownImage& reference, std::uint32_t largest_width);
+
+/// Counts of pixels, row by row from the top, made smaller in the same way; their mean is what remains.
+Picture count_map(std::uint32_t width, std::uint32_t height, const std::vector<std::uint32_t>& counts,
+                  std::uint32_t largest_width);
 
 }  // namespace vrpipe::tools

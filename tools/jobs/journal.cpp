@@ -170,7 +170,7 @@ void Journal::open(const json& head) {
     const json other = json::parse(text.substr(0, text.find('\n')), nullptr, false);
     const bool is_journal = other.is_object() && other.value("schema", json()) == head.at("schema");
     refuse(is_journal ? "it belongs to another run, of which this is different: " + difference(other, head)
-                      : std::string("it is no journal of views"),
+                      : std::string("it is no journal of this command"),
            "name another file, or remove it");
   }
   note_written(path_.string());

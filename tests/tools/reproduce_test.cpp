@@ -1,0 +1,391 @@
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <limits>
+#include <set>
+#include <thread>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/workloads/gaussian_file.h>
+#include <vrpipe/workloads/gaussian_scene.h>
+
+#include "forked.h"
+#include "image/base64.h"
+#include "jobs/heat_map.h"
+#include "jobs/paper_rows.h"
+#include "jobs/reproduce_findings.h"
+#include "jobs/reproduce_plan.h"
+#include "jobs/sensitivity_table.h"
+#include "output/reproduce_tables.h"
+
+namespace vrpipe::testing {
+namespace {
+
+using nlohmann::json;
+using tools::judge;
+using tools::Relation;
+using tools::Verdict;
+
+// Rows and verdicts.
+
+TEST(PaperRows, AreAllThereOnceInOrder) {
+  std::vector<std::string> expected;
+  for (int i = 1; i <= 32; ++i) expected.push_back("R" + std::to_string(i));
+  for (int i = 1; i <= 13; ++i) expected.push_back("C" + std::to_string(i));
+  std::vector<std::string> found;
+  for (const tools::PaperRow& row : tools::paper_rows()) {
+    found.emplace_back(row.id);
+    EXPECT_GT(std::string(row.value).size(), 0U) << row.id;
+    EXPECT_GT(std::string(row.where).size(), 0U) << row.id;
+    EXPECT_GT(std::string(row.how).size(), 0U) << row.id;
+    if (row.relation != Relation::claim) {
+      EXPECT_GT(row.number, 0) << row.id;
+    }
+  }
+  EXPECT_EQ(found, expected);
+}
+
+TEST(PaperRows, NumbersAgreeUpToTheirTolerance) {
+  EXPECT_EQ(judge(Relation::about, 2, 10, 2.2), Verdict::agrees);
+  EXPECT_EQ(judge(Relation::about, 2, 10, 1.8), Verdict::agrees);
+  EXPECT_EQ(judge(Relation::about, 2, 10, 2.2001), Verdict::differs);
+  EXPECT_EQ(judge(Relation::about, 2, 10, 1.7999), Verdict::differs);
+  EXPECT_EQ(judge(Relation::about, 67, 5, 64), Verdict::agrees);
+  EXPECT_EQ(judge(Relation::at_most, 100, 10, 110), Verdict::agrees);
+  EXPECT_EQ(judge(Relation::at_most, 100, 10, 110.1), Verdict::differs);
+  EXPECT_EQ(judge(Relation::at_most, 100, 10, 1), Verdict::agrees);
+  EXPECT_EQ(judge(Relation::at_least, 64, 10, 57.6), Verdict::agrees);
+  EXPECT_EQ(judge(Relation::at_least, 64, 10, 57.5), Verdict::differs);
+  EXPECT_EQ(judge(Relation::above, 1.5, 0, 1.5), Verdict::differs);
+  EXPECT_EQ(judge(Relation::above, 1.5, 0, 1.50001), Verdict::agrees);
+}
+
+TEST(PaperRows, NothingCanBeSaidOfWhatIsNoNumber) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const Relation relation : {Relation::about, Relation::at_most, Relation::at_least, Relation::above}) {
+    EXPECT_EQ(judge(relation, 2, 10, nan), Verdict::cannot_say);
+  }
+  EXPECT_EQ(judge(Relation::claim, 2, 10, 2), Verdict::cannot_say);
+  EXPECT_FALSE(tools::difference_percent(2, nan).has_value());
+  EXPECT_DOUBLE_EQ(tools::difference_percent(2, 3).value(), 50);
+}
+
+TEST(PaperRows, HaveTheRiddlesNumbers) {
+  EXPECT_NEAR(tools::paper_fragment_fall_percent(), 24.6, 0.1);
+  EXPECT_NEAR(tools::paper_het_efficiency(), 0.947, 0.001);
+  EXPECT_NEAR(tools::paper_het_qm_efficiency(), 0.825, 0.001);
+}
+
+TEST(Means, AreArithmeticAndGeometric) {
+  const tools::Mean mean = tools::mean_of({1, 4});
+  EXPECT_DOUBLE_EQ(mean.arithmetic, 2.5);
+  EXPECT_NEAR(mean.geometric, 2, 1e-14);
+  EXPECT_TRUE(std::isnan(tools::mean_of({}).arithmetic));
+  EXPECT_TRUE(std::isnan(tools::mean_of({1, std::nan("")}).geometric));
+}
+
+TEST(Base64, ComesBack) {
+  std::string bytes;
+  for (int i = 0; i < 260; ++i) {
+    EXPECT_EQ(tools::bytes_of_base64(tools::base64(bytes)), bytes);
+    bytes += static_cast<char>(i * 37);
+  }
+  EXPECT_EQ(tools::base64("Man"), "TWFu");
+  EXPECT_EQ(tools::base64("Ma"), "TWE=");
+}
+
+// The sensitivity.
+
+TEST(Sensitivity, VariesEveryParameterThatThePaperLeavesOpenOrSaysWhyNot) {
+  std::set<std::string> varied, not_varied;
+  for (const tools::SensitivityParameter& parameter : tools::sensitivity_parameters()) {
+    EXPECT_FALSE(parameter.values.empty()) << parameter.name;
+    for (const std::string& value : parameter.values) varied.insert(value.substr(0, value.find('=')));
+  }
+  for (const tools::NotVaried& each : tools::parameters_not_varied()) {
+    not_varied.insert(each.name);
+    EXPECT_FALSE(each.reason.empty());
+  }
+  for (const char* platform : {"agx-orin", "agx-orin-lpddr3"}) {
+    for (const ParameterListing& listing : list_parameters(&platform_named(platform))) {
+      for (const Parameter* parameter : listing.parameters->parameters()) {
+        if (std::string(parameter->source()) != source::open) continue;
+        const std::string name = listing.unit + "." + parameter->name();
+        EXPECT_TRUE(varied.count(name) > 0 || not_varied.count(name) > 0 ||
+                    not_varied.count(std::string("*.") + parameter->name()) > 0)
+            << name;
+      }
+    }
+  }
+}
+
+TEST(Sensitivity, SkipsWithANoteWhatThePlatformDoesNotKnow) {
+  RunRequest request;
+  request.platform = &platforms().front();
+  request.variant = variant_named("het+qm");
+  EXPECT_THROW(tools::with_settings(request, "crop.unheard_of=1"), UserError);
+  const RunRequest changed = tools::with_settings(request, "platform=agx-orin-lpddr3,tc.bins=16,termination=strict");
+  EXPECT_EQ(changed.platform->name, "agx-orin-lpddr3");
+  EXPECT_EQ(changed.termination, Termination::strict);
+  ASSERT_EQ(changed.settings.size(), 1U);
+  EXPECT_EQ(changed.settings[0].unit + changed.settings[0].parameter + changed.settings[0].value, "tcbins16");
+}
+
+TEST(ReproducePlan, HasEveryPointOnceAndSceneByScene) {
+  for (const bool quick : {false, true}) {
+    tools::ReproduceOptions options;
+    options.quick = quick;
+    options.base.platform = &platforms().front();
+    const tools::ReproducePlan plan = tools::plan_reproduction(options);
+    ASSERT_EQ(plan.scenes.size(), 8U);
+    EXPECT_EQ(plan.paper_scenes().size(), 6U);
+    EXPECT_EQ(plan.places.size(), plan.points.size());
+    for (std::size_t i = 1; i < plan.points.size(); ++i) {
+      EXPECT_LE(plan.points[i - 1].key.scene, plan.points[i].key.scene);
+    }
+    const std::size_t skipped = plan.skipped.size();
+    for (const tools::SkippedSetting& each : plan.skipped) EXPECT_FALSE(each.reason.empty()) << skipped;
+  }
+}
+
+TEST(HeatMaps, ComeBackFromAJournal) {
+  tools::HeatMap map;
+  map.width = 7;
+  map.height = 3;
+  map.sum = 1234567890123;
+  map.largest = 99;
+  map.png = std::string("\x89PNG\0\xff", 6);
+  const tools::HeatMap back = tools::heat_map_from_json(json::parse(tools::to_json(map).dump()));
+  EXPECT_EQ(back.png, map.png);
+  EXPECT_EQ(back.sum, map.sum);
+}
+
+// What follows from points.
+
+/// Points as the paper would have them: each scene gains what it says.
+class Synthetic : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    tools::ReproduceOptions options;
+    options.quick = true;
+    options.base.platform = &platforms().front();
+    result_.plan = tools::plan_reproduction(options);
+    for (const tools::ReproducePoint& point : result_.plan.points) result_.points.push_back(made(point));
+  }
+
+  static tools::PointResult made(const tools::ReproducePoint& point) {
+    // Speed-ups of HET and of QM, by scene: kitchen, bonsai, train, truck, lego, palace, building, rubble.
+    constexpr double het[] = {1.7, 1.5, 2.1, 2.2, 1.6, 1.65, 2, 2}, qm[] = {1.1, 1.15, 1.4, 1.49, 1.3, 1.35, 1.2, 1.2};
+    const Variant& variant = point.request.variant;
+    const double gain_het = variant.early_termination ? het[point.key.scene] : 1;
+    const double gain_qm = variant.quad_merging ? qm[point.key.scene] : 1;
+    tools::PointResult made;
+    made.run.request = point.request;
+    const double passes = point.key.passes == 1 ? 1 : point.key.scene == 2 || point.key.scene == 3 ? 1.3 : 0.9;
+    made.run.cycles = static_cast<std::uint64_t>(1e8 / gain_het / gain_qm / passes);
+    Counts& counts = made.run.counts;
+    counts.fragments_rasterized = 4'000'000;
+    counts.fragments_pruned = 1'000'000;
+    counts.fragments_blended = static_cast<std::uint64_t>(3e6 / (gain_het * 1.3) / gain_qm);
+    if (!variant.early_termination) counts.fragments_blended = static_cast<std::uint64_t>(3e6 / gain_qm);
+    counts.quads_blended = static_cast<std::uint64_t>(1e6 / gain_het / gain_qm);
+    made.run.utilization = {{"raster", 0.2}, {"zrop", 0.1}, {"prop", 0.9}, {"sm", 0.2}, {"crop", 0.9}, {"l2", 0.5}};
+    made.run.bottleneck = Bottleneck{"gpc0.crop", 1, {}};
+    made.gaussians_total = point.key.scene == 6 ? 9'060'000 : 5'210'000;
+    made.gaussians_visible = 900'000;
+    made.width = made.height = 100;
+    if (point.with_map) made.map = tools::HeatMap();
+    return made;
+  }
+
+  tools::RowFinding row(const std::string& id) const {
+    const tools::Reproduction of = tools::reproduction_of(result_);
+    for (const tools::RowFinding& each : of.rows) {
+      if (id == each.row->id) return each;
+    }
+    throw std::logic_error("no row " + id);
+  }
+  /// Of a scene at the main comparison.
+  tools::PointResult& point(std::size_t scene, const std::string& variant) {
+    tools::PointKey key;
+    key.scene = scene;
+    key.fidelity = result_.plan.fidelity;
+    key.variant = variant;
+    return result_.points[result_.plan.places.at(key.name(result_.plan.scenes))];
+  }
+
+  tools::ReproduceResult result_;
+};
+
+TEST_F(Synthetic, RowsSayWhatThePointsSay) {
+  EXPECT_EQ(row("R3").verdict, Verdict::agrees);
+  EXPECT_EQ(row("R3").measured, "1.49x (truck)");
+  EXPECT_EQ(row("R4").verdict, Verdict::agrees);
+  EXPECT_NEAR(row("R4").number.value(), (1.7 + 1.5 + 2.1 + 2.2 + 1.6 + 1.65) / 6, 1e-6);
+  EXPECT_EQ(row("R32").verdict, Verdict::agrees);
+  EXPECT_EQ(row("R23").verdict, Verdict::agrees);
+  for (const char* id : {"C2", "C5", "C6", "C7", "C8", "C9", "C11"}) {
+    EXPECT_EQ(row(id).verdict, Verdict::agrees) << id << ": " << row(id).reason;
+  }
+  for (const char* id : {"R9", "R12", "R21", "R22", "C1", "C10", "C13"}) {
+    EXPECT_EQ(row(id).verdict, Verdict::cannot_say) << id;
+    EXPECT_NE(row(id).reason, "") << id;
+  }
+}
+
+TEST_F(Synthetic, RowsThatDifferNameTheScenes) {
+  point(2, "het").run.cycles = *point(0, "baseline").run.cycles;
+  EXPECT_EQ(row("C6").verdict, Verdict::differs);
+  EXPECT_NE(row("C6").reason.find("train"), std::string::npos);
+  point(4, "het").run.counts.quads_blended = 1;
+  EXPECT_EQ(row("C8").verdict, Verdict::differs);
+  EXPECT_NE(row("C8").reason.find("lego"), std::string::npos);
+  point(7, "baseline").run.bottleneck->unit = "gpc0.raster";
+  EXPECT_EQ(row("C11").verdict, Verdict::differs);
+  EXPECT_NE(row("C11").reason.find("rubble"), std::string::npos);
+  point(6, "baseline").gaussians_total = 1;
+  EXPECT_EQ(row("R32").verdict, Verdict::differs);
+}
+
+TEST_F(Synthetic, NothingIsSaidOfScenesWithoutFragments) {
+  for (tools::PointResult& each : result_.points) each.run.counts = Counts();
+  for (const char* id : {"R1", "R2", "R5", "R18", "R19"}) {
+    EXPECT_EQ(row(id).verdict, Verdict::cannot_say) << id;
+    EXPECT_FALSE(row(id).number.has_value()) << id;
+  }
+}
+
+// The command, on a small scene in the place of each of the paper's.
+
+class Reproduce : public ToolTest {
+ protected:
+  void SetUp() override {
+    GaussianSceneBuilder builder(0);
+    for (int i = 0; i < 300; ++i) {
+      GaussianAttributes gaussian;
+      const auto spread = [i](int step) { return 0.04F * static_cast<float>((i * step) % 23 - 11); };
+      gaussian.position = {spread(7), spread(5), spread(3)};
+      gaussian.log_scale = {-2.0F, -1.7F, -1.9F};
+      gaussian.opacity_logit = i % 2 == 0 ? 6.0F : 0.5F;
+      gaussian.f_dc = {1, 0.2F, -0.5F};
+      builder.add(gaussian);
+    }
+    write_gaussian_file(folder() / "cloud.ply", builder.build());
+  }
+
+  static std::vector<std::string> command(const std::vector<std::string>& more = {}) {
+    std::vector<std::string> words{"reproduce", "--quick", "--size", "64x48"};
+    for (const char* scene : {"kitchen", "bonsai", "train", "truck", "lego", "palace", "building", "rubble"}) {
+      words.insert(words.end(), {"--scene", std::string(scene) + "=cloud.ply"});
+    }
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+};
+
+TEST_F(Reproduce, SaysSomethingOfEveryRow) {
+  const Finished finished = vrpipe(command(
+      {"--json", "r.json", "--html", "r.html", "--markdown", "r.md", "--output", "maps", "--journal", "j.jsonl"}));
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  const json result = json::parse(read_file(folder() / "r.json"));
+  EXPECT_EQ(result["schema"], "vrpipe.reproduce/1");
+  EXPECT_EQ(result["quick"], true);
+  const std::string page = read_file(folder() / "r.html"), document = read_file(folder() / "r.md");
+  ASSERT_EQ(result["rows"].size(), tools::paper_rows().size());
+  for (std::size_t i = 0; i < result["rows"].size(); ++i) {
+    const json& row = result["rows"][i];
+    const std::string id = tools::paper_rows()[i].id;
+    EXPECT_EQ(row["id"], id);
+    if (row["verdict"] == "cannot say") {
+      EXPECT_TRUE(row["reason"].is_string()) << id;
+    } else {
+      EXPECT_TRUE(row["measured"].is_string()) << id;
+    }
+    EXPECT_NE(page.find("<tr id=\"" + id + "\">"), std::string::npos) << id;
+    EXPECT_NE(document.find("| " + id + " |"), std::string::npos) << id;
+    EXPECT_NE(finished.out.find("\n" + id + " "), std::string::npos) << id;
+  }
+  // A verdict of a quick look says so.
+  EXPECT_EQ(document.find("| agrees |"), std::string::npos);
+  EXPECT_NE(document.find("| agrees (quick) |"), std::string::npos);
+  ASSERT_EQ(result["scenes"].size(), 6U);
+  for (const json& scene : result["scenes"]) {
+    EXPECT_EQ(scene["runs"].size(), 4U);
+    EXPECT_GT(scene["fragments_per_pixel"]["without"]["fragments"], 0);
+    // What was counted pixel by pixel is what was blended: without termination that is the same at every fidelity.
+    EXPECT_EQ(scene["fragments_per_pixel"]["without"]["fragments"], scene["runs"][0]["counts"]["fragments_blended"]);
+    const std::string name = scene["name"];
+    for (const char* variant : {"baseline", "het"}) {
+      const std::string png = read_file(folder() / "maps" / ("fragments-" + name + "-" + variant + ".png"));
+      EXPECT_EQ(png.substr(1, 3), "PNG") << name;
+    }
+  }
+  for (const char* outside : {"<script", "<link", "src=\"http", "href=\"http", "@import", "url("}) {
+    EXPECT_EQ(page.find(outside), std::string::npos) << outside;
+  }
+  EXPECT_NE(page.find("data:image/png;base64,"), std::string::npos);
+  EXPECT_NE(page.find("<svg"), std::string::npos);
+
+  // A journal that was named stays, and nothing is simulated again.
+  const Finished again = vrpipe(command({"--json", "s.json", "--journal", "j.jsonl"}));
+  EXPECT_EQ(again.code, 0);
+  EXPECT_NE(again.err.find("simulations were done before"), std::string::npos) << again.err;
+  json other = json::parse(read_file(folder() / "s.json"));
+  other["command"] = result["command"];
+  EXPECT_EQ(other, result);
+}
+
+TEST_F(Reproduce, GoesOnAfterItWasKilledAndEndsWithTheSameBytes) {
+  const std::vector<std::string> words = command({"--json", "r.json", "--html", "r.html", "--journal", "j.jsonl"});
+  const auto written = [&] { return read_file(folder() / "r.json") + read_file(folder() / "r.html"); };
+  const pid_t process = ::fork();
+  if (process == 0) {
+    const bool ready = ::chdir(folder().c_str()) == 0 && std::freopen("/dev/null", "w", stdout) != nullptr;
+    ::_exit(ready ? become_vrpipe(words) : 98);
+  }
+  std::ptrdiff_t lines = 0;
+  for (int waited = 0; lines < 30 && waited < 30000; ++waited) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    const std::string text = read_file(folder() / "j.jsonl");
+    lines = std::count(text.begin(), text.end(), '\n');
+  }
+  ::kill(process, SIGKILL);
+  int status = 0;
+  ::waitpid(process, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status)) << "it was done before it could be killed";
+  EXPECT_FALSE(std::filesystem::exists(folder() / "r.json"));
+  const Finished resumed = vrpipe(words);
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  std::size_t done = 0, all = 0;
+  EXPECT_EQ(std::sscanf(resumed.err.c_str(), "%zu of %zu simulations were done before", &done, &all), 2) << resumed.err;
+  EXPECT_GE(done, 20U);
+  EXPECT_LT(done, all);
+  const std::string of_two_runs = written();
+  std::filesystem::remove(folder() / "j.jsonl");
+  ASSERT_EQ(vrpipe(words).code, 0);
+  EXPECT_EQ(of_two_runs, written());
+}
+
+TEST_F(Reproduce, RefusesWhatItCannotDo) {
+  refused({"reproduce", "--scene", "cloud.ply"}, {"(--scene"});
+  refused({"reproduce", "--scene", "object=cloud.ply"}, {"(--scene object=cloud.ply)", "the paper does not have"});
+  refused({"reproduce", "--scene", "train=none.ply"}, {"(--scene train=none.ply)", "no such file"});
+  refused({"reproduce", "--scene", "train=cloud.ply", "--scene", "train=cloud.ply"}, {"train"});
+  refused({"reproduce", "--camera", "cameras.json"}, {"(--camera)", "NAME=FILE"});
+  write("cameras.json",
+        R"([{"img_name": "a", "width": 64, "height": 48, "position": [0, 0, -4],
+             "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "fx": 90, "fy": 90}])");
+  refused({"reproduce", "--camera", "train=cameras.json"}, {"(--camera train)", "add --scene train=FILE"});
+  refused({"reproduce", "--camera", "train=none.json"}, {"none.json"});
+  refused({"reproduce", "--fidelity", "functional"}, {"'functional' (--fidelity)"});
+  refused({"reproduce", "--views", "0"}, {"(--views)"});
+  refused({"reproduce", "--set", "tc.bin=3"}, {"tc.bin"});
+  refused(command({"--json", "cloud.ply"}), {"--json cloud.ply", "same file"});
+  refused(command({"--json", "a", "--html", "a"}), {"same file"});
+  refused(command({"--html", "none/a.html"}), {"--html none/a.html"});
+  refused({"reproduce", "--quik"}, {"--quick"});
+}
+
+}  // namespace
+}  // namespace vrpipe::testing

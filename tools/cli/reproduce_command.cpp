@@ -1,0 +1,208 @@
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/component/printable.h>
+#include <vrpipe/workloads/gaussian_file.h>
+#include <vrpipe/workloads/scene_substitution.h>
+
+#include "cli/command_line.h"
+#include "cli/options.h"
+#include "cli/parse.h"
+#include "host/output_file.h"
+#include "host/process_setup.h"
+#include "host/terminal.h"
+#include "jobs/reproduce_job.h"
+#include "output/json_text.h"
+#include "output/reproduce_json.h"
+#include "output/reproduce_markdown.h"
+#include "output/reproduce_page.h"
+#include "output/reproduce_report.h"
+
+namespace vrpipe::tools {
+namespace {
+
+constexpr const char* scenes_group = "What is drawn";
+constexpr const char* machine_group = "On which GPU";
+constexpr const char* results_group = "Where results go";
+constexpr unsigned most_views = 100'000;
+
+/// NAME=FILE[#CAMERA].
+std::pair<std::string, std::string> camera_of_scene(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == 0 || equals == std::string::npos || equals + 1 == text.size()) {
+    throw UserError("bad value '" + text + "'", "--camera", "it does not say of which scene it is",
+                    "give NAME=FILE, e.g. train=cameras.json#3");
+  }
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+class ReproduceCommand : public Command {
+ public:
+  std::string name() const override { return "reproduce"; }
+  std::string summary() const override { return "the paper's numbers beside what is measured here"; }
+
+  void declare(CLI::App& app) override {
+    app.add_flag("--quick", quick_,
+                 "a first answer in less than 3 minutes: everything at lt, two views, and of the\n"
+                 "open parameters those that matter most")
+        ->disable_flag_override()
+        ->group(scenes_group);
+    add_option(app, "--scene", scenes_, "NAME=FILE",
+               "a trained model in the place of a scene's stand-in, e.g. train=model.ply;\n"
+               "can be repeated",
+               scenes_group);
+    add_option(app, "--camera", cameras_, "NAME=FILE[#CAMERA]",
+               "cameras of such a model; the views are of this file, too; can be repeated", scenes_group);
+    add_option(app, "--size", size_, "WxH", "image size of every scene, pixels (default: the paper's)", scenes_group);
+    add_option(app, "--views", views_, "N", "views of each scene for early-termination ratios (default: 6)",
+               scenes_group);
+    add_option(app, "--platform", platform_, "NAME", "the GPU (default: " + platforms().front().name + ")",
+               machine_group);
+    add_option(app, "--set", settings_, "UNIT.PARAMETER=VALUE",
+               "changes a parameter of every simulation; can be repeated", machine_group);
+    add_option(app, "--fidelity", fidelity_, "NAME",
+               "of the main comparison: lt, at or cycle (default: cycle, with --quick lt); the\n"
+               "sensitivity is always at lt",
+               machine_group);
+    add_option(app, "--output", output_, "DIR", "writes the heat maps of fragments as PNG there; created if missing",
+               results_group);
+    add_option(app, "--json", json_, "FILE|-", "writes the result as JSON; `-`: to stdout, and nothing else there",
+               results_group);
+    add_option(app, "--html", html_, "FILE", "writes a page with plots and heat maps; it needs no network",
+               results_group);
+    add_option(app, "--markdown", markdown_, "FILE", "writes the page of the documentation", results_group);
+    add_option(app, ReproduceJob::journal_option, journal_, "FILE",
+               "where is stored what is done, to go on from after an interruption; it stays\n"
+               "(default: a file in the user's cache folder, removed at the end)",
+               results_group);
+    add_option(app, "--jobs", jobs_, "N",
+               "simulations at a time, each a process of its own (default: one for each\n"
+               "processor; results do not depend on it)",
+               results_group);
+    app.footer(
+        "Every number and statement of the paper, R1 to R32 and C1 to C13, with what is measured here, the\n"
+        "difference, and whether they agree; early-termination ratios over views, utilisation, large scenes,\n"
+        "heat maps, and how far the speed-ups move with what the paper leaves open. Takes a quarter of an hour\n"
+        "on two processors. Interrupted, the same command goes on where it was.\n"
+        "\n"
+        "Examples:\n"
+        "  vrpipe reproduce --quick\n"
+        "  vrpipe reproduce --html reproduction.html --output maps\n"
+        "  vrpipe reproduce --scene train=train/point_cloud.ply --camera train=train/cameras.json\n"
+        "  vrpipe reproduce --quick --set raster.screen_tile_interval_cycles=2");
+  }
+
+  void run() override {
+    const ReproduceJob job = resolve();
+    ProgressLine progress;
+    const ReproduceResult result = simulate_reproduction(job, progress);
+    const Reproduction reproduction = reproduction_of(result);
+    write_files(job, reproduction);
+    if (job.json) {
+      const std::string text = json_text(reproduction_json(reproduction));
+      if (*job.json == "-") {
+        std::cout << text;
+      } else {
+        write_output_file(*job.json, text, "--json");
+      }
+    }
+    if (job.json != "-") print(job, reproduction);
+    // Not before all of it is safe.
+    std::cout.flush();
+    if (std::cout) result.journal->finish();
+  }
+
+ private:
+  ReproduceJob resolve() const {
+    ReproduceJob job;
+    job.provenance = make_provenance(command_line(), {});
+    job.options.quick = quick_;
+    job.options.substitutions = scenes_;
+    for (const SceneSubstitution& file : scene_substitutions(scenes_, "--scene")) {
+      const std::filesystem::path path = gaussian_file_path(file.file);
+      std::error_code ignored;
+      if (!std::filesystem::exists(path, ignored)) {
+        throw UserError("cannot read scene", "--scene " + file.name + "=" + file.file, "there is no such file",
+                        "name a file of Gaussians");
+      }
+      job.inputs.push_back({"--scene", path});
+    }
+    for (const std::string& text : cameras_) {
+      job.options.cameras.push_back(camera_of_scene(text));
+      const std::string& camera = job.options.cameras.back().second;
+      static_cast<void>(camera_from_file(camera));
+      for (const auto& file : camera_files(camera_choice(camera).file)) job.inputs.push_back({"--camera", file});
+    }
+    if (const auto text = single(size_, "--size")) job.size = parse_size(*text, "--size");
+    if (const auto text = single(views_, "--views")) job.options.views = parse_count(*text, "--views", most_views);
+    RunRequest& base = job.options.base;
+    const auto platform = single(platform_, "--platform");
+    base.platform = platform ? &platform_named(*platform) : &platforms().front();
+    base.variant = variant_named("het+qm");
+    if (const auto name = single(fidelity_, "--fidelity")) {
+      job.options.fidelity = fidelity_named(*name);
+      if (*job.options.fidelity < Fidelity::lt) {
+        throw UserError("bad value '" + *name + "'", "--fidelity", "speed-ups need the time of every unit",
+                        "give lt, at or cycle");
+      }
+    }
+    for (const std::string& text : settings_) base.settings.push_back(parse_setting(text));
+    check_configuration(base);
+    job.json = single(json_, "--json");
+    const auto path = [](const Values& values, const char* option) {
+      const auto text = single(values, option);
+      return text ? std::optional<std::filesystem::path>(*text) : std::nullopt;
+    };
+    job.html = path(html_, "--html");
+    job.markdown = path(markdown_, "--markdown");
+    job.output = path(output_, "--output");
+    job.journal = path(journal_, ReproduceJob::journal_option);
+    const auto jobs = single(jobs_, "--jobs");
+    job.processes = jobs ? parse_count(*jobs, "--jobs", 1024) : std::max(1U, std::thread::hardware_concurrency());
+    return job;
+  }
+
+  static void write_files(const ReproduceJob& job, const Reproduction& of) {
+    if (job.html) write_output_file(*job.html, reproduction_page(of), "--html");
+    if (job.markdown) write_output_file(*job.markdown, reproduction_markdown(of), "--markdown");
+    if (!job.output) return;
+    for (const SceneFinding& scene : of.findings.scenes) {
+      for (const PointResult* point : {scene.map_without, scene.map_with}) {
+        const std::string file =
+            "fragments-" + of.result.plan.scenes[scene.scene].name + "-" + point->run.request.variant.name + ".png";
+        write_output_file(*job.output / file, point->map->png, "--output");
+      }
+    }
+  }
+
+  static void print(const ReproduceJob& job, const Reproduction& of) {
+    std::cout << reproduction_text(of, stdout_style());
+    const ReproduceResult& result = of.result;
+    std::cout << fmt::format("\ntook {:.0f} s to simulate {} in {} process{}", result.seconds,
+                             result.points.size() - result.done_before, result.processes,
+                             result.processes == 1 ? "" : "es at a time");
+    if (result.done_before > 0) std::cout << fmt::format("; {} were done before", result.done_before);
+    std::cout << '\n';
+    if (job.json) std::cout << "result: " << printable(*job.json) << '\n';
+    if (job.html) std::cout << "page: " << printable(job.html->string()) << '\n';
+    if (job.markdown) std::cout << "documentation: " << printable(job.markdown->string()) << '\n';
+    if (job.output) std::cout << "heat maps: " << printable(job.output->string()) << '\n';
+  }
+
+  Values scenes_, cameras_, size_, views_, platform_, settings_, fidelity_;
+  Values output_, json_, html_, markdown_, journal_, jobs_;
+  bool quick_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_reproduce_command() { return std::make_unique<ReproduceCommand>(); }
+
+}  // namespace vrpipe::tools

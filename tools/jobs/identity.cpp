@@ -1,0 +1,54 @@
+#include "jobs/identity.h"
+
+#include <sha2.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <system_error>
+#include <vector>
+
+#include <vrpipe/component/printable.h>
+#include <vrpipe/workloads/gaussian_file.h>
+#include <vrpipe/workloads/scene_substitution.h>
+
+namespace vrpipe::tools {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+json file_identity(const std::string& name) {
+  std::error_code ignored;
+  const fs::path path = fs::weakly_canonical(name, ignored);
+  const auto of_file = [](const fs::path& file) {
+    struct stat status {};
+    if (::stat(file.c_str(), &status) != 0) return json();
+    return json{{"path", valid_utf8(file.string())},
+                {"bytes", status.st_size},
+                {"modified", {status.st_mtim.tv_sec, status.st_mtim.tv_nsec}}};
+  };
+  if (!fs::is_directory(path, ignored)) return of_file(path);
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::recursive_directory_iterator(path, ignored)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  json all = json::array();
+  for (const fs::path& file : files) all.push_back(of_file(file));
+  return all;
+}
+
+json scene_identity(const std::string& scene) {
+  json identity = file_identity(gaussian_file_path(scene_file(scene)));
+  if (!identity.is_object()) identity = {{"files", identity}};
+  identity["scene"] = valid_utf8(scene);
+  return identity;
+}
+
+std::string sha256(const std::string& text) {
+  std::array<char, SHA256_DIGEST_STRING_LENGTH> digits{};
+  ::SHA256Data(reinterpret_cast<const std::uint8_t*>(text.data()), text.size(), digits.data());
+  return digits.data();
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,250 @@
+#include "jobs/reproduce_findings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "jobs/paper_rows.h"
+
+namespace vrpipe::tools {
+namespace {
+
+double quotient(std::uint64_t over, std::uint64_t under) {
+  if (under == 0) return std::numeric_limits<double>::quiet_NaN();
+  return static_cast<double>(over) / static_cast<double>(under);
+}
+
+double speedup(const RunResult& baseline, const RunResult& run) {
+  return baseline.counts.fragments_rasterized == 0 ? std::numeric_limits<double>::quiet_NaN()
+                                                   : quotient(baseline.cycles.value_or(0), run.cycles.value_or(0));
+}
+
+std::vector<double> each(const std::vector<Gains>& all, double Gains::*what) {
+  std::vector<double> values;
+  for (const Gains& gains : all) values.push_back(gains.*what);
+  return values;
+}
+
+std::array<const PointResult*, 4> runs_of(const ReproduceResult& result, PointKey key) {
+  std::array<const PointResult*, 4> runs{};
+  constexpr std::array<const char*, 4> variants{"baseline", "qm", "het", "het+qm"};
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    key.variant = variants[i];
+    runs[i] = &result.at(key);
+  }
+  return runs;
+}
+
+Gains gains_of(const std::array<const PointResult*, 4>& points) {
+  const RunResult& baseline = points[0]->run;
+  const RunResult& qm = points[1]->run;
+  const RunResult& het = points[2]->run;
+  const RunResult& both = points[3]->run;
+  Gains gains;
+  gains.qm = speedup(baseline, qm);
+  gains.het = speedup(baseline, het);
+  gains.het_qm = speedup(baseline, both);
+  gains.fragments_het = quotient(baseline.counts.fragments_blended, het.counts.fragments_blended);
+  gains.fragments_merging = quotient(het.counts.fragments_blended, both.counts.fragments_blended);
+  gains.quads_het = quotient(baseline.counts.quads_blended, het.counts.quads_blended);
+  gains.quads_merging = quotient(het.counts.quads_blended, both.counts.quads_blended);
+  gains.quads_qm = quotient(baseline.counts.quads_blended, qm.counts.quads_blended);
+  gains.lanes_baseline = quotient(baseline.counts.fragments_blended, baseline.counts.quads_blended);
+  gains.lanes_het = quotient(het.counts.fragments_blended, het.counts.quads_blended);
+  return gains;
+}
+
+double ratio_of(const ReproduceResult& result, PointKey key) {
+  key.fidelity = Fidelity::functional;
+  key.variant = "baseline";
+  const std::uint64_t without = result.at(key).run.counts.fragments_blended;
+  key.variant = "het";
+  return quotient(without, result.at(key).run.counts.fragments_blended);
+}
+
+SceneFinding scene_finding(const ReproduceResult& result, std::size_t scene) {
+  const ReproducePlan& plan = result.plan;
+  SceneFinding finding;
+  finding.scene = scene;
+  PointKey key;
+  key.scene = scene;
+  key.fidelity = plan.fidelity;
+  finding.runs = runs_of(result, key);
+  finding.gains = gains_of(finding.runs);
+  if (plan.scenes[scene].is_large) return finding;
+  std::vector<std::optional<double>> ratios;
+  for (key.view = 0; key.view < plan.views; ++key.view) {
+    finding.ratios.push_back(ratio_of(result, key));
+    if (std::isfinite(finding.ratios.back())) ratios.emplace_back(finding.ratios.back());
+  }
+  key.view = 0;
+  finding.ratio_distribution = distribution_of(ratios);
+  finding.ratio_mean = mean_of(finding.ratios).arithmetic;
+  key.fidelity = Fidelity::functional;
+  key.variant = "baseline";
+  finding.map_without = &result.at(key);
+  key.variant = "het";
+  finding.map_with = &result.at(key);
+  key.fidelity = sensitivity_fidelity;
+  const RunResult& het = result.at(key).run;
+  key.variant = "baseline";
+  const RunResult& one_pass = result.at(key).run;
+  finding.het_beside_passes = speedup(one_pass, het);
+  for (const unsigned passes : planned_passes(plan.quick)) {
+    key.passes = passes;
+    finding.passes.push_back(speedup(one_pass, result.at(key).run));
+  }
+  return finding;
+}
+
+StudyPoint study(const ReproduceResult& result, const std::vector<std::size_t>& scenes, Extent extent,
+                 Fidelity fidelity, const std::string& settings) {
+  std::vector<Gains> all;
+  std::vector<double> both;
+  for (const std::size_t scene : scenes) {
+    PointKey key;
+    key.scene = scene;
+    key.extent = extent;
+    key.fidelity = fidelity;
+    key.settings = settings;
+    all.push_back(gains_of(runs_of(result, key)));
+    both.push_back(all.back().quads_het * all.back().quads_merging);
+  }
+  StudyPoint point;
+  point.settings = settings;
+  point.qm = mean_of(each(all, &Gains::qm));
+  point.het = mean_of(each(all, &Gains::het));
+  point.het_qm = mean_of(each(all, &Gains::het_qm));
+  for (const Gains& gains : all) point.qm_best = std::max(point.qm_best, gains.qm);
+  point.quads_het = mean_of(each(all, &Gains::quads_het)).arithmetic;
+  point.quads_het_qm = mean_of(both).arithmetic;
+  return point;
+}
+
+void find_sensitivity(const ReproduceResult& result, Findings& findings) {
+  const ReproducePlan& plan = result.plan;
+  const auto at = [&](Breadth breadth, const std::string& settings) {
+    return study(result, plan.scenes_of(breadth), ReproducePlan::extent_of(breadth), sensitivity_fidelity, settings);
+  };
+  findings.efficiency.push_back(at(Breadth::headline, ""));
+  for (const SensitivityParameter& parameter : plan.parameters) {
+    SensitivityFinding finding{parameter, at(parameter.breadth, parameter.base), {}, 0};
+    double least = finding.at_default.het_qm.arithmetic, greatest = least;
+    for (const std::string& value : parameter.values) {
+      finding.values.push_back(at(parameter.breadth, joined_settings(parameter.base, value)));
+      least = std::min(least, finding.values.back().het_qm.arithmetic);
+      greatest = std::max(greatest, finding.values.back().het_qm.arithmetic);
+      if (parameter.breadth == Breadth::headline) findings.efficiency.push_back(finding.values.back());
+    }
+    finding.spread_percent = 100 * (greatest - least) / finding.at_default.het_qm.arithmetic;
+    findings.sensitivity.push_back(std::move(finding));
+  }
+  for (const std::string& settings : efficiency_settings()) {
+    PointKey key;
+    key.scene = plan.indoor;
+    key.fidelity = sensitivity_fidelity;
+    key.settings = settings;
+    key.variant = "het+qm";
+    if (plan.places.count(key.name(plan.scenes)) == 0) continue;
+    findings.indoor_efficiency.push_back(study(result, {plan.indoor}, Extent::full, sensitivity_fidelity, settings));
+  }
+  std::stable_sort(findings.sensitivity.begin(), findings.sensitivity.end(),
+                   [](const auto& a, const auto& b) { return a.spread_percent > b.spread_percent; });
+  if (plan.quick || plan.fidelity == sensitivity_fidelity) return;
+  for (const std::string& settings : checked_settings()) {
+    PointKey key;
+    key.scene = plan.column;
+    key.fidelity = sensitivity_fidelity;
+    key.settings = settings;
+    if (plan.places.count(key.name(plan.scenes)) == 0) continue;
+    const std::vector<std::size_t> one{plan.column};
+    findings.checks.push_back({settings, study(result, one, Extent::full, sensitivity_fidelity, settings),
+                               study(result, one, Extent::full, plan.fidelity, settings)});
+  }
+}
+
+FragmentFinding fragment_finding(const ReproduceResult& result, const std::vector<std::size_t>& scenes,
+                                 const std::string& name, const PointKey& of) {
+  std::vector<double> fragments, quads;
+  for (const std::size_t scene : scenes) {
+    PointKey key = of;
+    key.scene = scene;
+    key.variant = "baseline";
+    const Counts& without = result.at(key).run.counts;
+    key.variant = "het";
+    const Counts& with = result.at(key).run.counts;
+    fragments.push_back(quotient(without.fragments_blended, with.fragments_blended));
+    quads.push_back(quotient(without.quads_blended, with.quads_blended));
+  }
+  FragmentFinding finding{name, mean_of(fragments).arithmetic, mean_of(quads).arithmetic, 0};
+  finding.fall_percent = 100 * (1 - finding.quads / finding.fragments);
+  return finding;
+}
+
+void find_fragments(const ReproduceResult& result, Findings& findings) {
+  const ReproducePlan& plan = result.plan;
+  PointKey key;
+  key.fidelity = plan.fidelity;
+  const auto add = [&](const std::vector<std::size_t>& scenes, const std::string& name) {
+    findings.fragments.push_back(fragment_finding(result, scenes, name, key));
+  };
+  add(plan.paper_scenes(), "main comparison");
+  key.fidelity = Fidelity::functional;
+  add(plan.paper_scenes(), "no late updates (functional)");
+  key.extent = Extent::half;
+  add(plan.paper_scenes(), "smaller splats: images of half the width");
+  key.extent = Extent::quarter;
+  add(plan.paper_scenes(), "smaller splats: images of a quarter of the width");
+  key.extent = Extent::full;
+  for (const std::size_t scene : plan.paper_scenes()) add({scene}, plan.scenes[scene].name + " alone");
+  if (plan.studied.size() > 1) add(plan.studied, "the scenes of what follows");
+  for (const std::string& settings : plan.fragment_settings) {
+    key.settings = settings;
+    add(plan.studied, settings);
+  }
+  // Other ways to count the same runs: what is pruned counts without termination, and not with it.
+  std::vector<double> fragments, quads;
+  for (const SceneFinding& scene : findings.scenes) {
+    const Counts& without = scene.runs[0]->run.counts;
+    const Counts& with = scene.runs[2]->run.counts;
+    fragments.push_back(quotient(without.fragments_rasterized, with.fragments_blended));
+    quads.push_back(quotient(without.quads_blended, with.quads_blended));
+  }
+  FragmentFinding counted{"counted: rasterised fragments over HET's blended", mean_of(fragments).arithmetic,
+                          mean_of(quads).arithmetic, 0};
+  counted.fall_percent = 100 * (1 - counted.quads / counted.fragments);
+  findings.fragments.push_back(counted);
+}
+
+}  // namespace
+
+Mean mean_of(const std::vector<double>& values) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  std::vector<std::optional<double>> there;
+  for (const double value : values) {
+    if (!std::isfinite(value) || value <= 0) return {nan, nan};
+    there.emplace_back(value);
+  }
+  if (values.empty()) return {nan, nan};
+  return {std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size()),
+          distribution_of(there)->geometric_mean};
+}
+
+double paper_het_efficiency() { return paper_row("R4").number / paper_row("R7").number; }
+double paper_het_qm_efficiency() { return paper_row("R2").number / (paper_row("R7").number * paper_row("R8").number); }
+double paper_fragment_fall_percent() { return 100 * (1 - paper_row("R7").number / paper_row("R5").number); }
+
+Findings find(const ReproduceResult& result) {
+  const ReproducePlan& plan = result.plan;
+  Findings findings;
+  for (std::size_t scene = 0; scene < plan.scenes.size(); ++scene) {
+    (plan.scenes[scene].is_large ? findings.large : findings.scenes).push_back(scene_finding(result, scene));
+  }
+  findings.main = study(result, plan.paper_scenes(), Extent::full, plan.fidelity, "");
+  find_sensitivity(result, findings);
+  find_fragments(result, findings);
+  return findings;
+}
+
+}  // namespace vrpipe::tools

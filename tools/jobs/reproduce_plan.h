@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <vrpipe/platforms/simulation.h>
+
+#include "jobs/sensitivity_table.h"
+
+namespace vrpipe::tools {
+
+/// What of a scene's image is drawn.
+enum class Extent {
+  full,
+  column,  ///< the eighth of the width that is in the middle, as it is in the whole
+  half,    ///< all of it, in half the pixels a side, so that splats are smaller
+  quarter
+};
+const char* name_of(Extent extent);
+
+/// A scene that stands for one of the paper's.
+struct PlannedScene {
+  std::string name;                   ///< of the built-in one, without "builtin:"
+  std::string request;                ///< SceneRequest::scene: builtin:NAME, or NAME=FILE
+  std::optional<std::string> camera;  ///< SceneRequest::camera
+  bool is_large = false;              ///< Building, Rubble: beside the paper's six
+};
+
+/// What tells one simulation from the others.
+struct PointKey {
+  std::size_t scene = 0;  ///< in ReproducePlan::scenes
+  Extent extent = Extent::full;
+  std::size_t view = 0;  ///< 0: the scene's own camera
+  unsigned passes = 1;
+  Fidelity fidelity = Fidelity::cycle;
+  std::string settings;  ///< as SensitivityParameter::values
+  std::string variant = "baseline";
+
+  std::string name(const std::vector<PlannedScene>& scenes) const;
+};
+
+struct ReproducePoint {
+  PointKey key;
+  RunRequest request;
+  bool with_map = false;  ///< fragments blended are counted for each pixel
+};
+
+/// A setting that is not tried, since the platform does not know it.
+struct SkippedSetting {
+  std::string settings;
+  std::string reason;
+};
+
+struct ReproduceOptions {
+  bool quick = false;
+  std::optional<std::size_t> views;                          ///< of each scene; none: as many as there is time for
+  std::vector<std::pair<std::string, std::string>> cameras;  ///< scene and SceneRequest::camera
+  std::vector<std::string> substitutions;                    ///< NAME=FILE
+  RunRequest base;                                           ///< platform, settings and so on of every point
+  std::optional<Fidelity> fidelity;  ///< of the main comparison; none: as exact as there is time for
+};
+
+/// Everything that `reproduce` simulates, in the order in which it does.
+struct ReproducePlan {
+  std::vector<PlannedScene> scenes;  ///< the paper's six, then the large ones
+  std::vector<std::size_t> studied;  ///< scenes of Breadth::headline
+  std::size_t indoor = 0;            ///< the scene of efficiency_settings()
+  std::size_t column = 0;            ///< the scene of Breadth::open
+  bool quick = false;
+  std::size_t views = 0;  ///< of each of the six scenes
+  Fidelity fidelity = Fidelity::cycle;
+  std::vector<ReproducePoint> points;
+  std::map<std::string, std::size_t> places;     ///< of the points, by the names of their keys
+  std::vector<SensitivityParameter> parameters;  ///< that are varied, with the values that the platform knows
+  std::vector<std::string> fragment_settings;    ///< that could move fragments a quad
+  std::vector<SkippedSetting> skipped;
+
+  /// The scenes of a parameter's points, and what of them is drawn.
+  std::vector<std::size_t> scenes_of(Breadth breadth) const;
+  static Extent extent_of(Breadth breadth);
+  /// The six.
+  std::vector<std::size_t> paper_scenes() const;
+};
+
+/// Of the sensitivity; a few of its points are repeated at the fidelity of the main comparison.
+constexpr Fidelity sensitivity_fidelity = Fidelity::lt;
+/// Settings of those.
+const std::vector<std::string>& checked_settings();
+/// What could keep HET+QM from what its quads suggest, tried on an indoor scene, which CROP bounds; not in a quick look.
+const std::vector<std::string>& efficiency_settings();
+/// Beside one.
+const std::vector<unsigned>& planned_passes(bool quick);
+
+/// Throws UserError.
+ReproducePlan plan_reproduction(const ReproduceOptions& options);
+
+}  // namespace vrpipe::tools

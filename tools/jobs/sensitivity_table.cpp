@@ -1,0 +1,148 @@
+#include "jobs/sensitivity_table.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include <vrpipe/component/error.h>
+
+namespace vrpipe::tools {
+namespace {
+
+constexpr const char* lpddr3 = "platform=agx-orin-lpddr3";
+
+std::vector<SensitivityParameter> headline() {
+  const auto of = [](const char* name, std::size_t quick, std::vector<std::string> values) {
+    return SensitivityParameter{name, Breadth::headline, std::move(values), "", quick};
+  };
+  return {
+      of("raster.screen_tile_interval_cycles", 3,
+         {"raster.screen_tile_interval_cycles=2", "raster.screen_tile_interval_cycles=3",
+          "raster.screen_tile_interval_cycles=5", "raster.screen_tile_interval_cycles=1.5"}),
+      of("memory", 1, {"platform=agx-orin-lpddr3", "platform=agx-orin-lpddr5"}),
+      of("wait of a line that comes back", 2,
+         {"crop.line_return_cycles=150,zrop.line_return_cycles=150",
+          "crop.line_return_cycles=500,zrop.line_return_cycles=500"}),
+      of("tc.bins", 2, {"tc.bins=16", "tc.bins=64"}),
+      of("state.termination_threshold", 2, {"state.termination_threshold=0.98", "state.termination_threshold=0.9999"}),
+      of("qru.quads_per_cycle", 1, {"qru.quads_per_cycle=4", "qru.quads_per_cycle=3", "qru.quads_per_cycle=16"}),
+      of("prop.quads_per_cycle", 1, {"prop.quads_per_cycle=4", "prop.quads_per_cycle=6", "prop.quads_per_cycle=8"}),
+      of("raster.setup_interval_cycles", 0, {"raster.setup_interval_cycles=2", "raster.setup_interval_cycles=4"}),
+      of("tgc.entries_per_cycle", 0, {"tgc.entries_per_cycle=1"}),
+      of("tgc.bins", 0, {"tgc.bins=32", "tgc.bins=512"}),
+      of("tgc.grid_tiles", 0, {"tgc.grid_tiles=2", "tgc.grid_tiles=8"}),
+      of("sm.merge_instructions", 0, {"sm.merge_instructions=26"}),
+  };
+}
+
+std::vector<SensitivityParameter> open() {
+  std::vector<SensitivityParameter> all;
+  const auto of = [&](const std::string& name, const std::vector<std::string>& values, const char* base = "") {
+    SensitivityParameter parameter{name, Breadth::open, {}, base, 0};
+    for (const std::string& value : values) parameter.values.push_back(parameter.name + "=" + value);
+    all.push_back(parameter);
+  };
+  of("tgc.latency_cycles", {"1", "40"});
+  of("tc.quads_per_cycle", {"8"});
+  of("tc.latency_cycles", {"1", "40"});
+  of("tc.flush_queue_bins", {"1", "8"});
+  of("prop.latency_cycles", {"1", "40"});
+  of("zrop.latency_cycles", {"1", "80"});
+  of("zrop.updates_per_cycle", {"4"});
+  of("zrop.input_updates", {"8"}, lpddr3);
+  of("zrop.replacement", {"fifo"}, lpddr3);
+  of("zrop.hash_sets", {"on"}, lpddr3);
+  of("qru.latency_cycles", {"1", "40"});
+  of("sm.vertex_warps", {"8", "128"});
+  of("sm.vertex_instructions", {"10", "80"});
+  of("sm.fragment_instructions", {"12", "48"});
+  of("sm.merge_latency_cycles", {"0", "120"});
+  of("sm.attribute_buffer_bytes", {"262144"}, lpddr3);
+  of("sm.attribute_writes", {"80"}, lpddr3);
+  of("crop.latency_cycles", {"1", "40"});
+  of("crop.forwarding", {"off"});
+  of("crop.replacement", {"fifo", "random", "tree-plru"});
+  of("crop.hash_sets", {"on"});
+  of("sm.l1_ways", {"4"}, lpddr3);
+  of("l1.replacement", {"fifo"}, lpddr3);
+  of("l1.hash_sets", {"on"}, lpddr3);
+  of("l1.write_backs", {"8"}, lpddr3);
+  of("l1.bytes_per_cycle", {"64"}, lpddr3);
+  of("l1.port_requests", {"64"}, lpddr3);
+  of("l1.arbitration", {"oldest"}, lpddr3);
+  of("l1.write_allocate", {"byte-mask"}, lpddr3);
+  of("l1.hold_attributes", {"on"}, lpddr3);
+  of("l2.bytes_per_cycle", {"64", "256"});
+  of("l2.replacement", {"fifo"}, lpddr3);
+  of("l2.hash_sets", {"on"}, lpddr3);
+  of("l2.write_policy", {"write-through"}, lpddr3);
+  of("l2.write_allocate", {"byte-mask"}, lpddr3);
+  of("l2.write_backs", {"8"}, lpddr3);
+  of("l2.mshrs", {"16"}, lpddr3);
+  of("l2.arbitration", {"oldest"}, lpddr3);
+  of("dram.age_cap_cycles", {"128"}, lpddr3);
+  of("dram.port_requests", {"16"}, lpddr3);
+  of("state.exponential", {"exact", "fp16", "table256", "table16"});
+  of("state.blend_rounding", {"rtz", "measured"});
+  of("state.obb_padding", {"0", "4"});
+  for (const char* link :
+       {"draw.vertices", "sm.vertices", "vpo.primitives", "tgc.jobs", "raster.quads", "tc.bins", "prop.test",
+        "zrop.quads", "prop.survivors", "qru.warps", "sm.shaded", "prop.release", "prop.color", "crop.terminations"}) {
+    of(std::string("link.") + link + ".depth", {"2", "128"});
+  }
+  return all;
+}
+
+/// "UNIT.PARAMETER=VALUE"; a unit may have dots.
+Setting setting_of(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const std::size_t dot = text.rfind('.', equals);
+  return {text.substr(0, dot), text.substr(dot + 1, equals - dot - 1), text.substr(equals + 1)};
+}
+
+}  // namespace
+
+const std::vector<SensitivityParameter>& sensitivity_parameters() {
+  static const std::vector<SensitivityParameter> all = [] {
+    std::vector<SensitivityParameter> parameters = headline();
+    const std::vector<SensitivityParameter> more = open();
+    parameters.insert(parameters.end(), more.begin(), more.end());
+    return parameters;
+  }();
+  return all;
+}
+
+const std::vector<NotVaried>& parameters_not_varied() {
+  static const std::vector<NotVaried> all{
+      {"*.random_seed", "tells only with random replacement, which is tried"},
+      {"sm.mesh_instructions", "there are no meshes"},
+      {"sm.alpha_threshold_instructions", "of software termination alone"},
+      {"link.prop.late.depth", "of tests after shading, which these frames do not have"},
+      {"link.zrop.late.depth", "of tests after shading, which these frames do not have"},
+      {"link.zrop.hi_z.depth", "of Hi-Z, which frames without depth do not have"},
+      {"link.crop.done.depth", "of barriers between draws, which these frames do not have"},
+  };
+  return all;
+}
+
+std::string joined_settings(const std::string& base, const std::string& more) {
+  return base.empty() || more.empty() ? base + more : base + "," + more;
+}
+
+RunRequest with_settings(RunRequest request, const std::string& settings) {
+  for (std::size_t start = 0; start < settings.size();) {
+    const std::size_t end = std::min(settings.find(',', start), settings.size());
+    const std::string text = settings.substr(start, end - start);
+    start = end + 1;
+    if (text.rfind("platform=", 0) == 0) {
+      request.platform = &platform_named(text.substr(text.find('=') + 1));
+    } else if (text.rfind("termination=", 0) == 0) {
+      request.termination = termination_named(text.substr(text.find('=') + 1));
+    } else {
+      request.settings.push_back(setting_of(text));
+    }
+  }
+  check_configuration(request);
+  return request;
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,72 @@
+#include "output/reproduce_report.h"
+
+#include <cstddef>
+
+#include <fmt/format.h>
+
+#include "output/reproduce_answers.h"
+#include "output/text_table.h"
+
+namespace vrpipe::tools {
+namespace {
+
+constexpr std::size_t width = 80;
+
+std::string paragraph(const std::string& text, std::size_t indent = 0) {
+  std::string lines;
+  for (const std::string& line : wrapped(text, width - indent)) lines += std::string(indent, ' ') + line + "\n";
+  return lines;
+}
+
+/// Two lines or more: what was found, and under it what of and why.
+std::string row_text(const Reproduction& of, const RowFinding& finding, const TextStyle& style) {
+  const PaperRow& row = *finding.row;
+  const std::string verdict = fmt::format("{:20}", verdict_text(of, finding));
+  std::string text = fmt::format("{:4}{}{:24}", row.id,
+                                 finding.verdict == Verdict::agrees    ? style.good(verdict)
+                                 : finding.verdict == Verdict::differs ? style.bold(verdict)
+                                                                       : style.dim(verdict),
+                                 row.value);
+  const std::string measured = finding.measured.empty() ? "-" : finding.measured;
+  const std::string difference = difference_text(finding);
+  const bool is_short = measured.size() + difference.size() < 30;
+  text += (is_short ? measured + (difference.empty() ? "" : ", " + difference) : difference) + "\n";
+  constexpr std::size_t indent = 4;
+  text += style.dim(paragraph(fmt::format("{}; paper {}", row.what, row.where), indent));
+  if (!is_short) text += paragraph(measured, indent);
+  if (!finding.reason.empty()) text += paragraph(finding.reason, indent);
+  return text;
+}
+
+std::string table_text(const ReportTable& table, const TextStyle& style) {
+  TextTable text(table.heading);
+  const bool has_words = table.heading.back() == "values";
+  for (const auto& row : table.rows) text.row(row);
+  if (has_words) {
+    text.left(table.heading.size() - 1);
+    text.wrap(width + 20);
+  }
+  std::string all = style.bold(table.title) + "\n" + text.text(style);
+  if (!table.note.empty()) all += paragraph(table.note);
+  return all;
+}
+
+}  // namespace
+
+std::string reproduction_text(const Reproduction& of, const TextStyle& style) {
+  std::string text = style.bold("The paper's results, reproduced") + "\n";
+  for (const std::string& line : reproduction_heading(of)) text += paragraph(line);
+  text += "\n";
+  for (const RowFinding& row : of.rows) text += row_text(of, row, style);
+  text += "\n" + style.bold(verdict_summary(of)) + "\n";
+  for (const ReportTable& table : all_tables(of)) text += "\n" + table_text(table, style);
+  for (const Answer& answer : answers(of)) {
+    text += "\n" + style.bold(answer.question) + "\n" + paragraph(answer.text);
+  }
+  for (const SkippedSetting& skipped : of.result.plan.skipped) {
+    text += paragraph(fmt::format("not tried: {}: {}", skipped.settings, skipped.reason));
+  }
+  return text;
+}
+
+}  // namespace vrpipe::tools
