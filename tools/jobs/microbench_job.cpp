@@ -336,6 +336,12 @@ void crop_cache(Bench& bench) {
     if (blend) {
       bench.figure("a quad on the same place, blending", at(1));
       bench.figure("return of a line, 64 tiles in turn, blending", at(64));
+      const auto found = std::find_if(returns.begin(), returns.end(),
+                                      [](const Return& each) { return each.blend && each.tiles == 64; });
+      const double bytes = found->slope.per_item("crop.cache.bytes_filled") +
+                           found->slope.per_item("crop.cache.bytes_written_back") +
+                           found->slope.per_item("crop.cache.sectors_fetched_again") * sector_bytes;
+      bench.figure("sectors moved for a quad, 64 tiles in turn", bytes / sector_bytes / 64);
     } else {
       bench.figure("a quad on 64 tiles in turn, no blending", at(64) / 64);
     }
@@ -430,7 +436,7 @@ void kill_rate(Bench& bench) {
   const Kill all[] = {{"stencil, 64x64", KilledBy::stencil, 64}, {"stencil, 16x16", KilledBy::stencil, 16},
                       {"stencil, 2x2", KilledBy::stencil, 2},    {"depth without Hi-Z, 64x64", KilledBy::depth, 64},
                       {"Hi-Z, 64x64", KilledBy::hi_z, 64},       {"Hi-Z, 16x16", KilledBy::hi_z, 16},
-                      {"shader, 64x64", KilledBy::shader, 64}};
+                      {"shader, 64x64", KilledBy::shader, 64},   {"shader, 2x2", KilledBy::shader, 2}};
   const auto quads_of = [](const Kill& kill) { return kill.side * kill.side / 4; };
   std::vector<Slope> rates;
   for (const Kill& kill : all) {

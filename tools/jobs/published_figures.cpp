@@ -108,7 +108,9 @@ const std::vector<PublishedFigure>& published_figures() {
        "the simulator forwards a blend to the next, or waits crop.latency_cycles"},
       {"crop-cache", "return of a line, 64 tiles in turn, blending", "clk", none, 496.8, GpuScope::gpc, 10,
        "crop2.json, one_rect_per_tile, K = 64: clk a rectangle times K",
-       "the simulator has no wait for a line that comes back after a flush"},
+       "crop.line_return_cycles is 0 where the paper is silent"},
+      {"crop-cache", "sectors moved for a quad, 64 tiles in turn", "sectors", none, 3.0, GpuScope::partition, 5,
+       "crop2.json, one_rect_per_tile 2x2, less the 9.6 of its vertices: read twice, written once", ""},
       {"crop-cache", "a quad on 64 tiles in turn, no blending", "clk", none, 4.18, GpuScope::gpc, 10,
        "crop2.json, one_rect_per_tile, blend off, K = 64", "its front end takes 4.2 clk a rectangle"},
 
@@ -146,6 +148,8 @@ const std::vector<PublishedFigure>& published_figures() {
       {"kill-rate", "Hi-Z, 16x16", "quads/clk", none, 6.00, GpuScope::gpc, 5,
        "kill.json, depth_kill_all_fail_cleared 16", ""},
       {"kill-rate", "shader, 64x64", "quads/clk", none, 3.18, GpuScope::gpc, 5, "rop.json, no_rop, discard_all 64", ""},
+      {"kill-rate", "shader, 2x2", "quads/clk", none, 0.192, GpuScope::gpc, 5,
+       "5.1 to 5.3 clk a (primitive, screen tile) visit of a program that discards", ""},
   };
   return all;
 }
