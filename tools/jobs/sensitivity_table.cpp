@@ -63,14 +63,6 @@ std::vector<SensitivityParameter> open() {
   of("crop.replacement", {"fifo", "random", "tree-plru"});
   of("crop.hash_sets", {"on"});
   of("sm.l1_ways", {"4"}, lpddr3);
-  of("l1.replacement", {"fifo"}, lpddr3);
-  of("l1.hash_sets", {"on"}, lpddr3);
-  of("l1.write_backs", {"8"}, lpddr3);
-  of("l1.bytes_per_cycle", {"64"}, lpddr3);
-  of("l1.port_requests", {"64"}, lpddr3);
-  of("l1.arbitration", {"oldest"}, lpddr3);
-  of("l1.write_allocate", {"byte-mask"}, lpddr3);
-  of("l1.hold_attributes", {"on"}, lpddr3);
   of("l2.bytes_per_cycle", {"64", "256"});
   of("l2.replacement", {"fifo"}, lpddr3);
   of("l2.hash_sets", {"on"}, lpddr3);
@@ -116,6 +108,7 @@ const std::vector<NotVaried>& parameters_not_varied() {
       {"*.random_seed", "tells only with random replacement, which is tried"},
       {"sm.mesh_instructions", "there are no meshes"},
       {"sm.alpha_threshold_instructions", "of software termination alone"},
+      {"l1.*", "the slot is empty on these platforms; --unit l1=NAME puts a cache there"},
       {"link.prop.late.depth", "of tests after shading, which these frames do not have"},
       {"link.zrop.late.depth", "of tests after shading, which these frames do not have"},
       {"link.zrop.hi_z.depth", "of Hi-Z, which frames without depth do not have"},

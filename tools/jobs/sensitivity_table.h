@@ -27,7 +27,7 @@ const std::vector<SensitivityParameter>& sensitivity_parameters();
 
 /// A parameter that the paper leaves open and that is not varied, and why.
 struct NotVaried {
-  std::string name;  ///< of a parameter; what follows a * may be anything before it
+  std::string name;  ///< of a parameter; a * stands for any unit or any parameter
   std::string reason;
 };
 const std::vector<NotVaried>& parameters_not_varied();

@@ -316,9 +316,9 @@ ReportTable sensitivity_table(const Reproduction& of) {
         {name, number(finding.spread_percent, "{:.1f}"), times(finding.at_default.het_qm.arithmetic), values});
   }
   table.note = fmt::format(
-      "One at a time, at {}. With a star: {}, whole images; else the eighth of the width in the middle of {}. Spread: "
-      "greatest "
-      "less least, of the default.",
+      "One at a time, at {}. With a star: {}, whole images; else the eighth of the width in the middle of {}. In so "
+      "narrow an image "
+      "few tiles take turns, so that CROP's cache and hazards weigh more. Spread: greatest less least, of the default.",
       vrpipe::name_of(sensitivity_fidelity), studied_names(plan), plan.scenes[plan.column].name);
   return table;
 }
@@ -381,8 +381,8 @@ ReportTable efficiency_table(const Reproduction& of) {
       {"paper", "1.49x", "1.80x", "2.07x", percent(paper_het_efficiency()), percent(paper_het_qm_efficiency()), ""});
   table.note = fmt::format(
       "Those with settings, and with the defaults, at {}. Mean speed-up over the mean of the baseline's quads over the "
-      "variant's. Fits: "
-      "both within {} points of the paper's.",
+      "variant's. "
+      "Fits: both within {} points of the paper's.",
       vrpipe::name_of(sensitivity_fidelity), near_points);
   return table;
 }
