@@ -132,6 +132,11 @@ class TimedCrop : public TimedUnit {
                              : hazard_until(warp.tile, warp.position[from]);
     // Moving a sector takes time from blending, from when it moves.
     for (; !moves_.empty() && moves_.front().at <= std::max({there, hazard, blending_.next()}); moves_.pop()) {
+      // Beside a blend of several cycles the cache is idle.
+      if (const unsigned cost = moves_.front().moved * move_price_; idle_cache_ >= cost) {
+        idle_cache_ -= cost;
+        continue;
+      }
       blending_.take(moves_.front().at, moves_.front().moved * move_price_);
       did(CropWork::sectors, moves_.front().moved, moves_.front().at);
     }
@@ -143,6 +148,7 @@ class TimedCrop : public TimedUnit {
     }
     const unsigned price = price_of(warp, from, to);
     const CycleInterval blended = blending_.take(there, price);
+    if (timing_.column_cycles > 0) idle_cache_ = price > quads * price_ ? price - quads * price_ : 0;
     if (price > quads * price_) did(CropWork::unpaired, price - quads * price_, blended.first, blended.last + 1);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
@@ -285,6 +291,7 @@ class TimedCrop : public TimedUnit {
   ThroughputPort blending_;             ///< in parts of a cycle that both a quad and a sector are whole numbers of
   const unsigned price_;                ///< of blending a quad, in these
   const unsigned move_price_;           ///< of moving a sector, or a line
+  unsigned idle_cache_ = 0;             ///< parts of the last blend of several cycles, in which nothing moves
   const bool pairs_;                    ///< several quads go in a cycle only if they share a sector
   Ring<Move> moves_;                    ///< of sectors or lines, that blending has not given its time to yet
   std::vector<Cycle> lines_;            ///< of the cache: the last blend of a quad that needed it

@@ -131,8 +131,12 @@ class CropUnit : public Unit {
     if (moved > 0) pay(moved);
     fetched_again_ += ahead_->take_fetched_again();
   }
-  /// Gives what moves its time of the blender.
+  /// Gives what moves its time of the blender, unless the cache is idle beside a blend of several cycles.
   void pay(unsigned moved) {
+    if (idle_cache_ >= moved * move_price_) {
+      idle_cache_ -= moved * move_price_;
+      return;
+    }
     tokens_ -= moved * move_price_;
     did(CropWork::sectors, moved, now());
   }
@@ -228,6 +232,7 @@ class CropUnit : public Unit {
       const std::int64_t price = pairs_ ? price_beside_last(entry, most_in_a_cycle_ - budget) : price_;
       if (tokens_ < price) {
         stop_ = UnitState::busy;  // with the quads before it, or with moving sectors
+        if (pairs_) last_.waits = budget < most_in_a_cycle_ || last_.waits;
         break;
       }
       if (!timing_.forwards && hazard_gate_.enter() && blends(entry.quad)) {
@@ -262,7 +267,7 @@ class CropUnit : public Unit {
         ahead_->blended(entry.line, entry.sectors, changed, now);
         pay_for_stays();
       }
-      if (pairs_) last_ = {entry.place / positions_per_tile, entry.line, entry.sectors};
+      if (pairs_) last_ = {entry.place / positions_per_tile, entry.line, entry.sectors, price != 0, false};
       queue_.pop();
       if (!marks_.empty()) --marks_.front().quads;
       if (queue_.size() > quads_ahead) prefetch(queue_[quads_ahead]);
@@ -306,11 +311,13 @@ class CropUnit : public Unit {
     const std::int64_t more = columns_of(live) * timing_.column_cycles * income_ - price_;
     if (more <= 0) return 0;
     tokens_ -= more;
+    idle_cache_ = more;
     return more;
   }
   /// Of a quad, where several go in a cycle if they share a sector; `beside` have gone in this one.
   [[gnu::noinline]] std::int64_t price_beside_last(const Entry& entry, unsigned beside) const {
-    const bool shares = beside > 0 && last_.tile == entry.place / positions_per_tile && last_.line == entry.line &&
+    const bool shares = last_.is_first && (beside > 0 || last_.waits) &&
+                        last_.tile == entry.place / positions_per_tile && last_.line == entry.line &&
                         last_.sectors == entry.sectors;
     return shares ? 0 : income_;
   }
@@ -393,8 +400,11 @@ class CropUnit : public Unit {
   std::vector<bool> came_back_;         ///< by line of the cache: was there before; not used since
   std::optional<LinesAhead> ahead_;     ///< where tags run ahead of data
   Cycle ready_at_ = never;              ///< of the quad whose turn it is, if that is known
+  std::int64_t idle_cache_ = 0;         ///< tokens of the last blend of several cycles, in which nothing moves
   struct {
     std::uint32_t tile, line, sectors;
+    bool is_first;                                      ///< of those that go together
+    bool waits;                                         ///< so that the next one goes in a later cycle than it might
   } last_{};                                            ///< blended, where quads go in pairs
   std::deque<std::pair<std::uint32_t, Cycle>> recent_;  ///< blends in the pipeline, without forwarding
   UnitState stop_ = UnitState::starved;
