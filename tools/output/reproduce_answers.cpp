@@ -46,7 +46,7 @@ Answer fragments_answer(const Reproduction& of) {
     which = all[i].settings;
   }
   text += fmt::format(
-      "Of all that was varied (threshold, late updates, bins, what is rasterised for a splat, sizes of splats) the "
+      "Of all that was varied the "
       "most comes "
       "with {}: {:.1f} %. ",
       settings_text(which), farthest);
@@ -63,9 +63,9 @@ Answer fragments_answer(const Reproduction& of) {
   for (const FragmentFinding& finding : all) {
     if (finding.settings != "state.termination_threshold=0.9999") continue;
     text += fmt::format(
-        " With that count and a threshold of 0.9999 in place of 0.996, fragments would fall by {:.2f} and quads by "
-        "{:.2f} here "
-        "(the paper: 2.52 and 1.90).",
+        " With that count and a threshold of 0.9999 in place of 0.996, fragments are /{:.2f} and quads /{:.2f} here "
+        "(the "
+        "paper: /2.52 and /1.90).",
         finding.fragments / (1 - pruned_share(of)), finding.quads);
   }
   return {"Why do the fragments of a blended quad fall by 25 % under HET in the paper?", text};
@@ -137,8 +137,8 @@ Answer efficiency_answer(const Reproduction& of) {
     if (point.settings != "state.termination_threshold=0.9999") continue;
     text += fmt::format(
         "With a threshold of 0.9999, as the reference renderer in CUDA has it, HET gains {:.2f}x, HET+QM {:.2f}x, and "
-        "quads fall "
-        "by {:.2f} (the paper: 1.80x, 2.07x, 1.90).",
+        "quads are "
+        "/{:.2f} (the paper: 1.80x, 2.07x, /1.90).",
         point.het.arithmetic, point.het_qm.arithmetic, point.quads_het);
   }
   return {"Why does HET+QM reach only 82 % of what its quads suggest, where HET reaches 95 %?", text};
