@@ -241,6 +241,7 @@ Findings find(const ReproduceResult& result) {
   const ReproducePlan& plan = result.plan;
   Findings findings;
   for (std::size_t scene = 0; scene < plan.scenes.size(); ++scene) {
+    if (plan.quick && plan.scenes[scene].is_large) continue;
     (plan.scenes[scene].is_large ? findings.large : findings.scenes).push_back(scene_finding(result, scene));
   }
   findings.main = study(result, plan.paper_scenes(), Extent::full, plan.fidelity, "");

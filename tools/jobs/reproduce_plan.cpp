@@ -200,6 +200,7 @@ ReproducePlan plan_reproduction(const ReproduceOptions& options) {
       key.settings = settings;
       points.add(key, variants, with_map);
     };
+    if (plan.quick && plan.scenes[scene].is_large) continue;
     add(plan.fidelity, "", all_variants);
     if (plan.scenes[scene].is_large) continue;
     add(Fidelity::functional, "", without_merging, true);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -107,10 +108,10 @@ std::vector<std::string> reproduction_heading(const Reproduction& of) {
       "paper does not say which mean it takes: the arithmetic one is judged, the geometric one stands beside it.",
       "What only the paper's pictures show is not compared."};
   if (plan.quick) {
-    lines.emplace_back(
-        fmt::format("Quick look: at {} instead of cycle, {} views a scene, one number of passes, the sensitivity of "
-                    "one scene and of few parameters. Verdicts say that they are of a quick look.",
-                    vrpipe::name_of(plan.fidelity), plan.views));
+    lines.emplace_back(fmt::format(
+        "Quick look: at {} instead of cycle, {} views a scene, no large ones, one number of passes, the sensitivity of "
+        "one scene and of few parameters. Verdicts say that they are of a quick look.",
+        vrpipe::name_of(plan.fidelity), plan.views));
   }
   for (const Setting& setting : base.settings) {
     lines.push_back(printable(fmt::format("Set: {}.{}={}.", setting.unit, setting.parameter, setting.value)));
@@ -389,7 +390,8 @@ std::vector<ReportTable> all_tables(const Reproduction& of) {
   for (const auto make :
        {scenes_table, blended_table, utilization_table, maps_table, ratios_table, passes_table, large_table, cost_table,
         microbench_table, sensitivity_table, checks_table, fragments_table, efficiency_table}) {
-    tables.push_back(make(of));
+    ReportTable table = make(of);
+    if (!table.rows.empty()) tables.push_back(std::move(table));  // a quick look leaves some out
   }
   return tables;
 }
