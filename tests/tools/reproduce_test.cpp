@@ -169,7 +169,6 @@ class Synthetic : public ::testing::Test {
  protected:
   void SetUp() override {
     tools::ReproduceOptions options;
-    options.quick = true;
     options.base.platform = &platforms().front();
     result_.plan = tools::plan_reproduction(options);
     for (const tools::ReproducePoint& point : result_.plan.points) result_.points.push_back(made(point));

@@ -192,10 +192,12 @@ void find_fragments(const ReproduceResult& result, Findings& findings) {
   add(plan.paper_scenes(), "main comparison");
   key.fidelity = Fidelity::functional;
   add(plan.paper_scenes(), "no late updates (functional)");
-  key.extent = Extent::half;
-  add(plan.paper_scenes(), "smaller splats: images of half the width");
-  key.extent = Extent::quarter;
-  add(plan.paper_scenes(), "smaller splats: images of a quarter of the width");
+  if (!plan.quick) {
+    key.extent = Extent::half;
+    add(plan.paper_scenes(), "smaller splats: images of half the width");
+    key.extent = Extent::quarter;
+    add(plan.paper_scenes(), "smaller splats: images of a quarter of the width");
+  }
   key.extent = Extent::full;
   for (const std::size_t scene : plan.paper_scenes()) add({scene}, plan.scenes[scene].name + " alone");
   if (plan.studied.size() > 1) add(plan.studied, "the scenes of what follows");
@@ -239,6 +241,7 @@ Findings find(const ReproduceResult& result) {
   const ReproducePlan& plan = result.plan;
   Findings findings;
   for (std::size_t scene = 0; scene < plan.scenes.size(); ++scene) {
+    if (plan.quick && plan.scenes[scene].is_large) continue;
     (plan.scenes[scene].is_large ? findings.large : findings.scenes).push_back(scene_finding(result, scene));
   }
   findings.main = study(result, plan.paper_scenes(), Extent::full, plan.fidelity, "");

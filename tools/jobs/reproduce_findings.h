@@ -72,8 +72,8 @@ struct FragmentFinding {
 };
 
 struct Findings {
-  std::vector<SceneFinding> scenes;  ///< the six
-  std::vector<SceneFinding> large;
+  std::vector<SceneFinding> scenes;             ///< the six
+  std::vector<SceneFinding> large;              ///< none in a quick look
   std::vector<SensitivityFinding> sensitivity;  ///< the greatest spread first
   std::vector<CheckFinding> checks;
   StudyPoint main;                            ///< the six at the main fidelity

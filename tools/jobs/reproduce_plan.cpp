@@ -122,6 +122,7 @@ void choose_parameters(const ReproduceOptions& options, ReproducePlan& plan) {
     if (!chosen.values.empty()) plan.parameters.push_back(std::move(chosen));
   }
   for (const std::string& settings : fragment_candidates) {
+    if (options.quick && settings != "state.termination_threshold=0.9999") continue;
     if (is_kept(settings)) plan.fragment_settings.push_back(settings);
   }
 }
@@ -199,6 +200,7 @@ ReproducePlan plan_reproduction(const ReproduceOptions& options) {
       key.settings = settings;
       points.add(key, variants, with_map);
     };
+    if (plan.quick && plan.scenes[scene].is_large) continue;
     add(plan.fidelity, "", all_variants);
     if (plan.scenes[scene].is_large) continue;
     add(Fidelity::functional, "", without_merging, true);
@@ -233,7 +235,7 @@ ReproducePlan plan_reproduction(const ReproduceOptions& options) {
     }
     for (const Extent extent : {Extent::half, Extent::quarter}) {
       key.extent = extent;
-      add(Fidelity::functional, "", without_merging);
+      if (!plan.quick) add(Fidelity::functional, "", without_merging);
     }
     key.extent = Extent::full;
     for (key.view = 1; key.view < plan.views; ++key.view) add(Fidelity::functional, "", without_merging);

@@ -67,7 +67,7 @@ struct ReproduceOptions {
 
 /// Everything that `reproduce` simulates, in the order in which it does.
 struct ReproducePlan {
-  std::vector<PlannedScene> scenes;  ///< the paper's six, then the large ones
+  std::vector<PlannedScene> scenes;  ///< the paper's six, then the large ones, which a quick look leaves out
   std::vector<std::size_t> studied;  ///< scenes of Breadth::headline
   std::size_t indoor = 0;            ///< the scene of efficiency_settings()
   std::size_t column = 0;            ///< the scene of Breadth::open

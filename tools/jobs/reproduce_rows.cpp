@@ -55,7 +55,9 @@ class Rows {
       RowFinding finding = found == found_.end() ? RowFinding() : found->second;
       finding.row = &row;
       if (!row.is_within_reach) finding.reason = row.how;
-      if (found == found_.end() && row.is_within_reach) finding.reason = "there is nothing to measure it by";
+      if (found == found_.end() && row.is_within_reach) {
+        finding.reason = result_.plan.quick ? "not in a quick look" : "there is nothing to measure it by";
+      }
       if (finding.verdict == Verdict::differs && reasons().count(row.id) > 0) {
         finding.reason += (finding.reason.empty() ? "" : "; ") + reasons().at(row.id);
         if (finding.row->number > 0 && finding.reason.find("sensitivity") != std::string::npos) {
@@ -305,6 +307,7 @@ class Rows {
   }
 
   void large_scenes() {
+    if (findings_.large.empty()) return;
     std::vector<std::string> exceptions, texts;
     for (const SceneFinding& each : findings_.large) {
       const std::optional<Bottleneck>& bottleneck = each.runs[0]->run.bottleneck;

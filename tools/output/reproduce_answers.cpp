@@ -35,8 +35,7 @@ Answer fragments_answer(const Reproduction& of) {
                   fall_percent(least->gains), name_of(of, *least), fall_percent(most->gains), name_of(of, *most));
   text +=
       "Two effects are against each other: pixels of a quad terminate at different depths, which leaves partial quads; "
-      "and what "
-      "is in front has larger splats, whose quads are fuller. ";
+      "and what is in front has larger splats, whose quads are fuller. ";
   double farthest = 0;
   std::string which;
   // The last is another way to count, not another run.
@@ -45,27 +44,19 @@ Answer fragments_answer(const Reproduction& of) {
     farthest = all[i].fall_percent;
     which = all[i].settings;
   }
-  text += fmt::format(
-      "Of all that was varied (threshold, late updates, bins, what is rasterised for a splat, sizes of splats) the "
-      "most comes "
-      "with {}: {:.1f} %. ",
-      settings_text(which), farthest);
+  text += fmt::format("Of all that was varied the most comes with {}: {:.1f} %. ", settings_text(which), farthest);
   const double blended = paper_row("R5").number * (1 - pruned_share(of));
   text += fmt::format(
       "What does give it is another count: fragments rasterised without termination, pruned ones among them, over "
-      "those "
-      "blended with it, and quads as we count them, fall by {:.1f} % in the very same runs. {:.0f} % of the fragments "
-      "are "
-      "pruned here, so that the paper's 2.52 would stand for {:.2f} of blended ones, {:.0f} % above its 1.90 of quads. "
-      "That "
-      "is a guess which fits; the paper does not say what it counts.",
+      "those blended with it, and quads as we count them, fall by {:.1f} % in the very same runs. {:.0f} % of the "
+      "fragments are pruned here, so that the paper's 2.52 would stand for {:.2f} of blended ones, {:.0f} % above its "
+      "1.90 of quads. That is a guess which fits; the paper does not say what it counts.",
       all.back().fall_percent, 100 * pruned_share(of), blended, 100 * (blended / paper_row("R7").number - 1));
   for (const FragmentFinding& finding : all) {
     if (finding.settings != "state.termination_threshold=0.9999") continue;
     text += fmt::format(
-        " With that count and a threshold of 0.9999 in place of 0.996, fragments would fall by {:.2f} and quads by "
-        "{:.2f} here "
-        "(the paper: 2.52 and 1.90).",
+        " With that count and a threshold of 0.9999 in place of 0.996, fragments are /{:.2f} and quads /{:.2f} here "
+        "(the paper: /2.52 and /1.90).",
         finding.fragments / (1 - pruned_share(of)), finding.quads);
   }
   return {"Why do the fragments of a blended quad fall by 25 % under HET in the paper?", text};
@@ -112,8 +103,7 @@ Answer efficiency_answer(const Reproduction& of) {
   if (!others.empty()) {
     text += fmt::format(
         "In {} it does not: where nearly every quad is killed, the front end, a cycle for a pair of primitive and "
-        "screen "
-        "tile, bounds that part of the frame. ",
+        "screen tile, bounds that part of the frame. ",
         fmt::join(others, ", "));
   }
   const std::vector<StudyPoint>& indoor = of.findings.indoor_efficiency;
@@ -131,14 +121,13 @@ Answer efficiency_answer(const Reproduction& of) {
   text += nearest_text(of);
   text +=
       "The more a variant kills and merges, the sooner the front end bounds it and not CROP; QM also sets a primitive "
-      "up once for "
-      "each tile grid that it touches. A slower QRU takes from QM alone as well, which the paper's 1.49x excludes. ";
+      "up once for each tile grid that it touches. A slower QRU takes from QM alone as well, which the paper's 1.49x "
+      "excludes. ";
   for (const StudyPoint& point : of.findings.efficiency) {
     if (point.settings != "state.termination_threshold=0.9999") continue;
     text += fmt::format(
         "With a threshold of 0.9999, as the reference renderer in CUDA has it, HET gains {:.2f}x, HET+QM {:.2f}x, and "
-        "quads fall "
-        "by {:.2f} (the paper: 1.80x, 2.07x, 1.90).",
+        "quads are /{:.2f} (the paper: 1.80x, 2.07x, /1.90).",
         point.het.arithmetic, point.het_qm.arithmetic, point.quads_het);
   }
   return {"Why does HET+QM reach only 82 % of what its quads suggest, where HET reaches 95 %?", text};

@@ -40,6 +40,7 @@ std::string table_html(const ReportTable& table) {
 }
 
 std::string section(const ReportTable& table, const std::string& plot) {
+  if (table.rows.empty()) return {};
   return "<h2>" + html_escaped(table.title) + "</h2>\n" + plot + table_html(table);
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -104,15 +105,13 @@ std::vector<std::string> reproduction_heading(const Reproduction& of) {
       files.empty() ? "Scenes: stand-ins for the paper's, with the same size and number of Gaussians; none is trained."
                     : fmt::format("Scenes: stand-ins, none of them trained, but for {}.", fmt::join(files, ", ")),
       "Numbers agree within the tolerance of their row: 10 % of what scenes decide, 0.5 % of sizes, 5 % of R29. The "
-      "paper "
-      "does not say which mean it takes: the arithmetic one is judged, the geometric one stands beside it.",
+      "paper does not say which mean it takes: the arithmetic one is judged, the geometric one stands beside it.",
       "What only the paper's pictures show is not compared."};
   if (plan.quick) {
-    lines.emplace_back(
-        fmt::format("Quick look: at {} instead of cycle, {} views a scene, one number of passes, the sensitivity of "
-                    "one scene and of few "
-                    "parameters. Verdicts say that they are of a quick look.",
-                    vrpipe::name_of(plan.fidelity), plan.views));
+    lines.emplace_back(fmt::format(
+        "Quick look: at {} instead of cycle, {} views a scene, no large ones, one number of passes, the sensitivity of "
+        "one scene and of few parameters. Verdicts say that they are of a quick look.",
+        vrpipe::name_of(plan.fidelity), plan.views));
   }
   for (const Setting& setting : base.settings) {
     lines.push_back(printable(fmt::format("Set: {}.{}={}.", setting.unit, setting.parameter, setting.value)));
@@ -317,8 +316,8 @@ ReportTable sensitivity_table(const Reproduction& of) {
   }
   table.note = fmt::format(
       "One at a time, at {}. With a star: {}, whole images; else the eighth of the width in the middle of {}. In so "
-      "narrow an image "
-      "few tiles take turns, so that CROP's cache and hazards weigh more. Spread: greatest less least, of the default.",
+      "narrow an image few tiles take turns, so that CROP's cache and hazards weigh more. Spread: greatest less least, "
+      "of the default.",
       vrpipe::name_of(sensitivity_fidelity), studied_names(plan), plan.scenes[plan.column].name);
   return table;
 }
@@ -381,8 +380,7 @@ ReportTable efficiency_table(const Reproduction& of) {
       {"paper", "1.49x", "1.80x", "2.07x", percent(paper_het_efficiency()), percent(paper_het_qm_efficiency()), ""});
   table.note = fmt::format(
       "Those with settings, and with the defaults, at {}. Mean speed-up over the mean of the baseline's quads over the "
-      "variant's. "
-      "Fits: both within {} points of the paper's.",
+      "variant's. Fits: both within {} points of the paper's.",
       vrpipe::name_of(sensitivity_fidelity), near_points);
   return table;
 }
@@ -392,7 +390,8 @@ std::vector<ReportTable> all_tables(const Reproduction& of) {
   for (const auto make :
        {scenes_table, blended_table, utilization_table, maps_table, ratios_table, passes_table, large_table, cost_table,
         microbench_table, sensitivity_table, checks_table, fragments_table, efficiency_table}) {
-    tables.push_back(make(of));
+    ReportTable table = make(of);
+    if (!table.rows.empty()) tables.push_back(std::move(table));  // a quick look leaves some out
   }
   return tables;
 }
