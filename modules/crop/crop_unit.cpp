@@ -215,8 +215,8 @@ class CropUnit : public Unit {
     }
     TerminationBeat beat;
     stop_ = UnitState::starved;
+    ready_at_ = never;
     unsigned budget = most_in_a_cycle_;
-    std::int64_t unpaired = 0;
     for (; budget > 0 && !queue_.empty(); --budget) {
       if (!marks_.empty()) pass_marks(now);
       const Entry& entry = queue_.front();
@@ -256,8 +256,8 @@ class CropUnit : public Unit {
       if (quad.is_last()) quad.warp->release();
       const bool changed = outcome.changed || timing_.writes_unchanged;
       tokens_ -= price;
-      unpaired += price - price_;
-      if (timing_.column_cycles > 0 && blends(quad)) unpaired += pay_for_columns(quad.live());
+      unpaired_ += price - price_;
+      if (timing_.column_cycles > 0 && blends(quad)) unpaired_ += pay_for_columns(quad.live());
       if (!ahead_) {
         if (changed) port_.cache().make_dirty(entry.line, entry.sectors);
         port_.cache().unpin(entry.line);
@@ -278,7 +278,7 @@ class CropUnit : public Unit {
     frame_lasts(now + timing_.latency_cycles);
     did(CropWork::blend, blended, now);
     // Two that go together cost as much as one of a cycle's two.
-    if (unpaired > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(unpaired), now);
+    if (unpaired_ > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(std::exchange(unpaired_, 0)), now);
     last_blend_ = now;
     any_blended_ = true;
     return true;
@@ -286,7 +286,6 @@ class CropUnit : public Unit {
 
   /// Whether the sectors of a quad whose turn it is are not there.
   bool is_awaited(const Entry& entry, Cycle now) {
-    ready_at_ = never;
     if (!ahead_) {
       if (port_.awaited(entry.line, entry.sectors) != 0) return true;
       if (!returns_ || !came_back_[entry.line]) return false;
@@ -400,6 +399,7 @@ class CropUnit : public Unit {
   std::vector<bool> came_back_;         ///< by line of the cache: was there before; not used since
   std::optional<LinesAhead> ahead_;     ///< where tags run ahead of data
   Cycle ready_at_ = never;              ///< of the quad whose turn it is, if that is known
+  std::int64_t unpaired_ = 0;           ///< tokens that were not tallied yet, or too many
   std::int64_t idle_cache_ = 0;         ///< tokens of the last blend of several cycles, in which nothing moves
   struct {
     std::uint32_t tile, line, sectors;

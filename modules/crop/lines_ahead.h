@@ -35,7 +35,9 @@ class LinesAhead {
   /// One that replaces what is there does not read.
   Stay look_up(std::uint64_t address, std::uint32_t sectors, bool reads) {
     const auto most = static_cast<unsigned>(__builtin_popcount(sectors));
-    if (!requests_.empty() || !port_.memory().available() || filling_ + most > mshrs_) return no_stay;
+    if (!requests_.empty() || !port_.memory().available()) return no_stay;
+    // One that needs more registers than there are has them all to itself.
+    if (filling_ > 0 && filling_ + most > mshrs_) return no_stay;
     LineAccess access;
     access.address = address;
     access.sectors = sectors;

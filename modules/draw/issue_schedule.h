@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include <vrpipe/kernel/clock_domain.h>
@@ -20,7 +21,7 @@ class IssueSchedule {
     return due(issued_) - due(issued_ - 1);
   }
   void restart(Cycle now) {
-    begin_ = now;
+    begin_ = std::max(now, due());  // the turn of the last warp is over first
     issued_ = 0;
   }
 

@@ -30,16 +30,17 @@ class LateLookUps {
   /// After a warp wider than the unit.
   Cycle next() const { return next_; }
 
-  /// Looks up what is at the link. `moved(sectors)` is called for what it moves, `accessed(quads)` for each warp.
-  template <class Moved, class Accessed>
-  bool take(StreamIn<ShadedWarpItem>& in, CachePort& port, const BeatLines& lines, Cycle now, const Moved& moved,
+  /// Looks up what is at the link. `look_up(line)` goes on with a look-up and says whether it is done, as CachePort does;
+  /// `accessed(quads)` is called for each warp.
+  template <class LookUp, class Accessed>
+  bool take(StreamIn<ShadedWarpItem>& in, const BeatLines& lines, Cycle now, const LookUp& look_up,
             const Accessed& accessed) {
     bool any = false;
     for (; in.ready(); in.pop()) {
       const ShadedWarp& warp = *in.front().warp;
       if (!begun_ && !begin(warp, lines, now)) break;
       for (; at_ < needed_.count; ++at_) {
-        if (!port.look_up(line_, now, moved)) return any;
+        if (!look_up(line_)) return any;
         reads_.push({line_.line, line_.sectors});
         ++reads_asked_;
         any = true;
@@ -53,11 +54,11 @@ class LateLookUps {
     }
     return any;
   }
-  /// Reads what has come.
-  bool read(CachePort& port) {
+  /// Reads what has come: `is_there(line, sectors)` says so, and is told that the line may go.
+  template <class IsThere>
+  bool read(const IsThere& is_there) {
     bool any = false;
-    for (; !reads_.empty() && port.awaited(reads_.front().line, reads_.front().sectors) == 0; reads_.pop()) {
-      port.cache().unpin(reads_.front().line);
+    for (; !reads_.empty() && is_there(reads_.front().line, reads_.front().sectors); reads_.pop()) {
       ++reads_done_;
       any = true;
     }

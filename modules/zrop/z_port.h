@@ -165,42 +165,44 @@ class ZPort {
     std::uint64_t address = 0;
   };
   /// The same where tags run ahead of data: what is missed is read for the beat, whatever becomes of the line.
-  [[gnu::noinline]] bool look_up_ahead() {
+  /// `left` are the sectors yet to be read, between calls; `needs` becomes the last read that it waits for.
+  [[gnu::noinline]] bool look_up_ahead(CachePort::LookUp& wanted, std::uint32_t& left, std::uint64_t& needs,
+                                       bool waits) {
     if (!port_.write_back(moves())) return false;
-    if (ahead_left_ == 0) {
+    if (left == 0) {
       SectoredCache& cache = port_.cache();
-      const bool is_held = cache.find(line_.address) != SectoredCache::no_line;
-      if (!is_held && (!may_move_line() || !cache.can_allocate(line_.address))) return false;
+      const bool is_held = cache.find(wanted.address) != SectoredCache::no_line;
+      if (!is_held && (!may_move_line() || !cache.can_allocate(wanted.address))) return false;
       LineAccess access;
-      access.address = line_.address;
-      access.sectors = line_.sectors;
-      if (cleared_) access.known = cleared_->of_line(line_.address);
+      access.address = wanted.address;
+      access.sectors = wanted.sectors;
+      if (cleared_) access.known = cleared_->of_line(wanted.address);
       cache.look_up(access);
       if (cleared_) cleared_->count(access.missed & access.known);
-      line_.line = access.line;
+      wanted.line = access.line;
       if (access.replaced) {
         move_line();
         fill_of_line_[access.line] = 0;
-        note_return();
+        if (waits) note_return();
         if (access.written_back != 0) {
           move_line();
           port_.evict(access);
         }
       }
-      ahead_left_ = access.filled;
+      left = access.filled;
     }
-    while (ahead_left_ != 0) {
+    while (left != 0) {
       if (filling_ahead_ >= timing_.mshrs || !port_.memory_is_available()) return false;
-      const SectorRun run = take_sector_run(ahead_left_, timing_.organization.sectors_of_a_line());
+      const SectorRun run = take_sector_run(left, timing_.organization.sectors_of_a_line());
       const auto sector_bytes = std::uint64_t{timing_.organization.sector_bytes};
       ++reads_asked_;
-      port_.read_ahead(line_.address + run.first * sector_bytes, run.count, static_cast<std::uint32_t>(reads_asked_));
+      port_.read_ahead(wanted.address + run.first * sector_bytes, run.count, static_cast<std::uint32_t>(reads_asked_));
       sizes_.push(run.count);
       filling_ahead_ += run.count;
       moves()(run.count);
-      fill_of_line_[line_.line] = reads_asked_;
+      fill_of_line_[wanted.line] = reads_asked_;
     }
-    reads_of_beat_ = std::max(reads_of_beat_, fill_of_line_[line_.line]);
+    needs = std::max(needs, fill_of_line_[wanted.line]);
     return true;
   }
   /// Takes reads that have come; in their order, as beats use them.
@@ -227,7 +229,7 @@ class ZPort {
   }
   /// Looks a line of a beat up, and takes note if it left since it was last used.
   bool look_up_line() {
-    if (timing_.fetches_ahead) return look_up_ahead();
+    if (timing_.fetches_ahead) return look_up_ahead(line_, ahead_left_, reads_of_beat_, true);
     const bool is_held =
         line_.line != SectoredCache::no_line || port_.cache().find(line_.address) != SectoredCache::no_line;
     if (!is_held && !may_move_line()) return false;
@@ -316,8 +318,26 @@ class ZPort {
     return moved;
   }
   [[gnu::noinline]] bool take_late(StreamIn<ShadedWarpItem>& in) {
-    const bool moved = late_.take(in, port_, *lines_, now_, moves(), [this](unsigned quads) { count_accesses(quads); });
-    return late_.read(port_) || moved;
+    const auto count = [this](unsigned quads) { count_accesses(quads); };
+    if (timing_.fetches_ahead) {
+      // In the place of the line, the read that it needs.
+      const auto look_up = [this](CachePort::LookUp& line) {
+        std::uint64_t needs = 0;
+        if (!look_up_ahead(line, late_left_, needs, false)) return false;
+        line.line = static_cast<SectoredCache::Line>(needs);
+        return true;
+      };
+      const bool moved = late_.take(in, *lines_, now_, look_up, count);
+      return late_.read([this](SectoredCache::Line needs, std::uint32_t) { return reads_done_ >= needs; }) || moved;
+    }
+    const bool moved = late_.take(
+        in, *lines_, now_, [this](CachePort::LookUp& line) { return port_.look_up(line, now_, moves()); }, count);
+    const auto is_there = [this](SectoredCache::Line line, std::uint32_t sectors) {
+      if (port_.awaited(line, sectors) != 0) return false;
+      port_.cache().unpin(line);
+      return true;
+    };
+    return late_.read(is_there) || moved;
   }
   /// To look a beat up; false if that has to wait.
   bool begin(const QuadBeat& beat) {
@@ -389,6 +409,7 @@ class ZPort {
   std::vector<bool> were_there_;        ///< by line of the surface
   // Where tags run ahead of data; reads are numbered from 1.
   std::uint32_t ahead_left_ = 0;             ///< sectors of the line that is looked up, yet to be read
+  std::uint32_t late_left_ = 0;              ///< the same for a late test
   unsigned filling_ahead_ = 0;               ///< sectors
   std::vector<std::uint64_t> fill_of_line_;  ///< by line of the cache: the last read for it
   Ring<unsigned> sizes_;                     ///< of the reads under way, sectors

@@ -113,7 +113,8 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
                            ratio(done.z_lines, 1000), ratio(done.quads_rasterized, prop_.quads_per_cycle),
                            from_l2(done.z_sectors * zrop_.z_cache.organization.sector_bytes)});
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
-  cycles[sm] = std::max(instructions(done) / sm_.instructions_per_cycle(), ratio(done.launches, 1000));
+  cycles[sm] = std::max(instructions(done) / sm_.instructions_per_cycle(),
+                        ratio(to_last ? launches_to_last(done) : done.launches, 1000));
   cycles[late] = ratio(done.late_quads, std::min(zrop_.quads_per_cycle, prop_.quads_per_cycle));
   cycles[color] = static_cast<double>(done.color_quads) / prop_.color_rate.per_cycle();
   cycles[l2] = from_l2(done.sectors * crop_.sector_bytes);
@@ -122,11 +123,14 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   const auto turns = [&](std::uint64_t fills, std::uint64_t places) {
     return fills <= places ? 0.0 : ratio(fills - places, places) * l2_latency_cycles_;
   };
+  // Ahead of its data, a quad that needs more registers than there are has them all.
+  const std::uint64_t registers =
+      crop_.fetches_ahead ? std::max(crop_.mshrs, crop_.line_bytes / crop_.sector_bytes) : crop_.mshrs;
   cycles[crop] = std::max(
       {static_cast<double>(done.color_quads) / crop_.blend_rate.per_cycle() +
            ratio(color_moves(done) * crop_.parts_of_a_move(), crop_.moves_in_a_cycle()),
        crop_.fetches_ahead ? 0.0 : turns(done.lines_filled, std::max(crop_.cache_bytes / crop_.line_bytes, 1U)),
-       turns(done.sectors_filled, crop_.mshrs)});
+       turns(done.sectors_filled, registers)});
   return cycles;
 }
 
@@ -144,7 +148,17 @@ double PhaseBound::update_cycles(const Work& done) const {
   return std::max(0.0, updates - ratio(done.quads_tested, zrop_.quads_per_cycle) - ratio(done.z_blocks, 1000));
 }
 
+/// Nobody waits for what the last warp's hand-over takes.
+std::uint64_t PhaseBound::launches_to_last(const Work& done) const {
+  return done.launches - std::min(done.launches, longest_launch());
+}
+std::uint64_t PhaseBound::longest_launch() const {
+  const HandOverPrice& price = sm_.hand_over;
+  return price.warp_thousandths + quads_per_warp * (std::uint64_t{price.visit_thousandths} + price.discard_thousandths);
+}
+
 double PhaseBound::idle_after_last(unsigned stage) const {
+  if (stage == sm) return ratio(longest_launch(), 1000);
   const double interval =
       stage == draw ? 1 / vertex_warps_per_cycle_
       : stage == raster
@@ -244,7 +258,7 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
   }
   if (slot == "sm") {
     return priced(SmWork::kinds(sm_), {count(done.vertex_warps * sum_of(sm_.vertex)), count(done.fragment_instructions),
-                                       count(done.merging_warps * sum_of(sm_.merge)), count(done.launches)});
+                                       count(done.merging_warps * sum_of(sm_.merge)), count(launches_to_last(done))});
   }
   if (slot == "crop") return priced(CropWork::kinds(crop_), {count(done.color_quads), count(color_moves(done))});
   if (slot == "l2" && l2_bytes_per_cycle_ > 0)

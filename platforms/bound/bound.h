@@ -105,6 +105,8 @@ class PhaseBound {
   std::array<double, stages> end_of(const Work& done, bool to_last) const;
   double instructions(const Work& done) const;
   double update_cycles(const Work& done) const;
+  std::uint64_t launches_to_last(const Work& done) const;
+  std::uint64_t longest_launch() const;
   /// That take time from blending: sectors, or lines where these have a price.
   std::uint64_t color_moves(const Work& done) const { return crop_.line_cycles == 0 ? done.sectors : done.lines_paid; }
   /// Between a stage's items are more cycles than an item takes: those after the last, for which nobody waits.

@@ -238,7 +238,7 @@ TEST(Statistics, OfTheColourCacheAreTheSameWhereTheOrderIs) {
       EXPECT_EQ(report.value, at->second) << report.name << " at " << name_of(fidelity);
     }
   }
-  EXPECT_EQ(expected.size(), 13U + 3U + 1U) << "counters, ratios and the most lines held";
+  EXPECT_EQ(expected.size(), 14U + 3U + 1U) << "counters, ratios and the most lines held";
   EXPECT_EQ(expected.at("crop.cache.sector_misses"), 64U);
 }
 

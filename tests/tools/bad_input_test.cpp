@@ -49,9 +49,9 @@ class BadInput : public ToolTest {
 };
 
 TEST_F(BadInput, Commands) {
-  refused({}, {"no command", "run, compare, accuracy, convert, scenes, platforms, units"});
-  refused({"reproduce"}, {"'reproduce'", "compare"});
-  refused({"microbench", "tile-binning"}, {"'microbench'"});
+  refused({}, {"no command", "run, compare, accuracy, reproduce, microbench, convert, scenes, platforms, units"});
+  refused({"sweep"}, {"'sweep'", "compare"});
+  refused({"diff", "a.json", "b.json"}, {"'diff'"});
   refused({"compar"}, {"'compar'", "did you mean compare?"});
   refused({"--scene", "tiny.spl"}, {"'--scene'", "after the command"});
 }
