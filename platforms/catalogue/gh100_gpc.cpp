@@ -19,9 +19,8 @@ Platform gh100_gpc() {
       {"raster", "coarse_tiles_per_cycle", "4"},
       {"raster", "setup_interval_cycles", "5"},
       // 32 bins of 16x16 pixels, first in, first out: the defaults. Two quads part from a gap of 151 cycles on, of which nine
-      // are the second's way. With 16 live tiles a bin takes 460 quads.
+      // are the second's way.
       {"tc", "idle_timeout_cycles", "160"},
-      {"tc", "bin_quads", "460"},
       // 8 quads a cycle of full blocks, each touched half of one a cycle; rectangles of 2x2 take 4.17, of 16x16 10.67.
       {"zrop", "quads_per_cycle", "8"},
       {"zrop", "half_block_cycles", "1"},

@@ -297,7 +297,7 @@ void crop_cache(Bench& bench) {
     for (const unsigned tiles : in_turn) {
       returns.push_back(
           {tiles, blend,
-           Slope(bench, rgba16f, std::max(16U, 1024 / tiles), [tiles, blend = blend, gpcs](unsigned rounds) {
+           Slope(bench, rgba16f, std::max(64U, 4096 / tiles), [tiles, blend = blend, gpcs](unsigned rounds) {
              return microbench::rectangles_in_turn(tiles, rounds, 2, 2, blend, gpcs);
            })});
     }
