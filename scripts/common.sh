@@ -6,7 +6,7 @@ project=$PWD
 
 # Debian packages; the README says what each is for.
 build_packages=(g++ cmake ninja-build pkg-config ccache libsystemc-dev libglm-dev libboost1.81-dev nlohmann-json3-dev
-  libcli11-dev libfmt-dev libpng-dev libopenexr-dev libmd-dev libassimp-dev
+  libcli11-dev libfmt-dev libpng-dev libopenexr-dev libmd-dev libassimp-dev libtomlplusplus-dev
   zlib1g-dev libzstd-dev libwebp-dev libzip-dev)
 check_packages=(git clang libclang-rt-14-dev clang-format clang-tidy libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
   liblzma-dev xz-utils)
