@@ -94,8 +94,7 @@ class WorkCounter::Blends final : public BlendObserver {
     work_.lines_filled += fills_line ? 1U : 0U;
     if (unpaid_.empty()) return;
     work_.lines_paid += written_back != 0 ? 1U : 0U;
-    // Where each sector is filled once, a line is fetched once at least.
-    if (filled_.empty() ? fills != 0 : fills_line) unpaid_[access.address / line_bytes_] = true;
+    if (fills_line) unpaid_[access.address / line_bytes_] = true;
   }
 
   void blended(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) override {

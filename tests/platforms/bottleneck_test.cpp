@@ -136,6 +136,26 @@ TEST(Bottleneck, IsTheSameAtEveryFidelityWithTime) {
   }
 }
 
+// The bound paid for every sector of a line once.
+TEST(Bottleneck, ALineIsPaidForWhenItComesAndWhenItGoesHoweverManySectorsMove) {
+  for (const Fidelity fidelity : {Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+    const RunResult result = run(request_of("baseline", fidelity,
+                                            [](RunRequest& request) {
+                                              strictly(request);
+                                              request.platform = &platform_named("gh100-gpc");
+                                            }),
+                                 scene());
+    const auto& parts = result.bottleneck->parts;
+    const auto lines = std::find_if(parts.begin(), parts.end(), [](const auto& part) { return part.first == "lines"; });
+    ASSERT_NE(lines, parts.end()) << name_of(fidelity) << " " << result.bottleneck->unit;
+    const double paid = lines->second * static_cast<double>(*result.cycles);
+    EXPECT_GT(paid, 256 * 256 * 8 / 256) << name_of(fidelity) << ": every line comes once at least";
+    EXPECT_LE(paid, 1 + static_cast<double>(statistic(result, "crop.cache.line_misses") +
+                                            statistic(result, "crop.cache.lines_evicted")))
+        << name_of(fidelity);
+  }
+}
+
 TEST(Bottleneck, IsThereWhereTimeIs) {
   EXPECT_FALSE(run(request_of("baseline", Fidelity::functional), scene()).bottleneck.has_value());
 }
