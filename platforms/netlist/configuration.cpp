@@ -42,7 +42,8 @@ DrawState draw_state_from(const StateParameters& parameters) {
 
 namespace {
 void set_state(StateParameters& parameters, const RunRequest& request, const std::vector<Setting>& own) {
-  for (const auto* settings : {&request.platform->settings, &request.variant.settings, &request.settings, &own}) {
+  for (const auto* settings : {&request.platform->settings, &request.variant.settings, &request.settings,
+                               &request.variant.changed_settings, &own}) {
     for (const Setting& setting : *settings) {
       if (setting.unit == "state") parameters.set(setting.unit, setting.parameter, setting.value);
     }
@@ -75,7 +76,11 @@ Configuration::Configuration(const RunRequest& request, const Frame& frame)
     if (concerns_chosen_unit(setting)) apply(setting);
   }
   for (const Setting& setting : request.variant.settings) apply(setting);
-  for (const Setting& setting : request.settings) apply(setting);
+  // Those of all runs are for the units that a variant may have put others in the place of.
+  for (const Setting& setting : request.settings) {
+    if (request.variant.changed_units.empty() || concerns_chosen_unit(setting)) apply(setting);
+  }
+  for (const Setting& setting : request.variant.changed_settings) apply(setting);
   if (request.observers != nullptr) request.observers->check(netlist_);
 
   auto drawn = std::make_shared<Frame>(frame);
@@ -125,7 +130,9 @@ void Configuration::choose_implementations() {
     if (!unit.chosen->pass_through) unit.chosen = unit.real;
   }
   std::vector<UnitChoice> choices = request_.variant.units;
-  choices.insert(choices.end(), request_.units.begin(), request_.units.end());
+  for (const auto* units : {&request_.units, &request_.variant.changed_units}) {
+    choices.insert(choices.end(), units->begin(), units->end());
+  }
   for (const UnitChoice& choice : choices) {
     const std::vector<const Instance*> named = instances_named(choice.slot);
     const std::string& slot = named.empty() ? choice.slot : named.front()->slot;

@@ -59,6 +59,10 @@ std::vector<Variant>& variant_list() {
 }
 }  // namespace
 
+const std::string& name_of(const RunRequest& request) {
+  return request.name.empty() ? request.variant.name : request.name;
+}
+
 const std::vector<Variant>& variants() { return variant_list(); }
 
 void add_variant(Variant variant) {

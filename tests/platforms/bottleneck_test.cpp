@@ -143,13 +143,14 @@ TEST(Bottleneck, ALineIsPaidForWhenItComesAndWhenItGoesHoweverManySectorsMove) {
                                             [](RunRequest& request) {
                                               strictly(request);
                                               request.platform = &platform_named("gh100-gpc");
+                                              request.settings = {{"prop", "order", "draw"}};
                                             }),
                                  scene());
     const auto& parts = result.bottleneck->parts;
     const auto lines = std::find_if(parts.begin(), parts.end(), [](const auto& part) { return part.first == "lines"; });
     ASSERT_NE(lines, parts.end()) << name_of(fidelity) << " " << result.bottleneck->unit;
     const double paid = lines->second * static_cast<double>(*result.cycles);
-    EXPECT_GT(paid, 256 * 256 * 8 / 256) << name_of(fidelity) << ": every line comes once at least";
+    EXPECT_GE(paid, 0.999 * 256 * 256 * 8 / 256) << name_of(fidelity) << ": every line comes once at least";
     EXPECT_LE(paid, 1 + static_cast<double>(statistic(result, "crop.cache.line_misses") +
                                             statistic(result, "crop.cache.lines_evicted")))
         << name_of(fidelity);

@@ -7,6 +7,7 @@
 #include "cli/command_line.h"
 #include "cli/options.h"
 #include "cli/parse.h"
+#include "cli/print_config.h"
 #include "host/output_file.h"
 #include "host/terminal.h"
 #include "jobs/accuracy_job.h"
@@ -58,7 +59,11 @@ class AccuracyCommand : public Command {
 
   void run() override {
     AccuracyJob job;
-    job.simulation = arguments_.resolve(SimulationArguments::Variants::all, command_line());
+    job.simulation = arguments_.resolve(SimulationArguments::Variants::all, invocation());
+    if (prints_config(invocation())) {
+      std::cout << config_text(invocation(), job.simulation.requests, job.simulation.preprocess_parameters);
+      return;
+    }
     job.quick = quick_;
     job.markdown = markdown_;
     if (const auto text = single(repeat_, "--repeat")) job.repeat = parse_count(*text, "--repeat", largest_repeat);

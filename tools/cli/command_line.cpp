@@ -167,8 +167,14 @@ int run_parsed(int argc, const char* const* argv) {
     if (!parts[i]->parsed()) continue;
     refuse_missing_values(*parts[i]);
     refuse_leftovers(*parts[i], parts);
-    commands[i]->called_as({argv, argv + argc});
-    commands[i]->run();
+    std::optional<ConfigFile> config = read_config(*parts[i]);
+    commands[i]->called_as({{argv, argv + argc}, parts[i], config});
+    try {
+      commands[i]->run();
+    } catch (const UserError& error) {
+      if (!config) throw;
+      throw CommandFailure(exit_user_error, config->located(error.what()));
+    }
     return 0;
   }
   std::vector<std::string> names;

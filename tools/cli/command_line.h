@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "cli/config_file.h"
+
 namespace CLI {
 class App;
 }
@@ -19,16 +21,16 @@ class Command {
   virtual std::string summary() const = 0;  ///< one line, for `vrpipe --help`
   /// Adds options to the command's own part of the command line.
   virtual void declare(CLI::App& app) = 0;
-  /// The whole command line, before run().
-  void called_as(std::vector<std::string> words) { words_ = std::move(words); }
+  /// Before run().
+  void called_as(Invocation invocation) { invocation_ = std::move(invocation); }
   /// Does it; the options are parsed. Throws UserError, CommandFailure or a fault.
   virtual void run() = 0;
 
  protected:
-  const std::vector<std::string>& command_line() const { return words_; }
+  const Invocation& invocation() const { return invocation_; }
 
  private:
-  std::vector<std::string> words_;
+  Invocation invocation_;
 };
 
 std::unique_ptr<Command> make_run_command();

@@ -1,9 +1,11 @@
+#include <iostream>
 #include <optional>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/command_line.h"
 #include "cli/options.h"
+#include "cli/print_config.h"
 #include "cli/print_result.h"
 #include "jobs/simulation_job.h"
 #include "jobs/views_job.h"
@@ -15,19 +17,20 @@ class CompareCommand : public Command {
  public:
   std::string name() const override { return "compare"; }
   std::string summary() const override {
-    return "the variants baseline, qm, het and het+qm side by side (the main job)";
+    return "variants side by side: baseline, qm, het, het+qm and those of your own (the main job)";
   }
 
   void declare(CLI::App& app) override {
     arguments_.declare(app, SimulationArguments::Variants::all);
+    arguments_.declare_comparison(app);
     arguments_.declare_frames(app);
     arguments_.declare_views(app);
     arguments_.declare_explanation(app);
     app.footer(
-        "Simulates four GPUs that differ only in the units swapped in, on the same draw: baseline, qm (TGC and QRU\n"
-        "merge overlapping quads), het (ZROP and CROP terminate opaque pixels) and het+qm (both). Prints cycles,\n"
-        "speed-ups, counts and utilization side by side; with --views, how speed-ups and early-termination ratios\n"
-        "are distributed over many cameras.\n"
+        "Simulates GPUs that differ only in the units swapped in, on the same draw: baseline, qm (TGC and QRU merge\n"
+        "overlapping quads), het (ZROP and CROP terminate opaque pixels) and het+qm (both), or any set of variants\n"
+        "and platforms. Prints cycles, speed-ups, counts and utilization side by side; with --views, how speed-ups\n"
+        "and early-termination ratios are distributed over many cameras.\n"
         "\n"
         "Examples:\n"
         "  vrpipe compare\n"
@@ -36,12 +39,18 @@ class CompareCommand : public Command {
         "  vrpipe compare --scene point_cloud.ply --camera cameras.json --views 20 --size 1280x720\n"
         "  vrpipe compare --scene builtin:indoor --views 8 --fidelity lt\n"
         "  vrpipe compare --platform mobile --format rgba8\n"
+        "  vrpipe compare --variant het+qm --variant small=het+qm,tc.bins=16,tgc.bins=64\n"
+        "  vrpipe compare --platform agx-orin --platform mobile --relative-to mobile/baseline\n"
         "  vrpipe compare --set qru.quads_per_cycle=4 --json - | python3 -m json.tool");
   }
 
   void run() override {
     const std::optional<ViewsChoice> views = arguments_.views();
-    const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::all, command_line());
+    const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::all, invocation());
+    if (prints_config(invocation())) {
+      std::cout << config_text(invocation(), job.requests, job.preprocess_parameters);
+      return;
+    }
     if (views) {
       print_result(job, simulate_views(job, *views));
     } else {

@@ -8,6 +8,7 @@
 
 #include "cli/command_line.h"
 #include "cli/options.h"
+#include "cli/print_config.h"
 #include "host/output_file.h"
 #include "host/terminal.h"
 #include "jobs/microbench_job.h"
@@ -42,7 +43,11 @@ class MicrobenchCommand : public Command {
   }
 
   void run() override {
-    MachineJob job = arguments_.resolve_machine(command_line());
+    MachineJob job = arguments_.resolve_machine(invocation());
+    if (prints_config(invocation())) {
+      std::cout << config_text(invocation(), {job.request}, {});
+      return;
+    }
     std::vector<std::string> names = microbench_names();
     if (name_ != "all") names = {name_};
     for (const std::string& each : names) check_microbench(each, job.request);

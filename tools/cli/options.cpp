@@ -1,6 +1,7 @@
 #include "cli/options.h"
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <thread>
 
@@ -16,7 +17,9 @@
 #include "host/crash_report.h"
 #include "host/output_file.h"
 #include "host/stdout_to_stderr.h"
+#include "jobs/comparison.h"
 #include "jobs/settings.h"
+#include "jobs/user_variants.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -60,6 +63,13 @@ std::string names_of(const std::vector<Fidelity>& fidelities) {
     text += vrpipe::name_of(fidelity);
   }
   return text;
+}
+
+/// Whether a setting is from a configuration file.
+std::function<bool(const Setting&)> of_file(const Invocation& invocation) {
+  return [&invocation](const Setting& setting) {
+    return invocation.gives("--set " + setting.unit + "." + setting.parameter);
+  };
 }
 
 /// Of KEY=VALUE texts, only different keys may be given more than once.
@@ -133,12 +143,15 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
   add_option(app, "--fovy", fovy_, "DEGREES", "vertical field of view (default: the scene's own, 50 for a file)",
              scene_group);
 
+  declare_config(app);
+  add_option(app, "--define", definitions_, "NAME=BASE,...", "", "");
   declare_platform(app);
   if (variants == Variants::one) {
-    add_option(app, "--variant", variant_, "NAME",
+    add_option(app, "--variant", variant_, "NAME|NAME=BASE,...",
                "baseline, qm (quad merging), het (hardware early termination) or\n"
-               "het+qm (default: " +
-                   variant_default + ")",
+               "het+qm, or one of your own, as in mine=het+qm,qru=same-splat,tc.bins=64\n"
+               "(default: " +
+                   variant_default + "; docs/configuration.md)",
                machine_group);
   }
   declare_changes(app);
@@ -181,9 +194,33 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
                result_group);
   }
   if (variants == Variants::all) declare_jobs(app);
+  // For --print-config; help says them in words.
+  for (const auto& [name, usual] :
+       {std::pair{"--scene", "builtin:object"}, std::pair{"--effects", "auto"}, std::pair{"--format", "rgba16f"},
+        std::pair{"--termination", "paper"}, std::pair{"--background", "0,0,0"}}) {
+    app.get_option(name)->default_str(usual);
+  }
+  if (variants == Variants::one) app.get_option("--variant")->default_str(variant_default);
+}
+
+void SimulationArguments::declare_comparison(CLI::App& app) {
+  compares_any_ = true;
+  app.get_option("--platform")
+      ->description("the GPU (default: " + platforms().front().name +
+                    "; `vrpipe platforms` lists them); can be\nrepeated: every variant on every platform");
+  add_option(app, "--variant", variant_, "NAME|NAME=BASE,...",
+             "what is compared: baseline, qm, het, het+qm, or one of your own, as in\n"
+             "mine=het+qm,qru=same-splat,tc.bins=64; can be repeated (default: those four,\n"
+             "and those of plugins and of --config; docs/configuration.md)",
+             machine_group);
+  add_option(app, "--relative-to", relative_to_, "NAME",
+             "over what speed-ups are: a variant, or PLATFORM/VARIANT where there are\n"
+             "several platforms (default: the first)",
+             result_group);
 }
 
 void SimulationArguments::declare_machine(CLI::App& app) {
+  declare_config(app);
   declare_platform(app);
   declare_changes(app);
   declare_fidelity(app);
@@ -193,7 +230,8 @@ void SimulationArguments::declare_machine(CLI::App& app) {
 
 void SimulationArguments::declare_platform(CLI::App& app) {
   add_option(app, "--platform", platform_, "NAME",
-             "the GPU (default: " + platforms().front().name + "; `vrpipe platforms` lists them)", machine_group);
+             "the GPU (default: " + platforms().front().name + "; `vrpipe platforms` lists them)", machine_group)
+      ->default_str(platforms().front().name);
 }
 
 void SimulationArguments::declare_changes(CLI::App& app) {
@@ -214,7 +252,8 @@ void SimulationArguments::declare_fidelity(CLI::App& app) {
              "how exact time is, from images and counts alone to every unit in every\n"
              "cycle: " +
                  names_of(fidelities()) + " (default: cycle)",
-             rules_group);
+             rules_group)
+      ->default_str(vrpipe::name_of(Fidelity::cycle));
 }
 
 void SimulationArguments::declare_json(CLI::App& app) {
@@ -377,18 +416,20 @@ void SimulationArguments::check_explanation(const EffectChoice& effects) const {
   }
 }
 
-SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<std::string>& command) const {
+SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& invocation) const {
   // Plugins first: they may bring the platform and the units that the other options name.
   load_plugins(plugins_);
+  for (const std::string& text : definitions_) add_user_variant(parse_variant(text));
 
   SimulationJob job;
   job.schema = !views_.empty() ? "vrpipe.views/1" : variants == Variants::one ? "vrpipe.run/1" : "vrpipe.compare/1";
-  job.provenance = make_provenance(command, plugins_);
+  job.provenance = make_provenance(invocation.words, plugins_);
+  note_config(invocation, job.provenance);
   job.scene = scene_request();
   job.frame = frame();
 
   SettingsByPart parts;
-  RunRequest request = machine(parts);
+  RunRequest request = machine(parts, invocation);
   if (const auto list = single(effects_, "--effects")) request.effects = EffectChoice::parse(*list);
   check_explanation(request.effects);
   job.explain_effects = explain_effects_;
@@ -399,18 +440,17 @@ SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<
   job.preprocessing = std::move(parts.preprocessing);
   job.preprocess_parameters = std::move(parts.preprocess_parameters);
 
-  std::vector<Variant> wanted = vrpipe::variants();
-  if (variants == Variants::one) wanted = {variant_named(single(variant_, "--variant").value_or(variant_default))};
-  for (const Variant& variant : wanted) {
-    job.requests.push_back(request);
-    job.requests.back().variant = variant;
+  job.requests = requests(request, variants);
+  leave_out_restated(job.requests, of_file(invocation));
+  for (RunRequest& each : job.requests) {
     const StdoutToStderr redirected;
     if (variants == Variants::one) {
-      job.trace = trace(job.requests.back());
-      if (job.trace) job.requests.back().observers = job.trace->observers();
+      job.trace = trace(each);
+      if (job.trace) each.observers = job.trace->observers();
     }
-    check_configuration(job.requests.back());
+    check_configuration(each);
   }
+  job.baseline = place_of_run(job.requests, single(relative_to_, "--relative-to").value_or(""), "--relative-to");
 
   if (const auto text = single(background_, "--background")) job.background = parse_background(*text, "--background");
   if (const auto folder = single(output_, "--output")) {
@@ -425,17 +465,21 @@ SimulationJob SimulationArguments::resolve(Variants variants, const std::vector<
   return job;
 }
 
-MachineJob SimulationArguments::resolve_machine(const std::vector<std::string>& command) const {
+MachineJob SimulationArguments::resolve_machine(const Invocation& invocation) const {
   load_plugins(plugins_);
   MachineJob job;
-  job.provenance = make_provenance(command, plugins_);
+  job.provenance = make_provenance(invocation.words, plugins_);
+  note_config(invocation, job.provenance);
   SettingsByPart parts;
-  job.request = machine(parts);
+  job.request = machine(parts, invocation);
   if (!parts.preprocessing.empty()) {
     throw UserError("cannot set 'preprocess." + parts.preprocessing.front().parameter + "'", "--set",
                     "no scene is preprocessed", "leave it out");
   }
   job.request.variant = variant_named("baseline");
+  std::vector<RunRequest> requests{job.request};
+  leave_out_restated(requests, of_file(invocation));
+  job.request = requests.front();
   {
     const StdoutToStderr redirected;
     check_configuration(job.request);
@@ -446,19 +490,62 @@ MachineJob SimulationArguments::resolve_machine(const std::vector<std::string>& 
   return job;
 }
 
-RunRequest SimulationArguments::machine(SettingsByPart& parts) const {
+RunRequest SimulationArguments::machine(SettingsByPart& parts, const Invocation& invocation) const {
   RunRequest request;
-  const auto platform = single(platform_, "--platform");
-  request.platform = platform ? &platform_named(*platform) : &platforms().front();
+  request.platform = chosen_platforms().front();
   if (const auto name = single(fidelity_, "--fidelity")) request.fidelity = fidelity_named(*name);
   refuse_keys_given_twice(settings_, "--set");
   refuse_keys_given_twice(units_, "--unit");
   std::vector<Setting> settings;
-  for (const std::string& text : settings_) settings.push_back(parse_setting(text));
+  for (const std::string& text : settings_) {
+    const Setting setting = parse_setting(text);
+    if (!restates_preprocessing(setting) || !of_file(invocation)(setting)) settings.push_back(setting);
+  }
   parts = sort_settings(settings);
   request.settings = parts.machine;
   for (const std::string& text : units_) request.units.push_back(parse_unit_choice(text));
   return request;
+}
+
+std::vector<const Platform*> SimulationArguments::chosen_platforms() const {
+  if (platform_.empty()) return {&platforms().front()};
+  if (!compares_any_) static_cast<void>(single(platform_, "--platform"));
+  std::vector<const Platform*> chosen;
+  for (const std::string& name : platform_) chosen.push_back(&platform_named(name));
+  return chosen;
+}
+
+std::vector<Variant> SimulationArguments::chosen_variants(Variants variants) const {
+  if (variants == Variants::one) static_cast<void>(single(variant_, "--variant"));
+  std::vector<Variant> chosen;
+  for (const std::string& text : variant_) {
+    const bool is_new = text.find('=') != std::string::npos;
+    chosen.push_back(is_new ? add_user_variant(parse_variant(text)) : variant_named(text));
+  }
+  if (chosen.empty() && variants == Variants::one) return {variant_named(variant_default)};
+  return chosen.empty() ? vrpipe::variants() : chosen;
+}
+
+std::vector<RunRequest> SimulationArguments::requests(const RunRequest& common, Variants variants) const {
+  std::vector<RunRequest> all;
+  const std::vector<const Platform*> on = chosen_platforms();
+  const std::vector<Variant> compared = chosen_variants(variants);
+  std::vector<std::string> names;
+  for (const Platform* platform : on) {
+    for (const Variant& variant : compared) {
+      RunRequest request = common;
+      request.platform = platform;
+      request.variant = variant;
+      request.name = on.size() > 1 ? platform->name + "/" + variant.name : variant.name;
+      if (std::find(names.begin(), names.end(), request.name) != names.end()) {
+        throw UserError("'" + request.name + "' given twice", on.size() > 1 ? "--platform, --variant" : "--variant",
+                        "each is compared once", "leave out one");
+      }
+      names.push_back(request.name);
+      all.push_back(std::move(request));
+    }
+  }
+  return all;
 }
 
 unsigned SimulationArguments::processes() const {

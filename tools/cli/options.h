@@ -7,6 +7,7 @@
 
 #include <vrpipe/workloads/scene.h>
 
+#include "cli/config_file.h"
 #include "jobs/settings.h"
 #include "jobs/simulation_job.h"
 #include "jobs/views_job.h"
@@ -46,10 +47,12 @@ class SimulationArguments {
   enum class Variants { one, all };
 
   void declare(CLI::App& app, Variants variants);
+  /// --variant and --platform as often as one likes, and --relative-to, for commands that compare any set of them.
+  void declare_comparison(CLI::App& app);
   /// Those alone that say on what and how exactly it is simulated, for commands that draw frames of their own.
   void declare_machine(CLI::App& app);
   /// What these say; as `resolve`.
-  MachineJob resolve_machine(const std::vector<std::string>& command) const;
+  MachineJob resolve_machine(const Invocation& invocation) const;
   /// --frame and --multi-pass, for commands that draw frames of several draws as well.
   void declare_frames(CLI::App& app);
   /// --views and --journal, for commands that draw a scene from many cameras as well.
@@ -58,9 +61,8 @@ class SimulationArguments {
   std::optional<ViewsChoice> views() const;
   /// --explain-effects, for commands that report effects of each run.
   void declare_explanation(CLI::App& app);
-  /// Loads the plugins and checks every option but the names of output files, which the commands know; `command` is the
-  /// whole command line. Throws UserError.
-  SimulationJob resolve(Variants variants, const std::vector<std::string>& command) const;
+  /// Loads the plugins and checks every option but the names of output files, which the commands know. Throws UserError.
+  SimulationJob resolve(Variants variants, const Invocation& invocation) const;
 
  private:
   void declare_platform(CLI::App& app);
@@ -68,8 +70,11 @@ class SimulationArguments {
   void declare_fidelity(CLI::App& app);
   void declare_json(CLI::App& app);
   void declare_jobs(CLI::App& app);
-  /// Platform, fidelity, settings and units.
-  RunRequest machine(SettingsByPart& parts) const;
+  /// The first platform, fidelity, settings and units.
+  RunRequest machine(SettingsByPart& parts, const Invocation& invocation) const;
+  std::vector<const Platform*> chosen_platforms() const;
+  std::vector<Variant> chosen_variants(Variants variants) const;
+  std::vector<RunRequest> requests(const RunRequest& common, Variants variants) const;
   unsigned processes() const;
   SceneRequest scene_request() const;
   FrameDescription frame() const;
@@ -79,9 +84,10 @@ class SimulationArguments {
 
   Values meshes_;
   Values scene_, frame_, passes_, size_, camera_, eye_, look_at_, up_, fovy_;
-  Values platform_, settings_, variant_, units_, plugins_;
+  Values platform_, settings_, variant_, definitions_, units_, plugins_;
   Values fidelity_, effects_, format_, termination_;
-  Values views_, journal_;
+  Values views_, journal_, relative_to_;
+  bool compares_any_ = false;
   Values background_, output_, json_, save_draw_, jobs_;
   Values trace_, trace_every_, trace_statistics_;
   bool explain_effects_ = false;

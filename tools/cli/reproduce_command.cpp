@@ -15,6 +15,7 @@
 #include "cli/command_line.h"
 #include "cli/options.h"
 #include "cli/parse.h"
+#include "cli/print_config.h"
 #include "host/output_file.h"
 #include "host/process_setup.h"
 #include "host/terminal.h"
@@ -49,6 +50,7 @@ class ReproduceCommand : public Command {
   std::string summary() const override { return "the paper's numbers beside what is measured here"; }
 
   void declare(CLI::App& app) override {
+    declare_config(app);
     app.add_flag("--quick", quick_,
                  "a first answer in less than 3 minutes: everything at lt, two views, and of the\n"
                  "open parameters those that matter most")
@@ -101,6 +103,10 @@ class ReproduceCommand : public Command {
 
   void run() override {
     const ReproduceJob job = resolve();
+    if (prints_config(invocation())) {
+      std::cout << config_text(invocation(), {job.options.base}, {});
+      return;
+    }
     ProgressLine progress;
     const ReproduceResult result = simulate_reproduction(job, progress);
     const Reproduction reproduction = reproduction_of(result);
@@ -122,7 +128,8 @@ class ReproduceCommand : public Command {
  private:
   ReproduceJob resolve() const {
     ReproduceJob job;
-    job.provenance = make_provenance(command_line(), {});
+    job.provenance = make_provenance(invocation().words, {});
+    note_config(invocation(), job.provenance);
     job.options.quick = quick_;
     job.options.substitutions = scenes_;
     for (const SceneSubstitution& file : scene_substitutions(scenes_, "--scene")) {

@@ -1,7 +1,10 @@
+#include <iostream>
+
 #include <CLI/CLI.hpp>
 
 #include "cli/command_line.h"
 #include "cli/options.h"
+#include "cli/print_config.h"
 #include "cli/print_result.h"
 #include "jobs/simulation_job.h"
 
@@ -33,7 +36,11 @@ class RunCommand : public Command {
   }
 
   void run() override {
-    const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::one, command_line());
+    const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::one, invocation());
+    if (prints_config(invocation())) {
+      std::cout << config_text(invocation(), job.requests, job.preprocess_parameters);
+      return;
+    }
     print_result(job, perform(job));
   }
 

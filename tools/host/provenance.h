@@ -15,7 +15,9 @@ struct PluginFile {
 struct Provenance {
   std::vector<std::string> command;  ///< the command line, word by word
   std::vector<PluginFile> plugins;
-  double load_average = 0;  ///< of the host over the minute before, processes
+  std::string config;                        ///< the file of --config; empty for none
+  std::vector<std::string> config_settings;  ///< UNIT.PARAMETER of those that it says
+  double load_average = 0;                   ///< of the host over the minute before, processes
 };
 
 /// Takes note of the plugins and of the host as it is now. Throws UserError for a plugin that cannot be read.

@@ -1,22 +1,50 @@
 #include "jobs/comparison.h"
 
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include <vrpipe/component/error.h>
+
 namespace vrpipe::tools {
 
 std::optional<double> speedup(const RunResult& baseline, const RunResult& run) {
   if (!baseline.cycles || !run.cycles || *run.cycles == 0) return std::nullopt;
   if (baseline.counts.fragments_rasterized == 0) return std::nullopt;
-  return static_cast<double>(*baseline.cycles) / static_cast<double>(*run.cycles);
+  const double ratio = static_cast<double>(*baseline.cycles) / static_cast<double>(*run.cycles);
+  const double from = baseline.request.platform->frequency_mhz;
+  const double to = run.request.platform->frequency_mhz;
+  return from == to ? ratio : ratio * to / from;
 }
 
 std::optional<double> early_termination_ratio(const std::vector<RunResult>& runs) {
   const RunResult* without = nullptr;
   const RunResult* with = nullptr;
   for (const RunResult& run : runs) {
-    if (run.request.variant.quad_merging) continue;
-    (run.request.variant.early_termination ? with : without) = &run;
+    const Variant& variant = run.request.variant;
+    if (variant.quad_merging || !variant.base.empty()) continue;
+    if (run.request.platform != runs.front().request.platform) continue;
+    const RunResult*& found = variant.early_termination ? with : without;
+    if (found == nullptr) found = &run;
   }
   if (without == nullptr || with == nullptr || with->counts.fragments_blended == 0) return std::nullopt;
   return static_cast<double>(without->counts.fragments_blended) / static_cast<double>(with->counts.fragments_blended);
+}
+
+bool are_of_several_platforms(const std::vector<RunResult>& runs) {
+  return std::any_of(runs.begin(), runs.end(),
+                     [&](const RunResult& run) { return run.request.platform != runs.front().request.platform; });
+}
+
+std::size_t place_of_run(const std::vector<RunRequest>& requests, const std::string& name, const std::string& option) {
+  if (name.empty()) return 0;
+  std::vector<std::string> names;
+  for (const RunRequest& request : requests) {
+    if (name_of(request) == name) return names.size();
+    names.push_back(name_of(request));
+  }
+  throw UserError("unknown run '" + name + "'", option, "it is none of those that are compared",
+                  fmt::format("did you mean {}? There are {}", nearest_name(name, names), fmt::join(names, ", ")));
 }
 
 }  // namespace vrpipe::tools

@@ -80,7 +80,7 @@ std::vector<EffectCosts> measure_effects(const std::vector<RunResult>& runs, con
     for (const Repetition& repetition : repetitions) {
       RunRequest request = repetition.run->request;
       request.effects = repetition.effects;
-      tasks.push_back({request.variant.name + " " + request.effects.text(), request, frame});
+      tasks.push_back({name_of(request) + " " + request.effects.text(), request, frame});
     }
   }
   // One at a time, so that none takes cache or memory from another.
@@ -91,7 +91,7 @@ std::vector<EffectCosts> measure_effects(const std::vector<RunResult>& runs, con
     if (!repetition.is_same || simulated.result.result_hash == run.result_hash) return;
     throw CommandFailure(
         exit_fault, fmt::format("variant {}: what is left out changes the result: --effects {} gives another than {}",
-                                run.request.variant.name, run.request.effects.text(), repetition.effects.text()));
+                                name_of(run.request), run.request.effects.text(), repetition.effects.text()));
   });
   return costs;
 }

@@ -45,6 +45,33 @@ json scene_identity(const std::string& scene) {
   return identity;
 }
 
+json settings_identity(const std::vector<Setting>& settings) {
+  json all = json::array();
+  for (const Setting& setting : settings) {
+    all.push_back(valid_utf8(setting.unit + "." + setting.parameter + "=" + setting.value));
+  }
+  return all;
+}
+
+json request_identity(const RunRequest& request) {
+  const auto units = [](const std::vector<UnitChoice>& choices) {
+    json all = json::array();
+    for (const UnitChoice& unit : choices) all.push_back(valid_utf8(unit.slot + "=" + unit.implementation));
+    return all;
+  };
+  const Variant& variant = request.variant;
+  return {{"platform", valid_utf8(request.platform->name)},
+          {"variant",
+           {valid_utf8(variant.name), valid_utf8(variant.base), units(variant.changed_units),
+            settings_identity(variant.changed_settings)}},
+          {"fidelity", vrpipe::name_of(request.fidelity)},
+          {"effects", request.effects.text()},
+          {"format", vrpipe::name_of(request.format)},
+          {"termination", name_of(request.termination)},
+          {"set", settings_identity(request.settings)},
+          {"unit", units(request.units)}};
+}
+
 std::string sha256(const std::string& text) {
   std::array<char, SHA256_DIGEST_STRING_LENGTH> digits{};
   ::SHA256Data(reinterpret_cast<const std::uint8_t*>(text.data()), text.size(), digits.data());

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
+
+#include <vrpipe/platforms/simulation.h>
 
 namespace vrpipe::tools {
 
@@ -12,6 +15,9 @@ namespace vrpipe::tools {
 nlohmann::json file_identity(const std::string& name);
 /// Of SceneRequest::scene, which names a file: its files, and what of them is taken.
 nlohmann::json scene_identity(const std::string& scene);
+nlohmann::json settings_identity(const std::vector<Setting>& settings);
+/// Of all that a run's result depends on beside what is drawn, the program and its plugins.
+nlohmann::json request_identity(const RunRequest& request);
 /// 64 hex digits.
 std::string sha256(const std::string& text);
 

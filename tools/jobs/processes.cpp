@@ -197,8 +197,8 @@ class Worker {
 
  private:
   [[noreturn]] void fail(int code, const std::string& text) const {
-    const std::string& variant = request_.variant.name;
-    throw CommandFailure(code, "variant " + variant + (name_ == variant ? "" : ", " + name_) + ": " + text);
+    const std::string& name = name_of(request_);
+    throw CommandFailure(code, "variant " + name + (name_ == name ? "" : ", " + name_) + ": " + text);
   }
 
   [[noreturn]] void work(int out, const Frame& frame, SharedImage* image, std::atomic<float>& progress) const {
@@ -247,8 +247,8 @@ Simulated simulate_here(const RunRequest& request, const Frame& frame, bool with
   {
     const StdoutToStderr redirected;
     std::atomic<float> done{0.0F};
-    const ProgressThread drawing(request.variant.name, done, progress);
-    if (!loaded_plugins().empty()) report_crashes("variant " + request.variant.name + ": ");
+    const ProgressThread drawing(name_of(request), done, progress);
+    if (!loaded_plugins().empty()) report_crashes("variant " + name_of(request) + ": ");
     simulated.result = simulate(request, frame, &done);
   }
   progress.erase();
@@ -313,7 +313,7 @@ void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned proces
 std::vector<Simulated> simulate_in_processes(const std::vector<RunRequest>& requests, const FrameSource& frame,
                                              bool with_images, unsigned processes, ProgressLine& progress) {
   std::vector<Task> tasks;
-  for (const RunRequest& request : requests) tasks.push_back({request.variant.name, request, frame});
+  for (const RunRequest& request : requests) tasks.push_back({name_of(request), request, frame});
   std::vector<Simulated> results(requests.size());
   run_tasks(tasks, with_images, processes, {}, progress,
             [&](std::size_t index, Simulated&& simulated) { results[index] = std::move(simulated); });

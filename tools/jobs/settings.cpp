@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/platforms/configuration.h>
 #include <vrpipe/workloads/preprocess_parameters.h>
 
 namespace vrpipe::tools {
@@ -25,6 +26,53 @@ std::vector<ParameterListing> all_parameters(const Platform* platform) {
   listings.push_back({preprocess_unit, "projection", "what is done to a scene before the draw, at no simulated time",
                       false, std::make_unique<PreprocessParameters>()});
   return listings;
+}
+
+std::vector<std::pair<std::string, std::string>> final_parameters(const RunRequest& request) {
+  RunRequest all = request;
+  all.effects = EffectChoice::parse("all");
+  all.observers = nullptr;
+  return Configuration(all, Frame(1, 1)).parameters();
+}
+
+void leave_out_restated(std::vector<RunRequest>& requests, const std::function<bool(const Setting&)>& which) {
+  const std::vector<Setting>& given = requests.front().settings;
+  std::vector<bool> restated, is_listed(given.size(), false);
+  for (const Setting& setting : given) restated.push_back(which(setting));
+  for (const RunRequest& request : requests) {
+    RunRequest shorter = request;
+    std::vector<Setting>& kept = shorter.settings;
+    kept.erase(std::remove_if(kept.begin(), kept.end(), which), kept.end());
+    if (kept.size() == given.size()) return;
+    // One that names a path may be in neither list.
+    const auto with = final_parameters(request), without = final_parameters(shorter);
+    for (std::size_t i = 0; i < given.size(); ++i) {
+      const std::string name = given[i].unit + "." + given[i].parameter;
+      const auto value_in = [&](const auto& parameters) {
+        const auto found = std::find_if(parameters.begin(), parameters.end(),
+                                        [&](const auto& parameter) { return parameter.first == name; });
+        return found == parameters.end() ? std::string() : found->second;
+      };
+      is_listed[i] = is_listed[i] || !value_in(with).empty();
+      restated[i] = restated[i] && value_in(with) == value_in(without);
+    }
+  }
+  std::vector<Setting> kept;
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (!restated[i] || !is_listed[i]) kept.push_back(given[i]);
+  }
+  for (RunRequest& request : requests) request.settings = kept;
+}
+
+bool restates_preprocessing(const Setting& setting) {
+  if (setting.unit != preprocess_unit) return false;
+  PreprocessParameters given;
+  given.set(setting.parameter, setting.value);
+  const PreprocessParameters usual;
+  for (std::size_t i = 0; i < usual.parameters().size(); ++i) {
+    if (given.parameters()[i]->value() != usual.parameters()[i]->value()) return false;
+  }
+  return true;
 }
 
 SettingsByPart sort_settings(const std::vector<Setting>& settings) {

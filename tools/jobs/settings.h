@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,6 +21,15 @@ struct SettingsByPart {
   /// `preprocess.NAME` and value of every parameter of preprocessing.
   std::vector<std::pair<std::string, std::string>> preprocess_parameters;
 };
+
+/// UNIT.PARAMETER and final value of everything that can be set, without preprocessing. Throws UserError.
+std::vector<std::pair<std::string, std::string>> final_parameters(const RunRequest& request);
+
+/// Leaves out those settings of `which` that are so anyway in every request, so that reports list changes alone: a
+/// configuration file may say everything. Throws UserError.
+void leave_out_restated(std::vector<RunRequest>& requests, const std::function<bool(const Setting&)>& which);
+/// Whether a setting of preprocessing is the default. Throws UserError for one that does not exist.
+bool restates_preprocessing(const Setting& setting);
 
 /// Sorts settings, and applies those of preprocessing. Throws UserError for an unknown parameter or a bad value of
 /// preprocessing; the others are not checked.

@@ -24,7 +24,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 /// Writes the images of all runs, side by side: compression takes longer than the disk.
 void write_images(const SimulationJob& job, const std::vector<Simulated>& simulated, JobResult& result) {
   for (const RunResult& run : result.runs) {
-    result.images.emplace_back(image_files(job, image_name(result.scene.name, run.request.variant.name)));
+    result.images.emplace_back(image_files(job, image_name(result.scene.name, name_of(run.request))));
   }
   for_each_chunk(simulated.size(), job.processes, [&](std::uint64_t i) {
     const SharedImage& image = *simulated[i].image;
@@ -35,11 +35,13 @@ void write_images(const SimulationJob& job, const std::vector<Simulated>& simula
 
 }  // namespace
 
-std::string image_name(const std::string& scene, const std::string& variant) {
+std::string image_name(const std::string& scene, const std::string& run) {
   const std::string builtin = "builtin:";
-  const std::string name =
+  std::string name =
       scene.rfind(builtin, 0) == 0 ? scene.substr(builtin.size()) : std::filesystem::path(scene).stem().string();
-  return name + "-" + variant;
+  name += "-" + run;
+  std::replace(name.end() - static_cast<std::ptrdiff_t>(run.size()), name.end(), '/', '-');
+  return name;
 }
 
 ImageFiles image_files(const SimulationJob& job, const std::string& name) {
@@ -71,12 +73,13 @@ void save_draw(const SimulationJob& job, const Draw& draw) {
 JobResult perform(const SimulationJob& job) {
   std::vector<std::string> images;
   for (const RunRequest& request : job.requests) {
-    images.push_back(image_name(job.frame.name, request.variant.name));
+    images.push_back(image_name(job.frame.name, name_of(request)));
   }
   check_outputs(job, images);
   JobResult result;
   result.schema = job.schema;
   result.provenance = job.provenance;
+  result.baseline = job.baseline;
   ProgressLine progress;
   std::vector<Simulated> simulated;
   bool preprocessed_here = false;

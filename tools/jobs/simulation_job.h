@@ -27,7 +27,8 @@ struct SimulationJob {
   Provenance provenance;
   SceneRequest scene;                  ///< --scene, and how scenes are looked at
   FrameDescription frame;              ///< of --frame, or --scene as its one draw
-  std::vector<RunRequest> requests;    ///< one for each variant, alike in everything else
+  std::vector<RunRequest> requests;    ///< one for each platform and variant, alike in everything else
+  std::size_t baseline = 0;            ///< of `requests`, over which speed-ups are
   std::vector<Setting> preprocessing;  ///< of --set, for the report; `scene` has them
   /// `preprocess.NAME` and value of every parameter of preprocessing.
   std::vector<std::pair<std::string, std::string>> preprocess_parameters;
@@ -58,6 +59,7 @@ struct JobResult {
   std::uint32_t height = 0;
   std::uint32_t passes = 1;  ///< FrameDescription::passes
   std::vector<RunResult> runs;
+  std::size_t baseline = 0;                       ///< of `runs`, over which speed-ups are
   std::vector<std::optional<ImageFiles>> images;  ///< one for each run
   std::vector<EffectCosts> effect_costs;          ///< one for each run, if they were asked for
   unsigned processes = 1;
@@ -65,8 +67,9 @@ struct JobResult {
   double simulate_seconds = 0;  ///< wall time of all simulations together
 };
 
-/// Name of the images of a run, without folder and extension: SCENE-VARIANT.
-std::string image_name(const std::string& scene, const std::string& variant);
+/// Name of the images of a run, without folder and extension: SCENE-VARIANT, or SCENE-PLATFORM-VARIANT.
+/// @param run  its name_of()
+std::string image_name(const std::string& scene, const std::string& run);
 
 /// Checks, before anything is read, that all files that a job will write can be written, and overwrite neither what it
 /// reads nor each other.

@@ -100,29 +100,11 @@ json cameras_identity(const ViewsResult& result) {
   return {{"file", file}, {"views", result.views.size()}, {"sha256", sha256(all.dump())}};
 }
 
-json texts(const std::vector<Setting>& settings) {
-  json all = json::array();
-  for (const Setting& setting : settings) {
-    all.push_back(valid_utf8(setting.unit + "." + setting.parameter + "=" + setting.value));
-  }
-  return all;
-}
-
-json settings_identity(const SimulationJob& job) {
-  const RunRequest& request = job.requests.front();
-  json variants = json::array();
-  for (const RunRequest& each : job.requests) variants.push_back(valid_utf8(each.variant.name));
-  json units = json::array();
-  for (const UnitChoice& unit : request.units) units.push_back(valid_utf8(unit.slot + "=" + unit.implementation));
-  return {{"platform", valid_utf8(request.platform->name)},
-          {"variants", variants},
-          {"fidelity", vrpipe::name_of(request.fidelity)},
-          {"effects", request.effects.text()},
-          {"format", vrpipe::name_of(request.format)},
-          {"termination", name_of(request.termination)},
-          {"set", texts(request.settings)},
-          {"unit", units},
-          {"preprocessing", texts(job.preprocessing)},
+json runs_identity(const SimulationJob& job) {
+  json requests = json::array();
+  for (const RunRequest& request : job.requests) requests.push_back(request_identity(request));
+  return {{"runs", requests},
+          {"preprocessing", settings_identity(job.preprocessing)},
           {"multi_pass", job.frame.passes}};
 }
 
@@ -146,7 +128,7 @@ json identity(const SimulationJob& job, const ViewsResult& result) {
           {"scene", is_builtin ? json(result.scene) : scene_identity(job.scene.scene)},
           {"meshes", meshes},
           {"cameras", cameras_identity(result)},
-          {"settings", settings_identity(job)},
+          {"settings", runs_identity(job)},
           {"images", images}};
 }
 
@@ -272,7 +254,7 @@ void simulate(const SimulationJob& job, ViewFrames& frames, ViewsResult& result,
         view.scene = frames.loaded(view).summary;
         return made;
       };
-      tasks.push_back({fmt::format("view {} {}", view.index, request.variant.name), request, frame});
+      tasks.push_back({fmt::format("view {} {}", view.index, name_of(request)), request, frame});
     }
   }
   std::vector<std::vector<RunResult>> runs(views.size(), std::vector<RunResult>(variants));
@@ -323,6 +305,7 @@ ViewsResult simulate_views(const SimulationJob& job, const ViewsChoice& choice) 
   result.preprocessing = job.preprocessing;
   result.preprocess_parameters = job.preprocess_parameters;
   result.passes = job.frame.passes;
+  result.baseline = job.baseline;
   ProgressLine progress;
   progress.show("loading " + job.frame.name);
   const auto start = SteadyClock::now();
@@ -339,7 +322,7 @@ ViewsResult simulate_views(const SimulationJob& job, const ViewsChoice& choice) 
     for (const RunRequest& request : job.requests) {
       view.images.emplace_back();
       if (!job.output) continue;
-      const std::string name = image_name(job.frame.name, request.variant.name);
+      const std::string name = image_name(job.frame.name, name_of(request));
       view.images.back() = image_files(job, (fs::path(view_folder(index, result.cameras)) / name).string());
     }
     result.views.push_back(std::move(view));
@@ -368,7 +351,7 @@ ViewsResult simulate_views(const SimulationJob& job, const ViewsChoice& choice) 
 
 std::optional<Distribution> speedup_distribution(const ViewsResult& result, std::size_t variant) {
   std::vector<std::optional<double>> values;
-  for (const ViewResult& view : result.views) values.push_back(speedup(view.runs.front(), view.runs[variant]));
+  for (const ViewResult& view : result.views) values.push_back(speedup(view.runs[result.baseline], view.runs[variant]));
   return distribution_of(values);
 }
 

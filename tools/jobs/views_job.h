@@ -48,6 +48,7 @@ struct ViewsResult {
   /// `preprocess.NAME` and value of every parameter of preprocessing.
   std::vector<std::pair<std::string, std::string>> preprocess_parameters;
   std::uint32_t passes = 1;       ///< FrameDescription::passes
+  std::size_t baseline = 0;       ///< of the runs of a view, over which speed-ups are
   std::vector<ViewResult> views;  ///< by index
   std::size_t done_before = 0;    ///< of the views, in the journal
   unsigned processes = 1;

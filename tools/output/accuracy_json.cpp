@@ -75,7 +75,7 @@ Json accuracy_json(const AccuracyResult& result) {
   Json json = head_json("vrpipe.accuracy/1", result.provenance, result.processes);
   json.update({{"scene", scene_json(result.scene, result.width, result.height)},
                {"camera", camera_json(result.viewpoint)},
-               {"platform", platform_json({result.runs.front().run}, result.preprocessing)},
+               {"platform", platform_json({result.runs.front().run}, result.preprocessing, result.provenance)},
                {"implementations", implementations_json(result.runs.front().run)},
                {"format", vrpipe::name_of(result.base.format)},
                {"termination", name_of(result.base.termination)},

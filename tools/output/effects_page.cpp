@@ -14,9 +14,9 @@ std::string reasons(const std::vector<const RunResult*>& runs, std::size_t effec
     auto found = variants_of.begin();
     while (found != variants_of.end() && found->first != reason) ++found;
     if (found == variants_of.end()) {
-      variants_of.emplace_back(reason, run->request.variant.name);
+      variants_of.emplace_back(reason, name_of(run->request));
     } else {
-      found->second += ", " + run->request.variant.name;
+      found->second += ", " + name_of(run->request);
     }
   }
   if (variants_of.size() == 1) return html_escaped(variants_of.front().first);
@@ -31,7 +31,7 @@ std::string reasons(const std::vector<const RunResult*>& runs, std::size_t effec
 
 std::string effects_html(const std::vector<const RunResult*>& runs) {
   std::string text = "<div class=\"scroll\"><table class=\"effects\">\n<tr><th>effect</th>";
-  for (const RunResult* run : runs) text += "<th>" + html_escaped(run->request.variant.name) + "</th>";
+  for (const RunResult* run : runs) text += "<th>" + html_escaped(name_of(run->request)) + "</th>";
   text += "<th>reason</th></tr>\n";
   for (std::size_t i = 0; i < runs.front()->effects.size(); ++i) {
     text += "<tr><td>" + html_escaped(runs.front()->effects[i].name) + "</td>";

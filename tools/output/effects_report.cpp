@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -22,7 +23,7 @@ std::string ratio_text(double with, double without) {
 
 /// Effect, proof, if there are costs CPU seconds without and with it and their ratio, and the reason.
 std::string run_text(const RunResult& run, const EffectCosts* costs, const TextStyle& style) {
-  std::vector<std::string> heading{"effects of " + printable(run.request.variant.name), "proof"};
+  std::vector<std::string> heading{"effects of " + printable(name_of(run.request)), "proof"};
   if (costs != nullptr) heading.insert(heading.end(), {"host s without", "with", "ratio"});
   heading.emplace_back("reason");
   TextTable table(std::move(heading));
@@ -59,13 +60,22 @@ std::string run_text(const RunResult& run, const EffectCosts* costs, const TextS
 /// Those that differ, a column for each run; the others by name.
 std::string comparison_text(const std::vector<RunResult>& runs, const TextStyle& style) {
   std::vector<std::string> heading{"effects that differ"};
-  for (const RunResult& run : runs) heading.push_back(printable(run.request.variant.name));
+  for (const RunResult& run : runs) heading.push_back(printable(name_of(run.request)));
   TextTable table(std::move(heading));
   bool any_differs = false;
   std::map<std::string, std::string> alike;  // names, by state
-  for (std::size_t i = 0; i < runs.front().effects.size(); ++i) {
-    std::vector<std::string> cells{printable(runs.front().effects[i].name)};
-    for (const RunResult& run : runs) cells.push_back(state_of(run, run.effects[i]));
+  // Platforms may have different ones.
+  std::set<std::string> all_names;
+  for (const RunResult& run : runs) {
+    for (const EffectReport& effect : run.effects) all_names.insert(effect.name);
+  }
+  for (const std::string& name : all_names) {
+    std::vector<std::string> cells{printable(name)};
+    for (const RunResult& run : runs) {
+      const auto found = std::find_if(run.effects.begin(), run.effects.end(),
+                                      [&](const EffectReport& effect) { return effect.name == name; });
+      cells.push_back(found == run.effects.end() ? "-" : state_of(run, *found));
+    }
     if (std::all_of(cells.begin() + 1, cells.end(), [&](const std::string& cell) { return cell == cells[1]; })) {
       std::string& names = alike[cells[1]];
       names += (names.empty() ? "" : ", ") + cells[0];

@@ -55,7 +55,7 @@ Json microbench_json(const MicrobenchRun& run) {
   RunResult machine;
   machine.request = run.request;
   machine.parameters = run.results.front().parameters;
-  json["platform"] = platform_json({machine}, {});
+  json["platform"] = platform_json({machine}, {}, run.provenance);
   json["units"] = units_json(run.request);
   json["fidelity"] = vrpipe::name_of(run.request.fidelity);
   json["microbenchmarks"] = Json::array();

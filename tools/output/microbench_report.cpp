@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "output/machines_text.h"
 #include "output/report.h"
 #include "output/text_plot.h"
 #include "output/text_table.h"
@@ -87,7 +88,7 @@ std::string finding(const MicrobenchFigure& figure) {
 }
 
 std::string microbench_text(const MicrobenchRun& run, const TextStyle& style) {
-  std::string text = machine_text(run.request, {}, 1, style);
+  std::string text = machine_text(run.request, style);
   for (const MicrobenchResult& result : run.results) {
     text += fmt::format("\n{}: {}\n\n", result.name, result.question) + table(result, style);
     for (const MicrobenchCurve& curve : result.curves) text += '\n' + plot(curve);

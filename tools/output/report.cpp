@@ -13,6 +13,7 @@
 
 #include "jobs/comparison.h"
 #include "output/effects_report.h"
+#include "output/machines_text.h"
 #include "output/text_table.h"
 
 namespace vrpipe::tools {
@@ -74,7 +75,7 @@ class RunTable {
  private:
   static std::vector<std::string> heading(const std::vector<RunResult>& runs) {
     std::vector<std::string> cells{""};
-    for (const RunResult& run : runs) cells.push_back(run.request.variant.name);
+    for (const RunResult& run : runs) cells.push_back(name_of(run.request));
     return cells;
   }
   const std::vector<RunResult>& runs_;
@@ -109,7 +110,8 @@ constexpr Fates fragment_fates{&Counts::fragments_rasterized,  &Counts::fragment
                                &Counts::fragments_late_failed, &Counts::fragments_unblended,
                                &Counts::fragments_blended};
 
-void add_fates(RunTable& table, const std::string& title, const Fates& fates, const std::vector<RunResult>& runs) {
+void add_fates(RunTable& table, const std::string& title, const Fates& fates, const JobResult& result) {
+  const std::vector<RunResult>& runs = result.runs;
   std::uint64_t largest = 0;
   for (const RunResult& run : runs) largest = std::max(largest, run.counts.*fates.rasterized);
   const Scale scale = scale_for(largest);
@@ -126,21 +128,23 @@ void add_fates(RunTable& table, const std::string& title, const Fates& fates, co
   table.counts("not blended (no colour)", fates.unblended, scale, false);
   table.counts("blended", fates.blended, scale);
   if (runs.size() > 1) {
-    const std::uint64_t before = runs.front().counts.*fates.blended;
+    const std::uint64_t before = runs[result.baseline].counts.*fates.blended;
     table.row("blended, reduction", [&](const RunResult& run) { return ratio(before, run.counts.*fates.blended); });
   }
 }
 
-void add_time(RunTable& table, const std::vector<RunResult>& runs) {
+void add_time(RunTable& table, const JobResult& result) {
+  const std::vector<RunResult>& runs = result.runs;
+  const RunResult& baseline = runs[result.baseline];
   table.group("time");
   if (runs.front().cycles) {
     table.row("cycles", [](const RunResult& run) { return grouped(run.cycles.value_or(0)); });
     table.row("simulated ms", [](const RunResult& run) { return fmt::format("{:.3f}", run.milliseconds); });
     if (runs.size() > 1) {
       table.row(
-          "speed-up over " + runs.front().request.variant.name,
+          "speed-up over " + name_of(baseline.request),
           [&](const RunResult& run) {
-            const std::optional<double> gain = speedup(runs.front(), run);
+            const std::optional<double> gain = speedup(baseline, run);
             return gain ? fmt::format("{:.2f}x", *gain) : std::string("-");
           },
           true);
@@ -154,9 +158,10 @@ void add_utilization(RunTable& table, const std::vector<RunResult>& runs) {
   if (runs.front().utilization.empty()) return;
   table.group("utilization, % of peak");
   for (std::size_t i = 0; i < runs.front().utilization.size(); ++i) {
-    const auto& [name, share] = runs.front().utilization[i];
+    const std::string& name = runs.front().utilization[i].first;
     // DRAM does nothing while L2 is all the memory there is.
-    if (name == "dram" && share <= 0) continue;
+    const auto is_idle = [i](const RunResult& run) { return run.utilization[i].second <= 0; };
+    if (name == "dram" && std::all_of(runs.begin(), runs.end(), is_idle)) continue;
     table.row(name, [i](const RunResult& run) { return percent(run.utilization[i].second); });
   }
 }
@@ -259,7 +264,7 @@ std::string draws_text(const std::vector<RunResult>& runs, const TextStyle& styl
       continue;
     }
     table.group(printable(draws[i].name));
-    for (const RunResult& run : runs) row(run.request.variant.name, run.draws[i]);
+    for (const RunResult& run : runs) row(name_of(run.request), run.draws[i]);
   }
   std::string text = table.text(style);
   if (draws.size() > most_shown) text += fmt::format("and {} more draws: see --json\n", draws.size() - most_shown);
@@ -267,7 +272,6 @@ std::string draws_text(const std::vector<RunResult>& runs, const TextStyle& styl
 }
 
 std::string heading(const JobResult& result, const TextStyle& style) {
-  const RunRequest& request = result.runs.front().request;
   std::string text = style.bold(fmt::format("{}, {}x{}", printable(result.scene.name), result.width, result.height));
   text += fmt::format(": {} of {} Gaussians visible\n", grouped(result.scene.gaussians_visible),
                       grouped(result.scene.gaussians_total));
@@ -278,7 +282,7 @@ std::string heading(const JobResult& result, const TextStyle& style) {
       text += fmt::format(", {} left out", grouped(result.scene.triangles_rejected));
     text += "\n";
   }
-  return text + machine_text(request, result.preprocessing, result.passes, style) + "\n";
+  return text + machines_text(result.runs, result.preprocessing, result.passes, style) + "\n";
 }
 
 /// A unit as the text calls it: CROP, or gpc1.CROP where there are several.
@@ -323,14 +327,48 @@ std::string anomaly_text(const std::vector<RunResult>& runs) {
   return text + "\n";
 }
 
-/// Where cycles may be farther off than the documentation says; the runs' parameters are the same.
+/// Where cycles may be farther off than the documentation says: reasons of all runs, then those of some.
 std::string validated_text(const std::vector<RunResult>& runs) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> names_of_reason;
+  for (const RunResult& run : runs) {
+    for (const std::string& reason : run.outside_validated_range) {
+      auto found = std::find_if(names_of_reason.begin(), names_of_reason.end(),
+                                [&](const auto& each) { return each.first == reason; });
+      if (found == names_of_reason.end()) found = names_of_reason.insert(found, {reason, {}});
+      found->second.push_back(name_of(run.request));
+    }
+  }
   std::string text;
-  for (const std::string& reason : runs.front().outside_validated_range) {
-    text +=
-        fmt::format("{} may be off: {}; confirm at cycle\n", vrpipe::name_of(runs.front().request.fidelity), reason);
+  for (const auto& [reason, names] : names_of_reason) {
+    const bool is_of_all = names.size() == runs.size();
+    text += fmt::format("{}{} may be off: {}; confirm at cycle\n", vrpipe::name_of(runs.front().request.fidelity),
+                        is_of_all ? "" : fmt::format(" of {}", fmt::join(names, ", ")), reason);
   }
   return text;
+}
+
+/// What quad merging adds, once for all runs that add the same.
+std::string storage_text(const std::vector<RunResult>& runs) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> names_of_text;
+  std::size_t merging = 0;
+  for (const RunResult& run : runs) {
+    if (!run.request.variant.quad_merging) continue;
+    ++merging;
+    const StorageReport storage = quad_merging_storage(run.request);
+    const std::string text =
+        fmt::format("adds {} of hardware storage per GPC: TGC {}, QRU {}", bytes(storage.tgc_bytes + storage.qru_bytes),
+                    bytes(storage.tgc_bytes), bytes(storage.qru_bytes));
+    auto found =
+        std::find_if(names_of_text.begin(), names_of_text.end(), [&](const auto& each) { return each.first == text; });
+    if (found == names_of_text.end()) found = names_of_text.insert(found, {text, {}});
+    found->second.push_back(name_of(run.request));
+  }
+  std::string all;
+  for (const auto& [text, names] : names_of_text) {
+    all += names.size() == merging ? "quad merging " + text + "\n"
+                                   : fmt::format("quad merging of {} {}\n", fmt::join(names, ", "), text);
+  }
+  return all;
 }
 
 std::string remarks(const JobResult& result) {
@@ -344,14 +382,7 @@ std::string remarks(const JobResult& result) {
   if (const auto early = early_termination_ratio(runs)) {
     text += fmt::format("early-termination ratio {:.2f} (fragments blended without over with termination)\n", *early);
   }
-  const bool merges =
-      std::any_of(runs.begin(), runs.end(), [](const RunResult& run) { return run.request.variant.quad_merging; });
-  if (merges) {
-    const StorageReport storage = quad_merging_storage(runs.front().request);
-    text +=
-        fmt::format("quad merging adds {} of hardware storage per GPC: TGC {}, QRU {}\n",
-                    bytes(storage.tgc_bytes + storage.qru_bytes), bytes(storage.tgc_bytes), bytes(storage.qru_bytes));
-  }
+  text += storage_text(runs);
   const RejectedGaussians& rejected = result.scene.rejected;
   if (rejected.total() > 0) {
     text += fmt::format("rejected {} Gaussians: {} with a NaN or infinite value, {} without an orientation\n",
@@ -382,23 +413,6 @@ std::string grouped(std::uint64_t value) {
   return digits;
 }
 
-std::string machine_text(const RunRequest& request, const std::vector<Setting>& preprocessing, std::uint32_t passes,
-                         const TextStyle& style) {
-  const Platform& platform = *request.platform;
-  std::string text = style.bold(platform.name) + " (" + platform.description + ")\n";
-  text += fmt::format("{} fidelity, {} colour, {} termination", vrpipe::name_of(request.fidelity),
-                      vrpipe::name_of(request.format), name_of(request.termination));
-  if (passes > 1) text += fmt::format(", {} passes", passes);
-  text += effects_choice_text(request);
-  for (const std::vector<Setting>* settings : {&request.settings, &preprocessing}) {
-    for (const Setting& setting : *settings) {
-      text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
-    }
-  }
-  for (const UnitChoice& unit : request.units) text += fmt::format(", {}={}", unit.slot, unit.implementation);
-  return text + "\n";
-}
-
 std::string nothing_visible(const SceneSummary& scene, bool has_camera) {
   return fmt::format("nothing is visible: none of the {} {} covers a pixel; {}", grouped(scene.gaussians_total),
                      has_camera ? "Gaussians" : "splats",
@@ -416,10 +430,10 @@ std::string bound_text(const RunResult& run) {
   }
   const std::string unit = unit_text(busiest.unit, run);
   if (busiest.occupancy >= bounding_occupancy) {
-    return fmt::format("{} is bound by {}, occupied {} % ({})\n", run.request.variant.name, unit,
+    return fmt::format("{} is bound by {}, occupied {} % ({})\n", name_of(run.request), unit,
                        percent(busiest.occupancy), parts);
   }
-  std::string text = fmt::format("no one unit bounds {}: {} is occupied {} % ({})", run.request.variant.name, unit,
+  std::string text = fmt::format("no one unit bounds {}: {} is occupied {} % ({})", name_of(run.request), unit,
                                  percent(busiest.occupancy), parts);
   const UnitReport* next = nullptr;
   for (const UnitReport& other : run.units) {
@@ -434,9 +448,9 @@ std::string bound_text(const RunResult& run) {
 std::string report(const JobResult& result, const TextStyle& style) {
   const std::vector<RunResult>& runs = result.runs;
   RunTable table(runs);
-  add_time(table, runs);
-  add_fates(table, "fragments", fragment_fates, runs);
-  add_fates(table, "quads", quad_fates, runs);
+  add_time(table, result);
+  add_fates(table, "fragments", fragment_fates, result);
+  add_fates(table, "quads", quad_fates, result);
   const Scale exact{1, ""};
   table.group("batches");
   table.counts("warps", &Counts::warps, exact);

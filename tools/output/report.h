@@ -12,10 +12,6 @@ namespace vrpipe::tools {
 /// What a person reads: the runs side by side, and under the table what they mean.
 std::string report(const JobResult& result, const TextStyle& style);
 
-/// The platform, and what was asked of it; two lines.
-std::string machine_text(const RunRequest& request, const std::vector<Setting>& preprocessing, std::uint32_t passes,
-                         const TextStyle& style);
-
 /// What to say of a draw of which no fragment was rasterised; one line.
 std::string nothing_visible(const SceneSummary& scene, bool has_camera);
 

@@ -36,9 +36,12 @@ const Parameter* declaration(const std::vector<ParameterListing>& listings, cons
   const Parameter* found = nullptr;
   for (const ParameterListing& listing : listings) {
     if (listing.unit != unit) continue;
-    const bool chosen = std::any_of(request.units.begin(), request.units.end(), [&](const UnitChoice& choice) {
+    const auto is_this = [&](const UnitChoice& choice) {
       return choice.slot == unit && choice.implementation == listing.implementation;
-    });
+    };
+    const std::vector<UnitChoice>& own = request.variant.changed_units;
+    const bool chosen = std::any_of(request.units.begin(), request.units.end(), is_this) ||
+                        std::any_of(own.begin(), own.end(), is_this);
     for (const Parameter* parameter : listing.parameters->parameters()) {
       if (name == parameter->name() && (found == nullptr || chosen)) found = parameter;
     }
@@ -46,15 +49,28 @@ const Parameter* declaration(const std::vector<ParameterListing>& listings, cons
   return found;
 }
 
-Json parameters_json(const std::vector<RunResult>& runs) {
-  const RunRequest& request = runs.front().request;
-  const std::vector<ParameterListing> listings = all_parameters(request.platform);
+/// Values with their types.
+Json parameters_json(const RunResult& run) {
+  const std::vector<ParameterListing> listings = all_parameters(run.request.platform);
   Json values = Json::object();
-  for (const RunResult& run : runs) {
-    for (const auto& [key, value] : run.parameters) {
-      if (values.contains(key)) continue;
-      const Parameter* const parameter = declaration(listings, request, key);
-      values[key] = parameter != nullptr ? typed_value(*parameter, value) : Json(value);
+  for (const auto& [key, value] : run.parameters) {
+    const Parameter* const parameter = declaration(listings, run.request, key);
+    values[key] = parameter != nullptr ? typed_value(*parameter, value) : Json(value);
+  }
+  return values;
+}
+
+/// Of the runs on the first platform, those of variants that change others last: which units they have differs.
+Json common_parameters_json(const std::vector<RunResult>& runs) {
+  Json values = Json::object();
+  for (const bool of_changes : {false, true}) {
+    for (const RunResult& run : runs) {
+      if (run.request.platform != runs.front().request.platform || run.request.variant.base.empty() == of_changes)
+        continue;
+      const Json parameters = parameters_json(run);
+      for (const auto& [key, value] : parameters.items()) {
+        if (!values.contains(key)) values[key] = value;
+      }
     }
   }
   return values;
@@ -66,19 +82,24 @@ Json shares_json(const std::vector<std::pair<std::string, double>>& shares) {
   return json;
 }
 
-/// Where the value of each of these parameters comes from. The command line comes after the platform, and wins.
-Json origins_json(const Json& parameters, const RunRequest& request, const std::vector<Setting>& preprocessing) {
+/// Where the value of each of these parameters comes from. The command line comes after the file, which comes after the
+/// platform, and wins.
+Json origins_json(const Json& parameters, const RunRequest& request, const std::vector<Setting>& preprocessing,
+                  const std::vector<std::string>& of_file) {
+  const std::string given = "command line";
   Json origins = Json::object();
   for (const auto& parameter : parameters.items()) origins[parameter.key()] = "default";
-  const auto mark = [&](const std::vector<Setting>& settings, const char* origin) {
+  const auto mark = [&](const std::vector<Setting>& settings, const std::string& origin) {
     for (const Setting& setting : settings) {
       const std::string key = setting.unit + "." + setting.parameter;
-      if (origins.contains(key)) origins[key] = origin;
+      if (!origins.contains(key)) continue;
+      const bool is_of_file = std::find(of_file.begin(), of_file.end(), key) != of_file.end();
+      origins[key] = is_of_file && origin == given ? "file" : origin;
     }
   };
   mark(request.platform->settings, "platform");
-  mark(request.settings, "command line");
-  mark(preprocessing, "command line");
+  mark(request.settings, given);
+  mark(preprocessing, given);
   return origins;
 }
 
@@ -174,9 +195,31 @@ Json effects_json(const RunResult& run, const EffectCosts* costs) {
   return effects;
 }
 
-Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, const EffectCosts* costs) {
+/// Of a variant that changes another; null for one that does not.
+Json changes_json(const Variant& variant) {
+  if (variant.base.empty()) return {};
+  Json units = Json::object(), settings = Json::object();
+  for (const UnitChoice& unit : variant.changed_units) units[unit.slot] = unit.implementation;
+  for (const Setting& setting : variant.changed_settings)
+    settings[setting.unit + "." + setting.parameter] = setting.value;
+  return {{"base", variant.base}, {"unit", std::move(units)}, {"set", std::move(settings)}};
+}
+
+Json storage_json(const RunRequest& request) {
+  const StorageReport storage = quad_merging_storage(request);
+  return {{"tgc", storage.tgc_bytes}, {"qru", storage.qru_bytes}};
+}
+
+/// @param parameters  of platform_json()
+Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, const EffectCosts* costs,
+              const Json& parameters) {
   const bool timed = run.cycles.has_value();
   Json json = {{"variant", run.request.variant.name},
+               {"name", name_of(run.request)},
+               {"platform", run.request.platform->name},
+               {"frequency_mhz", run.request.platform->frequency_mhz},
+               {"changes", changes_json(run.request.variant)},
+               {"parameters", changed_parameters_json(run, parameters)},
                {"cycles", timed ? Json(*run.cycles) : Json()},
                {"milliseconds", timed ? Json(run.milliseconds) : Json()},
                {"host_seconds", run.host_seconds},
@@ -191,6 +234,7 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
                {"images", {{"png", images ? Json(images->png) : Json()}, {"exr", images ? Json(images->exr) : Json()}}},
                {"units", units_json(run)},
                {"statistics", statistics_json(run)},
+               {"quad_merging_storage_bytes", run.request.variant.quad_merging ? storage_json(run.request) : Json()},
                {"kernel_events", run.kernel_events},
                {"outside_validated_range", run.outside_validated_range}};
   if (costs != nullptr) json["all_effects"]["host_seconds"] = {{"with", costs->with_all}, {"without", costs->without}};
@@ -214,6 +258,7 @@ Json head_json(const std::string& schema, const Provenance& provenance, unsigned
   return {{"schema", schema},
           {"version", VRPIPE_VERSION},
           {"command", provenance.command},
+          {"config", provenance.config.empty() ? Json() : Json(provenance.config)},
           {"plugins", std::move(plugins)},
           {"host", {{"processes", processes}, {"load_average", provenance.load_average}}}};
 }
@@ -280,10 +325,20 @@ Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t he
            {{"not_finite", scene.rejected.not_finite}, {"zero_quaternion", scene.rejected.zero_quaternion}}}};
 }
 
-Json platform_json(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing) {
+Json changed_parameters_json(const RunResult& run, const Json& parameters) {
+  const Json all = parameters_json(run);
+  Json changed = Json::object();
+  for (const auto& [key, value] : all.items()) {
+    if (!parameters.contains(key) || parameters[key] != value) changed[key] = value;
+  }
+  return changed;
+}
+
+Json platform_json(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing,
+                   const Provenance& provenance) {
   const RunRequest& request = runs.front().request;
-  Json parameters = parameters_json(runs);
-  Json origins = origins_json(parameters, request, preprocessing);
+  Json parameters = common_parameters_json(runs);
+  Json origins = origins_json(parameters, request, preprocessing, provenance.config_settings);
   return {{"name", request.platform->name},
           {"frequency_mhz", request.platform->frequency_mhz},
           {"parameters", std::move(parameters)},
@@ -292,17 +347,18 @@ Json platform_json(const std::vector<RunResult>& runs, const std::vector<Setting
 
 Json result_json(const JobResult& result) {
   const RunRequest& request = result.runs.front().request;
+  Json platform = platform_json(result.runs, result.preprocessing, result.provenance);
   Json runs = Json::array();
   for (std::size_t i = 0; i < result.runs.size(); ++i) {
     const EffectCosts* const costs = result.effect_costs.empty() ? nullptr : &result.effect_costs[i];
-    runs.push_back(run_json(result.runs[i], result.images[i], costs));
+    runs.push_back(run_json(result.runs[i], result.images[i], costs, platform["parameters"]));
   }
-  const StorageReport storage = quad_merging_storage(request);
+  const RunResult& baseline = result.runs[result.baseline];
   Json json = head_json(result.schema, result.provenance, result.processes);
   json.update({{"seed", request.stall_seed},
                {"scene", scene_json(result.scene, result.width, result.height)},
                {"camera", camera_json(result.viewpoint)},
-               {"platform", platform_json(result.runs, result.preprocessing)},
+               {"platform", std::move(platform)},
                {"fidelity", vrpipe::name_of(request.fidelity)},
                {"format", vrpipe::name_of(request.format)},
                {"termination", name_of(request.termination)},
@@ -313,15 +369,16 @@ Json result_json(const JobResult& result) {
   if (result.runs.size() > 1) {
     Json speedups = Json::object();
     for (const RunResult& run : result.runs) {
-      if (&run == &result.runs.front()) continue;
-      const std::optional<double> gain = speedup(result.runs.front(), run);
-      speedups[run.request.variant.name] = gain ? Json(*gain) : Json();
+      if (&run == &baseline) continue;
+      const std::optional<double> gain = speedup(baseline, run);
+      speedups[name_of(run.request)] = gain ? Json(*gain) : Json();
     }
+    json["relative_to"] = name_of(baseline.request);
     json["speedup"] = std::move(speedups);
     const std::optional<double> ratio = early_termination_ratio(result.runs);
     json["early_termination_ratio"] = ratio ? Json(*ratio) : Json();
   }
-  json["quad_merging_storage_bytes"] = {{"tgc", storage.tgc_bytes}, {"qru", storage.qru_bytes}};
+  json["quad_merging_storage_bytes"] = storage_json(request);
   return json;
 }
 

@@ -32,9 +32,14 @@ Json bottleneck_json(const RunResult& run);
 Json utilization_json(const RunResult& run);
 Json counts_json(const std::vector<std::pair<std::string, std::uint64_t>>& counts);
 Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t height);
-/// The parameters are those of all runs, which differ in the variant at most.
+/// Of the first run's platform, with the parameters that its variants start from; what differs from them is in
+/// changed_parameters_json().
 /// @param preprocessing  what --set changed of it
-Json platform_json(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing);
+Json platform_json(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing,
+                   const Provenance& provenance);
+
+/// The parameters of a run, those alone that are others than these, of platform_json().
+Json changed_parameters_json(const RunResult& run, const Json& parameters);
 
 /// A parameter's value with its type: numbers as numbers, switches as true and false, choices as strings.
 Json typed_value(const Parameter& parameter, const std::string& value);

@@ -15,6 +15,8 @@ Json optional_json(const std::optional<double>& value) { return value ? Json(*va
 Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
   const bool timed = run.cycles.has_value();
   return {{"variant", run.request.variant.name},
+          {"name", name_of(run.request)},
+          {"platform", run.request.platform->name},
           {"cycles", timed ? Json(*run.cycles) : Json()},
           {"milliseconds", timed ? Json(run.milliseconds) : Json()},
           {"host_seconds", run.host_seconds},
@@ -27,7 +29,7 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
           {"outside_validated_range", run.outside_validated_range}};
 }
 
-Json view_json(const ViewResult& view) {
+Json view_json(const ViewResult& view, std::size_t baseline) {
   const Camera& camera = view.viewpoint.camera;
   Json scene = scene_json(view.scene, camera.width, camera.height);
   scene.erase("name");
@@ -36,7 +38,8 @@ Json view_json(const ViewResult& view) {
   Json speedups = Json::object();
   for (std::size_t i = 0; i < view.runs.size(); ++i) {
     runs.push_back(run_json(view.runs[i], view.images[i]));
-    if (i > 0) speedups[view.runs[i].request.variant.name] = optional_json(speedup(view.runs.front(), view.runs[i]));
+    if (i == baseline) continue;
+    speedups[name_of(view.runs[i].request)] = optional_json(speedup(view.runs[baseline], view.runs[i]));
   }
   const std::optional<CameraName>& file = view.viewpoint.file;
   return {{"index", view.index},
@@ -71,10 +74,11 @@ Json views_json(const ViewsResult& result) {
                           result.preprocess_parameters.end());
   }
   Json views = Json::array();
-  for (const ViewResult& view : result.views) views.push_back(view_json(view));
+  for (const ViewResult& view : result.views) views.push_back(view_json(view, result.baseline));
   Json speedups = Json::object();
-  for (std::size_t i = 1; i < runs.size(); ++i) {
-    speedups[runs[i].request.variant.name] = distribution_json(speedup_distribution(result, i), result);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (i == result.baseline) continue;
+    speedups[name_of(runs[i].request)] = distribution_json(speedup_distribution(result, i), result);
   }
   const StorageReport storage = quad_merging_storage(request);
   Json json = head_json(result.schema, result.provenance, result.processes);
@@ -84,19 +88,20 @@ Json views_json(const ViewsResult& result) {
                 {{"file", result.camera_file ? Json(*result.camera_file) : Json()},
                  {"count", result.cameras},
                  {"orbit", !result.camera_file}}},
-               {"platform", platform_json(runs, result.preprocessing)},
+               {"platform", platform_json(runs, result.preprocessing, result.provenance)},
                {"implementations", Json::object()},
                {"fidelity", vrpipe::name_of(request.fidelity)},
                {"format", vrpipe::name_of(request.format)},
                {"termination", name_of(request.termination)},
                {"effects", request.effects.text()},
                {"passes", result.passes},
+               {"relative_to", name_of(runs[result.baseline].request)},
                {"views", std::move(views)},
                {"distribution",
                 {{"speedup", std::move(speedups)},
                  {"early_termination_ratio", distribution_json(ratio_distribution(result), result)}}},
                {"quad_merging_storage_bytes", {{"tgc", storage.tgc_bytes}, {"qru", storage.qru_bytes}}}});
-  for (const RunResult& run : runs) json["implementations"][run.request.variant.name] = implementations_json(run);
+  for (const RunResult& run : runs) json["implementations"][name_of(run.request)] = implementations_json(run);
   return json;
 }
 

@@ -12,6 +12,7 @@
 #include <vrpipe/component/printable.h>
 
 #include "jobs/comparison.h"
+#include "output/machines_text.h"
 #include "output/report.h"
 #include "output/text_table.h"
 
@@ -45,8 +46,7 @@ std::string heading(const ViewsResult& result, const TextStyle& style) {
               ? fmt::format(", of the {} in {}", count_of(result.cameras, "camera"), printable(*result.camera_file))
               : std::string(" round the scene");
   text += fmt::format(": {} Gaussians\n", grouped(result.gaussians_total));
-  const RunRequest& request = result.views.front().runs.front().request;
-  return text + machine_text(request, result.preprocessing, result.passes, style) + "\n";
+  return text + machines_text(result.views.front().runs, result.preprocessing, result.passes, style) + "\n";
 }
 
 void add_distribution(TextTable& table, const std::string& name, const std::optional<Distribution>& of,
@@ -69,9 +69,10 @@ std::string distributions(const ViewsResult& result, const TextStyle& style) {
                    "most in"});
   const std::vector<RunResult>& runs = result.views.front().runs;
   if (runs.front().cycles) {
-    table.group("speed-up over " + runs.front().request.variant.name);
-    for (std::size_t i = 1; i < runs.size(); ++i) {
-      add_distribution(table, runs[i].request.variant.name, speedup_distribution(result, i), "x", result);
+    table.group("speed-up over " + name_of(runs[result.baseline].request));
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      if (i == result.baseline) continue;
+      add_distribution(table, name_of(runs[i].request), speedup_distribution(result, i), "x", result);
     }
   }
   table.group("early termination");
@@ -88,8 +89,9 @@ std::string views(const ViewsResult& result, const TextStyle& style) {
   if (named) columns.emplace_back("image");
   columns.emplace_back("visible");
   if (timed) {
-    columns.push_back("cycles, " + first.front().request.variant.name);
-    for (std::size_t i = 1; i < first.size(); ++i) columns.push_back(first[i].request.variant.name);
+    columns.push_back("cycles, " + name_of(first[result.baseline].request));
+    for (std::size_t i = 0; i < first.size(); ++i)
+      if (i != result.baseline) columns.push_back(name_of(first[i].request));
   }
   columns.emplace_back("ratio");
   TextTable table(std::move(columns));
@@ -99,9 +101,10 @@ std::string views(const ViewsResult& result, const TextStyle& style) {
     if (named) cells.push_back(printable(image_of(view)));
     cells.push_back(grouped(view.scene.gaussians_visible));
     if (timed) {
-      cells.push_back(grouped(view.runs.front().cycles.value_or(0)));
-      for (std::size_t i = 1; i < view.runs.size(); ++i) {
-        cells.push_back(times(speedup(view.runs.front(), view.runs[i]), "x"));
+      const RunResult& baseline = view.runs[result.baseline];
+      cells.push_back(grouped(baseline.cycles.value_or(0)));
+      for (const RunResult& run : view.runs) {
+        if (&run != &baseline) cells.push_back(times(speedup(baseline, run), "x"));
       }
     }
     cells.push_back(times(early_termination_ratio(view.runs), ""));

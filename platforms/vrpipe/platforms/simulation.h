@@ -47,11 +47,16 @@ struct UnitChoice {
 /// Which of the paper's two extensions a run has, and perhaps units and settings of its own, which come before those of
 /// the run.
 struct Variant {
-  std::string name;  ///< baseline, qm, het, het+qm, or of a plugin
+  std::string name;  ///< baseline, qm, het, het+qm, of a plugin or of the user
   bool quad_merging = false;
   bool early_termination = false;
   std::vector<UnitChoice> units = {};
   std::vector<Setting> settings = {};
+  std::string base = {};  ///< of which variant it is a change; empty for one that stands for itself
+  /// What makes it another than `base`: they come after units and settings of the run, so that runs that are alike in
+  /// everything else differ in them.
+  std::vector<UnitChoice> changed_units = {};
+  std::vector<Setting> changed_settings = {};
 };
 /// The paper's four, then those that were added.
 const std::vector<Variant>& variants();
@@ -83,6 +88,7 @@ const Platform& platform_named(const std::string& name);
 struct RunRequest {
   const Platform* platform = nullptr;
   Variant variant;
+  std::string name;  ///< what reports call it; empty for the variant's
   Fidelity fidelity = Fidelity::cycle;
   ColorFormat format = ColorFormat::rgba16f;
   Termination termination = Termination::paper;
@@ -101,6 +107,8 @@ struct RunRequest {
   /// For tests: ticks units in a random order drawn from this seed; 0 for the order of wiring.
   std::uint64_t tick_order_seed = 0;
 };
+/// What reports call a run, also in file names.
+const std::string& name_of(const RunRequest& request);
 
 /// Exact integers, of a frame; the names and rules are those of the contract.
 struct Counts {

@@ -1,0 +1,317 @@
+#include "cli/config_file.h"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <sstream>
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+#include <CLI/CLI.hpp>
+
+#include <vrpipe/component/error.h>
+
+#include "cli/options.h"
+#include "jobs/user_variants.h"
+
+namespace vrpipe::tools {
+namespace {
+
+constexpr const char* config_option = "--config";
+constexpr const char* print_option = "--print-config";
+const std::string settings_key = "set";
+const std::string units_key = "unit";
+const std::string variants_key = "variants";
+
+/// Of the file, with what the readers of its parts need.
+class Reader {
+ public:
+  Reader(const std::filesystem::path& path, const CLI::App& app) : path_(path), app_(app) {}
+
+  [[noreturn]] void refuse(const toml::node& node, const std::string& what, const std::string& why,
+                           const std::string& remedy) const {
+    throw UserError(what, place(node.source()), why, remedy);
+  }
+  [[noreturn]] void refuse_key(const toml::node& node, const std::string& key,
+                               const std::vector<std::string>& known) const {
+    refuse(node, "unknown key '" + key + "'", "there is no such key here",
+           fmt::format("did you mean {}? `vrpipe {} --help` lists the options", nearest_name(key, known),
+                       app_.get_name()));
+  }
+  std::string place(const toml::source_region& region) const {
+    return fmt::format("{}:{}", path_.string(), region.begin.line);
+  }
+
+  /// A value as the command line has it.
+  std::string scalar(const toml::node& node, const std::string& key) const {
+    if (const auto* text = node.as_string()) return text->get();
+    if (const auto* number = node.as_integer()) return std::to_string(number->get());
+    if (const auto* number = node.as_floating_point()) return fmt::format("{}", number->get());
+    if (const auto* flag = node.as_boolean()) return flag->get() ? "on" : "off";
+    refuse(node, "bad value of '" + key + "'", "it is no text, number, true or false", "give one of them");
+  }
+
+  const toml::table& table(const toml::node& node, const std::string& key) const {
+    if (const toml::table* found = node.as_table()) return *found;
+    refuse(node, "bad value of '" + key + "'", "it is no table", "write [" + key + "], and its keys below");
+  }
+
+  /// A table's entries in the order of the file.
+  static std::vector<std::pair<std::string, const toml::node*>> in_order(const toml::table& table) {
+    std::vector<std::pair<std::string, const toml::node*>> entries;
+    for (const auto& [key, node] : table) entries.emplace_back(std::string(key.str()), &node);
+    // A table that dotted keys made has no place of its own: that of its first value counts.
+    const auto before = [](const auto& a, const auto& b) {
+      const toml::source_position x = position(*a.second), y = position(*b.second);
+      return x < y;
+    };
+    std::stable_sort(entries.begin(), entries.end(), before);
+    return entries;
+  }
+  static toml::source_position position(const toml::node& node) {
+    toml::source_position first = node.source().begin;
+    if (const toml::table* table = node.as_table()) {
+      for (const auto& [key, value] : *table) {
+        const toml::source_position place = position(value);
+        if (!first || place < first) first = place;
+      }
+    }
+    return first;
+  }
+
+  /// Dotted paths and values of all leaves.
+  std::vector<std::pair<std::string, const toml::node*>> leaves(const toml::table& table,
+                                                                const std::string& prefix = "") const {
+    std::vector<std::pair<std::string, const toml::node*>> all;
+    for (const auto& [key, node] : in_order(table)) {
+      if (const toml::table* inner = node->as_table()) {
+        for (auto& leaf : leaves(*inner, prefix + key + ".")) all.push_back(std::move(leaf));
+      } else {
+        all.emplace_back(prefix + key, node);
+      }
+    }
+    return all;
+  }
+
+  VariantDefinition variant(const std::string& name, const toml::node& node) const {
+    VariantDefinition definition{name, "", {}};
+    for (const auto& [key, value] : in_order(table(node, variants_key + "." + name))) {
+      if (key == "base") {
+        definition.base = scalar(*value, key);
+      } else if (key == settings_key || key == units_key) {
+        for (const auto& [path, leaf] : leaves(table(*value, key))) {
+          definition.changes.emplace_back(path, scalar(*leaf, path));
+        }
+      } else {
+        refuse_key(*value, key, {"base", settings_key, units_key});
+      }
+    }
+    if (definition.base.empty()) {
+      refuse(node, "incomplete variant '" + name + "'", "it has no base", "add e.g. base = \"het+qm\"");
+    }
+    return definition;
+  }
+
+  /// The name of a file, from where vrpipe runs.
+  std::string from_here(const std::string& text, const std::string& type) const {
+    if (type.find("FILE") == std::string::npos && type.find("DIR") == std::string::npos) return text;
+    if (text == "-" || text.rfind("builtin:", 0) == 0) return text;
+    const std::size_t name = type.find("NAME=FILE") != std::string::npos ? text.find('=') + 1 : 0;
+    const std::filesystem::path file = text.substr(name);
+    return text.substr(0, name) + (file.is_absolute() ? file : path_.parent_path() / file).string();
+  }
+
+ private:
+  const std::filesystem::path& path_;
+  const CLI::App& app_;
+};
+
+std::string key_of(const std::string& text) { return text.substr(0, text.find('=')); }
+
+/// Options whose values are merged key by key; of others those of the command line take the place of the file's.
+bool is_merged(const std::string& option) {
+  return option == "--set" || option == "--unit" || option == "--define" || option == "--plugin";
+}
+
+}  // namespace
+
+ConfigFile::ConfigFile(const std::filesystem::path& path, CLI::App& app) : path_(path) {
+  read(app);
+  apply(app);
+}
+
+void ConfigFile::read(CLI::App& app) {
+  const Reader reader(path_, app);
+  std::ifstream file(path_, std::ios::binary);
+  std::ostringstream content;
+  if (!file || !(content << file.rdbuf())) {
+    throw UserError("cannot read configuration", std::string(config_option) + " " + path_.string(),
+                    file ? "it is empty, or no file" : "there is no such file, or it may not be read",
+                    "name a TOML file; docs/configuration.md describes it");
+  }
+  toml::table root;
+  try {
+    root = toml::parse(content.str(), path_.string());
+  } catch (const toml::parse_error& error) {
+    throw UserError("cannot read configuration", reader.place(error.source()), std::string(error.description()),
+                    "correct it; docs/configuration.md describes the file");
+  }
+  std::vector<std::string> known{settings_key, units_key};
+  const CLI::Option* const define = app.get_option_no_throw("--define");
+  if (define != nullptr) known.push_back(variants_key);
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) {
+      const std::array<const char*, 6> others{"help", "config", "print-config", "set", "unit", "define"};
+      if (std::find(others.begin(), others.end(), name) == others.end()) known.push_back(name);
+    }
+  }
+  for (const auto& [key, node] : Reader::in_order(root)) {
+    const unsigned line = Reader::position(*node).line;
+    const CLI::Option* const option = app.get_option_no_throw("--" + key);
+    if (std::find(known.begin(), known.end(), key) == known.end()) reader.refuse_key(*node, key, known);
+    if (key == settings_key || key == units_key) {
+      if (option == nullptr) reader.refuse_key(*node, key, known);
+      for (const auto& [path, leaf] : reader.leaves(reader.table(*node, key))) {
+        const std::string value = reader.scalar(*leaf, path);
+        add("--" + key, path, path + "=" + value, leaf->source().begin.line);
+        mention(path, value, leaf->source().begin.line);
+      }
+    } else if (key == variants_key) {
+      for (const auto& [name, each] : Reader::in_order(reader.table(*node, key))) {
+        const VariantDefinition definition = reader.variant(name, *each);
+        add("--define", name, text_of(definition), Reader::position(*each).line);
+        for (const auto& [path, leaf] : reader.leaves(*each->as_table())) {
+          const std::size_t dot = path.find('.');
+          if (dot != std::string::npos)
+            mention(path.substr(dot + 1), reader.scalar(*leaf, path), leaf->source().begin.line);
+        }
+      }
+    } else if (option->get_expected_max() == 0) {
+      const auto* flag = node->as_boolean();
+      if (flag == nullptr) reader.refuse(*node, "bad value of '" + key + "'", "it is a switch", "give true or false");
+      if (flag->get()) add("--" + key, "", "true", line);
+    } else {
+      const std::string type = option->get_type_name();
+      const toml::array* const list = node->as_array();
+      // Of several numbers, as X,Y,Z, or several values of an option that can be repeated.
+      if (list != nullptr && type.find(',') != std::string::npos && type.find('=') == std::string::npos) {
+        std::string text;
+        for (const toml::node& each : *list) text += (text.empty() ? "" : ",") + reader.scalar(each, key);
+        add("--" + key, "", text, line);
+      } else if (list != nullptr) {
+        for (const toml::node& each : *list) {
+          const std::string text = reader.from_here(reader.scalar(each, key), type);
+          add("--" + key, is_merged("--" + key) ? text : "", text, each.source().begin.line);
+        }
+      } else {
+        const std::string text = reader.from_here(reader.scalar(*node, key), type);
+        add("--" + key, is_merged("--" + key) ? text : "", text, line);
+      }
+    }
+  }
+}
+
+void ConfigFile::apply(CLI::App& app) {
+  std::vector<std::string> options;
+  for (const Entry& entry : entries_) {
+    if (std::find(options.begin(), options.end(), entry.option) == options.end()) options.push_back(entry.option);
+  }
+  for (const std::string& name : options) {
+    CLI::Option* const option = app.get_option(name);
+    const std::vector<std::string> typed = option->results();
+    std::vector<std::string> typed_keys;
+    for (const std::string& text : typed) typed_keys.push_back(key_of(text));
+    if (name == "--define") {
+      for (const std::string& text : app.get_option("--variant")->results()) {
+        if (text.find('=') != std::string::npos) typed_keys.push_back(key_of(text));
+      }
+    }
+    std::vector<std::string> results;
+    for (Entry& entry : entries_) {
+      if (entry.option != name) continue;
+      entry.used = is_merged(name) ? std::find(typed_keys.begin(), typed_keys.end(), entry.key) == typed_keys.end()
+                                   : typed.empty();
+      if (entry.used) results.push_back(entry.text);
+    }
+    if (results.empty()) continue;
+    results.insert(results.end(), typed.begin(), typed.end());
+    option->clear();
+    for (const std::string& text : results) option->add_result(text);
+    option->run_callback();
+  }
+}
+
+bool ConfigFile::gives(const std::string& what) const {
+  return std::any_of(entries_.begin(), entries_.end(),
+                     [&](const Entry& entry) { return entry.used && (entry.what() == what || entry.option == what); });
+}
+
+std::vector<std::string> ConfigFile::settings() const {
+  std::vector<std::string> keys;
+  for (const Entry& entry : entries_) {
+    if (entry.used && entry.option == "--set") keys.push_back(entry.key);
+  }
+  return keys;
+}
+
+void ConfigFile::add(const std::string& option, const std::string& key, const std::string& text, unsigned line) {
+  entries_.push_back({option, key, text, line});
+  // A definition is complained of as the --variant that it is.
+  const std::string what = option == "--define" ? "--variant " + key : entries_.back().what();
+  for (const char* end : {")", "=", " ", ","}) mentions_.push_back({"(" + what + end, line});
+}
+
+void ConfigFile::mention(const std::string& key, const std::string& value, unsigned line) {
+  mentions_.push_back({"(" + key + ")", line});
+  mentions_.push_back({fmt::format("'{}' (slot {})", value, key), line});
+  const std::size_t dot = key.rfind('.');
+  if (dot != std::string::npos)
+    mentions_.push_back({fmt::format("'{}' (unit {})", key.substr(dot + 1), key.substr(0, dot)), line});
+}
+
+std::string ConfigFile::located(std::string message) const {
+  // The longest says the most.
+  const Mention* best = nullptr;
+  for (const Mention& each : mentions_) {
+    if (message.find(each.text) == std::string::npos) continue;
+    if (best == nullptr || each.text.size() > best->text.size()) best = &each;
+  }
+  if (best == nullptr) return message;
+  const std::size_t place = message.find(best->text) + best->text.find('(') + 1;
+  return message.insert(place, fmt::format("{}:{}, ", path_.string(), best->line));
+}
+
+void note_config(const Invocation& invocation, Provenance& provenance) {
+  if (!invocation.config) return;
+  provenance.config = invocation.config->path().string();
+  provenance.config_settings = invocation.config->settings();
+}
+
+void declare_config(CLI::App& app) {
+  const std::string group = "A configuration";
+  app.add_option(config_option)
+      ->type_name("FILE.toml")
+      ->description(
+          "what is not on the command line is as this file says, which says all that the\n"
+          "command line can, and defines variants (docs/configuration.md)")
+      ->allow_extra_args(false)
+      ->expected(1)
+      ->take_all()
+      ->group(group);
+  app.add_flag(print_option)
+      ->description(
+          "prints such a file of all that the command would do, with every parameter\n"
+          "and where its value comes from, and does nothing")
+      ->disable_flag_override()
+      ->group(group);
+}
+
+std::optional<ConfigFile> read_config(CLI::App& app) {
+  const CLI::Option* const option = app.get_option_no_throw(config_option);
+  if (option == nullptr) return std::nullopt;
+  const auto file = single(option->results(), config_option);
+  if (!file) return std::nullopt;
+  return std::optional<ConfigFile>(std::in_place, *file, app);
+}
+
+}  // namespace vrpipe::tools

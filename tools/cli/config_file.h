@@ -1,0 +1,75 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/provenance.h"
+
+namespace CLI {
+class App;
+}
+
+namespace vrpipe::tools {
+
+/// A configuration file (TOML; docs/configuration.md): options of a command without their dashes, [set] and [unit] as
+/// tables, [variants.NAME] with base, set and unit. What the command line says as well, it says instead; of [set], [unit]
+/// and [variants] key by key. Names of files are relative to the file's folder.
+class ConfigFile {
+ public:
+  /// Reads the file that --config names, and gives the options of `app`, which are parsed, what they are not given.
+  /// Throws UserError with file and line for what is no TOML, an unknown key, with the nearest name, and a value of a type
+  /// that the option does not take.
+  ConfigFile(const std::filesystem::path& path, CLI::App& app);
+
+  const std::filesystem::path& path() const { return path_; }
+  /// Whether an option, or a key of --set, --unit and --define, has its value from here: "--size", "--set tc.bins".
+  bool gives(const std::string& what) const;
+  /// UNIT.PARAMETER of every setting from here.
+  std::vector<std::string> settings() const;
+  /// A message with file and line before the option that it is about, if that is from here.
+  std::string located(std::string message) const;
+
+ private:
+  struct Entry {
+    std::string option;  ///< with dashes
+    std::string key;     ///< of KEY=VALUE options; empty for others
+    std::string text;    ///< as on the command line
+    unsigned line = 0;
+    bool used = false;  ///< the command line does not say otherwise
+    std::string what() const { return key.empty() ? option : option + " " + key; }
+  };
+  /// A line, and how a message about what it says calls it.
+  struct Mention {
+    std::string text;
+    unsigned line = 0;
+  };
+  void add(const std::string& option, const std::string& key, const std::string& text, unsigned line);
+  /// Of UNIT.PARAMETER or SLOT, wherever it stands.
+  void mention(const std::string& key, const std::string& value, unsigned line);
+  void read(CLI::App& app);
+  void apply(CLI::App& app);
+
+  std::filesystem::path path_;
+  std::vector<Entry> entries_;
+  std::vector<Mention> mentions_;
+};
+
+/// How a command was called.
+struct Invocation {
+  std::vector<std::string> words;  ///< the whole command line
+  const CLI::App* app = nullptr;   ///< of the command, parsed
+  std::optional<ConfigFile> config;
+
+  bool gives(const std::string& what) const { return config && config->gives(what); }
+};
+
+/// Notes in a result's provenance what a configuration file says of parameters.
+void note_config(const Invocation& invocation, Provenance& provenance);
+/// --config and --print-config.
+void declare_config(CLI::App& app);
+/// Applies --config, if it is given.
+std::optional<ConfigFile> read_config(CLI::App& app);
+
+}  // namespace vrpipe::tools

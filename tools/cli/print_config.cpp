@@ -1,0 +1,224 @@
+#include "cli/print_config.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/platforms/netlist.h>
+
+#include "jobs/settings.h"
+
+namespace vrpipe::tools {
+namespace {
+
+constexpr std::size_t comment_column = 44;
+
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      result += std::string("\\") + c;
+    } else if (code < 0x20 || code == 0x7f) {
+      result += fmt::format("\\u{:04X}", code);
+    } else {
+      result += c;
+    }
+  }
+  return result + "\"";
+}
+
+/// A key, bare where TOML lets it be: dots stay dots.
+std::string key_text(const std::string& key) {
+  const auto is_bare = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.'; };
+  return std::all_of(key.begin(), key.end(), is_bare) ? key : quoted(key);
+}
+
+/// A number, or true and false, where it reads back as this very text.
+std::string value_text(const std::string& text) {
+  if (text == "on") return "true";
+  if (text == "off") return "false";
+  const char* const end = text.data() + text.size();
+  std::int64_t whole = 0;
+  if (const auto read = std::from_chars(text.data(), end, whole);
+      read.ec == std::errc() && read.ptr == end && std::to_string(whole) == text) {
+    return text;
+  }
+  double number = 0;
+  if (const auto read = std::from_chars(text.data(), end, number);
+      read.ec == std::errc() && read.ptr == end && std::isfinite(number) && fmt::format("{}", number) == text &&
+      text.find('.') != std::string::npos) {
+    return text;
+  }
+  return quoted(text);
+}
+
+std::string line_of(const std::string& key, const std::string& value, const std::string& comment) {
+  const std::string line = key + " = " + value;
+  return fmt::format("{:<{}} # {}\n", line, comment_column, comment);
+}
+
+/// Independent of where the file will stand.
+std::string file_text(const std::string& text, const std::string& type) {
+  if (type.find("FILE") == std::string::npos && type.find("DIR") == std::string::npos) return text;
+  if (text == "-" || text.rfind("builtin:", 0) == 0) return text;
+  const std::size_t name = type.find("NAME=FILE") != std::string::npos ? text.find('=') + 1 : 0;
+  return text.substr(0, name) + std::filesystem::absolute(text.substr(name)).lexically_normal().string();
+}
+
+/// What help says of an option that is not given.
+std::string default_of(const CLI::Option& option) {
+  const std::string start = "(default: ";
+  std::string text = option.get_description();
+  const std::size_t begin = text.find(start);
+  if (begin == std::string::npos) return "not given";
+  std::size_t end = begin;
+  for (int depth = 0; end < text.size(); ++end) {
+    depth += text[end] == '(' ? 1 : text[end] == ')' ? -1 : 0;
+    if (depth == 0) break;
+  }
+  text = text.substr(begin + start.size(), end - begin - start.size());
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return "default: " + text;
+}
+
+class Writer {
+ public:
+  Writer(const Invocation& invocation, const std::vector<RunRequest>& requests)
+      : invocation_(invocation), requests_(requests) {}
+
+  std::string options() const {
+    std::string text;
+    for (const CLI::Option* option : invocation_.app->get_options()) {
+      if (option->get_group().empty() || option->get_lnames().empty()) continue;
+      const std::string& name = option->get_lnames().front();
+      if (name == "help" || name == "config" || name == "print-config" || name == "set" || name == "unit") continue;
+      text += option_line(*option, name);
+    }
+    return text;
+  }
+
+  std::string units() const {
+    std::string text;
+    for (const UnitChoice& unit : requests_.front().units) {
+      text += line_of(key_text(unit.slot), quoted(unit.implementation), given("--unit", unit.slot));
+    }
+    return text.empty() ? text : "\n[unit]\n" + text;
+  }
+
+  std::string variants() const {
+    std::string text;
+    std::vector<std::string> seen;
+    for (const Variant& variant : vrpipe::variants()) {
+      if (variant.base.empty()) continue;
+      text += fmt::format("\n[variants.{}]\n", key_text(variant.name));
+      text += line_of("base", quoted(variant.base), given("--define", variant.name));
+      // What it changes of a base that is such a variant as well is there twice, which changes nothing.
+      for (const UnitChoice& unit : variant.changed_units)
+        text += fmt::format("unit.{} = {}\n", key_text(unit.slot), quoted(unit.implementation));
+      for (const Setting& setting : variant.changed_settings) {
+        text +=
+            fmt::format("set.{} = {}\n", key_text(setting.unit + "." + setting.parameter), value_text(setting.value));
+      }
+    }
+    return text;
+  }
+
+  std::string parameters(const std::vector<std::pair<std::string, std::string>>& preprocess) const {
+    const bool one_platform = std::all_of(requests_.begin(), requests_.end(), [&](const RunRequest& request) {
+      return request.platform == requests_.front().platform;
+    });
+    std::string text = "\n[set]\n";
+    for (const auto& [name, value] : preprocess) text += parameter_line(name, value, nullptr);
+    if (one_platform) {
+      RunRequest common = requests_.front();
+      common.variant = variant_named("het+qm");
+      for (const auto& [name, value] : final_parameters(common)) {
+        text += parameter_line(name, value, common.platform);
+      }
+      return text;
+    }
+    for (const Setting& setting : requests_.front().settings) {
+      const std::string name = setting.unit + "." + setting.parameter;
+      text += line_of(key_text(name), value_text(setting.value), given("--set", name));
+    }
+    const Platform* last = nullptr;
+    for (const RunRequest& request : requests_) {
+      if (std::exchange(last, request.platform) == request.platform) continue;
+      text += "\n# " + request.platform->name + " has these, of its own\n";
+      RunRequest of_platform = request;
+      of_platform.variant = variant_named("het+qm");
+      for (const auto& [name, value] : final_parameters(of_platform)) {
+        text += "# " + parameter_line(name, value, request.platform);
+      }
+    }
+    return text;
+  }
+
+ private:
+  std::string given(const std::string& option, const std::string& key = "") const {
+    return invocation_.gives(key.empty() ? option : option + " " + key) ? invocation_.config->path().string()
+                                                                        : std::string("command line");
+  }
+
+  std::string option_line(const CLI::Option& option, const std::string& name) const {
+    const std::string usual = option.get_default_str();
+    if (option.count() == 0 && (usual.empty() || option.get_expected_max() == 0)) {
+      return fmt::format("{:<{}} # {}\n", "# " + name, comment_column, default_of(option));
+    }
+    if (option.count() == 0) return line_of(name, value_text(usual), "default");
+    if (option.get_expected_max() == 0) return line_of(name, "true", given("--" + name));
+    std::vector<std::string> values;
+    for (const std::string& text : option.results()) {
+      // A variant that is defined where it is chosen stands below.
+      const bool defines = name == "variant" && text.find('=') != std::string::npos;
+      const std::string value = defines ? text.substr(0, text.find('=')) : file_text(text, option.get_type_name());
+      values.push_back(option.results().size() == 1 ? value_text(value) : quoted(value));
+    }
+    const std::string value = values.size() == 1 ? values.front() : fmt::format("[{}]", fmt::join(values, ", "));
+    return line_of(name, value, given("--" + name));
+  }
+
+  std::string parameter_line(const std::string& name, const std::string& value, const Platform* platform) const {
+    std::string origin = "default";
+    const auto has = [&](const std::vector<Setting>& settings) {
+      return std::any_of(settings.begin(), settings.end(), [&](const Setting& setting) {
+        const std::string set = setting.unit + "." + setting.parameter;
+        return set == name || set == without_gpc(name);
+      });
+    };
+    if (platform != nullptr && has(platform->settings)) origin = "platform";
+    for (const std::string& text : invocation_.app->get_option("--set")->results()) {
+      const std::string key = text.substr(0, text.find('='));
+      if (key == name || key == without_gpc(name)) origin = given("--set", key);
+    }
+    return line_of(key_text(name), value_text(value), origin);
+  }
+
+  const Invocation& invocation_;
+  const std::vector<RunRequest>& requests_;
+};
+
+}  // namespace
+
+bool prints_config(const Invocation& invocation) {
+  const CLI::Option* const option = invocation.app->get_option_no_throw("--print-config");
+  return option != nullptr && option->count() > 0;
+}
+
+std::string config_text(const Invocation& invocation, const std::vector<RunRequest>& requests,
+                        const std::vector<std::pair<std::string, std::string>>& preprocess) {
+  const Writer writer(invocation, requests);
+  return fmt::format(
+             "# `vrpipe {} --config THIS_FILE` does this; vrpipe {}. After each value is where it comes from.\n\n",
+             invocation.app->get_name(), VRPIPE_VERSION) +
+         writer.options() + writer.units() + writer.variants() + writer.parameters(preprocess);
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <vrpipe/platforms/simulation.h>
+
+namespace vrpipe::tools {
+
+/// A variant of the user's: the base's units and parameters but for these changes.
+struct VariantDefinition {
+  std::string name;
+  std::string base;
+  /// SLOT (or a unit's path) and implementation, or UNIT.PARAMETER and value, in the order given.
+  std::vector<std::pair<std::string, std::string>> changes;
+};
+
+/// "NAME=BASE[,SLOT=IMPLEMENTATION][,UNIT.PARAMETER=VALUE]..."; not checked against what there is. Throws UserError.
+VariantDefinition parse_variant(const std::string& text);
+
+/// The same as text.
+std::string text_of(const VariantDefinition& definition);
+
+/// Adds it to vrpipe::variants(). Throws UserError for a name that is taken or would not do as one of a file, an unknown
+/// base, and a change of what all runs share; that units and parameters exist is checked with the platform.
+const Variant& add_user_variant(const VariantDefinition& definition);
+
+/// What it changes, as in "qru=same-splat, tc.bins=64".
+std::string changes_text(const Variant& variant);
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,65 @@
+#include "output/machines_text.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include <vrpipe/component/printable.h>
+
+#include "jobs/user_variants.h"
+#include "output/effects_report.h"
+
+namespace vrpipe::tools {
+namespace {
+
+std::string common_text(const RunRequest& request, const std::vector<Setting>& preprocessing, std::uint32_t passes) {
+  std::string text = fmt::format("{} fidelity, {} colour, {} termination", vrpipe::name_of(request.fidelity),
+                                 vrpipe::name_of(request.format), name_of(request.termination));
+  if (passes > 1) text += fmt::format(", {} passes", passes);
+  text += effects_choice_text(request);
+  for (const std::vector<Setting>* settings : {&request.settings, &preprocessing}) {
+    for (const Setting& setting : *settings) {
+      text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
+    }
+  }
+  for (const UnitChoice& unit : request.units) text += fmt::format(", {}={}", unit.slot, unit.implementation);
+  return text + "\n";
+}
+
+std::string platform_line(const Platform& platform, const TextStyle& style) {
+  return style.bold(platform.name) + " (" + platform.description + ")\n";
+}
+
+/// Adds to `seen` what is not there; whether it was not.
+bool is_first(const std::string& name, std::vector<std::string>& seen) {
+  if (std::find(seen.begin(), seen.end(), name) != seen.end()) return false;
+  seen.push_back(name);
+  return true;
+}
+
+}  // namespace
+
+std::string machines_text(const std::vector<RunResult>& runs, const std::vector<Setting>& preprocessing,
+                          std::uint32_t passes, const TextStyle& style) {
+  std::string text;
+  std::vector<std::string> platforms, variants;
+  for (const RunResult& run : runs) {
+    const Platform& platform = *run.request.platform;
+    if (is_first(platform.name, platforms)) text += platform_line(platform, style);
+  }
+  text += common_text(runs.front().request, preprocessing, passes);
+  for (const RunResult& run : runs) {
+    const Variant& variant = run.request.variant;
+    if (variant.base.empty() || !is_first(variant.name, variants)) continue;
+    const std::string changes = changes_text(variant);
+    text += fmt::format("{}: {}{}{}\n", style.bold(variant.name), variant.base, changes.empty() ? "" : " with ",
+                        printable(changes));
+  }
+  return text;
+}
+
+std::string machine_text(const RunRequest& request, const TextStyle& style) {
+  return platform_line(*request.platform, style) + common_text(request, {}, 1);
+}
+
+}  // namespace vrpipe::tools
