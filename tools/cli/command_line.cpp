@@ -30,6 +30,8 @@ constexpr const char* program_footer =
     "  vrpipe run --variant het --set crop.cache_bytes=32768 --json result.json\n"
     "  vrpipe accuracy --quick --html accuracy.html     what accuracy costs in time\n"
     "  vrpipe reproduce --quick                         the paper's numbers beside what is measured here\n"
+    "  vrpipe compare --config study.toml               all of it from a file; --print-config writes one\n"
+    "  vrpipe diff before.json after.json               what differs between two results\n"
     "  vrpipe microbench all --html microbench.html     the paper's analysis of GPUs as workloads\n"
     "  vrpipe units                                     every unit and parameter that can be changed\n"
     "\n"
@@ -193,6 +195,7 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   commands.push_back(make_reproduce_command());
   commands.push_back(make_microbench_command());
   commands.push_back(make_convert_command());
+  commands.push_back(make_diff_command());
   commands.push_back(make_scenes_command());
   commands.push_back(make_platforms_command());
   commands.push_back(make_units_command());

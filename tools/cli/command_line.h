@@ -39,6 +39,7 @@ std::unique_ptr<Command> make_accuracy_command();
 std::unique_ptr<Command> make_reproduce_command();
 std::unique_ptr<Command> make_microbench_command();
 std::unique_ptr<Command> make_convert_command();
+std::unique_ptr<Command> make_diff_command();
 std::unique_ptr<Command> make_scenes_command();
 std::unique_ptr<Command> make_platforms_command();
 std::unique_ptr<Command> make_units_command();

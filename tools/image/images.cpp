@@ -9,9 +9,12 @@
 #include <utility>
 #include <vector>
 
+#include <Iex.h>
+#include <ImathBox.h>
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStdIO.h>
 #include <png.h>
@@ -136,6 +139,33 @@ std::string encode_exr(const SharedImage& image) {
     file.writePixels(static_cast<int>(image.height()));
   }
   return stream.str();
+}
+
+SharedImage read_exr(const std::string& path) {
+  try {
+    Imf::InputFile file(path.c_str(), 1);
+    const Imath::Box2i window = file.header().dataWindow();
+    constexpr int most = 16384;
+    const int width = window.max.x - window.min.x + 1, height = window.max.y - window.min.y + 1;
+    if (width < 1 || height < 1 || width > most || height > most)
+      throw std::runtime_error(path + ": of no usable size");
+    SharedImage image(static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height));
+    Imf::FrameBuffer pixels;
+    const std::size_t row_bytes = std::size_t{16} * image.width();
+    const std::ptrdiff_t before =
+        window.min.x * std::ptrdiff_t{16} + window.min.y * static_cast<std::ptrdiff_t>(row_bytes);
+    char* const first = reinterpret_cast<char*>(image.values()) - before;
+    std::size_t offset = 0;
+    for (const char* channel : {"R", "G", "B", "A"}) {
+      pixels.insert(channel, Imf::Slice(Imf::FLOAT, first + offset, 16, row_bytes));
+      offset += sizeof(float);
+    }
+    file.setFrameBuffer(pixels);
+    file.readPixels(window.min.y, window.max.y);
+    return image;
+  } catch (const Iex::BaseExc& error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
 }
 
 }  // namespace vrpipe::tools

@@ -49,4 +49,7 @@ std::string encode_png(std::uint32_t width, std::uint32_t height, const std::vec
 /// An OpenEXR file: RGBA float32, premultiplied, without a background.
 std::string encode_exr(const SharedImage& image);
 
+/// Reads such a file; channels that it does not have are 0. Throws std::runtime_error.
+SharedImage read_exr(const std::string& path);
+
 }  // namespace vrpipe::tools

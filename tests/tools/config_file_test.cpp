@@ -1,0 +1,211 @@
+// Configuration files: what they say, what the command line says instead, and what --print-config writes.
+#include "tool_test_support.h"
+
+#include <regex>
+
+namespace vrpipe::testing {
+namespace {
+
+using nlohmann::json;
+
+class ConfigFile : public ToolTest {
+ protected:
+  json with(const std::string& config, const std::string& command, std::vector<std::string> options = {}) const {
+    write("config.toml", config);
+    options.insert(options.begin(), {command, "--config", "config.toml"});
+    return json_of(std::move(options));
+  }
+  std::string printed(std::vector<std::string> options) const {
+    options.emplace_back("--print-config");
+    const Finished finished = vrpipe(std::move(options));
+    EXPECT_EQ(finished.code, 0) << finished.err;
+    return finished.out;
+  }
+  void bad(const std::string& config, const std::vector<std::string>& parts) const {
+    SCOPED_TRACE(config);
+    write("config.toml", config);
+    refused({"compare", "--config", "config.toml", "--output", "images"}, parts);
+  }
+};
+
+/// What does not depend on how it was asked for, nor on the host.
+json comparable(json result) {
+  for (const char* key : {"command", "config", "host"}) result.erase(key);
+  result["platform"].erase("origins");
+  for (json& run : result["runs"]) {
+    for (const char* key : {"host_seconds", "cpu_seconds"}) run.erase(key);
+  }
+  return result;
+}
+
+TEST_F(ConfigFile, SaysWhatTheCommandLineCan) {
+  const json by_file = with(R"(
+scene = "tiny.spl"
+platform = "mobile"
+fidelity = "lt"
+format = "rgba8"
+termination = "strict"
+effects = "all"
+variant = ["baseline", "mine"]
+relative-to = "mine"
+background = [0.5, 1, 0]
+jobs = 1
+
+[variants.mine]
+base = "het+qm"
+unit.qru = "pass-through"
+set.tgc.bins = 9
+
+[set]
+tc.bins = 5
+crop.cache_bytes = "8K"
+crop.forwarding = false
+
+[unit]
+l2 = "fixed-latency"
+)",
+                            "compare");
+  const json by_words = json_of({"compare",
+                                 "--scene",
+                                 "tiny.spl",
+                                 "--platform",
+                                 "mobile",
+                                 "--fidelity",
+                                 "lt",
+                                 "--format",
+                                 "rgba8",
+                                 "--termination",
+                                 "strict",
+                                 "--effects",
+                                 "all",
+                                 "--variant",
+                                 "baseline",
+                                 "--variant",
+                                 "mine=het+qm,qru=pass-through,tgc.bins=9",
+                                 "--relative-to",
+                                 "mine",
+                                 "--jobs",
+                                 "1",
+                                 "--set",
+                                 "tc.bins=5",
+                                 "--set",
+                                 "crop.cache_bytes=8K",
+                                 "--set",
+                                 "crop.forwarding=off",
+                                 "--unit",
+                                 "l2=fixed-latency"});
+  EXPECT_EQ(comparable(by_file), comparable(by_words));
+  EXPECT_EQ(by_file["config"], "config.toml");
+  EXPECT_EQ(by_file["platform"]["origins"]["tc.bins"], "file");
+}
+
+TEST_F(ConfigFile, GivesWayToTheCommandLineKeyByKey) {
+  const json result = with("scene = \"nowhere.ply\"\nfidelity = \"lt\"\n[set]\ntc.bins = 5\ntc.bin_quads = 16\n", "run",
+                           {"--scene", "tiny.spl", "--set", "tc.bins=6"});
+  EXPECT_EQ(result["fidelity"], "lt");
+  EXPECT_EQ(result["platform"]["parameters"]["tc.bins"], 6);
+  EXPECT_EQ(result["platform"]["parameters"]["tc.bin_quads"], 16);
+  EXPECT_EQ(result["platform"]["origins"]["tc.bins"], "command line");
+  EXPECT_EQ(result["platform"]["origins"]["tc.bin_quads"], "file");
+}
+
+TEST_F(ConfigFile, DefinesVariantsThatStandBesideTheFourInItsOrder) {
+  const json result =
+      with("scene = \"tiny.spl\"\n[variants.z]\nbase = \"qm\"\n[variants.a]\nbase = \"z\"\n", "compare");
+  std::vector<std::string> names;
+  for (const json& run : result["runs"]) names.push_back(run["variant"]);
+  EXPECT_EQ(names, (std::vector<std::string>{"baseline", "qm", "het", "het+qm", "z", "a"}));
+  EXPECT_EQ(result["runs"][5]["result_hash"], result["runs"][1]["result_hash"]);
+}
+
+TEST_F(ConfigFile, MayBeOverruledInWhatItDefines) {
+  const json result = with("scene = \"tiny.spl\"\n[variants.a]\nbase = \"qm\"\nset.tc.bins = 3\n", "compare",
+                           {"--variant", "a=het,tc.bins=4"});
+  EXPECT_EQ(result["runs"][0]["changes"]["base"], "het");
+}
+
+TEST_F(ConfigFile, NamesFilesFromWhereItStands) {
+  std::filesystem::create_directory(folder() / "study");
+  std::filesystem::rename(folder() / "tiny.spl", folder() / "study" / "tiny.spl");
+  write("study/config.toml", "scene = \"tiny.spl\"\noutput = \"images\"\nfidelity = \"functional\"\n");
+  const Finished finished = vrpipe({"run", "--config", "study/config.toml"});
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  EXPECT_TRUE(std::filesystem::exists(folder() / "study" / "images" / "tiny-het+qm.png"));
+}
+
+TEST_F(ConfigFile, PrintedReadsBackToTheSameRunAndTheSameFile) {
+  write("some.toml",
+        "scene = \"tiny.spl\"\n[variants.own]\nbase = \"het\"\n[variants.own.set]\ntc.bins = 3\n"
+        "crop.forwarding = false\n[set]\nzrop.cache_bytes = \"4K\"\n");
+  for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
+           {"run", "--scene", "tiny.spl", "--set", "state.termination_threshold=0.75", "--set",
+            "crop.latency_cycles=9"},
+           {"compare", "--config", "some.toml", "--set", "tc.bins=11", "--termination", "strict"},
+           {"compare", "--scene", "tiny.spl", "--platform", "mobile", "--variant", "baseline", "--variant",
+            "x=het+qm,qru=pass-through,state.pruning_threshold=1e-5"},
+           {"compare", "--scene", "tiny.spl", "--platform", "mobile", "--platform", "lpddr3", "--set", "tc.bins=4"},
+           {"accuracy", "--scene", "tiny.spl", "--quick", "--platform", "desktop"}}) {
+    const std::string text = printed(command);
+    SCOPED_TRACE(text);
+    write("printed.toml", text);
+    const auto without_comments = [](const std::string& of) {
+      return std::regex_replace(of, std::regex(" *#[^\n]*"), "");
+    };
+    EXPECT_EQ(without_comments(printed({command[0], "--config", "printed.toml"})), without_comments(text));
+    if (command[0] == "accuracy") continue;
+    const json first = json_of(command), again = json_of({command[0], "--config", "printed.toml"});
+    EXPECT_EQ(comparable(first), comparable(again));
+  }
+}
+
+TEST_F(ConfigFile, PrintedHasEveryParameterAndItsOrigin) {
+  write("config.toml", "scene = \"tiny.spl\"\nplatform = \"mobile\"\n[set]\ntc.bin_quads = 16\n");
+  const std::string text = printed({"run", "--config", "config.toml", "--set", "tgc.bins=7"});
+  const auto line = [&](const std::string& key) {
+    std::smatch found;
+    EXPECT_TRUE(std::regex_search(text, found, std::regex("\n(" + key + " = [^\n]*)"))) << key << "\n" << text;
+    return std::regex_replace(found[1].str(), std::regex(" +"), " ");
+  };
+  EXPECT_EQ(line("tc.bin_quads"), "tc.bin_quads = 16 # config.toml");
+  EXPECT_EQ(line("tgc.bins"), "tgc.bins = 7 # command line");
+  EXPECT_EQ(line("fidelity"), "fidelity = \"cycle\" # default");
+  EXPECT_EQ(line("platform"), "platform = \"mobile\" # config.toml");
+  EXPECT_EQ(line("sm.cores"), "sm.cores = 4 # platform");
+  const json result = json_of({"run", "--config", "config.toml", "--set", "tgc.bins=7"});
+  for (const auto& [name, value] : result["platform"]["parameters"].items()) line(name);
+  EXPECT_EQ(files(), (std::vector<std::string>{"config.toml", "tiny.spl"})) << "nothing is simulated";
+}
+
+TEST_F(ConfigFile, ThatSaysWhatIsSoAnywayChangesNothingInTheReport) {
+  const json result = with("scene = \"tiny.spl\"\n[set]\ntc.bins = 32\ntc.bin_quads = 16\n", "run");
+  EXPECT_EQ(result["platform"]["origins"]["tc.bins"], "default");
+  const Finished finished = vrpipe({"run", "--config", "config.toml"});
+  EXPECT_NE(finished.out.find("tc.bin_quads=16"), std::string::npos);
+  EXPECT_EQ(finished.out.find("tc.bins="), std::string::npos);
+}
+
+TEST_F(ConfigFile, ThatCannotBeUsedIsRefusedWithItsLine) {
+  bad("sise = \"32x32\"\n", {"unknown key 'sise'", "config.toml:1", "did you mean size"});
+  bad("scene = \"tiny.spl\"\n\nsize = \"32\"\n", {"config.toml:3", "--size", "WIDTHxHEIGHT"});
+  bad("[set]\n\ntc.bin = 4\n", {"'bin'", "config.toml:3", "tc.bins"});
+  bad("[set]\ntc.bins = 0\n", {"config.toml:2", "tc.bins"});
+  bad("[set]\nnowhere.bins = 1\n", {"config.toml:2", "nowhere"});
+  bad("[unit]\nqru = \"nothing\"\n", {"config.toml:2", "nothing"});
+  bad("[variants.a]\nbase = \"hat\"\n", {"config.toml:", "'hat'", "did you mean het"});
+  bad("[variants.a]\nbsae = \"het\"\n", {"config.toml:2", "'bsae'", "did you mean base"});
+  bad("[variants.a]\nset.tc.bins = 1\n", {"config.toml:", "has no base"});
+  bad("[variants.a]\nbase = \"het\"\nset.tc.bin = 1\n", {"config.toml:3", "'bin'"});
+  bad("variants = 3\n", {"config.toml:1", "table"});
+  bad("explain-effects = 3\n", {"config.toml:1", "true or false"});
+  bad("fidelity = 2020-01-01\n", {"config.toml:1", "fidelity"});
+  bad("fidelity = \"lt\"\nfidelity = \"at\"\n", {"config.toml:2", "cannot read configuration"});
+  bad("fidelity = lt\n", {"config.toml:1"});
+  bad("config = \"other.toml\"\n", {"unknown key 'config'"});
+  bad("\xff = 1\n", {"config.toml:1"});
+  refused({"run", "--config", "nowhere.toml"}, {"nowhere.toml", "no such file"});
+  refused({"run", "--config", "."}, {"cannot read configuration"});
+  refused({"units", "--config", "config.toml"}, {"--config"});
+}
+
+}  // namespace
+}  // namespace vrpipe::testing
