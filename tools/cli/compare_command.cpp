@@ -22,6 +22,7 @@ class CompareCommand : public Command {
     arguments_.declare(app, SimulationArguments::Variants::all);
     arguments_.declare_frames(app);
     arguments_.declare_views(app);
+    arguments_.declare_energy(app);
     arguments_.declare_explanation(app);
     app.footer(
         "Simulates four GPUs that differ only in the units swapped in, on the same draw: baseline, qm (TGC and QRU\n"
@@ -36,6 +37,7 @@ class CompareCommand : public Command {
         "  vrpipe compare --scene point_cloud.ply --camera cameras.json --views 20 --size 1280x720\n"
         "  vrpipe compare --scene builtin:indoor --views 8 --fidelity lt\n"
         "  vrpipe compare --platform mobile --format rgba8\n"
+        "  vrpipe compare --platform agx-orin-lpddr5 --energy\n"
         "  vrpipe compare --set qru.quads_per_cycle=4 --json - | python3 -m json.tool");
   }
 

@@ -77,6 +77,7 @@ JobResult perform(const SimulationJob& job) {
   JobResult result;
   result.schema = job.schema;
   result.provenance = job.provenance;
+  result.energies = job.energies;
   ProgressLine progress;
   std::vector<Simulated> simulated;
   bool preprocessed_here = false;

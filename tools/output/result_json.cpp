@@ -14,6 +14,7 @@
 #include "jobs/comparison.h"
 #include "jobs/settings.h"
 #include "output/effects_report.h"
+#include "output/energy_report.h"
 #include "output/report.h"
 
 namespace vrpipe::tools {
@@ -296,6 +297,9 @@ Json result_json(const JobResult& result) {
   for (std::size_t i = 0; i < result.runs.size(); ++i) {
     const EffectCosts* const costs = result.effect_costs.empty() ? nullptr : &result.effect_costs[i];
     runs.push_back(run_json(result.runs[i], result.images[i], costs));
+    if (!result.energies) continue;
+    const RunResult* const baseline = result.runs.size() > 1 ? &result.runs.front() : nullptr;
+    runs.back()["energy"] = energy_json(result.runs[i], baseline, *result.energies);
   }
   const StorageReport storage = quad_merging_storage(request);
   Json json = head_json(result.schema, result.provenance, result.processes);

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host/terminal.h"
+#include "jobs/energy.h"
+#include "output/result_json.h"
+
+namespace vrpipe::tools {
+
+/// What the runs spend, side by side; of several, over the first as well. Lines of at most 100 characters.
+std::string energy_text(const std::vector<RunResult>& runs, const EnergyTable& table, const TextStyle& style);
+
+/// `energy` of a run.
+/// @param baseline  what its ratio is over; null for none
+Json energy_json(const RunResult& run, const RunResult* baseline, const EnergyTable& table);
+
+}  // namespace vrpipe::tools
