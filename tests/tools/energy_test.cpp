@@ -132,6 +132,16 @@ TEST(Energy, WithoutTimeTheConstantPartIsUnknown) {
   EXPECT_FALSE(energy_ratio(amounts, amounts, table).has_value());
 }
 
+TEST(Energy, OfNothingHasNoRatio) {
+  const EnergyTable table = table_of(two_events);
+  RunResult nothing = run_of(0, 0, 100);
+  nothing.counts = Counts();
+  const EnergyAmounts none = energy_amounts(nothing, table), some = energy_amounts(run_of(500, 320, 1000), table);
+  EXPECT_FALSE(energy_ratio(none, none, table).has_value()) << "as there is no speed-up";
+  EXPECT_FALSE(energy_report(none, table).picojoules_per_fragment.has_value());
+  EXPECT_TRUE(energy_ratio(some, some, table).has_value());
+}
+
 TEST(Energy, OfARunWithoutCounterIsSaidToBeLeftOut) {
   const EnergyTable table = table_of(two_events);
   RunResult run = run_of(500, 320, 1000);

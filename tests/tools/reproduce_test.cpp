@@ -242,6 +242,7 @@ TEST_F(Synthetic, EnergyStandsBesideThePapersWithoutAVerdict) {
     amounts.events.assign(table.events.size(), 0);
     amounts.powers.assign(table.powers.size(), 1);
     amounts.seconds = seconds;
+    amounts.fragments_blended = 1;
   };
   // Constant power alone: energies are as times.
   for (std::size_t scene = 0; scene < 6; ++scene) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <limits>
 #include <map>
 #include <numeric>
 #include <utility>
@@ -72,11 +71,10 @@ double total(const std::vector<Term>& terms, double Term::*amount, double Range:
   return sum;
 }
 
-/// The least that the quotient of two sums can be. It is least where some terms are high and all others low, and terms
-/// lower it in the order of their own quotients; so there are no more combinations to try than terms.
-/// @param terms  by their quotients, the least first
-double least_ratio(const std::vector<Term>& terms) {
-  double least = std::numeric_limits<double>::infinity();
+/// What the quotient of two sums can be where terms up to one are high and all others low. It is least, or greatest, in
+/// one of these if terms are in the order of their own quotients: there is no need to try every combination.
+std::vector<double> quotients(const std::vector<Term>& terms) {
+  std::vector<double> all;
   for (std::size_t high = 0; high <= terms.size(); ++high) {
     double baseline = 0, run = 0;
     for (std::size_t i = 0; i < terms.size(); ++i) {
@@ -84,9 +82,9 @@ double least_ratio(const std::vector<Term>& terms) {
       baseline += terms[i].baseline * each;
       run += terms[i].run * each;
     }
-    least = std::min(least, baseline / run);
+    all.push_back(baseline / run);
   }
-  return least;
+  return all;
 }
 
 /// @param terms  of which neither side is nothing, even where all are low
@@ -94,10 +92,12 @@ Range ratio_of(std::vector<Term> terms) {
   const double nominal = total(terms, &Term::baseline, &Range::nominal) / total(terms, &Term::run, &Range::nominal);
   std::stable_sort(terms.begin(), terms.end(),
                    [](const Term& a, const Term& b) { return a.baseline / a.run < b.baseline / b.run; });
-  const double low = least_ratio(terms);
+  const std::vector<double> low = quotients(terms);
   std::reverse(terms.begin(), terms.end());
-  for (Term& term : terms) std::swap(term.baseline, term.run);
-  return {low, nominal, 1 / least_ratio(terms)};
+  const std::vector<double> high = quotients(terms);
+  // Rounding must not put the nominal one outside.
+  return {std::min(nominal, *std::min_element(low.begin(), low.end())), nominal,
+          std::max(nominal, *std::max_element(high.begin(), high.end()))};
 }
 
 /// Of a part of a whole, where part and rest vary by themselves.
@@ -161,7 +161,7 @@ EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& tabl
 }
 
 std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmounts& run, const EnergyTable& table) {
-  if (!baseline.seconds || !run.seconds) return std::nullopt;
+  if (!baseline.seconds || !run.seconds || baseline.fragments_blended == 0) return std::nullopt;
   std::vector<Term> terms;
   for (std::size_t i = 0; i < table.events.size(); ++i) {
     terms.push_back({baseline.events[i], run.events[i], table.events[i].picojoules * 1e-12});

@@ -41,9 +41,9 @@ struct EnergyReport {
 
 EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& table);
 
-/// Total of `baseline` over that of `run`, as a speed-up is of cycles; none without time, or where it may be that nothing
-/// was spent. Both have the same energies and powers, whatever these are: low and high are the extremes over all that they
-/// may be.
+/// Total of `baseline` over that of `run`, as a speed-up is of cycles; none without time, where the baseline blends nothing,
+/// or where the least that may have been spent is nothing. Both have the same energies and powers, whatever these are: low
+/// and high are the extremes over all that they may be.
 std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmounts& run, const EnergyTable& table);
 
 /// Powers of which the table says that they were found for other platforms than this.

@@ -276,9 +276,10 @@ void check_energy_names(const EnergyTable& table, const Platform& platform) {
   for (const auto& [name, value] : Counts().named()) countable.insert(name);
   for (const ParameterListing& listing : all_parameters(&platform)) {
     for (const Parameter* parameter : listing.parameters->parameters()) {
+      const std::string name = listing.unit + "." + parameter->name();
       const bool is_number =
           dynamic_cast<const Integer*>(parameter) != nullptr || dynamic_cast<const Real*>(parameter) != nullptr;
-      (is_number ? countable : others).insert(listing.unit + "." + parameter->name());
+      (is_number ? countable : others).insert(name);
     }
     for (const StatisticReport& statistic : list_statistics(listing)) {
       (statistic.kind == "counter" ? countable : others).insert(statistic.name);
