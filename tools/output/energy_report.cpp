@@ -94,7 +94,7 @@ void add_ratio(SpentTable& rows, const std::vector<RunResult>& runs, const Spent
   }
   const auto cell = [&](std::size_t i, const std::string& text) { return ratios[i] ? text : std::string("-"); };
   rows.row(
-      "efficiency over " + runs.front().request.variant.name,
+      "energy efficiency over " + runs.front().request.variant.name,
       [&](std::size_t i) { return cell(i, ratios[i] ? times(ratios[i]->nominal) : ""); }, true);
   rows.row("  low to high", [&](std::size_t i) {
     return cell(i, ratios[i] ? fmt::format("{:.2f} to {:.2f}x", ratios[i]->low, ratios[i]->high) : "");
