@@ -49,7 +49,8 @@ class BadInput : public ToolTest {
 };
 
 TEST_F(BadInput, Commands) {
-  refused({}, {"no command", "run, compare, accuracy, reproduce, microbench, convert, scenes, platforms, units"});
+  refused({},
+          {"no command", "run, compare, accuracy, reproduce, microbench, convert, scenes, platforms, units, energies"});
   refused({"sweep"}, {"'sweep'", "compare"});
   refused({"diff", "a.json", "b.json"}, {"'diff'"});
   refused({"compar"}, {"'compar'", "did you mean compare?"});

@@ -28,8 +28,8 @@ TEST_F(CommandLine, VersionAndHelp) {
   const Finished help = vrpipe({"--help"});
   EXPECT_EQ(help.code, 0);
   EXPECT_EQ(help.err, "");
-  expect_in(help.out,
-            {"run", "compare", "accuracy", "convert", "scenes", "platforms", "units", "--version", "Exit code"});
+  expect_in(help.out, {"run", "compare", "accuracy", "convert", "scenes", "platforms", "units", "energies", "--version",
+                       "Exit code"});
 }
 
 TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
@@ -54,6 +54,10 @@ TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
   expect_in(vrpipe({"units", "--help"}).out, {"--slot", "--platform", "--plugin", "--effects", "--json", "--markdown"});
   expect_in(vrpipe({"platforms", "--help"}).out, {"--plugin", "--json"});
   expect_in(vrpipe({"scenes", "--help"}).out, {"[FILE]", "--preview", "--json", "--measure", "--scene NAME|NAME=FILE"});
+  expect_in(vrpipe({"energies", "--help"}).out, {"[FILE.toml]", "--toml", "--markdown", "--json", "--platform"});
+  for (const char* command : {"run", "compare"}) {
+    expect_in(vrpipe({command, "--help"}).out, {"--energy", "--energies FILE.toml"});
+  }
   expect_in(vrpipe({"convert", "--help"}).out, {"IN", "OUT", ".splat"});
 }
 

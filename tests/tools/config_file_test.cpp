@@ -143,7 +143,7 @@ TEST_F(ConfigFile, PrintedReadsBackToTheSameRunAndTheSameFile) {
            {"compare", "--config", "some.toml", "--set", "tc.bins=11", "--termination", "strict"},
            {"compare", "--scene", "tiny.spl", "--platform", "mobile", "--variant", "baseline", "--variant",
             "x=het+qm,qru=pass-through,state.pruning_threshold=1e-5"},
-           {"compare", "--scene", "tiny.spl", "--platform", "mobile", "--platform", "lpddr3", "--set", "tc.bins=4"},
+           {"compare", "--scene", "tiny.spl", "--platform", "mobile", "--platform", "desktop", "--set", "tc.bins=4"},
            {"accuracy", "--scene", "tiny.spl", "--quick", "--platform", "desktop"}}) {
     const std::string text = printed(command);
     SCOPED_TRACE(text);

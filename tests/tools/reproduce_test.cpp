@@ -234,6 +234,29 @@ TEST_F(Synthetic, RowsSayWhatThePointsSay) {
   }
 }
 
+TEST_F(Synthetic, EnergyStandsBesideThePapersWithoutAVerdict) {
+  EXPECT_EQ(row("R12").measured, "") << "nothing was counted";
+  const tools::EnergyTable& table = tools::shipped_energies();
+  const auto spend = [&](std::size_t scene, const std::string& variant, double seconds) {
+    tools::EnergyAmounts& amounts = point(scene, variant).energy.emplace();
+    amounts.events.assign(table.events.size(), 0);
+    amounts.powers.assign(table.powers.size(), 1);
+    amounts.seconds = seconds;
+    amounts.fragments_blended = 1;
+  };
+  // Constant power alone: energies are as times.
+  for (std::size_t scene = 0; scene < 6; ++scene) {
+    spend(scene, "baseline", 2);
+    spend(scene, "het+qm", scene == 3 ? 0.5 : 1);
+  }
+  EXPECT_EQ(row("R12").measured, "2.33x, from 2.33x to 2.33x");
+  EXPECT_EQ(row("R13").measured, "4.00x, from 4.00x to 4.00x (truck)");
+  for (const char* id : {"R12", "R13"}) {
+    EXPECT_EQ(row(id).verdict, Verdict::cannot_say) << id;
+    EXPECT_NE(row(id).reason.find("another method"), std::string::npos) << id;
+  }
+}
+
 TEST_F(Synthetic, RowsThatDifferNameTheScenes) {
   point(2, "het").run.cycles = *point(0, "baseline").run.cycles;
   EXPECT_EQ(row("C6").verdict, Verdict::differs);
@@ -306,6 +329,7 @@ TEST_F(Reproduce, SaysSomethingOfEveryRow) {
     EXPECT_NE(document.find("| " + id + " |"), std::string::npos) << id;
     EXPECT_NE(finished.out.find("\n" + id + " "), std::string::npos) << id;
   }
+  EXPECT_NE(document.find("x, from "), std::string::npos) << "the energy of R12";
   // A verdict of a quick look says so.
   EXPECT_EQ(document.find("| agrees |"), std::string::npos);
   EXPECT_NE(document.find("| agrees (quick) |"), std::string::npos);

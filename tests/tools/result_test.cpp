@@ -233,7 +233,7 @@ TEST_F(Result, JsonOnStdoutIsAlone) {
     EXPECT_TRUE(json::accept(finished.out)) << finished.out;
     EXPECT_EQ(finished.err, "");
   }
-  for (const char* command : {"scenes", "platforms", "units"}) {
+  for (const char* command : {"scenes", "platforms", "units", "energies"}) {
     const Finished finished = vrpipe({command, "--json", "-"});
     EXPECT_EQ(finished.code, 0);
     EXPECT_TRUE(json::accept(finished.out)) << finished.out;
@@ -409,7 +409,9 @@ TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
   check("Of `run` and `compare`",
         {of_scene({"run"}), of_scene({"compare"}), json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional"}),
          json_of({"run", "--scene", "tiny.spl", "--platform", "desktop"}), json_of({"run", "--frame", "frame.json"}),
-         json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--explain-effects"})});
+         json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--explain-effects"}),
+         json_of({"compare", "--scene", "tiny.spl", "--platform", "desktop", "--energy"}),
+         json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--energy"})});
   check("Of `accuracy`", {of_scene({"accuracy", "--quick"}), json_of({"accuracy", "--quick", "--scene", "tiny.spl"})});
 }
 

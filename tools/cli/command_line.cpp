@@ -199,6 +199,7 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   commands.push_back(make_scenes_command());
   commands.push_back(make_platforms_command());
   commands.push_back(make_units_command());
+  commands.push_back(make_energies_command());
   return commands;
 }
 

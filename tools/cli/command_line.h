@@ -43,6 +43,7 @@ std::unique_ptr<Command> make_diff_command();
 std::unique_ptr<Command> make_scenes_command();
 std::unique_ptr<Command> make_platforms_command();
 std::unique_ptr<Command> make_units_command();
+std::unique_ptr<Command> make_energies_command();
 
 /// In the order in which `vrpipe --help` lists them.
 std::vector<std::unique_ptr<Command>> all_commands();

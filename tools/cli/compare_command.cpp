@@ -25,6 +25,7 @@ class CompareCommand : public Command {
     arguments_.declare_comparison(app);
     arguments_.declare_frames(app);
     arguments_.declare_views(app);
+    arguments_.declare_energy(app);
     arguments_.declare_explanation(app);
     app.footer(
         "Simulates GPUs that differ only in the units swapped in, on the same draw: baseline, qm (TGC and QRU merge\n"
@@ -41,6 +42,7 @@ class CompareCommand : public Command {
         "  vrpipe compare --platform mobile --format rgba8\n"
         "  vrpipe compare --variant het+qm --variant small=het+qm,tc.bins=16,tgc.bins=64\n"
         "  vrpipe compare --platform agx-orin --platform mobile --relative-to mobile/baseline\n"
+        "  vrpipe compare --platform agx-orin-lpddr5 --energy\n"
         "  vrpipe compare --set qru.quads_per_cycle=4 --json - | python3 -m json.tool");
   }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
-#include <sstream>
+#include <iterator>
 
 #include <fmt/format.h>
 #include <toml++/toml.h>
@@ -143,15 +143,16 @@ ConfigFile::ConfigFile(const std::filesystem::path& path, CLI::App& app) : path_
 void ConfigFile::read(CLI::App& app) {
   const Reader reader(path_, app);
   std::ifstream file(path_, std::ios::binary);
-  std::ostringstream content;
-  if (!file || !(content << file.rdbuf())) {
+  const std::string content(std::istreambuf_iterator<char>(file), {});
+  std::error_code ignored;
+  if (!file || std::filesystem::is_directory(path_, ignored)) {
     throw UserError("cannot read configuration", std::string(config_option) + " " + path_.string(),
-                    file ? "it is empty, or no file" : "there is no such file, or it may not be read",
+                    "there is no such file, or it may not be read",
                     "name a TOML file; docs/configuration.md describes it");
   }
   toml::table root;
   try {
-    root = toml::parse(content.str(), path_.string());
+    root = toml::parse(content, path_.string());
   } catch (const toml::parse_error& error) {
     throw UserError("cannot read configuration", reader.place(error.source()), std::string(error.description()),
                     "correct it; docs/configuration.md describes the file");

@@ -51,6 +51,8 @@ constexpr const char* machine_group = "On which GPU";
 constexpr const char* rules_group = "How exactly";
 constexpr const char* result_group = "Where results go";
 
+constexpr const char* energies_option = "--energies";
+
 /// Each but the last is two draws.
 constexpr unsigned most_passes = most_draws / 2 + 1;
 
@@ -309,6 +311,7 @@ std::optional<ViewsChoice> SimulationArguments::views() const {
   refuse(!frame_.empty(), "--frame", "--views draws one scene from many cameras");
   refuse(!save_draw_.empty(), "--save-draw", "a draw list has one draw, and each view has another");
   refuse(explain_effects_, "--explain-effects", "it measures the runs of one view");
+  refuse(energy_ || !energies_.empty(), energy_ ? "--energy" : energies_option, "it is of the runs of one view");
   const auto scene = single(scene_, "--scene");
   refuse(scene && is_draw_list(*scene), "--scene", "a .spl is a draw list, of one camera");
   const auto camera = single(camera_, "--camera");
@@ -332,6 +335,25 @@ std::optional<ViewsChoice> SimulationArguments::views() const {
   }
   if (journal) choice.journal = *journal;
   return choice;
+}
+
+void SimulationArguments::declare_energy(CLI::App& app) {
+  app.add_flag("--energy", energy_, "reports what each run spends, mJ by unit, with its range (docs/energy.md)")
+      ->disable_flag_override()
+      ->group(result_group);
+  add_option(app, energies_option, energies_, "FILE.toml",
+             "--energy by a table of your own (`vrpipe energies --toml` prints the one that\n"
+             "vrpipe comes with)",
+             result_group);
+}
+
+std::shared_ptr<const EnergyTable> SimulationArguments::energies(const Platform& platform) const {
+  const auto file = single(energies_, energies_option);
+  if (!file && !energy_) return nullptr;
+  auto table = std::make_shared<EnergyTable>(file ? read_energies(*file) : shipped_energies());
+  const StdoutToStderr redirected;  // plugins may print while their units are made
+  check_energy_names(*table, platform);
+  return table;
 }
 
 void SimulationArguments::declare_explanation(CLI::App& app) {
@@ -385,6 +407,7 @@ std::vector<NamedFile> SimulationArguments::inputs(const FrameDescription& frame
     for (const auto& file : camera_files(camera_choice(camera).file)) files.push_back({"--camera", file});
   }
   for (const std::string& plugin : plugins_) files.push_back({"--plugin", plugin});
+  for (const std::string& file : energies_) files.push_back({energies_option, file});
   return files;
 }
 
@@ -433,7 +456,9 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
   if (const auto list = single(effects_, "--effects")) request.effects = EffectChoice::parse(*list);
   check_explanation(request.effects);
   job.explain_effects = explain_effects_;
-  request.reads_statistics = single(json_, "--json").has_value() && views_.empty();
+  job.energies = energies(*request.platform);
+  // Those of the table that vrpipe comes with are counted in any case.
+  request.reads_statistics = (single(json_, "--json").has_value() && views_.empty()) || !energies_.empty();
   if (const auto name = single(format_, "--format")) request.format = color_format_named(*name);
   if (const auto name = single(termination_, "--termination")) request.termination = termination_named(*name);
   job.scene.preprocess = parts.preprocess;

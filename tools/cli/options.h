@@ -59,6 +59,8 @@ class SimulationArguments {
   void declare_views(CLI::App& app);
   /// What these say; none without --views. Throws UserError for options that mean nothing beside them.
   std::optional<ViewsChoice> views() const;
+  /// --energy and --energies, for commands that report what each run spends.
+  void declare_energy(CLI::App& app);
   /// --explain-effects, for commands that report effects of each run.
   void declare_explanation(CLI::App& app);
   /// Loads the plugins and checks every option but the names of output files, which the commands know. Throws UserError.
@@ -81,6 +83,8 @@ class SimulationArguments {
   std::vector<NamedFile> inputs(const FrameDescription& frame) const;
   std::shared_ptr<Trace> trace(const RunRequest& request) const;
   void check_explanation(const EffectChoice& effects) const;
+  /// Null if energy is not asked for; throws UserError.
+  std::shared_ptr<const EnergyTable> energies(const Platform& platform) const;
 
   Values meshes_;
   Values scene_, frame_, passes_, size_, camera_, eye_, look_at_, up_, fovy_;
@@ -90,6 +94,8 @@ class SimulationArguments {
   bool compares_any_ = false;
   Values background_, output_, json_, save_draw_, jobs_;
   Values trace_, trace_every_, trace_statistics_;
+  Values energies_;
+  bool energy_ = false;
   bool explain_effects_ = false;
 };
 

@@ -25,6 +25,9 @@ struct PaperRow {
   bool is_within_reach = true;   ///< of what is modelled here
 };
 
+/// Of R12 and R13, which is not how energy is simulated here.
+const char* paper_energy_method();
+
 /// R1 to R32, then C1 to C13, in order.
 const std::vector<PaperRow>& paper_rows();
 /// Throws std::logic_error for one that there is not.

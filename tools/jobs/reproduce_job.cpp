@@ -133,12 +133,35 @@ Journal open_journal(const ReproduceJob& job, const ReproducePlan& plan) {
                            ReproduceJob::journal_option);
 }
 
+json energy_to_json(const EnergyAmounts& amounts) {
+  return {{"events", amounts.events},
+          {"powers", amounts.powers},
+          {"seconds", amounts.seconds.value()},
+          {"fragments_blended", amounts.fragments_blended},
+          {"not_counted", amounts.not_counted}};
+}
+
+EnergyAmounts energy_from_json(const json& record) {
+  EnergyAmounts amounts;
+  record.at("events").get_to(amounts.events);
+  record.at("powers").get_to(amounts.powers);
+  amounts.seconds = record.at("seconds").get<double>();
+  record.at("fragments_blended").get_to(amounts.fragments_blended);
+  record.at("not_counted").get_to(amounts.not_counted);
+  const EnergyTable& table = shipped_energies();
+  if (amounts.events.size() != table.events.size() || amounts.powers.size() != table.powers.size()) {
+    throw std::runtime_error("a record of other energies");
+  }
+  return amounts;
+}
+
 json to_record(const std::string& name, const PointResult& point) {
   return {{"point", name},
           {"run", encode(point.run)},
           {"gaussians", {point.gaussians_total, point.gaussians_visible}},
           {"size", {point.width, point.height}},
-          {"map", point.map ? to_json(*point.map) : json()}};
+          {"map", point.map ? to_json(*point.map) : json()},
+          {"energy", point.energy ? energy_to_json(*point.energy) : json()}};
 }
 
 /// Throws std::runtime_error or json::exception for what to_record() cannot have made.
@@ -152,6 +175,7 @@ PointResult from_record(const json& record, const ReproducePoint& planned) {
   record.at("size").at(0).get_to(point.width);
   record.at("size").at(1).get_to(point.height);
   if (!record.at("map").is_null()) point.map = heat_map_from_json(record.at("map"));
+  if (!record.at("energy").is_null()) point.energy = energy_from_json(record.at("energy"));
   if (point.map.has_value() != planned.with_map) throw std::runtime_error("a record of another plan");
   return point;
 }
@@ -221,6 +245,8 @@ void simulate(const ReproduceJob& job, const std::vector<bool>& is_done, Reprodu
     PointResult& point = result.points[i];
     point.run = std::move(simulated.result);
     point.run.request = plan.points[i].request;
+    if (plan.points[i].key.settings.empty() && point.run.cycles)
+      point.energy = energy_amounts(point.run, shipped_energies());
     strip(point.run, i == 0);
     tasks[task].request.observers.reset();
     if (const auto counter = counters.find(i); counter != counters.end()) {

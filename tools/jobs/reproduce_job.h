@@ -14,6 +14,7 @@
 #include "host/output_file.h"
 #include "host/progress_line.h"
 #include "host/provenance.h"
+#include "jobs/energy.h"
 #include "jobs/heat_map.h"
 #include "jobs/journal.h"
 #include "jobs/microbench_job.h"
@@ -42,6 +43,7 @@ struct PointResult {
   std::uint64_t gaussians_total = 0, gaussians_visible = 0;
   std::uint32_t width = 0, height = 0;  ///< pixels
   std::optional<HeatMap> map;
+  std::optional<EnergyAmounts> energy;  ///< by shipped_energies(); of points that have time, at the default settings
 };
 
 struct ReproduceResult {

@@ -80,6 +80,7 @@ JobResult perform(const SimulationJob& job) {
   result.schema = job.schema;
   result.provenance = job.provenance;
   result.baseline = job.baseline;
+  result.energies = job.energies;
   ProgressLine progress;
   std::vector<Simulated> simulated;
   bool preprocessed_here = false;

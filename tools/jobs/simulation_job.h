@@ -16,6 +16,7 @@
 #include "host/output_file.h"
 #include "host/provenance.h"
 #include "jobs/effect_costs.h"
+#include "jobs/energy_table.h"
 #include "jobs/frame_file.h"
 #include "jobs/trace.h"
 
@@ -39,6 +40,7 @@ struct SimulationJob {
   std::optional<std::filesystem::path> save_draw;  ///< file
   std::shared_ptr<Trace> trace;                    ///< of the only request, which has its observers; null for none
   bool explain_effects = false;                    ///< measures what each effect that a run omits would cost
+  std::shared_ptr<const EnergyTable> energies;     ///< by which energy is reported; null if it is not
   unsigned processes = 1;                          ///< simulations at a time
 };
 
@@ -62,6 +64,7 @@ struct JobResult {
   std::size_t baseline = 0;                       ///< of `runs`, over which speed-ups are
   std::vector<std::optional<ImageFiles>> images;  ///< one for each run
   std::vector<EffectCosts> effect_costs;          ///< one for each run, if they were asked for
+  std::shared_ptr<const EnergyTable> energies;    ///< SimulationJob::energies
   unsigned processes = 1;
   double load_seconds = 0;      ///< wall time of reading and preprocessing scenes
   double simulate_seconds = 0;  ///< wall time of all simulations together

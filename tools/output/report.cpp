@@ -13,6 +13,7 @@
 
 #include "jobs/comparison.h"
 #include "output/effects_report.h"
+#include "output/energy_report.h"
 #include "output/machines_text.h"
 #include "output/text_table.h"
 
@@ -463,6 +464,7 @@ std::string report(const JobResult& result, const TextStyle& style) {
 
   std::string text = heading(result, style) + table.text(style) + "\n" + draws_text(runs, style);
   if (runs.size() == 1 && !runs.front().units.empty()) text += unit_states_text(runs.front(), style) + "\n";
+  if (result.energies) text += energy_text(runs, result.baseline, *result.energies, style) + "\n";
   return text + remarks(result) + effects_text(runs, result.effect_costs, style);
 }
 

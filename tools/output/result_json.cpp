@@ -14,6 +14,7 @@
 #include "jobs/comparison.h"
 #include "jobs/settings.h"
 #include "output/effects_report.h"
+#include "output/energy_report.h"
 #include "output/report.h"
 
 namespace vrpipe::tools {
@@ -348,12 +349,15 @@ Json platform_json(const std::vector<RunResult>& runs, const std::vector<Setting
 Json result_json(const JobResult& result) {
   const RunRequest& request = result.runs.front().request;
   Json platform = platform_json(result.runs, result.preprocessing, result.provenance);
+  const RunResult& baseline = result.runs[result.baseline];
   Json runs = Json::array();
   for (std::size_t i = 0; i < result.runs.size(); ++i) {
     const EffectCosts* const costs = result.effect_costs.empty() ? nullptr : &result.effect_costs[i];
     runs.push_back(run_json(result.runs[i], result.images[i], costs, platform["parameters"]));
+    if (!result.energies) continue;
+    const RunResult* const over = result.runs.size() > 1 ? &baseline : nullptr;
+    runs.back()["energy"] = energy_json(result.runs[i], over, *result.energies);
   }
-  const RunResult& baseline = result.runs[result.baseline];
   Json json = head_json(result.schema, result.provenance, result.processes);
   json.update({{"seed", request.stall_seed},
                {"scene", scene_json(result.scene, result.width, result.height)},

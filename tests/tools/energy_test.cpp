@@ -1,0 +1,282 @@
+// Tests of what a run is said to spend: by hand, on runs and tables made here.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <vrpipe/platforms/simulation.h>
+
+#include "jobs/energy.h"
+#include "tool_test_support.h"
+
+namespace vrpipe::testing {
+namespace {
+
+using tools::EnergyAmounts;
+using tools::EnergyReport;
+using tools::EnergyTable;
+using tools::Range;
+
+// 2 pJ a quad in SM, 4 a byte in L2, before scaling by 0.5, and 1 W: figures that double arithmetic holds exactly.
+const char* const two_events = R"(
+schema = "vrpipe.energies/1"
+process = "8 nm"
+[[node]]
+name = "12 nm"
+factor = { low = 0.25, nominal = 0.5, high = 1 }
+voltage_ratio = 1
+source = "s"
+[[event]]
+name = "lane"
+unit = "SM"
+count = "4 * sm.quads_shaded * sm.fragment_instructions"
+node = "12 nm"
+pj = { low = 2, nominal = 2, high = 2 }
+source = "s"
+meaning = "m"
+[[event]]
+name = "sector"
+unit = "L2"
+count = ["l2.color_bytes_read / 32", "l2.color_bytes_written / 32"]
+node = "12 nm"
+pj = { low = 4, nominal = 8, high = 16 }
+source = "s"
+meaning = "m"
+[[power]]
+name = "leakage"
+count = "1"
+watts = { low = 1, nominal = 2, high = 4 }
+platforms = ["agx-orin"]
+source = "s"
+meaning = "m"
+)";
+
+EnergyTable table_of(const std::string& text) { return tools::parse_energies(text, "table"); }
+
+RunResult run_of(std::uint64_t quads, std::uint64_t bytes, std::uint64_t cycles) {
+  RunResult run;
+  run.request.platform = &platform_named("agx-orin");
+  run.request.variant = variant_named("baseline");
+  run.cycles = cycles;
+  run.counts.fragments_blended = 1000;
+  const auto counter = [&](const std::string& name, std::uint64_t value) {
+    StatisticReport report;
+    report.name = name;
+    report.kind = "counter";
+    report.value = value;
+    run.statistics.push_back(report);
+  };
+  counter("sm.quads_shaded", quads);
+  counter("l2.color_bytes_read", bytes);
+  counter("l2.color_bytes_written", bytes);
+  run.parameters = {{"sm.fragment_instructions", "10"}};
+  return run;
+}
+
+constexpr std::uint64_t cycles_per_millisecond = 612'000;  // of agx-orin
+
+void expect_range(const Range& range, double low, double nominal, double high) {
+  EXPECT_DOUBLE_EQ(range.low, low);
+  EXPECT_DOUBLE_EQ(range.nominal, nominal);
+  EXPECT_DOUBLE_EQ(range.high, high);
+}
+
+void expect_ordered(const Range& range) {
+  EXPECT_LE(range.low, range.nominal);
+  EXPECT_LE(range.nominal, range.high);
+}
+
+TEST(Energy, IsCountsTimesEnergiesAndPowerTimesTime) {
+  const EnergyTable table = table_of(two_events);
+  const EnergyAmounts amounts = energy_amounts(run_of(1'000'000, 32'000'000, 3 * cycles_per_millisecond), table);
+  const EnergyReport report = energy_report(amounts, table);
+  ASSERT_EQ(report.units.size(), 2U);
+  // 40 M lane instructions of 2 pJ, scaled by 0.25, 0.5, 1; 2 M sectors of 4, 8, 16 pJ likewise; 3 ms.
+  EXPECT_EQ(report.units[0].unit, "SM");
+  expect_range(report.units[0].millijoules, 0.02, 0.04, 0.08);
+  expect_range(report.units[1].millijoules, 0.002, 0.008, 0.032);
+  expect_range(report.moving, 0.022, 0.048, 0.112);
+  expect_range(report.constant.value(), 3, 6, 12);
+  expect_range(report.total.value(), 3.022, 6.048, 12.112);
+  expect_range(report.watts.value(), 3.022 / 3, 2.016, 12.112 / 3);
+  expect_range(report.picojoules_per_fragment.value(), 3.022e6, 6.048e6, 12.112e6);
+}
+
+TEST(Energy, SupplyEntersSquared) {
+  std::string text = two_events;
+  text.replace(text.find("voltage_ratio = 1"), 17, "voltage_ratio = 0.5");
+  const EnergyTable table = table_of(text);
+  const EnergyReport report = energy_report(energy_amounts(run_of(1'000'000, 0, 1), table), table);
+  expect_range(report.units[0].millijoules, 0.005, 0.01, 0.02);
+}
+
+TEST(Energy, TwiceTheTimeDoublesTheConstantPartAlone) {
+  const EnergyTable table = table_of(two_events);
+  const EnergyReport once = energy_report(energy_amounts(run_of(500, 320, 1000), table), table);
+  const EnergyReport twice = energy_report(energy_amounts(run_of(500, 320, 2000), table), table);
+  expect_range(twice.moving, once.moving.low, once.moving.nominal, once.moving.high);
+  expect_range(twice.constant.value(), 2 * once.constant->low, 2 * once.constant->nominal, 2 * once.constant->high);
+}
+
+TEST(Energy, WithoutTimeTheConstantPartIsUnknown) {
+  const EnergyTable table = table_of(two_events);
+  RunResult run = run_of(500, 320, 0);
+  run.cycles.reset();
+  const EnergyAmounts amounts = energy_amounts(run, table);
+  const EnergyReport report = energy_report(amounts, table);
+  EXPECT_GT(report.moving.nominal, 0);
+  EXPECT_FALSE(report.constant || report.total || report.watts || report.picojoules_per_fragment);
+  EXPECT_FALSE(energy_ratio(amounts, amounts, table).has_value());
+}
+
+TEST(Energy, OfNothingHasNoRatio) {
+  const EnergyTable table = table_of(two_events);
+  RunResult nothing = run_of(0, 0, 100);
+  nothing.counts = Counts();
+  const EnergyAmounts none = energy_amounts(nothing, table), some = energy_amounts(run_of(500, 320, 1000), table);
+  EXPECT_FALSE(energy_ratio(none, none, table).has_value()) << "as there is no speed-up";
+  EXPECT_FALSE(energy_report(none, table).picojoules_per_fragment.has_value());
+  EXPECT_TRUE(energy_ratio(some, some, table).has_value());
+}
+
+TEST(Energy, OfARunWithoutCounterIsSaidToBeLeftOut) {
+  const EnergyTable table = table_of(two_events);
+  RunResult run = run_of(500, 320, 1000);
+  run.statistics.resize(1);
+  EXPECT_EQ(energy_amounts(run, table).not_counted, std::vector<std::string>{"L2: sector"});
+  run = run_of(500, 320, 1000);
+  run.statistics.resize(2);
+  EXPECT_TRUE(energy_amounts(run, table).not_counted.empty()) << "reads alone, where there are no writes";
+}
+
+TEST(Energy, AUnitThatPassesThroughSpendsNothing) {
+  std::string text = two_events;
+  text.replace(text.find("\"4 * sm.quads_shaded * sm.fragment_instructions\""), 48, "\"qru.quads\"");
+  const EnergyTable table = table_of(text);
+  RunResult run = run_of(500, 0, 1000);
+  run.statistics[0].name = "qru.quads";
+  for (const auto& [name, events] : {std::pair{"pairing", 500.0}, std::pair{"pass-through", 0.0}}) {
+    run.implementations = {{"qru", name}};
+    EXPECT_EQ(energy_amounts(run, table).events[0], events) << name;
+  }
+  EXPECT_TRUE(energy_amounts(run, table).not_counted.empty());
+}
+
+TEST(Energy, ARunToItselfIsOneWhateverFiguresAre) {
+  const EnergyTable& table = tools::shipped_energies();
+  RunResult run = run_of(123'457, 7'654'321, 999'983);
+  const EnergyAmounts amounts = energy_amounts(run, table);
+  const Range ratio = energy_ratio(amounts, amounts, table).value();
+  EXPECT_EQ(ratio.low, 1.0);
+  EXPECT_EQ(ratio.nominal, 1.0);
+  EXPECT_EQ(ratio.high, 1.0);
+}
+
+/// Every combination of low and high.
+Range ratio_by_trying(const EnergyAmounts& baseline, const EnergyAmounts& run, const EnergyTable& table) {
+  const std::size_t events = table.events.size(), terms = events + table.powers.size();
+  Range range{INFINITY, 0, 0};
+  for (std::uint64_t high = 0; high < std::uint64_t{1} << terms; ++high) {
+    double before = 0, after = 0;
+    for (std::size_t i = 0; i < terms; ++i) {
+      const bool is_event = i < events;
+      const Range each = is_event ? table.events[i].picojoules * 1e-12 : table.powers[i - events].watts;
+      const double value = (high >> i & 1) != 0 ? each.high : each.low;
+      before += value * (is_event ? baseline.events[i] : baseline.powers[i - events] * *baseline.seconds);
+      after += value * (is_event ? run.events[i] : run.powers[i - events] * *run.seconds);
+    }
+    range.low = std::min(range.low, before / after);
+    range.high = std::max(range.high, before / after);
+  }
+  return range;
+}
+
+TEST(Energy, RatiosReachFromTheLeastToTheGreatestOverAllFigures) {
+  const EnergyTable table = table_of(two_events);
+  const EnergyAmounts baseline = energy_amounts(run_of(9'000'000, 640'000'000, 2000), table);
+  struct Case {
+    std::uint64_t quads, bytes, cycles;
+  };
+  for (const Case& each : {Case{3'000'000, 640'000'000, 1000}, Case{12'000'000, 64'000, 1500}, Case{9'000'000, 0, 4000},
+                           Case{0, 640'000'000, 2000}}) {
+    const EnergyAmounts run = energy_amounts(run_of(each.quads, each.bytes, each.cycles), table);
+    const Range ratio = energy_ratio(baseline, run, table).value(), tried = ratio_by_trying(baseline, run, table);
+    EXPECT_DOUBLE_EQ(ratio.low, tried.low);
+    EXPECT_DOUBLE_EQ(ratio.high, tried.high);
+    expect_ordered(ratio);
+  }
+}
+
+TEST(Energy, PowerFoundForAnotherPlatformIsNamed) {
+  const EnergyTable table = table_of(two_events);
+  EXPECT_TRUE(powers_of_other_platforms(table, platform_named("agx-orin")).empty());
+  EXPECT_EQ(powers_of_other_platforms(table, platform_named("desktop")), std::vector<std::string>{"leakage"});
+}
+
+TEST(Energy, TheShippedTableCountsWhatPlatformsHave) {
+  for (const Platform& platform : platforms()) check_energy_names(tools::shipped_energies(), platform);
+}
+
+// The shipped table on runs of every platform and variant.
+
+RunResult simulated(const Platform& platform, const Variant& variant, bool reads_statistics) {
+  RunRequest request;
+  request.platform = &platform;
+  request.variant = variant;
+  request.fidelity = Fidelity::lt;
+  request.reads_statistics = reads_statistics;
+  fresh_simulation();
+  return simulate(request, tiny_draw());
+}
+
+TEST(Energy, OfEveryPlatformIsCompleteAndSumsUp) {
+  const EnergyTable& table = tools::shipped_energies();
+  for (const Platform& platform : platforms()) {
+    for (const char* name : {"baseline", "het+qm"}) {
+      SCOPED_TRACE(platform.name + " " + name);
+      const RunResult run = simulated(platform, variant_named(name), true);
+      const EnergyAmounts amounts = energy_amounts(run, table);
+      const EnergyReport report = energy_report(amounts, table);
+      Range sum;
+      for (const tools::UnitEnergy& unit : report.units) {
+        expect_ordered(unit.millijoules);
+        sum += unit.millijoules;
+        const bool extends = unit.unit == "TGC" || unit.unit == "QRU";
+        const bool always = unit.unit == "SM lanes" || unit.unit == "registers" || unit.unit == "L2" ||
+                            unit.unit == "crossbar" || unit.unit == "CROP" || unit.unit == "TC" ||
+                            unit.unit == "raster";
+        if (extends || always) {
+          EXPECT_EQ(unit.millijoules.nominal > 0, always || std::string(name) == "het+qm") << unit.unit;
+        }
+      }
+      EXPECT_DOUBLE_EQ(report.moving.nominal, sum.nominal);
+      EXPECT_DOUBLE_EQ(report.total->nominal, report.moving.nominal + report.constant->nominal);
+      expect_ordered(report.total.value());
+      expect_ordered(report.quad_merging_share.value());
+    }
+  }
+}
+
+TEST(Energy, WithMemoryNothingIsLeftOutButOtherWaysToIt) {
+  const RunResult run = simulated(platform_named("agx-orin-lpddr3"), variant_named("het+qm"), true);
+  EXPECT_TRUE(energy_amounts(run, tools::shipped_energies()).not_counted.empty());
+}
+
+TEST(Energy, DoesNotDependOnWhetherStatisticsAreFollowed) {
+  for (const char* platform : {"agx-orin", "agx-orin-lpddr5"}) {
+    const Variant& variant = variant_named("het+qm");
+    const auto amounts = [&](bool reads) {
+      return energy_amounts(simulated(platform_named(platform), variant, reads), tools::shipped_energies());
+    };
+    const EnergyAmounts with = amounts(true), without = amounts(false);
+    EXPECT_EQ(with.events, without.events);
+    EXPECT_EQ(with.powers, without.powers);
+    EXPECT_EQ(with.not_counted, without.not_counted);
+  }
+}
+
+}  // namespace
+}  // namespace vrpipe::testing

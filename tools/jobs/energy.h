@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vrpipe/platforms/simulation.h>
+
+#include "jobs/energy_table.h"
+
+namespace vrpipe::tools {
+
+/// What a run has of everything in a table; all that its energy depends on.
+struct EnergyAmounts {
+  std::vector<double> events;     ///< how often, by EnergyTable::events
+  std::vector<double> powers;     ///< how many, by EnergyTable::powers
+  std::optional<double> seconds;  ///< simulated; none where the fidelity has no time
+  std::uint64_t fragments_blended = 0;
+  std::vector<std::string> not_counted;  ///< "UNIT: NAME" of events and powers of which the run has no counter
+};
+
+/// A unit that passes items through has no events.
+EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table);
+
+struct UnitEnergy {
+  std::string unit;
+  Range millijoules;
+};
+
+/// Ranges are over every combination of the events' own; what needs the time is none without.
+struct EnergyReport {
+  std::vector<UnitEnergy> units;                 ///< in the order in which the table names them first
+  Range moving;                                  ///< of all units, mJ
+  std::optional<Range> constant;                 ///< of constant power, mJ
+  std::optional<Range> total;                    ///< mJ
+  std::optional<Range> watts;                    ///< mean of the total; none where nothing took time
+  std::optional<Range> picojoules_per_fragment;  ///< the total for each blended; none of none
+  std::optional<Range> quad_merging_share;       ///< of the units TGC and QRU, of the total
+};
+
+EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& table);
+
+/// Total of `baseline` over that of `run`, as a speed-up is of cycles; none without time, where the baseline blends nothing,
+/// or where the least that may have been spent is nothing. Both have the same energies and powers, whatever these are: low
+/// and high are the extremes over all that they may be.
+std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmounts& run, const EnergyTable& table);
+
+/// Powers of which the table says that they were found for other platforms than this.
+std::vector<std::string> powers_of_other_platforms(const EnergyTable& table, const Platform& platform);
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,303 @@
+#include "jobs/energy_table.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <vrpipe/component/error.h>
+
+#include "file_io.h"
+#include "jobs/settings.h"
+
+namespace vrpipe::tools {
+namespace {
+
+constexpr const char* cannot_use = "cannot use energies";
+constexpr const char* schema = "vrpipe.energies/1";
+
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == separator) {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+std::string trimmed(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(" \t\n");
+  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t\n") - first + 1);
+}
+
+bool starts_number(const std::string& text) {
+  return !text.empty() && ((text[0] >= '0' && text[0] <= '9') || text[0] == '.' || text[0] == '-');
+}
+
+class TableReader {
+ public:
+  explicit TableReader(std::string file) : file_(std::move(file)) {}
+
+  EnergyTable read(const std::string& text) {
+    const toml::table root = parsed(text);
+    check_keys(root, {"schema", "process", "node", "event", "power"});
+    if (text_at(root, "schema") != schema) {
+      refuse(*root.get("schema"), "schema is not " + std::string(schema), fmt::format("write schema = \"{}\"", schema));
+    }
+    EnergyTable table;
+    table.process = text_at(root, "process");
+    for (const toml::table* each : tables(root, "node")) table.nodes.push_back(node(*each));
+    for (const toml::table* each : tables(root, "event")) table.events.push_back(event(*each, table.nodes));
+    for (const toml::table* each : tables(root, "power")) table.powers.push_back(power(*each));
+    if (table.events.empty()) refuse(root, "it has no event", "write at least one [[event]]");
+    return table;
+  }
+
+ private:
+  std::string line(const toml::source_region& source) const {
+    return fmt::format("{} line {}", file_, source.begin.line);
+  }
+  [[noreturn]] void refuse(const toml::node& where, const std::string& why, const std::string& remedy) const {
+    throw UserError(cannot_use, line(where.source()), why, remedy);
+  }
+
+  toml::table parsed(const std::string& text) const {
+    try {
+      return toml::parse(text, file_);
+    } catch (const toml::parse_error& error) {
+      std::string why(error.description());
+      std::replace(why.begin(), why.end(), '\n', ' ');
+      throw UserError(cannot_use, line(error.source()), why, "write TOML 1.0, as `vrpipe energies --toml` prints it");
+    }
+  }
+
+  void check_keys(const toml::table& table, const std::vector<std::string>& known) const {
+    for (const auto& [key, value] : table) {
+      const std::string name(key.str());
+      if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+      throw UserError(cannot_use, line(key.source()), fmt::format("unknown key '{}'", name),
+                      fmt::format("did you mean {}? there are {}", nearest_name(name, known), fmt::join(known, ", ")));
+    }
+  }
+
+  const toml::node& at(const toml::table& table, const char* key, const std::string& example) const {
+    const toml::node* const found = table.get(key);
+    if (found == nullptr) {
+      const auto name = table["name"].value<std::string>();
+      refuse(table, fmt::format("{} has no {}", name ? "'" + *name + "'" : "it", key),
+             fmt::format("add {} = {}", key, example));
+    }
+    return *found;
+  }
+
+  std::string text_at(const toml::table& table, const char* key) const {
+    const toml::node& found = at(table, key, "\"...\"");
+    const auto text = found.value_exact<std::string>();
+    if (!text || text->empty()) refuse(found, fmt::format("{} is not a text", key), "write a text in quotes");
+    return *text;
+  }
+
+  double number(const toml::node& node, const std::string& what) const {
+    const auto value = node.is_number() ? node.value<double>() : std::nullopt;
+    if (!value || !std::isfinite(*value)) refuse(node, what + " is not a number", "write a number, as 4.5");
+    if (*value < 0) refuse(node, what + " is negative", "write 0 or more");
+    return *value;
+  }
+
+  Range range(const toml::table& table, const char* key) const {
+    const std::string example = "{ low = 1, nominal = 2, high = 3 }";
+    const toml::node& found = at(table, key, example);
+    if (!found.is_table()) {
+      refuse(found, fmt::format("{} is not a range", key), fmt::format("write {} = {}", key, example));
+    }
+    const toml::table& of = *found.as_table();
+    check_keys(of, {"low", "nominal", "high"});
+    const auto value = [&](const char* end) { return number(at(of, end, "1"), fmt::format("{} of {}", end, key)); };
+    const Range read{value("low"), value("nominal"), value("high")};
+    if (!(read.low <= read.nominal && read.nominal <= read.high)) {
+      refuse(found, fmt::format("{} is {:g}, {:g}, {:g}", key, read.low, read.nominal, read.high),
+             "low may not exceed nominal, nor that high");
+    }
+    return read;
+  }
+
+  /// Those of an array of tables, whose names differ, of events in a unit.
+  std::vector<const toml::table*> tables(const toml::table& root, const char* key) const {
+    std::vector<const toml::table*> found;
+    const toml::node* const node = root.get(key);
+    if (node == nullptr) return found;
+    if (!node->is_array_of_tables()) {
+      refuse(*node, fmt::format("{} is no array of tables", key), fmt::format("write [[{}]]", key));
+    }
+    std::set<std::pair<std::string, std::string>> names;
+    for (const toml::node& each : *node->as_array()) {
+      found.push_back(each.as_table());
+      const std::string name = text_at(*found.back(), "name");
+      const std::string unit = each.as_table()->contains("unit") ? text_at(*found.back(), "unit") : "";
+      if (!names.insert({unit, name}).second) refuse(each, fmt::format("there are two of '{}'", name), "rename one");
+    }
+    return found;
+  }
+
+  CountProduct product(const toml::node& node, const std::string& text) const {
+    CountProduct read;
+    for (const std::string& factor : split(text, '*')) {
+      const std::vector<std::string> parts = split(factor, '/');
+      for (std::size_t i = 0; i < parts.size(); ++i) {
+        const std::string part = trimmed(parts[i]);
+        const bool divides = i > 0;
+        if (part.empty()) refuse(node, fmt::format("'{}' lacks a factor", text), "write e.g. 4 * sm.quads_shaded / 32");
+        if (!starts_number(part)) {
+          if (divides) refuse(node, fmt::format("'{}' divides by a name", text), "divide by numbers alone");
+          read.names.push_back(part);
+          continue;
+        }
+        double value = 0;
+        const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
+        if (error != std::errc() || end != part.data() + part.size() || !std::isfinite(value) || value <= 0) {
+          refuse(node, fmt::format("'{}' in a count is no number above 0", part), "write a number, as 32");
+        }
+        read.factor = divides ? read.factor / value : read.factor * value;
+      }
+    }
+    return read;
+  }
+
+  CountFormula count(const toml::table& table) const {
+    const toml::node& found = at(table, "count", "\"sm.quads_shaded\"");
+    CountFormula formula;
+    formula.where = line(found.source());
+    const auto add = [&](const toml::node& node) {
+      const auto text = node.value_exact<std::string>();
+      if (!text) refuse(node, "count is neither a text nor an array of texts", "write e.g. \"4 * sm.quads_shaded\"");
+      formula.products.push_back(product(node, *text));
+      formula.text += (formula.text.empty() ? "" : " + ") + *text;
+    };
+    if (const toml::array* const all = found.as_array()) {
+      for (const toml::node& each : *all) add(each);
+    } else {
+      add(found);
+    }
+    if (formula.products.empty()) refuse(found, "count is empty", "write e.g. \"sm.quads_shaded\"");
+    return formula;
+  }
+
+  ProcessNode node(const toml::table& table) const {
+    check_keys(table, {"name", "factor", "voltage_ratio", "source"});
+    ProcessNode read;
+    read.name = text_at(table, "name");
+    read.factor = range(table, "factor");
+    read.voltage_ratio = number(at(table, "voltage_ratio", "1"), "voltage_ratio");
+    read.source = text_at(table, "source");
+    return read;
+  }
+
+  EnergyEvent event(const toml::table& table, const std::vector<ProcessNode>& nodes) const {
+    check_keys(table, {"name", "unit", "count", "node", "pj", "source", "meaning"});
+    EnergyEvent read;
+    read.name = text_at(table, "name");
+    read.unit = text_at(table, "unit");
+    read.count = count(table);
+    read.node = text_at(table, "node");
+    std::vector<std::string> names;
+    for (const ProcessNode& each : nodes) names.push_back(each.name);
+    const auto found = std::find(names.begin(), names.end(), read.node);
+    if (found == names.end()) {
+      refuse(*table.get("node"), fmt::format("there is no node '{}'", read.node),
+             names.empty() ? std::string("write a [[node]] of that name")
+                           : fmt::format("did you mean {}?", nearest_name(read.node, names)));
+    }
+    const Range scaling = nodes[static_cast<std::size_t>(found - names.begin())].scaling();
+    read.published = range(table, "pj");
+    read.picojoules = {read.published.low * scaling.low, read.published.nominal * scaling.nominal,
+                       read.published.high * scaling.high};
+    read.source = text_at(table, "source");
+    read.meaning = text_at(table, "meaning");
+    return read;
+  }
+
+  ConstantPower power(const toml::table& table) const {
+    check_keys(table, {"name", "count", "watts", "platforms", "source", "meaning"});
+    ConstantPower read;
+    read.name = text_at(table, "name");
+    read.count = count(table);
+    read.watts = range(table, "watts");
+    if (const toml::node* const platforms = table.get("platforms")) {
+      if (!platforms->is_array()) refuse(*platforms, "platforms is no array", "write e.g. [\"agx-orin\"]");
+      for (const toml::node& each : *platforms->as_array()) {
+        const auto name = each.value_exact<std::string>();
+        if (!name) refuse(each, "a platform is not a text", "write a text in quotes");
+        read.platforms.push_back(*name);
+      }
+    }
+    read.source = text_at(table, "source");
+    read.meaning = text_at(table, "meaning");
+    return read;
+  }
+
+  std::string file_;
+};
+
+}  // namespace
+
+Range& Range::operator+=(const Range& other) {
+  low += other.low;
+  nominal += other.nominal;
+  high += other.high;
+  return *this;
+}
+
+EnergyTable parse_energies(const std::string& text, const std::string& where) { return TableReader(where).read(text); }
+
+EnergyTable read_energies(const std::filesystem::path& path) {
+  const InputFile file(path, "cannot read energies");
+  std::string text(static_cast<std::size_t>(file.size()), '\0');
+  file.read(0, text.data(), text.size());
+  file.check_unchanged();
+  return parse_energies(text, path.string());
+}
+
+const EnergyTable& shipped_energies() {
+  static const EnergyTable table = parse_energies(shipped_energies_text(), "the table that vrpipe comes with");
+  return table;
+}
+
+void check_energy_names(const EnergyTable& table, const Platform& platform) {
+  std::set<std::string> countable;
+  std::set<std::string> others;
+  for (const auto& [name, value] : Counts().named()) countable.insert(name);
+  for (const ParameterListing& listing : all_parameters(&platform)) {
+    for (const Parameter* parameter : listing.parameters->parameters()) {
+      const std::string name = listing.unit + "." + parameter->name();
+      const bool is_number =
+          dynamic_cast<const Integer*>(parameter) != nullptr || dynamic_cast<const Real*>(parameter) != nullptr;
+      (is_number ? countable : others).insert(name);
+    }
+    for (const StatisticReport& statistic : list_statistics(listing)) {
+      (statistic.kind == "counter" ? countable : others).insert(statistic.name);
+    }
+  }
+  const auto check = [&](const CountFormula& formula) {
+    for (const CountProduct& product : formula.products) {
+      for (const std::string& name : product.names) {
+        if (countable.count(name) > 0) continue;
+        throw UserError(cannot_use, formula.where,
+                        others.count(name) > 0 ? "'" + name + "' is neither a counter nor a number"
+                                               : "nothing counts '" + name + "'",
+                        "did you mean " + nearest_name(name, countable) + "? `vrpipe units` lists all");
+      }
+    }
+  };
+  for (const EnergyEvent& event : table.events) check(event.count);
+  for (const ConstantPower& power : table.powers) check(power.count);
+}
+
+}  // namespace vrpipe::tools
