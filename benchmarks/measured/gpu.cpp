@@ -43,12 +43,12 @@ const Mode& mode_named(const std::string& name) {
   return *mode;
 }
 
-RunResult Gpu::run(const Draw& draw, const Mode& mode, Fidelity fidelity) {
+RunResult Gpu::run(const Draw& draw, const Mode& mode) const {
   RunRequest request;
   request.platform = &platform_named("gh100-gpc");
   request.variant = variant_named(mode.terminates ? "het" : "baseline");
   request.termination = mode.terminates ? Termination::strict : Termination::paper;
-  request.fidelity = fidelity;
+  request.fidelity = fidelity_;
   request.format = mode.format;
   request.settings = {{"state", "obb_padding", "0"}};  // the splats have the boxes that were drawn
   DrawState state = draw_state_of(request);

@@ -25,16 +25,12 @@ class Gpu {
  public:
   explicit Gpu(Fidelity fidelity) : fidelity_(fidelity) {}
 
-  RunResult run(const Draw& draw, const Mode& mode) const { return run(draw, mode, fidelity_); }
-  /// Without time.
-  RunResult counted(const Draw& draw, const Mode& mode) const { return run(draw, mode, Fidelity::functional); }
+  RunResult run(const Draw& draw, const Mode& mode) const;
   /// Millions.
   double cycles(const Draw& draw, const Mode& mode) const { return megacycles(run(draw, mode)); }
   static double megacycles(const RunResult& result) { return static_cast<double>(result.cycles.value_or(0)) / 1e6; }
 
  private:
-  static RunResult run(const Draw& draw, const Mode& mode, Fidelity fidelity);
-
   Fidelity fidelity_;
 };
 

@@ -29,8 +29,8 @@ constexpr Column counts[] = {{"triangles_clipped", "triangles"},
                              {"quads", "quads"},
                              {"quads_blended", "blended"},
                              {"warps", "warps"},
-                             {"fragments_until_termination", "until term."},
-                             {"pixels_terminated", "px. term."},
+                             {"fragments_until_termination", "until ET"},
+                             {"pixels_terminated", "px. ET"},
                              {"color_sectors", "sectors"}};
 constexpr Column times[] = {{"rgba16f", "RGBA16F", "RGBA16F"},
                             {"rgba8", "RGBA8", "RGBA8"},
@@ -114,9 +114,9 @@ void print_row(const std::string& scene, const char* what, const Values& values,
   for (const Column* column = begin; column != end; ++column) {
     const auto value = values.find(column->name);
     if (value == values.end()) {
-      std::printf("%12s", "-");
+      std::printf("%10s", "-");
     } else {
-      std::printf("%12.*f", digits, value->second / unit);
+      std::printf("%10.*f", digits, value->second / unit);
     }
   }
   std::printf("\n");
@@ -124,7 +124,7 @@ void print_row(const std::string& scene, const char* what, const Values& values,
 
 void print_heading(const char* title, const Column* begin, const Column* end) {
   std::printf("%-22s", title);
-  for (const Column* column = begin; column != end; ++column) std::printf("%12s", column->heading);
+  for (const Column* column = begin; column != end; ++column) std::printf("%10s", column->heading);
   std::printf("\n");
 }
 
@@ -158,7 +158,7 @@ void compare_scenes(const Gpu& gpu, bool is_short) {
     print_row("", "%", off, std::begin(times), std::end(times), 1, 1);
   }
   print_row("mean of", "errors", errors, std::begin(times), std::end(times), 1, 1);
-  std::printf("%-22s%12.1f\n", "over all modes", sum / static_cast<double>(all.size() * std::size(times)));
+  std::printf("%-22s%10.1f\n", "over all modes", sum / static_cast<double>(all.size() * std::size(times)));
 }
 
 }  // namespace vrpipe::measured
