@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include <vrpipe/platforms/simulation.h>
+
+namespace vrpipe::measured {
+
+/// How a draw was drawn when it was measured.
+struct Mode {
+  const char* name;
+  ColorFormat format = ColorFormat::rgba16f;
+  std::function<void(DrawState&)> change = {};
+  std::uint32_t passes = 1;
+  bool terminates = false;  ///< strictly, in bin order
+  bool off_screen = false;
+};
+
+const Mode& mode_named(const std::string& name);
+
+/// `gh100-gpc`.
+class Gpu {
+ public:
+  explicit Gpu(Fidelity fidelity) : fidelity_(fidelity) {}
+
+  RunResult run(const Draw& draw, const Mode& mode) const;
+  /// Millions.
+  double cycles(const Draw& draw, const Mode& mode) const { return megacycles(run(draw, mode)); }
+  static double megacycles(const RunResult& result) { return static_cast<double>(result.cycles.value_or(0)) / 1e6; }
+
+ private:
+  Fidelity fidelity_;
+};
+
+inline double percent(double predicted, double measured) { return 100 * (predicted / measured - 1); }
+
+/// The scenes of which only counts and times were kept, by stand-ins. `is_short`: the smallest alone.
+void compare_scenes(const Gpu& gpu, bool is_short);
+
+}  // namespace vrpipe::measured
