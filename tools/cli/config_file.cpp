@@ -142,14 +142,14 @@ ConfigFile::ConfigFile(const std::filesystem::path& path, CLI::App& app) : path_
 
 void ConfigFile::read(CLI::App& app) {
   const Reader reader(path_, app);
-  std::ifstream file(path_, std::ios::binary);
-  const std::string content(std::istreambuf_iterator<char>(file), {});
   std::error_code ignored;
+  std::ifstream file(path_, std::ios::binary);
   if (!file || std::filesystem::is_directory(path_, ignored)) {
     throw UserError("cannot read configuration", std::string(config_option) + " " + path_.string(),
                     "there is no such file, or it may not be read",
                     "name a TOML file; docs/configuration.md describes it");
   }
+  const std::string content(std::istreambuf_iterator<char>(file), {});
   toml::table root;
   try {
     root = toml::parse(content, path_.string());
