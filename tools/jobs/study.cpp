@@ -20,12 +20,6 @@ constexpr std::uint64_t most_points = 1'000'000;
 const std::vector<std::string> plain_axes{"scene",    "view",   "size",        "platform",  "variant",
                                           "fidelity", "format", "termination", "multi-pass"};
 
-/// Of what is drawn and how exactly: a point is compared to another of the same.
-bool follows_the_point(const std::string& axis) {
-  return axis == "scene" || axis == "view" || axis == "size" || axis == "fidelity" || axis == "multi-pass" ||
-         axis.rfind("preprocess.", 0) == 0;
-}
-
 class Reader {
  public:
   explicit Reader(const std::filesystem::path& path) : path_(path) {}
@@ -153,8 +147,8 @@ class Random {
 };
 
 /// The last axis changes fastest.
-StudyPoint point_of_product(const std::vector<StudyAxis>& axes, std::uint64_t place) {
-  StudyPoint point{std::vector<std::size_t>(axes.size())};
+StudiedPoint point_of_product(const std::vector<StudyAxis>& axes, std::uint64_t place) {
+  StudiedPoint point{std::vector<std::size_t>(axes.size())};
   for (std::size_t i = axes.size(); i-- > 0;) {
     point.values[i] = static_cast<std::size_t>(place % axes[i].values.size());
     place /= axes[i].values.size();
@@ -183,7 +177,7 @@ void add_list(const Reader& reader, const toml::array& list, Study& study) {
         study.axes.push_back({name, {}, true});
       }
     }
-    StudyPoint point{std::vector<std::size_t>(study.axes.size())};
+    StudiedPoint point{std::vector<std::size_t>(study.axes.size())};
     if (entries.size() != study.axes.size())
       reader.refuse(*table, "bad point", "it has not the keys of the first point", "give every point the same keys");
     for (const auto& [name, value] : entries) {
@@ -287,6 +281,11 @@ Study read_study(const std::filesystem::path& path) {
   return study;
 }
 
+bool follows_the_point(const std::string& axis) {
+  return axis == "scene" || axis == "view" || axis == "size" || axis == "fidelity" || axis == "multi-pass" ||
+         axis.rfind("preprocess.", 0) == 0;
+}
+
 AxisValues parse_axis_values(const std::string& text, const Study& study, const std::string& where) {
   AxisValues values;
   for (std::size_t start = 0; start <= text.size();) {
@@ -319,7 +318,7 @@ std::vector<std::optional<std::size_t>> references(const Study& study) {
   std::map<std::vector<std::size_t>, std::size_t> places;
   for (std::size_t i = 0; i < study.points.size(); ++i) places.emplace(study.points[i].values, i);
   std::vector<std::optional<std::size_t>> all;
-  for (const StudyPoint& point : study.points) {
+  for (const StudiedPoint& point : study.points) {
     std::vector<std::size_t> values = point.values;
     for (std::size_t axis = 0; axis < study.axes.size(); ++axis) {
       const StudyAxis& of = study.axes[axis];

@@ -18,7 +18,7 @@ struct StudyAxis {
 };
 
 /// What is run: a value on every axis.
-struct StudyPoint {
+struct StudiedPoint {
   std::vector<std::size_t> values;  ///< by axis, a place in its values
 };
 
@@ -28,7 +28,7 @@ using AxisValues = std::vector<std::pair<std::string, std::string>>;
 /// What a study file says beside what a configuration file says (docs/studies.md).
 struct Study {
   std::vector<StudyAxis> axes;
-  std::vector<StudyPoint> points;     ///< in the order of the results
+  std::vector<StudiedPoint> points;   ///< in the order of the results
   std::uint64_t product = 0;          ///< points of the whole product; 0 for a list
   std::optional<std::uint64_t> seed;  ///< of the sample; none if all of them are run
   AxisValues relative_to;
@@ -41,6 +41,9 @@ const std::vector<std::string>& study_keys();
 /// Reads axes and points. Throws UserError with file and line for what cannot be; that scenes, variants and parameters exist
 /// is not looked at.
 Study read_study(const std::filesystem::path& path);
+
+/// Whether an axis is of what is drawn and how exactly, not of what the GPU is: a point is compared to one of the same.
+bool follows_the_point(const std::string& axis);
 
 /// `AXIS=VALUE,...`. Throws UserError for another form, and for axes and values that the study does not have.
 AxisValues parse_axis_values(const std::string& text, const Study& study, const std::string& where);

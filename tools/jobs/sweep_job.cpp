@@ -27,7 +27,7 @@ namespace {
 using nlohmann::json;
 using SteadyClock = std::chrono::steady_clock;
 
-const std::string& value_on(const Study& study, const StudyPoint& point, const std::string& axis,
+const std::string& value_on(const Study& study, const StudiedPoint& point, const std::string& axis,
                             const std::string& otherwise) {
   for (std::size_t i = 0; i < study.axes.size(); ++i) {
     if (study.axes[i].name == axis) return study.axes[i].values[point.values[i]];
@@ -45,10 +45,11 @@ struct Drawn {
   auto key() const { return std::tie(scene, view, size, preprocess); }
 };
 
-Drawn drawn_by(const SweepJob& job, const StudyPoint& point) {
+Drawn drawn_by(const SweepJob& job, const StudiedPoint& point) {
   static const std::string none;
   const Study& study = job.study;
-  Drawn drawn{value_on(study, point, "scene", job.common.scene.scene),
+  const std::string& scene = value_on(study, point, "scene", none);
+  Drawn drawn{scene.empty() ? job.common.scene.scene : scene_of_axis(job, scene),
               value_on(study, point, "view", none),
               value_on(study, point, "size", none),
               {}};
@@ -76,7 +77,7 @@ class StudyFrames {
  public:
   explicit StudyFrames(const SweepJob& job) : job_(job) {}
 
-  std::shared_ptr<const Frame> frame(const StudyPoint& point, const RunRequest& request) {
+  std::shared_ptr<const Frame> frame(const StudiedPoint& point, const RunRequest& request) {
     const Drawn drawn = drawn_by(job_, point);
     if (!held_ || held_->key() != drawn.key()) load(drawn);
     FrameDescription description = frame_of_scene(drawn.scene);
@@ -166,7 +167,7 @@ json identity(const SweepJob& job) {
   add_scene(common.scene.scene);
   for (const StudyAxis& axis : job.study.axes) {
     if (axis.name != "scene") continue;
-    for (const std::string& scene : axis.values) add_scene(scene);
+    for (const std::string& scene : axis.values) add_scene(scene_of_axis(job, scene));
   }
   json cameras, meshes = json::array(), plugins = json::array(), variants = json::array();
   if (common.scene.camera)
@@ -355,7 +356,14 @@ bool SweepResult::is_complete() const {
   return std::all_of(points.begin(), points.end(), [](const auto& point) { return point.has_value(); });
 }
 
-RunRequest request_of(const SweepJob& job, const StudyPoint& point) {
+std::string scene_of_axis(const SweepJob& job, const std::string& value) {
+  if (value.rfind("builtin:", 0) == 0) return value;
+  const std::size_t name = value.find('=') == std::string::npos ? 0 : value.find('=') + 1;
+  const std::filesystem::path file = value.substr(name);
+  return value.substr(0, name) + (file.is_absolute() ? file : job.study_file.parent_path() / file).string();
+}
+
+RunRequest request_of(const SweepJob& job, const StudiedPoint& point) {
   RunRequest request = job.common.requests.front();
   for (std::size_t i = 0; i < job.study.axes.size(); ++i) {
     const std::string& axis = job.study.axes[i].name;
@@ -389,7 +397,7 @@ SweepResult run_sweep(const SweepJob& job) {
   result.processes = job.common.processes;
   check_views(job);
   std::vector<RunRequest> requests;
-  for (const StudyPoint& point : job.study.points) {
+  for (const StudiedPoint& point : job.study.points) {
     requests.push_back(request_of(job, point));
     check_configuration(requests.back());
   }

@@ -55,9 +55,12 @@ struct SweepResult {
   bool is_complete() const;
 };
 
+/// A value of the axis `scene`, from where vrpipe runs: names of files are relative to the study's folder.
+std::string scene_of_axis(const SweepJob& job, const std::string& value);
+
 /// The request of a point. Throws UserError for what does not exist, and for a parameter that the point's variant sets
 /// itself: its axis would change nothing.
-RunRequest request_of(const SweepJob& job, const StudyPoint& point);
+RunRequest request_of(const SweepJob& job, const StudiedPoint& point);
 
 /// Simulates what is not done yet, in processes of their own; a record is in the journal as soon as a point is done. Takes
 /// in the records of all shards. Warns on stderr of a study that will take more than an hour.
