@@ -85,7 +85,12 @@ void DepthStencilRop::test_termination(QuadBeat& beat, bool is_first) {
   take_out(
       beat,
       [&](const Quad& quad, unsigned) -> unsigned {
-        return quad.coverage & surface_->terminated(tile + quad.position);
+        const unsigned terminated = quad.coverage & surface_->terminated(tile + quad.position);
+        if (terminated != 0 && context_.fragments != nullptr) {
+          const auto lanes = static_cast<LaneMask>(terminated);
+          context_.fragments->happened(FragmentFate::terminated, beat.tile, quad.position, lanes);
+        }
+        return terminated;
       },
       [&](DrawIndex draw, unsigned in, unsigned out, unsigned fragments) {
         if (is_first) quads_tested.add(draw, in);
