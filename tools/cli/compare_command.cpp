@@ -25,6 +25,7 @@ class CompareCommand : public Command {
     arguments_.declare_comparison(app);
     arguments_.declare_frames(app);
     arguments_.declare_views(app);
+    arguments_.declare_page(app);
     arguments_.declare_energy(app);
     arguments_.declare_explanation(app);
     arguments_.declare_time(app, SimulationArguments::Variants::all);
@@ -37,6 +38,7 @@ class CompareCommand : public Command {
         "Examples:\n"
         "  vrpipe compare\n"
         "  vrpipe compare --scene builtin:outdoor --output images --json outdoor.json\n"
+        "  vrpipe compare --html compare.html\n"
         "  vrpipe compare --scene point_cloud.ply --camera cameras.json#3 --size 1280x720\n"
         "  vrpipe compare --scene point_cloud.ply --camera cameras.json --views 20 --size 1280x720\n"
         "  vrpipe compare --scene builtin:indoor --views 8 --fidelity lt\n"

@@ -52,6 +52,7 @@ constexpr const char* rules_group = "How exactly";
 constexpr const char* result_group = "Where results go";
 
 constexpr const char* energies_option = "--energies";
+constexpr const char* html_option = "--html";
 
 /// Each but the last is two draws.
 constexpr unsigned most_passes = most_draws / 2 + 1;
@@ -267,6 +268,13 @@ void SimulationArguments::declare_json(CLI::App& app) {
              result_group);
 }
 
+void SimulationArguments::declare_page(CLI::App& app) {
+  add_option(app, html_option, html_, "FILE",
+             "writes a page: pictures, speed-ups, where quads and cycles went, all settings;\n"
+             "it needs no network (docs/results.md)",
+             result_group);
+}
+
 void SimulationArguments::declare_jobs(CLI::App& app) {
   add_option(app, "--jobs", jobs_, "N",
              "simulations at a time, each a process of its own (default: one for each\n"
@@ -314,6 +322,7 @@ std::optional<ViewsChoice> SimulationArguments::views() const {
   };
   refuse(!frame_.empty(), "--frame", "--views draws one scene from many cameras");
   refuse(!save_draw_.empty(), "--save-draw", "a draw list has one draw, and each view has another");
+  refuse(!html_.empty(), html_option, "a page shows the runs of one view");
   refuse(explain_effects_, "--explain-effects", "it measures the runs of one view");
   const std::string observing = time_.any_given();
   refuse(!observing.empty(), observing.c_str(), "it looks at the runs of one view");
@@ -453,7 +462,8 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
   job.explain_effects = explain_effects_;
   job.energies = energies(*request.platform);
   // Those of the table that vrpipe comes with are counted in any case.
-  request.reads_statistics = (single(json_, "--json").has_value() && views_.empty()) || !energies_.empty();
+  job.html = single(html_, html_option);
+  request.reads_statistics = (single(json_, "--json").has_value() && views_.empty()) || job.html || !energies_.empty();
   if (const auto name = single(format_, "--format")) request.format = color_format_named(*name);
   if (const auto name = single(termination_, "--termination")) request.termination = termination_named(*name);
   job.scene.preprocess = parts.preprocess;

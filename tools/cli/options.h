@@ -67,6 +67,8 @@ class SimulationArguments {
   /// --interval, --heat-maps and the like, for commands that look at runs in their course; with --trace and --log for one
   /// that has one run.
   void declare_time(CLI::App& app, Variants variants);
+  /// --html, for commands that make a page of their runs.
+  void declare_page(CLI::App& app);
   /// --explain-effects, for commands that report effects of each run.
   void declare_explanation(CLI::App& app);
   /// Loads the plugins and checks every option but the names of output files, which the commands know. Throws UserError.
@@ -100,7 +102,7 @@ class SimulationArguments {
   Values fidelity_, effects_, format_, termination_;
   Values views_, journal_, relative_to_;
   bool compares_any_ = false;
-  Values background_, output_, json_, save_draw_, jobs_;
+  Values background_, output_, json_, html_, save_draw_, jobs_;
   TimeArguments time_;
   Values energies_;
   bool energy_ = false;

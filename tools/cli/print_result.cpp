@@ -8,6 +8,7 @@
 #include "host/output_file.h"
 #include "host/stdout_to_stderr.h"
 #include "host/terminal.h"
+#include "output/compare_page.h"
 #include "output/interval_report.h"
 #include "output/json_text.h"
 #include "output/report.h"
@@ -46,8 +47,17 @@ bool print(const SimulationJob& job, const MakeJson& make_json, const MakeText& 
 
 void print_result(const SimulationJob& job, const JobResult& result) {
   if (job.interval_csv) write_output_file(*job.interval_csv, intervals_csv(result.runs), "--interval-csv");
+  if (job.html) {
+    std::string page;
+    {
+      const StdoutToStderr redirected;
+      page = compare_page(result);
+    }
+    write_output_file(*job.html, page, "--html");
+  }
   const bool has_text = print(
       job, [&] { return result_json(result); }, [&](const TextStyle& style) { return report(result, style); });
+  if (has_text && job.html) std::cout << "page: " << printable(job.html->string()) << '\n';
   if (has_text && job.save_draw) std::cout << "draw: " << printable(job.save_draw->string()) << '\n';
 }
 

@@ -19,6 +19,7 @@ class RunCommand : public Command {
   void declare(CLI::App& app) override {
     arguments_.declare(app, SimulationArguments::Variants::one);
     arguments_.declare_frames(app);
+    arguments_.declare_page(app);
     arguments_.declare_energy(app);
     arguments_.declare_explanation(app);
     arguments_.declare_time(app, SimulationArguments::Variants::one);

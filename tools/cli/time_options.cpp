@@ -19,6 +19,8 @@ constexpr const char* interval_option = "--interval";
 constexpr const char* csv_option = "--interval-csv";
 constexpr const char* statistics_option = "--interval-statistics";
 constexpr unsigned longest_interval = 1'000'000'000;
+/// Of a page, which draws as many in one as it has no room for.
+constexpr Cycle page_interval = 2048;
 
 /// Where quads go, and what CROP moves, as far as a run of the request has it.
 std::vector<std::string> default_statistics(const RunRequest& request) {
@@ -33,9 +35,14 @@ std::vector<std::string> default_statistics(const RunRequest& request) {
   return names;
 }
 
+/// Whether it is known what is when.
+bool has_course(const RunRequest& request) {
+  return request.fidelity != Fidelity::functional && request.fidelity != Fidelity::bound;
+}
+
 void check_has_time(const SimulationJob& job, const std::string& option) {
+  if (has_course(job.requests.front())) return;
   const Fidelity fidelity = job.requests.front().fidelity;
-  if (fidelity != Fidelity::functional && fidelity != Fidelity::bound) return;
   throw UserError("cannot use option", option,
                   std::string("fidelity ") + vrpipe::name_of(fidelity) +
                       (fidelity == Fidelity::bound ? " knows how long a run takes, but not what is when"
@@ -111,9 +118,9 @@ void TimeArguments::observe(SimulationJob& job) const {
     throw UserError("no intervals", csv ? csv_option : statistics_option, "nobody says how long they are",
                     "add --interval CYCLES");
   }
-  if (interval && !csv && !job.json && !trace) {
-    throw UserError("intervals go nowhere", interval_option, "they are in the JSON and in a table",
-                    "add --json FILE or --interval-csv FILE.csv");
+  if (interval && !csv && !job.json && !trace && !job.html) {
+    throw UserError("intervals go nowhere", interval_option, "they are in the JSON, in a table and in a page",
+                    "add --json FILE, --interval-csv FILE.csv or --html FILE");
   }
   if (log_file && log_.empty()) {
     throw UserError("nothing to log", EventLog::file_option, "no unit is named", "add --log UNIT");
@@ -125,8 +132,11 @@ void TimeArguments::observe(SimulationJob& job) const {
   if (csv) job.interval_csv = *csv;
   const StdoutToStderr redirected;  // plugins may print while their units are made
   if (interval) check_has_time(job, interval_option);
-  if (interval && (csv || job.json)) {
+  if (interval && (csv || job.json || job.html)) {
     for (RunRequest& request : job.requests) record(request, *interval);
+  } else if (job.html && has_course(job.requests.front()) && !job.explain_effects) {
+    job.intervals_for_page = true;
+    for (RunRequest& request : job.requests) record_intervals(observers_of(request), page_interval, {});
   }
   RunRequest& request = job.requests.front();
   if (trace) {

@@ -28,8 +28,10 @@ class HeatMaps {
   /// All that will be written, by a path without extension.
   static std::vector<std::filesystem::path> files(const std::string& stem, Fidelity fidelity);
 
- private:
+  /// Once the run is done: a value of each pixel, of each thing that is looked at.
   std::vector<NamedChannel> of_pixels() const;
+
+ private:
   std::vector<NamedChannel> of_tiles(const std::vector<NamedChannel>& pixels) const;
 
   const bool has_time_;

@@ -63,6 +63,7 @@ ImageFiles image_files(const SimulationJob& job, const std::string& name) {
 
 void check_outputs(const SimulationJob& job, const std::vector<std::string>& images, std::vector<NamedFile> outputs) {
   if (job.json && *job.json != "-") outputs.push_back({"--json", *job.json});
+  if (job.html) outputs.push_back({"--html", *job.html});
   if (job.save_draw) outputs.push_back({"--save-draw", *job.save_draw});
   if (job.interval_csv) outputs.push_back({"--interval-csv", *job.interval_csv});
   if (job.trace) outputs.push_back({Trace::option, job.trace->path()});
@@ -130,9 +131,11 @@ JobResult perform(const SimulationJob& job) {
     }
 
     std::vector<RunRequest> requests = job.requests;
-    if (job.heat_maps) heat_maps = observe_heat(requests, result.width, result.height);
+    // Measuring effects repeats runs, and observers are of one.
+    if (job.heat_maps || (job.html && !job.explain_effects))
+      heat_maps = observe_heat(requests, result.width, result.height);
     const auto simulation_start = std::chrono::steady_clock::now();
-    const bool with_images = job.output.has_value();
+    const bool with_images = job.output || job.html;
     if (requests.size() == 1 && !job.explain_effects) {
       const RunRequest& request = requests.front();
       simulated.push_back(simulate_here(request, *frame_of(request), with_images, progress));
@@ -147,10 +150,17 @@ JobResult perform(const SimulationJob& job) {
     if (job.explain_effects) result.effect_costs = measure_effects(result.runs, frame_of, progress);
   }
 
+  if (job.html) {
+    progress.show("making pictures");
+    result.page = page_material(simulated, job.baseline, job.background, heat_maps, job.processes);
+    result.intervals_for_page = job.intervals_for_page;
+    progress.erase();
+  }
   if (job.output) {
     progress.show("writing images");
     write_images(job, simulated, result);
-    for (std::size_t i = 0; i < heat_maps.size(); ++i) heat_maps[i]->write((*job.output / images[i]).string());
+    for (std::size_t i = 0; job.heat_maps && i < heat_maps.size(); ++i)
+      heat_maps[i]->write((*job.output / images[i]).string());
     progress.erase();
   } else {
     result.images.resize(simulated.size());

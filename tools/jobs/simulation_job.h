@@ -20,6 +20,7 @@
 #include "jobs/event_log.h"
 #include "jobs/frame_file.h"
 #include "jobs/heat_maps.h"
+#include "jobs/page_material.h"
 #include "jobs/trace.h"
 
 namespace vrpipe::tools {
@@ -39,6 +40,8 @@ struct SimulationJob {
   std::vector<NamedFile> inputs;                      ///< that the options name; outputs must not be among them
   std::optional<std::filesystem::path> output;        ///< folder for images
   std::optional<std::string> json;                    ///< file, or "-" for stdout
+  std::optional<std::filesystem::path> html;          ///< file of a page
+  bool intervals_for_page = false;                    ///< whether requests record intervals for the page alone
   std::optional<std::filesystem::path> save_draw;     ///< file
   std::optional<std::filesystem::path> interval_csv;  ///< file
   std::shared_ptr<Trace> trace;                       ///< of the only request, which has its observers; null for none
@@ -70,6 +73,8 @@ struct JobResult {
   std::vector<std::optional<ImageFiles>> images;  ///< one for each run
   std::vector<EffectCosts> effect_costs;          ///< one for each run, if they were asked for
   std::shared_ptr<const EnergyTable> energies;    ///< SimulationJob::energies
+  PageMaterial page;                              ///< empty without SimulationJob::html
+  bool intervals_for_page = false;                ///< SimulationJob::intervals_for_page
   unsigned processes = 1;
   double load_seconds = 0;      ///< wall time of reading and preprocessing scenes
   double simulate_seconds = 0;  ///< wall time of all simulations together

@@ -372,6 +372,12 @@ std::string storage_text(const std::vector<RunResult>& runs) {
   return all;
 }
 
+std::string rejected_text(const RejectedGaussians& rejected) {
+  if (rejected.total() == 0) return {};
+  return fmt::format("rejected {} Gaussians: {} with a NaN or infinite value, {} without an orientation\n",
+                     grouped(rejected.total()), grouped(rejected.not_finite), grouped(rejected.zero_quaternion));
+}
+
 std::string remarks(const JobResult& result) {
   const std::vector<RunResult>& runs = result.runs;
   std::string text;
@@ -384,11 +390,7 @@ std::string remarks(const JobResult& result) {
     text += fmt::format("early-termination ratio {:.2f} (fragments blended without over with termination)\n", *early);
   }
   text += storage_text(runs);
-  const RejectedGaussians& rejected = result.scene.rejected;
-  if (rejected.total() > 0) {
-    text += fmt::format("rejected {} Gaussians: {} with a NaN or infinite value, {} without an orientation\n",
-                        grouped(rejected.total()), grouped(rejected.not_finite), grouped(rejected.zero_quaternion));
-  }
+  text += rejected_text(result.scene.rejected);
   for (const std::string& note : result.scene.notes) text += "note: " + printable(note) + "\n";
   text += anomaly_text(runs);
   text += fmt::format("took {:.1f} s to load the scene, {:.1f} s to simulate", result.load_seconds,
@@ -419,6 +421,21 @@ std::string nothing_visible(const SceneSummary& scene, bool has_camera) {
                      has_camera ? "Gaussians" : "splats",
                      has_camera ? "turn the camera with --camera, or --eye and --look-at"
                                 : "save the draw list from a camera that sees the scene");
+}
+
+std::vector<std::string> notes_of(const JobResult& result) {
+  std::string text;
+  if (result.runs.front().counts.fragments_rasterized == 0) {
+    text += nothing_visible(result.scene, result.viewpoint.has_value()) + "\n";
+  }
+  text += anomaly_text(result.runs) + validated_text(result.runs) + rejected_text(result.scene.rejected);
+  for (const std::string& note : result.scene.notes) text += "note: " + note + "\n";
+  text += storage_text(result.runs);
+  std::vector<std::string> lines;
+  for (std::size_t begin = 0, end; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1) {
+    lines.push_back(text.substr(begin, end - begin));
+  }
+  return lines;
 }
 
 std::string bound_text(const RunResult& run) {

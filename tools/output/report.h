@@ -15,6 +15,9 @@ std::string report(const JobResult& result, const TextStyle& style);
 /// What to say of a draw of which no fragment was rasterised; one line.
 std::string nothing_visible(const SceneSummary& scene, bool has_camera);
 
+/// What a reader of any kind of report is to know of the numbers, the gravest first: a line each.
+std::vector<std::string> notes_of(const JobResult& result);
+
 /// A unit that is occupied for this share of a run bounds it.
 constexpr double bounding_occupancy = 0.9;
 

@@ -356,6 +356,7 @@ Json result_json(const JobResult& result) {
   for (std::size_t i = 0; i < result.runs.size(); ++i) {
     const EffectCosts* const costs = result.effect_costs.empty() ? nullptr : &result.effect_costs[i];
     runs.push_back(run_json(result.runs[i], result.images[i], costs, platform["parameters"]));
+    if (result.intervals_for_page) runs.back().erase("intervals");
     if (!result.energies) continue;
     const RunResult* const over = result.runs.size() > 1 ? &baseline : nullptr;
     runs.back()["energy"] = energy_json(result.runs[i], over, *result.energies);
