@@ -130,7 +130,8 @@ void Trace::add_warps(const std::string& gpc, Observers& observers) {
                     {"quads", warp.count}});
   });
   observers.on_link<WarpRelease>(gpc + "prop.release", [&warps](const Observers::Passed<WarpRelease>& passed) {
-    warps.level.change(passed.first, -1);
+    // A mark has no slot.
+    if (passed.item.slot != no_slot) warps.level.change(passed.first, -1);
   });
 }
 
