@@ -161,6 +161,7 @@ TEST_F(Perfetto, ThatCannotBeWrittenIsAMistake) {
     refused_here({"--trace", "t.json", "--fidelity", fidelity}, {"--trace", fidelity, "use lt, at or cycle"});
   }
   refused_here({"--trace", "t.json@20:10"}, {"'@20:10'", "--trace", "it ends before it begins", "@1000:2000"});
+  refused_here({"--trace", "t.json@9999999:"}, {"--trace t.json@9999999:", "the run ends after", "begin earlier"});
   refused_here({"--trace", "t.json@1k:2k"}, {"'@1k:2k'", "whole numbers"});
   refused_here({"--trace", "t.json", "--trace", "u.json"}, {"twice"});
   refused({"compare", "--trace", "t.json"}, {"'--trace'", "`vrpipe run`"});

@@ -1,5 +1,6 @@
 #include "cli/print_result.h"
 
+#include <filesystem>
 #include <iostream>
 #include <string>
 
@@ -48,7 +49,15 @@ void print_result(const SimulationJob& job, const JobResult& result) {
   if (job.interval_csv) write_output_file(*job.interval_csv, intervals_csv(result.runs), "--interval-csv");
   const bool has_text = print(
       job, [&] { return result_json(result); }, [&](const TextStyle& style) { return report(result, style); });
-  if (has_text && job.save_draw) std::cout << "draw: " << printable(job.save_draw->string()) << '\n';
+  if (!has_text) return;
+  const auto tell = [](const char* what, const std::filesystem::path& where) {
+    std::cout << what << ": " << printable(where.string()) << '\n';
+  };
+  if (job.save_draw) tell("draw", *job.save_draw);
+  if (job.interval_csv) tell("intervals", *job.interval_csv);
+  if (job.trace) tell("trace", job.trace->path());
+  if (job.log && job.log->file()) tell("log", *job.log->file());
+  if (job.heat_maps) tell("heat maps", *job.output);
 }
 
 void print_result(const SimulationJob& job, const ViewsResult& result) {
