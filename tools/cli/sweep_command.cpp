@@ -13,6 +13,7 @@
 #include "cli/parse.h"
 #include "host/output_file.h"
 #include "host/terminal.h"
+#include "jobs/sweep_analysis.h"
 #include "jobs/sweep_job.h"
 #include "output/json_text.h"
 #include "output/sweep_report.h"
@@ -98,7 +99,7 @@ class SweepCommand : public Command {
       std::cout << json_text(sweep_json(findings));
     } else {
       std::cout << sweep_text(findings, stdout_style());
-      std::cout << fmt::format("took {:.1f} s to simulate {} points, {} at a time", result.seconds,
+      std::cout << fmt::format("took {:.1f} s to simulate {} of the points, {} at a time", result.seconds,
                                result.points.size() - result.done_before, result.processes);
       if (result.done_before > 0) std::cout << fmt::format("; {} were done before", result.done_before);
       std::cout << '\n';
@@ -118,6 +119,7 @@ class SweepCommand : public Command {
     SweepJob job;
     job.study_file = study_;
     job.study = read_study(study_);
+    check_pareto(job.study);
     if (const auto text = single(relative_to_, "--relative-to"))
       job.study.relative_to = parse_axis_values(*text, job.study, "--relative-to");
     job.common = arguments_.resolve(SimulationArguments::Variants::one, invocation());
