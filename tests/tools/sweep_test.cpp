@@ -254,6 +254,41 @@ TEST_F(Sweep, AsAnArrayOfABatchSystemOnOneNode) {
   EXPECT_NE(all.err.find("3 of 3 points were done before"), std::string::npos) << all.err;
 }
 
+/// With mpirun; false where there is none.
+bool has_mpi() { return std::system("command -v mpirun >/dev/null 2>&1") == 0 && std::filesystem::exists(VRPIPE_MPI); }
+
+std::string under_mpi(const std::filesystem::path& folder, unsigned ranks, const std::string& words) {
+  return "cd " + folder.string() +
+         " && OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe -n " +
+         std::to_string(ranks) + " " VRPIPE_BINARY " " + words + " >mpi.out 2>mpi.err";
+}
+
+TEST_F(Sweep, OverMpiRanksIsTheSameAsAlone) {
+  if (!has_mpi()) GTEST_SKIP() << "built or run without MPI";
+  write("study.toml", small + "[axes]\nvariant = [\"baseline\", \"qm\", \"het\"]\ntc.bins = [4, 32]\n");
+  ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv"}).code, 0);
+  ASSERT_EQ(std::system(under_mpi(folder(), 3, "sweep study.toml --csv mpi.csv").c_str()), 0)
+      << read_file(folder() / "mpi.err");
+  EXPECT_EQ(read_file(folder() / "mpi.csv"), read_file(folder() / "alone.csv"));
+  const std::string out = read_file(folder() / "mpi.out");
+  EXPECT_EQ(out.find("6 points"), out.rfind("6 points")) << "one rank says it";
+}
+
+TEST_F(Sweep, OfWhichARankIsLostGoesOn) {
+  if (!has_mpi()) GTEST_SKIP() << "built or run without MPI";
+  write("study.toml", "fidelity = \"lt\"\nsize = \"64x64\"\n[axes]\nview = [0, 1]\ntc.bins = [4, 8, 16, 32]\n");
+  ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv"}).code, 0);
+  const std::string command = under_mpi(folder(), 2, "sweep study.toml --csv mpi.csv --journal j");
+  // The second rank is killed once there are results; mpirun then ends the others.
+  const std::string killing = "(cd " + folder().string() +
+                              " && until [ -s j ]; do sleep 0.1; done; sleep 0.3; pkill -KILL -n -f 'sweep study.toml "
+                              "--csv mpi.csv' ) & " +
+                              command;
+  static_cast<void>(std::system(killing.c_str()));
+  ASSERT_EQ(std::system(command.c_str()), 0) << read_file(folder() / "mpi.err");
+  EXPECT_EQ(read_file(folder() / "mpi.csv"), read_file(folder() / "alone.csv"));
+}
+
 TEST_F(Sweep, ThatCannotBeIsRefusedWithItsLine) {
   bad("", {"nothing to study", "study.toml"});
   bad("[axes]\ntcbins = [1]\n", {"unknown axis 'tcbins'", "study.toml:2"});
