@@ -67,7 +67,6 @@ class TimedCrop : public TimedUnit {
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
     if (timing_.fetches_ahead || timing_.line_return_cycles > 0) {
       returns_.emplace(surface->address(0), surface->size_bytes(), timing_.line_bytes, timing_.line_return_cycles);
-      last_uses_.resize(returns_->lines());
       used_before_.resize(lines_.size());
     }
   }
@@ -216,7 +215,7 @@ class TimedCrop : public TimedUnit {
   void come_back(const CropBehaviour::LineAccess& access) {
     // What replaces colours does not read them.
     ready_[access.line] = access.filled != 0 ? returns_->from(access.address) : 0;
-    used_before_[access.line] = last_uses_[returns_->index(access.address)];
+    used_before_[access.line] = returns_->last_use(access.address);
   }
 
   /// Of quads, in parts of a cycle. Where several go in one only if they share a sector, the others take one each.
@@ -262,10 +261,7 @@ class TimedCrop : public TimedUnit {
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
       lines_[line] = at.last;
-      if (returns_) {
-        returns_->used(cache_.lines[i].address, at.last);
-        last_uses_[returns_->index(cache_.lines[i].address)] = at.last;
-      }
+      if (returns_) returns_->used(cache_.lines[i].address, at.last);
       if (dirty[i] == 0) continue;
       behaviour_->make_dirty(line, dirty[i]);
     }
@@ -336,7 +332,6 @@ class TimedCrop : public TimedUnit {
   std::vector<Cycle> ready_;            ///< of the cache: when one that came back can be used
   std::vector<char> unpaid_;            ///< of the cache: fetched, and nothing blended into it
   std::optional<LineReturns> returns_;  ///< where lines that come back wait
-  std::vector<Cycle> last_uses_;        ///< by line of the surface
   std::vector<Cycle> used_before_;      ///< by line of the cache: the last use of what it holds before it came back
   Ring<Recent> recent_;                 ///< blends in the pipeline, without forwarding
   Cycle last_blend_ = 0;
