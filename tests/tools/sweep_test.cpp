@@ -278,15 +278,17 @@ TEST_F(Sweep, OfWhichARankIsLostGoesOn) {
   if (!has_mpi()) GTEST_SKIP() << "built or run without MPI";
   write("study.toml", "fidelity = \"lt\"\nsize = \"64x64\"\n[axes]\nview = [0, 1]\ntc.bins = [4, 8, 16, 32]\n");
   ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv"}).code, 0);
-  const std::string command = under_mpi(folder(), 2, "sweep study.toml --csv mpi.csv --journal j");
-  // The second rank is killed once there are results; mpirun then ends the others.
-  const std::string killing = "(cd " + folder().string() +
-                              " && until [ -s j ]; do sleep 0.1; done; sleep 0.3; pkill -KILL -n -f 'sweep study.toml "
-                              "--csv mpi.csv' ) & " +
-                              command;
+  const std::string command = under_mpi(folder(), 2, "sweep study.toml --csv lost.csv --journal j");
+  // A rank is killed once there are results; mpirun then ends the others.
+  const std::string killing =
+      "(cd " + folder().string() +
+      " && until [ -s j ]; do sleep 0.1; done; sleep 0.3; for p in /proc/[0-9]*; do if tr '\\0' ' ' <$p/cmdline "
+      "2>/dev/null | grep -q '^[^ ]*vrpipe sweep study.toml --csv lost.csv'; then rank=${p#/proc/}; fi; done; "
+      "kill -KILL $rank) & " +
+      command;
   static_cast<void>(std::system(killing.c_str()));
   ASSERT_EQ(std::system(command.c_str()), 0) << read_file(folder() / "mpi.err");
-  EXPECT_EQ(read_file(folder() / "mpi.csv"), read_file(folder() / "alone.csv"));
+  EXPECT_EQ(read_file(folder() / "lost.csv"), read_file(folder() / "alone.csv"));
 }
 
 TEST_F(Sweep, ThatCannotBeIsRefusedWithItsLine) {
