@@ -243,9 +243,21 @@ template <ColorFormat Format, BlendRounding Rounding>
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
+void ColorRop<Format, Rounding>::tell(std::size_t place, LaneMask live) const {
+  const TileId tile = surface_->grid().tile(place / positions_per_tile);
+  const auto position = static_cast<unsigned>(place % positions_per_tile);
+  const auto closed = static_cast<LaneMask>(drops_late_ && blends_ ? live & terminated_[place] : 0);
+  if (closed != 0) context_.fragments->happened(FragmentFate::terminated, tile, position, closed);
+  if (live != closed) {
+    context_.fragments->happened(FragmentFate::blended, tile, position, static_cast<LaneMask>(live ^ closed));
+  }
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
 CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(DrawIndex draw, std::size_t place, LaneMask live,
                                                          const QuadColor& color) {
   if (draw != draw_) set_draw(draw);
+  if (context_.fragments != nullptr) tell(place, live);
   Tally tally;
   const Outcome outcome = blends_ ? blend_into(surface_->quad(place), place, live, color, tally)
                                   : replace(surface_->quad(place), place, live, color, tally);
@@ -255,6 +267,7 @@ CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(DrawIndex draw, std::si
 
 template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
+  if (context_.fragments != nullptr) return CropBehaviour::blend_quads(warp, from, to, outcomes);
   const std::size_t tile = surface_->grid().place(warp.tile, 0);
   QuadColor* const quads = &surface_->quad(tile);
   for (unsigned i = from; i < to;) {

@@ -143,6 +143,8 @@ class ColorRop : public CropBehaviour {
   }
   /// Blends for a draw from here on.
   void set_draw(DrawIndex draw);
+  /// Tells who looks what becomes of a quad's fragments, before it is blended.
+  void tell(std::size_t place, LaneMask live) const;
   /// Without blending: the colours of live samples take the places of those that are there.
   Outcome replace(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);
   Outcome blend_into(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);

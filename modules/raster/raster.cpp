@@ -164,6 +164,13 @@ bool TileRasterizer::advance() {
   return tile_y_ < tile_y_end_;
 }
 
+void TileRasterizer::tell(const QuadBeat& made) const {
+  for (unsigned i = 0; i < made.count; ++i) {
+    const Quad& quad = made.quads[i];
+    context_.fragments->happened(FragmentFate::rasterized, made.tile, quad.position, quad.coverage);
+  }
+}
+
 bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) {
   coarse_tests = 0;
   for (; tile_y_ < tile_y_end_; advance()) {
@@ -192,6 +199,7 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
     const unsigned fragments = wide_ ? fill_wide(out, x, y, value) : fill_narrow(out, x, y, value);
     quads_rasterized.add(primitive_.draw, out.count);
     fragments_rasterized.add(primitive_.draw, fragments);
+    if (context_.fragments != nullptr) tell(out);
     raster_tiles_tested += coarse_tests;
     ++raster_tiles_kept;
     new_screen_tile = !tile_counted_;

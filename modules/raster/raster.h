@@ -103,6 +103,7 @@ class TileRasterizer : public RasterBehaviour {
   unsigned fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]);
   unsigned fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]);
   void set_up_rectangle();
+  void tell(const QuadBeat& made) const;
   LaneMask in_area(std::int32_t x, std::int32_t y) const;
   bool advance();
   /// Whether Hi-Z culls the raster tile that begins at a pixel.

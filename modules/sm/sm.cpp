@@ -213,6 +213,14 @@ void SplatShader::shade_splats(const Warp& warp, WarpColors& colors) {
   }
 }
 
+void SplatShader::tell_merged(const Warp& warp, std::uint32_t threads) const {
+  for (unsigned i = 0; i < warp.count; ++i) {
+    const auto lanes = static_cast<LaneMask>(threads >> (4 * i) & all_lanes);
+    if (lanes == 0) continue;
+    context_.fragments->happened(FragmentFate::merged, warp.tile, warp.quads[i].position, lanes);
+  }
+}
+
 void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp& out) {
   out.tile = warp.tile;
   out.sequence = warp.sequence;
@@ -251,6 +259,7 @@ void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp
     }
   }
   out.count = static_cast<std::uint8_t>(count);
+  if (merged != 0 && context_.fragments != nullptr) tell_merged(warp, merged);
   // The threads of each draw, most often of one.
   for (std::uint32_t left = ~0U >> (4 * (quads_per_warp - warp.count)); left != 0;) {
     const DrawIndex draw = warp.quads[static_cast<unsigned>(__builtin_ctz(left)) / 4].draw;

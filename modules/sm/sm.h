@@ -228,6 +228,7 @@ class SplatShader : public SmBehaviour {
   void shade_by_alpha(const Warp& warp, WarpColors& colors);
   /// Merges, counts, and hands on what is live.
   void put_out(const Warp& warp, const WarpColors& colors, ShadedWarp& out);
+  void tell_merged(const Warp& warp, std::uint32_t threads) const;
   /// Alpha at the samples of two quads.
   template <Exponential Kind>
   static LanePair alpha_at(LanePair x, LanePair y, const AttributePair& splats);

@@ -60,6 +60,7 @@ unsigned TileCoalescing::insert(const QuadBeat& beat, unsigned from, Flush& out,
     bins_[static_cast<std::size_t>(index)].tile = beat.tile;
     bin_of_tile_[grid_.index(beat.tile)] = index;
     allocation_order_.push_back(static_cast<std::uint32_t>(index));
+    ++bins_begun;
   }
   Bin& bin = bins_[static_cast<std::size_t>(index)];
   const unsigned room = bin_quads_ - static_cast<unsigned>(bin.quads.size());

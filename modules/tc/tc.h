@@ -46,6 +46,7 @@ class TileCoalescing : public TcBehaviour {
   bool flush_oldest(FlushReason reason, Flush& out) override;
   TimingParameters timing() const override { return timing_; }
 
+  Counter bins_begun{*this, "bins_begun", "bins", "given to a screen tile; less `flushes`, those in use"};
   Counter flushes_full{*this, "flushes_full", "flushes", "because the bin was full"};
   Counter flushes_evicted{*this, "flushes_evicted", "flushes", "because another tile needed the bin"};
   Counter flushes_timed_out{*this, "flushes_timed_out", "flushes", "because no quad came for the time-out"};

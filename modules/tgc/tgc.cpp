@@ -95,6 +95,7 @@ bool TileGridCoalescing::step(Flush& out) {
     free_.pop_back();
     bins_[static_cast<std::size_t>(index)].grid = grid;
     bin_of_grid_[grid] = index;
+    ++bins_begun;
     allocation_order_.push_back(static_cast<std::uint32_t>(index));
   }
   Bin& bin = bins_[static_cast<std::size_t>(index)];

@@ -97,6 +97,7 @@ Configuration::Configuration(const RunRequest& request, const Frame& frame)
   context.precision.subpixel_bits = state_parameters_.subpixel_bits;
   context.clock_ps =
       std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(1e6 / request.platform->frequency_mhz)));
+  if (request.observers != nullptr) context.fragments = request.observers->of_fragments();
   context.placement.gpcs = request.platform->gpcs;
   for (unsigned& gpc = context.placement.gpc; gpc < request.platform->gpcs; ++gpc) contexts_.push_back(context);
   decide_effects();

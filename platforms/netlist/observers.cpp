@@ -51,7 +51,9 @@ LinkObservers Observers::of_link(const std::string& name) {
   LinkObservers observers;
   for (const OnLink& wanted : links_) {
     if (!names_path(wanted.name, name)) continue;
-    made_.push_back(wanted.make(name));
+    const auto joins = [&](LinkObserver* observer) { return wanted.sight->join(*observer); };
+    if (std::any_of(observers.begin(), observers.end(), joins)) continue;
+    made_.push_back(wanted.sight->make(name));
     observers.push_back(made_.back().get());
   }
   return observers;

@@ -582,6 +582,7 @@ RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<fl
   result.effects = configuration.effects();
   check_conservation(result.counts);
   result.result_hash = hash_of(result);
+  if (request.observers != nullptr) request.observers->end(result);
   return result;
 }
 

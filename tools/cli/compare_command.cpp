@@ -27,6 +27,7 @@ class CompareCommand : public Command {
     arguments_.declare_views(app);
     arguments_.declare_energy(app);
     arguments_.declare_explanation(app);
+    arguments_.declare_time(app, SimulationArguments::Variants::all);
     app.footer(
         "Simulates GPUs that differ only in the units swapped in, on the same draw: baseline, qm (TGC and QRU merge\n"
         "overlapping quads), het (ZROP and CROP terminate opaque pixels) and het+qm (both), or any set of variants\n"

@@ -206,21 +206,6 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
   declare_json(app);
   add_option(app, "--save-draw", save_draw_, "FILE.spl",
              "writes the draw after preprocessing; --scene FILE.spl takes it in again", result_group);
-  if (variants == Variants::one) {
-    add_option(app, Trace::option, trace_, "FILE.csv",
-               "writes statistics in the course of the run there, at the fidelities lt, at\n"
-               "and cycle: a row every so many cycles, a column for each statistic",
-               result_group);
-    add_option(app, "--trace-every", trace_every_, "CYCLES",
-               "between rows (default: " + std::to_string(Trace::default_every) +
-                   "); the last is at the end of the frame",
-               result_group);
-    add_option(app, "--trace-statistics", trace_statistics_, "NAME,...",
-               "which statistics (default: where quads go, and what CROP moves): over all\n"
-               "GPCs, tc.flushes; of one, gpc1.tc.flushes; several, gpc*.tc.flushes or\n"
-               "'tc.*' (`vrpipe units` lists all)",
-               result_group);
-  }
   if (variants == Variants::all) declare_jobs(app);
 }
 
@@ -330,6 +315,8 @@ std::optional<ViewsChoice> SimulationArguments::views() const {
   refuse(!frame_.empty(), "--frame", "--views draws one scene from many cameras");
   refuse(!save_draw_.empty(), "--save-draw", "a draw list has one draw, and each view has another");
   refuse(explain_effects_, "--explain-effects", "it measures the runs of one view");
+  const std::string observing = time_.any_given();
+  refuse(!observing.empty(), observing.c_str(), "it looks at the runs of one view");
   refuse(energy_ || !energies_.empty(), energy_ ? "--energy" : energies_option, "it is of the runs of one view");
   const auto scene = single(scene_, "--scene");
   refuse(scene && is_draw_list(*scene), "--scene", "a .spl is a draw list, of one camera");
@@ -430,20 +417,8 @@ std::vector<NamedFile> SimulationArguments::inputs(const FrameDescription& frame
   return files;
 }
 
-std::shared_ptr<Trace> SimulationArguments::trace(const RunRequest& request) const {
-  const auto file = single(trace_, Trace::option);
-  const auto every = single(trace_every_, "--trace-every");
-  const auto names = single(trace_statistics_, "--trace-statistics");
-  if (!file) {
-    if (every || names) {
-      throw UserError("nothing to trace to", every ? "--trace-every" : "--trace-statistics", "no file is named",
-                      "add --trace FILE.csv");
-    }
-    return nullptr;
-  }
-  const Cycle cycles = every ? parse_count(*every, "--trace-every", 1'000'000'000) : Trace::default_every;
-  return std::make_shared<Trace>(*file, cycles,
-                                 names ? parse_names(*names, "--trace-statistics") : Trace::default_names(request));
+void SimulationArguments::declare_time(CLI::App& app, Variants variants) {
+  time_.declare(app, "What is seen in its course", variants == Variants::one);
 }
 
 void SimulationArguments::check_explanation(const EffectChoice& effects) const {
@@ -452,9 +427,10 @@ void SimulationArguments::check_explanation(const EffectChoice& effects) const {
     throw UserError("nothing to explain", "--explain-effects", "--effects " + effects.text() + " leaves nothing out",
                     "leave out this or --effects");
   }
-  if (!trace_.empty()) {
-    throw UserError("cannot use option", "--explain-effects", "it repeats the run, and --trace writes one",
-                    "leave out this or --trace");
+  const std::string observing = time_.any_given();
+  if (!observing.empty()) {
+    throw UserError("cannot use option", "--explain-effects", "it repeats the run, and " + observing + " is of one",
+                    "leave out this or " + observing);
   }
 }
 
@@ -486,12 +462,8 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
 
   job.requests = requests(request, variants);
   leave_out_restated(job.requests, of_file(invocation));
-  for (RunRequest& each : job.requests) {
+  for (const RunRequest& each : job.requests) {
     const StdoutToStderr redirected;
-    if (variants == Variants::one) {
-      job.trace = trace(each);
-      if (job.trace) each.observers = job.trace->observers();
-    }
     check_configuration(each);
   }
   job.baseline = place_of_run(job.requests, single(relative_to_, "--relative-to").value_or(""), "--relative-to");
@@ -506,6 +478,7 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
   job.inputs = inputs(job.frame);
 
   job.processes = processes();
+  time_.observe(job);
   return job;
 }
 

@@ -8,6 +8,7 @@
 #include <vrpipe/workloads/scene.h>
 
 #include "cli/config_file.h"
+#include "cli/time_options.h"
 #include "jobs/settings.h"
 #include "jobs/simulation_job.h"
 #include "jobs/views_job.h"
@@ -63,6 +64,9 @@ class SimulationArguments {
   std::optional<ViewsChoice> views() const;
   /// --energy and --energies, for commands that report what each run spends.
   void declare_energy(CLI::App& app);
+  /// --interval, --heat-maps and the like, for commands that look at runs in their course; with --trace and --log for one
+  /// that has one run.
+  void declare_time(CLI::App& app, Variants variants);
   /// --explain-effects, for commands that report effects of each run.
   void declare_explanation(CLI::App& app);
   /// Loads the plugins and checks every option but the names of output files, which the commands know. Throws UserError.
@@ -86,7 +90,6 @@ class SimulationArguments {
   SceneRequest scene_request() const;
   FrameDescription frame() const;
   std::vector<NamedFile> inputs(const FrameDescription& frame) const;
-  std::shared_ptr<Trace> trace(const RunRequest& request) const;
   void check_explanation(const EffectChoice& effects) const;
   /// Null if energy is not asked for; throws UserError.
   std::shared_ptr<const EnergyTable> energies(const Platform& platform) const;
@@ -98,7 +101,7 @@ class SimulationArguments {
   Values views_, journal_, relative_to_;
   bool compares_any_ = false;
   Values background_, output_, json_, save_draw_, jobs_;
-  Values trace_, trace_every_, trace_statistics_;
+  TimeArguments time_;
   Values energies_;
   bool energy_ = false;
   bool explain_effects_ = false;

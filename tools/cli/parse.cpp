@@ -101,6 +101,21 @@ std::vector<std::string> parse_names(const std::string& text, const std::string&
   return names;
 }
 
+std::pair<std::string, CycleWindow> parse_window(const std::string& text, const std::string& option) {
+  CycleWindow window;
+  const std::size_t at = text.rfind('@');
+  const std::size_t colon = at == std::string::npos ? at : text.find(':', at);
+  if (colon == std::string::npos) return {text, window};
+  const std::string from = text.substr(at + 1, colon - at - 1), to = text.substr(colon + 1);
+  const bool is_read = (from.empty() || read_number(from, window.from)) && (to.empty() || read_number(to, window.to));
+  if (!is_read || window.from >= window.to) {
+    throw UserError("bad value '" + text.substr(at) + "'", option,
+                    is_read ? "it ends before it begins" : "cycles are whole numbers",
+                    "give @FROM:TO, e.g. @1000:2000");
+  }
+  return {text.substr(0, at), window};
+}
+
 Setting parse_setting(const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::size_t dot = text.rfind('.', equals);

@@ -2,10 +2,13 @@
 
 #include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/camera.h>
+
+#include "jobs/cycle_window.h"
 
 namespace vrpipe::tools {
 
@@ -30,6 +33,10 @@ std::array<float, 3> parse_background(const std::string& text, const std::string
 
 /// "NAME,...": at least one, none of them empty.
 std::vector<std::string> parse_names(const std::string& text, const std::string& option);
+
+/// "TEXT@FROM:TO": what comes before, and the cycles, of which either may be left out; all without them. What follows an @
+/// and has no colon is part of the text.
+std::pair<std::string, CycleWindow> parse_window(const std::string& text, const std::string& option);
 
 /// "UNIT.PARAMETER=VALUE".
 Setting parse_setting(const std::string& text);

@@ -8,6 +8,7 @@
 #include "host/output_file.h"
 #include "host/stdout_to_stderr.h"
 #include "host/terminal.h"
+#include "output/interval_report.h"
 #include "output/json_text.h"
 #include "output/report.h"
 #include "output/result_json.h"
@@ -44,6 +45,7 @@ bool print(const SimulationJob& job, const MakeJson& make_json, const MakeText& 
 }  // namespace
 
 void print_result(const SimulationJob& job, const JobResult& result) {
+  if (job.interval_csv) write_output_file(*job.interval_csv, intervals_csv(result.runs), "--interval-csv");
   const bool has_text = print(
       job, [&] { return result_json(result); }, [&](const TextStyle& style) { return report(result, style); });
   if (has_text && job.save_draw) std::cout << "draw: " << printable(job.save_draw->string()) << '\n';

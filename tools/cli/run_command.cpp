@@ -21,6 +21,7 @@ class RunCommand : public Command {
     arguments_.declare_frames(app);
     arguments_.declare_energy(app);
     arguments_.declare_explanation(app);
+    arguments_.declare_time(app, SimulationArguments::Variants::one);
     app.footer(
         "Prints cycles, counts, utilization and what each unit spent its cycles on.\n"
         "\n"
@@ -30,7 +31,8 @@ class RunCommand : public Command {
         "  vrpipe run --scene point_cloud.ply --eye 0,1.5,-4 --look-at 0,0,0 --fovy 45\n"
         "  vrpipe run --frame frame.json --variant het\n"
         "  vrpipe run --set crop.cache_bytes=32768 --set tc.bins=64 --json -\n"
-        "  vrpipe run --trace run.csv --trace-every 10000 --trace-statistics 'crop.quads_blended,l2.*'\n"
+        "  vrpipe run --interval 10000 --interval-csv run.csv --interval-statistics 'crop.quads_blended,l2.*'\n"
+        "  vrpipe run --size 320x180 --trace run.json@10000:20000 --log gpc0.crop@10000:10100\n"
         "  vrpipe run --size 320x180 --explain-effects\n"
         "  vrpipe run --plugin my_qru.so --unit qru=my-qru\n"
         "  vrpipe run --fidelity functional --termination strict");

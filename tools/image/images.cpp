@@ -119,6 +119,30 @@ std::string encode_png(std::uint32_t width, std::uint32_t height, const std::vec
   });
 }
 
+namespace {
+std::string exr_of(const Imf::Header& header, const Imf::FrameBuffer& pixels, std::uint32_t height) {
+  Imf::StdOSStream stream;
+  {
+    Imf::OutputFile file(stream, header);
+    file.setFrameBuffer(pixels);
+    file.writePixels(static_cast<int>(height));
+  }
+  return stream.str();
+}
+}  // namespace
+
+std::string encode_exr(std::uint32_t width, std::uint32_t height, const std::vector<NamedChannel>& channels) {
+  Imf::Header header(static_cast<int>(width), static_cast<int>(height));
+  header.compression() = Imf::ZIP_COMPRESSION;
+  Imf::FrameBuffer pixels;
+  for (const NamedChannel& channel : channels) {
+    header.channels().insert(channel.name, Imf::Channel(Imf::FLOAT));
+    char* const first = reinterpret_cast<char*>(const_cast<float*>(channel.values.data()));
+    pixels.insert(channel.name, Imf::Slice(Imf::FLOAT, first, sizeof(float), sizeof(float) * width));
+  }
+  return exr_of(header, pixels, height);
+}
+
 std::string encode_exr(const SharedImage& image) {
   Imf::Header header(static_cast<int>(image.width()), static_cast<int>(image.height()));
   header.compression() = Imf::ZIP_COMPRESSION;
@@ -132,13 +156,7 @@ std::string encode_exr(const SharedImage& image) {
     pixels.insert(channel, Imf::Slice(Imf::FLOAT, first + offset, 16, row_bytes));
     offset += sizeof(float);
   }
-  Imf::StdOSStream stream;
-  {
-    Imf::OutputFile file(stream, header);
-    file.setFrameBuffer(pixels);
-    file.writePixels(static_cast<int>(image.height()));
-  }
-  return stream.str();
+  return exr_of(header, pixels, image.height());
 }
 
 SharedImage read_exr(const std::string& path) {

@@ -49,7 +49,15 @@ std::string encode_png(std::uint32_t width, std::uint32_t height, const std::vec
 /// An OpenEXR file: RGBA float32, premultiplied, without a background.
 std::string encode_exr(const SharedImage& image);
 
-/// Reads such a file; channels that it does not have are 0. Throws std::runtime_error.
+/// A value of each pixel, row by row from the top.
+struct NamedChannel {
+  std::string name;
+  std::vector<float> values;  ///< width * height
+};
+/// An OpenEXR file of any channels, float32.
+std::string encode_exr(std::uint32_t width, std::uint32_t height, const std::vector<NamedChannel>& channels);
+
+/// Reads one of `encode_exr(image)`; channels that it does not have are 0. Throws std::runtime_error.
 SharedImage read_exr(const std::string& path);
 
 }  // namespace vrpipe::tools

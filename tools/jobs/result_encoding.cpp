@@ -55,9 +55,12 @@ VRPIPE_MEMBERS(AddressMap, color, depth_stencil, vertices, primitives, attribute
 VRPIPE_MEMBERS(Framebuffer, color, depth_stencil, addresses)
 VRPIPE_MEMBERS(DrawReport, name, counts)
 VRPIPE_MEMBERS(EffectReport, name, omitted, proof, reason)
+VRPIPE_MEMBERS(UnitIntervals, name, cycles)
+VRPIPE_MEMBERS(StatisticIntervals, name, kind, values, denominators)
+VRPIPE_MEMBERS(IntervalReport, every, from, units, statistics)
 VRPIPE_MEMBERS(RunResult, request, cycles, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
                bottleneck, statistics, implementations, parameters, outside_validated_range, effects, result_hash,
-               kernel_events, framebuffer, draws)
+               kernel_events, framebuffer, draws, intervals)
 
 /// Types of members that stay behind.
 template <class Member>

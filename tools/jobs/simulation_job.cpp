@@ -33,6 +33,18 @@ void write_images(const SimulationJob& job, const std::vector<Simulated>& simula
   });
 }
 
+/// Adds observers to requests; gives what they fill in.
+std::vector<std::unique_ptr<HeatMaps>> observe_heat(std::vector<RunRequest>& requests, std::uint32_t width,
+                                                    std::uint32_t height) {
+  std::vector<std::unique_ptr<HeatMaps>> maps;
+  for (RunRequest& request : requests) {
+    if (request.observers == nullptr) request.observers = std::make_shared<Observers>();
+    maps.push_back(std::make_unique<HeatMaps>(width, height, request.fidelity));
+    maps.back()->attach(*request.observers);
+  }
+  return maps;
+}
+
 }  // namespace
 
 std::string image_name(const std::string& scene, const std::string& run) {
@@ -52,12 +64,19 @@ ImageFiles image_files(const SimulationJob& job, const std::string& name) {
 void check_outputs(const SimulationJob& job, const std::vector<std::string>& images, std::vector<NamedFile> outputs) {
   if (job.json && *job.json != "-") outputs.push_back({"--json", *job.json});
   if (job.save_draw) outputs.push_back({"--save-draw", *job.save_draw});
+  if (job.interval_csv) outputs.push_back({"--interval-csv", *job.interval_csv});
   if (job.trace) outputs.push_back({Trace::option, job.trace->path()});
+  if (job.log && job.log->file()) outputs.push_back({EventLog::file_option, *job.log->file()});
   if (job.output) {
     for (const std::string& name : images) {
       const ImageFiles files = image_files(job, name);
       outputs.push_back({"--output", files.png});
       outputs.push_back({"--output", files.exr});
+      if (!job.heat_maps) continue;
+      const std::string stem = (*job.output / name).string();
+      for (const auto& map : HeatMaps::files(stem, job.requests.front().fidelity)) {
+        outputs.push_back({HeatMaps::option, map});
+      }
     }
   }
   for (const NamedFile& output : outputs) check_output_file(output.path, output.option, job.output);
@@ -83,6 +102,7 @@ JobResult perform(const SimulationJob& job) {
   result.energies = job.energies;
   ProgressLine progress;
   std::vector<Simulated> simulated;
+  std::vector<std::unique_ptr<HeatMaps>> heat_maps;
   bool preprocessed_here = false;
   {
     progress.show("loading " + job.frame.name);
@@ -109,17 +129,20 @@ JobResult perform(const SimulationJob& job) {
       save_draw(job, *loaded.geometry.front());
     }
 
+    std::vector<RunRequest> requests = job.requests;
+    if (job.heat_maps) heat_maps = observe_heat(requests, result.width, result.height);
     const auto simulation_start = std::chrono::steady_clock::now();
     const bool with_images = job.output.has_value();
-    if (job.requests.size() == 1 && !job.explain_effects) {
-      const RunRequest& request = job.requests.front();
+    if (requests.size() == 1 && !job.explain_effects) {
+      const RunRequest& request = requests.front();
       simulated.push_back(simulate_here(request, *frame_of(request), with_images, progress));
     } else {
-      simulated = simulate_in_processes(job.requests, frame_of, with_images, job.processes, progress);
+      simulated = simulate_in_processes(requests, frame_of, with_images, job.processes, progress);
     }
     for (Simulated& run : simulated) result.runs.push_back(std::move(run.result));
     result.simulate_seconds = seconds_since(simulation_start);
     if (job.trace) job.trace->finish();
+    if (job.log) job.log->finish();
     result.processes = std::min(job.processes, static_cast<unsigned>(job.requests.size()));
     if (job.explain_effects) result.effect_costs = measure_effects(result.runs, frame_of, progress);
   }
@@ -127,6 +150,7 @@ JobResult perform(const SimulationJob& job) {
   if (job.output) {
     progress.show("writing images");
     write_images(job, simulated, result);
+    for (std::size_t i = 0; i < heat_maps.size(); ++i) heat_maps[i]->write((*job.output / images[i]).string());
     progress.erase();
   } else {
     result.images.resize(simulated.size());

@@ -17,7 +17,9 @@
 #include "host/provenance.h"
 #include "jobs/effect_costs.h"
 #include "jobs/energy_table.h"
+#include "jobs/event_log.h"
 #include "jobs/frame_file.h"
+#include "jobs/heat_maps.h"
 #include "jobs/trace.h"
 
 namespace vrpipe::tools {
@@ -34,14 +36,17 @@ struct SimulationJob {
   /// `preprocess.NAME` and value of every parameter of preprocessing.
   std::vector<std::pair<std::string, std::string>> preprocess_parameters;
   std::array<float, 3> background{};
-  std::vector<NamedFile> inputs;                   ///< that the options name; outputs must not be among them
-  std::optional<std::filesystem::path> output;     ///< folder for images
-  std::optional<std::string> json;                 ///< file, or "-" for stdout
-  std::optional<std::filesystem::path> save_draw;  ///< file
-  std::shared_ptr<Trace> trace;                    ///< of the only request, which has its observers; null for none
-  bool explain_effects = false;                    ///< measures what each effect that a run omits would cost
-  std::shared_ptr<const EnergyTable> energies;     ///< by which energy is reported; null if it is not
-  unsigned processes = 1;                          ///< simulations at a time
+  std::vector<NamedFile> inputs;                      ///< that the options name; outputs must not be among them
+  std::optional<std::filesystem::path> output;        ///< folder for images
+  std::optional<std::string> json;                    ///< file, or "-" for stdout
+  std::optional<std::filesystem::path> save_draw;     ///< file
+  std::optional<std::filesystem::path> interval_csv;  ///< file
+  std::shared_ptr<Trace> trace;                       ///< of the only request, which has its observers; null for none
+  std::shared_ptr<EventLog> log;                      ///< likewise
+  bool heat_maps = false;                             ///< beside the images
+  bool explain_effects = false;                       ///< measures what each effect that a run omits would cost
+  std::shared_ptr<const EnergyTable> energies;        ///< by which energy is reported; null if it is not
+  unsigned processes = 1;                             ///< simulations at a time
 };
 
 /// The image files of one run.

@@ -15,6 +15,7 @@
 #include "jobs/settings.h"
 #include "output/effects_report.h"
 #include "output/energy_report.h"
+#include "output/interval_report.h"
 #include "output/report.h"
 
 namespace vrpipe::tools {
@@ -238,6 +239,7 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
                {"quad_merging_storage_bytes", run.request.variant.quad_merging ? storage_json(run.request) : Json()},
                {"kernel_events", run.kernel_events},
                {"outside_validated_range", run.outside_validated_range}};
+  if (run.intervals) json["intervals"] = intervals_json(*run.intervals);
   if (costs != nullptr) json["all_effects"]["host_seconds"] = {{"with", costs->with_all}, {"without", costs->without}};
   return json;
 }

@@ -109,6 +109,10 @@ class InPort : public Port {
 class LinkObserver {
  public:
   virtual ~LinkObserver() = default;
+  /// Of the receiver's queue, and of the sender's pipeline in front of it, so many places are taken or are free again, from
+  /// a cycle on. At first, before the first cycle, all become free. With time alone, and not at `lt`, where nothing waits.
+  virtual void places_taken(unsigned /*places*/, Cycle /*at*/) {}
+  virtual void places_freed(unsigned /*places*/, Cycle /*at*/) {}
 };
 template <class Item>
 class ItemObserver : public LinkObserver {
@@ -443,9 +447,11 @@ class LinkTap : public sc_core::sc_module,
   tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase& phase, sc_core::sc_time& t) override {
     const bool clocked = payload.at == never;
     observer_.passed(*payload.item, clocked ? clock_.now() : payload.at, clocked ? clock_.now() : payload.last);
+    observer_.places_taken(payload.beats, clocked ? clock_.now() : payload.at);
     return out->nb_transport_fw(payload, phase, t);
   }
   tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase& phase, sc_core::sc_time& t) override {
+    observer_.places_freed(payload.credits, payload.at == never ? clock_.now() : payload.last);
     return in->nb_transport_bw(payload, phase, t);
   }
   void b_transport(StreamPayload<Item>& payload, sc_core::sc_time& t) override {

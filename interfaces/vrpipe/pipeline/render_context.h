@@ -5,6 +5,7 @@
 #include <string>
 
 #include <vrpipe/pipeline/effects.h>
+#include <vrpipe/pipeline/fragment_observer.h>
 #include <vrpipe/pipeline/frame.h>
 
 namespace vrpipe {
@@ -31,6 +32,7 @@ struct RenderContext {
   Placement placement;
   std::uint64_t clock_ps = 1000;            ///< period of the units' clock, for what has a clock of its own
   std::shared_ptr<OmittedEffects> effects;  ///< null: none is left out
+  FragmentObserver* fragments = nullptr;    ///< null: nobody looks
 
   const DrawCall& draw(DrawIndex draw) const { return frame->draw_call(draw); }
   const DrawState& state(DrawIndex draw) const { return frame->draw_call(draw).state; }

@@ -10,10 +10,12 @@
 
 #include <vrpipe/kernel/accounting.h>
 #include <vrpipe/kernel/link.h>
+#include <vrpipe/pipeline/fragment_observer.h>
 
 namespace vrpipe {
 
 class Netlist;
+struct RunResult;
 
 /// What sees a run from outside, without changing it: given to `simulate` in its request. Links and units that are not
 /// observed cost nothing.
@@ -37,16 +39,13 @@ class Observers {
   /// What a link carries depends on the fidelity (batch.h): then give a function for each. A link that carries none of
   /// the items that are asked for, or that is not there, is a UserError when the run begins.
   template <class Item>
-  void on_link(std::string link, std::function<void(const Passed<Item>&)> see) {
-    struct Seeing final : ItemObserver<Item> {
-      Seeing(std::string name_of_link, std::function<void(const Passed<Item>&)> function)
-          : name(std::move(name_of_link)), call(std::move(function)) {}
-      void passed(const Item& item, Cycle first, Cycle last) override { call({name, item, first, last}); }
-      const std::string name;
-      const std::function<void(const Passed<Item>&)> call;
-    };
-    links_.push_back({std::move(link),
-                      [see = std::move(see)](const std::string& name) { return std::make_unique<Seeing>(name, see); }});
+  using SeeItem = std::function<void(const Passed<Item>&)>;
+  /// Places of a link's queue: taken, or fewer than 0 for some that are free again, from a cycle on. At first, before the
+  /// first cycle, all become free. At `cycle` and `at` alone: at `lt` nothing waits in a queue.
+  using SeePlaces = std::function<void(const std::string& link, std::int64_t places, Cycle at)>;
+  template <class Item>
+  void on_link(std::string link, SeeItem<Item> see, SeePlaces see_places = {}) {
+    links_.push_back({std::move(link), std::make_shared<LinkSightOf<Item>>(std::move(see), std::move(see_places))});
   }
 
   /// Called when a unit enters a state; units begin starved. With time alone.
@@ -86,6 +85,19 @@ class Observers {
   ///   on average, at most 31,000. Samples tell the share of the work that has been done, not when.
   void on_statistics(Cycle every, std::vector<std::string> names, SeeStatistics see);
 
+  /// Some fragments of a quad, and what has become of them.
+  struct Fragments {
+    FragmentFate fate;
+    TileId tile;
+    unsigned position;  ///< of the quad in the screen tile
+    LaneMask lanes;
+  };
+  /// At every fidelity. Of units that tell it (FragmentObserver); those of this library do.
+  void on_fragments(std::function<void(const Fragments&)> see) { fragments_.see.push_back(std::move(see)); }
+
+  /// Called when the run has ended well, with its result, of which `intervals` may be filled in.
+  void on_end(std::function<void(RunResult& result)> see) { ends_.push_back(std::move(see)); }
+
   // For the elaboration of a run.
 
   /// Throws UserError for a link that is asked for and not there.
@@ -94,6 +106,10 @@ class Observers {
   bool observes_link(const std::string& name) const;
   /// Null if nobody looks.
   StateObserver* of_unit(const std::string& path);
+  FragmentObserver* of_fragments() { return fragments_.see.empty() ? nullptr : &fragments_; }
+  void end(RunResult& result) const {
+    for (const auto& see : ends_) see(result);
+  }
   struct OnStatistics {
     Cycle every;
     std::vector<std::string> names;
@@ -102,14 +118,67 @@ class Observers {
   const std::vector<OnStatistics>& of_statistics() const { return statistics_; }
 
  private:
+  template <class Item>
+  struct Seeing final : ItemObserver<Item> {
+    explicit Seeing(std::string name_of_link) : name(std::move(name_of_link)) {}
+    void passed(const Item& item, Cycle first, Cycle last) override {
+      for (const auto& see : items) see({name, item, first, last});
+    }
+    void places_taken(unsigned count, Cycle at) override {
+      for (const auto& see : places) see(name, std::int64_t{count}, at);
+    }
+    void places_freed(unsigned count, Cycle at) override {
+      for (const auto& see : places) see(name, -std::int64_t{count}, at);
+    }
+    const std::string name;
+    std::vector<SeeItem<Item>> items;
+    std::vector<SeePlaces> places;
+  };
+  /// What one call of on_link asked for.
+  class LinkSight {
+   public:
+    virtual ~LinkSight() = default;
+    virtual std::unique_ptr<LinkObserver> make(const std::string& link) const = 0;
+    /// Whether it is for the items of that observer, which sees for this one as well then.
+    virtual bool join(LinkObserver& observer) const = 0;
+  };
+  template <class Item>
+  class LinkSightOf final : public LinkSight {
+   public:
+    LinkSightOf(SeeItem<Item> see, SeePlaces see_places) : item_(std::move(see)), places_(std::move(see_places)) {}
+    std::unique_ptr<LinkObserver> make(const std::string& link) const override {
+      auto made = std::make_unique<Seeing<Item>>(link);
+      join(*made);
+      return made;
+    }
+    bool join(LinkObserver& observer) const override {
+      auto* const seeing = dynamic_cast<Seeing<Item>*>(&observer);
+      if (seeing == nullptr) return false;
+      if (item_) seeing->items.push_back(item_);
+      if (places_) seeing->places.push_back(places_);
+      return true;
+    }
+
+   private:
+    SeeItem<Item> item_;
+    SeePlaces places_;
+  };
   struct OnLink {
     std::string name;
-    std::function<std::unique_ptr<LinkObserver>(const std::string& link)> make;
+    std::shared_ptr<const LinkSight> sight;
+  };
+  struct SeenFragments final : FragmentObserver {
+    void happened(FragmentFate fate, TileId tile, unsigned position, LaneMask lanes) override {
+      for (const auto& each : see) each({fate, tile, position, lanes});
+    }
+    std::vector<std::function<void(const Fragments&)>> see;
   };
   class States;
   std::vector<OnLink> links_;
   std::vector<std::function<void(const std::string&, UnitState, Cycle)>> states_;
   std::vector<OnStatistics> statistics_;
+  SeenFragments fragments_;
+  std::vector<std::function<void(RunResult&)>> ends_;
   std::vector<std::shared_ptr<LinkObserver>> made_;
   std::vector<std::shared_ptr<StateObserver>> made_states_;
 };

@@ -188,6 +188,29 @@ struct DrawReport {
   std::vector<std::pair<std::string, std::uint64_t>> counts;
 };
 
+/// What a unit spent the cycles of intervals on: by state, one number an interval.
+struct UnitIntervals {
+  std::string name;
+  std::array<std::vector<std::uint64_t>, unit_states> cycles;
+};
+/// A statistic over intervals, with one number for each. Of a ratio numerators, of a histogram sums.
+struct StatisticIntervals {
+  std::string name;
+  std::string kind;  ///< as in StatisticReport
+  /// What was counted in each; of an extreme, as it was at its end, none before anything was seen.
+  std::vector<std::optional<std::uint64_t>> values;
+  std::vector<std::uint64_t> denominators;  ///< of ratios and histograms, as in StatisticReport; empty otherwise
+  /// Of an interval, as StatisticReport::quotient().
+  std::optional<double> quotient(std::size_t interval) const;
+};
+/// A run in intervals of so many cycles, of which the last may be shorter: by record_intervals (intervals.h).
+struct IntervalReport {
+  std::uint64_t every = 0;
+  std::vector<std::uint64_t> from;  ///< first cycle of each
+  std::vector<UnitIntervals> units;
+  std::vector<StatisticIntervals> statistics;
+};
+
 struct RunResult {
   RunRequest request;
   std::optional<std::uint64_t> cycles;  ///< none where the fidelity has no time
@@ -211,7 +234,8 @@ struct RunResult {
   std::string result_hash;          ///< of counts, cycles and the stored bits of the image, 16 hex digits
   std::uint64_t kernel_events = 0;  ///< activations of the SystemC kernel's processes
   Framebuffer framebuffer;
-  std::vector<DrawReport> draws;  ///< in a frame of several
+  std::vector<DrawReport> draws;            ///< in a frame of several
+  std::optional<IntervalReport> intervals;  ///< if they were asked for
 };
 
 /// The state that a request gives to a draw with these settings of its own, of unit `state`; what is the hardware's

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "jobs/simulation_job.h"
+
+namespace CLI {
+class App;
+}  // namespace CLI
+
+namespace vrpipe::tools {
+
+/// The options that look at a run in its course, as typed: intervals, traces, logs and heat maps.
+class TimeArguments {
+ public:
+  /// @param of_one_run  also those that write what one run does
+  void declare(CLI::App& app, const std::string& group, bool of_one_run);
+  /// An option that is given, to be named where none of them can be; empty for none.
+  std::string any_given() const;
+  /// Adds observers to the requests of a job, and says what they write. Its other members are final. Throws UserError.
+  void observe(SimulationJob& job) const;
+
+ private:
+  std::optional<Cycle> every() const;
+  void record(RunRequest& request, Cycle every) const;
+
+  std::vector<std::string> interval_, interval_csv_, interval_statistics_;
+  std::vector<std::string> trace_, log_, log_file_;
+  bool heat_maps_ = false;
+};
+
+}  // namespace vrpipe::tools

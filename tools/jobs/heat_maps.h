@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <vrpipe/platforms/observers.h>
+#include <vrpipe/platforms/simulation.h>
+
+#include "image/images.h"
+
+namespace vrpipe::tools {
+
+/// What became of the fragments of each pixel and of each screen tile in one run, and when pixels terminated. Kept in
+/// memory that processes forked later share.
+class HeatMaps {
+ public:
+  static constexpr const char* option = "--heat-maps";
+
+  HeatMaps(std::uint32_t width, std::uint32_t height, Fidelity fidelity);
+
+  /// For one run, which must not outlive this.
+  void attach(Observers& observers);
+  /// Once the run is done: writes `files`. Throws UserError.
+  void write(const std::string& stem) const;
+
+  /// All that will be written, by a path without extension.
+  static std::vector<std::filesystem::path> files(const std::string& stem, Fidelity fidelity);
+
+ private:
+  std::vector<NamedChannel> of_pixels() const;
+  std::vector<NamedChannel> of_tiles(const std::vector<NamedChannel>& pixels) const;
+
+  const bool has_time_;
+  SharedImage fates_;   ///< fragments of each pixel, a channel for each FragmentFate
+  SharedImage cycles_;  ///< in the first channel: in which a pixel terminated, 0 if it did not
+};
+
+}  // namespace vrpipe::tools
