@@ -49,10 +49,10 @@ class BadInput : public ToolTest {
 };
 
 TEST_F(BadInput, Commands) {
-  refused({},
-          {"no command", "run, compare, accuracy, reproduce, microbench, convert, scenes, platforms, units, energies"});
-  refused({"sweep"}, {"'sweep'", "compare"});
-  refused({"diff", "a.json", "b.json"}, {"'diff'"});
+  refused({}, {"no command",
+               "run, compare, accuracy, sweep, reproduce, microbench, convert, diff, scenes, platforms, units"});
+  refused({"swep"}, {"'swep'", "did you mean sweep?"});
+  refused({"simulate", "a.json", "b.json"}, {"'simulate'"});
   refused({"compar"}, {"'compar'", "did you mean compare?"});
   refused({"--scene", "tiny.spl"}, {"'--scene'", "after the command"});
 }
@@ -60,7 +60,7 @@ TEST_F(BadInput, Commands) {
 TEST_F(BadInput, Options) {
   refused({"run", "--scen", "tiny.spl"}, {"'--scen'", "vrpipe run", "did you mean --scene?"});
   refused({"run", "--formt=rgba8"}, {"'--formt'", "did you mean --format?"});
-  refused({"compare", "--variant", "qm"}, {"'--variant'", "`vrpipe run`"});
+  refused({"accuracy", "--variant", "qm"}, {"'--variant'", "`vrpipe run`"});
   refused({"run", "-x"}, {"'-x'"});
   refused({"run", "extra"}, {"'extra'"});
   refused({"run", "--scene"}, {"missing value", "--scene"});

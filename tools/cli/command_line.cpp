@@ -31,6 +31,7 @@ constexpr const char* program_footer =
     "  vrpipe accuracy --quick --html accuracy.html     what accuracy costs in time\n"
     "  vrpipe reproduce --quick                         the paper's numbers beside what is measured here\n"
     "  vrpipe compare --config study.toml               all of it from a file; --print-config writes one\n"
+    "  vrpipe sweep study.toml --html study.html        a study over scenes, GPUs and parameters\n"
     "  vrpipe diff before.json after.json               what differs between two results\n"
     "  vrpipe microbench all --html microbench.html     the paper's analysis of GPUs as workloads\n"
     "  vrpipe units                                     every unit and parameter that can be changed\n"
@@ -169,7 +170,7 @@ int run_parsed(int argc, const char* const* argv) {
     if (!parts[i]->parsed()) continue;
     refuse_missing_values(*parts[i]);
     refuse_leftovers(*parts[i], parts);
-    std::optional<ConfigFile> config = read_config(*parts[i]);
+    std::optional<ConfigFile> config = commands[i]->configuration(*parts[i]);
     commands[i]->called_as({{argv, argv + argc}, parts[i], config});
     try {
       commands[i]->run();
@@ -192,6 +193,7 @@ std::vector<std::unique_ptr<Command>> all_commands() {
   commands.push_back(make_run_command());
   commands.push_back(make_compare_command());
   commands.push_back(make_accuracy_command());
+  commands.push_back(make_sweep_command());
   commands.push_back(make_reproduce_command());
   commands.push_back(make_microbench_command());
   commands.push_back(make_convert_command());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,6 +22,8 @@ class Command {
   virtual std::string summary() const = 0;  ///< one line, for `vrpipe --help`
   /// Adds options to the command's own part of the command line.
   virtual void declare(CLI::App& app) = 0;
+  /// What of the options, which are parsed, a file says; it is applied to them. Throws UserError.
+  virtual std::optional<ConfigFile> configuration(CLI::App& app) const { return read_config(app); }
   /// Before run().
   void called_as(Invocation invocation) { invocation_ = std::move(invocation); }
   /// Does it; the options are parsed. Throws UserError, CommandFailure or a fault.
@@ -36,6 +39,7 @@ class Command {
 std::unique_ptr<Command> make_run_command();
 std::unique_ptr<Command> make_compare_command();
 std::unique_ptr<Command> make_accuracy_command();
+std::unique_ptr<Command> make_sweep_command();
 std::unique_ptr<Command> make_reproduce_command();
 std::unique_ptr<Command> make_microbench_command();
 std::unique_ptr<Command> make_convert_command();

@@ -135,21 +135,22 @@ bool is_merged(const std::string& option) {
 
 }  // namespace
 
-ConfigFile::ConfigFile(const std::filesystem::path& path, CLI::App& app) : path_(path) {
-  read(app);
+ConfigFile::ConfigFile(const std::filesystem::path& path, CLI::App& app, const std::vector<std::string>& others)
+    : path_(path) {
+  read(app, others);
   apply(app);
 }
 
-void ConfigFile::read(CLI::App& app) {
+void ConfigFile::read(CLI::App& app, const std::vector<std::string>& others) {
   const Reader reader(path_, app);
-  std::ifstream file(path_, std::ios::binary);
-  const std::string content(std::istreambuf_iterator<char>(file), {});
   std::error_code ignored;
+  std::ifstream file(path_, std::ios::binary);
   if (!file || std::filesystem::is_directory(path_, ignored)) {
     throw UserError("cannot read configuration", std::string(config_option) + " " + path_.string(),
                     "there is no such file, or it may not be read",
                     "name a TOML file; docs/configuration.md describes it");
   }
+  const std::string content(std::istreambuf_iterator<char>(file), {});
   toml::table root;
   try {
     root = toml::parse(content, path_.string());
@@ -162,11 +163,13 @@ void ConfigFile::read(CLI::App& app) {
   if (define != nullptr) known.push_back(variants_key);
   for (const CLI::Option* option : app.get_options()) {
     for (const std::string& name : option->get_lnames()) {
-      const std::array<const char*, 6> others{"help", "config", "print-config", "set", "unit", "define"};
-      if (std::find(others.begin(), others.end(), name) == others.end()) known.push_back(name);
+      const std::array<const char*, 6> special{"help", "config", "print-config", "set", "unit", "define"};
+      if (std::find(special.begin(), special.end(), name) == special.end()) known.push_back(name);
     }
   }
+  known.insert(known.end(), others.begin(), others.end());
   for (const auto& [key, node] : Reader::in_order(root)) {
+    if (std::find(others.begin(), others.end(), key) != others.end()) continue;
     const unsigned line = Reader::position(*node).line;
     const CLI::Option* const option = app.get_option_no_throw("--" + key);
     if (std::find(known.begin(), known.end(), key) == known.end()) reader.refuse_key(*node, key, known);

@@ -21,7 +21,8 @@ class ConfigFile {
   /// Reads the file that --config names, and gives the options of `app`, which are parsed, what they are not given.
   /// Throws UserError with file and line for what is no TOML, an unknown key, with the nearest name, and a value of a type
   /// that the option does not take.
-  ConfigFile(const std::filesystem::path& path, CLI::App& app);
+  /// @param others  keys that somebody else reads
+  ConfigFile(const std::filesystem::path& path, CLI::App& app, const std::vector<std::string>& others = {});
 
   const std::filesystem::path& path() const { return path_; }
   /// Whether an option, or a key of --set, --unit and --define, has its value from here: "--size", "--set tc.bins".
@@ -48,7 +49,7 @@ class ConfigFile {
   void add(const std::string& option, const std::string& key, const std::string& text, unsigned line);
   /// Of UNIT.PARAMETER or SLOT, wherever it stands.
   void mention(const std::string& key, const std::string& value, unsigned line);
-  void read(CLI::App& app);
+  void read(CLI::App& app, const std::vector<std::string>& others);
   void apply(CLI::App& app);
 
   std::filesystem::path path_;

@@ -115,7 +115,7 @@ void load_plugins(const Values& plugins) {
   if (!plugins.empty()) report_crashes();
 }
 
-void SimulationArguments::declare(CLI::App& app, Variants variants) {
+void SimulationArguments::declare_scene(CLI::App& app) {
   add_option(app, "--scene", scene_, "FILE|builtin:NAME|NAME=FILE",
              "trained Gaussians (.ply, .splat, .spz, .sog, .ksplat ...), a .spl draw list,\n"
              "or a built-in scene (default: builtin:object; `vrpipe scenes` lists them);\n"
@@ -144,20 +144,21 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              scene_group);
   add_option(app, "--fovy", fovy_, "DEGREES", "vertical field of view (default: the scene's own, 50 for a file)",
              scene_group);
+  // For --print-config; help says defaults in words.
+  app.get_option("--scene")->default_str("builtin:object");
+}
 
-  declare_config(app);
-  add_option(app, "--define", definitions_, "NAME=BASE,...", "", "");
-  declare_platform(app);
-  if (variants == Variants::one) {
-    add_option(app, "--variant", variant_, "NAME|NAME=BASE,...",
-               "baseline, qm (quad merging), het (hardware early termination) or\n"
-               "het+qm, or one of your own, as in mine=het+qm,qru=same-splat,tc.bins=64\n"
-               "(default: " +
-                   variant_default + "; docs/configuration.md)",
-               machine_group);
-  }
-  declare_changes(app);
+void SimulationArguments::declare_variant(CLI::App& app) {
+  add_option(app, "--variant", variant_, "NAME|NAME=BASE,...",
+             "baseline, qm (quad merging), het (hardware early termination) or\n"
+             "het+qm, or one of your own, as in mine=het+qm,qru=same-splat,tc.bins=64\n"
+             "(default: " +
+                 variant_default + "; docs/configuration.md)",
+             machine_group)
+      ->default_str(variant_default);
+}
 
+void SimulationArguments::declare_rules(CLI::App& app) {
   declare_fidelity(app);
   add_option(app, "--effects", effects_, "LIST",
              "what is simulated: auto, what the frame calls for; approximate, of that\n"
@@ -171,23 +172,41 @@ void SimulationArguments::declare(CLI::App& app, Variants variants) {
              "when a termination bit counts: paper (once its update has travelled) or\n"
              "strict (order alone decides) (default: paper)",
              rules_group);
+  for (const auto& [name, usual] :
+       {std::pair{"--effects", "auto"}, std::pair{"--format", "rgba16f"}, std::pair{"--termination", "paper"}}) {
+    app.get_option(name)->default_str(usual);
+  }
+}
 
+void SimulationArguments::declare_study(CLI::App& app) {
+  declare_scene(app);
+  add_option(app, "--define", definitions_, "NAME=BASE,...", "", "");
+  declare_platform(app);
+  declare_variant(app);
+  declare_changes(app);
+  declare_rules(app);
+  declare_json(app);
+  declare_jobs(app);
+}
+
+void SimulationArguments::declare(CLI::App& app, Variants variants) {
+  declare_scene(app);
+  declare_config(app);
+  add_option(app, "--define", definitions_, "NAME=BASE,...", "", "");
+  declare_platform(app);
+  if (variants == Variants::one) declare_variant(app);
+  declare_changes(app);
+  declare_rules(app);
   add_option(app, "--output", output_, "DIR",
              "writes SCENE-VARIANT.png (8 bit, over the background) and .exr (RGBA\n"
              "float, premultiplied, no background) there; created if missing",
              result_group);
-  add_option(app, "--background", background_, "R,G,B", "behind the PNG, each 0 to 1 (default: 0,0,0)", result_group);
+  add_option(app, "--background", background_, "R,G,B", "behind the PNG, each 0 to 1 (default: 0,0,0)", result_group)
+      ->default_str("0,0,0");
   declare_json(app);
   add_option(app, "--save-draw", save_draw_, "FILE.spl",
              "writes the draw after preprocessing; --scene FILE.spl takes it in again", result_group);
   if (variants == Variants::all) declare_jobs(app);
-  // For --print-config; help says them in words.
-  for (const auto& [name, usual] :
-       {std::pair{"--scene", "builtin:object"}, std::pair{"--effects", "auto"}, std::pair{"--format", "rgba16f"},
-        std::pair{"--termination", "paper"}, std::pair{"--background", "0,0,0"}}) {
-    app.get_option(name)->default_str(usual);
-  }
-  if (variants == Variants::one) app.get_option("--variant")->default_str(variant_default);
 }
 
 void SimulationArguments::declare_comparison(CLI::App& app) {

@@ -50,6 +50,8 @@ class SimulationArguments {
   void declare(CLI::App& app, Variants variants);
   /// --variant and --platform as often as one likes, and --relative-to, for commands that compare any set of them.
   void declare_comparison(CLI::App& app);
+  /// Those that all points of a study share.
+  void declare_study(CLI::App& app);
   /// Those alone that say on what and how exactly it is simulated, for commands that draw frames of their own.
   void declare_machine(CLI::App& app);
   /// What these say; as `resolve`.
@@ -71,6 +73,9 @@ class SimulationArguments {
   SimulationJob resolve(Variants variants, const Invocation& invocation) const;
 
  private:
+  void declare_scene(CLI::App& app);
+  void declare_variant(CLI::App& app);
+  void declare_rules(CLI::App& app);
   void declare_platform(CLI::App& app);
   void declare_changes(CLI::App& app);
   void declare_fidelity(CLI::App& app);

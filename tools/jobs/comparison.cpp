@@ -12,6 +12,7 @@ std::optional<double> speedup(const RunResult& baseline, const RunResult& run) {
   if (!baseline.cycles || !run.cycles || *run.cycles == 0) return std::nullopt;
   if (baseline.counts.fragments_rasterized == 0) return std::nullopt;
   const double ratio = static_cast<double>(*baseline.cycles) / static_cast<double>(*run.cycles);
+  if (baseline.request.platform == run.request.platform) return ratio;
   const double from = baseline.request.platform->frequency_mhz;
   const double to = run.request.platform->frequency_mhz;
   return from == to ? ratio : ratio * to / from;

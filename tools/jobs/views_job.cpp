@@ -101,11 +101,17 @@ json cameras_identity(const ViewsResult& result) {
 }
 
 json runs_identity(const SimulationJob& job) {
-  json requests = json::array();
-  for (const RunRequest& request : job.requests) requests.push_back(request_identity(request));
-  return {{"runs", requests},
-          {"preprocessing", settings_identity(job.preprocessing)},
-          {"multi_pass", job.frame.passes}};
+  json common = request_identity(job.requests.front());
+  common.erase("platform");
+  common.erase("variant");
+  json runs = json::array();
+  for (const RunRequest& request : job.requests) {
+    const json each = request_identity(request);
+    runs.push_back({each["platform"], each["variant"]});
+  }
+  common.update(
+      {{"runs", runs}, {"preprocessing", settings_identity(job.preprocessing)}, {"multi_pass", job.frame.passes}});
+  return common;
 }
 
 /// All that the results of views depend on.

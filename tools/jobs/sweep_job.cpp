@@ -1,0 +1,481 @@
+#include "jobs/sweep_job.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+#include <thread>
+#include <tuple>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <vrpipe/component/error.h>
+#include <vrpipe/component/printable.h>
+
+#include "jobs/energy.h"
+#include "jobs/identity.h"
+#include "jobs/loaded_frame.h"
+#include "jobs/processes.h"
+#include "jobs/ranks.h"
+#include "jobs/result_encoding.h"
+#include "jobs/settings.h"
+
+namespace vrpipe::tools {
+namespace {
+
+using nlohmann::json;
+using SteadyClock = std::chrono::steady_clock;
+
+const std::string& value_on(const Study& study, const StudiedPoint& point, const std::string& axis,
+                            const std::string& otherwise) {
+  for (std::size_t i = 0; i < study.axes.size(); ++i) {
+    if (study.axes[i].name == axis) return study.axes[i].values[point.values[i]];
+  }
+  return otherwise;
+}
+
+bool is_parameter(const std::string& axis) { return axis.find('.') != std::string::npos; }
+
+/// What a point draws: points that draw the same come one after another.
+struct Drawn {
+  std::string scene, view, size;
+  std::vector<std::string> preprocess;  ///< settings
+
+  auto key() const { return std::tie(scene, view, size, preprocess); }
+};
+
+Drawn drawn_by(const SweepJob& job, const StudiedPoint& point) {
+  static const std::string none;
+  const Study& study = job.study;
+  const std::string& scene = value_on(study, point, "scene", none);
+  Drawn drawn{scene.empty() ? job.common.scene.scene : scene_of_axis(job, scene),
+              value_on(study, point, "view", none),
+              value_on(study, point, "size", none),
+              {}};
+  for (std::size_t i = 0; i < study.axes.size(); ++i) {
+    const std::string& name = study.axes[i].name;
+    if (name.rfind("preprocess.", 0) == 0)
+      drawn.preprocess.push_back(name + "=" + study.axes[i].values[point.values[i]]);
+  }
+  return drawn;
+}
+
+ImageSize size_of(const std::string& text) {
+  unsigned width = 0, height = 0;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%5ux%5u%c", &width, &height, &rest) != 2 || width < 1 || height < 1 ||
+      width > kMaxImageSize || height > kMaxImageSize) {
+    throw UserError("bad value '" + text + "'", "axis size", "it is not WIDTHxHEIGHT in whole pixels",
+                    "give e.g. 1280x720");
+  }
+  return {width, height};
+}
+
+/// Loads scenes when their points are asked for, each once while its points are run, and holds the last.
+class StudyFrames {
+ public:
+  explicit StudyFrames(const SweepJob& job) : job_(job) {}
+
+  std::shared_ptr<const Frame> frame(const StudiedPoint& point, const RunRequest& request) {
+    const Drawn drawn = drawn_by(job_, point);
+    if (!held_ || held_->key() != drawn.key()) load(drawn);
+    FrameDescription description = frame_of_scene(drawn.scene);
+    const std::string passes = value_on(job_.study, point, "multi-pass", std::to_string(job_.common.frame.passes));
+    description.passes = static_cast<std::uint32_t>(std::stoul(passes));
+    return make_frame(request, description, frame_);
+  }
+
+ private:
+  void load(const Drawn& drawn) {
+    held_.reset();
+    frame_ = LoadedFrame();
+    SceneRequest request = job_.common.scene;
+    request.scene = drawn.scene;
+    if (!drawn.size.empty()) request.size = size_of(drawn.size);
+    std::vector<Setting> settings = job_.common.preprocessing;
+    for (const std::string& text : drawn.preprocess) {
+      const std::size_t equals = text.find('=');
+      settings.push_back({"preprocess", text.substr(11, equals - 11), text.substr(equals + 1)});
+    }
+    request.preprocess = sort_settings(settings).preprocess;
+    if (drawn.view.empty()) {
+      frame_ = load_frame(frame_of_scene(drawn.scene), request);
+    } else if (request.camera) {
+      request.camera = camera_choice(*request.camera).file + "#" + drawn.view;
+      frame_ = load_frame(frame_of_scene(drawn.scene), request);
+    } else {
+      load_from_orbit(drawn, request);
+    }
+    held_ = drawn;
+  }
+
+  /// Views go round the scene, of as many as the study names, or one more than the largest.
+  void load_from_orbit(const Drawn& drawn, const SceneRequest& request) {
+    std::size_t views = 1;
+    for (const StudyAxis& axis : job_.study.axes) {
+      if (axis.name != "view") continue;
+      for (const std::string& value : axis.values) views = std::max<std::size_t>(views, std::stoul(value) + 1);
+    }
+    OpenedScene scene = open_scene(request);
+    const Camera camera = scene.viewpoint.camera;
+    if (!scene.viewpoint.view)
+      throw UserError("no views of " + drawn.scene, "axis view", "it has no orbit", "give --camera FILE");
+    const View view = orbit_views(*scene.viewpoint.view, views)[std::stoul(drawn.view)];
+    scene.viewpoint = {look_at(view, {camera.width, camera.height}), view, {}};
+    frame_ = load_frame(frame_of_scene(drawn.scene), scene, request.preprocess);
+  }
+
+  const SweepJob& job_;
+  std::optional<Drawn> held_;
+  LoadedFrame frame_;
+};
+
+void check_views(const SweepJob& job) {
+  for (const StudyAxis& axis : job.study.axes) {
+    for (const std::string& value : axis.values) {
+      const bool is_count =
+          !value.empty() && value.size() < 7 && value.find_first_not_of("0123456789") == std::string::npos;
+      if (axis.name == "view" && !job.common.scene.camera && !is_count) {
+        throw UserError("bad value '" + value + "'", "axis view", "it is no whole number, and there is no camera file",
+                        "give 0, 1, ... round the scene, or camera = FILE");
+      }
+      if (axis.name == "size") static_cast<void>(size_of(value));
+      if (axis.name == "multi-pass" && (!is_count || std::stoul(value) < 1))
+        throw UserError("bad value '" + value + "'", "axis multi-pass", "it is no whole number from 1", "give e.g. 8");
+    }
+  }
+}
+
+// The journal.
+
+json point_key(const Study& study, std::size_t point) {
+  json key = json::array();
+  for (std::size_t i = 0; i < study.axes.size(); ++i)
+    key.push_back(valid_utf8(study.axes[i].name + "=" + study.axes[i].values[study.points[point].values[i]]));
+  return key;
+}
+
+/// All that results depend on but the points, which may become more: a study that grows keeps what is done.
+json identity(const SweepJob& job) {
+  const SimulationJob& common = job.common;
+  json scenes = json::array();
+  const auto add_scene = [&](const std::string& scene) {
+    const bool is_builtin = scene.empty() || scene.rfind("builtin:", 0) == 0;
+    scenes.push_back(is_builtin ? json(scene) : scene_identity(scene));
+  };
+  add_scene(common.scene.scene);
+  for (const StudyAxis& axis : job.study.axes) {
+    if (axis.name != "scene") continue;
+    for (const std::string& scene : axis.values) add_scene(scene_of_axis(job, scene));
+  }
+  json cameras, meshes = json::array(), plugins = json::array(), variants = json::array();
+  if (common.scene.camera)
+    cameras = {{"files", file_identity(camera_choice(*common.scene.camera).file)},
+               {"camera", valid_utf8(*common.scene.camera)}};
+  for (const std::string& mesh : common.scene.meshes) meshes.push_back(file_identity(mesh));
+  for (const PluginFile& plugin : common.provenance.plugins) plugins.push_back(plugin.sha256);
+  for (const Variant& variant : vrpipe::variants()) {
+    RunRequest request = common.requests.front();
+    request.variant = variant;
+    if (!variant.base.empty()) variants.push_back(request_identity(request)["variant"]);
+  }
+  const SceneRequest& scene = common.scene;
+  const auto numbers = [](const auto& triple) { return triple ? json({triple->x, triple->y, triple->z}) : json(); };
+  return {{"schema", "vrpipe.sweep-journal/1"},
+          {"version", VRPIPE_VERSION},
+          {"build", build_identity()},
+          {"plugins", plugins},
+          {"scenes", scenes},
+          {"meshes", meshes},
+          {"cameras", cameras},
+          {"view",
+           {numbers(scene.eye), numbers(scene.look_at), numbers(scene.up),
+            scene.fovy_degrees ? json(*scene.fovy_degrees) : json()}},
+          {"size", scene.size ? json{scene.size->width, scene.size->height} : json()},
+          {"common", request_identity(common.requests.front())},
+          {"variants", variants},
+          {"preprocessing", settings_identity(common.preprocessing)},
+          {"multi_pass", common.frame.passes}};
+}
+
+std::filesystem::path shard_journal(const std::filesystem::path& journal, const Shard& shard) {
+  return journal.string() + fmt::format(".{}-of-{}", shard.index, shard.count);
+}
+
+Journal open_journal(const SweepJob& job) {
+  const json head = identity(job);
+  if (job.journal) {
+    return Journal::in_file(job.shard ? shard_journal(*job.journal, *job.shard) : *job.journal, head,
+                            SweepJob::journal_option);
+  }
+  return Journal::in_cache("sweep-" + sha256(head.dump()).substr(0, 16) + ".jsonl", head, SweepJob::journal_option);
+}
+
+json to_record(const Study& study, std::size_t place, const PointOutcome& point) {
+  return {{"point", point_key(study, place)},
+          {"run", encode(point.run)},
+          {"energy", point.energy ? json{point.energy->low, point.energy->nominal, point.energy->high} : json()},
+          {"cpu_seconds", point.cpu_seconds}};
+}
+
+std::uint64_t storage_of(const RunRequest& request) {
+  if (!request.variant.quad_merging) return 0;
+  const StorageReport storage = quad_merging_storage(request);
+  return storage.tgc_bytes + storage.qru_bytes;
+}
+
+/// Throws std::runtime_error or json::exception for what to_record() cannot have made.
+PointOutcome from_record(const json& record, const RunRequest& request) {
+  PointOutcome point;
+  point.run = decode(with_binaries(record.at("run")), request);
+  point.run.framebuffer.color = ColorSurface(1, 1, request.format);
+  point.run.framebuffer.depth_stencil = DepthStencilSurface(1, 1);
+  const json& energy = record.at("energy");
+  if (!energy.is_null())
+    point.energy = Range{energy.at(0).get<double>(), energy.at(1).get<double>(), energy.at(2).get<double>()};
+  point.storage_bytes = storage_of(request);
+  record.at("cpu_seconds").get_to(point.cpu_seconds);
+  return point;
+}
+
+/// How many points were taken.
+std::size_t take_records(const std::vector<json>& records, const std::vector<RunRequest>& requests,
+                         SweepResult& result) {
+  std::size_t taken = 0;
+  std::map<std::string, std::size_t> places;
+  for (std::size_t i = 0; i < result.study.points.size(); ++i) places.emplace(point_key(result.study, i).dump(), i);
+  for (const json& record : records) {
+    try {
+      const auto found = places.find(record.at("point").dump());
+      if (found == places.end() || result.points[found->second]) continue;
+      result.points[found->second] = from_record(record, requests[found->second]);
+      ++taken;
+    } catch (const json::exception&) {
+      continue;  // damaged: the point is simulated again
+    } catch (const std::runtime_error&) {
+      continue;
+    }
+  }
+  return taken;
+}
+
+/// Of shards that are there, whatever number of them there was; how many points were taken.
+std::size_t take_shards(const SweepJob& job, const std::vector<RunRequest>& requests, SweepResult& result) {
+  if (!job.journal || job.shard) return 0;
+  std::size_t taken = 0;
+  const std::filesystem::path folder = job.journal->has_parent_path() ? job.journal->parent_path() : ".";
+  const std::string prefix = job.journal->filename().string() + ".";
+  std::vector<std::filesystem::path> files;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.rfind(prefix, 0) == 0 && name.find("-of-") != std::string::npos) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  for (const std::filesystem::path& file : files) {
+    const Journal shard = Journal::in_file(file, identity(job), SweepJob::journal_option);
+    taken += take_records(shard.records(), requests, result);
+  }
+  return taken;
+}
+
+/// The time that is left, by what points took so far; warns once of a long study.
+class Foresight {
+ public:
+  Foresight(std::size_t points, unsigned processes, ProgressLine& progress)
+      : points_(points), processes_(processes), progress_(progress) {}
+
+  void done(double cpu_seconds) {
+    constexpr double hour = 3600;
+    seconds_ += cpu_seconds;
+    ++done_;
+    const std::size_t enough = std::min<std::size_t>(points_, std::max<std::size_t>(2, 2 * processes_));
+    if (warned_ || done_ < enough) return;
+    warned_ = true;
+    const double left = seconds_ / static_cast<double>(done_) * static_cast<double>(points_ - done_) / processes_;
+    if (left < hour) return;
+    progress_.erase();
+    fmt::print(stderr,
+               "sweep: the {} points that are left will take about {:.1f} hours; interrupted, the same command goes "
+               "on where it was\n",
+               points_ - done_, left / hour);
+  }
+
+ private:
+  std::size_t points_, done_ = 0;
+  unsigned processes_;
+  double seconds_ = 0;
+  bool warned_ = false;
+  ProgressLine& progress_;
+};
+
+void strip(RunResult& run) {
+  run.units.clear();
+  run.statistics.clear();
+  run.effects.clear();
+  run.draws.clear();
+  run.implementations.clear();
+  run.parameters.clear();
+  run.host_seconds = run.cpu_seconds = 0;
+}
+
+/// Simulates the missing points that are this process's, and gives each to `store`.
+template <class IsMine, class Store>
+void simulate(const SweepJob& job, const std::vector<RunRequest>& requests, SweepResult& result, BatchPlace place,
+              ProgressLine& progress, const IsMine& is_mine, const Store& store) {
+  const Study& study = job.study;
+  std::vector<std::size_t> missing;
+  for (std::size_t i = 0; i < study.points.size(); ++i) {
+    if (!result.points[i] && is_mine(i)) missing.push_back(i);
+  }
+  // Each scene is loaded once.
+  std::stable_sort(missing.begin(), missing.end(), [&](std::size_t a, std::size_t b) {
+    return drawn_by(job, study.points[a]).key() < drawn_by(job, study.points[b]).key();
+  });
+  StudyFrames frames(job);
+  std::vector<Task> tasks;
+  for (const std::size_t i : missing) {
+    const auto frame = [&frames, &study, i](const RunRequest& request) {
+      return frames.frame(study.points[i], request);
+    };
+    tasks.push_back({fmt::format("point {}", i), requests[i], frame});
+  }
+  Foresight foresight(missing.size(), result.processes, progress);
+  const auto finished = [&](std::size_t task, Simulated&& simulated) {
+    const std::size_t i = missing[task];
+    PointOutcome point;
+    point.run = std::move(simulated.result);
+    point.cpu_seconds = point.run.cpu_seconds;
+    if (point.run.cycles)
+      point.energy = energy_report(energy_amounts(point.run, shipped_energies()), shipped_energies()).total;
+    strip(point.run);
+    point.storage_bytes = storage_of(requests[i]);
+    progress.erase();
+    store(to_record(study, i, point));
+    foresight.done(point.cpu_seconds);
+    result.points[i] = std::move(point);
+  };
+  place.title = "sweep  ";
+  if (!tasks.empty()) run_tasks(tasks, false, result.processes, place, progress, finished);
+}
+
+std::string to_message(const json& record) {
+  const std::vector<std::uint8_t> bytes = json::to_cbor(record);
+  return {bytes.begin(), bytes.end()};
+}
+
+/// One rank of several: the first keeps the journal and collects what the leaders of other machines send it.
+void simulate_as_rank(const SweepJob& job, const std::vector<RunRequest>& requests, Ranks& ranks, SweepResult& result,
+                      ProgressLine& progress) {
+  std::string done(result.points.size(), '0');
+  for (std::size_t i = 0; i < done.size(); ++i) done[i] = result.points[i] ? '1' : '0';
+  done = ranks.broadcast(done);
+  const auto missing = static_cast<std::size_t>(std::count(done.begin(), done.end(), '0'));
+  std::size_t collected = 0;
+  const auto is_mine = [&](std::size_t i) {
+    const std::size_t slot = i % ranks.all_slots();
+    return done[i] == '0' && slot >= ranks.first_slot() && slot < ranks.first_slot() + ranks.slots();
+  };
+  BatchPlace place;
+  if (!ranks.is_first()) {
+    if (ranks.is_leader()) {
+      simulate(job, requests, result, place, progress, is_mine,
+               [&](const json& record) { ranks.send(to_message(record)); });
+    }
+    return ranks.wait_for_all();
+  }
+  place.meanwhile = [&] {
+    while (const auto message = ranks.receive()) {
+      const json record = json::from_cbor(*message);
+      result.journal->append(record);
+      collected += take_records({record}, requests, result);
+    }
+  };
+  simulate(job, requests, result, place, progress, is_mine, [&](const json& record) {
+    result.journal->append(record);
+    ++collected;
+  });
+  while (collected < missing) {
+    place.meanwhile();
+    progress.show(fmt::format("sweep  {} of {} points, other machines are at work", collected, missing));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  progress.erase();
+  ranks.wait_for_all();
+}
+
+}  // namespace
+
+std::string scene_of_axis(const SweepJob& job, const std::string& value) {
+  if (value.rfind("builtin:", 0) == 0) return value;
+  const std::size_t name = value.find('=') == std::string::npos ? 0 : value.find('=') + 1;
+  const std::filesystem::path file = value.substr(name);
+  return value.substr(0, name) + (file.is_absolute() ? file : job.study_file.parent_path() / file).string();
+}
+
+RunRequest request_of(const SweepJob& job, const StudiedPoint& point) {
+  RunRequest request = job.common.requests.front();
+  for (std::size_t i = 0; i < job.study.axes.size(); ++i) {
+    const std::string& axis = job.study.axes[i].name;
+    const std::string& value = job.study.axes[i].values[point.values[i]];
+    if (axis == "platform") request.platform = &platform_named(value);
+    if (axis == "variant") request.variant = variant_named(value);
+    if (axis == "fidelity") request.fidelity = fidelity_named(value);
+    if (axis == "format") request.format = color_format_named(value);
+    if (axis == "termination") request.termination = termination_named(value);
+    if (!is_parameter(axis) || axis.rfind("preprocess.", 0) == 0) continue;
+    const std::size_t dot = axis.rfind('.');
+    request.settings.push_back({axis.substr(0, dot), axis.substr(dot + 1), value});
+  }
+  request.name = request.variant.name;
+  for (const Setting& own : request.variant.changed_settings) {
+    const std::string name = own.unit + "." + own.parameter;
+    for (const StudyAxis& axis : job.study.axes) {
+      if (axis.name == name)
+        throw UserError("axis " + name + " changes nothing", "variant " + request.variant.name,
+                        "it sets " + name + " itself", "leave it out of the variant, or of the axes");
+    }
+  }
+  return request;
+}
+
+SweepResult run_sweep(const SweepJob& job) {
+  SweepResult result;
+  result.provenance = job.common.provenance;
+  result.study = job.study;
+  result.points.resize(job.study.points.size());
+  result.processes = job.common.processes;
+  check_views(job);
+  std::vector<RunRequest> requests;
+  for (const StudiedPoint& point : job.study.points) {
+    requests.push_back(request_of(job, point));
+    check_configuration(requests.back());
+  }
+  ProgressLine progress;
+  const auto start = SteadyClock::now();
+  const std::unique_ptr<Ranks> ranks = join_ranks();
+  if (ranks && job.shard)
+    throw UserError("cannot use option", "--shard", "mpirun shares the study already", "leave out this or mpirun");
+  if (ranks) result.processes = ranks->slots();
+  result.is_elsewhere = ranks && !ranks->is_first();
+  if (!result.is_elsewhere) {
+    result.journal = std::make_shared<Journal>(open_journal(job));
+    result.done_before = take_records(result.journal->records(), requests, result) + take_shards(job, requests, result);
+    if (result.done_before > 0)
+      fmt::print(stderr, "sweep: {} of {} points were done before\n", result.done_before, result.points.size());
+  }
+  if (ranks) {
+    simulate_as_rank(job, requests, *ranks, result, progress);
+  } else {
+    simulate(
+        job, requests, result, {}, progress, [&](std::size_t i) { return !job.shard || job.shard->has(i); },
+        [&](const json& record) { result.journal->append(record); });
+  }
+  result.seconds = std::chrono::duration<double>(SteadyClock::now() - start).count();
+  return result;
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vrpipe/platforms/simulation.h>
+
+#include "jobs/energy_table.h"
+#include "jobs/journal.h"
+#include "jobs/simulation_job.h"
+#include "jobs/study.h"
+
+namespace vrpipe::tools {
+
+/// The points I, I + N, I + 2 N, ... of a study, for batch systems.
+struct Shard {
+  std::size_t index = 1, count = 1;  ///< index from 1
+
+  bool has(std::size_t point) const { return point % count == index - 1; }
+};
+
+/// What a sweep is asked for.
+struct SweepJob {
+  SimulationJob common;  ///< what all points share; of `requests` there is one
+  Study study;
+  std::filesystem::path study_file;
+  std::optional<Shard> shard;
+  std::optional<std::filesystem::path> journal;  ///< none: one in the user's cache folder
+  std::optional<std::filesystem::path> csv, jsonl, html;
+
+  static constexpr const char* journal_option = "--journal";
+};
+
+/// What came of a point, without what the host made of it: the same however it was run.
+struct PointOutcome {
+  RunResult run;                    ///< without units, statistics, effects and draws
+  std::optional<Range> energy;      ///< mJ; none without time
+  std::uint64_t storage_bytes = 0;  ///< of TGC and QRU; 0 in variants without quad merging
+  double cpu_seconds = 0;           ///< of whoever ran it; in no result
+};
+
+struct SweepResult {
+  Provenance provenance;
+  Study study;
+  std::vector<std::optional<PointOutcome>> points;  ///< by point of the study; none of other shards
+  std::size_t done_before = 0;
+  unsigned processes = 1;
+  double seconds = 0;                ///< wall time of the simulations of this run
+  std::shared_ptr<Journal> journal;  ///< to be finished when the results are safe; null where `is_elsewhere`
+  bool is_elsewhere = false;         ///< another process, of those that mpirun started, has the results
+};
+
+/// A value of the axis `scene`, from where vrpipe runs: names of files are relative to the study's folder.
+std::string scene_of_axis(const SweepJob& job, const std::string& value);
+
+/// The request of a point. Throws UserError for what does not exist, and for a parameter that the point's variant sets
+/// itself: its axis would change nothing.
+RunRequest request_of(const SweepJob& job, const StudiedPoint& point);
+
+/// Simulates what is not done yet, in processes of their own; a record is in the journal as soon as a point is done. Takes
+/// in the records of all shards. Started by mpirun, the ranks of a machine are as many processes of its first, which sends
+/// what is done to the first of all. Warns on stderr of a study that will take more than an hour.
+/// Throws UserError, CommandFailure or a fault.
+SweepResult run_sweep(const SweepJob& job);
+
+}  // namespace vrpipe::tools

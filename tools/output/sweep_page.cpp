@@ -1,0 +1,124 @@
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+
+#include "image/base64.h"
+#include "output/page_style.h"
+#include "output/svg_bars.h"
+#include "output/svg_plot.h"
+#include "output/sweep_report.h"
+
+namespace vrpipe::tools {
+namespace {
+
+constexpr const char* bar_color = "#0072b2";
+constexpr const char* front_color = "#d1400f";
+constexpr const char* other_color = "#8a949e";
+constexpr std::size_t most_rows = 5000;
+
+std::string cell(const Json& value) {
+  if (value.is_null()) return {};
+  if (value.is_string()) return html_escaped(value.get<std::string>());
+  if (value.is_number_float()) return fmt::format("{:.5g}", value.get<double>());
+  return value.dump();
+}
+
+std::string effect_plot(const SweepFindings& findings, const AxisEffect& effect) {
+  const bool of_speedups = findings.effects.of_speedups;
+  BarPlot plot;
+  plot.description = "by " + findings.result.study.axes[effect.axis].name;
+  plot.title = of_speedups ? "speed-up; lines: least and most" : "milliseconds; lines: least and most";
+  if (of_speedups) plot.line = 1;
+  for (const AxisEffect::OfValue& value : effect.values) {
+    const std::string tip = fmt::format("{}: {:.3g} ({:.3g} to {:.3g}, {} points)", value.value, value.mean,
+                                        value.least, value.most, value.points);
+    plot.groups.push_back({value.value, {{0, value.mean, bar_color, tip}}, {value.least, value.most}});
+  }
+  return fmt::format("<h3>{}: {:.2f}x</h3>\n", html_escaped(findings.result.study.axes[effect.axis].name),
+                     effect.ratio) +
+         svg(plot);
+}
+
+std::string effects_section(const SweepFindings& findings) {
+  if (findings.effects.effects.empty()) return {};
+  std::string text = "<h2>What matters</h2>\n<p>The axis that moves ";
+  text += findings.effects.of_speedups ? "speed-ups" : "time";
+  text += " most comes first: the largest of its values' geometric means over the smallest, over all other axes.</p>\n";
+  for (const AxisEffect& effect : findings.effects.effects) text += effect_plot(findings, effect);
+  return text;
+}
+
+std::string pareto_section(const SweepFindings& findings) {
+  if (!findings.pareto) return {};
+  const ParetoTable& pareto = *findings.pareto;
+  const auto name = [](const std::string& column) { return column[0] == '-' ? column.substr(1) : column; };
+  Plot plot;
+  plot.description = "GPUs of the study";
+  plot.x.title = name(pareto.columns[0]);
+  plot.y.title = name(pareto.columns[1]);
+  std::string rows;
+  for (const ParetoRow& each : pareto.rows) {
+    std::string label;
+    for (const std::string& value : each.values) label += (label.empty() ? "" : ", ") + value;
+    plot.points.push_back({each.metrics[0], each.metrics[1], each.on_front ? front_color : other_color, Marker::circle,
+                           !each.on_front, each.on_front ? label : std::string(), label});
+    rows += each.on_front ? "<tr class=\"marked\">" : "<tr>";
+    for (const std::string& value : each.values) rows += "<td>" + html_escaped(value) + "</td>";
+    for (const double metric : each.metrics) rows += fmt::format("<td>{:.5g}</td>", metric);
+    rows += "</tr>\n";
+  }
+  plot.legend = {{"on the Pareto front", front_color, Marker::circle, false, false},
+                 {"another is better in all", other_color, Marker::circle, true, false}};
+  std::string heading;
+  for (const std::string& axis : pareto.axes) heading += "<th>" + html_escaped(axis) + "</th>";
+  for (const std::string& column : pareto.columns) heading += "<th>" + html_escaped(name(column)) + "</th>";
+  return "<h2>What is worth it</h2>\n<p>Each GPU over all that it draws (geometric means). Those on the Pareto front "
+         "are "
+         "marked: no other is better in one and no worse in the others.</p>\n" +
+         svg(plot) + "<div class=\"scroll\"><table>\n<tr>" + heading + "</tr>\n" + rows + "</table></div>\n";
+}
+
+std::string points_section(const SweepFindings& findings) {
+  const SweepTable& table = findings.table;
+  std::string text =
+      fmt::format("<h2>All points</h2>\n<p><a download=\"study.csv\" href=\"data:text/csv;base64,{}\">as CSV</a></p>\n",
+                  base64(sweep_csv(table)));
+  text += "<div class=\"scroll\"><table>\n<tr>";
+  for (const std::string& column : table.columns) text += "<th>" + html_escaped(column) + "</th>";
+  text += "</tr>\n";
+  for (std::size_t row = 0; row < std::min(table.rows.size(), most_rows); ++row) {
+    text += "<tr>";
+    for (const Json& value : table.rows[row]) text += "<td>" + cell(value) + "</td>";
+    text += "</tr>\n";
+  }
+  text += "</table></div>\n";
+  if (table.rows.size() > most_rows)
+    text += fmt::format("<p class=\"subtle\">and {} more in the CSV.</p>\n", table.rows.size() - most_rows);
+  return text;
+}
+
+}  // namespace
+
+std::string sweep_page(const SweepFindings& findings) {
+  const Study& study = findings.result.study;
+  std::string text = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
+  text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>vrpipe sweep</title>\n";
+  text += std::string("<style>") + page_style + "</style>\n</head>\n<body>\n<h1>A study</h1>\n";
+  text += fmt::format("<p class=\"verdict\">{} points", study.points.size());
+  if (study.seed) text += fmt::format(", a sample of {} (seed {})", study.product, *study.seed);
+  text += "</p>\n<ul>\n";
+  for (const StudyAxis& axis : study.axes) {
+    std::string values;
+    for (const std::string& value : axis.values) values += (values.empty() ? "" : ", ") + value;
+    text += "<li><b>" + html_escaped(axis.name) + "</b>: " + html_escaped(values) + "</li>\n";
+  }
+  text += "</ul>\n";
+  if (const std::string reference = reference_text(study); !reference.empty())
+    text += "<p class=\"subtle\">Speed-ups are over the point with " + html_escaped(reference) +
+            ", of the same scene, view and fidelity.</p>\n";
+  text += effects_section(findings) + pareto_section(findings) + points_section(findings);
+  return text + fmt::format("<p class=\"subtle\">vrpipe {}</p>\n</body>\n</html>\n", VRPIPE_VERSION);
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+
+#include "host/terminal.h"
+#include "jobs/sweep_analysis.h"
+#include "output/result_json.h"
+
+namespace vrpipe::tools {
+
+/// What a sweep found, ready to be told.
+struct SweepFindings {
+  const SweepResult& result;
+  SweepTable table;
+  AxisEffects effects;
+  std::optional<ParetoTable> pareto;
+};
+/// The result outlives it.
+SweepFindings sweep_findings(const SweepResult& result);
+
+/// For a person: what matters, the Pareto table, and the points if they are few.
+std::string sweep_text(const SweepFindings& findings, const TextStyle& style);
+/// RFC 4180, a row for each point.
+std::string sweep_csv(const SweepTable& table);
+/// A line of JSON for each point.
+std::string sweep_jsonl(const SweepTable& table);
+/// Schema vrpipe.sweep/1.
+Json sweep_json(const SweepFindings& findings);
+/// What speed-ups are over, in words; empty where there are none.
+std::string reference_text(const Study& study);
+/// A page that needs no network.
+std::string sweep_page(const SweepFindings& findings);
+
+}  // namespace vrpipe::tools
