@@ -3,6 +3,8 @@
 #include <optional>
 #include <utility>
 
+#include "crop/sector_pairs.h"
+
 #include <vrpipe/memory/line_returns.h>
 #include <vrpipe/model/timed_cache_port.h>
 #include <vrpipe/pipeline/barrier_plan.h>
@@ -13,7 +15,8 @@ namespace vrpipe {
 namespace {
 
 /// CROP at lt and at: as crop_unit.cpp, but a warp is taken in one piece: its quads look up the colour cache, and are
-/// blended once the sectors of all are there. Neighbouring sectors are filled in one access.
+/// blended once the sectors of all are there. Neighbouring sectors are filled in one access. Without forwarding, or where
+/// the cache is small, its quads go one by one.
 /// Ports: in_color (ShadedWarpItem), out_terminations (TerminationBeat), out_done (BlendsDone; optional), memory (TLM-2.0
 /// base protocol).
 class TimedCrop : public TimedUnit {
@@ -41,7 +44,8 @@ class TimedCrop : public TimedUnit {
         blending_(static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_))),
         price_(timing_.blend_rate.cycles * timing_.moves_in_a_cycle()),
         move_price_(timing_.blend_rate.items * timing_.parts_of_a_move()),
-        pairs_(timing_.pairs_in_sector && timing_.blend_rate.most_in_a_cycle() > 1),
+        in_pairs_(timing_.pairs_in_sector && timing_.blend_rate.most_in_a_cycle() > 1),
+        pairs_one_by_one_(in_pairs_ && at_once_ == 1),
         lines_(std::max(timing_.cache_bytes / timing_.line_bytes, 1U)),
         ready_(lines_.size()),
         unpaid_(lines_.size()) {
@@ -63,13 +67,13 @@ class TimedCrop : public TimedUnit {
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
     if (timing_.fetches_ahead || timing_.line_return_cycles > 0) {
       returns_.emplace(surface->address(0), surface->size_bytes(), timing_.line_bytes, timing_.line_return_cycles);
-      last_uses_.resize(returns_->lines());
       used_before_.resize(lines_.size());
     }
   }
 
   CycleInterval take(const ShadedWarp& warp, CycleInterval visible) {
     CycleInterval left = visible;
+    if (warp.mark != Mark::none) settle_unpaired();
     if (warp.mark == Mark::end_of_frame) {
       end_ = !any_blended_ ? visible.first : last_blend_ + timing_.latency_cycles;
     } else if (warp.mark != Mark::none) {
@@ -130,6 +134,23 @@ class TimedCrop : public TimedUnit {
     const Cycle hazard = timing_.forwards || !hazard_gate_.enter() || !context_.state(warp.draw[from]).blend
                              ? 0
                              : hazard_until(warp.tile, warp.position[from]);
+    const CycleInterval blended =
+        joins_last(from, std::max(there, hazard)) ? join_last() : blend_in_turn(warp, from, to, there, hazard);
+    charge(UnitState::memory, blended.first);
+    charge(UnitState::busy, blended.last + 1);
+    queue_.take(quads, blended.last);
+    last_blend_ = blended.last;
+    any_blended_ = true;
+    frame_lasts(blended.last + timing_.latency_cycles);
+    did(CropWork::blend, quads, blended.first, blended.last + 1);
+    if (!timing_.forwards) recent_.push({warp.tile, warp.position[from], blended.last});
+    blend(warp, from, to, blended);
+    return looked_up;
+  }
+
+  /// Takes the time of quads that can be blended from a cycle on, but for a hazard.
+  CycleInterval blend_in_turn(const ShadedWarp& warp, unsigned from, unsigned to, Cycle there, Cycle hazard) {
+    const unsigned quads = to - from;
     // Moving a sector takes time from blending, from when it moves.
     for (; !moves_.empty() && moves_.front().at <= std::max({there, hazard, blending_.next()}); moves_.pop()) {
       // Beside a blend of several cycles the cache is idle.
@@ -149,17 +170,27 @@ class TimedCrop : public TimedUnit {
     const unsigned price = price_of(warp, from, to);
     const CycleInterval blended = blending_.take(there, price);
     if (timing_.column_cycles > 0) idle_cache_ = price > quads * price_ ? price - quads * price_ : 0;
-    if (price > quads * price_) did(CropWork::unpaired, price - quads * price_, blended.first, blended.last + 1);
-    charge(UnitState::memory, blended.first);
-    charge(UnitState::busy, blended.last + 1);
-    queue_.take(quads, blended.last);
-    last_blend_ = blended.last;
-    any_blended_ = true;
-    frame_lasts(blended.last + timing_.latency_cycles);
-    did(CropWork::blend, quads, blended.first, blended.last + 1);
-    if (!timing_.forwards) recent_.push({warp.tile, warp.position[from], blended.last});
-    blend(warp, from, to, blended);
-    return looked_up;
+    settle_unpaired();
+    if (price > quads * price_) unpaired_ = {price - quads * price_, blended};
+    if (pairs_one_by_one_) pairs_.blended(place_of(from), blended.last);
+    return blended;
+  }
+  bool joins_last(unsigned index, Cycle there) const {
+    return pairs_one_by_one_ && pairs_.joins(place_of(index), there);
+  }
+  /// The quad costs nothing: the last one has paid for a cycle.
+  CycleInterval join_last() {
+    pairs_.join();
+    unpaired_.parts -= price_;
+    return {last_blend_, last_blend_};
+  }
+  SectorPairs::Place place_of(unsigned index) const {
+    return {cache_.lines[cache_.line_of[index]].address, cache_.sectors_of[index]};
+  }
+  /// Nothing goes with the last quads any more.
+  void settle_unpaired() {
+    if (unpaired_.parts > 0) did(CropWork::unpaired, unpaired_.parts, unpaired_.at.first, unpaired_.at.last + 1);
+    unpaired_.parts = 0;
   }
 
   void write_back(const CropBehaviour::LineAccess& access, Cycle looked_up) {
@@ -184,13 +215,13 @@ class TimedCrop : public TimedUnit {
   void come_back(const CropBehaviour::LineAccess& access) {
     // What replaces colours does not read them.
     ready_[access.line] = access.filled != 0 ? returns_->from(access.address) : 0;
-    used_before_[access.line] = last_uses_[returns_->index(access.address)];
+    used_before_[access.line] = returns_->last_use(access.address);
   }
 
   /// Of quads, in parts of a cycle. Where several go in one only if they share a sector, the others take one each.
   unsigned price_of(const ShadedWarp& warp, unsigned from, unsigned to) const {
     if (timing_.column_cycles > 0 && context_.state(warp.draw[from]).blend) return price_of_columns(warp, from, to);
-    if (!pairs_) return (to - from) * price_;
+    if (!in_pairs_) return (to - from) * price_;
     const auto cycle = static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_));
     const unsigned most = timing_.blend_rate.most_in_a_cycle();
     unsigned price = 0;
@@ -230,10 +261,7 @@ class TimedCrop : public TimedUnit {
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
       lines_[line] = at.last;
-      if (returns_) {
-        returns_->used(cache_.lines[i].address, at.last);
-        last_uses_[returns_->index(cache_.lines[i].address)] = at.last;
-      }
+      if (returns_) returns_->used(cache_.lines[i].address, at.last);
       if (dirty[i] == 0) continue;
       behaviour_->make_dirty(line, dirty[i]);
     }
@@ -287,18 +315,23 @@ class TimedCrop : public TimedUnit {
   std::unique_ptr<BlendOrderMonitor> monitor_;
   CropBehaviour::CacheLookUp cache_;
   ThroughputPort look_ups_;
-  SlotPool queue_;                      ///< quads between look-up and blending
-  ThroughputPort blending_;             ///< in parts of a cycle that both a quad and a sector are whole numbers of
-  const unsigned price_;                ///< of blending a quad, in these
-  const unsigned move_price_;           ///< of moving a sector, or a line
-  unsigned idle_cache_ = 0;             ///< parts of the last blend of several cycles, in which nothing moves
-  const bool pairs_;                    ///< several quads go in a cycle only if they share a sector
+  SlotPool queue_;               ///< quads between look-up and blending
+  ThroughputPort blending_;      ///< in parts of a cycle that both a quad and a sector are whole numbers of
+  const unsigned price_;         ///< of blending a quad, in these
+  const unsigned move_price_;    ///< of moving a sector, or a line
+  unsigned idle_cache_ = 0;      ///< parts of the last blend of several cycles, in which nothing moves
+  const bool in_pairs_;          ///< several quads go in a cycle only if they share a sector
+  const bool pairs_one_by_one_;  ///< and are blended one by one
+  SectorPairs pairs_;
+  struct {
+    unsigned parts = 0;
+    CycleInterval at;
+  } unpaired_;                          ///< of the last quads' price, beyond their rate
   Ring<Move> moves_;                    ///< of sectors or lines, that blending has not given its time to yet
   std::vector<Cycle> lines_;            ///< of the cache: the last blend of a quad that needed it
   std::vector<Cycle> ready_;            ///< of the cache: when one that came back can be used
   std::vector<char> unpaid_;            ///< of the cache: fetched, and nothing blended into it
   std::optional<LineReturns> returns_;  ///< where lines that come back wait
-  std::vector<Cycle> last_uses_;        ///< by line of the surface
   std::vector<Cycle> used_before_;      ///< by line of the cache: the last use of what it holds before it came back
   Ring<Recent> recent_;                 ///< blends in the pipeline, without forwarding
   Cycle last_blend_ = 0;

@@ -77,7 +77,6 @@ class LinesAhead {
     }
     return any;
   }
-  bool idle() const { return requests_.empty(); }
 
   /// What a quad whose turn it is to be blended still waits for.
   enum class Wait : std::uint8_t { none, memory, until };

@@ -80,17 +80,22 @@ std::uint32_t DepthStencilRop::test_depth_stencil(QuadBeat& beat) {
   return changed;
 }
 
+void DepthStencilRop::tell_terminated(const QuadBeat& beat) const {
+  const std::size_t tile = surface_->grid().place(beat.tile, 0);
+  for (unsigned i = 0; i < beat.count; ++i) {
+    const Quad& quad = beat.quads[i];
+    const auto lanes = static_cast<LaneMask>(quad.coverage & surface_->terminated(tile + quad.position));
+    if (lanes != 0) context_.fragments->happened(FragmentFate::terminated, beat.tile, quad.position, lanes);
+  }
+}
+
 void DepthStencilRop::test_termination(QuadBeat& beat, bool is_first) {
+  if (context_.fragments != nullptr) tell_terminated(beat);
   const std::size_t tile = surface_->grid().place(beat.tile, 0);
   take_out(
       beat,
       [&](const Quad& quad, unsigned) -> unsigned {
-        const unsigned terminated = quad.coverage & surface_->terminated(tile + quad.position);
-        if (terminated != 0 && context_.fragments != nullptr) {
-          const auto lanes = static_cast<LaneMask>(terminated);
-          context_.fragments->happened(FragmentFate::terminated, beat.tile, quad.position, lanes);
-        }
-        return terminated;
+        return quad.coverage & surface_->terminated(tile + quad.position);
       },
       [&](DrawIndex draw, unsigned in, unsigned out, unsigned fragments) {
         if (is_first) quads_tested.add(draw, in);

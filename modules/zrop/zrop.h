@@ -132,9 +132,10 @@ class DepthStencilRop : public ZropBehaviour {
 
  private:
   DepthStencilTest::Outcome test_quad(const Quad& quad, TileId tile);
-  /// Take failed samples and quads out of a beat.
+  /// Take failed samples and quads out of a beat. The termination test first tells who looks which it will take.
   std::uint32_t test_depth_stencil(QuadBeat& beat);
   void test_termination(QuadBeat& beat, bool is_first);
+  void tell_terminated(const QuadBeat& beat) const;
   /// Nothing shades them.
   void end_unshaded(QuadBeat& beat);
   void mark(const TerminationSignal& signal) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "zrop/block_price.h"
+#include "zrop/block_time.h"
 #include "zrop/hi_z_reports.h"
 #include "zrop/late_quads.h"
 #include "zrop/timed_z_cache.h"
@@ -50,6 +51,7 @@ class TimedZrop : public TimedUnit {
         z_cache_gate_(context, "zrop.z_cache"),
         blocks_(timing_.half_block_thousandths, timing_.block_thousandths, timing_.primitive_thousandths,
                 2 * std::uint64_t{context.frame->splats()}),
+        block_time_(timing_.quads_per_cycle),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
@@ -69,6 +71,7 @@ class TimedZrop : public TimedUnit {
     if (has_cache_) look_up_updates(never);
     while (!pending_.empty()) apply_update();
     make_way(never);
+    settle_blocks(never);
     TimedUnit::close_account(end);
   }
 
@@ -207,11 +210,20 @@ class TimedZrop : public TimedUnit {
   }
 
   [[gnu::noinline]] void pay_for_blocks(std::uint64_t price, unsigned quads, Cycle at) {
-    paid_until_ = std::max<std::uint64_t>(paid_until_, 1000 * at) + price;
-    tests_.hold(paid_until_ / 1000);
-    port_free_at_ = std::max<Cycle>(port_free_at_, (paid_until_ + 999) / 1000);
-    const std::uint64_t of_quads = std::uint64_t{1000} * quads / timing_.quads_per_cycle;
-    if (price > of_quads) did(ZropWork::blocks, price - of_quads, at, port_free_at_);
+    port_free_at_ = std::max(port_free_at_, block_port_.take(at, price));
+    tests_.hold(block_port_.free_from(0));
+    settle_blocks(at);
+    block_time_.pay(at, price);
+    block_time_.test(at, quads);
+  }
+  void settle_blocks(Cycle now) {
+    block_time_.settle(now, [this](std::uint64_t thousandths, Cycle from, Cycle until) {
+      did(ZropWork::blocks, thousandths, from, until);
+    });
+  }
+  [[gnu::noinline]] void take_cycle_of_blocks(Cycle at) {
+    settle_blocks(at);
+    block_time_.take_cycle(at);
   }
 
   void pass(Mark mark, Cycle at) {
@@ -272,6 +284,10 @@ class TimedZrop : public TimedUnit {
       const Cycle at = tests_.take(late_.front().at, quads);
       const Cycle until = at + (quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       did(ZropWork::late_tests, quads, at, until);
+      if (blocks_.is_on()) {
+        settle_blocks(at);
+        block_time_.test(at, quads);
+      }
       port_free_at_ = std::max(port_free_at_, until);
     }
   }
@@ -310,6 +326,7 @@ class TimedZrop : public TimedUnit {
       const Cycle at = tests_.take_cycle(moves_.front());
       port_free_at_ = at + 1;
       did(ZropWork::sectors, timing_.z_cache.sectors_per_cycle, at);
+      if (blocks_.is_on()) take_cycle_of_blocks(at);
     }
   }
 
@@ -318,6 +335,7 @@ class TimedZrop : public TimedUnit {
     const Cycle at = pending_.front().at;
     if (at >= port_free_at_) {
       did(ZropWork::updates, 1, at);
+      if (blocks_.is_on()) take_cycle_of_blocks(at);
       port_free_at_ = at + 1;
     }
     behaviour_->update(pending_.front().signal);
@@ -351,7 +369,8 @@ class TimedZrop : public TimedUnit {
   Ring<Pending> arrived_;                          ///< updates not looked up yet
   Ring<Cycle> moves_;                              ///< of a cycle's worth each, not moved yet
   BlockPrice blocks_;
-  std::uint64_t paid_until_ = 0;  ///< blocks of tests, in thousandths of a cycle
+  ThousandthsPort block_port_;  ///< where they have a price
+  BlockTime block_time_;
   HiZReports hi_z_;
 };
 

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "zrop/block_price.h"
+#include "zrop/block_time.h"
 #include "zrop/hi_z_reports.h"
 #include "zrop/late_quads.h"
 #include "zrop/z_port.h"
@@ -37,6 +38,7 @@ class ZropUnit : public Unit {
         limit_(timing_.quads_per_cycle),
         blocks_(timing_.half_block_thousandths, timing_.block_thousandths, timing_.primitive_thousandths,
                 2 * std::uint64_t{context.frame->splats()}),
+        block_time_(timing_.quads_per_cycle),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_hi_z_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
@@ -54,6 +56,10 @@ class ZropUnit : public Unit {
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &z_.socket(); }
   bool memory_is_optional() const override { return true; }
   MemoryBytes memory_bytes() const override { return z_.moved(); }
+  void close_account(Cycle end) override {
+    settle_blocks(never);
+    Unit::close_account(end);
+  }
 
  private:
   void before_end_of_elaboration() override {
@@ -84,7 +90,10 @@ class ZropUnit : public Unit {
   }
   bool count_updates(bool moved, Cycle now) {
     // Beside a beat that takes several cycles an update takes nothing of its own.
-    if (moved && now >= tested_until_) did(ZropWork::updates, 1, now);
+    if (moved && now >= tested_until_) {
+      did(ZropWork::updates, 1, now);
+      if (blocks_.is_on()) take_cycle_of_blocks(now);
+    }
     return moved;
   }
 
@@ -104,6 +113,7 @@ class ZropUnit : public Unit {
     if (z_.owed_sectors() < sectors || now < free_at_) return false;
     z_.pay_sectors(sectors);
     did(ZropWork::sectors, sectors, now);
+    if (blocks_.is_on()) take_cycle_of_blocks(now);
     return true;
   }
 
@@ -112,7 +122,7 @@ class ZropUnit : public Unit {
     while (!waits_ && (has_cache_ ? z_.beat_is_there() && !z_.holds_changed() : in_.ready()) && out_.credits() > 0) {
       const QuadBeat& next = has_cache_ ? z_.front() : in_.front();
       const unsigned width = std::max<unsigned>(next.count, 1);
-      if (!limit_.allows(width, now) || paid_until_ >= 1000 * (now + 1)) break;
+      if (!limit_.allows(width, now) || !block_port_.is_free(now)) break;
       QuadBeat beat = next;
       has_cache_ ? z_.pop(now) : in_.pop();
       tested_until_ = now + (width + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
@@ -140,15 +150,24 @@ class ZropUnit : public Unit {
       if (beat.count > 0 || beat.last_of_bin || beat.mark != Mark::none) out_.push(beat);
       limit_.take(width);
     }
-    if (moved) free_at_ = std::max<Cycle>(limit_.next(now), paid_until_ / 1000);
+    if (moved) free_at_ = block_port_.free_from(limit_.next(now));
     return moved;
   }
   [[gnu::noinline]] void pay_for_blocks(const QuadBeat& beat, Cycle now) {
     const std::uint64_t price = blocks_.of(beat.tile, beat.quads.data(), beat.count);
-    paid_until_ = std::max<std::uint64_t>(paid_until_, 1000 * now) + price;
-    tested_until_ = std::max<Cycle>(tested_until_, (paid_until_ + 999) / 1000);
-    const std::uint64_t of_quads = std::uint64_t{1000} * beat.count / timing_.quads_per_cycle;
-    if (price > of_quads) did(ZropWork::blocks, price - of_quads, now, tested_until_);
+    tested_until_ = std::max(tested_until_, block_port_.take(now, price));
+    settle_blocks(now);
+    block_time_.pay(now, price);
+    block_time_.test(now, beat.count);
+  }
+  void settle_blocks(Cycle now) {
+    block_time_.settle(now, [this](std::uint64_t thousandths, Cycle from, Cycle until) {
+      did(ZropWork::blocks, thousandths, from, until);
+    });
+  }
+  [[gnu::noinline]] void take_cycle_of_blocks(Cycle now) {
+    settle_blocks(now);
+    block_time_.take_cycle(now);
   }
 
   bool test_all(Cycle now) {
@@ -181,6 +200,10 @@ class ZropUnit : public Unit {
     const QuadBeat before = quads_of(warp);
     const std::uint32_t changed = behaviour_->test_late(warp);
     did(ZropWork::late_tests, before.count, now, tested_until_);
+    if (blocks_.is_on()) {
+      settle_blocks(now);
+      block_time_.test(now, before.count);
+    }
     if (has_cache_ && changed != 0) z_.change(before, changed);
     if (changed != 0 && hi_z_.wanted(before.quads[0].draw)) tell_later(before, changed);
     if (warp.count < before.count) frame_lasts(now + timing_.latency_cycles);
@@ -268,10 +291,11 @@ class ZropUnit : public Unit {
   unsigned signal_ = 0;
   BatchLimit limit_;
   BlockPrice blocks_;
-  std::uint64_t paid_until_ = 0;  ///< blocks of tests, in thousandths of a cycle
-  Cycle tested_until_ = 0;        ///< the last beat, rounded up to whole cycles
-  Cycle free_at_ = 0;             ///< after a beat wider than the unit
-  bool waits_ = false;            ///< for a mark to come around
+  ThousandthsPort block_port_;  ///< where they have a price
+  BlockTime block_time_;
+  Cycle tested_until_ = 0;  ///< the last beat, rounded up to whole cycles
+  Cycle free_at_ = 0;       ///< after a beat wider than the unit
+  bool waits_ = false;      ///< for a mark to come around
   HiZReports hi_z_;
   Ring<HiZUpdate> told_;  ///< and not sent yet
   ZCacheStatistics cache_statistics_{*this, "cache"};

@@ -59,6 +59,16 @@ class UntimedZrop : public UntimedUnit {
     }
     behaviour_->update(signal);
   }
+  /// As few thousandths beyond what quads take as any order in time of the beats can do with: those behind a block share no
+  /// more of its time than its last cycle.
+  [[gnu::noinline]] void count_blocks() {
+    const std::uint64_t price = blocks_.of(beat_.tile, beat_.quads.data(), beat_.count);
+    const std::uint64_t of_quads = (std::uint64_t{1000} * beat_.count + quads_per_cycle_ - 1) / quads_per_cycle_;
+    unshared_ += static_cast<std::int64_t>(price) - static_cast<std::int64_t>(of_quads);
+    if (unshared_ <= 0) return;
+    did(ZropWork::blocks, static_cast<std::uint64_t>(unshared_));
+    unshared_ = 0;
+  }
   void test(const BinItem& incoming) {
     if (incoming.mark != Mark::none) {
       behaviour_->pass(incoming.mark);
@@ -82,11 +92,7 @@ class UntimedZrop : public UntimedUnit {
         lines().find(beat_.tile, beat_.quads.data(), beat_.count, needed_);
         did(ZropWork::sectors, look_up(beat_.count));
       }
-      if (blocks_.is_on()) {
-        const std::uint64_t price = blocks_.of(beat_.tile, beat_.quads.data(), beat_.count);
-        const std::uint64_t of_quads = std::uint64_t{1000} * beat_.count / quads_per_cycle_;
-        did(ZropWork::blocks, price > of_quads ? price - of_quads : 0);
-      }
+      if (blocks_.is_on()) count_blocks();
       QuadBeat before;
       const bool may_change = follows_cache() && state.tests_early() && state.writes_depth_stencil();
       const bool hi_z = hi_z_.wanted(beat_.quads[0].draw);
@@ -197,6 +203,8 @@ class UntimedZrop : public UntimedUnit {
   QuadBeat beat_;
   const unsigned quads_per_cycle_;
   BlockPrice blocks_;
+  std::int64_t unshared_ =
+      -1000;  ///< what blocks cost beyond quads, but for their last cycle: thousandths, not counted yet
   std::vector<bool> filled_lines_;  ///< of the surface, where lines have a price
   HiZReports hi_z_;
 };

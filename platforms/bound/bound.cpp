@@ -109,7 +109,7 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
     return l2_bytes_per_cycle_ == 0 ? 0.0 : ratio(bytes, l2_bytes_per_cycle_);
   };
   cycles[test] = std::max({ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(done.z_blocks, 1000) +
-                               update_cycles(done) + ratio(done.z_sectors, zrop_.z_cache.sectors_per_cycle),
+                               update_cycles(done) + sector_cycles(done),
                            ratio(done.z_lines, 1000), ratio(done.quads_rasterized, prop_.quads_per_cycle),
                            from_l2(done.z_sectors * zrop_.z_cache.organization.sector_bytes)});
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
@@ -146,6 +146,11 @@ double PhaseBound::update_cycles(const Work& done) const {
     return updates;
   // Beside a beat that takes several cycles updates take nothing of their own.
   return std::max(0.0, updates - ratio(done.quads_tested, zrop_.quads_per_cycle) - ratio(done.z_blocks, 1000));
+}
+
+double PhaseBound::sector_cycles(const Work& done) const {
+  // A cycle in which sectors move may be the last that a block takes part of.
+  return std::max(0.0, ratio(done.z_sectors, zrop_.z_cache.sectors_per_cycle) - ratio(done.z_blocks, 1000));
 }
 
 /// Nobody waits for what the last warp's hand-over takes.
@@ -249,8 +254,9 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
                    count(done.color_quads), 0.0, count(done.late_quads)});
   }
   if (slot == "zrop") {
-    return priced(ZropWork::kinds(zrop_), {count(done.quads_tested), update_cycles(done), count(done.z_sectors),
-                                           count(done.late_quads), count(done.z_blocks), count(done.z_lines)});
+    return priced(ZropWork::kinds(zrop_),
+                  {count(done.quads_tested), update_cycles(done), sector_cycles(done) * zrop_.z_cache.sectors_per_cycle,
+                   count(done.late_quads), count(done.z_blocks), count(done.z_lines)});
   }
   if (slot == "qru") {
     const double quads = count(done.survivors) - count(done.warps) * qru_.items_per_cycle;

@@ -105,6 +105,7 @@ class PhaseBound {
   std::array<double, stages> end_of(const Work& done, bool to_last) const;
   double instructions(const Work& done) const;
   double update_cycles(const Work& done) const;
+  double sector_cycles(const Work& done) const;
   std::uint64_t launches_to_last(const Work& done) const;
   std::uint64_t longest_launch() const;
   /// That take time from blending: sectors, or lines where these have a price.

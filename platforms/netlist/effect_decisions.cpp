@@ -160,21 +160,21 @@ void Configuration::decide_effects() {
 }
 
 namespace {
-const EffectRegistrar details{{"cache",
-                               "details",
-                               "",
-                               EffectKind::timing,
-                               "causes of misses, and distributions of fills, in the statistics of all sectored caches",
-                               "nobody reads them (no --json, --html, --trace), and no `bound` follows from them",
-                               "which sectors ever were in each cache, and when each on its way was asked for",
-                               "at elaboration, where statistics are read",
-                               {},
-                               [](const EffectQuestion& asked) {
-                                 if (asked.reads_statistics) return EffectDecision::keep("statistics are read");
-                                 if (asked.counts_work && !asked.has_time)
-                                   return EffectDecision::keep("the bound follows from first fills");
-                                 return EffectDecision::omit("nobody reads statistics");
-                               }}};
+const EffectRegistrar details{
+    {"cache",
+     "details",
+     "",
+     EffectKind::timing,
+     "causes of misses, and distributions of fills, in the statistics of all sectored caches",
+     "nobody reads them (no --json, --html, --interval, --trace), and no `bound` follows from them",
+     "which sectors ever were in each cache, and when each on its way was asked for",
+     "at elaboration, where statistics are read",
+     {},
+     [](const EffectQuestion& asked) {
+       if (asked.reads_statistics) return EffectDecision::keep("statistics are read");
+       if (asked.counts_work && !asked.has_time) return EffectDecision::keep("the bound follows from first fills");
+       return EffectDecision::omit("nobody reads statistics");
+     }}};
 }  // namespace
 
 /// Takes out of the netlist what all effects that elaborate it have omitted. What is looked at from outside stays.

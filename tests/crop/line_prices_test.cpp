@@ -179,6 +179,69 @@ TEST_P(CropPrices, QuadsOfRgba8GoInPairsOnlyWithTheirNeighbourInTheSector) {
   EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, any, {0, 2, 4, 6, 8, 10, 12, 14}), 0.5, 0.01);
 }
 
+/// Quads that each have to wait for the one before them in their place.
+Bench::Settings pairs_without_forwarding(const Bench::Settings& more = {}) {
+  Bench::Settings settings{{"bytes_per_cycle", "32"},
+                           {"pairs_in_sector", "on"},
+                           {"forwarding", "off"},
+                           {"latency_cycles", "9"}};
+  settings.insert(settings.end(), more.begin(), more.end());
+  return settings;
+}
+
+TEST_P(CropPrices, QuadsOfRgba8GoInPairsWithoutForwardingToo) {
+  context.format = ColorFormat::rgba8;
+  std::vector<unsigned> whole_tile;
+  std::vector<unsigned> every_second;
+  for (unsigned position = 0; position < positions_per_tile; ++position) {
+    whole_tile.push_back(position);
+    if (position % 2 == 0) every_second.push_back(position);
+  }
+  const Bench::Settings settings = pairs_without_forwarding();
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, settings, whole_tile), 0.5, 0.01);
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, settings, every_second), 1, 0.01);
+}
+
+TEST_P(CropPrices, QuadsInPairsWaitForTheHazardsOfEach) {
+  context.format = ColorFormat::rgba8;
+  const Bench::Settings settings = pairs_without_forwarding();
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, settings, {0, 1}), 9.0 / 2, 0.01) << "together, in turn";
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, settings, {0}), 9, 0.01) << "never with itself";
+  // The second in place 1 waits nine cycles for the first, and that in place 0 goes with it.
+  EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, settings, {0, 1, 1}), 9.0 * 2 / 3, 0.01);
+}
+
+TEST_P(CropPrices, QuadsInPairsPayForTheirLinesOnce) {
+  context.format = ColorFormat::rgba8;
+  for (const char* forwarding : {"on", "off"}) {
+    EXPECT_NEAR(cycles_of_a_tile(GetParam(), context,
+                                 partition(
+                                     {{"fetch_ahead", "on"}, {"pairs_in_sector", "on"}, {"forwarding", forwarding}}),
+                                 0.5F),
+                32 + 4 + 4, 0.5)
+        << forwarding;
+  }
+}
+
+TEST_P(CropPrices, PartsOfTheOccupancySayWhatWasNotPaired) {
+  context.format = ColorFormat::rgba8;
+  for (const char* forwarding : {"on", "off"}) {
+    for (const unsigned step : {1U, 2U}) {
+      CropBench crop(GetParam(), context,
+                     {{"bytes_per_cycle", "32"}, {"pairs_in_sector", "on"}, {"forwarding", forwarding}});
+      for (unsigned round = 0; round < 10; ++round) {
+        for (unsigned position = 0; position < positions_per_tile; position += step) crop.quad({0, 0}, position, 0.01F);
+        crop.flush();
+      }
+      crop.run();
+      const double quads = 640.0 / step;
+      EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::blend), quads / 2) << forwarding << step;
+      EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::unpaired), step == 1 ? 0 : quads / 2)
+          << forwarding << step;
+    }
+  }
+}
+
 TEST_P(CropPrices, QuadsOfRgba32fTakeTheirColumns) {
   context.format = ColorFormat::rgba32f;
   const Bench::Settings columns{{"bytes_per_cycle", "32"}, {"rgba32f_column_cycles", "4"}};

@@ -70,6 +70,41 @@ rc::Gen<Setting> setting() {
   });
 }
 
+TEST(Bound, LetsQuadsShareTheLastCycleOfABlock) {
+  // Splats that stencil kills, over each other. Of a block's bins the first pays, the others come in what that leaves.
+  std::vector<Splat> splats;
+  for (unsigned y = 0; y + 16 <= 256; y += 8) {
+    for (unsigned x = 0; x + 16 <= 256; x += 8) {
+      const auto left = static_cast<float>(x);
+      const auto top = static_cast<float>(y);
+      splats.push_back(flat_box(left, top, left + 16, top + 16, 0.5F));
+    }
+  }
+  RunRequest r = request(variant_named("baseline"), ColorFormat::rgba8, Fidelity::bound);
+  r.platform = &platform_named("gh100-gpc");
+  r.settings = {{"tc", "bin_quads", "4"},
+                {"zrop", "block_cycles", "1.9"},
+                {"zrop", "primitive_cycles", "0"},
+                {"zrop", "line_cycles", "0.1"},
+                {"zrop", "line_return_cycles", "0"}};
+  Frame frame(256, 256);
+  DrawState state = draw_state_of(r);
+  state.stencil.test = true;
+  state.stencil.front.compare = state.stencil.back.compare = Compare::none;
+  frame.draw(geometry_of(256, 256, splats), state);
+  const auto cycles = [&](Fidelity fidelity) {
+    r.fidelity = fidelity;
+    fresh_simulation();
+    return *simulate(r, frame).cycles;
+  };
+  const Cycle bound = cycles(Fidelity::bound);
+  for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt, Fidelity::at}) {
+    const Cycle timed = cycles(fidelity);
+    EXPECT_LE(bound, timed) << name_of(fidelity);
+    EXPECT_GE(bound, 0.9 * static_cast<double>(timed)) << name_of(fidelity);
+  }
+}
+
 RC_GTEST_PROP(Bound, IsNeverAboveTheFidelitiesWithLinks, ()) {
   const Draw draw = *scene(60, 1.0F);
   RunRequest r = request(*rc::gen::elementOf(variants()), *format(), Fidelity::bound);

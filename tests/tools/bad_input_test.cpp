@@ -203,25 +203,10 @@ TEST_F(BadInput, Effects) {
     refused_with_outputs({command, "--effects", "all", "--explain-effects"}, {"nothing to explain", "--effects all"});
     refused_with_outputs({command, "--explain-effects=2"}, {"unexpected value (--explain-effects)", "it is a switch"});
   }
-  refused({"run", "--explain-effects", "--trace", "trace.csv"}, {"--explain-effects", "--trace"});
+  refused({"run", "--explain-effects", "--trace", "trace.json"}, {"--explain-effects", "--trace"});
   refused({"accuracy", "--explain-effects"}, {"'--explain-effects'", "it is an option of `vrpipe run`"});
   refused({"units", "--slot", "clok"}, {"'clok'", "did you mean clock?"});
   refused({"units", "--effects=all"}, {"unexpected value (--effects)", "it is a switch"});
-}
-
-TEST_F(BadInput, Traces) {
-  refused_with_outputs({"run", "--trace", "t.csv", "--trace-every", "0"}, {"'0'", "--trace-every", "from 1"});
-  refused_with_outputs({"run", "--trace", "t.csv", "--trace-every", "1k"}, {"'1k'", "--trace-every"});
-  refused_with_outputs({"run", "--trace", "t.csv", "--trace-statistics", "crop.quads_blendet"},
-                       {"'crop.quads_blendet'", "did you mean crop.quads_blended?"});
-  refused_with_outputs({"run", "--trace", "t.csv", "--trace-statistics", "sm.fragment_warps,"},
-                       {"--trace-statistics", "missing"});
-  refused_with_outputs({"run", "--trace", "t.csv", "--fidelity", "functional"}, {"functional", "use lt, at or cycle"});
-  refused_with_outputs({"run", "--trace", "t.csv", "--fidelity", "bound"}, {"bound", "use lt, at or cycle"});
-  refused_with_outputs({"run", "--trace-every", "100"}, {"--trace-every", "add --trace FILE.csv"});
-  refused_with_outputs({"run", "--trace-statistics", "sm.fragment_warps"},
-                       {"--trace-statistics", "add --trace FILE.csv"});
-  refused({"compare", "--trace", "t.csv"}, {"'--trace'", "`vrpipe run`"});
 }
 
 TEST_F(BadInput, Plugins) {
@@ -243,7 +228,7 @@ TEST_F(BadInput, Outputs) {
   refused({"run", "--scene", "tiny.spl", "--json", "nowhere/r.json"}, {"--json nowhere/r.json", "no folder nowhere"});
   refused({"run", "--scene", "tiny.spl", "--json", "folder.ply"}, {"--json folder.ply", "folder"});
   refused({"run", "--scene", "tiny.spl", "--save-draw", "nowhere/d.spl"}, {"--save-draw nowhere/d.spl", "no folder"});
-  refused({"run", "--scene", "tiny.spl", "--trace", "nowhere/t.csv"}, {"--trace nowhere/t.csv", "no folder nowhere"});
+  refused({"run", "--scene", "tiny.spl", "--trace", "nowhere/t.json"}, {"--trace nowhere/t.json", "no folder nowhere"});
   refused({"scenes", "--json", "nowhere/s.json"}, {"nowhere"});
 }
 

@@ -49,7 +49,11 @@ TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
     EXPECT_EQ(help.out.find("--explain-effects") != std::string::npos, std::string(command) != "accuracy");
   }
   expect_in(vrpipe({"compare", "--help"}).out, {"--views N|all", "--journal FILE"});
-  expect_in(vrpipe({"run", "--help"}).out, {"--trace FILE.csv", "--trace-every CYCLES", "--trace-statistics NAME,..."});
+  for (const char* command : {"run", "compare"}) {
+    expect_in(vrpipe({command, "--help"}).out,
+              {"--interval CYCLES", "--interval-csv FILE.csv", "--interval-statistics NAME,...", "--heat-maps"});
+  }
+  expect_in(vrpipe({"run", "--help"}).out, {"--trace FILE[@FROM:TO]", "--log UNIT[@FROM:TO]", "--log-file FILE"});
   expect_in(vrpipe({"accuracy", "--help"}).out, {"--quick", "--repeat", "--html", "--markdown"});
   expect_in(vrpipe({"units", "--help"}).out, {"--slot", "--platform", "--plugin", "--effects", "--json", "--markdown"});
   expect_in(vrpipe({"platforms", "--help"}).out, {"--plugin", "--json"});

@@ -68,6 +68,12 @@ RunResult full_result() {
   result.effects = {{"crop.blend_hazard", true, EffectProof::verified, "\xe9"},
                     {"tc.time_out", false, EffectProof::bounded, "after 150 cycles"}};
   result.draws = {{"first", {{"quads_blended", 7}}}, {"", {}}};
+  IntervalReport& intervals = result.intervals.emplace();
+  intervals.every = huge - 3;
+  intervals.from = {0, huge - 3};
+  intervals.units = {{"gpc0.crop", {}}};
+  intervals.units.front().cycles[1] = {huge, 21};
+  intervals.statistics = {{"crop.hits", "ratio", {22, std::nullopt}, {23, huge}}, {}};
   return result;
 }
 
@@ -112,11 +118,33 @@ void expect_equal_statistics(const StatisticReport& actual, const StatisticRepor
   }
 }
 
+void expect_equal_intervals(const IntervalReport& actual, const IntervalReport& expected) {
+  const auto& [every, from, units, statistics] = actual;
+  EXPECT_EQ(every, expected.every);
+  EXPECT_EQ(from, expected.from);
+  ASSERT_EQ(units.size(), expected.units.size());
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const auto& [name, cycles] = units[i];
+    EXPECT_EQ(name, expected.units[i].name);
+    EXPECT_EQ(cycles, expected.units[i].cycles);
+  }
+  ASSERT_EQ(statistics.size(), expected.statistics.size());
+  for (std::size_t i = 0; i < statistics.size(); ++i) {
+    const auto& [name, kind, values, denominators] = statistics[i];
+    EXPECT_EQ(name, expected.statistics[i].name);
+    EXPECT_EQ(kind, expected.statistics[i].kind);
+    EXPECT_EQ(values, expected.statistics[i].values);
+    EXPECT_EQ(denominators, expected.statistics[i].denominators);
+  }
+}
+
 /// All but the request and the surfaces. A new member has to be named here, and compared.
 void expect_equal(const RunResult& actual, const RunResult& expected) {
   const auto& [request, cycles, milliseconds, host_seconds, cpu_seconds, counts, utilization, units, bottleneck,
                statistics, implementations, parameters, outside_validated_range, effects, result_hash, kernel_events,
-               framebuffer, draws] = actual;
+               framebuffer, draws, intervals] = actual;
+  ASSERT_EQ(intervals.has_value(), expected.intervals.has_value());
+  if (intervals) expect_equal_intervals(*intervals, *expected.intervals);
   EXPECT_EQ(framebuffer.addresses.attributes.address, expected.framebuffer.addresses.attributes.address);
   EXPECT_EQ(framebuffer.addresses.attributes.bytes, expected.framebuffer.addresses.attributes.bytes);
   ASSERT_EQ(draws.size(), expected.draws.size());

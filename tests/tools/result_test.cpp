@@ -413,6 +413,7 @@ TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
          json_of({"run", "--frame", "frame.json"}),
          json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--explain-effects"}),
          json_of({"compare", "--scene", "tiny.spl", "--platform", "desktop", "--energy"}),
+         json_of({"run", "--scene", "tiny.spl", "--interval", "100"}),
          json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--energy"})});
   check("Of `accuracy`", {of_scene({"accuracy", "--quick"}), json_of({"accuracy", "--quick", "--scene", "tiny.spl"})});
 }

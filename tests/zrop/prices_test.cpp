@@ -1,12 +1,14 @@
 // What ZROP was measured to take on a real GPU beyond its rate: blocks that quads touch, lines that move, lines that come
 // back.
 #include <functional>
+#include <map>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "support/fidelities.h"
 #include "zrop/block_price.h"
+#include "zrop/block_time.h"
 #include "zrop/zrop.h"
 
 namespace vrpipe {
@@ -72,6 +74,64 @@ TEST(BlockPrice, OfAPrimitiveIsPaidOnceWhereverItsQuadsAre) {
   EXPECT_EQ(price.of({1, 0}, first, 2), 2U * 1400) << "in another screen tile";
 }
 
+/// What was said, by cycle.
+class Said {
+ public:
+  void settle(BlockTime& time, Cycle now) {
+    time.settle(now, [this](std::uint64_t thousandths, Cycle from, Cycle until) {
+      ASSERT_LT(from, until);
+      for (Cycle cycle = from; cycle < until; ++cycle) of_cycle[cycle] += thousandths / (until - from);
+    });
+  }
+  std::map<Cycle, std::uint64_t> of_cycle;
+};
+
+TEST(BlockTime, IsWhatQuadsLeave) {
+  BlockTime time(8);
+  Said said;
+  time.pay(0, 3400);
+  time.test(0, 4);
+  said.settle(time, 0);
+  EXPECT_TRUE(said.of_cycle.empty()) << "others may come in this cycle";
+  said.settle(time, 3);
+  EXPECT_EQ(said.of_cycle, (std::map<Cycle, std::uint64_t>{{0, 500}, {1, 1000}, {2, 1000}}));
+  // In the last cycle 400 of the block are left, beside which quads are tested.
+  time.pay(3, 0);
+  time.test(3, 2);
+  said.settle(time, never);
+  EXPECT_EQ(said.of_cycle[3], 150U);
+  said.settle(time, never);
+  EXPECT_EQ(said.of_cycle[3], 150U) << "once";
+}
+
+TEST(BlockTime, IsNotThatOfAWholeCycleThatGoesToOthers) {
+  BlockTime time(8);
+  Said said;
+  time.pay(0, 1400);
+  time.test(0, 1);
+  said.settle(time, 1);
+  time.take_cycle(1);
+  said.settle(time, 7);
+  time.pay(7, 2000);
+  time.test(7, 16);
+  said.settle(time, never);
+  EXPECT_EQ(said.of_cycle, (std::map<Cycle, std::uint64_t>{{0, 875}}));
+}
+
+TEST(BlockTime, IsWholeThousandthsOfRatesThatAreNone) {
+  BlockTime time(3);
+  Said said;
+  for (Cycle cycle = 0; cycle < 300; ++cycle) {
+    said.settle(time, cycle);
+    time.pay(cycle, 1000);
+    time.test(cycle, 1);
+  }
+  said.settle(time, never);
+  std::uint64_t sum = 0;
+  for (const auto& [cycle, thousandths] : said.of_cycle) sum += thousandths;
+  EXPECT_EQ(sum, 200'000U);
+}
+
 /// ZROP at any fidelity with time, in front of a memory or not; bins of up to a beat.
 class ZropPrices : public ::testing::TestWithParam<Fidelity> {
  protected:
@@ -105,6 +165,7 @@ class ZropPrices : public ::testing::TestWithParam<Fidelity> {
       }
       bench.run();
       last = out.records().back().cycle;
+      close(bench, last);
       reads = behind_reads(bench);
     } else {
       Source<BinItem>& in = bench.source<BinItem>("in_quads", 32);
@@ -112,9 +173,15 @@ class ZropPrices : public ::testing::TestWithParam<Fidelity> {
       for (const Bin& bin : all) in.add(bins.of(bin.tile, bin.quads));
       bench.run();
       last = out.records().back().last;
+      close(bench, last);
       reads = behind_reads(bench);
     }
     return last;
+  }
+  void close(Bench& bench, Cycle end) {
+    bench.unit().close_account(end);
+    tests = testing::occupied(bench.unit(), ZropWork::tests, end);
+    block_cycles = testing::occupied(bench.unit(), ZropWork::blocks, end);
   }
   static std::uint64_t behind_reads(Bench& bench) { return bench.unit().memory_bytes().read / 32; }
   /// Of each of so many bins more.
@@ -130,6 +197,8 @@ class ZropPrices : public ::testing::TestWithParam<Fidelity> {
   Draw draw;
   RenderContext context;
   std::uint64_t reads = 0;  ///< sectors, of the last run
+  double tests = 0;         ///< cycles of its own, of the same
+  double block_cycles = 0;
 };
 
 INSTANTIATE_TEST_SUITE_P(Fidelities, ZropPrices, ::testing::ValuesIn(testing::fidelities_with_time()),
@@ -157,6 +226,31 @@ TEST_P(ZropPrices, RectanglesTakeWhatTheyDoOnTheGpu) {
   EXPECT_NEAR(cycles_of_a_bin(small, settings), 4.17, 0.1);
   const auto block_of_tile = [](unsigned i) { return Bin{{0, 0}, block_quads(i % 2 * 4 + i / 2 % 2 * 32, 4, i / 4)}; };
   EXPECT_NEAR(4 * cycles_of_a_bin(block_of_tile, settings), 10.67, 0.1);
+}
+
+TEST_P(ZropPrices, BlocksTakeNoMoreThanTheTimeThatQuadsLeave) {
+  // A quad pays for its block, and shares the time of that with the rest of the block's half, which costs nothing more.
+  std::vector<Bin> bins;
+  for (unsigned i = 0; i < 500; ++i) {
+    std::vector<Quad> half = block_quads(i % 2 * 4, 2, i);
+    bins.push_back({{0, 0}, {half.back()}});
+    half.pop_back();
+    bins.push_back({{0, 0}, half});
+  }
+  const auto cycles = static_cast<double>(run(bins, blocks));
+  EXPECT_NEAR(cycles, 500 * 1.4, 8);
+  EXPECT_NEAR(tests, 500, 2) << "eight quads each";
+  EXPECT_NEAR(block_cycles, 500 * 0.4, 8);
+  EXPECT_LE(tests + block_cycles, cycles);
+}
+
+TEST_P(ZropPrices, BlocksTakeWhatTheyAreMeasuredTo) {
+  std::vector<Bin> bins;
+  for (unsigned i = 0; i < 500; ++i) bins.push_back({{0, 0}, {quad_at(i % 64, i)}});
+  const auto cycles = static_cast<double>(run(bins, blocks));
+  EXPECT_NEAR(tests, 500 / 8.0, 1);
+  EXPECT_NEAR(tests + block_cycles, 700, 2);
+  EXPECT_LE(tests + block_cycles, cycles);
 }
 
 const Bench::Settings small_cache{{"cache_bytes", "8192"},

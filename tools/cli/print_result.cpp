@@ -1,5 +1,6 @@
 #include "cli/print_result.h"
 
+#include <filesystem>
 #include <iostream>
 #include <string>
 
@@ -57,8 +58,16 @@ void print_result(const SimulationJob& job, const JobResult& result) {
   }
   const bool has_text = print(
       job, [&] { return result_json(result); }, [&](const TextStyle& style) { return report(result, style); });
-  if (has_text && job.html) std::cout << "page: " << printable(job.html->string()) << '\n';
-  if (has_text && job.save_draw) std::cout << "draw: " << printable(job.save_draw->string()) << '\n';
+  if (!has_text) return;
+  const auto tell = [](const char* what, const std::filesystem::path& where) {
+    std::cout << what << ": " << printable(where.string()) << '\n';
+  };
+  if (job.html) tell("page", *job.html);
+  if (job.save_draw) tell("draw", *job.save_draw);
+  if (job.interval_csv) tell("intervals", *job.interval_csv);
+  if (job.trace) tell("trace", job.trace->path());
+  if (job.log && job.log->file()) tell("log", *job.log->file());
+  if (job.heat_maps) tell("heat maps", *job.output);
 }
 
 void print_result(const SimulationJob& job, const ViewsResult& result) {

@@ -1,3 +1,5 @@
+#include <cstdio>
+#include <cstdlib>
 #include <iostream>
 
 #include <fmt/format.h>
@@ -13,6 +15,7 @@
 #include "cli/parse.h"
 #include "host/output_file.h"
 #include "host/terminal.h"
+#include "jobs/sweep_analysis.h"
 #include "jobs/sweep_job.h"
 #include "output/json_text.h"
 #include "output/sweep_report.h"
@@ -22,6 +25,20 @@ namespace {
 
 constexpr const char* result_group = "Where results go";
 constexpr unsigned most_shards = 1'000'000;
+
+/// Of several processes that mpirun started, one says what there is to say.
+bool is_later_rank() {
+  for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMI_RANK"}) {
+    const char* const rank = std::getenv(name);
+    if (rank != nullptr && std::strtol(rank, nullptr, 10) > 0) return true;
+  }
+  return false;
+}
+void silence() {
+  for (std::FILE* stream : {stdout, stderr}) {
+    if (std::freopen("/dev/null", "w", stream) == nullptr) continue;
+  }
+}
 
 /// "I/N", I from 1 to N.
 Shard parse_shard(const std::string& text) {
@@ -69,7 +86,7 @@ class SweepCommand : public Command {
     app.footer(
         "Simulates every point of a study, prints which axes matter and which GPUs are worth it, and writes the\n"
         "points. Killed at any moment, the same command goes on where it was and ends with the same bytes. Several\n"
-        "machines share a study by --shard.\n"
+        "machines share a study by MPI (mpirun -n N vrpipe sweep ...: N processes in all) or by --shard.\n"
         "\n"
         "Examples:\n"
         "  vrpipe sweep study.toml --csv study.csv --html study.html\n"
@@ -85,8 +102,10 @@ class SweepCommand : public Command {
   }
 
   void run() override {
+    if (is_later_rank()) silence();
     const SweepJob job = resolve();
     const SweepResult result = run_sweep(job);
+    if (result.is_elsewhere) return;
     if (job.shard) return tell_shard(job, result);
     const SweepFindings findings = sweep_findings(result);
     if (job.csv) write_output_file(*job.csv, sweep_csv(findings.table), "--csv");
@@ -98,7 +117,7 @@ class SweepCommand : public Command {
       std::cout << json_text(sweep_json(findings));
     } else {
       std::cout << sweep_text(findings, stdout_style());
-      std::cout << fmt::format("took {:.1f} s to simulate {} points, {} at a time", result.seconds,
+      std::cout << fmt::format("took {:.1f} s to simulate {} of the points, {} at a time", result.seconds,
                                result.points.size() - result.done_before, result.processes);
       if (result.done_before > 0) std::cout << fmt::format("; {} were done before", result.done_before);
       std::cout << '\n';
@@ -118,6 +137,7 @@ class SweepCommand : public Command {
     SweepJob job;
     job.study_file = study_;
     job.study = read_study(study_);
+    check_pareto(job.study);
     if (const auto text = single(relative_to_, "--relative-to"))
       job.study.relative_to = parse_axis_values(*text, job.study, "--relative-to");
     job.common = arguments_.resolve(SimulationArguments::Variants::one, invocation());

@@ -83,7 +83,10 @@ std::string text_of(const ShadedWarpItem& item) {
   return fmt::format("warp {} of {}, {} left", warp.sequence, text_of_tile(warp.tile), text_of_quads(warp.count));
 }
 
-std::string text_of(const WarpRelease& item) { return fmt::format("slot {} is free", item.slot); }
+std::string text_of(const WarpRelease& item) {
+  if (item.slot == no_slot) return "a mark, of no slot";
+  return fmt::format("slot {} is free", item.slot);
+}
 
 std::string text_of(const ColorBeat& item) {
   if (item.mark != Mark::none) return text_of_mark(item.mark);

@@ -288,9 +288,11 @@ void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned proces
     }
     std::vector<pollfd> pipes;
     for (const auto& worker : workers) pipes.push_back({worker->pipe(), POLLIN, 0});
-    if (::poll(pipes.data(), pipes.size(), progress.visible() ? redraw_milliseconds : -1) < 0 && errno != EINTR) {
+    const bool wakes = progress.visible() || place.meanwhile != nullptr;
+    if (::poll(pipes.data(), pipes.size(), wakes ? redraw_milliseconds : -1) < 0 && errno != EINTR) {
       system_failure("cannot wait for the simulations");
     }
+    if (place.meanwhile) place.meanwhile();
     for (std::size_t i = pipes.size(); i-- > 0;) {
       if (pipes[i].revents == 0 || !workers[i]->receive()) continue;
       const std::size_t index = workers[i]->index();

@@ -36,10 +36,11 @@ struct Task {
 
 /// Where some simulations stand among all that a command runs, for the progress.
 struct BatchPlace {
-  std::string title;          ///< before the progress; may be changed meanwhile, by `finished`
-  std::size_t before = 0;     ///< simulations done already
-  std::size_t after = 0;      ///< simulations that will follow
-  double seconds_before = 0;  ///< that those before took, wall time
+  std::string title;                          ///< before the progress; may be changed meanwhile, by `finished`
+  std::size_t before = 0;                     ///< simulations done already
+  std::size_t after = 0;                      ///< simulations that will follow
+  double seconds_before = 0;                  ///< that those before took, wall time
+  std::function<void()> meanwhile = nullptr;  ///< called some times a second, if there is one
 };
 
 /// Runs simulations side by side, each in a process of its own, at most `processes` at a time: SystemC holds one

@@ -263,7 +263,7 @@ Study read_study(const std::filesystem::path& path) {
     } else {
       add_product(reader, root, study);
     }
-    if (study.points.empty()) {
+    if (study.axes.empty()) {
       throw UserError("nothing to study", path.string(), "it has neither points nor axes",
                       "add [axes], e.g. tc.bins = [16, 32, 64]");
     }

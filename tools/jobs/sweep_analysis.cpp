@@ -57,18 +57,31 @@ std::optional<double> SweepTable::number(std::size_t row, std::size_t column) co
   return rows[row][column].get<double>();
 }
 
-SweepTable sweep_table(const SweepResult& result) {
-  SweepTable table;
-  table.columns.emplace_back("point");
-  for (const StudyAxis& axis : result.study.axes) table.columns.push_back(axis.name);
+std::vector<std::string> sweep_columns(const Study& study) {
+  std::vector<std::string> columns{"point"};
+  for (const StudyAxis& axis : study.axes) columns.push_back(axis.name);
   for (const char* name : {"cycles", "milliseconds", "speedup", "energy_mj", "energy_mj_low", "energy_mj_high",
                            "quad_merging_storage_bytes"}) {
-    table.columns.emplace_back(name);
+    columns.emplace_back(name);
   }
-  for (const auto& [name, value] : Counts().named()) table.columns.push_back("counts." + name);
-  for (const char* unit : utilized) table.columns.push_back(std::string("utilization.") + unit);
-  for (const char* name : {"bottleneck", "bottleneck_occupancy", "result_hash"}) table.columns.emplace_back(name);
+  for (const auto& [name, value] : Counts().named()) columns.push_back("counts." + name);
+  for (const char* unit : utilized) columns.push_back(std::string("utilization.") + unit);
+  for (const char* name : {"bottleneck", "bottleneck_occupancy", "result_hash"}) columns.emplace_back(name);
+  return columns;
+}
 
+void check_pareto(const Study& study) {
+  const std::vector<std::string> columns = sweep_columns(study);
+  for (const std::string& name : study.pareto) {
+    if (std::find(columns.begin(), columns.end(), plain(name)) == columns.end())
+      throw UserError("unknown column '" + plain(name) + "'", "pareto", "results have no such column",
+                      "did you mean " + nearest_name(plain(name), columns) + "?");
+  }
+}
+
+SweepTable sweep_table(const SweepResult& result) {
+  SweepTable table;
+  table.columns = sweep_columns(result.study);
   const std::vector<std::optional<std::size_t>> relative_to = references(result.study);
   for (std::size_t i = 0; i < result.points.size(); ++i) {
     if (!result.points[i]) continue;
@@ -147,9 +160,6 @@ std::optional<ParetoTable> pareto_table(const SweepResult& result, const SweepTa
   if (pareto.columns.empty()) pareto.columns = {"milliseconds", "energy_mj"};
   for (const std::string& name : pareto.columns) {
     columns.push_back(table.column(plain(name)));
-    if (columns.back() == table.columns.size())
-      throw UserError("unknown column '" + plain(name) + "'", "pareto", "results have no such column",
-                      "did you mean " + nearest_name(plain(name), table.columns) + "?");
   }
   std::vector<std::size_t> axes;
   for (std::size_t axis = 0; axis < result.study.axes.size(); ++axis) {

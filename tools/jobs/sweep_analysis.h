@@ -19,6 +19,8 @@ struct SweepTable {
   std::size_t column(const std::string& name) const;  ///< columns.size() if there is none
   std::optional<double> number(std::size_t row, std::size_t column) const;
 };
+/// Of every study with these axes.
+std::vector<std::string> sweep_columns(const Study& study);
 SweepTable sweep_table(const SweepResult& result);
 
 /// How much an axis moves time, over all points.
@@ -50,8 +52,9 @@ struct ParetoTable {
   std::vector<std::string> columns;  ///< as Study::pareto
   std::vector<ParetoRow> rows;       ///< those on the front first, then by the first column
 };
-/// Of rows that have all points; none without time, where nothing is asked for. Throws UserError for a column
-/// that is not there.
+/// Throws UserError for a column that there is not.
+void check_pareto(const Study& study);
+/// Of GPUs that have all points; none where a column has no numbers, as without time.
 std::optional<ParetoTable> pareto_table(const SweepResult& result, const SweepTable& table);
 
 }  // namespace vrpipe::tools

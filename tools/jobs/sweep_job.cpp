@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 #include <stdexcept>
+#include <thread>
 #include <tuple>
 #include <utility>
 
@@ -18,6 +19,7 @@
 #include "jobs/identity.h"
 #include "jobs/loaded_frame.h"
 #include "jobs/processes.h"
+#include "jobs/ranks.h"
 #include "jobs/result_encoding.h"
 #include "jobs/settings.h"
 
@@ -239,7 +241,10 @@ PointOutcome from_record(const json& record, const RunRequest& request) {
   return point;
 }
 
-void take_records(const std::vector<json>& records, const std::vector<RunRequest>& requests, SweepResult& result) {
+/// How many points were taken.
+std::size_t take_records(const std::vector<json>& records, const std::vector<RunRequest>& requests,
+                         SweepResult& result) {
+  std::size_t taken = 0;
   std::map<std::string, std::size_t> places;
   for (std::size_t i = 0; i < result.study.points.size(); ++i) places.emplace(point_key(result.study, i).dump(), i);
   for (const json& record : records) {
@@ -247,18 +252,20 @@ void take_records(const std::vector<json>& records, const std::vector<RunRequest
       const auto found = places.find(record.at("point").dump());
       if (found == places.end() || result.points[found->second]) continue;
       result.points[found->second] = from_record(record, requests[found->second]);
-      ++result.done_before;
+      ++taken;
     } catch (const json::exception&) {
       continue;  // damaged: the point is simulated again
     } catch (const std::runtime_error&) {
       continue;
     }
   }
+  return taken;
 }
 
-/// Of shards that are there, whatever number of them there was.
-void take_shards(const SweepJob& job, const std::vector<RunRequest>& requests, SweepResult& result) {
-  if (!job.journal || job.shard) return;
+/// Of shards that are there, whatever number of them there was; how many points were taken.
+std::size_t take_shards(const SweepJob& job, const std::vector<RunRequest>& requests, SweepResult& result) {
+  if (!job.journal || job.shard) return 0;
+  std::size_t taken = 0;
   const std::filesystem::path folder = job.journal->has_parent_path() ? job.journal->parent_path() : ".";
   const std::string prefix = job.journal->filename().string() + ".";
   std::vector<std::filesystem::path> files;
@@ -270,8 +277,9 @@ void take_shards(const SweepJob& job, const std::vector<RunRequest>& requests, S
   std::sort(files.begin(), files.end());
   for (const std::filesystem::path& file : files) {
     const Journal shard = Journal::in_file(file, identity(job), SweepJob::journal_option);
-    take_records(shard.records(), requests, result);
+    taken += take_records(shard.records(), requests, result);
   }
+  return taken;
 }
 
 /// The time that is left, by what points took so far; warns once of a long study.
@@ -310,15 +318,18 @@ void strip(RunResult& run) {
   run.effects.clear();
   run.draws.clear();
   run.implementations.clear();
+  run.parameters.clear();
   run.host_seconds = run.cpu_seconds = 0;
 }
 
-void simulate(const SweepJob& job, const std::vector<RunRequest>& requests, SweepResult& result,
-              ProgressLine& progress) {
+/// Simulates the missing points that are this process's, and gives each to `store`.
+template <class IsMine, class Store>
+void simulate(const SweepJob& job, const std::vector<RunRequest>& requests, SweepResult& result, BatchPlace place,
+              ProgressLine& progress, const IsMine& is_mine, const Store& store) {
   const Study& study = job.study;
   std::vector<std::size_t> missing;
   for (std::size_t i = 0; i < study.points.size(); ++i) {
-    if (!result.points[i] && (!job.shard || job.shard->has(i))) missing.push_back(i);
+    if (!result.points[i] && is_mine(i)) missing.push_back(i);
   }
   // Each scene is loaded once.
   std::stable_sort(missing.begin(), missing.end(), [&](std::size_t a, std::size_t b) {
@@ -332,7 +343,7 @@ void simulate(const SweepJob& job, const std::vector<RunRequest>& requests, Swee
     };
     tasks.push_back({fmt::format("point {}", i), requests[i], frame});
   }
-  Foresight foresight(missing.size(), job.common.processes, progress);
+  Foresight foresight(missing.size(), result.processes, progress);
   const auto finished = [&](std::size_t task, Simulated&& simulated) {
     const std::size_t i = missing[task];
     PointOutcome point;
@@ -343,18 +354,60 @@ void simulate(const SweepJob& job, const std::vector<RunRequest>& requests, Swee
     strip(point.run);
     point.storage_bytes = storage_of(requests[i]);
     progress.erase();
-    result.journal->append(to_record(study, i, point));
+    store(to_record(study, i, point));
     foresight.done(point.cpu_seconds);
     result.points[i] = std::move(point);
   };
-  if (!tasks.empty()) run_tasks(tasks, false, job.common.processes, {"sweep  ", 0, 0, 0}, progress, finished);
+  place.title = "sweep  ";
+  if (!tasks.empty()) run_tasks(tasks, false, result.processes, place, progress, finished);
+}
+
+std::string to_message(const json& record) {
+  const std::vector<std::uint8_t> bytes = json::to_cbor(record);
+  return {bytes.begin(), bytes.end()};
+}
+
+/// One rank of several: the first keeps the journal and collects what the leaders of other machines send it.
+void simulate_as_rank(const SweepJob& job, const std::vector<RunRequest>& requests, Ranks& ranks, SweepResult& result,
+                      ProgressLine& progress) {
+  std::string done(result.points.size(), '0');
+  for (std::size_t i = 0; i < done.size(); ++i) done[i] = result.points[i] ? '1' : '0';
+  done = ranks.broadcast(done);
+  const auto missing = static_cast<std::size_t>(std::count(done.begin(), done.end(), '0'));
+  std::size_t collected = 0;
+  const auto is_mine = [&](std::size_t i) {
+    const std::size_t slot = i % ranks.all_slots();
+    return done[i] == '0' && slot >= ranks.first_slot() && slot < ranks.first_slot() + ranks.slots();
+  };
+  BatchPlace place;
+  if (!ranks.is_first()) {
+    if (ranks.is_leader()) {
+      simulate(job, requests, result, place, progress, is_mine,
+               [&](const json& record) { ranks.send(to_message(record)); });
+    }
+    return ranks.wait_for_all();
+  }
+  place.meanwhile = [&] {
+    while (const auto message = ranks.receive()) {
+      const json record = json::from_cbor(*message);
+      result.journal->append(record);
+      collected += take_records({record}, requests, result);
+    }
+  };
+  simulate(job, requests, result, place, progress, is_mine, [&](const json& record) {
+    result.journal->append(record);
+    ++collected;
+  });
+  while (collected < missing) {
+    place.meanwhile();
+    progress.show(fmt::format("sweep  {} of {} points, other machines are at work", collected, missing));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  progress.erase();
+  ranks.wait_for_all();
 }
 
 }  // namespace
-
-bool SweepResult::is_complete() const {
-  return std::all_of(points.begin(), points.end(), [](const auto& point) { return point.has_value(); });
-}
 
 std::string scene_of_axis(const SweepJob& job, const std::string& value) {
   if (value.rfind("builtin:", 0) == 0) return value;
@@ -402,13 +455,25 @@ SweepResult run_sweep(const SweepJob& job) {
     check_configuration(requests.back());
   }
   ProgressLine progress;
-  result.journal = std::make_shared<Journal>(open_journal(job));
-  take_records(result.journal->records(), requests, result);
-  take_shards(job, requests, result);
-  if (result.done_before > 0)
-    fmt::print(stderr, "sweep: {} of {} points were done before\n", result.done_before, result.points.size());
   const auto start = SteadyClock::now();
-  simulate(job, requests, result, progress);
+  const std::unique_ptr<Ranks> ranks = join_ranks();
+  if (ranks && job.shard)
+    throw UserError("cannot use option", "--shard", "mpirun shares the study already", "leave out this or mpirun");
+  if (ranks) result.processes = ranks->slots();
+  result.is_elsewhere = ranks && !ranks->is_first();
+  if (!result.is_elsewhere) {
+    result.journal = std::make_shared<Journal>(open_journal(job));
+    result.done_before = take_records(result.journal->records(), requests, result) + take_shards(job, requests, result);
+    if (result.done_before > 0)
+      fmt::print(stderr, "sweep: {} of {} points were done before\n", result.done_before, result.points.size());
+  }
+  if (ranks) {
+    simulate_as_rank(job, requests, *ranks, result, progress);
+  } else {
+    simulate(
+        job, requests, result, {}, progress, [&](std::size_t i) { return !job.shard || job.shard->has(i); },
+        [&](const json& record) { result.journal->append(record); });
+  }
   result.seconds = std::chrono::duration<double>(SteadyClock::now() - start).count();
   return result;
 }

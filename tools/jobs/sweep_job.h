@@ -50,9 +50,8 @@ struct SweepResult {
   std::size_t done_before = 0;
   unsigned processes = 1;
   double seconds = 0;                ///< wall time of the simulations of this run
-  std::shared_ptr<Journal> journal;  ///< to be finished when the results are safe
-
-  bool is_complete() const;
+  std::shared_ptr<Journal> journal;  ///< to be finished when the results are safe; null where `is_elsewhere`
+  bool is_elsewhere = false;         ///< another process, of those that mpirun started, has the results
 };
 
 /// A value of the axis `scene`, from where vrpipe runs: names of files are relative to the study's folder.
@@ -63,7 +62,8 @@ std::string scene_of_axis(const SweepJob& job, const std::string& value);
 RunRequest request_of(const SweepJob& job, const StudiedPoint& point);
 
 /// Simulates what is not done yet, in processes of their own; a record is in the journal as soon as a point is done. Takes
-/// in the records of all shards. Warns on stderr of a study that will take more than an hour.
+/// in the records of all shards. Started by mpirun, the ranks of a machine are as many processes of its first, which sends
+/// what is done to the first of all. Warns on stderr of a study that will take more than an hour.
 /// Throws UserError, CommandFailure or a fault.
 SweepResult run_sweep(const SweepJob& job);
 

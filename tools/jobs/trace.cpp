@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include <vrpipe/component/error.h>
+
 #include "host/process_setup.h"
 #include "jobs/link_items.h"
 
@@ -130,7 +132,8 @@ void Trace::add_warps(const std::string& gpc, Observers& observers) {
                     {"quads", warp.count}});
   });
   observers.on_link<WarpRelease>(gpc + "prop.release", [&warps](const Observers::Passed<WarpRelease>& passed) {
-    warps.level.change(passed.first, -1);
+    // A mark has no slot.
+    if (passed.item.slot != no_slot) warps.level.change(passed.first, -1);
   });
 }
 
@@ -230,6 +233,10 @@ void Trace::begin(Counter& counter) {
 
 void Trace::end(const RunResult& result) {
   const Cycle cycles = result.cycles.value_or(0);
+  if (cycles <= window_.from) {
+    throw UserError("nothing to trace", fmt::format("{} {}@{}:", option, path_.string(), window_.from),
+                    fmt::format("the run ends after {} cycles", cycles), "begin earlier");
+  }
   for (auto& [name, unit] : units_) {
     enter(unit, unit.state, std::max(unit.since, cycles));
     for (Slice& slice : unit.held) slice.until = std::min(slice.until, cycles);
@@ -237,7 +244,6 @@ void Trace::end(const RunResult& result) {
     unit.held.erase(std::remove_if(unit.held.begin(), unit.held.end(), is_after), unit.held.end());
   }
   write_before(cycles, cycles);
-  if (cycles <= window_.from) return;
   for (LevelCounter& each : levels_) begin(each.counter);
   for (StatisticCounter& each : statistics_) begin(each.counter);
 }

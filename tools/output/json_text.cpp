@@ -1,5 +1,8 @@
 #include "output/json_text.h"
 
+#include <algorithm>
+#include <cstddef>
+
 #include <vrpipe/component/printable.h>
 
 namespace vrpipe::tools {
@@ -21,8 +24,39 @@ Json with_valid_texts(const Json& json) {
   return copy;
 }
 
+/// Numbers of a row, such as those of intervals, belong on one line from so many on.
+constexpr std::size_t long_row = 16;
+
+bool is_long_row(const Json& json) {
+  const auto is_number = [](const Json& value) { return value.is_number() || value.is_null(); };
+  return json.is_array() && json.size() >= long_row && std::all_of(json.begin(), json.end(), is_number);
+}
+
+/// As dump(2), but for long rows.
+void put(const Json& json, const std::string& indent, std::string& text) {
+  if (!json.is_structured() || json.empty() || is_long_row(json)) {
+    text += json.dump();
+    return;
+  }
+  const std::string inner = indent + "  ";
+  text += json.is_array() ? "[" : "{";
+  bool is_first = true;
+  for (const auto& [key, value] : json.items()) {
+    text += is_first ? "\n" : ",\n";
+    is_first = false;
+    text += inner;
+    if (json.is_object()) text += Json(key).dump() + ": ";
+    put(value, inner, text);
+  }
+  text += "\n" + indent + (json.is_array() ? "]" : "}");
+}
+
 }  // namespace
 
-std::string json_text(const Json& json) { return with_valid_texts(json).dump(2) + "\n"; }
+std::string json_text(const Json& json) {
+  std::string text;
+  put(with_valid_texts(json), "", text);
+  return text + "\n";
+}
 
 }  // namespace vrpipe::tools

@@ -117,7 +117,7 @@ std::string reference_text(const Study& study) {
 
 std::string sweep_text(const SweepFindings& findings, const TextStyle& style) {
   const Study& study = findings.result.study;
-  std::string text = style.bold(fmt::format("{} points", study.points.size()));
+  std::string text = style.bold(fmt::format("{} point{}", study.points.size(), study.points.size() == 1 ? "" : "s"));
   if (study.seed) text += fmt::format(", a sample of {} (seed {})", grouped(study.product), *study.seed);
   for (const StudyAxis& axis : study.axes) text += fmt::format("\n  {}: {}", printable(axis.name), axis.values.size());
   text += "\n\n" + points_text(findings, style) + effects_text(findings, style) + pareto_text(findings, style);

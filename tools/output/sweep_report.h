@@ -15,7 +15,7 @@ struct SweepFindings {
   AxisEffects effects;
   std::optional<ParetoTable> pareto;
 };
-/// The result outlives it. Throws UserError for a column of the Pareto table that there is not.
+/// The result outlives it.
 SweepFindings sweep_findings(const SweepResult& result);
 
 /// For a person: what matters, the Pareto table, and the points if they are few.

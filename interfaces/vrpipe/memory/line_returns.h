@@ -20,6 +20,11 @@ class LineReturns {
   void used(std::uint64_t address, Cycle at) { from_[index(address)] = at + wait_; }
   /// From when on a line that left can be used again; 0 for one that was not used yet.
   Cycle from(std::uint64_t address) const { return from_[index(address)]; }
+  /// The last use so far; 0 where there was none.
+  Cycle last_use(std::uint64_t address) const {
+    const Cycle from = from_[index(address)];
+    return from == 0 ? 0 : from - wait_;
+  }
   /// The line of the surface, from 0.
   std::size_t index(std::uint64_t address) const { return static_cast<std::size_t>((address - base_) >> shift_); }
   std::size_t lines() const { return from_.size(); }

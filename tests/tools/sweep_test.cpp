@@ -1,0 +1,345 @@
+// `vrpipe sweep`: studies, their points, and how they go on.
+#include "tool_test_support.h"
+
+#include <sys/wait.h>
+
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "documented_keys.h"
+
+namespace vrpipe::testing {
+namespace {
+
+using nlohmann::json;
+
+const std::string small = "scene = \"tiny.spl\"\nfidelity = \"lt\"\n";
+
+class Sweep : public ToolTest {
+ protected:
+  json sweep(const std::string& study, std::vector<std::string> options = {}) const {
+    write("study.toml", study);
+    options.insert(options.begin(), {"sweep", "study.toml"});
+    return json_of(std::move(options));
+  }
+  void bad(const std::string& study, const std::vector<std::string>& parts,
+           std::vector<std::string> options = {}) const {
+    SCOPED_TRACE(study);
+    write("study.toml", study);
+    options.insert(options.begin(), {"sweep", "study.toml", "--csv", "out.csv"});
+    refused(options, parts);
+  }
+};
+
+std::vector<std::vector<json>> values(const json& result) {
+  std::vector<std::vector<json>> all;
+  for (const json& point : result["points"]) {
+    all.emplace_back();
+    for (const json& axis : result["axes"]) all.back().push_back(point[axis["name"].get<std::string>()]);
+  }
+  return all;
+}
+
+TEST_F(Sweep, RunsTheProductOfItsAxesTheLastFastest) {
+  const json result =
+      sweep(small + "[axes]\nvariant = [\"baseline\", \"het\"]\ntc.bins = { from = 8, to = 32, factor = 2 }\n");
+  EXPECT_EQ(values(result),
+            (std::vector<std::vector<json>>{
+                {"baseline", 8}, {"baseline", 16}, {"baseline", 32}, {"het", 8}, {"het", 16}, {"het", 32}}));
+  EXPECT_EQ(result["product"], 6);
+}
+
+TEST_F(Sweep, APointIsTheRunOfItsSettings) {
+  const json result = sweep(small +
+                            "[set]\ntgc.bins = 9\n[variants.mine]\nbase = \"het+qm\"\nunit.qru = \"pass-through\"\n"
+                            "[axes]\nplatform = [\"mobile\", \"desktop\"]\nvariant = [\"mine\", \"qm\"]\n"
+                            "format = [\"rgba8\"]\ntermination = [\"strict\"]\ntc.bins = [3, 5]\n");
+  ASSERT_EQ(result["points"].size(), 8U);
+  for (const json& point : result["points"]) {
+    const std::string variant = point["variant"] == "mine" ? "mine=het+qm,qru=pass-through" : "qm";
+    const json run = json_of({"run", "--scene", "tiny.spl", "--fidelity", "lt", "--platform", point["platform"],
+                              "--variant", variant, "--format", "rgba8", "--termination", "strict", "--set",
+                              "tgc.bins=9", "--set", "tc.bins=" + point["tc.bins"].dump()})["runs"][0];
+    EXPECT_EQ(point["result_hash"], run["result_hash"]) << point;
+    EXPECT_EQ(point["cycles"], run["cycles"]);
+    EXPECT_EQ(point["counts.warps"], run["counts"]["warps"]);
+    EXPECT_EQ(point["utilization.crop"], run["utilization"]["crop"]);
+  }
+}
+
+TEST_F(Sweep, DrawsScenesViewsAndSizes) {
+  const json result = sweep("fidelity = \"functional\"\n[axes]\nscene = [\"builtin:object\", \"tiny.spl\"]\n");
+  EXPECT_NE(result["points"][0]["result_hash"], result["points"][1]["result_hash"]);
+  const json views = sweep(
+      "fidelity = \"functional\"\n[axes]\nview = [0, 1, 2]\nsize = [\"16x16\", \"24x16\"]\n"
+      "preprocess.sh_degree = [0, 3]\n");
+  std::set<std::string> hashes;
+  for (const json& point : views["points"]) hashes.insert(point["result_hash"]);
+  EXPECT_EQ(hashes.size(), 12U);
+  const json run = json_of({"run", "--size", "24x16", "--fidelity", "functional", "--set", "preprocess.sh_degree=0"});
+  EXPECT_EQ(views["points"][2]["result_hash"], run["runs"][0]["result_hash"]);
+}
+
+TEST_F(Sweep, NamesScenesFromTheStudysFolder) {
+  std::filesystem::create_directory(folder() / "study");
+  std::filesystem::copy(folder() / "tiny.spl", folder() / "study" / "own.spl");
+  write("study/s.toml", "fidelity = \"functional\"\n[axes]\nscene = [\"own.spl\"]\n");
+  EXPECT_EQ(json_of({"sweep", "study/s.toml"})["points"][0]["scene"], "own.spl");
+}
+
+TEST_F(Sweep, TakesAListOfPoints) {
+  const json result =
+      sweep(small + "[[points]]\nvariant = \"qm\"\ntc.bins = 4\n[[points]]\nvariant = \"het\"\ntc.bins = 2\n");
+  EXPECT_EQ(values(result), (std::vector<std::vector<json>>{{"qm", 4}, {"het", 2}}));
+  EXPECT_EQ(result["product"], 0);
+}
+
+TEST_F(Sweep, TakesASampleThatItsSeedDecides) {
+  const std::string axes =
+      "[axes]\ntc.bins = { from = 1, to = 40, step = 1 }\ntgc.bins = { from = 1, to = 50, step = 1 }\n";
+  const auto sample = [&](const std::string& keys) { return values(sweep(keys + small + axes)); };
+  const auto first = sample("sample = 6\nseed = 1\n");
+  EXPECT_EQ(first.size(), 6U);
+  EXPECT_TRUE(std::is_sorted(first.begin(), first.end()));
+  EXPECT_EQ(std::set(first.begin(), first.end()).size(), 6U);
+  EXPECT_EQ(sample("sample = 6\nseed = 1\n"), first);
+  EXPECT_NE(sample("sample = 6\nseed = 2\n"), first);
+  EXPECT_EQ(sweep("sample = 4\n" + small + "[axes]\ntc.bins = [1, 2, 3, 4]\n")["points"].size(), 4U);
+}
+
+TEST_F(Sweep, SpeedUpsAreOverOnePointOfTheSameScene) {
+  const std::string study =
+      "fidelity = \"lt\"\nsize = \"24x24\"\n[axes]\nview = [0, 1]\nvariant = [\"baseline\", \"het\"]\n"
+      "tc.bins = [4, 32]\n";
+  const json usual = sweep(study);
+  for (std::size_t i = 0; i < 8; ++i) {
+    const json& point = usual["points"][i];
+    const json& reference = usual["points"][i < 4 ? 0 : 4];
+    EXPECT_DOUBLE_EQ(point["speedup"].get<double>(), reference["cycles"].get<double>() / point["cycles"].get<double>());
+  }
+  const json named = sweep(study, {"--relative-to", "variant=het,tc.bins=32"});
+  EXPECT_EQ(named["relative_to"], "variant=het, tc.bins=32");
+  EXPECT_EQ(named["points"][3]["speedup"], 1.0);
+  EXPECT_EQ(named["points"][7]["speedup"], 1.0);
+}
+
+TEST_F(Sweep, RanksAxesByHowMuchTheyMoveTime) {
+  const json result = sweep(small + "[axes]\nl2.latency_cycles = [100, 101]\ncrop.bytes_per_cycle = [16, 64]\n");
+  ASSERT_EQ(result["effects"].size(), 2U);
+  EXPECT_EQ(result["effects"][0]["axis"], "crop.bytes_per_cycle");
+  EXPECT_GT(result["effects"][0]["ratio"], result["effects"][1]["ratio"]);
+  double product = 1;
+  for (const json& point : result["points"]) {
+    if (point["crop.bytes_per_cycle"] == 64) product *= point["speedup"].get<double>();
+  }
+  EXPECT_NEAR(result["effects"][0]["values"][1]["mean"].get<double>(), std::sqrt(product), 1e-12);
+}
+
+TEST_F(Sweep, MarksGpusThatNoOtherBeats) {
+  const json result = sweep("pareto = [\"milliseconds\", \"quad_merging_storage_bytes\"]\n" + small +
+                            "[axes]\nvariant = [\"baseline\", \"het+qm\"]\ntgc.bins = [16, 128]\n");
+  std::map<std::string, bool> front;
+  for (const json& gpu : result["pareto"]) {
+    front[gpu["axes"]["variant"].get<std::string>() + gpu["axes"]["tgc.bins"].get<std::string>()] = gpu["on_front"];
+    for (const json& other : result["pareto"]) {
+      const bool beats = other["metrics"]["milliseconds"] < gpu["metrics"]["milliseconds"] &&
+                         other["metrics"]["quad_merging_storage_bytes"] < gpu["metrics"]["quad_merging_storage_bytes"];
+      EXPECT_FALSE(beats && gpu["on_front"]);
+    }
+  }
+  EXPECT_EQ(front.size(), 4U);
+  EXPECT_TRUE(std::any_of(front.begin(), front.end(), [](const auto& each) { return each.second; }));
+}
+
+TEST_F(Sweep, WritesTheSamePointsAsCsvAndJsonLines) {
+  write("study.toml", small + "[axes]\nvariant = [\"baseline\", \"het\"]\ntc.bins = [3]\n");
+  const Finished finished =
+      vrpipe({"sweep", "study.toml", "--csv", "s.csv", "--jsonl", "s.jsonl", "--html", "s.html", "--json", "s.json"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  const json result = json::parse(read_file(folder() / "s.json"));
+  std::istringstream lines(read_file(folder() / "s.jsonl")), rows(read_file(folder() / "s.csv"));
+  std::string header, row;
+  std::getline(rows, header);
+  for (const json& point : result["points"]) {
+    std::string line;
+    std::getline(lines, line);
+    EXPECT_EQ(json::parse(line), point);
+    std::getline(rows, row);
+    std::istringstream names(header), cells(row);
+    for (std::string name, cell; std::getline(names, name, ',') && std::getline(cells, cell, ',');) {
+      if (!name.empty() && name.back() == '\r') continue;
+      const json& value = point[name];
+      EXPECT_EQ(cell, value.is_null() ? "" : value.is_string() ? value.get<std::string>() : value.dump()) << name;
+    }
+  }
+  const std::string page = read_file(folder() / "s.html");
+  EXPECT_NE(page.find("<svg"), std::string::npos);
+  EXPECT_EQ(page.find("http://"), page.find("http://www.w3.org/2000/svg"));
+  EXPECT_EQ(page.find("nan"), std::string::npos);
+}
+
+TEST_F(Sweep, KilledAtAnyMomentEndsWithTheSameBytes) {
+  write("study.toml",
+        "fidelity = \"lt\"\nsize = \"64x64\"\n[axes]\nview = [0, 1]\nvariant = [\"baseline\", \"het+qm\"]\n"
+        "tc.bins = [4, 32]\n");
+  const std::vector<std::string> outputs{"--csv",  "s.csv",  "--jsonl", "s.jsonl",
+                                         "--html", "s.html", "--json",  "s.json"};
+  std::vector<std::string> command{"sweep", "study.toml"};
+  command.insert(command.end(), outputs.begin(), outputs.end());
+  ASSERT_EQ(vrpipe(command).code, 0);
+  std::map<std::string, std::string> undisturbed;
+  for (const char* file : {"s.csv", "s.jsonl", "s.html", "s.json"}) {
+    undisturbed[file] = read_file(folder() / file);
+    std::filesystem::remove(folder() / file);
+  }
+  command.insert(command.end(), {"--journal", "j.jsonl"});
+  for (const int milliseconds : {900, 1300, 1800}) {
+    const pid_t process = ::fork();
+    if (process == 0) {
+      std::filesystem::current_path(folder());
+      std::vector<char*> argv;
+      std::vector<std::string> words = command;
+      words.insert(words.begin(), VRPIPE_BINARY);
+      for (std::string& word : words) argv.push_back(word.data());
+      argv.push_back(nullptr);
+      ::close(1);
+      ::close(2);
+      ::execv(VRPIPE_BINARY, argv.data());
+      ::_exit(1);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds));
+    ::kill(process, SIGKILL);
+    ::waitpid(process, nullptr, 0);
+  }
+  ASSERT_EQ(vrpipe(command).code, 0);
+  for (const auto& [file, bytes] : undisturbed) EXPECT_EQ(read_file(folder() / file), bytes) << file;
+}
+
+TEST_F(Sweep, InShardsIsTheSameAsAlone) {
+  const std::string study = small + "[axes]\nvariant = [\"baseline\", \"qm\", \"het\"]\ntc.bins = [4, 32]\n";
+  write("study.toml", study);
+  ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv"}).code, 0);
+  for (const char* shard : {"2/3", "1/3", "3/3"}) {
+    const Finished finished = vrpipe({"sweep", "study.toml", "--journal", "j", "--shard", shard});
+    ASSERT_EQ(finished.code, 0) << finished.err;
+    EXPECT_NE(finished.out.find("its 2 points are done"), std::string::npos) << finished.out;
+  }
+  const Finished merged = vrpipe({"sweep", "study.toml", "--journal", "j", "--csv", "merged.csv"});
+  EXPECT_NE(merged.err.find("6 of 6 points were done before"), std::string::npos) << merged.err;
+  EXPECT_EQ(read_file(folder() / "merged.csv"), read_file(folder() / "alone.csv"));
+}
+
+TEST_F(Sweep, ThatGrowsKeepsWhatIsDone) {
+  write("study.toml", small + "[axes]\ntc.bins = [4, 32]\n");
+  ASSERT_EQ(vrpipe({"sweep", "study.toml", "--journal", "j"}).code, 0);
+  write("study.toml", small + "[axes]\ntc.bins = [4, 8, 32]\n");
+  EXPECT_NE(vrpipe({"sweep", "study.toml", "--journal", "j"}).err.find("2 of 3 points were done before"),
+            std::string::npos);
+  refused({"sweep", "study.toml", "--journal", "j", "--set", "tgc.bins=3"}, {"--journal j", "belongs to another run"});
+}
+
+TEST_F(Sweep, AsAnArrayOfABatchSystemOnOneNode) {
+  write("study.toml", small + "[axes]\ntc.bins = [4, 8, 32]\n");
+  for (const char* task : {"1", "2"}) {
+    const std::string command = "cd " + folder().string() + " && SLURM_ARRAY_TASK_ID=" + task +
+                                " SLURM_ARRAY_TASK_COUNT=2 VRPIPE=" VRPIPE_BINARY " bash " VRPIPE_EXAMPLES
+                                "/study.slurm study.toml j >/dev/null 2>&1";
+    ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  }
+  const Finished all = vrpipe({"sweep", "study.toml", "--journal", "j", "--jobs", "1"});
+  EXPECT_NE(all.err.find("3 of 3 points were done before"), std::string::npos) << all.err;
+}
+
+/// With mpirun; false where there is none.
+bool has_mpi() { return std::system("command -v mpirun >/dev/null 2>&1") == 0 && std::filesystem::exists(VRPIPE_MPI); }
+
+std::string under_mpi(const std::filesystem::path& folder, unsigned ranks, const std::string& words) {
+  return "cd " + folder.string() +
+         " && OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe -n " +
+         std::to_string(ranks) + " " VRPIPE_BINARY " " + words + " >mpi.out 2>mpi.err";
+}
+
+TEST_F(Sweep, OverMpiRanksIsTheSameAsAlone) {
+  if (!has_mpi()) GTEST_SKIP() << "built or run without MPI";
+  write("study.toml", small + "[axes]\nvariant = [\"baseline\", \"qm\", \"het\"]\ntc.bins = [4, 32]\n");
+  ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv"}).code, 0);
+  ASSERT_EQ(std::system(under_mpi(folder(), 3, "sweep study.toml --csv mpi.csv").c_str()), 0)
+      << read_file(folder() / "mpi.err");
+  EXPECT_EQ(read_file(folder() / "mpi.csv"), read_file(folder() / "alone.csv"));
+  const std::string out = read_file(folder() / "mpi.out");
+  EXPECT_EQ(out.find("6 points"), out.rfind("6 points")) << "one rank says it";
+}
+
+TEST_F(Sweep, OfWhichARankIsLostGoesOn) {
+  if (!has_mpi()) GTEST_SKIP() << "built or run without MPI";
+  write("study.toml", "fidelity = \"lt\"\nsize = \"64x64\"\n[axes]\nview = [0, 1]\ntc.bins = [4, 8, 16, 32]\n");
+  ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv"}).code, 0);
+  const std::string command = under_mpi(folder(), 2, "sweep study.toml --csv lost.csv --journal j");
+  // A rank is killed once there are results; mpirun then ends the others.
+  const std::string killing =
+      "(cd " + folder().string() +
+      " && until [ -s j ]; do sleep 0.1; done; sleep 0.3; for p in /proc/[0-9]*; do if tr '\\0' ' ' <$p/cmdline "
+      "2>/dev/null | grep -q '^[^ ]*vrpipe sweep study.toml --csv lost.csv'; then rank=${p#/proc/}; fi; done; "
+      "kill -KILL $rank) & " +
+      command;
+  static_cast<void>(std::system(killing.c_str()));
+  ASSERT_EQ(std::system(command.c_str()), 0) << read_file(folder() / "mpi.err");
+  EXPECT_EQ(read_file(folder() / "lost.csv"), read_file(folder() / "alone.csv"));
+}
+
+TEST_F(Sweep, ThatCannotBeIsRefusedWithItsLine) {
+  bad("", {"nothing to study", "study.toml"});
+  bad("[axes]\ntcbins = [1]\n", {"unknown axis 'tcbins'", "study.toml:2"});
+  bad("[axes]\nsceen = [1]\n", {"'sceen'", "did you mean scene"});
+  bad("[axes]\ntc.bins = []\n", {"empty axis 'tc.bins'", "study.toml:2"});
+  bad("[axes]\ntc.bins = [4, 4]\n", {"'4' given twice"});
+  bad("[axes]\ntc.bins = { from = 4, to = 2, step = 1 }\n", {"never comes to its end"});
+  bad("[axes]\ntc.bins = { from = 4, to = 8 }\n", {"step and factor"});
+  bad("[axes]\ntc.bins = { from = 4, to = 8, stp = 1 }\n", {"'stp'", "did you mean step"});
+  bad("[axes]\ntc.bins = { from = 1, to = 2000000, step = 1 }\n", {"more than"});
+  bad("sample = 9\n[axes]\ntc.bins = [4]\n", {"sample", "study.toml:1"});
+  bad("seed = 9\n[axes]\ntc.bins = [4]\n", {"there is no sample"});
+  bad("[[points]]\ntc.bins = 4\n[[points]]\ntgc.bins = 4\n", {"study.toml:", "'tgc.bins'"});
+  bad("[[points]]\ntc.bins = 4\n[axes]\ntc.bins = [4]\n", {"points and axes"});
+  bad("sise = \"3x3\"\n[axes]\ntc.bins = [4]\n", {"unknown key 'sise'", "study.toml:1", "did you mean size"});
+  bad("[axes]\ntc.bins = [0]\n", {"tc.bins", "from 1 to"});
+  bad("[axes]\ntc.bin = [3]\n", {"'bin'", "tc.bins"});
+  bad("[axes]\nvariant = [\"hat\"]\n", {"'hat'", "het"});
+  bad("[axes]\nplatform = [\"moby\"]\n", {"'moby'", "mobile"});
+  bad("[axes]\nview = [\"left\"]\n", {"'left'", "axis view"});
+  bad("[axes]\nsize = [\"3\"]\n", {"axis size"});
+  bad("[variants.m]\nbase = \"qm\"\nset.tc.bins = 3\n[axes]\nvariant = [\"m\"]\ntc.bins = [3, 4]\n",
+      {"axis tc.bins changes nothing", "variant m"});
+  bad("pareto = [\"speed\", \"cycles\"]\n" + small + "[axes]\ntc.bins = [3]\n", {"'speed'", "pareto"});
+  bad(small + "[axes]\ntc.bins = [3]\n", {"unknown axis 'tc.bin'", "did you mean tc.bins"},
+      {"--relative-to", "tc.bin=3"});
+  bad(small + "[axes]\ntc.bins = [3]\n", {"unknown value '4'"}, {"--relative-to", "tc.bins=4"});
+  write("study.toml", small + "[axes]\ntc.bins = [3]\n");
+  refused({"sweep", "study.toml", "--shard", "1/2"}, {"--shard", "--journal"});
+  refused({"sweep", "study.toml", "--shard", "3/2", "--journal", "j"}, {"'3/2'", "I/N"});
+  refused({"sweep", "study.toml", "--shard", "1/2", "--journal", "j", "--csv", "s.csv"},
+          {"--csv", "a shard has not all points"});
+  refused({"sweep", "study.toml", "--csv", "study.toml"}, {"study.toml"});
+  refused({"sweep", "nowhere.toml"}, {"nowhere.toml"});
+  refused({"sweep"}, {"STUDY.toml"});
+}
+
+TEST_F(Sweep, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
+  const std::string page = read_file(VRPIPE_DOCS "/studies.md");
+  std::set<std::string> known;
+  const std::string heading = "\n## JSON\n";
+  ASSERT_NE(page.find(heading), std::string::npos);
+  std::string section = page.substr(page.find(heading));
+  section.replace(0, heading.size(), "\n### JSON\n");
+  known = documented(section, "JSON");
+  known.insert("schema");
+  expect_documented({sweep("sample = 2\n" + small + "[axes]\nvariant = [\"baseline\", \"het\"]\ntc.bins = [3, 4]\n")},
+                    known);
+}
+
+}  // namespace
+}  // namespace vrpipe::testing
