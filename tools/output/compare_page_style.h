@@ -30,26 +30,31 @@ dl { display: grid; grid-template-columns: max-content 1fr; gap: 3px 18px; margi
 .pictures figure, .maps figure { border: 0; padding: 0; } .pictures figure img, .maps figure img { width: 100%; display: block; }
 .maps { display: grid; gap: 10px; margin: 6px 0 14px; }
 table.parameters td, table.parameters th { text-align: left; } td.other { background: #fff0b8; font-weight: 600; }
-details { margin: 10px 0; } summary { cursor: pointer; font-weight: 600; }
+pre { font-size: 12px; overflow-x: auto; } details { margin: 10px 0; } summary { cursor: pointer; font-weight: 600; }
+table.effects td:last-child { white-space: normal; min-width: 320px; }
 .hidden { display: none; }
 @media print { nav, .controls, .links { display: none; } details > * { display: block; } h2 { break-after: avoid; } figure { break-inside: avoid; } }
 )";
 
-/// Runs at the end of the page. Errors are kept where tests find them.
+/// Comes before anything that may fail: what fails is kept where tests find it.
+inline constexpr const char* compare_page_watch = R"js(
+window.onerror = message => { document.documentElement.dataset.error = message; };
+)js";
+
+/// Runs at the end of the page.
 inline constexpr const char* compare_page_script = R"js(
 "use strict";
 const root = document.documentElement;
-window.onerror = message => { root.dataset.error = message; };
-window.onunhandledrejection = event => { root.dataset.error = String(event.reason); };
 const byId = id => document.getElementById(id);
 function comparePictures() {
   const pictures = Array.from(document.querySelectorAll(".pictures img"));
   const left = byId("left"), right = byId("right"), view = byId("view"), wipe = byId("wipe"), gain = byId("gain");
   const under = byId("under"), over = byId("over"), canvas = byId("difference"), edge = byId("edge");
-  const say = byId("difference-text");
+  const stage = byId("stage"), say = byId("difference-text");
   function pixels(picture) {
     const own = document.createElement("canvas");
-    own.width = picture.naturalWidth; own.height = picture.naturalHeight;
+    own.width = picture.naturalWidth;
+    own.height = picture.naturalHeight;
     const context = own.getContext("2d", {willReadFrequently: true});
     context.drawImage(picture, 0, 0);
     return context.getImageData(0, 0, own.width, own.height);
@@ -69,53 +74,51 @@ function comparePictures() {
       largest = Math.max(largest, here);
       differing += here > 0 ? 1 : 0;
     }
-    canvas.width = first.width; canvas.height = first.height;
+    canvas.width = first.width;
+    canvas.height = first.height;
     canvas.getContext("2d").putImageData(shown, 0, 0);
-    const share = 100 * differing * 4 / first.data.length;
-    say.textContent = largest === 0 ? "No pixel of these pictures differs." :
-      "Of the pictures shown " + share.toFixed(2) + " % of the pixels differ, by at most " + largest + " of 255.";
     canvas.dataset.largest = largest;
-  }
-  function update() {
-    const a = pictures[left.value], b = pictures[right.value];
-    const differs = view.value === "difference";
-    under.src = b.src; over.src = a.src;
-    byId("left-tag").textContent = a.alt; byId("right-tag").textContent = b.alt;
-    for (const each of [over, edge, byId("left-tag"), byId("right-tag"), byId("wipe-control")])
-      each.classList.toggle("hidden", differs);
-    canvas.classList.toggle("hidden", !differs);
-    byId("gain-control").classList.toggle("hidden", !differs);
-    drawDifference(a, b);
-    slide();
+    const share = 100 * differing * 4 / first.data.length;
+    say.textContent = largest === 0 ? "No pixel of these two pictures differs." :
+      "Of these two pictures " + share.toFixed(2) + " % of the pixels differ, by at most " + largest + " of 255.";
   }
   function slide() {
     over.style.clipPath = "inset(0 " + (100 - wipe.value) + "% 0 0)";
-edge.style.left = wipe.value + "%";
+    edge.style.left = wipe.value + "%";
+  }
+  function update() {
+    const a = pictures[left.value], b = pictures[right.value], differs = view.value === "difference";
+    under.src = b.src;
+    over.src = a.src;
+    byId("left-tag").textContent = a.alt;
+    byId("right-tag").textContent = b.alt;
+    for (const each of [over, edge, byId("left-tag"), byId("right-tag"), byId("wipe-control")])
+      each.classList.toggle("hidden", differs);
+    for (const each of [canvas, byId("gain-control")]) each.classList.toggle("hidden", !differs);
+    drawDifference(a, b);
+    slide();
+  }
+  function drag(event) {
+    if (event.buttons !== 1 || view.value === "difference") return;
+    const box = stage.getBoundingClientRect();
+    wipe.value = Math.min(100, Math.max(0, 100 * (event.clientX - box.left) / box.width));
+    slide();
+    event.preventDefault();
+  }
+  for (const each of [left, right, view, gain]) each.addEventListener("change", update);
+  wipe.addEventListener("input", slide);
+  stage.addEventListener("pointerdown", drag);
+  stage.addEventListener("pointermove", drag);
+  update();
 }
-for (const each of[left, right, view, gain]) each.addEventListener("change", update);
-wipe.addEventListener("input", slide);
-const stage = byId("stage");
-const drag = event = > {
-  if (event.buttons != = 1 || view.value == = "difference") return;
-  const box = stage.getBoundingClientRect();
-  wipe.value = Math.min(100, Math.max(0, 100 * (event.clientX - box.left) / box.width));
-  slide();
-  event.preventDefault();
-};
-stage.addEventListener("pointerdown", drag);
-stage.addEventListener("pointermove", drag);
-update();
-}
-async function start() {
-  await Promise.all(Array.from(document.images, picture = > picture.decode()));
+window.addEventListener("load", () => {
   if (byId("stage")) comparePictures();
   root.dataset.pictures = document.querySelectorAll(".pictures img").length;
   root.dataset.plots = document.querySelectorAll("figure.plot svg").length;
   root.dataset.maps = document.querySelectorAll(".maps img").length;
   root.dataset.downloads = document.querySelectorAll("a[download]").length;
   root.dataset.ready = "true";
-}
-start();
+});
 )js";
 
 }  // namespace vrpipe::tools

@@ -20,7 +20,26 @@ namespace {
 struct CourseSlice {
   std::uint64_t from = 0, to = 0;  ///< cycles, `to` excluded
   std::vector<UnitShares> units;
+  std::string bottleneck = {};  ///< a unit; empty where none does anything
 };
+
+/// Says which unit bounds each slice: one that does so goes on until another does so clearly more.
+void find_bottlenecks(std::vector<CourseSlice>& slices) {
+  constexpr double clearly = 0.02;
+  std::string last;
+  for (CourseSlice& slice : slices) {
+    const UnitShares* found = nullptr;
+    const UnitShares* before = nullptr;
+    for (const UnitShares& unit : slice.units) {
+      // Of equals the last: what is before it waits for it.
+      if (found == nullptr || engaged(unit) >= engaged(*found)) found = &unit;
+      if (unit.unit == last) before = &unit;
+    }
+    if (before != nullptr && engaged(*before) + clearly >= engaged(*found)) found = before;
+    if (found != nullptr && engaged(*found) > 0) slice.bottleneck = found->unit;
+    last = slice.bottleneck;
+  }
+}
 
 /// No more than there is room for.
 std::vector<CourseSlice> slices_of(const RunResult& run, std::uint64_t longest) {
@@ -35,16 +54,8 @@ std::vector<CourseSlice> slices_of(const RunResult& run, std::uint64_t longest) 
     if (to <= intervals.from[begin]) continue;
     slices.push_back({intervals.from[begin], to, unit_shares(intervals, begin, end)});
   }
+  find_bottlenecks(slices);
   return slices;
-}
-
-const UnitShares* bottleneck_of(const CourseSlice& slice) {
-  const UnitShares* found = nullptr;
-  for (const UnitShares& unit : slice.units) {
-    // Of equals the last: what is before it waits for it.
-    if (found == nullptr || engaged(unit) >= engaged(*found)) found = &unit;
-  }
-  return found != nullptr && engaged(*found) > 0 ? found : nullptr;
 }
 
 constexpr UnitState drawn_states[] = {UnitState::busy, UnitState::memory, UnitState::latency, UnitState::blocked};
@@ -73,7 +84,9 @@ struct CourseScale {
 /// Areas over one another, as steps.
 std::string unit_areas(const std::string& id, const RunResult& run, const std::vector<CourseSlice>& slices,
                        std::size_t unit, const CourseScale& scale, double top) {
-  std::string text;
+  std::string text =
+      fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{}\" fill=\"{}\" class=\"piece\"/>\n", left,
+                  top, scale.x(run, slices.back().to) - left, unit_height, fill_text(id, fill_of(UnitState::starved)));
   std::vector<double> below(slices.size(), 0.0);
   for (const UnitState state : drawn_states) {
     std::string upper;
@@ -92,8 +105,7 @@ std::string unit_areas(const std::string& id, const RunResult& run, const std::v
     if (most < 0.002) continue;
     text += fmt::format("<polygon points=\"{}{}\" fill=\"{}\"/>\n", upper, lower, fill_text(id, fill_of(state)));
   }
-  return text + fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{}\" class=\"frame\"/>\n", left, top,
-                            scale.x(run, slices.back().to) - left, unit_height);
+  return text;
 }
 
 /// Which unit bounds, one piece for as long as it is the same.
@@ -101,14 +113,9 @@ std::string bottleneck_strip(const RunResult& run, const std::vector<CourseSlice
                              double top) {
   std::string text;
   for (std::size_t i = 0; i < slices.size();) {
-    const UnitShares* const unit = bottleneck_of(slices[i]);
-    const std::string name = unit != nullptr ? unit->unit : "";
+    const std::string& name = slices[i].bottleneck;
     std::size_t end = i + 1;
-    const auto is_same = [&](const CourseSlice& slice) {
-      const UnitShares* const other = bottleneck_of(slice);
-      return name == (other != nullptr ? other->unit : "");
-    };
-    while (end < slices.size() && is_same(slices[end])) ++end;
+    while (end < slices.size() && slices[end].bottleneck == name) ++end;
     const double from = scale.x(run, slices[i].from);
     const double to = scale.x(run, slices[end - 1].to);
     text += fmt::format(
@@ -157,11 +164,9 @@ std::string slices_csv(const std::vector<RunResult>& runs, const std::vector<std
   CsvText csv(columns);
   for (std::size_t i = 0; i < runs.size(); ++i) {
     for (const CourseSlice& slice : slices[i]) {
-      const UnitShares* const bottleneck = bottleneck_of(slice);
       for (const UnitShares& unit : slice.units) {
         std::vector<std::string> cells{name_of(runs[i].request), fmt::format("{}", slice.from),
-                                       fmt::format("{}", slice.to), bottleneck != nullptr ? bottleneck->unit : "",
-                                       unit.unit};
+                                       fmt::format("{}", slice.to), slice.bottleneck, unit.unit};
         for (const double share : unit.shares) cells.push_back(fmt::format("{:.6g}", share));
         csv.row(cells);
       }
@@ -191,7 +196,7 @@ std::string course_section(const JobResult& result) {
   const std::string id = "states-over-time";
   std::vector<std::pair<std::string, std::size_t>> kinds;
   for (const UnitState state : drawn_states) kinds.emplace_back(vrpipe::name_of(state), fill_of(state));
-  kinds.emplace_back("starved: white", fill_of(UnitState::starved));
+  kinds.emplace_back(vrpipe::name_of(UnitState::starved), fill_of(UnitState::starved));
   std::string body = svg_legend(id, kinds, left, 12);
   double y = 30;
   for (std::size_t i = 0; i < runs.size(); ++i) {

@@ -4,7 +4,6 @@
 
 #include "output/compare_sections.h"
 #include "output/page_parts.h"
-#include "output/plot_fill.h"
 #include "output/report.h"
 #include "output/svg_plot.h"
 
@@ -89,18 +88,22 @@ std::string amount(std::uint64_t value) {
 
 // Pixels of the drawing.
 constexpr double width = 1040;
-constexpr double left = 170;
+constexpr double left = 160;
+constexpr double right = 1024;
+constexpr double room = 64;  // of a column, for what stands beside a bar
 constexpr double stage_height = 26;
 constexpr double stage_step = 42;
 constexpr double heading = 30;
 constexpr std::size_t most_columns = 4;
+constexpr const char* stage_color = "#b4cbe0";
+constexpr const char* last_color = "#123a5c";
 
 /// One run: a bar for each stage, in the middle, with what narrows it between.
-std::string funnel_column(const std::string& id, const std::string& run, const std::vector<FunnelStage>& stages,
-                          std::size_t index, double x, double y, double column, double greatest) {
+std::string funnel_column(const std::string& run, const std::vector<FunnelStage>& stages, std::size_t index, double x,
+                          double y, double column, double greatest) {
   const double middle = x + column / 2;
   const auto half = [&](std::uint64_t value) {
-    return greatest > 0 ? static_cast<double>(value) / greatest * (column - 24) / 2 : 0;
+    return greatest > 0 ? static_cast<double>(value) / greatest * (column - room) / 2 : 0;
   };
   std::string text =
       fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\" class=\"axis strong\">{}</text>\n", middle,
@@ -122,22 +125,24 @@ std::string funnel_column(const std::string& id, const std::string& run, const s
         "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{}\" fill=\"{}\" class=\"piece\"><title>{}, {}: {}, "
         "{:.1f} % of those rasterized</title></rect>\n",
         middle - half(value), top, std::max(1.0, 2 * half(value)), stage_height,
-        fill_text(id, i + 1 == stages.size() ? 0 : 2), html_escaped(run), html_escaped(stages[i].name), grouped(value),
-        share);
-    const std::string label = i == 0 ? amount(value) : fmt::format("{} ({:.0f} %)", amount(value), share);
-    const bool fits = 2 * half(value) > 7.2 * static_cast<double>(label.size()) + 6;
+        i + 1 == stages.size() ? last_color : stage_color, html_escaped(run), html_escaped(stages[i].name),
+        grouped(value), share);
+    const std::string label = i == 0 ? amount(value) : fmt::format("{}, {:.0f} %", amount(value), share);
+    const bool fits = 2 * half(value) > 6.1 * static_cast<double>(label.size()) + 8;
     const bool is_light = fits && i + 1 == stages.size();
     text += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" class=\"small {}\">{}</text>\n",
                         fits ? middle : middle + half(value) + 5, top + stage_height / 2 + 4, fits ? "middle" : "start",
-                        is_light ? "light" : "label", label);
+                        is_light ? "light"
+                        : fits   ? ""
+                                 : "label",
+                        label);
   }
   return text;
 }
 
-std::string funnel_svg(const std::string& id, const char* what, const std::vector<FunnelStage>& stages,
-                       const std::vector<RunResult>& runs) {
+std::string funnel_svg(const char* what, const std::vector<FunnelStage>& stages, const std::vector<RunResult>& runs) {
   const std::size_t columns = std::min(runs.size(), most_columns);
-  const double column = std::min(300.0, (width - left) / static_cast<double>(columns));
+  const double column = std::min(300.0, (right - left) / static_cast<double>(columns));
   const double panel = heading + stage_step * static_cast<double>(stages.size());
   const std::size_t panels = (runs.size() + columns - 1) / columns;
   const double greatest =
@@ -146,7 +151,6 @@ std::string funnel_svg(const std::string& id, const char* what, const std::vecto
       "<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"what became of {}\" "
       "xmlns=\"http://www.w3.org/2000/svg\">\n",
       width, panel * static_cast<double>(panels), what);
-  text += fill_definitions(id);
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const double y = panel * static_cast<double>(i / columns);
     if (i % columns == 0) {
@@ -156,7 +160,7 @@ std::string funnel_svg(const std::string& id, const char* what, const std::vecto
                             html_escaped(stages[k].name));
       }
     }
-    text += funnel_column(id, name_of(runs[i].request), stages, i, left + column * static_cast<double>(i % columns), y,
+    text += funnel_column(name_of(runs[i].request), stages, i, left + column * static_cast<double>(i % columns), y,
                           column, greatest);
   }
   return text + "</svg>\n";
@@ -185,7 +189,7 @@ std::string funnels_section(const JobResult& result) {
         funnel->what,
         fmt::format("What becomes of {}, from what is rasterized to what is blended; shares are of those rasterized.",
                     funnel->what),
-        funnel_svg(funnel->what, funnel->what, stages, result.runs), csv});
+        funnel_svg(funnel->what, stages, result.runs), csv});
   }
   return text;
 }

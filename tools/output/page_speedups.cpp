@@ -17,7 +17,7 @@ std::string speedup_figure(const JobResult& result, const std::string& csv) {
   plot.id = "speedup";
   plot.description = "speed-up of each run over " + name_of(baseline.request);
   plot.axis = "speed-up over " + name_of(baseline.request);
-  plot.kinds = {{"speed-up", 2}};
+  plot.kinds = {{"speed-up", 0}};
   plot.line = 1;
   StackGroup& group = plot.groups.emplace_back();
   for (const RunResult& run : result.runs) {

@@ -15,7 +15,6 @@ namespace {
 constexpr double width = 1040;
 constexpr double left = 260;
 constexpr double right = 840;  // notes stand behind it
-constexpr double top = 34;
 constexpr double bar_height = 15;
 constexpr double bar_step = 18;
 constexpr double group_gap = 10;
@@ -64,6 +63,7 @@ std::string svg_legend(const std::string& id, const std::vector<std::pair<std::s
 std::string svg(const StackPlot& plot) {
   const double end = end_of_scale(plot);
   const auto x = [&](double value) { return left + value / end * (right - left); };
+  const double top = plot.kinds.size() > 1 ? 34 : 10;  // below a legend
   std::string body;
   double y = top;
   for (const StackGroup& group : plot.groups) {
