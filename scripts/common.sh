@@ -9,7 +9,7 @@ build_packages=(g++ cmake ninja-build pkg-config ccache libsystemc-dev libglm-de
   libcli11-dev libfmt-dev libpng-dev libopenexr-dev libmd-dev libassimp-dev libtomlplusplus-dev
   zlib1g-dev libzstd-dev libwebp-dev libzip-dev)
 check_packages=(git clang libclang-rt-14-dev clang-format clang-tidy libgtest-dev libgmock-dev librapidcheck-dev libbenchmark-dev
-  liblzma-dev xz-utils libboost-mpi1.81-dev openmpi-bin)
+  liblzma-dev xz-utils libboost-mpi1.81-dev openmpi-bin chromium)
 
 # The comment at the head of a script is its help.
 if [ "${1-}" = --help ]; then
