@@ -191,7 +191,10 @@ std::string course_section(const JobResult& result) {
   for (const RunResult& run : runs) scale.longest = std::max(scale.longest, scale.of(run, run.cycles.value_or(0)));
   if (scale.longest <= 0) return {};
   std::vector<std::vector<CourseSlice>> slices;
-  for (const RunResult& run : runs) slices.push_back(slices_of(run, longest));
+  for (const RunResult& run : runs) {
+    slices.push_back(slices_of(run, longest));
+    if (slices.back().empty()) return {};
+  }
 
   const std::string id = "states-over-time";
   std::vector<std::pair<std::string, std::size_t>> kinds;

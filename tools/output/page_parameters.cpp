@@ -117,7 +117,9 @@ std::string implementations_table(const std::vector<RunResult>& runs) {
     }
     rows.push_back(std::move(row));
   }
-  return "<details><summary>Units and their implementations</summary>\n" + html_table(heading, rows, "parameters") +
+  const bool differ = std::any_of(rows.begin(), rows.end(), [](const PageRow& row) { return !row.kind.empty(); });
+  return (differ ? "<details open>" : "<details>") +
+         std::string("<summary>Units and their implementations</summary>\n") + html_table(heading, rows, "parameters") +
          "</details>\n";
 }
 

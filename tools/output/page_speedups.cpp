@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <vrpipe/platforms/netlist.h>
+
 #include "jobs/comparison.h"
 #include "output/compare_sections.h"
 #include "output/effects_page.h"
@@ -10,6 +12,13 @@
 
 namespace vrpipe::tools {
 namespace {
+
+std::string busiest_text(const RunResult& run) {
+  if (!run.bottleneck) return "-";
+  const std::string& unit = run.bottleneck->unit;
+  return fmt::format("{}, {:.0f} %", run.request.platform->gpcs > 1 ? unit : without_gpc(unit),
+                     100 * run.bottleneck->occupancy);
+}
 
 std::string speedup_figure(const JobResult& result, const std::string& csv) {
   const RunResult& baseline = result.runs[result.baseline];
@@ -48,9 +57,7 @@ std::string speedups_section(const JobResult& result) {
              csv_number(run.cpu_seconds), run.bottleneck ? run.bottleneck->unit : std::string(),
              run.bottleneck ? csv_number(run.bottleneck->occupancy) : std::string(), run.result_hash});
     rows.push_back({{name_of(run.request), grouped(run.cycles.value_or(0)), fmt::format("{:.3f}", run.milliseconds),
-                     gain ? fmt::format("{:.2f}x", *gain) : std::string("-"),
-                     run.bottleneck ? fmt::format("{}, {:.0f} %", run.bottleneck->unit, 100 * run.bottleneck->occupancy)
-                                    : std::string("-"),
+                     gain ? fmt::format("{:.2f}x", *gain) : std::string("-"), busiest_text(run),
                      fmt::format("{:.2f}", run.host_seconds), run.result_hash},
                     &run == &baseline && compares ? "marked" : ""});
   }
