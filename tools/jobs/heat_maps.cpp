@@ -83,13 +83,13 @@ nlohmann::ordered_json legend(const std::vector<NamedChannel>& channels) {
 HeatMaps::HeatMaps(std::uint32_t width, std::uint32_t height, Fidelity fidelity)
     : has_time_(has_time(fidelity)), fates_(width, height), cycles_(width, height) {}
 
-void HeatMaps::attach(Observers& observers) {
+void HeatMaps::attach(Observers& observers, bool terminates) {
   observers.on_fragments([this](const Observers::Fragments& seen) {
     float* const values = fates_.values() + static_cast<std::size_t>(seen.fate);
     for_each_pixel(seen.tile, seen.position, seen.lanes, fates_.width(),
                    [&](std::size_t pixel) { values[4 * pixel] += 1; });
   });
-  if (!has_time_) return;
+  if (!has_time_ || !terminates) return;
   observers.on_link<TerminationBeat>("crop.terminations", [this](const Observers::Passed<TerminationBeat>& passed) {
     for (unsigned i = 0; i < passed.item.count; ++i) {
       const TerminationSignal& signal = passed.item.signals[i];

@@ -21,7 +21,9 @@ class HeatMaps {
   HeatMaps(std::uint32_t width, std::uint32_t height, Fidelity fidelity);
 
   /// For one run, which must not outlive this.
-  void attach(Observers& observers);
+  /// @param terminates  whether pixels may terminate in it: if not, nobody looks at what would make units that a run is
+  ///                    without part of it
+  void attach(Observers& observers, bool terminates);
   /// Once the run is done: writes `files`. Throws UserError.
   void write(const std::string& stem) const;
 

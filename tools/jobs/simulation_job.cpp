@@ -40,7 +40,7 @@ std::vector<std::unique_ptr<HeatMaps>> observe_heat(std::vector<RunRequest>& req
   for (RunRequest& request : requests) {
     if (request.observers == nullptr) request.observers = std::make_shared<Observers>();
     maps.push_back(std::make_unique<HeatMaps>(width, height, request.fidelity));
-    maps.back()->attach(*request.observers);
+    maps.back()->attach(*request.observers, request.variant.early_termination);
   }
   return maps;
 }
