@@ -173,7 +173,8 @@ TEST_F(Interval, AreRefusedWithoutTimeOrWithoutAPlace) {
     refused_here({"--interval", "9", "--explain-effects"}, {"--explain-effects", "--interval"});
     refused_here({"--interval", "9", "--interval-csv", "r.json"}, {"is the same file"});
     refused_here({"--interval", "9", "--interval-csv", "no/i.csv"}, {"--interval-csv no/i.csv", "no folder no"});
-    refused({command, "--scene", "tiny.spl", "--interval", "9"}, {"--interval", "add --json FILE or --interval-csv"});
+    refused({command, "--scene", "tiny.spl", "--interval", "9"},
+            {"--interval", "add --json FILE, --interval-csv FILE.csv or --html"});
   }
   refused({"compare", "--views", "2", "--interval", "9", "--json", "r.json"}, {"--interval", "or --views"});
   refused({"accuracy", "--interval", "9"}, {"'--interval'", "`vrpipe run`"});
