@@ -13,16 +13,16 @@
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/observers.h>
 
+#include "support/fidelities.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::fidelities_with_time;
 using testing::random_draw;
 using testing::request_of;
 using testing::run;
-
-constexpr Fidelity with_time[] = {Fidelity::lt, Fidelity::at, Fidelity::cycle};
 
 RunRequest observed(const std::string& variant, Fidelity fidelity) {
   RunRequest request = request_of(variant, fidelity);
@@ -48,7 +48,7 @@ TEST(Observers, SeveralSeeOneLink) {
 
 TEST(Observers, SeePlacesOfAQueueTakenAndFree) {
   const Draw draw = random_draw(150, 90, 300, 9);
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     SCOPED_TRACE(name_of(fidelity));
     const std::string plain = run(request_of("het+qm", fidelity), draw).result_hash;
     RunRequest request = observed("het+qm", fidelity);
@@ -121,7 +121,7 @@ TEST(Observers, AreToldOfTheEndWithTheResult) {
 
 TEST(Intervals, SumToTheRun) {
   const Draw draw = random_draw(200, 120, 300, 2);
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     const std::string plain =
         run(request_of("het+qm", fidelity, [](RunRequest& r) { r.platform = &platform_named("desktop"); }), draw)
             .result_hash;

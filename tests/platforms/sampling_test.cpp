@@ -13,17 +13,17 @@
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/observers.h>
 
+#include "support/fidelities.h"
 #include "support/foreign_memory.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::fidelities_with_time;
 using testing::random_draw;
 using testing::request_of;
 using testing::run;
-
-constexpr Fidelity with_time[] = {Fidelity::lt, Fidelity::at, Fidelity::cycle};
 
 struct Sample {
   Cycle cycle;
@@ -55,7 +55,7 @@ const std::vector<std::string> everything{"*.*", "*.*.*", "*.*.*.*"};
 
 TEST(Sampling, ChangesNothing) {
   const Draw draw = random_draw(150, 90, 300, 9);
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     for (const Termination termination : {Termination::paper, Termination::strict}) {
       RunRequest request = request_of("het+qm", fidelity);
       request.termination = termination;
@@ -75,7 +75,7 @@ TEST(Sampling, ChangesNothing) {
 
 TEST(Sampling, IsAtMultiplesOfTheIntervalAndAtTheEnd) {
   const Draw draw = random_draw(150, 90, 300, 9);
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     const Cycle end = run(request_of("qm", fidelity), draw).cycles.value();
     for (const Cycle every : {Cycle{100}, end - 1, end, end + 1}) {
       std::vector<Cycle> expected;
@@ -92,7 +92,7 @@ TEST(Sampling, IsAtMultiplesOfTheIntervalAndAtTheEnd) {
 
 TEST(Sampling, EndsWithTheResult) {
   const Draw draw = random_draw(200, 120, 300, 2);
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     RunResult result;
     const std::vector<Sample> samples =
         sampled(request_of("het+qm", fidelity, [](RunRequest& r) { r.platform = &platform_named("desktop"); }), draw,
@@ -117,7 +117,7 @@ TEST(Sampling, EndsWithTheResult) {
 
 TEST(Sampling, CountersNeverFall) {
   const Draw draw = random_draw(150, 90, 300, 9);
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     std::map<std::string, std::uint64_t> before;
     unsigned rises = 0;
     for (const Sample& sample : sampled(request_of("het+qm", fidelity), draw, 50, everything)) {

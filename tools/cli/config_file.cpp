@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
-#include <iterator>
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 #include <CLI/CLI.hpp>
 
 #include <vrpipe/component/error.h>
 
 #include "cli/options.h"
+#include "jobs/toml_file.h"
 #include "jobs/user_variants.h"
 
 namespace vrpipe::tools {
@@ -24,73 +22,23 @@ const std::string units_key = "unit";
 const std::string variants_key = "variants";
 
 /// Of the file, with what the readers of its parts need.
-class Reader {
+class ConfigReader : public TomlFile {
  public:
-  Reader(const std::filesystem::path& path, const CLI::App& app) : path_(path), app_(app) {}
+  ConfigReader(const std::filesystem::path& path, const CLI::App& app)
+      : TomlFile(path, "cannot read configuration", std::string(config_option) + " " + path.string(),
+                 "docs/configuration.md"),
+        app_(app) {}
 
-  [[noreturn]] void refuse(const toml::node& node, const std::string& what, const std::string& why,
-                           const std::string& remedy) const {
-    throw UserError(what, place(node.source()), why, remedy);
-  }
   [[noreturn]] void refuse_key(const toml::node& node, const std::string& key,
                                const std::vector<std::string>& known) const {
     refuse(node, "unknown key '" + key + "'", "there is no such key here",
            fmt::format("did you mean {}? `vrpipe {} --help` lists the options", nearest_name(key, known),
                        app_.get_name()));
   }
-  std::string place(const toml::source_region& region) const {
-    return fmt::format("{}:{}", path_.string(), region.begin.line);
-  }
-
-  /// A value as the command line has it.
-  std::string scalar(const toml::node& node, const std::string& key) const {
-    if (const auto* text = node.as_string()) return text->get();
-    if (const auto* number = node.as_integer()) return std::to_string(number->get());
-    if (const auto* number = node.as_floating_point()) return fmt::format("{}", number->get());
-    if (const auto* flag = node.as_boolean()) return flag->get() ? "on" : "off";
-    refuse(node, "bad value of '" + key + "'", "it is no text, number, true or false", "give one of them");
-  }
 
   const toml::table& table(const toml::node& node, const std::string& key) const {
     if (const toml::table* found = node.as_table()) return *found;
     refuse(node, "bad value of '" + key + "'", "it is no table", "write [" + key + "], and its keys below");
-  }
-
-  /// A table's entries in the order of the file.
-  static std::vector<std::pair<std::string, const toml::node*>> in_order(const toml::table& table) {
-    std::vector<std::pair<std::string, const toml::node*>> entries;
-    for (const auto& [key, node] : table) entries.emplace_back(std::string(key.str()), &node);
-    // A table that dotted keys made has no place of its own: that of its first value counts.
-    const auto before = [](const auto& a, const auto& b) {
-      const toml::source_position x = position(*a.second), y = position(*b.second);
-      return x < y;
-    };
-    std::stable_sort(entries.begin(), entries.end(), before);
-    return entries;
-  }
-  static toml::source_position position(const toml::node& node) {
-    toml::source_position first = node.source().begin;
-    if (const toml::table* table = node.as_table()) {
-      for (const auto& [key, value] : *table) {
-        const toml::source_position place = position(value);
-        if (!first || place < first) first = place;
-      }
-    }
-    return first;
-  }
-
-  /// Dotted paths and values of all leaves.
-  std::vector<std::pair<std::string, const toml::node*>> leaves(const toml::table& table,
-                                                                const std::string& prefix = "") const {
-    std::vector<std::pair<std::string, const toml::node*>> all;
-    for (const auto& [key, node] : in_order(table)) {
-      if (const toml::table* inner = node->as_table()) {
-        for (auto& leaf : leaves(*inner, prefix + key + ".")) all.push_back(std::move(leaf));
-      } else {
-        all.emplace_back(prefix + key, node);
-      }
-    }
-    return all;
   }
 
   VariantDefinition variant(const std::string& name, const toml::node& node) const {
@@ -112,17 +60,13 @@ class Reader {
     return definition;
   }
 
-  /// The name of a file, from where vrpipe runs.
-  std::string from_here(const std::string& text, const std::string& type) const {
-    if (type.find("FILE") == std::string::npos && type.find("DIR") == std::string::npos) return text;
-    if (text == "-" || text.rfind("builtin:", 0) == 0) return text;
-    const std::size_t name = type.find("NAME=FILE") != std::string::npos ? text.find('=') + 1 : 0;
-    const std::filesystem::path file = text.substr(name);
-    return text.substr(0, name) + (file.is_absolute() ? file : path_.parent_path() / file).string();
+  /// A value of an option, with names of files from where vrpipe runs.
+  std::string value(const toml::node& node, const std::string& key, const CLI::Option& option) const {
+    return with_file_of(option, scalar(node, key),
+                        [&](const std::filesystem::path& file) { return in_folder(path().parent_path(), file); });
   }
 
  private:
-  const std::filesystem::path& path_;
   const CLI::App& app_;
 };
 
@@ -135,6 +79,13 @@ bool is_merged(const std::string& option) {
 
 }  // namespace
 
+std::string with_file_of(const CLI::Option& option, const std::string& text,
+                         const std::function<std::filesystem::path(const std::filesystem::path&)>& change) {
+  const std::string type = option.get_type_name();
+  if (type.find("FILE") == std::string::npos && type.find("DIR") == std::string::npos) return text;
+  return with_file(text, type.find("NAME=FILE") != std::string::npos, change);
+}
+
 ConfigFile::ConfigFile(const std::filesystem::path& path, CLI::App& app, const std::vector<std::string>& others)
     : path_(path) {
   read(app, others);
@@ -142,22 +93,7 @@ ConfigFile::ConfigFile(const std::filesystem::path& path, CLI::App& app, const s
 }
 
 void ConfigFile::read(CLI::App& app, const std::vector<std::string>& others) {
-  const Reader reader(path_, app);
-  std::error_code ignored;
-  std::ifstream file(path_, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path_, ignored)) {
-    throw UserError("cannot read configuration", std::string(config_option) + " " + path_.string(),
-                    "there is no such file, or it may not be read",
-                    "name a TOML file; docs/configuration.md describes it");
-  }
-  const std::string content(std::istreambuf_iterator<char>(file), {});
-  toml::table root;
-  try {
-    root = toml::parse(content, path_.string());
-  } catch (const toml::parse_error& error) {
-    throw UserError("cannot read configuration", reader.place(error.source()), std::string(error.description()),
-                    "correct it; docs/configuration.md describes the file");
-  }
+  const ConfigReader reader(path_, app);
   std::vector<std::string> known{settings_key, units_key};
   const CLI::Option* const define = app.get_option_no_throw("--define");
   if (define != nullptr) known.push_back(variants_key);
@@ -168,23 +104,23 @@ void ConfigFile::read(CLI::App& app, const std::vector<std::string>& others) {
     }
   }
   known.insert(known.end(), others.begin(), others.end());
-  for (const auto& [key, node] : Reader::in_order(root)) {
+  for (const auto& [key, node] : ConfigReader::in_order(reader.root())) {
     if (std::find(others.begin(), others.end(), key) != others.end()) continue;
-    const unsigned line = Reader::position(*node).line;
+    const unsigned line = ConfigReader::position(*node).line;
     const CLI::Option* const option = app.get_option_no_throw("--" + key);
     if (std::find(known.begin(), known.end(), key) == known.end()) reader.refuse_key(*node, key, known);
     if (key == settings_key || key == units_key) {
       if (option == nullptr) reader.refuse_key(*node, key, known);
-      for (const auto& [path, leaf] : reader.leaves(reader.table(*node, key))) {
+      for (const auto& [path, leaf] : TomlFile::leaves(reader.table(*node, key))) {
         const std::string value = reader.scalar(*leaf, path);
         add("--" + key, path, path + "=" + value, leaf->source().begin.line);
         mention(path, value, leaf->source().begin.line);
       }
     } else if (key == variants_key) {
-      for (const auto& [name, each] : Reader::in_order(reader.table(*node, key))) {
+      for (const auto& [name, each] : ConfigReader::in_order(reader.table(*node, key))) {
         const VariantDefinition definition = reader.variant(name, *each);
-        add("--define", name, text_of(definition), Reader::position(*each).line);
-        for (const auto& [path, leaf] : reader.leaves(*each->as_table())) {
+        add("--define", name, text_of(definition), ConfigReader::position(*each).line);
+        for (const auto& [path, leaf] : TomlFile::leaves(*each->as_table())) {
           const std::size_t dot = path.find('.');
           if (dot != std::string::npos)
             mention(path.substr(dot + 1), reader.scalar(*leaf, path), leaf->source().begin.line);
@@ -204,11 +140,11 @@ void ConfigFile::read(CLI::App& app, const std::vector<std::string>& others) {
         add("--" + key, "", text, line);
       } else if (list != nullptr) {
         for (const toml::node& each : *list) {
-          const std::string text = reader.from_here(reader.scalar(each, key), type);
+          const std::string text = reader.value(each, key, *option);
           add("--" + key, is_merged("--" + key) ? text : "", text, each.source().begin.line);
         }
       } else {
-        const std::string text = reader.from_here(reader.scalar(*node, key), type);
+        const std::string text = reader.value(*node, key, *option);
         add("--" + key, is_merged("--" + key) ? text : "", text, line);
       }
     }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,7 +10,8 @@
 
 namespace CLI {
 class App;
-}
+class Option;
+}  // namespace CLI
 
 namespace vrpipe::tools {
 
@@ -66,6 +68,9 @@ struct Invocation {
   bool gives(const std::string& what) const { return config && config->gives(what); }
 };
 
+/// What an option is given, with another name for the file if its value names one (help calls it FILE or DIR).
+std::string with_file_of(const CLI::Option& option, const std::string& text,
+                         const std::function<std::filesystem::path(const std::filesystem::path&)>& change);
 /// Notes in a result's provenance what a configuration file says of parameters.
 void note_config(const Invocation& invocation, Provenance& provenance);
 /// --config and --print-config.

@@ -107,6 +107,11 @@ std::optional<std::string> single(const Values& values, const std::string& optio
   return values.front();
 }
 
+std::optional<std::filesystem::path> single_path(const Values& values, const std::string& option) {
+  const auto text = single(values, option);
+  return text ? std::optional<std::filesystem::path>(*text) : std::nullopt;
+}
+
 void load_plugins(const Values& plugins) {
   const StdoutToStderr redirected;
   for (const std::string& plugin : plugins) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +31,9 @@ CLI::Option* add_option(CLI::App& app, const std::string& name, Values& values, 
 
 /// The text of an option that may be given once; none when it was not. Throws UserError.
 std::optional<std::string> single(const Values& values, const std::string& option);
+
+/// The same of an option that names a file or folder.
+std::optional<std::filesystem::path> single_path(const Values& values, const std::string& option);
 
 std::shared_ptr<CLI::FormatterBase> help_formatter();
 

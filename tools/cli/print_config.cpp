@@ -65,11 +65,8 @@ std::string line_of(const std::string& key, const std::string& value, const std:
 }
 
 /// Independent of where the file will stand.
-std::string file_text(const std::string& text, const std::string& type) {
-  if (type.find("FILE") == std::string::npos && type.find("DIR") == std::string::npos) return text;
-  if (text == "-" || text.rfind("builtin:", 0) == 0) return text;
-  const std::size_t name = type.find("NAME=FILE") != std::string::npos ? text.find('=') + 1 : 0;
-  return text.substr(0, name) + std::filesystem::absolute(text.substr(name)).lexically_normal().string();
+std::filesystem::path from_the_root(const std::filesystem::path& file) {
+  return std::filesystem::absolute(file).lexically_normal();
 }
 
 /// What help says of an option that is not given.
@@ -178,7 +175,7 @@ class Writer {
     for (const std::string& text : option.results()) {
       // A variant that is defined where it is chosen stands below.
       const bool defines = name == "variant" && text.find('=') != std::string::npos;
-      const std::string value = defines ? text.substr(0, text.find('=')) : file_text(text, option.get_type_name());
+      const std::string value = defines ? text.substr(0, text.find('=')) : with_file_of(option, text, from_the_root);
       values.push_back(option.results().size() == 1 ? value_text(value) : quoted(value));
     }
     const std::string value = values.size() == 1 ? values.front() : fmt::format("[{}]", fmt::join(values, ", "));

@@ -163,14 +163,10 @@ class ReproduceCommand : public Command {
     for (const std::string& text : settings_) base.settings.push_back(parse_setting(text));
     check_configuration(base);
     job.json = single(json_, "--json");
-    const auto path = [](const Values& values, const char* option) {
-      const auto text = single(values, option);
-      return text ? std::optional<std::filesystem::path>(*text) : std::nullopt;
-    };
-    job.html = path(html_, "--html");
-    job.markdown = path(markdown_, "--markdown");
-    job.output = path(output_, "--output");
-    job.journal = path(journal_, ReproduceJob::journal_option);
+    job.html = single_path(html_, "--html");
+    job.markdown = single_path(markdown_, "--markdown");
+    job.output = single_path(output_, "--output");
+    job.journal = single_path(journal_, ReproduceJob::journal_option);
     const auto jobs = single(jobs_, "--jobs");
     job.processes = jobs ? parse_count(*jobs, "--jobs", 1024) : std::max(1U, std::thread::hardware_concurrency());
     return job;

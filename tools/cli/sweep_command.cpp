@@ -141,14 +141,10 @@ class SweepCommand : public Command {
     if (const auto text = single(relative_to_, "--relative-to"))
       job.study.relative_to = parse_axis_values(*text, job.study, "--relative-to");
     job.common = arguments_.resolve(SimulationArguments::Variants::one, invocation());
-    const auto path = [](const Values& values, const char* option) {
-      const auto text = single(values, option);
-      return text ? std::optional<std::filesystem::path>(*text) : std::nullopt;
-    };
-    job.csv = path(csv_, "--csv");
-    job.jsonl = path(jsonl_, "--jsonl");
-    job.html = path(html_, "--html");
-    job.journal = path(journal_, SweepJob::journal_option);
+    job.csv = single_path(csv_, "--csv");
+    job.jsonl = single_path(jsonl_, "--jsonl");
+    job.html = single_path(html_, "--html");
+    job.journal = single_path(journal_, SweepJob::journal_option);
     if (const auto text = single(shard_, "--shard")) job.shard = parse_shard(*text);
     check_outputs(job);
     return job;

@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <set>
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <vrpipe/component/error.h>
+
+#include "jobs/toml_file.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -20,22 +19,13 @@ constexpr std::uint64_t most_points = 1'000'000;
 const std::vector<std::string> plain_axes{"scene",    "view",   "size",        "platform",  "variant",
                                           "fidelity", "format", "termination", "multi-pass"};
 
-class Reader {
+class StudyReader : public TomlFile {
  public:
-  explicit Reader(const std::filesystem::path& path) : path_(path) {}
+  explicit StudyReader(const std::filesystem::path& path)
+      : TomlFile(path, "cannot read study", path.string(), "docs/studies.md") {}
 
-  [[noreturn]] void refuse(const toml::node& node, const std::string& what, const std::string& why,
-                           const std::string& remedy) const {
-    throw UserError(what, fmt::format("{}:{}", path_.string(), node.source().begin.line), why, remedy);
-  }
-
-  std::string scalar(const toml::node& node, const std::string& key) const {
-    if (const auto* text = node.as_string()) return text->get();
-    if (const auto* number = node.as_integer()) return std::to_string(number->get());
-    if (const auto* number = node.as_floating_point()) return fmt::format("{}", number->get());
-    if (const auto* flag = node.as_boolean()) return flag->get() ? "on" : "off";
-    refuse(node, "bad value of '" + key + "'", "it is no text, number, true or false", "give one of them");
-  }
+  /// By dotted paths; a range is a value.
+  static Entries values(const toml::table& table) { return leaves(table, "from"); }
 
   void check_name(const toml::node& node, const std::string& name) const {
     if (std::find(plain_axes.begin(), plain_axes.end(), name) != plain_axes.end()) return;
@@ -44,27 +34,6 @@ class Reader {
     refuse(node, "unknown axis '" + name + "'",
            "it is neither of " + fmt::format("{}", fmt::join(plain_axes, ", ")) + " nor UNIT.PARAMETER",
            "did you mean " + nearest_name(name, plain_axes) + "?");
-  }
-
-  /// Leaves of a table by their dotted paths; a range is a leaf.
-  void leaves(const toml::table& table, const std::string& prefix,
-              std::vector<std::pair<std::string, const toml::node*>>& all) const {
-    for (const auto& [key, node] : table) {
-      const std::string name = prefix + std::string(key.str());
-      const toml::table* const inner = node.as_table();
-      if (inner != nullptr && !inner->contains("from")) {
-        leaves(*inner, name + ".", all);
-      } else {
-        all.emplace_back(name, &node);
-      }
-    }
-  }
-  std::vector<std::pair<std::string, const toml::node*>> leaves(const toml::table& table) const {
-    std::vector<std::pair<std::string, const toml::node*>> all;
-    leaves(table, "", all);
-    std::stable_sort(all.begin(), all.end(),
-                     [](const auto& a, const auto& b) { return a.second->source().begin < b.second->source().begin; });
-    return all;
   }
 
   StudyAxis axis(const std::string& name, const toml::node& node) const {
@@ -120,8 +89,6 @@ class Reader {
     refuse(range, "bad range of '" + name + "'", fmt::format("it has more than {} values", most_points),
            "take a larger step");
   }
-
-  const std::filesystem::path& path_;
 };
 
 /// SplitMix64 (Steele et al. 2014), the same everywhere.
@@ -166,11 +133,11 @@ std::set<std::uint64_t> sample(std::uint64_t limit, std::uint64_t count, std::ui
   return chosen;
 }
 
-void add_list(const Reader& reader, const toml::array& list, Study& study) {
+void add_list(const StudyReader& reader, const toml::array& list, Study& study) {
   for (const toml::node& node : list) {
     const toml::table* const table = node.as_table();
     if (table == nullptr) reader.refuse(node, "bad point", "it is no table", "write [[points]], and its keys below");
-    const auto entries = reader.leaves(*table);
+    const auto entries = StudyReader::values(*table);
     if (study.axes.empty()) {
       for (const auto& [name, value] : entries) {
         reader.check_name(*value, name);
@@ -196,12 +163,12 @@ void add_list(const Reader& reader, const toml::array& list, Study& study) {
   }
 }
 
-void add_product(const Reader& reader, const toml::table& root, Study& study) {
+void add_product(const StudyReader& reader, const toml::table& root, Study& study) {
   if (const toml::node* node = root.get("axes")) {
     const toml::table* const table = node->as_table();
     if (table == nullptr)
       reader.refuse(*node, "bad value of 'axes'", "it is no table", "write [axes], and its keys below");
-    for (const auto& [name, value] : reader.leaves(*table)) study.axes.push_back(reader.axis(name, *value));
+    for (const auto& [name, value] : StudyReader::values(*table)) study.axes.push_back(reader.axis(name, *value));
   }
   study.product = 1;
   for (const StudyAxis& axis : study.axes) {
@@ -240,43 +207,31 @@ const std::vector<std::string>& study_keys() {
 }
 
 Study read_study(const std::filesystem::path& path) {
-  std::error_code ignored;
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path, ignored)) {
-    throw UserError("cannot read study", path.string(), "there is no such file, or it may not be read",
-                    "name a TOML file; docs/studies.md describes it");
-  }
-  const std::string content(std::istreambuf_iterator<char>(file), {});
-  const Reader reader(path);
+  const StudyReader reader(path);
+  const toml::table& root = reader.root();
   Study study;
-  try {
-    const toml::table root = toml::parse(content, path.string());
-    if (const toml::node* points = root.get("points")) {
-      for (const char* other : {"axes", "sample", "seed"}) {
-        if (root.contains(other))
-          reader.refuse(*root.get(other), "points and " + std::string(other), "a list of points is all of a study",
-                        "leave out one of them");
-      }
-      if (points->as_array() == nullptr)
-        reader.refuse(*points, "bad value of 'points'", "it is no list", "write [[points]]");
-      add_list(reader, *points->as_array(), study);
-    } else {
-      add_product(reader, root, study);
+  if (const toml::node* points = root.get("points")) {
+    for (const char* other : {"axes", "sample", "seed"}) {
+      if (root.contains(other))
+        reader.refuse(*root.get(other), "points and " + std::string(other), "a list of points is all of a study",
+                      "leave out one of them");
     }
-    if (study.axes.empty()) {
-      throw UserError("nothing to study", path.string(), "it has neither points nor axes",
-                      "add [axes], e.g. tc.bins = [16, 32, 64]");
-    }
-    if (const toml::node* pareto = root.get("pareto")) {
-      const toml::array* const list = pareto->as_array();
-      if (list == nullptr || list->size() < 2)
-        reader.refuse(*pareto, "bad value of 'pareto'", "it is no list of two columns or more",
-                      "write e.g. pareto = [\"milliseconds\", \"energy_mj\"]");
-      for (const toml::node& column : *list) study.pareto.push_back(reader.scalar(column, "pareto"));
-    }
-  } catch (const toml::parse_error& error) {
-    throw UserError("cannot read study", fmt::format("{}:{}", path.string(), error.source().begin.line),
-                    std::string(error.description()), "correct it; docs/studies.md describes the file");
+    if (points->as_array() == nullptr)
+      reader.refuse(*points, "bad value of 'points'", "it is no list", "write [[points]]");
+    add_list(reader, *points->as_array(), study);
+  } else {
+    add_product(reader, root, study);
+  }
+  if (study.axes.empty()) {
+    throw UserError("nothing to study", path.string(), "it has neither points nor axes",
+                    "add [axes], e.g. tc.bins = [16, 32, 64]");
+  }
+  if (const toml::node* pareto = root.get("pareto")) {
+    const toml::array* const list = pareto->as_array();
+    if (list == nullptr || list->size() < 2)
+      reader.refuse(*pareto, "bad value of 'pareto'", "it is no list of two columns or more",
+                    "write e.g. pareto = [\"milliseconds\", \"energy_mj\"]");
+    for (const toml::node& column : *list) study.pareto.push_back(reader.scalar(column, "pareto"));
   }
   return study;
 }

@@ -22,6 +22,7 @@
 #include "jobs/ranks.h"
 #include "jobs/result_encoding.h"
 #include "jobs/settings.h"
+#include "jobs/toml_file.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -410,10 +411,8 @@ void simulate_as_rank(const SweepJob& job, const std::vector<RunRequest>& reques
 }  // namespace
 
 std::string scene_of_axis(const SweepJob& job, const std::string& value) {
-  if (value.rfind("builtin:", 0) == 0) return value;
-  const std::size_t name = value.find('=') == std::string::npos ? 0 : value.find('=') + 1;
-  const std::filesystem::path file = value.substr(name);
-  return value.substr(0, name) + (file.is_absolute() ? file : job.study_file.parent_path() / file).string();
+  return with_file(value, true,
+                   [&](const std::filesystem::path& file) { return in_folder(job.study_file.parent_path(), file); });
 }
 
 RunRequest request_of(const SweepJob& job, const StudiedPoint& point) {

@@ -79,7 +79,10 @@ const Variant& add_user_variant(const VariantDefinition& definition) {
   variant.name = definition.name;
   variant.base = definition.base;
   std::vector<std::string> seen;
-  for (const auto& [key, value] : definition.changes) {
+  for (const auto& change : definition.changes) {
+    // Not as a structured binding, which lambdas of C++17 do not capture.
+    const std::string& key = change.first;
+    const std::string& value = change.second;
     if (std::find(seen.begin(), seen.end(), key) != seen.end()) {
       throw UserError("'" + key + "' given twice", where, "a variant has one value of it", "leave out one");
     }
@@ -103,9 +106,7 @@ const Variant& add_user_variant(const VariantDefinition& definition) {
                       "set it for all with --set " + key + "=" + value);
     }
     auto& settings = variant.changed_settings;
-    const auto is_same = [&, name = &key](const Setting& setting) {
-      return setting.unit + "." + setting.parameter == *name;
-    };
+    const auto is_same = [&](const Setting& setting) { return setting.unit + "." + setting.parameter == key; };
     settings.erase(std::remove_if(settings.begin(), settings.end(), is_same), settings.end());
     settings.push_back({key.substr(0, dot), key.substr(dot + 1), value});
   }

@@ -31,15 +31,6 @@ double greatest_of(const BarPlot& plot) {
   return greatest > plot.least ? greatest + 0.02 * (greatest - plot.least) : plot.least + 1;
 }
 
-double step_of(double range) {
-  const double rough = range / 8;
-  const double power = std::pow(10, std::floor(std::log10(rough)));
-  for (const double digit : {1.0, 2.0, 5.0}) {
-    if (digit * power >= rough) return digit * power;
-  }
-  return 10 * power;
-}
-
 }  // namespace
 
 std::string svg(const BarPlot& plot) {
@@ -79,7 +70,7 @@ std::string svg(const BarPlot& plot) {
     text += fmt::format("<text x=\"{:.0f}\" y=\"18\">{}</text>\n", at + 17, html_escaped(name));
     at += 40 + 7.4 * static_cast<double>(name.size());
   }
-  const double step = step_of(greatest - plot.least);
+  const double step = nice_step((greatest - plot.least) / 8);
   for (double k = std::ceil(plot.least / step); k * step <= greatest; ++k) {
     text += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2:.1f}\" class=\"grid\"/>\n", x(k * step),
                         top - 6, y);

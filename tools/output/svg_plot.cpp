@@ -100,13 +100,6 @@ class Scale {
 
  private:
   double transformed(double value) const { return !logarithmic_ ? value : value > 0 ? std::log10(value) : zero_; }
-  static double nice_step(double rough) {
-    const double power = std::pow(10, std::floor(std::log10(rough)));
-    for (const double digit : {1.0, 2.0, 5.0}) {
-      if (digit * power >= rough) return digit * power;
-    }
-    return 10 * power;
-  }
 
   bool logarithmic_;
   double from_, to_;
@@ -240,6 +233,14 @@ std::string html_escaped(const std::string& text) {
     }
   }
   return result;
+}
+
+double nice_step(double rough) {
+  const double power = std::pow(10, std::floor(std::log10(rough)));
+  for (const double digit : {1.0, 2.0, 5.0}) {
+    if (digit * power >= rough) return digit * power;
+  }
+  return 10 * power;
 }
 
 std::string svg(const Plot& plot) {

@@ -49,6 +49,9 @@ struct Plot {
 /// there is no room is left out, and so is that of a point which lies under an earlier one.
 std::string svg(const Plot& plot);
 
+/// The least of 1, 2 and 5 times a power of ten that is no less than this: from one tick of an axis to the next.
+double nice_step(double rough);
+
 /// Text for HTML and SVG, also inside double quotes.
 std::string html_escaped(const std::string& text);
 

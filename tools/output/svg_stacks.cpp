@@ -36,15 +36,6 @@ double end_of_scale(const StackPlot& plot) {
   return greatest > 0 ? greatest : 1;
 }
 
-double step_of(double range) {
-  const double rough = range / 6;
-  const double power = std::pow(10, std::floor(std::log10(rough)));
-  for (const double digit : {1.0, 2.0, 5.0}) {
-    if (digit * power >= rough) return digit * power;
-  }
-  return 10 * power;
-}
-
 }  // namespace
 
 std::string svg_legend(const std::string& id, const std::vector<std::pair<std::string, std::size_t>>& kinds, double x,
@@ -99,7 +90,7 @@ std::string svg(const StackPlot& plot) {
       y + 40, html_escaped(plot.description));
   text += fill_definitions(plot.id);
   if (plot.kinds.size() > 1) text += svg_legend(plot.id, plot.kinds, left, 12);
-  const double step = step_of(end);
+  const double step = nice_step(end / 6);
   for (double k = 0; k * step <= end * 1.0001; ++k) {
     text += fmt::format(
         "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2:.1f}\" class=\"grid\"/>\n"
