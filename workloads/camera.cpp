@@ -17,7 +17,7 @@
 namespace vrpipe {
 namespace {
 
-constexpr char kCannotUse[] = "cannot use camera";
+constexpr char kCannotUseCamera[] = "cannot use camera";
 /// With this, no product of a projection overflows a double.
 constexpr float kMinNearPlane = 1e-6f;
 
@@ -75,14 +75,14 @@ std::size_t find_by_name(const std::vector<Camera>& cameras, const std::string& 
       found.push_back(i);
     }
     if (found.size() > 1) {
-      throw UserError(kCannotUse, where,
+      throw UserError(kCannotUseCamera, where,
                       fmt::format("{} of its cameras are called {}, the first two are #{} and #{}", found.size(), name,
                                   found[0], found[1]),
                       "give the index of one");
     }
     if (!found.empty()) return found.front();
   }
-  throw UserError(kCannotUse, where, fmt::format("none of its {} cameras is called {}", cameras.size(), name),
+  throw UserError(kCannotUseCamera, where, fmt::format("none of its {} cameras is called {}", cameras.size(), name),
                   other_cameras(cameras, name));
 }
 
@@ -130,23 +130,25 @@ double window_depth(const Camera& camera, double z) {
 Camera look_at(const Vec3& eye, const Vec3& target, const Vec3& up, double fovy_degrees, std::uint32_t width,
                std::uint32_t height) {
   check_image_size(width, height, "--size");
-  if (!all_finite(eye)) throw UserError(kCannotUse, "--eye", "a component is not finite", "give three numbers");
-  if (!all_finite(target)) throw UserError(kCannotUse, "--look-at", "a component is not finite", "give three numbers");
-  if (!all_finite(up)) throw UserError(kCannotUse, "--up", "a component is not finite", "give three numbers");
+  if (!all_finite(eye)) throw UserError(kCannotUseCamera, "--eye", "a component is not finite", "give three numbers");
+  if (!all_finite(target))
+    throw UserError(kCannotUseCamera, "--look-at", "a component is not finite", "give three numbers");
+  if (!all_finite(up)) throw UserError(kCannotUseCamera, "--up", "a component is not finite", "give three numbers");
   if (!(fovy_degrees >= 1e-6 && fovy_degrees < 180.0 - 1e-3)) {
-    throw UserError(kCannotUse, "--fovy", fmt::format("the field of view is {:g} degrees", fovy_degrees),
+    throw UserError(kCannotUseCamera, "--fovy", fmt::format("the field of view is {:g} degrees", fovy_degrees),
                     "give 1e-6 to less than 179.999");
   }
   // Halved first: the difference of two large numbers must not overflow.
   const Vec3 forward = normalized(0.5 * target - 0.5 * eye);
   if (dot(forward, forward) == 0) {
-    throw UserError(kCannotUse, "--look-at", "it is the point where the camera stands (--eye)", "give another point");
+    throw UserError(kCannotUseCamera, "--look-at", "it is the point where the camera stands (--eye)",
+                    "give another point");
   }
   const Vec3 unit_up = normalized(up);
-  if (dot(unit_up, unit_up) == 0) throw UserError(kCannotUse, "--up", "it has no direction", "give e.g. 0,-1,0");
+  if (dot(unit_up, unit_up) == 0) throw UserError(kCannotUseCamera, "--up", "it has no direction", "give e.g. 0,-1,0");
   const Vec3 side = cross(forward, unit_up);
   if (!(dot(side, side) > 1e-20)) {
-    throw UserError(kCannotUse, "--up", "it is parallel to the view from --eye to --look-at",
+    throw UserError(kCannotUseCamera, "--up", "it is parallel to the view from --eye to --look-at",
                     "give another direction, e.g. 0,0,1");
   }
   const Vec3 right = normalized(side);
@@ -178,7 +180,7 @@ Camera resized(const Camera& camera, ImageSize size) {
 
 std::vector<View> orbit_views(const View& view, std::size_t count) {
   const Vec3 up = normalized(view.up);
-  if (dot(up, up) == 0) throw UserError(kCannotUse, "--up", "it has no direction", "give e.g. 0,-1,0");
+  if (dot(up, up) == 0) throw UserError(kCannotUseCamera, "--up", "it has no direction", "give e.g. 0,-1,0");
   const Vec3 arm = view.eye - view.look_at;
   const Vec3 upright = up * dot(up, arm);
   const Vec3 level = arm - upright;
@@ -226,12 +228,13 @@ NamedCamera camera_from_file(const std::string& text, const std::optional<ImageS
   const std::string where = "--camera " + text;
   const std::string camera = choice.camera.value_or("0");
   if (camera.empty()) {
-    throw UserError(kCannotUse, where, "nothing follows #", "give FILE#INDEX, index from 0, or FILE#NAME");
+    throw UserError(kCannotUseCamera, where, "nothing follows #", "give FILE#INDEX, index from 0, or FILE#NAME");
   }
   const std::optional<std::size_t> given = read_index(camera);
   const std::size_t index = given ? *given : find_by_name(cameras, camera, where);
   if (index >= cameras.size()) {
-    throw UserError(kCannotUse, where, fmt::format("there is no camera {}, the file has {}", index, cameras.size()),
+    throw UserError(kCannotUseCamera, where,
+                    fmt::format("there is no camera {}, the file has {}", index, cameras.size()),
                     other_cameras(cameras, camera));
   }
   return {size ? resized(cameras[index], *size) : cameras[index], {choice.file, index, cameras[index].name}};

@@ -12,7 +12,7 @@
 namespace vrpipe {
 namespace {
 
-constexpr double kPruneThreshold = 1.0 / 255.0;
+constexpr double kExactPruneThreshold = 1.0 / 255.0;
 constexpr double kLargestAlpha = 0.99;
 /// Rows that a thread takes at a time.
 constexpr std::uint32_t kBandRows = 16;
@@ -73,7 +73,7 @@ class ExactSplat {
       const double u = along_a * a_.sigmas_per_pixel;
       const double v = along_b * b_.sigmas_per_pixel;
       const double weight = opacity_ * portable_exp(-0.5 * (u * u + v * v));
-      if (!(weight >= kPruneThreshold)) continue;
+      if (!(weight >= kExactPruneThreshold)) continue;
       const double alpha = std::min(kLargestAlpha, weight);
       const double share = transmittance[x] * alpha;
       for (std::size_t i = 0; i < 3; ++i) row[x][i] += share * color_[i];

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <climits>
 #include <system_error>
@@ -32,6 +33,13 @@ std::atomic<const char*>* note_unfinished(const char* name) {
 }
 
 }  // namespace
+
+std::string lower_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+std::string extension_of(const std::filesystem::path& path) { return lower_case(path.extension().string()); }
 
 InputFile::InputFile(const fs::path& path, const std::string& what) : what_(what), where_(path.string()) {
   // A pipe without a writer would block.

@@ -11,6 +11,11 @@ namespace vrpipe {
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "scene files are little-endian and are read where they lie");
 
+/// ASCII letters in lower case.
+std::string lower_case(std::string text);
+/// With its dot, in lower case; empty for a name without one.
+std::string extension_of(const std::filesystem::path& path);
+
 /// A regular file that is read, not mapped: a mapped file that someone cuts short ends the program by SIGBUS.
 class InputFile {
  public:

@@ -15,7 +15,6 @@ constexpr double kLn2Low = 1.90821492927058770002e-10;
 constexpr double kHalfPi1 = 1.57079632673412561417e+00;
 constexpr double kHalfPi2 = 6.07710050630396597660e-11;
 constexpr double kHalfPi3 = 2.02226624879595063154e-21;
-constexpr double kPi = 3.14159265358979323846;
 
 double from_bits(std::uint64_t bits) {
   double value;

@@ -13,6 +13,7 @@
 #include <vrpipe/workloads/portable_math.h>
 
 #include "for_each_chunk.h"
+#include "spherical_harmonics.h"
 
 namespace vrpipe {
 namespace {
@@ -23,15 +24,6 @@ constexpr std::uint64_t kChunk = 4096;
 constexpr double kMaxLogScale = 100.0;
 constexpr float kMaxFloat = std::numeric_limits<float>::max();
 constexpr float kPruneThreshold = 1.0f / 255.0f;
-
-// Real SH basis constants, as INRIA names them.
-constexpr double kShC0 = 0.28209479177387814;
-constexpr double kShC1 = 0.4886025119029199;
-constexpr std::array<double, 5> kShC2 = {1.0925484305920792, -1.0925484305920792, 0.31539156525252005,
-                                         -1.0925484305920792, 0.5462742152960396};
-constexpr std::array<double, 7> kShC3 = {-0.5900435899266435, 2.890611442640554,   -0.4570457994644658,
-                                         0.3731763325901154,  -0.4570457994644658, 1.445305721320277,
-                                         -0.5900435899266435};
 
 template <std::size_t N>
 bool all_finite(const std::array<float, N>& values) {

@@ -1,7 +1,6 @@
 #include <vrpipe/workloads/scene.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -17,10 +16,12 @@
 #include <vrpipe/workloads/portable_math.h>
 #include <vrpipe/workloads/scene_substitution.h>
 
+#include "file_io.h"
+
 namespace vrpipe {
 namespace {
 
-constexpr char kCannotUse[] = "cannot use option";
+constexpr char kCannotUseOption[] = "cannot use option";
 const std::string kBuiltinPrefix = "builtin:";
 
 /// The view with what the user named in place of what was there.
@@ -100,7 +101,7 @@ View automatic_view(const std::string& path, const GaussianFile& file, const Sce
 }
 
 void refuse(bool given, const std::string& option, const std::string& why, const std::string& remedy) {
-  if (given) throw UserError(kCannotUse, option, why, remedy);
+  if (given) throw UserError(kCannotUseOption, option, why, remedy);
 }
 
 void check_view_options(const SceneRequest& request) {
@@ -175,15 +176,6 @@ void read_meshes(const SceneRequest& request, OpenedScene& scene) {
 }
 
 bool is_builtin(const std::string& scene) { return scene.rfind(kBuiltinPrefix, 0) == 0 && !scene_substitution(scene); }
-
-std::string lower_case(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
-std::string extension_of(const std::string& scene) {
-  return lower_case(std::filesystem::path(scene).extension().string());
-}
 
 }  // namespace
 

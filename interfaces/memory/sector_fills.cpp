@@ -7,21 +7,21 @@ namespace vrpipe {
 
 namespace {
 
-constexpr unsigned sector_bytes = FixedLatencyMemory::sector_bytes;
+constexpr unsigned fill_bytes = FixedLatencyMemory::sector_bytes;
 
 /// Calls a function with each sector of a request.
 template <class Function>
 void for_each_sector(const MemoryRequest& request, Function&& function) {
-  const std::uint64_t last = (request.address + request.bytes - 1) / sector_bytes;
-  for (std::uint64_t sector = request.address / sector_bytes; sector <= last; ++sector) function(sector);
+  const std::uint64_t last = (request.address + request.bytes - 1) / fill_bytes;
+  for (std::uint64_t sector = request.address / fill_bytes; sector <= last; ++sector) function(sector);
 }
 
 bool writes_whole_sectors(const MemoryRequest& request) {
-  return request.command == tlm::TLM_WRITE_COMMAND && request.bytes >= sector_bytes;
+  return request.command == tlm::TLM_WRITE_COMMAND && request.bytes >= fill_bytes;
 }
 
 MemoryRequest read_of(std::uint64_t sector, const MemoryOrigin& origin) {
-  return {sector * sector_bytes, sector_bytes, tlm::TLM_READ_COMMAND, origin};
+  return {sector * fill_bytes, fill_bytes, tlm::TLM_READ_COMMAND, origin};
 }
 
 }  // namespace
@@ -42,7 +42,7 @@ Cycle AnnotatedFills::filled(const MemoryRequest& request, Cycle arrival) {
       return;
     }
     if (is_new) {
-      statistics_.bytes_filled += sector_bytes;
+      statistics_.bytes_filled += fill_bytes;
       sector = {asks, memory_.access(read_of(index, request.origin), asks)};
     } else if (asks < sector.asked) {
       // Who ran ahead of time has asked, but this access would have been the first: it takes as long from here.
@@ -105,7 +105,7 @@ void ClockedFills::look_up(unsigned port, tlm::tlm_generic_payload& payload, Cyc
     if (writes) there_.insert(sector);
     if (writes || is_there) return;
     if (!is_on_its_way) {
-      statistics_.bytes_filled += sector_bytes;
+      statistics_.bytes_filled += fill_bytes;
       fetches_.push({sector, request.origin});
     }
     on_their_way_[sector].push_back(waiting);

@@ -10,7 +10,7 @@ namespace vrpipe {
 
 namespace {
 
-std::map<std::string, TimedUnitMaker>& makers() {
+std::map<std::string, TimedUnitMaker>& timed_makers() {
   static std::map<std::string, TimedUnitMaker> all;
   return all;
 }
@@ -45,14 +45,15 @@ Cycle TimedUnit::tick(Cycle now) {
 }
 
 void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker) {
-  if (makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();
+  if (timed_makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();
   Registry::instance().add_problem(
       {"slot " + slot + " has a module for lt and at already", "write a behaviour for the slot instead"});
 }
 
 const TimedUnitMaker& timed_unit_maker(const std::string& slot) {
-  const auto found = makers().find(slot);
-  if (found == makers().end()) throw SimulationFault("registry", 0, "slot " + slot + " has no module for lt and at");
+  const auto found = timed_makers().find(slot);
+  if (found == timed_makers().end())
+    throw SimulationFault("registry", 0, "slot " + slot + " has no module for lt and at");
   return found->second;
 }
 

@@ -21,7 +21,7 @@ Port& port_named(const std::vector<Port*>& ports, const std::string& unit, const
                   names.empty() ? "it has none in this direction" : "did you mean " + nearest_name(name, names) + "?");
 }
 
-std::map<std::string, UnitMaker>& makers() {
+std::map<std::string, UnitMaker>& clocked_makers() {
   static std::map<std::string, UnitMaker> all;
   return all;
 }
@@ -41,14 +41,14 @@ bool Component::has_out(const std::string& name) const {
 }
 
 void register_unit_maker(const std::string& slot, UnitMaker maker) {
-  if (makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();
+  if (clocked_makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();
   Registry::instance().add_problem(
       {"slot " + slot + " has a module for cycle already", "write a behaviour for the slot instead"});
 }
 
 const UnitMaker& unit_maker(const std::string& slot) {
-  const auto found = makers().find(slot);
-  if (found == makers().end()) throw SimulationFault("registry", 0, "slot " + slot + " has no module");
+  const auto found = clocked_makers().find(slot);
+  if (found == clocked_makers().end()) throw SimulationFault("registry", 0, "slot " + slot + " has no module");
   return found->second;
 }
 

@@ -9,7 +9,7 @@ namespace vrpipe {
 
 namespace {
 
-std::map<std::string, UntimedUnitMaker>& makers() {
+std::map<std::string, UntimedUnitMaker>& untimed_makers() {
   static std::map<std::string, UntimedUnitMaker> all;
   return all;
 }
@@ -17,14 +17,15 @@ std::map<std::string, UntimedUnitMaker>& makers() {
 }  // namespace
 
 void register_untimed_unit_maker(const std::string& slot, UntimedUnitMaker maker) {
-  if (makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();
+  if (untimed_makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();
   Registry::instance().add_problem(
       {"slot " + slot + " has a unit without time already", "write a behaviour for the slot instead"});
 }
 
 const UntimedUnitMaker& untimed_unit_maker(const std::string& slot) {
-  const auto found = makers().find(slot);
-  if (found == makers().end()) throw SimulationFault("registry", 0, "slot " + slot + " has no unit without time");
+  const auto found = untimed_makers().find(slot);
+  if (found == untimed_makers().end())
+    throw SimulationFault("registry", 0, "slot " + slot + " has no unit without time");
   return found->second;
 }
 

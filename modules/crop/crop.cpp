@@ -303,9 +303,9 @@ template class ColorRop<ColorFormat::rgba32f, BlendRounding::rtz>;
 template class ColorRop<ColorFormat::rgba32f, BlendRounding::measured>;
 
 namespace {
-const SlotRegistrar slot{{"crop", 100, "color-rop", "", true, check_crop}};
+const SlotRegistrar crop_slot{{"crop", 100, "color-rop", "", true, check_crop}};
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool crop_registered = [] {
   Implementation implementation =
       CropMaker<ColorRop>::implementation("color-rop",
                                           "front-to-back blending behind a colour cache, alpha test for termination");

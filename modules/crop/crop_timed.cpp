@@ -342,7 +342,7 @@ class TimedCrop : public TimedUnit {
                          "a second time, since their line came back before what it had held was written back"};
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool crop_timed_registered = [] {
   register_timed_unit_maker("crop", [](const std::string& name, ClockDomain& domain,
                                        std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
                                        Transport transport) {

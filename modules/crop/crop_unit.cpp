@@ -425,7 +425,7 @@ class CropUnit : public Unit {
                          "a second time, since their line came back before what it had held was written back"};
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool crop_unit_registered = [] {
   register_unit_maker("crop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                  const RenderContext& context, unsigned) {
     return std::make_unique<CropUnit>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)), context);

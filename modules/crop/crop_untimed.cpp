@@ -111,7 +111,7 @@ class UntimedCrop : public UntimedUnit {
   CropBehaviour::CacheLookUp cache_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool crop_untimed_registered = [] {
   register_untimed_unit_maker("crop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
                                          const RenderContext& context, unsigned) {
     return std::make_unique<UntimedCrop>(name, behaviour_as<CropBehaviour>(std::move(behaviour)), context);

@@ -8,10 +8,10 @@ namespace vrpipe {
 namespace {
 
 /// Parts of a cycle in which the bus, and activates, are reserved.
-constexpr unsigned parts = 16;
+constexpr unsigned bus_parts = 16;
 constexpr std::uint64_t no_row = ~std::uint64_t{0};  ///< and no burst
 
-Cycle beyond(Cycle cycles, Cycle hidden) { return parts * (cycles - std::min(cycles, hidden)); }
+Cycle beyond(Cycle cycles, Cycle hidden) { return bus_parts * (cycles - std::min(cycles, hidden)); }
 
 }  // namespace
 
@@ -25,12 +25,12 @@ AnnotatedChannel::AnnotatedChannel(const DramTiming& timing, DramStatistics& sta
       write_row_cycle_(std::max(read_row_cycle_, timing.activate - 1 + timing.rcd + timing.cwl + timing.dqss +
                                                      timing.burst + timing.wr + timing.rp)),
       activate_overhead_(beyond(timing.activate + 1, timing.burst)),
-      turn_overhead_(parts * (timing.rtw + timing.dqss + timing.wtr + timing.cl) /
+      turn_overhead_(bus_parts * (timing.rtw + timing.dqss + timing.wtr + timing.cl) /
                      (timing.write_high - timing.write_low)),
       drain_overhead_(beyond(timing.rp + timing.rcd, timing.cl + timing.burst + timing.rtw - timing.cwl)),
       return_overhead_(beyond(timing.wr + timing.rp + timing.rcd, timing.wtr)),
-      bus_(parts),
-      activates_(parts),
+      bus_(bus_parts),
+      activates_(bus_parts),
       groups_(timing.groups, BandwidthReservation(1)),
       banks_(timing.banks, Bank(1)),
       read_places_(timing.read_queue),
@@ -79,8 +79,8 @@ AnnotatedChannel::Row& AnnotatedChannel::open_row(Bank& bank, std::uint64_t numb
   ++(conflicts ? statistics_.row_conflicts : statistics_.row_misses);
   const auto row_cycle = static_cast<unsigned>(writes ? write_row_cycle_ : read_row_cycle_);
   const Cycle free = bank.time.take(now + (conflicts ? timing_.rp : 0), row_cycle, present) - row_cycle;
-  const auto apart = static_cast<unsigned>(std::max(parts * timing_.rrd, parts * timing_.faw / 4));
-  const Cycle activated = activates_.take(free, apart, present) - (apart + parts - 1) / parts;
+  const auto apart = static_cast<unsigned>(std::max(bus_parts * timing_.rrd, bus_parts * timing_.faw / 4));
+  const Cycle activated = activates_.take(free, apart, present) - (apart + bus_parts - 1) / bus_parts;
   bank.hits = 0;
   rows.newest = (rows.newest + 1) % rows_kept;
   Row& opened = rows.rows[rows.newest];
@@ -97,7 +97,7 @@ Cycle AnnotatedChannel::move(const DramAddress& place, Row& row, Cycle now, Cycl
     const auto apart = static_cast<unsigned>(timing_.ccd_l);
     column = groups_[place.bank & (timing_.groups - 1)].take(column, apart, present) - apart;
   }
-  const auto taken = static_cast<unsigned>(parts * timing_.burst + overhead);
+  const auto taken = static_cast<unsigned>(bus_parts * timing_.burst + overhead);
   const Cycle there = bus_.take(column + latency, taken, present);
   row.last = std::max(row.last, there);
   return there;

@@ -113,9 +113,9 @@ const EffectRegistrar refresh{
                                                 1e-6 * static_cast<double>(dram.trfc_ps), us));
      }}};
 
-const SlotRegistrar slot{{"dram", 120, "lpddr3-1600", "", true, nullptr, true}};
+const SlotRegistrar dram_slot{{"dram", 120, "lpddr3-1600", "", true, nullptr, true}};
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool dram_registered = [] {
   Registry::instance().add(
       implementation("lpddr3-1600", "16 channels of LPDDR3-1600, the paper's: 102.4 GB/s", lpddr3_1600));
   Registry::instance().add(

@@ -35,7 +35,7 @@ class DramUnit final : public MemoryUnit {
   Timed timed_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool dram_unit_registered = [] {
   register_memory_unit_maker(
       "dram",
       [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,

@@ -44,7 +44,7 @@ bool VertexIssue::next(VertexWarp& out) {
 }
 
 namespace {
-const SlotRegistrar slot{{"draw", 10, "vertex-issue", "", false, check_draw}};
+const SlotRegistrar draw_slot{{"draw", 10, "vertex-issue", "", false, check_draw}};
 const Registrar<VertexIssue, DrawBehaviour> registrar("draw", "vertex-issue", "issues sorted splats as vertex warps",
                                                       false, Trust::trusted);
 const EffectRegistrar barriers{{"draw",

@@ -100,7 +100,7 @@ class TimedDraw : public TimedUnit {
   Cycle passed_at_ = 0;   ///< the last of them to the last barrier
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool draw_timed_registered = [] {
   register_timed_unit_maker("draw", [](const std::string& name, ClockDomain& domain,
                                        std::unique_ptr<Behaviour> behaviour, const RenderContext& context,
                                        unsigned gpcs, Transport transport) {

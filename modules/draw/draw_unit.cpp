@@ -88,7 +88,7 @@ class DrawUnit : public Unit {
   unsigned awaited_ = 0;  ///< GPCs that have not come to the barrier yet
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool draw_unit_registered = [] {
   register_unit_maker("draw", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                  const RenderContext& context, unsigned gpcs) {
     return std::make_unique<DrawUnit>(name.c_str(), domain, behaviour_as<DrawBehaviour>(std::move(behaviour)), context,

@@ -41,7 +41,7 @@ class UntimedDraw : public UntimedUnit {
   std::size_t turn_ = 0;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool draw_untimed_registered = [] {
   register_untimed_unit_maker("draw", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
                                          const RenderContext&, unsigned gpcs) {
     return std::make_unique<UntimedDraw>(name, behaviour_as<DrawBehaviour>(std::move(behaviour)), gpcs);

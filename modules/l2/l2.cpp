@@ -74,7 +74,7 @@ Effect contents(const CacheLevel& level) {
 const EffectRegistrar l1_contents(contents(level_of_l1));
 const EffectRegistrar l2_contents(contents(level_of_l2));
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool l2_registered = [] {
   for (const CacheLevel* level : {&level_of_l1, &level_of_l2}) {
     Registry::instance().add(sectored_cache(*level));
     register_memory_unit_maker(level->slot, make);

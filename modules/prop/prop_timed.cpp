@@ -231,7 +231,7 @@ class TimedProp : public TimedUnit {
   Cycle next_ = never;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool prop_timed_registered = [] {
   register_timed_unit_maker("prop", [](const std::string& name, ClockDomain& domain,
                                        std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
                                        Transport transport) {

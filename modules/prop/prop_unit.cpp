@@ -283,7 +283,7 @@ class PropUnit : public Unit {
   bool is_back_ = false;            ///< `current_` comes from there
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool prop_unit_registered = [] {
   register_unit_maker("prop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                  const RenderContext& context, unsigned) {
     return std::make_unique<PropUnit>(name.c_str(), domain, behaviour_as<PropBehaviour>(std::move(behaviour)), context);

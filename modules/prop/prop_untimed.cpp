@@ -54,7 +54,7 @@ class UntimedProp : public UntimedUnit {
   std::unique_ptr<PropBehaviour> behaviour_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool prop_untimed_registered = [] {
   register_untimed_unit_maker("prop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
                                          const RenderContext& context, unsigned) {
     return std::make_unique<UntimedProp>(name, behaviour_as<PropBehaviour>(std::move(behaviour)), context);

@@ -135,7 +135,7 @@ bool QruPassThrough::finish_bin(Warp& out) {
 }
 
 namespace {
-const SlotRegistrar slot{{"qru", 80, "pairing", "pass-through", false, check_qru}};
+const SlotRegistrar qru_slot{{"qru", 80, "pairing", "pass-through", false, check_qru}};
 const Registrar<PairingQru, QruBehaviour> pairing("qru", "pairing", "pairs overlapping quads of a bin for merging (QM)",
                                                   false, Trust::trusted);
 const Registrar<QruPassThrough, QruBehaviour> pass_through("qru", "pass-through", "warps in the order of the quads",

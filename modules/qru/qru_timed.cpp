@@ -99,7 +99,7 @@ class TimedQru : public TimedUnit {
   unsigned examined_ = 0;  ///< quads, in the cycle so far
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool qru_timed_registered = [] {
   register_timed_unit_maker("qru", [](const std::string& name, ClockDomain& domain,
                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
                                       Transport transport) {

@@ -99,7 +99,7 @@ class QruUnit : public Unit {
   WarpNumbering numbering_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool qru_unit_registered = [] {
   register_unit_maker("qru", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                 const RenderContext& context, unsigned) {
     return std::make_unique<QruUnit>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)), context);

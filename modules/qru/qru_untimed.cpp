@@ -52,7 +52,7 @@ class UntimedQru : public UntimedUnit {
   Warp warp_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool qru_untimed_registered = [] {
   register_untimed_unit_maker("qru", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
                                         const RenderContext& context, unsigned) {
     return std::make_unique<UntimedQru>(name, behaviour_as<QruBehaviour>(std::move(behaviour)), context);

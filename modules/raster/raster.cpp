@@ -304,7 +304,7 @@ unsigned TileRasterizer::fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y
 }
 
 namespace {
-const SlotRegistrar slot{{"raster", 40, "tile-rasterizer", "", true, check_raster}};
+const SlotRegistrar raster_slot{{"raster", 40, "tile-rasterizer", "", true, check_raster}};
 const Registrar<TileRasterizer, RasterBehaviour> registrar(
     "raster", "tile-rasterizer", "fixed-point edge functions, 8x8 raster tiles, top-left rule", false, Trust::trusted);
 

@@ -133,7 +133,7 @@ class TimedRaster : public TimedUnit {
   Cycle coarse_done_ = 0;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool raster_timed_registered = [] {
   register_timed_unit_maker("raster", [](const std::string& name, ClockDomain& domain,
                                          std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned,
                                          Transport transport) {

@@ -160,7 +160,7 @@ class RasterUnit : public Unit {
   ThousandthsPort setups_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool raster_unit_registered = [] {
   register_unit_maker("raster", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                    const RenderContext&, unsigned) {
     return std::make_unique<RasterUnit>(name.c_str(), domain, behaviour_as<RasterBehaviour>(std::move(behaviour)));

@@ -47,7 +47,7 @@ class UntimedRaster : public UntimedUnit {
   QuadBeat tile_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool raster_untimed_registered = [] {
   register_untimed_unit_maker("raster", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
                                            const RenderContext&, unsigned) {
     return std::make_unique<UntimedRaster>(name, behaviour_as<RasterBehaviour>(std::move(behaviour)));

@@ -406,7 +406,7 @@ class TimedSm : public TimedUnit {
   ShadedWarpPool pool_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool sm_timed_registered = [] {
   register_timed_unit_maker("sm", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                      const RenderContext& context, unsigned, Transport transport) {
     return std::make_unique<TimedSm>(name.c_str(), domain, behaviour_as<SmBehaviour>(std::move(behaviour)), context,

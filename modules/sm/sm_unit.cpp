@@ -469,7 +469,7 @@ class SmUnit : public Unit {
   Cycle busy_until_ = 0;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool sm_unit_registered = [] {
   register_unit_maker("sm", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                const RenderContext& context, unsigned) {
     return std::make_unique<SmUnit>(name.c_str(), domain, behaviour_as<SmBehaviour>(std::move(behaviour)), context);

@@ -115,7 +115,7 @@ class UntimedSm : public UntimedUnit {
   HandOver hand_over_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool sm_untimed_registered = [] {
   register_untimed_unit_maker("sm", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
                                        const RenderContext& context, unsigned) {
     return std::make_unique<UntimedSm>(name, behaviour_as<SmBehaviour>(std::move(behaviour)), context);

@@ -149,7 +149,7 @@ class TimedTc : public TimedUnit {
   bool holds_quads_ = false;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool tc_timed_registered = [] {
   register_timed_unit_maker("tc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                      const RenderContext& context, unsigned, Transport transport) {
     return std::make_unique<TimedTc>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)), context,

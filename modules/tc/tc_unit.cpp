@@ -165,7 +165,7 @@ class TcUnit : public Unit {
   Cycle last_arrival_ = 0;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool tc_unit_registered = [] {
   register_unit_maker("tc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                const RenderContext& context, unsigned) {
     return std::make_unique<TcUnit>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)), context);

@@ -54,7 +54,7 @@ class UntimedTc : public UntimedUnit {
   BinStorage storage_;  ///< whose bin has passed by the time of the next
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool tc_untimed_registered = [] {
   register_untimed_unit_maker("tc", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
                                        const RenderContext& context, unsigned) {
     return std::make_unique<UntimedTc>(name, behaviour_as<TcBehaviour>(std::move(behaviour)), context);

@@ -140,7 +140,7 @@ bool TgcPassThrough::step(Flush& out) {
 }
 
 namespace {
-const SlotRegistrar slot{{"tgc", 30, "tile-grid-coalescing", "pass-through", false, check_tgc}};
+const SlotRegistrar tgc_slot{{"tgc", 30, "tile-grid-coalescing", "pass-through", false, check_tgc}};
 const Registrar<TileGridCoalescing, TgcBehaviour> coalescing("tgc", "tile-grid-coalescing",
                                                              "bins of primitives, one per tile grid (QM)", false,
                                                              Trust::trusted);

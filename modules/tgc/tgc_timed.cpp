@@ -79,7 +79,7 @@ class TimedTgc : public TimedUnit {
   Cycle read_ = 0;  ///< the last flush has been read out
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool tgc_timed_registered = [] {
   register_timed_unit_maker("tgc", [](const std::string& name, ClockDomain& domain,
                                       std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned,
                                       Transport transport) {

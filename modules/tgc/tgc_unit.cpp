@@ -100,7 +100,7 @@ class TgcUnit : public Unit {
   bool drained_ = false;    ///< and all bins before it are flushed
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool tgc_unit_registered = [] {
   register_unit_maker("tgc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                 const RenderContext&, unsigned) {
     return std::make_unique<TgcUnit>(name.c_str(), domain, behaviour_as<TgcBehaviour>(std::move(behaviour)));

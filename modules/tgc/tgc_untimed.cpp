@@ -49,7 +49,7 @@ class UntimedTgc : public UntimedUnit {
   TgcBehaviour::Flush flush_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool tgc_untimed_registered = [] {
   register_untimed_unit_maker("tgc", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
                                         const RenderContext&, unsigned) {
     return std::make_unique<UntimedTgc>(name, behaviour_as<TgcBehaviour>(std::move(behaviour)));

@@ -65,7 +65,7 @@ unsigned PrimitiveAssembly::assemble(DrawIndex draw, std::uint32_t splat, std::a
 }
 
 namespace {
-const SlotRegistrar slot{{"vpo", 20, "primitive-assembly", "", false, check_vpo}};
+const SlotRegistrar vpo_slot{{"vpo", 20, "primitive-assembly", "", false, check_vpo}};
 const Registrar<PrimitiveAssembly, VpoBehaviour> registrar("vpo", "primitive-assembly",
                                                            "two triangles per splat, culled and boxed", false,
                                                            Trust::trusted);

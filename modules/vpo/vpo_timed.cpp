@@ -91,7 +91,7 @@ class TimedVpo : public TimedUnit {
   bool ended_ = false;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool vpo_timed_registered = [] {
   register_timed_unit_maker("vpo", [](const std::string& name, ClockDomain& domain,
                                       std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned gpcs,
                                       Transport transport) {

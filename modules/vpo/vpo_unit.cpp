@@ -114,7 +114,7 @@ class VpoUnit : public Unit {
   bool ended_ = false;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool vpo_unit_registered = [] {
   register_unit_maker("vpo", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                 const RenderContext&, unsigned gpcs) {
     return std::make_unique<VpoUnit>(name.c_str(), domain, behaviour_as<VpoBehaviour>(std::move(behaviour)), gpcs);

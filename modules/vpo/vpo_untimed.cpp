@@ -53,7 +53,7 @@ class UntimedVpo : public UntimedUnit {
   bool ended_ = false;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool vpo_untimed_registered = [] {
   register_untimed_unit_maker("vpo", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
                                         const RenderContext&, unsigned gpcs) {
     return std::make_unique<UntimedVpo>(name, behaviour_as<VpoBehaviour>(std::move(behaviour)), gpcs);

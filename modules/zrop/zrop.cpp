@@ -174,7 +174,7 @@ void DepthStencilRop::pass(Mark mark) {
 }
 
 namespace {
-const SlotRegistrar slot{{"zrop", 70, "depth-stencil-rop", "", true, check_zrop}};
+const SlotRegistrar zrop_slot{{"zrop", 70, "depth-stencil-rop", "", true, check_zrop}};
 const Registrar<DepthStencilRop, ZropBehaviour> registrar(
     "zrop", "depth-stencil-rop", "depth, stencil and termination tests, termination update on the stencil MSB", false,
     Trust::trusted);

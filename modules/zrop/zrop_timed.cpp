@@ -374,7 +374,7 @@ class TimedZrop : public TimedUnit {
   HiZReports hi_z_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool zrop_timed_registered = [] {
   register_timed_unit_maker("zrop", [](const std::string& name, ClockDomain& domain,
                                        std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
                                        Transport transport) {

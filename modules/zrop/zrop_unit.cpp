@@ -301,7 +301,7 @@ class ZropUnit : public Unit {
   ZCacheStatistics cache_statistics_{*this, "cache"};
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool zrop_unit_registered = [] {
   register_unit_maker("zrop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                  const RenderContext& context, unsigned) {
     return std::make_unique<ZropUnit>(name.c_str(), domain, behaviour_as<ZropBehaviour>(std::move(behaviour)), context);

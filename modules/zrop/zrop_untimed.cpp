@@ -209,7 +209,7 @@ class UntimedZrop : public UntimedUnit {
   HiZReports hi_z_;
 };
 
-[[maybe_unused]] const bool registered = [] {
+[[maybe_unused]] const bool zrop_untimed_registered = [] {
   register_untimed_unit_maker("zrop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
                                          const RenderContext& context, unsigned) {
     return std::make_unique<UntimedZrop>(name, behaviour_as<ZropBehaviour>(std::move(behaviour)), context);

@@ -12,14 +12,13 @@
 
 #include "for_each_chunk.h"
 
+#include "../spherical_harmonics.h"
+
 namespace vrpipe {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kShC0 = 0.28209479177387814;
-constexpr double kShC1 = 0.4886025119029199;
 /// Mean area of a splat's box over the square of its median sigma, for the sizes and opacities of splat().
-constexpr double kBoxArea = 80.0;
+constexpr double kCaptureBoxArea = 80.0;
 /// Median sigma, pixels, at scale 1: patches are laid out for it.
 constexpr double kSigma = 2.0;
 /// Side of a patch, in sigmas.
@@ -160,7 +159,7 @@ void CapturePainter::divide(std::uint32_t stroke, double u, double v, double du,
   const double area = 0.5 * glm::length(cross(diagonal, other));
   const double sigma = kSigma * s.texture.size * pixel_angle_ * distance;
   Cell cell{stroke, u, v, du, dv, distance};
-  cell.weight = s.texture.layers * area / (kBoxArea * sigma * sigma);
+  cell.weight = s.texture.layers * area / (kCaptureBoxArea * sigma * sigma);
   if (cell.weight > 0) cells.push_back(cell);
 }
 
@@ -354,7 +353,7 @@ GaussianScene CapturePainter::build(std::uint64_t count, unsigned threads) {
     }
     const double sigma = kSigma * stroke.texture.size * pixel_angle_ * cell.distance;
     const double shadow = kPi * std::max(stroke.b[0], stroke.b[2]) * stroke.b[1];  // about what it covers of the view
-    const double weight = stroke.texture.layers * shadow / (kBoxArea * sigma * sigma);
+    const double weight = stroke.texture.layers * shadow / (kCaptureBoxArea * sigma * sigma);
     const double parts = std::max(1.0, std::floor(weight / 64));
     cell.weight = weight / parts;
     cells.assign(static_cast<std::size_t>(parts), cell);

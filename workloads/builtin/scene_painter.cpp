@@ -7,12 +7,11 @@
 
 #include <vrpipe/workloads/portable_math.h>
 
+#include "../spherical_harmonics.h"
+
 namespace vrpipe {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kShC0 = 0.28209479177387814;
-constexpr double kShC1 = 0.4886025119029199;
 /// Mean area of a splat's box over the square of its median sigma, for the sizes and opacities of splat().
 constexpr double kBoxArea = 45.0;
 

@@ -10,8 +10,6 @@
 namespace vrpipe {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 std::uint64_t scramble(std::uint64_t z) {
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;

@@ -243,9 +243,9 @@ class Lines {
   Number number(const char* name) {
     const std::string_view text = word();
     Number value{};
-    const std::from_chars_result read = std::from_chars(text.data(), text.data() + text.size(), value);
+    const std::from_chars_result parsed = std::from_chars(text.data(), text.data() + text.size(), value);
     if (text.empty()) refuse(fmt::format("it ends before {}", name));
-    if (read.ec != std::errc{} || read.ptr != text.data() + text.size()) {
+    if (parsed.ec != std::errc{} || parsed.ptr != text.data() + text.size()) {
       refuse(fmt::format("{} is not a number", name));
     }
     return value;
@@ -414,9 +414,9 @@ std::vector<Camera> read_images_binary(const fs::path& path, const Intrinsics& c
   return by_name(std::move(images));
 }
 
-bool recognises(const CameraSource& source) { return !model_of(source).cameras.empty(); }
+bool is_colmap(const CameraSource& source) { return !model_of(source).cameras.empty(); }
 
-std::vector<Camera> read(const CameraSource& source) {
+std::vector<Camera> read_colmap(const CameraSource& source) {
   const Model model = model_of(source);
   if (model.is_binary) return read_images_binary(model.images, read_cameras_binary(model.cameras));
   return read_images_text(model.images, read_cameras_text(model.cameras));
@@ -427,9 +427,9 @@ std::vector<fs::path> files(const CameraSource& source) {
   return {model.cameras, model.images};
 }
 
-const CameraFormatRegistrar registrar(
+const CameraFormatRegistrar colmap_registrar(
     {"COLMAP model", "a folder with cameras.bin and images.bin or cameras.txt and images.txt, or one of these",
-     recognises, read, files});
+     is_colmap, read_colmap, files});
 
 }  // namespace
 }  // namespace vrpipe

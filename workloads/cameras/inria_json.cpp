@@ -9,7 +9,7 @@
 namespace vrpipe {
 namespace {
 
-constexpr char kLayout[] =
+constexpr char kInriaLayout[] =
     "an INRIA cameras.json is an array of {\"width\", \"height\", \"position\": [3], \"rotation\": [3][3], \"fx\", "
     "\"fy\"}";
 
@@ -37,20 +37,20 @@ Camera read_camera(const JsonObject& json) {
   return camera;
 }
 
-bool recognises(const CameraSource& source) { return source.json() != nullptr && source.json()->is_array(); }
+bool is_inria(const CameraSource& source) { return source.json() != nullptr && source.json()->is_array(); }
 
-std::vector<Camera> read(const CameraSource& source) {
+std::vector<Camera> read_inria(const CameraSource& source) {
   std::vector<Camera> cameras;
   for (const nlohmann::json& camera : *source.json()) {
     const std::string where = source.path() + " camera " + std::to_string(cameras.size());
-    cameras.push_back(read_camera(JsonObject(camera, where, kLayout)));
+    cameras.push_back(read_camera(JsonObject(camera, where, kInriaLayout)));
   }
   return cameras;
 }
 
-const CameraFormatRegistrar registrar({"INRIA cameras.json",
-                                       "a JSON array of cameras with \"position\" and \"rotation\"", recognises, read,
-                                       nullptr});
+const CameraFormatRegistrar inria_registrar({"INRIA cameras.json",
+                                             "a JSON array of cameras with \"position\" and \"rotation\"", is_inria,
+                                             read_inria, nullptr});
 
 }  // namespace
 }  // namespace vrpipe

@@ -19,7 +19,7 @@
 namespace vrpipe {
 namespace {
 
-constexpr char kLayout[] =
+constexpr char kNerfLayout[] =
     "a transforms.json is {\"fl_x\" or \"camera_angle_x\", \"w\", \"h\", \"frames\": [{\"file_path\", "
     "\"transform_matrix\": [4][4]}]}";
 constexpr char kUndistort[] =
@@ -29,9 +29,9 @@ constexpr char kUndistort[] =
 constexpr double kBlenderSide = 800;
 
 /// What a frame says of its camera, or the file of all of them.
-class Frame {
+class NerfFrame {
  public:
-  Frame(const JsonObject& frame, const JsonObject& file) : frame_(frame), file_(file) {}
+  NerfFrame(const JsonObject& frame, const JsonObject& file) : frame_(frame), file_(file) {}
 
   std::optional<double> number(const char* key) const {
     const std::optional<double> own = frame_.optional_number(key);
@@ -47,7 +47,7 @@ class Frame {
   const JsonObject& file_;
 };
 
-void refuse_distortion(const Frame& frame, const std::string& where) {
+void refuse_distortion(const NerfFrame& frame, const std::string& where) {
   for (const char* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"}) {
     if (frame.number(key).value_or(0) == 0) continue;
     throw UserError(kCannotReadCameras, where, fmt::format("\"{}\" is not 0: the camera is distorted", key),
@@ -64,7 +64,7 @@ void refuse_distortion(const Frame& frame, const std::string& where) {
                   "use a pinhole camera");
 }
 
-void read_size(const JsonObject& json, const Frame& frame, Camera& camera) {
+void read_size(const JsonObject& json, const NerfFrame& frame, Camera& camera) {
   const std::optional<double> width = frame.number("w"), height = frame.number("h");
   const bool has_size = width || height;
   if (has_size && !(width && height)) json.refuse(width ? "it has \"w\" and no \"h\"" : "it has \"h\" and no \"w\"");
@@ -76,8 +76,8 @@ void read_size(const JsonObject& json, const Frame& frame, Camera& camera) {
 }
 
 /// Along one side: in pixels, or from the angle of view, radians.
-std::optional<double> focal_length(const JsonObject& json, const Frame& frame, const char* pixels, const char* angle,
-                                   double side) {
+std::optional<double> focal_length(const JsonObject& json, const NerfFrame& frame, const char* pixels,
+                                   const char* angle, double side) {
   if (const std::optional<double> given = frame.number(pixels)) return given;
   const std::optional<double> radians = frame.number(angle);
   if (!radians) return std::nullopt;
@@ -123,7 +123,7 @@ void read_pose(const JsonObject& json, Camera& camera) {
 }
 
 Camera read_camera(const JsonObject& json, const JsonObject& file) {
-  const Frame frame(json, file);
+  const NerfFrame frame(json, file);
   refuse_distortion(frame, json.where());
   Camera camera;
   read_size(json, frame, camera);
@@ -139,24 +139,24 @@ Camera read_camera(const JsonObject& json, const JsonObject& file) {
   return camera;
 }
 
-bool recognises(const CameraSource& source) {
+bool is_nerf(const CameraSource& source) {
   return source.json() != nullptr && source.json()->is_object() && source.json()->contains("frames");
 }
 
-std::vector<Camera> read(const CameraSource& source) {
-  const JsonObject file(*source.json(), source.path(), kLayout);
+std::vector<Camera> read_nerf(const CameraSource& source) {
+  const JsonObject file(*source.json(), source.path(), kNerfLayout);
   const nlohmann::json& frames = source.json()->at("frames");
   if (!frames.is_array()) file.refuse("\"frames\" is not an array");
   std::vector<Camera> cameras;
   for (const nlohmann::json& frame : frames) {
     const std::string where = source.path() + " frame " + std::to_string(cameras.size());
-    cameras.push_back(read_camera(JsonObject(frame, where, kLayout), file));
+    cameras.push_back(read_camera(JsonObject(frame, where, kNerfLayout), file));
   }
   return cameras;
 }
 
-const CameraFormatRegistrar registrar({"NeRF transforms.json", "a JSON object with \"frames\"", recognises, read,
-                                       nullptr});
+const CameraFormatRegistrar nerf_registrar({"NeRF transforms.json", "a JSON object with \"frames\"", is_nerf, read_nerf,
+                                            nullptr});
 
 }  // namespace
 }  // namespace vrpipe

@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint64_t kChunkVertices = 256;
 constexpr double kSqrt2 = 1.41421356237309504880;
 
-Match match(const SceneFile& file) {
+Match matches_compressed_ply(const SceneFile& file) {
   if (!file.bytes.begins_with("ply\n") && !file.bytes.begins_with("ply\r\n")) return Match::no;
   const std::string_view head(reinterpret_cast<const char*>(file.bytes.data()),
                               static_cast<std::size_t>(std::min<std::uint64_t>(file.bytes.size(), kMaxPlyHeaderBytes)));
@@ -64,7 +64,7 @@ const std::array<float, 256>& rest_codes() {
   return codes;
 }
 
-GaussianFile read(const SceneFile& file) {
+GaussianFile read_compressed_ply(const SceneFile& file) {
   const FileBytes& bytes = file.bytes;
   const PlyHeader header = read_gaussian_ply_header(bytes);
   const PlyRecords chunks(bytes, header, "chunk");
@@ -134,12 +134,12 @@ GaussianFile read(const SceneFile& file) {
   return result;
 }
 
-const SceneFormatRegistrar registrar({"PlayCanvas compressed .ply",
-                                      "FILE.compressed.ply",
-                                      "16 bytes a Gaussian in chunks of 256, with or without SH",
-                                      {},
-                                      match,
-                                      read});
+const SceneFormatRegistrar compressed_ply_registrar({"PlayCanvas compressed .ply",
+                                                     "FILE.compressed.ply",
+                                                     "16 bytes a Gaussian in chunks of 256, with or without SH",
+                                                     {},
+                                                     matches_compressed_ply,
+                                                     read_compressed_ply});
 
 }  // namespace
 }  // namespace vrpipe

@@ -10,7 +10,7 @@
 namespace vrpipe {
 namespace {
 
-Match match(const SceneFile& file) {
+Match matches_inria_ply(const SceneFile& file) {
   if (file.bytes.begins_with("ply\n") || file.bytes.begins_with("ply\r\n")) return Match::by_container;
   return file.ends_with(".ply") ? Match::by_name : Match::no;
 }
@@ -25,7 +25,7 @@ Vec3 up_of(const PlyHeader& header) {
   return {0, -1, 0};
 }
 
-GaussianFile read(const SceneFile& file) {
+GaussianFile read_inria_ply(const SceneFile& file) {
   const PlyHeader header = read_gaussian_ply_header(file.bytes);
   const PlyRecords vertices(file.bytes, header, "vertex");
   GaussianLayout layout;
@@ -47,7 +47,7 @@ GaussianFile read(const SceneFile& file) {
   return result;
 }
 
-std::vector<std::string> write(const std::filesystem::path& path, const GaussianScene& scene) {
+std::vector<std::string> write_inria_ply(const std::filesystem::path& path, const GaussianScene& scene) {
   const std::size_t per_channel = kShRestPerChannel[static_cast<std::size_t>(scene.sh_degree())];
   std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(scene.size()) + "\n";
   const auto property = [&header](const std::string& name) { header += "property float " + name + "\n"; };
@@ -81,14 +81,14 @@ std::vector<std::string> write(const std::filesystem::path& path, const Gaussian
   return {};
 }
 
-const SceneFormatRegistrar registrar(
+const SceneFormatRegistrar inria_ply_registrar(
     {"INRIA .ply",
      "FILE.ply",
      "what INRIA's training code and most other programs write: float32, SH degree 0 to 3",
      {},
-     match,
-     read,
-     write,
+     matches_inria_ply,
+     read_inria_ply,
+     write_inria_ply,
      ".ply"});
 
 }  // namespace

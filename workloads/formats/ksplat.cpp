@@ -12,8 +12,8 @@
 namespace vrpipe {
 namespace {
 
-constexpr std::uint64_t kHeaderBytes = 4096, kSectionHeaderBytes = 1024;
-constexpr char kRemedy[] = "export the scene as .ksplat version 0.1, or in another format";
+constexpr std::uint64_t kKsplatHeaderBytes = 4096, kSectionHeaderBytes = 1024;
+constexpr char kKsplatRemedy[] = "export the scene as .ksplat version 0.1, or in another format";
 constexpr char kHeader[] = "its header";
 
 /// Bytes of a record's parts at compression levels 0, 1 and 2.
@@ -25,12 +25,12 @@ struct Level {
 };
 constexpr std::array<Level, 3> kLevels = {{{4, 4, 4, 4}, {2, 2, 2, 2}, {2, 2, 2, 1}}};
 
-Match match(const SceneFile& file) {
+Match matches_ksplat(const SceneFile& file) {
   const FileBytes& bytes = file.bytes;
-  if (bytes.size() >= kHeaderBytes && bytes.number<std::uint16_t>(0, kHeader) == 0x0100) {
+  if (bytes.size() >= kKsplatHeaderBytes && bytes.number<std::uint16_t>(0, kHeader) == 0x0100) {
     const std::uint64_t sections = bytes.number<std::uint32_t>(4, kHeader);
     const bool level = bytes.number<std::uint16_t>(20, kHeader) < kLevels.size();
-    if (level && sections >= 1 && sections <= (bytes.size() - kHeaderBytes) / kSectionHeaderBytes)
+    if (level && sections >= 1 && sections <= (bytes.size() - kKsplatHeaderBytes) / kSectionHeaderBytes)
       return Match::by_content;
   }
   return file.ends_with(".ksplat") ? Match::by_name : Match::no;
@@ -77,7 +77,7 @@ Section read_section(const FileBytes& bytes, std::uint64_t header, std::uint64_t
   if (section.count > room) {
     bytes.fail_at(header,
                   "a section has " + std::to_string(section.count) + " Gaussians and room for " + std::to_string(room),
-                  kRemedy);
+                  kKsplatRemedy);
   }
   if (section.sh_degree > 2) {
     bytes.fail_at(header + 40, "the SH degree is " + std::to_string(section.sh_degree), "the format has 0 to 2");
@@ -105,7 +105,7 @@ Section read_section(const FileBytes& bytes, std::uint64_t header, std::uint64_t
       bytes.fail_at(header,
                     "the section's buckets hold " + std::to_string(end) + " of its " + std::to_string(section.count) +
                         " Gaussians",
-                    kRemedy);
+                    kKsplatRemedy);
     }
   }
   offset += bucket_storage;
@@ -116,12 +116,12 @@ Section read_section(const FileBytes& bytes, std::uint64_t header, std::uint64_t
   return section;
 }
 
-GaussianFile read(const SceneFile& file) {
+GaussianFile read_ksplat(const SceneFile& file) {
   const FileBytes& bytes = file.bytes;
-  bytes.range(0, kHeaderBytes, kHeader);
+  bytes.range(0, kKsplatHeaderBytes, kHeader);
   const unsigned major = bytes.number<std::uint8_t>(0, kHeader), minor = bytes.number<std::uint8_t>(1, kHeader);
   if (major != 0 || minor < 1) {
-    bytes.fail_at(0, "its version is " + std::to_string(major) + "." + std::to_string(minor), kRemedy);
+    bytes.fail_at(0, "its version is " + std::to_string(major) + "." + std::to_string(minor), kKsplatRemedy);
   }
   // Not how many are loaded, at byte 8, which some programs leave at 0.
   const std::uint64_t count = bytes.number<std::uint32_t>(4, kHeader);
@@ -131,12 +131,12 @@ GaussianFile read(const SceneFile& file) {
   if (rest_low == 0) rest_low = -1.5;
   if (rest_high == 0) rest_high = 1.5;
 
-  bytes.records(kHeaderBytes, count, kSectionHeaderBytes, "the headers of its sections");
-  std::uint64_t offset = kHeaderBytes + count * kSectionHeaderBytes, total = 0;
+  bytes.records(kKsplatHeaderBytes, count, kSectionHeaderBytes, "the headers of its sections");
+  std::uint64_t offset = kKsplatHeaderBytes + count * kSectionHeaderBytes, total = 0;
   std::vector<Section> sections;
   unsigned degree = 0;
   for (std::uint64_t i = 0; i < count; ++i) {
-    Section section = read_section(bytes, kHeaderBytes + i * kSectionHeaderBytes, offset, level);
+    Section section = read_section(bytes, kKsplatHeaderBytes + i * kSectionHeaderBytes, offset, level);
     section.first = total;
     total += section.count;
     degree = std::max(degree, section.sh_degree);
@@ -187,12 +187,12 @@ GaussianFile read(const SceneFile& file) {
   return result;
 }
 
-const SceneFormatRegistrar registrar({"mkkellogg .ksplat",
-                                      "FILE.ksplat",
-                                      "24 to 140 bytes a Gaussian, compression levels 0 to 2, SH degree 0 to 2",
-                                      {},
-                                      match,
-                                      read});
+const SceneFormatRegistrar ksplat_registrar({"mkkellogg .ksplat",
+                                             "FILE.ksplat",
+                                             "24 to 140 bytes a Gaussian, compression levels 0 to 2, SH degree 0 to 2",
+                                             {},
+                                             matches_ksplat,
+                                             read_ksplat});
 
 }  // namespace
 }  // namespace vrpipe

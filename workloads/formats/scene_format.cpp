@@ -1,11 +1,12 @@
 #include "formats/scene_format.h"
 
 #include <algorithm>
-#include <cctype>
 #include <new>
 #include <utility>
 
 #include <vrpipe/component/error.h>
+
+#include "file_io.h"
 
 namespace vrpipe {
 namespace {
@@ -16,11 +17,6 @@ namespace fs = std::filesystem;
 std::vector<SceneFormat>& registry() {
   static std::vector<SceneFormat> formats;
   return formats;
-}
-
-std::string lower_case(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
 }
 
 bool ends_with(const std::string& text, const std::string& end) {

@@ -8,12 +8,12 @@
 namespace vrpipe {
 namespace {
 
-Match match(const SceneFile& file) {
+Match matches_sog(const SceneFile& file) {
   if (is_zip(file.bytes)) return Match::by_container;
   return file.name == "meta.json" || file.ends_with(".sog") ? Match::by_name : Match::no;
 }
 
-GaussianFile read(const SceneFile& file) {
+GaussianFile read_sog(const SceneFile& file) {
   if (file.ends_with(".sog") && !is_zip(file.bytes)) {
     file.bytes.fail_at(0, "there is no zip archive, which a .sog is", "get the file again");
   }
@@ -25,13 +25,13 @@ GaussianFile read(const SceneFile& file) {
   return result;
 }
 
-const SceneFormatRegistrar registrar(
+const SceneFormatRegistrar sog_registrar(
     {"PlayCanvas SOG",
      "FILE.sog, or a folder with a meta.json",
      "WebP images in a zip archive or a folder, about 15 bytes a Gaussian; versions 1 and 2",
      {},
-     match,
-     read});
+     matches_sog,
+     read_sog});
 
 }  // namespace
 }  // namespace vrpipe

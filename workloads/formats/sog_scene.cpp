@@ -15,7 +15,7 @@
 namespace vrpipe {
 namespace {
 
-constexpr char kRemedy[] = "export the scene again";
+constexpr char kSogRemedy[] = "export the scene again";
 /// Palette entries in a row of the image of centroids.
 constexpr std::uint64_t kPaletteRow = 64;
 
@@ -55,21 +55,21 @@ nlohmann::json parse_scene_json(const FileBytes& bytes) {
 }
 
 const nlohmann::json& json_member(const nlohmann::json& object, const std::string& name, const FileBytes& where) {
-  if (!object.is_object()) where.fail("there is no object that has a `" + name + "`", kRemedy);
+  if (!object.is_object()) where.fail("there is no object that has a `" + name + "`", kSogRemedy);
   const auto found = object.find(name);
-  if (found == object.end()) where.fail("there is no `" + name + "`", kRemedy);
+  if (found == object.end()) where.fail("there is no `" + name + "`", kSogRemedy);
   return *found;
 }
 
 std::uint64_t json_count(const nlohmann::json& value, const std::string& name, const FileBytes& where) {
   constexpr std::uint64_t kMost = std::uint64_t{1} << 53U;
   if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMost)
-    where.fail("`" + name + "` is not a count", kRemedy);
+    where.fail("`" + name + "` is not a count", kSogRemedy);
   return value.get<std::uint64_t>();
 }
 
 std::string json_text(const nlohmann::json& value, const std::string& name, const FileBytes& where) {
-  if (!value.is_string()) where.fail("`" + name + "` is not a text", kRemedy);
+  if (!value.is_string()) where.fail("`" + name + "` is not a text", kSogRemedy);
   return value.get<std::string>();
 }
 
@@ -92,11 +92,11 @@ std::array<double, 4> SogScene::range_ends(const nlohmann::json& attribute, cons
   const nlohmann::json& values = json_member(attribute, end, where_);
   const std::string what = name + "." + end;
   if (!values.is_array() || values.size() < count) {
-    where_.fail("`" + what + "` is not an array of " + std::to_string(count) + " numbers", kRemedy);
+    where_.fail("`" + what + "` is not an array of " + std::to_string(count) + " numbers", kSogRemedy);
   }
   std::array<double, 4> ends{};
   for (std::size_t i = 0; i < count; ++i) {
-    if (!values[i].is_number()) where_.fail("`" + what + "` holds what is not a number", kRemedy);
+    if (!values[i].is_number()) where_.fail("`" + what + "` holds what is not a number", kSogRemedy);
     ends[i] = values[i].get<double>();
   }
   return ends;
@@ -106,10 +106,10 @@ SogScene::Codes SogScene::codebook(const nlohmann::json& attribute, const std::s
   const nlohmann::json& values = json_member(attribute, "codebook", where_);
   Codes codes{};
   if (!values.is_array() || values.empty() || values.size() > codes.size()) {
-    where_.fail("`" + name + ".codebook` is not an array of up to 256 numbers", kRemedy);
+    where_.fail("`" + name + ".codebook` is not an array of up to 256 numbers", kSogRemedy);
   }
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!values[i].is_number()) where_.fail("`" + name + ".codebook` holds what is not a number", kRemedy);
+    if (!values[i].is_number()) where_.fail("`" + name + ".codebook` holds what is not a number", kSogRemedy);
     codes[i] = static_cast<float>(values[i].get<double>());
   }
   return codes;
@@ -126,7 +126,7 @@ SogScene::Codes SogScene::range_codes(double low, double high) const {
 FileBytes SogScene::image(const nlohmann::json& attribute, const std::string& name, std::size_t index,
                           const Neighbour& neighbour) {
   const nlohmann::json& files = json_member(attribute, "files", where_);
-  if (!files.is_array() || files.size() <= index) where_.fail("`" + name + ".files` names too few files", kRemedy);
+  if (!files.is_array() || files.size() <= index) where_.fail("`" + name + ".files` names too few files", kSogRemedy);
   const std::string file = json_text(files[index], name + ".files", where_);
   FileBytes bytes = neighbour(file);
   image_bytes_[file] = bytes.size();
@@ -148,7 +148,7 @@ void SogScene::read_attributes(const nlohmann::json& meta, const Neighbour& neig
     count_ = json_count(json_member(meta, "count", where_), "count", where_);
   } else {
     const nlohmann::json& shape = json_member(means, "shape", where_);
-    if (!shape.is_array() || shape.empty()) where_.fail("`means.shape` is not an array", kRemedy);
+    if (!shape.is_array() || shape.empty()) where_.fail("`means.shape` is not an array", kSogRemedy);
     count_ = json_count(shape[0], "means.shape", where_);
   }
   mean_low_ = range_ends(means, "means", "mins", 3);
@@ -191,12 +191,12 @@ void SogScene::read_rest(const nlohmann::json& rest, const Neighbour& neighbour)
   } else {
     const auto end = [&](const char* name) {
       const nlohmann::json& value = json_member(rest, name, where_);
-      if (!value.is_number()) where_.fail(std::string("`shN.") + name + "` is not a number", kRemedy);
+      if (!value.is_number()) where_.fail(std::string("`shN.") + name + "` is not a number", kSogRemedy);
       return value.get<double>();
     };
     rest_codes_ = range_codes(end("mins"), end("maxs"));
     const nlohmann::json& shape = json_member(rest, "shape", where_);
-    if (!shape.is_array() || shape.size() < 2) where_.fail("`shN.shape` is not an array of 2 numbers", kRemedy);
+    if (!shape.is_array() || shape.size() < 2) where_.fail("`shN.shape` is not an array of 2 numbers", kSogRemedy);
     coefficients = json_count(shape[1], "shN.shape", where_) / 3;
   }
   sh_degree_ = sh_degree_of(coefficients);
@@ -229,7 +229,7 @@ void SogScene::decode(const std::vector<Run>& runs, GaussianArray& gaussians) co
     if (centroids.width != row) {
       centroids_.fail("its image is " + std::to_string(centroids.width) + " pixels wide, and " + std::to_string(row) +
                           " are expected",
-                      kRemedy);
+                      kSogRemedy);
     }
     std::uint64_t entries = centroids.height * kPaletteRow;
     if (version_ == 2) entries = std::min(entries, palette_);
@@ -237,7 +237,7 @@ void SogScene::decode(const std::vector<Run>& runs, GaussianArray& gaussians) co
       if (label_of(i) < entries) continue;
       labels_.fail("Gaussian " + std::to_string(i) + " has palette entry " + std::to_string(label_of(i)) + " of " +
                        std::to_string(entries),
-                   kRemedy);
+                   kSogRemedy);
     }
   }
   constexpr double kSqrt2 = 1.41421356237309504880;

@@ -18,9 +18,9 @@ namespace {
 constexpr std::uint64_t kRecordBytes = 32;
 constexpr std::size_t kScale = 12, kColour = 24, kOpacity = 27, kRotation = 28;
 
-Match match(const SceneFile& file) { return file.ends_with(".splat") ? Match::by_name : Match::no; }
+Match matches_splat(const SceneFile& file) { return file.ends_with(".splat") ? Match::by_name : Match::no; }
 
-GaussianFile read(const SceneFile& file) {
+GaussianFile read_splat(const SceneFile& file) {
   const FileBytes& bytes = file.bytes;
   const std::uint64_t count = bytes.size() / kRecordBytes;
   if (bytes.size() % kRecordBytes != 0) {
@@ -54,7 +54,7 @@ std::byte to_byte(double value) {
   return static_cast<std::byte>(static_cast<unsigned>(limited + 0.5));
 }
 
-std::vector<std::string> write(const std::filesystem::path& path, const GaussianScene& scene) {
+std::vector<std::string> write_splat(const std::filesystem::path& path, const GaussianScene& scene) {
   AtomicFile file(path, "cannot write scene", path.string());
   for (std::uint64_t index = 0; index < scene.size(); ++index) {
     const GaussianRef gaussian = scene[index];
@@ -81,14 +81,14 @@ std::vector<std::string> write(const std::filesystem::path& path, const Gaussian
           " are left out: a .splat has none"};
 }
 
-const SceneFormatRegistrar registrar({"antimatter15 .splat",
-                                      "FILE.splat",
-                                      "32 bytes a Gaussian, colours and rotations in bytes, no SH",
-                                      {},
-                                      match,
-                                      read,
-                                      write,
-                                      ".splat"});
+const SceneFormatRegistrar splat_registrar({"antimatter15 .splat",
+                                            "FILE.splat",
+                                            "32 bytes a Gaussian, colours and rotations in bytes, no SH",
+                                            {},
+                                            matches_splat,
+                                            read_splat,
+                                            write_splat,
+                                            ".splat"});
 
 }  // namespace
 }  // namespace vrpipe

@@ -10,12 +10,12 @@
 namespace vrpipe {
 namespace {
 
-constexpr std::uint64_t kHeaderBytes = 16;
+constexpr std::uint64_t kSpzHeaderBytes = 16;
 constexpr std::uint64_t kHeaderBytesV4 = 32;
 constexpr char kGzipMagic[] = "\x1f\x8b";
-constexpr char kRemedy[] = "export the scene as .spz version 2 to 4";
+constexpr char kSpzRemedy[] = "export the scene as .spz version 2 to 4";
 
-Match match(const SceneFile& file) {
+Match matches_spz(const SceneFile& file) {
   if (file.bytes.begins_with("NGSP")) return Match::by_content;
   if (file.bytes.begins_with(kGzipMagic)) return Match::by_container;
   return file.ends_with(".spz") ? Match::by_name : Match::no;
@@ -33,15 +33,15 @@ struct Header {
 
 Header read_header(const FileBytes& bytes, std::uint64_t file_bytes) {
   const std::string what = "its header";
-  bytes.range(0, kHeaderBytes, what);
-  if (!bytes.begins_with("NGSP")) bytes.fail_at(0, "there is no `NGSP`, with which an .spz begins", kRemedy);
+  bytes.range(0, kSpzHeaderBytes, what);
+  if (!bytes.begins_with("NGSP")) bytes.fail_at(0, "there is no `NGSP`, with which an .spz begins", kSpzRemedy);
   Header header;
   header.version = bytes.number<std::uint32_t>(4, what);
   header.count = bytes.number<std::uint32_t>(8, what);
   header.sh_degree = bytes.number<std::uint8_t>(12, what);
   header.fraction_bits = bytes.number<std::uint8_t>(13, what);
   if (header.version < 2 || header.version > 4) {
-    bytes.fail_at(4, "its version is " + std::to_string(header.version), kRemedy);
+    bytes.fail_at(4, "its version is " + std::to_string(header.version), kSpzRemedy);
   }
   const unsigned most = header.version == 4 ? 4 : 3;
   if (header.sh_degree > most) {
@@ -68,7 +68,7 @@ std::array<std::uint64_t, 6> block_strides(const Header& header) {
 std::array<FileBytes, 6> blocks_of_stream(const Header& header, const FileBytes& unpacked) {
   std::array<FileBytes, 6> blocks;
   const std::array<std::uint64_t, 6> strides = block_strides(header);
-  std::uint64_t offset = kHeaderBytes;
+  std::uint64_t offset = kSpzHeaderBytes;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const std::byte* const first = unpacked.records(offset, header.count, strides[i], kBlockNames[i]);
     const std::uint64_t size = header.count * strides[i];
@@ -87,7 +87,7 @@ std::array<FileBytes, 6> blocks_of_table(const Header& header, const FileBytes& 
   if (streams < needed) {
     file.fail_at(15,
                  "it announces " + std::to_string(streams) + " streams, and " + std::to_string(needed) + " are needed",
-                 kRemedy);
+                 kSpzRemedy);
   }
   const std::uint64_t table = file.number<std::uint32_t>(16, what);
   constexpr std::uint64_t kEntryBytes = 16;
@@ -103,7 +103,7 @@ std::array<FileBytes, 6> blocks_of_table(const Header& header, const FileBytes& 
       file.fail_at(entry + 8,
                    std::string("the size of ") + kBlockNames[i] + " is " + std::to_string(unpacked) + " bytes, and " +
                        std::to_string(header.count * strides[i]) + " are needed",
-                   kRemedy);
+                   kSpzRemedy);
     }
     blocks[i] = unpack_zstd(file, offset, packed, unpacked, kBlockNames[i]);
     offset += packed;
@@ -153,7 +153,7 @@ bool turned(const SceneFile& file) {
   return false;
 }
 
-GaussianFile read(const SceneFile& file) {
+GaussianFile read_spz(const SceneFile& file) {
   const bool turn = turned(file);
   FileBytes bytes = file.bytes;
   Header header;
@@ -161,9 +161,9 @@ GaussianFile read(const SceneFile& file) {
   std::array<FileBytes, 6> blocks;
   if (bytes.begins_with(kGzipMagic)) {
     GzipStream stream(bytes);
-    stream.unpack(kHeaderBytes);
-    header = read_header(stream.first(kHeaderBytes), bytes.size());
-    if (header.version == 4) bytes.fail_at(0, "version 4 is in a gzip stream", kRemedy);
+    stream.unpack(kSpzHeaderBytes);
+    header = read_header(stream.first(kSpzHeaderBytes), bytes.size());
+    if (header.version == 4) bytes.fail_at(0, "version 4 is in a gzip stream", kSpzRemedy);
     std::uint64_t size = 0;
     for (const std::uint64_t stride : block_strides(header)) size += header.count * stride;
     stream.unpack(size);
@@ -213,14 +213,14 @@ GaussianFile read(const SceneFile& file) {
   return result;
 }
 
-const SceneFormatRegistrar registrar(
+const SceneFormatRegistrar spz_registrar(
     {"Niantic .spz",
      "FILE.spz",
      "20 bytes a Gaussian and up to 45 of SH, packed; versions 2 to 4",
      {{"axes",
        "rub: the file's y points up, as the format has it (the default); rdf: it points down, as some programs write"}},
-     match,
-     read});
+     matches_spz,
+     read_spz});
 
 }  // namespace
 }  // namespace vrpipe

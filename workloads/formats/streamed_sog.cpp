@@ -16,9 +16,9 @@
 namespace vrpipe {
 namespace {
 
-constexpr char kRemedy[] = "export the scene again";
+constexpr char kStreamedSogRemedy[] = "export the scene again";
 
-Match match(const SceneFile& file) { return file.name == "lod-meta.json" ? Match::by_name : Match::no; }
+Match matches_streamed_sog(const SceneFile& file) { return file.name == "lod-meta.json" ? Match::by_name : Match::no; }
 
 std::uint64_t chosen_level(const SceneFile& file, std::uint64_t levels) {
   const auto choice = file.choices.find("lod");
@@ -46,7 +46,7 @@ std::vector<Region> regions(const nlohmann::json& tree, const std::string& level
   while (!open.empty()) {
     const nlohmann::json& node = *open.back();
     open.pop_back();
-    if (!node.is_object()) where.fail("a node of `tree` is not an object", kRemedy);
+    if (!node.is_object()) where.fail("a node of `tree` is not an object", kStreamedSogRemedy);
     if (node.contains("children") && node["children"].is_array()) {
       const nlohmann::json& children = node["children"];
       for (auto child = children.rbegin(); child != children.rend(); ++child) open.push_back(&*child);
@@ -57,7 +57,7 @@ std::vector<Region> regions(const nlohmann::json& tree, const std::string& level
     found.push_back({number("file"), number("offset"), number("count")});
     if (found.back().file >= files) {
       where.fail("a region lies in file " + std::to_string(found.back().file) + " of " + std::to_string(files),
-                 kRemedy);
+                 kStreamedSogRemedy);
     }
   }
   return found;
@@ -71,13 +71,13 @@ SogScene open_scene(const SceneFile& file, const std::string& name) {
                   [&file, folder](const std::string& image) { return file.neighbour(folder + image); });
 }
 
-GaussianFile read(const SceneFile& file) {
+GaussianFile read_streamed_sog(const SceneFile& file) {
   const FileBytes& where = file.bytes;
   const nlohmann::json meta = parse_scene_json(where);
   const nlohmann::json& names = json_member(meta, "filenames", where);
-  if (!names.is_array()) where.fail("`filenames` is not an array", kRemedy);
+  if (!names.is_array()) where.fail("`filenames` is not an array", kStreamedSogRemedy);
   const std::uint64_t levels = json_count(json_member(meta, "lodLevels", where), "lodLevels", where);
-  if (levels == 0) where.fail("`lodLevels` is 0", kRemedy);
+  if (levels == 0) where.fail("`lodLevels` is 0", kStreamedSogRemedy);
   const std::uint64_t level = chosen_level(file, levels);
 
   // What several scenes name is read once, and counts once.
@@ -102,7 +102,7 @@ GaussianFile read(const SceneFile& file) {
     if (part == parts.end()) {
       const std::string name = json_text(names[region.file], "filenames", where);
       if (!opened.insert(std::filesystem::path(name).lexically_normal().string()).second) {
-        where.fail("`filenames` has `" + name.substr(0, 100) + "` twice", kRemedy);
+        where.fail("`filenames` has `" + name.substr(0, 100) + "` twice", kStreamedSogRemedy);
       }
       part = parts.emplace(region.file, Part{open_scene(source, name), {}, 0}).first;
     }
@@ -114,7 +114,7 @@ GaussianFile read(const SceneFile& file) {
       where.fail("a region has Gaussians " + std::to_string(region.from) + " to " +
                      std::to_string(region.from + region.count) + " of file " + std::to_string(region.file) +
                      ", which has " + std::to_string(of.scene.count()),
-                 kRemedy);
+                 kStreamedSogRemedy);
     }
     of.runs.push_back({region.from, region.count, total});
     total += region.count;
@@ -137,12 +137,12 @@ GaussianFile read(const SceneFile& file) {
   return result;
 }
 
-const SceneFormatRegistrar registrar({"PlayCanvas streamed SOG",
-                                      "FOLDER, or its lod-meta.json",
-                                      "SOG scenes in levels of detail",
-                                      {{"lod", "the level of detail, 0 (the finest, the default) and up"}},
-                                      match,
-                                      read});
+const SceneFormatRegistrar streamed_sog_registrar({"PlayCanvas streamed SOG",
+                                                   "FOLDER, or its lod-meta.json",
+                                                   "SOG scenes in levels of detail",
+                                                   {{"lod", "the level of detail, 0 (the finest, the default) and up"}},
+                                                   matches_streamed_sog,
+                                                   read_streamed_sog});
 
 }  // namespace
 }  // namespace vrpipe

@@ -7,7 +7,7 @@
 namespace vrpipe {
 namespace {
 
-constexpr char kRemedy[] = "get the file again";
+constexpr char kZipRemedy[] = "get the file again";
 
 std::string text_of(zip_error_t& error) {
   std::string text = zip_error_strerror(&error);
@@ -37,7 +37,8 @@ ZipArchive::ZipArchive(const FileBytes& bytes) : bytes_(bytes), handle_(std::mak
       bytes.fail("it ends at byte " + std::to_string(bytes.size()) + ", without the directory that ends a zip archive",
                  "get the file again, it seems cut short");
     }
-    bytes.fail("its zip archive of " + std::to_string(bytes.size()) + " bytes is damaged: " + text_of(error), kRemedy);
+    bytes.fail("its zip archive of " + std::to_string(bytes.size()) + " bytes is damaged: " + text_of(error),
+               kZipRemedy);
   }
   const zip_int64_t entries = zip_get_num_entries(handle_->archive, 0);
   for (zip_int64_t i = 0; i < entries; ++i) {
@@ -57,7 +58,7 @@ FileBytes ZipArchive::read(const std::string& name) const {
   zip_stat_t status;
   zip_stat_init(&status);
   if (zip_stat_index(handle_->archive, index, 0, &status) != 0 || (status.valid & ZIP_STAT_SIZE) == 0) {
-    bytes_.fail(what + " has no size", kRemedy);
+    bytes_.fail(what + " has no size", kZipRemedy);
   }
   // Other methods take memory as the archive says, up to gigabytes.
   const bool known = (status.valid & ZIP_STAT_COMP_METHOD) != 0 &&
@@ -69,7 +70,7 @@ FileBytes ZipArchive::read(const std::string& name) const {
   if (status.size > most || status.size > most - unpacked_) {
     bytes_.fail(what + " is to have " + std::to_string(status.size) + " bytes, and the archive has " +
                     std::to_string(bytes_.size()),
-                kRemedy);
+                kZipRemedy);
   }
   unpacked_ += status.size;
   const std::shared_ptr<std::byte[]> unpacked = allocate_bytes(status.size, bytes_.where());
@@ -80,7 +81,7 @@ FileBytes ZipArchive::read(const std::string& name) const {
   if (done >= 0 && zip_fread(file, &behind, 1) != 0) done = -1;
   if (file != nullptr && zip_fclose(file) != 0) done = -1;
   if (done < 0 || static_cast<zip_uint64_t>(done) != status.size) {
-    bytes_.fail(what + " is cut short or damaged", kRemedy);
+    bytes_.fail(what + " is cut short or damaged", kZipRemedy);
   }
   return FileBytes(unpacked, status.size, bytes_.where() + ", " + name.substr(0, 100));
 }

@@ -55,10 +55,9 @@ class MemoryStream : public Assimp::IOStream {
 }  // namespace
 
 std::string read_mesh_file(const std::string& path) {
-  constexpr char kCannotRead[] = "cannot read mesh";
-  const InputFile file(path, kCannotRead);
+  const InputFile file(path, kCannotReadMesh);
   if (file.size() > kMaxFileBytes) {
-    throw UserError(kCannotRead, path, "it has " + std::to_string(file.size()) + " bytes",
+    throw UserError(kCannotReadMesh, path, "it has " + std::to_string(file.size()) + " bytes",
                     "a file of a mesh has at most " + std::to_string(kMaxFileBytes) + "; use a simpler mesh");
   }
   try {
@@ -67,7 +66,7 @@ std::string read_mesh_file(const std::string& path) {
     file.check_unchanged();
     return bytes;
   } catch (const std::bad_alloc&) {
-    throw UserError(kCannotRead, path, "it needs " + std::to_string(file.size() >> 20U) + " MiB of memory",
+    throw UserError(kCannotReadMesh, path, "it needs " + std::to_string(file.size() >> 20U) + " MiB of memory",
                     "raise the limit on memory, or use a simpler mesh");
   }
 }

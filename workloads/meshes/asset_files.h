@@ -8,6 +8,9 @@
 
 namespace vrpipe {
 
+/// What every UserError about a mesh begins with.
+constexpr char kCannotReadMesh[] = "cannot read mesh";
+
 /// Reads a regular file whole, of at most a gigabyte.
 /// @throws UserError that begins "cannot read mesh"
 std::string read_mesh_file(const std::string& path);

@@ -34,10 +34,10 @@ void append(std::string& bytes, std::uint32_t value) {
 }
 
 /// Copies what is used of a document, piece by piece, each checked against those that were copied before.
-class Reducer {
+class GltfReducer {
  public:
-  Reducer(const Json& source, const std::string& where, std::optional<std::size_t> binary_bytes,
-          std::vector<std::uint64_t>& triangles)
+  GltfReducer(const Json& source, const std::string& where, std::optional<std::size_t> binary_bytes,
+              std::vector<std::uint64_t>& triangles)
       : source_(source), where_(where), binary_bytes_(binary_bytes), triangles_(triangles) {}
 
   Json reduce() {
@@ -51,14 +51,14 @@ class Reducer {
       fail("it requires extensions, of which none is supported");
     }
     result_["asset"] = {{"version", "2.0"}};
-    copy_all("buffers", &Reducer::buffer);
-    copy_all("bufferViews", &Reducer::buffer_view);
-    copy_all("accessors", &Reducer::accessor);
-    copy_all("materials", &Reducer::material);
-    copy_all("meshes", &Reducer::mesh);
-    copy_all("nodes", &Reducer::node);
+    copy_all("buffers", &GltfReducer::buffer);
+    copy_all("bufferViews", &GltfReducer::buffer_view);
+    copy_all("accessors", &GltfReducer::accessor);
+    copy_all("materials", &GltfReducer::material);
+    copy_all("meshes", &GltfReducer::mesh);
+    copy_all("nodes", &GltfReducer::node);
     check_tree();
-    copy_all("scenes", &Reducer::scene);
+    copy_all("scenes", &GltfReducer::scene);
     if (count("scenes") == 0) fail("it has no scene");
     result_["scene"] = source_.contains("scene") ? index(source_, "scene", "scenes", "the document") : 0;
     return std::move(result_);
@@ -109,7 +109,7 @@ class Reducer {
     to[name] = values;
   }
 
-  void copy_all(const char* kind, Json (Reducer::*copy)(const Json&, const std::string&)) {
+  void copy_all(const char* kind, Json (GltfReducer::*copy)(const Json&, const std::string&)) {
     if (!source_.contains(kind)) return;
     const Json& all = source_[kind];
     if (!all.is_array()) fail(std::string("`") + kind + "` is not an array");
@@ -325,7 +325,7 @@ std::string reduced_json(const std::string& text, const std::string& where, std:
   const Json source = Json::parse(text, watch, /*allow_exceptions=*/false);
   const char* why = too_deep ? "its JSON is nested too deep" : source.is_discarded() ? "it is not valid JSON" : nullptr;
   if (why != nullptr) throw UserError("cannot read mesh", where, why, "export it again, as glTF 2.0");
-  return Reducer(source, where, binary_bytes, triangles).reduce().dump();
+  return GltfReducer(source, where, binary_bytes, triangles).reduce().dump();
 }
 
 }  // namespace

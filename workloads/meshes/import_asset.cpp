@@ -17,15 +17,16 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/workloads/portable_math.h>
 
+#include "asset_files.h"
+
 namespace vrpipe {
 namespace {
 
-constexpr char kCannotRead[] = "cannot read mesh";
 /// Cutting ears takes a time of the square of this or more.
-constexpr unsigned kMaxCorners = 1024;
+constexpr unsigned kMaxFaceCorners = 1024;
 
 Vec3 to_double(const aiVector3D& v) { return {v.x, v.y, v.z}; }
-std::array<float, 3> to_float(const Vec3& v) {
+std::array<float, 3> to_floats(const Vec3& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
@@ -89,14 +90,14 @@ class Collector {
     const bool mirrored = transform.determinant() < 0;
     const auto first = static_cast<std::uint32_t>(result_.positions.size());
     const auto add_vertex = [&](unsigned v) {
-      result_.positions.push_back(to_float(transform.point(to_double(mesh.mVertices[v]))));
+      result_.positions.push_back(to_floats(transform.point(to_double(mesh.mVertices[v]))));
       result_.colours.push_back(colour(mesh, v, material));
     };
     // With normals, triangles share vertices as they do in the file.
     if (mesh.HasNormals()) {
       for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
         add_vertex(v);
-        result_.normals.push_back(to_float(transform.normal(to_double(mesh.mNormals[v]))));
+        result_.normals.push_back(to_floats(transform.normal(to_double(mesh.mNormals[v]))));
       }
     }
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
@@ -124,7 +125,7 @@ class Collector {
         mesh.HasNormals() ? std::uint64_t{mesh.mNumVertices} : 3 * std::uint64_t{mesh.mNumFaces};
     const std::uint64_t vertices = result_.positions.size() + added;
     if (std::max(triangles, vertices) <= kMaxMeshElements) return;
-    throw UserError(kCannotRead, where_,
+    throw UserError(kCannotReadMesh, where_,
                     "it has more than " + std::to_string(kMaxMeshElements) +
                         " triangles or vertices, three for each triangle without normals",
                     "use a simpler mesh");
@@ -152,7 +153,7 @@ class Collector {
     };
     const Vec3 normal = glm::cross(corner(1) - corner(0), corner(2) - corner(0));
     const double length = glm::length(normal);
-    return length > 0 && std::isfinite(length) ? to_float(normal / length) : std::array<float, 3>{};
+    return length > 0 && std::isfinite(length) ? to_floats(normal / length) : std::array<float, 3>{};
   }
 
   const aiScene& scene_;
@@ -167,9 +168,9 @@ void remove_bad_faces(aiScene& scene, const std::string& where, RejectedTriangle
   for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
     aiMesh& mesh = *scene.mMeshes[m];
     const auto is_bad = [&](const aiFace& face) {
-      if (face.mNumIndices > kMaxCorners) {
-        throw UserError(kCannotRead, where, "a face has " + std::to_string(face.mNumIndices) + " corners",
-                        "triangulate faces of more than " + std::to_string(kMaxCorners));
+      if (face.mNumIndices > kMaxFaceCorners) {
+        throw UserError(kCannotReadMesh, where, "a face has " + std::to_string(face.mNumIndices) + " corners",
+                        "triangulate faces of more than " + std::to_string(kMaxFaceCorners));
       }
       if (face.mNumIndices < 3) {
         ++rejected.lines_and_points;

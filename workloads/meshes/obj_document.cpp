@@ -17,8 +17,8 @@
 namespace vrpipe {
 namespace {
 
-constexpr std::size_t kMaxCorners = 1024;
-constexpr std::size_t kMaxNameBytes = 200;
+constexpr std::size_t kMaxObjCorners = 1024;
+constexpr std::size_t kMaxMaterialNameBytes = 200;
 
 /// Calls `use(words, line)` for every statement; a backslash at the end of a line joins it with the next.
 template <class Use>
@@ -53,7 +53,7 @@ std::string name_in(std::string_view statement, std::string_view keyword) {
   for (const char c : name) {
     if (static_cast<unsigned char>(c) < ' ') return {};
   }
-  return name.size() > kMaxNameBytes ? std::string{} : std::string(name);
+  return name.size() > kMaxMaterialNameBytes ? std::string{} : std::string(name);
 }
 
 /// A corner of a face: indices as in the file, from 1, or below 0 from the latest on; 0: none.
@@ -79,9 +79,9 @@ std::optional<Corner> corner_of(std::string_view word) {
 }
 
 /// Counts what a statement may refer to, and copies it.
-class Reducer {
+class ObjReducer {
  public:
-  Reducer(const std::string& where, RejectedTriangles& rejected) : where_(where), rejected_(rejected) {}
+  ObjReducer(const std::string& where, RejectedTriangles& rejected) : where_(where), rejected_(rejected) {}
 
   std::string reduce(const std::string& text) {
     for_each_statement(text, [&](const auto& words, const auto&) { count(words); });
@@ -152,9 +152,9 @@ class Reducer {
       ++rejected_.lines_and_points;
       return;
     }
-    if (corners > kMaxCorners) {
+    if (corners > kMaxObjCorners) {
       throw UserError("cannot read mesh", where_, fmt::format("a face has {} corners", corners),
-                      fmt::format("triangulate faces of more than {}", kMaxCorners));
+                      fmt::format("triangulate faces of more than {}", kMaxObjCorners));
     }
     std::string line = "f";
     for (std::size_t i = 1; i <= corners; ++i) {
@@ -181,7 +181,7 @@ class Reducer {
 }  // namespace
 
 std::string reduced_obj(const std::string& text, const std::string& where, RejectedTriangles& rejected) {
-  return Reducer(where, rejected).reduce(text);
+  return ObjReducer(where, rejected).reduce(text);
 }
 
 std::string reduced_mtl(const std::string& text) {

@@ -12,12 +12,12 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/workloads/mesh.h>
 
+#include "asset_files.h"
 #include "words.h"
 
 namespace vrpipe {
 namespace {
 
-constexpr char kCannotRead[] = "cannot read mesh";
 constexpr char kExportAgain[] = "export the mesh again";
 /// Longer lists are no polygons, and triangulating one would take minutes.
 constexpr std::uint64_t kMaxListLength = 1024;
@@ -45,7 +45,7 @@ class RecordWalker {
     ascii_ = header.format == "ascii 1.0";
     swap_ = header.format == "binary_big_endian 1.0";
     if (!ascii_ && !swap_ && header.format != "binary_little_endian 1.0") {
-      throw UserError(kCannotRead, where, "its format is `" + header.format + "`",
+      throw UserError(kCannotReadMesh, where, "its format is `" + header.format + "`",
                       "PLY formats are ascii 1.0, binary_little_endian 1.0 and binary_big_endian 1.0");
     }
   }
@@ -73,7 +73,7 @@ class RecordWalker {
 
  private:
   [[noreturn]] void fail(const PlyElement& element, std::uint64_t record, const std::string& why) const {
-    throw UserError(kCannotRead, where_,
+    throw UserError(kCannotReadMesh, where_,
                     why + " (record " + std::to_string(record) + " of element " + shortened(element.name) + ")",
                     kExportAgain);
   }
@@ -82,7 +82,7 @@ class RecordWalker {
     const bool known =
         ply_scalar_size(property.type) > 0 && (!property.is_list() || ply_scalar_size(property.count_type) > 0);
     if (known) return;
-    throw UserError(kCannotRead, where_, "property `" + shortened(property.name) + "` has an unknown type",
+    throw UserError(kCannotReadMesh, where_, "property `" + shortened(property.name) + "` has an unknown type",
                     "PLY types are char uchar short ushort int uint float double, and int8 to float64");
   }
 
@@ -163,18 +163,19 @@ class RecordWalker {
 std::string reduced_ply(const PlyHeader& header, const std::string& bytes, const std::string& where) {
   const PlyElement *const vertices = header.element("vertex"), *const faces = header.element("face");
   if (faces == nullptr || faces->count == 0 || vertices == nullptr) {
-    throw UserError(kCannotRead, where, "it has no faces",
+    throw UserError(kCannotReadMesh, where, "it has no faces",
                     "give a .ply with elements vertex and face; Gaussians are given as a scene");
   }
-  if (vertices > faces) throw UserError(kCannotRead, where, "element face comes before element vertex", kExportAgain);
+  if (vertices > faces)
+    throw UserError(kCannotReadMesh, where, "element face comes before element vertex", kExportAgain);
   RecordWalker walker(header, bytes, where);
   std::string head = "ply\nformat " + header.format + "\n", records;
   for (const PlyElement& element : header.elements) {
     if (header.element(element.name) != &element) {
-      throw UserError(kCannotRead, where, "there are two elements `" + shortened(element.name) + "`", kExportAgain);
+      throw UserError(kCannotReadMesh, where, "there are two elements `" + shortened(element.name) + "`", kExportAgain);
     }
     if (element.count > kMaxMeshElements) {
-      throw UserError(kCannotRead, where,
+      throw UserError(kCannotReadMesh, where,
                       "it has " + std::to_string(element.count) + " records of element " + shortened(element.name),
                       "use at most " + std::to_string(kMaxMeshElements));
     }
@@ -192,7 +193,7 @@ std::string reduced_ply(const PlyHeader& header, const std::string& bytes, const
     }
     const auto has = [&](const char* name) { return std::find(names.begin(), names.end(), name) != names.end(); };
     if (&element == vertices ? !has("x") || !has("y") || !has("z") : names.size() != 1) {
-      throw UserError(kCannotRead, where,
+      throw UserError(kCannotReadMesh, where,
                       &element == vertices ? "element vertex has no x, y and z"
                                            : "element face has no list vertex_indices, or two",
                       kExportAgain);

@@ -13,7 +13,7 @@
 namespace vrpipe {
 namespace {
 
-constexpr char kCannot[] = "cannot project mesh";
+constexpr char kCannotProject[] = "cannot project mesh";
 
 /// A colour as the pipeline takes it: not below 0, finite.
 float colour_of(double value) {
@@ -57,7 +57,7 @@ class Viewport {
 }  // namespace
 
 Draw project_mesh(const Mesh& mesh, const Camera& camera, RejectedTriangles& rejected) {
-  check_camera(camera, kCannot);
+  check_camera(camera, kCannotProject);
   check_mesh(mesh);
   const ClipVolume volume(camera);
   const Viewport viewport(camera);
@@ -86,7 +86,7 @@ Draw project_mesh(const Mesh& mesh, const Camera& camera, RejectedTriangles& rej
       previous = next;
     }
     if (draw.mesh.size() > kMostTriangles) {
-      throw UserError(kCannot, "size", "clipping makes more than 2^31 triangles of it", "use a smaller mesh");
+      throw UserError(kCannotProject, "size", "clipping makes more than 2^31 triangles of it", "use a smaller mesh");
     }
   }
   return draw;

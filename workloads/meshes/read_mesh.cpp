@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cctype>
 #include <exception>
 #include <string>
 #include <utility>
@@ -25,14 +24,6 @@
 namespace vrpipe {
 namespace {
 
-constexpr char kCannotRead[] = "cannot read mesh";
-
-std::string extension_of(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
-
 PlyHeader header_of(const std::filesystem::path& path, const std::string& what, const std::string& export_remedy) {
   const InputFile file(path, what);
   std::string head(static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), kMaxPlyHeaderBytes)), '\0');
@@ -55,7 +46,7 @@ void keep_one_reader(Assimp::Importer& importer, const std::string& extension) {
 
 [[noreturn]] void fail(const std::string& where, const std::string& why) {
   constexpr std::size_t kLongest = 300;
-  throw UserError(kCannotRead, where, why.empty() ? "it is not a mesh of its type" : why.substr(0, kLongest),
+  throw UserError(kCannotReadMesh, where, why.empty() ? "it is not a mesh of its type" : why.substr(0, kLongest),
                   "export it again as .obj, .ply, .gltf or .glb");
 }
 
@@ -66,7 +57,8 @@ Mesh import_mesh(const std::string& path, const std::string& extension, std::str
   if (is_gltf) bytes = reduced_gltf(bytes, path, triangles);
   if (extension == ".obj") bytes = reduced_obj(bytes, path, rejected);
   if (bytes.empty()) return {};
-  if (extension == ".ply") bytes = reduced_ply(header_of(path, kCannotRead, "export the mesh as a .ply"), bytes, path);
+  if (extension == ".ply")
+    bytes = reduced_ply(header_of(path, kCannotReadMesh, "export the mesh as a .ply"), bytes, path);
   Assimp::Importer importer;
   keep_one_reader(importer, extension);
   auto* files = new AssetFiles(path, std::move(bytes), extension == ".obj");  // the importer deletes it
@@ -101,7 +93,7 @@ bool is_mesh_file(const std::filesystem::path& path) {
 Mesh read_mesh(const std::filesystem::path& path, RejectedTriangles& rejected) {
   const std::string where = path.string(), extension = extension_of(path);
   if (extension != ".obj" && extension != ".ply" && extension != ".gltf" && extension != ".glb") {
-    throw UserError(kCannotRead, where,
+    throw UserError(kCannotReadMesh, where,
                     extension.empty() ? "it has no extension" : "meshes of type `" + extension + "` are not supported",
                     "give an .obj, .ply, .gltf or .glb");
   }
@@ -117,7 +109,7 @@ Mesh read_mesh(const std::filesystem::path& path, RejectedTriangles& rejected) {
   }
   reject_triangles(mesh, here);
   if (mesh.empty()) {
-    throw UserError(kCannotRead, where,
+    throw UserError(kCannotReadMesh, where,
                     "no triangle of it can be drawn: " + std::to_string(here.not_finite) + " are not finite, " +
                         std::to_string(here.index_out_of_range) + " have indices beyond the vertices, " +
                         std::to_string(here.degenerate) + " have no area; " + std::to_string(here.lines_and_points) +

@@ -15,7 +15,7 @@ bool is_finite(const std::array<float, 3>& v) {
   return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
 }
 
-Vec3 to_double(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
+Vec3 to_vector(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
 
 }  // namespace
 
@@ -49,9 +49,9 @@ bool can_be_drawn(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle
     return false;
   }
   // No square of a difference of floats overflows a double; a product that vanishes is of sides of 1e-40 and less.
-  const Vec3 corner = to_double(mesh.positions[triangle[0]]);
+  const Vec3 corner = to_vector(mesh.positions[triangle[0]]);
   const Vec3 normal =
-      glm::cross(to_double(mesh.positions[triangle[1]]) - corner, to_double(mesh.positions[triangle[2]]) - corner);
+      glm::cross(to_vector(mesh.positions[triangle[1]]) - corner, to_vector(mesh.positions[triangle[2]]) - corner);
   if (normal == Vec3{0, 0, 0}) {
     ++rejected.degenerate;
     return false;

@@ -2,6 +2,8 @@
 
 namespace vrpipe {
 
+constexpr double kPi = 3.14159265358979323846;
+
 // Elementary functions that give the same bits on every processor and with every compiler (glibc's differ with and
 // without FMA). Built from +, -, *, / and sqrt in double; relative error about 1e-15. Compile with -ffp-contract=off.
 
