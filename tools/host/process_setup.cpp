@@ -26,15 +26,15 @@ std::atomic<const char*> last_words{"vrpipe: interrupted, nothing written\n"};
 std::atomic<bool> progress_is_drawn{false};
 std::atomic<pid_t> owner{0};
 
-void say(const char* text) {
+void say_to_terminal(const char* text) {
   if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) return;  // nobody is left to be told
 }
 
 void end_in_order(int signal) {
   if (::getpid() == owner) {
     remove_unfinished_files();
-    if (progress_is_drawn) say("\r\x1b[J");
-    say(last_words);
+    if (progress_is_drawn) say_to_terminal("\r\x1b[J");
+    say_to_terminal(last_words);
   }
   // Delivered when the handler returns: whoever waits for the process sees which signal ended it.
   ::signal(signal, SIG_DFL);

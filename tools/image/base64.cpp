@@ -6,7 +6,7 @@
 namespace vrpipe::tools {
 namespace {
 
-constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+constexpr char alphabet[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 }  // namespace
 
@@ -19,14 +19,14 @@ std::string base64(const std::string& bytes) {
       group = group << 8U | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0U);
     }
     for (std::size_t k = 0; k < 4; ++k) {
-      text += i + k > bytes.size() ? '=' : digits[group >> (18 - 6 * k) & 63U];
+      text += i + k > bytes.size() ? '=' : alphabet[group >> (18 - 6 * k) & 63U];
     }
   }
   return text;
 }
 
 std::string bytes_of_base64(const std::string& text) {
-  const std::string known(digits);
+  const std::string known(alphabet);
   std::string bytes;
   std::uint32_t group = 0;
   unsigned bits = 0;

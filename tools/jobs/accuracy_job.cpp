@@ -12,6 +12,7 @@
 #include <vrpipe/workloads/scene.h>
 
 #include "host/output_file.h"
+#include "host/stopwatch.h"
 #include "jobs/comparison.h"
 #include "jobs/processes.h"
 
@@ -29,7 +30,7 @@ constexpr const char* reference_name = "reference";
 
 class Stopwatch {
  public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+  double seconds() const { return seconds_since(start_); }
 
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();

@@ -88,7 +88,7 @@ std::vector<double> quotients(const std::vector<Term>& terms) {
 }
 
 /// @param terms  of which neither side is nothing, even where all are low
-Range ratio_of(std::vector<Term> terms) {
+Range range_of_ratio(std::vector<Term> terms) {
   const double nominal = total(terms, &Term::baseline, &Range::nominal) / total(terms, &Term::run, &Range::nominal);
   std::stable_sort(terms.begin(), terms.end(),
                    [](const Term& a, const Term& b) { return a.baseline / a.run < b.baseline / b.run; });
@@ -176,7 +176,7 @@ std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmo
   for (double Term::*amount : {&Term::baseline, &Term::run}) {
     if (!(total(terms, amount, &Range::low) > 0)) return std::nullopt;
   }
-  return ratio_of(std::move(terms));
+  return range_of_ratio(std::move(terms));
 }
 
 std::vector<std::string> powers_of_other_platforms(const EnergyTable& table, const Platform& platform) {

@@ -18,7 +18,7 @@
 namespace vrpipe::tools {
 namespace {
 
-constexpr const char* cannot_use = "cannot use energies";
+constexpr const char* cannot_use_table = "cannot use energies";
 constexpr const char* schema = "vrpipe.energies/1";
 
 std::vector<std::string> split(const std::string& text, char separator) {
@@ -66,7 +66,7 @@ class TableReader {
     return fmt::format("{} line {}", file_, source.begin.line);
   }
   [[noreturn]] void refuse(const toml::node& where, const std::string& why, const std::string& remedy) const {
-    throw UserError(cannot_use, line(where.source()), why, remedy);
+    throw UserError(cannot_use_table, line(where.source()), why, remedy);
   }
 
   toml::table parsed(const std::string& text) const {
@@ -75,7 +75,8 @@ class TableReader {
     } catch (const toml::parse_error& error) {
       std::string why(error.description());
       std::replace(why.begin(), why.end(), '\n', ' ');
-      throw UserError(cannot_use, line(error.source()), why, "write TOML 1.0, as `vrpipe energies --toml` prints it");
+      throw UserError(cannot_use_table, line(error.source()), why,
+                      "write TOML 1.0, as `vrpipe energies --toml` prints it");
     }
   }
 
@@ -83,7 +84,7 @@ class TableReader {
     for (const auto& [key, value] : table) {
       const std::string name(key.str());
       if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-      throw UserError(cannot_use, line(key.source()), fmt::format("unknown key '{}'", name),
+      throw UserError(cannot_use_table, line(key.source()), fmt::format("unknown key '{}'", name),
                       fmt::format("did you mean {}? there are {}", nearest_name(name, known), fmt::join(known, ", ")));
     }
   }
@@ -289,7 +290,7 @@ void check_energy_names(const EnergyTable& table, const Platform& platform) {
     for (const CountProduct& product : formula.products) {
       for (const std::string& name : product.names) {
         if (countable.count(name) > 0) continue;
-        throw UserError(cannot_use, formula.where,
+        throw UserError(cannot_use_table, formula.where,
                         others.count(name) > 0 ? "'" + name + "' is neither a counter nor a number"
                                                : "nothing counts '" + name + "'",
                         "did you mean " + nearest_name(name, countable) + "? `vrpipe units` lists all");

@@ -15,7 +15,7 @@
 namespace vrpipe::tools {
 namespace {
 
-[[noreturn]] void refuse(const std::string& unit, const Netlist& netlist) {
+[[noreturn]] void refuse_log(const std::string& unit, const Netlist& netlist) {
   std::vector<std::string> names;
   bool is_memory = netlist.has_foreign(unit);
   for (const Instance& instance : netlist.instances()) {
@@ -58,7 +58,7 @@ void EventLog::attach(const RunRequest& request, Observers& observers) {
       if (logged(instance.path) == nullptr) logged_.push_back(std::make_unique<Logged>(Logged{instance.path, {}}));
       logged(instance.path)->windows.push_back(choice.window);
     }
-    if (!found) refuse(choice.unit, netlist);
+    if (!found) refuse_log(choice.unit, netlist);
   }
   observers.on_states([this](const std::string& unit, UnitState state, Cycle from) {
     const Logged* const of_unit = logged(unit);

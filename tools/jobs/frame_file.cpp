@@ -19,25 +19,25 @@
 namespace vrpipe::tools {
 namespace {
 
-using Json = nlohmann::json;
+using FrameJson = nlohmann::json;
 
-constexpr const char* cannot_use = "cannot use frame file";
+constexpr const char* cannot_use_frame = "cannot use frame file";
 constexpr const char* early_termination_key = "early_termination";
 constexpr const char* command_remedy = "give {\"draw\": SCENE} or {\"clear\": [...]}";
 
-[[noreturn]] void refuse(const std::string& where, const std::string& why, const std::string& remedy) {
-  throw UserError(cannot_use, where, why, remedy);
+[[noreturn]] void refuse_frame(const std::string& where, const std::string& why, const std::string& remedy) {
+  throw UserError(cannot_use_frame, where, why, remedy);
 }
 
 /// For a name that is none of those known.
 [[noreturn]] void refuse_unknown(const std::string& where, const std::string& kind, const std::string& name,
                                  const std::vector<std::string>& known) {
   const std::string all = known.size() > 1 ? fmt::format(" there are {}", fmt::join(known, ", ")) : "";
-  refuse(where, fmt::format("unknown {} '{}'", kind, name),
-         fmt::format("did you mean {}?{}", nearest_name(name, known), all));
+  refuse_frame(where, fmt::format("unknown {} '{}'", kind, name),
+               fmt::format("did you mean {}?{}", nearest_name(name, known), all));
 }
 
-void check_keys(const Json& object, const std::vector<std::string>& known, const std::string& where) {
+void check_keys(const FrameJson& object, const std::vector<std::string>& known, const std::string& where) {
   for (const auto& entry : object.items()) {
     if (std::find(known.begin(), known.end(), entry.key()) == known.end()) {
       refuse_unknown(where, "key", entry.key(), known);
@@ -46,42 +46,42 @@ void check_keys(const Json& object, const std::vector<std::string>& known, const
 }
 
 /// A value in a message; of an array or an object only that it is one.
-std::string shown(const Json& value) {
+std::string shown(const FrameJson& value) {
   if (value.is_array()) return "an array";
   return value.is_object() ? "an object" : value.dump();
 }
 
-const std::string& text_of(const Json& value, const std::string& where) {
+const std::string& text_at(const FrameJson& value, const std::string& where) {
   if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-    refuse(where, "it is " + shown(value) + ", not a text", "write a text in quotes");
+    refuse_frame(where, "it is " + shown(value) + ", not a text", "write a text in quotes");
   }
   return value.get_ref<const std::string&>();
 }
 
 /// Parses JSON. The library would take the last of two keys of one name, and a draw would be missing.
-Json parse(const std::string& text, const std::string& where) {
+FrameJson parse(const std::string& text, const std::string& where) {
   std::vector<std::set<std::string>> keys;  // of the objects that the parser is in
-  const auto check = [&](int, Json::parse_event_t event, Json& parsed) {
-    if (event == Json::parse_event_t::object_start) keys.emplace_back();
-    if (event == Json::parse_event_t::object_end) keys.pop_back();
-    if (event == Json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second) {
-      refuse(where, "an object has the key " + parsed.dump() + " twice", "keep one of the two");
+  const auto check = [&](int, FrameJson::parse_event_t event, FrameJson& parsed) {
+    if (event == FrameJson::parse_event_t::object_start) keys.emplace_back();
+    if (event == FrameJson::parse_event_t::object_end) keys.pop_back();
+    if (event == FrameJson::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second) {
+      refuse_frame(where, "an object has the key " + parsed.dump() + " twice", "keep one of the two");
     }
     return true;
   };
   try {
-    return Json::parse(text, check);
-  } catch (const Json::exception& error) {
+    return FrameJson::parse(text, check);
+  } catch (const FrameJson::exception& error) {
     const std::string why = error.what();
-    refuse(where, "it is not valid JSON: " + why.substr(why.find("] ") + 2), "correct the file");
+    refuse_frame(where, "it is not valid JSON: " + why.substr(why.find("] ") + 2), "correct the file");
   }
 }
 
 /// One of several names, in the order of an enumeration.
 template <class Enumeration>
-Enumeration read_choice(const Json& value, const std::vector<std::string>& names, const std::string& kind,
+Enumeration read_choice(const FrameJson& value, const std::vector<std::string>& names, const std::string& kind,
                         const std::string& where) {
-  const std::string& name = text_of(value, where);
+  const std::string& name = text_at(value, where);
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end()) refuse_unknown(where, kind, name, names);
   return static_cast<Enumeration>(found - names.begin());
@@ -95,20 +95,20 @@ const std::vector<std::string> operation_names{"keep",      "zero",   "replace",
 const std::vector<std::string> shader_names{"splat", "vertex", "lit", "none"};
 const std::vector<std::string> cull_names{"none", "back", "front"};
 
-bool read_switch(const Json& value, const std::string& where) {
-  if (!value.is_boolean()) refuse(where, "it is " + shown(value), "give true or false");
+bool read_switch(const FrameJson& value, const std::string& where) {
+  if (!value.is_boolean()) refuse_frame(where, "it is " + shown(value), "give true or false");
   return value.get<bool>();
 }
 
-std::uint8_t read_stencil_value(const Json& value, const std::string& where) {
+std::uint8_t read_stencil_value(const FrameJson& value, const std::string& where) {
   if (!value.is_number_unsigned() || value.get<std::uint64_t>() > stencil_bits) {
-    refuse(where, "it is " + shown(value), "give 0 to 127: the highest bit is termination's");
+    refuse_frame(where, "it is " + shown(value), "give 0 to 127: the highest bit is termination's");
   }
   return value.get<std::uint8_t>();
 }
 
-DepthState read_depth(const Json& value, const std::string& where) {
-  if (!value.is_object()) refuse(where, "it is not an object", "give {\"compare\": \"less\", \"write\": true}");
+DepthState read_depth(const FrameJson& value, const std::string& where) {
+  if (!value.is_object()) refuse_frame(where, "it is not an object", "give {\"compare\": \"less\", \"write\": true}");
   check_keys(value, {"compare", "write"}, where);
   DepthState depth;
   depth.test = true;
@@ -119,8 +119,9 @@ DepthState read_depth(const Json& value, const std::string& where) {
   return depth;
 }
 
-StencilFace read_face(const Json& value, const std::string& where) {
-  if (!value.is_object()) refuse(where, "it is not an object", "give {\"compare\": \"equal\", \"reference\": 1, ...}");
+StencilFace read_face(const FrameJson& value, const std::string& where) {
+  if (!value.is_object())
+    refuse_frame(where, "it is not an object", "give {\"compare\": \"equal\", \"reference\": 1, ...}");
   check_keys(value, {"compare", "stencil_fail", "depth_fail", "pass", "reference", "read_mask", "write_mask"}, where);
   StencilFace face;
   if (value.contains("compare")) {
@@ -139,7 +140,7 @@ StencilFace read_face(const Json& value, const std::string& where) {
 }
 
 /// Of both faces alike, or of each.
-StencilState read_stencil(const Json& value, const std::string& where) {
+StencilState read_stencil(const FrameJson& value, const std::string& where) {
   StencilState stencil;
   stencil.test = true;
   if (!value.is_object() || (!value.contains("front") && !value.contains("back"))) {
@@ -152,12 +153,12 @@ StencilState read_stencil(const Json& value, const std::string& where) {
   return stencil;
 }
 
-Clear read_clear(const Json& value, const std::string& where) {
+Clear read_clear(const FrameJson& value, const std::string& where) {
   const std::string remedy = "give [\"color\"], or several of color, termination, depth, stencil";
-  if (!value.is_array() || value.empty()) refuse(where, "it does not say what is cleared", remedy);
+  if (!value.is_array() || value.empty()) refuse_frame(where, "it does not say what is cleared", remedy);
   Clear clear;
-  for (const Json& part : value) {
-    const std::string& name = text_of(part, where);
+  for (const FrameJson& part : value) {
+    const std::string& name = text_at(part, where);
     if (name == "color") {
       clear.color = true;
     } else if (name == "termination") {
@@ -173,27 +174,27 @@ Clear read_clear(const Json& value, const std::string& where) {
   return clear;
 }
 
-void read_splats(const Json& value, const std::string& where, SceneDraw& draw) {
+void read_splats(const FrameJson& value, const std::string& where, SceneDraw& draw) {
   constexpr std::uint64_t most = 0x80000000;
-  const auto is_count = [](const Json& number) {
+  const auto is_count = [](const FrameJson& number) {
     return number.is_number_unsigned() && number.get<std::uint64_t>() <= most;
   };
   if (!value.is_array() || value.size() != 2 || !is_count(value[0]) || !is_count(value[1])) {
-    refuse(where, "it is not an array of two whole numbers from 0 to 2^31", "give [FIRST, COUNT]");
+    refuse_frame(where, "it is not an array of two whole numbers from 0 to 2^31", "give [FIRST, COUNT]");
   }
   draw.first = value[0].get<std::uint32_t>();
   draw.splats = value[1].get<std::uint32_t>();
 }
 
 /// A parameter's value as --set would have it. Numbers are numbers and choices are texts, as in results.
-std::string value_text(const Parameter& parameter, const Json& value, const std::string& where) {
-  if (dynamic_cast<const Choice*>(&parameter) != nullptr) return text_of(value, where);
-  if (!value.is_number()) refuse(where, "it is " + shown(value) + ", not a number", "give " + parameter.range());
+std::string parameter_words(const Parameter& parameter, const FrameJson& value, const std::string& where) {
+  if (dynamic_cast<const Choice*>(&parameter) != nullptr) return text_at(value, where);
+  if (!value.is_number()) refuse_frame(where, "it is " + shown(value) + ", not a number", "give " + parameter.range());
   return value.dump();
 }
 
-void read_state(const Json& value, const std::string& where, SceneDraw& draw) {
-  if (!value.is_object()) refuse(where, "it is not an object", "give {\"PARAMETER\": VALUE, ...}");
+void read_state(const FrameJson& value, const std::string& where, SceneDraw& draw) {
+  if (!value.is_object()) refuse_frame(where, "it is not an object", "give {\"PARAMETER\": VALUE, ...}");
   StateParameters parameters;
   const std::vector<Parameter*> of_draws = parameters.of_draws();
   std::vector<std::string> known{early_termination_key, "blend", "depth", "stencil", "late_tests", "shader", "cull"};
@@ -234,17 +235,18 @@ void read_state(const Json& value, const std::string& where, SceneDraw& draw) {
     if (found == of_draws.end()) {
       const std::vector<Parameter*>& all = parameters.parameters();
       if (std::none_of(all.begin(), all.end(), is_named)) refuse_unknown(where, "parameter", key, known);
-      refuse(here, "it is the precision of the hardware, which all draws share", "use --set state." + key + "=VALUE");
+      refuse_frame(here, "it is the precision of the hardware, which all draws share",
+                   "use --set state." + key + "=VALUE");
     }
-    const std::string text = value_text(**found, entry.value(), here);
+    const std::string text = parameter_words(**found, entry.value(), here);
     (*found)->set(text, here);
     draw.settings.push_back({"state", key, text});
   }
 }
 
-SceneDraw read_draw(const Json& command, const std::string& where, const std::filesystem::path& folder) {
+SceneDraw read_draw(const FrameJson& command, const std::string& where, const std::filesystem::path& folder) {
   SceneDraw draw;
-  draw.scene = text_of(command["draw"], where + ", draw");
+  draw.scene = text_at(command["draw"], where + ", draw");
   const bool is_file = draw.scene.rfind("builtin:", 0) != 0;
   const auto in_folder = [&folder](const std::string& file) { return (folder / file).lexically_normal().string(); };
   const auto in_place = scene_substitution(draw.scene);
@@ -256,46 +258,47 @@ SceneDraw read_draw(const Json& command, const std::string& where, const std::fi
   draw.is_mesh = is_file && !in_place && !is_draw_list(draw.scene) && std::filesystem::is_regular_file(draw.scene) &&
                  is_mesh_file(draw.scene);
   if (draw.is_mesh && command.contains("splats")) {
-    refuse(where + ", splats", "it is a mesh, which has none", "leave it out");
+    refuse_frame(where + ", splats", "it is a mesh, which has none", "leave it out");
   }
-  if (command.contains("name")) draw.name = text_of(command["name"], where + ", name");
+  if (command.contains("name")) draw.name = text_at(command["name"], where + ", name");
   if (command.contains("splats")) read_splats(command["splats"], where + ", splats", draw);
   if (command.contains("state")) read_state(command["state"], where + ", state", draw);
   const FragmentShader shader = draw.shader.value_or(FragmentShader::none);
   if (shader != FragmentShader::none && draw.is_mesh == (shader == FragmentShader::splat)) {
-    refuse(where + ", state.shader", draw.is_mesh ? "it is that of splats" : "it is that of a mesh",
-           draw.is_mesh ? "use lit, vertex or none" : "use splat or none");
+    refuse_frame(where + ", state.shader", draw.is_mesh ? "it is that of splats" : "it is that of a mesh",
+                 draw.is_mesh ? "use lit, vertex or none" : "use splat or none");
   }
   if (!draw.blend && draw.early_termination.value_or(false)) {
-    refuse(where + ", state.early_termination", "the draw does not blend, so that no pixel's alpha grows",
-           "leave it out, or blend");
+    refuse_frame(where + ", state.early_termination", "the draw does not blend, so that no pixel's alpha grows",
+                 "leave it out, or blend");
   }
   if (draw.late_tests && draw.shader == FragmentShader::none) {
-    refuse(where + ", state.late_tests", "its tests are to come after shading, and its shader is none",
-           "leave it out, or use another shader");
+    refuse_frame(where + ", state.late_tests", "its tests are to come after shading, and its shader is none",
+                 "leave it out, or use another shader");
   }
   return draw;
 }
 
-FrameCommand read_command(const Json& json, const std::string& where, const std::filesystem::path& folder) {
-  if (!json.is_object()) refuse(where, "it is not an object", command_remedy);
+FrameCommand read_command(const FrameJson& json, const std::string& where, const std::filesystem::path& folder) {
+  if (!json.is_object()) refuse_frame(where, "it is not an object", command_remedy);
   FrameCommand command;
   command.where = where;
   if (json.contains("clear")) {
-    if (json.contains("draw")) refuse(where, "it has other keys beside \"clear\"", "make another command of them");
+    if (json.contains("draw"))
+      refuse_frame(where, "it has other keys beside \"clear\"", "make another command of them");
     check_keys(json, {"clear", "depth", "stencil"}, where);
     command.clear = read_clear(json["clear"], where + ", clear");
     const auto value_of = [&](const char* key, bool is_cleared) {
       if (json.contains(key) && !is_cleared) {
-        refuse(where, fmt::format("it has a value for {}, which is not cleared", key),
-               "add it to the list, or leave it out");
+        refuse_frame(where, fmt::format("it has a value for {}, which is not cleared", key),
+                     "add it to the list, or leave it out");
       }
       return json.contains(key);
     };
     if (value_of("depth", command.clear.depth)) {
-      const Json& depth = json["depth"];
+      const FrameJson& depth = json["depth"];
       if (!depth.is_number() || !(depth.get<double>() >= 0 && depth.get<double>() <= 1)) {
-        refuse(where + ", depth", "it is " + shown(depth), "give 0 to 1");
+        refuse_frame(where + ", depth", "it is " + shown(depth), "give 0 to 1");
       }
       command.clear.depth_value = depth.get<float>();
     }
@@ -305,7 +308,7 @@ FrameCommand read_command(const Json& json, const std::string& where, const std:
     return command;
   }
   check_keys(json, {"draw", "name", "splats", "state", "clear"}, where);
-  if (!json.contains("draw")) refuse(where, "it has neither \"draw\" nor \"clear\"", command_remedy);
+  if (!json.contains("draw")) refuse_frame(where, "it has neither \"draw\" nor \"clear\"", command_remedy);
   command.draw = read_draw(json, where, folder);
   return command;
 }
@@ -343,23 +346,23 @@ FrameDescription read_frame_file(const std::filesystem::path& path) {
   std::string text(static_cast<std::size_t>(file.size()), '\0');
   file.read(0, text.data(), text.size());
   file.check_unchanged();
-  const Json json = parse(text, where);
+  const FrameJson json = parse(text, where);
   const std::string layout = "give {\"commands\": [{\"draw\": SCENE}, ...]}";
-  if (!json.is_object()) refuse(where, "it is not an object", layout);
+  if (!json.is_object()) refuse_frame(where, "it is not an object", layout);
   check_keys(json, {"commands"}, where);
-  if (!json.contains("commands")) refuse(where, "it has no \"commands\"", layout);
-  const Json& commands = json["commands"];
-  if (!commands.is_array()) refuse(where + ", commands", "it is not an array", layout);
+  if (!json.contains("commands")) refuse_frame(where, "it has no \"commands\"", layout);
+  const FrameJson& commands = json["commands"];
+  if (!commands.is_array()) refuse_frame(where + ", commands", "it is not an array", layout);
 
   FrameDescription frame;
   frame.name = path.filename().string();
-  for (const Json& command : commands) {
+  for (const FrameJson& command : commands) {
     frame.commands.push_back(
         read_command(command, fmt::format("{}, command {}", where, frame.commands.size() + 1), path.parent_path()));
   }
   const auto draws = [](const FrameCommand& command) { return command.draw.has_value(); };
   if (std::none_of(frame.commands.begin(), frame.commands.end(), draws)) {
-    refuse(where + ", commands", "nothing is drawn", layout);
+    refuse_frame(where + ", commands", "nothing is drawn", layout);
   }
   name_draws(frame.commands);
   return frame;

@@ -17,45 +17,43 @@
 namespace vrpipe::tools {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
-
-json file_identity(const std::string& name) {
+nlohmann::json file_identity(const std::string& name) {
   std::error_code ignored;
   const fs::path path = fs::weakly_canonical(name, ignored);
   const auto of_file = [](const fs::path& file) {
     struct stat status {};
-    if (::stat(file.c_str(), &status) != 0) return json();
-    return json{{"path", valid_utf8(file.string())},
-                {"bytes", status.st_size},
-                {"modified", {status.st_mtim.tv_sec, status.st_mtim.tv_nsec}}};
+    if (::stat(file.c_str(), &status) != 0) return nlohmann::json();
+    return nlohmann::json{{"path", valid_utf8(file.string())},
+                          {"bytes", status.st_size},
+                          {"modified", {status.st_mtim.tv_sec, status.st_mtim.tv_nsec}}};
   };
   if (!fs::is_directory(path, ignored)) return of_file(path);
   std::vector<fs::path> files;
   for (const auto& entry : fs::recursive_directory_iterator(path, ignored)) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
-  json all = json::array();
+  nlohmann::json all = nlohmann::json::array();
   for (const fs::path& file : files) all.push_back(of_file(file));
   return all;
 }
 
-json scene_identity(const std::string& scene) {
-  json identity = file_identity(gaussian_file_path(scene_file(scene)));
+nlohmann::json scene_identity(const std::string& scene) {
+  nlohmann::json identity = file_identity(gaussian_file_path(scene_file(scene)));
   if (!identity.is_object()) identity = {{"files", identity}};
   identity["scene"] = valid_utf8(scene);
   return identity;
 }
 
-json settings_identity(const std::vector<Setting>& settings) {
-  json all = json::array();
+nlohmann::json settings_identity(const std::vector<Setting>& settings) {
+  nlohmann::json all = nlohmann::json::array();
   for (const Setting& setting : settings) {
     all.push_back(valid_utf8(setting.unit + "." + setting.parameter + "=" + setting.value));
   }
   return all;
 }
 
-json request_identity(const RunRequest& request) {
+nlohmann::json request_identity(const RunRequest& request) {
   const auto units = [](const std::vector<UnitChoice>& choices) {
-    json all = json::array();
+    nlohmann::json all = nlohmann::json::array();
     for (const UnitChoice& unit : choices) all.push_back(valid_utf8(unit.slot + "=" + unit.implementation));
     return all;
   };

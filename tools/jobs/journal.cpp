@@ -24,11 +24,9 @@ namespace vrpipe::tools {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
-
 constexpr char kCannotUse[] = "cannot use journal";
 
-std::string describe(int error) { return std::generic_category().message(error); }
+std::string describe_error(int error) { return std::generic_category().message(error); }
 
 /// As the XDG Base Directory Specification has it, where a relative path counts as none.
 std::optional<fs::path> cache_folder() {
@@ -48,8 +46,8 @@ void say(const std::string& option, const std::string& text) {
 }
 
 /// The first place in which two heads differ, e.g. settings.fidelity.
-std::string difference(const json& one, const json& other) {
-  const json patch = json::diff(one, other);
+std::string difference(const nlohmann::json& one, const nlohmann::json& other) {
+  const nlohmann::json patch = nlohmann::json::diff(one, other);
   if (patch.empty()) return "form";
   std::string path = patch.front().at("path").get<std::string>();
   path.erase(0, 1);
@@ -57,23 +55,23 @@ std::string difference(const json& one, const json& other) {
   return path.empty() ? "form" : path;
 }
 
-json binaries(json value, unsigned depth) {
+nlohmann::json binaries(nlohmann::json value, unsigned depth) {
   if (depth == 0) throw std::runtime_error("a record goes deeper than any that was written");
   if (!value.is_structured()) return value;
   const auto bytes =
       value.is_object() && value.size() == 2 && value.contains("subtype") ? value.find("bytes") : value.end();
   if (bytes != value.end() && bytes->is_array()) {
     std::vector<std::uint8_t> content;
-    for (const json& byte : *bytes) content.push_back(byte.get<std::uint8_t>());
-    return json::binary(std::move(content));
+    for (const nlohmann::json& byte : *bytes) content.push_back(byte.get<std::uint8_t>());
+    return nlohmann::json::binary(std::move(content));
   }
-  for (json& element : value) element = binaries(std::move(element), depth - 1);
+  for (nlohmann::json& element : value) element = binaries(std::move(element), depth - 1);
   return value;
 }
 
 }  // namespace
 
-json with_binaries(json value) {
+nlohmann::json with_binaries(nlohmann::json value) {
   constexpr unsigned deepest = 16;
   return binaries(std::move(value), deepest);
 }
@@ -99,13 +97,13 @@ std::optional<fs::path> Journal::path() const {
   return descriptor_ >= 0 ? std::optional<fs::path>(path_) : std::nullopt;
 }
 
-Journal Journal::in_file(const fs::path& path, const json& head, const std::string& option) {
+Journal Journal::in_file(const fs::path& path, const nlohmann::json& head, const std::string& option) {
   Journal journal(path, option, true);
   journal.open(head);
   return journal;
 }
 
-Journal Journal::in_cache(const std::string& name, const json& head, const std::string& option) {
+Journal Journal::in_cache(const std::string& name, const nlohmann::json& head, const std::string& option) {
   const std::optional<fs::path> folder = cache_folder();
   Journal journal(folder ? *folder / name : fs::path(), option, false);
   std::string why = "neither XDG_CACHE_HOME nor HOME names a folder";
@@ -126,12 +124,12 @@ Journal Journal::in_cache(const std::string& name, const json& head, const std::
 }
 
 /// Throws UserError.
-void Journal::open(const json& head) {
+void Journal::open(const nlohmann::json& head) {
   const std::string where = option_ + " " + path_.string();
   const auto refuse = [&](const std::string& why, const std::string& remedy) {
     throw UserError(kCannotUse, where, why, remedy);
   };
-  const auto fail = [&](int error) { refuse(describe(error), remedy_for_output(error)); };
+  const auto fail = [&](int error) { refuse(describe_error(error), remedy_for_output(error)); };
   // Without O_NONBLOCK a pipe would wait for its other end.
   descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK, 0666);
   if (descriptor_ < 0) fail(errno);
@@ -167,8 +165,8 @@ void Journal::open(const json& head) {
   } else if (text.compare(0, first.size(), first) == 0) {
     take_in(text, first);
   } else {
-    const json other = json::parse(text.substr(0, text.find('\n')), nullptr, false);
-    const bool is_journal = other.is_object() && other.value("schema", json()) == head.at("schema");
+    const nlohmann::json other = nlohmann::json::parse(text.substr(0, text.find('\n')), nullptr, false);
+    const bool is_journal = other.is_object() && other.value("schema", nlohmann::json()) == head.at("schema");
     refuse(is_journal ? "it belongs to another run, of which this is different: " + difference(other, head)
                       : std::string("it is no journal of this command"),
            "name another file, or remove it");
@@ -180,17 +178,17 @@ void Journal::open(const json& head) {
 void Journal::take_in(const std::string& text, const std::string& first) {
   std::size_t start = first.size();
   for (std::size_t end; (end = text.find('\n', start)) != std::string::npos; start = end + 1) {
-    json record = json::parse(text.begin() + static_cast<std::ptrdiff_t>(start),
-                              text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
+    nlohmann::json record = nlohmann::json::parse(text.begin() + static_cast<std::ptrdiff_t>(start),
+                                                  text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
     if (!record.is_discarded()) records_.push_back(std::move(record));
   }
   if (start < text.size() && ::ftruncate(descriptor_, static_cast<off_t>(start)) != 0) {
     const int error = errno;
-    throw UserError(kCannotUse, option_ + " " + path_.string(), describe(error), remedy_for_output(error));
+    throw UserError(kCannotUse, option_ + " " + path_.string(), describe_error(error), remedy_for_output(error));
   }
 }
 
-void Journal::append(const json& record) {
+void Journal::append(const nlohmann::json& record) {
   if (descriptor_ < 0) return;
   const std::string line = record.dump() + '\n';
   std::size_t done = 0;
@@ -201,7 +199,7 @@ void Journal::append(const json& record) {
     done += static_cast<std::size_t>(count);
   }
   if (done == line.size() && ::fsync(descriptor_) == 0) return;
-  say(option_, fmt::format("nothing more is stored: {}: {}", path_.string(), describe(errno)));
+  say(option_, fmt::format("nothing more is stored: {}: {}", path_.string(), describe_error(errno)));
   close();
 }
 

@@ -9,6 +9,7 @@
 
 #include <vrpipe/component/error.h>
 
+#include "host/stopwatch.h"
 #include "jobs/microbench_bench.h"
 #include "jobs/published_figures.h"
 
@@ -135,7 +136,7 @@ MicrobenchResult run_microbench(const std::string& name, const RunRequest& reque
   const auto start = std::chrono::steady_clock::now();
   tools::MicrobenchBench bench(definition, baseline, processes, result);
   definition.run(bench);
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.seconds = tools::seconds_since(start);
   return result;
 }
 

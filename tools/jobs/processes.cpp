@@ -32,6 +32,7 @@
 #include "host/command_failure.h"
 #include "host/crash_report.h"
 #include "host/stdout_to_stderr.h"
+#include "host/stopwatch.h"
 #include "host/terminal.h"
 #include "jobs/result_encoding.h"
 
@@ -40,10 +41,6 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 constexpr int redraw_milliseconds = 100;
-
-double seconds_since(SteadyClock::time_point start) {
-  return std::chrono::duration<double>(SteadyClock::now() - start).count();
-}
 
 /// The first byte of what a worker sends.
 enum Outcome : char { outcome_result = 'R', outcome_user_error = 'U', outcome_fault = 'F' };

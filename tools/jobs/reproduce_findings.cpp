@@ -15,7 +15,7 @@ double quotient(std::uint64_t over, std::uint64_t under) {
   return static_cast<double>(over) / static_cast<double>(under);
 }
 
-double speedup(const RunResult& baseline, const RunResult& run) {
+double gain(const RunResult& baseline, const RunResult& run) {
   return baseline.counts.fragments_rasterized == 0 ? std::numeric_limits<double>::quiet_NaN()
                                                    : quotient(baseline.cycles.value_or(0), run.cycles.value_or(0));
 }
@@ -42,9 +42,9 @@ Gains gains_of(const std::array<const PointResult*, 4>& points) {
   const RunResult& het = points[2]->run;
   const RunResult& both = points[3]->run;
   Gains gains;
-  gains.qm = speedup(baseline, qm);
-  gains.het = speedup(baseline, het);
-  gains.het_qm = speedup(baseline, both);
+  gains.qm = gain(baseline, qm);
+  gains.het = gain(baseline, het);
+  gains.het_qm = gain(baseline, both);
   gains.fragments_het = quotient(baseline.counts.fragments_blended, het.counts.fragments_blended);
   gains.fragments_merging = quotient(het.counts.fragments_blended, both.counts.fragments_blended);
   gains.quads_het = quotient(baseline.counts.quads_blended, het.counts.quads_blended);
@@ -90,10 +90,10 @@ SceneFinding scene_finding(const ReproduceResult& result, std::size_t scene) {
   const RunResult& het = result.at(key).run;
   key.variant = "baseline";
   const RunResult& one_pass = result.at(key).run;
-  finding.het_beside_passes = speedup(one_pass, het);
+  finding.het_beside_passes = gain(one_pass, het);
   for (const unsigned passes : planned_passes(plan.quick)) {
     key.passes = passes;
-    finding.passes.push_back(speedup(one_pass, result.at(key).run));
+    finding.passes.push_back(gain(one_pass, result.at(key).run));
   }
   return finding;
 }

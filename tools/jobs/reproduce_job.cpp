@@ -22,7 +22,6 @@
 namespace vrpipe::tools {
 namespace {
 
-using nlohmann::json;
 using SteadyClock = std::chrono::steady_clock;
 
 Camera cut(Camera camera, Extent extent) {
@@ -96,22 +95,22 @@ class PointFrames {
 };
 
 /// All that the results depend on.
-json identity(const ReproduceJob& job, const ReproducePlan& plan) {
-  json scenes = json::array();
+nlohmann::json reproduce_identity(const ReproduceJob& job, const ReproducePlan& plan) {
+  nlohmann::json scenes = nlohmann::json::array();
   for (const PlannedScene& scene : plan.scenes) {
-    json cameras;
+    nlohmann::json cameras;
     if (scene.camera) {
       const CameraChoice choice = camera_choice(*scene.camera);
       cameras = {{"files", file_identity(choice.file)}, {"camera", valid_utf8(choice.camera.value_or("0"))}};
     }
     const bool is_builtin = scene.request.rfind("builtin:", 0) == 0;
-    scenes.push_back(
-        {{"scene", is_builtin ? json(scene.request) : scene_identity(scene.request)}, {"cameras", std::move(cameras)}});
+    scenes.push_back({{"scene", is_builtin ? nlohmann::json(scene.request) : scene_identity(scene.request)},
+                      {"cameras", std::move(cameras)}});
   }
   std::string points;
   for (const ReproducePoint& point : plan.points) points += point.key.name(plan.scenes) + "\n";
   const RunRequest& base = job.options.base;
-  json settings = json::array();
+  nlohmann::json settings = nlohmann::json::array();
   for (const Setting& setting : base.settings) {
     settings.push_back(valid_utf8(setting.unit + "." + setting.parameter + "=" + setting.value));
   }
@@ -119,21 +118,21 @@ json identity(const ReproduceJob& job, const ReproducePlan& plan) {
           {"version", VRPIPE_VERSION},
           {"build", build_identity()},
           {"scenes", scenes},
-          {"size", job.size ? json{job.size->width, job.size->height} : json()},
+          {"size", job.size ? nlohmann::json{job.size->width, job.size->height} : nlohmann::json()},
           {"platform", base.platform->name},
           {"set", settings},
           {"views", plan.views},
           {"points", {{"count", plan.points.size()}, {"sha256", sha256(points)}}}};
 }
 
-Journal open_journal(const ReproduceJob& job, const ReproducePlan& plan) {
-  const json head = identity(job, plan);
+Journal open_reproduce_journal(const ReproduceJob& job, const ReproducePlan& plan) {
+  const nlohmann::json head = reproduce_identity(job, plan);
   if (job.journal) return Journal::in_file(*job.journal, head, ReproduceJob::journal_option);
   return Journal::in_cache("reproduce-" + sha256(head.dump()).substr(0, 16) + ".jsonl", head,
                            ReproduceJob::journal_option);
 }
 
-json energy_to_json(const EnergyAmounts& amounts) {
+nlohmann::json energy_to_json(const EnergyAmounts& amounts) {
   return {{"events", amounts.events},
           {"powers", amounts.powers},
           {"seconds", amounts.seconds.value()},
@@ -141,7 +140,7 @@ json energy_to_json(const EnergyAmounts& amounts) {
           {"not_counted", amounts.not_counted}};
 }
 
-EnergyAmounts energy_from_json(const json& record) {
+EnergyAmounts energy_from_json(const nlohmann::json& record) {
   EnergyAmounts amounts;
   record.at("events").get_to(amounts.events);
   record.at("powers").get_to(amounts.powers);
@@ -155,17 +154,17 @@ EnergyAmounts energy_from_json(const json& record) {
   return amounts;
 }
 
-json to_record(const std::string& name, const PointResult& point) {
+nlohmann::json to_reproduce_record(const std::string& name, const PointResult& point) {
   return {{"point", name},
           {"run", encode(point.run)},
           {"gaussians", {point.gaussians_total, point.gaussians_visible}},
           {"size", {point.width, point.height}},
-          {"map", point.map ? to_json(*point.map) : json()},
-          {"energy", point.energy ? energy_to_json(*point.energy) : json()}};
+          {"map", point.map ? to_json(*point.map) : nlohmann::json()},
+          {"energy", point.energy ? energy_to_json(*point.energy) : nlohmann::json()}};
 }
 
 /// Throws std::runtime_error or json::exception for what to_record() cannot have made.
-PointResult from_record(const json& record, const ReproducePoint& planned) {
+PointResult reproduce_from_record(const nlohmann::json& record, const ReproducePoint& planned) {
   PointResult point;
   point.run = decode(with_binaries(record.at("run")), planned.request);
   point.run.framebuffer.color = ColorSurface(1, 1, planned.request.format);
@@ -185,13 +184,13 @@ std::vector<bool> take_done_points(const Journal& journal, ReproduceResult& resu
   const std::vector<ReproducePoint>& points = result.plan.points;
   const std::map<std::string, std::size_t>& places = result.plan.places;
   std::vector<bool> is_done(points.size());
-  for (const json& record : journal.records()) {
+  for (const nlohmann::json& record : journal.records()) {
     try {
       const auto found = places.find(record.at("point").get<std::string>());
       if (found == places.end()) continue;
-      result.points[found->second] = from_record(record, points[found->second]);
+      result.points[found->second] = reproduce_from_record(record, points[found->second]);
       is_done[found->second] = true;
-    } catch (const json::exception&) {
+    } catch (const nlohmann::json::exception&) {
       continue;  // damaged: the point is simulated again
     } catch (const std::runtime_error&) {
       continue;
@@ -200,7 +199,7 @@ std::vector<bool> take_done_points(const Journal& journal, ReproduceResult& resu
   return is_done;
 }
 
-void strip(RunResult& run, bool keeps_parameters) {
+void strip_point(RunResult& run, bool keeps_parameters) {
   run.units.clear();
   run.statistics.clear();
   run.effects.clear();
@@ -210,8 +209,8 @@ void strip(RunResult& run, bool keeps_parameters) {
   if (!keeps_parameters) run.parameters.clear();
 }
 
-void simulate(const ReproduceJob& job, const std::vector<bool>& is_done, ReproduceResult& result,
-              ProgressLine& progress) {
+void simulate_points(const ReproduceJob& job, const std::vector<bool>& is_done, ReproduceResult& result,
+                     ProgressLine& progress) {
   const ReproducePlan& plan = result.plan;
   PointFrames frames(job, plan);
   std::vector<std::size_t> missing;
@@ -247,7 +246,7 @@ void simulate(const ReproduceJob& job, const std::vector<bool>& is_done, Reprodu
     point.run.request = plan.points[i].request;
     if (plan.points[i].key.settings.empty() && point.run.cycles)
       point.energy = energy_amounts(point.run, shipped_energies());
-    strip(point.run, i == 0);
+    strip_point(point.run, i == 0);
     tasks[task].request.observers.reset();
     if (const auto counter = counters.find(i); counter != counters.end()) {
       point.map = counter->second.map();
@@ -258,7 +257,7 @@ void simulate(const ReproduceJob& job, const std::vector<bool>& is_done, Reprodu
       }
     }
     progress.erase();
-    result.journal->append(to_record(tasks[task].name, point));
+    result.journal->append(to_reproduce_record(tasks[task].name, point));
   };
   if (!tasks.empty()) run_tasks(tasks, false, job.processes, {"", 0, 0, 0}, progress, finished);
 }
@@ -266,12 +265,12 @@ void simulate(const ReproduceJob& job, const std::vector<bool>& is_done, Reprodu
 /// After the points: they fork as well, and show their own progress.
 void run_microbenches(const ReproduceJob& job, ReproduceResult& result) {
   std::map<std::string, MicrobenchResult> done;
-  for (const json& record : result.journal->records()) {
+  for (const nlohmann::json& record : result.journal->records()) {
     try {
       if (!record.contains("microbench")) continue;
       MicrobenchResult found = microbench_from_json(record.at("microbench"));
       done[found.name] = std::move(found);
-    } catch (const json::exception&) {
+    } catch (const nlohmann::json::exception&) {
       continue;  // damaged: it is run again
     }
   }
@@ -281,7 +280,7 @@ void run_microbenches(const ReproduceJob& job, ReproduceResult& result) {
   for (const std::string& name : microbench_names()) {
     auto found = done.find(name);
     if (found == done.end()) {
-      const json record = to_json(run_microbench(name, request, job.processes));
+      const nlohmann::json record = to_json(run_microbench(name, request, job.processes));
       result.journal->append({{"microbench", record}});
       // As it comes back from a journal, so that it does not matter which it was.
       found = done.emplace(name, microbench_from_json(record)).first;
@@ -317,14 +316,14 @@ ReproduceResult simulate_reproduction(const ReproduceJob& job, ProgressLine& pro
   result.provenance = job.provenance;
   result.processes = job.processes;
   result.points.resize(result.plan.points.size());
-  result.journal = std::make_shared<Journal>(open_journal(job, result.plan));
+  result.journal = std::make_shared<Journal>(open_reproduce_journal(job, result.plan));
   const std::vector<bool> is_done = take_done_points(*result.journal, result);
   result.done_before = static_cast<std::size_t>(std::count(is_done.begin(), is_done.end(), true));
   if (result.done_before > 0) {
     fmt::print(stderr, "{} of {} simulations were done before\n", result.done_before, result.points.size());
   }
   const auto start = SteadyClock::now();
-  simulate(job, is_done, result, progress);
+  simulate_points(job, is_done, result, progress);
   run_microbenches(job, result);
   result.seconds = std::chrono::duration<double>(SteadyClock::now() - start).count();
   if (job.output) create_output_folder(*job.output, "--output");

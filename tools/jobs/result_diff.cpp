@@ -131,7 +131,7 @@ void compare(const Leaves& a, const Leaves& b, const std::string& run, std::vect
 }
 
 /// Runs by name; those of results that have runs at their top.
-std::vector<std::pair<std::string, const Json*>> runs_of(const Json& result) {
+std::vector<std::pair<std::string, const Json*>> compared_runs(const Json& result) {
   std::vector<std::pair<std::string, const Json*>> runs;
   const auto found = result.find("runs");
   if (found == result.end() || !found->is_array()) return runs;
@@ -216,7 +216,7 @@ std::optional<double> Difference::change_percent() const {
 
 ResultDiff diff_results(ResultFile a, ResultFile b) {
   ResultDiff diff{std::move(a), std::move(b), {}, {}, {}, {}};
-  const auto runs_a = runs_of(diff.a.content), runs_b = runs_of(diff.b.content);
+  const auto runs_a = compared_runs(diff.a.content), runs_b = compared_runs(diff.b.content);
   const auto common = [](Json content, bool has_runs) {
     if (has_runs) content.erase("runs");
     // Where a value comes from changes nothing.

@@ -13,7 +13,7 @@
 namespace vrpipe::tools {
 namespace {
 
-using Json = nlohmann::json;
+using Record = nlohmann::json;
 
 /// The first of some names, "one, two, three", which is taken off.
 std::string next_name(std::string& names) {
@@ -68,34 +68,34 @@ constexpr bool stays = std::is_same<Member, RunRequest>::value || std::is_same<M
                        std::is_same<Member, DepthStencilSurface>::value;
 
 struct Writer {
-  static Json of(std::uint64_t value) { return value; }
-  static Json of(double value) { return value; }
-  static Json of(bool value) { return value; }
-  static Json of(EffectProof proof) { return name_of(proof); }
+  static Record of(std::uint64_t value) { return value; }
+  static Record of(double value) { return value; }
+  static Record of(bool value) { return value; }
+  static Record of(EffectProof proof) { return name_of(proof); }
   /// CBOR's texts are UTF-8.
-  static Json of(const std::string& text) {
+  static Record of(const std::string& text) {
     if (valid_utf8(text) == text) return text;
-    return Json::binary({text.begin(), text.end()});
+    return Record::binary({text.begin(), text.end()});
   }
   template <class Value>
-  static Json of(const std::optional<Value>& value) {
-    return value ? of(*value) : Json();
+  static Record of(const std::optional<Value>& value) {
+    return value ? of(*value) : Record();
   }
   template <class First, class Second>
-  static Json of(const std::pair<First, Second>& pair) {
-    return Json::array({of(pair.first), of(pair.second)});
+  static Record of(const std::pair<First, Second>& pair) {
+    return Record::array({of(pair.first), of(pair.second)});
   }
   template <class Value>
-  static Json of(const std::vector<Value>& values) {
+  static Record of(const std::vector<Value>& values) {
     return of_all(values);
   }
   template <class Value, std::size_t Size>
-  static Json of(const std::array<Value, Size>& values) {
+  static Record of(const std::array<Value, Size>& values) {
     return of_all(values);
   }
   template <class Struct>
-  static Json of(const Struct& value) {
-    Json json = Json::object();
+  static Record of(const Struct& value) {
+    Record json = Record::object();
     each_member(value, [&](const std::string& name, const auto& member) {
       if constexpr (!stays<std::decay_t<decltype(member)>>) json[name] = of(member);
     });
@@ -104,41 +104,41 @@ struct Writer {
 
  private:
   template <class Values>
-  static Json of_all(const Values& values) {
-    Json json = Json::array();
+  static Record of_all(const Values& values) {
+    Record json = Record::array();
     for (const auto& value : values) json.push_back(of(value));
     return json;
   }
 };
 
-[[noreturn]] void refuse(const std::string& why) {
+[[noreturn]] void refuse_record(const std::string& why) {
   throw std::runtime_error("a simulation's result cannot be read: " + why);
 }
 
 /// Takes nothing for what it is not: the library would turn any number into any other.
 struct Reader {
-  static void read(const Json& json, std::uint64_t& value, const std::string& where) {
+  static void read(const Record& json, std::uint64_t& value, const std::string& where) {
     check(json.is_number_unsigned(), where);
     value = json.get<std::uint64_t>();
   }
-  static void read(const Json& json, bool& value, const std::string& where) {
+  static void read(const Record& json, bool& value, const std::string& where) {
     check(json.is_boolean(), where);
     value = json.get<bool>();
   }
-  static void read(const Json& json, EffectProof& value, const std::string& where) {
+  static void read(const Record& json, EffectProof& value, const std::string& where) {
     for (const EffectProof proof : {EffectProof::by_facts, EffectProof::verified, EffectProof::bounded}) {
       if (json == name_of(proof)) {
         value = proof;
         return;
       }
     }
-    refuse(where + " is no proof");
+    refuse_record(where + " is no proof");
   }
-  static void read(const Json& json, double& value, const std::string& where) {
+  static void read(const Record& json, double& value, const std::string& where) {
     check(json.is_number_float(), where);
     value = json.get<double>();
   }
-  static void read(const Json& json, std::string& text, const std::string& where) {
+  static void read(const Record& json, std::string& text, const std::string& where) {
     if (json.is_binary()) {
       text.assign(json.get_binary().begin(), json.get_binary().end());
       return;
@@ -147,54 +147,54 @@ struct Reader {
     text = json.get_ref<const std::string&>();
   }
   template <class Value>
-  static void read(const Json& json, std::optional<Value>& value, const std::string& where) {
+  static void read(const Record& json, std::optional<Value>& value, const std::string& where) {
     if (!json.is_null()) read(json, value.emplace(), where);
   }
   template <class First, class Second>
-  static void read(const Json& json, std::pair<First, Second>& pair, const std::string& where) {
+  static void read(const Record& json, std::pair<First, Second>& pair, const std::string& where) {
     check(json.is_array() && json.size() == 2, where);
     read(json[0], pair.first, where);
     read(json[1], pair.second, where);
   }
   template <class Value>
-  static void read(const Json& json, std::vector<Value>& values, const std::string& where) {
+  static void read(const Record& json, std::vector<Value>& values, const std::string& where) {
     check(json.is_array(), where);
     values.resize(json.size());
     for (std::size_t i = 0; i < values.size(); ++i) read(json[i], values[i], where);
   }
   template <class Value, std::size_t Size>
-  static void read(const Json& json, std::array<Value, Size>& values, const std::string& where) {
+  static void read(const Record& json, std::array<Value, Size>& values, const std::string& where) {
     check(json.is_array() && json.size() == Size, where);
     for (std::size_t i = 0; i < Size; ++i) read(json[i], values[i], where);
   }
   template <class Struct>
-  static void read(const Json& json, Struct& value, const std::string& where) {
+  static void read(const Record& json, Struct& value, const std::string& where) {
     check(json.is_object(), where);
     std::size_t expected = 0;
     each_member(value, [&](const std::string& name, auto& member) {
       if constexpr (!stays<std::decay_t<decltype(member)>>) {
         const auto found = json.find(name);
-        if (found == json.end()) refuse(where + " has no " + name);
+        if (found == json.end()) refuse_record(where + " has no " + name);
         read(*found, member, where + "." + name);
         ++expected;
       }
     });
-    if (json.size() != expected) refuse(where + " has more than this version knows");
+    if (json.size() != expected) refuse_record(where + " has more than this version knows");
   }
 
  private:
   static void check(bool is_right, const std::string& where) {
-    if (!is_right) refuse(where + " is not what it should be");
+    if (!is_right) refuse_record(where + " is not what it should be");
   }
 };
 
 /// Looks through a document before it is built, which takes the stack for every level of it.
-class Examination : public nlohmann::json_sax<Json> {
+class Examination : public nlohmann::json_sax<Record> {
  public:
   /// What is wrong with it; none otherwise.
   static std::optional<std::string> of(const std::string& bytes) {
     Examination examination;
-    if (Json::sax_parse(bytes, &examination, Json::input_format_t::cbor)) return std::nullopt;
+    if (Record::sax_parse(bytes, &examination, Record::input_format_t::cbor)) return std::nullopt;
     return examination.complaint_;
   }
 
@@ -210,7 +210,7 @@ class Examination : public nlohmann::json_sax<Json> {
   bool end_object() override { return --depth_, true; }
   bool start_array(std::size_t) override { return ++depth_ <= deepest; }
   bool end_array() override { return --depth_, true; }
-  bool parse_error(std::size_t, const std::string&, const Json::exception& error) override {
+  bool parse_error(std::size_t, const std::string&, const Record::exception& error) override {
     complaint_ = error.what();
     return false;
   }
@@ -223,9 +223,9 @@ class Examination : public nlohmann::json_sax<Json> {
 
 }  // namespace
 
-Json encode(const RunResult& result) { return Writer::of(result); }
+Record encode(const RunResult& result) { return Writer::of(result); }
 
-RunResult decode(const Json& json, const RunRequest& request) {
+RunResult decode(const Record& json, const RunRequest& request) {
   RunResult result;
   Reader::read(json, result, "result");
   result.request = request;
@@ -234,13 +234,13 @@ RunResult decode(const Json& json, const RunRequest& request) {
 
 std::string to_bytes(const RunResult& result) {
   std::string bytes;
-  Json::to_cbor(encode(result), bytes);
+  Record::to_cbor(encode(result), bytes);
   return bytes;
 }
 
 RunResult from_bytes(const std::string& bytes, const RunRequest& request) {
-  if (const auto complaint = Examination::of(bytes)) refuse(*complaint);
-  return decode(Json::from_cbor(bytes), request);
+  if (const auto complaint = Examination::of(bytes)) refuse_record(*complaint);
+  return decode(Record::from_cbor(bytes), request);
 }
 
 }  // namespace vrpipe::tools

@@ -9,6 +9,7 @@
 #include <vrpipe/workloads/scene.h>
 
 #include "host/stdout_to_stderr.h"
+#include "host/stopwatch.h"
 
 namespace vrpipe::tools {
 
@@ -37,7 +38,7 @@ SceneMeasurement measure_scene(const std::string& scene) {
   asked.scene = scene;
   const auto start = std::chrono::steady_clock::now();
   const LoadedScene loaded = load_scene(asked);
-  measured.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  measured.load_seconds = seconds_since(start);
   measured.name = loaded.summary.name;
   measured.width = loaded.draw.width;
   measured.height = loaded.draw.height;

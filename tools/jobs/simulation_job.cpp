@@ -11,15 +11,12 @@
 #include "host/output_file.h"
 #include "host/process_setup.h"
 #include "host/progress_line.h"
+#include "host/stopwatch.h"
 #include "jobs/loaded_frame.h"
 #include "jobs/processes.h"
 
 namespace vrpipe::tools {
 namespace {
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 /// Writes the images of all runs, side by side: compression takes longer than the disk.
 void write_images(const SimulationJob& job, const std::vector<Simulated>& simulated, JobResult& result) {

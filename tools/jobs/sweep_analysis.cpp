@@ -12,6 +12,7 @@
 #include <vrpipe/component/error.h>
 
 #include "jobs/comparison.h"
+#include "jobs/optional_json.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -30,12 +31,10 @@ Json typed(const StudyAxis& axis, const std::string& text) {
   return text;
 }
 
-Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
-
 constexpr std::array<const char*, 7> utilized{"raster", "zrop", "prop", "sm", "crop", "l2", "dram"};
 
 /// Geometric, or arithmetic where a value is not above 0.
-double mean_of(const std::vector<double>& values) {
+double mean_of_values(const std::vector<double>& values) {
   const bool all_above = std::all_of(values.begin(), values.end(), [](double value) { return value > 0; });
   double sum = 0;
   for (const double value : values) sum += all_above ? std::log(value) : value;
@@ -44,7 +43,7 @@ double mean_of(const std::vector<double>& values) {
 }
 
 bool is_better(const std::string& column, double a, double b) { return column[0] == '-' ? a > b : a < b; }
-std::string plain(const std::string& column) { return column[0] == '-' ? column.substr(1) : column; }
+std::string is_plain(const std::string& column) { return column[0] == '-' ? column.substr(1) : column; }
 
 }  // namespace
 
@@ -73,9 +72,9 @@ std::vector<std::string> sweep_columns(const Study& study) {
 void check_pareto(const Study& study) {
   const std::vector<std::string> columns = sweep_columns(study);
   for (const std::string& name : study.pareto) {
-    if (std::find(columns.begin(), columns.end(), plain(name)) == columns.end())
-      throw UserError("unknown column '" + plain(name) + "'", "pareto", "results have no such column",
-                      "did you mean " + nearest_name(plain(name), columns) + "?");
+    if (std::find(columns.begin(), columns.end(), is_plain(name)) == columns.end())
+      throw UserError("unknown column '" + is_plain(name) + "'", "pareto", "results have no such column",
+                      "did you mean " + nearest_name(is_plain(name), columns) + "?");
   }
 }
 
@@ -140,7 +139,7 @@ AxisEffects axis_effects(const SweepResult& result, const SweepTable& table) {
       }
       if (of_value.empty()) continue;
       const auto [least, most] = std::minmax_element(of_value.begin(), of_value.end());
-      effect.values.push_back({of.values[value], of_value.size(), mean_of(of_value), *least, *most});
+      effect.values.push_back({of.values[value], of_value.size(), mean_of_values(of_value), *least, *most});
       smallest = std::min(smallest, effect.values.back().mean);
       largest = std::max(largest, effect.values.back().mean);
     }
@@ -159,7 +158,7 @@ std::optional<ParetoTable> pareto_table(const SweepResult& result, const SweepTa
   std::vector<std::size_t> columns;
   if (pareto.columns.empty()) pareto.columns = {"milliseconds", "energy_mj"};
   for (const std::string& name : pareto.columns) {
-    columns.push_back(table.column(plain(name)));
+    columns.push_back(table.column(is_plain(name)));
   }
   std::vector<std::size_t> axes;
   for (std::size_t axis = 0; axis < result.study.axes.size(); ++axis) {
@@ -185,7 +184,7 @@ std::optional<ParetoTable> pareto_table(const SweepResult& result, const SweepTa
       for (const std::size_t row : rows) {
         if (const auto number = table.number(row, column)) values.push_back(*number);
       }
-      if (values.size() == most) row_of_gpu.metrics.push_back(mean_of(values));
+      if (values.size() == most) row_of_gpu.metrics.push_back(mean_of_values(values));
     }
     if (row_of_gpu.metrics.size() == columns.size()) pareto.rows.push_back(std::move(row_of_gpu));
   }

@@ -27,7 +27,6 @@
 namespace vrpipe::tools {
 namespace {
 
-using nlohmann::json;
 using SteadyClock = std::chrono::steady_clock;
 
 const std::string& value_on(const Study& study, const StudiedPoint& point, const std::string& axis,
@@ -152,27 +151,28 @@ void check_views(const SweepJob& job) {
 
 // The journal.
 
-json point_key(const Study& study, std::size_t point) {
-  json key = json::array();
+nlohmann::json point_key(const Study& study, std::size_t point) {
+  nlohmann::json key = nlohmann::json::array();
   for (std::size_t i = 0; i < study.axes.size(); ++i)
     key.push_back(valid_utf8(study.axes[i].name + "=" + study.axes[i].values[study.points[point].values[i]]));
   return key;
 }
 
 /// All that results depend on but the points, which may become more: a study that grows keeps what is done.
-json identity(const SweepJob& job) {
+nlohmann::json sweep_identity(const SweepJob& job) {
   const SimulationJob& common = job.common;
-  json scenes = json::array();
+  nlohmann::json scenes = nlohmann::json::array();
   const auto add_scene = [&](const std::string& scene) {
     const bool is_builtin = scene.empty() || scene.rfind("builtin:", 0) == 0;
-    scenes.push_back(is_builtin ? json(scene) : scene_identity(scene));
+    scenes.push_back(is_builtin ? nlohmann::json(scene) : scene_identity(scene));
   };
   add_scene(common.scene.scene);
   for (const StudyAxis& axis : job.study.axes) {
     if (axis.name != "scene") continue;
     for (const std::string& scene : axis.values) add_scene(scene_of_axis(job, scene));
   }
-  json cameras, meshes = json::array(), plugins = json::array(), variants = json::array();
+  nlohmann::json cameras, meshes = nlohmann::json::array(), plugins = nlohmann::json::array(),
+                          variants = nlohmann::json::array();
   if (common.scene.camera)
     cameras = {{"files", file_identity(camera_choice(*common.scene.camera).file)},
                {"camera", valid_utf8(*common.scene.camera)}};
@@ -184,7 +184,9 @@ json identity(const SweepJob& job) {
     if (!variant.base.empty()) variants.push_back(request_identity(request)["variant"]);
   }
   const SceneRequest& scene = common.scene;
-  const auto numbers = [](const auto& triple) { return triple ? json({triple->x, triple->y, triple->z}) : json(); };
+  const auto numbers = [](const auto& triple) {
+    return triple ? nlohmann::json({triple->x, triple->y, triple->z}) : nlohmann::json();
+  };
   return {{"schema", "vrpipe.sweep-journal/1"},
           {"version", VRPIPE_VERSION},
           {"build", build_identity()},
@@ -194,8 +196,8 @@ json identity(const SweepJob& job) {
           {"cameras", cameras},
           {"view",
            {numbers(scene.eye), numbers(scene.look_at), numbers(scene.up),
-            scene.fovy_degrees ? json(*scene.fovy_degrees) : json()}},
-          {"size", scene.size ? json{scene.size->width, scene.size->height} : json()},
+            scene.fovy_degrees ? nlohmann::json(*scene.fovy_degrees) : nlohmann::json()}},
+          {"size", scene.size ? nlohmann::json{scene.size->width, scene.size->height} : nlohmann::json()},
           {"common", request_identity(common.requests.front())},
           {"variants", variants},
           {"preprocessing", settings_identity(common.preprocessing)},
@@ -206,8 +208,8 @@ std::filesystem::path shard_journal(const std::filesystem::path& journal, const 
   return journal.string() + fmt::format(".{}-of-{}", shard.index, shard.count);
 }
 
-Journal open_journal(const SweepJob& job) {
-  const json head = identity(job);
+Journal open_sweep_journal(const SweepJob& job) {
+  const nlohmann::json head = sweep_identity(job);
   if (job.journal) {
     return Journal::in_file(job.shard ? shard_journal(*job.journal, *job.shard) : *job.journal, head,
                             SweepJob::journal_option);
@@ -215,10 +217,11 @@ Journal open_journal(const SweepJob& job) {
   return Journal::in_cache("sweep-" + sha256(head.dump()).substr(0, 16) + ".jsonl", head, SweepJob::journal_option);
 }
 
-json to_record(const Study& study, std::size_t place, const PointOutcome& point) {
+nlohmann::json to_sweep_record(const Study& study, std::size_t place, const PointOutcome& point) {
   return {{"point", point_key(study, place)},
           {"run", encode(point.run)},
-          {"energy", point.energy ? json{point.energy->low, point.energy->nominal, point.energy->high} : json()},
+          {"energy", point.energy ? nlohmann::json{point.energy->low, point.energy->nominal, point.energy->high}
+                                  : nlohmann::json()},
           {"cpu_seconds", point.cpu_seconds}};
 }
 
@@ -229,12 +232,12 @@ std::uint64_t storage_of(const RunRequest& request) {
 }
 
 /// Throws std::runtime_error or json::exception for what to_record() cannot have made.
-PointOutcome from_record(const json& record, const RunRequest& request) {
+PointOutcome sweep_from_record(const nlohmann::json& record, const RunRequest& request) {
   PointOutcome point;
   point.run = decode(with_binaries(record.at("run")), request);
   point.run.framebuffer.color = ColorSurface(1, 1, request.format);
   point.run.framebuffer.depth_stencil = DepthStencilSurface(1, 1);
-  const json& energy = record.at("energy");
+  const nlohmann::json& energy = record.at("energy");
   if (!energy.is_null())
     point.energy = Range{energy.at(0).get<double>(), energy.at(1).get<double>(), energy.at(2).get<double>()};
   point.storage_bytes = storage_of(request);
@@ -243,18 +246,18 @@ PointOutcome from_record(const json& record, const RunRequest& request) {
 }
 
 /// How many points were taken.
-std::size_t take_records(const std::vector<json>& records, const std::vector<RunRequest>& requests,
+std::size_t take_records(const std::vector<nlohmann::json>& records, const std::vector<RunRequest>& requests,
                          SweepResult& result) {
   std::size_t taken = 0;
   std::map<std::string, std::size_t> places;
   for (std::size_t i = 0; i < result.study.points.size(); ++i) places.emplace(point_key(result.study, i).dump(), i);
-  for (const json& record : records) {
+  for (const nlohmann::json& record : records) {
     try {
       const auto found = places.find(record.at("point").dump());
       if (found == places.end() || result.points[found->second]) continue;
-      result.points[found->second] = from_record(record, requests[found->second]);
+      result.points[found->second] = sweep_from_record(record, requests[found->second]);
       ++taken;
-    } catch (const json::exception&) {
+    } catch (const nlohmann::json::exception&) {
       continue;  // damaged: the point is simulated again
     } catch (const std::runtime_error&) {
       continue;
@@ -277,7 +280,7 @@ std::size_t take_shards(const SweepJob& job, const std::vector<RunRequest>& requ
   }
   std::sort(files.begin(), files.end());
   for (const std::filesystem::path& file : files) {
-    const Journal shard = Journal::in_file(file, identity(job), SweepJob::journal_option);
+    const Journal shard = Journal::in_file(file, sweep_identity(job), SweepJob::journal_option);
     taken += take_records(shard.records(), requests, result);
   }
   return taken;
@@ -313,7 +316,7 @@ class Foresight {
   ProgressLine& progress_;
 };
 
-void strip(RunResult& run) {
+void strip_row(RunResult& run) {
   run.units.clear();
   run.statistics.clear();
   run.effects.clear();
@@ -325,8 +328,8 @@ void strip(RunResult& run) {
 
 /// Simulates the missing points that are this process's, and gives each to `store`.
 template <class IsMine, class Store>
-void simulate(const SweepJob& job, const std::vector<RunRequest>& requests, SweepResult& result, BatchPlace place,
-              ProgressLine& progress, const IsMine& is_mine, const Store& store) {
+void simulate_rows(const SweepJob& job, const std::vector<RunRequest>& requests, SweepResult& result, BatchPlace place,
+                   ProgressLine& progress, const IsMine& is_mine, const Store& store) {
   const Study& study = job.study;
   std::vector<std::size_t> missing;
   for (std::size_t i = 0; i < study.points.size(); ++i) {
@@ -352,10 +355,10 @@ void simulate(const SweepJob& job, const std::vector<RunRequest>& requests, Swee
     point.cpu_seconds = point.run.cpu_seconds;
     if (point.run.cycles)
       point.energy = energy_report(energy_amounts(point.run, shipped_energies()), shipped_energies()).total;
-    strip(point.run);
+    strip_row(point.run);
     point.storage_bytes = storage_of(requests[i]);
     progress.erase();
-    store(to_record(study, i, point));
+    store(to_sweep_record(study, i, point));
     foresight.done(point.cpu_seconds);
     result.points[i] = std::move(point);
   };
@@ -363,8 +366,8 @@ void simulate(const SweepJob& job, const std::vector<RunRequest>& requests, Swee
   if (!tasks.empty()) run_tasks(tasks, false, result.processes, place, progress, finished);
 }
 
-std::string to_message(const json& record) {
-  const std::vector<std::uint8_t> bytes = json::to_cbor(record);
+std::string to_message(const nlohmann::json& record) {
+  const std::vector<std::uint8_t> bytes = nlohmann::json::to_cbor(record);
   return {bytes.begin(), bytes.end()};
 }
 
@@ -383,19 +386,19 @@ void simulate_as_rank(const SweepJob& job, const std::vector<RunRequest>& reques
   BatchPlace place;
   if (!ranks.is_first()) {
     if (ranks.is_leader()) {
-      simulate(job, requests, result, place, progress, is_mine,
-               [&](const json& record) { ranks.send(to_message(record)); });
+      simulate_rows(job, requests, result, place, progress, is_mine,
+                    [&](const nlohmann::json& record) { ranks.send(to_message(record)); });
     }
     return ranks.wait_for_all();
   }
   place.meanwhile = [&] {
     while (const auto message = ranks.receive()) {
-      const json record = json::from_cbor(*message);
+      const nlohmann::json record = nlohmann::json::from_cbor(*message);
       result.journal->append(record);
       collected += take_records({record}, requests, result);
     }
   };
-  simulate(job, requests, result, place, progress, is_mine, [&](const json& record) {
+  simulate_rows(job, requests, result, place, progress, is_mine, [&](const nlohmann::json& record) {
     result.journal->append(record);
     ++collected;
   });
@@ -461,7 +464,7 @@ SweepResult run_sweep(const SweepJob& job) {
   if (ranks) result.processes = ranks->slots();
   result.is_elsewhere = ranks && !ranks->is_first();
   if (!result.is_elsewhere) {
-    result.journal = std::make_shared<Journal>(open_journal(job));
+    result.journal = std::make_shared<Journal>(open_sweep_journal(job));
     result.done_before = take_records(result.journal->records(), requests, result) + take_shards(job, requests, result);
     if (result.done_before > 0)
       fmt::print(stderr, "sweep: {} of {} points were done before\n", result.done_before, result.points.size());
@@ -469,9 +472,9 @@ SweepResult run_sweep(const SweepJob& job) {
   if (ranks) {
     simulate_as_rank(job, requests, *ranks, result, progress);
   } else {
-    simulate(
+    simulate_rows(
         job, requests, result, {}, progress, [&](std::size_t i) { return !job.shard || job.shard->has(i); },
-        [&](const json& record) { result.journal->append(record); });
+        [&](const nlohmann::json& record) { result.journal->append(record); });
   }
   result.seconds = std::chrono::duration<double>(SteadyClock::now() - start).count();
   return result;

@@ -12,7 +12,7 @@
 namespace vrpipe::tools {
 namespace {
 
-constexpr const char* option = "--variant";
+constexpr const char* variant_option = "--variant";
 constexpr const char* form = "NAME=BASE[,SLOT=IMPLEMENTATION][,UNIT.PARAMETER=VALUE]...";
 constexpr const char* example = "give e.g. --variant mine=het+qm,qru=same-splat,tc.bins=64";
 
@@ -20,7 +20,8 @@ constexpr const char* example = "give e.g. --variant mine=het+qm,qru=same-splat,
 std::pair<std::string, std::string> pair_of(const std::string& part, const std::string& text) {
   const std::size_t equals = part.find('=');
   if (equals == std::string::npos || equals == 0 || equals + 1 == part.size()) {
-    throw UserError("bad value '" + text + "'", option, fmt::format("'{}' is not as in {}", part, form), example);
+    throw UserError("bad value '" + text + "'", variant_option, fmt::format("'{}' is not as in {}", part, form),
+                    example);
   }
   return {part.substr(0, equals), part.substr(equals + 1)};
 }
@@ -58,9 +59,9 @@ std::string text_of(const VariantDefinition& definition) {
 }
 
 const Variant& add_user_variant(const VariantDefinition& definition) {
-  const std::string where = std::string(option) + " " + definition.name;
+  const std::string where = std::string(variant_option) + " " + definition.name;
   if (!is_good_name(definition.name)) {
-    throw UserError("bad name '" + definition.name + "' of a variant", option,
+    throw UserError("bad name '" + definition.name + "' of a variant", variant_option,
                     "it is not 1 to 64 letters, digits, + - _ or ., the first no - or .", example);
   }
   const auto& known = variants();

@@ -17,6 +17,7 @@
 
 #include "for_each_chunk.h"
 #include "host/progress_line.h"
+#include "host/stopwatch.h"
 #include "jobs/comparison.h"
 #include "jobs/identity.h"
 #include "jobs/loaded_frame.h"
@@ -27,12 +28,7 @@ namespace vrpipe::tools {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 using SteadyClock = std::chrono::steady_clock;
-
-double seconds_since(SteadyClock::time_point start) {
-  return std::chrono::duration<double>(SteadyClock::now() - start).count();
-}
 
 // What is drawn.
 
@@ -83,11 +79,11 @@ class ViewFrames {
 
 // What a journal belongs to.
 
-json numbers(const Vec3& v) { return {v.x, v.y, v.z}; }
+nlohmann::json numbers(const Vec3& v) { return {v.x, v.y, v.z}; }
 
 /// Which cameras, to the last bit.
-json cameras_identity(const ViewsResult& result) {
-  json all = json::array();
+nlohmann::json cameras_identity(const ViewsResult& result) {
+  nlohmann::json all = nlohmann::json::array();
   for (const ViewResult& view : result.views) {
     const Camera& camera = view.viewpoint.camera;
     all.push_back({view.index, valid_utf8(camera.name), numbers(camera.eye), numbers(camera.rotation[0]),
@@ -95,18 +91,19 @@ json cameras_identity(const ViewsResult& result) {
                    camera.height, camera.near_plane, camera.far_plane});
   }
   std::error_code ignored;
-  const json file =
-      result.camera_file ? json(valid_utf8(fs::weakly_canonical(*result.camera_file, ignored).string())) : json();
+  const nlohmann::json file =
+      result.camera_file ? nlohmann::json(valid_utf8(fs::weakly_canonical(*result.camera_file, ignored).string()))
+                         : nlohmann::json();
   return {{"file", file}, {"views", result.views.size()}, {"sha256", sha256(all.dump())}};
 }
 
-json runs_identity(const SimulationJob& job) {
-  json common = request_identity(job.requests.front());
+nlohmann::json runs_identity(const SimulationJob& job) {
+  nlohmann::json common = request_identity(job.requests.front());
   common.erase("platform");
   common.erase("variant");
-  json runs = json::array();
+  nlohmann::json runs = nlohmann::json::array();
   for (const RunRequest& request : job.requests) {
-    const json each = request_identity(request);
+    const nlohmann::json each = request_identity(request);
     runs.push_back({each["platform"], each["variant"]});
   }
   common.update(
@@ -115,12 +112,12 @@ json runs_identity(const SimulationJob& job) {
 }
 
 /// All that the results of views depend on.
-json identity(const SimulationJob& job, const ViewsResult& result) {
-  json plugins = json::array();
+nlohmann::json views_identity(const SimulationJob& job, const ViewsResult& result) {
+  nlohmann::json plugins = nlohmann::json::array();
   for (const PluginFile& plugin : job.provenance.plugins) plugins.push_back(plugin.sha256);
-  json meshes = json::array();
+  nlohmann::json meshes = nlohmann::json::array();
   for (const std::string& mesh : job.scene.meshes) meshes.push_back(file_identity(mesh));
-  json images;
+  nlohmann::json images;
   if (job.output) {
     std::error_code ignored;
     const std::string folder = fs::weakly_canonical(*job.output, ignored).string();
@@ -131,15 +128,15 @@ json identity(const SimulationJob& job, const ViewsResult& result) {
           {"version", VRPIPE_VERSION},
           {"build", build_identity()},
           {"plugins", plugins},
-          {"scene", is_builtin ? json(result.scene) : scene_identity(job.scene.scene)},
+          {"scene", is_builtin ? nlohmann::json(result.scene) : scene_identity(job.scene.scene)},
           {"meshes", meshes},
           {"cameras", cameras_identity(result)},
           {"settings", runs_identity(job)},
           {"images", images}};
 }
 
-Journal open_journal(const SimulationJob& job, const ViewsChoice& choice, const ViewsResult& result) {
-  const json head = identity(job, result);
+Journal open_views_journal(const SimulationJob& job, const ViewsChoice& choice, const ViewsResult& result) {
+  const nlohmann::json head = views_identity(job, result);
   if (choice.journal) return Journal::in_file(*choice.journal, head, ViewsChoice::journal_option);
   const std::string key = sha256(head.dump()).substr(0, 16);
   return Journal::in_cache("views-" + key + ".jsonl", head, ViewsChoice::option);
@@ -147,8 +144,8 @@ Journal open_journal(const SimulationJob& job, const ViewsChoice& choice, const 
 
 // What is in a journal.
 
-json to_record(const ViewResult& view) {
-  json runs = json::array();
+nlohmann::json to_views_record(const ViewResult& view) {
+  nlohmann::json runs = nlohmann::json::array();
   for (const RunResult& run : view.runs) runs.push_back(encode(run));
   const SceneSummary& scene = view.scene;
   return {{"view", view.index},
@@ -164,9 +161,9 @@ json to_record(const ViewResult& view) {
 }
 
 /// Throws std::runtime_error or json::exception for what to_record() cannot have made.
-void from_record(const json& record, const std::vector<RunRequest>& requests, ViewResult& view) {
-  const json& scene = record.at("scene");
-  const json& runs = record.at("runs");
+void views_from_record(const nlohmann::json& record, const std::vector<RunRequest>& requests, ViewResult& view) {
+  const nlohmann::json& scene = record.at("scene");
+  const nlohmann::json& runs = record.at("runs");
   if (runs.size() != requests.size()) throw std::runtime_error("a record of other variants");
   SceneSummary summary;
   scene.at("gaussians_total").get_to(summary.gaussians_total);
@@ -190,7 +187,7 @@ void from_record(const json& record, const std::vector<RunRequest>& requests, Vi
 void take_done_views(const Journal& journal, const std::vector<RunRequest>& requests, ViewsResult& result) {
   std::map<std::size_t, ViewResult*> views;
   for (ViewResult& view : result.views) views.emplace(view.index, &view);
-  for (const json& record : journal.records()) {
+  for (const nlohmann::json& record : journal.records()) {
     try {
       const auto found = views.find(record.at("view").get<std::size_t>());
       if (found == views.end()) continue;
@@ -199,8 +196,8 @@ void take_done_views(const Journal& journal, const std::vector<RunRequest>& requ
         return !images || (fs::is_regular_file(images->png, ignored) && fs::is_regular_file(images->exr, ignored));
       };
       ViewResult& view = *found->second;
-      if (std::all_of(view.images.begin(), view.images.end(), is_there)) from_record(record, requests, view);
-    } catch (const json::exception&) {
+      if (std::all_of(view.images.begin(), view.images.end(), is_there)) views_from_record(record, requests, view);
+    } catch (const nlohmann::json::exception&) {
       continue;  // damaged: the view is simulated again
     } catch (const std::runtime_error&) {
       continue;
@@ -231,7 +228,7 @@ void check_view_outputs(const SimulationJob& job, const ViewsChoice& choice, con
   check_files_differ(job.inputs, outputs);
 }
 
-void write_images(const SimulationJob& job, const ImageFiles& files, const SharedImage& image) {
+void write_view_images(const SimulationJob& job, const ImageFiles& files, const SharedImage& image) {
   create_output_folder(fs::path(files.png).parent_path(), "--output");
   for_each_chunk(2, job.processes, [&](std::uint64_t i) {
     if (i == 0) write_output_file(files.png, encode_png(image, job.background), "--output");
@@ -240,14 +237,14 @@ void write_images(const SimulationJob& job, const ImageFiles& files, const Share
 }
 
 /// What many views would fill memory and journal with, and nobody reads.
-void strip(RunResult& run) {
+void strip_view(RunResult& run) {
   run.units.clear();
   run.statistics.clear();
   run.effects.clear();
   run.draws.clear();
 }
 
-void simulate(const SimulationJob& job, ViewFrames& frames, ViewsResult& result, ProgressLine& progress) {
+void simulate_views(const SimulationJob& job, ViewFrames& frames, ViewsResult& result, ProgressLine& progress) {
   const std::size_t variants = job.requests.size();
   std::vector<Task> tasks;
   std::vector<ViewResult*> views;
@@ -272,13 +269,13 @@ void simulate(const SimulationJob& job, ViewFrames& frames, ViewsResult& result,
   const auto finished = [&](std::size_t index, Simulated&& simulated) {
     const std::size_t i = index / variants, variant = index % variants;
     ViewResult& view = *views[i];
-    if (simulated.image) write_images(job, *view.images[variant], *simulated.image);
+    if (simulated.image) write_view_images(job, *view.images[variant], *simulated.image);
     runs[i][variant] = std::move(simulated.result);
-    strip(runs[i][variant]);
+    strip_view(runs[i][variant]);
     if (--missing[i] > 0) return;
     view.runs = std::move(runs[i]);
     progress.erase();
-    result.journal->append(to_record(view));
+    result.journal->append(to_views_record(view));
     ++done;
     say_done();
   };
@@ -341,14 +338,14 @@ ViewsResult simulate_views(const SimulationJob& job, const ViewsChoice& choice) 
   // What cannot be drawn is refused before anything is written.
   for (const RunRequest& request : job.requests) static_cast<void>(frames.frame(result.views.front(), request));
   if (job.output) create_output_folder(*job.output, "--output");
-  result.journal = std::make_shared<Journal>(open_journal(job, choice, result));
+  result.journal = std::make_shared<Journal>(open_views_journal(job, choice, result));
   take_done_views(*result.journal, job.requests, result);
   if (result.done_before > 0) {
     fmt::print(stderr, "{}: {} of {} views were done before\n", ViewsChoice::option, result.done_before,
                result.views.size());
   }
   const auto simulation_start = SteadyClock::now();
-  simulate(job, frames, result, progress);
+  simulate_views(job, frames, result, progress);
   result.simulate_seconds = seconds_since(simulation_start);
   result.processes =
       static_cast<unsigned>(std::min<std::size_t>(job.processes, result.views.size() * job.requests.size()));

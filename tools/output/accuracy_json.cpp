@@ -6,10 +6,11 @@
 
 #include <vrpipe/arithmetic/blend.h>
 
+#include "jobs/optional_json.h"
+
 namespace vrpipe::tools {
 namespace {
 
-Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 Json cycles_json(const RunResult& run) { return run.cycles ? Json(*run.cycles) : Json(); }
 Json decibels_json(double psnr) { return std::isinf(psnr) ? Json() : Json(psnr); }
 

@@ -44,7 +44,7 @@ std::string table(const AccuracyTable& source) {
   return text + "</table></div>\n";
 }
 
-std::string list(const std::vector<std::string>& lines) {
+std::string word_list(const std::vector<std::string>& lines) {
   if (lines.empty()) return {};
   std::string text = "<ul>\n";
   for (const std::string& line : lines) text += "<li>" + html_escaped(line) + "</li>\n";
@@ -63,8 +63,8 @@ std::string exactness(const ImageError& error) {
 }
 
 /// Colours that can be told from one another; what is of more kinds differs in the marker.
-constexpr std::array<const char*, 8> colors{"#0072b2", "#d1400f", "#009e73", "#e69f00",
-                                            "#cc79a7", "#56b4e9", "#7a3e9d", "#6b4a2b"};
+constexpr std::array<const char*, 8> fidelity_colors{"#0072b2", "#d1400f", "#009e73", "#e69f00",
+                                                     "#cc79a7", "#56b4e9", "#7a3e9d", "#6b4a2b"};
 
 std::string fidelity_plot(const AccuracyResult& result) {
   constexpr Marker markers[] = {Marker::triangle, Marker::square, Marker::diamond, Marker::circle, Marker::star};
@@ -88,7 +88,7 @@ std::string fidelity_plot(const AccuracyResult& result) {
     index_of(fidelities_seen, request.fidelity);
     const std::string name = fmt::format("{} {}", request.variant.name, vrpipe::name_of(request.fidelity));
     const double error = std::fabs(*level.cycles_error_percent);
-    const char* const color = colors[variant % colors.size()];
+    const char* const color = fidelity_colors[variant % fidelity_colors.size()];
     plot.points.push_back({level.cpu_seconds, error, color, markers[static_cast<unsigned>(request.fidelity)],
                            level.dominated, name,
                            fmt::format("{}: {:.2g} % in {:.2f} s{}", name, error, level.cpu_seconds,
@@ -99,7 +99,8 @@ std::string fidelity_plot(const AccuracyResult& result) {
   }
   for (PlotLine& line : plot.lines) std::sort(line.points.begin(), line.points.end());
   for (std::size_t i = 0; i < variants_seen.size(); ++i) {
-    plot.legend.push_back({variants_seen[i], colors[i % colors.size()], Marker::circle, false, false});
+    plot.legend.push_back(
+        {variants_seen[i], fidelity_colors[i % fidelity_colors.size()], Marker::circle, false, false});
   }
   for (const Fidelity fidelity : fidelities_seen) {
     plot.legend.push_back(
@@ -135,8 +136,8 @@ std::string precision_plot(const AccuracyResult& result) {
   plot.legend.push_back({"the default", "#111", Marker::star, false, false});
   for (std::size_t k = 0; k < precision_knobs().size(); ++k) {
     const PrecisionKnob& knob = precision_knobs()[k];
-    const char* const color = colors[k % colors.size()];
-    const Marker marker = k < colors.size() ? Marker::circle : Marker::square;
+    const char* const color = fidelity_colors[k % fidelity_colors.size()];
+    const Marker marker = k < fidelity_colors.size() ? Marker::circle : Marker::square;
     bool seen = false;
     for (const PrecisionRow& row : result.precision) {
       if (row.knob != &knob || row.run == 0) continue;
@@ -198,7 +199,7 @@ std::string functional_note(const AccuracyResult& result) {
 }
 
 /// Of the most exact level of each variant.
-std::string effects_section(const AccuracyResult& result) {
+std::string omitted_effects_section(const AccuracyResult& result) {
   std::vector<const RunResult*> runs;
   for (const FidelityLevel& level : result.fidelity) {
     if (level.run.request.fidelity == fidelities().back()) runs.push_back(&level.run);
@@ -231,7 +232,7 @@ std::string accuracy_page(const AccuracyResult& result) {
       "left is sooner done, further down more exact.</p>\n",
       vrpipe::name_of(fidelities().back()));
   text += fidelity_plot(result) + functional_note(result) + definition(fidelity_definition()) +
-          list(fidelity_summary(result)) + table(fidelity_table(result));
+          word_list(fidelity_summary(result)) + table(fidelity_table(result));
 
   text += "<h3>" + html_escaped(stress_title) + "</h3>\n" + table(stress_table(result));
 
@@ -249,9 +250,9 @@ std::string accuracy_page(const AccuracyResult& result) {
             "<p class=\"subtle\">What lies on the default has no label; a point's name shows under the pointer.</p>\n" +
             definition(precision_definition());
   }
-  text += list(precision_summary(result)) + table(precision_table(result));
+  text += word_list(precision_summary(result)) + table(precision_table(result));
 
-  text += effects_section(result);
+  text += omitted_effects_section(result);
 
   text += "<h2>Images and error maps</h2>\n";
   text +=

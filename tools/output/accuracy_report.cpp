@@ -35,7 +35,7 @@ std::string decibels(double psnr) { return std::isinf(psnr) ? "equal" : fmt::for
 
 std::string cycles_text(const RunResult& run) { return run.cycles ? grouped(*run.cycles) : "-"; }
 
-std::string settings_text(const AccuracyResult& result) {
+std::string accuracy_settings(const AccuracyResult& result) {
   std::string text = effects_choice_text(result.base);
   for (const std::vector<Setting>* settings : {&result.base.settings, &result.preprocessing}) {
     for (const Setting& setting : *settings) {
@@ -338,7 +338,7 @@ std::vector<std::string> accuracy_heading(const AccuracyResult& result) {
                               grouped(result.scene.gaussians_total)));
   lines.push_back(base.platform->name + " (" + base.platform->description + ")");
   lines.push_back(fmt::format("{} colour, {} termination{}", vrpipe::name_of(base.format), name_of(base.termination),
-                              settings_text(result)));
+                              accuracy_settings(result)));
   if (result.quick) {
     std::string line = "a quick look: two variants, and one value of some knobs";
     if (result.width != result.full_width || result.height != result.full_height) {

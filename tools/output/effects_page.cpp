@@ -7,7 +7,7 @@ namespace vrpipe::tools {
 namespace {
 
 /// Why, once for all runs that give the same reason, which are named where there are several reasons.
-std::string reasons(const std::vector<const RunResult*>& runs, std::size_t effect) {
+std::string reasons_html(const std::vector<const RunResult*>& runs, std::size_t effect) {
   std::vector<std::pair<std::string, std::string>> variants_of;  // by reason
   for (const RunResult* run : runs) {
     const std::string& reason = run->effects[effect].reason;
@@ -39,7 +39,7 @@ std::string effects_html(const std::vector<const RunResult*>& runs) {
       const EffectReport& effect = run->effects[i];
       text += (effect.omitted ? "<td>" : "<td class=\"active\">") + state_of(*run, effect) + "</td>";
     }
-    text += "<td>" + reasons(runs, i) + "</td></tr>\n";
+    text += "<td>" + reasons_html(runs, i) + "</td></tr>\n";
   }
   return text + "</table></div>\n";
 }

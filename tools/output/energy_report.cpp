@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t line_width = 100;
 
 /// Three digits or so, so that what is small is seen beside what is large.
-std::string digits(double value) {
+std::string three_digits(double value) {
   if (value == 0) return "0";
   if (value >= 99.95) return fmt::format("{:.0f}", value);
   if (value >= 9.995) return fmt::format("{:.1f}", value);
@@ -25,11 +25,11 @@ std::string digits(double value) {
   return value >= 0.001 ? fmt::format("{:.3f}", value) : fmt::format("{:.1g}", value);
 }
 
-std::string between(const Range& range) { return digits(range.low) + " to " + digits(range.high); }
-std::string times(double value) { return fmt::format("{:.2f}x", value); }
+std::string between(const Range& range) { return three_digits(range.low) + " to " + three_digits(range.high); }
+std::string ratio_of_energies(double value) { return fmt::format("{:.2f}x", value); }
 
 /// Words between commas, broken between them.
-std::string paragraph(const std::string& text) {
+std::string broken_at_commas(const std::string& text) {
   std::string all;
   for (const std::string& line : wrapped(text, line_width - 2)) all += (all.empty() ? "" : "  ") + line + "\n";
   return all;
@@ -63,7 +63,7 @@ class SpentTable {
       const std::optional<Range> range = value(i);
       return range ? show(*range * scale) : std::string("-");
     };
-    row(label, [&](std::size_t i) { return cell(i, [](const Range& range) { return digits(range.nominal); }); });
+    row(label, [&](std::size_t i) { return cell(i, [](const Range& range) { return three_digits(range.nominal); }); });
     row("  low to high", [&](std::size_t i) { return cell(i, between); });
   }
   std::string text(const TextStyle& style) const { return table_.text(style); }
@@ -96,7 +96,7 @@ void add_ratio(SpentTable& rows, const RunRequest& baseline, const EnergyAmounts
   const auto cell = [&](std::size_t i, const std::string& text) { return ratios[i] ? text : std::string("-"); };
   rows.row(
       "energy efficiency over " + name_of(baseline),
-      [&](std::size_t i) { return cell(i, ratios[i] ? times(ratios[i]->nominal) : ""); }, true);
+      [&](std::size_t i) { return cell(i, ratios[i] ? ratio_of_energies(ratios[i]->nominal) : ""); }, true);
   rows.row("  low to high", [&](std::size_t i) {
     return cell(i, ratios[i] ? fmt::format("{:.2f} to {:.2f}x", ratios[i]->low, ratios[i]->high) : "");
   });
@@ -115,14 +115,15 @@ std::string left_out_text(const std::vector<RunResult>& runs, const Spent& spent
     names.erase(std::remove_if(names.begin(), names.end(), is_counted), names.end());
   }
   if (!names.empty()) {
-    text += paragraph("energy of what is not simulated here is left out: " + fmt::format("{}", fmt::join(names, ", ")));
+    text += broken_at_commas("energy of what is not simulated here is left out: " +
+                             fmt::format("{}", fmt::join(names, ", ")));
   }
   if (!spent.amounts.front().seconds) {
     text += "energy of constant power is unknown, since there is no time, and so are totals\n";
   } else if (const Platform& platform = *runs.front().request.platform;
              !powers_of_other_platforms(table, platform).empty()) {
-    text += paragraph(fmt::format("constant power ({}) was not found for {}: take totals and ratios as examples",
-                                  fmt::join(powers_of_other_platforms(table, platform), ", "), platform.name));
+    text += broken_at_commas(fmt::format("constant power ({}) was not found for {}: take totals and ratios as examples",
+                                         fmt::join(powers_of_other_platforms(table, platform), ", "), platform.name));
   }
   return text;
 }
@@ -141,7 +142,7 @@ std::string energy_text(const std::vector<RunResult>& runs, std::size_t baseline
     const auto spends = [&](const EnergyReport& report) { return of(report) > 0; };
     if (std::none_of(spent.reports.begin(), spent.reports.end(), spends)) continue;
     rows.row(printable(spent.reports.front().units[unit].unit),
-             [&](std::size_t i) { return digits(of(spent.reports[i])); });
+             [&](std::size_t i) { return three_digits(of(spent.reports[i])); });
   }
   rows.both(
       "all that moves", [&](std::size_t i) { return spent.reports[i].moving; }, 1);
@@ -156,14 +157,14 @@ std::string energy_text(const std::vector<RunResult>& runs, std::size_t baseline
 
   std::string text =
       rows.text(style) +
-      paragraph(fmt::format(
+      broken_at_commas(fmt::format(
           "energies at {}; low to high: wherever in its range each figure lies, in a ratio the same in both "
           "runs (docs/energy.md)",
           printable(table.process)));
   text += left_out_text(runs, spent, table);
   if (runs.size() > 1) {
-    text += paragraph(fmt::format("the paper has {} on average and {} (R12, R13) by another method: {}",
-                                  paper_row("R12").value, paper_row("R13").value, paper_energy_method()));
+    text += broken_at_commas(fmt::format("the paper has {} on average and {} (R12, R13) by another method: {}",
+                                         paper_row("R12").value, paper_row("R13").value, paper_energy_method()));
   }
   return text;
 }

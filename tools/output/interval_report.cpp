@@ -14,7 +14,7 @@ bool is_quotient(const StatisticIntervals& statistic) {
   return statistic.kind == "ratio" || statistic.kind == "histogram";
 }
 
-Json value_json(const StatisticIntervals& statistic, std::size_t interval) {
+Json interval_value_json(const StatisticIntervals& statistic, std::size_t interval) {
   if (is_quotient(statistic)) {
     const std::optional<double> quotient = statistic.quotient(interval);
     return quotient ? Json(*quotient) : Json();
@@ -47,7 +47,7 @@ std::vector<std::string> columns_of(const std::vector<RunResult>& runs) {
 Row row_of(const IntervalReport& intervals, std::size_t interval) {
   Row row;
   for (const StatisticIntervals& statistic : intervals.statistics) {
-    const Json value = value_json(statistic, interval);
+    const Json value = interval_value_json(statistic, interval);
     row[statistic.name] = value.is_null()           ? std::string()
                           : value.is_number_float() ? fmt::format("{:.6g}", value.get<double>())
                                                     : fmt::format("{}", value.get<std::uint64_t>());
@@ -74,7 +74,7 @@ Json intervals_json(const IntervalReport& intervals) {
   Json statistics = Json::object();
   for (const StatisticIntervals& statistic : intervals.statistics) {
     Json& values = statistics[statistic.name] = Json::array();
-    for (std::size_t i = 0; i < intervals.from.size(); ++i) values.push_back(value_json(statistic, i));
+    for (std::size_t i = 0; i < intervals.from.size(); ++i) values.push_back(interval_value_json(statistic, i));
   }
   return {{"cycles", intervals.every},
           {"from", intervals.from},

@@ -33,7 +33,7 @@ bool is_long_row(const Json& json) {
 }
 
 /// As dump(2), but for long rows.
-void put(const Json& json, const std::string& indent, std::string& text) {
+void put_text(const Json& json, const std::string& indent, std::string& text) {
   if (!json.is_structured() || json.empty() || is_long_row(json)) {
     text += json.dump();
     return;
@@ -46,7 +46,7 @@ void put(const Json& json, const std::string& indent, std::string& text) {
     is_first = false;
     text += inner;
     if (json.is_object()) text += Json(key).dump() + ": ";
-    put(value, inner, text);
+    put_text(value, inner, text);
   }
   text += "\n" + indent + (json.is_array() ? "]" : "}");
 }
@@ -55,7 +55,7 @@ void put(const Json& json, const std::string& indent, std::string& text) {
 
 std::string json_text(const Json& json) {
   std::string text;
-  put(with_valid_texts(json), "", text);
+  put_text(with_valid_texts(json), "", text);
   return text + "\n";
 }
 

@@ -8,7 +8,7 @@ namespace vrpipe::tools {
 namespace {
 
 Json number_json(double value) { return std::isfinite(value) ? Json(value) : Json(); }
-Json optional_json(const std::optional<double>& value) { return value ? number_json(*value) : Json(); }
+Json measured_json(const std::optional<double>& value) { return value ? number_json(*value) : Json(); }
 
 Json points_json(const MicrobenchPoints& points) {
   Json json = Json::array();
@@ -16,7 +16,7 @@ Json points_json(const MicrobenchPoints& points) {
   return json;
 }
 
-Json units_json(const RunRequest& request) {
+Json chosen_units_json(const RunRequest& request) {
   Json json = Json::object();
   for (const UnitChoice& unit : request.units) json[unit.slot] = unit.implementation;
   return json;
@@ -25,13 +25,13 @@ Json units_json(const RunRequest& request) {
 Json figure_json(const MicrobenchFigure& figure) {
   return {{"name", figure.name},
           {"unit", figure.unit},
-          {"paper", optional_json(figure.paper)},
-          {"gpu", optional_json(figure.gpu)},
+          {"paper", measured_json(figure.paper)},
+          {"gpu", measured_json(figure.gpu)},
           {"gpu_is_of", figure.gpu_is_of.empty() ? Json() : Json(figure.gpu_is_of)},
           {"measured", number_json(figure.measured)},
-          {"reference", optional_json(figure.reference)},
+          {"reference", measured_json(figure.reference)},
           {"reference_is", figure.reference ? Json(figure.reference_is) : Json()},
-          {"difference_percent", optional_json(figure.difference_percent())},
+          {"difference_percent", measured_json(figure.difference_percent())},
           {"tolerance_percent", figure.tolerance_percent < 0 ? Json() : Json(figure.tolerance_percent)},
           {"agrees", figure.reference && figure.tolerance_percent >= 0 ? Json(figure.agrees()) : Json()},
           {"note", figure.note},
@@ -56,7 +56,7 @@ Json microbench_json(const MicrobenchRun& run) {
   machine.request = run.request;
   machine.parameters = run.results.front().parameters;
   json["platform"] = platform_json({machine}, {}, run.provenance);
-  json["units"] = units_json(run.request);
+  json["units"] = chosen_units_json(run.request);
   json["fidelity"] = vrpipe::name_of(run.request.fidelity);
   json["microbenchmarks"] = Json::array();
   for (const MicrobenchResult& result : run.results) {

@@ -10,7 +10,7 @@ namespace vrpipe::tools {
 
 namespace {
 
-constexpr const char* style = R"(
+constexpr const char* microbench_style = R"(
 :root { color-scheme: light; }
 body { margin: 0 auto; padding: 28px 24px 60px; max-width: 1080px; background: #fff; color: #1d232a;
        font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
@@ -36,7 +36,7 @@ constexpr Look simulator{"simulator", "#0072b2", Marker::circle, false};
 constexpr Look real_gpu{"real GPU", "#d1400f", Marker::square, true};
 constexpr Look paper{"paper", "#009e73", Marker::diamond, false};
 
-void add(Plot& plot, const MicrobenchPoints& points, const Look& look) {
+void add_points(Plot& plot, const MicrobenchPoints& points, const Look& look) {
   if (points.empty()) return;
   PlotLine line;
   line.color = look.color;
@@ -57,9 +57,9 @@ std::string curve_html(const MicrobenchCurve& curve) {
   plot.description = fmt::format("{}: {}, by {}", curve.name, curve.y_label, curve.x_label);
   plot.x.title = curve.x_label;
   plot.y.title = curve.y_label;
-  add(plot, curve.measured, simulator);
-  add(plot, curve.gpu, real_gpu);
-  add(plot, curve.paper, paper);
+  add_points(plot, curve.measured, simulator);
+  add_points(plot, curve.gpu, real_gpu);
+  add_points(plot, curve.paper, paper);
   return "<h3>" + html_escaped(curve.name) + "</h3>\n" + svg(plot) + '\n';
 }
 
@@ -85,7 +85,7 @@ std::string microbench_page(const MicrobenchRun& run) {
   std::string text = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
   text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
   text += "<title>vrpipe microbench: " + html_escaped(platform.name) + "</title>\n";
-  text += std::string("<style>") + style + "</style>\n</head>\n<body>\n<h1>Microbenchmarks</h1>\n";
+  text += std::string("<style>") + microbench_style + "</style>\n</head>\n<body>\n<h1>Microbenchmarks</h1>\n";
   text += fmt::format("<p class=\"subtle\">{} ({}), {} fidelity. What differs from what is published is marked.</p>\n",
                       html_escaped(platform.name), html_escaped(platform.description),
                       vrpipe::name_of(run.request.fidelity));

@@ -14,9 +14,9 @@ namespace vrpipe::tools {
 
 namespace {
 
-constexpr unsigned plot_width = 64;
-constexpr unsigned plot_height = 12;
-constexpr std::size_t text_width = 110;
+constexpr unsigned chart_width = 64;
+constexpr unsigned chart_height = 12;
+constexpr std::size_t finding_width = 110;
 constexpr char of_simulator = '*';
 constexpr char of_gpu = 'o';
 constexpr char of_paper = '#';
@@ -31,21 +31,22 @@ std::string percent_text(double percent) {
 
 std::string plot(const MicrobenchCurve& curve) {
   std::string text = fmt::format("{}: {}, by {}\n", curve.name, curve.y_label, curve.x_label);
-  text += text_plot({{of_simulator, curve.measured}, {of_paper, curve.paper}, {of_gpu, curve.gpu}}, plot_width,
-                    plot_height);
+  text += text_plot({{of_simulator, curve.measured}, {of_paper, curve.paper}, {of_gpu, curve.gpu}}, chart_width,
+                    chart_height);
   text += fmt::format("{} simulator", of_simulator);
   if (!curve.paper.empty()) text += fmt::format(", {} paper", of_paper);
   if (!curve.gpu.empty()) text += fmt::format(", {} real GPU", of_gpu);
   return text + '\n';
 }
 
-std::string table(const MicrobenchResult& result, const TextStyle& style) {
-  TextTable table({"", "paper", "real GPU", "simulator", "unit"});
-  table.left(4);
+std::string figures_table(const MicrobenchResult& result, const TextStyle& style) {
+  TextTable figures_table({"", "paper", "real GPU", "simulator", "unit"});
+  figures_table.left(4);
   for (const MicrobenchFigure& figure : result.figures) {
-    table.row({figure.name, optional_text(figure.paper), gpu_text(figure), number_text(figure.measured), figure.unit});
+    figures_table.row(
+        {figure.name, optional_text(figure.paper), gpu_text(figure), number_text(figure.measured), figure.unit});
   }
-  std::string text = table.text(style);
+  std::string text = figures_table.text(style);
   const auto of_a_part = [](const MicrobenchFigure& figure) { return figure.gpu_is_of == one_partition; };
   if (std::any_of(result.figures.begin(), result.figures.end(), of_a_part))
     text += "the real GPU's graphics GPC has one ROP partition, the paper's two\n";
@@ -90,11 +91,11 @@ std::string finding(const MicrobenchFigure& figure) {
 std::string microbench_text(const MicrobenchRun& run, const TextStyle& style) {
   std::string text = machine_text(run.request, style);
   for (const MicrobenchResult& result : run.results) {
-    text += fmt::format("\n{}: {}\n\n", result.name, result.question) + table(result, style);
+    text += fmt::format("\n{}: {}\n\n", result.name, result.question) + figures_table(result, style);
     for (const MicrobenchCurve& curve : result.curves) text += '\n' + plot(curve);
     text += '\n';
     for (const MicrobenchFigure& figure : result.figures) {
-      const std::vector<std::string> lines = wrapped(finding(figure), text_width);
+      const std::vector<std::string> lines = wrapped(finding(figure), finding_width);
       for (std::size_t i = 0; i < lines.size(); ++i) text += (i == 0 ? "" : "  ") + lines[i] + '\n';
     }
     text += fmt::format("took {:.1f} s in {} process{} at a time\n", result.seconds, run.processes,

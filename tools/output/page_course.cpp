@@ -61,10 +61,10 @@ std::vector<CourseSlice> slices_of(const RunResult& run, std::uint64_t longest) 
 constexpr UnitState drawn_states[] = {UnitState::busy, UnitState::memory, UnitState::latency, UnitState::blocked};
 
 // Pixels of the drawing.
-constexpr double width = 1040;
-constexpr double left = 110;
-constexpr double right = 1025;
-constexpr double heading = 26;
+constexpr double course_width = 1040;
+constexpr double course_left = 110;
+constexpr double course_right = 1025;
+constexpr double course_heading = 26;
 constexpr double strip_height = 18;
 constexpr double unit_height = 22;
 constexpr double unit_step = 26;
@@ -74,7 +74,9 @@ constexpr double panel_gap = 22;
 struct CourseScale {
   bool in_milliseconds = false;
   double longest = 0;
-  double x(const RunResult& run, std::uint64_t cycle) const { return left + of(run, cycle) / longest * (right - left); }
+  double x(const RunResult& run, std::uint64_t cycle) const {
+    return course_left + of(run, cycle) / longest * (course_right - course_left);
+  }
   double of(const RunResult& run, std::uint64_t cycle) const {
     const double cycles = static_cast<double>(cycle);
     return in_milliseconds ? cycles / (1e3 * run.request.platform->frequency_mhz) : cycles;
@@ -85,8 +87,9 @@ struct CourseScale {
 std::string unit_areas(const std::string& id, const RunResult& run, const std::vector<CourseSlice>& slices,
                        std::size_t unit, const CourseScale& scale, double top) {
   std::string text =
-      fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{}\" fill=\"{}\" class=\"piece\"/>\n", left,
-                  top, scale.x(run, slices.back().to) - left, unit_height, fill_text(id, fill_of(UnitState::starved)));
+      fmt::format("<rect x=\"{}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{}\" fill=\"{}\" class=\"piece\"/>\n",
+                  course_left, top, scale.x(run, slices.back().to) - course_left, unit_height,
+                  fill_text(id, fill_of(UnitState::starved)));
   std::vector<double> below(slices.size(), 0.0);
   for (const UnitState state : drawn_states) {
     std::string upper;
@@ -143,14 +146,14 @@ std::string time_axis(const CourseScale& scale, double y) {
   const double unit = scale.in_milliseconds ? 1 : scale.longest >= 2e6 ? 1e6 : scale.longest >= 2e3 ? 1e3 : 1;
   std::string text;
   for (double k = 0; k * step <= scale.longest; ++k) {
-    const double x = left + k * step / scale.longest * (right - left);
+    const double x = course_left + k * step / scale.longest * (course_right - course_left);
     text += fmt::format(
         "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\" stroke=\"#aab3bd\"/>\n"
         "<text x=\"{0:.1f}\" y=\"{3:.1f}\" text-anchor=\"middle\">{4:.6g}</text>\n",
         x, y, y + 5, y + 18, k * step / unit);
   }
   return text + fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"middle\" class=\"axis\">{}</text>\n",
-                            (left + right) / 2, y + 37,
+                            (course_left + course_right) / 2, y + 37,
                             scale.in_milliseconds ? "milliseconds"
                             : unit == 1e6         ? "cycles, millions"
                             : unit == 1e3         ? "cycles, thousands"
@@ -200,17 +203,17 @@ std::string course_section(const JobResult& result) {
   std::vector<std::pair<std::string, std::size_t>> kinds;
   for (const UnitState state : drawn_states) kinds.emplace_back(vrpipe::name_of(state), fill_of(state));
   kinds.emplace_back(vrpipe::name_of(UnitState::starved), fill_of(UnitState::starved));
-  std::string body = svg_legend(id, kinds, left, 12);
+  std::string body = svg_legend(id, kinds, course_left, 12);
   double y = 30;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     body += fmt::format("<text x=\"4\" y=\"{:.1f}\" class=\"axis strong\">{}</text>\n", y + 14,
                         html_escaped(name_of(runs[i].request)));
-    y += heading;
-    body += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">bottleneck</text>\n", left - 8, y + 13);
+    y += course_heading;
+    body += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">bottleneck</text>\n", course_left - 8, y + 13);
     body += bottleneck_strip(runs[i], slices[i], scale, y);
     y += strip_height + 4;
     for (std::size_t unit = 0; unit < slices[i].front().units.size(); ++unit) {
-      body += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", left - 8, y + 15,
+      body += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", course_left - 8, y + 15,
                           html_escaped(slices[i].front().units[unit].unit));
       body += unit_areas(id, runs[i], slices[i], unit, scale, y);
       y += unit_step;
@@ -221,7 +224,7 @@ std::string course_section(const JobResult& result) {
       fmt::format(
           "<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"what units did over time\" "
           "xmlns=\"http://www.w3.org/2000/svg\">\n",
-          width, y + 42) +
+          course_width, y + 42) +
       fill_definitions(id) + body + time_axis(scale, y - panel_gap + 4) + "</svg>\n";
   return html(
       PageFigure{id,

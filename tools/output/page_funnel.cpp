@@ -87,13 +87,13 @@ std::string amount(std::uint64_t value) {
 }
 
 // Pixels of the drawing.
-constexpr double width = 1040;
-constexpr double left = 160;
-constexpr double right = 1024;
-constexpr double room = 64;  // of a column, for what stands beside a bar
+constexpr double funnel_width = 1040;
+constexpr double funnel_left = 160;
+constexpr double funnel_right = 1024;
+constexpr double funnel_room = 64;  // of a column, for what stands beside a bar
 constexpr double stage_height = 26;
 constexpr double stage_step = 42;
-constexpr double heading = 30;
+constexpr double funnel_heading = 30;
 constexpr std::size_t most_columns = 4;
 constexpr const char* stage_color = "#b4cbe0";
 constexpr const char* last_color = "#123a5c";
@@ -103,7 +103,7 @@ std::string funnel_column(const std::string& run, const std::vector<FunnelStage>
                           double y, double column, double greatest) {
   const double middle = x + column / 2;
   const auto half = [&](std::uint64_t value) {
-    return greatest > 0 ? static_cast<double>(value) / greatest * (column - room) / 2 : 0;
+    return greatest > 0 ? static_cast<double>(value) / greatest * (column - funnel_room) / 2 : 0;
   };
   std::string text =
       fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\" class=\"axis strong\">{}</text>\n", middle,
@@ -111,7 +111,7 @@ std::string funnel_column(const std::string& run, const std::vector<FunnelStage>
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const std::uint64_t value = stages[i].of_run[index];
     const std::uint64_t first = stages.front().of_run[index];
-    const double top = y + heading + stage_step * static_cast<double>(i);
+    const double top = y + funnel_heading + stage_step * static_cast<double>(i);
     const double share = first > 0 ? 100 * static_cast<double>(value) / static_cast<double>(first) : 0;
     if (i > 0) {
       const double above = half(stages[i - 1].of_run[index]);
@@ -142,26 +142,26 @@ std::string funnel_column(const std::string& run, const std::vector<FunnelStage>
 
 std::string funnel_svg(const char* what, const std::vector<FunnelStage>& stages, const std::vector<RunResult>& runs) {
   const std::size_t columns = std::min(runs.size(), most_columns);
-  const double column = std::min(300.0, (right - left) / static_cast<double>(columns));
-  const double panel = heading + stage_step * static_cast<double>(stages.size());
+  const double column = std::min(300.0, (funnel_right - funnel_left) / static_cast<double>(columns));
+  const double panel = funnel_heading + stage_step * static_cast<double>(stages.size());
   const std::size_t panels = (runs.size() + columns - 1) / columns;
   const double greatest =
       static_cast<double>(*std::max_element(stages.front().of_run.begin(), stages.front().of_run.end()));
   std::string text = fmt::format(
       "<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"what became of {}\" "
       "xmlns=\"http://www.w3.org/2000/svg\">\n",
-      width, panel * static_cast<double>(panels), what);
+      funnel_width, panel * static_cast<double>(panels), what);
   for (std::size_t i = 0; i < runs.size(); ++i) {
     const double y = panel * static_cast<double>(i / columns);
     if (i % columns == 0) {
       for (std::size_t k = 0; k < stages.size(); ++k) {
-        text += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", left - 8,
-                            y + heading + stage_step * static_cast<double>(k) + stage_height / 2 + 4,
+        text += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", funnel_left - 8,
+                            y + funnel_heading + stage_step * static_cast<double>(k) + stage_height / 2 + 4,
                             html_escaped(stages[k].name));
       }
     }
-    text += funnel_column(name_of(runs[i].request), stages, i, left + column * static_cast<double>(i % columns), y,
-                          column, greatest);
+    text += funnel_column(name_of(runs[i].request), stages, i, funnel_left + column * static_cast<double>(i % columns),
+                          y, column, greatest);
   }
   return text + "</svg>\n";
 }

@@ -11,7 +11,7 @@
 namespace vrpipe::tools {
 namespace {
 
-std::string value_text(const Json& value) {
+std::string parameter_text(const Json& value) {
   if (value.is_boolean()) return value.get<bool>() ? "on" : "off";
   return value.is_string() ? value.get<std::string>() : value.dump();
 }
@@ -34,14 +34,14 @@ std::vector<ParameterRow> parameter_rows(const JobResult& result) {
   std::map<std::string, std::size_t> places;
   for (const auto& [key, value] : platform["parameters"].items()) {
     places[key] = rows.size();
-    rows.push_back({key, value_text(value), platform["origins"][key].get<std::string>(), {}});
+    rows.push_back({key, parameter_text(value), platform["origins"][key].get<std::string>(), {}});
   }
   for (const RunResult& run : result.runs) {
     const Json changed = changed_parameters_json(run, platform["parameters"]);
     for (const auto& [key, value] : changed.items()) {
       const auto [place, is_new] = places.emplace(key, rows.size());
       if (is_new) rows.push_back({key, "-", "", {}});
-      rows[place->second].others.emplace_back(name_of(run.request), value_text(value));
+      rows[place->second].others.emplace_back(name_of(run.request), parameter_text(value));
     }
   }
   // Those of a unit together, also what a run alone has.

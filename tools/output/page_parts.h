@@ -42,6 +42,8 @@ std::string html_table(const std::vector<std::string>& heading, const std::vecto
 /// A data URI.
 std::string png_uri(const Picture& picture);
 
+/// A text as a cell of CSV, quoted where it must be.
+std::string csv_text(const std::string& text);
 /// A number as CSV has it: all its digits; empty for what is none.
 std::string csv_number(double value);
 

@@ -21,7 +21,7 @@ namespace vrpipe::tools {
 namespace {
 
 /// Counts of a table in one scale, so that they compare at a glance.
-struct Scale {
+struct CountScale {
   double divisor;
   const char* suffix;  ///< for the heading of a group
   std::string operator()(std::uint64_t value) const {
@@ -30,13 +30,13 @@ struct Scale {
   }
 };
 
-Scale scale_for(std::uint64_t largest) {
+CountScale scale_for(std::uint64_t largest) {
   if (largest >= 1000000) return {1e6, ", millions"};
   if (largest >= 100000) return {1e3, ", thousands"};
   return {1, ""};
 }
 
-std::string percent(double share) { return fmt::format("{:.1f}", 100 * share); }
+std::string tenths_of_percent(double share) { return fmt::format("{:.1f}", 100 * share); }
 
 std::string ratio(std::uint64_t numerator, std::uint64_t denominator) {
   if (denominator == 0) return "-";
@@ -66,7 +66,7 @@ class RunTable {
     table_.row(std::move(cells), emphasised);
   }
   /// A row of counts; left out when all are zero and it is not `always` there.
-  void counts(const std::string& label, std::uint64_t Counts::*member, const Scale& scale, bool always = true) {
+  void counts(const std::string& label, std::uint64_t Counts::*member, const CountScale& scale, bool always = true) {
     const auto is_zero = [member](const RunResult& run) { return run.counts.*member == 0; };
     if (!always && std::all_of(runs_.begin(), runs_.end(), is_zero)) return;
     row(label, [&](const RunResult& run) { return scale(run.counts.*member); });
@@ -115,7 +115,7 @@ void add_fates(RunTable& table, const std::string& title, const Fates& fates, co
   const std::vector<RunResult>& runs = result.runs;
   std::uint64_t largest = 0;
   for (const RunResult& run : runs) largest = std::max(largest, run.counts.*fates.rasterized);
-  const Scale scale = scale_for(largest);
+  const CountScale scale = scale_for(largest);
   table.group(title + scale.suffix);
   table.counts("rasterized", fates.rasterized, scale);
   table.counts("depth/stencil failed", fates.depth_stencil_failed, scale, false);
@@ -163,12 +163,12 @@ void add_utilization(RunTable& table, const std::vector<RunResult>& runs) {
     // DRAM does nothing while L2 is all the memory there is.
     const auto is_idle = [i](const RunResult& run) { return run.utilization[i].second <= 0; };
     if (name == "dram" && std::all_of(runs.begin(), runs.end(), is_idle)) continue;
-    table.row(name, [i](const RunResult& run) { return percent(run.utilization[i].second); });
+    table.row(name, [i](const RunResult& run) { return tenths_of_percent(run.utilization[i].second); });
   }
 }
 
 /// A ratio of a run; none where it did not have what it is of.
-std::optional<double> ratio_of(const RunResult& run, const std::string& name) {
+std::optional<double> statistic_quotient(const RunResult& run, const std::string& name) {
   for (const StatisticReport& report : run.statistics) {
     if (report.name == name) return report.quotient();
   }
@@ -176,12 +176,12 @@ std::optional<double> ratio_of(const RunResult& run, const std::string& name) {
 }
 
 void add_cache(RunTable& table, const std::vector<RunResult>& runs) {
-  const auto hits = [](const RunResult& run) { return ratio_of(run, "crop.cache.sector_hit_rate"); };
+  const auto hits = [](const RunResult& run) { return statistic_quotient(run, "crop.cache.sector_hit_rate"); };
   if (std::none_of(runs.begin(), runs.end(), hits)) return;
   table.group("colour cache");
   table.row("sectors hit, %", [&](const RunResult& run) {
     const std::optional<double> rate = hits(run);
-    return rate ? percent(*rate) : std::string("-");
+    return rate ? tenths_of_percent(*rate) : std::string("-");
   });
 }
 
@@ -196,7 +196,9 @@ void add_memory(RunTable& table, const std::vector<RunResult>& runs) {
     }
     return static_cast<double>(bytes) / 1e6;
   };
-  const auto misses = [](const RunResult& run) { return ratio_of(run, "l2.cache.sector_hit_rate").has_value(); };
+  const auto misses = [](const RunResult& run) {
+    return statistic_quotient(run, "l2.cache.sector_hit_rate").has_value();
+  };
   if (std::none_of(runs.begin(), runs.end(), misses)) return;
   table.group("moved to and from memory, MB");
   for (const auto& [memory, shown] : {std::pair{"l2", "L2"}, std::pair{"dram", "DRAM"}}) {
@@ -223,7 +225,8 @@ std::string unit_states_text(const RunResult& run, const TextStyle& style) {
   const double cycles = static_cast<double>(std::max<std::uint64_t>(run.cycles.value_or(0), 1));
   for (const UnitReport& unit : run.units) {
     std::vector<std::string> cells{unit.name};
-    for (const std::uint64_t spent : unit.cycles) cells.push_back(percent(static_cast<double>(spent) / cycles));
+    for (const std::uint64_t spent : unit.cycles)
+      cells.push_back(tenths_of_percent(static_cast<double>(spent) / cycles));
     table.row(std::move(cells));
   }
   return table.text(style);
@@ -444,21 +447,21 @@ std::string bound_text(const RunResult& run) {
   std::string parts;
   for (const auto& [name, share] : busiest.parts) {
     if (share < 0.001) continue;
-    parts += fmt::format("{}{} {} %", parts.empty() ? "" : ", ", name, percent(share));
+    parts += fmt::format("{}{} {} %", parts.empty() ? "" : ", ", name, tenths_of_percent(share));
   }
   const std::string unit = unit_text(busiest.unit, run);
   if (busiest.occupancy >= bounding_occupancy) {
     return fmt::format("{} is bound by {}, occupied {} % ({})\n", name_of(run.request), unit,
-                       percent(busiest.occupancy), parts);
+                       tenths_of_percent(busiest.occupancy), parts);
   }
   std::string text = fmt::format("no one unit bounds {}: {} is occupied {} % ({})", name_of(run.request), unit,
-                                 percent(busiest.occupancy), parts);
+                                 tenths_of_percent(busiest.occupancy), parts);
   const UnitReport* next = nullptr;
   for (const UnitReport& other : run.units) {
     if (other.name != busiest.unit && (next == nullptr || other.occupancy > next->occupancy)) next = &other;
   }
   if (next != nullptr && next->occupancy > 0) {
-    text += fmt::format(", {} {} %", unit_text(next->name, run), percent(next->occupancy));
+    text += fmt::format(", {} {} %", unit_text(next->name, run), tenths_of_percent(next->occupancy));
   }
   return text + "\n";
 }
@@ -469,7 +472,7 @@ std::string report(const JobResult& result, const TextStyle& style) {
   add_time(table, result);
   add_fates(table, "fragments", fragment_fates, result);
   add_fates(table, "quads", quad_fates, result);
-  const Scale exact{1, ""};
+  const CountScale exact{1, ""};
   table.group("batches");
   table.counts("warps", &Counts::warps, exact);
   table.counts("TGC flushes", &Counts::tgc_flushes, exact);

@@ -8,7 +8,7 @@
 namespace vrpipe::tools {
 namespace {
 
-std::string name_of(const Reproduction& of, const SceneFinding& scene) {
+std::string answer_title(const Reproduction& of, const SceneFinding& scene) {
   return of.result.plan.scenes[scene.scene].name;
 }
 
@@ -30,9 +30,9 @@ Answer fragments_answer(const Reproduction& of) {
     return fall_percent(a.gains) < fall_percent(b.gains);
   };
   const auto [least, most] = std::minmax_element(of.findings.scenes.begin(), of.findings.scenes.end(), less);
-  std::string text =
-      fmt::format("Here they fall by {:.1f} %, from {:.1f} % in {} to {:.1f} % in {}. ", all.front().fall_percent,
-                  fall_percent(least->gains), name_of(of, *least), fall_percent(most->gains), name_of(of, *most));
+  std::string text = fmt::format("Here they fall by {:.1f} %, from {:.1f} % in {} to {:.1f} % in {}. ",
+                                 all.front().fall_percent, fall_percent(least->gains), answer_title(of, *least),
+                                 fall_percent(most->gains), answer_title(of, *most));
   text +=
       "Two effects are against each other: pixels of a quad terminate at different depths, which leaves partial quads; "
       "and what is in front has larger splats, whose quads are fuller. ";
@@ -95,7 +95,7 @@ Answer efficiency_answer(const Reproduction& of) {
     const double both = scene.gains.het_qm / (scene.gains.quads_het * scene.gains.quads_merging);
     constexpr double nearly_all = 0.9;
     (het >= nearly_all ? bound_by_crop : others)
-        .push_back(fmt::format("{} ({:.0f} and {:.0f} %)", name_of(of, scene), 100 * het, 100 * both));
+        .push_back(fmt::format("{} ({:.0f} and {:.0f} %)", answer_title(of, scene), 100 * het, 100 * both));
   }
   if (!bound_by_crop.empty()) {
     text += fmt::format("CROP bounds all of the frame in {}. ", fmt::join(bound_by_crop, ", "));

@@ -10,10 +10,10 @@
 namespace vrpipe::tools {
 namespace {
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
-Json number(const std::optional<double>& value) { return value ? number(*value) : Json(); }
+Json finite_json(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+Json finite_json(const std::optional<double>& value) { return value ? finite_json(*value) : Json(); }
 Json mean_json(const Mean& mean) {
-  return {{"arithmetic", number(mean.arithmetic)}, {"geometric", number(mean.geometric)}};
+  return {{"arithmetic", finite_json(mean.arithmetic)}, {"geometric", finite_json(mean.geometric)}};
 }
 
 Json row_json(const RowFinding& finding) {
@@ -27,13 +27,13 @@ Json row_json(const RowFinding& finding) {
           {"tolerance_percent", is_number ? Json(row.tolerance_percent) : Json()},
           {"how", row.how},
           {"measured", finding.measured.empty() ? Json() : Json(finding.measured)},
-          {"measured_number", number(finding.number)},
-          {"difference_percent", number(finding.difference_percent)},
+          {"measured_number", finite_json(finding.number)},
+          {"difference_percent", finite_json(finding.difference_percent)},
           {"verdict", name_of(finding.verdict)},
           {"reason", finding.reason.empty() ? Json() : Json(finding.reason)}};
 }
 
-Json run_json(const PointResult& point) {
+Json point_json(const PointResult& point) {
   Json utilization = Json::object();
   for (const auto& [unit, value] : point.run.utilization) utilization[unit] = value;
   return {{"variant", point.run.request.variant.name}, {"cycles", point.run.cycles ? Json(*point.run.cycles) : Json()},
@@ -47,15 +47,15 @@ Json map_json(const PointResult& point) {
   return {{"fragments", point.map->sum}, {"largest", point.map->largest}};
 }
 
-Json scene_json(const Reproduction& of, const SceneFinding& scene) {
+Json finding_json(const Reproduction& of, const SceneFinding& scene) {
   const PlannedScene& planned = of.result.plan.scenes[scene.scene];
   const Gains& gains = scene.gains;
   Json runs = Json::array();
-  for (const PointResult* run : scene.runs) runs.push_back(run_json(*run));
+  for (const PointResult* run : scene.runs) runs.push_back(point_json(*run));
   Json ratios = Json::array(), passes = Json::array();
-  for (const double ratio : scene.ratios) ratios.push_back(number(ratio));
+  for (const double ratio : scene.ratios) ratios.push_back(finite_json(ratio));
   for (std::size_t i = 0; i < scene.passes.size(); ++i) {
-    passes.push_back({{"passes", planned_passes(of.result.plan.quick)[i]}, {"speedup", number(scene.passes[i])}});
+    passes.push_back({{"passes", planned_passes(of.result.plan.quick)[i]}, {"speedup", finite_json(scene.passes[i])}});
   }
   Json json{{"name", planned.name},
             {"scene", planned.request},
@@ -63,17 +63,18 @@ Json scene_json(const Reproduction& of, const SceneFinding& scene) {
             {"gaussians_visible", scene.runs[0]->gaussians_visible},
             {"width", scene.runs[0]->width},
             {"height", scene.runs[0]->height},
-            {"speedup", {{"qm", number(gains.qm)}, {"het", number(gains.het)}, {"het+qm", number(gains.het_qm)}}},
+            {"speedup",
+             {{"qm", finite_json(gains.qm)}, {"het", finite_json(gains.het)}, {"het+qm", finite_json(gains.het_qm)}}},
             {"fragments_blended",
-             {{"het", number(gains.fragments_het)}, {"qm_on_het", number(gains.fragments_merging)}}},
-            {"quads_blended", {{"het", number(gains.quads_het)}, {"qm_on_het", number(gains.quads_merging)}}},
+             {{"het", finite_json(gains.fragments_het)}, {"qm_on_het", finite_json(gains.fragments_merging)}}},
+            {"quads_blended", {{"het", finite_json(gains.quads_het)}, {"qm_on_het", finite_json(gains.quads_merging)}}},
             {"runs", std::move(runs)}};
   if (!planned.is_large) {
     json.update(
         {{"early_termination_ratios", std::move(ratios)},
          {"fragments_per_pixel", {{"without", map_json(*scene.map_without)}, {"with", map_json(*scene.map_with)}}},
          {"passes", std::move(passes)},
-         {"het_beside_passes", number(scene.het_beside_passes)}});
+         {"het_beside_passes", finite_json(scene.het_beside_passes)}});
   }
   return json;
 }
@@ -83,9 +84,9 @@ Json study_json(const StudyPoint& point) {
           {"qm", mean_json(point.qm)},
           {"het", mean_json(point.het)},
           {"het+qm", mean_json(point.het_qm)},
-          {"qm_best", number(point.qm_best)},
-          {"quads_het", number(point.quads_het)},
-          {"quads_het+qm", number(point.quads_het_qm)}};
+          {"qm_best", finite_json(point.qm_best)},
+          {"quads_het", finite_json(point.quads_het)},
+          {"quads_het+qm", finite_json(point.quads_het_qm)}};
 }
 
 }  // namespace
@@ -98,7 +99,7 @@ Json reproduction_json(const Reproduction& of) {
     for (const auto& value : values) json.push_back(make(value));
     return json;
   };
-  const auto scene = [&](const SceneFinding& finding) { return scene_json(of, finding); };
+  const auto scene = [&](const SceneFinding& finding) { return finding_json(of, finding); };
   Json parameters = Json::object();
   for (const auto& [name, value] : of.result.points.front().run.parameters) parameters[name] = value;
   Json studied = Json::array();
@@ -126,7 +127,7 @@ Json reproduction_json(const Reproduction& of) {
                                   return {{"name", finding.parameter.name},
                                           {"base", finding.parameter.base},
                                           {"extent", name_of(ReproducePlan::extent_of(finding.parameter.breadth))},
-                                          {"spread_percent", number(finding.spread_percent)},
+                                          {"spread_percent", finite_json(finding.spread_percent)},
                                           {"default", study_json(finding.at_default)},
                                           {"values", each(finding.values, study_json)}};
                                 })},
@@ -143,9 +144,9 @@ Json reproduction_json(const Reproduction& of) {
           {"fragments_per_quad", each(of.findings.fragments,
                                       [](const FragmentFinding& finding) -> Json {
                                         return {{"what", finding.settings},
-                                                {"fragments", number(finding.fragments)},
-                                                {"quads", number(finding.quads)},
-                                                {"fall_percent", number(finding.fall_percent)}};
+                                                {"fragments", finite_json(finding.fragments)},
+                                                {"quads", finite_json(finding.quads)},
+                                                {"fall_percent", finite_json(finding.fall_percent)}};
                                       })},
           {"microbenchmarks",
            each(of.result.microbenches, [](const MicrobenchResult& result) { return Json(to_json(result)); })},

@@ -9,7 +9,7 @@
 namespace vrpipe::tools {
 namespace {
 
-std::string row_of(const std::vector<std::string>& cells) {
+std::string markdown_row(const std::vector<std::string>& cells) {
   std::string line = "|";
   for (const std::string& cell : cells) {
     line += ' ';
@@ -20,10 +20,10 @@ std::string row_of(const std::vector<std::string>& cells) {
 }
 
 std::string table_markdown(const std::vector<std::string>& heading, const std::vector<std::vector<std::string>>& rows) {
-  std::string text = row_of(heading) + "|";
+  std::string text = markdown_row(heading) + "|";
   for (std::size_t i = 0; i < heading.size(); ++i) text += "---|";
   text += "\n";
-  for (const auto& row : rows) text += row_of(row);
+  for (const auto& row : rows) text += markdown_row(row);
   return text + "\n";
 }
 

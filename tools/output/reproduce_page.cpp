@@ -24,7 +24,7 @@ table.rows td:nth-child(4), table.rows td:nth-child(6) { white-space: nowrap; }
 table.words td:last-child { white-space: normal; text-align: left; }
 )";
 
-std::string table_html(const ReportTable& table) {
+std::string report_table_html(const ReportTable& table) {
   const bool has_words = table.heading.back() == "values";
   std::string text = has_words ? "<table class=\"words\">\n<tr>" : "<div class=\"scroll\"><table>\n<tr>";
   for (const std::string& cell : table.heading) text += "<th>" + html_escaped(cell) + "</th>";
@@ -41,7 +41,7 @@ std::string table_html(const ReportTable& table) {
 
 std::string section(const ReportTable& table, const std::string& plot) {
   if (table.rows.empty()) return {};
-  return "<h2>" + html_escaped(table.title) + "</h2>\n" + plot + table_html(table);
+  return "<h2>" + html_escaped(table.title) + "</h2>\n" + plot + report_table_html(table);
 }
 
 std::string rows_html(const Reproduction& of) {
@@ -64,7 +64,7 @@ std::string rows_html(const Reproduction& of) {
   return text + "</table>\n";
 }
 
-const std::string& name_of(const Reproduction& of, const SceneFinding& scene) {
+const std::string& label_of(const Reproduction& of, const SceneFinding& scene) {
   return of.result.plan.scenes[scene.scene].name;
 }
 
@@ -77,7 +77,7 @@ std::string speedups_plot(const Reproduction& of) {
   for (const auto* scenes : {&of.findings.scenes, &of.findings.large}) {
     for (const SceneFinding& scene : *scenes) {
       const Gains& gains = scene.gains;
-      BarGroup group{name_of(of, scene), {}, {}};
+      BarGroup group{label_of(of, scene), {}, {}};
       group.bars = {{0, gains.qm, colors[1], fmt::format("QM {:.2f}x", gains.qm)},
                     {0, gains.het, colors[2], fmt::format("HET {:.2f}x", gains.het)},
                     {0, gains.het_qm, colors[3], fmt::format("HET+QM {:.2f}x", gains.het_qm)}};
@@ -98,7 +98,7 @@ std::string utilization_plot(const Reproduction& of) {
       const auto& both = scene.runs[3]->run.utilization;
       for (std::size_t i = 0; i < std::min(baseline.size(), both.size()); ++i) {
         if (baseline[i].first == "dram") continue;
-        BarGroup group{name_of(of, scene) + ", " + baseline[i].first, {}, {}};
+        BarGroup group{label_of(of, scene) + ", " + baseline[i].first, {}, {}};
         group.bars = {{0, 100 * baseline[i].second, colors[0], fmt::format("{:.1f} %", 100 * baseline[i].second)},
                       {0, 100 * both[i].second, colors[3], fmt::format("{:.1f} %", 100 * both[i].second)}};
         plot.groups.push_back(std::move(group));
@@ -116,7 +116,7 @@ std::string ratios_plot(const Reproduction& of) {
   for (const SceneFinding& scene : of.findings.scenes) {
     const auto& distribution = scene.ratio_distribution;
     if (!distribution) continue;
-    BarGroup group{name_of(of, scene), {}, {distribution->minimum, distribution->median, distribution->maximum}};
+    BarGroup group{label_of(of, scene), {}, {distribution->minimum, distribution->median, distribution->maximum}};
     group.bars = {{distribution->lower_quartile, distribution->upper_quartile, colors[2],
                    fmt::format("{} views", distribution->count)}};
     plot.groups.push_back(std::move(group));
@@ -160,7 +160,7 @@ std::string maps_html(const Reproduction& of) {
       "ten; left without, right with termination</div>\n<div class=\"cards\">\n",
       smallest_mapped_count, stops, largest_mapped_count);
   for (const SceneFinding& scene : of.findings.scenes) {
-    text += "<figure><figcaption><b>" + html_escaped(name_of(of, scene)) + "</b></figcaption><div class=\"pair\">";
+    text += "<figure><figcaption><b>" + html_escaped(label_of(of, scene)) + "</b></figcaption><div class=\"pair\">";
     for (const PointResult* point : {scene.map_without, scene.map_with}) {
       if (!point->map) continue;
       text += fmt::format("<img alt=\"fragments blended a pixel, {}\" src=\"data:image/png;base64,{}\">",

@@ -10,11 +10,11 @@
 namespace vrpipe::tools {
 namespace {
 
-constexpr std::size_t width = 80;
+constexpr std::size_t page_width = 80;
 
-std::string paragraph(const std::string& text, std::size_t indent = 0) {
+std::string indented(const std::string& text, std::size_t indent = 0) {
   std::string lines;
-  for (const std::string& line : wrapped(text, width - indent)) lines += std::string(indent, ' ') + line + "\n";
+  for (const std::string& line : wrapped(text, page_width - indent)) lines += std::string(indent, ' ') + line + "\n";
   return lines;
 }
 
@@ -32,9 +32,9 @@ std::string row_text(const Reproduction& of, const RowFinding& finding, const Te
   const bool is_short = measured.size() + difference.size() < 30;
   text += (is_short ? measured + (difference.empty() ? "" : ", " + difference) : difference) + "\n";
   constexpr std::size_t indent = 4;
-  text += style.dim(paragraph(fmt::format("{}; paper {}", row.what, row.where), indent));
-  if (!is_short) text += paragraph(measured, indent);
-  if (!finding.reason.empty()) text += paragraph(finding.reason, indent);
+  text += style.dim(indented(fmt::format("{}; paper {}", row.what, row.where), indent));
+  if (!is_short) text += indented(measured, indent);
+  if (!finding.reason.empty()) text += indented(finding.reason, indent);
   return text;
 }
 
@@ -44,10 +44,10 @@ std::string table_text(const ReportTable& table, const TextStyle& style) {
   for (const auto& row : table.rows) text.row(row);
   if (has_words) {
     text.left(table.heading.size() - 1);
-    text.wrap(width + 20);
+    text.wrap(page_width + 20);
   }
   std::string all = style.bold(table.title) + "\n" + text.text(style);
-  if (!table.note.empty()) all += paragraph(table.note);
+  if (!table.note.empty()) all += indented(table.note);
   return all;
 }
 
@@ -55,16 +55,16 @@ std::string table_text(const ReportTable& table, const TextStyle& style) {
 
 std::string reproduction_text(const Reproduction& of, const TextStyle& style) {
   std::string text = style.bold("The paper's results, reproduced") + "\n";
-  for (const std::string& line : reproduction_heading(of)) text += paragraph(line);
+  for (const std::string& line : reproduction_heading(of)) text += indented(line);
   text += "\n";
   for (const RowFinding& row : of.rows) text += row_text(of, row, style);
   text += "\n" + style.bold(verdict_summary(of)) + "\n";
   for (const ReportTable& table : all_tables(of)) text += "\n" + table_text(table, style);
   for (const Answer& answer : answers(of)) {
-    text += "\n" + style.bold(answer.question) + "\n" + paragraph(answer.text);
+    text += "\n" + style.bold(answer.question) + "\n" + indented(answer.text);
   }
   for (const SkippedSetting& skipped : of.result.plan.skipped) {
-    text += paragraph(fmt::format("not tried: {}: {}", skipped.settings, skipped.reason));
+    text += indented(fmt::format("not tried: {}: {}", skipped.settings, skipped.reason));
   }
   return text;
 }

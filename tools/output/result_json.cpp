@@ -22,7 +22,7 @@ namespace vrpipe::tools {
 namespace {
 
 template <class Number>
-Json number(const std::string& text) {
+Json number_or_null(const std::string& text) {
   Number value{};
   const char* const end = text.data() + text.size();
   const std::from_chars_result read = std::from_chars(text.data(), end, value);
@@ -105,7 +105,7 @@ Json origins_json(const Json& parameters, const RunRequest& request, const std::
   return origins;
 }
 
-Json triple(const Vec3& vector) { return {vector.x, vector.y, vector.z}; }
+Json vector_json(const Vec3& vector) { return {vector.x, vector.y, vector.z}; }
 
 Json units_json(const RunResult& run) {
   Json units = Json::array();
@@ -132,15 +132,15 @@ Json value_json(const Statistic& statistic) {
 
 Json histogram_json(const StatisticReport& statistic) {
   if (!statistic.histogram) return {};
-  const auto number = [](const std::optional<std::uint64_t>& value) { return value ? Json(*value) : Json(); };
+  const auto number_or_null = [](const std::optional<std::uint64_t>& value) { return value ? Json(*value) : Json(); };
   Json buckets = Json::array();
   for (const HistogramBucket& bucket : statistic.histogram->buckets) {
-    buckets.push_back({{"from", bucket.from}, {"to", number(bucket.to)}, {"count", bucket.count}});
+    buckets.push_back({{"from", bucket.from}, {"to", number_or_null(bucket.to)}, {"count", bucket.count}});
   }
-  return {{"count", number(statistic.denominator)},
+  return {{"count", number_or_null(statistic.denominator)},
           {"sum", statistic.value},
-          {"smallest", number(statistic.histogram->smallest)},
-          {"largest", number(statistic.histogram->largest)},
+          {"smallest", number_or_null(statistic.histogram->smallest)},
+          {"largest", number_or_null(statistic.histogram->largest)},
           {"buckets", std::move(buckets)}};
 }
 
@@ -247,8 +247,8 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
 }  // namespace
 
 Json typed_value(const Parameter& parameter, const std::string& value) {
-  if (dynamic_cast<const Integer*>(&parameter) != nullptr) return number<std::uint64_t>(value);
-  if (dynamic_cast<const Real*>(&parameter) != nullptr) return number<double>(value);
+  if (dynamic_cast<const Integer*>(&parameter) != nullptr) return number_or_null<std::uint64_t>(value);
+  if (dynamic_cast<const Real*>(&parameter) != nullptr) return number_or_null<double>(value);
   if (dynamic_cast<const Switch*>(&parameter) != nullptr) return value == "on";
   return value;
 }
@@ -270,15 +270,15 @@ Json camera_json(const std::optional<Viewpoint>& viewpoint) {
   if (!viewpoint) return {};
   const auto& [camera, view, file] = *viewpoint;
   const auto column = [&rows = camera.rotation](glm::length_t i) {
-    return triple({rows[0][i], rows[1][i], rows[2][i]});
+    return vector_json({rows[0][i], rows[1][i], rows[2][i]});
   };
   constexpr double degrees = 57.29577951308232;
   return {{"file", file ? Json(file->file) : Json()},
           {"index", file ? Json(file->index) : Json()},
           {"name", file && !file->image.empty() ? Json(file->image) : Json()},
-          {"eye", triple(camera.eye)},
-          {"look_at", view ? triple(view->look_at) : Json()},
-          {"up", view ? triple(view->up) : Json()},
+          {"eye", vector_json(camera.eye)},
+          {"look_at", view ? vector_json(view->look_at) : Json()},
+          {"up", view ? vector_json(view->up) : Json()},
           {"fovy_degrees", 2 * degrees * std::atan(0.5 * camera.height / camera.fy)},
           {"right", column(0)},
           {"down", column(1)},

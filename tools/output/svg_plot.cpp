@@ -12,13 +12,13 @@ namespace vrpipe::tools {
 namespace {
 
 // Pixels of the drawing; the page scales it.
-constexpr double width = 1040;
-constexpr double height = 520;
-constexpr double left = 68;
-constexpr double right = 820;  // the legend is beyond
-constexpr double top = 16;
-constexpr double bottom = 466;
-constexpr double radius = 5.5;
+constexpr double plot_width = 1040;
+constexpr double plot_height = 520;
+constexpr double plot_left = 68;
+constexpr double plot_right = 820;  // the legend is beyond
+constexpr double plot_top = 16;
+constexpr double plot_bottom = 466;
+constexpr double plot_radius = 5.5;
 constexpr double character_width = 7.4;
 constexpr double line_height = 14;
 
@@ -46,9 +46,9 @@ struct Segment {
 };
 
 /// From values to pixels.
-class Scale {
+class PlotScale {
  public:
-  Scale(const PlotAxis& axis, const std::vector<double>& values, double from, double to)
+  PlotScale(const PlotAxis& axis, const std::vector<double>& values, double from, double to)
       : logarithmic_(axis.logarithmic), from_(from), to_(to) {
     double least = std::numeric_limits<double>::infinity();
     double largest = -least;
@@ -116,7 +116,7 @@ std::string marker_shape(Marker marker, double x, double y, const std::string& s
     points.pop_back();
     return fmt::format("<polygon points=\"{}\" {}>{}</polygon>\n", points, style, title);
   };
-  constexpr double r = radius;
+  constexpr double r = plot_radius;
   switch (marker) {
     case Marker::circle:
       return fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" {}>{}</circle>\n", x, y, r, style, title);
@@ -163,57 +163,58 @@ std::vector<Place> places() {
   return all;
 }
 
-Box label_box(double x, double y, const Place& place, double text_width) {
+Box label_box(double x, double y, const Place& place, double width_of_label) {
   const double at = x + place.dx;
   const std::string anchor = place.anchor;
-  const double x0 = anchor == "start" ? at : anchor == "end" ? at - text_width : at - text_width / 2;
-  return {x0, y + place.dy - line_height / 2, x0 + text_width, y + place.dy + line_height / 2};
+  const double x0 = anchor == "start" ? at : anchor == "end" ? at - width_of_label : at - width_of_label / 2;
+  return {x0, y + place.dy - line_height / 2, x0 + width_of_label, y + place.dy + line_height / 2};
 }
 
-std::string axes(const Plot& plot, const Scale& x, const Scale& y) {
+std::string axes(const Plot& plot, const PlotScale& x, const PlotScale& y) {
   std::string text;
   double last = -1e9;
   for (const double tick : x.ticks()) {
-    text += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\" class=\"grid\"/>\n", x(tick), top,
-                        bottom);
+    text += fmt::format("<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\" class=\"grid\"/>\n", x(tick),
+                        plot_top, plot_bottom);
     const std::string label = fmt::format("{:.6g}", tick);
     if (x(tick) - last < character_width * static_cast<double>(label.size()) + 14) continue;
     last = x(tick);
-    text += fmt::format("<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n", x(tick), bottom + 18, label);
+    text +=
+        fmt::format("<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n", x(tick), plot_bottom + 18, label);
   }
   last = 1e9;
   for (const double tick : y.ticks()) {
-    text += fmt::format("<line x1=\"{1}\" x2=\"{2}\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" class=\"grid\"/>\n", y(tick), left,
-                        right);
+    text += fmt::format("<line x1=\"{1}\" x2=\"{2}\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" class=\"grid\"/>\n", y(tick),
+                        plot_left, plot_right);
     if (last - y(tick) < line_height) continue;
     last = y(tick);
     const double shown = std::fabs(tick) < 1e-12 ? 0 : tick;
-    text +=
-        fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{:.6g}</text>\n", left - 8, y(tick) + 4, shown);
+    text += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{:.6g}</text>\n", plot_left - 8, y(tick) + 4,
+                        shown);
   }
-  text += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"frame\"/>\n", left, top, right - left,
-                      bottom - top);
-  text += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"middle\" class=\"axis\">{}</text>\n", (left + right) / 2,
-                      bottom + 42, html_escaped(plot.x.title));
+  text += fmt::format("<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" class=\"frame\"/>\n", plot_left, plot_top,
+                      plot_right - plot_left, plot_bottom - plot_top);
+  text += fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"middle\" class=\"axis\">{}</text>\n",
+                      (plot_left + plot_right) / 2, plot_bottom + 42, html_escaped(plot.x.title));
   text +=
       fmt::format("<text transform=\"translate(16 {}) rotate(-90)\" text-anchor=\"middle\" class=\"axis\">{}</text>\n",
-                  (top + bottom) / 2, html_escaped(plot.y.title));
+                  (plot_top + plot_bottom) / 2, html_escaped(plot.y.title));
   return text;
 }
 
 std::string legend_text(const std::vector<LegendEntry>& legend) {
   std::string text;
-  double y = top + 10;
+  double y = plot_top + 10;
   for (const LegendEntry& entry : legend) {
     if (entry.is_line) {
       text += fmt::format(
           "<line x1=\"{}\" x2=\"{}\" y1=\"{}\" y2=\"{}\" stroke=\"{}\" stroke-width=\"1.5\" stroke-dasharray=\"5 "
           "4\"/>\n",
-          right + 16, right + 36, y, y, entry.color);
+          plot_right + 16, plot_right + 36, y, y, entry.color);
     } else {
-      text += marker_shape(entry.marker, right + 26, y, marker_style(entry.color, entry.hollow), "");
+      text += marker_shape(entry.marker, plot_right + 26, y, marker_style(entry.color, entry.hollow), "");
     }
-    text += fmt::format("<text x=\"{}\" y=\"{}\">{}</text>\n", right + 44, y + 4, html_escaped(entry.text));
+    text += fmt::format("<text x=\"{}\" y=\"{}\">{}</text>\n", plot_right + 44, y + 4, html_escaped(entry.text));
     y += 21;
   }
   return text;
@@ -250,12 +251,12 @@ std::string svg(const Plot& plot) {
     xs.push_back(point.x);
     ys.push_back(point.y);
   }
-  const Scale x(plot.x, xs, left, right);
-  const Scale y(plot.y, ys, bottom, top);
+  const PlotScale x(plot.x, xs, plot_left, plot_right);
+  const PlotScale y(plot.y, ys, plot_bottom, plot_top);
 
   std::string text =
       fmt::format("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\" xmlns=\"http://www.w3.org/2000/svg\">\n",
-                  width, height, html_escaped(plot.description));
+                  plot_width, plot_height, html_escaped(plot.description));
   text += axes(plot, x, y);
   std::vector<Segment> segments;
   for (const PlotLine& line : plot.lines) {
@@ -271,7 +272,7 @@ std::string svg(const Plot& plot) {
 
   std::vector<Box> taken;
   for (const PlotPoint& point : plot.points) {
-    const double reach = radius + 2;
+    const double reach = plot_radius + 2;
     taken.push_back({x(point.x) - reach, y(point.y) - reach, x(point.x) + reach, y(point.y) + reach});
   }
   const std::vector<Place> candidates = places();
@@ -280,25 +281,26 @@ std::string svg(const Plot& plot) {
     const double px = x(point.x);
     const double py = y(point.y);
     const auto is_here = [&](const PlotPoint& other) {
-      return std::fabs(x(other.x) - px) < radius && std::fabs(y(other.y) - py) < radius;
+      return std::fabs(x(other.x) - px) < plot_radius && std::fabs(y(other.y) - py) < plot_radius;
     };
     const bool covered = &*std::find_if(plot.points.begin(), plot.points.end(), is_here) != &point;
     if (point.label.empty() || covered) continue;
-    const double text_width = character_width * static_cast<double>(point.label.size()) + 2;
+    const double width_of_label = character_width * static_cast<double>(point.label.size()) + 2;
     const auto is_free = [&](const Place& place) {
-      const Box box = label_box(px, py, place, text_width);
-      if (box.x0 < left + 2 || box.x1 > right - 2 || box.y0 < top + 2 || box.y1 > bottom - 2) return false;
+      const Box box = label_box(px, py, place, width_of_label);
+      if (box.x0 < plot_left + 2 || box.x1 > plot_right - 2 || box.y0 < plot_top + 2 || box.y1 > plot_bottom - 2)
+        return false;
       return std::none_of(taken.begin(), taken.end(), [&](const Box& other) { return box.overlaps(other); });
     };
     const auto is_clear = [&](const Place& place) {
-      const Box box = label_box(px, py, place, text_width);
+      const Box box = label_box(px, py, place, width_of_label);
       return is_free(place) &&
              std::none_of(segments.begin(), segments.end(), [&](const Segment& line) { return line.crosses(box); });
     };
     auto place = std::find_if(candidates.begin(), candidates.end(), is_clear);
     if (place == candidates.end()) place = std::find_if(candidates.begin(), candidates.end(), is_free);
     if (place == candidates.end()) continue;
-    taken.push_back(label_box(px, py, *place, text_width));
+    taken.push_back(label_box(px, py, *place, width_of_label));
     if (std::max(std::fabs(place->dx), std::fabs(place->dy)) > 14) {
       labels += fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" class=\"leader\"/>\n", px,
                             py, px + place->dx, py + place->dy);

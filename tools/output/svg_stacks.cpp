@@ -12,12 +12,12 @@ namespace vrpipe::tools {
 namespace {
 
 // Pixels of the drawing; the page scales it.
-constexpr double width = 1040;
-constexpr double left = 260;
-constexpr double right = 840;  // notes stand behind it
-constexpr double bar_height = 15;
-constexpr double bar_step = 18;
-constexpr double group_gap = 10;
+constexpr double stacks_width = 1040;
+constexpr double stacks_left = 260;
+constexpr double stacks_right = 840;  // notes stand behind it
+constexpr double stacks_bar_height = 15;
+constexpr double stacks_bar_step = 18;
+constexpr double stacks_group_gap = 10;
 
 bool is_drawn(double value) { return std::isfinite(value) && value > 0; }
 
@@ -53,7 +53,7 @@ std::string svg_legend(const std::string& id, const std::vector<std::pair<std::s
 
 std::string svg(const StackPlot& plot) {
   const double end = end_of_scale(plot);
-  const auto x = [&](double value) { return left + value / end * (right - left); };
+  const auto x = [&](double value) { return stacks_left + value / end * (stacks_right - stacks_left); };
   const double top = plot.kinds.size() > 1 ? 34 : 10;  // below a legend
   std::string body;
   double y = top;
@@ -63,7 +63,7 @@ std::string svg(const StackPlot& plot) {
                           html_escaped(group.title));
     }
     for (const StackedBar& bar : group.bars) {
-      body += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", left - 8, y + 12,
+      body += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", stacks_left - 8, y + 12,
                           html_escaped(bar.label));
       double from = 0;
       for (std::size_t kind = 0; kind < bar.values.size(); ++kind) {
@@ -72,7 +72,7 @@ std::string svg(const StackPlot& plot) {
         body += fmt::format(
             "<rect x=\"{:.2f}\" y=\"{:.1f}\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\" class=\"piece\">"
             "<title>{}: {} {:.4g}</title></rect>\n",
-            x(from), y, x(from + value) - x(from), bar_height, fill_text(plot.id, plot.kinds[kind].second),
+            x(from), y, x(from + value) - x(from), stacks_bar_height, fill_text(plot.id, plot.kinds[kind].second),
             html_escaped((group.title.empty() ? "" : group.title + ", ") + bar.label),
             html_escaped(plot.kinds[kind].first), value);
         from += value;
@@ -81,15 +81,15 @@ std::string svg(const StackPlot& plot) {
         body += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" class=\"label\">{}</text>\n", x(from) + 7, y + 12,
                             html_escaped(bar.note));
       }
-      y += bar_step;
+      y += stacks_bar_step;
     }
-    y += group_gap;
+    y += stacks_group_gap;
   }
   std::string text = fmt::format(
-      "<svg viewBox=\"0 0 {} {:.0f}\" role=\"img\" aria-label=\"{}\" xmlns=\"http://www.w3.org/2000/svg\">\n", width,
-      y + 40, html_escaped(plot.description));
+      "<svg viewBox=\"0 0 {} {:.0f}\" role=\"img\" aria-label=\"{}\" xmlns=\"http://www.w3.org/2000/svg\">\n",
+      stacks_width, y + 40, html_escaped(plot.description));
   text += fill_definitions(plot.id);
-  if (plot.kinds.size() > 1) text += svg_legend(plot.id, plot.kinds, left, 12);
+  if (plot.kinds.size() > 1) text += svg_legend(plot.id, plot.kinds, stacks_left, 12);
   const double step = nice_step(end / 6);
   for (double k = 0; k * step <= end * 1.0001; ++k) {
     text += fmt::format(
@@ -104,7 +104,7 @@ std::string svg(const StackPlot& plot) {
         x(*plot.line), top - 6, y);
   }
   text += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"middle\" class=\"axis\">{}</text>\n",
-                      (left + right) / 2, y + 33, html_escaped(plot.axis));
+                      (stacks_left + stacks_right) / 2, y + 33, html_escaped(plot.axis));
   return text + "</svg>\n";
 }
 

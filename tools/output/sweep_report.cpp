@@ -7,6 +7,7 @@
 #include <vrpipe/component/printable.h>
 
 #include "output/json_text.h"
+#include "output/page_parts.h"
 #include "output/report.h"
 #include "output/text_table.h"
 
@@ -25,12 +26,7 @@ std::string cell_text(const Json& value) {
 
 std::string csv_cell(const Json& value) {
   if (value.is_null()) return {};
-  if (!value.is_string()) return value.dump();
-  std::string text = value.get<std::string>();
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
+  return value.is_string() ? csv_text(value.get<std::string>()) : value.dump();
 }
 
 std::string effects_text(const SweepFindings& findings, const TextStyle& style) {

@@ -9,7 +9,7 @@ namespace vrpipe::tools {
 
 namespace {
 
-struct Range {
+struct AxisRange {
   double from = INFINITY;
   double to = -INFINITY;
   void add(double value) {
@@ -26,8 +26,8 @@ struct Range {
 }  // namespace
 
 std::string text_plot(const std::vector<TextSeries>& series, unsigned width, unsigned height) {
-  Range x;
-  Range y;
+  AxisRange x;
+  AxisRange y;
   y.add(0);
   for (const TextSeries& each : series) {
     for (const auto& [px, py] : each.points) {

@@ -6,13 +6,12 @@
 #include <vector>
 
 #include "jobs/comparison.h"
+#include "jobs/optional_json.h"
 
 namespace vrpipe::tools {
 namespace {
 
-Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
-
-Json run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
+Json view_run_json(const RunResult& run, const std::optional<ImageFiles>& images) {
   const bool timed = run.cycles.has_value();
   return {{"variant", run.request.variant.name},
           {"name", name_of(run.request)},
@@ -37,7 +36,7 @@ Json view_json(const ViewResult& view, std::size_t baseline) {
   Json runs = Json::array();
   Json speedups = Json::object();
   for (std::size_t i = 0; i < view.runs.size(); ++i) {
-    runs.push_back(run_json(view.runs[i], view.images[i]));
+    runs.push_back(view_run_json(view.runs[i], view.images[i]));
     if (i == baseline) continue;
     speedups[name_of(view.runs[i].request)] = optional_json(speedup(view.runs[baseline], view.runs[i]));
   }

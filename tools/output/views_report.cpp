@@ -19,7 +19,7 @@
 namespace vrpipe::tools {
 namespace {
 
-std::string times(const std::optional<double>& ratio, const char* suffix) {
+std::string view_ratio(const std::optional<double>& ratio, const char* suffix) {
   return ratio ? fmt::format("{:.2f}{}", *ratio, suffix) : std::string("-");
 }
 
@@ -32,7 +32,7 @@ std::string count_of(std::size_t count, const char* what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
 
-std::string heading(const ViewsResult& result, const TextStyle& style) {
+std::string views_heading(const ViewsResult& result, const TextStyle& style) {
   const auto size_of = [](const ViewResult& view) {
     return fmt::format("{}x{}", view.viewpoint.camera.width, view.viewpoint.camera.height);
   };
@@ -55,7 +55,7 @@ void add_distribution(TextTable& table, const std::string& name, const std::opti
   if (of) {
     for (const double value :
          {of->minimum, of->lower_quartile, of->median, of->upper_quartile, of->maximum, of->geometric_mean}) {
-      cells.push_back(times(value, suffix));
+      cells.push_back(view_ratio(value, suffix));
     }
     for (const std::size_t view : {of->least, of->most}) cells.push_back(std::to_string(result.views[view].index));
   } else {
@@ -104,17 +104,17 @@ std::string views(const ViewsResult& result, const TextStyle& style) {
       const RunResult& baseline = view.runs[result.baseline];
       cells.push_back(grouped(baseline.cycles.value_or(0)));
       for (const RunResult& run : view.runs) {
-        if (&run != &baseline) cells.push_back(times(speedup(baseline, run), "x"));
+        if (&run != &baseline) cells.push_back(view_ratio(speedup(baseline, run), "x"));
       }
     }
-    cells.push_back(times(early_termination_ratio(view.runs), ""));
+    cells.push_back(view_ratio(early_termination_ratio(view.runs), ""));
     table.row(std::move(cells));
   }
   return table.text(style);
 }
 
 /// Where cycles may be farther off than the documentation says, and in how many views.
-std::string validated_text(const ViewsResult& result) {
+std::string views_validated_text(const ViewsResult& result) {
   std::map<std::string, std::size_t> reasons;
   for (const ViewResult& view : result.views) {
     for (const std::string& reason : view.runs.front().outside_validated_range) ++reasons[reason];
@@ -127,14 +127,14 @@ std::string validated_text(const ViewsResult& result) {
   return text;
 }
 
-std::string remarks(const ViewsResult& result) {
+std::string view_remarks(const ViewsResult& result) {
   std::string text =
       "quartiles are interpolated between views; the ratio is that of fragments blended without over with "
       "termination\n";
   std::size_t empty = 0;
   for (const ViewResult& view : result.views) empty += view.runs.front().counts.fragments_rasterized == 0 ? 1U : 0U;
   if (empty > 0) text += fmt::format("{} with nothing visible, without speed-up and ratio\n", count_of(empty, "view"));
-  text += validated_text(result);
+  text += views_validated_text(result);
   for (const std::string& note : result.views.front().scene.notes) text += "note: " + printable(note) + "\n";
   text += fmt::format("took {:.1f} s to load the scene, {:.1f} s to simulate {}", result.load_seconds,
                       result.simulate_seconds, count_of(result.views.size() - result.done_before, "view"));
@@ -154,7 +154,8 @@ std::string remarks(const ViewsResult& result) {
 }  // namespace
 
 std::string views_report(const ViewsResult& result, const TextStyle& style) {
-  return heading(result, style) + distributions(result, style) + "\n" + views(result, style) + "\n" + remarks(result);
+  return views_heading(result, style) + distributions(result, style) + "\n" + views(result, style) + "\n" +
+         view_remarks(result);
 }
 
 }  // namespace vrpipe::tools
