@@ -3,7 +3,7 @@
 
 #include <vrpipe/pipeline/registry.h>
 
-#include "support/fidelities.h"
+#include "crop/marked_crop_bench.h"
 
 namespace vrpipe {
 namespace {
@@ -11,8 +11,8 @@ namespace {
 using testing::color_of;
 using testing::context_of;
 using testing::geometry_of;
+using testing::MarkedCropBench;
 using testkit::Bench;
-using testkit::Source;
 
 DrawState terminated_at(float threshold, bool on = true) {
   DrawState state;
@@ -189,51 +189,6 @@ class CropMarksTest : public ::testing::TestWithParam<Fidelity> {};
 INSTANTIATE_TEST_SUITE_P(Fidelities, CropMarksTest, ::testing::ValuesIn(testing::fidelities_with_time()),
                          testing::name_of_fidelity);
 
-/// CROP with a slow memory and a source of warps of one quad.
-struct CropBench {
-  CropBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {})
-      : bench(fidelity, "crop", "color-rop", context, settings),
-        signals(bench.sink<TerminationBeat>("out_terminations", 64)) {
-    bench.set_memory(300, 4);
-    if (fidelity == Fidelity::cycle) {
-      beats = &bench.source<ColorBeat>("in_color", 7);
-    } else {
-      items = &bench.source<ShadedWarpItem>("in_color", 7);
-    }
-  }
-  void quad(DrawIndex draw, TileId tile, unsigned position, float alpha) {
-    ShadedWarp& warp = pool.take();
-    warp.tile = tile;
-    warp.count = 1;
-    warp.mark = Mark::none;
-    warp.position[0] = static_cast<std::uint8_t>(position);
-    warp.live[0] = all_lanes;
-    warp.first_primitive[0] = warp.last_primitive[0] = next_primitive++;
-    warp.draw[0] = draw;
-    warp.color[0] = color_of(alpha, alpha, alpha, alpha);
-    ColorBeat beat;
-    beat.count = 1;
-    beat.quads[0] = {&warp, 0};
-    if (items != nullptr) items->add({&warp});
-    if (beats != nullptr) beats->add(beat);
-  }
-  void mark(Mark mark) {
-    ShadedWarp& warp = pool.take();
-    warp.count = 0;
-    warp.mark = mark;
-    ColorBeat beat;
-    beat.mark = mark;
-    if (items != nullptr) items->add({&warp});
-    if (beats != nullptr) beats->add(beat);
-  }
-  Bench bench;
-  testkit::Sink<TerminationBeat>& signals;
-  Source<ShadedWarpItem>* items = nullptr;
-  Source<ColorBeat>* beats = nullptr;
-  ShadedWarpPool pool;
-  std::uint32_t next_primitive = 0;
-};
-
 /// Draws with a clear of colour between each two: draw n is command 2 n.
 RenderContext cleared_between(unsigned draws, const DrawState& state = {}) {
   Frame frame(256, 256);
@@ -251,7 +206,7 @@ TEST_P(CropMarksTest, AClearWaitsForAllBlendsBeforeItAndNothingBehindItIsBlended
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
     Bench::Settings settings;
     if (seed % 2 == 0) settings = {{"cache_bytes", "1024"}, {"input_quads", "4"}, {"mshrs", "2"}};
-    CropBench crop(GetParam(), cleared_between(draws), settings);
+    MarkedCropBench crop(GetParam(), cleared_between(draws), settings);
     // What the last draw leaves: its own blends alone.
     std::vector<float> last(256);
     for (DrawIndex draw = 0; draw < draws; ++draw) {
@@ -276,7 +231,8 @@ TEST_P(CropMarksTest, AClearWaitsForAllBlendsBeforeItAndNothingBehindItIsBlended
 }
 
 TEST_P(CropMarksTest, ASignalHasTheEpochOfItsDraw) {
-  CropBench crop(GetParam(), cleared_between(3, terminated_at(0.5F)));
+  MarkedCropBench crop(GetParam(), cleared_between(3, terminated_at(0.5F)));
+  const testkit::Sink<TerminationBeat>& signals = crop.bench.sink<TerminationBeat>("out_terminations", 64);
   crop.quad(0, {0, 0}, 1, 0.6F);
   crop.mark(Frame::mark_of(1));
   crop.quad(1, {0, 0}, 2, 0.6F);
@@ -285,7 +241,7 @@ TEST_P(CropMarksTest, ASignalHasTheEpochOfItsDraw) {
   crop.mark(Mark::end_of_frame);
   crop.bench.run();
   std::vector<std::pair<unsigned, unsigned>> seen;  // position and epoch
-  for (const auto& record : crop.signals.records()) {
+  for (const auto& record : signals.records()) {
     for (unsigned i = 0; i < record.item.count; ++i) {
       seen.emplace_back(record.item.signals[i].position, record.item.signals[i].epoch);
     }
@@ -294,7 +250,7 @@ TEST_P(CropMarksTest, ASignalHasTheEpochOfItsDraw) {
 }
 
 TEST_P(CropMarksTest, QuadsBehindAClearFillTheirSectorsWhileThoseBeforeItWaitForTheirs) {
-  CropBench crop(GetParam(), cleared_between(6));
+  MarkedCropBench crop(GetParam(), cleared_between(6));
   for (DrawIndex draw = 0; draw < 6; ++draw) {
     if (draw > 0) crop.mark(Frame::mark_of(2 * std::size_t{draw} - 1));
     crop.quad(draw, {draw, 0}, 0, 0.5F);
@@ -306,7 +262,7 @@ TEST_P(CropMarksTest, QuadsBehindAClearFillTheirSectorsWhileThoseBeforeItWaitFor
 }
 
 TEST_P(CropMarksTest, ClearsAloneEndTheFrame) {
-  CropBench crop(GetParam(), cleared_between(3));
+  MarkedCropBench crop(GetParam(), cleared_between(3));
   crop.mark(Frame::mark_of(1));
   crop.mark(Frame::mark_of(3));
   crop.mark(Mark::end_of_frame);

@@ -13,7 +13,7 @@ using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
-using CropBench = testing::TimedCropBench;
+using testing::TimedCropBench;
 
 class CropTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
@@ -31,7 +31,7 @@ TEST_P(CropTimedTest, ResidentQuadsBlendAtTheRateOfTheFormat) {
                                                       {ColorFormat::rgba32f, 1}};
   for (const auto& [format, rate] : formats) {
     context.format = format;
-    CropBench crop(GetParam(), context, {{"latency_cycles", "8"}});
+    TimedCropBench crop(GetParam(), context, {{"latency_cycles", "8"}});
     for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i % 2 + 8 * (i / 2 % 2));
     for (unsigned i = 0; i < 400; ++i) crop.quad({0, 0}, i % 2 + 8 * (i / 2 % 2), 0.01F, 0b0110, 1000);
     // In hand and in the queue from 1001 on, blended from 1002 on; 8 cycles of latency behind the last.
@@ -42,7 +42,7 @@ TEST_P(CropTimedTest, ResidentQuadsBlendAtTheRateOfTheFormat) {
 }
 
 TEST_P(CropTimedTest, AMissWaitsForTheMemoryAndAHitDoesNot) {
-  CropBench crop(GetParam(), context, {{"latency_cycles", "8"}, {"sectors_per_cycle", "8"}}, 100);
+  TimedCropBench crop(GetParam(), context, {{"latency_cycles", "8"}, {"sectors_per_cycle", "8"}}, 100);
   crop.quad({0, 0}, 0);
   crop.flush();
   // In hand at 1, its sector asked for at 1, there at 101, blended then.
@@ -53,7 +53,7 @@ TEST_P(CropTimedTest, AMissWaitsForTheMemoryAndAHitDoesNot) {
 }
 
 TEST_P(CropTimedTest, FillsOfAWarpAndOfThoseBehindItOverlap) {
-  CropBench crop(GetParam(), context, {{"latency_cycles", "8"}, {"sectors_per_cycle", "8"}}, 100);
+  TimedCropBench crop(GetParam(), context, {{"latency_cycles", "8"}, {"sectors_per_cycle", "8"}}, 100);
   for (unsigned i = 0; i < 64; ++i) crop.quad({0, 0}, i);
   // One latency, 32 cycles of blending and 8 of moving sectors. A warp is blended once the sectors of all its quads are
   // there, which it asks for in its last cycle.
@@ -65,14 +65,14 @@ TEST_P(CropTimedTest, FillsOfAWarpAndOfThoseBehindItOverlap) {
 }
 
 TEST_P(CropTimedTest, QuadsInTheSameSectorAskForItOnce) {
-  CropBench crop(GetParam(), context);
+  TimedCropBench crop(GetParam(), context);
   for (unsigned i = 0; i < 20; ++i) crop.quad({0, 0}, 5);
   crop.run();
   EXPECT_EQ(crop.memory.bytes(), 32U);
 }
 
 TEST_P(CropTimedTest, MovingSectorsTakesCyclesFromBlending) {
-  CropBench crop(GetParam(), context, {{"sectors_per_cycle", "8"}, {"cache_bytes", "1048576"}}, 20);
+  TimedCropBench crop(GetParam(), context, {{"sectors_per_cycle", "8"}, {"cache_bytes", "1048576"}}, 20);
   for (std::uint16_t tile = 0; tile < 64; ++tile) {
     for (unsigned i = 0; i < 64; ++i) crop.quad({tile, 0}, i);
   }
@@ -84,7 +84,7 @@ TEST_P(CropTimedTest, MovingSectorsTakesCyclesFromBlending) {
 
 TEST_P(CropTimedTest, NoMoreFillsAreInFlightThanItHasMissRegisters) {
   for (const unsigned mshrs : {1U, 2U, 4U, 8U}) {
-    CropBench crop(GetParam(), context, {{"mshrs", std::to_string(mshrs)}, {"latency_cycles", "8"}}, 100);
+    TimedCropBench crop(GetParam(), context, {{"mshrs", std::to_string(mshrs)}, {"latency_cycles", "8"}}, 100);
     for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i);
     // A round of the memory for each so many sectors, each from the cycle in which the one before is complete; the first
     // begins in cycles 1 to 4 as the quads come, two a cycle.
@@ -98,7 +98,7 @@ TEST_P(CropTimedTest, NoMoreFillsAreInFlightThanItHasMissRegisters) {
 /// Sectors missed when so many lines, one quad each, are drawn in turn, so many rounds.
 std::uint64_t misses_of_rounds(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings,
                                unsigned lines, unsigned rounds, std::vector<unsigned> order = {}) {
-  CropBench crop(fidelity, context, settings);
+  TimedCropBench crop(fidelity, context, settings);
   if (order.empty()) {
     for (unsigned line = 0; line < lines; ++line) order.push_back(line);
   }
@@ -145,7 +145,7 @@ TEST_P(CropTimedTest, LinesOfOneSetMissInACacheOfFewWays) {
 }
 
 TEST_P(CropTimedTest, AFillIsSeenToTakeAsLongAsTheMemory) {
-  CropBench crop(GetParam(), context, {}, 77);
+  TimedCropBench crop(GetParam(), context, {}, 77);
   for (unsigned i = 0; i < 10; ++i) crop.quad({static_cast<std::uint16_t>(i), 0}, 0);
   crop.run();
   const Histogram& fills = crop.bench.behaviour<CropBehaviour>().cache_statistics.fill_cycles;
@@ -161,7 +161,7 @@ TEST_P(CropTimedTest, AFillIsSeenToTakeAsLongAsTheMemory) {
 
 TEST_P(CropTimedTest, WithoutForwardingAQuadWaitsForTheOneBeforeAtItsPosition) {
   for (const bool forwarding : {true, false}) {
-    CropBench crop(GetParam(), context, {{"forwarding", forwarding ? "on" : "off"}, {"latency_cycles", "8"}});
+    TimedCropBench crop(GetParam(), context, {{"forwarding", forwarding ? "on" : "off"}, {"latency_cycles", "8"}});
     crop.quad({0, 0}, 0);
     crop.flush();
     for (unsigned i = 0; i < 96; ++i) crop.quad({0, 0}, 0, 0.01F, all_lanes, 1000);
@@ -174,7 +174,7 @@ TEST_P(CropTimedTest, WithoutForwardingAQuadWaitsForTheOneBeforeAtItsPosition) {
 
 // case B10
 TEST_P(CropTimedTest, WithoutForwardingOtherPositionsDoNotWait) {
-  CropBench crop(GetParam(), context, {{"forwarding", "off"}, {"latency_cycles", "8"}});
+  TimedCropBench crop(GetParam(), context, {{"forwarding", "off"}, {"latency_cycles", "8"}});
   for (unsigned i = 0; i < 64; ++i) crop.quad({0, 0}, i);
   for (unsigned i = 0; i < 256; ++i) crop.quad({0, 0}, i % 64, 0.01F, all_lanes, 1000);
   EXPECT_EQ(crop.run(), 1001U + 128 + 8);
@@ -183,7 +183,7 @@ TEST_P(CropTimedTest, WithoutForwardingOtherPositionsDoNotWait) {
 TEST_P(CropTimedTest, ATerminationIsSeenTheLatencyAfterItsBlend) {
   testing::terminate_early(context);
   for (const unsigned latency : {1U, 8U}) {
-    CropBench crop(GetParam(), context, {{"latency_cycles", std::to_string(latency)}});
+    TimedCropBench crop(GetParam(), context, {{"latency_cycles", std::to_string(latency)}});
     crop.quad({2, 1}, 9, 0.5F);
     crop.flush();
     crop.quad({2, 1}, 9, 0.999F, 0b0101, 1000);
@@ -201,7 +201,7 @@ TEST_P(CropTimedTest, ATerminationIsSeenTheLatencyAfterItsBlend) {
 
 TEST_P(CropTimedTest, TheSignalsOfAWarpComeNoLaterThanTheLatencyAfterItsLastBlend) {
   testing::terminate_early(context);
-  CropBench crop(GetParam(), context, {{"latency_cycles", "8"}});
+  TimedCropBench crop(GetParam(), context, {{"latency_cycles", "8"}});
   for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i, 0.5F);
   for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i, 0.999F, all_lanes, 1000);
   crop.run();
@@ -218,7 +218,7 @@ TEST_P(CropTimedTest, TheSignalsOfAWarpComeNoLaterThanTheLatencyAfterItsLastBlen
 
 TEST_P(CropTimedTest, SignalsThatNobodyTakesStopTheBlending) {
   testing::terminate_early(context);
-  CropBench crop(GetParam(), context, {{"latency_cycles", "1"}}, 2, 8, 1);
+  TimedCropBench crop(GetParam(), context, {{"latency_cycles", "1"}}, 2, 8, 1);
   crop.signals.close(0, 500);
   for (unsigned i = 0; i < 8; ++i) {
     crop.quad({0, 0}, i, 0.999F);
@@ -233,13 +233,13 @@ TEST_P(CropTimedTest, SignalsThatNobodyTakesStopTheBlending) {
 
 // case T05
 TEST_P(CropTimedTest, AnEmptyDrawEndsWithItsMark) {
-  CropBench crop(GetParam(), context);
+  TimedCropBench crop(GetParam(), context);
   EXPECT_EQ(crop.run(), 1U);
 }
 
 TEST_P(CropTimedTest, DirtySectorsAreWrittenBackWhenTheirLineGoesAndCleanOnesAreNot) {
   for (const bool changes : {true, false}) {
-    CropBench crop(GetParam(), context, {{"cache_bytes", "1024"}}, 10);  // 8 lines, 32 quads
+    TimedCropBench crop(GetParam(), context, {{"cache_bytes", "1024"}}, 10);  // 8 lines, 32 quads
     for (std::uint16_t tile = 0; tile < 4; ++tile) {
       for (unsigned i = 0; i < 64; ++i) crop.quad({tile, 0}, i, changes ? 0.5F : 0.0F);
     }
@@ -252,7 +252,7 @@ TEST_P(CropTimedTest, DirtySectorsAreWrittenBackWhenTheirLineGoesAndCleanOnesAre
 TEST_P(CropTimedTest, ALineIsNotReplacedBeforeItsQuadsAreBlended) {
   // One line, memory of 100 cycles: every second warp needs another, and a fill can only begin once the quads before are
   // blended.
-  CropBench crop(GetParam(), context, {{"cache_bytes", "128"}, {"latency_cycles", "8"}}, 100);
+  TimedCropBench crop(GetParam(), context, {{"cache_bytes", "128"}, {"latency_cycles", "8"}}, 100);
   for (std::uint16_t i = 0; i < 6; ++i) {
     crop.quad({static_cast<std::uint16_t>(i % 2), 0}, 0);
     crop.flush();
@@ -269,12 +269,12 @@ TEST_P(CropTimedTest, ImageAndSignalsAreThoseOfCycleUnderAnyStallsAndMemory) {
   std::vector<float> expected;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     // What is to come out is what cycle makes of it undisturbed.
-    CropBench crop(seed == 0 ? Fidelity::cycle : GetParam(), context,
-                   {{"cache_bytes", seed % 2 == 0 ? "1024" : "16384"},
-                    {"mshrs", seed % 3 == 0 ? "2" : "16"},
-                    {"input_quads", seed % 5 == 0 ? "1" : "64"}},
-                   static_cast<unsigned>(2 + seed * 7 % 300), static_cast<unsigned>(1 + seed % 10),
-                   static_cast<unsigned>(1 + seed % 9));
+    TimedCropBench crop(seed == 0 ? Fidelity::cycle : GetParam(), context,
+                        {{"cache_bytes", seed % 2 == 0 ? "1024" : "16384"},
+                         {"mshrs", seed % 3 == 0 ? "2" : "16"},
+                         {"input_quads", seed % 5 == 0 ? "1" : "64"}},
+                        static_cast<unsigned>(2 + seed * 7 % 300), static_cast<unsigned>(1 + seed % 10),
+                        static_cast<unsigned>(1 + seed % 9));
     for (std::uint64_t i = 0; i < 600; ++i) {
       crop.quad({static_cast<std::uint16_t>(mix(i / 5) % 3), 0}, static_cast<unsigned>(mix(i + 999) % 64),
                 testing::uniform(4, i, 0.2F, 0.95F), static_cast<LaneMask>(1 + mix(i + 5) % 15));

@@ -9,7 +9,7 @@
 namespace vrpipe {
 namespace {
 
-using CropBench = testing::TimedCropBench;
+using testing::TimedCropBench;
 using testkit::Bench;
 
 /// One quad of RGBA16F a cycle, lines of 256 bytes at a cycle each, 8 KB, as on a GH100's ROP partition.
@@ -41,7 +41,7 @@ unsigned in_memory_order(unsigned n) {
 /// Cycles of so many whole tiles more, each of its own place.
 double cycles_of_a_tile(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings, float alpha) {
   const auto cycles = [&](std::uint16_t tiles) {
-    CropBench crop(fidelity, context, settings);
+    TimedCropBench crop(fidelity, context, settings);
     for (std::uint16_t tile = 0; tile < tiles; ++tile) {
       for (unsigned n = 0; n < positions_per_tile; ++n)
         crop.quad({static_cast<std::uint16_t>(tile % 128), static_cast<std::uint16_t>(tile / 128)}, in_memory_order(n),
@@ -66,7 +66,7 @@ TEST_P(CropPrices, LinesOfUnchangedValuesAreFree) {
 
 TEST_P(CropPrices, ALineOfWhichOneSectorMovesCostsAsMuchAsAWholeOne) {
   const auto cycles = [&](std::uint16_t tiles) {
-    CropBench crop(GetParam(), context, partition({{"fetch_ahead", "on"}}));
+    TimedCropBench crop(GetParam(), context, partition({{"fetch_ahead", "on"}}));
     for (std::uint16_t tile = 0; tile < tiles; ++tile) {
       // In the first quad of each of the tile's eight lines.
       for (unsigned n = 0; n < positions_per_tile; n += 8) crop.quad({tile, 0}, in_memory_order(n), 0.5F);
@@ -80,7 +80,7 @@ TEST_P(CropPrices, ALineOfWhichOneSectorMovesCostsAsMuchAsAWholeOne) {
 double cycles_of_a_round(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings,
                          unsigned tiles) {
   const auto cycles = [&](unsigned rounds) {
-    CropBench crop(fidelity, context, settings);
+    TimedCropBench crop(fidelity, context, settings);
     for (unsigned round = 0; round < rounds; ++round) {
       for (unsigned tile = 0; tile < tiles; ++tile) {
         crop.quad({static_cast<std::uint16_t>(tile), 0}, 0, 0.001F);
@@ -105,7 +105,7 @@ TEST_P(CropPrices, ALineThatLeftAndComesBackWaits) {
 
 TEST_P(CropPrices, AheadOfItsDataALineThatComesBackSoonIsFetchedTwice) {
   const auto sectors_read = [&](unsigned tiles) {
-    CropBench crop(GetParam(), context, partition({{"fetch_ahead", "on"}}), 400);
+    TimedCropBench crop(GetParam(), context, partition({{"fetch_ahead", "on"}}), 400);
     for (unsigned round = 0; round < 4; ++round) {
       for (unsigned tile = 0; tile < tiles; ++tile) {
         crop.quad({static_cast<std::uint16_t>(tile), 0}, 0, 0.5F);
@@ -122,7 +122,7 @@ TEST_P(CropPrices, AheadOfItsDataALineThatComesBackSoonIsFetchedTwice) {
 
 TEST_P(CropPrices, AheadOfItsDataMoreLinesAreUnderWayThanTheCacheHolds) {
   for (const bool ahead : {true, false}) {
-    CropBench crop(GetParam(), context, partition({{"fetch_ahead", ahead ? "on" : "off"}}), 400);
+    TimedCropBench crop(GetParam(), context, partition({{"fetch_ahead", ahead ? "on" : "off"}}), 400);
     for (std::uint16_t tile = 0; tile < 120; ++tile) {
       crop.quad({tile, 0}, 0, 0.5F);
       crop.flush();
@@ -139,7 +139,7 @@ TEST_P(CropPrices, AheadOfItsDataMoreLinesAreUnderWayThanTheCacheHolds) {
 
 TEST_P(CropPrices, WhatIsBlendedIsTheSameAheadOfItsDataAndNot) {
   const auto image = [&](const Bench::Settings& settings) {
-    CropBench crop(GetParam(), context, settings);
+    TimedCropBench crop(GetParam(), context, settings);
     for (std::uint64_t i = 0; i < 4000; ++i) {
       crop.quad({static_cast<std::uint16_t>(mix(i / 5) % 60), 0}, static_cast<unsigned>(mix(i + 999) % 64), 0.2F);
     }
@@ -161,7 +161,7 @@ TEST_P(CropPrices, WhatIsBlendedIsTheSameAheadOfItsDataAndNot) {
 double cycles_of_a_quad(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings,
                         const std::vector<unsigned>& positions, LaneMask live = all_lanes) {
   const auto cycles = [&](unsigned quads) {
-    CropBench crop(fidelity, context, settings);
+    TimedCropBench crop(fidelity, context, settings);
     for (unsigned i = 0; i < quads; ++i) crop.quad({0, 0}, positions[i % positions.size()], 0.001F, live);
     return static_cast<double>(crop.run());
   };
@@ -227,8 +227,8 @@ TEST_P(CropPrices, PartsOfTheOccupancySayWhatWasNotPaired) {
   context.format = ColorFormat::rgba8;
   for (const char* forwarding : {"on", "off"}) {
     for (const unsigned step : {1U, 2U}) {
-      CropBench crop(GetParam(), context,
-                     {{"bytes_per_cycle", "32"}, {"pairs_in_sector", "on"}, {"forwarding", forwarding}});
+      TimedCropBench crop(GetParam(), context,
+                          {{"bytes_per_cycle", "32"}, {"pairs_in_sector", "on"}, {"forwarding", forwarding}});
       for (unsigned round = 0; round < 10; ++round) {
         for (unsigned position = 0; position < positions_per_tile; position += step) crop.quad({0, 0}, position, 0.01F);
         crop.flush();
@@ -253,7 +253,7 @@ TEST_P(CropPrices, QuadsOfRgba32fTakeTheirColumns) {
 }
 
 TEST_P(CropPrices, PartsOfTheOccupancySayWhatTookTheTime) {
-  CropBench crop(GetParam(), context, partition({{"fetch_ahead", "on"}}));
+  TimedCropBench crop(GetParam(), context, partition({{"fetch_ahead", "on"}}));
   for (std::uint16_t tile = 0; tile < 100; ++tile) {
     for (unsigned n = 0; n < positions_per_tile; ++n) crop.quad({tile, 0}, in_memory_order(n), 0.5F);
   }

@@ -14,7 +14,7 @@ namespace {
 
 using namespace testing;
 
-constexpr Cycle run = 100000;
+constexpr Cycle long_run = 100000;
 
 /// Cycles for a burst, in the long run, of reads or writes as dense as the queues allow.
 double cycles_per_burst(const DramParameters& parameters, const std::function<DramAddress(std::uint64_t)>& place,
@@ -29,8 +29,8 @@ double cycles_per_burst(const DramParameters& parameters, const std::function<Dr
         ++count;
         return true;
       },
-      run, run);
-  return static_cast<double>(run) /
+      long_run, long_run);
+  return static_cast<double>(long_run) /
          static_cast<double>(bench.statistics.reads.value() + bench.statistics.writes.value());
 }
 

@@ -25,6 +25,11 @@ struct Scene {
   std::function<std::string(const RunResult&)> looked_at = [](const RunResult& result) { return result.result_hash; };
 };
 
+inline RunResult run_with(Scene scene, const EffectChoice& choice) {
+  scene.request.effects = choice;
+  return run(scene.request, scene.frame);
+}
+
 /// A frame that can do without an effect, and the smallest that cannot.
 struct EffectCase {
   std::string effect;

@@ -28,6 +28,7 @@ const std::vector<EffectCase>& effect_cases() {
 namespace {
 
 using testing::EffectCase;
+using testing::run_with;
 using testing::Scene;
 
 /// Those that are ever omitted.
@@ -37,12 +38,6 @@ std::vector<std::string> names() {
     if (effect.decide != nullptr) names.push_back(effect.full_name());
   }
   return names;
-}
-
-RunResult run(Scene scene, const EffectChoice& choice) {
-  scene.request.effects = choice;
-  fresh_simulation();
-  return simulate(scene.request, scene.frame);
 }
 
 EffectReport report_of(const RunResult& result, const std::string& effect) {
@@ -94,9 +89,9 @@ TEST(Effects, ThatAreNeverOmittedCannotBeLeftOut) {
     if (effect.decide != nullptr) continue;
     Scene scene = testing::plain_splats(Fidelity::cycle, "het+qm");
     scene.request.platform = &platform_named("agx-orin-lpddr3");  // which has all components but an L1
-    EXPECT_FALSE(report_of(run(scene, {}), effect.full_name()).omitted);
+    EXPECT_FALSE(report_of(run_with(scene, {}), effect.full_name()).omitted);
     try {
-      run(testing::plain_splats(Fidelity::functional), without(effect.full_name()));
+      run_with(testing::plain_splats(Fidelity::functional), without(effect.full_name()));
       ADD_FAILURE() << "took it";
     } catch (const UserError& error) {
       EXPECT_NE(std::string(error.what()).find(effect.full_name()), std::string::npos) << error.what();
@@ -110,15 +105,15 @@ TEST_P(EveryEffect, IsOmittedWhereNothingTellsTheDifference) {
     ASSERT_FALSE(each.without_at.empty());
     for (const Fidelity fidelity : each.without_at) {
       SCOPED_TRACE(name_of(fidelity));
-      const RunResult automatic = run(each.without(fidelity), {});
-      const RunResult all = run(each.without(fidelity), EffectChoice::everything());
+      const RunResult automatic = run_with(each.without(fidelity), {});
+      const RunResult all = run_with(each.without(fidelity), EffectChoice::everything());
       const EffectReport report = report_of(automatic, GetParam());
       EXPECT_TRUE(report.omitted) << report.reason;
       EXPECT_FALSE(report.reason.empty());
       EXPECT_FALSE(report_of(all, GetParam()).omitted);
       expect_same(automatic, all);
       // Nor does it matter whether it was the predicate that left it out.
-      expect_same(run(each.without(fidelity), without(GetParam())), all);
+      expect_same(run_with(each.without(fidelity), without(GetParam())), all);
     }
   }
 }
@@ -128,10 +123,10 @@ TEST_P(EveryEffect, IsActiveWhereTheFrameCallsForIt) {
     ASSERT_FALSE(each.with_at.empty());
     for (const Fidelity fidelity : each.with_at) {
       SCOPED_TRACE(name_of(fidelity));
-      const RunResult automatic = run(each.with(fidelity), {});
+      const RunResult automatic = run_with(each.with(fidelity), {});
       const EffectReport report = report_of(automatic, GetParam());
       EXPECT_FALSE(report.omitted) << report.reason;
-      expect_same(automatic, run(each.with(fidelity), EffectChoice::everything()));
+      expect_same(automatic, run_with(each.with(fidelity), EffectChoice::everything()));
     }
   }
 }
@@ -143,10 +138,10 @@ TEST_P(EveryEffect, LeftOutInSilenceThereIsMissed) {
     for (const Fidelity fidelity : each.with_at) {
       SCOPED_TRACE(name_of(fidelity));
       const Scene whole = each.with(fidelity);
-      const std::string expected = whole.looked_at(run(whole, {}));
+      const std::string expected = whole.looked_at(run_with(whole, {}));
       const Scene maimed = each.with(fidelity);
       try {
-        EXPECT_NE(maimed.looked_at(run(maimed, silent)), expected);
+        EXPECT_NE(maimed.looked_at(run_with(maimed, silent)), expected);
         EXPECT_EQ(each.refusal, "") << "it ran";
         EXPECT_FALSE(each.faults) << "it ran";
       } catch (const SimulationFault& fault) {
@@ -164,7 +159,7 @@ TEST_P(EveryEffect, LeftOutByForceThereEndsTheRunWithItsName) {
     for (const Fidelity fidelity : each.with_at) {
       SCOPED_TRACE(name_of(fidelity));
       try {
-        run(each.with(fidelity), without(GetParam()));
+        run_with(each.with(fidelity), without(GetParam()));
         ADD_FAILURE() << "nobody noticed";
       } catch (const UserError& error) {
         EXPECT_NE(std::string(error.what()).find(GetParam()), std::string::npos) << error.what();

@@ -14,6 +14,7 @@
 namespace vrpipe {
 namespace {
 
+using testing::run_with;
 using testing::Scene;
 
 // As a plugin derives them.
@@ -38,12 +39,6 @@ const Registrar<AnotherQru, QruBehaviour> qru("qru", "another-make", "pairs quad
   return true;
 }();
 
-RunResult run(Scene scene, const EffectChoice& choice) {
-  scene.request.effects = choice;
-  fresh_simulation();
-  return simulate(scene.request, scene.frame);
-}
-
 /// What `auto` says of it.
 EffectReport said_of(const std::string& effect, const RunResult& result) {
   const auto found = std::find_if(result.effects.begin(), result.effects.end(),
@@ -61,11 +56,11 @@ TEST_P(OtherMakes, OfUnitsDoAsTheyLike) {
                             {"tgc", "grid_tiles", "1"},
                             {"tc", "bins", "1"},
                             {"tc", "idle_timeout_cycles", "1"}};
-  const RunResult usual = run(scene, {});
+  const RunResult usual = run_with(scene, {});
   scene.request.units = {{"tgc", "another-make"}, {"tc", "another-make"}, {"qru", "another-make"}};
-  const RunResult result = run(scene, {});
+  const RunResult result = run_with(scene, {});
   EXPECT_EQ(result.result_hash, usual.result_hash);
-  EXPECT_EQ(run(scene, EffectChoice::everything()).result_hash, usual.result_hash);
+  EXPECT_EQ(run_with(scene, EffectChoice::everything()).result_hash, usual.result_hash);
   for (const char* effect : {"tgc.binning", "tgc.eviction", "tc.eviction", "tc.time_out", "qru.pairing"}) {
     EXPECT_FALSE(said_of(effect, result).omitted) << effect;
     EXPECT_NE(said_of(effect, result).reason.find("another-make"), std::string::npos) << effect;
@@ -75,20 +70,20 @@ TEST_P(OtherMakes, OfUnitsDoAsTheyLike) {
 TEST_P(OtherMakes, OfAPassThroughArePassedThrough) {
   Scene scene = testing::plain_splats(GetParam(), "qm");
   scene.request.units = {{"tgc", "pass-through"}, {"qru", "pass-through"}};
-  const RunResult result = run(scene, {});
+  const RunResult result = run_with(scene, {});
   EXPECT_TRUE(said_of("tgc.binning", result).omitted);
   EXPECT_TRUE(said_of("qru.pairing", result).omitted);
-  EXPECT_EQ(result.result_hash, run(scene, EffectChoice::everything()).result_hash);
+  EXPECT_EQ(result.result_hash, run_with(scene, EffectChoice::everything()).result_hash);
 }
 
 // A cache of another make may ask the DRAM also where nothing has time.
 TEST_P(OtherMakes, OfMemoriesKeepWhatIsBelowThem) {
   Scene scene = testing::plain_splats(GetParam());
   scene.request.platform = &platform_named("agx-orin-lpddr3");
-  const std::string usual = run(scene, {}).result_hash;
+  const std::string usual = run_with(scene, {}).result_hash;
   scene =
       testing::on_platform(scene, "agx-orin-lpddr3", [](Netlist& netlist) { netlist.replace("l2", "another-make"); });
-  const RunResult result = run(scene, {});
+  const RunResult result = run_with(scene, {});
   EXPECT_EQ(result.result_hash, usual);
   EXPECT_FALSE(said_of("l2.contents", result).omitted);
   EXPECT_FALSE(said_of("dram.accesses", result).omitted) << said_of("dram.accesses", result).reason;

@@ -18,21 +18,15 @@
 namespace vrpipe {
 namespace {
 
-constexpr ImageSize size{96, 54};
+using testing::count;
+
+constexpr ImageSize courtyard_size{96, 54};
 
 LoadedScene courtyard() {
   SceneRequest request;
   request.scene = "builtin:courtyard";
-  request.size = size;
+  request.size = courtyard_size;
   return load_scene(request);
-}
-
-std::uint64_t count(const DrawReport& draw, const std::string& name) {
-  for (const auto& [each, value] : draw.counts) {
-    if (each == name) return value;
-  }
-  ADD_FAILURE() << "no count " << name;
-  return 0;
 }
 
 double brightest_of(const Draw& splats) {
@@ -47,9 +41,9 @@ unsigned wrong_channels(const RunResult& result, const testing::MixedReference& 
   // What termination leaves out, and a fragment or two that rounding prunes here and not there.
   const double slack = brightest * (1 - 0.996 + 2.0 / 255);
   unsigned wrong = 0;
-  for (std::uint32_t y = 0; y < size.height; ++y) {
-    for (std::uint32_t x = 0; x < size.width; ++x) {
-      const std::size_t index = std::size_t{y} * size.width + x;
+  for (std::uint32_t y = 0; y < courtyard_size.height; ++y) {
+    for (std::uint32_t x = 0; x < courtyard_size.width; ++x) {
+      const std::size_t index = std::size_t{y} * courtyard_size.width + x;
       const auto pixel = result.framebuffer.color.pixel(x, y);
       for (std::size_t channel = 0; channel < 4; ++channel) {
         const double bound = reference.bound[index][channel == 3 ? 1 : 0] + slack;
@@ -87,7 +81,7 @@ TEST(CourtyardFrame, IsThatOfTheReferenceAndWhatIsBehindWallsIsNotShaded) {
     EXPECT_LT(failed, expected.failed / 3) << "Hi-Z takes most of them";
     EXPECT_EQ(count(result.draws[0], "fragments_blended"), 0U);
     // Of equal depth are the fragments that were nearest before: one for each pixel of the meshes, or two along an edge.
-    EXPECT_GT(count(result.draws[2], "fragments_blended"), size.width * size.height / 3);
+    EXPECT_GT(count(result.draws[2], "fragments_blended"), courtyard_size.width * courtyard_size.height / 3);
   }
 }
 

@@ -19,13 +19,9 @@ namespace vrpipe {
 namespace {
 
 using testing::request_of;
+using testing::run;
 using testing::same_image;
 using testing::strictly;
-
-RunResult run(const RunRequest& request, const Frame& frame) {
-  fresh_simulation();
-  return simulate(request, frame);
-}
 
 /// Behind a wall that closes the left half: so draws have what terminates, and what does not.
 std::shared_ptr<const Draw> half_closed(std::uint32_t splats, std::uint64_t seed) {

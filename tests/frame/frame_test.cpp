@@ -11,7 +11,7 @@
 namespace vrpipe {
 namespace {
 
-std::shared_ptr<const Draw> geometry_of(std::uint32_t splats, std::uint32_t width = 64, std::uint32_t height = 48) {
+std::shared_ptr<const Draw> numbered_splats(std::uint32_t splats, std::uint32_t width = 64, std::uint32_t height = 48) {
   auto draw = std::make_shared<Draw>(testing::draw_of(width, height, std::vector<Splat>(splats)));
   for (std::uint32_t i = 0; i < splats; ++i) draw->splats[i].cx = static_cast<float>(i);
   return draw;
@@ -40,7 +40,7 @@ std::string refusal_of(Action&& action) {
 }
 
 TEST(Frame, NumbersSplatsThroughAllDraws) {
-  const auto geometry = geometry_of(20);
+  const auto geometry = numbered_splats(20);
   Frame frame(64, 48);
   frame.draw(geometry, {}, "whole");
   frame.draw(geometry, {}, "none of it", 7, 0);
@@ -65,14 +65,14 @@ TEST(Frame, ASplatHasTheTriangleOfItsPlaceInTheGeometry) {
     geometry->triangles.push_back(testing::one_quad_triangle(2.0F * static_cast<float>(i), 0));
   }
   Frame frame(64, 48);
-  frame.draw(geometry_of(3), {});
+  frame.draw(numbered_splats(3), {});
   frame.draw(geometry, {}, "", 2, 2);
   EXPECT_EQ(frame.draw_call(0).triangle(1), nullptr);
   EXPECT_EQ(frame.draw_call(1).triangle(4), &geometry->triangles[3]);
 }
 
 TEST(Frame, OnlyClearsOfTerminationBeginAnEpoch) {
-  const auto geometry = geometry_of(1);
+  const auto geometry = numbered_splats(1);
   Frame frame(64, 48);
   frame.clear({false, true});
   frame.draw(geometry, {});
@@ -87,7 +87,7 @@ TEST(Frame, OnlyClearsOfTerminationBeginAnEpoch) {
 }
 
 TEST(Frame, ADrawChangesStateIfTheDrawBeforeItHadAnother) {
-  const auto geometry = geometry_of(1);
+  const auto geometry = numbered_splats(1);
   Frame frame(64, 48);
   frame.draw(geometry, pruned_at(0.1F));
   frame.draw(geometry, pruned_at(0.1F));
@@ -134,7 +134,7 @@ TEST(Frame, EveryFieldOfAStateTellsItFromAnother) {
 }
 
 TEST(Frame, StatesThatBecomeEqualChangeNoMore) {
-  const auto geometry = geometry_of(1);
+  const auto geometry = numbered_splats(1);
   Frame frame(64, 48);
   frame.draw(geometry, pruned_at(0.1F));
   frame.clear({true, true});
@@ -145,7 +145,7 @@ TEST(Frame, StatesThatBecomeEqualChangeNoMore) {
 }
 
 TEST(Frame, TerminatesEarlyIfAnyDrawDoes) {
-  const auto geometry = geometry_of(1);
+  const auto geometry = numbered_splats(1);
   DrawState terminates;
   terminates.early_termination = true;
   Frame frame(64, 48);
@@ -158,7 +158,7 @@ TEST(Frame, TerminatesEarlyIfAnyDrawDoes) {
 }
 
 TEST(Frame, NeedsZropIfAnyDrawTestsAnythingOrShadesNothing) {
-  const auto geometry = geometry_of(1);
+  const auto geometry = numbered_splats(1);
   const std::vector<std::function<void(DrawState&)>> changes{[](DrawState& state) { state.early_termination = true; },
                                                              [](DrawState& state) { state.depth.test = true; },
                                                              [](DrawState& state) { state.stencil.test = true; },
@@ -178,7 +178,7 @@ TEST(Frame, NeedsZropIfAnyDrawTestsAnythingOrShadesNothing) {
 }
 
 TEST(Frame, AMeshAndItsStateBelongTogether) {
-  const auto splats = geometry_of(1);
+  const auto splats = numbered_splats(1);
   const auto mesh = std::make_shared<Draw>(testing::draw_of(64, 48));
   mesh->mesh.resize(3);
   const auto both = std::make_shared<Draw>(*mesh);
@@ -214,7 +214,7 @@ TEST(Frame, ClearsAreOfWhatATargetHolds) {
 }
 
 TEST(Frame, AMarkOfAClearGivesItAndNoOtherDoes) {
-  const auto geometry = geometry_of(1);
+  const auto geometry = numbered_splats(1);
   Frame frame(64, 48);
   frame.draw(geometry, {});
   frame.clear({true, false});
@@ -241,7 +241,7 @@ TEST(Frame, ASideIs1To16384) {
 
 TEST(Frame, ADrawOfAnotherSizeIsRefusedByName) {
   Frame frame(64, 48);
-  for (const auto& other : {geometry_of(1, 63, 48), geometry_of(1, 64, 49)}) {
+  for (const auto& other : {numbered_splats(1, 63, 48), numbered_splats(1, 64, 49)}) {
     const std::string refusal = refusal_of([&] { frame.draw(other, {}, "roof"); });
     EXPECT_NE(refusal.find("cannot draw 'roof'"), std::string::npos) << refusal;
     EXPECT_NE(refusal.find("the frame has 64x48"), std::string::npos) << refusal;
@@ -256,7 +256,7 @@ TEST(Frame, TrianglesThatAreNotAsManyAsSplatsAreRefused) {
 }
 
 TEST(Frame, SplatsThatAreNotThereAreRefused) {
-  const auto geometry = geometry_of(20);
+  const auto geometry = numbered_splats(20);
   struct Range {
     std::uint32_t first, splats;
   };
@@ -273,7 +273,7 @@ TEST(Frame, SplatsThatAreNotThereAreRefused) {
 }
 
 TEST(Frame, Has32767DrawsAtMost) {
-  const auto geometry = geometry_of(1);
+  const auto geometry = numbered_splats(1);
   Frame frame(64, 48);
   for (unsigned i = 0; i < 32767; ++i) frame.draw(geometry, {});
   EXPECT_NE(refusal_of([&] { frame.draw(geometry, {}); }).find("32767 draws at most"), std::string::npos);
@@ -287,7 +287,7 @@ TEST(Frame, Has65534CommandsAtMostAndEachAMarkOfItsOwn) {
   Frame frame(64, 48);
   for (unsigned i = 0; i < 65534; ++i) frame.clear({false, true});
   EXPECT_NE(refusal_of([&] { frame.clear({true, true}); }).find("65534 commands"), std::string::npos);
-  EXPECT_NE(refusal_of([&] { frame.draw(geometry_of(1), {}); }).find("65534 commands"), std::string::npos);
+  EXPECT_NE(refusal_of([&] { frame.draw(numbered_splats(1), {}); }).find("65534 commands"), std::string::npos);
   EXPECT_EQ(frame.commands().size(), 65534U);
   EXPECT_TRUE(frame.draws().empty());
   EXPECT_EQ(frame.splats(), 0U);
@@ -296,7 +296,7 @@ TEST(Frame, Has65534CommandsAtMostAndEachAMarkOfItsOwn) {
 }
 
 TEST(Frame, HasTwoToThe31SplatsAtMost) {
-  const auto geometry = geometry_of(1U << 17U);
+  const auto geometry = numbered_splats(1U << 17U);
   Frame frame(64, 48);
   for (unsigned i = 0; i < 1U << 14U; ++i) frame.draw(geometry, {});
   EXPECT_EQ(frame.splats(), 1U << 31U);
@@ -320,7 +320,7 @@ TEST(Frame, RefusesEarlyTerminationWithoutBlending) {
   state.blend = false;
   state.early_termination = true;
   Frame frame(64, 48);
-  const std::string refusal = refusal_of([&] { frame.draw(geometry_of(1), state, "flat"); });
+  const std::string refusal = refusal_of([&] { frame.draw(numbered_splats(1), state, "flat"); });
   EXPECT_NE(refusal.find("cannot draw 'flat' (draw 0 of the frame): it terminates early, and does not blend"),
             std::string::npos)
       << refusal;

@@ -14,7 +14,7 @@ Clear of_termination() {
   return clear;
 }
 
-std::shared_ptr<const Draw> geometry_of(std::uint32_t splats, bool triangles = false) {
+std::shared_ptr<const Draw> empty_geometry(std::uint32_t splats, bool triangles = false) {
   auto draw = std::make_shared<Draw>(testing::draw_of(100, 40, std::vector<Splat>(splats)));
   if (triangles) draw->triangles.resize(splats);
   return draw;
@@ -34,8 +34,8 @@ TEST(ScreenTiling, ATileAndItsIndexGiveEachOther) {
 
 TEST(AddressMap, RegionsFollowOneAnotherInPagesOf64KiB) {
   Frame frame(100, 40);
-  frame.draw(geometry_of(3000), {});
-  frame.draw(geometry_of(2000, true), {});
+  frame.draw(empty_geometry(3000), {});
+  frame.draw(empty_geometry(2000, true), {});
   for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
     const AddressMap map = address_map(frame, format);
     std::uint64_t free_from = 0;
@@ -52,8 +52,8 @@ TEST(AddressMap, RegionsFollowOneAnotherInPagesOf64KiB) {
 
 TEST(AddressMap, SizesAreThoseOfWhatIsInThem) {
   Frame frame(100, 40);
-  frame.draw(geometry_of(3000), {});
-  frame.draw(geometry_of(2000, true), {});
+  frame.draw(empty_geometry(3000), {});
+  frame.draw(empty_geometry(2000, true), {});
   const AddressMap map = address_map(frame, ColorFormat::rgba16f);
   constexpr std::uint64_t tiles = 7 * 3;
   EXPECT_EQ(map.color.bytes, tiles * 256 * 8);
@@ -66,10 +66,10 @@ TEST(AddressMap, SizesAreThoseOfWhatIsInThem) {
 }
 
 TEST(AddressMap, AGeometryIsThereOnceHoweverOftenItIsDrawn) {
-  const auto twice = geometry_of(1000, true);
+  const auto twice = empty_geometry(1000, true);
   Frame frame(100, 40);
   frame.draw(twice, {}, "", 0, 600);
-  frame.draw(geometry_of(10), {});
+  frame.draw(empty_geometry(10), {});
   frame.clear({true, true});
   frame.draw(twice, {}, "", 100, 900);
   const AddressMap map = address_map(frame, ColorFormat::rgba16f);
@@ -80,7 +80,7 @@ TEST(AddressMap, AGeometryIsThereOnceHoweverOftenItIsDrawn) {
 
 TEST(Framebuffer, HasTheFramesSizeAndIsCleared) {
   Frame frame(100, 40);
-  frame.draw(geometry_of(5), {});
+  frame.draw(empty_geometry(5), {});
   const Framebuffer framebuffer(frame, ColorFormat::rgba8);
   EXPECT_EQ(framebuffer.color.width(), 100U);
   EXPECT_EQ(framebuffer.color.height(), 40U);

@@ -18,12 +18,9 @@ namespace {
 using testing::mixed_frame;
 using testing::random_frame;
 using testing::request_of;
+using testing::run;
 using testing::statistic;
 
-RunResult run(const RunRequest& request, const Frame& frame) {
-  fresh_simulation();
-  return simulate(request, frame);
-}
 RunRequest with(RunRequest request, const std::string& name, const std::string& value) {
   request.settings.push_back({"raster", name, value});
   return request;

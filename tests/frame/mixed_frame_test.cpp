@@ -17,6 +17,7 @@
 namespace vrpipe {
 namespace {
 
+using testing::count;
 using testing::expect_depth_stencil;
 using testing::expect_image;
 using testing::mixed_frame;
@@ -25,14 +26,6 @@ using testing::random_frame;
 using testing::request_of;
 
 RenderContext context_of(const Frame& frame) { return testing::context_of(frame); }
-
-std::uint64_t count(const DrawReport& draw, const std::string& name) {
-  for (const auto& [each, value] : draw.counts) {
-    if (each == name) return value;
-  }
-  ADD_FAILURE() << "no count " << name;
-  return 0;
-}
 
 /// What Hi-Z culls would have failed; of a draw that is tested late it may have been pruned before.
 void expect_counts(const RunResult& result, const MixedReference& reference) {

@@ -25,18 +25,19 @@ namespace vrpipe {
 namespace {
 
 using testing::request_of;
+using testing::run;
 using testing::same_image;
 
-constexpr std::uint32_t width = 80;
-constexpr std::uint32_t height = 56;
+constexpr std::uint32_t passes_width = 80;
+constexpr std::uint32_t passes_height = 56;
 
 /// Front to back, many to a pixel.
 Draw dense_splats(std::uint64_t seed, std::uint32_t splats = 90) {
-  Draw draw = testing::draw_of(width, height);
+  Draw draw = testing::draw_of(passes_width, passes_height);
   for (std::uint32_t i = 0; i < splats; ++i) {
     const std::uint64_t k = 16ULL * i;
     draw.splats.push_back(
-        testing::splat_at(testing::uniform(seed, k, 0, width), testing::uniform(seed, k + 1, 0, height),
+        testing::splat_at(testing::uniform(seed, k, 0, passes_width), testing::uniform(seed, k + 1, 0, passes_height),
                           testing::uniform(seed, k + 2, 2, 14), testing::uniform(seed, k + 3, 2, 14),
                           testing::uniform(seed, k + 4, 0, 6.2F), testing::uniform(seed, k + 5, 0.1F, 0.9F),
                           testing::uniform(seed, k + 6, 0, 1), testing::uniform(seed, k + 7, 0, 1),
@@ -45,10 +46,6 @@ Draw dense_splats(std::uint64_t seed, std::uint32_t splats = 90) {
   return draw;
 }
 
-RunResult run(const RunRequest& request, const Frame& frame) {
-  fresh_simulation();
-  return simulate(request, frame);
-}
 RunResult run_passes(const RunRequest& request, const Draw& draw, std::uint32_t passes) {
   return run(request, *multi_pass_frame(draw, draw_state_of(request), passes));
 }
@@ -93,9 +90,9 @@ TEST_P(MultiPass, IsTheSplatsUpToTheEndOfTheBatchInWhichAPixelPassesTheThreshold
     std::vector<unsigned> ends(passes, 0);  // pixels that end with each pass
     unsigned undecided = 0;
     unsigned wrong = 0;
-    for (std::uint32_t y = 0; y < height; ++y) {
-      for (std::uint32_t x = 0; x < width; ++x) {
-        const std::size_t index = std::size_t{y} * width + x;
+    for (std::uint32_t y = 0; y < passes_height; ++y) {
+      for (std::uint32_t x = 0; x < passes_width; ++x) {
+        const std::size_t index = std::size_t{y} * passes_width + x;
         const double threshold = 0.9;
         std::uint32_t pass = 0;
         bool near = false;
@@ -118,7 +115,7 @@ TEST_P(MultiPass, IsTheSplatsUpToTheEndOfTheBatchInWhichAPixelPassesTheThreshold
       }
     }
     EXPECT_EQ(wrong, 0U) << passes << " passes";
-    EXPECT_LT(undecided, width * height / 20) << passes << " passes";
+    EXPECT_LT(undecided, passes_width * passes_height / 20) << passes << " passes";
     EXPECT_GT(ends.front(), 50U) << "some end at once";
     EXPECT_GT(ends.back(), 50U) << "and some never";
   }
@@ -150,12 +147,12 @@ TEST_P(MultiPass, TheMorePassesTheFewerFragmentsAreLeft) {
       const auto count = [&](const char* name) {
         return std::find_if(counts.begin(), counts.end(), [&](const auto& each) { return each.first == name; })->second;
       };
-      EXPECT_EQ(count("fragments_shaded"), width * height);
+      EXPECT_EQ(count("fragments_shaded"), passes_width * passes_height);
       EXPECT_EQ(count("fragments_blended"), 0U);
       EXPECT_EQ(count("fragments_shaded"), count("fragments_pruned") + count("fragments_unblended"));
       at_ends += count("fragments_shaded");
     }
-    EXPECT_EQ(at_ends, std::uint64_t{passes - 1} * width * height);
+    EXPECT_EQ(at_ends, std::uint64_t{passes - 1} * passes_width * passes_height);
   }
 }
 
@@ -203,7 +200,7 @@ TEST_P(MultiPassInOrder, EveryPixelIsAsOrderMakesIt) {
     const RunResult result = run(strict, frame);
     std::size_t wrong = 0;
     for (std::uint32_t i = 0; i < expected.size(); ++i)
-      wrong += result.framebuffer.color.pixel(i % width, i / width) != expected[i] ? 1U : 0U;
+      wrong += result.framebuffer.color.pixel(i % passes_width, i / passes_width) != expected[i] ? 1U : 0U;
     EXPECT_EQ(wrong, 0U) << passes;
   }
 }
@@ -290,9 +287,9 @@ TEST(MultiPass, ReadingTheTargetIsTrafficOfColour) {
     const std::uint64_t read = testing::statistic(result, "l2.color_bytes_read");
     const std::uint64_t by_crop = testing::statistic(result, "crop.cache.bytes_filled");
     // A sector for each quad of the target, twice where both triangles cover it, unless in one warp.
-    const std::uint64_t quads = std::uint64_t{width / 2} * (height / 2);
+    const std::uint64_t quads = std::uint64_t{passes_width / 2} * (passes_height / 2);
     EXPECT_GE(read - by_crop, 2 * quads * 32);
-    EXPECT_LE(read - by_crop, 2 * (quads + width / 2 + height / 2) * 32);
+    EXPECT_LE(read - by_crop, 2 * (quads + passes_width / 2 + passes_height / 2) * 32);
   }
 }
 

@@ -18,7 +18,7 @@ namespace {
 
 using testing::color_of;
 
-constexpr ColorFormat formats[] = {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f};
+constexpr ColorFormat color_formats[] = {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f};
 constexpr BlendRounding roundings[] = {BlendRounding::rne, BlendRounding::rtz};
 
 /// What a cleared pixel holds after `count` fragments of one alpha and one grey.
@@ -204,7 +204,7 @@ TEST(Blend, TheLargestColourStaysFinite) {
 
 // case B07
 TEST(Blend, AnOpaquePixelTakesNothingMore) {
-  for (const ColorFormat format : formats) {
+  for (const ColorFormat format : color_formats) {
     Stack stack(format, BlendRounding::rne);
     stack.pixel = color_of(0.5F, 0.25F, 0.125F, 1.0F);
     const QuadColor before = stack.pixel = stack.blend(stack.pixel, QuadColor{});
@@ -217,7 +217,7 @@ TEST(Blend, AnOpaquePixelTakesNothingMore) {
 TEST(Blend, IsWithinTheConformanceToleranceOfExactBlending) {
   const double tolerances[] = {4.0 / 255.0, 0.005, 1e-5};
   for (unsigned f = 0; f < 3; ++f) {
-    const BlendFunction blend = blend_function(formats[f], BlendRounding::rne);
+    const BlendFunction blend = blend_function(color_formats[f], BlendRounding::rne);
     for (std::uint64_t i = 0; i < 20'000; ++i) {
       const QuadColor destination =
           blend(QuadColor{}, color_of(testing::uniform(1, 8 * i, 0, 1), 0, 0, testing::uniform(1, 8 * i + 1, 0, 1)));
@@ -226,15 +226,15 @@ TEST(Blend, IsWithinTheConformanceToleranceOfExactBlending) {
       const QuadColor result = blend(destination, color_of(red, 0, 0, alpha));
       const double exact = static_cast<double>(destination.red[0]) +
                            (1.0 - static_cast<double>(destination.alpha[0])) * static_cast<double>(red);
-      ASSERT_NEAR(static_cast<double>(result.red[0]), formats[f] == ColorFormat::rgba8 ? std::fmin(exact, 1.0) : exact,
-                  tolerances[f]);
+      ASSERT_NEAR(static_cast<double>(result.red[0]),
+                  color_formats[f] == ColorFormat::rgba8 ? std::fmin(exact, 1.0) : exact, tolerances[f]);
     }
   }
 }
 
 // case B09
 TEST(Blend, GreyStaysGrey) {
-  for (const ColorFormat format : formats) {
+  for (const ColorFormat format : color_formats) {
     for (const BlendRounding rounding : roundings) {
       Stack stack(format, rounding);
       for (std::uint64_t i = 0; i < 500; ++i) {
@@ -320,7 +320,7 @@ TEST(FrontToBack, IsAssociativeWhereNothingIsRounded) {
 // case Q02
 TEST(FrontToBack, ADeadFragmentIsTheExactIdentityOnEitherSide) {
   const QuadColor nothing{};
-  for (const ColorFormat format : formats) {
+  for (const ColorFormat format : color_formats) {
     const BlendFunction store = blend_function(format, BlendRounding::rne);
     for (std::uint64_t i = 0; i < 2000; ++i) {
       const QuadColor fragment =

@@ -15,20 +15,20 @@ using testing::flat_box;
 using testing::geometry_of;
 using testing::round_splat;
 
-constexpr std::uint32_t side = 64;
+constexpr std::uint32_t facts_side = 64;
 constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
 constexpr float infinite = std::numeric_limits<float>::infinity();
 
 std::shared_ptr<Draw> mesh(float x, float y, float size, float red = 0.5F) {
-  auto draw = std::make_shared<Draw>(testing::draw_of(side, side));
+  auto draw = std::make_shared<Draw>(testing::draw_of(facts_side, facts_side));
   const auto corner = [&](float u, float v) { return MeshVertex{u, v, 0.5F, 1, red, 0.5F, 0.5F, 0, 0, 1}; };
   draw->mesh.push_back({{corner(x, y), corner(x, y + size), corner(x + size, y)}});
   return draw;
 }
 
 FrameFacts facts_of(const std::vector<Splat>& splats, const DrawState& state = {}) {
-  Frame frame(side, side);
-  frame.draw(geometry_of(side, side, splats), state);
+  Frame frame(facts_side, facts_side);
+  frame.draw(geometry_of(facts_side, facts_side, splats), state);
   return FrameFacts(testing::context_of(frame));
 }
 
@@ -43,8 +43,8 @@ TEST(FrameFacts, OfNothing) {
 }
 
 TEST(FrameFacts, CountDrawsByWhatTheyAre) {
-  Frame frame(side, side);
-  const auto splats = geometry_of(side, side, {round_splat(8, 8, 2, 0.5F), round_splat(9, 8, 2, 0.5F)});
+  Frame frame(facts_side, facts_side);
+  const auto splats = geometry_of(facts_side, facts_side, {round_splat(8, 8, 2, 0.5F), round_splat(9, 8, 2, 0.5F)});
   const auto triangles = mesh(4, 4, 8);
   DrawState state;
   frame.draw(splats, state, "plain");
@@ -85,8 +85,8 @@ TEST(FrameFacts, SplatsHaveNoFaceToCull) {
 
 // A frame may draw a part of a geometry.
 TEST(FrameFacts, LookAtWhatIsDrawnAlone) {
-  Frame frame(side, side);
-  frame.draw(geometry_of(side, side,
+  Frame frame(facts_side, facts_side);
+  frame.draw(geometry_of(facts_side, facts_side,
                          {round_splat(8, 8, 300, 1, 9), flat_box(36, 36, 44, 44, 0.5F, 0.25F, 0.5F, 0.75F)}),
              {}, "the second", 1);
   const FrameFacts facts(testing::context_of(frame));
@@ -141,9 +141,9 @@ TEST(FrameFacts, WhatIsNotFiniteIsCountedAndBoundsNothing) {
 // A splat that is finite may be drawn as a triangle that is not.
 TEST(FrameFacts, TrianglesThatAreNotFiniteBoundNothing) {
   for (const float value : {not_a_number, infinite, -infinite}) {
-    auto draw = std::make_shared<Draw>(testing::draw_of(side, side, {flat_box(4, 4, 12, 12, 0.5F)}));
+    auto draw = std::make_shared<Draw>(testing::draw_of(facts_side, facts_side, {flat_box(4, 4, 12, 12, 0.5F)}));
     draw->triangles = {{{4, 12, value}, {4, value, 12}}};
-    Frame frame(side, side);
+    Frame frame(facts_side, facts_side);
     frame.draw(draw, {});
     const FrameFacts facts(testing::context_of(frame));
     EXPECT_EQ(facts.not_finite, 1U);
@@ -153,7 +153,7 @@ TEST(FrameFacts, TrianglesThatAreNotFiniteBoundNothing) {
 }
 
 TEST(FrameFacts, OfMeshesBoundVerticesAndColors) {
-  Frame frame(side, side);
+  Frame frame(facts_side, facts_side);
   DrawState state;
   state.shader = FragmentShader::vertex;
   frame.draw(mesh(20, 20, 8, 3), state);
@@ -167,12 +167,12 @@ TEST(FrameFacts, OfMeshesBoundVerticesAndColors) {
 }
 
 TEST(FrameFacts, SayWhereTheSurfacesAre) {
-  const Frame frame(side, side);
+  const Frame frame(facts_side, facts_side);
   RenderContext context = testing::context_of(frame);
   context.format = ColorFormat::rgba32f;
-  EXPECT_EQ(FrameFacts(context).addresses.color.bytes, side * side * 16U);
+  EXPECT_EQ(FrameFacts(context).addresses.color.bytes, facts_side * facts_side * 16U);
   context.format = ColorFormat::rgba8;
-  EXPECT_EQ(FrameFacts(context).addresses.color.bytes, side * side * 4U);
+  EXPECT_EQ(FrameFacts(context).addresses.color.bytes, facts_side * facts_side * 4U);
 }
 
 }  // namespace

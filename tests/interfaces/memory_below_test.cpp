@@ -48,10 +48,10 @@ class Recorder : public sc_core::sc_module {
 
 // Of the L2: 32 bytes a cycle. Of the memory below: two cycles for a sector.
 constexpr Cycle l2_latency = 10;
-constexpr Cycle fill = 40 + 2;
+constexpr Cycle fill_cycles = 40 + 2;
 /// Of 32 bytes.
-constexpr Cycle hit = l2_latency + 1;
-constexpr Cycle miss = 1 + fill + hit;
+constexpr Cycle hit_cycles = l2_latency + 1;
+constexpr Cycle miss_cycles = 1 + fill_cycles + hit_cycles;
 
 class MemoryBelowTest : public ::testing::Test {
  protected:
@@ -103,39 +103,40 @@ INSTANTIATE_TEST_SUITE_P(With, MemoryBelowAtEachFidelity,
                          });
 
 TEST_P(MemoryBelowAtEachFidelity, ASectorIsFetchedWhenItIsFirstRead) {
-  EXPECT_EQ(completed({read(100, 64), read(300, 64)}), (std::vector<Cycle>{100 + miss, 300 + hit}));
+  EXPECT_EQ(completed({read(100, 64), read(300, 64)}), (std::vector<Cycle>{100 + miss_cycles, 300 + hit_cycles}));
   EXPECT_EQ(fetched(), 1U);
   EXPECT_EQ(below->bytes(), 32U);
 }
 
 TEST_P(MemoryBelowAtEachFidelity, AReadOfASectorOnItsWayWaitsForThatFill) {
-  const Cycle there = 100 + 1 + fill;
+  const Cycle there = 100 + 1 + fill_cycles;
   EXPECT_EQ(completed({read(100, 64), read(120, 64), read(there, 64)}),
-            (std::vector<Cycle>{there + hit, there + 1 + hit, there + 2 + hit}));
+            (std::vector<Cycle>{there + hit_cycles, there + 1 + hit_cycles, there + 2 + hit_cycles}));
   EXPECT_EQ(fetched(), 1U);
 }
 
 TEST_P(MemoryBelowAtEachFidelity, AWriteOfWholeSectorsNeedsNoFill) {
   EXPECT_EQ(completed({write(100, 64, 64), read(200, 64), read(300, 96)}),
-            (std::vector<Cycle>{100 + l2_latency + 2, 200 + hit, 300 + hit}));
+            (std::vector<Cycle>{100 + l2_latency + 2, 200 + hit_cycles, 300 + hit_cycles}));
   EXPECT_EQ(fetched(), 0U);
 }
 
 TEST_P(MemoryBelowAtEachFidelity, AWriteOfPartOfASectorFetchesIt) {
-  EXPECT_EQ(completed({write(100, 80, 16), write(200, 64, 16)}), (std::vector<Cycle>{100 + miss, 200 + hit}));
+  EXPECT_EQ(completed({write(100, 80, 16), write(200, 64, 16)}),
+            (std::vector<Cycle>{100 + miss_cycles, 200 + hit_cycles}));
   EXPECT_EQ(fetched(), 1U);
 }
 
 TEST_P(MemoryBelowAtEachFidelity, WhatIsWrittenWholeWhileItIsOnItsWayIsThere) {
   EXPECT_EQ(completed({read(100, 64), write(110, 64), read(120, 64)}),
-            (std::vector<Cycle>{100 + miss, 110 + hit, 120 + hit}));
+            (std::vector<Cycle>{100 + miss_cycles, 110 + hit_cycles, 120 + hit_cycles}));
   EXPECT_EQ(fetched(), 1U);
 }
 
 TEST_P(MemoryBelowAtEachFidelity, AnAccessToSeveralSectorsWaitsForTheLast) {
   // The memory below takes two cycles for each; then four sectors move from the L2.
   EXPECT_EQ(completed({read(100, 0, 32), read(200, 0, 128)}),
-            (std::vector<Cycle>{100 + miss, 200 + 1 + (40 + 3 * 2) + l2_latency + 4}));
+            (std::vector<Cycle>{100 + miss_cycles, 200 + 1 + (40 + 3 * 2) + l2_latency + 4}));
   EXPECT_EQ(fetched(), 4U) << "32 bytes each";
 }
 
@@ -208,7 +209,8 @@ TEST_P(MemoryBelowAtEachFidelity, AMemoryBelowWithTimeOfItsOwnIsAsked) {
   // In the open row, in another one, in that one.
   const std::vector<Cycle> done =
       MemoryBelowTest::completed(*cache, GetParam(), {read(500, 0), read(1000, 4096), read(2000, 4128)});
-  EXPECT_EQ(done, (std::vector<Cycle>{500 + 1 + 21 + hit, 1000 + 1 + 61 + hit, 2000 + 1 + 21 + hit}));
+  EXPECT_EQ(done,
+            (std::vector<Cycle>{500 + 1 + 21 + hit_cycles, 1000 + 1 + 61 + hit_cycles, 2000 + 1 + 21 + hit_cycles}));
 }
 
 // At lt.
@@ -217,7 +219,7 @@ TEST_F(MemoryBelowTest, AnAccessAheadOfTimeDoesNotDelayAnEarlierOne) {
   FixedLatencyMemory below("below", *clock, 40, 16, 1);
   l2->below().bind(below.port(0));
   EXPECT_EQ(completed(*l2, MemoryBelow::annotated, {read(4000, 64), read(100, 64), read(300, 64)}),
-            (std::vector<Cycle>{4000 + miss, 100 + miss, 300 + hit}));
+            (std::vector<Cycle>{4000 + miss_cycles, 100 + miss_cycles, 300 + hit_cycles}));
   EXPECT_EQ(below.bytes(), 32U) << "fetched once all the same";
 }
 
@@ -266,7 +268,7 @@ TEST_F(MemoryBelowTest, FillsWaitInTheL2WhileTheMemoryBelowDoesNotTakeThem) {
   for (std::size_t i = 0; i < done.size(); ++i) {
     ASSERT_NE(done[i], never) << i;
     // Taken one in five cycles, of the clock that is; a hit at once takes none of it.
-    ASSERT_GE(done[i], 101 + 5 * i + 35 + hit) << i;
+    ASSERT_GE(done[i], 101 + 5 * i + 35 + hit_cycles) << i;
   }
 }
 
@@ -291,7 +293,7 @@ TEST_F(MemoryBelowTest, OfOneClockTheKernelMayLagBehindAsWithoutIt) {
   l2->below().bind(below.port(0));
   clock->set_cycles_per_activation(64);
   EXPECT_EQ(completed(*l2, MemoryBelow::clocked, {read(100, 0), read(101, 32), read(102, 0)}),
-            (std::vector<Cycle>{100 + miss, 101 + 1 + fill + 1 + hit, 100 + miss + 1}));
+            (std::vector<Cycle>{100 + miss_cycles, 101 + 1 + fill_cycles + 1 + hit_cycles, 100 + miss_cycles + 1}));
   EXPECT_LT(clock->activations(), clock->edges());
 }
 
@@ -353,7 +355,8 @@ TEST_F(MemoryBelowTest, AnInitiatorMayEndItsResponsesLater) {
   clock->run(cycles(1000));
   const auto next = 20 + 2;  // seen at the edge after the end, answered at the one after that
   EXPECT_EQ(initiator.responses,
-            (std::vector<sc_core::sc_time>{cycles(100 + hit), cycles(100 + hit + next), cycles(100 + hit + 2 * next)}));
+            (std::vector<sc_core::sc_time>{cycles(100 + hit_cycles), cycles(100 + hit_cycles + next),
+                                           cycles(100 + hit_cycles + 2 * next)}));
 }
 
 TEST_F(MemoryBelowTest, AtCycleBTransportIsAFault) {

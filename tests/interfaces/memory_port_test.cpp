@@ -17,10 +17,10 @@ namespace vrpipe {
 namespace {
 
 /// Reads line after line as fast as the port allows, and keeps when each came back.
-class Reader : public sc_core::sc_module, public Clocked, public PortOwner {
+class ClockedReader : public sc_core::sc_module, public Clocked, public PortOwner {
  public:
-  Reader(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned in_flight, unsigned accesses,
-         unsigned bytes = 32)
+  ClockedReader(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned in_flight, unsigned accesses,
+                unsigned bytes = 32)
       : sc_module(name),
         PortOwner({&domain, domain.attach(*this)}),
         memory(*this, "memory", in_flight, {MemoryTraffic::vertex, 3}),
@@ -236,7 +236,7 @@ class MemoryPortTest : public ::testing::Test {
 };
 
 TEST_F(MemoryPortTest, AFixedLatencyMemoryAnswersAfterLatencyAndTransfer) {
-  Reader reader("reader", *clock, 4, 1);
+  ClockedReader reader("reader", *clock, 4, 1);
   FixedLatencyMemory memory("memory", *clock, 10, 32, 1);
   reader.memory.socket.bind(memory.port(0));
   sc_core::sc_start();
@@ -246,7 +246,7 @@ TEST_F(MemoryPortTest, AFixedLatencyMemoryAnswersAfterLatencyAndTransfer) {
 }
 
 TEST_F(MemoryPortTest, AFixedLatencyMemoryMovesItsBytesPerCycle) {
-  Reader reader("reader", *clock, 8, 8);
+  ClockedReader reader("reader", *clock, 8, 8);
   FixedLatencyMemory memory("memory", *clock, 10, 64, 1);
   reader.memory.socket.bind(memory.port(0));
   sc_core::sc_start();
@@ -259,7 +259,7 @@ TEST_F(MemoryPortTest, AMemoryAskedDirectlyAnswersInTheSameCyclesAsThroughItsSoc
     for (const bool relayed : {false, true}) {
       fresh_simulation();
       clock = std::make_unique<ClockDomain>("clock", 735);
-      Reader reader("reader", *clock, 5, 40);
+      ClockedReader reader("reader", *clock, 5, 40);
       FixedLatencyMemory memory("memory", *clock, 10, bytes_per_cycle, 1);
       const std::unique_ptr<Relay> relay = bind(reader.memory.socket, memory, relayed);
       sc_core::sc_start();
@@ -278,7 +278,7 @@ TEST_F(MemoryPortTest, AMemoryAskedDirectlyAnswersInTheSameCyclesAsThroughItsSoc
 
 TEST_F(MemoryPortTest, AMemoryOfAnotherClockIsAskedThroughItsSocket) {
   ClockDomain slow("slow", 4000);
-  Reader reader("reader", *clock, 2, 2);
+  ClockedReader reader("reader", *clock, 2, 2);
   FixedLatencyMemory memory("memory", slow, 10, 32, 1);
   reader.memory.socket.bind(memory.port(0));
   sc_core::sc_start();
@@ -286,7 +286,7 @@ TEST_F(MemoryPortTest, AMemoryOfAnotherClockIsAskedThroughItsSocket) {
 }
 
 TEST_F(MemoryPortTest, NoMoreAccessesAreInFlightThanItHasSlots) {
-  Reader reader("reader", *clock, 3, 20);
+  ClockedReader reader("reader", *clock, 3, 20);
   FixedLatencyMemory memory("memory", *clock, 50, 1024, 1);
   reader.memory.socket.bind(memory.port(0));
   sc_core::sc_start();
@@ -295,7 +295,7 @@ TEST_F(MemoryPortTest, NoMoreAccessesAreInFlightThanItHasSlots) {
 }
 
 TEST_F(MemoryPortTest, AFourPhaseMemoryWithTimeOfItsOwnIsServedWhileAllUnitsSleep) {
-  Reader reader("reader", *clock, 4, 5);
+  ClockedReader reader("reader", *clock, 4, 5);
   FourPhaseMemory memory("memory", cycles(3), cycles(40.5));
   reader.memory.socket.bind(memory.socket);
   sc_core::sc_start();
@@ -309,7 +309,7 @@ TEST_F(MemoryPortTest, AFourPhaseMemoryWithTimeOfItsOwnIsServedWhileAllUnitsSlee
 }
 
 TEST_F(MemoryPortTest, AnAnswerAtAnEdgeIsSeenACycleLater) {
-  Reader reader("reader", *clock, 1, 1);
+  ClockedReader reader("reader", *clock, 1, 1);
   FourPhaseMemory memory("memory", cycles(2), cycles(8));
   reader.memory.socket.bind(memory.socket);
   sc_core::sc_start();
@@ -317,7 +317,7 @@ TEST_F(MemoryPortTest, AnAnswerAtAnEdgeIsSeenACycleLater) {
 }
 
 TEST_F(MemoryPortTest, TheNextRequestWaitsForTheEndOfTheLast) {
-  Reader reader("reader", *clock, 4, 2);
+  ClockedReader reader("reader", *clock, 4, 2);
   FourPhaseMemory memory("memory", cycles(6), cycles(100));
   reader.memory.socket.bind(memory.socket);
   sc_core::sc_start();
@@ -325,7 +325,7 @@ TEST_F(MemoryPortTest, TheNextRequestWaitsForTheEndOfTheLast) {
 }
 
 TEST_F(MemoryPortTest, APayloadThatTheMemoryStillHoldsIsNotUsedAgain) {
-  Reader reader("reader", *clock, 1, 2);
+  ClockedReader reader("reader", *clock, 1, 2);
   FourPhaseMemory memory("memory", cycles(2), cycles(8));
   memory.hold(cycles(20));
   reader.memory.socket.bind(memory.socket);
@@ -337,7 +337,7 @@ TEST_F(MemoryPortTest, APayloadThatTheMemoryStillHoldsIsNotUsedAgain) {
 class EarlyCompletion : public MemoryPortTest, public ::testing::WithParamInterface<ImmediateMemory::Way> {};
 
 TEST_P(EarlyCompletion, IsSeenAfterTheAnnotatedDelay) {
-  Reader reader("reader", *clock, 2, 3);
+  ClockedReader reader("reader", *clock, 2, 3);
   ImmediateMemory memory("memory", GetParam(), cycles(9.5));
   reader.memory.socket.bind(memory.socket);
   sc_core::sc_start();
@@ -345,7 +345,7 @@ TEST_P(EarlyCompletion, IsSeenAfterTheAnnotatedDelay) {
 }
 
 TEST_P(EarlyCompletion, IsSeenInTheNextCycleAtTheEarliest) {
-  Reader reader("reader", *clock, 1, 2);
+  ClockedReader reader("reader", *clock, 1, 2);
   ImmediateMemory memory("memory", GetParam(), sc_core::SC_ZERO_TIME);
   reader.memory.socket.bind(memory.socket);
   sc_core::sc_start();
@@ -365,7 +365,7 @@ INSTANTIATE_TEST_SUITE_P(Ways, EarlyCompletion,
                          [](const auto& way) { return std::string(name_of(way.param)); });
 
 TEST_F(MemoryPortTest, AnswersOutOfOrderComeBackWhenEachIsThere) {
-  Reader reader("reader", *clock, 4, 4);
+  ClockedReader reader("reader", *clock, 4, 4);
   ImmediateMemory memory("memory", ImmediateMemory::Way::sooner_each, cycles(10));
   reader.memory.socket.bind(memory.socket);
   clock->run(cycles(100));
@@ -375,7 +375,7 @@ TEST_F(MemoryPortTest, AnswersOutOfOrderComeBackWhenEachIsThere) {
 }
 
 TEST_F(MemoryPortTest, AnErrorResponseIsAFault) {
-  Reader reader("reader", *clock, 1, 1);
+  ClockedReader reader("reader", *clock, 1, 1);
   ImmediateMemory memory("memory", ImmediateMemory::Way::error, sc_core::SC_ZERO_TIME);
   reader.memory.socket.bind(memory.socket);
   EXPECT_THROW(clock->run(cycles(100)), SimulationFault);
@@ -405,7 +405,7 @@ TEST_F(MemoryPortTest, ATimedPortAsksOutOfOrderAndBehindTheClockInTheSameCyclesE
       fresh_simulation();
       clock = std::make_unique<ClockDomain>("clock", 735);
       TimedReader reader("reader", *clock);
-      Reader later("later", *clock, 1, 0);  // for the clock to advance
+      ClockedReader later("later", *clock, 1, 0);  // for the clock to advance
       FixedLatencyMemory memory("memory", *clock, 10, 48, 2);
       const std::unique_ptr<Relay> relay = bind(reader.memory.socket, memory, relayed);
       later.memory.socket.bind(memory.port(1));
@@ -436,7 +436,7 @@ TEST_F(MemoryPortTest, AnAccessAheadOfTimeDoesNotDelayAnEarlierOne) {
 
 TEST_F(MemoryPortTest, ABlockingMemoryOfAnotherMakeIsAskedAheadOfTheClockAndBehindIt) {
   TimedReader reader("reader", *clock);
-  Reader later("later", *clock, 1, 0);
+  ClockedReader later("later", *clock, 1, 0);
   foreign::Dram dram("dram", cycles(0), cycles(10), cycles(25.5));
   dram.never_refresh();
   FixedLatencyMemory memory("memory", *clock, 10, 32, 1);
@@ -494,7 +494,7 @@ TEST_F(MemoryPortTest, ABlockingMemoryThatWaitsIsNamed) {
 }
 
 TEST_F(MemoryPortTest, AtCycleABlockingMemoryMayWait) {
-  Reader reader("reader", *clock, 2, 3);
+  ClockedReader reader("reader", *clock, 2, 3);
   WaitingMemory memory("memory");
   reader.memory.socket.bind(memory.socket);
   EXPECT_TRUE(clock->run_to_rest(cycles(1000)));
@@ -502,7 +502,7 @@ TEST_F(MemoryPortTest, AtCycleABlockingMemoryMayWait) {
 }
 
 TEST_F(MemoryPortTest, ARequestSaysWhoAsksAndForWhat) {
-  Reader reader("reader", *clock, 2, 3);
+  ClockedReader reader("reader", *clock, 2, 3);
   FixedLatencyMemory memory("memory", *clock, 10, 32, 1);
   const std::unique_ptr<Relay> relay = bind(reader.memory.socket, memory, true);
   clock->run(cycles(100));
@@ -521,7 +521,7 @@ TEST_F(MemoryPortTest, ARequestSaysWhoAsksAndForWhat) {
 TEST_F(MemoryPortTest, AnAccessOnBehalfOfAnotherKeepsItsOrigin) {
   const MemoryRequest request{256, 64, tlm::TLM_WRITE_COMMAND, {MemoryTraffic::depth_stencil, 7}};
   TimedReader timed("timed", *clock);
-  Reader reader("reader", *clock, 4, 0);
+  ClockedReader reader("reader", *clock, 4, 0);
   FixedLatencyMemory memory("memory", *clock, 10, 64, 2);
   const std::unique_ptr<Relay> relay = bind(timed.memory.socket, memory, true);
   reader.memory.socket.bind(memory.port(1));
@@ -546,7 +546,7 @@ TEST_F(MemoryPortTest, AnInitiatorOfAnotherMakeIsServedWithoutAnOrigin) {
 }
 
 TEST_F(MemoryPortTest, AMemoryOfAnotherMakeAnswersOutOfOrderUnderBackPressureAndRefresh) {
-  Reader reader("reader", *clock, 16, 2000, 256);
+  ClockedReader reader("reader", *clock, 16, 2000, 256);
   foreign::Dram dram("dram", cycles(1.3), cycles(30.7), cycles(61.1));
   reader.memory.socket.bind(dram.socket);
   while (!clock->run_to_rest(cycles(1000))) {}
@@ -567,7 +567,7 @@ TEST_F(MemoryPortTest, TheKernelKeepsStepWithTheClockWhereAMemoryHasTimeOfItsOwn
     fresh_simulation();
     clock = std::make_unique<ClockDomain>("clock", 1000);
     ClockDomain slow("slow", 4000);
-    Reader reader("reader", *clock, 1, 10);
+    ClockedReader reader("reader", *clock, 1, 10);
     FixedLatencyMemory memory("memory", kind == 1 ? slow : *clock, 2, 32, 1);
     const std::unique_ptr<Relay> relay = bind(reader.memory.socket, memory, kind == 2);
     clock->set_cycles_per_activation(64);
@@ -606,7 +606,7 @@ class DriftingMemory : public sc_core::sc_module, private tlm::tlm_fw_transport_
 };
 
 TEST_F(MemoryPortTest, AnEarlyCompletionMemoryMayDeclareTimeOfItsOwn) {
-  Reader reader("reader", *clock, 1, 10);
+  ClockedReader reader("reader", *clock, 1, 10);
   DriftingMemory memory("memory", *clock);
   reader.memory.socket.bind(memory.socket);
   clock->set_cycles_per_activation(64);
@@ -626,7 +626,7 @@ std::string fault_before_rest(ClockDomain& clock) {
 }
 
 TEST_F(MemoryPortTest, AMemoryThatFallsSilentIsNamedWithTheOldestRequest) {
-  Reader reader("reader", *clock, 4, 100);
+  ClockedReader reader("reader", *clock, 4, 100);
   foreign::Dram dram("dram", cycles(1), cycles(30), cycles(60));
   dram.fall_silent_after(10);
   reader.memory.socket.bind(dram.socket);
@@ -639,7 +639,7 @@ TEST_F(MemoryPortTest, AMemoryThatFallsSilentIsNamedWithTheOldestRequest) {
 }
 
 TEST_F(MemoryPortTest, AMemoryWithoutTimersThatFallsSilentIsNamedAtOnce) {
-  Reader reader("reader", *clock, 4, 100);
+  ClockedReader reader("reader", *clock, 4, 100);
   foreign::Dram dram("dram", cycles(1), cycles(30), cycles(60));
   dram.never_refresh();
   dram.fall_silent_after(0);
@@ -651,7 +651,7 @@ TEST_F(MemoryPortTest, AMemoryWithoutTimersThatFallsSilentIsNamedAtOnce) {
 }
 
 TEST_F(MemoryPortTest, AnErrorResponseFromAProcessOfTheMemoryIsAFaultOfThePort) {
-  Reader reader("reader", *clock, 4, 100);
+  ClockedReader reader("reader", *clock, 4, 100);
   foreign::Dram dram("dram", cycles(1), cycles(30), cycles(60));
   dram.answer_with(tlm::TLM_ADDRESS_ERROR_RESPONSE);
   reader.memory.socket.bind(dram.socket);
@@ -661,7 +661,7 @@ TEST_F(MemoryPortTest, AnErrorResponseFromAProcessOfTheMemoryIsAFaultOfThePort) 
 }
 
 TEST_F(MemoryPortTest, AnAccessThatIsNotNaturallyAlignedIsRefused) {
-  Reader reader("reader", *clock, 8, 0);
+  ClockedReader reader("reader", *clock, 8, 0);
   FixedLatencyMemory memory("memory", *clock, 1, 32, 1);
   reader.memory.socket.bind(memory.port(0));
   for (const auto& [address, bytes] : {std::pair{16U, 32U}, {8U, 16U}, {0U, 48U}, {0U, 0U}, {1U, 2U}}) {

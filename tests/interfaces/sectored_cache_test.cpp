@@ -24,9 +24,9 @@ CacheOrganization of_lines(std::uint32_t lines, std::uint32_t ways = 0, Replacem
 }
 
 /// Reads lines by number.
-class Reader {
+class LineReader {
  public:
-  explicit Reader(const CacheOrganization& organization) : cache(organization, counted.statistics) {}
+  explicit LineReader(const CacheOrganization& organization) : cache(organization, counted.statistics) {}
   bool misses(std::uint64_t line) { return cache.access(line * 128, 32, false).filled != 0; }
   std::uint64_t misses_of(const std::vector<std::uint64_t>& lines) {
     std::uint64_t missed = 0;
@@ -37,7 +37,8 @@ class Reader {
   SectoredCache cache;
 };
 
-constexpr Replacement policies[] = {Replacement::lru, Replacement::fifo, Replacement::random, Replacement::tree_plru};
+constexpr Replacement all_policies[] = {Replacement::lru, Replacement::fifo, Replacement::random,
+                                        Replacement::tree_plru};
 
 std::vector<std::uint64_t> rounds_over(std::uint64_t lines, unsigned rounds) {
   std::vector<std::uint64_t> made;
@@ -51,7 +52,7 @@ TEST(SectoredCache, ALoopThatFitsMissesOnceALineAndALongerOneAlways) {
   for (const Replacement replacement : {Replacement::lru, Replacement::fifo}) {
     for (std::uint32_t lines = 1; lines <= 40; ++lines) {
       for (std::uint32_t loop = 1; loop <= lines + 3; ++loop) {
-        Reader reader(of_lines(lines, 0, replacement));
+        LineReader reader(of_lines(lines, 0, replacement));
         ASSERT_EQ(reader.misses_of(rounds_over(loop, 5)), loop <= lines ? loop : 5 * loop) << loop << " in " << lines;
         const SectoredCacheStatistics& counts = reader.counted.statistics;
         ASSERT_EQ(counts.sector_misses_compulsory.value(), loop);
@@ -66,15 +67,15 @@ TEST(SectoredCache, ALoopThatFitsMissesOnceALineAndALongerOneAlways) {
 // machine", CACM 12(6), 1969.
 TEST(SectoredCache, WithFifoALargerCacheMayMissMore) {
   const std::vector<std::uint64_t> references = {1, 2, 3, 4, 1, 2, 5, 1, 2, 3, 4, 5};
-  EXPECT_EQ(Reader(of_lines(3, 0, Replacement::fifo)).misses_of(references), 9U);
-  EXPECT_EQ(Reader(of_lines(4, 0, Replacement::fifo)).misses_of(references), 10U);
-  EXPECT_EQ(Reader(of_lines(3)).misses_of(references), 10U);
-  EXPECT_EQ(Reader(of_lines(4)).misses_of(references), 8U);
+  EXPECT_EQ(LineReader(of_lines(3, 0, Replacement::fifo)).misses_of(references), 9U);
+  EXPECT_EQ(LineReader(of_lines(4, 0, Replacement::fifo)).misses_of(references), 10U);
+  EXPECT_EQ(LineReader(of_lines(3)).misses_of(references), 10U);
+  EXPECT_EQ(LineReader(of_lines(4)).misses_of(references), 8U);
 }
 
 // The tree of four ways after reads of its ways 0, 1, 2, 3 leads to 0; a hit of 0 turns it to the other half, 2.
 TEST(SectoredCache, ATreeLeadsAwayFromWhatWasUsed) {
-  Reader reader(of_lines(4, 0, Replacement::tree_plru));
+  LineReader reader(of_lines(4, 0, Replacement::tree_plru));
   EXPECT_EQ(reader.misses_of({10, 11, 12, 13}), 4U);
   EXPECT_FALSE(reader.misses(10));
   EXPECT_TRUE(reader.misses(14)) << "takes the place of 12, though 11 was not used for longer";
@@ -91,8 +92,8 @@ TEST(SectoredCache, RandomReplacementMissesALoopOfALineTooManyTwiceARound) {
   for (const std::uint32_t seed : {1U, 2U, 3U}) {
     CacheOrganization organization = of_lines(64, 0, Replacement::random);
     organization.random_seed = seed;
-    missed.push_back(Reader(organization).misses_of(rounds));
-    EXPECT_EQ(missed.back(), Reader(organization).misses_of(rounds)) << "the same again";
+    missed.push_back(LineReader(organization).misses_of(rounds));
+    EXPECT_EQ(missed.back(), LineReader(organization).misses_of(rounds)) << "the same again";
     EXPECT_NEAR(static_cast<double>(missed.back()), 65 + 798, 64);
   }
   EXPECT_NE(missed[0], missed[1]);
@@ -101,7 +102,7 @@ TEST(SectoredCache, RandomReplacementMissesALoopOfALineTooManyTwiceARound) {
 TEST(SectoredCache, LinesOfOneSetAreConflictsAndOnesTooManyAreCapacity) {
   constexpr std::uint32_t sets = 8;
   {
-    Reader reader(of_lines(4 * sets, 4));
+    LineReader reader(of_lines(4 * sets, 4));
     for (unsigned round = 0; round < 10; ++round) {
       for (std::uint64_t line = 0; line < 5; ++line) EXPECT_TRUE(reader.misses(line * sets));
     }
@@ -110,7 +111,7 @@ TEST(SectoredCache, LinesOfOneSetAreConflictsAndOnesTooManyAreCapacity) {
     EXPECT_EQ(reader.counted.statistics.sector_misses_conflict.value(), 45U);
   }
   {
-    Reader reader(of_lines(4 * sets, 4));
+    LineReader reader(of_lines(4 * sets, 4));
     reader.misses_of(rounds_over(5 * sets, 10));
     EXPECT_EQ(reader.counted.statistics.sector_misses_compulsory.value(), 5U * sets);
     EXPECT_EQ(reader.counted.statistics.sector_misses_capacity.value(), 45U * sets);
@@ -120,9 +121,9 @@ TEST(SectoredCache, LinesOfOneSetAreConflictsAndOnesTooManyAreCapacity) {
 
 TEST(SectoredCache, HashedSetsSpreadAPowerOfTwoStride) {
   CacheOrganization organization = of_lines(64, 4);  // 16 sets
-  Reader plain(organization);
+  LineReader plain(organization);
   organization.hashes_sets = true;
-  Reader hashed(organization);
+  LineReader hashed(organization);
   for (unsigned round = 0; round < 4; ++round) {
     for (std::uint64_t line = 0; line < 64; ++line) {
       plain.misses(16 * line);
@@ -134,7 +135,7 @@ TEST(SectoredCache, HashedSetsSpreadAPowerOfTwoStride) {
 }
 
 TEST(SectoredCache, APinnedLineStaysAndWithoutOthersNoneCanBeHad) {
-  for (const Replacement replacement : policies) {
+  for (const Replacement replacement : all_policies) {
     Counted counted;
     SectoredCache cache(of_lines(4, 2, replacement), counted.statistics);
     SectoredCache::Evicted evicted;
@@ -162,8 +163,8 @@ TEST(SectoredCache, APinnedLineStaysAndWithoutOthersNoneCanBeHad) {
 }
 
 TEST(SectoredCache, AStreamPassesByALineThatIsKept) {
-  for (const Replacement replacement : policies) {
-    Reader reader(of_lines(8, 4, replacement));
+  for (const Replacement replacement : all_policies) {
+    LineReader reader(of_lines(8, 4, replacement));
     for (const std::uint64_t line : {0U, 2U, 4U}) {
       reader.misses(line);
       reader.cache.keep(reader.cache.find(line * 128));
@@ -178,9 +179,9 @@ TEST(SectoredCache, AStreamPassesByALineThatIsKept) {
 }
 
 TEST(SectoredCache, OfLinesThatAreAllKeptThePolicyChoosesAndWhatComesIsNotKept) {
-  for (const Replacement replacement : policies) {
-    Reader reader(of_lines(4, 0, replacement));
-    Reader without(of_lines(4, 0, replacement));
+  for (const Replacement replacement : all_policies) {
+    LineReader reader(of_lines(4, 0, replacement));
+    LineReader without(of_lines(4, 0, replacement));
     for (std::uint64_t line = 0; line < 4; ++line) {
       reader.misses(line);
       without.misses(line);
@@ -203,7 +204,7 @@ TEST(SectoredCache, OfLinesThatAreAllKeptThePolicyChoosesAndWhatComesIsNotKept) 
 }
 
 TEST(SectoredCache, ALineIsKeptForAsLongAsItHoldsTheSame) {
-  Reader reader(of_lines(2));
+  LineReader reader(of_lines(2));
   reader.misses(0);
   reader.cache.keep(reader.cache.find(0));
   reader.misses_of({1, 2});
@@ -274,7 +275,7 @@ TEST(SectoredCache, ALineGoesWithAMaskWhereASectorIsNotWhole) {
 }
 
 TEST(SectoredCache, AFlushTakesDirtySectorsOnceAndLeavesTheLines) {
-  Reader reader(of_lines(16, 4));
+  LineReader reader(of_lines(16, 4));
   std::vector<std::pair<std::uint64_t, std::uint32_t>> taken;
   const auto take = [&](std::uint64_t address, std::uint32_t sectors) { taken.emplace_back(address, sectors); };
   reader.cache.access(0, 32, true);
@@ -307,7 +308,7 @@ TEST(SectoredCache, SaysHowFullItWas) {
 TEST(SectoredCache, WithoutTheSecondCacheConflictsAreCountedAsCapacity) {
   CacheOrganization organization = of_lines(4, 1);
   organization.tells_conflicts = false;
-  Reader reader(organization);
+  LineReader reader(organization);
   reader.misses_of({0, 4, 0, 4});
   EXPECT_EQ(reader.counted.statistics.sector_misses_compulsory.value(), 2U);
   EXPECT_EQ(reader.counted.statistics.sector_misses_capacity.value(), 2U);

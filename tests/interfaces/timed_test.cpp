@@ -80,8 +80,8 @@ struct Way {
 };
 
 /// A sender and a receiver, and a link between them.
-struct Pair {
-  Pair(Way way, unsigned depth, unsigned latency, Cycle cycles_per_item) {
+struct TimedPair {
+  TimedPair(Way way, unsigned depth, unsigned latency, Cycle cycles_per_item) {
     fresh_simulation();
     clock = std::make_unique<ClockDomain>("clock", 1000);
     sender = std::make_unique<Sender>("sender", *clock, way.transport);
@@ -112,7 +112,7 @@ class TimedLink : public ::testing::TestWithParam<Way> {};
 
 TEST_P(TimedLink, AnItemOfCycleTThroughLatencyLIsVisibleAtTPlusL) {
   for (const unsigned latency : {1U, 2U, 7U}) {
-    Pair pair(GetParam(), 4, latency, 1);
+    TimedPair pair(GetParam(), 4, latency, 1);
     pair.sender->at = {10, 25};
     pair.run();
     EXPECT_EQ(firsts(pair.taker->came), (std::vector<Cycle>{10 + latency, 25 + latency}));
@@ -134,7 +134,7 @@ TEST_P(TimedLink, TheSendersPipelineAddsItsLatency) {
 
 TEST_P(TimedLink, BlockedAtTMinus1ReadyAtT) {
   // One place, an item every 10 cycles. An item that leaves the queue in cycle t makes room for one of cycle t + 1.
-  Pair pair(GetParam(), 1, 1, 10);
+  TimedPair pair(GetParam(), 1, 1, 10);
   pair.sender->at = {0, 0, 0, 0};
   pair.run();
   EXPECT_EQ(pair.taker->left, (std::vector<Cycle>{1, 11, 21, 31}));
@@ -142,7 +142,7 @@ TEST_P(TimedLink, BlockedAtTMinus1ReadyAtT) {
 }
 
 TEST_P(TimedLink, AQueueHoldsItsDepthAndNoMore) {
-  Pair pair(GetParam(), 3, 1, 100);
+  TimedPair pair(GetParam(), 3, 1, 100);
   pair.sender->at = {0, 0, 0, 0, 0};
   pair.run();
   // Three places, and the place of an item is free once it has left.
@@ -153,7 +153,7 @@ TEST_P(TimedLink, AQueueHoldsItsDepthAndNoMore) {
 }
 
 TEST_P(TimedLink, ABatchTakesItsCyclesAndAsManyPlaces) {
-  Pair pair(GetParam(), 8, 2, 1);
+  TimedPair pair(GetParam(), 8, 2, 1);
   pair.sender->at = {CycleInterval(10, 14), CycleInterval(15, 15)};
   pair.sender->beats = {5, 1};
   pair.run();
@@ -164,7 +164,7 @@ TEST_P(TimedLink, ABatchTakesItsCyclesAndAsManyPlaces) {
 }
 
 TEST_P(TimedLink, ABatchLargerThanTheQueuePassesAllTheSame) {
-  Pair pair(GetParam(), 2, 1, 1);
+  TimedPair pair(GetParam(), 2, 1, 1);
   pair.sender->at = {CycleInterval(0, 15), CycleInterval(16, 31), CycleInterval(32, 32)};
   pair.sender->beats = {16, 16, 1};
   pair.run();
@@ -176,7 +176,7 @@ TEST_P(TimedLink, ItemsComeInOrderEachOnceUnderAnyStallsAndLater) {
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     Cycle unstalled = 0;
     for (const bool stalls : {false, true}) {
-      Pair pair(GetParam(), static_cast<unsigned>(1 + seed % 5), static_cast<unsigned>(1 + seed % 3), 2);
+      TimedPair pair(GetParam(), static_cast<unsigned>(1 + seed % 5), static_cast<unsigned>(1 + seed % 3), 2);
       pair.sender->at.assign(100, 0);
       if (stalls) {
         pair.sender->out.stall_randomly(seed, 96);
@@ -214,7 +214,7 @@ INSTANTIATE_TEST_SUITE_P(Ways, TimedLink,
                          });
 
 TEST(TimedLink, AGateKeepsItemsInTheQueue) {
-  Pair pair({Transport::non_blocking, false}, 4, 1, 1);
+  TimedPair pair({Transport::non_blocking, false}, 4, 1, 1);
   bool open = false;
   pair.taker->in.set_gate([&] { return open; });
   pair.sender->at = {0, 0, 0};

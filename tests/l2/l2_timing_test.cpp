@@ -19,12 +19,12 @@
 namespace vrpipe {
 namespace {
 
-constexpr Cycle latency = 10;
+constexpr Cycle l2_latency = 10;
 /// Of a sector, from the memory below: 40 cycles and two to move it.
-constexpr Cycle fill = 40 + 2;
-constexpr Cycle hit = latency + 1;
-constexpr Cycle miss = 1 + fill + hit;
-constexpr std::uint64_t line = 128;
+constexpr Cycle fill_cycles = 40 + 2;
+constexpr Cycle hit_cycles = l2_latency + 1;
+constexpr Cycle miss_cycles = 1 + fill_cycles + hit_cycles;
+constexpr std::uint64_t line_bytes = 128;
 
 enum class Time { annotated, clocked };
 
@@ -126,38 +126,40 @@ INSTANTIATE_TEST_SUITE_P(With, L2AtEachFidelity, ::testing::Values(Time::annotat
                          });
 
 TEST_P(L2AtEachFidelity, ASectorIsFetchedWhenItIsFirstRead) {
-  EXPECT_EQ(run(GetParam(), {read(100, 64), read(300, 64)}), (std::vector<Cycle>{100 + miss, 300 + hit}));
+  EXPECT_EQ(run(GetParam(), {read(100, 64), read(300, 64)}), (std::vector<Cycle>{100 + miss_cycles, 300 + hit_cycles}));
   EXPECT_EQ(bytes_below(false), 32U);
 }
 
 TEST_P(L2AtEachFidelity, AReadOfASectorOnItsWayWaitsForThatFill) {
-  const Cycle there = 100 + 1 + fill;
-  EXPECT_EQ(run(GetParam(), {read(100, 64), read(120, 64)}), (std::vector<Cycle>{there + hit, there + 1 + hit}));
+  const Cycle there = 100 + 1 + fill_cycles;
+  EXPECT_EQ(run(GetParam(), {read(100, 64), read(120, 64)}),
+            (std::vector<Cycle>{there + hit_cycles, there + 1 + hit_cycles}));
   EXPECT_EQ(bytes_below(false), 32U);
 }
 
 TEST_P(L2AtEachFidelity, NeighbouringSectorsAreFetchedInOneAccess) {
   // Eight cycles to move 128 bytes from below; the bank passes a sector a cycle, as does the port.
-  EXPECT_EQ(run(GetParam(), {read(100, 0, 128)}), (std::vector<Cycle>{100 + 1 + 40 + 8 + 4 + latency}));
+  EXPECT_EQ(run(GetParam(), {read(100, 0, 128)}), (std::vector<Cycle>{100 + 1 + 40 + 8 + 4 + l2_latency}));
   EXPECT_EQ(below->traffic().accesses(MemoryTraffic::color, false), 1U);
 }
 
 TEST_P(L2AtEachFidelity, AWriteOfWholeSectorsNeedsNoFill) {
   const std::vector<Cycle> completed = run(GetParam(), {write(100, 64, 64), read(200, 64), read(300, 96)});
-  EXPECT_EQ(completed[1], 200 + hit);
-  EXPECT_EQ(completed[2], 300 + hit);
+  EXPECT_EQ(completed[1], 200 + hit_cycles);
+  EXPECT_EQ(completed[2], 300 + hit_cycles);
   EXPECT_EQ(bytes_below(false), 0U);
 }
 
 TEST_P(L2AtEachFidelity, AWriteOfPartOfASectorFetchesIt) {
-  EXPECT_EQ(run(GetParam(), {write(100, 80, 16), read(300, 64, 16)}), (std::vector<Cycle>{100 + miss, 300 + hit}));
+  EXPECT_EQ(run(GetParam(), {write(100, 80, 16), read(300, 64, 16)}),
+            (std::vector<Cycle>{100 + miss_cycles, 300 + hit_cycles}));
   EXPECT_EQ(bytes_below(false), 32U);
 }
 
 TEST_P(L2AtEachFidelity, WrittenThroughItIsServedWithTheMemoryBelowAndLeavesWhatIsThere) {
   set("write_policy", "write-through");
   EXPECT_EQ(run(GetParam(), {read(100, 64), write(300, 64), read(500, 64)}),
-            (std::vector<Cycle>{100 + miss, 300 + miss, 500 + hit}));
+            (std::vector<Cycle>{100 + miss_cycles, 300 + miss_cycles, 500 + hit_cycles}));
   EXPECT_EQ(bytes_below(true), 32U);
   EXPECT_EQ(bytes_below(false), 32U);
   EXPECT_EQ(model->statistics().sector_accesses.value(), 2U) << "the reads";
@@ -166,7 +168,7 @@ TEST_P(L2AtEachFidelity, WrittenThroughItIsServedWithTheMemoryBelowAndLeavesWhat
 
 TEST_P(L2AtEachFidelity, WrittenThroughWhatIsNotThereIsNotKept) {
   set("write_policy", "write-through");
-  EXPECT_EQ(run(GetParam(), {write(100, 0, 128), read(300, 0)})[1], 300 + miss);
+  EXPECT_EQ(run(GetParam(), {write(100, 0, 128), read(300, 0)})[1], 300 + miss_cycles);
   EXPECT_EQ(bytes_below(true), 128U);
 }
 
@@ -174,12 +176,12 @@ TEST_P(L2AtEachFidelity, WrittenThroughWhatIsNotThereIsNotKept) {
 TEST_P(L2AtEachFidelity, WrittenThroughGoesBelowInTheOrderOfItsBank) {
   set("write_policy", "write-through");
   const std::vector<Cycle> completed = run(GetParam(), {write(100, 64), read(100, 64)});
-  EXPECT_EQ(completed[0], 100 + miss);
+  EXPECT_EQ(completed[0], 100 + miss_cycles);
   EXPECT_GT(completed[1], completed[0]);
 }
 
 TEST_P(L2AtEachFidelity, SeesHowLongFillsTakeAndHowManyAreOnTheirWay) {
-  run(GetParam(), {read(100, 0, 64), read(110, line), read(500, 2 * line)});
+  run(GetParam(), {read(100, 0, 64), read(110, line_bytes), read(500, 2 * line_bytes)});
   const Histogram& filling = model->statistics().sectors_filling;
   const Histogram& fills = model->statistics().fill_cycles;
   // Of the first access the second sector finds the first, the second access both, the third nobody.
@@ -188,13 +190,14 @@ TEST_P(L2AtEachFidelity, SeesHowLongFillsTakeAndHowManyAreOnTheirWay) {
   EXPECT_EQ(filling.largest(), 2U);
   // Of a run of sectors each is seen.
   EXPECT_EQ(fills.count(), 4U);
-  EXPECT_EQ(fills.sum(), 2 * (40U + 4) + 2 * fill);
+  EXPECT_EQ(fills.sum(), 2 * (40U + 4) + 2 * fill_cycles);
 }
 
 // Sets are 16 lines apart.
 TEST_P(L2AtEachFidelity, DirtySectorsOfALineThatGoesAreWrittenBackInTheNameOfWhoWroteThem) {
   constexpr MemoryOrigin depth{MemoryTraffic::depth_stencil, 0};
-  std::vector<Access> accesses = {write(100, 32), write(110, 64), read(200, 16 * line), read(300, 32 * line)};
+  std::vector<Access> accesses = {write(100, 32), write(110, 64), read(200, 16 * line_bytes),
+                                  read(300, 32 * line_bytes)};
   accesses[0].request.origin = depth;
   accesses[1].request.origin = depth;
   run(GetParam(), accesses);
@@ -208,24 +211,27 @@ TEST_P(L2AtEachFidelity, BanksWorkSideBySideAndOneAfterTheOtherInThemselves) {
     start();
     // Written before, so that all hit.
     const auto completed =
-        run(GetParam(), {{write(10, 0), write(20, line), write(30, 2 * line), read(200, 0)}, {read(200, address)}});
+        run(GetParam(),
+            {{write(10, 0), write(20, line_bytes), write(30, 2 * line_bytes), read(200, 0)}, {read(200, address)}});
     return std::max(completed[0].back(), completed[1].back());
   };
-  EXPECT_EQ(second(line), 200 + hit);
-  EXPECT_EQ(second(2 * line), 200 + hit + 1);
+  EXPECT_EQ(second(line_bytes), 200 + hit_cycles);
+  EXPECT_EQ(second(2 * line_bytes), 200 + hit_cycles + 1);
 }
 
 TEST_P(L2AtEachFidelity, APortPassesItsBytesACycle) {
-  const std::vector<Cycle> completed = run(GetParam(), {write(10, 0), write(20, line), read(200, 0), read(200, line)});
-  EXPECT_EQ(completed[2], 200 + hit);
-  EXPECT_EQ(completed[3], 200 + hit + 1);
+  const std::vector<Cycle> completed =
+      run(GetParam(), {write(10, 0), write(20, line_bytes), read(200, 0), read(200, line_bytes)});
+  EXPECT_EQ(completed[2], 200 + hit_cycles);
+  EXPECT_EQ(completed[3], 200 + hit_cycles + 1);
 }
 
 TEST_P(L2AtEachFidelity, AWiderPortPassesMore) {
   port_width = 2;
-  const std::vector<Cycle> completed = run(GetParam(), {write(10, 0), write(20, line), read(200, 0), read(200, line)});
-  EXPECT_EQ(completed[2], 200 + hit);
-  EXPECT_EQ(completed[3], 200 + hit);
+  const std::vector<Cycle> completed =
+      run(GetParam(), {write(10, 0), write(20, line_bytes), read(200, 0), read(200, line_bytes)});
+  EXPECT_EQ(completed[2], 200 + hit_cycles);
+  EXPECT_EQ(completed[3], 200 + hit_cycles);
 }
 
 // Its parts go to their banks on their own; it is answered with the last.
@@ -240,38 +246,39 @@ TEST_P(L2AtEachFidelity, ARequestOfSeveralLinesIsAnAccessToEach) {
 // "Blocked at t - 1, ready at t".
 TEST_F(L2Test, AMissWithoutAnMshrWaitsForAFillOfItsBank) {
   set("mshrs", "1");
-  const Cycle there = 100 + 1 + fill;
-  const std::vector<Cycle> completed = run(Time::clocked, {read(100, 0), read(101, 2 * line), read(102, line)});
-  EXPECT_EQ(completed[0], there + hit);
+  const Cycle there = 100 + 1 + fill_cycles;
+  const std::vector<Cycle> completed =
+      run(Time::clocked, {read(100, 0), read(101, 2 * line_bytes), read(102, line_bytes)});
+  EXPECT_EQ(completed[0], there + hit_cycles);
   // Taken when the first fill has passed the bank, a cycle; its own fill leaves then.
-  EXPECT_EQ(completed[1], there + 1 + fill + hit);
-  EXPECT_EQ(completed[2], 102 + miss) << "another bank has its own";
+  EXPECT_EQ(completed[1], there + 1 + fill_cycles + hit_cycles);
+  EXPECT_EQ(completed[2], 102 + miss_cycles) << "another bank has its own";
 }
 
 TEST_F(L2Test, AHitBehindAMissWithoutAnMshrWaitsInItsBank) {
   set("mshrs", "1");
-  const std::vector<Cycle> completed =
-      run(Time::clocked, {write(10, 4 * line), read(100, 0), read(101, 2 * line), read(102, 4 * line)});
-  EXPECT_GT(completed[3], 100 + 1 + fill + latency);
+  const std::vector<Cycle> completed = run(Time::clocked, {write(10, 4 * line_bytes), read(100, 0),
+                                                           read(101, 2 * line_bytes), read(102, 4 * line_bytes)});
+  EXPECT_GT(completed[3], 100 + 1 + fill_cycles + l2_latency);
 }
 
 TEST_F(L2Test, ALineThatIsBeingFilledDoesNotGo) {
   // Both ways of a set are on their way when a third line wants one.
-  const std::vector<Cycle> completed =
-      run(Time::clocked, {read(100, 0), read(101, 16 * line), read(102, 32 * line), read(400, 16 * line)});
-  EXPECT_EQ(completed[0], 100 + miss);
-  EXPECT_GT(completed[2], 100 + 1 + fill + fill + hit);
-  EXPECT_EQ(completed[3], 400 + hit) << "the first line went";
+  const std::vector<Cycle> completed = run(Time::clocked, {read(100, 0), read(101, 16 * line_bytes),
+                                                           read(102, 32 * line_bytes), read(400, 16 * line_bytes)});
+  EXPECT_EQ(completed[0], 100 + miss_cycles);
+  EXPECT_GT(completed[2], 100 + 1 + fill_cycles + fill_cycles + hit_cycles);
+  EXPECT_EQ(completed[3], 400 + hit_cycles) << "the first line went";
 }
 
 TEST_F(L2Test, AFullPortHoldsRequestsBack) {
   set("port_requests", "1");
   set("mshrs", "1");
-  run(Time::clocked, {read(100, 0), read(100, 2 * line), read(100, 4 * line), read(100, 6 * line)});
+  run(Time::clocked, {read(100, 0), read(100, 2 * line_bytes), read(100, 4 * line_bytes), read(100, 6 * line_bytes)});
   // The first is taken by its bank at 101, the second waits there for the MSHR and takes the port's place.
   EXPECT_EQ(units[0]->issued[0], 100U);
   EXPECT_GT(units[0]->issued[2], 101U);
-  EXPECT_GT(units[0]->issued[3], 100 + fill);
+  EXPECT_GT(units[0]->issued[3], 100 + fill_cycles);
 }
 
 // The first leaves its place in cycle 101, in which the second comes, before or after.
@@ -280,9 +287,9 @@ TEST_F(L2Test, APlaceIsFreeFromTheNextCycleOnWhoeverTicksFirst) {
     start();
     set("port_requests", "1");
     tick_order = order;
-    const std::vector<Cycle> completed = run(Time::clocked, {read(100, 0), read(101, line)});
-    EXPECT_EQ(completed[0], 100 + miss);
-    EXPECT_EQ(completed[1], 102 + miss);
+    const std::vector<Cycle> completed = run(Time::clocked, {read(100, 0), read(101, line_bytes)});
+    EXPECT_EQ(completed[0], 100 + miss_cycles);
+    EXPECT_EQ(completed[1], 102 + miss_cycles);
   }
 }
 
@@ -307,9 +314,9 @@ std::vector<std::vector<Access>> random_accesses(std::uint64_t seed, Cycle apart
   for (std::uint64_t i = 0; i < 600; ++i) {
     const std::uint64_t bits = mix(seed + i);
     const unsigned bytes = 16U << (bits % 4);
-    const std::uint64_t address = (bits >> 8) % (lines * line) / bytes * bytes;
+    const std::uint64_t address = (bits >> 8) % (lines * line_bytes) / bytes * bytes;
     Access access = (bits >> 40) % 3 == 0 ? write(at, address, bytes) : read(at, address, bytes);
-    if (address / line % 7 == 0) access.request.origin.traffic = MemoryTraffic::attribute;
+    if (address / line_bytes % 7 == 0) access.request.origin.traffic = MemoryTraffic::attribute;
     accesses[bits >> 32 & 1].push_back(access);
     at += apart;
   }
@@ -371,7 +378,7 @@ TEST_P(L2AtEachFidelity, WhatItAsksForIsWhatTheMemoryBelowDelivers) {
 std::vector<std::vector<Access>> stream(bool writes) {
   std::vector<std::vector<Access>> accesses(2);
   for (std::uint64_t i = 0; i < 800; ++i) {
-    accesses[i % 2].push_back(writes ? write(100 + i, i * line) : read(100 + i, i * line));
+    accesses[i % 2].push_back(writes ? write(100 + i, i * line_bytes) : read(100 + i, i * line_bytes));
   }
   return accesses;
 }

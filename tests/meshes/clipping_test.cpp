@@ -18,6 +18,7 @@ namespace vrpipe {
 namespace {
 
 using testing::add_triangle;
+using testing::doubled_area;
 
 /// What is seen of a triangle along a ray.
 struct Hit {
@@ -55,12 +56,6 @@ std::optional<Hit> cast_ray(const Camera& camera, const Corners& corners, double
   if (u < 0 || v < 0 || u + v > 1) return {};
   if (z < static_cast<double>(camera.near_plane) || z > static_cast<double>(camera.far_plane)) return {};
   return Hit{z, {1 - u - v, u, v}};
-}
-
-double doubled_area(const MeshTriangle& t) {
-  const auto& v = t.vertices;
-  return (static_cast<double>(v[1].x) - v[0].x) * (static_cast<double>(v[2].y) - v[0].y) -
-         (static_cast<double>(v[1].y) - v[0].y) * (static_cast<double>(v[2].x) - v[0].x);
 }
 
 /// Perspective-correct interpolation, if a window point lies in a piece.

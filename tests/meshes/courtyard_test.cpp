@@ -9,19 +9,17 @@
 #include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/scene.h>
 
+#include "mesh_test_support.h"
+
 namespace vrpipe {
 namespace {
+
+using testing::doubled_area;
 
 LoadedScene load_courtyard() {
   SceneRequest request;
   request.scene = "builtin:courtyard";
   return load_scene(request);
-}
-
-double doubled_area(const MeshTriangle& t) {
-  const auto& v = t.vertices;
-  return (static_cast<double>(v[1].x) - v[0].x) * (static_cast<double>(v[2].y) - v[0].y) -
-         (static_cast<double>(v[1].y) - v[0].y) * (static_cast<double>(v[2].x) - v[0].x);
 }
 
 /// Depth of the meshes at every pixel's sample, front faces alone; 1 where there is none.

@@ -24,6 +24,13 @@ inline void add_triangle(Mesh& mesh, const Triangle3& corners) {
   mesh.triangles.push_back({first, first + 1, first + 2});
 }
 
+/// On the screen, where y points down: below 0 of one that faces the camera.
+inline double doubled_area(const MeshTriangle& t) {
+  const auto& v = t.vertices;
+  return (static_cast<double>(v[1].x) - v[0].x) * (static_cast<double>(v[2].y) - v[0].y) -
+         (static_cast<double>(v[1].y) - v[0].y) * (static_cast<double>(v[2].x) - v[0].x);
+}
+
 /// The same numbers with every standard library.
 class Numbers {
  public:

@@ -4,19 +4,19 @@
 
 #include <vrpipe/platforms/wiring.h>
 
+#include "support/fidelities.h"
 #include "support/foreign_memory.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::fidelities_with_time;
 using testing::request_of;
 using testing::run;
 using testing::same_image;
 using testing::statistic;
 using testing::strictly;
-
-constexpr Fidelity with_time[] = {Fidelity::lt, Fidelity::at, Fidelity::cycle};
 
 Platform with_attribute_traffic(const std::string& name = "agx-orin") {
   Platform platform = platform_named(name);
@@ -27,8 +27,8 @@ Platform with_attribute_traffic(const std::string& name = "agx-orin") {
   return platform;
 }
 
-RunRequest with_traffic(const Platform& platform, const std::string& variant, Fidelity fidelity,
-                        const std::function<void(RunRequest&)>& change = nullptr) {
+RunRequest attribute_traffic_request(const Platform& platform, const std::string& variant, Fidelity fidelity,
+                                     const std::function<void(RunRequest&)>& change = nullptr) {
   RunRequest request = request_of(variant, fidelity, change);
   request.platform = &platform;
   request.effects = EffectChoice::everything();
@@ -41,9 +41,9 @@ TEST(AttributeTrafficOfAFrame, IsWhatItsSplatsAndPrimitivesNeed) {
   for (const char* name : {"agx-orin", "desktop"}) {
     const Platform platform = with_attribute_traffic(name);
     for (const char* variant : {"baseline", "het+qm"}) {
-      for (const Fidelity fidelity : with_time) {
+      for (const Fidelity fidelity : fidelities_with_time()) {
         const std::string what = std::string(name) + " " + variant + " " + name_of(fidelity);
-        const RunResult result = run(with_traffic(platform, variant, fidelity), draw);
+        const RunResult result = run(attribute_traffic_request(platform, variant, fidelity), draw);
         EXPECT_EQ(statistic(result, "l2.vertex_bytes_read"), splats * 48) << what;
         EXPECT_EQ(statistic(result, "l2.vertex_reads"), splats * 48 / 128) << what << ": whole lines";
         EXPECT_EQ(statistic(result, "l2.vertex_writes"), 0U) << what;
@@ -69,21 +69,22 @@ TEST(AttributeTrafficOfAFrame, IsWhatItsSplatsAndPrimitivesNeed) {
 TEST(AttributeTrafficOfAFrame, ALargeL1OfOneCoreReadsEachPrimitiveOnce) {
   const Draw draw = testing::random_draw(96, 64, 300, 32);
   const Platform platform = with_attribute_traffic();
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     const RunResult result =
-        run(with_traffic(platform, "baseline", fidelity,
-                         [](RunRequest& request) {
-                           request.settings = {{"sm", "cores", "4"}, {"sm", "l1_bytes", "1048576"}};
-                         }),
+        run(attribute_traffic_request(platform, "baseline", fidelity,
+                                      [](RunRequest& request) {
+                                        request.settings = {{"sm", "cores", "4"}, {"sm", "l1_bytes", "1048576"}};
+                                      }),
             draw);
     EXPECT_EQ(statistic(result, "sm.l1.sector_misses"), statistic(result, "sm.l1.sector_misses_compulsory"));
     // Each core may read each primitive once; not every primitive has a quad.
     EXPECT_LE(statistic(result, "l2.attribute_bytes_read"), 4 * result.counts.primitives * 64);
-    const RunResult small = run(with_traffic(platform, "baseline", fidelity,
-                                             [](RunRequest& request) {
-                                               request.settings = {{"sm", "cores", "4"}, {"sm", "l1_bytes", "1024"}};
-                                             }),
-                                draw);
+    const RunResult small =
+        run(attribute_traffic_request(platform, "baseline", fidelity,
+                                      [](RunRequest& request) {
+                                        request.settings = {{"sm", "cores", "4"}, {"sm", "l1_bytes", "1024"}};
+                                      }),
+            draw);
     EXPECT_GT(statistic(small, "l2.attribute_bytes_read"), statistic(result, "l2.attribute_bytes_read"));
   }
 }
@@ -99,30 +100,30 @@ TEST(AttributeTrafficOfAFrame, ChangesNothingButTimeInStrictTermination) {
                                                   request.platform = &platform_named(name);
                                                 }),
                                      draw);
-      for (const Fidelity fidelity : with_time) {
+      for (const Fidelity fidelity : fidelities_with_time()) {
         for (std::uint64_t seed = 0; seed < 3; ++seed) {
           const std::string what =
               std::string(name) + " " + variant + " " + name_of(fidelity) + " " + std::to_string(seed);
           const auto pick = [&](std::uint64_t salt, std::initializer_list<const char*> values) {
             return std::string(*(values.begin() + mix(seed * 16 + salt) % values.size()));
           };
-          const RunResult result =
-              run(with_traffic(platform, variant, fidelity,
-                               [&](RunRequest& request) {
-                                 strictly(request);
-                                 request.settings = {{"l2", "latency_cycles", pick(1, {"1", "146", "900"})},
-                                                     {"l2", "bytes_per_cycle", pick(2, {"32", "128", "1024"})},
-                                                     {"sm", "l1_bytes", pick(3, {"128", "1024", "49152"})},
-                                                     {"sm", "l1_mshrs", pick(4, {"1", "8", "384"})},
-                                                     {"sm", "l1_latency_cycles", pick(5, {"0", "38", "200"})},
-                                                     {"sm", "attribute_writes", pick(6, {"1", "640"})},
-                                                     {"sm", "attribute_bytes", pick(7, {"4", "40", "352"})}};
-                                 if (fidelity != Fidelity::cycle) return;
-                                 request.stall_seed = seed + 1;
-                                 request.stall_per_256 = 40;
-                                 request.tick_order_seed = seed + 7;
-                               }),
-                  draw);
+          const RunResult result = run(
+              attribute_traffic_request(platform, variant, fidelity,
+                                        [&](RunRequest& request) {
+                                          strictly(request);
+                                          request.settings = {{"l2", "latency_cycles", pick(1, {"1", "146", "900"})},
+                                                              {"l2", "bytes_per_cycle", pick(2, {"32", "128", "1024"})},
+                                                              {"sm", "l1_bytes", pick(3, {"128", "1024", "49152"})},
+                                                              {"sm", "l1_mshrs", pick(4, {"1", "8", "384"})},
+                                                              {"sm", "l1_latency_cycles", pick(5, {"0", "38", "200"})},
+                                                              {"sm", "attribute_writes", pick(6, {"1", "640"})},
+                                                              {"sm", "attribute_bytes", pick(7, {"4", "40", "352"})}};
+                                          if (fidelity != Fidelity::cycle) return;
+                                          request.stall_seed = seed + 1;
+                                          request.stall_per_256 = 40;
+                                          request.tick_order_seed = seed + 7;
+                                        }),
+              draw);
           EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color)) << what;
           EXPECT_EQ(result.counts.named(), expected.counts.named()) << what;
           // What runs ahead without time moves nothing, and what repeats it moves all.
@@ -137,7 +138,7 @@ TEST(AttributeTrafficOfAFrame, ChangesNothingButTimeInStrictTermination) {
 TEST(AttributeTrafficOfAFrame, DoesNotDependOnTheOrderOfTicks) {
   const Draw draw = testing::random_draw(96, 64, 400, 34);
   const Platform platform = with_attribute_traffic();
-  RunRequest request = with_traffic(platform, "het+qm", Fidelity::cycle);
+  RunRequest request = attribute_traffic_request(platform, "het+qm", Fidelity::cycle);
   const RunResult expected = run(request, draw);
   for (std::uint64_t seed = 1; seed < 4; ++seed) {
     request.tick_order_seed = seed;
@@ -150,13 +151,13 @@ TEST(AttributeTrafficOfAFrame, DoesNotDependOnTheOrderOfTicks) {
 TEST(AttributeTrafficOfAFrame, SlowerMemoryMakesASlowerFrame) {
   const Draw draw = testing::random_draw(96, 64, 1500, 35);
   const Platform platform = with_attribute_traffic();
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     Cycle before = 0;
     for (const char* bytes : {"1024", "32"}) {
-      const RunResult result = run(with_traffic(platform, "baseline", fidelity,
-                                                [&](RunRequest& request) {
-                                                  request.settings = {{"l2", "bytes_per_cycle", bytes}};
-                                                }),
+      const RunResult result = run(attribute_traffic_request(platform, "baseline", fidelity,
+                                                             [&](RunRequest& request) {
+                                                               request.settings = {{"l2", "bytes_per_cycle", bytes}};
+                                                             }),
                                    draw);
       EXPECT_GT(*result.cycles, before) << bytes << " " << name_of(fidelity);
       before = *result.cycles;
@@ -185,8 +186,8 @@ TEST(AttributeTrafficOfAFrame, TakesAMemoryOfAnotherMake) {
     netlist.connect_memory("l2", "dram");
   };
   const RunResult expected = run(request_of("het+qm", Fidelity::functional, strictly), draw);
-  for (const Fidelity fidelity : with_time) {
-    const RunResult result = run(with_traffic(platform, "het+qm", fidelity, strictly), draw);
+  for (const Fidelity fidelity : fidelities_with_time()) {
+    const RunResult result = run(attribute_traffic_request(platform, "het+qm", fidelity, strictly), draw);
     EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color)) << name_of(fidelity);
     EXPECT_EQ(result.counts.named(), expected.counts.named()) << name_of(fidelity);
     // Attributes are written before they are read, so they are never fetched from below.
@@ -202,10 +203,10 @@ TEST(AttributeTrafficOfAFrame, GoesThroughAnL2ThatMissesAtEveryFidelity) {
   const Platform platform = with_attribute_traffic("agx-orin-lpddr3");
   for (const char* variant : {"baseline", "het+qm"}) {
     const RunResult expected = run(request_of(variant, Fidelity::functional, strictly), draw);
-    const RunResult clocked = run(with_traffic(platform, variant, Fidelity::cycle, strictly), draw);
+    const RunResult clocked = run(attribute_traffic_request(platform, variant, Fidelity::cycle, strictly), draw);
     for (const Fidelity fidelity : fidelities()) {
       const std::string what = std::string(variant) + " " + name_of(fidelity);
-      const RunResult result = run(with_traffic(platform, variant, fidelity, strictly), draw);
+      const RunResult result = run(attribute_traffic_request(platform, variant, fidelity, strictly), draw);
       EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color)) << what;
       EXPECT_EQ(result.counts.named(), expected.counts.named()) << what;
       EXPECT_EQ(statistic(result, "l2.vertex_bytes_read"), splats * 48) << what;
@@ -222,7 +223,7 @@ TEST(AttributeTrafficOfAFrame, GoesThroughAnL2ThatMissesAtEveryFidelity) {
 
 TEST(AttributeTrafficOfAFrame, MayStayUnconnected) {
   const Draw draw = testing::random_draw(64, 64, 300, 37);
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     const RunResult result = run(request_of("baseline", fidelity), draw);
     EXPECT_EQ(statistic(result, "l2.vertex_reads"), 0U);
     EXPECT_EQ(statistic(result, "l2.attribute_writes"), 0U);

@@ -5,19 +5,19 @@
 #include <vrpipe/platforms/wiring.h>
 #include <vrpipe/workloads/scene.h>
 
+#include "support/fidelities.h"
 #include "support/foreign_memory.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::fidelities_with_time;
 using testing::request_of;
 using testing::run;
 using testing::same_image;
 using testing::statistic;
 using testing::strictly;
-
-constexpr Fidelity with_time[] = {Fidelity::lt, Fidelity::at, Fidelity::cycle};
 
 Platform with_z_traffic(const std::string& name = "agx-orin") {
   Platform platform = platform_named(name);
@@ -28,8 +28,8 @@ Platform with_z_traffic(const std::string& name = "agx-orin") {
   return platform;
 }
 
-RunRequest with_traffic(const Platform& platform, const std::string& variant, Fidelity fidelity,
-                        const std::function<void(RunRequest&)>& change = nullptr) {
+RunRequest z_traffic_request(const Platform& platform, const std::string& variant, Fidelity fidelity,
+                             const std::function<void(RunRequest&)>& change = nullptr) {
   RunRequest request = request_of(variant, fidelity, change);
   request.platform = &platform;
   request.effects = EffectChoice::everything();
@@ -54,12 +54,12 @@ TEST(DepthStencilTraffic, IsWhatTheZCachesMove) {
   for (const char* name : {"agx-orin", "desktop"}) {
     const Platform platform = with_z_traffic(name);
     for (const char* variant : {"het", "het+qm"}) {
-      for (const Fidelity fidelity : with_time) {
+      for (const Fidelity fidelity : fidelities_with_time()) {
         const std::string what = std::string(name) + " " + variant + " " + name_of(fidelity);
-        const RunResult result = run(with_traffic(platform, variant, fidelity,
-                                                  [](RunRequest& request) {
-                                                    request.settings = {{"zrop", "cache_bytes", "4096"}};
-                                                  }),
+        const RunResult result = run(z_traffic_request(platform, variant, fidelity,
+                                                       [](RunRequest& request) {
+                                                         request.settings = {{"zrop", "cache_bytes", "4096"}};
+                                                       }),
                                      draw);
         // An access for each quad that is tested and for each update, of one sector.
         const std::uint64_t accesses =
@@ -85,11 +85,11 @@ TEST(DepthStencilTraffic, ACacheThatHoldsTheSurfaceReadsEachSectorOnceAndWritesN
   const Draw draw = terminating_draw(128, 96, 300, 42);
   for (const char* name : {"agx-orin", "desktop"}) {
     const Platform platform = with_z_traffic(name);
-    for (const Fidelity fidelity : with_time) {
-      const RunResult result = run(with_traffic(platform, "het", fidelity,
-                                                [](RunRequest& request) {
-                                                  request.settings = {{"zrop", "cache_bytes", "65536"}};
-                                                }),
+    for (const Fidelity fidelity : fidelities_with_time()) {
+      const RunResult result = run(z_traffic_request(platform, "het", fidelity,
+                                                     [](RunRequest& request) {
+                                                       request.settings = {{"zrop", "cache_bytes", "65536"}};
+                                                     }),
                                    draw);
       EXPECT_EQ(statistic(result, "l2.depth_stencil_bytes_read"), 128U * 96 * 4) << name << " " << name_of(fidelity);
       EXPECT_EQ(statistic(result, "l2.depth_stencil_bytes_written"), 0U) << name << " " << name_of(fidelity);
@@ -104,10 +104,10 @@ TEST(DepthStencilTraffic, HasItsKneeWhereTheTilesInUseFit) {
   const Platform platform = with_z_traffic();
   std::vector<double> missed;
   for (const char* bytes : {"4096", "8192", "16384", "32768", "65536"}) {
-    const RunResult result = run(with_traffic(platform, "het", Fidelity::cycle,
-                                              [&](RunRequest& request) {
-                                                request.settings = {{"zrop", "cache_bytes", bytes}};
-                                              }),
+    const RunResult result = run(z_traffic_request(platform, "het", Fidelity::cycle,
+                                                   [&](RunRequest& request) {
+                                                     request.settings = {{"zrop", "cache_bytes", bytes}};
+                                                   }),
                                  draw);
     missed.push_back(static_cast<double>(statistic(result, "zrop.cache.sector_misses")) / (96 * 64 / 8));
   }
@@ -121,8 +121,8 @@ TEST(DepthStencilTraffic, HasItsKneeWhereTheTilesInUseFit) {
 TEST(DepthStencilTraffic, AFrameThatDoesNotTerminateEarlyHasNone) {
   const Draw draw = testing::random_draw(96, 64, 200, 43);
   const Platform platform = with_z_traffic();
-  for (const Fidelity fidelity : with_time) {
-    const RunResult connected = run(with_traffic(platform, "baseline", fidelity), draw);
+  for (const Fidelity fidelity : fidelities_with_time()) {
+    const RunResult connected = run(z_traffic_request(platform, "baseline", fidelity), draw);
     EXPECT_EQ(statistic(connected, "l2.depth_stencil_reads"), 0U);
     EXPECT_EQ(connected.cycles, run(request_of("baseline", fidelity), draw).cycles) << name_of(fidelity);
   }
@@ -147,23 +147,23 @@ TEST(DepthStencilTraffic, ChangesNothingButTimeInStrictTermination) {
             return std::string(*(values.begin() + mix(seed * 16 + salt) % values.size()));
           };
           const RunResult result =
-              run(with_traffic(platform, variant, fidelity,
-                               [&](RunRequest& request) {
-                                 strictly(request);
-                                 request.settings = {{"zrop", "cache_bytes", pick(1, {"128", "1024", "16384"})},
-                                                     {"zrop", "mshrs", pick(2, {"1", "8", "384"})},
-                                                     {"zrop", "input_quads", pick(3, {"1", "40", "512"})},
-                                                     {"zrop", "input_updates", pick(4, {"1", "64"})},
-                                                     {"zrop", "sectors_per_cycle", pick(5, {"1", "16"})},
-                                                     {"zrop", "quads_per_cycle", pick(6, {"3", "16"})},
-                                                     {"zrop", "updates_per_cycle", pick(7, {"1", "4"})},
-                                                     {"zrop", "line_bytes", pick(8, {"64", "128"})},
-                                                     {"zrop", "fast_clear", pick(9, {"on", "off"})}};
-                                 if (fidelity != Fidelity::cycle) return;
-                                 request.stall_seed = seed + 1;
-                                 request.stall_per_256 = 40;
-                                 request.tick_order_seed = seed + 7;
-                               }),
+              run(z_traffic_request(platform, variant, fidelity,
+                                    [&](RunRequest& request) {
+                                      strictly(request);
+                                      request.settings = {{"zrop", "cache_bytes", pick(1, {"128", "1024", "16384"})},
+                                                          {"zrop", "mshrs", pick(2, {"1", "8", "384"})},
+                                                          {"zrop", "input_quads", pick(3, {"1", "40", "512"})},
+                                                          {"zrop", "input_updates", pick(4, {"1", "64"})},
+                                                          {"zrop", "sectors_per_cycle", pick(5, {"1", "16"})},
+                                                          {"zrop", "quads_per_cycle", pick(6, {"3", "16"})},
+                                                          {"zrop", "updates_per_cycle", pick(7, {"1", "4"})},
+                                                          {"zrop", "line_bytes", pick(8, {"64", "128"})},
+                                                          {"zrop", "fast_clear", pick(9, {"on", "off"})}};
+                                      if (fidelity != Fidelity::cycle) return;
+                                      request.stall_seed = seed + 1;
+                                      request.stall_per_256 = 40;
+                                      request.tick_order_seed = seed + 7;
+                                    }),
                   draw);
           EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color)) << what;
           EXPECT_EQ(result.counts.named(), expected.counts.named()) << what;
@@ -176,7 +176,7 @@ TEST(DepthStencilTraffic, ChangesNothingButTimeInStrictTermination) {
 TEST(DepthStencilTraffic, DoesNotDependOnTheOrderOfTicks) {
   const Draw draw = terminating_draw(96, 64, 300, 45);
   const Platform platform = with_z_traffic();
-  RunRequest request = with_traffic(platform, "het+qm", Fidelity::cycle);
+  RunRequest request = z_traffic_request(platform, "het+qm", Fidelity::cycle);
   request.settings = {{"zrop", "cache_bytes", "2048"}};
   const RunResult expected = run(request, draw);
   for (std::uint64_t seed = 1; seed < 4; ++seed) {
@@ -191,12 +191,12 @@ TEST(DepthStencilTraffic, AFastClearReadsOnlyWhatWasWrittenBack) {
   const Draw draw = terminating_draw(160, 128, 600, 46);
   for (const char* name : {"agx-orin", "desktop"}) {
     const Platform platform = with_z_traffic(name);
-    for (const Fidelity fidelity : with_time) {
+    for (const Fidelity fidelity : fidelities_with_time()) {
       const RunResult result =
-          run(with_traffic(platform, "het", fidelity,
-                           [](RunRequest& request) {
-                             request.settings = {{"zrop", "cache_bytes", "1024"}, {"zrop", "fast_clear", "on"}};
-                           }),
+          run(z_traffic_request(platform, "het", fidelity,
+                                [](RunRequest& request) {
+                                  request.settings = {{"zrop", "cache_bytes", "1024"}, {"zrop", "fast_clear", "on"}};
+                                }),
               draw);
       const std::string what = std::string(name) + " " + name_of(fidelity);
       const std::uint64_t read = statistic(result, "zrop.cache.bytes_filled");
@@ -219,17 +219,17 @@ TEST(DepthStencilTraffic, TimedFidelitiesStayNearCycleAndTheBoundBelow) {
     const Platform platform = with_z_traffic(name);
     for (const char* bytes : {"4096", "16384"}) {
       const auto small = [&](RunRequest& request) { request.settings = {{"zrop", "cache_bytes", bytes}}; };
-      const RunResult clocked = run(with_traffic(platform, "het", Fidelity::cycle, small), draw);
+      const RunResult clocked = run(z_traffic_request(platform, "het", Fidelity::cycle, small), draw);
       const auto cycles = static_cast<double>(*clocked.cycles);
       const auto misses = static_cast<double>(statistic(clocked, "zrop.cache.sector_misses"));
       for (const auto& [fidelity, percent] : {std::pair{Fidelity::lt, 10.0}, std::pair{Fidelity::at, 3.0}}) {
-        const RunResult result = run(with_traffic(platform, "het", fidelity, small), draw);
+        const RunResult result = run(z_traffic_request(platform, "het", fidelity, small), draw);
         // Misses are many or few where the tiles in use just fit.
         const std::string what = std::string(name) + " " + bytes + " " + name_of(fidelity);
         EXPECT_NEAR(static_cast<double>(*result.cycles) / cycles, 1, percent / 100) << what;
         EXPECT_NEAR(static_cast<double>(statistic(result, "zrop.cache.sector_misses")) / misses, 1, 0.25) << what;
       }
-      EXPECT_LE(*run(with_traffic(platform, "het", Fidelity::bound, small), draw).cycles, *clocked.cycles) << name;
+      EXPECT_LE(*run(z_traffic_request(platform, "het", Fidelity::bound, small), draw).cycles, *clocked.cycles) << name;
     }
   }
 }
@@ -239,9 +239,9 @@ TEST(DepthStencilTraffic, IsCountedWithoutTimeWhereMemoryWantsToKnow) {
   const Draw draw = terminating_draw(128, 96, 600, 47);
   const Platform platform = with_z_traffic("agx-orin-lpddr3");
   const auto clocked = static_cast<double>(
-      statistic(run(with_traffic(platform, "het", Fidelity::cycle, strictly), draw), "zrop.cache.sector_misses"));
+      statistic(run(z_traffic_request(platform, "het", Fidelity::cycle, strictly), draw), "zrop.cache.sector_misses"));
   for (const Fidelity fidelity : {Fidelity::functional, Fidelity::bound}) {
-    const RunResult result = run(with_traffic(platform, "het", fidelity, strictly), draw);
+    const RunResult result = run(z_traffic_request(platform, "het", fidelity, strictly), draw);
     EXPECT_EQ(statistic(result, "l2.depth_stencil_bytes_read"), statistic(result, "zrop.cache.bytes_filled"));
     EXPECT_EQ(statistic(result, "l2.depth_stencil_bytes_written"), statistic(result, "zrop.cache.bytes_written_back"));
     EXPECT_EQ(statistic(result, "zrop.cache.sector_misses_compulsory"), 128U * 96 / 8);
@@ -265,12 +265,12 @@ TEST(DepthStencilTraffic, TakesAMemoryOfAnotherMake) {
     connect_depth_stencil_traffic(netlist);
   };
   const RunResult expected = run(request_of("het+qm", Fidelity::functional, strictly), draw);
-  for (const Fidelity fidelity : with_time) {
-    const RunResult result = run(with_traffic(platform, "het+qm", fidelity,
-                                              [](RunRequest& request) {
-                                                strictly(request);
-                                                request.settings = {{"zrop", "cache_bytes", "1024"}};
-                                              }),
+  for (const Fidelity fidelity : fidelities_with_time()) {
+    const RunResult result = run(z_traffic_request(platform, "het+qm", fidelity,
+                                                   [](RunRequest& request) {
+                                                     strictly(request);
+                                                     request.settings = {{"zrop", "cache_bytes", "1024"}};
+                                                   }),
                                  draw);
     EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color)) << name_of(fidelity);
     EXPECT_EQ(result.counts.named(), expected.counts.named()) << name_of(fidelity);
@@ -280,7 +280,7 @@ TEST(DepthStencilTraffic, TakesAMemoryOfAnotherMake) {
 
 TEST(DepthStencilTraffic, MayStayUnconnected) {
   const Draw draw = testing::random_draw(64, 64, 300, 49);
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     const RunResult result = run(request_of("het", fidelity), draw);
     EXPECT_EQ(statistic(result, "l2.depth_stencil_reads"), 0U);
     for (const StatisticReport& report : result.statistics)

@@ -6,12 +6,14 @@
 #include <vrpipe/memory/memory_port.h>
 #include <vrpipe/platforms/wiring.h>
 
+#include "support/fidelities.h"
 #include "support/foreign_memory.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::fidelities_with_time;
 using testing::request_of;
 using testing::run;
 using testing::same_image;
@@ -51,17 +53,18 @@ ClockDomain& clock_of_units() { return dynamic_cast<ClockDomain&>(*sc_core::sc_f
 sc_core::sc_time ns(double nanoseconds) { return sc_core::sc_time(nanoseconds, sc_core::SC_NS); }
 
 /// What a DRAM did, beyond its life, which ends with the run.
-struct Counts {
+struct DramCounts {
   std::uint64_t requests = 0, responses = 0, out_of_order = 0, refreshes = 0;
 };
 
 class CountedDram : public foreign::Dram {
  public:
-  CountedDram(const std::string& name, Counts& counts) : Dram(name.c_str(), ns(1), ns(40), ns(70)), counts_(counts) {}
+  CountedDram(const std::string& name, DramCounts& counts)
+      : Dram(name.c_str(), ns(1), ns(40), ns(70)), counts_(counts) {}
   ~CountedDram() override { counts_ = {requests, responses, out_of_order, refreshes}; }
 
  private:
-  Counts& counts_;
+  DramCounts& counts_;
 };
 
 template <class Module>
@@ -79,16 +82,14 @@ std::string fault_of(const RunRequest& request, const Draw& draw) {
   return "no fault";
 }
 
-constexpr Fidelity with_time[] = {Fidelity::lt, Fidelity::at, Fidelity::cycle};
-
 TEST(ForeignMemory, TakesThePlaceOfTheL2ThoughItsRefreshNeverEnds) {
   const Draw draw = testing::random_draw(96, 96, 600, 21);
-  Counts dram;
+  DramCounts dram;
   const Platform platform = with_memory(
       [&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
   for (const char* variant : {"baseline", "het+qm"}) {
     const RunResult expected = run(request_of(variant, Fidelity::functional, strictly), draw);
-    for (const Fidelity fidelity : with_time) {
+    for (const Fidelity fidelity : fidelities_with_time()) {
       const RunResult result = run(request_of(variant, fidelity,
                                               [&](RunRequest& r) {
                                                 strictly(r);
@@ -110,7 +111,7 @@ TEST(ForeignMemory, TakesThePlaceOfTheL2ThoughItsRefreshNeverEnds) {
 // An L2 of 64 lines, so that it reads again what it had, and writes back.
 TEST(ForeignMemory, LiesBelowAnL2ThatMisses) {
   const Draw draw = testing::random_draw(96, 96, 600, 21);
-  Counts dram;
+  DramCounts dram;
   Platform platform = with_memory_below(
       [&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
   platform.wire = [wire = platform.wire](Netlist& netlist) {
@@ -119,7 +120,7 @@ TEST(ForeignMemory, LiesBelowAnL2ThatMisses) {
   };
   for (const char* variant : {"baseline", "het+qm"}) {
     const RunResult expected = run(request_of(variant, Fidelity::functional, strictly), draw);
-    for (const Fidelity fidelity : with_time) {
+    for (const Fidelity fidelity : fidelities_with_time()) {
       const std::string what = std::string(variant) + " " + name_of(fidelity);
       const RunResult result = run(request_of(variant, fidelity,
                                               [&](RunRequest& r) {
@@ -148,11 +149,11 @@ TEST(ForeignMemory, LiesBelowAnL2ThatMisses) {
 
 TEST(ForeignMemory, BelowTheL2DelaysARunAndChangesNothingElse) {
   const Draw draw = testing::random_draw(96, 96, 600, 21);
-  Counts dram;
+  DramCounts dram;
   const Platform platform = with_memory_below(
       [&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
   for (const char* variant : {"baseline", "het+qm"}) {
-    for (const Fidelity fidelity : with_time) {
+    for (const Fidelity fidelity : fidelities_with_time()) {
       RunRequest request = request_of(variant, fidelity, strictly);
       request.settings = {{"crop", "cache_bytes", "2048"}};
       const RunResult without = run(request, draw);
@@ -187,7 +188,7 @@ TEST(ForeignMemory, WithoutOneBelowTheL2HasNoStatisticsOfACache) {
 /// Random stalls and another order of ticks change no decision, and the run ends.
 TEST(ForeignMemory, BelowTheL2ChangesNothingUnderStallsEither) {
   const Draw draw = testing::random_draw(96, 96, 300, 23);
-  Counts dram;
+  DramCounts dram;
   const Platform platform = with_memory_below(
       [&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
   RunRequest request = request_of("het+qm", Fidelity::cycle, strictly);
@@ -231,7 +232,7 @@ TEST(ForeignMemory, ShowsItsStatisticsUnderItsPath) {
   const MemoryMaker make = [](const std::string& name, unsigned) {
     return as_memory(std::make_unique<CountingMemory>(name.c_str()));
   };
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     const Platform below = with_memory_below(make);
     RunRequest request = request_of("baseline", fidelity);
     request.platform = &below;
@@ -291,7 +292,7 @@ class CountedMemory : public FixedLatencyMemory {
 
 TEST(ForeignMemory, ThroughSocketsAloneARunIsTheSameAsWithDirectCalls) {
   const Draw draw = testing::random_draw(128, 96, 800, 22);
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     for (const char* variant : {"baseline", "het+qm"}) {
       std::string hashes[2];
       std::vector<std::uint64_t> traffic[2];
@@ -321,7 +322,7 @@ TEST(ForeignMemory, ThroughSocketsAloneARunIsTheSameAsWithDirectCalls) {
 TEST(ForeignMemory, ADeadlockIsFoundAndNamedThoughATimerGoesOn) {
   const Draw draw = testing::random_draw(64, 64, 300, 7);
   for (Platform (*const place)(MemoryMaker) : {with_memory, with_memory_below}) {
-    Counts dram;
+    DramCounts dram;
     Platform platform =
         place([&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
     platform.wire = [wire = platform.wire](Netlist& netlist) {
@@ -344,7 +345,7 @@ TEST(ForeignMemory, ADeadlockIsFoundAndNamedThoughATimerGoesOn) {
 TEST(ForeignMemory, ThatFallsSilentIsNamedWithItsPortAndTheOldestRequest) {
   const Draw draw = testing::random_draw(64, 64, 300, 8);
   for (const bool refreshes : {true, false}) {
-    Counts counts;
+    DramCounts counts;
     const MemoryMaker make = [&](const std::string& name, unsigned) {
       auto dram = std::make_unique<CountedDram>(name, counts);
       dram->fall_silent_after(20);
@@ -379,7 +380,7 @@ class TickingMemory : public FixedLatencyMemory, public Clocked {
 
 TEST(ForeignMemory, ATimerInTheClockOfTheUnitsDoesNotKeepARunUp) {
   const Draw draw = testing::random_draw(64, 64, 300, 9);
-  for (const Fidelity fidelity : with_time) {
+  for (const Fidelity fidelity : fidelities_with_time()) {
     std::string hashes[2];
     for (const bool ticks : {false, true}) {
       const Platform platform = with_memory([&](const std::string& name, unsigned) {

@@ -12,7 +12,7 @@ using testing::run;
 using testing::same_image;
 using testing::strictly;
 
-constexpr ColorFormat formats[] = {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f};
+constexpr ColorFormat color_formats[] = {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f};
 
 struct Size {
   std::uint32_t width, height, splats;
@@ -29,7 +29,7 @@ class RandomScene : public ::testing::TestWithParam<Size> {
 // case M08
 TEST_P(RandomScene, BaselineAndMergingAreWithinTheRunningBoundOfTheReference) {
   for (const char* variant : {"baseline", "qm"}) {
-    for (const ColorFormat format : formats) {
+    for (const ColorFormat format : color_formats) {
       SCOPED_TRACE(std::string(variant) + " " + name_of(format));
       testing::expect_near_reference(
           run(request_of(variant, Fidelity::functional, [&](RunRequest& r) { r.format = format; }), draw), draw, 0);
@@ -40,7 +40,7 @@ TEST_P(RandomScene, BaselineAndMergingAreWithinTheRunningBoundOfTheReference) {
 // case H02
 TEST_P(RandomScene, EarlyTerminationIsWithinTheThresholdsRemainderOfTheReference) {
   for (const char* variant : {"het", "het+qm"}) {
-    for (const ColorFormat format : formats) {
+    for (const ColorFormat format : color_formats) {
       SCOPED_TRACE(std::string(variant) + " " + name_of(format));
       testing::expect_near_reference(
           run(request_of(variant, Fidelity::cycle, [&](RunRequest& r) { r.format = format; }), draw), draw, 0.004);
@@ -50,7 +50,7 @@ TEST_P(RandomScene, EarlyTerminationIsWithinTheThresholdsRemainderOfTheReference
 
 TEST_P(RandomScene, StrictlyFunctionalAndCycleHaveTheSameImageAndCounts) {
   for (const Variant& variant : variants()) {
-    for (const ColorFormat format : formats) {
+    for (const ColorFormat format : color_formats) {
       SCOPED_TRACE(variant.name + " " + name_of(format));
       const auto change = [&](RunRequest& r) {
         r.format = format;
@@ -387,7 +387,7 @@ TEST(EnlargedBoxes, BlendTheSameFragments) {
 TEST(GreySplats, GiveAGreyImageInEveryFormat) {
   Draw draw = testing::random_draw(64, 64, 200, 14);
   for (Splat& splat : draw.splats) splat.green = splat.blue = splat.red;
-  for (const ColorFormat format : formats) {
+  for (const ColorFormat format : color_formats) {
     const RunResult result =
         run(request_of("het+qm", Fidelity::cycle, [&](RunRequest& r) { r.format = format; }), draw);
     for (std::uint32_t y = 0; y < 64; ++y) {

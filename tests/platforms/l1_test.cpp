@@ -51,7 +51,7 @@ RunRequest on(const Platform& platform, const std::string& variant, Fidelity fid
 }
 
 /// 64 lines in sets of 4.
-const std::vector<Setting> small = {{"l1", "bytes", "8192"}, {"l1", "ways", "4"}, {"l1", "banks", "4"}};
+const std::vector<Setting> small_l1 = {{"l1", "bytes", "8192"}, {"l1", "ways", "4"}, {"l1", "banks", "4"}};
 
 bool has_statistic(const RunResult& result, const std::string& prefix) {
   return std::any_of(result.statistics.begin(), result.statistics.end(),
@@ -78,7 +78,7 @@ TEST(L1OfAnArray, PassesOnWhatItLacksAndWhatIsWritten) {
     for (const char* variant : {"baseline", "het+qm"}) {
       for (const Fidelity fidelity : fidelities()) {
         const std::string what = std::string(name) + " " + variant + " " + name_of(fidelity);
-        const RunResult result = run(on(platform, variant, fidelity, small), draw);
+        const RunResult result = run(on(platform, variant, fidelity, small_l1), draw);
         EXPECT_EQ(statistic(result, "l1.vertex_bytes_read"), splats * 48) << what;
         EXPECT_EQ(statistic(result, "l1.attribute_bytes_written"), result.counts.primitives * 352) << what;
         EXPECT_EQ(statistic(result, "l1.cache.bytes_filled"), 32 * statistic(result, "l1.cache.sector_misses")) << what;
@@ -118,7 +118,7 @@ TEST(L1OfAnArray, ThatHoldsThemAllReadsEachSectorOfAttributesOnce) {
       // Two sectors of each primitive that has a quad, whichever cores want it.
       EXPECT_LE(statistic(result, "l2.attribute_bytes_read"), result.counts.primitives * 64) << what;
       EXPECT_GT(statistic(result, "l2.attribute_bytes_read"), result.counts.primitives * 20) << what;
-      const RunResult few = run(on(platform, variant, fidelity, small), draw);
+      const RunResult few = run(on(platform, variant, fidelity, small_l1), draw);
       EXPECT_GT(statistic(few, "l2.attribute_bytes_read"), statistic(result, "l2.attribute_bytes_read")) << what;
     }
   }
@@ -151,7 +151,7 @@ TEST(L1OfAnArray, MissesWhatACacheByItsDefinitionMisses) {
       for (const std::uint32_t kilobytes : {8U, 64U}) {
         const std::string what = std::string(variant) + " " + replacement + " " + std::to_string(kilobytes) + " KB";
         look_ups.events.clear();
-        std::vector<Setting> settings = small;
+        std::vector<Setting> settings = small_l1;
         settings.push_back({"l1", "bytes", std::to_string(kilobytes * 1024)});
         settings.push_back({"l1", "replacement", replacement});
         const RunResult result =
@@ -232,7 +232,7 @@ TEST(L1OfAnArray, ChangesNothingButTimeInStrictTermination) {
 TEST(L1OfAnArray, DoesNotDependOnTheOrderOfTicks) {
   const Draw draw = testing::random_draw(96, 64, 400, 45);
   const Platform platform = with_l1("agx-orin-lpddr3");
-  RunRequest request = on(platform, "het+qm", Fidelity::cycle, small);
+  RunRequest request = on(platform, "het+qm", Fidelity::cycle, small_l1);
   const RunResult expected = run(request, draw);
   for (std::uint64_t seed = 1; seed < 4; ++seed) {
     request.tick_order_seed = seed;
@@ -265,7 +265,7 @@ TEST(L1OfAnArray, TakesAsLongAtEachFidelity) {
   for (const char* variant : {"baseline", "het+qm"}) {
     const std::vector<Setting> usual;
     const std::vector<Setting> one_bank = {{"l1", "banks", "1"}, {"l1", "bank_bytes_per_cycle", "16"}};
-    for (const std::vector<Setting>& settings : {usual, small, one_bank}) {
+    for (const std::vector<Setting>& settings : {usual, small_l1, one_bank}) {
       const auto cycles = [&](Fidelity fidelity) {
         return static_cast<double>(*run(on(platform, variant, fidelity, settings), draw).cycles);
       };

@@ -65,10 +65,10 @@ RunResult record(const Pressure& pressure) {
   return run(request, testing::random_draw(384, 256, 1200, 31));
 }
 
-const std::map<MemoryTraffic, std::string> names = {{MemoryTraffic::color, "color"},
-                                                    {MemoryTraffic::depth_stencil, "depth_stencil"},
-                                                    {MemoryTraffic::vertex, "vertex"},
-                                                    {MemoryTraffic::attribute, "attribute"}};
+const std::map<MemoryTraffic, std::string> traffic_names = {{MemoryTraffic::color, "color"},
+                                                            {MemoryTraffic::depth_stencil, "depth_stencil"},
+                                                            {MemoryTraffic::vertex, "vertex"},
+                                                            {MemoryTraffic::attribute, "attribute"}};
 
 TEST(RecordedTraffic, OfTheL2MakesTheHitsMissesAndWriteBacksOfACacheByItsDefinition) {
   for (const Pressure& pressure : pressures) {
@@ -77,7 +77,7 @@ TEST(RecordedTraffic, OfTheL2MakesTheHitsMissesAndWriteBacksOfACacheByItsDefinit
     std::uint64_t looked_up = 0;
     for (const auto& [part, served] : of_l2().events) looked_up += served ? 0 : part.bytes;
     std::uint64_t asked = 0;
-    for (const auto& [traffic, name] : names) {
+    for (const auto& [traffic, name] : traffic_names) {
       const Counted& counted = expected.of[traffic];
       const std::string what = pressure.text() + " " + name;
       EXPECT_EQ(statistic(result, "l2." + name + "_sectors"), counted.needed) << what;
@@ -101,8 +101,9 @@ TEST(RecordedTraffic, OfTheL2MissesNearlyAsMuchInACacheWithoutPins) {
     if (pressure.bytes == 65536) continue;
     const RunResult result = record(pressure);
     for (const auto& [traffic, counted] : replay(organization_of(pressure), of_l2().events, false).of) {
-      const auto missed = static_cast<double>(statistic(result, "l2." + names.at(traffic) + "_sector_misses"));
-      EXPECT_NEAR(missed / static_cast<double>(counted.missed), 1, 0.005) << pressure.text() << names.at(traffic);
+      const auto missed = static_cast<double>(statistic(result, "l2." + traffic_names.at(traffic) + "_sector_misses"));
+      EXPECT_NEAR(missed / static_cast<double>(counted.missed), 1, 0.005)
+          << pressure.text() << traffic_names.at(traffic);
     }
   }
 }
@@ -190,7 +191,7 @@ TEST(TrafficToDram, IsWhatIsTouchedForTheFirstTimeWhereAllFitsIntoL2) {
             EXPECT_EQ(color, of_color) << what << ": the first has fetched it";
           }
           of_color = color;
-          for (const auto& [traffic, written] : names) {
+          for (const auto& [traffic, written] : traffic_names) {
             EXPECT_EQ(statistic(result, "dram." + written + "_bytes_written"), 0U) << what;
           }
         }

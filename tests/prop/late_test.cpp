@@ -3,18 +3,20 @@
 
 #include <gtest/gtest.h>
 
+#include "prop/mark_numbers.h"
 #include "support/fidelities.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::mark_number;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
 /// Draw 0 is tested late, draw 1 not at all, draw 2 before it is shaded; a clear of colour lies between 0 and 1.
-constexpr std::size_t color_clear = 1;
-constexpr std::size_t early_draw = 3;
+constexpr std::size_t color_clear_command = 1;
+constexpr std::size_t early_draw_command = 3;
 RenderContext three_draws() {
   DrawState late;
   late.depth = {true, Compare::less, true};
@@ -28,10 +30,6 @@ RenderContext three_draws() {
   return testing::context_of(frame);
 }
 
-constexpr std::uint32_t marks_from = 1000;
-std::uint32_t mark_number(std::size_t command) {
-  return marks_from + static_cast<std::uint32_t>(Frame::mark_of(command));
-}
 using Numbers = std::vector<std::uint32_t>;
 
 /// PROP and what stands for ZROP: it gives a warp back so many cycles later, without the quads at `dead` positions.
@@ -60,7 +58,7 @@ class LateProp : public ::testing::TestWithParam<Fidelity> {
     };
     if (GetParam() == Fidelity::cycle) {
       bench->sink<ColorBeat>("out_color", depth).on_take([note](const ColorBeat& beat, Cycle at) {
-        if (beat.mark != Mark::none) note(marks_from + static_cast<std::uint32_t>(beat.mark), at);
+        if (beat.mark != Mark::none) note(mark_number(beat.mark), at);
         for (unsigned i = 0; i < beat.count; ++i) note(number_of(*beat.quads[i].warp), at);
       });
     } else {
@@ -70,7 +68,7 @@ class LateProp : public ::testing::TestWithParam<Fidelity> {
     }
   }
   static std::uint32_t number_of(const ShadedWarp& warp) {
-    return warp.mark != Mark::none ? marks_from + static_cast<std::uint32_t>(warp.mark) : warp.sequence;
+    return warp.mark != Mark::none ? mark_number(warp.mark) : warp.sequence;
   }
   ShadedWarpItem warp(std::uint32_t sequence, unsigned column, std::uint32_t tile_sequence, DrawIndex draw,
                       std::uint8_t count = 8) {
@@ -158,29 +156,29 @@ TEST_P(LateProp, WhatIsNotTestedLateWaitsForWhatIs) {
   make();
   shaded->add(warp(0, 0, 0, 0), 10);
   shaded->add(warp(1, 1, 0, 0), 11);
-  shaded->add(mark(2, color_clear), 12);
+  shaded->add(mark(2, color_clear_command), 12);
   shaded->add(warp(2, 0, 1, 1), 13);
   shaded->add(warp(3, 2, 0, 1), 14);
   bench->run();
   EXPECT_EQ(sent, (Numbers{0, 1}));
-  EXPECT_EQ(left, (Numbers{0, 1, mark_number(color_clear), 2, 3}));
+  EXPECT_EQ(left, (Numbers{0, 1, mark_number(color_clear_command), 2, 3}));
   EXPECT_GT(left_at[2], 100U);
 }
 
 TEST_P(LateProp, AMarkThatWaitsForLateTestsGoesTheirWay) {
   make();
   shaded->add(warp(0, 0, 0, 0), 10);
-  shaded->add(mark(1, early_draw), 11);
+  shaded->add(mark(1, early_draw_command), 11);
   bench->run();
-  EXPECT_EQ(sent, (Numbers{0, mark_number(early_draw)}));
-  EXPECT_EQ(left, (Numbers{0, mark_number(early_draw)}));
+  EXPECT_EQ(sent, (Numbers{0, mark_number(early_draw_command)}));
+  EXPECT_EQ(left, (Numbers{0, mark_number(early_draw_command)}));
   EXPECT_GT(left_at[1], 110U);
   EXPECT_EQ(release->records().size(), 2U);
   EXPECT_TRUE(bench->unit().idle());
 }
 
 TEST_P(LateProp, AMarkStaysBehindAllQuadsOfTheWarpBeforeIt) {
-  for (const std::size_t command : {color_clear, early_draw}) {
+  for (const std::size_t command : {color_clear_command, early_draw_command}) {
     sent.clear();
     left.clear();
     make({{"color_bytes_per_cycle", "16"}}, 2);  // a quad in two cycles

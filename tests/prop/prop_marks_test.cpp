@@ -5,12 +5,14 @@
 
 #include <gtest/gtest.h>
 
+#include "prop/mark_numbers.h"
 #include "prop/reorder_buffer.h"
 #include "support/fidelities.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::mark_number;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
@@ -50,14 +52,13 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, PropMarksTest,
                          });
 
 /// What left PROP for CROP, in its order: numbers of warps that have quads, and of marks from 1000 on.
-constexpr std::uint32_t marks_from = 1000;
 struct PropBench {
   PropBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings, unsigned depth = 64)
       : bench(fidelity, "prop", "pre-rop", context, settings),
         shaded(bench.source<ShadedWarpItem>("in_shaded", 64)),
         release(bench.sink<WarpRelease>("out_release", depth)) {
     const auto note = [this](const ShadedWarp* warp, Mark mark) {
-      const std::uint32_t number = mark != Mark::none ? marks_from + static_cast<std::uint32_t>(mark) : warp->sequence;
+      const std::uint32_t number = mark != Mark::none ? mark_number(mark) : warp->sequence;
       if (left.empty() || left.back() != number) left.push_back(number);
     };
     if (fidelity == Fidelity::cycle) {
@@ -79,10 +80,7 @@ struct PropBench {
   Sink<ShadedWarpItem>* warps = nullptr;
   std::vector<std::uint32_t> left;
 };
-std::uint32_t mark_number(std::size_t command) {
-  return marks_from + static_cast<std::uint32_t>(Frame::mark_of(command));
-}
-constexpr std::uint32_t end_number = marks_from + static_cast<std::uint32_t>(Mark::end_of_frame);
+constexpr std::uint32_t end_number = mark_number(Mark::end_of_frame);
 
 using Left = std::vector<std::uint32_t>;
 
@@ -174,7 +172,7 @@ TEST_P(PropMarksTest, NoOrderOfCompletionAndNoStallMovesAWarpPastAMark) {
     std::size_t warps = 0;
     std::map<unsigned, std::uint32_t> last_of_tile;
     for (const std::uint32_t number : prop.left) {
-      if (number >= marks_from) {
+      if (number >= testing::marks_from) {
         ASSERT_EQ(number, seen < marks ? mark_number(seen) : end_number) << "seed " << seed;
         ++seen;
         continue;

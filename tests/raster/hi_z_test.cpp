@@ -16,14 +16,14 @@ namespace {
 
 using testing::uniform;
 
-constexpr std::uint32_t width = 60;  // the last raster tiles are cut
-constexpr std::uint32_t height = 44;
-constexpr std::uint32_t primitives = 40;
+constexpr std::uint32_t hi_z_width = 60;  // the last raster tiles are cut
+constexpr std::uint32_t hi_z_height = 44;
+constexpr std::uint32_t hi_z_primitives = 40;
 
-constexpr DepthFormat formats[] = {DepthFormat::d16, DepthFormat::d24, DepthFormat::d32f};
+constexpr DepthFormat depth_formats[] = {DepthFormat::d16, DepthFormat::d24, DepthFormat::d32f};
 
 TEST(HiZ, KeepsADepthInItsBitsRoundedUp) {
-  for (const DepthFormat format : formats) {
+  for (const DepthFormat format : depth_formats) {
     for (unsigned bits = 1; bits <= 24; ++bits) {
       std::set<std::uint32_t> kept;
       std::uint32_t before = 0;
@@ -49,19 +49,19 @@ TEST(HiZ, KeepsADepthInItsBitsRoundedUp) {
 /// Triangles of a mesh that cross one another, or splats of any depth; drawn behind a draw that stores.
 class Scene {
  public:
-  Scene(std::uint64_t seed, bool splats, DepthFormat format, Compare compare) : frame_(width, height) {
+  Scene(std::uint64_t seed, bool splats, DepthFormat format, Compare compare) : frame_(hi_z_width, hi_z_height) {
     frame_.set_depth_format(format);
-    auto stored = std::make_shared<Draw>(testing::draw_of(width, height, {Splat{}}));
+    auto stored = std::make_shared<Draw>(testing::draw_of(hi_z_width, hi_z_height, {Splat{}}));
     DrawState state;
     state.depth = {true, Compare::less, true};
     frame_.draw(stored, state);
-    auto tested = std::make_shared<Draw>(testing::draw_of(width, height));
+    auto tested = std::make_shared<Draw>(testing::draw_of(hi_z_width, hi_z_height));
     if (splats) {
-      *tested = testing::random_draw(width, height, primitives, seed);
-      for (std::uint32_t i = 0; i < primitives; ++i) tested->splats[i].depth = uniform(seed, 7000 + i, 0, 1);
+      *tested = testing::random_draw(hi_z_width, hi_z_height, hi_z_primitives, seed);
+      for (std::uint32_t i = 0; i < hi_z_primitives; ++i) tested->splats[i].depth = uniform(seed, 7000 + i, 0, 1);
     } else {
       state.shader = FragmentShader::vertex;
-      for (std::uint32_t i = 0; i < primitives; ++i) tested->mesh.push_back(triangle(seed, i));
+      for (std::uint32_t i = 0; i < hi_z_primitives; ++i) tested->mesh.push_back(triangle(seed, i));
     }
     state.depth = {true, compare, false};
     frame_.draw(tested, state);
@@ -72,13 +72,15 @@ class Scene {
 
   const RenderContext& context() const { return context_; }
   DepthFormat format() const { return frame_.depth_format(); }
-  std::uint32_t at(std::int32_t x, std::int32_t y) const { return depth_[static_cast<std::size_t>(y) * width + x]; }
+  std::uint32_t at(std::int32_t x, std::int32_t y) const {
+    return depth_[static_cast<std::size_t>(y) * hi_z_width + x];
+  }
 
   /// The farthest of a raster tile's pixels in the frame.
   std::uint32_t farthest(std::int32_t x, std::int32_t y) const {
     std::uint32_t farthest = 0;
-    for (std::int32_t row = y; row < std::min<std::int32_t>(y + 8, height); ++row) {
-      for (std::int32_t column = x; column < std::min<std::int32_t>(x + 8, width); ++column) {
+    for (std::int32_t row = y; row < std::min<std::int32_t>(y + 8, hi_z_height); ++row) {
+      for (std::int32_t column = x; column < std::min<std::int32_t>(x + 8, hi_z_width); ++column) {
         farthest = std::max(farthest, at(column, row));
       }
     }
@@ -86,7 +88,7 @@ class Scene {
   }
 
   /// The samples that are left of a primitive.
-  using Covered = std::array<bool, std::size_t{width} * height>;
+  using Covered = std::array<bool, std::size_t{hi_z_width} * hi_z_height>;
   Covered rasterize(TileRasterizer& raster, const Primitive& primitive) const {
     Covered covered{};
     raster.begin(primitive, primitive.bounds);
@@ -99,15 +101,15 @@ class Scene {
           if ((beat.quads[q].coverage >> lane & 1U) == 0) continue;
           const unsigned position = beat.quads[q].position;
           const std::uint32_t x = beat.tile.x * 16U + position % 8 * 2 + lane % 2;
-          covered.at(std::size_t{beat.tile.y * 16U + position / 8 * 2 + lane / 2} * width + x) = true;
+          covered.at(std::size_t{beat.tile.y * 16U + position / 8 * 2 + lane / 2} * hi_z_width + x) = true;
         }
       }
     }
     return covered;
   }
   void tell(TileRasterizer& raster) const {
-    for (std::uint16_t y = 0; y < height; y = static_cast<std::uint16_t>(y + 8)) {
-      for (std::uint16_t x = 0; x < width; x = static_cast<std::uint16_t>(x + 8)) {
+    for (std::uint16_t y = 0; y < hi_z_height; y = static_cast<std::uint16_t>(y + 8)) {
+      for (std::uint16_t x = 0; x < hi_z_width; x = static_cast<std::uint16_t>(x + 8)) {
         HiZUpdate update;
         update.tile = {static_cast<std::uint16_t>(x / 16), static_cast<std::uint16_t>(y / 16)};
         update.part = static_cast<std::uint8_t>(y / 8 % 2 * 2 + x / 8 % 2);
@@ -119,7 +121,7 @@ class Scene {
   std::vector<Primitive> assembled() const {
     std::vector<Primitive> all;
     const DrawCall& call = context_.draw(1);
-    for (std::uint32_t i = 0; i < primitives; ++i) {
+    for (std::uint32_t i = 0; i < hi_z_primitives; ++i) {
       for (unsigned triangle = 0; triangle < primitives_per_splat(call); ++triangle) {
         Primitive primitive;
         primitive.splat = call.base + i;
@@ -138,8 +140,8 @@ class Scene {
     const std::uint64_t k = 50ULL * i;
     // Some are thin, some far larger than the frame, some nearly flat.
     const float size = std::exp(uniform(seed, k, 1, 8));
-    const float x = uniform(seed, k + 1, 0, width);
-    const float y = uniform(seed, k + 2, 0, height);
+    const float x = uniform(seed, k + 1, 0, hi_z_width);
+    const float y = uniform(seed, k + 2, 0, hi_z_height);
     const float depth = uniform(seed, k + 3, 0, 1);
     const float slope = i % 3 == 0 ? 1e-6F : 1.0F;
     for (unsigned v = 0; v < 3; ++v) {
@@ -154,14 +156,14 @@ class Scene {
   }
   /// Of each raster tile depths about one of its own.
   void store(std::uint64_t seed) {
-    depth_.resize(std::size_t{width} * height);
-    for (std::uint32_t y = 0; y < height; ++y) {
-      for (std::uint32_t x = 0; x < width; ++x) {
+    depth_.resize(std::size_t{hi_z_width} * hi_z_height);
+    for (std::uint32_t y = 0; y < hi_z_height; ++y) {
+      for (std::uint32_t x = 0; x < hi_z_width; ++x) {
         const std::uint64_t tile = y / 8 * 100 + x / 8;
         const float middle = uniform(seed, 9000 + tile, 0, 1);
         const float around = std::exp(uniform(seed, 10000 + tile, -14, -1));
-        const float depth = middle + around * uniform(seed, 20000 + std::uint64_t{y} * width + x, -1, 1);
-        depth_[std::size_t{y} * width + x] = store_depth(format(), static_cast<double>(depth));
+        const float depth = middle + around * uniform(seed, 20000 + std::uint64_t{y} * hi_z_width + x, -1, 1);
+        depth_[std::size_t{y} * hi_z_width + x] = store_depth(format(), static_cast<double>(depth));
       }
     }
   }
@@ -185,8 +187,8 @@ TileFate fate_of(const Scene& scene, const DepthPlane& plane, Compare compare, s
   for (std::int32_t y = y0; y < y0 + 8; ++y) {
     for (std::int32_t x = x0; x < x0 + 8; ++x) {
       nearest = std::min(nearest, plane.at(x, y));
-      if (x >= static_cast<std::int32_t>(width) || y >= static_cast<std::int32_t>(height)) continue;
-      const std::size_t place = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+      if (x >= static_cast<std::int32_t>(hi_z_width) || y >= static_cast<std::int32_t>(hi_z_height)) continue;
+      const std::size_t place = static_cast<std::size_t>(y) * hi_z_width + static_cast<std::size_t>(x);
       if (left[place] && !all[place]) ++fate.culled_wrongly;
       if (left[place]) ++fate.kept;
       if (!all[place] || left[place]) continue;
@@ -204,7 +206,7 @@ TEST(HiZ, CullsWhatFailsAtEverySampleAlone) {
   std::uint64_t kept = 0;
   std::uint64_t well_behind = 0;
   for (const bool splats : {false, true}) {
-    for (const DepthFormat format : formats) {
+    for (const DepthFormat format : depth_formats) {
       for (const Compare compare : {Compare::less, Compare::less_equal, Compare::equal}) {
         for (unsigned bits = 1; bits <= 24; ++bits) {
           const Scene scene(mix(bits * 64 + static_cast<unsigned>(format) * 8 + static_cast<unsigned>(compare)), splats,
@@ -220,8 +222,8 @@ TEST(HiZ, CullsWhatFailsAtEverySampleAlone) {
             const Scene::Covered left = scene.rasterize(with, primitive);
             const Scene::Covered all = scene.rasterize(without, primitive);
             const DepthPlane plane(scene.context(), primitive.draw, primitive.splat, primitive.triangle);
-            for (std::int32_t y = 0; y < static_cast<std::int32_t>(height); y += 8) {
-              for (std::int32_t x = 0; x < static_cast<std::int32_t>(width); x += 8) {
+            for (std::int32_t y = 0; y < static_cast<std::int32_t>(hi_z_height); y += 8) {
+              for (std::int32_t x = 0; x < static_cast<std::int32_t>(hi_z_width); x += 8) {
                 const TileFate fate = fate_of(scene, plane, compare, x, y, all, left);
                 SCOPED_TRACE(std::to_string(bits) + " bits, primitive " + std::to_string(primitive.splat));
                 ASSERT_EQ(fate.culled_wrongly, 0U) << "raster tile at " << x << "," << y;
@@ -250,7 +252,7 @@ TEST(HiZ, CullsWhatFailsAtEverySampleAlone) {
 }
 
 TEST(HiZ, IsNotBuiltWhereNothingIsStored) {
-  const Draw draw = testing::draw_of(width, height, {testing::round_splat(20, 20, 5, 1)});
+  const Draw draw = testing::draw_of(hi_z_width, hi_z_height, {testing::round_splat(20, 20, 5, 1)});
   DrawState state;
   state.depth = {true, Compare::less, false};
   const RenderContext context = testing::context_of(draw, state);

@@ -14,7 +14,7 @@ using testkit::Sink;
 using testkit::Source;
 
 constexpr std::uint32_t splats_of_draw = 5;
-constexpr DrawIndex draws = 8;
+constexpr DrawIndex marked_draws = 8;
 
 class RasterMarksTest : public ::testing::TestWithParam<Fidelity> {
  protected:
@@ -26,7 +26,7 @@ class RasterMarksTest : public ::testing::TestWithParam<Fidelity> {
     }
     const auto geometry = testing::geometry_of(64, 64, splats);
     Frame frame(64, 64);
-    for (DrawIndex draw = 0; draw < draws; ++draw) {
+    for (DrawIndex draw = 0; draw < marked_draws; ++draw) {
       frame.draw(geometry, {});
       frame.clear({true, true});
     }
@@ -43,19 +43,14 @@ class RasterMarksTest : public ::testing::TestWithParam<Fidelity> {
     job.clip = job.primitive.bounds;
     return job;
   }
-  static RasterJob mark_job(Mark mark) {
-    RasterJob job;
-    job.mark = mark;
-    return job;
-  }
   void add_frame(Source<RasterJob>& in) const {
-    for (DrawIndex draw = 0; draw < draws; ++draw) {
+    for (DrawIndex draw = 0; draw < marked_draws; ++draw) {
       for (std::uint32_t i = 0; i < splats_of_draw; ++i) {
         for (const unsigned triangle : {0U, 1U}) in.add(job_of(draw, splats_of_draw * draw + i, triangle));
       }
-      in.add(mark_job(Frame::mark_of(2 * draw + 1)));
+      in.add(testing::marked<RasterJob>(Frame::mark_of(2 * draw + 1)));
     }
-    in.add(mark_job(Mark::end_of_frame));
+    in.add(testing::marked<RasterJob>());
   }
   RenderContext context;
 };
@@ -84,7 +79,7 @@ TEST_P(RasterMarksTest, AMarkComesBehindTheQuadsOfTheJobsBeforeItUnderAnyStalls)
         ASSERT_EQ(beat.mark, Frame::mark_of(2 * std::size_t{draw} + 1));
         ++draw;
       }
-      EXPECT_EQ(draw, draws);
+      EXPECT_EQ(draw, marked_draws);
       EXPECT_EQ(out.records().back().item.mark, Mark::end_of_frame);
       EXPECT_TRUE(bench.unit().idle());
     }
@@ -99,7 +94,7 @@ TEST_P(RasterMarksTest, CountsForTheDrawOfThePrimitive) {
   for (const unsigned triangle : {0U, 1U}) in.add(job_of(6, 6 * splats_of_draw, triangle));      // of 40x40
   bench.run();
   const auto& raster = bench.behaviour<TileRasterizer>();
-  ASSERT_EQ(raster.fragments_rasterized.of_draw().size(), std::size_t{draws});
+  ASSERT_EQ(raster.fragments_rasterized.of_draw().size(), std::size_t{marked_draws});
   EXPECT_EQ(raster.fragments_rasterized.of_draw()[3], 4U);
   EXPECT_EQ(raster.fragments_rasterized.of_draw()[6], 1600U);
   EXPECT_EQ(raster.fragments_rasterized.value(), 1604U);

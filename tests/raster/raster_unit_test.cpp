@@ -5,60 +5,18 @@
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/testkit/bench.h>
 
-#include "support/builders.h"
+#include "raster/raster_scene.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::marked;
+using testing::quads_in;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
-class RasterUnitTest : public ::testing::Test {
- protected:
-  RasterUnitTest() : draw(testing::draw_of(128, 128)), context(testing::context_of(draw)) {
-    testing::change_state(context, [&](DrawState& drawn) { drawn.obb_padding = 0; });
-  }
-
-  /// The jobs of all triangles of the draw, unclipped.
-  std::vector<RasterJob> jobs() const {
-    std::vector<RasterJob> all;
-    for (std::uint32_t splat = 0; splat < draw.splats.size(); ++splat) {
-      for (unsigned triangle = 0; triangle < primitives_per_splat(context.draw(0)); ++triangle) {
-        SnappedTriangle snapped;
-        if (!snap_triangle(context, 0, splat, triangle, snapped) || doubled_area(snapped) == 0) continue;
-        RasterJob job;
-        job.primitive.splat = splat;
-        job.primitive.triangle = static_cast<std::uint8_t>(triangle);
-        job.primitive.bounds = covered_bounds(snapped, context.precision.subpixel_bits, draw.width, draw.height);
-        job.clip = job.primitive.bounds;
-        if (!job.primitive.bounds.empty()) all.push_back(job);
-      }
-    }
-    return all;
-  }
-  void add_triangle(const ScreenTriangle& triangle) {
-    draw.triangles.push_back(triangle);
-    draw.splats.emplace_back();
-  }
-  /// A triangle that covers the whole image.
-  void add_full() { add_triangle({{-1, 300, -1}, {-1, -1, 300}}); }
-
-  Draw draw;
-  RenderContext context;
-};
-
-RasterJob end_of_frame() {
-  RasterJob job;
-  job.mark = Mark::end_of_frame;
-  return job;
-}
-
-std::uint64_t quads_in(const Sink<QuadBeat>& sink) {
-  std::uint64_t quads = 0;
-  for (const auto& record : sink.records()) quads += record.item.count;
-  return quads;
-}
+class RasterUnitTest : public ::testing::Test, protected testing::RasterScene {};
 
 TEST_F(RasterUnitTest, TheFirstQuadIsSeenTheSetUpLatencyAfterTheJob) {
   add_triangle(testing::one_quad_triangle(4, 4));
@@ -167,7 +125,7 @@ TEST_F(RasterUnitTest, TheEndComesLast) {
   Source<RasterJob>& in = bench.source<RasterJob>("in_jobs");
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 1);
   in.add(jobs()[0]);
-  in.add(end_of_frame());
+  in.add(marked<RasterJob>());
   bench.run();
   EXPECT_TRUE(out.records().back().item.mark == Mark::end_of_frame);
   EXPECT_EQ(quads_in(out), 4096U);
@@ -196,7 +154,7 @@ TEST_F(RasterUnitTest, QuadsAndTheirOrderAreTheSameUnderAnyStalls) {
     Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", static_cast<unsigned>(1 + seed % 4));
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", static_cast<unsigned>(1 + seed % 3));
     for (const RasterJob& job : all) in.add(job);
-    in.add(end_of_frame());
+    in.add(marked<RasterJob>());
     if (seed > 0) bench.stall_randomly(seed, 80);
     bench.run();
     std::vector<std::uint64_t> quads;

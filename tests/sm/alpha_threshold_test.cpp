@@ -13,11 +13,13 @@ namespace {
 using testing::alpha_threshold_state;
 using testkit::Bench;
 
-constexpr std::uint32_t side = 64;
+constexpr std::uint32_t threshold_side = 64;
 
 RenderContext context_with(const DrawState& state, ColorFormat format = ColorFormat::rgba16f) {
-  Frame frame(side, side);
-  frame.draw(testing::geometry_of(side, side, {testing::flat_box(0, 0, side, side, 1)}), state);
+  Frame frame(threshold_side, threshold_side);
+  frame.draw(testing::geometry_of(threshold_side, threshold_side,
+                                  {testing::flat_box(0, 0, threshold_side, threshold_side, 1)}),
+             state);
   RenderContext context = testing::context_of(frame);
   context.format = format;
   return context;
@@ -32,8 +34,8 @@ Warp warp_of(std::initializer_list<unsigned> positions, TileId tile = {0, 0}, st
   return warp;
 }
 
-struct Shader {
-  explicit Shader(const DrawState& state) : context(context_with(state)), sm(parameters, context) {
+struct ThresholdShader {
+  explicit ThresholdShader(const DrawState& state) : context(context_with(state)), sm(parameters, context) {
     sm.set_draws(1);
     sm.attach(surface);
   }
@@ -45,11 +47,11 @@ struct Shader {
   RenderContext context;
   SplatShader::Parameters parameters;
   SplatShader sm;
-  ColorSurface surface{side, side, ColorFormat::rgba16f};
+  ColorSurface surface{threshold_side, threshold_side, ColorFormat::rgba16f};
 };
 
 TEST(AlphaThreshold, PixelsBelowTheThresholdAreDiscarded) {
-  Shader shader(alpha_threshold_state(0.5F));
+  ThresholdShader shader(alpha_threshold_state(0.5F));
   shader.surface.quad({1, 2}, 9).alpha = Lanes{0.5F, 0.499F, 1.0F, 0.0F};
   shader.surface.quad({1, 2}, 11).alpha = Lanes{0.9F, 0.9F, 0.9F, 0.1F};
   Warp warp = warp_of({9, 10, 11}, {1, 2});
@@ -71,7 +73,7 @@ TEST(AlphaThreshold, TheThresholdItselfGoesByTheRuleOfTermination) {
   for (const bool inclusive : {true, false}) {
     DrawState state = alpha_threshold_state(threshold);
     state.termination_inclusive = inclusive;
-    Shader shader(state);
+    ThresholdShader shader(state);
     shader.surface.quad({0, 0}, 0).alpha = Lanes{threshold, 0.75048828F, 0.74951172F, 1};
     const ShadedWarp out = shader.shade(warp_of({0}));
     ASSERT_EQ(out.count, 1U);
@@ -117,11 +119,11 @@ TEST_P(AlphaThresholdTest, AWarpTakesItsFiveInstructionsAndTheLoad) {
 }
 
 TEST_P(AlphaThresholdTest, AWarpOfAMeshTakesThoseOfItsOwnProgram) {
-  Frame frame(side, side);
-  auto mesh = std::make_shared<Draw>(testing::draw_of(side, side));
+  Frame frame(threshold_side, threshold_side);
+  auto mesh = std::make_shared<Draw>(testing::draw_of(threshold_side, threshold_side));
   mesh->mesh.resize(1);
   for (MeshVertex& vertex : mesh->mesh[0].vertices) vertex = {0, 0, 0.5F, 1, 1, 1, 1, 0, 0, 1};
-  mesh->mesh[0].vertices[1].x = mesh->mesh[0].vertices[2].y = side;
+  mesh->mesh[0].vertices[1].x = mesh->mesh[0].vertices[2].y = threshold_side;
   DrawState state;
   state.shader = FragmentShader::vertex;
   frame.draw(mesh, state);

@@ -14,7 +14,7 @@ using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
-constexpr DrawIndex draws = 3;
+constexpr DrawIndex marked_draws = 3;
 constexpr std::uint32_t splats_of_draw = 8;
 
 /// Draws of equal state: splats 0, 1, ... of the frame, eight of each. Round ones, so that some lanes are pruned.
@@ -25,16 +25,16 @@ RenderContext three_draws() {
   }
   const auto geometry = testing::geometry_of(64, 64, splats);
   Frame frame(64, 64);
-  for (DrawIndex draw = 0; draw < draws; ++draw) frame.draw(geometry, {});
+  for (DrawIndex draw = 0; draw < marked_draws; ++draw) frame.draw(geometry, {});
   return testing::context_of(frame);
 }
 
 /// A shader whose counters count by draw.
-struct Shader : SplatShader {
-  explicit Shader(const RenderContext& context) : SplatShader({}, context) { set_draws(draws); }
+struct CountingShader : SplatShader {
+  explicit CountingShader(const RenderContext& context) : SplatShader({}, context) { set_draws(marked_draws); }
 };
 
-Quad quad_of(std::uint32_t splat, unsigned position, LaneMask coverage) {
+Quad quad_of_splat(std::uint32_t splat, unsigned position, LaneMask coverage) {
   Quad quad{};
   quad.splat = splat;
   quad.position = static_cast<std::uint8_t>(position);
@@ -95,11 +95,11 @@ TEST(SplatShaderOfAFrame, PrunesAtTheThresholdOfTheWarpsDraw) {
 
 TEST(SplatShaderOfAFrame, AMergedQuadIsOfItsFrontsDrawAndIsCountedAsMergedForItsBacks) {
   const RenderContext context = three_draws();
-  Shader sm(context);
+  CountingShader sm(context);
   Warp warp;
   warp.merge_pairs = 1;
-  warp.quads[0] = quad_of(0, 8, 0b0111);                   // draw 0
-  warp.quads[1] = quad_of(2 * splats_of_draw, 8, 0b1110);  // draw 2
+  warp.quads[0] = quad_of_splat(0, 8, 0b0111);                   // draw 0
+  warp.quads[1] = quad_of_splat(2 * splats_of_draw, 8, 0b1110);  // draw 2
   warp.count = 2;
   ShadedWarp out;
   sm.shade(warp, out);
@@ -114,22 +114,22 @@ TEST(SplatShaderOfAFrame, AMergedQuadIsOfItsFrontsDrawAndIsCountedAsMergedForIts
 
 TEST(SplatShaderOfAFrame, WarpsOfSeveralDrawsAreCountedQuadByQuad) {
   const RenderContext context = three_draws();
-  Shader sm(context);
-  Shader alone(context);  // a quad at a time: which of its lanes live
-  ByDraw shaded(draws), fragments(draws), pruned(draws), fragments_pruned(draws), merged(draws),
-      fragments_merged(draws);
+  CountingShader sm(context);
+  CountingShader alone(context);  // a quad at a time: which of its lanes live
+  ByDraw shaded(marked_draws), fragments(marked_draws), pruned(marked_draws), fragments_pruned(marked_draws),
+      merged(marked_draws), fragments_merged(marked_draws);
   for (std::uint64_t seed = 0; seed < 400; ++seed) {
     Warp warp;
     warp.count = static_cast<std::uint8_t>(1 + mix(seed) % 8);
     LaneMask live[quads_per_warp] = {};
     for (unsigned i = 0; i < warp.count; ++i) {
       const std::uint64_t random = mix(seed * 8 + i);
-      const auto splat = static_cast<std::uint32_t>(random % (draws * splats_of_draw));
+      const auto splat = static_cast<std::uint32_t>(random % (marked_draws * splats_of_draw));
       // About the splat, or of the position of the quad before, to be merged.
       const bool pairs = i % 2 == 1 && random / 64 % 2 == 0;
       const auto position = static_cast<unsigned>(splat % splats_of_draw + 8 * (random / 128 % 3));
-      warp.quads[i] =
-          quad_of(splat, pairs ? warp.quads[i - 1].position : position, static_cast<LaneMask>(1 + random / 1024 % 15));
+      warp.quads[i] = quad_of_splat(splat, pairs ? warp.quads[i - 1].position : position,
+                                    static_cast<LaneMask>(1 + random / 1024 % 15));
       if (pairs) warp.merge_pairs |= static_cast<std::uint8_t>(1U << (i / 2));
       Warp single;
       single.count = 1;
@@ -157,7 +157,7 @@ TEST(SplatShaderOfAFrame, WarpsOfSeveralDrawsAreCountedQuadByQuad) {
   EXPECT_EQ(sm.fragments_pruned.of_draw(), fragments_pruned);
   EXPECT_EQ(sm.quads_merged.of_draw(), merged);
   EXPECT_EQ(sm.fragments_merged.of_draw(), fragments_merged);
-  for (DrawIndex draw = 0; draw < draws; ++draw) {
+  for (DrawIndex draw = 0; draw < marked_draws; ++draw) {
     EXPECT_GT(pruned[draw], 0U) << "the test is of something";
     EXPECT_GT(merged[draw], 0U);
   }
@@ -170,7 +170,7 @@ class SmMarksTest : public ::testing::TestWithParam<Fidelity> {
     Warp warp;
     warp.sequence = warp.tile_sequence = sequence;
     warp.count = 8;
-    for (unsigned i = 0; i < 8; ++i) warp.quads[i] = quad_of(sequence % splats_of_draw, i, all_lanes);
+    for (unsigned i = 0; i < 8; ++i) warp.quads[i] = quad_of_splat(sequence % splats_of_draw, i, all_lanes);
     return warp;
   }
   static Warp mark(std::uint32_t sequence, Mark which) {
@@ -185,8 +185,9 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, SmMarksTest, ::testing::ValuesIn(testing::f
                          testing::name_of_fidelity);
 
 /// The numbers of warps and, from 1000 on, of marks as they come to PROP, which releases slots a little later.
-struct SmBench {
-  SmBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {}, unsigned depth = 64)
+struct MarkedSmBench {
+  MarkedSmBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {},
+                unsigned depth = 64)
       : bench(fidelity, "sm", "splat-shader", context, settings),
         warps(bench.source<Warp>("in_warps", depth)),
         release(bench.source<WarpRelease>("in_release", 4096)),
@@ -214,7 +215,7 @@ TEST_P(SmMarksTest, NoWarpLaunchedAfterAMarkIsHandedOnBeforeIt) {
     // With room to spare, and with so few slots that warps wait for one.
     Bench::Settings settings;
     if (seed % 2 == 1) settings = {{"cores", "1"}, {"warps_per_core", "3"}};
-    SmBench sm(GetParam(), context, settings, seed % 4 < 2 ? 64 : 2);
+    MarkedSmBench sm(GetParam(), context, settings, seed % 4 < 2 ? 64 : 2);
     constexpr std::uint32_t count = 60;
     std::uint32_t marks = 0;
     std::vector<std::uint32_t> marks_before;
@@ -245,7 +246,7 @@ TEST_P(SmMarksTest, NoWarpLaunchedAfterAMarkIsHandedOnBeforeIt) {
 
 TEST_P(SmMarksTest, AMarkTakesNoSlotAndWaitsForNoWarpBeforeIt) {
   if (GetParam() == Fidelity::lt) GTEST_SKIP() << "there it comes behind all before it";
-  SmBench sm(GetParam(), context);
+  MarkedSmBench sm(GetParam(), context);
   sm.warps.add(warp(0), 10);
   sm.warps.add(mark(1, Frame::mark_of(0)), 11);
   sm.warps.add(warp(1), 12);

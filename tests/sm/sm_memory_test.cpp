@@ -58,18 +58,18 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, SmMemoryTest, ::testing::ValuesIn(testing::
                          testing::name_of_fidelity);
 
 constexpr unsigned memory_latency = 100;
-constexpr unsigned line_bytes = 128;
+constexpr unsigned memory_line_bytes = 128;
 
 /// The unit with everything around it, and a memory of 100 cycles that moves a line a cycle.
-struct SmBench {
-  SmBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {})
+struct SmMemoryBench {
+  SmMemoryBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {})
       : bench(fidelity, "sm", "splat-shader", context, settings),
         warps(bench.source<Warp>("in_warps", 64)),
         release(bench.source<WarpRelease>("in_release", 4096)),
         vertices(bench.source<VertexWarp>("in_vertices", 64)),
         shaded(bench.sink<ShadedWarpItem>("out_shaded", 64)),
         shaded_vertices(bench.sink<VertexWarp>("out_vertices", 64)) {
-    bench.set_memory(memory_latency, line_bytes);
+    bench.set_memory(memory_latency, memory_line_bytes);
     shaded.on_take([this](const ShadedWarpItem& item, Cycle now) {
       if (item.warp->mark == Mark::none) cycles[item.warp->sequence] = now;
       item.warp->release();
@@ -106,58 +106,58 @@ struct SmBench {
 };
 
 // Default programs: 4 instructions, what they fetch, then 20 (16 for vertices) and 75 cycles; an instruction issues in 2.
-constexpr Cycle first_cycles = 4 * 2;
-constexpr Cycle fragment_cycles = 20 * 2 + 75;
-constexpr Cycle vertex_cycles = first_cycles + 16 * 2 + 75;
+constexpr Cycle first_segment_cycles = 4 * 2;
+constexpr Cycle second_segment_cycles = 20 * 2 + 75;
+constexpr Cycle fetched_vertex_cycles = first_segment_cycles + 16 * 2 + 75;
 
 TEST_P(SmMemoryTest, AVertexWarpBeginsWhenItsVerticesAreThere) {
-  SmBench sm(GetParam(), context);
+  SmMemoryBench sm(GetParam(), context);
   sm.vertices.add({0, 8}, 10);
   sm.run();
   ASSERT_EQ(sm.shaded_vertices.records().size(), 2U);
   // In hand and asked for at 11; of three lines that move one a cycle the last is there at 11 + 100 + 3. Attributes are
   // sent as soon as it is shaded; the memory takes them all.
-  EXPECT_EQ(sm.shaded_vertices.records()[0].cycle, 11 + memory_latency + 3 + vertex_cycles + 1);
+  EXPECT_EQ(sm.shaded_vertices.records()[0].cycle, 11 + memory_latency + 3 + fetched_vertex_cycles + 1);
   EXPECT_EQ(sm.bench_unit().memory_bytes().read, 8U * 48);
   EXPECT_EQ(sm.bench_unit().memory_bytes().written, 8U * 704);
 }
 
 TEST_P(SmMemoryTest, AVertexWarpLeavesWhenTheLastOfItsAttributesHasBeenSent) {
-  SmBench sm(GetParam(), context, {{"attribute_writes", "4"}});
+  SmMemoryBench sm(GetParam(), context, {{"attribute_writes", "4"}});
   sm.vertices.add({0, 8}, 10);
   sm.run();
   ASSERT_EQ(sm.shaded_vertices.records().size(), 2U);
   // 44 lines. The first four are sent at once and answered in four cycles, the first after 101; each answer lets one go.
-  const Cycle shaded = 11 + memory_latency + 3 + vertex_cycles;
+  const Cycle shaded = 11 + memory_latency + 3 + fetched_vertex_cycles;
   EXPECT_EQ(sm.shaded_vertices.records()[0].cycle, shaded + 10 * (memory_latency + 1) + 3 + 1);
 }
 
 TEST_P(SmMemoryTest, WhatIsCulledIsNotWritten) {
   draw.splats[2] = draw.splats[5] = testing::flat_box(100, 100, 120, 120, 0.5F);
-  SmBench sm(GetParam(), context);
+  SmMemoryBench sm(GetParam(), context);
   sm.vertices.add({0, 8}, 10);
   sm.run();
   EXPECT_EQ(sm.bench_unit().memory_bytes().written, 6U * 704);
 }
 
 TEST_P(SmMemoryTest, AFragmentWarpWaitsForAttributesBehindItsFirstSegment) {
-  SmBench sm(GetParam(), context);
+  SmMemoryBench sm(GetParam(), context);
   sm.warps.add(warp(0, 0), 10);
   sm.run();
   // Two sectors, in one access, asked for as it is launched at 11.
-  EXPECT_EQ(sm.cycles[0], 11 + memory_latency + 1 + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[0], 11 + memory_latency + 1 + second_segment_cycles + 1);
   EXPECT_EQ(sm.bench_unit().memory_bytes().read, 64U);
 }
 
 TEST_P(SmMemoryTest, WhatIsOnItsWayIsNotAskedForAgainAndWhatIsThereTakesTheTimeOfL1) {
-  SmBench sm(GetParam(), context);
+  SmMemoryBench sm(GetParam(), context);
   sm.warps.add(warp(0, 0), 10);
   sm.warps.add(warp(1, 0), 10);
   sm.warps.add(warp(2, 0), 299);
   sm.run();
-  EXPECT_EQ(sm.cycles[0], 11 + memory_latency + 1 + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[0], 11 + memory_latency + 1 + second_segment_cycles + 1);
   EXPECT_EQ(sm.cycles[1], sm.cycles[0]) << "launched a cycle later, with the same fill";
-  EXPECT_EQ(sm.cycles[2], 300 + 38 + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[2], 300 + 38 + second_segment_cycles + 1);
   EXPECT_EQ(sm.bench_unit().memory_bytes().read, 64U);
   EXPECT_EQ(sm.l1("line_accesses"), 3U);
   EXPECT_EQ(sm.l1("sector_misses"), 2U);
@@ -165,86 +165,87 @@ TEST_P(SmMemoryTest, WhatIsOnItsWayIsNotAskedForAgainAndWhatIsThereTakesTheTimeO
 }
 
 TEST_P(SmMemoryTest, EachCoreHasAnL1OfItsOwn) {
-  SmBench sm(GetParam(), context);
+  SmMemoryBench sm(GetParam(), context);
   sm.warps.add(warp(0, 0), 10);
   sm.warps.add(warp(1, 0, 1, {1, 0}), 300);  // another tile goes to another core
   sm.run();
-  EXPECT_EQ(sm.cycles[1], 301 + memory_latency + 1 + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[1], 301 + memory_latency + 1 + second_segment_cycles + 1);
   EXPECT_EQ(sm.bench_unit().memory_bytes().read, 2 * 64U);
 }
 
 TEST_P(SmMemoryTest, AMemoryFasterThanL1DoesNotShortenItsTime) {
-  SmBench sm(GetParam(), context);
-  sm.bench.set_memory(1, line_bytes);
+  SmMemoryBench sm(GetParam(), context);
+  sm.bench.set_memory(1, memory_line_bytes);
   sm.warps.add(warp(0, 0), 10);
   sm.run();
-  EXPECT_EQ(sm.cycles[0], 11 + 38 + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[0], 11 + 38 + second_segment_cycles + 1);
 }
 
 TEST_P(SmMemoryTest, AWarpIsLaunchedWhenAllItsSectorsHaveBeenAskedFor) {
-  SmBench sm(GetParam(), context, {{"l1_mshrs", "1"}});
+  SmMemoryBench sm(GetParam(), context, {{"l1_mshrs", "1"}});
   sm.warps.add(warp(0, 0, 2), 10);
   sm.run();
   // Two primitives of two sectors, each asked for when the one before has come.
   const Cycle launched = 11 + 3 * (memory_latency + 1);
-  EXPECT_EQ(sm.cycles[0], launched + memory_latency + 1 + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[0], launched + memory_latency + 1 + second_segment_cycles + 1);
 }
 
 TEST_P(SmMemoryTest, EightPrimitivesMoveAsManyLinesAsTheyLieIn) {
-  SmBench sm(GetParam(), context);
+  SmMemoryBench sm(GetParam(), context);
   sm.bench.set_memory(memory_latency, 32);
   sm.warps.add(warp(0, 0, 8), 10);
   sm.run();
   // Sixteen sectors, one a cycle.
-  EXPECT_EQ(sm.cycles[0], 11 + memory_latency + 16 + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[0], 11 + memory_latency + 16 + second_segment_cycles + 1);
 }
 
 TEST_P(SmMemoryTest, AnL1OfOneLineWaitsForItBeforeItGoesForAnother) {
-  SmBench sm(GetParam(), context, {{"l1_bytes", "128"}});
+  SmMemoryBench sm(GetParam(), context, {{"l1_bytes", "128"}});
   sm.warps.add(warp(0, 0, 2), 10);
   sm.run();
   // The second primitive's line can only be asked for when the first one's has come; then the warp is launched.
-  EXPECT_EQ(sm.cycles[0], 11 + 2 * (memory_latency + 1) + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[0], 11 + 2 * (memory_latency + 1) + second_segment_cycles + 1);
   EXPECT_EQ(sm.l1("lines_evicted"), 1U);
 }
 
 TEST_P(SmMemoryTest, WithoutAnL1EachWarpAsksForAllThatItReads) {
-  SmBench sm(GetParam(), context, {{"l1_bytes", "0"}});
+  SmMemoryBench sm(GetParam(), context, {{"l1_bytes", "0"}});
   sm.warps.add(warp(0, 0), 10);
   sm.warps.add(warp(1, 0), 10);
   sm.warps.add(warp(2, 0), 299);
   sm.run();
-  EXPECT_EQ(sm.cycles[0], 11 + memory_latency + 1 + fragment_cycles + 1);
-  EXPECT_EQ(sm.cycles[1], 12 + memory_latency + 1 + fragment_cycles + 1);
-  EXPECT_EQ(sm.cycles[2], 300 + memory_latency + 1 + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[0], 11 + memory_latency + 1 + second_segment_cycles + 1);
+  EXPECT_EQ(sm.cycles[1], 12 + memory_latency + 1 + second_segment_cycles + 1);
+  EXPECT_EQ(sm.cycles[2], 300 + memory_latency + 1 + second_segment_cycles + 1);
   EXPECT_EQ(sm.bench_unit().memory_bytes().read, 3 * 64U);
   EXPECT_EQ(sm.l1("line_accesses"), 0U);
   EXPECT_EQ(sm.l1("sector_misses"), 0U);
 }
 
 TEST_P(SmMemoryTest, WithoutAnL1MemorySaysHowLongItTakes) {
-  SmBench sm(GetParam(), context, {{"l1_bytes", "0"}});
-  sm.bench.set_memory(1, line_bytes);
+  SmMemoryBench sm(GetParam(), context, {{"l1_bytes", "0"}});
+  sm.bench.set_memory(1, memory_line_bytes);
   sm.warps.add(warp(0, 0), 10);
   sm.run();
-  EXPECT_EQ(sm.cycles[0], 11 + first_cycles + fragment_cycles + 1) << "before its first instructions have been issued";
+  EXPECT_EQ(sm.cycles[0], 11 + first_segment_cycles + second_segment_cycles + 1)
+      << "before its first instructions have been issued";
 }
 
 TEST_P(SmMemoryTest, WithoutAnL1ACoreHasNoMoreSectorsInFlight) {
-  SmBench sm(GetParam(), context, {{"l1_bytes", "0"}, {"l1_mshrs", "1"}});
+  SmMemoryBench sm(GetParam(), context, {{"l1_bytes", "0"}, {"l1_mshrs", "1"}});
   sm.warps.add(warp(0, 0, 2), 10);
   sm.run();
   const Cycle launched = 11 + 3 * (memory_latency + 1);
-  EXPECT_EQ(sm.cycles[0], launched + memory_latency + 1 + fragment_cycles + 1);
+  EXPECT_EQ(sm.cycles[0], launched + memory_latency + 1 + second_segment_cycles + 1);
   EXPECT_EQ(sm.bench_unit().memory_bytes().read, 4 * 32U);
 }
 
 TEST_P(SmMemoryTest, CyclesOfWaitingForMemoryAreChargedToIt) {
-  SmBench sm(GetParam(), context);
+  SmMemoryBench sm(GetParam(), context);
   sm.warps.add(warp(0, 0), 10);
   sm.warps.add(warp(1, 100), 500);  // at lt and at cycles are charged when the next warp comes
   sm.run();
-  EXPECT_GE(testing::charged(sm.bench.unit(), UnitState::memory, 501), memory_latency - first_cycles);
+  EXPECT_GE(testing::charged(sm.bench.unit(), UnitState::memory, 501), memory_latency - first_segment_cycles);
 }
 
 TEST_P(SmMemoryTest, WithoutAMemoryAttributesTakeAFixedTime) {
@@ -253,7 +254,7 @@ TEST_P(SmMemoryTest, WithoutAMemoryAttributesTakeAFixedTime) {
   Sink<VertexWarp>& out = bench.sink<VertexWarp>("out_vertices");
   in.add({0, 8}, 10);
   bench.run();
-  EXPECT_EQ(out.records().at(0).cycle, 11 + 500 + vertex_cycles + 1);
+  EXPECT_EQ(out.records().at(0).cycle, 11 + 500 + fetched_vertex_cycles + 1);
   EXPECT_EQ(bench.unit().memory_bytes().read, 0U);
 }
 
@@ -265,15 +266,15 @@ TEST_P(SmMemoryTest, EveryWarpComesOutOnceWhateverTheMemoryDoes) {
     const auto of = [&](std::uint64_t salt, std::initializer_list<const char*> values) {
       return std::string(*(values.begin() + mix(seed * 7 + salt) % values.size()));
     };
-    SmBench sm(GetParam(), context,
-               {{"cores", "2"},
-                {"warps_per_core", "6"},
-                {"vertex_warps", "3"},
-                {"l1_bytes", of(1, {"128", "256", "1024", "49152"})},
-                {"l1_mshrs", of(2, {"1", "3", "8", "384"})},
-                {"attribute_writes", of(3, {"1", "5", "640"})},
-                {"attribute_bytes", of(4, {"4", "40", "352"})},
-                {"l1_latency_cycles", of(5, {"0", "38", "300"})}});
+    SmMemoryBench sm(GetParam(), context,
+                     {{"cores", "2"},
+                      {"warps_per_core", "6"},
+                      {"vertex_warps", "3"},
+                      {"l1_bytes", of(1, {"128", "256", "1024", "49152"})},
+                      {"l1_mshrs", of(2, {"1", "3", "8", "384"})},
+                      {"attribute_writes", of(3, {"1", "5", "640"})},
+                      {"attribute_bytes", of(4, {"4", "40", "352"})},
+                      {"l1_latency_cycles", of(5, {"0", "38", "300"})}});
     foreign::Dram dram("dram", nanoseconds(1 + seed % 3), nanoseconds(40), nanoseconds(70 + 100 * (seed % 5)));
     sm.bench.bind_memory(dram.socket);
     for (std::uint32_t i = 0; i < 60; ++i) {
@@ -309,7 +310,7 @@ TEST_F(SmMemoryWithoutTimeTest, AsksForWhatItAsksForAtCycle) {
   sm->memory_port()->connect(memory);
   auto& vertices = dynamic_cast<UntimedIn<VertexWarp>&>(sm->in("in_vertices"));
   auto& warps = dynamic_cast<UntimedIn<Warp>&>(sm->in("in_warps"));
-  SmBench cycle(Fidelity::cycle, context);
+  SmMemoryBench cycle(Fidelity::cycle, context);
   for (std::uint32_t i = 0; i < 4; ++i) {
     vertices.take({8 * i, 8});
     cycle.vertices.add({8 * i, 8});

@@ -4,44 +4,28 @@
 
 #include <gtest/gtest.h>
 
+#include "sm/sm_scene.h"
 #include "support/fidelities.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::fragment_cycles;
+using testing::issue_cycles;
+using testing::merge_cycles;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
-class SmTimedTest : public ::testing::TestWithParam<Fidelity> {
- protected:
-  SmTimedTest()
-      : draw(testing::draw_of(64, 64, std::vector<Splat>(64, testing::flat_box(0, 0, 64, 64, 0.5F)))),
-        context(testing::context_of(draw)) {}
-
-  Warp warp(std::uint32_t sequence, TileId tile = {0, 0}, std::uint8_t merge_pairs = 0) const {
-    Warp result;
-    result.tile = tile;
-    result.sequence = result.tile_sequence = sequence;
-    result.merge_pairs = merge_pairs;
-    for (unsigned i = 0; i < 8; ++i) {
-      result.quads[result.count++] = {sequence % 64, static_cast<std::uint8_t>(merge_pairs != 0 ? i / 2 : i), all_lanes,
-                                      0, 0};
-    }
-    return result;
-  }
-
-  Draw draw;
-  RenderContext context;
-};
+class SmTimedTest : public ::testing::TestWithParam<Fidelity>, protected testing::SmScene {};
 
 INSTANTIATE_TEST_SUITE_P(Fidelities, SmTimedTest, ::testing::ValuesIn(testing::fidelities_with_time()),
                          testing::name_of_fidelity);
 
 /// The unit with everything around it: what is shaded is noted and its slot released at once, or later.
-struct SmBench {
-  SmBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {}, unsigned in_depth = 64,
-          unsigned out_depth = 64)
+struct TimedSmBench {
+  TimedSmBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {},
+               unsigned in_depth = 64, unsigned out_depth = 64)
       : bench(fidelity, "sm", "splat-shader", context, settings),
         warps(bench.source<Warp>("in_warps", in_depth)),
         release(bench.source<WarpRelease>("in_release", 4096)),
@@ -75,15 +59,11 @@ struct SmBench {
   unsigned quads = 0;
 };
 
-// Default program: 4 instructions, 146 cycles for attributes, 20 instructions, 75 cycles; an instruction issues in 2.
-constexpr Cycle issue_cycles = (4 + 20) * 2;
-constexpr Cycle fragment_cycles = issue_cycles + 146 + 75;
-constexpr Cycle merge_cycles = 13 * 2 + 30;
 constexpr Cycle vertex_cycles = (4 + 16) * 2 + 146 + 75;
 
 TEST_P(SmTimedTest, AWarpAloneTakesItsInstructionsAndLatencies) {
   for (const bool pairs : {false, true}) {
-    SmBench sm(GetParam(), context);
+    TimedSmBench sm(GetParam(), context);
     sm.warps.add(warp(0, {0, 0}, pairs ? 0b0001 : 0), 10);
     sm.run();
     // In hand at 11, seen a link later.
@@ -92,14 +72,14 @@ TEST_P(SmTimedTest, AWarpAloneTakesItsInstructionsAndLatencies) {
 }
 
 TEST_P(SmTimedTest, FewerLanesMakeAnInstructionIssueLonger) {
-  SmBench sm(GetParam(), context, {{"lanes_per_scheduler", "8"}});
+  TimedSmBench sm(GetParam(), context, {{"lanes_per_scheduler", "8"}});
   sm.warps.add(warp(0), 10);
   sm.run();
   EXPECT_EQ(sm.cycles[0], 11 + fragment_cycles + issue_cycles + 1);
 }
 
 TEST_P(SmTimedTest, AnArrayWithRoomToSpareLaunchesAWarpACycle) {
-  SmBench sm(GetParam(), context, {{"warps_to_one_core", "8"}}, 256, 256);
+  TimedSmBench sm(GetParam(), context, {{"warps_to_one_core", "8"}}, 256, 256);
   for (std::uint32_t i = 0; i < 200; ++i) sm.warps.add(warp(i));
   sm.run();
   ASSERT_EQ(sm.cycles.size(), 200U);
@@ -119,7 +99,7 @@ TEST_P(SmTimedTest, AnArrayWithRoomToSpareLaunchesAWarpACycle) {
 }
 
 TEST_P(SmTimedTest, WarpsOfOneSchedulerHideOneAnothersLatencies) {
-  SmBench sm(GetParam(), context, {{"cores", "1"}, {"schedulers_per_core", "1"}});
+  TimedSmBench sm(GetParam(), context, {{"cores", "1"}, {"schedulers_per_core", "1"}});
   for (std::uint32_t i = 0; i < 48; ++i) sm.warps.add(warp(i));
   sm.run();
   ASSERT_EQ(sm.cycles.size(), 48U);
@@ -129,7 +109,7 @@ TEST_P(SmTimedTest, WarpsOfOneSchedulerHideOneAnothersLatencies) {
 }
 
 TEST_P(SmTimedTest, SchedulersWorkSideBySide) {
-  SmBench sm(GetParam(), context, {{"cores", "1"}, {"schedulers_per_core", "4"}});
+  TimedSmBench sm(GetParam(), context, {{"cores", "1"}, {"schedulers_per_core", "4"}});
   for (std::uint32_t i = 0; i < 48; ++i) sm.warps.add(warp(i));
   sm.run();
   // Twelve warps each, the first of which is launched in cycles 1 to 4; a quarter of the time but for the latencies.
@@ -140,7 +120,7 @@ TEST_P(SmTimedTest, SchedulersWorkSideBySide) {
 }
 
 TEST_P(SmTimedTest, AWarpWaitsForASlotUntilACycleAfterItsRelease) {
-  SmBench sm(GetParam(), context, {{"cores", "1"}, {"warps_per_core", "1"}});
+  TimedSmBench sm(GetParam(), context, {{"cores", "1"}, {"warps_per_core", "1"}});
   sm.release_after = 500;
   sm.warps.add(warp(0));
   sm.warps.add(warp(1));
@@ -154,7 +134,7 @@ TEST_P(SmTimedTest, AWarpWaitsForASlotUntilACycleAfterItsRelease) {
 }
 
 TEST_P(SmTimedTest, WarpsWithoutASlotStayOutside) {
-  SmBench sm(GetParam(), context, {{"cores", "1"}, {"warps_per_core", "2"}}, 1);
+  TimedSmBench sm(GetParam(), context, {{"cores", "1"}, {"warps_per_core", "2"}}, 1);
   sm.release_after = never;
   for (std::uint32_t i = 0; i < 5; ++i) sm.warps.add(warp(i));
   if (GetParam() == Fidelity::lt) {
@@ -169,8 +149,8 @@ TEST_P(SmTimedTest, WarpsWithoutASlotStayOutside) {
 TEST_P(SmTimedTest, ConsecutiveWarpsOfATileGoToOneCore) {
   // Two cores of one scheduler: whether two warps share it tells.
   for (const bool together : {false, true}) {
-    SmBench sm(GetParam(), context,
-               {{"cores", "2"}, {"schedulers_per_core", "1"}, {"warps_to_one_core", together ? "8" : "1"}});
+    TimedSmBench sm(GetParam(), context,
+                    {{"cores", "2"}, {"schedulers_per_core", "1"}, {"warps_to_one_core", together ? "8" : "1"}});
     for (std::uint32_t i = 0; i < 2; ++i) sm.warps.add(warp(i), 10);
     sm.run();
     // Launched at 12; one that shares the scheduler issues its first segment 7 cycles late, and its second once that of
@@ -211,7 +191,7 @@ TEST_P(SmTimedTest, NoMoreVertexWarpsAreInFlightThanItHasPlaces) {
 }
 
 TEST_P(SmTimedTest, FragmentsThatFillAllSlotsDoNotHoldUpVertices) {
-  SmBench sm(GetParam(), context, {{"cores", "1"}, {"warps_per_core", "2"}});
+  TimedSmBench sm(GetParam(), context, {{"cores", "1"}, {"warps_per_core", "2"}});
   Source<VertexWarp>& vertices = sm.bench.source<VertexWarp>("in_vertices");
   Sink<VertexWarp>& out = sm.bench.sink<VertexWarp>("out_vertices");
   sm.release_after = 1'000'000;
@@ -224,7 +204,7 @@ TEST_P(SmTimedTest, FragmentsThatFillAllSlotsDoNotHoldUpVertices) {
 
 TEST_P(SmTimedTest, VerticesTakeIssueSlotsFromFragments) {
   // One scheduler: a vertex warp's 20 instructions, or its first 4, go before the fragment warp's.
-  SmBench sm(GetParam(), context, {{"cores", "1"}, {"schedulers_per_core", "1"}});
+  TimedSmBench sm(GetParam(), context, {{"cores", "1"}, {"schedulers_per_core", "1"}});
   Source<VertexWarp>& vertices = sm.bench.source<VertexWarp>("in_vertices");
   sm.bench.sink<VertexWarp>("out_vertices");
   vertices.add({0, 8, false}, 5);
@@ -237,8 +217,8 @@ TEST_P(SmTimedTest, VerticesTakeIssueSlotsFromFragments) {
 // case M06
 TEST_P(SmTimedTest, EveryWarpComesOutOnceUnderAnyStallsInWhateverOrder) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    SmBench sm(GetParam(), context, {{"cores", "2"}, {"warps_per_core", "6"}, {"vertex_warps", "3"}},
-               static_cast<unsigned>(1 + seed % 9), static_cast<unsigned>(1 + seed % 10));
+    TimedSmBench sm(GetParam(), context, {{"cores", "2"}, {"warps_per_core", "6"}, {"vertex_warps", "3"}},
+                    static_cast<unsigned>(1 + seed % 9), static_cast<unsigned>(1 + seed % 10));
     Source<VertexWarp>& vertices = sm.bench.source<VertexWarp>("in_vertices");
     Sink<VertexWarp>& shaded_vertices = sm.bench.sink<VertexWarp>("out_vertices");
     sm.release_after = 1 + seed % 40;

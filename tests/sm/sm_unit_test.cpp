@@ -4,41 +4,25 @@
 
 #include <vrpipe/testkit/bench.h>
 
-#include "support/builders.h"
+#include "sm/sm_scene.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::fragment_cycles;
+using testing::merge_cycles;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
-class SmUnitTest : public ::testing::Test {
+class SmUnitTest : public ::testing::Test, protected testing::SmScene {
  protected:
-  SmUnitTest()
-      : draw(testing::draw_of(64, 64, std::vector<Splat>(64, testing::flat_box(0, 0, 64, 64, 0.5F)))),
-        context(testing::context_of(draw)) {}
-
-  Warp warp(std::uint32_t sequence, TileId tile = {0, 0}, std::uint8_t merge_pairs = 0) const {
-    Warp result;
-    result.tile = tile;
-    result.sequence = result.tile_sequence = sequence;
-    result.merge_pairs = merge_pairs;
-    for (unsigned i = 0; i < 8; ++i) {
-      result.quads[result.count++] = {sequence % 64, static_cast<std::uint8_t>(merge_pairs != 0 ? i / 2 : i), all_lanes,
-                                      0, 0};
-    }
-    return result;
-  }
-  Warp end(std::uint32_t warps) const {
+  static Warp end(std::uint32_t warps) {
     Warp result;
     result.mark = Mark::end_of_frame;
     result.sequence = warps;
     return result;
   }
-
-  Draw draw;
-  RenderContext context;
 };
 
 /// The unit with everything around it: what is shaded is noted and its slot released at once, or later.
@@ -66,10 +50,6 @@ struct SmBench {
   std::vector<Cycle> cycles;
   unsigned quads = 0;
 };
-
-// Default program: 4 instructions, 146 cycles for attributes, 20 instructions, 75 cycles; an instruction issues in 2.
-constexpr Cycle fragment_cycles = 4 * 2 + 146 + 20 * 2 + 75;
-constexpr Cycle merge_cycles = 13 * 2 + 30;
 
 TEST_F(SmUnitTest, AWarpAloneTakesItsInstructionsAndLatencies) {
   SmBench sm(context);

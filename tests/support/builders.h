@@ -114,6 +114,21 @@ inline ScreenTriangle one_quad_triangle(float x, float y) {
   return {{x - 0.45F, x + 2.45F, x + 1.0F}, {y + 0.4F, y + 0.4F, y + 2.3F}};
 }
 
+/// 0, 1, 2, ...
+inline std::vector<unsigned> numbers(unsigned count) {
+  std::vector<unsigned> all;
+  for (unsigned i = 0; i < count; ++i) all.push_back(i);
+  return all;
+}
+
+/// What is no work but a mark, of any stream that has them.
+template <class Item>
+Item marked(Mark mark = Mark::end_of_frame) {
+  Item item;
+  item.mark = mark;
+  return item;
+}
+
 /// A beat of full quads of one tile, at these positions, of splats first, first + 1, ...
 inline QuadBeat beat_of(TileId tile, const std::vector<unsigned>& positions, std::uint32_t first_splat = 0,
                         bool last_of_bin = false) {
@@ -126,11 +141,7 @@ inline QuadBeat beat_of(TileId tile, const std::vector<unsigned>& positions, std
   return beat;
 }
 
-inline QuadBeat end_beat() {
-  QuadBeat beat;
-  beat.mark = Mark::end_of_frame;
-  return beat;
-}
+inline QuadBeat end_beat() { return marked<QuadBeat>(); }
 
 inline QuadColor color_of(float red, float green, float blue, float alpha) {
   return {splat_lanes(red), splat_lanes(green), splat_lanes(blue), splat_lanes(alpha)};

@@ -87,11 +87,4 @@ inline std::vector<std::uint32_t> splats_of(const BinItem& bin) {
   return splats;
 }
 
-/// 0, 1, 2, ...
-inline std::vector<unsigned> numbers(unsigned count) {
-  std::vector<unsigned> all;
-  for (unsigned i = 0; i < count; ++i) all.push_back(i);
-  return all;
-}
-
 }  // namespace vrpipe::testing

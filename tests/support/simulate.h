@@ -30,6 +30,11 @@ inline RunResult run(const RunRequest& request, const Draw& draw) {
   return simulate(request, draw);
 }
 
+inline RunResult run(const RunRequest& request, const Frame& frame) {
+  fresh_simulation();
+  return simulate(request, frame);
+}
+
 inline void strictly(RunRequest& request) { request.termination = Termination::strict; }
 
 /// Whether two targets hold the same bits in every pixel.
@@ -49,6 +54,15 @@ inline std::uint64_t statistic(const RunResult& result, const std::string& name)
     if (report.name == name) return report.value;
   }
   ADD_FAILURE() << "no statistic " << name;
+  return 0;
+}
+
+/// What a draw of a frame counted.
+inline std::uint64_t count(const DrawReport& draw, const std::string& name) {
+  for (const auto& [each, value] : draw.counts) {
+    if (each == name) return value;
+  }
+  ADD_FAILURE() << "no count " << name;
   return 0;
 }
 

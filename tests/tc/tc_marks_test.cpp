@@ -7,28 +7,22 @@
 
 #include "support/fidelities.h"
 #include "tc/tc.h"
+#include "tc/tc_tiles.h"
 
 namespace vrpipe {
 namespace {
 
 using testing::beat_of;
 using testing::pruned_at;
+using testing::tile;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
 using Words = std::vector<std::string>;
 
-TileId tile(unsigned index) { return {static_cast<std::uint16_t>(index), 0}; }
-
-constexpr unsigned change = 1;  ///< command of a draw of another state
-constexpr unsigned clear = 2;   ///< command of a clear
-
-QuadBeat mark_beat(Mark mark) {
-  QuadBeat beat;
-  beat.mark = mark;
-  return beat;
-}
+constexpr unsigned change_command = 1;  ///< command of a draw of another state
+constexpr unsigned clear_command = 2;   ///< command of a clear
 
 /// TC with its ports, of whatever fidelity.
 struct TcBench {
@@ -37,8 +31,8 @@ struct TcBench {
         in(bench.source<QuadBeat>("in_quads", depth)),
         beats(fidelity == Fidelity::cycle ? &bench.sink<QuadBeat>("out_bins", depth) : nullptr),
         bins(fidelity == Fidelity::cycle ? nullptr : &bench.sink<BinItem>("out_bins", depth)) {}
-  void mark(unsigned command, Cycle at = 0) { in.add(mark_beat(Frame::mark_of(command)), at); }
-  void end(Cycle at = 0) { in.add(mark_beat(Mark::end_of_frame), at); }
+  void mark(unsigned command, Cycle at = 0) { in.add(testing::marked<QuadBeat>(Frame::mark_of(command)), at); }
+  void end(Cycle at = 0) { in.add(testing::end_beat(), at); }
   void close(Cycle from, Cycle until) { beats != nullptr ? beats->close(from, until) : bins->close(from, until); }
 
   /// What came out: the splats of each bin, and marks.
@@ -100,7 +94,7 @@ TEST_P(TcMarksTest, AClearFlushesAllBinsAndFollowsThem) {
   tc.in.add(beat_of(tile(0), {1}, 0));
   tc.in.add(beat_of(tile(1), {1}, 1));
   tc.in.add(beat_of(tile(0), {2}, 2));
-  tc.mark(clear);
+  tc.mark(clear_command);
   tc.in.add(beat_of(tile(0), {3}, 3));
   tc.end();
   tc.bench.run();
@@ -111,7 +105,7 @@ TEST_P(TcMarksTest, AClearFlushesAllBinsAndFollowsThem) {
 TEST_P(TcMarksTest, AChangeOfStateFlushesAllBinsAndEndsThere) {
   TcBench tc(GetParam(), context);
   tc.in.add(beat_of(tile(0), {1, 2}, 0));
-  tc.mark(change);
+  tc.mark(change_command);
   tc.in.add(beat_of(tile(0), {3, 4}, 2));
   tc.end();
   tc.bench.run();
@@ -120,7 +114,9 @@ TEST_P(TcMarksTest, AChangeOfStateFlushesAllBinsAndEndsThere) {
 
 TEST_P(TcMarksTest, MarksThatFindNothingGoOnOrNotAllTheSame) {
   TcBench tc(GetParam(), context);
-  for (const unsigned command : {clear, change, change, clear, clear, change}) tc.mark(command);
+  for (const unsigned command :
+       {clear_command, change_command, change_command, clear_command, clear_command, change_command})
+    tc.mark(command);
   tc.end();
   tc.bench.run();
   EXPECT_EQ(tc.words(), (Words{"mark 2", "mark 2", "mark 2", "end"}));
@@ -130,7 +126,7 @@ TEST_P(TcMarksTest, MarksThatFindNothingGoOnOrNotAllTheSame) {
 TEST_P(TcMarksTest, ALostMarkLeavesNothingForTheTimeOut) {
   TcBench tc(GetParam(), context, {{"idle_timeout_cycles", "50"}});
   tc.in.add(beat_of(tile(0), {1}, 0));
-  tc.mark(change);
+  tc.mark(change_command);
   tc.in.add(beat_of(tile(1), {1}, 1), 300);
   tc.end(1000);
   tc.bench.run();
@@ -141,7 +137,7 @@ TEST_P(TcMarksTest, ALostMarkLeavesNothingForTheTimeOut) {
 }
 
 TEST_P(TcMarksTest, DrainsIntoAFullQueueAndAClosedReceiverWithMoreBehind) {
-  for (const unsigned command : {change, clear}) {
+  for (const unsigned command : {change_command, clear_command}) {
     for (const char* queue : {"1", "2", "5"}) {
       for (const Cycle closed_from : {Cycle{0}, Cycle{10}, Cycle{25}}) {
         TcBench tc(GetParam(), context, {{"flush_queue_bins", queue}, {"bin_quads", "4"}}, 2);
@@ -162,7 +158,7 @@ TEST_P(TcMarksTest, DrainsIntoAFullQueueAndAClosedReceiverWithMoreBehind) {
           marks += item.mark != Mark::none;
         }
         EXPECT_EQ(next, splat);
-        EXPECT_EQ(marks, command == clear ? 4U : 1U);
+        EXPECT_EQ(marks, command == clear_command ? 4U : 1U);
         EXPECT_TRUE(tc.bench.unit().idle());
       }
     }
@@ -192,7 +188,7 @@ TEST_P(TcMarksTest, ABinIsOfOneStateAndNoQuadPassesAMarkUnderAnyStalls) {
         const bool clears_now = random / 9 % 2 == 0;
         clears += clears_now;
         ++marks;
-        tc.mark(clears_now ? clear : change, at);
+        tc.mark(clears_now ? clear_command : change_command, at);
         continue;
       }
       std::vector<unsigned> positions(1 + random / 32 % 16, 5);
@@ -214,7 +210,7 @@ TEST_P(TcMarksTest, ABinIsOfOneStateAndNoQuadPassesAMarkUnderAnyStalls) {
         ASSERT_EQ(marks_before[each], marks_before[item.splats.front()]) << "seed " << seed;
         splats.insert(each);
       }
-      seen += item.mark == Frame::mark_of(clear);
+      seen += item.mark == Frame::mark_of(clear_command);
     }
     EXPECT_EQ(seen, clears);
     EXPECT_EQ(splats.size(), splat);

@@ -6,15 +6,15 @@
 #include <gtest/gtest.h>
 
 #include "support/builders.h"
+#include "tc/tc_tiles.h"
 
 namespace vrpipe {
 namespace {
 
 using testing::beat_of;
+using testing::tile;
 using Flush = TcBehaviour::Flush;
 using Reason = TcBehaviour::FlushReason;
-
-TileId tile(unsigned index) { return {static_cast<std::uint16_t>(index % 40), static_cast<std::uint16_t>(index / 40)}; }
 
 class TileCoalescingTest : public ::testing::Test {
  protected:

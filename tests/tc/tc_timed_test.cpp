@@ -5,20 +5,19 @@
 
 #include "support/fidelities.h"
 #include "tc/tc.h"
+#include "tc/tc_tiles.h"
 
 namespace vrpipe {
 namespace {
 
 using testing::beat_of;
 using testing::end_beat;
+using testing::numbers;
 using testing::splats_of;
+using testing::tile;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
-
-TileId tile(unsigned index) { return {static_cast<std::uint16_t>(index % 40), static_cast<std::uint16_t>(index / 40)}; }
-
-const std::vector<unsigned> sixteen = testing::numbers(16);
 
 class TcTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
@@ -31,9 +30,9 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, TcTimedTest, ::testing::ValuesIn(testing::t
                          testing::name_of_fidelity);
 
 /// TC with its ports.
-struct TcBench {
-  TcBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {}, unsigned in_depth = 4,
-          unsigned out_depth = 64)
+struct TimedTcBench {
+  TimedTcBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {},
+               unsigned in_depth = 4, unsigned out_depth = 64)
       : bench(fidelity, "tc", "tile-coalescing", context, settings),
         in(bench.source<QuadBeat>("in_quads", in_depth)),
         out(bench.sink<BinItem>("out_bins", out_depth)) {}
@@ -53,22 +52,23 @@ struct TcBench {
 };
 
 TEST_P(TcTimedTest, AFullBinIsSeenFromTheCycleAfterItFilledPlusTheLatencyOnABeatACycle) {
-  TcBench tc(GetParam(), context, {{"bin_quads", "64"}, {"latency_cycles", "4"}});
-  for (unsigned i = 0; i < 4; ++i) tc.in.add(beat_of(tile(3), sixteen, 16 * i), 10 + i);
+  TimedTcBench tc(GetParam(), context, {{"bin_quads", "64"}, {"latency_cycles", "4"}});
+  for (unsigned i = 0; i < 4; ++i) tc.in.add(beat_of(tile(3), numbers(16), 16 * i), 10 + i);
   tc.bench.run();
   ASSERT_EQ(tc.out.records().size(), 1U);
   // The last quads are in hand at 14; the bin goes from 15 on, in four beats.
   EXPECT_EQ(tc.out.records()[0].cycle, 15U + 4);
   EXPECT_EQ(tc.out.records()[0].last, 18U + 4);
   EXPECT_EQ(tc.out.records()[0].item.tile, tile(3));
-  EXPECT_EQ(splats_of(tc.out.records()[0].item), testing::numbers(64));
+  EXPECT_EQ(splats_of(tc.out.records()[0].item), numbers(64));
 }
 
 TEST_P(TcTimedTest, TakesItsQuadsPerCycleAndHandsBinsOnAtTheSameRate) {
   for (const unsigned rate : {4U, 8U, 16U}) {
-    TcBench tc(GetParam(), context,
-               {{"quads_per_cycle", std::to_string(rate)}, {"bin_quads", "256"}, {"latency_cycles", "4"}}, 64, 256);
-    for (unsigned i = 0; i < 64; ++i) tc.in.add(beat_of(tile(0), sixteen, 16 * i));
+    TimedTcBench tc(GetParam(), context,
+                    {{"quads_per_cycle", std::to_string(rate)}, {"bin_quads", "256"}, {"latency_cycles", "4"}}, 64,
+                    256);
+    for (unsigned i = 0; i < 64; ++i) tc.in.add(beat_of(tile(0), numbers(16), 16 * i));
     tc.bench.run();
     ASSERT_EQ(tc.out.records().size(), 4U);
     // All is at the port in cycle 1; bin n is full 256 / rate cycles after the one before, and takes as long to leave.
@@ -82,14 +82,14 @@ TEST_P(TcTimedTest, TakesItsQuadsPerCycleAndHandsBinsOnAtTheSameRate) {
 }
 
 TEST_P(TcTimedTest, SmallBeatsShareACycle) {
-  TcBench tc(GetParam(), context, {{"quads_per_cycle", "16"}, {"bin_quads", "64"}, {"latency_cycles", "4"}}, 64);
+  TimedTcBench tc(GetParam(), context, {{"quads_per_cycle", "16"}, {"bin_quads", "64"}, {"latency_cycles", "4"}}, 64);
   for (unsigned i = 0; i < 64; ++i) tc.in.add(beat_of(tile(0), {i}, i));
   tc.bench.run();
   EXPECT_EQ(tc.out.records().at(0).cycle, 4U + 1 + 4) << "64 beats of one quad enter in four cycles";
 }
 
 TEST_P(TcTimedTest, ATileWithoutABinEvictsTheOldestInTheCycleOfItsQuads) {
-  TcBench tc(GetParam(), context, {{"bins", "2"}, {"latency_cycles", "4"}});
+  TimedTcBench tc(GetParam(), context, {{"bins", "2"}, {"latency_cycles", "4"}});
   tc.in.add(beat_of(tile(0), {1, 2}, 0), 10);
   tc.in.add(beat_of(tile(1), {1}, 10), 20);
   tc.in.add(beat_of(tile(2), {1}, 20), 30);
@@ -102,7 +102,7 @@ TEST_P(TcTimedTest, ATileWithoutABinEvictsTheOldestInTheCycleOfItsQuads) {
 
 TEST_P(TcTimedTest, TheIdleTimeOutFiresExactlyItsCyclesAfterTheLastArrival) {
   for (const unsigned timeout : {1U, 150U, 151U}) {
-    TcBench tc(GetParam(), context, {{"idle_timeout_cycles", std::to_string(timeout)}, {"latency_cycles", "4"}});
+    TimedTcBench tc(GetParam(), context, {{"idle_timeout_cycles", std::to_string(timeout)}, {"latency_cycles", "4"}});
     tc.in.add(beat_of(tile(0), {1}), 10);
     tc.in.add(beat_of(tile(1), {1}), 1000);  // at lt it is what comes next that finds a bin's time out
     tc.in.add(end_beat(), 2000);
@@ -116,8 +116,8 @@ TEST_P(TcTimedTest, TheIdleTimeOutFiresExactlyItsCyclesAfterTheLastArrival) {
 }
 
 TEST_P(TcTimedTest, BinsWhoseTimeIsOutGoOneACycle) {
-  TcBench tc(GetParam(), context, {{"idle_timeout_cycles", "20"}, {"latency_cycles", "4"}, {"flush_queue_bins", "16"}},
-             16);
+  TimedTcBench tc(GetParam(), context,
+                  {{"idle_timeout_cycles", "20"}, {"latency_cycles", "4"}, {"flush_queue_bins", "16"}}, 16);
   for (unsigned i = 0; i < 5; ++i) tc.in.add(beat_of(tile(i), {1}, i), 10);
   tc.in.add(end_beat(), 1000);
   tc.bench.run();
@@ -130,7 +130,7 @@ TEST_P(TcTimedTest, BinsWhoseTimeIsOutGoOneACycle) {
 
 TEST_P(TcTimedTest, AnArrivalInTheCycleOfTheTimeOutPutsItOff) {
   for (const Cycle gap : {149U, 150U, 151U}) {
-    TcBench tc(GetParam(), context, {{"idle_timeout_cycles", "150"}});
+    TimedTcBench tc(GetParam(), context, {{"idle_timeout_cycles", "150"}});
     tc.in.add(beat_of(tile(0), {1}), 10);
     tc.in.add(beat_of(tile(0), {2}), 10 + gap);
     tc.in.add(end_beat(), 5000);
@@ -142,7 +142,7 @@ TEST_P(TcTimedTest, AnArrivalInTheCycleOfTheTimeOutPutsItOff) {
 
 TEST_P(TcTimedTest, InStrictTerminationABinWaitsForTheEndOfTheDraw) {
   context.termination = Termination::strict;
-  TcBench tc(GetParam(), context, {{"idle_timeout_cycles", "150"}, {"latency_cycles", "4"}});
+  TimedTcBench tc(GetParam(), context, {{"idle_timeout_cycles", "150"}, {"latency_cycles", "4"}});
   tc.in.add(beat_of(tile(0), {1}));
   tc.in.add(end_beat(), 100'000);
   tc.bench.run();
@@ -154,7 +154,7 @@ TEST_P(TcTimedTest, InStrictTerminationABinWaitsForTheEndOfTheDraw) {
 
 // case T05
 TEST_P(TcTimedTest, TheEndOfAnEmptyDrawGoesThroughAlone) {
-  TcBench tc(GetParam(), context);
+  TimedTcBench tc(GetParam(), context);
   tc.in.add(end_beat());
   tc.bench.run();
   ASSERT_EQ(tc.out.records().size(), 1U);
@@ -162,8 +162,8 @@ TEST_P(TcTimedTest, TheEndOfAnEmptyDrawGoesThroughAlone) {
 }
 
 TEST_P(TcTimedTest, FlushedBinsThatNobodyTakesStopItAtTheQueuesDepth) {
-  TcBench tc(GetParam(), context, {{"bin_quads", "16"}, {"flush_queue_bins", "3"}, {"latency_cycles", "1"}}, 1, 1);
-  for (unsigned i = 0; i < 10; ++i) tc.in.add(beat_of(tile(0), sixteen, 16 * i));
+  TimedTcBench tc(GetParam(), context, {{"bin_quads", "16"}, {"flush_queue_bins", "3"}, {"latency_cycles", "1"}}, 1, 1);
+  for (unsigned i = 0; i < 10; ++i) tc.in.add(beat_of(tile(0), numbers(16), 16 * i));
   tc.out.close(0, 1000);
   tc.bench.run();
   // As at cycle: one bin at the closed port, three in the queue, one at the input: the sixth waits. At `at` TC does not
@@ -172,7 +172,7 @@ TEST_P(TcTimedTest, FlushedBinsThatNobodyTakesStopItAtTheQueuesDepth) {
   ASSERT_EQ(tc.in.sent().size(), 10U);
   EXPECT_LT(tc.in.sent()[4], 100U);
   EXPECT_GE(tc.in.sent()[5 + again], 1000U);
-  EXPECT_EQ(tc.splats(), testing::numbers(160));
+  EXPECT_EQ(tc.splats(), numbers(160));
   for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(tc.out.records()[i].cycle, 1000 + 2 * i) << "one place";
   EXPECT_GT(testing::charged(tc.bench.unit(), UnitState::blocked, 1020), 900U);
 }
@@ -222,8 +222,8 @@ TEST_P(TcTimedTest, BinsAreThoseOfCycleUnderAnyStallsWithoutTimeOut) {
     expected = contents(out);
   }
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    TcBench tc(GetParam(), context, settings, static_cast<unsigned>(1 + seed % 10),
-               static_cast<unsigned>(1 + seed % 9));
+    TimedTcBench tc(GetParam(), context, settings, static_cast<unsigned>(1 + seed % 10),
+                    static_cast<unsigned>(1 + seed % 9));
     add_many(tc.in);
     tc.bench.stall_randomly(seed, seed == 0 ? 0 : 100);
     tc.bench.run();
@@ -244,7 +244,7 @@ TEST_P(TcTimedTest, WithRoomToSpareBinsLeaveWhenTheyDoAtCycle) {
       if (record.item.last_of_bin || record.item.mark == Mark::end_of_frame) expected.push_back(record.cycle);
     }
   }
-  TcBench tc(GetParam(), context, settings);
+  TimedTcBench tc(GetParam(), context, settings);
   add_many(tc.in);
   tc.bench.run();
   // The end of the frame takes a cycle of its own: the four bins that it flushes, and itself, are a cycle late.
@@ -256,7 +256,7 @@ TEST_P(TcTimedTest, WithRoomToSpareBinsLeaveWhenTheyDoAtCycle) {
 
 TEST_P(TcTimedTest, WithTimeOutsStallsMayCutBinsButLoseNoQuad) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-    TcBench tc(GetParam(), context, {{"idle_timeout_cycles", "3"}});
+    TimedTcBench tc(GetParam(), context, {{"idle_timeout_cycles", "3"}});
     for (unsigned i = 0; i < 200; ++i) tc.in.add(beat_of(tile(i % 5), {i % 64}, i));
     tc.in.add(end_beat());
     tc.bench.stall_randomly(seed, 150);

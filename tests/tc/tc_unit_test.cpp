@@ -6,19 +6,18 @@
 
 #include "support/builders.h"
 #include "tc/tc.h"
+#include "tc/tc_tiles.h"
 
 namespace vrpipe {
 namespace {
 
 using testing::beat_of;
 using testing::end_beat;
+using testing::numbers;
+using testing::tile;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
-
-TileId tile(unsigned index) { return {static_cast<std::uint16_t>(index % 40), static_cast<std::uint16_t>(index / 40)}; }
-
-const std::vector<unsigned> sixteen{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 
 class TcUnitTest : public ::testing::Test {
  protected:
@@ -105,7 +104,7 @@ TEST_F(TcUnitTest, TakesItsQuadsPerCycle) {
     Bench bench("tc", "tile-coalescing", context, {{"quads_per_cycle", std::to_string(rate)}, {"bin_quads", "1024"}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 64);
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins", 8);
-    for (unsigned i = 0; i < 64; ++i) in.add(beat_of(tile(0), sixteen, 16 * i));
+    for (unsigned i = 0; i < 64; ++i) in.add(beat_of(tile(0), numbers(16), 16 * i));
     bench.run();
     ASSERT_GT(out.records().size(), 0U);
     // All is at the port in cycle 1; the last quad enters 1024 / rate cycles on, and the full bin leaves from there.
@@ -140,7 +139,7 @@ TEST_F(TcUnitTest, FlushedBinsThatNobodyTakesStopItAtTheQueuesDepth) {
               {{"bin_quads", "16"}, {"flush_queue_bins", "3"}, {"latency_cycles", "1"}});
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 1);
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_bins", 1);
-  for (unsigned i = 0; i < 10; ++i) in.add(beat_of(tile(0), sixteen, 16 * i));
+  for (unsigned i = 0; i < 10; ++i) in.add(beat_of(tile(0), numbers(16), 16 * i));
   out.close(0, 1000);
   bench.run();
   // One bin at the closed port, three in the queue, one at the input: the sixth waits.

@@ -5,10 +5,13 @@
 
 #include "support/fidelities.h"
 #include "tgc/tgc.h"
+#include "tgc/tgc_items.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::item_in;
+using testing::marked;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
@@ -17,23 +20,6 @@ using Words = std::vector<std::string>;
 
 constexpr PixelRect one_grid{0, 0, 4, 4};
 constexpr PixelRect another_grid{300, 300, 304, 304};
-
-PrimitiveItem item_in(std::uint32_t splat, PixelRect bounds) {
-  PrimitiveItem item;
-  item.primitive.splat = splat;
-  item.primitive.bounds = bounds;
-  return item;
-}
-PrimitiveItem mark_item(unsigned command) {
-  PrimitiveItem item;
-  item.mark = Frame::mark_of(command);
-  return item;
-}
-PrimitiveItem end_item() {
-  PrimitiveItem item;
-  item.mark = Mark::end_of_frame;
-  return item;
-}
 
 /// TGC with its ports.
 struct TgcBench {
@@ -72,7 +58,7 @@ TEST_P(TgcMarksTest, AMarkFlushesAllBinsAndComesBehindThem) {
   tgc.in.add(item_in(0, one_grid));
   tgc.in.add(item_in(1, another_grid));
   tgc.in.add(item_in(2, one_grid));
-  tgc.in.add(mark_item(1));
+  tgc.in.add(marked<PrimitiveItem>(Frame::mark_of(1)));
   tgc.bench.run();
   EXPECT_EQ(tgc.words(), (Words{"0", "2", "1", "mark 1"})) << "bin by bin, the oldest first";
   EXPECT_TRUE(tgc.bench.unit().idle());
@@ -81,9 +67,9 @@ TEST_P(TgcMarksTest, AMarkFlushesAllBinsAndComesBehindThem) {
 TEST_P(TgcMarksTest, PrimitivesAfterAMarkShareNoBinWithThoseBefore) {
   TgcBench tgc(GetParam(), context);
   for (const unsigned splat : {0U, 1U}) tgc.in.add(item_in(splat, one_grid));
-  tgc.in.add(mark_item(1));
+  tgc.in.add(marked<PrimitiveItem>(Frame::mark_of(1)));
   for (const unsigned splat : {2U, 3U}) tgc.in.add(item_in(splat, one_grid));
-  tgc.in.add(end_item());
+  tgc.in.add(marked<PrimitiveItem>());
   tgc.bench.run();
   EXPECT_EQ(tgc.words(), (Words{"0", "1", "mark 1", "2", "3", "end"}));
   EXPECT_EQ(tgc.bench.behaviour<TileGridCoalescing>().flushes.value(), 2U);
@@ -92,10 +78,10 @@ TEST_P(TgcMarksTest, PrimitivesAfterAMarkShareNoBinWithThoseBefore) {
 
 TEST_P(TgcMarksTest, MarksWithNothingBetweenThemFollowOneAnother) {
   TgcBench tgc(GetParam(), context);
-  for (const unsigned command : {0U, 1U, 2U}) tgc.in.add(mark_item(command));
+  for (const unsigned command : {0U, 1U, 2U}) tgc.in.add(marked<PrimitiveItem>(Frame::mark_of(command)));
   tgc.in.add(item_in(0, one_grid));
-  for (const unsigned command : {4U, 5U}) tgc.in.add(mark_item(command));
-  tgc.in.add(end_item());
+  for (const unsigned command : {4U, 5U}) tgc.in.add(marked<PrimitiveItem>(Frame::mark_of(command)));
+  tgc.in.add(marked<PrimitiveItem>());
   tgc.bench.run();
   EXPECT_EQ(tgc.words(), (Words{"mark 0", "mark 1", "mark 2", "0", "mark 4", "mark 5", "end"}));
 }
@@ -103,9 +89,9 @@ TEST_P(TgcMarksTest, MarksWithNothingBetweenThemFollowOneAnother) {
 TEST_P(TgcMarksTest, WithoutBinsAMarkGoesThroughInItsPlace) {
   TgcBench tgc(GetParam(), context, {}, "pass-through");
   tgc.in.add(item_in(0, one_grid));
-  tgc.in.add(mark_item(1));
+  tgc.in.add(marked<PrimitiveItem>(Frame::mark_of(1)));
   tgc.in.add(item_in(1, one_grid));
-  tgc.in.add(end_item());
+  tgc.in.add(marked<PrimitiveItem>());
   tgc.bench.run();
   EXPECT_EQ(tgc.words(), (Words{"0", "mark 1", "1", "end"}));
 }
@@ -117,12 +103,12 @@ TEST_P(TgcMarksTest, StallsMovePrimitivesPastNoMark) {
     std::vector<unsigned> marks_before;  // of each splat
     unsigned marks = 0;
     for (std::uint32_t splat = 0; splat < primitives; ++splat) {
-      for (; mix(seed + 7 * splat + marks) % 6 == 0; ++marks) tgc.in.add(mark_item(marks));
+      for (; mix(seed + 7 * splat + marks) % 6 == 0; ++marks) tgc.in.add(marked<PrimitiveItem>(Frame::mark_of(marks)));
       marks_before.push_back(marks);
       const auto x = static_cast<std::int32_t>(mix(seed ^ splat) % 5 * 100);
       tgc.in.add(item_in(splat, {x, 0, x + 90, 90}));
     }
-    tgc.in.add(end_item());
+    tgc.in.add(marked<PrimitiveItem>());
     tgc.out.close(50, 400);
     tgc.bench.stall_randomly(seed, 96);
     tgc.bench.run();

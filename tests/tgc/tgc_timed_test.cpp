@@ -2,26 +2,17 @@
 #include <gtest/gtest.h>
 
 #include "support/fidelities.h"
+#include "tgc/tgc_items.h"
 
 namespace vrpipe {
 namespace {
 
 using testing::cycles_of;
+using testing::item_in;
+using testing::marked;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
-
-PrimitiveItem item_in(std::uint32_t splat, PixelRect bounds) {
-  PrimitiveItem item;
-  item.primitive.splat = splat;
-  item.primitive.bounds = bounds;
-  return item;
-}
-PrimitiveItem end_of_frame() {
-  PrimitiveItem item;
-  item.mark = Mark::end_of_frame;
-  return item;
-}
 
 class TgcTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
@@ -77,7 +68,7 @@ TEST_P(TgcTimedTest, PassingThroughHandsOnOneJobACycle) {
   Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 32);
   Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 32);
   for (std::uint32_t i = 0; i < 16; ++i) in.add(item_in(i, {0, 0, 4, 4}));
-  in.add(end_of_frame());
+  in.add(marked<PrimitiveItem>());
   bench.run();
   ASSERT_EQ(out.records().size(), 17U);
   for (std::size_t i = 1; i < 16; ++i) EXPECT_EQ(out.records()[i].cycle, out.records()[0].cycle + i);
@@ -95,7 +86,7 @@ TEST_P(TgcTimedTest, TheEndFlushesAllBinsAndComesLast) {
       const auto y = static_cast<std::int32_t>(i / 16 * 64);
       in.add(item_in(i, {x, y, x + 1, y + 1}));
     }
-    in.add(end_of_frame());
+    in.add(marked<PrimitiveItem>());
     bench.run();
     ASSERT_EQ(out.records().size(), bins + 1);
     for (std::uint32_t i = 0; i < bins; ++i) EXPECT_EQ(out.records()[i].item.primitive.splat, i);
@@ -109,7 +100,7 @@ TEST_P(TgcTimedTest, BinsThatTheEndFlushesFollowOneAnotherWithoutAGap) {
   Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 32);
   Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 32);
   for (std::int32_t i = 0; i < 10; ++i) in.add(item_in(static_cast<std::uint32_t>(i), {64 * i, 0, 64 * i + 1, 1}));
-  in.add(end_of_frame(), 100);
+  in.add(marked<PrimitiveItem>(), 100);
   bench.run();
   ASSERT_EQ(out.records().size(), 11U);
   // The end is in hand at 101, and the first bin is read out from 102 on. At lt and at the end takes a cycle of its own.
@@ -148,7 +139,7 @@ TEST_P(TgcTimedTest, FlushesAreTheSameUnderAnyStalls) {
       const auto x = static_cast<std::int32_t>(mix(i) % 500);
       in.add(item_in(i, {x, 30, x + 70, 66}));
     }
-    in.add(end_of_frame());
+    in.add(marked<PrimitiveItem>());
     if (seed > 0) bench.stall_randomly(seed, 100);
     bench.run();
     std::vector<std::uint32_t> jobs;

@@ -3,25 +3,16 @@
 #include <vrpipe/testkit/bench.h>
 
 #include "support/builders.h"
+#include "tgc/tgc_items.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::item_in;
+using testing::marked;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
-
-PrimitiveItem item_in(std::uint32_t splat, PixelRect bounds) {
-  PrimitiveItem item;
-  item.primitive.splat = splat;
-  item.primitive.bounds = bounds;
-  return item;
-}
-PrimitiveItem end_of_frame() {
-  PrimitiveItem item;
-  item.mark = Mark::end_of_frame;
-  return item;
-}
 
 class TgcUnitTest : public ::testing::Test {
  protected:
@@ -72,7 +63,7 @@ TEST_F(TgcUnitTest, PassingThroughTakesTwoPrimitivesInAndOneJobOutACycle) {
   Source<PrimitiveItem>& in = bench.source<PrimitiveItem>("in_primitives", 16);
   Sink<RasterJob>& out = bench.sink<RasterJob>("out_jobs", 16);
   for (std::uint32_t i = 0; i < 16; ++i) in.add(item_in(i, {0, 0, 4, 4}));
-  in.add(end_of_frame());
+  in.add(marked<PrimitiveItem>());
   bench.run();
   ASSERT_EQ(out.records().size(), 17U);
   EXPECT_EQ(out.records()[15].cycle - out.records()[0].cycle, 15U);
@@ -90,7 +81,7 @@ TEST_F(TgcUnitTest, TheEndFlushesAllBinsAndComesLast) {
       const auto y = static_cast<std::int32_t>(i / 16 * 64);
       in.add(item_in(i, {x, y, x + 1, y + 1}));
     }
-    in.add(end_of_frame());
+    in.add(marked<PrimitiveItem>());
     bench.run();
     ASSERT_EQ(out.records().size(), bins + 1);
     for (std::uint32_t i = 0; i < bins; ++i) EXPECT_EQ(out.records()[i].item.primitive.splat, i);
@@ -109,7 +100,7 @@ TEST_F(TgcUnitTest, FlushesAreTheSameUnderAnyStalls) {
       const auto x = static_cast<std::int32_t>(mix(i) % 500);
       in.add(item_in(i, {x, 30, x + 70, 66}));
     }
-    in.add(end_of_frame());
+    in.add(marked<PrimitiveItem>());
     if (seed > 0) bench.stall_randomly(seed, 100);
     bench.run();
     std::vector<std::uint32_t> jobs;

@@ -251,12 +251,12 @@ TEST_F(BadInput, BrokenGaussiansAreCountedNotFatal) {
   write_gaussian_file(folder() / "broken.ply", builder.build());
   const std::vector<std::string> arguments{"run",   "--scene", "broken.ply", "--size", "32x32",
                                            "--eye", "0,0,0",   "--look-at",  "0,0,1"};
-  const nlohmann::json json = json_of(arguments);
-  EXPECT_EQ(json["scene"]["gaussians_total"], 4);
-  EXPECT_EQ(json["scene"]["gaussians_visible"], 1);
-  EXPECT_EQ(json["scene"]["gaussians_rejected"], 3);
-  EXPECT_EQ(json["scene"]["rejected_by_reason"]["not_finite"], 2);
-  EXPECT_EQ(json["scene"]["rejected_by_reason"]["zero_quaternion"], 1);
+  const nlohmann::json written = json_of(arguments);
+  EXPECT_EQ(written["scene"]["gaussians_total"], 4);
+  EXPECT_EQ(written["scene"]["gaussians_visible"], 1);
+  EXPECT_EQ(written["scene"]["gaussians_rejected"], 3);
+  EXPECT_EQ(written["scene"]["rejected_by_reason"]["not_finite"], 2);
+  EXPECT_EQ(written["scene"]["rejected_by_reason"]["zero_quaternion"], 1);
   EXPECT_NE(vrpipe(arguments).out.find("rejected 3 Gaussians"), std::string::npos);
 }
 

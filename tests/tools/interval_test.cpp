@@ -46,10 +46,10 @@ class Interval : public ToolTest {
   }
 };
 
-const std::vector<std::string> timed{"lt", "at", "cycle"};
+const std::vector<std::string> timed_fidelities{"lt", "at", "cycle"};
 
 TEST_F(Interval, SumToTheRunAndChangeNothing) {
-  for (const std::string& fidelity : timed) {
+  for (const std::string& fidelity : timed_fidelities) {
     SCOPED_TRACE(fidelity);
     const std::vector<std::string> command{"run", "--scene", "tiny.spl", "--fidelity", fidelity};
     const json plain = json_of(command)["runs"][0];
@@ -77,7 +77,7 @@ TEST_F(Interval, SumToTheRunAndChangeNothing) {
 
 // That the last interval is what the others leave of the total does not hide what is charged to a wrong one.
 TEST_F(Interval, OfHalfTheLengthAreThePartsOfThoseOfTheWhole) {
-  for (const std::string& fidelity : timed) {
+  for (const std::string& fidelity : timed_fidelities) {
     const auto of = [&](const char* cycles) {
       return json_of({"run", "--scene", "tiny.spl", "--fidelity", fidelity, "--interval",
                       cycles})["runs"][0]["intervals"]["states"];

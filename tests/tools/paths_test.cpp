@@ -132,9 +132,9 @@ TEST_F(Paths, ThatAreNotUtf8LoseNoResult) {
   const Finished compared = vrpipe(
       {"compare", "--scene", "caf\xe9.spl", "--fidelity", "functional", "--json", "r\xff.json", "--output", "o\xe9"});
   ASSERT_EQ(compared.code, 0) << compared.err;
-  const nlohmann::json json = nlohmann::json::parse(read_file(folder() / "r\xff.json"));
-  EXPECT_EQ(json["scene"]["name"], "caf\\xE9.spl");
-  EXPECT_EQ(json["runs"][0]["images"]["png"], "o\\xE9/caf\\xE9-baseline.png");
+  const nlohmann::json written = nlohmann::json::parse(read_file(folder() / "r\xff.json"));
+  EXPECT_EQ(written["scene"]["name"], "caf\\xE9.spl");
+  EXPECT_EQ(written["runs"][0]["images"]["png"], "o\\xE9/caf\\xE9-baseline.png");
   EXPECT_TRUE(std::filesystem::exists(folder() / "o\xe9" / "caf\xe9-baseline.png"));
   EXPECT_TRUE(std::filesystem::exists(folder() / "o\xe9" / "caf\xe9-het+qm.exr"));
   EXPECT_NE(compared.out.find("image: o\\xE9/caf\\xE9-qm.png and .exr"), std::string::npos) << compared.out;

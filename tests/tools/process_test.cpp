@@ -89,9 +89,9 @@ TEST_F(Process, ForeignBytesOfAPluginAreEscaped) {
   Implementation foreign = Registry::instance().find("qru", "pairing");
   foreign.name = "for\xe9ign";
   foreign.description = "caf\xe9 \x1b[2J";
-  const Finished json = with_unit(foreign, {"units", "--slot", "qru", "--json", "-"});
-  EXPECT_EQ(json.code, 0) << json.err;
-  EXPECT_NE(json.out.find(R"("caf\\xE9 \u001b[2J")"), std::string::npos) << json.out;
+  const Finished listed = with_unit(foreign, {"units", "--slot", "qru", "--json", "-"});
+  EXPECT_EQ(listed.code, 0) << listed.err;
+  EXPECT_NE(listed.out.find(R"("caf\\xE9 \u001b[2J")"), std::string::npos) << listed.out;
   for (const auto& options : {std::vector<const char*>{}, {"--markdown"}}) {
     std::vector<const char*> arguments{"units", "--slot", "qru"};
     arguments.insert(arguments.end(), options.begin(), options.end());

@@ -38,14 +38,14 @@ TEST_F(Scenes, OfAFileSayWhatIsInIt) {
 }
 
 TEST_F(Scenes, OfAFileAreInJsonAsWell) {
-  const nlohmann::json json = nlohmann::json::parse(vrpipe({"scenes", "ball.ply", "--json", "-"}).out);
-  EXPECT_EQ(json["schema"], "vrpipe.scene/1");
-  EXPECT_EQ(json["gaussians"], 300);
-  EXPECT_EQ(json["sh_degree"], 1);
-  EXPECT_EQ(json["description"]["opacity"].size(), json["description"]["percents"].size());
-  EXPECT_NEAR(json["description"]["scale"][0].get<double>(), std::exp(-3.0), 1e-6);
-  EXPECT_NEAR(json["description"]["anisotropy"][0].get<double>(), std::exp(1.0), 1e-5);
-  EXPECT_EQ(json["view"]["up"], nlohmann::json::array({0.0, -1.0, 0.0}));
+  const nlohmann::json listed = nlohmann::json::parse(vrpipe({"scenes", "ball.ply", "--json", "-"}).out);
+  EXPECT_EQ(listed["schema"], "vrpipe.scene/1");
+  EXPECT_EQ(listed["gaussians"], 300);
+  EXPECT_EQ(listed["sh_degree"], 1);
+  EXPECT_EQ(listed["description"]["opacity"].size(), listed["description"]["percents"].size());
+  EXPECT_NEAR(listed["description"]["scale"][0].get<double>(), std::exp(-3.0), 1e-6);
+  EXPECT_NEAR(listed["description"]["anisotropy"][0].get<double>(), std::exp(1.0), 1e-5);
+  EXPECT_EQ(listed["view"]["up"], nlohmann::json::array({0.0, -1.0, 0.0}));
 }
 
 TEST_F(Scenes, AreDrawnAsAPreview) {

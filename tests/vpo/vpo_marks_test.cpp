@@ -6,11 +6,12 @@
 namespace vrpipe {
 namespace {
 
+using testing::marked;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
-constexpr unsigned draws = 6;
+constexpr unsigned marked_draws = 6;
 constexpr unsigned splats_of_draw = 16;
 
 /// Draws with a clear before each but the first: draw n is command 2 n, the clear before it 2 n - 1.
@@ -24,15 +25,13 @@ RenderContext cleared_between_draws() {
   }
   const auto geometry = testing::geometry_of(128, 128, splats);
   Frame frame(128, 128);
-  for (unsigned draw = 0; draw < draws; ++draw) {
+  for (unsigned draw = 0; draw < marked_draws; ++draw) {
     if (draw > 0) frame.clear({true, true});
     frame.draw(geometry, {});
   }
   return testing::context_of(frame);
 }
 Mark before(unsigned draw) { return Frame::mark_of(2 * draw - 1); }
-
-VertexWarp mark_item(Mark mark) { return {0, 0, 0, mark}; }
 
 class VpoMarksTest : public ::testing::TestWithParam<Fidelity> {};
 INSTANTIATE_TEST_SUITE_P(Fidelities, VpoMarksTest, ::testing::ValuesIn(testing::fidelities_with_time()),
@@ -54,13 +53,13 @@ struct VpoBench {
     ++added;
   }
   void add_frame() {
-    for (std::uint32_t draw = 0; draw < draws; ++draw) {
-      if (draw > 0) add(mark_item(before(draw)));
+    for (std::uint32_t draw = 0; draw < marked_draws; ++draw) {
+      if (draw > 0) add(marked<VertexWarp>(before(draw)));
       for (std::uint32_t first = 0; first < splats_of_draw; first += 8) {
         add({splats_of_draw * draw + first, 8, static_cast<DrawIndex>(draw), Mark::none});
       }
     }
-    for (std::size_t gpc = 0; gpc < ins.size(); ++gpc) add(mark_item(Mark::end_of_frame));
+    for (std::size_t gpc = 0; gpc < ins.size(); ++gpc) add(marked<VertexWarp>());
   }
 
   Bench bench;
@@ -88,7 +87,7 @@ void expect_marks_in_place(const Sink<PrimitiveItem>& sink) {
     }
   }
   EXPECT_TRUE(ended);
-  EXPECT_EQ(draw + 1, draws);
+  EXPECT_EQ(draw + 1, marked_draws);
 }
 
 TEST_P(VpoMarksTest, AMarkGoesToEveryGpcOnceInItsPlace) {
@@ -119,7 +118,7 @@ TEST_P(VpoMarksTest, StallsAndGpcsThatTakeNothingForLongChangeNoOrder) {
 TEST_P(VpoMarksTest, AMarkTakesTheCycleOfATriangle) {
   const RenderContext context = cleared_between_draws();
   VpoBench vpo(GetParam(), context, 1, 64);
-  vpo.ins[0]->add(mark_item(before(1)), 20);
+  vpo.ins[0]->add(marked<VertexWarp>(before(1)), 20);
   vpo.bench.run();
   EXPECT_EQ(testing::cycles_of(*vpo.outs[0]), (std::vector<Cycle>{21 + 10})) << "in hand at 21, latency 10";
 }

@@ -7,12 +7,10 @@ namespace vrpipe {
 namespace {
 
 using testing::cycles_of;
+using testing::marked;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
-
-VertexWarp warp_at(std::uint32_t first, std::uint32_t splats) { return {first, splats, false}; }
-VertexWarp end_of_frame() { return {0, 0, 0, Mark::end_of_frame}; }
 
 class VpoTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
@@ -43,7 +41,7 @@ TEST_P(VpoTimedTest, APrimitiveIsSeenTheLatencyAfterItsVertices) {
                 {{"latency_cycles", std::to_string(latency)}, {"triangles_per_cycle", "1"}});
     Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
     Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
-    vertices.add(warp_at(0, 1), 20);
+    vertices.add({0, 1}, 20);
     bench.run();
     EXPECT_EQ(cycles_of(primitives), (std::vector<Cycle>{21 + latency, 22 + latency})) << "in hand at 21";
   }
@@ -55,7 +53,7 @@ TEST_P(VpoTimedTest, AssemblesItsTrianglesPerCycle) {
                 {{"triangles_per_cycle", std::to_string(rate)}, {"latency_cycles", "10"}});
     Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", 8);
     Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
-    for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
+    for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
     bench.run();
     ASSERT_EQ(primitives.records().size(), 64U);
     for (std::size_t i = 0; i < 64; ++i) EXPECT_EQ(primitives.records()[i].cycle, 1 + i / rate + 10);
@@ -69,8 +67,8 @@ TEST_P(VpoTimedTest, CulledTrianglesTakeTheirTurn) {
               {{"triangles_per_cycle", "1"}, {"latency_cycles", "1"}});
   Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
   Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
-  vertices.add(warp_at(0, 8));
-  vertices.add(warp_at(8, 1));
+  vertices.add({0, 8});
+  vertices.add({8, 1});
   bench.run();
   // Eight splats without a triangle, a cycle each from 1 on.
   EXPECT_EQ(cycles_of(primitives), (std::vector<Cycle>{10, 11}));
@@ -80,8 +78,8 @@ TEST_P(VpoTimedTest, PrimitivesComeInDrawOrderAndTheEndLast) {
   Bench bench(GetParam(), "vpo", "primitive-assembly", context);
   Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
   Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
-  for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
-  vertices.add(end_of_frame());
+  for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
+  vertices.add(marked<VertexWarp>());
   bench.run();
   expect_in_draw_order(primitives);
   EXPECT_TRUE(bench.unit().idle());
@@ -96,12 +94,12 @@ TEST_P(VpoTimedTest, TakesTheGpcsVerticesInTurn) {
   Source<VertexWarp>& odd = bench.source<VertexWarp>("in_vertices_1");
   Sink<PrimitiveItem>& first = bench.sink<PrimitiveItem>("out_primitives_0");
   Sink<PrimitiveItem>& second = bench.sink<PrimitiveItem>("out_primitives_1");
-  even.add(warp_at(0, 8), 500);
-  odd.add(warp_at(8, 8), in_order ? 600 : 0);
-  even.add(warp_at(16, 8), 700);
-  odd.add(warp_at(24, 8), in_order ? 800 : 0);
-  even.add(end_of_frame(), 900);
-  odd.add(end_of_frame(), in_order ? 901 : 0);
+  even.add({0, 8}, 500);
+  odd.add({8, 8}, in_order ? 600 : 0);
+  even.add({16, 8}, 700);
+  odd.add({24, 8}, in_order ? 800 : 0);
+  even.add(marked<VertexWarp>(), 900);
+  odd.add(marked<VertexWarp>(), in_order ? 901 : 0);
   bench.run();
   std::size_t primitives = 0;
   for (const Sink<PrimitiveItem>* sink : {&first, &second}) {
@@ -128,7 +126,7 @@ TEST_P(VpoTimedTest, APrimitiveGoesToEveryGpcThatOwnsATileOfItsBoundsAndToNoOthe
   for (unsigned gpc = 0; gpc < 4; ++gpc) {
     sinks[gpc] = &bench.sink<PrimitiveItem>("out_primitives_" + std::to_string(gpc));
   }
-  vertices.add(warp_at(32, 1));
+  vertices.add({32, 1});
   bench.run();
   for (unsigned gpc = 0; gpc < 4; ++gpc) {
     const bool owns = gpc == owner_of({0, 0}, 4) || gpc == owner_of({1, 0}, 4);
@@ -142,8 +140,8 @@ TEST_P(VpoTimedTest, AFullReceiverStopsItUntilACycleAfterItTakes) {
   Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
   Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 2);
   primitives.close(0, 50);
-  vertices.add(warp_at(0, 2));
-  vertices.add(end_of_frame());
+  vertices.add({0, 2});
+  vertices.add(marked<VertexWarp>());
   bench.run();
   // At lt and at the one that waited goes beside the next.
   const Cycle fourth = GetParam() == Fidelity::cycle ? 53 : 52;
@@ -163,8 +161,8 @@ TEST_P(VpoTimedTest, StallsChangeNeitherPrimitivesNorOrder) {
     Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", static_cast<unsigned>(1 + seed % 2));
     Sink<PrimitiveItem>& primitives =
         bench.sink<PrimitiveItem>("out_primitives_0", static_cast<unsigned>(1 + seed % 10));
-    for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
-    vertices.add(end_of_frame());
+    for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
+    vertices.add(marked<VertexWarp>());
     bench.stall_randomly(seed, 100);
     bench.run();
     expect_in_draw_order(primitives);

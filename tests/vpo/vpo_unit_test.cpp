@@ -7,12 +7,10 @@
 namespace vrpipe {
 namespace {
 
+using testing::marked;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
-
-VertexWarp warp_at(std::uint32_t first, std::uint32_t splats) { return {first, splats, false}; }
-VertexWarp end_of_frame() { return {0, 0, 0, Mark::end_of_frame}; }
 
 class VpoUnitTest : public ::testing::Test {
  protected:
@@ -31,7 +29,7 @@ TEST_F(VpoUnitTest, APrimitiveIsSeenItsLatencyAfterTheVertices) {
   Bench bench("vpo", "primitive-assembly", context);
   Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
   Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
-  vertices.add(warp_at(0, 1), 20);
+  vertices.add({0, 1}, 20);
   bench.run();
   ASSERT_EQ(primitives.records().size(), 2U);
   EXPECT_EQ(primitives.records()[0].cycle, 21U + 10) << "in hand at 21, latency 10";
@@ -42,7 +40,7 @@ TEST_F(VpoUnitTest, AssemblesItsTrianglesPerCycle) {
     Bench bench("vpo", "primitive-assembly", context, {{"triangles_per_cycle", std::to_string(rate)}});
     Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", 8);
     Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
-    for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
+    for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
     bench.run();
     ASSERT_EQ(primitives.records().size(), 64U);
     EXPECT_EQ(primitives.records().back().cycle - primitives.records().front().cycle + 1, 64 / rate);
@@ -53,8 +51,8 @@ TEST_F(VpoUnitTest, PrimitivesComeInDrawOrderAndTheEndLast) {
   Bench bench("vpo", "primitive-assembly", context);
   Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
   Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
-  for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
-  vertices.add(end_of_frame());
+  for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
+  vertices.add(marked<VertexWarp>());
   bench.run();
   ASSERT_EQ(primitives.records().size(), 65U);
   for (std::uint32_t i = 0; i < 64; ++i) {
@@ -71,12 +69,12 @@ TEST_F(VpoUnitTest, TakesTheGpcsVerticesInTurnHoweverLateOneIs) {
   Source<VertexWarp>& odd = bench.source<VertexWarp>("in_vertices_1");
   Sink<PrimitiveItem>& first = bench.sink<PrimitiveItem>("out_primitives_0");
   Sink<PrimitiveItem>& second = bench.sink<PrimitiveItem>("out_primitives_1");
-  even.add(warp_at(0, 8), 500);
-  odd.add(warp_at(8, 8));
-  even.add(warp_at(16, 8), 700);
-  odd.add(warp_at(24, 8));
-  even.add(end_of_frame());
-  odd.add(end_of_frame());
+  even.add({0, 8}, 500);
+  odd.add({8, 8});
+  even.add({16, 8}, 700);
+  odd.add({24, 8});
+  even.add(marked<VertexWarp>());
+  odd.add(marked<VertexWarp>());
   bench.run();
   for (const Sink<PrimitiveItem>* sink : {&first, &second}) {
     std::uint32_t last = 0;
@@ -100,7 +98,7 @@ TEST_F(VpoUnitTest, APrimitiveGoesToEveryGpcThatOwnsATileOfItsBoundsAndToNoOther
     sources[gpc] = &bench.source<VertexWarp>("in_vertices_" + std::to_string(gpc));
     sinks[gpc] = &bench.sink<PrimitiveItem>("out_primitives_" + std::to_string(gpc));
   }
-  sources[0]->add(warp_at(32, 1));
+  sources[0]->add({32, 1});
   bench.run();
   for (unsigned gpc = 0; gpc < 4; ++gpc) {
     const bool owns = gpc == owner_of({0, 0}, 4) || gpc == owner_of({1, 0}, 4);
@@ -114,8 +112,8 @@ TEST_F(VpoUnitTest, StallsChangeNeitherPrimitivesNorOrder) {
     Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", static_cast<unsigned>(1 + seed % 2));
     Sink<PrimitiveItem>& primitives =
         bench.sink<PrimitiveItem>("out_primitives_0", static_cast<unsigned>(1 + seed % 5));
-    for (std::uint32_t i = 0; i < 4; ++i) vertices.add(warp_at(8 * i, 8));
-    vertices.add(end_of_frame());
+    for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
+    vertices.add(marked<VertexWarp>());
     bench.stall_randomly(seed, 100);
     bench.shuffle_ticks(seed);
     bench.run();

@@ -14,9 +14,9 @@ namespace {
 using testing::passes_by_table;
 using testing::stencil_by_table;
 
-constexpr unsigned largest = 127;
-const unsigned values[] = {0, 1, 2, 63, 64, 85, 126, 127};
-const unsigned masks[] = {0, 1, 15, 85, 126, 127};
+constexpr unsigned largest_stencil = 127;
+const unsigned stencil_values[] = {0, 1, 2, 63, 64, 85, 126, 127};
+const unsigned stencil_masks[] = {0, 1, 15, 85, 126, 127};
 
 /// One triangle over 16x16 pixels, of one depth, that faces the viewer or turns its back.
 std::shared_ptr<Draw> triangle_of(float depth, bool is_back = false) {
@@ -149,9 +149,9 @@ TEST(DepthTest, WithoutItAllPassAndNothingIsWritten) {
 
 TEST(StencilTest, FollowsTheTableForEveryFunctionAndMask) {
   for (unsigned function = 0; function < compares; ++function) {
-    for (const unsigned mask : masks) {
-      for (const unsigned reference : values) {
-        for (const unsigned stored : values) {
+    for (const unsigned mask : stencil_masks) {
+      for (const unsigned reference : stencil_values) {
+        for (const unsigned stored : stencil_values) {
           DrawState state;
           state.shader = FragmentShader::vertex;
           state.stencil.test = true;
@@ -175,9 +175,9 @@ TEST(StencilTest, EveryOperationFollowsTheTableForEveryCaseFaceAndMask) {
   for (const Case which : {stencil_fails, depth_fails, both_pass}) {
     for (const bool is_back : {false, true}) {
       for (unsigned operation = 0; operation < stencil_operations; ++operation) {
-        for (const unsigned mask : masks) {
+        for (const unsigned mask : stencil_masks) {
           for (const unsigned reference : {0U, 77U, 127U}) {
-            for (const unsigned stored : values) {
+            for (const unsigned stored : stencil_values) {
               DrawState state;
               state.shader = FragmentShader::vertex;
               state.depth = {true, which == depth_fails ? Compare::none : Compare::always, false};
@@ -199,7 +199,7 @@ TEST(StencilTest, EveryOperationFollowsTheTableForEveryCaseFaceAndMask) {
               face.write_mask = static_cast<std::uint8_t>(mask);
               const Tested tested = test_one(state, 0.5F, is_back, 1, stored, false);
               const unsigned value = stencil_by_table(static_cast<StencilOperation>(operation), stored, reference);
-              const unsigned expected = (stored & (largest - mask)) + (value & mask);
+              const unsigned expected = (stored & (largest_stencil - mask)) + (value & mask);
               SCOPED_TRACE("case " + std::to_string(which) + " back " + std::to_string(is_back) + " operation " +
                            std::to_string(operation) + " mask " + std::to_string(mask) + " reference " +
                            std::to_string(reference) + " stored " + std::to_string(stored));

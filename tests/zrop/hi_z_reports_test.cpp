@@ -20,16 +20,17 @@ using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
-constexpr std::uint32_t width = 60;  // the last raster tiles are cut
-constexpr std::uint32_t height = 44;
-constexpr std::uint32_t splats = 400;
+constexpr std::uint32_t reports_width = 60;  // the last raster tiles are cut
+constexpr std::uint32_t reports_height = 44;
+constexpr std::uint32_t reports_splats = 400;
 
 using RasterTile = std::tuple<unsigned, unsigned>;  ///< column and row
 
 class HiZReportsTest : public ::testing::Test {
  protected:
-  HiZReportsTest() : draw(testing::draw_of(width, height, std::vector<Splat>(splats))), context(of(draw)) {
-    for (std::uint32_t i = 0; i < splats; ++i) draw.splats[i].depth = testing::uniform(7, i, 0, 1);
+  HiZReportsTest()
+      : draw(testing::draw_of(reports_width, reports_height, std::vector<Splat>(reports_splats))), context(of(draw)) {
+    for (std::uint32_t i = 0; i < reports_splats; ++i) draw.splats[i].depth = testing::uniform(7, i, 0, 1);
   }
   static RenderContext of(const Draw& draw) {
     DrawState state;
@@ -45,7 +46,7 @@ class HiZReportsTest : public ::testing::Test {
       const std::uint64_t random = mix(splat * 64ULL + position);
       const unsigned x = beat.tile.x * 16U + position % 8 * 2;
       const unsigned y = beat.tile.y * 16U + position / 8 * 2;
-      if (random % 3 != 0 || x >= width || y >= height) continue;
+      if (random % 3 != 0 || x >= reports_width || y >= reports_height) continue;
       const auto coverage = static_cast<LaneMask>(1 + (random >> 8U) % 15);
       beat.quads[beat.count++] = {splat, static_cast<std::uint8_t>(position), coverage, 0, 0};
     }
@@ -54,8 +55,8 @@ class HiZReportsTest : public ::testing::Test {
   /// Over the pixels in the frame.
   static std::map<RasterTile, std::uint32_t> farthest_of(const DepthStencilSurface& surface) {
     std::map<RasterTile, std::uint32_t> farthest;
-    for (std::uint32_t y = 0; y < height; ++y) {
-      for (std::uint32_t x = 0; x < width; ++x) {
+    for (std::uint32_t y = 0; y < reports_height; ++y) {
+      for (std::uint32_t x = 0; x < reports_width; ++x) {
         const TileId tile{static_cast<std::uint16_t>(x / 16), static_cast<std::uint16_t>(y / 16)};
         const DepthStencilQuad& quad = surface.quad(surface.grid().place(tile, y % 16 / 2 * 8 + x % 16 / 2));
         std::uint32_t& most = farthest[{x / 8, y / 8}];
@@ -69,11 +70,11 @@ class HiZReportsTest : public ::testing::Test {
   }
   /// What is stored in the end, by a functional model of its own.
   DepthStencilSurface stored() const {
-    DepthStencilSurface surface(width, height);
+    DepthStencilSurface surface(reports_width, reports_height);
     const DepthStencilRop::Parameters parameters;
     DepthStencilRop rop(parameters, context);
     rop.attach(surface);
-    for (std::uint32_t splat = 0; splat < splats; ++splat) {
+    for (std::uint32_t splat = 0; splat < reports_splats; ++splat) {
       QuadBeat beat = beat_of(splat);
       rop.test(beat);
     }
@@ -85,7 +86,7 @@ class HiZReportsTest : public ::testing::Test {
 };
 
 TEST_F(HiZReportsTest, AreTheFarthestOfTheRasterTilesThatHaveChanged) {
-  DepthStencilSurface surface(width, height);
+  DepthStencilSurface surface(reports_width, reports_height);
   const DepthStencilRop::Parameters parameters;
   DepthStencilRop rop(parameters, context);
   rop.attach(surface);
@@ -93,7 +94,7 @@ TEST_F(HiZReportsTest, AreTheFarthestOfTheRasterTilesThatHaveChanged) {
   ASSERT_TRUE(reports.wanted(0));
   std::map<RasterTile, std::uint32_t> told = farthest_of(surface);
   std::uint64_t updates = 0;
-  for (std::uint32_t splat = 0; splat < splats; ++splat) {
+  for (std::uint32_t splat = 0; splat < reports_splats; ++splat) {
     QuadBeat beat = beat_of(splat);
     const QuadBeat before = beat;
     const std::uint32_t changed = rop.test(beat);
@@ -111,7 +112,7 @@ TEST_F(HiZReportsTest, AreTheFarthestOfTheRasterTilesThatHaveChanged) {
 }
 
 TEST_F(HiZReportsTest, NothingIsToldTwice) {
-  DepthStencilSurface surface(width, height);
+  DepthStencilSurface surface(reports_width, reports_height);
   HiZReports reports(context);
   const QuadBeat beat = testing::beat_of({1, 1}, {0, 4, 32, 36});
   unsigned updates = 0;
@@ -136,9 +137,9 @@ TEST_P(HiZReportsOfUnit, ComeInTheEndThoughTheLinkIsFull) {
     Sink<HiZUpdate>& told = bench.sink<HiZUpdate>("out_hi_z", 1);
     if (closed > 0) told.close(0, closed);
     bench.stall_randomly(3, GetParam());
-    for (std::uint32_t splat = 0; splat < splats; ++splat) in.add(beat_of(splat));
+    for (std::uint32_t splat = 0; splat < reports_splats; ++splat) in.add(beat_of(splat));
     bench.run();
-    std::map<RasterTile, std::uint32_t> last = farthest_of(DepthStencilSurface(width, height));
+    std::map<RasterTile, std::uint32_t> last = farthest_of(DepthStencilSurface(reports_width, reports_height));
     for (const auto& record : told.records()) {
       EXPECT_GE(record.cycle, closed);
       std::uint32_t& known = last.at(raster_tile_of(record.item));

@@ -10,21 +10,19 @@ namespace vrpipe {
 namespace {
 
 using testing::beat_of;
+using testing::numbers;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
-const std::vector<unsigned> eight{0, 1, 2, 3, 4, 5, 6, 7};
-const std::vector<unsigned> sixteen{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-
-constexpr std::uint32_t side = 64;
+constexpr std::uint32_t late_side = 64;
 constexpr std::size_t early_command = 1;
 
 /// A late draw of splats of depth 0.5, and one behind it that is tested before it is shaded.
 Frame late_and_early() {
-  auto splats = std::make_shared<Draw>(testing::draw_of(side, side, std::vector<Splat>(64)));
+  auto splats = std::make_shared<Draw>(testing::draw_of(late_side, late_side, std::vector<Splat>(64)));
   for (Splat& splat : splats->splats) splat.depth = 0.5F;
-  Frame frame(side, side);
+  Frame frame(late_side, late_side);
   DrawState state;
   state.depth = {true, Compare::less, true};
   frame.draw(splats, state, "late");
@@ -101,7 +99,7 @@ TEST_P(LateZrop, TestsItsQuadsPerCycle) {
     Bench bench(GetParam(), "zrop", "depth-stencil-rop", context, {{"quads_per_cycle", std::to_string(rate)}});
     Source<ShadedWarpItem>& in = bench.source<ShadedWarpItem>("in_late", 32);
     Sink<ShadedWarpItem>& out = bench.sink<ShadedWarpItem>("out_late", 32);
-    for (unsigned i = 0; i < 32; ++i) in.add(warp(eight));
+    for (unsigned i = 0; i < 32; ++i) in.add(warp(numbers(8)));
     bench.run();
     ASSERT_EQ(out.records().size(), 32U);
     EXPECT_EQ(out.records().back().cycle - out.records().front().cycle, 31U * 8 / rate);
@@ -116,8 +114,8 @@ TEST_F(LateZropTest, HasThePortBeforeOtherTests) {
   Source<ShadedWarpItem>& late = bench.source<ShadedWarpItem>("in_late", 8);
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 8);
   Sink<ShadedWarpItem>& back = bench.sink<ShadedWarpItem>("out_late", 8);
-  for (unsigned i = 0; i < 6; ++i) early.add(quads_of_draw(1, sixteen));
-  for (const Cycle at : {2U, 3U}) late.add(warp(eight, 0), at);
+  for (unsigned i = 0; i < 6; ++i) early.add(quads_of_draw(1, numbers(16)));
+  for (const Cycle at : {2U, 3U}) late.add(warp(numbers(8), 0), at);
   bench.run();
   // A beat of 16 quads in each cycle from 1 on; beside a warp of 8 there is no room for one.
   ASSERT_EQ(back.records().size(), 2U);
@@ -135,10 +133,10 @@ TEST_F(LateZropTest, ABeatIsTestedBesideAWarpThatLeavesRoom) {
   Source<ShadedWarpItem>& late = bench.source<ShadedWarpItem>("in_late", 8);
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 8);
   Sink<ShadedWarpItem>& back = bench.sink<ShadedWarpItem>("out_late", 8);
-  late.add(warp(eight), 20);
-  late.add(warp(eight), 21);
-  early.add(quads_of_draw(0, eight), 20);
-  early.add(quads_of_draw(0, sixteen), 21);
+  late.add(warp(numbers(8)), 20);
+  late.add(warp(numbers(8)), 21);
+  early.add(quads_of_draw(0, numbers(8)), 20);
+  early.add(quads_of_draw(0, numbers(16)), 21);
   bench.run();
   ASSERT_EQ(out.records().size(), 2U);
   EXPECT_EQ(back.records()[0].cycle, 22U);
@@ -182,8 +180,8 @@ TEST_F(LateZropTest, GoesOnWhileSurvivorsAreHeldUp) {
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 1);
   Sink<ShadedWarpItem>& back = bench.sink<ShadedWarpItem>("out_late", 1);
   out.close(0, 5000);
-  for (unsigned i = 0; i < 40; ++i) early.add(quads_of_draw(0, sixteen));
-  for (unsigned i = 0; i < 40; ++i) late.add(warp(eight));
+  for (unsigned i = 0; i < 40; ++i) early.add(quads_of_draw(0, numbers(16)));
+  for (unsigned i = 0; i < 40; ++i) late.add(warp(numbers(8)));
   bench.run();
   EXPECT_EQ(back.records().size(), 40U);
   EXPECT_LT(back.records().back().cycle, 1000U);

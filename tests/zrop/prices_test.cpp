@@ -204,22 +204,22 @@ class ZropPrices : public ::testing::TestWithParam<Fidelity> {
 INSTANTIATE_TEST_SUITE_P(Fidelities, ZropPrices, ::testing::ValuesIn(testing::fidelities_with_time()),
                          testing::name_of_fidelity);
 
-const Bench::Settings blocks{{"half_block_cycles", "1"}, {"block_cycles", "1.4"}};
+const Bench::Settings priced_blocks{{"half_block_cycles", "1"}, {"block_cycles", "1.4"}};
 
 TEST_P(ZropPrices, FullBlocksAreTestedEightQuadsACycle) {
   const auto full = [](unsigned i) { return Bin{{0, 0}, block_quads(0, 4, i)}; };
-  EXPECT_NEAR(cycles_of_a_bin(full, blocks), 2, 0.01);
+  EXPECT_NEAR(cycles_of_a_bin(full, priced_blocks), 2, 0.01);
   EXPECT_NEAR(cycles_of_a_bin(full, {}), 2, 0.01);
 }
 
 TEST_P(ZropPrices, ASingleQuadTakesItsBlock) {
   const auto single = [](unsigned i) { return Bin{{0, 0}, {quad_at(i % 64, i)}}; };
-  EXPECT_NEAR(cycles_of_a_bin(single, blocks), 1.4, 0.01);
+  EXPECT_NEAR(cycles_of_a_bin(single, priced_blocks), 1.4, 0.01);
   EXPECT_LT(cycles_of_a_bin(single, {}), 1.01);
 }
 
 TEST_P(ZropPrices, RectanglesTakeWhatTheyDoOnTheGpu) {
-  Bench::Settings settings = blocks;
+  Bench::Settings settings = priced_blocks;
   settings.push_back({"primitive_cycles", "2.7"});
   // Killed one after the other: 2x2 pixels every 4.17 cycles, 16x16 every 10.67.
   const auto small = [](unsigned i) { return Bin{{0, 0}, {quad_at(i % 64, i)}}; };
@@ -237,7 +237,7 @@ TEST_P(ZropPrices, BlocksTakeNoMoreThanTheTimeThatQuadsLeave) {
     half.pop_back();
     bins.push_back({{0, 0}, half});
   }
-  const auto cycles = static_cast<double>(run(bins, blocks));
+  const auto cycles = static_cast<double>(run(bins, priced_blocks));
   EXPECT_NEAR(cycles, 500 * 1.4, 8);
   EXPECT_NEAR(tests, 500, 2) << "eight quads each";
   EXPECT_NEAR(block_cycles, 500 * 0.4, 8);
@@ -247,7 +247,7 @@ TEST_P(ZropPrices, BlocksTakeNoMoreThanTheTimeThatQuadsLeave) {
 TEST_P(ZropPrices, BlocksTakeWhatTheyAreMeasuredTo) {
   std::vector<Bin> bins;
   for (unsigned i = 0; i < 500; ++i) bins.push_back({{0, 0}, {quad_at(i % 64, i)}});
-  const auto cycles = static_cast<double>(run(bins, blocks));
+  const auto cycles = static_cast<double>(run(bins, priced_blocks));
   EXPECT_NEAR(tests, 500 / 8.0, 1);
   EXPECT_NEAR(tests + block_cycles, 700, 2);
   EXPECT_LE(tests + block_cycles, cycles);

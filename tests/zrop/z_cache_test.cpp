@@ -11,6 +11,7 @@
 #include "support/builders.h"
 #include "support/fidelities.h"
 #include "support/reference_cache.h"
+#include "zrop/signals.h"
 #include "zrop/zrop.h"
 
 namespace vrpipe {
@@ -18,6 +19,7 @@ namespace {
 
 using testing::beat_of;
 using testing::end_beat;
+using testing::signals;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
@@ -66,13 +68,6 @@ class NotingMemory : public sc_core::sc_module, private tlm::tlm_fw_transport_if
   const ClockDomain& clock_;
   const double latency_;
 };
-
-TerminationBeat signals(std::initializer_list<unsigned> positions, TileId tile = {0, 0}) {
-  TerminationBeat beat;
-  for (const unsigned position : positions)
-    beat.signals[beat.count++] = {tile, static_cast<std::uint8_t>(position), all_lanes};
-  return beat;
-}
 
 /// ZROP at cycle, with a latency of a cycle and without fast clears unless told, in front of a memory of 100 cycles.
 struct ZBench {

@@ -48,8 +48,8 @@ RenderContext three_draws(unsigned side = 64) {
 }
 
 /// With a surface of its own.
-struct Rop : DepthStencilRop {
-  explicit Rop(const RenderContext& context)
+struct RopOfAFrame : DepthStencilRop {
+  explicit RopOfAFrame(const RenderContext& context)
       : DepthStencilRop({}, context), stencil(context.frame->width(), context.frame->height()) {
     attach(stencil);
     set_draws(context.frame->draws().size());
@@ -63,7 +63,7 @@ struct Rop : DepthStencilRop {
 
 TEST(DepthStencilRopOfAFrame, OnlyAClearOfTerminationOpensPixels) {
   const RenderContext context = three_draws();
-  Rop zrop(context);
+  RopOfAFrame zrop(context);
   zrop.update({{0, 0}, 3, all_lanes, 0});
   EXPECT_EQ(zrop.survivors(beat_of({quad_of(0, 3)})), 0U);
   zrop.pass(Frame::mark_of(color_clear));
@@ -76,7 +76,7 @@ TEST(DepthStencilRopOfAFrame, OnlyAClearOfTerminationOpensPixels) {
 
 TEST(DepthStencilRopOfAFrame, ASignalOfAnEpochThatHasPassedIsCountedAndVoid) {
   const RenderContext context = three_draws();
-  Rop zrop(context);
+  RopOfAFrame zrop(context);
   zrop.pass(Frame::mark_of(color_clear));
   zrop.update({{0, 0}, 1, all_lanes, 0});
   EXPECT_EQ(zrop.updates_void.value(), 0U) << "a clear of colour ends no epoch";
@@ -95,7 +95,7 @@ TEST(DepthStencilRopOfAFrame, ADrawThatDoesNotTerminatePassesTerminatedPixelsAnd
   frame.draw(geometry_of(64, 64), terminating(false));
   frame.draw(geometry_of(64, 64), terminating());
   const RenderContext context = context_of(frame);
-  Rop zrop(context);
+  RopOfAFrame zrop(context);
   zrop.update({{0, 0}, 3, all_lanes, 0});
   EXPECT_EQ(zrop.survivors(beat_of({quad_of(0, 3)})), 0U);
   EXPECT_EQ(zrop.survivors(beat_of({quad_of(1, 3)})), 1U);
@@ -108,7 +108,7 @@ TEST(DepthStencilRopOfAFrame, ABeatOfSeveralDrawsIsCountedQuadByQuad) {
   Frame frame(64, 64);
   for (unsigned i = 0; i < 4; ++i) frame.draw(geometry_of(64, 64), terminating());
   const RenderContext context = context_of(frame);
-  Rop zrop(context);
+  RopOfAFrame zrop(context);
   zrop.update({{0, 0}, 1, all_lanes, 0});
   zrop.update({{0, 0}, 2, 0b0011, 0});
   QuadBeat beat = beat_of({quad_of(0, 1, 0b0111), quad_of(0, 2), quad_of(1, 1), quad_of(3, 2, 0b0001), quad_of(3, 5)});
@@ -126,7 +126,7 @@ TEST(DepthStencilRopOfAFrame, ABeatOfSeveralDrawsIsCountedQuadByQuad) {
 TEST(DepthStencilRopOfAFrame, AGpcClearsItsOwnTilesAlone) {
   RenderContext context = three_draws(128);
   context.placement = {2, 1};
-  Rop zrop(context);
+  RopOfAFrame zrop(context);
   const ScreenTiling& grid = zrop.stencil.grid();
   for (std::size_t place = 0; place < grid.quads(); ++place) zrop.stencil.terminated(place) = all_lanes;
   zrop.pass(Frame::mark_of(termination_clear));
@@ -140,8 +140,8 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, ZropMarksTest, ::testing::ValuesIn(testing:
                          testing::name_of_fidelity);
 
 /// ZROP with its ports, of whatever fidelity. What leaves it is noted by splat, marks as 1000 and their number.
-struct ZropBench {
-  explicit ZropBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {})
+struct MarkedZropBench {
+  explicit MarkedZropBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {})
       : bench(fidelity, "zrop", "depth-stencil-rop", context, settings),
         updates(bench.source<TerminationBeat>("in_terminations")) {
     if (fidelity == Fidelity::cycle) {
@@ -189,7 +189,7 @@ std::uint32_t number_of(std::size_t command) { return 1000 + static_cast<std::ui
 
 TEST_P(ZropMarksTest, AQuadBehindAClearPassesWhereOneBeforeItWasTerminated) {
   const RenderContext context = three_draws();
-  ZropBench zrop(GetParam(), context);
+  MarkedZropBench zrop(GetParam(), context);
   zrop.signal(3, 0, 10);
   zrop.test(0, 1, 3, 50);
   zrop.pass(Frame::mark_of(termination_clear), 60);
@@ -201,7 +201,7 @@ TEST_P(ZropMarksTest, AQuadBehindAClearPassesWhereOneBeforeItWasTerminated) {
 
 TEST_P(ZropMarksTest, ALateSignalOfThePassedEpochTakesItsTimeAndTerminatesNothing) {
   const RenderContext context = three_draws();
-  ZropBench zrop(GetParam(), context);
+  MarkedZropBench zrop(GetParam(), context);
   zrop.pass(Frame::mark_of(termination_clear), 50);
   zrop.signal(3, 0, 100);
   zrop.test(0, 2, 3, 200);
@@ -215,7 +215,7 @@ TEST_P(ZropMarksTest, ALateSignalOfThePassedEpochTakesItsTimeAndTerminatesNothin
 
 TEST_P(ZropMarksTest, ASignalThatComesBeforeTheClearIsClearedWithTheRest) {
   const RenderContext context = three_draws();
-  ZropBench zrop(GetParam(), context);
+  MarkedZropBench zrop(GetParam(), context);
   zrop.signal(3, 0, 10);
   zrop.pass(Frame::mark_of(termination_clear), 50);
   zrop.test(0, 2, 3, 60);
@@ -227,7 +227,7 @@ TEST_P(ZropMarksTest, ASignalThatComesBeforeTheClearIsClearedWithTheRest) {
 TEST_P(ZropMarksTest, MarksKeepTheirPlaceAmongQuadsUnderStalls) {
   const RenderContext context = three_draws();
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    ZropBench zrop(GetParam(), context, {{"quads_per_cycle", seed == 2 ? "1" : "16"}});
+    MarkedZropBench zrop(GetParam(), context, {{"quads_per_cycle", seed == 2 ? "1" : "16"}});
     std::vector<std::uint32_t> expected;
     for (std::uint32_t i = 0; i < 60; ++i) {
       zrop.test(i, 0, i, 0);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "support/fidelities.h"
+#include "zrop/signals.h"
 #include "zrop/zrop.h"
 
 namespace vrpipe {
@@ -9,17 +10,11 @@ namespace {
 
 using testing::Bins;
 using testing::cycles_of;
+using testing::signals;
 using testing::splats_of;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
-
-TerminationBeat signals(std::initializer_list<unsigned> positions, LaneMask pixels = all_lanes) {
-  TerminationBeat beat;
-  for (const unsigned position : positions)
-    beat.signals[beat.count++] = {{0, 0}, static_cast<std::uint8_t>(position), pixels};
-  return beat;
-}
 
 class ZropTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
@@ -35,8 +30,9 @@ INSTANTIATE_TEST_SUITE_P(Fidelities, ZropTimedTest, ::testing::ValuesIn(testing:
                          testing::name_of_fidelity);
 
 /// ZROP with its ports; updates of a cycle are there before the bins of it.
-struct ZropBench {
-  ZropBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {}, unsigned depth = 64)
+struct TimedZropBench {
+  TimedZropBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {},
+                 unsigned depth = 64)
       : bench(fidelity, "zrop", "depth-stencil-rop", context, settings),
         updates(bench.source<TerminationBeat>("in_terminations")),
         in(bench.source<BinItem>("in_quads", depth)),
@@ -49,7 +45,7 @@ struct ZropBench {
 
 TEST_P(ZropTimedTest, ATestTakesItsLatency) {
   for (const unsigned latency : {1U, 8U}) {
-    ZropBench zrop(GetParam(), context, {{"latency_cycles", std::to_string(latency)}});
+    TimedZropBench zrop(GetParam(), context, {{"latency_cycles", std::to_string(latency)}});
     zrop.in.add(bins.at({0, 0}, {1}), 10);
     zrop.bench.run();
     EXPECT_EQ(cycles_of(zrop.out), (std::vector<Cycle>{11 + latency}));
@@ -58,7 +54,7 @@ TEST_P(ZropTimedTest, ATestTakesItsLatency) {
 
 TEST_P(ZropTimedTest, TestsItsQuadsPerCycle) {
   for (const unsigned rate : {4U, 8U, 16U}) {
-    ZropBench zrop(GetParam(), context, {{"quads_per_cycle", std::to_string(rate)}, {"latency_cycles", "8"}}, 512);
+    TimedZropBench zrop(GetParam(), context, {{"quads_per_cycle", std::to_string(rate)}, {"latency_cycles", "8"}}, 512);
     for (unsigned i = 0; i < 8; ++i) zrop.in.add(bins.at({0, 0}, testing::numbers(64), 64 * i), {0, 3}, 4);
     zrop.bench.run();
     ASSERT_EQ(zrop.out.records().size(), 8U);
@@ -93,7 +89,7 @@ TEST_P(ZropTimedTest, BinsOfAnySizeAreTestedInTheCyclesOfCycle) {
         if (record.item.last_of_bin) expected.push_back(record.cycle);
       }
     }
-    ZropBench zrop(GetParam(), context, settings, 128);
+    TimedZropBench zrop(GetParam(), context, settings, 128);
     zrop.in.set_rate(1);
     for (unsigned i = 0; i < 30; ++i) {
       const auto quads = static_cast<unsigned>(1 + mix(i) % 60);
@@ -110,7 +106,7 @@ TEST_P(ZropTimedTest, BinsOfAnySizeAreTestedInTheCyclesOfCycle) {
 TEST_P(ZropTimedTest, ATestSeesAnUpdateOfTheCycleBeforeAndNotOfItsOwn) {
   // The update is applied in cycle 21 and keeps the test from the z-cache in it.
   for (const Cycle pushed : {19U, 20U, 21U}) {
-    ZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}}, 4);
+    TimedZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}}, 4);
     zrop.in.add(bins.at({0, 0}, {7}), pushed);  // in hand a cycle later
     zrop.updates.add(signals({7}), 20);
     zrop.bench.run();
@@ -123,7 +119,7 @@ TEST_P(ZropTimedTest, ATestSeesAnUpdateOfTheCycleBeforeAndNotOfItsOwn) {
 TEST_P(ZropTimedTest, AnUpdateMeetsThePartOfABinThatIsTestedLater) {
   // Sixteen quads a cycle from 11 on; position 40 is tested in 13.
   for (const Cycle pushed : {11U, 12U, 13U}) {
-    ZropBench zrop(GetParam(), context, {{"quads_per_cycle", "16"}});
+    TimedZropBench zrop(GetParam(), context, {{"quads_per_cycle", "16"}});
     zrop.updates.add(signals({40}), pushed);  // applied a cycle later
     zrop.in.add(bins.at({0, 0}, testing::numbers(64)), {10, 13}, 4);
     zrop.in.add(bins.at({0, 0}, {40}, 64), 100);
@@ -138,7 +134,7 @@ TEST_P(ZropTimedTest, AnUpdateMeetsThePartOfABinThatIsTestedLater) {
 
 TEST_P(ZropTimedTest, ACycleWithAnUpdateTestsNothing) {
   for (const unsigned updates_at_once : {0U, 1U, 3U}) {
-    ZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}, {"updates_per_cycle", "1"}}, 4);
+    TimedZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}, {"updates_per_cycle", "1"}}, 4);
     for (unsigned i = 0; i < 6; ++i) zrop.in.add(bins.at({0, 0}, testing::numbers(16), 16 * i), i);
     if (updates_at_once == 1) zrop.updates.add(signals({60}), 2);
     if (updates_at_once == 3) zrop.updates.add(signals({60, 61, 62}), 2);
@@ -154,7 +150,7 @@ TEST_P(ZropTimedTest, ACycleWithAnUpdateTestsNothing) {
 }
 
 TEST_P(ZropTimedTest, AppliesItsUpdatesPerCycle) {
-  ZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}, {"updates_per_cycle", "4"}}, 4);
+  TimedZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}, {"updates_per_cycle", "4"}}, 4);
   for (unsigned i = 0; i < 3; ++i) zrop.in.add(bins.at({0, 0}, testing::numbers(16), 16 * i), i);
   zrop.updates.add(signals({60, 61, 62, 63}), 1);
   zrop.bench.run();
@@ -163,7 +159,7 @@ TEST_P(ZropTimedTest, AppliesItsUpdatesPerCycle) {
 }
 
 TEST_P(ZropTimedTest, UpdatesAfterTheLastTestAreCountedWithTheDraw) {
-  ZropBench zrop(GetParam(), context);
+  TimedZropBench zrop(GetParam(), context);
   zrop.in.add(bins.at({0, 0}, {1}));
   zrop.updates.add(signals({1, 2}), 50);
   zrop.bench.run();
@@ -172,7 +168,7 @@ TEST_P(ZropTimedTest, UpdatesAfterTheLastTestAreCountedWithTheDraw) {
 }
 
 TEST_P(ZropTimedTest, SurvivorsKeepTheirOrderAndTheDeadAreTakenOut) {
-  ZropBench zrop(GetParam(), context);
+  TimedZropBench zrop(GetParam(), context);
   zrop.updates.add(signals({1, 3}));
   zrop.updates.add(signals({4}, 0b0011));
   zrop.in.add(bins.at({0, 0}, {0, 1, 2, 3, 4, 5}, 100), 50);
@@ -184,7 +180,7 @@ TEST_P(ZropTimedTest, SurvivorsKeepTheirOrderAndTheDeadAreTakenOut) {
 
 TEST_P(ZropTimedTest, WhatIsLeftOfABinTakesItsOwnBeats) {
   // Of four cycles of tests the second and third leave nothing.
-  ZropBench zrop(GetParam(), context, {{"quads_per_cycle", "16"}, {"latency_cycles", "8"}});
+  TimedZropBench zrop(GetParam(), context, {{"quads_per_cycle", "16"}, {"latency_cycles", "8"}});
   for (unsigned i = 16; i < 48; i += 4) zrop.updates.add(signals({i, i + 1, i + 2, i + 3}));
   zrop.in.add(bins.at({0, 0}, testing::numbers(64)), {100, 103}, 4);
   zrop.in.add(Bins::end());
@@ -199,7 +195,7 @@ TEST_P(ZropTimedTest, WhatIsLeftOfABinTakesItsOwnBeats) {
 }
 
 TEST_P(ZropTimedTest, AReceiverThatTakesNothingStopsIt) {
-  ZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}, {"quads_per_cycle", "16"}}, 2);
+  TimedZropBench zrop(GetParam(), context, {{"latency_cycles", "1"}, {"quads_per_cycle", "16"}}, 2);
   zrop.out.close(0, 200);
   for (unsigned i = 0; i < 5; ++i) zrop.in.add(bins.at({0, 0}, testing::numbers(16), 16 * i));
   zrop.in.add(Bins::end());
@@ -212,7 +208,7 @@ TEST_P(ZropTimedTest, AReceiverThatTakesNothingStopsIt) {
 // case H05
 TEST_P(ZropTimedTest, NoUpdateIsLostUnderAnyStallsAndEveryQuadIsAccountedFor) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    ZropBench zrop(GetParam(), context, {}, static_cast<unsigned>(1 + seed % 10));
+    TimedZropBench zrop(GetParam(), context, {}, static_cast<unsigned>(1 + seed % 10));
     for (unsigned i = 0; i < 60; ++i) {
       zrop.in.add(bins.at({0, 0}, {i, (i + 1) % 64, (i + 2) % 64}, 3 * i));
       zrop.updates.add(signals({i, (7 * i) % 64}, static_cast<LaneMask>(1U << i % 4)));

@@ -3,6 +3,7 @@
 #include <vrpipe/testkit/bench.h>
 
 #include "support/builders.h"
+#include "zrop/signals.h"
 #include "zrop/zrop.h"
 
 namespace vrpipe {
@@ -10,18 +11,11 @@ namespace {
 
 using testing::beat_of;
 using testing::end_beat;
+using testing::numbers;
+using testing::signals;
 using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
-
-const std::vector<unsigned> sixteen{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-
-TerminationBeat signals(std::initializer_list<unsigned> positions, LaneMask pixels = all_lanes) {
-  TerminationBeat beat;
-  for (const unsigned position : positions)
-    beat.signals[beat.count++] = {{0, 0}, static_cast<std::uint8_t>(position), pixels};
-  return beat;
-}
 
 class ZropUnitTest : public ::testing::Test {
  protected:
@@ -47,7 +41,7 @@ TEST_F(ZropUnitTest, TestsItsQuadsPerCycle) {
     Bench bench("zrop", "depth-stencil-rop", context, {{"quads_per_cycle", std::to_string(rate)}});
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 32);
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 32);
-    for (unsigned i = 0; i < 32; ++i) in.add(beat_of({0, 0}, sixteen, 16 * i));
+    for (unsigned i = 0; i < 32; ++i) in.add(beat_of({0, 0}, numbers(16), 16 * i));
     bench.run();
     ASSERT_EQ(out.records().size(), 32U);
     EXPECT_EQ(out.records().back().cycle - out.records().front().cycle, 31 * 16 / rate);
@@ -77,7 +71,7 @@ TEST_F(ZropUnitTest, ACycleWithAnUpdateTestsNothing) {
     Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 8);
     Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations");
     Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 8);
-    for (unsigned i = 0; i < 6; ++i) in.add(beat_of({0, 0}, sixteen, 16 * i));
+    for (unsigned i = 0; i < 6; ++i) in.add(beat_of({0, 0}, numbers(16), 16 * i));
     if (updates_at_once == 1) updates.add(signals({60}), 2);
     if (updates_at_once == 3) updates.add(signals({60, 61, 62}), 2);
     bench.run();
@@ -94,7 +88,7 @@ TEST_F(ZropUnitTest, AppliesItsUpdatesPerCycle) {
   Source<QuadBeat>& in = bench.source<QuadBeat>("in_quads", 8);
   Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations");
   Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 8);
-  for (unsigned i = 0; i < 3; ++i) in.add(beat_of({0, 0}, sixteen, 16 * i));
+  for (unsigned i = 0; i < 3; ++i) in.add(beat_of({0, 0}, numbers(16), 16 * i));
   updates.add(signals({60, 61, 62, 63}), 1);
   bench.run();
   EXPECT_EQ(out.records()[1].cycle, 4U) << "one cycle for four signals";
