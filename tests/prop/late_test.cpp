@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/prop.h>
+
 #include "support/fidelities.h"
 
 namespace vrpipe {
