@@ -3,6 +3,14 @@
 
 #include <benchmark/benchmark.h>
 
+#include <vrpipe/pipeline/slots/crop.h>
+#include <vrpipe/pipeline/slots/qru.h>
+#include <vrpipe/pipeline/slots/raster.h>
+#include <vrpipe/pipeline/slots/sm.h>
+#include <vrpipe/pipeline/slots/tc.h>
+#include <vrpipe/pipeline/slots/tgc.h>
+#include <vrpipe/pipeline/slots/vpo.h>
+#include <vrpipe/pipeline/slots/zrop.h>
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/workloads/scene.h>
 

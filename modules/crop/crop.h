@@ -9,7 +9,7 @@
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/pipeline/quad_sectors.h>
 #include <vrpipe/pipeline/registry.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/crop.h>
 
 namespace vrpipe {
 

@@ -9,6 +9,7 @@
 #include <vrpipe/model/timed_cache_port.h>
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
+#include <vrpipe/pipeline/slots/crop.h>
 
 namespace vrpipe {
 

@@ -10,6 +10,7 @@
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
 #include <vrpipe/pipeline/quad_sectors.h>
+#include <vrpipe/pipeline/slots/crop.h>
 
 namespace vrpipe {
 

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <optional>
 
-#include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
+#include <vrpipe/pipeline/slots/crop.h>
 
 namespace vrpipe {
 

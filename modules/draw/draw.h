@@ -1,7 +1,7 @@
 #pragma once
 
 #include <vrpipe/component/parameter.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/draw.h>
 
 namespace vrpipe {
 

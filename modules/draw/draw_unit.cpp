@@ -1,6 +1,7 @@
 #include "draw/issue_schedule.h"
 
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/slots/draw.h>
 
 namespace vrpipe {
 

@@ -6,6 +6,7 @@
 #include <vrpipe/model/timed.h>
 #include <vrpipe/pipeline/early_tests.h>
 #include <vrpipe/pipeline/late_plan.h>
+#include <vrpipe/pipeline/slots/prop.h>
 
 namespace vrpipe {
 

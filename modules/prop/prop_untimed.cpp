@@ -1,7 +1,7 @@
-#include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/early_tests.h>
 #include <vrpipe/pipeline/late_plan.h>
+#include <vrpipe/pipeline/slots/prop.h>
 
 namespace vrpipe {
 

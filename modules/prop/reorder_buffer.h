@@ -8,7 +8,7 @@
 #include <vrpipe/kernel/accounting.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/pipeline/screen_tiling.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/prop.h>
 
 namespace vrpipe {
 

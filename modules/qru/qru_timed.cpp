@@ -4,6 +4,8 @@
 #include "qru/warp_numbering.h"
 
 #include <vrpipe/model/timed.h>
+#include <vrpipe/pipeline/slots/qru.h>
+#include <vrpipe/pipeline/slots/tc.h>
 
 namespace vrpipe {
 

@@ -3,6 +3,7 @@
 #include "qru/warp_numbering.h"
 
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/slots/qru.h>
 
 namespace vrpipe {
 

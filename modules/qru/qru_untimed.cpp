@@ -1,7 +1,8 @@
 #include "qru/warp_numbering.h"
 
-#include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/slots/qru.h>
+#include <vrpipe/pipeline/slots/tc.h>
 
 namespace vrpipe {
 

@@ -7,7 +7,7 @@
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/geometry.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/raster.h>
 
 namespace vrpipe {
 

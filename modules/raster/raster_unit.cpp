@@ -1,5 +1,6 @@
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/slots/raster.h>
 
 namespace vrpipe {
 

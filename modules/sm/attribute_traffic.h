@@ -8,7 +8,7 @@
 #include <vrpipe/memory/sectors.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/screen_tiling.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/sm.h>
 
 namespace vrpipe {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include <vrpipe/pipeline/payload.h>
 #include <vrpipe/pipeline/render_context.h>
-#include <vrpipe/pipeline/units.h>
 
 namespace vrpipe {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include <vrpipe/pipeline/render_context.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/sm.h>
 
 namespace vrpipe {
 

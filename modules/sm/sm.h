@@ -4,7 +4,7 @@
 #include "mesh_shader.h"
 
 #include <vrpipe/component/parameter.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/sm.h>
 
 namespace vrpipe {
 

@@ -6,6 +6,7 @@
 
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/model/timed.h>
+#include <vrpipe/pipeline/slots/sm.h>
 
 namespace vrpipe {
 

@@ -9,6 +9,7 @@
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/slots/sm.h>
 
 namespace vrpipe {
 

@@ -2,8 +2,8 @@
 #include "sm/hand_over.h"
 
 #include <vrpipe/memory/sectored_cache.h>
-#include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/slots/sm.h>
 
 namespace vrpipe {
 

@@ -7,7 +7,7 @@
 #include <vrpipe/pipeline/hi_z_plan.h>
 #include <vrpipe/pipeline/late_plan.h>
 #include <vrpipe/pipeline/screen_tiling.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/tc.h>
 
 namespace vrpipe {
 

@@ -1,6 +1,5 @@
 #include "tc/tc.h"
 
-#include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
 
 namespace vrpipe {

@@ -3,7 +3,7 @@
 #include <deque>
 
 #include <vrpipe/component/parameter.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/tgc.h>
 
 namespace vrpipe {
 

@@ -1,4 +1,5 @@
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/slots/tgc.h>
 
 namespace vrpipe {
 

@@ -1,5 +1,5 @@
-#include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/slots/tgc.h>
 
 namespace vrpipe {
 

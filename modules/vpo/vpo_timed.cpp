@@ -1,4 +1,5 @@
 #include <vrpipe/model/timed.h>
+#include <vrpipe/pipeline/slots/vpo.h>
 
 namespace vrpipe {
 

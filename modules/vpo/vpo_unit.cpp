@@ -1,4 +1,5 @@
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/slots/vpo.h>
 
 namespace vrpipe {
 

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <array>
 
-#include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/slots/vpo.h>
 
 namespace vrpipe {
 

@@ -5,7 +5,7 @@
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/pipeline/screen_tiling.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/zrop.h>
 
 namespace vrpipe {
 

@@ -11,6 +11,8 @@
 
 #include <vrpipe/model/timed.h>
 #include <vrpipe/pipeline/late_plan.h>
+#include <vrpipe/pipeline/slots/tc.h>
+#include <vrpipe/pipeline/slots/zrop.h>
 
 namespace vrpipe {
 

@@ -8,6 +8,7 @@
 #include "zrop/z_port.h"
 
 #include <vrpipe/model/unit.h>
+#include <vrpipe/pipeline/slots/zrop.h>
 
 namespace vrpipe {
 

@@ -9,8 +9,9 @@
 #include "zrop/z_cache_statistics.h"
 
 #include <vrpipe/memory/sectored_cache.h>
-#include <vrpipe/model/occupancy.h>
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/slots/tc.h>
+#include <vrpipe/pipeline/slots/zrop.h>
 
 namespace vrpipe {
 

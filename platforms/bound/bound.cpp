@@ -4,6 +4,12 @@
 #include <map>
 #include <type_traits>
 
+#include <vrpipe/pipeline/slots/draw.h>
+#include <vrpipe/pipeline/slots/memory.h>
+#include <vrpipe/pipeline/slots/qru.h>
+#include <vrpipe/pipeline/slots/tgc.h>
+#include <vrpipe/pipeline/slots/vpo.h>
+
 namespace vrpipe {
 
 namespace {

@@ -5,7 +5,13 @@
 #include <string>
 #include <vector>
 
-#include <vrpipe/model/occupancy.h>
+#include <vrpipe/kernel/accounting.h>
+#include <vrpipe/pipeline/slots/crop.h>
+#include <vrpipe/pipeline/slots/prop.h>
+#include <vrpipe/pipeline/slots/raster.h>
+#include <vrpipe/pipeline/slots/sm.h>
+#include <vrpipe/pipeline/slots/tc.h>
+#include <vrpipe/pipeline/slots/zrop.h>
 #include <vrpipe/platforms/configuration.h>
 
 namespace vrpipe {

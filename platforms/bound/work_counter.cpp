@@ -2,8 +2,15 @@
 
 #include <algorithm>
 
-#include <vrpipe/model/occupancy.h>
 #include <vrpipe/pipeline/batch.h>
+#include <vrpipe/pipeline/slots/crop.h>
+#include <vrpipe/pipeline/slots/draw.h>
+#include <vrpipe/pipeline/slots/raster.h>
+#include <vrpipe/pipeline/slots/sm.h>
+#include <vrpipe/pipeline/slots/tc.h>
+#include <vrpipe/pipeline/slots/tgc.h>
+#include <vrpipe/pipeline/slots/vpo.h>
+#include <vrpipe/pipeline/slots/zrop.h>
 
 namespace vrpipe {
 

@@ -12,6 +12,8 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/model/timed.h>
 #include <vrpipe/pipeline/checked_behaviours.h>
+#include <vrpipe/pipeline/slots/memory.h>
+#include <vrpipe/pipeline/slots/zrop.h>
 
 namespace vrpipe {
 
@@ -127,11 +129,9 @@ void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
     }
   }
   follow_clock(*counting, *clock_);
-  if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(framebuffer.color);
-  if (auto* const sm = dynamic_cast<SmBehaviour*>(behaviour.get())) sm->attach(framebuffer.color);
-  if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get()); zrop != nullptr) {
-    zrop->attach(framebuffer.depth_stencil);
-    if (ahead != ahead_.end()) zrop->follow(*ahead->second);
+  attach_surfaces(*behaviour, framebuffer);
+  if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get()); zrop != nullptr && ahead != ahead_.end()) {
+    zrop->follow(*ahead->second);
   }
   const std::string module = module_name(instance.path);
   const unsigned gpcs = configuration_.netlist().gpcs();

@@ -6,6 +6,9 @@
 
 #include "elaboration/elaborate.h"
 
+#include <vrpipe/pipeline/slots/crop.h>
+#include <vrpipe/pipeline/slots/sm.h>
+
 namespace vrpipe {
 
 /// What became of the warps that were shaded here and not yet blended by the timing models, in launch order.

@@ -5,9 +5,14 @@
 #include <vector>
 
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/slots/tc.h>
+#include <vrpipe/pipeline/slots/zrop.h>
 #include <vrpipe/platforms/configuration.h>
 
 namespace vrpipe {
+
+class CropBehaviour;
+class SmBehaviour;
 
 /// Strict termination where there is time: what comes behind ZROP in a GPC, elaborated without time. It takes each bin
 /// as it is tested, in order, through merging, shading, late tests and blending, and knows what that terminates before the

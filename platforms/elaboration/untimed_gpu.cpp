@@ -12,9 +12,7 @@ UntimedGpu::UntimedGpu(const Configuration& configuration, Framebuffer& framebuf
   for (const Instance& instance : netlist.instances()) {
     if (Netlist::is_memory(instance)) continue;
     std::unique_ptr<Behaviour> behaviour = configuration.make(instance);
-    if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(framebuffer.color);
-    if (auto* const sm = dynamic_cast<SmBehaviour*>(behaviour.get())) sm->attach(framebuffer.color);
-    if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get())) zrop->attach(framebuffer.depth_stencil);
+    attach_surfaces(*behaviour, framebuffer);
     units_.push_back(
         {&instance, untimed_unit_maker(instance.slot)(instance.path, std::move(behaviour),
                                                       configuration.context_of(instance.gpc), netlist.gpcs())});

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/slots/memory.h>
 #include <vrpipe/platforms/configuration.h>
 
 namespace vrpipe {

@@ -16,6 +16,14 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/checked_behaviours.h>
+#include <vrpipe/pipeline/slots/crop.h>
+#include <vrpipe/pipeline/slots/qru.h>
+#include <vrpipe/pipeline/slots/raster.h>
+#include <vrpipe/pipeline/slots/sm.h>
+#include <vrpipe/pipeline/slots/tc.h>
+#include <vrpipe/pipeline/slots/tgc.h>
+#include <vrpipe/pipeline/slots/vpo.h>
+#include <vrpipe/pipeline/slots/zrop.h>
 #include <vrpipe/platforms/gpu.h>
 #include <vrpipe/platforms/observers.h>
 #include <vrpipe/platforms/validated_range.h>

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/pipeline/registry.h>
+#include <vrpipe/pipeline/slots/crop.h>
 
 #include "crop/marked_crop_bench.h"
 

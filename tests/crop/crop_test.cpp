@@ -10,6 +10,7 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/quad_sectors.h>
 #include <vrpipe/pipeline/registry.h>
+#include <vrpipe/pipeline/slots/crop.h>
 
 #include "support/builders.h"
 

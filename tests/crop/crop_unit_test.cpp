@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/arithmetic/half.h>
+#include <vrpipe/pipeline/slots/crop.h>
 #include <vrpipe/testkit/bench.h>
 
 #include "support/builders.h"

@@ -14,6 +14,7 @@
 #include <vrpipe/component/error.h>
 
 #include <vrpipe/model/memory_unit.h>
+#include <vrpipe/pipeline/slots/memory.h>
 
 #include "dram_bench.h"
 

@@ -1,6 +1,8 @@
 // DRAW at lt and at; what has one closed form at every fidelity is compared with cycle by it.
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/draw.h>
+
 #include "support/fidelities.h"
 
 namespace vrpipe {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/draw.h>
 #include <vrpipe/testkit/bench.h>
 
 #include "support/builders.h"

@@ -12,6 +12,7 @@
 
 #include <vrpipe/arithmetic/random.h>
 #include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/slots/memory.h>
 
 #include "support/builders.h"
 #include "support/reference_cache.h"

@@ -2,7 +2,6 @@
 #include <boost/numeric/interval.hpp>
 
 #include <vrpipe/pipeline/registry.h>
-#include <vrpipe/pipeline/units.h>
 
 #include "numerics_test_support.h"
 #include "support/pixel_oracle.h"

@@ -10,6 +10,7 @@
 #include <tlm>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/slots/crop.h>
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/platforms/wiring.h>
 

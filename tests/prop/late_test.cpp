@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/prop.h>
+
 #include "prop/mark_numbers.h"
 #include "support/fidelities.h"
 

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/prop.h>
+
 #include "support/fidelities.h"
 
 namespace vrpipe {

@@ -2,7 +2,8 @@
 
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/pipeline/registry.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/raster.h>
+#include <vrpipe/pipeline/slots/vpo.h>
 
 #include "scenes.h"
 

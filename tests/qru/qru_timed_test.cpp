@@ -1,6 +1,9 @@
 // QRU at lt and at, where a bin comes in one piece, compared with cycle, where it comes beat by beat.
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/qru.h>
+#include <vrpipe/pipeline/slots/tc.h>
+
 #include "support/fidelities.h"
 
 namespace vrpipe {

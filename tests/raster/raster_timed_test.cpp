@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/pipeline/geometry.h>
+#include <vrpipe/pipeline/slots/raster.h>
 
 #include "raster/raster_scene.h"
 #include "support/fidelities.h"

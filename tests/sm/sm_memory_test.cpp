@@ -7,6 +7,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/model/untimed.h>
+#include <vrpipe/pipeline/slots/memory.h>
 
 #include "support/fidelities.h"
 #include "support/foreign_memory.h"

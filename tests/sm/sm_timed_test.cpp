@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/sm.h>
+
 #include "sm/sm_scene.h"
 #include "support/fidelities.h"
 

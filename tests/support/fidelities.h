@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/pipeline/batch.h>
+#include <vrpipe/pipeline/slots/tc.h>
 #include <vrpipe/testkit/bench.h>
 
 #include "support/builders.h"

@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include <vrpipe/pipeline/registry.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/raster.h>
+#include <vrpipe/pipeline/slots/sm.h>
+#include <vrpipe/pipeline/slots/vpo.h>
 
 #include "builders.h"
 

@@ -1,6 +1,8 @@
 // TGC at lt and at; what has one closed form at every fidelity is compared with cycle by it.
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/tgc.h>
+
 #include "support/fidelities.h"
 #include "tgc/tgc_items.h"
 

@@ -1,6 +1,8 @@
 // VPO at lt and at; what has one closed form at every fidelity is compared with cycle by it.
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/vpo.h>
+
 #include "support/fidelities.h"
 
 namespace vrpipe {

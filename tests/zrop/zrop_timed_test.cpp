@@ -1,6 +1,8 @@
 // ZROP at lt and at, where a bin goes in one piece.
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/tc.h>
+
 #include "support/fidelities.h"
 #include "zrop/signals.h"
 #include "zrop/zrop.h"

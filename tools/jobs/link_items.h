@@ -3,6 +3,7 @@
 #include <string>
 
 #include <vrpipe/pipeline/batch.h>
+#include <vrpipe/pipeline/slots/tc.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/observers.h>
 #include <vrpipe/platforms/simulation.h>

@@ -22,6 +22,14 @@ enum class UnitState : std::uint8_t {
 constexpr unsigned unit_states = 5;
 const char* name_of(UnitState state);
 
+/// A kind of work that takes a unit's time.
+struct WorkKind {
+  const char* name;        ///< one word for reports, e.g. "blend"
+  unsigned resource;       ///< of the unit, from 0: kinds of one resource take turns, resources work side by side
+  double cycles_per_item;  ///< that an item keeps the resource
+  bool is_throughput;      ///< utilization, work over peak rate, counts this kind
+};
+
 /// How long a kind of work kept its resource.
 struct OccupancyPart {
   const char* name;

@@ -10,8 +10,8 @@
 #include <tlm>
 
 #include <vrpipe/component/statistic.h>
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/kernel/clock_domain.h>
-#include <vrpipe/model/occupancy.h>
 #include <vrpipe/pipeline/slots/memory.h>
 
 namespace vrpipe {

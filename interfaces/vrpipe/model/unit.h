@@ -13,7 +13,8 @@
 #include <vrpipe/kernel/link.h>
 #include <vrpipe/memory/memory_request.h>
 #include <vrpipe/model/occupancy.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/render_context.h>
+#include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
 

@@ -13,12 +13,15 @@
 #include <vrpipe/model/unit.h>
 #include <vrpipe/pipeline/batch.h>
 #include <vrpipe/pipeline/render_context.h>
+#include <vrpipe/pipeline/slots/memory.h>
 
 /// Units and ports without time: the fidelities `functional` and `bound`, and what strict termination runs ahead. They
 /// have the ports of `lt` and `at` (batch.h) and no SystemC. Sending is a call: it returns when all that the item leads to
 /// has been done, down to the last blend.
 
 namespace vrpipe {
+
+class BlendObserver;
 
 template <class Item>
 class UntimedIn;
@@ -109,14 +112,6 @@ void UntimedOut<Item>::connect(InPort& in, const LinkOptions& options) {
   }
 }
 
-/// Told of what the colour cache and the blender do for each quad: for the bound.
-class BlendObserver {
- public:
-  virtual ~BlendObserver() = default;
-  virtual void looked_up(const CropBehaviour::LineAccess& access) = 0;
-  virtual void blended(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) = 0;
-};
-
 /// A memory port without time: an access is a call of the memory's functional model.
 class UntimedMemoryPort {
  public:
@@ -158,8 +153,8 @@ class UntimedUnit : public Component {
   explicit UntimedUnit(std::string name) : Component(ClockHandle()), name_(std::move(name)) {}
 
   std::string label() const override { return name_; }
-  /// Of a kind of work of its slot (occupancy.h), so far: the items that it is counted in, but whole warps where that is
-  /// cycles or instructions.
+  /// Of a kind of work of its slot (CropWork and others), so far: the items that it is counted in, but whole warps where
+  /// that is cycles or instructions.
   std::uint64_t items(unsigned kind) const { return items_[kind]; }
 
   /// For a unit with a memory port; null otherwise.

@@ -8,7 +8,7 @@
 
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/pipeline/render_context.h>
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
 

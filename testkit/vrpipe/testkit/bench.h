@@ -18,6 +18,7 @@
 #include <vrpipe/pipeline/checked_behaviours.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/registry.h>
+#include <vrpipe/pipeline/slots/behaviour.h>
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/testkit/sink.h>
 #include <vrpipe/testkit/source.h>
@@ -76,9 +77,7 @@ class Bench {
     const std::unique_ptr<ParameterSet> parameters = found.make_parameters();
     for (const auto& [name, value] : settings) parameters->set(slot, name, value);
     std::unique_ptr<Behaviour> behaviour = found.make_behaviour(*parameters, context_);
-    if (auto* const crop = dynamic_cast<CropBehaviour*>(behaviour.get())) crop->attach(framebuffer_.color);
-    if (auto* const sm = dynamic_cast<SmBehaviour*>(behaviour.get())) sm->attach(framebuffer_.color);
-    if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get())) zrop->attach(framebuffer_.depth_stencil);
+    attach_surfaces(*behaviour, framebuffer_);
     behaviour->unit().set_draws(context.frame->draws().size());
     follow_clock(*behaviour, *clock_);
     unit_ = clocked() ? unit_maker(slot)(slot, *clock_, std::move(behaviour), context_, gpcs)

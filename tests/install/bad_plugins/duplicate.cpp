@@ -1,4 +1,5 @@
 #include <vrpipe/pipeline/registry.h>
+#include <vrpipe/pipeline/slots/draw.h>
 
 VRPIPE_PLUGIN
 

@@ -10,6 +10,8 @@
 
 namespace vrpipe {
 
+struct Framebuffer;
+
 /// How fast a unit works: what its timing model asks for.
 struct Throughput {
   std::uint32_t items_per_cycle = 1;  ///< peak rate
@@ -32,5 +34,8 @@ class Behaviour : public StatisticSet {
 /// Throws SimulationFault for a unit of another slot.
 using SlotCheck = std::unique_ptr<Behaviour> (*)(const std::string& name, const RenderContext& context,
                                                  std::unique_ptr<Behaviour> behaviour);
+
+/// Gives a unit of a slot that draws into surfaces, or reads them, those of a frame; others have no use for them.
+void attach_surfaces(Behaviour& unit, Framebuffer& framebuffer);
 
 }  // namespace vrpipe

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/memory/cache_statistics.h>
@@ -104,6 +106,37 @@ class CropBehaviour : public Behaviour {
 
  protected:
   ColorSurface* surface_ = nullptr;
+};
+
+/// Quads of a warp that are looked up before the first of them is blended. Where places in CROP's queue, lines of the
+/// cache or miss registers are few, one that is taken a few cycles longer than it need be tells; then quads go one by one,
+/// as they do where a line could go for another one of the same warp.
+inline unsigned quads_looked_up_at_once(const CropBehaviour::TimingParameters& crop) {
+  constexpr std::uint32_t enough = 16 * quads_per_warp;
+  const bool roomy =
+      crop.cache_bytes / crop.line_bytes >= enough && crop.input_quads >= 3 * enough && crop.mshrs >= enough;
+  const bool keeps_a_warp = crop.replacement == Replacement::lru && (crop.ways == 0 || crop.ways >= quads_per_warp);
+  return roomy && keeps_a_warp ? quads_per_warp : 1;
+}
+
+/// Told of what the colour cache and the blender do for each quad: for the bound.
+class BlendObserver {
+ public:
+  virtual ~BlendObserver() = default;
+  virtual void looked_up(const CropBehaviour::LineAccess& access) = 0;
+  virtual void blended(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) = 0;
+};
+
+/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+struct CropWork {
+  /// Quads blended, what moves in its time (sectors, or lines where these have a price), and what hazards waste of the
+  /// blender, and quads that have no neighbour to go with (pairs_in_sector): shares of a cycle, of which one has
+  /// `parts_of_a_cycle`.
+  enum : unsigned { blend, sectors, forwarding, unpaired };
+  static std::uint64_t parts_of_a_cycle(const CropBehaviour::TimingParameters& timing) {
+    return std::uint64_t{timing.blend_rate.items} * timing.moves_in_a_cycle();
+  }
+  static std::vector<WorkKind> kinds(const CropBehaviour::TimingParameters& timing);
 };
 
 /// The slot's SlotCheck.

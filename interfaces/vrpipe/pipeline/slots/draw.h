@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
@@ -16,6 +18,12 @@ class DrawBehaviour : public Behaviour {
   virtual bool next(VertexWarp& out) = 0;
   /// Vertex warps in 1024 cycles.
   virtual std::uint32_t warps_per_1024_cycles() const = 0;
+};
+
+/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+struct DrawWork {
+  enum : unsigned { warps };  ///< in cycles between a warp and the next
+  static std::vector<WorkKind> kinds();
 };
 
 /// The slot's SlotCheck.

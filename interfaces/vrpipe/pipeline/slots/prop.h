@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
@@ -20,6 +22,12 @@ class PropBehaviour : public Behaviour {
     Order order;
   };
   virtual TimingParameters timing() const = 0;
+};
+
+/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+struct PropWork {
+  enum : unsigned { bins, tested, color, empty_warps, late };  ///< `late`: quads to be tested late
+  static std::vector<WorkKind> kinds(const PropBehaviour::TimingParameters& timing);
 };
 
 /// The slot's SlotCheck.

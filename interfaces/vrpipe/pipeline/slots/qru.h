@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
@@ -19,6 +21,12 @@ class QruBehaviour : public Behaviour {
   virtual bool finish_bin(Warp& out) = 0;
   virtual Throughput timing() const = 0;            ///< items: quads examined
   virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
+};
+
+/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+struct QruWork {
+  enum : unsigned { quads, launches };  ///< quads examined in cycles without a launch, which ends a cycle
+  static std::vector<WorkKind> kinds(const Throughput& timing);
 };
 
 /// The slot's SlotCheck.

@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
@@ -34,6 +36,12 @@ class RasterBehaviour : public Behaviour {
 
   DrawCounter quads_rasterized{*this, "quads_rasterized", "quads", "with at least one covered sample"};
   DrawCounter fragments_rasterized{*this, "fragments_rasterized", "fragments", "covered samples"};
+};
+
+/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+struct RasterWork {
+  enum : unsigned { setup, coarse, fine, pairs, quads };
+  static std::vector<WorkKind> kinds(const RasterBehaviour::TimingParameters& timing);
 };
 
 /// The slot's SlotCheck.

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 #include <vrpipe/pipeline/surface.h>
@@ -85,6 +86,13 @@ class SmBehaviour : public Behaviour {
 
  protected:
   const ColorSurface* surface_ = nullptr;
+};
+
+/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+struct SmWork {
+  /// Warp instructions; and handing warps to cores, in thousandths of a cycle.
+  enum : unsigned { vertex, fragment, merge, launches };
+  static std::vector<WorkKind> kinds(const SmBehaviour::TimingParameters& timing);
 };
 
 /// The slot's SlotCheck.

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
@@ -37,6 +38,18 @@ class TcBehaviour : public Behaviour {
 
   Counter quads{*this, "quads", "quads", "taken into bins"};
   Counter flushes{*this, "flushes", "flushes", "bins handed to PROP"};
+};
+
+/// Where TC keeps the quads of a flushed bin until QRU has formed its warps.
+struct BinStorage {
+  TcBehaviour::Flush flush;
+  bool in_use = false;
+};
+
+/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+struct TcWork {
+  enum : unsigned { quads, beats };
+  static std::vector<WorkKind> kinds(const TcBehaviour::TimingParameters& timing);
 };
 
 /// The slot's SlotCheck.

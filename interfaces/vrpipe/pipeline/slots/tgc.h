@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
@@ -30,6 +31,12 @@ class TgcBehaviour : public Behaviour {
   virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
 
   Counter flushes{*this, "flushes", "flushes", "bins handed to the rasteriser; 0 where a unit passes through"};
+};
+
+/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+struct TgcWork {
+  enum : unsigned { entries, primitives };
+  static std::vector<WorkKind> kinds(const Throughput& timing);
 };
 
 /// The slot's SlotCheck.

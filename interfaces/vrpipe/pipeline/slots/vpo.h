@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
@@ -17,6 +19,12 @@ class VpoBehaviour : public Behaviour {
   virtual Throughput timing() const = 0;  ///< items: triangles
 
   DrawCounter primitives{*this, "primitives", "triangles", "triangles handed to the GPCs"};
+};
+
+/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+struct VpoWork {
+  enum : unsigned { triangles };
+  static std::vector<WorkKind> kinds(const Throughput& timing);
 };
 
 /// The slot's SlotCheck.

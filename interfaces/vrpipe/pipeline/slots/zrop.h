@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
@@ -99,6 +100,14 @@ class ZropBehaviour : public Behaviour {
 
  protected:
   DepthStencilSurface* surface_ = nullptr;
+};
+
+/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+struct ZropWork {
+  /// Quads tested before shading, cycles with updates, sectors moved, quads tested after shading; in thousandths of a cycle,
+  /// what the blocks that quads touch take beyond their number, and lines that move.
+  enum : unsigned { tests, updates, sectors, late_tests, blocks, lines };
+  static std::vector<WorkKind> kinds(const ZropBehaviour::TimingParameters& timing);
 };
 
 /// The slot's SlotCheck.

@@ -1,4 +1,13 @@
-#include <vrpipe/model/occupancy.h>
+#include <vrpipe/pipeline/slots/crop.h>
+#include <vrpipe/pipeline/slots/draw.h>
+#include <vrpipe/pipeline/slots/prop.h>
+#include <vrpipe/pipeline/slots/qru.h>
+#include <vrpipe/pipeline/slots/raster.h>
+#include <vrpipe/pipeline/slots/sm.h>
+#include <vrpipe/pipeline/slots/tc.h>
+#include <vrpipe/pipeline/slots/tgc.h>
+#include <vrpipe/pipeline/slots/vpo.h>
+#include <vrpipe/pipeline/slots/zrop.h>
 
 namespace vrpipe {
 

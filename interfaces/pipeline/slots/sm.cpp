@@ -1,8 +1,9 @@
-#include <vrpipe/pipeline/units.h>
+#include <vrpipe/pipeline/slots/sm.h>
 
 #include <fmt/format.h>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/framebuffer.h>
 
 namespace vrpipe {
 
@@ -60,45 +61,6 @@ void AttributeFetch::check() const {
                     "use bytes = a power of two x ways x line, or 0 ways for a fully associative cache");
   }
   l1.check("L1 of an SM", "sm", "l1_bytes");
-}
-
-void ZCache::check(DepthFormat format) const {
-  const std::uint32_t quad = DepthStencilSurface::bytes_per_quad(format);
-  const std::uint32_t tile = positions_per_tile * quad;
-  organization.check("z-cache", "zrop", "cache_bytes");
-  if (organization.line_bytes > tile) {
-    throw UserError("unusable z-cache", "zrop.line_bytes",
-                    fmt::format("a line of {} bytes is of several screen tiles, which may be other GPCs'",
-                                organization.line_bytes),
-                    fmt::format("use lines of at most {}", tile));
-  }
-  if (organization.sector_bytes < quad) {
-    throw UserError("unusable z-cache", "zrop.sector_bytes",
-                    fmt::format("a quad of {} bytes does not fit into a sector of {}", quad, organization.sector_bytes),
-                    "use larger sectors");
-  }
-}
-
-CacheOrganization CropBehaviour::TimingParameters::cache() const {
-  CacheOrganization made;
-  made.bytes = cache_bytes;
-  made.line_bytes = line_bytes;
-  made.sector_bytes = sector_bytes;
-  made.ways = ways;
-  made.replacement = replacement;
-  made.random_seed = random_seed;
-  made.hashes_sets = hashes_sets;
-  made.tells_conflicts = tells_conflicts;
-  return made;
-}
-
-void CropBehaviour::TimingParameters::check_cache(ColorFormat format) const {
-  cache().check("CROP cache", "crop", "cache_bytes");
-  const std::uint32_t quad = 4 * bytes_per_pixel(format);
-  if (quad <= line_bytes) return;
-  throw UserError("unusable CROP cache", "crop.line_bytes, --format",
-                  fmt::format("a quad of {} bytes does not fit into a line of {}", quad, line_bytes),
-                  "use longer lines");
 }
 
 }  // namespace vrpipe
