@@ -49,8 +49,30 @@ quietly() {
   rm -f "$log"
 }
 
-# What ccache knows of one checkout serves another.
-export CCACHE_BASEDIR=$project CCACHE_NOHASHDIR=true
+# What ccache knows of one checkout serves another; what a source includes it has from the compiler, not from a second
+# pass of the preprocessor.
+export CCACHE_BASEDIR=$project CCACHE_NOHASHDIR=true CCACHE_DEPEND=true
+
+# minutes SECONDS: as `7 s` or `2 min 5 s`.
+minutes() { if [ "$1" -lt 60 ]; then echo "$1 s"; else echo "$(($1 / 60)) min $(($1 % 60)) s"; fi; }
+
+# build DIR TARGET...: builds, and says how far it is: on a terminal in one line, elsewhere in a line every 20 seconds. What
+# compilers say is shown.
+build() {
+  # Batches of sources take about as long as one another, so that their number tells the time that is left.
+  NINJA_STATUS="[%f %t %e] " cmake --build "$1" --target "${@:2}" 2>&1 </dev/null | awk -v terminal="$([ -t 2 ] && echo 1)" '
+    match($0, /^\[[0-9]+ [0-9]+ [0-9.]+\] /) {
+      split(substr($0, 2, RLENGTH - 3), at, " ")
+      left = at[3] * (at[2] - at[1]) / at[1]
+      time = at[1] < 4 || at[1] == at[2] ? "" : left < 60 ? sprintf(", %d s left", left) : sprintf(", %.0f min left", left / 60)
+      said = sprintf("compiling: %d of %d steps%s", at[1], at[2], time)
+      if (terminal) printf "\r\033[K%s", said
+      else if (at[3] - before >= 20) { print said; before = at[3] }
+      fflush(); next
+    }
+    { if (terminal) printf "\r\033[K"; print; fflush() }
+    END { if (terminal) printf "\r\033[K" }' >&2
+}
 
 # configure BINARY_DIR OPTIONS...: a cmake run, with ccache if there is one.
 configure() {
