@@ -24,45 +24,45 @@ namespace {
 using namespace testing;
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
-constexpr const char* lpddr3 = "lpddr3-1600";
+constexpr const char* lpddr3_make = "lpddr3-1600";
 
 TEST(DramUnit, CountsCyclesOfItsOwn) {
   // The GPU has cycles of 1 ns, the DRAM of 1.25 ns. A read in cycle 10 is seen at the first edge from cycle 11 on, the
   // ninth, at 11.25 ns. Row and data take 15 + 12 + 4 cycles: until the 40th edge, at 50 ns.
-  DramBench without(lpddr3, {{"controller_ps", "0"}});
+  DramBench without(lpddr3_make, {{"controller_ps", "0"}});
   EXPECT_EQ(without.answered({read(10, 0)}), (std::vector<Cycle>{50}));
-  DramBench bench(lpddr3);
+  DramBench bench(lpddr3_make);
   EXPECT_EQ(bench.answered({read(10, 0)}), (std::vector<Cycle>{70})) << "20 ns in the controller";
   // 700 ps: cycle 11 is at 7.7 ns, before the 7th edge; the 38th is at 47.5 ns, before cycle 68.
-  DramBench faster(lpddr3, {{"controller_ps", "0"}}, 700);
+  DramBench faster(lpddr3_make, {{"controller_ps", "0"}}, 700);
   EXPECT_EQ(faster.answered({read(10, 0)}), (std::vector<Cycle>{68}));
   // 3 ns: cycle 11 is at 33 ns, before the 27th edge; the 58th is at 72.5 ns, before cycle 25.
-  DramBench slower(lpddr3, {{"controller_ps", "0"}}, 3000);
+  DramBench slower(lpddr3_make, {{"controller_ps", "0"}}, 3000);
   EXPECT_EQ(slower.answered({read(10, 0)}), (std::vector<Cycle>{25}));
 }
 
 TEST(DramUnit, AnswersAWriteOnceItIsQueued) {
-  DramBench bench(lpddr3, {{"controller_ps", "0"}});
+  DramBench bench(lpddr3_make, {{"controller_ps", "0"}});
   EXPECT_EQ(bench.answered({write(10, 0)}), (std::vector<Cycle>{12})) << "the ninth edge is at 11.25 ns";
 }
 
 TEST(DramUnit, AnswersARequestWithTheLastOfItsBursts) {
-  DramBench bench(lpddr3, {{"controller_ps", "0"}});
+  DramBench bench(lpddr3_make, {{"controller_ps", "0"}});
   // Four bursts, one after the other: 12 cycles of 1.25 ns more.
   EXPECT_EQ(bench.answered({read(10, 0, 128)}), (std::vector<Cycle>{50 + 15}));
   EXPECT_EQ(bench.clocked->statistics.channels.reads.value(), 4U);
   // In channels of their own, at once.
-  DramBench spread(lpddr3, {{"controller_ps", "0"}, {"interleave_bytes", "32"}});
+  DramBench spread(lpddr3_make, {{"controller_ps", "0"}, {"interleave_bytes", "32"}});
   EXPECT_EQ(spread.answered({read(10, 0, 128)}), (std::vector<Cycle>{50}));
   // Half of a burst of 64 bytes takes as long as all of it.
-  DramBench wide(lpddr3, {{"controller_ps", "0"}, {"channel_bits", "64"}});
+  DramBench wide(lpddr3_make, {{"controller_ps", "0"}, {"channel_bits", "64"}});
   EXPECT_EQ(wide.answered({read(10, 32, 32)}), (std::vector<Cycle>{50}));
   EXPECT_EQ(wide.clocked->statistics.channels.reads.value(), 1U);
 }
 
 TEST(DramUnit, AnswersOutOfOrder) {
   // Two rows of a bank; the third access hits the first row.
-  DramBench bench(lpddr3, {{"channels", "1"}, {"hash", "off"}, {"controller_ps", "0"}});
+  DramBench bench(lpddr3_make, {{"channels", "1"}, {"hash", "off"}, {"controller_ps", "0"}});
   const std::uint64_t next_row = 8 * 4096;
   const std::vector<Cycle> answered = bench.answered({read(10, 0), read(10, next_row), read(10, 32)});
   EXPECT_EQ(answered[2], answered[0] + 5);
@@ -74,14 +74,14 @@ TEST(DramUnit, AFullQueueHoldsItsPortUp) {
   // behind it, is let in in cycle 12, so that in 13 the third may be asked for, which is held up in turn. The command
   // of the first is at the 24th edge; cycle 31 is the first with a later one. Then the second enters, and the third is
   // let in in cycle 32.
-  DramBench bench(lpddr3, {{"channels", "1"}, {"read_queue", "1"}, {"port_requests", "1"}});
+  DramBench bench(lpddr3_make, {{"channels", "1"}, {"read_queue", "1"}, {"port_requests", "1"}});
   bench.answered({read(10, 0), read(10, 32), read(10, 64), read(10, 96)});
   EXPECT_EQ(bench.issued, (std::vector<Cycle>{10, 10, 13, 33}));
 }
 
 TEST(DramUnit, RequestsForOtherChannelsOvertakeThoseForAFullOne) {
   const Settings settings = {{"channels", "2"}, {"hash", "off"}, {"read_queue", "1"}, {"controller_ps", "0"}};
-  DramBench bench(lpddr3, settings);
+  DramBench bench(lpddr3_make, settings);
   const std::vector<Cycle> answered = bench.answered({read(10, 0), read(10, 32), read(10, 64), read(10, 256)});
   EXPECT_EQ(answered[3], answered[0]);
   EXPECT_LT(answered[0], answered[1]);
@@ -90,13 +90,13 @@ TEST(DramUnit, RequestsForOtherChannelsOvertakeThoseForAFullOne) {
 
 TEST(DramUnit, RequestsForAChannelDoNotOvertakeOneAnother) {
   // The second read waits for a place; the write of the same bytes behind it has one.
-  DramBench bench(lpddr3, {{"channels", "1"}, {"read_queue", "1"}});
+  DramBench bench(lpddr3_make, {{"channels", "1"}, {"read_queue", "1"}});
   bench.answered({read(10, 0), read(10, 64), write(10, 64)});
   EXPECT_EQ(bench.clocked->statistics.channels.reads_forwarded.value(), 0U) << "it would see what is written later";
 }
 
 TEST(DramUnit, PortsTakeTurns) {
-  DramBench bench(lpddr3, {{"channels", "1"}, {"read_queue", "1"}});
+  DramBench bench(lpddr3_make, {{"channels", "1"}, {"read_queue", "1"}});
   ClockedDram dram("dram", *bench.clock, *bench.behaviour, 2);
   const std::vector<Access> accesses(200, read(0, 0));
   ClockedInitiator one("one", *bench.clock, accesses);
@@ -120,7 +120,7 @@ TEST(DramUnit, AnswersEveryRequestOnce) {
       const std::uint64_t address = mix(i + 5000) % (1U << 16U) / bytes * bytes;
       accesses.push_back(mix(i + 9000) % 3 == 0 ? write(i / 8, address, bytes) : read(i / 8, address, bytes));
     }
-    DramBench bench(lpddr3, settings);
+    DramBench bench(lpddr3_make, settings);
     const std::vector<Cycle> answered = bench.answered(accesses);
     EXPECT_EQ(std::count(answered.begin(), answered.end(), never), 0);
     for (std::size_t i = 0; i < accesses.size(); ++i) ASSERT_GT(answered[i], bench.issued[i]);
@@ -138,7 +138,7 @@ TEST(DramUnit, AnswersEveryRequestOnce) {
 
 TEST(DramUnit, TheOrderOfTicksDoesNotMatter) {
   const auto answers = [](const Settings& settings, const std::vector<unsigned>& order) {
-    DramBench bench(lpddr3, settings);
+    DramBench bench(lpddr3_make, settings);
     std::vector<std::unique_ptr<ClockedInitiator>> units;
     std::unique_ptr<ClockedDram> dram;
     for (unsigned unit = 0; unit < 3; ++unit) {
@@ -169,7 +169,7 @@ TEST(DramUnit, TheOrderOfTicksDoesNotMatter) {
 }
 
 TEST(DramUnit, ComesToRestThoughItRefreshesForEver) {
-  DramBench bench(lpddr3);
+  DramBench bench(lpddr3_make);
   bench.answered({read(10, 0), write(20, 4096)});
   EXPECT_TRUE(bench.clock->at_rest());
   EXPECT_LT(bench.clock->now(), 100U);
@@ -238,7 +238,7 @@ class SlowInitiator : public sc_core::sc_module {
 };
 
 TEST(DramUnit, AnswersAnInitiatorOfAnotherMakeOneByOne) {
-  DramBench bench(lpddr3, {{"port_requests", "1"}});
+  DramBench bench(lpddr3_make, {{"port_requests", "1"}});
   ClockedDram dram("dram", *bench.clock, *bench.behaviour, 1);
   SlowInitiator initiator("initiator");
   initiator.socket.bind(dram.port(0));
@@ -287,7 +287,7 @@ class EarlyInitiator : public sc_core::sc_module {
 };
 
 TEST(DramUnit, ARequestThatIsAnnotatedAheadComesThen) {
-  DramBench bench(lpddr3, {{"controller_ps", "0"}});
+  DramBench bench(lpddr3_make, {{"controller_ps", "0"}});
   ClockedDram dram("dram", *bench.clock, *bench.behaviour, 2);
   ClockedInitiator busy("busy", *bench.clock, {read(6, 0), read(20, 32), read(60, 64)});
   EarlyInitiator early("early", bench.cycles(200));
@@ -301,7 +301,7 @@ TEST(DramUnit, ARequestThatIsAnnotatedAheadComesThen) {
 TEST(DramUnit, WithoutTimeCountsWhatEveryOrderHasToMove) {
   // A channel, whose queue of 64 writes may keep the last; bursts of 5 ns, in cycles of 1 ns. Written twice and read
   // back, a burst may be moved once.
-  DramBench bench(lpddr3, {{"channels", "1"}, {"refresh", "off"}});
+  DramBench bench(lpddr3_make, {{"channels", "1"}, {"refresh", "off"}});
   const auto cycles = [&] { return bench.behaviour->least_occupancy(1000).front().cycles; };
   EXPECT_EQ(cycles(), 0);
   for (std::uint64_t i = 0; i < 100; ++i) bench.behaviour->access(read(0, i * 64, 64).request);
@@ -309,13 +309,13 @@ TEST(DramUnit, WithoutTimeCountsWhatEveryOrderHasToMove) {
   for (std::uint64_t i = 0; i < 10; ++i) bench.behaviour->access(write(0, 0).request);
   bench.behaviour->access(read(0, 0).request);
   EXPECT_EQ(cycles(), (201 - 64) * 5);
-  DramBench refreshed(lpddr3, {{"channels", "1"}});
+  DramBench refreshed(lpddr3_make, {{"channels", "1"}});
   for (std::uint64_t i = 0; i < 2000 + 64; ++i) refreshed.behaviour->access(read(0, i * 32).request);
   EXPECT_EQ(refreshed.behaviour->least_occupancy(1000).front().cycles, 2000 * 5 + 2 * 130) << "two in 10 us";
 }
 
 TEST(DramUnit, IsMadeByItsSlot) {
-  DramBench bench(lpddr3);
+  DramBench bench(lpddr3_make);
   const Implementation& implementation = Registry::instance().find("dram", "lpddr5-6400");
   const auto parameters = implementation.make_parameters();
   RenderContext context;

@@ -74,12 +74,12 @@ class L2 {
   RenderContext context_;
 };
 
-constexpr MemoryOrigin color{MemoryTraffic::color, 1};
-constexpr MemoryOrigin attribute{MemoryTraffic::attribute, 2};
+constexpr MemoryOrigin color_origin{MemoryTraffic::color, 1};
+constexpr MemoryOrigin attribute_origin{MemoryTraffic::attribute, 2};
 
 TEST(SectoredL2, AMissFetchesItsSectorsInOneRequestOfItsOriginAndAHitNothing) {
   L2 l2;
-  l2.read(0x1000'0000'0080, 64, color);
+  l2.read(0x1000'0000'0080, 64, color_origin);
   ASSERT_EQ(l2.below.requests.size(), 1U);
   const MemoryRequest& fill = l2.below.requests.front();
   EXPECT_EQ(fill.address, 0x1000'0000'0080U);
@@ -87,9 +87,9 @@ TEST(SectoredL2, AMissFetchesItsSectorsInOneRequestOfItsOriginAndAHitNothing) {
   EXPECT_EQ(fill.command, tlm::TLM_READ_COMMAND);
   EXPECT_EQ(fill.origin.traffic, MemoryTraffic::color);
   EXPECT_EQ(fill.origin.gpc, 1U);
-  l2.read(0x1000'0000'0080, 32, attribute);
+  l2.read(0x1000'0000'0080, 32, attribute_origin);
   EXPECT_EQ(l2.below.requests.size(), 1U);
-  l2.read(0x1000'0000'0080, 128, attribute);
+  l2.read(0x1000'0000'0080, 128, attribute_origin);
   EXPECT_EQ(l2.below.requests.size(), 2U);
   EXPECT_EQ(l2.count("color_sectors"), 2U);
   EXPECT_EQ(l2.count("color_sector_misses"), 2U);
@@ -101,9 +101,9 @@ TEST(SectoredL2, AMissFetchesItsSectorsInOneRequestOfItsOriginAndAHitNothing) {
 
 TEST(SectoredL2, WhatWasWrittenGoesBelowWithTheOriginOfItsLineWhenThatGoes) {
   L2 l2(Settings{{"bytes", "1024"}, {"ways", "0"}, {"banks", "1"}, {"hold_attributes", "off"}});  // 8 lines
-  l2.write(0, 128, attribute);
-  l2.write(128 + 32, 32, color);
-  for (std::uint64_t line = 2; line < 9; ++line) l2.read(128 * line, 32, color);
+  l2.write(0, 128, attribute_origin);
+  l2.write(128 + 32, 32, color_origin);
+  for (std::uint64_t line = 2; line < 9; ++line) l2.read(128 * line, 32, color_origin);
   ASSERT_EQ(l2.below.bytes.written, 128U) << "the first line alone";
   MemoryRequest written;
   for (const MemoryRequest& request : l2.below.requests) {
@@ -122,9 +122,9 @@ TEST(SectoredL2, WritingThroughItPassesOnEveryWriteAndReadsWhatItWouldWithoutThe
   for (std::uint64_t i = 0; i < 2000; ++i) {
     const std::uint64_t line = mix(i) % 64;
     if (mix(i + 5000) % 3 != 0) {
-      for (L2* l2 : {&through, &reads}) l2->read(128 * line, 64, color);
+      for (L2* l2 : {&through, &reads}) l2->read(128 * line, 64, color_origin);
     } else {
-      through.write(128 * line + 32, 16, attribute);
+      through.write(128 * line + 32, 16, attribute_origin);
       written += 16;
     }
   }
@@ -143,10 +143,10 @@ TEST(SectoredL2, ColourStreamsThroughAndAttributesStay) {
   for (const bool held : {true, false}) {
     L2 l2(Settings{{"bytes", "64K"}, {"hold_attributes", held ? "on" : "off"}, {"hash_sets", "on"}});
     constexpr std::uint64_t lines = 256;  // of attributes: half of it
-    for (std::uint64_t line = 0; line < lines; ++line) l2.write(128 * line, 128, attribute);
-    for (std::uint64_t line = 0; line < 4096; ++line) l2.read((1U << 30U) + 128 * line, 128, color);
+    for (std::uint64_t line = 0; line < lines; ++line) l2.write(128 * line, 128, attribute_origin);
+    for (std::uint64_t line = 0; line < 4096; ++line) l2.read((1U << 30U) + 128 * line, 128, color_origin);
     EXPECT_EQ(l2.below.bytes.written, held ? 0 : 128 * lines);
-    for (std::uint64_t line = 0; line < lines; ++line) l2.read(128 * line, 128, attribute);
+    for (std::uint64_t line = 0; line < lines; ++line) l2.read(128 * line, 128, attribute_origin);
     EXPECT_EQ(l2.count("attribute_sector_misses"), 4 * (held ? lines : 2 * lines));
     EXPECT_EQ(l2.count("attribute_lines_held") > 0, held);
   }
@@ -154,14 +154,14 @@ TEST(SectoredL2, ColourStreamsThroughAndAttributesStay) {
 
 TEST(SectoredL2, AttributesThatAreMoreThanItHoldsGoAsOthersDo) {
   L2 l2(Settings{{"bytes", "64K"}});
-  for (std::uint64_t line = 0; line < 1024; ++line) l2.write(128 * line, 128, attribute);
+  for (std::uint64_t line = 0; line < 1024; ++line) l2.write(128 * line, 128, attribute_origin);
   EXPECT_EQ(l2.below.bytes.written, 64U * 1024);
   EXPECT_EQ(l2.count("attribute_lines_held"), 0U);
 }
 
 TEST(SectoredL2, ARequestLongerThanALineIsOneForEachLine) {
   L2 l2(Settings{{"line_bytes", "64"}});
-  l2.read(4096, 256, color);
+  l2.read(4096, 256, color_origin);
   EXPECT_EQ(l2.below.requests.size(), 4U);
   EXPECT_EQ(l2.below.bytes.read, 256U);
   EXPECT_EQ(l2.count("cache.line_misses"), 4U);
@@ -265,8 +265,8 @@ TEST(SectoredL2, ReadsAndWritesBelowWhatACacheByItsDefinitionWould) {
 std::uint64_t filled(L2& l2, std::uint64_t bytes, unsigned rounds) {
   for (unsigned round = 0; round < rounds; ++round) {
     for (std::uint64_t address = 0; address < bytes; address += 32) {
-      l2.read(address, 32, color);
-      l2.write(address, 32, color);
+      l2.read(address, 32, color_origin);
+      l2.write(address, 32, color_origin);
     }
   }
   return l2.below.bytes.read / 32;

@@ -14,7 +14,7 @@ using namespace testing;
 using Wide = boost::multiprecision::int128_t;
 
 /// The top-left rule, written from its definition (y down, the triangle turned so that its area is positive).
-bool covers(const SnappedTriangle& given, unsigned bits, std::uint32_t x, std::uint32_t y) {
+bool covers_pixel(const SnappedTriangle& given, unsigned bits, std::uint32_t x, std::uint32_t y) {
   SnappedTriangle t = given;
   if (doubled_area(t) < 0) {
     std::swap(t.x[1], t.x[2]);
@@ -82,7 +82,8 @@ RC_GTEST_PROP(Raster, EachSampleOfASplatIsProducedExactlyOnce, ()) {
     for (std::uint32_t x = 0; x < width; ++x) {
       unsigned expected = 0;
       for (unsigned i = 0; finite && i < 2; ++i) {
-        if (doubled_area(snapped[i]) != 0 && covers(snapped[i], context.precision.subpixel_bits, x, y)) ++expected;
+        if (doubled_area(snapped[i]) != 0 && covers_pixel(snapped[i], context.precision.subpixel_bits, x, y))
+          ++expected;
       }
       RC_ASSERT(hits[std::size_t{y} * width + x] == expected);
       RC_ASSERT(expected <= 1U);

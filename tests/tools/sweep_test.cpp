@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-const std::string small = "scene = \"tiny.spl\"\nfidelity = \"lt\"\n";
+const std::string small_sweep = "scene = \"tiny.spl\"\nfidelity = \"lt\"\n";
 
 class Sweep : public ToolTest {
  protected:
@@ -46,7 +46,7 @@ std::vector<std::vector<json>> values(const json& result) {
 
 TEST_F(Sweep, RunsTheProductOfItsAxesTheLastFastest) {
   const json result =
-      sweep(small + "[axes]\nvariant = [\"baseline\", \"het\"]\ntc.bins = { from = 8, to = 32, factor = 2 }\n");
+      sweep(small_sweep + "[axes]\nvariant = [\"baseline\", \"het\"]\ntc.bins = { from = 8, to = 32, factor = 2 }\n");
   EXPECT_EQ(values(result),
             (std::vector<std::vector<json>>{
                 {"baseline", 8}, {"baseline", 16}, {"baseline", 32}, {"het", 8}, {"het", 16}, {"het", 32}}));
@@ -54,7 +54,7 @@ TEST_F(Sweep, RunsTheProductOfItsAxesTheLastFastest) {
 }
 
 TEST_F(Sweep, APointIsTheRunOfItsSettings) {
-  const json result = sweep(small +
+  const json result = sweep(small_sweep +
                             "[set]\ntgc.bins = 9\n[variants.mine]\nbase = \"het+qm\"\nunit.qru = \"pass-through\"\n"
                             "[axes]\nplatform = [\"mobile\", \"desktop\"]\nvariant = [\"mine\", \"qm\"]\n"
                             "format = [\"rgba8\"]\ntermination = [\"strict\"]\ntc.bins = [3, 5]\n");
@@ -93,7 +93,7 @@ TEST_F(Sweep, NamesScenesFromTheStudysFolder) {
 
 TEST_F(Sweep, TakesAListOfPoints) {
   const json result =
-      sweep(small + "[[points]]\nvariant = \"qm\"\ntc.bins = 4\n[[points]]\nvariant = \"het\"\ntc.bins = 2\n");
+      sweep(small_sweep + "[[points]]\nvariant = \"qm\"\ntc.bins = 4\n[[points]]\nvariant = \"het\"\ntc.bins = 2\n");
   EXPECT_EQ(values(result), (std::vector<std::vector<json>>{{"qm", 4}, {"het", 2}}));
   EXPECT_EQ(result["product"], 0);
 }
@@ -101,14 +101,14 @@ TEST_F(Sweep, TakesAListOfPoints) {
 TEST_F(Sweep, TakesASampleThatItsSeedDecides) {
   const std::string axes =
       "[axes]\ntc.bins = { from = 1, to = 40, step = 1 }\ntgc.bins = { from = 1, to = 50, step = 1 }\n";
-  const auto sample = [&](const std::string& keys) { return values(sweep(keys + small + axes)); };
+  const auto sample = [&](const std::string& keys) { return values(sweep(keys + small_sweep + axes)); };
   const auto first = sample("sample = 6\nseed = 1\n");
   EXPECT_EQ(first.size(), 6U);
   EXPECT_TRUE(std::is_sorted(first.begin(), first.end()));
   EXPECT_EQ(std::set(first.begin(), first.end()).size(), 6U);
   EXPECT_EQ(sample("sample = 6\nseed = 1\n"), first);
   EXPECT_NE(sample("sample = 6\nseed = 2\n"), first);
-  EXPECT_EQ(sweep("sample = 4\n" + small + "[axes]\ntc.bins = [1, 2, 3, 4]\n")["points"].size(), 4U);
+  EXPECT_EQ(sweep("sample = 4\n" + small_sweep + "[axes]\ntc.bins = [1, 2, 3, 4]\n")["points"].size(), 4U);
 }
 
 TEST_F(Sweep, SpeedUpsAreOverOnePointOfTheSameScene) {
@@ -128,7 +128,7 @@ TEST_F(Sweep, SpeedUpsAreOverOnePointOfTheSameScene) {
 }
 
 TEST_F(Sweep, RanksAxesByHowMuchTheyMoveTime) {
-  const json result = sweep(small + "[axes]\nl2.latency_cycles = [100, 101]\ncrop.bytes_per_cycle = [16, 64]\n");
+  const json result = sweep(small_sweep + "[axes]\nl2.latency_cycles = [100, 101]\ncrop.bytes_per_cycle = [16, 64]\n");
   ASSERT_EQ(result["effects"].size(), 2U);
   EXPECT_EQ(result["effects"][0]["axis"], "crop.bytes_per_cycle");
   EXPECT_GT(result["effects"][0]["ratio"], result["effects"][1]["ratio"]);
@@ -140,7 +140,7 @@ TEST_F(Sweep, RanksAxesByHowMuchTheyMoveTime) {
 }
 
 TEST_F(Sweep, MarksGpusThatNoOtherBeats) {
-  const json result = sweep("pareto = [\"milliseconds\", \"quad_merging_storage_bytes\"]\n" + small +
+  const json result = sweep("pareto = [\"milliseconds\", \"quad_merging_storage_bytes\"]\n" + small_sweep +
                             "[axes]\nvariant = [\"baseline\", \"het+qm\"]\ntgc.bins = [16, 128]\n");
   std::map<std::string, bool> front;
   for (const json& gpu : result["pareto"]) {
@@ -156,7 +156,7 @@ TEST_F(Sweep, MarksGpusThatNoOtherBeats) {
 }
 
 TEST_F(Sweep, WritesTheSamePointsAsCsvAndJsonLines) {
-  write("study.toml", small + "[axes]\nvariant = [\"baseline\", \"het\"]\ntc.bins = [3]\n");
+  write("study.toml", small_sweep + "[axes]\nvariant = [\"baseline\", \"het\"]\ntc.bins = [3]\n");
   const Finished finished =
       vrpipe({"sweep", "study.toml", "--csv", "s.csv", "--jsonl", "s.jsonl", "--html", "s.html", "--json", "s.json"});
   ASSERT_EQ(finished.code, 0) << finished.err;
@@ -220,7 +220,7 @@ TEST_F(Sweep, KilledAtAnyMomentEndsWithTheSameBytes) {
 }
 
 TEST_F(Sweep, InShardsIsTheSameAsAlone) {
-  const std::string study = small + "[axes]\nvariant = [\"baseline\", \"qm\", \"het\"]\ntc.bins = [4, 32]\n";
+  const std::string study = small_sweep + "[axes]\nvariant = [\"baseline\", \"qm\", \"het\"]\ntc.bins = [4, 32]\n";
   write("study.toml", study);
   ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv"}).code, 0);
   for (const char* shard : {"2/3", "1/3", "3/3"}) {
@@ -234,16 +234,16 @@ TEST_F(Sweep, InShardsIsTheSameAsAlone) {
 }
 
 TEST_F(Sweep, ThatGrowsKeepsWhatIsDone) {
-  write("study.toml", small + "[axes]\ntc.bins = [4, 32]\n");
+  write("study.toml", small_sweep + "[axes]\ntc.bins = [4, 32]\n");
   ASSERT_EQ(vrpipe({"sweep", "study.toml", "--journal", "j"}).code, 0);
-  write("study.toml", small + "[axes]\ntc.bins = [4, 8, 32]\n");
+  write("study.toml", small_sweep + "[axes]\ntc.bins = [4, 8, 32]\n");
   EXPECT_NE(vrpipe({"sweep", "study.toml", "--journal", "j"}).err.find("2 of 3 points were done before"),
             std::string::npos);
   refused({"sweep", "study.toml", "--journal", "j", "--set", "tgc.bins=3"}, {"--journal j", "belongs to another run"});
 }
 
 TEST_F(Sweep, AsAnArrayOfABatchSystemOnOneNode) {
-  write("study.toml", small + "[axes]\ntc.bins = [4, 8, 32]\n");
+  write("study.toml", small_sweep + "[axes]\ntc.bins = [4, 8, 32]\n");
   for (const char* task : {"1", "2"}) {
     const std::string command = "cd " + folder().string() + " && SLURM_ARRAY_TASK_ID=" + task +
                                 " SLURM_ARRAY_TASK_COUNT=2 VRPIPE=" VRPIPE_BINARY " bash " VRPIPE_EXAMPLES
@@ -265,7 +265,7 @@ std::string under_mpi(const std::filesystem::path& folder, unsigned ranks, const
 
 TEST_F(Sweep, OverMpiRanksIsTheSameAsAlone) {
   if (!has_mpi()) GTEST_SKIP() << "built or run without MPI";
-  write("study.toml", small + "[axes]\nvariant = [\"baseline\", \"qm\", \"het\"]\ntc.bins = [4, 32]\n");
+  write("study.toml", small_sweep + "[axes]\nvariant = [\"baseline\", \"qm\", \"het\"]\ntc.bins = [4, 32]\n");
   ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv"}).code, 0);
   ASSERT_EQ(std::system(under_mpi(folder(), 3, "sweep study.toml --csv mpi.csv").c_str()), 0)
       << read_file(folder() / "mpi.err");
@@ -314,11 +314,11 @@ TEST_F(Sweep, ThatCannotBeIsRefusedWithItsLine) {
   bad("[axes]\nsize = [\"3\"]\n", {"axis size"});
   bad("[variants.m]\nbase = \"qm\"\nset.tc.bins = 3\n[axes]\nvariant = [\"m\"]\ntc.bins = [3, 4]\n",
       {"axis tc.bins changes nothing", "variant m"});
-  bad("pareto = [\"speed\", \"cycles\"]\n" + small + "[axes]\ntc.bins = [3]\n", {"'speed'", "pareto"});
-  bad(small + "[axes]\ntc.bins = [3]\n", {"unknown axis 'tc.bin'", "did you mean tc.bins"},
+  bad("pareto = [\"speed\", \"cycles\"]\n" + small_sweep + "[axes]\ntc.bins = [3]\n", {"'speed'", "pareto"});
+  bad(small_sweep + "[axes]\ntc.bins = [3]\n", {"unknown axis 'tc.bin'", "did you mean tc.bins"},
       {"--relative-to", "tc.bin=3"});
-  bad(small + "[axes]\ntc.bins = [3]\n", {"unknown value '4'"}, {"--relative-to", "tc.bins=4"});
-  write("study.toml", small + "[axes]\ntc.bins = [3]\n");
+  bad(small_sweep + "[axes]\ntc.bins = [3]\n", {"unknown value '4'"}, {"--relative-to", "tc.bins=4"});
+  write("study.toml", small_sweep + "[axes]\ntc.bins = [3]\n");
   refused({"sweep", "study.toml", "--shard", "1/2"}, {"--shard", "--journal"});
   refused({"sweep", "study.toml", "--shard", "3/2", "--journal", "j"}, {"'3/2'", "I/N"});
   refused({"sweep", "study.toml", "--shard", "1/2", "--journal", "j", "--csv", "s.csv"},
@@ -337,8 +337,8 @@ TEST_F(Sweep, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
   section.replace(0, heading.size(), "\n### JSON\n");
   known = documented(section, "JSON");
   known.insert("schema");
-  expect_documented({sweep("sample = 2\n" + small + "[axes]\nvariant = [\"baseline\", \"het\"]\ntc.bins = [3, 4]\n")},
-                    known);
+  expect_documented(
+      {sweep("sample = 2\n" + small_sweep + "[axes]\nvariant = [\"baseline\", \"het\"]\ntc.bins = [3, 4]\n")}, known);
 }
 
 }  // namespace

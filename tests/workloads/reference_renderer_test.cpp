@@ -4,26 +4,20 @@
 
 #include <cmath>
 
+#include "support/builders.h"
+
 namespace vrpipe::testing {
 namespace {
 
 /// A round splat of `sigma` pixels whose box ends where alpha is 1/255.
-Splat round_splat(float x, float y, float sigma, float opacity, float grey = 1) {
+Splat grey_splat(float x, float y, float sigma, float opacity, float grey = 1) {
   const float r = std::sqrt(2 * std::log(255 * opacity));
   return {x, y, sigma * r, 0, 0, sigma * r, r, 0, grey, grey, grey, opacity};
 }
 
-Draw draw_of(std::uint32_t width, std::uint32_t height, const std::vector<Splat>& splats) {
-  Draw draw;
-  draw.width = width;
-  draw.height = height;
-  draw.splats = splats;
-  return draw;
-}
-
 // Z03
 TEST(ReferenceRenderer, OneSplatIsItsClosedFormAtEveryPixel) {
-  const ReferenceImage image = render_reference(draw_of(40, 30, {round_splat(17.3f, 12.8f, 3, 0.8f, 0.5f)}));
+  const ReferenceImage image = render_reference(draw_of(40, 30, {grey_splat(17.3f, 12.8f, 3, 0.8f, 0.5f)}));
   for (std::uint32_t y = 0; y < 30; ++y) {
     for (std::uint32_t x = 0; x < 40; ++x) {
       const double dx = x + 0.5 - 17.3f, dy = y + 0.5 - 12.8f;
@@ -38,18 +32,18 @@ TEST(ReferenceRenderer, OneSplatIsItsClosedFormAtEveryPixel) {
 // Z04
 TEST(ReferenceRenderer, EqualSplatsFillUpAsAPower) {
   const ReferenceImage image =
-      render_reference(draw_of(1, 1, std::vector<Splat>(20, round_splat(0.5f, 0.5f, 2, 0.25f))));
+      render_reference(draw_of(1, 1, std::vector<Splat>(20, grey_splat(0.5f, 0.5f, 2, 0.25f))));
   EXPECT_NEAR(image.at(0, 0)[3], 1 - std::pow(0.75, 20), 1e-12);
   EXPECT_EQ(image.fragments_blended, 20u);
 }
 
 TEST(ReferenceRenderer, AlphaIsCappedAt099) {
-  EXPECT_EQ(render_reference(draw_of(1, 1, {round_splat(0.5f, 0.5f, 2, 1.0f)})).at(0, 0)[3], 0.99);
+  EXPECT_EQ(render_reference(draw_of(1, 1, {grey_splat(0.5f, 0.5f, 2, 1.0f)})).at(0, 0)[3], 0.99);
 }
 
 TEST(ReferenceRenderer, ATerminatedPixelTakesNothingMore) {
-  const std::vector<Splat> splats = {round_splat(0.5f, 0.5f, 2, 1), round_splat(0.5f, 0.5f, 2, 1),
-                                     round_splat(0.5f, 0.5f, 2, 1)};
+  const std::vector<Splat> splats = {grey_splat(0.5f, 0.5f, 2, 1), grey_splat(0.5f, 0.5f, 2, 1),
+                                     grey_splat(0.5f, 0.5f, 2, 1)};
   ReferenceOptions options;
   options.termination_threshold = 0.996;
   const ReferenceImage image = render_reference(draw_of(1, 1, splats), options);
@@ -59,13 +53,13 @@ TEST(ReferenceRenderer, ATerminatedPixelTakesNothingMore) {
 
 // O08: the corners of a box hold 1 - pi/4 of its fragments.
 TEST(ReferenceRenderer, CornersOfTheBoxArePruned) {
-  Splat turned = round_splat(300, 300, 60, 0.9f);
+  Splat turned = grey_splat(300, 300, 60, 0.9f);
   const float c = 0.8f, s = 0.6f, extent = turned.ax;
   turned.ax = c * extent;
   turned.ay = s * extent;
   turned.bx = -s * extent;
   turned.by = c * extent;
-  for (const Splat& splat : {round_splat(300, 300, 60, 0.9f), turned}) {
+  for (const Splat& splat : {grey_splat(300, 300, 60, 0.9f), turned}) {
     const ReferenceImage image = render_reference(draw_of(600, 600, {splat}));
     EXPECT_NEAR(1 - static_cast<double>(image.fragments_blended) / static_cast<double>(image.fragments_covered),
                 1 - 3.14159265 / 4, 0.002);
@@ -74,7 +68,7 @@ TEST(ReferenceRenderer, CornersOfTheBoxArePruned) {
 }
 
 TEST(ReferenceRenderer, ASplatWithoutExtentCoversOnlyASampleAtItsCentre) {
-  Splat point = round_splat(2.5f, 1.5f, 0, 0.5f);
+  Splat point = grey_splat(2.5f, 1.5f, 0, 0.5f);
   point.opacity = 1.0f / 255;
   point.r = 0;
   EXPECT_EQ(render_reference(draw_of(4, 4, {point})).fragments_blended, 1u);
@@ -86,7 +80,7 @@ TEST(ReferenceRenderer, ASplatWithoutExtentCoversOnlyASampleAtItsCentre) {
 TEST(ReferenceRenderer, TheRunningBoundHoldsForARoundingBlender) {
   std::vector<Splat> splats;
   for (int i = 0; i < 300; ++i)
-    splats.push_back(round_splat(0.5f, 0.5f, 2, 0.01f + 0.0007f * static_cast<float>(i), i % 3 ? 0.9f : 0.1f));
+    splats.push_back(grey_splat(0.5f, 0.5f, 2, 0.01f + 0.0007f * static_cast<float>(i), i % 3 ? 0.9f : 0.1f));
   const Draw draw = draw_of(1, 1, splats);
   ReferenceOptions options;
   options.bound_format = BoundFormat::rgba8;
@@ -117,7 +111,7 @@ TEST(ReferenceRenderer, TheRunningBoundHoldsForARoundingBlender) {
 }
 
 TEST(ReferenceRenderer, TrianglesAreRefused) {
-  Draw draw = draw_of(1, 1, {round_splat(0, 0, 1, 0.5f)});
+  Draw draw = draw_of(1, 1, {grey_splat(0, 0, 1, 0.5f)});
   draw.triangles.resize(1);
   EXPECT_THROW(render_reference(draw), std::invalid_argument);
 }
