@@ -14,6 +14,7 @@
 #include <vrpipe/pipeline/checked_behaviours.h>
 #include <vrpipe/pipeline/slots/memory.h>
 #include <vrpipe/pipeline/slots/zrop.h>
+#include <vrpipe/platforms/foreign_memory.h>
 
 namespace vrpipe {
 

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/pipeline/slots/crop.h>
+
 #include "crop/timed_crop_bench.h"
 
 namespace vrpipe {

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/wiring.h>
 
 #include "dram/clocked_dram.h"

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include <vrpipe/pipeline/batch.h>
+#include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/observers.h>
 #include <vrpipe/platforms/wiring.h>

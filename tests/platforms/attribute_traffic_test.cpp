@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/wiring.h>
 
 #include "support/fidelities.h"

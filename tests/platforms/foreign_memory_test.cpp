@@ -4,6 +4,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/memory/memory_port.h>
+#include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/wiring.h>
 
 #include "support/fidelities.h"

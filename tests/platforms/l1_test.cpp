@@ -9,6 +9,7 @@
 
 #include <vrpipe/arithmetic/random.h>
 #include <vrpipe/component/error.h>
+#include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/wiring.h>
 
 #include "support/foreign_memory.h"

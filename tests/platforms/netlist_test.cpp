@@ -12,6 +12,7 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/slots/crop.h>
 #include <vrpipe/platforms/configuration.h>
+#include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/wiring.h>
 
 #include "support/simulate.h"

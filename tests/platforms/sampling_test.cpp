@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/observers.h>
 

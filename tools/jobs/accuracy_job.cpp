@@ -7,6 +7,7 @@
 #include <memory>
 #include <utility>
 
+#include <vrpipe/component/error.h>
 #include <vrpipe/platforms/stress.h>
 #include <vrpipe/workloads/exact_image.h>
 #include <vrpipe/workloads/scene.h>

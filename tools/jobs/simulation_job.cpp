@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <utility>
 
+#include <vrpipe/component/error.h>
 #include <vrpipe/workloads/draw_list.h>
 
 #include "for_each_chunk.h"

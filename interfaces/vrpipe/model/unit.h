@@ -84,13 +84,4 @@ using UnitMaker = std::function<std::unique_ptr<Unit>(const std::string& name, C
 void register_unit_maker(const std::string& slot, UnitMaker maker);
 const UnitMaker& unit_maker(const std::string& slot);
 
-/// Hands a functional model to a timing model that needs the interface of its slot.
-template <class SlotBehaviour>
-std::unique_ptr<SlotBehaviour> behaviour_as(std::unique_ptr<Behaviour> behaviour) {
-  auto* const typed = dynamic_cast<SlotBehaviour*>(behaviour.get());
-  if (typed == nullptr) throw SimulationFault("registry", 0, "a behaviour was made for another slot");
-  static_cast<void>(behaviour.release());
-  return std::unique_ptr<SlotBehaviour>(typed);
-}
-
 }  // namespace vrpipe

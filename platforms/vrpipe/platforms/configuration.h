@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <vrpipe/component/parameter.h>
-#include <vrpipe/model/unit.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/simulation.h>

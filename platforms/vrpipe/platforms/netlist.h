@@ -7,9 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include <systemc>
-#include <tlm>
-
 #include <vrpipe/component/parameter.h>
 
 namespace vrpipe {
@@ -40,12 +37,8 @@ struct Link {
   std::string name() const;  ///< as in `link.NAME`
 };
 
-/// A memory of another make, as an instance of a platform: a SystemC module, and sockets of the unmodified TLM-2.0 base
-/// protocol: one for each unit that is connected to it, or a single one that takes many.
-struct ForeignMemory {
-  std::unique_ptr<sc_core::sc_module> module;
-  std::vector<tlm::tlm_base_target_socket_b<32>*> sockets;
-};
+/// A memory of another make: its SystemC module and sockets (foreign_memory.h).
+struct ForeignMemory;
 /// Makes the module of a name for so many units. At fidelities without time there are no accesses, and it is not called.
 using MemoryMaker = std::function<ForeignMemory(const std::string& name, unsigned units)>;
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include <vrpipe/kernel/accounting.h>
-#include <vrpipe/kernel/link.h>
+#include <vrpipe/kernel/link_observer.h>
 #include <vrpipe/pipeline/fragment_observer.h>
 
 namespace vrpipe {

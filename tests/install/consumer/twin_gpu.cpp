@@ -10,6 +10,7 @@
 #include <tlm>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/wiring.h>
 #include <vrpipe/workloads/scene.h>
 

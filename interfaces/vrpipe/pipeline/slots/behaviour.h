@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include <vrpipe/component/error.h>
 #include <vrpipe/component/statistic.h>
 #include <vrpipe/pipeline/payload.h>
 #include <vrpipe/pipeline/render_context.h>
@@ -34,6 +35,15 @@ class Behaviour : public StatisticSet {
 /// Throws SimulationFault for a unit of another slot.
 using SlotCheck = std::unique_ptr<Behaviour> (*)(const std::string& name, const RenderContext& context,
                                                  std::unique_ptr<Behaviour> behaviour);
+
+/// Hands a functional model to a timing model that needs the interface of its slot.
+template <class SlotBehaviour>
+std::unique_ptr<SlotBehaviour> behaviour_as(std::unique_ptr<Behaviour> behaviour) {
+  auto* const typed = dynamic_cast<SlotBehaviour*>(behaviour.get());
+  if (typed == nullptr) throw SimulationFault("registry", 0, "a behaviour was made for another slot");
+  static_cast<void>(behaviour.release());
+  return std::unique_ptr<SlotBehaviour>(typed);
+}
 
 /// Gives a unit of a slot that draws into surfaces, or reads them, those of a frame; others have no use for them.
 void attach_surfaces(Behaviour& unit, Framebuffer& framebuffer);
