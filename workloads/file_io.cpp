@@ -9,6 +9,7 @@
 #include <cctype>
 #include <cerrno>
 #include <climits>
+#include <cstdlib>
 #include <system_error>
 
 #include <vrpipe/component/error.h>
@@ -40,6 +41,17 @@ std::string lower_case(std::string text) {
 }
 
 std::string extension_of(const std::filesystem::path& path) { return lower_case(path.extension().string()); }
+
+std::optional<fs::path> user_cache_folder() {
+  const auto absolute = [](const char* variable) -> std::optional<fs::path> {
+    const char* const value = std::getenv(variable);
+    if (value == nullptr || value[0] != '/') return std::nullopt;
+    return fs::path(value);
+  };
+  if (const auto folder = absolute("XDG_CACHE_HOME")) return *folder / "vrpipe";
+  if (const auto home = absolute("HOME")) return *home / ".cache" / "vrpipe";
+  return std::nullopt;
+}
 
 InputFile::InputFile(const fs::path& path, const std::string& what) : what_(what), where_(path.string()) {
   // A pipe without a writer would block.

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,9 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "scene files are little
 std::string lower_case(std::string text);
 /// With its dot, in lower case; empty for a name without one.
 std::string extension_of(const std::filesystem::path& path);
+
+/// `vrpipe` in the user's cache folder, as the XDG Base Directory Specification has it, where a relative path counts as none.
+std::optional<std::filesystem::path> user_cache_folder();
 
 /// A regular file that is read, not mapped: a mapped file that someone cuts short ends the program by SIGBUS.
 class InputFile {

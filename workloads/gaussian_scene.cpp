@@ -85,6 +85,8 @@ void GaussianArray::set(std::uint64_t index, const GaussianAttributes& gaussian)
                  [&to](const float* values, std::size_t count) { to = std::copy_n(values, count, to); });
 }
 
+std::size_t GaussianArray::bytes_per_gaussian(int sh_degree) { return canonical_floats(sh_degree) * sizeof(float); }
+
 GaussianScene GaussianArray::build() {
   const auto* records = reinterpret_cast<const std::byte*>(floats_.get());
   return GaussianScene(std::move(floats_), records, count_, floats_per_gaussian_ * sizeof(float),

@@ -156,7 +156,7 @@ void refuse_mesh(const std::string& path) {
 }
 
 void open_builtin(const std::string& name, const SceneRequest& request, OpenedScene& scene) {
-  const BuiltinScene builtin = make_builtin_scene(name);
+  const BuiltinScene builtin = request.scene_cache ? cached_builtin_scene(name) : make_builtin_scene(name);
   scene.gaussians = builtin.gaussians;
   scene.meshes = builtin.meshes;
   scene.viewpoint = viewpoint(request, builtin.info.size, [&] { return with_options(builtin.info.view, request); });
@@ -194,7 +194,7 @@ GaussianFile open_gaussians(const std::string& scene) {
   const std::string name = scene_name(scene);
   if (is_builtin(name)) {
     GaussianFile file;
-    file.gaussians = make_builtin_scene(name.substr(kBuiltinPrefix.size())).gaussians;
+    file.gaussians = cached_builtin_scene(name.substr(kBuiltinPrefix.size())).gaussians;
     file.format = "built-in";
     return file;
   }

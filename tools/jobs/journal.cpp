@@ -28,18 +28,6 @@ constexpr char kCannotUse[] = "cannot use journal";
 
 std::string describe_error(int error) { return std::generic_category().message(error); }
 
-/// As the XDG Base Directory Specification has it, where a relative path counts as none.
-std::optional<fs::path> cache_folder() {
-  const auto absolute = [](const char* variable) -> std::optional<fs::path> {
-    const char* const value = std::getenv(variable);
-    if (value == nullptr || value[0] != '/') return std::nullopt;
-    return fs::path(value);
-  };
-  if (const auto folder = absolute("XDG_CACHE_HOME")) return *folder / "vrpipe";
-  if (const auto home = absolute("HOME")) return *home / ".cache" / "vrpipe";
-  return std::nullopt;
-}
-
 void say(const std::string& option, const std::string& text) {
   fmt::print(stderr, "{}: {}\n", option, printable(text));
   std::fflush(stderr);
@@ -104,7 +92,7 @@ Journal Journal::in_file(const fs::path& path, const nlohmann::json& head, const
 }
 
 Journal Journal::in_cache(const std::string& name, const nlohmann::json& head, const std::string& option) {
-  const std::optional<fs::path> folder = cache_folder();
+  const std::optional<fs::path> folder = user_cache_folder();
   Journal journal(folder ? *folder / name : fs::path(), option, false);
   std::string why = "neither XDG_CACHE_HOME nor HOME names a folder";
   if (folder) {

@@ -1,9 +1,11 @@
 #include <vrpipe/workloads/builtin_scenes.h>
 
 #include <memory>
+#include <utility>
 
 #include <vrpipe/component/error.h>
 
+#include "scene_cache.h"
 #include "scenes.h"
 
 namespace vrpipe {
@@ -68,6 +70,14 @@ const std::vector<Entry>& entries() {
   return all;
 }
 
+const Entry& entry_named(const std::string& name) {
+  return entries()[static_cast<std::size_t>(&builtin_scene_named(name) - builtin_scenes().data())];
+}
+
+void add_mesh(const Entry& entry, BuiltinScene& scene) {
+  if (entry.mesh != nullptr) scene.meshes.push_back(std::make_shared<const Mesh>(entry.mesh()));
+}
+
 }  // namespace
 
 const std::vector<BuiltinSceneInfo>& builtin_scenes() {
@@ -96,8 +106,8 @@ const BuiltinSceneInfo& builtin_scene_named(const std::string& name) {
 }
 
 BuiltinScene make_builtin_scene(const std::string& name, unsigned threads) {
-  const BuiltinSceneInfo& info = builtin_scene_named(name);
-  const Entry& entry = entries()[static_cast<std::size_t>(&info - builtin_scenes().data())];
+  const Entry& entry = entry_named(name);
+  const BuiltinSceneInfo& info = entry.info;
   BuiltinScene scene{info, {}, {}};
   if (entry.capture != nullptr) {
     CapturePainter painter(entry.seed, info.view, info.size.height, entry.sh_degree);
@@ -108,7 +118,20 @@ BuiltinScene make_builtin_scene(const std::string& name, unsigned threads) {
     entry.paint(painter);
     scene.gaussians = painter.build();
   }
-  if (entry.mesh != nullptr) scene.meshes.push_back(std::make_shared<const Mesh>(entry.mesh()));
+  add_mesh(entry, scene);
+  return scene;
+}
+
+BuiltinScene cached_builtin_scene(const std::string& name) {
+  const Entry& entry = entry_named(name);
+  BuiltinScene scene{entry.info, {}, {}};
+  if (auto gaussians = cached_scene(name)) {
+    scene.gaussians = std::move(*gaussians);
+    add_mesh(entry, scene);
+    return scene;
+  }
+  scene = make_builtin_scene(name);
+  cache_scene(name, scene.gaussians);
   return scene;
 }
 

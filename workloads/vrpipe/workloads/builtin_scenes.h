@@ -56,4 +56,8 @@ const BuiltinSceneInfo& builtin_scene_named(const std::string& name);
 /// @throws UserError for an unknown name, with the nearest one
 BuiltinScene make_builtin_scene(const std::string& name, unsigned threads = 0);
 
+/// The same bits, from the user's cache folder if this build has made the scene before; else it is made and stored there.
+/// @throws UserError for an unknown name, with the nearest one
+BuiltinScene cached_builtin_scene(const std::string& name);
+
 }  // namespace vrpipe

@@ -80,6 +80,9 @@ class GaussianScene {
     return GaussianRef(records_ + static_cast<std::size_t>(index) * stride_bytes_, layout_.get(), sh_degree_);
   }
 
+  /// Of all Gaussians, one after the other.
+  const std::byte* records() const { return records_; }
+
   /// Asks the host's caches for Gaussian `index` < size(), for who reads in another order than the file's.
   void prefetch(std::uint64_t index) const {
     constexpr std::size_t kLine = 64;
@@ -115,6 +118,11 @@ class GaussianArray {
 
   /// @pre index < count
   void set(std::uint64_t index, const GaussianAttributes& gaussian);
+
+  /// What a Gaussian takes: position, f_dc, f_rest, opacity, scale, rotation, all float32. sh_degree is 0 to 3.
+  static std::size_t bytes_per_gaussian(int sh_degree);
+  /// All of them, to be read in as they lie in a scene that build() has made.
+  std::byte* bytes() { return reinterpret_cast<std::byte*>(floats_.get()); }
 
   /// Hands the Gaussians over; those that were not set hold anything.
   GaussianScene build();

@@ -25,6 +25,7 @@ struct SceneRequest {
   std::optional<Vec3> up;
   std::optional<double> fovy_degrees;
   PreprocessOptions preprocess;
+  bool scene_cache = true;  ///< a built-in scene may come from the user's cache folder; see cached_builtin_scene()
   std::vector<std::string> meshes;  ///< files of meshes that are drawn with the scene, in this order; see read_mesh()
 };
 
