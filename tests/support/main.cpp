@@ -1,10 +1,70 @@
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
 #include <cstdlib>
+#include <cstring>
+#include <string>
 
 #include <gtest/gtest.h>
+#if defined(VRPIPE_SANITIZED)
+#include <sanitizer/common_interface_defs.h>
+#endif
+
+namespace vrpipe::testing {
+namespace {
+
+/// Says on stderr within which test the process ended. Processes that tests fork say nothing.
+class LastWords : public ::testing::EmptyTestEventListener {
+ public:
+  LastWords() {
+    owner = ::getpid();
+    static std::array<char, 16384> own_stack;  // where that of a test has overflowed
+    stack_t stack{};
+    stack.ss_sp = own_stack.data();
+    stack.ss_size = own_stack.size();
+    ::sigaltstack(&stack, nullptr);
+    for (const int signal : {SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGSEGV, SIGTERM}) {
+      struct sigaction former {};
+      ::sigaction(signal, nullptr, &former);
+      if (former.sa_handler != SIG_DFL) continue;  // a sanitizer's
+      struct sigaction action {};
+      action.sa_handler = end;
+      action.sa_flags = static_cast<int>(SA_ONSTACK | SA_RESETHAND);
+      ::sigaction(signal, &action, nullptr);
+    }
+    std::atexit(say);
+#if defined(VRPIPE_SANITIZED)
+    __sanitizer_set_death_callback(say);
+#endif
+  }
+
+ private:
+  void OnTestStart(const ::testing::TestInfo& test) override {
+    words = std::string("The process ended within ") + test.test_suite_name() + "." + test.name() + "\n";
+  }
+  void OnTestEnd(const ::testing::TestInfo&) override { words.clear(); }
+
+  static void say() {
+    if (words.empty() || ::getpid() != owner) return;
+    if (::write(STDERR_FILENO, words.data(), words.size()) < 0) return;  // nobody is left to be told
+  }
+  static void end(int signal) {
+    say();
+    ::raise(signal);  // delivered, as by default, when the handler returns
+  }
+
+  static inline std::string words;
+  static inline pid_t owner = 0;
+};
+
+}  // namespace
+}  // namespace vrpipe::testing
 
 // SystemC's library has a main of its own, which would win over the one in an archive.
 int main(int argc, char** argv) {
   ::testing::InitGoogleTest(&argc, argv);
+  ::testing::UnitTest::GetInstance()->listeners().Append(new vrpipe::testing::LastWords);
   setenv("SYSTEMC_DISABLE_COPYRIGHT_MESSAGE", "1", 1);
   return RUN_ALL_TESTS();
 }
