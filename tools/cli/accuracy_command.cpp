@@ -1,6 +1,5 @@
 #include <iostream>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/component/printable.h>
@@ -27,24 +26,21 @@ class AccuracyCommand : public Command {
   std::string name() const override { return "accuracy"; }
   std::string summary() const override { return "what accuracy costs in time, on one scene"; }
 
-  void declare(CLI::App& app) override {
-    arguments_.declare(app, SimulationArguments::Variants::all);
+  void declare(Arguments& arguments) override {
+    arguments_.declare(arguments, SimulationArguments::Variants::all);
     const std::string ladders = "The ladders";
-    app.add_flag("--quick", quick_,
-                 "a first answer: the middle ninth of the image unless --size is given, two\n"
-                 "variants, and one value of some knobs")
-        ->disable_flag_override()
-        ->group(ladders);
-    add_option(app, "--repeat", repeat_, "N",
-               "measures each rung of the fidelity ladder N times, interleaved, and\n"
-               "takes the median of the seconds (default: 1)",
-               ladders);
-    add_option(app, "--html", html_, "FILE", "writes a page with plots, images and error maps; it needs no network",
-               "Where results go");
-    app.add_flag("--markdown", markdown_, "prints the tables as Markdown in place of the report")
-        ->disable_flag_override()
-        ->group("Where results go");
-    app.footer(
+    arguments.add_flag("--quick", quick_,
+                       "a first answer: the middle ninth of the image unless --size is given, two\n"
+                       "variants, and one value of some knobs",
+                       ladders);
+    arguments.add_option("--repeat", repeat_, "N",
+                         "measures each rung of the fidelity ladder N times, interleaved, and\n"
+                         "takes the median of the seconds (default: 1)",
+                         ladders);
+    arguments.add_option("--html", html_, "FILE",
+                         "writes a page with plots, images and error maps; it needs no network", result_group);
+    arguments.add_flag("--markdown", markdown_, "prints the tables as Markdown in place of the report", result_group);
+    arguments.set_footer(
         "Climbs two ladders. Fidelity: every variant at every --fidelity that there is, one at a time, with its\n"
         "error in cycles and speed-up against the most exact, and its CPU seconds. Precision: het+qm, at the\n"
         "--fidelity given (default: cycle), with one arithmetic choice changed at a time, with its error against\n"

@@ -1,8 +1,6 @@
 #include <iostream>
 #include <optional>
 
-#include <CLI/CLI.hpp>
-
 #include "cli/command_line.h"
 #include "cli/options.h"
 #include "cli/print_config.h"
@@ -20,16 +18,16 @@ class CompareCommand : public Command {
     return "variants side by side: baseline, qm, het, het+qm and those of your own (the main job)";
   }
 
-  void declare(CLI::App& app) override {
-    arguments_.declare(app, SimulationArguments::Variants::all);
-    arguments_.declare_comparison(app);
-    arguments_.declare_frames(app);
-    arguments_.declare_views(app);
-    arguments_.declare_page(app);
-    arguments_.declare_energy(app);
-    arguments_.declare_explanation(app);
-    arguments_.declare_time(app, SimulationArguments::Variants::all);
-    app.footer(
+  void declare(Arguments& arguments) override {
+    arguments_.declare(arguments, SimulationArguments::Variants::all);
+    arguments_.declare_comparison(arguments);
+    arguments_.declare_frames(arguments);
+    arguments_.declare_views(arguments);
+    arguments_.declare_page(arguments);
+    arguments_.declare_energy(arguments);
+    arguments_.declare_explanation(arguments);
+    arguments_.declare_time(arguments, SimulationArguments::Variants::all);
+    arguments.set_footer(
         "Simulates GPUs that differ only in the units swapped in, on the same draw: baseline, qm (TGC and QRU merge\n"
         "overlapping quads), het (ZROP and CROP terminate opaque pixels) and het+qm (both), or any set of variants\n"
         "and platforms. Prints cycles, speed-ups, counts and utilization side by side; with --views, how speed-ups\n"

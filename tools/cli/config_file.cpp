@@ -4,11 +4,9 @@
 #include <array>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <vrpipe/component/error.h>
 
-#include "cli/options.h"
 #include "jobs/toml_file.h"
 #include "jobs/user_variants.h"
 
@@ -24,16 +22,16 @@ const std::string variants_key = "variants";
 /// Of the file, with what the readers of its parts need.
 class ConfigReader : public TomlFile {
  public:
-  ConfigReader(const std::filesystem::path& path, const CLI::App& app)
+  ConfigReader(const std::filesystem::path& path, const Arguments& arguments)
       : TomlFile(path, "cannot read configuration", std::string(config_option) + " " + path.string(),
                  "docs/configuration.md"),
-        app_(app) {}
+        arguments_(arguments) {}
 
   [[noreturn]] void refuse_key(const toml::node& node, const std::string& key,
                                const std::vector<std::string>& known) const {
     refuse(node, "unknown key '" + key + "'", "there is no such key here",
            fmt::format("did you mean {}? `vrpipe {} --help` lists the options", nearest_name(key, known),
-                       app_.get_name()));
+                       arguments_.command()));
   }
 
   const toml::table& table(const toml::node& node, const std::string& key) const {
@@ -61,13 +59,13 @@ class ConfigReader : public TomlFile {
   }
 
   /// A value of an option, with names of files from where vrpipe runs.
-  std::string value(const toml::node& node, const std::string& key, const CLI::Option& option) const {
+  std::string value(const toml::node& node, const std::string& key, const Option& option) const {
     return with_file_of(option, scalar(node, key),
                         [&](const std::filesystem::path& file) { return in_folder(path().parent_path(), file); });
   }
 
  private:
-  const CLI::App& app_;
+  const Arguments& arguments_;
 };
 
 std::string key_of(const std::string& text) { return text.substr(0, text.find('=')); }
@@ -79,35 +77,33 @@ bool is_merged(const std::string& option) {
 
 }  // namespace
 
-std::string with_file_of(const CLI::Option& option, const std::string& text,
+std::string with_file_of(const Option& option, const std::string& text,
                          const std::function<std::filesystem::path(const std::filesystem::path&)>& change) {
-  const std::string type = option.get_type_name();
+  const std::string& type = option.value_name;
   if (type.find("FILE") == std::string::npos && type.find("DIR") == std::string::npos) return text;
   return with_file(text, type.find("NAME=FILE") != std::string::npos, change);
 }
 
-ConfigFile::ConfigFile(const std::filesystem::path& path, CLI::App& app, const std::vector<std::string>& others)
+ConfigFile::ConfigFile(const std::filesystem::path& path, Arguments& arguments, const std::vector<std::string>& others)
     : path_(path) {
-  read(app, others);
-  apply(app);
+  read(arguments, others);
+  apply(arguments);
 }
 
-void ConfigFile::read(CLI::App& app, const std::vector<std::string>& others) {
-  const ConfigReader reader(path_, app);
+void ConfigFile::read(Arguments& arguments, const std::vector<std::string>& others) {
+  const ConfigReader reader(path_, arguments);
   std::vector<std::string> known{settings_key, units_key};
-  const CLI::Option* const define = app.get_option_no_throw("--define");
-  if (define != nullptr) known.push_back(variants_key);
-  for (const CLI::Option* option : app.get_options()) {
-    for (const std::string& name : option->get_lnames()) {
-      const std::array<const char*, 6> special{"help", "config", "print-config", "set", "unit", "define"};
-      if (std::find(special.begin(), special.end(), name) == special.end()) known.push_back(name);
-    }
+  if (arguments.find("--define") != nullptr) known.push_back(variants_key);
+  for (const Option& option : arguments.options()) {
+    const std::array<const char*, 5> special{config_option, print_option, "--set", "--unit", "--define"};
+    if (option.kind == Option::Kind::positional) continue;
+    if (std::find(special.begin(), special.end(), option.name) == special.end()) known.push_back(option.name.substr(2));
   }
   known.insert(known.end(), others.begin(), others.end());
   for (const auto& [key, node] : ConfigReader::in_order(reader.root())) {
     if (std::find(others.begin(), others.end(), key) != others.end()) continue;
     const unsigned line = ConfigReader::position(*node).line;
-    const CLI::Option* const option = app.get_option_no_throw("--" + key);
+    const Option* const option = arguments.find("--" + key);
     if (std::find(known.begin(), known.end(), key) == known.end()) reader.refuse_key(*node, key, known);
     if (key == settings_key || key == units_key) {
       if (option == nullptr) reader.refuse_key(*node, key, known);
@@ -126,12 +122,12 @@ void ConfigFile::read(CLI::App& app, const std::vector<std::string>& others) {
             mention(path.substr(dot + 1), reader.scalar(*leaf, path), leaf->source().begin.line);
         }
       }
-    } else if (option->get_expected_max() == 0) {
+    } else if (option->kind == Option::Kind::flag) {
       const auto* flag = node->as_boolean();
       if (flag == nullptr) reader.refuse(*node, "bad value of '" + key + "'", "it is a switch", "give true or false");
       if (flag->get()) add("--" + key, "", "true", line);
     } else {
-      const std::string type = option->get_type_name();
+      const std::string& type = option->value_name;
       const toml::array* const list = node->as_array();
       // Of several numbers, as X,Y,Z, or several values of an option that can be repeated.
       if (list != nullptr && type.find(',') != std::string::npos && type.find('=') == std::string::npos) {
@@ -151,33 +147,32 @@ void ConfigFile::read(CLI::App& app, const std::vector<std::string>& others) {
   }
 }
 
-void ConfigFile::apply(CLI::App& app) {
+void ConfigFile::apply(Arguments& arguments) {
   std::vector<std::string> options;
   for (const Entry& entry : entries_) {
     if (std::find(options.begin(), options.end(), entry.option) == options.end()) options.push_back(entry.option);
   }
   for (const std::string& name : options) {
-    CLI::Option* const option = app.get_option(name);
-    const std::vector<std::string> typed = option->results();
+    Option* const option = arguments.find(name);
+    const Values typed = option->texts;
     std::vector<std::string> typed_keys;
     for (const std::string& text : typed) typed_keys.push_back(key_of(text));
     if (name == "--define") {
-      for (const std::string& text : app.get_option("--variant")->results()) {
+      const Option* const variant = arguments.find("--variant");
+      for (const std::string& text : variant == nullptr ? Values() : variant->texts) {
         if (text.find('=') != std::string::npos) typed_keys.push_back(key_of(text));
       }
     }
-    std::vector<std::string> results;
+    Values texts;
     for (Entry& entry : entries_) {
       if (entry.option != name) continue;
       entry.used = is_merged(name) ? std::find(typed_keys.begin(), typed_keys.end(), entry.key) == typed_keys.end()
                                    : typed.empty();
-      if (entry.used) results.push_back(entry.text);
+      if (entry.used) texts.push_back(entry.text);
     }
-    if (results.empty()) continue;
-    results.insert(results.end(), typed.begin(), typed.end());
-    option->clear();
-    for (const std::string& text : results) option->add_result(text);
-    option->run_callback();
+    if (texts.empty()) continue;
+    texts.insert(texts.end(), typed.begin(), typed.end());
+    option->give(texts);
   }
 }
 
@@ -227,31 +222,24 @@ void note_config(const Invocation& invocation, Provenance& provenance) {
   provenance.config_settings = invocation.config->settings();
 }
 
-void declare_config(CLI::App& app) {
-  const std::string group = "A configuration";
-  app.add_option(config_option)
-      ->type_name("FILE.toml")
-      ->description(
-          "what is not on the command line is as this file says, which says all that the\n"
-          "command line can, and defines variants (docs/configuration.md)")
-      ->allow_extra_args(false)
-      ->expected(1)
-      ->take_all()
-      ->group(group);
-  app.add_flag(print_option)
-      ->description(
-          "prints such a file of all that the command would do, with every parameter\n"
-          "and where its value comes from, and does nothing")
-      ->disable_flag_override()
-      ->group(group);
+void declare_config(Arguments& arguments) {
+  const char* const group = "A configuration";
+  arguments.add({Option::Kind::text, config_option, "FILE.toml",
+                 "what is not on the command line is as this file says, which says all that the\n"
+                 "command line can, and defines variants (docs/configuration.md)",
+                 group, nullptr});
+  arguments.add({Option::Kind::flag, print_option, "",
+                 "prints such a file of all that the command would do, with every parameter\n"
+                 "and where its value comes from, and does nothing",
+                 group, nullptr});
 }
 
-std::optional<ConfigFile> read_config(CLI::App& app) {
-  const CLI::Option* const option = app.get_option_no_throw(config_option);
+std::optional<ConfigFile> read_config(Arguments& arguments) {
+  const Option* const option = arguments.find(config_option);
   if (option == nullptr) return std::nullopt;
-  const auto file = single(option->results(), config_option);
+  const auto file = single(option->texts, config_option);
   if (!file) return std::nullopt;
-  return std::optional<ConfigFile>(std::in_place, *file, app);
+  return std::optional<ConfigFile>(std::in_place, *file, arguments);
 }
 
 }  // namespace vrpipe::tools

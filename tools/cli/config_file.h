@@ -6,12 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "cli/arguments.h"
 #include "host/provenance.h"
-
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
 
 namespace vrpipe::tools {
 
@@ -20,11 +16,11 @@ namespace vrpipe::tools {
 /// and [variants] key by key. Names of files are relative to the file's folder.
 class ConfigFile {
  public:
-  /// Reads the file that --config names, and gives the options of `app`, which are parsed, what they are not given.
+  /// Reads the file that --config names, and gives options, which are parsed, what they are not given.
   /// Throws UserError with file and line for what is no TOML, an unknown key, with the nearest name, and a value of a type
   /// that the option does not take.
   /// @param others  keys that somebody else reads
-  ConfigFile(const std::filesystem::path& path, CLI::App& app, const std::vector<std::string>& others = {});
+  ConfigFile(const std::filesystem::path& path, Arguments& arguments, const std::vector<std::string>& others = {});
 
   const std::filesystem::path& path() const { return path_; }
   /// Whether an option, or a key of --set, --unit and --define, has its value from here: "--size", "--set tc.bins".
@@ -51,8 +47,8 @@ class ConfigFile {
   void add(const std::string& option, const std::string& key, const std::string& text, unsigned line);
   /// Of UNIT.PARAMETER or SLOT, wherever it stands.
   void mention(const std::string& key, const std::string& value, unsigned line);
-  void read(CLI::App& app, const std::vector<std::string>& others);
-  void apply(CLI::App& app);
+  void read(Arguments& arguments, const std::vector<std::string>& others);
+  void apply(Arguments& arguments);
 
   std::filesystem::path path_;
   std::vector<Entry> entries_;
@@ -61,21 +57,21 @@ class ConfigFile {
 
 /// How a command was called.
 struct Invocation {
-  std::vector<std::string> words;  ///< the whole command line
-  const CLI::App* app = nullptr;   ///< of the command, parsed
+  std::vector<std::string> words;        ///< the whole command line
+  const Arguments* arguments = nullptr;  ///< of the command, parsed
   std::optional<ConfigFile> config;
 
   bool gives(const std::string& what) const { return config && config->gives(what); }
 };
 
 /// What an option is given, with another name for the file if its value names one (help calls it FILE or DIR).
-std::string with_file_of(const CLI::Option& option, const std::string& text,
+std::string with_file_of(const Option& option, const std::string& text,
                          const std::function<std::filesystem::path(const std::filesystem::path&)>& change);
 /// Notes in a result's provenance what a configuration file says of parameters.
 void note_config(const Invocation& invocation, Provenance& provenance);
 /// --config and --print-config.
-void declare_config(CLI::App& app);
+void declare_config(Arguments& arguments);
 /// Applies --config, if it is given.
-std::optional<ConfigFile> read_config(CLI::App& app);
+std::optional<ConfigFile> read_config(Arguments& arguments);
 
 }  // namespace vrpipe::tools

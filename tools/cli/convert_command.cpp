@@ -2,7 +2,6 @@
 #include <iostream>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <vrpipe/component/printable.h>
 #include <vrpipe/workloads/gaussian_file.h>
@@ -22,14 +21,12 @@ class ConvertCommand : public Command {
   std::string name() const override { return "convert"; }
   std::string summary() const override { return "a scene in another format"; }
 
-  void declare(CLI::App& app) override {
-    app.add_option("IN", in_, "a file of Gaussians, or builtin:NAME; `vrpipe scenes` lists the formats")
-        ->required()
-        ->type_name("");
-    app.add_option("OUT", out_, "FILE.ply, as INRIA writes it, attributes bit for bit; or FILE.splat")
-        ->required()
-        ->type_name("");
-    app.footer(
+  void declare(Arguments& arguments) override {
+    arguments.add_positional("IN", in_, "a file of Gaussians, or builtin:NAME; `vrpipe scenes` lists the formats")
+        .is_required = true;
+    arguments.add_positional("OUT", out_, "FILE.ply, as INRIA writes it, attributes bit for bit; or FILE.splat")
+        .is_required = true;
+    arguments.set_footer(
         "Reads any format and writes INRIA's .ply, or .splat, in whose bytes colours and rotations are rounded.\n"
         "\n"
         "Examples:\n"

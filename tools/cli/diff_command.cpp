@@ -1,7 +1,5 @@
 #include <iostream>
 
-#include <CLI/CLI.hpp>
-
 #include <vrpipe/component/error.h>
 
 #include "cli/command_line.h"
@@ -21,15 +19,12 @@ class DiffCommand : public Command {
     return "what differs between two results: settings, counts, cycles, pictures";
   }
 
-  void declare(CLI::App& app) override {
-    app.add_option("A.json", a_, "a result that --json wrote")->type_name("");
-    app.add_option("B.json", b_, "another one")->type_name("");
-    app.add_flag("--all", all_, "every statistic that differs, not only those that changed most")
-        ->disable_flag_override()
-        ->group("Where results go");
-    add_option(app, "--json", json_, "FILE|-", "writes the differences as JSON; `-`: to stdout, in place of the text",
-               "Where results go");
-    app.footer(
+  void declare(Arguments& arguments) override {
+    arguments.add_positional("A.json", a_, "a result that --json wrote");
+    arguments.add_positional("B.json", b_, "another one");
+    arguments.add_flag("--all", all_, "every statistic that differs, not only those that changed most", result_group);
+    declare_json(arguments, json_, "differences");
+    arguments.set_footer(
         "Says what was asked for otherwise, what came out otherwise, and by how much. Runs, units and statistics are\n"
         "matched by name. Pictures are compared where both results have them (--output). What the host makes is left\n"
         "out: seconds, load, names of files. Exit code 0 whether they differ or not; JSON has `equal`.\n"

@@ -26,7 +26,7 @@ EffectList effects_that(const Belongs& belongs) {
 /// Never omitted: the declaration says why in the place of when.
 bool is_decided(const Effect& effect) { return effect.decide != nullptr; }
 
-std::string row(const std::vector<std::string>& cells) {
+std::string effect_row(const std::vector<std::string>& cells) {
   std::string text = "|";
   for (const std::string& cell : cells) text += " " + markdown_escaped(cell) + " |";
   return text + "\n";
@@ -74,8 +74,8 @@ std::string effects_as_markdown(const EffectList& effects) {
   std::string text = "| effect | kind | models | omitted when | elaborates | tripwire |\n|---|---|---|---|---|---|\n";
   for (const Effect* effect : effects) {
     const std::string when = (is_decided(*effect) ? "" : "never: ") + effect->omitted_when;
-    text +=
-        row({name_cell(*effect), name_of(effect->kind), effect->models, when, effect->elaborates, effect->tripwire});
+    text += effect_row(
+        {name_cell(*effect), name_of(effect->kind), effect->models, when, effect->elaborates, effect->tripwire});
   }
   return text;
 }
@@ -87,7 +87,7 @@ std::string all_effects_as_markdown() {
     if (is_decided(*effect)) {
       decided.push_back(effect);
     } else {
-      others += row({name_cell(*effect), name_of(effect->kind), effect->models, effect->omitted_when});
+      others += effect_row({name_cell(*effect), name_of(effect->kind), effect->models, effect->omitted_when});
     }
   }
   std::string text = effects_as_markdown(decided);

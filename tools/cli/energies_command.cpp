@@ -1,7 +1,6 @@
 #include <iostream>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/component/printable.h>
@@ -18,47 +17,47 @@
 namespace vrpipe::tools {
 namespace {
 
-std::string numbers(const Range& range) {
+std::string range_text(const Range& range) {
   return fmt::format("{:.3g} / {:.3g} / {:.3g}", range.low, range.nominal, range.high);
 }
 
-std::string as_text(const EnergyTable& table, const TextStyle& style) {
+std::string energies_as_text(const EnergyTable& table, const TextStyle& style) {
   constexpr std::size_t width = 120;
   TextTable events({"unit: event", fmt::format("pJ at {}", printable(table.process)), "how often"});
   events.left(2);
   events.wrap(width);
   for (const EnergyEvent& event : table.events) {
-    events.row({printable(event.unit + ": " + event.name), numbers(event.picojoules), printable(event.count.text)});
+    events.row({printable(event.unit + ": " + event.name), range_text(event.picojoules), printable(event.count.text)});
   }
   TextTable powers({"constant power", "W", "how often"});
   powers.left(2);
   for (const ConstantPower& power : table.powers) {
-    powers.row({printable(power.name), numbers(power.watts), printable(power.count.text)});
+    powers.row({printable(power.name), range_text(power.watts), printable(power.count.text)});
   }
   return events.text(style) + "\n" + powers.text(style) +
          "low / nominal / high; sources: --markdown; to change them: --toml, then `vrpipe compare --energies FILE`\n";
 }
 
 /// What the documentation holds.
-std::string as_markdown(const EnergyTable& table) {
+std::string energies_as_markdown(const EnergyTable& table) {
   std::string text = fmt::format("| unit: event | pJ as published | pJ at {} | how often | what, and source |\n",
                                  markdown_escaped(table.process)) +
                      "|---|---|---|---|---|\n";
   for (const EnergyEvent& event : table.events) {
     text += fmt::format("| {}: {} | {}, {} | {} | {} | {}. {} |\n", markdown_escaped(event.unit),
-                        markdown_escaped(event.name), numbers(event.published), markdown_escaped(event.node),
-                        numbers(event.picojoules), markdown_escaped(event.count.text), markdown_escaped(event.meaning),
-                        markdown_escaped(event.source));
+                        markdown_escaped(event.name), range_text(event.published), markdown_escaped(event.node),
+                        range_text(event.picojoules), markdown_escaped(event.count.text),
+                        markdown_escaped(event.meaning), markdown_escaped(event.source));
   }
   text += fmt::format("\n| process | factor to {} | supply, of that | source |\n|---|---|---|---|\n",
                       markdown_escaped(table.process));
   for (const ProcessNode& node : table.nodes) {
-    text += fmt::format("| {} | {} | {:g} | {} |\n", markdown_escaped(node.name), numbers(node.factor),
+    text += fmt::format("| {} | {} | {:g} | {} |\n", markdown_escaped(node.name), range_text(node.factor),
                         node.voltage_ratio, markdown_escaped(node.source));
   }
   text += "\n| constant power | W | how often | of | what, and source |\n|---|---|---|---|---|\n";
   for (const ConstantPower& power : table.powers) {
-    text += fmt::format("| {} | {} | {} | {} | {}. {} |\n", markdown_escaped(power.name), numbers(power.watts),
+    text += fmt::format("| {} | {} | {} | {} | {}. {} |\n", markdown_escaped(power.name), range_text(power.watts),
                         markdown_escaped(power.count.text),
                         markdown_escaped(fmt::format("{}", fmt::join(power.platforms, ", "))),
                         markdown_escaped(power.meaning), markdown_escaped(power.source));
@@ -68,7 +67,7 @@ std::string as_markdown(const EnergyTable& table) {
 
 Json range_json(const Range& range) { return {{"low", range.low}, {"nominal", range.nominal}, {"high", range.high}}; }
 
-Json as_json(const EnergyTable& table) {
+Json energies_as_json(const EnergyTable& table) {
   Json nodes = Json::array(), events = Json::array(), powers = Json::array();
   for (const ProcessNode& node : table.nodes) {
     nodes.push_back({{"name", node.name},
@@ -108,20 +107,18 @@ class EnergiesCommand : public Command {
     return "what events cost, by which --energy reports; or checks a file of them";
   }
 
-  void declare(CLI::App& app) override {
-    app.add_option("FILE.toml", file_, "a table of your own, as --energies takes it")->type_name("");
-    add_option(app, "--platform", platform_, "NAME",
-               "whose units have to have what the file counts (default: " + platforms().front().name + ")",
-               "What is listed");
-    add_option(app, "--plugin", plugins_, "FILE.so", "loads a plugin's units first; can be repeated", "What is listed");
-    app.add_flag("--toml", toml_, "prints the table that vrpipe comes with as a file, to begin with")
-        ->disable_flag_override()
-        ->group("Where results go");
-    app.add_flag("--markdown", markdown_, "prints the table as Markdown, with sources")
-        ->disable_flag_override()
-        ->group("Where results go");
-    declare_json(app, json_);
-    app.footer(
+  void declare(Arguments& arguments) override {
+    arguments.add_positional("FILE.toml", file_, "a table of your own, as --energies takes it");
+    arguments.add_option("--platform", platform_, "NAME",
+                         "whose units have to have what the file counts (default: " + platforms().front().name + ")",
+                         listed_group);
+    arguments.add_option("--plugin", plugins_, "FILE.so", "loads a plugin's units first; can be repeated",
+                         listed_group);
+    arguments.add_flag("--toml", toml_, "prints the table that vrpipe comes with as a file, to begin with",
+                       result_group);
+    arguments.add_flag("--markdown", markdown_, "prints the table as Markdown, with sources", result_group);
+    declare_json(arguments, json_, "list");
+    arguments.set_footer(
         "Examples:\n"
         "  vrpipe energies\n"
         "  vrpipe energies --toml > mine.toml\n"
@@ -142,7 +139,8 @@ class EnergiesCommand : public Command {
       const StdoutToStderr redirected;  // plugins may print while their units are made
       check_energy_names(table, platform);
     }
-    print_listing(as_json(table), markdown_ ? as_markdown(table) : as_text(table, stdout_style()), json_, plugins_);
+    print_listing(energies_as_json(table),
+                  markdown_ ? energies_as_markdown(table) : energies_as_text(table, stdout_style()), json_, plugins_);
   }
 
  private:

@@ -11,10 +11,12 @@
 
 namespace vrpipe::tools {
 
-void declare_json(CLI::App& app, Values& json) {
-  add_option(app, "--json", json, "FILE|-", "writes the list as JSON; `-`: to stdout, in place of the text",
-             "Where results go");
+void declare_json(Arguments& arguments, Values& json, const std::string& what) {
+  arguments.add_option("--json", json, "FILE|-",
+                       "writes the " + what + " as JSON; `-`: to stdout, in place of the text", result_group);
 }
+
+Json json_triple(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 
 std::string markdown_escaped(const std::string& text) {
   std::string result;

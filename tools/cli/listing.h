@@ -2,15 +2,19 @@
 
 #include <string>
 
-#include "cli/options.h"
+#include <vrpipe/workloads/camera.h>
+
+#include "cli/arguments.h"
 #include "output/result_json.h"
 
 namespace vrpipe::tools {
 
 // What the commands that list things have in common.
 
-/// Adds `--json FILE|-`.
-void declare_json(CLI::App& app, Values& json);
+/// Adds `--json FILE|-`. `what` is written to it: "list".
+void declare_json(Arguments& arguments, Values& json, const std::string& what);
+
+Json json_triple(const Vec3& v);
 
 /// As a cell of a table, on one line.
 std::string markdown_escaped(const std::string& text);

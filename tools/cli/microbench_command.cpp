@@ -1,7 +1,6 @@
 #include <iostream>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/component/error.h>
@@ -26,13 +25,12 @@ class MicrobenchCommand : public Command {
   std::string name() const override { return "microbench"; }
   std::string summary() const override { return "the paper's analysis of GPUs as workloads, beside a real GPU"; }
 
-  void declare(CLI::App& app) override {
-    app.add_option("NAME", name_, fmt::format("{}, or all", fmt::join(microbench_names(), ", ")))
-        ->required()
-        ->type_name("");
-    arguments_.declare_machine(app);
-    add_option(app, "--html", html_, "FILE", "writes a page with the curves; it needs no network", "Where results go");
-    app.footer(
+  void declare(Arguments& arguments) override {
+    arguments.add_positional("NAME", name_, fmt::format("{}, or all", fmt::join(microbench_names(), ", ")))
+        .is_required = true;
+    arguments_.declare_machine(arguments);
+    arguments.add_option("--html", html_, "FILE", "writes a page with the curves; it needs no network", result_group);
+    arguments.set_footer(
         "Each draws rectangles of its own on the baseline GPU and prints what the paper found, what a real GPU (one\n"
         "graphics GPC of a GH100) measured and what the simulator does beside one another, with its curve. Draw state\n"
         "is the microbenchmark's: of --set state.NAME the precision of the hardware counts alone.\n"

@@ -6,7 +6,6 @@
 #include <thread>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/registry.h>
@@ -23,33 +22,6 @@
 
 namespace vrpipe::tools {
 namespace {
-
-/// CLI11's layout, with our names of values and without its marks for repeatable options.
-class HelpFormatter : public CLI::Formatter {
- public:
-  HelpFormatter() { column_width(34); }
-  std::string make_option_opts(const CLI::Option* option) const override {
-    return option->get_type_name().empty() ? std::string() : " " + option->get_type_name();
-  }
-  std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override {
-    std::string text = CLI::Formatter::make_help(app, std::move(name), mode);
-    for (std::size_t gap; (gap = text.find("\n\n\n")) != std::string::npos;) text.erase(gap, 1);
-    return text;
-  }
-  std::string make_usage(const CLI::App* app, std::string name) const override {
-    const std::string full = name.empty() ? app->get_name() : name;
-    std::string text = "\nUsage: " + full + (app->get_subcommands({}).empty() ? " [OPTIONS]" : " COMMAND [OPTIONS]");
-    for (const CLI::Option* option : app->get_options([](const CLI::Option* each) { return each->get_positional(); })) {
-      text += option->get_required() ? " " + option->get_name(true) : " [" + option->get_name(true) + "]";
-    }
-    return text + "\n";
-  }
-};
-
-constexpr const char* scene_group = "What is drawn";
-constexpr const char* machine_group = "On which GPU";
-constexpr const char* rules_group = "How exactly";
-constexpr const char* result_group = "Where results go";
 
 constexpr const char* energies_option = "--energies";
 constexpr const char* html_option = "--html";
@@ -91,25 +63,21 @@ void refuse_keys_given_twice(const Values& values, const std::string& option) {
 
 }  // namespace
 
-std::shared_ptr<CLI::FormatterBase> help_formatter() { return std::make_shared<HelpFormatter>(); }
-
-CLI::Option* add_option(CLI::App& app, const std::string& name, Values& values, const std::string& value_name,
-                        const std::string& help, const std::string& group) {
-  // Every option collects its texts, so that one given twice is refused with a message of our own.
-  return app.add_option(name, values, help)->type_name(value_name)->allow_extra_args(false)->take_all()->group(group);
+void declare_result_json(Arguments& arguments, Values& json) {
+  arguments.add_option("--json", json, "FILE|-", "writes the result as JSON; `-`: to stdout, and nothing else there",
+                       result_group);
 }
 
-std::optional<std::string> single(const Values& values, const std::string& option) {
-  if (values.empty()) return std::nullopt;
-  if (values.size() > 1) {
-    throw UserError("option given twice", option, "as '" + values[0] + "' and as '" + values[1] + "'", "give it once");
-  }
-  return values.front();
+void declare_jobs(Arguments& arguments, Values& jobs) {
+  arguments.add_option("--jobs", jobs, "N",
+                       "simulations at a time, each a process of its own (default: one for each\n"
+                       "processor; results do not depend on it)",
+                       result_group);
 }
 
-std::optional<std::filesystem::path> single_path(const Values& values, const std::string& option) {
-  const auto text = single(values, option);
-  return text ? std::optional<std::filesystem::path>(*text) : std::nullopt;
+unsigned processes(const Values& jobs) {
+  const auto text = single(jobs, "--jobs");
+  return text ? parse_count(*text, "--jobs", 1024) : std::max(1U, std::thread::hardware_concurrency());
 }
 
 void load_plugins(const Values& plugins) {
@@ -121,195 +89,190 @@ void load_plugins(const Values& plugins) {
   if (!plugins.empty()) report_crashes();
 }
 
-void SimulationArguments::declare_scene(CLI::App& app) {
-  add_option(app, "--scene", scene_, "FILE|builtin:NAME|NAME=FILE",
-             "trained Gaussians (.ply, .splat, .spz, .sog, .ksplat ...), a .spl draw list,\n"
-             "or a built-in scene (default: builtin:object; `vrpipe scenes` lists them);\n"
-             "with NAME=FILE the file takes the place of a built-in scene and has its\n"
-             "size: train=model.ply",
-             scene_group);
-  add_option(app, "--mesh", meshes_, "FILE",
-             "an opaque triangle mesh that is drawn with the scene: .obj, .ply, .gltf or\n"
-             ".glb, in the world of its Gaussians; can be repeated (docs/meshes.md)",
-             scene_group);
-  add_option(app, "--size", size_, "WxH",
-             "image size, pixels, each side 1 to 16384 (default: the scene's or the\n"
-             "camera's own, 1280x720 for a file without a camera)",
-             scene_group);
-  add_option(app, "--camera", camera_, "FILE[#INDEX|#NAME]",
-             "a cameras.json (INRIA), a transforms.json (NeRF, nerfstudio) or the folder of\n"
-             "a COLMAP model, and which camera of it, by number or by its image's name\n"
-             "(default: #0; docs/cameras.md)",
-             scene_group);
-  add_option(app, "--eye", eye_, "X,Y,Z", "where the camera stands, world units (default: chosen to fit the scene)",
-             scene_group);
-  add_option(app, "--look-at", look_at_, "X,Y,Z", "the point in the middle of the image, world units", scene_group);
-  add_option(app, "--up", up_, "X,Y,Z",
-             "the world's up direction (default: 0,-1,0, since y points down in INRIA\n"
-             "scenes; 0,1,0 for y-up files)",
-             scene_group);
-  add_option(app, "--fovy", fovy_, "DEGREES", "vertical field of view (default: the scene's own, 50 for a file)",
-             scene_group);
-  // For --print-config; help says defaults in words.
-  app.get_option("--scene")->default_str("builtin:object");
+void SimulationArguments::declare_scene(Arguments& arguments) {
+  arguments
+      .add_option("--scene", scene_, "FILE|builtin:NAME|NAME=FILE",
+                  "trained Gaussians (.ply, .splat, .spz, .sog, .ksplat ...), a .spl draw list,\n"
+                  "or a built-in scene (default: builtin:object; `vrpipe scenes` lists them);\n"
+                  "with NAME=FILE the file takes the place of a built-in scene and has its\n"
+                  "size: train=model.ply",
+                  scene_group)
+      .default_text = "builtin:object";
+  arguments.add_option("--mesh", meshes_, "FILE",
+                       "an opaque triangle mesh that is drawn with the scene: .obj, .ply, .gltf or\n"
+                       ".glb, in the world of its Gaussians; can be repeated (docs/meshes.md)",
+                       scene_group);
+  arguments.add_option("--size", size_, "WxH",
+                       "image size, pixels, each side 1 to 16384 (default: the scene's or the\n"
+                       "camera's own, 1280x720 for a file without a camera)",
+                       scene_group);
+  arguments.add_option("--camera", camera_, "FILE[#INDEX|#NAME]",
+                       "a cameras.json (INRIA), a transforms.json (NeRF, nerfstudio) or the folder of\n"
+                       "a COLMAP model, and which camera of it, by number or by its image's name\n"
+                       "(default: #0; docs/cameras.md)",
+                       scene_group);
+  arguments.add_option("--eye", eye_, "X,Y,Z",
+                       "where the camera stands, world units (default: chosen to fit the scene)", scene_group);
+  arguments.add_option("--look-at", look_at_, "X,Y,Z", "the point in the middle of the image, world units",
+                       scene_group);
+  arguments.add_option("--up", up_, "X,Y,Z",
+                       "the world's up direction (default: 0,-1,0, since y points down in INRIA\n"
+                       "scenes; 0,1,0 for y-up files)",
+                       scene_group);
+  arguments.add_option("--fovy", fovy_, "DEGREES", "vertical field of view (default: the scene's own, 50 for a file)",
+                       scene_group);
 }
 
-void SimulationArguments::declare_variant(CLI::App& app) {
-  add_option(app, "--variant", variant_, "NAME|NAME=BASE,...",
-             "baseline, qm (quad merging), het (hardware early termination) or\n"
-             "het+qm, or one of your own, as in mine=het+qm,qru=same-splat,tc.bins=64\n"
-             "(default: " +
-                 variant_default + "; docs/configuration.md)",
-             machine_group)
-      ->default_str(variant_default);
+void SimulationArguments::declare_variant(Arguments& arguments) {
+  arguments
+      .add_option("--variant", variant_, "NAME|NAME=BASE,...",
+                  "baseline, qm (quad merging), het (hardware early termination) or\n"
+                  "het+qm, or one of your own, as in mine=het+qm,qru=same-splat,tc.bins=64\n"
+                  "(default: " +
+                      variant_default + "; docs/configuration.md)",
+                  machine_group)
+      .default_text = variant_default;
 }
 
-void SimulationArguments::declare_rules(CLI::App& app) {
-  declare_fidelity(app);
-  add_option(app, "--effects", effects_, "LIST",
-             "what is simulated: auto, what the frame calls for; approximate, of that\n"
-             "nothing whose absence is bounded; all; or a list, as in all,-raster.hi_z,\n"
-             "where -NAME is left out (docs/effects.md; `vrpipe units --effects` lists\n"
-             "them) (default: auto)",
-             rules_group);
-  add_option(app, "--format", format_, "NAME", "colour target: rgba8, rgba16f or rgba32f (default: rgba16f)",
-             rules_group);
-  add_option(app, "--termination", termination_, "NAME",
-             "when a termination bit counts: paper (once its update has travelled) or\n"
-             "strict (order alone decides) (default: paper)",
-             rules_group);
-  for (const auto& [name, usual] :
-       {std::pair{"--effects", "auto"}, std::pair{"--format", "rgba16f"}, std::pair{"--termination", "paper"}}) {
-    app.get_option(name)->default_str(usual);
-  }
+void SimulationArguments::declare_rules(Arguments& arguments) {
+  declare_fidelity(arguments);
+  arguments
+      .add_option("--effects", effects_, "LIST",
+                  "what is simulated: auto, what the frame calls for; approximate, of that\n"
+                  "nothing whose absence is bounded; all; or a list, as in all,-raster.hi_z,\n"
+                  "where -NAME is left out (docs/effects.md; `vrpipe units --effects` lists\n"
+                  "them) (default: auto)",
+                  rules_group)
+      .default_text = "auto";
+  arguments
+      .add_option("--format", format_, "NAME", "colour target: rgba8, rgba16f or rgba32f (default: rgba16f)",
+                  rules_group)
+      .default_text = "rgba16f";
+  arguments
+      .add_option("--termination", termination_, "NAME",
+                  "when a termination bit counts: paper (once its update has travelled) or\n"
+                  "strict (order alone decides) (default: paper)",
+                  rules_group)
+      .default_text = "paper";
 }
 
-void SimulationArguments::declare_study(CLI::App& app) {
-  declare_scene(app);
-  add_option(app, "--define", definitions_, "NAME=BASE,...", "", "");
-  declare_platform(app);
-  declare_variant(app);
-  declare_changes(app);
-  declare_rules(app);
-  declare_json(app);
-  declare_jobs(app);
+void SimulationArguments::declare_study(Arguments& arguments) {
+  declare_scene(arguments);
+  arguments.add_option("--define", definitions_, "NAME=BASE,...", "", "");
+  declare_platform(arguments);
+  declare_variant(arguments);
+  declare_changes(arguments);
+  declare_rules(arguments);
+  declare_result_json(arguments, json_);
+  declare_jobs(arguments, jobs_);
 }
 
-void SimulationArguments::declare(CLI::App& app, Variants variants) {
-  declare_scene(app);
-  declare_config(app);
-  add_option(app, "--define", definitions_, "NAME=BASE,...", "", "");
-  declare_platform(app);
-  if (variants == Variants::one) declare_variant(app);
-  declare_changes(app);
-  declare_rules(app);
-  add_option(app, "--output", output_, "DIR",
-             "writes SCENE-VARIANT.png (8 bit, over the background) and .exr (RGBA\n"
-             "float, premultiplied, no background) there; created if missing",
-             result_group);
-  add_option(app, "--background", background_, "R,G,B", "behind the PNG, each 0 to 1 (default: 0,0,0)", result_group)
-      ->default_str("0,0,0");
-  declare_json(app);
-  add_option(app, "--save-draw", save_draw_, "FILE.spl",
-             "writes the draw after preprocessing; --scene FILE.spl takes it in again", result_group);
-  if (variants == Variants::all) declare_jobs(app);
+void SimulationArguments::declare(Arguments& arguments, Variants variants) {
+  declare_scene(arguments);
+  declare_config(arguments);
+  arguments.add_option("--define", definitions_, "NAME=BASE,...", "", "");
+  declare_platform(arguments);
+  if (variants == Variants::one) declare_variant(arguments);
+  declare_changes(arguments);
+  declare_rules(arguments);
+  arguments.add_option("--output", output_, "DIR",
+                       "writes SCENE-VARIANT.png (8 bit, over the background) and .exr (RGBA\n"
+                       "float, premultiplied, no background) there; created if missing",
+                       result_group);
+  arguments
+      .add_option("--background", background_, "R,G,B", "behind the PNG, each 0 to 1 (default: 0,0,0)", result_group)
+      .default_text = "0,0,0";
+  declare_result_json(arguments, json_);
+  arguments.add_option("--save-draw", save_draw_, "FILE.spl",
+                       "writes the draw after preprocessing; --scene FILE.spl takes it in again", result_group);
+  if (variants == Variants::all) declare_jobs(arguments, jobs_);
 }
 
-void SimulationArguments::declare_comparison(CLI::App& app) {
+void SimulationArguments::declare_comparison(Arguments& arguments) {
   compares_any_ = true;
-  app.get_option("--platform")
-      ->description("the GPU (default: " + platforms().front().name +
-                    "; `vrpipe platforms` lists them); can be\nrepeated: every variant on every platform");
-  add_option(app, "--variant", variant_, "NAME|NAME=BASE,...",
-             "what is compared: baseline, qm, het, het+qm, or one of your own, as in\n"
-             "mine=het+qm,qru=same-splat,tc.bins=64; can be repeated (default: those four,\n"
-             "and those of plugins and of --config; docs/configuration.md)",
-             machine_group);
-  add_option(app, "--relative-to", relative_to_, "NAME",
-             "over what speed-ups are: a variant, or PLATFORM/VARIANT where there are\n"
-             "several platforms (default: the first)",
-             result_group);
+  arguments.find("--platform")->help =
+      "the GPU (default: " + platforms().front().name +
+      "; `vrpipe platforms` lists them); can be\nrepeated: every variant on every platform";
+  arguments.add_option("--variant", variant_, "NAME|NAME=BASE,...",
+                       "what is compared: baseline, qm, het, het+qm, or one of your own, as in\n"
+                       "mine=het+qm,qru=same-splat,tc.bins=64; can be repeated (default: those four,\n"
+                       "and those of plugins and of --config; docs/configuration.md)",
+                       machine_group);
+  arguments.add_option("--relative-to", relative_to_, "NAME",
+                       "over what speed-ups are: a variant, or PLATFORM/VARIANT where there are\n"
+                       "several platforms (default: the first)",
+                       result_group);
 }
 
-void SimulationArguments::declare_machine(CLI::App& app) {
-  declare_config(app);
-  declare_platform(app);
-  declare_changes(app);
-  declare_fidelity(app);
-  declare_json(app);
-  declare_jobs(app);
+void SimulationArguments::declare_machine(Arguments& arguments) {
+  declare_config(arguments);
+  declare_platform(arguments);
+  declare_changes(arguments);
+  declare_fidelity(arguments);
+  declare_result_json(arguments, json_);
+  declare_jobs(arguments, jobs_);
 }
 
-void SimulationArguments::declare_platform(CLI::App& app) {
-  add_option(app, "--platform", platform_, "NAME",
-             "the GPU (default: " + platforms().front().name + "; `vrpipe platforms` lists them)", machine_group)
-      ->default_str(platforms().front().name);
+void SimulationArguments::declare_platform(Arguments& arguments) {
+  arguments
+      .add_option("--platform", platform_, "NAME",
+                  "the GPU (default: " + platforms().front().name + "; `vrpipe platforms` lists them)", machine_group)
+      .default_text = platforms().front().name;
 }
 
-void SimulationArguments::declare_changes(CLI::App& app) {
-  add_option(app, "--set", settings_, "UNIT.PARAMETER=VALUE",
-             "changes a parameter, e.g. tc.bins=64, or crop.cache_bytes=32K; can be\n"
-             "repeated (`vrpipe units` lists all, with units, ranges and defaults)",
-             machine_group);
-  add_option(app, "--unit", units_, "SLOT=IMPLEMENTATION",
-             "puts another unit into a slot, in every variant where the slot is not\n"
-             "pass-through; can be repeated",
-             machine_group);
-  add_option(app, "--plugin", plugins_, "FILE.so", "loads units from a plugin, for --unit; can be repeated",
-             machine_group);
+void SimulationArguments::declare_changes(Arguments& arguments) {
+  arguments.add_option("--set", settings_, "UNIT.PARAMETER=VALUE",
+                       "changes a parameter, e.g. tc.bins=64, or crop.cache_bytes=32K; can be\n"
+                       "repeated (`vrpipe units` lists all, with units, ranges and defaults)",
+                       machine_group);
+  arguments.add_option("--unit", units_, "SLOT=IMPLEMENTATION",
+                       "puts another unit into a slot, in every variant where the slot is not\n"
+                       "pass-through; can be repeated",
+                       machine_group);
+  arguments.add_option("--plugin", plugins_, "FILE.so", "loads units from a plugin, for --unit; can be repeated",
+                       machine_group);
 }
 
-void SimulationArguments::declare_fidelity(CLI::App& app) {
-  add_option(app, "--fidelity", fidelity_, "NAME",
-             "how exact time is, from images and counts alone to every unit in every\n"
-             "cycle: " +
-                 names_of(fidelities()) + " (default: cycle)",
-             rules_group)
-      ->default_str(vrpipe::name_of(Fidelity::cycle));
+void SimulationArguments::declare_fidelity(Arguments& arguments) {
+  arguments
+      .add_option("--fidelity", fidelity_, "NAME",
+                  "how exact time is, from images and counts alone to every unit in every\n"
+                  "cycle: " +
+                      names_of(fidelities()) + " (default: cycle)",
+                  rules_group)
+      .default_text = vrpipe::name_of(Fidelity::cycle);
 }
 
-void SimulationArguments::declare_json(CLI::App& app) {
-  add_option(app, "--json", json_, "FILE|-", "writes the result as JSON; `-`: to stdout, and nothing else there",
-             result_group);
+void SimulationArguments::declare_page(Arguments& arguments) {
+  arguments.add_option(html_option, html_, "FILE",
+                       "writes a page: pictures, speed-ups, where quads and cycles went, all settings;\n"
+                       "it needs no network (docs/results.md)",
+                       result_group);
 }
 
-void SimulationArguments::declare_page(CLI::App& app) {
-  add_option(app, html_option, html_, "FILE",
-             "writes a page: pictures, speed-ups, where quads and cycles went, all settings;\n"
-             "it needs no network (docs/results.md)",
-             result_group);
+void SimulationArguments::declare_frames(Arguments& arguments) {
+  arguments.add_option("--frame", frame_, "FILE.json",
+                       "in place of --scene: clears and draws of scenes, each with a state of its\n"
+                       "own (docs/frames.md)",
+                       scene_group);
+  arguments.add_option("--multi-pass", passes_, "N",
+                       "early termination by software: the splats in N batches, after each but the\n"
+                       "last a draw that sets the stencil where a pixel has terminated (default: 1;\n"
+                       "docs/early-termination.md)",
+                       scene_group);
 }
 
-void SimulationArguments::declare_jobs(CLI::App& app) {
-  add_option(app, "--jobs", jobs_, "N",
-             "simulations at a time, each a process of its own (default: one for each\n"
-             "processor; results do not depend on it)",
-             result_group);
-}
-
-void SimulationArguments::declare_frames(CLI::App& app) {
-  add_option(app, "--frame", frame_, "FILE.json",
-             "in place of --scene: clears and draws of scenes, each with a state of its\n"
-             "own (docs/frames.md)",
-             scene_group);
-  add_option(app, "--multi-pass", passes_, "N",
-             "early termination by software: the splats in N batches, after each but the\n"
-             "last a draw that sets the stencil where a pixel has terminated (default: 1;\n"
-             "docs/early-termination.md)",
-             scene_group);
-}
-
-void SimulationArguments::declare_views(CLI::App& app) {
-  add_option(app, ViewsChoice::option, views_, "N|all",
-             "the scene from N cameras evenly spaced among those of --camera FILE, or from\n"
-             "all of them; without a file, from N round the scene. Reports how speed-ups\n"
-             "and early-termination ratios are distributed. Goes on where it was\n"
-             "interrupted (docs/cameras.md)",
-             scene_group);
-  add_option(app, ViewsChoice::journal_option, journal_, "FILE",
-             "where --views stores what is done, and goes on from; it stays (default: a\n"
-             "file in the user's cache folder, removed at the end)",
-             result_group);
+void SimulationArguments::declare_views(Arguments& arguments) {
+  arguments.add_option(ViewsChoice::option, views_, "N|all",
+                       "the scene from N cameras evenly spaced among those of --camera FILE, or from\n"
+                       "all of them; without a file, from N round the scene. Reports how speed-ups\n"
+                       "and early-termination ratios are distributed. Goes on where it was\n"
+                       "interrupted (docs/cameras.md)",
+                       scene_group);
+  arguments.add_option(ViewsChoice::journal_option, journal_, "FILE",
+                       "where --views stores what is done, and goes on from; it stays (default: a\n"
+                       "file in the user's cache folder, removed at the end)",
+                       result_group);
 }
 
 std::optional<ViewsChoice> SimulationArguments::views() const {
@@ -344,7 +307,6 @@ std::optional<ViewsChoice> SimulationArguments::views() const {
                       "give a number, or a camera file");
     }
   } else {
-    constexpr unsigned most_views = 100'000;
     try {
       choice.count = parse_count(*text, ViewsChoice::option, most_views);
     } catch (const UserError&) {
@@ -357,14 +319,13 @@ std::optional<ViewsChoice> SimulationArguments::views() const {
   return choice;
 }
 
-void SimulationArguments::declare_energy(CLI::App& app) {
-  app.add_flag("--energy", energy_, "reports what each run spends, mJ by unit, with its range (docs/energy.md)")
-      ->disable_flag_override()
-      ->group(result_group);
-  add_option(app, energies_option, energies_, "FILE.toml",
-             "--energy by a table of your own (`vrpipe energies --toml` prints the one that\n"
-             "vrpipe comes with)",
-             result_group);
+void SimulationArguments::declare_energy(Arguments& arguments) {
+  arguments.add_flag("--energy", energy_, "reports what each run spends, mJ by unit, with its range (docs/energy.md)",
+                     result_group);
+  arguments.add_option(energies_option, energies_, "FILE.toml",
+                       "--energy by a table of your own (`vrpipe energies --toml` prints the one that\n"
+                       "vrpipe comes with)",
+                       result_group);
 }
 
 std::shared_ptr<const EnergyTable> SimulationArguments::energies(const Platform& platform) const {
@@ -376,12 +337,11 @@ std::shared_ptr<const EnergyTable> SimulationArguments::energies(const Platform&
   return table;
 }
 
-void SimulationArguments::declare_explanation(CLI::App& app) {
-  app.add_flag("--explain-effects", explain_effects_,
-               "measures what each effect that was left out would cost the host: repeats\n"
-               "the run with it taken in, three times, and with all (docs/effects.md)")
-      ->disable_flag_override()
-      ->group(result_group);
+void SimulationArguments::declare_explanation(Arguments& arguments) {
+  arguments.add_flag("--explain-effects", explain_effects_,
+                     "measures what each effect that was left out would cost the host: repeats\n"
+                     "the run with it taken in, three times, and with all (docs/effects.md)",
+                     result_group);
 }
 
 SceneRequest SimulationArguments::scene_request() const {
@@ -431,8 +391,8 @@ std::vector<NamedFile> SimulationArguments::inputs(const FrameDescription& frame
   return files;
 }
 
-void SimulationArguments::declare_time(CLI::App& app, Variants variants) {
-  time_.declare(app, "What is seen in its course", variants == Variants::one);
+void SimulationArguments::declare_time(Arguments& arguments, Variants variants) {
+  time_.declare(arguments, "What is seen in its course", variants == Variants::one);
 }
 
 void SimulationArguments::check_explanation(const EffectChoice& effects) const {
@@ -492,7 +452,7 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
   if (const auto file = single(save_draw_, "--save-draw")) job.save_draw = *file;
   job.inputs = inputs(job.frame);
 
-  job.processes = processes();
+  job.processes = processes(jobs_);
   time_.observe(job);
   return job;
 }
@@ -517,7 +477,7 @@ MachineJob SimulationArguments::resolve_machine(const Invocation& invocation) co
     check_configuration(job.request);
   }
   job.json = single(json_, "--json");
-  job.processes = processes();
+  job.processes = processes(jobs_);
   for (const std::string& plugin : plugins_) job.inputs.push_back({"--plugin", plugin});
   return job;
 }
@@ -578,12 +538,6 @@ std::vector<RunRequest> SimulationArguments::requests(const RunRequest& common, 
     }
   }
   return all;
-}
-
-unsigned SimulationArguments::processes() const {
-  const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
-  const auto jobs = single(jobs_, "--jobs");
-  return jobs ? parse_count(*jobs, "--jobs", 1024) : processors;
 }
 
 }  // namespace vrpipe::tools

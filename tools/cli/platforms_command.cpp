@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/platforms/simulation.h>
@@ -18,10 +17,10 @@ class PlatformsCommand : public Command {
   std::string name() const override { return "platforms"; }
   std::string summary() const override { return "the GPUs that can be simulated, and where they differ"; }
 
-  void declare(CLI::App& app) override {
-    add_option(app, "--plugin", plugins_, "FILE.so", "loads a plugin first; can be repeated", "On which GPU");
-    declare_json(app, json_);
-    app.footer("Example:\n  vrpipe compare --platform mobile");
+  void declare(Arguments& arguments) override {
+    arguments.add_option("--plugin", plugins_, "FILE.so", "loads a plugin first; can be repeated", machine_group);
+    declare_json(arguments, json_, "list");
+    arguments.set_footer("Example:\n  vrpipe compare --platform mobile");
   }
 
   void run() override {

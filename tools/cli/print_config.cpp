@@ -7,7 +7,6 @@
 #include <filesystem>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/platforms/netlist.h>
@@ -70,9 +69,9 @@ std::filesystem::path from_the_root(const std::filesystem::path& file) {
 }
 
 /// What help says of an option that is not given.
-std::string default_of(const CLI::Option& option) {
+std::string default_of(const Option& option) {
   const std::string start = "(default: ";
-  std::string text = option.get_description();
+  std::string text = option.help;
   const std::size_t begin = text.find(start);
   if (begin == std::string::npos) return "not given";
   std::size_t end = begin;
@@ -92,11 +91,11 @@ class Writer {
 
   std::string options() const {
     std::string text;
-    for (const CLI::Option* option : invocation_.app->get_options()) {
-      if (option->get_group().empty() || option->get_lnames().empty()) continue;
-      const std::string& name = option->get_lnames().front();
-      if (name == "help" || name == "config" || name == "print-config" || name == "set" || name == "unit") continue;
-      text += option_line(*option, name);
+    for (const Option& option : invocation_.arguments->options()) {
+      if (option.group.empty() || option.kind == Option::Kind::positional) continue;
+      const std::string name = option.name.substr(2);
+      if (name == "config" || name == "print-config" || name == "set" || name == "unit") continue;
+      text += option_line(option, name);
     }
     return text;
   }
@@ -164,22 +163,21 @@ class Writer {
                                                                         : std::string("command line");
   }
 
-  std::string option_line(const CLI::Option& option, const std::string& name) const {
-    const std::string usual = option.get_default_str();
-    if (option.count() == 0 && (usual.empty() || option.get_expected_max() == 0)) {
+  std::string option_line(const Option& option, const std::string& name) const {
+    if (!option.is_given() && option.default_text.empty()) {
       return fmt::format("{:<{}} # {}\n", "# " + name, comment_column, default_of(option));
     }
-    if (option.count() == 0) return line_of(name, value_text(usual), "default");
-    if (option.get_expected_max() == 0) return line_of(name, "true", given("--" + name));
+    if (!option.is_given()) return line_of(name, value_text(option.default_text), "default");
+    if (option.kind == Option::Kind::flag) return line_of(name, "true", given(option.name));
     std::vector<std::string> values;
-    for (const std::string& text : option.results()) {
+    for (const std::string& text : option.texts) {
       // A variant that is defined where it is chosen stands below.
       const bool defines = name == "variant" && text.find('=') != std::string::npos;
       const std::string value = defines ? text.substr(0, text.find('=')) : with_file_of(option, text, from_the_root);
-      values.push_back(option.results().size() == 1 ? value_text(value) : quoted(value));
+      values.push_back(option.texts.size() == 1 ? value_text(value) : quoted(value));
     }
     const std::string value = values.size() == 1 ? values.front() : fmt::format("[{}]", fmt::join(values, ", "));
-    return line_of(name, value, given("--" + name));
+    return line_of(name, value, given(option.name));
   }
 
   std::string parameter_line(const std::string& name, const std::string& value, const Platform* platform) const {
@@ -191,7 +189,7 @@ class Writer {
       });
     };
     if (platform != nullptr && has(platform->settings)) origin = "platform";
-    for (const std::string& text : invocation_.app->get_option("--set")->results()) {
+    for (const std::string& text : invocation_.arguments->find("--set")->texts) {
       const std::string key = text.substr(0, text.find('='));
       if (key == name || key == without_gpc(name)) origin = given("--set", key);
     }
@@ -205,8 +203,8 @@ class Writer {
 }  // namespace
 
 bool prints_config(const Invocation& invocation) {
-  const CLI::Option* const option = invocation.app->get_option_no_throw("--print-config");
-  return option != nullptr && option->count() > 0;
+  const Option* const option = invocation.arguments->find("--print-config");
+  return option != nullptr && option->is_given();
 }
 
 std::string config_text(const Invocation& invocation, const std::vector<RunRequest>& requests,
@@ -214,7 +212,7 @@ std::string config_text(const Invocation& invocation, const std::vector<RunReque
   const Writer writer(invocation, requests);
   return fmt::format(
              "# `vrpipe {} --config THIS_FILE` does this; vrpipe {}. After each value is where it comes from.\n\n",
-             invocation.app->get_name(), VRPIPE_VERSION) +
+             invocation.arguments->command(), VRPIPE_VERSION) +
          writer.options() + writer.units() + writer.variants() + writer.parameters(preprocess);
 }
 

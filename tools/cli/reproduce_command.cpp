@@ -1,11 +1,8 @@
-#include <algorithm>
 #include <filesystem>
 #include <iostream>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/component/error.h>
@@ -30,11 +27,6 @@
 namespace vrpipe::tools {
 namespace {
 
-constexpr const char* scenes_group = "What is drawn";
-constexpr const char* machine_group = "On which GPU";
-constexpr const char* results_group = "Where results go";
-constexpr unsigned most_views = 100'000;
-
 /// NAME=FILE[#CAMERA].
 std::pair<std::string, std::string> camera_of_scene(const std::string& text) {
   const std::size_t equals = text.find('=');
@@ -50,46 +42,42 @@ class ReproduceCommand : public Command {
   std::string name() const override { return "reproduce"; }
   std::string summary() const override { return "the paper's numbers beside what is measured here"; }
 
-  void declare(CLI::App& app) override {
-    declare_config(app);
-    app.add_flag("--quick", quick_,
-                 "a first answer in less than 3 minutes: everything at lt, two views, and of the\n"
-                 "open parameters those that matter most")
-        ->disable_flag_override()
-        ->group(scenes_group);
-    add_option(app, "--scene", scenes_, "NAME=FILE",
-               "a trained model in the place of a scene's stand-in, e.g. train=model.ply;\n"
-               "can be repeated",
-               scenes_group);
-    add_option(app, "--camera", cameras_, "NAME=FILE[#CAMERA]",
-               "cameras of such a model; the views are of this file, too; can be repeated", scenes_group);
-    add_option(app, "--size", size_, "WxH", "image size of every scene, pixels (default: the paper's)", scenes_group);
-    add_option(app, "--views", views_, "N", "views of each scene for early-termination ratios (default: 6)",
-               scenes_group);
-    add_option(app, "--platform", platform_, "NAME", "the GPU (default: " + platforms().front().name + ")",
-               machine_group);
-    add_option(app, "--set", settings_, "UNIT.PARAMETER=VALUE",
-               "changes a parameter of every simulation; can be repeated", machine_group);
-    add_option(app, "--fidelity", fidelity_, "NAME",
-               "of the main comparison: lt, at or cycle (default: cycle, with --quick lt); the\n"
-               "sensitivity is always at lt",
-               machine_group);
-    add_option(app, "--output", output_, "DIR", "writes the heat maps of fragments as PNG there; created if missing",
-               results_group);
-    add_option(app, "--json", json_, "FILE|-", "writes the result as JSON; `-`: to stdout, and nothing else there",
-               results_group);
-    add_option(app, "--html", html_, "FILE", "writes a page with plots and heat maps; it needs no network",
-               results_group);
-    add_option(app, "--markdown", markdown_, "FILE", "writes the page of the documentation", results_group);
-    add_option(app, ReproduceJob::journal_option, journal_, "FILE",
-               "where is stored what is done, to go on from after an interruption; it stays\n"
-               "(default: a file in the user's cache folder, removed at the end)",
-               results_group);
-    add_option(app, "--jobs", jobs_, "N",
-               "simulations at a time, each a process of its own (default: one for each\n"
-               "processor; results do not depend on it)",
-               results_group);
-    app.footer(
+  void declare(Arguments& arguments) override {
+    declare_config(arguments);
+    arguments.add_flag("--quick", quick_,
+                       "a first answer in less than 3 minutes: everything at lt, two views, and of the\n"
+                       "open parameters those that matter most",
+                       scene_group);
+    arguments.add_option("--scene", scenes_, "NAME=FILE",
+                         "a trained model in the place of a scene's stand-in, e.g. train=model.ply;\n"
+                         "can be repeated",
+                         scene_group);
+    arguments.add_option("--camera", cameras_, "NAME=FILE[#CAMERA]",
+                         "cameras of such a model; the views are of this file, too; can be repeated", scene_group);
+    arguments.add_option("--size", size_, "WxH", "image size of every scene, pixels (default: the paper's)",
+                         scene_group);
+    arguments.add_option("--views", views_, "N", "views of each scene for early-termination ratios (default: 6)",
+                         scene_group);
+    arguments.add_option("--platform", platform_, "NAME", "the GPU (default: " + platforms().front().name + ")",
+                         machine_group);
+    arguments.add_option("--set", settings_, "UNIT.PARAMETER=VALUE",
+                         "changes a parameter of every simulation; can be repeated", machine_group);
+    arguments.add_option("--fidelity", fidelity_, "NAME",
+                         "of the main comparison: lt, at or cycle (default: cycle, with --quick lt); the\n"
+                         "sensitivity is always at lt",
+                         machine_group);
+    arguments.add_option("--output", output_, "DIR",
+                         "writes the heat maps of fragments as PNG there; created if missing", result_group);
+    declare_result_json(arguments, json_);
+    arguments.add_option("--html", html_, "FILE", "writes a page with plots and heat maps; it needs no network",
+                         result_group);
+    arguments.add_option("--markdown", markdown_, "FILE", "writes the page of the documentation", result_group);
+    arguments.add_option(ReproduceJob::journal_option, journal_, "FILE",
+                         "where is stored what is done, to go on from after an interruption; it stays\n"
+                         "(default: a file in the user's cache folder, removed at the end)",
+                         result_group);
+    declare_jobs(arguments, jobs_);
+    arguments.set_footer(
         "Every number and statement of the paper, R1 to R32 and C1 to C13, with what is measured here, the\n"
         "difference, and whether they agree; early-termination ratios over views, utilisation, large scenes,\n"
         "heat maps, and how far the speed-ups move with what the paper leaves open. Takes a quarter of an hour\n"
@@ -168,8 +156,7 @@ class ReproduceCommand : public Command {
     job.markdown = single_path(markdown_, "--markdown");
     job.output = single_path(output_, "--output");
     job.journal = single_path(journal_, ReproduceJob::journal_option);
-    const auto jobs = single(jobs_, "--jobs");
-    job.processes = jobs ? parse_count(*jobs, "--jobs", 1024) : std::max(1U, std::thread::hardware_concurrency());
+    job.processes = processes(jobs_);
     return job;
   }
 

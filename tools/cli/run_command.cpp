@@ -1,7 +1,5 @@
 #include <iostream>
 
-#include <CLI/CLI.hpp>
-
 #include "cli/command_line.h"
 #include "cli/options.h"
 #include "cli/print_config.h"
@@ -16,14 +14,14 @@ class RunCommand : public Command {
   std::string name() const override { return "run"; }
   std::string summary() const override { return "one platform, one variant, one scene"; }
 
-  void declare(CLI::App& app) override {
-    arguments_.declare(app, SimulationArguments::Variants::one);
-    arguments_.declare_frames(app);
-    arguments_.declare_page(app);
-    arguments_.declare_energy(app);
-    arguments_.declare_explanation(app);
-    arguments_.declare_time(app, SimulationArguments::Variants::one);
-    app.footer(
+  void declare(Arguments& arguments) override {
+    arguments_.declare(arguments, SimulationArguments::Variants::one);
+    arguments_.declare_frames(arguments);
+    arguments_.declare_page(arguments);
+    arguments_.declare_energy(arguments);
+    arguments_.declare_explanation(arguments);
+    arguments_.declare_time(arguments, SimulationArguments::Variants::one);
+    arguments.set_footer(
         "Prints cycles, counts, utilization and what each unit spent its cycles on.\n"
         "\n"
         "Examples:\n"

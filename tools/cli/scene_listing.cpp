@@ -62,12 +62,9 @@ std::string description_as_text(const SceneDescription& d) {
   return text + table.text({});
 }
 
-Json array_of(const std::array<double, 3>& v) { return Json::array({v[0], v[1], v[2]}); }
-Json array_of(const Vec3& v) { return Json::array({v[0], v[1], v[2]}); }
-
 Json description_as_json(const SceneDescription& d) {
-  Json json = {{"bounds", {{"low", array_of(d.low)}, {"high", array_of(d.high)}}},
-               {"bounds_98_percent", {{"low", array_of(d.low_middle)}, {"high", array_of(d.high_middle)}}},
+  Json json = {{"bounds", {{"low", d.low}, {"high", d.high}}},
+               {"bounds_98_percent", {{"low", d.low_middle}, {"high", d.high_middle}}},
                {"percents", kDescribedPercents}};
   for (const Distribution& each : distributions(d)) json[each.name] = each.quantiles;
   return json;
@@ -145,9 +142,9 @@ SceneListing describe_scene(const std::string& scene, const std::optional<std::s
   if (!view) return listing;
   listing.text += fmt::format("\n  seen with --eye {} --look-at {} --up {} --fovy {:g}\n", triple(view->eye),
                               triple(view->look_at), triple(view->up), view->fovy_degrees);
-  listing.json["view"] = {{"eye", array_of(view->eye)},
-                          {"look_at", array_of(view->look_at)},
-                          {"up", array_of(view->up)},
+  listing.json["view"] = {{"eye", json_triple(view->eye)},
+                          {"look_at", json_triple(view->look_at)},
+                          {"up", json_triple(view->up)},
                           {"fovy_degrees", view->fovy_degrees}};
   if (preview) {
     draw_preview(scene, std::move(file), *view, *preview);

@@ -3,7 +3,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/component/error.h>
@@ -26,8 +25,7 @@
 namespace vrpipe::tools {
 namespace {
 
-Json json_triple(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
-std::string triple(const Vec3& v) { return fmt::format("{},{},{}", v[0], v[1], v[2]); }
+std::string exact_triple(const Vec3& v) { return fmt::format("{},{},{}", v[0], v[1], v[2]); }
 
 class ScenesCommand : public Command {
  public:
@@ -36,23 +34,21 @@ class ScenesCommand : public Command {
     return "the built-in scenes and the formats that are read; or what is in a file";
   }
 
-  void declare(CLI::App& app) override {
-    app.add_option("FILE", file_, "a file of Gaussians to look into, or builtin:NAME")->type_name("");
-    app.add_flag("--measure", measure_,
-                 "instead of the list, a table of what each scene asks of the pipeline:\n"
-                 "fragments per pixel, sizes of splats, early-termination ratio; takes a few\n"
-                 "minutes for all")
-        ->disable_flag_override();
-    add_option(app, "--scene", scenes_, "NAME|NAME=FILE",
-               "with --measure: this built-in scene alone, or FILE in its place; can be\n"
-               "repeated",
-               "What is measured");
-    add_option(app, "--preview", preview_, "FILE.png", "draws the scene of FILE, 480x270 pixels", "Where results go");
-    app.add_flag("--markdown", markdown_, "prints the formats that are read as a Markdown table")
-        ->disable_flag_override()
-        ->group("Where results go");
-    declare_json(app, json_);
-    app.footer(
+  void declare(Arguments& arguments) override {
+    arguments.add_positional("FILE", file_, "a file of Gaussians to look into, or builtin:NAME");
+    arguments.add_flag("--measure", measure_,
+                       "instead of the list, a table of what each scene asks of the pipeline:\n"
+                       "fragments per pixel, sizes of splats, early-termination ratio; takes a few\n"
+                       "minutes for all",
+                       other_group);
+    arguments.add_option("--scene", scenes_, "NAME|NAME=FILE",
+                         "with --measure: this built-in scene alone, or FILE in its place; can be\n"
+                         "repeated",
+                         "What is measured");
+    arguments.add_option("--preview", preview_, "FILE.png", "draws the scene of FILE, 480x270 pixels", result_group);
+    arguments.add_flag("--markdown", markdown_, "prints the formats that are read as a Markdown table", result_group);
+    declare_json(arguments, json_, "list");
+    arguments.set_footer(
         "Of a file: how many Gaussians, their SH degree, bounds, how opacities, scales and anisotropies are\n"
         "distributed, and a view that shows them.\n"
         "\n"
@@ -190,8 +186,8 @@ class ScenesCommand : public Command {
                             of_paper.dataset, of_paper.kind, grouped(of_paper.gaussians));
       }
       text += fmt::format("  --size {}x{} --eye {} --look-at {} --up {} --fovy {}\n", scene.size.width,
-                          scene.size.height, triple(scene.view.eye), triple(scene.view.look_at), triple(scene.view.up),
-                          scene.view.fovy_degrees);
+                          scene.size.height, exact_triple(scene.view.eye), exact_triple(scene.view.look_at),
+                          exact_triple(scene.view.up), scene.view.fovy_degrees);
     }
     text += formats_as_text(style);
     text += style.bold("FILE.spl") + "\n  a draw list that --save-draw wrote: its camera and size are part of it\n";

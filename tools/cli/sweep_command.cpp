@@ -3,7 +3,6 @@
 #include <iostream>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>
@@ -23,7 +22,6 @@
 namespace vrpipe::tools {
 namespace {
 
-constexpr const char* result_group = "Where results go";
 constexpr unsigned most_shards = 1'000'000;
 
 /// Of several processes that mpirun started, one says what there is to say.
@@ -62,28 +60,28 @@ class SweepCommand : public Command {
   std::string name() const override { return "sweep"; }
   std::string summary() const override { return "a study over scenes, views, platforms, variants and parameters"; }
 
-  void declare(CLI::App& app) override {
-    app.add_option("STUDY.toml", study_, "axes and points, and whatever a configuration file says (docs/studies.md)")
-        ->type_name("");
-    arguments_.declare_study(app);
-    add_option(app, "--relative-to", relative_to_, "AXIS=VALUE,...",
-               "over which point speed-ups are, e.g. variant=baseline,platform=mobile; axes of\n"
-               "what the GPU is that are not named have their first value, scene, view and\n"
-               "fidelity are the point's own (default: the first value of each)",
-               result_group);
-    add_option(app, "--csv", csv_, "FILE", "writes a row for each point", result_group);
-    add_option(app, "--jsonl", jsonl_, "FILE", "writes a line of JSON for each point", result_group);
-    add_option(app, "--html", html_, "FILE", "writes a page with a plot for each axis; it needs no network",
-               result_group);
-    add_option(app, "--shard", shard_, "I/N",
-               "simulates the points I, I + N, ... alone, into a journal of its own beside\n"
-               "--journal FILE; without --shard the same command takes in all of them",
-               result_group);
-    add_option(app, SweepJob::journal_option, journal_, "FILE",
-               "where is stored what is done, to go on from after an interruption; it stays\n"
-               "(default: a file in the user's cache folder, removed at the end)",
-               result_group);
-    app.footer(
+  void declare(Arguments& arguments) override {
+    arguments.add_positional("STUDY.toml", study_,
+                             "axes and points, and whatever a configuration file says (docs/studies.md)");
+    arguments_.declare_study(arguments);
+    arguments.add_option("--relative-to", relative_to_, "AXIS=VALUE,...",
+                         "over which point speed-ups are, e.g. variant=baseline,platform=mobile; axes of\n"
+                         "what the GPU is that are not named have their first value, scene, view and\n"
+                         "fidelity are the point's own (default: the first value of each)",
+                         result_group);
+    arguments.add_option("--csv", csv_, "FILE", "writes a row for each point", result_group);
+    arguments.add_option("--jsonl", jsonl_, "FILE", "writes a line of JSON for each point", result_group);
+    arguments.add_option("--html", html_, "FILE", "writes a page with a plot for each axis; it needs no network",
+                         result_group);
+    arguments.add_option("--shard", shard_, "I/N",
+                         "simulates the points I, I + N, ... alone, into a journal of its own beside\n"
+                         "--journal FILE; without --shard the same command takes in all of them",
+                         result_group);
+    arguments.add_option(SweepJob::journal_option, journal_, "FILE",
+                         "where is stored what is done, to go on from after an interruption; it stays\n"
+                         "(default: a file in the user's cache folder, removed at the end)",
+                         result_group);
+    arguments.set_footer(
         "Simulates every point of a study, prints which axes matter and which GPUs are worth it, and writes the\n"
         "points. Killed at any moment, the same command goes on where it was and ends with the same bytes. Several\n"
         "machines share a study by MPI (mpirun -n N vrpipe sweep ...: N processes in all) or by --shard.\n"
@@ -94,11 +92,11 @@ class SweepCommand : public Command {
         "  vrpipe sweep study.toml --journal study.jsonl --shard 2/8");
   }
 
-  std::optional<ConfigFile> configuration(CLI::App& app) const override {
+  std::optional<ConfigFile> configuration(Arguments& arguments) const override {
     if (study_.empty())
       throw UserError("missing argument", "vrpipe sweep", "there is no STUDY.toml",
                       "name a study; docs/studies.md describes it");
-    return std::optional<ConfigFile>(std::in_place, study_, app, study_keys());
+    return std::optional<ConfigFile>(std::in_place, study_, arguments, study_keys());
   }
 
   void run() override {

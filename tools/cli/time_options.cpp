@@ -3,12 +3,9 @@
 #include <algorithm>
 #include <utility>
 
-#include <CLI/CLI.hpp>
-
 #include <vrpipe/component/error.h>
 #include <vrpipe/platforms/intervals.h>
 
-#include "cli/options.h"
 #include "cli/parse.h"
 #include "host/stdout_to_stderr.h"
 
@@ -57,34 +54,33 @@ Observers& observers_of(RunRequest& request) {
 
 }  // namespace
 
-void TimeArguments::declare(CLI::App& app, const std::string& group, bool of_one_run) {
-  add_option(app, interval_option, interval_, "CYCLES",
-             "states and statistics of each interval of so many cycles, in the JSON, at the\n"
-             "fidelities lt, at and cycle (docs/time.md)",
-             group);
-  add_option(app, csv_option, interval_csv_, "FILE.csv", "the same as a table, a row for each interval", group);
-  add_option(app, statistics_option, interval_statistics_, "NAME,...",
-             "which statistics (default: where quads go, and what CROP moves): over all\n"
-             "GPCs, tc.flushes; of one, gpc1.tc.flushes; several, gpc*.tc.flushes or\n"
-             "'tc.*' (`vrpipe units` lists all)",
-             group);
+void TimeArguments::declare(Arguments& arguments, const std::string& group, bool of_one_run) {
+  arguments.add_option(interval_option, interval_, "CYCLES",
+                       "states and statistics of each interval of so many cycles, in the JSON, at the\n"
+                       "fidelities lt, at and cycle (docs/time.md)",
+                       group);
+  arguments.add_option(csv_option, interval_csv_, "FILE.csv", "the same as a table, a row for each interval", group);
+  arguments.add_option(statistics_option, interval_statistics_, "NAME,...",
+                       "which statistics (default: where quads go, and what CROP moves): over all\n"
+                       "GPCs, tc.flushes; of one, gpc1.tc.flushes; several, gpc*.tc.flushes or\n"
+                       "'tc.*' (`vrpipe units` lists all)",
+                       group);
   if (of_one_run) {
-    add_option(app, Trace::option, trace_, "FILE[@FROM:TO]",
-               "writes a trace that Perfetto (ui.perfetto.dev) opens, at the same fidelities:\n"
-               "states of units, queues, bins, warps and memory; of the cycles from FROM to\n"
-               "TO - 1 alone; either may be left out",
-               group);
-    add_option(app, EventLog::option, log_, "UNIT[@FROM:TO]",
-               "writes what a unit does to stderr, a line an event: crop, gpc0.crop; can be\n"
-               "repeated",
-               group);
-    add_option(app, EventLog::file_option, log_file_, "FILE", "writes it there instead", group);
+    arguments.add_option(Trace::option, trace_, "FILE[@FROM:TO]",
+                         "writes a trace that Perfetto (ui.perfetto.dev) opens, at the same fidelities:\n"
+                         "states of units, queues, bins, warps and memory; of the cycles from FROM to\n"
+                         "TO - 1 alone; either may be left out",
+                         group);
+    arguments.add_option(EventLog::option, log_, "UNIT[@FROM:TO]",
+                         "writes what a unit does to stderr, a line an event: crop, gpc0.crop; can be\n"
+                         "repeated",
+                         group);
+    arguments.add_option(EventLog::file_option, log_file_, "FILE", "writes it there instead", group);
   }
-  app.add_flag(HeatMaps::option, heat_maps_,
-               "with --output: writes maps of the fragments of each pixel and screen tile,\n"
-               "SCENE-VARIANT-pixels-*.png and .exr, -tiles-*.png and .exr")
-      ->disable_flag_override()
-      ->group(group);
+  arguments.add_flag(HeatMaps::option, heat_maps_,
+                     "with --output: writes maps of the fragments of each pixel and screen tile,\n"
+                     "SCENE-VARIANT-pixels-*.png and .exr, -tiles-*.png and .exr",
+                     group);
 }
 
 std::string TimeArguments::any_given() const {

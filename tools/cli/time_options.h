@@ -5,11 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "cli/arguments.h"
 #include "jobs/simulation_job.h"
-
-namespace CLI {
-class App;
-}  // namespace CLI
 
 namespace vrpipe::tools {
 
@@ -17,7 +14,7 @@ namespace vrpipe::tools {
 class TimeArguments {
  public:
   /// @param of_one_run  also those that write what one run does
-  void declare(CLI::App& app, const std::string& group, bool of_one_run);
+  void declare(Arguments& arguments, const std::string& group, bool of_one_run);
   /// An option that is given, to be named where none of them can be; empty for none.
   std::string any_given() const;
   /// Adds observers to the requests of a job, and says what they write. Its other members are final. Throws UserError.
@@ -27,8 +24,8 @@ class TimeArguments {
   std::optional<Cycle> every() const;
   void record(RunRequest& request, Cycle every) const;
 
-  std::vector<std::string> interval_, interval_csv_, interval_statistics_;
-  std::vector<std::string> trace_, log_, log_file_;
+  Values interval_, interval_csv_, interval_statistics_;
+  Values trace_, log_, log_file_;
   bool heat_maps_ = false;
 };
 

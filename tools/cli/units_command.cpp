@@ -2,7 +2,6 @@
 #include <map>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <vrpipe/component/error.h>
@@ -58,12 +57,12 @@ std::string with_unit(const std::string& value, const Parameter& parameter) {
   return value + " " + unit;
 }
 
-std::string heading(const ParameterListing& unit) {
+std::string unit_heading(const ParameterListing& unit) {
   return unit.implementation.empty() ? unit.unit : unit.unit + "=" + unit.implementation;
 }
 
 /// How a heading calls the unit's part in a run; starts with a blank unless it is empty.
-std::string role(const ParameterListing& unit, const Used& used) {
+std::string role_in_run(const ParameterListing& unit, const Used& used) {
   if (unit.implementation.empty()) return "";
   if (used.has(unit)) return is_default(unit) ? " (default)" : " (on " + used.platform.name + ")";
   if (is_default(unit)) return " (default on other platforms)";
@@ -75,13 +74,13 @@ bool is_last_of_slot(const std::vector<ParameterListing>& units, std::size_t ind
   return index + 1 == units.size() || units[index + 1].unit != units[index].unit;
 }
 
-std::string as_text(const std::vector<ParameterListing>& units, const Used& used, const TextStyle& style) {
+std::string units_as_text(const std::vector<ParameterListing>& units, const Used& used, const TextStyle& style) {
   std::string text;
   for (std::size_t i = 0; i < units.size(); ++i) {
     const ParameterListing& unit = units[i];
     if (!text.empty()) text += '\n';
-    text += style.bold(printable(heading(unit))) + printable(role(unit, used)) + "\n  " + printable(unit.description) +
-            "\n";
+    text += style.bold(printable(unit_heading(unit))) + printable(role_in_run(unit, used)) + "\n  " +
+            printable(unit.description) + "\n";
     for (const Parameter* parameter : unit.parameters->parameters()) {
       text += fmt::format("  {} = {}", style.bold(unit.unit + "." + parameter->name()),
                           with_unit(parameter->value(), *parameter));
@@ -102,7 +101,7 @@ std::string as_text(const std::vector<ParameterListing>& units, const Used& used
 }
 
 /// The reference that the documentation holds, a table for each implementation.
-std::string as_markdown(const std::vector<ParameterListing>& units, const Used& used) {
+std::string units_as_markdown(const std::vector<ParameterListing>& units, const Used& used) {
   std::string text;
   std::string slot;
   for (std::size_t i = 0; i < units.size(); ++i) {
@@ -113,7 +112,8 @@ std::string as_markdown(const std::vector<ParameterListing>& units, const Used& 
       slot = chapter;
       text += "## " + slot + "\n\n";
     }
-    text += fmt::format("### `{}`{}\n\n{}.\n", heading(unit), role(unit, used), markdown_escaped(unit.description));
+    text += fmt::format("### `{}`{}\n\n{}.\n", unit_heading(unit), role_in_run(unit, used),
+                        markdown_escaped(unit.description));
     if (!unit.parameters->parameters().empty()) {
       text += "\n| parameter | default | unit | allowed | meaning | default from |\n|---|---|---|---|---|---|\n";
     }
@@ -146,7 +146,7 @@ std::map<std::string, EffectList> effects_of_others(const std::vector<ParameterL
   return others;
 }
 
-Json as_json(const std::vector<ParameterListing>& units, const EffectList& effects, const Used& used) {
+Json units_as_json(const std::vector<ParameterListing>& units, const EffectList& effects, const Used& used) {
   Json list = Json::array();
   for (const ParameterListing& unit : units) {
     Json parameters = Json::array();
@@ -189,20 +189,17 @@ class UnitsCommand : public Command {
     return "every unit, its implementations, all parameters, statistics and effects";
   }
 
-  void declare(CLI::App& app) override {
-    add_option(app, "--slot", slot_, "NAME", "only the units of this slot, e.g. tc", "What is listed");
-    add_option(app, "--platform", platform_, "NAME",
-               "values as this GPU sets them (default: " + platforms().front().name + ")", "What is listed");
-    add_option(app, "--plugin", plugins_, "FILE.so", "loads a plugin's units first; can be repeated", "What is listed");
-    declare_json(app, json_);
-    app.add_flag("--effects", effects_only_,
-                 "only effects: what can be left out, when, and what notices (docs/effects.md)")
-        ->disable_flag_override()
-        ->group("What is listed");
-    app.add_flag("--markdown", markdown_, "prints the reference as Markdown")
-        ->disable_flag_override()
-        ->group("Where results go");
-    app.footer(
+  void declare(Arguments& arguments) override {
+    arguments.add_option("--slot", slot_, "NAME", "only the units of this slot, e.g. tc", listed_group);
+    arguments.add_option("--platform", platform_, "NAME",
+                         "values as this GPU sets them (default: " + platforms().front().name + ")", listed_group);
+    arguments.add_option("--plugin", plugins_, "FILE.so", "loads a plugin's units first; can be repeated",
+                         listed_group);
+    declare_json(arguments, json_, "list");
+    arguments.add_flag("--effects", effects_only_,
+                       "only effects: what can be left out, when, and what notices (docs/effects.md)", listed_group);
+    arguments.add_flag("--markdown", markdown_, "prints the reference as Markdown", result_group);
+    arguments.set_footer(
         "Examples:\n"
         "  vrpipe units --slot crop\n"
         "  vrpipe units --effects\n"
@@ -225,7 +222,7 @@ class UnitsCommand : public Command {
     {
       const StdoutToStderr redirected;  // plugins may print while their units are made
       const Used used(platform);
-      json = as_json(units, effects, used);
+      json = units_as_json(units, effects, used);
       text = effects_only_ ? effects_alone(effects, style) : everything(units, effects, used, style);
     }
     print_listing(json, text, json_, plugins_);
@@ -238,7 +235,7 @@ class UnitsCommand : public Command {
   }
   std::string everything(const std::vector<ParameterListing>& units, const EffectList& effects, const Used& used,
                          const TextStyle& style) const {
-    std::string text = markdown_ ? as_markdown(units, used) : as_text(units, used, style);
+    std::string text = markdown_ ? units_as_markdown(units, used) : units_as_text(units, used, style);
     for (const auto& [component, some] : effects_of_others(units, effects)) {
       if (!text.empty()) text += '\n';
       text += markdown_ ? fmt::format("## {}\n\n", component) + effects_as_markdown(some)
