@@ -53,6 +53,8 @@ endif()
 # Nobody replaces a function of the library's by one of the same name.
 add_compile_options(-fno-semantic-interposition -fno-plt -fvisibility-inlines-hidden)
 add_link_options(-Wl,-Bsymbolic-functions)
+# By which cached scenes are known: g++ asks for it by default, clang++ does not.
+add_link_options(-Wl,--build-id=sha1)
 # Vectors wider than the processor's registers cross no library's boundary.
 add_compile_options(-Wno-psabi)
 add_compile_options(-Wall -Wextra -Wshadow -Wconversion)

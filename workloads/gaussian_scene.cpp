@@ -1,6 +1,9 @@
 #include <vrpipe/workloads/gaussian_scene.h>
 
+#include <sys/mman.h>
+
 #include <algorithm>
+#include <cstdlib>
 #include <limits>
 #include <memory>
 #include <new>
@@ -41,6 +44,19 @@ int checked_degree(int sh_degree) {
   return sh_degree;
 }
 
+/// Floats that are not set. Large blocks lie in huge pages, where the system has them: a fault for each of 4096 bytes takes
+/// longer than what is read into them.
+std::shared_ptr<float[]> large_block(std::size_t floats) {
+  constexpr std::size_t kHugePage = std::size_t{1} << 21U;
+  const std::size_t bytes = floats * sizeof(float);
+  if (bytes < 2 * kHugePage) return std::shared_ptr<float[]>(new float[floats]);
+  const std::size_t padded = (bytes + kHugePage - 1) / kHugePage * kHugePage;
+  void* const block = std::aligned_alloc(kHugePage, padded);
+  if (block == nullptr) throw std::bad_alloc();
+  madvise(block, padded, MADV_HUGEPAGE);
+  return std::shared_ptr<float[]>(static_cast<float*>(block), [](float* begin) { std::free(begin); });
+}
+
 /// Calls block(values, count) for the parts of a record, in the order of canonical_layout().
 template <class Block>
 void for_each_block(const GaussianAttributes& gaussian, int sh_degree, const Block& block) {
@@ -69,8 +85,7 @@ GaussianArray::GaussianArray(std::uint64_t count, int sh_degree, const std::stri
   const std::uint64_t stride = floats_per_gaussian_ * sizeof(float);
   try {
     if (count > std::numeric_limits<std::size_t>::max() / 2 / stride) throw std::bad_alloc();
-    floats_.reset(
-        new float[static_cast<std::size_t>(count) * floats_per_gaussian_]);  // not zeroed, as a vector would be
+    floats_ = large_block(static_cast<std::size_t>(count) * floats_per_gaussian_);
   } catch (const std::bad_alloc&) {
     throw UserError("cannot read scene", where,
                     "its " + std::to_string(count) + " Gaussians need " + std::to_string(stride) +

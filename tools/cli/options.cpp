@@ -121,6 +121,10 @@ void SimulationArguments::declare_scene(Arguments& arguments) {
                        scene_group);
   arguments.add_option("--fovy", fovy_, "DEGREES", "vertical field of view (default: the scene's own, 50 for a file)",
                        scene_group);
+  arguments.add_flag("--no-scene-cache", no_scene_cache_,
+                     "makes a built-in scene anew, instead of reading what the same build has made\n"
+                     "before from the user's cache folder",
+                     scene_group);
 }
 
 void SimulationArguments::declare_variant(Arguments& arguments) {
@@ -347,6 +351,7 @@ void SimulationArguments::declare_explanation(Arguments& arguments) {
 SceneRequest SimulationArguments::scene_request() const {
   SceneRequest request;
   request.scene = single(scene_, "--scene").value_or("");
+  request.scene_cache = !no_scene_cache_;
   if (const auto text = single(size_, "--size")) request.size = parse_size(*text, "--size");
   request.meshes = meshes_;
   request.camera = single(camera_, "--camera");

@@ -87,6 +87,7 @@ class SimulationArguments {
   TimeArguments time_;
   Values energies_;
   bool energy_ = false;
+  bool no_scene_cache_ = false;
   bool explain_effects_ = false;
 };
 

@@ -36,6 +36,7 @@ SceneMeasurement measure_scene(const std::string& scene) {
   SceneMeasurement measured;
   SceneRequest asked;
   asked.scene = scene;
+  asked.scene_cache = false;
   const auto start = std::chrono::steady_clock::now();
   const LoadedScene loaded = load_scene(asked);
   measured.load_seconds = seconds_since(start);

@@ -75,12 +75,12 @@ struct Header {
   BuildId build_id{};
   std::uint32_t sh_degree = 0;
   std::uint64_t count = 0;
-  std::uint64_t checksum = 0;  ///< CRC-32 of the records
+  std::uint64_t checksum = 0;  ///< Adler-32 of the records
 };
 static_assert(sizeof(Header) == 48, "without padding");
 
 std::uint64_t checksum_of(const std::byte* bytes, std::size_t count) {
-  return crc32_z(crc32_z(0, nullptr, 0), reinterpret_cast<const unsigned char*>(bytes), count);
+  return adler32_z(adler32_z(0, nullptr, 0), reinterpret_cast<const unsigned char*>(bytes), count);
 }
 
 /// Where a scene of this build is stored; none if there is no folder for it, or nothing to know the build by.
