@@ -4,6 +4,7 @@
 #include <limits>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <vrpipe/component/printable.h>
 #include <vrpipe/pipeline/registry.h>

@@ -2,6 +2,8 @@
 
 #include <iostream>
 
+#include <nlohmann/json.hpp>
+
 #include <vrpipe/component/printable.h>
 
 #include "host/output_file.h"

@@ -4,6 +4,8 @@
 #include <iostream>
 #include <string>
 
+#include <nlohmann/json.hpp>
+
 #include <vrpipe/component/printable.h>
 
 #include "host/output_file.h"

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/workloads/builtin_scenes.h>

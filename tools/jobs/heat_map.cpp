@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include <vrpipe/pipeline/payload.h>
 
 #include "image/base64.h"

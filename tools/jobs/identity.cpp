@@ -10,6 +10,8 @@
 #include <system_error>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include <vrpipe/component/printable.h>
 #include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/scene_substitution.h>

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>

@@ -2,6 +2,8 @@
 
 #include <optional>
 
+#include <nlohmann/json.hpp>
+
 namespace vrpipe::tools {
 namespace {
 

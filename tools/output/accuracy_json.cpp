@@ -4,6 +4,8 @@
 #include <optional>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
 #include <vrpipe/arithmetic/blend.h>
 
 namespace vrpipe::tools {

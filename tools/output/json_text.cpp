@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include <nlohmann/json.hpp>
+
 #include <vrpipe/component/printable.h>
 
 namespace vrpipe::tools {

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
 #include "jobs/microbench_record.h"
 #include "output/reproduce_answers.h"
 

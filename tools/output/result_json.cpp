@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
 #include <vrpipe/arithmetic/blend.h>
 #include <vrpipe/kernel/accounting.h>
 #include <vrpipe/platforms/netlist.h>

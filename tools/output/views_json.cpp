@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "jobs/comparison.h"
 
 namespace vrpipe::tools {

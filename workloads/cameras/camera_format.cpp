@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
 
 #include "../file_io.h"
 
@@ -43,6 +44,8 @@ CameraSource::CameraSource(std::string path) : path_(std::move(path)) {
   std::error_code ignored;
   is_folder_ = std::filesystem::is_directory(path_, ignored);
 }
+
+CameraSource::~CameraSource() = default;
 
 const nlohmann::json* CameraSource::json() const {
   if (is_read_ || is_folder_) return json_.get();

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/workloads/camera.h>
@@ -17,6 +17,7 @@ namespace vrpipe {
 class CameraSource {
  public:
   explicit CameraSource(std::string path);
+  ~CameraSource();
 
   const std::string& path() const { return path_; }
   bool is_folder() const { return is_folder_; }

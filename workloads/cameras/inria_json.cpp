@@ -2,6 +2,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "camera_format.h"
 
 // The cameras.json that the INRIA code writes beside what it trained: an array of cameras.

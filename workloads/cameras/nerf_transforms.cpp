@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
 
 #include <vrpipe/workloads/portable_math.h>
 

@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
 #include <vrpipe/workloads/gaussian_scene.h>
 #include <vrpipe/workloads/portable_math.h>
 

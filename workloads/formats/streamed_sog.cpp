@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "formats/attribute_codes.h"
 #include "formats/scene_format.h"
 #include "formats/sog_scene.h"
