@@ -1,6 +1,7 @@
 #include "jobs/result_encoding.h"
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
