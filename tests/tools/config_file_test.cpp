@@ -144,7 +144,7 @@ TEST_F(ConfigFile, PrintedReadsBackToTheSameRunAndTheSameFile) {
            {"compare", "--scene", "tiny.spl", "--platform", "mobile", "--variant", "baseline", "--variant",
             "x=het+qm,qru=pass-through,state.pruning_threshold=1e-5"},
            {"compare", "--scene", "tiny.spl", "--platform", "mobile", "--platform", "desktop", "--set", "tc.bins=4"},
-           {"accuracy", "--scene", "tiny.spl", "--quick", "--platform", "desktop"}}) {
+           {"accuracy", "--config", "some.toml", "--quick", "--platform", "desktop"}}) {
     const std::string text = printed(command);
     SCOPED_TRACE(text);
     write("printed.toml", text);

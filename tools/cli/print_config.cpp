@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t comment_column = 44;
 
-std::string quoted(const std::string& text) {
+std::string toml_quoted(const std::string& text) {
   std::string result = "\"";
   for (const char c : text) {
     const auto code = static_cast<unsigned char>(c);
@@ -36,7 +36,7 @@ std::string quoted(const std::string& text) {
 /// A key, bare where TOML lets it be: dots stay dots.
 std::string key_text(const std::string& key) {
   const auto is_bare = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.'; };
-  return std::all_of(key.begin(), key.end(), is_bare) ? key : quoted(key);
+  return std::all_of(key.begin(), key.end(), is_bare) ? key : toml_quoted(key);
 }
 
 /// A number, or true and false, where it reads back as this very text.
@@ -55,7 +55,7 @@ std::string value_text(const std::string& text) {
       text.find('.') != std::string::npos) {
     return text;
   }
-  return quoted(text);
+  return toml_quoted(text);
 }
 
 std::string line_of(const std::string& key, const std::string& value, const std::string& comment) {
@@ -84,9 +84,9 @@ std::string default_of(const Option& option) {
   return "default: " + text;
 }
 
-class Writer {
+class ConfigWriter {
  public:
-  Writer(const Invocation& invocation, const std::vector<RunRequest>& requests)
+  ConfigWriter(const Invocation& invocation, const std::vector<RunRequest>& requests)
       : invocation_(invocation), requests_(requests) {}
 
   std::string options() const {
@@ -103,7 +103,7 @@ class Writer {
   std::string units() const {
     std::string text;
     for (const UnitChoice& unit : requests_.front().units) {
-      text += line_of(key_text(unit.slot), quoted(unit.implementation), given("--unit", unit.slot));
+      text += line_of(key_text(unit.slot), toml_quoted(unit.implementation), given("--unit", unit.slot));
     }
     return text.empty() ? text : "\n[unit]\n" + text;
   }
@@ -114,10 +114,10 @@ class Writer {
     for (const Variant& variant : vrpipe::variants()) {
       if (variant.base.empty()) continue;
       text += fmt::format("\n[variants.{}]\n", key_text(variant.name));
-      text += line_of("base", quoted(variant.base), given("--define", variant.name));
+      text += line_of("base", toml_quoted(variant.base), given("--define", variant.name));
       // What it changes of a base that is such a variant as well is there twice, which changes nothing.
       for (const UnitChoice& unit : variant.changed_units)
-        text += fmt::format("unit.{} = {}\n", key_text(unit.slot), quoted(unit.implementation));
+        text += fmt::format("unit.{} = {}\n", key_text(unit.slot), toml_quoted(unit.implementation));
       for (const Setting& setting : variant.changed_settings) {
         text +=
             fmt::format("set.{} = {}\n", key_text(setting.unit + "." + setting.parameter), value_text(setting.value));
@@ -174,7 +174,7 @@ class Writer {
       // A variant that is defined where it is chosen stands below.
       const bool defines = name == "variant" && text.find('=') != std::string::npos;
       const std::string value = defines ? text.substr(0, text.find('=')) : with_file_of(option, text, from_the_root);
-      values.push_back(option.texts.size() == 1 ? value_text(value) : quoted(value));
+      values.push_back(option.texts.size() == 1 ? value_text(value) : toml_quoted(value));
     }
     const std::string value = values.size() == 1 ? values.front() : fmt::format("[{}]", fmt::join(values, ", "));
     return line_of(name, value, given(option.name));
@@ -209,7 +209,7 @@ bool prints_config(const Invocation& invocation) {
 
 std::string config_text(const Invocation& invocation, const std::vector<RunRequest>& requests,
                         const std::vector<std::pair<std::string, std::string>>& preprocess) {
-  const Writer writer(invocation, requests);
+  const ConfigWriter writer(invocation, requests);
   return fmt::format(
              "# `vrpipe {} --config THIS_FILE` does this; vrpipe {}. After each value is where it comes from.\n\n",
              invocation.arguments->command(), VRPIPE_VERSION) +

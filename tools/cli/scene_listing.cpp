@@ -30,13 +30,13 @@ constexpr ImageSize kPreviewSize{480, 270};
 std::string triple(const Vec3& v) { return fmt::format("{:.4g},{:.4g},{:.4g}", v[0], v[1], v[2]); }
 std::string triple(const std::array<double, 3>& v) { return fmt::format("{:.4g},{:.4g},{:.4g}", v[0], v[1], v[2]); }
 
-struct Distribution {
+struct DescribedDistribution {
   const char* name;
   const char* meaning;
   const DescribedQuantiles& quantiles;
 };
 
-std::array<Distribution, 3> distributions(const SceneDescription& description) {
+std::array<DescribedDistribution, 3> distributions(const SceneDescription& description) {
   return {{{"opacity", "0 to 1", description.opacity},
            {"scale", "longest axis, one sigma, world units", description.scale},
            {"anisotropy", "longest axis over shortest", description.anisotropy}}};
@@ -53,7 +53,7 @@ std::string description_as_text(const SceneDescription& d) {
   heading.push_back("");
   TextTable table(heading);
   table.left(heading.size() - 1);
-  for (const Distribution& each : distributions(d)) {
+  for (const DescribedDistribution& each : distributions(d)) {
     std::vector<std::string> row = {each.name};
     for (const double value : each.quantiles) row.push_back(fmt::format("{:.3g}", value));
     row.push_back(each.meaning);
@@ -66,7 +66,7 @@ Json description_as_json(const SceneDescription& d) {
   Json json = {{"bounds", {{"low", d.low}, {"high", d.high}}},
                {"bounds_98_percent", {{"low", d.low_middle}, {"high", d.high_middle}}},
                {"percents", kDescribedPercents}};
-  for (const Distribution& each : distributions(d)) json[each.name] = each.quantiles;
+  for (const DescribedDistribution& each : distributions(d)) json[each.name] = each.quantiles;
   return json;
 }
 
