@@ -19,7 +19,7 @@ using testing::TimedCropBench;
 
 class CropTimedTest : public ::testing::TestWithParam<Fidelity> {
  protected:
-  CropTimedTest() : draw(testing::draw_of(1024, 1024)), context(testing::context_of(draw)) {}
+  CropTimedTest() : draw(testing::draw_of(1024, 32)), context(testing::context_of(draw)) {}
   Draw draw;
   RenderContext context;
 };

@@ -103,7 +103,7 @@ struct CropBench {
 
 class CropUnitTest : public ::testing::Test {
  protected:
-  CropUnitTest() : draw(testing::draw_of(1024, 1024)), context(testing::context_of(draw)) {}
+  CropUnitTest() : draw(testing::draw_of(1024, 128)), context(testing::context_of(draw)) {}
   Draw draw;
   RenderContext context;
 };
@@ -418,6 +418,8 @@ TEST_F(CropUnitTest, ImageAndSignalsAreTheSameUnderAnyStallsAndMemory) {
 }
 
 TEST_F(CropUnitTest, AMemoryOfAnotherMakeIsServedToTheEndWhateverItsRefresh) {
+  draw = testing::draw_of(1024, 1024);
+  context = testing::context_of(draw);
   Bench bench("crop", "color-rop", context, {{"cache_bytes", "1024"}});
   foreign::Dram dram("dram", sc_core::sc_time(1.5, sc_core::SC_NS), sc_core::sc_time(30, sc_core::SC_NS),
                      sc_core::sc_time(75, sc_core::SC_NS));

@@ -24,7 +24,7 @@ Bench::Settings partition(const Bench::Settings& more = {}) {
 
 class CropPrices : public ::testing::TestWithParam<Fidelity> {
  protected:
-  CropPrices() : draw(testing::draw_of(2048, 2048)), context(testing::context_of(draw)) {}
+  CropPrices() : draw(testing::draw_of(2048, 32)), context(testing::context_of(draw)) {}
   Draw draw;
   RenderContext context;
 };

@@ -19,11 +19,15 @@ class LastWords : public ::testing::EmptyTestEventListener {
  public:
   LastWords() {
     owner = ::getpid();
+#if defined(VRPIPE_SANITIZED)
+    __sanitizer_set_death_callback(say);
+#else
     static std::array<char, 16384> own_stack;  // where that of a test has overflowed
     stack_t stack{};
     stack.ss_sp = own_stack.data();
     stack.ss_size = own_stack.size();
     ::sigaltstack(&stack, nullptr);
+#endif
     for (const int signal : {SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGSEGV, SIGTERM}) {
       struct sigaction former {};
       ::sigaction(signal, nullptr, &former);
@@ -34,9 +38,6 @@ class LastWords : public ::testing::EmptyTestEventListener {
       ::sigaction(signal, &action, nullptr);
     }
     std::atexit(say);
-#if defined(VRPIPE_SANITIZED)
-    __sanitizer_set_death_callback(say);
-#endif
   }
 
  private:
