@@ -60,18 +60,26 @@ minutes() { if [ "$1" -lt 60 ]; then echo "$1 s"; else echo "$(($1 / 60)) min $(
 # compilers say is shown.
 build() {
   # Batches of sources take about as long as one another, so that their number tells the time that is left.
-  NINJA_STATUS="[%f %t %e] " cmake --build "$1" --target "${@:2}" 2>&1 </dev/null | awk -v terminal="$([ -t 2 ] && echo 1)" '
-    match($0, /^\[[0-9]+ [0-9]+ [0-9.]+\] /) {
-      split(substr($0, 2, RLENGTH - 3), at, " ")
-      left = at[3] * (at[2] - at[1]) / at[1]
-      time = at[1] < 4 || at[1] == at[2] ? "" : left < 60 ? sprintf(", %d s left", left) : sprintf(", %.0f min left", left / 60)
-      said = sprintf("compiling: %d of %d steps%s", at[1], at[2], time)
-      if (terminal) printf "\r\033[K%s", said
-      else if (at[3] - before >= 20) { print said; before = at[3] }
-      fflush(); next
-    }
-    { if (terminal) printf "\r\033[K"; print; fflush() }
-    END { if (terminal) printf "\r\033[K" }' >&2
+  NINJA_STATUS="[%f %t %e] " cmake --build "$1" --target "${@:2}" 2>&1 </dev/null | {
+    local line done all seconds left said=0 clear=
+    if [ -t 2 ]; then clear=$'\r\033[K'; fi
+    while IFS= read -r line; do
+      if [[ ! $line =~ ^\[([0-9]+)\ ([0-9]+)\ ([0-9]+)\. ]]; then
+        printf '%s%s\n' "$clear" "$line"
+        continue
+      fi
+      done=${BASH_REMATCH[1]} all=${BASH_REMATCH[2]} seconds=${BASH_REMATCH[3]}
+      left=
+      if [ "$done" -gt 3 ] && [ "$done" -lt "$all" ]; then left=", $(minutes $((seconds * (all - done) / done))) left"; fi
+      if [ -n "$clear" ]; then
+        printf '%scompiling: %d of %d steps%s' "$clear" "$done" "$all" "$left"
+      elif [ $((seconds - said)) -ge 20 ]; then
+        printf 'compiling: %d of %d steps%s\n' "$done" "$all" "$left"
+        said=$seconds
+      fi
+    done
+    printf '%s' "$clear"
+  } >&2
 }
 
 # configure BINARY_DIR OPTIONS...: a cmake run, with ccache if there is one.
