@@ -28,7 +28,7 @@ class LastWords : public ::testing::EmptyTestEventListener {
     stack.ss_size = own_stack.size();
     ::sigaltstack(&stack, nullptr);
 #endif
-    for (const int signal : {SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGSEGV, SIGTERM}) {
+    for (const int signal : {SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGSEGV}) {
       struct sigaction former {};
       ::sigaction(signal, nullptr, &former);
       if (former.sa_handler != SIG_DFL) continue;  // a sanitizer's
