@@ -314,7 +314,7 @@ const SlotRegistrar crop_slot{{"crop", 100, "color-rop", "", true, check_crop}};
   return true;
 }();
 
-const EffectRegistrar late_drops{
+const EffectRegistrar late_drops_effect{
     {"crop",
      "late_drops",
      "",
@@ -329,7 +329,7 @@ const EffectRegistrar late_drops{
        if (asked.context.termination != Termination::strict) return EffectDecision::omit("termination is not strict");
        return EffectDecision::keep(fmt::format("{} draws terminate early, in strict order", asked.facts.terminating));
      }}};
-const EffectRegistrar rounding_loss{
+const EffectRegistrar rounding_loss_effect{
     {"crop",
      "rounding_loss",
      "color-rop",
@@ -340,7 +340,7 @@ const EffectRegistrar rounding_loss{
      "at the first such fragment",
      {},
      [](const EffectQuestion&) { return EffectDecision::watch("fragments whose alpha is lost to rounding"); }}};
-const EffectRegistrar saturation{
+const EffectRegistrar saturation_effect{
     {"crop",
      "saturation",
      "color-rop",
@@ -359,7 +359,7 @@ const EffectRegistrar saturation{
        const std::string numbers = fmt::format("colours up to {:.3g}; the format's largest is {:g}", here, largest);
        return here <= largest / 16 ? EffectDecision::omit(numbers) : EffectDecision::keep(numbers);
      }}};
-const EffectRegistrar blend_hazard{
+const EffectRegistrar blend_hazard_effect{
     {"crop",
      "blend_hazard",
      "",
@@ -376,7 +376,7 @@ const EffectRegistrar blend_hazard{
        return EffectDecision::keep(fmt::format("crop.forwarding=off, {} cycles", std::uint32_t{crop->latency_cycles}));
      }}};
 
-const EffectRegistrar cache_order{
+const EffectRegistrar cache_order_effect{
     {"crop",
      "cache_order",
      "color-rop",

@@ -76,21 +76,21 @@ Implementation implementation(const char* name, const char* description, const D
   return made;
 }
 
-const EffectRegistrar accesses{{"dram",
-                                "accesses",
-                                "",
-                                EffectKind::timing,
-                                "the DRAM: rows, banks, queues and buses of its channels",
-                                "there is no time (functional)",
-                                "the DRAM",
-                                "none is needed: without it nothing of a frame's result asks for it",
-                                {"dram"},
-                                [](const EffectQuestion& asked) {
-                                  if (!asked.counts_work)
-                                    return EffectDecision::omit("without time nothing waits for it");
-                                  return EffectDecision::keep("what the cache above has never held, is fetched");
-                                }}};
-const EffectRegistrar refresh{
+const EffectRegistrar accesses_effect{{"dram",
+                                       "accesses",
+                                       "",
+                                       EffectKind::timing,
+                                       "the DRAM: rows, banks, queues and buses of its channels",
+                                       "there is no time (functional)",
+                                       "the DRAM",
+                                       "none is needed: without it nothing of a frame's result asks for it",
+                                       {"dram"},
+                                       [](const EffectQuestion& asked) {
+                                         if (!asked.counts_work)
+                                           return EffectDecision::omit("without time nothing waits for it");
+                                         return EffectDecision::keep("what the cache above has never held, is fetched");
+                                       }}};
+const EffectRegistrar refresh_effect{
     {"dram",
      "refresh",
      "",
@@ -124,16 +124,16 @@ const SlotRegistrar dram_slot{{"dram", 120, "lpddr3-1600", "", true, nullptr, tr
 }();
 
 // Not decided: why stands in place of a predicate.
-const EffectRegistrar bank_conflicts{{"dram",
-                                      "bank_conflicts",
-                                      "",
-                                      EffectKind::timing,
-                                      "a row has to be closed before another of its bank is opened",
-                                      "which rows are open depends on the order of requests in time",
-                                      "the state of each bank",
-                                      "",
-                                      {},
-                                      nullptr}};
+const EffectRegistrar bank_conflicts_effect{{"dram",
+                                             "bank_conflicts",
+                                             "",
+                                             EffectKind::timing,
+                                             "a row has to be closed before another of its bank is opened",
+                                             "which rows are open depends on the order of requests in time",
+                                             "the state of each bank",
+                                             "",
+                                             {},
+                                             nullptr}};
 }  // namespace
 
 }  // namespace vrpipe

@@ -47,22 +47,22 @@ namespace {
 const SlotRegistrar draw_slot{{"draw", 10, "vertex-issue", "", false, check_draw}};
 const Registrar<VertexIssue, DrawBehaviour> registrar("draw", "vertex-issue", "issues sorted splats as vertex warps",
                                                       false, Trust::trusted);
-const EffectRegistrar barriers{{"draw",
-                                "barriers",
-                                "",
-                                EffectKind::functional,
-                                "a draw that reads the colour target waits until all before it is blended",
-                                "no draw reads what another has written (BarrierPlan)",
-                                "the link crop.done",
-                                "in BarrierPlan, of which DRAW, TC and CROP each have one",
-                                {"crop.done"},
-                                [](const EffectQuestion& asked) {
-                                  if (BarrierPlan(asked.context).is_used())
-                                    return EffectDecision::keep(
-                                        fmt::format("{} draws read the colour target", asked.facts.reading_color));
-                                  return EffectDecision::omit("no draw reads what another has written");
-                                }}};
-const EffectRegistrar several_draws{
+const EffectRegistrar barriers_effect{
+    {"draw",
+     "barriers",
+     "",
+     EffectKind::functional,
+     "a draw that reads the colour target waits until all before it is blended",
+     "no draw reads what another has written (BarrierPlan)",
+     "the link crop.done",
+     "in BarrierPlan, of which DRAW, TC and CROP each have one",
+     {"crop.done"},
+     [](const EffectQuestion& asked) {
+       if (BarrierPlan(asked.context).is_used())
+         return EffectDecision::keep(fmt::format("{} draws read the colour target", asked.facts.reading_color));
+       return EffectDecision::omit("no draw reads what another has written");
+     }}};
+const EffectRegistrar several_draws_effect{
     {"draw",
      "several_draws",
      "",

@@ -71,8 +71,8 @@ Effect contents(const CacheLevel& level) {
             return keep_with_surfaces(asked, asked.as<SectoredL2Parameters>().cache.organization().bytes);
           }};
 }
-const EffectRegistrar l1_contents(contents(level_of_l1));
-const EffectRegistrar l2_contents(contents(level_of_l2));
+const EffectRegistrar l1_contents_effect(contents(level_of_l1));
+const EffectRegistrar l2_contents_effect(contents(level_of_l2));
 
 [[maybe_unused]] const bool l2_registered = [] {
   for (const CacheLevel* level : {&level_of_l1, &level_of_l2}) {
@@ -83,26 +83,26 @@ const EffectRegistrar l2_contents(contents(level_of_l2));
 }();
 
 // Not decided: why stands in place of a predicate.
-const EffectRegistrar bank_conflicts{{"l2",
-                                      "bank_conflicts",
-                                      "sectored-cache",
-                                      EffectKind::timing,
-                                      "requests for one bank wait for one another",
-                                      "that none ever does is known only once they have been simulated",
-                                      "a queue for each bank",
-                                      "",
-                                      {},
-                                      nullptr}};
-const EffectRegistrar crossbar{{"l2",
-                                "crossbar",
-                                "sectored-cache",
-                                EffectKind::timing,
-                                "requests of several ports wait for one another",
-                                "as bank_conflicts; with one port bound, its queue and width still take time",
-                                "a queue for each port",
-                                "",
-                                {},
-                                nullptr}};
+const EffectRegistrar bank_conflicts_effect{{"l2",
+                                             "bank_conflicts",
+                                             "sectored-cache",
+                                             EffectKind::timing,
+                                             "requests for one bank wait for one another",
+                                             "that none ever does is known only once they have been simulated",
+                                             "a queue for each bank",
+                                             "",
+                                             {},
+                                             nullptr}};
+const EffectRegistrar crossbar_effect{{"l2",
+                                       "crossbar",
+                                       "sectored-cache",
+                                       EffectKind::timing,
+                                       "requests of several ports wait for one another",
+                                       "as bank_conflicts; with one port bound, its queue and width still take time",
+                                       "a queue for each port",
+                                       "",
+                                       {},
+                                       nullptr}};
 }  // namespace
 
 }  // namespace vrpipe

@@ -71,7 +71,7 @@ void HiZ::update(const HiZUpdate& update) {
 }
 
 namespace {
-const EffectRegistrar hi_z{
+const EffectRegistrar hi_z_effect{
     {"raster",
      "hi_z",
      "",

@@ -308,7 +308,7 @@ const SlotRegistrar raster_slot{{"raster", 40, "tile-rasterizer", "", true, chec
 const Registrar<TileRasterizer, RasterBehaviour> registrar(
     "raster", "tile-rasterizer", "fixed-point edge functions, 8x8 raster tiles, top-left rule", false, Trust::trusted);
 
-const EffectRegistrar wide_edges{
+const EffectRegistrar wide_edges_effect{
     {"raster",
      "wide_edges",
      "tile-rasterizer",
@@ -326,21 +326,22 @@ const EffectRegistrar wide_edges{
            fmt::format("the widest edge is at most {:.0f} px; 32 bits hold {:.0f}", here, widest);
        return here < widest ? EffectDecision::omit(numbers) : EffectDecision::watch(numbers);
      }}};
-const EffectRegistrar tile_ownership{{"raster",
-                                      "tile_ownership",
-                                      "tile-rasterizer",
-                                      EffectKind::functional,
-                                      "screen tiles that belong to other GPCs: each rasterises its own",
-                                      "there is one GPC",
-                                      "a test of each screen tile",
-                                      "at elaboration, where there are others",
-                                      {},
-                                      [](const EffectQuestion& asked) {
-                                        const unsigned gpcs = asked.context.placement.gpcs;
-                                        if (gpcs == 1) return EffectDecision::omit("one GPC has all screen tiles");
-                                        return EffectDecision::keep(
-                                            fmt::format("{} GPCs share the screen tiles", gpcs));
-                                      }}};
+const EffectRegistrar tile_ownership_effect{{"raster",
+                                             "tile_ownership",
+                                             "tile-rasterizer",
+                                             EffectKind::functional,
+                                             "screen tiles that belong to other GPCs: each rasterises its own",
+                                             "there is one GPC",
+                                             "a test of each screen tile",
+                                             "at elaboration, where there are others",
+                                             {},
+                                             [](const EffectQuestion& asked) {
+                                               const unsigned gpcs = asked.context.placement.gpcs;
+                                               if (gpcs == 1)
+                                                 return EffectDecision::omit("one GPC has all screen tiles");
+                                               return EffectDecision::keep(
+                                                   fmt::format("{} GPCs share the screen tiles", gpcs));
+                                             }}};
 }  // namespace
 
 }  // namespace vrpipe

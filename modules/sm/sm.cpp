@@ -285,38 +285,38 @@ const SlotRegistrar sm_slot{{"sm", 90, "splat-shader", "", true, check_sm}};
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
                                                     "Gaussian splatting shaders with alpha pruning and quad merging",
                                                     false, Trust::trusted);
-const EffectRegistrar mesh_shading{{"sm",
-                                    "mesh_shading",
-                                    "splat-shader",
-                                    EffectKind::functional,
-                                    "shaders of meshes: vertex attributes, interpolated perspective-correct, and light",
-                                    "no draw is of a mesh",
-                                    "planes of attributes for the triangles that were shaded last",
-                                    "before a warp of a mesh is shaded",
-                                    {},
-                                    [](const EffectQuestion& asked) {
-                                      const FrameFacts& facts = asked.facts;
-                                      if (facts.of_meshes == 0) return EffectDecision::omit("no draw is of a mesh");
-                                      return EffectDecision::keep(
-                                          fmt::format("{} of {} draws are of meshes", facts.of_meshes, facts.draws));
-                                    }}};
-const EffectRegistrar color_reads{{"sm",
-                                   "color_reads",
-                                   "splat-shader",
-                                   EffectKind::functional,
-                                   "shaders that read the colour target",
-                                   "no draw has one",
-                                   "a look at the target for each quad",
-                                   "before a warp with such a shader is shaded",
-                                   {},
-                                   [](const EffectQuestion& asked) {
-                                     const FrameFacts& facts = asked.facts;
-                                     if (facts.reading_color == 0)
-                                       return EffectDecision::omit("no shader reads the colour target");
-                                     return EffectDecision::keep(fmt::format("the shaders of {} of {} draws read it",
-                                                                             facts.reading_color, facts.draws));
-                                   }}};
-const EffectRegistrar attribute_fetch{
+const EffectRegistrar mesh_shading_effect{
+    {"sm",
+     "mesh_shading",
+     "splat-shader",
+     EffectKind::functional,
+     "shaders of meshes: vertex attributes, interpolated perspective-correct, and light",
+     "no draw is of a mesh",
+     "planes of attributes for the triangles that were shaded last",
+     "before a warp of a mesh is shaded",
+     {},
+     [](const EffectQuestion& asked) {
+       const FrameFacts& facts = asked.facts;
+       if (facts.of_meshes == 0) return EffectDecision::omit("no draw is of a mesh");
+       return EffectDecision::keep(fmt::format("{} of {} draws are of meshes", facts.of_meshes, facts.draws));
+     }}};
+const EffectRegistrar color_reads_effect{
+    {"sm",
+     "color_reads",
+     "splat-shader",
+     EffectKind::functional,
+     "shaders that read the colour target",
+     "no draw has one",
+     "a look at the target for each quad",
+     "before a warp with such a shader is shaded",
+     {},
+     [](const EffectQuestion& asked) {
+       const FrameFacts& facts = asked.facts;
+       if (facts.reading_color == 0) return EffectDecision::omit("no shader reads the colour target");
+       return EffectDecision::keep(
+           fmt::format("the shaders of {} of {} draws read it", facts.reading_color, facts.draws));
+     }}};
+const EffectRegistrar attribute_fetch_effect{
     {"sm",
      "attribute_fetch",
      "",
@@ -337,28 +337,30 @@ const EffectRegistrar attribute_fetch{
      }}};
 
 // Not decided: why stands in place of a predicate.
-const EffectRegistrar alpha_pruning{{"sm",
-                                     "alpha_pruning",
-                                     "splat-shader",
-                                     EffectKind::functional,
-                                     "fragments of a small alpha are dropped",
-                                     "a fifth of a splat's oriented box lies outside the ellipse of alpha 1/255; "
-                                     "without the comparison nothing is saved",
-                                     "a comparison for eight fragments",
-                                     "",
-                                     {},
-                                     nullptr}};
-const EffectRegistrar alpha_clamp{{"sm",
-                                   "alpha_clamp",
-                                   "splat-shader",
-                                   EffectKind::functional,
-                                   "alpha is at most 0.99",
-                                   "one instruction for eight fragments: to leave it out costs as much as it saves",
-                                   "a selection",
-                                   "",
-                                   {},
-                                   nullptr}};
-const EffectRegistrar scheduling{
+const EffectRegistrar alpha_pruning_effect{
+    {"sm",
+     "alpha_pruning",
+     "splat-shader",
+     EffectKind::functional,
+     "fragments of a small alpha are dropped",
+     "a fifth of a splat's oriented box lies outside the ellipse of alpha 1/255; "
+     "without the comparison nothing is saved",
+     "a comparison for eight fragments",
+     "",
+     {},
+     nullptr}};
+const EffectRegistrar alpha_clamp_effect{
+    {"sm",
+     "alpha_clamp",
+     "splat-shader",
+     EffectKind::functional,
+     "alpha is at most 0.99",
+     "one instruction for eight fragments: to leave it out costs as much as it saves",
+     "a selection",
+     "",
+     {},
+     nullptr}};
+const EffectRegistrar scheduling_effect{
     {"sm",
      "scheduling",
      "",

@@ -88,7 +88,7 @@ namespace {
 const SlotRegistrar tc_slot{{"tc", 50, "tile-coalescing", "", false, check_tc}};
 const Registrar<TileCoalescing, TcBehaviour> registrar("tc", "tile-coalescing", "bins of quads, one per screen tile",
                                                        false, Trust::trusted);
-const EffectRegistrar eviction{
+const EffectRegistrar eviction_effect{
     {"tc",
      "eviction",
      "tile-coalescing",
@@ -105,7 +105,7 @@ const EffectRegistrar eviction{
            fmt::format("primitives touch at most {} of {} tiles; {} bins", touched, asked.facts.tiles, bins);
        return touched <= bins ? EffectDecision::omit(numbers) : EffectDecision::watch(numbers);
      }}};
-const EffectRegistrar time_out{
+const EffectRegistrar time_out_effect{
     {"tc",
      "time_out",
      "tile-coalescing",

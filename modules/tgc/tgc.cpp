@@ -146,17 +146,18 @@ const Registrar<TileGridCoalescing, TgcBehaviour> coalescing("tgc", "tile-grid-c
                                                              Trust::trusted);
 const Registrar<TgcPassThrough, TgcBehaviour> pass_through("tgc", "pass-through", "primitives go on one by one", true,
                                                            Trust::trusted);
-const EffectRegistrar binning{{"tgc",
-                               "binning",
-                               "tile-grid-coalescing",
-                               EffectKind::functional,
-                               "primitives binned by tile grids (QM): each is set up and rasterised once for each grid",
-                               "the variant does without, and its TGC passes through",
-                               "masks of samples outside the grid",
-                               "in the rasteriser, where less than a primitive's bounds is to be filled",
-                               {},
-                               [](const EffectQuestion&) { return EffectDecision::keep("TGC bins primitives"); }}};
-const EffectRegistrar eviction{
+const EffectRegistrar binning_effect{
+    {"tgc",
+     "binning",
+     "tile-grid-coalescing",
+     EffectKind::functional,
+     "primitives binned by tile grids (QM): each is set up and rasterised once for each grid",
+     "the variant does without, and its TGC passes through",
+     "masks of samples outside the grid",
+     "in the rasteriser, where less than a primitive's bounds is to be filled",
+     {},
+     [](const EffectQuestion&) { return EffectDecision::keep("TGC bins primitives"); }}};
+const EffectRegistrar eviction_effect{
     {"tgc",
      "eviction",
      "tile-grid-coalescing",

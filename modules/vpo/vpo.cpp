@@ -69,44 +69,45 @@ const SlotRegistrar vpo_slot{{"vpo", 20, "primitive-assembly", "", false, check_
 const Registrar<PrimitiveAssembly, VpoBehaviour> registrar("vpo", "primitive-assembly",
                                                            "two triangles per splat, culled and boxed", false,
                                                            Trust::trusted);
-const EffectRegistrar face_culling{{"vpo",
-                                    "face_culling",
-                                    "",
-                                    EffectKind::functional,
-                                    "triangles of meshes that face away are dropped",
-                                    "no draw of a mesh culls",
-                                    "the facing of each triangle",
-                                    "where a triangle is to be dropped",
-                                    {},
-                                    [](const EffectQuestion& asked) {
-                                      const FrameFacts& facts = asked.facts;
-                                      if (facts.culling_faces == 0)
-                                        return EffectDecision::omit("no draw of a mesh culls");
-                                      return EffectDecision::keep(
-                                          fmt::format("{} of {} draws cull", facts.culling_faces, facts.draws));
-                                    }}};
+const EffectRegistrar face_culling_effect{{"vpo",
+                                           "face_culling",
+                                           "",
+                                           EffectKind::functional,
+                                           "triangles of meshes that face away are dropped",
+                                           "no draw of a mesh culls",
+                                           "the facing of each triangle",
+                                           "where a triangle is to be dropped",
+                                           {},
+                                           [](const EffectQuestion& asked) {
+                                             const FrameFacts& facts = asked.facts;
+                                             if (facts.culling_faces == 0)
+                                               return EffectDecision::omit("no draw of a mesh culls");
+                                             return EffectDecision::keep(
+                                                 fmt::format("{} of {} draws cull", facts.culling_faces, facts.draws));
+                                           }}};
 
 // Not decided: why stands in place of a predicate.
-const EffectRegistrar clipping{{"vpo",
-                                "clipping",
-                                "",
-                                EffectKind::functional,
-                                "splats beyond the guard band are cut to it",
-                                "whether a corner is outside is what is tested for anyway; only what is, is cut",
-                                "a comparison for each corner",
-                                "",
-                                {},
-                                nullptr}};
-const EffectRegistrar not_finite{{"vpo",
-                                  "not_finite",
-                                  "",
-                                  EffectKind::functional,
-                                  "splats with a NaN or an infinity are dropped",
-                                  "the test is the tripwire; a frame of them is rare, and a picture of them wrong",
-                                  "a test of a splat's eleven numbers",
-                                  "",
-                                  {},
-                                  nullptr}};
+const EffectRegistrar clipping_effect{{"vpo",
+                                       "clipping",
+                                       "",
+                                       EffectKind::functional,
+                                       "splats beyond the guard band are cut to it",
+                                       "whether a corner is outside is what is tested for anyway; only what is, is cut",
+                                       "a comparison for each corner",
+                                       "",
+                                       {},
+                                       nullptr}};
+const EffectRegistrar not_finite_effect{
+    {"vpo",
+     "not_finite",
+     "",
+     EffectKind::functional,
+     "splats with a NaN or an infinity are dropped",
+     "the test is the tripwire; a frame of them is rare, and a picture of them wrong",
+     "a test of a splat's eleven numbers",
+     "",
+     {},
+     nullptr}};
 }  // namespace
 
 }  // namespace vrpipe

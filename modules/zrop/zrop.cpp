@@ -178,7 +178,7 @@ const SlotRegistrar zrop_slot{{"zrop", 70, "depth-stencil-rop", "", true, check_
 const Registrar<DepthStencilRop, ZropBehaviour> registrar(
     "zrop", "depth-stencil-rop", "depth, stencil and termination tests, termination update on the stencil MSB", false,
     Trust::trusted);
-const EffectRegistrar depth_stencil{
+const EffectRegistrar depth_stencil_effect{
     {"zrop",
      "depth_stencil",
      "",
@@ -194,7 +194,7 @@ const EffectRegistrar depth_stencil{
        if (called == 0) return EffectDecision::omit("no draw tests depth or stencil");
        return EffectDecision::keep(fmt::format("{} of {} draws test depth or stencil", called, facts.draws));
      }}};
-const EffectRegistrar termination{
+const EffectRegistrar termination_effect{
     {"zrop",
      "termination",
      "",
@@ -209,7 +209,7 @@ const EffectRegistrar termination{
        if (facts.terminating == 0) return EffectDecision::omit("no draw terminates early");
        return EffectDecision::keep(fmt::format("{} of {} draws terminate early", facts.terminating, facts.draws));
      }}};
-const EffectRegistrar late_tests{
+const EffectRegistrar late_tests_effect{
     {"zrop",
      "late_tests",
      "",
@@ -225,7 +225,7 @@ const EffectRegistrar late_tests{
        return EffectDecision::keep(
            fmt::format("{} of {} draws are tested after shading", facts.tested_late, facts.draws));
      }}};
-const EffectRegistrar z_cache{
+const EffectRegistrar z_cache_effect{
     {"zrop",
      "z_cache",
      "",
@@ -247,7 +247,7 @@ const EffectRegistrar z_cache{
      }}};
 
 // Not decided: why stands in place of a predicate.
-const EffectRegistrar update_latency{
+const EffectRegistrar update_latency_effect{
     {"zrop",
      "update_latency",
      "",
