@@ -73,7 +73,7 @@ class Scene {
   const RenderContext& context() const { return context_; }
   DepthFormat format() const { return frame_.depth_format(); }
   std::uint32_t at(std::int32_t x, std::int32_t y) const {
-    return depth_[static_cast<std::size_t>(y) * hi_z_width + x];
+    return depth_[static_cast<std::size_t>(y) * hi_z_width + static_cast<std::size_t>(x)];
   }
 
   /// The farthest of a raster tile's pixels in the frame.
