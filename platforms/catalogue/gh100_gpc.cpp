@@ -1,3 +1,5 @@
+#include "catalogue/catalogue.h"
+
 #include <vrpipe/platforms/wiring.h>
 
 namespace vrpipe {

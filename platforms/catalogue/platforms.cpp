@@ -4,14 +4,9 @@
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/simulation.h>
 
-namespace vrpipe {
+#include "catalogue/catalogue.h"
 
-Platform agx_orin();
-Platform agx_orin_lpddr3();
-Platform agx_orin_lpddr5();
-Platform gh100_gpc();
-Platform mobile();
-Platform desktop();
+namespace vrpipe {
 
 namespace {
 std::vector<Platform>& list() {

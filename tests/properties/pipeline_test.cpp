@@ -20,7 +20,8 @@ class Parameters : public ::testing::Environment {
     std::cout << "RC_PARAMS=\"" << std::getenv("RC_PARAMS") << "\"\n";
   }
 };
-[[maybe_unused]] ::testing::Environment* const parameters = ::testing::AddGlobalTestEnvironment(new Parameters);
+[[maybe_unused]] ::testing::Environment* const parameters_environment =
+    ::testing::AddGlobalTestEnvironment(new Parameters);
 
 rc::Gen<Variant> variant() { return rc::gen::elementOf(variants()); }
 

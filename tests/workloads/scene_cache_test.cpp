@@ -104,7 +104,7 @@ TEST_F(SceneCache, TakesNoFileWithAFlippedBit) {
 
 TEST_F(SceneCache, TakesNoFileThatIsCutShort) {
   cache_scene("some", small_scene(1));
-  for (const std::uintmax_t size : {9199, 9200, 48, 47, 0}) {
+  for (const std::uintmax_t size : {9199U, 9200U, 48U, 47U, 0U}) {
     fs::resize_file(stored(), size);
     EXPECT_FALSE(cached_scene("some")) << size;
   }
