@@ -17,13 +17,12 @@
 namespace vrpipe::tools {
 namespace {
 
-using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 const std::string separator = ".";
 
 /// What an element of an array is called; empty if by its place.
-std::string element_name(const Json& element) {
+std::string element_name(const nlohmann::ordered_json& element) {
   if (!element.is_object()) return {};
   for (const char* key : {"name", "variant", "microbench", "id", "knob"}) {
     const auto found = element.find(key);
@@ -33,10 +32,10 @@ std::string element_name(const Json& element) {
 }
 
 /// Names of the elements of an array, or their places where not all have a name of their own.
-std::vector<std::string> element_names(const Json& array) {
+std::vector<std::string> element_names(const nlohmann::ordered_json& array) {
   std::vector<std::string> names;
   std::set<std::string> seen;
-  for (const Json& element : array) {
+  for (const nlohmann::ordered_json& element : array) {
     names.push_back(element_name(element));
     if (names.back().empty() || !seen.insert(names.back()).second) {
       names.clear();
@@ -56,7 +55,8 @@ bool is_ignored(const std::string& key) {
 }
 
 /// Leaves by path, in the order of the file.
-void flatten(const Json& value, const std::string& path, std::vector<std::pair<std::string, Json>>& leaves) {
+void flatten(const nlohmann::ordered_json& value, const std::string& path,
+             std::vector<std::pair<std::string, nlohmann::ordered_json>>& leaves) {
   const auto below = [&](const std::string& key) { return path.empty() ? key : path + separator + key; };
   if (value.is_object() && !value.empty()) {
     for (const auto& [key, each] : value.items()) {
@@ -114,26 +114,27 @@ DiffGroup group_of(const std::string& key) {
   return DiffGroup::other;
 }
 
-using Leaves = std::vector<std::pair<std::string, Json>>;
+using Leaves = std::vector<std::pair<std::string, nlohmann::ordered_json>>;
 
 void compare(const Leaves& a, const Leaves& b, const std::string& run, std::vector<Difference>& differences) {
-  std::map<std::string, const Json*> of_b;
+  std::map<std::string, const nlohmann::ordered_json*> of_b;
   for (const auto& [key, value] : b) of_b.emplace(key, &value);
   std::set<std::string> of_a;
   for (const auto& [key, value] : a) {
     of_a.insert(key);
     const auto found = of_b.find(key);
-    const Json other = found == of_b.end() ? Json() : *found->second;
+    const nlohmann::ordered_json other = found == of_b.end() ? nlohmann::ordered_json() : *found->second;
     if (value != other) differences.push_back({group_of(key), run, key, value, other});
   }
   for (const auto& [key, value] : b) {
-    if (of_a.count(key) == 0 && !value.is_null()) differences.push_back({group_of(key), run, key, Json(), value});
+    if (of_a.count(key) == 0 && !value.is_null())
+      differences.push_back({group_of(key), run, key, nlohmann::ordered_json(), value});
   }
 }
 
 /// Runs by name; those of results that have runs at their top.
-std::vector<std::pair<std::string, const Json*>> compared_runs(const Json& result) {
-  std::vector<std::pair<std::string, const Json*>> runs;
+std::vector<std::pair<std::string, const nlohmann::ordered_json*>> compared_runs(const nlohmann::ordered_json& result) {
+  std::vector<std::pair<std::string, const nlohmann::ordered_json*>> runs;
   const auto found = result.find("runs");
   if (found == result.end() || !found->is_array()) return runs;
   const std::vector<std::string> names = element_names(*found);
@@ -142,8 +143,8 @@ std::vector<std::pair<std::string, const Json*>> compared_runs(const Json& resul
 }
 
 /// A picture's file, from where vrpipe runs or from where the result is.
-std::optional<fs::path> picture_of(const Json& run, const ResultFile& result) {
-  const Json exr = run.value("/images/exr"_json_pointer, Json());
+std::optional<fs::path> picture_of(const nlohmann::ordered_json& run, const ResultFile& result) {
+  const nlohmann::ordered_json exr = run.value("/images/exr"_json_pointer, nlohmann::ordered_json());
   if (!exr.is_string()) return std::nullopt;
   const fs::path path = exr.get<std::string>();
   std::error_code ignored;
@@ -153,10 +154,11 @@ std::optional<fs::path> picture_of(const Json& run, const ResultFile& result) {
   return std::nullopt;
 }
 
-PictureDiff compare_pictures(const std::string& name, const Json& a, const Json& b, const ResultFile& of_a,
-                             const ResultFile& of_b) {
+PictureDiff compare_pictures(const std::string& name, const nlohmann::ordered_json& a, const nlohmann::ordered_json& b,
+                             const ResultFile& of_a, const ResultFile& of_b) {
   PictureDiff diff{name, {}, {}, {}};
-  const Json hash_a = a.value("result_hash", Json()), hash_b = b.value("result_hash", Json());
+  const nlohmann::ordered_json hash_a = a.value("result_hash", nlohmann::ordered_json()),
+                               hash_b = b.value("result_hash", nlohmann::ordered_json());
   if (!hash_a.is_null() && !hash_b.is_null()) diff.same_bits = hash_a == hash_b;
   const auto file_a = picture_of(a, of_a), file_b = picture_of(b, of_b);
   if (!file_a || !file_b) {
@@ -189,12 +191,13 @@ ResultFile read_result(const fs::path& path) {
   }
   ResultFile result{path, {}};
   try {
-    result.content = Json::parse(file);
-  } catch (const Json::parse_error& error) {
+    result.content = nlohmann::ordered_json::parse(file);
+  } catch (const nlohmann::ordered_json::parse_error& error) {
     throw UserError("cannot read result", path.string(), fmt::format("it is no JSON from byte {} on", error.byte),
                     "name a file that --json has written");
   }
-  const Json schema = result.content.is_object() ? result.content.value("schema", Json()) : Json();
+  const nlohmann::ordered_json schema =
+      result.content.is_object() ? result.content.value("schema", nlohmann::ordered_json()) : nlohmann::ordered_json();
   if (!schema.is_string() || schema.get<std::string>().rfind("vrpipe.", 0) != 0) {
     throw UserError("cannot read result", path.string(), "it has no schema of vrpipe",
                     "name a file that --json has written");
@@ -218,7 +221,7 @@ std::optional<double> Difference::change_percent() const {
 ResultDiff diff_results(ResultFile a, ResultFile b) {
   ResultDiff diff{std::move(a), std::move(b), {}, {}, {}, {}};
   const auto runs_a = compared_runs(diff.a.content), runs_b = compared_runs(diff.b.content);
-  const auto common = [](Json content, bool has_runs) {
+  const auto common = [](nlohmann::ordered_json content, bool has_runs) {
     if (has_runs) content.erase("runs");
     // Where a value comes from changes nothing.
     if (content.contains("platform") && content["platform"].is_object()) content["platform"].erase("origins");

@@ -18,9 +18,7 @@
 namespace vrpipe::tools {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-Json typed(const StudyAxis& axis, const std::string& text) {
+nlohmann::ordered_json typed(const StudyAxis& axis, const std::string& text) {
   if (!axis.numeric) return text;
   const char* const end = text.data() + text.size();
   std::int64_t whole = 0;
@@ -87,28 +85,29 @@ SweepTable sweep_table(const SweepResult& result) {
     if (!result.points[i]) continue;
     const PointOutcome& point = *result.points[i];
     const RunResult& run = point.run;
-    std::vector<Json> row{i};
+    std::vector<nlohmann::ordered_json> row{i};
     for (std::size_t axis = 0; axis < result.study.axes.size(); ++axis) {
       const StudyAxis& of = result.study.axes[axis];
       row.push_back(typed(of, of.values[result.study.points[i].values[axis]]));
     }
     const bool timed = run.cycles.has_value();
-    row.push_back(timed ? Json(*run.cycles) : Json());
-    row.push_back(timed ? Json(run.milliseconds) : Json());
+    row.push_back(timed ? nlohmann::ordered_json(*run.cycles) : nlohmann::ordered_json());
+    row.push_back(timed ? nlohmann::ordered_json(run.milliseconds) : nlohmann::ordered_json());
     const bool has_reference = relative_to[i] && result.points[*relative_to[i]];
-    row.push_back(has_reference ? optional_json(speedup(result.points[*relative_to[i]]->run, run)) : Json());
-    row.push_back(point.energy ? Json(point.energy->nominal) : Json());
-    row.push_back(point.energy ? Json(point.energy->low) : Json());
-    row.push_back(point.energy ? Json(point.energy->high) : Json());
+    row.push_back(has_reference ? optional_json(speedup(result.points[*relative_to[i]]->run, run))
+                                : nlohmann::ordered_json());
+    row.push_back(point.energy ? nlohmann::ordered_json(point.energy->nominal) : nlohmann::ordered_json());
+    row.push_back(point.energy ? nlohmann::ordered_json(point.energy->low) : nlohmann::ordered_json());
+    row.push_back(point.energy ? nlohmann::ordered_json(point.energy->high) : nlohmann::ordered_json());
     row.push_back(point.storage_bytes);
     for (const auto& [name, value] : run.counts.named()) row.push_back(value);
     for (const char* unit : utilized) {
       const auto found = std::find_if(run.utilization.begin(), run.utilization.end(),
                                       [&](const auto& each) { return each.first == unit; });
-      row.push_back(found == run.utilization.end() ? Json() : Json(found->second));
+      row.push_back(found == run.utilization.end() ? nlohmann::ordered_json() : nlohmann::ordered_json(found->second));
     }
-    row.push_back(run.bottleneck ? Json(run.bottleneck->unit) : Json());
-    row.push_back(run.bottleneck ? Json(run.bottleneck->occupancy) : Json());
+    row.push_back(run.bottleneck ? nlohmann::ordered_json(run.bottleneck->unit) : nlohmann::ordered_json());
+    row.push_back(run.bottleneck ? nlohmann::ordered_json(run.bottleneck->occupancy) : nlohmann::ordered_json());
     row.push_back(run.result_hash);
     table.rows.push_back(std::move(row));
     table.points.push_back(i);

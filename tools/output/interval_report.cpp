@@ -9,18 +9,16 @@
 namespace vrpipe::tools {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 bool is_quotient(const StatisticIntervals& statistic) {
   return statistic.kind == "ratio" || statistic.kind == "histogram";
 }
 
-Json interval_value_json(const StatisticIntervals& statistic, std::size_t interval) {
+nlohmann::ordered_json interval_value_json(const StatisticIntervals& statistic, std::size_t interval) {
   if (is_quotient(statistic)) {
     const std::optional<double> quotient = statistic.quotient(interval);
-    return quotient ? Json(*quotient) : Json();
+    return quotient ? nlohmann::ordered_json(*quotient) : nlohmann::ordered_json();
   }
-  return statistic.values[interval] ? Json(*statistic.values[interval]) : Json();
+  return statistic.values[interval] ? nlohmann::ordered_json(*statistic.values[interval]) : nlohmann::ordered_json();
 }
 
 /// The cells of an interval, by column.
@@ -48,7 +46,7 @@ std::vector<std::string> columns_of(const std::vector<RunResult>& runs) {
 Row row_of(const IntervalReport& intervals, std::size_t interval) {
   Row row;
   for (const StatisticIntervals& statistic : intervals.statistics) {
-    const Json value = interval_value_json(statistic, interval);
+    const nlohmann::ordered_json value = interval_value_json(statistic, interval);
     row[statistic.name] = value.is_null()           ? std::string()
                           : value.is_number_float() ? fmt::format("{:.6g}", value.get<double>())
                                                     : fmt::format("{}", value.get<std::uint64_t>());
@@ -64,17 +62,17 @@ Row row_of(const IntervalReport& intervals, std::size_t interval) {
 
 }  // namespace
 
-Json intervals_json(const IntervalReport& intervals) {
-  Json states = Json::object();
+nlohmann::ordered_json intervals_json(const IntervalReport& intervals) {
+  nlohmann::ordered_json states = nlohmann::ordered_json::object();
   for (const UnitIntervals& unit : intervals.units) {
-    Json& of_unit = states[unit.name];
+    nlohmann::ordered_json& of_unit = states[unit.name];
     for (unsigned state = 0; state < unit_states; ++state) {
       of_unit[vrpipe::name_of(static_cast<UnitState>(state))] = unit.cycles[state];
     }
   }
-  Json statistics = Json::object();
+  nlohmann::ordered_json statistics = nlohmann::ordered_json::object();
   for (const StatisticIntervals& statistic : intervals.statistics) {
-    Json& values = statistics[statistic.name] = Json::array();
+    nlohmann::ordered_json& values = statistics[statistic.name] = nlohmann::ordered_json::array();
     for (std::size_t i = 0; i < intervals.from.size(); ++i) values.push_back(interval_value_json(statistic, i));
   }
   return {{"cycles", intervals.every},
