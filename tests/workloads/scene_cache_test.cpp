@@ -102,6 +102,14 @@ TEST_F(SceneCache, TakesNoFileWithAFlippedBit) {
   EXPECT_TRUE(cached_scene("some"));
 }
 
+TEST_F(SceneCache, TakesNoFileOfAnotherScene) {
+  cache_scene("some", small_scene(1));
+  const fs::path file = stored();
+  std::string name = file.filename().string();
+  fs::rename(file, file.parent_path() / name.replace(0, 4, "other"));
+  EXPECT_FALSE(cached_scene("other"));
+}
+
 TEST_F(SceneCache, TakesNoFileThatIsCutShort) {
   cache_scene("some", small_scene(1));
   for (const std::uintmax_t size : {9199U, 9200U, 48U, 47U, 0U}) {

@@ -39,7 +39,9 @@ BuildId id_in_notes(const dl_phdr_info& object) {
       ElfW(Nhdr) note;
       std::memcpy(&note, at, sizeof note);
       const unsigned char* const description = at + sizeof note + padded(note.n_namesz);
-      if (note.n_type == NT_GNU_BUILD_ID) {
+      constexpr std::string_view kOwner{"GNU", 4};  // with its end
+      const bool is_gnu = note.n_namesz == kOwner.size() && std::memcmp(at + sizeof note, kOwner.data(), 4) == 0;
+      if (is_gnu && note.n_type == NT_GNU_BUILD_ID) {
         std::memcpy(id.data(), description, std::min<std::size_t>(note.n_descsz, id.size()));
         return id;
       }
@@ -75,12 +77,13 @@ struct Header {
   BuildId build_id{};
   std::uint32_t sh_degree = 0;
   std::uint64_t count = 0;
-  std::uint64_t checksum = 0;  ///< Adler-32 of the records
+  std::uint64_t checksum = 0;  ///< Adler-32 of the records and the scene's name
 };
 static_assert(sizeof(Header) == 48, "without padding");
 
-std::uint64_t checksum_of(const std::byte* bytes, std::size_t count) {
-  return adler32_z(adler32_z(0, nullptr, 0), reinterpret_cast<const unsigned char*>(bytes), count);
+std::uint64_t checksum_of(const std::string& name, const std::byte* bytes, std::size_t count) {
+  const auto of_name = adler32_z(1, reinterpret_cast<const unsigned char*>(name.data()), name.size());
+  return adler32_z(of_name, reinterpret_cast<const unsigned char*>(bytes), count);
 }
 
 /// Where a scene of this build is stored; none if there is no folder for it, or nothing to know the build by.
@@ -105,10 +108,13 @@ void keep_small(const fs::path& folder) {
   std::vector<Stored> all;
   std::uint64_t bytes = 0;
   std::error_code ignored;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored)) {
-    if (entry.path().extension() != ".scene" || !entry.is_regular_file(ignored)) continue;
-    all.push_back({entry.last_write_time(ignored), entry.path(), entry.file_size(ignored)});
-    bytes += all.back().bytes;
+  for (fs::directory_iterator entry(folder, ignored), end; !ignored && entry != end; entry.increment(ignored)) {
+    std::error_code gone;  // another process may have removed it
+    const std::uint64_t size = entry->file_size(gone);
+    const fs::file_time_type written = entry->last_write_time(gone);
+    if (gone || entry->path().extension() != ".scene") continue;
+    all.push_back({written, entry->path(), size});
+    bytes += size;
   }
   std::sort(all.begin(), all.end(), [](const Stored& a, const Stored& b) { return a.written < b.written; });
   for (const Stored& oldest : all) {
@@ -137,7 +143,7 @@ std::optional<GaussianScene> cached_scene(const std::string& name) {
     if (header.count != bytes / stride || bytes % stride != 0) return std::nullopt;
     GaussianArray gaussians(header.count, sh_degree, name);
     file.read(sizeof header, gaussians.bytes(), static_cast<std::size_t>(bytes));
-    if (checksum_of(gaussians.bytes(), static_cast<std::size_t>(bytes)) != header.checksum) return std::nullopt;
+    if (checksum_of(name, gaussians.bytes(), static_cast<std::size_t>(bytes)) != header.checksum) return std::nullopt;
     return gaussians.build();
   } catch (const UserError&) {
     return std::nullopt;
@@ -156,7 +162,7 @@ void cache_scene(const std::string& name, const GaussianScene& scene) {
   header.build_id = id;
   header.sh_degree = static_cast<std::uint32_t>(scene.sh_degree());
   header.count = scene.size();
-  header.checksum = checksum_of(scene.records(), static_cast<std::size_t>(bytes));
+  header.checksum = checksum_of(name, scene.records(), static_cast<std::size_t>(bytes));
   try {
     AtomicFile file(*path, "cannot cache scene", path->string());
     file.write(&header, sizeof header);
