@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
-#include <string_view>
+#include <string>
 #include <system_error>
 #include <vector>
 
@@ -39,8 +39,8 @@ BuildId id_in_notes(const dl_phdr_info& object) {
       ElfW(Nhdr) note;
       std::memcpy(&note, at, sizeof note);
       const unsigned char* const description = at + sizeof note + padded(note.n_namesz);
-      constexpr std::string_view kOwner{"GNU", 4};  // with its end
-      const bool is_gnu = note.n_namesz == kOwner.size() && std::memcmp(at + sizeof note, kOwner.data(), 4) == 0;
+      constexpr char kOwner[] = "GNU";  // with its end
+      const bool is_gnu = note.n_namesz == sizeof kOwner && std::memcmp(at + sizeof note, kOwner, sizeof kOwner) == 0;
       if (is_gnu && note.n_type == NT_GNU_BUILD_ID) {
         std::memcpy(id.data(), description, std::min<std::size_t>(note.n_descsz, id.size()));
         return id;
