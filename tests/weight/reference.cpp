@@ -28,7 +28,8 @@ std::string described(const std::map<std::string, std::vector<double>>& rows) {
 }
 
 std::vector<std::function<std::string(const std::map<std::string, std::vector<double>>&)>> all() {
-  return {described<0>, described<1>, described<2>, described<3>, described<4>, described<5>, described<6>, described<7>};
+  return {described<0>, described<1>, described<2>, described<3>,
+          described<4>, described<5>, described<6>, described<7>};
 }
 
 }  // namespace vrpipe::weight
