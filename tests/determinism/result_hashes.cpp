@@ -12,6 +12,7 @@ namespace {
 void print_hashes() {
   SceneRequest scene;
   scene.size = ImageSize{120, 90};
+  scene.scene_cache = false;  // making it is compared as well
   const LoadedScene loaded = load_scene(scene);
   for (const Fidelity fidelity : {Fidelity::functional, Fidelity::lt, Fidelity::cycle}) {
     for (const Termination termination : {Termination::paper, Termination::strict}) {
