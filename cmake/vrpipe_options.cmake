@@ -17,7 +17,7 @@ option(VRPIPE_WARNINGS_AS_ERRORS "stop at warnings" ${checked_compiler})
 # Most of a source's time goes into its headers, so that a batch of them takes little longer than one.
 option(VRPIPE_UNITY "compile sources in batches; OFF compiles one alone, for who works on it" ON)
 set(CMAKE_UNITY_BUILD ${VRPIPE_UNITY})
-set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 16)
 
 set(VRPIPE_SANITIZE "" CACHE STRING "sanitizers, as for -fsanitize=")
 

@@ -60,7 +60,7 @@ minutes() { if [ "$1" -lt 60 ]; then echo "$1 s"; else echo "$(($1 / 60)) min $(
 # compilers say is shown.
 build() {
   # Batches of sources take about as long as one another, so that their number tells the time that is left.
-  NINJA_STATUS="[%f %t %e] " cmake --build "$1" --target "${@:2}" 2>&1 </dev/null | {
+  NINJA_STATUS="[%f %t %e] " cmake --build "$1" -j "$(nproc)" --target "${@:2}" 2>&1 </dev/null | {
     local line done all seconds left said=0 clear=
     if [ -t 2 ]; then clear=$'\r\033[K'; fi
     while IFS= read -r line; do
@@ -87,4 +87,18 @@ configure() {
   local options=(-S . -B "$@")
   if command -v ccache >/dev/null; then options+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache); fi
   quietly cmake "${options[@]}"
+}
+
+# compare_hashes BUILD OTHER...: whether the programs of these builds compute the same, bit by bit.
+compare_hashes() {
+  local expected other
+  export ASAN_OPTIONS=detect_leaks=0:detect_stack_use_after_return=0 SYSTEMC_DISABLE_COPYRIGHT_MESSAGE=1
+  expected=$("$1/bin/result_hashes")
+  [ "$(wc -l <<<"$expected")" -eq 24 ]
+  for other in "${@:2}"; do
+    if ! diff <(echo "$expected") <("$other/bin/result_hashes") >&2; then
+      say "$other gives other results than $1"
+      return 1
+    fi
+  done
 }

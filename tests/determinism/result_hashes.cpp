@@ -11,6 +11,7 @@ namespace {
 
 void print_hashes() {
   SceneRequest scene;
+  scene.scene = "builtin:courtyard";
   scene.size = ImageSize{120, 90};
   scene.scene_cache = false;  // making it is compared as well
   const LoadedScene loaded = load_scene(scene);

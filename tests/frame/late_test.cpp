@@ -70,11 +70,12 @@ INSTANTIATE_TEST_SUITE_P(Frame, LateFrame, testing::every_fidelity_and_variant()
 // Whatever terminates, and when: depth and stencil are the reference's to the bit.
 TEST_P(LateFrame, IsThatOfTheReference) {
   const bool terminates = request().variant.early_termination;
+  static testing::MixedReferences references;
   unsigned frames = 0;
   for (std::uint64_t seed = 1; frames < 6; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Frame frame = late_frame(seed, request());
-    const testing::MixedReference reference = testing::render_mixed(testing::context_of(frame));
+    const testing::MixedReference& reference = references.of(seed, testing::context_of(frame));
     if (reference.near_prune_edge > 0) continue;
     ++frames;
     EXPECT_GT(reference.of_draw[1].late_failed, 0U);

@@ -342,7 +342,6 @@ TEST(ForeignMemory, ADeadlockIsFoundAndNamedThoughATimerGoesOn) {
   }
 }
 
-#ifndef VRPIPE_SANITIZED  // by what loses sight of the stack when a coroutine of SystemC's has run before a throw
 TEST(ForeignMemory, ThatFallsSilentIsNamedWithItsPortAndTheOldestRequest) {
   const Draw draw = testing::random_draw(64, 64, 300, 8);
   for (const bool refreshes : {true, false}) {
@@ -364,7 +363,6 @@ TEST(ForeignMemory, ThatFallsSilentIsNamedWithItsPortAndTheOldestRequest) {
     }
   }
 }
-#endif
 
 /// A memory with a refresh that is counted in cycles of the units' clock, which then never comes to rest.
 class TickingMemory : public FixedLatencyMemory, public Clocked {

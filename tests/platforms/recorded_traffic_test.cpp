@@ -51,8 +51,15 @@ CacheOrganization organization_of(const Pressure& pressure) {
 
 LookUps& of_l2() { return testing::record_look_ups("l2"); }
 
-/// A run at `cycle` whose L2 holds a part of what is asked for.
-RunResult record(const Pressure& pressure) {
+struct Recorded {
+  RunResult result;
+  decltype(LookUps::events) events;
+};
+
+/// A run at `cycle` whose L2 holds a part of what is asked for, made once.
+const Recorded& record(const Pressure& pressure) {
+  static std::map<const Pressure*, Recorded> made;
+  if (const auto found = made.find(&pressure); found != made.end()) return found->second;
   of_l2().events.clear();
   RunRequest request = request_of(pressure.variant, Fidelity::cycle);
   request.platform = &platform_named(pressure.platform);
@@ -62,7 +69,8 @@ RunResult record(const Pressure& pressure) {
                       {"sm", "attribute_buffer_bytes", "65536"},
                       {"crop", "cache_bytes", "2048"},
                       {"zrop", "fast_clear", "off"}};
-  return run(request, testing::random_draw(384, 256, 1200, 31));
+  RunResult result = run(request, testing::random_draw(384, 256, 1200, 31));
+  return made.emplace(&pressure, Recorded{std::move(result), of_l2().events}).first->second;
 }
 
 const std::map<MemoryTraffic, std::string> traffic_names = {{MemoryTraffic::color, "color"},
@@ -72,10 +80,10 @@ const std::map<MemoryTraffic, std::string> traffic_names = {{MemoryTraffic::colo
 
 TEST(RecordedTraffic, OfTheL2MakesTheHitsMissesAndWriteBacksOfACacheByItsDefinition) {
   for (const Pressure& pressure : pressures) {
-    const RunResult result = record(pressure);
-    Replayed expected = replay(organization_of(pressure), of_l2().events, true);
+    const auto& [result, events] = record(pressure);
+    Replayed expected = replay(organization_of(pressure), events, true);
     std::uint64_t looked_up = 0;
-    for (const auto& [part, served] : of_l2().events) looked_up += served ? 0 : part.bytes;
+    for (const auto& [part, served] : events) looked_up += served ? 0 : part.bytes;
     std::uint64_t asked = 0;
     for (const auto& [traffic, name] : traffic_names) {
       const Counted& counted = expected.of[traffic];
@@ -99,8 +107,8 @@ TEST(RecordedTraffic, OfTheL2MakesTheHitsMissesAndWriteBacksOfACacheByItsDefinit
 TEST(RecordedTraffic, OfTheL2MissesNearlyAsMuchInACacheWithoutPins) {
   for (const Pressure& pressure : pressures) {
     if (pressure.bytes == 65536) continue;
-    const RunResult result = record(pressure);
-    for (const auto& [traffic, counted] : replay(organization_of(pressure), of_l2().events, false).of) {
+    const auto& [result, events] = record(pressure);
+    for (const auto& [traffic, counted] : replay(organization_of(pressure), events, false).of) {
       const auto missed = static_cast<double>(statistic(result, "l2." + traffic_names.at(traffic) + "_sector_misses"));
       EXPECT_NEAR(missed / static_cast<double>(counted.missed), 1, 0.005)
           << pressure.text() << traffic_names.at(traffic);

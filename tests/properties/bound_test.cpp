@@ -107,7 +107,7 @@ TEST(Bound, LetsQuadsShareTheLastCycleOfABlock) {
 
 RC_GTEST_PROP(Bound, IsNeverAboveTheFidelitiesWithLinks, ()) {
   const Draw draw = *scene(60, 1.0F);
-  RunRequest r = request(*rc::gen::elementOf(variants()), *format(), Fidelity::bound);
+  RunRequest r = drawn_request(Fidelity::bound);
   r.platform = &platforms()[static_cast<std::size_t>(*whole(0, static_cast<int>(platforms().size())))];
   r.termination = *rc::gen::element(Termination::paper, Termination::strict);
   r.settings = *bins();

@@ -9,7 +9,7 @@ namespace vrpipe {
 namespace {
 
 using testing::bins;
-using testing::format;
+using testing::drawn_request;
 using testing::mixed_frame;
 using testing::random_frame;
 using testing::scene;
@@ -113,7 +113,8 @@ void expect_no_difference(const RunRequest& request, const Frame& frame) {
 }
 
 RunRequest any_request(const Machine& machine) {
-  RunRequest request = testing::request(*rc::gen::elementOf(variants()), *format(), *fidelity());
+  RunRequest request = drawn_request();
+  request.fidelity = *fidelity();
   request.platform = machine.platform;
   request.termination = *rc::gen::element(Termination::paper, Termination::strict);
   const bool has_time = request.fidelity != Fidelity::functional && request.fidelity != Fidelity::bound;

@@ -142,6 +142,13 @@ inline RunRequest request(const Variant& variant, ColorFormat format, Fidelity f
   return r;
 }
 
+/// Of any variant and format. Drawn in statements, whose order every compiler keeps.
+inline RunRequest drawn_request(Fidelity fidelity = Fidelity::functional) {
+  const Variant variant = *rc::gen::elementOf(variants());
+  const ColorFormat color = *format();
+  return request(variant, color, fidelity);
+}
+
 /// Simulates; making a NaN out of numbers ends the test program.
 inline RunResult run_trapped(const RunRequest& request, const Draw& draw) {
   if (request.fidelity != Fidelity::functional) fresh_simulation();

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include <vrpipe/pipeline/render_context.h>
@@ -34,5 +35,18 @@ struct MixedReference {
   std::uint64_t near_prune_edge = 0;  ///< fragments whose fate rounding may decide
 };
 MixedReference render_mixed(const RenderContext& context);
+
+/// Frames that differ by their key alone, as far as order goes: each is rendered once a process.
+class MixedReferences {
+ public:
+  const MixedReference& of(std::uint64_t key, const RenderContext& context) {
+    const auto [place, is_new] = references_.try_emplace(key);
+    if (is_new) place->second = render_mixed(context);
+    return place->second;
+  }
+
+ private:
+  std::map<std::uint64_t, MixedReference> references_;
+};
 
 }  // namespace vrpipe::testing
