@@ -5,6 +5,7 @@
 #include <dlfcn.h>
 
 #include <filesystem>
+#include <stdexcept>
 #include <system_error>
 
 #include "component/plugin_tag.h"
@@ -140,7 +141,14 @@ void load_plugin(const std::string& path) {
   {
     const ForeignCall running(file.c_str(), "while it is loaded");
     const Loading now;
-    library = dlopen(file.c_str(), RTLD_NOW);
+    // A plugin's constructors may throw, though glibc declares that dlopen does not: a compiler that sees the declaration
+    // may leave out what has to be undone then.
+    void* (*const volatile load)(const char*, int) = dlopen;
+    call_with_fault([&] { library = load(file.c_str(), RTLD_NOW); },
+                    [&](const char* text) {
+                      throw std::runtime_error(file + ", while it is loaded: throws " +
+                                               (text != nullptr ? text : "what is no std::exception"));
+                    });
   }
   if (library == nullptr) {
     const char* const detail = dlerror();

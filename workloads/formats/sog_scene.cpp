@@ -242,7 +242,7 @@ void SogScene::decode(const std::vector<Run>& runs, GaussianArray& gaussians) co
                    kSogRemedy);
     }
   }
-  constexpr double kSqrt2 = 1.41421356237309504880;
+  constexpr double kRootOfTwo = 1.41421356237309504880;
   for (const Run& run : runs) {
     decode_into(gaussians, run.to, run.count, [&](std::uint64_t offset, GaussianAttributes& gaussian) {
       const std::uint64_t index = run.from + offset;
@@ -259,7 +259,7 @@ void SogScene::decode(const std::vector<Run>& runs, GaussianArray& gaussians) co
       const std::byte* const rotation = rotations[index];
       const unsigned omitted = std::to_integer<unsigned>(rotation[3]) - 252U;
       const auto component = [&](std::size_t i) {
-        return (std::to_integer<int>(rotation[i]) / 255.0 * 2 - 1) / kSqrt2;
+        return (std::to_integer<int>(rotation[i]) / 255.0 * 2 - 1) / kRootOfTwo;
       };
       if (omitted < 4) gaussian.rotation = quaternion_without(omitted, component(0), component(1), component(2));
       if (coefficients == 0) return;
