@@ -95,7 +95,11 @@ TEST(Fidelity, StrictImagesAndCountsAreTheSameOnBuiltinScenes) {
     scene.scene = "builtin:" + info.name;
     scene.size = ImageSize{160, 96};
     const LoadedScene loaded = load_scene(scene);
-    for (const Variant& variant : variants()) expect_same_on_every_rung(request_of(variant.name), loaded.draw);
+    // All variants of one scene; of the others the one that has all.
+    for (const Variant& variant : variants()) {
+      if (&info == &builtin_scenes().front() || variant.name == "het+qm")
+        expect_same_on_every_rung(request_of(variant.name), loaded.draw);
+    }
   }
 }
 

@@ -219,6 +219,7 @@ TEST(DepthStencilTraffic, TimedFidelitiesStayNearCycleAndTheBoundBelow) {
   for (const char* name : {"agx-orin", "agx-orin-lpddr3", "desktop"}) {
     const Platform platform = with_z_traffic(name);
     for (const char* bytes : {"4096", "16384"}) {
+      if (std::string(name) != "agx-orin" && std::string(bytes) != "4096") continue;
       const auto small = [&](RunRequest& request) { request.settings = {{"zrop", "cache_bytes", bytes}}; };
       const RunResult clocked = run(z_traffic_request(platform, "het", Fidelity::cycle, small), draw);
       const auto cycles = static_cast<double>(*clocked.cycles);
