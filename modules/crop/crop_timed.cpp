@@ -3,7 +3,7 @@
 #include <optional>
 #include <utility>
 
-#include "crop/sector_pairs.h"
+#include "crop/sector_group.h"
 
 #include <vrpipe/memory/line_returns.h>
 #include <vrpipe/model/timed_cache_port.h>
@@ -47,6 +47,7 @@ class TimedCrop : public TimedUnit {
         move_price_(timing_.blend_rate.items * timing_.parts_of_a_move()),
         in_pairs_(timing_.pairs_in_sector && timing_.blend_rate.most_in_a_cycle() > 1),
         pairs_one_by_one_(in_pairs_ && at_once_ == 1),
+        group_(timing_.blend_rate.most_in_a_cycle(), CropWork::parts_of_a_cycle(timing_)),
         lines_(std::max(timing_.cache_bytes / timing_.line_bytes, 1U)),
         ready_(lines_.size()),
         unpaid_(lines_.size()) {
@@ -135,8 +136,9 @@ class TimedCrop : public TimedUnit {
     const Cycle hazard = timing_.forwards || !hazard_gate_.enter() || !context_.state(warp.draw[from]).blend
                              ? 0
                              : hazard_until(warp.tile, warp.position[from]);
-    const CycleInterval blended =
-        joins_last(from, std::max(there, hazard)) ? join_last() : blend_in_turn(warp, from, to, there, hazard);
+    const CycleInterval blended = joins_last(from, std::max(there, hazard))
+                                      ? join_last(warp, from)
+                                      : blend_in_turn(warp, from, to, there, hazard);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
     queue_.take(quads, blended.last);
@@ -168,24 +170,23 @@ class TimedCrop : public TimedUnit {
       did(CropWork::forwarding, wasted, there, hazard);
       there = hazard;
     }
-    const unsigned price = price_of(warp, from, to);
+    const auto price = static_cast<unsigned>(price_of(warp, from, to));
     const CycleInterval blended = blending_.take(there, price);
     if (timing_.column_cycles > 0) idle_cache_ = price > quads * price_ ? price - quads * price_ : 0;
     settle_unpaired();
     if (price > quads * price_) unpaired_ = {price - quads * price_, blended};
-    if (pairs_one_by_one_) pairs_.blended(place_of(from), blended.last);
     return blended;
   }
   bool joins_last(unsigned index, Cycle there) const {
-    return pairs_one_by_one_ && pairs_.joins(place_of(index), there);
+    return pairs_one_by_one_ && any_blended_ && there <= last_blend_ && group_.takes(place_of(index));
   }
-  /// The quad costs nothing: the last one has paid for a cycle.
-  CycleInterval join_last() {
-    pairs_.join();
-    unpaired_.parts -= price_;
-    return {last_blend_, last_blend_};
+  /// The last quads have paid for the rest of a cycle.
+  CycleInterval join_last(const ShadedWarp& warp, unsigned index) {
+    const auto price = static_cast<unsigned>(group_.join(own_price(warp, index)));
+    unpaired_.parts = unpaired_.parts + price - price_;
+    return price == 0 ? CycleInterval{last_blend_, last_blend_} : blending_.take(last_blend_, price);
   }
-  SectorPairs::Place place_of(unsigned index) const {
+  SectorGroup::Place place_of(unsigned index) const {
     return {cache_.lines[cache_.line_of[index]].address, cache_.sectors_of[index]};
   }
   /// Nothing goes with the last quads any more.
@@ -219,28 +220,21 @@ class TimedCrop : public TimedUnit {
     used_before_[access.line] = returns_->last_use(access.address);
   }
 
-  /// Of quads, in parts of a cycle. Where several go in one only if they share a sector, the others take one each.
-  unsigned price_of(const ShadedWarp& warp, unsigned from, unsigned to) const {
-    if (timing_.column_cycles > 0 && context_.state(warp.draw[from]).blend) return price_of_columns(warp, from, to);
-    if (!in_pairs_) return (to - from) * price_;
-    const auto cycle = static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_));
-    const unsigned most = timing_.blend_rate.most_in_a_cycle();
-    unsigned price = 0;
-    unsigned beside = most;
+  /// Of quads, in parts of a cycle.
+  std::uint64_t price_of(const ShadedWarp& warp, unsigned from, unsigned to) {
+    if (!in_pairs_ && timing_.column_cycles == 0) return std::uint64_t{to - from} * price_;
+    std::uint64_t price = 0;
     for (unsigned i = from; i < to; ++i) {
-      const bool shares = i > from && cache_.line_of[i] == cache_.line_of[i - 1] &&
-                          cache_.sectors_of[i] == cache_.sectors_of[i - 1] && beside < most;
-      beside = shares ? beside + 1 : 1;
-      price += shares ? 0 : cycle;
+      const unsigned own = own_price(warp, i);
+      const bool joins = i > from && group_.takes(place_of(i));
+      price += !in_pairs_ ? own : joins ? group_.join(own) : group_.begin(place_of(i), own);
     }
     return price;
   }
-
-  [[gnu::noinline]] unsigned price_of_columns(const ShadedWarp& warp, unsigned from, unsigned to) const {
+  unsigned own_price(const ShadedWarp& warp, unsigned index) const {
+    if (timing_.column_cycles == 0 || !context_.state(warp.draw[index]).blend) return price_;
     const auto column = timing_.column_cycles * static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_));
-    unsigned price = 0;
-    for (unsigned i = from; i < to; ++i) price += std::max(price_, columns_of(warp.live[i]) * column);
-    return price;
+    return std::max(price_, columns_of(warp.live[index]) * column);
   }
 
   void blend(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval at) {
@@ -323,7 +317,7 @@ class TimedCrop : public TimedUnit {
   unsigned idle_cache_ = 0;      ///< parts of the last blend of several cycles, in which nothing moves
   const bool in_pairs_;          ///< several quads go in a cycle only if they share a sector
   const bool pairs_one_by_one_;  ///< and are blended one by one
-  SectorPairs pairs_;
+  SectorGroup group_;            ///< the last of these
   struct {
     unsigned parts = 0;
     CycleInterval at;

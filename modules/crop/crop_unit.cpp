@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "crop/lines_ahead.h"
+#include "crop/sector_group.h"
 
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
@@ -41,6 +42,7 @@ class CropUnit : public Unit {
         income_(static_cast<std::int64_t>(CropWork::parts_of_a_cycle(timing_))),
         most_in_a_cycle_(timing_.blend_rate.most_in_a_cycle()),
         pairs_(timing_.pairs_in_sector && most_in_a_cycle_ > 1),
+        group_(most_in_a_cycle_, CropWork::parts_of_a_cycle(timing_)),
         port_(*this, "memory", timing_.mshrs,
               {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
     out_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.blend_rate));
@@ -207,7 +209,7 @@ class CropUnit : public Unit {
     // What sectors took from blending is paid back first; unused cycles are lost, fractions of a quad are not.
     if (now > refilled_) {
       tokens_ += static_cast<std::int64_t>(now - refilled_) * income_;
-      const std::int64_t lost = tokens_ - (income_ + price_ - 1);
+      const std::int64_t lost = tokens_ - (income_ + (pairs_ ? income_ : price_) - 1);
       if (lost > 0) {
         tokens_ -= lost;
         if (stop_ == UnitState::latency) did(CropWork::forwarding, static_cast<std::uint64_t>(lost), refilled_, now);
@@ -230,10 +232,11 @@ class CropUnit : public Unit {
         stop_ = UnitState::memory;
         break;
       }
-      const std::int64_t price = pairs_ ? price_beside_last(entry, most_in_a_cycle_ - budget) : price_;
+      const bool joins = pairs_ && joins_last(entry, most_in_a_cycle_ - budget);
+      const std::int64_t price = !pairs_ ? price_ : joins ? price_of_next() : income_;
       if (tokens_ < price) {
         stop_ = UnitState::busy;  // with the quads before it, or with moving sectors
-        if (pairs_) last_.waits = budget < most_in_a_cycle_ || last_.waits;
+        if (pairs_) last_waits_ = budget < most_in_a_cycle_ || last_waits_;
         break;
       }
       if (!timing_.forwards && hazard_gate_.enter() && blends(entry.quad)) {
@@ -256,6 +259,7 @@ class CropUnit : public Unit {
       }
       if (quad.is_last()) quad.warp->release();
       const bool changed = outcome.changed || timing_.writes_unchanged;
+      if (pairs_) goes(entry, joins);
       tokens_ -= price;
       unpaired_ += price - price_;
       if (timing_.column_cycles > 0 && blends(quad)) unpaired_ += pay_for_columns(quad.live());
@@ -268,7 +272,6 @@ class CropUnit : public Unit {
         ahead_->blended(entry.line, entry.sectors, changed, now);
         pay_for_stays();
       }
-      if (pairs_) last_ = {entry.place / positions_per_tile, entry.line, entry.sectors, price != 0, false};
       queue_.pop();
       if (!marks_.empty()) --marks_.front().quads;
       if (queue_.size() > quads_ahead) prefetch(queue_[quads_ahead]);
@@ -278,8 +281,7 @@ class CropUnit : public Unit {
     if (blended == 0) return false;
     frame_lasts(now + timing_.latency_cycles);
     did(CropWork::blend, blended, now);
-    // Two that go together cost as much as one of a cycle's two.
-    if (unpaired_ > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(std::exchange(unpaired_, 0)), now);
+    if (!pairs_) settle_unpaired(now);
     last_blend_ = now;
     any_blended_ = true;
     return true;
@@ -308,18 +310,33 @@ class CropUnit : public Unit {
   }
   /// What the columns of two pixels of a quad that have live samples take beyond its price, which is paid once it is blended.
   [[gnu::noinline]] std::int64_t pay_for_columns(LaneMask live) {
-    const std::int64_t more = columns_of(live) * timing_.column_cycles * income_ - price_;
+    std::int64_t more = columns_of(live) * timing_.column_cycles * income_ - price_;
     if (more <= 0) return 0;
+    if (pairs_) more = static_cast<std::int64_t>(group_.lengthen(static_cast<std::uint64_t>(more)));
     tokens_ -= more;
     idle_cache_ = more;
     return more;
   }
-  /// Of a quad, where several go in a cycle if they share a sector; `beside` have gone in this one.
-  [[gnu::noinline]] std::int64_t price_beside_last(const Entry& entry, unsigned beside) const {
-    const bool shares = last_.is_first && (beside > 0 || last_.waits) &&
-                        last_.tile == entry.place / positions_per_tile && last_.line == entry.line &&
-                        last_.sectors == entry.sectors;
-    return shares ? 0 : income_;
+  /// Whether a quad goes with the last ones; `beside` have gone in this cycle. A line may have become another tile's since.
+  static SectorGroup::Place place_of(const Entry& entry) {
+    return {std::uint64_t{entry.place / positions_per_tile} << 32U | entry.line, entry.sectors};
+  }
+  [[gnu::noinline]] bool joins_last(const Entry& entry, unsigned beside) const {
+    return (beside > 0 || last_waits_) && group_.takes(place_of(entry));
+  }
+  std::int64_t price_of_next() const {
+    return static_cast<std::int64_t>(group_.price_of_next(static_cast<std::uint64_t>(price_)));
+  }
+  [[gnu::noinline]] void goes(const Entry& entry, bool joins) {
+    const auto own = static_cast<std::uint64_t>(price_);
+    if (!joins) settle_unpaired(now());
+    joins ? group_.join(own) : group_.begin(place_of(entry), own);
+    last_waits_ = false;
+  }
+  /// Nothing goes with the last quads any more.
+  void settle_unpaired(Cycle now) {
+    if (unpaired_ > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(unpaired_), now);
+    unpaired_ = 0;
   }
 
   /// Behind the quads in the queue.
@@ -334,6 +351,7 @@ class CropUnit : public Unit {
     bool passed = false;
     for (; !marks_.empty() && marks_.front().quads == 0; marks_.pop()) {
       passed = true;
+      settle_unpaired(now);
       if (marks_.front().mark != Mark::end_of_frame) {
         behaviour_->pass(marks_.front().mark);
         if (barriers_.is_barrier(marks_.front().mark)) done_.push({marks_.front().mark});
@@ -385,6 +403,7 @@ class CropUnit : public Unit {
   const std::int64_t income_;       ///< of a cycle: what so many quads, or so many sectors, cost
   const unsigned most_in_a_cycle_;  ///< quads looked up or blended
   const bool pairs_;                ///< several go in a cycle only if they share a sector
+  SectorGroup group_;               ///< the last of these
   CachePort port_;
   const ColorSurface* surface_ = nullptr;
   std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
@@ -400,13 +419,9 @@ class CropUnit : public Unit {
   std::vector<bool> came_back_;         ///< by line of the cache: was there before; not used since
   std::optional<LinesAhead> ahead_;     ///< where tags run ahead of data
   Cycle ready_at_ = never;              ///< of the quad whose turn it is, if that is known
-  std::int64_t unpaired_ = 0;           ///< tokens that were not tallied yet, or too many
+  std::int64_t unpaired_ = 0;           ///< tokens of the last quads' price beyond their rate, not tallied yet
   std::int64_t idle_cache_ = 0;         ///< tokens of the last blend of several cycles, in which nothing moves
-  struct {
-    std::uint32_t tile, line, sectors;
-    bool is_first;                                      ///< of those that go together
-    bool waits;                                         ///< so that the next one goes in a later cycle than it might
-  } last_{};                                            ///< blended, where quads go in pairs
+  bool last_waits_ = false;             ///< so that the next one goes in a later cycle than it might
   std::deque<std::pair<std::uint32_t, Cycle>> recent_;  ///< blends in the pipeline, without forwarding
   UnitState stop_ = UnitState::starved;
   struct QueuedMark {

@@ -1,6 +1,8 @@
 // What CROP was measured to take on a real GPU beyond its rate: lines that move, lines that come back, quads without a
 // neighbour in their sector, columns of RGBA32F. The same closed forms at every fidelity with time.
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -211,6 +213,50 @@ TEST_P(CropPrices, QuadsInPairsWaitForTheHazardsOfEach) {
   EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, settings, {0}), 9, 0.01) << "never with itself";
   // The second in place 1 waits nine cycles for the first, and that in place 0 goes with it.
   EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, settings, {0, 1, 1}), 9.0 * 2 / 3, 0.01);
+}
+
+/// Rates of which two quads of RGBA8 take more than a cycle, and one of which three would fit into one.
+constexpr unsigned rates_between_whole_quads[] = {17, 18, 24, 31, 33, 40};
+
+TEST_P(CropPrices, QuadsInPairsTakeNoLessThanTheirBytes) {
+  context.format = ColorFormat::rgba8;
+  std::vector<unsigned> whole_tile;  // so that no quad waits for the one before it in its place
+  std::vector<unsigned> every_second;
+  for (unsigned position = 0; position < positions_per_tile; ++position) {
+    whole_tile.push_back(position);
+    if (position % 2 == 0) every_second.push_back(position);
+  }
+  for (const unsigned bytes : rates_between_whole_quads) {
+    for (const char* forwarding : {"on", "off"}) {
+      SCOPED_TRACE(std::to_string(bytes) + " bytes a cycle, forwarding " + forwarding);
+      const Bench::Settings settings{{"bytes_per_cycle", std::to_string(bytes)},
+                                     {"pairs_in_sector", "on"},
+                                     {"forwarding", forwarding}};
+      EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, settings, whole_tile), std::max(0.5, 16.0 / bytes), 0.01);
+      EXPECT_NEAR(cycles_of_a_quad(GetParam(), context, settings, every_second), 1, 0.01);
+    }
+  }
+}
+
+TEST_P(CropPrices, PartsOfTheOccupancyAreItsTimeAtRatesBetweenWholeQuads) {
+  context.format = ColorFormat::rgba8;
+  for (const unsigned bytes : rates_between_whole_quads) {
+    for (const char* forwarding : {"on", "off"}) {
+      SCOPED_TRACE(std::to_string(bytes) + " bytes a cycle, forwarding " + forwarding);
+      TimedCropBench crop(GetParam(), context,
+                          {{"bytes_per_cycle", std::to_string(bytes)},
+                           {"pairs_in_sector", "on"},
+                           {"forwarding", forwarding}});
+      for (unsigned round = 0; round < 10; ++round) {
+        for (unsigned position = 0; position < positions_per_tile; ++position) crop.quad({0, 0}, position, 0.01F);
+        crop.flush();
+      }
+      crop.run();
+      const double by_bytes = 640 * 16.0 / bytes;
+      EXPECT_NEAR(testing::occupied(crop.bench.unit(), CropWork::blend), by_bytes, 1e-6);
+      EXPECT_NEAR(testing::occupied(crop.bench.unit(), CropWork::unpaired), std::max(0.0, 320 - by_bytes), 1e-6);
+    }
+  }
 }
 
 TEST_P(CropPrices, QuadsInPairsPayForTheirLinesOnce) {

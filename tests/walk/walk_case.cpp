@@ -154,13 +154,16 @@ bool bounds_of(const Parameter& parameter, double& low, double& high) {
 }
 
 std::string whole_value(Dice& dice, double low, double high, double usual) {
+  // Bytes a cycle between those of whole quads.
+  constexpr double between[] = {0.75, 1.125, 1.25, 1.5};
   double value = usual;
-  switch (dice.below(6)) {
+  switch (dice.below(7)) {
     case 0: value = low; break;
     case 1: value = high; break;
     case 2: value = low + 1; break;
     case 3: value = usual * (dice.chance(50) ? 2 : 0.5); break;
     case 4: value = std::exp2(std::round(dice.real(0.0, std::log2(high)))); break;
+    case 5: value = usual * dice.one_of(between); break;
     default: value = std::exp(dice.real(std::log(low + 1), std::log(high + 1))) - 1; break;
   }
   return fmt::format("{:.0f}", std::min(high, std::max(low, std::floor(value))));
