@@ -130,9 +130,10 @@ tlm::tlm_sync_enum MemoryPort::nb_transport_bw(tlm::tlm_generic_payload& payload
     clock_.domain->fail(std::current_exception());
     return tlm::TLM_COMPLETED;
   }
+  // As legal as TLM_COMPLETED; but there are memories that wait for END_RESP after that.
   phase = tlm::END_RESP;
   access.release();
-  return tlm::TLM_COMPLETED;
+  return tlm::TLM_UPDATED;
 }
 
 void MemoryPort::free(tlm::tlm_generic_payload* payload) {

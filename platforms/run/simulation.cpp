@@ -581,6 +581,9 @@ RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<fl
   result.parameters = configuration.parameters();
   if (request.fidelity == Fidelity::lt || request.fidelity == Fidelity::at) {
     result.outside_validated_range = outside_validated_range(result.parameters);
+    for (std::string& reason : memories_outside_validated_range(configuration.netlist())) {
+      result.outside_validated_range.push_back(std::move(reason));
+    }
   }
   if (has_time(request.fidelity)) {
     run_clocked(configuration, progress, result);

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include <vrpipe/platforms/netlist.h>
+
 namespace vrpipe {
 
 namespace {
@@ -42,6 +44,15 @@ std::vector<std::string> outside_validated_range(const std::vector<std::pair<std
                           ", the most that was validated");
       }
     }
+  }
+  return reasons;
+}
+
+std::vector<std::string> memories_outside_validated_range(const Netlist& netlist) {
+  std::vector<std::string> reasons;
+  for (const ForeignInstance& memory : netlist.foreign_memories()) {
+    reasons.push_back("memory " + memory.path +
+                      " is of another make, and asked by b_transport, whose times may be a guess of its own");
   }
   return reasons;
 }

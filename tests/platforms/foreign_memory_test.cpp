@@ -109,6 +109,49 @@ TEST(ForeignMemory, TakesThePlaceOfTheL2ThoughItsRefreshNeverEnds) {
   }
 }
 
+// As DRAMSys up to 5.1: a response ends with END_RESP alone, and a request is taken after the one before.
+TEST(ForeignMemory, MayWaitForEndRespAndTakeOneRequestAtATime) {
+  const Draw draw = testing::random_draw(96, 96, 600, 21);
+  const RunResult expected = run(request_of("het+qm", Fidelity::functional, strictly), draw);
+  for (const bool waits : {false, true}) {
+    for (const bool one_at_a_time : {false, true}) {
+      SCOPED_TRACE(std::string(waits ? "waits" : "does not wait") + (one_at_a_time ? ", one at a time" : ""));
+      DramCounts dram;
+      const MemoryMaker make = [&](const std::string& name, unsigned) {
+        auto module = std::make_unique<CountedDram>(name, dram);
+        if (waits) module->wait_for_end_resp();
+        if (one_at_a_time) module->take_one_at_a_time();
+        return as_memory(std::move(module));
+      };
+      for (const Platform& platform : {with_memory(make), with_memory_below(make)}) {
+        RunRequest request = request_of("het+qm", Fidelity::cycle, strictly);
+        request.platform = &platform;
+        request.settings = {{"crop", "cache_bytes", "2048"}};
+        const RunResult result = run(request, draw);
+        EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color));
+        EXPECT_EQ(dram.responses, dram.requests);
+        EXPECT_EQ(dram.out_of_order == 0, one_at_a_time);
+      }
+    }
+  }
+}
+
+// What its b_transport says may have little to do with the times that it has at cycle.
+TEST(ForeignMemory, IsNamedWhereOnlyItsBTransportIsAsked) {
+  const Draw draw = testing::random_draw(32, 32, 20, 1);
+  DramCounts dram;
+  const Platform platform = with_memory_below(
+      [&](const std::string& name, unsigned) { return as_memory(std::make_unique<CountedDram>(name, dram)); });
+  for (const Fidelity fidelity : fidelities_with_time()) {
+    RunRequest request = request_of("baseline", fidelity);
+    EXPECT_TRUE(run(request, draw).outside_validated_range.empty()) << name_of(fidelity);
+    request.platform = &platform;
+    const std::vector<std::string> reasons = run(request, draw).outside_validated_range;
+    ASSERT_EQ(reasons.size(), fidelity == Fidelity::cycle ? 0U : 1U) << name_of(fidelity);
+    for (const std::string& reason : reasons) EXPECT_NE(reason.find("memory dram"), std::string::npos) << reason;
+  }
+}
+
 // An L2 of 64 lines, so that it reads again what it had, and writes back.
 TEST(ForeignMemory, LiesBelowAnL2ThatMisses) {
   const Draw draw = testing::random_draw(96, 96, 600, 21);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <utility>
 
 #include <tlm_utils/peq_with_get.h>
 #include <tlm_utils/simple_target_socket.h>
@@ -39,6 +40,10 @@ class Dram : public sc_core::sc_module {
   void fall_silent_after(std::uint64_t accesses) { silent_after_ = accesses; }
   void never_refresh() { refreshes_ = false; }
   void answer_with(tlm::tlm_response_status status) { status_ = status; }
+  /// A response ends with END_RESP alone, whatever nb_transport_bw returns beside it, and the next one waits for it.
+  void wait_for_end_resp() { waits_for_end_resp_ = true; }
+  /// It takes a request when it has answered the one before.
+  void take_one_at_a_time() { one_at_a_time_ = true; }
   std::uint64_t requests = 0, responses = 0, out_of_order = 0, refreshes = 0;
 
  private:
@@ -57,14 +62,18 @@ class Dram : public sc_core::sc_module {
   }
   tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) {
+    if (phase == tlm::END_RESP) {
+      responding_ = false;
+      ended_.notify();
+    }
     if (phase != tlm::BEGIN_REQ) return tlm::TLM_COMPLETED;
     payload.acquire();
     accepting_ = &payload;
-    accepted_.notify(delay + accept_);
+    if (!one_at_a_time_ || waiting_.empty()) accepted_.notify(delay + accept_);
     return tlm::TLM_ACCEPTED;
   }
   void end_request() {
-    tlm::tlm_generic_payload* const payload = accepting_;
+    tlm::tlm_generic_payload* const payload = std::exchange(accepting_, nullptr);
     waiting_.push_back(payload);
     if (requests++ < silent_after_) {
       answers_.notify(*payload, latency_of(payload->get_address(), sc_core::sc_time_stamp()));
@@ -83,8 +92,13 @@ class Dram : public sc_core::sc_module {
         payload->set_response_status(status_);
         tlm::tlm_phase phase = tlm::BEGIN_RESP;
         sc_core::sc_time delay;
-        socket->nb_transport_bw(*payload, phase, delay);
+        responding_ = true;
+        const tlm::tlm_sync_enum status = socket->nb_transport_bw(*payload, phase, delay);
+        if (status == tlm::TLM_UPDATED && phase == tlm::END_RESP) responding_ = false;
+        if (status == tlm::TLM_COMPLETED && !waits_for_end_resp_) responding_ = false;
+        while (responding_) wait(ended_);
         payload->release();
+        if (one_at_a_time_ && accepting_ != nullptr) accepted_.notify(accept_);
       }
     }
   }
@@ -104,7 +118,9 @@ class Dram : public sc_core::sc_module {
   std::map<std::uint64_t, std::uint64_t> open_rows_;  ///< by bank
   tlm::tlm_response_status status_ = tlm::TLM_OK_RESPONSE;
   std::uint64_t silent_after_ = ~std::uint64_t{0};
-  bool refreshes_ = true;
+  bool refreshes_ = true, waits_for_end_resp_ = false, one_at_a_time_ = false;
+  sc_core::sc_event ended_;  ///< a response
+  bool responding_ = false;  ///< BEGIN_RESP without END_RESP yet
 };
 
 }  // namespace foreign
