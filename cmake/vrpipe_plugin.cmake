@@ -16,6 +16,10 @@ endfunction()
 function(vrpipe_add_plugin name)
   add_library(${name} SHARED ${ARGN})
   set_target_properties(${name} PROPERTIES PREFIX "")
+  # A unit is asked millions of times in a frame.
+  if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+    target_compile_options(${name} PRIVATE -O2)
+  endif()
   target_compile_definitions(${name} PRIVATE VRPIPE_PLUGIN_TAG="${VRPIPE_PLUGIN_TAG}")
   target_link_libraries(${name} PRIVATE vrpipe::vrpipe)
   # Whoever links a plugin wants its units registered, even if it names none of its classes.
