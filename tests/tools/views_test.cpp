@@ -467,8 +467,11 @@ TEST_F(Views, ADamagedRecordIsSimulatedAgain) {
   const std::string whole = read_file(folder() / "j.jsonl");
   const std::size_t start = whole.find('\n') + 1, end = whole.find('\n', start);
   const std::string nested = std::string(100'000, '[') + std::string(100'000, ']');
+  // A bit of a number, so that the line still reads well.
+  std::string flipped = whole.substr(start, end - start);
+  flipped[flipped.find_last_of("0123456789")] ^= 1;
   for (const std::string& record :
-       {std::string("garbage"), std::string("[]"), std::string(R"({"view": 0})"),
+       {flipped, std::string("garbage"), std::string("[]"), std::string(R"({"view": 0})"),
         std::string(R"({"view": "x", "runs": 3})"), R"({"view": 0, "scene": {}, "runs": [1, 2, 3, )" + nested + "]}"}) {
     write("j.jsonl", whole.substr(0, start) + record + whole.substr(end));
     const Finished finished = vrpipe(words);

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <cstdlib>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -20,6 +22,7 @@
 
 #include "file_io.h"
 #include "host/process_setup.h"
+#include "jobs/identity.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -42,6 +45,23 @@ std::string difference(const nlohmann::json& one, const nlohmann::json& other) {
   path.erase(0, 1);
   std::replace(path.begin(), path.end(), '/', '.');
   return path.empty() ? "form" : path;
+}
+
+/// {"sha256":"the first 16 digits","record":RECORD}
+constexpr std::size_t digits = 16;
+constexpr std::string_view line_start = "{\"sha256\":\"", line_middle = "\",\"record\":";
+
+std::string line_of(const std::string& record) {
+  return fmt::format("{}{}{}{}}}\n", line_start, sha256(record).substr(0, digits), line_middle, record);
+}
+
+/// The record of a line without its end; none if the line is not what was written.
+std::optional<std::string_view> record_in(std::string_view line) {
+  const std::size_t before = line_start.size() + digits + line_middle.size();
+  if (line.size() <= before) return std::nullopt;
+  const std::string_view record = line.substr(before, line.size() - before - 1);
+  if (line_of(std::string(record)) != std::string(line) + '\n') return std::nullopt;
+  return record;
 }
 
 nlohmann::json binaries(nlohmann::json value, unsigned depth) {
@@ -167,8 +187,9 @@ void Journal::open(const nlohmann::json& head) {
 void Journal::take_in(const std::string& text, const std::string& first) {
   std::size_t start = first.size();
   for (std::size_t end; (end = text.find('\n', start)) != std::string::npos; start = end + 1) {
-    nlohmann::json record = nlohmann::json::parse(text.begin() + static_cast<std::ptrdiff_t>(start),
-                                                  text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
+    const auto written = record_in(std::string_view(text).substr(start, end - start));
+    if (!written) continue;
+    nlohmann::json record = nlohmann::json::parse(*written, nullptr, false);
     if (!record.is_discarded()) records_.push_back(std::move(record));
   }
   if (start < text.size() && ::ftruncate(descriptor_, static_cast<off_t>(start)) != 0) {
@@ -179,7 +200,7 @@ void Journal::take_in(const std::string& text, const std::string& first) {
 
 void Journal::append(const nlohmann::json& record) {
   if (descriptor_ < 0) return;
-  const std::string line = record.dump() + '\n';
+  const std::string line = line_of(record.dump());
   std::size_t done = 0;
   while (done < line.size()) {
     const ssize_t count = ::write(descriptor_, line.data() + done, line.size() - done);

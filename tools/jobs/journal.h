@@ -10,8 +10,8 @@
 namespace vrpipe::tools {
 
 /// What a long run has done, in a file, so that the run goes on where it was after it was ended, by whatever. JSON lines:
-/// the first says what the others belong to, each other is a record. A record is on the disk when append() returns; one
-/// that was being written when the run ended is left out.
+/// the first says what the others belong to, each other is a record with its checksum. A record is on the disk when append()
+/// returns; one that was being written when the run ended, or is not what was written, is left out.
 /// One process at a time holds a journal.
 class Journal {
  public:
