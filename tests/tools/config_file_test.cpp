@@ -2,6 +2,9 @@
 #include "tool_test_support.h"
 
 #include <regex>
+#include <sstream>
+
+#include "jobs/toml_depth.h"
 
 namespace vrpipe::testing {
 namespace {
@@ -137,6 +140,7 @@ TEST_F(ConfigFile, PrintedReadsBackToTheSameRunAndTheSameFile) {
   write("some.toml",
         "scene = \"tiny.spl\"\n[variants.own]\nbase = \"het\"\n[variants.own.set]\ntc.bins = 3\n"
         "crop.forwarding = false\n[set]\nzrop.cache_bytes = \"4K\"\n");
+  write("frame.json", R"({"commands": [{"draw": "tiny.spl"}]})");
   for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
            {"run", "--scene", "tiny.spl", "--set", "state.termination_threshold=0.75", "--set",
             "crop.latency_cycles=9"},
@@ -144,6 +148,13 @@ TEST_F(ConfigFile, PrintedReadsBackToTheSameRunAndTheSameFile) {
            {"compare", "--scene", "tiny.spl", "--platform", "mobile", "--variant", "baseline", "--variant",
             "x=het+qm,qru=pass-through,state.pruning_threshold=1e-5"},
            {"compare", "--scene", "tiny.spl", "--platform", "mobile", "--platform", "desktop", "--set", "tc.bins=4"},
+           {"run", "--scene", "tiny.spl", "--variant", "mine=het,tc.bins=7", "--set", "tc.bins=1"},
+           {"compare", "--scene", "tiny.spl", "--variant", "mine=het,tc.bins=7", "--variant", "baseline", "--set",
+            "tc.bins=1"},
+           {"run", "--frame", "frame.json", "--fidelity", "lt"},
+           {"compare", "--frame", "frame.json", "--set", "tc.bins=3"},
+           {"microbench", "kill-rate", "--fidelity", "bound", "--set", "tc.bins=9"},
+           {"reproduce", "--quick", "--size", "64x48", "--set", "tc.bins=9"},
            {"accuracy", "--config", "some.toml", "--quick", "--platform", "desktop"}}) {
     const std::string text = printed(command);
     SCOPED_TRACE(text);
@@ -151,9 +162,15 @@ TEST_F(ConfigFile, PrintedReadsBackToTheSameRunAndTheSameFile) {
     const auto without_comments = [](const std::string& of) {
       return std::regex_replace(of, std::regex(" *#[^\n]*"), "");
     };
-    EXPECT_EQ(without_comments(printed({command[0], "--config", "printed.toml"})), without_comments(text));
-    if (command[0] == "accuracy") continue;
-    const json first = json_of(command), again = json_of({command[0], "--config", "printed.toml"});
+    // As its first line says.
+    std::vector<std::string> again_words;
+    std::istringstream says(
+        text.substr(text.find("vrpipe ") + 7, text.find(" --config THIS_FILE") - text.find("vrpipe ") - 7));
+    for (std::string word; says >> word;) again_words.push_back(word);
+    again_words.insert(again_words.end(), {"--config", "printed.toml"});
+    EXPECT_EQ(without_comments(printed(again_words)), without_comments(text));
+    if (command[0] != "run" && command[0] != "compare") continue;
+    const json first = json_of(command), again = json_of(again_words);
     EXPECT_EQ(comparable(first), comparable(again));
   }
 }
@@ -202,9 +219,28 @@ TEST_F(ConfigFile, ThatCannotBeUsedIsRefusedWithItsLine) {
   bad("fidelity = lt\n", {"config.toml:1"});
   bad("config = \"other.toml\"\n", {"unknown key 'config'"});
   bad("\xff = 1\n", {"config.toml:1"});
+  std::string deep = "a";
+  for (int part = 0; part < 50000; ++part) deep += ".a";
+  bad("\n" + deep + " = 1\n", {"config.toml:2", "more than 64 parts"});
+  bad("[" + deep + "]\n", {"config.toml:1", "more than 64 parts"});
+  bad("set = { " + deep + " = 1 }\n", {"config.toml:1", "more than 64 parts"});
   refused({"run", "--config", "nowhere.toml"}, {"nowhere.toml", "no such file"});
   refused({"run", "--config", "."}, {"cannot read configuration"});
   refused({"units", "--config", "config.toml"}, {"--config"});
+}
+
+TEST(TomlKeys, DotsOfNumbersTextsAndCommentsAreNoPartsOfAKey) {
+  const std::string dots(200, '.');
+  std::string numbers = "a = [";
+  for (int i = 0; i < 200; ++i) numbers += "0.5, ";
+  for (const std::string& text : {"a = \"" + dots + "\"\n", "a = '" + dots + "'\n", "# " + dots + "\n", numbers + "]\n",
+                                  "a = \"\"\"\n" + dots + "\n\"" + dots + "\"\"\"\n", "\"\\\"" + dots + "\" = 1\n"}) {
+    EXPECT_EQ(tools::line_of_too_deep_a_key(text), 0U) << text;
+  }
+  std::string key = "a";
+  for (int part = 1; part < 64; ++part) key += " . 'b.'";
+  EXPECT_EQ(tools::line_of_too_deep_a_key(key + " = 1\n"), 0U);
+  EXPECT_EQ(tools::line_of_too_deep_a_key("a = 1\n\n" + key + ".c = 1\n"), 3U);
 }
 
 }  // namespace

@@ -36,8 +36,9 @@ struct Option {
   std::string group;                         ///< its heading in help; empty: not in help
   std::function<void(const Values&)> store;  ///< told what is given, all of it, whenever that changes; may be empty
   bool is_required = false;
-  std::string default_text = {};  ///< what stands for it where it is not given, for --print-config; empty: none
-  Values texts = {};              ///< as given; of a flag "true", as often as it is there
+  std::string default_text = {};    ///< what stands for it where it is not given, for --print-config; empty: none
+  std::string default_unless = {};  ///< an option beside which nothing does
+  Values texts = {};                ///< as given; of a flag "true", as often as it is there
 
   bool is_given() const { return !texts.empty(); }
   /// These texts are given, and no others.

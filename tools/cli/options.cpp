@@ -90,14 +90,14 @@ void load_plugins(const Values& plugins) {
 }
 
 void SimulationArguments::declare_scene(Arguments& arguments) {
-  arguments
-      .add_option("--scene", scene_, "FILE|builtin:NAME|NAME=FILE",
-                  "trained Gaussians (.ply, .splat, .spz, .sog, .ksplat ...), a .spl draw list,\n"
-                  "or a built-in scene (default: builtin:object; `vrpipe scenes` lists them);\n"
-                  "with NAME=FILE the file takes the place of a built-in scene and has its\n"
-                  "size: train=model.ply",
-                  scene_group)
-      .default_text = "builtin:object";
+  Option& scene = arguments.add_option("--scene", scene_, "FILE|builtin:NAME|NAME=FILE",
+                                       "trained Gaussians (.ply, .splat, .spz, .sog, .ksplat ...), a .spl draw list,\n"
+                                       "or a built-in scene (default: builtin:object; `vrpipe scenes` lists them);\n"
+                                       "with NAME=FILE the file takes the place of a built-in scene and has its\n"
+                                       "size: train=model.ply",
+                                       scene_group);
+  scene.default_text = "builtin:object";
+  scene.default_unless = "--frame";
   arguments.add_option("--mesh", meshes_, "FILE",
                        "an opaque triangle mesh that is drawn with the scene: .obj, .ply, .gltf or\n"
                        ".glb, in the world of its Gaussians; can be repeated (docs/meshes.md)",

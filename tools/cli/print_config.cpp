@@ -164,7 +164,8 @@ class ConfigWriter {
   }
 
   std::string option_line(const Option& option, const std::string& name) const {
-    if (!option.is_given() && option.default_text.empty()) {
+    const bool has_default = !option.default_text.empty() && !is_given(option.default_unless);
+    if (!option.is_given() && !has_default) {
       return fmt::format("{:<{}} # {}\n", "# " + name, comment_column, default_of(option));
     }
     if (!option.is_given()) return line_of(name, value_text(option.default_text), "default");
@@ -178,6 +179,11 @@ class ConfigWriter {
     }
     const std::string value = values.size() == 1 ? values.front() : fmt::format("[{}]", fmt::join(values, ", "));
     return line_of(name, value, given(option.name));
+  }
+
+  bool is_given(const std::string& option) const {
+    const Option* const found = option.empty() ? nullptr : invocation_.arguments->find(option);
+    return found != nullptr && found->is_given();
   }
 
   std::string parameter_line(const std::string& name, const std::string& value, const Platform* platform) const {
@@ -210,9 +216,15 @@ bool prints_config(const Invocation& invocation) {
 std::string config_text(const Invocation& invocation, const std::vector<RunRequest>& requests,
                         const std::vector<std::pair<std::string, std::string>>& preprocess) {
   const ConfigWriter writer(invocation, requests);
+  // What is known by its place has no key.
+  std::string command = invocation.arguments->command();
+  for (const Option& option : invocation.arguments->options()) {
+    if (option.kind != Option::Kind::positional) continue;
+    for (const std::string& text : option.texts) command += " " + text;
+  }
   return fmt::format(
              "# `vrpipe {} --config THIS_FILE` does this; vrpipe {}. After each value is where it comes from.\n\n",
-             invocation.arguments->command(), VRPIPE_VERSION) +
+             command, VRPIPE_VERSION) +
          writer.options() + writer.units() + writer.variants() + writer.parameters(preprocess);
 }
 

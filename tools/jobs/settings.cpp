@@ -40,12 +40,15 @@ void leave_out_restated(std::vector<RunRequest>& requests, const std::function<b
   std::vector<bool> restated, is_listed(given.size(), false);
   for (const Setting& setting : given) restated.push_back(which(setting));
   for (const RunRequest& request : requests) {
-    RunRequest shorter = request;
+    // What a variant sets itself hides a setting, and does not make it so anyway.
+    RunRequest whole = request;
+    whole.variant.changed_settings.clear();
+    RunRequest shorter = whole;
     std::vector<Setting>& kept = shorter.settings;
     kept.erase(std::remove_if(kept.begin(), kept.end(), which), kept.end());
     if (kept.size() == given.size()) return;
     // One that names a path may be in neither list.
-    const auto with = final_parameters(request), without = final_parameters(shorter);
+    const auto with = final_parameters(whole), without = final_parameters(shorter);
     for (std::size_t i = 0; i < given.size(); ++i) {
       const std::string name = given[i].unit + "." + given[i].parameter;
       const auto value_in = [&](const auto& parameters) {
