@@ -350,6 +350,7 @@ TEST_F(FrameFile, BadStates) {
   bad_state(R"({"early_termination": "off"})", {"state.early_termination): it is \"off\"", "true or false"});
   bad_state(R"({"pruning_threshold": 2})", {"state.pruning_threshold): ", "'2'", "from 0 to 1"});
   bad_state(R"({"pruning_threshold": "0.1"})", {"state.pruning_threshold): ", "not a number"});
+  bad_state(R"({"depth": {}})", {"state.depth): it is a draw list, whose splats have no depth"});
   bad_state(R"({"splat_extent": 1})", {"state.splat_extent): ", "not a text"});
   bad_state(R"({"splat_extent": "box"})", {"state.splat_extent): ", "obb"});
   for (const char* precision : {"blend_rounding", "exponential", "subpixel_bits"}) {

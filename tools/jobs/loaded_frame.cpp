@@ -44,6 +44,10 @@ void check(const FrameCommand& command, const Draw& geometry, const LoadedFrame&
                     frame.viewpoint ? fmt::format("give --size {}x{}", geometry.width, geometry.height)
                                     : "use draw lists of one size");
   }
+  if (draw.depth && !draw.is_mesh && is_draw_list(draw.scene)) {
+    throw UserError("cannot test the depth of " + draw.scene, command.where + ", state.depth",
+                    "it is a draw list, whose splats have no depth", "leave out the depth test, or draw the .ply");
+  }
   const std::size_t there = geometry.splats.size();
   const bool is_part = draw.splats != ~0U;
   if (is_part && (draw.first > there || draw.splats > there - draw.first)) {
