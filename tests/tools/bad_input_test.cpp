@@ -232,6 +232,29 @@ TEST_F(BadInput, Outputs) {
   refused({"scenes", "--json", "nowhere/s.json"}, {"nowhere"});
 }
 
+TEST_F(BadInput, AFullDiskUnderOneResultLeavesTheOthers) {
+  write("study.toml", "scene = \"tiny.spl\"\nfidelity = \"lt\"\n[axes]\ntc.bins = [4]\n");
+  for (std::vector<std::string> words :
+       std::vector<std::vector<std::string>>{{"run", "--scene", "tiny.spl"},
+                                             {"compare", "--scene", "tiny.spl"},
+                                             {"accuracy", "--scene", "tiny.spl", "--quick"},
+                                             {"microbench", "kill-rate", "--fidelity", "bound"},
+                                             {"sweep", "study.toml"}}) {
+    SCOPED_TRACE(words[0]);
+    std::vector<std::string> all = words;
+    words.insert(words.end(), {"--html", "/dev/full", "--json", "ok.json"});
+    const Finished finished = vrpipe(words);
+    EXPECT_EQ(finished.code, 2);
+    EXPECT_EQ(finished.err.rfind("vrpipe: error: cannot write file (--html /dev/full)", 0), 0U) << finished.err;
+    EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1) << finished.err;
+    EXPECT_TRUE(std::filesystem::remove(folder() / "ok.json"));
+    EXPECT_NE(finished.out.find("result: ok.json"), std::string::npos) << finished.out;
+    EXPECT_EQ(finished.out.find("page: "), std::string::npos) << finished.out;
+    all.insert(all.end(), {"--html", "/dev/full", "--json", "/dev/full"});
+    EXPECT_NE(vrpipe(all).err.find("; neither could --json /dev/full be written"), std::string::npos);
+  }
+}
+
 TEST_F(BadInput, BrokenGaussiansAreCountedNotFatal) {
   GaussianSceneBuilder builder(0);
   GaussianAttributes gaussian;

@@ -68,9 +68,10 @@ class AccuracyCommand : public Command {
 
     ProgressLine progress;
     const AccuracyResult result = measure_accuracy(job, progress);
+    ResultFiles files;
     if (job.html) {
       progress.show("writing the page");
-      write_output_file(*job.html, accuracy_page(result), "--html");
+      files.write(*job.html, accuracy_page(result), "--html");
     }
     progress.erase();
     const std::optional<std::string>& json = job.simulation.json;
@@ -78,14 +79,14 @@ class AccuracyCommand : public Command {
       const std::string text = json_text(accuracy_json(result));
       if (*json == "-") {
         std::cout << text;
-        return;
+        return files.check();
       }
-      write_output_file(*json, text, "--json");
+      files.write(*json, text, "--json");
     }
     std::cout << (job.markdown ? accuracy_markdown(result) : accuracy_text(result, stdout_style()));
-    if (job.markdown) return;
-    if (json) std::cout << "result: " << printable(*json) << '\n';
-    if (job.html) std::cout << "page: " << printable(job.html->string()) << '\n';
+    if (files.has("--json") && !job.markdown) std::cout << "result: " << printable(*json) << '\n';
+    if (files.has("--html") && !job.markdown) std::cout << "page: " << printable(job.html->string()) << '\n';
+    files.check();
   }
 
  private:

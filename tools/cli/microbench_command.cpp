@@ -62,18 +62,20 @@ class MicrobenchCommand : public Command {
     run.request = job.request;
     run.processes = job.processes;
     for (const std::string& each : names) run.results.push_back(run_microbench(each, job.request, job.processes));
-    if (html) write_output_file(*html, microbench_page(run), "--html");
+    ResultFiles files;
+    if (html) files.write(*html, microbench_page(run), "--html");
     if (job.json) {
       const std::string text = json_text(microbench_json(run));
       if (*job.json == "-") {
         std::cout << text;
-        return;
+        return files.check();
       }
-      write_output_file(*job.json, text, "--json");
+      files.write(*job.json, text, "--json");
     }
     std::cout << microbench_text(run, stdout_style());
-    if (job.json) std::cout << "result: " << printable(*job.json) << '\n';
-    if (html) std::cout << "page: " << printable(*html) << '\n';
+    if (files.has("--json")) std::cout << "result: " << printable(*job.json) << '\n';
+    if (files.has("--html")) std::cout << "page: " << printable(*html) << '\n';
+    files.check();
   }
 
  private:

@@ -25,7 +25,7 @@ namespace {
 
 /// Both made and printed as the job says; false when stdout is for the JSON alone.
 template <class MakeJson, class MakeText>
-bool print(const SimulationJob& job, const MakeJson& make_json, const MakeText& make_text) {
+bool print(const SimulationJob& job, ResultFiles& files, const MakeJson& make_json, const MakeText& make_text) {
   const TextStyle style = stdout_style();
   std::string json;
   std::string text;
@@ -39,42 +39,47 @@ bool print(const SimulationJob& job, const MakeJson& make_json, const MakeText& 
       std::cout << json;
       return false;
     }
-    write_output_file(*job.json, json, "--json");
+    files.write(*job.json, json, "--json");
   }
   std::cout << text;
-  if (job.json) std::cout << "result: " << printable(*job.json) << '\n';
+  if (files.has("--json")) std::cout << "result: " << printable(*job.json) << '\n';
   return true;
 }
 
 }  // namespace
 
 void print_result(const SimulationJob& job, const JobResult& result) {
-  if (job.interval_csv) write_output_file(*job.interval_csv, intervals_csv(result.runs), "--interval-csv");
+  ResultFiles files;
+  if (job.interval_csv) files.write(*job.interval_csv, intervals_csv(result.runs), "--interval-csv");
   if (job.html) {
     std::string page;
     {
       const StdoutToStderr redirected;
       page = compare_page(result);
     }
-    write_output_file(*job.html, page, "--html");
+    files.write(*job.html, page, "--html");
   }
   const bool has_text = print(
-      job, [&] { return result_json(result); }, [&](const TextStyle& style) { return report(result, style); });
-  if (!has_text) return;
+      job, files, [&] { return result_json(result); }, [&](const TextStyle& style) { return report(result, style); });
+  if (!has_text) return files.check();
   const auto tell = [](const char* what, const std::filesystem::path& where) {
     std::cout << what << ": " << printable(where.string()) << '\n';
   };
-  if (job.html) tell("page", *job.html);
+  if (files.has("--html")) tell("page", *job.html);
   if (job.save_draw) tell("draw", *job.save_draw);
-  if (job.interval_csv) tell("intervals", *job.interval_csv);
+  if (files.has("--interval-csv")) tell("intervals", *job.interval_csv);
   if (job.trace) tell("trace", job.trace->path());
   if (job.log && job.log->file()) tell("log", *job.log->file());
   if (job.heat_maps) tell("heat maps", *job.output);
+  files.check();
 }
 
 void print_result(const SimulationJob& job, const ViewsResult& result) {
+  ResultFiles files;
   print(
-      job, [&] { return views_json(result); }, [&](const TextStyle& style) { return views_report(result, style); });
+      job, files, [&] { return views_json(result); },
+      [&](const TextStyle& style) { return views_report(result, style); });
+  files.check();
   // Not before all of it is safe.
   std::cout.flush();
   if (std::cout) result.journal->finish();

@@ -99,16 +99,18 @@ class ReproduceCommand : public Command {
     ProgressLine progress;
     const ReproduceResult result = simulate_reproduction(job, progress);
     const Reproduction reproduction = reproduction_of(result);
-    write_files(job, reproduction);
+    ResultFiles files;
+    write_files(job, reproduction, files);
     if (job.json) {
       const std::string text = json_text(reproduction_json(reproduction));
       if (*job.json == "-") {
         std::cout << text;
       } else {
-        write_output_file(*job.json, text, "--json");
+        files.write(*job.json, text, "--json");
       }
     }
-    if (job.json != "-") print(job, reproduction);
+    if (job.json != "-") print(job, reproduction, files);
+    files.check();
     // Not before all of it is safe.
     std::cout.flush();
     if (std::cout) result.journal->finish();
@@ -160,20 +162,20 @@ class ReproduceCommand : public Command {
     return job;
   }
 
-  static void write_files(const ReproduceJob& job, const Reproduction& of) {
-    if (job.html) write_output_file(*job.html, reproduction_page(of), "--html");
-    if (job.markdown) write_output_file(*job.markdown, reproduction_markdown(of), "--markdown");
+  static void write_files(const ReproduceJob& job, const Reproduction& of, ResultFiles& files) {
+    if (job.html) files.write(*job.html, reproduction_page(of), "--html");
+    if (job.markdown) files.write(*job.markdown, reproduction_markdown(of), "--markdown");
     if (!job.output) return;
     for (const SceneFinding& scene : of.findings.scenes) {
       for (const PointResult* point : {scene.map_without, scene.map_with}) {
         const std::string file =
             "fragments-" + of.result.plan.scenes[scene.scene].name + "-" + point->run.request.variant.name + ".png";
-        write_output_file(*job.output / file, point->map->png, "--output");
+        files.write(*job.output / file, point->map->png, "--output");
       }
     }
   }
 
-  static void print(const ReproduceJob& job, const Reproduction& of) {
+  static void print(const ReproduceJob& job, const Reproduction& of, const ResultFiles& files) {
     std::cout << reproduction_text(of, stdout_style());
     const ReproduceResult& result = of.result;
     std::cout << fmt::format("\ntook {:.0f} s to simulate {} in {} process{}", result.seconds,
@@ -181,10 +183,10 @@ class ReproduceCommand : public Command {
                              result.processes == 1 ? "" : "es at a time");
     if (result.done_before > 0) std::cout << fmt::format("; {} were done before", result.done_before);
     std::cout << '\n';
-    if (job.json) std::cout << "result: " << printable(*job.json) << '\n';
-    if (job.html) std::cout << "page: " << printable(job.html->string()) << '\n';
-    if (job.markdown) std::cout << "documentation: " << printable(job.markdown->string()) << '\n';
-    if (job.output) std::cout << "heat maps: " << printable(job.output->string()) << '\n';
+    if (files.has("--json")) std::cout << "result: " << printable(*job.json) << '\n';
+    if (files.has("--html")) std::cout << "page: " << printable(job.html->string()) << '\n';
+    if (files.has("--markdown")) std::cout << "documentation: " << printable(job.markdown->string()) << '\n';
+    if (files.has("--output")) std::cout << "heat maps: " << printable(job.output->string()) << '\n';
   }
 
   Values scenes_, cameras_, size_, views_, platform_, settings_, fidelity_;

@@ -65,9 +65,9 @@ class SweepCommand : public Command {
                              "axes and points, and whatever a configuration file says (docs/studies.md)");
     arguments_.declare_study(arguments);
     arguments.add_option("--relative-to", relative_to_, "AXIS=VALUE,...",
-                         "over which point speed-ups are, e.g. variant=baseline,platform=mobile; axes of\n"
-                         "what the GPU is that are not named have their first value, scene, view and\n"
-                         "fidelity are the point's own (default: the first value of each)",
+                         "over which point speed-ups are, e.g. variant=baseline,platform=mobile; of axes of\n"
+                         "what the GPU is that are not named the baseline or the platform's own value, if it\n"
+                         "is there, else the first; scene, view and fidelity are the point's own",
                          result_group);
     arguments.add_option("--csv", csv_, "FILE", "writes a row for each point", result_group);
     arguments.add_option("--jsonl", jsonl_, "FILE", "writes a line of JSON for each point", result_group);
@@ -106,11 +106,12 @@ class SweepCommand : public Command {
     if (result.is_elsewhere) return;
     if (job.shard) return tell_shard(job, result);
     const SweepFindings findings = sweep_findings(result);
-    if (job.csv) write_output_file(*job.csv, sweep_csv(findings.table), "--csv");
-    if (job.jsonl) write_output_file(*job.jsonl, sweep_jsonl(findings.table), "--jsonl");
-    if (job.html) write_output_file(*job.html, sweep_page(findings), "--html");
+    ResultFiles files;
+    if (job.csv) files.write(*job.csv, sweep_csv(findings.table), "--csv");
+    if (job.jsonl) files.write(*job.jsonl, sweep_jsonl(findings.table), "--jsonl");
+    if (job.html) files.write(*job.html, sweep_page(findings), "--html");
     const auto& json = job.common.json;
-    if (json && *json != "-") write_output_file(*json, json_text(sweep_json(findings)), "--json");
+    if (json && *json != "-") files.write(*json, json_text(sweep_json(findings)), "--json");
     if (json == "-") {
       std::cout << json_text(sweep_json(findings));
     } else {
@@ -119,12 +120,12 @@ class SweepCommand : public Command {
                                result.points.size() - result.done_before, result.processes);
       if (result.done_before > 0) std::cout << fmt::format("; {} were done before", result.done_before);
       std::cout << '\n';
-      for (const auto& [what, file] :
-           {std::pair{"points", job.csv}, std::pair{"points", job.jsonl}, std::pair{"page", job.html}}) {
-        if (file) std::cout << what << ": " << printable(file->string()) << '\n';
-      }
-      if (json) std::cout << "result: " << printable(*json) << '\n';
+      if (files.has("--csv")) std::cout << "points: " << printable(job.csv->string()) << '\n';
+      if (files.has("--jsonl")) std::cout << "points: " << printable(job.jsonl->string()) << '\n';
+      if (files.has("--html")) std::cout << "page: " << printable(job.html->string()) << '\n';
+      if (files.has("--json")) std::cout << "result: " << printable(*json) << '\n';
     }
+    files.check();
     // Not before all of it is safe.
     std::cout.flush();
     if (std::cout) result.journal->finish();
@@ -139,6 +140,7 @@ class SweepCommand : public Command {
     if (const auto text = single(relative_to_, "--relative-to"))
       job.study.relative_to = parse_axis_values(*text, job.study, "--relative-to");
     job.common = arguments_.resolve(SimulationArguments::Variants::one, invocation());
+    choose_references(job);
     job.csv = single_path(csv_, "--csv");
     job.jsonl = single_path(jsonl_, "--jsonl");
     job.html = single_path(html_, "--html");

@@ -12,6 +12,7 @@
 
 #include <vrpipe/component/error.h>
 
+#include "host/command_failure.h"
 #include "host/process_setup.h"
 
 namespace vrpipe::tools {
@@ -127,6 +128,24 @@ void write_output_file(const fs::path& path, const std::string& bytes, const std
   file->write(bytes.data(), bytes.size());
   file->commit();
   note_written(path.string());
+}
+
+void ResultFiles::write(const fs::path& path, const std::string& bytes, const std::string& option) {
+  try {
+    write_output_file(path, bytes, option);
+    written_.insert(option);
+  } catch (const UserError& error) {
+    failures_ += failures_.empty() ? error.what() : "; neither could " + place(path, option) + " be written";
+    failed_.insert(option);
+  }
+}
+
+bool ResultFiles::has(const std::string& option) const {
+  return written_.count(option) > 0 && failed_.count(option) == 0;
+}
+
+void ResultFiles::check() const {
+  if (!failures_.empty()) throw CommandFailure(exit_user_error, failures_);
 }
 
 }  // namespace vrpipe::tools

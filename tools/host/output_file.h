@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -39,5 +40,20 @@ std::unique_ptr<AtomicFile> open_output_file(const std::filesystem::path& path, 
 
 /// Writes a file as AtomicFile does.
 void write_output_file(const std::filesystem::path& path, const std::string& bytes, const std::string& option);
+
+/// The files of one result: a disk that is full under one of them does not take the others with it.
+class ResultFiles {
+ public:
+  /// Writes a file as write_output_file() does; what keeps it from being written, check() says.
+  void write(const std::filesystem::path& path, const std::string& bytes, const std::string& option);
+  /// Whether all that an option named is written, and something is.
+  bool has(const std::string& option) const;
+  /// Once all is written and printed. Throws CommandFailure with all that could not be.
+  void check() const;
+
+ private:
+  std::set<std::string> written_, failed_;  ///< options
+  std::string failures_;
+};
 
 }  // namespace vrpipe::tools

@@ -11,7 +11,7 @@
 namespace vrpipe::tools {
 namespace {
 
-constexpr unsigned rounds = 3;
+constexpr unsigned measured_rounds = 3;
 /// From here on a user wants to know beforehand.
 constexpr double long_seconds = 30;
 
@@ -68,15 +68,15 @@ std::vector<EffectCosts> measure_effects(const std::vector<RunResult>& runs, con
   std::vector<Repetition> repetitions;
   for (std::size_t i = 0; i < runs.size(); ++i) add_repetitions(runs[i], costs[i], repetitions);
   double seconds = 0;
-  for (const Repetition& repetition : repetitions) seconds += rounds * repetition.run->cpu_seconds;
-  const std::string text = announcement(rounds * repetitions.size(), seconds);
+  for (const Repetition& repetition : repetitions) seconds += measured_rounds * repetition.run->cpu_seconds;
+  const std::string text = announcement(measured_rounds * repetitions.size(), seconds);
   if (!text.empty()) {
     progress.erase();
     fmt::print(stderr, "{}\n", text);
   }
 
   std::vector<Task> tasks;
-  for (unsigned round = 0; round < rounds; ++round) {
+  for (unsigned round = 0; round < measured_rounds; ++round) {
     for (const Repetition& repetition : repetitions) {
       RunRequest request = repetition.run->request;
       request.effects = repetition.effects;
