@@ -118,9 +118,10 @@ TEST_F(Sweep, SpeedUpsAreOverOnePointOfTheSameScene) {
   const json usual = sweep(study);
   for (std::size_t i = 0; i < 8; ++i) {
     const json& point = usual["points"][i];
-    const json& reference = usual["points"][i < 4 ? 0 : 4];
+    const json& reference = usual["points"][i < 4 ? 1 : 5];  // of the platform's own 32 bins
     EXPECT_DOUBLE_EQ(point["speedup"].get<double>(), reference["cycles"].get<double>() / point["cycles"].get<double>());
   }
+  EXPECT_EQ(usual["relative_to"], "variant=baseline, tc.bins=32");
   const json named = sweep(study, {"--relative-to", "variant=het,tc.bins=32"});
   EXPECT_EQ(named["relative_to"], "variant=het, tc.bins=32");
   EXPECT_EQ(named["points"][3]["speedup"], 1.0);
@@ -304,6 +305,9 @@ TEST_F(Sweep, ThatCannotBeIsRefusedWithItsLine) {
   bad("sample = 9\n[axes]\ntc.bins = [4]\n", {"sample", "study.toml:1"});
   bad("seed = 9\n[axes]\ntc.bins = [4]\n", {"there is no sample"});
   bad("[[points]]\ntc.bins = 4\n[[points]]\ntgc.bins = 4\n", {"study.toml:", "'tgc.bins'"});
+  bad("seed = -1\nsample = 1\n[axes]\ntc.bins = [4]\n", {"'seed'", "study.toml:1", "negative"});
+  bad("[[points]]\ntc.bins = 4\n[[points]]\ntc.bins = 4\n", {"study.toml:3", "it is there twice"});
+  bad("pareto = [\"cycles\", \"-cycles\"]\n[axes]\ntc.bins = [3]\n", {"study.toml:1", "it has cycles twice"});
   bad("[[points]]\ntc.bins = 4\n[axes]\ntc.bins = [4]\n", {"points and axes"});
   bad("sise = \"3x3\"\n[axes]\ntc.bins = [4]\n", {"unknown key 'sise'", "study.toml:1", "did you mean size"});
   bad("[axes]\ntc.bins = [0]\n", {"tc.bins", "from 1 to"});

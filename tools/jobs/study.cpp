@@ -159,6 +159,9 @@ void add_list(const StudyReader& reader, const toml::array& list, Study& study) 
           static_cast<std::size_t>(found - axis->values.begin());
       if (found == axis->values.end()) axis->values.push_back(text);
     }
+    const bool is_there = std::any_of(study.points.begin(), study.points.end(),
+                                      [&](const StudiedPoint& other) { return other.values == point.values; });
+    if (is_there) reader.refuse(*table, "bad point", "it is there twice", "leave it out");
     study.points.push_back(std::move(point));
   }
 }
@@ -181,6 +184,8 @@ void add_product(const StudyReader& reader, const toml::table& root, Study& stud
   if (seed != nullptr && (count == nullptr || !seed->is_integer()))
     reader.refuse(*seed, "bad value of 'seed'", count == nullptr ? "there is no sample" : "it is no whole number",
                   count == nullptr ? "add sample = N, or leave it out" : "give a whole number");
+  if (seed != nullptr && *seed->value<std::int64_t>() < 0)
+    reader.refuse(*seed, "bad value of 'seed'", "it is negative", "give a whole number from 0");
   if (count == nullptr) {
     if (study.product > most_points)
       reader.refuse(root, "too many points", fmt::format("the product has {}", study.product),
@@ -231,7 +236,16 @@ Study read_study(const std::filesystem::path& path) {
     if (list == nullptr || list->size() < 2)
       reader.refuse(*pareto, "bad value of 'pareto'", "it is no list of two columns or more",
                     "write e.g. pareto = [\"milliseconds\", \"energy_mj\"]");
-    for (const toml::node& column : *list) study.pareto.push_back(reader.scalar(column, "pareto"));
+    const auto quantity = [](const std::string& column) { return column.substr(column.rfind('-', 0) == 0 ? 1 : 0); };
+    for (const toml::node& node : *list) {
+      const std::string column = reader.scalar(node, "pareto");
+      for (const std::string& other : study.pareto) {
+        if (quantity(other) == quantity(column))
+          reader.refuse(node, "bad value of 'pareto'", "it has " + quantity(column) + " twice",
+                        "take columns of different quantities");
+      }
+      study.pareto.push_back(column);
+    }
   }
   return study;
 }
@@ -283,7 +297,7 @@ std::vector<std::optional<std::size_t>> references(const Study& study) {
         values[axis] =
             static_cast<std::size_t>(std::find(of.values.begin(), of.values.end(), named->second) - of.values.begin());
       } else if (!follows_the_point(of.name)) {
-        values[axis] = 0;
+        values[axis] = of.reference;
       }
     }
     const auto found = places.find(values);

@@ -14,7 +14,8 @@ namespace vrpipe::tools {
 struct StudyAxis {
   std::string name;  ///< scene, view, size, platform, variant, fidelity, format, termination, or UNIT.PARAMETER
   std::vector<std::string> values;
-  bool numeric = false;  ///< all values are numbers
+  bool numeric = false;       ///< all values are numbers
+  std::size_t reference = 0;  ///< the place of the value over which speed-ups are, unless a study names another
 };
 
 /// What is run: a value on every axis.
@@ -49,7 +50,7 @@ bool follows_the_point(const std::string& axis);
 AxisValues parse_axis_values(const std::string& text, const Study& study, const std::string& where);
 
 /// For each point the one that it is relative to: the named axes have the named values, the others of what the GPU is
-/// (platform, variant, parameters) their first, and those of what is drawn and how exactly the point's own. None where that
+/// (platform, variant, parameters) their reference, and those of what is drawn and how exactly the point's own. None where that
 /// is no point of the study.
 std::vector<std::optional<std::size_t>> references(const Study& study);
 

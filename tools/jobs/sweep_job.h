@@ -57,6 +57,10 @@ struct SweepResult {
 /// A value of the axis `scene`, from where vrpipe runs: names of files are relative to the study's folder.
 std::string scene_of_axis(const SweepJob& job, const std::string& value);
 
+/// Makes the reference of each axis what is so without the study, where the axis has it: the baseline, the platform's own
+/// value of a parameter, the format and termination of the other options.
+void choose_references(SweepJob& job);
+
 /// The request of a point. Throws UserError for what does not exist, and for a parameter that the point's variant sets
 /// itself: its axis would change nothing.
 RunRequest request_of(const SweepJob& job, const StudiedPoint& point);

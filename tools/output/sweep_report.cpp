@@ -107,7 +107,7 @@ std::string reference_text(const Study& study) {
                                     [&](const auto& each) { return each.first == axis.name; });
     if (named == study.relative_to.end() && follows_the_point(axis.name)) continue;
     text += fmt::format("{}{}={}", text.empty() ? "" : ", ", axis.name,
-                        named == study.relative_to.end() ? axis.values.front() : named->second);
+                        named == study.relative_to.end() ? axis.values[axis.reference] : named->second);
   }
   return text;
 }
