@@ -7,9 +7,12 @@
 #include <string>
 #include <vector>
 
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/simulation.h>
 
 #include "jobs/energy.h"
+#include "output/energy_report.h"
+#include "qru/qru.h"
 #include "tool_test_support.h"
 
 namespace vrpipe::testing {
@@ -150,6 +153,31 @@ TEST(Energy, OfARunWithoutCounterIsSaidToBeLeftOut) {
   run = run_of(500, 320, 1000);
   run.statistics.resize(2);
   EXPECT_TRUE(energy_amounts(run, table).not_counted.empty()) << "reads alone, where there are no writes";
+}
+
+/// A unit of somebody else's, which counts nothing.
+const Registrar<PairingQru, QruBehaviour> silent("qru", "silent", "as pairing, for runs by hand");
+
+TEST(Energy, OfAUnitThatDoesNotCountIsAtLeastWhatIsSaid) {
+  std::string text = two_events;
+  text.replace(text.find("\"4 * sm.quads_shaded * sm.fragment_instructions\""), 48,
+               "[\"sm.quads_shaded\", \"qru.pairs\", \"qru.cache.sectors\"]");
+  const EnergyTable table = table_of(text);
+  RunResult run = run_of(500, 320, 1000);
+  run.implementations = {{"qru", "pairing"}};
+  const EnergyAmounts shipped = energy_amounts(run, table);
+  EXPECT_TRUE(shipped.missing.empty()) << "what that does not count does not happen";
+  run.implementations = {{"qru", "silent"}};
+  const EnergyAmounts amounts = energy_amounts(run, table);
+  EXPECT_EQ(amounts.missing, std::vector<std::string>{"qru.pairs of qru=silent"});
+  EXPECT_EQ(amounts.events, shipped.events);
+  EXPECT_FALSE(energy_ratio(shipped, amounts, table).has_value());
+  EXPECT_FALSE(energy_ratio(amounts, shipped, table).has_value());
+  EXPECT_TRUE(energy_report(amounts, table).total.has_value());
+  EXPECT_FALSE(energy_report(amounts, table).quad_merging_share.has_value());
+  const std::string said = tools::energy_text({run}, 0, table, {});
+  EXPECT_NE(said.find("at least"), std::string::npos) << said;
+  EXPECT_NE(said.find("do not count qru.pairs"), std::string::npos) << said;
 }
 
 TEST(Energy, AUnitThatPassesThroughSpendsNothing) {

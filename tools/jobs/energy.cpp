@@ -4,6 +4,7 @@
 #include <charconv>
 #include <map>
 #include <numeric>
+#include <set>
 #include <utility>
 
 #include <vrpipe/pipeline/registry.h>
@@ -28,35 +29,46 @@ class RunNumbers {
     }
     for (const auto& [slot, name] : run.implementations) {
       for (const Implementation* each : Registry::instance().of_slot(slot)) {
-        if (each->name == name && each->pass_through) passed_.push_back(slot + ".");
+        if (each->name != name) continue;
+        if (each->pass_through) passed_.push_back(slot + ".");
+        if (each->trust == Trust::checked) own_.emplace_back(slot, name);
       }
     }
   }
 
   /// Of the products that the run has numbers for: what a platform lacks does not happen there. None if it lacks all.
-  std::optional<double> value(const CountFormula& formula) const {
+  /// @param missing  told what a unit of one's own should say and does not
+  std::optional<double> value(const CountFormula& formula, std::set<std::string>& missing) const {
     std::optional<double> sum;
     for (const CountProduct& product : formula.products) {
-      if (const std::optional<double> each = value(product)) sum = sum.value_or(0) + *each;
+      if (const std::optional<double> each = value(product, missing)) sum = sum.value_or(0) + *each;
     }
     return sum;
   }
 
  private:
-  std::optional<double> value(const CountProduct& product) const {
+  std::optional<double> value(const CountProduct& product, std::set<std::string>& missing) const {
     double value = product.factor;
     for (const std::string& name : product.names) {
       const auto is_start = [&](const std::string& slot) { return name.compare(0, slot.size(), slot) == 0; };
       if (std::any_of(passed_.begin(), passed_.end(), is_start)) return 0;
       const auto found = numbers_.find(name);
-      if (found == numbers_.end()) return std::nullopt;
+      if (found == numbers_.end()) {
+        // Parts, such as a cache, may well not be there: they have names of their own in between.
+        const bool is_of_unit = std::count(name.begin(), name.end(), '.') == 1;
+        for (const auto& [slot, unit] : own_) {
+          if (is_of_unit && is_start(slot + ".")) missing.insert(name + " of " + slot + "=" + unit);
+        }
+        return std::nullopt;
+      }
       value *= found->second;
     }
     return value;
   }
 
   std::map<std::string, double> numbers_;
-  std::vector<std::string> passed_;  ///< slots of units that pass items through, with a dot
+  std::vector<std::string> passed_;                       ///< slots of units that pass items through, with a dot
+  std::vector<std::pair<std::string, std::string>> own_;  ///< slots and names of units that are not of this library
 };
 
 /// What is spent on one event or power: so often, each time between low and high.
@@ -111,8 +123,9 @@ Range share_of(const Range& part, const Range& rest) {
 EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table) {
   const RunNumbers numbers(run);
   EnergyAmounts amounts;
+  std::set<std::string> missing;
   const auto count = [&](const CountFormula& formula, const std::string& name) {
-    const std::optional<double> value = numbers.value(formula);
+    const std::optional<double> value = numbers.value(formula, missing);
     if (!value) amounts.not_counted.push_back(name);
     return value.value_or(0);
   };
@@ -122,6 +135,7 @@ EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table) {
   for (const ConstantPower& power : table.powers) {
     amounts.powers.push_back(count(power.count, "constant: " + power.name));
   }
+  amounts.missing.assign(missing.begin(), missing.end());
   if (run.cycles) amounts.seconds = static_cast<double>(*run.cycles) / (run.request.platform->frequency_mhz * 1e6);
   amounts.fragments_blended = run.counts.fragments_blended;
   return amounts;
@@ -151,7 +165,7 @@ EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& tabl
   report.total = report.moving;
   *report.total += constant;
   others += constant;
-  report.quad_merging_share = share_of(merging, others);
+  if (amounts.missing.empty()) report.quad_merging_share = share_of(merging, others);
   if (seconds > 0) report.watts = *report.total * (1e-3 / seconds);
   if (amounts.fragments_blended > 0) {
     const double fragments = static_cast<double>(amounts.fragments_blended);
@@ -162,6 +176,7 @@ EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& tabl
 
 std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmounts& run, const EnergyTable& table) {
   if (!baseline.seconds || !run.seconds || baseline.fragments_blended == 0) return std::nullopt;
+  if (!baseline.missing.empty() || !run.missing.empty()) return std::nullopt;
   std::vector<Term> terms;
   for (std::size_t i = 0; i < table.events.size(); ++i) {
     terms.push_back({baseline.events[i], run.events[i], table.events[i].picojoules * 1e-12});

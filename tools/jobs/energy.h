@@ -18,6 +18,9 @@ struct EnergyAmounts {
   std::optional<double> seconds;  ///< simulated; none where the fidelity has no time
   std::uint64_t fragments_blended = 0;
   std::vector<std::string> not_counted;  ///< "UNIT: NAME" of events and powers of which the run has no counter
+  /// What units of one's own do not say of themselves, e.g. "qru.pairs of qru=mine": what was spent is more, by nobody knows
+  /// how much.
+  std::vector<std::string> missing;
 };
 
 /// A unit that passes items through has no events.
@@ -36,14 +39,14 @@ struct EnergyReport {
   std::optional<Range> total;                    ///< mJ
   std::optional<Range> watts;                    ///< mean of the total; none where nothing took time
   std::optional<Range> picojoules_per_fragment;  ///< the total for each blended; none of none
-  std::optional<Range> quad_merging_share;       ///< of the units TGC and QRU, of the total
+  std::optional<Range> quad_merging_share;       ///< of the units TGC and QRU, of the total; none of a part of it
 };
 
 EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& table);
 
 /// Total of `baseline` over that of `run`, as a speed-up is of cycles; none without time, where the baseline blends nothing,
 /// or where the least that may have been spent is nothing. Both have the same energies and powers, whatever these are: low
-/// and high are the extremes over all that they may be.
+/// and high are the extremes over all that they may be. None where either misses something.
 std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmounts& run, const EnergyTable& table);
 
 /// Powers of which the table says that they were found for other platforms than this.

@@ -354,8 +354,9 @@ void simulate_rows(const SweepJob& job, const std::vector<RunRequest>& requests,
     PointOutcome point;
     point.run = std::move(simulated.result);
     point.cpu_seconds = point.run.cpu_seconds;
-    if (point.run.cycles)
-      point.energy = energy_report(energy_amounts(point.run, shipped_energies()), shipped_energies()).total;
+    // A sum that misses something is none to rank GPUs by.
+    const EnergyAmounts amounts = energy_amounts(point.run, shipped_energies());
+    if (amounts.missing.empty()) point.energy = energy_report(amounts, shipped_energies()).total;
     strip_row(point.run);
     point.storage_bytes = storage_of(requests[i]);
     progress.erase();
@@ -443,6 +444,41 @@ RunRequest request_of(const SweepJob& job, const StudiedPoint& point) {
     }
   }
   return request;
+}
+
+void choose_references(SweepJob& job) {
+  RunRequest usual = job.common.requests.front();
+  const auto place_of = [](const StudyAxis& axis, const std::string& value) {
+    const auto found = std::find(axis.values.begin(), axis.values.end(), value);
+    return found == axis.values.end() ? std::size_t{0} : static_cast<std::size_t>(found - axis.values.begin());
+  };
+  for (StudyAxis& axis : job.study.axes) {
+    if (axis.name == "variant") axis.reference = place_of(axis, "baseline");
+    if (axis.name == "format") axis.reference = place_of(axis, name_of(usual.format));
+    if (axis.name == "termination") axis.reference = place_of(axis, name_of(usual.termination));
+    if (axis.name == "platform") usual.platform = &platform_named(axis.values.front());
+  }
+  usual.variant = variant_named("het+qm");
+  for (StudyAxis& axis : job.study.axes) {
+    if (!is_parameter(axis.name) || follows_the_point(axis.name)) continue;
+    const std::size_t dot = axis.name.rfind('.');
+    const auto value_in = [&](const RunRequest& request) {
+      for (const auto& [name, value] : final_parameters(request)) {
+        if (name == axis.name) return value;
+      }
+      return std::string();
+    };
+    try {
+      const std::string own = value_in(usual);
+      for (std::size_t i = axis.values.size(); i-- > 0 && !own.empty();) {
+        RunRequest set = usual;
+        set.settings.push_back({axis.name.substr(0, dot), axis.name.substr(dot + 1), axis.values[i]});
+        if (value_in(set) == own) axis.reference = i;
+      }
+    } catch (const UserError&) {
+      // Said of the point that has it.
+    }
+  }
 }
 
 SweepResult run_sweep(const SweepJob& job) {

@@ -64,7 +64,10 @@ class SpentTable {
       const std::optional<Range> range = value(i);
       return range ? show(*range * scale) : std::string("-");
     };
-    row(label, [&](std::size_t i) { return cell(i, [](const Range& range) { return three_digits(range.nominal); }); });
+    row(label, [&](std::size_t i) {
+      const std::string at_least = spent_.amounts[i].missing.empty() ? "" : "at least ";
+      return cell(i, [&](const Range& range) { return at_least + three_digits(range.nominal); });
+    });
     row("  low to high", [&](std::size_t i) { return cell(i, between); });
   }
   std::string text(const TextStyle& style) const { return table_.text(style); }
@@ -114,6 +117,12 @@ std::string left_out_text(const std::vector<RunResult>& runs, const Spent& spent
       return std::find(others.begin(), others.end(), name) == others.end();
     };
     names.erase(std::remove_if(names.begin(), names.end(), is_counted), names.end());
+  }
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (spent.amounts[i].missing.empty()) continue;
+    text += broken_at_commas(
+        fmt::format("{} spends more than is said here, by nobody knows how much: its units do not count {}",
+                    name_of(runs[i].request), printable(fmt::format("{}", fmt::join(spent.amounts[i].missing, ", ")))));
   }
   if (!names.empty()) {
     text += broken_at_commas("energy of what is not simulated here is left out: " +
@@ -197,6 +206,7 @@ Json energy_json(const RunResult& run, const RunResult* baseline, const EnergyTa
           {"picojoules_per_fragment", range_json(report.picojoules_per_fragment)},
           {"quad_merging_share", range_json(report.quad_merging_share)},
           {"not_counted", amounts.not_counted},
+          {"missing", amounts.missing},
           {"powers_of_other_platforms", powers_of_other_platforms(table, *run.request.platform)}};
 }
 

@@ -107,7 +107,7 @@ Answer efficiency_answer(const Reproduction& of) {
         fmt::join(others, ", "));
   }
   const std::vector<StudyPoint>& indoor = of.findings.indoor_efficiency;
-  if (!indoor.empty()) {
+  if (indoor.size() > 1) {  // a quick look tries no others
     text += fmt::format("What lowers the one and not the other was looked for in {}, which reaches {} by default: ",
                         of.result.plan.scenes[of.result.plan.indoor].name, efficiencies(indoor.front()));
     std::vector<std::string> candidates;
