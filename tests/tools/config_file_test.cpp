@@ -4,7 +4,7 @@
 #include <regex>
 #include <sstream>
 
-#include "jobs/toml_depth.h"
+#include "jobs/toml_text.h"
 
 namespace vrpipe::testing {
 namespace {

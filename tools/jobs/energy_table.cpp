@@ -14,7 +14,7 @@
 
 #include "file_io.h"
 #include "jobs/settings.h"
-#include "jobs/toml_depth.h"
+#include "jobs/toml_text.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -71,19 +71,10 @@ class TableReader {
   }
 
   toml::table parsed(const std::string& text) const {
-    if (const std::size_t line = line_of_too_deep_a_key(text); line != 0) {
-      throw UserError(cannot_use_table, fmt::format("{} line {}", file_, line),
-                      fmt::format("a key has more than {} parts", most_parts_of_a_key),
-                      "write TOML 1.0, as `vrpipe energies --toml` prints it");
-    }
-    try {
-      return toml::parse(text, file_);
-    } catch (const toml::parse_error& error) {
-      std::string why(error.description());
+    return parse_toml(text, file_, [&](const toml::source_region& source, std::string why) {
       std::replace(why.begin(), why.end(), '\n', ' ');
-      throw UserError(cannot_use_table, line(error.source()), why,
-                      "write TOML 1.0, as `vrpipe energies --toml` prints it");
-    }
+      throw UserError(cannot_use_table, line(source), why, "write TOML 1.0, as `vrpipe energies --toml` prints it");
+    });
   }
 
   void check_keys(const toml::table& table, const std::vector<std::string>& known) const {

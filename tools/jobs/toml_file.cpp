@@ -8,7 +8,7 @@
 
 #include <vrpipe/component/error.h>
 
-#include "jobs/toml_depth.h"
+#include "jobs/toml_text.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -43,17 +43,9 @@ TomlFile::TomlFile(const std::filesystem::path& path, const std::string& what, c
                     "name a TOML file; " + page + " describes it");
   }
   const std::string content(std::istreambuf_iterator<char>(file), {});
-  if (const std::size_t line = line_of_too_deep_a_key(content); line != 0) {
-    throw UserError(what, fmt::format("{}:{}", path_.string(), line),
-                    fmt::format("a key has more than {} parts", most_parts_of_a_key),
-                    "correct it; " + page + " describes the file");
-  }
-  try {
-    root_ = toml::parse(content, path_.string());
-  } catch (const toml::parse_error& error) {
-    throw UserError(what, place(error.source()), std::string(error.description()),
-                    "correct it; " + page + " describes the file");
-  }
+  root_ = parse_toml(content, path_.string(), [&](const toml::source_region& source, const std::string& why) {
+    throw UserError(what, place(source), why, "correct it; " + page + " describes the file");
+  });
 }
 
 void TomlFile::refuse(const toml::node& node, const std::string& what, const std::string& why,

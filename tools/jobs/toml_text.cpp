@@ -1,7 +1,9 @@
-#include "jobs/toml_depth.h"
+#include "jobs/toml_text.h"
 
 #include <algorithm>
 #include <string>
+
+#include <fmt/format.h>
 
 namespace vrpipe::tools {
 
@@ -46,6 +48,21 @@ std::size_t line_of_too_deep_a_key(std::string_view text) {
     ++i;
   }
   return 0;
+}
+
+toml::table parse_toml(const std::string& text, const std::string& name,
+                       const std::function<void(const toml::source_region& where, const std::string& why)>& refuse) {
+  if (const std::size_t line = line_of_too_deep_a_key(text); line != 0) {
+    toml::source_region where;
+    where.begin.line = static_cast<toml::source_index>(line);
+    refuse(where, fmt::format("a key has more than {} parts", most_parts_of_a_key));
+  }
+  try {
+    return toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    refuse(error.source(), std::string(error.description()));
+    throw;
+  }
 }
 
 }  // namespace vrpipe::tools
