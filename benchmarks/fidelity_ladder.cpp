@@ -29,10 +29,9 @@ struct Level {
   double speedup_percent;   ///< wanted: error of the speed-up over the baseline at most
   double quads_per_second;  ///< wanted: at least
 };
-constexpr std::array<Level, 5> levels{{{Fidelity::functional, 0, 0, 10e6},
+constexpr std::array<Level, 4> levels{{{Fidelity::functional, 0, 0, 10e6},
                                        {Fidelity::bound, 25, 15, 9e6},
                                        {Fidelity::lt, 10, 5, 8e6},
-                                       {Fidelity::at, 3, 2, 6e6},
                                        {Fidelity::cycle, 0, 0, 4e6}}};
 
 struct Run {

@@ -19,7 +19,7 @@
 
 namespace vrpipe {
 
-/// At `lt` and `at`: the memory below says at once when a sector will be there.
+/// At `lt`: the memory below says at once when a sector will be there.
 class AnnotatedFills : private PortOwner {
  public:
   AnnotatedFills(ClockDomain& domain, CompulsoryMissStatistics& statistics);

@@ -15,7 +15,7 @@ namespace vrpipe {
 
 namespace {
 
-/// CROP at lt and at: as crop_unit.cpp, but a warp is taken in one piece: its quads look up the colour cache, and are
+/// CROP at lt: as crop_unit.cpp, but a warp is taken in one piece: its quads look up the colour cache, and are
 /// blended once the sectors of all are there. Neighbouring sectors are filled in one access. Without forwarding, or where
 /// the cache is small, its quads go one by one.
 /// Ports: in_color (ShadedWarpItem), out_terminations (TerminationBeat), out_done (BlendsDone; optional), memory (TLM-2.0
@@ -23,13 +23,13 @@ namespace {
 class TimedCrop : public TimedUnit {
  public:
   TimedCrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
-            const RenderContext& context, Transport transport)
-      : TimedUnit(name, domain, CropWork::kinds(behaviour->timing()), transport),
+            const RenderContext& context)
+      : TimedUnit(name, domain, CropWork::kinds(behaviour->timing())),
         context_(context),
         out_(*this, "out_terminations"),
         out_done_(*this, "out_done"),
         in_(*this, "in_color",
-            [this](const ShadedWarpItem& item, CycleInterval visible) { return take(*item.warp, visible); }, {&out_}),
+            [this](const ShadedWarpItem& item, CycleInterval visible) { return take(*item.warp, visible); }),
         behaviour_(std::move(behaviour)),
         barriers_(context),
         hazard_gate_(context, "crop.blend_hazard"),
@@ -339,10 +339,9 @@ class TimedCrop : public TimedUnit {
 
 [[maybe_unused]] const bool crop_timed_registered = [] {
   register_timed_unit_maker("crop", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
-                                       Transport transport) {
-    return std::make_unique<TimedCrop>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)), context,
-                                       transport);
+                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned) {
+    return std::make_unique<TimedCrop>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)),
+                                       context);
   });
   return true;
 }();

@@ -15,7 +15,7 @@
 
 namespace vrpipe {
 
-/// A DRAM at `lt` and `at`: says as soon as a request comes when it will be answered. Its parameters are those of
+/// A DRAM at `lt`: says as soon as a request comes when it will be answered. Its parameters are those of
 /// `cycle`, its channels an approximation (annotated_channel.h).
 class AnnotatedDram : public sc_core::sc_module {
  public:

@@ -9,7 +9,7 @@ namespace vrpipe {
 
 namespace {
 
-/// The DRAM at `lt`, `at` and `cycle`.
+/// The DRAM at `lt` and `cycle`.
 template <class Timed>
 class DramUnit final : public MemoryUnit {
  public:

@@ -7,12 +7,12 @@ namespace vrpipe {
 
 namespace {
 
-/// DRAW at lt and at. Ports as in draw_unit.cpp.
+/// DRAW at lt. Ports as in draw_unit.cpp.
 class TimedDraw : public TimedUnit {
  public:
   TimedDraw(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<DrawBehaviour> behaviour,
-            const RenderContext& context, unsigned gpcs, Transport transport)
-      : TimedUnit(name, domain, DrawWork::kinds(), transport),
+            const RenderContext& context, unsigned gpcs)
+      : TimedUnit(name, domain, DrawWork::kinds()),
         behaviour_(std::move(behaviour)),
         schedule_(behaviour_->warps_per_1024_cycles()),
         barriers_(context) {
@@ -40,20 +40,6 @@ class TimedDraw : public TimedUnit {
   }
 
   Cycle tick(Cycle now) override {
-    if (awaited_ == 0) return issue(now);
-    for (const auto& in : in_done_) in->serve(now);
-    if (awaited_ == 0) return issue(now);
-    Cycle next = never;
-    for (const auto& in : in_done_) next = std::min(next, in->front());
-    return next;
-  }
-  Cycle issue(Cycle now) {
-    if (last_ != nullptr) {
-      if (last_->blocked()) return never;
-      // At `at` it is known only now when what waited was taken.
-      charge(UnitState::blocked, last_->last());
-      charge(UnitState::busy, last_->last() + 1);
-    }
     if (idle()) return never;
     const Cycle at = std::max({due(), passed_at_, last_ == nullptr ? 0 : last_->last() + 1});
     if (at > now) return at;
@@ -64,7 +50,7 @@ class TimedDraw : public TimedUnit {
       warp_.mark = Mark::end_of_frame;
     }
     const bool is_barrier = have_ && barriers_.is_barrier(warp_.mark);
-    // At `lt` all come to it meanwhile.
+    // All come to it meanwhile.
     if (is_barrier) awaited_ = static_cast<unsigned>(outs_.size());
     const Cycle taken = out.send(warp_, at).first;
     charge(UnitState::blocked, taken);
@@ -80,11 +66,8 @@ class TimedDraw : public TimedUnit {
     }
     turn_ = (turn_ + 1) % outs_.size();
     last_ = &out;
-    if (awaited_ > 0) {
-      if (blocking()) throw SimulationFault(name(), taken, "CROP has not passed a mark that is a barrier");
-      return never;
-    }
-    return out.blocked() ? never : std::max({due(), out.last() + 1, now + 1});
+    if (awaited_ > 0) throw SimulationFault(name(), taken, "CROP has not passed a mark that is a barrier");
+    return std::max({due(), out.last() + 1, now + 1});
   }
 
   std::unique_ptr<DrawBehaviour> behaviour_;
@@ -104,9 +87,9 @@ class TimedDraw : public TimedUnit {
 [[maybe_unused]] const bool draw_timed_registered = [] {
   register_timed_unit_maker("draw", [](const std::string& name, ClockDomain& domain,
                                        std::unique_ptr<Behaviour> behaviour, const RenderContext& context,
-                                       unsigned gpcs, Transport transport) {
+                                       unsigned gpcs) {
     return std::make_unique<TimedDraw>(name.c_str(), domain, behaviour_as<DrawBehaviour>(std::move(behaviour)), context,
-                                       gpcs, transport);
+                                       gpcs);
   });
   return true;
 }();

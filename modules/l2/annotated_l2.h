@@ -16,7 +16,7 @@
 
 namespace vrpipe {
 
-/// The sectored L2 at `lt` and `at`: it is looked up in the order of the calls, and says at once when an access is
+/// The sectored L2 at `lt`: it is looked up in the order of the calls, and says at once when an access is
 /// complete. Ports, banks, their MSHRs and their places for what is evicted are reserved in time. A bank whose request
 /// has to wait for one takes no other meanwhile.
 class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private PortOwner {

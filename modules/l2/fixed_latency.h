@@ -31,7 +31,7 @@ class FixedLatency final : public MemoryBehaviour {
   TimingParameters timing_;
 };
 
-/// The same at `lt`, `at` and `cycle`.
+/// The same at `lt` and `cycle`.
 class FixedLatencyUnit final : public MemoryUnit {
  public:
   FixedLatencyUnit(const std::string& name, ClockDomain& domain, std::unique_ptr<FixedLatency> behaviour,

@@ -12,15 +12,15 @@ namespace vrpipe {
 
 namespace {
 
-/// PROP at lt and at: as prop_unit.cpp, but bins and warps go in one piece. Of the warps whose turn has come the oldest
-/// of those that are there goes when the way to CROP is free; at lt all are there in launch order.
+/// PROP at lt: as prop_unit.cpp, but bins and warps go in one piece. Of the warps whose turn has come the oldest
+/// of those that are there goes when the way to CROP is free; all are there in launch order.
 /// Ports: in_bins, out_test, in_tested, out_survivors (BinItem), in_shaded, out_color (ShadedWarpItem),
 /// out_release (WarpRelease), out_late, in_late (ShadedWarpItem; optional).
 class TimedProp : public TimedUnit {
  public:
   TimedProp(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
-            const RenderContext& context, Transport transport)
-      : TimedUnit(name, domain, PropWork::kinds(behaviour->timing()), transport),
+            const RenderContext& context)
+      : TimedUnit(name, domain, PropWork::kinds(behaviour->timing())),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         tests_(tests_before_shading(context)),
@@ -33,18 +33,15 @@ class TimedProp : public TimedUnit {
         in_tested_(*this, "in_tested",
                    [this](const BinItem& item, CycleInterval visible) {
                      return forward(PropWork::tested, item, visible, back_, out_survivors_);
-                   },
-                   {&out_survivors_}),
+                   }),
         in_bins_(*this, "in_bins",
                  [this](const BinItem& item, CycleInterval visible) {
                    return forward(PropWork::bins, item, visible, there_, tests_ ? out_test_ : out_survivors_);
-                 },
-                 {tests_ ? &out_test_ : &out_survivors_}),
+                 }),
         in_late_(*this, "in_late",
                  [this](const ShadedWarpItem& item, CycleInterval visible) {
                    return take_back(*item.warp, visible.first);
-                 },
-                 {&out_color_, &out_release_}),
+                 }),
         in_shaded_(*this, "in_shaded",
                    [this](const ShadedWarpItem& item, CycleInterval visible) {
                      return collect(*item.warp, visible.first);
@@ -79,41 +76,26 @@ class TimedProp : public TimedUnit {
   }
 
   Cycle collect(const ShadedWarp& warp, Cycle visible) {
-    leave_until(visible);
     if (warp.mark != Mark::none) {
       order_.arrive_mark(warp, visible + 1);
     } else {
       order_.arrive(warp, visible + 1);
     }
-    if (blocking()) leave_until(never);
+    leave_in_order();
     return visible;
   }
 
-  Cycle advance(Cycle until) override {
-    leave_until(until);
-    if (plan_.is_used()) return next_;
-    return order_.has_next() && can_send() ? color_.next() : never;
-  }
-
-  bool can_send() const { return out_color_.clear() && out_release_.clear(); }
-
-  /// Lets those warps leave whose time comes up to a cycle.
-  void leave_until(Cycle until) {
-    if (plan_.is_used()) return leave_beside_late(until);
+  /// Lets those warps leave whose turn has come.
+  void leave_in_order() {
+    if (plan_.is_used()) return leave_beside_late();
     do {
-      while (order_.has_next() && can_send()) {
-        // A warp begins to leave once its release has room.
-        const Cycle room = out_release_.room_from();
-        if (room == never || std::max(room, color_.next()) > until) break;
-        color_.hold(room);
-        leave(order_.take());
-      }
+      while (order_.has_next()) leave(order_.take());
     } while (pass_mark());
   }
 
   bool pass_mark() {
     const ReorderBuffer::Waiting* const mark = order_.next_mark();
-    if (mark == nullptr || !can_send()) return false;
+    if (mark == nullptr) return false;
     const ReorderBuffer::Waiting next = *mark;
     order_.leave_mark();
     hand_on_mark(*next.warp, next.from);
@@ -128,6 +110,8 @@ class TimedProp : public TimedUnit {
   }
 
   void leave(const ReorderBuffer::Waiting& next) {
+    // A warp begins to leave once its release has room.
+    color_.hold(out_release_.room_from());
     const WarpRelease release{next.warp->slot};
     const Cycle left = hand_on(*next.warp, next.from);
     order_.leave(next.turn, left);
@@ -156,9 +140,8 @@ class TimedProp : public TimedUnit {
   }
 
   bool is_late(const ShadedWarp& warp) const { return warp.count > 0 && plan_.is_late(warp.draw[0]); }
-  /// In a frame with late tests: either way. `next_` is when to go on.
-  [[gnu::noinline]] void leave_beside_late(Cycle until) {
-    next_ = never;
+  /// In a frame with late tests: either way.
+  [[gnu::noinline]] void leave_beside_late() {
     bool left = true;
     while (left) {
       if (in_turn_.warp == nullptr && order_.has_next()) in_turn_ = order_.take();
@@ -166,16 +149,17 @@ class TimedProp : public TimedUnit {
       const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &in_turn_;
       if (next == nullptr) return;
       const bool goes_late = is_mark ? plan_.waits_at(next->warp->mark) : is_late(*next->warp);
-      left = goes_late ? send_late(*next, is_mark, until) : leave_behind_late(is_mark, until);
+      left = true;
+      if (goes_late) {
+        send_late(*next, is_mark);
+      } else {
+        left = leave_behind_late(is_mark);
+      }
     }
   }
-  bool send_late(const ReorderBuffer::Waiting next, bool is_mark, Cycle until) {
-    const Cycle room = out_late_.clear() ? out_late_.room_from() : never;
-    if (room == never) return false;
-    next_ = std::max(room, late_.next_free());
-    if (next_ > until) return false;
+  void send_late(const ReorderBuffer::Waiting next, bool is_mark) {
     const unsigned quads = next.warp->count;
-    const Cycle at = late_.take(std::max({next.from, room, out_late_.last()}), std::max(quads, 1U));
+    const Cycle at = late_.take(std::max({next.from, out_late_.room_from(), out_late_.last()}), std::max(quads, 1U));
     if (is_mark) {
       order_.leave_mark();
     } else {
@@ -185,16 +169,11 @@ class TimedProp : public TimedUnit {
     }
     ++on_late_way_;
     late_.hold(out_late_.send({next.warp}, at).first);
-    return true;
   }
   /// What is not tested late goes on when nothing is on that way.
-  bool leave_behind_late(bool is_mark, Cycle until) {
-    if (on_late_way_ > 0 || !can_send()) return false;
+  bool leave_behind_late(bool is_mark) {
+    if (on_late_way_ > 0) return false;
     if (is_mark) return pass_mark();
-    const Cycle room = out_release_.room_from();
-    next_ = room == never ? never : std::max(room, color_.next());
-    if (room == never || next_ > until) return false;
-    color_.hold(room);
     leave(std::exchange(in_turn_, {}));
     return true;
   }
@@ -229,15 +208,13 @@ class TimedProp : public TimedUnit {
   IssuePort late_;
   ReorderBuffer::Waiting in_turn_;  ///< the warp whose turn it is to go either way; none without a warp
   unsigned on_late_way_ = 0;        ///< warps and marks that were sent to be tested late and are not back
-  Cycle next_ = never;
 };
 
 [[maybe_unused]] const bool prop_timed_registered = [] {
   register_timed_unit_maker("prop", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
-                                       Transport transport) {
-    return std::make_unique<TimedProp>(name.c_str(), domain, behaviour_as<PropBehaviour>(std::move(behaviour)), context,
-                                       transport);
+                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned) {
+    return std::make_unique<TimedProp>(name.c_str(), domain, behaviour_as<PropBehaviour>(std::move(behaviour)),
+                                       context);
   });
   return true;
 }();

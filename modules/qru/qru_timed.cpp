@@ -11,15 +11,14 @@ namespace vrpipe {
 
 namespace {
 
-/// QRU at lt and at. Ports: in_quads (BinItem), out_warps (Warp).
+/// QRU at lt. Ports: in_quads (BinItem), out_warps (Warp).
 class TimedQru : public TimedUnit {
  public:
   TimedQru(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<QruBehaviour> behaviour,
-           const RenderContext& context, Transport transport)
-      : TimedUnit(name, domain, QruWork::kinds(behaviour->timing()), transport),
+           const RenderContext& context)
+      : TimedUnit(name, domain, QruWork::kinds(behaviour->timing())),
         out_(*this, "out_warps"),
-        in_(*this, "in_quads", [this](const BinItem& item, CycleInterval visible) { return examine(item, visible); },
-            {&out_}),
+        in_(*this, "in_quads", [this](const BinItem& item, CycleInterval visible) { return examine(item, visible); }),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         numbering_(context),
@@ -103,10 +102,8 @@ class TimedQru : public TimedUnit {
 
 [[maybe_unused]] const bool qru_timed_registered = [] {
   register_timed_unit_maker("qru", [](const std::string& name, ClockDomain& domain,
-                                      std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
-                                      Transport transport) {
-    return std::make_unique<TimedQru>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)), context,
-                                      transport);
+                                      std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned) {
+    return std::make_unique<TimedQru>(name.c_str(), domain, behaviour_as<QruBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

@@ -6,19 +6,17 @@ namespace vrpipe {
 
 namespace {
 
-/// RASTER at lt and at. What ZROP has stored comes with its time, at `lt` long before that, and counts from then on. Ports as
+/// RASTER at lt. What ZROP has stored comes long before its time, and counts from then on. Ports as
 /// in raster_unit.cpp.
 class TimedRaster : public TimedUnit {
  public:
-  TimedRaster(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour,
-              Transport transport)
-      : TimedUnit(name, domain, RasterWork::kinds(behaviour->timing()), transport),
+  TimedRaster(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour)
+      : TimedUnit(name, domain, RasterWork::kinds(behaviour->timing())),
         out_(*this, "out_quads"),
         in_hi_z_(*this, "in_hi_z",
                  [this](const HiZUpdate& update, CycleInterval visible) { return take(update, visible.first); }),
         in_(*this, "in_jobs",
-            [this](const RasterJob& job, CycleInterval visible) { return rasterize(job, visible.first); },
-            {&out_, &hold_}),
+            [this](const RasterJob& job, CycleInterval visible) { return rasterize(job, visible.first); }),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         coarse_(timing_.coarse_tiles_per_cycle),
@@ -35,12 +33,6 @@ class TimedRaster : public TimedUnit {
   }
 
  private:
-  /// Jobs wait while it is on.
-  class Hold : public TimedOutput {
-   public:
-    void set(bool on) { waiting_items_ = on ? 1 : 0; }
-    bool is_on() const { return waiting_items_ > 0; }
-  };
   struct Update {
     HiZUpdate update;
     Cycle at = 0;
@@ -50,7 +42,7 @@ class TimedRaster : public TimedUnit {
     if (update.mark == Mark::none) return visible;
     // Of what was waited for.
     apply_updates(never);
-    hold_.set(false);
+    holds_ = false;
     charge(UnitState::starved, now_);
     now_ = std::max(now_, visible);
     charge(UnitState::latency, now_);
@@ -69,12 +61,11 @@ class TimedRaster : public TimedUnit {
     if (job.mark != Mark::none) {
       QuadBeat mark;
       mark.mark = job.mark;
-      hold_.set(!in_hi_z_.is_stub() && behaviour_->waits_at(job.mark));
-      // At `lt` it comes back meanwhile.
+      holds_ = !in_hi_z_.is_stub() && behaviour_->waits_at(job.mark);
+      // It comes back meanwhile.
       const Cycle sent = out_.send(mark, now_).first;
       now_ = std::max(now_, sent);
-      if (hold_.is_on() && blocking())
-        throw SimulationFault(name(), now_, "ZROP has not passed a mark that Hi-Z waits for");
+      if (holds_) throw SimulationFault(name(), now_, "ZROP has not passed a mark that Hi-Z waits for");
       return sent;
     }
     now_ = setups_.free_from(now_);
@@ -120,7 +111,6 @@ class TimedRaster : public TimedUnit {
 
   TimedOut<QuadBeat> out_;
   TimedIn<HiZUpdate> in_hi_z_;
-  Hold hold_;  ///< while a mark has not come back from ZROP
   TimedIn<RasterJob> in_;
   std::unique_ptr<RasterBehaviour> behaviour_;
   const RasterBehaviour::TimingParameters timing_;
@@ -132,14 +122,13 @@ class TimedRaster : public TimedUnit {
   ThousandthsPort pairs_;
   ThousandthsPort setups_;
   Cycle coarse_done_ = 0;
+  bool holds_ = false;  ///< while a mark has not come back from ZROP
 };
 
 [[maybe_unused]] const bool raster_timed_registered = [] {
   register_timed_unit_maker("raster", [](const std::string& name, ClockDomain& domain,
-                                         std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned,
-                                         Transport transport) {
-    return std::make_unique<TimedRaster>(name.c_str(), domain, behaviour_as<RasterBehaviour>(std::move(behaviour)),
-                                         transport);
+                                         std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned) {
+    return std::make_unique<TimedRaster>(name.c_str(), domain, behaviour_as<RasterBehaviour>(std::move(behaviour)));
   });
   return true;
 }();

@@ -12,16 +12,16 @@ namespace vrpipe {
 
 namespace {
 
-/// The SM array at lt and at. Ports as in sm_unit.cpp. Fragment warps issue segment by segment, first come, first served,
+/// The SM array at lt. Ports as in sm_unit.cpp. Fragment warps issue segment by segment, first come, first served,
 /// and go to PROP as they are done. An array with room to spare has a scheduler for all of a warp's instructions at once
-/// and waits for all its latencies after that, at lt in launch order: nothing waits for what that makes late.
+/// and waits for all its latencies after that, in launch order: nothing waits for what that makes late.
 /// Vertex warps take issue slots from fragment warps but do not wait for them: they are few.
 /// With the memory port connected a warp fetches what it reads when it is launched, as in sm_unit.cpp.
 class TimedSm : public TimedUnit {
  public:
   TimedSm(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<SmBehaviour> behaviour,
-          const RenderContext& context, Transport transport)
-      : TimedUnit(name, domain, SmWork::kinds(behaviour->timing()), transport),
+          const RenderContext& context)
+      : TimedUnit(name, domain, SmWork::kinds(behaviour->timing())),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         cycles_per_instruction_(timing_.cycles_per_instruction()),
@@ -42,8 +42,7 @@ class TimedSm : public TimedUnit {
         in_vertices_(*this, "in_vertices",
                      [this](const VertexWarp& warp, CycleInterval visible) {
                        return shade_vertices(warp, visible.first);
-                     },
-                     {&out_vertices_}),
+                     }),
         hand_over_(timing_, context),
         scheduler_free_at_(std::size_t{timing_.cores} * timing_.schedulers_per_core, 0),
         free_of_core_(timing_.cores, timing_.warps_per_core),
@@ -51,10 +50,9 @@ class TimedSm : public TimedUnit {
     fragment_.for_each([&](const Program& each) { waiting_.resize(std::max(waiting_.size(), each.size())); });
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
     free_slots_ = timing_.fragment_slots();
-    in_warps_.set_gate([this] { return has_slot(); });
   }
 
-  bool idle() const override { return TimedUnit::idle() && next_event() == never && shaded_vertices_.empty(); }
+  bool idle() const override { return next_event() == never; }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &memory_.socket(); }
   unsigned memory_bytes_per_cycle() const override { return timing_.cores * timing_.fetch.core_bytes; }
@@ -68,8 +66,6 @@ class TimedSm : public TimedUnit {
     lacks_fetch_ = no_memory_ == nullptr && !fetches_;
     if (!fetches_) return;
     memory_.connect();
-    // As at cycle; otherwise times alone say when a place is free.
-    if (!blocking()) in_vertices_.set_gate([this] { return shaded_vertices_.size() < timing_.vertex_warps; });
     // What memory says stands for the first stall.
     vertex_.stall_cycles -= timing_.vertex.front().stall_cycles;
     fragment_.for_each([](Program& each) { each.front().stall_cycles -= each.front().fetch.stall_cycles; });
@@ -150,17 +146,15 @@ class TimedSm : public TimedUnit {
   Cycle launch(const Warp& warp, Cycle visible) {
     Cycle launch = std::max(visible, next_launch_);
     if (warp.mark != Mark::none) {
-      // Another mark than the last goes at once, before any warp after it is done; PROP keeps it behind those before it.
-      const bool waits = blocking() || warp.mark == Mark::end_of_frame;
-      if (waits) issue_until(never);
-      done_.push_in_order({waits ? std::max(launch, last_done_) : launch, take_flight(warp)}, &Event::at);
-      if (blocking()) hand_on_until(never);
+      issue_until(never);
+      done_.push_in_order({std::max(launch, last_done_), take_flight(warp)}, &Event::at);
+      hand_on_until(never);
       return launch;
     }
     charge(UnitState::memory, std::min(launch, last_done_));
     charge(UnitState::starved, launch);
-    if (blocking() && !roomy_) hand_on_until(launch);
-    while (blocking() && !has_slot() && next_event() != never) hand_on_until(next_event());
+    if (!roomy_) hand_on_until(launch);
+    while (!has_slot() && next_event() != never) hand_on_until(next_event());
     if (!has_slot()) {
       throw SimulationFault("deadlock", launch, std::string(name()) + " has warps to launch, and no slot is released");
     }
@@ -180,7 +174,7 @@ class TimedSm : public TimedUnit {
     }
 
     const Program& needed = fragment_.of(warp);
-    if (blocking() && roomy_) {
+    if (roomy_) {
       const Cycle done = issue(needed.front(), next_scheduler(), launch, there);
       last_done_ = std::max(last_done_, done);
       shade(warp, core_, done);
@@ -265,10 +259,10 @@ class TimedSm : public TimedUnit {
   /// The cycle in which the next warp waits for its scheduler or is done.
   Cycle next_event() const { return done_.empty() ? next_issue_ : std::min(next_issue_, done_.front().at); }
 
-  /// Sends the warps that are done up to a cycle, as long as PROP takes them.
+  /// Sends the warps that are done up to a cycle.
   void hand_on_until(Cycle until) {
     issue_until(until);
-    for (; !done_.empty() && done_.front().at <= until && out_shaded_.clear(); done_.pop()) {
+    for (; !done_.empty() && done_.front().at <= until; done_.pop()) {
       const Flight& flight = flights_[done_.front().flight];
       shade(flight.warp, flight.core, done_.front().at);
       free_flights_.push_back(done_.front().flight);
@@ -290,13 +284,6 @@ class TimedSm : public TimedUnit {
     out_shaded_.send({&shaded}, done);
   }
 
-  Cycle advance(Cycle until) override {
-    if (blocking()) return never;
-    hand_on_until(until);
-    const Cycle next = out_shaded_.clear() ? next_event() : never;
-    return shaded_vertices_.empty() ? next : std::min(next, hand_on_vertices_until(until));
-  }
-
   Cycle shade_vertices(const VertexWarp& warp, Cycle visible) {
     Cycle launch = std::max(visible, next_vertex_launch_);
     Cycle done = 0;
@@ -311,11 +298,7 @@ class TimedSm : public TimedUnit {
       done = (fetches_ ? memory_.fetch_vertices(warp, launch) : launch) + issue + vertex_.stall_cycles;
     }
     next_vertex_launch_ = launch + 1;
-    if (fetches_ && !blocking()) {
-      shaded_vertices_.push({std::max(done, launch), vertex_turn_, warp});
-    } else {
-      vertex_slots_[vertex_turn_] = hand_on_vertices(warp, std::max(done, launch)) + 1;
-    }
+    vertex_slots_[vertex_turn_] = hand_on_vertices(warp, std::max(done, launch)) + 1;
     vertex_turn_ = vertex_turn_ + 1 == timing_.vertex_warps ? 0 : vertex_turn_ + 1;
     return launch;
   }
@@ -324,29 +307,10 @@ class TimedSm : public TimedUnit {
   Cycle hand_on_vertices(const VertexWarp& warp, Cycle done) {
     if (fetches_) {
       if (warp.mark == Mark::none) done = memory_.write_attributes(warp, done);
-      if (warp.mark != Mark::none || !blocking()) memory_.send_until(never);
+      if (warp.mark != Mark::none) memory_.send_until(never);
     }
     vertices_done_ = std::max(vertices_done_, done);
     return out_vertices_.send(warp, vertices_done_).first;
-  }
-
-  /// At `at`, where attributes are written in the order of time: as many as VPO takes; returns when to go on.
-  Cycle hand_on_vertices_until(Cycle until) {
-    while (!shaded_vertices_.empty() && out_vertices_.clear()) {
-      const ShadedVertices& next = shaded_vertices_.front();
-      if (leaves_) {  // one that has had to wait
-        vertex_slots_[next.slot] = out_vertices_.gone() + 1;
-        leaves_ = false;
-        shaded_vertices_.pop();
-        continue;
-      }
-      if (next.done > until) return next.done;
-      const Cycle taken = hand_on_vertices(next.warp, next.done);
-      vertex_slots_[next.slot] = taken + 1;
-      leaves_ = !out_vertices_.clear();
-      if (!leaves_) shaded_vertices_.pop();
-    }
-    return never;
   }
 
   Cycle free(const WarpRelease& release, Cycle visible) {
@@ -391,13 +355,6 @@ class TimedSm : public TimedUnit {
   std::uint64_t vertex_scheduler_ = 0;
   Cycle next_vertex_launch_ = 0;
   Cycle vertices_done_ = 0;
-  struct ShadedVertices {
-    Cycle done = 0;
-    std::uint32_t slot = 0;
-    VertexWarp warp;
-  };
-  Ring<ShadedVertices> shaded_vertices_;  ///< or to be, with memory at `at`; in order
-  bool leaves_ = false;                   ///< the first of them was sent and waits for room
   Cycle next_launch_ = 0;
   Cycle last_done_ = 0;
   TileId last_tile_;
@@ -409,9 +366,8 @@ class TimedSm : public TimedUnit {
 
 [[maybe_unused]] const bool sm_timed_registered = [] {
   register_timed_unit_maker("sm", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                     const RenderContext& context, unsigned, Transport transport) {
-    return std::make_unique<TimedSm>(name.c_str(), domain, behaviour_as<SmBehaviour>(std::move(behaviour)), context,
-                                     transport);
+                                     const RenderContext& context, unsigned) {
+    return std::make_unique<TimedSm>(name.c_str(), domain, behaviour_as<SmBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

@@ -14,7 +14,7 @@
 
 namespace vrpipe {
 
-/// As sm_memory.h, at lt and at: each access gets its cycle when its warp is launched or shaded. L1s see the launches
+/// As sm_memory.h, at lt: each access gets its cycle when its warp is launched or shaded. L1s see the launches
 /// in their order.
 class TimedSmMemory {
  public:

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <deque>
+#include <utility>
 
 #include "tc/tc.h"
 
@@ -8,16 +10,16 @@ namespace vrpipe {
 
 namespace {
 
-/// TC at lt and at: as tc_unit.cpp, but a flushed bin goes in one piece.
+/// TC at lt: as tc_unit.cpp, but a flushed bin goes in one piece.
 /// Ports: in_quads (QuadBeat), out_bins (BinItem).
 class TimedTc : public TimedUnit {
  public:
   TimedTc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour,
-          const RenderContext& context, Transport transport)
-      : TimedUnit(name, domain, TcWork::kinds(behaviour->timing()), transport),
+          const RenderContext& context)
+      : TimedUnit(name, domain, TcWork::kinds(behaviour->timing())),
         out_(*this, "out_bins"),
         in_(*this, "in_quads",
-            [this](const QuadBeat& beat, CycleInterval visible) { return collect(beat, visible.first); }, {&out_}),
+            [this](const QuadBeat& beat, CycleInterval visible) { return collect(beat, visible.first); }),
         behaviour_(std::move(behaviour)),
         passing_(context),
         timing_(behaviour_->timing()),
@@ -26,7 +28,6 @@ class TimedTc : public TimedUnit {
         entries_(timing_.quads_per_cycle),
         sent_at_(timing_.flush_queue_bins, 0) {
     out_.set_pipeline(timing_.latency_cycles - 1, 1);
-    out_.set_buffer(timing_.flush_queue_bins - 1);
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -47,8 +48,9 @@ class TimedTc : public TimedUnit {
       if (flushed) send(at);
     }
     did(TcWork::quads, beat.count, at);
-    holds_quads_ = true;
     last_arrival_ = at;
+    if (!std::exchange(holds_quads_, true) && timeout_due() != never)
+      clock.domain->wake(clock.unit, std::max(timeout_due(), now() + 1));
     charge(UnitState::blocked, at);
     charge(UnitState::busy, at + 1);
     return at;
@@ -85,8 +87,8 @@ class TimedTc : public TimedUnit {
     place_ = place_ + 1 == sent_at_.size() ? 0 : place_ + 1;
   }
 
-  /// When the bin has gone whose place the next takes. At `at` its cycle is known once no more bins wait than may.
-  Cycle place_free_at() const { return out_.full() ? std::max(sent_at_[place_], out_.gone()) : sent_at_[place_]; }
+  /// When the bin has gone whose place the next takes.
+  Cycle place_free_at() const { return sent_at_[place_]; }
 
   Cycle timeout_due() const {
     if (idle_timeout_cycles_ == 0 || !holds_quads_) return never;
@@ -95,7 +97,7 @@ class TimedTc : public TimedUnit {
 
   /// Flushes the bins whose time is out before a quad comes.
   void flush_idle(Cycle next_arrival) {
-    for (Cycle due = timeout_due(); due < next_arrival && !out_.blocked(); due = timeout_due()) {
+    for (Cycle due = timeout_due(); due < next_arrival; due = timeout_due()) {
       if (!time_out_gate_.enter()) {
         idle_timeout_cycles_ = 0;
         return;
@@ -111,6 +113,12 @@ class TimedTc : public TimedUnit {
     }
   }
 
+  /// Whether quads come or not.
+  Cycle tick(Cycle now) override {
+    flush_idle(now + 1);
+    return timeout_due();
+  }
+
   Cycle drain(Mark mark, Cycle visible) {
     Cycle at = visible + 1;
     while (behaviour_->flush_oldest(Reason::end_of_draw, next_storage().flush)) {
@@ -123,11 +131,6 @@ class TimedTc : public TimedUnit {
     item.mark = mark;
     out_.send(item, std::max({at, sent_ + 1, out_.last() + 1}));
     return visible;
-  }
-
-  Cycle advance(Cycle) override {
-    if (in_.empty()) flush_idle(now() + 1);
-    return out_.blocked() ? never : timeout_due();
   }
 
   TimedOut<BinItem> out_;
@@ -151,9 +154,8 @@ class TimedTc : public TimedUnit {
 
 [[maybe_unused]] const bool tc_timed_registered = [] {
   register_timed_unit_maker("tc", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                     const RenderContext& context, unsigned, Transport transport) {
-    return std::make_unique<TimedTc>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)), context,
-                                     transport);
+                                     const RenderContext& context, unsigned) {
+    return std::make_unique<TimedTc>(name.c_str(), domain, behaviour_as<TcBehaviour>(std::move(behaviour)), context);
   });
   return true;
 }();

@@ -5,18 +5,16 @@ namespace vrpipe {
 
 namespace {
 
-/// TGC at lt and at. Ports as in tgc_unit.cpp.
+/// TGC at lt. Ports as in tgc_unit.cpp.
 class TimedTgc : public TimedUnit {
  public:
-  TimedTgc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TgcBehaviour> behaviour,
-           Transport transport)
-      : TimedUnit(name, domain, TgcWork::kinds(behaviour->timing()), transport),
+  TimedTgc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TgcBehaviour> behaviour)
+      : TimedUnit(name, domain, TgcWork::kinds(behaviour->timing())),
         out_(*this, "out_jobs"),
         in_(*this, "in_primitives",
             [this](const PrimitiveItem& item, CycleInterval visible) {
               return item.mark != Mark::none ? drain(item.mark, visible.first) : enter_bins(item, visible.first);
-            },
-            {&out_}),
+            }),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         entries_(timing_.items_per_cycle) {
@@ -82,10 +80,8 @@ class TimedTgc : public TimedUnit {
 
 [[maybe_unused]] const bool tgc_timed_registered = [] {
   register_timed_unit_maker("tgc", [](const std::string& name, ClockDomain& domain,
-                                      std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned,
-                                      Transport transport) {
-    return std::make_unique<TimedTgc>(name.c_str(), domain, behaviour_as<TgcBehaviour>(std::move(behaviour)),
-                                      transport);
+                                      std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned) {
+    return std::make_unique<TimedTgc>(name.c_str(), domain, behaviour_as<TgcBehaviour>(std::move(behaviour)));
   });
   return true;
 }();

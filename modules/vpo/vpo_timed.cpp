@@ -5,27 +5,25 @@ namespace vrpipe {
 
 namespace {
 
-/// VPO at lt and at. Ports as in vpo_unit.cpp.
+/// VPO at lt. Ports as in vpo_unit.cpp.
 class TimedVpo : public TimedUnit {
  public:
   TimedVpo(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<VpoBehaviour> behaviour,
-           unsigned gpcs, Transport transport)
-      : TimedUnit(name, domain, VpoWork::kinds(behaviour->timing()), transport),
+           unsigned gpcs)
+      : TimedUnit(name, domain, VpoWork::kinds(behaviour->timing())),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         gpcs_(gpcs),
         lane_(timing_.items_per_cycle) {
-    std::vector<TimedOutput*> sends_to;
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<TimedOut<PrimitiveItem>>(*this, "out_primitives_" + std::to_string(gpc)));
       outs_.back()->set_pipeline(timing_.latency_cycles - 1, timing_.items_per_cycle);
-      sends_to.push_back(outs_.back().get());
     }
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
-      ins_.push_back(std::make_unique<TimedIn<VertexWarp>>(
-          *this, "in_vertices_" + std::to_string(gpc),
-          [this](const VertexWarp& warp, CycleInterval visible) { return assemble(warp, visible.first); }, sends_to));
-      ins_.back()->set_gate([this, gpc] { return turn_ == gpc; });
+      ins_.push_back(std::make_unique<TimedIn<VertexWarp>>(*this, "in_vertices_" + std::to_string(gpc),
+                                                           [this](const VertexWarp& warp, CycleInterval visible) {
+                                                             return assemble(warp, visible.first);
+                                                           }));
     }
   }
 
@@ -43,7 +41,6 @@ class TimedVpo : public TimedUnit {
   }
 
   Cycle assemble(const VertexWarp& warp, Cycle visible) {
-    turn_ = turn_ + 1 == gpcs_ ? 0 : turn_ + 1;
     for (const auto& out : outs_) {
       lane_.hold(out->last());
       charge(UnitState::blocked, out->last());
@@ -88,16 +85,13 @@ class TimedVpo : public TimedUnit {
   std::vector<std::unique_ptr<TimedOut<PrimitiveItem>>> outs_;
   std::vector<std::unique_ptr<TimedIn<VertexWarp>>> ins_;
   IssuePort lane_;
-  unsigned turn_ = 0;
   bool ended_ = false;
 };
 
 [[maybe_unused]] const bool vpo_timed_registered = [] {
   register_timed_unit_maker("vpo", [](const std::string& name, ClockDomain& domain,
-                                      std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned gpcs,
-                                      Transport transport) {
-    return std::make_unique<TimedVpo>(name.c_str(), domain, behaviour_as<VpoBehaviour>(std::move(behaviour)), gpcs,
-                                      transport);
+                                      std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned gpcs) {
+    return std::make_unique<TimedVpo>(name.c_str(), domain, behaviour_as<VpoBehaviour>(std::move(behaviour)), gpcs);
   });
   return true;
 }();

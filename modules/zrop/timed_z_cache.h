@@ -15,7 +15,7 @@
 
 namespace vrpipe {
 
-/// The z-cache at lt and at, in front of ZROP's memory port: as z_port.h, but what is looked up is there for the cache at
+/// The z-cache at lt, in front of ZROP's memory port: as z_port.h, but what is looked up is there for the cache at
 /// once, and the times are kept beside it.
 class TimedZCache {
  public:

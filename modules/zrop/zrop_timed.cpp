@@ -18,8 +18,8 @@ namespace vrpipe {
 
 namespace {
 
-/// ZROP at lt and at. Updates go first, so that the cycle of one is known when it arrives; a test applies those of its
-/// past. Late tests, too, go first: at `lt` they come long before their time, and what they take of the z-cache's one port is
+/// ZROP at lt. Updates go first, so that the cycle of one is known when it arrives; a test applies those of its
+/// past. Late tests, too, go first: they come long before their time, and what they take of the z-cache's one port is
 /// kept for the tests that are to make way. With the memory port connected, quads and updates are looked up in the z-cache first
 /// (timed_z_cache.h).
 /// Ports: in_quads, out_quads (BinItem), in_terminations (TerminationBeat), in_late, out_late (ShadedWarpItem; optional),
@@ -27,8 +27,8 @@ namespace {
 class TimedZrop : public TimedUnit {
  public:
   TimedZrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
-            const RenderContext& context, Transport transport)
-      : TimedUnit(name, domain, ZropWork::kinds(behaviour->timing()), transport),
+            const RenderContext& context)
+      : TimedUnit(name, domain, ZropWork::kinds(behaviour->timing())),
         context_(context),
         plan_(context),
         out_(*this, "out_quads"),
@@ -39,10 +39,8 @@ class TimedZrop : public TimedUnit {
                            return update(beat, visible.first);
                          }),
         in_late_(*this, "in_late",
-                 [this](const ShadedWarpItem& item, CycleInterval visible) { return test_late(item, visible.first); },
-                 {&out_late_}),
-        in_(*this, "in_quads", [this](const BinItem& item, CycleInterval visible) { return test(item, visible); },
-            {&out_, &hold_}),
+                 [this](const ShadedWarpItem& item, CycleInterval visible) { return test_late(item, visible.first); }),
+        in_(*this, "in_quads", [this](const BinItem& item, CycleInterval visible) { return test(item, visible); }),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
         at_once_(std::min(timing_.quads_per_cycle, QuadBeat::capacity)),
@@ -86,12 +84,6 @@ class TimedZrop : public TimedUnit {
     unsigned quads = 0;
     Cycle at = 0;
   };
-  /// Bins wait while it is on.
-  class Hold : public TimedOutput {
-   public:
-    void set(bool on) { waiting_items_ = on ? 1 : 0; }
-    bool is_on() const { return waiting_items_ > 0; }
-  };
 
   void before_end_of_elaboration() override {
     no_memory_ = stub_unbound(z_.socket(), *clock.domain);
@@ -109,7 +101,6 @@ class TimedZrop : public TimedUnit {
       at = updates_.take(visible);
       if (has_cache_) {
         arrived_.push({beat.signals[i], at});
-        if (!blocking()) look_up_updates(at);
         continue;
       }
       pending_.push({beat.signals[i], at});
@@ -117,7 +108,7 @@ class TimedZrop : public TimedUnit {
     return at;
   }
 
-  /// Updates that have arrived up to a cycle. At `lt` they come long before their time, so they wait for it.
+  /// Updates that have arrived up to a cycle. They come long before their time, so they wait for it.
   [[gnu::noinline]] void look_up_updates(Cycle until) {
     for (; !arrived_.empty() && arrived_.front().at <= until; arrived_.pop()) {
       const TerminationSignal signal = arrived_.front().signal;
@@ -144,7 +135,7 @@ class TimedZrop : public TimedUnit {
       const Cycle taken = out_.send(item, at).first;
       tests_.hold(taken);
       // What they are caused by has gone before.
-      if (has_cache_ && blocking() && item.mark == Mark::end_of_frame) look_up_updates(never);
+      if (has_cache_ && item.mark == Mark::end_of_frame) look_up_updates(never);
       return {at, taken};
     }
     std::vector<Quad>& quads = item.storage->flush.quads;
@@ -237,12 +228,12 @@ class TimedZrop : public TimedUnit {
     if (hi_z_.returns(mark)) out_hi_z_.send(HiZReports::of_mark(mark), at);
   }
 
-  /// A mark that is passed when it has come around. At `lt` it does so meanwhile.
+  /// A mark that is passed when it has come around, as it does meanwhile.
   [[gnu::noinline]] CycleInterval send_around(const BinItem& mark, Cycle at) {
-    hold_.set(true);
+    holds_ = true;
     const Cycle taken = out_.send(mark, at).first;
     tests_.hold(taken);
-    if (hold_.is_on() && blocking()) throw SimulationFault(name(), taken, "a mark has not come around");
+    if (holds_) throw SimulationFault(name(), taken, "a mark has not come around");
     return {at, taken};
   }
 
@@ -251,9 +242,8 @@ class TimedZrop : public TimedUnit {
     late_tests_.hold(out_late_.last());
     if (warp.mark != Mark::none) {
       const Cycle at = late_tests_.take(visible);
-      if (has_cache_ && !blocking()) look_up_updates(at);
       pass(warp.mark, at);
-      hold_.set(false);
+      holds_ = false;
       tests_.hold(at + 1);
       charge(UnitState::latency, at);
       late_tests_.hold(out_late_.send(item, at).first);
@@ -349,7 +339,6 @@ class TimedZrop : public TimedUnit {
   TimedOut<BinItem> out_;
   TimedOut<HiZUpdate> out_hi_z_;
   TimedOut<ShadedWarpItem> out_late_;
-  Hold hold_;  ///< while a mark has not come around
   TimedIn<TerminationBeat> in_terminations_;
   TimedIn<ShadedWarpItem> in_late_;
   TimedIn<BinItem> in_;
@@ -364,6 +353,7 @@ class TimedZrop : public TimedUnit {
   Cycle port_free_at_ = 0;  ///< of the z-cache, after the last test, update or move
   ZCacheStatistics cache_statistics_{*this, "cache"};
   TimedZCache z_;
+  bool holds_ = false;  ///< while a mark has not come around
   bool has_cache_ = false;
   bool lacks_cache_ = false;  ///< memory is connected, and the cache was left out
   EffectGate z_cache_gate_;
@@ -378,10 +368,9 @@ class TimedZrop : public TimedUnit {
 
 [[maybe_unused]] const bool zrop_timed_registered = [] {
   register_timed_unit_maker("zrop", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned,
-                                       Transport transport) {
-    return std::make_unique<TimedZrop>(name.c_str(), domain, behaviour_as<ZropBehaviour>(std::move(behaviour)), context,
-                                       transport);
+                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned) {
+    return std::make_unique<TimedZrop>(name.c_str(), domain, behaviour_as<ZropBehaviour>(std::move(behaviour)),
+                                       context);
   });
   return true;
 }();

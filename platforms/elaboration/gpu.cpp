@@ -137,13 +137,8 @@ void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
   const std::string module = module_name(instance.path);
   const unsigned gpcs = configuration_.netlist().gpcs();
   const Fidelity fidelity = configuration_.request().fidelity;
-  std::unique_ptr<Unit> unit;
-  if (fidelity == Fidelity::cycle) {
-    unit = unit_maker(slot)(module, *clock_, std::move(behaviour), context, gpcs);
-  } else {
-    const Transport transport = fidelity == Fidelity::lt ? Transport::blocking : Transport::non_blocking;
-    unit = timed_unit_maker(slot)(module, *clock_, std::move(behaviour), context, gpcs, transport);
-  }
+  const UnitMaker& make = fidelity == Fidelity::cycle ? unit_maker(slot) : timed_unit_maker(slot);
+  std::unique_ptr<Unit> unit = make(module, *clock_, std::move(behaviour), context, gpcs);
   if (Observers* const observers = configuration_.request().observers.get()) {
     if (StateObserver* const states = observers->of_unit(instance.path)) unit->observe_states(*states);
   }

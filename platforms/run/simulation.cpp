@@ -35,15 +35,13 @@ const char* name_of(Fidelity fidelity) {
     case Fidelity::functional: return "functional";
     case Fidelity::bound: return "bound";
     case Fidelity::lt: return "lt";
-    case Fidelity::at: return "at";
     case Fidelity::cycle: return "cycle";
   }
   return "";
 }
 
 const std::vector<Fidelity>& fidelities() {
-  static const std::vector<Fidelity> all{Fidelity::functional, Fidelity::bound, Fidelity::lt, Fidelity::at,
-                                         Fidelity::cycle};
+  static const std::vector<Fidelity> all{Fidelity::functional, Fidelity::bound, Fidelity::lt, Fidelity::cycle};
   return all;
 }
 
@@ -177,7 +175,7 @@ void check_sampling_has_time(const RunRequest& request) {
   throw UserError("cannot sample statistics", std::string("--fidelity ") + name_of(request.fidelity),
                   request.fidelity == Fidelity::bound ? "its cycles follow from all the work, no work has a cycle"
                                                       : "it has no time",
-                  "use lt, at or cycle");
+                  "use lt or cycle");
 }
 
 /// The counters that every unit of a slot has, summed over GPCs. `value` gives what of one is counted.
@@ -579,7 +577,7 @@ RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<fl
   result.framebuffer = Framebuffer(configuration.frame(), request.format);
   result.implementations = configuration.implementations();
   result.parameters = configuration.parameters();
-  if (request.fidelity == Fidelity::lt || request.fidelity == Fidelity::at) {
+  if (request.fidelity == Fidelity::lt) {
     result.outside_validated_range = outside_validated_range(result.parameters);
     for (std::string& reason : memories_outside_validated_range(configuration.netlist())) {
       result.outside_validated_range.push_back(std::move(reason));

@@ -148,8 +148,7 @@ std::vector<StatisticReport> list_statistics(const ParameterListing& listing) {
         }
       } else {
         collector.add(listing.unit, "untimed", *untimed_unit_maker(listing.unit)("untimed", make(), context, 1));
-        collector.add(listing.unit, "timed",
-                      *timed_unit_maker(listing.unit)("timed", clock, make(), context, 1, Transport::blocking));
+        collector.add(listing.unit, "timed", *timed_unit_maker(listing.unit)("timed", clock, make(), context, 1));
         collector.add(listing.unit, "cycle", *unit_maker(listing.unit)("cycle", clock, make(), context, 1));
       }
     }

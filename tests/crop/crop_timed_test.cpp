@@ -1,4 +1,4 @@
-// CROP at lt and at, where a warp goes in one piece; what has one closed form at every fidelity is compared with cycle by
+// CROP at lt, where a warp goes in one piece; what has one closed form at every fidelity is compared with cycle by
 // it.
 #include <vector>
 
@@ -207,7 +207,7 @@ TEST_P(CropTimedTest, TheSignalsOfAWarpComeNoLaterThanTheLatencyAfterItsLastBlen
   for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i, 0.5F);
   for (unsigned i = 0; i < 8; ++i) crop.quad({0, 0}, i, 0.999F, all_lanes, 1000);
   crop.run();
-  // Blended in cycles 1002 to 1005, two a cycle; at lt and at the signals of four quads go together.
+  // Blended in cycles 1002 to 1005, two a cycle; at lt the signals of four quads go together.
   std::vector<unsigned> positions;
   for (const auto& record : crop.signals.records()) {
     EXPECT_GE(record.cycle, 1002U + 8);

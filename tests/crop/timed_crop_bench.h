@@ -10,8 +10,7 @@ using testkit::Source;
 
 /// CROP with a source of warps and a memory around it.
 struct TimedCropBench {
-  /// `latency`: of a fill, in cycles, at least 2. `depth`: of less than eight, since deeper queues are served up to so many
-  /// cycles late at `at`, and the first access goes through the memory's socket, which knows no past.
+  /// `latency`: of a fill, in cycles, at least 2.
   TimedCropBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {},
                  unsigned latency = 100, unsigned depth = 7, unsigned signal_depth = 64)
       : bench(fidelity, "crop", "color-rop", context, settings),

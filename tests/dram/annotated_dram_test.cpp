@@ -1,4 +1,4 @@
-// The DRAM with annotated time, of `lt` and `at`: where nothing is guessed it is that of `cycle`.
+// The DRAM with annotated time, of `lt`: where nothing is guessed it is that of `cycle`.
 
 #include <algorithm>
 #include <string>

@@ -1,4 +1,4 @@
-// How near annotated time, of `lt` and `at`, comes to that of `cycle`.
+// How near annotated time, of `lt`, comes to that of `cycle`.
 
 #include <algorithm>
 #include <functional>

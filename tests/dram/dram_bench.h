@@ -66,7 +66,7 @@ class ClockedInitiator : public sc_core::sc_module, public Clocked, public PortO
   std::size_t next_ = 0;
 };
 
-/// A unit of `lt` or `at`, as far as its memory port is concerned.
+/// A unit of `lt`, as far as its memory port is concerned.
 class TimedInitiator : public sc_core::sc_module, public PortOwner {
  public:
   TimedInitiator(const sc_core::sc_module_name& name, ClockDomain& domain)

@@ -43,7 +43,7 @@ TEST(DramOfAFrame, IsReadForWhatTheL2HasNotSeen) {
   for (const char* implementation : {"lpddr3-1600", "lpddr5-6400"}) {
     const RunResult expected = run(request_of("baseline", Fidelity::functional, strictly), draw);
     double cycle = 0;
-    for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::at, Fidelity::lt}) {
+    for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt}) {
       const RunResult result = run(request_for(platform, fidelity, implementation), draw);
       EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color));
       EXPECT_EQ(result.counts.named(), expected.counts.named());
@@ -61,7 +61,7 @@ TEST(DramOfAFrame, IsReadForWhatTheL2HasNotSeen) {
 TEST(DramOfAFrame, DelaysItTheMoreTheSlowerItIs) {
   const Draw draw = random_draw(128, 128, 400, 21);
   const Platform platform = with_dram([](Netlist& netlist) { netlist.add("dram"); });
-  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     const auto cycles = [&](const std::vector<Setting>& settings) {
       RunRequest request = request_for(platform, fidelity, "lpddr3-1600");
       request.settings = settings;

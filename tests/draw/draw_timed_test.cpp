@@ -1,4 +1,4 @@
-// DRAW at lt and at; what has one closed form at every fidelity is compared with cycle by it.
+// DRAW at lt; what has one closed form at every fidelity is compared with cycle by it.
 #include <gtest/gtest.h>
 
 #include <vrpipe/pipeline/slots/draw.h>

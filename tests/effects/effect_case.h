@@ -49,10 +49,9 @@ std::vector<EffectCase> test_cases();
 std::vector<EffectCase> shading_cases();
 std::vector<EffectCase> time_cases();
 
-inline const std::vector<Fidelity> everywhere = {Fidelity::functional, Fidelity::bound, Fidelity::lt, Fidelity::at,
-                                                 Fidelity::cycle};
-inline const std::vector<Fidelity> with_time = {Fidelity::lt, Fidelity::at, Fidelity::cycle};
-inline const std::vector<Fidelity> with_cycles = {Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle};
+inline const std::vector<Fidelity> everywhere = {Fidelity::functional, Fidelity::bound, Fidelity::lt, Fidelity::cycle};
+inline const std::vector<Fidelity> with_time = {Fidelity::lt, Fidelity::cycle};
+inline const std::vector<Fidelity> with_cycles = {Fidelity::bound, Fidelity::lt, Fidelity::cycle};
 inline const std::vector<Fidelity> without_time = {Fidelity::functional, Fidelity::bound};
 
 inline Scene scene_of(const std::string& variant, Fidelity fidelity,

@@ -89,7 +89,7 @@ std::vector<EffectCase> shading_cases() {
   return {
       {"draw.several_draws", one_draw, everywhere, two_draws, everywhere},
       // Without time order alone decides what a draw reads, at a barrier or not.
-      {"draw.barriers", reads_the_background, everywhere, passes, {Fidelity::at, Fidelity::cycle}},
+      {"draw.barriers", reads_the_background, everywhere, passes, {Fidelity::cycle}},
       {"qru.pairing", [](Fidelity f) { return overlapping(f, "het"); }, everywhere,
        [](Fidelity f) { return overlapping(f, "qm"); }, everywhere},
       {"sm.mesh_shading", plain, everywhere, mesh, everywhere},

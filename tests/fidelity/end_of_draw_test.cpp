@@ -8,7 +8,7 @@ namespace {
 
 using namespace testing;
 
-constexpr Fidelity timed[] = {Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle};
+constexpr Fidelity timed[] = {Fidelity::bound, Fidelity::lt, Fidelity::cycle};
 
 /// Every state by itself, every share, and the sums.
 void expect_accounts_within_the_draw(const RunResult& result, const std::string& what) {
@@ -58,7 +58,7 @@ TEST(EndOfDraw, IsNotBeforeTheLastQuadIsTested) {
 }
 
 TEST(EndOfDraw, IsTheSameWhetherTheLastQuadIsBlendedOrPruned) {
-  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     Draw draw = draw_of(64, 64, {flat_box(0, 0, 64, 64, 0.5F)});
     const Cycle alone = *run(request_of("baseline", fidelity), draw).cycles;
     // One of pruned fragments behind it: a shaded quad's alpha of 0 is below any threshold.
@@ -72,7 +72,7 @@ TEST(EndOfDraw, IsTheSameWhetherTheLastQuadIsBlendedOrPruned) {
 
 // Quads alone keep a draw going: the vertices and triangles behind the last of them do not.
 TEST(EndOfDraw, IsNotPutOffByWhatCoversNothing) {
-  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     for (const char* variant : {"baseline", "het"}) {  // TGC would keep primitives until the end of the frame
       Draw draw = draw_of(64, 64, {flat_box(4, 4, 60, 60, 0.5F)});
       const RunResult alone = run(request_of(variant, fidelity), draw);

@@ -57,7 +57,7 @@ TEST(LinkObservers, SeeTheSameBinsAtEveryFidelityAndChangeNothing) {
   using Bin = LinkRecorder<BinItem>::Record;
 
   std::vector<Seen> reference;
-  for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt, Fidelity::at, Fidelity::bound, Fidelity::functional}) {
+  for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt, Fidelity::bound, Fidelity::functional}) {
     SCOPED_TRACE(name_of(fidelity));
     RunRequest request = request_of("het+qm", fidelity, strictly);
     const RunResult plain = run(request, draw);
@@ -100,7 +100,7 @@ TEST(LinkObservers, SeeTheSameBinsAtEveryFidelityAndChangeNothing) {
 TEST(LinkObservers, OfALinkThatIsNotThereOrCarriesOtherItemsAreRefused) {
   const Draw draw = random_draw(32, 32, 10, 9);
   const auto refused = [&](const auto& observe) {
-    RunRequest request = request_of("qm", Fidelity::at);
+    RunRequest request = request_of("qm", Fidelity::lt);
     request.observers = std::make_shared<Observers>();
     observe(*request.observers);
     EXPECT_THROW(run(request, draw), UserError);
@@ -111,7 +111,7 @@ TEST(LinkObservers, OfALinkThatIsNotThereOrCarriesOtherItemsAreRefused) {
 
 TEST(StateObservers, SeeTheCyclesThatTheAccountsHave) {
   const Draw draw = random_draw(150, 90, 300, 9);
-  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     RunRequest request = request_of("het+qm", fidelity);
     struct Unit {
       UnitState state = UnitState::starved;

@@ -275,7 +275,7 @@ TEST_P(EveryFidelityUnmerged, ClearedColorKeepsPixelsClosed) {
 }
 
 class EveryFidelityWithTime : public ::testing::TestWithParam<Fidelity> {};
-INSTANTIATE_TEST_SUITE_P(Frame, EveryFidelityWithTime, ::testing::Values(Fidelity::lt, Fidelity::at, Fidelity::cycle),
+INSTANTIATE_TEST_SUITE_P(Frame, EveryFidelityWithTime, ::testing::Values(Fidelity::lt, Fidelity::cycle),
                          [](const auto& each) { return name_of(each.param); });
 
 TEST_P(EveryFidelityWithTime, ALateSignalDoesNotTouchADrawAfterAClear) {

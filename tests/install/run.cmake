@@ -112,7 +112,7 @@ expect_refusal("effect qru.same_splat_pairs is called for" ${vrpipe} run ${draw}
 
 # The unit that derives from a shipped one: its parameters, all counters, and the same result at every fidelity.
 set(counting ${WORK_DIR}/consumer/counting_rop.so)
-foreach(fidelity functional bound lt at cycle)
+foreach(fidelity functional bound lt cycle)
   set(one ${draw} --variant het --fidelity ${fidelity} --set crop.cache_bytes=8192 --json -)
   expect_success("\"result_hash\": *\"([0-9a-f]+)\"" ${vrpipe} run ${one})
   string(REGEX MATCH "\"result_hash\": *\"[0-9a-f]+\"" hash "${output}")
@@ -146,7 +146,7 @@ expect_refusal("did you mean qm-small" ${vrpipe} run ${draw} --plugin ${wide} --
 # The slot: it counts at every fidelity what RASTER makes, and is listed with its parameter.
 set(tally --plugin ${WORK_DIR}/consumer/tally_slot.so)
 expect_success("tally.beats_per_cycle" ${vrpipe} units ${tally} --platform tallied)
-foreach(fidelity functional bound lt at cycle)
+foreach(fidelity functional bound lt cycle)
   expect_success("\"quads_rasterized\": *([0-9]+)" ${vrpipe} run ${draw} ${tally} --platform tallied --fidelity ${fidelity}
     --json -)
   string(REGEX MATCH "\"quads_rasterized\": *([0-9]+)" ignored "${output}")
@@ -182,7 +182,7 @@ expect_success("decoy" ${vrpipe} platforms --plugin ${bad}/decoy.so)
 expect_fault("throwing.so.*no licence" ${vrpipe} units --plugin ${bad}/throwing.so)
 expect_fault("exiting.so, while it is loaded: calls exit" ${vrpipe} units --plugin ${bad}/exiting.so)
 expect_fault("segfaulting.so, while it is loaded: ended by signal 11" ${vrpipe} units --plugin ${bad}/segfaulting.so)
-foreach(fidelity functional bound lt at cycle)
+foreach(fidelity functional bound lt cycle)
   foreach(command run compare)
     set(faulty ${vrpipe} ${command} ${draw} --fidelity ${fidelity} --plugin ${bad}/faulty.so --unit)
     expect_fault("tc=throws at cycle [0-9]+: insert throws: too full" ${faulty} tc=throws)

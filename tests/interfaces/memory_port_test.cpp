@@ -465,7 +465,7 @@ class WaitingMemory : public sc_core::sc_module {
   }
 };
 
-/// A unit of lt or at that reads once.
+/// A unit of lt that reads once.
 class OneRead : public sc_core::sc_module, public Clocked, public PortOwner {
  public:
   OneRead(const sc_core::sc_module_name& name, ClockDomain& domain)

@@ -1,4 +1,4 @@
-// Ports and resources of the fidelities lt and at.
+// Ports and resources of the fidelity lt.
 #include <vrpipe/model/timed.h>
 
 #include <functional>
@@ -19,8 +19,7 @@ class NoBehaviour : public Behaviour {};
 /// What the units of this file have in common.
 class Plain : public TimedUnit {
  public:
-  Plain(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport)
-      : TimedUnit(name, domain, {}, transport) {}
+  Plain(const sc_core::sc_module_name& name, ClockDomain& domain) : TimedUnit(name, domain, {}) {}
   Behaviour& behaviour() override { return behaviour_; }
 
  private:
@@ -30,23 +29,22 @@ class Plain : public TimedUnit {
 /// Sends items, each in a cycle or as soon as there is room.
 class Sender : public Plain {
  public:
-  Sender(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport)
-      : Plain(name, domain, transport), out(*this, "out") {}
+  Sender(const sc_core::sc_module_name& name, ClockDomain& domain) : Plain(name, domain), out(*this, "out") {}
   TimedOut<int> out;
   std::vector<CycleInterval> at;     ///< of each item
   std::vector<unsigned> beats;       ///< of each item; 1 where there is none
   std::vector<CycleInterval> taken;  ///< as known when it was sent
 
  private:
-  Cycle tick(Cycle now) override {
-    while (sent_ < at.size() && !out.blocked()) {
+  Cycle tick(Cycle) override {
+    while (sent_ < at.size()) {
       const CycleInterval when = at[sent_];
       const Cycle earliest = std::max(when.first, sent_ == 0 ? 0 : out.last() + 1);
       taken.push_back(out.send(static_cast<int>(sent_), {earliest, earliest + (when.last - when.first)},
                                sent_ < beats.size() ? beats[sent_] : 1));
       ++sent_;
     }
-    return sent_ < at.size() && !out.blocked() ? now + 1 : never;
+    return never;
   }
   std::size_t sent_ = 0;
 };
@@ -54,9 +52,8 @@ class Sender : public Plain {
 /// Takes an item every so many cycles.
 class Taker : public Plain {
  public:
-  Taker(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport, Cycle cycles_per_item)
-      : Plain(name, domain, transport),
-        in(*this, "in", [this, cycles_per_item](const int& item, CycleInterval visible) {
+  Taker(const sc_core::sc_module_name& name, ClockDomain& domain, Cycle cycles_per_item)
+      : Plain(name, domain), in(*this, "in", [this, cycles_per_item](const int& item, CycleInterval visible) {
           const Cycle at = std::max(visible.first, free_at_);
           free_at_ = std::max(at + cycles_per_item, visible.last + 1);
           items.push_back(item);
@@ -73,21 +70,15 @@ class Taker : public Plain {
   Cycle free_at_ = 0;
 };
 
-/// How items pass: recorded, through the sockets; else the ends call each other.
-struct Way {
-  Transport transport;
-  bool recorded;
-};
-
 /// A sender and a receiver, and a link between them.
 struct TimedPair {
-  TimedPair(Way way, unsigned depth, unsigned latency, Cycle cycles_per_item) {
+  TimedPair(bool recorded, unsigned depth, unsigned latency, Cycle cycles_per_item) {
     fresh_simulation();
     clock = std::make_unique<ClockDomain>("clock", 1000);
-    sender = std::make_unique<Sender>("sender", *clock, way.transport);
-    taker = std::make_unique<Taker>("taker", *clock, way.transport, cycles_per_item);
+    sender = std::make_unique<Sender>("sender", *clock);
+    taker = std::make_unique<Taker>("taker", *clock, cycles_per_item);
     LinkOptions options{depth, latency};
-    if (way.recorded) options.observers = {&recorder};
+    if (recorded) options.observers = {&recorder};
     sender->out.connect(taker->in, options);
   }
   void run() {
@@ -108,7 +99,8 @@ std::vector<Cycle> firsts(const std::vector<CycleInterval>& spans) {
   return cycles;
 }
 
-class TimedLink : public ::testing::TestWithParam<Way> {};
+/// Recorded, through the sockets; else the ends call each other.
+class TimedLink : public ::testing::TestWithParam<bool> {};
 
 TEST_P(TimedLink, AnItemOfCycleTThroughLatencyLIsVisibleAtTPlusL) {
   for (const unsigned latency : {1U, 2U, 7U}) {
@@ -122,8 +114,8 @@ TEST_P(TimedLink, AnItemOfCycleTThroughLatencyLIsVisibleAtTPlusL) {
 TEST_P(TimedLink, TheSendersPipelineAddsItsLatency) {
   fresh_simulation();
   ClockDomain clock("clock", 1000);
-  Sender sender("sender", clock, GetParam().transport);
-  Taker taker("taker", clock, GetParam().transport, 1);
+  Sender sender("sender", clock);
+  Taker taker("taker", clock, 1);
   sender.out.set_pipeline(5, 2);
   sender.out.connect(taker.in, 4, 1);
   taker.in.open();
@@ -197,7 +189,7 @@ TEST_P(TimedLink, ItemsComeInOrderEachOnceUnderAnyStallsAndLater) {
 TEST_P(TimedLink, AStubbedOutputSwallows) {
   fresh_simulation();
   ClockDomain clock("clock", 1000);
-  Sender sender("sender", clock, GetParam().transport);
+  Sender sender("sender", clock);
   sender.out.stub();
   sender.at.assign(1000, 0);
   clock.run(sc_core::sc_time(10, sc_core::SC_US));
@@ -205,23 +197,8 @@ TEST_P(TimedLink, AStubbedOutputSwallows) {
   EXPECT_TRUE(sender.idle());
 }
 
-INSTANTIATE_TEST_SUITE_P(Ways, TimedLink,
-                         ::testing::Values(Way{Transport::blocking, false}, Way{Transport::blocking, true},
-                                           Way{Transport::non_blocking, false}, Way{Transport::non_blocking, true}),
-                         [](const auto& way) {
-                           return std::string(way.param.transport == Transport::blocking ? "lt" : "at") +
-                                  (way.param.recorded ? "_recorded" : "");
-                         });
-
-TEST(TimedLink, AGateKeepsItemsInTheQueue) {
-  TimedPair pair({Transport::non_blocking, false}, 4, 1, 1);
-  bool open = false;
-  pair.taker->in.set_gate([&] { return open; });
-  pair.sender->at = {0, 0, 0};
-  pair.run();
-  EXPECT_TRUE(pair.taker->items.empty());
-  EXPECT_FALSE(pair.taker->idle());
-}
+INSTANTIATE_TEST_SUITE_P(Ways, TimedLink, ::testing::Bool(),
+                         [](const auto& way) { return way.param ? "recorded" : "direct"; });
 
 TEST(IssuePort, TakesSoManyACycleInOrder) {
   IssuePort lane(4);

@@ -1,4 +1,4 @@
-// The sectored L2 in time, at `lt` and `at` (annotated) and at `cycle` (clocked), with a memory of fixed latency below.
+// The sectored L2 in time, at `lt` (annotated) and at `cycle` (clocked), with a memory of fixed latency below.
 
 #include <algorithm>
 #include <memory>

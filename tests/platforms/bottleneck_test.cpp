@@ -122,7 +122,7 @@ TEST(Bottleneck, IsTheUnitThatASettingMakesSlow) {
 TEST(Bottleneck, IsTheSameAtEveryFidelityWithTime) {
   for (const Variant& variant : variants()) {
     const RunResult exact = run(request_of(variant.name), scene());
-    for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at}) {
+    for (const Fidelity fidelity : {Fidelity::lt}) {
       const RunResult result = run(request_of(variant.name, fidelity), scene());
       EXPECT_EQ(result.bottleneck->unit, exact.bottleneck->unit) << variant.name;
       EXPECT_NEAR(result.bottleneck->occupancy, exact.bottleneck->occupancy, 0.02) << variant.name;
@@ -138,7 +138,7 @@ TEST(Bottleneck, IsTheSameAtEveryFidelityWithTime) {
 
 // The bound paid for every sector of a line once.
 TEST(Bottleneck, ALineIsPaidForWhenItComesAndWhenItGoesHoweverManySectorsMove) {
-  for (const Fidelity fidelity : {Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+  for (const Fidelity fidelity : {Fidelity::bound, Fidelity::lt, Fidelity::cycle}) {
     const RunResult result = run(request_of("baseline", fidelity,
                                             [](RunRequest& request) {
                                               strictly(request);
@@ -169,7 +169,7 @@ TEST(Rates, BytesACycleMeanWhatTheySay) {
   };
   const auto quads =
       static_cast<double>(run(request_of("baseline", Fidelity::functional), scene()).counts.quads_blended);
-  for (const Fidelity fidelity : {Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+  for (const Fidelity fidelity : {Fidelity::bound, Fidelity::lt, Fidelity::cycle}) {
     for (const char* bytes : {"16", "24", "32", "48"}) {
       const double least = quads * 32 / std::stod(bytes);
       EXPECT_GE(cycles(bytes, fidelity), least) << bytes << " " << name_of(fidelity);

@@ -233,7 +233,7 @@ TEST(StrictTermination, DoesNotDependOnHowFastBinsAreTested) {
   const Draw draw = testing::random_draw(64, 64, 300, 8);
   for (const char* variant : {"het", "het+qm"}) {
     const RunResult expected = run(request_of(variant, Fidelity::functional, strictly), draw);
-    for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+    for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
       for (const char* quads : {"1", "2", "5"}) {
         const RunResult result = run(request_of(variant, fidelity,
                                                 [&](RunRequest& r) {

@@ -155,7 +155,7 @@ TEST(Netlist, WhatAPlatformLeavesOutIsMissingAtEveryFidelity) {
                              [](const UnitReport& unit) { return unit.name == "gpc0.raster"; }));
   }
   // With time the end of the frame never comes to CROP.
-  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     RunRequest request = request_of("baseline", fidelity);
     request.platform = &half;
     EXPECT_THROW(run(request, draw), SimulationFault) << name_of(fidelity);
@@ -252,7 +252,7 @@ TEST(Instances, MayHaveImplementationsOfTheirOwn) {
 
 TEST(Links, TheirParametersDecideAtEveryFidelityWithTime) {
   const Draw draw = random_draw(96, 96, 300, 6);
-  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     const auto cycles = [&](const Setting& setting) {
       RunRequest request = request_of("baseline", fidelity);
       request.settings = {setting};
@@ -292,7 +292,7 @@ TEST(ForeignMemories, MayStandBesideTheL2) {
     netlist.add_memory("other", make_other);
     netlist.connect_memory("gpc0.crop", "other");
   });
-  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+  for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     RunRequest request = request_of("baseline", fidelity);
     request.platform = &platform;
     const RunResult result = run(request, draw);

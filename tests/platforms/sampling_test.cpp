@@ -177,7 +177,7 @@ TEST(Sampling, TwoIntervalsSeeTheSame) {
 TEST(Sampling, NamesAStatisticOfAllComponentsOrOfOne) {
   const Draw draw = random_draw(200, 120, 300, 2);
   const RunRequest request =
-      request_of("baseline", Fidelity::at, [](RunRequest& r) { r.platform = &platform_named("desktop"); });
+      request_of("baseline", Fidelity::lt, [](RunRequest& r) { r.platform = &platform_named("desktop"); });
   const std::vector<Sample> samples =
       sampled(request, draw, 100, {"crop.quads_blended", "gpc1.crop.quads_blended", "gpc*.crop.quads_blended"});
   std::vector<std::string> names;
@@ -228,9 +228,9 @@ TEST(Sampling, OfWhatIsNotThereIsRefusedBeforeTheRun) {
   EXPECT_EQ(refusal_of(Fidelity::cycle, "crop.quads_blended"), "accepted");
   expect_in("did you mean crop.quads_blended?", refusal_of(Fidelity::cycle, "crop.quads_blendet"));
   expect_in("did you mean gpc0.crop.quads_blended?", refusal_of(Fidelity::lt, "gpc1.crop.quads_blended"));
-  expect_in("'dram.*'", refusal_of(Fidelity::at, "dram.*"));
+  expect_in("'dram.*'", refusal_of(Fidelity::lt, "dram.*"));
   for (const Fidelity fidelity : {Fidelity::functional, Fidelity::bound}) {
-    expect_in("use lt, at or cycle", refusal_of(fidelity, "crop.quads_blended"));
+    expect_in("use lt or cycle", refusal_of(fidelity, "crop.quads_blended"));
   }
   EXPECT_THROW(Observers().on_statistics(0, {"crop.quads_blended"}, [](Cycle, const auto&) {}), UserError);
 }

@@ -229,7 +229,7 @@ TEST(Statistics, OfTheColourCacheMeanTheSameAtEveryFidelity) {
 TEST(Statistics, OfTheColourCacheAreTheSameWhereTheOrderIs) {
   const Draw draw = testing::random_draw(16, 16, 400, 2);
   std::map<std::string, std::uint64_t> expected;
-  for (const Fidelity fidelity : {Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle}) {
+  for (const Fidelity fidelity : {Fidelity::bound, Fidelity::lt, Fidelity::cycle}) {
     const RunResult result = run(request_of("baseline", fidelity), draw);
     for (const StatisticReport& report : result.statistics) {
       if (report.name.rfind("crop.cache.", 0) != 0 || report.name == "crop.cache.sector_hits_on_their_way") continue;

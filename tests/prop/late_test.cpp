@@ -120,7 +120,7 @@ TEST_P(LateProp, AWarpGoesToZropInItsTurnAndToCropWhenItIsBack) {
   // Visible in 11, in its turn in 12, through the unit in 4.
   EXPECT_EQ(sent_at[0], 16U);
   ASSERT_EQ(left, (Numbers{0, 1}));
-  // Back in 116 and visible in 117. At `lt` and `at` it goes in one piece, whose last quads leave 3 cycles later.
+  // Back in 116 and visible in 117. At `lt` it goes in one piece, whose last quads leave 3 cycles later.
   EXPECT_EQ(left_at[0], 117U + 4 + (GetParam() == Fidelity::cycle ? 0 : 3));
   EXPECT_GE(left_at[1], left_at[0] + 4) << "8 quads go in 4 cycles";
   EXPECT_EQ(release->records().size(), 2U);

@@ -1,4 +1,4 @@
-// PROP at lt and at, where bins and warps go in one piece.
+// PROP at lt, where bins and warps go in one piece.
 #include <algorithm>
 #include <map>
 
@@ -17,7 +17,7 @@ using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
-class PropTimedTest : public ::testing::TestWithParam<Fidelity> {
+class PropTimedTest : public ::testing::Test {
  protected:
   PropTimedTest() : draw(testing::draw_of(256, 256)), context(testing::context_of(draw)) {}
 
@@ -45,9 +45,6 @@ class PropTimedTest : public ::testing::TestWithParam<Fidelity> {
   ShadedWarpPool pool;
 };
 
-INSTANTIATE_TEST_SUITE_P(Fidelities, PropTimedTest, ::testing::ValuesIn(testing::timed_fidelities()),
-                         testing::name_of_fidelity);
-
 /// The ways of shaded warps through PROP.
 struct ColorBench {
   ColorBench(Fidelity fidelity, const RenderContext& context, const Bench::Settings& settings = {}, unsigned depth = 64,
@@ -72,8 +69,8 @@ struct ColorBench {
   Sink<WarpRelease>& release;
 };
 
-TEST_P(PropTimedTest, WithoutTestsBinsGoStraightToTheQru) {
-  Bench bench(GetParam(), "prop", "pre-rop", context, {{"latency_cycles", "4"}});
+TEST_F(PropTimedTest, WithoutTestsBinsGoStraightToTheQru) {
+  Bench bench(Fidelity::lt, "prop", "pre-rop", context, {{"latency_cycles", "4"}});
   Source<BinItem>& in = bench.source<BinItem>("in_bins", 8);
   Sink<BinItem>& survivors = bench.sink<BinItem>("out_survivors", 8);
   Sink<BinItem>& test = bench.sink<BinItem>("out_test");
@@ -83,9 +80,9 @@ TEST_P(PropTimedTest, WithoutTestsBinsGoStraightToTheQru) {
   EXPECT_TRUE(test.records().empty());
 }
 
-TEST_P(PropTimedTest, WithTestsBinsGoToZropAndWhatComesBackToTheQru) {
+TEST_F(PropTimedTest, WithTestsBinsGoToZropAndWhatComesBackToTheQru) {
   testing::terminate_early(context);
-  Bench bench(GetParam(), "prop", "pre-rop", context, {{"latency_cycles", "4"}});
+  Bench bench(Fidelity::lt, "prop", "pre-rop", context, {{"latency_cycles", "4"}});
   Source<BinItem>& in = bench.source<BinItem>("in_bins", 8);
   Source<BinItem>& tested = bench.source<BinItem>("in_tested", 8);
   Sink<BinItem>& survivors = bench.sink<BinItem>("out_survivors", 8);
@@ -97,10 +94,10 @@ TEST_P(PropTimedTest, WithTestsBinsGoToZropAndWhatComesBackToTheQru) {
   EXPECT_EQ(cycles_of(survivors), (std::vector<Cycle>{21 + 4}));
 }
 
-TEST_P(PropTimedTest, MovesItsQuadsPerCycleEachWayAsTheyCome) {
+TEST_F(PropTimedTest, MovesItsQuadsPerCycleEachWayAsTheyCome) {
   testing::terminate_early(context);
   for (const unsigned rate : {8U, 16U}) {
-    Bench bench(GetParam(), "prop", "pre-rop", context,
+    Bench bench(Fidelity::lt, "prop", "pre-rop", context,
                 {{"quads_per_cycle", std::to_string(rate)}, {"latency_cycles", "4"}});
     Source<BinItem>& in = bench.source<BinItem>("in_bins", 64);
     Source<BinItem>& tested = bench.source<BinItem>("in_tested", 64);
@@ -123,7 +120,7 @@ TEST_P(PropTimedTest, MovesItsQuadsPerCycleEachWayAsTheyCome) {
   }
 }
 
-TEST_P(PropTimedTest, BinsOfAnySizePassInTheCyclesOfCycle) {
+TEST_F(PropTimedTest, BinsOfAnySizePassInTheCyclesOfCycle) {
   // Not more than one beat a cycle comes and goes, so that a bin takes as long as its beats.
   const Bench::Settings settings{{"quads_per_cycle", "16"}, {"latency_cycles", "4"}};
   std::vector<Cycle> expected;  // of the last beat of each bin
@@ -144,7 +141,7 @@ TEST_P(PropTimedTest, BinsOfAnySizePassInTheCyclesOfCycle) {
       if (record.item.last_of_bin) expected.push_back(record.cycle);
     }
   }
-  Bench bench(GetParam(), "prop", "pre-rop", context, settings);
+  Bench bench(Fidelity::lt, "prop", "pre-rop", context, settings);
   Source<BinItem>& in = bench.source<BinItem>("in_bins", 64);
   in.set_rate(1);
   const Sink<BinItem>& out = bench.sink<BinItem>("out_survivors", 64);
@@ -159,8 +156,8 @@ TEST_P(PropTimedTest, BinsOfAnySizePassInTheCyclesOfCycle) {
   EXPECT_EQ(got, expected);
 }
 
-TEST_P(PropTimedTest, ABinThatComesSlowlyTakesAsLongToPass) {
-  Bench bench(GetParam(), "prop", "pre-rop", context, {{"quads_per_cycle", "16"}, {"latency_cycles", "4"}});
+TEST_F(PropTimedTest, ABinThatComesSlowlyTakesAsLongToPass) {
+  Bench bench(Fidelity::lt, "prop", "pre-rop", context, {{"quads_per_cycle", "16"}, {"latency_cycles", "4"}});
   Source<BinItem>& in = bench.source<BinItem>("in_bins", 8);
   Sink<BinItem>& survivors = bench.sink<BinItem>("out_survivors", 8);
   in.add(bins.at({0, 0}, testing::numbers(64)), {10, 40}, 4);
@@ -170,13 +167,13 @@ TEST_P(PropTimedTest, ABinThatComesSlowlyTakesAsLongToPass) {
   EXPECT_EQ(survivors.records()[0].last, 41U + 4);
 }
 
-TEST_P(PropTimedTest, HandsItsColourQuadsPerCycleToCrop) {
+TEST_F(PropTimedTest, HandsItsColourQuadsPerCycleToCrop) {
   const std::pair<ColorFormat, unsigned> formats[] = {{ColorFormat::rgba8, 4},
                                                       {ColorFormat::rgba16f, 2},
                                                       {ColorFormat::rgba32f, 1}};
   for (const auto& [format, rate] : formats) {
     context.format = format;
-    ColorBench prop(GetParam(), context, {{"latency_cycles", "4"}}, 256);
+    ColorBench prop(Fidelity::lt, context, {{"latency_cycles", "4"}}, 256);
     for (std::uint32_t i = 0; i < 16; ++i) prop.shaded.add({warp(i)}, 10);
     prop.bench.run();
     ASSERT_EQ(prop.color.records().size(), 16U);
@@ -191,13 +188,13 @@ TEST_P(PropTimedTest, HandsItsColourQuadsPerCycleToCrop) {
   }
 }
 
-TEST_P(PropTimedTest, ColourBytesThatAreNoWholeQuadsPassAtTheirRateExactly) {
+TEST_F(PropTimedTest, ColourBytesThatAreNoWholeQuadsPassAtTheirRateExactly) {
   for (const unsigned bytes : {16U, 17U, 48U, 64U, 96U, 200U, 256U}) {
     for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
       context.format = format;
       const Rate rate = Rate::of_bytes(bytes, 4 * bytes_per_pixel(format));
-      ColorBench prop(GetParam(), context, {{"color_bytes_per_cycle", std::to_string(bytes)}, {"latency_cycles", "4"}},
-                      4096);
+      ColorBench prop(Fidelity::lt, context,
+                      {{"color_bytes_per_cycle", std::to_string(bytes)}, {"latency_cycles", "4"}}, 4096);
       // All wait for the first, so that the rate decides.
       for (std::uint32_t i = 1; i < 60; ++i) prop.shaded.add({warp(i)});
       prop.shaded.add({warp(0)}, 100);
@@ -210,18 +207,18 @@ TEST_P(PropTimedTest, ColourBytesThatAreNoWholeQuadsPassAtTheirRateExactly) {
   }
 }
 
-TEST_P(PropTimedTest, ShadedOutOfOrderWarpsLeaveInTheOrderOfTheirTile) {
+TEST_F(PropTimedTest, ShadedOutOfOrderWarpsLeaveInTheOrderOfTheirTile) {
   for (const char* order : {"draw", "tile"}) {
-    ColorBench prop(GetParam(), context, {{"order", order}});
+    ColorBench prop(Fidelity::lt, context, {{"order", order}});
     for (const std::uint32_t sequence : {3U, 1U, 2U, 0U}) prop.shaded.add({warp(sequence)});
     prop.bench.run();
     EXPECT_EQ(prop.sequences(), (std::vector<std::uint32_t>{0, 1, 2, 3}));
   }
 }
 
-TEST_P(PropTimedTest, InTileOrderAnotherTileDoesNotWait) {
+TEST_F(PropTimedTest, InTileOrderAnotherTileDoesNotWait) {
   for (const bool tile_order : {true, false}) {
-    ColorBench prop(GetParam(), context, {{"order", tile_order ? "tile" : "draw"}, {"latency_cycles", "4"}});
+    ColorBench prop(Fidelity::lt, context, {{"order", tile_order ? "tile" : "draw"}, {"latency_cycles", "4"}});
     prop.shaded.add({warp(1, {1, 0}, 0)});        // of another tile
     prop.shaded.add({warp(0, {0, 0}, 0)}, 1000);  // launched first, shaded late
     prop.bench.run();
@@ -231,8 +228,8 @@ TEST_P(PropTimedTest, InTileOrderAnotherTileDoesNotWait) {
   }
 }
 
-TEST_P(PropTimedTest, AWarpIsReleasedWithItsLastQuad) {
-  ColorBench prop(GetParam(), context, {{"latency_cycles", "4"}});
+TEST_F(PropTimedTest, AWarpIsReleasedWithItsLastQuad) {
+  ColorBench prop(Fidelity::lt, context, {{"latency_cycles", "4"}});
   const ShadedWarp* const only = warp(7, {0, 0}, 0);
   prop.shaded.add({only}, 10);
   prop.bench.run();
@@ -241,8 +238,8 @@ TEST_P(PropTimedTest, AWarpIsReleasedWithItsLastQuad) {
   EXPECT_NE(&pool.take(), only) << "CROP has yet to blend its quads";
 }
 
-TEST_P(PropTimedTest, AWarpBeginsToLeaveOnceItsReleaseHasRoom) {
-  ColorBench prop(GetParam(), context, {{"latency_cycles", "4"}}, 64, 1);
+TEST_F(PropTimedTest, AWarpBeginsToLeaveOnceItsReleaseHasRoom) {
+  ColorBench prop(Fidelity::lt, context, {{"latency_cycles", "4"}}, 64, 1);
   prop.release.close(0, 500);
   for (std::uint32_t i = 0; i < 3; ++i) prop.shaded.add({warp(i)});
   prop.bench.run();
@@ -250,8 +247,8 @@ TEST_P(PropTimedTest, AWarpBeginsToLeaveOnceItsReleaseHasRoom) {
   EXPECT_EQ(cycles_of(prop.color), (std::vector<Cycle>{2 + 4, 501 + 4, 506 + 4}));
 }
 
-TEST_P(PropTimedTest, AWarpWithoutSurvivorsIsReleasedAndPassedOverInACycle) {
-  ColorBench prop(GetParam(), context, {{"latency_cycles", "4"}});
+TEST_F(PropTimedTest, AWarpWithoutSurvivorsIsReleasedAndPassedOverInACycle) {
+  ColorBench prop(Fidelity::lt, context, {{"latency_cycles", "4"}});
   const ShadedWarp* const empty = warp(0, {0, 0}, 0, 0);
   prop.shaded.add({empty});
   prop.shaded.add({warp(1, {0, 0}, 1, 2)});
@@ -263,8 +260,8 @@ TEST_P(PropTimedTest, AWarpWithoutSurvivorsIsReleasedAndPassedOverInACycle) {
   EXPECT_EQ(&pool.take(), empty) << "nobody else needs it";
 }
 
-TEST_P(PropTimedTest, TheEndWaitsForAllWarpsOfTheDraw) {
-  ColorBench prop(GetParam(), context);
+TEST_F(PropTimedTest, TheEndWaitsForAllWarpsOfTheDraw) {
+  ColorBench prop(Fidelity::lt, context);
   prop.shaded.add({end(2)});
   prop.shaded.add({warp(1, {3, 0}, 0)}, 500);
   prop.shaded.add({warp(0, {0, 0}, 0)}, 1000);
@@ -275,26 +272,25 @@ TEST_P(PropTimedTest, TheEndWaitsForAllWarpsOfTheDraw) {
   EXPECT_TRUE(prop.bench.unit().idle());
 }
 
-TEST_P(PropTimedTest, ACropThatTakesNothingStopsIt) {
-  ColorBench prop(GetParam(), context, {{"latency_cycles", "1"}}, 8);
+TEST_F(PropTimedTest, ACropThatTakesNothingStopsIt) {
+  ColorBench prop(Fidelity::lt, context, {{"latency_cycles", "1"}}, 8);
   prop.color.close(0, 300);
   for (std::uint32_t i = 0; i < 6; ++i) prop.shaded.add({warp(i)});
   prop.shaded.add({end(6)});
   prop.bench.run();
   EXPECT_EQ(prop.sequences(), (std::vector<std::uint32_t>{0, 1, 2, 3, 4, 5, ~0U}));
   ASSERT_EQ(prop.release.records().size(), 7U);
-  // Two warps of four beats fit. At `at` the third is released although it waits: nobody knows yet how long.
-  const std::size_t waits = GetParam() == Fidelity::at ? 1 : 0;
-  EXPECT_LT(prop.release.records()[1 + waits].cycle, 20U);
-  EXPECT_GT(prop.release.records()[2 + waits].cycle, 300U);
+  // Two warps of four beats fit.
+  EXPECT_LT(prop.release.records()[1].cycle, 20U);
+  EXPECT_GT(prop.release.records()[2].cycle, 300U);
   EXPECT_GT(testing::charged(prop.bench.unit(), UnitState::blocked, 350), 280U);
 }
 
 // case M06
-TEST_P(PropTimedTest, OrderHoldsPerTileUnderAnyArrivalAndStalls) {
+TEST_F(PropTimedTest, OrderHoldsPerTileUnderAnyArrivalAndStalls) {
   for (const char* order : {"draw", "tile"}) {
     for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-      ColorBench prop(GetParam(), context, {{"order", order}}, static_cast<unsigned>(1 + seed % 12),
+      ColorBench prop(Fidelity::lt, context, {{"order", order}}, static_cast<unsigned>(1 + seed % 12),
                       static_cast<unsigned>(1 + seed % 9));
       std::vector<const ShadedWarp*> all;
       std::map<unsigned, std::uint32_t> in_tile;

@@ -98,7 +98,7 @@ TEST(Bound, LetsQuadsShareTheLastCycleOfABlock) {
     return *simulate(r, frame).cycles;
   };
   const Cycle bound = cycles(Fidelity::bound);
-  for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt, Fidelity::at}) {
+  for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt}) {
     const Cycle timed = cycles(fidelity);
     EXPECT_LE(bound, timed) << name_of(fidelity);
     EXPECT_GE(bound, 0.9 * static_cast<double>(timed)) << name_of(fidelity);
@@ -120,7 +120,7 @@ RC_GTEST_PROP(Bound, IsNeverAboveTheFidelitiesWithLinks, ()) {
     RC_DISCARD("a cache that cannot be");
   }
   const Cycle bound = *run_trapped(r, draw).cycles;
-  for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt, Fidelity::at}) {
+  for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt}) {
     r.fidelity = fidelity;
     const Cycle cycles = *run_trapped(r, draw).cycles;
     if (bound <= cycles) continue;

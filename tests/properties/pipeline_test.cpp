@@ -163,7 +163,7 @@ RC_GTEST_PROP(Pipeline, InStrictModeEveryFidelityIsTheUntimedOneBitForBit, ()) {
   r.termination = Termination::strict;
   r.settings = *bins();
   const RunResult untimed = run_trapped(r, draw);
-  for (const char* name : {"bound", "lt", "at", "cycle"}) {
+  for (const char* name : {"bound", "lt", "cycle"}) {
     try {
       r.fidelity = fidelity_named(name);
     } catch (const UserError&) {

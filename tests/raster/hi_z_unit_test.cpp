@@ -62,7 +62,7 @@ class HiZUnitTest : public ::testing::TestWithParam<Fidelity> {
   Frame frame;
   RenderContext context;
 };
-INSTANTIATE_TEST_SUITE_P(Raster, HiZUnitTest, ::testing::Values(Fidelity::lt, Fidelity::at, Fidelity::cycle),
+INSTANTIATE_TEST_SUITE_P(Raster, HiZUnitTest, ::testing::Values(Fidelity::lt, Fidelity::cycle),
                          [](const auto& fidelity) { return std::string(name_of(fidelity.param)); });
 
 TEST_P(HiZUnitTest, AnUpdateCountsFromTheCycleInWhichItComes) {

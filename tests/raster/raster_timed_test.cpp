@@ -1,4 +1,4 @@
-// RASTER at lt and at; what has one closed form at every fidelity is compared with cycle by it. At lt and at a raster
+// RASTER at lt; what has one closed form at every fidelity is compared with cycle by it. At lt a raster
 // tile goes in one piece, in the cycle of its last quad.
 #include <gtest/gtest.h>
 
@@ -137,17 +137,12 @@ TEST_P(RasterTimedTest, ABlockedReceiverStopsItUntilACycleAfterItTakes) {
   ASSERT_EQ(out.records().size(), 256U);
   EXPECT_EQ(out.records()[3].cycle, 100U);
   EXPECT_EQ(out.records()[4].cycle, 102U);
-  // At lt the tile that waited goes beside the next, which was made meanwhile. At `at` all tiles of a job are made before
-  // it is known that they wait, in cycles 1 to 256, and then go as places become free.
-  const bool ahead = GetParam() == Fidelity::at;
+  // At lt the tile that waited goes beside the next, which was made meanwhile.
   for (std::size_t i = 5; i < 256; ++i) {
     ASSERT_LE(out.records()[i].cycle, 98 + i);
-    ASSERT_GE(out.records()[i].cycle, ahead ? i + 2 : GetParam() == Fidelity::lt ? 97 + i : 98 + i);
+    ASSERT_GE(out.records()[i].cycle, GetParam() == Fidelity::lt ? 97 + i : 98 + i);
   }
-  const std::uint64_t blocked = testing::charged(bench.unit(), UnitState::blocked, 356);
-  if (!ahead) {
-    EXPECT_EQ(blocked, 96U) << "cycles 5 to 100";
-  }
+  EXPECT_EQ(testing::charged(bench.unit(), UnitState::blocked, 356), 96U) << "cycles 5 to 100";
 }
 
 TEST_P(RasterTimedTest, QuadsAndTheirOrderAreTheSameUnderAnyStalls) {

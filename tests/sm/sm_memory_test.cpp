@@ -244,7 +244,7 @@ TEST_P(SmMemoryTest, WithoutAnL1ACoreHasNoMoreSectorsInFlight) {
 TEST_P(SmMemoryTest, CyclesOfWaitingForMemoryAreChargedToIt) {
   SmMemoryBench sm(GetParam(), context);
   sm.warps.add(warp(0, 0), 10);
-  sm.warps.add(warp(1, 100), 500);  // at lt and at cycles are charged when the next warp comes
+  sm.warps.add(warp(1, 100), 500);  // at lt cycles are charged when the next warp comes
   sm.run();
   EXPECT_GE(testing::charged(sm.bench.unit(), UnitState::memory, 501), memory_latency - first_segment_cycles);
 }

@@ -1,4 +1,4 @@
-// The SM array at lt and at; what has one closed form at every fidelity is compared with cycle by it.
+// The SM array at lt; what has one closed form at every fidelity is compared with cycle by it.
 #include <algorithm>
 #include <map>
 
@@ -86,7 +86,7 @@ TEST_P(SmTimedTest, AnArrayWithRoomToSpareLaunchesAWarpACycle) {
   sm.run();
   ASSERT_EQ(sm.cycles.size(), 200U);
   // Of the eight warps of a core the second four wait for the schedulers of the first: at cycle for the 40 cycles of the
-  // second segment less the 4 that they come later. At lt and at, where a warp of such an array has its scheduler for all
+  // second segment less the 4 that they come later. At lt, where a warp of such an array has its scheduler for all
   // its instructions at once, for 48 less 4; at lt what is done before those of smaller number leaves with them.
   const Cycle wait = (GetParam() == Fidelity::cycle ? 40 : issue_cycles) - 4;
   Cycle before = 0;

@@ -15,12 +15,8 @@
 
 namespace vrpipe::testing {
 
-inline const std::vector<Fidelity>& timed_fidelities() {
-  static const std::vector<Fidelity> all{Fidelity::lt, Fidelity::at};
-  return all;
-}
 inline const std::vector<Fidelity>& fidelities_with_time() {
-  static const std::vector<Fidelity> all{Fidelity::lt, Fidelity::at, Fidelity::cycle};
+  static const std::vector<Fidelity> all{Fidelity::lt, Fidelity::cycle};
   return all;
 }
 inline std::string name_of_fidelity(const ::testing::TestParamInfo<Fidelity>& fidelity) {

@@ -10,7 +10,7 @@
 #include <vrpipe/memory/memory_port.h>
 #include <vrpipe/memory/timed_memory_port.h>
 
-/// What makes accesses to a memory, at `cycle` and at `lt` and `at`.
+/// What makes accesses to a memory, at `cycle` and at `lt`.
 
 namespace vrpipe {
 
@@ -59,7 +59,7 @@ class ClockedInitiator : public sc_core::sc_module, public Clocked, public PortO
   std::size_t next_ = 0;
 };
 
-/// A unit of `lt` or `at`, as far as its memory port is concerned.
+/// A unit of `lt`, as far as its memory port is concerned.
 class TimedInitiator : public sc_core::sc_module, public PortOwner {
  public:
   TimedInitiator(const sc_core::sc_module_name& name, ClockDomain& domain)

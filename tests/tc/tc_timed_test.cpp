@@ -1,4 +1,4 @@
-// TC at lt and at, where a flushed bin goes in one piece, compared with cycle, where it goes beat by beat.
+// TC at lt, where a flushed bin goes in one piece, compared with cycle, where it goes beat by beat.
 #include <map>
 
 #include <gtest/gtest.h>
@@ -19,15 +19,12 @@ using testkit::Bench;
 using testkit::Sink;
 using testkit::Source;
 
-class TcTimedTest : public ::testing::TestWithParam<Fidelity> {
+class TcTimedTest : public ::testing::Test {
  protected:
   TcTimedTest() : draw(testing::draw_of(640, 640)), context(testing::context_of(draw)) {}
   Draw draw;
   RenderContext context;
 };
-
-INSTANTIATE_TEST_SUITE_P(Fidelities, TcTimedTest, ::testing::ValuesIn(testing::timed_fidelities()),
-                         testing::name_of_fidelity);
 
 /// TC with its ports.
 struct TimedTcBench {
@@ -51,8 +48,8 @@ struct TimedTcBench {
   Sink<BinItem>& out;
 };
 
-TEST_P(TcTimedTest, AFullBinIsSeenFromTheCycleAfterItFilledPlusTheLatencyOnABeatACycle) {
-  TimedTcBench tc(GetParam(), context, {{"bin_quads", "64"}, {"latency_cycles", "4"}});
+TEST_F(TcTimedTest, AFullBinIsSeenFromTheCycleAfterItFilledPlusTheLatencyOnABeatACycle) {
+  TimedTcBench tc(Fidelity::lt, context, {{"bin_quads", "64"}, {"latency_cycles", "4"}});
   for (unsigned i = 0; i < 4; ++i) tc.in.add(beat_of(tile(3), numbers(16), 16 * i), 10 + i);
   tc.bench.run();
   ASSERT_EQ(tc.out.records().size(), 1U);
@@ -63,9 +60,9 @@ TEST_P(TcTimedTest, AFullBinIsSeenFromTheCycleAfterItFilledPlusTheLatencyOnABeat
   EXPECT_EQ(splats_of(tc.out.records()[0].item), numbers(64));
 }
 
-TEST_P(TcTimedTest, TakesItsQuadsPerCycleAndHandsBinsOnAtTheSameRate) {
+TEST_F(TcTimedTest, TakesItsQuadsPerCycleAndHandsBinsOnAtTheSameRate) {
   for (const unsigned rate : {4U, 8U, 16U}) {
-    TimedTcBench tc(GetParam(), context,
+    TimedTcBench tc(Fidelity::lt, context,
                     {{"quads_per_cycle", std::to_string(rate)}, {"bin_quads", "256"}, {"latency_cycles", "4"}}, 64,
                     256);
     for (unsigned i = 0; i < 64; ++i) tc.in.add(beat_of(tile(0), numbers(16), 16 * i));
@@ -81,15 +78,15 @@ TEST_P(TcTimedTest, TakesItsQuadsPerCycleAndHandsBinsOnAtTheSameRate) {
   }
 }
 
-TEST_P(TcTimedTest, SmallBeatsShareACycle) {
-  TimedTcBench tc(GetParam(), context, {{"quads_per_cycle", "16"}, {"bin_quads", "64"}, {"latency_cycles", "4"}}, 64);
+TEST_F(TcTimedTest, SmallBeatsShareACycle) {
+  TimedTcBench tc(Fidelity::lt, context, {{"quads_per_cycle", "16"}, {"bin_quads", "64"}, {"latency_cycles", "4"}}, 64);
   for (unsigned i = 0; i < 64; ++i) tc.in.add(beat_of(tile(0), {i}, i));
   tc.bench.run();
   EXPECT_EQ(tc.out.records().at(0).cycle, 4U + 1 + 4) << "64 beats of one quad enter in four cycles";
 }
 
-TEST_P(TcTimedTest, ATileWithoutABinEvictsTheOldestInTheCycleOfItsQuads) {
-  TimedTcBench tc(GetParam(), context, {{"bins", "2"}, {"latency_cycles", "4"}});
+TEST_F(TcTimedTest, ATileWithoutABinEvictsTheOldestInTheCycleOfItsQuads) {
+  TimedTcBench tc(Fidelity::lt, context, {{"bins", "2"}, {"latency_cycles", "4"}});
   tc.in.add(beat_of(tile(0), {1, 2}, 0), 10);
   tc.in.add(beat_of(tile(1), {1}, 10), 20);
   tc.in.add(beat_of(tile(2), {1}, 20), 30);
@@ -100,9 +97,9 @@ TEST_P(TcTimedTest, ATileWithoutABinEvictsTheOldestInTheCycleOfItsQuads) {
   EXPECT_EQ(splats_of(tc.out.records()[0].item), (std::vector<std::uint32_t>{0, 1}));
 }
 
-TEST_P(TcTimedTest, TheIdleTimeOutFiresExactlyItsCyclesAfterTheLastArrival) {
+TEST_F(TcTimedTest, TheIdleTimeOutFiresExactlyItsCyclesAfterTheLastArrival) {
   for (const unsigned timeout : {1U, 150U, 151U}) {
-    TimedTcBench tc(GetParam(), context, {{"idle_timeout_cycles", std::to_string(timeout)}, {"latency_cycles", "4"}});
+    TimedTcBench tc(Fidelity::lt, context, {{"idle_timeout_cycles", std::to_string(timeout)}, {"latency_cycles", "4"}});
     tc.in.add(beat_of(tile(0), {1}), 10);
     tc.in.add(beat_of(tile(1), {1}), 1000);  // at lt it is what comes next that finds a bin's time out
     tc.in.add(end_beat(), 2000);
@@ -115,8 +112,8 @@ TEST_P(TcTimedTest, TheIdleTimeOutFiresExactlyItsCyclesAfterTheLastArrival) {
   }
 }
 
-TEST_P(TcTimedTest, BinsWhoseTimeIsOutGoOneACycle) {
-  TimedTcBench tc(GetParam(), context,
+TEST_F(TcTimedTest, BinsWhoseTimeIsOutGoOneACycle) {
+  TimedTcBench tc(Fidelity::lt, context,
                   {{"idle_timeout_cycles", "20"}, {"latency_cycles", "4"}, {"flush_queue_bins", "16"}}, 16);
   for (unsigned i = 0; i < 5; ++i) tc.in.add(beat_of(tile(i), {1}, i), 10);
   tc.in.add(end_beat(), 1000);
@@ -128,9 +125,9 @@ TEST_P(TcTimedTest, BinsWhoseTimeIsOutGoOneACycle) {
   }
 }
 
-TEST_P(TcTimedTest, AnArrivalInTheCycleOfTheTimeOutPutsItOff) {
+TEST_F(TcTimedTest, AnArrivalInTheCycleOfTheTimeOutPutsItOff) {
   for (const Cycle gap : {149U, 150U, 151U}) {
-    TimedTcBench tc(GetParam(), context, {{"idle_timeout_cycles", "150"}});
+    TimedTcBench tc(Fidelity::lt, context, {{"idle_timeout_cycles", "150"}});
     tc.in.add(beat_of(tile(0), {1}), 10);
     tc.in.add(beat_of(tile(0), {2}), 10 + gap);
     tc.in.add(end_beat(), 5000);
@@ -140,9 +137,9 @@ TEST_P(TcTimedTest, AnArrivalInTheCycleOfTheTimeOutPutsItOff) {
   }
 }
 
-TEST_P(TcTimedTest, InStrictTerminationABinWaitsForTheEndOfTheDraw) {
+TEST_F(TcTimedTest, InStrictTerminationABinWaitsForTheEndOfTheDraw) {
   context.termination = Termination::strict;
-  TimedTcBench tc(GetParam(), context, {{"idle_timeout_cycles", "150"}, {"latency_cycles", "4"}});
+  TimedTcBench tc(Fidelity::lt, context, {{"idle_timeout_cycles", "150"}, {"latency_cycles", "4"}});
   tc.in.add(beat_of(tile(0), {1}));
   tc.in.add(end_beat(), 100'000);
   tc.bench.run();
@@ -153,25 +150,24 @@ TEST_P(TcTimedTest, InStrictTerminationABinWaitsForTheEndOfTheDraw) {
 }
 
 // case T05
-TEST_P(TcTimedTest, TheEndOfAnEmptyDrawGoesThroughAlone) {
-  TimedTcBench tc(GetParam(), context);
+TEST_F(TcTimedTest, TheEndOfAnEmptyDrawGoesThroughAlone) {
+  TimedTcBench tc(Fidelity::lt, context);
   tc.in.add(end_beat());
   tc.bench.run();
   ASSERT_EQ(tc.out.records().size(), 1U);
   EXPECT_TRUE(tc.out.records()[0].item.mark == Mark::end_of_frame);
 }
 
-TEST_P(TcTimedTest, FlushedBinsThatNobodyTakesStopItAtTheQueuesDepth) {
-  TimedTcBench tc(GetParam(), context, {{"bin_quads", "16"}, {"flush_queue_bins", "3"}, {"latency_cycles", "1"}}, 1, 1);
+TEST_F(TcTimedTest, FlushedBinsThatNobodyTakesStopItAtTheQueuesDepth) {
+  TimedTcBench tc(Fidelity::lt, context, {{"bin_quads", "16"}, {"flush_queue_bins", "3"}, {"latency_cycles", "1"}}, 1,
+                  1);
   for (unsigned i = 0; i < 10; ++i) tc.in.add(beat_of(tile(0), numbers(16), 16 * i));
   tc.out.close(0, 1000);
   tc.bench.run();
-  // As at cycle: one bin at the closed port, three in the queue, one at the input: the sixth waits. At `at` TC does not
-  // know when the bins that waited went, so that it takes as many more a second time.
-  const std::size_t again = GetParam() == Fidelity::at ? 3 : 0;
+  // As at cycle: one bin at the closed port, three in the queue, one at the input: the sixth waits.
   ASSERT_EQ(tc.in.sent().size(), 10U);
   EXPECT_LT(tc.in.sent()[4], 100U);
-  EXPECT_GE(tc.in.sent()[5 + again], 1000U);
+  EXPECT_GE(tc.in.sent()[5], 1000U);
   EXPECT_EQ(tc.splats(), numbers(160));
   for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(tc.out.records()[i].cycle, 1000 + 2 * i) << "one place";
   EXPECT_GT(testing::charged(tc.bench.unit(), UnitState::blocked, 1020), 900U);
@@ -210,7 +206,7 @@ void add_many(Source<QuadBeat>& in) {
   in.add(end_beat());
 }
 
-TEST_P(TcTimedTest, BinsAreThoseOfCycleUnderAnyStallsWithoutTimeOut) {
+TEST_F(TcTimedTest, BinsAreThoseOfCycleUnderAnyStallsWithoutTimeOut) {
   context.termination = Termination::strict;
   const Bench::Settings settings{{"bins", "4"}, {"bin_quads", "24"}};
   std::vector<std::uint64_t> expected;
@@ -222,7 +218,7 @@ TEST_P(TcTimedTest, BinsAreThoseOfCycleUnderAnyStallsWithoutTimeOut) {
     expected = contents(out);
   }
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    TimedTcBench tc(GetParam(), context, settings, static_cast<unsigned>(1 + seed % 10),
+    TimedTcBench tc(Fidelity::lt, context, settings, static_cast<unsigned>(1 + seed % 10),
                     static_cast<unsigned>(1 + seed % 9));
     add_many(tc.in);
     tc.bench.stall_randomly(seed, seed == 0 ? 0 : 100);
@@ -232,7 +228,7 @@ TEST_P(TcTimedTest, BinsAreThoseOfCycleUnderAnyStallsWithoutTimeOut) {
   }
 }
 
-TEST_P(TcTimedTest, WithRoomToSpareBinsLeaveWhenTheyDoAtCycle) {
+TEST_F(TcTimedTest, WithRoomToSpareBinsLeaveWhenTheyDoAtCycle) {
   const Bench::Settings settings{{"bins", "4"}, {"bin_quads", "24"}, {"idle_timeout_cycles", "0"}};
   std::vector<Cycle> expected;  // of the last beat of each bin
   {
@@ -244,7 +240,7 @@ TEST_P(TcTimedTest, WithRoomToSpareBinsLeaveWhenTheyDoAtCycle) {
       if (record.item.last_of_bin || record.item.mark == Mark::end_of_frame) expected.push_back(record.cycle);
     }
   }
-  TimedTcBench tc(GetParam(), context, settings);
+  TimedTcBench tc(Fidelity::lt, context, settings);
   add_many(tc.in);
   tc.bench.run();
   // The end of the frame takes a cycle of its own: the four bins that it flushes, and itself, are a cycle late.
@@ -254,9 +250,9 @@ TEST_P(TcTimedTest, WithRoomToSpareBinsLeaveWhenTheyDoAtCycle) {
   EXPECT_EQ(got, expected);
 }
 
-TEST_P(TcTimedTest, WithTimeOutsStallsMayCutBinsButLoseNoQuad) {
+TEST_F(TcTimedTest, WithTimeOutsStallsMayCutBinsButLoseNoQuad) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-    TimedTcBench tc(GetParam(), context, {{"idle_timeout_cycles", "3"}});
+    TimedTcBench tc(Fidelity::lt, context, {{"idle_timeout_cycles", "3"}});
     for (unsigned i = 0; i < 200; ++i) tc.in.add(beat_of(tile(i % 5), {i % 64}, i));
     tc.in.add(end_beat());
     tc.bench.stall_randomly(seed, 150);

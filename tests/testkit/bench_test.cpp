@@ -133,13 +133,8 @@ TEST_P(BenchTest, ItemsComeInOrderEachOnceUnderAnyStallsAndNoEarlier) {
   }
 }
 
-class TimedBenchTest : public ::testing::TestWithParam<Fidelity> {};
-
-INSTANTIATE_TEST_SUITE_P(Fidelities, TimedBenchTest, ::testing::ValuesIn(testing::timed_fidelities()),
-                         testing::name_of_fidelity);
-
-TEST_P(TimedBenchTest, ABatchTakesTheLinkForItsBeats) {
-  Pair pair(GetParam(), 8, 2);
+TEST(TimedBenchTest, ABatchTakesTheLinkForItsBeats) {
+  Pair pair(Fidelity::lt, 8, 2);
   pair.source.add(1, {10, 14}, 5);
   pair.source.add(2);
   pair.bench.run();
@@ -151,8 +146,8 @@ TEST_P(TimedBenchTest, ABatchTakesTheLinkForItsBeats) {
   EXPECT_EQ(pair.sink.records()[1].last, 17U);
 }
 
-TEST_P(TimedBenchTest, ABatchThatGoesLateTakesAsLong) {
-  Pair pair(GetParam(), 4);
+TEST(TimedBenchTest, ABatchThatGoesLateTakesAsLong) {
+  Pair pair(Fidelity::lt, 4);
   pair.sink.close(0, 100);
   pair.source.add(1, {0, 3}, 4);
   pair.source.add(2, {10, 19}, 4);

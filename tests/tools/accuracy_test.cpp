@@ -110,7 +110,7 @@ tools::AccuracyResult large_result() {
       result.runs.back().name = knob.name + "=" + value;
     }
   }
-  for (const Fidelity fidelity : {Fidelity::bound, Fidelity::lt, Fidelity::at}) {
+  for (const Fidelity fidelity : {Fidelity::bound, Fidelity::lt}) {
     result.stress.resize(1, {"termination queue of depth 1", "het+qm", 1234567890123, {}});
     result.stress.back().error_percent.emplace_back(fidelity, -12345.678);
   }
@@ -155,7 +155,7 @@ TEST(AccuracyText, SaysWhatAccuracyCosts) {
     level.cycles_error_percent = is_baseline ? -0.1 : 0.04;
   }
   EXPECT_EQ(tools::fidelity_verdict(result),
-            "at: 12.3 times as fast as cycle, cycles within 12.4 %; lt: 1.7 to 2.3 times, cycles within 0.1 %; "
+            "lt: 1.7 to 2.3 times as fast as cycle, cycles within 0.1 %; "
             "bound: 12.3 times, cycles within 12.4 %; functional: 12.3 times, without cycles");
   for (tools::PrecisionRun& run : result.runs) run.on_front = false;
   result.runs[0].error.psnr_db = 57.4;
@@ -560,7 +560,7 @@ TEST_F(Accuracy, PageStandsAlone) {
     if (!row["default"].get<bool>()) runs.insert(row["knob"].get<std::string>() + row["value"].get<std::string>());
   }
   EXPECT_EQ(occurrences(page, "<img"), 1 + 2 * (1 + runs.size()));
-  for (const char* part : {"class=\"verdict\">at: ", "times as fast as cycle",
+  for (const char* part : {"class=\"verdict\">lt: ", "times as fast as cycle",
                            "class=\"verdict\">the default: ", "<b>dominated</b>: another", "<b>front</b>: nothing",
                            "accuracy --scene '&lt;b&gt;.spl' --quick --html page.html</code>"}) {
     EXPECT_NE(page.find(part), std::string::npos) << part;

@@ -154,7 +154,7 @@ TEST_F(BadInput, Cameras) {
 TEST_F(BadInput, Machines) {
   refused_with_outputs({"run", "--platform", "agx-orim"}, {"'agx-orim'", "did you mean agx-orin?"});
   refused_with_outputs({"run", "--variant", "hett"}, {"'hett'", "het+qm"});
-  refused_with_outputs({"run", "--fidelity", "exact"}, {"'exact'", "There are functional, bound, lt, at, cycle"});
+  refused_with_outputs({"run", "--fidelity", "exact"}, {"'exact'", "There are functional, bound, lt, cycle"});
   refused_with_outputs({"run", "--format", "rgb10"}, {"'rgb10'", "rgba16f"});
   refused_with_outputs({"run", "--termination", "late"}, {"'late'", "strict"});
   refused_with_outputs({"compare", "--set", "tcc.bins=1"}, {"'tcc'", "did you mean"});

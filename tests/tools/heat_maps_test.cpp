@@ -42,7 +42,7 @@ class HeatMapFiles : public ToolTest {
 
 TEST_F(HeatMapFiles, SumToTheCountsAtEveryFidelityAndChangeNothing) {
   for (const char* termination : {"paper", "strict"}) {
-    for (const char* fidelity : {"functional", "bound", "lt", "at", "cycle"}) {
+    for (const char* fidelity : {"functional", "bound", "lt", "cycle"}) {
       SCOPED_TRACE(std::string(termination) + " " + fidelity);
       const std::vector<std::string> command{"run",           "--scene",   "tiny.spl", "--fidelity", fidelity,
                                              "--termination", termination, "--output", "o"};
@@ -69,7 +69,7 @@ TEST_F(HeatMapFiles, SumToTheCountsAtEveryFidelityAndChangeNothing) {
 }
 
 TEST_F(HeatMapFiles, TellWhenPixelsTerminate) {
-  for (const char* fidelity : {"lt", "at", "cycle"}) {
+  for (const char* fidelity : {"lt", "cycle"}) {
     const json run = json_of({"run", "--scene", "tiny.spl", "--fidelity", fidelity, "--termination", "strict",
                               "--output", "o", "--heat-maps"})["runs"][0];
     const std::vector<float> cycles = channel("o/tiny-het+qm-pixels.exr", "termination_cycle", 48, 40);

@@ -46,7 +46,7 @@ class Interval : public ToolTest {
   }
 };
 
-const std::vector<std::string> timed_fidelities{"lt", "at", "cycle"};
+const std::vector<std::string> timed_fidelities{"lt", "cycle"};
 
 TEST_F(Interval, SumToTheRunAndChangeNothing) {
   for (const std::string& fidelity : timed_fidelities) {
@@ -163,7 +163,7 @@ TEST_F(Interval, AreRefusedWithoutTimeOrWithoutAPlace) {
     refused_here({"--interval", "0"}, {"'0'", "--interval", "from 1"});
     refused_here({"--interval", "1k"}, {"'1k'", "--interval"});
     for (const char* fidelity : {"functional", "bound"}) {
-      refused_here({"--interval", "100", "--fidelity", fidelity}, {"--interval", fidelity, "use lt, at or cycle"});
+      refused_here({"--interval", "100", "--fidelity", fidelity}, {"--interval", fidelity, "use lt or cycle"});
     }
     refused_here({"--interval-csv", "i.csv"}, {"--interval-csv", "add --interval CYCLES"});
     refused_here({"--interval-statistics", "tc.flushes"}, {"--interval-statistics", "add --interval CYCLES"});

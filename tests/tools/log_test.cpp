@@ -32,7 +32,7 @@ class Log : public ToolTest {
 };
 
 TEST_F(Log, HasWhatPassesLinksAndStatesAndChangesNothing) {
-  for (const char* fidelity : {"lt", "at", "cycle"}) {
+  for (const char* fidelity : {"lt", "cycle"}) {
     SCOPED_TRACE(fidelity);
     const std::vector<std::string> command{"run", "--scene", "tiny.spl", "--fidelity", fidelity};
     std::vector<std::string> logged = command;
@@ -48,7 +48,7 @@ TEST_F(Log, HasWhatPassesLinksAndStatesAndChangesNothing) {
 }
 
 TEST_F(Log, SaysWhyABinIsFlushedAndWhatIsTerminated) {
-  const nlohmann::json run = json_of({"run", "--scene", "tiny.spl", "--fidelity", "at", "--log", "gpc0.tc", "--log",
+  const nlohmann::json run = json_of({"run", "--scene", "tiny.spl", "--fidelity", "lt", "--log", "gpc0.tc", "--log",
                                       "crop", "--log-file", "log.txt"})["runs"][0];
   const std::string text = read_file(folder() / "log.txt");
   EXPECT_EQ(count(lines_of(text), "out gpc0.tc.bins: bin of tile "), run["counts"]["tc_flushes"]);
@@ -78,7 +78,7 @@ TEST_F(Log, RefusesWhatItCannotLog) {
   refused_here({"--log", "gpc1.crop"}, {"'gpc1.crop'", "did you mean gpc0.crop?"});
   refused_here({"--log", "l2"}, {"'l2'", "a memory has no states"});
   refused_here({"--log", "crop@7:7"}, {"'@7:7'", "it ends before it begins"});
-  refused_here({"--log", "crop", "--fidelity", "functional"}, {"--log", "functional", "use lt, at or cycle"});
+  refused_here({"--log", "crop", "--fidelity", "functional"}, {"--log", "functional", "use lt or cycle"});
   refused_here({"--log-file", "log.txt"}, {"--log-file", "add --log UNIT"});
   refused_here({"--log", "crop", "--log-file", "no/log.txt"}, {"--log-file no/log.txt", "no folder no"});
   refused_here({"--log", "crop", "--log-file", "tiny.spl"}, {"is the same file"});

@@ -146,7 +146,7 @@ TEST_F(Microbench, FollowsThePlatformsSettings) {
     EXPECT_EQ(figure["gpu_is_of"], "one ROP partition");
     EXPECT_NE(figure["finding"].get<std::string>().find("differs from the paper's 8: 50 % less"), std::string::npos);
   }
-  const json small = json_of({"microbench", "crop-cache", "--set", "crop.cache_bytes=8K", "--fidelity", "at"});
+  const json small = json_of({"microbench", "crop-cache", "--set", "crop.cache_bytes=8K", "--fidelity", "lt"});
   EXPECT_EQ(measured(small, "crop-cache").at("largest working set without reads"), 8);
   const json bins = json_of({"microbench", "tile-binning", "--set", "tc.bins=16", "--fidelity", "functional"});
   EXPECT_EQ(measured(bins, "tile-binning").at("bins"), 16);
@@ -162,7 +162,7 @@ TEST_F(Microbench, ResultsDoNotDependOnTheNumberOfProcesses) {
 }
 
 TEST_F(Microbench, BlendsInOrderAtEveryFidelity) {
-  for (const char* fidelity : {"functional", "bound", "lt", "at"}) {
+  for (const char* fidelity : {"functional", "bound", "lt"}) {
     const json result =
         json_of({"microbench", "blend-order", "--fidelity", fidelity, "--set", "state.blend_rounding=rtz"});
     for (const auto& [name, pixels] : measured(result, "blend-order")) EXPECT_EQ(pixels, 0) << fidelity << ", " << name;

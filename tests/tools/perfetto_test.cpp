@@ -79,7 +79,7 @@ class Perfetto : public ToolTest {
 };
 
 TEST_F(Perfetto, StatesSumToThoseOfTheRunAndNothingChanges) {
-  for (const char* fidelity : {"lt", "at", "cycle"}) {
+  for (const char* fidelity : {"lt", "cycle"}) {
     SCOPED_TRACE(fidelity);
     const std::vector<std::string> command{"run", "--scene", "tiny.spl", "--fidelity", fidelity};
     std::vector<std::string> traced = command;
@@ -158,7 +158,7 @@ TEST_F(Perfetto, ThatCannotBeWrittenIsAMistake) {
     refused(options, parts);
   };
   for (const char* fidelity : {"functional", "bound"}) {
-    refused_here({"--trace", "t.json", "--fidelity", fidelity}, {"--trace", fidelity, "use lt, at or cycle"});
+    refused_here({"--trace", "t.json", "--fidelity", fidelity}, {"--trace", fidelity, "use lt or cycle"});
   }
   refused_here({"--trace", "t.json@20:10"}, {"'@20:10'", "--trace", "it ends before it begins", "@1000:2000"});
   refused_here({"--trace", "t.json@9999999:"}, {"--trace t.json@9999999:", "the run ends after", "begin earlier"});

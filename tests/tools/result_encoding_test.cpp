@@ -23,7 +23,7 @@ RunRequest a_request() {
   RunRequest request;
   request.platform = &platforms().back();
   request.variant = variants().back();
-  request.fidelity = Fidelity::at;
+  request.fidelity = Fidelity::lt;
   request.settings = {{"tc", "bins", "8"}};
   return request;
 }

@@ -417,7 +417,7 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   c.seed = seed;
   c.index = index;
   const ColorFormat formats[] = {ColorFormat::rgba16f, ColorFormat::rgba8, ColorFormat::rgba32f};
-  const Fidelity timed[] = {Fidelity::lt, Fidelity::at, Fidelity::cycle};
+  const Fidelity timed[] = {Fidelity::lt, Fidelity::cycle};
   c.platform = dice.chance(40) ? &platforms().front() : &dice.one_of(platforms());
   c.variant = dice.one_of(variants());
   c.format = dice.one_of(formats);

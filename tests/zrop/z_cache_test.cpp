@@ -511,8 +511,8 @@ TEST_F(ZCacheTest, WhatMakesNoCacheIsRefusedWhenTheUnitIsMade) {
   EXPECT_THROW(z_cache.check(DepthFormat::d24), UserError) << "of half a quad";
 }
 
-/// At lt and at a bin waits for its fills as its beats do at cycle.
-class TimedZCacheTest : public ::testing::TestWithParam<Fidelity> {
+/// At lt a bin waits for its fills as its beats do at cycle.
+class TimedZCacheTest : public ::testing::Test {
  protected:
   TimedZCacheTest() : draw(testing::draw_of(64, 64)), context(testing::context_of(draw)) {
     testing::terminate_early(context);
@@ -521,11 +521,9 @@ class TimedZCacheTest : public ::testing::TestWithParam<Fidelity> {
   RenderContext context;
   testing::Bins bins;
 };
-INSTANTIATE_TEST_SUITE_P(Fidelities, TimedZCacheTest, ::testing::ValuesIn(testing::timed_fidelities()),
-                         testing::name_of_fidelity);
 
-TEST_P(TimedZCacheTest, AMissWaitsForItsFillAndAHitDoesNot) {
-  Bench bench(GetParam(), "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
+TEST_F(TimedZCacheTest, AMissWaitsForItsFillAndAHitDoesNot) {
+  Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
   NotingMemory memory("noting_memory", bench.clock(), 100);
   bench.bind_memory(memory.socket);
   Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
@@ -538,8 +536,8 @@ TEST_P(TimedZCacheTest, AMissWaitsForItsFillAndAHitDoesNot) {
   EXPECT_EQ(memory.accesses.size(), 2U);
 }
 
-TEST_P(TimedZCacheTest, AFastClearSparesReadingWhatNothingWasWrittenBackTo) {
-  Bench bench(GetParam(), "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"cache_bytes", "128"}});
+TEST_F(TimedZCacheTest, AFastClearSparesReadingWhatNothingWasWrittenBackTo) {
+  Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"cache_bytes", "128"}});
   NotingMemory memory("noting_memory", bench.clock(), 100);
   bench.bind_memory(memory.socket);
   Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
@@ -557,8 +555,8 @@ TEST_P(TimedZCacheTest, AFastClearSparesReadingWhatNothingWasWrittenBackTo) {
   EXPECT_EQ(memory.bytes(true), 32U);
 }
 
-TEST_P(TimedZCacheTest, AnUpdateWaitsForItsFillAndTestsGoBy) {
-  Bench bench(GetParam(), "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
+TEST_F(TimedZCacheTest, AnUpdateWaitsForItsFillAndTestsGoBy) {
+  Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
   NotingMemory memory("noting_memory", bench.clock(), 100);
   bench.bind_memory(memory.socket);
   Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);

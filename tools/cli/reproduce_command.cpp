@@ -63,7 +63,7 @@ class ReproduceCommand : public Command {
     arguments.add_option("--set", settings_, "UNIT.PARAMETER=VALUE",
                          "changes a parameter of every simulation; can be repeated", machine_group);
     arguments.add_option("--fidelity", fidelity_, "NAME",
-                         "of the main comparison: lt, at or cycle (default: cycle, with --quick lt); the\n"
+                         "of the main comparison: lt or cycle (default: cycle, with --quick lt); the\n"
                          "sensitivity is always at lt",
                          machine_group);
     arguments.add_option("--output", output_, "DIR",
@@ -148,7 +148,7 @@ class ReproduceCommand : public Command {
       job.options.fidelity = fidelity_named(*name);
       if (*job.options.fidelity < Fidelity::lt) {
         throw UserError("bad value '" + *name + "'", "--fidelity", "speed-ups need the time of every unit",
-                        "give lt, at or cycle");
+                        "give lt or cycle");
       }
     }
     for (const std::string& text : settings_) base.settings.push_back(parse_setting(text));

@@ -44,7 +44,7 @@ void check_has_time(const SimulationJob& job, const std::string& option) {
                   std::string("fidelity ") + vrpipe::name_of(fidelity) +
                       (fidelity == Fidelity::bound ? " knows how long a run takes, but not what is when"
                                                    : " has no time"),
-                  "use lt, at or cycle");
+                  "use lt or cycle");
 }
 
 Observers& observers_of(RunRequest& request) {
@@ -57,7 +57,7 @@ Observers& observers_of(RunRequest& request) {
 void TimeArguments::declare(Arguments& arguments, const std::string& group, bool of_one_run) {
   arguments.add_option(interval_option, interval_, "CYCLES",
                        "states and statistics of each interval of so many cycles, in the JSON, at the\n"
-                       "fidelities lt, at and cycle (docs/time.md)",
+                       "fidelities lt and cycle (docs/time.md)",
                        group);
   arguments.add_option(csv_option, interval_csv_, "FILE.csv", "the same as a table, a row for each interval", group);
   arguments.add_option(statistics_option, interval_statistics_, "NAME,...",

@@ -232,7 +232,7 @@ void climb_fidelities(const AccuracyJob& job, const Workload& workload, const st
   }
 }
 
-constexpr std::array stress_rungs{Fidelity::bound, Fidelity::lt, Fidelity::at, Fidelity::cycle};
+constexpr std::array stress_rungs{Fidelity::bound, Fidelity::lt, Fidelity::cycle};
 
 /// The first variant and the last on every stress configuration, at each of `stress_rungs`, in the middle of the image.
 std::vector<Task> stress_tasks(const AccuracyJob& job, const Workload& workload, AccuracyResult& result) {

@@ -9,7 +9,7 @@
 namespace vrpipe::tools {
 
 /// A level that is known by its changes, taken at the cycles 0, `every`, 2 `every` ... The changes need not come in the
-/// order of cycles, as they do not at `lt` and `at`: they wait until they are given.
+/// order of cycles, as they do not at `lt`: they wait until they are given.
 class Level {
  public:
   explicit Level(Cycle every) : every_(every) {}

@@ -119,7 +119,7 @@ void check_microbench_name(const std::string& name) { definition_named(name); }
 void check_microbench(const std::string& name, const RunRequest& request) {
   if (!definition_named(name).needs_time || request.fidelity != Fidelity::functional) return;
   throw UserError("cannot measure " + name, "--fidelity functional", "it measures time, and this fidelity has none",
-                  "use bound, lt, at or cycle");
+                  "use bound, lt or cycle");
 }
 
 MicrobenchResult run_microbench(const std::string& name, const RunRequest& request, unsigned processes) {

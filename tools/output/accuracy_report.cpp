@@ -199,7 +199,7 @@ AccuracyTable fidelity_table(const AccuracyResult& result) {
 AccuracyTable stress_table(const AccuracyResult& result) {
   AccuracyTable table;
   table.group_heading = "configuration";
-  table.heading = {"variant", "cycles", "bound %", "lt %", "at %"};
+  table.heading = {"variant", "cycles", "bound %", "lt %"};
   for (const StressRow& row : result.stress) {
     table.rows.push_back({row.configuration, {row.variant, grouped(row.cycles)}, false});
     for (const auto& [fidelity, error] : row.error_percent) table.rows.back().cells.push_back(signed_percent(error));
@@ -376,7 +376,7 @@ std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) 
       text_of(fidelity, {0, 1, 2, 3, 4, 5, 6}, style) + "\n" + text_of(fidelity, {0, 7, 8, 9, 10, 11}, style) + "\n";
   for (const std::string& line : fidelity_summary(result)) text += line + "\n";
   text += fidelity_definition() + "\n";
-  text += "\n" + style.bold(stress_title) + "\n\n" + text_of(stress_table(result), {0, 1, 2, 3, 4}, style);
+  text += "\n" + style.bold(stress_title) + "\n\n" + text_of(stress_table(result), {0, 1, 2, 3}, style);
   text += "\n" + style.bold(precision_title(result)) + "\n\n";
   text += text_of(precision_table(result), {0, 1, 3, 5, 6, 7, 9}, style) + "\n";
   if (const std::string verdict = precision_verdict(result); !verdict.empty()) text += verdict + "\n";

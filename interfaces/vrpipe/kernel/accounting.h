@@ -55,7 +55,7 @@ class FrameEnd {
 class StateObserver {
  public:
   virtual ~StateObserver() = default;
-  /// The unit is in a state from a cycle on; before the first call it is starved. At `lt` and `at` the cycle may be ahead of the clock.
+  /// The unit is in a state from a cycle on; before the first call it is starved. At `lt` the cycle may be ahead of the clock.
   virtual void entered(UnitState state, Cycle from) = 0;
 };
 

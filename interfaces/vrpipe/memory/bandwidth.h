@@ -19,8 +19,8 @@ namespace vrpipe {
 /// for any more are forgotten (compare the history lists of Graphite and Sniper, which keep a fixed number).
 class BandwidthReservation {
  public:
-  /// Nobody asks for cycles further back from the present: units are activated at most 8 cycles late (timed.h). Who is
-  /// later nevertheless, because it waited for room at `at`, finds what lies further back taken.
+  /// Few ask for cycles further back from the present: what has waited for its time (timed_memory_port.h). They find what
+  /// lies further back taken.
   static constexpr Cycle remembered_cycles = 64;
 
   /// @param bytes_per_cycle not 0

@@ -61,7 +61,7 @@ struct SectoredCacheStatistics : StatisticSet {
                          "moved for a sector needed"};
 };
 
-/// Counts the fills of a cache at `lt` and `at`, where memory says at once when a sector is there. Asked for in another
+/// Counts the fills of a cache at `lt`, where memory says at once when a sector is there. Asked for in another
 /// order than that of time, as at `lt`, those that have come by a later cycle are no longer on their way in an earlier.
 class AnnotatedFillCounter {
  public:

@@ -146,7 +146,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
 /// Whether a memory has another one below it, and how it asks that.
 enum class MemoryBelow : std::uint8_t {
   none,
-  annotated,  ///< at `lt` and `at`: by calls of b_transport, which annotates its time
+  annotated,  ///< at `lt`: by calls of b_transport, which annotates its time
   clocked,    ///< at `cycle`: in the phases of the base protocol
 };
 

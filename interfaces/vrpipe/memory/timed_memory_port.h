@@ -24,8 +24,8 @@ class TimedMemoryPort : private tlm::tlm_bw_transport_if<>, private OutsidePort 
 
   tlm::tlm_initiator_socket<32> socket;
 
-  /// An access in cycle `at`; returns the cycle in which it is complete. At `lt` it may be far ahead of the clock, at
-  /// `at` behind it.
+  /// An access in cycle `at`; returns the cycle in which it is complete. It may be far ahead of the clock, or behind it:
+  /// what has waited for its time, as an update of the z-cache does, is only looked up when something comes after it.
   Cycle read(std::uint64_t address, unsigned bytes, Cycle at) {
     return access({address, bytes, tlm::TLM_READ_COMMAND, origin_}, at);
   }

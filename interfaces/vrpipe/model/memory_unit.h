@@ -42,7 +42,7 @@ struct MemoryPlace {
   /// memory. The port of a memory above has what those that are bound to that have in all.
   std::vector<unsigned> ports;
   bool has_below;   ///< there is a memory below it
-  bool is_clocked;  ///< `cycle`; at `lt` and `at` its time is annotated
+  bool is_clocked;  ///< `cycle`; at `lt` its time is annotated
 
   /// The same, with what a memory gives to a port.
   std::vector<unsigned> port_bytes(unsigned own) const {

@@ -16,31 +16,16 @@
 #include <vrpipe/model/unit.h>
 #include <vrpipe/pipeline/batch.h>
 
-/// Units and ports of the fidelities `lt` and `at`: the behaviours, latencies and queue depths of `cycle`, but the passage
-/// of an item is computed instead of clocked, and a batch moves in one piece (batch.h). A unit has a handler for each
-/// input, which is given an item and the cycles in which it becomes visible, reserves the unit's resources from then on,
-/// sends what comes of the item, and returns the cycles in which the item leaves the queue. One handler serves both
-/// fidelities; the ports differ:
+/// Units and ports of the fidelity `lt`: the behaviours, latencies and queue depths of `cycle`, but the passage of an item
+/// is computed instead of clocked, and a batch moves in one piece (batch.h). A unit has a handler for each input, which is
+/// given an item and the cycles in which it becomes visible, reserves the unit's resources from then on, sends what comes
+/// of the item, and returns the cycles in which the item leaves the queue.
 ///
-/// - `lt`, blocking: a transfer is a b_transport call annotated (in its payload, in cycles) with when the item is offered
-///   and, on return, when it was taken: as soon as the item as many places ahead as the queue is deep has left it. Calls
-///   nest, so that what one vertex warp leads to runs down to its last blend at once; only termination updates wait for
-///   their time.
-/// - `at`, non-blocking: transfers and credits are nb_transport calls annotated with their cycle. An item waits in its
-///   queue until its cycle comes and whatever its unit sends has found room. Units are activated in the order of time.
+/// A transfer is a b_transport call annotated (in its payload, in cycles) with when the item is offered and, on return,
+/// when it was taken: as soon as the item as many places ahead as the queue is deep has left it. Calls nest, so that what
+/// one vertex warp leads to runs down to its last blend at once; only termination updates wait for their time.
 
 namespace vrpipe {
-
-enum class Transport : std::uint8_t { blocking, non_blocking };
-
-/// At `at`, units are activated in cycles so far apart, and take what becomes visible until the next: bursts cost one
-/// activation. Times stay exact; what depends on their order (a termination update before a test) may be off by as much.
-/// Shallower queues, which would move no more than their depth in that time, are served as items and credits come.
-constexpr Cycle activation_cycles = 8;
-/// The cycle in which what is wanted for a cycle is activated; later than `now`.
-constexpr Cycle activation_for(Cycle wanted, Cycle now) {
-  return wanted == never ? never : std::max(wanted, now + activation_cycles) / activation_cycles * activation_cycles;
-}
 
 /// The cycles in which the first and the last part of an item move.
 struct CycleInterval {
@@ -173,61 +158,14 @@ class SlotPool {
   Ring<Taken> taken_;
 };
 
-/// What a unit's activation sees of its inputs.
-class TimedInput {
- public:
-  virtual ~TimedInput() = default;
-  /// Handles the items visible up to a cycle, as long as they can be; false if there was none.
-  virtual bool serve(Cycle until) = 0;
-  /// Whether the first item can be handled.
-  virtual bool may_serve() const = 0;
-  /// When the first item is visible; `never` if none is there.
-  Cycle front() const { return front_; }
-
- protected:
-  Cycle front_ = never;
-};
-
-/// What a unit's activation sees of its outputs.
-class TimedOutput {
- public:
-  virtual ~TimedOutput() = default;
-  /// Whether as much that was sent waits for room as may.
-  bool blocked() const { return waiting_items_ > may_wait_; }
-  /// Whether one more would be too many: then what was sent before all that waits has gone.
-  bool full() const { return waiting_items_ == may_wait_; }
-  /// Whether nothing waits.
-  bool clear() const { return waiting_items_ == 0; }
-  /// The unit may send so many more items while one waits: a buffer of its own in front of the port.
-  void set_buffer(std::size_t items) { may_wait_ = items; }
-
- protected:
-  std::size_t waiting_items_ = 0;
-
- private:
-  std::size_t may_wait_ = 0;
-};
-
 class TimedUnit : public Unit {
  public:
-  TimedUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector<WorkKind> work, Transport transport)
-      : Unit(name, domain, std::move(work)), transport_(transport) {}
-
-  Transport transport() const { return transport_; }
-  bool blocking() const { return transport_ == Transport::blocking; }
-  bool idle() const override;
+  using Unit::Unit;
+  bool idle() const override { return true; }
   void close_account(Cycle end) override;
 
  protected:
-  template <class>
-  friend class TimedIn;
-  template <class>
-  friend class TimedOut;
-
-  /// Non-blocking: what the unit does by itself up to a cycle, for instance work that waited for room. Called at each
-  /// activation, after the inputs; returns the cycle in which it is to be called again.
-  virtual Cycle advance(Cycle /*until*/) { return never; }
-  Cycle tick(Cycle now) override;
+  Cycle tick(Cycle) override { return never; }
   /// Charges the cycles not charged yet, up to `until`, to a state.
   void charge(UnitState state, Cycle until) {
     if (until <= charged_) return;
@@ -236,10 +174,7 @@ class TimedUnit : public Unit {
   }
 
  private:
-  const Transport transport_;
   Cycle charged_ = 0;
-  std::vector<TimedInput*> inputs_;
-  std::vector<TimedOutput*> outputs_;
 };
 
 template <class Item>
@@ -247,78 +182,31 @@ class TimedIn;
 
 /// The sending end. As between clocked units, ends with nothing in between call each other directly.
 template <class Item>
-class TimedOut : public OutEnd<Item>, public TimedOutput {
+class TimedOut : public OutEnd<Item> {
  public:
-  TimedOut(TimedUnit& owner, const std::string& name)
-      : OutEnd<Item>(owner, name), blocking_(owner.transport() == Transport::blocking) {
-    owner.outputs_.push_back(this);
-  }
-
+  using OutEnd<Item>::OutEnd;
   using OutEnd<Item>::connect;
   void connect(InPort& in, const LinkOptions& options) override;
 
   /// Sends an item whose parts are there in the cycles `at`, and which takes the link for so many. Returns the cycles in
-  /// which it is taken; `at`, if it has to wait and nobody knows yet how long: then the port is not `clear`.
+  /// which it is taken.
   CycleInterval send(const Item& item, CycleInterval at, unsigned beats = 1) {
     for (; this->stalled_at(at.first); ++at.first) at.last = std::max(at.last, at.first + 1);
     if (rate_) at = limited(at, beats);
-    if (!blocking_ && !unlimited_ && (waiting_items_ > 0 || credits_.empty())) {
-      waiting_.push({item, at, beats});
-      ++waiting_items_;
-      return at;
-    }
-    return transfer(item, at, beats);
-  }
-  /// At `at`: the cycle in which the last item of which nothing waits was taken.
-  Cycle gone() const { return gone_; }
-  /// The cycle in which the last part of the last item was taken.
-  Cycle last() const { return last_; }
-  /// From when on there is room for another item; `never`, if nobody knows yet: then the unit is activated once it is
-  /// known.
-  Cycle room_from() {
-    if (unlimited_) return 0;
-    if (blocking_) return end_ == nullptr ? 0 : end_->free_at_[end_->place_];
-    if (!credits_.empty()) return credits_.front();
-    room_wanted_ = true;
-    return never;
-  }
-
- private:
-  friend class TimedIn<Item>;
-  using OutEnd<Item>::clock_;
-
-  CycleInterval transfer(const Item& item, CycleInterval at, unsigned beats) {
     ++this->transferred_;
-    if (blocking_) {
-      at = direct_ != nullptr ? direct_->offer(item, at, beats, this->pipeline_) : call(item, at, beats);
-      last_ = at.last;
-      return at;
-    }
-    if (!unlimited_) {
-      const Cycle begin = std::max(at.first, credits_.front());
-      at.last = std::max(at.last, begin + (at.last - at.first));
-      at.first = begin;
-      // What the queue has no place for yet follows when it has: nobody knows when, but the next item waits for it.
-      for (unsigned beat = 0; beat < beats; ++beat) {
-        if (credits_.empty()) {
-          owed_ = beats - beat;
-          ++waiting_items_;
-          break;
-        }
-        at.last = std::max(at.last, credits_.front());
-        credits_.pop();
-      }
-    }
+    at = direct_ != nullptr ? direct_->offer(item, at, beats, this->pipeline_) : call(item, at, beats);
     last_ = at.last;
-    if (owed_ == 0) gone_ = last_;
-    if (direct_ != nullptr) {
-      direct_->accept(item, at, beats, this->pipeline_);
-    } else {
-      call(item, at, beats);
-    }
     return at;
   }
-  /// Through the socket; returns, from a blocking call, when it is taken.
+  /// The cycle in which the last part of the last item was taken.
+  Cycle last() const { return last_; }
+  /// From when on there is room for another item.
+  Cycle room_from() const { return end_ == nullptr ? 0 : end_->free_at_[end_->place_]; }
+
+ private:
+  using OutEnd<Item>::clock_;
+
+  /// Through the socket; returns when it is taken.
   CycleInterval call(const Item& item, CycleInterval at, unsigned beats) {
     StreamPayload<Item> payload;
     payload.item = &item;
@@ -327,74 +215,29 @@ class TimedOut : public OutEnd<Item>, public TimedOutput {
     payload.last = at.last;
     payload.beats = beats;
     sc_core::sc_time delay;
-    if (blocking_) {
-      this->socket->b_transport(payload, delay);
-    } else {
-      StreamPhase phase = StreamPhase::transfer;
-      this->socket->nb_transport_fw(payload, phase, delay);
-    }
+    this->socket->b_transport(payload, delay);
     return {payload.at, payload.last};
   }
-
-  tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
-    give(payload.credits, {payload.at, payload.last});
-    return tlm::TLM_ACCEPTED;
-  }
-  void give(unsigned credits, CycleInterval at) {
-    const bool was_waiting = waiting_items_ > 0 || room_wanted_;
-    for (unsigned credit = 0; credit < credits; ++credit) {
-      const Cycle cycle = at.of_part(credit, credits);
-      if (owed_ > 0) {
-        last_ = std::max(last_, cycle);
-        if (--owed_ == 0) {
-          --waiting_items_;
-          gone_ = last_;
-        }
-      } else {
-        credits_.push(cycle);
-      }
-    }
-    room_wanted_ = false;
-    while (!waiting_.empty() && owed_ == 0 && !credits_.empty()) {
-      const Waiting& next = waiting_.front();
-      transfer(next.item, next.at, next.beats);
-      waiting_.pop();
-      --waiting_items_;
-    }
-    if (was_waiting && !blocked()) {
-      const Cycle now = clock_.domain->now();
-      clock_.domain->wake(clock_.unit, prompt_ ? now + 1 : activation_for(now, now));
-    }
-  }
-  void unlimited() override { unlimited_ = true; }
   /// When the link passes an item, at its rate.
   CycleInterval limited(CycleInterval at, unsigned beats) {
     const CycleInterval passes = rate_->take(at.first, beats);
     return {passes.first, std::max(passes.last, at.last + (passes.first - at.first))};
   }
+  tlm::tlm_sync_enum nb_transport_bw(StreamPayload<Item>&, StreamPhase&, sc_core::sc_time&) override {
+    this->fault(this->socket, "nb_transport on a link of a unit at lt");
+    return tlm::TLM_ACCEPTED;
+  }
+  void unlimited() override {}
 
-  struct Waiting {
-    Item item;
-    CycleInterval at;
-    unsigned beats;
-  };
-  const bool blocking_;
   TimedIn<Item>* direct_ = nullptr;
   TimedIn<Item>* end_ = nullptr;  ///< also where a socket is between
   std::optional<ThroughputPort> rate_;
-  bool unlimited_ = false;
-  bool prompt_ = false;
-  bool room_wanted_ = false;
-  unsigned owed_ = 0;  ///< places that sent items take and the queue has not had yet
   Cycle last_ = 0;
-  Cycle gone_ = 0;
-  Ring<Cycle> credits_;  ///< the cycle from which each can be used
-  Ring<Waiting> waiting_;
 };
 
 /// The receiving end, with its queue.
 template <class Item>
-class TimedIn : public InEnd<Item>, public TimedInput {
+class TimedIn : public InEnd<Item> {
  public:
   /// Given an item and the cycles in which its parts become visible, returns those in which they leave the queue. Made
   /// of a lambda that captures little more than its unit; spans go in registers, as they do not to a std::function.
@@ -415,60 +258,21 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     CycleInterval (*call_)(const void*, const Item&, CycleInterval);
   };
 
-  /// @param sends_to  the handler is called while none of these is blocked
-  TimedIn(TimedUnit& owner, const std::string& name, Handler handler, std::vector<TimedOutput*> sends_to = {})
-      : InEnd<Item>(owner, name),
-        blocking_(owner.transport() == Transport::blocking),
-        handler_(handler),
-        sends_to_(std::move(sends_to)) {
-    owner.inputs_.push_back(this);
+  TimedIn(TimedUnit& owner, const std::string& name, Handler handler) : InEnd<Item>(owner, name), handler_(handler) {
     TimedIn::configure(4, 1);
   }
 
-  /// A further condition for the handler to be called.
-  void set_gate(std::function<bool()> gate) { gate_ = std::move(gate); }
-
   void configure(unsigned depth, unsigned latency) override {
-    latency_ = latency;
     depth_ = depth;
-    prompt_ = depth < activation_cycles;
-    free_at_.assign(blocking_ ? depth : 0, 0);
+    latency_ = latency;
+    free_at_.assign(depth, 0);
     place_ = 0;
   }
-  void open() override {
-    if (!blocking_ && !this->is_stub()) grant(depth_, 0);
-  }
-  bool empty() const override { return queue_.empty(); }
-
-  bool serve(Cycle until) override {
-    bool served = false;
-    while (front_ <= until && TimedIn::may_serve()) {
-      const Entry& entry = queue_.front();
-      const unsigned beats = entry.beats;
-      const CycleInterval left = handler_(entry.item, entry.visible);
-      queue_.pop();
-      front_ = queue_.empty() ? never : queue_.front().visible.first;
-      queued_beats_ -= beats;
-      grant(beats, beats == 1 ? CycleInterval(left.last + 1) : CycleInterval(left.first + 1, left.last + 1));
-      served = true;
-    }
-    return served;
-  }
-  bool may_serve() const override {
-    for (const TimedOutput* out : sends_to_) {
-      if (out->blocked()) return false;
-    }
-    return !gate_ || gate_();
-  }
+  void open() override {}
+  bool empty() const override { return true; }
 
  private:
   friend class TimedOut<Item>;
-  using InEnd<Item>::clock_;
-  struct Entry {
-    CycleInterval visible;
-    unsigned beats = 1;
-    Item item;
-  };
 
   CycleInterval visible(CycleInterval at, Cycle pipeline) const {
     const Cycle latency = latency_ + pipeline;
@@ -477,23 +281,12 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     return span;
   }
 
-  void grant(unsigned credits, CycleInterval at) {
-    if (direct_ != nullptr) return direct_->give(credits, at);
-    StreamPayload<Item> payload;
-    payload.credits = credits;
-    payload.at = at.first;
-    payload.last = at.last;
-    StreamPhase phase = StreamPhase::credit;
-    sc_core::sc_time delay;
-    this->socket->nb_transport_bw(payload, phase, delay);
-  }
-
   void b_transport(StreamPayload<Item>& payload, sc_core::sc_time&) override {
     const CycleInterval taken = offer(*payload.item, {payload.at, payload.last}, payload.beats, payload.latency);
     payload.at = taken.first;
     payload.last = taken.last;
   }
-  /// Blocking: takes an item; returns when.
+  /// Takes an item; returns when.
   CycleInterval offer(const Item& item, CycleInterval at, unsigned beats, Cycle pipeline) {
     std::size_t place = place_;
     if (free_at_[place] > at.first) {
@@ -519,61 +312,28 @@ class TimedIn : public InEnd<Item>, public TimedInput {
     return at;
   }
 
-  tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>& payload, StreamPhase&, sc_core::sc_time&) override {
-    accept(*payload.item, {payload.at, payload.last}, payload.beats, payload.latency);
+  tlm::tlm_sync_enum nb_transport_fw(StreamPayload<Item>&, StreamPhase&, sc_core::sc_time&) override {
+    this->fault(this->socket, "nb_transport on a link of a unit at lt");
     return tlm::TLM_ACCEPTED;
   }
-  /// Non-blocking: queues an item.
-  void accept(const Item& item, CycleInterval at, unsigned beats, Cycle pipeline) {
-    if (queued_beats_ >= depth_) this->fault(this->socket, "an item arrived at a full queue");
-    queued_beats_ += beats;
-    const CycleInterval seen = visible(at, pipeline);
-    Entry& entry = queue_.push();
-    entry.visible = seen;
-    entry.beats = beats;
-    entry.item = item;
-    if (front_ == never) front_ = seen.first;
-    const Cycle now = clock_.domain->now();
-    clock_.domain->wake(clock_.unit, prompt_ ? std::max(seen.first, now + 1) : activation_for(seen.first, now));
-  }
 
-  const bool blocking_;
-  TimedOut<Item>* direct_ = nullptr;
   Handler handler_;
-  std::vector<TimedOutput*> sends_to_;
-  std::function<bool()> gate_;
-  bool prompt_ = true;
   unsigned depth_ = 4;
   unsigned latency_ = 1;
-  std::vector<Cycle> free_at_;  ///< blocking: when each place of the queue can be filled, a ring
+  std::vector<Cycle> free_at_;  ///< when each place of the queue can be filled, a ring
   std::size_t place_ = 0;
-  Ring<Entry> queue_;  ///< non-blocking
-  unsigned queued_beats_ = 0;
 };
 
 template <class Item>
 void TimedOut<Item>::connect(InPort& in, const LinkOptions& options) {
   OutEnd<Item>::connect(in, options);
   if (options.items_per_cycle != 0) rate_.emplace(options.items_per_cycle);
-  // What is on its way through the pipeline in front of the link takes no place of the queue.
-  prompt_ = options.depth < activation_cycles;
-  auto* const end = dynamic_cast<TimedIn<Item>*>(&in);
-  if (end == nullptr) return;
-  end->prompt_ = prompt_;
-  end_ = end;
-  if (!options.observers.empty() || clock_.domain->passes_sockets()) return;
-  direct_ = end;
-  end->direct_ = this;
+  end_ = dynamic_cast<TimedIn<Item>*>(&in);
+  if (end_ != nullptr && options.observers.empty() && !clock_.domain->passes_sockets()) direct_ = end_;
 }
 
-/// Makes the timing model of a slot for `lt` or `at` around a functional model.
-using TimedUnitMaker =
-    std::function<std::unique_ptr<Unit>(const std::string& name, ClockDomain& domain,
-                                        std::unique_ptr<Behaviour> behaviour, const RenderContext& context,
-                                        unsigned gpcs, Transport transport)>;
-
-/// Registered by each timing model for its slot. A second one for a slot is a problem of the registry's.
-void register_timed_unit_maker(const std::string& slot, TimedUnitMaker maker);
-const TimedUnitMaker& timed_unit_maker(const std::string& slot);
+/// As for `cycle` (unit.h): registered by each timing model for its slot.
+void register_timed_unit_maker(const std::string& slot, UnitMaker maker);
+const UnitMaker& timed_unit_maker(const std::string& slot);
 
 }  // namespace vrpipe

@@ -10,7 +10,7 @@
 
 namespace vrpipe {
 
-/// The memory port of a sectored cache at `lt` and `at`: moves what a look-up says. Neighbouring sectors go in one access.
+/// The memory port of a sectored cache at `lt`: moves what a look-up says. Neighbouring sectors go in one access.
 class TimedCachePort {
  public:
   /// @param mshrs        sectors that are filled at a time

@@ -16,7 +16,7 @@
 #include <vrpipe/pipeline/slots/memory.h>
 
 /// Units and ports without time: the fidelities `functional` and `bound`, and what strict termination runs ahead. They
-/// have the ports of `lt` and `at` (batch.h) and no SystemC. Sending is a call: it returns when all that the item leads to
+/// have the ports of `lt` (batch.h) and no SystemC. Sending is a call: it returns when all that the item leads to
 /// has been done, down to the last blend.
 
 namespace vrpipe {

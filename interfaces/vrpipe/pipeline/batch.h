@@ -4,7 +4,7 @@
 
 #include <vrpipe/pipeline/payload.h>
 
-/// What moves in one piece at `lt` and `at` where `cycle` moves what fits into a cycle: a flushed bin from TC to QRU
+/// What moves in one piece at `lt` where `cycle` moves what fits into a cycle: a flushed bin from TC to QRU
 /// (instead of QuadBeat), a shaded warp from PROP to CROP (ShadedWarpItem instead of ColorBeat). Other links carry the
 /// same items at every fidelity with time.
 

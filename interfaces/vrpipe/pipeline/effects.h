@@ -44,7 +44,7 @@ struct EffectQuestion {
   const FrameFacts& facts;
   const RenderContext& context;
   const ParameterSet& parameters;  ///< of the instance; of none, for a component that is no slot
-  bool has_time = false;           ///< lt, at and cycle
+  bool has_time = false;           ///< lt and cycle
   bool counts_work = false;        ///< and bound, whose cycles follow from counts
   bool memory_connected = false;   ///< the instance's port is bound to a memory that is elaborated
   bool meets_own_time = false;     ///< a memory of another make is there, with time of its own

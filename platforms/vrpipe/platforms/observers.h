@@ -41,7 +41,7 @@ class Observers {
   template <class Item>
   using SeeItem = std::function<void(const Passed<Item>&)>;
   /// Places of a link's queue: taken, or fewer than 0 for some that are free again, from a cycle on. At first, before the
-  /// first cycle, all become free. At `cycle` and `at` alone: at `lt` nothing waits in a queue.
+  /// first cycle, all become free. At `cycle` alone: at `lt` nothing waits in a queue.
   using SeePlaces = std::function<void(const std::string& link, std::int64_t places, Cycle at)>;
   template <class Item>
   void on_link(std::string link, SeeItem<Item> see, SeePlaces see_places = {}) {
@@ -77,10 +77,8 @@ class Observers {
   ///
   /// A sample has what was counted at the edges of all earlier cycles, and nothing of its own. Not every counter is at
   /// the time of what it counts (figures: builtin:object, 400x400, agx-orin):
-  /// - At `cycle` all are.
-  /// - At `at` they are at most 60 cycles ahead, and up to 700 late where a unit had to wait for room.
-  /// - At both, in strict termination with early termination, SM and CROP count a bin when it is tested: 1,000 cycles
-  ///   ahead on average, at most 4,000.
+  /// - At `cycle` all are, but in strict termination with early termination, where SM and CROP count a bin when it is
+  ///   tested: 1,000 cycles ahead on average, at most 4,000.
   /// - At `lt` all that a vertex warp leads to is counted when the warp is issued: 4,000 to 8,000 cycles before its time
   ///   on average, at most 31,000. Samples tell the share of the work that has been done, not when.
   void on_statistics(Cycle every, std::vector<std::string> names, SeeStatistics see);

@@ -24,7 +24,7 @@ class Netlist;
 class Observers;
 
 /// How exact a run is about time.
-enum class Fidelity : std::uint8_t { functional, bound, lt, at, cycle };
+enum class Fidelity : std::uint8_t { functional, bound, lt, cycle };
 const char* name_of(Fidelity fidelity);
 /// All, the least exact first.
 const std::vector<Fidelity>& fidelities();
@@ -227,7 +227,7 @@ struct RunResult {
   std::vector<std::pair<std::string, std::string>> implementations;
   /// UNIT.PARAMETER and value of everything that could be set, pass-through units left out.
   std::vector<std::pair<std::string, std::string>> parameters;
-  /// Reasons why cycles of lt or at may be farther off than documented; empty at the other fidelities.
+  /// Reasons why cycles of lt may be farther off than documented; empty at the other fidelities.
   std::vector<std::string> outside_validated_range;
   /// All that the platform's components declare, by name, and what became of each in this run.
   std::vector<EffectReport> effects;

@@ -42,8 +42,8 @@ namespace vrpipe::testkit {
 ///     bench.run();
 ///     for (const auto& record : warps.records()) { record.cycle; record.item; }
 ///
-/// Bench(Fidelity::lt, "qru", ...) makes the unit's timing model of `lt` and `at` instead, and sources and sinks that speak
-/// its protocol; all else is written once. Where a batch moves in one piece there, the item is another (batch.h):
+/// Bench(Fidelity::lt, "qru", ...) makes the unit's timing model of `lt` instead, and sources and sinks that speak its
+/// protocol; all else is written once. Where a batch moves in one piece there, the item is another (batch.h):
 /// `source<BinItem>` for `source<QuadBeat>`.
 ///
 /// Each Bench has a SystemC context of its own, so that a program can have one after another (not two at a time).
@@ -55,9 +55,9 @@ class Bench {
   explicit Bench(std::uint64_t period_ps = 1000) : Bench(Fidelity::cycle, period_ps) {}
   /// Throws UserError for a fidelity without time.
   explicit Bench(Fidelity fidelity, std::uint64_t period_ps = 1000) : fidelity_(fidelity) {
-    if (fidelity != Fidelity::lt && fidelity != Fidelity::at && fidelity != Fidelity::cycle) {
+    if (fidelity != Fidelity::lt && fidelity != Fidelity::cycle) {
       throw UserError("no testbench", std::string("fidelity ") + name_of(fidelity), "units have no ports there",
-                      "choose lt, at or cycle");
+                      "choose lt or cycle");
     }
     fresh_simulation();
     clock_ = std::make_unique<ClockDomain>("clock", period_ps);
@@ -82,7 +82,7 @@ class Bench {
     behaviour->unit().set_draws(context.frame->draws().size());
     follow_clock(*behaviour, *clock_);
     unit_ = clocked() ? unit_maker(slot)(slot, *clock_, std::move(behaviour), context_, gpcs)
-                      : timed_unit_maker(slot)(slot, *clock_, std::move(behaviour), context_, gpcs, transport());
+                      : timed_unit_maker(slot)(slot, *clock_, std::move(behaviour), context_, gpcs);
   }
   Bench(const Bench&) = delete;
   Bench& operator=(const Bench&) = delete;
@@ -106,7 +106,7 @@ class Bench {
     const char* const name = sc_core::sc_gen_unique_name("source");
     Source<Item>& made = clocked()
                              ? static_cast<Source<Item>&>(keep(std::make_unique<ClockedSource<Item>>(name, *clock_)))
-                             : keep(std::make_unique<TimedSource<Item>>(name, *clock_, transport()));
+                             : keep(std::make_unique<TimedSource<Item>>(name, *clock_));
     if (!port.empty()) made.out().connect(unit_->in(port), depth, latency);
     return made;
   }
@@ -116,7 +116,7 @@ class Bench {
   Sink<Item>& sink(const std::string& port = "", unsigned depth = 4, unsigned latency = 1) {
     const char* const name = sc_core::sc_gen_unique_name("sink");
     Sink<Item>& made = clocked() ? static_cast<Sink<Item>&>(keep(std::make_unique<ClockedSink<Item>>(name, *clock_)))
-                                 : keep(std::make_unique<TimedSink<Item>>(name, *clock_, transport()));
+                                 : keep(std::make_unique<TimedSink<Item>>(name, *clock_));
     if (!port.empty()) unit_->out(port).connect(made.in(), depth, latency);
     return made;
   }
@@ -144,7 +144,7 @@ class Bench {
 
   /// Runs until nothing moves any more; once. Modules of your own may move an item again within 10,000 cycles; timers
   /// that never end, as of a memory's refresh, are not waited for. Returns the last cycle in which something was asked to
-  /// move; at `lt` and `at` the clock need not come as far as the items. Throws SimulationFault when that takes more than
+  /// move; at `lt` the clock need not come as far as the items. Throws SimulationFault when that takes more than
   /// `limit` cycles, or a memory does not answer.
   Cycle run(Cycle limit = 10'000'000) {
     prepare();
@@ -160,7 +160,6 @@ class Bench {
 
  private:
   bool clocked() const { return fidelity_ == Fidelity::cycle; }
-  Transport transport() const { return fidelity_ == Fidelity::lt ? Transport::blocking : Transport::non_blocking; }
 
   template <class Owner>
   Owner& keep(std::unique_ptr<Owner> made) {

@@ -22,7 +22,7 @@ class Sink {
   struct Record {
     Cycle cycle;  ///< in which it, or its first part, was taken
     Item item;
-    Cycle last;  ///< in which its last part was taken; several cycles only at `lt` and `at`
+    Cycle last;  ///< in which its last part was taken; several cycles only at `lt`
   };
 
   virtual ~Sink() = default;
@@ -92,16 +92,13 @@ class ClockedSink : public sc_core::sc_module, public Clocked, public PortOwner,
   StreamIn<Item> in_;
 };
 
-/// At `lt` and `at`.
+/// At `lt`.
 template <class Item>
 class TimedSink : public TimedUnit, public Sink<Item> {
  public:
-  TimedSink(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport)
-      : TimedUnit(name, domain, {}, transport),
-        in_(*this, "in", [this](const Item& item, CycleInterval visible) { return take(item, visible); }) {
-    // Items that come to a closed sink stay in its queue, so that nobody knows before when there will be room.
-    in_.set_gate([this] { return taken_from(in_.front()) <= now() + activation_cycles; });
-  }
+  TimedSink(const sc_core::sc_module_name& name, ClockDomain& domain)
+      : TimedUnit(name, domain, {}),
+        in_(*this, "in", [this](const Item& item, CycleInterval visible) { return take(item, visible); }) {}
 
   InEnd<Item>& in() override { return in_; }
   Behaviour& behaviour() override { return behaviour_; }
@@ -123,7 +120,6 @@ class TimedSink : public TimedUnit, public Sink<Item> {
     this->record(item, at);
     return at;
   }
-  Cycle advance(Cycle) override { return in_.empty() ? never : taken_from(in_.front()); }
 
   TimedIn<Item> in_;
   NoBehaviour behaviour_;

@@ -22,8 +22,8 @@ class Source {
   Source(const Source&) = delete;
   Source& operator=(const Source&) = delete;
 
-  /// Adds an item that goes at cycle `at.first` or later. At `lt` and `at` a batch takes the link for several `beats`, the
-  /// last of which is there `at.last - at.first` cycles after the first. Also while the simulation runs: `at` is later
+  /// Adds an item that goes at cycle `at.first` or later. At `lt` a batch takes the link for several `beats`, the last
+  /// of which is there `at.last - at.first` cycles after the first. Also while the simulation runs: `at` is later
   /// then; at `lt` the item goes at once, by a call that is annotated with its cycle, as the answers of units do.
   void add(const Item& item, CycleInterval at = Cycle{0}, unsigned beats = 1) {
     items_.push_back({item, at, beats});
@@ -82,15 +82,15 @@ class ClockedSource : public sc_core::sc_module, public Clocked, public PortOwne
   StreamOut<Item> out_;
 };
 
-/// What sources and sinks have for a behaviour, being units at `lt` and `at`.
+/// What sources and sinks have for a behaviour, being units at `lt`.
 class NoBehaviour : public Behaviour {};
 
-/// At `lt` and `at`.
+/// At `lt`.
 template <class Item>
 class TimedSource : public TimedUnit, public Source<Item> {
  public:
-  TimedSource(const sc_core::sc_module_name& name, ClockDomain& domain, Transport transport)
-      : TimedUnit(name, domain, {}, transport), out_(*this, "out") {}
+  TimedSource(const sc_core::sc_module_name& name, ClockDomain& domain)
+      : TimedUnit(name, domain, {}), out_(*this, "out") {}
 
   OutEnd<Item>& out() override { return out_; }
   Behaviour& behaviour() override { return behaviour_; }
@@ -98,7 +98,7 @@ class TimedSource : public TimedUnit, public Source<Item> {
  private:
   void added(Cycle earliest) override {
     if (!clock.domain->running()) return clock.domain->wake(clock.unit, earliest);
-    if (blocking() && !sending_ && this->items_.size() == 1) {
+    if (!sending_ && this->items_.size() == 1) {
       send_until(never);
     } else {
       clock.domain->wake(clock.unit, std::max(earliest, now() + 1));
@@ -106,14 +106,12 @@ class TimedSource : public TimedUnit, public Source<Item> {
   }
   Cycle tick(Cycle now) override { return send_until(now); }
 
-  /// Sends what can go up to a cycle; returns the one in which the next can, `never` if a credit will tell.
+  /// Sends what can go up to a cycle; returns the one in which the next can.
   Cycle send_until(Cycle until) {
     if (sending_) return never;
     while (!this->done()) {
-      const Cycle room = out_.room_from();
-      if (room == never) return never;
       const auto next = this->items_.front();
-      const Cycle at = std::max({next.at.first, room, turn()});
+      const Cycle at = std::max({next.at.first, out_.room_from(), turn()});
       if (at > until) return at;
       this->items_.pop_front();
       sending_ = true;
@@ -133,7 +131,7 @@ class TimedSource : public TimedUnit, public Source<Item> {
 
   TimedOut<Item> out_;
   NoBehaviour behaviour_;
-  bool sending_ = false;  ///< at `lt` what an item leads to may add another
+  bool sending_ = false;  ///< what an item leads to may add another
   bool was_batch_ = false;
   unsigned in_cycle_ = 0;  ///< items that went in the cycle of the last
 };

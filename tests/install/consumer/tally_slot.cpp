@@ -62,15 +62,14 @@ class UntimedTally : public UntimedUnit {
   std::unique_ptr<TallyBehaviour> behaviour_;
 };
 
-/// At `lt` and `at`: an item is given with the cycle in which it becomes visible; the handler returns when it leaves.
+/// At `lt`: an item is given with the cycle in which it becomes visible; the handler returns when it leaves.
 class TimedTally : public TimedUnit {
  public:
-  TimedTally(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TallyBehaviour> behaviour,
-             Transport transport)
-      : TimedUnit(name, domain, kinds(behaviour->timing()), transport),
+  TimedTally(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TallyBehaviour> behaviour)
+      : TimedUnit(name, domain, kinds(behaviour->timing())),
         out_(*this, "out_quads"),
         in_(*this, "in_quads",
-            [this](const QuadBeat& beat, CycleInterval visible) { return pass(beat, visible.first); }, {&out_}),
+            [this](const QuadBeat& beat, CycleInterval visible) { return pass(beat, visible.first); }),
         behaviour_(std::move(behaviour)),
         lane_(behaviour_->timing().items_per_cycle) {}
   Behaviour& behaviour() override { return *behaviour_; }
@@ -150,10 +149,8 @@ const Registrar<QuadTally, TallyBehaviour> unit("tally", "quad-tally", "counts t
     return std::make_unique<UntimedTally>(name, behaviour_as<TallyBehaviour>(std::move(behaviour)));
   });
   register_timed_unit_maker("tally", [](const std::string& name, ClockDomain& domain,
-                                        std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned,
-                                        Transport transport) {
-    return std::make_unique<TimedTally>(name.c_str(), domain, behaviour_as<TallyBehaviour>(std::move(behaviour)),
-                                        transport);
+                                        std::unique_ptr<Behaviour> behaviour, const RenderContext&, unsigned) {
+    return std::make_unique<TimedTally>(name.c_str(), domain, behaviour_as<TallyBehaviour>(std::move(behaviour)));
   });
   register_unit_maker("tally", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                                   const RenderContext&, unsigned) {
