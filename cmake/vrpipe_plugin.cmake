@@ -20,7 +20,8 @@ function(vrpipe_add_plugin name)
   if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
     target_compile_options(${name} PRIVATE -O2)
   endif()
-  target_compile_definitions(${name} PRIVATE VRPIPE_PLUGIN_TAG="${VRPIPE_PLUGIN_TAG}")
+  # An index beyond an array of what it is given ends in its own call, not later and elsewhere.
+  target_compile_definitions(${name} PRIVATE VRPIPE_PLUGIN_TAG="${VRPIPE_PLUGIN_TAG}" _GLIBCXX_ASSERTIONS)
   target_link_libraries(${name} PRIVATE vrpipe::vrpipe)
   # Whoever links a plugin wants its units registered, even if it names none of its classes.
   target_link_options(${name} INTERFACE LINKER:--no-as-needed)

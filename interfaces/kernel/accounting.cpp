@@ -1,6 +1,17 @@
 #include <vrpipe/kernel/accounting.h>
 
+#include <string>
+
+#include <vrpipe/component/error.h>
+
 namespace vrpipe {
+
+void refuse_work_kind(const std::string& unit, unsigned kind) {
+  throw SimulationFault(unit, 0,
+                        "did(" + std::to_string(kind) +
+                            ", ...) is work of a kind that it has not declared; there are " +
+                            std::to_string(most_work_kinds) + " at most");
+}
 
 const char* name_of(UnitState state) {
   switch (state) {

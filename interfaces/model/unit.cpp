@@ -32,7 +32,16 @@ Unit::Unit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector
     : sc_module(name),
       Component({&domain, domain.attach(*this)}),
       occupancy_(domain.frame_end(), std::move(work)),
-      account_(domain.frame_end()) {}
+      account_(domain.frame_end()) {
+  if (occupancy_.kinds() > most_work_kinds) refuse_work_kind(this->name(), most_work_kinds);
+}
+
+void Unit::close_account(Cycle end) {
+  account_.close(end);
+  for (auto kind = static_cast<unsigned>(occupancy_.kinds()); kind < most_work_kinds; ++kind) {
+    if (occupancy_.items(kind) > 0) refuse_work_kind(name(), kind);
+  }
+}
 
 InPort& Component::in(const std::string& name) { return port_named(in_ports, label(), name); }
 OutPort& Component::out(const std::string& name) { return port_named(out_ports, label(), name); }

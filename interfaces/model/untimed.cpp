@@ -16,6 +16,13 @@ std::map<std::string, UntimedUnitMaker>& untimed_makers() {
 
 }  // namespace
 
+void UntimedUnit::check_work() const {
+  if (work_.empty()) return;
+  for (auto kind = static_cast<unsigned>(work_.size()); kind < items_.size(); ++kind) {
+    if (items_[kind] > 0) refuse_work_kind(name_, kind);
+  }
+}
+
 void register_untimed_unit_maker(const std::string& slot, UntimedUnitMaker maker) {
   if (untimed_makers().emplace(slot, std::move(maker)).second) return Registry::instance().count_registration();
   Registry::instance().add_problem(

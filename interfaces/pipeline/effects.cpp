@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <sstream>
 
+#include "pipeline/slots/checks.h"
+
 #include <vrpipe/component/error.h>
+#include <vrpipe/component/names.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/pipeline/render_context.h>
 
@@ -47,6 +50,14 @@ const std::vector<Effect>& effects() { return effect_list(); }
 void add_effect(Effect effect) {
   std::vector<Effect>& all = effect_list();
   const std::string name = effect.full_name();
+  for (const std::string& part : {effect.component, effect.name}) {
+    if (!is_good_name(part)) return Registry::instance().add_bad_name("component or effect", part);
+  }
+  if (is_loading_plugin() && effect.decide != nullptr) {
+    effect.decide = [what = "effect " + name, decide = std::move(effect.decide)](const EffectQuestion& asked) {
+      return call_foreign(what, "decide", 0, [&] { return decide(asked); });
+    };
+  }
   if (std::any_of(all.begin(), all.end(), [&](const Effect& known) { return known.full_name() == name; })) {
     return Registry::instance().add_problem({"there is an effect '" + name + "' already", "choose another name"});
   }

@@ -11,6 +11,8 @@
 #include "component/plugin_tag.h"
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/component/names.h>
+#include <vrpipe/component/printable.h>
 #include <vrpipe/pipeline/checked_behaviours.h>
 
 namespace vrpipe {
@@ -21,6 +23,7 @@ Registry& Registry::instance() {
 }
 
 void Registry::add(Slot slot) {
+  if (!is_good_name(slot.name)) return add_bad_name("slot", slot.name);
   if (has_slot(slot.name)) {
     return add_problem({"there is a slot '" + slot.name + "' already", "choose another name"});
   }
@@ -48,7 +51,12 @@ std::vector<std::string> Registry::slot_names() const {
   return names;
 }
 
+void Registry::add_bad_name(const std::string& what, const std::string& name) {
+  add_problem({"the name '" + printable(name) + "' of a " + what + " is not " + good_name_rule, "choose another name"});
+}
+
 void Registry::add(Implementation implementation) {
+  if (!is_good_name(implementation.name)) return add_bad_name("unit", implementation.name);
   if (!has_slot(implementation.slot)) {
     return add_problem({"there is no slot '" + implementation.slot + "' for its unit '" + implementation.name + "'",
                         "did you mean " + nearest_name(implementation.slot, slot_names()) + "?"});

@@ -31,11 +31,9 @@ PairingQru::PairingQru(const Parameters& parameters, const RenderContext& contex
 }
 
 void PairingQru::launch(Warp& out) {
-  warp_sizes.see(warp_.count);
   out = warp_;
   warp_.count = 0;
   warp_.merge_pairs = 0;
-  ++warps;
 }
 
 unsigned PairingQru::examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) {
@@ -68,19 +66,16 @@ unsigned PairingQru::examine(TileId tile, const Quad* quads, unsigned count, War
       paired += 2 & found;
     }
     buffered_ = id;
-    pairs += (paired - warp_.count) / 2;
     warp_.count = static_cast<std::uint8_t>(paired);
     warp_.merge_pairs = static_cast<std::uint8_t>((1U << paired / 2) - 1);  // left-overs come at the end of the bin
     launched = paired == quads_per_warp;
     if (launched) launch(out);
   }
-  quads_examined += at;
   return at;
 }
 
 unsigned PairingQru::pass_by(const Quad* quads, unsigned count, Warp& out, bool& launched) {
   const unsigned examined = append(warp_, quads, count);
-  quads_examined += examined;
   launched = warp_.count == quads_per_warp;
   if (launched) launch(out);
   return examined;
@@ -113,16 +108,13 @@ std::uint64_t PairingQru::storage_bytes() const {
 }
 
 void QruPassThrough::launch(Warp& out) {
-  warp_sizes.see(warp_.count);
   out = warp_;
   warp_.count = 0;
-  ++warps;
 }
 
 unsigned QruPassThrough::examine(TileId tile, const Quad* quads, unsigned count, Warp& out, bool& launched) {
   warp_.tile = tile;
   const unsigned examined = append(warp_, quads, count);
-  quads_examined += examined;
   launched = warp_.count == quads_per_warp;
   if (launched) launch(out);
   return examined;

@@ -5,9 +5,6 @@
 
 namespace vrpipe {
 
-/// A bucket for each number of quads.
-inline constexpr Histogram::Buckets warp_size_buckets = Histogram::Buckets::linear(1, quads_per_warp + 2);
-
 /// Quad reorder unit (paper 5.3): 64 position registers pair overlapping quads of a bin, a 128-bit bitmap tells which
 /// are left for the end. A register that holds a quad means a pair, and is then empty again. Quads of draws that are tested
 /// late or not blended pass by the registers.
@@ -47,11 +44,6 @@ class PairingQru : public QruBehaviour {
   /// (4 B pointer + 6-bit position) x quads + 64 x 1 B register + bitmap (paper, table of hardware cost).
   std::uint64_t storage_bytes() const override;
 
-  Counter warps{*this, "warps", "warps", "launched"};
-  Counter pairs{*this, "pairs", "pairs", "of overlapping quads marked for merging"};
-  Counter quads_examined{*this, "quads", "quads", "examined"};
-  Histogram warp_sizes{*this, warp_size_buckets, "quads_per_warp", "quads", "in a warp launched"};
-
  private:
   static constexpr std::uint16_t no_quad = 0xffff;
   static constexpr unsigned bits_per_word = 64;
@@ -81,10 +73,6 @@ class QruPassThrough : public QruBehaviour {
   bool finish_bin(Warp& out) override;
   Throughput timing() const override { return {QuadBeat::capacity, 1}; }
   std::uint64_t storage_bytes() const override { return 0; }
-
-  Counter warps{*this, "warps", "warps", "launched"};
-  Counter quads_examined{*this, "quads", "quads", "examined"};
-  Histogram warp_sizes{*this, warp_size_buckets, "quads_per_warp", "quads", "in a warp launched"};
 
  private:
   void launch(Warp& out);

@@ -21,7 +21,7 @@ class TimedQru : public TimedUnit {
         in_(*this, "in_quads", [this](const BinItem& item, CycleInterval visible) { return examine(item, visible); }),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
-        numbering_(context),
+        numbering_(context, *behaviour_),
         budget_(timing_.items_per_cycle) {
     out_.set_pipeline(timing_.latency_cycles - 1, 1);
   }

@@ -20,7 +20,7 @@ class QruUnit : public Unit {
         out_(*this, "out_warps"),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
-        numbering_(context) {
+        numbering_(context, *behaviour_) {
     out_.set_pipeline(timing_.latency_cycles - 1, 1);
   }
 

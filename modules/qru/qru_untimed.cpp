@@ -16,7 +16,7 @@ class UntimedQru : public UntimedUnit {
         out_(*this, "out_warps"),
         in_(input<BinItem>("in_quads", [this](const BinItem& item) { examine(item); })),
         behaviour_(std::move(behaviour)),
-        numbering_(context) {}
+        numbering_(context, *behaviour_) {}
 
   Behaviour& behaviour() override { return *behaviour_; }
   void prefetch_for(UntimedUnit& blender) override { blender_ = &blender; }

@@ -278,8 +278,6 @@ void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp
   }
 }
 
-void SplatShader::shade_vertices(const VertexWarp&) { ++vertex_warps; }
-
 namespace {
 const SlotRegistrar sm_slot{{"sm", 90, "splat-shader", "", true, check_sm}};
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",

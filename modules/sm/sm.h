@@ -181,10 +181,9 @@ class SplatShader : public SmBehaviour {
   SplatShader(const Parameters& parameters, const RenderContext& context);
 
   void shade(const Warp& warp, ShadedWarp& out) override;
-  void shade_vertices(const VertexWarp& warp) override;
+  void shade_vertices(const VertexWarp&) override {}
   TimingParameters timing() const override { return timing_; }
 
-  Counter vertex_warps{*this, "vertex_warps", "warps", "of vertices"};
   Counter colors_clamped{*this, "colors_clamped", "splats",
                          "set-ups of a splat with a colour below 0 or beyond the largest half"};
 

@@ -294,7 +294,7 @@ class TimedSm : public TimedUnit {
       free_at = std::max(free_at, launch) + issue;
       did(SmWork::vertex, vertex_.instructions, free_at - issue, free_at);
       if (lacks_fetch_) fetch_gate_.enter();
-      behaviour_->shade_vertices(warp);
+      behaviour_->shade_and_count(warp);
       done = (fetches_ ? memory_.fetch_vertices(warp, launch) : launch) + issue + vertex_.stall_cycles;
     }
     next_vertex_launch_ = launch + 1;

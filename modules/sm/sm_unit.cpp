@@ -211,7 +211,7 @@ class SmUnit : public Unit {
     if (slot >= fragment_slots_) {
       const std::uint32_t turn = slot - fragment_slots_;
       if (lacks_fetch_) fetch_gate_.enter();
-      behaviour_->shade_vertices(vertices_[turn]);
+      behaviour_->shade_and_count(vertices_[turn]);
       flights_[slot].done = !fetches_ || !memory_.write_attributes(turn, vertices_[turn]);
       return;
     }

@@ -49,7 +49,7 @@ class UntimedSm : public UntimedUnit {
       did(SmWork::vertex, 1);
       const auto access = [this](const MemoryRequest& request) { memory_.access(request); };
       if (follows_memory()) traffic_.read_vertices(warp, access);
-      behaviour_->shade_vertices(warp);
+      behaviour_->shade_and_count(warp);
       if (follows_memory()) {
         traffic_.write_attributes(warp, [this](const MemoryRequest& request) {
           memory_.access(traffic_.in_buffer(request));

@@ -62,6 +62,11 @@ void Work::add(const Work& other) {
   lines_paid += other.lines_paid;
 }
 
+bool PhaseBound::knows(const std::string& slot) {
+  constexpr const char* known[] = {"draw", "vpo", "tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"};
+  return std::find(std::begin(known), std::end(known), slot) != std::end(known);
+}
+
 PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc) {
   const auto cost_of = [&](const char* slot, auto* of_slot, const auto& take) {
     for (const Instance& instance : configuration.netlist().instances()) {

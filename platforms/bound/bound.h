@@ -64,6 +64,8 @@ struct Work : FrontEndWork {
 /// - any unit after it has finished the last phase but one (units from the rasteriser on).
 class PhaseBound {
  public:
+  /// Whether this is a slot of the pipeline.
+  static bool knows(const std::string& slot);
   /// A slot that the platform does without takes no time.
   PhaseBound(const Configuration& configuration, unsigned gpc);
 

@@ -164,8 +164,11 @@ void WorkCounter::tap(UntimedUnit* unit, const char* port, Function function) {
   taps_.push_back(std::move(made));
 }
 
-WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc, PhaseBound& bound)
+WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc, PhaseBound& bound,
+                         OtherSlots& others)
     : bound_(bound),
+      others_(others),
+      gpc_(gpc),
       counts_late_(!(bound.times_out() && configuration.frame().terminates_early())),
       barriers_(configuration.context_of(0)),
       draw_(gpu.of_slot("draw", gpc)),
@@ -205,8 +208,10 @@ WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& g
     if (beat.count > 0) {
       count_front_end(bound_.work);
       bound_.quad_rasterized();
+      others_.quad_rasterized(gpc_);
     }
     next.take(beat);
+    if (beat.count > 0) others_.quad_collected(gpc_);
   });
   tap<BinItem>(tc_, "out_bins", [this](const BinItem& item, UntimedTarget<BinItem>& next) {
     next.take(item);
@@ -217,6 +222,7 @@ WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& g
     if (item.mark != Mark::none) return;
     count();
     bound_.quads_ended();
+    others_.bin_ended(gpc_);
     if (bound_.phase_is_full()) end_phase();
   });
 }

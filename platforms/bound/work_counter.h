@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "bound/bound.h"
+#include "bound/other_slots.h"
 #include "elaboration/untimed_gpu.h"
 
 #include <vrpipe/pipeline/barrier_plan.h>
@@ -18,8 +19,9 @@ namespace vrpipe {
 /// it no more often. The same holds of the z-cache, always, of which what late tests fill is left out.
 class WorkCounter {
  public:
-  /// The GPU and the bound outlive it.
-  WorkCounter(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc, PhaseBound& bound);
+  /// The GPU, the bound and `others` outlive it.
+  WorkCounter(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc, PhaseBound& bound,
+              OtherSlots& others);
   ~WorkCounter();
   /// With what has been done so far; after the run as well.
   void end_phase();
@@ -33,6 +35,8 @@ class WorkCounter {
   void count();
 
   PhaseBound& bound_;
+  OtherSlots& others_;
+  const unsigned gpc_;
   const bool counts_late_;  ///< late tests, unless some run may be spared them
   const BarrierPlan barriers_;
   std::unique_ptr<Blends> blends_;

@@ -101,6 +101,17 @@ Configuration::Configuration(const RunRequest& request, const Frame& frame)
   context.placement.gpcs = request.platform->gpcs;
   for (unsigned& gpc = context.placement.gpc; gpc < request.platform->gpcs; ++gpc) contexts_.push_back(context);
   decide_effects();
+  check_left_out();
+}
+
+/// Parameters that cannot be are refused whatever the frame calls for: the units that are left out, or pass through in this
+/// variant, are made once.
+void Configuration::check_left_out() const {
+  for (const Instance& instance : netlist_.instances()) {
+    const UnitChoices& unit = units_.at(instance.path);
+    if (elaborated_.find(instance.path) != nullptr && unit.chosen == unit.real) continue;
+    unit.real->make_behaviour(*unit.real_parameters, contexts_[instance.gpc]);
+  }
 }
 
 void Configuration::wire() {

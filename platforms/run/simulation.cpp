@@ -5,6 +5,7 @@
 #include <cstring>
 #include <ctime>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "bound/work_counter.h"
@@ -15,6 +16,8 @@
 #include <fmt/format.h>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/component/names.h>
+#include <vrpipe/component/printable.h>
 #include <vrpipe/pipeline/checked_behaviours.h>
 #include <vrpipe/pipeline/slots/crop.h>
 #include <vrpipe/pipeline/slots/qru.h>
@@ -75,11 +78,21 @@ void add_variant(Variant variant) {
   const std::vector<Variant>& known = variants();
   const bool taken =
       std::any_of(known.begin(), known.end(), [&](const Variant& each) { return each.name == variant.name; });
-  if (taken || variant.name.empty()) {
-    const std::string why = taken ? "there is one of that name" : "it has no name";
+  const auto refuse = [&](const std::string& why, const std::string& remedy) {
     if (!is_loading_plugin())
-      throw UserError("cannot add variant '" + variant.name + "'", "add_variant", why, "choose another name");
-    return Registry::instance().add_problem({"variant '" + variant.name + "': " + why, "choose another name"});
+      throw UserError("cannot add variant '" + printable(variant.name) + "'", "add_variant", why, remedy);
+    Registry::instance().add_problem({"variant '" + printable(variant.name) + "': " + why, remedy});
+  };
+  if (taken) return refuse("there is one of that name", "choose another name");
+  if (!is_good_name(variant.name))
+    return refuse(std::string("its name is not ") + good_name_rule, "choose another name");
+  for (std::size_t i = 0; i < variant.settings.size(); ++i) {
+    const Setting& setting = variant.settings[i];
+    const auto is_same = [&](const Setting& other) {
+      return other.unit == setting.unit && other.parameter == setting.parameter;
+    };
+    if (std::any_of(variant.settings.begin(), variant.settings.begin() + static_cast<std::ptrdiff_t>(i), is_same))
+      return refuse("it sets " + setting.unit + "." + setting.parameter + " twice", "set it once");
   }
   variant_list().push_back(std::move(variant));
   Registry::instance().count_registration();
@@ -458,12 +471,15 @@ bool follows_accesses(const UntimedGpu& gpu, const std::string& slot) {
 
 /// The bounds of all GPCs: the longest is the draw's.
 void report_bound(const Configuration& configuration, const UntimedGpu& gpu, const std::vector<PhaseBound>& bounds,
-                  RunResult& result) {
+                  const OtherSlots& others, RunResult& result) {
   double longest = 0;
   // A GPC without quads does not keep the draw up, unless there is none at all.
   const bool any_quads = std::any_of(bounds.begin(), bounds.end(), [](const auto& bound) { return bound.has_quads(); });
   for (const PhaseBound& bound : bounds) {
     if (bound.has_quads() || !any_quads) longest = std::max(longest, bound.cycles());
+  }
+  for (const UntimedGpu::Placed& placed : gpu.units()) {
+    longest = std::max(longest, others.busy_cycles(placed.instance->path));
   }
   // A memory works side by side with the units.
   const double period_ps = 1e6 / configuration.platform().frequency_mhz;
@@ -481,10 +497,12 @@ void report_bound(const Configuration& configuration, const UntimedGpu& gpu, con
     const PhaseBound& bound = bounds[instance.gpc];
     UnitReport unit;
     unit.name = instance.path;
-    const Cycle busy = std::min(cycles, static_cast<Cycle>(bound.busy_cycles(instance.slot)));
+    const bool is_known = PhaseBound::knows(instance.slot);
+    const Cycle busy = std::min(cycles, static_cast<Cycle>(is_known ? bound.busy_cycles(instance.slot)
+                                                                    : others.busy_cycles(instance.path)));
     unit.cycles[static_cast<unsigned>(UnitState::busy)] = busy;
     unit.cycles[static_cast<unsigned>(UnitState::starved)] = cycles - busy;
-    occupancy.add(std::move(unit), instance.slot, bound.parts(instance.slot));
+    occupancy.add(std::move(unit), instance.slot, is_known ? bound.parts(instance.slot) : others.parts(instance.path));
   }
   for (const UntimedGpu::PlacedMemory& placed : gpu.memories()) {
     UnitReport report;
@@ -506,11 +524,13 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
   UntimedGpu gpu(configuration, result.framebuffer);
   std::vector<PhaseBound> bounds;
   std::vector<std::unique_ptr<WorkCounter>> counters;
+  std::optional<OtherSlots> others;
   if (result.request.fidelity == Fidelity::bound) {
     const unsigned gpcs = configuration.netlist().gpcs();
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) bounds.emplace_back(configuration, gpc);
+    others.emplace(gpu, configuration.frame().terminates_early() && bounds.front().times_out());
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
-      counters.push_back(std::make_unique<WorkCounter>(configuration, gpu, gpc, bounds[gpc]));
+      counters.push_back(std::make_unique<WorkCounter>(configuration, gpu, gpc, bounds[gpc], *others));
     }
   }
   const HostTimer timer;
@@ -524,13 +544,16 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
     const Behaviour& behaviour = placed.unit->behaviour();
     behaviours.of_instance.emplace_back(placed.instance, &behaviour);
     add_statistics(*placed.instance, behaviour, *placed.unit, statistics);
+    placed.unit->check_work();
   }
   for (const UntimedGpu::PlacedMemory& placed : gpu.memories()) {
     statistics.add(placed.instance->slot, placed.instance->path, placed.memory->unit());
   }
   check_conservation(gpu, configuration.netlist());
   report_counts(configuration, behaviours, statistics, result);
-  if (!bounds.empty()) report_bound(configuration, gpu, bounds, result);
+  if (bounds.empty()) return;
+  report_bound(configuration, gpu, bounds, *others, result);
+  for (const std::string& reason : others->unknown()) result.outside_validated_range.push_back(reason);
 }
 
 }  // namespace
@@ -579,7 +602,7 @@ RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<fl
   result.parameters = configuration.parameters();
   if (request.fidelity == Fidelity::lt) {
     result.outside_validated_range = outside_validated_range(result.parameters);
-    for (std::string& reason : memories_outside_validated_range(configuration.netlist())) {
+    for (std::string& reason : outside_validated_range(configuration.netlist())) {
       result.outside_validated_range.push_back(std::move(reason));
     }
   }
@@ -620,7 +643,8 @@ RunRequest with_all_effects(RunRequest request) {
 }  // namespace
 
 void check_configuration(const RunRequest& request) {
-  const Frame empty(1, 1);
+  Frame empty(1, 1);
+  empty.set_depth_format(depth_format_of(request));
   check_sampling_has_time(request);
   const Configuration configuration(with_all_effects(request), empty);
   for (const Instance& instance : configuration.netlist().instances()) configuration.make(instance);

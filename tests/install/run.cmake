@@ -87,6 +87,8 @@ endif()
 expect_success("" ${vrpipe} compare ${draw} --termination strict --plugin ${plugin} --unit qru=same-splat
   --set qru.quads_per_cycle=4)
 expect_refusal("same-splat" ${vrpipe} run ${draw} --plugin ${plugin} --unit qru=same-spalt)
+# Its warps and pairs are counted by its slot, so that nothing is missing from its energy.
+expect_success("\"missing\": *\\[ *\\]" ${vrpipe} run ${draw} --variant qm --plugin ${plugin} --unit qru=same-splat --energy --json -)
 # On a platform that sets parameters which the unit does not have; the user may not.
 expect_success("" ${vrpipe} run ${draw} --platform mobile --fidelity lt --plugin ${plugin} --unit qru=same-splat)
 expect_refusal("bin_quads" ${vrpipe} run ${draw} --plugin ${plugin} --unit qru=same-splat --set qru.bin_quads=64)
@@ -157,6 +159,23 @@ foreach(fidelity functional bound lt cycle)
     message(FATAL_ERROR "tally.quads is not ${quads} at ${fidelity} in\n${output}")
   endif()
 endforeach()
+# What it takes is known at every fidelity, the bound included.
+set(one_beat run ${draw} ${tally} --platform tallied --set tally.beats_per_cycle=1 --set crop.bytes_per_cycle=256
+  --set crop.sectors_per_cycle=8 --set prop.color_bytes_per_cycle=256)
+expect_success("" ${vrpipe} ${one_beat} --json -)
+string(REGEX MATCH "\"cycles\": *([0-9]+)" ignored "${output}")
+set(cycles ${CMAKE_MATCH_1})
+foreach(fidelity bound lt)
+  expect_success("" ${vrpipe} ${one_beat} --fidelity ${fidelity} --json -)
+  string(REGEX MATCH "\"cycles\": *([0-9]+)" ignored "${output}")
+  set(other ${CMAKE_MATCH_1})
+  math(EXPR off "1000 * (${other} - ${cycles}) / ${cycles}")
+  if(off GREATER 10 OR off LESS -10 OR (fidelity STREQUAL bound AND other GREATER cycles))
+    message(FATAL_ERROR "${fidelity} has ${other} cycles with a slot of one's own, cycle ${cycles}")
+  endif()
+  expect_success("bound by (gpc0\\.)?(tally|TALLY)" ${vrpipe} ${one_beat} --fidelity ${fidelity})
+endforeach()
+expect_success("gpc0.tally is in slot tally of a plugin" ${vrpipe} ${one_beat} --fidelity lt)
 expect_refusal("link.tally.quads" ${vrpipe} run ${draw} ${tally} --platform tallied --set link.tally.quadz.depth=4)
 expect_success("" ${vrpipe} run ${draw} ${tally} --platform tallied --set link.tally.quads.depth=1)
 
@@ -173,6 +192,7 @@ expect_refusal("0\\.0\\.1" ${vrpipe} run ${draw} --plugin ${bad}/other_version.s
 expect_refusal("vertex-issue" ${vrpipe} run ${draw} --plugin ${bad}/duplicate.so)
 expect_refusal("registers no unit" ${vrpipe} run ${draw} --plugin ${bad}/empty.so)
 expect_refusal("'mobile': there is one" ${vrpipe} run ${draw} --plugin ${bad}/duplicate_platform.so)
+expect_refusal("platform 'a/b.n.x1B.31m': its name is not 1 to 64 letters" ${vrpipe} platforms --plugin ${bad}/bad_name.so)
 expect_refusal("no slot 'tcs'.*did you mean tc" ${vrpipe} run ${draw} --plugin ${bad}/misspelt.so)
 expect_refusal("slot zrop has a module" ${vrpipe} run ${draw} --plugin ${bad}/module.so)
 expect_refusal("loaded already" ${vrpipe} run ${draw} --plugin ${plugin} --plugin ${plugin})
@@ -191,6 +211,12 @@ foreach(fidelity functional bound lt cycle)
     expect_fault("variant [a-z+]+: tc=exits, [a-z_]+: calls exit" ${faulty} tc=exits)
   endforeach()
 endforeach()
+expect_fault("effect qru.leaves, decide: calls exit" ${vrpipe} run ${draw} --plugin ${bad}/deciding.so)
+expect_fault("effect qru.leaves at cycle 0: decide throws: no idea" ${CMAKE_COMMAND} -E env DECIDING_THROWS=1 ${vrpipe} run ${draw}
+  --plugin ${bad}/deciding.so)
+# The library has said before which index it was.
+expect_failure(1 "vrpipe: fault: [^\n]+\n$" "qru=overruns, examine: ended by signal 6" ${vrpipe} run ${draw} --plugin ${bad}/faulty.so
+  --unit qru=overruns)
 expect_fault("vpo=crashes-when-made, make_behaviour: ended by signal 8" ${vrpipe} run ${draw} --plugin ${bad}/faulty.so
   --unit vpo=crashes-when-made)
 expect_refusal("pairing" ${vrpipe} run ${draw} --unit qru=paring)

@@ -1,4 +1,5 @@
 // What a request and a platform may say, and what is registered only once.
+#include <cmath>
 #include <cstdlib>
 #include <stdexcept>
 #include <tuple>
@@ -63,11 +64,27 @@ TEST(Configuration, ACacheThatCannotBeIsRefusedAtEveryFidelity) {
   }
 }
 
+TEST(Configuration, ParametersThatCannotBeAreRefusedWhateverTheFrameCallsFor) {
+  for (const char* effects : {"auto", "all"}) {
+    for (const Setting& setting : {Setting{"zrop", "sector_bytes", "16"}, Setting{"zrop", "cache_bytes", "100"},
+                                   Setting{"sm", "attribute_buffer_bytes", "100"}}) {
+      RunRequest request = request_of("qm", Fidelity::functional);
+      request.effects = EffectChoice::parse(effects);
+      request.settings = {{"state", "depth_format", "d32f"}, setting};
+      EXPECT_THROW(check_configuration(request), UserError) << effects << " " << setting.parameter;
+    }
+  }
+}
+
 TEST(Platforms, OneWithoutGpcFrequencyOrWiringOrOfANameThatIsTakenIsRefused) {
   const Platform good = platform_named("agx-orin");
   EXPECT_THROW(add_platform(good), UserError);
-  for (const auto& [gpcs, megahertz, wire] :
-       {std::tuple{0U, 1.0, good.wire}, {1U, 0.0, good.wire}, {1U, 1.0, decltype(good.wire)()}}) {
+  for (const auto& [gpcs, megahertz, wire] : {std::tuple{0U, 1.0, good.wire},
+                                              {1U, 0.0, good.wire},
+                                              {1U, 1.0, decltype(good.wire)()},
+                                              {most_gpcs + 1, 1.0, good.wire},
+                                              {1U, 1e300, good.wire},
+                                              {1U, std::nan(""), good.wire}}) {
     Platform bad = good;
     bad.name = "bad";
     bad.gpcs = gpcs;
@@ -76,6 +93,22 @@ TEST(Platforms, OneWithoutGpcFrequencyOrWiringOrOfANameThatIsTakenIsRefused) {
     EXPECT_THROW(add_platform(bad), UserError);
   }
   EXPECT_THROW(platform_named("bad"), UserError);
+  for (const char* name : {"", "a/b", "\x1b[31m", "-x", "two words"}) {
+    Platform bad = good;
+    bad.name = name;
+    EXPECT_THROW(add_platform(bad), UserError) << name;
+    Variant variant = variant_named("qm");
+    variant.name = name;
+    EXPECT_THROW(add_variant(variant), UserError) << name;
+  }
+  Platform described = good;
+  described.name = "described";
+  described.description = "two\nlines";
+  EXPECT_THROW(add_platform(described), UserError);
+  Variant twice = variant_named("qm");
+  twice.name = "twice";
+  twice.settings = {{"tc", "bins", "8"}, {"tc", "bins", "9"}};
+  EXPECT_THROW(add_variant(twice), UserError);
 }
 
 TEST(Platforms, WiringThatThrowsIsAFaultThatNamesThePlatform) {

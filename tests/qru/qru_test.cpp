@@ -186,7 +186,8 @@ TEST_F(QruTest, WarpsOfPairsAreFullBeforeTheLeftOversCome) {
 
 TEST_F(QruTest, WarpsAreNumberedInTheDrawAndInTheirTile) {
   const Draw two_tiles = testing::draw_of(32, 16);
-  WarpNumbering numbering(testing::context_of(two_tiles));
+  PairingQru qru(parameters, context);
+  WarpNumbering numbering(testing::context_of(two_tiles), qru);
   const std::uint32_t in_tile[] = {0, 1, 0, 1, 2, 3};
   std::uint32_t launched = 0;
   for (const unsigned x : {0U, 0U, 1U, 1U, 0U, 0U}) {
@@ -201,7 +202,8 @@ TEST_F(QruTest, WarpsAreNumberedInTheDrawAndInTheirTile) {
 
 TEST_F(QruTest, AMarkHasTheNumberOfTheWarpThatFollows) {
   const Draw two_tiles = testing::draw_of(32, 16);
-  WarpNumbering numbering(testing::context_of(two_tiles));
+  PairingQru qru(parameters, context);
+  WarpNumbering numbering(testing::context_of(two_tiles), qru);
   Warp warp;
   numbering.number(warp);
   numbering.number(warp);
@@ -211,6 +213,21 @@ TEST_F(QruTest, AMarkHasTheNumberOfTheWarpThatFollows) {
   numbering.number(warp);
   EXPECT_EQ(warp.sequence, 2U);
   EXPECT_EQ(warp.tile_sequence, 2U);
+}
+
+TEST_F(QruTest, WarpsPairsAndQuadsAreCountedOfAnyUnit) {
+  QruPassThrough counts_nothing({}, context);
+  WarpNumbering numbering(context, counts_nothing);
+  Warp warp;
+  warp.count = 5;
+  warp.merge_pairs = 0b11;
+  numbering.number(warp);
+  warp.count = 8;
+  warp.merge_pairs = 0;
+  numbering.number(warp);
+  EXPECT_EQ(counts_nothing.warps.value(), 2U);
+  EXPECT_EQ(counts_nothing.pairs.value(), 2U);
+  EXPECT_EQ(counts_nothing.quads_launched.value(), 13U);
 }
 
 // case T06
@@ -236,7 +253,6 @@ TEST_F(QruTest, NoQuadIsLostOrDoubledAndEachPositionKeepsItsOrder) {
     ASSERT_EQ(seen.size(), positions.size());
     first += static_cast<std::uint32_t>(positions.size());
   }
-  EXPECT_EQ(qru.quads_examined.value(), first);
 }
 
 TEST_F(QruTest, StorageIsThatOfThePapersTable) { EXPECT_EQ(PairingQru(parameters, context).storage_bytes(), 688U); }
@@ -258,7 +274,6 @@ TEST_F(QruTest, PassingThroughABinEndsItsWarp) {
   QruPassThrough qru(none, context);
   EXPECT_EQ(run(qru, {1, 2}).warps.size(), 1U);
   EXPECT_EQ(run(qru, {1, 2}).warps.size(), 1U);
-  EXPECT_EQ(qru.warps.value(), 2U);
 }
 
 // A fragment of a pair that failed its test would have been blended with the other.
@@ -287,7 +302,6 @@ TEST_F(QruTest, QuadsOfADrawThatIsTestedLateFillWarpsInOrderAndNeverPair) {
     EXPECT_EQ(outcome.warps[0].count, 8);
     EXPECT_EQ(outcome.singles, (std::vector<std::uint32_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}));
   }
-  EXPECT_EQ(pairing.quads_examined.value(), 33U);
 }
 
 }  // namespace

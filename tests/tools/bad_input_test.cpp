@@ -175,6 +175,20 @@ TEST_F(BadInput, Machines) {
   refused({"units", "--slot", "tcc"}, {"'tcc'", "did you mean"});
 }
 
+// What would be taken, reported and mean nothing.
+TEST_F(BadInput, SettingsWithoutMeaning) {
+  refused({"microbench", "kill-rate", "--set", "state.termination_threshold=0.1"},
+          {"state.termination_threshold", "the microbenchmark's own", "blend_rounding"});
+  refused({"energies", "none.toml", "--toml"}, {"--toml", "leave out FILE"});
+  refused({"energies", "--toml", "--markdown"}, {"--toml", "leave out --markdown"});
+  for (const char* command : {"energies", "units", "scenes"}) {
+    refused({command, "--markdown", "--json", "-"}, {"--markdown, --json -", "in one form"});
+  }
+  refused({"scenes", "good.ply", "--preview", "p.jpg"}, {"--preview p.jpg", "it is a PNG"});
+  refused({"compare", "--scene", "good.ply", "--fidelity", "functional", "--relative-to", "qm"},
+          {"--relative-to", "functional has none"});
+}
+
 TEST_F(BadInput, Effects) {
   const std::vector<std::pair<const char*, std::vector<std::string>>> lists{
       {"al", {"unknown effect 'al'", "`vrpipe units` lists all"}},

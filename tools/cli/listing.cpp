@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>
 
 #include "host/output_file.h"
@@ -25,6 +26,12 @@ std::string markdown_escaped(const std::string& text) {
     result += c;
   }
   return result;
+}
+
+void check_one_form(const char* option, bool is_given, const Values& json_option) {
+  if (!is_given || single(json_option, "--json").value_or("") != "-") return;
+  throw UserError("cannot print both", std::string(option) + ", --json -", "stdout has the list in one form",
+                  "give one of them, or --json FILE");
 }
 
 void print_listing(const Json& json, const std::string& text, const Values& json_option, const Values& plugins) {

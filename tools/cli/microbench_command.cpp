@@ -33,7 +33,7 @@ class MicrobenchCommand : public Command {
     arguments.set_footer(
         "Each draws rectangles of its own on the baseline GPU and prints what the paper found, what a real GPU (one\n"
         "graphics GPC of a GH100) measured and what the simulator does beside one another, with its curve. Draw state\n"
-        "is the microbenchmark's: of --set state.NAME the precision of the hardware counts alone.\n"
+        "is the microbenchmark's: of --set state.NAME the precision of the hardware is taken alone.\n"
         "\n"
         "Examples:\n"
         "  vrpipe microbench tile-binning\n"

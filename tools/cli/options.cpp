@@ -447,6 +447,10 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
     check_configuration(each);
   }
   job.baseline = place_of_run(job.requests, single(relative_to_, "--relative-to").value_or(""), "--relative-to");
+  if (job.baseline != 0 && request.fidelity == Fidelity::functional) {
+    throw UserError("cannot use option", "--relative-to", "speed-ups are of time, and functional has none",
+                    "leave it out, or choose another --fidelity");
+  }
 
   if (const auto text = single(background_, "--background")) job.background = parse_background(*text, "--background");
   if (const auto folder = single(output_, "--output")) {

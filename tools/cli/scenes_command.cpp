@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -69,7 +70,12 @@ class ScenesCommand : public Command {
       throw UserError("cannot do both", measure_ ? "--measure" : "--markdown",
                       "FILE, --measure and --markdown are different things to print", "give one of them");
     }
+    check_one_form("--markdown", markdown_, json_);
     const auto preview = single(preview_, "--preview");
+    if (preview && std::filesystem::path(*preview).extension() != ".png") {
+      throw UserError("cannot draw a preview", "--preview " + *preview,
+                      "it is a PNG, and the file's name says otherwise", "name it ....png");
+    }
     if (preview && file_.empty()) {
       throw UserError("nothing to draw", "--preview", "no file is named", "give vrpipe scenes FILE --preview FILE.png");
     }

@@ -208,6 +208,7 @@ class UnitsCommand : public Command {
   }
 
   void run() override {
+    check_one_form("--markdown", markdown_, json_);
     load_plugins(plugins_);
     const auto named = single(platform_, "--platform");
     const Platform& platform = named ? platform_named(*named) : platforms().front();

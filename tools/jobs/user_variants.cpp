@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/component/names.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/netlist.h>
 
@@ -24,14 +25,6 @@ std::pair<std::string, std::string> pair_of(const std::string& part, const std::
                     example);
   }
   return {part.substr(0, equals), part.substr(equals + 1)};
-}
-
-bool is_good_name(const std::string& name) {
-  const auto is_good = [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '+' || c == '-' || c == '_' || c == '.';
-  };
-  return !name.empty() && name.size() <= 64 && name.front() != '-' && name.front() != '.' &&
-         std::all_of(name.begin(), name.end(), is_good);
 }
 
 }  // namespace
@@ -62,7 +55,7 @@ const Variant& add_user_variant(const VariantDefinition& definition) {
   const std::string where = std::string(variant_option) + " " + definition.name;
   if (!is_good_name(definition.name)) {
     throw UserError("bad name '" + definition.name + "' of a variant", variant_option,
-                    "it is not 1 to 64 letters, digits, + - _ or ., the first no - or .", example);
+                    fmt::format("it is not {}", good_name_rule), example);
   }
   const auto& known = variants();
   if (std::any_of(known.begin(), known.end(), [&](const Variant& each) { return each.name == definition.name; })) {

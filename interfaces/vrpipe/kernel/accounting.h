@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <string>
 
 #include <vrpipe/kernel/ring.h>
 
@@ -29,6 +30,11 @@ struct WorkKind {
   double cycles_per_item;  ///< that an item keeps the resource
   bool is_throughput;      ///< utilization, work over peak rate, counts this kind
 };
+
+/// Kinds that a unit may have.
+constexpr unsigned most_work_kinds = 8;
+/// Throws SimulationFault: a unit did work of a kind that it has not declared.
+[[noreturn]] void refuse_work_kind(const std::string& unit, unsigned kind);
 
 /// How long a kind of work kept its resource.
 struct OccupancyPart {

@@ -15,11 +15,12 @@ class Occupancy {
  public:
   /// `frame_end` outlives it.
   Occupancy(const FrameEnd& frame_end, std::vector<WorkKind> kinds)
-      : kinds_(std::move(kinds)), tallies_(kinds_.size(), WorkTally(frame_end)) {}
+      : kinds_(std::move(kinds)), tallies_(most_work_kinds, WorkTally(frame_end)) {}
 
-  /// Items of a kind, an index into the kinds, that keep the unit from cycle `from` to `until` - 1, or for a cycle.
+  /// Items of a kind, an index into the kinds, that keep the unit from cycle `from` to `until` - 1.
   void add(unsigned kind, std::uint64_t items, Cycle from, Cycle until) { tallies_[kind].add(items, from, until); }
-  void add(unsigned kind, std::uint64_t items, Cycle at) { tallies_[kind].add(items, at); }
+
+  std::size_t kinds() const { return kinds_.size(); }
 
   /// Items of a kind so far.
   std::uint64_t items(unsigned kind) const { return static_cast<std::uint64_t>(tallies_[kind].items()); }
@@ -35,7 +36,7 @@ class Occupancy {
 
  private:
   std::vector<WorkKind> kinds_;
-  std::vector<WorkTally> tallies_;
+  std::vector<WorkTally> tallies_;  ///< also of kinds that are not declared, which the unit asks for
 };
 
 }  // namespace vrpipe

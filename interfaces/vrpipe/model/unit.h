@@ -37,7 +37,8 @@ class Component : public PortOwner, public StatisticSet {
 /// directly.
 class Unit : public Clocked, public sc_core::sc_module, public Component {
  public:
-  /// Attaches to the clock. `work`: the kinds of work that take the unit's time.
+  /// Attaches to the clock. `work`: the kinds of work that take the unit's time, at most `most_work_kinds`; otherwise a
+  /// SimulationFault.
   Unit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector<WorkKind> work);
 
   std::string label() const override { return name(); }
@@ -58,15 +59,18 @@ class Unit : public Clocked, public sc_core::sc_module, public Component {
 
   const Occupancy& occupancy() const { return occupancy_; }
   const StateAccount& account() const { return account_; }
-  virtual void close_account(Cycle end) { account_.close(end); }
+  virtual void close_account(Cycle end);
   void observe_states(StateObserver& observer) { account_.observe(observer); }
 
  protected:
   void enter(UnitState state, Cycle now) { account_.enter(state, now); }
   Cycle now() const { return clock.domain->now(); }
   /// The unit did `items` of a kind of work in this cycle, or from cycle `from` to `until` - 1.
-  void did(unsigned kind, std::uint64_t items, Cycle at) { occupancy_.add(kind, items, at); }
-  void did(unsigned kind, std::uint64_t items, Cycle from, Cycle until) { occupancy_.add(kind, items, from, until); }
+  void did(unsigned kind, std::uint64_t items, Cycle at) { did(kind, items, at, at + 1); }
+  void did(unsigned kind, std::uint64_t items, Cycle from, Cycle until) {
+    if (kind >= most_work_kinds) refuse_work_kind(name(), kind);  // no instruction where the kind is a constant
+    occupancy_.add(kind, items, from, until);
+  }
   /// A quad is blended or dropped in the cycle before `cycle`, or later: the draw does not end earlier.
   void frame_lasts(Cycle cycle) { clock.domain->frame_end().not_before(cycle); }
 

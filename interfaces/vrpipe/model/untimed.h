@@ -150,12 +150,18 @@ class UntimedMemoryPort {
 /// A unit without time: a functional model with ports.
 class UntimedUnit : public Component {
  public:
-  explicit UntimedUnit(std::string name) : Component(ClockHandle()), name_(std::move(name)) {}
+  /// @param work  as of `lt` and `cycle` (unit.h): so `bound` knows what a unit in a slot of your own takes. Without it the
+  ///              kinds that the unit counts are those of its slot, of which `bound` knows.
+  explicit UntimedUnit(std::string name, std::vector<WorkKind> work = {})
+      : Component(ClockHandle()), name_(std::move(name)), work_(std::move(work)) {}
 
   std::string label() const override { return name_; }
   /// Of a kind of work of its slot (CropWork and others), so far: the items that it is counted in, but whole warps where
   /// that is cycles or instructions.
   std::uint64_t items(unsigned kind) const { return items_[kind]; }
+  const std::vector<WorkKind>& work() const { return work_; }
+  /// Throws SimulationFault if it did work of a kind that it has not declared.
+  void check_work() const;
 
   /// For a unit with a memory port; null otherwise.
   virtual UntimedMemoryPort* memory_port() { return nullptr; }
@@ -173,12 +179,15 @@ class UntimedUnit : public Component {
   std::unique_ptr<UntimedIn<Item>> input(const std::string& name, Function function) {
     return std::make_unique<UntimedHandler<Item, Function>>(*this, name, function);
   }
-  void did(unsigned kind, std::uint64_t items) { items_[kind] += items; }
+  void did(unsigned kind, std::uint64_t items) {
+    if (kind >= items_.size()) refuse_work_kind(name_, kind);  // no instruction where the kind is a constant
+    items_[kind] += items;
+  }
 
  private:
   std::string name_;
-  static constexpr unsigned most_kinds = 8;
-  std::array<std::uint64_t, most_kinds> items_{};
+  std::vector<WorkKind> work_;
+  std::array<std::uint64_t, most_work_kinds> items_{};
 };
 
 /// Makes the unit without time around a functional model of a slot. `gpcs` is how many GPCs the front end serves.

@@ -54,6 +54,8 @@ class Registry {
     std::string remedy;
   };
   void add_problem(Problem problem) { problems_.push_back(std::move(problem)); }
+  /// The problem that a name cannot be one (names.h).
+  void add_bad_name(const std::string& what, const std::string& name);
   void count_registration() { ++registrations_; }
   /// Of everything, so that a plugin that registers nothing is told.
   std::size_t registrations() const { return registrations_; }

@@ -108,6 +108,7 @@ class Configuration {
   };
   void wire();
   void decide_effects();
+  void check_left_out() const;
   void leave_out_parts(OmittedEffects& omitted, bool memories);
   void choose_implementations();
   void apply(const Setting& setting);

@@ -60,10 +60,14 @@ struct Variant {
 };
 /// The paper's four, then those that were added.
 const std::vector<Variant>& variants();
-/// Adds one of your own, as `add_platform` does a platform. Throws UserError for a name that is empty or taken.
+/// Adds one of your own, as `add_platform` does a platform. Throws UserError for a name that is taken or no name (names.h), and
+/// for a parameter that it sets twice.
 void add_variant(Variant variant);
 /// Throws UserError naming those that exist.
 const Variant& variant_named(const std::string& name);
+
+/// GPCs of a platform at most.
+constexpr unsigned most_gpcs = 256;
 
 /// A GPU: units and the links between them.
 struct Platform {
@@ -77,9 +81,10 @@ struct Platform {
 
 /// All named platforms, the default first.
 const std::vector<Platform>& platforms();
-/// Adds one of your own: in a program before it is used, in a plugin from a static initialiser. Throws UserError for a
-/// name that is taken and a platform without GPC, frequency or wiring; while a plugin is loaded, when nothing may be
-/// thrown, `load_plugin` does.
+/// Adds one of your own: in a program before it is used, in a plugin from a static initialiser. Throws UserError for a name that
+/// is taken or no name (names.h), a description of several lines, no GPC or more than `most_gpcs`, a frequency outside
+/// 0.001 to 1,000,000 MHz, and a platform without wiring; while a plugin is loaded, when nothing may be thrown, `load_plugin`
+/// does.
 void add_platform(Platform platform);
 /// Throws UserError naming the nearest.
 const Platform& platform_named(const std::string& name);
@@ -227,7 +232,7 @@ struct RunResult {
   std::vector<std::pair<std::string, std::string>> implementations;
   /// UNIT.PARAMETER and value of everything that could be set, pass-through units left out.
   std::vector<std::pair<std::string, std::string>> parameters;
-  /// Reasons why cycles of lt may be farther off than documented; empty at the other fidelities.
+  /// Reasons why cycles of lt, or a bound, may be farther off than documented; empty at the other fidelities.
   std::vector<std::string> outside_validated_range;
   /// All that the platform's components declare, by name, and what became of each in this run.
   std::vector<EffectReport> effects;

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <stdexcept>
 
+#include <vrpipe/modules/qru/qru.h>
 #include <vrpipe/modules/tc/tc.h>
 #include <vrpipe/modules/vpo/vpo.h>
 #include <vrpipe/pipeline/registry.h>
@@ -31,6 +32,14 @@ struct Exits : vrpipe::TileCoalescing {
   using TileCoalescing::TileCoalescing;
   bool flush_oldest(FlushReason, Flush&) override { std::exit(0); }
 };
+struct Overruns : vrpipe::PairingQru {
+  using PairingQru::PairingQru;
+  unsigned examine(vrpipe::TileId tile, const vrpipe::Quad* quads, unsigned count, vrpipe::Warp& out,
+                   bool& launched) override {
+    for (unsigned i = 0; i < 2 * vrpipe::quads_per_warp; ++i) out.quads[i] = quads[i % count];
+    return PairingQru::examine(tile, quads, count, out, launched);
+  }
+};
 struct CrashesWhenMade : vrpipe::PrimitiveAssembly {
   CrashesWhenMade(const Parameters& parameters, const vrpipe::RenderContext& context)
       : PrimitiveAssembly(parameters, context) {
@@ -44,6 +53,7 @@ const Tc<Throws> throws("tc", "throws", "throws in a call");
 const Tc<TakesTooMuch> takes_too_much("tc", "takes-too-much", "takes more quads than there are");
 const Tc<Crashes> crashes("tc", "crashes", "ends by a signal");
 const Tc<Exits> exits("tc", "exits", "calls exit()");
+const vrpipe::Registrar<Overruns, vrpipe::QruBehaviour> overruns("qru", "overruns", "writes past the quads of a warp");
 const vrpipe::Registrar<CrashesWhenMade, vrpipe::VpoBehaviour> when_made("vpo", "crashes-when-made",
                                                                          "ends by a signal");
 

@@ -19,7 +19,6 @@ unsigned SameSplatQru::examine(vrpipe::TileId tile, const vrpipe::Quad* quads, u
   unsigned examined = 0;
   while (examined < count && !launched) {
     const vrpipe::Quad& quad = quads[examined++];
-    ++quads_examined;
     vrpipe::Quad& held = registers_[quad.position];
     if (held.coverage == 0) {
       held = quad;
@@ -53,7 +52,6 @@ void SameSplatQru::add_pair(const vrpipe::Quad& front, const vrpipe::Quad& back)
     fill_slots(std::exchange(waiting_, back), front, false);
     return;
   }
-  ++pairs;
   fill_slots(front, back, true);
 }
 
@@ -81,7 +79,6 @@ void SameSplatQru::launch(vrpipe::Warp& out) {
   out = warp_;
   warp_.count = 0;
   warp_.merge_pairs = 0;
-  ++warps;
 }
 
 VRPIPE_PLUGIN

@@ -35,10 +35,6 @@ class SameSplatQru : public vrpipe::QruBehaviour {
   /// 64 registers of a 4 B pointer and the quad's 4 B, and one for the single that waits.
   std::uint64_t storage_bytes() const override { return (vrpipe::positions_per_tile + 1) * sizeof(vrpipe::Quad); }
 
-  vrpipe::Counter warps{*this, "warps", "warps", "launched"};
-  vrpipe::Counter pairs{*this, "pairs", "pairs", "of quads of the same splat"};
-  vrpipe::Counter quads_examined{*this, "quads", "quads", "examined"};
-
  private:
   /// What is tested after shading is not merged.
   bool may_merge(const vrpipe::Quad& quad) const;

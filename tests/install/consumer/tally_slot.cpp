@@ -46,11 +46,12 @@ std::vector<WorkKind> kinds(const Throughput& timing) { return {{"beats", 0, 1.0
 class UntimedTally : public UntimedUnit {
  public:
   UntimedTally(const std::string& name, std::unique_ptr<TallyBehaviour> behaviour)
-      : UntimedUnit(name),
+      : UntimedUnit(name, kinds(behaviour->timing())),
         out_(*this, "out_quads"),
         in_(input<QuadBeat>("in_quads",
                             [this](const QuadBeat& beat) {
                               behaviour_->pass(beat);
+                              did(0, 1);
                               out_.send(beat);
                             })),
         behaviour_(std::move(behaviour)) {}

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <vrpipe/kernel/accounting.h>
+#include <vrpipe/pipeline/payload.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
@@ -21,6 +22,20 @@ class QruBehaviour : public Behaviour {
   virtual bool finish_bin(Warp& out) = 0;
   virtual Throughput timing() const = 0;            ///< items: quads examined
   virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
+
+  /// Called by the modules with each warp that is launched, so that energy and reports know of any unit's.
+  void count(const Warp& warp) {
+    ++warps;
+    pairs += static_cast<unsigned>(__builtin_popcount(warp.merge_pairs));
+    quads_launched += warp.count;
+    warp_sizes.see(warp.count);
+  }
+
+  static constexpr Histogram::Buckets warp_size_buckets = Histogram::Buckets::linear(1, quads_per_warp + 2);
+  Counter warps{*this, "warps", "warps", "launched"};
+  Counter pairs{*this, "pairs", "pairs", "of quads marked for merging, in these"};
+  Counter quads_launched{*this, "quads", "quads", "in these"};
+  Histogram warp_sizes{*this, warp_size_buckets, "quads_per_warp", "quads", "in a warp launched"};
 };
 
 /// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.

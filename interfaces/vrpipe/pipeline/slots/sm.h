@@ -83,6 +83,13 @@ class SmBehaviour : public Behaviour {
   DrawCounter quads_merged{*this, "quads_merged", "quads", "taken away by merging, one a pair with two live quads"};
   DrawCounter fragments_merged{*this, "fragments_merged", "fragments", "taken away by merging, where both are live"};
   Counter fragment_warps{*this, "fragment_warps", "warps", "of fragments"};
+  Counter vertex_warps{*this, "vertex_warps", "warps", "of vertices"};
+
+  /// For the modules: `shade_vertices`, and counts the warp for any unit.
+  void shade_and_count(const VertexWarp& warp) {
+    ++dynamic_cast<SmBehaviour&>(unit()).vertex_warps;
+    shade_vertices(warp);
+  }
 
  protected:
   const ColorSurface* surface_ = nullptr;
