@@ -1,6 +1,7 @@
 #include "tool_test_support.h"
 
 #include <map>
+#include <regex>
 #include <set>
 
 #include <vrpipe/pipeline/effects.h>
@@ -100,20 +101,24 @@ TEST_F(EffectsCommand, WhatIsForcedOutHasNoProof) {
   const json entry = effects_by(command)["qru.pairing"];
   EXPECT_EQ(entry["state"], "omitted");
   EXPECT_TRUE(entry["proof"].is_null());
-  expect_in(vrpipe(command).out,
-            {"termination, effects auto,-qru.pairing\n", "qru.pairing            forced    left out"});
+  expect_in(vrpipe(command).out, {"termination, effects auto,-qru.pairing\n", "left out by force: qru.pairing\n"});
 }
 
-TEST_F(EffectsCommand, RunsListThemAndComparisonsWhereTheyDiffer) {
+TEST_F(EffectsCommand, RunsCountThemAndComparisonsSayWhereTheyDiffer) {
   const std::string run = vrpipe({"run", "--scene", "tiny.spl", "--variant", "qm"}).out;
-  std::vector<std::string> names;
-  for (const std::string& name : declared()) names.push_back("  " + name + " ");
-  expect_in(run, names);
-  expect_in(run, {"effects of qm ", "static    no draw tests depth or stencil\n"});
-  EXPECT_LT(run.find("took "), run.find("effects of qm ")) << "at the end";
+  std::smatch counted;
+  ASSERT_TRUE(std::regex_search(run, counted, std::regex("\neffects: (\\d+) active, (\\d+) left out \\("))) << run;
+  EXPECT_EQ(std::stoul(counted[1]) + std::stoul(counted[2]), declared().size());
+  EXPECT_LT(run.find("took "), run.find("\neffects: ")) << "at the end";
   const std::string compared = vrpipe({"compare", "--scene", "tiny.spl"}).out;
   expect_in(compared, {"effects that differ", "  qru.pairing            static  active  static  active\n"});
-  for (const std::string& name : declared()) EXPECT_NE(compared.find(name), std::string::npos) << name;
+  EXPECT_TRUE(std::regex_search(compared, std::regex("\neffects: \\d+ active in all, \\d+ left out in all \\(")));
+  const std::string explained =
+      vrpipe({"run", "--scene", "tiny.spl", "--variant", "qm", "--fidelity", "functional", "--explain-effects"}).out;
+  std::vector<std::string> names;
+  for (const std::string& name : declared()) names.push_back("  " + name + " ");
+  expect_in(explained, names);
+  expect_in(explained, {"effects of qm ", "no draw tests depth or stencil\n"});
 }
 
 TEST_F(EffectsCommand, ExplainingMeasuresWhatIsOmittedAndAllTogether) {

@@ -32,19 +32,17 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-TEST(EffectsReport, OfOneRunHasTheActiveFirstAndReasonsOfAll) {
-  const std::string text = effects_text({run_of("qm")}, {}, {});
-  EXPECT_EQ(text,
-            "\n"
-            "effects of qm        proof     reason\n"
-            "----------------------------------------------------------------------------------------------------\n"
-            "active\n"
-            "  qru.pairing                  QRU pairs\n"
-            "omitted\n"
-            "  crop.blend_hazard  verified  watched\n"
-            "  dram.refresh       bounded   at most 3 %\n"
-            "  raster.hi_z        static    a reason of more words than there is room for on a line of a hundred\n"
-            "                               characters, beside a name and a proof\n");
+TEST(EffectsReport, OfOneRunCountsThemAndNamesWhatChangesResults) {
+  const std::string where = "each with its reason: --json, --html; with what it would cost: --explain-effects\n";
+  EXPECT_EQ(
+      effects_text({run_of("qm")}, {}, {}),
+      "\neffects: 1 active, 3 left out (1 bounded, 1 static, 1 verified)\napproximated: dram.refresh (at most 3 %)\n" +
+          where);
+  RunResult forced = run_of("qm");
+  forced.request.effects = EffectChoice::parse("auto,-raster.hi_z,-dram.refresh");
+  EXPECT_EQ(effects_text({forced}, {}, {}),
+            "\neffects: 1 active, 3 left out (2 forced, 1 verified)\nleft out by force: dram.refresh, raster.hi_z\n" +
+                where);
 }
 
 TEST(EffectsReport, ThatTheUserForcedOutHasNoProof) {
@@ -65,14 +63,13 @@ TEST(EffectsReport, OfSeveralRunsHasARowWhereTheyDiffer) {
             "effects that differ  baseline      qm\n"
             "-------------------------------------\n"
             "  qru.pairing          static  active\n"
-            "omitted in all, bounded: dram.refresh\n"
-            "omitted in all, static: raster.hi_z\n"
-            "omitted in all, verified: crop.blend_hazard\n"
-            "reasons: --json, or `vrpipe run`; what they would cost: --explain-effects\n");
+            "effects: 0 active in all, 3 left out in all (1 bounded, 1 static, 1 verified)\n"
+            "approximated: dram.refresh\n"
+            "each with its reason: --json, --html; with what it would cost: --explain-effects\n");
   runs[0].effects[2] = runs[1].effects[2];
   const std::string alike = effects_text(runs, {}, {});
   EXPECT_EQ(alike.find("differ"), std::string::npos) << alike;
-  EXPECT_NE(alike.find("effects active in all: qru.pairing\n"), std::string::npos) << alike;
+  EXPECT_NE(alike.find("effects: 1 active in all, 3 left out"), std::string::npos) << alike;
 }
 
 TEST(EffectsReport, CostsAreColumnsOfWhatIsOmittedAndARowOfAll) {
@@ -88,6 +85,7 @@ TEST(EffectsReport, CostsAreColumnsOfWhatIsOmittedAndARowOfAll) {
   EXPECT_EQ(line_with("qru.pairing"), "  qru.pairing                                                 QRU pairs");
   EXPECT_EQ(line_with("crop.blend_hazard"), "  crop.blend_hazard  verified            1.00   1.25   1.25x  watched");
   EXPECT_EQ(line_with("raster.hi_z").substr(0, 62), "  raster.hi_z        static              1.00  12.50  12.50x  ");
+  EXPECT_NE(effects_text({run_of("qm")}, {costs}, {}).find("a reason of more words"), std::string::npos);
   EXPECT_EQ(line_with("all effects"), "  all effects                            1.00  13.75  13.75x  --effects all");
 }
 

@@ -3,6 +3,8 @@
 #include <sys/resource.h>
 
 #include <csignal>
+#include <regex>
+#include <stdexcept>
 
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/simulation.h>
@@ -12,6 +14,7 @@
 #include "forked.h"
 #include "host/output_file.h"
 #include "host/process_setup.h"
+#include "qru/qru.h"
 
 namespace vrpipe::testing {
 namespace {
@@ -83,6 +86,36 @@ TEST_F(Process, WhatAPluginPrintsIsNoResult) {
   }
   const Finished report = with_unit(chatty, {"run", "--scene", "tiny.spl", "--unit", "qru=chatty"});
   EXPECT_EQ(report.out.find("here"), std::string::npos) << report.out;
+}
+
+TEST_F(Process, APointThatEndsInAFaultIsARowAndTheOthersAreDone) {
+  struct Faulty : PairingQru {
+    using PairingQru::PairingQru;
+    unsigned examine(TileId, const Quad*, unsigned, Warp&, bool&) override {
+      throw std::runtime_error("no idea, really");
+    }
+  };
+  Implementation faulty = Registry::instance().find("qru", "pairing");
+  faulty.name = "faulty";
+  faulty.make_behaviour = [](const ParameterSet& parameters, const RenderContext& context) {
+    return std::make_unique<Faulty>(dynamic_cast<const PairingQru::Parameters&>(parameters), context);
+  };
+  write("study.toml",
+        "scene = \"tiny.spl\"\nfidelity = \"lt\"\n[variants.bad]\nbase = \"qm\"\nunit.qru = \"faulty\"\n"
+        "[axes]\nvariant = [\"baseline\", \"bad\", \"qm\"]\n");
+  std::string before;
+  for (const char* done : {"", "3 of 3 points were done before"}) {
+    const Finished finished = with_unit(faulty, {"sweep", "study.toml", "--journal", "j.jsonl", "--csv", "points.csv"});
+    EXPECT_EQ(finished.code, 1);
+    EXPECT_NE(finished.err.find(done), std::string::npos) << finished.err;
+    EXPECT_NE(finished.err.find("1 of 3 points ended in a fault"), std::string::npos) << finished.err;
+    EXPECT_NE(finished.out.find("on the Pareto front"), std::string::npos) << finished.out;
+    const std::string points = read_file(folder() / "points.csv");
+    EXPECT_TRUE(std::regex_search(points, std::regex("\n1,bad,,,.*,\"?.*no idea, really"))) << points;
+    EXPECT_TRUE(std::regex_search(points, std::regex("\n2,qm,[0-9]+,[0-9.]+,[0-9.]+"))) << points;
+    EXPECT_TRUE(before.empty() || points == before) << points;
+    before = points;
+  }
 }
 
 TEST_F(Process, ForeignBytesOfAPluginAreEscaped) {

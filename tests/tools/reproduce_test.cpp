@@ -409,6 +409,16 @@ TEST_F(Reproduce, RefusesWhatItCannotDo) {
   refused(command({"--json", "a", "--html", "a"}), {"same file"});
   refused(command({"--html", "none/a.html"}), {"--html none/a.html"});
   refused({"reproduce", "--quik"}, {"--quick"});
+  refused({"reproduce", "--unit", "qru=same-splat"}, {"'same-splat'", "slot qru"});
+  refused({"reproduce", "--plugin", "none.so"}, {"none.so", "no such file"});
+}
+
+TEST_F(Reproduce, TakesUnitsOfPlugins) {
+  const Finished finished = vrpipe({"reproduce", "--quick", "--plugin", TEST_PLUGIN, "--unit", "qru=same-splat",
+                                    "--set", "state.termination_threshold=0.9", "--print-config"});
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  EXPECT_NE(finished.out.find("same-splat"), std::string::npos) << finished.out;
+  EXPECT_NE(finished.out.find(TEST_PLUGIN), std::string::npos) << finished.out;
 }
 
 }  // namespace

@@ -71,6 +71,29 @@ TEST_F(Sweep, APointIsTheRunOfItsSettings) {
   }
 }
 
+TEST_F(Sweep, HasTheStatisticsThatItNamesAsColumns) {
+  const json result =
+      sweep(small_sweep +
+            "columns = [\"crop.cache.sector_hits\", \"tc.quads_per_flush\", \"zrop.cache.sector_hits\"]\n"
+            "pareto = [\"cycles\", \"-crop.cache.sector_hits\"]\n[axes]\nvariant = [\"baseline\", \"qm\"]\n");
+  for (const json& point : result["points"]) {
+    const json run =
+        json_of({"run", "--scene", "tiny.spl", "--fidelity", "lt", "--variant", point["variant"]})["runs"][0];
+    for (const char* column : {"crop.cache.sector_hits", "tc.quads_per_flush"}) {
+      const auto found = std::find_if(run["statistics"].begin(), run["statistics"].end(),
+                                      [&](const json& statistic) { return statistic["name"] == column; });
+      ASSERT_NE(found, run["statistics"].end()) << column;
+      EXPECT_EQ(point[column], (*found)["value"]) << column;
+    }
+    EXPECT_GT(point["crop.cache.sector_hits"], 0);
+    EXPECT_TRUE(point["zrop.cache.sector_hits"].is_null()) << "the z-cache is bound to nothing";
+  }
+  EXPECT_EQ(result["pareto"][0]["metrics"].size(), 2U);
+  bad(small_sweep + "columns = [\"crop.cache.sector_hit\"]\n[axes]\ntc.bins = [1, 2]\n",
+      {"'crop.cache.sector_hit'", "did you mean crop.cache.sector_hits?"});
+  bad(small_sweep + "columns = \"crop.quads_blended\"\n[axes]\ntc.bins = [1, 2]\n", {"'columns'", "no list"});
+}
+
 TEST_F(Sweep, DrawsScenesViewsAndSizes) {
   const json result = sweep("fidelity = \"functional\"\n[axes]\nscene = [\"builtin:object\", \"tiny.spl\"]\n");
   EXPECT_NE(result["points"][0]["result_hash"], result["points"][1]["result_hash"]);

@@ -49,6 +49,7 @@ class MicrobenchCommand : public Command {
     }
     std::vector<std::string> names = microbench_names();
     if (name_ != "all") names = {name_};
+    check_microbench_state(job.request);
     for (const std::string& each : names) check_microbench(each, job.request);
     const auto html = single(html_, "--html");
     std::vector<NamedFile> outputs;

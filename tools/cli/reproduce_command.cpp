@@ -62,6 +62,12 @@ class ReproduceCommand : public Command {
                          machine_group);
     arguments.add_option("--set", settings_, "UNIT.PARAMETER=VALUE",
                          "changes a parameter of every simulation; can be repeated", machine_group);
+    arguments.add_option("--unit", units_, "SLOT=IMPLEMENTATION",
+                         "puts another unit into a slot, in every variant where the slot is not\n"
+                         "pass-through; can be repeated",
+                         machine_group);
+    arguments.add_option("--plugin", plugins_, "FILE.so", "loads units from a plugin, for --unit; can be repeated",
+                         machine_group);
     arguments.add_option("--fidelity", fidelity_, "NAME",
                          "of the main comparison: lt or cycle (default: cycle, with --quick lt); the\n"
                          "sensitivity is always at lt",
@@ -118,8 +124,10 @@ class ReproduceCommand : public Command {
 
  private:
   ReproduceJob resolve() const {
+    load_plugins(plugins_);
     ReproduceJob job;
-    job.provenance = make_provenance(invocation().words, {});
+    job.provenance = make_provenance(invocation().words, plugins_);
+    for (const std::string& plugin : plugins_) job.inputs.push_back({"--plugin", plugin});
     note_config(invocation(), job.provenance);
     job.options.quick = quick_;
     job.options.substitutions = scenes_;
@@ -152,6 +160,7 @@ class ReproduceCommand : public Command {
       }
     }
     for (const std::string& text : settings_) base.settings.push_back(parse_setting(text));
+    for (const std::string& text : units_) base.units.push_back(parse_unit_choice(text));
     check_configuration(base);
     job.json = single(json_, "--json");
     job.html = single_path(html_, "--html");
@@ -178,9 +187,9 @@ class ReproduceCommand : public Command {
   static void print(const ReproduceJob& job, const Reproduction& of, const ResultFiles& files) {
     std::cout << reproduction_text(of, stdout_style());
     const ReproduceResult& result = of.result;
-    std::cout << fmt::format("\ntook {:.0f} s to simulate {} in {} process{}", result.seconds,
-                             result.points.size() - result.done_before, result.processes,
-                             result.processes == 1 ? "" : "es at a time");
+    std::cout << fmt::format("\ntook {:.0f} s, {:.0f} s of processor time, to simulate {} in {} process{}",
+                             result.seconds, result.cpu_seconds, result.points.size() - result.done_before,
+                             result.processes, result.processes == 1 ? "" : "es at a time");
     if (result.done_before > 0) std::cout << fmt::format("; {} were done before", result.done_before);
     std::cout << '\n';
     if (files.has("--json")) std::cout << "result: " << printable(*job.json) << '\n';
@@ -189,7 +198,7 @@ class ReproduceCommand : public Command {
     if (files.has("--output")) std::cout << "heat maps: " << printable(job.output->string()) << '\n';
   }
 
-  Values scenes_, cameras_, size_, views_, platform_, settings_, fidelity_;
+  Values scenes_, cameras_, size_, views_, platform_, settings_, units_, plugins_, fidelity_;
   Values output_, json_, html_, markdown_, journal_, jobs_;
   bool quick_ = false;
 };

@@ -12,6 +12,7 @@
 #include "cli/command_line.h"
 #include "cli/options.h"
 #include "cli/parse.h"
+#include "host/command_failure.h"
 #include "host/output_file.h"
 #include "host/terminal.h"
 #include "jobs/sweep_analysis.h"
@@ -129,6 +130,7 @@ class SweepCommand : public Command {
     // Not before all of it is safe.
     std::cout.flush();
     if (std::cout) result.journal->finish();
+    check_faults(result);
   }
 
  private:
@@ -148,6 +150,19 @@ class SweepCommand : public Command {
     if (const auto text = single(shard_, "--shard")) job.shard = parse_shard(*text);
     check_outputs(job);
     return job;
+  }
+
+  /// After all results are written. Throws CommandFailure.
+  static void check_faults(const SweepResult& result) {
+    std::size_t faults = 0;
+    const PointOutcome* first = nullptr;
+    for (const auto& point : result.points) {
+      if (!point || point->fault.empty()) continue;
+      if (faults++ == 0) first = &*point;
+    }
+    if (first == nullptr) return;
+    throw CommandFailure(exit_fault, fmt::format("{} of {} points ended in a fault, the first of them: {}", faults,
+                                                 result.points.size(), first->fault));
   }
 
   static void check_outputs(const SweepJob& job) {
@@ -185,6 +200,7 @@ class SweepCommand : public Command {
     std::cout << fmt::format("shard {} of {}: its {} points are done, in {:.1f} s\n", job.shard->index,
                              job.shard->count, own, result.seconds);
     result.journal->finish();
+    check_faults(result);
   }
 
   SimulationArguments arguments_;

@@ -15,6 +15,12 @@ class CommandFailure : public std::runtime_error {
   const int exit_code;  ///< exit_user_error or exit_fault
 };
 
+/// A simulation that ended in a fault of its own, as it would again.
+class SimulationFailure : public CommandFailure {
+ public:
+  explicit SimulationFailure(const std::string& text) : CommandFailure(exit_fault, text) {}
+};
+
 /// What to say and to advise when memory runs out.
 constexpr const char* out_of_memory =
     "out of memory; try a smaller --size, fewer --jobs, or smaller queues and bins where --set made them larger";

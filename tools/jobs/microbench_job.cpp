@@ -116,13 +116,16 @@ std::vector<std::string> microbench_names() {
 
 void check_microbench_name(const std::string& name) { definition_named(name); }
 
-void check_microbench(const std::string& name, const RunRequest& request) {
+void check_microbench_state(const RunRequest& request) {
   for (const Setting& setting : request.settings) {
     const std::string& of = setting.parameter;
     if (setting.unit != "state" || of == "blend_rounding" || of == "exponential" || of == "subpixel_bits") continue;
     throw UserError("cannot set state." + of, "--set state." + of, "the draw's state is the microbenchmark's own",
                     "of state.* set blend_rounding, exponential or subpixel_bits");
   }
+}
+
+void check_microbench(const std::string& name, const RunRequest& request) {
   if (!definition_named(name).needs_time || request.fidelity != Fidelity::functional) return;
   throw UserError("cannot measure " + name, "--fidelity functional", "it measures time, and this fidelity has none",
                   "use bound, lt or cycle");

@@ -64,6 +64,8 @@ inline constexpr const char* measured_platform = "gh100-gpc";
 std::vector<std::string> microbench_names();
 /// Throws UserError naming the nearest.
 void check_microbench_name(const std::string& name);
+/// Throws UserError for a setting of the draw's state, which is the microbenchmark's own, but for the hardware's precision.
+void check_microbench_state(const RunRequest& request);
 /// Throws UserError if it measures time, and the fidelity has none.
 void check_microbench(const std::string& name, const RunRequest& request);
 

@@ -173,29 +173,34 @@ class Worker {
     process_ = -1;
     if (WIFSIGNALED(status)) {
       const int signal = WTERMSIG(status);
-      fail(exit_fault, fmt::format("its process was ended by signal {} ({}){}", signal, ::strsignal(signal),
-                                   signal == SIGKILL ? "; if memory ran out, try --jobs 1 or a smaller --size" : ""));
+      const std::string how = fmt::format("its process was ended by signal {} ({})", signal, ::strsignal(signal));
+      if (signal == SIGKILL) fail(how + "; if memory ran out, try --jobs 1 or a smaller --size");
+      const bool is_from_outside = signal == SIGTERM || signal == SIGINT || signal == SIGHUP;
+      is_from_outside ? fail(how) : fault(how);
     }
     if (received_.empty() || WEXITSTATUS(status) != 0) {
-      fail(exit_fault, fmt::format("its process ended with code {} before it was done", WEXITSTATUS(status)));
+      fail(fmt::format("its process ended with code {} before it was done", WEXITSTATUS(status)));
     }
     const std::string content = received_.substr(1);
     if (received_[0] == outcome_user_error) throw CommandFailure(exit_user_error, content);
-    if (received_[0] != outcome_result) fail(exit_fault, content);
+    if (received_[0] != outcome_result) content == out_of_memory ? fail(content) : fault(content);
     Simulated simulated;
     try {
       simulated.result = from_bytes(content, request_);
     } catch (const std::runtime_error& error) {
-      fail(exit_fault, error.what());
+      fail(error.what());
     }
     simulated.image = std::move(image_);
     return simulated;
   }
 
  private:
-  [[noreturn]] void fail(int code, const std::string& text) const {
+  /// For a reason of its own; for another it may be well the next time.
+  [[noreturn]] void fault(const std::string& text) const { throw SimulationFailure(said_of_it(text)); }
+  [[noreturn]] void fail(const std::string& text) const { throw CommandFailure(exit_fault, said_of_it(text)); }
+  std::string said_of_it(const std::string& text) const {
     const std::string& name = name_of(request_);
-    throw CommandFailure(code, "variant " + name + (name_ == name ? "" : ", " + name_) + ": " + text);
+    return "variant " + name + (name_ == name ? "" : ", " + name_) + ": " + text;
   }
 
   [[noreturn]] void work(int out, const Frame& frame, SharedImage* image, std::atomic<float>& progress) const {
@@ -293,10 +298,17 @@ void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned proces
     for (std::size_t i = pipes.size(); i-- > 0;) {
       if (pipes[i].revents == 0 || !workers[i]->receive()) continue;
       const std::size_t index = workers[i]->index();
-      Simulated simulated = workers[i]->finish();
+      std::optional<Simulated> simulated;
+      std::string fault;
+      try {
+        simulated = workers[i]->finish();
+      } catch (const SimulationFailure& failure) {
+        if (!place.failed) throw;
+        fault = failure.what();
+      }
       workers.erase(workers.begin() + static_cast<std::ptrdiff_t>(i));
       done[index] = 1.0F;
-      finished(index, std::move(simulated));
+      simulated ? finished(index, std::move(*simulated)) : place.failed(index, fault);
     }
     std::vector<float> all(place.before, 1.0F);
     const std::vector<float> these = done.now();

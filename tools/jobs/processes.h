@@ -41,12 +41,15 @@ struct BatchPlace {
   std::size_t after = 0;                      ///< simulations that will follow
   double seconds_before = 0;                  ///< that those before took, wall time
   std::function<void()> meanwhile = nullptr;  ///< called some times a second, if there is one
+  /// Given a simulation that ended in a fault of its own; then the others go on.
+  std::function<void(std::size_t index, const std::string& fault)> failed = nullptr;
 };
 
 /// Runs simulations side by side, each in a process of its own, at most `processes` at a time: SystemC holds one
 /// simulation per process. `finished` gets each as it ends, in whatever order; what it is given for one does not depend
 /// on `processes`. The caller must not have other threads meanwhile, nor have used SystemC.
-/// Throws CommandFailure with the text of the first simulation that failed, or was killed; the others are ended.
+/// Throws CommandFailure with the text of the first simulation that failed, unless `failed` takes it, or was killed; the
+/// others are ended.
 void run_tasks(const std::vector<Task>& tasks, bool with_images, unsigned processes, const BatchPlace& place,
                ProgressLine& progress, const std::function<void(std::size_t index, Simulated&& simulated)>& finished);
 

@@ -115,6 +115,9 @@ nlohmann::json reproduce_identity(const ReproduceJob& job, const ReproducePlan& 
   for (const Setting& setting : base.settings) {
     settings.push_back(valid_utf8(setting.unit + "." + setting.parameter + "=" + setting.value));
   }
+  nlohmann::json units = nlohmann::json::array(), plugins = nlohmann::json::array();
+  for (const UnitChoice& unit : base.units) units.push_back(valid_utf8(unit.slot + "=" + unit.implementation));
+  for (const PluginFile& plugin : job.provenance.plugins) plugins.push_back(plugin.sha256);
   return {{"schema", "vrpipe.reproduce-journal/1"},
           {"version", VRPIPE_VERSION},
           {"build", build_identity()},
@@ -122,6 +125,8 @@ nlohmann::json reproduce_identity(const ReproduceJob& job, const ReproducePlan& 
           {"size", job.size ? nlohmann::json{job.size->width, job.size->height} : nlohmann::json()},
           {"platform", base.platform->name},
           {"set", settings},
+          {"units", units},
+          {"plugins", plugins},
           {"views", plan.views},
           {"points", {{"count", plan.points.size()}, {"sha256", sha256(points)}}}};
 }
@@ -134,11 +139,9 @@ Journal open_reproduce_journal(const ReproduceJob& job, const ReproducePlan& pla
 }
 
 nlohmann::json energy_to_json(const EnergyAmounts& amounts) {
-  return {{"events", amounts.events},
-          {"powers", amounts.powers},
-          {"seconds", amounts.seconds.value()},
-          {"fragments_blended", amounts.fragments_blended},
-          {"not_counted", amounts.not_counted}};
+  return {{"events", amounts.events},           {"powers", amounts.powers},
+          {"seconds", amounts.seconds.value()}, {"fragments_blended", amounts.fragments_blended},
+          {"not_counted", amounts.not_counted}, {"missing", amounts.missing}};
 }
 
 EnergyAmounts energy_from_json(const nlohmann::json& record) {
@@ -148,6 +151,7 @@ EnergyAmounts energy_from_json(const nlohmann::json& record) {
   amounts.seconds = record.at("seconds").get<double>();
   record.at("fragments_blended").get_to(amounts.fragments_blended);
   record.at("not_counted").get_to(amounts.not_counted);
+  record.at("missing").get_to(amounts.missing);
   const EnergyTable& table = shipped_energies();
   if (amounts.events.size() != table.events.size() || amounts.powers.size() != table.powers.size()) {
     throw std::runtime_error("a record of other energies");
@@ -247,6 +251,7 @@ void simulate_points(const ReproduceJob& job, const std::vector<bool>& is_done, 
     point.run.request = plan.points[i].request;
     if (plan.points[i].key.settings.empty() && point.run.cycles)
       point.energy = energy_amounts(point.run, shipped_energies());
+    result.cpu_seconds += point.run.cpu_seconds;
     strip_point(point.run, i == 0);
     tasks[task].request.observers.reset();
     if (const auto counter = counters.find(i); counter != counters.end()) {

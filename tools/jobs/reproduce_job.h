@@ -53,6 +53,7 @@ struct ReproduceResult {
   Provenance provenance;
   std::size_t done_before = 0;  ///< of the points, in the journal
   double seconds = 0;           ///< wall time of all simulations of this run together
+  double cpu_seconds = 0;       ///< and their processor time, microbenchmarks left out
   unsigned processes = 1;
   std::shared_ptr<Journal> journal;  ///< to be finished when the results are safe
 

@@ -207,7 +207,7 @@ void add_product(const StudyReader& reader, const toml::table& root, Study& stud
 }  // namespace
 
 const std::vector<std::string>& study_keys() {
-  static const std::vector<std::string> keys{"axes", "points", "sample", "seed", "pareto"};
+  static const std::vector<std::string> keys{"axes", "points", "sample", "seed", "columns", "pareto"};
   return keys;
 }
 
@@ -230,6 +230,18 @@ Study read_study(const std::filesystem::path& path) {
   if (study.axes.empty()) {
     throw UserError("nothing to study", path.string(), "it has neither points nor axes",
                     "add [axes], e.g. tc.bins = [16, 32, 64]");
+  }
+  if (const toml::node* columns = root.get("columns")) {
+    const toml::array* const list = columns->as_array();
+    if (list == nullptr)
+      reader.refuse(*columns, "bad value of 'columns'", "it is no list",
+                    "write e.g. columns = [\"crop.cache.bytes_filled\"]");
+    for (const toml::node& node : *list) {
+      const std::string column = reader.scalar(node, "columns");
+      if (std::find(study.columns.begin(), study.columns.end(), column) != study.columns.end())
+        reader.refuse(node, "bad value of 'columns'", "it has " + column + " twice", "name it once");
+      study.columns.push_back(column);
+    }
   }
   if (const toml::node* pareto = root.get("pareto")) {
     const toml::array* const list = pareto->as_array();

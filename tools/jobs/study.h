@@ -33,7 +33,8 @@ struct Study {
   std::uint64_t product = 0;          ///< points of the whole product; 0 for a list
   std::optional<std::uint64_t> seed;  ///< of the sample; none if all of them are run
   AxisValues relative_to;
-  std::vector<std::string> pareto;  ///< columns of results; a - in front of those of which more is better
+  std::vector<std::string> columns;  ///< statistics that results have beside what they always have
+  std::vector<std::string> pareto;   ///< columns of results; a - in front of those of which more is better
 };
 
 /// Keys of a study file that are no options.

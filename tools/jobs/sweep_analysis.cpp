@@ -65,6 +65,8 @@ std::vector<std::string> sweep_columns(const Study& study) {
   for (const auto& [name, value] : Counts().named()) columns.push_back("counts." + name);
   for (const char* unit : utilized) columns.push_back(std::string("utilization.") + unit);
   for (const char* name : {"bottleneck", "bottleneck_occupancy", "result_hash"}) columns.emplace_back(name);
+  columns.insert(columns.end(), study.columns.begin(), study.columns.end());
+  columns.emplace_back("fault");
   return columns;
 }
 
@@ -90,6 +92,13 @@ SweepTable sweep_table(const SweepResult& result) {
       const StudyAxis& of = result.study.axes[axis];
       row.push_back(typed(of, of.values[result.study.points[i].values[axis]]));
     }
+    if (!point.fault.empty()) {
+      row.resize(table.columns.size() - 1);
+      row.emplace_back(point.fault);
+      table.rows.push_back(std::move(row));
+      table.points.push_back(i);
+      continue;
+    }
     const bool timed = run.cycles.has_value();
     row.push_back(timed ? nlohmann::ordered_json(*run.cycles) : nlohmann::ordered_json());
     row.push_back(timed ? nlohmann::ordered_json(run.milliseconds) : nlohmann::ordered_json());
@@ -109,6 +118,8 @@ SweepTable sweep_table(const SweepResult& result) {
     row.push_back(run.bottleneck ? nlohmann::ordered_json(run.bottleneck->unit) : nlohmann::ordered_json());
     row.push_back(run.bottleneck ? nlohmann::ordered_json(run.bottleneck->occupancy) : nlohmann::ordered_json());
     row.push_back(run.result_hash);
+    for (const std::optional<double>& column : point.columns) row.push_back(optional_json(column));
+    row.emplace_back();
     table.rows.push_back(std::move(row));
     table.points.push_back(i);
   }
@@ -120,6 +131,7 @@ AxisEffects axis_effects(const SweepResult& result, const SweepTable& table) {
   const std::size_t speedups = table.column("speedup"), milliseconds = table.column("milliseconds");
   all.of_speedups = !table.rows.empty();
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
+    if (!result.points[table.points[row]]->fault.empty()) continue;
     const auto gain = table.number(row, speedups);
     all.of_speedups = all.of_speedups && gain && *gain > 0;
   }

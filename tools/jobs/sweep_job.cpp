@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <map>
 #include <numeric>
+#include <set>
 #include <stdexcept>
 #include <thread>
 #include <tuple>
@@ -202,7 +203,8 @@ nlohmann::json sweep_identity(const SweepJob& job) {
           {"common", request_identity(common.requests.front())},
           {"variants", variants},
           {"preprocessing", settings_identity(common.preprocessing)},
-          {"multi_pass", common.frame.passes}};
+          {"multi_pass", common.frame.passes},
+          {"columns", job.study.columns}};
 }
 
 std::filesystem::path shard_journal(const std::filesystem::path& journal, const Shard& shard) {
@@ -219,11 +221,48 @@ Journal open_sweep_journal(const SweepJob& job) {
 }
 
 nlohmann::json to_sweep_record(const Study& study, std::size_t place, const PointOutcome& point) {
+  if (!point.fault.empty()) return {{"point", point_key(study, place)}, {"fault", valid_utf8(point.fault)}};
+  nlohmann::json columns = nlohmann::json::array();
+  for (const std::optional<double>& value : point.columns)
+    columns.push_back(value ? nlohmann::json(*value) : nlohmann::json());
   return {{"point", point_key(study, place)},
           {"run", encode(point.run)},
           {"energy", point.energy ? nlohmann::json{point.energy->low, point.energy->nominal, point.energy->high}
                                   : nlohmann::json()},
+          {"columns", columns},
           {"cpu_seconds", point.cpu_seconds}};
+}
+
+/// Columns are statistics of some point. Throws UserError.
+void check_columns(const SweepJob& job, const std::vector<RunRequest>& requests) {
+  std::set<std::string> known;
+  std::set<std::pair<std::string, std::string>> seen;  // platforms and variants
+  for (RunRequest request : requests) {
+    if (job.study.columns.empty() || !seen.emplace(request.platform->name, request.variant.name).second) continue;
+    request.fidelity = Fidelity::cycle;
+    // Those of all GPCs: of one, gpc1.crop.quads_blended, there is no column.
+    for (const std::string& name : sampled_statistics(request)) {
+      if (name.rfind("gpc", 0) != 0) known.insert(name);
+    }
+  }
+  for (const std::string& column : job.study.columns) {
+    if (known.count(column) > 0) continue;
+    throw UserError("unknown statistic '" + column + "'", "columns", "no point has one of that name",
+                    "did you mean " + nearest_name(column, known) + "? `vrpipe units` lists them");
+  }
+}
+
+std::vector<std::optional<double>> columns_of(const RunResult& run, const Study& study) {
+  std::vector<std::optional<double>> values;
+  for (const std::string& column : study.columns) {
+    const auto found = std::find_if(run.statistics.begin(), run.statistics.end(),
+                                    [&](const StatisticReport& report) { return report.name == column; });
+    std::optional<double>& value = values.emplace_back();
+    if (found == run.statistics.end()) continue;
+    const bool is_quotient = found->kind == "ratio" || found->kind == "histogram";
+    value = is_quotient ? found->quotient() : static_cast<double>(found->value);
+  }
+  return values;
 }
 
 std::uint64_t storage_of(const RunRequest& request) {
@@ -235,6 +274,11 @@ std::uint64_t storage_of(const RunRequest& request) {
 /// Throws std::runtime_error or json::exception for what to_record() cannot have made.
 PointOutcome sweep_from_record(const nlohmann::json& record, const RunRequest& request) {
   PointOutcome point;
+  if (record.contains("fault")) {
+    record.at("fault").get_to(point.fault);
+    point.run.request = request;
+    return point;
+  }
   point.run = decode(with_binaries(record.at("run")), request);
   point.run.framebuffer.color = ColorSurface(1, 1, request.format);
   point.run.framebuffer.depth_stencil = DepthStencilSurface(1, 1);
@@ -242,6 +286,8 @@ PointOutcome sweep_from_record(const nlohmann::json& record, const RunRequest& r
   if (!energy.is_null())
     point.energy = Range{energy.at(0).get<double>(), energy.at(1).get<double>(), energy.at(2).get<double>()};
   point.storage_bytes = storage_of(request);
+  for (const nlohmann::json& value : record.at("columns"))
+    point.columns.push_back(value.is_null() ? std::nullopt : std::optional(value.get<double>()));
   record.at("cpu_seconds").get_to(point.cpu_seconds);
   return point;
 }
@@ -357,11 +403,21 @@ void simulate_rows(const SweepJob& job, const std::vector<RunRequest>& requests,
     // A sum that misses something is none to rank GPUs by.
     const EnergyAmounts amounts = energy_amounts(point.run, shipped_energies());
     if (amounts.missing.empty()) point.energy = energy_report(amounts, shipped_energies()).total;
+    point.columns = columns_of(point.run, study);
     strip_row(point.run);
     point.storage_bytes = storage_of(requests[i]);
     progress.erase();
     store(to_sweep_record(study, i, point));
     foresight.done(point.cpu_seconds);
+    result.points[i] = std::move(point);
+  };
+  place.failed = [&](std::size_t task, const std::string& fault) {
+    const std::size_t i = missing[task];
+    PointOutcome point;
+    point.fault = fault;
+    point.run.request = requests[i];
+    progress.erase();
+    store(to_sweep_record(study, i, point));
     result.points[i] = std::move(point);
   };
   place.title = "sweep  ";
@@ -422,6 +478,7 @@ std::string scene_of_axis(const SweepJob& job, const std::string& value) {
 
 RunRequest request_of(const SweepJob& job, const StudiedPoint& point) {
   RunRequest request = job.common.requests.front();
+  request.reads_statistics = request.reads_statistics || !job.study.columns.empty();
   for (std::size_t i = 0; i < job.study.axes.size(); ++i) {
     const std::string& axis = job.study.axes[i].name;
     const std::string& value = job.study.axes[i].values[point.values[i]];
@@ -493,6 +550,7 @@ SweepResult run_sweep(const SweepJob& job) {
     requests.push_back(request_of(job, point));
     check_configuration(requests.back());
   }
+  check_columns(job, requests);
   ProgressLine progress;
   const auto start = SteadyClock::now();
   const std::unique_ptr<Ranks> ranks = join_ranks();

@@ -37,10 +37,13 @@ struct SweepJob {
 
 /// What came of a point, without what the host made of it: the same however it was run.
 struct PointOutcome {
+  std::string fault;                ///< by which its simulation ended: then there is nothing else; else empty
   RunResult run;                    ///< without units, statistics, effects and draws
   std::optional<Range> energy;      ///< mJ; none without time
   std::uint64_t storage_bytes = 0;  ///< of TGC and QRU; 0 in variants without quad merging
-  double cpu_seconds = 0;           ///< of whoever ran it; in no result
+  std::vector<std::optional<double>>
+      columns;             ///< of Study::columns; none where the point has no such statistic, or no value
+  double cpu_seconds = 0;  ///< of whoever ran it; in no result
 };
 
 struct SweepResult {
@@ -68,6 +71,7 @@ RunRequest request_of(const SweepJob& job, const StudiedPoint& point);
 /// Simulates what is not done yet, in processes of their own; a record is in the journal as soon as a point is done. Takes
 /// in the records of all shards. Started by mpirun, the ranks of a machine are as many processes of its first, which sends
 /// what is done to the first of all. Warns on stderr of a study that will take more than an hour.
+/// A point whose simulation ends in a fault has an outcome that says so, and is not simulated again.
 /// Throws UserError, CommandFailure or a fault.
 SweepResult run_sweep(const SweepJob& job);
 

@@ -21,20 +21,18 @@ std::string ratio_text(double with, double without) {
   return without > 0 ? fmt::format("{:.2f}x", with / without) : std::string("-");
 }
 
-/// Effect, proof, if there are costs CPU seconds without and with it and their ratio, and the reason.
-std::string run_text(const RunResult& run, const EffectCosts* costs, const TextStyle& style) {
-  std::vector<std::string> heading{"effects of " + printable(name_of(run.request)), "proof"};
-  if (costs != nullptr) heading.insert(heading.end(), {"host s without", "with", "ratio"});
-  heading.emplace_back("reason");
-  TextTable table(std::move(heading));
+/// Effect, proof, CPU seconds without and with it and their ratio, and the reason.
+std::string run_text(const RunResult& run, const EffectCosts& costs, const TextStyle& style) {
+  TextTable table(
+      {"effects of " + printable(name_of(run.request)), "proof", "host s without", "with", "ratio", "reason"});
   table.left(1);
   table.wrap(report_width);
   const auto row = [&](const std::string& name, const std::string& proof, const std::optional<double>& with,
                        const std::string& reason) {
     std::vector<std::string> cells{name, proof};
     if (with) {
-      cells.insert(cells.end(), {seconds_text(costs->without), seconds_text(*with), ratio_text(*with, costs->without)});
-    } else if (costs != nullptr) {
+      cells.insert(cells.end(), {seconds_text(costs.without), seconds_text(*with), ratio_text(*with, costs.without)});
+    } else {
       cells.insert(cells.end(), 3, "");
     }
     cells.push_back(reason);
@@ -46,24 +44,55 @@ std::string run_text(const RunResult& run, const EffectCosts* costs, const TextS
     table.group(omitted ? "omitted" : "active");
     for (const EffectReport& effect : run.effects) {
       if (!belongs(effect)) continue;
-      row(printable(effect.name), omitted ? state_of(run, effect) : std::string(),
-          costs == nullptr ? std::nullopt : costs->with_effect(effect.name), printable(effect.reason));
+      row(printable(effect.name), omitted ? state_of(run, effect) : std::string(), costs.with_effect(effect.name),
+          printable(effect.reason));
     }
   }
-  if (costs != nullptr) {
-    table.group("together");
-    row("all effects", "", costs->with_all, "--effects all");
-  }
+  table.group("together");
+  row("all effects", "", costs.with_all, "--effects all");
   return table.text(style);
 }
 
-/// Those that differ, a column for each run; the others by name.
+constexpr const char* where_all_are =
+    "each with its reason: --json, --html; with what it would cost: --explain-effects\n";
+
+/// How many are in each state, of `where`; by name those that change what comes out.
+std::string counted_text(const std::map<std::string, std::vector<std::string>>& names_of_state,
+                         const std::string& where) {
+  std::size_t active = 0, omitted = 0;
+  std::string states, named;
+  for (const auto& [state, names] : names_of_state) {
+    (state == "active" ? active : omitted) += names.size();
+    if (state == "active") continue;
+    states += fmt::format("{}{} {}", states.empty() ? "" : ", ", names.size(), state);
+    if (state != "bounded" && state != "forced") continue;
+    const std::string title = state == "forced" ? "left out by force" : "approximated";
+    const std::vector<std::string> lines =
+        wrapped(fmt::format("{}: {}", title, fmt::join(names, ", ")), report_width - 2);
+    for (const std::string& line : lines) named += (&line == &lines.front() ? "" : "  ") + line + "\n";
+  }
+  return fmt::format("effects: {} active{}, {} left out{}{}\n", active, where, omitted, where,
+                     states.empty() ? "" : " (" + states + ")") +
+         named + where_all_are;
+}
+
+std::string short_text(const RunResult& run) {
+  std::map<std::string, std::vector<std::string>> names_of_state;
+  for (const EffectReport& effect : run.effects) {
+    const std::string state = state_of(run, effect);
+    const std::string bound = state == "bounded" ? " (" + effect.reason + ")" : std::string();
+    names_of_state[state].push_back(printable(effect.name + bound));
+  }
+  return counted_text(names_of_state, "");
+}
+
+/// Those that differ, a column for each run; the others are counted.
 std::string comparison_text(const std::vector<RunResult>& runs, const TextStyle& style) {
   std::vector<std::string> heading{"effects that differ"};
   for (const RunResult& run : runs) heading.push_back(printable(name_of(run.request)));
   TextTable table(std::move(heading));
   bool any_differs = false;
-  std::map<std::string, std::string> alike;  // names, by state
+  std::map<std::string, std::vector<std::string>> alike;  // names, by state
   // Platforms may have different ones.
   std::set<std::string> all_names;
   for (const RunResult& run : runs) {
@@ -77,20 +106,13 @@ std::string comparison_text(const std::vector<RunResult>& runs, const TextStyle&
       cells.push_back(found == run.effects.end() ? "-" : state_of(run, *found));
     }
     if (std::all_of(cells.begin() + 1, cells.end(), [&](const std::string& cell) { return cell == cells[1]; })) {
-      std::string& names = alike[cells[1]];
-      names += (names.empty() ? "" : ", ") + cells[0];
+      alike[cells[1]].push_back(cells[0]);
     } else {
       table.row(std::move(cells));
       any_differs = true;
     }
   }
-  std::string text = any_differs ? table.text(style) : std::string();
-  for (const auto& [state, names] : alike) {
-    const std::string title = state == "active" ? "effects active in all" : "omitted in all, " + state;
-    const std::vector<std::string> lines = wrapped(title + ": " + names, report_width - 2);
-    for (const std::string& line : lines) text += (&line == &lines.front() ? "" : "  ") + line + "\n";
-  }
-  return text + "reasons: --json, or `vrpipe run`; what they would cost: --explain-effects\n";
+  return (any_differs ? table.text(style) : std::string()) + counted_text(alike, " in all");
 }
 
 }  // namespace
@@ -114,11 +136,9 @@ std::string effects_choice_text(const RunRequest& request) {
 std::string effects_text(const std::vector<RunResult>& runs, const std::vector<EffectCosts>& costs,
                          const TextStyle& style) {
   if (runs.front().effects.empty()) return {};
-  if (costs.empty() && runs.size() > 1) return "\n" + comparison_text(runs, style);
+  if (costs.empty()) return "\n" + (runs.size() > 1 ? comparison_text(runs, style) : short_text(runs.front()));
   std::string text;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    text += "\n" + run_text(runs[i], costs.empty() ? nullptr : &costs[i], style);
-  }
+  for (std::size_t i = 0; i < runs.size(); ++i) text += "\n" + run_text(runs[i], costs[i], style);
   return text;
 }
 

@@ -116,6 +116,10 @@ std::vector<std::string> reproduction_heading(const Reproduction& of) {
   for (const Setting& setting : base.settings) {
     lines.push_back(printable(fmt::format("Set: {}.{}={}.", setting.unit, setting.parameter, setting.value)));
   }
+  for (const UnitChoice& unit : base.units) {
+    lines.push_back(
+        printable(fmt::format("Unit: {}={}, where the slot is not pass-through.", unit.slot, unit.implementation)));
+  }
   return lines;
 }
 

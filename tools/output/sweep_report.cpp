@@ -71,7 +71,7 @@ std::string points_text(const SweepFindings& findings, const TextStyle& style) {
   const SweepTable& table = findings.table;
   std::vector<std::size_t> columns;
   for (std::size_t i = 0; i <= findings.result.study.axes.size(); ++i) columns.push_back(i);
-  for (const char* name : {"cycles", "milliseconds", "speedup", "energy_mj", "bottleneck"}) {
+  for (const char* name : {"cycles", "milliseconds", "speedup", "energy_mj", "bottleneck", "fault"}) {
     const std::size_t column = table.column(name);
     const bool any =
         std::any_of(table.rows.begin(), table.rows.end(), [&](const auto& row) { return !row[column].is_null(); });
