@@ -59,9 +59,7 @@ class TimedProp : public TimedUnit {
     in_late_.set_optional();
   }
 
-  bool idle() const override {
-    return TimedUnit::idle() && order_.empty() && in_turn_.warp == nullptr && on_late_way_ == 0;
-  }
+  bool idle() const override { return order_.empty() && in_turn_.warp == nullptr && on_late_way_ == 0; }
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
@@ -149,7 +147,6 @@ class TimedProp : public TimedUnit {
       const ReorderBuffer::Waiting* const next = is_mark ? order_.next_mark() : &in_turn_;
       if (next == nullptr) return;
       const bool goes_late = is_mark ? plan_.waits_at(next->warp->mark) : is_late(*next->warp);
-      left = true;
       if (goes_late) {
         send_late(*next, is_mark);
       } else {

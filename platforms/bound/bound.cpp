@@ -205,7 +205,7 @@ void PhaseBound::end_phase() {
     ended_ = total_;
     ended_.add(up_to_quads_);
     // Late tests share the port of the others, which are a stage of their own.
-    if (ended_.late_quads > 0) last_quad_ = std::max(last_quad_, busy_cycles("zrop"));
+    if (ended_.late_quads > 0) last_quad_ = std::max(last_quad_, busiest(parts("zrop")));
   } else if (!has_quads()) {
     Work passed = work;
     passed.tile_pairs = 0;  // for a pair without quads nobody waits
@@ -226,10 +226,10 @@ void PhaseBound::pass_barrier() {
   for (double& end : end_) end = std::max(end, last_quad_);
 }
 
-double PhaseBound::busy_cycles(const std::string& slot) const {
+double busiest(const std::vector<OccupancyPart>& parts) {
   double longest = 0;
   std::map<unsigned, double> resources;
-  for (const OccupancyPart& part : parts(slot)) {
+  for (const OccupancyPart& part : parts) {
     longest = std::max(longest, resources[part.resource] += part.cycles);
   }
   return longest;

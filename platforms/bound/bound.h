@@ -53,6 +53,9 @@ struct Work : FrontEndWork {
   void add(const Work& other);
 };
 
+/// Cycles of the resource that has most.
+double busiest(const std::vector<OccupancyPart>& parts);
+
 /// The least cycles that a GPC's work takes when every unit works at its peak: the busiest unit's, phase by phase, up to
 /// the last quad. What follows it (splats that cover nothing) is no part of a draw's cycles.
 ///
@@ -101,9 +104,8 @@ class PhaseBound {
   /// Screen tiles may be blended in another order than they were flushed in.
   bool tiles_may_overtake() const { return prop_.order == PropBehaviour::Order::tile; }
 
-  /// Of all phases, up to the last quad: cycles in which the unit of a slot, or `l2`, works at its peak, and what on;
-  /// none for a slot that this knows nothing of.
-  double busy_cycles(const std::string& slot) const;
+  /// Of all phases, up to the last quad: what the unit of a slot, or `l2`, spends its time on at its peak; none for a slot that
+  /// this knows nothing of.
   std::vector<OccupancyPart> parts(const std::string& slot) const;
 
  private:

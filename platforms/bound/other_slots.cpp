@@ -1,7 +1,6 @@
 #include "bound/other_slots.h"
 
 #include <algorithm>
-#include <map>
 
 #include <vrpipe/pipeline/registry.h>
 
@@ -55,13 +54,6 @@ std::vector<OccupancyPart> OtherSlots::parts(const std::string& path) const {
     parts.push_back({work[i].name, work[i].resource, cycles, work[i].is_throughput});
   }
   return parts;
-}
-
-double OtherSlots::busy_cycles(const std::string& path) const {
-  double longest = 0;
-  std::map<unsigned, double> resources;
-  for (const OccupancyPart& part : parts(path)) longest = std::max(longest, resources[part.resource] += part.cycles);
-  return longest;
 }
 
 }  // namespace vrpipe

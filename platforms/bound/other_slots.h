@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -28,8 +27,6 @@ class OtherSlots {
 
   /// Of a unit, none if it says nothing or is of no other slot.
   std::vector<OccupancyPart> parts(const std::string& path) const;
-  /// Cycles in which the unit's busiest resource works at its peak.
-  double busy_cycles(const std::string& path) const;
   /// Units of which the bound knows nothing: a reason each.
   const std::vector<std::string>& unknown() const { return unknown_; }
 

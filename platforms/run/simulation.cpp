@@ -479,15 +479,12 @@ void report_bound(const Configuration& configuration, const UntimedGpu& gpu, con
     if (bound.has_quads() || !any_quads) longest = std::max(longest, bound.cycles());
   }
   for (const UntimedGpu::Placed& placed : gpu.units()) {
-    longest = std::max(longest, others.busy_cycles(placed.instance->path));
+    longest = std::max(longest, busiest(others.parts(placed.instance->path)));
   }
   // A memory works side by side with the units.
   const double period_ps = 1e6 / configuration.platform().frequency_mhz;
   for (const UntimedGpu::PlacedMemory& placed : gpu.memories()) {
-    std::map<unsigned, double> resources;
-    for (const OccupancyPart& part : placed.memory->least_occupancy(period_ps)) {
-      longest = std::max(longest, resources[part.resource] += part.cycles);
-    }
+    longest = std::max(longest, busiest(placed.memory->least_occupancy(period_ps)));
   }
   const auto cycles = static_cast<Cycle>(longest);
   set_time(configuration, cycles, result);
@@ -497,12 +494,12 @@ void report_bound(const Configuration& configuration, const UntimedGpu& gpu, con
     const PhaseBound& bound = bounds[instance.gpc];
     UnitReport unit;
     unit.name = instance.path;
-    const bool is_known = PhaseBound::knows(instance.slot);
-    const Cycle busy = std::min(cycles, static_cast<Cycle>(is_known ? bound.busy_cycles(instance.slot)
-                                                                    : others.busy_cycles(instance.path)));
+    const std::vector<OccupancyPart> parts =
+        PhaseBound::knows(instance.slot) ? bound.parts(instance.slot) : others.parts(instance.path);
+    const Cycle busy = std::min(cycles, static_cast<Cycle>(busiest(parts)));
     unit.cycles[static_cast<unsigned>(UnitState::busy)] = busy;
     unit.cycles[static_cast<unsigned>(UnitState::starved)] = cycles - busy;
-    occupancy.add(std::move(unit), instance.slot, is_known ? bound.parts(instance.slot) : others.parts(instance.path));
+    occupancy.add(std::move(unit), instance.slot, parts);
   }
   for (const UntimedGpu::PlacedMemory& placed : gpu.memories()) {
     UnitReport report;
@@ -513,7 +510,7 @@ void report_bound(const Configuration& configuration, const UntimedGpu& gpu, con
     UnitReport report;
     report.name = l2;
     double moved = 0;
-    for (const PhaseBound& bound : bounds) moved += bound.busy_cycles(l2) / static_cast<double>(bounds.size());
+    for (const PhaseBound& bound : bounds) moved += busiest(bound.parts(l2)) / static_cast<double>(bounds.size());
     occupancy.add_memory(std::move(report), l2, {{"bytes", 0, moved, true}});
   }
   occupancy.finish();

@@ -229,11 +229,15 @@ void SimulationArguments::declare_changes(Arguments& arguments) {
                        "changes a parameter, e.g. tc.bins=64, or crop.cache_bytes=32K; can be\n"
                        "repeated (`vrpipe units` lists all, with units, ranges and defaults)",
                        machine_group);
-  arguments.add_option("--unit", units_, "SLOT=IMPLEMENTATION",
+  declare_units(arguments, units_, plugins_);
+}
+
+void declare_units(Arguments& arguments, Values& units, Values& plugins) {
+  arguments.add_option("--unit", units, "SLOT=IMPLEMENTATION",
                        "puts another unit into a slot, in every variant where the slot is not\n"
                        "pass-through; can be repeated",
                        machine_group);
-  arguments.add_option("--plugin", plugins_, "FILE.so", "loads units from a plugin, for --unit; can be repeated",
+  arguments.add_option("--plugin", plugins, "FILE.so", "loads units from a plugin, for --unit; can be repeated",
                        machine_group);
 }
 

@@ -96,6 +96,8 @@ constexpr unsigned most_views = 100'000;
 
 /// --json, for the result of simulations.
 void declare_result_json(Arguments& arguments, Values& json);
+/// --unit and --plugin.
+void declare_units(Arguments& arguments, Values& units, Values& plugins);
 /// --jobs.
 void declare_jobs(Arguments& arguments, Values& jobs);
 /// What it says; one for each processor where it is not given. Throws UserError.

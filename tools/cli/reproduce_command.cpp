@@ -62,12 +62,7 @@ class ReproduceCommand : public Command {
                          machine_group);
     arguments.add_option("--set", settings_, "UNIT.PARAMETER=VALUE",
                          "changes a parameter of every simulation; can be repeated", machine_group);
-    arguments.add_option("--unit", units_, "SLOT=IMPLEMENTATION",
-                         "puts another unit into a slot, in every variant where the slot is not\n"
-                         "pass-through; can be repeated",
-                         machine_group);
-    arguments.add_option("--plugin", plugins_, "FILE.so", "loads units from a plugin, for --unit; can be repeated",
-                         machine_group);
+    declare_units(arguments, units_, plugins_);
     arguments.add_option("--fidelity", fidelity_, "NAME",
                          "of the main comparison: lt or cycle (default: cycle, with --quick lt); the\n"
                          "sensitivity is always at lt",

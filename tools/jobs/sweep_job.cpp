@@ -259,8 +259,7 @@ std::vector<std::optional<double>> columns_of(const RunResult& run, const Study&
                                     [&](const StatisticReport& report) { return report.name == column; });
     std::optional<double>& value = values.emplace_back();
     if (found == run.statistics.end()) continue;
-    const bool is_quotient = found->kind == "ratio" || found->kind == "histogram";
-    value = is_quotient ? found->quotient() : static_cast<double>(found->value);
+    value = found->denominator ? found->quotient() : static_cast<double>(found->value);
   }
   return values;
 }
