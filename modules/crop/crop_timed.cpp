@@ -75,8 +75,8 @@ class TimedCrop : public TimedUnit {
 
   CycleInterval take(const ShadedWarp& warp, CycleInterval visible) {
     CycleInterval left = visible;
-    if (warp.mark != Mark::none) settle_unpaired();
     if (warp.mark == Mark::end_of_frame) {
+      settle_unpaired();
       end_ = !any_blended_ ? visible.first : last_blend_ + timing_.latency_cycles;
     } else if (warp.mark != Mark::none) {
       behaviour_->pass(warp.mark);

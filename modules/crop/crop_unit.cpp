@@ -351,11 +351,11 @@ class CropUnit : public Unit {
     bool passed = false;
     for (; !marks_.empty() && marks_.front().quads == 0; marks_.pop()) {
       passed = true;
-      settle_unpaired(now);
       if (marks_.front().mark != Mark::end_of_frame) {
         behaviour_->pass(marks_.front().mark);
         if (barriers_.is_barrier(marks_.front().mark)) done_.push({marks_.front().mark});
       } else {
+        settle_unpaired(now);
         end_ = !any_blended_ ? now : last_blend_ + timing_.latency_cycles;
       }
     }

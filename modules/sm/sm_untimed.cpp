@@ -25,7 +25,9 @@ class UntimedSm : public UntimedUnit {
         traffic_(context, timing_.fetch),
         memory_(traffic_.origin(MemoryTraffic::attribute)),
         fetch_gate_(context, "sm.attribute_fetch"),
-        hand_over_(timing_, context) {
+        hand_over_(timing_, context),
+        tiling_(context.frame->width(), context.frame->height()),
+        visits_(hand_over_.is_on() && context.termination == Termination::paper ? tiling_.tiles() : 0) {
     if (!EffectGate(context, "cache.details").is_active()) l1_statistics_.leave_out_details();
   }
 
@@ -39,10 +41,14 @@ class UntimedSm : public UntimedUnit {
     shaded_.count = 0;
     if (warp.mark == Mark::none) {
       if (follows_memory()) read(warp);
-      if (hand_over_.is_on()) did(SmWork::launches, hand_over_.of(warp));
+      if (hand_over_.is_on()) did(SmWork::launches, launch(warp));
       behaviour_->shade(warp, shaded_);
     }
     out_shaded_.send({&shaded_});
+  }
+  /// In bins that time out a primitive's quads may be together that are not so here.
+  std::uint64_t launch(const Warp& warp) {
+    return visits_.empty() ? hand_over_.of(warp) : hand_over_.least_of(warp, visits_[tiling_.index(warp.tile)]);
   }
   void shade_vertices(const VertexWarp& warp) {
     if (warp.mark == Mark::none) {
@@ -113,6 +119,8 @@ class UntimedSm : public UntimedUnit {
   std::uint32_t sent_to_core_ = 0;
   ShadedWarp shaded_;
   HandOver hand_over_;
+  const ScreenTiling tiling_;
+  std::vector<HandOver::Visit> visits_;  ///< the last, by screen tile; empty where no bin times out
 };
 
 [[maybe_unused]] const bool sm_untimed_registered = [] {

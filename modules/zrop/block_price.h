@@ -21,8 +21,17 @@ class BlockPrice {
         of_primitive_(of_primitive),
         seen_(of_primitive > 0 ? static_cast<std::size_t>(primitives) : 0) {}
   bool is_on() const { return block_ > 0 || of_primitive_ > 0; }
+  /// Where a primitive's quads were.
+  struct Place {
+    TileId tile;
+    std::uint32_t primitive = ~0U;
+    unsigned block = ~0U;
+    unsigned halves = 0;  ///< of it, a bit each
+  };
   /// Of quads in the order of their tests, in thousandths of a cycle: what they add to those before.
-  std::uint64_t of(TileId tile, const Quad* quads, unsigned count) {
+  std::uint64_t of(TileId tile, const Quad* quads, unsigned count) { return of(tile, quads, count, last_); }
+  /// The same, where the last place is not that of the quads before.
+  std::uint64_t of(TileId tile, const Quad* quads, unsigned count, Place& last) {
     std::uint64_t price = 0;
     for (unsigned i = 0; i < count; ++i) {
       const Quad& quad = quads[i];
@@ -30,18 +39,15 @@ class BlockPrice {
       const unsigned block = quad.position / (4 * quads_per_tile_row) * 2 + column / 4;
       const unsigned half = 1U << (column / 2 % 2);
       const std::uint32_t primitive = primitive_order(quad);
-      if (primitive != primitive_ || block != at_block_ || tile != tile_) {
-        primitive_ = primitive;
-        at_block_ = block;
-        tile_ = tile;
-        halves_ = half;
+      if (primitive != last.primitive || block != last.block || tile != last.tile) {
+        last = {tile, primitive, block, half};
         price += block_;
         if (of_primitive_ > 0 && !seen_[primitive]) {
           seen_[primitive] = true;
           price += of_primitive_;
         }
-      } else if ((halves_ & half) == 0) {
-        halves_ |= half;
+      } else if ((last.halves & half) == 0) {
+        last.halves |= half;
         price += 2 * half_ > block_ ? 2 * half_ - block_ : 0;
       }
     }
@@ -53,10 +59,7 @@ class BlockPrice {
   std::uint32_t block_;
   std::uint32_t of_primitive_;
   std::vector<bool> seen_;  ///< primitives
-  std::uint32_t primitive_ = ~0U;
-  unsigned at_block_ = ~0U;
-  TileId tile_;
-  unsigned halves_ = 0;
+  Place last_;
 };
 
 }  // namespace vrpipe

@@ -40,6 +40,8 @@ class UntimedZrop : public UntimedUnit {
         quads_per_cycle_(behaviour_->timing().quads_per_cycle),
         blocks_(behaviour_->timing().half_block_thousandths, behaviour_->timing().block_thousandths,
                 behaviour_->timing().primitive_thousandths, 2 * std::uint64_t{context.frame->splats()}),
+        tiling_(context.frame->width(), context.frame->height()),
+        places_(blocks_.is_on() && context.termination == Termination::paper ? tiling_.tiles() : 1),
         hi_z_(context) {
     if (!EffectGate(context, "cache.details").is_active()) cache_statistics_.leave_out_details();
     out_hi_z_.set_optional();
@@ -63,7 +65,8 @@ class UntimedZrop : public UntimedUnit {
   /// As few thousandths beyond what quads take as any order in time of the beats can do with: those behind a block share no
   /// more of its time than its last cycle.
   [[gnu::noinline]] void count_blocks() {
-    const std::uint64_t price = blocks_.of(beat_.tile, beat_.quads.data(), beat_.count);
+    BlockPrice::Place& last = places_.size() == 1 ? places_[0] : places_[tiling_.index(beat_.tile)];
+    const std::uint64_t price = blocks_.of(beat_.tile, beat_.quads.data(), beat_.count, last);
     const std::uint64_t of_quads = (std::uint64_t{1000} * beat_.count + quads_per_cycle_ - 1) / quads_per_cycle_;
     unshared_ += static_cast<std::int64_t>(price) - static_cast<std::int64_t>(of_quads);
     if (unshared_ <= 0) return;
@@ -204,6 +207,9 @@ class UntimedZrop : public UntimedUnit {
   QuadBeat beat_;
   const unsigned quads_per_cycle_;
   BlockPrice blocks_;
+  const ScreenTiling tiling_;
+  /// The last; by screen tile where bins may time out, in which a primitive's quads may be together that are not so here.
+  std::vector<BlockPrice::Place> places_;
   std::int64_t unshared_ =
       -1000;  ///< what blocks cost beyond quads, but for their last cycle: thousandths, not counted yet
   std::vector<bool> filled_lines_;  ///< of the surface, where lines have a price

@@ -24,6 +24,11 @@ double spaced(std::uint64_t items, double cycles, bool to_last) {
   return to_last ? static_cast<double>(items - 1) * cycles + 1 : static_cast<double>(items) * cycles;
 }
 
+/// Thousandths of a cycle of which the last item has no more than `longest`: nobody waits for what it takes.
+std::uint64_t without_last(std::uint64_t thousandths, std::uint64_t longest) {
+  return thousandths - std::min(thousandths, longest);
+}
+
 std::uint64_t sum_of(const std::vector<ShaderSegment>& program) {
   std::uint64_t sum = 0;
   for (const ShaderSegment& segment : program) sum += segment.instructions;
@@ -119,13 +124,14 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   const auto from_l2 = [&](std::uint64_t bytes) {
     return l2_bytes_per_cycle_ == 0 ? 0.0 : ratio(bytes, l2_bytes_per_cycle_);
   };
-  cycles[test] = std::max({ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(done.z_blocks, 1000) +
+  const std::uint64_t z_blocks = to_last ? without_last(done.z_blocks, longest_beat_of_blocks()) : done.z_blocks;
+  const std::uint64_t launches = to_last ? without_last(done.launches, longest_launch()) : done.launches;
+  cycles[test] = std::max({ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(z_blocks, 1000) +
                                update_cycles(done) + sector_cycles(done),
                            ratio(done.z_lines, 1000), ratio(done.quads_rasterized, prop_.quads_per_cycle),
                            from_l2(done.z_sectors * zrop_.z_cache.organization.sector_bytes)});
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
-  cycles[sm] = std::max(instructions(done) / sm_.instructions_per_cycle(),
-                        ratio(to_last ? launches_to_last(done) : done.launches, 1000));
+  cycles[sm] = std::max(instructions(done) / sm_.instructions_per_cycle(), ratio(launches, 1000));
   cycles[late] = ratio(done.late_quads, std::min(zrop_.quads_per_cycle, prop_.quads_per_cycle));
   cycles[color] = static_cast<double>(done.color_quads) / prop_.color_rate.per_cycle();
   cycles[l2] = from_l2(done.sectors * crop_.sector_bytes);
@@ -164,17 +170,18 @@ double PhaseBound::sector_cycles(const Work& done) const {
   return std::max(0.0, ratio(done.z_sectors, zrop_.z_cache.sectors_per_cycle) - ratio(done.z_blocks, 1000));
 }
 
-/// Nobody waits for what the last warp's hand-over takes.
-std::uint64_t PhaseBound::launches_to_last(const Work& done) const {
-  return done.launches - std::min(done.launches, longest_launch());
-}
 std::uint64_t PhaseBound::longest_launch() const {
   const HandOverPrice& price = sm_.hand_over;
   return price.warp_thousandths + quads_per_warp * (std::uint64_t{price.visit_thousandths} + price.discard_thousandths);
 }
+std::uint64_t PhaseBound::longest_beat_of_blocks() const {
+  const std::uint64_t block = std::max(zrop_.half_block_thousandths, zrop_.block_thousandths);
+  return QuadBeat::capacity * (block + zrop_.primitive_thousandths);
+}
 
 double PhaseBound::idle_after_last(unsigned stage) const {
   if (stage == sm) return ratio(longest_launch(), 1000);
+  if (stage == test) return ratio(longest_beat_of_blocks(), 1000);
   const double interval =
       stage == draw ? 1 / vertex_warps_per_cycle_
       : stage == raster
@@ -267,7 +274,8 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
   if (slot == "zrop") {
     return priced(ZropWork::kinds(zrop_),
                   {count(done.quads_tested), update_cycles(done), sector_cycles(done) * zrop_.z_cache.sectors_per_cycle,
-                   count(done.late_quads), count(done.z_blocks), count(done.z_lines)});
+                   count(done.late_quads), count(without_last(done.z_blocks, longest_beat_of_blocks())),
+                   count(done.z_lines)});
   }
   if (slot == "qru") {
     const double quads = count(done.survivors) - count(done.warps) * qru_.items_per_cycle;
@@ -275,7 +283,8 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
   }
   if (slot == "sm") {
     return priced(SmWork::kinds(sm_), {count(done.vertex_warps * sum_of(sm_.vertex)), count(done.fragment_instructions),
-                                       count(done.merging_warps * sum_of(sm_.merge)), count(launches_to_last(done))});
+                                       count(done.merging_warps * sum_of(sm_.merge)),
+                                       count(without_last(done.launches, longest_launch()))});
   }
   if (slot == "crop") return priced(CropWork::kinds(crop_), {count(done.color_quads), count(color_moves(done))});
   if (slot == "l2" && l2_bytes_per_cycle_ > 0)

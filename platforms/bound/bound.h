@@ -116,8 +116,9 @@ class PhaseBound {
   double instructions(const Work& done) const;
   double update_cycles(const Work& done) const;
   double sector_cycles(const Work& done) const;
-  std::uint64_t launches_to_last(const Work& done) const;
+  /// Thousandths of a cycle of one hand-over, and of one beat's tests.
   std::uint64_t longest_launch() const;
+  std::uint64_t longest_beat_of_blocks() const;
   /// That take time from blending: sectors, or lines where these have a price.
   std::uint64_t color_moves(const Work& done) const { return crop_.line_cycles == 0 ? done.sectors : done.lines_paid; }
   /// Between a stage's items are more cycles than an item takes: those after the last, for which nobody waits.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <vrpipe/pipeline/batch.h>
+#include <vrpipe/pipeline/hi_z_plan.h>
 #include <vrpipe/pipeline/slots/crop.h>
 #include <vrpipe/pipeline/slots/draw.h>
 #include <vrpipe/pipeline/slots/raster.h>
@@ -170,6 +171,7 @@ WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& g
       others_(others),
       gpc_(gpc),
       counts_late_(!(bound.times_out() && configuration.frame().terminates_early())),
+      hides_at_other_times_(bound.times_out() && HiZPlan(configuration.context_of(gpc)).is_used()),
       barriers_(configuration.context_of(0)),
       draw_(gpu.of_slot("draw", gpc)),
       vpo_(gpu.of_slot("vpo", gpc)),
@@ -242,6 +244,9 @@ void WorkCounter::count_front_end(FrontEndWork& work) const {
   work.fine_tiles = items(raster_, RasterWork::fine) - before_.fine_tiles;
   work.tile_pairs = items(raster_, RasterWork::pairs) - before_.tile_pairs;
   work.quads_rasterized = items(raster_, RasterWork::quads) - before_.quads_rasterized;
+  if (!hides_at_other_times_) return;
+  work.fine_tiles = work.tile_pairs = 0;
+  work.quads_rasterized = std::min(work.quads_rasterized, std::max(bound_.work.survivors, std::uint64_t{1}));
 }
 
 void WorkCounter::count() {
@@ -254,6 +259,9 @@ void WorkCounter::count() {
   if (counts_late_) bound_.work.launches = items(sm_, SmWork::launches) - before_.launches;
   if (counts_late_) bound_.work.late_quads = items(zrop_, ZropWork::late_tests) - before_.late_quads;
   bound_.work.z_sectors = bound_.z_sectors_of(items(zrop_, ZropWork::sectors) - z_sectors_before_);
+  if (!hides_at_other_times_) return;
+  bound_.work.quads_tested = bound_.work.survivors;
+  bound_.work.bin_beats = bound_.work.z_lines = bound_.work.z_blocks = bound_.work.z_sectors = 0;
 }
 
 void WorkCounter::end_phase() {

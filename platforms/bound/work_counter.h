@@ -16,7 +16,8 @@ namespace vrpipe {
 /// Where `cycle` may flush bins at other times, what a quad terminates may spare others later than here; so only quads are
 /// counted whose pixels are not all terminated by what was blended before: no run is spared these, however early it
 /// flushes its bins. And where screen tiles may be blended in another order each sector is filled once: the cache may miss
-/// it no more often. The same holds of the z-cache, always, of which what late tests fill is left out.
+/// it no more often. The same holds of the z-cache, always, of which what late tests fill is left out. What Hi-Z may hide
+/// from some run is left out too: up to the tests, quads count that survive them.
 class WorkCounter {
  public:
   /// The GPU, the bound and `others` outlive it.
@@ -37,7 +38,8 @@ class WorkCounter {
   PhaseBound& bound_;
   OtherSlots& others_;
   const unsigned gpc_;
-  const bool counts_late_;  ///< late tests, unless some run may be spared them
+  const bool counts_late_;           ///< late tests, unless some run may be spared them
+  const bool hides_at_other_times_;  ///< Hi-Z, told earlier than here by bins that time out
   const BarrierPlan barriers_;
   std::unique_ptr<Blends> blends_;
   std::vector<std::shared_ptr<void>> taps_;

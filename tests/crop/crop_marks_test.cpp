@@ -262,6 +262,27 @@ TEST_P(CropMarksTest, QuadsBehindAClearFillTheirSectorsWhileThoseBeforeItWaitFor
   EXPECT_LT(crop.bench.unit().end_of_frame(), 450U) << "and not two one after the other";
 }
 
+// A mark ends no cycle of the blender: what is counted as unpaired is what does not go together.
+TEST_P(CropMarksTest, QuadsOfASectorGoTogetherAcrossAMark) {
+  Frame frame(256, 256);
+  for (unsigned draw = 0; draw < 5; ++draw) frame.draw(geometry_of(256, 256), {});
+  RenderContext context = context_of(frame);
+  context.format = ColorFormat::rgba8;
+  for (const char* forwarding : {"on", "off"}) {
+    MarkedCropBench crop(
+        GetParam(), context,
+        {{"bytes_per_cycle", "32"}, {"cache_bytes", "8192"}, {"pairs_in_sector", "on"}, {"forwarding", forwarding}});
+    for (DrawIndex draw = 0; draw < 5; ++draw) {
+      if (draw > 0) crop.mark(Frame::mark_of(draw));
+      crop.quad(draw, {0, 0}, draw, 0.5F);
+    }
+    crop.mark(Mark::end_of_frame);
+    crop.bench.run();
+    EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::blend), 2.5) << forwarding;
+    EXPECT_DOUBLE_EQ(testing::occupied(crop.bench.unit(), CropWork::unpaired), 0.5) << forwarding;
+  }
+}
+
 TEST_P(CropMarksTest, ClearsAloneEndTheFrame) {
   MarkedCropBench crop(GetParam(), cleared_between(3));
   crop.mark(Frame::mark_of(1));

@@ -1,0 +1,71 @@
+// No run is faster than the bound, also where a price is paid for what nobody waits for, or where `cycle` flushes its bins
+// at other times than the run that the bound counts.
+#include <vrpipe/platforms/simulation.h>
+
+#include "support/mixed_frames.h"
+#include "support/simulate.h"
+
+namespace vrpipe {
+namespace {
+
+using namespace testing;
+
+RunRequest with(const char* variant, const std::vector<Setting>& settings) {
+  RunRequest request = request_of(variant, Fidelity::bound);
+  request.settings = settings;
+  return request;
+}
+
+/// Cycles of the bound as a share of those of `cycle`.
+template <class Scene>
+double share_of_cycle(RunRequest request, const Scene& scene) {
+  request.fidelity = Fidelity::bound;
+  const auto bound = static_cast<double>(*run(request, scene).cycles);
+  request.fidelity = Fidelity::cycle;
+  return bound / static_cast<double>(*run(request, scene).cycles);
+}
+
+const Setting prices[] = {{"zrop", "block_cycles", "100"},
+                          {"zrop", "half_block_cycles", "100"},
+                          {"zrop", "primitive_cycles", "100"},
+                          {"sm", "warp_launch_cycles", "1000"},
+                          {"sm", "visit_launch_cycles", "1000"}};
+
+// Quads of eight primitives are tested, and handed over, in one go, and are on their way as it begins.
+TEST(Bound, WaitsForNoPriceOfTheLastQuads) {
+  for (const Setting& price : prices) {
+    for (const unsigned splats : {1U, 8U, 16U, 24U}) {
+      const Draw draw = draw_of(2, 2, std::vector<Splat>(splats, flat_box(0, 0, 2, 2, 0.05F)));
+      for (const char* variant : {"het", "het+qm"})
+        EXPECT_LE(share_of_cycle(with(variant, {price}), draw), 1)
+            << price.parameter << " " << variant << " " << splats;
+    }
+  }
+}
+
+TEST(Bound, IsCloseWhereAPriceIsAllThatCounts) {
+  const Draw draw = random_draw(96, 80, 400, 1);
+  for (const Setting& price : prices) {
+    RunRequest request = with("het", {price});
+    request.termination = Termination::strict;  // in which no bin times out
+    EXPECT_GT(share_of_cycle(request, draw), 0.94) << price.parameter;
+  }
+}
+
+// Merged with quads of the next primitive, a primitive's would come to the SMs in several visits.
+TEST(Bound, VisitsAreAsFewAsInBinsThatTimeOut) {
+  const Draw draw = draw_of(16, 16, std::vector<Splat>(64, flat_box(0, 0, 16, 16, 0.05F)));
+  const RunRequest request =
+      with("qm", {{"sm", "visit_launch_cycles", "100"}, {"raster", "setup_interval_cycles", "400"}});
+  EXPECT_LE(share_of_cycle(request, draw), 1);
+}
+
+// Told earlier, by bins that time out, Hi-Z hides more.
+TEST(Bound, HiZHidesAsMuchAsInBinsThatTimeOut) {
+  RunRequest request = with("het", {{"raster", "screen_tile_interval_cycles", "1000"}, {"raster", "hi_z_bits", "2"}});
+  request.format = ColorFormat::rgba32f;
+  EXPECT_LE(share_of_cycle(request, mixed_frame(331876, request)), 1);
+}
+
+}  // namespace
+}  // namespace vrpipe
