@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string>
@@ -82,6 +83,7 @@ class PhaseBound {
     up_to_quads_ = work;
     if (times_out_) static_cast<FrontEndWork&>(up_to_quads_) = up_to_quad_;
     up_to_quads_.tile_pairs = up_to_quad_.tile_pairs;  // for a pair without quads nobody waits
+    up_to_quads_.quads_rasterized = std::max(up_to_quads_.quads_rasterized, work.survivors);
   }
   void end_phase();
   /// A barrier: what follows begins once the last quad of the phases so far has ended.

@@ -47,7 +47,7 @@ Case shrunk(Case c, const std::string& rule, const Limits& limits) {
   if (c.platform != &platforms().front())
     without([](Case& x) {
       x.platform = &platforms().front();
-      x.connects_z_caches = x.inserts_l1s = false;
+      x.edits = {};
     });
   if (c.format != ColorFormat::rgba16f) without([](Case& x) { x.format = ColorFormat::rgba16f; });
   if (c.termination != Termination::paper) without([](Case& x) { x.termination = Termination::paper; });

@@ -158,27 +158,39 @@ class Judge {
 
   void refusal() {
     const Setting& bad = case_.settings.back();
-    try {
-      verdict_.stage("check");
-      check_configuration(case_.request(Fidelity::functional));
-    } catch (const UserError& error) {
-      if (std::string(error.what()).find(bad.parameter) != std::string::npos) return;
-      find("check", {"a bad value is refused by name", error.what()});
-      return;
+    const std::string message = refused();
+    if (message.empty()) {
+      find("check", {"a bad value is refused", fmt::format("{}.{}='{}'", bad.unit, bad.parameter, bad.value)});
+    } else if (message.find(bad.parameter) == std::string::npos) {
+      find("check", {"a bad value is refused by name", message});
     }
-    find("check", {"a bad value is refused", fmt::format("{}.{}='{}'", bad.unit, bad.parameter, bad.value)});
   }
 
   /// Whether the configuration can be used; a refusal must be a documented one.
   bool usable() {
+    const std::string message = refused();
+    if (!message.empty() && !documented_refusal(message)) find("check", {"a good value is taken", message});
+    return message.empty();
+  }
+
+  /// Why the configuration is refused, the same whatever effects are simulated; empty if it is not.
+  std::string refused() {
     verdict_.stage("check");
-    try {
-      check_configuration(case_.request(Fidelity::functional));
-      return true;
-    } catch (const UserError& error) {
-      if (!documented_refusal(error.what())) find("check", {"a good value is taken", error.what()});
+    std::string messages[2];
+    for (const bool all : {false, true}) {
+      RunRequest request = case_.request(Fidelity::functional);
+      if (all) request.effects = EffectChoice::parse("all");
+      try {
+        check_configuration(request);
+      } catch (const UserError& error) {
+        messages[all ? 1 : 0] = error.what();
+      }
     }
-    return false;
+    if (messages[0] != messages[1]) {
+      find("check", {"what a frame does not call for is refused all the same",
+                     fmt::format("auto: '{}', all: '{}'", messages[0], messages[1])});
+    }
+    return messages[0];
   }
 
   void ladder() {

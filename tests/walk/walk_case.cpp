@@ -7,7 +7,7 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <tuple>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -15,11 +15,13 @@
 #include <vrpipe/arithmetic/random.h>
 #include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/registry.h>
+#include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/netlist.h>
 #include <vrpipe/platforms/wiring.h>
 #include <vrpipe/workloads/multi_pass.h>
 
 #include "support/builders.h"
+#include "support/foreign_memory.h"
 #include "support/mixed_frames.h"
 
 namespace vrpipe::walk {
@@ -214,16 +216,17 @@ std::string refused_value(Dice& dice, const Parameter& parameter) {
   return dice.one_of(nonsense);
 }
 
-/// Whether the platform has memory of a kind: most have an L2 alone.
+/// Whether the platform has a unit of the slot, and memory of the kind: most have an L2 alone.
 bool is_of(const Platform& platform, const ParameterListing& listing) {
   const Registry& registry = Registry::instance();
-  if (!registry.has_slot(listing.unit) || !registry.slot(listing.unit).is_memory) return true;
+  if (!registry.has_slot(listing.unit)) return true;
+  const Slot& slot = registry.slot(listing.unit);
   Netlist netlist(platform.gpcs);
   platform.wire(netlist);
-  const std::string& usual = registry.slot(listing.unit).implementation;
   return std::any_of(netlist.instances().begin(), netlist.instances().end(), [&](const Instance& instance) {
-    return instance.slot == listing.unit &&
-           listing.implementation == (instance.implementation.empty() ? usual : instance.implementation);
+    if (instance.slot != listing.unit) return false;
+    return !slot.is_memory ||
+           listing.implementation == (instance.implementation.empty() ? slot.implementation : instance.implementation);
   });
 }
 
@@ -310,21 +313,65 @@ void draw_stencils(Dice& dice, std::vector<Part>& parts) {
   }
 }
 
-/// A platform with its z-caches connected, or with an L1 between each SM array and the L2; it keeps its name and stays
-/// where it is.
-const Platform& edited(const Platform& platform, bool z_caches, bool l1s) {
-  static std::map<std::tuple<std::string, bool, bool>, Platform> made;
-  const auto [at, is_new] = made.emplace(std::tuple{platform.name, z_caches, l1s}, platform);
+bool has_instance(const Netlist& netlist, const std::string& path) {
+  return std::any_of(netlist.instances().begin(), netlist.instances().end(),
+                     [&](const Instance& instance) { return instance.path == path; });
+}
+
+constexpr unsigned other_memories = 12;
+
+/// A DRAM that another project wrote, in one of the styles that TLM-2.0 leaves it.
+ForeignMemory other_memory(unsigned which, const std::string& name) {
+  const auto ns = [](double nanoseconds) { return sc_core::sc_time(nanoseconds, sc_core::SC_NS); };
+  const double accept[] = {0.3, 1, 20};
+  auto dram =
+      std::make_unique<foreign::Dram>(name.c_str(), ns(accept[which % 3]), ns(40), ns(which % 2 == 0 ? 70 : 900));
+  if (which / 3 % 2 == 1) dram->wait_for_end_resp();
+  if (which / 6 % 2 == 1) dram->take_one_at_a_time();
+  tlm::tlm_base_target_socket_b<32>& socket = dram->socket;
+  return {std::move(dram), {&socket}};
+}
+
+void edit(Netlist& netlist, const Edits& edits) {
+  if (edits.z_caches) connect_depth_stencil_traffic(netlist);
+  if (edits.l1s) {
+    connect_attribute_traffic(netlist);
+    insert_l1(netlist);
+  }
+  for (unsigned gpc = 0; edits.tallies && gpc < netlist.gpcs(); ++gpc) {
+    const std::string self = "gpc" + std::to_string(gpc) + ".";
+    if (has_instance(netlist, self + "tally")) continue;
+    netlist.insert(self + "raster.out_quads", self + "tally", "tally", "in_quads", "out_quads");
+  }
+  if (edits.other_memory == 0 || has_instance(netlist, "dram") || !has_instance(netlist, "l2")) return;
+  netlist.add_memory("dram", [which = edits.other_memory](const std::string& name, unsigned) {
+    return other_memory(which, name);
+  });
+  netlist.connect_memory("l2", "dram");
+}
+
+/// A platform that is edited keeps its name and stays where it is.
+const Platform& edited(const Platform& platform, const Edits& edits) {
+  static std::map<std::pair<std::string, Edits>, Platform> made;
+  const auto [at, is_new] = made.emplace(std::pair{platform.name, edits}, platform);
   if (is_new) {
-    at->second.wire = [wire = platform.wire, z_caches, l1s](Netlist& netlist) {
+    at->second.wire = [wire = platform.wire, edits](Netlist& netlist) {
       wire(netlist);
-      if (z_caches) connect_depth_stencil_traffic(netlist);
-      if (!l1s) return;
-      connect_attribute_traffic(netlist);
-      insert_l1(netlist);
+      edit(netlist, edits);
     };
   }
   return at->second;
+}
+
+/// A slot of one's own, and the links around it.
+void draw_tally(Dice& dice, std::vector<Setting>& settings) {
+  const char* const few[] = {"1", "2", "8", "64"};
+  const char* const many[] = {"1", "3", "8", "15", "100", "5000"};
+  if (dice.chance(60)) settings.push_back({"tally", "beats_per_cycle", dice.one_of(few)});
+  for (const char* link : {"link.raster.quads", "link.tally.quads"}) {
+    for (const char* parameter : {"depth", "latency_cycles"})
+      if (dice.chance(50)) settings.push_back({link, parameter, dice.one_of(many)});
+  }
 }
 
 /// Caches and queues in which everybody waits for everybody.
@@ -435,14 +482,18 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   c.parts = draw_parts(dice, c.draw.splats.size());
   Dice of_stencils(mix(mix(seed + 1) ^ index));
   draw_stencils(of_stencils, c.parts);
-  c.connects_z_caches = dice.chance(40);
-  if (c.connects_z_caches && !c.refused && dice.chance(60)) draw_small_z_cache(dice, c.settings);
-  c.inserts_l1s = dice.chance(25);
-  if (c.inserts_l1s && !c.refused) draw_l1(dice, c.settings);
+  c.edits.z_caches = dice.chance(40);
+  if (c.edits.z_caches && !c.refused && dice.chance(60)) draw_small_z_cache(dice, c.settings);
+  c.edits.l1s = dice.chance(25);
+  if (c.edits.l1s && !c.refused) draw_l1(dice, c.settings);
   if (c.parts.empty() && c.draw.splats.size() > 1 && dice.chance(25)) {
     c.passes = 2 + dice.below(std::min<std::size_t>(c.draw.splats.size(), 9) - 1);
   }
-  if (c.connects_z_caches || c.inserts_l1s) c.platform = &edited(*c.platform, c.connects_z_caches, c.inserts_l1s);
+  Dice of_edits(mix(mix(seed + 3) ^ index));
+  c.edits.tallies = of_edits.chance(20);
+  if (c.edits.tallies && !c.refused) draw_tally(of_edits, c.settings);
+  if (of_edits.chance(15)) c.edits.other_memory = 1 + of_edits.below(other_memories);
+  if (c.edits.any()) c.platform = &edited(*c.platform, c.edits);
   if (!c.refused && dice.chance(20)) {
     c.mixed_seed = 1 + dice.below(1000000);
     c.draw = draw_of(testing::mixed_frame_width, testing::mixed_frame_height);
@@ -458,8 +509,10 @@ std::string describe(const Case& c) {
   std::string text = fmt::format("{} {} {} {} {}x{}, {} splats", c.platform->name, c.variant.name, name_of(c.format),
                                  word_for(c.termination), c.draw.width, c.draw.height, c.draw.splats.size());
   if (c.mixed_seed != 0) text += fmt::format(", meshes and splats of seed {},", c.mixed_seed);
-  if (c.connects_z_caches) text += ", z-caches connected,";
-  if (c.inserts_l1s) text += ", L1s inserted,";
+  if (c.edits.z_caches) text += ", z-caches connected,";
+  if (c.edits.l1s) text += ", L1s inserted,";
+  if (c.edits.tallies) text += ", tallies inserted,";
+  if (c.edits.other_memory != 0) text += fmt::format(", memory of another make {},", c.edits.other_memory);
   if (c.passes > 1) text += fmt::format(" {} passes", c.passes);
   if (!c.effects.empty()) text += " effects " + c.effects;
   for (const UnitChoice& unit : c.units) text += fmt::format(" {}={}", unit.slot, unit.implementation);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <vrpipe/pipeline/frame.h>
@@ -21,13 +22,26 @@ struct Part {
   StencilOperation operation = StencilOperation::keep;  ///< that writes
 };
 
+/// What a platform of the catalogue is edited by.
+struct Edits {
+  bool z_caches = false;      ///< connected
+  bool l1s = false;           ///< one between each SM array and the L2
+  bool tallies = false;       ///< a slot of one's own between RASTER and TC
+  unsigned other_memory = 0;  /// of another make, below the L2 or in its place: which one, 0 for none
+
+  bool any() const { return z_caches || l1s || tallies || other_memory != 0; }
+  friend bool operator<(const Edits& a, const Edits& b) {
+    return std::tie(a.z_caches, a.l1s, a.tallies, a.other_memory) <
+           std::tie(b.z_caches, b.l1s, b.tallies, b.other_memory);
+  }
+};
+
 /// One configuration and one scene of the random walk.
 struct Case {
   std::uint64_t seed = 0;
   std::uint64_t index = 0;
   const Platform* platform = nullptr;  ///< of the catalogue, or one of them edited
-  bool connects_z_caches = false;
-  bool inserts_l1s = false;
+  Edits edits;
   Variant variant;
   ColorFormat format = ColorFormat::rgba16f;
   Termination termination = Termination::paper;

@@ -111,8 +111,8 @@ class Registrar {
 
 /// Put VRPIPE_PLUGIN once in a plugin's source: the tag by which the loader knows, before it runs any code of the
 /// plugin, that it was built for this vrpipe. VRPIPE_PLUGIN_TAG comes from the build (vrpipe_add_plugin).
-#define VRPIPE_PLUGIN                                                                     \
-  extern "C" __attribute__((visibility("default"), used)) const char vrpipe_plugin_tag[]; \
+#define VRPIPE_PLUGIN                                                               \
+  extern "C" __attribute__((visibility("default"))) const char vrpipe_plugin_tag[]; \
   extern "C" __attribute__((visibility("default"), used)) const char vrpipe_plugin_tag[] = VRPIPE_PLUGIN_TAG;
 
 /// Loads a plugin; its units and platforms can be used afterwards. Throws UserError when the file is missing, is not a
