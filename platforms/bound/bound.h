@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string>
@@ -83,7 +82,10 @@ class PhaseBound {
     up_to_quads_ = work;
     if (times_out_) static_cast<FrontEndWork&>(up_to_quads_) = up_to_quad_;
     up_to_quads_.tile_pairs = up_to_quad_.tile_pairs;  // for a pair without quads nobody waits
-    up_to_quads_.quads_rasterized = std::max(up_to_quads_.quads_rasterized, work.survivors);
+    // What has survived was rasterised, though the last of it may be known by that alone (WorkCounter).
+    const std::uint64_t survivors = total_.survivors + work.survivors;
+    const std::uint64_t rasterized = total_.quads_rasterized + up_to_quads_.quads_rasterized;
+    if (survivors > rasterized) up_to_quads_.quads_rasterized += survivors - rasterized;
   }
   void end_phase();
   /// A barrier: what follows begins once the last quad of the phases so far has ended.

@@ -25,11 +25,9 @@ double share_of_cycle(RunRequest request, const Scene& scene) {
   return bound / static_cast<double>(*run(request, scene).cycles);
 }
 
-const Setting prices[] = {{"zrop", "block_cycles", "100"},
-                          {"zrop", "half_block_cycles", "100"},
-                          {"zrop", "primitive_cycles", "100"},
-                          {"sm", "warp_launch_cycles", "1000"},
-                          {"sm", "visit_launch_cycles", "1000"}};
+const Setting prices[] = {{"prop", "quads_per_cycle", "1"},     {"zrop", "block_cycles", "100"},
+                          {"zrop", "half_block_cycles", "100"}, {"zrop", "primitive_cycles", "100"},
+                          {"sm", "warp_launch_cycles", "1000"}, {"sm", "visit_launch_cycles", "1000"}};
 
 // Quads of eight primitives are tested, and handed over, in one go, and are on their way as it begins.
 TEST(Bound, WaitsForNoPriceOfTheLastQuads) {
@@ -65,6 +63,8 @@ TEST(Bound, HiZHidesAsMuchAsInBinsThatTimeOut) {
   RunRequest request = with("het", {{"raster", "screen_tile_interval_cycles", "1000"}, {"raster", "hi_z_bits", "2"}});
   request.format = ColorFormat::rgba32f;
   EXPECT_LE(share_of_cycle(request, mixed_frame(331876, request)), 1);
+  request.settings = {{"prop", "quads_per_cycle", "1"}};
+  for (const std::uint64_t seed : {432200U, 942808U}) EXPECT_LE(share_of_cycle(request, mixed_frame(seed, request)), 1);
 }
 
 }  // namespace

@@ -434,6 +434,12 @@ TEST_F(Views, ANamedJournalStaysAndServesAgain) {
   EXPECT_EQ(read_file(folder() / "j.jsonl"), journal);
   // How many at a time, and where the result goes, are no matter.
   EXPECT_EQ(vrpipe(of_file({"--views", "all", "--journal", "j.jsonl", "--jobs", "1"})).err, done_before(5, 5));
+  // Nor how the files are named.
+  const auto from_here = [&](const char* name) { return (folder() / ".." / folder().filename() / name).string(); };
+  const Finished elsewhere =
+      vrpipe({"compare", "--scene", from_here("cloud.ply"), "--camera", from_here("cameras.json"), "--fidelity", "lt",
+              "--views", "all", "--journal", "j.jsonl"});
+  EXPECT_EQ(elsewhere.err, done_before(5, 5));
 }
 
 TEST_F(Views, AJournalThatEndsInTheMiddleOfARecordLosesThatRecord) {

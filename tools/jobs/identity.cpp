@@ -39,9 +39,11 @@ nlohmann::json file_identity(const std::string& name) {
 }
 
 nlohmann::json scene_identity(const std::string& scene) {
-  nlohmann::json identity = file_identity(gaussian_file_path(scene_file(scene)));
+  const std::string file = gaussian_file_path(scene_file(scene));
+  nlohmann::json identity = file_identity(file);
   if (!identity.is_object()) identity = {{"files", identity}};
-  identity["scene"] = valid_utf8(scene);
+  // The file's path, of which there are several, is there already.
+  identity["name and part"] = valid_utf8(std::string(scene).replace(scene.rfind(file), file.size(), "FILE"));
   return identity;
 }
 
