@@ -269,6 +269,42 @@ TEST_F(BadInput, AFullDiskUnderOneResultLeavesTheOthers) {
   }
 }
 
+TEST_F(BadInput, AFullDiskUnderWhatIsWrittenDuringARunLeavesItsResult) {
+  for (const std::vector<std::string>& options :
+       std::vector<std::vector<std::string>>{{"--trace", "/dev/full"}, {"--log", "crop", "--log-file", "/dev/full"}}) {
+    std::vector<std::string> words{"run", "--scene", "tiny.spl", "--html", "page.html", "--json", "ok.json"};
+    words.insert(words.end(), options.begin(), options.end());
+    const Finished finished = vrpipe(words);
+    EXPECT_EQ(finished.code, 2);
+    EXPECT_EQ(finished.err.rfind("vrpipe: error: cannot write file (--", 0), 0U) << finished.err;
+    EXPECT_NE(finished.err.find("/dev/full"), std::string::npos) << finished.err;
+    EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1) << finished.err;
+    EXPECT_TRUE(std::filesystem::remove(folder() / "ok.json"));
+    EXPECT_TRUE(std::filesystem::remove(folder() / "page.html"));
+    EXPECT_NE(finished.out.find("took "), std::string::npos) << finished.out;
+    EXPECT_EQ(finished.out.find("trace: "), std::string::npos) << finished.out;
+  }
+}
+
+TEST_F(BadInput, AFullDiskUnderImagesLeavesTheResult) {
+  std::filesystem::create_directory(folder() / "images");
+  for (const char* command : {"run", "compare", "accuracy"}) {
+    const std::string image = std::string(command) == "accuracy" ? "tiny-default" : "tiny-het+qm";
+    std::filesystem::create_symlink("/dev/full", folder() / "images" / (image + ".png"));
+    std::vector<std::string> words{command, "--scene", "tiny.spl", "--output", "images", "--json", "ok.json"};
+    if (std::string(command) == "accuracy") words.emplace_back("--quick");
+    const Finished finished = vrpipe(words);
+    SCOPED_TRACE(finished.out);
+    EXPECT_EQ(finished.code, 2);
+    EXPECT_EQ(finished.err.rfind("vrpipe: error: cannot write file (--output images/" + image + ".png)", 0), 0U)
+        << finished.err;
+    EXPECT_TRUE(std::filesystem::remove(folder() / "ok.json"));
+    EXPECT_TRUE(std::filesystem::remove(folder() / "images" / (image + ".exr")));
+    std::filesystem::remove(folder() / "images" / (image + ".png"));
+    EXPECT_EQ(finished.out.find("image: images/" + image), std::string::npos);
+  }
+}
+
 TEST_F(BadInput, BrokenGaussiansAreCountedNotFatal) {
   GaussianSceneBuilder builder(0);
   GaussianAttributes gaussian;

@@ -210,14 +210,16 @@ TEST(Text, ParsesStrictly) {
   const ImageSize size = parse_size("16384x1", "--size");
   EXPECT_EQ(size.width, 16384U);
   EXPECT_EQ(size.height, 1U);
-  const Setting setting = parse_setting("tc.bins=a=b.c");
+  const Setting setting = parse_settings({"tc.bins=a=b.c"}).at(0);
   EXPECT_EQ(setting.unit, "tc");
   EXPECT_EQ(setting.parameter, "bins");
   EXPECT_EQ(setting.value, "a=b.c");
   for (const char* text : {"", "=", ".", ".=", "tc.=1", ".bins=1", "tc.bins=", "tc.bins", "tc=1"}) {
-    EXPECT_THROW(parse_setting(text), UserError) << text;
+    EXPECT_THROW(parse_settings({text}), UserError) << text;
   }
-  EXPECT_EQ(parse_unit_choice("qru=mine").implementation, "mine");
+  EXPECT_EQ(parse_unit_choices({"qru=mine"}).at(0).implementation, "mine");
+  EXPECT_THROW(parse_unit_choices({"qru=mine", "qru=mine"}), UserError);
+  EXPECT_THROW(parse_settings({"tc.bins=1", "tc.bins=2"}), UserError);
 }
 
 }  // namespace

@@ -67,8 +67,8 @@ class AccuracyCommand : public Command {
     if (const auto file = single(html_, "--html")) job.html = *file;
 
     ProgressLine progress;
-    const AccuracyResult result = measure_accuracy(job, progress);
-    ResultFiles files;
+    AccuracyResult result = measure_accuracy(job, progress);
+    ResultFiles& files = result.files;
     if (job.html) {
       progress.show("writing the page");
       files.write(*job.html, accuracy_page(result), "--html");

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <map>
 #include <thread>
 
 #include <fmt/format.h>
@@ -45,20 +44,6 @@ std::function<bool(const Setting&)> of_file(const Invocation& invocation) {
   return [&invocation](const Setting& setting) {
     return invocation.gives("--set " + setting.unit + "." + setting.parameter);
   };
-}
-
-/// Of KEY=VALUE texts, only different keys may be given more than once.
-void refuse_keys_given_twice(const Values& values, const std::string& option) {
-  std::map<std::string, std::string> given;
-  for (const std::string& text : values) {
-    const std::size_t equals = std::min(text.find('='), text.size());
-    const std::string key = text.substr(0, equals);
-    const std::string value = text.substr(std::min(equals + 1, text.size()));
-    const auto [first, is_new] = given.emplace(key, value);
-    if (is_new) continue;
-    throw UserError("option given twice", option + " " + key, "as '" + first->second + "' and as '" + value + "'",
-                    "give it once");
-  }
 }
 
 }  // namespace
@@ -499,16 +484,13 @@ RunRequest SimulationArguments::machine(SettingsByPart& parts, const Invocation&
   RunRequest request;
   request.platform = chosen_platforms().front();
   if (const auto name = single(fidelity_, "--fidelity")) request.fidelity = fidelity_named(*name);
-  refuse_keys_given_twice(settings_, "--set");
-  refuse_keys_given_twice(units_, "--unit");
   std::vector<Setting> settings;
-  for (const std::string& text : settings_) {
-    const Setting setting = parse_setting(text);
+  for (const Setting& setting : parse_settings(settings_)) {
     if (!restates_preprocessing(setting) || !of_file(invocation)(setting)) settings.push_back(setting);
   }
   parts = sort_settings(settings);
   request.settings = parts.machine;
-  for (const std::string& text : units_) request.units.push_back(parse_unit_choice(text));
+  request.units = parse_unit_choices(units_);
   return request;
 }
 

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include <fmt/format.h>
@@ -116,7 +117,7 @@ std::pair<std::string, CycleWindow> parse_window(const std::string& text, const 
   return {text.substr(0, at), window};
 }
 
-Setting parse_setting(const std::string& text) {
+static Setting parse_setting(const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::size_t dot = text.rfind('.', equals);
   if (equals == std::string::npos || dot == std::string::npos || dot == 0 || dot + 1 >= equals ||
@@ -127,13 +128,41 @@ Setting parse_setting(const std::string& text) {
   return {text.substr(0, dot), text.substr(dot + 1, equals - dot - 1), text.substr(equals + 1)};
 }
 
-UnitChoice parse_unit_choice(const std::string& text) {
+static UnitChoice parse_unit_choice(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
     throw UserError("bad value '" + text + "'", "--unit", "it is not SLOT=IMPLEMENTATION",
                     "give e.g. --unit qru=pass-through; `vrpipe units` lists all implementations");
   }
   return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+/// Of KEY=VALUE texts, only different keys may be given more than once.
+static void refuse_keys_given_twice(const std::vector<std::string>& values, const std::string& option) {
+  std::map<std::string, std::string> given;
+  for (const std::string& text : values) {
+    const std::size_t equals = std::min(text.find('='), text.size());
+    const std::string key = text.substr(0, equals);
+    const std::string value = text.substr(std::min(equals + 1, text.size()));
+    const auto [first, is_new] = given.emplace(key, value);
+    if (is_new) continue;
+    throw UserError("option given twice", option + " " + key, "as '" + first->second + "' and as '" + value + "'",
+                    "give it once");
+  }
+}
+
+std::vector<Setting> parse_settings(const std::vector<std::string>& texts) {
+  refuse_keys_given_twice(texts, "--set");
+  std::vector<Setting> settings;
+  for (const std::string& text : texts) settings.push_back(parse_setting(text));
+  return settings;
+}
+
+std::vector<UnitChoice> parse_unit_choices(const std::vector<std::string>& texts) {
+  refuse_keys_given_twice(texts, "--unit");
+  std::vector<UnitChoice> choices;
+  for (const std::string& text : texts) choices.push_back(parse_unit_choice(text));
+  return choices;
 }
 
 }  // namespace vrpipe::tools

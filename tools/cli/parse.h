@@ -38,10 +38,10 @@ std::vector<std::string> parse_names(const std::string& text, const std::string&
 /// and has no colon is part of the text.
 std::pair<std::string, CycleWindow> parse_window(const std::string& text, const std::string& option);
 
-/// "UNIT.PARAMETER=VALUE".
-Setting parse_setting(const std::string& text);
+/// "UNIT.PARAMETER=VALUE" each, of different parameters.
+std::vector<Setting> parse_settings(const std::vector<std::string>& texts);
 
-/// "SLOT=IMPLEMENTATION".
-UnitChoice parse_unit_choice(const std::string& text);
+/// "SLOT=IMPLEMENTATION" each, of different slots.
+std::vector<UnitChoice> parse_unit_choices(const std::vector<std::string>& texts);
 
 }  // namespace vrpipe::tools

@@ -48,8 +48,8 @@ bool print(const SimulationJob& job, ResultFiles& files, const MakeJson& make_js
 
 }  // namespace
 
-void print_result(const SimulationJob& job, const JobResult& result) {
-  ResultFiles files;
+void print_result(const SimulationJob& job, JobResult result) {
+  ResultFiles& files = result.files;
   if (job.interval_csv) files.write(*job.interval_csv, intervals_csv(result.runs), "--interval-csv");
   if (job.html) {
     std::string page;
@@ -68,9 +68,9 @@ void print_result(const SimulationJob& job, const JobResult& result) {
   if (files.has("--html")) tell("page", *job.html);
   if (job.save_draw) tell("draw", *job.save_draw);
   if (files.has("--interval-csv")) tell("intervals", *job.interval_csv);
-  if (job.trace) tell("trace", job.trace->path());
-  if (job.log && job.log->file()) tell("log", *job.log->file());
-  if (job.heat_maps) tell("heat maps", *job.output);
+  if (files.has(Trace::option)) tell("trace", job.trace->path());
+  if (files.has(EventLog::file_option)) tell("log", *job.log->file());
+  if (files.has(HeatMaps::option)) tell("heat maps", *job.output);
   files.check();
 }
 

@@ -154,8 +154,8 @@ class ReproduceCommand : public Command {
                         "give lt or cycle");
       }
     }
-    for (const std::string& text : settings_) base.settings.push_back(parse_setting(text));
-    for (const std::string& text : units_) base.units.push_back(parse_unit_choice(text));
+    base.settings = parse_settings(settings_);
+    base.units = parse_unit_choices(units_);
     check_configuration(base);
     job.json = single(json_, "--json");
     job.html = single_path(html_, "--html");

@@ -119,24 +119,50 @@ void create_output_folder(const fs::path& path, const std::string& option) {
   }
 }
 
-std::unique_ptr<AtomicFile> open_output_file(const fs::path& path, const std::string& option) {
-  return std::make_unique<AtomicFile>(path, cannot_write, place(path, option));
-}
-
 void write_output_file(const fs::path& path, const std::string& bytes, const std::string& option) {
-  const std::unique_ptr<AtomicFile> file = open_output_file(path, option);
-  file->write(bytes.data(), bytes.size());
-  file->commit();
+  AtomicFile file(path, cannot_write, place(path, option));
+  file.write(bytes.data(), bytes.size());
+  file.commit();
   note_written(path.string());
 }
 
-void ResultFiles::write(const fs::path& path, const std::string& bytes, const std::string& option) {
+CourseFile::CourseFile(const fs::path& path, const std::string& option) : path_(path) {
+  attempt([&] { file_ = std::make_unique<AtomicFile>(path, cannot_write, place(path, option)); });
+}
+
+void CourseFile::write(const void* data, std::size_t size_bytes) {
+  if (file_ != nullptr) attempt([&] { file_->write(data, size_bytes); });
+}
+
+void CourseFile::commit() {
+  if (file_ != nullptr) attempt([&] { file_->commit(); });
+  if (failure_) std::rethrow_exception(failure_);
+  note_written(path_.string());
+}
+
+template <class Step>
+void CourseFile::attempt(const Step& step) {
   try {
-    write_output_file(path, bytes, option);
+    step();
+  } catch (const UserError&) {
+    failure_ = std::current_exception();
+    file_.reset();
+  }
+}
+
+bool ResultFiles::write(const fs::path& path, const std::string& bytes, const std::string& option) {
+  return finish(path, option, [&] { write_output_file(path, bytes, option); });
+}
+
+bool ResultFiles::finish(const fs::path& path, const std::string& option, const std::function<void()>& finish) {
+  try {
+    finish();
     written_.insert(option);
+    return true;
   } catch (const UserError& error) {
     failures_ += failures_.empty() ? error.what() : "; neither could " + place(path, option) + " be written";
     failed_.insert(option);
+    return false;
   }
 }
 

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstddef>
+#include <exception>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -35,8 +38,22 @@ void check_output_folder(const std::filesystem::path& path, const std::string& o
 /// Makes the folder, with the folders above it, unless it is there.
 void create_output_folder(const std::filesystem::path& path, const std::string& option);
 
-/// For a file that is written in pieces; it appears with commit().
-std::unique_ptr<AtomicFile> open_output_file(const std::filesystem::path& path, const std::string& option);
+/// A file that a run writes as it goes on. What keeps it from being written does not end the run: commit() says it.
+class CourseFile {
+ public:
+  CourseFile(const std::filesystem::path& path, const std::string& option);
+  void write(const void* data, std::size_t size_bytes);
+  /// The file appears, or what kept it from that is thrown.
+  void commit();
+
+ private:
+  template <class Step>
+  void attempt(const Step& step);
+
+  const std::filesystem::path path_;
+  std::unique_ptr<AtomicFile> file_;  ///< null once it failed
+  std::exception_ptr failure_;
+};
 
 /// Writes a file as AtomicFile does.
 void write_output_file(const std::filesystem::path& path, const std::string& bytes, const std::string& option);
@@ -44,8 +61,10 @@ void write_output_file(const std::filesystem::path& path, const std::string& byt
 /// The files of one result: a disk that is full under one of them does not take the others with it.
 class ResultFiles {
  public:
-  /// Writes a file as write_output_file() does; what keeps it from being written, check() says.
-  void write(const std::filesystem::path& path, const std::string& bytes, const std::string& option);
+  /// Writes a file as write_output_file() does; what keeps it from being written, check() says. Returns whether it is there.
+  bool write(const std::filesystem::path& path, const std::string& bytes, const std::string& option);
+  /// The same of what `finish` writes, a CourseFile's last piece.
+  bool finish(const std::filesystem::path& path, const std::string& option, const std::function<void()>& finish);
   /// Whether all that an option named is written, and something is.
   bool has(const std::string& option) const;
   /// Once all is written and printed. Throws CommandFailure with all that could not be.

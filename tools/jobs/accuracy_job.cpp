@@ -114,10 +114,10 @@ Workload load(const AccuracyJob& job, AccuracyResult& result) {
   return workload;
 }
 
-void write_image(const AccuracyJob& job, const std::string& scene, const std::string& name, const SharedImage& image) {
-  const ImageFiles files = image_files(job.simulation, image_name(scene, name));
-  write_output_file(files.png, encode_png(image, job.simulation.background), "--output");
-  write_output_file(files.exr, encode_exr(image), "--output");
+void write_image(const AccuracyJob& job, AccuracyResult& result, const std::string& name, const SharedImage& image) {
+  const ImageFiles files = image_files(job.simulation, image_name(result.scene.name, name));
+  result.files.write(files.png, encode_png(image, job.simulation.background), "--output");
+  result.files.write(files.exr, encode_exr(image), "--output");
 }
 
 /// The image that errors are measured against: all bands, exact order.
@@ -131,7 +131,7 @@ ShownImage make_reference(const AccuracyJob& job, const Workload& workload, Accu
     for (const std::array<double, 4>& pixel : exact.rgba) {
       value = std::transform(pixel.begin(), pixel.end(), value, [](double x) { return static_cast<float>(x); });
     }
-    write_image(job, result.scene.name, reference_name, image);
+    write_image(job, result, reference_name, image);
   }
   ShownImage reference = shown(exact, job.simulation.background);
   if (job.html) result.reference = picture_of(reference, reference_width);
@@ -323,9 +323,7 @@ void climb_precisions(const AccuracyJob& job, const Workload& workload, const st
       run.picture = picture_of(image, picture_width);
       run.error_map = error_map(image, reference, picture_width);
     }
-    if (job.simulation.output) {
-      write_image(job, result.scene.name, file_name(run.name), *simulated.image);
-    }
+    if (job.simulation.output) write_image(job, result, file_name(run.name), *simulated.image);
   });
 
   std::vector<TradeOff> trade_offs;

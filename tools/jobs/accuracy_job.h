@@ -90,6 +90,7 @@ struct AccuracyResult {
   Picture reference;                        ///< the exact image, for the page
   double reference_seconds = 0;             ///< to render it
   double seconds = 0;                       ///< wall time of everything
+  ResultFiles files;                        ///< written so far: images
 };
 
 /// Runs both ladders. Images go to the folder of --output. Throws UserError, CommandFailure or a fault.

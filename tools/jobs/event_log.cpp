@@ -8,8 +8,6 @@
 
 #include <vrpipe/component/error.h>
 
-#include "host/output_file.h"
-#include "host/process_setup.h"
 #include "jobs/link_items.h"
 
 namespace vrpipe::tools {
@@ -81,7 +79,7 @@ void EventLog::attach(const RunRequest& request, Observers& observers) {
 }
 
 void EventLog::open() {
-  if (path_ && out_ == nullptr) out_ = open_output_file(*path_, file_option);
+  if (path_ && out_ == nullptr) out_ = std::make_unique<CourseFile>(*path_, file_option);
 }
 
 void EventLog::write(Cycle cycle, const std::string& unit, const std::string& what) {
@@ -96,9 +94,7 @@ void EventLog::write(Cycle cycle, const std::string& unit, const std::string& wh
 
 void EventLog::finish() {
   open();
-  if (out_ == nullptr) return;
   out_->commit();
-  note_written(path_->string());
 }
 
 }  // namespace vrpipe::tools

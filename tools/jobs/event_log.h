@@ -9,7 +9,7 @@
 #include <vrpipe/platforms/observers.h>
 #include <vrpipe/platforms/simulation.h>
 
-#include "file_io.h"
+#include "host/output_file.h"
 #include "jobs/cycle_window.h"
 
 namespace vrpipe::tools {
@@ -31,7 +31,7 @@ class EventLog {
   const std::optional<std::filesystem::path>& file() const { return path_; }
   /// Adds its observers; it has to live while they are called. Throws UserError for a unit that is not there.
   void attach(const RunRequest& request, Observers& observers);
-  /// After the run: the file appears. Throws UserError.
+  /// After the run, where there is one: the file appears. Throws UserError.
   void finish();
 
  private:
@@ -47,7 +47,7 @@ class EventLog {
 
   const std::vector<Choice> choices_;
   const std::optional<std::filesystem::path> path_;
-  std::unique_ptr<AtomicFile> out_;
+  std::unique_ptr<CourseFile> out_;
   std::vector<std::unique_ptr<Logged>> logged_;
 };
 

@@ -149,20 +149,20 @@ std::vector<std::filesystem::path> HeatMaps::files(const std::string& stem, Fide
   return files;
 }
 
-void HeatMaps::write(const std::string& stem) const {
+void HeatMaps::write(const std::string& stem, ResultFiles& files) const {
   const std::uint32_t width = fates_.width(), height = fates_.height();
   const std::vector<NamedChannel> pixels = of_pixels();
   const std::vector<NamedChannel> tiles = of_tiles(pixels);
   const nlohmann::ordered_json legends{{pixels_name, legend(pixels)}, {tiles_name, legend(tiles)}};
-  write_output_file(legend_name(stem), legends.dump(2) + "\n", option);
-  write_output_file(exr_name(stem, pixels_name), encode_exr(width, height, pixels), option);
-  write_output_file(exr_name(stem, tiles_name), encode_exr(tiles_along(width), tiles_along(height), tiles), option);
+  files.write(legend_name(stem), legends.dump(2) + "\n", option);
+  files.write(exr_name(stem, pixels_name), encode_exr(width, height, pixels), option);
+  files.write(exr_name(stem, tiles_name), encode_exr(tiles_along(width), tiles_along(height), tiles), option);
   for (const NamedChannel& channel : pixels) {
-    write_output_file(png_name(stem, pixels_name, channel.name), picture(channel, width, 1, width, height), option);
+    files.write(png_name(stem, pixels_name, channel.name), picture(channel, width, 1, width, height), option);
   }
   for (const NamedChannel& channel : tiles) {
-    write_output_file(png_name(stem, tiles_name, channel.name),
-                      picture(channel, tiles_along(width), screen_tile_pixels, width, height), option);
+    files.write(png_name(stem, tiles_name, channel.name),
+                picture(channel, tiles_along(width), screen_tile_pixels, width, height), option);
   }
 }
 

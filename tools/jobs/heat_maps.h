@@ -8,6 +8,7 @@
 #include <vrpipe/platforms/observers.h>
 #include <vrpipe/platforms/simulation.h>
 
+#include "host/output_file.h"
 #include "image/images.h"
 
 namespace vrpipe::tools {
@@ -25,7 +26,7 @@ class HeatMaps {
   ///                    without part of it
   void attach(Observers& observers, bool terminates);
   /// Once the run is done: writes `files`. Throws UserError.
-  void write(const std::string& stem) const;
+  void write(const std::string& stem, ResultFiles& files) const;
 
   /// All that will be written, by a path without extension.
   static std::vector<std::filesystem::path> files(const std::string& stem, Fidelity fidelity);

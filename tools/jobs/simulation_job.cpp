@@ -19,16 +19,19 @@
 namespace vrpipe::tools {
 namespace {
 
-/// Writes the images of all runs, side by side: compression takes longer than the disk.
+/// Writes the images of all runs, encoded side by side: compression takes longer than the disk.
 void write_images(const SimulationJob& job, const std::vector<Simulated>& simulated, JobResult& result) {
-  for (const RunResult& run : result.runs) {
-    result.images.emplace_back(image_files(job, image_name(result.scene.name, name_of(run.request))));
-  }
+  std::vector<std::pair<std::string, std::string>> encoded(simulated.size());
   for_each_chunk(simulated.size(), job.processes, [&](std::uint64_t i) {
     const SharedImage& image = *simulated[i].image;
-    write_output_file(result.images[i]->png, encode_png(image, job.background), "--output");
-    write_output_file(result.images[i]->exr, encode_exr(image), "--output");
+    encoded[i] = {encode_png(image, job.background), encode_exr(image)};
   });
+  for (std::size_t i = 0; i < encoded.size(); ++i) {
+    const ImageFiles files = image_files(job, image_name(result.scene.name, name_of(result.runs[i].request)));
+    const bool has_png = result.files.write(files.png, encoded[i].first, "--output");
+    const bool has_exr = result.files.write(files.exr, encoded[i].second, "--output");
+    result.images.push_back(has_png && has_exr ? std::optional(files) : std::nullopt);
+  }
 }
 
 /// Adds observers to requests; gives what they fill in.
@@ -142,8 +145,9 @@ JobResult perform(const SimulationJob& job) {
     }
     for (Simulated& run : simulated) result.runs.push_back(std::move(run.result));
     result.simulate_seconds = seconds_since(simulation_start);
-    if (job.trace) job.trace->finish();
-    if (job.log) job.log->finish();
+    if (job.trace) result.files.finish(job.trace->path(), Trace::option, [&] { job.trace->finish(); });
+    if (job.log && job.log->file())
+      result.files.finish(*job.log->file(), EventLog::file_option, [&] { job.log->finish(); });
     result.processes = std::min(job.processes, static_cast<unsigned>(job.requests.size()));
     if (job.explain_effects) result.effect_costs = measure_effects(result.runs, frame_of, progress);
   }
@@ -158,7 +162,7 @@ JobResult perform(const SimulationJob& job) {
     progress.show("writing images");
     write_images(job, simulated, result);
     for (std::size_t i = 0; job.heat_maps && i < heat_maps.size(); ++i)
-      heat_maps[i]->write((*job.output / images[i]).string());
+      heat_maps[i]->write((*job.output / images[i]).string(), result.files);
     progress.erase();
   } else {
     result.images.resize(simulated.size());

@@ -70,7 +70,7 @@ struct JobResult {
   std::uint32_t passes = 1;  ///< FrameDescription::passes
   std::vector<RunResult> runs;
   std::size_t baseline = 0;                       ///< of `runs`, over which speed-ups are
-  std::vector<std::optional<ImageFiles>> images;  ///< one for each run
+  std::vector<std::optional<ImageFiles>> images;  ///< one for each run; none where they could not be written
   std::vector<EffectCosts> effect_costs;          ///< one for each run, if they were asked for
   std::shared_ptr<const EnergyTable> energies;    ///< SimulationJob::energies
   PageMaterial page;                              ///< empty without SimulationJob::html
@@ -78,6 +78,7 @@ struct JobResult {
   unsigned processes = 1;
   double load_seconds = 0;      ///< wall time of reading and preprocessing scenes
   double simulate_seconds = 0;  ///< wall time of all simulations together
+  ResultFiles files;            ///< written so far: images, heat maps, the trace and the log
 };
 
 /// Name of the images of a run, without folder and extension: SCENE-VARIANT, or SCENE-PLATFORM-VARIANT.

@@ -9,7 +9,6 @@
 
 #include <vrpipe/component/error.h>
 
-#include "host/process_setup.h"
 #include "jobs/link_items.h"
 
 namespace vrpipe::tools {
@@ -249,9 +248,6 @@ void Trace::end(const RunResult& result) {
   for (StatisticCounter& each : statistics_) begin(each.counter);
 }
 
-void Trace::finish() {
-  file().commit();
-  note_written(path_.string());
-}
+void Trace::finish() { file().commit(); }
 
 }  // namespace vrpipe::tools

@@ -33,7 +33,7 @@ class Trace {
   const std::filesystem::path& path() const { return path_; }
   /// Adds its observers; it has to live while they are called. The run has time. Throws UserError.
   void attach(const RunRequest& request, Observers& observers);
-  /// After the run: the file appears. Throws UserError, as writing does during the run.
+  /// After the run: the file appears. Throws UserError.
   void finish();
 
  private:

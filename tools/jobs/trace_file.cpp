@@ -23,10 +23,10 @@ std::string text_of_time(std::uint64_t picoseconds) {
 
 TraceFile::TraceFile(const std::filesystem::path& path, const std::string& option, double frequency_mhz,
                      const nlohmann::json& about)
-    : picoseconds_(1e6 / frequency_mhz), file_(open_output_file(path, option)) {
+    : picoseconds_(1e6 / frequency_mhz), file_(path, option) {
   const std::string head =
       R"({"displayTimeUnit":"ns","otherData":)" + json_text(about) + ",\n" + R"("traceEvents":[)" + "\n";
-  file_->write(head.data(), head.size());
+  file_.write(head.data(), head.size());
 }
 
 std::uint64_t TraceFile::picoseconds(Cycle cycle) const {
@@ -36,7 +36,7 @@ std::uint64_t TraceFile::picoseconds(Cycle cycle) const {
 void TraceFile::write(const std::string& event) {
   const std::string text = (is_first_ ? "" : ",\n") + event;
   is_first_ = false;
-  file_->write(text.data(), text.size());
+  file_.write(text.data(), text.size());
 }
 
 void TraceFile::name_group(unsigned group, const std::string& name) {
@@ -71,8 +71,8 @@ void TraceFile::counter(unsigned group, const std::string& name, const std::stri
 
 void TraceFile::commit() {
   const std::string tail = "\n]}\n";
-  file_->write(tail.data(), tail.size());
-  file_->commit();
+  file_.write(tail.data(), tail.size());
+  file_.commit();
 }
 
 }  // namespace vrpipe::tools

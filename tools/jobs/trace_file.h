@@ -2,14 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include <vrpipe/kernel/accounting.h>
 
-#include "file_io.h"
+#include "host/output_file.h"
 
 namespace vrpipe::tools {
 
@@ -34,7 +33,7 @@ class TraceFile {
   void instant(Track track, const std::string& name, Cycle at, nlohmann::json arguments);
   /// From a cycle on.
   void counter(unsigned group, const std::string& name, const std::string& unit, Cycle at, std::int64_t value);
-  /// The file appears. All throw UserError where it cannot be written.
+  /// The file appears. Throws UserError where it cannot be written.
   void commit();
 
  private:
@@ -43,7 +42,7 @@ class TraceFile {
   void write(const std::string& event);
 
   const double picoseconds_;  ///< of a cycle
-  std::unique_ptr<AtomicFile> file_;
+  CourseFile file_;
   bool is_first_ = true;
 };
 
