@@ -547,10 +547,13 @@ TEST_F(Accuracy, PageStandsAlone) {
   EXPECT_EQ(page.rfind("<!DOCTYPE html>", 0), 0U);
   EXPECT_EQ(occurrences(page, "</html>"), 1U);
   EXPECT_EQ(occurrences(page, "<svg"), 2U);
+  EXPECT_EQ(occurrences(page, ">plot as SVG<"), 2U);
+  EXPECT_EQ(occurrences(page, ">data as CSV<"), 2U);
   // Nothing is loaded: the only address is the name of SVG.
   EXPECT_EQ(occurrences(page, "http"), occurrences(page, "xmlns=\"http://www.w3.org/2000/svg\""));
   EXPECT_EQ(occurrences(page, "src="), occurrences(page, "src=\"data:image/png;base64,"));
-  for (const char* loading : {"<script", "<link", "<iframe", "@import", "url(", "href="}) {
+  EXPECT_EQ(occurrences(page, "href="), occurrences(page, "href=\"data:"));
+  for (const char* loading : {"<script", "<link", "<iframe", "@import", "url("}) {
     EXPECT_EQ(page.find(loading), std::string::npos) << loading;
   }
   // The reference, and for each run an image and an error map.

@@ -127,9 +127,13 @@ TEST_F(Microbench, OnThePapersGpuAllThatIsPublishedOfItAgrees) {
   EXPECT_NEAR(rop.at("RGBA16F, no blending, 1024x1024"), 7.11, 0.05) << "a write-back alone";
 
   const std::string page = read_file(folder() / "all.html");
-  std::size_t plots = 0;
-  for (std::size_t at = 0; (at = page.find("<svg", at)) != std::string::npos; ++at) ++plots;
-  EXPECT_EQ(plots, curves);
+  const auto times = [&](const std::string& text) {
+    std::size_t count = 0;
+    for (std::size_t at = 0; (at = page.find(text, at)) != std::string::npos; ++at) ++count;
+    return count;
+  };
+  EXPECT_EQ(times("<svg"), curves);
+  EXPECT_EQ(times(">plot as SVG<"), curves);
   EXPECT_EQ(page.find("src=\"http"), std::string::npos);
   EXPECT_EQ(page.find("href=\"http"), std::string::npos);
   EXPECT_NE(page.find("</html>"), std::string::npos);

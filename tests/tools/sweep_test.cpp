@@ -10,6 +10,8 @@
 #include <sstream>
 #include <thread>
 
+#include <fmt/format.h>
+
 #include "documented_keys.h"
 
 namespace vrpipe::testing {
@@ -53,6 +55,56 @@ TEST_F(Sweep, RunsTheProductOfItsAxesTheLastFastest) {
   EXPECT_EQ(result["product"], 6);
 }
 
+// baseline's TGC passes through: it has no bins.
+TEST_F(Sweep, HasOnePointWhereNoUnitDeclaresTheParameterOfAnAxis) {
+  const json result = sweep(small_sweep + "[axes]\nvariant = [\"baseline\", \"qm\"]\ntgc.bins = [4, 64, 128]\n");
+  EXPECT_EQ(values(result),
+            (std::vector<std::vector<json>>{{"baseline", nullptr}, {"qm", 4}, {"qm", 64}, {"qm", 128}}));
+  const double of_baseline = result["points"][0]["cycles"];
+  for (const json& point : result["points"]) {
+    ASSERT_TRUE(point["speedup"].is_number()) << "over baseline, which has one point: " << point;
+    EXPECT_DOUBLE_EQ(point["speedup"], of_baseline / point["cycles"].get<double>());
+  }
+  for (const json& effect : result["effects"]) {
+    if (effect["axis"] != "tgc.bins") continue;
+    for (const json& value : effect["values"]) EXPECT_EQ(value["points"], 1) << value;
+  }
+  const json list = sweep(small_sweep +
+                          "[[points]]\nvariant = \"baseline\"\ntgc.bins = 4\n"
+                          "[[points]]\nvariant = \"baseline\"\ntgc.bins = 8\n"
+                          "[[points]]\nvariant = \"qm\"\ntgc.bins = 8\n");
+  EXPECT_EQ(values(list), (std::vector<std::vector<json>>{{"baseline", nullptr}, {"qm", 8}}));
+}
+
+TEST_F(Sweep, ItsPageHasVariantsBySceneWithTheirGeometricMean) {
+  write_draw_list(folder() / "other.spl", [] {
+    Draw draw = tiny_draw();
+    draw.splats.resize(20);
+    return draw;
+  }());
+  const json result = sweep(
+      "fidelity = \"lt\"\n[axes]\nscene = [\"tiny.spl\", \"other.spl\"]\n"
+      "variant = [\"baseline\", \"qm\"]\n",
+      {"--html", "s.html"});
+  double product = 1;
+  for (const json& point : result["points"]) {
+    if (point["variant"] == "qm") product *= point["speedup"].get<double>();
+  }
+  const std::string page = read_file(folder() / "s.html");
+  const std::size_t mean = page.find(">geometric mean</text>");
+  ASSERT_NE(mean, std::string::npos);
+  EXPECT_LT(page.find(">other.spl</text>"), mean);
+  EXPECT_LT(mean, page.find(fmt::format("<title>qm: {:.3g}</title>", std::sqrt(product)), mean));
+  EXPECT_NE(page.find(">simulated time, ms</text>"), std::string::npos) << "words, no keys";
+}
+
+TEST_F(Sweep, NamesThePointThatCannotBe) {
+  bad(small_sweep + "[axes]\nvariant = [\"baseline\", \"qm\"]\ntgc.bins = [4, 0]\n",
+      {"'0'", "of the point variant=qm, tgc.bins=0", "give a whole number"});
+  bad(small_sweep + "[axes]\nvariant = [\"baseline\", \"qm\"]\ntgc.binz = [4]\n",
+      {"'binz'", "of the point variant=baseline, tgc.binz=4", "did you mean tgc.bins"});
+}
+
 TEST_F(Sweep, APointIsTheRunOfItsSettings) {
   const json result = sweep(small_sweep +
                             "[set]\ntgc.bins = 9\n[variants.mine]\nbase = \"het+qm\"\nunit.qru = \"pass-through\"\n"
@@ -92,6 +144,34 @@ TEST_F(Sweep, HasTheStatisticsThatItNamesAsColumns) {
   bad(small_sweep + "columns = [\"crop.cache.sector_hit\"]\n[axes]\ntc.bins = [1, 2]\n",
       {"'crop.cache.sector_hit'", "did you mean crop.cache.sector_hits?"});
   bad(small_sweep + "columns = \"crop.quads_blended\"\n[axes]\ntc.bins = [1, 2]\n", {"'columns'", "no list"});
+}
+
+TEST_F(Sweep, MeasuresImagesAgainstTheExactOne) {
+  const std::string study = small_sweep +
+                            "columns = [\"image.psnr_db\", \"tc.flushes\", \"image.ssim\", \"image.max_abs_error\"]\n"
+                            "[axes]\nformat = [\"rgba8\", \"rgba32f\"]\nstate.termination_threshold = [0.9, 0.999]\n";
+  const json result = sweep(study);
+  // The exact image: by another command.
+  const json accuracy = json_of({"accuracy", "--scene", "tiny.spl", "--quick", "--fidelity", "lt", "--format", "rgba8",
+                                 "--set", "state.termination_threshold=0.9"});
+  for (const json& row : accuracy["precision"]) {
+    if (!row["default"]) continue;
+    EXPECT_EQ(result["points"][0]["image.psnr_db"], row["psnr_db"]);
+  }
+  for (const json& point : result["points"]) {
+    EXPECT_GT(point["image.psnr_db"], 30);
+    EXPECT_GT(point["image.ssim"], 0.9);
+    EXPECT_LT(point["image.max_abs_error"], 0.1);
+    EXPECT_GT(point["tc.flushes"], 0);
+  }
+  EXPECT_GT(result["points"][3]["image.psnr_db"], result["points"][1]["image.psnr_db"]) << "32 bits for 8";
+  EXPECT_GT(result["points"][3]["image.psnr_db"], result["points"][2]["image.psnr_db"]) << "a threshold of 0.999";
+  // Taken from the journal they are the same.
+  for (const char* file : {"first.json", "second.json"}) {
+    const Finished finished = vrpipe({"sweep", "study.toml", "--journal", "j", "--json", file});
+    ASSERT_EQ(finished.code, 0) << finished.err;
+    EXPECT_EQ(json::parse(read_file(folder() / file))["points"], result["points"]) << file;
+  }
 }
 
 TEST_F(Sweep, DrawsScenesViewsAndSizes) {
@@ -175,7 +255,7 @@ TEST_F(Sweep, MarksGpusThatNoOtherBeats) {
       EXPECT_FALSE(beats && gpu["on_front"]);
     }
   }
-  EXPECT_EQ(front.size(), 4U);
+  EXPECT_EQ(front.size(), 3U) << "baseline has no bins";
   EXPECT_TRUE(std::any_of(front.begin(), front.end(), [](const auto& each) { return each.second; }));
 }
 

@@ -12,6 +12,7 @@
 #include "cli/parse.h"
 #include "host/progress_line.h"
 #include "jobs/comparison.h"
+#include "output/page_parts.h"
 #include "output/report.h"
 #include "output/text_table.h"
 
@@ -220,6 +221,23 @@ TEST(Text, ParsesStrictly) {
   EXPECT_EQ(parse_unit_choices({"qru=mine"}).at(0).implementation, "mine");
   EXPECT_THROW(parse_unit_choices({"qru=mine", "qru=mine"}), UserError);
   EXPECT_THROW(parse_settings({"tc.bins=1", "tc.bins=2"}), UserError);
+}
+
+TEST(PageFigure, HasTheDataOfAPlotByItsWords) {
+  BarPlot bars;
+  bars.legend = {{"qm", "#0072b2"}};
+  bars.groups = {{"a, b", {{0, 1.5, "#0072b2", "tip"}}, {2}}};
+  const std::string html = figure("Speed-ups, by scene", bars);
+  EXPECT_NE(html.find("download=\"speed-ups-by-scene.csv\""), std::string::npos) << html;
+  const std::string csv = "group,series,from,to,note\n\"a, b\",qm,0,1.5,tip\n\"a, b\",mark,2,2,\n";
+  EXPECT_NE(html.find(csv_link("speed-ups-by-scene", csv)), std::string::npos) << html;
+  Plot plot;
+  plot.x.title = "cycles";
+  plot.y.title = "error, %";
+  plot.points = {{1, 2, "#123456", Marker::square, false, "lt", "lt: 2 %"}};
+  plot.legend = {{"front", "#123456", Marker::square, false, true}, {"het", "#123456", Marker::square, false, false}};
+  EXPECT_NE(figure("x", plot).find(csv_link("x", "series,cycles,\"error, %\",label,note\nhet,1,2,lt,lt: 2 %\n")),
+            std::string::npos);
 }
 
 }  // namespace

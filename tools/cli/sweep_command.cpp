@@ -142,6 +142,7 @@ class SweepCommand : public Command {
     if (const auto text = single(relative_to_, "--relative-to"))
       job.study.relative_to = parse_axis_values(*text, job.study, "--relative-to");
     job.common = arguments_.resolve(SimulationArguments::Variants::one, invocation());
+    leave_out_absent(job);
     choose_references(job);
     job.csv = single_path(csv_, "--csv");
     job.jsonl = single_path(jsonl_, "--jsonl");

@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/configuration.h>
+#include <vrpipe/platforms/netlist.h>
 #include <vrpipe/workloads/preprocess_parameters.h>
 
 namespace vrpipe::tools {
@@ -33,6 +35,19 @@ std::vector<std::pair<std::string, std::string>> final_parameters(const RunReque
   all.effects = EffectChoice::parse("all");
   all.observers = nullptr;
   return Configuration(all, Frame(1, 1)).parameters();
+}
+
+bool declares(const RunRequest& request, const std::string& parameter) {
+  const std::size_t dot = parameter.rfind('.');
+  const std::string slot = without_gpc(parameter.substr(0, dot)), name = parameter.substr(dot + 1);
+  if (!Registry::instance().has_slot(slot)) return true;
+  const auto implementations = Configuration(request, Frame(1, 1)).implementations();
+  return std::any_of(implementations.begin(), implementations.end(), [&](const auto& of_slot) {
+    if (without_gpc(of_slot.first) != slot) return false;
+    const std::unique_ptr<ParameterSet> set = Registry::instance().find(slot, of_slot.second).make_parameters();
+    const auto& declared = set->parameters();
+    return std::any_of(declared.begin(), declared.end(), [&](const Parameter* each) { return each->name() == name; });
+  });
 }
 
 void leave_out_restated(std::vector<RunRequest>& requests, const std::function<bool(const Setting&)>& which) {

@@ -25,6 +25,10 @@ struct SettingsByPart {
 /// UNIT.PARAMETER and final value of everything that can be set, without preprocessing. Throws UserError.
 std::vector<std::pair<std::string, std::string>> final_parameters(const RunRequest& request);
 
+/// Whether the units of a request declare UNIT.PARAMETER: one that passes through, or is another make, may not. What is no
+/// unit's is, if it can be set at all. Throws UserError.
+bool declares(const RunRequest& request, const std::string& parameter);
+
 /// Leaves out those settings of `which` that are so anyway in every request, so that reports list changes alone: a
 /// configuration file may say everything. Throws UserError.
 void leave_out_restated(std::vector<RunRequest>& requests, const std::function<bool(const Setting&)>& which);

@@ -206,6 +206,38 @@ void add_product(const StudyReader& reader, const toml::table& root, Study& stud
 
 }  // namespace
 
+const std::string& text_of(const StudyAxis& axis, std::size_t place) {
+  static const std::string none;
+  return place == no_value ? none : axis.values[place];
+}
+
+std::optional<std::size_t> Study::axis(const std::string& name) const {
+  const auto found = std::find_if(axes.begin(), axes.end(), [&](const StudyAxis& each) { return each.name == name; });
+  return found == axes.end() ? std::nullopt : std::optional(static_cast<std::size_t>(found - axes.begin()));
+}
+
+std::pair<std::size_t, std::size_t> Study::machine_of(const std::vector<std::size_t>& values) const {
+  const auto platform = axis("platform"), variant = axis("variant");
+  return {platform ? values[*platform] : 0, variant ? values[*variant] : 0};
+}
+
+std::vector<std::size_t> Study::without_absent(std::vector<std::size_t> values) const {
+  const auto found = absent.find(machine_of(values));
+  if (found == absent.end()) return values;
+  for (const std::size_t each : found->second) values[each] = no_value;
+  return values;
+}
+
+void Study::leave_out_absent() {
+  std::set<std::vector<std::size_t>> seen;
+  std::vector<StudiedPoint> kept;
+  for (StudiedPoint& point : points) {
+    point.values = without_absent(std::move(point.values));
+    if (seen.insert(point.values).second) kept.push_back(std::move(point));
+  }
+  points = std::move(kept);
+}
+
 const std::vector<std::string>& study_keys() {
   static const std::vector<std::string> keys{"axes", "points", "sample", "seed", "columns", "pareto"};
   return keys;
@@ -312,7 +344,7 @@ std::vector<std::optional<std::size_t>> references(const Study& study) {
         values[axis] = of.reference;
       }
     }
-    const auto found = places.find(values);
+    const auto found = places.find(study.without_absent(std::move(values)));
     all.push_back(found == places.end() ? std::nullopt : std::optional(found->second));
   }
   return all;

@@ -3,7 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,9 +20,14 @@ struct StudyAxis {
   std::size_t reference = 0;  ///< the place of the value over which speed-ups are, unless a study names another
 };
 
+/// In the place of a value: the axis is of a parameter that the point's units do not have.
+constexpr std::size_t no_value = ~std::size_t{0};
+/// Of a point on an axis, its value as text; empty for no_value.
+const std::string& text_of(const StudyAxis& axis, std::size_t place);
+
 /// What is run: a value on every axis.
 struct StudiedPoint {
-  std::vector<std::size_t> values;  ///< by axis, a place in its values
+  std::vector<std::size_t> values;  ///< by axis, a place in its values, or no_value
 };
 
 /// Named axes and values, as `variant=baseline,tc.bins=32` says them.
@@ -35,6 +42,16 @@ struct Study {
   AxisValues relative_to;
   std::vector<std::string> columns;  ///< statistics that results have beside what they always have
   std::vector<std::string> pareto;   ///< columns of results; a - in front of those of which more is better
+  /// By places on the axes `platform` and `variant`, 0 where there is none: axes of parameters that these do not have.
+  std::map<std::pair<std::size_t, std::size_t>, std::set<std::size_t>> absent;
+
+  std::optional<std::size_t> axis(const std::string& name) const;
+  /// The places on these axes of a point's values.
+  std::pair<std::size_t, std::size_t> machine_of(const std::vector<std::size_t>& values) const;
+  /// Without values on the axes that are absent there.
+  std::vector<std::size_t> without_absent(std::vector<std::size_t> values) const;
+  /// Points that come to the same are one.
+  void leave_out_absent();
 };
 
 /// Keys of a study file that are no options.

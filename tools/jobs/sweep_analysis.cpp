@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <utility>
@@ -18,7 +19,9 @@
 namespace vrpipe::tools {
 namespace {
 
-nlohmann::ordered_json typed(const StudyAxis& axis, const std::string& text) {
+nlohmann::ordered_json typed(const StudyAxis& axis, std::size_t place) {
+  if (place == no_value) return {};
+  const std::string& text = axis.values[place];
   if (!axis.numeric) return text;
   const char* const end = text.data() + text.size();
   std::int64_t whole = 0;
@@ -90,7 +93,7 @@ SweepTable sweep_table(const SweepResult& result) {
     std::vector<nlohmann::ordered_json> row{i};
     for (std::size_t axis = 0; axis < result.study.axes.size(); ++axis) {
       const StudyAxis& of = result.study.axes[axis];
-      row.push_back(typed(of, of.values[result.study.points[i].values[axis]]));
+      row.push_back(typed(of, result.study.points[i].values[axis]));
     }
     if (!point.fault.empty()) {
       row.resize(table.columns.size() - 1);
@@ -118,7 +121,7 @@ SweepTable sweep_table(const SweepResult& result) {
     row.push_back(run.bottleneck ? nlohmann::ordered_json(run.bottleneck->unit) : nlohmann::ordered_json());
     row.push_back(run.bottleneck ? nlohmann::ordered_json(run.bottleneck->occupancy) : nlohmann::ordered_json());
     row.push_back(run.result_hash);
-    for (const std::optional<double>& column : point.columns) row.push_back(optional_json(column));
+    for (const std::optional<double>& column : point.columns) row.push_back(column_json(column));
     row.emplace_back();
     table.rows.push_back(std::move(row));
     table.points.push_back(i);
@@ -164,6 +167,48 @@ AxisEffects axis_effects(const SweepResult& result, const SweepTable& table) {
   return all;
 }
 
+std::optional<GroupedMeans> grouped_means(const SweepResult& result, const SweepTable& table, bool of_speedups) {
+  const Study& study = result.study;
+  const auto first_of = [&](std::initializer_list<const char*> names, bool drawn) -> std::optional<std::size_t> {
+    for (const char* name : names) {
+      const auto axis = study.axis(name);
+      if (axis && study.axes[*axis].values.size() > 1) return axis;
+    }
+    for (std::size_t i = 0; i < study.axes.size(); ++i) {
+      if (follows_the_point(study.axes[i].name) == drawn && study.axes[i].values.size() > 1) return i;
+    }
+    return std::nullopt;
+  };
+  const auto groups = first_of({"scene", "view", "size"}, true);
+  const auto series = first_of({"variant", "platform"}, false);
+  if (!groups || !series) return std::nullopt;
+  GroupedMeans means{*groups, *series, {}, {}};
+  const std::size_t column = table.column(of_speedups ? "speedup" : "milliseconds");
+  const auto mean_of = [&](std::size_t group, std::size_t each) -> std::optional<double> {
+    std::vector<double> values;
+    for (std::size_t row = 0; row < table.rows.size(); ++row) {
+      const std::vector<std::size_t>& at = study.points[table.points[row]].values;
+      const auto number = table.number(row, column);
+      if (at[*groups] == group && at[*series] == each && number && *number > 0) values.push_back(*number);
+    }
+    return values.empty() ? std::nullopt : std::optional(mean_of_values(values));
+  };
+  for (std::size_t group = 0; group < study.axes[*groups].values.size(); ++group) {
+    means.of_group.emplace_back();
+    for (std::size_t each = 0; each < study.axes[*series].values.size(); ++each)
+      means.of_group.back().push_back(mean_of(group, each));
+  }
+  for (std::size_t each = 0; each < study.axes[*series].values.size(); ++each) {
+    std::vector<double> values;
+    for (const auto& group : means.of_group) {
+      if (group[each]) values.push_back(*group[each]);
+    }
+    means.geometric_mean.push_back(values.size() == means.of_group.size() ? std::optional(mean_of_values(values))
+                                                                          : std::nullopt);
+  }
+  return means;
+}
+
 std::optional<ParetoTable> pareto_table(const SweepResult& result, const SweepTable& table) {
   ParetoTable pareto;
   pareto.columns = result.study.pareto;
@@ -190,7 +235,7 @@ std::optional<ParetoTable> pareto_table(const SweepResult& result, const SweepTa
   for (const auto& [key, rows] : rows_of) {
     ParetoRow row_of_gpu;
     for (std::size_t i = 0; i < axes.size(); ++i)
-      row_of_gpu.values.push_back(result.study.axes[axes[i]].values[key[i]]);
+      row_of_gpu.values.push_back(text_of(result.study.axes[axes[i]], key[i]));
     for (const std::size_t column : columns) {
       std::vector<double> values;
       for (const std::size_t row : rows) {

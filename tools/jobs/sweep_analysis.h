@@ -41,6 +41,17 @@ struct AxisEffects {
 };
 AxisEffects axis_effects(const SweepResult& result, const SweepTable& table);
 
+/// What is drawn, by what draws it, as papers show it: means of speed-ups, or of milliseconds where there are none, over all
+/// other axes.
+struct GroupedMeans {
+  std::size_t groups_axis = 0;                               ///< scene, or another of what is drawn
+  std::size_t series_axis = 0;                               ///< variant, or another of what the GPU is
+  std::vector<std::vector<std::optional<double>>> of_group;  ///< by value of groups_axis, then of series_axis
+  std::vector<std::optional<double>> geometric_mean;         ///< over the groups, where all have the value
+};
+/// None where there are not two values on one such axis and two or more on the other.
+std::optional<GroupedMeans> grouped_means(const SweepResult& result, const SweepTable& table, bool of_speedups);
+
 /// A GPU of the study, over all that it draws.
 struct ParetoRow {
   std::vector<std::string> values;  ///< by axis of ParetoTable

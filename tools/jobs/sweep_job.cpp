@@ -1,8 +1,10 @@
 #include "jobs/sweep_job.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <set>
@@ -16,10 +18,13 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>
+#include <vrpipe/workloads/exact_image.h>
 
+#include "image/image_error.h"
 #include "jobs/energy.h"
 #include "jobs/identity.h"
 #include "jobs/loaded_frame.h"
+#include "jobs/optional_json.h"
 #include "jobs/processes.h"
 #include "jobs/ranks.h"
 #include "jobs/result_encoding.h"
@@ -33,10 +38,8 @@ using SteadyClock = std::chrono::steady_clock;
 
 const std::string& value_on(const Study& study, const StudiedPoint& point, const std::string& axis,
                             const std::string& otherwise) {
-  for (std::size_t i = 0; i < study.axes.size(); ++i) {
-    if (study.axes[i].name == axis) return study.axes[i].values[point.values[i]];
-  }
-  return otherwise;
+  const auto found = study.axis(axis);
+  return found ? text_of(study.axes[*found], point.values[*found]) : otherwise;
 }
 
 bool is_parameter(const std::string& axis) { return axis.find('.') != std::string::npos; }
@@ -60,7 +63,7 @@ Drawn drawn_by(const SweepJob& job, const StudiedPoint& point) {
   for (std::size_t i = 0; i < study.axes.size(); ++i) {
     const std::string& name = study.axes[i].name;
     if (name.rfind("preprocess.", 0) == 0)
-      drawn.preprocess.push_back(name + "=" + study.axes[i].values[point.values[i]]);
+      drawn.preprocess.push_back(name + "=" + text_of(study.axes[i], point.values[i]));
   }
   return drawn;
 }
@@ -81,9 +84,28 @@ class StudyFrames {
  public:
   explicit StudyFrames(const SweepJob& job) : job_(job) {}
 
+  /// The draw of what a point draws, in exact order and with all that the scene has, whatever --set says of preprocessing.
+  std::shared_ptr<const Draw> exact_draw(Drawn drawn) {
+    drawn.preprocess.clear();
+    load(drawn, PreprocessOptions());
+    held_.reset();
+    if (!frame_.meshes.front().empty()) {
+      throw UserError("cannot measure images", "columns", "they are measured against an exact image of splats alone",
+                      "leave out meshes, or columns of image");
+    }
+    return frame_.geometry.front();
+  }
+
   std::shared_ptr<const Frame> frame(const StudiedPoint& point, const RunRequest& request) {
     const Drawn drawn = drawn_by(job_, point);
-    if (!held_ || held_->key() != drawn.key()) load(drawn);
+    if (!held_ || held_->key() != drawn.key()) {
+      std::vector<Setting> settings = job_.common.preprocessing;
+      for (const std::string& text : drawn.preprocess) {
+        const std::size_t equals = text.find('=');
+        settings.push_back({"preprocess", text.substr(11, equals - 11), text.substr(equals + 1)});
+      }
+      load(drawn, sort_settings(settings).preprocess);
+    }
     FrameDescription description = frame_of_scene(drawn.scene);
     const std::string passes = value_on(job_.study, point, "multi-pass", std::to_string(job_.common.frame.passes));
     description.passes = static_cast<std::uint32_t>(std::stoul(passes));
@@ -91,18 +113,13 @@ class StudyFrames {
   }
 
  private:
-  void load(const Drawn& drawn) {
+  void load(const Drawn& drawn, const PreprocessOptions& preprocess) {
     held_.reset();
     frame_ = LoadedFrame();
     SceneRequest request = job_.common.scene;
     request.scene = drawn.scene;
     if (!drawn.size.empty()) request.size = size_of(drawn.size);
-    std::vector<Setting> settings = job_.common.preprocessing;
-    for (const std::string& text : drawn.preprocess) {
-      const std::size_t equals = text.find('=');
-      settings.push_back({"preprocess", text.substr(11, equals - 11), text.substr(equals + 1)});
-    }
-    request.preprocess = sort_settings(settings).preprocess;
+    request.preprocess = preprocess;
     if (drawn.view.empty()) {
       frame_ = load_frame(frame_of_scene(drawn.scene), request);
     } else if (request.camera) {
@@ -135,6 +152,49 @@ class StudyFrames {
   LoadedFrame frame_;
 };
 
+// Columns that are not statistics: of the image against the exact one.
+constexpr const char* psnr_column = "image.psnr_db";
+constexpr const char* ssim_column = "image.ssim";
+constexpr const char* max_error_column = "image.max_abs_error";
+constexpr std::array<const char*, 3> image_columns{psnr_column, ssim_column, max_error_column};
+
+bool measures_images(const Study& study) {
+  return std::any_of(study.columns.begin(), study.columns.end(), [](const std::string& column) {
+    return std::find(image_columns.begin(), image_columns.end(), column) != image_columns.end();
+  });
+}
+
+/// The exact images of what points draw, each while there are such points.
+class ExactImages {
+ public:
+  ExactImages(const SweepJob& job, const std::vector<std::size_t>& points) : job_(job), frames_(job) {
+    for (const std::size_t point : points) ++of(point).points_left;
+  }
+  ImageError error(std::size_t point, const SharedImage& image) {
+    OfScene& scene = of(point);
+    if (scene.image.rgb.empty())
+      scene.image = shown(render_exactly(*frames_.exact_draw(drawn_by(job_, job_.study.points[point]))), background_);
+    const ImageError error = image_error(shown(image, background_), scene.image);
+    if (--scene.points_left == 0) scene.image = {};
+    return error;
+  }
+
+ private:
+  struct OfScene {
+    ShownImage image;
+    std::size_t points_left = 0;
+  };
+  OfScene& of(std::size_t point) {
+    const Drawn drawn = drawn_by(job_, job_.study.points[point]);
+    return scenes_[std::tuple(drawn.scene, drawn.view, drawn.size)];
+  }
+
+  const SweepJob& job_;
+  StudyFrames frames_;
+  const std::array<float, 3> background_{};
+  std::map<std::tuple<std::string, std::string, std::string>, OfScene> scenes_;
+};
+
 void check_views(const SweepJob& job) {
   for (const StudyAxis& axis : job.study.axes) {
     for (const std::string& value : axis.values) {
@@ -153,10 +213,28 @@ void check_views(const SweepJob& job) {
 
 // The journal.
 
+std::string point_text(const Study& study, const StudiedPoint& point) {
+  std::string text;
+  for (std::size_t i = 0; i < study.axes.size(); ++i) {
+    if (point.values[i] == no_value) continue;
+    text += (text.empty() ? "" : ", ") + study.axes[i].name + "=" + text_of(study.axes[i], point.values[i]);
+  }
+  return text;
+}
+
+/// WHAT (WHERE): WHY; WHAT TO DO, with the point in WHERE.
+UserError of_point(const UserError& error, const Study& study, const StudiedPoint& point) {
+  const std::string text = error.what();
+  const std::size_t where = text.find(" ("), why = text.find("): ", where), remedy = text.find("; ", why);
+  if (remedy == std::string::npos) return error;
+  return {text.substr(0, where), text.substr(where + 2, why - where - 2) + ", of the point " + point_text(study, point),
+          text.substr(why + 3, remedy - why - 3), text.substr(remedy + 2)};
+}
+
 nlohmann::json point_key(const Study& study, std::size_t point) {
   nlohmann::json key = nlohmann::json::array();
   for (std::size_t i = 0; i < study.axes.size(); ++i)
-    key.push_back(valid_utf8(study.axes[i].name + "=" + study.axes[i].values[study.points[point].values[i]]));
+    key.push_back(valid_utf8(study.axes[i].name + "=" + text_of(study.axes[i], study.points[point].values[i])));
   return key;
 }
 
@@ -223,8 +301,7 @@ Journal open_sweep_journal(const SweepJob& job) {
 nlohmann::json to_sweep_record(const Study& study, std::size_t place, const PointOutcome& point) {
   if (!point.fault.empty()) return {{"point", point_key(study, place)}, {"fault", valid_utf8(point.fault)}};
   nlohmann::json columns = nlohmann::json::array();
-  for (const std::optional<double>& value : point.columns)
-    columns.push_back(value ? nlohmann::json(*value) : nlohmann::json());
+  for (const std::optional<double>& value : point.columns) columns.push_back(nlohmann::json(column_json(value)));
   return {{"point", point_key(study, place)},
           {"run", encode(point.run)},
           {"energy", point.energy ? nlohmann::json{point.energy->low, point.energy->nominal, point.energy->high}
@@ -235,7 +312,7 @@ nlohmann::json to_sweep_record(const Study& study, std::size_t place, const Poin
 
 /// Columns are statistics of some point. Throws UserError.
 void check_columns(const SweepJob& job, const std::vector<RunRequest>& requests) {
-  std::set<std::string> known;
+  std::set<std::string> known(image_columns.begin(), image_columns.end());
   std::set<std::pair<std::string, std::string>> seen;  // platforms and variants
   for (RunRequest request : requests) {
     if (job.study.columns.empty() || !seen.emplace(request.platform->name, request.variant.name).second) continue;
@@ -252,9 +329,14 @@ void check_columns(const SweepJob& job, const std::vector<RunRequest>& requests)
   }
 }
 
-std::vector<std::optional<double>> columns_of(const RunResult& run, const Study& study) {
+std::vector<std::optional<double>> columns_of(const RunResult& run, const std::optional<ImageError>& error,
+                                              const Study& study) {
   std::vector<std::optional<double>> values;
   for (const std::string& column : study.columns) {
+    if (error && column == psnr_column) values.emplace_back(error->psnr_db);
+    if (error && column == ssim_column) values.emplace_back(error->ssim);
+    if (error && column == max_error_column) values.emplace_back(error->max_abs_error);
+    if (std::find(image_columns.begin(), image_columns.end(), column) != image_columns.end()) continue;
     const auto found = std::find_if(run.statistics.begin(), run.statistics.end(),
                                     [&](const StatisticReport& report) { return report.name == column; });
     std::optional<double>& value = values.emplace_back();
@@ -286,7 +368,9 @@ PointOutcome sweep_from_record(const nlohmann::json& record, const RunRequest& r
     point.energy = Range{energy.at(0).get<double>(), energy.at(1).get<double>(), energy.at(2).get<double>()};
   point.storage_bytes = storage_of(request);
   for (const nlohmann::json& value : record.at("columns"))
-    point.columns.push_back(value.is_null() ? std::nullopt : std::optional(value.get<double>()));
+    point.columns.push_back(value.is_null()     ? std::nullopt
+                            : value.is_string() ? std::optional(std::numeric_limits<double>::infinity())
+                                                : std::optional(value.get<double>()));
   record.at("cpu_seconds").get_to(point.cpu_seconds);
   return point;
 }
@@ -393,6 +477,8 @@ void simulate_rows(const SweepJob& job, const std::vector<RunRequest>& requests,
     };
     tasks.push_back({fmt::format("point {}", i), requests[i], frame});
   }
+  std::optional<ExactImages> exact_images;
+  if (measures_images(study)) exact_images.emplace(job, missing);
   Foresight foresight(missing.size(), result.processes, progress);
   const auto finished = [&](std::size_t task, Simulated&& simulated) {
     const std::size_t i = missing[task];
@@ -402,7 +488,12 @@ void simulate_rows(const SweepJob& job, const std::vector<RunRequest>& requests,
     // A sum that misses something is none to rank GPUs by.
     const EnergyAmounts amounts = energy_amounts(point.run, shipped_energies());
     if (amounts.missing.empty()) point.energy = energy_report(amounts, shipped_energies()).total;
-    point.columns = columns_of(point.run, study);
+    std::optional<ImageError> error;
+    if (exact_images) {
+      progress.show("comparing with the exact image");
+      error = exact_images->error(i, *simulated.image);
+    }
+    point.columns = columns_of(point.run, error, study);
     strip_row(point.run);
     point.storage_bytes = storage_of(requests[i]);
     progress.erase();
@@ -420,7 +511,7 @@ void simulate_rows(const SweepJob& job, const std::vector<RunRequest>& requests,
     result.points[i] = std::move(point);
   };
   place.title = "sweep  ";
-  if (!tasks.empty()) run_tasks(tasks, false, result.processes, place, progress, finished);
+  if (!tasks.empty()) run_tasks(tasks, exact_images.has_value(), result.processes, place, progress, finished);
 }
 
 std::string to_message(const nlohmann::json& record) {
@@ -480,6 +571,7 @@ RunRequest request_of(const SweepJob& job, const StudiedPoint& point) {
   request.reads_statistics = request.reads_statistics || !job.study.columns.empty();
   for (std::size_t i = 0; i < job.study.axes.size(); ++i) {
     const std::string& axis = job.study.axes[i].name;
+    if (point.values[i] == no_value) continue;
     const std::string& value = job.study.axes[i].values[point.values[i]];
     if (axis == "platform") request.platform = &platform_named(value);
     if (axis == "variant") request.variant = variant_named(value);
@@ -500,6 +592,29 @@ RunRequest request_of(const SweepJob& job, const StudiedPoint& point) {
     }
   }
   return request;
+}
+
+void leave_out_absent(SweepJob& job) {
+  Study& study = job.study;
+  std::set<std::pair<std::size_t, std::size_t>> machines;
+  for (const StudiedPoint& point : study.points) machines.insert(study.machine_of(point.values));
+  for (std::size_t i = 0; i < study.axes.size(); ++i) {
+    const std::string& name = study.axes[i].name;
+    if (!is_parameter(name) || follows_the_point(name)) continue;
+    std::set<std::pair<std::size_t, std::size_t>> without;
+    for (const auto& machine : machines) {
+      RunRequest request = job.common.requests.front();
+      if (const auto axis = study.axis("platform"))
+        request.platform = &platform_named(study.axes[*axis].values[machine.first]);
+      if (const auto axis = study.axis("variant"))
+        request.variant = variant_named(study.axes[*axis].values[machine.second]);
+      if (!declares(request, name)) without.insert(machine);
+    }
+    // What none has is a mistake.
+    if (without.size() == machines.size()) continue;
+    for (const auto& machine : without) study.absent[machine].insert(i);
+  }
+  study.leave_out_absent();
 }
 
 void choose_references(SweepJob& job) {
@@ -546,8 +661,12 @@ SweepResult run_sweep(const SweepJob& job) {
   check_views(job);
   std::vector<RunRequest> requests;
   for (const StudiedPoint& point : job.study.points) {
-    requests.push_back(request_of(job, point));
-    check_configuration(requests.back());
+    try {
+      requests.push_back(request_of(job, point));
+      check_configuration(requests.back());
+    } catch (const UserError& error) {
+      throw of_point(error, job.study, point);
+    }
   }
   check_columns(job, requests);
   ProgressLine progress;

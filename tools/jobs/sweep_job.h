@@ -60,6 +60,9 @@ struct SweepResult {
 /// A value of the axis `scene`, from where vrpipe runs: names of files are relative to the study's folder.
 std::string scene_of_axis(const SweepJob& job, const std::string& value);
 
+/// Takes from points the values of parameters that their units do not have: of these there is one.
+void leave_out_absent(SweepJob& job);
+
 /// Makes the reference of each axis what is so without the study, where the axis has it: the baseline, the platform's own
 /// value of a parameter, the format and termination of the other options.
 void choose_references(SweepJob& job);

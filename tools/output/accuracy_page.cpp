@@ -13,9 +13,9 @@
 #include "image/images.h"
 #include "output/accuracy_report.h"
 #include "output/effects_page.h"
+#include "output/page_parts.h"
 #include "output/page_style.h"
 #include "output/report.h"
-#include "output/svg_plot.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -108,7 +108,7 @@ std::string fidelity_plot(const AccuracyResult& result) {
   }
   plot.legend.push_back({"front of a variant", "#4d5b6a", Marker::circle, false, true});
   if (any_dominated) plot.legend.push_back({"dominated", "#4d5b6a", Marker::circle, true, false});
-  return svg(plot);
+  return figure("error against time", plot);
 }
 
 std::string precision_plot(const AccuracyResult& result) {
@@ -154,7 +154,7 @@ std::string precision_plot(const AccuracyResult& result) {
   }
   plot.legend.push_back({"front", "#4d5b6a", Marker::circle, false, true});
   plot.legend.push_back({"not on the front", "#4d5b6a", Marker::circle, true, false});
-  return svg(plot);
+  return figure("image error against cycles", plot);
 }
 
 std::string error_scale() {

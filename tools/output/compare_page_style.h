@@ -14,10 +14,8 @@ svg { background: #fff; } text { font: 12px "DejaVu Sans", Arial, Helvetica, san
 inline constexpr const char* compare_page_style = R"(
 svg .strong { font-weight: 600; } svg .piece { stroke: #1d232a; stroke-width: .4; } svg .flow { fill: #e3e8ed; }
 svg .small { font-size: 11px; } svg .light { fill: #fff; }
-nav { margin: 10px 0 0; font-size: 14px; } nav a { margin-right: 14px; white-space: nowrap; } a { color: #0b5394; }
+nav { margin: 10px 0 0; font-size: 14px; } nav a { margin-right: 14px; white-space: nowrap; } 
 h2 { border-top: 1px solid #dfe3e8; padding-top: 18px; }
-figure.plot { border: 0; padding: 0; margin: 8px 0 18px; } figure.plot figcaption { color: #3b4652; max-width: 900px; }
-.links { white-space: nowrap; } .links a { margin-left: 6px; font-size: 12px; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: 3px 18px; margin: 10px 0; } dt { color: #5a6572; } dd { margin: 0; overflow-wrap: anywhere; }
 .controls { display: flex; flex-wrap: wrap; gap: 8px 18px; align-items: center; margin: 10px 0; font-size: 14px; }
 .controls input[type=range] { width: 220px; } select { font: inherit; }

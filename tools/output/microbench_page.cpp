@@ -4,26 +4,16 @@
 
 #include <fmt/format.h>
 
-#include "output/svg_plot.h"
+#include "output/page_parts.h"
+#include "output/page_style.h"
 
 namespace vrpipe::tools {
 
 namespace {
 
-constexpr const char* microbench_style = R"(
-:root { color-scheme: light; }
-body { margin: 0 auto; padding: 28px 24px 60px; max-width: 1080px; background: #fff; color: #1d232a;
-       font: 15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
-h1 { font-size: 26px; margin: 0 0 4px; } h2 { font-size: 20px; margin: 44px 0 6px; } h3 { font-size: 15px; margin: 20px 0 0; }
-p { margin: 6px 0; max-width: 860px; } ul { margin: 6px 0; padding-left: 20px; } code { overflow-wrap: anywhere; }
-.subtle { color: #5a6572; } .scroll { overflow-x: auto; }
-table { border-collapse: collapse; margin: 10px 0; font-variant-numeric: tabular-nums; }
-th, td { padding: 3px 12px; text-align: right; border-bottom: 1px solid #e7eaee; white-space: nowrap; }
-th:first-child, td:first-child, td.left, th.left { text-align: left; } tr.differs td { background: #fff4d6; }
-svg { width: 100%; height: auto; margin: 4px 0 10px; }
-svg text { font: 12px system-ui, "Segoe UI", "DejaVu Sans", sans-serif; fill: #1d232a; }
-svg .label { paint-order: stroke; stroke: #fff; stroke-width: 3px; } svg .axis { font-size: 13px; }
-svg .grid { stroke: #e7eaee; } svg .frame { fill: none; stroke: #aab3bd; }
+constexpr const char* own_style = R"(
+h3 { font-size: 15px; margin: 20px 0 0; } tr.differs td { background: #fff4d6; }
+td.left, th.left { text-align: left; }
 )";
 
 struct Look {
@@ -60,7 +50,7 @@ std::string curve_html(const MicrobenchCurve& curve) {
   add_points(plot, curve.measured, simulator);
   add_points(plot, curve.gpu, real_gpu);
   add_points(plot, curve.paper, paper);
-  return "<h3>" + html_escaped(curve.name) + "</h3>\n" + svg(plot) + '\n';
+  return "<h3>" + html_escaped(curve.name) + "</h3>\n" + figure(curve.name, plot);
 }
 
 std::string table_html(const MicrobenchResult& result) {
@@ -85,7 +75,7 @@ std::string microbench_page(const MicrobenchRun& run) {
   std::string text = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
   text += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
   text += "<title>vrpipe microbench: " + html_escaped(platform.name) + "</title>\n";
-  text += std::string("<style>") + microbench_style + "</style>\n</head>\n<body>\n<h1>Microbenchmarks</h1>\n";
+  text += std::string("<style>") + page_style + own_style + "</style>\n</head>\n<body>\n<h1>Microbenchmarks</h1>\n";
   text += fmt::format("<p class=\"subtle\">{} ({}), {} fidelity. What differs from what is published is marked.</p>\n",
                       html_escaped(platform.name), html_escaped(platform.description),
                       vrpipe::name_of(run.request.fidelity));

@@ -1,5 +1,7 @@
 #include "output/page_parts.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -7,7 +9,6 @@
 #include "image/base64.h"
 #include "image/images.h"
 #include "output/compare_page_style.h"
-#include "output/svg_plot.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -21,6 +22,45 @@ std::string standalone(const std::string& svg) {
 std::string link(const std::string& name, const std::string& type, const std::string& bytes, const std::string& text) {
   return fmt::format("<a download=\"{}\" href=\"data:{};base64,{}\">{}</a>", html_escaped(name), type, base64(bytes),
                      text);
+}
+
+/// Of words: letters and digits, what is between them a line.
+std::string file_name(const std::string& words) {
+  std::string name;
+  for (const char c : words) {
+    const bool is_plain = std::isalnum(static_cast<unsigned char>(c)) != 0;
+    if (is_plain) name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (!is_plain && !name.empty() && name.back() != '-') name += '-';
+  }
+  while (!name.empty() && name.back() == '-') name.pop_back();
+  return name;
+}
+
+std::string csv_of(const Plot& plot) {
+  CsvText csv({"series", plot.x.title, plot.y.title, "label", "note"});
+  for (const PlotPoint& point : plot.points) {
+    const auto looks_so = [&](const LegendEntry& entry) {
+      return !entry.is_line && entry.color == point.color && entry.marker == point.marker;
+    };
+    const auto series = std::find_if(plot.legend.begin(), plot.legend.end(), looks_so);
+    csv.row({series == plot.legend.end() ? "" : series->text, csv_number(point.x), csv_number(point.y), point.label,
+             point.tooltip});
+  }
+  return csv.text();
+}
+
+std::string csv_of(const BarPlot& plot) {
+  CsvText csv({"group", "series", "from", "to", "note"});
+  for (const BarGroup& group : plot.groups) {
+    for (const Bar& bar : group.bars) {
+      const auto series = std::find_if(plot.legend.begin(), plot.legend.end(),
+                                       [&](const auto& entry) { return entry.second == bar.color; });
+      csv.row({group.label, series == plot.legend.end() ? "" : series->first, csv_number(bar.from), csv_number(bar.to),
+               bar.tooltip});
+    }
+    for (const double mark : group.marks) csv.row({group.label, "mark", csv_number(mark), csv_number(mark), ""});
+  }
+  return csv.text();
 }
 
 }  // namespace
@@ -47,6 +87,13 @@ std::string html(const PageFigure& figure) {
       "</figcaption>\n</figure>\n",
       figure.name, figure.svg, figure.caption, csv_link(figure.name, figure.csv),
       link(figure.name + ".svg", "image/svg+xml", standalone(figure.svg), "plot as SVG"));
+}
+
+std::string figure(const std::string& name, const Plot& plot, const std::string& caption) {
+  return html(PageFigure{file_name(name), caption, svg(plot), csv_of(plot)});
+}
+std::string figure(const std::string& name, const BarPlot& plot, const std::string& caption) {
+  return html(PageFigure{file_name(name), caption, svg(plot), csv_of(plot)});
 }
 
 std::string html_table(const std::vector<std::string>& heading, const std::vector<PageRow>& rows,

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "image/picture.h"
+#include "output/svg_bars.h"
+#include "output/svg_plot.h"
 
 namespace vrpipe::tools {
 
@@ -27,6 +29,9 @@ struct PageFigure {
   std::string csv;
 };
 std::string html(const PageFigure& figure);
+/// The same of a plot, its data being what it shows. `name`: words, of which the files' names are made.
+std::string figure(const std::string& name, const Plot& plot, const std::string& caption = "");
+std::string figure(const std::string& name, const BarPlot& plot, const std::string& caption = "");
 
 /// Links that save data.
 std::string csv_link(const std::string& name, const std::string& csv);

@@ -26,6 +26,8 @@ table.effects th, table.effects td { text-align: left; vertical-align: top; } td
 figure { margin: 0; border: 1px solid #dfe3e8; border-radius: 6px; padding: 10px; }
 figure .pair { display: flex; gap: 8px; } figure img { width: calc(50% - 4px); height: auto; }
 figcaption { font-size: 13px; margin-bottom: 6px; } figcaption b { font-size: 14px; }
+figure.plot { border: 0; padding: 0; margin: 8px 0 18px; } figure.plot figcaption { color: #3b4652; max-width: 900px; }
+a { color: #0b5394; } .links { white-space: nowrap; } .links a { margin-left: 6px; font-size: 12px; }
 figure.reference { max-width: 420px; } figure.reference img { width: 100%; }
 .scale { display: flex; align-items: center; gap: 8px; font-size: 13px; margin: 8px 0; }
 .scale i { display: inline-block; width: 260px; height: 14px; border-radius: 2px; }

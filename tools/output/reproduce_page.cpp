@@ -8,10 +8,9 @@
 
 #include "image/base64.h"
 #include "image/picture.h"
+#include "output/page_parts.h"
 #include "output/page_style.h"
 #include "output/reproduce_answers.h"
-#include "output/svg_bars.h"
-#include "output/svg_plot.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -84,7 +83,7 @@ std::string speedups_plot(const Reproduction& of) {
       plot.groups.push_back(std::move(group));
     }
   }
-  return svg(plot);
+  return figure("speed-ups", plot);
 }
 
 std::string utilization_plot(const Reproduction& of) {
@@ -105,7 +104,7 @@ std::string utilization_plot(const Reproduction& of) {
       }
     }
   }
-  return svg(plot);
+  return figure("utilisation", plot);
 }
 
 std::string ratios_plot(const Reproduction& of) {
@@ -121,7 +120,7 @@ std::string ratios_plot(const Reproduction& of) {
                    fmt::format("{} views", distribution->count)}};
     plot.groups.push_back(std::move(group));
   }
-  return svg(plot);
+  return figure("early-termination ratios", plot);
 }
 
 std::string tornado(const Reproduction& of) {
@@ -145,7 +144,7 @@ std::string tornado(const Reproduction& of) {
   }
   plot.least = 0.1 * static_cast<int>(10 * least);
   plot.legend = {{"less", colors[1]}, {"more", colors[3]}};
-  return svg(plot);
+  return figure("sensitivity", plot);
 }
 
 std::string maps_html(const Reproduction& of) {

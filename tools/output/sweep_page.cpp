@@ -4,10 +4,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "image/base64.h"
+#include "output/page_parts.h"
 #include "output/page_style.h"
-#include "output/svg_bars.h"
-#include "output/svg_plot.h"
 #include "output/sweep_report.h"
 
 namespace vrpipe::tools {
@@ -16,6 +14,8 @@ namespace {
 constexpr const char* bar_color = "#0072b2";
 constexpr const char* front_color = "#d1400f";
 constexpr const char* other_color = "#8a949e";
+constexpr std::array<const char*, 8> series_colors{"#8a949e", "#0072b2", "#009e73", "#d1400f",
+                                                   "#e69f00", "#56b4e9", "#7a3e9d", "#6b4a2b"};
 constexpr std::size_t most_rows = 5000;
 
 std::string cell(const Json& value) {
@@ -23,6 +23,60 @@ std::string cell(const Json& value) {
   if (value.is_string()) return html_escaped(value.get<std::string>());
   if (value.is_number_float()) return fmt::format("{:.5g}", value.get<double>());
   return value.dump();
+}
+
+/// A column in words, with its unit.
+std::string words_of(const std::string& column) {
+  const std::vector<std::pair<std::string, std::string>> known{
+      {"milliseconds", "simulated time, ms"},
+      {"energy_mj", "energy, mJ (nominal)"},
+      {"energy_mj_low", "energy, mJ (lowest)"},
+      {"energy_mj_high", "energy, mJ (highest)"},
+      {"quad_merging_storage_bytes", "storage of quad merging, bytes"},
+      {"bottleneck_occupancy", "occupancy of the busiest unit"},
+      {"speedup", "speed-up"},
+      {"image.psnr_db", "PSNR against the exact image, dB"},
+      {"image.ssim", "SSIM against the exact image"},
+      {"image.max_abs_error", "largest error against the exact image"}};
+  for (const auto& [name, words] : known) {
+    if (name == column) return words;
+  }
+  std::string words = column.rfind("counts.", 0) == 0 ? column.substr(7) : column;
+  std::replace_if(
+      words.begin(), words.end(), [](char c) { return c == '_' || c == '.'; }, ' ');
+  return words;
+}
+
+/// As papers have it: a group of bars for each scene, and one of the geometric means.
+std::string grouped_section(const SweepFindings& findings) {
+  const auto& means = findings.grouped;
+  if (!means) return {};
+  const Study& study = findings.result.study;
+  const StudyAxis& groups = study.axes[means->groups_axis];
+  const StudyAxis& series = study.axes[means->series_axis];
+  BarPlot plot;
+  const std::string what = findings.effects.of_speedups ? "speed-up" : "simulated time, ms";
+  plot.title = what;
+  plot.description = what + " by " + groups.name + " and " + series.name;
+  if (findings.effects.of_speedups) plot.line = 1;
+  const auto color = [](std::size_t i) { return series_colors[i % series_colors.size()]; };
+  for (std::size_t i = 0; i < series.values.size(); ++i) plot.legend.emplace_back(series.values[i], color(i));
+  const auto add = [&](const std::string& label, const std::vector<std::optional<double>>& values) {
+    BarGroup group{label, {}, {}};
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (values[i])
+        group.bars.push_back({0, *values[i], color(i), fmt::format("{}: {:.3g}", series.values[i], *values[i])});
+    }
+    if (!group.bars.empty()) plot.groups.push_back(std::move(group));
+  };
+  for (std::size_t i = 0; i < groups.values.size(); ++i) add(groups.values[i], means->of_group[i]);
+  add("geometric mean", means->geometric_mean);
+  return fmt::format("<h2>By {} and {}</h2>\n", html_escaped(groups.name), html_escaped(series.name)) +
+         figure("by " + groups.name + " and " + series.name, plot,
+                "Geometric means over all other axes" +
+                    std::string(findings.effects.of_speedups
+                                    ? "; the line is 1, the speed of the point that speed-ups are over."
+                                    : "."));
 }
 
 std::string effect_plot(const SweepFindings& findings, const AxisEffect& effect) {
@@ -38,7 +92,7 @@ std::string effect_plot(const SweepFindings& findings, const AxisEffect& effect)
   }
   return fmt::format("<h3>{}: {:.2f}x</h3>\n", html_escaped(findings.result.study.axes[effect.axis].name),
                      effect.ratio) +
-         svg(plot);
+         figure("by " + findings.result.study.axes[effect.axis].name, plot);
 }
 
 std::string effects_section(const SweepFindings& findings) {
@@ -56,12 +110,14 @@ std::string pareto_section(const SweepFindings& findings) {
   const auto name = [](const std::string& column) { return column[0] == '-' ? column.substr(1) : column; };
   Plot plot;
   plot.description = "GPUs of the study";
-  plot.x.title = name(pareto.columns[0]);
-  plot.y.title = name(pareto.columns[1]);
+  plot.x.title = words_of(name(pareto.columns[0]));
+  plot.y.title = words_of(name(pareto.columns[1]));
   std::string rows;
   for (const ParetoRow& each : pareto.rows) {
     std::string label;
-    for (const std::string& value : each.values) label += (label.empty() ? "" : ", ") + value;
+    for (const std::string& value : each.values) {
+      if (!value.empty()) label += (label.empty() ? "" : ", ") + value;
+    }
     plot.points.push_back({each.metrics[0], each.metrics[1], each.on_front ? front_color : other_color, Marker::circle,
                            !each.on_front, each.on_front ? label : std::string(), label});
     rows += each.on_front ? "<tr class=\"marked\">" : "<tr>";
@@ -73,18 +129,17 @@ std::string pareto_section(const SweepFindings& findings) {
                  {"another is better in all", other_color, Marker::circle, true, false}};
   std::string heading;
   for (const std::string& axis : pareto.axes) heading += "<th>" + html_escaped(axis) + "</th>";
-  for (const std::string& column : pareto.columns) heading += "<th>" + html_escaped(name(column)) + "</th>";
+  for (const std::string& column : pareto.columns) heading += "<th>" + html_escaped(words_of(name(column))) + "</th>";
   return "<h2>What is worth it</h2>\n<p>Each GPU over all that it draws (geometric means). Those on the Pareto front "
          "are "
          "marked: no other is better in one and no worse in the others.</p>\n" +
-         svg(plot) + "<div class=\"scroll\"><table>\n<tr>" + heading + "</tr>\n" + rows + "</table></div>\n";
+         figure("Pareto front", plot) + "<div class=\"scroll\"><table>\n<tr>" + heading + "</tr>\n" + rows +
+         "</table></div>\n";
 }
 
 std::string points_section(const SweepFindings& findings) {
   const SweepTable& table = findings.table;
-  std::string text =
-      fmt::format("<h2>All points</h2>\n<p><a download=\"study.csv\" href=\"data:text/csv;base64,{}\">as CSV</a></p>\n",
-                  base64(sweep_csv(table)));
+  std::string text = "<h2>All points</h2>\n<p class=\"links\">" + csv_link("study", sweep_csv(table)) + "</p>\n";
   text += "<div class=\"scroll\"><table>\n<tr>";
   for (const std::string& column : table.columns) text += "<th>" + html_escaped(column) + "</th>";
   text += "</tr>\n";
@@ -118,7 +173,7 @@ std::string sweep_page(const SweepFindings& findings) {
   if (const std::string reference = reference_text(study); !reference.empty())
     text += "<p class=\"subtle\">Speed-ups are over the point with " + html_escaped(reference) +
             ", of the same scene, view and fidelity.</p>\n";
-  text += effects_section(findings) + pareto_section(findings) + points_section(findings);
+  text += grouped_section(findings) + effects_section(findings) + pareto_section(findings) + points_section(findings);
   return text + fmt::format("<p class=\"subtle\">vrpipe {}</p>\n</body>\n</html>\n", VRPIPE_VERSION);
 }
 

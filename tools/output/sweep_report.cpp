@@ -60,7 +60,7 @@ std::string pareto_text(const SweepFindings& findings, const TextStyle& style) {
     front = each.on_front;
     if (!front && ++shown > most_rows_shown) break;
     std::vector<std::string> cells;
-    for (const std::string& value : each.values) cells.push_back(printable(value));
+    for (const std::string& value : each.values) cells.push_back(value.empty() ? "-" : printable(value));
     for (const double metric : each.metrics) cells.push_back(fmt::format("{:.4g}", metric));
     table.row(std::move(cells));
   }
@@ -96,18 +96,27 @@ std::string points_text(const SweepFindings& findings, const TextStyle& style) {
 SweepFindings sweep_findings(const SweepResult& result) {
   SweepTable table = sweep_table(result);
   AxisEffects effects = axis_effects(result, table);
+  std::optional<GroupedMeans> grouped = grouped_means(result, table, effects.of_speedups);
   std::optional<ParetoTable> pareto = pareto_table(result, table);
-  return {result, std::move(table), std::move(effects), std::move(pareto)};
+  return {result, std::move(table), std::move(effects), std::move(grouped), std::move(pareto)};
 }
 
 std::string reference_text(const Study& study) {
-  std::string text;
+  std::vector<std::size_t> values;
   for (const StudyAxis& axis : study.axes) {
     const auto named = std::find_if(study.relative_to.begin(), study.relative_to.end(),
                                     [&](const auto& each) { return each.first == axis.name; });
-    if (named == study.relative_to.end() && follows_the_point(axis.name)) continue;
-    text += fmt::format("{}{}={}", text.empty() ? "" : ", ", axis.name,
-                        named == study.relative_to.end() ? axis.values[axis.reference] : named->second);
+    const bool is_own = named == study.relative_to.end() && follows_the_point(axis.name);
+    const auto place = [&] { return std::find(axis.values.begin(), axis.values.end(), named->second); };
+    values.push_back(is_own                             ? no_value
+                     : named == study.relative_to.end() ? axis.reference
+                                                        : static_cast<std::size_t>(place() - axis.values.begin()));
+  }
+  values = study.without_absent(std::move(values));
+  std::string text;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i] != no_value)
+      text += fmt::format("{}{}={}", text.empty() ? "" : ", ", study.axes[i].name, study.axes[i].values[values[i]]);
   }
   return text;
 }

@@ -13,6 +13,7 @@ struct SweepFindings {
   const SweepResult& result;
   SweepTable table;
   AxisEffects effects;
+  std::optional<GroupedMeans> grouped;
   std::optional<ParetoTable> pareto;
 };
 /// The result outlives it.
