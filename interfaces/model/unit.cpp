@@ -32,7 +32,8 @@ Unit::Unit(const sc_core::sc_module_name& name, ClockDomain& domain, std::vector
     : sc_module(name),
       Component({&domain, domain.attach(*this)}),
       occupancy_(domain.frame_end(), std::move(work)),
-      account_(domain.frame_end()) {
+      account_(domain.frame_end()),
+      tells_draws_(domain.frame_end().tells_draws()) {
   if (occupancy_.kinds() > most_work_kinds) refuse_work_kind(this->name(), most_work_kinds);
 }
 

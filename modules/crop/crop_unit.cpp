@@ -257,6 +257,7 @@ class CropUnit : public Unit {
         beat.signals[beat.count++] = {quad.warp->tile, static_cast<std::uint8_t>(quad.position()), outcome.terminated,
                                       context_.draw(quad.warp->draw[quad.index]).epoch};
       }
+      if (tells_draws()) draw_lasts(quad.warp->draw[quad.index], now + timing_.latency_cycles);
       if (quad.is_last()) quad.warp->release();
       const bool changed = outcome.changed || timing_.writes_unchanged;
       if (pairs_) goes(entry, joins);

@@ -166,6 +166,9 @@ class TimedZrop : public TimedUnit {
       const Cycle at = take(ready, beat.count);
       if (has_cache_) z_.tested(beat.count, needs_stencil, at);
       const unsigned tested_quads = beat.count;
+      // Of survivors it is known that they end later.
+      for (unsigned i = 0; tells_draws() && i < tested_quads; ++i)
+        draw_lasts(beat.quads[i].draw, at + timing_.latency_cycles);
       port_free_at_ = at + (tested_quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       if (blocks_.is_on())
         pay_for_blocks(price * (from + tested_quads) / total - price * from / total, tested_quads, at);
@@ -265,6 +268,8 @@ class TimedZrop : public TimedUnit {
     }
     if (changed != 0 && hi_z_.wanted(before.quads[0].draw)) tell(before, changed, at);
     if (warp.count < before.count) frame_lasts(at + timing_.latency_cycles);
+    for (unsigned i = 0; tells_draws() && i < before.count; ++i)
+      draw_lasts(before.quads[i].draw, at + timing_.latency_cycles);
     const Cycle taken = out_late_.send(item, at).first;
     late_tests_.hold(taken);
     return has_cache_ ? times.at : std::max(at, taken);

@@ -130,6 +130,9 @@ class ZropUnit : public Unit {
       if (blocks_.is_on()) pay_for_blocks(beat, now);
       did(ZropWork::tests, beat.count, now, tested_until_);
       const unsigned tested = beat.count;
+      // Of survivors it is known that they end later.
+      for (unsigned i = 0; tells_draws() && i < tested; ++i)
+        draw_lasts(beat.quads[i].draw, now + timing_.latency_cycles);
       if (lacks_cache_ && tested > 0) z_cache_gate_.enter();
       // Of what may write, the quads that come in.
       QuadBeat before;
@@ -208,6 +211,8 @@ class ZropUnit : public Unit {
     if (has_cache_ && changed != 0) z_.change(before, changed);
     if (changed != 0 && hi_z_.wanted(before.quads[0].draw)) tell_later(before, changed);
     if (warp.count < before.count) frame_lasts(now + timing_.latency_cycles);
+    for (unsigned i = 0; tells_draws() && i < before.count; ++i)
+      draw_lasts(before.quads[i].draw, now + timing_.latency_cycles);
   }
 
   void pass(Mark mark) {

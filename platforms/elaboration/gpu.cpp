@@ -80,6 +80,7 @@ Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
       clock_(std::make_unique<ClockDomain>("clock", configuration.context_of(0).clock_ps)),
       kernel_time_gate_(configuration.context_of(0), "clock.kernel_time") {
   clock_->ask_about_own_time([this] { return kernel_time_gate_.enter(); });
+  if (const std::size_t draws = configuration.frame().draws().size(); draws > 1) clock_->frame_end().tell_draws(draws);
   EffectGate sockets(configuration.context_of(0), "link.sockets");
   if (configuration.request().effects.elaborates_all_of("link.sockets")) clock_->set_passes_sockets();
   const Netlist& netlist = configuration.netlist();

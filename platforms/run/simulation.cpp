@@ -259,6 +259,16 @@ std::vector<DrawReport> draw_reports(const Frame& frame, const BehaviourList& be
   return reports;
 }
 
+/// Of draws that are told apart.
+void set_draw_times(const std::vector<Cycle>& ends, std::vector<DrawReport>& draws) {
+  Cycle before = 0;
+  for (std::size_t draw = 0; draw < ends.size(); ++draw) {
+    if (ends[draw] > 0) draws[draw].end = ends[draw];
+    draws[draw].cycles = ends[draw] - std::min(ends[draw], before);
+    before = std::max(before, ends[draw]);
+  }
+}
+
 /// What the units counted, once a checked unit's counters are what went through it.
 void report_counts(const Configuration& configuration, const BehaviourList& behaviours,
                    const StatisticCollector& statistics, RunResult& result) {
@@ -462,6 +472,7 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
   occupancy.finish();
   check_conservation(gpu, configuration.netlist());
   report_counts(configuration, behaviours, statistics, result);
+  set_draw_times(gpu.clock().frame_end().of_draws(), result.draws);
 }
 
 bool follows_accesses(const UntimedGpu& gpu, const std::string& slot) {

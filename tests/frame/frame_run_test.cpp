@@ -121,6 +121,34 @@ TEST_P(EveryFidelity, TheCountsOfDrawsSumToTheFrames) {
   for (const DrawReport& each : result.draws) EXPECT_GT(counts_of(each).at("quads_blended"), 0U) << each.name;
 }
 
+TEST_P(EveryFidelity, TheCyclesOfDrawsSumToTheFrames) {
+  const auto draw = half_closed(300, 11);
+  const DrawState state = draw_state_of(request());
+  for (const char* platform : {"agx-orin", "desktop"}) {
+    Frame frame(draw->width, draw->height);
+    frame.draw(draw, state, "first", 0, 150);
+    frame.draw(draw, state, "nothing", 150, 0);
+    frame.clear({true, true});
+    frame.draw(draw, state, "second", 150);
+    const RunResult result = run(request(platform), frame);
+    ASSERT_EQ(result.draws.size(), 3U);
+    EXPECT_FALSE(result.draws[1].end) << "it has no quads";
+    if (!result.draws[0].cycles) {
+      EXPECT_LT(request().fidelity, Fidelity::lt);
+      for (const DrawReport& each : result.draws) EXPECT_FALSE(each.cycles || each.end) << each.name;
+      continue;
+    }
+    Frame alone(draw->width, draw->height);
+    alone.draw(draw, state, "first", 0, 150);
+    const auto cycles_alone = static_cast<double>(*run(request(platform), alone).cycles);
+    EXPECT_NEAR(static_cast<double>(*result.draws[0].cycles), cycles_alone, 0.1 * cycles_alone);
+    EXPECT_EQ(result.draws[0].end, result.draws[0].cycles);
+    EXPECT_EQ(result.draws[1].cycles, 0U);
+    EXPECT_EQ(result.draws[2].end, result.cycles) << "it waits for the clear, which waits for the first";
+    EXPECT_EQ(*result.draws[0].cycles + *result.draws[2].cycles, *result.cycles);
+  }
+}
+
 TEST_P(EveryFidelity, DrawsWithAllClearedBetweenThemAreTwoRuns) {
   const auto before = half_closed(200, 3);
   const auto after = half_closed(250, 4);

@@ -101,6 +101,14 @@ std::vector<Finding> broken_draws(const RunResult& result) {
               n["fragments_pruned"] + n["fragments_dropped_late"] + n["fragments_late_failed"] +
                   n["fragments_unblended"] + n["fragments_blended"]);
   }
+  std::uint64_t cycles = 0;
+  bool any_end = false;
+  for (const DrawReport& draw : result.draws) {
+    cycles += draw.cycles.value_or(0);
+    any_end = any_end || draw.end;
+  }
+  if (any_end && cycles != *result.cycles)
+    findings.push_back({"cycles of draws sum to the frame's", fmt::format("{} of {}", cycles, *result.cycles)});
   for (const auto& [name, count] : result.counts.named()) {
     if (sum.count(name) != 0 && sum[name] != count) {
       findings.push_back({"draws sum to the frame", fmt::format("{}: {} of {}", name, sum[name], count)});

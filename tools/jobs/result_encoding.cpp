@@ -55,7 +55,7 @@ VRPIPE_MEMBERS(StatisticReport, name, unit, meaning, value, kind, formula, denom
 VRPIPE_MEMBERS(MemoryRegion, address, bytes)
 VRPIPE_MEMBERS(AddressMap, color, depth_stencil, vertices, primitives, attributes)
 VRPIPE_MEMBERS(Framebuffer, color, depth_stencil, addresses)
-VRPIPE_MEMBERS(DrawReport, name, counts)
+VRPIPE_MEMBERS(DrawReport, name, counts, end, cycles)
 VRPIPE_MEMBERS(EffectReport, name, omitted, proof, reason)
 VRPIPE_MEMBERS(UnitIntervals, name, cycles)
 VRPIPE_MEMBERS(StatisticIntervals, name, kind, values, denominators)

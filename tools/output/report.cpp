@@ -252,6 +252,8 @@ std::string draws_text(const std::vector<RunResult>& runs, const TextStyle& styl
     columns.insert(columns.end() - 1, "quads_late_failed");
     names.insert(names.end() - 1, "late failed");
   }
+  const bool timed = draws.front().cycles.has_value();
+  if (timed) names.insert(names.end(), {"cycles", "to cycle"});
   TextTable table(std::move(names));
   const auto row = [&](const std::string& label, const DrawReport& draw) {
     std::vector<std::string> cells{label};
@@ -259,6 +261,10 @@ std::string draws_text(const std::vector<RunResult>& runs, const TextStyle& styl
       const auto found =
           std::find_if(draw.counts.begin(), draw.counts.end(), [&](const auto& count) { return count.first == name; });
       cells.push_back(grouped(found->second));
+    }
+    if (timed) {
+      cells.push_back(grouped(draw.cycles.value_or(0)));
+      cells.push_back(draw.end ? grouped(*draw.end) : "-");
     }
     table.row(std::move(cells));
   };

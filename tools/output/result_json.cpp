@@ -166,7 +166,10 @@ Json statistics_json(const RunResult& run) {
 Json draws_json(const RunResult& run) {
   Json draws;
   for (const DrawReport& draw : run.draws) {
-    draws.push_back({{"name", draw.name}, {"counts", counts_json(draw.counts)}});
+    draws.push_back({{"name", draw.name},
+                     {"counts", counts_json(draw.counts)},
+                     {"end", draw.end ? Json(*draw.end) : Json()},
+                     {"cycles", draw.cycles ? Json(*draw.cycles) : Json()}});
   }
   return draws;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <vrpipe/kernel/ring.h>
 
@@ -44,8 +45,9 @@ struct OccupancyPart {
   bool is_throughput;
 };
 
-/// Where a draw ends: in the cycle after the last of its quads has been blended, or dropped by a test, by pruning or by
-/// a merge. Known only once all of the frame has passed; until then units say what it cannot be earlier than.
+/// Where a frame ends, and in one of several each draw: in the cycle after the last of its quads has been blended, or dropped
+/// by a test, by pruning or by a merge. Known only once all of the frame has passed; until then units say what it cannot be
+/// earlier than.
 class FrameEnd {
  public:
   /// A quad ends in the cycle before `cycle`, or later.
@@ -53,8 +55,17 @@ class FrameEnd {
   /// The end, as far as it is known: it is this or later. 0 before the first quad.
   Cycle so_far() const { return so_far_; }
 
+  /// Before units are made: draws are told apart.
+  void tell_draws(std::size_t draws) { of_draw_.resize(draws); }
+  bool tells_draws() const { return !of_draw_.empty(); }
+  /// A quad of the draw ends in the cycle before `cycle`, or later.
+  void draw_not_before(std::size_t draw, Cycle cycle) { of_draw_[draw] = std::max(of_draw_[draw], cycle); }
+  /// By draw, once all of the frame has passed; 0 for one without quads. Empty where they are not told apart.
+  const std::vector<Cycle>& of_draws() const { return of_draw_; }
+
  private:
   Cycle so_far_ = 0;
+  std::vector<Cycle> of_draw_;
 };
 
 /// Sees the states of a unit, from outside.

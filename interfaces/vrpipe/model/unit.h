@@ -73,10 +73,14 @@ class Unit : public Clocked, public sc_core::sc_module, public Component {
   }
   /// A quad is blended or dropped in the cycle before `cycle`, or later: the draw does not end earlier.
   void frame_lasts(Cycle cycle) { clock.domain->frame_end().not_before(cycle); }
+  /// Whether it is to be said of which draws such quads are as well.
+  bool tells_draws() const { return tells_draws_; }
+  void draw_lasts(std::size_t draw, Cycle cycle) { clock.domain->frame_end().draw_not_before(draw, cycle); }
 
  private:
   Occupancy occupancy_;
   StateAccount account_;
+  const bool tells_draws_;
 };
 
 /// Makes the timing model of `cycle` around a functional model of a slot. `gpcs` is how many GPCs the front end serves.

@@ -191,6 +191,11 @@ struct StatisticReport {
 struct DrawReport {
   std::string name;
   std::vector<std::pair<std::string, std::uint64_t>> counts;
+  /// The cycle after the last of its quads has been blended or dropped; none without quads, or without time.
+  std::optional<std::uint64_t> end;
+  /// From the end of the draws before it to its own, 0 if they end later: over all draws these sum to the frame's. None
+  /// without time.
+  std::optional<std::uint64_t> cycles;
 };
 
 /// What a unit spent the cycles of intervals on: by state, one number an interval.
