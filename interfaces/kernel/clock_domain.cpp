@@ -113,7 +113,7 @@ void ClockDomain::edge() {
   const Cycle present = next_;
   // Through the kernel an exception would come out as a report of the kernel's.
   try {
-    const Cycle end = present + cycles_per_activation_;
+    const Cycle end = std::min(present + cycles_per_activation_, stop_at_);
     for (Cycle cycle = present; !finished_ && cycle < end;) {
       if (cycle >= look_at_) look_at_ = look_(cycle);
       // Mostly someone wants the very next cycle.
@@ -125,6 +125,7 @@ void ClockDomain::edge() {
     }
     next_ = *std::min_element(due_.begin(), due_.end());
     if (next_ <= now_) throw SimulationFault(name(), now_, "a unit was woken for an edge in the past");
+    if (next_ != never && next_ >= stop_at_) stopped_ = finished_ = true;
   } catch (...) {
     thrown_ = std::current_exception();
     finished_ = true;

@@ -275,6 +275,7 @@ Cycle Gpu::run(std::atomic<float>* progress) {
     clock_->set_tick_order(order);
   }
 
+  if (request.stop_at > 0) clock_->stop_at(request.stop_at);
   clock_->set_cycles_per_activation(configuration_.request().effects.elaborates_all_of("clock.kernel_time") ? 1 : 64);
 
   // In slices, so that progress shows.
@@ -294,6 +295,11 @@ Cycle Gpu::run(std::atomic<float>* progress) {
     over = frame_is_over();
     if (was_over && over) break;
   }
+
+  // A draw without quads ends when its end has passed through.
+  const Cycle last_quad = clock_->frame_end().so_far();
+  stopped_ = clock_->stopped() && !frame_is_over();
+  if (stopped_) return close(std::max<Cycle>(request.stop_at, last_quad), progress);
 
   Cycle passed = 0;
   bool any_end = false;
@@ -326,9 +332,10 @@ Cycle Gpu::run(std::atomic<float>* progress) {
     }
     throw SimulationFault("deadlock", clock_->now(), "units with work left that wait for each other: " + waiting);
   }
-  // A draw without quads ends when its end has passed through.
-  const Cycle last_quad = clock_->frame_end().so_far();
-  const Cycle end = last_quad > 0 ? last_quad : passed;
+  return close(last_quad > 0 ? last_quad : passed, progress);
+}
+
+Cycle Gpu::close(Cycle end, std::atomic<float>* progress) {
   for (const Placed& placed : units_) placed.unit->close_account(end);
   for (const PlacedMemory& placed : memories_) placed.memory->close(end);
   if (progress != nullptr) *progress = 1;

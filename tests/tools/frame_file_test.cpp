@@ -48,6 +48,18 @@ std::uint64_t count(const json& counts_of, const std::string& name) {
   return counts_of["counts"][name].get<std::uint64_t>();
 }
 
+TEST_F(FrameFile, ItsFirstDrawsAloneAreTheFrameOfThese) {
+  write("three.json", R"({"commands": [{"draw": "tiny.spl"}, {"clear": ["color"]}, {"draw": "tiny.spl", "name": "b"},
+                          {"clear": ["color"]}, {"draw": "tiny.spl", "name": "c"}]})");
+  write("two.json", R"({"commands": [{"draw": "tiny.spl"}, {"clear": ["color"]}, {"draw": "tiny.spl", "name": "b"}]})");
+  const json part = json_of({"run", "--frame", "three.json", "--draws", "2"})["runs"][0];
+  const json two = json_of({"run", "--frame", "two.json"})["runs"][0];
+  EXPECT_EQ(part["result_hash"], two["result_hash"]);
+  EXPECT_EQ(part["draws"], two["draws"]);
+  refused({"run", "--frame", "two.json", "--draws", "3"}, {"'3'", "--draws", "two.json has 2 draws"});
+  refused({"run", "--scene", "tiny.spl", "--draws", "1"}, {"--draws", "a scene is one draw"});
+}
+
 TEST_F(FrameFile, OfOneDrawIsTheScene) {
   for (const std::string scene : {"tiny.spl", "builtin:object"}) {
     std::vector<std::string> options{"--fidelity", "cycle"};

@@ -75,6 +75,34 @@ TEST_F(Interval, SumToTheRunAndChangeNothing) {
   }
 }
 
+TEST_F(Interval, ARunThatStopsIsTheBeginningOfTheWhole) {
+  for (const char* variant : {"baseline", "het+qm"}) {
+    const std::vector<std::string> command{"run", "--scene", "tiny.spl", "--variant", variant};
+    const auto with = [&](std::vector<std::string> options) {
+      options.insert(options.begin(), command.begin(), command.end());
+      return json_of(options)["runs"][0];
+    };
+    const json whole = with({"--interval", "400"});
+    const json part = with({"--until", "400"});
+    EXPECT_TRUE(part["stopped"].get<bool>());
+    EXPECT_FALSE(whole["stopped"].get<bool>());
+    EXPECT_GE(part["cycles"], 400U);
+    EXPECT_LT(part["cycles"], 440U) << "but for what is under way";
+    for (const auto& [name, values] : whole["intervals"]["statistics"].items())
+      EXPECT_EQ(statistic(part, name)["value"], values[0]) << name;
+    EXPECT_LT(part["counts"]["quads_blended"], whole["counts"]["quads_blended"]);
+    EXPECT_GT(part["counts"]["quads_blended"], 0U);
+    const json beyond = with({"--until", "1000000"});
+    EXPECT_FALSE(beyond["stopped"].get<bool>());
+    EXPECT_EQ(beyond["result_hash"], whole["result_hash"]);
+  }
+  EXPECT_NE(
+      vrpipe({"run", "--scene", "tiny.spl", "--until", "400"}).out.find("stopped at cycle 400: the frame goes on"),
+      std::string::npos);
+  refused({"run", "--scene", "tiny.spl", "--until", "400", "--fidelity", "lt"}, {"--until", "lt", "use cycle"});
+  refused({"run", "--scene", "tiny.spl", "--until", "0"}, {"--until", "'0'"});
+}
+
 // That the last interval is what the others leave of the total does not hide what is charged to a wrong one.
 TEST_F(Interval, OfHalfTheLengthAreThePartsOfThoseOfTheWhole) {
   for (const std::string& fidelity : timed_fidelities) {

@@ -34,6 +34,7 @@ RunResult full_result() {
   RunResult result;
   result.request = a_request();
   result.cycles = huge;
+  result.stopped = true;
   result.milliseconds = 0.1;
   result.host_seconds = 1.0 / 3;
   result.cpu_seconds = 12345678.901234567;
@@ -68,7 +69,7 @@ RunResult full_result() {
   result.framebuffer.addresses.attributes = {0x10000, 123};
   result.effects = {{"crop.blend_hazard", true, EffectProof::verified, "\xe9"},
                     {"tc.time_out", false, EffectProof::bounded, "after 150 cycles"}};
-  result.draws = {{"first", {{"quads_blended", 7}}}, {"", {}}};
+  result.draws = {{"first", {{"quads_blended", 7}}, huge - 2, 8}, {"", {}, std::nullopt, std::nullopt}};
   IntervalReport& intervals = result.intervals.emplace();
   intervals.every = huge - 3;
   intervals.from = {0, huge - 3};
@@ -141,16 +142,18 @@ void expect_equal_intervals(const IntervalReport& actual, const IntervalReport& 
 
 /// All but the request and the surfaces. A new member has to be named here, and compared.
 void expect_equal(const RunResult& actual, const RunResult& expected) {
-  const auto& [request, cycles, milliseconds, host_seconds, cpu_seconds, counts, utilization, units, bottleneck,
-               statistics, implementations, parameters, outside_validated_range, effects, result_hash, kernel_events,
-               framebuffer, draws, intervals] = actual;
+  const auto& [request, cycles, stopped, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
+               bottleneck, statistics, implementations, parameters, outside_validated_range, effects, result_hash,
+               kernel_events, framebuffer, draws, intervals] = actual;
   ASSERT_EQ(intervals.has_value(), expected.intervals.has_value());
   if (intervals) expect_equal_intervals(*intervals, *expected.intervals);
   EXPECT_EQ(framebuffer.addresses.attributes.address, expected.framebuffer.addresses.attributes.address);
   EXPECT_EQ(framebuffer.addresses.attributes.bytes, expected.framebuffer.addresses.attributes.bytes);
   ASSERT_EQ(draws.size(), expected.draws.size());
   for (std::size_t i = 0; i < draws.size(); ++i) {
-    const auto& [name, counts_of_draw] = draws[i];
+    const auto& [name, counts_of_draw, end, cycles_of_draw] = draws[i];
+    EXPECT_EQ(end, expected.draws[i].end);
+    EXPECT_EQ(cycles_of_draw, expected.draws[i].cycles);
     EXPECT_EQ(name, expected.draws[i].name);
     EXPECT_EQ(counts_of_draw, expected.draws[i].counts);
   }
@@ -163,6 +166,7 @@ void expect_equal(const RunResult& actual, const RunResult& expected) {
     EXPECT_EQ(reason, expected.effects[i].reason);
   }
   EXPECT_EQ(cycles, expected.cycles);
+  EXPECT_EQ(stopped, expected.stopped);
   EXPECT_EQ(milliseconds, expected.milliseconds);
   EXPECT_EQ(host_seconds, expected.host_seconds);
   EXPECT_EQ(cpu_seconds, expected.cpu_seconds);

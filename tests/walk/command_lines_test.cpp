@@ -68,6 +68,8 @@ const std::map<std::string, Words> texts_of = {
     {"--log", {"crop", "gpc0.tc@10:50"}},
     {"--log-file", {"events.log"}},
     {"--heat-maps", {}},
+    {"--until", {"700", "1"}},
+    {"--draws", {"1", "2"}},
     {"--markdown", {"page.md"}},  // of reproduce; of accuracy a flag
     {"--quick", {}},
     {"--repeat", {"1", "3"}},

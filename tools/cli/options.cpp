@@ -248,6 +248,7 @@ void SimulationArguments::declare_frames(Arguments& arguments) {
                        "in place of --scene: clears and draws of scenes, each with a state of its\n"
                        "own (docs/frames.md)",
                        scene_group);
+  arguments.add_option("--draws", draws_, "N", "of --frame, its first N draws alone (default: all)", scene_group);
   arguments.add_option("--multi-pass", passes_, "N",
                        "early termination by software: the splats in N batches, after each but the\n"
                        "last a draw that sets the stencil where a pixel has terminated (default: 1;\n"
@@ -358,6 +359,8 @@ FrameDescription SimulationArguments::frame() const {
     FrameDescription frame = frame_of_scene(single(scene_, "--scene").value_or(""));
     if (const auto text = single(passes_, "--multi-pass"))
       frame.passes = parse_count(*text, "--multi-pass", most_passes);
+    if (!draws_.empty())
+      throw UserError("cannot use option", "--draws", "a scene is one draw", "leave it out, or draw a --frame FILE");
     return frame;
   }
   const auto refuse_with_frame = [](const Values& given, const char* option, const char* why) {
@@ -367,7 +370,10 @@ FrameDescription SimulationArguments::frame() const {
   refuse_with_frame(meshes_, "--mesh", "--frame says what is drawn");
   refuse_with_frame(passes_, "--multi-pass", "it splits the one draw of a scene, and --frame says what is drawn");
   refuse_with_frame(save_draw_, "--save-draw", "a draw list has one draw, and a frame may have several");
-  return read_frame_file(*file);
+  FrameDescription frame = read_frame_file(*file);
+  if (const auto text = single(draws_, "--draws"))
+    leave_out_draws_after(parse_count(*text, "--draws", most_draws), frame);
+  return frame;
 }
 
 std::vector<NamedFile> SimulationArguments::inputs(const FrameDescription& frame) const {

@@ -78,7 +78,7 @@ class SimulationArguments {
   std::shared_ptr<const EnergyTable> energies(const Platform& platform) const;
 
   Values meshes_;
-  Values scene_, frame_, passes_, size_, camera_, eye_, look_at_, up_, fovy_;
+  Values scene_, frame_, draws_, passes_, size_, camera_, eye_, look_at_, up_, fovy_;
   Values platform_, settings_, variant_, definitions_, units_, plugins_;
   Values fidelity_, effects_, format_, termination_;
   Values views_, journal_, relative_to_;

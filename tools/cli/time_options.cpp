@@ -12,6 +12,7 @@
 namespace vrpipe::tools {
 namespace {
 
+constexpr const char* until_option = "--until";
 constexpr const char* interval_option = "--interval";
 constexpr const char* csv_option = "--interval-csv";
 constexpr const char* statistics_option = "--interval-statistics";
@@ -76,6 +77,10 @@ void TimeArguments::declare(Arguments& arguments, const std::string& group, bool
                          "repeated",
                          group);
     arguments.add_option(EventLog::file_option, log_file_, "FILE", "writes it there instead", group);
+    arguments.add_option(until_option, until_, "CYCLE",
+                         "stops there, with counts, states and picture as they are by then, at fidelity\n"
+                         "cycle",
+                         group);
   }
   arguments.add_flag(HeatMaps::option, heat_maps_,
                      "with --output: writes maps of the fragments of each pixel and screen tile,\n"
@@ -87,7 +92,8 @@ std::string TimeArguments::any_given() const {
   for (const auto& [values, option] :
        {std::pair{&interval_, interval_option}, std::pair{&interval_csv_, csv_option},
         std::pair{&interval_statistics_, statistics_option}, std::pair{&trace_, Trace::option},
-        std::pair{&log_, EventLog::option}, std::pair{&log_file_, EventLog::file_option}}) {
+        std::pair{&log_, EventLog::option}, std::pair{&log_file_, EventLog::file_option},
+        std::pair{&until_, until_option}}) {
     if (!values->empty()) return option;
   }
   return heat_maps_ ? HeatMaps::option : "";
@@ -123,6 +129,15 @@ void TimeArguments::observe(SimulationJob& job) const {
   }
   if (heat_maps_ && !job.output) {
     throw UserError("heat maps go nowhere", HeatMaps::option, "no folder is named", "add --output DIR");
+  }
+  if (const auto until = single(until_, until_option)) {
+    job.requests.front().stop_at = parse_count(*until, until_option, longest_interval);
+    if (job.requests.front().fidelity != Fidelity::cycle) {
+      throw UserError("cannot use option", until_option,
+                      "what " + std::string(vrpipe::name_of(job.requests.front().fidelity)) +
+                          " has done by a cycle is not what the GPU has",
+                      "use cycle");
+    }
   }
   job.heat_maps = heat_maps_;
   if (csv) job.interval_csv = *csv;

@@ -25,7 +25,7 @@ class TimeArguments {
   void record(RunRequest& request, Cycle every) const;
 
   Values interval_, interval_csv_, interval_statistics_;
-  Values trace_, log_, log_file_;
+  Values trace_, log_, log_file_, until_;
   bool heat_maps_ = false;
 };
 

@@ -329,6 +329,17 @@ void name_draws(std::vector<FrameCommand>& commands) {
 
 }  // namespace
 
+void leave_out_draws_after(std::size_t count, FrameDescription& frame) {
+  std::size_t draws = 0;
+  for (std::size_t i = 0; i < frame.commands.size(); ++i) {
+    if (!frame.commands[i].draw || ++draws < count) continue;
+    frame.commands.resize(i + 1);
+    return;
+  }
+  throw UserError("bad value '" + std::to_string(count) + "'", "--draws",
+                  fmt::format("{} has {} draw{}", frame.name, draws, draws == 1 ? "" : "s"), "give fewer");
+}
+
 FrameDescription frame_of_scene(const std::string& scene) {
   FrameDescription frame;
   frame.name = scene_name(scene);

@@ -43,6 +43,9 @@ struct FrameDescription {
   std::uint32_t passes = 1;  ///< in which the splats of a scene are drawn (draw_in_passes)
 };
 
+/// Of the frame's commands, those up to its `count`th draw are left. Throws UserError if it has fewer.
+void leave_out_draws_after(std::size_t count, FrameDescription& frame);
+
 /// A frame of one draw.
 FrameDescription frame_of_scene(const std::string& scene);
 

@@ -60,7 +60,7 @@ VRPIPE_MEMBERS(EffectReport, name, omitted, proof, reason)
 VRPIPE_MEMBERS(UnitIntervals, name, cycles)
 VRPIPE_MEMBERS(StatisticIntervals, name, kind, values, denominators)
 VRPIPE_MEMBERS(IntervalReport, every, from, units, statistics)
-VRPIPE_MEMBERS(RunResult, request, cycles, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
+VRPIPE_MEMBERS(RunResult, request, cycles, stopped, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
                bottleneck, statistics, implementations, parameters, outside_validated_range, effects, result_hash,
                kernel_events, framebuffer, draws, intervals)
 

@@ -337,6 +337,13 @@ std::string anomaly_text(const std::vector<RunResult>& runs) {
   return text + "\n";
 }
 
+/// That all is of a part of the run.
+std::string stopped_text(const RunResult& run) {
+  if (!run.stopped) return {};
+  return fmt::format("stopped at cycle {}: the frame goes on; counts, states and picture are as they were then\n",
+                     grouped(run.request.stop_at));
+}
+
 /// Where cycles may be farther off than the documentation says: reasons of all runs, then those of some.
 std::string validated_text(const std::vector<RunResult>& runs) {
   std::vector<std::pair<std::string, std::vector<std::string>>> names_of_reason;
@@ -393,6 +400,7 @@ std::string remarks(const JobResult& result) {
   if (runs.front().counts.fragments_rasterized == 0) {
     text += nothing_visible(result.scene, result.viewpoint.has_value()) + "\n";
   }
+  text += stopped_text(runs.front());
   for (const RunResult& run : runs) text += bound_text(run);
   text += validated_text(runs);
   if (const auto early = early_termination_ratio(runs)) {

@@ -228,6 +228,7 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
                {"changes", changes_json(run.request.variant)},
                {"parameters", changed_parameters_json(run, parameters)},
                {"cycles", timed ? Json(*run.cycles) : Json()},
+               {"stopped", run.stopped},
                {"milliseconds", timed ? Json(run.milliseconds) : Json()},
                {"host_seconds", run.host_seconds},
                {"cpu_seconds", run.cpu_seconds},

@@ -126,6 +126,10 @@ class ClockDomain : public sc_core::sc_module {
 
   /// Ends the simulation after this cycle.
   void finish() { finished_ = true; }
+  /// Lets no edge of this cycle or a later one come; before the first. What wants one then ends the simulation.
+  void stop_at(Cycle cycle) { stop_at_ = cycle; }
+  /// Whether that has ended it.
+  bool stopped() const { return stopped_; }
   bool finished() const { return finished_; }
   /// Number of edges at which at least one unit was ticked.
   std::uint64_t edges() const { return edges_; }
@@ -154,6 +158,8 @@ class ClockDomain : public sc_core::sc_module {
   FrameEnd frame_end_;
   Cycle now_ = 0;
   Cycle next_ = 0;  ///< the edge that is armed; `never` for none
+  Cycle stop_at_ = never;
+  bool stopped_ = false;
   unsigned cycles_per_activation_ = 1;
   std::uint64_t edges_ = 0;
   std::uint64_t activations_ = 0;

@@ -44,8 +44,10 @@ class Gpu {
   const std::vector<PlacedForeign>& foreign_memories() const { return foreign_memories_; }
   ClockDomain& clock() { return *clock_; }
 
-  /// Runs the draw to its end; returns the cycles. `progress` goes to 1.
+  /// Runs the frame to its end, or to RunRequest::stop_at; returns the cycles. `progress` goes to 1.
   Cycle run(std::atomic<float>* progress);
+  /// Whether the run ended at RunRequest::stop_at, before its frame.
+  bool stopped() const { return stopped_; }
 
  private:
   void add(const Instance& instance, Framebuffer& framebuffer);
@@ -60,6 +62,8 @@ class Gpu {
   void check() const;
   /// Whether the draw has ended everywhere, no unit has work left and no access to memory is under way.
   bool frame_is_over() const;
+  /// Closes all accounts with this cycle; returns it.
+  Cycle close(Cycle end, std::atomic<float>* progress);
   Unit* find(const std::string& path) const;
 
   const Configuration& configuration_;
@@ -69,6 +73,7 @@ class Gpu {
   std::vector<PlacedForeign> foreign_memories_;
   std::map<unsigned, std::unique_ptr<RunAhead>> ahead_;  ///< by GPC, in strict termination
   std::vector<Placed> units_;
+  bool stopped_ = false;
 };
 
 }  // namespace vrpipe

@@ -106,6 +106,10 @@ struct RunRequest {
   /// Seen from outside in this process; null for nothing.
   std::shared_ptr<Observers> observers;
 
+  /// At fidelity `cycle`: the run stops there, with what is done by then, unless its frame ends earlier; at least 1. 0: it
+  /// does not.
+  std::uint64_t stop_at = 0;
+
   /// For tests: a seed and a share of cycles (of 256) in which ports stall at random; 0 for none.
   std::uint64_t stall_seed = 0;
   unsigned stall_per_256 = 0;
@@ -224,6 +228,9 @@ struct IntervalReport {
 struct RunResult {
   RunRequest request;
   std::optional<std::uint64_t> cycles;  ///< none where the fidelity has no time
+  /// Its frame goes on after RunRequest::stop_at: all is as it was then, and `cycles` is that, or a few more that what was
+  /// under way is known to take.
+  bool stopped = false;
   double milliseconds = 0;              ///< simulated, at the platform's clock
   double host_seconds = 0;              ///< wall time of the simulation alone
   double cpu_seconds = 0;               ///< processor time of this process over the same; what the simulation costs
