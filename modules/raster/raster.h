@@ -84,10 +84,6 @@ class TileRasterizer : public RasterBehaviour {
   bool waits_at(Mark mark) const override { return hi_z_ != nullptr && hi_z_->waits_at(mark); }
   TimingParameters timing() const override { return timing_; }
 
-  Counter setups{*this, "setups", "primitives", "set up; again for each flush that a primitive is in"};
-  Counter raster_tiles_tested{*this, "raster_tiles_tested", "raster tiles", "by coarse rasterisation"};
-  Counter raster_tiles_kept{*this, "raster_tiles_kept", "raster tiles", "handed to fine rasterisation"};
-  Counter screen_tile_pairs{*this, "screen_tile_pairs", "pairs", "of a primitive and a screen tile that it may cover"};
   MinMax widest_edge{*this, MinMax::Of::largest, "widest_edge", "bits",
                      "sign included, that the largest edge function needs over the samples of the viewport"};
   Counter hi_z_tests{*this, "hi_z_tests", "raster tiles", "that coarse rasterisation keeps and Hi-Z looks at"};

@@ -50,7 +50,6 @@ class TileGridCoalescing : public TgcBehaviour {
   /// (4 B pointer x 3 vertices x primitives + 2 B grid id) x bins (paper, table of hardware cost).
   std::uint64_t storage_bytes() const override;
 
-  Counter entries{*this, "entries", "entries", "primitives entered into bins; one for each grid touched"};
   Counter bins_begun{*this, "bins_begun", "bins", "given to a tile grid; less `flushes`, those in use"};
   Counter evictions{*this, "evictions", "flushes", "of these, to make room"};
   Histogram flush_sizes{*this, Histogram::Buckets::log2(), "primitives_per_flush", "primitives", "in a flushed bin"};

@@ -634,6 +634,67 @@ void choose_checked(RunRequest& request) {
   }
 }
 
+/// The shipped RASTER and TGC, as somebody else's that count no more than they have to.
+class SilentRaster : public RasterBehaviour {
+ public:
+  using Parameters = TileRasterizer::Parameters;
+  SilentRaster(const Parameters& parameters, const RenderContext& context) : inner_(parameters, context) {}
+  void begin(const Primitive& primitive, const PixelRect& clip) override {
+    draw_ = primitive.draw;
+    inner_.begin(primitive, clip);
+  }
+  bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override {
+    const bool more = inner_.next(out, coarse_tests, new_screen_tile);
+    for (unsigned i = 0; more && i < out.count; ++i) {
+      quads_rasterized.add(draw_, 1);
+      fragments_rasterized.add(draw_, popcount(out.quads[i].coverage));
+    }
+    return more;
+  }
+  TimingParameters timing() const override { return inner_.timing(); }
+
+ private:
+  TileRasterizer inner_;
+  DrawIndex draw_ = 0;
+};
+class SilentTgc : public TgcBehaviour {
+ public:
+  using Parameters = TileGridCoalescing::Parameters;
+  SilentTgc(const Parameters& parameters, const RenderContext& context) : inner_(parameters, context) {}
+  void begin(const Primitive& primitive) override { inner_.begin(primitive); }
+  bool entering() const override { return inner_.entering(); }
+  bool step(Flush& out) override { return counted(inner_.step(out)); }
+  bool drain(Flush& out) override { return counted(inner_.drain(out)); }
+  Throughput timing() const override { return inner_.timing(); }
+  std::uint32_t largest_flush() const override { return inner_.largest_flush(); }
+  std::uint64_t storage_bytes() const override { return inner_.storage_bytes(); }
+
+ private:
+  bool counted(bool is_flushed) {
+    flushes += is_flushed ? 1 : 0;
+    return is_flushed;
+  }
+  TileGridCoalescing inner_;
+};
+
+TEST(CheckedUnits, WhatAUnitDoesNotCountIsCountedForIt) {
+  const Registrar<SilentRaster, RasterBehaviour> raster("raster", "silent", "counts no more than it has to");
+  const Registrar<SilentTgc, TgcBehaviour> tgc("tgc", "silent", "counts no more than it has to");
+  const Draw draw = random_draw(100, 60, 200, 2);
+  for (const Fidelity fidelity : fidelities()) {
+    RunRequest request = request_of("het+qm", fidelity);
+    const RunResult shipped = run(request, draw);
+    request.units = {{"raster", "silent"}, {"tgc", "silent"}};
+    const RunResult silent = run(request, draw);
+    EXPECT_EQ(silent.result_hash, shipped.result_hash);
+    for (const char* name : {"tgc.entries", "raster.setups", "raster.raster_tiles_tested", "raster.raster_tiles_kept",
+                             "raster.screen_tile_pairs"}) {
+      EXPECT_GT(statistic(shipped, name), 0U) << name;
+      EXPECT_EQ(statistic(silent, name), statistic(shipped, name)) << name << " at " << name_of(fidelity);
+    }
+  }
+}
+
 TEST(CheckedUnits, ChecksChangeNothing) {
   ASSERT_TRUE(registered);
   const Draw draw = random_draw(100, 60, 200, 2);

@@ -82,14 +82,21 @@ TEST_F(Interval, ARunThatStopsIsTheBeginningOfTheWhole) {
       options.insert(options.begin(), command.begin(), command.end());
       return json_of(options)["runs"][0];
     };
-    const json whole = with({"--interval", "400"});
-    const json part = with({"--until", "400"});
+    const json whole = with({"--interval", "1000"});
+    const json part = with({"--until", "1000"});
     EXPECT_TRUE(part["stopped"].get<bool>());
     EXPECT_FALSE(whole["stopped"].get<bool>());
-    EXPECT_GE(part["cycles"], 400U);
-    EXPECT_LT(part["cycles"], 440U) << "but for what is under way";
-    for (const auto& [name, values] : whole["intervals"]["statistics"].items())
-      EXPECT_EQ(statistic(part, name)["value"], values[0]) << name;
+    EXPECT_GE(part["cycles"], 1000U);
+    EXPECT_LT(part["cycles"], 1040U) << "but for what is under way";
+    std::size_t compared = 0;
+    for (const json& each : part["statistics"]) {
+      const json& in_intervals = whole["intervals"]["statistics"];
+      const auto found = in_intervals.find(each["name"].get<std::string>());
+      if (found == in_intervals.end()) continue;
+      EXPECT_EQ(each["value"], found->at(0)) << each["name"];
+      ++compared;
+    }
+    EXPECT_GT(compared, 4U);
     EXPECT_LT(part["counts"]["quads_blended"], whole["counts"]["quads_blended"]);
     EXPECT_GT(part["counts"]["quads_blended"], 0U);
     const json beyond = with({"--until", "1000000"});

@@ -14,12 +14,16 @@ class CheckedRaster final : public CheckedSlot<RasterBehaviour> {
     primitive_ = primitive;
     kept_ = 0;
     ask("begin", [&] { checked_->begin(primitive, clip); });
+    count_up_to(checked_->setups, ++set_up_);
   }
   bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override {
     const bool more = ask("next", [&] { return checked_->next(out, coarse_tests, new_screen_tile); });
+    count_up_to(checked_->raster_tiles_tested, tested_ += coarse_tests);
     if (coarse_tests > raster_tiles())
       fault("next", "{} raster tiles tested, the frame has {}", coarse_tests, raster_tiles());
     if (!more) return false;
+    count_up_to(checked_->raster_tiles_kept, ++kept_of_all_);
+    count_up_to(checked_->screen_tile_pairs, pairs_ += new_screen_tile ? 1 : 0);
     if (++kept_ > raster_tiles())
       fault("next", "splat {} covers more raster tiles than the frame has", primitive_.splat);
     if (out.count > QuadBeat::capacity) fault("next", "{} quads in a raster tile", out.count);
@@ -66,6 +70,7 @@ class CheckedRaster final : public CheckedSlot<RasterBehaviour> {
  private:
   std::uint64_t raster_tiles() const { return 4 * tiles(); }
 
+  std::uint64_t set_up_ = 0, tested_ = 0, kept_of_all_ = 0, pairs_ = 0;
   Primitive primitive_;
   std::uint64_t kept_ = 0;  ///< raster tiles of the primitive
   Seen quads_;

@@ -61,6 +61,7 @@ class CheckedTgc final : public CheckedSlot<TgcBehaviour> {
     for (const Primitive& primitive : out.primitives) check_primitive(call, primitive);
     ++flushes_;
     left_ += out.primitives.size();
+    if (out.primitives.size() > 1 || largest_flush() > 1) count_up_to(checked_->entries, left_);
     if (left_ > entered_) fault(call, "{} primitives came out, {} were entered", left_, entered_);
     return true;
   }

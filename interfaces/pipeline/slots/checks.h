@@ -69,6 +69,10 @@ class Checks {
   Checks(const Checks&) = delete;
   Checks& operator=(const Checks&) = delete;
 
+  /// Counts for a unit what it has not counted itself.
+  static void count_up_to(Counter& counter, std::uint64_t value) {
+    if (counter.value() < value) counter += value - counter.value();
+  }
   void follow(const ClockDomain& clock) { clock_ = &clock; }
   /// Asks for all costs, which are checked: what cannot be is told before anything runs, at every fidelity.
   virtual void check_timing() const = 0;

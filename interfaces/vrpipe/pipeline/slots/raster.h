@@ -36,6 +36,11 @@ class RasterBehaviour : public Behaviour {
 
   DrawCounter quads_rasterized{*this, "quads_rasterized", "quads", "with at least one covered sample"};
   DrawCounter fragments_rasterized{*this, "fragments_rasterized", "fragments", "covered samples"};
+  // What a unit of one's own does not count of these is counted for it, by its answers.
+  Counter setups{*this, "setups", "primitives", "set up; again for each flush that a primitive is in"};
+  Counter raster_tiles_tested{*this, "raster_tiles_tested", "raster tiles", "by coarse rasterisation"};
+  Counter raster_tiles_kept{*this, "raster_tiles_kept", "raster tiles", "handed to fine rasterisation"};
+  Counter screen_tile_pairs{*this, "screen_tile_pairs", "pairs", "of a primitive and a screen tile that it may cover"};
 };
 
 /// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.

@@ -31,6 +31,8 @@ class TgcBehaviour : public Behaviour {
   virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
 
   Counter flushes{*this, "flushes", "flushes", "bins handed to the rasteriser; 0 where a unit passes through"};
+  /// A unit of one's own that does not count them has those counted that leave it.
+  Counter entries{*this, "entries", "entries", "primitives entered into bins; one for each grid touched"};
 };
 
 /// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
