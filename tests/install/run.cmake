@@ -69,7 +69,7 @@ endif()
 set(vrpipe ${prefix}/bin/vrpipe)
 set(plugin ${WORK_DIR}/consumer/same_splat_qru.so)
 # Preprocessed once: it is run some sixty times.
-expect_success("" ${vrpipe} run --scene builtin:object --size 160x120 --fidelity functional
+expect_success("" ${vrpipe} run --scene builtin:object --size 160x120 --fovy 10 --fidelity functional
   --save-draw ${WORK_DIR}/draw.spl)
 set(draw --scene ${WORK_DIR}/draw.spl)
 

@@ -178,12 +178,13 @@ TEST_F(Sweep, DrawsScenesViewsAndSizes) {
   const json result = sweep("fidelity = \"functional\"\n[axes]\nscene = [\"builtin:object\", \"tiny.spl\"]\n");
   EXPECT_NE(result["points"][0]["result_hash"], result["points"][1]["result_hash"]);
   const json views = sweep(
-      "fidelity = \"functional\"\n[axes]\nview = [0, 1, 2]\nsize = [\"16x16\", \"24x16\"]\n"
+      "fidelity = \"functional\"\nfovy = 20\n[axes]\nview = [0, 1, 2]\nsize = [\"16x16\", \"24x16\"]\n"
       "preprocess.sh_degree = [0, 3]\n");
   std::set<std::string> hashes;
   for (const json& point : views["points"]) hashes.insert(point["result_hash"]);
   EXPECT_EQ(hashes.size(), 12U);
-  const json run = json_of({"run", "--size", "24x16", "--fidelity", "functional", "--set", "preprocess.sh_degree=0"});
+  const json run = json_of(
+      {"run", "--size", "24x16", "--fovy", "20", "--fidelity", "functional", "--set", "preprocess.sh_degree=0"});
   EXPECT_EQ(views["points"][2]["result_hash"], run["runs"][0]["result_hash"]);
 }
 
@@ -216,8 +217,8 @@ TEST_F(Sweep, TakesASampleThatItsSeedDecides) {
 
 TEST_F(Sweep, SpeedUpsAreOverOnePointOfTheSameScene) {
   const std::string study =
-      "fidelity = \"lt\"\nsize = \"24x24\"\n[axes]\nview = [0, 1]\nvariant = [\"baseline\", \"het\"]\n"
-      "tc.bins = [4, 32]\n";
+      "fidelity = \"lt\"\nsize = \"24x24\"\nfovy = 10\n[axes]\nview = [0, 1]\n"
+      "variant = [\"baseline\", \"het\"]\ntc.bins = [4, 32]\n";
   const json usual = sweep(study);
   for (std::size_t i = 0; i < 8; ++i) {
     const json& point = usual["points"][i];
@@ -288,20 +289,22 @@ TEST_F(Sweep, WritesTheSamePointsAsCsvAndJsonLines) {
 
 TEST_F(Sweep, KilledAtAnyMomentEndsWithTheSameBytes) {
   write("study.toml",
-        "fidelity = \"lt\"\nsize = \"64x64\"\n[axes]\nview = [0, 1]\nvariant = [\"baseline\", \"het+qm\"]\n"
-        "tc.bins = [4, 32]\n");
+        "fidelity = \"lt\"\nsize = \"64x64\"\nfovy = 20\n[axes]\nview = [0, 1]\n"
+        "variant = [\"baseline\", \"het+qm\"]\ntc.bins = [4, 32]\n");
   const std::vector<std::string> outputs{"--csv",  "s.csv",  "--jsonl", "s.jsonl",
                                          "--html", "s.html", "--json",  "s.json"};
   std::vector<std::string> command{"sweep", "study.toml"};
   command.insert(command.end(), outputs.begin(), outputs.end());
+  const auto start = std::chrono::steady_clock::now();
   ASSERT_EQ(vrpipe(command).code, 0);
+  const auto duration = std::chrono::steady_clock::now() - start;
   std::map<std::string, std::string> undisturbed;
   for (const char* file : {"s.csv", "s.jsonl", "s.html", "s.json"}) {
     undisturbed[file] = read_file(folder() / file);
     std::filesystem::remove(folder() / file);
   }
   command.insert(command.end(), {"--journal", "j.jsonl"});
-  for (const int milliseconds : {900, 1300, 1800}) {
+  for (const int tenths : {4, 6, 8}) {
     const pid_t process = ::fork();
     if (process == 0) {
       std::filesystem::current_path(folder());
@@ -315,7 +318,7 @@ TEST_F(Sweep, KilledAtAnyMomentEndsWithTheSameBytes) {
       ::execv(VRPIPE_BINARY, argv.data());
       ::_exit(1);
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(milliseconds));
+    std::this_thread::sleep_for(duration * tenths / 10);
     ::kill(process, SIGKILL);
     ::waitpid(process, nullptr, 0);
   }
@@ -380,13 +383,14 @@ TEST_F(Sweep, OverMpiRanksIsTheSameAsAlone) {
 
 TEST_F(Sweep, OfWhichARankIsLostGoesOn) {
   if (!has_mpi()) GTEST_SKIP() << "built or run without MPI";
-  write("study.toml", "fidelity = \"lt\"\nsize = \"64x64\"\n[axes]\nview = [0, 1]\ntc.bins = [4, 8, 16, 32]\n");
+  write("study.toml",
+        "fidelity = \"lt\"\nsize = \"64x64\"\nfovy = 20\n[axes]\nview = [0, 1]\ntc.bins = [4, 8, 16, 32]\n");
   ASSERT_EQ(vrpipe({"sweep", "study.toml", "--csv", "alone.csv"}).code, 0);
   const std::string command = under_mpi(folder(), 2, "sweep study.toml --csv lost.csv --journal j");
   // A rank is killed once there are results; mpirun then ends the others.
   const std::string killing =
       "(cd " + folder().string() +
-      " && until [ -s j ]; do sleep 0.1; done; sleep 0.3; for p in /proc/[0-9]*; do if tr '\\0' ' ' <$p/cmdline "
+      " && until [ -s j ]; do sleep 0.1; done; sleep 0.1; for p in /proc/[0-9]*; do if tr '\\0' ' ' <$p/cmdline "
       "2>/dev/null | grep -q '^[^ ]*vrpipe sweep study.toml --csv lost.csv'; then rank=${p#/proc/}; fi; done; "
       "kill -KILL $rank) & " +
       command;
