@@ -231,9 +231,9 @@ struct RunResult {
   /// Its frame goes on after RunRequest::stop_at: all is as it was then, and `cycles` is that, or a few more that what was
   /// under way is known to take.
   bool stopped = false;
-  double milliseconds = 0;              ///< simulated, at the platform's clock
-  double host_seconds = 0;              ///< wall time of the simulation alone
-  double cpu_seconds = 0;               ///< processor time of this process over the same; what the simulation costs
+  double milliseconds = 0;  ///< simulated, at the platform's clock
+  double host_seconds = 0;  ///< wall time of the simulation alone
+  double cpu_seconds = 0;   ///< processor time of this process over the same; what the simulation costs
   Counts counts;
   /// raster zrop prop sm crop l2 dram, in [0, 1]; empty without time. DRAM is 0 while L2 is all the memory there is.
   std::vector<std::pair<std::string, double>> utilization;
