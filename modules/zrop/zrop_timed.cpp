@@ -166,22 +166,19 @@ class TimedZrop : public TimedUnit {
       const Cycle at = take(ready, beat.count);
       if (has_cache_) z_.tested(beat.count, needs_stencil, at);
       const unsigned tested_quads = beat.count;
-      // Of survivors it is known that they end later.
-      for (unsigned i = 0; tells_draws() && i < tested_quads; ++i)
-        draw_lasts(beat.quads[i].draw, at + timing_.latency_cycles);
       port_free_at_ = at + (tested_quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       if (blocks_.is_on())
         pay_for_blocks(price * (from + tested_quads) / total - price * from / total, tested_quads, at);
       did(ZropWork::tests, tested_quads, at, port_free_at_);
       QuadBeat before;
-      if (may_change || hi_z) before = beat;
+      if (may_change || hi_z || tells_draws()) before = beat;
       const std::uint32_t changed = behaviour_->test(beat);
       if (may_change && changed != 0) {
         z_.change(before, changed, at);
         note_moves();
       }
       if (hi_z && changed != 0) tell(before, changed, at);
-      if (beat.count < tested_quads) frame_lasts(at + timing_.latency_cycles);
+      if (beat.count < tested_quads) end_quads(before, tested_quads, at + timing_.latency_cycles);
       tested.first = std::min(tested.first, at);
       tested.last = at;
       // A part without survivors goes no further, but for the mark that closes the bin.
@@ -205,6 +202,11 @@ class TimedZrop : public TimedUnit {
     return {tested.first, std::max(tested.last, taken.last)};
   }
 
+  /// Some of them end, in the cycle before this one; of the others' draws it is known as well that they last so long.
+  void end_quads(const QuadBeat& tested, unsigned count, Cycle cycle) {
+    frame_lasts(cycle);
+    for (unsigned i = 0; tells_draws() && i < count; ++i) draw_lasts(tested.quads[i].draw, cycle);
+  }
   [[gnu::noinline]] void pay_for_blocks(std::uint64_t price, unsigned quads, Cycle at) {
     port_free_at_ = std::max(port_free_at_, block_port_.take(at, price));
     tests_.hold(block_port_.free_from(0));
@@ -267,9 +269,7 @@ class TimedZrop : public TimedUnit {
       note_moves();
     }
     if (changed != 0 && hi_z_.wanted(before.quads[0].draw)) tell(before, changed, at);
-    if (warp.count < before.count) frame_lasts(at + timing_.latency_cycles);
-    for (unsigned i = 0; tells_draws() && i < before.count; ++i)
-      draw_lasts(before.quads[i].draw, at + timing_.latency_cycles);
+    if (warp.count < before.count) end_quads(before, before.count, at + timing_.latency_cycles);
     const Cycle taken = out_late_.send(item, at).first;
     late_tests_.hold(taken);
     return has_cache_ ? times.at : std::max(at, taken);

@@ -130,14 +130,12 @@ class ZropUnit : public Unit {
       if (blocks_.is_on()) pay_for_blocks(beat, now);
       did(ZropWork::tests, beat.count, now, tested_until_);
       const unsigned tested = beat.count;
-      // Of survivors it is known that they end later.
-      for (unsigned i = 0; tells_draws() && i < tested; ++i)
-        draw_lasts(beat.quads[i].draw, now + timing_.latency_cycles);
       if (lacks_cache_ && tested > 0) z_cache_gate_.enter();
       // Of what may write, the quads that come in.
       QuadBeat before;
       const bool hi_z = tested > 0 && hi_z_.wanted(beat.quads[0].draw);
-      if (hi_z || (has_cache_ && tested > 0 && context_.state(beat.quads[0].draw).writes_depth_stencil()))
+      if (hi_z || tells_draws() ||
+          (has_cache_ && tested > 0 && context_.state(beat.quads[0].draw).writes_depth_stencil()))
         before = beat;
       if (beat.mark == Mark::none) {
         const std::uint32_t changed = behaviour_->test(beat);
@@ -148,7 +146,7 @@ class ZropUnit : public Unit {
       } else {
         pass(beat.mark);
       }
-      if (beat.count < tested) frame_lasts(now + timing_.latency_cycles);
+      if (beat.count < tested) end_quads(before, tested, now + timing_.latency_cycles);
       moved = true;
       // A beat without survivors goes no further, but for the mark that closes a bin.
       if (beat.count > 0 || beat.last_of_bin || beat.mark != Mark::none) out_.push(beat);
@@ -156,6 +154,11 @@ class ZropUnit : public Unit {
     }
     if (moved) free_at_ = block_port_.free_from(limit_.next(now));
     return moved;
+  }
+  /// Some of them end, in the cycle before this one; of the others' draws it is known as well that they last so long.
+  void end_quads(const QuadBeat& tested, unsigned count, Cycle cycle) {
+    frame_lasts(cycle);
+    for (unsigned i = 0; tells_draws() && i < count; ++i) draw_lasts(tested.quads[i].draw, cycle);
   }
   [[gnu::noinline]] void pay_for_blocks(const QuadBeat& beat, Cycle now) {
     const std::uint64_t price = blocks_.of(beat.tile, beat.quads.data(), beat.count);
@@ -210,9 +213,7 @@ class ZropUnit : public Unit {
     }
     if (has_cache_ && changed != 0) z_.change(before, changed);
     if (changed != 0 && hi_z_.wanted(before.quads[0].draw)) tell_later(before, changed);
-    if (warp.count < before.count) frame_lasts(now + timing_.latency_cycles);
-    for (unsigned i = 0; tells_draws() && i < before.count; ++i)
-      draw_lasts(before.quads[i].draw, now + timing_.latency_cycles);
+    if (warp.count < before.count) end_quads(before, before.count, now + timing_.latency_cycles);
   }
 
   void pass(Mark mark) {

@@ -259,8 +259,11 @@ std::vector<DrawReport> draw_reports(const Frame& frame, const BehaviourList& be
   return reports;
 }
 
-/// Of draws that are told apart.
-void set_draw_times(const std::vector<Cycle>& ends, std::vector<DrawReport>& draws) {
+/// Of draws that are told apart. The frame ends with the last of them: what keeps it up beyond that, as far as lt knows, is
+/// of a quad of that draw.
+void set_draw_times(std::vector<Cycle> ends, Cycle cycles, std::vector<DrawReport>& draws) {
+  const auto last = std::max_element(ends.begin(), ends.end());
+  if (last != ends.end() && *last > 0) *last = cycles;
   Cycle before = 0;
   for (std::size_t draw = 0; draw < ends.size(); ++draw) {
     if (ends[draw] > 0) draws[draw].end = ends[draw];
@@ -473,7 +476,7 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
   occupancy.finish();
   if (!result.stopped) check_conservation(gpu, configuration.netlist());
   report_counts(configuration, behaviours, statistics, result);
-  if (!result.stopped) set_draw_times(gpu.clock().frame_end().of_draws(), result.draws);
+  if (!result.stopped) set_draw_times(gpu.clock().frame_end().of_draws(), cycles, result.draws);
 }
 
 bool follows_accesses(const UntimedGpu& gpu, const std::string& slot) {
