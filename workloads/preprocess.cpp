@@ -50,7 +50,9 @@ std::array<Vec3, 3> rotation_matrix(const std::array<float, 4>& quaternion) {
 /// Projects Gaussians for one camera. Stateless between calls: any thread, any order, the same bits.
 class Projector {
  public:
-  explicit Projector(const Camera& camera) : camera_(camera) {
+  /// @param origin  of the scene's positions
+  Projector(const Camera& camera, const std::array<double, 3>& origin)
+      : camera_(camera), eye_{camera.eye[0] - origin[0], camera.eye[1] - origin[1], camera.eye[2] - origin[2]} {
     for (std::size_t i = 0; i < 3; ++i) {
       world_to_camera_[i] = {camera.rotation[0][i], camera.rotation[1][i], camera.rotation[2][i]};
     }
@@ -141,8 +143,8 @@ class Projector {
 
   Vec3 eye_to(const GaussianRef& gaussian) const {
     const std::array<float, 3> position = gaussian.position();
-    return {static_cast<double>(position[0]) - camera_.eye[0], static_cast<double>(position[1]) - camera_.eye[1],
-            static_cast<double>(position[2]) - camera_.eye[2]};
+    return {static_cast<double>(position[0]) - eye_[0], static_cast<double>(position[1]) - eye_[1],
+            static_cast<double>(position[2]) - eye_[2]};
   }
 
   /// Rows of M = J W R S with Sigma = M M^T: the Jacobian of the projection, the view, the Gaussian's axes.
@@ -171,6 +173,7 @@ class Projector {
   }
 
   const Camera& camera_;
+  const Vec3 eye_;
   std::array<Vec3, 3> world_to_camera_;  ///< rows: right, down, forward
   double limit_x_, limit_y_;
 };
@@ -364,7 +367,7 @@ Draw preprocess(const GaussianScene& scene, const Camera& camera, const Preproce
   check_options(scene, camera, options);
   const int degree = std::min(options.sh_degree, scene.sh_degree());
   const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
-  const Projector projector(camera);
+  const Projector projector(camera, scene.origin());
 
   // First which are visible, and their keys; the splats only once their places are known. That is cheaper than a second copy
   // of the splats, and keeps the memory per Gaussian small.

@@ -63,7 +63,7 @@ View automatic_view(const std::string& path, const GaussianFile& file, const Sce
       return static_cast<double>(values[(last * tenths + (tenths > 5 ? 9 : 0)) / 10]);
     };
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      middle[axis] = quantile(coordinates[axis], 5);
+      middle[axis] = scene.origin()[axis] + quantile(coordinates[axis], 5);
       const double half = 0.5 * quantile(coordinates[axis], 9) - 0.5 * quantile(coordinates[axis], 1);
       squares += half * half;
     }

@@ -49,10 +49,11 @@ SceneDescription describe(const GaussianScene& scene) {
   }
   if (logits.empty()) return result;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    result.low[axis] = quantile(coordinates[axis], 0);
-    result.high[axis] = quantile(coordinates[axis], 100);
-    result.low_middle[axis] = quantile(coordinates[axis], 1);
-    result.high_middle[axis] = quantile(coordinates[axis], 99);
+    const double from = scene.origin()[axis];
+    result.low[axis] = from + quantile(coordinates[axis], 0);
+    result.high[axis] = from + quantile(coordinates[axis], 100);
+    result.low_middle[axis] = from + quantile(coordinates[axis], 1);
+    result.high_middle[axis] = from + quantile(coordinates[axis], 99);
   }
   // As bytes have it: what is left of 0 after a logit of -40 is no opacity.
   result.opacity = quantiles(logits, [](double logit) { return logit <= -40 ? 0.0 : sigmoid(logit); });

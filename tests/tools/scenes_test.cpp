@@ -1,6 +1,7 @@
 #include "tool_test_support.h"
 
 #include <cmath>
+#include <sstream>
 
 #include <vrpipe/workloads/gaussian_file.h>
 
@@ -35,6 +36,18 @@ TEST_F(Scenes, OfAFileSayWhatIsInIt) {
        {"ball.ply", "INRIA .ply", "300 Gaussians, SH degree 1", "opacity", "scale", "anisotropy", "--eye "}) {
     EXPECT_NE(finished.out.find(part), std::string::npos) << part << " is not in\n" << finished.out;
   }
+}
+
+TEST_F(Scenes, TheViewOfAFileCanBeGivenBack) {
+  const std::string out = vrpipe({"scenes", "ball.ply"}).out;
+  const std::string seen = "seen with ";
+  std::istringstream words(out.substr(out.find(seen) + seen.size(), out.find('\n', out.find(seen)) - out.find(seen)));
+  std::vector<std::string> command{"run", "--scene", "ball.ply", "--size", "160x120", "--fidelity", "functional"};
+  const auto hash = [&] { return json_of(command)["runs"][0]["result_hash"]; };
+  const auto automatic = hash();
+  for (std::string word; words >> word;) command.push_back(word);
+  EXPECT_EQ(command.size(), 7U + 8U);
+  EXPECT_EQ(hash(), automatic);
 }
 
 TEST_F(Scenes, OfAFileAreInJsonAsWell) {

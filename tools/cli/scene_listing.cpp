@@ -27,8 +27,11 @@ namespace {
 
 constexpr ImageSize kPreviewSize{480, 270};
 
-std::string triple(const Vec3& v) { return fmt::format("{:.4g},{:.4g},{:.4g}", v[0], v[1], v[2]); }
-std::string triple(const std::array<double, 3>& v) { return fmt::format("{:.4g},{:.4g},{:.4g}", v[0], v[1], v[2]); }
+/// In as many digits as read back to the same numbers.
+template <class Triple>
+std::string triple(const Triple& v) {
+  return fmt::format("{},{},{}", v[0], v[1], v[2]);
+}
 
 struct DescribedDistribution {
   const char* name;
@@ -140,7 +143,7 @@ SceneListing describe_scene(const std::string& scene, const std::optional<std::s
     listing.text += std::string("\n  no view: ") + printable(error.what()) + "\n";
   }
   if (!view) return listing;
-  listing.text += fmt::format("\n  seen with --eye {} --look-at {} --up {} --fovy {:g}\n", triple(view->eye),
+  listing.text += fmt::format("\n  seen with --eye {} --look-at {} --up {} --fovy {}\n", triple(view->eye),
                               triple(view->look_at), triple(view->up), view->fovy_degrees);
   listing.json["view"] = {{"eye", json_triple(view->eye)},
                           {"look_at", json_triple(view->look_at)},

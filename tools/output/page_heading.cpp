@@ -33,8 +33,7 @@ class Terms {
 };
 
 std::string triple_text(const Json& triple) {
-  return fmt::format("{:.4g}, {:.4g}, {:.4g}", triple[0].get<double>(), triple[1].get<double>(),
-                     triple[2].get<double>());
+  return fmt::format("{},{},{}", triple[0].get<double>(), triple[1].get<double>(), triple[2].get<double>());
 }
 
 std::string camera_text(const JobResult& result) {
@@ -49,7 +48,7 @@ std::string camera_text(const JobResult& result) {
   text += "at " + triple_text(camera["eye"]);
   text += camera["look_at"].is_null() ? ", forward " + triple_text(camera["forward"])
                                       : ", looking at " + triple_text(camera["look_at"]);
-  return text + fmt::format(", {:.4g} degrees high", camera["fovy_degrees"].get<double>());
+  return text + fmt::format(", {} degrees high", camera["fovy_degrees"].get<double>());
 }
 
 std::string scene_text(const JobResult& result) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <thread>
@@ -30,6 +31,13 @@ float log_scale_of(double scale);
 double largest_component(double a, double b, double c);
 /// (w, x, y, z) with `omitted` left out and computed from the others, which are in this order.
 std::array<float, 4> quaternion_without(unsigned omitted, double a, double b, double c);
+
+/// What lies at `share`, 0 to 1, of the way between two numbers. An end that is infinite is there wherever the other one has
+/// no share alone: where scales are 0, their logarithms are.
+inline double between(double from, double to, double share) {
+  if (std::isfinite(to - from)) return from + (to - from) * share;
+  return share <= 0 ? from : share >= 1 ? to : from * (1 - share) + to * share;
+}
 
 /// SH degree with this many coefficients per channel beyond the first, 0 to 3; -1 for none.
 int sh_degree_of(std::uint64_t coefficients_per_channel);

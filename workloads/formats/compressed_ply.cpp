@@ -36,8 +36,7 @@ struct RangeLayout {
   }
   /// Component `i` at `share` of the range, 0 to 1.
   double at(const std::byte* chunk, std::size_t i, double share) const {
-    const double from = load<float>(chunk + low[i]), to = load<float>(chunk + high[i]);
-    return from + (to - from) * share;
+    return between(load<float>(chunk + low[i]), load<float>(chunk + high[i]), share);
   }
 };
 
@@ -92,6 +91,7 @@ GaussianFile read_compressed_ply(const SceneFile& file) {
   if (header.element("sh") != nullptr) {
     const PlyRecords rest(bytes, header, "sh");
     sh_degree = sh_degree_of_ply(rest.rest_count(), "sh", bytes);
+    if (sh_degree > 3) bytes.fail("its SH degree is " + std::to_string(sh_degree), "export it with 3 or fewer");
     for (std::size_t i = 0; i < rest.rest_count(); ++i)
       rest_offsets[i] = rest.offset("f_rest_" + std::to_string(i), "uchar");
     if (rest.count() < count) {

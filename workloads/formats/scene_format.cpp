@@ -1,10 +1,15 @@
 #include "formats/scene_format.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <new>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <vrpipe/component/error.h>
+#include <vrpipe/workloads/portable_math.h>
 
 #include "file_io.h"
 
@@ -74,6 +79,30 @@ void check_choices(const SceneFile& file, const SceneFormat& format) {
   }
 }
 
+/// Far from the origin the steps of single precision are wider than splats. Empty where they are not.
+std::string precision_note(const GaussianScene& scene) {
+  constexpr float kFar = 256;
+  std::uint64_t too_small = 0;
+  float widest = 0;
+  for (std::uint64_t i = 0; i < scene.size(); ++i) {
+    const GaussianRef gaussian = scene[i];
+    float farthest = 0;
+    for (const float coordinate : gaussian.position()) farthest = std::max(farthest, std::fabs(coordinate));
+    if (!(farthest >= kFar) || !std::isfinite(farthest)) continue;
+    const float step = std::nextafter(farthest, std::numeric_limits<float>::infinity()) - farthest;
+    const std::array<float, 3> log_scale = gaussian.log_scale();
+    if (static_cast<double>(step) <= portable_exp(*std::max_element(log_scale.begin(), log_scale.end()))) continue;
+    ++too_small;
+    widest = std::max(widest, step);
+  }
+  if (too_small * 100 < scene.size() || too_small == 0) return {};
+  return fmt::format(
+      "positions are of single precision, in steps of up to {} so far from the origin, and {:.0f} % of the Gaussians "
+      "are "
+      "smaller than that: it has moved them; positions in double (.ply), or nearer to the origin, keep their places",
+      widest, 100.0 * static_cast<double>(too_small) / static_cast<double>(scene.size()));
+}
+
 }  // namespace
 
 bool SceneFile::ends_with(const std::string& extension) const { return vrpipe::ends_with(name, extension); }
@@ -115,6 +144,7 @@ GaussianFile read_scene(const SceneFile& file) try {
   check_choices(file, *best);
   GaussianFile scene = best->read(file);
   scene.format = best->name;
+  if (std::string note = precision_note(scene.gaussians); !note.empty()) scene.notes.push_back(std::move(note));
   return scene;
 } catch (const std::bad_alloc&) {
   file.bytes.fail("it needs more memory than there is", "raise the limit on memory, or use a smaller scene");

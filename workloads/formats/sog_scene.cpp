@@ -120,7 +120,7 @@ SogScene::Codes SogScene::codebook(const nlohmann::json& attribute, const std::s
 SogScene::Codes SogScene::range_codes(double low, double high) const {
   Codes codes{};
   for (std::size_t i = 0; i < codes.size(); ++i) {
-    codes[i] = static_cast<float>(low + (high - low) * (static_cast<double>(i) / 255));
+    codes[i] = static_cast<float>(between(low, high, static_cast<double>(i) / 255));
   }
   return codes;
 }

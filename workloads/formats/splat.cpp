@@ -59,7 +59,8 @@ std::vector<std::string> write_splat(const std::filesystem::path& path, const Ga
   for (std::uint64_t index = 0; index < scene.size(); ++index) {
     const GaussianRef gaussian = scene[index];
     std::array<std::byte, kRecordBytes> record{};
-    const std::array<float, 3> position = gaussian.position(), log_scale = gaussian.log_scale(), f_dc = gaussian.f_dc();
+    const std::array<float, 3> position = scene.world_position(gaussian), log_scale = gaussian.log_scale(),
+                               f_dc = gaussian.f_dc();
     for (std::size_t i = 0; i < 3; ++i) {
       const float scale = static_cast<float>(portable_exp(log_scale[i]));
       std::memcpy(&record[4 * i], &position[i], sizeof(float));

@@ -75,6 +75,16 @@ class GaussianScene {
   bool empty() const { return count_ == 0; }
   int sh_degree() const { return sh_degree_; }  ///< 0 to 3
 
+  /// Where in the world positions of Gaussians count from: not zero for a scene of double positions far from the world's origin.
+  const std::array<double, 3>& origin() const { return origin_; }
+  void set_origin(const std::array<double, 3>& origin) { origin_ = origin; }
+  /// Of one of its Gaussians, rounded to single precision.
+  std::array<float, 3> world_position(const GaussianRef& gaussian) const {
+    std::array<float, 3> position = gaussian.position();
+    for (std::size_t i = 0; i < 3; ++i) position[i] = static_cast<float>(origin_[i] + static_cast<double>(position[i]));
+    return position;
+  }
+
   /// Gaussian `index` < size().
   GaussianRef operator[](std::uint64_t index) const {
     return GaussianRef(records_ + static_cast<std::size_t>(index) * stride_bytes_, layout_.get(), sh_degree_);
@@ -97,6 +107,7 @@ class GaussianScene {
   std::size_t stride_bytes_ = 0;
   std::shared_ptr<const GaussianLayout> layout_ = std::make_shared<const GaussianLayout>();
   int sh_degree_ = 0;
+  std::array<double, 3> origin_{};
 };
 
 /// The attributes of a Gaussian to add to a scene; f_rest[channel][coefficient - 1], unused ones are ignored.
