@@ -164,7 +164,7 @@ TEST_F(PlyKinds, PositionsInDoubleKeepTheirPlacesFarFromTheOrigin) {
   ASSERT_GT(expected.splats.size(), gaussians / 2);
   ply.retype("double", {"x", "y", "z"});
   for (auto& record : ply.records) {
-    for (int axis = 0; axis < 3; ++axis) record[static_cast<std::size_t>(axis)] += far[axis];
+    for (std::size_t axis = 0; axis < 3; ++axis) record[axis] += far[axis];
   }
   for (const std::string& bytes : {ply.binary(), ply.binary(true), ply.ascii()}) {
     const GaussianFile file = read(bytes);
@@ -177,9 +177,9 @@ TEST_F(PlyKinds, PositionsInDoubleKeepTheirPlacesFarFromTheOrigin) {
       EXPECT_NEAR(draw.splats[i].ax, expected.splats[i].ax, 1e-3) << i;
     }
     const SceneDescription described = describe(file.gaussians);
-    for (int axis = 0; axis < 3; ++axis) {
-      EXPECT_NEAR(described.low[static_cast<std::size_t>(axis)], far[axis] - 1, 0.1);
-      EXPECT_NEAR(described.high[static_cast<std::size_t>(axis)], far[axis] + 1, 0.1);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_NEAR(described.low[axis], far[axis] - 1, 0.1);
+      EXPECT_NEAR(described.high[axis], far[axis] + 1, 0.1);
     }
   }
   // Written, they are world positions again, in single precision.
