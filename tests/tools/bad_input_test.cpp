@@ -286,6 +286,15 @@ TEST_F(BadInput, AFullDiskUnderWhatIsWrittenDuringARunLeavesItsResult) {
   }
 }
 
+// Effects are decided before the cache is made, and ask how many sets it has.
+TEST_F(BadInput, ACacheOfLessThanALineIsRefusedByName) {
+  for (const char* effects : {"auto", "all"}) {
+    refused({"run", "--scene", "tiny.spl", "--platform", "gh100-gpc", "--effects", effects, "--set",
+             "crop.cache_bytes=129"},
+            {"CROP cache", "crop.cache_bytes"});
+  }
+}
+
 TEST_F(BadInput, AFullDiskUnderImagesLeavesTheResult) {
   std::filesystem::create_directory(folder() / "images");
   for (const char* command : {"run", "compare", "accuracy"}) {
