@@ -10,7 +10,13 @@ namespace vrpipe {
 
 UserError::UserError(const std::string& what, const std::string& where, const std::string& why,
                      const std::string& remedy)
-    : std::runtime_error(printable(what + " (" + where + "): " + why + "; " + remedy)) {}
+    : std::runtime_error(printable(what + " (" + where + "): " + why + "; " + remedy)),
+      parts_(std::make_shared<const std::array<std::string, 4>>(std::array{what, where, why, remedy})) {}
+
+UserError UserError::also_in(const std::string& place) const {
+  const auto& [what, where, why, remedy] = *parts_;
+  return {what, where + ", " + place, why, remedy};
+}
 
 SimulationFault::SimulationFault(const std::string& unit, unsigned long long cycle, const std::string& item)
     : std::logic_error(unit + " at cycle " + std::to_string(cycle) + ": " + item) {}

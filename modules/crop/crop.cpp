@@ -392,7 +392,6 @@ const EffectRegistrar cache_order_effect{
          return EffectDecision::omit("nobody asks for what the cache misses");
        if (asked.counts_work && !asked.has_time) return EffectDecision::keep("the bound follows from what goes");
        const CacheOrganization cache = asked.as<CropParameters>().cache.organization();
-       if (cache.lines() == 0) return EffectDecision::keep("of less than a line, it is refused");
        const std::uint64_t bytes = screen_tile_pixels * screen_tile_pixels * bytes_per_pixel(asked.context.format);
        const std::uint64_t touched = asked.facts.tiles_touched * (bytes / cache.line_bytes);
        const std::string numbers = fmt::format("at most {} lines are touched, and {} held", touched, cache.lines());

@@ -144,9 +144,7 @@ class TimedCrop : public TimedUnit {
     queue_.take(quads, blended.last);
     last_blend_ = blended.last;
     any_blended_ = true;
-    frame_lasts(blended.last + timing_.latency_cycles);
-    for (unsigned i = from; tells_draws() && i < to; ++i)
-      draw_lasts(warp.draw[i], blended.last + timing_.latency_cycles);
+    quads_last(blended.last + timing_.latency_cycles, to - from, [&](unsigned i) { return warp.draw[from + i]; });
     did(CropWork::blend, quads, blended.first, blended.last + 1);
     if (!timing_.forwards) recent_.push({warp.tile, warp.position[from], blended.last});
     blend(warp, from, to, blended);

@@ -278,10 +278,7 @@ class TimedSm : public TimedUnit {
       shaded.slot = no_slot;
     } else {
       behaviour_->shade(warp, shaded);
-      if (shaded.count < warp.count) {
-        frame_lasts(done + 1);
-        for (unsigned i = 0; tells_draws() && i < warp.count; ++i) draw_lasts(warp.quads[i].draw, done + 1);
-      }
+      if (shaded.count < warp.count) quads_last(done + 1, warp.count, [&](unsigned i) { return warp.quads[i].draw; });
       shaded.slot = static_cast<std::uint16_t>(core);
     }
     out_shaded_.send({&shaded}, done);

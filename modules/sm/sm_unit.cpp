@@ -218,10 +218,8 @@ class SmUnit : public Unit {
     --running_;
     ShadedWarp& shaded = pool_.take();
     behaviour_->shade(warps_[slot], shaded);
-    if (const Warp& warp = warps_[slot]; shaded.count < warp.count) {
-      frame_lasts(now + 1);
-      for (unsigned i = 0; tells_draws() && i < warp.count; ++i) draw_lasts(warp.quads[i].draw, now + 1);
-    }
+    if (const Warp& warp = warps_[slot]; shaded.count < warp.count)
+      quads_last(now + 1, warp.count, [&](unsigned i) { return warp.quads[i].draw; });
     shaded.slot = static_cast<std::uint16_t>(slot);
     completed_.push(&shaded);
   }

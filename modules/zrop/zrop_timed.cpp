@@ -204,8 +204,7 @@ class TimedZrop : public TimedUnit {
 
   /// Some of them end, in the cycle before this one; of the others' draws it is known as well that they last so long.
   void end_quads(const QuadBeat& tested, unsigned count, Cycle cycle) {
-    frame_lasts(cycle);
-    for (unsigned i = 0; tells_draws() && i < count; ++i) draw_lasts(tested.quads[i].draw, cycle);
+    quads_last(cycle, count, [&](unsigned i) { return tested.quads[i].draw; });
   }
   [[gnu::noinline]] void pay_for_blocks(std::uint64_t price, unsigned quads, Cycle at) {
     port_free_at_ = std::max(port_free_at_, block_port_.take(at, price));

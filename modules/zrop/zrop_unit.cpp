@@ -157,8 +157,7 @@ class ZropUnit : public Unit {
   }
   /// Some of them end, in the cycle before this one; of the others' draws it is known as well that they last so long.
   void end_quads(const QuadBeat& tested, unsigned count, Cycle cycle) {
-    frame_lasts(cycle);
-    for (unsigned i = 0; tells_draws() && i < count; ++i) draw_lasts(tested.quads[i].draw, cycle);
+    quads_last(cycle, count, [&](unsigned i) { return tested.quads[i].draw; });
   }
   [[gnu::noinline]] void pay_for_blocks(const QuadBeat& beat, Cycle now) {
     const std::uint64_t price = blocks_.of(beat.tile, beat.quads.data(), beat.count);

@@ -183,6 +183,12 @@ bool samples_statistics(const RunRequest& request) {
   return request.observers != nullptr && !request.observers->of_statistics().empty();
 }
 
+void check_may_stop(const RunRequest& request) {
+  if (request.stop_at == 0 || request.fidelity == Fidelity::cycle) return;
+  throw UserError("cannot stop at a cycle", std::string("fidelity ") + name_of(request.fidelity),
+                  "what it has done by a cycle is not what the GPU has", "use cycle");
+}
+
 void check_sampling_has_time(const RunRequest& request) {
   if (!samples_statistics(request) || has_time(request.fidelity)) return;
   throw UserError("cannot sample statistics", std::string("--fidelity ") + name_of(request.fidelity),
@@ -606,10 +612,7 @@ RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<floa
 
 RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
   check_sampling_has_time(request);
-  if (request.stop_at > 0 && request.fidelity != Fidelity::cycle) {
-    throw UserError("cannot stop at a cycle", std::string("fidelity ") + name_of(request.fidelity),
-                    "what it has done by a cycle is not what the GPU has", "use cycle");
-  }
+  check_may_stop(request);
   const Configuration configuration(request, frame);
   RunResult result;
   result.request = request;
@@ -662,6 +665,7 @@ void check_configuration(const RunRequest& request) {
   Frame empty(1, 1);
   empty.set_depth_format(depth_format_of(request));
   check_sampling_has_time(request);
+  check_may_stop(request);
   const Configuration configuration(with_all_effects(request), empty);
   for (const Instance& instance : configuration.netlist().instances()) configuration.make(instance);
   if (!samples_statistics(request)) return;

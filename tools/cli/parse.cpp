@@ -35,6 +35,40 @@ bool read_number(const std::string& text, Number& out) {
   return result.ec == std::errc() && result.ptr == end;
 }
 
+Setting parse_setting(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const std::size_t dot = text.rfind('.', equals);
+  if (equals == std::string::npos || dot == std::string::npos || dot == 0 || dot + 1 >= equals ||
+      equals + 1 == text.size()) {
+    throw UserError("bad value '" + text + "'", "--set", "it is not UNIT.PARAMETER=VALUE",
+                    "give e.g. --set tc.bins=64; `vrpipe units` lists all parameters");
+  }
+  return {text.substr(0, dot), text.substr(dot + 1, equals - dot - 1), text.substr(equals + 1)};
+}
+
+UnitChoice parse_unit_choice(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
+    throw UserError("bad value '" + text + "'", "--unit", "it is not SLOT=IMPLEMENTATION",
+                    "give e.g. --unit qru=pass-through; `vrpipe units` lists all implementations");
+  }
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+/// Of KEY=VALUE texts, only different keys may be given more than once.
+void refuse_keys_given_twice(const std::vector<std::string>& values, const std::string& option) {
+  std::map<std::string, std::string> given;
+  for (const std::string& text : values) {
+    const std::size_t equals = std::min(text.find('='), text.size());
+    const std::string key = text.substr(0, equals);
+    const std::string value = text.substr(std::min(equals + 1, text.size()));
+    const auto [first, is_new] = given.emplace(key, value);
+    if (is_new) continue;
+    throw UserError("option given twice", option + " " + key, "as '" + first->second + "' and as '" + value + "'",
+                    "give it once");
+  }
+}
+
 }  // namespace
 
 double parse_number(const std::string& text, const std::string& option) {
@@ -115,40 +149,6 @@ std::pair<std::string, CycleWindow> parse_window(const std::string& text, const 
                     "give @FROM:TO, e.g. @1000:2000");
   }
   return {text.substr(0, at), window};
-}
-
-static Setting parse_setting(const std::string& text) {
-  const std::size_t equals = text.find('=');
-  const std::size_t dot = text.rfind('.', equals);
-  if (equals == std::string::npos || dot == std::string::npos || dot == 0 || dot + 1 >= equals ||
-      equals + 1 == text.size()) {
-    throw UserError("bad value '" + text + "'", "--set", "it is not UNIT.PARAMETER=VALUE",
-                    "give e.g. --set tc.bins=64; `vrpipe units` lists all parameters");
-  }
-  return {text.substr(0, dot), text.substr(dot + 1, equals - dot - 1), text.substr(equals + 1)};
-}
-
-static UnitChoice parse_unit_choice(const std::string& text) {
-  const std::size_t equals = text.find('=');
-  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
-    throw UserError("bad value '" + text + "'", "--unit", "it is not SLOT=IMPLEMENTATION",
-                    "give e.g. --unit qru=pass-through; `vrpipe units` lists all implementations");
-  }
-  return {text.substr(0, equals), text.substr(equals + 1)};
-}
-
-/// Of KEY=VALUE texts, only different keys may be given more than once.
-static void refuse_keys_given_twice(const std::vector<std::string>& values, const std::string& option) {
-  std::map<std::string, std::string> given;
-  for (const std::string& text : values) {
-    const std::size_t equals = std::min(text.find('='), text.size());
-    const std::string key = text.substr(0, equals);
-    const std::string value = text.substr(std::min(equals + 1, text.size()));
-    const auto [first, is_new] = given.emplace(key, value);
-    if (is_new) continue;
-    throw UserError("option given twice", option + " " + key, "as '" + first->second + "' and as '" + value + "'",
-                    "give it once");
-  }
 }
 
 std::vector<Setting> parse_settings(const std::vector<std::string>& texts) {

@@ -130,15 +130,8 @@ void TimeArguments::observe(SimulationJob& job) const {
   if (heat_maps_ && !job.output) {
     throw UserError("heat maps go nowhere", HeatMaps::option, "no folder is named", "add --output DIR");
   }
-  if (const auto until = single(until_, until_option)) {
+  if (const auto until = single(until_, until_option))
     job.requests.front().stop_at = parse_count(*until, until_option, longest_interval);
-    if (job.requests.front().fidelity != Fidelity::cycle) {
-      throw UserError("cannot use option", until_option,
-                      "what " + std::string(vrpipe::name_of(job.requests.front().fidelity)) +
-                          " has done by a cycle is not what the GPU has",
-                      "use cycle");
-    }
-  }
   job.heat_maps = heat_maps_;
   if (csv) job.interval_csv = *csv;
   const StdoutToStderr redirected;  // plugins may print while their units are made
@@ -167,7 +160,7 @@ void TimeArguments::observe(SimulationJob& job) const {
     job.log->attach(request, observers_of(request));
   }
   for (const RunRequest& each : job.requests) {
-    if (each.observers != nullptr) check_configuration(each);
+    if (each.observers != nullptr || each.stop_at > 0) check_configuration(each);
   }
 }
 

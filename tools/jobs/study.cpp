@@ -327,24 +327,27 @@ AxisValues parse_axis_values(const std::string& text, const Study& study, const 
   return values;
 }
 
+std::vector<std::size_t> reference_values(const Study& study, std::vector<std::size_t> own) {
+  for (std::size_t axis = 0; axis < study.axes.size(); ++axis) {
+    const StudyAxis& of = study.axes[axis];
+    const auto named = std::find_if(study.relative_to.begin(), study.relative_to.end(),
+                                    [&](const auto& each) { return each.first == of.name; });
+    if (named != study.relative_to.end()) {
+      own[axis] =
+          static_cast<std::size_t>(std::find(of.values.begin(), of.values.end(), named->second) - of.values.begin());
+    } else if (!follows_the_point(of.name)) {
+      own[axis] = of.reference;
+    }
+  }
+  return study.without_absent(std::move(own));
+}
+
 std::vector<std::optional<std::size_t>> references(const Study& study) {
   std::map<std::vector<std::size_t>, std::size_t> places;
   for (std::size_t i = 0; i < study.points.size(); ++i) places.emplace(study.points[i].values, i);
   std::vector<std::optional<std::size_t>> all;
   for (const StudiedPoint& point : study.points) {
-    std::vector<std::size_t> values = point.values;
-    for (std::size_t axis = 0; axis < study.axes.size(); ++axis) {
-      const StudyAxis& of = study.axes[axis];
-      const auto named = std::find_if(study.relative_to.begin(), study.relative_to.end(),
-                                      [&](const auto& each) { return each.first == of.name; });
-      if (named != study.relative_to.end()) {
-        values[axis] =
-            static_cast<std::size_t>(std::find(of.values.begin(), of.values.end(), named->second) - of.values.begin());
-      } else if (!follows_the_point(of.name)) {
-        values[axis] = of.reference;
-      }
-    }
-    const auto found = places.find(study.without_absent(std::move(values)));
+    const auto found = places.find(reference_values(study, point.values));
     all.push_back(found == places.end() ? std::nullopt : std::optional(found->second));
   }
   return all;

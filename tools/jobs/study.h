@@ -67,9 +67,10 @@ bool follows_the_point(const std::string& axis);
 /// `AXIS=VALUE,...`. Throws UserError for another form, and for axes and values that the study does not have.
 AxisValues parse_axis_values(const std::string& text, const Study& study, const std::string& where);
 
-/// For each point the one that it is relative to: the named axes have the named values, the others of what the GPU is
-/// (platform, variant, parameters) their reference, and those of what is drawn and how exactly the point's own. None where that
-/// is no point of the study.
+/// What a point of these values is relative to: the named axes have the named values, the others of what the GPU is
+/// (platform, variant, parameters) their reference, and those of what is drawn and how exactly the point's own.
+std::vector<std::size_t> reference_values(const Study& study, std::vector<std::size_t> own);
+/// For each point the one of these values. None where that is no point of the study.
 std::vector<std::optional<std::size_t>> references(const Study& study);
 
 }  // namespace vrpipe::tools

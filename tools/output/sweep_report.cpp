@@ -102,17 +102,8 @@ SweepFindings sweep_findings(const SweepResult& result) {
 }
 
 std::string reference_text(const Study& study) {
-  std::vector<std::size_t> values;
-  for (const StudyAxis& axis : study.axes) {
-    const auto named = std::find_if(study.relative_to.begin(), study.relative_to.end(),
-                                    [&](const auto& each) { return each.first == axis.name; });
-    const bool is_own = named == study.relative_to.end() && follows_the_point(axis.name);
-    const auto place = [&] { return std::find(axis.values.begin(), axis.values.end(), named->second); };
-    values.push_back(is_own                             ? no_value
-                     : named == study.relative_to.end() ? axis.reference
-                                                        : static_cast<std::size_t>(place() - axis.values.begin()));
-  }
-  values = study.without_absent(std::move(values));
+  const std::vector<std::size_t> values =
+      reference_values(study, std::vector<std::size_t>(study.axes.size(), no_value));
   std::string text;
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (values[i] != no_value)

@@ -12,7 +12,7 @@ class CheckedRaster final : public CheckedSlot<RasterBehaviour> {
 
   void begin(const Primitive& primitive, const PixelRect& clip) override {
     primitive_ = primitive;
-    kept_ = 0;
+    kept_before_ = kept_;
     ask("begin", [&] { checked_->begin(primitive, clip); });
     count_up_to(checked_->setups, ++set_up_);
   }
@@ -22,9 +22,9 @@ class CheckedRaster final : public CheckedSlot<RasterBehaviour> {
     if (coarse_tests > raster_tiles())
       fault("next", "{} raster tiles tested, the frame has {}", coarse_tests, raster_tiles());
     if (!more) return false;
-    count_up_to(checked_->raster_tiles_kept, ++kept_of_all_);
+    count_up_to(checked_->raster_tiles_kept, ++kept_);
     count_up_to(checked_->screen_tile_pairs, pairs_ += new_screen_tile ? 1 : 0);
-    if (++kept_ > raster_tiles())
+    if (kept_ - kept_before_ > raster_tiles())
       fault("next", "splat {} covers more raster tiles than the frame has", primitive_.splat);
     if (out.count > QuadBeat::capacity) fault("next", "{} quads in a raster tile", out.count);
     if (out.mark != Mark::none || out.last_of_bin) fault("next", "a raster tile with marks that are not its own");
@@ -70,9 +70,9 @@ class CheckedRaster final : public CheckedSlot<RasterBehaviour> {
  private:
   std::uint64_t raster_tiles() const { return 4 * tiles(); }
 
-  std::uint64_t set_up_ = 0, tested_ = 0, kept_of_all_ = 0, pairs_ = 0;
+  std::uint64_t set_up_ = 0, tested_ = 0, kept_ = 0, pairs_ = 0;
   Primitive primitive_;
-  std::uint64_t kept_ = 0;  ///< raster tiles of the primitive
+  std::uint64_t kept_before_ = 0;  ///< of the primitives before this one
   Seen quads_;
   Seen fragments_;
 };

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <memory>
 #include <stdexcept>
 #include <string>
 
@@ -14,6 +16,12 @@ class UserError : public std::runtime_error {
   /// @param why     what was found
   /// @param remedy  what to do about it, e.g. the allowed values
   UserError(const std::string& what, const std::string& where, const std::string& why, const std::string& remedy);
+
+  /// The same error, somewhere more.
+  UserError also_in(const std::string& place) const;
+
+ private:
+  std::shared_ptr<const std::array<std::string, 4>> parts_;  ///< shared: an exception is copied without throwing
 };
 
 /// A fault of the program itself: a broken invariant of a unit. The command prints it and exits with code 1.

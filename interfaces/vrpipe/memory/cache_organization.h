@@ -37,7 +37,7 @@ struct CacheOrganization {
 
   std::uint32_t lines() const { return static_cast<std::uint32_t>(bytes / line_bytes); }
   std::uint32_t ways_of_a_set() const { return ways == 0 ? lines() : ways; }
-  std::uint32_t sets() const { return lines() / ways_of_a_set(); }
+  std::uint32_t sets() const { return ways == 0 ? 1 : lines() / ways; }
   std::uint32_t sectors_of_a_line() const { return line_bytes / sector_bytes; }
 
   /// Throws UserError for a cache that cannot be. Bytes of a line and of a sector and the number of sets are powers of

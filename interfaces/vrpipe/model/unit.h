@@ -76,6 +76,13 @@ class Unit : public Clocked, public sc_core::sc_module, public Component {
   /// Whether it is to be said of which draws such quads are as well.
   bool tells_draws() const { return tells_draws_; }
   void draw_lasts(std::size_t draw, Cycle cycle) { clock.domain->frame_end().draw_not_before(draw, cycle); }
+  /// Of `count` quads some are blended or dropped then, and where draws are told apart no quad's draw ends earlier:
+  /// `draw_of(i)` is that of the i-th.
+  template <class DrawOf>
+  void quads_last(Cycle cycle, unsigned count, DrawOf&& draw_of) {
+    frame_lasts(cycle);
+    for (unsigned i = 0; tells_draws() && i < count; ++i) draw_lasts(draw_of(i), cycle);
+  }
 
  private:
   Occupancy occupancy_;
