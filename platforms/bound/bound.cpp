@@ -196,7 +196,8 @@ std::array<double, PhaseBound::stages> PhaseBound::end_of(const Work& done, bool
   for (unsigned stage = 0; stage < stages; ++stage) {
     double begin = 0;
     for (unsigned before = 0; before < stage; ++before) begin = std::max(begin, end_[before] - idle_after_last(before));
-    begin = std::max(begin, end_[stage]);
+    // Whose last item was one of an earlier phase: for what it takes after it, the last quad does not wait.
+    begin = std::max(begin, end_[stage] - (to_last && cycles[stage] == 0 ? idle_after_last(stage) : 0));
     for (unsigned after = stage + 1; stage >= raster && after < stages; ++after)
       begin = std::max(begin, end_before_[after]);
     end[stage] = begin + cycles[stage];

@@ -50,6 +50,16 @@ TEST(Bound, IsCloseWhereAPriceIsAllThatCounts) {
   }
 }
 
+// Whose quads are more than are on their way at a time.
+TEST(Bound, WaitsForNoIntervalOfTheLastVertexWarp) {
+  const Draw draw = draw_of(8, 8, std::vector<Splat>(14, flat_box(0, 0, 8, 8, 0.05F)));
+  const RunRequest request = with("baseline", {{"draw", "warps_per_1024_cycles", "1"},
+                                               {"sm", "cores", "2"},
+                                               {"sm", "warps_per_core", "4"},
+                                               {"crop", "input_quads", "8"}});
+  EXPECT_LE(share_of_cycle(request, draw), 1);
+}
+
 // Merged with quads of the next primitive, a primitive's would come to the SMs in several visits.
 TEST(Bound, VisitsAreAsFewAsInBinsThatTimeOut) {
   const Draw draw = draw_of(16, 16, std::vector<Splat>(64, flat_box(0, 0, 16, 16, 0.05F)));
