@@ -7,6 +7,7 @@
 #include <string>
 #include <thread>
 
+#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <vrpipe/component/error.h>
@@ -51,8 +52,11 @@ std::array<Vec3, 3> rotation_matrix(const std::array<float, 4>& quaternion) {
 class Projector {
  public:
   /// @param origin  of the scene's positions
-  Projector(const Camera& camera, const std::array<double, 3>& origin)
-      : camera_(camera), eye_{camera.eye[0] - origin[0], camera.eye[1] - origin[1], camera.eye[2] - origin[2]} {
+  Projector(const Camera& camera, const std::array<double, 3>& origin, double dilation, bool compensates_opacity)
+      : camera_(camera),
+        eye_{camera.eye[0] - origin[0], camera.eye[1] - origin[1], camera.eye[2] - origin[2]},
+        dilation_(dilation),
+        compensates_opacity_(compensates_opacity) {
     for (std::size_t i = 0; i < 3; ++i) {
       world_to_camera_[i] = {camera.rotation[0][i], camera.rotation[1][i], camera.rotation[2][i]};
     }
@@ -63,6 +67,10 @@ class Projector {
   /// Whether a Gaussian is visible, and its camera z. Does without its ellipse where its centre is in the image.
   /// @pre rejection_of() found none
   bool is_visible(const GaussianRef& gaussian, float& depth) const {
+    if (compensates_opacity_) {
+      Splat splat;
+      return project(gaussian, splat, depth);
+    }
     const Vec3 offset = eye_to(gaussian);
     const double z = dot(world_to_camera_[2], offset);
     if (!(z > static_cast<double>(camera_.near_plane))) return false;
@@ -84,14 +92,18 @@ class Projector {
     const Vec3 offset = eye_to(gaussian);
     const double z = dot(world_to_camera_[2], offset);
     if (!(z > static_cast<double>(camera_.near_plane))) return false;
-    const float opacity = opacity_of(gaussian);
+    float opacity = opacity_of(gaussian);
     if (!(opacity >= kPruneThreshold)) return false;
 
     const double ray_x = dot(world_to_camera_[0], offset) / z;
     const double ray_y = dot(world_to_camera_[1], offset) / z;
     Vec3 m1, m2;
     covariance_factor(gaussian, z, ray_x, ray_y, m1, m2);
-    const EllipseAxes ellipse = decompose_covariance(m1, m2);
+    const EllipseAxes ellipse = decompose_covariance(m1, m2, dilation_);
+    if (compensates_opacity_) {
+      opacity = compensated_opacity(gaussian, m1, m2);
+      if (!(opacity >= kPruneThreshold)) return false;
+    }
 
     const double r = half_extent_in_sigmas(opacity);
     const double half_width = 0.5 * camera_.width, half_height = 0.5 * camera_.height;
@@ -141,6 +153,11 @@ class Projector {
     return static_cast<float>(sigmoid(static_cast<double>(gaussian.opacity_logit())));
   }
 
+  float compensated_opacity(const GaussianRef& gaussian, const Vec3& m1, const Vec3& m2) const {
+    const double share = covariance_determinant(m1, m2, 0) / covariance_determinant(m1, m2, dilation_);
+    return static_cast<float>(sigmoid(static_cast<double>(gaussian.opacity_logit())) * std::sqrt(share));
+  }
+
   Vec3 eye_to(const GaussianRef& gaussian) const {
     const std::array<float, 3> position = gaussian.position();
     return {static_cast<double>(position[0]) - eye_[0], static_cast<double>(position[1]) - eye_[1],
@@ -176,6 +193,8 @@ class Projector {
   const Vec3 eye_;
   std::array<Vec3, 3> world_to_camera_;  ///< rows: right, down, forward
   double limit_x_, limit_y_;
+  const double dilation_;  ///< pixels^2
+  const bool compensates_opacity_;
 };
 
 void check_options(const GaussianScene& scene, const Camera& camera, const PreprocessOptions& options) {
@@ -186,6 +205,9 @@ void check_options(const GaussianScene& scene, const Camera& camera, const Prepr
   const int bits = options.depth_key_bits;
   if (bits != 32 && bits != 24 && bits != 16 && bits != 12) {
     throw UserError(kCannot, "depth key bits", "there are " + std::to_string(bits), "give 32, 24, 16 or 12");
+  }
+  if (!(options.dilation >= 0.001 && options.dilation <= 100)) {
+    throw UserError(kCannot, "dilation", fmt::format("it is {} pixels^2", options.dilation), "give 0.001 to 100");
   }
   // Indices are 32 bits beside the key.
   if (scene.size() > std::numeric_limits<std::uint32_t>::max()) {
@@ -231,26 +253,26 @@ Rejection rejection_of(const GaussianRef& gaussian, int degree) {
   return Rejection::none;
 }
 
-double covariance_determinant(const Vec3& m1, const Vec3& m2) {
+double covariance_determinant(const Vec3& m1, const Vec3& m2, double dilation) {
   const Vec3 c = cross(m1, m2);
-  return dot(c, c) + kDilation * (dot(m1, m1) + dot(m2, m2)) + kDilation * kDilation;
+  return dot(c, c) + dilation * (dot(m1, m1) + dot(m2, m2)) + dilation * dilation;
 }
 
-EllipseAxes decompose_covariance(const Vec3& m1, const Vec3& m2) {
+EllipseAxes decompose_covariance(const Vec3& m1, const Vec3& m2, double dilation) {
   // Sigma = [a b; b d]
   const double a = dot(m1, m1), b = dot(m1, m2), d = dot(m2, m2);
   // Axis-aligned, or turned by less than a double resolves beside the dilation (by a denormal, say): no square root and
   // no division, so exact.
-  if (std::fabs(b) <= 0x1p-53 * (a + d + kDilation)) {
-    if (a >= d) return {a + kDilation, d + kDilation, 1.0, 0.0};
-    return {d + kDilation, a + kDilation, 0.0, 1.0};
+  if (std::fabs(b) <= 0x1p-53 * (a + d + dilation)) {
+    if (a >= d) return {a + dilation, d + dilation, 1.0, 0.0};
+    return {d + dilation, a + dilation, 0.0, 1.0};
   }
   const double half_difference = 0.5 * (a - d);
   const double radius = std::sqrt(half_difference * half_difference + b * b);
-  const double lambda1 = 0.5 * (a + d) + radius + kDilation;
+  const double lambda1 = 0.5 * (a + d) + radius + dilation;
   // det / lambda1 keeps a small lambda2 that lambda1 - 2 radius would lose; rounding must not leave the dilation.
-  const double quotient = covariance_determinant(m1, m2) / lambda1;
-  const double lambda2 = std::min(lambda1, std::max(kDilation, quotient));
+  const double quotient = covariance_determinant(m1, m2, dilation) / lambda1;
+  const double lambda2 = std::min(lambda1, std::max(dilation, quotient));
   // Of the two rows of Sigma - lambda2 I, the one whose terms do not cancel.
   double x = b, y = b;
   if (a >= d) {
@@ -280,33 +302,10 @@ double sigmoid(double logit) {
 }
 
 std::array<float, 3> sh_colour(const GaussianRef& gaussian, const Vec3& direction, int degree) {
-  const double x = direction[0], y = direction[1], z = direction[2];
   const std::array<float, 3> f_dc = gaussian.f_dc();
   degree = std::min(degree, gaussian.sh_degree());
-  if (x == 0 && y == 0 && z == 0) degree = 0;
-  std::array<double, 15> basis{};
-  if (degree >= 1) {
-    basis[0] = -kShC1 * y;
-    basis[1] = kShC1 * z;
-    basis[2] = -kShC1 * x;
-  }
-  const double xx = x * x, yy = y * y, zz = z * z;
-  if (degree >= 2) {
-    basis[3] = kShC2[0] * (x * y);
-    basis[4] = kShC2[1] * (y * z);
-    basis[5] = kShC2[2] * (2.0 * zz - xx - yy);
-    basis[6] = kShC2[3] * (x * z);
-    basis[7] = kShC2[4] * (xx - yy);
-  }
-  if (degree >= 3) {
-    basis[8] = kShC3[0] * (y * (3.0 * xx - yy));
-    basis[9] = kShC3[1] * (x * y * z);
-    basis[10] = kShC3[2] * (y * (4.0 * zz - xx - yy));
-    basis[11] = kShC3[3] * (z * (2.0 * zz - 3.0 * xx - 3.0 * yy));
-    basis[12] = kShC3[4] * (x * (4.0 * zz - xx - yy));
-    basis[13] = kShC3[5] * (z * (xx - yy));
-    basis[14] = kShC3[6] * (x * (xx - 3.0 * yy));
-  }
+  if (direction == Vec3{}) degree = 0;
+  const std::array<double, 15> basis = sh_basis(direction, degree);
   std::array<float, 3> rgb{};
   for (std::uint32_t channel = 0; channel < 3; ++channel) {
     // Left to right whatever the degree: a band of zeros changes no bit.
@@ -367,7 +366,8 @@ Draw preprocess(const GaussianScene& scene, const Camera& camera, const Preproce
   check_options(scene, camera, options);
   const int degree = std::min(options.sh_degree, scene.sh_degree());
   const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
-  const Projector projector(camera, scene.origin());
+  const bool compensates_opacity = options.opacity_compensation.value_or(scene.compensates_opacity());
+  const Projector projector(camera, scene.origin(), options.dilation, compensates_opacity);
 
   // First which are visible, and their keys; the splats only once their places are known. That is cheaper than a second copy
   // of the splats, and keeps the memory per Gaussian small.
@@ -432,6 +432,7 @@ Draw preprocess(const GaussianScene& scene, const Camera& camera, const Preproce
 
   summary.gaussians_total = scene.size();
   summary.gaussians_visible = draw.splats.size();
+  summary.gaussians_compensated = compensates_opacity ? scene.size() : 0;
   summary.rejected = rejected;
   return draw;
 }

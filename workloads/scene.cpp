@@ -129,6 +129,9 @@ LoadedScene load_draw_list(const std::string& path, const SceneRequest& request)
   refuse(request.preprocess.sh_degree != untouched.sh_degree, "--set preprocess.sh_degree", preprocessed, remedy);
   refuse(request.preprocess.depth_key_bits != untouched.depth_key_bits, "--set preprocess.depth_key_bits", preprocessed,
          remedy);
+  refuse(request.preprocess.dilation != untouched.dilation, "--set preprocess.dilation", preprocessed, remedy);
+  refuse(request.preprocess.opacity_compensation != untouched.opacity_compensation,
+         "--set preprocess.opacity_compensation", preprocessed, remedy);
   DrawList list = read_draw_list(path);
   LoadedScene loaded;
   loaded.draw = std::move(list.draw);

@@ -536,7 +536,7 @@ TEST_F(HostileFolders, NamesDoNotLeadOutOfTheFolder) {
   expect_refused_name(std::string(999, 'x'), {"File name too long"});
   expect_refused_name("missing.webp", {"missing.webp", "no such file"});
   expect_refused_name(".", {"directory"});
-  expect_refused_name("meta.json", {"meta.json", "at byte 0", "no lossless WebP image"});
+  expect_refused_name("meta.json", {"meta.json", "at byte 0", "neither a lossless WebP image nor a .png"});
   expect_refused_name("means_l.webp/", {"means_l.webp"});
 }
 

@@ -90,8 +90,8 @@ SceneFile hostile_file(const std::string& format, const void* data, std::size_t 
     return found->second;
   };
   if (format == "any") {
-    constexpr std::array<const char*, 7> kNames = {"a.ply",    "a.compressed.ply", "a.splat",      "a.spz",
-                                                   "a.ksplat", "meta.json",        "lod-meta.json"};
+    constexpr std::array<const char*, 8> kNames = {"a.ply",    "a.compressed.ply", "a.splat",      "a.spz",
+                                                   "a.ksplat", "meta.json",        "lod-meta.json", "a.gltf"};
     file.name = kNames[last % kNames.size()];
   } else if (format == "PlayCanvas streamed SOG" && last % 4 != 0) {
     file.choices["lod"] = std::to_string(last % 4);

@@ -309,7 +309,7 @@ TEST_F(MeshFile, DocumentsOfGltfThatLieAreRefused) {
   expect_refused("a.gltf", with("\"nodes\": [0]", "\"nodes\": [1]"), {"not there"});
   expect_refused("a.gltf", with("\"bufferView\": 0, \"comp", "\"sparse\": {}, \"comp"), {"sparse"});
   expect_refused("a.gltf", with("\"asset\"", "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"asset\""),
-                 {"requires extensions"});
+                 {"requires the extension KHR_draco_mesh_compression"});
   expect_refused("a.gltf", std::string(1000000, '['), {"JSON"});
   expect_refused("a.gltf", with("\"scene\": 0", "\"extras\": " + std::string(100, '[') + std::string(100, ']')),
                  {"nested too deep"});

@@ -621,6 +621,8 @@ TEST_F(Accuracy, RefusesBadInputAndWritesNothing) {
       {{"--fidelity", "exact"}, {"'exact'", "cycle"}},
       {{"--set", "preprocess.sh_degree=1"}, {"preprocess.sh_degree", ".spl", "preprocessed already"}},
       {{"--set", "preprocess.depth_key_bits=16"}, {"preprocess.depth_key_bits", ".spl"}},
+      {{"--set", "preprocess.dilation=0.1"}, {"preprocess.dilation", ".spl"}},
+      {{"--set", "preprocess.opacity_compensation=on"}, {"preprocess.opacity_compensation", ".spl"}},
       {{"--set", "preprocess.sh_degree=4"}, {"preprocess.sh_degree", "0 to 3"}},
       {{"--set", "preprocess.depth_key_bits=20"}, {"'20'", "32, 24, 16, 12"}},
       {{"--set", "preprocess.sh=1"}, {"did you mean preprocess.sh_degree?"}},

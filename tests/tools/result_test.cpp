@@ -385,6 +385,42 @@ TEST_F(Result, CameraHasItsFinalNumbers) {
   EXPECT_TRUE(json_of({"run", "--scene", "tiny.spl"})["camera"].is_null());
 }
 
+TEST_F(Result, WhatTheFileSaysOfItsModelIsAParameterThatTheUserMayOverride) {
+  GaussianSceneBuilder builder(0);
+  GaussianAttributes gaussian;
+  gaussian.log_scale = {-4, -4, -4};
+  gaussian.opacity_logit = 2;
+  builder.add(gaussian);
+  GaussianFile file;
+  file.gaussians = builder.build();
+  write_gaussian_file(folder() / "classic.ply", file);
+  file.gaussians.set_compensates_opacity(true);
+  write_gaussian_file(folder() / "mip.ply", file);
+  const auto drawn = [&](const char* scene, const std::vector<std::string>& settings) {
+    std::vector<std::string> command{"run", "--scene", scene, "--size", "16x16", "--fidelity", "functional"};
+    for (const std::string& setting : settings) command.insert(command.end(), {"--set", "preprocess." + setting});
+    return json_of(command);
+  };
+  const std::string name = "preprocess.opacity_compensation";
+  const auto expect = [&](const json& result, const char* value, const char* origin, unsigned compensated) {
+    EXPECT_EQ(result["platform"]["parameters"][name], value);
+    EXPECT_EQ(result["platform"]["origins"][name], origin);
+    EXPECT_EQ(result["scene"]["gaussians_compensated"], compensated);
+  };
+  const json classic = drawn("classic.ply", {}), mip = drawn("mip.ply", {});
+  expect(classic, "off", "default", 0);
+  expect(mip, "on", "scene", 1);
+  expect(drawn("mip.ply", {"opacity_compensation=off"}), "off", "command line", 0);
+  expect(drawn("classic.ply", {"opacity_compensation=on"}), "on", "command line", 1);
+  const auto hash = [](const json& result) { return result["runs"][0]["result_hash"]; };
+  EXPECT_NE(hash(mip), hash(classic));
+  EXPECT_EQ(hash(mip), hash(drawn("classic.ply", {"opacity_compensation=on"})));
+  EXPECT_EQ(hash(classic), hash(drawn("mip.ply", {"opacity_compensation=off"})));
+  EXPECT_NE(hash(classic), hash(drawn("classic.ply", {"dilation=0.1"})));
+  ASSERT_EQ(mip["scene"]["notes"].size(), 1U);
+  EXPECT_NE(mip["scene"]["notes"][0].get<std::string>().find("SplatRenderMode: mip"), std::string::npos);
+}
+
 // The documentation.
 
 TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {

@@ -144,9 +144,9 @@ TEST_F(SceneFile, AnOpenedSceneCanBePreprocessedAgain) {
 }
 
 TEST_F(SceneFile, UnknownKindsOfFilesAreRefusedWithWhatIsSupported) {
-  request_.scene = write("scene.usd", "#usda 1.0").string();
+  request_.scene = write("scene.3ds", "MM").string();
   expect_user_error([&] { load_scene(request_); },
-                    {"scene.usd", "known format", ".ply", ".splat", ".spl", "builtin:NAME"});
+                    {"scene.3ds", "known format", ".ply", ".splat", ".spl", "builtin:NAME"});
   request_.scene = "objct";
   expect_user_error([&] { load_scene(request_); }, {"no such file", "builtin:object"});
   request_.scene = "builtin:objekt";

@@ -40,7 +40,7 @@ class ConvertCommand : public Command {
     check_files_differ({{"IN", gaussian_file_path(scene_file(in_))}}, {{"OUT", out_}});
     const GaussianFile scene = open_gaussians(in_);
     for (const std::string& note : scene.notes) std::cerr << "note: " << printable(note) << "\n";
-    for (const std::string& note : write_gaussian_file(out_, scene.gaussians)) {
+    for (const std::string& note : write_gaussian_file(out_, scene)) {
       std::cerr << "note: " << printable(note) << "\n";
     }
     std::cout << fmt::format("{}: {} Gaussians, {:.1f} MB\n", printable(out_), grouped(scene.gaussians.size()),

@@ -16,6 +16,7 @@
 #include "host/stopwatch.h"
 #include "jobs/comparison.h"
 #include "jobs/processes.h"
+#include "jobs/settings.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -62,8 +63,7 @@ struct Workload {
   std::shared_ptr<const Draw> stress_draw;  ///< the middle of it
 
   std::shared_ptr<const Draw> draw_with(const PreprocessOptions& wanted) const {
-    const bool same = wanted.sh_degree == options.sh_degree && wanted.depth_key_bits == options.depth_key_bits;
-    if (same || scene.draw_list) return draw;
+    if (wanted == options || scene.draw_list) return draw;
     return std::make_shared<const Draw>(preprocess_scene(scene, wanted).draw);
   }
 };
@@ -123,7 +123,7 @@ void write_image(const AccuracyJob& job, AccuracyResult& result, const std::stri
 /// The image that errors are measured against: all bands, exact order.
 ShownImage make_reference(const AccuracyJob& job, const Workload& workload, AccuracyResult& result) {
   const Stopwatch watch;
-  const ExactImage exact = render_exactly(*workload.draw_with(PreprocessOptions()));
+  const ExactImage exact = render_exactly(*workload.draw_with(workload.options.exact()));
   result.reference_seconds = watch.seconds();
   if (job.simulation.output) {
     SharedImage image(exact.width, exact.height);
@@ -365,10 +365,8 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   climb_precisions(job, workload, values, reference, {"precision ", climbs + stress.size(), 0, ladders.seconds()},
                    result, progress);
   if (!workload.scene.draw_list) {
-    for (PrecisionRun& run : result.runs) {
-      run.run.parameters.insert(run.run.parameters.end(), job.simulation.preprocess_parameters.begin(),
-                                job.simulation.preprocess_parameters.end());
-    }
+    for (PrecisionRun& run : result.runs)
+      add_preprocess_parameters(job.simulation.preprocess_parameters, result.scene, run.run);
   }
   result.seconds = watch.seconds();
   return result;

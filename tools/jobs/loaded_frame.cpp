@@ -28,6 +28,7 @@ SceneRequest seen_from(const Viewpoint& viewpoint, SceneRequest options) {
 void add(const SceneSummary& scene, SceneSummary& sum) {
   sum.gaussians_total += scene.gaussians_total;
   sum.gaussians_visible += scene.gaussians_visible;
+  sum.gaussians_compensated += scene.gaussians_compensated;
   sum.rejected.not_finite += scene.rejected.not_finite;
   sum.rejected.zero_quaternion += scene.rejected.zero_quaternion;
   sum.triangles += scene.triangles;

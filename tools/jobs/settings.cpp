@@ -115,4 +115,14 @@ SettingsByPart sort_settings(const std::vector<Setting>& settings) {
   return parts;
 }
 
+void add_preprocess_parameters(const std::vector<std::pair<std::string, std::string>>& parameters,
+                               const SceneSummary& scene, RunResult& run) {
+  for (const auto& [name, value] : parameters) {
+    const bool is_open = name == preprocess_unit + ".opacity_compensation" && value == "scene";
+    const bool on = scene.gaussians_compensated == scene.gaussians_total, off = scene.gaussians_compensated == 0;
+    // Scenes of a frame may be of two minds.
+    run.parameters.emplace_back(name, is_open && off ? "off" : is_open && on ? "on" : value);
+  }
+}
+
 }  // namespace vrpipe::tools

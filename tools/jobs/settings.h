@@ -39,4 +39,8 @@ bool restates_preprocessing(const Setting& setting);
 /// preprocessing; the others are not checked.
 SettingsByPart sort_settings(const std::vector<Setting>& settings);
 
+/// Adds parameters of preprocessing to those of a run, with what its scenes' files decided in place of what was left to them.
+void add_preprocess_parameters(const std::vector<std::pair<std::string, std::string>>& parameters,
+                               const SceneSummary& scene, RunResult& run);
+
 }  // namespace vrpipe::tools

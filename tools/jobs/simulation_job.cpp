@@ -15,6 +15,7 @@
 #include "host/stopwatch.h"
 #include "jobs/loaded_frame.h"
 #include "jobs/processes.h"
+#include "jobs/settings.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -168,8 +169,7 @@ JobResult perform(const SimulationJob& job) {
     result.images.resize(simulated.size());
   }
   for (RunResult& run : result.runs) {
-    if (!preprocessed_here) break;
-    run.parameters.insert(run.parameters.end(), job.preprocess_parameters.begin(), job.preprocess_parameters.end());
+    if (preprocessed_here) add_preprocess_parameters(job.preprocess_parameters, result.scene, run);
   }
   return result;
 }

@@ -84,10 +84,9 @@ class StudyFrames {
  public:
   explicit StudyFrames(const SweepJob& job) : job_(job) {}
 
-  /// The draw of what a point draws, in exact order and with all that the scene has, whatever --set says of preprocessing.
-  std::shared_ptr<const Draw> exact_draw(Drawn drawn) {
-    drawn.preprocess.clear();
-    load(drawn, PreprocessOptions());
+  /// The draw of what a point draws, in exact order and with all that the scene has.
+  std::shared_ptr<const Draw> exact_draw(const Drawn& drawn) {
+    load(drawn, preprocessing_of(drawn).exact());
     held_.reset();
     if (!frame_.meshes.front().empty()) {
       throw UserError("cannot measure images", "columns", "they are measured against an exact image of splats alone",
@@ -98,14 +97,7 @@ class StudyFrames {
 
   std::shared_ptr<const Frame> frame(const StudiedPoint& point, const RunRequest& request) {
     const Drawn drawn = drawn_by(job_, point);
-    if (!held_ || held_->key() != drawn.key()) {
-      std::vector<Setting> settings = job_.common.preprocessing;
-      for (const std::string& text : drawn.preprocess) {
-        const std::size_t equals = text.find('=');
-        settings.push_back({"preprocess", text.substr(11, equals - 11), text.substr(equals + 1)});
-      }
-      load(drawn, sort_settings(settings).preprocess);
-    }
+    if (!held_ || held_->key() != drawn.key()) load(drawn, preprocessing_of(drawn));
     FrameDescription description = frame_of_scene(drawn.scene);
     const std::string passes = value_on(job_.study, point, "multi-pass", std::to_string(job_.common.frame.passes));
     description.passes = static_cast<std::uint32_t>(std::stoul(passes));
@@ -113,6 +105,14 @@ class StudyFrames {
   }
 
  private:
+  PreprocessOptions preprocessing_of(const Drawn& drawn) const {
+    std::vector<Setting> settings = job_.common.preprocessing;
+    for (const std::string& text : drawn.preprocess) {
+      const std::size_t equals = text.find('=');
+      settings.push_back({"preprocess", text.substr(11, equals - 11), text.substr(equals + 1)});
+    }
+    return sort_settings(settings).preprocess;
+  }
   void load(const Drawn& drawn, const PreprocessOptions& preprocess) {
     held_.reset();
     frame_ = LoadedFrame();
@@ -158,10 +158,11 @@ constexpr const char* ssim_column = "image.ssim";
 constexpr const char* max_error_column = "image.max_abs_error";
 constexpr std::array<const char*, 3> image_columns{psnr_column, ssim_column, max_error_column};
 
+bool is_of_image(const std::string& column) {
+  return std::find(image_columns.begin(), image_columns.end(), column) != image_columns.end();
+}
 bool measures_images(const Study& study) {
-  return std::any_of(study.columns.begin(), study.columns.end(), [](const std::string& column) {
-    return std::find(image_columns.begin(), image_columns.end(), column) != image_columns.end();
-  });
+  return std::any_of(study.columns.begin(), study.columns.end(), is_of_image);
 }
 
 /// The exact images of what points draw, each while there are such points.
@@ -184,15 +185,21 @@ class ExactImages {
     ShownImage image;
     std::size_t points_left = 0;
   };
+  /// Of points that differ in the precision of preprocessing alone there is one.
   OfScene& of(std::size_t point) {
-    const Drawn drawn = drawn_by(job_, job_.study.points[point]);
-    return scenes_[std::tuple(drawn.scene, drawn.view, drawn.size)];
+    Drawn drawn = drawn_by(job_, job_.study.points[point]);
+    const auto is_precision = [](const std::string& setting) {
+      return setting.rfind("preprocess.sh_degree=", 0) == 0 || setting.rfind("preprocess.depth_key_bits=", 0) == 0;
+    };
+    std::vector<std::string>& settings = drawn.preprocess;
+    settings.erase(std::remove_if(settings.begin(), settings.end(), is_precision), settings.end());
+    return scenes_[{drawn.scene, drawn.view, drawn.size, settings}];
   }
 
   const SweepJob& job_;
   StudyFrames frames_;
   const std::array<float, 3> background_{};
-  std::map<std::tuple<std::string, std::string, std::string>, OfScene> scenes_;
+  std::map<std::tuple<std::string, std::string, std::string, std::vector<std::string>>, OfScene> scenes_;
 };
 
 void check_views(const SweepJob& job) {
@@ -220,15 +227,6 @@ std::string point_text(const Study& study, const StudiedPoint& point) {
     text += (text.empty() ? "" : ", ") + study.axes[i].name + "=" + text_of(study.axes[i], point.values[i]);
   }
   return text;
-}
-
-/// WHAT (WHERE): WHY; WHAT TO DO, with the point in WHERE.
-UserError of_point(const UserError& error, const Study& study, const StudiedPoint& point) {
-  const std::string text = error.what();
-  const std::size_t where = text.find(" ("), why = text.find("): ", where), remedy = text.find("; ", why);
-  if (remedy == std::string::npos) return error;
-  return {text.substr(0, where), text.substr(where + 2, why - where - 2) + ", of the point " + point_text(study, point),
-          text.substr(why + 3, remedy - why - 3), text.substr(remedy + 2)};
 }
 
 nlohmann::json point_key(const Study& study, std::size_t point) {
@@ -336,7 +334,7 @@ std::vector<std::optional<double>> columns_of(const RunResult& run, const std::o
     if (error && column == psnr_column) values.emplace_back(error->psnr_db);
     if (error && column == ssim_column) values.emplace_back(error->ssim);
     if (error && column == max_error_column) values.emplace_back(error->max_abs_error);
-    if (std::find(image_columns.begin(), image_columns.end(), column) != image_columns.end()) continue;
+    if (is_of_image(column)) continue;
     const auto found = std::find_if(run.statistics.begin(), run.statistics.end(),
                                     [&](const StatisticReport& report) { return report.name == column; });
     std::optional<double>& value = values.emplace_back();
@@ -665,7 +663,7 @@ SweepResult run_sweep(const SweepJob& job) {
       requests.push_back(request_of(job, point));
       check_configuration(requests.back());
     } catch (const UserError& error) {
-      throw of_point(error, job.study, point);
+      throw error.also_in("of the point " + point_text(job.study, point));
     }
   }
   check_columns(job, requests);

@@ -153,6 +153,7 @@ nlohmann::json to_views_record(const ViewResult& view) {
           {"scene",
            {{"gaussians_total", scene.gaussians_total},
             {"gaussians_visible", scene.gaussians_visible},
+            {"gaussians_compensated", scene.gaussians_compensated},
             {"not_finite", scene.rejected.not_finite},
             {"zero_quaternion", scene.rejected.zero_quaternion},
             {"triangles", scene.triangles},
@@ -169,6 +170,7 @@ void views_from_record(const nlohmann::json& record, const std::vector<RunReques
   SceneSummary summary;
   scene.at("gaussians_total").get_to(summary.gaussians_total);
   scene.at("gaussians_visible").get_to(summary.gaussians_visible);
+  scene.at("gaussians_compensated").get_to(summary.gaussians_compensated);
   scene.at("not_finite").get_to(summary.rejected.not_finite);
   scene.at("zero_quaternion").get_to(summary.rejected.zero_quaternion);
   scene.at("triangles").get_to(summary.triangles);

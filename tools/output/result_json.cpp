@@ -104,6 +104,9 @@ Json origins_json(const Json& parameters, const RunRequest& request, const std::
   mark(request.platform->settings, "platform");
   mark(request.settings, given);
   mark(preprocessing, given);
+  const char* const decided = "preprocess.opacity_compensation";
+  if (origins.contains(decided) && origins[decided] == "default" && parameters[decided] == "on")
+    origins[decided] = "scene";
   return origins;
 }
 
@@ -324,6 +327,7 @@ Json scene_json(const SceneSummary& scene, std::uint32_t width, std::uint32_t he
   return {{"name", scene.name},
           {"gaussians_total", scene.gaussians_total},
           {"gaussians_visible", scene.gaussians_visible},
+          {"gaussians_compensated", scene.gaussians_compensated},
           {"gaussians_rejected", scene.rejected.total()},
           {"triangles", scene.triangles},
           {"triangles_rejected", scene.triangles_rejected},

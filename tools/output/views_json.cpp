@@ -9,6 +9,7 @@
 
 #include "jobs/comparison.h"
 #include "jobs/optional_json.h"
+#include "jobs/settings.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -70,10 +71,7 @@ Json distribution_json(const std::optional<Distribution>& of, const ViewsResult&
 Json views_json(const ViewsResult& result) {
   std::vector<RunResult> runs = result.views.front().runs;
   const RunRequest& request = runs.front().request;
-  for (RunResult& run : runs) {
-    run.parameters.insert(run.parameters.end(), result.preprocess_parameters.begin(),
-                          result.preprocess_parameters.end());
-  }
+  for (RunResult& run : runs) add_preprocess_parameters(result.preprocess_parameters, result.views.front().scene, run);
   Json views = Json::array();
   for (const ViewResult& view : result.views) views.push_back(view_json(view, result.baseline));
   Json speedups = Json::object();

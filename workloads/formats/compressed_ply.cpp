@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "formats/attribute_codes.h"
+#include "formats/ply_comments.h"
 #include "formats/ply_records.h"
 #include "formats/scene_format.h"
 
@@ -131,6 +132,7 @@ GaussianFile read_compressed_ply(const SceneFile& file) {
           }
         }
       });
+  apply_ply_comments(header, result);
   return result;
 }
 

@@ -2,24 +2,20 @@
 // f_rest channel by channel. Vertices of float32 stay in memory as they lie in the file.
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <locale>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
-
-#include <glm/geometric.hpp>
 
 #include <vrpipe/workloads/portable_math.h>
 #include <vrpipe/workloads/preprocess.h>
 
 #include "file_io.h"
 #include "formats/attribute_codes.h"
+#include "formats/ply_comments.h"
 #include "formats/ply_records.h"
 #include "formats/scene_format.h"
 
@@ -29,28 +25,6 @@ namespace {
 Match matches_inria_ply(const SceneFile& file) {
   if (file.bytes.begins_with("ply\n") || file.bytes.begins_with("ply\r\n")) return Match::by_container;
   return file.ends_with(".ply") ? Match::by_name : Match::no;
-}
-
-/// Nerfstudio's exports name the axis that points up, Brush's say its direction.
-Vec3 up_of(const PlyHeader& header) {
-  const std::string key = "vertical axis:";
-  for (const std::string& comment : header.comments) {
-    std::string text = comment;
-    std::transform(text.begin(), text.end(), text.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (text.rfind(key, 0) != 0) continue;
-    std::istringstream words(text.substr(key.size()));
-    std::string word;
-    words >> word;
-    if (word == "x") return {1, 0, 0};
-    if (word == "y") return {0, 1, 0};
-    if (word == "z") return {0, 0, 1};
-    std::istringstream numbers(text.substr(key.size()));
-    numbers.imbue(std::locale::classic());
-    Vec3 up{};
-    if (numbers >> up[0] >> up[1] >> up[2] && std::isfinite(glm::length(up)) && glm::length(up) > 0) return up;
-  }
-  return {0, -1, 0};
 }
 
 /// What only looks like Gaussians as they are drawn here.
@@ -219,16 +193,18 @@ GaussianFile read_inria_ply(const SceneFile& file) {
                        !columns.any([](PlyNumber::Type type) { return type != PlyNumber::Type::float32; });
   result.gaussians =
       lies_so ? as_they_lie(vertices, columns, used_degree) : converted(vertices, columns, used_degree, file.bytes);
-  result.up = up_of(header);
+  apply_ply_comments(header, result);
   if (degree > used_degree) result.notes.push_back("spherical harmonics of degree 4 are left out");
   if (columns.filter) result.notes.push_back("Mip-Splatting's 3D filter (filter_3D) is put into scales and opacities");
   if (std::string note = activated_note(result.gaussians); !note.empty()) result.notes.push_back(std::move(note));
   return result;
 }
 
-std::vector<std::string> write_inria_ply(const std::filesystem::path& path, const GaussianScene& scene) {
+std::vector<std::string> write_inria_ply(const std::filesystem::path& path, const GaussianFile& of) {
+  const GaussianScene& scene = of.gaussians;
   const std::size_t per_channel = kShRestPerChannel[static_cast<std::size_t>(scene.sh_degree())];
-  std::string header = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(scene.size()) + "\n";
+  std::string header = "ply\nformat binary_little_endian 1.0\n" + ply_comments_of(of) + "element vertex " +
+                       std::to_string(scene.size()) + "\n";
   const auto property = [&header](const std::string& name) { header += "property float " + name + "\n"; };
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) property(name);
   for (int i = 0; i < 3; ++i) property("f_dc_" + std::to_string(i));

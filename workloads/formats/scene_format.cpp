@@ -103,6 +103,38 @@ std::string precision_note(const GaussianScene& scene) {
       widest, 100.0 * static_cast<double>(too_small) / static_cast<double>(scene.size()));
 }
 
+/// What other programs have for their own.
+struct ForeignFormat {
+  const char* extension;
+  const char* what;
+  const char* remedy;
+};
+constexpr char kWithSplatTransform[] = "convert it to .ply, by PlayCanvas' splat-transform for one";
+constexpr ForeignFormat kForeignFormats[] = {
+    {".lcc", "a scene of XGRIDS' LCC", kWithSplatTransform},
+    {".lcc2", "a scene of XGRIDS' LCC", kWithSplatTransform},
+    {".spx", "a scene of Reall3dViewer", "convert it to .ply or .spz, by gsbox for one"},
+    {".rad", "a scene in levels of detail of Spark", "give the file that it was made from"},
+    {".ckpt", "a checkpoint of a training",
+     "export the Gaussians as .ply, in nerfstudio by `ns-export gaussian-splat`"},
+    {".pt", "a checkpoint of a training", "export the Gaussians as .ply"},
+    {".pth", "a checkpoint of a training", "export the Gaussians as .ply"},
+    {".usdz", "a scene of OpenUSD", "export the Gaussians as .ply"},
+    {".usd", "a scene of OpenUSD", "export the Gaussians as .ply"},
+};
+
+/// Of a file that no reader takes.
+[[noreturn]] void fail_of_unknown(const SceneFile& file) {
+  for (const ForeignFormat& foreign : kForeignFormats) {
+    if (file.ends_with(foreign.extension))
+      file.bytes.fail(std::string("it is ") + foreign.what + ", which is not read", foreign.remedy);
+  }
+  std::string known;
+  for (const SceneFormat& format : registry()) known += (known.empty() ? "" : ", ") + format.name;
+  file.bytes.fail("neither its content nor its name is that of a known format",
+                  "known are " + known + "; draw lists (.spl) and builtin:NAME");
+}
+
 }  // namespace
 
 bool SceneFile::ends_with(const std::string& extension) const { return vrpipe::ends_with(name, extension); }
@@ -113,6 +145,13 @@ SceneFormatRegistrar::SceneFormatRegistrar(SceneFormat format) {
   const auto place =
       std::find_if(formats.begin(), formats.end(), [&](const SceneFormat& other) { return format.name < other.name; });
   formats.insert(place, std::move(format));
+}
+
+void set_anti_aliased(GaussianFile& file, const std::string& said) {
+  if (file.gaussians.compensates_opacity()) return;
+  file.gaussians.set_compensates_opacity(true);
+  file.notes.push_back("it was trained anti-aliased (`" + said +
+                       "`): preprocess.opacity_compensation is on unless it is set");
 }
 
 const std::vector<SceneFormat>& scene_formats() { return registry(); }
@@ -135,11 +174,11 @@ GaussianFile read_scene(const SceneFile& file) try {
       best = &format;
     }
   }
-  if (best == nullptr) {
-    std::string known;
-    for (const SceneFormat& format : registry()) known += (known.empty() ? "" : ", ") + format.name;
-    file.bytes.fail("neither its content nor its name is that of a known format",
-                    "known are " + known + "; draw lists (.spl) and builtin:NAME");
+  // A checkpoint is a zip archive as well.
+  if (best == nullptr || match == Match::by_container) {
+    const auto is_foreign = [&](const ForeignFormat& foreign) { return file.ends_with(foreign.extension); };
+    if (best == nullptr || std::any_of(std::begin(kForeignFormats), std::end(kForeignFormats), is_foreign))
+      fail_of_unknown(file);
   }
   check_choices(file, *best);
   GaussianFile scene = best->read(file);
@@ -172,7 +211,7 @@ GaussianFile read_gaussian_file(const std::string& text) {
   return read_scene(file);
 }
 
-std::vector<std::string> write_gaussian_file(const fs::path& path, const GaussianScene& scene) {
+std::vector<std::string> write_gaussian_file(const fs::path& path, const GaussianFile& scene) {
   const std::string name = lower_case(path.filename().string());
   std::string known;
   for (const SceneFormat& format : registry()) {
@@ -182,6 +221,12 @@ std::vector<std::string> write_gaussian_file(const fs::path& path, const Gaussia
   }
   throw UserError("cannot write scene", path.string(), "its extension is not that of a format that is written",
                   "give a name that ends in " + known);
+}
+
+std::vector<std::string> write_gaussian_file(const fs::path& path, const GaussianScene& scene) {
+  GaussianFile file;
+  file.gaussians = scene;
+  return write_gaussian_file(path, file);
 }
 
 }  // namespace vrpipe

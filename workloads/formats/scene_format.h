@@ -39,7 +39,7 @@ struct SceneFormat {
   /// @throws UserError for whatever is not as the format has it
   GaussianFile (*read)(const SceneFile& file);
   /// Null for a format that is not written. Returns what of the scene is not in the file, a sentence each.
-  std::vector<std::string> (*write)(const std::filesystem::path& path, const GaussianScene& scene) = nullptr;
+  std::vector<std::string> (*write)(const std::filesystem::path& path, const GaussianFile& scene) = nullptr;
   std::string extension{};  ///< of files that are written, e.g. ".ply"
 };
 
@@ -47,6 +47,9 @@ class SceneFormatRegistrar {
  public:
   explicit SceneFormatRegistrar(SceneFormat format);
 };
+
+/// Its Gaussians were trained anti-aliased, and `said` is where the file says so; call it when they are there.
+void set_anti_aliased(GaussianFile& file, const std::string& said);
 
 /// All formats, by name.
 const std::vector<SceneFormat>& scene_formats();

@@ -22,6 +22,7 @@ GaussianFile read_sog(const SceneFile& file) {
   scene.decode({{0, scene.count(), 0}}, gaussians);
   GaussianFile result;
   result.gaussians = gaussians.build();
+  if (!scene.anti_aliased().empty()) set_anti_aliased(result, scene.anti_aliased());
   return result;
 }
 

@@ -21,6 +21,25 @@ constexpr char kSogRemedy[] = "export the scene again";
 /// Palette entries in a row of the image of centroids.
 constexpr std::uint64_t kPaletteRow = 64;
 
+/// Of an archive that is no SOG: what it is instead.
+[[noreturn]] void fail_of_archive(const ZipArchive& archive, const FileBytes& file) {
+  const auto ends_with = [](const std::string& name, const std::string& end) {
+    return name.size() >= end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
+  };
+  for (const std::string& name : archive.names()) {
+    if (name == "document.json")
+      file.fail("it is a project of SuperSplat", "open it there, and export the scene as .ply or .sog");
+    if (ends_with(name, ".npy")) file.fail("it holds arrays of NumPy (.npz)", "write the Gaussians as INRIA's .ply");
+  }
+  for (const char* extension : {".ply", ".splat", ".spz", ".ksplat", ".sog", ".glb"}) {
+    for (const std::string& name : archive.names()) {
+      if (ends_with(name, extension))
+        file.fail("it is a zip archive with `" + name.substr(0, 100) + "`", "unpack it, and give that file");
+    }
+  }
+  file.fail("its zip archive has no meta.json, nor a scene in another format", "give a .sog, which has one");
+}
+
 /// The members of an archive beside its meta.json, wherever that lies in it.
 std::string folder_of_meta(const ZipArchive& archive, const FileBytes& file) {
   const std::string meta = "meta.json";
@@ -30,7 +49,7 @@ std::string folder_of_meta(const ZipArchive& archive, const FileBytes& file) {
                                        name.compare(name.size() - meta.size() - 1, std::string::npos, "/" + meta) == 0);
     if (ends && (best == nullptr || name.size() < best->size())) best = &name;
   }
-  if (best == nullptr) file.fail("its zip archive has no meta.json", "give a .sog, which has one");
+  if (best == nullptr) fail_of_archive(archive, file);
   return best->substr(0, best->size() - meta.size());
 }
 
@@ -153,6 +172,9 @@ void SogScene::read_attributes(const nlohmann::json& meta, const Neighbour& neig
     if (!shape.is_array() || shape.empty()) where_.fail("`means.shape` is not an array", kSogRemedy);
     count_ = json_count(shape[0], "means.shape", where_);
   }
+  for (const char* name : {"antialias", "antialiased"}) {
+    if (meta.contains(name) && meta[name] == true) anti_aliased_ = std::string(name) + ": true";
+  }
   mean_low_ = range_ends(means, "means", "mins", 3);
   mean_high_ = range_ends(means, "means", "maxs", 3);
   if (version_ == 2) {
@@ -213,9 +235,9 @@ void SogScene::read_rest(const nlohmann::json& rest, const Neighbour& neighbour)
 
 void SogScene::decode(const std::vector<Run>& runs, GaussianArray& gaussians) const {
   const std::uint64_t most = pixels_at_most(count_);
-  const RgbaImage low = unpack_webp(means_low_, count_, most), high = unpack_webp(means_high_, count_, most);
-  const RgbaImage scales = unpack_webp(scales_, count_, most), rotations = unpack_webp(rotations_, count_, most);
-  const RgbaImage colours = unpack_webp(colours_, count_, most);
+  const RgbaImage low = unpack_image(means_low_, count_, most), high = unpack_image(means_high_, count_, most);
+  const RgbaImage scales = unpack_image(scales_, count_, most), rotations = unpack_image(rotations_, count_, most);
+  const RgbaImage colours = unpack_image(colours_, count_, most);
   const std::size_t coefficients = kShRestPerChannel[static_cast<std::size_t>(sh_degree_)];
   RgbaImage labels, centroids;
   std::uint64_t row = 0;
@@ -224,10 +246,10 @@ void SogScene::decode(const std::vector<Run>& runs, GaussianArray& gaussians) co
     return std::to_integer<std::uint64_t>(label[0]) | std::to_integer<std::uint64_t>(label[1]) << 8U;
   };
   if (coefficients > 0) {
-    labels = unpack_webp(labels_, count_, most);
+    labels = unpack_image(labels_, count_, most);
     row = kPaletteRow * coefficients;
     constexpr std::uint64_t kMostRows = 65536 / kPaletteRow;
-    centroids = unpack_webp(centroids_, palette_ * coefficients, kMostRows * row);
+    centroids = unpack_image(centroids_, palette_ * coefficients, kMostRows * row);
     if (centroids.width != row) {
       centroids_.fail("its image is " + std::to_string(centroids.width) + " pixels wide, and " + std::to_string(row) +
                           " are expected",

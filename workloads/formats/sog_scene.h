@@ -41,6 +41,8 @@ class SogScene {
 
   std::uint64_t count() const { return count_; }
   int sh_degree() const { return sh_degree_; }
+  /// Where its meta.json says that it was trained anti-aliased; empty where it does not.
+  const std::string& anti_aliased() const { return anti_aliased_; }
 
   /// `count` Gaussians from `from` on, to be set in an array from `to` on.
   struct Run {
@@ -69,6 +71,7 @@ class SogScene {
   int version_ = 0;
   std::uint64_t count_ = 0;
   int sh_degree_ = 0;
+  std::string anti_aliased_;
   std::uint64_t palette_ = 0;  ///< entries of it
   std::array<double, 4> mean_low_{}, mean_high_{};
   std::array<Codes, 3> scale_codes_{}, colour_codes_{};

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include <vrpipe/workloads/portable_math.h>
 #include <vrpipe/workloads/preprocess.h>
 
@@ -54,7 +56,8 @@ std::byte to_byte(double value) {
   return static_cast<std::byte>(static_cast<unsigned>(limited + 0.5));
 }
 
-std::vector<std::string> write_splat(const std::filesystem::path& path, const GaussianScene& scene) {
+std::vector<std::string> write_splat(const std::filesystem::path& path, const GaussianFile& of) {
+  const GaussianScene& scene = of.gaussians;
   AtomicFile file(path, "cannot write scene", path.string());
   for (std::uint64_t index = 0; index < scene.size(); ++index) {
     const GaussianRef gaussian = scene[index];
@@ -77,9 +80,20 @@ std::vector<std::string> write_splat(const std::filesystem::path& path, const Ga
     file.write(record.data(), record.size());
   }
   file.commit();
-  if (scene.sh_degree() == 0) return {};
-  return {"spherical harmonics of degree 1 to " + std::to_string(scene.sh_degree()) +
-          " are left out: a .splat has none"};
+  std::vector<std::string> left_out;
+  if (scene.sh_degree() > 0) {
+    left_out.push_back("spherical harmonics of degree 1 to " + std::to_string(scene.sh_degree()) +
+                       " are left out: a .splat has none");
+  }
+  if (scene.compensates_opacity()) {
+    left_out.push_back(
+        "that it was trained anti-aliased is left out: draw it with --set preprocess.opacity_compensation=on");
+  }
+  if (of.up != GaussianFile().up) {
+    left_out.push_back(
+        fmt::format("where up is in it, {},{},{}, is left out: give it as --up", of.up.x, of.up.y, of.up.z));
+  }
+  return left_out;
 }
 
 const SceneFormatRegistrar splat_registrar({"antimatter15 .splat",

@@ -136,6 +136,9 @@ GaussianFile read_streamed_sog(const SceneFile& file) {
   if (environment) environment->decode({{0, environment->count(), total}}, gaussians);
   GaussianFile result;
   result.gaussians = gaussians.build();
+  for (const auto& part : parts) {
+    if (!part.second.scene.anti_aliased().empty()) set_anti_aliased(result, part.second.scene.anti_aliased());
+  }
   return result;
 }
 

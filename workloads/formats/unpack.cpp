@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <new>
+#include <string>
 #include <vector>
 
+#include <png.h>
 #include <webp/decode.h>
 #include <zlib.h>
 #include <zstd.h>
@@ -13,6 +16,56 @@ namespace vrpipe {
 namespace {
 
 constexpr char kDamagedRemedy[] = "get the file again";
+constexpr char kPngMagic[] = "\x89PNG\r\n\x1a\n";
+
+void check_size(const RgbaImage& image, const FileBytes& packed, std::uint64_t least, std::uint64_t most) {
+  const std::uint64_t pixels = image.width * image.height;
+  if (pixels >= least && pixels <= most) return;
+  packed.fail("its image has " + std::to_string(image.width) + "x" + std::to_string(image.height) + " pixels, and " +
+                  std::to_string(least) + " to " + std::to_string(most) + " are expected",
+              "export the scene again");
+}
+
+/// The chunks of a .png in which its pixels are, without those by which libpng would correct them.
+std::vector<std::byte> chunks_of_pixels(const FileBytes& packed) {
+  const std::string what = "its .png";
+  std::vector<std::byte> kept(packed.data(), packed.range(0, 8, what) + 8);
+  for (std::uint64_t at = 8; at < packed.size();) {
+    std::uint64_t length = 0;
+    for (std::uint64_t i = 0; i < 4; ++i) length = length << 8U | packed.number<std::uint8_t>(at + i, what);
+    const std::byte* const chunk = packed.range(at, 12 + length, what);
+    const std::string kind(reinterpret_cast<const char*>(chunk + 4), 4);
+    if (kind == "IHDR" && length >= 9 && std::to_integer<unsigned>(chunk[16]) != 8)
+      packed.fail_at(at + 16, "its .png has no 8 bits a channel", "save it with 8, or as lossless WebP");
+    for (const char* used : {"IHDR", "PLTE", "tRNS", "IDAT", "IEND"}) {
+      if (kind == used) kept.insert(kept.end(), chunk, chunk + 12 + length);
+    }
+    if (kind == "IEND") break;
+    at += 12 + length;
+  }
+  return kept;
+}
+
+RgbaImage unpack_png(const FileBytes& packed, std::uint64_t least, std::uint64_t most) {
+  const std::vector<std::byte> chunks = chunks_of_pixels(packed);
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  const std::unique_ptr<png_image, void (*)(png_image*)> freed(&png, png_image_free);
+  const auto check = [&](int done) {
+    if (done == 0) packed.fail(std::string("its .png is damaged: ") + png.message, kDamagedRemedy);
+  };
+  check(png_image_begin_read_from_memory(&png, chunks.data(), chunks.size()));
+  RgbaImage image;
+  image.width = png.width;
+  image.height = png.height;
+  check_size(image, packed, least, most);
+  const std::uint64_t size = 4 * image.width * image.height;
+  const std::shared_ptr<std::byte[]> bytes = allocate_bytes(size, packed.where());
+  png.format = PNG_FORMAT_RGBA;
+  check(png_image_finish_read(&png, nullptr, bytes.get(), 0, nullptr));
+  image.pixels = FileBytes(bytes, size, packed.where());
+  return image;
+}
 
 }  // namespace
 
@@ -80,21 +133,32 @@ void GzipStream::unpack(std::uint64_t size) {
   }
 }
 
-void GzipStream::finish() {
+void GzipStream::read_on(const std::function<void(const std::byte* bytes, std::size_t size)>& take) {
   State& s = *state_;
-  std::array<std::byte, 4096> dropped{};
+  std::array<std::byte, 4096> next{};
   constexpr std::uint64_t kMost = std::uint64_t{16} << 20U;
-  for (std::uint64_t done = 0; !s.ended; done += dropped.size()) {
+  for (std::uint64_t done = 0; !s.ended; done += next.size()) {
     if (done > kMost) {
       s.packed.fail_at(s.position(),
                        "its gzip stream goes on, after the " + std::to_string(s.unpacked.size()) +
                            " bytes of its Gaussians",
                        kDamagedRemedy);
     }
-    s.stream.next_out = reinterpret_cast<Bytef*>(dropped.data());
-    s.stream.avail_out = static_cast<uInt>(dropped.size());
+    s.stream.next_out = reinterpret_cast<Bytef*>(next.data());
+    s.stream.avail_out = static_cast<uInt>(next.size());
     s.ended = step() == Z_STREAM_END;
+    take(next.data(), next.size() - s.stream.avail_out);
   }
+}
+
+void GzipStream::unpack_rest() {
+  read_on([this](const std::byte* bytes, std::size_t size) {
+    state_->unpacked.insert(state_->unpacked.end(), bytes, bytes + size);
+  });
+}
+
+void GzipStream::finish() {
+  read_on([](const std::byte*, std::size_t) {});
 }
 
 FileBytes GzipStream::first(std::uint64_t size) const {
@@ -131,7 +195,8 @@ FileBytes unpack_zstd(const FileBytes& packed, std::uint64_t offset, std::uint64
   return FileBytes(bytes, unpacked_size, packed.where() + ", " + what);
 }
 
-RgbaImage unpack_webp(const FileBytes& packed, std::uint64_t least, std::uint64_t most) {
+RgbaImage unpack_image(const FileBytes& packed, std::uint64_t least, std::uint64_t most) {
+  if (packed.begins_with(kPngMagic)) return unpack_png(packed, least, most);
   const auto* const data = reinterpret_cast<const std::uint8_t*>(packed.data());
   const std::size_t size = static_cast<std::size_t>(packed.size());
   WebPBitstreamFeatures features;
@@ -142,17 +207,13 @@ RgbaImage unpack_webp(const FileBytes& packed, std::uint64_t least, std::uint64_
   }
   constexpr int kLossless = 2;
   if (status != VP8_STATUS_OK || features.has_animation != 0 || features.format != kLossless) {
-    packed.fail_at(0, "there is no lossless WebP image", kDamagedRemedy);
+    packed.fail_at(0, "there is neither a lossless WebP image nor a .png", kDamagedRemedy);
   }
   RgbaImage image;
   image.width = static_cast<std::uint64_t>(features.width);
   image.height = static_cast<std::uint64_t>(features.height);
   const std::uint64_t pixels = image.width * image.height;
-  if (pixels < least || pixels > most) {
-    packed.fail("its image has " + std::to_string(image.width) + "x" + std::to_string(image.height) + " pixels, and " +
-                    std::to_string(least) + " to " + std::to_string(most) + " are expected",
-                "export the scene again");
-  }
+  check_size(image, packed, least, most);
   const std::shared_ptr<std::byte[]> bytes = allocate_bytes(4 * pixels, packed.where());
   WebPDecoderConfig config;
   if (WebPInitDecoderConfig(&config) == 0) throw std::bad_alloc();

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -21,6 +22,9 @@ class GzipStream {
   /// The next `size` bytes, on top of those unpacked so far. Memory grows with what is really there.
   /// @throws UserError that names the byte of the packed file when it ends before or is damaged
   void unpack(std::uint64_t size);
+  /// What is left up to the end, on top of those unpacked so far, of at most 16 MB.
+  /// @throws UserError when it ends before, is damaged or goes on for longer
+  void unpack_rest();
   /// Unpacks what is left and drops it: only at its end has a stream its checksum.
   /// @throws UserError when it ends before, is damaged, or goes on much longer than what was unpacked
   void finish();
@@ -32,6 +36,8 @@ class GzipStream {
  private:
   struct State;
   int step();
+  /// Gives what is left to `take`, up to the end.
+  void read_on(const std::function<void(const std::byte* bytes, std::size_t size)>& take);
   std::unique_ptr<State> state_;
 };
 
@@ -47,8 +53,8 @@ struct RgbaImage {
   const std::byte* operator[](std::uint64_t pixel) const { return pixels.data() + 4 * pixel; }
 };
 
-/// Decodes a lossless WebP image.
-/// @throws UserError when it is none, is damaged, or has fewer than `least` or more than `most` pixels
-RgbaImage unpack_webp(const FileBytes& packed, std::uint64_t least, std::uint64_t most);
+/// Decodes a lossless WebP image, or a .png of 8 bits a channel, whose values are taken as they are, whatever it says of gamma.
+/// @throws UserError when it is neither, is damaged, or has fewer than `least` or more than `most` pixels
+RgbaImage unpack_image(const FileBytes& packed, std::uint64_t least, std::uint64_t most);
 
 }  // namespace vrpipe

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <array>
+#include <cstring>
 #include <exception>
 #include <string>
 #include <utility>
@@ -24,11 +26,35 @@
 namespace vrpipe {
 namespace {
 
+constexpr char kGltfGaussians[] = "KHR_gaussian_splatting";
+constexpr std::uint64_t kMostGltfText = std::uint64_t{64} << 20U;
+
 PlyHeader header_of(const std::filesystem::path& path, const std::string& what, const std::string& export_remedy) {
   const InputFile file(path, what);
   std::string head(static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), kMaxPlyHeaderBytes)), '\0');
   file.read(0, head.data(), head.size());
   return read_ply_header(head, what, path.string(), export_remedy);
+}
+
+bool is_gltf(const std::string& extension) { return extension == ".gltf" || extension == ".glb"; }
+
+/// Whether a .glb or .gltf speaks of the extension for Gaussians, which it has to list.
+bool has_gltf_gaussians(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return false;
+  const InputFile file(path, "cannot read scene");
+  std::array<char, 20> head{};
+  std::uint64_t from = 0, size = file.size();
+  if (size >= head.size()) file.read(0, head.data(), head.size());
+  if (std::memcmp(head.data(), "glTF", 4) == 0) {
+    std::uint32_t text_bytes = 0;
+    std::memcpy(&text_bytes, &head[12], sizeof text_bytes);
+    from = head.size();
+    size = std::min<std::uint64_t>(text_bytes, size - from);
+  }
+  std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(size, kMostGltfText)), '\0');
+  file.read(from, text.data(), text.size());
+  return text.find(kGltfGaussians) != std::string::npos;
 }
 
 /// Leaves assimp the reader of one format: another one would be taken for a file that only looks like it.
@@ -52,9 +78,8 @@ void keep_one_reader(Assimp::Importer& importer, const std::string& extension) {
 
 Mesh import_mesh(const std::string& path, const std::string& extension, std::string bytes,
                  RejectedTriangles& rejected) {
-  const bool is_gltf = extension == ".gltf" || extension == ".glb";
   std::vector<std::uint64_t> triangles;
-  if (is_gltf) bytes = reduced_gltf(bytes, path, triangles);
+  if (is_gltf(extension)) bytes = reduced_gltf(bytes, path, triangles);
   if (extension == ".obj") bytes = reduced_obj(bytes, path, rejected);
   if (bytes.empty()) return {};
   if (extension == ".ply")
@@ -67,9 +92,9 @@ Mesh import_mesh(const std::string& path, const std::string& extension, std::str
     fail(path, files->failure().empty() ? importer.GetErrorString() : files->failure());
   }
   ColourRule rule = ColourRule::as_they_are;
-  if (is_gltf) rule = ColourRule::linear_and_product;
+  if (is_gltf(extension)) rule = ColourRule::linear_and_product;
   if (extension == ".obj" && files->others_read() == 0) rule = ColourRule::white_material;
-  if (is_gltf) rejected.index_out_of_range += triangles_left_out(*importer.GetScene(), triangles);
+  if (is_gltf(extension)) rejected.index_out_of_range += triangles_left_out(*importer.GetScene(), triangles);
   // The importer's scene is its own, and const for others alone.
   remove_bad_faces(const_cast<aiScene&>(*importer.GetScene()), path, rejected);
   const aiScene* const scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
@@ -81,7 +106,8 @@ Mesh import_mesh(const std::string& path, const std::string& extension, std::str
 
 bool is_mesh_file(const std::filesystem::path& path) {
   const std::string extension = extension_of(path);
-  if (extension == ".obj" || extension == ".gltf" || extension == ".glb") return true;
+  if (is_gltf(extension)) return !has_gltf_gaussians(path);
+  if (extension == ".obj") return true;
   if (extension != ".ply") return false;
   const PlyHeader header = header_of(path, "cannot read scene", "export the scene as a .ply");
   const PlyElement* const vertex = header.element("vertex");
@@ -92,7 +118,7 @@ bool is_mesh_file(const std::filesystem::path& path) {
 
 Mesh read_mesh(const std::filesystem::path& path, RejectedTriangles& rejected) {
   const std::string where = path.string(), extension = extension_of(path);
-  if (extension != ".obj" && extension != ".ply" && extension != ".gltf" && extension != ".glb") {
+  if (extension != ".obj" && extension != ".ply" && !is_gltf(extension)) {
     throw UserError(kCannotReadMesh, where,
                     extension.empty() ? "it has no extension" : "meshes of type `" + extension + "` are not supported",
                     "give an .obj, .ply, .gltf or .glb");
@@ -114,7 +140,9 @@ Mesh read_mesh(const std::filesystem::path& path, RejectedTriangles& rejected) {
                         std::to_string(here.index_out_of_range) + " have indices beyond the vertices, " +
                         std::to_string(here.degenerate) + " have no area; " + std::to_string(here.lines_and_points) +
                         " lines and points",
-                    "export it again, with faces");
+                    is_gltf(extension) && has_gltf_gaussians(path)
+                        ? "it has Gaussians (KHR_gaussian_splatting): give it as --scene"
+                        : "export it again, with faces");
   }
   rejected.not_finite += here.not_finite;
   rejected.index_out_of_range += here.index_out_of_range;

@@ -73,7 +73,8 @@ struct RejectedGaussians {
 struct SceneSummary {
   std::string name;
   std::uint64_t gaussians_total = 0;
-  std::uint64_t gaussians_visible = 0;  ///< in the draw
+  std::uint64_t gaussians_visible = 0;      ///< in the draw
+  std::uint64_t gaussians_compensated = 0;  ///< of the total, whose opacity is that of a splat without dilation
   RejectedGaussians rejected;
   std::uint64_t triangles = 0;           ///< of meshes, in the draws of each, clipped
   std::uint64_t triangles_rejected = 0;  ///< that cannot be drawn

@@ -7,6 +7,7 @@
 Python 3.8 and its standard library; the same bytes every time, but for what another zlib packs otherwise. The encoders are
 written from the formats' documents and know nothing of the readers.
 """
+import base64
 import gzip
 import heapq
 import io
@@ -17,6 +18,7 @@ import random
 import struct
 import sys
 import zipfile
+import zlib
 
 COUNT = 260  # of the scene: two chunks of 256 in a compressed .ply
 FEW = 24  # Gaussians of most files: the first ones of the scene
@@ -167,13 +169,13 @@ def spz_blocks(gaussians, version, degree):
     for g in gaussians:
         x, y, z = g["position"]
         for c in (x, -y, -z):
-            positions += struct.pack("<i", int(math.floor(c * 4096 + 0.5)))[:3]
+            positions += struct.pack("<e", c) if version == 1 else struct.pack("<i", int(math.floor(c * 4096 + 0.5)))[:3]
         alphas += bytes([code(255 * opacity(g), 255)])
         colours += bytes([code((c * 0.15 + 0.5) * 255, 255) for c in g["f_dc"]])
         scales += bytes([code((s + 10) * 16, 255) for s in g["log_scale"]])
         w, x, y, z = unit(g["rotation"])
         q = [x, -y, -z, w]
-        if version == 2:
+        if version <= 2:
             sign = -1 if w < 0 else 1
             rotations += bytes([code((sign * c + 1) * 127.5, 255) for c in q[:3]])
         else:
@@ -189,9 +191,10 @@ def spz_blocks(gaussians, version, degree):
     return [positions, alphas, colours, scales, rotations, rest]
 
 
-def spz(gaussians, version, degree):
-    return struct.pack("<4sIIBBBB", b"NGSP", version, len(gaussians), degree, 12, 0, 0) + b"".join(
-        spz_blocks(gaussians, version, degree))
+def spz(gaussians, version, degree, extension=b""):
+    flags = 2 if extension else 0
+    return struct.pack("<4sIIBBBB", b"NGSP", version, len(gaussians), degree, 12, flags, 0) + b"".join(
+        spz_blocks(gaussians, version, degree)) + extension
 
 
 def zstd_frame(content):
@@ -390,10 +393,19 @@ def constant_webp(width, height):
     return small[:21] + struct.pack("<I", word & ~0xFFFFFFF | sides) + small[25:]
 
 
-def image(pixels):
+def png(pixels, width):
+    """The same, with a gamma that is not to be applied."""
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    rows = b"".join(b"\0" + bytes(c for p in pixels[i:i + width] for c in p) for i in range(0, len(pixels), width))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, len(pixels) // width, 8, 6, 0, 0, 0)) + chunk(
+        b"gAMA", struct.pack(">I", 100000)) + chunk(b"IDAT", zlib.compress(rows, 9)) + chunk(b"IEND", b"")
+
+
+def image(pixels, encode=webp):
     width = math.ceil(math.sqrt(len(pixels)))
     height = math.ceil(len(pixels) / width)
-    return webp(pixels + [(0, 0, 0, 255)] * (width * height - len(pixels)), width)
+    return encode(pixels + [(0, 0, 0, 255)] * (width * height - len(pixels)), width)
 
 
 # ----------------------------------------------------------------------------------------------------------------------- SOG
@@ -417,8 +429,13 @@ def codebook(values):
     return [number(v) for v in book], lambda value: min(range(256), key=lambda i: abs(book[i] - value))
 
 
-def sog(gaussians, version, degree):
+def sog(gaussians, version, degree, encode=webp):
     """{name: bytes} of meta.json and its images."""
+    kind = "." + encode.__name__
+
+    def pixels(image_of):
+        return image(image_of, encode)
+
     def folded(value):
         return math.copysign(math.log(abs(value) + 1), value)
 
@@ -430,16 +447,16 @@ def sog(gaussians, version, degree):
     low, high = ends(lambda g: [folded(c) for c in g["position"]], 3)
     means = [[code((folded(g["position"][i]) - low[i]) / (high[i] - low[i]) * 65535, 65535) for i in range(3)]
              for g in gaussians]
-    files["means_l.webp"] = image([tuple(c & 255 for c in m) + (255,) for m in means])
-    files["means_u.webp"] = image([tuple(c >> 8 for c in m) + (255,) for m in means])
+    files["means_l" + kind] = pixels([tuple(c & 255 for c in m) + (255,) for m in means])
+    files["means_u" + kind] = pixels([tuple(c >> 8 for c in m) + (255,) for m in means])
     rotations = []
     for g in gaussians:
         largest, others = largest_left_out(unit(g["rotation"]))
         rotations.append(tuple(code((c * math.sqrt(2) + 1) / 2 * 255, 255) for c in others) + (252 + largest,))
-    files["quats.webp"] = image(rotations)
+    files["quats" + kind] = pixels(rotations)
     meta = {"means": {"mins": [number(c) for c in low], "maxs": [number(c) for c in high],
-                      "files": ["means_l.webp", "means_u.webp"]},
-            "scales": {"files": ["scales.webp"]}, "quats": {"files": ["quats.webp"]}, "sh0": {"files": ["sh0.webp"]}}
+                      "files": ["means_l" + kind, "means_u" + kind]},
+            "scales": {"files": ["scales" + kind]}, "quats": {"files": ["quats" + kind]}, "sh0": {"files": ["sh0" + kind]}}
     if version == 2:
         meta = dict({"version": 2, "count": len(gaussians), "antialias": False}, **meta)
         meta["scales"]["codebook"], scale_code = codebook([s for g in gaussians for s in g["log_scale"]])
@@ -457,13 +474,13 @@ def sog(gaussians, version, degree):
         meta["quats"]["encoding"] = "quaternion_packed"
         scales = [s + (255,) for s in lerped("scales", lambda g: g["log_scale"], 3)]
         colours = lerped("sh0", lambda g: g["f_dc"] + [g["opacity_logit"]], 4)
-    files["scales.webp"] = image(scales)
-    files["sh0.webp"] = image(colours)
+    files["scales" + kind] = pixels(scales)
+    files["sh0" + kind] = pixels(colours)
     if k:
         entries = 70  # more than a row; those that nobody names are grey
         place = [(37 * i + 5) % entries for i in range(len(gaussians))]
         values = [v for g in gaussians for channel in g["f_rest"] for v in channel[:k]]
-        rest = {"files": ["shN_centroids.webp", "shN_labels.webp"]}
+        rest = {"files": ["shN_centroids" + kind, "shN_labels" + kind]}
         if version == 2:
             rest.update({"count": entries, "bands": degree})
             rest["codebook"], rest_code = codebook(values)
@@ -477,8 +494,8 @@ def sog(gaussians, version, degree):
         for g, p in zip(gaussians, place):
             for j in range(k):
                 centroids[p // 64 * 64 * k + p % 64 * k + j] = tuple(rest_code(g["f_rest"][i][j]) for i in range(3)) + (255,)
-        files["shN_centroids.webp"] = webp(centroids, 64 * k)
-        files["shN_labels.webp"] = image([(p & 255, p >> 8, 0, 255) for p in place])
+        files["shN_centroids" + kind] = encode(centroids, 64 * k)
+        files["shN_labels" + kind] = pixels([(p & 255, p >> 8, 0, 255) for p in place])
         meta["shN"] = rest
     files["meta.json"] = json.dumps(meta, separators=(",", ":")).encode()
     return files
@@ -519,6 +536,50 @@ def streamed_sog(scene, degree=1):
     return files, orders
 
 
+# ---------------------------------------------------------------------------------------------------------------------- glTF
+def gltf(gaussians, degree, logarithms=False, **node):
+    """The document of KHR_gaussian_splatting, and its buffer; `node`: how its one node places it."""
+    attributes, accessors, views, buffer = {}, [], [], b""
+
+    def add(name, values):
+        nonlocal buffer
+        shape = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}[len(values[0])]
+        data = b"".join(struct.pack("<%df" % len(v), *v) for v in values)
+        attributes[name] = len(accessors)
+        accessors.append({"bufferView": len(views), "componentType": 5126, "count": len(values), "type": shape})
+        views.append({"buffer": 0, "byteOffset": len(buffer), "byteLength": len(data)})
+        buffer += data
+
+    khr = "KHR_gaussian_splatting:"
+    add("POSITION", [g["position"] for g in gaussians])
+    add(khr + "ROTATION", [g["rotation"][1:] + g["rotation"][:1] for g in gaussians])
+    add(khr + "SCALE", [g["log_scale"] if logarithms else [math.exp(s) for s in g["log_scale"]] for g in gaussians])
+    add(khr + "OPACITY", [[opacity(g)] for g in gaussians])
+    add(khr + "SH_DEGREE_0_COEF_0", [g["f_dc"] for g in gaussians])
+    for c in range(REST[degree]):
+        band = int(math.sqrt(c + 1))
+        add(khr + "SH_DEGREE_%d_COEF_%d" % (band, c + 1 - band * band),
+            [[g["f_rest"][channel][c] for channel in range(3)] for g in gaussians])
+    extension = {"kernel": "ellipse", "colorSpace": "srgb_rec709_display", "projection": "perspective", "sortingMethod": "zDepth"}
+    document = {
+        "asset": {"version": "2.0"}, "extensionsUsed": ["KHR_gaussian_splatting"], "scene": 0, "scenes": [{"nodes": [0]}],
+        "nodes": [dict(mesh=0, **node)],
+        "meshes": [{"primitives": [{"mode": 0, "attributes": attributes, "extensions": {"KHR_gaussian_splatting": extension}}]}],
+        "accessors": accessors, "bufferViews": views, "buffers": [{"byteLength": len(buffer)}]}
+    return document, buffer
+
+
+def glb(document, buffer):
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(buffer), b"BIN\0") + buffer
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def gltf_text(document, uri):
+    return json.dumps(dict(document, buffers=[dict(document["buffers"][0], uri=uri)]), separators=(",", ":")).encode()
+
+
 # ---------------------------------------------------------------------------------------------------------------------- all
 def bundle(files, first):
     """Several files as one, as tests/fuzz/exercise.h has it."""
@@ -533,17 +594,25 @@ def write_seeds(folder):
     streamed = streamed_sog(scene, 0)[0]
     seeds = {
         "inria_ply": {"sh0": inria_ply(three, 0), "sh1": inria_ply(three, 1), "sh3": inria_ply(three, 3),
+                      "anti_aliased": inria_ply(three, 0).replace(b"element", b"comment SplatRenderMode: mip\nelement", 1),
                       "z_up": inria_ply(three, 0).replace(b"element", b"comment Vertical Axis: z\nelement", 1)},
         "compressed_ply": {"12_columns": compressed_ply(three, 12, 0), "18_columns": compressed_ply(three, 18, 0),
                            "sh1": compressed_ply(three, 18, 1)},
         "splat": {"three": splat(three)},
-        "spz": {"v2": gzip.compress(spz(three, 2, 1), 9, mtime=0), "v2_bare": spz(three, 2, 0),
+        "spz": {"v1": gzip.compress(spz(three, 1, 1), 9, mtime=0), "v4_axes": spz4(three, 3, struct.pack("<III", 0xADBE0003, 4, 12)),
+                "v3_axes": gzip.compress(spz(three, 3, 1, struct.pack("<III", 0xADBE0003, 4, 6)), 9, mtime=0),
+                "v2": gzip.compress(spz(three, 2, 1), 9, mtime=0), "v2_bare": spz(three, 2, 0),
                 "v3_bare": spz(three, 3, 3), "v4": spz4(three, 0), "v4_sh4": spz4(three, 4, extension)},
         "ksplat": {"level0": ksplat(three, 0, 0, [(0, [3], 0)]), "level1": ksplat(three, 1, 1, [(0, [2, 1], 0)]),
                    "level2": ksplat(scene[:10], 2, 2, [(1, [1], 1), (0, [1], 0)])},
         "sog": {"v1": bundle(sog(three, 1, 0), "meta.json"), "v1_sh1": bundle(sog(three, 1, 1), "meta.json"),
                 "v2": bundle(sog(three, 2, 0), "meta.json"), "v2_sh2": bundle(sog(three, 2, 2), "meta.json"),
+                "v2_png": bundle(sog(three, 2, 1, png), "meta.json"),
                 "v1_zip": zipped(sog(three, 1, 0), "", zipfile.ZIP_DEFLATED), "v2_zip": zipped(sog(three, 2, 1))},
+        "gltf": {"glb": glb(*gltf(three, 1)), "logarithms": glb(*gltf(three, 0, True)),
+                 "turned": glb(*gltf(three, 3, rotation=[0.5, 0.5, 0.5, 0.5], scale=[2, 2, 2], translation=[1000, 0, 3])),
+                 "embedded": gltf_text(gltf(three, 0)[0], "data:application/octet-stream;base64," + base64.b64encode(
+                     gltf(three, 0)[1]).decode())},
         "streamed_sog": {"lod0": bundle(streamed, "lod-meta.json") + b"\0", "lod1": bundle(streamed, "lod-meta.json") + b"\1"}}
     # Attacks; tests/formats/hostile_test.cpp says what is expected of each.
     bomb = struct.pack("<4sIIBBBB", b"NGSP", 3, 3, 0, 12, 0, 0) + b"".join(spz_blocks(three, 3, 0)) + bytes(17 << 20)
@@ -615,6 +684,7 @@ def main():
 
     coarse = {"position": 0.5 / 4096, "log_scale": 0.5 / 16, "opacity": byte, "f_dc": byte / 0.15, "f_rest": 0.5 / 128}
     for name, content, degree, rotation in (
+            ("v1.spz", gzip.compress(spz(few, 1, 0), 9, mtime=0), 0, 0.1),
             ("v2_sh1.spz", gzip.compress(spz(few, 2, 1), 9, mtime=0), 1, 0.1),
             ("v2_bare.spz", spz(few, 2, 0), 0, 0.1),
             ("v3.spz", gzip.compress(spz(few, 3, 0), 9, mtime=0), 0, 0.003),
@@ -624,7 +694,7 @@ def main():
             ("v4_sh3.spz", spz4(few, 3, struct.pack("<II", 0x11223344, 4) + b"none"), 3, 0.003),
             ("v4_sh4.spz", spz4(few, 4), 3, 0.003)):
         write(name, content)
-        expect(name, "Niantic .spz", degree, dict(coarse, rotation=rotation))
+        expect(name, "Niantic .spz", degree, dict(coarse, rotation=rotation, position=20 / 2 ** 12 if name == "v1.spz" else 0.5 / 4096))
 
     one, two = [(2, [5, 3], 0)], [(1, [5, 3], 2), (0, [8], 0)]
     for level in range(3):
@@ -663,6 +733,23 @@ def main():
     for name, content in sog(few, 2, 2).items():
         write("sog/" + name, content)
     expect("sog", "PlayCanvas SOG", 2, sog_tolerance(2, few, 2))
+
+    for name, content in sog(few, 2, 1, png).items():
+        write("sog_png/" + name, content)
+    expect("sog_png", "PlayCanvas SOG", 1, sog_tolerance(2, few, 1))
+
+    linear = {"log_scale": 1e-6, "rotation": 1e-6, "opacity": 1e-6}
+    document, buffer = gltf(few, 3)
+    write("linear_sh3.glb", glb(document, buffer))
+    expect("linear_sh3.glb", "glTF KHR_gaussian_splatting", 3, linear)
+    write("logarithms.glb", glb(*gltf(few, 0, True)))
+    expect("logarithms.glb", "glTF KHR_gaussian_splatting", 0, dict(linear, log_scale=0))
+    document, buffer = gltf(few, 1)
+    write("apart/buffer 1.bin", buffer)
+    write("apart/scene.gltf", gltf_text(document, "buffer%201.bin"))
+    expect("apart/scene.gltf", "glTF KHR_gaussian_splatting", 1, linear)
+    write("embedded.gltf", gltf_text(document, "data:application/octet-stream;base64," + base64.b64encode(buffer).decode()))
+    expect("embedded.gltf", "glTF KHR_gaussian_splatting", 1, linear)
 
     files, orders = streamed_sog(scene)
     for name, content in files.items():

@@ -43,9 +43,12 @@ std::vector<GaussianFormat> gaussian_formats();
 /// @throws UserError when the file cannot be read, is in no known format, is cut short or damaged, or is written meanwhile
 GaussianFile read_gaussian_file(const std::string& text);
 
-/// Writes in the format of the name's extension. The file appears complete or not at all.
+/// Writes in the format of the name's extension, with what the file says beside its Gaussians as far as the format can say it.
+/// The file appears complete or not at all.
 /// @return what of the scene is not in the file, a sentence each
 /// @throws UserError when it cannot be written, or no format with this extension is written
+std::vector<std::string> write_gaussian_file(const std::filesystem::path& path, const GaussianFile& scene);
+/// Gaussians of which nothing else is to be said.
 std::vector<std::string> write_gaussian_file(const std::filesystem::path& path, const GaussianScene& scene);
 
 /// The file that `text` names, without what follows `#`.

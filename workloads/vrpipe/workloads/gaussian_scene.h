@@ -78,6 +78,9 @@ class GaussianScene {
   /// Where in the world positions of Gaussians count from: not zero for a scene of double positions far from the world's origin.
   const std::array<double, 3>& origin() const { return origin_; }
   void set_origin(const std::array<double, 3>& origin) { origin_ = origin; }
+  /// Whether it was trained anti-aliased, so that PreprocessOptions::opacity_compensation is how it is meant to be drawn.
+  bool compensates_opacity() const { return compensates_opacity_; }
+  void set_compensates_opacity(bool compensates) { compensates_opacity_ = compensates; }
   /// Of one of its Gaussians, rounded to single precision.
   std::array<float, 3> world_position(const GaussianRef& gaussian) const {
     std::array<float, 3> position = gaussian.position();
@@ -108,6 +111,7 @@ class GaussianScene {
   std::shared_ptr<const GaussianLayout> layout_ = std::make_shared<const GaussianLayout>();
   int sh_degree_ = 0;
   std::array<double, 3> origin_{};
+  bool compensates_opacity_ = false;
 };
 
 /// The attributes of a Gaussian to add to a scene; f_rest[channel][coefficient - 1], unused ones are ignored.
