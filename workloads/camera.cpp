@@ -86,49 +86,10 @@ std::size_t find_by_name(const std::vector<Camera>& cameras, const std::string& 
                   other_cameras(cameras, name));
 }
 
-}  // namespace
-
-void check_image_size(std::uint64_t width, std::uint64_t height, const std::string& where) {
-  if (width >= 1 && width <= kMaxImageSize && height >= 1 && height <= kMaxImageSize) return;
-  throw UserError("cannot use image size", where, "it is " + std::to_string(width) + "x" + std::to_string(height),
-                  "both sides must be 1 to " + std::to_string(kMaxImageSize));
-}
-
-void check_camera(const Camera& camera, const std::string& what) {
-  check_image_size(camera.width, camera.height, "camera");
-  const float near_plane = camera.near_plane, far_plane = camera.far_plane;
-  bool good = camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy);
-  good = good && near_plane >= kMinNearPlane && near_plane < far_plane && std::isfinite(far_plane);
-  for (std::size_t i = 0; i < 3; ++i) {
-    good = good && std::isfinite(camera.eye[i]);
-    for (std::size_t k = 0; k < 3; ++k) good = good && std::fabs(camera.rotation[i][k]) <= 2;
-  }
-  if (!good) {
-    throw UserError(what, "camera",
-                    "an element is not finite, a focal length is not above 0, the near plane is below 1e-6, or the far "
-                    "plane is not beyond it",
-                    "make it with look_at or load_cameras");
-  }
-}
-
-Vec3 camera_space(const Camera& camera, const Vec3& world) {
-  // The eye is subtracted in double, so a scene far from the origin loses nothing.
-  const Vec3 offset = world - camera.eye;
-  Vec3 seen;
-  for (std::size_t i = 0; i < 3; ++i) {
-    seen[i] = dot(Vec3{camera.rotation[0][i], camera.rotation[1][i], camera.rotation[2][i]}, offset);
-  }
-  return seen;
-}
-
-double window_depth(const Camera& camera, double z) {
-  const double near_plane = camera.near_plane, far_plane = camera.far_plane;
-  const double depth = far_plane / (far_plane - near_plane) * (1.0 - near_plane / z);
-  return std::min(1.0, std::max(0.0, depth));
-}
-
-Camera look_at(const Vec3& eye, const Vec3& target, const Vec3& up, double fovy_degrees, std::uint32_t width,
-               std::uint32_t height) {
+/// @param up_source  as View has it
+Camera camera_at(const Vec3& eye, const Vec3& target, const Vec3& up, double fovy_degrees, ImageSize size,
+                 const std::string& up_source) {
+  const auto [width, height] = size;
   check_image_size(width, height, "--size");
   if (!all_finite(eye)) throw UserError(kCannotUseCamera, "--eye", "a component is not finite", "give three numbers");
   if (!all_finite(target))
@@ -148,8 +109,13 @@ Camera look_at(const Vec3& eye, const Vec3& target, const Vec3& up, double fovy_
   if (dot(unit_up, unit_up) == 0) throw UserError(kCannotUseCamera, "--up", "it has no direction", "give e.g. 0,-1,0");
   const Vec3 side = cross(forward, unit_up);
   if (!(dot(side, side) > 1e-20)) {
-    throw UserError(kCannotUseCamera, "--up", "it is parallel to the view from --eye to --look-at",
-                    "give another direction, e.g. 0,0,1");
+    const bool is_option = up_source == "--up";
+    throw UserError(kCannotUseCamera, up_source,
+                    fmt::format("{} is parallel to the view from --eye to --look-at",
+                                is_option ? "it"
+                                          : fmt::format("the up of its world, {:g},{:g},{:g},", up.x, up.y, up.z)),
+                    (is_option ? "give another direction, e.g. " : "give another, e.g. --up ") +
+                        up_for_view(eye, target));
   }
   const Vec3 right = normalized(side);
   const Vec3 down = cross(forward, right);
@@ -163,8 +129,79 @@ Camera look_at(const Vec3& eye, const Vec3& target, const Vec3& up, double fovy_
   return camera;
 }
 
+}  // namespace
+
+void check_image_size(std::uint64_t width, std::uint64_t height, const std::string& where) {
+  if (width >= 1 && width <= kMaxImageSize && height >= 1 && height <= kMaxImageSize) return;
+  throw UserError("cannot use image size", where, "it is " + std::to_string(width) + "x" + std::to_string(height),
+                  "both sides must be 1 to " + std::to_string(kMaxImageSize));
+}
+
+void check_camera(const Camera& camera, const std::string& what) {
+  check_image_size(camera.width, camera.height, "camera");
+  const float near_plane = camera.near_plane, far_plane = camera.far_plane;
+  bool good = camera.fx > 0 && camera.fy > 0 && std::isfinite(camera.fx) && std::isfinite(camera.fy);
+  // Not a NaN either.
+  good = good && std::fabs(camera.principal_x) <= kMaxPrincipalOffset &&
+         std::fabs(camera.principal_y) <= kMaxPrincipalOffset;
+  good = good && near_plane >= kMinNearPlane && near_plane < far_plane && std::isfinite(far_plane);
+  for (std::size_t i = 0; i < 3; ++i) {
+    good = good && std::isfinite(camera.eye[i]);
+    for (std::size_t k = 0; k < 3; ++k) good = good && std::fabs(camera.rotation[i][k]) <= 2;
+  }
+  if (!good) {
+    throw UserError(
+        what, "camera",
+        "an element is not finite, a focal length is not above 0, the principal point is more than 1e6 pixels "
+        "from the centre, the near plane is below 1e-6, or the far plane is not beyond it",
+        "make it with look_at or load_cameras");
+  }
+}
+
+Vec3 camera_space(const Camera& camera, const Vec3& world) {
+  // The eye is subtracted in double, so a scene far from the origin loses nothing.
+  const Vec3 offset = world - camera.eye;
+  Vec3 seen;
+  for (std::size_t i = 0; i < 3; ++i) {
+    seen[i] = dot(Vec3{camera.rotation[0][i], camera.rotation[1][i], camera.rotation[2][i]}, offset);
+  }
+  return seen;
+}
+
+double clip_w(const Camera& camera, double z) { return camera.projection == Projection::perspective ? z : 1.0; }
+
+double window_depth(const Camera& camera, double z) {
+  const double near_plane = camera.near_plane, far_plane = camera.far_plane;
+  const double depth = camera.projection == Projection::perspective
+                           ? far_plane / (far_plane - near_plane) * (1.0 - near_plane / z)
+                           : (z - near_plane) / (far_plane - near_plane);
+  return std::min(1.0, std::max(0.0, depth));
+}
+
+Camera look_at(const Vec3& eye, const Vec3& target, const Vec3& up, double fovy_degrees, std::uint32_t width,
+               std::uint32_t height) {
+  return camera_at(eye, target, up, fovy_degrees, {width, height}, View().up_source);
+}
+
 Camera look_at(const View& view, ImageSize size) {
-  return look_at(view.eye, view.look_at, view.up, view.fovy_degrees, size.width, size.height);
+  if (!view.orthographic_height) {
+    return camera_at(view.eye, view.look_at, view.up, view.fovy_degrees, size, view.up_source);
+  }
+  const double height = *view.orthographic_height;
+  if (!(height >= kMinOrthographicHeight && height <= kMaxOrthographicHeight)) {
+    throw UserError(kCannotUseCamera, "--orthographic", fmt::format("the image is {:g} world units high", height),
+                    fmt::format("give {:g} to {:g}", kMinOrthographicHeight, kMaxOrthographicHeight));
+  }
+  Camera camera = camera_at(view.eye, view.look_at, view.up, View().fovy_degrees, size, view.up_source);
+  camera.projection = Projection::orthographic;
+  camera.fx = camera.fy = size.height / height;
+  return camera;
+}
+
+std::string up_for_view(const Vec3& eye, const Vec3& target) {
+  const Vec3 forward = normalized(0.5 * target - 0.5 * eye);
+  // Up as INRIA's worlds have it, else what is level in them.
+  return std::fabs(forward.y) < 0.9 ? "0,-1,0" : "0,0,1";
 }
 
 Camera resized(const Camera& camera, ImageSize size) {
@@ -173,6 +210,8 @@ Camera resized(const Camera& camera, ImageSize size) {
   const double scale = static_cast<double>(size.height) / camera.height;
   result.fx *= scale;
   result.fy *= scale;
+  result.principal_x *= scale;
+  result.principal_y *= scale;
   result.width = size.width;
   result.height = size.height;
   return result;
@@ -193,11 +232,11 @@ std::vector<View> orbit_views(const View& view, std::size_t count) {
   return views;
 }
 
-std::vector<Camera> load_cameras(const std::string& path) {
+std::vector<Camera> load_cameras(const std::string& path, Lenses lenses) {
   const CameraSource source(path);
   std::string known;
   for (const CameraFormat& format : camera_formats()) {
-    if (format.recognises(source)) return format.read(source);
+    if (format.recognises(source)) return format.read(source, lenses);
     known += fmt::format("{}{} ({})", known.empty() ? "" : ", ", format.name, format.looks_like);
   }
   if (source.complaint()) throw UserError(*source.complaint());
@@ -222,9 +261,9 @@ CameraChoice camera_choice(const std::string& text) {
   return {text.substr(0, mark), text.substr(mark + 1)};
 }
 
-NamedCamera camera_from_file(const std::string& text, const std::optional<ImageSize>& size) {
+NamedCamera camera_from_file(const std::string& text, const std::optional<ImageSize>& size, Lenses lenses) {
   const CameraChoice choice = camera_choice(text);
-  const std::vector<Camera> cameras = load_cameras(choice.file);
+  const std::vector<Camera> cameras = load_cameras(choice.file, lenses);
   const std::string where = "--camera " + text;
   const std::string camera = choice.camera.value_or("0");
   if (camera.empty()) {

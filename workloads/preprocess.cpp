@@ -60,8 +60,12 @@ class Projector {
     for (std::size_t i = 0; i < 3; ++i) {
       world_to_camera_[i] = {camera.rotation[0][i], camera.rotation[1][i], camera.rotation[2][i]};
     }
+    // Without perspective, a projection has no third column: the ray is taken as 0.
+    if (camera.projection == Projection::orthographic) return;
     limit_x_ = 1.3 * (0.5 * camera.width / camera.fx);
     limit_y_ = 1.3 * (0.5 * camera.height / camera.fy);
+    middle_x_ = -camera.principal_x / camera.fx;
+    middle_y_ = -camera.principal_y / camera.fy;
   }
 
   /// Whether a Gaussian is visible, and its camera z. Does without its ellipse where its centre is in the image.
@@ -74,8 +78,9 @@ class Projector {
     const Vec3 offset = eye_to(gaussian);
     const double z = dot(world_to_camera_[2], offset);
     if (!(z > static_cast<double>(camera_.near_plane))) return false;
-    const double x = camera_.fx * (dot(world_to_camera_[0], offset) / z);
-    const double y = camera_.fy * (dot(world_to_camera_[1], offset) / z);
+    const double w = clip_w(camera_, z);
+    const double x = camera_.principal_x + camera_.fx * (dot(world_to_camera_[0], offset) / w);
+    const double y = camera_.principal_y + camera_.fy * (dot(world_to_camera_[1], offset) / w);
     // An extent that is limited moves the centre less than it still reaches, so project() says the same.
     if (std::fabs(x) < 0.5 * camera_.width && std::fabs(y) < 0.5 * camera_.height) {
       depth = to_float(z);
@@ -95,10 +100,11 @@ class Projector {
     float opacity = opacity_of(gaussian);
     if (!(opacity >= kPruneThreshold)) return false;
 
-    const double ray_x = dot(world_to_camera_[0], offset) / z;
-    const double ray_y = dot(world_to_camera_[1], offset) / z;
+    const double w = clip_w(camera_, z);
+    const double ray_x = dot(world_to_camera_[0], offset) / w;
+    const double ray_y = dot(world_to_camera_[1], offset) / w;
     Vec3 m1, m2;
-    covariance_factor(gaussian, z, ray_x, ray_y, m1, m2);
+    covariance_factor(gaussian, w, ray_x, ray_y, m1, m2);
     const EllipseAxes ellipse = decompose_covariance(m1, m2, dilation_);
     if (compensates_opacity_) {
       opacity = compensated_opacity(gaussian, m1, m2);
@@ -108,7 +114,7 @@ class Projector {
     const double r = half_extent_in_sigmas(opacity);
     const double half_width = 0.5 * camera_.width, half_height = 0.5 * camera_.height;
     // Centre relative to the image's centre, along the ellipse's axes: there an extent can be limited exactly.
-    const double x = camera_.fx * ray_x, y = camera_.fy * ray_y;
+    const double x = camera_.principal_x + camera_.fx * ray_x, y = camera_.principal_y + camera_.fy * ray_y;
     double along_a = x * ellipse.axis_x + y * ellipse.axis_y;
     double along_b = y * ellipse.axis_x - x * ellipse.axis_y;
     double extent_a = std::sqrt(ellipse.lambda1) * r;
@@ -165,10 +171,10 @@ class Projector {
   }
 
   /// Rows of M = J W R S with Sigma = M M^T: the Jacobian of the projection, the view, the Gaussian's axes.
-  void covariance_factor(const GaussianRef& gaussian, double z, double ray_x, double ray_y, Vec3& m1, Vec3& m2) const {
-    const double x = std::min(limit_x_, std::max(-limit_x_, ray_x));
-    const double y = std::min(limit_y_, std::max(-limit_y_, ray_y));
-    const double focal_x = camera_.fx / z, focal_y = camera_.fy / z;
+  void covariance_factor(const GaussianRef& gaussian, double w, double ray_x, double ray_y, Vec3& m1, Vec3& m2) const {
+    const double x = std::min(middle_x_ + limit_x_, std::max(middle_x_ - limit_x_, ray_x));
+    const double y = std::min(middle_y_ + limit_y_, std::max(middle_y_ - limit_y_, ray_y));
+    const double focal_x = camera_.fx / w, focal_y = camera_.fy / w;
     // Rows of J W.
     const Vec3 j1 = focal_x * (world_to_camera_[0] - x * world_to_camera_[2]);
     const Vec3 j2 = focal_y * (world_to_camera_[1] - y * world_to_camera_[2]);
@@ -192,7 +198,8 @@ class Projector {
   const Camera& camera_;
   const Vec3 eye_;
   std::array<Vec3, 3> world_to_camera_;  ///< rows: right, down, forward
-  double limit_x_, limit_y_;
+  /// INRIA's limit of rays in the Jacobian, 1.3 times the tangent of half the field of view on both sides of the image's middle.
+  double middle_x_ = 0, middle_y_ = 0, limit_x_ = 0, limit_y_ = 0;
   const double dilation_;  ///< pixels^2
   const bool compensates_opacity_;
 };

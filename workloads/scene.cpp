@@ -28,8 +28,13 @@ const std::string kBuiltinPrefix = "builtin:";
 View with_options(View view, const SceneRequest& request) {
   if (request.eye) view.eye = *request.eye;
   if (request.look_at) view.look_at = *request.look_at;
-  if (request.up) view.up = *request.up;
+  view.up_source = scene_name(request.scene);
+  if (request.up) {
+    view.up = *request.up;
+    view.up_source = View().up_source;
+  }
   if (request.fovy_degrees) view.fovy_degrees = *request.fovy_degrees;
+  view.orthographic_height = request.orthographic_height;
   return view;
 }
 
@@ -39,7 +44,9 @@ View automatic_view(const std::string& path, const GaussianFile& file, const Sce
   const GaussianScene& scene = file.gaussians;
   View view;
   view.up = request.up.value_or(file.up);
+  if (!request.up) view.up_source = path;
   if (request.fovy_degrees) view.fovy_degrees = *request.fovy_degrees;
+  view.orthographic_height = request.orthographic_height;
   // Quantiles of a sample: trained scenes hold a few Gaussians very far out.
   constexpr std::uint64_t kSample = 100000;
   const std::uint64_t step = scene.size() / kSample + 1;
@@ -105,6 +112,8 @@ void refuse(bool given, const std::string& option, const std::string& why, const
 }
 
 void check_view_options(const SceneRequest& request) {
+  refuse(request.fovy_degrees && request.orthographic_height, "--fovy", "--orthographic is without perspective",
+         "give one or the other");
   if (!request.camera) return;
   const std::string why = "--camera gives a whole camera";
   const std::string remedy = "give one or the other";
@@ -112,6 +121,7 @@ void check_view_options(const SceneRequest& request) {
   refuse(request.look_at.has_value(), "--look-at", why, remedy);
   refuse(request.up.has_value(), "--up", why, remedy);
   refuse(request.fovy_degrees.has_value(), "--fovy", why, remedy);
+  refuse(request.orthographic_height.has_value(), "--orthographic", why, remedy);
 }
 
 LoadedScene load_draw_list(const std::string& path, const SceneRequest& request) {
@@ -123,6 +133,7 @@ LoadedScene load_draw_list(const std::string& path, const SceneRequest& request)
   refuse(request.look_at.has_value(), "--look-at", why, remedy);
   refuse(request.up.has_value(), "--up", why, remedy);
   refuse(request.fovy_degrees.has_value(), "--fovy", why, remedy);
+  refuse(request.orthographic_height.has_value(), "--orthographic", why, remedy);
   refuse(!request.meshes.empty(), "--mesh", "a .spl is a draw list, which has no camera and no depth", remedy);
   const std::string preprocessed = "a .spl is a draw list, preprocessed already";
   const PreprocessOptions untouched;
@@ -145,7 +156,7 @@ LoadedScene load_draw_list(const std::string& path, const SceneRequest& request)
 template <class MakeView>
 Viewpoint viewpoint(const SceneRequest& request, ImageSize default_size, const MakeView& make_view) {
   if (request.camera) {
-    NamedCamera named = camera_from_file(*request.camera, request.size);
+    NamedCamera named = camera_from_file(*request.camera, request.size, request.lenses);
     return {std::move(named.camera), {}, std::move(named.name)};
   }
   const View view = make_view();
@@ -268,6 +279,8 @@ LoadedScene preprocess_scene(const OpenedScene& scene, const PreprocessOptions& 
     }
     loaded.summary.triangles_rejected = loaded.rejected_triangles.total();
     loaded.summary.notes = scene.notes;
+    const std::vector<std::string>& of_camera = scene.viewpoint.camera.notes;
+    loaded.summary.notes.insert(loaded.summary.notes.end(), of_camera.begin(), of_camera.end());
     loaded.viewpoint = scene.viewpoint;
     loaded.preprocessed_here = true;
   }

@@ -44,13 +44,15 @@ TEST(WindowDepth, IsExactlyZeroAndOneAtThePlanesAndClampedBeyond) {
   }
 }
 
-TEST(ProjectMesh, PutsAVertexAndAGaussiansCentreAtTheSamePixelAndDepthToTheBit) {
-  const Camera camera = tilted_camera();
+/// A vertex and a Gaussian's centre, at one point of the world.
+void expect_at_the_same_pixel(const Camera& camera) {
+  const bool is_perspective = camera.projection == Projection::perspective;
   testing::Numbers random(2);
   int compared = 0;
   for (int i = 0; i < 500; ++i) {
     const double z = random.uniform(0.5, 40);
-    const auto seen = [&] { return Vec3{random.uniform(-0.4, 0.4) * z, random.uniform(-0.4, 0.4) * z, z}; };
+    const double wide = is_perspective ? z : 1;
+    const auto seen = [&] { return Vec3{random.uniform(-0.4, 0.4) * wide, random.uniform(-0.4, 0.4) * wide, z}; };
     GaussianAttributes gaussian = testing::ordinary_gaussian();
     gaussian.position = testing::world_of(camera, seen());
     SceneSummary summary;
@@ -68,6 +70,67 @@ TEST(ProjectMesh, PutsAVertexAndAGaussiansCentreAtTheSamePixelAndDepthToTheBit) 
     ++compared;
   }
   EXPECT_EQ(compared, 500);
+}
+
+TEST(ProjectMesh, PutsAVertexAndAGaussiansCentreAtTheSamePixelAndDepthToTheBit) {
+  Camera camera = tilted_camera();
+  expect_at_the_same_pixel(camera);
+  camera.principal_x = 5.25;
+  camera.principal_y = -7.5;
+  expect_at_the_same_pixel(camera);
+  camera.projection = Projection::orthographic;
+  expect_at_the_same_pixel(camera);
+}
+
+TEST(ProjectMesh, WithoutPerspectiveWIsOneAndTheGuardBandIsCutParallel) {
+  Camera camera = look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 90, 64, 64);
+  camera.projection = Projection::orthographic;
+  camera.fx = camera.fy = 4;
+  camera.principal_x = 10;
+  camera.near_plane = 1;
+  camera.far_plane = 9;
+  Mesh mesh;
+  add_triangle(mesh, {{{-1, -1, 3}, {1, -1, 5}, {0, 1, 9}}});
+  add_triangle(mesh, {{{-1, -1, 0}, {1, -1, 0}, {0, 1, 2}}});       // cut by the near plane
+  add_triangle(mesh, {{{0, 0, 2}, {90000, 0, 4}, {0, 90000, 4}}});  // and by the guard band
+  RejectedTriangles rejected;
+  const Draw draw = project_mesh(mesh, camera, rejected);
+  ASSERT_GE(draw.mesh.size(), 3U);
+  const auto& v = draw.mesh[0].vertices;
+  EXPECT_EQ(v[0].x, 38);  // 42 - 4
+  EXPECT_EQ(v[0].y, 28);
+  EXPECT_EQ(v[1].x, 46);
+  EXPECT_EQ(v[0].depth, 0.25F);
+  EXPECT_EQ(v[1].depth, 0.5F);
+  EXPECT_EQ(v[2].depth, 1);
+  double least_depth = 1;
+  float farthest = 0;
+  for (const MeshTriangle& triangle : draw.mesh) {
+    for (const MeshVertex& vertex : triangle.vertices) {
+      EXPECT_EQ(vertex.inverse_w, 1);
+      least_depth = std::min<double>(least_depth, vertex.depth);
+      farthest = std::max({farthest, vertex.x, vertex.y});
+    }
+  }
+  EXPECT_EQ(least_depth, 0);
+  EXPECT_EQ(farthest, 32768);
+}
+
+TEST(ProjectMesh, APrincipalPointMovesTheGuardBandWithTheImage) {
+  Camera camera = look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 90, 64, 64);
+  camera.principal_x = 1000;
+  Mesh mesh;
+  add_triangle(mesh, {{{-90000, -1, 4}, {90000, -1, 4}, {0, 1, 4}}});
+  RejectedTriangles rejected;
+  float left = 0, right = 0;
+  for (const MeshTriangle& triangle : project_mesh(mesh, camera, rejected).mesh) {
+    for (const MeshVertex& vertex : triangle.vertices) {
+      left = std::min(left, vertex.x);
+      right = std::max(right, vertex.x);
+    }
+  }
+  EXPECT_EQ(left, -32768);
+  EXPECT_EQ(right, 32768);
 }
 
 TEST(ProjectMesh, AGaussianBeyondTheFarPlaneHasDepthOne) {

@@ -133,6 +133,9 @@ void expect_same(const std::vector<Camera>& cameras, const std::vector<Camera>& 
     EXPECT_EQ(camera.height, other.height);
     EXPECT_NEAR(camera.fx, other.fx, 1e-9 * other.fx);
     EXPECT_NEAR(camera.fy, other.fy, 1e-9 * other.fy);
+    EXPECT_EQ(camera.cx(), other.cx());
+    EXPECT_EQ(camera.cy(), other.cy());
+    EXPECT_EQ(camera.projection, other.projection);
     EXPECT_LE(glm::length(camera.eye - other.eye), 1e-12);
     for (std::size_t row = 0; row < 3; ++row) {
       EXPECT_LE(glm::length(camera.rotation[row] - other.rotation[row]), 1e-12) << "row " << row;
@@ -191,6 +194,165 @@ TEST_F(CameraFiles, RealInriaCamerasAreTheSameAsTransforms) {
   expect_same(load_cameras(write_json(document)), real);
 }
 
+// Principal points.
+
+TEST_F(CameraFiles, PrincipalPointsAreReadInEveryFormat) {
+  std::vector<Camera> expected = by_hand();
+  for (Camera& camera : expected) {
+    camera.principal_x = 20.25 - 32;
+    camera.principal_y = 30.5 - 24;
+  }
+  json cameras = inria(), document = transforms();
+  for (json& camera : cameras) camera.update({{"cx", 20.25}, {"cy", 30.5}});
+  document.update({{"cx", 20.25}, {"cy", 30.5}});
+  expect_same(load_cameras(write_json(cameras)), expected);
+  expect_same(load_cameras(write_json(document)), expected);
+  const std::string text = "7 PINHOLE 64 48 50 51 20.25 30.5\n";
+  expect_same(load_cameras(write_model(".txt", text, kImagesText)), expected);
+  expect_same(load_cameras(write_model(".bin", cameras_binary(1, 1, {50, 51, 20.25, 30.5}), images_binary())),
+              expected);
+  for (Camera& camera : expected) camera.fy = 50;
+  for (const char* line : {"7 SIMPLE_PINHOLE 64 48 50 20.25 30.5", "7 SIMPLE_RADIAL 64 48 50 20.25 30.5 0",
+                           "7 RADIAL 64 48 50 20.25 30.5 0 0", "7 OPENCV 64 48 50 50 20.25 30.5 0 0 0 0"}) {
+    std::filesystem::remove(in_folder("cameras.bin"));
+    expect_same(load_cameras(write_model(".txt", line, kImagesText)), expected);
+  }
+  const Camera small = camera_from_file(write_json(document), ImageSize{32, 24}).camera;
+  EXPECT_EQ(small.cx(), 10.125) << "scales with the image";
+  EXPECT_EQ(small.cy(), 15.25);
+}
+
+TEST_F(CameraFiles, AFileWithoutAPrincipalPointHasItInTheCentreAndAFrameItsOwn) {
+  json document = transforms();
+  document.erase("cx");
+  document["cy"] = 20;
+  document["frames"][1]["cx"] = 30;
+  const std::vector<Camera> cameras = load_cameras(write_json(document));
+  EXPECT_EQ(cameras[0].cx(), 32);
+  EXPECT_EQ(cameras[0].cy(), 20);
+  EXPECT_EQ(cameras[1].cx(), 30);
+  expect_transforms_refused([](json& d) { d["cx"] = 2e6; },
+                            {"frame 0", "\"cx\" and \"cy\"", "principal point", "1e+06"});
+  expect_transforms_refused([](json& d) { d["cy"] = "x"; }, {"\"cy\" is not a number"});
+  expect_transforms_refused([](json& d) { d.erase("fl_x"), d.erase("fl_y"), d.erase("w"), d.erase("h"); },
+                            {"\"cx\" is in pixels, and there is no \"w\" and \"h\""});
+  expect_text_refused("7 PINHOLE 64 48 50 51 1e9 24", kImagesText, {"line 1", "principal point"});
+}
+
+// Distortion.
+
+/// Of k1 in a camera of 64x48 with 50 pixels of focal length: at the corner r = 40 / 50, which moves by 50 k1 r^3.
+constexpr double kPixelsOfK1 = 50 * 0.8 * 0.8 * 0.8;
+
+TEST_F(CameraFiles, DistortionBelowATenthOfAPixelIsNone) {
+  json document = transforms();
+  document.erase("camera_model");
+  document["fl_y"] = 50;
+  for (const double sign : {-1.0, 1.0}) {
+    document["k1"] = sign * 0.099 / kPixelsOfK1;
+    const Camera camera = load_cameras(write_json(document))[0];
+    EXPECT_TRUE(camera.notes.empty());
+    EXPECT_EQ(camera.fx, 50);
+    document["k1"] = sign * 0.101 / kPixelsOfK1;
+    const std::string path = write_json(document);
+    expect_user_error([&] { load_cameras(path); },
+                      {"frame 0", "distorted by k1 = " + fmt::format("{:g}", document["k1"].get<double>()), "up to 0.1",
+                       "--undistorted"});
+  }
+  // k times r^3 of COLMAP, likewise.
+  for (const double pixels : {0.099, 0.101}) {
+    const std::string line = fmt::format("7 SIMPLE_RADIAL 64 48 50 32 24 {}", pixels / kPixelsOfK1);
+    if (pixels < 0.1) {
+      EXPECT_EQ(load_cameras(write_model(".txt", line, kImagesText)).size(), 2U);
+    } else {
+      expect_text_refused(line, kImagesText, {"SIMPLE_RADIAL", "k = ", "colmap image_undistorter", "--undistorted"});
+    }
+  }
+  // More of the field of view, more pixels.
+  document["k1"] = 0.099 / kPixelsOfK1;
+  document["w"] = 128;
+  const std::string wider = write_json(document);
+  expect_user_error([&] { load_cameras(wider); }, {"k1"});
+}
+
+TEST_F(CameraFiles, WhatMovesPixelsFarthestIsNamed) {
+  json document = transforms();
+  document.erase("camera_model");
+  document.update({{"k1", 0.01}, {"k2", -0.5}, {"p1", 0.001}});
+  const std::string path = write_json(document);
+  expect_user_error([&] { load_cameras(path); }, {"distorted by k2 = -0.5"});
+  expect_text_refused("7 FULL_OPENCV 64 48 50 50 32 24 0 0 0 0 0 0 0 0.25", kImagesText, {"FULL_OPENCV", "k6 = 0.25"});
+  expect_text_refused("7 FOV 64 48 50 50 32 24 0.5", kImagesText, {"FOV", "omega = 0.5"});
+  EXPECT_EQ(load_cameras(write_model(".txt", "7 FOV 64 48 50 50 32 24 1e-3", kImagesText)).size(), 2U);
+  // Whose distortion overflows.
+  document["k1"] = 1e308;
+  document["k2"] = -1e308;
+  const std::string huge = write_json(document);
+  expect_user_error([&] { load_cameras(huge); }, {"distorted by k", "up to inf"});
+}
+
+TEST_F(CameraFiles, CamerasForNerfstudioAreTakenAsUndistortedAndSayIt) {
+  // Each of what ns-process-data writes tells.
+  const std::vector<json> marks{{{"camera_model", "OPENCV"}},
+                                {{"applied_transform", json::array()}},
+                                {{"ply_file_path", "sparse_pc.ply"}}};
+  json document = transforms();
+  document.erase("camera_model");
+  document.update({{"k1", 0.058}, {"k2", -0.07}, {"p1", 1e-4}});
+  for (const json& mark : marks) {
+    json marked = document;
+    marked.update(mark);
+    const std::vector<Camera> cameras = load_cameras(write_json(marked));
+    expect_same(cameras, by_hand());
+    ASSERT_EQ(cameras[1].notes.size(), 1U);
+    EXPECT_NE(cameras[1].notes[0].find("cameras.json are taken as undistorted: nerfstudio"), std::string::npos)
+        << cameras[1].notes[0];
+  }
+  document["frames"][0]["colmap_im_id"] = 1;
+  document["frames"][1]["colmap_im_id"] = 2;
+  expect_same(load_cameras(write_json(document)), by_hand());
+  EXPECT_TRUE(load_cameras(write_json(transforms()))[0].notes.empty()) << "nothing to undo";
+}
+
+TEST_F(CameraFiles, ASwitchTakesAnyLensAsUndistorted) {
+  json document = transforms();
+  document.erase("camera_model");
+  document["k1"] = 0.058;
+  const std::string path = write_json(document);
+  const auto check = [](const std::vector<Camera>& cameras, const std::string& name) {
+    expect_same(cameras, by_hand());
+    ASSERT_EQ(cameras[0].notes.size(), 1U);
+    EXPECT_NE(cameras[0].notes[0].find(name + " are taken without their distortion, as --undistorted says"),
+              std::string::npos)
+        << cameras[0].notes[0];
+  };
+  check(load_cameras(path, Lenses::undistorted), "cameras.json");
+  EXPECT_EQ(camera_from_file(path + "#b", {}, Lenses::undistorted).camera.notes.size(), 1U);
+  check(load_cameras(write_model(".txt", "7 OPENCV 64 48 50 51 32 24 0.1 0 0 0", kImagesText), Lenses::undistorted),
+        "cameras.txt");
+  expect_user_error(
+      [&] {
+        load_cameras(write_model(".txt", "7 SIMPLE_RADIAL_FISHEYE 64 48 50 32 24 0", kImagesText), Lenses::undistorted);
+      },
+      {"SIMPLE_RADIAL_FISHEYE", "no pinhole"});
+}
+
+// Without perspective.
+
+TEST_F(CameraFiles, AnOrthophotoIsOrthographicWithPixelsForEachUnit) {
+  json document = transforms();
+  document["camera_model"] = "ORTHOPHOTO";
+  document["k1"] = 0.1;  // which has no meaning
+  std::vector<Camera> expected = by_hand();
+  for (Camera& camera : expected) camera.projection = Projection::orthographic;
+  expect_same(load_cameras(write_json(document)), expected);
+  document.erase("fl_x");
+  document.erase("fl_y");
+  document["camera_angle_x"] = 1;
+  const std::string path = write_json(document);
+  expect_user_error([&] { load_cameras(path); }, {"frame 0", "ORTHOPHOTO", "no \"fl_x\"", "world unit"});
+}
+
 // Which camera.
 
 TEST_F(CameraFiles, AnImagesNameChoosesACamera) {
@@ -243,6 +405,9 @@ TEST_F(CameraFiles, BlenderFilesHaveAnAngleAndTheSizeOfTheirDataSet) {
   EXPECT_EQ(cameras[0].height, 800U);
   EXPECT_NEAR(cameras[0].fx, 800, 1e-9);
   EXPECT_EQ(cameras[0].fy, cameras[0].fx);
+  ASSERT_EQ(cameras[0].notes.size(), 1U);
+  EXPECT_NE(cameras[0].notes[0].find("cameras.json says no size"), std::string::npos) << cameras[0].notes[0];
+  EXPECT_NE(cameras[0].notes[0].find("800x800"), std::string::npos) << cameras[0].notes[0];
   const Camera small = camera_from_file(in_folder("cameras.json").string(), ImageSize{200, 100}).camera;
   EXPECT_NEAR(small.fy, 100, 1e-9) << "the vertical field of view stays";
 }
@@ -284,12 +449,14 @@ TEST_F(CameraFiles, TransformsThatCannotBeUsedNameTheFrame) {
       },
       {"frame 1", "scales by 0.25", "divide"});
   for (const char* key : {"k1", "k2", "k3", "k4", "p1", "p2"}) {
-    expect_transforms_refused([&](json& d) { d[key] = 0.01; }, {"frame 0", key, "distorted", "undistort", "to 0"});
+    expect_transforms_refused([&](json& d) { d.erase("camera_model"), d[key] = 0.05; },
+                              {"frame 0", key + std::string(" = 0.05"), "distorted", "--undistorted"});
   }
   expect_transforms_refused([](json& d) { d["camera_model"] = "OPENCV_FISHEYE"; }, {"OPENCV_FISHEYE", "no pinhole"});
-  expect_transforms_refused([](json& d) { d["is_fisheye"] = true; }, {"fisheye", "no pinhole"});
+  expect_transforms_refused([](json& d) { d["is_fisheye"] = true; }, {"fisheye", "no pinhole", "--eye"});
   expect_transforms_refused([](json& d) { d.erase("h"); }, {"\"w\" and no \"h\""});
-  expect_transforms_refused([](json& d) { d.erase("w"), d.erase("h"); }, {"no \"w\" and \"h\""});
+  expect_transforms_refused([](json& d) { d.erase("w"), d.erase("h"); },
+                            {"\"fl_x\" is in pixels, and there is no \"w\" and \"h\""});
   expect_transforms_refused([](json& d) { d["w"] = 16385; }, {"\"w\"", "1 to 16384"});
   expect_transforms_refused([](json& d) { d.erase("fl_x"), d.erase("fl_y"); }, {"neither \"fl_x\" nor"});
   expect_transforms_refused([](json& d) { d["fl_x"] = -1; }, {"\"fl_x\"", "focal length"});
@@ -349,16 +516,27 @@ TEST_F(CameraFiles, DistortionIsAcceptedWhereItIsNone) {
     EXPECT_EQ(cameras[0].fx, 50) << model;
     EXPECT_EQ(cameras[0].fy, 50) << model;
     if (model == "SIMPLE_PINHOLE") continue;
-    expect_text_refused(line.substr(0, line.size() - 1) + "0.1", kImagesText,
-                        {"cameras.txt line 1", model, "distorted by 0.1", "colmap image_undistorter"});
+    expect_text_refused(line.substr(0, line.size() - 1) + "0.3", kImagesText,
+                        {"cameras.txt line 1", model, "distorted by", " = 0.3, ", "colmap image_undistorter"});
   }
-  for (const std::string model : {"OPENCV_FISHEYE 64 48 50 50 32 24 0 0 0 0", "SIMPLE_RADIAL_FISHEYE 64 48 50 32 24 0",
-                                  "EQUIRECTANGULAR 64 48"}) {
-    expect_text_refused("7 " + model, kImagesText, {model.substr(0, model.find(' ')), "image_undistorter"});
+  // The remedy is one that there is.
+  const std::vector<std::pair<std::string, std::string>> others{
+      {"OPENCV_FISHEYE 64 48 50 50 32 24 0 0 0 0", "colmap image_undistorter"},
+      {"SIMPLE_RADIAL_FISHEYE 64 48 50 32 24 0", "colmap image_undistorter"},
+      {"EUCM 64 48 50 50 32 24 0 0", "colmap image_undistorter"},
+      {"EQUIRECTANGULAR 64 48 64 48", "panorama_sfm.py"},
+      {"NOT_KNOWN 64 48", "--eye"}};
+  for (const auto& [model, remedy] : others) {
+    expect_text_refused("7 " + model, kImagesText, {model.substr(0, model.find(' ')), "no pinhole", remedy});
   }
-  for (const std::uint32_t model : {5U, 11U, 4'000'000'000U}) {
+  for (const auto& [model, parts] : std::vector<std::pair<std::uint32_t, std::vector<std::string>>>{
+           {5U, {"OPENCV_FISHEYE", "image_undistorter"}},
+           {11U, {"RAD_TAN_THIN_PRISM_FISHEYE", "image_undistorter"}},
+           {17U, {"EQUIRECTANGULAR", "panorama_sfm.py"}},
+           {4'000'000'000U, {"number 4000000000", "--eye"}}}) {
     const std::string folder = write_model(".bin", cameras_binary(1, model, std::vector<double>(16)), images_binary());
     expect_user_error([&] { load_cameras(folder); }, {"cameras.bin byte 8", "no pinhole"});
+    expect_user_error([&] { load_cameras(folder); }, parts);
   }
 }
 

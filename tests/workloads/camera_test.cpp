@@ -63,6 +63,64 @@ TEST(LookAt, RefusesWhatHasNoDirection) {
 }
 
 // P05: a field of view of 180 degrees.
+TEST(LookAt, AnUpThatIsParallelIsNamedByWhereItComesFromWithOneThatIsNot) {
+  for (const Vec3& up : {Vec3{0, 0, 1}, Vec3{0, -1, 0}, Vec3{1, 0, 0}, Vec3{3, -2, 9}}) {
+    View view;
+    view.eye = {1, 2, 3};
+    view.look_at = view.eye + up;
+    view.up = up;
+    std::string suggested = up_for_view(view.eye, view.look_at);
+    expect_user_error(
+        [&] {
+          look_at(view, {64, 64});
+        },
+        {"(--up)", "it is parallel", "another direction, e.g. " + suggested});
+    view.up_source = "scene.ply";
+    expect_user_error(
+        [&] {
+          look_at(view, {64, 64});
+        },
+        {"(scene.ply): the up of its world, ", "is parallel", "e.g. --up " + suggested});
+    Vec3 other;
+    for (std::size_t i = 0; i < 3; ++i) {
+      other[i] = std::stod(suggested);
+      suggested.erase(0, suggested.find(',') + 1);
+    }
+    view.up = other;
+    EXPECT_NO_THROW(look_at(view, {64, 64}));
+  }
+}
+
+TEST(LookAt, WithoutPerspectiveTheHeightIsInWorldUnits) {
+  View view;
+  view.eye = {3, 1, -4};
+  view.look_at = {-1, 0.5, 2};
+  const Camera perspective = look_at(view, {640, 480});
+  EXPECT_EQ(perspective.projection, Projection::perspective);
+  view.orthographic_height = 2.5;
+  const Camera camera = look_at(view, {640, 480});
+  EXPECT_EQ(camera.projection, Projection::orthographic);
+  EXPECT_EQ(camera.fy, 192);
+  EXPECT_EQ(camera.fx, 192);
+  EXPECT_EQ(camera.eye, perspective.eye);
+  EXPECT_EQ(camera.rotation, perspective.rotation);
+  EXPECT_EQ(resized(camera, {320, 240}).fy, 96) << "the same height of the world";
+  for (const double height : {0.0, -1.0, 1e-10, 1e10, std::nan("")}) {
+    view.orthographic_height = height;
+    expect_user_error([&] { look_at(view, {640, 480}); }, {"--orthographic", "world units high", "1e-09 to 1e+09"});
+  }
+}
+
+TEST(WindowDepth, WithoutPerspectiveIsLinear) {
+  Camera camera;
+  camera.projection = Projection::orthographic;
+  camera.near_plane = 1;
+  camera.far_plane = 5;
+  for (const double z : {1.0, 2.0, 3.5, 5.0}) EXPECT_EQ(window_depth(camera, z), (z - 1) / 4);
+  EXPECT_EQ(window_depth(camera, 0.5), 0);
+  EXPECT_EQ(window_depth(camera, 6), 1);
+}
+
 TEST(LookAt, FieldOfViewMustLieBetweenZeroAndAlmost180Degrees) {
   for (const double fovy : {0.0, -10.0, 179.999, 180.0, 1e9, std::nan("")}) {
     expect_user_error([=] { look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, fovy, 64, 64); }, {"--fovy"});
@@ -82,6 +140,31 @@ TEST(LookAt, ImageSizeMustBeOneTo16384) {
     expect_user_error([=] { look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 50, 64, side); }, {"image size", "1 to 16384"});
   }
   EXPECT_EQ(look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 50, 16384, 1).width, 16384u);
+}
+
+TEST(Resized, ThePrincipalPointStaysWhereItIsInTheImage) {
+  Camera camera = look_at({0, 0, 0}, {0, 0, 1}, {0, -1, 0}, 60, 320, 240);
+  EXPECT_EQ(camera.cx(), 160);
+  EXPECT_EQ(camera.cy(), 120);
+  camera.principal_x = -60;
+  camera.principal_y = -60;
+  EXPECT_EQ(camera.cx(), 100);
+  const Camera half = resized(camera, {160, 120});
+  EXPECT_EQ(half.cx(), 50);
+  EXPECT_EQ(half.cy(), 30);
+  const Camera wide = resized(camera, {640, 240});
+  EXPECT_EQ(wide.cx(), 260) << "as far from the centre, as everything";
+  EXPECT_EQ(wide.cy(), 60);
+}
+
+TEST(CheckCamera, RefusesAPrincipalPointFarOutAndNone) {
+  for (const double far_out : {1.1e6, -1e300, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    for (const bool is_x : {true, false}) {
+      Camera camera;
+      (is_x ? camera.principal_x : camera.principal_y) = far_out;
+      expect_user_error([&] { check_camera(camera, "cannot use it"); }, {"cannot use it", "principal point"});
+    }
+  }
 }
 
 TEST(Resized, KeepsTheVerticalFieldOfViewAndSquarePixels) {

@@ -335,12 +335,15 @@ TEST(PreprocessProjection, P05AnAlmostFlatFieldOfViewStaysFinite) {
   EXPECT_GE(summary.gaussians_visible, 1u);
 }
 
-TEST(PreprocessProjection, AgreesWithTheTextbookFormulaInExtendedPrecision) {
+/// Compares random Gaussians with the formulas of EWA splatting, the limits of rays being gsplat's, in 50 digits.
+void expect_textbook(const Camera& camera) {
+  const bool is_perspective = camera.projection == Projection::perspective;
   std::mt19937 random(7);
   const auto uniform = [&random](double low, double high) {
     return static_cast<float>(low + (high - low) * (static_cast<double>(random()) / 4294967296.0));
   };
-  const Camera camera = look_at({1, -2, -3}, {0.2, 0.1, 2}, {0.1, -1, 0.05}, 50, 200, 120);
+  const Exact fx = camera.fx, fy = camera.fy, cx = camera.cx(), cy = camera.cy();
+  const Exact width = camera.width, height = camera.height;
   int compared = 0;
   for (int trial = 0; trial < 500; ++trial) {
     GaussianAttributes g = ordinary_gaussian();
@@ -359,19 +362,21 @@ TEST(PreprocessProjection, AgreesWithTheTextbookFormulaInExtendedPrecision) {
       for (std::size_t k = 0; k < 3; ++k)
         t[i] += Exact(camera.rotation[k][i]) * (Exact(g.position[k]) - Exact(camera.eye[k]));
     }
-    EXPECT_NEAR(s.cx, static_cast<double>(100 + Exact(camera.fx) * t[0] / t[2]), 1e-4);
-    EXPECT_NEAR(s.cy, static_cast<double>(60 + Exact(camera.fy) * t[1] / t[2]), 1e-4);
+    const Exact w_of_clip = is_perspective ? t[2] : Exact(1);
+    EXPECT_NEAR(s.cx, static_cast<double>(cx + fx * t[0] / w_of_clip), 1e-4);
+    EXPECT_NEAR(s.cy, static_cast<double>(cy + fy * t[1] / w_of_clip), 1e-4);
     for (std::size_t i = 0; i < 4; ++i) length += Exact(g.rotation[i]) * g.rotation[i];
     for (std::size_t i = 0; i < 4; ++i) q[i] = Exact(g.rotation[i]) / sqrt(length);
     const Exact w = q[0], x = q[1], y = q[2], z = q[3];
     const Exact r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
                            {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
                            {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
-    const Exact limit_x = Exact(1.3) * 100 / Exact(camera.fx), limit_y = Exact(1.3) * 60 / Exact(camera.fy);
-    const auto clamp = [](const Exact& v, const Exact& limit) {
-      return v > limit ? limit : (v < -limit ? Exact(-limit) : v);
+    const auto clamp = [](const Exact& v, const Exact& focal, const Exact& centre, const Exact& side) {
+      const Exact more = Exact(3) / 10 * side / (2 * focal);
+      return std::min(Exact((side - centre) / focal + more), std::max(Exact(-centre / focal - more), v));
     };
-    const Exact rx = clamp(t[0] / t[2], limit_x), ry = clamp(t[1] / t[2], limit_y);
+    const Exact rx = is_perspective ? clamp(t[0] / t[2], fx, cx, width) : Exact(0);
+    const Exact ry = is_perspective ? clamp(t[1] / t[2], fy, cy, height) : Exact(0);
     Exact sigma[2][2] = {{Exact(3) / 10, 0}, {0, Exact(3) / 10}};
     for (std::size_t k = 0; k < 3; ++k) {
       Exact axis[3];
@@ -380,8 +385,7 @@ TEST(PreprocessProjection, AgreesWithTheTextbookFormulaInExtendedPrecision) {
         for (std::size_t j = 0; j < 3; ++j) axis[i] += Exact(camera.rotation[j][i]) * r[j][k];
         axis[i] *= exp(Exact(g.log_scale[k]));
       }
-      const Exact m[2] = {Exact(camera.fx) / t[2] * (axis[0] - rx * axis[2]),
-                          Exact(camera.fy) / t[2] * (axis[1] - ry * axis[2])};
+      const Exact m[2] = {fx / w_of_clip * (axis[0] - rx * axis[2]), fy / w_of_clip * (axis[1] - ry * axis[2])};
       for (int i = 0; i < 2; ++i) {
         for (int j = 0; j < 2; ++j) sigma[i][j] += m[i] * m[j];
       }
@@ -394,7 +398,183 @@ TEST(PreprocessProjection, AgreesWithTheTextbookFormulaInExtendedPrecision) {
     EXPECT_NEAR((double{s.ay} * s.ay + double{s.by} * s.by) / rr, static_cast<double>(sigma[1][1]), 1e-6 * scale);
     EXPECT_NEAR(double{s.ax} * s.bx + double{s.ay} * s.by, 0, 1e-6 * rr * scale) << "axes at right angles";
   }
-  EXPECT_GT(compared, 100);
+  EXPECT_GT(compared, 40);
+}
+
+TEST(PreprocessProjection, AgreesWithTheTextbookFormulaInExtendedPrecision) {
+  Camera camera = look_at({1, -2, -3}, {0.2, 0.1, 2}, {0.1, -1, 0.05}, 50, 200, 120);
+  expect_textbook(camera);
+  camera.projection = Projection::orthographic;
+  camera.fx = 40;
+  camera.fy = 44;
+  expect_textbook(camera);
+}
+
+TEST(PreprocessProjection, AgreesWithItWhereverThePrincipalPointIs) {
+  for (const Projection projection : {Projection::perspective, Projection::orthographic}) {
+    // The last is outside the image, which then shows what is aside.
+    for (const std::array<double, 2>& at : {std::array<double, 2>{-43, 17.5}, {90, -55}, {60, 130}}) {
+      Camera camera = look_at({1, -2, -3}, {0.2, 0.1, 2}, {0.1, -1, 0.05}, 50, 200, 120);
+      camera.projection = projection;
+      if (projection == Projection::orthographic) camera.fx = camera.fy = 40;
+      camera.principal_x = at[0];
+      camera.principal_y = at[1];
+      expect_textbook(camera);
+    }
+  }
+}
+
+/// A crowd in front of plain_camera(), half of it beyond its sides.
+std::vector<GaussianAttributes> crowd() {
+  std::mt19937 random(29);
+  std::vector<GaussianAttributes> gaussians(500, ordinary_gaussian());
+  for (GaussianAttributes& gaussian : gaussians) {
+    const auto uniform = [&random] { return static_cast<float>(random()) / 4294967296.0f - 0.5f; };
+    const float z = 6 + 8 * uniform();
+    gaussian.position = {2.6f * z * uniform(), 2.6f * z * uniform(), z};
+    for (float& component : gaussian.rotation) component = uniform();
+    for (float& log_scale : gaussian.log_scale) log_scale = -1.5f + 2 * uniform();
+  }
+  return gaussians;
+}
+
+TEST(PreprocessProjection, AnImageCutOffACornerIsThatOfAPrincipalPointOffTheCentre) {
+  for (const bool is_perspective : {true, false}) {
+    Camera whole = plain_camera();
+    if (!is_perspective) {
+      whole.projection = Projection::orthographic;
+      whole.fx = whole.fy = 4;
+    }
+    Camera part = whole;
+    part.width = 40;
+    part.height = 30;
+    part.principal_x = 32 - 20;
+    part.principal_y = 32 - 15;
+    SceneSummary summary;
+    const Draw all = preprocess(scene_of(crowd()), whole, {}, summary);
+    const Draw there = preprocess(scene_of(crowd()), part, {}, summary);
+    EXPECT_LT(there.splats.size(), all.splats.size());
+    // Those of the part are among all, in their order, but for the shape of those beyond the part's own limit of rays.
+    std::size_t next = 0, same = 0;
+    for (const Splat& splat : there.splats) {
+      while (next < all.splats.size() && (all.splats[next].cx != splat.cx || all.splats[next].cy != splat.cy)) ++next;
+      ASSERT_LT(next, all.splats.size());
+      const double limit_x = is_perspective ? 40 + 0.3 * 20 : 1e9, limit_y = is_perspective ? 30 + 0.3 * 15 : 1e9;
+      if (splat.cx > limit_x || splat.cy > limit_y || splat.cx < -0.3 * 20 || splat.cy < -0.3 * 15) continue;
+      EXPECT_EQ(std::memcmp(&all.splats[next], &splat, sizeof splat), 0) << splat.cx << "," << splat.cy;
+      ++same;
+    }
+    EXPECT_GT(same, 40U) << is_perspective;
+    // What is left out misses the part.
+    for (const Splat& splat : all.splats) {
+      const bool is_there = splat.cx > 0 && splat.cx < 40 && splat.cy > 0 && splat.cy < 30;
+      if (!is_there) continue;
+      EXPECT_TRUE(std::any_of(there.splats.begin(), there.splats.end(),
+                              [&](const Splat& each) { return each.cx == splat.cx && each.cy == splat.cy; }));
+    }
+  }
+}
+
+TEST(PreprocessProjection, AHugeGaussianIsShortenedTowardsTheImagesCentreWhereverThePrincipalPointIs) {
+  Camera camera = plain_camera();
+  camera.principal_x = 5000;
+  GaussianAttributes g = ordinary_gaussian();
+  g.position = {-700, 0, 5};
+  g.log_scale = {15, 15, -kInf};
+  SceneSummary summary;
+  const Splat s = preprocess(scene_of({g}), camera, {}, summary).splats.at(0);
+  const double extent = 32 / 5.0 * std::exp(15.0) * double{s.r};
+  EXPECT_GT(extent, 10 * kMaxHalfExtent);
+  EXPECT_NEAR(s.cx, 32 + (5000 - 700 / 5.0 * 32) * kMaxHalfExtent / extent, 1e-3);
+}
+
+TEST(PreprocessOrthographic, ACovarianceIsTimesTheSquareOfTheScaleAndTheDilation) {
+  // 64 pixels over 16 units: 4 pixels a unit, at whatever depth.
+  View view;
+  view.eye = {0, 0, 0};
+  view.look_at = {0, 0, 1};
+  view.orthographic_height = 16;
+  const Camera camera = look_at(view, {64, 64});
+  for (const float z : {0.5f, 5.0f, 500.0f, 5000.0f}) {
+    GaussianAttributes g = ordinary_gaussian();
+    g.position = {3.5f, -2, z};
+    g.log_scale = {1, 0, 3};
+    SceneSummary summary;
+    const Splat s = preprocess(scene_of({g}), camera, {}, summary).splats.at(0);
+    EXPECT_EQ(s.cx, 32 + 4 * 3.5f);
+    EXPECT_EQ(s.cy, 32 - 4 * 2.0f);
+    EXPECT_NEAR(std::fabs(s.ax / s.r), std::sqrt(16 * std::exp(2.0) + 0.3), 1e-5);
+    EXPECT_NEAR(std::fabs(s.by / s.r), std::sqrt(16 + 0.3), 1e-6);
+    EXPECT_EQ(s.ay, 0);
+    EXPECT_EQ(s.bx, 0);
+    EXPECT_NEAR(s.depth, std::min(1.0, (z - double{camera.near_plane}) / (1000 - double{camera.near_plane})), 1e-7);
+  }
+}
+
+TEST(PreprocessOrthographic, IsWhatPerspectiveFromFarAwayComesTo) {
+  View view;
+  view.look_at = {0, 0, 6};
+  view.eye = {0, 0, 0};
+  view.orthographic_height = 16;
+  SceneSummary summary;
+  const Draw parallel = preprocess(scene_of(crowd()), look_at(view, {64, 64}), {}, summary);
+  double last = 1e9;
+  for (const double distance : {1e3, 1e5, 1e7}) {
+    Camera far_away = look_at(view, {64, 64});
+    far_away.projection = Projection::perspective;
+    far_away.eye = {0, 0, 6 - distance};
+    far_away.fx = far_away.fy = 4 * distance;
+    const Draw draw = preprocess(scene_of(crowd()), far_away, {}, summary);
+    double most = 0;
+    unsigned compared = 0;
+    for (const Splat& splat : parallel.splats) {
+      double nearest = 1e9;
+      for (const Splat& other : draw.splats) {
+        nearest = std::min(nearest, std::hypot(double{splat.cx} - other.cx, double{splat.cy} - other.cy) +
+                                        std::fabs(std::hypot(double{splat.ax}, double{splat.ay}) -
+                                                  std::hypot(double{other.ax}, double{other.ay})));
+      }
+      // At the image's border one of the two may be culled.
+      if (splat.cx < 1 || splat.cx > 63 || splat.cy < 1 || splat.cy > 63) continue;
+      most = std::max(most, nearest);
+      ++compared;
+    }
+    EXPECT_GT(compared, 100U);
+    EXPECT_LT(most, std::min(last / 50, 300 / distance + 2e-5));
+    last = std::max(most, 1e-3);
+  }
+}
+
+TEST(PreprocessOrthographic, TheNearPlaneCullsAndDepthOrders) {
+  Camera camera = plain_camera();
+  camera.projection = Projection::orthographic;
+  std::vector<GaussianAttributes> gaussians(4, ordinary_gaussian());
+  gaussians[0].position = {0, 0, 9};
+  gaussians[1].position = {0, 0, 0.1f};
+  gaussians[2].position = {0, 0, -5};
+  gaussians[3].position = {0.1f, 0, 3};
+  SceneSummary summary;
+  const Draw draw = preprocess(scene_of(gaussians), camera, {}, summary);
+  ASSERT_EQ(draw.splats.size(), 2U);
+  EXPECT_GT(draw.splats[0].cx, 32);
+  EXPECT_EQ(draw.splats[1].cx, 32);
+}
+
+TEST(PreprocessOrthographic, ColoursAreSeenFromTheEyeAsInGsplat) {
+  std::mt19937 random(31);
+  GaussianAttributes g = ordinary_gaussian();
+  g.position = {0.4f, -0.3f, 2};
+  for (auto& channel : g.f_rest) {
+    for (float& coefficient : channel) coefficient = static_cast<float>(random()) / 4294967296.0f;
+  }
+  Camera camera = plain_camera();
+  SceneSummary summary;
+  const Splat perspective = preprocess(scene_of({g}, 3), camera, {}, summary).splats.at(0);
+  camera.projection = Projection::orthographic;
+  const Splat orthographic = preprocess(scene_of({g}, 3), camera, {}, summary).splats.at(0);
+  EXPECT_EQ(perspective.red, orthographic.red);
+  EXPECT_EQ(perspective.green, orthographic.green);
+  EXPECT_EQ(perspective.blue, orthographic.blue);
 }
 
 TEST(PreprocessProjection, P07FarFromTheOriginNothingIsLost) {

@@ -90,6 +90,79 @@ TEST_F(SceneFile, CameraFileGivesSizeAndViewAndExcludesViewOptions) {
   expect_user_error([&] { load_scene(request_); }, {"--eye", "--camera gives a whole camera"});
 }
 
+TEST_F(SceneFile, APrincipalPointOffTheCentreShowsThatPartOfALargerImageWhicheverKindOfFileSaysIt) {
+  const std::string pose = R"("position":[0,0,0],"rotation":[[1,0,0],[0,1,0],[0,0,1]])";
+  write("whole.json", R"([{"width":80,"height":60,)" + pose + R"(,"fx":40,"fy":40}])");
+  write("inria.json", R"([{"width":64,"height":48,)" + pose + R"(,"fx":40,"fy":40,"cx":40,"cy":30}])");
+  write("transforms.json", R"({"fl_x":40,"fl_y":40,"cx":40,"cy":30,"w":64,"h":48,)"
+                           R"("frames":[{"transform_matrix":[[1,0,0,0],[0,-1,0,0],[0,0,-1,0],[0,0,0,1]]}]})");
+  write("cameras.txt", "1 PINHOLE 64 48 40 40 40 30\n");
+  write("images.txt", "1 1 0 0 0 0 0 0 1 a.png\n\n");
+  const auto drawn = [&](const std::string& camera) {
+    request_.camera = in_folder(camera).string();
+    return testing::render_reference(load_scene(request_).draw);
+  };
+  const testing::ReferenceImage whole = drawn("whole.json");
+  unsigned drawn_pixels = 0;
+  for (const char* file : {"inria.json", "transforms.json", "cameras.txt"}) {
+    const testing::ReferenceImage part = drawn(file);
+    ASSERT_EQ(part.width, 64U);
+    for (std::uint32_t y = 0; y < part.height; ++y) {
+      for (std::uint32_t x = 0; x < part.width; ++x) {
+        ASSERT_EQ(part.at(x, y), whole.at(x, y)) << file << " at " << x << "," << y;
+        drawn_pixels += part.at(x, y)[3] > 0 ? 1U : 0U;
+      }
+    }
+  }
+  EXPECT_GT(drawn_pixels, 100U);
+}
+
+TEST_F(SceneFile, WhatWasAssumedOfACameraIsAmongTheNotesOnce) {
+  write("transforms.json", R"({"camera_angle_x":1,"camera_model":"OPENCV","k1":0.1,)"
+                           R"("frames":[{"transform_matrix":[[1,0,0,0],[0,-1,0,0],[0,0,-1,0],[0,0,0,1]]}]})");
+  request_.camera = in_folder("transforms.json").string();
+  const std::vector<std::string> notes = load_scene(request_).summary.notes;
+  ASSERT_EQ(notes.size(), 2U);
+  EXPECT_NE(notes[0].find("800x800"), std::string::npos) << notes[0];
+  EXPECT_NE(notes[1].find("taken as undistorted"), std::string::npos) << notes[1];
+  request_.lenses = Lenses::undistorted;
+  EXPECT_NE(load_scene(request_).summary.notes.at(1).find("--undistorted"), std::string::npos);
+}
+
+TEST_F(SceneFile, WithoutPerspectiveTheViewIsThatOfTheOptions) {
+  request_.orthographic_height = 3;
+  request_.size = ImageSize{64, 48};
+  const OpenedScene scene = open_scene(request_);
+  EXPECT_EQ(scene.viewpoint.camera.projection, Projection::orthographic);
+  EXPECT_EQ(scene.viewpoint.camera.fy, 16);
+  EXPECT_EQ(scene.viewpoint.view->orthographic_height, 3);
+  EXPECT_EQ(preprocess_scene(scene, {}).summary.gaussians_visible, 3U) << "where a perspective would see all";
+  for (const View& view : orbit_views(*scene.viewpoint.view, 3)) EXPECT_EQ(view.orthographic_height, 3);
+  SceneRequest builtin;
+  builtin.scene = "builtin:object";
+  builtin.size = ImageSize{64, 64};
+  builtin.orthographic_height = 4;
+  EXPECT_EQ(open_scene(builtin).viewpoint.camera.fx, 16);
+  request_.fovy_degrees = 40;
+  expect_user_error([&] { load_scene(request_); }, {"--fovy", "--orthographic is without perspective"});
+  request_.fovy_degrees.reset();
+  request_.camera = "cameras.json";
+  expect_user_error([&] { load_scene(request_); }, {"--orthographic", "--camera gives a whole camera"});
+}
+
+TEST_F(SceneFile, AnUpThatNobodyGaveIsNamedAsTheScenes) {
+  request_.eye = Vec3{0, 5, 0};
+  request_.look_at = Vec3{0, 0, 0};
+  expect_user_error([&] { load_scene(request_); },
+                    {"four.ply): the up of its world, 0,-1,0, is parallel to the view from --eye to --look-at",
+                     "--up 0,0,1"});
+  request_.up = Vec3{0, 2, 0};
+  expect_user_error([&] { load_scene(request_); }, {"(--up): it is parallel", "e.g. 0,0,1"});
+  request_.scene = "builtin:object";
+  request_.up.reset();
+  expect_user_error([&] { load_scene(request_); }, {"(builtin:object): the up of its world, ", "is parallel"});
+}
+
 TEST_F(SceneFile, ADrawListComesInAsItIsAndRefusesCameras) {
   LoadedScene original = load_scene(request_);
   write_draw_list(in_folder("saved.SPL"), original.draw);
@@ -110,6 +183,9 @@ TEST_F(SceneFile, ADrawListComesInAsItIsAndRefusesCameras) {
   SceneRequest viewed = replay;
   viewed.up = Vec3{0, 1, 0};
   expect_user_error([&] { load_scene(viewed); }, {"--up", ".spl"});
+  viewed = replay;
+  viewed.orthographic_height = 2;
+  expect_user_error([&] { load_scene(viewed); }, {"--orthographic", ".spl"});
   SceneRequest filmed = replay;
   filmed.camera = "cameras.json";
   expect_user_error([&] { load_scene(filmed); }, {"--camera", ".spl"});

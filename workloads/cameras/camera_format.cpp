@@ -99,11 +99,29 @@ void check_rotation(const Camera& camera, const std::string& where, const std::s
   if (!good) throw UserError(kCannotReadCameras, where, name + " is not a rotation matrix", remedy);
 }
 
+void set_principal_point(Camera& camera, const std::optional<double>& cx, const std::optional<double>& cy,
+                         const std::string& where, const std::string& names) {
+  if (cx) camera.principal_x = *cx - 0.5 * camera.width;
+  if (cy) camera.principal_y = *cy - 0.5 * camera.height;
+  // Not a NaN either.
+  if (std::fabs(camera.principal_x) <= kMaxPrincipalOffset && std::fabs(camera.principal_y) <= kMaxPrincipalOffset)
+    return;
+  throw UserError(kCannotReadCameras, where,
+                  fmt::format("{}, the principal point, is more than {:g} pixels from the image's centre", names,
+                              kMaxPrincipalOffset),
+                  "give it in pixels from the image's upper left corner");
+}
+
 void check_focal_lengths(const Camera& camera, const std::string& where, const std::string& names) {
   // The same range as that of a field of view of 1e-6 to 180 - 1e-3 degrees.
-  const auto usable = [](double focal, std::uint32_t side) { return focal > 4e-6 * side && focal < 6e7 * side; };
+  // Or as that of an image of the heights that an orthographic view may have.
+  const bool is_perspective = camera.projection == Projection::perspective;
+  const double least = is_perspective ? 4e-6 : 1 / kMaxOrthographicHeight;
+  const double most = is_perspective ? 6e7 : 1 / kMinOrthographicHeight;
+  const auto usable = [=](double focal, std::uint32_t side) { return focal > least * side && focal < most * side; };
   if (usable(camera.fx, camera.width) && usable(camera.fy, camera.height)) return;
-  throw UserError(kCannotReadCameras, where, names + " is not a usable focal length", "give it in pixels, above 0");
+  throw UserError(kCannotReadCameras, where, names + " is not a usable focal length",
+                  is_perspective ? "give it in pixels, above 0" : "give it in pixels for each world unit, above 0");
 }
 
 JsonObject::JsonObject(const nlohmann::json& json, std::string where, const char* layout)

@@ -41,7 +41,7 @@ struct CameraFormat {
   const char* looks_like;  ///< for the message about a file that is none of them
   bool (*recognises)(const CameraSource& source);
   /// Only of what it recognises. Throws UserError naming the camera, the line or the byte.
-  std::vector<Camera> (*read)(const CameraSource& source);
+  std::vector<Camera> (*read)(const CameraSource& source, Lenses lenses);
   /// The files that are read, where these are not the source itself; else null.
   std::vector<std::filesystem::path> (*files)(const CameraSource& source);
 };
@@ -65,7 +65,13 @@ std::uint32_t checked_side(double side, const std::string& where, const std::str
 /// @param name  of the matrix in the file, e.g. "\"rotation\""
 void check_rotation(const Camera& camera, const std::string& where, const std::string& name, const std::string& remedy);
 
-/// @throws UserError unless the focal lengths are those of a field of view that can be drawn
+/// @param cx,cy  of the principal point, pixels from the image's upper left corner; none: of the centre
+/// @param names  of these in the file
+/// @throws UserError when it is farther than kMaxPrincipalOffset from the centre
+void set_principal_point(Camera& camera, const std::optional<double>& cx, const std::optional<double>& cy,
+                         const std::string& where, const std::string& names);
+
+/// @throws UserError unless the focal lengths are those of an image that can be drawn
 void check_focal_lengths(const Camera& camera, const std::string& where, const std::string& names);
 
 /// An object in a JSON file. What is wrong with a value names the place and the file's layout.

@@ -17,6 +17,7 @@
 
 #include "../file_io.h"
 #include "camera_format.h"
+#include "lens.h"
 
 // A COLMAP model, https://colmap.github.io/format.html: intrinsics in `cameras`, poses in `images`, both as .txt or both
 // as .bin; other files of the model are not needed.
@@ -73,49 +74,82 @@ Model model_of(const CameraSource& source) {
   return {};
 }
 
-/// A camera model that has a pinhole among its cameras: those whose parameters from `distortion` on are 0.
+/// A camera model. One that has a pinhole among its cameras has it where all parameters that distort are 0.
 struct CameraModel {
   const char* name;
-  std::size_t parameters;
-  std::size_t distortion;
-  bool is_pinhole;  ///< without distortion; false: a fisheye or a sphere, whatever its parameters
+  std::size_t
+      focal_lengths;  ///< 1 of both sides, or 2; 0: no pinhole, whatever its parameters. Then the principal point
+  LensModel lens;
+  std::vector<const char*> distortion;  ///< then these
+
+  std::size_t parameters() const { return focal_lengths + 2 + distortion.size(); }
 };
 
-/// By their numbers in .bin files. Those that COLMAP has added since are no pinholes either.
-constexpr std::array<CameraModel, 11> kModels{{{"SIMPLE_PINHOLE", 3, 3, true},
-                                               {"PINHOLE", 4, 4, true},
-                                               {"SIMPLE_RADIAL", 4, 3, true},
-                                               {"RADIAL", 5, 3, true},
-                                               {"OPENCV", 8, 4, true},
-                                               {"OPENCV_FISHEYE", 8, 4, false},
-                                               {"FULL_OPENCV", 12, 4, true},
-                                               {"FOV", 5, 4, true},
-                                               {"SIMPLE_RADIAL_FISHEYE", 4, 3, false},
-                                               {"RADIAL_FISHEYE", 5, 3, false},
-                                               {"THIN_PRISM_FISHEYE", 12, 4, false}}};
+/// By their numbers in .bin files.
+const std::vector<CameraModel>& models() {
+  constexpr LensModel polynomial = LensModel::polynomial;
+  static const std::vector<CameraModel> all{
+      {"SIMPLE_PINHOLE", 1, polynomial, {}},
+      {"PINHOLE", 2, polynomial, {}},
+      {"SIMPLE_RADIAL", 1, polynomial, {"k"}},
+      {"RADIAL", 1, polynomial, {"k1", "k2"}},
+      {"OPENCV", 2, polynomial, {"k1", "k2", "p1", "p2"}},
+      {"OPENCV_FISHEYE", 0, polynomial, {}},
+      {"FULL_OPENCV", 2, LensModel::rational, {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"}},
+      {"FOV", 2, LensModel::field_of_view, {"omega"}},
+      {"SIMPLE_RADIAL_FISHEYE", 0, polynomial, {}},
+      {"RADIAL_FISHEYE", 0, polynomial, {}},
+      {"THIN_PRISM_FISHEYE", 0, polynomial, {}},
+      {"RAD_TAN_THIN_PRISM_FISHEYE", 0, polynomial, {}},
+      {"SIMPLE_DIVISION", 0, polynomial, {}},
+      {"DIVISION", 0, polynomial, {}},
+      {"SIMPLE_FISHEYE", 0, polynomial, {}},
+      {"FISHEYE", 0, polynomial, {}},
+      {"EUCM", 0, polynomial, {}},
+      {"EQUIRECTANGULAR", 0, polynomial, {}},
+  };
+  return all;
+}
 
-[[noreturn]] void refuse_model(const std::string& name, const std::string& where, const std::string& why) {
-  throw UserError(kCannotReadCameras, where, fmt::format("its camera model is {}, {}", name, why),
-                  "undistort with `colmap image_undistorter`, and take the model that this writes");
+constexpr char kUndistorter[] = "give the model that `colmap image_undistorter` writes";
+
+[[noreturn]] void refuse_model(const std::string& name, const std::string& where) {
+  // A sphere has no pinhole that sees all of it, and what is not known may have none.
+  std::string remedy = "give a model of pinholes, or in place of --camera a view of your own, with --eye and --look-at";
+  const auto known =
+      std::find_if(models().begin(), models().end(), [&](const CameraModel& model) { return name == model.name; });
+  if (name == "EQUIRECTANGULAR") {
+    remedy =
+        "give a model of perspective views of the panoramas, which COLMAP's panorama_sfm.py makes, or in place of "
+        "--camera a view of your own, with --eye and --look-at";
+  } else if (known != models().end()) {
+    remedy = kUndistorter;
+  }
+  throw UserError(kCannotReadCameras, where, fmt::format("its camera model is {}, which is no pinhole", name), remedy);
 }
 
 /// Intrinsics, in a camera that has no pose yet.
 Camera intrinsics(const CameraModel& model, double width, double height, const std::vector<double>& parameters,
-                  const std::string& where) {
-  if (!model.is_pinhole) refuse_model(model.name, where, "which is no pinhole");
+                  const std::string& file, const std::string& where, Lenses lenses) {
   for (const double parameter : parameters) {
     if (!std::isfinite(parameter)) throw UserError(kCannotReadCameras, where, "a parameter is not finite", kGetAgain);
-  }
-  for (std::size_t i = model.distortion; i < model.parameters; ++i) {
-    if (parameters[i] != 0) refuse_model(model.name, where, fmt::format("distorted by {:g}", parameters[i]));
   }
   Camera camera;
   camera.width = checked_side(width, where, "the width");
   camera.height = checked_side(height, where, "the height");
   camera.fx = parameters[0];
-  // The focal length of both sides, unless there are two; then the principal point.
-  camera.fy = model.distortion == 3 ? parameters[0] : parameters[1];
+  camera.fy = parameters[model.focal_lengths - 1];
   check_focal_lengths(camera, where, "a parameter");
+  set_principal_point(camera, parameters[model.focal_lengths], parameters[model.focal_lengths + 1], where,
+                      "a parameter");
+  Lens lens;
+  lens.model = model.lens;
+  for (std::size_t i = 0; i < model.distortion.size(); ++i) {
+    lens.parameters.push_back({model.distortion[i], parameters[model.focal_lengths + 2 + i]});
+  }
+  lens.complaint = fmt::format("its camera model is {}, distorted by", model.name);
+  lens.remedy = fmt::format("{}, or --undistorted if the model was trained on undistorted images", kUndistorter);
+  if (!lens.parameters.empty()) check_lens(lens, lenses, file, where, camera);
   return camera;
 }
 
@@ -273,23 +307,24 @@ class Lines {
   std::size_t number_ = 0;
 };
 
-Intrinsics read_cameras_text(const fs::path& path) {
+Intrinsics read_cameras_text(const fs::path& path, Lenses lenses) {
   Intrinsics cameras;
   for (Lines lines(path); lines.next_entry();) {
     const auto id = lines.number<std::uint64_t>("the number of the camera");
     const std::string name(lines.word());
-    const auto* const model =
-        std::find_if(kModels.begin(), kModels.end(), [&](const CameraModel& known) { return name == known.name; });
+    const auto model =
+        std::find_if(models().begin(), models().end(), [&](const CameraModel& known) { return name == known.name; });
     if (name.empty()) lines.refuse("it ends before the camera model");
-    if (model == kModels.end()) refuse_model(name.substr(0, 64), lines.where(), "which is none that can be drawn");
+    if (model == models().end() || model->focal_lengths == 0) refuse_model(name.substr(0, 64), lines.where());
     const auto width = lines.number<double>("the width");
     const auto height = lines.number<double>("the height");
     std::vector<double> parameters;
-    for (std::size_t i = 0; i < model->parameters; ++i) parameters.push_back(lines.number<double>("a parameter"));
+    for (std::size_t i = 0; i < model->parameters(); ++i) parameters.push_back(lines.number<double>("a parameter"));
     if (!lines.rest().empty()) {
-      lines.refuse(fmt::format("{} has {} parameters, and there are more", name, model->parameters));
+      lines.refuse(fmt::format("{} has {} parameters, and there are more", name, model->parameters()));
     }
-    add(cameras, id, intrinsics(*model, width, height, parameters, lines.where()), lines.where());
+    add(cameras, id, intrinsics(*model, width, height, parameters, path.string(), lines.where(), lenses),
+        lines.where());
   }
   return cameras;
 }
@@ -371,7 +406,7 @@ class Bytes {
   std::vector<std::byte> window_;
 };
 
-Intrinsics read_cameras_binary(const fs::path& path) {
+Intrinsics read_cameras_binary(const fs::path& path, Lenses lenses) {
   Intrinsics cameras;
   Bytes bytes(path);
   const auto count = bytes.number<std::uint64_t>("the number of cameras");
@@ -379,13 +414,16 @@ Intrinsics read_cameras_binary(const fs::path& path) {
     const std::string where = bytes.where();
     const auto id = bytes.number<std::uint32_t>("a camera");
     const auto number = bytes.number<std::uint32_t>("a camera model");
-    if (number >= kModels.size()) refuse_model(fmt::format("number {}", number), where, "which is no pinhole");
-    const CameraModel& model = kModels[number];
+    if (number >= models().size()) refuse_model(fmt::format("number {}", number), where);
+    const CameraModel& model = models()[number];
+    if (model.focal_lengths == 0) refuse_model(model.name, where);
     const auto width = bytes.number<std::uint64_t>("a width");
     const auto height = bytes.number<std::uint64_t>("a height");
     std::vector<double> parameters;
-    for (std::size_t k = 0; k < model.parameters; ++k) parameters.push_back(bytes.number<double>("a parameter"));
-    add(cameras, id, intrinsics(model, static_cast<double>(width), static_cast<double>(height), parameters, where),
+    for (std::size_t k = 0; k < model.parameters(); ++k) parameters.push_back(bytes.number<double>("a parameter"));
+    add(cameras, id,
+        intrinsics(model, static_cast<double>(width), static_cast<double>(height), parameters, path.string(), where,
+                   lenses),
         where);
   }
   bytes.finish();
@@ -416,10 +454,10 @@ std::vector<Camera> read_images_binary(const fs::path& path, const Intrinsics& c
 
 bool is_colmap(const CameraSource& source) { return !model_of(source).cameras.empty(); }
 
-std::vector<Camera> read_colmap(const CameraSource& source) {
+std::vector<Camera> read_colmap(const CameraSource& source, Lenses lenses) {
   const Model model = model_of(source);
-  if (model.is_binary) return read_images_binary(model.images, read_cameras_binary(model.cameras));
-  return read_images_text(model.images, read_cameras_text(model.cameras));
+  if (model.is_binary) return read_images_binary(model.images, read_cameras_binary(model.cameras, lenses));
+  return read_images_text(model.images, read_cameras_text(model.cameras, lenses));
 }
 
 std::vector<fs::path> files(const CameraSource& source) {

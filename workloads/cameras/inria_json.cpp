@@ -35,13 +35,16 @@ Camera read_camera(const JsonObject& json) {
   camera.fx = json.number("fx");
   camera.fy = json.number("fy");
   check_focal_lengths(camera, json.where(), "\"fx\" or \"fy\"");
+  set_principal_point(camera, json.optional_number("cx"), json.optional_number("cy"), json.where(),
+                      "\"cx\" and \"cy\"");
   camera.name = json.text("img_name");
   return camera;
 }
 
 bool is_inria(const CameraSource& source) { return source.json() != nullptr && source.json()->is_array(); }
 
-std::vector<Camera> read_inria(const CameraSource& source) {
+/// The INRIA code undistorts before it trains, and its files have no distortion.
+std::vector<Camera> read_inria(const CameraSource& source, Lenses /*lenses*/) {
   std::vector<Camera> cameras;
   for (const nlohmann::json& camera : *source.json()) {
     const std::string where = source.path() + " camera " + std::to_string(cameras.size());

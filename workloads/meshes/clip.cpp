@@ -30,14 +30,17 @@ ClipVertex crossing(const ClipVertex& from, double from_distance, const ClipVert
 }  // namespace
 
 ClipVolume::ClipVolume(const Camera& camera) : near_plane_(camera.near_plane), far_plane_(camera.far_plane) {
-  // Window x = half + fx x / z lies in the guard band where fx x + (half +- guard) z has the right sign.
-  const double half_width = 0.5 * camera.width, half_height = 0.5 * camera.height;
+  // Window x = cx + fx x / w lies in the guard band where fx x + (cx +- guard) w has the right sign.
+  const bool is_perspective = camera.projection == Projection::perspective;
+  const auto side = [is_perspective](double x, double y, double of_w) {
+    return is_perspective ? Plane{{x, y, of_w}, 0} : Plane{{x, y, 0}, of_w};
+  };
   planes_ = {{{{0, 0, 1}, -near_plane_},
               {{0, 0, -1}, far_plane_},
-              {{camera.fx, 0, guard_band_pixels + half_width}, 0},
-              {{-camera.fx, 0, guard_band_pixels - half_width}, 0},
-              {{0, camera.fy, guard_band_pixels + half_height}, 0},
-              {{0, -camera.fy, guard_band_pixels - half_height}, 0}}};
+              side(camera.fx, 0, guard_band_pixels + camera.cx()),
+              side(-camera.fx, 0, guard_band_pixels - camera.cx()),
+              side(0, camera.fy, guard_band_pixels + camera.cy()),
+              side(0, -camera.fy, guard_band_pixels - camera.cy())}};
 }
 
 ClipPolygon ClipVolume::clip(const std::array<ClipVertex, 3>& triangle) const {

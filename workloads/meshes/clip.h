@@ -7,7 +7,7 @@
 
 namespace vrpipe {
 
-/// A vertex between vertex shading and the division by w: clip space is camera space, where w is z.
+/// A vertex between vertex shading and the division by w: clip space is camera space, where w is z, or 1 without perspective.
 struct ClipVertex {
   Vec3 position{};  ///< camera space
   Vec3 colour{};

@@ -29,13 +29,14 @@ class Viewport {
   MeshVertex operator()(const ClipVertex& vertex) const {
     const Vec3& p = vertex.position;
     // As Gaussians are projected, to the bit.
-    const double x = 0.5 * camera_.width + camera_.fx * (p.x / p.z);
-    const double y = 0.5 * camera_.height + camera_.fy * (p.y / p.z);
+    const double w = clip_w(camera_, p.z);
+    const double x = 0.5 * camera_.width + (camera_.principal_x + camera_.fx * (p.x / w));
+    const double y = 0.5 * camera_.height + (camera_.principal_y + camera_.fy * (p.y / w));
     MeshVertex out{};
     out.x = within_guard_band(x);
     out.y = within_guard_band(y);
     out.depth = static_cast<float>(window_depth(camera_, p.z));
-    out.inverse_w = static_cast<float>(1.0 / p.z);
+    out.inverse_w = static_cast<float>(1.0 / w);
     out.red = colour_of(vertex.colour.r);
     out.green = colour_of(vertex.colour.g);
     out.blue = colour_of(vertex.colour.b);

@@ -44,7 +44,8 @@ struct PreprocessOptions {
 /// what it was, and coverage never shrinks when a scale grows. So every corner lies within +-2^22 pixels.
 constexpr double kMaxHalfExtent = 1e6;
 
-/// Projects a scene to what the vertex shader takes in, as the INRIA renderer does: frustum and off-screen culling,
+/// Projects a scene to what the vertex shader takes in, as the INRIA renderer does, and off the centre or without perspective as
+/// gsplat does: frustum and off-screen culling,
 /// EWA projection (dilated; view rays clamped at 1.3 tan(fov/2)), SH colour + 0.5 clamped at 0, sigmoid
 /// opacity, stable sort by camera z, equal depths in the scene's order. Computed in double, stored as float; every
 /// splat that leaves is finite.

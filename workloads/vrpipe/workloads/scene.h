@@ -14,16 +14,19 @@
 
 namespace vrpipe {
 
-/// What the user asked to draw; field by field the options --scene, --size, --camera, --eye, --look-at, --up, --fovy.
+/// What the user asked to draw; field by field the options --scene, --size, --camera, --eye, --look-at, --up, --fovy,
+/// --orthographic and --undistorted.
 struct SceneRequest {
   /// A file of Gaussians, see read_gaussian_file(); FILE.spl; builtin:NAME; or NAME=FILE. Empty: builtin:object.
   std::string scene;
   std::optional<ImageSize> size;
-  std::optional<std::string> camera;  ///< as camera_from_file takes it; excludes the four below
+  std::optional<std::string> camera;   ///< as camera_from_file takes it; excludes the five below
+  Lenses lenses = Lenses::as_written;  ///< of the cameras of the file
   std::optional<Vec3> eye;
   std::optional<Vec3> look_at;
   std::optional<Vec3> up;
   std::optional<double> fovy_degrees;
+  std::optional<double> orthographic_height;  ///< as View has it; excludes the field of view
   PreprocessOptions preprocess;
   bool scene_cache = true;  ///< a built-in scene may come from the user's cache folder; see cached_builtin_scene()
   std::vector<std::string> meshes;  ///< files of meshes that are drawn with the scene, in this order; see read_mesh()
@@ -81,7 +84,7 @@ View view_of(const std::string& scene, const GaussianFile& gaussians);
 /// at the median position from a distance at which the middle 80 % of the positions fit (a ball of radius 0.5 and of
 /// three median sigmas at least), from the front (-z), 30 degrees to the left and 20 degrees above, with the world's
 /// up where the file says it is, else at 0,-1,0 (y points down, as in INRIA and COLMAP worlds; give --up 0,1,0 for y-up
-/// files), and a vertical field of view of 50 degrees. A scene so far out that a camera beside it rounds to where it is gets none.
+/// files), and a vertical field of view of 50 degrees. Without perspective it stands where a perspective would. A scene so far out that a camera beside it rounds to where it is gets none.
 /// NAME=FILE: the file in the place of the built-in scene NAME, whose size it has unless the request gives one; see
 /// scene_substitution(). The view is that of a file.
 /// .spl: the draw as it is; size, camera, view options, meshes and preprocessing other than the default are
