@@ -149,6 +149,13 @@ TEST_F(BadInput, Cameras) {
   refused_with_outputs({"run", "--scene", "good.ply", "--camera", "broken.json"}, {"broken.json"});
   refused_with_outputs({"run", "--scene", "good.ply", "--camera", "cameras.json", "--eye", "1,2,3"},
                        {"--eye", "--camera"});
+  refused_with_outputs({"run", "--scene", "good.ply", "--undistorted"}, {"--undistorted", "there is none", "--camera"});
+  refused({"reproduce", "--undistorted"}, {"--undistorted", "there is none", "--camera"});
+  refused_with_outputs({"run", "--scene", "good.ply", "--orthographic", "0"}, {"--orthographic", "1e-09 to 1e+09"});
+  refused_with_outputs({"run", "--scene", "good.ply", "--orthographic", "wide"}, {"--orthographic", "'wide'"});
+  refused_with_outputs({"run", "--orthographic", "3", "--fovy", "40"}, {"--fovy", "--orthographic"});
+  refused_with_outputs({"run", "--scene", "good.ply", "--camera", "cameras.json", "--orthographic", "3"},
+                       {"--orthographic", "--camera"});
 }
 
 TEST_F(BadInput, Machines) {

@@ -39,7 +39,7 @@ TEST_F(CommandLine, HelpMentionsEveryOptionAndShowsExamples) {
       "--plugin",       "--fidelity",       "--format",       "--effects",      "--termination",
       "--background",   "--output",         "--json",         "--save-draw",    "default: agx-orin",
       "default: cycle", "default: rgba16f", "default: paper", "default: 0,0,0", "pixels",
-      "DEGREES",        "Examples:"};
+      "DEGREES",        "Examples:",        "--undistorted",  "--orthographic", "HEIGHT"};
   for (const char* command : {"run", "compare", "accuracy"}) {
     const Finished help = vrpipe({command, "--help"});
     EXPECT_EQ(help.code, 0);

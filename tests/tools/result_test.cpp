@@ -363,14 +363,22 @@ TEST_F(Result, CameraHasItsFinalNumbers) {
   EXPECT_EQ(camera["up"], (json{0, -1, 0}));
   EXPECT_NEAR(camera["fovy_degrees"].get<double>(), 90, 1e-9);
   EXPECT_NEAR(camera["focal_pixels"][1].get<double>(), 12, 1e-9);
+  EXPECT_EQ(camera["projection"], "perspective");
+  EXPECT_EQ(camera["principal_point"], (json{16, 12}));
+  EXPECT_TRUE(camera["orthographic_height"].is_null());
   EXPECT_NEAR(camera["right"][0].get<double>(), 1, 1e-12);
   EXPECT_NEAR(camera["down"][1].get<double>(), 1, 1e-12);
   EXPECT_NEAR(camera["forward"][2].get<double>(), 1, 1e-12);
   EXPECT_TRUE(camera["file"].is_null() && camera["index"].is_null());
 
-  const json entry = {
-      {"width", 32}, {"height", 24}, {"position", {1, 2, -3}}, {"rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
-      {"fx", 20},    {"fy", 24}};
+  const json entry = {{"width", 32},
+                      {"height", 24},
+                      {"position", {1, 2, -3}},
+                      {"rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                      {"fx", 20},
+                      {"fy", 24},
+                      {"cx", 10},
+                      {"cy", 14.5}};
   write("cameras.json", json{entry, entry}.dump());
   std::vector<std::string> from_file{"run", "--scene", "builtin:object", "--fidelity", "functional"};
   from_file.insert(from_file.end(), {"--camera", "cameras.json#1"});
@@ -379,7 +387,16 @@ TEST_F(Result, CameraHasItsFinalNumbers) {
   EXPECT_EQ(read["index"], 1);
   EXPECT_EQ(read["eye"], (json{1, 2, -3}));
   EXPECT_EQ(read["focal_pixels"], (json{20, 24}));
+  EXPECT_EQ(read["principal_point"], (json{10, 14.5}));
   EXPECT_TRUE(read["look_at"].is_null() && read["up"].is_null());
+
+  std::vector<std::string> parallel = draw;
+  parallel.insert(parallel.end(), {"--orthographic", "3"});
+  const json orthographic = json_of(parallel)["camera"];
+  EXPECT_EQ(orthographic["projection"], "orthographic");
+  EXPECT_EQ(orthographic["orthographic_height"], 3);
+  EXPECT_EQ(orthographic["focal_pixels"], (json{8, 8}));
+  EXPECT_TRUE(orthographic["fovy_degrees"].is_null());
 
   EXPECT_FALSE(json_of(draw)["camera"]["look_at"].is_null()) << "the scene's own";
   EXPECT_TRUE(json_of({"run", "--scene", "tiny.spl"})["camera"].is_null());

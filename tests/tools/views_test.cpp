@@ -265,6 +265,36 @@ TEST_F(Views, WithoutAFileGoRoundTheScene) {
               tilted["views"][1]["camera"]["eye"][2].get<double>(), 1e-9);
 }
 
+TEST_F(Views, WithoutPerspectiveGoRoundTheSceneLikewise) {
+  const json result = json_of(command({"--views", "2", "--size", "16x12", "--orthographic", "3"}));
+  for (const json& view : result["views"]) {
+    EXPECT_EQ(view["camera"]["orthographic_height"], 3);
+    EXPECT_GT(view["scene"]["gaussians_visible"], 0);
+  }
+}
+
+TEST_F(Views, SayOnceWhatWasAssumedOfTheirCameras) {
+  json frames = json::array();
+  for (const double x : {-0.1, 0.0, 0.1}) {
+    frames.push_back({{"file_path", fmt::format("{}.png", x)},
+                      {"transform_matrix", {{1, 0, 0, x}, {0, -1, 0, 0}, {0, 0, -1, 0}, {0, 0, 0, 1}}}});
+  }
+  json file{{"fl_x", 90}, {"w", 64}, {"h", 48}, {"k1", 0.2}, {"frames", frames}};
+  write("transforms.json", file.dump());
+  const std::vector<std::string> all = command({"--camera", "transforms.json", "--views", "all"});
+  refused(all, {"k1 = 0.2", "--undistorted"});
+  std::vector<std::string> undistorted = all;
+  undistorted.emplace_back("--undistorted");
+  const std::string said = "note: cameras of transforms.json are taken without their distortion";
+  const std::string text = vrpipe(undistorted).out;
+  const std::size_t at = text.find(said);
+  ASSERT_NE(at, std::string::npos) << text;
+  EXPECT_EQ(text.find("note: ", at + 1), std::string::npos) << text;
+  file["camera_model"] = "OPENCV";
+  write("transforms.json", file.dump());
+  EXPECT_NE(vrpipe(all).out.find("taken as undistorted: nerfstudio"), std::string::npos);
+}
+
 TEST_F(Views, WithoutTimeHaveARatioAlone) {
   const json result = json_of(of_file({"--views", "3", "--fidelity", "functional"}));
   for (const json& view : result["views"]) {

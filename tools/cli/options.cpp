@@ -96,15 +96,20 @@ void SimulationArguments::declare_scene(Arguments& arguments) {
                        "a COLMAP model, and which camera of it, by number or by its image's name\n"
                        "(default: #0; docs/cameras.md)",
                        scene_group);
+  declare_undistorted(arguments, undistorted_);
   arguments.add_option("--eye", eye_, "X,Y,Z",
                        "where the camera stands, world units (default: chosen to fit the scene)", scene_group);
   arguments.add_option("--look-at", look_at_, "X,Y,Z", "the point in the middle of the image, world units",
                        scene_group);
   arguments.add_option("--up", up_, "X,Y,Z",
-                       "the world's up direction (default: 0,-1,0, since y points down in INRIA\n"
-                       "scenes; 0,1,0 for y-up files)",
+                       "the world's up direction (default: where the file says it is, else 0,-1,0,\n"
+                       "since y points down in INRIA scenes; 0,1,0 for y-up files)",
                        scene_group);
   arguments.add_option("--fovy", fovy_, "DEGREES", "vertical field of view (default: the scene's own, 50 for a file)",
+                       scene_group);
+  arguments.add_option("--orthographic", orthographic_, "HEIGHT",
+                       "in place of --fovy: without perspective, and how many world units the image's\n"
+                       "height spans",
                        scene_group);
   arguments.add_flag("--no-scene-cache", no_scene_cache_,
                      "makes a built-in scene anew, instead of reading what the same build has made\n"
@@ -215,6 +220,22 @@ void SimulationArguments::declare_changes(Arguments& arguments) {
                        "repeated (`vrpipe units` lists all, with units, ranges and defaults)",
                        machine_group);
   declare_units(arguments, units_, plugins_);
+}
+
+void declare_undistorted(Arguments& arguments, bool& undistorted) {
+  arguments.add_flag("--undistorted", undistorted,
+                     "of --camera: takes distorted cameras without their distortion, for a model that\n"
+                     "was trained on undistorted images",
+                     scene_group);
+}
+
+Lenses lenses_of(bool undistorted, const Values& cameras) {
+  if (!undistorted) return Lenses::as_written;
+  if (cameras.empty()) {
+    throw UserError("cannot use option", "--undistorted", "it is of the cameras of a file, and there is none",
+                    "add --camera, or leave it out");
+  }
+  return Lenses::undistorted;
 }
 
 void declare_units(Arguments& arguments, Values& units, Values& plugins) {
@@ -345,11 +366,15 @@ SceneRequest SimulationArguments::scene_request() const {
   if (const auto text = single(size_, "--size")) request.size = parse_size(*text, "--size");
   request.meshes = meshes_;
   request.camera = single(camera_, "--camera");
+  request.lenses = lenses_of(undistorted_, camera_);
   if (const auto text = single(eye_, "--eye")) request.eye = parse_triple(*text, "--eye", "X,Y,Z", "2,-1.5,-4");
   if (const auto text = single(look_at_, "--look-at"))
     request.look_at = parse_triple(*text, "--look-at", "X,Y,Z", "0,0,0");
   if (const auto text = single(up_, "--up")) request.up = parse_triple(*text, "--up", "X,Y,Z", "0,-1,0");
   if (const auto text = single(fovy_, "--fovy")) request.fovy_degrees = parse_number(*text, "--fovy");
+  if (const auto text = single(orthographic_, "--orthographic")) {
+    request.orthographic_height = parse_number(*text, "--orthographic");
+  }
   return request;
 }
 

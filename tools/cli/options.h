@@ -78,7 +78,7 @@ class SimulationArguments {
   std::shared_ptr<const EnergyTable> energies(const Platform& platform) const;
 
   Values meshes_;
-  Values scene_, frame_, draws_, passes_, size_, camera_, eye_, look_at_, up_, fovy_;
+  Values scene_, frame_, draws_, passes_, size_, camera_, eye_, look_at_, up_, fovy_, orthographic_;
   Values platform_, settings_, variant_, definitions_, units_, plugins_;
   Values fidelity_, effects_, format_, termination_;
   Values views_, journal_, relative_to_;
@@ -88,6 +88,7 @@ class SimulationArguments {
   Values energies_;
   bool energy_ = false;
   bool no_scene_cache_ = false;
+  bool undistorted_ = false;
   bool explain_effects_ = false;
 };
 
@@ -96,6 +97,10 @@ constexpr unsigned most_views = 100'000;
 
 /// --json, for the result of simulations.
 void declare_result_json(Arguments& arguments, Values& json);
+/// --undistorted, of the cameras of --camera.
+void declare_undistorted(Arguments& arguments, bool& undistorted);
+/// What these say together. Throws UserError when there are no cameras.
+Lenses lenses_of(bool undistorted, const Values& cameras);
 /// --unit and --plugin.
 void declare_units(Arguments& arguments, Values& units, Values& plugins);
 /// --jobs.

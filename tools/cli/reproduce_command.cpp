@@ -54,6 +54,7 @@ class ReproduceCommand : public Command {
                          scene_group);
     arguments.add_option("--camera", cameras_, "NAME=FILE[#CAMERA]",
                          "cameras of such a model; the views are of this file, too; can be repeated", scene_group);
+    declare_undistorted(arguments, undistorted_);
     arguments.add_option("--size", size_, "WxH", "image size of every scene, pixels (default: the paper's)",
                          scene_group);
     arguments.add_option("--views", views_, "N", "views of each scene for early-termination ratios (default: 6)",
@@ -135,10 +136,11 @@ class ReproduceCommand : public Command {
       }
       job.inputs.push_back({"--scene", path});
     }
+    job.options.lenses = lenses_of(undistorted_, cameras_);
     for (const std::string& text : cameras_) {
       job.options.cameras.push_back(camera_of_scene(text));
       const std::string& camera = job.options.cameras.back().second;
-      static_cast<void>(camera_from_file(camera));
+      static_cast<void>(camera_from_file(camera, std::nullopt, job.options.lenses));
       for (const auto& file : camera_files(camera_choice(camera).file)) job.inputs.push_back({"--camera", file});
     }
     if (const auto text = single(size_, "--size")) job.size = parse_size(*text, "--size");
@@ -195,7 +197,7 @@ class ReproduceCommand : public Command {
 
   Values scenes_, cameras_, size_, views_, platform_, settings_, units_, plugins_, fidelity_;
   Values output_, json_, html_, markdown_, journal_, jobs_;
-  bool quick_ = false;
+  bool quick_ = false, undistorted_ = false;
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "jobs/loaded_frame.h"
 
+#include <algorithm>
 #include <map>
 #include <string>
 #include <utility>
@@ -20,7 +21,9 @@ SceneRequest seen_from(const Viewpoint& viewpoint, SceneRequest options) {
     options.eye = viewpoint.view->eye;
     options.look_at = viewpoint.view->look_at;
     options.up = viewpoint.view->up;
+    options.orthographic_height = viewpoint.view->orthographic_height;
     options.fovy_degrees = viewpoint.view->fovy_degrees;
+    if (options.orthographic_height) options.fovy_degrees.reset();
   }
   return options;
 }
@@ -33,7 +36,10 @@ void add(const SceneSummary& scene, SceneSummary& sum) {
   sum.rejected.zero_quaternion += scene.rejected.zero_quaternion;
   sum.triangles += scene.triangles;
   sum.triangles_rejected += scene.triangles_rejected;
-  sum.notes.insert(sum.notes.end(), scene.notes.begin(), scene.notes.end());
+  // Those of the camera, which all scenes share, once.
+  for (const std::string& note : scene.notes) {
+    if (std::find(sum.notes.begin(), sum.notes.end(), note) == sum.notes.end()) sum.notes.push_back(note);
+  }
 }
 
 void check(const FrameCommand& command, const Draw& geometry, const LoadedFrame& frame) {

@@ -71,6 +71,7 @@ class PointFrames {
     SceneRequest request;
     request.scene = plan_.scenes[scene].request;
     request.camera = plan_.scenes[scene].camera;
+    request.lenses = job_.options.lenses;
     request.size = job_.size;
     scene_ = open_scene(request);
     own_ = scene_->viewpoint;
@@ -82,7 +83,7 @@ class PointFrames {
     if (view == 0) return own_;
     const ImageSize size{own_.camera.width, own_.camera.height};
     if (own_.view) return {look_at(orbit_views(*own_.view, plan_.views)[view], size), {}, {}};
-    const std::vector<Camera> cameras = load_cameras(own_.file->file);
+    const std::vector<Camera> cameras = load_cameras(own_.file->file, job_.options.lenses);
     return {resized(cameras[view * cameras.size() / plan_.views], size), {}, {}};
   }
 
@@ -102,7 +103,9 @@ nlohmann::json reproduce_identity(const ReproduceJob& job, const ReproducePlan& 
     nlohmann::json cameras;
     if (scene.camera) {
       const CameraChoice choice = camera_choice(*scene.camera);
-      cameras = {{"files", file_identity(choice.file)}, {"camera", valid_utf8(choice.camera.value_or("0"))}};
+      cameras = {{"files", file_identity(choice.file)},
+                 {"camera", valid_utf8(choice.camera.value_or("0"))},
+                 {"lenses", job.options.lenses}};
     }
     const bool is_builtin = scene.request.rfind("builtin:", 0) == 0;
     scenes.push_back({{"scene", is_builtin ? nlohmann::json(scene.request) : scene_identity(scene.request)},

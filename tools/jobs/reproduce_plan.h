@@ -60,6 +60,7 @@ struct ReproduceOptions {
   bool quick = false;
   std::optional<std::size_t> views;                          ///< of each scene; none: as many as there is time for
   std::vector<std::pair<std::string, std::string>> cameras;  ///< scene and SceneRequest::camera
+  Lenses lenses = Lenses::as_written;                        ///< of these
   std::vector<std::string> substitutions;                    ///< NAME=FILE
   RunRequest base;                                           ///< platform, settings and so on of every point
   std::optional<Fidelity> fidelity;  ///< of the main comparison; none: as exact as there is time for

@@ -253,7 +253,8 @@ nlohmann::json sweep_identity(const SweepJob& job) {
                           variants = nlohmann::json::array();
   if (common.scene.camera)
     cameras = {{"files", file_identity(camera_choice(*common.scene.camera).file)},
-               {"camera", valid_utf8(*common.scene.camera)}};
+               {"camera", valid_utf8(*common.scene.camera)},
+               {"lenses", common.scene.lenses}};
   for (const std::string& mesh : common.scene.meshes) meshes.push_back(file_identity(mesh));
   for (const PluginFile& plugin : common.provenance.plugins) plugins.push_back(plugin.sha256);
   for (const Variant& variant : vrpipe::variants()) {
@@ -274,7 +275,8 @@ nlohmann::json sweep_identity(const SweepJob& job) {
           {"cameras", cameras},
           {"view",
            {numbers(scene.eye), numbers(scene.look_at), numbers(scene.up),
-            scene.fovy_degrees ? nlohmann::json(*scene.fovy_degrees) : nlohmann::json()}},
+            scene.fovy_degrees ? nlohmann::json(*scene.fovy_degrees) : nlohmann::json(),
+            scene.orthographic_height ? nlohmann::json(*scene.orthographic_height) : nlohmann::json()}},
           {"size", scene.size ? nlohmann::json{scene.size->width, scene.size->height} : nlohmann::json()},
           {"common", request_identity(common.requests.front())},
           {"variants", variants},

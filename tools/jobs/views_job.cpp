@@ -39,7 +39,7 @@ std::vector<Viewpoint> all_cameras(const SimulationJob& job, const ViewsChoice& 
   const std::optional<ImageSize>& size = job.scene.size;
   if (job.scene.camera) {
     const std::string file = camera_choice(*job.scene.camera).file;
-    for (Camera& camera : load_cameras(file)) {
+    for (Camera& camera : load_cameras(file, job.scene.lenses)) {
       CameraName name{file, cameras.size(), camera.name};
       cameras.push_back({size ? resized(camera, *size) : std::move(camera), {}, std::move(name)});
     }
@@ -88,8 +88,9 @@ nlohmann::json cameras_identity(const ViewsResult& result) {
   for (const ViewResult& view : result.views) {
     const Camera& camera = view.viewpoint.camera;
     all.push_back({view.index, valid_utf8(camera.name), numbers(camera.eye), numbers(camera.rotation[0]),
-                   numbers(camera.rotation[1]), numbers(camera.rotation[2]), camera.fx, camera.fy, camera.width,
-                   camera.height, camera.near_plane, camera.far_plane});
+                   numbers(camera.rotation[1]), numbers(camera.rotation[2]), camera.fx, camera.fy, camera.cx(),
+                   camera.cy(), camera.projection, camera.width, camera.height, camera.near_plane, camera.far_plane,
+                   valid_utf8(fmt::format("{}", fmt::join(camera.notes, "; ")))});
   }
   std::error_code ignored;
   const nlohmann::json file =

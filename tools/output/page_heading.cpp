@@ -48,7 +48,9 @@ std::string camera_text(const JobResult& result) {
   text += "at " + triple_text(camera["eye"]);
   text += camera["look_at"].is_null() ? ", forward " + triple_text(camera["forward"])
                                       : ", looking at " + triple_text(camera["look_at"]);
-  return text + fmt::format(", {} degrees high", camera["fovy_degrees"].get<double>());
+  return text + (camera["fovy_degrees"].is_null()
+                     ? fmt::format(", {} world units high, orthographic", camera["orthographic_height"].get<double>())
+                     : fmt::format(", {} degrees high", camera["fovy_degrees"].get<double>()));
 }
 
 std::string scene_text(const JobResult& result) {

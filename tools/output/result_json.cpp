@@ -281,6 +281,7 @@ Json camera_json(const std::optional<Viewpoint>& viewpoint) {
   const auto column = [&rows = camera.rotation](glm::length_t i) {
     return vector_json({rows[0][i], rows[1][i], rows[2][i]});
   };
+  const bool is_perspective = camera.projection == Projection::perspective;
   constexpr double degrees = 57.29577951308232;
   return {{"file", file ? Json(file->file) : Json()},
           {"index", file ? Json(file->index) : Json()},
@@ -288,11 +289,14 @@ Json camera_json(const std::optional<Viewpoint>& viewpoint) {
           {"eye", vector_json(camera.eye)},
           {"look_at", view ? vector_json(view->look_at) : Json()},
           {"up", view ? vector_json(view->up) : Json()},
-          {"fovy_degrees", 2 * degrees * std::atan(0.5 * camera.height / camera.fy)},
+          {"projection", is_perspective ? "perspective" : "orthographic"},
+          {"fovy_degrees", is_perspective ? Json(2 * degrees * std::atan(0.5 * camera.height / camera.fy)) : Json()},
+          {"orthographic_height", is_perspective ? Json() : Json(camera.height / camera.fy)},
           {"right", column(0)},
           {"down", column(1)},
           {"forward", column(2)},
           {"focal_pixels", {camera.fx, camera.fy}},
+          {"principal_point", {camera.cx(), camera.cy()}},
           {"near_plane", camera.near_plane}};
 }
 

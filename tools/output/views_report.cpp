@@ -135,7 +135,15 @@ std::string view_remarks(const ViewsResult& result) {
   for (const ViewResult& view : result.views) empty += view.runs.front().counts.fragments_rasterized == 0 ? 1U : 0U;
   if (empty > 0) text += fmt::format("{} with nothing visible, without speed-up and ratio\n", count_of(empty, "view"));
   text += views_validated_text(result);
-  for (const std::string& note : result.views.front().scene.notes) text += "note: " + printable(note) + "\n";
+  // Cameras of a file have notes of their own.
+  std::vector<std::string> said;
+  for (const ViewResult& view : result.views) {
+    for (const std::string& note : view.scene.notes) {
+      if (std::find(said.begin(), said.end(), note) != said.end()) continue;
+      said.push_back(note);
+      text += "note: " + printable(note) + "\n";
+    }
+  }
   text += fmt::format("took {:.1f} s to load the scene, {:.1f} s to simulate {}", result.load_seconds,
                       result.simulate_seconds, count_of(result.views.size() - result.done_before, "view"));
   text += fmt::format(" in {} process{}", result.processes, result.processes == 1 ? "" : "es at a time");

@@ -53,7 +53,7 @@ FileBytes part_of(const FileBytes& bytes, std::uint64_t offset, std::uint64_t si
 }
 
 /// The numbers of an accessor, all of which are there.
-struct Numbers {
+struct AccessorNumbers {
   FileBytes bytes;  ///< holds them
   const std::byte* first = nullptr;
   std::uint64_t count = 0, stride = 0;
@@ -87,9 +87,9 @@ struct Placement {
 };
 
 /// A primitive of Gaussians in its place.
-struct Part {
-  Numbers position, rotation, scale, opacity, f_dc;
-  std::vector<Numbers> rest;
+struct PlacedPrimitive {
+  AccessorNumbers position, rotation, scale, opacity, f_dc;
+  std::vector<AccessorNumbers> rest;
   int degree = 0;
   Placement placement;
 };
@@ -116,7 +116,7 @@ class GltfGaussians {
   GaussianFile read() {
     std::uint64_t count = 0;
     int degree = 0;
-    for (const Part& part : parts_) {
+    for (const PlacedPrimitive& part : parts_) {
       count += part.position.count;
       degree = std::max(degree, part.degree);
     }
@@ -137,7 +137,7 @@ class GltfGaussians {
     }
     GaussianArray gaussians(count, degree, file_.bytes.where());
     std::uint64_t first = 0;
-    for (const Part& part : parts_) {
+    for (const PlacedPrimitive& part : parts_) {
       const HarmonicsTurn harmonics(part.placement.turn);
       decode_into(gaussians, first, part.position.count, [&](std::uint64_t index, GaussianAttributes& gaussian) {
         decode(part, index, has_logarithms, gaussian);
@@ -243,7 +243,8 @@ class GltfGaussians {
   }
 
   /// The accessor that `attributes` has as `name`, of `components` each.
-  Numbers numbers(const Json& attributes, const std::string& name, std::uint64_t components, const std::string& place) {
+  AccessorNumbers numbers(const Json& attributes, const std::string& name, std::uint64_t components,
+                          const std::string& place) {
     const std::string of = place + "." + name;
     if (!attributes.contains(name)) fail(place + " has no `" + name + "`", kGltfRemedy);
     const Json& accessor = element("accessors", json_count(attributes[name], of, file_.bytes), of);
@@ -251,7 +252,7 @@ class GltfGaussians {
     if (!accessor.contains("type") || accessor["type"] != shape) fail(of + " is not of type " + shape, kGltfRemedy);
     if (accessor.contains("sparse") || !accessor.contains("bufferView"))
       fail(of + " has a sparse accessor, or one without data", kGltfRemedy);
-    Numbers result;
+    AccessorNumbers result;
     result.type = whole(accessor, "componentType", of);
     const bool is_known = (result.type >= 5120 && result.type <= 5123) || result.type == 5126;
     if (!is_known) fail(of + " is of neither bytes, shorts nor floats", kGltfRemedy);
@@ -407,9 +408,9 @@ class GltfGaussians {
     }
   }
 
-  Part part(const Json& attributes, const std::string& place) {
+  PlacedPrimitive part(const Json& attributes, const std::string& place) {
     const std::string prefix = std::string(kExtension) + ":";
-    Part part;
+    PlacedPrimitive part;
     part.position = numbers(attributes, "POSITION", 3, place);
     part.rotation = numbers(attributes, prefix + "ROTATION", 4, place);
     part.scale = numbers(attributes, prefix + "SCALE", 3, place);
@@ -421,9 +422,9 @@ class GltfGaussians {
       for (int n = 0; n <= 2 * degree; ++n) part.rest.push_back(numbers(attributes, name(n), 3, place));
       part.degree = degree;
     }
-    std::vector<const Numbers*> all = {&part.rotation, &part.scale, &part.opacity, &part.f_dc};
-    for (const Numbers& each : part.rest) all.push_back(&each);
-    for (const Numbers* each : all) {
+    std::vector<const AccessorNumbers*> all = {&part.rotation, &part.scale, &part.opacity, &part.f_dc};
+    for (const AccessorNumbers& each : part.rest) all.push_back(&each);
+    for (const AccessorNumbers* each : all) {
       if (each->count != part.position.count) {
         fail(fmt::format("an attribute of {} has {} elements, and its POSITION {}", place, each->count,
                          part.position.count),
@@ -435,7 +436,7 @@ class GltfGaussians {
 
   /// A scale is not; its logarithm may be.
   bool any_scale_is_negative() const {
-    for (const Part& part : parts_) {
+    for (const PlacedPrimitive& part : parts_) {
       for (std::uint64_t i = 0; i < part.scale.count; ++i) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
           if (part.scale.at(i, axis) < 0) return true;
@@ -445,7 +446,8 @@ class GltfGaussians {
     return false;
   }
 
-  static void decode(const Part& part, std::uint64_t index, bool has_logarithms, GaussianAttributes& gaussian) {
+  static void decode(const PlacedPrimitive& part, std::uint64_t index, bool has_logarithms,
+                     GaussianAttributes& gaussian) {
     for (std::size_t i = 0; i < 3; ++i) {
       gaussian.position[i] = static_cast<float>(part.position.at(index, i));
       const double scale = part.scale.at(index, i);
@@ -459,7 +461,7 @@ class GltfGaussians {
     gaussian.opacity_logit = logit_of_opacity(part.opacity.at(index, 0));
   }
 
-  static void place(const Part& part, const HarmonicsTurn& harmonics, std::uint64_t index,
+  static void place(const PlacedPrimitive& part, const HarmonicsTurn& harmonics, std::uint64_t index,
                     const std::array<double, 3>& origin, GaussianAttributes& gaussian) {
     const Placement& placement = part.placement;
     if (placement.is_none) return;
@@ -481,7 +483,7 @@ class GltfGaussians {
   std::optional<FileBytes> binary_;  ///< of a .glb
   std::map<std::uint64_t, FileBytes> buffers_;
   std::uint64_t bytes_read_ = 0;
-  std::vector<Part> parts_;
+  std::vector<PlacedPrimitive> parts_;
   std::size_t other_primitives_ = 0;
   std::set<std::string> notes_;
 };
