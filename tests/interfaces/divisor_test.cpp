@@ -1,5 +1,7 @@
 #include <vrpipe/arithmetic/divisor.h>
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 #include <vrpipe/arithmetic/random.h>
@@ -30,6 +32,20 @@ TEST(Divisor, IsExactUpToItsLimitForAnyDivisor) {
     const std::uint64_t dividend = limit == 0 ? 0 : mix(2 * i + 1) % limit;
     ASSERT_EQ(by.quotient(dividend), dividend / divisor) << dividend << " / " << divisor;
     ASSERT_EQ(by.quotient(limit - 1), (limit - 1) / divisor) << limit - 1 << " / " << divisor;
+  }
+}
+
+TEST(Divisor, DividesAnyDividendWithItsRemainder) {
+  for (std::uint64_t i = 0; i < 200'000; ++i) {
+    const std::uint64_t divisor = std::max<std::uint64_t>(mix(2 * i) >> (1 + mix(i) % 63), 1);
+    const Divisor by(divisor);
+    const std::uint64_t any = mix(2 * i + 1);
+    const std::uint64_t multiple = any - any % divisor;
+    for (const std::uint64_t dividend : {any, multiple, multiple - 1, ~std::uint64_t{0}, std::uint64_t{0}}) {
+      const Divisor::Division divided = by.divide(dividend);
+      ASSERT_EQ(divided.quotient, dividend / divisor) << dividend << " / " << divisor;
+      ASSERT_EQ(divided.remainder, dividend % divisor) << dividend << " / " << divisor;
+    }
   }
 }
 

@@ -5,7 +5,7 @@
 namespace vrpipe {
 
 /// Divides by a number known only at run time, with a multiplication: a division takes several times as long.
-/// Exact for dividends up to 2^64 / divisor.
+/// A quotient alone is exact for dividends up to 2^64 / divisor.
 class Divisor {
  public:
   /// @param divisor not 0
@@ -19,6 +19,15 @@ class Divisor {
   }
   /// The same, rounded up.
   std::uint64_t quotient_up(std::uint64_t dividend) const { return quotient(dividend + divisor_ - 1); }
+  struct Division {
+    std::uint64_t quotient, remainder;
+  };
+  /// Both, exact for any dividend; of divisors up to 2^63.
+  Division divide(std::uint64_t dividend) const {
+    const std::uint64_t estimate = quotient(dividend);  // beyond its limit perhaps one too much
+    const std::uint64_t rest = dividend - estimate * divisor_;
+    return rest < divisor_ ? Division{estimate, rest} : Division{estimate - 1, rest + divisor_};
+  }
 
  private:
   __extension__ typedef unsigned __int128 Product;  // NOLINT(modernize-use-using): takes no __extension__
