@@ -38,9 +38,6 @@ void CacheOrganization::check(const std::string& cache, const std::string& compo
   require(bytes % set_bytes == 0, of_ways + ", " + of_bytes,
           fmt::format("{} lines are no whole sets of {} ways", lines(), ways),
           "use a number of ways that divides the number of lines");
-  require(is_power_of_two(sets()), of_ways + ", " + of_bytes,
-          fmt::format("{} lines in sets of {} ways are {} sets, no power of two", lines(), ways, sets()),
-          "use bytes = a power of two x ways x line");
   if (replacement == Replacement::tree_plru) {
     const std::uint32_t leaves = ways_of_a_set();
     require(is_power_of_two(leaves) && leaves >= 2 && leaves <= 64, component + ".replacement, " + of_ways,
@@ -58,8 +55,10 @@ CacheParameters::CacheParameters(ParameterSet& owner, const Defaults& defaults)
       replacement(owner, "replacement", {"lru", "fifo", "random", "tree-plru"}, 0, source::open,
                   "of the lines of a set that nobody waits for, which one goes"),
       random_seed(owner, "random_seed", 0, 0, 0xffffffffU, "", source::open, "of random replacement"),
-      hash_sets(owner, "hash_sets", false, source::open,
-                "a line's set follows from all bits of its address, not from the lowest alone"),
+      hash_sets(
+          owner, "hash_sets", false, source::open,
+          "a line's set follows from all bits of its address, not from its number mod sets alone: they are XORed, "
+          "or, where sets are no power of two, a pseudo-random number of the higher ones is added"),
       tell_conflicts(owner, "tell_conflicts", false, "takes the host's time",
                      "tell conflict misses from capacity misses, among which they are counted otherwise") {}
 

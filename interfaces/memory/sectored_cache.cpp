@@ -45,7 +45,7 @@ SectoredCache::SectoredCache(const CacheOrganization& organization, SectoredCach
   line_shift_ = log2_of(organization.line_bytes);
   sector_shift_ = log2_of(organization.sector_bytes);
   sector_bytes_ = organization.sector_bytes;
-  set_bits_ = log2_of(organization.sets());
+  interleaving_ = Interleaving(organization.sets());
   lines_.resize(organization.lines());
   for (Line line = 0; line < lines_.size(); ++line) lines_[line].set = line / ways_;
   sets_.resize(organization.sets());

@@ -64,14 +64,11 @@ CacheOrganization checked(const SectoredL2Parameters& parameters) {
   const std::string slot = parameters.level.slot;
   organization.check(name, slot, "bytes");
   const std::uint32_t banks = parameters.banks;
-  if ((banks & (banks - 1)) != 0) {
-    throw UserError("unusable " + name, slot + ".banks", fmt::format("{} is no power of two", banks),
-                    "use a power of two");
-  }
-  if (banks > organization.sets()) {
-    throw UserError("unusable " + name, slot + ".banks, " + slot + ".ways",
-                    fmt::format("{} sets cannot be dealt out to {} banks", organization.sets(), banks),
-                    fmt::format("use at most {} banks, or fewer ways", organization.sets()));
+  if (organization.sets() % banks != 0) {
+    const std::uint64_t of_banks = std::uint64_t{banks} * organization.ways_of_a_set() * organization.line_bytes;
+    throw UserError("unusable " + name, slot + ".banks, " + slot + ".bytes",
+                    fmt::format("{} sets cannot be dealt out evenly to {} banks", organization.sets(), banks),
+                    fmt::format("use a multiple of {} bytes (banks x ways x line), or other banks or ways", of_banks));
   }
   return organization;
 }
@@ -98,6 +95,7 @@ SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderConte
       last_of_line_(cache_.organization().line_bytes - 1),
       sector_shift_(static_cast<unsigned>(__builtin_ctz(cache_.organization().sector_bytes))),
       bank_width_(sizes_.bank_bytes_per_cycle),
+      interleaving_(sizes_.banks),
       origins_(cache_.organization().lines()),
       bank_cycles_(sizes_.banks) {}
 

@@ -7,6 +7,7 @@
 
 #include <vrpipe/arithmetic/divisor.h>
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/memory/interleaving.h>
 #include <vrpipe/memory/memory_request.h>
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/pipeline/render_context.h>
@@ -55,7 +56,9 @@ struct SectoredL2Parameters : ParameterSet {
                         "what a write of a part of a sector does that is not there: has it filled, or marks its bytes"};
   Switch hold_attributes{*this, "hold_attributes", level.holds_attributes, level.holds_source,
                          "a line of attributes goes only where its set has no other that can"};
-  Integer banks{*this, "banks", level.banks, 1, 64, "banks", level.banks_source, "among which the sets are dealt out"};
+  Integer banks{
+      *this, "banks", level.banks,        1,
+      64,    "banks", level.banks_source, "among which the sets are dealt out evenly: set n is in bank n mod banks"};
   Integer bank_bytes_per_cycle{*this,
                                "bank_bytes_per_cycle",
                                32,
@@ -110,7 +113,8 @@ class L2Observer {
 /// stays there.
 class SectoredL2 final : public MemoryBehaviour {
  public:
-  /// Throws UserError for a cache that cannot be, more banks than sets, or a port or bank narrower than a sector.
+  /// Throws UserError for a cache that cannot be, sets that cannot be dealt out evenly to the banks, or a port or bank
+  /// narrower than a sector.
   SectoredL2(const SectoredL2Parameters& parameters, const RenderContext& context);
 
   void access(const MemoryRequest& request) override;
@@ -150,7 +154,7 @@ class SectoredL2 final : public MemoryBehaviour {
     return writes_through_ && request.command == tlm::TLM_WRITE_COMMAND;
   }
   /// Of a piece of a request.
-  std::uint32_t bank_of(std::uint64_t address) const { return cache_.set_of(address) & (sizes_.banks - 1); }
+  std::uint32_t bank_of(std::uint64_t address) const { return interleaving_.share(cache_.set_of(address)).place; }
   SectoredCache& cache() { return cache_; }
   SectoredCacheStatistics& statistics() { return statistics_; }
   /// At a port.
@@ -237,6 +241,7 @@ class SectoredL2 final : public MemoryBehaviour {
   const std::uint64_t last_of_line_;  ///< byte
   const unsigned sector_shift_;       ///< log2 of the bytes of a sector
   const Divisor bank_width_;          ///< bytes a cycle
+  const Interleaving interleaving_;   ///< of sets, to banks
   L2Observer* observer_ = nullptr;
   std::vector<MemoryOrigin> origins_;       ///< by line of the cache
   std::vector<std::uint64_t> bank_cycles_;  ///< by bank

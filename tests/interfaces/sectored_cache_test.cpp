@@ -1,5 +1,6 @@
 #include <vrpipe/memory/sectored_cache.h>
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -132,6 +133,31 @@ TEST(SectoredCache, HashedSetsSpreadAPowerOfTwoStride) {
   }
   EXPECT_EQ(plain.counted.statistics.sector_misses.value(), 256U) << "all in one set";
   EXPECT_EQ(hashed.counted.statistics.sector_misses.value(), 64U) << "four in each";
+}
+
+TEST(SectoredCache, AnyNumberOfSetsHoldsItsCapacityAndLinesGoRoundThem) {
+  for (const std::uint32_t sets : {3U, 5U, 10U, 12U, 40U, 48U, 3072U}) {
+    for (const bool hashes : {false, true}) {
+      CacheOrganization organization = of_lines(sets * 4, 4);
+      organization.hashes_sets = hashes;
+      LineReader reader(organization);
+      for (unsigned round = 0; round < 3; ++round) {
+        for (std::uint64_t line = 0; line < sets * 4; ++line) reader.misses(line);
+      }
+      EXPECT_EQ(reader.counted.statistics.line_misses.value(), sets * 4) << sets;
+      // Without hashing, neighbours are in neighbouring sets; whatever is above, all sets have one of as many lines.
+      const SectoredCache cache(organization, reader.counted.statistics);
+      std::set<std::uint32_t> found;
+      constexpr std::uint64_t far = std::uint64_t{1} << 44U;
+      for (std::uint64_t i = 0; i < sets; ++i) {
+        const std::uint64_t line = far / 128 / sets * sets + i;
+        found.insert(cache.set_of(line * 128));
+        EXPECT_TRUE(hashes || cache.set_of(line * 128) == i);
+      }
+      EXPECT_EQ(found.size(), sets);
+      EXPECT_EQ(*found.rbegin(), sets - 1);
+    }
+  }
 }
 
 TEST(SectoredCache, APinnedLineStaysAndWithoutOthersNoneCanBeHad) {
@@ -347,11 +373,11 @@ TEST(CacheOrganization, RefusesWhatCannotBeAndNamesTheRule) {
   refused(made(1024, 128, 32, 16), "crop.ways, crop.cache_bytes",
           "16 ways of 128 bytes are more than the cache of 1024");
   refused(made(1024, 128, 32, 3), "crop.ways, crop.cache_bytes", "8 lines are no whole sets of 3 ways");
-  refused(made(6 * 128, 128, 32, 2), "crop.ways, crop.cache_bytes", "are 3 sets, no power of two");
   refused(made(6 * 128, 128, 32, 6, Replacement::tree_plru), "crop.replacement, crop.ways", "and this has 6");
   refused(made(16384, 128, 32, 0, Replacement::tree_plru), "crop.replacement, crop.ways", "and this has 128");
   made(48 * 1024, 128, 32, 6).check("L1", "l1", "bytes");
   made(3 * 128, 128, 32, 0).check("L1", "l1", "bytes");
+  made(6 * 128, 128, 32, 2).check("L1", "l1", "bytes");
   made(1024, 1024, 32, 1).check("L1", "l1", "bytes");
 }
 

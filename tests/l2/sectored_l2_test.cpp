@@ -205,7 +205,12 @@ TEST(SectoredL2, ReadsAndWritesBelowWhatACacheByItsDefinitionWould) {
                                {{"ways", "4"}, unheld},
                                {{"ways", "2"}, {"hash_sets", "off"}, {"tell_conflicts", "on"}},
                                {{"ways", "8"}, {"replacement", "tree-plru"}},
-                               {{"ways", "0"}, {"replacement", "random"}, {"banks", "1"}}};
+                               {{"ways", "0"}, {"replacement", "random"}, {"banks", "1"}},
+                               {{"bytes", "30K"}, {"ways", "4"}, {"banks", "12"}},
+                               {{"bytes", "30K"}, {"ways", "2"}, {"banks", "10"}, {"hash_sets", "on"}},
+                               {{"bytes", "40K"}, {"ways", "8"}, {"banks", "40"}, {"hash_sets", "on"}},
+                               {{"bytes", "33K"}, {"ways", "8"}, {"banks", "3"}, {"replacement", "fifo"}},
+                               {{"bytes", "30K"}, {"ways", "5"}, {"banks", "48"}, {"tell_conflicts", "on"}}};
   for (Settings settings : variants) {
     settings.insert(settings.begin(), {{"bytes", "32K"}, {"banks", "8"}});
     L2 l2(settings);
@@ -314,6 +319,43 @@ TEST(SectoredL2, NeighbouringLinesAreInOtherBanksAndAllBanksHaveTheirShare) {
   }
 }
 
+struct RealL2 {
+  const char* bytes;
+  std::uint32_t banks, sets;
+};
+constexpr RealL2 real_l2s[] = {{"6M", 12, 3072}, {"5M", 10, 2560},    {"40M", 40, 20480},
+                               {"3M", 6, 1536},  {"5632K", 11, 2816}, {"6M", 48, 3072}};
+
+TEST(SectoredL2, MayHaveTheBanksOfRealGpus) {
+  for (const RealL2& real : real_l2s) {
+    for (const char* hashed : {"on", "off"}) {
+      const L2 l2(Settings{{"bytes", real.bytes}, {"banks", std::to_string(real.banks)}, {"hash_sets", hashed}});
+      EXPECT_EQ(l2.behaviour->cache().organization().sets(), real.sets);
+      // As many neighbouring lines as banks: one in each.
+      const std::uint64_t first = (std::uint64_t{1} << 30U) * real.sets;
+      for (std::uint64_t round = 0; round < 5000; ++round) {
+        std::set<std::uint32_t> banks;
+        for (std::uint64_t i = 0; i < real.banks; ++i) {
+          banks.insert(l2.behaviour->bank_of(128 * (first + round * real.banks + i)));
+        }
+        ASSERT_EQ(banks.size(), real.banks);
+        ASSERT_EQ(*banks.rbegin(), real.banks - 1);
+      }
+      // Every set is in one bank, and each bank has as many.
+      std::map<std::uint32_t, std::set<std::uint32_t>> sets_of;
+      std::set<std::uint32_t> sets;
+      for (std::uint64_t line = 0; line < 3 * std::uint64_t{real.sets}; ++line) {
+        const std::uint32_t set = l2.behaviour->cache().set_of(128 * line);
+        sets_of[l2.behaviour->bank_of(128 * line)].insert(set);
+        sets.insert(set);
+      }
+      EXPECT_EQ(sets.size(), real.sets);
+      EXPECT_EQ(sets_of.size(), real.banks);
+      for (const auto& [bank, of_bank] : sets_of) EXPECT_EQ(of_bank.size(), real.sets / real.banks) << bank;
+    }
+  }
+}
+
 TEST(SectoredL2, ItsBanksAreBusyForTheBytesThatTheyMove) {
   L2 l2(Settings{{"bank_bytes_per_cycle", "32"}, {"port_requests", "1"}});
   for (std::uint64_t line = 0; line < 32; ++line) l2.read(128 * line, 128);
@@ -348,7 +390,9 @@ TEST(L1, IsAsLargeAsThoseOf16CoresAndWritesThrough) {
     SectoredL2 made(refused, context);
     FAIL() << "accepted";
   } catch (const UserError& error) {
-    EXPECT_NE(std::string(error.what()).find("unusable L1 (l1.banks): 3 is no power of two"), std::string::npos);
+    EXPECT_NE(
+        std::string(error.what()).find("unusable L1 (l1.banks, l1.bytes): 64 sets cannot be dealt out evenly to 3"),
+        std::string::npos);
   }
 }
 
@@ -385,8 +429,11 @@ TEST(SectoredL2, RefusesBanksThatCannotBe) {
     }
     return std::string("accepted");
   };
-  EXPECT_NE(refusal({{"banks", "3"}}).find("unusable L2 (l2.banks): 3 is no power of two"), std::string::npos);
-  EXPECT_NE(refusal({{"bytes", "64K"}, {"banks", "64"}}).find("32 sets cannot be dealt out to 64 banks"),
+  EXPECT_EQ(
+      refusal({{"banks", "12"}}),
+      "unusable L2 (l2.banks, l2.bytes): 2048 sets cannot be dealt out evenly to 12 banks; use a multiple of 24576 "
+      "bytes (banks x ways x line), or other banks or ways");
+  EXPECT_NE(refusal({{"bytes", "64K"}, {"banks", "64"}}).find("32 sets cannot be dealt out evenly to 64 banks"),
             std::string::npos);
   EXPECT_NE(refusal({{"ways", "5"}}).find("unusable L2 (l2.ways, l2.bytes)"), std::string::npos);
   EXPECT_EQ(refusal({}), "accepted");

@@ -29,7 +29,7 @@ CacheOrganization some_organization() {
       *rc::gen::element(Replacement::lru, Replacement::fifo, Replacement::random, Replacement::tree_plru);
   const bool tree = made.replacement == Replacement::tree_plru;
   std::uint32_t ways = tree ? 1U << *rc::gen::inRange(1U, 5U) : *rc::gen::inRange(1U, 20U);
-  const std::uint32_t sets = 1U << *rc::gen::inRange(0U, 5U);
+  const std::uint32_t sets = *rc::gen::inRange(1U, 33U);
   made.bytes = std::uint64_t{ways} * sets * made.line_bytes;
   made.ways = sets == 1 && *rc::gen::arbitrary<bool>() ? 0 : ways;
   made.random_seed = *rc::gen::arbitrary<std::uint32_t>();

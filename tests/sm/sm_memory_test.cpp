@@ -362,8 +362,10 @@ TEST(SmMemory, RefusesWhatCannotBe) {
   EXPECT_THROW(make("attribute_bytes", "356"), UserError) << "more than a primitive has";
   EXPECT_THROW(make("l1_bytes", "200"), UserError) << "not whole lines";
   EXPECT_THROW(make("l1_bytes", "127"), UserError) << "less than one";
-  EXPECT_THROW(make("l1_ways", "128"), UserError) << "three sets";
+  EXPECT_THROW(make("l1_ways", "5"), UserError) << "no whole sets";
+  EXPECT_THROW(make("l1_ways", "768"), UserError) << "more than there are lines";
   EXPECT_NO_THROW(make("l1_ways", "96"));
+  EXPECT_NO_THROW(make("l1_ways", "128")) << "three sets";
   EXPECT_NO_THROW(make("l1_bytes", "0")) << "none";
 }
 

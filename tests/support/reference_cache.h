@@ -124,6 +124,9 @@ class ReferenceCache {
     std::uint64_t digits = address / shape_.line_bytes;
     std::uint64_t set = digits % sets_.size();
     if (!shape_.hashes_sets || sets_.size() == 1) return set;
+    if ((sets_.size() & (sets_.size() - 1)) != 0) {
+      return (set + (mix(digits / sets_.size()) >> 32U) * sets_.size() / (std::uint64_t{1} << 32U)) % sets_.size();
+    }
     for (digits /= sets_.size(); digits != 0; digits /= sets_.size()) set ^= digits % sets_.size();
     return set;
   }

@@ -54,11 +54,10 @@ void AttributeFetch::check() const {
                     fmt::format("a line of {} bytes does not fit", l1.line_bytes), "use whole lines, or 0 for none");
   }
   const std::uint32_t ways = l1.ways_of_a_set();
-  const std::uint32_t sets = ways <= l1.lines() ? l1.lines() / ways : 0;
-  if (sets * ways != l1.lines() || (sets & (sets - 1)) != 0) {
+  if (l1.lines() % ways != 0) {
     throw UserError("unusable L1 of an SM", "sm.l1_ways, sm.l1_bytes",
-                    fmt::format("{} lines in sets of {} are no power of two of sets", l1.lines(), ways),
-                    "use bytes = a power of two x ways x line, or 0 ways for a fully associative cache");
+                    fmt::format("{} lines are no whole sets of {} ways", l1.lines(), ways),
+                    "use bytes = sets x ways x line, or 0 ways for a fully associative cache");
   }
   l1.check("L1 of an SM", "sm", "l1_bytes");
 }

@@ -28,8 +28,9 @@ struct CacheOrganization {
   std::uint32_t ways = 0;  ///< 0: as many as lines, fully associative
   Replacement replacement = Replacement::lru;
   std::uint32_t random_seed = 0;
-  /// The set is an exclusive or of all groups of address bits instead of the lowest group (Gonzalez et al.,
-  /// "Eliminating cache conflict misses through XOR-based placement functions", 1997).
+  /// The set follows from all bits of the address, not from the line's number mod sets alone (Interleaving). For a power of
+  /// two of sets it is an exclusive or of all groups of bits (Gonzalez et al., "Eliminating cache conflict misses through
+  /// XOR-based placement functions", 1997).
   bool hashes_sets = false;
   WriteAllocate write_allocate = WriteAllocate::fill;
   /// Tells conflict misses from capacity misses, which takes a second cache's time.
@@ -40,9 +41,9 @@ struct CacheOrganization {
   std::uint32_t sets() const { return ways == 0 ? 1 : lines() / ways; }
   std::uint32_t sectors_of_a_line() const { return line_bytes / sector_bytes; }
 
-  /// Throws UserError for a cache that cannot be. Bytes of a line and of a sector and the number of sets are powers of
-  /// two; sector <= line <= cache; the cache is whole sets of whole lines; a line has at most 32 sectors; a tree has 2
-  /// to 64 ways, a power of two.
+  /// Throws UserError for a cache that cannot be. Bytes of a line and of a sector are powers of two, sets any number;
+  /// sector <= line <= cache; the cache is whole sets of whole lines; a line has at most 32 sectors; a tree has 2 to 64
+  /// ways, a power of two.
   /// @param cache       in words, "CROP cache"
   /// @param component   whose parameters these are, "crop"
   /// @param bytes_name  of the parameter for `bytes`

@@ -8,6 +8,7 @@
 
 #include <vrpipe/memory/cache_organization.h>
 #include <vrpipe/memory/cache_statistics.h>
+#include <vrpipe/memory/interleaving.h>
 #include <vrpipe/memory/sector_history.h>
 #include <vrpipe/memory/sectors.h>
 
@@ -200,11 +201,8 @@ class SectoredCache {
 
   std::size_t chain_of(std::uint64_t tag) const { return (tag * 0x9e3779b97f4a7c15ULL) >> chain_shift_; }
   std::uint32_t set_of_tag(std::uint64_t tag) const {
-    std::uint64_t set = tag;
-    if (set_bits_ > 0 && organization_.hashes_sets) {
-      for (std::uint64_t rest = tag >> set_bits_; rest != 0; rest >>= set_bits_) set ^= rest;
-    }
-    return static_cast<std::uint32_t>(set & ((std::uint64_t{1} << set_bits_) - 1));
+    const Interleaving::Share share = interleaving_.share(tag);
+    return organization_.hashes_sets ? interleaving_.hashed_place<Interleaving::all_digits>(share) : share.place;
   }
   void take_line(LineAccess& access) {
     access.line = find(access.address);
@@ -285,8 +283,8 @@ class SectoredCache {
   std::uint32_t ways_;
   unsigned line_shift_;    ///< log2 of the bytes of a line
   unsigned sector_shift_;  ///< log2 of the bytes of a sector
-  unsigned set_bits_;      ///< log2 of the sets
   unsigned chain_shift_;
+  Interleaving interleaving_{1};  ///< of lines, to sets
   std::uint64_t sector_bytes_;
   SectoredCacheStatistics* statistics_;
   bool details_;  ///< of the statistics
