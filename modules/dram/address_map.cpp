@@ -9,9 +9,9 @@ unsigned log2_of(std::uint32_t power_of_two) { return static_cast<unsigned>(__bu
 }  // namespace
 
 DramAddressMap::DramAddressMap(const DramParameters& p)
-    : burst_bits_(log2_of(burst_bytes(p))),
+    : channels_(p.channels),
+      burst_bits_(log2_of(burst_bytes(p))),
       low_column_bits_(log2_of(p.interleave_bytes / burst_bytes(p))),
-      channel_bits_(log2_of(p.channels)),
       low_bank_bits_(0),
       high_column_bits_(log2_of(p.row_bytes / p.interleave_bytes)),
       high_bank_bits_(0),

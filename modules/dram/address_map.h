@@ -4,6 +4,8 @@
 
 #include "dram_parameters.h"
 
+#include <vrpipe/memory/interleaving.h>
+
 namespace vrpipe {
 
 /// Where a burst is.
@@ -14,7 +16,8 @@ struct DramAddress {
   std::uint64_t row = 0;     ///< no capacity is modelled: any row is there
 };
 
-/// The place of each address: one burst of addresses for each place.
+/// The place of each address: one burst of addresses for each place. Fields are bits of the address but for the channel, of
+/// which there may be any number: the fields above it are of its round (Interleaving).
 class DramAddressMap {
  public:
   explicit DramAddressMap(const DramParameters& parameters);
@@ -23,18 +26,18 @@ class DramAddressMap {
     std::uint64_t rest = address >> burst_bits_;
     DramAddress place;
     const std::uint64_t low_column = take(rest, low_column_bits_);
-    const std::uint64_t channel = take(rest, channel_bits_);
-    const std::uint64_t above = rest;
+    const Interleaving::Share channel = channels_.share(rest);
+    rest = channel.round;
     const std::uint64_t low_bank = take(rest, low_bank_bits_);
     const std::uint64_t high_column = take(rest, high_column_bits_);
     const std::uint64_t high_bank = take(rest, high_bank_bits_);
     place.row = rest;
     place.column = static_cast<std::uint32_t>(high_column << low_column_bits_ | low_column);
     place.bank = static_cast<unsigned>(high_bank << low_bank_bits_ | low_bank);
-    place.channel = static_cast<unsigned>(channel);
+    place.channel = channel.place;
     if (!hash_) return place;
     place.bank ^= static_cast<unsigned>(rest & ((std::uint64_t{1} << (low_bank_bits_ + high_bank_bits_)) - 1));
-    place.channel ^= static_cast<unsigned>(folded(above) & ((std::uint64_t{1} << channel_bits_) - 1));
+    place.channel = channels_.hashed_place<8>(channel);
     return place;
   }
 
@@ -44,14 +47,8 @@ class DramAddressMap {
     rest >>= bits;
     return field;
   }
-  /// The exclusive or of eight neighbouring fields of a channel's width.
-  std::uint64_t folded(std::uint64_t value) const {
-    value ^= value >> (4 * channel_bits_);
-    value ^= value >> (2 * channel_bits_);
-    return value ^ value >> channel_bits_;
-  }
-
-  unsigned burst_bits_, low_column_bits_, channel_bits_, low_bank_bits_, high_column_bits_, high_bank_bits_;
+  Interleaving channels_;
+  unsigned burst_bits_, low_column_bits_, low_bank_bits_, high_column_bits_, high_bank_bits_;
   bool hash_;
 };
 

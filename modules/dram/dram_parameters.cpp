@@ -97,10 +97,10 @@ namespace {
   throw UserError("unusable DRAM", where, why, remedy);
 }
 
-void check_power_of_two(const Integer& parameter) {
+void check_power_of_two(const Integer& parameter, const char* remedy) {
   const std::uint32_t value = parameter;
   if ((value & (value - 1)) == 0) return;
-  refuse(std::string("dram.") + parameter.name(), fmt::format("{} is no power of two", value), "use a power of two");
+  refuse(std::string("dram.") + parameter.name(), fmt::format("{} is no power of two", value), remedy);
 }
 
 /// `less` is at most `more`, both in the same unit.
@@ -126,9 +126,10 @@ void check_sum(std::initializer_list<const Integer*> parts, const Integer& whole
 }
 
 void check_geometry(const DramParameters& p) {
-  for (const Integer* parameter : {&p.channels, &p.channel_bits, &p.banks, &p.bank_groups, &p.row_bytes,
-                                   &p.burst_length, &p.beats_per_cycle, &p.interleave_bytes})
-    check_power_of_two(*parameter);
+  for (const Integer* parameter :
+       {&p.channel_bits, &p.banks, &p.bank_groups, &p.row_bytes, &p.burst_length, &p.beats_per_cycle})
+    check_power_of_two(*parameter, "use a power of two, as every DRAM standard has it; channels may be any number");
+  check_power_of_two(p.interleave_bytes, "use a power of two");
   check_order(p.bank_groups, p.banks, "a group has a bank");
   const unsigned burst = burst_bytes(p);
   if (p.burst_length < p.beats_per_cycle) {

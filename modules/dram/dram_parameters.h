@@ -25,7 +25,7 @@ extern const DramDevice lpddr3_1600;
 extern const DramDevice lpddr5_6400;
 
 /// In which order the fields of an address stand, from the highest bits to the lowest. Below them all is the place in
-/// an interleaved piece: the low bits of the column, and the byte in a burst.
+/// an interleaved piece: the low bits of the column, and the byte in a burst. Channels may be of any number (DramAddressMap).
 enum class DramMapping : std::uint8_t {
   row_bank_column_channel,
   row_column_bank_channel,
@@ -44,9 +44,15 @@ class DramParameters : public ParameterSet {
   const DramDevice& device_;  // before its users
 
  public:
-  Integer channels{
-      *this, "channels", device_.channels.value,  1,
-      64,    "channels", device_.channels.source, "each with a controller, a command bus and a data bus of its own"};
+  Integer channels{*this,
+                   "channels",
+                   device_.channels.value,
+                   1,
+                   64,
+                   "channels",
+                   device_.channels.source,
+                   "of any number, each with a controller, a command bus and a data bus of its own: piece n is in "
+                   "channel n mod channels"};
   Integer channel_bits{*this, "channel_bits", device_.channel_bits.value,  8,
                        256,   "bits",         device_.channel_bits.source, "width of a channel's data bus"};
   Integer banks{*this, "banks", device_.banks.value, 1, 32, "banks", device_.banks.source, "of a channel"};
@@ -82,9 +88,10 @@ class DramParameters : public ParameterSet {
                            "bytes",
                            device_.interleave_bytes.source,
                            "of neighbouring addresses in one channel; the next are in the next"};
-  Switch hash{*this, "hash", true,
-              "Zhang et al., MICRO 2000 (permutation-based page interleaving); of channels likewise",
-              "the row is XORed into the bank, and all above the channel into the channel, so that strides spread"};
+  Switch hash{
+      *this, "hash", true, "Zhang et al., MICRO 2000 (permutation-based page interleaving); of channels likewise",
+      "the row is XORed into the bank, and all above the channel into the channel, so that strides spread; where "
+      "channels are no power of two, a pseudo-random number of what is above is added, mod channels"};
 
   Integer trcd_ps{*this,   "trcd_ps", device_.trcd_ps.value,  1,
                   1000000, "ps",      device_.trcd_ps.source, "from the activate of a row to its first read or write"};

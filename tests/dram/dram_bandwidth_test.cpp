@@ -1,12 +1,15 @@
 // What a channel sustains, against the arithmetic of its distances.
 
 #include <algorithm>
+#include <map>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include <vrpipe/arithmetic/random.h>
 
+#include "dram_bench.h"
 #include "traffic.h"
 
 namespace vrpipe {
@@ -143,11 +146,41 @@ TEST(DramPeak, IsThatOfTheDataBusesLessRefreshes) {
   EXPECT_DOUBLE_EQ(peak_bytes(lpddr3, second), 102.4e9);
   lpddr3.set("dram", "channel_bits", "64");
   EXPECT_DOUBLE_EQ(peak_bytes(lpddr3, second), 204.8e9);
+  lpddr3.set("dram", "channels", "12");
+  EXPECT_DOUBLE_EQ(peak_bytes(lpddr3, second), 12 * 204.8e9 / 16);
   DramParameters lpddr5(lpddr5_6400);
   lpddr5.set("dram", "refresh", "off");
   EXPECT_DOUBLE_EQ(peak_bytes(lpddr5, second), 204.8e9);
   lpddr5.set("dram", "bank_groups", "1");
   EXPECT_DOUBLE_EQ(peak_bytes(lpddr5, second), 102.4e9) << "within a group bursts are twice as far apart";
+}
+
+// A burst of 4 cycles of 1.25 ns in each channel, less refreshes: 5 ns / channels a burst, in cycles of 1 ns.
+TEST(DramStream, TakesAsLongAsItsShareOfAnyNumberOfChannels) {
+  std::map<unsigned, double> cycles, annotated;
+  for (const unsigned channels : {1U, 3U, 5U, 10U, 12U, 16U, 40U, 48U}) {
+    for (const char* hash : {"on", "off"}) {
+      DramBench bench("lpddr3-1600", {{"channels", std::to_string(channels)}, {"hash", hash}});
+      std::vector<Access> stream;
+      const std::uint64_t bursts = std::uint64_t{1500} * channels;
+      for (std::uint64_t i = 0; i < bursts; ++i) stream.push_back(read(0, i * 32));
+      const auto last = [](const std::vector<Cycle>& answered) {
+        return static_cast<double>(*std::max_element(answered.begin(), answered.end()));
+      };
+      cycles[channels] = last(bench.answered(stream));
+      annotated[channels] = last(bench.annotated_answers(stream));
+      constexpr double share = 1500 * 5 / (1 - 130.0 / 3900);
+      EXPECT_GE(cycles[channels], 1500 * 5) << channels;
+      EXPECT_LE(cycles[channels], share * 1.05) << channels;
+      EXPECT_NEAR(annotated[channels] / cycles[channels], 1, 0.03) << channels;
+      for (const Access& access : stream) bench.behaviour->access(access.request);
+      EXPECT_LE(bench.behaviour->least_occupancy(1000).front().cycles, cycles[channels]);
+      EXPECT_GE(bench.behaviour->least_occupancy(1000).front().cycles, 0.9 * cycles[channels]);
+    }
+  }
+  // As many bytes a channel take as long: of the same bytes, 12 move 12/16 of what 16 do.
+  EXPECT_NEAR(cycles[12] / cycles[16], 1, 0.01);
+  EXPECT_NEAR(annotated[12] / annotated[16], 1, 0.01);
 }
 
 }  // namespace

@@ -46,11 +46,11 @@ TEST(DramParameters, WhatCannotBeIsRefusedWithItsRule) {
       {{{"tccd_ps", "4999"}}, "bursts would overlap on the data bus"},
       {{{"tcwl_ps", "20001"}}, "data written would come after"},
       {{{"trefi_ps", "200000"}}, "nothing but refresh"},
-      {{{"channels", "12"}}, "12 is no power of two"},
-      {{{"banks", "6"}}, "6 is no power of two"},
+      {{{"banks", "6"}},
+       "6 is no power of two; use a power of two, as every DRAM standard has it; channels may be any"},
       {{{"row_bytes", "3000"}}, "3000 is no power of two"},
       {{{"interleave_bytes", "96"}}, "96 is no power of two"},
-      {{{"channel_bits", "24"}}, "24 is no power of two"},
+      {{{"channel_bits", "24"}}, "24 is no power of two; use a power of two, as every DRAM standard has it"},
       {{{"burst_length", "12"}}, "12 is no power of two"},
       {{{"bank_groups", "8"}, {"banks", "4"}}, "a group has a bank"},
       {{{"channel_bits", "8"}, {"burst_length", "4"}}, "too narrow: a burst moves 4 bytes"},
@@ -76,13 +76,10 @@ TEST(DramParameters, WhatCannotBeIsRefusedWithItsRule) {
 
 TEST(DramParameters, WhatIsJustPossibleIsTaken) {
   const std::vector<Settings> cases = {
-      {{"tras_ps", "25500"}},
-      {{"tccd_ps", "5000"}},
-      {{"tcwl_ps", "20000"}},
-      {{"write_low", "53"}},
-      {{"interleave_bytes", "4096"}},
-      {{"channels", "1"}, {"banks", "1"}},
-      {{"trefi_ps", "5000"}, {"refresh", "off"}},
+      {{"tras_ps", "25500"}},         {{"tccd_ps", "5000"}},
+      {{"tcwl_ps", "20000"}},         {{"write_low", "53"}},
+      {{"interleave_bytes", "4096"}}, {{"channels", "1"}, {"banks", "1"}},
+      {{"channels", "12"}},           {{"trefi_ps", "5000"}, {"refresh", "off"}},
   };
   for (const Settings& settings : cases) {
     DramParameters parameters(lpddr3_1600);
@@ -142,6 +139,52 @@ TEST_F(AddressMapTest, NoTwoBurstsShareAPlace) {
   }
 }
 
+TEST_F(AddressMapTest, OfAnyNumberOfChannelsNoTwoBurstsShareAPlaceAndNeighboursGoRoundThemAll) {
+  for (const unsigned channels : {1U, 3U, 5U, 10U, 12U, 40U, 48U}) {
+    for (const char* mapping :
+         {"row-bank-column-channel", "row-column-bank-channel", "row-bank-column-group-channel"}) {
+      for (const char* hash : {"on", "off"}) {
+        set(parameters, {{"mapping", mapping},
+                         {"hash", hash},
+                         {"channels", std::to_string(channels)},
+                         {"row_bytes", "512"},
+                         {"bank_groups", "2"}});
+        const DramAddressMap map(parameters);
+        std::set<std::tuple<unsigned, unsigned, std::uint64_t, std::uint32_t>> places;
+        const std::uint64_t bursts = 6 * channels * 8 * 16;  // rows, channels, banks, columns
+        for (std::uint64_t first = 0; first < bursts; first += 8 * channels) {
+          std::set<unsigned> found;
+          for (std::uint64_t burst = first; burst < first + 8 * channels; ++burst) {  // eight in a piece
+            const DramAddress place = map.place_of(burst * 32);
+            ASSERT_TRUE(place.channel < channels && place.bank < 8 && place.column < 16 && place.row < 6);
+            places.emplace(place.channel, place.bank, place.row, place.column);
+            found.insert(place.channel);
+            ASSERT_TRUE(hash == std::string("on") || place.channel == burst / 8 % channels);
+          }
+          ASSERT_EQ(found.size(), channels);
+        }
+        EXPECT_EQ(places.size(), bursts) << mapping << " of " << channels;
+      }
+    }
+  }
+}
+
+TEST_F(AddressMapTest, WhatLiesAboveAChannelDoesNotDependOnHowManyThereAre) {
+  // 256 bytes in a piece: piece r * channels + c is where piece r is of a DRAM of one channel.
+  set(parameters, {{"hash", "off"}, {"channels", "1"}});
+  const DramAddressMap one(parameters);
+  set(parameters, {{"channels", "12"}});
+  const DramAddressMap twelve(parameters);
+  for (std::uint64_t i = 0; i < 10'000; ++i) {
+    const std::uint64_t round = mix(i) >> (20 + mix(i + 1) % 20);
+    const std::uint64_t byte = mix(i + 2) % 256;
+    const DramAddress expected = one.place_of(round * 256 + byte);
+    const DramAddress place = twelve.place_of((12 * round + i % 12) * 256 + byte);
+    ASSERT_EQ(place.channel, i % 12);
+    ASSERT_EQ(std::tie(place.bank, place.row, place.column), std::tie(expected.bank, expected.row, expected.column));
+  }
+}
+
 TEST_F(AddressMapTest, HashingSpreadsStridesOverChannelsAndBanks) {
   const auto used = [&](std::uint64_t stride) {
     std::set<unsigned> channels, banks;
@@ -156,6 +199,13 @@ TEST_F(AddressMapTest, HashingSpreadsStridesOverChannelsAndBanks) {
   EXPECT_EQ(used(rows), std::make_pair(std::size_t{1}, std::size_t{1}));
   set(parameters, {{"hash", "on"}});
   EXPECT_EQ(used(rows), std::make_pair(std::size_t{16}, std::size_t{8}));
+  for (const std::size_t channels : {3U, 5U, 10U, 12U, 40U, 48U}) {
+    set(parameters, {{"channels", std::to_string(channels)}, {"hash", "off"}});
+    EXPECT_EQ(used(channels * rows).first, 1U);
+    set(parameters, {{"hash", "on"}});
+    EXPECT_GE(10 * used(channels * rows).first, 9 * channels);
+    EXPECT_GE(10 * used(rows).first, 9 * channels) << "of 256 strides";
+  }
 }
 
 TEST_F(AddressMapTest, ALineIsInOneRowOfOneChannelUnlessPiecesAreSmaller) {
