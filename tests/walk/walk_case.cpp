@@ -399,6 +399,23 @@ void draw_l1(Dice& dice, std::vector<Setting>& settings) {
   if (dice.chance(30)) settings.push_back({"l1", "write_allocate", "byte-mask"});
 }
 
+/// Banks of the L2 and channels of the DRAM of any number, and as many sets as the banks divide.
+void draw_memory_counts(Dice& dice, const Platform& platform, std::vector<Setting>& settings) {
+  constexpr unsigned counts[] = {1, 3, 5, 6, 10, 11, 12, 24, 40, 48, 63};
+  constexpr unsigned sets_of_a_bank[] = {1, 3, 32, 100};
+  for (const ParameterListing& listing : list_parameters(&platform)) {
+    if (listing.pass_through || !is_of(platform, listing)) continue;
+    if (listing.unit == "l2" && listing.implementation == "sectored-cache") {
+      const unsigned banks = dice.one_of(counts);
+      const unsigned sets = banks * dice.one_of(sets_of_a_bank);
+      settings.push_back({"l2", "banks", std::to_string(banks)});
+      settings.push_back({"l2", "bytes", std::to_string(sets * 16 * 128)});
+      if (dice.chance(50)) settings.push_back({"l2", "hash_sets", "on"});
+    }
+    if (listing.unit == "dram") settings.push_back({"dram", "channels", std::to_string(dice.one_of(counts))});
+  }
+}
+
 /// As for `--effects`.
 std::string draw_effects(Dice& dice) {
   if (dice.chance(50)) return "all";
@@ -493,6 +510,12 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   c.edits.tallies = of_edits.chance(20);
   if (c.edits.tallies && !c.refused) draw_tally(of_edits, c.settings);
   if (of_edits.chance(15)) c.edits.other_memory = 1 + of_edits.below(other_memories);
+  Dice of_memory(mix(mix(seed + 4) ^ index));
+  if (of_memory.chance(20) && !c.refused &&
+      std::none_of(c.settings.begin(), c.settings.end(),
+                   [](const Setting& setting) { return setting.unit == "l2" || setting.unit == "dram"; })) {
+    draw_memory_counts(of_memory, *c.platform, c.settings);
+  }
   if (c.edits.any()) c.platform = &edited(*c.platform, c.edits);
   if (!c.refused && dice.chance(20)) {
     c.mixed_seed = 1 + dice.below(1000000);
