@@ -511,7 +511,7 @@ Case draw_case(std::uint64_t seed, std::uint64_t index, const Draw& real) {
   if (c.edits.tallies && !c.refused) draw_tally(of_edits, c.settings);
   if (of_edits.chance(15)) c.edits.other_memory = 1 + of_edits.below(other_memories);
   Dice of_memory(mix(mix(seed + 4) ^ index));
-  if (of_memory.chance(20) && !c.refused &&
+  if (of_memory.chance(60) && !c.refused &&
       std::none_of(c.settings.begin(), c.settings.end(),
                    [](const Setting& setting) { return setting.unit == "l2" || setting.unit == "dram"; })) {
     draw_memory_counts(of_memory, *c.platform, c.settings);
