@@ -76,7 +76,7 @@ void load_plugins(const Values& plugins) {
 
 void SimulationArguments::declare_scene(Arguments& arguments) {
   Option& scene = arguments.add_option("--scene", scene_, "FILE|builtin:NAME|NAME=FILE",
-                                       "trained Gaussians (.ply, .splat, .spz, .sog, .ksplat ...), a .spl draw list,\n"
+                                       "trained Gaussians (.ply, .spz, .sog, .splat, .glb ...), a .spl draw list,\n"
                                        "or a built-in scene (default: builtin:object; `vrpipe scenes` lists them);\n"
                                        "with NAME=FILE the file takes the place of a built-in scene and has its\n"
                                        "size: train=model.ply",
