@@ -361,5 +361,18 @@ TEST_F(PlyKinds, ACompressedChunkWithAScaleOfZeroLosesNoGaussian) {
   for (std::uint64_t i = 0; i < 3; ++i) EXPECT_EQ(rejection_of(file.gaussians[i], 0), Rejection::none) << i;
 }
 
+TEST_F(PlyKinds, PropertiesThatAreNotUsedAreNamed) {
+  MadePly ply = plain();
+  for (const char* name : {"nx", "red", "alpha"}) ply.add("float", name, 0);
+  EXPECT_TRUE(read(ply.binary()).notes.empty());
+  ply.add("uchar", "segment", 3);
+  ply.add("float", "confidence", 1);
+  EXPECT_EQ(read(ply.binary()).notes,
+            (std::vector<std::string>{"properties of its vertices are not used: confidence, segment"}));
+  for (int i = 0; i < 9; ++i) ply.add("float", "p" + std::to_string(i), 0);
+  EXPECT_EQ(read(ply.binary()).notes[0],
+            "properties of its vertices are not used: confidence, p0, p1, p2, p3, p4, p5, p6 and 3 more");
+}
+
 }  // namespace
 }  // namespace vrpipe

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include <vrpipe/workloads/portable_math.h>
 #include <vrpipe/workloads/preprocess.h>
 
@@ -181,6 +183,25 @@ std::string activated_note(const GaussianScene& scene) {
          "as these, as INRIA's files have them";
 }
 
+/// Names what of a vertex is not drawn, but for what everybody writes: normals, which are 0, and colours beside f_dc. Empty for
+/// none.
+std::string unused_note(const PlyRecords& vertices) {
+  constexpr std::array<const char*, 19> kKnown = {"x",       "y",       "z",     "opacity",  "scale_0",
+                                                  "scale_1", "scale_2", "rot_0", "rot_1",    "rot_2",
+                                                  "nx",      "ny",      "rot_3", "red",      "green",
+                                                  "blue",    "nz",      "alpha", "filter_3D"};
+  constexpr std::size_t kMost = 8, kLongest = 40;
+  std::string names;
+  std::size_t count = 0;
+  for (const std::string& name : vertices.names()) {
+    const bool is_known = std::find(kKnown.begin(), kKnown.end(), name) != kKnown.end() || name.rfind("f_", 0) == 0;
+    if (is_known || ++count > kMost) continue;
+    names += (names.empty() ? "" : ", ") + name.substr(0, kLongest);
+  }
+  if (count > kMost) names += fmt::format(" and {} more", count - kMost);
+  return names.empty() ? names : "properties of its vertices are not used: " + names;
+}
+
 GaussianFile read_inria_ply(const SceneFile& file) {
   const PlyHeader header = read_gaussian_ply_header(file.bytes);
   const PlyRecords vertices(file.bytes, header, "vertex");
@@ -196,6 +217,7 @@ GaussianFile read_inria_ply(const SceneFile& file) {
   apply_ply_comments(header, result);
   if (degree > used_degree) result.notes.push_back("spherical harmonics of degree 4 are left out");
   if (columns.filter) result.notes.push_back("Mip-Splatting's 3D filter (filter_3D) is put into scales and opacities");
+  if (std::string note = unused_note(vertices); !note.empty()) result.notes.push_back(std::move(note));
   if (std::string note = activated_note(result.gaussians); !note.empty()) result.notes.push_back(std::move(note));
   return result;
 }

@@ -213,6 +213,12 @@ double PlyNumber::of(const std::byte* record) const {
   });
 }
 
+std::vector<std::string> PlyRecords::names() const {
+  std::vector<std::string> names;
+  for (const auto& [name, property] : properties_) names.push_back(name);
+  return names;
+}
+
 std::uint64_t PlyRecords::rest_count() const {
   return static_cast<std::uint64_t>(
       std::count_if(element_->properties.begin(), element_->properties.end(),

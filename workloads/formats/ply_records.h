@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "formats/file_bytes.h"
 #include "ply_header.h"
@@ -39,6 +40,8 @@ class PlyRecords {
   const std::byte* operator[](std::uint64_t index) const { return data_ + index * stride(); }
 
   bool has(const std::string& name) const { return properties_.count(name) != 0; }
+  /// Of all properties, in alphabetical order.
+  std::vector<std::string> names() const;
   /// How many properties are named f_rest_*.
   std::uint64_t rest_count() const;
   /// Where a property lies in its record, bytes. `type` is "float", "uint" or "uchar"; so are its other names (float32 ...).
