@@ -90,7 +90,7 @@ SceneFile hostile_file(const std::string& format, const void* data, std::size_t 
     return found->second;
   };
   if (format == "any") {
-    constexpr std::array<const char*, 8> kNames = {"a.ply",    "a.compressed.ply", "a.splat",      "a.spz",
+    constexpr std::array<const char*, 8> kNames = {"a.ply",    "a.compressed.ply", "a.splat",       "a.spz",
                                                    "a.ksplat", "meta.json",        "lod-meta.json", "a.gltf"};
     file.name = kNames[last % kNames.size()];
   } else if (format == "PlayCanvas streamed SOG" && last % 4 != 0) {

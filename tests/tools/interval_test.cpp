@@ -106,7 +106,8 @@ TEST_F(Interval, ARunThatStopsIsTheBeginningOfTheWhole) {
   EXPECT_NE(
       vrpipe({"run", "--scene", "tiny.spl", "--until", "400"}).out.find("stopped at cycle 400: the frame goes on"),
       std::string::npos);
-  refused({"run", "--scene", "tiny.spl", "--until", "400", "--fidelity", "lt"}, {"cannot stop at a cycle", "lt", "use cycle"});
+  refused({"run", "--scene", "tiny.spl", "--until", "400", "--fidelity", "lt"},
+          {"cannot stop at a cycle", "lt", "use cycle"});
   refused({"run", "--scene", "tiny.spl", "--until", "0"}, {"--until", "'0'"});
 }
 
