@@ -1,8 +1,8 @@
 // What `gh100-gpc` predicts of a draw that was measured on the GPU itself, beside the measurement.
 //   measured_gpu [--fidelity NAME] [--short] [--synthetic]
 // The draw is tests/data/measured_draw.spl.xz: 211,320 splats of a trained scene at 800x800, with boxes of its own. Cycles of
-// the GPU are of its clock, 1980 MHz (tests/data/README.md). Nothing of the platform was fitted to it. --short takes a
-// twentieth of the splats, of which nothing was measured, to see that it works. --synthetic draws stand-ins for twelve scenes
+// the GPU are of its clock, 1980 MHz (tests/data/README.md). Nothing of the platform was fitted to it. --short takes one
+// splat in two hundred, of which nothing was measured, to see that it works. --synthetic draws stand-ins for twelve scenes
 // of which only counts and times were kept, instead; with --short the smallest.
 #include <algorithm>
 #include <cmath>
@@ -152,7 +152,7 @@ int main(int argc, char** argv) try {
   }
   const vrpipe::testing::UnpackedFile file("measured_draw.spl");
   vrpipe::Draw draw = vrpipe::read_draw_list(file.path()).draw;
-  if (is_short) draw.splats.resize(draw.splats.size() / 20);
+  if (is_short) draw.splats.resize(draw.splats.size() / 200);
   vrpipe::measured::compare_modes(gpu, draw);
   vrpipe::measured::compare_orders(gpu, draw);
   return 0;

@@ -100,6 +100,10 @@ Cycle AnnotatedChannel::move(const DramAddress& place, Row& row, Cycle now, Cycl
   const auto taken = static_cast<unsigned>(bus_parts * timing_.burst + overhead);
   const Cycle there = bus_.take(column + latency, taken, present);
   row.last = std::max(row.last, there);
+  if (data_ != nullptr) {
+    const Cycle end = real(there);
+    data_->add(end - timing_.burst, end);
+  }
   return there;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "address_map.h"
+#include "data_bus_time.h"
 #include "dram_parameters.h"
 #include "dram_statistics.h"
 
@@ -26,6 +27,8 @@ class AnnotatedChannel {
   /// `statistics` outlive it, and may be shared.
   /// @param refresh  the gate of dram.refresh
   AnnotatedChannel(const DramTiming& timing, DramStatistics& statistics, EffectGate refresh = {});
+  /// Is told when data moves; outlives the channel.
+  void tell(DataBusTime& data) { data_ = &data; }
 
   /// The first cycle before which all data of a read has come that is asked for in a cycle. `present` never decreases,
   /// and is the cycle of the clock that the bursts' cycles may be ahead of.
@@ -76,6 +79,7 @@ class AnnotatedChannel {
 
   const DramTiming timing_;
   DramStatistics& statistics_;
+  DataBusTime* data_ = nullptr;
   EffectGate refresh_gate_;
   bool refreshes_;
   Cycle refresh_cycles_;                    ///< of a period, in which nothing else happens

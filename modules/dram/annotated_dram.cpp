@@ -43,9 +43,10 @@ AnnotatedDram::AnnotatedDram(const sc_core::sc_module_name& name, ClockDomain& d
       domain_(domain),
       behaviour_(behaviour),
       settings_(behaviour.settings()),
-      clock_(domain, settings_.tck_ps, settings_.controller_ps) {
+      clock_(domain, settings_.tck_ps, settings_.controller_ps),
+      data_(domain.frame_end(), clock_) {
   for (unsigned index = 0; index < settings_.channels; ++index)
-    channels_.emplace_back(settings_.timing, statistics.channels, behaviour.refresh_gate());
+    channels_.emplace_back(settings_.timing, statistics.channels, behaviour.refresh_gate()).tell(data_);
   for (unsigned index = 0; index < ports; ++index) ports_.push_back(std::make_unique<Port>(index, *this));
 }
 

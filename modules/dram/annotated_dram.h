@@ -27,6 +27,9 @@ class AnnotatedDram : public sc_core::sc_module {
   /// To be called once.
   void close(Cycle end);
 
+  /// Of the buses of all channels, up to the end of the frame, cycles of the DRAM.
+  double data_cycles(Cycle end) const { return data_.cycles(end); }
+
   DramUnitStatistics statistics;
 
  private:
@@ -37,6 +40,7 @@ class AnnotatedDram : public sc_core::sc_module {
   Dram& behaviour_;
   const DramSettings& settings_;
   const DramClock clock_;
+  DataBusTime data_;
   std::vector<AnnotatedChannel> channels_;
   std::vector<std::unique_ptr<Port>> ports_;
 };

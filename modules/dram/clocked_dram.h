@@ -32,6 +32,9 @@ class ClockedDram : public Clocked, public sc_core::sc_module {
   /// To be called once: channels go on to the end of the run.
   void close(Cycle end);
 
+  /// Of the buses of all channels, up to the end of the frame, cycles of the DRAM.
+  double data_cycles(Cycle end) const { return data_.cycles(end); }
+
   DramUnitStatistics statistics;
 
  private:
@@ -64,6 +67,7 @@ class ClockedDram : public Clocked, public sc_core::sc_module {
   Dram& behaviour_;
   const DramSettings& settings_;
   const DramClock clock_;
+  DataBusTime data_;
   std::vector<DramChannel> channels_;
   std::vector<Cycle> due_;  ///< by channel: when data of it may be answered next
   std::vector<std::unique_ptr<Port>> ports_;

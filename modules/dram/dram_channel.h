@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "address_map.h"
+#include "data_bus_time.h"
 #include "dram_parameters.h"
 #include "dram_statistics.h"
 
@@ -48,6 +49,8 @@ class DramChannel {
   /// `statistics` outlive it, and may be shared.
   /// @param refresh  the gate of dram.refresh
   DramChannel(const DramTiming& timing, DramStatistics& statistics, EffectGate refresh = {});
+  /// Is told when data moves; outlives the channel.
+  void tell(DataBusTime& data) { data_ = &data; }
 
   void observe(DramCommandObserver& observer) { observer_ = &observer; }
 
@@ -166,6 +169,7 @@ class DramChannel {
 
   const DramTiming timing_;
   DramStatistics& statistics_;
+  DataBusTime* data_ = nullptr;
   DramCommandObserver* observer_ = nullptr;
 
   Queue reads_, writes_;

@@ -19,6 +19,8 @@ class DramClock {
   Cycle edge_of(Cycle cycle) const { return tck_.quotient_up(cycle * period_.value()); }
   /// The first cycle of the domain in which is seen what the DRAM has at an edge, once it has passed the controller.
   Cycle seen(Cycle edge) const { return period_.quotient_up(edge * tck_.value() + controller_); }
+  /// The first cycle of the domain that is not before an edge of the DRAM.
+  Cycle cycle_of(Cycle edge) const { return period_.quotient_up(edge * tck_.value()); }
   /// The first cycle of the domain whose `edge_of` is later than an edge.
   Cycle after(Cycle edge) const { return edge == never ? never : period_.quotient(edge * tck_.value()) + 1; }
 

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "support/mixed_frames.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -103,6 +104,22 @@ TEST(MemoryCounts, OfRealGpusDrawAFrame) {
       const RunResult result = run(request, draw);
       EXPECT_EQ(statistic(result, "l2.cache.sector_misses"), statistic(result, "l2.cache.sector_misses_compulsory"))
           << real.bytes;
+    }
+  }
+}
+
+// What is written back at the frame's end is under way for longer than the frame.
+TEST(MemoryCounts, AChannelThatIsFullIsOccupiedForNoMoreThanTheFrame) {
+  for (const unsigned banks : {8U, 10U}) {
+    for (const Fidelity fidelity : {Fidelity::cycle, Fidelity::lt}) {
+      RunRequest request = request_for({banks, 1, 1}, "qm", fidelity);
+      request.settings = {{"l2", "banks", std::to_string(banks)},
+                          {"l2", "bytes", std::to_string(banks * 16 * 128)},
+                          {"dram", "channels", "1"}};
+      for (const std::uint64_t seed : {775535U, 1U, 2U, 3U}) {
+        const RunResult result = run(request, testing::mixed_frame(seed, request));
+        for (const auto& [slot, share] : result.utilization) EXPECT_LE(share, 1) << slot;
+      }
     }
   }
 }

@@ -225,8 +225,8 @@ class GltfGaussians {
   }
 
   FileBytes from_data_uri(const std::string& uri) const {
-    using namespace boost::archive::iterators;
-    using Decoded = transform_width<binary_from_base64<const char*>, 8, 6>;
+    namespace iterators = boost::archive::iterators;
+    using Decoded = iterators::transform_width<iterators::binary_from_base64<const char*>, 8, 6>;
     const std::string mark = ";base64,";
     const std::size_t at = uri.find(mark);
     if (at == std::string::npos) fail("a buffer's data URI is not in base64", kGltfRemedy);
@@ -235,8 +235,8 @@ class GltfGaussians {
     const std::shared_ptr<std::byte[]> bytes = allocate_bytes(size, file_.bytes.where());
     try {
       Decoded next(uri.data() + from);
-      for (std::uint64_t i = 0; i < size; ++i, ++next) bytes[i] = static_cast<std::byte>(*next);
-    } catch (const dataflow_exception&) {
+      std::generate_n(bytes.get(), size, [&next] { return static_cast<std::byte>(*next++); });
+    } catch (const iterators::dataflow_exception&) {
       fail("a buffer's data URI is not in base64", kGltfRemedy);
     }
     return FileBytes(bytes, size, file_.bytes.where() + ", a buffer");

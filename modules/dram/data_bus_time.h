@@ -1,0 +1,29 @@
+#pragma once
+
+#include <algorithm>
+
+#include <vrpipe/kernel/accounting.h>
+
+#include "dram_clock.h"
+
+namespace vrpipe {
+
+/// How long the data buses of all channels have data on them, in cycles of the DRAM. What moves after the frame is not counted.
+class DataBusTime {
+ public:
+  /// `frame_end` outlives it.
+  DataBusTime(const FrameEnd& frame_end, const DramClock& clock) : clock_(clock), tally_(frame_end) {}
+
+  /// Of a channel, from one edge of the DRAM up to another.
+  void add(Cycle from, Cycle until) {
+    const Cycle first = clock_.cycle_of(from);
+    tally_.add(until - from, first, std::max(clock_.cycle_of(until), first + 1));
+  }
+  double cycles(Cycle end) const { return tally_.items(end); }
+
+ private:
+  DramClock clock_;
+  WorkTally tally_;
+};
+
+}  // namespace vrpipe
