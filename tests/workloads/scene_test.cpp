@@ -138,16 +138,18 @@ TEST_F(SceneFile, WithoutPerspectiveTheViewIsThatOfTheOptions) {
   EXPECT_EQ(scene.viewpoint.view->orthographic_height, 3);
   EXPECT_EQ(preprocess_scene(scene, {}).summary.gaussians_visible, 3U) << "where a perspective would see all";
   for (const View& view : orbit_views(*scene.viewpoint.view, 3)) EXPECT_EQ(view.orthographic_height, 3);
-  SceneRequest builtin;
-  builtin.scene = "builtin:object";
-  builtin.size = ImageSize{64, 64};
-  builtin.orthographic_height = 4;
-  EXPECT_EQ(open_scene(builtin).viewpoint.camera.fx, 16);
   request_.fovy_degrees = 40;
   expect_user_error([&] { load_scene(request_); }, {"--fovy", "--orthographic is without perspective"});
   request_.fovy_degrees.reset();
   request_.camera = "cameras.json";
   expect_user_error([&] { load_scene(request_); }, {"--orthographic", "--camera gives a whole camera"});
+}
+
+TEST(BuiltinRequest, TheDefaultMayBeSeenWithoutPerspective) {
+  SceneRequest request;
+  request.size = ImageSize{64, 64};
+  request.orthographic_height = 4;
+  EXPECT_EQ(open_scene(request).viewpoint.camera.fx, 16);
 }
 
 TEST_F(SceneFile, AnUpThatNobodyGaveIsNamedAsTheScenes) {
