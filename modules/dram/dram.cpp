@@ -41,7 +41,7 @@ void Dram::access(const MemoryRequest& request) {
     Channel& channel = channels_[settings_.map.place_of(address).channel];
     // What is queued to be written is read from there, and written over there.
     if (std::find(channel.written.begin(), channel.written.end(), burst) != channel.written.end()) continue;
-    channel.bursts += is_for_quads(request) ? 1U : 0U;
+    channel.bursts += request.is_certain && is_for_quads(request) ? 1U : 0U;
     if (request.command != tlm::TLM_WRITE_COMMAND) continue;
     channel.written[channel.next] = burst;
     channel.next = channel.next + 1 < channel.written.size() ? channel.next + 1 : 0;

@@ -96,6 +96,7 @@ SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderConte
       sector_shift_(static_cast<unsigned>(__builtin_ctz(cache_.organization().sector_bytes))),
       bank_width_(sizes_.bank_bytes_per_cycle),
       interleaving_(sizes_.banks),
+      terminates_early_(context.frame != nullptr && context.frame->terminates_early()),
       origins_(cache_.organization().lines()),
       bank_cycles_(sizes_.banks) {}
 
@@ -104,24 +105,41 @@ void SectoredL2::access(const MemoryRequest& request) {
   const bool writes = request.command == tlm::TLM_WRITE_COMMAND;
   for_each_line(looked_up_as(request), [&](std::uint64_t address, std::uint32_t bytes) {
     if (passes(request)) {
-      if (below_ != nullptr) below_->access(below_as({address, bytes, request.command, request.origin}));
-      if (is_for_quads(request)) count_bank(bank_of(address), bytes);
+      if (below_ != nullptr)
+        below_->access(below_as({address, bytes, request.command, request.origin, is_certain(request)}));
+      if (is_certain(request)) count_bank(bank_of(address), bytes);
       return;
     }
     const LineAccess done = cache_.access(address, bytes, writes);
     looked_up({address, bytes, request.command, request.origin},
               static_cast<unsigned>(__builtin_popcount(done.sectors)),
               static_cast<unsigned>(__builtin_popcount(done.missed)));
-    const auto below = [&](const MemoryRequest& moved, const SectorRun&) {
-      if (below_ != nullptr) below_->access(moved);
+    // What goes, and is missed once more, is so because of what came between.
+    bool is_first = is_certain(request);
+    if (below_ != nullptr) {
+      std::uint32_t& touched = touched_[done.address];
+      is_first = is_first && (done.filled & touched) == 0;
+      touched |= done.sectors;
+    }
+    const auto below = [&](bool certain) {
+      return [this, certain](MemoryRequest moved, const SectorRun&) {
+        moved.is_certain = certain;
+        if (below_ != nullptr) below_->access(moved);
+      };
     };
-    for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, origins_[done.line], below);
+    for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, origins_[done.line], below(false));
     if (done.replaced) allocated(done.line, request.origin, done.spared);
-    for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, request.origin, below);
-    const auto moved = static_cast<unsigned>(__builtin_popcount(done.filled) + __builtin_popcount(done.written_back));
-    if (!is_for_quads(request)) return;
-    count_bank(bank_of(address), bytes + std::uint64_t{moved} * cache_.organization().sector_bytes);
+    for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, request.origin, below(is_first));
+    if (!is_certain(request)) return;
+    const auto filled = is_first ? static_cast<unsigned>(__builtin_popcount(done.filled)) : 0U;
+    count_bank(bank_of(address), bytes + std::uint64_t{filled} * cache_.organization().sector_bytes);
   });
+}
+
+bool SectoredL2::is_certain(const MemoryRequest& request) const {
+  // Which sectors of the stencil are dirty when they go depends on when terminations land.
+  const bool follows_terminations = terminates_early_ && request.origin.traffic == MemoryTraffic::depth_stencil;
+  return request.is_certain && is_for_quads(request) && !follows_terminations;
 }
 
 std::vector<OccupancyPart> SectoredL2::least_occupancy(double /*period_ps*/) const {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <unordered_map>
 #include <vector>
 
 #include <vrpipe/arithmetic/divisor.h>
@@ -222,6 +223,8 @@ class SectoredL2 final : public MemoryBehaviour {
   }
 
  private:
+  /// Whether a bank has to serve the request whatever the order of accesses is.
+  bool is_certain(const MemoryRequest& request) const;
   struct OfTraffic {
     Counter sectors, misses;
   };
@@ -242,6 +245,9 @@ class SectoredL2 final : public MemoryBehaviour {
   const unsigned sector_shift_;       ///< log2 of the bytes of a sector
   const Divisor bank_width_;          ///< bytes a cycle
   const Interleaving interleaving_;   ///< of sets, to banks
+  const bool terminates_early_;       ///< the frame
+  /// Sectors that were accessed, by line, without time and with a memory below.
+  std::unordered_map<std::uint64_t, std::uint32_t> touched_;
   L2Observer* observer_ = nullptr;
   std::vector<MemoryOrigin> origins_;       ///< by line of the cache
   std::vector<std::uint64_t> bank_cycles_;  ///< by bank

@@ -30,6 +30,8 @@ struct MemoryRequest {
   std::uint32_t bytes = 0;  ///< a power of two that divides the address
   tlm::tlm_command command = tlm::TLM_READ_COMMAND;
   MemoryOrigin origin;
+  /// Without time: it is made in every order of accesses, unlike what a cache misses because of what came between.
+  bool is_certain = true;
 };
 
 /// Whether some quad may have to wait for it. Vertices are read, and attributes written, also of what makes no quad any
