@@ -116,12 +116,11 @@ tlm::tlm_sync_enum MemoryPort::nb_transport_bw(tlm::tlm_generic_payload& payload
   if (phase != tlm::END_REQ && phase != tlm::BEGIN_RESP) return tlm::TLM_ACCEPTED;  // ignorable ones of the memory's
   if (requesting_ == &access) {                                                     // BEGIN_RESP implies END_REQ
     requesting_ = nullptr;
-    requesting_until_ = clock_.domain->now() + 1;
+    // Whether or not an edge of the present time has been, or is to be: a unit that sleeps sees what one does that is awake.
+    requesting_until_ = clock_.domain->edge_after(sc_core::SC_ZERO_TIME);
+    clock_.domain->wake(clock_.unit, requesting_until_);
   }
-  if (phase == tlm::END_REQ) {
-    clock_.domain->wake(clock_.unit, clock_.domain->now() + 1);
-    return tlm::TLM_ACCEPTED;
-  }
+  if (phase == tlm::END_REQ) return tlm::TLM_ACCEPTED;
   // The memory's own process has called: through the kernel what is thrown would come out as a report of the kernel's.
   try {
     if (!access.pending) throw SimulationFault(socket.name(), clock_.domain->now(), "a second response to a request");

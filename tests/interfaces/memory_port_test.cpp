@@ -31,6 +31,7 @@ class ClockedReader : public sc_core::sc_module, public Clocked, public PortOwne
   std::vector<Cycle> issued, completed;
   std::vector<std::uint32_t> tags;  ///< of what came back; accesses are numbered
   unsigned most_in_flight = 0;
+  bool sleeps = true;  ///< in cycles in which it has nothing to do
 
  private:
   Cycle tick(Cycle now) override {
@@ -47,7 +48,7 @@ class ClockedReader : public sc_core::sc_module, public Clocked, public PortOwne
       --left_;
       most_in_flight = std::max(most_in_flight, ++in_flight_);
     }
-    return memory.next_completion();
+    return sleeps || (left_ == 0 && in_flight_ == 0) ? memory.next_completion() : now + 1;
   }
   unsigned left_;
   unsigned bytes_;
@@ -126,6 +127,42 @@ class FourPhaseMemory : public sc_core::sc_module, private tlm::tlm_fw_transport
   std::deque<tlm::tlm_generic_payload*> queue_;
   const tlm::tlm_generic_payload* held_ = nullptr;  ///< after its response
   bool request_open_ = false;
+};
+
+/// Answers one request at a time from a method, which kernels run before threads: at an edge perhaps before the clock.
+class MethodMemory : public sc_core::sc_module, private tlm::tlm_fw_transport_if<> {
+ public:
+  SC_HAS_PROCESS(MethodMemory);
+  MethodMemory(const sc_core::sc_module_name& name, sc_core::sc_time accept)
+      : sc_module(name), socket("socket"), accept_(accept) {
+    socket.bind(*this);
+    SC_METHOD(respond);
+    sensitive << accepted_;
+    dont_initialize();
+  }
+  tlm::tlm_target_socket<32> socket;
+
+ private:
+  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
+                                     sc_core::sc_time&) override {
+    if (phase != tlm::BEGIN_REQ) return tlm::TLM_COMPLETED;
+    payload_ = &payload;
+    accepted_.notify(accept_);
+    return tlm::TLM_ACCEPTED;
+  }
+  void respond() {
+    payload_->set_response_status(tlm::TLM_OK_RESPONSE);
+    tlm::tlm_phase phase = tlm::BEGIN_RESP;
+    sc_core::sc_time delay = 5 * accept_;
+    socket->nb_transport_bw(*payload_, phase, delay);
+  }
+  void b_transport(tlm::tlm_generic_payload&, sc_core::sc_time&) override {}
+  bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
+  unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
+
+  sc_core::sc_time accept_;
+  sc_core::sc_event accepted_;
+  tlm::tlm_generic_payload* payload_ = nullptr;
 };
 
 /// Answers in the call itself, in one of the ways that the base protocol allows.
@@ -234,6 +271,24 @@ class MemoryPortTest : public ::testing::Test {
   sc_core::sc_time cycles(double count) const { return sc_core::sc_time(1000.0 * count, sc_core::SC_PS); }
   std::unique_ptr<ClockDomain> clock;
 };
+
+TEST_F(MemoryPortTest, WhatEndsAtAnEdgeIsSeenInTheNextWhetherOrNotTheUnitSleeps) {
+  for (const double accept : {0.5, 1.0, 1.5, 3.0}) {
+    std::vector<Cycle> issued[2];
+    for (const bool sleeps : {false, true}) {
+      fresh_simulation();
+      clock = std::make_unique<ClockDomain>("clock", 1000);
+      ClockedReader reader("reader", *clock, 4, 6);
+      reader.sleeps = sleeps;
+      MethodMemory memory("memory", cycles(accept));
+      reader.memory.socket.bind(memory.socket);
+      clock->run(cycles(100));
+      issued[sleeps ? 1 : 0] = reader.issued;
+      EXPECT_EQ(reader.completed.size(), 6U);
+    }
+    EXPECT_EQ(issued[1], issued[0]) << accept;
+  }
+}
 
 TEST_F(MemoryPortTest, AFixedLatencyMemoryAnswersAfterLatencyAndTransfer) {
   ClockedReader reader("reader", *clock, 4, 1);
