@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "pipeline/slots/checks.h"
+#include <vrpipe/pipeline/slots/checks.h>
 
 namespace vrpipe {
 

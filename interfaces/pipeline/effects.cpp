@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "pipeline/slots/checks.h"
+#include <vrpipe/pipeline/slots/checks.h>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/names.h>

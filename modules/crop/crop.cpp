@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "crop/checked_crop.h"
+
 #include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
@@ -23,27 +25,7 @@ ColorRop<Format, Rounding>::ColorRop(const CropParameters& parameters, const Ren
       watches_saturation_(saturation_gate_.is_active()),
       replaces_(context.frame->replaces_color()),
       checks_previous_(parameters.previous_alpha_check),
-      timing_{Rate::of_bytes(parameters.bytes_per_cycle, 4 * bytes_per_pixel(Format)),
-              parameters.input_quads,
-              parameters.latency_cycles,
-              parameters.forwarding,
-              parameters.cache.bytes,
-              parameters.cache.line_bytes,
-              parameters.cache.sector_bytes,
-              parameters.mshrs,
-              parameters.sectors_per_cycle,
-              parameters.writes_unchanged,
-              parameters.cache.ways,
-              parameters.cache.organization().replacement,
-              parameters.cache.random_seed,
-              parameters.cache.hash_sets,
-              parameters.cache.tell_conflicts,
-              parameters.line_cycles,
-              parameters.fetch_ahead,
-              parameters.line_return_cycles,
-              parameters.pairs_in_sector,
-              Format == ColorFormat::rgba32f ? parameters.rgba32f_column_cycles : 0U} {
-  timing_.check_cache(Format);
+      time_(parameters, Format) {
   if (!EffectGate(context, "cache.details").is_active()) cache_statistics.leave_out_details();
   several_draws_ =
       several_draws_gate_.is_active() || (context.frame->draws().size() > 1 && several_draws_gate_.enter());
@@ -103,11 +85,11 @@ void ColorRop<Format, Rounding>::check_end() {
 template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, unsigned to, CacheLookUp& out) {
   if (!cache_) {
-    CacheOrganization organization = timing_.cache();
+    CacheOrganization organization = time_.cache;
     if (!cache_order_gate_.is_active()) organization.replacement = Replacement::random;  // which keeps no order
     cache_.emplace(organization, cache_statistics);
     if (!cache_order_gate_.is_active()) cache_->before_eviction([this] { cache_order_gate_.enter(); });
-    sectors_of_quads_ = sectors_of_quads(timing_.cache(), 4 * bytes_per_pixel(Format));
+    sectors_of_quads_ = sectors_of_quads(time_.cache, 4 * bytes_per_pixel(Format));
   }
   const std::uint64_t tile = surface_->address(warp.tile, 0);
   // Where a line of the tile is in `out.lines`, if it is there. Without branches, which would be mispredicted.
@@ -131,7 +113,7 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   }
   out.count = count;
   for (unsigned place = 0; place < count; ++place) {
-    out.lines[place].address = tile + std::uint64_t{line_at[place]} * timing_.line_bytes;
+    out.lines[place].address = tile + std::uint64_t{line_at[place]} * time_.cache.line_bytes;
     out.lines[place].sectors = sectors_at[place];
     if (replaces_) out.lines[place].known = context_.state(warp.draw[from]).blend ? 0 : ~0U;  // all quads' state
     cache_->look_up(out.lines[place]);

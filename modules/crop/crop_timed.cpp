@@ -3,13 +3,12 @@
 #include <optional>
 #include <utility>
 
-#include "crop/sector_group.h"
+#include "crop/crop_time.h"
 
 #include <vrpipe/memory/line_returns.h>
 #include <vrpipe/model/timed_cache_port.h>
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
-#include <vrpipe/pipeline/slots/crop.h>
 
 namespace vrpipe {
 
@@ -24,35 +23,27 @@ class TimedCrop : public TimedUnit {
  public:
   TimedCrop(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
             const RenderContext& context)
-      : TimedUnit(name, domain, CropWork::kinds(behaviour->timing())),
+      : TimedUnit(name, domain, behaviour->time().kinds()),
         context_(context),
         out_(*this, "out_terminations"),
         out_done_(*this, "out_done"),
         in_(*this, "in_color",
             [this](const ShadedWarpItem& item, CycleInterval visible) { return take(*item.warp, visible); }),
         behaviour_(std::move(behaviour)),
+        time_(behaviour_->time()),
         barriers_(context),
         hazard_gate_(context, "crop.blend_hazard"),
-        timing_(behaviour_->timing()),
         // A hazard is one of quads.
-        at_once_(timing_.forwards ? quads_looked_up_at_once(timing_) : 1),
-        memory_(*this, "memory", timing_.mshrs,
-                at_once_ == 1 ? 1 : std::min(timing_.line_bytes / timing_.sector_bytes, timing_.mshrs),
-                timing_.sector_bytes, dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics,
+        at_once_(time_.forwards ? time_.looked_up_at_once() : 1),
+        memory_(*this, "memory", time_.mshrs,
+                at_once_ == 1 ? 1 : std::min(time_.cache.sectors_of_a_line(), time_.mshrs), time_.cache.sector_bytes,
+                dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics,
                 {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}),
-        look_ups_(timing_.blend_rate.most_in_a_cycle()),
-        queue_(timing_.input_quads),
-        blending_(static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_))),
-        price_(timing_.blend_rate.cycles * timing_.moves_in_a_cycle()),
-        move_price_(timing_.blend_rate.items * timing_.parts_of_a_move()),
-        in_pairs_(timing_.pairs_in_sector && timing_.blend_rate.most_in_a_cycle() > 1),
-        pairs_one_by_one_(in_pairs_ && at_once_ == 1),
-        group_(timing_.blend_rate.most_in_a_cycle(), CropWork::parts_of_a_cycle(timing_)),
-        lines_(std::max(timing_.cache_bytes / timing_.line_bytes, 1U)),
-        ready_(lines_.size()),
-        unpaid_(lines_.size()) {
-    out_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.blend_rate));
-    out_done_.set_pipeline(timing_.latency_cycles - 1);
+        look_ups_(time_.most_in_a_cycle),
+        queue_(time_.input_quads),
+        stays_(time_.cache.lines()) {
+    out_.set_pipeline(time_.latency_cycles - 1, ColorBeat::in_a_cycle(time_.blend_rate));
+    out_done_.set_pipeline(time_.latency_cycles - 1);
     out_done_.set_optional();
   }
 
@@ -67,21 +58,18 @@ class TimedCrop : public TimedUnit {
     const ColorSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
-    if (timing_.fetches_ahead || timing_.line_return_cycles > 0) {
-      returns_.emplace(surface->address(0), surface->size_bytes(), timing_.line_bytes, timing_.line_return_cycles);
-      used_before_.resize(lines_.size());
-    }
+    if (time_.fetches_ahead || time_.line_return_cycles > 0)
+      returns_.emplace(surface->address(0), surface->size_bytes(), time_.cache.line_bytes, time_.line_return_cycles);
   }
 
   CycleInterval take(const ShadedWarp& warp, CycleInterval visible) {
     CycleInterval left = visible;
     if (warp.mark == Mark::end_of_frame) {
-      settle_unpaired();
-      end_ = !any_blended_ ? visible.first : last_blend_ + timing_.latency_cycles;
+      tell_unpaired(time_.take_unpaired(true), time_.last_blend());
+      end_ = any_blended_ ? time_.last_blend() + time_.latency_cycles : visible.first;
     } else if (warp.mark != Mark::none) {
       behaviour_->pass(warp.mark);
-      if (barriers_.is_barrier(warp.mark))
-        out_done_.send({warp.mark}, any_blended_ ? std::max(visible.first, last_blend_) : visible.first);
+      if (barriers_.is_barrier(warp.mark)) out_done_.send({warp.mark}, std::max(visible.first, time_.last_blend()));
     } else if (at_once_ >= warp.count) {
       left = pass(warp, 0, warp.count, visible);
     } else {
@@ -110,22 +98,16 @@ class TimedCrop : public TimedUnit {
     behaviour_->look_up(warp, from, to, cache_);
     // Places in the queue, and lines that no queued quad needs.
     Cycle at = queue_.free_from(visible.first, quads);
-    for (unsigned line = 0; line < cache_.count && !timing_.fetches_ahead; ++line) {
-      if (cache_.lines[line].replaced) at = std::max(at, lines_[cache_.lines[line].line]);
+    for (unsigned line = 0; line < cache_.count && !time_.fetches_ahead; ++line) {
+      if (cache_.lines[line].replaced) at = std::max(at, stays_[cache_.lines[line].line].last_blend);
     }
     CycleInterval looked_up = look_ups_.take(at, quads);
     looked_up.last = std::max(looked_up.last, visible.last);
     Cycle there = looked_up.first + 1;
-    for (unsigned line = 0; line < cache_.count; ++line) {
-      const CropBehaviour::LineAccess& access = cache_.lines[line];
-      if (access.written_back != 0) write_back(access, looked_up.last);
-      if (returns_ && access.replaced) come_back(access);
-      if (access.filled != 0) there = std::max(there, fill(access, looked_up.last));
-      if (returns_) there = std::max(there, ready_[access.line]);
-    }
+    for (unsigned line = 0; line < cache_.count; ++line)
+      there = std::max(there, move(cache_.lines[line], looked_up.last));
     look_ups_.hold(looked_up.last);
-    if (const unsigned moved = memory_.take_moved(); moved > 0 && timing_.line_cycles == 0)
-      moves_.push({looked_up.last, moved});
+    if (const unsigned moved = memory_.take_moved(); moved > 0) pay_later(looked_up.last, {moved, 0});
 
     charge(UnitState::starved, looked_up.first + 1);
     if (out_.last() > there) {
@@ -133,108 +115,86 @@ class TimedCrop : public TimedUnit {
       charge(UnitState::blocked, out_.last());
       there = out_.last();
     }
-    const Cycle hazard = timing_.forwards || !hazard_gate_.enter() || !context_.state(warp.draw[from]).blend
-                             ? 0
-                             : hazard_until(warp.tile, warp.position[from]);
-    const CycleInterval blended = joins_last(from, std::max(there, hazard))
-                                      ? join_last(warp, from)
-                                      : blend_in_turn(warp, from, to, there, hazard);
+    const CycleInterval blended = blend_in_turn(warp, from, to, there);
     charge(UnitState::memory, blended.first);
     charge(UnitState::busy, blended.last + 1);
     queue_.take(quads, blended.last);
-    last_blend_ = blended.last;
     any_blended_ = true;
-    quads_last(blended.last + timing_.latency_cycles, to - from, [&](unsigned i) { return warp.draw[from + i]; });
+    quads_last(blended.last + time_.latency_cycles, quads, [&](unsigned i) { return warp.draw[from + i]; });
     did(CropWork::blend, quads, blended.first, blended.last + 1);
-    if (!timing_.forwards) recent_.push({warp.tile, warp.position[from], blended.last});
     blend(warp, from, to, blended);
     return looked_up;
   }
 
-  /// Takes the time of quads that can be blended from a cycle on, but for a hazard.
-  CycleInterval blend_in_turn(const ShadedWarp& warp, unsigned from, unsigned to, Cycle there, Cycle hazard) {
-    const unsigned quads = to - from;
-    // Moving a sector takes time from blending, from when it moves.
-    for (; !moves_.empty() && moves_.front().at <= std::max({there, hazard, blending_.next()}); moves_.pop()) {
-      // Beside a blend of several cycles the cache is idle.
-      if (const unsigned cost = moves_.front().moved * move_price_; idle_cache_ >= cost) {
-        idle_cache_ -= cost;
-        continue;
-      }
-      blending_.take(moves_.front().at, moves_.front().moved * move_price_);
-      did(CropWork::sectors, moves_.front().moved, moves_.front().at);
+  /// Takes the time of quads whose sectors are there from a cycle on.
+  CycleInterval blend_in_turn(const ShadedWarp& warp, unsigned from, unsigned to, Cycle there) {
+    // What moves takes time from blending, from when it does.
+    for (; !moves_.empty() && moves_.front().at <= time_.free_from(time_.price(), there); moves_.pop()) {
+      const Move& move = moves_.front();
+      if (time_.move(move.paid, move.at)) did(CropWork::sectors, move.paid, move.at);
     }
-    there = std::max(there, blending_.next());
-    if (hazard > there) {
-      const std::uint64_t wasted = (hazard - there) * CropWork::parts_of_a_cycle(timing_) - blending_.taken_of(there);
-      did(CropWork::forwarding, wasted, there, hazard);
-      there = hazard;
+    if (time_.quads_are_alike()) {
+      const auto [first, last] = time_.blend_all(to - from, there);
+      return {first, last};
     }
-    const auto price = static_cast<unsigned>(price_of(warp, from, to));
-    const CycleInterval blended = blending_.take(there, price);
-    if (timing_.column_cycles > 0) idle_cache_ = price > quads * price_ ? price - quads * price_ : 0;
-    settle_unpaired();
-    if (price > quads * price_) unpaired_ = {price - quads * price_, blended};
+    CycleInterval blended = never;
+    for (unsigned i = from; i < to; ++i) {
+      const CropTime::Quad quad = priced_quad(warp, i);
+      Cycle ready = there;
+      if (!time_.forwards && hazard_gate_.enter() && quad.blends) ready = wait_for_hazard(quad.place, there);
+      const CropTime::Price price = time_.price_of(quad, ready);
+      blended.last = time_.free_from(price, ready);
+      blended.first = std::min(blended.first, blended.last);
+      time_.blend(quad, price, blended.last);
+      tell_unpaired(time_.take_unpaired(), blended.last);
+    }
     return blended;
   }
-  bool joins_last(unsigned index, Cycle there) const {
-    return pairs_one_by_one_ && any_blended_ && there <= last_blend_ && group_.takes(place_of(index));
+  CropTime::Quad priced_quad(const ShadedWarp& warp, unsigned index) const {
+    return {cache_.lines[cache_.line_of[index]].address, cache_.sectors_of[index],
+            static_cast<std::uint32_t>(behaviour_->surface()->grid().place(warp.tile, warp.position[index])),
+            warp.live[index], context_.state(warp.draw[index]).blend};
   }
-  /// The last quads have paid for the rest of a cycle.
-  CycleInterval join_last(const ShadedWarp& warp, unsigned index) {
-    const auto price = static_cast<unsigned>(group_.join(own_price(warp, index)));
-    unpaired_.parts = unpaired_.parts + price - price_;
-    return price == 0 ? CycleInterval{last_blend_, last_blend_} : blending_.take(last_blend_, price);
+  [[gnu::noinline]] Cycle wait_for_hazard(std::uint32_t place, Cycle there) {
+    const Cycle free = time_.free_from(time_.price(), there);
+    const Cycle until = time_.hazard_until(place, time_.last_blend());
+    if (until <= free) return there;
+    time_.open(free);
+    did(CropWork::forwarding, static_cast<std::uint64_t>(time_.open(until)), free, until);
+    return until;
   }
-  SectorGroup::Place place_of(unsigned index) const {
-    return {cache_.lines[cache_.line_of[index]].address, cache_.sectors_of[index]};
+  void tell_unpaired(std::int64_t parts, Cycle at) {
+    if (parts > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(parts), at);
   }
-  /// Nothing goes with the last quads any more.
-  void settle_unpaired() {
-    if (unpaired_.parts > 0) did(CropWork::unpaired, unpaired_.parts, unpaired_.at.first, unpaired_.at.last + 1);
-    unpaired_.parts = 0;
-  }
-
-  void write_back(const CropBehaviour::LineAccess& access, Cycle looked_up) {
-    // Where tags run ahead, quads may still be blended into what the line held.
-    const Cycle at = timing_.fetches_ahead ? std::max(looked_up, lines_[access.line]) : looked_up;
-    memory_.write_back(access, at);
-    if (timing_.line_cycles > 0) moves_.push({at, 1});
-  }
-  /// Returns when the sectors are there. Those that are fetched before what the line held is written back are fetched again.
-  Cycle fill(const CropBehaviour::LineAccess& access, Cycle& at) {
-    if (access.replaced) unpaid_[access.line] = true;
-    Cycle there = memory_.fill(access, at);
-    if (!timing_.fetches_ahead) return there;
-    Cycle before = used_before_[access.line];
-    if (before <= at) return there;
-    fetched_again_ += static_cast<unsigned>(__builtin_popcount(access.filled));
-    there = std::max(there, memory_.fill(access, before));
-    ready_[access.line] = std::max(ready_[access.line], there);
-    return there;
-  }
-  /// A line is there for another, which may have been before.
-  void come_back(const CropBehaviour::LineAccess& access) {
-    // What replaces colours does not read them.
-    ready_[access.line] = access.filled != 0 ? returns_->from(access.address) : 0;
-    used_before_[access.line] = returns_->last_use(access.address);
+  void pay_later(Cycle at, const CropTime::Moves& moves) {
+    if (const unsigned paid = time_.paid(moves); paid > 0) moves_.push({at, paid});
   }
 
-  /// Of quads, in parts of a cycle.
-  std::uint64_t price_of(const ShadedWarp& warp, unsigned from, unsigned to) {
-    if (!in_pairs_ && timing_.column_cycles == 0) return std::uint64_t{to - from} * price_;
-    std::uint64_t price = 0;
-    for (unsigned i = from; i < to; ++i) {
-      const unsigned own = own_price(warp, i);
-      const bool joins = i > from && group_.takes(place_of(i));
-      price += !in_pairs_ ? own : joins ? group_.join(own) : group_.begin(place_of(i), own);
+  /// Moves what a look-up says of a line; returns when its sectors are there.
+  Cycle move(const CropBehaviour::LineAccess& access, Cycle& at) {
+    Stay& stay = stays_[access.line];
+    if (access.written_back != 0) {
+      // Where tags run ahead, quads may still be blended into what the line held.
+      const Cycle from = time_.fetches_ahead ? std::max(at, stay.last_blend) : at;
+      memory_.write_back(access, from);
+      pay_later(from, {0, 1});
     }
-    return price;
-  }
-  unsigned own_price(const ShadedWarp& warp, unsigned index) const {
-    if (timing_.column_cycles == 0 || !context_.state(warp.draw[index]).blend) return price_;
-    const auto column = timing_.column_cycles * static_cast<unsigned>(CropWork::parts_of_a_cycle(timing_));
-    return std::max(price_, columns_of(warp.live[index]) * column);
+    if (returns_ && access.replaced) {
+      // It is there for another, which may have been before. What replaces colours does not read them.
+      stay.ready = access.filled != 0 ? returns_->from(access.address) : 0;
+      stay.used_before = returns_->last_use(access.address);
+    }
+    if (access.filled == 0) return stay.ready;
+    stay.is_unpaid = stay.is_unpaid || access.replaced;
+    Cycle there = memory_.fill(access, at);
+    if (time_.fetches_ahead && stay.used_before > at) {
+      // Fetched before what the line held is written back, and so again.
+      fetched_again_ += static_cast<unsigned>(__builtin_popcount(access.filled));
+      Cycle again = stay.used_before;
+      there = std::max(there, memory_.fill(access, again));
+      stay.ready = std::max(stay.ready, there);
+    }
+    return std::max(there, stay.ready);
   }
 
   void blend(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval at) {
@@ -244,21 +204,20 @@ class TimedCrop : public TimedUnit {
     std::array<std::uint32_t, quads_per_warp> dirty{};  // by line
     unsigned terminated = 0;
     for (unsigned i = from; i < to; ++i) {
-      const CropBehaviour::Outcome outcome = outcomes[i];
-      dirty[cache_.line_of[i]] |= outcome.changed || timing_.writes_unchanged ? cache_.sectors_of[i] : 0U;
-      terminated |= outcome.terminated;
+      const bool changed = outcomes[i].changed || time_.writes_unchanged;
+      dirty[cache_.line_of[i]] |= changed ? cache_.sectors_of[i] : 0U;
+      terminated |= outcomes[i].terminated;
       // A line is paid for with the quad for which it was fetched.
-      if (timing_.line_cycles > 0 && std::exchange(unpaid_[cache_.lines[cache_.line_of[i]].line], false) &&
-          (outcome.changed || timing_.writes_unchanged))
-        moves_.push({at.last, 1});
+      if (time_.pays_for_lines && std::exchange(stays_[cache_.lines[cache_.line_of[i]].line].is_unpaid, false) &&
+          changed)
+        pay_later(at.last, {0, 1});
     }
     if (terminated != 0) signal(warp, from, to, outcomes, at);
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
-      lines_[line] = at.last;
+      stays_[line].last_blend = at.last;
       if (returns_) returns_->used(cache_.lines[i].address, at.last);
-      if (dirty[i] == 0) continue;
-      behaviour_->make_dirty(line, dirty[i]);
+      if (dirty[i] != 0) behaviour_->make_dirty(line, dirty[i]);
     }
   }
 
@@ -276,25 +235,16 @@ class TimedCrop : public TimedUnit {
     if (beat.count > 0) out_.send(beat, at.last);
   }
 
-  /// The cycle in which a quad of the same position has left the blending pipeline.
-  [[gnu::noinline]] Cycle hazard_until(TileId tile, std::uint8_t position) {
-    while (!recent_.empty() && recent_.front().at + timing_.latency_cycles <= last_blend_) recent_.pop();
-    Cycle until = 0;
-    for (std::size_t i = 0; i < recent_.size(); ++i) {
-      const Recent& blend = recent_[i];
-      if (blend.tile == tile && blend.position == position) until = blend.at + timing_.latency_cycles;
-    }
-    return until;
-  }
-
   struct Move {
     Cycle at = 0;
-    unsigned moved = 0;
+    unsigned paid = 0;
   };
-  struct Recent {
-    TileId tile;
-    std::uint8_t position = 0;
-    Cycle at = 0;
+  /// What a line of the cache holds.
+  struct Stay {
+    Cycle last_blend = 0;    ///< of a quad that needed it, or what it held before
+    Cycle ready = 0;         ///< of one that came back: when it can be used
+    Cycle used_before = 0;   ///< the last use of what it holds before it came back
+    bool is_unpaid = false;  ///< fetched, and nothing blended into it
   };
 
   const RenderContext& context_;
@@ -302,34 +252,18 @@ class TimedCrop : public TimedUnit {
   TimedOut<BlendsDone> out_done_;
   TimedIn<ShadedWarpItem> in_;
   std::unique_ptr<CropBehaviour> behaviour_;
+  CropTime time_;
   const BarrierPlan barriers_;
   EffectGate hazard_gate_;
-  const CropBehaviour::TimingParameters timing_;
   const unsigned at_once_;  ///< quads looked up before the first of them is blended
   TimedCachePort memory_;
   std::unique_ptr<BlendOrderMonitor> monitor_;
   CropBehaviour::CacheLookUp cache_;
   ThroughputPort look_ups_;
-  SlotPool queue_;               ///< quads between look-up and blending
-  ThroughputPort blending_;      ///< in parts of a cycle that both a quad and a sector are whole numbers of
-  const unsigned price_;         ///< of blending a quad, in these
-  const unsigned move_price_;    ///< of moving a sector, or a line
-  unsigned idle_cache_ = 0;      ///< parts of the last blend of several cycles, in which nothing moves
-  const bool in_pairs_;          ///< several quads go in a cycle only if they share a sector
-  const bool pairs_one_by_one_;  ///< and are blended one by one
-  SectorGroup group_;            ///< the last of these
-  struct {
-    unsigned parts = 0;
-    CycleInterval at;
-  } unpaired_;                          ///< of the last quads' price, beyond their rate
-  Ring<Move> moves_;                    ///< of sectors or lines, that blending has not given its time to yet
-  std::vector<Cycle> lines_;            ///< of the cache: the last blend of a quad that needed it
-  std::vector<Cycle> ready_;            ///< of the cache: when one that came back can be used
-  std::vector<char> unpaid_;            ///< of the cache: fetched, and nothing blended into it
+  SlotPool queue_;    ///< quads between look-up and blending
+  Ring<Move> moves_;  ///< that the blender has not given its time to yet
+  std::vector<Stay> stays_;
   std::optional<LineReturns> returns_;  ///< where lines that come back wait
-  std::vector<Cycle> used_before_;      ///< by line of the cache: the last use of what it holds before it came back
-  Ring<Recent> recent_;                 ///< blends in the pipeline, without forwarding
-  Cycle last_blend_ = 0;
   Cycle end_ = never;
   bool any_blended_ = false;
   StatisticSet more_cache_statistics_{*this, "cache"};

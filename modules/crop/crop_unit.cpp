@@ -2,8 +2,8 @@
 #include <optional>
 #include <utility>
 
+#include "crop/crop_time.h"
 #include "crop/lines_ahead.h"
-#include "crop/sector_group.h"
 
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
@@ -11,42 +11,37 @@
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
 #include <vrpipe/pipeline/quad_sectors.h>
-#include <vrpipe/pipeline/slots/crop.h>
 
 namespace vrpipe {
 
 namespace {
 
 /// CROP at cycle fidelity. A quad looks up the colour cache when it arrives and starts the fills that it needs, then
-/// waits in order; blending takes place at the head. Moving a sector, or a line, takes cycles from blending.
+/// waits in order; blending takes place at the head, when there is time for it (CropTime).
 /// Ports: in_color (ColorBeat), out_terminations (TerminationBeat), out_done (BlendsDone; optional), memory (TLM-2.0 base
 /// protocol).
+/// `Plain`: a run without hazards, lines that return or go ahead, prices of lines, pairs and columns, colours that are
+/// replaced, and draws that are told apart.
+template <bool Plain>
 class CropUnit : public Unit {
  public:
   CropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<CropBehaviour> behaviour,
            const RenderContext& context)
-      : Unit(name, domain, CropWork::kinds(behaviour->timing())),
+      : Unit(name, domain, behaviour->time().kinds()),
         context_(context),
         in_(*this, "in_color"),
         out_(*this, "out_terminations"),
         out_done_(*this, "out_done"),
         behaviour_(std::move(behaviour)),
-        timing_(behaviour_->timing()),
+        time_(behaviour_->time()),
         signals_(context.frame->terminates_early()),
         replaces_(context.frame->replaces_color()),
         barriers_(context),
         hazard_gate_(context, "crop.blend_hazard"),
         cache_order_gate_(context, "crop.cache_order"),
-        price_(std::int64_t{timing_.blend_rate.cycles} * timing_.moves_in_a_cycle()),
-        move_price_(std::int64_t{timing_.blend_rate.items} * timing_.parts_of_a_move()),
-        income_(static_cast<std::int64_t>(CropWork::parts_of_a_cycle(timing_))),
-        most_in_a_cycle_(timing_.blend_rate.most_in_a_cycle()),
-        pairs_(timing_.pairs_in_sector && most_in_a_cycle_ > 1),
-        group_(most_in_a_cycle_, CropWork::parts_of_a_cycle(timing_)),
-        port_(*this, "memory", timing_.mshrs,
-              {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
-    out_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.blend_rate));
-    out_done_.set_pipeline(timing_.latency_cycles - 1);
+        port_(*this, "memory", time_.mshrs, {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
+    out_.set_pipeline(time_.latency_cycles - 1, ColorBeat::in_a_cycle(time_.blend_rate));
+    out_done_.set_pipeline(time_.latency_cycles - 1);
     out_done_.set_optional();
   }
 
@@ -69,24 +64,20 @@ class CropUnit : public Unit {
   void end_of_elaboration() override {
     surface_ = behaviour_->surface();
     if (surface_ == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
-    line_shift_ = static_cast<unsigned>(__builtin_ctz(timing_.line_bytes));
-    timing_.check_cache(surface_->format());
-    CacheOrganization organization = timing_.cache();
+    line_shift_ = static_cast<unsigned>(__builtin_ctz(time_.cache.line_bytes));
+    CacheOrganization organization = time_.cache;
     if (!cache_order_gate_.is_active()) organization.replacement = Replacement::random;  // which keeps no order
-    port_.make_cache(organization, dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics);
+    SectoredCacheStatistics& statistics = dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics;
+    port_.make_cache(organization, statistics);
     if (!cache_order_gate_.is_active()) port_.cache().before_eviction([this] { cache_order_gate_.enter(); });
-    sectors_of_quads_ = sectors_of_quads(timing_.cache(), 4 * bytes_per_pixel(surface_->format()));
+    sectors_of_quads_ = sectors_of_quads(time_.cache, 4 * bytes_per_pixel(surface_->format()));
     sectors_of_a_quad_ = static_cast<unsigned>(__builtin_popcount(sectors_of_quads_.front().sectors));
     monitor_.emplace(surface_->width(), surface_->height());
-    if (timing_.fetches_ahead || timing_.line_return_cycles > 0) {
-      returns_.emplace(surface_->address(0), surface_->size_bytes(), timing_.line_bytes, timing_.line_return_cycles);
-      came_back_.resize(organization.lines());
-    }
-    if (timing_.fetches_ahead) {
-      ahead_.emplace(port_, dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics, *returns_,
-                     timing_.mshrs);
-    }
-    unpaid_.resize(organization.lines());
+    if (Plain) return;
+    stays_.resize(organization.lines());
+    if (time_.fetches_ahead || time_.line_return_cycles > 0)
+      returns_.emplace(surface_->address(0), surface_->size_bytes(), time_.cache.line_bytes, time_.line_return_cycles);
+    if (time_.fetches_ahead) ahead_.emplace(port_, statistics, fetched_again_, *returns_, time_.mshrs);
   }
 
   /// Takes a quad from the link into the queue; false when it has to wait.
@@ -95,12 +86,12 @@ class CropUnit : public Unit {
     const std::size_t tile = surface_->grid().place(quad.warp->tile, 0);
     const auto [line_of_tile, sectors] = sectors_of_quads_[position];
     const std::uint64_t address = surface_->address(tile) + (std::uint64_t{line_of_tile} << line_shift_);
-    if (ahead_) return look_up_ahead(quad, address, sectors, tile + position);
+    if (!Plain && ahead_) return look_up_ahead(quad, address, sectors, tile + position);
     SectoredCache::Line line =
         wanted_.line == SectoredCache::no_line ? port_.pin_held(address, sectors) : SectoredCache::no_line;
     std::uint32_t asked_for = 0;
     if (line == SectoredCache::no_line) {
-      if (replaces_) wanted_.reads = blends(quad);
+      wanted_.reads = blends(quad);
       line = fill(address, sectors, asked_for);
       if (line == SectoredCache::no_line) return false;
     }
@@ -123,25 +114,17 @@ class CropUnit : public Unit {
                                        std::size_t place) {
     const LinesAhead::Stay stay = ahead_->look_up(address, sectors, blends(quad));
     if (stay == LinesAhead::no_stay) return false;
-    pay_for_stays();
+    pay(ahead_->take_moves());
     queue(quad, stay, sectors, place);
     return true;
   }
-  bool blends(const ColorQuad& quad) const { return !replaces_ || context_.state(quad.warp->draw[quad.index]).blend; }
-  void pay_for_stays() {
-    const LinesAhead::Moves moves = ahead_->take_moves();
-    const unsigned moved = timing_.line_cycles == 0 ? moves.sectors : moves.lines;
-    if (moved > 0) pay(moved);
-    fetched_again_ += ahead_->take_fetched_again();
+  bool blends(const ColorQuad& quad) const {
+    return Plain || !replaces_ || context_.state(quad.warp->draw[quad.index]).blend;
   }
-  /// Gives what moves its time of the blender, unless the cache is idle beside a blend of several cycles.
-  void pay(unsigned moved) {
-    if (idle_cache_ >= moved * move_price_) {
-      idle_cache_ -= moved * move_price_;
-      return;
-    }
-    tokens_ -= moved * move_price_;
-    did(CropWork::sectors, moved, now());
+  /// Gives what moves its time of the blender.
+  void pay(const CropTime::Moves& moves) {
+    const unsigned paid = time_.paid(moves);
+    if (paid > 0 && time_.move(paid, now())) did(CropWork::sectors, paid, now());
   }
 
   /// Goes on with the look-up of the quad at the link; `no_line` while it has to wait.
@@ -149,17 +132,11 @@ class CropUnit : public Unit {
     wanted_.address = address;
     wanted_.sectors = sectors;
     const bool had_line = wanted_.line != SectoredCache::no_line;
-    const bool done = port_.look_up(wanted_, now(), [this](unsigned moved) {
-      if (timing_.line_cycles == 0) pay(moved);
-    });
-    if (timing_.line_cycles > 0) {
-      if (const unsigned lines = port_.take_lines_moved().written_back; lines > 0) pay(lines);
-    }
+    const bool done = port_.look_up(wanted_, now(), [this](unsigned moved) { pay({moved, 0}); });
+    pay({0, port_.take_lines_moved().written_back});
     // It has just been pinned, by nobody else if it is new.
-    if (!had_line && wanted_.line != SectoredCache::no_line && port_.cache().present(wanted_.line) == 0) {
-      unpaid_[wanted_.line] = wanted_.reads;
-      if (returns_) came_back_[wanted_.line] = wanted_.reads && returns_->from(wanted_.address) != 0;
-    }
+    if (!Plain && !had_line && wanted_.line != SectoredCache::no_line && port_.cache().present(wanted_.line) == 0)
+      stays_[wanted_.line] = {wanted_.reads, wanted_.reads && returns_ && returns_->from(address) != 0};
     if (!done) return SectoredCache::no_line;
     asked_for = std::exchange(wanted_.asked_for, 0);
     return std::exchange(wanted_.line, SectoredCache::no_line);
@@ -167,7 +144,8 @@ class CropUnit : public Unit {
 
   bool accept() {
     bool moved = false;
-    auto budget = static_cast<unsigned>(std::min<std::size_t>(most_in_a_cycle_, timing_.input_quads - queue_.size()));
+    auto budget =
+        static_cast<unsigned>(std::min<std::size_t>(time_.most_in_a_cycle, time_.input_quads - queue_.size()));
     while (budget > 0 && in_.ready()) {
       const ColorBeat& beat = in_.front();
       if (beat.mark != Mark::none) {
@@ -189,12 +167,6 @@ class CropUnit : public Unit {
     return moved;
   }
 
-  /// Whether a quad of the same position is still in the blending pipeline.
-  bool hazard(std::uint32_t place, Cycle now) {
-    while (!recent_.empty() && recent_.front().second + timing_.latency_cycles <= now) recent_.pop_front();
-    return std::any_of(recent_.begin(), recent_.end(), [&](const auto& blend) { return blend.first == place; });
-  }
-
   /// For the host: what blending a quad will touch was last touched long ago. Inlined, since GCC drops calls of
   /// functions that do nothing but prefetch.
   [[gnu::always_inline]] void prefetch(const Entry& entry) const {
@@ -206,20 +178,14 @@ class CropUnit : public Unit {
 
   /// Blends from the head of the queue; why it stopped is in `stop_`.
   bool blend(Cycle now) {
-    // What sectors took from blending is paid back first; unused cycles are lost, fractions of a quad are not.
-    if (now > refilled_) {
-      tokens_ += static_cast<std::int64_t>(now - refilled_) * income_;
-      const std::int64_t lost = tokens_ - (income_ + (pairs_ ? income_ : price_) - 1);
-      if (lost > 0) {
-        tokens_ -= lost;
-        if (stop_ == UnitState::latency) did(CropWork::forwarding, static_cast<std::uint64_t>(lost), refilled_, now);
-      }
-      refilled_ = now;
-    }
+    const std::int64_t lost = time_.open(now);
+    if (!Plain && lost > 0 && stop_ == UnitState::latency)
+      did(CropWork::forwarding, static_cast<std::uint64_t>(lost), opened_, now);
+    opened_ = now;
     TerminationBeat beat;
     stop_ = UnitState::starved;
     ready_at_ = never;
-    unsigned budget = most_in_a_cycle_;
+    unsigned budget = time_.most_in_a_cycle;
     for (; budget > 0 && !queue_.empty(); --budget) {
       if (!marks_.empty()) pass_marks(now);
       const Entry& entry = queue_.front();
@@ -232,19 +198,17 @@ class CropUnit : public Unit {
         stop_ = UnitState::memory;
         break;
       }
-      const bool joins = pairs_ && joins_last(entry, most_in_a_cycle_ - budget);
-      const std::int64_t price = !pairs_ ? price_ : joins ? price_of_next() : income_;
-      if (tokens_ < price) {
+      const CropTime::Quad priced = Plain ? CropTime::Quad{} : priced_quad(entry);
+      const CropTime::Price price = Plain ? time_.price() : time_.price_of(priced, std::min(waits_from_, now));
+      if (!time_.is_free(price, now)) {
         stop_ = UnitState::busy;  // with the quads before it, or with moving sectors
-        if (pairs_) last_waits_ = budget < most_in_a_cycle_ || last_waits_;
+        waits_from_ = std::min(waits_from_, now);
         break;
       }
-      if (!timing_.forwards && hazard_gate_.enter() && blends(entry.quad)) {
-        if (hazard(entry.place, now)) {
-          stop_ = UnitState::latency;
-          break;
-        }
-        recent_.emplace_back(entry.place, now);
+      if (!Plain && !time_.forwards && hazard_gate_.enter() && priced.blends &&
+          time_.hazard_until(entry.place, now) > now) {
+        stop_ = UnitState::latency;
+        break;
       }
       const ColorQuad& quad = entry.quad;
       monitor_->blended(entry.place, *quad.warp, quad.index, now);
@@ -257,42 +221,38 @@ class CropUnit : public Unit {
         beat.signals[beat.count++] = {quad.warp->tile, static_cast<std::uint8_t>(quad.position()), outcome.terminated,
                                       context_.draw(quad.warp->draw[quad.index]).epoch};
       }
-      if (tells_draws()) draw_lasts(quad.warp->draw[quad.index], now + timing_.latency_cycles);
+      if (!Plain && tells_draws()) draw_lasts(quad.warp->draw[quad.index], now + time_.latency_cycles);
       if (quad.is_last()) quad.warp->release();
-      const bool changed = outcome.changed || timing_.writes_unchanged;
-      if (pairs_) goes(entry, joins);
-      tokens_ -= price;
-      unpaired_ += price - price_;
-      if (timing_.column_cycles > 0 && blends(quad)) unpaired_ += pay_for_columns(quad.live());
-      if (!ahead_) {
-        if (changed) port_.cache().make_dirty(entry.line, entry.sectors);
-        port_.cache().unpin(entry.line);
-        if (returns_) use(entry, now);
-        if (timing_.line_cycles > 0 && unpaid_[entry.line]) pay_for_fetch(entry.line, changed);
-      } else {
-        ahead_->blended(entry.line, entry.sectors, changed, now);
-        pay_for_stays();
-      }
+      Plain ? time_.blend(now) : time_.blend(priced, price, now);
+      waits_from_ = never;
+      leave(entry, outcome.changed || time_.writes_unchanged, now);
       queue_.pop();
       if (!marks_.empty()) --marks_.front().quads;
       if (queue_.size() > quads_ahead) prefetch(queue_[quads_ahead]);
     }
     if (beat.count > 0) out_.push(beat);
-    const unsigned blended = most_in_a_cycle_ - budget;
+    const unsigned blended = time_.most_in_a_cycle - budget;
     if (blended == 0) return false;
-    frame_lasts(now + timing_.latency_cycles);
-    did(CropWork::blend, blended, now);
-    if (!pairs_) settle_unpaired(now);
-    last_blend_ = now;
     any_blended_ = true;
+    frame_lasts(now + time_.latency_cycles);
+    did(CropWork::blend, blended, now);
+    if (!Plain) tell_unpaired(time_.take_unpaired());
     return true;
+  }
+  [[gnu::noinline]] CropTime::Quad priced_quad(const Entry& entry) const {
+    // A line may have become another tile's since.
+    return {std::uint64_t{entry.place / positions_per_tile} << 32U | entry.line, entry.sectors, entry.place,
+            entry.quad.live(), blends(entry.quad)};
+  }
+  void tell_unpaired(std::int64_t parts) {
+    if (parts > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(parts), now());
   }
 
   /// Whether the sectors of a quad whose turn it is are not there.
   bool is_awaited(const Entry& entry, Cycle now) {
-    if (!ahead_) {
+    if (Plain || !ahead_) {
       if (port_.awaited(entry.line, entry.sectors) != 0) return true;
-      if (!returns_ || !came_back_[entry.line]) return false;
+      if (Plain || !stays_[entry.line].came_back) return false;
       const Cycle from = returns_->from(port_.cache().address(entry.line));
       if (now < from) ready_at_ = from;
       return now < from;
@@ -301,43 +261,17 @@ class CropUnit : public Unit {
     if (wait == LinesAhead::Wait::until) ready_at_ = ahead_->ready_at(entry.line);
     return wait != LinesAhead::Wait::none;
   }
-  [[gnu::noinline]] void use(const Entry& entry, Cycle now) {
-    came_back_[entry.line] = false;
-    returns_->used(port_.cache().address(entry.line), now);
-  }
-  [[gnu::noinline]] void pay_for_fetch(SectoredCache::Line line, bool changed) {
-    unpaid_[line] = false;
-    if (changed) pay(1);
-  }
-  /// What the columns of two pixels of a quad that have live samples take beyond its price, which is paid once it is blended.
-  [[gnu::noinline]] std::int64_t pay_for_columns(LaneMask live) {
-    std::int64_t more = columns_of(live) * timing_.column_cycles * income_ - price_;
-    if (more <= 0) return 0;
-    if (pairs_) more = static_cast<std::int64_t>(group_.lengthen(static_cast<std::uint64_t>(more)));
-    tokens_ -= more;
-    idle_cache_ = more;
-    return more;
-  }
-  /// Whether a quad goes with the last ones; `beside` have gone in this cycle. A line may have become another tile's since.
-  static SectorGroup::Place place_of(const Entry& entry) {
-    return {std::uint64_t{entry.place / positions_per_tile} << 32U | entry.line, entry.sectors};
-  }
-  [[gnu::noinline]] bool joins_last(const Entry& entry, unsigned beside) const {
-    return (beside > 0 || last_waits_) && group_.takes(place_of(entry));
-  }
-  std::int64_t price_of_next() const {
-    return static_cast<std::int64_t>(group_.price_of_next(static_cast<std::uint64_t>(price_)));
-  }
-  [[gnu::noinline]] void goes(const Entry& entry, bool joins) {
-    const auto own = static_cast<std::uint64_t>(price_);
-    if (!joins) settle_unpaired(now());
-    joins ? group_.join(own) : group_.begin(place_of(entry), own);
-    last_waits_ = false;
-  }
-  /// Nothing goes with the last quads any more.
-  void settle_unpaired(Cycle now) {
-    if (unpaired_ > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(unpaired_), now);
-    unpaired_ = 0;
+  /// A quad has been blended into its line.
+  void leave(const Entry& entry, bool changed, Cycle now) {
+    if (!Plain && ahead_) {
+      ahead_->blended(entry.line, entry.sectors, changed, now);
+      return pay(ahead_->take_moves());
+    }
+    if (changed) port_.cache().make_dirty(entry.line, entry.sectors);
+    port_.cache().unpin(entry.line);
+    if (Plain) return;
+    if (returns_) returns_->used(port_.cache().address(entry.line), now);
+    if (std::exchange(stays_[entry.line], {}).is_unpaid && changed) pay({0, 1});
   }
 
   /// Behind the quads in the queue.
@@ -356,8 +290,8 @@ class CropUnit : public Unit {
         behaviour_->pass(marks_.front().mark);
         if (barriers_.is_barrier(marks_.front().mark)) done_.push({marks_.front().mark});
       } else {
-        settle_unpaired(now);
-        end_ = !any_blended_ ? now : last_blend_ + timing_.latency_cycles;
+        tell_unpaired(time_.take_unpaired(true));
+        end_ = any_blended_ ? time_.last_blend() + time_.latency_cycles : now;
       }
     }
     return passed;
@@ -367,7 +301,7 @@ class CropUnit : public Unit {
   }
 
   Cycle tick(Cycle now) override {
-    if (!ahead_) {
+    if (Plain || !ahead_) {
       port_.finish_fills(now);
     } else {
       ahead_->advance();
@@ -377,11 +311,8 @@ class CropUnit : public Unit {
     const bool marked = !marks_.empty() && pass_marks(now);
     if (!done_.empty()) send_done();
     enter(blended ? UnitState::busy : !queue_.empty() ? stop_ : UnitState::starved, now);
-    if (blended || accepted || marked ||
-        (!queue_.empty() && stop_ != UnitState::blocked &&
-         (stop_ == UnitState::latency || stop_ == UnitState::busy || tokens_ < price_))) {
-      return now + 1;
-    }
+    const bool waits_for_time = !queue_.empty() && (stop_ == UnitState::latency || stop_ == UnitState::busy);
+    if (blended || accepted || marked || waits_for_time) return now + 1;
     // A quad at the link that could not be looked up waits for a completion or for the queue to move.
     Cycle next = std::min(port_.next_completion(), queue_.empty() ? never : ready_at_);
     if (in_.next_ready() > now) next = std::min(next, in_.next_ready());
@@ -393,18 +324,12 @@ class CropUnit : public Unit {
   StreamOut<TerminationBeat> out_;
   StreamOut<BlendsDone> out_done_;
   std::unique_ptr<CropBehaviour> behaviour_;
-  const CropBehaviour::TimingParameters timing_;
+  CropTime time_;
   const bool signals_;
   const bool replaces_;  ///< colours, in any draw that does not blend
   const BarrierPlan barriers_;
   EffectGate hazard_gate_;
   EffectGate cache_order_gate_;
-  const std::int64_t price_;        ///< of blending a quad, in tokens
-  const std::int64_t move_price_;   ///< of moving a sector, or a line
-  const std::int64_t income_;       ///< of a cycle: what so many quads, or so many sectors, cost
-  const unsigned most_in_a_cycle_;  ///< quads looked up or blended
-  const bool pairs_;                ///< several go in a cycle only if they share a sector
-  SectorGroup group_;               ///< the last of these
   CachePort port_;
   const ColorSurface* surface_ = nullptr;
   std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
@@ -413,17 +338,16 @@ class CropUnit : public Unit {
   Ring<Entry> queue_;         ///< looked up and waiting to be blended
   unsigned at_ = 0;           ///< quads taken of the beat at the link
   CachePort::LookUp wanted_;  ///< of the quad at the link
-  std::int64_t tokens_ = 0;
-  Cycle refilled_ = 0;
-  std::vector<bool> unpaid_;            ///< by line of the cache: nothing has been blended into it
+  struct Stay {
+    bool is_unpaid = false;  ///< nothing has been blended into it
+    bool came_back = false;  ///< it was there before; not used since
+  };
+  std::vector<Stay> stays_;             ///< by line of the cache
   std::optional<LineReturns> returns_;  ///< where lines that come back wait
-  std::vector<bool> came_back_;         ///< by line of the cache: was there before; not used since
   std::optional<LinesAhead> ahead_;     ///< where tags run ahead of data
   Cycle ready_at_ = never;              ///< of the quad whose turn it is, if that is known
-  std::int64_t unpaired_ = 0;           ///< tokens of the last quads' price beyond their rate, not tallied yet
-  std::int64_t idle_cache_ = 0;         ///< tokens of the last blend of several cycles, in which nothing moves
-  bool last_waits_ = false;             ///< so that the next one goes in a later cycle than it might
-  std::deque<std::pair<std::uint32_t, Cycle>> recent_;  ///< blends in the pipeline, without forwarding
+  Cycle waits_from_ = never;            ///< it has waited for nothing but the blender
+  Cycle opened_ = 0;                    ///< the blender, last
   UnitState stop_ = UnitState::starved;
   struct QueuedMark {
     Mark mark = Mark::none;
@@ -431,7 +355,6 @@ class CropUnit : public Unit {
   };
   Ring<QueuedMark> marks_;
   Ring<BlendsDone> done_;  ///< and not sent yet
-  Cycle last_blend_ = 0;
   Cycle end_ = never;
   bool any_blended_ = false;
   unsigned sectors_of_a_quad_ = 0;
@@ -443,10 +366,17 @@ class CropUnit : public Unit {
 };
 
 [[maybe_unused]] const bool crop_unit_registered = [] {
-  register_unit_maker("crop", [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
-                                 const RenderContext& context, unsigned) {
-    return std::make_unique<CropUnit>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)), context);
-  });
+  register_unit_maker("crop",
+                      [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                         const RenderContext& context, unsigned) -> std::unique_ptr<Unit> {
+                        auto crop = behaviour_as<CropBehaviour>(std::move(behaviour));
+                        const Frame& frame = *context.frame;
+                        const bool is_plain =
+                            crop->time().is_plain() && !frame.replaces_color() && !domain.frame_end().tells_draws();
+                        if (is_plain)
+                          return std::make_unique<CropUnit<true>>(name.c_str(), domain, std::move(crop), context);
+                        return std::make_unique<CropUnit<false>>(name.c_str(), domain, std::move(crop), context);
+                      });
   return true;
 }();
 

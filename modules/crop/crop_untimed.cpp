@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <optional>
+#include <vector>
+
+#include "crop/crop_time.h"
 
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
-#include <vrpipe/pipeline/slots/crop.h>
 
 namespace vrpipe {
 
@@ -14,16 +16,14 @@ namespace {
 class UntimedCrop : public UntimedUnit {
  public:
   UntimedCrop(const std::string& name, std::unique_ptr<CropBehaviour> behaviour, const RenderContext& context)
-      : UntimedUnit(name),
+      : UntimedUnit(name, work(behaviour->time())),
         context_(context),
         out_(*this, "out_terminations"),
         out_done_(*this, "out_done"),
         in_(input<ShadedWarpItem>("in_color", [this](const ShadedWarpItem& item) { take(*item.warp); })),
         behaviour_(std::move(behaviour)),
         barriers_(context),
-        timing_(behaviour_->timing()),
-        organization_(timing_.cache()),
-        looked_up_at_once_(quads_looked_up_at_once(timing_)),
+        time_(behaviour_->time()),
         memory_({MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
     out_done_.set_optional();
   }
@@ -42,12 +42,35 @@ class UntimedCrop : public UntimedUnit {
     }
   }
 
-  void observe(BlendObserver& observer) override { observer_ = &observer; }
+  void count_least(const BoundTerms& terms) override {
+    counts_ = true;
+    memory_latency_cycles_ = terms.memory_latency_cycles;
+    if (terms.bins_vary && context_.frame->terminates_early())
+      terminated_.resize(behaviour_->surface()->grid().quads());
+    const std::size_t lines = behaviour_->surface()->size_bytes() / time_.cache.line_bytes + 1;
+    // Of lines that go in another order than they are used, which one goes depends on those that are waited for.
+    if (terms.order_varies || time_.cache.replacement != Replacement::lru) filled_.resize(lines);
+    if (time_.pays_for_lines) unpaid_.resize(lines);
+  }
+  double least_cycles(const Items& items) const override {
+    return time_.least_cycles({items[CropWork::blend], items[CropWork::sectors], items[CropWork::sectors_filled],
+                               items[CropWork::lines_filled], memory_latency_cycles_});
+  }
+  std::uint64_t room_in_warps() const override { return time_.input_quads; }
 
  private:
+  /// What is counted beside the kinds of the slot takes as long as the memory says (least_cycles).
+  static std::vector<WorkKind> work(const CropTime& time) {
+    std::vector<WorkKind> kinds = time.kinds();
+    for (const char* name : {"sectors filled", "lines filled", "bytes moved"}) kinds.push_back({name, 1, 0, false});
+    return kinds;
+  }
+
   void take(const ShadedWarp& warp) {
     if (warp.mark != Mark::none) {
       behaviour_->pass(warp.mark);
+      const Clear* const clear = context_.frame->clear_of(warp.mark);
+      if (clear != nullptr && clear->termination) std::fill(terminated_.begin(), terminated_.end(), LaneMask{0});
       if (barriers_.is_barrier(warp.mark)) out_done_.send({warp.mark});
       return warp.release();
     }
@@ -58,12 +81,13 @@ class UntimedCrop : public UntimedUnit {
     if (!follows_cache()) {
       blend(warp, 0, warp.count);
     } else {
-      for (unsigned from = 0; from < warp.count; from += looked_up_at_once_) {
-        const unsigned to = std::min<unsigned>(from + looked_up_at_once_, warp.count);
+      const unsigned at_once = time_.looked_up_at_once();
+      for (unsigned from = 0; from < warp.count; from += at_once) {
+        const unsigned to = std::min<unsigned>(from + at_once, warp.count);
         behaviour_->look_up(warp, from, to, cache_);
         for (unsigned line = 0; line < cache_.count; ++line) {
-          if (observer_ != nullptr) observer_->looked_up(cache_.lines[line]);
-          if (memory_.connected()) memory_.move(cache_.lines[line], organization_);
+          if (counts_) count(cache_.lines[line]);
+          if (memory_.connected()) memory_.move(cache_.lines[line], time_.cache);
         }
         blend(warp, from, to);
       }
@@ -72,7 +96,7 @@ class UntimedCrop : public UntimedUnit {
   }
 
   /// Whether anybody wants to know what the colour cache does.
-  bool follows_cache() const { return observer_ != nullptr || memory_.connected(); }
+  bool follows_cache() const { return counts_ || memory_.connected(); }
 
   void blend(const ShadedWarp& warp, unsigned from, unsigned to) {
     monitor_->blended(warp, from, to, 0);
@@ -90,11 +114,55 @@ class UntimedCrop : public UntimedUnit {
   }
 
   void account(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) {
-    if (cache_.count > 0 && (outcome.changed || timing_.writes_unchanged)) {
+    const bool changed = outcome.changed || time_.writes_unchanged;
+    if (cache_.count > 0 && changed) {
       behaviour_->make_dirty(cache_.lines[cache_.line_of[index]].line, cache_.sectors_of[index]);
     }
-    if (observer_ != nullptr) observer_->blended(warp, index, outcome);
+    if (counts_) count(warp, index, outcome, changed);
   }
+
+  /// What the cache moves in any order: each sector is filled once, though others may go for those that are waited for.
+  void count(const CropBehaviour::LineAccess& access) {
+    std::uint32_t fills = access.filled;
+    std::uint32_t written_back = access.written_back;
+    bool fills_line = access.replaced && fills != 0;
+    const std::size_t line = line_of(access.address);
+    if (!filled_.empty()) {
+      std::uint32_t& before = filled_[line];
+      fills_line = before == 0 && fills != 0;
+      fills &= ~before;
+      before |= fills;
+      written_back = 0;
+    }
+    const unsigned filled = popcount(fills);
+    const unsigned moved = filled + popcount(written_back);
+    did(CropWork::sectors_filled, filled);
+    did(CropWork::bytes_moved, std::uint64_t{moved} * time_.cache.sector_bytes);
+    did(CropWork::lines_filled, fills_line ? 1 : 0);
+    did(CropWork::sectors, time_.paid({moved, written_back != 0 ? 1U : 0U}));
+    if (fills_line && !unpaid_.empty()) unpaid_[line] = true;
+  }
+  /// A quad that is blended whenever bins are flushed: some of its pixels are not terminated by what was blended before.
+  void count(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome, bool changed) {
+    const std::size_t place = behaviour_->surface()->grid().place(warp.tile, warp.position[index]);
+    bool is_needed = true;
+    if (!terminated_.empty()) {
+      LaneMask& before = terminated_[place];
+      is_needed = !context_.state(warp.draw[index]).early_termination || (warp.live[index] & ~before) != 0;
+      before = static_cast<LaneMask>(before | outcome.terminated);
+    }
+    if (!is_needed) return;
+    did(CropWork::blend, 1);
+    if (unpaid_.empty()) return;
+    const std::size_t line = line_of(behaviour_->surface()->address(place));
+    if (unpaid_[line] && changed) did(CropWork::sectors, time_.paid({0, 1}));
+    unpaid_[line] = false;
+  }
+  /// Of the surface.
+  std::size_t line_of(std::uint64_t address) const {
+    return static_cast<std::size_t>((address - behaviour_->surface()->address(0)) / time_.cache.line_bytes);
+  }
+  static unsigned popcount(std::uint32_t sectors) { return static_cast<unsigned>(__builtin_popcount(sectors)); }
 
   const RenderContext& context_;
   UntimedOut<TerminationBeat> out_;
@@ -103,12 +171,15 @@ class UntimedCrop : public UntimedUnit {
   std::unique_ptr<CropBehaviour> behaviour_;
   const BarrierPlan barriers_;
   std::optional<BlendOrderMonitor> monitor_;
-  BlendObserver* observer_ = nullptr;
-  const CropBehaviour::TimingParameters timing_;
-  const CacheOrganization organization_;
-  const unsigned looked_up_at_once_;
+  const CropTime& time_;
   UntimedMemoryPort memory_;
   CropBehaviour::CacheLookUp cache_;
+  // For `bound`:
+  bool counts_ = false;
+  std::uint32_t memory_latency_cycles_ = 0;
+  std::vector<LaneMask> terminated_;   ///< by quad of the surface; empty if all quads count
+  std::vector<std::uint32_t> filled_;  ///< sectors so far, by line of the surface; empty if all that moves counts
+  std::vector<bool> unpaid_;           ///< by line of the surface; empty if lines have no price
 };
 
 [[maybe_unused]] const bool crop_untimed_registered = [] {

@@ -4,6 +4,9 @@
 #include <utility>
 #include <vector>
 
+#include "crop/crop_time.h"
+
+#include <vrpipe/component/statistic.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
 #include <vrpipe/memory/line_returns.h>
@@ -20,10 +23,12 @@ class LinesAhead {
   using Stay = std::uint32_t;
   static constexpr Stay no_stay = ~0U;
 
-  /// The port's cache has been made. Port, statistics and returns outlive it.
-  LinesAhead(CachePort& port, SectoredCacheStatistics& statistics, LineReturns& returns, unsigned mshrs)
+  /// The port's cache has been made. All but `mshrs` outlive it. `fetched_again`: sectors, a second time.
+  LinesAhead(CachePort& port, SectoredCacheStatistics& statistics, Counter& fetched_again, LineReturns& returns,
+             unsigned mshrs)
       : port_(port),
         statistics_(statistics),
+        fetched_again_(fetched_again),
         returns_(returns),
         sector_bytes_(port.cache().organization().sector_bytes),
         sectors_of_a_line_(port.cache().organization().sectors_of_a_line()),
@@ -98,14 +103,8 @@ class LinesAhead {
     if (--stay.quads == 0 && stay.left) end(number);
   }
 
-  /// Since this was last called: sectors, and lines that were written back, or fetched for a quad that changed a value: the first of
-  /// the stay.
-  struct Moves {
-    unsigned sectors = 0;
-    unsigned lines = 0;
-  };
-  Moves take_moves() { return std::exchange(moves_, {}); }
-  std::uint64_t take_fetched_again() { return std::exchange(fetched_again_, 0); }
+  /// Since this was last called.
+  CropTime::Moves take_moves() { return std::exchange(moves_, {}); }
 
  private:
   static constexpr std::uint32_t write_back_tag = ~0U;
@@ -208,6 +207,7 @@ class LinesAhead {
 
   CachePort& port_;
   SectoredCacheStatistics& statistics_;
+  Counter& fetched_again_;
   LineReturns& returns_;
   const std::uint64_t sector_bytes_;
   const unsigned sectors_of_a_line_;
@@ -218,8 +218,7 @@ class LinesAhead {
   std::vector<Stay> stay_of_line_;  ///< by line of the cache
   std::vector<Stay> latest_;        ///< by line of the surface: of those that have not ended
   Ring<Request> requests_;          ///< that the memory port has not taken yet
-  Moves moves_;
-  std::uint64_t fetched_again_ = 0;
+  CropTime::Moves moves_;
 };
 
 }  // namespace vrpipe

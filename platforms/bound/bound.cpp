@@ -4,6 +4,7 @@
 #include <map>
 #include <type_traits>
 
+#include <vrpipe/pipeline/slots/crop.h>
 #include <vrpipe/pipeline/slots/draw.h>
 #include <vrpipe/pipeline/slots/memory.h>
 #include <vrpipe/pipeline/slots/qru.h>
@@ -60,19 +61,18 @@ void Work::add(const Work& other) {
   fragment_instructions += other.fragment_instructions;
   merging_warps += other.merging_warps;
   launches += other.launches;
-  color_quads += other.color_quads;
-  sectors += other.sectors;
-  sectors_filled += other.sectors_filled;
-  lines_filled += other.lines_filled;
-  lines_paid += other.lines_paid;
+  for (std::size_t kind = 0; kind < crop.size(); ++kind) crop[kind] += other.crop[kind];
 }
+
+std::uint64_t Work::color_quads() const { return crop[CropWork::blend]; }
 
 bool PhaseBound::knows(const std::string& slot) {
   constexpr const char* known[] = {"draw", "vpo", "tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"};
   return std::find(std::begin(known), std::end(known), slot) != std::end(known);
 }
 
-PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc) {
+PhaseBound::PhaseBound(const Configuration& configuration, const UntimedUnit* crop_unit, unsigned gpc)
+    : crop_(crop_unit) {
   const auto cost_of = [&](const char* slot, auto* of_slot, const auto& take) {
     for (const Instance& instance : configuration.netlist().instances()) {
       if (instance.slot != slot || (instance.gpc != gpc && !instance.in_front_end)) continue;
@@ -89,9 +89,9 @@ PhaseBound::PhaseBound(const Configuration& configuration, unsigned gpc) {
   cost_of("zrop", static_cast<ZropBehaviour*>(nullptr), [&](const auto& unit) { zrop_ = unit.timing(); });
   cost_of("qru", static_cast<QruBehaviour*>(nullptr), [&](const auto& unit) { qru_ = unit.timing(); });
   cost_of("sm", static_cast<SmBehaviour*>(nullptr), [&](const auto& unit) { sm_ = unit.timing(); });
-  cost_of("crop", static_cast<CropBehaviour*>(nullptr), [&](const auto& unit) { crop_ = unit.timing(); });
   // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
-  warps_in_phase_ = 2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + crop_.input_quads);
+  const std::uint64_t in_crop = crop_ == nullptr ? 0 : crop_->room_in_warps();
+  warps_in_phase_ = 2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + in_crop);
   times_out_ = tc_.timeout_in(configuration.request().termination) > 0;
   cost_of("l2", static_cast<MemoryBehaviour*>(nullptr), [&](const auto& memory) {
     l2_bytes_per_cycle_ = memory.timing().bytes_per_cycle;
@@ -110,7 +110,7 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   std::array<double, stages> cycles{};
   cycles[draw] = spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_, to_last);
   // Vertices are assembled once their attributes are sent; so many of these may still be on their way.
-  const std::uint64_t sent = std::uint64_t{sm_.fetch.attribute_writes} * crop_.line_bytes;
+  const std::uint64_t sent = std::uint64_t{sm_.fetch.attribute_writes} * sm_.fetch.l1.line_bytes;
   cycles[vpo] = std::max(ratio(done.triangles, vpo_.items_per_cycle),
                          ratio(done.attribute_bytes_written - std::min(done.attribute_bytes_written, sent),
                                std::uint64_t{sm_.cores} * sm_.fetch.core_bytes));
@@ -133,21 +133,9 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
   cycles[sm] = std::max(instructions(done) / sm_.instructions_per_cycle(), ratio(launches, 1000));
   cycles[late] = ratio(done.late_quads, std::min(zrop_.quads_per_cycle, prop_.quads_per_cycle));
-  cycles[color] = static_cast<double>(done.color_quads) / prop_.color_rate.per_cycle();
-  cycles[l2] = from_l2(done.sectors * crop_.sector_bytes);
-  // A line, and a miss register, is taken for as long as a fill is under way; those of a phase's beginning may have been
-  // asked for before it.
-  const auto turns = [&](std::uint64_t fills, std::uint64_t places) {
-    return fills <= places ? 0.0 : ratio(fills - places, places) * l2_latency_cycles_;
-  };
-  // Ahead of its data, a quad that needs more registers than there are has them all.
-  const std::uint64_t registers =
-      crop_.fetches_ahead ? std::max(crop_.mshrs, crop_.line_bytes / crop_.sector_bytes) : crop_.mshrs;
-  cycles[crop] = std::max(
-      {static_cast<double>(done.color_quads) / crop_.blend_rate.per_cycle() +
-           ratio(color_moves(done) * crop_.parts_of_a_move(), crop_.moves_in_a_cycle()),
-       crop_.fetches_ahead ? 0.0 : turns(done.lines_filled, std::max(crop_.cache_bytes / crop_.line_bytes, 1U)),
-       turns(done.sectors_filled, registers)});
+  cycles[color] = static_cast<double>(done.color_quads()) / prop_.color_rate.per_cycle();
+  cycles[l2] = from_l2(done.crop[CropWork::bytes_moved]);
+  cycles[crop] = crop_ == nullptr ? 0 : crop_->least_cycles(done.crop);
   return cycles;
 }
 
@@ -270,7 +258,7 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
   if (slot == "prop") {
     return priced(PropWork::kinds(prop_),
                   {count(done.quads_rasterized), done.quads_tested > 0 ? count(done.survivors) : 0.0,
-                   count(done.color_quads), 0.0, count(done.late_quads)});
+                   count(done.color_quads()), 0.0, count(done.late_quads)});
   }
   if (slot == "zrop") {
     return priced(ZropWork::kinds(zrop_),
@@ -287,9 +275,9 @@ std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
                                        count(done.merging_warps * sum_of(sm_.merge)),
                                        count(without_last(done.launches, longest_launch()))});
   }
-  if (slot == "crop") return priced(CropWork::kinds(crop_), {count(done.color_quads), count(color_moves(done))});
+  if (slot == "crop") return priced(crop_->work(), {count(done.color_quads()), count(done.crop[CropWork::sectors])});
   if (slot == "l2" && l2_bytes_per_cycle_ > 0)
-    return {{"bytes", 0, ratio(done.sectors * crop_.sector_bytes, l2_bytes_per_cycle_), true}};
+    return {{"bytes", 0, ratio(done.crop[CropWork::bytes_moved], l2_bytes_per_cycle_), true}};
   return {};
 }
 

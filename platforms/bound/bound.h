@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <vrpipe/kernel/accounting.h>
-#include <vrpipe/pipeline/slots/crop.h>
+#include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/slots/prop.h>
 #include <vrpipe/pipeline/slots/raster.h>
 #include <vrpipe/pipeline/slots/sm.h>
@@ -44,11 +44,8 @@ struct Work : FrontEndWork {
   std::uint64_t fragment_instructions = 0;  ///< of these warps
   std::uint64_t merging_warps = 0;
   std::uint64_t launches = 0;  ///< of warps, thousandths of a cycle
-  std::uint64_t color_quads = 0;
-  std::uint64_t sectors = 0;  ///< filled or written back
-  std::uint64_t sectors_filled = 0;
-  std::uint64_t lines_filled = 0;  ///< of the colour cache, in the place of others
-  std::uint64_t lines_paid = 0;    ///< of it, that were written back, or fetched for a quad that changes a value
+  UntimedUnit::Items crop{};   ///< by kind of CropWork
+  std::uint64_t color_quads() const;
 
   void add(const Work& other);
 };
@@ -69,8 +66,8 @@ class PhaseBound {
  public:
   /// Whether this is a slot of the pipeline.
   static bool knows(const std::string& slot);
-  /// A slot that the platform does without takes no time.
-  PhaseBound(const Configuration& configuration, unsigned gpc);
+  /// A slot that the platform does without takes no time. The CROP of the GPC outlives it; null for none.
+  PhaseBound(const Configuration& configuration, const UntimedUnit* crop_unit, unsigned gpc);
 
   Work work;  ///< of the phase
   bool phase_is_full() const { return work.warps >= warps_in_phase_; }
@@ -105,8 +102,11 @@ class PhaseBound {
     const std::uint64_t ahead = std::uint64_t{zrop_.z_cache.input_quads} * zrop_.z_cache.line_thousandths;
     return moved > ahead ? moved - ahead : 0;
   }
-  /// Screen tiles may be blended in another order than they were flushed in.
-  bool tiles_may_overtake() const { return prop_.order == PropBehaviour::Order::tile; }
+  /// What runs with time may do otherwise than the one whose work this counts.
+  BoundTerms terms() const {
+    // Tiles may overtake each other, unless PROP keeps their order.
+    return {times_out_, times_out_ || prop_.order == PropBehaviour::Order::tile, l2_latency_cycles_};
+  }
 
   /// Of all phases, up to the last quad: what the unit of a slot, or `l2`, spends its time on at its peak; none for a slot that
   /// this knows nothing of.
@@ -123,8 +123,6 @@ class PhaseBound {
   /// Thousandths of a cycle of one hand-over, and of one beat's tests.
   std::uint64_t longest_launch() const;
   std::uint64_t longest_beat_of_blocks() const;
-  /// That take time from blending: sectors, or lines where these have a price.
-  std::uint64_t color_moves(const Work& done) const { return crop_.line_cycles == 0 ? done.sectors : done.lines_paid; }
   /// Between a stage's items are more cycles than an item takes: those after the last, for which nobody waits.
   double idle_after_last(unsigned stage) const;
 
@@ -137,7 +135,7 @@ class PhaseBound {
   ZropBehaviour::TimingParameters zrop_{1, 1, 1};
   Throughput qru_;
   SmBehaviour::TimingParameters sm_{1, 1, 32, 1, 1, 1, {}, {}, {}};
-  CropBehaviour::TimingParameters crop_{{}, 1, 1, true, 0, 1, 1, 1, 1, false};
+  const UntimedUnit* crop_;
   std::uint32_t l2_bytes_per_cycle_ = 0;  ///< 0: a memory of which nothing is known
   std::uint32_t l2_latency_cycles_ = 0;
   std::uint64_t warps_in_phase_ = 0;

@@ -17,31 +17,16 @@ namespace vrpipe {
 
 namespace {
 
-unsigned bits_of_mask(std::uint32_t mask) {
-  unsigned count = 0;
-  for (; mask != 0; mask &= mask - 1) ++count;
-  return count;
-}
-
 std::uint64_t items(const UntimedUnit* unit, unsigned kind) { return unit == nullptr ? 0 : unit->items(kind); }
 
 }  // namespace
 
-/// From the survivors of a test to the colour cache.
-class WorkCounter::Blends final : public BlendObserver {
+/// What survives tests, and the warps of it, in a frame with termination where bins vary.
+class WorkCounter::Survivors {
  public:
-  Blends(PhaseBound& bound, const Frame& frame, const ColorSurface& surface,
-         const CropBehaviour::TimingParameters& crop, bool only_needed, bool any_order)
-      : work_(bound.work),
-        bound_(bound),
-        frame_(frame),
-        surface_(surface),
-        grid_(surface.grid()),
-        line_bytes_(crop.line_bytes) {
+  Survivors(PhaseBound& bound, const Frame& frame, bool only_needed)
+      : work_(bound.work), bound_(bound), frame_(frame), grid_(frame.width(), frame.height()) {
     if (only_needed) terminated_.resize(grid_.quads());
-    const std::size_t lines = surface.size_bytes() / line_bytes_ + 1;
-    if (any_order) filled_.resize(lines);
-    if (crop.line_cycles > 0) unpaid_.resize(lines);
   }
 
   void passed(Mark mark) {
@@ -86,46 +71,20 @@ class WorkCounter::Blends final : public BlendObserver {
     needed_pairs_ %= quads_per_warp / 2;
   }
 
-  void looked_up(const CropBehaviour::LineAccess& access) override {
-    std::uint32_t fills = access.filled;
-    std::uint32_t written_back = access.written_back;
-    bool fills_line = access.replaced && fills != 0;
-    if (!filled_.empty()) {
-      std::uint32_t& before = filled_[access.address / line_bytes_];
-      fills_line = before == 0 && fills != 0;
-      fills &= ~before;
-      before |= fills;
-      written_back = 0;
+  void terminated(const TerminationBeat& beat) {
+    for (unsigned i = 0; i < beat.count; ++i) {
+      const TerminationSignal& signal = beat.signals[i];
+      if (terminated_.empty()) {
+        ++work_.updates;
+        continue;
+      }
+      LaneMask& before = terminated_[grid_.place(signal.tile, signal.position)];
+      work_.updates += before == 0 ? 1U : 0U;
+      before = static_cast<LaneMask>(before | signal.pixels);
     }
-    work_.sectors += bits_of_mask(fills) + bits_of_mask(written_back);
-    work_.sectors_filled += bits_of_mask(fills);
-    work_.lines_filled += fills_line ? 1U : 0U;
-    if (unpaid_.empty()) return;
-    work_.lines_paid += written_back != 0 ? 1U : 0U;
-    if (fills_line) unpaid_[access.address / line_bytes_] = true;
-  }
-
-  void blended(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) override {
-    if (!unpaid_.empty()) pay(warp, index, outcome.changed);
-    if (terminated_.empty()) {
-      ++work_.color_quads;
-      work_.updates += outcome.terminated != 0 ? 1U : 0U;
-      return;
-    }
-    LaneMask& before = terminated_[grid_.place(warp.tile, warp.position[index])];
-    work_.color_quads += !terminates(warp.draw[index]) || (warp.live[index] & ~before) != 0 ? 1U : 0U;
-    work_.updates += before == 0 && outcome.terminated != 0 ? 1U : 0U;
-    before = static_cast<LaneMask>(before | outcome.terminated);
   }
 
  private:
-  void pay(const ShadedWarp& warp, unsigned index, bool changed) {
-    const std::size_t place = grid_.place(warp.tile, warp.position[index]);
-    if (!terminated_.empty() && terminates(warp.draw[index]) && (warp.live[index] & ~terminated_[place]) == 0) return;
-    const std::size_t line = surface_.address(place) / line_bytes_;
-    work_.lines_paid += unpaid_[line] && changed ? 1U : 0U;
-    unpaid_[line] = false;
-  }
   bool is_needed(std::size_t tile, const Quad& quad) const {
     return !terminates(quad.draw) || (quad.coverage & ~terminated_[tile + quad.position]) != 0;
   }
@@ -137,14 +96,10 @@ class WorkCounter::Blends final : public BlendObserver {
   Work& work_;
   const PhaseBound& bound_;
   const Frame& frame_;
-  const ColorSurface& surface_;
   const ScreenTiling grid_;
-  const std::uint32_t line_bytes_;
-  std::vector<LaneMask> terminated_;   ///< by quad of the surface; empty if all work counts
-  std::vector<std::uint32_t> filled_;  ///< sectors so far, by line of the surface; empty if all moves count
-  std::vector<bool> unpaid_;           ///< by line of the surface; empty if lines have no price
-  std::uint64_t instructions_ = 0;     ///< of the last warp
-  unsigned needed_quads_ = 0;          ///< less than a warp
+  std::vector<LaneMask> terminated_;  ///< by quad of the screen; empty if all work counts
+  std::uint64_t instructions_ = 0;    ///< of the last warp
+  unsigned needed_quads_ = 0;         ///< less than a warp
   unsigned needed_pairs_ = 0;
 };
 
@@ -179,30 +134,29 @@ WorkCounter::WorkCounter(const Configuration& configuration, const UntimedGpu& g
       raster_(gpu.of_slot("raster", gpc)),
       tc_(gpu.of_slot("tc", gpc)),
       zrop_(gpu.of_slot("zrop", gpc)),
-      sm_(gpu.of_slot("sm", gpc)) {
+      sm_(gpu.of_slot("sm", gpc)),
+      crop_(gpu.of_slot("crop", gpc)) {
   UntimedUnit* const prop = gpu.of_slot("prop", gpc);
-  UntimedUnit* const crop = gpu.of_slot("crop", gpc);
-  if (crop != nullptr) {
-    const auto* const colors = dynamic_cast<const CropBehaviour*>(&crop->behaviour());
-    // A time-out flushes bins when this run does not, and quads of theirs may terminate those that are with them here.
-    const bool times_out = bound.times_out();
-    // Of lines that go in another order than they are used, which one goes depends on those that are waited for.
-    const bool any_line = colors->timing().replacement != Replacement::lru;
-    const bool any_order = times_out || bound.tiles_may_overtake() || any_line;
-    const bool only_needed = configuration.frame().terminates_early() && times_out;
-    blends_ = std::make_unique<Blends>(bound, configuration.frame(), *colors->surface(), colors->timing(), only_needed,
-                                       any_order);
-    crop->observe(*blends_);
+  if (crop_ != nullptr) {
+    const BoundTerms terms = bound.terms();
+    crop_->count_least(terms);
+    survivors_ = std::make_unique<Survivors>(bound, configuration.frame(),
+                                             configuration.frame().terminates_early() && terms.bins_vary);
+    tap<TerminationBeat>(crop_, "out_terminations",
+                         [this](const TerminationBeat& beat, UntimedTarget<TerminationBeat>& next) {
+                           survivors_->terminated(beat);
+                           next.take(beat);
+                         });
     tap<BinItem>(prop, "out_survivors", [this](const BinItem& item, UntimedTarget<BinItem>& next) {
       if (item.mark == Mark::none) {
-        blends_->survived(item);
+        survivors_->survived(item);
       } else {
-        blends_->passed(item.mark);
+        survivors_->passed(item.mark);
       }
       next.take(item);
     });
     tap<Warp>(gpu.of_slot("qru", gpc), "out_warps", [this](const Warp& warp, UntimedTarget<Warp>& next) {
-      blends_->launched(warp);
+      survivors_->launched(warp);
       next.take(warp);
     });
   }
@@ -251,6 +205,8 @@ void WorkCounter::count_front_end(FrontEndWork& work) const {
 
 void WorkCounter::count() {
   count_front_end(bound_.work);
+  for (unsigned kind = 0; kind < bound_.work.crop.size(); ++kind)
+    bound_.work.crop[kind] = items(crop_, kind) - before_.crop[kind];
   bound_.work.bin_beats = items(tc_, TcWork::beats) - before_.bin_beats;
   bound_.work.quads_tested = items(zrop_, ZropWork::tests) - before_.quads_tested;
   bound_.work.z_lines = bound_.z_lines_of(items(zrop_, ZropWork::lines) - z_lines_before_);

@@ -11,7 +11,7 @@
 
 namespace vrpipe {
 
-/// Counts what the units of a GPC do in a run without time, for its bound: by taps on the links and at the blender.
+/// Counts what the units of a GPC do in a run without time, for its bound: by what they count, and by taps on the links.
 ///
 /// Where `cycle` may flush bins at other times, what a quad terminates may spare others later than here; so only quads are
 /// counted whose pixels are not all terminated by what was blended before: no run is spared these, however early it
@@ -28,7 +28,7 @@ class WorkCounter {
   void end_phase();
 
  private:
-  class Blends;
+  class Survivors;
   template <class Item, class Function>
   void tap(UntimedUnit* unit, const char* port, Function function);
   /// Of the phase.
@@ -41,11 +41,11 @@ class WorkCounter {
   const bool counts_late_;           ///< late tests, unless some run may be spared them
   const bool hides_at_other_times_;  ///< Hi-Z, told earlier than here by bins that time out
   const BarrierPlan barriers_;
-  std::unique_ptr<Blends> blends_;
+  std::unique_ptr<Survivors> survivors_;
   std::vector<std::shared_ptr<void>> taps_;
-  UntimedUnit *draw_, *vpo_, *tgc_, *raster_, *tc_, *zrop_, *sm_;  ///< null for none
-  Work before_;                                                    ///< of the phases before
-  std::uint64_t z_sectors_before_ = 0;                             ///< the same, all that were filled
+  UntimedUnit *draw_, *vpo_, *tgc_, *raster_, *tc_, *zrop_, *sm_, *crop_;  ///< null for none
+  Work before_;                                                            ///< of the phases before
+  std::uint64_t z_sectors_before_ = 0;                                     ///< the same, all that were filled
   std::uint64_t z_lines_before_ = 0;
 };
 

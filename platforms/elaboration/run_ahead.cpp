@@ -137,7 +137,7 @@ class RunAhead::RecordingCrop final : public CropBehaviour {
     crop_->blend_quads(warp, from, to, outcomes);
     record_.blended(warp, from, to, outcomes);
   }
-  TimingParameters timing() const override { return crop_->timing(); }
+  const CropTime& time() const override { return crop_->time(); }
 
  private:
   std::unique_ptr<CropBehaviour> crop_;
@@ -176,7 +176,7 @@ class RunAhead::RepeatingCrop final : public CropBehaviour {
     crop_.look_up(warp, from, to, out);
   }
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override { crop_.make_dirty(line, sectors); }
-  TimingParameters timing() const override { return crop_.timing(); }
+  const CropTime& time() const override { return crop_.time(); }
 
  private:
   CropBehaviour& crop_;

@@ -545,7 +545,7 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
   std::optional<OtherSlots> others;
   if (result.request.fidelity == Fidelity::bound) {
     const unsigned gpcs = configuration.netlist().gpcs();
-    for (unsigned gpc = 0; gpc < gpcs; ++gpc) bounds.emplace_back(configuration, gpc);
+    for (unsigned gpc = 0; gpc < gpcs; ++gpc) bounds.emplace_back(configuration, gpu.of_slot("crop", gpc), gpc);
     others.emplace(gpu, configuration.frame().terminates_early() && bounds.front().times_out());
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       counters.push_back(std::make_unique<WorkCounter>(configuration, gpu, gpc, bounds[gpc], *others));

@@ -12,6 +12,7 @@
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/pipeline/slots/crop.h>
 
+#include "crop/crop_time.h"
 #include "support/builders.h"
 
 namespace vrpipe {
@@ -269,26 +270,26 @@ TEST_F(ColorRopTest, QuadsPerCycleFollowTheFormat) {
   for (const auto& [format, quads] : expected) {
     context.format = format;
     make();
-    EXPECT_EQ(crop->timing().blend_rate, (Rate{quads, 1}));
+    EXPECT_EQ(crop->time().blend_rate, (Rate{quads, 1}));
   }
 }
 
 TEST(CropQuads, AQuadsSectorsAreThoseThatHoldItsBytes) {
   for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
     const ColorSurface surface(32, 32, format);
-    CropBehaviour::TimingParameters timing{};
-    for (timing.line_bytes = 64; timing.line_bytes <= 1024; timing.line_bytes *= 2) {
-      for (timing.sector_bytes = std::max(16U, timing.line_bytes / 32); timing.sector_bytes <= timing.line_bytes;
-           timing.sector_bytes *= 2) {
-        const auto quads = sectors_of_quads(timing.cache(), 4 * bytes_per_pixel(format));
+    CacheOrganization cache;
+    for (cache.line_bytes = 64; cache.line_bytes <= 1024; cache.line_bytes *= 2) {
+      for (cache.sector_bytes = std::max(16U, cache.line_bytes / 32); cache.sector_bytes <= cache.line_bytes;
+           cache.sector_bytes *= 2) {
+        const auto quads = sectors_of_quads(cache, 4 * bytes_per_pixel(format));
         for (unsigned position = 0; position < positions_per_tile; ++position) {
           const std::uint64_t tile = surface.address({1, 1}, 0);
-          const std::uint64_t line = tile + std::uint64_t{quads[position].line} * timing.line_bytes;
+          const std::uint64_t line = tile + std::uint64_t{quads[position].line} * cache.line_bytes;
           std::uint32_t expected = 0;
           for (std::uint64_t byte = 0; byte < 4 * bytes_per_pixel(format); ++byte) {
             const std::uint64_t offset = surface.address({1, 1}, position) + byte - line;
-            ASSERT_LT(offset, timing.line_bytes) << position;
-            expected |= 1U << (offset / timing.sector_bytes);
+            ASSERT_LT(offset, cache.line_bytes) << position;
+            expected |= 1U << (offset / cache.sector_bytes);
           }
           ASSERT_EQ(quads[position].sectors, expected) << position;
         }

@@ -202,13 +202,9 @@ struct SmThatForgetsAWarp : SplatShader {
   }
 };
 template <ColorFormat Format, BlendRounding Rounding>
-struct CropWithoutMshrs : ColorRop<Format, Rounding> {
+struct CropWithoutTime : ColorRop<Format, Rounding> {
   using ColorRop<Format, Rounding>::ColorRop;
-  CropBehaviour::TimingParameters timing() const override {
-    CropBehaviour::TimingParameters timing = ColorRop<Format, Rounding>::timing();
-    timing.mshrs = 0;
-    return timing;
-  }
+  const CropTime& time() const override { throw 7; }
 };
 template <ColorFormat Format, BlendRounding Rounding>
 struct CropThatKillsTheDead : ColorRop<Format, Rounding> {
@@ -234,7 +230,7 @@ struct CropWithoutCounts : CropBehaviour {
   Outcome blend(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color) override {
     return rop.blend(draw, place, live, color);
   }
-  TimingParameters timing() const override { return rop.timing(); }
+  const CropTime& time() const override { return rop.time(); }
   ColorRop<ColorFormat::rgba16f, BlendRounding::rne> rop;
 };
 
@@ -291,7 +287,8 @@ const Add<QruOfAnotherSplat, QruBehaviour> qru_splat("qru", "other-splat", "spla
 const Add<SmWithoutCores, SmBehaviour> sm_cores("sm", "no-cores", "cores is 0");
 const Add<SmThatForgetsAWarp, SmBehaviour> sm_warp("sm", "forgets", "quads_pruned + quads_merged counts");
 const Add<CropWithoutCounts, CropBehaviour> crop_counts("crop", "no-counts", "quads_dropped_late counts 0, but");
-const AddCrop crop_mshrs(CropMaker<CropWithoutMshrs>::implementation("no-mshrs", "breaks a rule"), "mshrs is 0");
+const AddCrop crop_time(CropMaker<CropWithoutTime>::implementation("no-time", "breaks a rule"),
+                        "time throws an exception of unknown type");
 const AddCrop crop_dead(CropMaker<CropThatKillsTheDead>::implementation("kills-the-dead", "breaks a rule"),
                         "pixels 0x1f terminated by fragments");
 const AddCrop crop_null(
@@ -486,7 +483,7 @@ struct CropForDraw0 : CropBehaviour {
     count_for_draw_0(*this, rop);
     return outcome;
   }
-  TimingParameters timing() const override { return rop.timing(); }
+  const CropTime& time() const override { return rop.time(); }
   ColorRop<ColorFormat::rgba16f, BlendRounding::rne> rop;
 };
 /// Adds to a draw's counter as to one that knows no draws.

@@ -15,6 +15,7 @@
 #include <vrpipe/platforms/foreign_memory.h>
 #include <vrpipe/platforms/wiring.h>
 
+#include "crop/crop_time.h"
 #include "support/simulate.h"
 
 namespace vrpipe {
@@ -198,7 +199,7 @@ TEST(Instances, ParametersNameAnInstanceOrAllOfAKind) {
                       {"link.gpc2.tc.bins", "depth", "5"}};
   const Configuration configuration(request, *Frame::of(draw));
   const auto bytes = [&](const std::string& path) {
-    return configuration.make_as<CropBehaviour>(*configuration.netlist().find(path))->timing().cache_bytes;
+    return configuration.make_as<CropBehaviour>(*configuration.netlist().find(path))->time().cache.bytes;
   };
   EXPECT_EQ(bytes("gpc0.crop"), 8192U);
   EXPECT_EQ(bytes("gpc1.crop"), 4096U);

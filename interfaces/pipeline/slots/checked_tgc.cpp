@@ -1,4 +1,4 @@
-#include "pipeline/slots/checks.h"
+#include <vrpipe/pipeline/slots/checks.h>
 
 #include <vrpipe/pipeline/slots/tgc.h>
 

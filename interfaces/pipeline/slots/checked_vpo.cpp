@@ -1,6 +1,6 @@
 #include <array>
 
-#include "pipeline/slots/checks.h"
+#include <vrpipe/pipeline/slots/checks.h>
 
 #include <vrpipe/pipeline/slots/vpo.h>
 

@@ -1,4 +1,3 @@
-#include <vrpipe/pipeline/slots/crop.h>
 #include <vrpipe/pipeline/slots/draw.h>
 #include <vrpipe/pipeline/slots/prop.h>
 #include <vrpipe/pipeline/slots/qru.h>
@@ -68,14 +67,6 @@ std::vector<WorkKind> SmWork::kinds(const SmBehaviour::TimingParameters& timing)
           {"fragments", 0, issue, throughput},
           {"merging", 0, issue, throughput},
           {"launches", 1, per(1000), false}};
-}
-
-std::vector<WorkKind> CropWork::kinds(const CropBehaviour::TimingParameters& timing) {
-  return {{"blend", 0, per(timing.blend_rate.per_cycle()), throughput},
-          {timing.line_cycles == 0 ? "sectors" : "lines", 0, timing.parts_of_a_move() * per(timing.moves_in_a_cycle()),
-           false},
-          {"forwarding", 0, 1.0 / static_cast<double>(parts_of_a_cycle(timing)), false},
-          {"unpaired", 0, 1.0 / static_cast<double>(parts_of_a_cycle(timing)), false}};
 }
 
 }  // namespace vrpipe

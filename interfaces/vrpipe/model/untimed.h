@@ -21,8 +21,6 @@
 
 namespace vrpipe {
 
-class BlendObserver;
-
 template <class Item>
 class UntimedIn;
 
@@ -147,9 +145,17 @@ class UntimedMemoryPort {
   MemoryBytes moved_;
 };
 
+/// What runs with time may do otherwise than one without, and what their memory takes at least.
+struct BoundTerms {
+  bool bins_vary = false;  ///< they are flushed at other times: what a quad terminates may spare others later than here
+  bool order_varies = false;  ///< screen tiles are blended in another order
+  std::uint32_t memory_latency_cycles = 0;
+};
+
 /// A unit without time: a functional model with ports.
 class UntimedUnit : public Component {
  public:
+  using Items = std::array<std::uint64_t, most_work_kinds>;  ///< by kind of work
   /// @param work  as of `lt` and `cycle` (unit.h): so `bound` knows what a unit in a slot of your own takes. Without it the
   ///              kinds that the unit counts are those of its slot, of which `bound` knows.
   explicit UntimedUnit(std::string name, std::vector<WorkKind> work = {})
@@ -159,6 +165,7 @@ class UntimedUnit : public Component {
   /// Of a kind of work of its slot (CropWork and others), so far: the items that it is counted in, but whole warps where
   /// that is cycles or instructions.
   std::uint64_t items(unsigned kind) const { return items_[kind]; }
+  const Items& items() const { return items_; }
   const std::vector<WorkKind>& work() const { return work_; }
   /// Throws SimulationFault if it did work of a kind that it has not declared.
   void check_work() const;
@@ -171,8 +178,12 @@ class UntimedUnit : public Component {
   virtual void prefetch(const Warp&) {}
   /// For the unit that launches warps: who is to know of them. It outlives this one.
   virtual void prefetch_for(UntimedUnit& /*blender*/) {}
-  /// For the unit that blends: it looks its colour cache up from now on. The observer outlives it.
-  virtual void observe(BlendObserver&) {}
+  /// For `bound`: from now on counts the work alone that any run with time makes.
+  virtual void count_least(const BoundTerms&) {}
+  /// The least cycles of so much of it, which can begin at once.
+  virtual double least_cycles(const Items&) const { return 0; }
+  /// Warps between TC and the end of CROP that it has room for, at worst.
+  virtual std::uint64_t room_in_warps() const { return 0; }
 
  protected:
   template <class Item, class Function>
@@ -187,7 +198,7 @@ class UntimedUnit : public Component {
  private:
   std::string name_;
   std::vector<WorkKind> work_;
-  std::array<std::uint64_t, most_work_kinds> items_{};
+  Items items_{};
 };
 
 /// Makes the unit without time around a functional model of a slot. `gpcs` is how many GPCs the front end serves.

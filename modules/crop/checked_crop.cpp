@@ -1,6 +1,8 @@
-#include "pipeline/slots/checks.h"
+#include "crop/checked_crop.h"
 
-#include <vrpipe/pipeline/slots/crop.h>
+#include "crop/crop_time.h"
+
+#include <vrpipe/pipeline/slots/checks.h>
 
 namespace vrpipe {
 
@@ -9,7 +11,7 @@ namespace {
 class CheckedCrop final : public CheckedSlot<CropBehaviour> {
  public:
   CheckedCrop(std::string name, const RenderContext& context, std::unique_ptr<CropBehaviour> checked)
-      : CheckedSlot(std::move(name), context, std::move(checked)), format_(context.format) {}
+      : CheckedSlot(std::move(name), context, std::move(checked)) {}
 
   void attach(ColorSurface& surface) override {
     CropBehaviour::attach(surface);
@@ -36,11 +38,9 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
     ask("look_up", [&] { checked_->look_up(warp, from, to, out); });
     if (out.count > to - from)
       fault("look_up", "{} lines for {} quads in {}", out.count, to - from, words_of(warp.tile));
-    const TimingParameters shape = timing();
+    const std::uint32_t held = time().cache.lines();
     for (unsigned i = 0; i < out.count; ++i) {
-      if (out.lines[i].line >= shape.cache_bytes / shape.line_bytes) {
-        fault("look_up", "line {} of a cache of {}", out.lines[i].line, shape.cache_bytes / shape.line_bytes);
-      }
+      if (out.lines[i].line >= held) fault("look_up", "line {} of a cache of {}", out.lines[i].line, held);
     }
     for (unsigned i = from; out.count > 0 && i < to; ++i) {
       if (out.line_of[i] >= out.count) fault("look_up", "quad {} needs line {} of {}", i, out.line_of[i], out.count);
@@ -57,17 +57,10 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
   void make_dirty(std::uint32_t line, std::uint32_t sectors) override {
     ask("make_dirty", [&] { checked_->make_dirty(line, sectors); });
   }
-  TimingParameters timing() const override {
-    const TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
-    check_rate("blend_rate", timing.blend_rate, TerminationBeat::capacity);
-    check_rate("input_quads", timing.input_quads);
-    check_latency("latency_cycles", timing.latency_cycles);
-    check_rate("mshrs", timing.mshrs);
-    check_rate("sectors_per_cycle", timing.sectors_per_cycle);
-    timing.check_cache(format_);
-    return timing;
+  const CropTime& time() const override {
+    return ask("time", [&]() -> const CropTime& { return checked_->time(); });
   }
-  void check_timing() const override { timing(); }
+  void check_timing() const override { time(); }
   void check_counters() const override {
     check_by_draw("quads_blended + quads_dropped_late", {&checked_->quads_blended, &checked_->quads_dropped_late},
                   quads_, "quads came in");
@@ -89,7 +82,7 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
                   sector_misses_, "sectors were missed");
     check_counter("cache.sectors_written_back", cache.sectors_written_back.value(), written_back_,
                   "sectors were written back");
-    const std::uint64_t sector_bytes = timing().sector_bytes;
+    const std::uint64_t sector_bytes = time().cache.sector_bytes;
     check_counter("cache.bytes_filled", cache.bytes_filled.value(), sector_bytes * sectors_filled_,
                   "bytes were filled");
     check_counter("cache.bytes_written_back", cache.bytes_written_back.value(), sector_bytes * written_back_,
@@ -112,7 +105,6 @@ class CheckedCrop final : public CheckedSlot<CropBehaviour> {
 
   static unsigned bits(std::uint32_t sectors) { return static_cast<unsigned>(__builtin_popcount(sectors)); }
 
-  const ColorFormat format_;
   std::uint64_t line_accesses_ = 0;
   std::uint64_t line_misses_ = 0;
   std::uint64_t sector_accesses_ = 0;

@@ -1,0 +1,67 @@
+#include "crop/crop_time.h"
+
+#include <fmt/format.h>
+
+#include <vrpipe/component/error.h>
+
+namespace vrpipe {
+
+CropTime::CropTime(const CropParameters& parameters, ColorFormat format)
+    : cache(parameters.cache.organization()),
+      blend_rate(Rate::of_bytes(parameters.bytes_per_cycle, 4 * bytes_per_pixel(format))),
+      most_in_a_cycle(blend_rate.most_in_a_cycle()),
+      input_quads(parameters.input_quads),
+      latency_cycles(parameters.latency_cycles),
+      mshrs(parameters.mshrs),
+      forwards(parameters.forwarding),
+      writes_unchanged(parameters.writes_unchanged),
+      fetches_ahead(parameters.fetch_ahead),
+      line_return_cycles(parameters.line_return_cycles),
+      pays_for_lines(parameters.line_cycles > 0),
+      parts_of_a_cycle(std::int64_t{blend_rate.items} * (pays_for_lines ? 1 : parameters.sectors_per_cycle)),
+      price_(std::int64_t{blend_rate.cycles} * (pays_for_lines ? 1 : parameters.sectors_per_cycle)),
+      move_price_(std::int64_t{blend_rate.items} * (pays_for_lines ? parameters.line_cycles : 1)),
+      column_parts_(format == ColorFormat::rgba32f ? parameters.rgba32f_column_cycles * parts_of_a_cycle : 0),
+      in_pairs_(parameters.pairs_in_sector && most_in_a_cycle > 1),
+      most_kept_((in_pairs_ ? parts_of_a_cycle : price_) - 1),
+      cycles_(static_cast<std::uint64_t>(parts_of_a_cycle)) {
+  cache.check("CROP cache", "crop", "cache_bytes");
+  const std::uint32_t quad = 4 * bytes_per_pixel(format);
+  if (quad <= cache.line_bytes) return;
+  throw UserError("unusable CROP cache", "crop.line_bytes, --format",
+                  fmt::format("a quad of {} bytes does not fit into a line of {}", quad, cache.line_bytes),
+                  "use longer lines");
+}
+
+std::vector<WorkKind> CropTime::kinds() const {
+  const auto cycles = [this](std::int64_t parts) {
+    return static_cast<double>(parts) / static_cast<double>(parts_of_a_cycle);
+  };
+  return {{"blend", 0, cycles(price_), true},
+          {pays_for_lines ? "lines" : "sectors", 0, cycles(move_price_), false},
+          {"forwarding", 0, cycles(1), false},
+          {"unpaired", 0, cycles(1), false}};
+}
+
+double CropTime::least_cycles(const Sum& sum) const {
+  const auto of = [](std::uint64_t items, double cycles) { return static_cast<double>(items) * cycles; };
+  // What is under way at the beginning may have been asked for before.
+  const auto turns = [&](std::uint64_t fills, std::uint64_t places) {
+    return fills <= places ? 0.0 : of(fills - places, sum.memory_latency_cycles / static_cast<double>(places));
+  };
+  // Ahead of its data, a quad that needs more registers than there are has them all, and lines go while they are filled.
+  const std::uint64_t registers = fetches_ahead ? std::max(mshrs, cache.sectors_of_a_line()) : mshrs;
+  const std::vector<WorkKind> kind = kinds();
+  return std::max(
+      {of(sum.quads, kind[CropWork::blend].cycles_per_item) + of(sum.moves, kind[CropWork::sectors].cycles_per_item),
+       turns(sum.sectors_filled, registers), fetches_ahead ? 0.0 : turns(sum.lines_filled, cache.lines())});
+}
+
+unsigned CropTime::looked_up_at_once() const {
+  constexpr std::uint32_t enough = 16 * quads_per_warp;
+  const bool roomy = cache.lines() >= enough && input_quads >= 3 * enough && mshrs >= enough;
+  const bool keeps_a_warp = cache.replacement == Replacement::lru && (cache.ways == 0 || cache.ways >= quads_per_warp);
+  return roomy && keeps_a_warp ? quads_per_warp : 1;
+}
+
+}  // namespace vrpipe

@@ -1,0 +1,220 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "crop_parameters.h"
+
+#include <vrpipe/arithmetic/divisor.h>
+#include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/rate.h>
+#include <vrpipe/kernel/ring.h>
+#include <vrpipe/pipeline/slots/crop.h>
+
+namespace vrpipe {
+
+/// Of a quad: those of two pixels, one above the other, in which samples live.
+constexpr unsigned columns_of(LaneMask live) { return ((live & 5U) != 0 ? 1U : 0U) + ((live & 10U) != 0 ? 1U : 0U); }
+
+/// What CROP's work takes, and when it may be done: stated here alone. The unit of `cycle` asks for each quad in each
+/// cycle, that of `lt` for a warp, `bound` for a sum.
+///
+/// The blender does one thing after the other: quads, and what the colour cache moves. It has `parts_of_a_cycle` in a
+/// cycle, of which both are whole numbers. Cycles in which it has nothing to do are lost, fractions of a quad are not.
+class CropTime {
+ public:
+  /// Throws UserError for a cache that cannot be (CacheOrganization::check), or whose lines do not hold a quad.
+  CropTime(const CropParameters& parameters, ColorFormat format);
+
+  const CacheOrganization cache;
+  const Rate blend_rate;                   ///< of quads, of the format
+  const unsigned most_in_a_cycle;          ///< quads looked up or blended
+  const std::uint32_t input_quads;         ///< queue between tag look-up and blending
+  const std::uint32_t latency_cycles;      ///< of blending, termination test included
+  const std::uint32_t mshrs;               ///< sectors in flight
+  const bool forwards;                     ///< overlapping quads need not wait for `latency_cycles`
+  const bool writes_unchanged;             ///< a blend that changes no value makes its sector dirty all the same
+  const bool fetches_ahead;                ///< a line may go while quads wait to be blended into it
+  const std::uint32_t line_return_cycles;  ///< from a line's last use to the next, if it left in between
+  const bool pays_for_lines;               ///< that move, whatever number of their sectors does; else for sectors
+  const std::int64_t parts_of_a_cycle;
+
+  /// What the cache moves.
+  struct Moves {
+    unsigned sectors = 0;  ///< filled or written back
+    unsigned lines = 0;    ///< written back, or fetched for a quad that changes a value: the first after the fetch
+  };
+  /// How many of them take time from blending.
+  unsigned paid(const Moves& moves) const { return pays_for_lines ? moves.lines : moves.sectors; }
+
+  /// A quad that is to be blended.
+  struct Quad {
+    std::uint64_t line = 0;     ///< its address, or what stands for it
+    std::uint32_t sectors = 0;  ///< of the line, a bit each
+    std::uint32_t place = 0;    ///< in the surface's grid
+    LaneMask live = 0;
+    bool blends = true;  ///< else its colours replace those that are there
+  };
+  /// What one takes before it is blended, in parts.
+  struct Price {
+    std::int64_t parts = 0;
+    bool joins = false;  ///< the last quads, with which it shares a sector
+  };
+  /// Nothing but the blender holds it from cycle `ready` on.
+  Price price_of(const Quad& quad, Cycle ready) const {
+    if (!in_pairs_) return {price_, false};
+    // Quads of one cycle share a sector: those that go together take a cycle, or as long as they do one by one.
+    const bool joins = ready <= last_blend_ && group_.quads > 0 && group_.quads < most_in_a_cycle &&
+                       group_.line == quad.line && group_.sectors == quad.sectors;
+    return {joins ? group_.lengthened_by(price_, parts_of_a_cycle) : std::max(parts_of_a_cycle, price_), joins};
+  }
+  /// Whether there is time for it in a cycle to which the blender is `open`.
+  bool is_free(const Price& price, Cycle now) const { return done_ + price.parts <= parts_until(now + 1); }
+  /// The first cycle from `ready` on in which there is.
+  Cycle free_from(const Price& price, Cycle ready) const {
+    const std::int64_t end = std::max(done_, earliest(ready)) + price.parts;
+    return std::max({ready, last_blend_, cycle_of(end)});
+  }
+  /// Nothing is done before this cycle any more; returns the parts that are lost for that.
+  std::int64_t open(Cycle now) {
+    const std::int64_t lost = earliest(now) - done_;
+    if (lost <= 0) return 0;
+    done_ += lost;
+    return lost;
+  }
+  /// It is blended in a cycle in which there is time for it.
+  void blend(const Quad& quad, const Price& price, Cycle at) {
+    open(at);
+    std::int64_t parts = price.parts;
+    if (in_pairs_) go_with(quad, price.joins);
+    if (column_parts_ > 0 && quad.blends) parts += lengthen(quad);
+    done_ += parts;
+    unpaired_ += parts - price_;
+    if (!forwards && quad.blends) in_pipeline_.push({quad.place, at});
+    last_blend_ = at;
+  }
+  /// Whether no quad has another price than its rate's, and none has to wait for another.
+  bool quads_are_alike() const { return forwards && !in_pairs_ && column_parts_ == 0; }
+  /// Whether that is all that takes time, but for sectors.
+  bool is_plain() const { return quads_are_alike() && !pays_for_lines && !fetches_ahead && line_return_cycles == 0; }
+  Price price() const { return {price_, false}; }
+  /// Where quads are alike: one is blended in a cycle to which the blender is open, or so many from the first one on in which there is
+  /// time; returns the cycles of the first and of the last.
+  void blend(Cycle now) {
+    done_ += price_;
+    last_blend_ = now;
+  }
+  std::pair<Cycle, Cycle> blend_all(unsigned quads, Cycle ready) {
+    const Cycle first = free_from(price(), ready);
+    open(first);
+    done_ += quads * price_;
+    last_blend_ = std::max(first, cycle_of(done_));
+    return {first, last_blend_};
+  }
+  /// Of the last quad; 0 before the first.
+  Cycle last_blend() const { return last_blend_; }
+  /// The cache moves so many of what is paid for; false if that takes the blender nothing, since the cache is idle beside a
+  /// blend of several cycles.
+  bool move(unsigned moves, Cycle at) {
+    const std::int64_t parts = moves * move_price_;
+    if (idle_cache_ >= parts) {
+      idle_cache_ -= parts;
+      return false;
+    }
+    open(at);
+    done_ += parts;
+    return true;
+  }
+  /// From when on no blend of a quad of the same place is in the pipeline, without forwarding; `now` does not go back.
+  Cycle hazard_until(std::uint32_t place, Cycle now) {
+    while (!in_pipeline_.empty() && in_pipeline_.front().at + latency_cycles <= now) in_pipeline_.pop();
+    Cycle until = 0;
+    for (std::size_t i = 0; i < in_pipeline_.size(); ++i) {
+      if (in_pipeline_[i].place == place) until = in_pipeline_[i].at + latency_cycles;
+    }
+    return until;
+  }
+
+  /// For CropWork::unpaired: parts beyond their rate's that quads took with which none goes any more. `all`: nor with the last.
+  std::int64_t take_unpaired(bool all = false) {
+    if (all || !in_pairs_) settled_ += std::exchange(unpaired_, 0);
+    return std::exchange(settled_, 0);
+  }
+  /// Work of which all may begin at once.
+  struct Sum {
+    std::uint64_t quads = 0;
+    std::uint64_t moves = 0;           ///< paid
+    std::uint64_t sectors_filled = 0;  ///< each of which takes a miss register, for as long as the memory's latency
+    std::uint64_t lines_filled = 0;    ///< and a line of the cache
+    std::uint32_t memory_latency_cycles = 0;
+  };
+  /// The least that it takes: the resource that has most to do.
+  double least_cycles(const Sum& sum) const;
+  /// The slot's kinds of work.
+  std::vector<WorkKind> kinds() const;
+  /// Quads of a warp that are looked up before the first of them is blended, where a warp is taken in one piece. Where places
+  /// in the queue, lines or miss registers are few, one that is taken a few cycles longer than it need be tells; then quads go one by
+  /// one, as they do where a line could go for another one of the same warp.
+  unsigned looked_up_at_once() const;
+
+ private:
+  /// In which parts end, of which there is at least one.
+  Cycle cycle_of(std::int64_t parts) const {
+    return cycles_.quotient_up(static_cast<std::uint64_t>(std::max<std::int64_t>(parts, 1))) - 1;
+  }
+  std::int64_t parts_until(Cycle cycle) const { return static_cast<std::int64_t>(cycle) * parts_of_a_cycle; }
+  /// What is begun in a cycle may take what is left of the one before, if a quad did not fit there.
+  std::int64_t earliest(Cycle cycle) const { return parts_until(cycle) - most_kept_; }
+  void go_with(const Quad& quad, bool joins) {
+    if (!joins) {
+      settled_ += std::exchange(unpaired_, 0);
+      group_ = {quad.line, quad.sectors, 0, 0};
+    }
+    ++group_.quads;
+    group_.own += price_;
+  }
+  /// Columns of two pixels with live samples, of which each takes so long: what that is beyond the price.
+  std::int64_t lengthen(const Quad& quad) {
+    std::int64_t more = columns_of(quad.live) * column_parts_ - price_;
+    if (more <= 0) return 0;
+    if (in_pairs_) {
+      const std::int64_t own = more;
+      more = group_.lengthened_by(own, parts_of_a_cycle);
+      group_.own += own;
+    }
+    idle_cache_ = more;
+    return more;
+  }
+
+  struct Group {
+    std::uint64_t line = 0;
+    std::uint32_t sectors = 0;
+    unsigned quads = 0;
+    std::int64_t own = 0;  ///< parts that they take one by one
+    std::int64_t lengthened_by(std::int64_t more, std::int64_t least) const {
+      return std::max(least, own + more) - std::max(least, own);
+    }
+  };
+  struct Blend {
+    std::uint32_t place = 0;
+    Cycle at = 0;
+  };
+
+  std::int64_t price_;           ///< of a quad by its rate
+  std::int64_t move_price_;      ///< of what moves
+  std::int64_t column_parts_;    ///< 0: columns have no price
+  bool in_pairs_;                ///< several quads go in a cycle only if they share a sector
+  std::int64_t most_kept_;       ///< of a cycle's parts in the next one
+  Divisor cycles_;               ///< of parts
+  std::int64_t done_ = 0;        ///< parts from the beginning, those that were lost too
+  std::int64_t idle_cache_ = 0;  ///< parts of the last blend of several cycles, in which nothing moves
+  Group group_;                  ///< the last quads that go together
+  Cycle last_blend_ = 0;
+  std::int64_t unpaired_ = 0;  ///< parts of the last quads' price beyond their rate's
+  std::int64_t settled_ = 0;   ///< and of those before, not tallied yet
+  Ring<Blend> in_pipeline_;    ///< without forwarding
+};
+
+}  // namespace vrpipe

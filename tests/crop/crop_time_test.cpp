@@ -1,0 +1,139 @@
+#include "crop/crop_time.h"
+
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace vrpipe {
+namespace {
+
+CropTime time_of(const std::vector<std::pair<std::string, std::string>>& settings, ColorFormat format) {
+  CropParameters parameters;
+  for (const auto& [name, value] : settings) parameters.set("crop", name, value);
+  return {parameters, format};
+}
+constexpr std::uint32_t one_sector = 1;
+CropTime::Quad quad_of(std::uint64_t line, std::uint32_t place = 0) {
+  return {line, one_sector, place, all_lanes, true};
+}
+
+/// Blends a quad that is ready in a cycle; returns when.
+Cycle blended(CropTime& time, const CropTime::Quad& quad, Cycle ready) {
+  const CropTime::Price price = time.price_of(quad, ready);
+  const Cycle at = time.free_from(price, ready);
+  time.blend(quad, price, at);
+  return at;
+}
+
+TEST(CropTime, QuadsGoAtTheRateOfTheirFormat) {
+  const std::pair<ColorFormat, Cycle> eight_quads[] = {{ColorFormat::rgba8, 2},
+                                                       {ColorFormat::rgba16f, 4},
+                                                       {ColorFormat::rgba32f, 8}};
+  for (const auto& [format, cycles] : eight_quads) {
+    CropTime time = time_of({}, format);
+    for (unsigned quad = 0; quad < 8; ++quad) EXPECT_EQ(blended(time, quad_of(quad), 10), 10 + quad * cycles / 8);
+    EXPECT_EQ(blended(time, quad_of(8), 10), 10 + cycles);
+  }
+}
+
+TEST(CropTime, FractionsOfAQuadAreKeptAndUnusedCyclesLost) {
+  CropTime time = time_of({{"bytes_per_cycle", "48"}}, ColorFormat::rgba16f);  // three quads in two cycles
+  std::vector<Cycle> at;
+  for (unsigned quad = 0; quad < 6; ++quad) at.push_back(blended(time, quad_of(quad), 10));
+  EXPECT_EQ(at, (std::vector<Cycle>{10, 10, 11, 12, 12, 13}));
+  EXPECT_EQ(blended(time, quad_of(6), 100), 100U);
+  EXPECT_EQ(blended(time, quad_of(7), 100), 100U);
+  EXPECT_EQ(blended(time, quad_of(8), 100), 101U);
+}
+
+TEST(CropTime, TheUnitOfACycleAndThatOfAWarpGetTheSameAnswer) {
+  std::mt19937 draws(7);
+  const auto below = [&draws](unsigned limit) { return static_cast<unsigned>(draws() % limit); };
+  for (const char* bytes : {"16", "24", "64", "80", "256"}) {
+    for (const char* pairs : {"off", "on"}) {
+      CropTime of_warp = time_of({{"bytes_per_cycle", bytes}, {"pairs_in_sector", pairs}}, ColorFormat::rgba8);
+      CropTime of_cycle = of_warp;
+      Cycle now = 0;
+      Cycle ready = 0;
+      for (unsigned i = 0; i < 2000; ++i) {
+        const CropTime::Quad quad = quad_of(below(2));
+        ready += below(8) == 0 ? below(5) : 0;
+        for (now = std::max(now, ready);; ++now) {
+          of_cycle.open(now);
+          const CropTime::Price price = of_cycle.price_of(quad, ready);
+          if (!of_cycle.is_free(price, now)) continue;
+          of_cycle.blend(quad, price, now);
+          break;
+        }
+        ASSERT_EQ(blended(of_warp, quad, ready), now) << bytes << ' ' << pairs << ' ' << i;
+        if (below(4) != 0) continue;
+        const unsigned moved = below(5);
+        EXPECT_EQ(of_warp.move(moved, now), of_cycle.move(moved, now));
+      }
+    }
+  }
+}
+
+TEST(CropTime, AWarpOfQuadsThatAreAlikeTakesWhatTheyTakeOneByOne) {
+  for (const char* bytes : {"16", "48", "64", "112"}) {
+    CropTime together = time_of({{"bytes_per_cycle", bytes}}, ColorFormat::rgba16f);
+    CropTime apart = together;
+    for (Cycle ready = 5; ready < 400; ready += ready % 11) {
+      const auto [first, last] = together.blend_all(8, ready);
+      for (unsigned quad = 0; quad < 8; ++quad) {
+        const Cycle at = blended(apart, quad_of(quad), ready);
+        EXPECT_TRUE(quad != 0 || first == at) << bytes << ' ' << ready;
+        EXPECT_TRUE(quad != 7 || last == at) << bytes << ' ' << ready;
+      }
+    }
+  }
+}
+
+TEST(CropTime, SectorsOrLinesTakeTimeFromBlending) {
+  CropTime sectors = time_of({{"sectors_per_cycle", "4"}}, ColorFormat::rgba16f);
+  EXPECT_EQ(sectors.paid({3, 1}), 3U);
+  sectors.move(8, 10);
+  EXPECT_EQ(blended(sectors, quad_of(0), 10), 12U);
+  CropTime lines = time_of({{"line_cycles", "3"}}, ColorFormat::rgba16f);
+  EXPECT_EQ(lines.paid({3, 1}), 1U);
+  lines.move(1, 10);
+  EXPECT_EQ(blended(lines, quad_of(0), 10), 13U);
+}
+
+TEST(CropTime, QuadsOfOneCycleShareASector) {
+  CropTime time = time_of({{"pairs_in_sector", "on"}}, ColorFormat::rgba16f);
+  EXPECT_EQ(blended(time, quad_of(0), 10), 10U);
+  EXPECT_EQ(blended(time, quad_of(0), 10), 10U);
+  EXPECT_EQ(blended(time, quad_of(0), 10), 11U) << "two go in a cycle";
+  EXPECT_EQ(blended(time, quad_of(1), 10), 12U) << "another line";
+  EXPECT_EQ(time.take_unpaired(), time.parts_of_a_cycle / 2) << "of the third, which went alone";
+  EXPECT_EQ(blended(time, quad_of(1), 13), 13U) << "too late for the last";
+}
+
+TEST(CropTime, ColumnsOfRgba32fLastAndTheCacheIsIdleBesideThem) {
+  CropTime time = time_of({{"rgba32f_column_cycles", "4"}}, ColorFormat::rgba32f);
+  CropTime::Quad column = quad_of(0);
+  column.live = 5;
+  EXPECT_EQ(blended(time, quad_of(0), 10), 10U);
+  EXPECT_EQ(blended(time, column, 10), 18U) << "two columns";
+  EXPECT_FALSE(time.move(1, 18));
+  EXPECT_EQ(blended(time, column, 10), 22U) << "one column";
+}
+
+TEST(CropTime, WithoutForwardingAQuadOfTheSamePlaceWaits) {
+  CropTime time = time_of({{"forwarding", "off"}, {"latency_cycles", "9"}}, ColorFormat::rgba16f);
+  EXPECT_EQ(blended(time, quad_of(0, 3), 10), 10U);
+  EXPECT_EQ(time.hazard_until(3, 11), 19U);
+  EXPECT_EQ(time.hazard_until(4, 11), 0U);
+  EXPECT_EQ(time.hazard_until(3, 19), 0U);
+}
+
+TEST(CropTime, ASumTakesAsLongAsItsBusiestResource) {
+  const CropTime time = time_of({{"mshrs", "100"}, {"cache_bytes", "12800"}}, ColorFormat::rgba16f);
+  EXPECT_DOUBLE_EQ(time.least_cycles({1000, 160, 0, 0, 50}), 1000 / 2.0 + 160 / 16.0);
+  EXPECT_DOUBLE_EQ(time.least_cycles({10, 0, 1100, 0, 50}), (1100 - 100) / 100.0 * 50) << "miss registers";
+  EXPECT_DOUBLE_EQ(time.least_cycles({10, 0, 90, 350, 50}), (350 - 100) / 100.0 * 50) << "lines";
+}
+
+}  // namespace
+}  // namespace vrpipe
