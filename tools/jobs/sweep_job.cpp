@@ -84,9 +84,18 @@ class StudyFrames {
  public:
   explicit StudyFrames(const SweepJob& job) : job_(job) {}
 
+  PreprocessOptions options_of(const Drawn& drawn) const {
+    std::vector<Setting> settings = job_.common.preprocessing;
+    for (const std::string& text : drawn.preprocess) {
+      const std::size_t equals = text.find('=');
+      settings.push_back({"preprocess", text.substr(11, equals - 11), text.substr(equals + 1)});
+    }
+    return sort_settings(settings).preprocess;
+  }
+
   /// The draw of what a point draws, in exact order and with all that the scene has.
   std::shared_ptr<const Draw> exact_draw(const Drawn& drawn) {
-    load(drawn, preprocessing_of(drawn).exact());
+    load(drawn, options_of(drawn).exact());
     held_.reset();
     if (!frame_.meshes.front().empty()) {
       throw UserError("cannot measure images", "columns", "they are measured against an exact image of splats alone",
@@ -97,7 +106,7 @@ class StudyFrames {
 
   std::shared_ptr<const Frame> frame(const StudiedPoint& point, const RunRequest& request) {
     const Drawn drawn = drawn_by(job_, point);
-    if (!held_ || held_->key() != drawn.key()) load(drawn, preprocessing_of(drawn));
+    if (!held_ || held_->key() != drawn.key()) load(drawn, options_of(drawn));
     FrameDescription description = frame_of_scene(drawn.scene);
     const std::string passes = value_on(job_.study, point, "multi-pass", std::to_string(job_.common.frame.passes));
     description.passes = static_cast<std::uint32_t>(std::stoul(passes));
@@ -105,14 +114,6 @@ class StudyFrames {
   }
 
  private:
-  PreprocessOptions preprocessing_of(const Drawn& drawn) const {
-    std::vector<Setting> settings = job_.common.preprocessing;
-    for (const std::string& text : drawn.preprocess) {
-      const std::size_t equals = text.find('=');
-      settings.push_back({"preprocess", text.substr(11, equals - 11), text.substr(equals + 1)});
-    }
-    return sort_settings(settings).preprocess;
-  }
   void load(const Drawn& drawn, const PreprocessOptions& preprocess) {
     held_.reset();
     frame_ = LoadedFrame();
@@ -185,21 +186,16 @@ class ExactImages {
     ShownImage image;
     std::size_t points_left = 0;
   };
-  /// Of points that differ in the precision of preprocessing alone there is one.
+  /// Of points that differ in precision alone there is one.
   OfScene& of(std::size_t point) {
-    Drawn drawn = drawn_by(job_, job_.study.points[point]);
-    const auto is_precision = [](const std::string& setting) {
-      return setting.rfind("preprocess.sh_degree=", 0) == 0 || setting.rfind("preprocess.depth_key_bits=", 0) == 0;
-    };
-    std::vector<std::string>& settings = drawn.preprocess;
-    settings.erase(std::remove_if(settings.begin(), settings.end(), is_precision), settings.end());
-    return scenes_[{drawn.scene, drawn.view, drawn.size, settings}];
+    const Drawn drawn = drawn_by(job_, job_.study.points[point]);
+    return scenes_[{drawn.scene, drawn.view, drawn.size, frames_.options_of(drawn).exact()}];
   }
 
   const SweepJob& job_;
   StudyFrames frames_;
   const std::array<float, 3> background_{};
-  std::map<std::tuple<std::string, std::string, std::string, std::vector<std::string>>, OfScene> scenes_;
+  std::map<std::tuple<std::string, std::string, std::string, PreprocessOptions>, OfScene> scenes_;
 };
 
 void check_views(const SweepJob& job) {

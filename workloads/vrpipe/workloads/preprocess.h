@@ -26,10 +26,9 @@ struct PreprocessOptions {
   std::optional<bool> opacity_compensation;
   unsigned threads = 0;  ///< 0: one per hardware thread. The result does not depend on it.
 
-  bool operator==(const PreprocessOptions& other) const {
-    return std::tie(sh_degree, depth_key_bits, dilation, opacity_compensation, threads) ==
-           std::tie(other.sh_degree, other.depth_key_bits, other.dilation, other.opacity_compensation, other.threads);
-  }
+  auto key() const { return std::tie(sh_degree, depth_key_bits, dilation, opacity_compensation, threads); }
+  bool operator==(const PreprocessOptions& other) const { return key() == other.key(); }
+  bool operator<(const PreprocessOptions& other) const { return key() < other.key(); }
   /// The same model with all bands and in exact order, for images that others are measured against.
   PreprocessOptions exact() const {
     PreprocessOptions all = *this;
