@@ -11,11 +11,10 @@
 #include <boost/archive/iterators/transform_width.hpp>
 
 #include "formats/sog_scene.h"
+#include "glb.h"
 
 namespace vrpipe {
 namespace {
-
-constexpr char kGlbMagic[] = "glTF";
 
 /// A part of a file's bytes.
 FileBytes part_of(const FileBytes& bytes, std::uint64_t offset, std::uint64_t size, const std::string& what) {
@@ -98,21 +97,18 @@ std::vector<double> GltfData::doubles(const Json& node, const char* name, std::s
 }
 
 void GltfData::read_chunks() {
-  constexpr std::uint64_t kHeader = 12, kChunkHeader = 8;
-  constexpr std::uint32_t kJson = 0x4e4f534a, kBinary = 0x004e4942;
   const FileBytes& bytes = file_.bytes;
-  const std::string what = "its header";
-  if (bytes.number<std::uint32_t>(4, what) != 2) bytes.fail_at(4, "it is no .glb of version 2", kGltfRemedy);
-  const std::uint64_t text_size = bytes.number<std::uint32_t>(kHeader, what);
-  if (bytes.number<std::uint32_t>(kHeader + 4, what) != kJson)
-    bytes.fail_at(kHeader + 4, "its first chunk is no JSON", kGltfRemedy);
-  document_ = parse_scene_json(part_of(bytes, kHeader + kChunkHeader, text_size, "its JSON"));
-  const std::uint64_t next = kHeader + kChunkHeader + (text_size + 3) / 4 * 4;
+  const auto start = bytes.number<GlbStart>(0, "its header");
+  if (start.version != 2) bytes.fail_at(offsetof(GlbStart, version), "it is no .glb of version 2", kGltfRemedy);
+  if (start.document.kind != GlbChunk::json)
+    bytes.fail_at(offsetof(GlbStart, document.kind), "its first chunk is no JSON", kGltfRemedy);
+  document_ = parse_scene_json(part_of(bytes, sizeof start, start.document.bytes, "its JSON"));
+  const std::uint64_t next = start.next_chunk();
   if (next >= bytes.size()) return;
-  const std::uint64_t size = bytes.number<std::uint32_t>(next, "its second chunk");
-  if (bytes.number<std::uint32_t>(next + 4, "its second chunk") != kBinary) return;
-  binary_ = part_of(bytes, next + kChunkHeader, size, "its binary chunk");
-  bytes_read_ += size;
+  const auto chunk = bytes.number<GlbChunk>(next, "its second chunk");
+  if (chunk.kind != GlbChunk::binary) return;
+  binary_ = part_of(bytes, next + sizeof chunk, chunk.bytes, "its binary chunk");
+  bytes_read_ += chunk.bytes;
 }
 
 const FileBytes& GltfData::buffer(std::uint64_t index, const std::string& place) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -21,22 +22,18 @@
 #include "formats/scene_format.h"
 #include "formats/sog_scene.h"
 #include "formats/turn.h"
+#include "glb.h"
 
 namespace vrpipe {
 namespace {
 
 using Json = nlohmann::json;
 
-constexpr char kExtension[] = "KHR_gaussian_splatting";
-
-bool mentions_gaussians(const FileBytes& bytes) {
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), static_cast<std::size_t>(bytes.size()));
-  return text.find(kExtension) != std::string_view::npos;
-}
-
 Match matches_gltf(const SceneFile& file) {
-  if (is_glb(file.bytes)) return Match::by_content;
-  return file.ends_with(".gltf") && mentions_gaussians(file.bytes) ? Match::by_content : Match::no;
+  const FileBytes& bytes = file.bytes;
+  if (is_glb(bytes)) return Match::by_content;
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), static_cast<std::size_t>(bytes.size()));
+  return file.ends_with(".gltf") && mentions_gaussians(text) ? Match::by_content : Match::no;
 }
 
 /// How a node places its Gaussians: x becomes scale turn x + offset.
@@ -63,13 +60,13 @@ class GltfGaussians {
     const Json& document = data_.document();
     if (document.contains("extensionsRequired")) {
       for (const Json& name : data_.array(document["extensionsRequired"], "extensionsRequired")) {
-        if (name != kExtension && name != "KHR_mesh_quantization")
+        if (name != kGltfGaussians && name != "KHR_mesh_quantization")
           data_.fail("it requires the extension " + shortened(name));
       }
     }
     read_scene();
     if (primitives_.empty())
-      data_.fail(fmt::format("no primitive of its scene has {}", kExtension), "draw it with a scene, as a mesh");
+      data_.fail(fmt::format("no primitive of its scene has {}", kGltfGaussians), "draw it with a scene, as a mesh");
   }
 
   GaussianFile read() {
@@ -203,11 +200,11 @@ class GltfGaussians {
       const Json& primitive = primitives[i];
       if (!primitive.is_object()) data_.fail(place + " is not an object");
       const auto extensions = primitive.find("extensions");
-      if (extensions == primitive.end() || !extensions->is_object() || !extensions->contains(kExtension)) {
+      if (extensions == primitive.end() || !extensions->is_object() || !extensions->contains(kGltfGaussians)) {
         ++other_primitives_;
         continue;
       }
-      check_properties((*extensions)[kExtension], place);
+      check_properties((*extensions)[kGltfGaussians], place);
       if (data_.whole_or(primitive, "mode", 4, place) != 0) data_.fail(place + " has Gaussians and is not of points");
       const Json& attributes = json_member(primitive, "attributes", file_.bytes);
       if (!attributes.is_object()) data_.fail(place + ".attributes is not an object");
@@ -219,7 +216,7 @@ class GltfGaussians {
 
   /// What the extension says of how they are to be drawn.
   void check_properties(const Json& extension, const std::string& place) {
-    if (!extension.is_object()) data_.fail(place + "." + kExtension + " is not an object");
+    if (!extension.is_object()) data_.fail(place + "." + kGltfGaussians + " is not an object");
     if (extension.contains("extensions") && !extension["extensions"].empty()) {
       const Json& more = extension["extensions"];
       const std::string name = more.is_object() ? more.begin().key().substr(0, 100) : std::string("that has no name");
@@ -243,7 +240,7 @@ class GltfGaussians {
   }
 
   PlacedPrimitive part(const Json& attributes, const std::string& place) {
-    const std::string prefix = std::string(kExtension) + ":";
+    const std::string prefix = std::string(kGltfGaussians) + ":";
     PlacedPrimitive part;
     part.position = data_.numbers(attributes, "POSITION", 3, place);
     part.rotation = data_.numbers(attributes, prefix + "ROTATION", 4, place);

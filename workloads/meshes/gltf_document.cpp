@@ -10,26 +10,28 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/workloads/mesh.h>
 
+#include "../glb.h"
+
 namespace vrpipe {
 namespace {
 
 using Json = nlohmann::json;
 
-constexpr char kMagic[] = "glTF";
-constexpr std::size_t kGlbHeaderBytes = 12, kChunkHeaderBytes = 8;
-constexpr std::uint32_t kJsonChunk = 0x4e4f534a, kBinaryChunk = 0x004e4942;
 /// A document that is used has about ten levels, and deeper ones end recursive readers.
 constexpr int kMaxNesting = 64;
 constexpr std::size_t kMaxNodeDepth = 256;
 constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30;
 
-std::uint32_t load(const std::string& bytes, std::size_t offset) {
-  std::uint32_t value;
+/// Of bytes that are there.
+template <class T>
+T load(const std::string& bytes, std::size_t offset) {
+  T value;
   std::memcpy(&value, bytes.data() + offset, sizeof value);
   return value;
 }
 
-void append(std::string& bytes, std::uint32_t value) {
+template <class T>
+void append(std::string& bytes, const T& value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
@@ -50,7 +52,7 @@ class GltfReducer {
     if (source_.contains("extensionsRequired")) {
       for (const Json& name : source_["extensionsRequired"]) {
         // Gaussians are no triangles, and left out as other points are.
-        if (name == "KHR_gaussian_splatting") continue;
+        if (name == kGltfGaussians) continue;
         const std::string text = name.is_string() ? name.get<std::string>().substr(0, 100) : "without a name";
         fail("it requires the extension " + text + ", which is not supported");
       }
@@ -336,33 +338,34 @@ std::string reduced_json(const std::string& text, const std::string& where, std:
 }  // namespace
 
 std::string reduced_gltf(const std::string& bytes, const std::string& where, std::vector<std::uint64_t>& triangles) {
-  if (bytes.compare(0, 4, kMagic) != 0) return reduced_json(bytes, where, {}, triangles);
+  if (bytes.compare(0, 4, kGlbMagic) != 0) return reduced_json(bytes, where, {}, triangles);
   const auto cut_short = [&] {
     return UserError("cannot read mesh", where, "it is cut short, or no .glb of version 2", "get the file again");
   };
-  if (bytes.size() < kGlbHeaderBytes + kChunkHeaderBytes || load(bytes, 4) != 2 || load(bytes, 8) != bytes.size()) {
+  if (bytes.size() < sizeof(GlbStart)) throw cut_short();
+  auto start = load<GlbStart>(bytes, 0);
+  if (start.version != 2 || start.bytes != bytes.size() || start.document.kind != GlbChunk::json ||
+      start.document.bytes > bytes.size() - sizeof start) {
     throw cut_short();
   }
-  const std::size_t text_bytes = load(bytes, kGlbHeaderBytes), text_begin = kGlbHeaderBytes + kChunkHeaderBytes;
-  if (load(bytes, kGlbHeaderBytes + 4) != kJsonChunk || text_bytes > bytes.size() - text_begin) throw cut_short();
-  const std::size_t next = text_begin + (text_bytes + 3) / 4 * 4;
+  const std::size_t next = start.next_chunk();
+  GlbChunk chunk{0, GlbChunk::binary};
   std::string binary;
-  if (next + kChunkHeaderBytes <= bytes.size()) {
-    const std::size_t binary_bytes = load(bytes, next), binary_begin = next + kChunkHeaderBytes;
-    if (load(bytes, next + 4) != kBinaryChunk || binary_bytes > bytes.size() - binary_begin) throw cut_short();
-    binary = bytes.substr(binary_begin, binary_bytes);
+  if (next + sizeof chunk <= bytes.size()) {
+    chunk = load<GlbChunk>(bytes, next);
+    if (chunk.kind != GlbChunk::binary || chunk.bytes > bytes.size() - next - sizeof chunk) throw cut_short();
+    binary = bytes.substr(next + sizeof chunk, chunk.bytes);
   }
-  std::string text = reduced_json(bytes.substr(text_begin, text_bytes), where, binary.size(), triangles);
+  std::string text = reduced_json(bytes.substr(sizeof start, start.document.bytes), where, binary.size(), triangles);
   text.resize((text.size() + 3) / 4 * 4, ' ');
   binary.resize((binary.size() + 3) / 4 * 4, '\0');
-  std::string result = kMagic;
-  append(result, 2);
-  append(result, static_cast<std::uint32_t>(kGlbHeaderBytes + 2 * kChunkHeaderBytes + text.size() + binary.size()));
-  append(result, static_cast<std::uint32_t>(text.size()));
-  append(result, kJsonChunk);
+  start.document.bytes = static_cast<std::uint32_t>(text.size());
+  chunk.bytes = static_cast<std::uint32_t>(binary.size());
+  start.bytes = static_cast<std::uint32_t>(sizeof start + text.size() + sizeof chunk + binary.size());
+  std::string result;
+  append(result, start);
   result += text;
-  append(result, static_cast<std::uint32_t>(binary.size()));
-  append(result, kBinaryChunk);
+  append(result, chunk);
   return result + binary;
 }
 

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <exception>
 #include <string>
@@ -16,6 +15,7 @@
 #include <vrpipe/workloads/mesh.h>
 
 #include "../file_io.h"
+#include "../glb.h"
 #include "../ply_header.h"
 #include "asset_files.h"
 #include "gltf_document.h"
@@ -26,7 +26,6 @@
 namespace vrpipe {
 namespace {
 
-constexpr char kGltfGaussians[] = "KHR_gaussian_splatting";
 constexpr std::uint64_t kMostGltfText = std::uint64_t{64} << 20U;
 
 PlyHeader header_of(const std::filesystem::path& path, const std::string& what, const std::string& export_remedy) {
@@ -38,23 +37,21 @@ PlyHeader header_of(const std::filesystem::path& path, const std::string& what, 
 
 bool is_gltf(const std::string& extension) { return extension == ".gltf" || extension == ".glb"; }
 
-/// Whether a .glb or .gltf speaks of the extension for Gaussians, which it has to list.
+/// Of a .glb or .gltf.
 bool has_gltf_gaussians(const std::filesystem::path& path) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored)) return false;
   const InputFile file(path, "cannot read scene");
-  std::array<char, 20> head{};
+  GlbStart start{};
   std::uint64_t from = 0, size = file.size();
-  if (size >= head.size()) file.read(0, head.data(), head.size());
-  if (std::memcmp(head.data(), "glTF", 4) == 0) {
-    std::uint32_t text_bytes = 0;
-    std::memcpy(&text_bytes, &head[12], sizeof text_bytes);
-    from = head.size();
-    size = std::min<std::uint64_t>(text_bytes, size - from);
+  if (size >= sizeof start) file.read(0, &start, sizeof start);
+  if (std::memcmp(start.magic, kGlbMagic, sizeof start.magic) == 0) {
+    from = sizeof start;
+    size = std::min<std::uint64_t>(start.document.bytes, size - from);
   }
   std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(size, kMostGltfText)), '\0');
   file.read(from, text.data(), text.size());
-  return text.find(kGltfGaussians) != std::string::npos;
+  return mentions_gaussians(text);
 }
 
 /// Leaves assimp the reader of one format: another one would be taken for a file that only looks like it.
