@@ -12,6 +12,8 @@ namespace vrpipe::tools {
 namespace {
 
 const std::string preprocess_unit = "preprocess";
+/// What scenes' files decide where nobody sets it.
+const std::string of_scene = preprocess_unit + ".opacity_compensation";
 
 /// Platforms know nothing of preprocessing, and could not suggest it for a misspelling.
 bool means_preprocess(const std::string& unit) {
@@ -118,11 +120,15 @@ SettingsByPart sort_settings(const std::vector<Setting>& settings) {
 void add_preprocess_parameters(const std::vector<std::pair<std::string, std::string>>& parameters,
                                const SceneSummary& scene, RunResult& run) {
   for (const auto& [name, value] : parameters) {
-    const bool is_open = name == preprocess_unit + ".opacity_compensation" && value == "scene";
+    const bool is_open = name == of_scene && value == "scene";
     const bool on = scene.gaussians_compensated == scene.gaussians_total, off = scene.gaussians_compensated == 0;
     // Scenes of a frame may be of two minds.
     run.parameters.emplace_back(name, is_open && off ? "off" : is_open && on ? "on" : value);
   }
+}
+
+const char* origin_unless_set(const std::string& parameter, const std::string& value) {
+  return parameter == of_scene && value == "on" ? "scene" : "default";
 }
 
 }  // namespace vrpipe::tools

@@ -42,5 +42,7 @@ SettingsByPart sort_settings(const std::vector<Setting>& settings);
 /// Adds parameters of preprocessing to those of a run, with what its scenes' files decided in place of what was left to them.
 void add_preprocess_parameters(const std::vector<std::pair<std::string, std::string>>& parameters,
                                const SceneSummary& scene, RunResult& run);
+/// Where the final value of a parameter that nobody has set comes from.
+const char* origin_unless_set(const std::string& parameter, const std::string& value);
 
 }  // namespace vrpipe::tools

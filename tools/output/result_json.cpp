@@ -92,7 +92,8 @@ Json origins_json(const Json& parameters, const RunRequest& request, const std::
                   const std::vector<std::string>& of_file) {
   const std::string given = "command line";
   Json origins = Json::object();
-  for (const auto& parameter : parameters.items()) origins[parameter.key()] = "default";
+  for (const auto& [key, value] : parameters.items())
+    origins[key] = origin_unless_set(key, value.is_string() ? value.get<std::string>() : value.dump());
   const auto mark = [&](const std::vector<Setting>& settings, const std::string& origin) {
     for (const Setting& setting : settings) {
       const std::string key = setting.unit + "." + setting.parameter;
@@ -104,9 +105,6 @@ Json origins_json(const Json& parameters, const RunRequest& request, const std::
   mark(request.platform->settings, "platform");
   mark(request.settings, given);
   mark(preprocessing, given);
-  const char* const decided = "preprocess.opacity_compensation";
-  if (origins.contains(decided) && origins[decided] == "default" && parameters[decided] == "on")
-    origins[decided] = "scene";
   return origins;
 }
 
