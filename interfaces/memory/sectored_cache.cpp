@@ -305,6 +305,7 @@ LineAccess SectoredCache::access(std::uint64_t address, std::uint32_t bytes, boo
   Entry& entry = lines_[access.line];
   if (access.filled != 0) {
     entry.present |= access.filled;
+    access.filled_first = access.filled & ~(is_masked() ? were_touched_.of(entry.tag) : *entry.were_there);
     count_misses(entry, access.filled);
   }
   access.missed = missed_sectors_;

@@ -103,11 +103,11 @@ SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderConte
 void SectoredL2::access(const MemoryRequest& request) {
   traffic_.count(request);
   const bool writes = request.command == tlm::TLM_WRITE_COMMAND;
+  const bool certain = is_certain(request);
   for_each_line(looked_up_as(request), [&](std::uint64_t address, std::uint32_t bytes) {
     if (passes(request)) {
-      if (below_ != nullptr)
-        below_->access(below_as({address, bytes, request.command, request.origin, is_certain(request)}));
-      if (is_certain(request)) count_bank(bank_of(address), bytes);
+      if (below_ != nullptr) below_->access(below_as({address, bytes, request.command, request.origin, certain}));
+      if (certain) count_bank(bank_of(address), bytes);
       return;
     }
     const LineAccess done = cache_.access(address, bytes, writes);
@@ -115,22 +115,17 @@ void SectoredL2::access(const MemoryRequest& request) {
               static_cast<unsigned>(__builtin_popcount(done.sectors)),
               static_cast<unsigned>(__builtin_popcount(done.missed)));
     // What goes, and is missed once more, is so because of what came between.
-    bool is_first = is_certain(request);
-    if (below_ != nullptr) {
-      std::uint32_t& touched = touched_[done.address];
-      is_first = is_first && (done.filled & touched) == 0;
-      touched |= done.sectors;
-    }
-    const auto below = [&](bool certain) {
-      return [this, certain](MemoryRequest moved, const SectorRun&) {
-        moved.is_certain = certain;
+    const bool is_first = certain && done.filled == done.filled_first;
+    const auto below = [&](bool moved_always) {
+      return [this, moved_always](MemoryRequest moved, const SectorRun&) {
+        moved.is_certain = moved_always;
         if (below_ != nullptr) below_->access(moved);
       };
     };
     for_each_run(done.old_address, done.written_back, tlm::TLM_WRITE_COMMAND, origins_[done.line], below(false));
     if (done.replaced) allocated(done.line, request.origin, done.spared);
     for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, request.origin, below(is_first));
-    if (!is_certain(request)) return;
+    if (!certain) return;
     const auto filled = is_first ? static_cast<unsigned>(__builtin_popcount(done.filled)) : 0U;
     count_bank(bank_of(address), bytes + std::uint64_t{filled} * cache_.organization().sector_bytes);
   });

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <unordered_map>
 #include <vector>
 
 #include <vrpipe/arithmetic/divisor.h>
@@ -246,8 +245,6 @@ class SectoredL2 final : public MemoryBehaviour {
   const Divisor bank_width_;          ///< bytes a cycle
   const Interleaving interleaving_;   ///< of sets, to banks
   const bool terminates_early_;       ///< the frame
-  /// Sectors that were accessed, by line, without time and with a memory below.
-  std::unordered_map<std::uint64_t, std::uint32_t> touched_;
   L2Observer* observer_ = nullptr;
   std::vector<MemoryOrigin> origins_;       ///< by line of the cache
   std::vector<std::uint64_t> bank_cycles_;  ///< by bank

@@ -366,6 +366,20 @@ TEST(SectoredL2, ItsBanksAreBusyForTheBytesThatTheyMove) {
       << "of the busiest: a line and its fill, and half a line; less a line that may wait at the port";
 }
 
+// What is missed once more, or read beside what was written, depends on what came between.
+TEST(SectoredL2, WhatEveryOrderReadsFromBelowIsWhatWasNeverThere) {
+  L2 l2(Settings{{"bytes", "2048"}, {"banks", "1"}, {"write_allocate", "byte-mask"}});
+  l2.write(128 * 32, 8);
+  l2.read(128 * 32, 32);
+  for (std::uint64_t line = 0; line < 17; ++line) l2.read(128 * line, 32);
+  l2.read(0, 32);
+  std::vector<std::uint64_t> uncertain;
+  for (const MemoryRequest& request : l2.below.requests) {
+    if (!request.is_certain) uncertain.push_back(request.address);
+  }
+  EXPECT_EQ(uncertain, (std::vector<std::uint64_t>{128 * 32, 128 * 32, 0})) << "read, written back; read again";
+}
+
 // A frame may end before they are done.
 TEST(SectoredL2, NoQuadWaitsForVerticesOrForAttributesToBeWritten) {
   L2 l2(Settings{{"port_requests", "1"}});

@@ -68,6 +68,7 @@ struct LineAccess {
   std::uint32_t known = 0;         ///< of these, not to be read when they are missed
   std::uint32_t missed = 0;        ///< of these, neither there nor on their way
   std::uint32_t filled = 0;        ///< of these, to be read from below
+  std::uint32_t filled_first = 0;  ///< of these, no byte was there before; with details of the statistics
   std::uint32_t written_back = 0;  ///< dirty sectors of what the line held
   bool replaced = false;           ///< the line held something else, or nothing, before
   bool spared = false;             ///< and it went instead of one that is kept
