@@ -90,7 +90,6 @@ AnnotatedChannel::Row& AnnotatedChannel::open_row(Bank& bank, std::uint64_t numb
 
 Cycle AnnotatedChannel::move(const DramAddress& place, Row& row, Cycle now, Cycle latency, Cycle present,
                              Cycle overhead) {
-  statistics_.data_cycles += timing_.burst;
   // Who opened the row may have run ahead of time: then it would have taken as long from here.
   Cycle column = now >= row.asked ? std::max(now, row.ready) : now + (row.ready - row.asked);
   if (timing_.groups > 1 || timing_.ccd_l > timing_.burst) {

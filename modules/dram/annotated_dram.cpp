@@ -73,6 +73,7 @@ Cycle AnnotatedDram::serve(const MemoryRequest& request, Cycle arrival) {
 
 void AnnotatedDram::close(Cycle end) {
   for (AnnotatedChannel& channel : channels_) channel.close(clock_.edge_of(end));
+  statistics.channels.data_cycles += data_.cycles(end);
 }
 
 }  // namespace vrpipe

@@ -27,9 +27,6 @@ class AnnotatedDram : public sc_core::sc_module {
   /// To be called once.
   void close(Cycle end);
 
-  /// Of the buses of all channels, up to the end of the frame, cycles of the DRAM.
-  double data_cycles(Cycle end) const { return data_.cycles(end); }
-
   DramUnitStatistics statistics;
 
  private:

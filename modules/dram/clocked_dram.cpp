@@ -236,6 +236,7 @@ void ClockedDram::close(Cycle end) {
     channel.advance(edge);
     channel.close(edge);
   }
+  statistics.channels.data_cycles += data_.cycles(end);
 }
 
 }  // namespace vrpipe

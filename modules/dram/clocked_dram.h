@@ -32,9 +32,6 @@ class ClockedDram : public Clocked, public sc_core::sc_module {
   /// To be called once: channels go on to the end of the run.
   void close(Cycle end);
 
-  /// Of the buses of all channels, up to the end of the frame, cycles of the DRAM.
-  double data_cycles(Cycle end) const { return data_.cycles(end); }
-
   DramUnitStatistics statistics;
 
  private:

@@ -19,7 +19,8 @@ class DataBusTime {
     const Cycle first = clock_.cycle_of(from);
     tally_.add(until - from, first, std::max(clock_.cycle_of(until), first + 1));
   }
-  double cycles(Cycle end) const { return tally_.items(end); }
+  /// Whole ones before cycle `end` of the domain, which is not before `frame_end.so_far()`.
+  std::uint64_t cycles(Cycle end) const { return static_cast<std::uint64_t>(tally_.items(end)); }
 
  private:
   DramClock clock_;

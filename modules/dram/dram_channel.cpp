@@ -388,7 +388,6 @@ void DramChannel::move_data(Cycle at) {
   ++(entry.cause == Cause::hit    ? statistics_.row_hits
      : entry.cause == Cause::miss ? statistics_.row_misses
                                   : statistics_.row_conflicts);
-  statistics_.data_cycles += timing_.burst;
   if (data_ != nullptr) {
     const Cycle begin = at + (draining_ ? timing_.cwl : timing_.cl);
     data_->add(begin, begin + timing_.burst);

@@ -21,8 +21,7 @@ struct DramStatistics : StatisticSet {
   Counter reads_forwarded{*this, "reads_forwarded", "bursts", "read from the queue of writes"};
   Counter writes_merged{*this, "writes_merged", "bursts", "written over one that is queued"};
   Counter drain_cycles{*this, "drain_cycles", "cycles", "of a channel in which it writes instead of reading"};
-  Counter data_cycles{*this, "data_cycles", "cycles",
-                      "of a channel's data bus with data on it, also of what is written after the frame"};
+  Counter data_cycles{*this, "data_cycles", "cycles", "of a channel's data bus with data on it, up to the frame's end"};
   Counter channel_cycles{*this, "channel_cycles", "cycles", "of all channels, at work or not"};
   Ratio row_hit_rate{*this,          row_hits,         row_hits + row_misses + row_conflicts,
                      "row_hit_rate", "hits per burst", "of bursts"};

@@ -23,9 +23,9 @@ class DramUnit final : public MemoryUnit {
   MemoryBehaviour& behaviour() override { return *behaviour_; }
   const StatisticSet& statistics() const override { return timed_.statistics; }
   void close(Cycle end) override { timed_.close(end); }
-  std::vector<OccupancyPart> parts(Cycle end) const override {
+  std::vector<OccupancyPart> parts(Cycle) const override {
     const DramSettings& settings = behaviour_->settings();
-    const double cycles = timed_.data_cycles(end) / settings.channels;
+    const double cycles = static_cast<double>(timed_.statistics.channels.data_cycles.value()) / settings.channels;
     return {{"data", 0, cycles * static_cast<double>(settings.tck_ps) / period_ps_, true}};
   }
 

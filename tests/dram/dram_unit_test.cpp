@@ -179,6 +179,26 @@ TEST(DramUnit, ComesToRestThoughItRefreshesForEver) {
   EXPECT_EQ(s.channel_cycles.value(), 16U * 31200U);
 }
 
+TEST(DramUnit, ItsDataBusIsBusyForNoLongerThanTheFrame) {
+  std::vector<Access> accesses;
+  for (std::uint64_t i = 0; i < 100; ++i) accesses.push_back(write(10, 32 * i));
+  accesses.push_back(read(1000, 0));
+  DramBench bench(lpddr3_make, {{"channels", "1"}, {"write_high", "1"}, {"write_low", "0"}});
+  const auto expect = [](const DramStatistics& s, Cycle end) {
+    EXPECT_EQ(s.channel_cycles.value(), end * 4 / 5);
+    EXPECT_LE(s.data_cycles.value(), s.channel_cycles.value());
+    EXPECT_GE(s.data_cycles.value(), end == 200 ? 100U : 404U) << "4 of each burst that is moved by then";
+  };
+  for (const Cycle end : {200U, 2000U}) {
+    bench.answered(accesses);
+    bench.clocked->close(end);
+    expect(bench.clocked->statistics.channels, end);
+    bench.annotated_answers(accesses);
+    bench.annotated->close(end);
+    expect(bench.annotated->statistics.channels, end);
+  }
+}
+
 /// An initiator of another make: one request, and an END_RESP of its own time for each response.
 class SlowInitiator : public sc_core::sc_module {
  public:
