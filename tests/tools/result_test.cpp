@@ -402,14 +402,18 @@ TEST_F(Result, CameraHasItsFinalNumbers) {
   EXPECT_TRUE(json_of({"run", "--scene", "tiny.spl"})["camera"].is_null());
 }
 
-TEST_F(Result, WhatTheFileSaysOfItsModelIsAParameterThatTheUserMayOverride) {
+GaussianScene one_gaussian() {
   GaussianSceneBuilder builder(0);
   GaussianAttributes gaussian;
   gaussian.log_scale = {-4, -4, -4};
   gaussian.opacity_logit = 2;
   builder.add(gaussian);
+  return builder.build();
+}
+
+TEST_F(Result, WhatTheFileSaysOfItsModelIsAParameterThatTheUserMayOverride) {
   GaussianFile file;
-  file.gaussians = builder.build();
+  file.gaussians = one_gaussian();
   write_gaussian_file(folder() / "classic.ply", file);
   file.gaussians.set_compensates_opacity(true);
   write_gaussian_file(folder() / "mip.ply", file);
@@ -441,12 +445,7 @@ TEST_F(Result, WhatTheFileSaysOfItsModelIsAParameterThatTheUserMayOverride) {
 // The documentation.
 
 TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
-  GaussianSceneBuilder builder(0);
-  GaussianAttributes gaussian;
-  gaussian.log_scale = {-2, -2, -2};
-  gaussian.opacity_logit = 2;
-  builder.add(gaussian);
-  write_gaussian_file(folder() / "scene.ply", builder.build());
+  write_gaussian_file(folder() / "scene.ply", one_gaussian());
   write("frame.json", R"({"commands": [{"draw": "tiny.spl"}, {"draw": "tiny.spl"}]})");
   const std::string page = read_file(RESULTS_PAGE);
   const auto of_scene = [&](std::vector<std::string> command) {
