@@ -104,9 +104,13 @@ class StateAccount {
   };
   void change(UnitState state, Cycle now) {
     if (observer_ != nullptr) observer_->entered(state, now);
-    changes_.push({state_, now});
+    if (changes_.empty() && now <= frame_end_->so_far()) {
+      charge(state_, now);
+    } else {
+      changes_.push({state_, now});
+      if (changes_.size() >= most_changes_) settle();
+    }
     state_ = state;
-    if (changes_.size() >= most_changes_) settle();
   }
   void settle();
   void charge(UnitState state, Cycle until) {
