@@ -108,6 +108,21 @@ class TimedZCache {
     return applied;
   }
 
+  /// The same of one that is looked up later, by what the cache holds now.
+  Cycle foreseen(const TerminationSignal& signal, Cycle arrived) {
+    const BeatLines::Needed::Line needed = lines_->find(signal);
+    const SectoredCache::Line line = cache_->find(needed.address);
+    std::uint32_t missed = needed.sectors & ~(cleared_ ? cleared_->of_line(needed.address) : 0);
+    Cycle there = arrived;
+    if (line != SectoredCache::no_line) {
+      missed &= ~cache_->present(line);
+      for (std::uint32_t left = needed.sectors & cache_->present(line); left != 0; left &= left - 1)
+        there = std::max(there, there_[std::size_t{line} * sectors_of_a_line_ + __builtin_ctz(left)]);
+    }
+    if (missed != 0) there = std::max(there, arrived + fill_cycles_);
+    return foreseen_until_ = std::max(foreseen_until_, there);
+  }
+
   /// Cycles that moving sectors takes from the z-cache and that were not asked for yet, and from when on.
   std::pair<Cycle, std::uint64_t> take_moves() {
     const std::uint64_t cycles = owed_ / timing_.sectors_per_cycle;
@@ -161,8 +176,10 @@ class TimedZCache {
       if (returns_) returned_from_[access.line] = returns_->from(access.address);
     }
     if (access.filled != 0) {
-      port_.fill(access, times.at,
-                 [&](unsigned first, unsigned count, Cycle cycle) { std::fill_n(there + first, count, cycle); });
+      const Cycle filled = port_.fill(access, times.at, [&](unsigned first, unsigned count, Cycle cycle) {
+        std::fill_n(there + first, count, cycle);
+      });
+      fill_cycles_ = filled - times.at;
     }
     for (std::uint32_t left = access.sectors; left != 0; left &= left - 1) {
       times.there = std::max(times.there, there[__builtin_ctz(left)]);
@@ -202,6 +219,8 @@ class TimedZCache {
   BeatLines::Needed needed_;
   std::vector<Cycle> kept_until_;       ///< by line of the cache
   std::vector<Cycle> there_;            ///< by sector
+  Cycle fill_cycles_ = 0;               ///< of the last fill
+  Cycle foreseen_until_ = 0;            ///< of updates
   std::optional<LineReturns> returns_;  ///< where lines that come back wait
   std::vector<Cycle> returned_from_;    ///< by line of the cache
   ThousandthsPort line_moves_;

@@ -112,8 +112,21 @@ class TimedZrop : public TimedUnit {
   [[gnu::noinline]] void look_up_updates(Cycle until) {
     for (; !arrived_.empty() && arrived_.front().at <= until; arrived_.pop()) {
       const TerminationSignal signal = arrived_.front().signal;
-      pending_.push({signal, z_.update(signal, arrived_.front().at)});
+      const Cycle at = z_.update(signal, arrived_.front().at);
+      if (foreseen_ > 0) {
+        --foreseen_;
+      } else {
+        pending_.push({signal, at});
+      }
       note_moves();
+    }
+  }
+  /// Updates that have arrived up to a test, also those that come behind its look-up, which may be long before: they are
+  /// looked up behind beats that are not here yet.
+  [[gnu::noinline]] void foresee_updates(Cycle test) {
+    for (; foreseen_ < arrived_.size() && arrived_[foreseen_].at <= test; ++foreseen_) {
+      const Pending& update = arrived_[foreseen_];
+      pending_.push({update.signal, z_.foreseen(update.signal, update.at)});
     }
   }
   void note_moves() {
@@ -298,6 +311,7 @@ class TimedZrop : public TimedUnit {
     if (!late_.empty()) make_way(visible);
     if (has_cache_) move_sectors(visible);
     Cycle at = tests_.take(visible, quads);
+    if (has_cache_) foresee_updates(at);
     while (!pending_.empty() && pending_.front().at <= at) {
       // One z-cache port: a cycle with updates tests nothing.
       if (pending_.front().at == at) at = tests_.take(at + 1, quads);
@@ -363,6 +377,7 @@ class TimedZrop : public TimedUnit {
   EffectGate z_cache_gate_;
   std::unique_ptr<FixedLatencyMemory> no_memory_;  ///< behind a port that is not connected
   Ring<Pending> arrived_;                          ///< updates not looked up yet
+  std::size_t foreseen_ = 0;                       ///< of these, the first, which are among those pending
   Ring<Cycle> moves_;                              ///< of a cycle's worth each, not moved yet
   BlockPrice blocks_;
   ThousandthsPort block_port_;  ///< where they have a price

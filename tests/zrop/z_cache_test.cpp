@@ -574,5 +574,21 @@ TEST_F(TimedZCacheTest, AnUpdateWaitsForItsFillAndTestsGoBy) {
   EXPECT_EQ(memory.accesses.size(), 2U) << "the sector of the update is that of the last tests";
 }
 
+TEST_F(TimedZCacheTest, ATestSeesAnUpdateThatCameBehindItsLookUp) {
+  for (const bool in_time : {true, false}) {
+    Bench bench(Fidelity::lt, "zrop", "depth-stencil-rop", context, {{"latency_cycles", "1"}, {"fast_clear", "off"}});
+    NotingMemory memory("noting_memory", bench.clock(), 100);
+    bench.bind_memory(memory.socket);
+    Source<BinItem>& in = bench.source<BinItem>("in_quads", 64);
+    Source<TerminationBeat>& updates = bench.source<TerminationBeat>("in_terminations", 4, 60);
+    bench.sink<BinItem>("out_quads", 64);
+    updates.add(signals({0}), in_time ? 10 : 70);  // visible in 70 or 130
+    in.add(bins.at({0, 0}, {0}), 20);              // looked up in 21, tested in 121
+    bench.run();
+    EXPECT_EQ(bench.behaviour<DepthStencilRop>().quads_terminated.value(), in_time ? 1U : 0U);
+    EXPECT_EQ(memory.accesses.size(), 1U) << "the sector is fetched once";
+  }
+}
+
 }  // namespace
 }  // namespace vrpipe
