@@ -64,30 +64,6 @@ TEST(Fidelity, AnUnknownNameIsAnErrorThatNamesTheNearest) {
   }
 }
 
-TEST(Fidelity, StrictImagesAndCountsAreTheSameOnEveryRung) {
-  for (const std::uint64_t seed : {1ULL, 2ULL}) {
-    const Draw draw = random_draw(150, 90, 400, seed);
-    for (const Variant& variant : variants()) {
-      for (const ColorFormat format : {ColorFormat::rgba8, ColorFormat::rgba16f, ColorFormat::rgba32f}) {
-        expect_same_on_every_rung(request_of(variant.name, Fidelity::functional,
-                                             [&](RunRequest& request) { request.format = format; }),
-                                  draw);
-      }
-    }
-  }
-}
-
-TEST(Fidelity, StrictImagesAndCountsAreTheSameOnEveryPlatform) {
-  const Draw draw = random_draw(200, 120, 500, 3);
-  for (const Platform& platform : platforms()) {
-    for (const Variant& variant : variants()) {
-      expect_same_on_every_rung(request_of(variant.name, Fidelity::functional,
-                                           [&](RunRequest& request) { request.platform = &platform; }),
-                                draw);
-    }
-  }
-}
-
 TEST(Fidelity, StrictImagesAndCountsAreTheSameOnBuiltinScenes) {
   for (const BuiltinSceneInfo& info : builtin_scenes()) {
     if (info.stands_for) continue;  // large, and of the same kinds
@@ -208,7 +184,7 @@ TEST(Fidelity, LtStaysNearCycle) {
   for (const Variant& variant : variants()) {
     const auto cycles = static_cast<double>(*run(request_of(variant.name), loaded.draw).cycles);
     const auto result = static_cast<double>(*run(request_of(variant.name, Fidelity::lt), loaded.draw).cycles);
-    EXPECT_NEAR(result / cycles, 1, 0.1) << variant.name;
+    EXPECT_NEAR(result / cycles, 1, 0.03) << variant.name;
   }
 }
 
