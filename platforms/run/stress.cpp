@@ -2,32 +2,26 @@
 
 #include <algorithm>
 
-#include <vrpipe/platforms/wiring.h>
+#include <vrpipe/platforms/configuration.h>
 
 namespace vrpipe {
 
 namespace {
 
-/// With links of at most so many items.
-Platform with_links_of_depth(unsigned depth) {
-  Platform platform = platform_named("agx-orin");
-  platform.wire = [wire = platform.wire, depth](Netlist& netlist) {
-    wire(netlist);
-    for (const Link& link : netlist.links())
-      link.parameters->depth = std::min<std::uint32_t>(link.parameters->depth, depth);
-  };
-  return platform;
+StressConfiguration with_links_of_depth(std::uint32_t depth, bool quick = false) {
+  return {"links of depth " + std::to_string(depth), {}, depth, quick};
 }
 
-Platform with_terminations_of_depth(unsigned depth) {
-  Platform platform = platform_named("agx-orin");
-  platform.settings.push_back({"link.crop.terminations", "depth", std::to_string(depth)});
-  return platform;
+StressConfiguration with_terminations_of_depth(unsigned depth, bool quick = false) {
+  return {"termination queue of depth " + std::to_string(depth),
+          {{"link.crop.terminations", "depth", std::to_string(depth)}},
+          {},
+          quick};
 }
 
 /// `UNIT.PARAMETER=VALUE`, several with blanks between.
 StressConfiguration with(const std::string& settings, bool quick = false) {
-  StressConfiguration configuration{settings, platform_named("agx-orin"), {}, quick};
+  StressConfiguration configuration{settings, {}, {}, quick};
   for (std::size_t begin = 0; begin < settings.size();) {
     const std::size_t end = std::min(settings.find(' ', begin), settings.size());
     const std::size_t dot = settings.find('.', begin);
@@ -41,14 +35,12 @@ StressConfiguration with(const std::string& settings, bool quick = false) {
 
 std::vector<StressConfiguration> make() {
   return {
-      {"agx-orin", platform_named("agx-orin"), {}},
-      {"mobile", platform_named("mobile"), {}},
-      {"desktop", platform_named("desktop"), {}},
+      {"no change", {}, {}},
       // Short queues.
-      {"links of depth 1", with_links_of_depth(1), {}, true},
-      {"links of depth 2", with_links_of_depth(2), {}},
-      {"termination queue of depth 1", with_terminations_of_depth(1), {}, true},
-      {"termination queue of depth 4", with_terminations_of_depth(4), {}},
+      with_links_of_depth(1, true),
+      with_links_of_depth(2),
+      with_terminations_of_depth(1, true),
+      with_terminations_of_depth(4),
       with("crop.input_quads=1"),
       with("crop.input_quads=8", true),
       with("crop.input_quads=16"),
@@ -108,6 +100,24 @@ std::vector<StressConfiguration> make() {
 const std::vector<StressConfiguration>& stress_configurations() {
   static const std::vector<StressConfiguration> all = make();
   return all;
+}
+
+RunRequest stressed(RunRequest request, const StressConfiguration& configuration) {
+  RunRequest whole = request;
+  whole.effects = EffectChoice::parse("all");
+  std::vector<Setting> changes = configuration.settings;
+  if (configuration.link_depth) {
+    const Configuration unchanged(whole, Frame(1, 1));
+    for (const Link& link : unchanged.netlist().links()) {
+      if (link.parameters->depth > *configuration.link_depth)
+        changes.push_back({"link." + link.name(), "depth", std::to_string(*configuration.link_depth)});
+    }
+  }
+  for (RunRequest* const each : {&whole, &request})
+    each->settings.insert(each->settings.end(), changes.begin(), changes.end());
+  const Configuration changed(whole, Frame(1, 1));
+  for (const Instance& instance : changed.netlist().instances()) changed.make(instance);
+  return request;
 }
 
 }  // namespace vrpipe

@@ -1,4 +1,5 @@
 // How far lt may be off away from the defaults.
+#include <vrpipe/component/error.h>
 #include <vrpipe/platforms/stress.h>
 #include <vrpipe/platforms/validated_range.h>
 
@@ -16,12 +17,7 @@ TEST_P(Stress, BoundIsBelowAndLtWithinTenPercent) {
   const Draw draw = random_draw(160, 120, 2000, 6);
   for (const Variant& variant : variants()) {
     const auto result_at = [&](Fidelity fidelity) {
-      return run(request_of(variant.name, fidelity,
-                            [&](RunRequest& request) {
-                              request.platform = &configuration.platform;
-                              request.settings = configuration.settings;
-                            }),
-                 draw);
+      return run(stressed(request_of(variant.name, fidelity), configuration), draw);
     };
     const auto cycles = static_cast<double>(*result_at(Fidelity::cycle).cycles);
     EXPECT_LE(static_cast<double>(*result_at(Fidelity::bound).cycles), cycles) << variant.name;
@@ -38,6 +34,40 @@ std::string name_of_case(const ::testing::TestParamInfo<std::size_t>& info) {
 }
 INSTANTIATE_TEST_SUITE_P(Configurations, Stress, ::testing::Range(std::size_t{0}, stress_configurations().size()),
                          name_of_case);
+
+TEST(StressedRequest, HasTheChangeBehindItsOwnSettingsOnAnyPlatform) {
+  for (const Platform& platform : platforms()) {
+    RunRequest request = request_of("het+qm");
+    request.platform = &platform;
+    request.settings = {{"crop", "mshrs", "100"}};
+    for (const StressConfiguration& configuration : stress_configurations()) {
+      const RunRequest changed = stressed(request, configuration);
+      EXPECT_EQ(changed.platform, &platform);
+      EXPECT_EQ(changed.settings.front().value, "100");
+      EXPECT_EQ(changed.settings.size() > 1, &configuration != &stress_configurations().front()) << configuration.name;
+    }
+  }
+}
+
+TEST(StressedRequest, LinksAreAsShortAsSaidOrShorter) {
+  RunRequest request = request_of("het+qm");
+  request.settings = {{"link.crop.terminations", "depth", "1"}};
+  std::size_t changes = 0;
+  for (const Setting& setting : stressed(request, {"", {}, 2}).settings) {
+    const bool is_short = setting.unit.find("crop.terminations") != std::string::npos;
+    EXPECT_EQ(setting.value, is_short ? "1" : "2") << setting.unit;
+    ++changes;
+  }
+  EXPECT_GT(changes, 10U);
+}
+
+TEST(StressedRequest, WhatCannotBeIsRefused) {
+  RunRequest request = request_of("baseline");
+  EXPECT_THROW(stressed(request, {"", {{"crop", "mshr", "1"}}, {}}), UserError);
+  EXPECT_THROW(stressed(request, {"", {{"dram", "channels", "1"}}, {}}), UserError) << "there is none";
+  request.settings = {{"crop", "ways", "64"}};
+  EXPECT_THROW(stressed(request, {"", {{"crop", "cache_bytes", "1024"}}, {}}), UserError) << "fewer lines than ways";
+}
 
 TEST(ValidatedRange, NamesTheParameterThatLiesOutside) {
   EXPECT_EQ(outside_validated_range({{"sm.cores", "4"}, {"l2.latency_cycles", "1000"}}), std::vector<std::string>{});

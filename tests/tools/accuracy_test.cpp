@@ -492,6 +492,46 @@ TEST_F(Accuracy, KnobsOfPreprocessingPreprocessAgain) {
   }
 }
 
+TEST_F(Accuracy, StressIsOfWhatWasAskedForAndSaysSo) {
+  const std::vector<std::string> asked{"--scene", "tiny.spl", "--platform",      "gh100-gpc",     "--format",
+                                       "rgba8",   "--set",    "prop.order=draw", "--termination", "strict"};
+  std::vector<std::string> arguments{"accuracy", "--quick", "--html", "page.html", "--json", "result.json"};
+  arguments.insert(arguments.end(), asked.begin(), asked.end());
+  const Finished finished = vrpipe(arguments);
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  const std::string says =
+      "Away from gh100-gpc, rgba8 colour, strict termination, prop.order=draw: errors of the cycles";
+  EXPECT_NE(finished.out.find(says + "\n"), std::string::npos) << finished.out;
+  EXPECT_NE(read_file(folder() / "page.html").find(says), std::string::npos);
+  const json result = json::parse(read_file(folder() / "result.json"));
+  EXPECT_TRUE(result["stress_left_out"].empty());
+  std::size_t rows = 0;
+  for (const json& row : result["stress"]) {
+    EXPECT_EQ(row["platform"], "gh100-gpc");
+    EXPECT_EQ(row["format"], "rgba8");
+    EXPECT_EQ(row["termination"], "strict");
+    const auto change = row["configuration"].get<std::string>();
+    if (change.find('=') == std::string::npos) continue;
+    std::vector<std::string> alone{"run", "--variant", row["variant"].get<std::string>()};
+    alone.insert(alone.end(), asked.begin(), asked.end());
+    alone.insert(alone.end(), {"--set", change});
+    EXPECT_EQ(row["cycles"], json_of(alone)["runs"][0]["cycles"]) << change;
+    ++rows;
+  }
+  EXPECT_EQ(rows, 10U);
+}
+
+TEST_F(Accuracy, WhatCannotBeChangedInWhatWasAskedForIsLeftOutAndSaysSo) {
+  const Finished finished = vrpipe({"accuracy", "--scene", "tiny.spl", "--set", "crop.ways=64"});
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  EXPECT_NE(finished.out.find(
+                "\nleft out: crop.cache_bytes=1024: unusable CROP cache (crop.ways, crop.cache_bytes): 64 ways"),
+            std::string::npos)
+      << finished.out;
+  EXPECT_EQ(finished.out.find("\ncrop.cache_bytes=1024\n"), std::string::npos);
+  EXPECT_NE(finished.out.find("\ncrop.cache_bytes=262144\n"), std::string::npos);
+}
+
 TEST_F(Accuracy, QuickIsSmallerAndSaysSo) {
   const Finished finished = vrpipe({"accuracy", "--quick", "--scene", "tiny.spl"});
   EXPECT_EQ(finished.code, 0) << finished.err;

@@ -42,10 +42,11 @@ class AccuracyCommand : public Command {
     arguments.add_flag("--markdown", markdown_, "prints the tables as Markdown in place of the report", result_group);
     arguments.set_footer(
         "Climbs two ladders. Fidelity: every variant at every --fidelity that there is, one at a time, with its\n"
-        "error in cycles and speed-up against the most exact, and its CPU seconds. Precision: het+qm, at the\n"
-        "--fidelity given (default: cycle), with one arithmetic choice changed at a time, with its error against\n"
-        "an image in double precision (no tiles, no termination, all bands, exact order), and its simulated\n"
-        "cycles. --jobs is for the precision ladder. --output writes the image of every choice.\n"
+        "error in cycles and speed-up against the most exact, and its CPU seconds; then with one thing changed at a\n"
+        "time in the platform, format, termination, units and settings given. Precision: het+qm, at the --fidelity\n"
+        "given (default: cycle), with one arithmetic choice changed at a time, with its error against an image in\n"
+        "double precision (no tiles, no termination, all bands, exact order), and its simulated cycles. --jobs is\n"
+        "for what is not timed. --output writes the image of every choice.\n"
         "\n"
         "Examples:\n"
         "  vrpipe accuracy --quick\n"

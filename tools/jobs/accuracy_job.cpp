@@ -234,16 +234,22 @@ void climb_fidelities(const AccuracyJob& job, const Workload& workload, const st
 
 constexpr std::array stress_rungs{Fidelity::bound, Fidelity::lt, Fidelity::cycle};
 
-/// The first variant and the last on every stress configuration, at each of `stress_rungs`, in the middle of the image.
+/// The first variant and the last of what was asked for under every stress configuration, at each of `stress_rungs`, in the
+/// middle of the image.
 std::vector<Task> stress_tasks(const AccuracyJob& job, const Workload& workload, AccuracyResult& result) {
   std::vector<RunRequest> variants{job.simulation.requests.front()};
   if (job.simulation.requests.size() > 1) variants.push_back(job.simulation.requests.back());
   std::vector<Task> tasks;
   for (const StressConfiguration& configuration : stress_configurations()) {
     if (job.quick && !configuration.quick) continue;
-    for (RunRequest request : variants) {
-      request.platform = &configuration.platform;
-      request.settings.insert(request.settings.end(), configuration.settings.begin(), configuration.settings.end());
+    std::vector<RunRequest> requests;
+    try {
+      for (const RunRequest& variant : variants) requests.push_back(stressed(variant, configuration));
+    } catch (const UserError& error) {
+      result.stress_left_out.push_back({configuration.name, error.what()});
+      continue;
+    }
+    for (RunRequest& request : requests) {
       result.stress.push_back({configuration.name, request.variant.name, 0, {}});
       for (const Fidelity fidelity : stress_rungs) {
         request.fidelity = fidelity;

@@ -63,12 +63,19 @@ struct PrecisionRow {
   std::size_t run;  ///< 0 is the default
 };
 
-/// A stress configuration: cycles at the most exact fidelity, and the errors of the others in the order of `fidelities()`.
+/// A stress configuration of what was asked for: cycles at the most exact fidelity, and the errors of the others in the order
+/// of `fidelities()`.
 struct StressRow {
   std::string configuration;
   std::string variant;
   std::uint64_t cycles = 0;
   std::vector<std::pair<Fidelity, double>> error_percent;
+};
+
+/// A stress configuration that what was asked for cannot have.
+struct StressLeftOut {
+  std::string configuration;
+  std::string reason;
 };
 
 struct AccuracyResult {
@@ -87,10 +94,11 @@ struct AccuracyResult {
   std::vector<PrecisionRow> precision;      ///< by knob
   std::vector<std::string> knobs_left_out;  ///< those that mean nothing for a draw list
   std::vector<StressRow> stress;            ///< by configuration, then by variant
-  Picture reference;                        ///< the exact image, for the page
-  double reference_seconds = 0;             ///< to render it
-  double seconds = 0;                       ///< wall time of everything
-  ResultFiles files;                        ///< written so far: images
+  std::vector<StressLeftOut> stress_left_out;
+  Picture reference;             ///< the exact image, for the page
+  double reference_seconds = 0;  ///< to render it
+  double seconds = 0;            ///< wall time of everything
+  ResultFiles files;             ///< written so far: images
 };
 
 /// Runs both ladders. Images go to the folder of --output. Throws UserError, CommandFailure or a fault.

@@ -68,11 +68,19 @@ Json accuracy_json(const AccuracyResult& result) {
   for (const FidelityLevel& level : result.fidelity) fidelity.push_back(fidelity_json(level));
   Json stress = Json::array();
   for (const StressRow& row : result.stress) {
-    stress.push_back({{"configuration", row.configuration}, {"variant", row.variant}, {"cycles", row.cycles}});
+    stress.push_back({{"configuration", row.configuration},
+                      {"platform", result.base.platform->name},
+                      {"format", vrpipe::name_of(result.base.format)},
+                      {"termination", name_of(result.base.termination)},
+                      {"variant", row.variant},
+                      {"cycles", row.cycles}});
     for (const auto& [level, error] : row.error_percent) {
       stress.back()[std::string(vrpipe::name_of(level)) + "_error_percent"] = error;
     }
   }
+  Json stress_left_out = Json::array();
+  for (const StressLeftOut& left_out : result.stress_left_out)
+    stress_left_out.push_back({{"configuration", left_out.configuration}, {"reason", left_out.reason}});
   Json precision = Json::array();
   for (const PrecisionRow& row : result.precision) precision.push_back(precision_json(row, result.runs[row.run]));
   Json json = head_json("vrpipe.accuracy/1", result.provenance, result.processes);
@@ -96,6 +104,7 @@ Json accuracy_json(const AccuracyResult& result) {
                  {"psnr_db", precision_tolerance.error}}},
                {"fidelity", std::move(fidelity)},
                {"stress", std::move(stress)},
+               {"stress_left_out", std::move(stress_left_out)},
                {"precision", std::move(precision)}});
   return json;
 }

@@ -234,7 +234,8 @@ std::string accuracy_page(const AccuracyResult& result) {
   text += fidelity_plot(result) + functional_note(result) + definition(fidelity_definition()) +
           word_list(fidelity_summary(result)) + table(fidelity_table(result));
 
-  text += "<h3>" + html_escaped(stress_title) + "</h3>\n" + table(stress_table(result));
+  text += "<h3>" + html_escaped(stress_title(result)) + "</h3>\n" + table(stress_table(result)) +
+          word_list(stress_notes(result));
 
   text += "<h2>Precision: how exact numbers are</h2>\n";
   if (const std::string verdict = precision_verdict(result); !verdict.empty()) {

@@ -35,8 +35,11 @@ std::string decibels(double psnr) { return std::isinf(psnr) ? "equal" : fmt::for
 
 std::string cycles_text(const RunResult& run) { return run.cycles ? grouped(*run.cycles) : "-"; }
 
-std::string accuracy_settings(const AccuracyResult& result) {
-  std::string text = effects_choice_text(result.base);
+/// How the draw was drawn, beside the platform.
+std::string state_text(const AccuracyResult& result) {
+  std::string text =
+      fmt::format("{} colour, {} termination", vrpipe::name_of(result.base.format), name_of(result.base.termination)) +
+      effects_choice_text(result.base);
   for (const std::vector<Setting>* settings : {&result.base.settings, &result.preprocessing}) {
     for (const Setting& setting : *settings) {
       text += fmt::format(", {}.{}={}", setting.unit, setting.parameter, setting.value);
@@ -225,6 +228,19 @@ AccuracyTable precision_table(const AccuracyResult& result) {
   return table;
 }
 
+std::string stress_title(const AccuracyResult& result) {
+  // A draw list has no camera that could take in less.
+  return fmt::format("Away from {}, {}: errors of the cycles{}", result.base.platform->name, state_text(result),
+                     result.viewpoint ? ", in the middle of the image" : "");
+}
+
+std::vector<std::string> stress_notes(const AccuracyResult& result) {
+  std::vector<std::string> lines;
+  for (const StressLeftOut& left_out : result.stress_left_out)
+    lines.push_back(printable("left out: " + left_out.configuration + ": " + left_out.reason));
+  return lines;
+}
+
 std::string within(double percent) {
   if (percent == 0) return "0 %";
   // Rounded up, since it is a bound.
@@ -337,8 +353,7 @@ std::vector<std::string> accuracy_heading(const AccuracyResult& result) {
                               result.height, grouped(result.scene.gaussians_visible),
                               grouped(result.scene.gaussians_total)));
   lines.push_back(base.platform->name + " (" + base.platform->description + ")");
-  lines.push_back(fmt::format("{} colour, {} termination{}", vrpipe::name_of(base.format), name_of(base.termination),
-                              accuracy_settings(result)));
+  lines.push_back(state_text(result));
   if (result.quick) {
     std::string line = "a quick look: two variants, and one value of some knobs";
     if (result.width != result.full_width || result.height != result.full_height) {
@@ -376,7 +391,8 @@ std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) 
       text_of(fidelity, {0, 1, 2, 3, 4, 5, 6}, style) + "\n" + text_of(fidelity, {0, 7, 8, 9, 10, 11}, style) + "\n";
   for (const std::string& line : fidelity_summary(result)) text += line + "\n";
   text += fidelity_definition() + "\n";
-  text += "\n" + style.bold(stress_title) + "\n\n" + text_of(stress_table(result), {0, 1, 2, 3}, style);
+  text += "\n" + style.bold(stress_title(result)) + "\n\n" + text_of(stress_table(result), {0, 1, 2, 3}, style);
+  for (const std::string& line : stress_notes(result)) text += line + "\n";
   text += "\n" + style.bold(precision_title(result)) + "\n\n";
   text += text_of(precision_table(result), {0, 1, 3, 5, 6, 7, 9}, style) + "\n";
   if (const std::string verdict = precision_verdict(result); !verdict.empty()) text += verdict + "\n";
@@ -391,8 +407,9 @@ std::string accuracy_markdown(const AccuracyResult& result) {
   for (const std::string& line : accuracy_heading(result)) text += line + ".\n";
   text += "\n" + markdown(fidelity_table(result)) + "\n";
   for (const std::string& line : fidelity_summary(result)) text += "* " + line + "\n";
-  text += std::string("\n") + stress_title + ":\n\n" + markdown(stress_table(result));
-  text += "\n" + markdown(precision_table(result)) + "\n";
+  text += "\n" + stress_title(result) + ":\n\n" + markdown(stress_table(result)) + "\n";
+  for (const std::string& line : stress_notes(result)) text += "* " + line + "\n";
+  text += (result.stress_left_out.empty() ? "" : "\n") + markdown(precision_table(result)) + "\n";
   for (const std::string& line : precision_summary(result)) text += "* " + line + "\n";
   return text;
 }

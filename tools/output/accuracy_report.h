@@ -20,8 +20,7 @@ struct AccuracyTable {
   std::vector<Row> rows;
 };
 AccuracyTable fidelity_table(const AccuracyResult& result);
-/// Errors of the fidelities away from the default configuration, and the words above them.
-inline constexpr const char* stress_title = "Away from the default: errors of the cycles, in the middle of the image";
+/// Errors of the fidelities away from what was asked for.
 AccuracyTable stress_table(const AccuracyResult& result);
 /// The default once, and below it every other value.
 AccuracyTable precision_table(const AccuracyResult& result);
@@ -30,6 +29,11 @@ AccuracyTable precision_table(const AccuracyResult& result);
 std::string fidelity_verdict(const AccuracyResult& result);
 /// The same of the precision ladder; empty without time.
 std::string precision_verdict(const AccuracyResult& result);
+
+/// What stands above the stress table: what it departs from.
+std::string stress_title(const AccuracyResult& result);
+/// What stands below: configurations that were left out, one line each.
+std::vector<std::string> stress_notes(const AccuracyResult& result);
 
 // What the words of the tables mean, tolerances included.
 std::string fidelity_definition();   ///< of "dominated"
