@@ -12,8 +12,9 @@ namespace vrpipe {
 
 namespace {
 
-/// PROP at lt: as prop_unit.cpp, but bins and warps go in one piece. Of the warps whose turn has come the oldest
-/// of those that are there goes when the way to CROP is free; all are there in launch order.
+/// PROP at lt: as prop_unit.cpp, but bins and warps go in one piece. Of the warps whose turn has come the oldest of those
+/// that are there goes when the way to CROP is free: they are kept until all that come before that are known, by one that
+/// comes later, by the SMs, which ask when they need to know what is released, or by the clock.
 /// Ports: in_bins, out_test, in_tested, out_survivors (BinItem), in_shaded, out_color (ShadedWarpItem),
 /// out_release (WarpRelease), out_late, in_late (ShadedWarpItem; optional).
 class TimedProp : public TimedUnit {
@@ -57,6 +58,7 @@ class TimedProp : public TimedUnit {
     out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
+    if (!plan_.is_used()) out_release_.on_asked([this](Cycle until) { leave_until(until); });
   }
 
   bool idle() const override { return order_.empty() && in_turn_.warp == nullptr && on_late_way_ == 0; }
@@ -74,21 +76,37 @@ class TimedProp : public TimedUnit {
   }
 
   Cycle collect(const ShadedWarp& warp, Cycle visible) {
+    if (!plan_.is_used()) leave_until(visible + 1);
     if (warp.mark != Mark::none) {
       order_.arrive_mark(warp, visible + 1);
     } else {
       order_.arrive(warp, visible + 1);
     }
-    leave_in_order();
+    if (plan_.is_used()) {
+      leave_beside_late();
+    } else if (warp.mark != Mark::none) {
+      leave_until(never);  // it comes behind all before it
+    } else if (!std::exchange(is_awake_, true)) {
+      clock.domain->wake(clock.unit, next_tick(now()));
+    }
     return visible;
   }
+  Cycle tick(Cycle now) override {
+    leave_until(now);
+    is_awake_ = order_.has_next();
+    return is_awake_ ? next_tick(now) : never;
+  }
+  Cycle next_tick(Cycle now) const { return std::max(way_is_free_from(), now) + 1; }
 
-  /// Lets those warps leave whose turn has come.
-  void leave_in_order() {
-    if (plan_.is_used()) return leave_beside_late();
+  /// Lets those warps leave whose turn has come and whose way is free before a cycle.
+  void leave_until(Cycle until) {
     do {
-      while (order_.has_next()) leave(order_.take());
+      while (order_.has_next() && way_is_free_from() < until) leave(order_.take());
     } while (pass_mark());
+  }
+  /// For another warp, which begins to leave once its release has room.
+  Cycle way_is_free_from() const {
+    return std::max({color_.next(), out_color_.last(), out_color_.room_from(), out_release_.room_from()});
   }
 
   bool pass_mark() {
@@ -108,7 +126,6 @@ class TimedProp : public TimedUnit {
   }
 
   void leave(const ReorderBuffer::Waiting& next) {
-    // A warp begins to leave once its release has room.
     color_.hold(out_release_.room_from());
     const WarpRelease release{next.warp->slot};
     const Cycle left = hand_on(*next.warp, next.from);
@@ -198,6 +215,7 @@ class TimedProp : public TimedUnit {
   TimedIn<ShadedWarpItem> in_late_;
   TimedIn<ShadedWarpItem> in_shaded_;
   ReorderBuffer order_;
+  bool is_awake_ = false;
   BatchServer there_;     ///< to the tests, or past them
   BatchServer back_;      ///< from the tests
   ThroughputPort color_;  ///< in parts of a cycle and of a quad: a cycle passes `color_rate.items`

@@ -153,8 +153,16 @@ class TimedSm : public TimedUnit {
     }
     charge(UnitState::memory, std::min(launch, last_done_));
     charge(UnitState::starved, launch);
-    if (!roomy_) hand_on_until(launch);
-    while (!has_slot() && next_event() != never) hand_on_until(next_event());
+    if (!roomy_) {
+      hand_on_until(launch);
+      in_release_.ask(launch);
+    }
+    while (!has_slot()) {
+      const Cycle next = next_event();
+      in_release_.ask(next);
+      if (has_slot() || next == never) break;
+      hand_on_until(next);
+    }
     if (!has_slot()) {
       throw SimulationFault("deadlock", launch, std::string(name()) + " has warps to launch, and no slot is released");
     }

@@ -21,9 +21,10 @@ struct Exception {
   double percent;  ///< measured, rounded up; below 0: too few cycles
 };
 const Exception exceptions[] = {
-    // Of warps that wait for the way to CROP the oldest goes first. At lt PROP lets them go in the order in which it hears
-    // of them, which tells where neither the SMs nor CROP alone bound the draw.
-    {"mobile", "rgba8", "paper", "het+qm", 3.5},
+    // Where SMs and CROP bound the draw by turns, tiles overtake one another by chance: a cycle of latency more, anywhere,
+    // moves cycle itself by 2 % on average and 6 % at most.
+    {"mobile", "rgba8", "strict", "het", 4.0},
+    {"mobile", "rgba8", "strict", "het+qm", 4.4},
 };
 
 double percent_above(std::uint64_t value, std::uint64_t reference) {

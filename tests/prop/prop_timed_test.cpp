@@ -228,6 +228,17 @@ TEST_F(PropTimedTest, InTileOrderAnotherTileDoesNotWait) {
   }
 }
 
+TEST_F(PropTimedTest, OfTheWarpsThatWaitForTheWayToCropTheOldestGoesFirst) {
+  ColorBench prop(Fidelity::lt, context, {{"latency_cycles", "1"}}, 4);
+  prop.color.close(0, 300);
+  prop.shaded.add({warp(0, {0, 0}, 0)});      // its four beats are all that CROP takes
+  prop.shaded.add({warp(2, {1, 0}, 0)}, 10);  // comes before an older one
+  prop.shaded.add({warp(1, {2, 0}, 0)}, 20);
+  prop.shaded.add({warp(3, {3, 0}, 0)}, 400);
+  prop.bench.run();
+  EXPECT_EQ(prop.sequences(), (std::vector<std::uint32_t>{0, 1, 2, 3}));
+}
+
 TEST_F(PropTimedTest, AWarpIsReleasedWithItsLastQuad) {
   ColorBench prop(Fidelity::lt, context, {{"latency_cycles", "4"}});
   const ShadedWarp* const only = warp(7, {0, 0}, 0);

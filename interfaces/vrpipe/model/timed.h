@@ -202,8 +202,12 @@ class TimedOut : public OutEnd<Item> {
   Cycle last() const { return last_; }
   /// From when on there is room for another item.
   Cycle room_from() const { return end_ == nullptr ? 0 : end_->free_at_[end_->place_]; }
+  /// Of a unit that keeps items until it knows all that could go before them: sends those that go before a cycle, up to
+  /// which the receiver knows that.
+  void on_asked(std::function<void(Cycle until)> send) { asked_ = std::move(send); }
 
  private:
+  friend class TimedIn<Item>;
   using OutEnd<Item>::clock_;
 
   /// Through the socket; returns when it is taken.
@@ -231,6 +235,7 @@ class TimedOut : public OutEnd<Item> {
 
   TimedIn<Item>* direct_ = nullptr;
   TimedIn<Item>* end_ = nullptr;  ///< also where a socket is between
+  std::function<void(Cycle until)> asked_;
   std::optional<ThroughputPort> rate_;
   Cycle last_ = 0;
 };
@@ -270,6 +275,10 @@ class TimedIn : public InEnd<Item> {
   }
   void open() override {}
   bool empty() const override { return true; }
+  /// Asks for what goes before a cycle, if the other end keeps anything (TimedOut::on_asked).
+  void ask(Cycle until) {
+    if (begin_ != nullptr && begin_->asked_) begin_->asked_(until);
+  }
 
  private:
   friend class TimedOut<Item>;
@@ -318,6 +327,7 @@ class TimedIn : public InEnd<Item> {
   }
 
   Handler handler_;
+  TimedOut<Item>* begin_ = nullptr;
   unsigned depth_ = 4;
   unsigned latency_ = 1;
   std::vector<Cycle> free_at_;  ///< when each place of the queue can be filled, a ring
@@ -329,6 +339,7 @@ void TimedOut<Item>::connect(InPort& in, const LinkOptions& options) {
   OutEnd<Item>::connect(in, options);
   if (options.items_per_cycle != 0) rate_.emplace(options.items_per_cycle);
   end_ = dynamic_cast<TimedIn<Item>*>(&in);
+  if (end_ != nullptr) end_->begin_ = this;
   if (end_ != nullptr && options.observers.empty() && !clock_.domain->passes_sockets()) direct_ = end_;
 }
 
