@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "elaboration/hierarchy.h"
+
 #include <vrpipe/component/error.h>
 #include <vrpipe/model/unit.h>
 #include <vrpipe/pipeline/barrier_plan.h>
@@ -14,6 +16,9 @@
 #include <vrpipe/platforms/observers.h>
 
 namespace vrpipe {
+
+/// Null for a unit without time, which is none.
+inline sc_core::sc_module* module_of(Component& unit) { return dynamic_cast<sc_core::sc_module*>(&unit); }
 
 /// Connects the units of a netlist, or of a part of it, and stubs what is to be. `find` gives the Component* of a path;
 /// null for one that is not there, whose links are left out.
@@ -28,12 +33,14 @@ void connect_units(const Netlist& netlist, Observers* observers, Find&& find) {
     if (sender == nullptr || receiver == nullptr) continue;
     LinkOptions options{link.parameters->depth, link.parameters->latency_cycles, link.parameters->items_per_cycle};
     if (observers != nullptr) options.observers = observers->of_link(link.name());
+    const ModuleScope scope(module_of(*sender));
     sender->out(out).connect(receiver->in(in), options);
   }
   for (const std::string& port : netlist.stubs()) {
     const auto [path, name] = split_port(port);
     Component* const unit = find(path);
     if (unit == nullptr) continue;
+    const ModuleScope scope(module_of(*unit));
     if (unit->has_out(name)) {
       unit->out(name).stub();
     } else {
@@ -66,7 +73,8 @@ inline void check_barriers(const Configuration& configuration) {
 }
 
 /// Stubs optional ports that are not connected. Throws UserError for another that is neither connected nor stubbed.
-inline void check_ports(const Component& unit, const std::string& path, const std::string& platform) {
+inline void check_ports(Component& unit, const std::string& path, const std::string& platform) {
+  const ModuleScope scope(module_of(unit));
   const auto check = [&](const auto& ports) {
     for (auto* port : ports) {
       if (!port->connected() && port->is_optional()) port->stub();

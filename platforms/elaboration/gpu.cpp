@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "elaboration/elaborate.h"
+#include "elaboration/hierarchy.h"
 #include "elaboration/run_ahead.h"
 
 #include <fmt/format.h>
@@ -19,12 +20,6 @@
 namespace vrpipe {
 
 namespace {
-
-/// What SystemC calls what has a path: that has no points.
-std::string module_name(std::string path) {
-  std::replace(path.begin(), path.end(), '.', '_');
-  return path;
-}
 
 [[noreturn]] void refuse_memory(const std::string& where, const std::string& why, const std::string& remedy) {
   throw UserError("cannot connect memory", where, why, remedy);
@@ -78,6 +73,7 @@ const EffectRegistrar back_pressure{
 Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
     : configuration_(configuration),
       clock_(std::make_unique<ClockDomain>("clock", configuration.context_of(0).clock_ps)),
+      hierarchy_(std::make_unique<Hierarchy>(configuration.netlist())),
       kernel_time_gate_(configuration.context_of(0), "clock.kernel_time") {
   clock_->ask_about_own_time([this] { return kernel_time_gate_.enter(); });
   if (const std::size_t draws = configuration.frame().draws().size(); draws > 1) clock_->frame_end().tell_draws(draws);
@@ -135,11 +131,11 @@ void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
   if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get()); zrop != nullptr && ahead != ahead_.end()) {
     zrop->follow(*ahead->second);
   }
-  const std::string module = module_name(instance.path);
   const unsigned gpcs = configuration_.netlist().gpcs();
   const Fidelity fidelity = configuration_.request().fidelity;
   const UnitMaker& make = fidelity == Fidelity::cycle ? unit_maker(slot) : timed_unit_maker(slot);
-  std::unique_ptr<Unit> unit = make(module, *clock_, std::move(behaviour), context, gpcs);
+  const Hierarchy::Place place = hierarchy_->place_of(instance.path);
+  std::unique_ptr<Unit> unit = make(place.name, *clock_, std::move(behaviour), context, gpcs);
   if (Observers* const observers = configuration_.request().observers.get()) {
     if (StateObserver* const states = observers->of_unit(instance.path)) unit->observe_states(*states);
   }
@@ -200,15 +196,16 @@ Gpu::TargetSockets Gpu::make_memory(const Instance& instance, const std::vector<
   const MemoryPlace place{ports, has_below, configuration_.request().fidelity == Fidelity::cycle};
   auto behaviour = configuration_.make_as<MemoryBehaviour>(instance);
   check_below(configuration_.netlist(), instance.path, *behaviour, configuration_.platform().name);
-  memories_.push_back(
-      {&instance, memory_unit_maker(instance.slot)(module_name(instance.path), *clock_, std::move(behaviour), place)});
+  const Hierarchy::Place in = hierarchy_->place_of(instance.path);
+  memories_.push_back({&instance, memory_unit_maker(instance.slot)(in.name, *clock_, std::move(behaviour), place)});
   TargetSockets sockets;
   for (unsigned index = 0; index < ports.size(); ++index) sockets.push_back(&memories_.back().memory->target(index));
   return sockets;
 }
 
 Gpu::TargetSockets Gpu::make_foreign(const ForeignInstance& foreign, unsigned ports) {
-  ForeignMemory made = foreign.make(module_name(foreign.path), ports);
+  const Hierarchy::Place place = hierarchy_->place_of(foreign.path);
+  ForeignMemory made = foreign.make(place.name, ports);
   if (made.module == nullptr) refuse_memory(foreign.path, "nothing was made", "return a module and its sockets");
   foreign_memories_.push_back({&foreign, std::move(made.module)});
   TargetSockets sockets = std::move(made.sockets);

@@ -395,7 +395,7 @@ TEST(ForeignMemory, ThatFallsSilentIsNamedWithItsPortAndTheOldestRequest) {
       if (!refreshes) dram->never_refresh();
       return as_memory(std::move(dram));
     };
-    const std::pair<Platform, const char*> places[] = {{with_memory(make), "gpc0_crop.memory"},
+    const std::pair<Platform, const char*> places[] = {{with_memory(make), "gpc0.crop.memory"},
                                                        {with_memory_below(make), "l2.below"}};
     for (const auto& [platform, port] : places) {
       RunRequest request = request_of("baseline", Fidelity::cycle);

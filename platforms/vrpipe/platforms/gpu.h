@@ -13,9 +13,10 @@
 
 namespace vrpipe {
 
+class Hierarchy;
 class RunAhead;
 
-/// A platform with time: its netlist, elaborated as SystemC modules.
+/// A platform with time: its netlist, elaborated as SystemC modules, in which gpc0.crop is a child of gpc0.
 class Gpu {
  public:
   struct Placed {
@@ -68,6 +69,7 @@ class Gpu {
 
   const Configuration& configuration_;
   std::unique_ptr<ClockDomain> clock_;
+  std::unique_ptr<Hierarchy> hierarchy_;
   EffectGate kernel_time_gate_;
   std::vector<PlacedMemory> memories_;
   std::vector<PlacedForeign> foreign_memories_;
