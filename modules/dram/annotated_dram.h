@@ -8,8 +8,8 @@
 
 #include "annotated_channel.h"
 #include "dram.h"
-#include "dram_clock.h"
 
+#include <vrpipe/kernel/clock_crossing.h>
 #include <vrpipe/kernel/clock_domain.h>
 #include <vrpipe/memory/memory_port.h>
 
@@ -36,7 +36,7 @@ class AnnotatedDram : public sc_core::sc_module {
   ClockDomain& domain_;
   Dram& behaviour_;
   const DramSettings& settings_;
-  const DramClock clock_;
+  const ClockCrossing clock_;
   DataBusTime data_;
   std::vector<AnnotatedChannel> channels_;
   std::vector<std::unique_ptr<Port>> ports_;

@@ -8,8 +8,8 @@
 
 #include "dram.h"
 #include "dram_channel.h"
-#include "dram_clock.h"
 
+#include <vrpipe/kernel/clock_crossing.h>
 #include <vrpipe/kernel/clock_domain.h>
 #include <vrpipe/memory/memory_port.h>
 
@@ -63,7 +63,7 @@ class ClockedDram : public Clocked, public sc_core::sc_module {
   const unsigned handle_;
   Dram& behaviour_;
   const DramSettings& settings_;
-  const DramClock clock_;
+  const ClockCrossing clock_;
   DataBusTime data_;
   std::vector<DramChannel> channels_;
   std::vector<Cycle> due_;  ///< by channel: when data of it may be answered next

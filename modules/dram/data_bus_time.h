@@ -3,8 +3,7 @@
 #include <algorithm>
 
 #include <vrpipe/kernel/accounting.h>
-
-#include "dram_clock.h"
+#include <vrpipe/kernel/clock_crossing.h>
 
 namespace vrpipe {
 
@@ -12,7 +11,7 @@ namespace vrpipe {
 class DataBusTime {
  public:
   /// `frame_end` outlives it.
-  DataBusTime(const FrameEnd& frame_end, const DramClock& clock) : clock_(clock), tally_(frame_end) {}
+  DataBusTime(const FrameEnd& frame_end, const ClockCrossing& clock) : clock_(clock), tally_(frame_end) {}
 
   /// Of a channel, from one edge of the DRAM up to another.
   void add(Cycle from, Cycle until) {
@@ -23,7 +22,7 @@ class DataBusTime {
   std::uint64_t cycles(Cycle end) const { return static_cast<std::uint64_t>(tally_.items(end)); }
 
  private:
-  DramClock clock_;
+  ClockCrossing clock_;
   WorkTally tally_;
 };
 
