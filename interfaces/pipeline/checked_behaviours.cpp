@@ -4,11 +4,15 @@
 
 #include <vrpipe/pipeline/slots/checks.h>
 
+#include <vrpipe/kernel/clock_domain.h>
+
 namespace vrpipe {
 
 namespace {
 ForeignCode running;
 }  // namespace
+
+Cycle Checks::cycle() const { return clock_ == nullptr ? 0 : clock_->now(); }
 
 void check_calls(Implementation& implementation) {
   const std::string name = implementation.slot + "=" + implementation.name;

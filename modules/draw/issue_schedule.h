@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include <vrpipe/kernel/clock_domain.h>
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/pipeline/barrier_plan.h>
 
 namespace vrpipe {

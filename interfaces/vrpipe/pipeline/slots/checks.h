@@ -4,12 +4,13 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include <vrpipe/arithmetic/lanes.h>
 #include <vrpipe/component/error.h>
-#include <vrpipe/kernel/clock_domain.h>
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/pipeline/checked_behaviours.h>
 #include <vrpipe/pipeline/screen_tiling.h>
@@ -18,6 +19,8 @@
 /// What the checks of all slots have in common.
 
 namespace vrpipe {
+
+class ClockDomain;
 
 // Beyond these a shell would allocate without bounds or overrun a beat.
 inline constexpr std::uint32_t longest_latency = 1'000'000;
@@ -169,7 +172,7 @@ class Checks {
   const Frame& frame() const { return frame_; }
 
  private:
-  Cycle cycle() const { return clock_ == nullptr ? 0 : clock_->now(); }
+  Cycle cycle() const;
 
   const std::string name_;  ///< slot=implementation
   const Frame& frame_;
