@@ -167,7 +167,7 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
 
   unsigned bytes_per_cycle() const { return bandwidth_.bytes_per_cycle(); }
   std::uint64_t bytes_before(Cycle end) const {
-    return end == never ? bytes_ : bytes_ - std::min(bytes_, bandwidth_.reserved_from(end));
+    return end == never ? bytes_ : bytes_ - std::min(bytes_, bandwidth_.reserved_from(memory_.crossing_.over_by(end)));
   }
 
  private:
@@ -175,7 +175,9 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
     if (memory_.annotated_ != nullptr) arrival = memory_.annotated_->filled(request, arrival);
     memory_.traffic_.count(request);
     bytes_ += request.bytes;
-    return memory_.latency_cycles_ + bandwidth_.take(arrival, request.bytes, clock().now());
+    const ClockCrossing& own = memory_.crossing_;
+    const Cycle moved = bandwidth_.take(own.edge_of(arrival), request.bytes, own.edge_of(clock().now()));
+    return own.cycle_of(memory_.latency_cycles_ + moved);
   }
   const ClockDomain& clock() const override { return memory_.domain_; }
   bool completes_early() const override { return memory_.clocked_ == nullptr; }
@@ -250,8 +252,8 @@ FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, Cloc
 
 FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain,
                                        unsigned latency_cycles, const std::vector<unsigned>& bytes_per_cycle,
-                                       MemoryBelow below)
-    : sc_module(name), domain_(domain), latency_cycles_(latency_cycles), traffic_(*this) {
+                                       MemoryBelow below, std::uint64_t period_ps)
+    : sc_module(name), domain_(domain), crossing_(domain, period_ps), latency_cycles_(latency_cycles), traffic_(*this) {
   if (below == MemoryBelow::annotated) annotated_ = std::make_unique<AnnotatedFills>(domain, cache_);
   if (below == MemoryBelow::clocked) clocked_ = std::make_unique<ClockedFills>(domain, cache_);
   for (const unsigned bytes : bytes_per_cycle) {
@@ -278,7 +280,7 @@ std::uint64_t FixedLatencyMemory::bytes(Cycle end) const {
 double FixedLatencyMemory::peak_rate() const {
   double sum = 0;
   for (const auto& port : ports_) sum += port->bytes_per_cycle();
-  return sum;
+  return sum / crossing_.ratio();
 }
 
 std::unique_ptr<FixedLatencyMemory> stub_unbound(tlm::tlm_initiator_socket<32>& socket, ClockDomain& domain) {

@@ -24,7 +24,8 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
   Cycle serve(const MemoryRequest& request, Cycle arrival) override {
     SectoredL2& l2 = *l2_.behaviour_;
     l2.count(request);
-    const Cycle now = clock().now();
+    const Cycle now = l2_.now();
+    arrival = l2_.crossing_.edge_of(arrival);
     Cycle complete = 0;
     l2.for_each_line(l2.looked_up_as(request), [&](std::uint64_t address, std::uint32_t bytes) {
       const MemoryRequest part{address, bytes, request.command, request.origin};
@@ -37,7 +38,7 @@ class AnnotatedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
       const Cycle there = l2.passes(part) ? l2_.pass(part, from, from) : l2_.look_up(part, from, from);
       complete = std::max({complete, responses_.take(from, out, now), there});
     });
-    return l2_.sizes_.latency_cycles + complete;
+    return l2_.crossing_.cycle_of(l2_.sizes_.latency_cycles + complete);
   }
   const ClockDomain& clock() const override { return *l2_.clock.domain; }
 
@@ -70,6 +71,7 @@ AnnotatedL2::AnnotatedL2(const sc_core::sc_module_name& name, ClockDomain& domai
     : sc_module(name),
       PortOwner({&domain, 0}),
       behaviour_(std::move(behaviour)),
+      crossing_(domain, behaviour_->clock().period_ps()),
       sizes_(behaviour_->sizes()),
       cache_(behaviour_->cache()),
       memory_(*this, "below"),
@@ -93,9 +95,9 @@ bool AnnotatedL2::awaits(const Fill* fills, std::uint32_t sectors, Cycle at) {
 }
 
 Cycle AnnotatedL2::write(const MemoryRequest& access, Bank& bank, Cycle at) {
-  const Cycle done = memory_.access(access, at);
+  const Cycle done = access_below(access, at);
   quickest_write_ = std::min(quickest_write_, done - at);
-  bank.write_backs.take(at, at + (done - at - quickest_write_), clock.domain->now());
+  bank.write_backs.take(at, at + (done - at - quickest_write_), now());
   return done;
 }
 
@@ -116,7 +118,7 @@ Cycle AnnotatedL2::occupy(Bank& bank, Cycle from, Cycle begin, std::uint32_t byt
     waits = (begin - from) * sizes_.bank_bytes_per_cycle - reserved;
   }
   bank.bytes += bytes;
-  return bank.time.take(from, static_cast<unsigned>(waits) + bytes, clock.domain->now());
+  return bank.time.take(from, static_cast<unsigned>(waits) + bytes, now());
 }
 
 Cycle AnnotatedL2::pass(const MemoryRequest& access, Cycle arrival, Cycle& from) {
@@ -132,7 +134,6 @@ Cycle AnnotatedL2::pass(const MemoryRequest& access, Cycle arrival, Cycle& from)
 }
 
 Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& from) {
-  const Cycle now = clock.domain->now();
   const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
   const LineAccess done = cache_.access(access.address, access.bytes, writes);
   behaviour_->looked_up(access, static_cast<unsigned>(__builtin_popcount(done.sectors)),
@@ -156,7 +157,7 @@ Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& fr
   }
   behaviour_->for_each_run(done.address, done.filled, tlm::TLM_READ_COMMAND, access.origin,
                            [&](const MemoryRequest& read, const SectorRun& run) {
-                             const Cycle there = memory_.access(read, asks);
+                             const Cycle there = access_below(read, asks);
                              std::fill_n(fills + run.first, run.count, Fill{asks, there});
                              counted_fills_.ask(run.count, asks, there);
                              moved += read.bytes;
@@ -169,7 +170,7 @@ Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& fr
     if (asks < fill.asked) fill = {asks, asks + (fill.there - fill.asked)};
     all_there = std::max(all_there, fill.there);
   }
-  if (waits) bank.mshrs.take(begin, all_there, now);
+  if (waits) bank.mshrs.take(begin, all_there, now());
   const std::uint32_t cycles = behaviour_->bank_cycles(moved);
   const Cycle free_at = occupy(bank, arrival, begin, cycles * sizes_.bank_bytes_per_cycle);
   behaviour_->count_bank(index, moved);
@@ -178,6 +179,8 @@ Cycle AnnotatedL2::look_up(const MemoryRequest& access, Cycle arrival, Cycle& fr
 }
 
 std::vector<OccupancyPart> AnnotatedL2::parts(Cycle end) const {
+  end = crossing_.over_by(end);
+  const double ratio = crossing_.ratio();
   std::uint64_t in = 0;
   std::uint64_t out = 0;
   double width = 0;
@@ -189,9 +192,9 @@ std::vector<OccupancyPart> AnnotatedL2::parts(Cycle end) const {
   std::uint64_t banks = 0;
   for (const Bank& bank : banks_) banks += bank.bytes - std::min(bank.bytes, bank.time.reserved_from(end));
   const double of_banks = static_cast<double>(sizes_.bank_bytes_per_cycle) * sizes_.banks;
-  return {{"responses", 1, static_cast<double>(out) / width, true},
-          {"requests", 2, static_cast<double>(in) / width, false},
-          {"banks", 0, static_cast<double>(banks) / of_banks, false}};
+  return {{"responses", 1, static_cast<double>(out) / width * ratio, true},
+          {"requests", 2, static_cast<double>(in) / width * ratio, false},
+          {"banks", 0, static_cast<double>(banks) / of_banks * ratio, false}};
 }
 
 }  // namespace vrpipe

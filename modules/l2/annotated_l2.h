@@ -7,6 +7,7 @@
 
 #include "l2/sectored_l2.h"
 
+#include <vrpipe/kernel/clock_crossing.h>
 #include <vrpipe/kernel/clock_domain.h>
 #include <vrpipe/memory/bandwidth.h>
 #include <vrpipe/memory/memory_port.h>
@@ -17,7 +18,7 @@
 namespace vrpipe {
 
 /// The sectored L2 at `lt`: it is looked up in the order of the calls, and says at once when an access is
-/// complete. Ports, banks, their MSHRs and their places for what is evicted are reserved in time. A bank whose request
+/// complete. It counts in the cycles of its own clock. Ports, banks, their MSHRs and their places for what is evicted are reserved in time. A bank whose request
 /// has to wait for one takes no other meanwhile.
 class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private PortOwner {
  public:
@@ -59,10 +60,17 @@ class AnnotatedL2 final : public sc_core::sc_module, public MemoryUnit, private 
   Cycle look_up(const MemoryRequest& access, Cycle arrival, Cycle& from);
   /// The same for one that goes below without a look-up, and is served when that has it.
   Cycle pass(const MemoryRequest& access, Cycle arrival, Cycle& from);
+  /// The present.
+  Cycle now() const { return crossing_.edge_of(clock.domain->now()); }
+  /// An access to the memory below.
+  Cycle access_below(const MemoryRequest& access, Cycle at) {
+    return crossing_.edge_of(memory_.access(access, crossing_.cycle_of(at)));
+  }
   /// Writes to the memory below, from a cycle on.
   Cycle write(const MemoryRequest& access, Bank& bank, Cycle at);
 
   std::unique_ptr<SectoredL2> behaviour_;
+  const ClockCrossing crossing_;
   const SectoredL2::Sizes& sizes_;
   SectoredCache& cache_;
   TimedMemoryPort memory_;

@@ -30,7 +30,7 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCom
 
   /// Lets in what there is room for now, and what arrived before this cycle into the queues of the banks.
   void let_in(Cycle now) {
-    give_back(now);
+    give_back();
     if (held_back_ != nullptr && free_ > 0) {
       tlm::tlm_generic_payload& payload = *std::exchange(held_back_, nullptr);
       admit(payload, held_back_arrival_);
@@ -52,9 +52,9 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCom
   void send(std::uint32_t bytes, Cycle now) {
     sent_ = std::max(sent_, now * bytes_per_cycle_) + bytes;
     bytes_in_ += bytes;
-    // Seen from the next cycle on, so that it does not matter who ticks first.
-    if (freed_in_ != now) give_back(now);
-    freed_in_ = now;
+    // Seen from the units' next cycle on, so that it does not matter who ticks first.
+    give_back();
+    freed_in_ = l2_.clock.domain->now();
     ++freed_;
   }
   /// When so many bytes that are there in a cycle have gone out.
@@ -70,9 +70,9 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCom
   }
   std::uint64_t bytes_out(Cycle end) const { return bytes_out_ - std::min(bytes_out_, responses_.reserved_from(end)); }
 
-  void respond(tlm::tlm_generic_payload& payload, Cycle at, Cycle now) {
-    answered_.push({&payload, at});
-    send_responses(now);
+  void respond(tlm::tlm_generic_payload& payload, Cycle at) {
+    answered_.push({&payload, l2_.crossing_.cycle_of(at)});
+    send_responses();
   }
 
  private:
@@ -82,11 +82,11 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCom
   };
   struct Response {
     tlm::tlm_generic_payload* payload;
-    Cycle at;
+    Cycle at;  ///< of the units
   };
 
-  void give_back(Cycle now) {
-    if (freed_in_ >= now) return;
+  void give_back() {
+    if (freed_in_ >= l2_.clock.domain->now()) return;
     free_ += std::exchange(freed_, 0);
   }
   void admit(tlm::tlm_generic_payload& payload, Cycle arrival) {
@@ -99,9 +99,11 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCom
     made.port = index_;
     l2_.cache_.prefetch(made.access.address);
     arrived_.push_in_order({arrival, request}, &Arrival::at);
-    l2_.clock.domain->wake(l2_.clock.unit, std::max(arrival, l2_.clock.domain->now()) + 1);
+    const Cycle next = l2_.clock.domain->now() + 1;
+    l2_.clock.domain->wake(l2_.clock.unit, std::max(l2_.crossing_.cycle_of(arrival + 1), next));
   }
-  void send_responses(Cycle now) {
+  void send_responses() {
+    const Cycle now = l2_.clock.domain->now();
     while (!answered_.empty() && !responding_) {
       const Response response = answered_.front();
       answered_.pop();
@@ -125,9 +127,9 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCom
                                      sc_core::sc_time& delay) override {
     if (phase == tlm::BEGIN_REQ) {
       const Cycle now = l2_.clock.domain->now();
-      const Cycle arrival = now + l2_.clock.domain->whole_cycles(delay);
+      const Cycle arrival = l2_.crossing_.edge_of(now + l2_.clock.domain->whole_cycles(delay));
       payload.acquire();
-      give_back(now);
+      give_back();
       if (free_ == 0) {
         held_back_ = &payload;
         held_back_arrival_ = arrival;
@@ -140,7 +142,7 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCom
     }
     if (phase != tlm::END_RESP) return tlm::TLM_ACCEPTED;  // ignorable ones of the initiator's
     responding_ = false;
-    send_responses(l2_.clock.domain->now());
+    send_responses();
     return tlm::TLM_COMPLETED;
   }
   void b_transport(tlm::tlm_generic_payload&, sc_core::sc_time&) override {
@@ -155,7 +157,7 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCom
   const std::uint64_t bytes_per_cycle_;
   std::uint32_t free_;  ///< places for requests
   std::uint32_t freed_ = 0;
-  Cycle freed_in_ = 0;
+  Cycle freed_in_ = 0;                             ///< of the units
   tlm::tlm_generic_payload* held_back_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
   Cycle held_back_arrival_ = 0;
   Ring<Arrival> arrived_;
@@ -172,6 +174,7 @@ ClockedL2::ClockedL2(const sc_core::sc_module_name& name, ClockDomain& domain, s
     : sc_module(name),
       PortOwner({&domain, domain.attach(*this)}),
       behaviour_(std::move(behaviour)),
+      crossing_(domain, behaviour_->clock().period_ps()),
       sizes_(behaviour_->sizes()),
       cache_(behaviour_->cache()),
       occupancy_(domain.frame_end(), kinds_of(sizes_)),
@@ -222,32 +225,37 @@ void ClockedL2::queue(std::uint32_t request) {
   });
 }
 
-Cycle ClockedL2::tick(Cycle now) {
+Cycle ClockedL2::tick(Cycle cycle) {
+  const Cycle now = crossing_.over_by(cycle);
+  if (crossing_.cycle_of(now) != cycle) return crossing_.cycle_of(now + 1);
   finish_fills(now);
   for (const auto& port : ports_) port->let_in(now);
   take_requests(now);
   ask_below();
-  Cycle next = memory_.next_completion();
+  Cycle next = never;
   for (const auto& port : ports_) next = std::min(next, port->next(now));
   for (std::uint64_t left = banks_with_requests_; left != 0; left &= left - 1) {
     const Bank& bank = banks_[static_cast<unsigned>(__builtin_ctzll(left))];
     if (!bank.stuck) next = std::min(next, std::max(bank.free_at, now + 1));
   }
   if (!(reads_.empty() && writes_.empty()) && memory_.available()) next = now + 1;
-  return std::max(next, now + 1);
+  if (next != never) next = crossing_.cycle_of(std::max(next, now + 1));
+  return std::max(std::min(next, memory_.next_completion()), cycle + 1);
 }
 
 void ClockedL2::occupy(std::uint32_t bank, std::uint64_t bytes, Cycle now) {
   const std::uint32_t cycles = behaviour_->bank_cycles(bytes);
   const Cycle from = std::max(banks_[bank].free_at, now);
   banks_[bank].free_at = from + cycles;
-  occupancy_.add(0, cycles, from, from + cycles);
+  occupancy_.add(0, cycles, crossing_.cycle_of(from), crossing_.cycle_of(from + cycles));
   behaviour_->count_bank(bank, bytes);
 }
 
 void ClockedL2::finish_fills(Cycle now) {
+  // A cycle of the units that has an edge may begin after it, and so what comes from below then.
+  const Cycle after = crossing_.after(now);
   std::uint32_t tag = 0;
-  while (memory_.next_completed(tag)) {
+  while (memory_.next_completion() < after && memory_.next_completed(tag)) {
     const Below done = asked_[tag];
     free_tags_.push_back(tag);
     if (done.access.command == tlm::TLM_WRITE_COMMAND) {
@@ -415,7 +423,7 @@ void ClockedL2::ask_below() {
 
 void ClockedL2::respond(std::uint32_t request, Cycle from) {
   const Request& done = requests_[request];
-  const Cycle now = clock.domain->now();
+  const Cycle now = crossing_.over_by(clock.domain->now());
   behaviour_->served(done.access);
   const Cycle left = ports_[done.port]->leave(from, behaviour_->response_bytes(done.access), now);
   answer(request, sizes_.latency_cycles + std::max(left, from + behaviour_->bank_cycles(done.access.bytes)));
@@ -424,12 +432,12 @@ void ClockedL2::respond(std::uint32_t request, Cycle from) {
 void ClockedL2::answer(std::uint32_t request, Cycle at) {
   Request& done = requests_[request];
   free_requests_.push_back(request);
-  if (done.whole == nobody) return ports_[done.port]->respond(*done.payload, at, clock.domain->now());
+  if (done.whole == nobody) return ports_[done.port]->respond(*done.payload, at);
   Request& whole = requests_[done.whole];
   whole.answered = std::max(whole.answered, at);
   if (--whole.parts > 0) return;
   free_requests_.push_back(done.whole);
-  ports_[whole.port]->respond(*whole.payload, whole.answered, clock.domain->now());
+  ports_[whole.port]->respond(*whole.payload, whole.answered);
 }
 
 std::vector<OccupancyPart> ClockedL2::parts(Cycle end) const {
@@ -438,12 +446,13 @@ std::vector<OccupancyPart> ClockedL2::parts(Cycle end) const {
   double width = 0;
   for (const auto& port : ports_) {
     width += static_cast<double>(port->bytes_per_cycle());
-    in += port->bytes_in(end);
-    out += port->bytes_out(end);
+    in += port->bytes_in(crossing_.over_by(end));
+    out += port->bytes_out(crossing_.over_by(end));
   }
   std::vector<OccupancyPart> parts = {{"responses", 1, static_cast<double>(out) / width, true},
                                       {"requests", 2, static_cast<double>(in) / width, false}};
   for (const OccupancyPart& banks : occupancy_.parts(end)) parts.push_back(banks);
+  for (OccupancyPart& part : parts) part.cycles *= crossing_.ratio();
   return parts;
 }
 

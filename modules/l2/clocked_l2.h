@@ -8,6 +8,7 @@
 
 #include "l2/sectored_l2.h"
 
+#include <vrpipe/kernel/clock_crossing.h>
 #include <vrpipe/kernel/clock_domain.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/bandwidth.h>
@@ -23,7 +24,8 @@ namespace vrpipe {
 /// other.
 ///
 /// A request that arrives in cycle t and meets nobody is taken at t + 1, which counts as t, and answered at t + 1 +
-/// latency; a fill leaves at t + 1.
+/// latency; a fill leaves at t + 1. These are cycles of its own clock; each of its edges is taken in the first cycle of the
+/// units that is not before it.
 class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Clocked, private PortOwner {
  public:
   /// @param ports  bytes a cycle of each
@@ -71,7 +73,7 @@ class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Cl
     std::uint32_t request = nobody;  ///< that is served with it
   };
 
-  Cycle tick(Cycle now) override;
+  Cycle tick(Cycle cycle) override;
   std::uint32_t make_request();
   void queue(std::uint32_t request);
   void finish_fills(Cycle now);
@@ -89,6 +91,7 @@ class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Cl
   void occupy(std::uint32_t bank, std::uint64_t bytes, Cycle now);
 
   std::unique_ptr<SectoredL2> behaviour_;
+  const ClockCrossing crossing_;
   const SectoredL2::Sizes& sizes_;
   SectoredCache& cache_;
   Occupancy occupancy_;  ///< of the banks

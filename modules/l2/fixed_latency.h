@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "l2/own_clock.h"
+
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/memory/memory_port.h>
 #include <vrpipe/model/memory_unit.h>
@@ -19,16 +21,22 @@ class FixedLatency final : public MemoryBehaviour {
         *this, "latency_cycles", 146, 1, 100000, "cycles", "Accel-Sim, SM87_ORIN: L2 latency", "from request to data"};
     Integer bytes_per_cycle{*this, "bytes_per_cycle", 128,          32,
                             4096,  "bytes",           source::open, "moved for each GPC: four sectors"};
+    OwnClock::Parameter frequency_mhz{*this};
   };
-  FixedLatency(const Parameters& parameters, const RenderContext&)
-      : timing_{parameters.latency_cycles, parameters.bytes_per_cycle} {}
+  FixedLatency(const Parameters& parameters, const RenderContext& context)
+      : clock_("l2", parameters.frequency_mhz, context),
+        own_timing_{parameters.latency_cycles, parameters.bytes_per_cycle} {}
 
   void access(const MemoryRequest&) override {}
   bool follows_accesses() const override { return false; }
-  TimingParameters timing() const override { return timing_; }
+  TimingParameters timing() const override { return clock_.of_units(own_timing_); }
+  /// In cycles of its clock.
+  const TimingParameters& own_timing() const { return own_timing_; }
+  const OwnClock& clock() const { return clock_; }
 
  private:
-  TimingParameters timing_;
+  OwnClock clock_;
+  TimingParameters own_timing_;
 };
 
 /// The same at `lt` and `cycle`.
@@ -37,8 +45,9 @@ class FixedLatencyUnit final : public MemoryUnit {
   FixedLatencyUnit(const std::string& name, ClockDomain& domain, std::unique_ptr<FixedLatency> behaviour,
                    const MemoryPlace& place)
       : behaviour_(std::move(behaviour)),
-        memory_(name.c_str(), domain, behaviour_->timing().latency_cycles,
-                place.port_bytes(behaviour_->timing().bytes_per_cycle), below_of(place)) {}
+        memory_(name.c_str(), domain, behaviour_->own_timing().latency_cycles,
+                behaviour_->clock().port_bytes(place, behaviour_->own_timing().bytes_per_cycle), below_of(place),
+                behaviour_->clock().period_ps()) {}
 
   tlm::tlm_base_target_socket_b<32>& target(unsigned index) override { return memory_.port(index); }
   tlm::tlm_initiator_socket<32>* below() override { return &memory_.below(); }

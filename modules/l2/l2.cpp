@@ -45,7 +45,7 @@ std::unique_ptr<MemoryUnit> make(const std::string& name, ClockDomain& domain, s
     throw SimulationFault(name, 0, "there is no timing model for a functional model of its kind");
   }
   std::unique_ptr<SectoredL2> l2(sectored);
-  const std::vector<unsigned> ports = place.port_bytes(l2->sizes().bytes_per_cycle);
+  const std::vector<unsigned> ports = l2->clock().port_bytes(place, l2->sizes().bytes_per_cycle);
   if (place.is_clocked) return std::make_unique<ClockedL2>(name.c_str(), domain, std::move(l2), ports);
   return std::make_unique<AnnotatedL2>(name.c_str(), domain, std::move(l2), ports);
 }

@@ -76,7 +76,8 @@ CacheOrganization checked(const SectoredL2Parameters& parameters) {
 }  // namespace
 
 SectoredL2::SectoredL2(const SectoredL2Parameters& parameters, const RenderContext& context)
-    : sizes_(sizes_of(parameters)),
+    : clock_(parameters.level.slot, parameters.frequency_mhz, context),
+      sizes_(sizes_of(parameters)),
       gpcs_(context.placement.gpcs),
       sees_all_writes_(parameters.level.sees_all_writes),
       writes_through_(parameters.write_policy == 1U),
@@ -142,7 +143,7 @@ std::vector<OccupancyPart> SectoredL2::least_occupancy(double /*period_ps*/) con
   // The last that CROP writes back may wait at its port.
   const std::uint64_t waiting =
       std::uint64_t{sizes_.port_requests} * bank_cycles(cache_.organization().line_bytes) * gpcs_;
-  return {{"banks", 0, static_cast<double>(busiest - std::min(busiest, waiting)), true}};
+  return {{"banks", 0, static_cast<double>(busiest - std::min(busiest, waiting)) * clock_.ratio(), true}};
 }
 
 }  // namespace vrpipe

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "l2/own_clock.h"
+
 #include <vrpipe/arithmetic/divisor.h>
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/memory/interleaving.h>
@@ -96,6 +98,7 @@ struct SectoredL2Parameters : ParameterSet {
                         "that wait at a port of the crossbar"};
   Choice arbitration{*this, "arbitration", {"round-robin", "oldest"},
                      0,     source::open,  "of the ports that have requests for a bank"};
+  OwnClock::Parameter frequency_mhz{*this};
 };
 
 /// Sees the look-ups of an L2, in their order.
@@ -125,7 +128,7 @@ class SectoredL2 final : public MemoryBehaviour {
     return {of_lines.read, of_lines.written + (writes_through_ ? traffic_.bytes().written : 0)};
   }
   std::vector<OccupancyPart> least_occupancy(double period_ps) const override;
-  TimingParameters timing() const override { return {sizes_.latency_cycles, sizes_.bytes_per_cycle}; }
+  TimingParameters timing() const override { return clock_.of_units({sizes_.latency_cycles, sizes_.bytes_per_cycle}); }
 
   void observe(L2Observer& observer) { observer_ = &observer; }
 
@@ -134,7 +137,9 @@ class SectoredL2 final : public MemoryBehaviour {
     std::uint32_t latency_cycles, bytes_per_cycle, header_bytes, port_requests;
     bool oldest_first;
   };
+  /// In cycles of its clock, as all that it is asked for.
   const Sizes& sizes() const { return sizes_; }
+  const OwnClock& clock() const { return clock_; }
 
   // For timing models.
 
@@ -229,6 +234,7 @@ class SectoredL2 final : public MemoryBehaviour {
   };
   static constexpr unsigned round_shift = 48;  ///< beyond all addresses
 
+  const OwnClock clock_;
   const Sizes sizes_;
   const unsigned gpcs_;
   const bool sees_all_writes_;

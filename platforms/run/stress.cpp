@@ -71,6 +71,8 @@ std::vector<StressConfiguration> make() {
       with("crop.bytes_per_cycle=32"),
       with("crop.sectors_per_cycle=1"),
       with("l2.bytes_per_cycle=32 crop.cache_bytes=4096"),
+      with("l2.frequency_mhz=401"),
+      with("l2.frequency_mhz=150 crop.cache_bytes=4096"),
       // Few places, and long waits for them.
       with("sm.warps_per_core=8", true),
       with("sm.warps_per_core=2"),

@@ -147,20 +147,20 @@ TEST(Fidelity, NarrowUnitsNeitherLockNorChangeTheResult) {
 
 TEST(Fidelity, TheBoundIsBelowCycleWhateverTheBottleneck) {
   const Draw draw = random_draw(200, 150, 1500, 6);
-  const std::vector<std::vector<Setting>> bottlenecks{{{"draw", "warps_per_1024_cycles", "4"}},
-                                                      {{"vpo", "triangles_per_cycle", "1"}},
-                                                      {{"raster", "setup_interval_cycles", "40"}},
-                                                      {{"raster", "coarse_tiles_per_cycle", "1"}},
-                                                      {{"raster", "fine_tiles_per_cycle", "1"},
-                                                       {"raster", "quads_per_cycle", "1"}},
-                                                      {{"raster", "screen_tile_interval_cycles", "20"}},
-                                                      {{"tc", "quads_per_cycle", "1"}},
-                                                      {{"zrop", "quads_per_cycle", "1"}},
-                                                      {{"qru", "quads_per_cycle", "1"}},
-                                                      {{"sm", "cores", "1"}},
-                                                      {{"crop", "cache_bytes", "1024"}},
-                                                      {{"l2", "bytes_per_cycle", "32"},
-                                                       {"crop", "cache_bytes", "1024"}}};
+  const std::vector<std::vector<Setting>> bottlenecks{
+      {{"draw", "warps_per_1024_cycles", "4"}},
+      {{"vpo", "triangles_per_cycle", "1"}},
+      {{"raster", "setup_interval_cycles", "40"}},
+      {{"raster", "coarse_tiles_per_cycle", "1"}},
+      {{"raster", "fine_tiles_per_cycle", "1"}, {"raster", "quads_per_cycle", "1"}},
+      {{"raster", "screen_tile_interval_cycles", "20"}},
+      {{"tc", "quads_per_cycle", "1"}},
+      {{"zrop", "quads_per_cycle", "1"}},
+      {{"qru", "quads_per_cycle", "1"}},
+      {{"sm", "cores", "1"}},
+      {{"crop", "cache_bytes", "1024"}},
+      {{"l2", "bytes_per_cycle", "32"}, {"crop", "cache_bytes", "1024"}},
+      {{"l2", "frequency_mhz", "100"}, {"crop", "cache_bytes", "1024"}}};
   for (const auto& settings : bottlenecks) {
     for (const char* variant : {"baseline", "het+qm"}) {
       RunRequest request = request_of(variant, Fidelity::bound, strictly);

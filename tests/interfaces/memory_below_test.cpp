@@ -102,6 +102,21 @@ INSTANTIATE_TEST_SUITE_P(With, MemoryBelowAtEachFidelity,
                            return std::string(below.param == MemoryBelow::clocked ? "Clocked" : "Annotated");
                          });
 
+TEST_F(MemoryBelowTest, InAClockOfItsOwnOfHalfTheFrequencyAMemoryTakesTwiceAsLongAndMovesHalfAsMuch) {
+  for (const MemoryBelow time : {MemoryBelow::none, MemoryBelow::annotated}) {
+    start();
+    FixedLatencyMemory memory("memory", *clock, l2_latency, std::vector<unsigned>{32}, MemoryBelow::none, 2000);
+    constexpr Cycle takes = 2 * hit_cycles;
+    // It takes what comes between two of its edges at the later one.
+    EXPECT_EQ(completed(memory, time, {read(100, 0), read(100, 64), read(301, 0)}),
+              (std::vector<Cycle>{100 + takes, 100 + takes + 2, 302 + takes}));
+    EXPECT_EQ(memory.peak_rate(), 16);
+    EXPECT_EQ(memory.bytes(), 96U);
+    EXPECT_EQ(memory.bytes(101), 0U) << "a cycle of its own is not over";
+    EXPECT_EQ(memory.bytes(102), 32U);
+  }
+}
+
 TEST_P(MemoryBelowAtEachFidelity, ASectorIsFetchedWhenItIsFirstRead) {
   EXPECT_EQ(completed({read(100, 64), read(300, 64)}), (std::vector<Cycle>{100 + miss_cycles, 300 + hit_cycles}));
   EXPECT_EQ(fetched(), 1U);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -11,6 +12,7 @@
 #include "l2/clocked_l2.h"
 
 #include <vrpipe/arithmetic/random.h>
+#include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/simulation.h>
 
@@ -118,6 +120,23 @@ class L2Test : public ::testing::Test {
   SectoredL2* model = nullptr;
   std::vector<std::unique_ptr<ClockedInitiator>> units;
 };
+
+/// Random accesses of three ports to so many lines, 64 of which are twice what the L2 holds; a seventh of them are of
+/// attributes.
+std::vector<std::vector<Access>> random_accesses(std::uint64_t seed, Cycle apart, std::uint64_t lines = 64) {
+  std::vector<std::vector<Access>> accesses(3);
+  Cycle at = 100;
+  for (std::uint64_t i = 0; i < 600; ++i) {
+    const std::uint64_t bits = mix(seed + i);
+    const unsigned bytes = 16U << (bits % 4);
+    const std::uint64_t address = (bits >> 8) % (lines * line_bytes) / bytes * bytes;
+    Access access = (bits >> 40) % 3 == 0 ? write(at, address, bytes) : read(at, address, bytes);
+    if (address / line_bytes % 7 == 0) access.request.origin.traffic = MemoryTraffic::attribute;
+    accesses[bits >> 32 & 1].push_back(access);
+    at += apart;
+  }
+  return accesses;
+}
 
 class L2AtEachFidelity : public L2Test, public ::testing::WithParamInterface<Time> {};
 INSTANTIATE_TEST_SUITE_P(With, L2AtEachFidelity, ::testing::Values(Time::annotated, Time::clocked),
@@ -243,6 +262,93 @@ TEST_P(L2AtEachFidelity, ARequestOfSeveralLinesIsAnAccessToEach) {
   EXPECT_EQ(l2->delivered().read, 512U);
 }
 
+// Of 1 GHz the units', of 500 MHz the L2's: its cycles are two of the units.
+TEST_P(L2AtEachFidelity, OfHalfTheFrequencyItTakesTwiceAsLong) {
+  set("frequency_mhz", "500");
+  constexpr Cycle hit = 2 * hit_cycles;
+  // The fill leaves a cycle of the L2 later, and comes at one of its edges.
+  constexpr Cycle miss = 2 + fill_cycles + hit;
+  EXPECT_EQ(run(GetParam(), {read(100, 64), read(300, 64), read(401, 64), write(500, 32)}),
+            (std::vector<Cycle>{100 + miss, 300 + hit, 402 + hit, 500 + hit}));
+}
+
+TEST_P(L2AtEachFidelity, OfHalfTheFrequencyItMovesHalfAsManyBytes) {
+  const auto last_of = [&](const char* frequency, const std::vector<Access>& accesses) {
+    start();
+    set("frequency_mhz", frequency);
+    const std::vector<Cycle> completed = run(GetParam(), accesses);
+    return *std::max_element(completed.begin(), completed.end());
+  };
+  // All hit, of both banks; the port passes 32 bytes a cycle.
+  std::vector<Access> accesses;
+  for (std::uint64_t line = 0; line < 8; ++line) accesses.push_back(write(100, line * line_bytes, 128));
+  for (std::uint64_t i = 0; i < 200; ++i) accesses.push_back(read(1000, i % 8 * line_bytes, 128));
+  const Cycle whole = last_of("0", accesses);
+  EXPECT_EQ(whole, 1000 + 200 * 4 + l2_latency);
+  EXPECT_EQ(last_of("1000", accesses), whole);
+  EXPECT_EQ(last_of("500", accesses), 1000 + 2 * (whole - 1000));
+  EXPECT_EQ(last_of("250", accesses), 1000 + 4 * (whole - 1000));
+}
+
+TEST_P(L2AtEachFidelity, IsNeverOccupiedForMoreThanItsTimeWhateverItsFrequency) {
+  for (const char* frequency : {"0", "999", "701", "500", "333", "17"}) {
+    start();
+    set("frequency_mhz", frequency);
+    Cycle last = 0;
+    for (const auto& of_port : run(GetParam(), random_accesses(5, 1))) {
+      for (const Cycle cycle : of_port) last = std::max(last, cycle);
+    }
+    clock->frame_end().not_before(100);
+    for (const Cycle end : {Cycle{100}, Cycle{101}, Cycle{150}, Cycle{307}, last}) {
+      for (const OccupancyPart& part : l2->parts(end)) {
+        EXPECT_LE(part.cycles, static_cast<double>(end) * (1 + 1e-9)) << part.name << " at " << frequency;
+      }
+    }
+    EXPECT_EQ(l2->memory_bytes().read, below->traffic().bytes().read);
+    EXPECT_EQ(l2->memory_bytes().written, below->traffic().bytes().written);
+  }
+}
+
+TEST_F(L2Test, OfAnyFrequencyItDoesNotMatterWhoTicksFirst) {
+  for (const char* frequency : {"999", "701", "500", "333"}) {
+    set("frequency_mhz", frequency);
+    set("port_requests", "2");
+    std::vector<std::vector<Cycle>> completed[2];
+    for (const bool last : {false, true}) {
+      start();
+      tick_order = last ? std::vector<unsigned>{3, 2, 1, 0} : std::vector<unsigned>{0, 1, 2, 3};
+      completed[last] = run(Time::clocked, random_accesses(6, 1));
+    }
+    EXPECT_EQ(completed[0], completed[1]) << frequency;
+  }
+}
+
+TEST_F(L2Test, APortWhoseWidthItsUnitSaysKeepsItInCyclesOfTheUnit) {
+  const MemoryPlace place{{0, 512, 0, 3}, true, true};
+  const auto ports_of = [&](std::uint32_t frequency) {
+    return OwnClock("l2", frequency, RenderContext()).port_bytes(place, 128);
+  };
+  EXPECT_EQ(ports_of(0), (std::vector<unsigned>{128, 512, 128, 3}));
+  EXPECT_EQ(ports_of(500), (std::vector<unsigned>{128, 1024, 128, 6}));
+  EXPECT_EQ(ports_of(701), (std::vector<unsigned>{128, 731, 128, 5})) << "of 1427 ps, at least as wide";
+}
+
+TEST_F(L2Test, WhatTheBoundKnowsOfItIsInCyclesOfTheUnits) {
+  const auto timing_of = [&](const char* frequency) {
+    set("frequency_mhz", frequency);
+    const auto timing = SectoredL2(parameters, RenderContext()).timing();
+    return std::pair{timing.latency_cycles, timing.bytes_per_cycle};
+  };
+  EXPECT_EQ(timing_of("0"), (std::pair{10U, 32U}));
+  EXPECT_EQ(timing_of("500"), (std::pair{20U, 16U}));
+  EXPECT_EQ(timing_of("701"), (std::pair{14U, 23U})) << "of 1427 ps: at least 14.27 cycles, at most 22.4 bytes";
+}
+
+TEST_F(L2Test, AClockFasterThanThatOfTheUnitsIsRefused) {
+  set("frequency_mhz", "1001");
+  EXPECT_THROW(SectoredL2(parameters, RenderContext()), UserError);
+}
+
 // "Blocked at t - 1, ready at t".
 TEST_F(L2Test, AMissWithoutAnMshrWaitsForAFillOfItsBank) {
   set("mshrs", "1");
@@ -304,23 +410,6 @@ TEST_F(L2Test, TheOldestRequestOrTheNextPortGoesFirst) {
   EXPECT_LT(oldest[2][0], oldest[1][0]);
   const auto in_turn = order("round-robin");
   EXPECT_LT(in_turn[1][0], in_turn[2][0]);
-}
-
-/// Random accesses of three ports to so many lines, 64 of which are twice what the L2 holds; a seventh of them are of
-/// attributes.
-std::vector<std::vector<Access>> random_accesses(std::uint64_t seed, Cycle apart, std::uint64_t lines = 64) {
-  std::vector<std::vector<Access>> accesses(3);
-  Cycle at = 100;
-  for (std::uint64_t i = 0; i < 600; ++i) {
-    const std::uint64_t bits = mix(seed + i);
-    const unsigned bytes = 16U << (bits % 4);
-    const std::uint64_t address = (bits >> 8) % (lines * line_bytes) / bytes * bytes;
-    Access access = (bits >> 40) % 3 == 0 ? write(at, address, bytes) : read(at, address, bytes);
-    if (address / line_bytes % 7 == 0) access.request.origin.traffic = MemoryTraffic::attribute;
-    accesses[bits >> 32 & 1].push_back(access);
-    at += apart;
-  }
-  return accesses;
 }
 
 std::uint64_t value_of(const StatisticSet& set, const std::string& name) {

@@ -9,6 +9,7 @@
 #include <systemc>
 #include <tlm>
 
+#include <vrpipe/kernel/clock_crossing.h>
 #include <vrpipe/kernel/clock_domain.h>
 #include <vrpipe/kernel/link.h>
 #include <vrpipe/kernel/ring.h>
@@ -170,8 +171,10 @@ class FixedLatencyMemory : public sc_core::sc_module, public StatisticSet {
   FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned latency_cycles,
                      unsigned bytes_per_cycle, unsigned ports, MemoryBelow below = MemoryBelow::none);
   /// @param bytes_per_cycle  of each port
+  /// @param period_ps        of a clock of its own, in whose cycles these are; 0 for the domain's
   FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned latency_cycles,
-                     const std::vector<unsigned>& bytes_per_cycle, MemoryBelow below = MemoryBelow::none);
+                     const std::vector<unsigned>& bytes_per_cycle, MemoryBelow below = MemoryBelow::none,
+                     std::uint64_t period_ps = 0);
   ~FixedLatencyMemory() override;
   /// Each port is for one initiator.
   tlm::tlm_base_target_socket_b<32>& port(unsigned index);
@@ -179,7 +182,7 @@ class FixedLatencyMemory : public sc_core::sc_module, public StatisticSet {
   tlm::tlm_initiator_socket<32>& below();
   /// Moved in all, or before cycle `end`.
   std::uint64_t bytes(Cycle end = never) const;
-  /// Bytes per cycle of all ports.
+  /// Bytes per cycle of the domain of all ports.
   double peak_rate() const;
   /// Of all ports.
   const MemoryTrafficCounters& traffic() const { return traffic_; }
@@ -189,6 +192,7 @@ class FixedLatencyMemory : public sc_core::sc_module, public StatisticSet {
  private:
   class MemoryTarget;
   const ClockDomain& domain_;
+  const ClockCrossing crossing_;
   unsigned latency_cycles_;
   MemoryTrafficCounters traffic_;
   CompulsoryMissStatistics cache_{*this, "cache"};
