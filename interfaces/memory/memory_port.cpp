@@ -176,6 +176,7 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
     memory_.traffic_.count(request);
     bytes_ += request.bytes;
     const ClockCrossing& own = memory_.crossing_;
+    if (own.is_same()) return memory_.latency_cycles_ + bandwidth_.take(arrival, request.bytes, clock().now());
     const Cycle moved = bandwidth_.take(own.edge_of(arrival), request.bytes, own.edge_of(clock().now()));
     return own.cycle_of(memory_.latency_cycles_ + moved);
   }

@@ -17,6 +17,8 @@ class ClockCrossing {
   /// @param delay_ps   from an edge of the other clock until the domain can see what is there
   ClockCrossing(const ClockDomain& domain, std::uint64_t period_ps, std::uint64_t delay_ps = 0);
 
+  /// Whether both have one period, and so the same cycles.
+  bool is_same() const { return same_; }
   /// The first edge of the other clock that is not before a cycle of the domain.
   Cycle edge_of(Cycle cycle) const { return same_ ? cycle : up(other_, cycle * domain_.value()); }
   /// How many cycles of the other clock are over by a cycle of the domain.
@@ -34,10 +36,8 @@ class ClockCrossing {
   double ratio() const { return static_cast<double>(other_.value()) / static_cast<double>(domain_.value()); }
 
  private:
-  static Cycle up(const Divisor& divisor, std::uint64_t dividend) {
-    const Divisor::Division division = divisor.divide(dividend);
-    return division.quotient + (division.remainder > 0 ? 1 : 0);
-  }
+  // Out of line, so that of one clock only the question is left.
+  static Cycle up(const Divisor& divisor, std::uint64_t dividend);
 
   Divisor domain_, other_;  ///< periods, in units of sc_time
   std::uint64_t delay_;
