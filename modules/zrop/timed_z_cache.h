@@ -117,7 +117,8 @@ class TimedZCache {
     if (line != SectoredCache::no_line) {
       missed &= ~cache_->present(line);
       for (std::uint32_t left = needed.sectors & cache_->present(line); left != 0; left &= left - 1)
-        there = std::max(there, there_[std::size_t{line} * sectors_of_a_line_ + __builtin_ctz(left)]);
+        there = std::max(there,
+                         there_[std::size_t{line} * sectors_of_a_line_ + static_cast<unsigned>(__builtin_ctz(left))]);
     }
     if (missed != 0) there = std::max(there, arrived + fill_cycles_);
     return foreseen_until_ = std::max(foreseen_until_, there);

@@ -126,10 +126,12 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   };
   const std::uint64_t z_blocks = to_last ? without_last(done.z_blocks, longest_beat_of_blocks()) : done.z_blocks;
   const std::uint64_t launches = to_last ? without_last(done.launches, longest_launch()) : done.launches;
-  cycles[test] = std::max({ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(z_blocks, 1000) +
-                               update_cycles(done) + sector_cycles(done),
-                           ratio(done.z_lines, 1000), ratio(done.quads_rasterized, prop_.quads_per_cycle),
-                           from_l2(done.z_sectors * zrop_.z_cache.organization.sector_bytes)});
+  // Beside which beats updates hide is not known phase by phase.
+  const double updates = updates_hide() ? 0.0 : update_cycles(done);
+  cycles[test] =
+      std::max({ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(z_blocks, 1000) + updates + sector_cycles(done),
+                ratio(done.z_lines, 1000), ratio(done.quads_rasterized, prop_.quads_per_cycle),
+                from_l2(done.z_sectors * zrop_.z_cache.organization.sector_bytes)});
   cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
   cycles[sm] = std::max(instructions(done) / sm_.instructions_per_cycle(), ratio(launches, 1000));
   cycles[late] = ratio(done.late_quads, std::min(zrop_.quads_per_cycle, prop_.quads_per_cycle));
@@ -145,11 +147,14 @@ std::uint64_t PhaseBound::z_sectors_of(std::uint64_t filled) const {
   return sectors - sectors % zrop_.z_cache.sectors_per_cycle;
 }
 
+bool PhaseBound::updates_hide() const {
+  return zrop_.quads_per_cycle < QuadBeat::capacity || zrop_.block_thousandths != 0 ||
+         zrop_.primitive_thousandths != 0 || zrop_.half_block_thousandths != 0;
+}
+
 double PhaseBound::update_cycles(const Work& done) const {
   const double updates = ratio(done.updates, zrop_.updates_per_cycle);
-  if (zrop_.quads_per_cycle >= QuadBeat::capacity && zrop_.block_thousandths == 0 && zrop_.primitive_thousandths == 0)
-    return updates;
-  // Beside a beat that takes several cycles updates take nothing of their own.
+  if (!updates_hide()) return updates;
   return std::max(0.0, updates - ratio(done.quads_tested, zrop_.quads_per_cycle) - ratio(done.z_blocks, 1000));
 }
 
@@ -200,8 +205,8 @@ void PhaseBound::end_phase() {
     last_quad_ = *std::max_element(end.begin(), end.end());
     ended_ = total_;
     ended_.add(up_to_quads_);
-    // Late tests share the port of the others, which are a stage of their own.
-    if (ended_.late_quads > 0) last_quad_ = std::max(last_quad_, busiest(parts("zrop")));
+    // Late tests, which are a stage of their own, and updates share the port of the others.
+    if (ended_.late_quads > 0 || updates_hide()) last_quad_ = std::max(last_quad_, busiest(parts("zrop")));
   } else if (!has_quads()) {
     Work passed = work;
     passed.tile_pairs = 0;  // for a pair without quads nobody waits

@@ -119,6 +119,8 @@ class PhaseBound {
   std::array<double, stages> end_of(const Work& done, bool to_last) const;
   double instructions(const Work& done) const;
   double update_cycles(const Work& done) const;
+  /// Beside beats that take several cycles updates take nothing of their own.
+  bool updates_hide() const;
   double sector_cycles(const Work& done) const;
   /// Thousandths of a cycle of one hand-over, and of one beat's tests.
   std::uint64_t longest_launch() const;

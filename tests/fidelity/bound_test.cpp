@@ -61,6 +61,12 @@ TEST(Bound, WaitsForNoIntervalOfTheLastVertexWarp) {
 }
 
 // Merged with quads of the next primitive, a primitive's would come to the SMs in several visits.
+// Updates of the last phase come while ZROP is still at the blocks of the one before it.
+TEST(Bound, UpdatesHideBesideTestsOfEarlierPhases) {
+  const Draw draw = draw_of(100, 100, std::vector<Splat>(2, flat_box(0, 0, 100, 100, 0.99F)));
+  EXPECT_LE(share_of_cycle(with("het", {{"zrop", "half_block_cycles", "100"}}), draw), 1);
+}
+
 TEST(Bound, VisitsAreAsFewAsInBinsThatTimeOut) {
   const Draw draw = draw_of(16, 16, std::vector<Splat>(64, flat_box(0, 0, 16, 16, 0.05F)));
   const RunRequest request =
