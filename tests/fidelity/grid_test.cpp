@@ -23,7 +23,6 @@ struct Exception {
 const Exception exceptions[] = {
     // Where SMs and CROP bound the draw by turns, tiles overtake one another by chance: a cycle of latency more, anywhere,
     // moves cycle itself by 2 % on average and 6 % at most.
-    {"mobile", "rgba8", "strict", "het", 4.0},
     {"mobile", "rgba8", "strict", "het+qm", 4.4},
 };
 

@@ -41,7 +41,8 @@ Platform with(const std::string& base, const std::function<void(Netlist&)>& edit
 class Elaborated {
  public:
   explicit Elaborated(const RunRequest& request)
-      : frame_(Frame::of(random_draw(32, 32, 10, 1))),
+      : draw_(random_draw(32, 32, 10, 1)),
+        frame_(Frame::of(draw_)),
         configuration_(request, *frame_),
         framebuffer_(*frame_, request.format) {
     fresh_simulation();
@@ -50,6 +51,7 @@ class Elaborated {
   const Gpu& gpu() const { return *gpu_; }
 
  private:
+  const Draw draw_;
   const std::shared_ptr<const Frame> frame_;
   const Configuration configuration_;
   Framebuffer framebuffer_;

@@ -108,6 +108,14 @@ TEST(MemoryCounts, OfRealGpusDrawAFrame) {
   }
 }
 
+// An L2 and a DRAM of ours work in the cycles of the units' clock.
+TEST(MemoryCounts, OfThePlatformNeedNoEventOfTheKernelForEachCycle) {
+  RunRequest request = testing::request_of("baseline", Fidelity::cycle);
+  request.platform = &platform_named("agx-orin-lpddr3");
+  const RunResult result = run(request, testing::random_draw(64, 64, 200, 3));
+  EXPECT_LT(result.kernel_events, *result.cycles / 10);
+}
+
 // What is written back at the frame's end is under way for longer than the frame.
 TEST(MemoryCounts, AChannelThatIsFullIsOccupiedForNoMoreThanTheFrame) {
   for (const unsigned banks : {8U, 10U}) {
