@@ -21,8 +21,8 @@ void fault_of_response(const sc_core::sc_object& port, Cycle now, const tlm::tlm
 namespace {
 
 /// What a socket is bound to, if it works in the cycles of this clock; null otherwise.
-EarlyCompletionMemory* memory_of_clock(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
-  auto* const memory = dynamic_cast<EarlyCompletionMemory*>(socket.operator->());
+ClockedMemory* memory_of_clock(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
+  auto* const memory = dynamic_cast<ClockedMemory*>(socket.operator->());
   return memory != nullptr && &memory->clock() == &clock ? memory : nullptr;
 }
 
@@ -30,12 +30,12 @@ EarlyCompletionMemory* memory_of_clock(tlm::tlm_initiator_socket<32>& socket, co
 
 EarlyCompletionMemory* early_completion_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
   if (clock.passes_sockets()) return nullptr;
-  EarlyCompletionMemory* const memory = memory_of_clock(socket, clock);
+  auto* const memory = dynamic_cast<EarlyCompletionMemory*>(memory_of_clock(socket, clock));
   return memory != nullptr && memory->completes_early() ? memory : nullptr;
 }
 
 bool meets_own_time(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
-  const EarlyCompletionMemory* const memory = memory_of_clock(socket, clock);
+  const ClockedMemory* const memory = memory_of_clock(socket, clock);
   return memory == nullptr || memory->has_own_time();
 }
 

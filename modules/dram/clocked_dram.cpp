@@ -9,7 +9,7 @@
 
 namespace vrpipe {
 
-class ClockedDram::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCompletionMemory {
+class ClockedDram::Port final : public tlm::tlm_fw_transport_if<>, public ClockedMemory {
  public:
   Port(unsigned index, ClockedDram& dram)
       : socket(("port_" + std::to_string(index)).c_str()), dram_(dram), index_(index) {
@@ -49,11 +49,7 @@ class ClockedDram::Port final : public tlm::tlm_fw_transport_if<>, public EarlyC
   }
 
  private:
-  Cycle serve(const MemoryRequest&, Cycle arrival) override {
-    throw SimulationFault(socket.name(), arrival, "an access outside the phases of the base protocol");
-  }
   const ClockDomain& clock() const override { return dram_.domain_; }
-  bool completes_early() const override { return false; }
 
   void b_transport(tlm::tlm_generic_payload&, sc_core::sc_time&) override {
     throw SimulationFault(socket.name(), clock().now(), "b_transport at cycle, where it would have to wait");

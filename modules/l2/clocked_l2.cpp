@@ -15,7 +15,7 @@ std::vector<WorkKind> kinds_of(const SectoredL2::Sizes& sizes) { return {{"banks
 }  // namespace
 
 /// A port of the crossbar.
-class ClockedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCompletionMemory {
+class ClockedL2::Port final : public tlm::tlm_fw_transport_if<>, public ClockedMemory {
  public:
   Port(unsigned index, ClockedL2& l2, unsigned bytes_per_cycle)
       : socket(("port_" + std::to_string(index)).c_str()),
@@ -117,11 +117,7 @@ class ClockedL2::Port final : public tlm::tlm_fw_transport_if<>, public EarlyCom
     }
   }
 
-  Cycle serve(const MemoryRequest&, Cycle arrival) override {
-    throw SimulationFault(socket.name(), arrival, "an access outside the phases of the base protocol");
-  }
   const ClockDomain& clock() const override { return *l2_.clock.domain; }
-  bool completes_early() const override { return false; }
 
   tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override {

@@ -32,25 +32,29 @@ inline void check_response(const sc_core::sc_object& port, Cycle now, const tlm:
   if (access.is_response_error()) fault_of_response(port, now, access);
 }
 
-/// A memory that says as soon as an access begins when it will be complete. A port that is bound to one with nothing in
-/// between asks it directly instead of through the sockets, as with a direct memory interface; in the same cycles.
-class EarlyCompletionMemory {
+/// A memory that works in the cycles of a clock, and answers in them.
+class ClockedMemory {
  public:
-  virtual ~EarlyCompletionMemory() = default;
-  /// Takes an access that arrives in a cycle; returns the cycle in which it is complete. Accesses need not come in the
-  /// order of their cycles: at `lt` units run ahead of the clock.
-  virtual Cycle serve(const MemoryRequest& request, Cycle arrival) = 0;
-  /// The clock in whose cycles `serve` counts.
+  virtual ~ClockedMemory() = default;
   virtual const ClockDomain& clock() const = 0;
   /// Whether its answers depend on anything but the requests and their cycles: on sc_time, or timers.
   virtual bool has_own_time() const { return false; }
-  /// Whether it can say so. If not, it answers in the cycles of its clock, through the sockets.
+};
+
+/// One that says as soon as an access begins when it will be complete. A port that is bound to it with nothing in
+/// between asks it directly instead of through the sockets, as with a direct memory interface; in the same cycles.
+class EarlyCompletionMemory : public ClockedMemory {
+ public:
+  /// Takes an access that arrives in a cycle; returns the cycle in which it is complete. Accesses need not come in the
+  /// order of their cycles: at `lt` units run ahead of the clock.
+  virtual Cycle serve(const MemoryRequest& request, Cycle arrival) = 0;
+  /// Whether it can say so. If not, it answers through the sockets.
   virtual bool completes_early() const { return true; }
 };
 
 /// The memory that a socket is bound to, if it completes early and counts the cycles of this clock; null otherwise.
 EarlyCompletionMemory* early_completion_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock);
-/// Whether what a socket is bound to has time of its own, as everything may but an EarlyCompletionMemory.
+/// Whether what a socket is bound to has time of its own, as everything may but a ClockedMemory.
 bool meets_own_time(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock);
 
 /// An initiator on the unmodified TLM-2.0 base protocol, for timing only: payloads carry addresses and lengths, data
