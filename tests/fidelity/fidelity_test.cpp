@@ -212,12 +212,7 @@ TEST(Fidelity, EveryRungWithTimeReportsWhatItsUnitsDid) {
 }
 
 TEST(Fidelity, ADeadlockIsNamedOnEveryRungWithLinks) {
-  Platform platform = platform_named("agx-orin");
-  platform.name = "without-release";
-  platform.wire = [wire = platform.wire](Netlist& netlist) {
-    wire(netlist);
-    netlist.disconnect("gpc0.prop.out_release");
-  };
+  const Platform platform = edited("agx-orin", [](Netlist& netlist) { netlist.disconnect("gpc0.prop.out_release"); });
   const Draw draw = random_draw(64, 64, 200, 10);
   for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     for (const char* variant : {"baseline", "het+qm"}) {

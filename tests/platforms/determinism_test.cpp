@@ -106,12 +106,9 @@ TEST(Determinism, TheLatenciesOfShadersChangeNoImage) {
 
 // case T10
 TEST(QueuesOfOnePlace, CompleteWithTheSameImageAndAreNotFaster) {
-  Platform shallow = platform_named("agx-orin");
-  shallow.name = "shallow";
-  shallow.wire = [wire = shallow.wire](Netlist& netlist) {
-    wire(netlist);
+  const Platform shallow = testing::edited("agx-orin", [](Netlist& netlist) {
     for (const Link& link : netlist.links()) link.parameters->depth = 1;
-  };
+  });
   const Draw draw = testing::random_draw(64, 64, 300, 6);
   for (const Variant& variant : variants()) {
     const auto on = [&](const Platform* platform) {
@@ -161,14 +158,11 @@ void register_wall() {
 
 TEST(Deadlock, IsReportedWithTheUnitsThatWait) {
   register_wall();
-  Platform broken = platform_named("agx-orin");
-  broken.name = "broken";
-  broken.wire = [wire = broken.wire](Netlist& netlist) {
-    wire(netlist);
+  const Platform broken = testing::edited("agx-orin", [](Netlist& netlist) {
     netlist.disconnect("gpc0.prop.out_color");
     netlist.add("gpc0.wall");
     netlist.connect("gpc0.prop.out_color", "gpc0.wall.in_color", 2);
-  };
+  });
   const Draw draw = testing::random_draw(64, 64, 300, 7);
   try {
     run(request_of("baseline", Fidelity::cycle, [&](RunRequest& r) { r.platform = &broken; }), draw);

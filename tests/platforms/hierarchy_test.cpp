@@ -21,21 +21,11 @@
 namespace vrpipe {
 namespace {
 
+using testing::edited;
 using testing::fidelities_with_time;
 using testing::random_draw;
 using testing::request_of;
 using testing::run;
-
-/// A platform, edited.
-Platform with(const std::string& base, const std::function<void(Netlist&)>& edit) {
-  Platform platform = platform_named(base);
-  platform.name = "edited";
-  platform.wire = [wire = platform.wire, edit](Netlist& netlist) {
-    wire(netlist);
-    edit(netlist);
-  };
-  return platform;
-}
 
 /// A platform, elaborated.
 class Elaborated {
@@ -83,7 +73,7 @@ class NoNameIsTaken {
 TEST(Hierarchy, EveryInstanceIsFoundByItsPathInItsGpc) {
   const NoNameIsTaken check;
   for (const Fidelity fidelity : fidelities_with_time()) {
-    const Platform platform = with("desktop", [](Netlist& netlist) {
+    const Platform platform = edited("desktop", [](Netlist& netlist) {
       wire_dram(netlist, "lpddr3-1600");
       connect_attribute_traffic(netlist);
       insert_l1(netlist);
@@ -126,7 +116,7 @@ TEST(Hierarchy, IsTheSameInEverySimulationOfAProcess) {
 
 TEST(Hierarchy, WhatIsPutOnALinkOrAPortIsAChildOfTheUnitThatHasIt) {
   RunRequest request = request_of("het");
-  const Platform platform = with("desktop", [](Netlist& netlist) { netlist.disconnect("gpc1.prop.out_color"); });
+  const Platform platform = edited("desktop", [](Netlist& netlist) { netlist.disconnect("gpc1.prop.out_color"); });
   request.platform = &platform;
   request.observers = std::make_shared<Observers>();
   request.observers->on_link<QuadBeat>("gpc2.raster.quads", [](const auto&) {});
@@ -168,7 +158,7 @@ TEST(Hierarchy, HoldsUnitsInSlotsOfOnesOwnAndMemoriesOfOtherMakes) {
   const NoNameIsTaken check;
   for (const Fidelity fidelity : fidelities_with_time()) {
     std::string given;
-    const Platform platform = with("desktop", [&](Netlist& netlist) {
+    const Platform platform = edited("desktop", [&](Netlist& netlist) {
       netlist.add("gpc1.bystander");
       netlist.add("gpc1.cluster0.bystander");
       netlist.add("gpc1.cluster1.bystander");

@@ -21,22 +21,12 @@
 namespace vrpipe {
 namespace {
 
+using testing::edited;
 using testing::random_draw;
 using testing::request_of;
 using testing::run;
 using testing::same_image;
 using testing::strictly;
-
-/// A platform, edited.
-Platform edited(const std::string& base, std::function<void(Netlist&)> edit) {
-  Platform platform = platform_named(base);
-  platform.name = "edited";
-  platform.wire = [wire = platform.wire, edit = std::move(edit)](Netlist& netlist) {
-    wire(netlist);
-    edit(netlist);
-  };
-  return platform;
-}
 
 std::string refusal_of(const Platform& platform, Fidelity fidelity, const std::vector<Setting>& settings = {}) {
   RunRequest request = request_of("het+qm", fidelity, strictly);

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <functional>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -23,6 +24,17 @@ inline RunRequest request_of(const std::string& variant, Fidelity fidelity = Fid
   request.fidelity = fidelity;
   if (change) change(request);
   return request;
+}
+
+/// A platform, edited.
+inline Platform edited(const std::string& base, std::function<void(Netlist&)> edit) {
+  Platform platform = platform_named(base);
+  platform.name = "edited";
+  platform.wire = [wire = platform.wire, edit = std::move(edit)](Netlist& netlist) {
+    wire(netlist);
+    edit(netlist);
+  };
+  return platform;
 }
 
 inline RunResult run(const RunRequest& request, const Draw& draw) {
