@@ -75,4 +75,8 @@ CacheOrganization CacheParameters::organization() const {
   return made;
 }
 
+RopMshrs::RopMshrs(ParameterSet& owner)
+    : Integer(owner, "mshrs", 384, 1, 65536, "sectors", "Accel-Sim, SM87_ORIN: 384 MSHRs of a first-level cache",
+              "fills in flight, and as many write-backs") {}
+
 }  // namespace vrpipe

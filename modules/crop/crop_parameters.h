@@ -39,14 +39,7 @@ struct CropParameters : ParameterSet {
   Switch previous_alpha_check{*this, "previous_alpha_check", true, source::paper_text,
                               "signal only pixels that newly pass the threshold (paper 5.2)"};
   CacheParameters cache{*this, {"cache_bytes", 16384, 1 << 24, "CROP cache", 0, source::measured}};
-  Integer mshrs{*this,
-                "mshrs",
-                384,
-                1,
-                65536,
-                "sectors",
-                "Accel-Sim, SM87_ORIN: 384 MSHRs of a first-level cache",
-                "fills in flight, and as many write-backs"};
+  RopMshrs mshrs{*this};
   Integer sectors_per_cycle{*this,
                             "sectors_per_cycle",
                             16,

@@ -98,7 +98,9 @@ class CropTime {
   /// Whether no quad has another price than its rate's, and none has to wait for another.
   bool quads_are_alike() const { return forwards && !in_pairs_ && column_parts_ == 0; }
   /// Whether that is all that takes time, but for sectors.
-  bool is_plain() const { return quads_are_alike() && !pays_for_lines && !fetches_ahead && line_return_cycles == 0; }
+  bool is_plain() const { return quads_are_alike() && !pays_for_lines && !lines_return(); }
+  /// Whether a line that left and comes back may have to wait.
+  bool lines_return() const { return fetches_ahead || line_return_cycles > 0; }
   Price price() const { return {price_, false}; }
   /// Where quads are alike: one is blended in a cycle to which the blender is open, or so many from the first one on in which there is
   /// time; returns the cycles of the first and of the last.

@@ -58,7 +58,7 @@ class TimedCrop : public TimedUnit {
     const ColorSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
-    if (time_.fetches_ahead || time_.line_return_cycles > 0)
+    if (time_.lines_return())
       returns_.emplace(surface->address(0), surface->size_bytes(), time_.cache.line_bytes, time_.line_return_cycles);
   }
 

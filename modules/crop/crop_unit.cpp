@@ -75,7 +75,7 @@ class CropUnit : public Unit {
     monitor_.emplace(surface_->width(), surface_->height());
     if (Plain) return;
     stays_.resize(organization.lines());
-    if (time_.fetches_ahead || time_.line_return_cycles > 0)
+    if (time_.lines_return())
       returns_.emplace(surface_->address(0), surface_->size_bytes(), time_.cache.line_bytes, time_.line_return_cycles);
     if (time_.fetches_ahead) ahead_.emplace(port_, statistics, fetched_again_, *returns_, time_.mshrs);
   }

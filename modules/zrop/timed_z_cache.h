@@ -116,9 +116,7 @@ class TimedZCache {
     Cycle there = arrived;
     if (line != SectoredCache::no_line) {
       missed &= ~cache_->present(line);
-      for (std::uint32_t left = needed.sectors & cache_->present(line); left != 0; left &= left - 1)
-        there = std::max(there,
-                         there_[std::size_t{line} * sectors_of_a_line_ + static_cast<unsigned>(__builtin_ctz(left))]);
+      there = std::max(there, all_there(line, needed.sectors & cache_->present(line)));
     }
     if (missed != 0) there = std::max(there, arrived + fill_cycles_);
     return foreseen_until_ = std::max(foreseen_until_, there);
@@ -182,10 +180,15 @@ class TimedZCache {
       });
       fill_cycles_ = filled - times.at;
     }
-    for (std::uint32_t left = access.sectors; left != 0; left &= left - 1) {
-      times.there = std::max(times.there, there[__builtin_ctz(left)]);
-    }
+    times.there = std::max(times.there, all_there(access.line, access.sectors));
     return access.line;
+  }
+  /// When all of these sectors are there; 0 for none.
+  Cycle all_there(SectoredCache::Line line, std::uint32_t sectors) const {
+    const Cycle* const there = &there_[std::size_t{line} * sectors_of_a_line_];
+    Cycle last = 0;
+    for (; sectors != 0; sectors &= sectors - 1) last = std::max(last, there[__builtin_ctz(sectors)]);
+    return last;
   }
   void write_back(const LineAccess& access, Cycle at) {
     port_.write_back(access, at);

@@ -38,14 +38,7 @@ class DepthStencilRop : public ZropBehaviour {
     CacheParameters cache{*this,
                           {"cache_bytes", 16384, 1 << 24, "z-cache, where memory is connected", 0,
                            "ATTILA: 4 ways of 16 lines of 256 bytes for each ROP"}};
-    Integer mshrs{*this,
-                  "mshrs",
-                  384,
-                  1,
-                  65536,
-                  "sectors",
-                  "Accel-Sim, SM87_ORIN: 384 MSHRs of a first-level cache",
-                  "fills in flight, and as many write-backs"};
+    RopMshrs mshrs{*this};
     Integer input_quads{*this,
                         "input_quads",
                         4096,

@@ -4,7 +4,6 @@
 
 #include <vrpipe/pipeline/batch.h>
 #include <vrpipe/pipeline/hi_z_plan.h>
-#include <vrpipe/pipeline/slots/crop.h>
 #include <vrpipe/pipeline/slots/draw.h>
 #include <vrpipe/pipeline/slots/raster.h>
 #include <vrpipe/pipeline/slots/sm.h>

@@ -73,4 +73,9 @@ struct CacheParameters {
   Switch tell_conflicts;
 };
 
+/// Parameter `mshrs` of a ROP's cache: sectors in flight.
+struct RopMshrs : Integer {
+  explicit RopMshrs(ParameterSet& owner);
+};
+
 }  // namespace vrpipe

@@ -165,7 +165,6 @@ class UntimedUnit : public Component {
   /// Of a kind of work of its slot (CropWork and others), so far: the items that it is counted in, but whole warps where
   /// that is cycles or instructions.
   std::uint64_t items(unsigned kind) const { return items_[kind]; }
-  const Items& items() const { return items_; }
   const std::vector<WorkKind>& work() const { return work_; }
   /// Throws SimulationFault if it did work of a kind that it has not declared.
   void check_work() const;
