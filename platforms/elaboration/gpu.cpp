@@ -127,7 +127,7 @@ void Gpu::add(const Instance& instance, Framebuffer& framebuffer) {
     }
   }
   follow_clock(*counting, *clock_);
-  attach_surfaces(*behaviour, framebuffer);
+  behaviour->use_surfaces(framebuffer);
   if (auto* const zrop = dynamic_cast<ZropBehaviour*>(behaviour.get()); zrop != nullptr && ahead != ahead_.end()) {
     zrop->follow(*ahead->second);
   }

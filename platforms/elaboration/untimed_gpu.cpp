@@ -12,7 +12,7 @@ UntimedGpu::UntimedGpu(const Configuration& configuration, Framebuffer& framebuf
   for (const Instance& instance : netlist.instances()) {
     if (Netlist::is_memory(instance)) continue;
     std::unique_ptr<Behaviour> behaviour = configuration.make(instance);
-    attach_surfaces(*behaviour, framebuffer);
+    behaviour->use_surfaces(framebuffer);
     units_.push_back(
         {&instance, untimed_unit_maker(instance.slot)(instance.path, std::move(behaviour),
                                                       configuration.context_of(instance.gpc), netlist.gpcs())});

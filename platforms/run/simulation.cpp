@@ -6,7 +6,6 @@
 #include <ctime>
 #include <map>
 #include <optional>
-#include <set>
 
 #include "bound/work_counter.h"
 #include "elaboration/untimed_gpu.h"
@@ -19,14 +18,8 @@
 #include <vrpipe/component/names.h>
 #include <vrpipe/component/printable.h>
 #include <vrpipe/pipeline/checked_behaviours.h>
-#include <vrpipe/pipeline/slots/crop.h>
 #include <vrpipe/pipeline/slots/qru.h>
-#include <vrpipe/pipeline/slots/raster.h>
-#include <vrpipe/pipeline/slots/sm.h>
-#include <vrpipe/pipeline/slots/tc.h>
 #include <vrpipe/pipeline/slots/tgc.h>
-#include <vrpipe/pipeline/slots/vpo.h>
-#include <vrpipe/pipeline/slots/zrop.h>
 #include <vrpipe/platforms/gpu.h>
 #include <vrpipe/platforms/observers.h>
 #include <vrpipe/platforms/validated_range.h>
@@ -118,12 +111,9 @@ void fnv1a(std::uint64_t& hash, std::uint64_t value) {
 
 std::string hash_of(const RunResult& result) {
   std::uint64_t hash = 0xcbf29ce484222325ULL;
-  for (const auto& [name, count] : result.counts.named()) {
-    // So that frames without such draws keep the hashes that they have always had.
-    static const std::set<std::string> of_such_draws{"quads_unshaded", "fragments_unshaded", "quads_unblended",
-                                                     "fragments_unblended"};
-    if (count == 0 && of_such_draws.count(name) > 0) continue;
-    fnv1a(hash, count);
+  for (const CountField& field : Counts::fields()) {
+    const std::uint64_t count = result.counts.*field.value;
+    if (count != 0 || !field.is_rare) fnv1a(hash, count);
   }
   fnv1a(hash, result.cycles.value_or(0));
   const ColorSurface& surface = result.framebuffer.color;
@@ -142,9 +132,7 @@ std::string hash_of(const RunResult& result) {
 const std::string l2 = "l2";
 
 /// The functional models of all units.
-struct BehaviourList {
-  std::vector<std::pair<const Instance*, const Behaviour*>> of_instance;
-};
+using BehaviourList = std::vector<Behaviour*>;
 
 // Statistics go to a StatisticCollector at the end of a run, to a StatisticSampler in its course.
 
@@ -197,69 +185,23 @@ void check_sampling_has_time(const RunRequest& request) {
                   "use lt or cycle");
 }
 
-/// The counters that every unit of a slot has, summed over GPCs. `value` gives what of one is counted.
-template <class Value>
-Counts counts_from(const BehaviourList& behaviours, const Value& value) {
-  Counts c;
-  for (const auto& [instance, behaviour] : behaviours.of_instance) {
-    const Behaviour& unit = behaviour->unit();
-    if (const auto* const vpo = dynamic_cast<const VpoBehaviour*>(&unit)) {
-      c.primitives += value(vpo->primitives);
-    } else if (const auto* const tgc = dynamic_cast<const TgcBehaviour*>(&unit)) {
-      c.tgc_flushes += value(tgc->flushes);
-    } else if (const auto* const raster = dynamic_cast<const RasterBehaviour*>(&unit)) {
-      c.quads_rasterized += value(raster->quads_rasterized);
-      c.fragments_rasterized += value(raster->fragments_rasterized);
-    } else if (const auto* const tc = dynamic_cast<const TcBehaviour*>(&unit)) {
-      c.tc_flushes += value(tc->flushes);
-    } else if (const auto* const zrop = dynamic_cast<const ZropBehaviour*>(&unit)) {
-      c.quads_depth_stencil_failed += value(zrop->quads_depth_stencil_failed);
-      c.fragments_depth_stencil_failed += value(zrop->fragments_depth_stencil_failed);
-      c.quads_terminated += value(zrop->quads_terminated);
-      c.fragments_terminated += value(zrop->fragments_terminated);
-      c.quads_unshaded += value(zrop->quads_unshaded);
-      c.fragments_unshaded += value(zrop->fragments_unshaded);
-      c.quads_late_failed += value(zrop->quads_late_failed);
-      c.fragments_late_failed += value(zrop->fragments_late_failed);
-      c.quads_unblended += value(zrop->quads_unblended);
-      c.fragments_unblended += value(zrop->fragments_unblended);
-    } else if (const auto* const sm = dynamic_cast<const SmBehaviour*>(&unit)) {
-      c.quads_shaded += value(sm->quads_shaded);
-      c.fragments_shaded += value(sm->fragments_shaded);
-      c.quads_pruned += value(sm->quads_pruned);
-      c.fragments_pruned += value(sm->fragments_pruned);
-      c.quads_merged += value(sm->quads_merged);
-      c.fragments_merged += value(sm->fragments_merged);
-      c.warps += value(sm->fragment_warps);
-    } else if (const auto* const crop = dynamic_cast<const CropBehaviour*>(&unit)) {
-      c.quads_dropped_late += value(crop->quads_dropped_late);
-      c.fragments_dropped_late += value(crop->fragments_dropped_late);
-      c.quads_blended += value(crop->quads_blended);
-      c.fragments_blended += value(crop->fragments_blended);
-      c.termination_updates += value(crop->termination_signals);
-    }
-  }
-  return c;
+/// What all units count, of the frame or of a draw.
+Counts counts_from(const BehaviourList& behaviours, const CountOf& of) {
+  Counts counts;
+  for (Behaviour* const behaviour : behaviours) behaviour->unit().add_to(counts, of);
+  return counts;
 }
-
-struct OfDraw {
-  std::size_t draw;
-  std::uint64_t operator()(const DrawCounter& counter) const { return counter.of_draw()[draw]; }
-  std::uint64_t operator()(const Counter&) const { return 0; }
-};
 
 /// By draw, in a frame of several.
 std::vector<DrawReport> draw_reports(const Frame& frame, const BehaviourList& behaviours) {
-  // What several draws may share is nobody's own.
-  static const std::set<std::string> shared{"warps", "tgc_flushes", "tc_flushes"};
   std::vector<DrawReport> reports;
   if (frame.draws().size() < 2) return reports;
   for (std::size_t draw = 0; draw < frame.draws().size(); ++draw) {
     DrawReport& report = reports.emplace_back();
     report.name = frame.draws()[draw].name;
-    const Counts counts = counts_from(behaviours, OfDraw{draw});
-    for (const auto& count : counts.named()) {
-      if (shared.count(count.first) == 0) report.counts.push_back(count);
+    const Counts counts = counts_from(behaviours, CountOf(draw));
+    for (const CountField& field : Counts::fields()) {
+      if (!field.is_shared) report.counts.emplace_back(field.name, counts.*field.value);
     }
   }
   return reports;
@@ -281,12 +223,12 @@ void set_draw_times(std::vector<Cycle> ends, Cycle cycles, std::vector<DrawRepor
 /// What the units counted, once a checked unit's counters are what went through it.
 void report_counts(const Configuration& configuration, const BehaviourList& behaviours,
                    const StatisticCollector& statistics, RunResult& result) {
-  for (const auto& [instance, behaviour] : behaviours.of_instance) {
+  for (Behaviour* const behaviour : behaviours) {
     check_counters(*behaviour);
-    if (!result.stopped) const_cast<Behaviour&>(*behaviour).unit().check_end();
+    if (!result.stopped) behaviour->unit().check_end();
   }
   result.statistics = statistics.reports();
-  result.counts = counts_from(behaviours, [](const Counter& counter) { return counter.value(); });
+  result.counts = counts_from(behaviours, CountOf());
   result.draws = draw_reports(configuration.frame(), behaviours);
 }
 
@@ -466,7 +408,7 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
   add_statistics(gpu, statistics);
   OccupancyReport occupancy(static_cast<double>(cycles), result);
   for (const Gpu::Placed& placed : gpu.units()) {
-    behaviours.of_instance.emplace_back(placed.instance, placed.behaviour);
+    behaviours.push_back(placed.behaviour);
     UnitReport report;
     report.name = placed.instance->path;
     for (unsigned state = 0; state < unit_states; ++state) {
@@ -559,8 +501,8 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
   BehaviourList behaviours;
   StatisticCollector statistics;
   for (const UntimedGpu::Placed& placed : gpu.units()) {
-    const Behaviour& behaviour = placed.unit->behaviour();
-    behaviours.of_instance.emplace_back(placed.instance, &behaviour);
+    Behaviour& behaviour = placed.unit->behaviour();
+    behaviours.push_back(&behaviour);
     add_statistics(*placed.instance, behaviour, *placed.unit, statistics);
     placed.unit->check_work();
   }
@@ -575,36 +517,6 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
 }
 
 }  // namespace
-
-std::vector<std::pair<std::string, std::uint64_t>> Counts::named() const {
-  return {{"primitives", primitives},
-          {"quads_rasterized", quads_rasterized},
-          {"fragments_rasterized", fragments_rasterized},
-          {"quads_depth_stencil_failed", quads_depth_stencil_failed},
-          {"fragments_depth_stencil_failed", fragments_depth_stencil_failed},
-          {"quads_terminated", quads_terminated},
-          {"fragments_terminated", fragments_terminated},
-          {"quads_unshaded", quads_unshaded},
-          {"fragments_unshaded", fragments_unshaded},
-          {"quads_shaded", quads_shaded},
-          {"fragments_shaded", fragments_shaded},
-          {"quads_pruned", quads_pruned},
-          {"fragments_pruned", fragments_pruned},
-          {"quads_merged", quads_merged},
-          {"fragments_merged", fragments_merged},
-          {"quads_dropped_late", quads_dropped_late},
-          {"fragments_dropped_late", fragments_dropped_late},
-          {"quads_late_failed", quads_late_failed},
-          {"fragments_late_failed", fragments_late_failed},
-          {"quads_unblended", quads_unblended},
-          {"fragments_unblended", fragments_unblended},
-          {"quads_blended", quads_blended},
-          {"fragments_blended", fragments_blended},
-          {"warps", warps},
-          {"tgc_flushes", tgc_flushes},
-          {"tc_flushes", tc_flushes},
-          {"termination_updates", termination_updates}};
-}
 
 RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<float>* progress) {
   return simulate(request, *Frame::of(draw, draw_state_of(request)), progress);

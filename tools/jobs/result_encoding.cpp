@@ -40,12 +40,11 @@ void visit_all(std::string names, const Visit& visit, Members&... members) {
   (visit(next_name(names), members), ...);
 }
 
-VRPIPE_MEMBERS(Counts, primitives, quads_rasterized, fragments_rasterized, quads_depth_stencil_failed,
-               fragments_depth_stencil_failed, quads_terminated, fragments_terminated, quads_unshaded,
-               fragments_unshaded, quads_shaded, fragments_shaded, quads_pruned, fragments_pruned, quads_merged,
-               fragments_merged, quads_dropped_late, fragments_dropped_late, quads_late_failed, fragments_late_failed,
-               quads_unblended, fragments_unblended, quads_blended, fragments_blended, warps, tgc_flushes, tc_flushes,
-               termination_updates)
+template <class Value, class Visit>
+std::enable_if_t<std::is_same<std::remove_const_t<Value>, Counts>::value> each_member(Value& counts,
+                                                                                      const Visit& visit) {
+  for (const CountField& field : Counts::fields()) visit(field.name, counts.*field.value);
+}
 VRPIPE_MEMBERS(UnitReport, name, cycles, occupancy, parts)
 VRPIPE_MEMBERS(Bottleneck, unit, occupancy, parts)
 VRPIPE_MEMBERS(HistogramBucket, from, to, count)

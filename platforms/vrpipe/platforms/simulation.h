@@ -12,6 +12,7 @@
 
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/kernel/accounting.h>
+#include <vrpipe/pipeline/counts.h>
 #include <vrpipe/pipeline/draw.h>
 #include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/frame.h>
@@ -118,26 +119,6 @@ struct RunRequest {
 };
 /// What reports call a run, also in file names.
 const std::string& name_of(const RunRequest& request);
-
-/// Exact integers, of a frame; the names and rules are those of the contract.
-struct Counts {
-  std::uint64_t primitives = 0;
-  std::uint64_t quads_rasterized = 0, fragments_rasterized = 0;
-  std::uint64_t quads_depth_stencil_failed = 0, fragments_depth_stencil_failed = 0;
-  std::uint64_t quads_terminated = 0, fragments_terminated = 0;
-  std::uint64_t quads_unshaded = 0, fragments_unshaded = 0;  ///< passed in draws that shade nothing
-  std::uint64_t quads_shaded = 0, fragments_shaded = 0;
-  std::uint64_t quads_pruned = 0, fragments_pruned = 0;
-  std::uint64_t quads_merged = 0, fragments_merged = 0;
-  std::uint64_t quads_dropped_late = 0, fragments_dropped_late = 0;
-  std::uint64_t quads_late_failed = 0, fragments_late_failed = 0;
-  std::uint64_t quads_unblended = 0, fragments_unblended = 0;  ///< passed late in draws that write no colour
-  std::uint64_t quads_blended = 0, fragments_blended = 0;
-  std::uint64_t warps = 0, tgc_flushes = 0, tc_flushes = 0, termination_updates = 0;
-
-  /// Name and value of each, in the order of the contract.
-  std::vector<std::pair<std::string, std::uint64_t>> named() const;
-};
 
 /// The cycles of one unit by state; they sum to the run's cycles.
 struct UnitReport {

@@ -78,7 +78,7 @@ class Bench {
     std::unique_ptr<Behaviour> behaviour = found.make_behaviour(*parameters, context_);
     // Clearing surfaces takes longer than most tests of units that have none.
     if (slot == "crop" || slot == "sm" || slot == "zrop") framebuffer_ = Framebuffer(*context.frame, context.format);
-    attach_surfaces(*behaviour, framebuffer_);
+    behaviour->use_surfaces(framebuffer_);
     behaviour->unit().set_draws(context.frame->draws().size());
     follow_clock(*behaviour, *clock_);
     unit_ = clocked() ? unit_maker(slot)(slot, *clock_, std::move(behaviour), context_, gpcs)

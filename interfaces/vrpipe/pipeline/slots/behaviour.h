@@ -6,6 +6,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/statistic.h>
+#include <vrpipe/pipeline/counts.h>
 #include <vrpipe/pipeline/payload.h>
 #include <vrpipe/pipeline/render_context.h>
 
@@ -26,6 +27,10 @@ class Behaviour : public StatisticSet {
   virtual ~Behaviour() = default;
   /// The unit as its author wrote it: itself, or what stands behind the checks (checked_behaviours.h).
   virtual const Behaviour& unit() const { return *this; }
+  /// Before anything is drawn, of a unit that draws into surfaces of the frame or reads them.
+  virtual void use_surfaces(Framebuffer& /*framebuffer*/) {}
+  /// Adds what it counts to the counts of the frame, or to those of a draw: `of` takes that from a counter.
+  virtual void add_to(Counts& /*counts*/, const CountOf& /*of*/) const {}
   /// Called when the frame has ended: what can be checked only then.
   virtual void check_end() {}
   Behaviour& unit() { return const_cast<Behaviour&>(static_cast<const Behaviour*>(this)->unit()); }
@@ -44,8 +49,5 @@ std::unique_ptr<SlotBehaviour> behaviour_as(std::unique_ptr<Behaviour> behaviour
   static_cast<void>(behaviour.release());
   return std::unique_ptr<SlotBehaviour>(typed);
 }
-
-/// Gives a unit of a slot that draws into surfaces, or reads them, those of a frame; others have no use for them.
-void attach_surfaces(Behaviour& unit, Framebuffer& framebuffer);
 
 }  // namespace vrpipe

@@ -61,6 +61,15 @@ class CropBehaviour : public Behaviour {
   /// What its work takes: the parameters of its timing models (modules/crop/crop_time.h).
   virtual const CropTime& time() const = 0;
 
+  void use_surfaces(Framebuffer& framebuffer) override { attach(framebuffer.color); }
+  void add_to(Counts& counts, const CountOf& of) const override {
+    counts.quads_dropped_late += of(quads_dropped_late);
+    counts.fragments_dropped_late += of(fragments_dropped_late);
+    counts.quads_blended += of(quads_blended);
+    counts.fragments_blended += of(fragments_blended);
+    counts.termination_updates += of(termination_signals);
+  }
+
   DrawCounter quads_blended{*this, "quads_blended", "quads", "blended"};
   DrawCounter fragments_blended{*this, "fragments_blended", "fragments", "blended"};
   DrawCounter quads_dropped_late{*this, "quads_dropped_late", "quads",

@@ -34,6 +34,11 @@ class RasterBehaviour : public Behaviour {
   };
   virtual TimingParameters timing() const = 0;
 
+  void add_to(Counts& counts, const CountOf& of) const override {
+    counts.quads_rasterized += of(quads_rasterized);
+    counts.fragments_rasterized += of(fragments_rasterized);
+  }
+
   DrawCounter quads_rasterized{*this, "quads_rasterized", "quads", "with at least one covered sample"};
   DrawCounter fragments_rasterized{*this, "fragments_rasterized", "fragments", "covered samples"};
   // What a unit of one's own does not count of these is counted for it, by its answers.

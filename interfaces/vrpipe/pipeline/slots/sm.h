@@ -7,8 +7,8 @@
 
 #include <vrpipe/kernel/accounting.h>
 #include <vrpipe/memory/cache_organization.h>
+#include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
-#include <vrpipe/pipeline/surface.h>
 
 namespace vrpipe {
 
@@ -74,6 +74,17 @@ class SmBehaviour : public Behaviour {
     double instructions_per_cycle() const { return double{1} * cores * schedulers_per_core / cycles_per_instruction(); }
   };
   virtual TimingParameters timing() const = 0;
+
+  void use_surfaces(Framebuffer& framebuffer) override { attach(framebuffer.color); }
+  void add_to(Counts& counts, const CountOf& of) const override {
+    counts.quads_shaded += of(quads_shaded);
+    counts.fragments_shaded += of(fragments_shaded);
+    counts.quads_pruned += of(quads_pruned);
+    counts.fragments_pruned += of(fragments_pruned);
+    counts.quads_merged += of(quads_merged);
+    counts.fragments_merged += of(fragments_merged);
+    counts.warps += of(fragment_warps);
+  }
 
   DrawCounter quads_shaded{*this, "quads_shaded", "quads", "launched in fragment warps"};
   DrawCounter fragments_shaded{*this, "fragments_shaded", "fragments", "live samples launched"};

@@ -36,6 +36,8 @@ class TcBehaviour : public Behaviour {
   };
   virtual TimingParameters timing() const = 0;
 
+  void add_to(Counts& counts, const CountOf& of) const override { counts.tc_flushes += of(flushes); }
+
   Counter quads{*this, "quads", "quads", "taken into bins"};
   Counter flushes{*this, "flushes", "flushes", "bins handed to PROP"};
 };

@@ -30,6 +30,8 @@ class TgcBehaviour : public Behaviour {
   virtual std::uint32_t largest_flush() const = 0;  ///< primitives
   virtual std::uint64_t storage_bytes() const = 0;  ///< of hardware
 
+  void add_to(Counts& counts, const CountOf& of) const override { counts.tgc_flushes += of(flushes); }
+
   Counter flushes{*this, "flushes", "flushes", "bins handed to the rasteriser; 0 where a unit passes through"};
   /// A unit of one's own that does not count them has those counted that leave it.
   Counter entries{*this, "entries", "entries", "primitives entered into bins; one for each grid touched"};

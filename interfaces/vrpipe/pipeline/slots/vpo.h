@@ -18,6 +18,8 @@ class VpoBehaviour : public Behaviour {
   virtual unsigned assemble(DrawIndex draw, std::uint32_t splat, std::array<Primitive, 2>& out) = 0;
   virtual Throughput timing() const = 0;  ///< items: triangles
 
+  void add_to(Counts& counts, const CountOf& of) const override { counts.primitives += of(primitives); }
+
   DrawCounter primitives{*this, "primitives", "triangles", "triangles handed to the GPCs"};
 };
 

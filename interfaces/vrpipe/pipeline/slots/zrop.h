@@ -77,6 +77,20 @@ class ZropBehaviour : public Behaviour {
   };
   virtual TimingParameters timing() const = 0;
 
+  void use_surfaces(Framebuffer& framebuffer) override { attach(framebuffer.depth_stencil); }
+  void add_to(Counts& counts, const CountOf& of) const override {
+    counts.quads_depth_stencil_failed += of(quads_depth_stencil_failed);
+    counts.fragments_depth_stencil_failed += of(fragments_depth_stencil_failed);
+    counts.quads_terminated += of(quads_terminated);
+    counts.fragments_terminated += of(fragments_terminated);
+    counts.quads_unshaded += of(quads_unshaded);
+    counts.fragments_unshaded += of(fragments_unshaded);
+    counts.quads_late_failed += of(quads_late_failed);
+    counts.fragments_late_failed += of(fragments_late_failed);
+    counts.quads_unblended += of(quads_unblended);
+    counts.fragments_unblended += of(fragments_unblended);
+  }
+
   DrawCounter quads_tested{*this, "quads_tested", "quads",
                            "that entered a test before shading: of depth, stencil or termination"};
   DrawCounter quads_depth_stencil_failed{*this, "quads_depth_stencil_failed", "quads",
