@@ -4,6 +4,7 @@
 
 #include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/hi_z_plan.h>
+#include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
 
@@ -39,5 +40,11 @@ LatePlan::LatePlan(const RenderContext& context) {
 }
 
 bool LatePlan::waits_at(Mark mark) const { return std::binary_search(waits_.begin(), waits_.end(), mark); }
+
+PortNeed way_of_late_tests() {
+  return {"out_late", [](const RenderContext& context) { return LatePlan(context).is_used(); },
+          "depth or stencil of a draw is tested after shading, and the port is not connected",
+          "connect prop.out_late to zrop.in_late, and zrop.out_late to prop.in_late"};
+}
 
 }  // namespace vrpipe

@@ -8,6 +8,7 @@
 
 #include "crop/checked_crop.h"
 
+#include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/frame_facts.h>
 #include <vrpipe/pipeline/registry.h>
 
@@ -285,7 +286,12 @@ template class ColorRop<ColorFormat::rgba32f, BlendRounding::rtz>;
 template class ColorRop<ColorFormat::rgba32f, BlendRounding::measured>;
 
 namespace {
-const SlotRegistrar crop_slot{{"crop", 100, "color-rop", "", true, check_crop}};
+const SlotRegistrar crop_slot{
+    {"crop", 100, "color-rop", "", true, check_crop},
+    {{"latency_cycles", 1, 200}, {"cache_bytes", 1024, 1 << 24}},
+    {{"out_done", [](const RenderContext& context) { return BarrierPlan(context).is_used(); },
+      "a draw of the frame reads the colour target, and nobody tells DRAW when all before it is blended",
+      "connect it to draw.in_done_N, as wire_gpc does"}}};
 
 [[maybe_unused]] const bool crop_registered = [] {
   Implementation implementation =

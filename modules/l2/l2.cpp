@@ -15,7 +15,7 @@ namespace vrpipe {
 namespace {
 
 const SlotRegistrar slot_of_l1{{"l1", 105, "sectored-cache", "", false, nullptr, true}};
-const SlotRegistrar slot_of_l2{{"l2", 110, "fixed-latency", "", true, nullptr, true}};
+const SlotRegistrar slot_of_l2{{"l2", 110, "fixed-latency", "", true, nullptr, true}, {{"latency_cycles", 1, 1000}}};
 const Registrar<FixedLatency, MemoryBehaviour> fixed_latency(
     "l2", "fixed-latency", "holds everything: a fixed latency, a number of bytes a cycle for each GPC", false,
     Trust::trusted);

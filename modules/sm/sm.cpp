@@ -279,7 +279,13 @@ void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp
 }
 
 namespace {
-const SlotRegistrar sm_slot{{"sm", 90, "splat-shader", "", true, check_sm}};
+const SlotRegistrar sm_slot{{"sm", 90, "splat-shader", "", true, check_sm},
+                            {{"cores", 4, 1024},
+                             {"warps_per_core", 2, 256},
+                             {"warps_to_one_core", 4, 256},
+                             {"attribute_latency_cycles", 0, 1000},
+                             {"fragment_latency_cycles", 0, 1000},
+                             {"merge_latency_cycles", 0, 1000}}};
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
                                                     "Gaussian splatting shaders with alpha pruning and quad merging",
                                                     false, Trust::trusted);

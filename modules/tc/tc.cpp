@@ -85,7 +85,8 @@ bool TileCoalescing::flush_oldest(FlushReason reason, Flush& out) {
 }
 
 namespace {
-const SlotRegistrar tc_slot{{"tc", 50, "tile-coalescing", "", false, check_tc}};
+const SlotRegistrar tc_slot{{"tc", 50, "tile-coalescing", "", false, check_tc},
+                            {{"bins", 2, 65536}, {"bin_quads", 8, 4096}}};
 const Registrar<TileCoalescing, TcBehaviour> registrar("tc", "tile-coalescing", "bins of quads, one per screen tile",
                                                        false, Trust::trusted);
 const EffectRegistrar eviction_effect{

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <vrpipe/pipeline/frame_facts.h>
+#include <vrpipe/pipeline/late_plan.h>
 #include <vrpipe/pipeline/registry.h>
 
 namespace vrpipe {
@@ -174,7 +175,9 @@ void DepthStencilRop::pass(Mark mark) {
 }
 
 namespace {
-const SlotRegistrar zrop_slot{{"zrop", 70, "depth-stencil-rop", "", true, check_zrop}};
+const SlotRegistrar zrop_slot{{"zrop", 70, "depth-stencil-rop", "", true, check_zrop},
+                              {{"latency_cycles", 1, 200}},
+                              {way_of_late_tests()}};
 const Registrar<DepthStencilRop, ZropBehaviour> registrar(
     "zrop", "depth-stencil-rop", "depth, stencil and termination tests, termination update on the stencil MSB", false,
     Trust::trusted);

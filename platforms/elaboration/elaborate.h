@@ -8,8 +8,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/model/unit.h>
-#include <vrpipe/pipeline/barrier_plan.h>
-#include <vrpipe/pipeline/late_plan.h>
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/pipeline/slots/memory.h>
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/platforms/netlist.h>
@@ -60,15 +59,16 @@ inline void check_below(const Netlist& netlist, const std::string& path, const M
                   "add one and use connect_memory, or put a memory there that needs none");
 }
 
-/// Throws UserError for a frame with barriers on a platform where they have no way back to DRAW.
-inline void check_barriers(const Configuration& configuration) {
-  if (!BarrierPlan(configuration.context_of(0)).is_used()) return;
+/// Throws UserError for a frame that needs a port of a unit which is not connected.
+inline void check_needs(const Configuration& configuration) {
   for (const Instance& instance : configuration.netlist().instances()) {
-    const std::string port = instance.path + ".out_done";
-    if (instance.slot != "crop" || configuration.netlist().link_from(port) != nullptr) continue;
-    throw UserError("incomplete platform " + configuration.platform().name, port,
-                    "a draw of the frame reads the colour target, and nobody tells DRAW when all before it is blended",
-                    "connect it to draw.in_done_N, as wire_gpc does");
+    for (const PortNeed& need : Registry::instance().slot(instance.slot).needs) {
+      const std::string port = instance.path + "." + need.port;
+      if (configuration.netlist().link_from(port) != nullptr || !need.is_needed(configuration.context_of(instance.gpc)))
+        continue;
+      throw UserError("platform " + configuration.platform().name + " cannot draw the frame", port, need.why,
+                      need.remedy);
+    }
   }
 }
 
@@ -85,20 +85,6 @@ inline void check_ports(Component& unit, const std::string& path, const std::str
   };
   check(unit.in_ports);
   check(unit.out_ports);
-}
-
-/// Throws UserError for a frame with tests after shading, where PROP has no way to ZROP and back for them.
-inline void check_late_way(const Configuration& configuration) {
-  const Netlist& netlist = configuration.netlist();
-  if (!LatePlan(configuration.context_of(0)).is_used()) return;
-  for (const Instance& instance : netlist.instances()) {
-    if (instance.slot != "prop" && instance.slot != "zrop") continue;
-    const std::string port = instance.path + ".out_late";
-    if (netlist.link_from(port) != nullptr) continue;
-    throw UserError("platform " + configuration.platform().name + " cannot draw the frame", port,
-                    "depth or stencil of a draw is tested after shading, and the port is not connected",
-                    "connect prop.out_late to zrop.in_late, and zrop.out_late to prop.in_late");
-  }
 }
 
 }  // namespace vrpipe

@@ -81,7 +81,7 @@ Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
   if (configuration.request().effects.elaborates_all_of("link.sockets")) clock_->set_passes_sockets();
   const Netlist& netlist = configuration.netlist();
   const RunRequest& request = configuration.request();
-  check_barriers(configuration);
+  check_needs(configuration);
   for (const Instance& instance : netlist.instances()) {
     const bool runs_ahead = instance.slot == "zrop" && request.termination == Termination::strict &&
                             configuration.frame().terminates_early();
@@ -90,7 +90,6 @@ Gpu::Gpu(const Configuration& configuration, Framebuffer& framebuffer)
   for (const Instance& instance : netlist.instances()) {
     if (!Netlist::is_memory(instance)) add(instance, framebuffer);
   }
-  check_late_way(configuration);
   Observers* observers = request.observers.get();
   const bool observes_links =
       observers != nullptr && std::any_of(netlist.links().begin(), netlist.links().end(),

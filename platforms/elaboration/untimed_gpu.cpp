@@ -8,7 +8,7 @@ namespace vrpipe {
 
 UntimedGpu::UntimedGpu(const Configuration& configuration, Framebuffer& framebuffer) : configuration_(configuration) {
   const Netlist& netlist = configuration.netlist();
-  check_barriers(configuration);
+  check_needs(configuration);
   for (const Instance& instance : netlist.instances()) {
     if (Netlist::is_memory(instance)) continue;
     std::unique_ptr<Behaviour> behaviour = configuration.make(instance);
@@ -17,7 +17,6 @@ UntimedGpu::UntimedGpu(const Configuration& configuration, Framebuffer& framebuf
         {&instance, untimed_unit_maker(instance.slot)(instance.path, std::move(behaviour),
                                                       configuration.context_of(instance.gpc), netlist.gpcs())});
   }
-  check_late_way(configuration);
   connect_units(netlist, configuration.request().observers.get(), [&](const std::string& path) -> Component* {
     for (const Placed& placed : units_) {
       if (placed.instance->path == path) return placed.unit.get();

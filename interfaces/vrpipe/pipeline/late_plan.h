@@ -29,4 +29,8 @@ class LatePlan {
   std::vector<Mark> waits_;         ///< in order
 };
 
+struct PortNeed;
+/// The way from PROP to ZROP and back: both need their end of it, where any draw is tested late.
+PortNeed way_of_late_tests();
+
 }  // namespace vrpipe

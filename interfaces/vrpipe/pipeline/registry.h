@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -16,6 +17,21 @@ namespace vrpipe {
 /// of this repository are, whose tests check it.
 enum class Trust : std::uint8_t { checked, trusted };
 
+/// An optional port of a unit that some frames need: a platform where it is not connected cannot draw these.
+struct PortNeed {
+  std::string port;
+  std::function<bool(const RenderContext&)> is_needed;
+  std::string why;
+  std::string remedy;
+};
+
+/// Values of a parameter for which `lt` was compared with `cycle`: of one that decides how much can be under way, and for how
+/// long. There a warp or a bin that moves in one piece may tell; rates of units do not matter to that.
+struct ValidatedRange {
+  std::string parameter;
+  std::uint64_t least, most;
+};
+
 /// A kind of unit that platforms are built of. Instances of it have paths, such as gpc0.tc.
 struct Slot {
   std::string name;            ///< e.g. "tc"
@@ -25,6 +41,8 @@ struct Slot {
   bool reports_utilization = false;
   SlotCheck check = nullptr;  ///< for units that are not trusted; null if nothing of theirs is checked
   bool is_memory = false;     ///< of memories (MemoryBehaviour), which have no streams but are bound to memory ports
+  std::vector<ValidatedRange> validated = {};  ///< of parameters that are not named every value is
+  std::vector<PortNeed> needs = {};
 };
 
 /// An implementation of a slot: a unit that a platform can be built with.
@@ -83,7 +101,11 @@ class Registry {
 
 /// Registers a slot at program or plugin load, before its implementations.
 struct SlotRegistrar {
-  explicit SlotRegistrar(Slot slot) { Registry::instance().add(std::move(slot)); }
+  explicit SlotRegistrar(Slot slot, std::vector<ValidatedRange> validated = {}, std::vector<PortNeed> needs = {}) {
+    slot.validated = std::move(validated);
+    slot.needs = std::move(needs);
+    Registry::instance().add(std::move(slot));
+  }
 };
 
 /// Registers a behaviour class at program or plugin load. `Unit` has a nested `Parameters` (a ParameterSet) and a
