@@ -1,10 +1,21 @@
 #include <vrpipe/kernel/accounting.h>
 
+#include <algorithm>
+#include <map>
 #include <string>
 
 #include <vrpipe/component/error.h>
 
 namespace vrpipe {
+
+double busiest(const std::vector<OccupancyPart>& parts) {
+  double longest = 0;
+  std::map<unsigned, double> resources;
+  for (const OccupancyPart& part : parts) {
+    longest = std::max(longest, resources[part.resource] += part.cycles);
+  }
+  return longest;
+}
 
 void refuse_work_kind(const std::string& unit, unsigned kind) {
   throw SimulationFault(unit, 0,

@@ -1,5 +1,6 @@
 #include <vrpipe/model/untimed.h>
 
+#include <algorithm>
 #include <map>
 
 #include <vrpipe/component/error.h>
@@ -21,6 +22,25 @@ void UntimedUnit::check_work() const {
   for (auto kind = static_cast<unsigned>(work_.size()); kind < items_.size(); ++kind) {
     if (items_[kind] > 0) refuse_work_kind(name_, kind);
   }
+}
+
+std::vector<OccupancyPart> UntimedUnit::least_parts(const Items& items, bool to_last) const {
+  std::vector<OccupancyPart> parts;
+  for (std::size_t i = 0; i < work_.size(); ++i) {
+    const WorkKind& kind = work_[i];
+    if (kind.cycles_per_item == 0) continue;
+    const auto count = static_cast<double>(items[i]);
+    const bool is_interval = to_last && items[i] > 0 && kind.cycles_per_item > 1;
+    const double cycles = is_interval ? (count - 1) * kind.cycles_per_item + 1 : count * kind.cycles_per_item;
+    parts.push_back({kind.name, kind.resource, cycles, kind.is_throughput});
+  }
+  return parts;
+}
+
+double UntimedUnit::idle_after_last() const {
+  double longest = 1;
+  for (const WorkKind& kind : work_) longest = std::max(longest, kind.cycles_per_item);
+  return longest - 1;
 }
 
 void register_untimed_unit_maker(const std::string& slot, UntimedUnitMaker maker) {

@@ -9,7 +9,8 @@ namespace {
 class UntimedDraw : public UntimedUnit {
  public:
   UntimedDraw(const std::string& name, std::unique_ptr<DrawBehaviour> behaviour, unsigned gpcs)
-      : UntimedUnit(name), behaviour_(std::move(behaviour)) {
+      : UntimedUnit(name, {{"warps", 0, 1024.0 / behaviour->warps_per_1024_cycles(), true}}),
+        behaviour_(std::move(behaviour)) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       outs_.push_back(std::make_unique<UntimedOut<VertexWarp>>(*this, "out_vertices_" + std::to_string(gpc)));
       // Here all that a warp leads to is done before the next.

@@ -21,9 +21,9 @@ class TimedProp : public TimedUnit {
  public:
   TimedProp(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
             const RenderContext& context)
-      : TimedUnit(name, domain, PropWork::kinds(behaviour->timing())),
+      : TimedUnit(name, domain, behaviour->time().kinds()),
         behaviour_(std::move(behaviour)),
-        timing_(behaviour_->timing()),
+        time_(behaviour_->time()),
         tests_(tests_before_shading(context)),
         plan_(context),
         out_test_(*this, "out_test"),
@@ -47,15 +47,15 @@ class TimedProp : public TimedUnit {
                    [this](const ShadedWarpItem& item, CycleInterval visible) {
                      return collect(*item.warp, visible.first);
                    }),
-        order_(timing_.order, context),
-        there_(timing_.quads_per_cycle),
-        back_(timing_.quads_per_cycle),
-        color_(timing_.color_rate.items),
-        late_(timing_.quads_per_cycle) {
-    out_test_.set_pipeline(timing_.latency_cycles - 1, 1);
-    out_survivors_.set_pipeline(timing_.latency_cycles - 1, 1);
-    out_color_.set_pipeline(timing_.latency_cycles - 1, 1);
-    out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+        order_(time_.order, context),
+        there_(time_.quads_per_cycle),
+        back_(time_.quads_per_cycle),
+        color_(time_.color_rate.items),
+        late_(time_.quads_per_cycle) {
+    out_test_.set_pipeline(time_.latency_cycles - 1, 1);
+    out_survivors_.set_pipeline(time_.latency_cycles - 1, 1);
+    out_color_.set_pipeline(time_.latency_cycles - 1, 1);
+    out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
     if (!plan_.is_used()) out_release_.on_asked([this](Cycle until) { leave_until(until); });
@@ -118,7 +118,7 @@ class TimedProp : public TimedUnit {
     return true;
   }
   Cycle hand_on_mark(const ShadedWarp& mark, Cycle from) {
-    const Cycle at = color_.take(from, timing_.color_rate.items).first;
+    const Cycle at = color_.take(from, time_.color_rate.items).first;
     const WarpRelease release{mark.slot};
     out_color_.send({&mark}, at);
     out_release_.send(release, at);
@@ -138,16 +138,16 @@ class TimedProp : public TimedUnit {
     charge(UnitState::blocked, out_color_.last());
     Cycle left = 0;
     if (warp.count > 0) {
-      const CycleInterval at = color_.take(from, warp.count * timing_.color_rate.cycles);
+      const CycleInterval at = color_.take(from, warp.count * time_.color_rate.cycles);
       charge(UnitState::starved, at.first);
       charge(UnitState::busy, at.last + 1);
       did(PropWork::color, warp.count, at.first, at.last + 1);
-      left = out_color_.send({&warp}, at, color_.cycles(warp.count * timing_.color_rate.cycles)).last;
+      left = out_color_.send({&warp}, at, color_.cycles(warp.count * time_.color_rate.cycles)).last;
       charge(UnitState::blocked, left);
       color_.hold(left);
     } else {
       // A warp without survivors takes the cycle in which it is passed over.
-      left = color_.take(from, timing_.color_rate.items).last;
+      left = color_.take(from, time_.color_rate.items).last;
       did(PropWork::empty_warps, 1, left);
       warp.release();
     }
@@ -177,7 +177,7 @@ class TimedProp : public TimedUnit {
     if (is_mark) {
       order_.leave_mark();
     } else {
-      did(PropWork::late, quads, at, at + (quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle);
+      did(PropWork::late, quads, at, at + (quads + time_.quads_per_cycle - 1) / time_.quads_per_cycle);
       in_turn_.warp = nullptr;
       order_.leave(next.turn, at);
     }
@@ -202,7 +202,7 @@ class TimedProp : public TimedUnit {
   }
 
   std::unique_ptr<PropBehaviour> behaviour_;
-  const PropBehaviour::TimingParameters timing_;
+  const PropTime time_;
   const bool tests_;
   const LatePlan plan_;
   TimedOut<BinItem> out_test_;

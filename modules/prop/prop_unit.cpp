@@ -20,7 +20,7 @@ class PropUnit : public Unit {
  public:
   PropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<PropBehaviour> behaviour,
            const RenderContext& context)
-      : Unit(name, domain, PropWork::kinds(behaviour->timing())),
+      : Unit(name, domain, behaviour->time().kinds()),
         in_bins_(*this, "in_bins"),
         out_test_(*this, "out_test"),
         in_tested_(*this, "in_tested"),
@@ -33,17 +33,17 @@ class PropUnit : public Unit {
         plan_(context),
         tests_late_(plan_.is_used()),
         behaviour_(std::move(behaviour)),
-        timing_(behaviour_->timing()),
+        time_(behaviour_->time()),
         tests_(tests_before_shading(context)),
-        there_{PropWork::bins, BatchLimit(timing_.quads_per_cycle)},
-        back_{PropWork::tested, BatchLimit(timing_.quads_per_cycle)},
-        order_(timing_.order, context),
-        color_limit_(timing_.color_rate),
-        late_limit_(timing_.quads_per_cycle) {
-    out_test_.set_pipeline(timing_.latency_cycles - 1, 1);
-    out_survivors_.set_pipeline(timing_.latency_cycles - 1, 1);
-    out_color_.set_pipeline(timing_.latency_cycles - 1, ColorBeat::in_a_cycle(timing_.color_rate));
-    out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
+        there_{PropWork::bins, BatchLimit(time_.quads_per_cycle)},
+        back_{PropWork::tested, BatchLimit(time_.quads_per_cycle)},
+        order_(time_.order, context),
+        color_limit_(time_.color_rate),
+        late_limit_(time_.quads_per_cycle) {
+    out_test_.set_pipeline(time_.latency_cycles - 1, 1);
+    out_survivors_.set_pipeline(time_.latency_cycles - 1, 1);
+    out_color_.set_pipeline(time_.latency_cycles - 1, ColorBeat::in_a_cycle(time_.color_rate));
+    out_late_.set_pipeline(time_.latency_cycles - 1, time_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
   }
@@ -267,7 +267,7 @@ class PropUnit : public Unit {
   const LatePlan plan_;
   const bool tests_late_;  ///< any draw
   std::unique_ptr<PropBehaviour> behaviour_;
-  const PropBehaviour::TimingParameters timing_;
+  const PropTime time_;
   const bool tests_;
   BatchServer there_;  ///< to the tests, or past them
   BatchServer back_;   ///< from the tests

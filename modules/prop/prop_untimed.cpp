@@ -1,3 +1,5 @@
+#include "prop/prop.h"
+
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/early_tests.h>
 #include <vrpipe/pipeline/late_plan.h>
@@ -11,7 +13,7 @@ namespace {
 class UntimedProp : public UntimedUnit {
  public:
   UntimedProp(const std::string& name, std::unique_ptr<PropBehaviour> behaviour, const RenderContext& context)
-      : UntimedUnit(name),
+      : UntimedUnit(name, behaviour->time().kinds()),
         out_test_(*this, "out_test"),
         out_survivors_(*this, "out_survivors"),
         out_release_(*this, "out_release"),
@@ -29,6 +31,8 @@ class UntimedProp : public UntimedUnit {
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
+  /// Tiles may overtake each other.
+  BoundTerms terms() const override { return {false, behaviour_->time().order == PropTime::Order::tile, 0}; }
 
  private:
   void forward(const BinItem& item) { out_survivors_.send(item); }

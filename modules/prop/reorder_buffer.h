@@ -5,10 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include "prop/prop.h"
+
 #include <vrpipe/kernel/accounting.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/pipeline/screen_tiling.h>
-#include <vrpipe/pipeline/slots/prop.h>
 
 namespace vrpipe {
 
@@ -29,8 +30,8 @@ class ReorderBuffer {
     Cycle from = 0;  ///< the first cycle in which it can leave, for timing models that know it ahead
   };
 
-  ReorderBuffer(PropBehaviour::Order order, const RenderContext& context)
-      : by_draw_(order == PropBehaviour::Order::draw),
+  ReorderBuffer(PropTime::Order order, const RenderContext& context)
+      : by_draw_(order == PropTime::Order::draw),
         grid_(context.frame->width(), context.frame->height()),
         next_of_line_(by_draw_ ? 1 : grid_.tiles()) {}
 

@@ -12,7 +12,7 @@ namespace {
 class UntimedQru : public UntimedUnit {
  public:
   UntimedQru(const std::string& name, std::unique_ptr<QruBehaviour> behaviour, const RenderContext& context)
-      : UntimedUnit(name),
+      : UntimedUnit(name, QruWork::kinds(behaviour->timing())),
         out_(*this, "out_warps"),
         in_(input<BinItem>("in_quads", [this](const BinItem& item) { examine(item); })),
         behaviour_(std::move(behaviour)),

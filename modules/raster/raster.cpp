@@ -68,12 +68,7 @@ unsigned put_covered(Quad* out, Words quads, std::uint64_t coverage) {
 
 TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderContext& context)
     : context_(context),
-      timing_{parameters.setup_latency_cycles,
-              parameters.setup_interval_cycles.thousandths(),
-              parameters.coarse_tiles_per_cycle,
-              parameters.fine_tiles_per_cycle,
-              parameters.screen_tile_interval_cycles.thousandths(),
-              parameters.quads_per_cycle},
+      time_(parameters),
       wide_edges_gate_(context, "raster.wide_edges"),
       binned_gate_(context, "tgc.binning"),
       ownership_gate_(context, "raster.tile_ownership"),

@@ -1,70 +1,104 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "hi_z.h"
 
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/pipeline/slots/raster.h>
 
 namespace vrpipe {
 
+/// Of a RASTER: one of your own derives its parameters from these.
+struct RasterParameters : ParameterSet {
+  Integer setup_latency_cycles{*this,
+                               "setup_latency_cycles",
+                               10,
+                               1,
+                               1000,
+                               "cycles",
+                               "ATTILA, Emerald: set-up latency 10",
+                               "of setting up a primitive's edge functions"};
+  Real setup_interval_cycles{
+      *this,
+      "setup_interval_cycles",
+      1,
+      0.001,
+      1000,
+      "cycles",
+      source::open,
+      "from one set-up to the next; the 8 to 10 cycles that a set-up takes are a latency, not an interval"};
+  Integer coarse_tiles_per_cycle{*this,
+                                 "coarse_tiles_per_cycle",
+                                 8,
+                                 1,
+                                 1024,
+                                 "raster tiles",
+                                 "ATTILA: 16x16 scan tiles, two a cycle",
+                                 "raster tiles tested against the edges in a cycle"};
+  Integer fine_tiles_per_cycle{*this,
+                               "fine_tiles_per_cycle",
+                               2,
+                               1,
+                               64,
+                               "raster tiles",
+                               "Emerald: 2 fine tiles a cycle and cluster",
+                               "raster tiles made into quads in a cycle"};
+  Real screen_tile_interval_cycles{*this,
+                                   "screen_tile_interval_cycles",
+                                   1,
+                                   0.001,
+                                   1000,
+                                   "cycles",
+                                   "measured on a GH100 graphics GPC: 5.5 cycles with 2 TPCs, scaled to 8",
+                                   "between (primitive, screen tile) pairs"};
+  Integer quads_per_cycle{*this,
+                          "quads_per_cycle",
+                          16,
+                          1,
+                          16,
+                          "quads",
+                          "measured on a GH100 graphics GPC: 64 pixels a cycle",
+                          "quads handed to TC in a cycle"};
+};
+
+/// What RASTER's work takes, by its parameters: all that its models of `cycle`, `lt` and `bound` ask for.
+struct RasterTime {
+  explicit RasterTime(const RasterParameters& parameters)
+      : setup_latency_cycles(parameters.setup_latency_cycles),
+        setup_interval_thousandths(parameters.setup_interval_cycles.thousandths()),
+        coarse_tiles_per_cycle(parameters.coarse_tiles_per_cycle),
+        fine_tiles_per_cycle(parameters.fine_tiles_per_cycle),
+        screen_tile_interval_thousandths(parameters.screen_tile_interval_cycles.thousandths()),
+        quads_per_cycle(parameters.quads_per_cycle) {}
+
+  const std::uint32_t setup_latency_cycles;
+  const std::uint32_t setup_interval_thousandths;        ///< of a cycle, between primitives
+  const std::uint32_t coarse_tiles_per_cycle;            ///< raster tiles tested
+  const std::uint32_t fine_tiles_per_cycle;              ///< raster tiles made into quads
+  const std::uint32_t screen_tile_interval_thousandths;  ///< of a cycle, between (primitive, screen tile) pairs
+  const std::uint32_t quads_per_cycle;                   ///< handed to TC
+
+  /// As in RasterWork.
+  std::vector<WorkKind> kinds() const {
+    return {{"set-up", 0, setup_interval_thousandths / 1000.0, false},
+            {"coarse tests", 1, 1.0 / coarse_tiles_per_cycle, false},
+            {"fine tiles", 2, 1.0 / fine_tiles_per_cycle, false},
+            {"screen tiles", 3, screen_tile_interval_thousandths / 1000.0, false},
+            {"quads", 4, 1.0 / quads_per_cycle, true}};
+  }
+};
+
 /// Setup, coarse and fine rasterisation (paper 5.1): fixed point, samples at pixel centres, top-left rule, so that the
 /// two triangles of a splat never share a sample. Screen tiles row by row, raster tiles row by row within.
 class TileRasterizer : public RasterBehaviour {
  public:
-  struct Parameters : ParameterSet {
-    Integer setup_latency_cycles{*this,
-                                 "setup_latency_cycles",
-                                 10,
-                                 1,
-                                 1000,
-                                 "cycles",
-                                 "ATTILA, Emerald: set-up latency 10",
-                                 "of setting up a primitive's edge functions"};
-    Real setup_interval_cycles{
-        *this,
-        "setup_interval_cycles",
-        1,
-        0.001,
-        1000,
-        "cycles",
-        source::open,
-        "from one set-up to the next; the 8 to 10 cycles that a set-up takes are a latency, not an interval"};
-    Integer coarse_tiles_per_cycle{*this,
-                                   "coarse_tiles_per_cycle",
-                                   8,
-                                   1,
-                                   1024,
-                                   "raster tiles",
-                                   "ATTILA: 16x16 scan tiles, two a cycle",
-                                   "raster tiles tested against the edges in a cycle"};
-    Integer fine_tiles_per_cycle{*this,
-                                 "fine_tiles_per_cycle",
-                                 2,
-                                 1,
-                                 64,
-                                 "raster tiles",
-                                 "Emerald: 2 fine tiles a cycle and cluster",
-                                 "raster tiles made into quads in a cycle"};
-    Real screen_tile_interval_cycles{*this,
-                                     "screen_tile_interval_cycles",
-                                     1,
-                                     0.001,
-                                     1000,
-                                     "cycles",
-                                     "measured on a GH100 graphics GPC: 5.5 cycles with 2 TPCs, scaled to 8",
-                                     "between (primitive, screen tile) pairs"};
-    Integer quads_per_cycle{*this,
-                            "quads_per_cycle",
-                            16,
-                            1,
-                            16,
-                            "quads",
-                            "measured on a GH100 graphics GPC: 64 pixels a cycle",
-                            "quads handed to TC in a cycle"};
+  struct Parameters : RasterParameters {
     Switch hi_z{*this, "hi_z", true, "all GPUs since HyperZ (ATI, 2000)",
                 "raster tiles behind all that is stored there are dropped before fine rasterisation"};
     Integer hi_z_bits{*this,
@@ -82,7 +116,7 @@ class TileRasterizer : public RasterBehaviour {
   bool next(QuadBeat& out, unsigned& coarse_tests, bool& new_screen_tile) override;
   void update(const HiZUpdate& update) override;
   bool waits_at(Mark mark) const override { return hi_z_ != nullptr && hi_z_->waits_at(mark); }
-  TimingParameters timing() const override { return timing_; }
+  const RasterTime& time() const override { return time_; }
 
   MinMax widest_edge{*this, MinMax::Of::largest, "widest_edge", "bits",
                      "sign included, that the largest edge function needs over the samples of the viewport"};
@@ -106,7 +140,7 @@ class TileRasterizer : public RasterBehaviour {
   [[gnu::noinline]] bool is_hidden(TileId tile, std::int32_t x, std::int32_t y);
 
   const RenderContext& context_;
-  TimingParameters timing_;
+  const RasterTime time_;
   Edge edges_[3];
   bool wide_ = false;
   Primitive primitive_;

@@ -1,3 +1,5 @@
+#include "raster/raster.h"
+
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/model/timed.h>
 #include <vrpipe/pipeline/slots/raster.h>
@@ -11,18 +13,18 @@ namespace {
 class TimedRaster : public TimedUnit {
  public:
   TimedRaster(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour)
-      : TimedUnit(name, domain, RasterWork::kinds(behaviour->timing())),
+      : TimedUnit(name, domain, behaviour->time().kinds()),
         out_(*this, "out_quads"),
         in_hi_z_(*this, "in_hi_z",
                  [this](const HiZUpdate& update, CycleInterval visible) { return take(update, visible.first); }),
         in_(*this, "in_jobs",
             [this](const RasterJob& job, CycleInterval visible) { return rasterize(job, visible.first); }),
         behaviour_(std::move(behaviour)),
-        timing_(behaviour_->timing()),
-        coarse_(timing_.coarse_tiles_per_cycle),
-        fine_(timing_.fine_tiles_per_cycle),
-        quads_out_(timing_.quads_per_cycle) {
-    out_.set_pipeline(timing_.setup_latency_cycles - 1, timing_.fine_tiles_per_cycle);
+        time_(behaviour_->time()),
+        coarse_(time_.coarse_tiles_per_cycle),
+        fine_(time_.fine_tiles_per_cycle),
+        quads_out_(time_.quads_per_cycle) {
+    out_.set_pipeline(time_.setup_latency_cycles - 1, time_.fine_tiles_per_cycle);
     in_hi_z_.set_optional();
   }
 
@@ -70,7 +72,7 @@ class TimedRaster : public TimedUnit {
     }
     now_ = setups_.free_from(now_);
     const Cycle setup = now_;
-    const Cycle set_up = setups_.take(setup, timing_.setup_interval_thousandths);
+    const Cycle set_up = setups_.take(setup, time_.setup_interval_thousandths);
     did(RasterWork::setup, 1, setup, std::max(set_up, setup + 1));
     charge(UnitState::busy, setup + 1);
     apply_updates(now_);
@@ -85,7 +87,7 @@ class TimedRaster : public TimedUnit {
       now_ = std::max(coarse_done_, fine);
       if (new_screen_tile) {
         now_ = pairs_.free_from(now_);
-        const Cycle over = pairs_.take(now_, timing_.screen_tile_interval_thousandths);
+        const Cycle over = pairs_.take(now_, time_.screen_tile_interval_thousandths);
         did(RasterWork::pairs, 1, now_, std::max(over, now_ + 1));
       }
       if (tile.count == 0) continue;
@@ -113,7 +115,7 @@ class TimedRaster : public TimedUnit {
   TimedIn<HiZUpdate> in_hi_z_;
   TimedIn<RasterJob> in_;
   std::unique_ptr<RasterBehaviour> behaviour_;
-  const RasterBehaviour::TimingParameters timing_;
+  const RasterTime time_;
   ThroughputPort coarse_;
   IssuePort fine_;
   ThroughputPort quads_out_;

@@ -1,3 +1,5 @@
+#include "raster/raster.h"
+
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/model/unit.h>
 #include <vrpipe/pipeline/slots/raster.h>
@@ -12,13 +14,13 @@ namespace {
 class RasterUnit : public Unit {
  public:
   RasterUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<RasterBehaviour> behaviour)
-      : Unit(name, domain, RasterWork::kinds(behaviour->timing())),
+      : Unit(name, domain, behaviour->time().kinds()),
         in_(*this, "in_jobs"),
         out_(*this, "out_quads"),
         in_hi_z_(*this, "in_hi_z"),
         behaviour_(std::move(behaviour)),
-        timing_(behaviour_->timing()) {
-    out_.set_pipeline(timing_.setup_latency_cycles - 1, timing_.fine_tiles_per_cycle);
+        time_(behaviour_->time()) {
+    out_.set_pipeline(time_.setup_latency_cycles - 1, time_.fine_tiles_per_cycle);
     in_hi_z_.set_optional();
   }
 
@@ -70,9 +72,9 @@ class RasterUnit : public Unit {
     return std::min(work(now), in_hi_z_.next_ready());
   }
   Cycle work(Cycle now) {
-    unsigned quad_budget = timing_.quads_per_cycle;
-    unsigned fine_budget = timing_.fine_tiles_per_cycle;
-    unsigned coarse_budget = timing_.coarse_tiles_per_cycle;
+    unsigned quad_budget = time_.quads_per_cycle;
+    unsigned fine_budget = time_.fine_tiles_per_cycle;
+    unsigned coarse_budget = time_.coarse_tiles_per_cycle;
     bool moved = false;
     while (true) {
       if (coarse_debt_ > 0) {
@@ -123,7 +125,7 @@ class RasterUnit : public Unit {
         if (!setups_.is_free(now)) break;
         behaviour_->begin(in_.front().primitive, in_.front().clip);
         in_.pop();
-        const Cycle set_up = setups_.take(now, timing_.setup_interval_thousandths);
+        const Cycle set_up = setups_.take(now, time_.setup_interval_thousandths);
         did(RasterWork::setup, 1, now, std::max(set_up, now + 1));
       }
       unsigned tests = 0;
@@ -136,7 +138,7 @@ class RasterUnit : public Unit {
         did(RasterWork::fine, 1, now);
         if (new_screen_tile) {
           tile_due_ = pairs_.free_from(now);
-          const Cycle over = pairs_.take(tile_due_, timing_.screen_tile_interval_thousandths);
+          const Cycle over = pairs_.take(tile_due_, time_.screen_tile_interval_thousandths);
           did(RasterWork::pairs, 1, tile_due_, std::max(over, tile_due_ + 1));
         }
       }
@@ -150,7 +152,7 @@ class RasterUnit : public Unit {
   StreamOut<QuadBeat> out_;
   StreamIn<HiZUpdate> in_hi_z_;
   std::unique_ptr<RasterBehaviour> behaviour_;
-  const RasterBehaviour::TimingParameters timing_;
+  const RasterTime time_;
   bool active_ = false;
   bool waits_ = false;  ///< for a mark to come back from ZROP
   QuadBeat tile_;       ///< quads of the raster tile in hand, sent up to `at_`

@@ -1,3 +1,5 @@
+#include "raster/raster.h"
+
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/slots/raster.h>
 
@@ -9,7 +11,7 @@ namespace {
 class UntimedRaster : public UntimedUnit {
  public:
   UntimedRaster(const std::string& name, std::unique_ptr<RasterBehaviour> behaviour)
-      : UntimedUnit(name),
+      : UntimedUnit(name, behaviour->time().kinds()),
         out_(*this, "out_quads"),
         in_(input<RasterJob>("in_jobs", [this](const RasterJob& job) { rasterize(job); })),
         in_hi_z_(input<HiZUpdate>("in_hi_z", [this](const HiZUpdate& update) { behaviour_->update(update); })),

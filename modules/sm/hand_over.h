@@ -15,6 +15,11 @@ class HandOver {
   HandOver(const SmBehaviour::TimingParameters& timing, const RenderContext& context)
       : context_(context), price_(timing.hand_over) {}
   bool is_on() const { return price_.is_on(); }
+  /// Of one warp at most, in thousandths of a cycle.
+  std::uint64_t longest() const {
+    return price_.warp_thousandths +
+           quads_per_warp * (std::uint64_t{price_.visit_thousandths} + price_.discard_thousandths);
+  }
   /// A primitive's quads in a screen tile.
   struct Visit {
     TileId tile;

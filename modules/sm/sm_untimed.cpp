@@ -14,7 +14,7 @@ namespace {
 class UntimedSm : public UntimedUnit {
  public:
   UntimedSm(const std::string& name, std::unique_ptr<SmBehaviour> behaviour, const RenderContext& context)
-      : UntimedUnit(name),
+      : UntimedUnit(name, work(behaviour->timing())),
         out_vertices_(*this, "out_vertices"),
         out_shaded_(*this, "out_shaded"),
         in_release_(input<WarpRelease>("in_release", [](const WarpRelease&) {})),
@@ -33,8 +33,22 @@ class UntimedSm : public UntimedUnit {
 
   Behaviour& behaviour() override { return *behaviour_; }
   UntimedMemoryPort* memory_port() override { return &memory_; }
+  std::vector<OccupancyPart> least_parts(const Items& items, bool to_last) const override {
+    Items needed = items;
+    if (to_last) needed[SmWork::launches] -= std::min(needed[SmWork::launches], hand_over_.longest());
+    return UntimedUnit::least_parts(needed, false);  // of warps, which schedulers share
+  }
+  double idle_after_last() const override { return static_cast<double>(hand_over_.longest()) / 1000; }
+  std::uint64_t room_in_warps() const override { return std::uint64_t{timing_.cores} * timing_.warps_per_core; }
 
  private:
+  /// Vertices and merging are counted in warps, fragments in instructions.
+  static std::vector<WorkKind> work(const SmBehaviour::TimingParameters& timing) {
+    std::vector<WorkKind> kinds = SmWork::kinds(timing);
+    kinds[SmWork::vertex].cycles_per_item *= static_cast<double>(instructions_in(timing.vertex));
+    kinds[SmWork::merge].cycles_per_item *= static_cast<double>(instructions_in(timing.merge));
+    return kinds;
+  }
   void shade(const Warp& warp) {
     shaded_.mark = warp.mark;
     shaded_.sequence = warp.sequence;

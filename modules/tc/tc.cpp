@@ -12,8 +12,7 @@ namespace vrpipe {
 TileCoalescing::TileCoalescing(const Parameters& parameters, const RenderContext& context)
     : bin_quads_(parameters.bin_quads),
       grid_(context.frame->width(), context.frame->height()),
-      timing_{parameters.quads_per_cycle, parameters.latency_cycles, parameters.idle_timeout_cycles,
-              parameters.flush_queue_bins},
+      time_(parameters),
       bins_(parameters.bins),
       bin_of_tile_(grid_.tiles(), -1),
       eviction_gate_(context, "tc.eviction") {

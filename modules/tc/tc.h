@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstdint>
 #include <deque>
+#include <vector>
 
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/kernel/accounting.h>
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/hi_z_plan.h>
 #include <vrpipe/pipeline/late_plan.h>
@@ -11,40 +14,60 @@
 
 namespace vrpipe {
 
+/// Of a TC: one of your own derives its parameters from these.
+struct TcParameters : ParameterSet {
+  Integer bins{*this, "bins", 32, 1, 65536, "bins", source::paper_table, "screen tiles collected at a time"};
+  Integer bin_quads{*this, "bin_quads", 128, 1, 4096, "quads", source::paper_table, "quads in a full bin"};
+  Integer quads_per_cycle{*this,        "quads_per_cycle",
+                          16,           1,
+                          16,           "quads",
+                          source::open, "quads taken into bins in a cycle; the rasteriser's peak"};
+  Integer latency_cycles{
+      *this, "latency_cycles", 4, 1, 1000, "cycles", source::open, "from the flush decision to the first quad at PROP"};
+  Integer idle_timeout_cycles{*this,
+                              "idle_timeout_cycles",
+                              150,
+                              0,
+                              1000000,
+                              "cycles",
+                              source::measured,
+                              "without an incoming quad until bins are flushed; 0 never; not in strict termination"};
+  Integer flush_queue_bins{
+      *this, "flush_queue_bins", 2, 1, 1024, "bins", source::open, "flushed bins that wait for PROP before TC stops"};
+};
+
+/// What TC's work takes, by its parameters: all that its models of `cycle`, `lt` and `bound` ask for.
+struct TcTime {
+  explicit TcTime(const TcParameters& parameters)
+      : quads_per_cycle(parameters.quads_per_cycle),
+        latency_cycles(parameters.latency_cycles),
+        idle_timeout_cycles(parameters.idle_timeout_cycles),
+        flush_queue_bins(parameters.flush_queue_bins) {}
+
+  const std::uint32_t quads_per_cycle;
+  const std::uint32_t latency_cycles;
+  const std::uint32_t idle_timeout_cycles;  ///< without an incoming quad until bins are flushed; 0: never
+  const std::uint32_t flush_queue_bins;     ///< flushed bins that wait for PROP
+
+  /// The time-out that applies. None in strict termination: the contents of bins would depend on time.
+  std::uint32_t timeout_in(Termination termination) const {
+    return termination == Termination::strict ? 0 : idle_timeout_cycles;
+  }
+  /// As in TcWork.
+  std::vector<WorkKind> kinds() const {
+    return {{"quads", 0, 1.0 / quads_per_cycle, true}, {"read-out", 1, 1.0, false}};
+  }
+};
+
 /// Tile coalescing (paper 5.1, 7.1): bins of quads, a bin per screen tile, replaced first in, first out.
 class TileCoalescing : public TcBehaviour {
  public:
-  struct Parameters : ParameterSet {
-    Integer bins{*this, "bins", 32, 1, 65536, "bins", source::paper_table, "screen tiles collected at a time"};
-    Integer bin_quads{*this, "bin_quads", 128, 1, 4096, "quads", source::paper_table, "quads in a full bin"};
-    Integer quads_per_cycle{*this,        "quads_per_cycle",
-                            16,           1,
-                            16,           "quads",
-                            source::open, "quads taken into bins in a cycle; the rasteriser's peak"};
-    Integer latency_cycles{*this,
-                           "latency_cycles",
-                           4,
-                           1,
-                           1000,
-                           "cycles",
-                           source::open,
-                           "from the flush decision to the first quad at PROP"};
-    Integer idle_timeout_cycles{*this,
-                                "idle_timeout_cycles",
-                                150,
-                                0,
-                                1000000,
-                                "cycles",
-                                source::measured,
-                                "without an incoming quad until bins are flushed; 0 never; not in strict termination"};
-    Integer flush_queue_bins{
-        *this, "flush_queue_bins", 2, 1, 1024, "bins", source::open, "flushed bins that wait for PROP before TC stops"};
-  };
+  using Parameters = TcParameters;
   TileCoalescing(const Parameters& parameters, const RenderContext& context);
 
   unsigned insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) override;
   bool flush_oldest(FlushReason reason, Flush& out) override;
-  TimingParameters timing() const override { return timing_; }
+  const TcTime& time() const override { return time_; }
 
   Counter bins_begun{*this, "bins_begun", "bins", "given to a screen tile; less `flushes`, those in use"};
   Counter flushes_full{*this, "flushes_full", "flushes", "because the bin was full"};
@@ -63,7 +86,7 @@ class TileCoalescing : public TcBehaviour {
 
   const std::uint32_t bin_quads_;
   const ScreenTiling grid_;
-  const TimingParameters timing_;
+  const TcTime time_;
   std::vector<Bin> bins_;
   std::vector<std::uint32_t> free_;
   std::deque<std::uint32_t> allocation_order_;

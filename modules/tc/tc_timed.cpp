@@ -16,18 +16,18 @@ class TimedTc : public TimedUnit {
  public:
   TimedTc(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour,
           const RenderContext& context)
-      : TimedUnit(name, domain, TcWork::kinds(behaviour->timing())),
+      : TimedUnit(name, domain, behaviour->time().kinds()),
         out_(*this, "out_bins"),
         in_(*this, "in_quads",
             [this](const QuadBeat& beat, CycleInterval visible) { return collect(beat, visible.first); }),
         behaviour_(std::move(behaviour)),
         passing_(context),
-        timing_(behaviour_->timing()),
-        idle_timeout_cycles_(timing_.timeout_in(context.termination)),
+        time_(behaviour_->time()),
+        idle_timeout_cycles_(time_.timeout_in(context.termination)),
         time_out_gate_(context, "tc.time_out"),
-        entries_(timing_.quads_per_cycle),
-        sent_at_(timing_.flush_queue_bins, 0) {
-    out_.set_pipeline(timing_.latency_cycles - 1, 1);
+        entries_(time_.quads_per_cycle),
+        sent_at_(time_.flush_queue_bins, 0) {
+    out_.set_pipeline(time_.latency_cycles - 1, 1);
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -79,7 +79,7 @@ class TimedTc : public TimedUnit {
     item.storage = &storage;
     item.tile = storage.flush.tile;
     item.quads = static_cast<std::uint32_t>(storage.flush.quads.size());
-    const unsigned beats = (item.quads + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
+    const unsigned beats = (item.quads + time_.quads_per_cycle - 1) / time_.quads_per_cycle;
     const Cycle begin = std::max({flushed, sent_, out_.last()}) + 1;
     sent_ = out_.send(item, {begin, begin + beats - 1}, beats).last;
     did(TcWork::beats, beats, sent_);
@@ -137,7 +137,7 @@ class TimedTc : public TimedUnit {
   TimedIn<QuadBeat> in_;
   std::unique_ptr<TcBehaviour> behaviour_;
   const PassingMarks passing_;
-  const TcBehaviour::TimingParameters timing_;
+  const TcTime time_;
   std::uint32_t idle_timeout_cycles_;  ///< 0: never
   EffectGate time_out_gate_;
   std::deque<BinStorage> storage_ = std::deque<BinStorage>(1);

@@ -14,16 +14,16 @@ class TcUnit : public Unit {
  public:
   TcUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<TcBehaviour> behaviour,
          const RenderContext& context)
-      : Unit(name, domain, TcWork::kinds(behaviour->timing())),
+      : Unit(name, domain, behaviour->time().kinds()),
         in_(*this, "in_quads"),
         out_(*this, "out_bins"),
         behaviour_(std::move(behaviour)),
         passing_(context),
-        timing_(behaviour_->timing()),
-        idle_timeout_cycles_(timing_.timeout_in(context.termination)),
+        time_(behaviour_->time()),
+        idle_timeout_cycles_(time_.timeout_in(context.termination)),
         time_out_gate_(context, "tc.time_out"),
-        queue_(timing_.flush_queue_bins) {
-    out_.set_pipeline(timing_.latency_cycles - 1, 1);
+        queue_(time_.flush_queue_bins) {
+    out_.set_pipeline(time_.latency_cycles - 1, 1);
   }
 
   bool idle() const override { return in_.empty() && queued_ == 0 && mark_ == Mark::none && !holds_quads_; }
@@ -36,7 +36,7 @@ class TcUnit : public Unit {
 
   bool collect(Cycle now) {
     bool moved = false;
-    for (unsigned budget = timing_.quads_per_cycle; budget > 0 && mark_ == Mark::none && in_.ready() && has_room();) {
+    for (unsigned budget = time_.quads_per_cycle; budget > 0 && mark_ == Mark::none && in_.ready() && has_room();) {
       const QuadBeat& beat = in_.front();
       if (beat.mark != Mark::none) {
         mark_ = beat.mark;
@@ -117,7 +117,7 @@ class TcUnit : public Unit {
     QuadBeat beat;
     beat.tile = flush.tile;
     const auto left = static_cast<unsigned>(flush.quads.size()) - sent_;
-    beat.count = static_cast<std::uint8_t>(std::min(left, timing_.quads_per_cycle));
+    beat.count = static_cast<std::uint8_t>(std::min(left, time_.quads_per_cycle));
     std::copy_n(flush.quads.begin() + sent_, beat.count, beat.quads.begin());
     sent_ += beat.count;
     beat.last_of_bin = sent_ == flush.quads.size();
@@ -151,7 +151,7 @@ class TcUnit : public Unit {
   StreamOut<QuadBeat> out_;
   std::unique_ptr<TcBehaviour> behaviour_;
   const PassingMarks passing_;
-  const TcBehaviour::TimingParameters timing_;
+  const TcTime time_;
   std::uint32_t idle_timeout_cycles_;  ///< 0: never
   EffectGate time_out_gate_;
   std::vector<Flush> queue_;  ///< flushed bins, a ring

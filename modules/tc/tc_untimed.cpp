@@ -10,13 +10,15 @@ namespace {
 class UntimedTc : public UntimedUnit {
  public:
   UntimedTc(const std::string& name, std::unique_ptr<TcBehaviour> behaviour, const RenderContext& context)
-      : UntimedUnit(name),
+      : UntimedUnit(name, behaviour->time().kinds()),
         passing_(context),
         out_(*this, "out_bins"),
         in_(input<QuadBeat>("in_quads", [this](const QuadBeat& beat) { collect(beat); })),
-        behaviour_(std::move(behaviour)) {}
+        behaviour_(std::move(behaviour)),
+        times_out_(behaviour_->time().timeout_in(context.termination) > 0) {}
 
   Behaviour& behaviour() override { return *behaviour_; }
+  BoundTerms terms() const override { return {times_out_, times_out_, 0}; }
 
  private:
   void collect(const QuadBeat& beat) {
@@ -50,7 +52,8 @@ class UntimedTc : public UntimedUnit {
   UntimedOut<BinItem> out_;
   std::unique_ptr<UntimedIn<QuadBeat>> in_;
   std::unique_ptr<TcBehaviour> behaviour_;
-  BinStorage storage_;  ///< whose bin has passed by the time of the next
+  const bool times_out_;  ///< where there is time
+  BinStorage storage_;    ///< whose bin has passed by the time of the next
 };
 
 [[maybe_unused]] const bool tc_untimed_registered = [] {

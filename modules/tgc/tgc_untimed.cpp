@@ -9,7 +9,7 @@ namespace {
 class UntimedTgc : public UntimedUnit {
  public:
   UntimedTgc(const std::string& name, std::unique_ptr<TgcBehaviour> behaviour)
-      : UntimedUnit(name),
+      : UntimedUnit(name, TgcWork::kinds(behaviour->timing())),
         out_(*this, "out_jobs"),
         in_(input<PrimitiveItem>("in_primitives", [this](const PrimitiveItem& item) { enter_bins(item); })),
         behaviour_(std::move(behaviour)) {}

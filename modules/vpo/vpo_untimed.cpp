@@ -12,7 +12,7 @@ namespace {
 class UntimedVpo : public UntimedUnit {
  public:
   UntimedVpo(const std::string& name, std::unique_ptr<VpoBehaviour> behaviour, unsigned gpcs)
-      : UntimedUnit(name), behaviour_(std::move(behaviour)), gpcs_(gpcs) {
+      : UntimedUnit(name, VpoWork::kinds(behaviour->timing())), behaviour_(std::move(behaviour)), gpcs_(gpcs) {
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
       const std::string index = std::to_string(gpc);
       outs_.push_back(std::make_unique<UntimedOut<PrimitiveItem>>(*this, "out_primitives_" + index));

@@ -1,28 +1,22 @@
 #include "bound/bound.h"
 
 #include <algorithm>
-#include <map>
-#include <type_traits>
 
-#include <vrpipe/pipeline/slots/crop.h>
-#include <vrpipe/pipeline/slots/draw.h>
+#include <vrpipe/pipeline/registry.h>
 #include <vrpipe/pipeline/slots/memory.h>
-#include <vrpipe/pipeline/slots/qru.h>
+#include <vrpipe/pipeline/slots/prop.h>
+#include <vrpipe/pipeline/slots/tc.h>
 #include <vrpipe/pipeline/slots/tgc.h>
-#include <vrpipe/pipeline/slots/vpo.h>
 
 namespace vrpipe {
 
 namespace {
 
+constexpr std::array<const char*, Pipeline::places> slots{"draw", "vpo",  "tgc", "raster", "tc",
+                                                          "prop", "zrop", "qru", "sm",     "crop"};
+
 double ratio(std::uint64_t items, std::uint64_t per_cycle) {
   return items == 0 ? 0.0 : static_cast<double>(items) / static_cast<double>(per_cycle);
-}
-
-/// Cycles of so many items, each so long after the one before; if they are the last of the draw, up to the last item.
-double spaced(std::uint64_t items, double cycles, bool to_last) {
-  if (items == 0) return 0;
-  return to_last ? static_cast<double>(items - 1) * cycles + 1 : static_cast<double>(items) * cycles;
 }
 
 /// Thousandths of a cycle of which the last item has no more than `longest`: nobody waits for what it takes.
@@ -30,114 +24,97 @@ std::uint64_t without_last(std::uint64_t thousandths, std::uint64_t longest) {
   return thousandths - std::min(thousandths, longest);
 }
 
-std::uint64_t sum_of(const std::vector<ShaderSegment>& program) {
-  std::uint64_t sum = 0;
-  for (const ShaderSegment& segment : program) sum += segment.instructions;
-  return sum;
-}
-
 }  // namespace
 
+Pipeline::Pipeline(const UntimedGpu& gpu, unsigned gpc) {
+  for (unsigned place = 0; place < places; ++place) at[place] = gpu.of_slot(slots[place], gpc);
+}
+
+unsigned Pipeline::rank(Place place) { return Registry::instance().slot(slots[place]).rank; }
+
+Pipeline::Place Pipeline::place_of(const std::string& slot) {
+  return static_cast<Place>(std::find(slots.begin(), slots.end(), slot) - slots.begin());
+}
+
 void Work::add(const Work& other) {
-  vertex_warps_issued += other.vertex_warps_issued;
-  triangles += other.triangles;
-  bin_entries += other.bin_entries;
-  setups += other.setups;
-  coarse_tiles += other.coarse_tiles;
-  fine_tiles += other.fine_tiles;
-  tile_pairs += other.tile_pairs;
-  quads_rasterized += other.quads_rasterized;
-  bin_beats += other.bin_beats;
-  quads_tested += other.quads_tested;
-  updates += other.updates;
-  z_sectors += other.z_sectors;
-  z_blocks += other.z_blocks;
-  z_lines += other.z_lines;
-  survivors += other.survivors;
-  late_quads += other.late_quads;
-  vertex_warps += other.vertex_warps;
+  for (unsigned place = 0; place < of.size(); ++place) {
+    for (unsigned kind = 0; kind < of[place].size(); ++kind) of[place][kind] += other.of[place][kind];
+  }
   attribute_bytes_written += other.attribute_bytes_written;
-  warps += other.warps;
-  fragment_instructions += other.fragment_instructions;
-  merging_warps += other.merging_warps;
-  launches += other.launches;
-  for (std::size_t kind = 0; kind < crop.size(); ++kind) crop[kind] += other.crop[kind];
 }
 
-std::uint64_t Work::color_quads() const { return crop[CropWork::blend]; }
-
-bool PhaseBound::knows(const std::string& slot) {
-  constexpr const char* known[] = {"draw", "vpo", "tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"};
-  return std::find(std::begin(known), std::end(known), slot) != std::end(known);
-}
-
-PhaseBound::PhaseBound(const Configuration& configuration, const UntimedUnit* crop_unit, unsigned gpc)
-    : crop_(crop_unit) {
-  const auto cost_of = [&](const char* slot, auto* of_slot, const auto& take) {
-    for (const Instance& instance : configuration.netlist().instances()) {
-      if (instance.slot != slot || (instance.gpc != gpc && !instance.in_front_end)) continue;
-      return take(*configuration.make_as<std::remove_pointer_t<decltype(of_slot)>>(instance));
+PhaseBound::PhaseBound(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc) : pipeline_(gpu, gpc) {
+  if (unit(Pipeline::zrop)) zrop_ = dynamic_cast<ZropBehaviour&>(unit(Pipeline::zrop)->behaviour()).timing();
+  if (unit(Pipeline::sm)) sm_ = dynamic_cast<SmBehaviour&>(unit(Pipeline::sm)->behaviour()).timing();
+  const Netlist& netlist = configuration.netlist();
+  for (const UntimedGpu::Placed& placed : gpu.units()) {
+    if (placed.instance->gpc != gpc && !placed.instance->in_front_end) continue;
+    const BoundTerms terms = placed.unit->terms();
+    terms_.bins_vary |= terms.bins_vary;
+    terms_.order_varies |= terms.order_varies;
+    // Quads (of as many warps, at worst) in CROP's queue, warps in the SMs, and as much again for the links.
+    warps_in_phase_ += 2 * placed.unit->room_in_warps();
+    if (placed.unit.get() != unit(Pipeline::crop)) continue;
+    for (const MemoryLink& link : netlist.memory_links()) {
+      const Instance* const memory = link.from == placed.instance->path ? netlist.find(link.to) : nullptr;
+      if (memory == nullptr) continue;
+      const MemoryBehaviour::TimingParameters timing = configuration.make_as<MemoryBehaviour>(*memory)->timing();
+      memory_ = memory->path;
+      memory_bytes_per_cycle_ = timing.bytes_per_cycle;
+      terms_.memory_latency_cycles = timing.latency_cycles;
     }
-  };
-  cost_of("draw", static_cast<DrawBehaviour*>(nullptr),
-          [&](const auto& unit) { vertex_warps_per_cycle_ = unit.warps_per_1024_cycles() / 1024.0; });
-  cost_of("vpo", static_cast<VpoBehaviour*>(nullptr), [&](const auto& unit) { vpo_ = unit.timing(); });
-  cost_of("tgc", static_cast<TgcBehaviour*>(nullptr), [&](const auto& unit) { tgc_ = unit.timing(); });
-  cost_of("raster", static_cast<RasterBehaviour*>(nullptr), [&](const auto& unit) { raster_ = unit.timing(); });
-  cost_of("tc", static_cast<TcBehaviour*>(nullptr), [&](const auto& unit) { tc_ = unit.timing(); });
-  cost_of("prop", static_cast<PropBehaviour*>(nullptr), [&](const auto& unit) { prop_ = unit.timing(); });
-  cost_of("zrop", static_cast<ZropBehaviour*>(nullptr), [&](const auto& unit) { zrop_ = unit.timing(); });
-  cost_of("qru", static_cast<QruBehaviour*>(nullptr), [&](const auto& unit) { qru_ = unit.timing(); });
-  cost_of("sm", static_cast<SmBehaviour*>(nullptr), [&](const auto& unit) { sm_ = unit.timing(); });
-  // Warps in the SMs, quads (of as many warps, at worst) in CROP's queue, and as much again for the links.
-  const std::uint64_t in_crop = crop_ == nullptr ? 0 : crop_->room_in_warps();
-  warps_in_phase_ = 2 * (std::uint64_t{sm_.cores} * sm_.warps_per_core + in_crop);
-  times_out_ = tc_.timeout_in(configuration.request().termination) > 0;
-  cost_of("l2", static_cast<MemoryBehaviour*>(nullptr), [&](const auto& memory) {
-    l2_bytes_per_cycle_ = memory.timing().bytes_per_cycle;
-    l2_latency_cycles_ = memory.timing().latency_cycles;
-  });
+  }
 }
 
-double PhaseBound::instructions(const Work& done) const {
-  return static_cast<double>(done.vertex_warps * sum_of(sm_.vertex) + done.fragment_instructions +
-                             done.merging_warps * sum_of(sm_.merge));
+std::uint64_t PhaseBound::instructions_of(FragmentShader shader) const {
+  return instructions_in(sm_.fragment_program(shader));
 }
 
-std::uint64_t PhaseBound::instructions_of(FragmentShader shader) const { return sum_of(sm_.fragment_program(shader)); }
+std::uint64_t PhaseBound::collected(const Work& done) const {
+  return unit(Pipeline::tc) == nullptr ? done.rasterized()
+                                       : std::min(done.rasterized(), done.of[Pipeline::tc][TcWork::quads]);
+}
+
+double PhaseBound::from_memory(std::uint64_t bytes) const {
+  return memory_bytes_per_cycle_ == 0 ? 0.0 : ratio(bytes, memory_bytes_per_cycle_);
+}
+
+double PhaseBound::least(Pipeline::Place place, const Work& done, bool to_last) const {
+  return unit(place) == nullptr ? 0.0 : busiest(parts_of(place, done, to_last));
+}
 
 std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, bool to_last) const {
+  const Work::Items& tests = done.of[Pipeline::zrop];
+  const Work::Items& blends = done.of[Pipeline::crop];
+  const auto prop_takes = [&](unsigned kind, std::uint64_t quads) {
+    const UntimedUnit* const prop = unit(Pipeline::prop);
+    return prop == nullptr ? 0.0 : static_cast<double>(quads) * prop->work()[kind].cycles_per_item;
+  };
   std::array<double, stages> cycles{};
-  cycles[draw] = spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_, to_last);
+  cycles[draw] = least(Pipeline::draw, done, to_last);
   // Vertices are assembled once their attributes are sent; so many of these may still be on their way.
   const std::uint64_t sent = std::uint64_t{sm_.fetch.attribute_writes} * sm_.fetch.l1.line_bytes;
-  cycles[vpo] = std::max(ratio(done.triangles, vpo_.items_per_cycle),
+  cycles[vpo] = std::max(least(Pipeline::vpo, done, to_last),
                          ratio(done.attribute_bytes_written - std::min(done.attribute_bytes_written, sent),
                                std::uint64_t{sm_.cores} * sm_.fetch.core_bytes));
-  cycles[tgc] = std::max(ratio(done.bin_entries, tgc_.items_per_cycle), ratio(done.setups, 1));
-  cycles[raster] = std::max({spaced(done.setups, raster_.setup_interval_thousandths / 1000.0, to_last),
-                             ratio(done.coarse_tiles, raster_.coarse_tiles_per_cycle),
-                             ratio(done.fine_tiles, raster_.fine_tiles_per_cycle),
-                             spaced(done.tile_pairs, raster_.screen_tile_interval_thousandths / 1000.0, to_last),
-                             ratio(done.quads_rasterized, raster_.quads_per_cycle)});
-  cycles[tc] = std::max(ratio(done.quads_rasterized, tc_.quads_per_cycle), ratio(done.bin_beats, 1));
-  const auto from_l2 = [&](std::uint64_t bytes) {
-    return l2_bytes_per_cycle_ == 0 ? 0.0 : ratio(bytes, l2_bytes_per_cycle_);
-  };
-  const std::uint64_t z_blocks = to_last ? without_last(done.z_blocks, longest_beat_of_blocks()) : done.z_blocks;
-  const std::uint64_t launches = to_last ? without_last(done.launches, longest_launch()) : done.launches;
+  cycles[tgc] = least(Pipeline::tgc, done, to_last);
+  cycles[raster] = least(Pipeline::raster, done, to_last);
+  cycles[tc] = least(Pipeline::tc, done, to_last);
+  const std::uint64_t z_blocks =
+      to_last ? without_last(tests[ZropWork::blocks], longest_beat_of_blocks()) : tests[ZropWork::blocks];
   // Beside which beats updates hide is not known phase by phase.
   const double updates = updates_hide() ? 0.0 : update_cycles(done);
-  cycles[test] =
-      std::max({ratio(done.quads_tested, zrop_.quads_per_cycle) + ratio(z_blocks, 1000) + updates + sector_cycles(done),
-                ratio(done.z_lines, 1000), ratio(done.quads_rasterized, prop_.quads_per_cycle),
-                from_l2(done.z_sectors * zrop_.z_cache.organization.sector_bytes)});
-  cycles[qru] = std::max(ratio(done.survivors, qru_.items_per_cycle), ratio(done.warps, 1));
-  cycles[sm] = std::max(instructions(done) / sm_.instructions_per_cycle(), ratio(launches, 1000));
-  cycles[late] = ratio(done.late_quads, std::min(zrop_.quads_per_cycle, prop_.quads_per_cycle));
-  cycles[color] = static_cast<double>(done.color_quads()) / prop_.color_rate.per_cycle();
-  cycles[l2] = from_l2(done.crop[CropWork::bytes_moved]);
-  cycles[crop] = crop_ == nullptr ? 0 : crop_->least_cycles(done.crop);
+  cycles[test] = std::max(
+      {ratio(tests[ZropWork::tests], zrop_.quads_per_cycle) + ratio(z_blocks, 1000) + updates + sector_cycles(done),
+       ratio(tests[ZropWork::lines], 1000), prop_takes(PropWork::bins, collected(done)),
+       from_memory(tests[ZropWork::sectors] * zrop_.z_cache.organization.sector_bytes)});
+  cycles[qru] = least(Pipeline::qru, done, to_last);
+  cycles[sm] = least(Pipeline::sm, done, to_last);
+  cycles[late] = std::max(ratio(tests[ZropWork::late_tests], zrop_.quads_per_cycle),
+                          prop_takes(PropWork::late, tests[ZropWork::late_tests]));
+  cycles[color] = prop_takes(PropWork::color, blends[CropWork::blend]);
+  cycles[memory_of_crop] = from_memory(blends[CropWork::bytes_moved]);
+  cycles[crop] = unit(Pipeline::crop) == nullptr ? 0 : unit(Pipeline::crop)->least_cycles(blends);
   return cycles;
 }
 
@@ -153,34 +130,32 @@ bool PhaseBound::updates_hide() const {
 }
 
 double PhaseBound::update_cycles(const Work& done) const {
-  const double updates = ratio(done.updates, zrop_.updates_per_cycle);
+  const Work::Items& tests = done.of[Pipeline::zrop];
+  const double updates = ratio(tests[ZropWork::updates], zrop_.updates_per_cycle);
   if (!updates_hide()) return updates;
-  return std::max(0.0, updates - ratio(done.quads_tested, zrop_.quads_per_cycle) - ratio(done.z_blocks, 1000));
+  return std::max(0.0, updates - ratio(tests[ZropWork::tests], zrop_.quads_per_cycle) -
+                           ratio(tests[ZropWork::blocks], 1000));
 }
 
 double PhaseBound::sector_cycles(const Work& done) const {
   // A cycle in which sectors move may be the last that a block takes part of.
-  return std::max(0.0, ratio(done.z_sectors, zrop_.z_cache.sectors_per_cycle) - ratio(done.z_blocks, 1000));
+  const Work::Items& tests = done.of[Pipeline::zrop];
+  return std::max(0.0, ratio(tests[ZropWork::sectors], zrop_.z_cache.sectors_per_cycle) -
+                           ratio(tests[ZropWork::blocks], 1000));
 }
 
-std::uint64_t PhaseBound::longest_launch() const {
-  const HandOverPrice& price = sm_.hand_over;
-  return price.warp_thousandths + quads_per_warp * (std::uint64_t{price.visit_thousandths} + price.discard_thousandths);
-}
 std::uint64_t PhaseBound::longest_beat_of_blocks() const {
   const std::uint64_t block = std::max(zrop_.half_block_thousandths, zrop_.block_thousandths);
   return QuadBeat::capacity * (block + zrop_.primitive_thousandths);
 }
 
 double PhaseBound::idle_after_last(unsigned stage) const {
-  if (stage == sm) return ratio(longest_launch(), 1000);
   if (stage == test) return ratio(longest_beat_of_blocks(), 1000);
-  const double interval =
-      stage == draw ? 1 / vertex_warps_per_cycle_
-      : stage == raster
-          ? std::max(raster_.setup_interval_thousandths, raster_.screen_tile_interval_thousandths) / 1000.0
-          : 1.0;
-  return std::max(0.0, interval - 1);
+  const Pipeline::Place place = stage == draw     ? Pipeline::draw
+                                : stage == raster ? Pipeline::raster
+                                : stage == sm     ? Pipeline::sm
+                                                  : Pipeline::places;
+  return place == Pipeline::places || unit(place) == nullptr ? 0.0 : unit(place)->idle_after_last();
 }
 
 std::array<double, PhaseBound::stages> PhaseBound::end_of(const Work& done, bool to_last) const {
@@ -200,16 +175,17 @@ std::array<double, PhaseBound::stages> PhaseBound::end_of(const Work& done, bool
 }
 
 void PhaseBound::end_phase() {
-  if (up_to_quads_.quads_rasterized > 0) {
+  if (up_to_quads_.rasterized() > 0) {
     const std::array<double, stages> end = end_of(up_to_quads_, true);
     last_quad_ = *std::max_element(end.begin(), end.end());
     ended_ = total_;
     ended_.add(up_to_quads_);
     // Late tests, which are a stage of their own, and updates share the port of the others.
-    if (ended_.late_quads > 0 || updates_hide()) last_quad_ = std::max(last_quad_, busiest(parts("zrop")));
+    if (ended_.of[Pipeline::zrop][ZropWork::late_tests] > 0 || updates_hide())
+      last_quad_ = std::max(last_quad_, least(Pipeline::zrop, ended_, true));
   } else if (!has_quads()) {
     Work passed = work;
-    passed.tile_pairs = 0;  // for a pair without quads nobody waits
+    passed.of[Pipeline::raster][RasterWork::pairs] = 0;  // for a pair without quads nobody waits
     const std::array<double, stages> end = end_of(passed, true);
     last_quad_ = *std::max_element(end.begin(), end.end());
   }
@@ -219,7 +195,7 @@ void PhaseBound::end_phase() {
   total_.add(work);
   work = Work();
   up_to_quads_ = Work();
-  up_to_quad_ = FrontEndWork();
+  up_to_quad_ = Work();
 }
 
 void PhaseBound::pass_barrier() {
@@ -227,63 +203,41 @@ void PhaseBound::pass_barrier() {
   for (double& end : end_) end = std::max(end, last_quad_);
 }
 
-double busiest(const std::vector<OccupancyPart>& parts) {
-  double longest = 0;
-  std::map<unsigned, double> resources;
-  for (const OccupancyPart& part : parts) {
-    longest = std::max(longest, resources[part.resource] += part.cycles);
-  }
-  return longest;
-}
-
-std::vector<OccupancyPart> PhaseBound::parts(const std::string& slot) const {
-  const Work& done = ended_;
-  const auto priced = [](const std::vector<WorkKind>& kinds, const std::vector<double>& items) {
-    std::vector<OccupancyPart> parts;
-    for (std::size_t i = 0; i < items.size(); ++i) {
-      const WorkKind& kind = kinds[i];
-      parts.push_back({kind.name, kind.resource, items[i] * kind.cycles_per_item, kind.is_throughput});
+std::vector<OccupancyPart> PhaseBound::parts_of(Pipeline::Place place, const Work& done, bool to_last) const {
+  const Work::Items& tests = done.of[Pipeline::zrop];
+  Work::Items items = done.of[place];
+  switch (place) {
+    case Pipeline::tgc: items[TgcWork::primitives] = done.of[Pipeline::raster][RasterWork::setup]; break;
+    case Pipeline::tc: items[TcWork::quads] = collected(done); break;
+    case Pipeline::prop:
+      items[PropWork::bins] = collected(done);
+      items[PropWork::tested] = tests[ZropWork::tests] > 0 ? done.survivors() : 0;
+      items[PropWork::color] = done.of[Pipeline::crop][CropWork::blend];
+      items[PropWork::late] = tests[ZropWork::late_tests];
+      return unit(place)->least_parts(items, false);
+    case Pipeline::zrop: {
+      const std::vector<WorkKind> kinds = ZropWork::kinds(zrop_);
+      const double taken[] = {static_cast<double>(tests[ZropWork::tests]),
+                              update_cycles(done),
+                              sector_cycles(done) * zrop_.z_cache.sectors_per_cycle,
+                              static_cast<double>(tests[ZropWork::late_tests]),
+                              static_cast<double>(without_last(tests[ZropWork::blocks], longest_beat_of_blocks())),
+                              static_cast<double>(tests[ZropWork::lines])};
+      std::vector<OccupancyPart> parts;
+      for (const WorkKind& kind : kinds)
+        parts.push_back({kind.name, kind.resource, taken[parts.size()] * kind.cycles_per_item, kind.is_throughput});
+      return parts;
     }
-    return parts;
-  };
-  const auto count = [](std::uint64_t items) { return static_cast<double>(items); };
-  if (slot == "draw")
-    return priced(DrawWork::kinds(), {spaced(done.vertex_warps_issued, 1 / vertex_warps_per_cycle_, true)});
-  if (slot == "vpo") return priced(VpoWork::kinds(vpo_), {count(done.triangles)});
-  if (slot == "tgc") return priced(TgcWork::kinds(tgc_), {count(done.bin_entries), count(done.setups)});
-  if (slot == "raster") {
-    const double setup = raster_.setup_interval_thousandths / 1000.0;
-    const double pair = raster_.screen_tile_interval_thousandths / 1000.0;
-    const double setups = spaced(done.setups, setup, true) / setup;
-    const double pairs = spaced(done.tile_pairs, pair, true) / pair;
-    return priced(RasterWork::kinds(raster_),
-                  {setups, count(done.coarse_tiles), count(done.fine_tiles), pairs, count(done.quads_rasterized)});
+    case Pipeline::qru: {
+      // A launch ends a cycle.
+      const auto rate = static_cast<std::uint64_t>(1 / unit(place)->work()[QruWork::quads].cycles_per_item + 0.5);
+      items[QruWork::quads] -= std::min(items[QruWork::quads], items[QruWork::launches] * rate);
+      break;
+    }
+    case Pipeline::crop: return unit(place)->least_parts(items, false);
+    default: break;
   }
-  if (slot == "tc") return priced(TcWork::kinds(tc_), {count(done.quads_rasterized), count(done.bin_beats)});
-  if (slot == "prop") {
-    return priced(PropWork::kinds(prop_),
-                  {count(done.quads_rasterized), done.quads_tested > 0 ? count(done.survivors) : 0.0,
-                   count(done.color_quads()), 0.0, count(done.late_quads)});
-  }
-  if (slot == "zrop") {
-    return priced(ZropWork::kinds(zrop_),
-                  {count(done.quads_tested), update_cycles(done), sector_cycles(done) * zrop_.z_cache.sectors_per_cycle,
-                   count(done.late_quads), count(without_last(done.z_blocks, longest_beat_of_blocks())),
-                   count(done.z_lines)});
-  }
-  if (slot == "qru") {
-    const double quads = count(done.survivors) - count(done.warps) * qru_.items_per_cycle;
-    return priced(QruWork::kinds(qru_), {std::max(quads, 0.0), count(done.warps)});
-  }
-  if (slot == "sm") {
-    return priced(SmWork::kinds(sm_), {count(done.vertex_warps * sum_of(sm_.vertex)), count(done.fragment_instructions),
-                                       count(done.merging_warps * sum_of(sm_.merge)),
-                                       count(without_last(done.launches, longest_launch()))});
-  }
-  if (slot == "crop") return priced(crop_->work(), {count(done.color_quads()), count(done.crop[CropWork::sectors])});
-  if (slot == "l2" && l2_bytes_per_cycle_ > 0)
-    return {{"bytes", 0, ratio(done.crop[CropWork::bytes_moved], l2_bytes_per_cycle_), true}};
-  return {};
+  return unit(place)->least_parts(items, to_last);
 }
 
 }  // namespace vrpipe

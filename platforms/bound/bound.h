@@ -1,57 +1,57 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "elaboration/untimed_gpu.h"
+
 #include <vrpipe/kernel/accounting.h>
 #include <vrpipe/model/untimed.h>
-#include <vrpipe/pipeline/slots/prop.h>
+#include <vrpipe/pipeline/slots/crop.h>
+#include <vrpipe/pipeline/slots/qru.h>
 #include <vrpipe/pipeline/slots/raster.h>
 #include <vrpipe/pipeline/slots/sm.h>
-#include <vrpipe/pipeline/slots/tc.h>
 #include <vrpipe/pipeline/slots/zrop.h>
 #include <vrpipe/platforms/configuration.h>
 
 namespace vrpipe {
 
-/// What it takes to make quads.
-struct FrontEndWork {
-  std::uint64_t vertex_warps_issued = 0;
-  std::uint64_t vertex_warps = 0;  ///< shaded
-  std::uint64_t attribute_bytes_written = 0;
-  std::uint64_t triangles = 0;
-  std::uint64_t bin_entries = 0;
-  std::uint64_t setups = 0;
-  std::uint64_t coarse_tiles = 0;
-  std::uint64_t fine_tiles = 0;
-  std::uint64_t tile_pairs = 0;
-  std::uint64_t quads_rasterized = 0;
+/// The units of a GPC, and of the front end, that its phases are about, in the order in which work goes through them.
+struct Pipeline {
+  enum Place : unsigned { draw, vpo, tgc, raster, tc, prop, zrop, qru, sm, crop, places };
+  Pipeline(const UntimedGpu& gpu, unsigned gpc);
+  /// Throws UserError for a slot that is not registered.
+  static unsigned rank(Place place);
+  /// `places` for another slot.
+  static Place place_of(const std::string& slot);
+
+  std::array<UntimedUnit*, places> at{};  ///< null where the platform does without
 };
 
-/// What the units of a GPC did, in the terms of their costs, and the front end for it.
-struct Work : FrontEndWork {
-  std::uint64_t bin_beats = 0;
-  std::uint64_t quads_tested = 0;
-  std::uint64_t updates = 0;
-  std::uint64_t z_sectors = 0;  ///< filled into the z-cache, in whole cycles of it
-  std::uint64_t z_lines = 0;    ///< thousandths of a cycle of lines, beside the tests
-  std::uint64_t z_blocks = 0;   ///< thousandths of a cycle beyond what quads_tested take
-  std::uint64_t survivors = 0;
-  std::uint64_t late_quads = 0;  ///< tested after shading
-  std::uint64_t warps = 0;
-  std::uint64_t fragment_instructions = 0;  ///< of these warps
-  std::uint64_t merging_warps = 0;
-  std::uint64_t launches = 0;  ///< of warps, thousandths of a cycle
-  UntimedUnit::Items crop{};   ///< by kind of CropWork
-  std::uint64_t color_quads() const;
+/// What they did, by the kinds of work of each.
+struct Work {
+  using Items = UntimedUnit::Items;
+  std::array<Items, Pipeline::places> of{};
+  std::uint64_t attribute_bytes_written = 0;
 
   void add(const Work& other);
+  /// What it took to make quads.
+  void set_front_end(const Work& other) {
+    std::copy(other.of.begin(), other.of.begin() + Pipeline::tc, of.begin());
+    of[Pipeline::sm][SmWork::vertex] = other.of[Pipeline::sm][SmWork::vertex];
+    attribute_bytes_written = other.attribute_bytes_written;
+  }
+  std::uint64_t& rasterized() { return of[Pipeline::raster][RasterWork::quads]; }
+  std::uint64_t rasterized() const { return of[Pipeline::raster][RasterWork::quads]; }
+  /// What QRU was given, and the warps that it made of it.
+  std::uint64_t& survivors() { return of[Pipeline::qru][QruWork::quads]; }
+  std::uint64_t survivors() const { return of[Pipeline::qru][QruWork::quads]; }
+  std::uint64_t& warps() { return of[Pipeline::qru][QruWork::launches]; }
+  std::uint64_t warps() const { return of[Pipeline::qru][QruWork::launches]; }
 };
-
-/// Cycles of the resource that has most.
-double busiest(const std::vector<OccupancyPart>& parts);
 
 /// The least cycles that a GPC's work takes when every unit works at its peak: the busiest unit's, phase by phase, up to
 /// the last quad. What follows it (splats that cover nothing) is no part of a draw's cycles.
@@ -64,25 +64,26 @@ double busiest(const std::vector<OccupancyPart>& parts);
 /// - any unit after it has finished the last phase but one (units from the rasteriser on).
 class PhaseBound {
  public:
-  /// Whether this is a slot of the pipeline.
-  static bool knows(const std::string& slot);
-  /// A slot that the platform does without takes no time. The CROP of the GPC outlives it; null for none.
-  PhaseBound(const Configuration& configuration, const UntimedUnit* crop_unit, unsigned gpc);
+  /// The GPU outlives it.
+  PhaseBound(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc);
+
+  const Pipeline& pipeline() const { return pipeline_; }
 
   Work work;  ///< of the phase
-  bool phase_is_full() const { return work.warps >= warps_in_phase_; }
+  bool phase_is_full() const { return warps_in_phase_ > 0 && work.warps() >= warps_in_phase_; }
   /// The work so far includes a quad that was rasterised.
-  void quad_rasterized() { up_to_quad_ = static_cast<const FrontEndWork&>(work); }
+  void quad_rasterized() { up_to_quad_.set_front_end(work); }
   /// All quads so far have been blended or dropped. Where a time-out flushes the last bins, what made no quad any more
   /// does not come before.
   void quads_ended() {
     up_to_quads_ = work;
-    if (times_out_) static_cast<FrontEndWork&>(up_to_quads_) = up_to_quad_;
-    up_to_quads_.tile_pairs = up_to_quad_.tile_pairs;  // for a pair without quads nobody waits
+    if (terms_.bins_vary) up_to_quads_.set_front_end(up_to_quad_);
+    // For a pair without quads nobody waits.
+    up_to_quads_.of[Pipeline::raster][RasterWork::pairs] = up_to_quad_.of[Pipeline::raster][RasterWork::pairs];
     // What has survived was rasterised, though the last of it may be known by that alone (WorkCounter).
-    const std::uint64_t survivors = total_.survivors + work.survivors;
-    const std::uint64_t rasterized = total_.quads_rasterized + up_to_quads_.quads_rasterized;
-    if (survivors > rasterized) up_to_quads_.quads_rasterized += survivors - rasterized;
+    const std::uint64_t survivors = total_.survivors() + work.survivors();
+    const std::uint64_t rasterized = total_.rasterized() + up_to_quads_.rasterized();
+    if (survivors > rasterized) up_to_quads_.rasterized() += survivors - rasterized;
   }
   void end_phase();
   /// A barrier: what follows begins once the last quad of the phases so far has ended.
@@ -91,9 +92,7 @@ class PhaseBound {
   std::uint64_t instructions_of(FragmentShader shader) const;
   /// Up to the last quad; without quads, of what the front end does all the same.
   double cycles() const { return last_quad_; }
-  bool has_quads() const { return ended_.quads_rasterized > 0; }
-  /// In time, bins may be flushed that are not full.
-  bool times_out() const { return times_out_; }
+  bool has_quads() const { return ended_.rasterized() > 0; }
   /// Of so many sectors that every run fills into the z-cache in a phase, those that no earlier phase can have filled for it:
   /// look-ups run ahead by the quads of a queue.
   std::uint64_t z_sectors_of(std::uint64_t filled) const;
@@ -103,49 +102,45 @@ class PhaseBound {
     return moved > ahead ? moved - ahead : 0;
   }
   /// What runs with time may do otherwise than the one whose work this counts.
-  BoundTerms terms() const {
-    // Tiles may overtake each other, unless PROP keeps their order.
-    return {times_out_, times_out_ || prop_.order == PropBehaviour::Order::tile, l2_latency_cycles_};
-  }
+  const BoundTerms& terms() const { return terms_; }
 
-  /// Of all phases, up to the last quad: what the unit of a slot, or `l2`, spends its time on at its peak; none for a slot that
-  /// this knows nothing of.
-  std::vector<OccupancyPart> parts(const std::string& slot) const;
+  /// Of all phases, up to the last quad: what a unit of the pipeline spends its time on at its peak.
+  std::vector<OccupancyPart> parts(Pipeline::Place place) const { return parts_of(place, ended_, true); }
+  /// And the memory that CROP's is bound to, if it follows no accesses: its path, and cycles.
+  const std::string& memory() const { return memory_; }
+  double memory_cycles() const { return from_memory(ended_.of[Pipeline::crop][CropWork::bytes_moved]); }
 
  private:
   /// In the order of the pipeline; PROP is there twice.
-  enum Stage : unsigned { draw, vpo, tgc, raster, tc, test, qru, sm, late, color, l2, crop, stages };
+  enum Stage : unsigned { draw, vpo, tgc, raster, tc, test, qru, sm, late, color, memory_of_crop, crop, stages };
   std::array<double, stages> cycles_of(const Work& done, bool to_last) const;
   std::array<double, stages> end_of(const Work& done, bool to_last) const;
-  double instructions(const Work& done) const;
+  UntimedUnit* unit(Pipeline::Place place) const { return pipeline_.at[place]; }
+  std::vector<OccupancyPart> parts_of(Pipeline::Place place, const Work& done, bool to_last) const;
+  double least(Pipeline::Place place, const Work& done, bool to_last) const;
+  /// Of the quads that were rasterised, those that came to TC.
+  std::uint64_t collected(const Work& done) const;
+  double from_memory(std::uint64_t bytes) const;
   double update_cycles(const Work& done) const;
   /// Beside beats that take several cycles updates take nothing of their own.
   bool updates_hide() const;
   double sector_cycles(const Work& done) const;
-  /// Thousandths of a cycle of one hand-over, and of one beat's tests.
-  std::uint64_t longest_launch() const;
+  /// Thousandths of a cycle of one beat's tests.
   std::uint64_t longest_beat_of_blocks() const;
   /// Between a stage's items are more cycles than an item takes: those after the last, for which nobody waits.
   double idle_after_last(unsigned stage) const;
 
-  double vertex_warps_per_cycle_ = 1;
-  Throughput vpo_;
-  Throughput tgc_;
-  RasterBehaviour::TimingParameters raster_{1, 1000, 1, 1, 1000, 1};
-  TcBehaviour::TimingParameters tc_{1, 1, 0, 1};
-  PropBehaviour::TimingParameters prop_{1, {}, 1, PropBehaviour::Order::tile};
+  const Pipeline pipeline_;
   ZropBehaviour::TimingParameters zrop_{1, 1, 1};
-  Throughput qru_;
-  SmBehaviour::TimingParameters sm_{1, 1, 32, 1, 1, 1, {}, {}, {}};
-  const UntimedUnit* crop_;
-  std::uint32_t l2_bytes_per_cycle_ = 0;  ///< 0: a memory of which nothing is known
-  std::uint32_t l2_latency_cycles_ = 0;
+  SmBehaviour::TimingParameters sm_{};
+  std::string memory_;
+  std::uint32_t memory_bytes_per_cycle_ = 0;  ///< 0: a memory of which nothing is known
+  BoundTerms terms_;
   std::uint64_t warps_in_phase_ = 0;
-  Work total_;               ///< of the phases before
-  FrontEndWork up_to_quad_;  ///< of the phase, up to the last quad that was rasterised
-  Work up_to_quads_;         ///< of the phase, up to its last quad
-  Work ended_;               ///< of all phases, up to the last quad
-  bool times_out_ = false;
+  Work total_;        ///< of the phases before
+  Work up_to_quad_;   ///< of the phase's front end, up to the last quad that was rasterised
+  Work up_to_quads_;  ///< of the phase, up to its last quad
+  Work ended_;        ///< of all phases, up to the last quad
   double last_quad_ = 0;
   std::array<double, stages> end_{};         ///< of the last phase
   std::array<double, stages> end_before_{};  ///< of the phase before it

@@ -35,7 +35,7 @@ class OtherSlots {
   struct Other {
     const UntimedGpu::Placed* placed;
     Place place;
-    std::vector<std::uint64_t> items;  ///< by kind of work, up to the last quad
+    UntimedUnit::Items items;  ///< by kind of work, up to the last quad
   };
   void note(Place place, unsigned gpc);
   const Other* find(const std::string& path) const;

@@ -5,7 +5,6 @@
 
 #include "bound/bound.h"
 #include "bound/other_slots.h"
-#include "elaboration/untimed_gpu.h"
 
 #include <vrpipe/pipeline/barrier_plan.h>
 
@@ -20,9 +19,8 @@ namespace vrpipe {
 /// from some run is left out too: up to the tests, quads count that survive them.
 class WorkCounter {
  public:
-  /// The GPU, the bound and `others` outlive it.
-  WorkCounter(const Configuration& configuration, const UntimedGpu& gpu, unsigned gpc, PhaseBound& bound,
-              OtherSlots& others);
+  /// The bound and `others` outlive it.
+  WorkCounter(const Configuration& configuration, unsigned gpc, PhaseBound& bound, OtherSlots& others);
   ~WorkCounter();
   /// With what has been done so far; after the run as well.
   void end_phase();
@@ -30,9 +28,13 @@ class WorkCounter {
  private:
   class Survivors;
   template <class Item, class Function>
-  void tap(UntimedUnit* unit, const char* port, Function function);
+  void tap(Pipeline::Place place, const char* port, Function function);
+  UntimedUnit* unit(Pipeline::Place place) const { return bound_.pipeline().at[place]; }
+  /// So far.
+  std::uint64_t items(Pipeline::Place place, unsigned kind) const;
   /// Of the phase.
-  void count_front_end(FrontEndWork& work) const;
+  void count(Pipeline::Place place, unsigned kind);
+  void count_front_end();
   void count();
 
   PhaseBound& bound_;
@@ -43,9 +45,8 @@ class WorkCounter {
   const BarrierPlan barriers_;
   std::unique_ptr<Survivors> survivors_;
   std::vector<std::shared_ptr<void>> taps_;
-  UntimedUnit *draw_, *vpo_, *tgc_, *raster_, *tc_, *zrop_, *sm_, *crop_;  ///< null for none
-  Work before_;                                                            ///< of the phases before
-  std::uint64_t z_sectors_before_ = 0;                                     ///< the same, all that were filled
+  Work before_;                         ///< of the phases before
+  std::uint64_t z_sectors_before_ = 0;  ///< the same, all that were filled
   std::uint64_t z_lines_before_ = 0;
 };
 

@@ -30,6 +30,8 @@ class UntimedGpu {
   const std::vector<Placed>& units() const { return units_; }
   /// Those that find out what is accessed.
   const std::vector<PlacedMemory>& memories() const { return memories_; }
+  /// Of a path; null for one that does not, or none.
+  MemoryBehaviour* memory(const std::string& path) const;
   /// A slot's unit in a GPC; in a slot of the front end it serves all. Null for none.
   UntimedUnit* of_slot(const std::string& slot, unsigned gpc) const;
 
@@ -38,7 +40,6 @@ class UntimedGpu {
 
  private:
   void add_memories();
-  MemoryBehaviour* memory(const std::string& path) const;
 
   const Configuration& configuration_;
   std::vector<Placed> units_;

@@ -129,8 +129,6 @@ std::string hash_of(const RunResult& result) {
   return fmt::format("{:016x}", hash);
 }
 
-const std::string l2 = "l2";
-
 /// The functional models of all units.
 using BehaviourList = std::vector<Behaviour*>;
 
@@ -318,7 +316,6 @@ class OccupancyReport {
       if (!slot.reports_utilization && !is_there) continue;
       result_.utilization.emplace_back(slot.name, units > 0 ? sum / units : 0.0);
     }
-    if (!Registry::instance().has_slot("dram")) result_.utilization.emplace_back("dram", 0.0);
   }
 
  private:
@@ -427,11 +424,6 @@ void run_clocked(const Configuration& configuration, std::atomic<float>* progres
   if (!result.stopped) set_draw_times(gpu.clock().frame_end().of_draws(), cycles, result.draws);
 }
 
-bool follows_accesses(const UntimedGpu& gpu, const std::string& slot) {
-  return std::any_of(gpu.memories().begin(), gpu.memories().end(),
-                     [&](const UntimedGpu::PlacedMemory& placed) { return placed.instance->slot == slot; });
-}
-
 /// The bounds of all GPCs: the longest is the draw's.
 void report_bound(const Configuration& configuration, const UntimedGpu& gpu, const std::vector<PhaseBound>& bounds,
                   const OtherSlots& others, RunResult& result) {
@@ -454,11 +446,11 @@ void report_bound(const Configuration& configuration, const UntimedGpu& gpu, con
   OccupancyReport occupancy(longest, result);
   for (const UntimedGpu::Placed& placed : gpu.units()) {
     const Instance& instance = *placed.instance;
-    const PhaseBound& bound = bounds[instance.gpc];
+    const Pipeline::Place place = Pipeline::place_of(instance.slot);
     UnitReport unit;
     unit.name = instance.path;
     const std::vector<OccupancyPart> parts =
-        PhaseBound::knows(instance.slot) ? bound.parts(instance.slot) : others.parts(instance.path);
+        place != Pipeline::places ? bounds[instance.gpc].parts(place) : others.parts(instance.path);
     const Cycle busy = std::min(cycles, static_cast<Cycle>(busiest(parts)));
     unit.cycles[static_cast<unsigned>(UnitState::busy)] = busy;
     unit.cycles[static_cast<unsigned>(UnitState::starved)] = cycles - busy;
@@ -469,12 +461,16 @@ void report_bound(const Configuration& configuration, const UntimedGpu& gpu, con
     report.name = placed.instance->path;
     occupancy.add_memory(std::move(report), placed.instance->slot, placed.memory->least_occupancy(period_ps));
   }
-  if (!follows_accesses(gpu, l2)) {
+  for (const std::string& path : configuration.netlist().used_memories()) {
+    const Instance* const memory = configuration.netlist().find(path);
+    if (memory == nullptr || gpu.memory(path) != nullptr) continue;
     UnitReport report;
-    report.name = l2;
+    report.name = path;
     double moved = 0;
-    for (const PhaseBound& bound : bounds) moved += busiest(bound.parts(l2)) / static_cast<double>(bounds.size());
-    occupancy.add_memory(std::move(report), l2, {{"bytes", 0, moved, true}});
+    for (const PhaseBound& bound : bounds) {
+      if (bound.memory() == path) moved += bound.memory_cycles() / static_cast<double>(bounds.size());
+    }
+    occupancy.add_memory(std::move(report), memory->slot, {{"bytes", 0, moved, true}});
   }
   occupancy.finish();
 }
@@ -487,10 +483,10 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
   std::optional<OtherSlots> others;
   if (result.request.fidelity == Fidelity::bound) {
     const unsigned gpcs = configuration.netlist().gpcs();
-    for (unsigned gpc = 0; gpc < gpcs; ++gpc) bounds.emplace_back(configuration, gpu.of_slot("crop", gpc), gpc);
-    others.emplace(gpu, configuration.frame().terminates_early() && bounds.front().times_out());
+    for (unsigned gpc = 0; gpc < gpcs; ++gpc) bounds.emplace_back(configuration, gpu, gpc);
+    others.emplace(gpu, configuration.frame().terminates_early() && bounds.front().terms().bins_vary);
     for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
-      counters.push_back(std::make_unique<WorkCounter>(configuration, gpu, gpc, bounds[gpc], *others));
+      counters.push_back(std::make_unique<WorkCounter>(configuration, gpc, bounds[gpc], *others));
     }
   }
   const HostTimer timer;

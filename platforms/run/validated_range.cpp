@@ -58,7 +58,7 @@ std::vector<std::string> outside_validated_range(const std::vector<std::pair<std
 std::vector<std::string> outside_validated_range(const Netlist& netlist) {
   std::vector<std::string> reasons;
   for (const Instance& instance : netlist.instances()) {
-    if (!Netlist::is_memory(instance) && !PhaseBound::knows(instance.slot)) {
+    if (!Netlist::is_memory(instance) && Pipeline::place_of(instance.slot) == Pipeline::places) {
       reasons.push_back(instance.path + " is in slot " + instance.slot + " of a plugin, which was not validated");
     }
   }

@@ -85,12 +85,16 @@ TEST(Fidelity, AnEmptyDrawTakesNoWorkOnAnyRung) {
 
 /// A TC of another make, which has its time-out in every mode.
 struct ImpatientTc : TileCoalescing {
-  using TileCoalescing::TileCoalescing;
-  TimingParameters timing() const override {
-    TimingParameters timing = TileCoalescing::timing();
-    timing.idle_timeout_cycles = 3;
-    return timing;
+  ImpatientTc(const Parameters& parameters, const RenderContext& context) : TileCoalescing(parameters, context) {}
+  const TcTime& time() const override { return time_; }
+
+ private:
+  static TcTime after_three_cycles() {
+    TcParameters parameters;
+    parameters.set("tc", "idle_timeout_cycles", "3");
+    return TcTime(parameters);
   }
+  const TcTime time_ = after_three_cycles();
 };
 const Registrar<ImpatientTc, TcBehaviour> impatient("tc", "impatient", "flushes bins after three idle cycles");
 

@@ -131,13 +131,9 @@ struct TcOfAnotherPosition : TileCoalescing {
     return flushed;
   }
 };
-struct PropWithoutLatency : PreRop {
+struct PropWithoutTime : PreRop {
   using PreRop::PreRop;
-  TimingParameters timing() const override {
-    TimingParameters timing = PreRop::timing();
-    timing.latency_cycles = 0;
-    return timing;
-  }
+  const PropTime& time() const override { throw 7; }
 };
 struct ZropOfAnotherTile : DepthStencilRop {
   using DepthStencilRop::DepthStencilRop;
@@ -275,7 +271,7 @@ const Add<TcThatTakesNothing, TcBehaviour> tc_nothing("tc", "takes-nothing", "in
 const Add<TcThatThrows, TcBehaviour> tc_throws("tc", "throws", "insert throws an exception of unknown type");
 const Add<TcThatKeepsQuads, TcBehaviour> tc_keeps("tc", "keeps", "flush_oldest: ");
 const Add<TcOfAnotherPosition, TcBehaviour> tc_position("tc", "position", "position 64, a tile has 64");
-const Add<PropWithoutLatency, PropBehaviour> prop_latency("prop", "no-latency", "latency_cycles is 0");
+const Add<PropWithoutTime, PropBehaviour> prop_time("prop", "no-time", "time throws");
 const Add<ZropOfAnotherTile, ZropBehaviour> zrop_tile("zrop", "other-tile", "test: a beat of screen tile");
 const Add<ZropThatChangesQuadsThatAreNotThere, ZropBehaviour> zrop_changes("zrop", "changes-more",
                                                                            "have changed something");
@@ -425,7 +421,7 @@ struct RasterForDraw0 : RasterBehaviour {
     count_for_draw_0(*this, unit_);
     return more;
   }
-  TimingParameters timing() const override { return unit_.timing(); }
+  const RasterTime& time() const override { return unit_.time(); }
   TileRasterizer unit_;
 };
 struct ZropForDraw0 : ZropBehaviour {
@@ -648,7 +644,7 @@ class SilentRaster : public RasterBehaviour {
     }
     return more;
   }
-  TimingParameters timing() const override { return inner_.timing(); }
+  const RasterTime& time() const override { return inner_.time(); }
 
  private:
   TileRasterizer inner_;

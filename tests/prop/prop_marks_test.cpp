@@ -193,7 +193,7 @@ TEST_P(PropMarksTest, NoOrderOfCompletionAndNoStallMovesAWarpPastAMark) {
 TEST(WarpOrderOfAFrame, IsEmptyOnlyWhenTheMarkHasLeftToo) {
   const Draw draw = testing::draw_of(64, 64);
   const RenderContext context = testing::context_of(draw);
-  ReorderBuffer order(PropBehaviour::Order::tile, context);
+  ReorderBuffer order(PropTime::Order::tile, context);
   ShadedWarp mark;
   mark.sequence = 0;
   mark.mark = Frame::mark_of(0);

@@ -16,7 +16,7 @@ TEST(PreRop, ColourQuadsPerCycleFollowTheFormat) {
                                                        {ColorFormat::rgba32f, 1}};
   for (const auto& [format, quads] : expected) {
     context.format = format;
-    EXPECT_EQ(PreRop(parameters, context).timing().color_rate, (Rate{quads, 1})) << name_of(format);
+    EXPECT_EQ(PreRop(parameters, context).time().color_rate, (Rate{quads, 1})) << name_of(format);
   }
 }
 
@@ -26,9 +26,9 @@ TEST(PreRop, BytesThatAreNoWholeQuadsAreAFraction) {
   context.format = ColorFormat::rgba32f;
   PreRop::Parameters parameters;
   parameters.set("prop", "color_bytes_per_cycle", "16");
-  EXPECT_EQ(PreRop(parameters, context).timing().color_rate, (Rate{1, 4}));
+  EXPECT_EQ(PreRop(parameters, context).time().color_rate, (Rate{1, 4}));
   parameters.set("prop", "color_bytes_per_cycle", "48");
-  EXPECT_EQ(PreRop(parameters, context).timing().color_rate, (Rate{3, 4}));
+  EXPECT_EQ(PreRop(parameters, context).time().color_rate, (Rate{3, 4}));
 }
 
 }  // namespace

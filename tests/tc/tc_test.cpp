@@ -158,7 +158,7 @@ TEST_F(TileCoalescingTest, NoQuadIsLostDoubledOrReorderedWithinItsTile) {
 }
 
 TEST_F(TileCoalescingTest, StrictTerminationHasNoTimeOut) {
-  const TcBehaviour::TimingParameters timing = TileCoalescing(parameters, context).timing();
+  const TcTime timing(parameters);
   EXPECT_EQ(timing.timeout_in(Termination::paper), 150U);
   EXPECT_EQ(timing.timeout_in(Termination::strict), 0U);
 }

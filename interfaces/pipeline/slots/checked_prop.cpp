@@ -10,16 +10,10 @@ class CheckedProp final : public CheckedSlot<PropBehaviour> {
  public:
   using CheckedSlot::CheckedSlot;
 
-  TimingParameters timing() const override {
-    const TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
-    check_rate("quads_per_cycle", timing.quads_per_cycle);
-    check_rate("color_rate", timing.color_rate, ColorBeat::capacity);
-    check_latency("latency_cycles", timing.latency_cycles);
-    if (timing.order > Order::tile)
-      fault("timing", "order {} is neither draw nor tile", static_cast<unsigned>(timing.order));
-    return timing;
+  const PropTime& time() const override {
+    return ask("time", [&]() -> const PropTime& { return checked_->time(); });
   }
-  void check_timing() const override { timing(); }
+  void check_timing() const override { time(); }
   void check_counters() const override {}
 };
 

@@ -31,14 +31,10 @@ class CheckedTc final : public CheckedSlot<TcBehaviour> {
     check_flush("flush_oldest", out);
     return true;
   }
-  TimingParameters timing() const override {
-    const TimingParameters timing = ask("timing", [&] { return checked_->timing(); });
-    check_rate("quads_per_cycle", timing.quads_per_cycle, QuadBeat::capacity);
-    check_latency("latency_cycles", timing.latency_cycles);
-    check_rate("flush_queue_bins", timing.flush_queue_bins);
-    return timing;
+  const TcTime& time() const override {
+    return ask("time", [&]() -> const TcTime& { return checked_->time(); });
   }
-  void check_timing() const override { timing(); }
+  void check_timing() const override { time(); }
   void check_counters() const override {
     check_counter("quads", checked_->quads.value(), taken_, "quads came in");
     check_counter("flushes", checked_->flushes.value(), flushes_, "bins came out");

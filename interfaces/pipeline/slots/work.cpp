@@ -1,9 +1,6 @@
 #include <vrpipe/pipeline/slots/draw.h>
-#include <vrpipe/pipeline/slots/prop.h>
 #include <vrpipe/pipeline/slots/qru.h>
-#include <vrpipe/pipeline/slots/raster.h>
 #include <vrpipe/pipeline/slots/sm.h>
-#include <vrpipe/pipeline/slots/tc.h>
 #include <vrpipe/pipeline/slots/tgc.h>
 #include <vrpipe/pipeline/slots/vpo.h>
 #include <vrpipe/pipeline/slots/zrop.h>
@@ -26,26 +23,6 @@ std::vector<WorkKind> VpoWork::kinds(const Throughput& timing) {
 
 std::vector<WorkKind> TgcWork::kinds(const Throughput& timing) {
   return {{"bin entries", 0, per(timing.items_per_cycle), throughput}, {"read-out", 1, 1.0, false}};
-}
-
-std::vector<WorkKind> RasterWork::kinds(const RasterBehaviour::TimingParameters& timing) {
-  return {{"set-up", 0, timing.setup_interval_thousandths * per(1000), false},
-          {"coarse tests", 1, per(timing.coarse_tiles_per_cycle), false},
-          {"fine tiles", 2, per(timing.fine_tiles_per_cycle), false},
-          {"screen tiles", 3, timing.screen_tile_interval_thousandths * per(1000), false},
-          {"quads", 4, per(timing.quads_per_cycle), throughput}};
-}
-
-std::vector<WorkKind> TcWork::kinds(const TcBehaviour::TimingParameters& timing) {
-  return {{"quads", 0, per(timing.quads_per_cycle), throughput}, {"read-out", 1, 1.0, false}};
-}
-
-std::vector<WorkKind> PropWork::kinds(const PropBehaviour::TimingParameters& timing) {
-  return {{"bins", 0, per(timing.quads_per_cycle), false},
-          {"survivors", 1, per(timing.quads_per_cycle), false},
-          {"colours", 2, per(timing.color_rate.per_cycle()), throughput},
-          {"empty warps", 2, 1.0, false},
-          {"late tests", 3, per(timing.quads_per_cycle), false}};
 }
 
 std::vector<WorkKind> ZropWork::kinds(const ZropBehaviour::TimingParameters& timing) {

@@ -45,6 +45,9 @@ struct OccupancyPart {
   bool is_throughput;
 };
 
+/// Cycles of the resource that has most.
+double busiest(const std::vector<OccupancyPart>& parts);
+
 /// Where a frame ends, and in one of several each draw: in the cycle after the last of its quads has been blended, or dropped
 /// by a test, by pruning or by a merge. Known only once all of the frame has passed; until then units say what it cannot be
 /// earlier than.

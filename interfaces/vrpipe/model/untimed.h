@@ -156,15 +156,15 @@ struct BoundTerms {
 class UntimedUnit : public Component {
  public:
   using Items = std::array<std::uint64_t, most_work_kinds>;  ///< by kind of work
-  /// @param work  as of `lt` and `cycle` (unit.h): so `bound` knows what a unit in a slot of your own takes. Without it the
-  ///              kinds that the unit counts are those of its slot, of which `bound` knows.
+  /// @param work  what it counts, and what that takes, for `bound`; as of `lt` and `cycle` (unit.h), unless what is counted
+  ///              here is another item. Cycles of 0 for what is counted beside.
   explicit UntimedUnit(std::string name, std::vector<WorkKind> work = {})
       : Component(ClockHandle()), name_(std::move(name)), work_(std::move(work)) {}
 
   std::string label() const override { return name_; }
-  /// Of a kind of work of its slot (CropWork and others), so far: the items that it is counted in, but whole warps where
-  /// that is cycles or instructions.
+  /// Of a kind of work, so far.
   std::uint64_t items(unsigned kind) const { return items_[kind]; }
+  const Items& items() const { return items_; }
   const std::vector<WorkKind>& work() const { return work_; }
   /// Throws SimulationFault if it did work of a kind that it has not declared.
   void check_work() const;
@@ -177,10 +177,17 @@ class UntimedUnit : public Component {
   virtual void prefetch(const Warp&) {}
   /// For the unit that launches warps: who is to know of them. It outlives this one.
   virtual void prefetch_for(UntimedUnit& /*blender*/) {}
-  /// For `bound`: from now on counts the work alone that any run with time makes.
+  // For `bound`:
+  /// As far as it is up to this unit.
+  virtual BoundTerms terms() const { return {}; }
+  /// From now on counts the work alone that any run with time makes.
   virtual void count_least(const BoundTerms&) {}
-  /// The least cycles of so much of it, which can begin at once.
-  virtual double least_cycles(const Items&) const { return 0; }
+  /// What so much work takes at least. `to_last`: up to the last item, for the rest of whose interval nobody waits.
+  virtual std::vector<OccupancyPart> least_parts(const Items& items, bool to_last) const;
+  /// The least cycles of so much, which can begin at once.
+  virtual double least_cycles(const Items& items) const { return busiest(least_parts(items, false)); }
+  /// In which it does nothing more after the last item has gone, at most: the rest of an interval.
+  virtual double idle_after_last() const;
   /// Warps between TC and the end of CROP that it has room for, at worst.
   virtual std::uint64_t room_in_warps() const { return 0; }
 

@@ -6,28 +6,22 @@
 #include <vector>
 
 #include <vrpipe/kernel/accounting.h>
-#include <vrpipe/kernel/rate.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 
 namespace vrpipe {
 
+struct PropTime;
+
 /// Slot `prop`: hands bins to ZROP and on to QRU, and shaded warps to CROP in order.
 class PropBehaviour : public Behaviour {
  public:
-  enum class Order : std::uint8_t { draw, tile };
-  struct TimingParameters {
-    std::uint32_t quads_per_cycle;  ///< TC to ZROP to QRU
-    Rate color_rate;                ///< of quads to CROP, of this draw's format
-    std::uint32_t latency_cycles;
-    Order order;
-  };
-  virtual TimingParameters timing() const = 0;
+  /// What its work takes: the parameters of its timing models (modules/prop/prop.h).
+  virtual const PropTime& time() const = 0;
 };
 
-/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+/// The slot's kinds of work.
 struct PropWork {
   enum : unsigned { bins, tested, color, empty_warps, late };  ///< `late`: quads to be tested late
-  static std::vector<WorkKind> kinds(const PropBehaviour::TimingParameters& timing);
 };
 
 /// The slot's SlotCheck.

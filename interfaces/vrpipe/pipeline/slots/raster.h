@@ -10,6 +10,8 @@
 
 namespace vrpipe {
 
+struct RasterTime;
+
 /// Slot `raster`: setup, coarse and fine rasterisation of one primitive at a time.
 class RasterBehaviour : public Behaviour {
  public:
@@ -24,15 +26,8 @@ class RasterBehaviour : public Behaviour {
   /// Whether, once it has passed a mark on, it begins no primitive before that comes back as an update: with strict
   /// termination, where time decides nothing.
   virtual bool waits_at(Mark /*mark*/) const { return false; }
-  struct TimingParameters {
-    std::uint32_t setup_latency_cycles;
-    std::uint32_t setup_interval_thousandths;        ///< of a cycle, between primitives
-    std::uint32_t coarse_tiles_per_cycle;            ///< raster tiles tested
-    std::uint32_t fine_tiles_per_cycle;              ///< raster tiles made into quads
-    std::uint32_t screen_tile_interval_thousandths;  ///< of a cycle, between (primitive, screen tile) pairs
-    std::uint32_t quads_per_cycle;                   ///< handed to TC
-  };
-  virtual TimingParameters timing() const = 0;
+  /// What its work takes: the parameters of its timing models (modules/raster/raster.h).
+  virtual const RasterTime& time() const = 0;
 
   void add_to(Counts& counts, const CountOf& of) const override {
     counts.quads_rasterized += of(quads_rasterized);
@@ -48,10 +43,9 @@ class RasterBehaviour : public Behaviour {
   Counter screen_tile_pairs{*this, "screen_tile_pairs", "pairs", "of a primitive and a screen tile that it may cover"};
 };
 
-/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+/// The slot's kinds of work.
 struct RasterWork {
   enum : unsigned { setup, coarse, fine, pairs, quads };
-  static std::vector<WorkKind> kinds(const RasterBehaviour::TimingParameters& timing);
 };
 
 /// The slot's SlotCheck.

@@ -18,6 +18,13 @@ struct ShaderSegment {
   std::uint32_t stall_cycles;
 };
 
+/// Of a program.
+inline std::uint64_t instructions_in(const std::vector<ShaderSegment>& program) {
+  std::uint64_t sum = 0;
+  for (const ShaderSegment& segment : program) sum += segment.instructions;
+  return sum;
+}
+
 /// How an SM array fetches vertices and attributes where its memory port is connected.
 struct AttributeFetch {
   std::uint32_t attribute_bytes = 40;    ///< of a primitive, that the fragment shader reads

@@ -10,6 +10,8 @@
 
 namespace vrpipe {
 
+struct TcTime;
+
 /// Slot `tc`: collects quads per screen tile.
 class TcBehaviour : public Behaviour {
  public:
@@ -24,17 +26,8 @@ class TcBehaviour : public Behaviour {
   virtual unsigned insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) = 0;
   /// Flushes the bin whose turn it is (the shipped unit's: allocated first); false when all are empty.
   virtual bool flush_oldest(FlushReason reason, Flush& out) = 0;
-  struct TimingParameters {
-    std::uint32_t quads_per_cycle;
-    std::uint32_t latency_cycles;
-    std::uint32_t idle_timeout_cycles;  ///< without an incoming quad until bins are flushed; 0: never
-    std::uint32_t flush_queue_bins;     ///< flushed bins that wait for PROP
-    /// The time-out that applies. None in strict termination: the contents of bins would depend on time.
-    std::uint32_t timeout_in(Termination termination) const {
-      return termination == Termination::strict ? 0 : idle_timeout_cycles;
-    }
-  };
-  virtual TimingParameters timing() const = 0;
+  /// What its work takes: the parameters of its timing models (modules/tc/tc.h).
+  virtual const TcTime& time() const = 0;
 
   void add_to(Counts& counts, const CountOf& of) const override { counts.tc_flushes += of(flushes); }
 
@@ -48,10 +41,9 @@ struct BinStorage {
   bool in_use = false;
 };
 
-/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
+/// The slot's kinds of work.
 struct TcWork {
   enum : unsigned { quads, beats };
-  static std::vector<WorkKind> kinds(const TcBehaviour::TimingParameters& timing);
 };
 
 /// The slot's SlotCheck.
