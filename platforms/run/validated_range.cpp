@@ -45,11 +45,11 @@ std::vector<std::string> outside_validated_range(const std::vector<std::pair<std
     for (const ValidatedRange& range : Registry::instance().slot(slot).validated) {
       if (name.compare(dot + 1, std::string::npos, range.parameter) != 0) continue;
       const std::uint64_t number = std::stoull(value);
-      const auto outside = [&](const char* side, std::uint64_t limit, const char* which) {
-        reasons.push_back(fmt::format("{}={} is {} {}, the {} that was validated", name, value, side, limit, which));
-      };
-      if (number < range.least) outside("below", range.least, "least");
-      if (number > range.most) outside("above", range.most, "most");
+      if (number >= range.least && number <= range.most) continue;
+      const bool is_below = number < range.least;
+      reasons.push_back(fmt::format("{}={} is {} {}, the {} that was validated", name, value,
+                                    is_below ? "below" : "above", is_below ? range.least : range.most,
+                                    is_below ? "least" : "most"));
     }
   }
   return reasons;

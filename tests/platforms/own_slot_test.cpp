@@ -8,6 +8,7 @@
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/registry.h>
+#include <vrpipe/platforms/netlist.h>
 
 #include "support/builders.h"
 #include "support/simulate.h"
