@@ -14,12 +14,17 @@ struct Point {
   double x, y;
 };
 
-std::int32_t snap(double pixels, double steps_per_pixel) {
+std::int32_t to_steps(double pixels, double steps_per_pixel) {
   return static_cast<std::int32_t>(std::floor(pixels * steps_per_pixel + 0.5));
 }
 
+/// False for NaN.
 bool in_guard_band(const Point& point) {
   return std::fabs(point.x) <= guard_band_pixels && std::fabs(point.y) <= guard_band_pixels;
+}
+bool in_guard_band(const std::array<Point, 4>& corners) {
+  return in_guard_band(corners[0]) && in_guard_band(corners[1]) && in_guard_band(corners[2]) &&
+         in_guard_band(corners[3]);
 }
 
 /// The part of [-1, 1] along an axis that can reach the viewport's circumcircle.
@@ -72,44 +77,55 @@ bool box_corners(const RenderContext& context, const DrawState& state, const Spl
   };
   const auto set_corners = [&] { corners = {corner(a0, b0), corner(a1, b0), corner(a0, b1), corner(a1, b1)}; };
   set_corners();
-  if (!std::all_of(corners.begin(), corners.end(), in_guard_band)) {
-    const double width = context.frame->width();
-    const double height = context.frame->height();
-    const Point view_center{width / 2, height / 2};
-    const double view_radius = 0.5 * std::sqrt(width * width + height * height) + 2.0;
-    cut_axis(center, a, view_center, view_radius, a0, a1);
-    cut_axis(center, b, view_center, view_radius, b0, b1);
-    set_corners();
-  }
-  // Also false for NaN; a box off to one side of the screen keeps a far corner only when it misses the viewport.
-  return std::all_of(corners.begin(), corners.end(), in_guard_band);
+  if (in_guard_band(corners)) return true;
+  const double width = context.frame->width();
+  const double height = context.frame->height();
+  const Point view_center{width / 2, height / 2};
+  const double view_radius = 0.5 * std::sqrt(width * width + height * height) + 2.0;
+  cut_axis(center, a, view_center, view_radius, a0, a1);
+  cut_axis(center, b, view_center, view_radius, b0, b1);
+  set_corners();
+  // A box off to one side of the screen keeps a far corner only when it misses the viewport.
+  return in_guard_band(corners);
 }
 
 }  // namespace
 
-bool snap_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
-                   SnappedTriangle& out) {
-  const DrawCall& call = context.draw(draw);
-  const auto steps = static_cast<double>(1U << context.precision.subpixel_bits);
-  const auto put = [&](unsigned vertex, const Point& point) {
-    out.x[vertex] = snap(point.x, steps);
-    out.y[vertex] = snap(point.y, steps);
-  };
+bool TriangleSnapper::snap(DrawIndex draw, std::uint32_t splat, unsigned triangle, SnappedTriangle& out) {
+  constexpr unsigned order[2][3] = {{0, 1, 2}, {1, 3, 2}};
+  const DrawCall& call = context_.draw(draw);
+  const auto steps = static_cast<double>(1U << context_.precision.subpixel_bits);
   const bool is_mesh = call.geometry->is_mesh();
   if (const ScreenTriangle* const given = call.triangle(splat); is_mesh || given != nullptr) {
     for (unsigned vertex = 0; vertex < 3; ++vertex) {
       const MeshVertex* const of_mesh = is_mesh ? &call.mesh_triangle(splat).vertices[vertex] : nullptr;
       const Point point = is_mesh ? Point{of_mesh->x, of_mesh->y} : Point{given->x[vertex], given->y[vertex]};
       if (!in_guard_band(point)) return false;
-      put(vertex, point);
+      out.x[vertex] = to_steps(point.x, steps);
+      out.y[vertex] = to_steps(point.y, steps);
     }
     return true;
   }
-  std::array<Point, 4> corners;
-  if (!box_corners(context, call.state, call.splat(splat), corners)) return false;
-  constexpr unsigned order[2][3] = {{0, 1, 2}, {1, 3, 2}};
-  for (unsigned vertex = 0; vertex < 3; ++vertex) put(vertex, corners[order[triangle][vertex]]);
+  if (splat_ != splat) {
+    splat_ = splat;
+    std::array<Point, 4> corners;
+    is_finite_ = box_corners(context_, call.state, call.splat(splat), corners);
+    for (unsigned corner = 0; is_finite_ && corner < 4; ++corner) {
+      x_[corner] = to_steps(corners[corner].x, steps);
+      y_[corner] = to_steps(corners[corner].y, steps);
+    }
+  }
+  if (!is_finite_) return false;
+  for (unsigned vertex = 0; vertex < 3; ++vertex) {
+    out.x[vertex] = x_[order[triangle][vertex]];
+    out.y[vertex] = y_[order[triangle][vertex]];
+  }
   return true;
+}
+
+bool snap_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
+                   SnappedTriangle& out) {
+  return TriangleSnapper(context).snap(draw, splat, triangle, out);
 }
 
 std::int64_t doubled_area(const SnappedTriangle& t) {
@@ -165,8 +181,14 @@ bool is_back_face(const Draw& draw, const SnappedTriangle& triangle) {
 
 Culling cull_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
                       PixelRect& bounds) {
+  TriangleSnapper snapper(context);
+  return cull_triangle(context, snapper, draw, splat, triangle, bounds);
+}
+
+Culling cull_triangle(const RenderContext& context, TriangleSnapper& snapper, DrawIndex draw, std::uint32_t splat,
+                      unsigned triangle, PixelRect& bounds) {
   SnappedTriangle snapped;
-  if (!snap_triangle(context, draw, splat, triangle, snapped)) return Culling::not_finite;
+  if (!snapper.snap(draw, splat, triangle, snapped)) return Culling::not_finite;
   if (doubled_area(snapped) == 0) return Culling::zero_area;
   const DrawCall& call = context.draw(draw);
   if (draws_rectangles(call)) {

@@ -28,32 +28,50 @@ constexpr unsigned coverage_shift = 40;
 constexpr unsigned triangle_shift = 48;
 constexpr unsigned draw_shift = 49;
 
-/// Puts those of four quads in a row of the raster tile that are covered, 4 bits each, one after the other; returns how
-/// many. A quad is one word, since one of narrow stores would be waited for when it is copied. All four are written,
-/// since a branch would be mispredicted too often.
-unsigned put_covered(Quad* out, Words quads, std::uint64_t coverage) {
-  const Words covered = ((Words{} + coverage) >> Words{0, 4, 8, 12}) & all_lanes;
+/// Of a raster tile's 4x4 quads, 4 bits each: the samples in the first so many columns, and rows.
+struct SamplesBelow {
+  std::array<std::uint64_t, raster_side + 1> columns{}, rows{};
+};
+constexpr SamplesBelow samples_below = [] {
+  SamplesBelow below;
+  for (unsigned line = 0; line < raster_side; ++line) {
+    std::uint64_t column = 0;
+    std::uint64_t row = 0;
+    for (unsigned quad = 0; quad < 4; ++quad) {
+      column |= std::uint64_t{0b0101} << (line % 2 + 4 * (4 * quad + line / 2));
+      row |= std::uint64_t{0b0011} << (2 * (line % 2) + 4 * (quad + 4 * (line / 2)));
+    }
+    below.columns[line + 1] = below.columns[line] | column;
+    below.rows[line + 1] = below.rows[line] | row;
+  }
+  return below;
+}();
+
+/// Puts those of four quads in a row of the raster tile that are covered one after the other; returns how many. A quad is
+/// one word, since one of narrow stores would be waited for when it is copied. All four are written, since a branch would
+/// be mispredicted too often.
+unsigned put_covered(Quad* out, Words quads, Words covered) {
   quads |= covered << coverage_shift;
 #if defined(__AVX2__)
-  // By the bits of those that are covered: where the halves of each come from.
+  // By the bits of those that are not covered: where the halves of the others come from.
   static constexpr auto halves_from = [] {
     std::array<std::array<std::int32_t, 8>, 16> from{};
-    for (unsigned bits = 0; bits < 16; ++bits) {
+    for (unsigned empty = 0; empty < 16; ++empty) {
       unsigned put = 0;
       for (std::int32_t quad = 0; quad < 4; ++quad) {
-        if ((bits >> quad & 1U) == 0) continue;
-        from[bits][put++] = 2 * quad;
-        from[bits][put++] = 2 * quad + 1;
+        if ((empty >> quad & 1U) != 0) continue;
+        from[empty][put++] = 2 * quad;
+        from[empty][put++] = 2 * quad + 1;
       }
     }
     return from;
   }();
-  const unsigned bits = sign_mask(reinterpret_cast<Words>(covered != 0));
+  const unsigned empty = sign_mask(reinterpret_cast<Words>(covered == 0));
   LanePairBits from;
-  std::memcpy(&from, &halves_from[bits], sizeof from);
+  std::memcpy(&from, &halves_from[empty], sizeof from);
   const LanePairBits packed = __builtin_ia32_permvarsi256(reinterpret_cast<LanePairBits>(quads), from);
   std::memcpy(static_cast<void*>(out), &packed, sizeof packed);
-  return popcount(static_cast<LaneMask>(bits));
+  return 4 - popcount(static_cast<LaneMask>(empty));
 #else
   unsigned count = 0;
   for (unsigned quad = 0; quad < 4; ++quad) {
@@ -68,6 +86,7 @@ unsigned put_covered(Quad* out, Words quads, std::uint64_t coverage) {
 
 TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderContext& context)
     : context_(context),
+      snapper_(context),
       time_(parameters),
       wide_edges_gate_(context, "raster.wide_edges"),
       binned_gate_(context, "tgc.binning"),
@@ -110,7 +129,7 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   tests_hi_z_ = hi_z_ != nullptr && hi_z_->begin(primitive);
   if (draws_rectangles(context_.draw(primitive.draw))) return set_up_rectangle();
   SnappedTriangle t;
-  if (!snap_triangle(context_, primitive.draw, primitive.splat, primitive.triangle, t)) {
+  if (!snapper_.snap(primitive.draw, primitive.splat, primitive.triangle, t)) {
     throw SimulationFault("raster", 0, "primitive of splat " + std::to_string(primitive.splat) + " has no vertices");
   }
   if (doubled_area(t) < 0) {
@@ -134,11 +153,23 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
     const bool top_left = (down == 0 && across > 0) || down < 0;
     edge.origin = across * (half - t.y[i]) - down * (half - t.x[i]) - (top_left ? 0 : 1);
     if (std::abs(edge.dx) + std::abs(edge.dy) > narrow_gradient) wide_ = true;
+    edge.set_up_tile();
     magnitudes |= std::abs(edge.origin) + std::abs(edge.dx) * width + std::abs(edge.dy) * height;
   }
   if (wide_ && !wide_edges_gate_.enter()) wide_ = false;
   if (wide_) ++wide_edges;
   widest_edge.see(static_cast<std::uint64_t>(65 - __builtin_clzll(static_cast<unsigned long long>(magnitudes))));
+}
+
+void TileRasterizer::Edge::set_up_tile() {
+  // The largest value over a tile's samples is at the corner to which the gradient points.
+  reach = (raster_side - 1) * (std::max<std::int64_t>(dx, 0) + std::max<std::int64_t>(dy, 0));
+  // Of edges that are too wide, which are filled by these only if that effect was left out by force, the low bits.
+  const auto across = static_cast<std::int32_t>(dx);
+  const auto down = static_cast<std::int32_t>(dy);
+  samples = across * LanePairBits{0, 1, 0, 1, 0, 1, 0, 1} + down * LanePairBits{0, 0, 1, 1, 2, 2, 3, 3};
+  right = LanePairBits{} + 2 * across;
+  below = LanePairBits{} + 4 * down;
 }
 
 /// It covers its bounds: edges that have no sample outside, and all beyond the bounds masked off.
@@ -176,22 +207,20 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
     if (shares_tiles_ && !context_.placement.owns(tile)) continue;
     ++coarse_tests;
     std::int64_t value[3];
-    bool rejected = false;
+    std::int64_t most = 0;  // below 0 if that of any edge is
     for (unsigned i = 0; i < 3; ++i) {
       const Edge& edge = edges_[i];
       value[i] = edge.origin + edge.dx * x + edge.dy * y;
-      // The largest value over the tile's samples is at the corner to which the gradient points.
-      const std::int64_t most =
-          value[i] + 7 * (std::max<std::int64_t>(edge.dx, 0) + std::max<std::int64_t>(edge.dy, 0));
-      rejected = rejected || most < 0;
+      most |= value[i] + edge.reach;
     }
-    if (rejected || (tests_hi_z_ && is_hidden(tile, x, y))) continue;
+    if (most < 0 || (tests_hi_z_ && is_hidden(tile, x, y))) continue;
 
     out.tile = tile;
-    out.count = 0;
     out.last_of_bin = false;
     out.mark = Mark::none;
-    const unsigned fragments = wide_ ? fill_wide(out, x, y, value) : fill_narrow(out, x, y, value);
+    const std::uint64_t covered = (wide_ ? coverage_of_wide(value) : coverage_of_narrow(value)) & in_area(x, y);
+    const auto fragments = static_cast<unsigned>(__builtin_popcountll(covered));
+    put_quads(out, x, y, covered);
     quads_rasterized.add(primitive_.draw, out.count);
     fragments_rasterized.add(primitive_.draw, fragments);
     if (context_.fragments != nullptr) tell(out);
@@ -216,45 +245,51 @@ bool TileRasterizer::is_hidden(TileId tile, std::int32_t x, std::int32_t y) {
   return is_hidden;
 }
 
-LaneMask TileRasterizer::in_area(std::int32_t x, std::int32_t y) const {
-  unsigned mask = all_lanes;
-  if (x < mask_area_.x0) mask &= x + 1 < mask_area_.x0 ? 0U : 0b1010U;
-  if (x + 1 >= mask_area_.x1) mask &= x >= mask_area_.x1 ? 0U : 0b0101U;
-  if (y < mask_area_.y0) mask &= y + 1 < mask_area_.y0 ? 0U : 0b1100U;
-  if (y + 1 >= mask_area_.y1) mask &= y >= mask_area_.y1 ? 0U : 0b0011U;
-  return static_cast<LaneMask>(mask);
+std::uint64_t TileRasterizer::in_area(std::int32_t x, std::int32_t y) const {
+  if (x >= mask_area_.x0 && y >= mask_area_.y0 && x + raster_side <= mask_area_.x1 &&
+      y + raster_side <= mask_area_.y1) {
+    return ~std::uint64_t{0};
+  }
+  const auto up_to = [](std::int32_t line) { return static_cast<std::size_t>(std::clamp(line, 0, raster_side)); };
+  const auto& [columns, rows] = samples_below;
+  return columns[up_to(mask_area_.x1 - x)] & ~columns[up_to(mask_area_.x0 - x)] & rows[up_to(mask_area_.y1 - y)] &
+         ~rows[up_to(mask_area_.y0 - y)];
 }
 
-unsigned TileRasterizer::fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]) {
-  // Two quads of a row at a time. No edge function may be negative inside.
-  LanePairBits at[3];
-  LanePairBits right[3];
-  LanePairBits down[3];
+std::uint64_t TileRasterizer::coverage_of_narrow(const std::int64_t (&value)[3]) const {
+  // The quads of a column in two rows at a time. No edge function may be negative inside.
+  LanePairBits upper[3];
   for (unsigned i = 0; i < 3; ++i) {
-    const auto start = static_cast<std::int32_t>(std::clamp(value[i], -narrow_limit, narrow_limit));
-    // Of edges that are too wide, which are here only if that effect was left out by force, the low bits.
-    const auto step = [&edge = edges_[i]](std::int64_t columns, std::int64_t rows) {
-      return static_cast<std::int32_t>(columns * edge.dx + rows * edge.dy);
-    };
-    at[i] = LanePairBits{0, step(1, 0), step(0, 1), step(1, 1), step(2, 0), step(3, 0), step(2, 1), step(3, 1)} + start;
-    right[i] = LanePairBits{} + step(4, 0);
-    down[i] = LanePairBits{} + step(0, 2);
+    upper[i] = edges_[i].samples + static_cast<std::int32_t>(std::clamp(value[i], -narrow_limit, narrow_limit));
   }
-  std::uint64_t coverage = 0;  // of the 4x4 quads, 4 bits each
-  for (unsigned row = 0; row < 4; ++row) {
-    coverage |= std::uint64_t{~sign_mask(at[0] | at[1] | at[2]) & 0xffU} << (16 * row);
-    coverage |= std::uint64_t{~sign_mask((at[0] + right[0]) | (at[1] + right[1]) | (at[2] + right[2])) & 0xffU}
-                << (16 * row + 8);
-    for (unsigned i = 0; i < 3; ++i) at[i] += down[i];
-  }
-  if (x < mask_area_.x0 || y < mask_area_.y0 || x + raster_side > mask_area_.x1 || y + raster_side > mask_area_.y1) {
-    for (unsigned quad = 0; quad < 16; ++quad) {
-      const auto column = static_cast<std::int32_t>(quad % 4);
-      const auto row = static_cast<std::int32_t>(quad / 4);
-      const auto outside = static_cast<LaneMask>(in_area(x + 2 * column, y + 2 * row) ^ all_lanes);
-      coverage &= ~(std::uint64_t{outside} << (4 * quad));
+  std::uint64_t outside = 0;
+  for (unsigned half = 0; half < 2; ++half) {
+    LanePairBits at[3];
+    for (unsigned i = 0; i < 3; ++i) at[i] = half == 0 ? upper[i] : upper[i] + edges_[i].below;
+    LanePairBits of_column[4];
+    for (LanePairBits& any : of_column) {
+      any = at[0] | at[1] | at[2];
+      for (unsigned i = 0; i < 3; ++i) at[i] += edges_[i].right;
     }
+    outside |= std::uint64_t{sign_masks(of_column)} << (32 * half);
   }
+  return ~outside;
+}
+
+std::uint64_t TileRasterizer::coverage_of_wide(const std::int64_t (&value)[3]) const {
+  std::uint64_t coverage = 0;
+  for (unsigned sample = 0; sample < 64; ++sample) {
+    const unsigned quad = sample / 4;
+    const unsigned x = 2 * (quad % 4) + sample % 2;
+    const unsigned y = 2 * (quad / 4) + sample / 2 % 2;
+    bool inside = true;
+    for (unsigned i = 0; i < 3; ++i) inside = inside && value[i] + edges_[i].dx * x + edges_[i].dy * y >= 0;
+    coverage |= std::uint64_t{inside} << sample;
+  }
+  return coverage;
+}
+
+void TileRasterizer::put_quads(QuadBeat& out, std::int32_t x, std::int32_t y, std::uint64_t coverage) const {
   const unsigned first =
       static_cast<unsigned>((y % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) + (x % tile_side) / 2);
   const std::uint64_t upper_left = primitive_.splat | std::uint64_t{first} << position_shift |
@@ -264,38 +299,11 @@ unsigned TileRasterizer::fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t
   Words quads = upper_left + Words{0, to_the_right, 2 * to_the_right, 3 * to_the_right};
   unsigned count = 0;
   for (unsigned row = 0; row < 4; ++row) {
-    count += put_covered(&out.quads[count], quads, coverage >> (16 * row));
+    const Words covered = ((Words{} + coverage) >> (Words{0, 4, 8, 12} + 16 * row)) & all_lanes;
+    count += put_covered(&out.quads[count], quads, covered);
     quads += quads_per_tile_row * to_the_right;
   }
   out.count = static_cast<std::uint8_t>(count);
-  return static_cast<unsigned>(__builtin_popcountll(coverage));
-}
-
-unsigned TileRasterizer::fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]) {
-  unsigned fragments = 0;
-  for (std::int32_t row = 0; row < raster_side; row += 2) {
-    for (std::int32_t column = 0; column < raster_side; column += 2) {
-      unsigned mask = 0;
-      for (std::int32_t lane = 0; lane < 4; ++lane) {
-        const std::int32_t dx = column + (lane & 1);
-        const std::int32_t dy = row + (lane >> 1);
-        bool inside = true;
-        for (unsigned i = 0; i < 3; ++i) inside = inside && value[i] + edges_[i].dx * dx + edges_[i].dy * dy >= 0;
-        mask |= (inside ? 1U : 0U) << lane;
-      }
-      mask &= in_area(x + column, y + row);
-      if (mask == 0) continue;
-      Quad& quad = out.quads[out.count++];
-      quad.splat = primitive_.splat;
-      quad.position = static_cast<std::uint8_t>(
-          ((y + row) % tile_side) / 2 * static_cast<std::int32_t>(quads_per_tile_row) + ((x + column) % tile_side) / 2);
-      quad.coverage = static_cast<LaneMask>(mask);
-      quad.triangle = primitive_.triangle & 1U;
-      quad.draw = primitive_.draw & most_draws;
-      fragments += popcount(quad.coverage);
-    }
-  }
-  return fragments;
 }
 
 namespace {

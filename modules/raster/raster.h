@@ -129,17 +129,27 @@ class TileRasterizer : public RasterBehaviour {
   struct Edge {
     std::int64_t dx = 0, dy = 0;  ///< change of the edge function a pixel to the right and down
     std::int64_t origin = 0;      ///< at the sample of pixel (0, 0), top-left rule included
+    // Of a raster tile, beyond its first sample:
+    std::int64_t reach = 0;  ///< the largest
+    LanePairBits samples{}, right{},
+        below{};  ///< in 32 bits: of the first column's upper quads; to the next column, the lower
+    void set_up_tile();
   };
-  unsigned fill_narrow(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]);
-  unsigned fill_wide(QuadBeat& out, std::int32_t x, std::int32_t y, const std::int64_t (&value)[3]);
+  /// Samples of a raster tile that are inside, 4 bits for each of its 4x4 quads: by the values at its first one.
+  std::uint64_t coverage_of_narrow(const std::int64_t (&value)[3]) const;
+  std::uint64_t coverage_of_wide(const std::int64_t (&value)[3]) const;
   void set_up_rectangle();
   void tell(const QuadBeat& made) const;
-  LaneMask in_area(std::int32_t x, std::int32_t y) const;
+  /// Those of the raster tile that begins at a pixel that are not masked off.
+  std::uint64_t in_area(std::int32_t x, std::int32_t y) const;
+  /// All quads of it that are covered.
+  void put_quads(QuadBeat& out, std::int32_t x, std::int32_t y, std::uint64_t coverage) const;
   bool advance();
   /// Whether Hi-Z culls the raster tile that begins at a pixel.
   [[gnu::noinline]] bool is_hidden(TileId tile, std::int32_t x, std::int32_t y);
 
   const RenderContext& context_;
+  TriangleSnapper snapper_;
   const RasterTime time_;
   Edge edges_[3];
   bool wide_ = false;

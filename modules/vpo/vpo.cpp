@@ -41,10 +41,11 @@ unsigned PrimitiveAssembly::assemble(DrawIndex draw, std::uint32_t splat, std::a
     const Splat& given = call.splat(splat);
     if (given.r > 0) smallest_determinant.see(determinant(given));
   }
+  TriangleSnapper snapper(context_);
   unsigned count = 0;
   for (unsigned triangle = 0; triangle < primitives_per_splat(call); ++triangle) {
     PixelRect bounds;
-    switch (cull_triangle(context_, draw, splat, triangle, bounds)) {
+    switch (cull_triangle(context_, snapper, draw, splat, triangle, bounds)) {
       case Culling::not_finite: ++dropped_not_finite; return 0;
       case Culling::zero_area: ++culled_zero_area; continue;
       case Culling::facing:

@@ -31,7 +31,12 @@ inline LanePairBits join(LaneBits first, LaneBits second) {
 inline Lanes first_of(LanePair pair) { return __builtin_shufflevector(pair, pair, 0, 1, 2, 3); }
 inline Lanes second_of(LanePair pair) { return __builtin_shufflevector(pair, pair, 4, 5, 6, 7); }
 
+/// One of the two, twice.
+inline LanePair first_twice(LanePair pair) { return __builtin_shufflevector(pair, pair, 0, 1, 2, 3, 0, 1, 2, 3); }
+inline LanePair second_twice(LanePair pair) { return __builtin_shufflevector(pair, pair, 4, 5, 6, 7, 4, 5, 6, 7); }
+
 inline Lanes splat_lanes(float value) { return Lanes{value, value, value, value}; }
+inline LanePair splat_pair(float value) { return LanePair{value, value, value, value, value, value, value, value}; }
 
 template <class Floats>
 inline BitsOf<Floats> bits_of(Floats value) {
@@ -70,6 +75,22 @@ inline unsigned sign_mask(LanePairBits bits) {
 #endif
 }
 
+/// The sign bits of four pairs: those of the firsts in the lower 16 bits, those of the seconds in the upper.
+inline std::uint32_t sign_masks(const LanePairBits (&pairs)[4]) {
+#if defined(__AVX2__)
+  const auto lower = __builtin_ia32_packssdw256(pairs[0], pairs[1]);
+  const auto upper = __builtin_ia32_packssdw256(pairs[2], pairs[3]);
+  return static_cast<std::uint32_t>(__builtin_ia32_pmovmskb256(__builtin_ia32_packsswb256(lower, upper)));
+#else
+  std::uint32_t masks = 0;
+  for (unsigned pair = 0; pair < 4; ++pair) {
+    const unsigned mask = sign_mask(pairs[pair]);
+    masks |= (mask & 0xFU) << (4 * pair) | (mask >> 4U) << (16 + 4 * pair);
+  }
+  return masks;
+#endif
+}
+
 /// Four words of 64 bits side by side.
 using Words = std::uint64_t __attribute__((vector_size(32)));
 
@@ -82,6 +103,17 @@ inline unsigned sign_mask(Words words) {
   unsigned mask = 0;
   for (int word = 0; word < 4; ++word) mask |= static_cast<unsigned>(words[word] >> 63U) << word;
   return mask;
+#endif
+}
+
+/// Whether any bit is set in any lane.
+inline bool any_bit(LanePairBits bits) {
+  const auto words = reinterpret_cast<Words>(bits);
+#if defined(__AVX__)
+  using Integers = long long __attribute__((vector_size(32)));
+  return __builtin_ia32_ptestz256(reinterpret_cast<Integers>(words), reinterpret_cast<Integers>(words)) == 0;
+#else
+  return (words[0] | words[1] | words[2] | words[3]) != 0;
 #endif
 }
 

@@ -21,6 +21,19 @@ constexpr double guard_band_pixels = 32768.0;
 bool snap_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
                    SnappedTriangle& out);
 
+/// The same for primitives in their order: both triangles of a splat are of one box, which is snapped once.
+class TriangleSnapper {
+ public:
+  explicit TriangleSnapper(const RenderContext& context) : context_(context) {}
+  bool snap(DrawIndex draw, std::uint32_t splat, unsigned triangle, SnappedTriangle& out);
+
+ private:
+  const RenderContext& context_;
+  std::uint32_t splat_ = ~0U;  ///< of the box
+  bool is_finite_ = false;
+  std::array<std::int32_t, 4> x_{}, y_{};  ///< its corners
+};
+
 /// Whether a draw's splats are a rectangle each: one primitive, which covers its bounds. Its snapped triangle has the corners
 /// upper left, upper right and lower left.
 inline bool draws_rectangles(const DrawCall& draw) {
@@ -87,6 +100,8 @@ enum class Culling : std::uint8_t {
 /// `bounds` gets those of a triangle that is not culled.
 Culling cull_triangle(const RenderContext& context, DrawIndex draw, std::uint32_t splat, unsigned triangle,
                       PixelRect& bounds);
+Culling cull_triangle(const RenderContext& context, TriangleSnapper& snapper, DrawIndex draw, std::uint32_t splat,
+                      unsigned triangle, PixelRect& bounds);
 
 /// How many primitives a splat of a draw is.
 inline unsigned primitives_per_splat(const DrawCall& draw) {
