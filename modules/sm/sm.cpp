@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include <fmt/format.h>
 #include <vrpipe/arithmetic/exp2.h>
@@ -18,14 +19,16 @@ constexpr float half_log2_e = 0.72134752F;
 // Of the axes' determinant, px^2: below it the inverse overflows, and flushing denormals would decide.
 constexpr float smallest_determinant = 1e-30F;
 
-/// Sample positions of the quads of a screen tile, by column and by row.
+/// Sample positions of the quads of a screen tile.
 struct Samples {
-  Lanes x[quads_per_tile_row];
-  Lanes y[quads_per_tile_row];
+  struct OfQuad {
+    Lanes x, y;
+  } of[positions_per_tile];
   Samples() {
-    for (unsigned i = 0; i < quads_per_tile_row; ++i) {
-      x[i] = 2.0F * static_cast<float>(i) + Lanes{0.5F, 1.5F, 0.5F, 1.5F};
-      y[i] = 2.0F * static_cast<float>(i) + Lanes{0.5F, 0.5F, 1.5F, 1.5F};
+    for (unsigned position = 0; position < positions_per_tile; ++position) {
+      const auto x = static_cast<float>(2 * (position % quads_per_tile_row));
+      const auto y = static_cast<float>(2 * (position / quads_per_tile_row));
+      of[position] = {x + Lanes{0.5F, 1.5F, 0.5F, 1.5F}, y + Lanes{0.5F, 0.5F, 1.5F, 1.5F}};
     }
   }
 };
@@ -100,17 +103,16 @@ void SplatShader::set_up(Attributes& attributes, const Quad& quad) {
   const float largest = std::max({splat.red, splat.green, splat.blue});
   const float least = std::min({splat.red, splat.green, splat.blue});
   if (!(least >= 0.0F && largest <= half_max)) ++colors_clamped;
-  attributes = {quad.splat,
-                splat_lanes(splat.cx),
-                splat_lanes(splat.cy),
-                splat_lanes(splat.by * scale),
-                splat_lanes(-splat.bx * scale),
-                splat_lanes(-splat.ay * scale),
-                splat_lanes(splat.ax * scale),
-                splat_lanes(splat.opacity),
-                splat_lanes(clamp_color(splat.red)),
-                splat_lanes(clamp_color(splat.green)),
-                splat_lanes(clamp_color(splat.blue))};
+  attributes = {join(splat_lanes(clamp_color(splat.red)), splat_lanes(clamp_color(splat.green))),
+                join(splat_lanes(clamp_color(splat.blue)), splat_lanes(1.0F)),
+                quad.splat,
+                splat.cx,
+                splat.cy,
+                splat.by * scale,
+                -splat.bx * scale,
+                -splat.ay * scale,
+                splat.ax * scale,
+                splat.opacity};
 }
 
 const SplatShader::Attributes& SplatShader::attributes_of(AttributeTable& table, const Quad& quad) {
@@ -120,7 +122,7 @@ const SplatShader::Attributes& SplatShader::attributes_of(AttributeTable& table,
 }
 
 template <Exponential Kind>
-inline LanePair SplatShader::alpha_at(LanePair x, LanePair y, const AttributePair& splats) {
+inline LanePair SplatShader::alpha_at(LanePair x, LanePair y, const Shape& splats) {
   const LanePair dx = x - splats.cx;
   const LanePair dy = y - splats.cy;
   const LanePair u = dx * splats.m00 + dy * splats.m01;
@@ -158,15 +160,7 @@ void SplatShader::shade_mesh(const Warp& warp, WarpColors& colors) {
                        static_cast<std::int32_t>(warp.tile.y * screen_tile_pixels) + 2 * (quad.position / row));
   };
   const bool shades = mesh_gate_.enter();
-  if (!shades) {
-    for (auto& pair : colors.pairs) pair.red = pair.green = pair.blue = pair.alpha = LanePair{};
-  }
-  for (unsigned i = 0; shades && i < warp.count; i += 2) {
-    const QuadColor first = color_of(warp.quads[i]);
-    const QuadColor second = i + 1U < warp.count ? color_of(warp.quads[i + 1]) : QuadColor{};
-    colors.pairs[i / 2] = {join(first.red, second.red), join(first.green, second.green), join(first.blue, second.blue),
-                           join(first.alpha, second.alpha)};
-  }
+  for (unsigned i = 0; i < warp.count; ++i) colors.quads[i] = shades ? color_of(warp.quads[i]) : QuadColor{};
   for (unsigned i = 0; i < warp.count; ++i) colors.covered |= static_cast<unsigned>(warp.quads[i].coverage) << (4 * i);
   colors.live = colors.covered;
 }
@@ -180,7 +174,7 @@ void SplatShader::shade_by_alpha(const Warp& warp, WarpColors& colors) {
     colors.covered |= static_cast<unsigned>(quad.coverage) << (4 * i);
     colors.live |= (quad.coverage & (reads ? static_cast<unsigned>(sign_mask(alpha >= threshold)) : 0U)) << (4 * i);
   }
-  for (auto& pair : colors.pairs) pair.red = pair.green = pair.blue = pair.alpha = LanePair{};
+  std::fill(std::begin(colors.quads), std::end(colors.quads), QuadColor{});
 }
 
 template <Exponential Kind>
@@ -196,18 +190,19 @@ void SplatShader::shade_splats(const Warp& warp, WarpColors& colors) {
     const Quad& first = warp.quads[i];
     const Quad& second = warp.quads[i + (i < last)];
     const Attributes& of_first = attributes_of(attributes_of_first_, first);
-    const AttributePair splats = first.splat == second.splat
-                                     ? AttributePair(of_first, of_first)
-                                     : AttributePair(of_first, attributes_of(attributes_of_second_, second));
+    const bool is_same = first.splat == second.splat;
+    const Attributes& of_second = is_same ? of_first : attributes_of(attributes_of_second_, second);
+    const Samples::OfQuad& at_first = samples.of[first.position];
+    const Samples::OfQuad& at_second = samples.of[second.position];
     const std::uint32_t covered = first.coverage | (i == last ? 0U : static_cast<unsigned>(second.coverage) << 4U);
-    const LanePair alpha = alpha_at<Kind>(x + join(samples.x[first.position % quads_per_tile_row],
-                                                   samples.x[second.position % quads_per_tile_row]),
-                                          y + join(samples.y[first.position / quads_per_tile_row],
-                                                   samples.y[second.position / quads_per_tile_row]),
-                                          splats);
+    const LanePair alpha = alpha_at<Kind>(x + join(at_first.x, at_second.x), y + join(at_first.y, at_second.y),
+                                          is_same ? Shape(of_first) : Shape(of_first, of_second));
     const LanePairBits kept = (alpha >= pruning_threshold) & expand_mask_pair(covered);
     const LanePair visible = floats_of<LanePair>(bits_of(alpha) & kept);
-    colors.pairs[i / 2] = {visible * splats.red, visible * splats.green, visible * splats.blue, visible};
+    const LanePair to_first = first_twice(visible);
+    const LanePair to_second = second_twice(visible);
+    store({to_first * of_first.red_green, to_first * of_first.blue_one}, colors.quads[i]);
+    store({to_second * of_second.red_green, to_second * of_second.blue_one}, colors.quads[i + 1]);
     colors.covered |= covered << (4 * i);
     colors.live |= sign_mask(kept) << (4 * i);
   }
@@ -234,28 +229,28 @@ void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp
   std::uint32_t merged = 0;  // a bit a thread of a back quad that its front takes up, where both are live
   std::uint32_t merged_quads = 0;
   // Written whether the quad lives or not, since a branch would be mispredicted too often.
-  const auto put = [&](const Quad& quad, LaneMask live, const QuadColor& color) {
-    out.color[count] = color;
+  const auto put = [&](const Quad& quad, LaneMask live, const ChannelPairs& color) {
+    store(color, out.color[count]);
     out.position[count] = quad.position;
     out.live[count] = live;
     out.first_primitive[count] = out.last_primitive[count] = primitive_order(quad);
     if (several_draws_) out.draw[count] = quad.draw;
     count += live != 0;
   };
-  for (unsigned i = 0; i < warp.count; i += 2) {
-    const auto& [red, green, blue, alpha] = colors.pairs[i / 2];
-    const QuadColor front{first_of(red), first_of(green), first_of(blue), first_of(alpha)};
-    const QuadColor back{second_of(red), second_of(green), second_of(blue), second_of(alpha)};
-    const auto live_front = static_cast<LaneMask>(live_of_warp >> (4 * i) & all_lanes);
-    const auto live_back = static_cast<LaneMask>(live_of_warp >> (4 * i + 4) & all_lanes);
-    if ((merge_pairs >> (i / 2) & 1U) != 0 && live_front != 0 && live_back != 0) {
-      put(warp.quads[i], static_cast<LaneMask>(live_front | live_back), blend_front_to_back(front, back));
+  const auto color_of = [&](unsigned quad) { return channel_pairs(colors.quads[quad]); };
+  const auto live_in = [&](unsigned quad) { return static_cast<LaneMask>(live_of_warp >> (4 * quad) & all_lanes); };
+  for (unsigned i = 0; merge_pairs == 0 && i < warp.count; ++i) put(warp.quads[i], live_in(i), color_of(i));
+  for (unsigned i = 0; merge_pairs != 0 && i < warp.count; i += 2) {
+    const LaneMask front = live_in(i);
+    const LaneMask back = i < last ? live_in(i + 1) : LaneMask{0};
+    if ((merge_pairs >> (i / 2) & 1U) != 0 && front != 0 && back != 0) {
+      put(warp.quads[i], static_cast<LaneMask>(front | back), blend_front_to_back(color_of(i), color_of(i + 1)));
       out.last_primitive[count - 1] = primitive_order(warp.quads[i + 1]);
-      merged |= (unsigned{live_front} & live_back) << (4 * i + 4);
+      merged |= (unsigned{front} & back) << (4 * i + 4);
       merged_quads |= 1U << (4 * i + 4);
     } else {
-      put(warp.quads[i], live_front, front);
-      put(warp.quads[i + (i < last)], live_back, back);
+      put(warp.quads[i], front, color_of(i));
+      put(warp.quads[i + (i < last)], back, color_of(i + 1));
     }
   }
   out.count = static_cast<std::uint8_t>(count);

@@ -188,36 +188,40 @@ class SplatShader : public SmBehaviour {
                          "set-ups of a splat with a colour below 0 or beyond the largest half"};
 
  private:
-  /// What the fragment shader needs of a splat, each for the four samples of a quad.
+  /// What the fragment shader needs of a splat.
   struct Attributes {
+    LanePair red_green, blue_one;  ///< the colour, opaque, at a quad's samples
     std::uint32_t splat = ~0U;
-    Lanes cx, cy;
-    Lanes m00, m01, m10, m11;  ///< pixels to sigmas along the two axes
-    Lanes opacity, red, green, blue;
+    float cx, cy;
+    float m00, m01, m10, m11;  ///< pixels to sigmas along the two axes
+    float opacity;
   };
-  /// Those of two quads.
-  struct AttributePair {
-    LanePair cx, cy, m00, m01, m10, m11, opacity, red, green, blue;
-    AttributePair(const Attributes& a, const Attributes& b)
-        : cx(join(a.cx, b.cx)),
-          cy(join(a.cy, b.cy)),
-          m00(join(a.m00, b.m00)),
-          m01(join(a.m01, b.m01)),
-          m10(join(a.m10, b.m10)),
-          m11(join(a.m11, b.m11)),
-          opacity(join(a.opacity, b.opacity)),
-          red(join(a.red, b.red)),
-          green(join(a.green, b.green)),
-          blue(join(a.blue, b.blue)) {}
+  /// Its shape, for the samples of two quads.
+  struct Shape {
+    LanePair cx, cy, m00, m01, m10, m11, opacity;
+    [[gnu::always_inline]] explicit Shape(const Attributes& both)
+        : cx(splat_pair(both.cx)),
+          cy(splat_pair(both.cy)),
+          m00(splat_pair(both.m00)),
+          m01(splat_pair(both.m01)),
+          m10(splat_pair(both.m10)),
+          m11(splat_pair(both.m11)),
+          opacity(splat_pair(both.opacity)) {}
+    [[gnu::always_inline]] Shape(const Attributes& a, const Attributes& b)
+        : cx(join(splat_lanes(a.cx), splat_lanes(b.cx))),
+          cy(join(splat_lanes(a.cy), splat_lanes(b.cy))),
+          m00(join(splat_lanes(a.m00), splat_lanes(b.m00))),
+          m01(join(splat_lanes(a.m01), splat_lanes(b.m01))),
+          m10(join(splat_lanes(a.m10), splat_lanes(b.m10))),
+          m11(join(splat_lanes(a.m11), splat_lanes(b.m11))),
+          opacity(join(splat_lanes(a.opacity), splat_lanes(b.opacity))) {}
   };
   void set_up(Attributes& attributes, const Quad& quad);
   using AttributeTable = std::array<Attributes, 32>;
   const Attributes& attributes_of(AttributeTable& table, const Quad& quad);
-  /// The colours of a warp's quads, two at a time, before merging.
+  /// The colours of a warp's quads, before merging.
   struct WarpColors {
-    struct {
-      LanePair red, green, blue, alpha;
-    } pairs[quads_per_warp / 2];
+    QuadColor quads[quads_per_warp];
     std::uint32_t covered = 0;  ///< threads, a bit each
     std::uint32_t live = 0;     ///< of these, not pruned
   };
@@ -230,7 +234,7 @@ class SplatShader : public SmBehaviour {
   void tell_merged(const Warp& warp, std::uint32_t threads) const;
   /// Alpha at the samples of two quads.
   template <Exponential Kind>
-  static LanePair alpha_at(LanePair x, LanePair y, const AttributePair& splats);
+  static LanePair alpha_at(LanePair x, LanePair y, const Shape& splats);
 
   const RenderContext& context_;
   EffectGate several_draws_gate_;

@@ -86,13 +86,17 @@ inline void store(const ChannelPairs& pairs, QuadColor& out) {
   to[1] = pairs.blue_alpha;
 }
 
+/// The same of pairs of channels.
+inline ChannelPairs blend_front_to_back(const ChannelPairs& front, const ChannelPairs& back) {
+  const LanePair transmittance = second_twice(1.0F - front.blue_alpha);
+  return {front.red_green + transmittance * back.red_green, front.blue_alpha + transmittance * back.blue_alpha};
+}
+
 /// A blend into a target: single-precision multiply, single-precision add, then one rounding to the format.
 template <ColorFormat Format, BlendRounding Rounding>
 inline ChannelPairs blend_into_target(const ChannelPairs& destination, const ChannelPairs& source) {
-  const Lanes transmittance = 1.0F - second_of(destination.blue_alpha);
-  const LanePair both = join(transmittance, transmittance);
-  return {store_channel<Format, Rounding>(destination.red_green + both * source.red_green),
-          store_channel<Format, Rounding>(destination.blue_alpha + both * source.blue_alpha)};
+  const ChannelPairs exact = blend_front_to_back(destination, source);
+  return {store_channel<Format, Rounding>(exact.red_green), store_channel<Format, Rounding>(exact.blue_alpha)};
 }
 
 /// The same for a rounding known only at run time; the measured model of a real GPU's blender is here alone.
