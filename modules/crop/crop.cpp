@@ -37,10 +37,10 @@ template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::set_draw(DrawIndex draw) {
   const DrawState& state = context_.state(draw);
   draw_ = draw;
-  blends_ = state.blend;
   signals_ = state.early_termination && termination_gate_.enter();
   threshold_ = state.terminating_alpha();
   drops_late_ = state.early_termination && context_.termination == Termination::strict && late_drops_gate_.enter();
+  way_ = !state.blend ? Way::replacing : signals_ || drops_late_ || watches_saturation_ ? Way::asking : Way::plain;
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
@@ -151,9 +151,11 @@ void ColorRop<Format, Rounding>::count_anomalies(std::size_t place, LaneMask liv
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
+template <typename ColorRop<Format, Rounding>::Way How>
 [[gnu::always_inline]] inline CropBehaviour::Outcome ColorRop<Format, Rounding>::blend_into(
     QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally) {
-  if (drops_late_) {
+  if constexpr (How == Way::replacing) return replace(destination, place, live, color, tally);
+  if (How == Way::asking && drops_late_) {
     const auto closed = static_cast<LaneMask>(live & terminated_[place]);
     tally.fragments_dropped += popcount(closed);
     live = static_cast<LaneMask>(live ^ closed);
@@ -175,23 +177,21 @@ template <ColorFormat Format, BlendRounding Rounding>
   blended.red_green = select(kept, blended.red_green, before.red_green);
   blended.blue_alpha = select(kept, blended.blue_alpha, before.blue_alpha);
   store(blended, destination);
-  const LanePairBits difference = (bits_of(blended.red_green) ^ bits_of(before.red_green)) |
-                                  (bits_of(blended.blue_alpha) ^ bits_of(before.blue_alpha));
-  const bool changed = sign_mask(difference == 0) != 0xff;
-  const Lanes previous = second_of(before.blue_alpha);
-  const Lanes alpha = second_of(blended.blue_alpha);
-  const unsigned passed = sign_mask(passes(alpha));
+  const bool changed = any_bit((bits_of(blended.red_green) ^ bits_of(before.red_green)) |
+                               (bits_of(blended.blue_alpha) ^ bits_of(before.blue_alpha)));
+  const auto of_alpha = [](LanePairBits of_blue_alpha) { return sign_mask(of_blue_alpha) >> 4U; };
+  const LanePairBits passed = blended.blue_alpha >= threshold_;
   unsigned signalled = 0;
-  if (signals_) {
-    signalled = passed & live;
-    if (checks_previous_) signalled &= ~static_cast<unsigned>(sign_mask(passes(previous)));
+  if (How == Way::asking && signals_) {
+    signalled = of_alpha(passed) & live;
+    if (checks_previous_) signalled &= ~of_alpha(before.blue_alpha >= threshold_);
     if (signalled != 0) {
       ++tally.signals;
       if (drops_late_) terminated_[place] = static_cast<LaneMask>(terminated_[place] | signalled);
     }
   }
-  unsigned anomaly = sign_mask(alpha == previous) & ~passed;
-  if constexpr (largest_color < std::numeric_limits<float>::infinity()) {
+  unsigned anomaly = ~of_alpha((blended.blue_alpha != before.blue_alpha) | passed);
+  if constexpr (How == Way::asking && largest_color < std::numeric_limits<float>::infinity()) {
     if (watches_saturation_) {
       const unsigned red_green = sign_mask(blended.red_green >= largest_color);
       const unsigned blue = sign_mask(blended.blue_alpha >= largest_color);
@@ -229,7 +229,7 @@ template <ColorFormat Format, BlendRounding Rounding>
 void ColorRop<Format, Rounding>::tell(std::size_t place, LaneMask live) const {
   const TileId tile = surface_->grid().tile(place / positions_per_tile);
   const auto position = static_cast<unsigned>(place % positions_per_tile);
-  const auto closed = static_cast<LaneMask>(drops_late_ && blends_ ? live & terminated_[place] : 0);
+  const auto closed = static_cast<LaneMask>(drops_late_ && way_ != Way::replacing ? live & terminated_[place] : 0);
   if (closed != 0) context_.fragments->happened(FragmentFate::terminated, tile, position, closed);
   if (live != closed) {
     context_.fragments->happened(FragmentFate::blended, tile, position, static_cast<LaneMask>(live ^ closed));
@@ -242,35 +242,45 @@ CropBehaviour::Outcome ColorRop<Format, Rounding>::blend(DrawIndex draw, std::si
   if (draw != draw_) set_draw(draw);
   if (context_.fragments != nullptr) tell(place, live);
   Tally tally;
-  const Outcome outcome = blends_ ? blend_into(surface_->quad(place), place, live, color, tally)
-                                  : replace(surface_->quad(place), place, live, color, tally);
+  QuadColor& quad = surface_->quad(place);
+  const Outcome outcome = way_ == Way::plain    ? blend_into<Way::plain>(quad, place, live, color, tally)
+                          : way_ == Way::asking ? blend_into<Way::asking>(quad, place, live, color, tally)
+                                                : replace(quad, place, live, color, tally);
   count(draw, tally);
   return outcome;
 }
 
 template <ColorFormat Format, BlendRounding Rounding>
-void ColorRop<Format, Rounding>::blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
-  if (context_.fragments != nullptr) return CropBehaviour::blend_quads(warp, from, to, outcomes);
+template <typename ColorRop<Format, Rounding>::Way How>
+void ColorRop<Format, Rounding>::blend_run(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
   const std::size_t tile = surface_->grid().place(warp.tile, 0);
   QuadColor* const quads = &surface_->quad(tile);
-  for (unsigned i = from; i < to;) {
-    const DrawIndex draw = warp.draw[i];
+  Tally tally;
+  for (unsigned i = from; i < to; ++i) {
+    const unsigned position = warp.position[i];
+    outcomes[i] = blend_into<How>(quads[position], tile + position, warp.live[i], warp.color[i], tally);
+  }
+  count(draw_, tally);
+}
+
+template <ColorFormat Format, BlendRounding Rounding>
+void ColorRop<Format, Rounding>::blend_quads(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes) {
+  if (context_.fragments != nullptr) return CropBehaviour::blend_quads(warp, from, to, outcomes);
+  while (from < to) {
+    const DrawIndex draw = warp.draw[from];
     if (draw != draw_) set_draw(draw);
-    Tally tally;
     unsigned end = to;
-    if (several_draws_)
-      end = static_cast<unsigned>(
-          std::find_if(warp.draw.begin() + i, warp.draw.begin() + to, [&](DrawIndex other) { return other != draw; }) -
-          warp.draw.begin());
-    for (; !blends_ && i < end; ++i) {
-      const unsigned position = warp.position[i];
-      outcomes[i] = replace(quads[position], tile + position, warp.live[i], warp.color[i], tally);
+    if (several_draws_) {
+      const auto is_other = [&](DrawIndex other) { return other != draw; };
+      end = static_cast<unsigned>(std::find_if(warp.draw.begin() + from, warp.draw.begin() + to, is_other) -
+                                  warp.draw.begin());
     }
-    for (; i < end; ++i) {
-      const unsigned position = warp.position[i];
-      outcomes[i] = blend_into(quads[position], tile + position, warp.live[i], warp.color[i], tally);
+    switch (way_) {
+      case Way::plain: blend_run<Way::plain>(warp, from, end, outcomes); break;
+      case Way::asking: blend_run<Way::asking>(warp, from, end, outcomes); break;
+      case Way::replacing: blend_run<Way::replacing>(warp, from, end, outcomes); break;
     }
-    count(draw, tally);
+    from = end;
   }
 }
 

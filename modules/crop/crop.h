@@ -55,12 +55,17 @@ class ColorRop : public CropBehaviour {
     if (tally.signals != 0) termination_signals.add(draw, tally.signals);
   }
   /// Blends for a draw from here on.
-  void set_draw(DrawIndex draw);
+  [[gnu::noinline]] void set_draw(DrawIndex draw);
   /// Tells who looks what becomes of a quad's fragments, before it is blended.
   void tell(std::size_t place, LaneMask live) const;
-  /// Without blending: the colours of live samples take the places of those that are there.
-  Outcome replace(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);
+  /// What becomes of a draw's quads. They are blended, and that is all, or there is more to ask (signals, late drops,
+  /// saturation), or the colours of live samples take the places of those that are there.
+  enum class Way : std::uint8_t { plain, asking, replacing };
+  template <Way>
   Outcome blend_into(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);
+  Outcome replace(QuadColor& destination, std::size_t place, LaneMask live, const QuadColor& color, Tally& tally);
+  template <Way>
+  void blend_run(const ShadedWarp& warp, unsigned from, unsigned to, Outcomes& outcomes);
   LaneBits passes(Lanes alpha) const { return alpha >= threshold_; }
   /// After a blend of `color` into a quad that held the channels given.
   [[gnu::noinline]] void count_anomalies(std::size_t place, LaneMask live, const QuadColor& color, LanePair red_green,
@@ -69,7 +74,7 @@ class ColorRop : public CropBehaviour {
   const RenderContext& context_;
   bool several_draws_ = false;
   DrawIndex draw_ = 0;  ///< that is blended, with its state:
-  bool blends_ = true;
+  Way way_ = Way::plain;
   bool signals_ = false;
   float threshold_ = 0;  ///< that alpha reaches to be terminated
   bool drops_late_ = false;

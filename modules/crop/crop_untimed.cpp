@@ -22,6 +22,7 @@ class UntimedCrop : public UntimedUnit {
         out_done_(*this, "out_done"),
         in_(input<ShadedWarpItem>("in_color", [this](const ShadedWarpItem& item) { take(*item.warp); })),
         behaviour_(std::move(behaviour)),
+        signals_(context.frame->terminates_early()),
         barriers_(context),
         time_(behaviour_->time()),
         memory_({MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
@@ -35,10 +36,12 @@ class UntimedCrop : public UntimedUnit {
     if (warp.count == 0) return;
     const ColorSurface& surface = *behaviour_->surface();
     const std::size_t tile = surface.grid().place(warp.tile, 0);
+    const QuadColor* const quads = &surface.quad(tile);
+    const BlendOrderMonitor& monitor = watch();
     for (unsigned i = 0; i < warp.count; ++i) {
-      const std::size_t place = tile + warp.quads[i].position;
-      __builtin_prefetch(&surface.quad(place), 1);
-      if (monitor_) monitor_->prefetch(place);
+      const unsigned position = warp.quads[i].position;
+      __builtin_prefetch(&quads[position], 1);
+      monitor.prefetch(tile + position);
     }
   }
 
@@ -74,10 +77,6 @@ class UntimedCrop : public UntimedUnit {
       if (barriers_.is_barrier(warp.mark)) out_done_.send({warp.mark});
       return warp.release();
     }
-    if (!monitor_) {
-      const ColorSurface& surface = *behaviour_->surface();
-      monitor_.emplace(surface.width(), surface.height());
-    }
     if (!follows_cache()) {
       blend(warp, 0, warp.count);
     } else {
@@ -98,13 +97,24 @@ class UntimedCrop : public UntimedUnit {
   /// Whether anybody wants to know what the colour cache does.
   bool follows_cache() const { return counts_ || memory_.connected(); }
 
+  BlendOrderMonitor& watch() { return monitor_ ? *monitor_ : begin_to_watch(); }
+  [[gnu::noinline]] BlendOrderMonitor& begin_to_watch() {
+    const ColorSurface& surface = *behaviour_->surface();
+    return monitor_.emplace(surface.width(), surface.height());
+  }
+
   void blend(const ShadedWarp& warp, unsigned from, unsigned to) {
-    monitor_->blended(warp, from, to, 0);
+    watch().blended(warp, from, to, 0);
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, from, to, outcomes);
+    if (follows_cache()) {
+      for (unsigned i = from; i < to; ++i) account(warp, i, outcomes[i]);
+    }
+    if (signals_) signal(warp, from, to, outcomes);
+  }
+  void signal(const ShadedWarp& warp, unsigned from, unsigned to, const CropBehaviour::Outcomes& outcomes) {
     for (unsigned i = from; i < to; ++i) {
       const CropBehaviour::Outcome outcome = outcomes[i];
-      if (follows_cache()) account(warp, i, outcome);
       if (outcome.terminated == 0) continue;
       TerminationBeat beat;
       beat.count = 1;
@@ -169,6 +179,7 @@ class UntimedCrop : public UntimedUnit {
   UntimedOut<BlendsDone> out_done_;
   std::unique_ptr<UntimedIn<ShadedWarpItem>> in_;
   std::unique_ptr<CropBehaviour> behaviour_;
+  const bool signals_;
   const BarrierPlan barriers_;
   std::optional<BlendOrderMonitor> monitor_;
   const CropTime& time_;
