@@ -17,7 +17,7 @@ TileCoalescing::TileCoalescing(const Parameters& parameters, const RenderContext
       bin_of_tile_(grid_.tiles(), -1),
       eviction_gate_(context, "tc.eviction") {
   for (auto bin = static_cast<std::uint32_t>(bins_.size()); bin-- > 0;) {
-    bins_[bin].quads.reserve(bin_quads_);
+    bins_[bin].quads.resize(bin_quads_);
     free_.push_back(bin);
   }
 }
@@ -26,10 +26,11 @@ void TileCoalescing::flush_bin(std::uint32_t index, FlushReason reason, Flush& o
   Bin& bin = bins_[index];
   out.tile = bin.tile;
   out.reason = reason;
-  flush_sizes.see(bin.quads.size());
-  out.quads.clear();
+  flush_sizes.see(bin.count);
   std::swap(out.quads, bin.quads);
-  bin.quads.reserve(bin_quads_);
+  out.quads.resize(bin.count);
+  bin.quads.resize(bin_quads_);
+  bin.count = 0;
   bin_of_tile_[grid_.index(bin.tile)] = -1;
   free_.push_back(index);
   ++flushes;
@@ -41,35 +42,41 @@ void TileCoalescing::flush_bin(std::uint32_t index, FlushReason reason, Flush& o
   }
 }
 
+void TileCoalescing::flush_full(std::uint32_t bin, Flush& out) {
+  allocation_order_.erase(std::find(allocation_order_.begin(), allocation_order_.end(), bin));
+  flush_bin(bin, FlushReason::full, out);
+}
+
+bool TileCoalescing::begin_bin(TileId tile) {
+  if (free_.empty() && !eviction_gate_.enter()) {
+    free_.push_back(static_cast<std::uint32_t>(bins_.size()));
+    bins_.emplace_back().quads.resize(bin_quads_);
+  }
+  if (free_.empty()) return false;
+  const std::uint32_t bin = free_.back();
+  free_.pop_back();
+  bins_[bin].tile = tile;
+  bin_of_tile_[grid_.index(tile)] = static_cast<std::int32_t>(bin);
+  allocation_order_.push_back(bin);
+  ++bins_begun;
+  return true;
+}
+
 unsigned TileCoalescing::insert(const QuadBeat& beat, unsigned from, Flush& out, bool& flushed) {
   flushed = false;
   if (from == beat.count) return 0;
-  std::int32_t index = bin_of_tile_[grid_.index(beat.tile)];
-  if (index < 0) {
-    if (free_.empty() && !eviction_gate_.enter()) {
-      free_.push_back(static_cast<std::uint32_t>(bins_.size()));
-      bins_.emplace_back();
-    }
-    if (free_.empty()) {
-      flushed = flush_oldest(FlushReason::evicted, out);
-      return 0;
-    }
-    index = static_cast<std::int32_t>(free_.back());
-    free_.pop_back();
-    bins_[static_cast<std::size_t>(index)].tile = beat.tile;
-    bin_of_tile_[grid_.index(beat.tile)] = index;
-    allocation_order_.push_back(static_cast<std::uint32_t>(index));
-    ++bins_begun;
+  const std::int32_t& index = bin_of_tile_[grid_.index(beat.tile)];
+  if (index < 0 && !begin_bin(beat.tile)) {
+    flushed = flush_oldest(FlushReason::evicted, out);
+    return 0;
   }
   Bin& bin = bins_[static_cast<std::size_t>(index)];
-  const unsigned room = bin_quads_ - static_cast<unsigned>(bin.quads.size());
-  const unsigned taken = std::min(room, beat.count - from);
-  bin.quads.insert(bin.quads.end(), beat.quads.begin() + from, beat.quads.begin() + from + taken);
+  const unsigned taken = std::min(bin_quads_ - bin.count, beat.count - from);
+  std::copy_n(beat.quads.begin() + from, taken, bin.quads.begin() + bin.count);
+  bin.count += taken;
   quads += taken;
-  if (bin.quads.size() == bin_quads_) {
-    allocation_order_.erase(
-        std::find(allocation_order_.begin(), allocation_order_.end(), static_cast<std::uint32_t>(index)));
-    flush_bin(static_cast<std::uint32_t>(index), FlushReason::full, out);
+  if (bin.count == bin_quads_) {
+    flush_full(static_cast<std::uint32_t>(index), out);
     flushed = true;
   }
   return taken;

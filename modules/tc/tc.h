@@ -80,9 +80,15 @@ class TileCoalescing : public TcBehaviour {
  private:
   struct Bin {
     TileId tile;
-    std::vector<Quad> quads;
+    std::uint32_t count = 0;
+    std::vector<Quad> quads;  ///< as many as it has room for, of which it holds `count`
   };
-  void flush_bin(std::uint32_t bin, FlushReason reason, Flush& out);
+  // Out of line: most beats go into a bin that is there and does not get full.
+  [[gnu::noinline]] void flush_bin(std::uint32_t bin, FlushReason reason, Flush& out);
+  /// Flushes a full bin.
+  [[gnu::noinline]] void flush_full(std::uint32_t bin, Flush& out);
+  /// Gives a bin to a tile; false if none is free.
+  [[gnu::noinline]] bool begin_bin(TileId tile);
 
   const std::uint32_t bin_quads_;
   const ScreenTiling grid_;
