@@ -35,6 +35,11 @@ const char* name_of(UnitState state) {
   return "";
 }
 
+void StateAccount::keep(Change change) {
+  changes_.push(change);
+  if (changes_.size() >= most_changes_) settle();
+}
+
 void StateAccount::settle() {
   for (; !changes_.empty() && changes_.front().until <= frame_end_->so_far(); changes_.pop()) {
     charge(changes_.front().state, changes_.front().until);

@@ -140,9 +140,9 @@ void ClockDomain::fault_of_tick(const Clocked& unit) const {
   throw SimulationFault(named == nullptr ? name() : named->name(), now_, "it asked for an edge in the past");
 }
 
-inline void ClockDomain::tick(Clocked& unit, Cycle& due) {
-  const Cycle next = unit.tick(now_);
-  if (next <= now_) fault_of_tick(unit);
+inline void ClockDomain::tick(Clocked& unit, Cycle cycle, Cycle& due) {
+  const Cycle next = unit.tick(cycle);
+  if (next <= cycle) fault_of_tick(unit);
   due = std::min(due, next);
 }
 
@@ -158,7 +158,7 @@ bool ClockDomain::tick_due(Cycle cycle) {
     now_ = cycle;
     for (; active != 0; active &= active - 1) {
       const auto place = static_cast<std::size_t>(__builtin_ctzll(active));
-      tick(*units[place], due[place]);
+      tick(*units[place], cycle, due[place]);
     }
   }
   return any;
@@ -173,7 +173,7 @@ bool ClockDomain::tick_due_in_order(Cycle cycle) {
   }
   if (active.empty()) return false;
   now_ = cycle;
-  for (const unsigned handle : active) tick(*units_[handle], due_[handle]);
+  for (const unsigned handle : active) tick(*units_[handle], cycle, due_[handle]);
   return true;
 }
 

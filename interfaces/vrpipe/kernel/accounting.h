@@ -110,11 +110,12 @@ class StateAccount {
     if (changes_.empty() && now <= frame_end_->so_far()) {
       charge(state_, now);
     } else {
-      changes_.push({state_, now});
-      if (changes_.size() >= most_changes_) settle();
+      keep({state_, now});
     }
     state_ = state;
   }
+  /// Until the draw is known to last as long.
+  void keep(Change change);
   void settle();
   void charge(UnitState state, Cycle until) {
     cycles_[static_cast<unsigned>(state)] += until - charged_;

@@ -144,7 +144,7 @@ class ClockDomain : public sc_core::sc_module {
   void edge();
   bool tick_due(Cycle cycle);
   bool tick_due_in_order(Cycle cycle);
-  void tick(Clocked& unit, Cycle& due);
+  void tick(Clocked& unit, Cycle cycle, Cycle& due);
   [[noreturn]] void fault_of_tick(const Clocked& unit) const;
   void wake_from_outside(unsigned handle, Cycle at);
   void start_of_simulation() override;

@@ -176,7 +176,8 @@ class SectoredCache {
 
  private:
   static constexpr std::uint64_t no_tag = ~std::uint64_t{0};
-  struct Entry {
+  /// In one line of the host's caches.
+  struct alignas(64) Entry {
     std::uint64_t tag = no_tag;
     std::uint32_t present = 0;
     std::uint32_t filling = 0;
