@@ -36,7 +36,9 @@ class Gpu {
 
 inline double percent(double predicted, double measured) { return 100 * (predicted / measured - 1); }
 
-/// The scenes of which only counts and times were kept, by stand-ins. `is_short`: the smallest alone.
+/// Scenes of synthetic splats. `is_short`: a part of the smallest, to see that it works.
 void compare_scenes(const Gpu& gpu, bool is_short);
+/// Splats of one size each, in %. `is_short`: a part of one of them.
+void compare_uniform(const Gpu& gpu, bool is_short);
 
 }  // namespace vrpipe::measured

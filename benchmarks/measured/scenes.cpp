@@ -1,5 +1,4 @@
-// Twelve scenes of synthetic splats were measured on the GPU, of which counts and times were kept (tests/data/README.md).
-// Drawn here are stand-ins: other splats, of about the same counts.
+// Synthetic splats that were measured on the GPU.
 #include <cmath>
 #include <cstdio>
 #include <map>
@@ -82,7 +81,7 @@ double color_sectors(const RunResult& result) {
          statistic(result, "crop.cache.sectors_fetched_again");
 }
 
-/// Everything that is compared, of a stand-in.
+/// Everything that is compared.
 Values predict(const Gpu& gpu, const Draw& draw) {
   Values values;
   for (const Column& time : times) {
@@ -132,15 +131,17 @@ void print_heading(const char* title, const Column* begin, const Column* end) {
 
 void compare_scenes(const Gpu& gpu, bool is_short) {
   std::vector<std::pair<MeasuredScene, Values>> all;
-  for (MeasuredScene& scene : testing::measured_scenes()) {
-    if (is_short && scene.name != "sweep-50k") continue;
-    const Values predicted = predict(gpu, scene.draw());
+  for (const std::string& name : testing::measured_scene_names()) {
+    if (is_short && name != "sweep-50k") continue;
+    MeasuredScene scene = testing::measured_scene(name);
+    if (is_short) scene.draw.splats.resize(scene.draw.splats.size() / 20);
+    const Values predicted = predict(gpu, scene.draw);
     all.emplace_back(std::move(scene), predicted);
   }
   print_heading("thousands", std::begin(counts), std::end(counts));
   for (const auto& [scene, predicted] : all) {
     print_row(scene.name, "measured", scene.values, std::begin(counts), std::end(counts), 1e3, 0);
-    print_row("", "stand-in", predicted, std::begin(counts), std::end(counts), 1e3, 0);
+    print_row("", "counted", predicted, std::begin(counts), std::end(counts), 1e3, 0);
   }
   std::printf("\n");
   print_heading("millions of cycles", std::begin(times), std::end(times));
@@ -159,6 +160,36 @@ void compare_scenes(const Gpu& gpu, bool is_short) {
   }
   print_row("mean of", "errors", errors, std::begin(times), std::end(times), 1, 1);
   std::printf("%-22s%10.1f\n", "over all modes", sum / static_cast<double>(all.size() * std::size(times)));
+}
+
+void compare_uniform(const Gpu& gpu, bool is_short) {
+  std::printf("%-16s", "cycles a splat");
+  std::vector<Column> columns;
+  for (const Column& time : times) {
+    if (time.name != std::string("rgba32f") && time.name != std::string("ideal_termination")) columns.push_back(time);
+  }
+  for (const Column& column : columns) std::printf("%17s", column.heading);
+  std::printf("\n");
+  Values errors;
+  double scenes = 0;
+  for (MeasuredScene& scene : testing::measured_uniform_scenes()) {
+    if (is_short && scene.name != "4x4") continue;
+    const double splats = static_cast<double>(scene.draw.splats.size());
+    if (is_short) scene.draw.splats.resize(scene.draw.splats.size() / 20);
+    std::printf("%-8s%8.2f", scene.name.c_str(), scene.values.at("opacity"));
+    for (const Column& column : columns) {
+      const double measured = scene.values.at(column.name);
+      const double predicted = 1e6 * gpu.cycles(scene.draw, mode_named(column.mode)) / splats;
+      std::printf("%10.1f%+7.1f", measured, percent(predicted, measured));
+      std::fflush(stdout);
+      errors[column.name] += std::fabs(percent(predicted, measured));
+    }
+    std::printf("\n");
+    ++scenes;
+  }
+  std::printf("%-16s", "mean of errors");
+  for (const Column& column : columns) std::printf("%17.1f", errors[column.name] / scenes);
+  std::printf("\n");
 }
 
 }  // namespace vrpipe::measured

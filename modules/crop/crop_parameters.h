@@ -50,16 +50,25 @@ struct CropParameters : ParameterSet {
                             "filled or written back in a cycle in which nothing is blended"};
   Switch writes_unchanged{*this, "writes_unchanged", false, source::measured,
                           "write sectors back in which no value changed"};
-  Integer line_cycles{
+  Integer port_flits_per_cycle{
       *this,
-      "line_cycles",
+      "port_flits_per_cycle",
       0,
       0,
-      64,
-      "cycles",
+      16,
+      "flits",
       "left open by the paper; measured on a GH100 graphics GPC: 1",
-      "of blending that a line takes which is written back, or fetched for a quad that changes a value, "
-      "however many of its sectors move; 0: sectors_per_cycle says what moving takes"};
+      "of a sector each, to L2, beside the blender: one for a line of which a triangle reads, one for a line written "
+      "back "
+      "and one for each sector of it; 0: sectors_per_cycle says what moving takes, of the blender"};
+  Integer port_backlog_flits{*this,
+                             "port_backlog_flits",
+                             64,
+                             1,
+                             65536,
+                             "flits",
+                             "assumed; on a GH100 graphics GPC 16 to 2000 make 2 % of a small scene",
+                             "that wait for the port; of more, nothing is looked up or blended"};
   Switch fetch_ahead{
       *this, "fetch_ahead", false, "left open by the paper; measured on a GH100 graphics GPC: on",
       "tags run ahead of data by input_quads: a line may go while quads wait to be blended into it, and is "
@@ -72,6 +81,18 @@ struct CropParameters : ParameterSet {
                              "cycles",
                              "left open by the paper; measured on a GH100 graphics GPC: 503",
                              "from the last blend into a line that leaves the cache to the next one"};
+  Switch gob_hazards{
+      *this, "gob_hazards", false, "left open by the paper; measured on a GH100 graphics GPC: on",
+      "without forwarding, pixels of a screen tile wait for one another that have the same place in a block of "
+      "64 bytes by 8 rows (a GOB), not only the same pixels"};
+  Integer rgba32f_latency_cycles{*this,
+                                 "rgba32f_latency_cycles",
+                                 0,
+                                 0,
+                                 1000,
+                                 "cycles",
+                                 "left open by the paper; measured on a GH100 graphics GPC: 12",
+                                 "of a blend of RGBA32F; 0: latency_cycles"};
   Integer rgba32f_column_cycles{
       *this,
       "rgba32f_column_cycles",

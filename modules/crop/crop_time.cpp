@@ -1,30 +1,43 @@
 #include "crop/crop_time.h"
 
+#include <array>
+
 #include <fmt/format.h>
 
 #include <vrpipe/component/error.h>
 
 namespace vrpipe {
 
+namespace {
+/// Of a position in a screen tile, the bits of its place in a block of 64 bytes by 8 rows.
+std::size_t place_in_gob(ColorFormat format) {
+  const std::size_t columns = 64 / (2 * bytes_per_pixel(format));
+  return std::min<std::size_t>(columns, quads_per_tile_row) - 1 + 3 * quads_per_tile_row;
+}
+}  // namespace
+
 CropTime::CropTime(const CropParameters& parameters, ColorFormat format)
     : cache(parameters.cache.organization()),
       blend_rate(Rate::of_bytes(parameters.bytes_per_cycle, 4 * bytes_per_pixel(format))),
       most_in_a_cycle(blend_rate.most_in_a_cycle()),
       input_quads(parameters.input_quads),
-      latency_cycles(parameters.latency_cycles),
+      latency_cycles(format == ColorFormat::rgba32f && parameters.rgba32f_latency_cycles > 0
+                         ? parameters.rgba32f_latency_cycles
+                         : parameters.latency_cycles),
       mshrs(parameters.mshrs),
       forwards(parameters.forwarding),
       writes_unchanged(parameters.writes_unchanged),
       fetches_ahead(parameters.fetch_ahead),
       line_return_cycles(parameters.line_return_cycles),
-      pays_for_lines(parameters.line_cycles > 0),
-      parts_of_a_cycle(std::int64_t{blend_rate.items} * (pays_for_lines ? 1 : parameters.sectors_per_cycle)),
-      price_(std::int64_t{blend_rate.cycles} * (pays_for_lines ? 1 : parameters.sectors_per_cycle)),
-      move_price_(std::int64_t{blend_rate.items} * (pays_for_lines ? parameters.line_cycles : 1)),
+      parts_of_a_cycle(std::int64_t{blend_rate.items} * parameters.sectors_per_cycle),
+      port(parameters.port_flits_per_cycle, parameters.port_backlog_flits),
+      price_(std::int64_t{blend_rate.cycles} * parameters.sectors_per_cycle),
+      sector_price_(blend_rate.items),
       column_parts_(format == ColorFormat::rgba32f ? parameters.rgba32f_column_cycles * parts_of_a_cycle : 0),
       in_pairs_(parameters.pairs_in_sector && most_in_a_cycle > 1),
       most_kept_((in_pairs_ ? parts_of_a_cycle : price_) - 1),
-      cycles_(static_cast<std::uint64_t>(parts_of_a_cycle)) {
+      cycles_(static_cast<std::uint64_t>(parts_of_a_cycle)),
+      hazard_mask_(parameters.gob_hazards ? place_in_gob(format) : positions_per_tile - 1) {
   cache.check("CROP cache", "crop", "cache_bytes");
   const std::uint32_t quad = 4 * bytes_per_pixel(format);
   if (quad <= cache.line_bytes) return;
@@ -38,9 +51,10 @@ std::vector<WorkKind> CropTime::kinds() const {
     return static_cast<double>(parts) / static_cast<double>(parts_of_a_cycle);
   };
   return {{"blend", 0, cycles(price_), true},
-          {pays_for_lines ? "lines" : "sectors", 0, cycles(move_price_), false},
+          {"sectors", 0, cycles(sector_price_), false},
           {"forwarding", 0, cycles(1), false},
-          {"unpaired", 0, cycles(1), false}};
+          {"unpaired", 0, cycles(1), false},
+          {"flits", 1, port.cycles_of_a_flit(), false}};
 }
 
 double CropTime::least_cycles(const Sum& sum) const {
@@ -53,8 +67,25 @@ double CropTime::least_cycles(const Sum& sum) const {
   const std::uint64_t registers = fetches_ahead ? std::max(mshrs, cache.sectors_of_a_line()) : mshrs;
   const std::vector<WorkKind> kind = kinds();
   return std::max(
-      {of(sum.quads, kind[CropWork::blend].cycles_per_item) + of(sum.moves, kind[CropWork::sectors].cycles_per_item),
-       turns(sum.sectors_filled, registers), fetches_ahead ? 0.0 : turns(sum.lines_filled, cache.lines())});
+      {of(sum.quads, kind[CropWork::blend].cycles_per_item) + of(sum.sectors, kind[CropWork::sectors].cycles_per_item),
+       of(sum.flits, kind[CropWork::flits].cycles_per_item), turns(sum.sectors_filled, registers),
+       fetches_ahead ? 0.0 : turns(sum.lines_filled, cache.lines())});
+}
+
+unsigned CropTime::flits_of_reads(const ShadedWarp& warp, unsigned from, unsigned to,
+                                  const CropBehaviour::CacheLookUp& looked_up, const ColorSurface& surface) {
+  const std::size_t tile = surface.grid().place(warp.tile, 0);
+  std::array<std::uint32_t, quads_per_warp> lacking{};  // by line
+  for (unsigned line = 0; line < looked_up.count; ++line) lacking[line] = looked_up.lines[line].filled;
+  unsigned flits = 0;
+  for (unsigned i = from; i < to; ++i) {
+    const unsigned line = looked_up.line_of[i];
+    if ((lacking[line] & looked_up.sectors_of[i]) == 0) continue;
+    lacking[line] &= ~looked_up.sectors_of[i];
+    const std::uint64_t offset = looked_up.lines[line].address - surface.address(tile);
+    flits += flits_of_read(tile, warp.first_primitive[i], static_cast<unsigned>(offset / cache.line_bytes));
+  }
+  return flits;
 }
 
 unsigned CropTime::looked_up_at_once() const {

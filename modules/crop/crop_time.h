@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "crop_parameters.h"
+#include "flit_port.h"
 
 #include <vrpipe/arithmetic/divisor.h>
 #include <vrpipe/kernel/accounting.h>
@@ -38,22 +39,34 @@ class CropTime {
   const bool writes_unchanged;             ///< a blend that changes no value makes its sector dirty all the same
   const bool fetches_ahead;                ///< a line may go while quads wait to be blended into it
   const std::uint32_t line_return_cycles;  ///< from a line's last use to the next, if it left in between
-  const bool pays_for_lines;               ///< that move, whatever number of their sectors does; else for sectors
   const std::int64_t parts_of_a_cycle;
 
+  /// What the cache moves through this, beside the blender; where it is not on, sectors take time of the blender.
+  FlitPort port;
   /// What the cache moves.
   struct Moves {
     unsigned sectors = 0;  ///< filled or written back
-    unsigned lines = 0;    ///< written back, or fetched for a quad that changes a value: the first after the fetch
+    unsigned flits = 0;    ///< of lines written back, and of fetches
+    /// Sectors of a line are written back.
+    void write(unsigned count) {
+      sectors += count;
+      flits += 1 + count;
+    }
   };
-  /// How many of them take time from blending.
-  unsigned paid(const Moves& moves) const { return pays_for_lines ? moves.lines : moves.sectors; }
+  /// A quad's triangle reads sectors of a line of its screen tile: flits, of which it takes one for all of its quads there.
+  unsigned flits_of_read(std::size_t tile, std::uint32_t primitive, unsigned line) {
+    if (tile != visit_.tile || primitive != visit_.primitive) visit_ = {tile, primitive, 0};
+    const std::uint64_t asks = std::uint64_t{1} << line;
+    const bool asked = (visit_.lines & asks) != 0;
+    visit_.lines |= asks;
+    return asked ? 0 : 1;
+  }
 
   /// A quad that is to be blended.
   struct Quad {
     std::uint64_t line = 0;     ///< its address, or what stands for it
     std::uint32_t sectors = 0;  ///< of the line, a bit each
-    std::uint32_t place = 0;    ///< in the surface's grid
+    std::size_t place = 0;      ///< in the surface's grid
     LaneMask live = 0;
     bool blends = true;  ///< else its colours replace those that are there
   };
@@ -92,13 +105,13 @@ class CropTime {
     if (column_parts_ > 0 && quad.blends) parts += lengthen(quad);
     done_ += parts;
     unpaired_ += parts - price_;
-    if (!forwards && quad.blends) in_pipeline_.push({quad.place, at});
+    if (!forwards && quad.blends) in_pipeline_.push({address_of(quad.place), at, quad.live});
     last_blend_ = at;
   }
   /// Whether no quad has another price than its rate's, and none has to wait for another.
   bool quads_are_alike() const { return forwards && !in_pairs_ && column_parts_ == 0; }
   /// Whether that is all that takes time, but for sectors.
-  bool is_plain() const { return quads_are_alike() && !pays_for_lines && !lines_return(); }
+  bool is_plain() const { return quads_are_alike() && !port.is_on() && !lines_return(); }
   /// Whether a line that left and comes back may have to wait.
   bool lines_return() const { return fetches_ahead || line_return_cycles > 0; }
   Price price() const { return {price_, false}; }
@@ -117,10 +130,10 @@ class CropTime {
   }
   /// Of the last quad; 0 before the first.
   Cycle last_blend() const { return last_blend_; }
-  /// The cache moves so many of what is paid for; false if that takes the blender nothing, since the cache is idle beside a
-  /// blend of several cycles.
-  bool move(unsigned moves, Cycle at) {
-    const std::int64_t parts = moves * move_price_;
+  /// The cache moves so many sectors without a port; false if that takes the blender nothing, since the cache is idle
+  /// beside a blend of several cycles.
+  bool move(unsigned sectors, Cycle at) {
+    const std::int64_t parts = sectors * sector_price_;
     if (idle_cache_ >= parts) {
       idle_cache_ -= parts;
       return false;
@@ -129,12 +142,14 @@ class CropTime {
     done_ += parts;
     return true;
   }
-  /// From when on no blend of a quad of the same place is in the pipeline, without forwarding; `now` does not go back.
-  Cycle hazard_until(std::uint32_t place, Cycle now) {
+  /// From when on no blend of the same pixels is in the pipeline, without forwarding; `now` does not go back.
+  Cycle hazard_until(std::size_t place, LaneMask live, Cycle now) {
     while (!in_pipeline_.empty() && in_pipeline_.front().at + latency_cycles <= now) in_pipeline_.pop();
     Cycle until = 0;
+    const std::size_t address = address_of(place);
     for (std::size_t i = 0; i < in_pipeline_.size(); ++i) {
-      if (in_pipeline_[i].place == place) until = in_pipeline_[i].at + latency_cycles;
+      if (in_pipeline_[i].address == address && (in_pipeline_[i].live & live) != 0)
+        until = in_pipeline_[i].at + latency_cycles;
     }
     return until;
   }
@@ -147,11 +162,15 @@ class CropTime {
   /// Work of which all may begin at once.
   struct Sum {
     std::uint64_t quads = 0;
-    std::uint64_t moves = 0;           ///< paid
+    std::uint64_t sectors = 0;  ///< moved in the blender's time
+    std::uint64_t flits = 0;
     std::uint64_t sectors_filled = 0;  ///< each of which takes a miss register, for as long as the memory's latency
     std::uint64_t lines_filled = 0;    ///< and a line of the cache
     std::uint32_t memory_latency_cycles = 0;
   };
+  /// Of quads of a warp that have been looked up.
+  unsigned flits_of_reads(const ShadedWarp& warp, unsigned from, unsigned to,
+                          const CropBehaviour::CacheLookUp& looked_up, const ColorSurface& surface);
   /// The least that it takes: the resource that has most to do.
   double least_cycles(const Sum& sum) const;
   /// The slot's kinds of work.
@@ -200,12 +219,22 @@ class CropTime {
     }
   };
   struct Blend {
-    std::uint32_t place = 0;
+    std::size_t address = 0;  ///< by which hazards are found
     Cycle at = 0;
+    LaneMask live = 0;
+  };
+  std::size_t address_of(std::size_t place) const {
+    return place & (~std::size_t{positions_per_tile - 1} | hazard_mask_);
+  }
+  /// A triangle's quads in a screen tile, one after the other.
+  struct Visit {
+    std::size_t tile = 0;
+    std::uint32_t primitive = ~0U;
+    std::uint64_t lines = 0;  ///< that it has asked for, a bit each
   };
 
   std::int64_t price_;           ///< of a quad by its rate
-  std::int64_t move_price_;      ///< of what moves
+  std::int64_t sector_price_;    ///< of one that moves
   std::int64_t column_parts_;    ///< 0: columns have no price
   bool in_pairs_;                ///< several quads go in a cycle only if they share a sector
   std::int64_t most_kept_;       ///< of a cycle's parts in the next one
@@ -217,6 +246,8 @@ class CropTime {
   std::int64_t unpaired_ = 0;  ///< parts of the last quads' price beyond their rate's
   std::int64_t settled_ = 0;   ///< and of those before, not tallied yet
   Ring<Blend> in_pipeline_;    ///< without forwarding
+  std::size_t hazard_mask_;    ///< of a quad's position
+  Visit visit_;                ///< the last
 };
 
 }  // namespace vrpipe

@@ -17,7 +17,7 @@ namespace {
 /// CROP at lt: as crop_unit.cpp, but a warp is taken in one piece: its quads look up the colour cache, and are
 /// blended once the sectors of all are there. Neighbouring sectors are filled in one access. Without forwarding, or where
 /// the cache is small, its quads go one by one.
-/// Ports: in_color (ShadedWarpItem), out_terminations (TerminationBeat), out_done (BlendsDone; optional), memory (TLM-2.0
+/// Ports: in_color (ShadedWarpItem), in_reads (PortReads; optional), out_terminations (TerminationBeat), out_done (BlendsDone; optional), memory (TLM-2.0
 /// base protocol).
 class TimedCrop : public TimedUnit {
  public:
@@ -29,8 +29,15 @@ class TimedCrop : public TimedUnit {
         out_done_(*this, "out_done"),
         in_(*this, "in_color",
             [this](const ShadedWarpItem& item, CycleInterval visible) { return take(*item.warp, visible); }),
+        in_reads_(*this, "in_reads",
+                  [this](const PortReads& reads, CycleInterval visible) -> CycleInterval {
+                    // What CROP has reserved for later would be behind them.
+                    send(reads.flits, visible.first);
+                    return visible;
+                  }),
         behaviour_(std::move(behaviour)),
         time_(behaviour_->time()),
+        sent_before_(time_.port),
         barriers_(context),
         hazard_gate_(context, "crop.blend_hazard"),
         // A hazard is one of quads.
@@ -45,6 +52,7 @@ class TimedCrop : public TimedUnit {
     out_.set_pipeline(time_.latency_cycles - 1, ColorBeat::in_a_cycle(time_.blend_rate));
     out_done_.set_pipeline(time_.latency_cycles - 1);
     out_done_.set_optional();
+    in_reads_.set_optional();
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -54,6 +62,15 @@ class TimedCrop : public TimedUnit {
   Cycle end_of_frame() const override { return end_; }
 
  private:
+  /// What a line of the cache holds.
+  struct Stay {
+    Cycle last_blend = 0;      ///< of a quad that needed it, or what it held before
+    Cycle ready = 0;           ///< of one that came back: when it can be used
+    Cycle used_before = 0;     ///< the last use of what it holds before it came back
+    bool asked_again = false;  ///< for what was asked for before that use
+    std::uint32_t dirty = 0;   ///< sectors, where they take flits
+  };
+
   void end_of_elaboration() override {
     const ColorSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
@@ -101,13 +118,18 @@ class TimedCrop : public TimedUnit {
     for (unsigned line = 0; line < cache_.count && !time_.fetches_ahead; ++line) {
       if (cache_.lines[line].replaced) at = std::max(at, stays_[cache_.lines[line].line].last_blend);
     }
-    CycleInterval looked_up = look_ups_.take(at, quads);
+    CycleInterval looked_up = look_ups_.take(port_open_from(at), quads);
     looked_up.last = std::max(looked_up.last, visible.last);
     Cycle there = looked_up.first + 1;
     for (unsigned line = 0; line < cache_.count; ++line)
       there = std::max(there, move(cache_.lines[line], looked_up.last));
     look_ups_.hold(looked_up.last);
-    if (const unsigned moved = memory_.take_moved(); moved > 0) pay_later(looked_up.last, {moved, 0});
+    if (time_.port.is_on()) {
+      send(time_.flits_of_reads(warp, from, to, cache_, *behaviour_->surface()), looked_up.last);
+      there = std::max(there, time_.port.open_from(there));
+    } else if (const unsigned moved = memory_.take_moved(); moved > 0) {
+      moves_.push({looked_up.last, moved});
+    }
 
     charge(UnitState::starved, looked_up.first + 1);
     if (out_.last() > there) {
@@ -131,7 +153,7 @@ class TimedCrop : public TimedUnit {
     // What moves takes time from blending, from when it does.
     for (; !moves_.empty() && moves_.front().at <= time_.free_from(time_.price(), there); moves_.pop()) {
       const Move& move = moves_.front();
-      if (time_.move(move.paid, move.at)) did(CropWork::sectors, move.paid, move.at);
+      if (time_.move(move.sectors, move.at)) did(CropWork::sectors, move.sectors, move.at);
     }
     if (time_.quads_are_alike()) {
       const auto [first, last] = time_.blend_all(to - from, there);
@@ -141,7 +163,7 @@ class TimedCrop : public TimedUnit {
     for (unsigned i = from; i < to; ++i) {
       const CropTime::Quad quad = priced_quad(warp, i);
       Cycle ready = there;
-      if (!time_.forwards && hazard_gate_.enter() && quad.blends) ready = wait_for_hazard(quad.place, there);
+      if (!time_.forwards && hazard_gate_.enter() && quad.blends) ready = wait_for_hazard(quad, there);
       const CropTime::Price price = time_.price_of(quad, ready);
       blended.last = time_.free_from(price, ready);
       blended.first = std::min(blended.first, blended.last);
@@ -152,12 +174,12 @@ class TimedCrop : public TimedUnit {
   }
   CropTime::Quad priced_quad(const ShadedWarp& warp, unsigned index) const {
     return {cache_.lines[cache_.line_of[index]].address, cache_.sectors_of[index],
-            static_cast<std::uint32_t>(behaviour_->surface()->grid().place(warp.tile, warp.position[index])),
-            warp.live[index], context_.state(warp.draw[index]).blend};
+            behaviour_->surface()->grid().place(warp.tile, warp.position[index]), warp.live[index],
+            context_.state(warp.draw[index]).blend};
   }
-  [[gnu::noinline]] Cycle wait_for_hazard(std::uint32_t place, Cycle there) {
+  [[gnu::noinline]] Cycle wait_for_hazard(const CropTime::Quad& quad, Cycle there) {
     const Cycle free = time_.free_from(time_.price(), there);
-    const Cycle until = time_.hazard_until(place, time_.last_blend());
+    const Cycle until = time_.hazard_until(quad.place, quad.live, time_.last_blend());
     if (until <= free) return there;
     time_.open(free);
     did(CropWork::forwarding, static_cast<std::uint64_t>(time_.open(until)), free, until);
@@ -166,8 +188,22 @@ class TimedCrop : public TimedUnit {
   void tell_unpaired(std::int64_t parts, Cycle at) {
     if (parts > 0) did(CropWork::unpaired, static_cast<std::uint64_t>(parts), at);
   }
-  void pay_later(Cycle at, const CropTime::Moves& moves) {
-    if (const unsigned paid = time_.paid(moves); paid > 0) moves_.push({at, paid});
+  /// From when on the port takes more, by what was sent before: lines are written back when quads are blended, which is long
+  /// after the look-ups of those behind them. Blending did not wait for what it made dirty and which is not sent yet.
+  Cycle port_open_from(Cycle at) {
+    while (true) {
+      for (; !sent_.empty() && sent_.front().at <= at; sent_.pop())
+        sent_before_.take(sent_.front().flits, sent_.front().at);
+      const Cycle open = sent_before_.open_from(at, owed_);
+      if (open == at) return at;
+      at = open;
+    }
+  }
+  void send(unsigned flits, Cycle at) {
+    if (flits == 0 || !time_.port.is_on()) return;
+    const auto [from, until] = time_.port.take(flits, at);
+    sent_.push_in_order({at, flits}, &Sent::at);
+    did(CropWork::flits, flits, from, until);
   }
 
   /// Moves what a look-up says of a line; returns when its sectors are there.
@@ -177,15 +213,21 @@ class TimedCrop : public TimedUnit {
       // Where tags run ahead, quads may still be blended into what the line held.
       const Cycle from = time_.fetches_ahead ? std::max(at, stay.last_blend) : at;
       memory_.write_back(access, from);
-      pay_later(from, {0, 1});
+      CropTime::Moves moves;
+      moves.write(static_cast<unsigned>(__builtin_popcount(access.written_back)));
+      if (time_.port.is_on()) {
+        send(moves.flits, from);
+        owed_ -= moves.flits;
+        stay.dirty = 0;
+      }
     }
     if (returns_ && access.replaced) {
       // It is there for another, which may have been before. What replaces colours does not read them.
       stay.ready = access.filled != 0 ? returns_->from(access.address) : 0;
       stay.used_before = returns_->last_use(access.address);
+      stay.asked_again = false;
     }
     if (access.filled == 0) return stay.ready;
-    stay.is_unpaid = stay.is_unpaid || access.replaced;
     Cycle there = memory_.fill(access, at);
     if (time_.fetches_ahead && stay.used_before > at) {
       // Fetched before what the line held is written back, and so again.
@@ -193,6 +235,7 @@ class TimedCrop : public TimedUnit {
       Cycle again = stay.used_before;
       there = std::max(there, memory_.fill(access, again));
       stay.ready = std::max(stay.ready, there);
+      if (!std::exchange(stay.asked_again, true)) send(1, again);
     }
     return std::max(there, stay.ready);
   }
@@ -207,18 +250,22 @@ class TimedCrop : public TimedUnit {
       const bool changed = outcomes[i].changed || time_.writes_unchanged;
       dirty[cache_.line_of[i]] |= changed ? cache_.sectors_of[i] : 0U;
       terminated |= outcomes[i].terminated;
-      // A line is paid for with the quad for which it was fetched.
-      if (time_.pays_for_lines && std::exchange(stays_[cache_.lines[cache_.line_of[i]].line].is_unpaid, false) &&
-          changed)
-        pay_later(at.last, {0, 1});
     }
     if (terminated != 0) signal(warp, from, to, outcomes, at);
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
       stays_[line].last_blend = at.last;
       if (returns_) returns_->used(cache_.lines[i].address, at.last);
-      if (dirty[i] != 0) behaviour_->make_dirty(line, dirty[i]);
+      if (dirty[i] == 0) continue;
+      behaviour_->make_dirty(line, dirty[i]);
+      if (time_.port.is_on()) owe(stays_[line], dirty[i]);
     }
+  }
+
+  /// Flits of what is dirty now.
+  void owe(Stay& stay, std::uint32_t dirty) {
+    owed_ += static_cast<unsigned>(__builtin_popcount(dirty & ~stay.dirty)) + (stay.dirty == 0 ? 1U : 0U);
+    stay.dirty |= dirty;
   }
 
   void signal(const ShadedWarp& warp, unsigned from, unsigned to, const CropBehaviour::Outcomes& outcomes,
@@ -237,22 +284,23 @@ class TimedCrop : public TimedUnit {
 
   struct Move {
     Cycle at = 0;
-    unsigned paid = 0;
-  };
-  /// What a line of the cache holds.
-  struct Stay {
-    Cycle last_blend = 0;    ///< of a quad that needed it, or what it held before
-    Cycle ready = 0;         ///< of one that came back: when it can be used
-    Cycle used_before = 0;   ///< the last use of what it holds before it came back
-    bool is_unpaid = false;  ///< fetched, and nothing blended into it
+    unsigned sectors = 0;
   };
 
   const RenderContext& context_;
   TimedOut<TerminationBeat> out_;
   TimedOut<BlendsDone> out_done_;
   TimedIn<ShadedWarpItem> in_;
+  TimedIn<PortReads> in_reads_;
   std::unique_ptr<CropBehaviour> behaviour_;
   CropTime time_;
+  struct Sent {
+    Cycle at = 0;
+    unsigned flits = 0;
+  };
+  Ring<Sent> sent_;         ///< to the port, later than the last look-up
+  FlitPort sent_before_;    ///< what was sent before it
+  std::uint64_t owed_ = 0;  ///< flits of lines that are dirty
   const BarrierPlan barriers_;
   EffectGate hazard_gate_;
   const unsigned at_once_;  ///< quads looked up before the first of them is blended

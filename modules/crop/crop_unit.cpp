@@ -18,7 +18,7 @@ namespace {
 
 /// CROP at cycle fidelity. A quad looks up the colour cache when it arrives and starts the fills that it needs, then
 /// waits in order; blending takes place at the head, when there is time for it (CropTime).
-/// Ports: in_color (ColorBeat), out_terminations (TerminationBeat), out_done (BlendsDone; optional), memory (TLM-2.0 base
+/// Ports: in_color (ColorBeat), in_reads (PortReads; optional), out_terminations (TerminationBeat), out_done (BlendsDone; optional), memory (TLM-2.0 base
 /// protocol).
 /// `Plain`: a run without hazards, lines that return or go ahead, prices of lines, pairs and columns, colours that are
 /// replaced, and draws that are told apart.
@@ -30,6 +30,7 @@ class CropUnit : public Unit {
       : Unit(name, domain, behaviour->time().kinds()),
         context_(context),
         in_(*this, "in_color"),
+        in_reads_(*this, "in_reads"),
         out_(*this, "out_terminations"),
         out_done_(*this, "out_done"),
         behaviour_(std::move(behaviour)),
@@ -43,9 +44,12 @@ class CropUnit : public Unit {
     out_.set_pipeline(time_.latency_cycles - 1, ColorBeat::in_a_cycle(time_.blend_rate));
     out_done_.set_pipeline(time_.latency_cycles - 1);
     out_done_.set_optional();
+    in_reads_.set_optional();
   }
 
-  bool idle() const override { return in_.empty() && queue_.empty() && marks_.empty() && done_.empty(); }
+  bool idle() const override {
+    return in_.empty() && in_reads_.empty() && queue_.empty() && marks_.empty() && done_.empty();
+  }
   Behaviour& behaviour() override { return *behaviour_; }
   tlm::tlm_initiator_socket<32>* memory_socket() override { return &port_.socket(); }
   MemoryBytes memory_bytes() const override { return port_.moved(); }
@@ -73,8 +77,9 @@ class CropUnit : public Unit {
     sectors_of_quads_ = sectors_of_quads(time_.cache, 4 * bytes_per_pixel(surface_->format()));
     sectors_of_a_quad_ = static_cast<unsigned>(__builtin_popcount(sectors_of_quads_.front().sectors));
     monitor_.emplace(surface_->width(), surface_->height());
+    go_to({});
     if (Plain) return;
-    stays_.resize(organization.lines());
+    came_back_.resize(organization.lines());
     if (time_.lines_return())
       returns_.emplace(surface_->address(0), surface_->size_bytes(), time_.cache.line_bytes, time_.line_return_cycles);
     if (time_.fetches_ahead) ahead_.emplace(port_, statistics, fetched_again_, *returns_, time_.mshrs);
@@ -82,24 +87,31 @@ class CropUnit : public Unit {
 
   /// Takes a quad from the link into the queue; false when it has to wait.
   bool look_up(const ColorQuad& quad) {
+    if (quad.warp->tile != tile_) go_to(quad.warp->tile);
     const unsigned position = quad.position();
-    const std::size_t tile = surface_->grid().place(quad.warp->tile, 0);
     const auto [line_of_tile, sectors] = sectors_of_quads_[position];
-    const std::uint64_t address = surface_->address(tile) + (std::uint64_t{line_of_tile} << line_shift_);
-    if (!Plain && ahead_) return look_up_ahead(quad, address, sectors, tile + position);
+    const std::uint64_t address = tile_address_ + (std::uint64_t{line_of_tile} << line_shift_);
+    if (!Plain && ahead_) return look_up_ahead(quad, address, sectors, tile_place_ + position);
     SectoredCache::Line line =
         wanted_.line == SectoredCache::no_line ? port_.pin_held(address, sectors) : SectoredCache::no_line;
     std::uint32_t asked_for = 0;
     if (line == SectoredCache::no_line) {
       wanted_.reads = blends(quad);
+      if (!port_is_open()) return false;
       line = fill(address, sectors, asked_for);
       if (line == SectoredCache::no_line) return false;
+      if (!Plain && asked_for != 0) ask(quad, tile_place_ + position);
     }
     if (const std::uint32_t on_their_way = port_.awaited(line, sectors) & ~asked_for; on_their_way != 0) {
       hits_on_their_way_ += static_cast<unsigned>(__builtin_popcount(on_their_way));
     }
-    queue(quad, line, sectors, tile + position);
+    queue(quad, line, sectors, tile_place_ + position);
     return true;
+  }
+  void go_to(TileId tile) {
+    tile_ = tile;
+    tile_place_ = surface_->grid().place(tile, 0);
+    tile_address_ = surface_->address(tile_place_);
   }
   [[gnu::always_inline]] void queue(const ColorQuad& quad, std::uint32_t line, std::uint32_t sectors,
                                     std::size_t place) {
@@ -112,19 +124,37 @@ class CropUnit : public Unit {
   }
   [[gnu::noinline]] bool look_up_ahead(const ColorQuad& quad, std::uint64_t address, std::uint32_t sectors,
                                        std::size_t place) {
-    const LinesAhead::Stay stay = ahead_->look_up(address, sectors, blends(quad));
+    if (!port_is_open()) return false;
+    bool fills = false;
+    const LinesAhead::Stay stay = ahead_->look_up(address, sectors, blends(quad), fills);
     if (stay == LinesAhead::no_stay) return false;
     pay(ahead_->take_moves());
+    if (fills) ask(quad, place);
     queue(quad, stay, sectors, place);
     return true;
   }
   bool blends(const ColorQuad& quad) const {
     return Plain || !replaces_ || context_.state(quad.warp->draw[quad.index]).blend;
   }
-  /// Gives what moves its time of the blender.
+  /// Gives what moves its time of the blender, or of the port.
   void pay(const CropTime::Moves& moves) {
-    const unsigned paid = time_.paid(moves);
-    if (paid > 0 && time_.move(paid, now())) did(CropWork::sectors, paid, now());
+    if (!Plain && time_.port.is_on()) return send(moves.flits);
+    if (moves.sectors > 0 && time_.move(moves.sectors, now())) did(CropWork::sectors, moves.sectors, now());
+  }
+  bool port_is_open() const { return Plain || time_.port.open_from(now()) == now(); }
+  void ask(const ColorQuad& quad, std::size_t place) {
+    if (!time_.port.is_on()) return;
+    send(time_.flits_of_read(place - quad.position(), quad.warp->first_primitive[quad.index],
+                             sectors_of_quads_[quad.position()].line));
+  }
+  /// ZROP's go first.
+  [[gnu::noinline]] void take_reads() {
+    for (; in_reads_.ready() && port_is_open(); in_reads_.pop()) send(in_reads_.front().flits);
+  }
+  [[gnu::noinline]] void send(unsigned flits) {
+    if (flits == 0 || !time_.port.is_on()) return;
+    const auto [from, until] = time_.port.take(flits, now());
+    did(CropWork::flits, flits, from, until);
   }
 
   /// Goes on with the look-up of the quad at the link; `no_line` while it has to wait.
@@ -133,10 +163,13 @@ class CropUnit : public Unit {
     wanted_.sectors = sectors;
     const bool had_line = wanted_.line != SectoredCache::no_line;
     const bool done = port_.look_up(wanted_, now(), [this](unsigned moved) { pay({moved, 0}); });
-    pay({0, port_.take_lines_moved().written_back});
-    // It has just been pinned, by nobody else if it is new.
-    if (!Plain && !had_line && wanted_.line != SectoredCache::no_line && port_.cache().present(wanted_.line) == 0)
-      stays_[wanted_.line] = {wanted_.reads, wanted_.reads && returns_ && returns_->from(address) != 0};
+    if (!Plain) {
+      const CachePort::LinesMoved moved = port_.take_lines_moved();
+      if (time_.port.is_on()) send(moved.written_back + moved.sectors_written_back);
+      // It has just been pinned, by nobody else if it is new.
+      if (!had_line && wanted_.line != SectoredCache::no_line && port_.cache().present(wanted_.line) == 0)
+        came_back_[wanted_.line] = wanted_.reads && returns_ && returns_->from(address) != 0;
+    }
     if (!done) return SectoredCache::no_line;
     asked_for = std::exchange(wanted_.asked_for, 0);
     return std::exchange(wanted_.line, SectoredCache::no_line);
@@ -194,7 +227,7 @@ class CropUnit : public Unit {
         stop_ = UnitState::blocked;
         break;
       }
-      if (is_awaited(entry, now)) {
+      if (is_awaited(entry, now) || !port_is_open()) {
         stop_ = UnitState::memory;
         break;
       }
@@ -206,7 +239,7 @@ class CropUnit : public Unit {
         break;
       }
       if (!Plain && !time_.forwards && hazard_gate_.enter() && priced.blends &&
-          time_.hazard_until(entry.place, now) > now) {
+          time_.hazard_until(entry.place, priced.live, now) > now) {
         stop_ = UnitState::latency;
         break;
       }
@@ -252,7 +285,7 @@ class CropUnit : public Unit {
   bool is_awaited(const Entry& entry, Cycle now) {
     if (Plain || !ahead_) {
       if (port_.awaited(entry.line, entry.sectors) != 0) return true;
-      if (Plain || !stays_[entry.line].came_back) return false;
+      if (Plain || !came_back_[entry.line]) return false;
       const Cycle from = returns_->from(port_.cache().address(entry.line));
       if (now < from) ready_at_ = from;
       return now < from;
@@ -271,7 +304,7 @@ class CropUnit : public Unit {
     port_.cache().unpin(entry.line);
     if (Plain) return;
     if (returns_) returns_->used(port_.cache().address(entry.line), now);
-    if (std::exchange(stays_[entry.line], {}).is_unpaid && changed) pay({0, 1});
+    came_back_[entry.line] = false;
   }
 
   /// Behind the quads in the queue.
@@ -306,6 +339,7 @@ class CropUnit : public Unit {
     } else {
       ahead_->advance();
     }
+    if (!in_reads_.empty()) take_reads();
     const bool blended = blend(now);
     const bool accepted = accept();
     const bool marked = !marks_.empty() && pass_marks(now);
@@ -315,12 +349,16 @@ class CropUnit : public Unit {
     if (blended || accepted || marked || waits_for_time) return now + 1;
     // A quad at the link that could not be looked up waits for a completion or for the queue to move.
     Cycle next = std::min(port_.next_completion(), queue_.empty() ? never : ready_at_);
-    if (in_.next_ready() > now) next = std::min(next, in_.next_ready());
+    if (const Cycle open = Plain ? now : time_.port.open_from(now); open > now) next = std::min(next, open);
+    for (const Cycle at : {in_.next_ready(), in_reads_.next_ready()}) {
+      if (at > now) next = std::min(next, at);
+    }
     return next;
   }
 
   const RenderContext& context_;
   StreamIn<ColorBeat> in_;
+  StreamIn<PortReads> in_reads_;
   StreamOut<TerminationBeat> out_;
   StreamOut<BlendsDone> out_done_;
   std::unique_ptr<CropBehaviour> behaviour_;
@@ -338,11 +376,10 @@ class CropUnit : public Unit {
   Ring<Entry> queue_;         ///< looked up and waiting to be blended
   unsigned at_ = 0;           ///< quads taken of the beat at the link
   CachePort::LookUp wanted_;  ///< of the quad at the link
-  struct Stay {
-    bool is_unpaid = false;  ///< nothing has been blended into it
-    bool came_back = false;  ///< it was there before; not used since
-  };
-  std::vector<Stay> stays_;             ///< by line of the cache
+  TileId tile_;               ///< of the last quad that was looked up
+  std::size_t tile_place_ = 0;
+  std::uint64_t tile_address_ = 0;
+  std::vector<bool> came_back_;         ///< by line of the cache: it was there before, and has not been used since
   std::optional<LineReturns> returns_;  ///< where lines that come back wait
   std::optional<LinesAhead> ahead_;     ///< where tags run ahead of data
   Cycle ready_at_ = never;              ///< of the quad whose turn it is, if that is known

@@ -21,12 +21,14 @@ class UntimedCrop : public UntimedUnit {
         out_(*this, "out_terminations"),
         out_done_(*this, "out_done"),
         in_(input<ShadedWarpItem>("in_color", [this](const ShadedWarpItem& item) { take(*item.warp); })),
+        in_reads_(input<PortReads>("in_reads", [](const PortReads&) {})),
         behaviour_(std::move(behaviour)),
         signals_(context.frame->terminates_early()),
         barriers_(context),
         time_(behaviour_->time()),
         memory_({MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}) {
     out_done_.set_optional();
+    in_reads_->set_optional();
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -53,11 +55,13 @@ class UntimedCrop : public UntimedUnit {
     const std::size_t lines = behaviour_->surface()->size_bytes() / time_.cache.line_bytes + 1;
     // Of lines that go in another order than they are used, which one goes depends on those that are waited for.
     if (terms.order_varies || time_.cache.replacement != Replacement::lru) filled_.resize(lines);
-    if (time_.pays_for_lines) unpaid_.resize(lines);
   }
   double least_cycles(const Items& items) const override {
-    return time_.least_cycles({items[CropWork::blend], items[CropWork::sectors], items[CropWork::sectors_filled],
-                               items[CropWork::lines_filled], memory_latency_cycles_});
+    return time_.least_cycles({items[CropWork::blend], items[CropWork::sectors], items[CropWork::flits],
+                               items[CropWork::sectors_filled], items[CropWork::lines_filled], memory_latency_cycles_});
+  }
+  void leave_out_pending(Items& items) const override {
+    items[CropWork::flits] -= std::min(items[CropWork::flits], time_.port.most_waiting(time_.cache));
   }
   std::uint64_t room_in_warps() const override { return time_.input_quads; }
 
@@ -84,6 +88,8 @@ class UntimedCrop : public UntimedUnit {
       for (unsigned from = 0; from < warp.count; from += at_once) {
         const unsigned to = std::min<unsigned>(from + at_once, warp.count);
         behaviour_->look_up(warp, from, to, cache_);
+        if (counts_ && time_.port.is_on() && filled_.empty())
+          did(CropWork::flits, time_.flits_of_reads(warp, from, to, cache_, *behaviour_->surface()));
         for (unsigned line = 0; line < cache_.count; ++line) {
           if (counts_) count(cache_.lines[line]);
           if (memory_.connected()) memory_.move(cache_.lines[line], time_.cache);
@@ -128,7 +134,7 @@ class UntimedCrop : public UntimedUnit {
     if (cache_.count > 0 && changed) {
       behaviour_->make_dirty(cache_.lines[cache_.line_of[index]].line, cache_.sectors_of[index]);
     }
-    if (counts_) count(warp, index, outcome, changed);
+    if (counts_) count(warp, index, outcome);
   }
 
   /// What the cache moves in any order: each sector is filled once, though others may go for those that are waited for.
@@ -149,11 +155,16 @@ class UntimedCrop : public UntimedUnit {
     did(CropWork::sectors_filled, filled);
     did(CropWork::bytes_moved, std::uint64_t{moved} * time_.cache.sector_bytes);
     did(CropWork::lines_filled, fills_line ? 1 : 0);
-    did(CropWork::sectors, time_.paid({moved, written_back != 0 ? 1U : 0U}));
-    if (fills_line && !unpaid_.empty()) unpaid_[line] = true;
+    if (!time_.port.is_on()) {
+      did(CropWork::sectors, moved);
+    } else {
+      // In any order each line is asked for once.
+      if (!filled_.empty()) did(CropWork::flits, fills_line ? 1 : 0);
+      if (written_back != 0) did(CropWork::flits, 1 + popcount(written_back));
+    }
   }
   /// A quad that is blended whenever bins are flushed: some of its pixels are not terminated by what was blended before.
-  void count(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome, bool changed) {
+  void count(const ShadedWarp& warp, unsigned index, const CropBehaviour::Outcome& outcome) {
     const std::size_t place = behaviour_->surface()->grid().place(warp.tile, warp.position[index]);
     bool is_needed = true;
     if (!terminated_.empty()) {
@@ -161,12 +172,7 @@ class UntimedCrop : public UntimedUnit {
       is_needed = !context_.state(warp.draw[index]).early_termination || (warp.live[index] & ~before) != 0;
       before = static_cast<LaneMask>(before | outcome.terminated);
     }
-    if (!is_needed) return;
-    did(CropWork::blend, 1);
-    if (unpaid_.empty()) return;
-    const std::size_t line = line_of(behaviour_->surface()->address(place));
-    if (unpaid_[line] && changed) did(CropWork::sectors, time_.paid({0, 1}));
-    unpaid_[line] = false;
+    if (is_needed) did(CropWork::blend, 1);
   }
   /// Of the surface.
   std::size_t line_of(std::uint64_t address) const {
@@ -178,11 +184,12 @@ class UntimedCrop : public UntimedUnit {
   UntimedOut<TerminationBeat> out_;
   UntimedOut<BlendsDone> out_done_;
   std::unique_ptr<UntimedIn<ShadedWarpItem>> in_;
+  std::unique_ptr<UntimedIn<PortReads>> in_reads_;
   std::unique_ptr<CropBehaviour> behaviour_;
   const bool signals_;
   const BarrierPlan barriers_;
   std::optional<BlendOrderMonitor> monitor_;
-  const CropTime& time_;
+  CropTime time_;
   UntimedMemoryPort memory_;
   CropBehaviour::CacheLookUp cache_;
   // For `bound`:
@@ -190,7 +197,6 @@ class UntimedCrop : public UntimedUnit {
   std::uint32_t memory_latency_cycles_ = 0;
   std::vector<LaneMask> terminated_;   ///< by quad of the surface; empty if all quads count
   std::vector<std::uint32_t> filled_;  ///< sectors so far, by line of the surface; empty if all that moves counts
-  std::vector<bool> unpaid_;           ///< by line of the surface; empty if lines have no price
 };
 
 [[maybe_unused]] const bool crop_untimed_registered = [] {

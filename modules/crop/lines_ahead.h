@@ -37,8 +37,8 @@ class LinesAhead {
         latest_(returns.lines(), no_stay) {}
 
   /// Looks a quad up, which then waits to be blended; `no_stay` while it has to wait for the memory port or a register.
-  /// One that replaces what is there does not read.
-  Stay look_up(std::uint64_t address, std::uint32_t sectors, bool reads) {
+  /// One that replaces what is there does not read. `fills`: whether sectors are asked for.
+  Stay look_up(std::uint64_t address, std::uint32_t sectors, bool reads, bool& fills) {
     const auto most = static_cast<unsigned>(__builtin_popcount(sectors));
     if (!requests_.empty() || !port_.memory().available()) return no_stay;
     // One that needs more registers than there are has them all to itself.
@@ -52,7 +52,8 @@ class LinesAhead {
     const Stay number = stay_of_line_[access.line];
     State& stay = stays_[number];
     ++stay.quads;
-    if (access.filled == 0) return number;
+    fills = access.filled != 0;
+    if (!fills) return number;
     stay.filling |= access.filled;
     if (stay.waits) stay.again |= access.filled;
     for_each_sector_run(access.filled, sectors_of_a_line_, [&](unsigned first, unsigned count) {
@@ -99,7 +100,6 @@ class LinesAhead {
     stay.came_back = false;
     returns_.used(stay.address, now);
     if (changed) stay.dirty |= sectors;
-    if (std::exchange(stay.unpaid, false) && changed) ++moves_.lines;
     if (--stay.quads == 0 && stay.left) end(number);
   }
 
@@ -118,7 +118,6 @@ class LinesAhead {
     Stay following = no_stay;  ///< of the same line, which waits for the end of this one
     bool left = false;         ///< the line has gone for another
     bool ended = false;
-    bool unpaid = false;     ///< nothing has been blended into it: the quad for which it was fetched is the first
     bool waits = false;      ///< for the stay before it to end
     bool came_back = false;  ///< the line was there before; nothing has been blended into it since
   };
@@ -145,12 +144,12 @@ class LinesAhead {
     State& stay = stays_[number];
     stay = {};
     stay.address = access.address;
-    stay.unpaid = access.filled != 0;
-    stay.came_back = stay.unpaid && returns_.from(access.address) != 0;
+    const bool reads = access.filled != 0;
+    stay.came_back = reads && returns_.from(access.address) != 0;
     Stay& latest = latest_[returns_.index(access.address)];
     if (latest != no_stay) {
       stays_[latest].following = number;
-      stay.waits = stay.came_back = stay.unpaid;
+      stay.waits = stay.came_back = reads;
     }
     latest = number;
     stay_of_line_[access.line] = number;
@@ -165,7 +164,7 @@ class LinesAhead {
       const auto count = static_cast<unsigned>(__builtin_popcount(stay.dirty));
       statistics_.sectors_written_back += count;
       statistics_.bytes_written_back += count * sector_bytes_;
-      ++moves_.lines;
+      moves_.write(count);
       for_each_sector_run(stay.dirty, sectors_of_a_line_, [&](unsigned first, unsigned sectors) {
         request({number, first, sectors, Request::write_back, stay.address});
       });
@@ -175,6 +174,7 @@ class LinesAhead {
       following.waits = false;
       const std::uint32_t again = std::exchange(following.again, 0);
       following.filling_again = again;
+      moves_.flits += again != 0 ? 1 : 0;
       fetched_again_ += static_cast<unsigned>(__builtin_popcount(again));
       for_each_sector_run(again, sectors_of_a_line_, [&](unsigned first, unsigned sectors) {
         request({stay.following, first, sectors, Request::fill_again});
@@ -188,8 +188,10 @@ class LinesAhead {
   }
 
   void request(const Request& wanted) {
-    moves_.sectors += wanted.count;
-    if (wanted.kind != Request::write_back) filling_ += wanted.count;
+    if (wanted.kind != Request::write_back) {
+      moves_.sectors += wanted.count;
+      filling_ += wanted.count;
+    }
     if (requests_.empty() && port_.memory().available()) {
       send(wanted);
     } else {

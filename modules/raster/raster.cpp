@@ -91,6 +91,7 @@ TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderContext
       wide_edges_gate_(context, "raster.wide_edges"),
       binned_gate_(context, "tgc.binning"),
       ownership_gate_(context, "raster.tile_ownership"),
+      by_halves_(parameters.half_tile_order),
       shares_tiles_(context.placement.gpcs > 1 && ownership_gate_.enter()) {
   if (!parameters.hi_z) return;
   hi_z_ = std::make_unique<HiZ>(context, parameters.hi_z_bits);
@@ -168,8 +169,8 @@ void TileRasterizer::Edge::set_up_tile() {
   const auto across = static_cast<std::int32_t>(dx);
   const auto down = static_cast<std::int32_t>(dy);
   samples = across * LanePairBits{0, 1, 0, 1, 0, 1, 0, 1} + down * LanePairBits{0, 0, 1, 1, 2, 2, 3, 3};
-  right = LanePairBits{} + 2 * across;
-  below = LanePairBits{} + 4 * down;
+  right = LanePairBits{} + static_cast<std::int32_t>(2 * dx);
+  below = LanePairBits{} + static_cast<std::int32_t>(4 * dy);
 }
 
 /// It covers its bounds: edges that have no sample outside, and all beyond the bounds masked off.
@@ -221,6 +222,7 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
     const std::uint64_t covered = (wide_ ? coverage_of_wide(value) : coverage_of_narrow(value)) & in_area(x, y);
     const auto fragments = static_cast<unsigned>(__builtin_popcountll(covered));
     put_quads(out, x, y, covered);
+    if (by_halves_) take_by_halves(out);
     quads_rasterized.add(primitive_.draw, out.count);
     fragments_rasterized.add(primitive_.draw, fragments);
     if (context_.fragments != nullptr) tell(out);
@@ -234,6 +236,16 @@ bool TileRasterizer::next(QuadBeat& out, unsigned& coarse_tests, bool& new_scree
   }
   raster_tiles_tested += coarse_tests;
   return false;
+}
+
+void TileRasterizer::take_by_halves(QuadBeat& tile) {
+  const QuadBeat rows = tile;
+  unsigned taken = 0;
+  for (const unsigned half : {0U, 2U}) {
+    for (unsigned i = 0; i < rows.count; ++i) {
+      if ((rows.quads[i].position & 2U) == half) tile.quads[taken++] = rows.quads[i];
+    }
+  }
 }
 
 bool TileRasterizer::is_hidden(TileId tile, std::int32_t x, std::int32_t y) {

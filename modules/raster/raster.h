@@ -99,6 +99,9 @@ struct RasterTime {
 class TileRasterizer : public RasterBehaviour {
  public:
   struct Parameters : RasterParameters {
+    Switch half_tile_order{*this, "half_tile_order", false,
+                           "left open by the paper; measured on a GH100 graphics GPC: on",
+                           "quads of a raster tile come half by half, 4x8 pixels each, not row by row"};
     Switch hi_z{*this, "hi_z", true, "all GPUs since HyperZ (ATI, 2000)",
                 "raster tiles behind all that is stored there are dropped before fine rasterisation"};
     Integer hi_z_bits{*this,
@@ -145,6 +148,7 @@ class TileRasterizer : public RasterBehaviour {
   /// All quads of it that are covered.
   void put_quads(QuadBeat& out, std::int32_t x, std::int32_t y, std::uint64_t coverage) const;
   bool advance();
+  [[gnu::noinline]] static void take_by_halves(QuadBeat& tile);
   /// Whether Hi-Z culls the raster tile that begins at a pixel.
   [[gnu::noinline]] bool is_hidden(TileId tile, std::int32_t x, std::int32_t y);
 
@@ -168,6 +172,7 @@ class TileRasterizer : public RasterBehaviour {
   EffectGate wide_edges_gate_;
   EffectGate binned_gate_;
   EffectGate ownership_gate_;
+  const bool by_halves_;     ///< quads of a raster tile, not by rows
   const bool shares_tiles_;  ///< with other GPCs
 };
 

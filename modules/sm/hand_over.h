@@ -2,67 +2,93 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <utility>
 
+#include <vrpipe/kernel/rate.h>
 #include <vrpipe/pipeline/render_context.h>
 #include <vrpipe/pipeline/slots/sm.h>
 
 namespace vrpipe {
 
-/// What handing fragment warps to cores takes: so much for a full warp, a part of one in proportion, and at least so much
-/// for the quads of a primitive in a screen tile that come one after the other (measured on a GH100 graphics GPC).
+/// What handing fragment warps to cores takes: so much for a warp, and beside that so much for a visit, the quads of a
+/// primitive in a screen tile that come one after the other; the longer of the two counts (measured on a GH100 graphics GPC).
 class HandOver {
  public:
   HandOver(const SmBehaviour::TimingParameters& timing, const RenderContext& context)
       : context_(context), price_(timing.hand_over) {}
   bool is_on() const { return price_.is_on(); }
-  /// Of one warp at most, in thousandths of a cycle.
-  std::uint64_t longest() const {
-    return price_.warp_thousandths +
-           quads_per_warp * (std::uint64_t{price_.visit_thousandths} + price_.discard_thousandths);
-  }
+  /// In thousandths of a cycle.
+  struct Price {
+    std::uint64_t warp = 0;
+    std::uint64_t visits = 0;
+  };
   /// A primitive's quads in a screen tile.
   struct Visit {
     TileId tile;
     std::uint32_t primitive = ~0U;
-    std::uint64_t taken = 0;  ///< by them
-    std::uint64_t paid = 0;   ///< for them
   };
-  /// Of a warp, in thousandths of a cycle: what it adds to those before.
-  std::uint64_t of(const Warp& warp) {
-    return of(warp, last_, [](const Visit&, std::uint32_t) { return true; });
+  /// Of a warp that follows those before.
+  Price of(const Warp& warp) {
+    return {of_warp(warp), of_visits(warp, last_, [](const Visit&, std::uint32_t) { return true; })};
   }
-  /// The least of it in any company: a primitive comes to a tile once. `last` is of this tile.
-  std::uint64_t least_of(const Warp& warp, Visit& last) const {
-    return of(warp, last, [](const Visit& before, std::uint32_t primitive) {
-      return before.primitive == ~0U || primitive >= before.primitive;
-    });
+  /// The least of it in any company: its quads may fill other warps, and a primitive comes to a tile once. `last` is of this
+  /// tile.
+  Price least_of(const Warp& warp, Visit& last) const {
+    return {of_warp(warp) * warp.count / quads_per_warp,
+            of_visits(warp, last, [](const Visit& before, std::uint32_t primitive) {
+              return before.primitive == ~0U || primitive >= before.primitive;
+            })};
+  }
+  /// What is not done when the last warp is launched, at most.
+  Price most_left() const {
+    return {price_.warp_thousandths + price_.discard_warp_thousandths,
+            1000 * most_visits_behind +
+                quads_per_warp * (std::uint64_t{price_.visit_thousandths} + price_.discard_thousandths)};
+  }
+
+  /// Whether a warp may be launched in a cycle.
+  bool is_free(Cycle now) const { return warps_.is_free(now) && visits_.is_free(now + most_visits_behind); }
+  /// The first from one on in which it may.
+  Cycle free_from(Cycle cycle) const {
+    const Cycle visits = visits_.free_from(cycle + most_visits_behind) - most_visits_behind;
+    return std::max(warps_.free_from(cycle), visits);
+  }
+  /// Launches one in such a cycle. `did(kind, thousandths, from, until)` is told what is busy with it.
+  template <class Did>
+  void take(const Warp& warp, Cycle now, Did&& did) {
+    const Price price = of(warp);
+    did(SmWork::launches, price.warp, now, std::max(warps_.take(now, price.warp), now + 1));
+    const Cycle from = visits_.free_from(now);
+    if (price.visits > 0) did(SmWork::visits, price.visits, from, std::max(visits_.take(now, price.visits), from + 1));
   }
 
  private:
+  /// Cycles: a few visits wait while warps go on. Assumed; only that it is more than a few warps' was seen.
+  static constexpr Cycle most_visits_behind = 64;
+
+  bool discards(const Warp& warp) const {
+    return context_.state(warp.quads[0].draw).discards();
+  }  // all are of one state
+  std::uint64_t of_warp(const Warp& warp) const {
+    return price_.warp_thousandths + (discards(warp) ? price_.discard_warp_thousandths : 0);
+  }
   template <class Counts>
-  std::uint64_t of(const Warp& warp, Visit& last, Counts counts) const {
-    const bool discards = context_.state(warp.quads[0].draw).discards();  // all are of one state
-    const std::uint64_t of_visit = price_.visit_thousandths + (discards ? price_.discard_thousandths : 0);
-    std::uint64_t price = 0;
+  std::uint64_t of_visits(const Warp& warp, Visit& last, Counts counts) const {
+    unsigned visits = 0;
     for (unsigned i = 0; i < warp.count; ++i) {
       const std::uint32_t primitive = primitive_order(warp.quads[i]);
-      if (!counts(last, primitive)) continue;
-      if (primitive != last.primitive || warp.tile != last.tile) {
-        last = {warp.tile, primitive, 0, of_visit};
-        price += of_visit;
-      }
-      last.taken += price_.warp_thousandths;  // eighths of the thousandths of a warp
-      if (const std::uint64_t due = last.taken / quads_per_warp; due > last.paid) {
-        price += due - last.paid;
-        last.paid = due;
-      }
+      if (!counts(last, primitive) || (primitive == last.primitive && warp.tile == last.tile)) continue;
+      last = {warp.tile, primitive};
+      ++visits;
     }
-    return price;
+    return visits * (std::uint64_t{price_.visit_thousandths} + (discards(warp) ? price_.discard_thousandths : 0));
   }
 
   const RenderContext& context_;
   const HandOverPrice price_;
   Visit last_;
+  ThousandthsPort warps_;
+  ThousandthsPort visits_;
 };
 
 }  // namespace vrpipe

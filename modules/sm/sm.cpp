@@ -58,7 +58,7 @@ SplatShader::SplatShader(const Parameters& parameters, const RenderContext& cont
                      (context.frame->draws().size() > 1 && several_draws_gate_.enter())),
       mesh_(context) {
   timing_.hand_over = {parameters.warp_launch_cycles.thousandths(), parameters.visit_launch_cycles.thousandths(),
-                       parameters.discard_launch_cycles.thousandths()};
+                       parameters.discard_launch_cycles.thousandths(), parameters.discard_warp_cycles.thousandths()};
   timing_.cores = parameters.cores;
   timing_.schedulers_per_core = parameters.schedulers_per_core;
   timing_.lanes_per_scheduler = parameters.lanes_per_scheduler;

@@ -42,31 +42,39 @@ class SplatShader : public SmBehaviour {
                               "warps",
                               "measured on a GH100 graphics GPC: 64 quads to one SM, SMs in turn",
                               "consecutive warps of a screen tile that go to the same core"};
-    Real warp_launch_cycles{
+    Real warp_launch_cycles{*this,
+                            "warp_launch_cycles",
+                            0,
+                            0,
+                            1000,
+                            "cycles",
+                            "left open by the paper; measured on a GH100 graphics GPC with 2 TPCs: 2.5",
+                            "of handing a warp to a core; 0: a warp a cycle"};
+    Real visit_launch_cycles{
         *this,
-        "warp_launch_cycles",
+        "visit_launch_cycles",
         0,
         0,
         1000,
         "cycles",
-        "left open by the paper; measured on a GH100 graphics GPC with 2 TPCs: 2.5",
-        "of handing a full warp to a core, of another in proportion to its quads; 0: a warp a cycle"};
-    Real visit_launch_cycles{*this,
-                             "visit_launch_cycles",
-                             0,
-                             0,
-                             1000,
-                             "cycles",
-                             "left open by the paper; measured on a GH100 graphics GPC with 2 TPCs: 4",
-                             "the least that quads of a primitive in a screen tile take to be handed over"};
+        "left open by the paper; measured on a GH100 graphics GPC with 2 TPCs: 4",
+        "beside that, of handing over a primitive's quads in a screen tile; the longer of the two counts"};
     Real discard_launch_cycles{*this,
                                "discard_launch_cycles",
                                0,
                                0,
                                1000,
                                "cycles",
-                               "left open by the paper; measured on a GH100 graphics GPC with 2 TPCs: 1.2",
+                               "left open by the paper; measured on a GH100 graphics GPC with 2 TPCs: 1.7",
                                "on top of that, of a program that discards"};
+    Real discard_warp_cycles{*this,
+                             "discard_warp_cycles",
+                             0,
+                             0,
+                             1000,
+                             "cycles",
+                             "left open by the paper; measured on a GH100 graphics GPC with 2 TPCs: 1.03",
+                             "on top of warp_launch_cycles, of a program that discards"};
     Integer vertex_instructions{*this,        "vertex_instructions",
                                 20,           1,
                                 1000,         "instructions",

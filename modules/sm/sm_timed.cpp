@@ -166,7 +166,7 @@ class TimedSm : public TimedUnit {
     if (!has_slot()) {
       throw SimulationFault("deadlock", launch, std::string(name()) + " has warps to launch, and no slot is released");
     }
-    launch = take_slot(warp.tile, launches_.free_from(launch));
+    launch = take_slot(warp.tile, hand_over_.free_from(launch));
     charge(UnitState::blocked, launch);
     Cycle there = 0;
     if (fetches_) {
@@ -177,8 +177,9 @@ class TimedSm : public TimedUnit {
     }
     next_launch_ = launch + 1;
     if (hand_over_.is_on()) {
-      const std::uint64_t price = hand_over_.of(warp);
-      did(SmWork::launches, price, launch, std::max(launches_.take(launch, price), launch + 1));
+      hand_over_.take(warp, launch, [this](unsigned kind, std::uint64_t thousandths, Cycle from, Cycle until) {
+        did(kind, thousandths, from, until);
+      });
     }
 
     const Program& needed = fragment_.of(warp);
@@ -344,7 +345,6 @@ class TimedSm : public TimedUnit {
   TimedIn<Warp> in_warps_;
   TimedIn<VertexWarp> in_vertices_;
   HandOver hand_over_;
-  ThousandthsPort launches_;  ///< where handing over has a price
   std::vector<Cycle> scheduler_free_at_;
   std::vector<Flight> flights_;
   std::vector<std::uint32_t> free_flights_;

@@ -333,7 +333,7 @@ class SmUnit : public Unit {
     if (!in_warps_.ready()) return;
     const Warp& warp = in_warps_.front();
     if (warp.mark != Mark::none) return pass_mark();
-    if (!launches_.is_free(now)) return;
+    if (hand_over_.is_on() && !hand_over_.is_free(now)) return;
     if (!looks_up_) {
       if (!choose_core(warp.tile)) {
         slots_full_ = true;
@@ -361,8 +361,9 @@ class SmUnit : public Unit {
   }
 
   [[gnu::noinline]] void pay_for_launch(const Warp& warp, Cycle now) {
-    const std::uint64_t price = hand_over_.of(warp);
-    did(SmWork::launches, price, now, std::max(launches_.take(now, price), now + 1));
+    hand_over_.take(warp, now, [this](unsigned kind, std::uint64_t thousandths, Cycle from, Cycle until) {
+      did(kind, thousandths, from, until);
+    });
   }
 
   /// Looks a warp's attributes up; false if that takes longer than this cycle.
@@ -417,7 +418,7 @@ class SmUnit : public Unit {
     if (next == now + 1) return next;
     // What could not be taken for want of a slot, a credit or an answer waits for the port that brings one.
     if (!slots_full_ && !(looks_up_ && in_warps_.ready())) {
-      next = std::min(next, std::max(in_warps_.next_ready(), launches_.free_from(now + 1)));
+      next = std::min(next, std::max(in_warps_.next_ready(), hand_over_.free_from(now + 1)));
     }
     if (vertex_count_ < timing_.vertex_warps) next = std::min(next, std::max(in_vertices_.next_ready(), now + 1));
     return std::min(next, in_release_.next_ready());
@@ -439,7 +440,6 @@ class SmUnit : public Unit {
   bool lacks_fetch_ = false;  ///< it is, and its traffic was left out
   EffectGate fetch_gate_;
   HandOver hand_over_;
-  ThousandthsPort launches_;  ///< where handing over has a price
   // The programs, in whose first segments nothing stands for memory where that is connected.
   Program vertex_;
   FragmentPrograms<Program> fragment_;

@@ -35,10 +35,17 @@ class UntimedSm : public UntimedUnit {
   UntimedMemoryPort* memory_port() override { return &memory_; }
   std::vector<OccupancyPart> least_parts(const Items& items, bool to_last) const override {
     Items needed = items;
-    if (to_last) needed[SmWork::launches] -= std::min(needed[SmWork::launches], hand_over_.longest());
+    if (to_last) {
+      const HandOver::Price left = hand_over_.most_left();
+      needed[SmWork::launches] -= std::min(needed[SmWork::launches], left.warp);
+      needed[SmWork::visits] -= std::min(needed[SmWork::visits], left.visits);
+    }
     return UntimedUnit::least_parts(needed, false);  // of warps, which schedulers share
   }
-  double idle_after_last() const override { return static_cast<double>(hand_over_.longest()) / 1000; }
+  double idle_after_last() const override {
+    const HandOver::Price left = hand_over_.most_left();
+    return hand_over_.is_on() ? static_cast<double>(std::max(left.warp, left.visits)) / 1000 : 0;
+  }
   std::uint64_t room_in_warps() const override { return std::uint64_t{timing_.cores} * timing_.warps_per_core; }
 
  private:
@@ -55,13 +62,17 @@ class UntimedSm : public UntimedUnit {
     shaded_.count = 0;
     if (warp.mark == Mark::none) {
       if (follows_memory()) read(warp);
-      if (hand_over_.is_on()) did(SmWork::launches, launch(warp));
+      if (hand_over_.is_on()) {
+        const HandOver::Price price = launch(warp);
+        did(SmWork::launches, price.warp);
+        did(SmWork::visits, price.visits);
+      }
       behaviour_->shade(warp, shaded_);
     }
     out_shaded_.send({&shaded_});
   }
   /// In bins that time out a primitive's quads may be together that are not so here.
-  std::uint64_t launch(const Warp& warp) {
+  HandOver::Price launch(const Warp& warp) {
     return visits_.empty() ? hand_over_.of(warp) : hand_over_.least_of(warp, visits_[tiling_.index(warp.tile)]);
   }
   void shade_vertices(const VertexWarp& warp) {

@@ -2,25 +2,18 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <vector>
 
 #include <vrpipe/pipeline/payload.h>
 
 namespace vrpipe {
 
 /// What tests take by the places that they touch: so much for each half, 4x8 pixels, of an 8x8 block in which a primitive
-/// has quads, and at least so much for the block (measured on a GH100 graphics GPC: 1 and 1.4 cycles); and once so much for
-/// the primitive (2.7: rectangles of 2x2 take 4.17 cycles, of 16x16 10.67, and one over many tiles 8.05 a tile).
+/// has quads, and at least so much for the block (measured on a GH100 graphics GPC: 1 and 1.4 cycles).
 class BlockPrice {
  public:
   /// In thousandths of a cycle; all 0: there is no such price.
-  /// @param primitives  of the frame, in whose order they are numbered (primitive_order)
-  BlockPrice(std::uint32_t half, std::uint32_t block, std::uint32_t of_primitive = 0, std::uint64_t primitives = 0)
-      : half_(half),
-        block_(std::max(half, block)),
-        of_primitive_(of_primitive),
-        seen_(of_primitive > 0 ? static_cast<std::size_t>(primitives) : 0) {}
-  bool is_on() const { return block_ > 0 || of_primitive_ > 0; }
+  BlockPrice(std::uint32_t half, std::uint32_t block) : half_(half), block_(std::max(half, block)) {}
+  bool is_on() const { return block_ > 0; }
   /// Where a primitive's quads were.
   struct Place {
     TileId tile;
@@ -42,10 +35,6 @@ class BlockPrice {
       if (primitive != last.primitive || block != last.block || tile != last.tile) {
         last = {tile, primitive, block, half};
         price += block_;
-        if (of_primitive_ > 0 && !seen_[primitive]) {
-          seen_[primitive] = true;
-          price += of_primitive_;
-        }
       } else if ((last.halves & half) == 0) {
         last.halves |= half;
         price += 2 * half_ > block_ ? 2 * half_ - block_ : 0;
@@ -57,8 +46,6 @@ class BlockPrice {
  private:
   std::uint32_t half_;
   std::uint32_t block_;
-  std::uint32_t of_primitive_;
-  std::vector<bool> seen_;  ///< primitives
   Place last_;
 };
 

@@ -19,9 +19,11 @@ namespace vrpipe {
 /// once, and the times are kept beside it.
 class TimedZCache {
  public:
-  TimedZCache(TimedUnit& owner, const ZropBehaviour::TimingParameters& timing, Placement placement,
-              ZCacheStatistics& statistics)
+  /// @param out_reads  what they take of the ROPs' port
+  TimedZCache(TimedUnit& owner, TimedOut<PortReads>& out_reads, const ZropBehaviour::TimingParameters& timing,
+              Placement placement, ZCacheStatistics& statistics)
       : timing_(timing.z_cache),
+        out_reads_(out_reads),
         sectors_of_a_line_(timing_.organization.sectors_of_a_line()),
         statistics_(statistics),
         port_(owner, "memory", timing_.mshrs, std::min(sectors_of_a_line_, timing_.mshrs),
@@ -128,10 +130,6 @@ class TimedZCache {
     owed_ -= cycles * timing_.sectors_per_cycle;
     return {owed_at_, cycles};
   }
-  /// When lines that move beside the tests are done, and their thousandths of a cycle since this was last called.
-  std::pair<Cycle, std::uint64_t> take_line_work() {
-    return {line_moves_.free_from(0) + 1, std::exchange(line_work_, 0)};
-  }
 
  private:
   /// From the look-up of quads to their test, in order.
@@ -170,11 +168,15 @@ class TimedZCache {
     Cycle* const there = &there_[std::size_t{access.line} * sectors_of_a_line_];
     if (access.replaced) {
       if (!timing_.fetches_ahead) times.at = std::max(times.at, kept_until_[access.line]);
-      move_line(times.at);
       if (access.written_back != 0) write_back(access, times.at);
       if (returns_) returned_from_[access.line] = returns_->from(access.address);
     }
     if (access.filled != 0) {
+      if (!out_reads_.is_stub()) {
+        const std::uint32_t held = cache_->present(access.line) & ~access.filled;
+        if (const unsigned flits = lines_->flits_of(access.address, access.filled, held); flits > 0)
+          times.at = out_reads_.send({flits}, times.at).first;
+      }
       const Cycle filled = port_.fill(access, times.at, [&](unsigned first, unsigned count, Cycle cycle) {
         std::fill_n(there + first, count, cycle);
       });
@@ -192,24 +194,16 @@ class TimedZCache {
   }
   void write_back(const LineAccess& access, Cycle at) {
     port_.write_back(access, at);
-    Cycle moves = at;
-    move_line(moves);
     if (cleared_) cleared_->written(access.old_address, access.written_back);
-  }
-  /// Where lines have a price they move beside the tests, one after the other.
-  void move_line(Cycle& at) {
-    if (timing_.line_thousandths == 0) return;
-    at = line_moves_.free_from(at);
-    line_moves_.take(at, timing_.line_thousandths);
-    line_work_ += timing_.line_thousandths;
   }
   void owe(Cycle at) {
     const unsigned sectors = port_.take_moved();
-    owed_ += timing_.line_thousandths == 0 ? sectors : 0;
+    owed_ += out_reads_.is_stub() ? sectors : 0;
     owed_at_ = at;
   }
 
   const ZCache timing_;
+  TimedOut<PortReads>& out_reads_;
   const unsigned sectors_of_a_line_;
   ZCacheStatistics& statistics_;
   TimedCachePort port_;
@@ -227,9 +221,7 @@ class TimedZCache {
   Cycle foreseen_until_ = 0;            ///< of updates
   std::optional<LineReturns> returns_;  ///< where lines that come back wait
   std::vector<Cycle> returned_from_;    ///< by line of the cache
-  ThousandthsPort line_moves_;
-  std::uint64_t line_work_ = 0;
-  std::uint64_t owed_ = 0;  ///< sectors
+  std::uint64_t owed_ = 0;              ///< sectors
   Cycle owed_at_ = 0;
 };
 

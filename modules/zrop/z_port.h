@@ -28,11 +28,13 @@ namespace vrpipe {
 /// looked up behind a mark that has to come around first (LatePlan).
 class ZPort {
  public:
-  ZPort(PortOwner& owner, const ZCache& timing, unsigned quads_per_cycle, unsigned updates_per_cycle,
-        const RenderContext& context, const LatePlan& plan)
+  /// @param out_reads  what they take of the ROPs' port
+  ZPort(PortOwner& owner, StreamOut<PortReads>& out_reads, const ZCache& timing, unsigned quads_per_cycle,
+        unsigned updates_per_cycle, const RenderContext& context, const LatePlan& plan)
       : context_(context),
         plan_(plan),
         timing_(timing),
+        out_reads_(out_reads),
         updates_per_cycle_(updates_per_cycle),
         port_(owner, "memory", timing.mshrs,
               {MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)},
@@ -76,8 +78,8 @@ class ZPort {
              const StreamIn<ShadedWarpItem>& late) const {
     Cycle next = port_.next_completion();
     // What could not be looked up waits for a completion, for the queue to move or for its turn.
-    for (const Cycle at : {quads.next_ready(), updates.next_ready(), late.next_ready(), next_look_up_, late_.next(),
-                           returned_from(), timing_.line_thousandths == 0 ? 0 : line_moves_.free_from(0)}) {
+    for (const Cycle at :
+         {quads.next_ready(), updates.next_ready(), late.next_ready(), next_look_up_, late_.next(), returned_from()}) {
       if (at > now) next = std::min(next, at);
     }
     return next;
@@ -86,10 +88,6 @@ class ZPort {
   /// Sectors whose time the z-cache has not given yet.
   std::uint64_t owed_sectors() const { return owed_; }
   void pay_sectors(unsigned sectors) { owed_ -= sectors; }
-  /// Of lines that move beside the tests, thousandths of a cycle since this was last called.
-  std::uint64_t take_line_work() { return std::exchange(line_work_, 0); }
-  /// When that is over.
-  Cycle lines_done() const { return line_moves_.free_from(0) + 1; }
 
   bool has_beats() const { return !beats_.empty(); }
   /// Whether all that the first beat needs has come.
@@ -145,19 +143,28 @@ class ZPort {
     SectoredCache::Line line = SectoredCache::no_line;
     std::uint32_t sectors = 0;
   };
-  /// Of sectors that move, unless lines are what takes time.
+  /// Of sectors that move, unless a port's flits are what takes time.
   struct Moved {
     void operator()(unsigned sectors) const { owed += takes_time ? sectors : 0; }
     std::uint64_t& owed;
     bool takes_time;
   };
-  Moved moves() { return {owed_, timing_.line_thousandths == 0}; }
-  /// Where lines have a price they move beside the tests, one after the other: whether another may begin.
-  bool may_move_line() const { return timing_.line_thousandths == 0 || line_moves_.is_free(now_); }
-  void move_line() {
-    if (timing_.line_thousandths == 0) return;
-    line_moves_.take(now_, timing_.line_thousandths);
-    line_work_ += timing_.line_thousandths;
+  Moved moves() { return {owed_, out_reads_.is_stub()}; }
+  /// Whether something may be read.
+  bool may_read() const { return out_reads_.credits() > 0; }
+  void read(std::uint64_t address, std::uint32_t sectors, std::uint32_t held) {
+    if (out_reads_.is_stub()) return;
+    if (const unsigned flits = lines_->flits_of(address, sectors, held); flits > 0) out_reads_.push({flits});
+  }
+  /// Goes on with a look-up in the cache.
+  bool look_up(CachePort::LookUp& wanted) {
+    if (out_reads_.is_stub()) return port_.look_up(wanted, now_, moves());
+    if (!may_read() || !port_.look_up(wanted, now_, moves())) return false;
+    const SectoredCache& cache = port_.cache();
+    if (wanted.asked_for != 0)
+      read(wanted.address, wanted.asked_for,
+           (cache.present(wanted.line) | cache.filling(wanted.line)) & ~wanted.asked_for);
+    return true;
   }
   /// A line that came back to the cache, for a beat.
   struct Returned {
@@ -172,7 +179,7 @@ class ZPort {
     if (left == 0) {
       SectoredCache& cache = port_.cache();
       const bool is_held = cache.find(wanted.address) != SectoredCache::no_line;
-      if (!is_held && (!may_move_line() || !cache.can_allocate(wanted.address))) return false;
+      if (!may_read() || (!is_held && !cache.can_allocate(wanted.address))) return false;
       LineAccess access;
       access.address = wanted.address;
       access.sectors = wanted.sectors;
@@ -181,15 +188,12 @@ class ZPort {
       if (cleared_) cleared_->count(access.missed & access.known);
       wanted.line = access.line;
       if (access.replaced) {
-        move_line();
         fill_of_line_[access.line] = 0;
         if (waits) note_return();
-        if (access.written_back != 0) {
-          move_line();
-          port_.evict(access);
-        }
+        if (access.written_back != 0) port_.evict(access);
       }
       left = access.filled;
+      if (left != 0) read(wanted.address, left, cache.present(access.line) & ~left);
     }
     while (left != 0) {
       if (filling_ahead_ >= timing_.mshrs || !port_.memory_is_available()) return false;
@@ -232,13 +236,8 @@ class ZPort {
     if (timing_.fetches_ahead) return look_up_ahead(line_, ahead_left_, reads_of_beat_, true);
     const bool is_held =
         line_.line != SectoredCache::no_line || port_.cache().find(line_.address) != SectoredCache::no_line;
-    if (!is_held && !may_move_line()) return false;
-    const bool done = port_.look_up(line_, now_, moves());
-    if (!is_held && line_.line != SectoredCache::no_line) {
-      note_return();
-      const CachePort::LinesMoved lines = port_.take_lines_moved();
-      for (unsigned i = 0; i < lines.allocated + lines.written_back; ++i) move_line();
-    }
+    const bool done = look_up(line_);
+    if (!is_held && line_.line != SectoredCache::no_line) note_return();
     if (done) {
       reads_.push({line_.line, line_.sectors});
       reads_of_beat_ = ++reads_asked_;
@@ -280,7 +279,7 @@ class ZPort {
           update_ = {needed.address, needed.sectors, SectoredCache::no_line, 0};
           update_begun_ = true;
         }
-        if (!port_.look_up(update_, now_, moves())) break;
+        if (!look_up(update_)) break;
         update_begun_ = false;
         count_accesses(1);
         updates_.push({signal, update_.line, update_.sectors});
@@ -331,7 +330,7 @@ class ZPort {
       return late_.read([this](SectoredCache::Line needs, std::uint32_t) { return reads_done_ >= needs; }) || moved;
     }
     const bool moved = late_.take(
-        in, *lines_, now_, [this](CachePort::LookUp& line) { return port_.look_up(line, now_, moves()); }, count);
+        in, *lines_, now_, [this](CachePort::LookUp& line) { return look_up(line); }, count);
     const auto is_there = [this](SectoredCache::Line line, std::uint32_t sectors) {
       if (port_.awaited(line, sectors) != 0) return false;
       port_.cache().unpin(line);
@@ -400,6 +399,7 @@ class ZPort {
   const RenderContext& context_;
   const LatePlan& plan_;
   const ZCache timing_;
+  StreamOut<PortReads>& out_reads_;
   const unsigned updates_per_cycle_;
   CachePort port_;
   BatchLimit look_ups_;
@@ -420,8 +420,6 @@ class ZPort {
   Cycle now_ = 0;
   Cycle next_look_up_ = 0;  ///< after a beat wider than the unit
   std::uint64_t owed_ = 0;
-  ThousandthsPort line_moves_;  ///< where lines have a price
-  std::uint64_t line_work_ = 0;
   unsigned accesses_ = 0;  ///< that are not counted yet
   // Of the beat at the link:
   bool beat_begun_ = false;

@@ -77,24 +77,6 @@ class DepthStencilRop : public ZropBehaviour {
                       "cycles",
                       "left open by the paper; measured on a GH100 graphics GPC: 1.4",
                       "the least that such a block takes"};
-    Real primitive_cycles{*this,
-                          "primitive_cycles",
-                          0,
-                          0,
-                          100,
-                          "cycles",
-                          "left open by the paper; measured on a GH100 graphics GPC: 2.7",
-                          "on top of its blocks, once for each primitive that has quads to be tested before shading"};
-    Real line_cycles{
-        *this,
-        "line_cycles",
-        0,
-        0,
-        100,
-        "cycles",
-        "left open by the paper; measured on a GH100 graphics GPC: 1.4",
-        "beside the tests, for a line that is allocated or written back, however many of its sectors move; 0: "
-        "sectors_per_cycle says what moving takes, of the tests"};
     Switch fetch_ahead{
         *this, "fetch_ahead", false, "left open by the paper; measured on a GH100 graphics GPC: on",
         "tags run ahead of data by input_quads: a line may go while it is fetched for a test, so that more are "

@@ -34,6 +34,7 @@ class TimedZrop : public TimedUnit {
         out_(*this, "out_quads"),
         out_hi_z_(*this, "out_hi_z"),
         out_late_(*this, "out_late"),
+        out_reads_(*this, "out_reads"),
         in_terminations_(*this, "in_terminations",
                          [this](const TerminationBeat& beat, CycleInterval visible) {
                            return update(beat, visible.first);
@@ -47,10 +48,9 @@ class TimedZrop : public TimedUnit {
         tests_(timing_.quads_per_cycle),
         late_tests_(timing_.quads_per_cycle),
         updates_(timing_.updates_per_cycle),
-        z_(*this, timing_, context.placement, cache_statistics_),
+        z_(*this, out_reads_, timing_, context.placement, cache_statistics_),
         z_cache_gate_(context, "zrop.z_cache"),
-        blocks_(timing_.half_block_thousandths, timing_.block_thousandths, timing_.primitive_thousandths,
-                2 * std::uint64_t{context.frame->splats()}),
+        blocks_(timing_.half_block_thousandths, timing_.block_thousandths),
         block_time_(timing_.quads_per_cycle),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
@@ -60,6 +60,7 @@ class TimedZrop : public TimedUnit {
     out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
+    out_reads_.set_optional();
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -130,7 +131,6 @@ class TimedZrop : public TimedUnit {
     }
   }
   void note_moves() {
-    if (const auto [until, lines] = z_.take_line_work(); lines > 0) did(ZropWork::lines, lines, until - 1, until);
     if (const auto [at, cycles] = z_.take_moves(); cycles > 0) {
       for (unsigned cycle = 0; cycle < cycles; ++cycle) moves_.push(at);
     }
@@ -357,6 +357,7 @@ class TimedZrop : public TimedUnit {
   TimedOut<BinItem> out_;
   TimedOut<HiZUpdate> out_hi_z_;
   TimedOut<ShadedWarpItem> out_late_;
+  TimedOut<PortReads> out_reads_;
   TimedIn<TerminationBeat> in_terminations_;
   TimedIn<ShadedWarpItem> in_late_;
   TimedIn<BinItem> in_;

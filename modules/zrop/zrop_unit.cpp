@@ -17,7 +17,7 @@ namespace {
 /// ZROP at cycle fidelity. One port into the z-cache: a cycle either moves sectors, a whole cycle's worth of them, or
 /// applies updates, or tests, in this order; late tests go before others. Without memory the z-cache holds everything.
 /// Ports: in_quads, out_quads (QuadBeat), in_terminations (TerminationBeat), in_late, out_late (ShadedWarpItem; optional),
-/// out_hi_z (HiZUpdate; optional), memory (TLM-2.0 base protocol; optional).
+/// out_hi_z (HiZUpdate; optional), out_reads (PortReads; optional), memory (TLM-2.0 base protocol; optional).
 class ZropUnit : public Unit {
  public:
   ZropUnit(const sc_core::sc_module_name& name, ClockDomain& domain, std::unique_ptr<ZropBehaviour> behaviour,
@@ -29,16 +29,16 @@ class ZropUnit : public Unit {
         in_terminations_(*this, "in_terminations"),
         in_late_(*this, "in_late"),
         out_late_(*this, "out_late"),
+        out_reads_(*this, "out_reads"),
         context_(context),
         plan_(context),
         tests_late_(plan_.is_used()),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
-        z_(*this, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context, plan_),
+        z_(*this, out_reads_, timing_.z_cache, timing_.quads_per_cycle, timing_.updates_per_cycle, context, plan_),
         z_cache_gate_(context, "zrop.z_cache"),
         limit_(timing_.quads_per_cycle),
-        blocks_(timing_.half_block_thousandths, timing_.block_thousandths, timing_.primitive_thousandths,
-                2 * std::uint64_t{context.frame->splats()}),
+        blocks_(timing_.half_block_thousandths, timing_.block_thousandths),
         block_time_(timing_.quads_per_cycle),
         hi_z_(context) {
     out_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
@@ -48,6 +48,8 @@ class ZropUnit : public Unit {
     out_late_.set_pipeline(timing_.latency_cycles - 1, timing_.quads_per_cycle);
     out_late_.set_optional();
     in_late_.set_optional();
+    out_reads_.set_pipeline(0, 2 * QuadBeat::capacity);
+    out_reads_.set_optional();
   }
 
   bool idle() const override {
@@ -263,8 +265,6 @@ class ZropUnit : public Unit {
 
   [[gnu::noinline]] Cycle tick_cache(Cycle now) {
     const bool looked_up = z_.advance(now, in_, in_terminations_, in_late_);
-    if (const std::uint64_t lines = z_.take_line_work(); lines > 0)
-      did(ZropWork::lines, lines, now, std::max(z_.lines_done(), now + 1));
     const bool worked = move_sectors(now) || apply_updates(now) || (now >= free_at_ && test_all(now));
     const bool has_work = z_.has_beats() || in_.ready() || z_.has_late() || in_late_.ready();
     enter(worked || now < free_at_                                ? UnitState::busy
@@ -284,6 +284,7 @@ class ZropUnit : public Unit {
   StreamIn<TerminationBeat> in_terminations_;
   StreamIn<ShadedWarpItem> in_late_;
   StreamOut<ShadedWarpItem> out_late_;
+  StreamOut<PortReads> out_reads_;
   const RenderContext& context_;
   const LatePlan plan_;
   const bool tests_late_;  ///< any draw

@@ -18,7 +18,7 @@ namespace vrpipe {
 namespace {
 
 /// ZROP without time: a bin's test sees what the bins before it have terminated and what their late tests have stored, so no mark
-/// need come around. Where its memory wants to know, tests and updates go through the z-cache. Ports as in zrop_timed.cpp.
+/// need come around. Nobody counts what its reads take of the ROPs' port. Where its memory wants to know, tests and updates go through the z-cache. Ports as in zrop_timed.cpp.
 class UntimedZrop : public UntimedUnit {
  public:
   UntimedZrop(const std::string& name, std::unique_ptr<ZropBehaviour> behaviour, const RenderContext& context)
@@ -27,6 +27,7 @@ class UntimedZrop : public UntimedUnit {
         out_(*this, "out_quads"),
         out_hi_z_(*this, "out_hi_z"),
         out_late_(*this, "out_late"),
+        out_reads_(*this, "out_reads"),
         in_late_(input<ShadedWarpItem>("in_late", [this](const ShadedWarpItem& item) { test_late(item); })),
         in_(input<BinItem>("in_quads", [this](const BinItem& item) { test(item); })),
         in_terminations_(input<TerminationBeat>("in_terminations",
@@ -38,8 +39,7 @@ class UntimedZrop : public UntimedUnit {
         memory_({MemoryTraffic::depth_stencil, static_cast<std::uint16_t>(context.placement.gpc)}),
         z_cache_gate_(context, "zrop.z_cache"),
         quads_per_cycle_(behaviour_->timing().quads_per_cycle),
-        blocks_(behaviour_->timing().half_block_thousandths, behaviour_->timing().block_thousandths,
-                behaviour_->timing().primitive_thousandths, 2 * std::uint64_t{context.frame->splats()}),
+        blocks_(behaviour_->timing().half_block_thousandths, behaviour_->timing().block_thousandths),
         tiling_(context.frame->width(), context.frame->height()),
         places_(blocks_.is_on() && context.termination == Termination::paper ? tiling_.tiles() : 1),
         hi_z_(context) {
@@ -47,6 +47,7 @@ class UntimedZrop : public UntimedUnit {
     out_hi_z_.set_optional();
     out_late_.set_optional();
     in_late_->set_optional();
+    out_reads_.set_optional();
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
@@ -151,11 +152,9 @@ class UntimedZrop : public UntimedUnit {
     }
     return *lines_;
   }
-  /// What so many quads or updates need. Returns the sectors that no run is spared, whatever its order: for the bound. Lines
-  /// that none is spared are counted, where they have a price.
+  /// What so many quads or updates need. Returns the sectors that no run is spared, whatever its order: for the bound.
   std::uint64_t look_up(unsigned accesses) {
     const std::uint64_t before = cache_statistics_.sector_misses_compulsory.value();
-    std::uint64_t first_lines = 0;
     for (unsigned i = 0; i < needed_.count; ++i) {
       LineAccess access;
       access.address = needed_.lines[i].address;
@@ -167,30 +166,17 @@ class UntimedZrop : public UntimedUnit {
         if (access.written_back != 0) cleared_->written(access.old_address, access.written_back);
       }
       line_ = access.line;
-      if (z_cache_.line_thousandths > 0 && access.filled != 0) first_lines += is_first(access.address) ? 1U : 0U;
       memory_.move(access, z_cache_.organization);
     }
     cache_->accessed(accesses, accesses);
-    // Cleared sectors are not read for the first time.
-    if (z_cache_.line_thousandths > 0) {
-      did(ZropWork::lines, first_lines * z_cache_.line_thousandths);
-      return 0;
-    }
-    return cleared_ ? 0 : cache_statistics_.sector_misses_compulsory.value() - before;
+    // Cleared sectors are not read for the first time; and what takes flits takes no time of the tests.
+    return cleared_ || !out_reads_.is_stub() ? 0 : cache_statistics_.sector_misses_compulsory.value() - before;
   }
-  /// Whether sectors of a line are filled for the first time.
-  bool is_first(std::uint64_t address) {
-    const std::size_t line = (address - behaviour_->surface()->address({0, 0}, 0)) / z_cache_.organization.line_bytes;
-    if (line >= filled_lines_.size()) filled_lines_.resize(line + 1);
-    const bool is_first = !filled_lines_[line];
-    filled_lines_[line] = true;
-    return is_first;
-  }
-
   const RenderContext& context_;
   UntimedOut<BinItem> out_;
   UntimedOut<HiZUpdate> out_hi_z_;
   UntimedOut<ShadedWarpItem> out_late_;
+  UntimedOut<PortReads> out_reads_;
   std::unique_ptr<UntimedIn<ShadedWarpItem>> in_late_;
   std::unique_ptr<UntimedIn<BinItem>> in_;
   std::unique_ptr<UntimedIn<TerminationBeat>> in_terminations_;
@@ -212,7 +198,6 @@ class UntimedZrop : public UntimedUnit {
   std::vector<BlockPrice::Place> places_;
   std::int64_t unshared_ =
       -1000;  ///< what blocks cost beyond quads, but for their last cycle: thousandths, not counted yet
-  std::vector<bool> filled_lines_;  ///< of the surface, where lines have a price
   HiZReports hi_z_;
 };
 

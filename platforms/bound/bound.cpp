@@ -106,7 +106,7 @@ std::array<double, PhaseBound::stages> PhaseBound::cycles_of(const Work& done, b
   const double updates = updates_hide() ? 0.0 : update_cycles(done);
   cycles[test] = std::max(
       {ratio(tests[ZropWork::tests], zrop_.quads_per_cycle) + ratio(z_blocks, 1000) + updates + sector_cycles(done),
-       ratio(tests[ZropWork::lines], 1000), prop_takes(PropWork::bins, collected(done)),
+       prop_takes(PropWork::bins, collected(done)),
        from_memory(tests[ZropWork::sectors] * zrop_.z_cache.organization.sector_bytes)});
   cycles[qru] = least(Pipeline::qru, done, to_last);
   cycles[sm] = least(Pipeline::sm, done, to_last);
@@ -126,7 +126,7 @@ std::uint64_t PhaseBound::z_sectors_of(std::uint64_t filled) const {
 
 bool PhaseBound::updates_hide() const {
   return zrop_.quads_per_cycle < QuadBeat::capacity || zrop_.block_thousandths != 0 ||
-         zrop_.primitive_thousandths != 0 || zrop_.half_block_thousandths != 0;
+         zrop_.half_block_thousandths != 0;
 }
 
 double PhaseBound::update_cycles(const Work& done) const {
@@ -145,8 +145,7 @@ double PhaseBound::sector_cycles(const Work& done) const {
 }
 
 std::uint64_t PhaseBound::longest_beat_of_blocks() const {
-  const std::uint64_t block = std::max(zrop_.half_block_thousandths, zrop_.block_thousandths);
-  return QuadBeat::capacity * (block + zrop_.primitive_thousandths);
+  return std::uint64_t{QuadBeat::capacity} * std::max(zrop_.half_block_thousandths, zrop_.block_thousandths);
 }
 
 double PhaseBound::idle_after_last(unsigned stage) const {
@@ -217,12 +216,10 @@ std::vector<OccupancyPart> PhaseBound::parts_of(Pipeline::Place place, const Wor
       return unit(place)->least_parts(items, false);
     case Pipeline::zrop: {
       const std::vector<WorkKind> kinds = ZropWork::kinds(zrop_);
-      const double taken[] = {static_cast<double>(tests[ZropWork::tests]),
-                              update_cycles(done),
+      const double taken[] = {static_cast<double>(tests[ZropWork::tests]), update_cycles(done),
                               sector_cycles(done) * zrop_.z_cache.sectors_per_cycle,
                               static_cast<double>(tests[ZropWork::late_tests]),
-                              static_cast<double>(without_last(tests[ZropWork::blocks], longest_beat_of_blocks())),
-                              static_cast<double>(tests[ZropWork::lines])};
+                              static_cast<double>(without_last(tests[ZropWork::blocks], longest_beat_of_blocks()))};
       std::vector<OccupancyPart> parts;
       for (const WorkKind& kind : kinds)
         parts.push_back({kind.name, kind.resource, taken[parts.size()] * kind.cycles_per_item, kind.is_throughput});

@@ -96,11 +96,6 @@ class PhaseBound {
   /// Of so many sectors that every run fills into the z-cache in a phase, those that no earlier phase can have filled for it:
   /// look-ups run ahead by the quads of a queue.
   std::uint64_t z_sectors_of(std::uint64_t filled) const;
-  /// The same of lines, in thousandths of a cycle.
-  std::uint64_t z_lines_of(std::uint64_t moved) const {
-    const std::uint64_t ahead = std::uint64_t{zrop_.z_cache.input_quads} * zrop_.z_cache.line_thousandths;
-    return moved > ahead ? moved - ahead : 0;
-  }
   /// What runs with time may do otherwise than the one whose work this counts.
   const BoundTerms& terms() const { return terms_; }
 

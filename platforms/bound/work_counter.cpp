@@ -199,27 +199,27 @@ void WorkCounter::count() {
   Work& work = bound_.work;
   count_front_end();
   for (unsigned kind = 0; kind < work.of[Pipeline::crop].size(); ++kind) count(Pipeline::crop, kind);
+  if (const UntimedUnit* const crop = unit(Pipeline::crop)) crop->leave_out_pending(work.of[Pipeline::crop]);
   count(Pipeline::tc, TcWork::quads);
   count(Pipeline::tc, TcWork::beats);
   count(Pipeline::zrop, ZropWork::tests);
   count(Pipeline::zrop, ZropWork::blocks);
   // Where time-outs decide what is flushed, some run may be spared warps of this one.
   if (counts_late_) count(Pipeline::sm, SmWork::launches);
+  if (counts_late_) count(Pipeline::sm, SmWork::visits);
   if (counts_late_) count(Pipeline::zrop, ZropWork::late_tests);
   Work::Items& tests = work.of[Pipeline::zrop];
-  tests[ZropWork::lines] = bound_.z_lines_of(items(Pipeline::zrop, ZropWork::lines) - z_lines_before_);
   tests[ZropWork::sectors] = bound_.z_sectors_of(items(Pipeline::zrop, ZropWork::sectors) - z_sectors_before_);
   if (!hides_at_other_times_) return;
   tests[ZropWork::tests] = work.survivors();
   work.of[Pipeline::tc][TcWork::beats] = 0;
-  tests[ZropWork::lines] = tests[ZropWork::blocks] = tests[ZropWork::sectors] = 0;
+  tests[ZropWork::blocks] = tests[ZropWork::sectors] = 0;
 }
 
 void WorkCounter::end_phase() {
   count();
   before_.add(bound_.work);
   z_sectors_before_ = items(Pipeline::zrop, ZropWork::sectors);
-  z_lines_before_ = items(Pipeline::zrop, ZropWork::lines);
   bound_.end_phase();
 }
 

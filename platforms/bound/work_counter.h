@@ -47,7 +47,6 @@ class WorkCounter {
   std::vector<std::shared_ptr<void>> taps_;
   Work before_;                         ///< of the phases before
   std::uint64_t z_sectors_before_ = 0;  ///< the same, all that were filled
-  std::uint64_t z_lines_before_ = 0;
 };
 
 }  // namespace vrpipe

@@ -19,7 +19,8 @@ Platform gh100_gpc() {
       // 64 pixels a cycle, 256 of what Hi-Z kills; a strip of two triangles every 10 cycles.
       {"raster", "fine_tiles_per_cycle", "1"},
       {"raster", "coarse_tiles_per_cycle", "4"},
-      {"raster", "setup_interval_cycles", "5"},
+      {"raster", "setup_interval_cycles", "4.55"},
+      {"raster", "half_tile_order", "on"},
       // 32 bins of 16x16 pixels, first in, first out: the defaults. Two quads part from a gap of 151 cycles on, of which nine
       // are the second's way.
       {"tc", "idle_timeout_cycles", "160"},
@@ -27,10 +28,8 @@ Platform gh100_gpc() {
       {"zrop", "quads_per_cycle", "8"},
       {"zrop", "half_block_cycles", "1"},
       {"zrop", "block_cycles", "1.4"},
-      {"zrop", "primitive_cycles", "2.7"},
       {"zrop", "cache_bytes", "8192"},
       {"zrop", "line_bytes", "256"},
-      {"zrop", "line_cycles", "1.4"},
       {"zrop", "fetch_ahead", "on"},
       {"zrop", "fast_clear", "off"},
       {"zrop", "mshrs", "2048"},
@@ -40,7 +39,8 @@ Platform gh100_gpc() {
       {"sm", "lanes_per_scheduler", "32"},
       {"sm", "warp_launch_cycles", "2.5"},
       {"sm", "visit_launch_cycles", "4"},
-      {"sm", "discard_launch_cycles", "1.2"},
+      {"sm", "discard_launch_cycles", "1.7"},
+      {"sm", "discard_warp_cycles", "1.03"},
       // 4 pixels a cycle of RGBA16F, 8 of RGBA8 in pairs, 0.5 of RGBA32F; lines of 256 bytes at a cycle each; the same
       // quad again after 9 cycles.
       {"prop", "color_bytes_per_cycle", "32"},
@@ -51,7 +51,9 @@ Platform gh100_gpc() {
       {"crop", "latency_cycles", "9"},
       {"crop", "cache_bytes", "8192"},
       {"crop", "line_bytes", "256"},
-      {"crop", "line_cycles", "1"},
+      {"crop", "port_flits_per_cycle", "1"},
+      {"crop", "gob_hazards", "on"},
+      {"crop", "rgba32f_latency_cycles", "12"},
       {"crop", "fetch_ahead", "on"},
       {"crop", "input_quads", "1280"},
       {"crop", "line_return_cycles", "503"},
@@ -61,6 +63,7 @@ Platform gh100_gpc() {
   platform.wire = [](Netlist& netlist) {
     wire_pipeline(netlist);
     connect_depth_stencil_traffic(netlist);
+    netlist.connect("gpc0.zrop.out_reads", "gpc0.crop.in_reads", 8);
   };
   return platform;
 }

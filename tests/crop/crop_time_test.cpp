@@ -89,15 +89,34 @@ TEST(CropTime, AWarpOfQuadsThatAreAlikeTakesWhatTheyTakeOneByOne) {
   }
 }
 
-TEST(CropTime, SectorsOrLinesTakeTimeFromBlending) {
-  CropTime sectors = time_of({{"sectors_per_cycle", "4"}}, ColorFormat::rgba16f);
-  EXPECT_EQ(sectors.paid({3, 1}), 3U);
-  sectors.move(8, 10);
-  EXPECT_EQ(blended(sectors, quad_of(0), 10), 12U);
-  CropTime lines = time_of({{"line_cycles", "3"}}, ColorFormat::rgba16f);
-  EXPECT_EQ(lines.paid({3, 1}), 1U);
-  lines.move(1, 10);
-  EXPECT_EQ(blended(lines, quad_of(0), 10), 13U);
+TEST(CropTime, WithoutAPortSectorsTakeTimeFromBlending) {
+  CropTime time = time_of({{"sectors_per_cycle", "4"}}, ColorFormat::rgba16f);
+  time.move(8, 10);
+  EXPECT_EQ(blended(time, quad_of(0), 10), 12U);
+}
+
+TEST(CropTime, ATriangleAsksOnceForALineOfATile) {
+  CropTime time = time_of({{"port_flits_per_cycle", "1"}}, ColorFormat::rgba16f);
+  EXPECT_EQ(time.flits_of_read(64, 7, 2), 1U);
+  EXPECT_EQ(time.flits_of_read(64, 7, 3), 1U);
+  EXPECT_EQ(time.flits_of_read(64, 7, 2), 0U) << "4x8 halves of a block come back to its lines";
+  EXPECT_EQ(time.flits_of_read(64, 8, 2), 1U) << "another triangle";
+  EXPECT_EQ(time.flits_of_read(128, 8, 2), 1U) << "another tile";
+  CropTime::Moves moves;
+  moves.write(8);
+  EXPECT_EQ(moves.flits, 9U);
+}
+
+TEST(CropTime, ThePortTakesAFlitACycleAndABacklog) {
+  CropTime time = time_of({{"port_flits_per_cycle", "1"}, {"port_backlog_flits", "16"}}, ColorFormat::rgba16f);
+  EXPECT_EQ(time.port.open_from(100), 100U);
+  EXPECT_EQ(time.port.take(20, 100), (std::pair<Cycle, Cycle>{100, 120}));
+  EXPECT_EQ(time.port.open_from(100), 104U);
+  EXPECT_EQ(time.port.open_from(110), 110U);
+  EXPECT_EQ(time.port.take(1, 104), (std::pair<Cycle, Cycle>{120, 121}));
+  const CropTime none = time_of({}, ColorFormat::rgba16f);
+  EXPECT_FALSE(none.port.is_on());
+  EXPECT_EQ(none.port.open_from(5), 5U);
 }
 
 TEST(CropTime, QuadsOfOneCycleShareASector) {
@@ -120,19 +139,52 @@ TEST(CropTime, ColumnsOfRgba32fLastAndTheCacheIsIdleBesideThem) {
   EXPECT_EQ(blended(time, column, 10), 22U) << "one column";
 }
 
-TEST(CropTime, WithoutForwardingAQuadOfTheSamePlaceWaits) {
+TEST(CropTime, WithoutForwardingAQuadWaitsForOneOfTheSamePixels) {
   CropTime time = time_of({{"forwarding", "off"}, {"latency_cycles", "9"}}, ColorFormat::rgba16f);
-  EXPECT_EQ(blended(time, quad_of(0, 3), 10), 10U);
-  EXPECT_EQ(time.hazard_until(3, 11), 19U);
-  EXPECT_EQ(time.hazard_until(4, 11), 0U);
-  EXPECT_EQ(time.hazard_until(3, 19), 0U);
+  CropTime::Quad left = quad_of(0, 3);
+  left.live = 5;
+  EXPECT_EQ(blended(time, left, 10), 10U);
+  EXPECT_EQ(time.hazard_until(3, all_lanes, 11), 19U);
+  EXPECT_EQ(time.hazard_until(3, 10, 11), 0U) << "the other half of its pixels";
+  EXPECT_EQ(time.hazard_until(4, all_lanes, 11), 0U);
+  EXPECT_EQ(time.hazard_until(3, all_lanes, 19), 0U);
+}
+
+TEST(CropTime, QuadsWaitForThoseOfTheSamePlaceInABlockOf64BytesBy8Rows) {
+  const std::pair<ColorFormat, unsigned> columns[] = {{ColorFormat::rgba8, 8},
+                                                      {ColorFormat::rgba16f, 4},
+                                                      {ColorFormat::rgba32f, 2}};
+  for (const auto& [format, width] : columns) {
+    for (unsigned position = 0; position < positions_per_tile; ++position) {
+      const auto waits = [&, format = format](const char* by_gob, std::size_t place) {
+        CropTime time = time_of({{"forwarding", "off"}, {"latency_cycles", "9"}, {"gob_hazards", by_gob}}, format);
+        CropTime::Quad first = quad_of(0);
+        first.place = 5 * positions_per_tile;
+        return time.hazard_until(place, all_lanes, blended(time, first, 10) + 1) != 0;
+      };
+      const bool same = position % quads_per_tile_row % width == 0 && position / quads_per_tile_row % 4 == 0;
+      EXPECT_EQ(waits("on", 5 * positions_per_tile + position), same) << name_of(format) << ' ' << position;
+      EXPECT_EQ(waits("off", 5 * positions_per_tile + position), position == 0) << name_of(format) << ' ' << position;
+      EXPECT_FALSE(waits("on", 6 * positions_per_tile + position)) << "another tile";
+    }
+  }
+}
+
+TEST(CropTime, ABlendOfRgba32fMayTakeLonger) {
+  const std::vector<std::pair<std::string, std::string>> settings = {{"rgba32f_latency_cycles", "12"},
+                                                                     {"latency_cycles", "9"}};
+  EXPECT_EQ(time_of(settings, ColorFormat::rgba32f).latency_cycles, 12U);
+  EXPECT_EQ(time_of(settings, ColorFormat::rgba16f).latency_cycles, 9U);
 }
 
 TEST(CropTime, ASumTakesAsLongAsItsBusiestResource) {
   const CropTime time = time_of({{"mshrs", "100"}, {"cache_bytes", "12800"}}, ColorFormat::rgba16f);
-  EXPECT_DOUBLE_EQ(time.least_cycles({1000, 160, 0, 0, 50}), 1000 / 2.0 + 160 / 16.0);
-  EXPECT_DOUBLE_EQ(time.least_cycles({10, 0, 1100, 0, 50}), (1100 - 100) / 100.0 * 50) << "miss registers";
-  EXPECT_DOUBLE_EQ(time.least_cycles({10, 0, 90, 350, 50}), (350 - 100) / 100.0 * 50) << "lines";
+  EXPECT_DOUBLE_EQ(time.least_cycles({1000, 160, 0, 0, 0, 50}), 1000 / 2.0 + 160 / 16.0);
+  EXPECT_DOUBLE_EQ(time.least_cycles({10, 0, 0, 1100, 0, 50}), (1100 - 100) / 100.0 * 50) << "miss registers";
+  EXPECT_DOUBLE_EQ(time.least_cycles({10, 0, 0, 90, 350, 50}), (350 - 100) / 100.0 * 50) << "lines";
+  const CropTime port = time_of({{"port_flits_per_cycle", "2"}, {"port_backlog_flits", "100"}}, ColorFormat::rgba16f);
+  EXPECT_DOUBLE_EQ(port.least_cycles({10, 0, 1000, 0, 0, 50}), 1000 / 2.0);
+  EXPECT_EQ(port.port.most_waiting(port.cache), 100U + 4 + 3) << "at the end of a frame";
 }
 
 }  // namespace

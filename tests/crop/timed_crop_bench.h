@@ -39,7 +39,7 @@ struct TimedCropBench {
     const unsigned i = warp->count++;
     warp->position[i] = static_cast<std::uint8_t>(position);
     warp->live[i] = live;
-    warp->first_primitive[i] = warp->last_primitive[i] = next_primitive++;
+    warp->first_primitive[i] = warp->last_primitive[i] = next_quad++ / quads_of_a_primitive;
     warp->color[i] = color_of(alpha, alpha, alpha, alpha);
     if (warp->count == quads_per_warp) flush(earliest);
   }
@@ -77,7 +77,8 @@ struct TimedCropBench {
   ShadedWarp end_mark;
   ShadedWarpPool pool;
   unsigned taken = 0;  ///< warps, from the pool
-  std::uint32_t next_primitive = 0;
+  std::uint32_t next_quad = 0;
+  std::uint32_t quads_of_a_primitive = 1;
 };
 
 }  // namespace vrpipe::testing

@@ -25,9 +25,11 @@ double share_of_cycle(RunRequest request, const Scene& scene) {
   return bound / static_cast<double>(*run(request, scene).cycles);
 }
 
-const Setting prices[] = {{"prop", "quads_per_cycle", "1"},     {"zrop", "block_cycles", "100"},
-                          {"zrop", "half_block_cycles", "100"}, {"zrop", "primitive_cycles", "100"},
-                          {"sm", "warp_launch_cycles", "1000"}, {"sm", "visit_launch_cycles", "1000"}};
+const Setting prices[] = {{"prop", "quads_per_cycle", "1"},
+                          {"zrop", "block_cycles", "100"},
+                          {"zrop", "half_block_cycles", "100"},
+                          {"sm", "warp_launch_cycles", "1000"},
+                          {"sm", "visit_launch_cycles", "1000"}};
 
 // Quads of eight primitives are tested, and handed over, in one go, and are on their way as it begins.
 TEST(Bound, WaitsForNoPriceOfTheLastQuads) {

@@ -46,15 +46,17 @@ rc::Gen<Setting> setting() {
                                            {"crop", "forwarding", {"off"}},
                                            {"crop", "previous_alpha_check", {"off"}},
                                            {"crop", "writes_unchanged", {"on"}},
-                                           {"crop", "line_cycles", {"1", "9"}},
+                                           {"crop", "port_flits_per_cycle", {"1", "3"}},
+                                           {"crop", "port_backlog_flits", {"1", "5000"}},
+                                           {"crop", "gob_hazards", {"on"}},
+                                           {"crop", "rgba32f_latency_cycles", {"12"}},
+                                           {"raster", "half_tile_order", {"on"}},
                                            {"crop", "fetch_ahead", {"on"}},
                                            {"crop", "line_return_cycles", {"3", "500"}},
                                            {"crop", "pairs_in_sector", {"on"}},
                                            {"crop", "rgba32f_column_cycles", {"1", "4"}},
                                            {"zrop", "half_block_cycles", {"0.3", "1"}},
                                            {"zrop", "block_cycles", {"1.4", "7"}},
-                                           {"zrop", "primitive_cycles", {"2.7"}},
-                                           {"zrop", "line_cycles", {"0.5", "3"}},
                                            {"zrop", "fetch_ahead", {"on"}},
                                            {"zrop", "line_return_cycles", {"3", "461"}},
                                            {"sm", "warp_launch_cycles", {"0.5", "2.5"}},
@@ -82,11 +84,7 @@ TEST(Bound, LetsQuadsShareTheLastCycleOfABlock) {
   }
   RunRequest r = request(variant_named("baseline"), ColorFormat::rgba8, Fidelity::bound);
   r.platform = &platform_named("gh100-gpc");
-  r.settings = {{"tc", "bin_quads", "4"},
-                {"zrop", "block_cycles", "1.9"},
-                {"zrop", "primitive_cycles", "0"},
-                {"zrop", "line_cycles", "0.1"},
-                {"zrop", "line_return_cycles", "0"}};
+  r.settings = {{"tc", "bin_quads", "4"}, {"zrop", "block_cycles", "1.9"}, {"zrop", "line_return_cycles", "0"}};
   Frame frame(256, 256);
   DrawState state = draw_state_of(r);
   state.stencil.test = true;

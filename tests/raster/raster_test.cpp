@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -119,6 +121,39 @@ TEST(TileRasterizer, AFilledRectangleOfTwoByTwoIsOneQuad) {
 }
 
 // case R03
+TEST(TileRasterizer, QuadsOfARasterTileComeByRowsOrByItsHalves) {
+  const Draw draw = draw_of(16, 16, {flat_box(0, 0, 16, 16, 0.5F)});
+  const RenderContext context = unpadded(draw);
+  for (const char* by_halves : {"off", "on"}) {
+    TileRasterizer::Parameters parameters;
+    parameters.set("raster", "half_tile_order", by_halves);
+    TileRasterizer raster(parameters, context);
+    const PrimitiveAssembly::Parameters vpo_parameters;
+    PrimitiveAssembly vpo(vpo_parameters, context);
+    std::array<Primitive, 2> primitives;
+    std::set<unsigned> positions;
+    const unsigned count = vpo.assemble(0, 0, primitives);
+    for (unsigned triangle = 0; triangle < count; ++triangle) {
+      raster.begin(primitives[triangle], primitives[triangle].bounds);
+      QuadBeat tile;
+      unsigned tests = 0;
+      bool new_tile = false;
+      while (raster.next(tile, tests, new_tile)) {
+        unsigned last = 0;
+        for (unsigned i = 0; i < tile.count; ++i) {
+          const unsigned position = tile.quads[i].position;
+          positions.insert(position);
+          const unsigned half = by_halves == std::string("on") ? position / 2 % 2 : 0;
+          const unsigned place = half * 1000 + position;
+          EXPECT_TRUE(i == 0 || last < place) << by_halves << ' ' << position;
+          last = place;
+        }
+      }
+    }
+    EXPECT_EQ(positions.size(), positions_per_tile);
+  }
+}
+
 TEST(TileRasterizer, ASquareOnSampleCentresHasItsTopAndLeftSamplesOnly) {
   const Coverage coverage = cover(draw_of(16, 16, {flat_box(4.5F, 4.5F, 8.5F, 8.5F, 0.5F)}));
   EXPECT_EQ(coverage.fragments, 16U);

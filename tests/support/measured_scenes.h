@@ -5,23 +5,24 @@
 #include <string>
 #include <vector>
 
-#include "support/stand_in_scene.h"
+#include <vrpipe/pipeline/draw.h>
 
 namespace vrpipe::testing {
 
-/// A scene that was measured on a GPU and not kept (tests/data/measured_scenes.csv), with the stand-in for it.
+/// Splats that were drawn on a GPU, with what was counted and timed there.
 struct MeasuredScene {
   std::string name;
-  std::map<std::string, double>
-      values;  ///< by column: counts, and millions of cycles; what was not measured is not there
-  StandIn stand_in;
+  std::map<std::string, double> values;  ///< by column of its file; what was not measured is not there
+  Draw draw;
 
   std::uint64_t count(const std::string& column) const;
-  /// Other splats than those that were measured, of about the same counts.
-  Draw draw() const;
 };
 
-/// All of them, the three large ones first.
-std::vector<MeasuredScene> measured_scenes();
+/// Three scenes of splats of all sizes, some in clusters (tests/data/measured_scenes.csv: counts, and millions of cycles).
+MeasuredScene measured_scene(const std::string& name);
+const std::vector<std::string>& measured_scene_names();
+
+/// Splats of one size each, anywhere in 1024x1024 (tests/data/measured_uniform.csv: cycles a splat).
+std::vector<MeasuredScene> measured_uniform_scenes();
 
 }  // namespace vrpipe::testing

@@ -1,5 +1,5 @@
-// What ZROP was measured to take on a real GPU beyond its rate: blocks that quads touch, lines that move, lines that come
-// back.
+// What ZROP was measured to take on a real GPU beyond its rate: blocks that quads touch, flits of the ROPs' port, lines that
+// come back.
 #include <functional>
 #include <map>
 #include <vector>
@@ -65,13 +65,6 @@ TEST(BlockPrice, DoesNotDependOnWhereBeatsEnd) {
   BlockPrice price(1000, 1400);
   price.of({0, 0}, quads.data(), 1);
   EXPECT_EQ(price.of({1, 0}, quads.data(), 1), 1400U) << "another screen tile";
-}
-
-TEST(BlockPrice, OfAPrimitiveIsPaidOnceWhereverItsQuadsAre) {
-  BlockPrice price(1000, 1400, 2700, 4);
-  const Quad first[] = {quad_at(0, 0), quad_at(1, 1)};
-  EXPECT_EQ(price.of({0, 0}, first, 2), 2U * (1400 + 2700));
-  EXPECT_EQ(price.of({1, 0}, first, 2), 2U * 1400) << "in another screen tile";
 }
 
 /// What was said, by cycle.
@@ -151,6 +144,7 @@ class ZropPrices : public ::testing::TestWithParam<Fidelity> {
     FixedLatencyMemory behind("memory", bench.clock(), latency - 1, 4096, 1);
     if (memory) bench.bind_memory(behind.port(0));
     bench.source<TerminationBeat>("in_terminations");
+    Sink<PortReads>* const port = memory ? &bench.sink<PortReads>("out_reads", 8192) : nullptr;
     Bins bins;
     Cycle last = 0;
     if (GetParam() == Fidelity::cycle) {
@@ -176,6 +170,8 @@ class ZropPrices : public ::testing::TestWithParam<Fidelity> {
       close(bench, last);
       reads = behind_reads(bench);
     }
+    flits = 0;
+    for (std::size_t i = 0; port != nullptr && i < port->records().size(); ++i) flits += port->records()[i].item.flits;
     return last;
   }
   void close(Bench& bench, Cycle end) {
@@ -197,6 +193,7 @@ class ZropPrices : public ::testing::TestWithParam<Fidelity> {
   Draw draw;
   RenderContext context;
   std::uint64_t reads = 0;  ///< sectors, of the last run
+  std::uint64_t flits = 0;  ///< of the same
   double tests = 0;         ///< cycles of its own, of the same
   double block_cycles = 0;
 };
@@ -216,16 +213,6 @@ TEST_P(ZropPrices, ASingleQuadTakesItsBlock) {
   const auto single = [](unsigned i) { return Bin{{0, 0}, {quad_at(i % 64, i)}}; };
   EXPECT_NEAR(cycles_of_a_bin(single, priced_blocks), 1.4, 0.01);
   EXPECT_LT(cycles_of_a_bin(single, {}), 1.01);
-}
-
-TEST_P(ZropPrices, RectanglesTakeWhatTheyDoOnTheGpu) {
-  Bench::Settings settings = priced_blocks;
-  settings.push_back({"primitive_cycles", "2.7"});
-  // Killed one after the other: 2x2 pixels every 4.17 cycles, 16x16 every 10.67.
-  const auto small = [](unsigned i) { return Bin{{0, 0}, {quad_at(i % 64, i)}}; };
-  EXPECT_NEAR(cycles_of_a_bin(small, settings), 4.17, 0.1);
-  const auto block_of_tile = [](unsigned i) { return Bin{{0, 0}, block_quads(i % 2 * 4 + i / 2 % 2 * 32, 4, i / 4)}; };
-  EXPECT_NEAR(4 * cycles_of_a_bin(block_of_tile, settings), 10.67, 0.1);
 }
 
 TEST_P(ZropPrices, BlocksTakeNoMoreThanTheTimeThatQuadsLeave) {
@@ -258,15 +245,20 @@ const Bench::Settings small_cache{{"cache_bytes", "8192"},
                                   {"mshrs", "2048"},
                                   {"fetch_ahead", "on"}};
 
-TEST_P(ZropPrices, ALineThatMovesTakesItsCycles) {
-  // A block is a line of 256 bytes: two cycles of tests, beside which its line moves.
-  const auto missing = [](unsigned i) {
-    return Bin{{static_cast<std::uint16_t>(i / 4 % 128), static_cast<std::uint16_t>(i / 512)},
-               block_quads(i % 2 * 4 + i / 2 % 2 * 32, 4, i)};
+TEST_P(ZropPrices, AFlitReadsAHalfOfABlock) {
+  const auto flits_of = [this](const std::vector<std::vector<Quad>>& beats) {
+    std::vector<Bin> bins;
+    for (const std::vector<Quad>& quads : beats) bins.push_back({{3, 0}, quads});
+    run(bins, small_cache, true);
+    return flits;
   };
-  Bench::Settings settings = small_cache;
-  settings.push_back({"line_cycles", "2.5"});
-  EXPECT_NEAR(cycles_of_a_bin(missing, settings, true), 2.5, 0.05);
+  EXPECT_EQ(flits_of({{quad_at(0)}}), 1U);
+  EXPECT_EQ(flits_of({block_quads(0, 2)}), 1U) << "a half";
+  EXPECT_EQ(flits_of({block_quads(0, 4)}), 2U) << "both";
+  EXPECT_EQ(flits_of({{quad_at(0), quad_at(3)}}), 2U) << "a quad in each";
+  EXPECT_EQ(flits_of({{quad_at(0), quad_at(4)}}), 2U) << "in two blocks";
+  EXPECT_EQ(flits_of({{quad_at(0)}, {quad_at(25)}}), 1U) << "the rest of a half that is held";
+  EXPECT_EQ(flits_of({{quad_at(0)}, {quad_at(2)}}), 2U);
 }
 
 TEST_P(ZropPrices, AheadOfItsDataMoreLinesAreUnderWayThanTheCacheHolds) {

@@ -110,6 +110,10 @@ std::string text_of(const HiZUpdate& item) {
   return fmt::format("farthest depth {} of part {} of {}", item.farthest, unsigned{item.part}, text_of_tile(item.tile));
 }
 
+std::string text_of(const PortReads& item) {
+  return fmt::format("reads of {} flit{}", item.flits, item.flits == 1 ? "" : "s");
+}
+
 std::string text_of(const BlendsDone& item) { return "blended, all before " + text_of_mark(item.mark); }
 
 }  // namespace vrpipe::tools

@@ -29,6 +29,7 @@ void on_any_item(Observers& observers, const std::string& link, const See& see,
   add(ColorBeat{});
   add(TerminationBeat{});
   add(HiZUpdate{});
+  add(PortReads{});
   add(BlendsDone{});
 }
 
@@ -46,6 +47,7 @@ std::string text_of(const WarpRelease& item);
 std::string text_of(const ColorBeat& item);
 std::string text_of(const TerminationBeat& item);
 std::string text_of(const HiZUpdate& item);
+std::string text_of(const PortReads& item);
 std::string text_of(const BlendsDone& item);
 
 }  // namespace vrpipe::tools

@@ -30,8 +30,7 @@ std::vector<WorkKind> ZropWork::kinds(const ZropBehaviour::TimingParameters& tim
           {"updates", 0, 1.0, false},
           {"sectors", 0, per(timing.z_cache.sectors_per_cycle), false},
           {"late tests", 0, per(timing.quads_per_cycle), throughput},
-          {"blocks", 0, per(1000), false},
-          {"lines", 1, per(1000), false}};
+          {"blocks", 0, per(1000), false}};
 }
 
 std::vector<WorkKind> QruWork::kinds(const Throughput& timing) {
@@ -43,7 +42,8 @@ std::vector<WorkKind> SmWork::kinds(const SmBehaviour::TimingParameters& timing)
   return {{"vertices", 0, issue, throughput},
           {"fragments", 0, issue, throughput},
           {"merging", 0, issue, throughput},
-          {"launches", 1, per(1000), false}};
+          {"launches", 1, per(1000), false},
+          {"visits", 2, per(1000), false}};
 }
 
 }  // namespace vrpipe

@@ -172,6 +172,7 @@ class OutEnd : public OutPort, protected tlm::tlm_bw_transport_if<StreamProtocol
     mark_connected();
     unlimited();
   }
+  bool is_stub() const { return stub_ != nullptr; }
 
  protected:
   /// The receiver has room for whatever comes.

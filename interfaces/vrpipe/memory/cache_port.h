@@ -149,6 +149,7 @@ class CachePort {
     write_back_ = evicted.written_back;
     write_back_address_ = evicted.old_address;
     ++lines_moved_.written_back;
+    lines_moved_.sectors_written_back += static_cast<unsigned>(__builtin_popcount(evicted.written_back));
     if (cleared_ != nullptr) cleared_->written(evicted.old_address, evicted.written_back);
   }
   /// Sends dirty sectors of an evicted line, as each look-up does that follows the eviction; false while some are left.
@@ -163,10 +164,11 @@ class CachePort {
     return write_back_ == 0;
   }
   bool has_written_back() const { return write_back_ == 0; }
-  /// Since this was last called: lines that were allocated, and lines of which sectors were written back.
+  /// Since this was last called: lines that were allocated, and lines of which sectors were written back, and these.
   struct LinesMoved {
     unsigned allocated = 0;
     unsigned written_back = 0;
+    unsigned sectors_written_back = 0;
   };
   LinesMoved take_lines_moved() { return std::exchange(lines_moved_, {}); }
 
@@ -198,6 +200,7 @@ class CachePort {
       write_back_ = evicted.dirty;
       ++lines_moved_.allocated;
       lines_moved_.written_back += evicted.dirty != 0 ? 1U : 0U;
+      lines_moved_.sectors_written_back += static_cast<unsigned>(__builtin_popcount(evicted.dirty));
       write_back_address_ = evicted.address;
       if (cleared_ != nullptr && evicted.dirty != 0) cleared_->written(evicted.address, evicted.dirty);
     }

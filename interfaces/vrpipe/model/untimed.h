@@ -51,7 +51,9 @@ class UntimedOut : public OutPort {
     };
     static Sink sink;
     attach(sink);
+    is_stub_ = true;
   }
+  bool is_stub() const { return is_stub_; }
   /// Sends to something else than a unit's port.
   void attach(UntimedTarget<Item>& target) {
     target_ = &target;
@@ -64,6 +66,7 @@ class UntimedOut : public OutPort {
  private:
   UntimedTarget<Item>* target_ = nullptr;
   std::unique_ptr<UntimedTarget<Item>> tap_;
+  bool is_stub_ = false;
 };
 
 /// The receiving end of a unit.
@@ -186,6 +189,8 @@ class UntimedUnit : public Component {
   virtual std::vector<OccupancyPart> least_parts(const Items& items, bool to_last) const;
   /// The least cycles of so much, which can begin at once.
   virtual double least_cycles(const Items& items) const { return busiest(least_parts(items, false)); }
+  /// Of work so far, what need not be done when the last item has gone.
+  virtual void leave_out_pending(Items&) const {}
   /// In which it does nothing more after the last item has gone, at most: the rest of an interval.
   virtual double idle_after_last() const;
   /// Warps between TC and the end of CROP that it has room for, at worst.

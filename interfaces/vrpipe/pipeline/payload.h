@@ -212,6 +212,11 @@ struct HiZUpdate {
   std::uint32_t farthest = 0;  ///< depth stored at any of its pixels in the frame, as store_depth has it
 };
 
+/// ZROP to CROP: reads of the depth-stencil target, which take the ROPs' port to L2 (crop.port_flits_per_cycle).
+struct PortReads {
+  std::uint32_t flits = 0;
+};
+
 /// CROP to DRAW: all that was drawn before a mark has been blended (BarrierPlan).
 struct BlendsDone {
   Mark mark = Mark::none;

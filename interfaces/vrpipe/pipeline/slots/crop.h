@@ -87,9 +87,9 @@ class CropBehaviour : public Behaviour {
 
 /// The slot's kinds of work.
 struct CropWork {
-  /// Quads blended, what moves in its time (sectors, or lines where these have a price), and what hazards waste of the
-  /// blender, and quads that have no neighbour to go with (pairs_in_sector): parts of a cycle (CropTime).
-  enum : unsigned { blend, sectors, forwarding, unpaired, kinds };
+  /// Quads blended, sectors that move in its time, what hazards waste of the blender, and quads that have no neighbour to
+  /// go with (pairs_in_sector): parts of a cycle (CropTime). And flits of the port to L2.
+  enum : unsigned { blend, sectors, forwarding, unpaired, flits, kinds };
   /// And what is counted for `bound`.
   enum : unsigned { sectors_filled = kinds, lines_filled, bytes_moved };
 };

@@ -39,12 +39,15 @@ struct AttributeFetch {
   void check() const;
 };
 
-/// What handing fragment warps to cores takes beyond a cycle each, in thousandths of a cycle.
+/// What handing fragment warps to cores takes beyond a cycle each, in thousandths of a cycle. Warps and visits go side by side.
 struct HandOverPrice {
-  std::uint32_t warp_thousandths = 0;     ///< of a full warp; of another in proportion
-  std::uint32_t visit_thousandths = 0;    ///< the least for a primitive's quads in a screen tile, one after the other
-  std::uint32_t discard_thousandths = 0;  ///< on top of that, of a program that discards
-  bool is_on() const { return warp_thousandths != 0 || visit_thousandths != 0 || discard_thousandths != 0; }
+  std::uint32_t warp_thousandths = 0;
+  std::uint32_t visit_thousandths = 0;         ///< of a primitive's quads in a screen tile, one after the other
+  std::uint32_t discard_thousandths = 0;       ///< on top of a visit, of a program that discards
+  std::uint32_t discard_warp_thousandths = 0;  ///< on top of a warp, of such a program
+  bool is_on() const {
+    return (warp_thousandths | visit_thousandths | discard_thousandths | discard_warp_thousandths) != 0;
+  }
 };
 
 /// Slot `sm`: vertex and fragment shading, alpha pruning, quad merging.
@@ -116,7 +119,7 @@ class SmBehaviour : public Behaviour {
 /// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
 struct SmWork {
   /// Warp instructions; and handing warps to cores, in thousandths of a cycle.
-  enum : unsigned { vertex, fragment, merge, launches };
+  enum : unsigned { vertex, fragment, merge, launches, visits };
   static std::vector<WorkKind> kinds(const SmBehaviour::TimingParameters& timing);
 };
 

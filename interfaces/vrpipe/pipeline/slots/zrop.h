@@ -31,10 +31,8 @@ struct ZCache {
   std::uint32_t input_updates = 64;       ///< the same of updates, signals
   std::uint32_t sectors_per_cycle = 16;   ///< filled or written back in a cycle in which nothing is tested or updated
   bool fast_clear = true;                 ///< sectors that a clear has left as they are in memory are not read
-  /// Of a cycle, for a line that is allocated or written back, beside the tests; 0: sectors take time, of the tests.
-  std::uint32_t line_thousandths = 0;
-  bool fetches_ahead = false;            ///< a line may go while it is fetched for a test
-  std::uint32_t line_return_cycles = 0;  ///< from a line's last use to the next, if it left in between
+  bool fetches_ahead = false;             ///< a line may go while it is fetched for a test
+  std::uint32_t line_return_cycles = 0;   ///< from a line's last use to the next, if it left in between
   /// Throws UserError for one that cannot be: CacheOrganization::check; a sector holds a quad of the target, a line is of one
   /// screen tile.
   void check(DepthFormat format) const;
@@ -73,7 +71,6 @@ class ZropBehaviour : public Behaviour {
     /// shading, and the least of a block; both 0: quads alone take time.
     std::uint32_t half_block_thousandths = 0;
     std::uint32_t block_thousandths = 0;
-    std::uint32_t primitive_thousandths = 0;  ///< and once for each primitive of which a quad is tested so
   };
   virtual TimingParameters timing() const = 0;
 
@@ -119,8 +116,8 @@ class ZropBehaviour : public Behaviour {
 /// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity.
 struct ZropWork {
   /// Quads tested before shading, cycles with updates, sectors moved, quads tested after shading; in thousandths of a cycle,
-  /// what the blocks that quads touch take beyond their number, and lines that move.
-  enum : unsigned { tests, updates, sectors, late_tests, blocks, lines };
+  /// what the blocks that quads touch take beyond their number.
+  enum : unsigned { tests, updates, sectors, late_tests, blocks };
   static std::vector<WorkKind> kinds(const ZropBehaviour::TimingParameters& timing);
 };
 
