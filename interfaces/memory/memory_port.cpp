@@ -176,9 +176,10 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
     memory_.traffic_.count(request);
     bytes_ += request.bytes;
     const ClockCrossing& own = memory_.crossing_;
-    if (own.is_same()) return memory_.latency_cycles_ + bandwidth_.take(arrival, request.bytes, clock().now());
+    const Cycle latency = memory_.latency_.of(request);
+    if (own.is_same()) return latency + bandwidth_.take(arrival, request.bytes, clock().now());
     const Cycle moved = bandwidth_.take(own.edge_of(arrival), request.bytes, own.edge_of(clock().now()));
-    return own.cycle_of(memory_.latency_cycles_ + moved);
+    return own.cycle_of(latency + moved);
   }
   const ClockDomain& clock() const override { return memory_.domain_; }
   bool completes_early() const override { return memory_.clocked_ == nullptr; }
@@ -246,15 +247,14 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
   bool responding_ = false;   ///< BEGIN_RESP without END_RESP yet
 };
 
-FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain,
-                                       unsigned latency_cycles, unsigned bytes_per_cycle, unsigned ports,
-                                       MemoryBelow below)
-    : FixedLatencyMemory(name, domain, latency_cycles, std::vector<unsigned>(ports, bytes_per_cycle), below) {}
+FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain, MemoryLatency latency,
+                                       unsigned bytes_per_cycle, unsigned ports, MemoryBelow below)
+    : FixedLatencyMemory(name, domain, latency, std::vector<unsigned>(ports, bytes_per_cycle), below) {}
 
-FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain,
-                                       unsigned latency_cycles, const std::vector<unsigned>& bytes_per_cycle,
-                                       MemoryBelow below, std::uint64_t period_ps)
-    : sc_module(name), domain_(domain), crossing_(domain, period_ps), latency_cycles_(latency_cycles), traffic_(*this) {
+FixedLatencyMemory::FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain, MemoryLatency latency,
+                                       const std::vector<unsigned>& bytes_per_cycle, MemoryBelow below,
+                                       std::uint64_t period_ps)
+    : sc_module(name), domain_(domain), crossing_(domain, period_ps), latency_(latency), traffic_(*this) {
   if (below == MemoryBelow::annotated) annotated_ = std::make_unique<AnnotatedFills>(domain, cache_);
   if (below == MemoryBelow::clocked) clocked_ = std::make_unique<ClockedFills>(domain, cache_);
   for (const unsigned bytes : bytes_per_cycle) {

@@ -69,18 +69,16 @@ struct CropParameters : ParameterSet {
                              "flits",
                              "assumed; on a GH100 graphics GPC 16 to 2000 make 2 % of a small scene",
                              "that wait for the port; of more, nothing is looked up or blended"};
-  Switch fetch_ahead{
-      *this, "fetch_ahead", false, "left open by the paper; measured on a GH100 graphics GPC: on",
-      "tags run ahead of data by input_quads: a line may go while quads wait to be blended into it, and is "
-      "fetched a second time if it is wanted again before that"};
-  Integer line_return_cycles{*this,
-                             "line_return_cycles",
-                             0,
-                             0,
-                             100000,
-                             "cycles",
-                             "left open by the paper; measured on a GH100 graphics GPC: 503",
-                             "from the last blend into a line that leaves the cache to the next one"};
+  Integer fetch_ahead_quads{*this,
+                            "fetch_ahead_quads",
+                            0,
+                            0,
+                            65536,
+                            "quads",
+                            "left open by the paper; measured on a GH100 graphics GPC: 512 to 1024",
+                            "if any, tags run ahead of data: a look at them asks for sectors, and a second one, at "
+                            "most so many quads later, stops "
+                            "for lines that come back; a line may go while quads wait to be blended into it"};
   Switch gob_hazards{
       *this, "gob_hazards", false, "left open by the paper; measured on a GH100 graphics GPC: on",
       "without forwarding, pixels of a screen tile wait for one another that have the same place in a block of "

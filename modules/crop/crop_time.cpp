@@ -27,8 +27,7 @@ CropTime::CropTime(const CropParameters& parameters, ColorFormat format)
       mshrs(parameters.mshrs),
       forwards(parameters.forwarding),
       writes_unchanged(parameters.writes_unchanged),
-      fetches_ahead(parameters.fetch_ahead),
-      line_return_cycles(parameters.line_return_cycles),
+      fetch_ahead_quads(parameters.fetch_ahead_quads),
       parts_of_a_cycle(std::int64_t{blend_rate.items} * parameters.sectors_per_cycle),
       port(parameters.port_flits_per_cycle, parameters.port_backlog_flits),
       price_(std::int64_t{blend_rate.cycles} * parameters.sectors_per_cycle),
@@ -64,12 +63,12 @@ double CropTime::least_cycles(const Sum& sum) const {
     return fills <= places ? 0.0 : of(fills - places, sum.memory_latency_cycles / static_cast<double>(places));
   };
   // Ahead of its data, a quad that needs more registers than there are has them all, and lines go while they are filled.
-  const std::uint64_t registers = fetches_ahead ? std::max(mshrs, cache.sectors_of_a_line()) : mshrs;
+  const std::uint64_t registers = fetches_ahead() ? std::max(mshrs, cache.sectors_of_a_line()) : mshrs;
   const std::vector<WorkKind> kind = kinds();
   return std::max(
       {of(sum.quads, kind[CropWork::blend].cycles_per_item) + of(sum.sectors, kind[CropWork::sectors].cycles_per_item),
        of(sum.flits, kind[CropWork::flits].cycles_per_item), turns(sum.sectors_filled, registers),
-       fetches_ahead ? 0.0 : turns(sum.lines_filled, cache.lines())});
+       fetches_ahead() ? 0.0 : turns(sum.lines_filled, cache.lines())});
 }
 
 unsigned CropTime::flits_of_reads(const ShadedWarp& warp, unsigned from, unsigned to,

@@ -30,15 +30,14 @@ class CropTime {
   CropTime(const CropParameters& parameters, ColorFormat format);
 
   const CacheOrganization cache;
-  const Rate blend_rate;                   ///< of quads, of the format
-  const unsigned most_in_a_cycle;          ///< quads looked up or blended
-  const std::uint32_t input_quads;         ///< queue between tag look-up and blending
-  const std::uint32_t latency_cycles;      ///< of blending, termination test included
-  const std::uint32_t mshrs;               ///< sectors in flight
-  const bool forwards;                     ///< overlapping quads need not wait for `latency_cycles`
-  const bool writes_unchanged;             ///< a blend that changes no value makes its sector dirty all the same
-  const bool fetches_ahead;                ///< a line may go while quads wait to be blended into it
-  const std::uint32_t line_return_cycles;  ///< from a line's last use to the next, if it left in between
+  const Rate blend_rate;                  ///< of quads, of the format
+  const unsigned most_in_a_cycle;         ///< quads looked up or blended
+  const std::uint32_t input_quads;        ///< queue between tag look-up and blending
+  const std::uint32_t latency_cycles;     ///< of blending, termination test included
+  const std::uint32_t mshrs;              ///< sectors in flight
+  const bool forwards;                    ///< overlapping quads need not wait for `latency_cycles`
+  const bool writes_unchanged;            ///< a blend that changes no value makes its sector dirty all the same
+  const std::uint32_t fetch_ahead_quads;  ///< between two looks at tags, if there are two
   const std::int64_t parts_of_a_cycle;
 
   /// What the cache moves through this, beside the blender; where it is not on, sectors take time of the blender.
@@ -111,9 +110,9 @@ class CropTime {
   /// Whether no quad has another price than its rate's, and none has to wait for another.
   bool quads_are_alike() const { return forwards && !in_pairs_ && column_parts_ == 0; }
   /// Whether that is all that takes time, but for sectors.
-  bool is_plain() const { return quads_are_alike() && !port.is_on() && !lines_return(); }
-  /// Whether a line that left and comes back may have to wait.
-  bool lines_return() const { return fetches_ahead || line_return_cycles > 0; }
+  bool is_plain() const { return quads_are_alike() && !port.is_on() && !fetches_ahead(); }
+  /// Whether a line may go while quads wait to be blended into it.
+  bool fetches_ahead() const { return fetch_ahead_quads > 0; }
   Price price() const { return {price_, false}; }
   /// Where quads are alike: one is blended in a cycle to which the blender is open, or so many from the first one on in which there is
   /// time; returns the cycles of the first and of the last.

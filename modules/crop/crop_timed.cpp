@@ -5,7 +5,7 @@
 
 #include "crop/crop_time.h"
 
-#include <vrpipe/memory/line_returns.h>
+#include <vrpipe/memory/line_visits.h>
 #include <vrpipe/model/timed_cache_port.h>
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
@@ -40,13 +40,15 @@ class TimedCrop : public TimedUnit {
         sent_before_(time_.port),
         barriers_(context),
         hazard_gate_(context, "crop.blend_hazard"),
-        // A hazard is one of quads.
-        at_once_(time_.forwards ? time_.looked_up_at_once() : 1),
+        // A hazard is one of quads, as is what waits for a line that comes back.
+        at_once_(time_.forwards && !time_.fetches_ahead() ? time_.looked_up_at_once() : 1),
         memory_(*this, "memory", time_.mshrs,
                 at_once_ == 1 ? 1 : std::min(time_.cache.sectors_of_a_line(), time_.mshrs), time_.cache.sector_bytes,
                 dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics,
                 {MemoryTraffic::color, static_cast<std::uint16_t>(context.placement.gpc)}),
         look_ups_(time_.most_in_a_cycle),
+        second_looks_(time_.most_in_a_cycle),
+        ahead_(std::max(time_.fetch_ahead_quads, 1U)),
         queue_(time_.input_quads),
         stays_(time_.cache.lines()) {
     out_.set_pipeline(time_.latency_cycles - 1, ColorBeat::in_a_cycle(time_.blend_rate));
@@ -64,19 +66,15 @@ class TimedCrop : public TimedUnit {
  private:
   /// What a line of the cache holds.
   struct Stay {
-    Cycle last_blend = 0;      ///< of a quad that needed it, or what it held before
-    Cycle ready = 0;           ///< of one that came back: when it can be used
-    Cycle used_before = 0;     ///< the last use of what it holds before it came back
-    bool asked_again = false;  ///< for what was asked for before that use
-    std::uint32_t dirty = 0;   ///< sectors, where they take flits
+    Cycle last_blend = 0;     ///< of a quad that needed it, or what it held before
+    std::uint32_t dirty = 0;  ///< sectors, where they take flits
   };
 
   void end_of_elaboration() override {
     const ColorSurface* const surface = behaviour_->surface();
     if (surface == nullptr) throw SimulationFault(this->name(), 0, "no colour surface is attached");
     monitor_ = std::make_unique<BlendOrderMonitor>(surface->width(), surface->height());
-    if (time_.lines_return())
-      returns_.emplace(surface->address(0), surface->size_bytes(), time_.cache.line_bytes, time_.line_return_cycles);
+    if (time_.fetches_ahead()) uses_.resize(surface->size_bytes() / time_.cache.line_bytes + 1);
   }
 
   CycleInterval take(const ShadedWarp& warp, CycleInterval visible) {
@@ -114,8 +112,8 @@ class TimedCrop : public TimedUnit {
     }
     behaviour_->look_up(warp, from, to, cache_);
     // Places in the queue, and lines that no queued quad needs.
-    Cycle at = queue_.free_from(visible.first, quads);
-    for (unsigned line = 0; line < cache_.count && !time_.fetches_ahead; ++line) {
+    Cycle at = (time_.fetches_ahead() ? ahead_ : queue_).free_from(visible.first, quads);
+    for (unsigned line = 0; line < cache_.count && !time_.fetches_ahead(); ++line) {
       if (cache_.lines[line].replaced) at = std::max(at, stays_[cache_.lines[line].line].last_blend);
     }
     CycleInterval looked_up = look_ups_.take(port_open_from(at), quads);
@@ -130,6 +128,8 @@ class TimedCrop : public TimedUnit {
     } else if (const unsigned moved = memory_.take_moved(); moved > 0) {
       moves_.push({looked_up.last, moved});
     }
+
+    if (time_.fetches_ahead()) there = std::max(there, look_again(warp, from, looked_up.last));
 
     charge(UnitState::starved, looked_up.first + 1);
     if (out_.last() > there) {
@@ -211,7 +211,7 @@ class TimedCrop : public TimedUnit {
     Stay& stay = stays_[access.line];
     if (access.written_back != 0) {
       // Where tags run ahead, quads may still be blended into what the line held.
-      const Cycle from = time_.fetches_ahead ? std::max(at, stay.last_blend) : at;
+      const Cycle from = time_.fetches_ahead() ? std::max(at, stay.last_blend) : at;
       memory_.write_back(access, from);
       CropTime::Moves moves;
       moves.write(static_cast<unsigned>(__builtin_popcount(access.written_back)));
@@ -221,23 +221,35 @@ class TimedCrop : public TimedUnit {
         stay.dirty = 0;
       }
     }
-    if (returns_ && access.replaced) {
-      // It is there for another, which may have been before. What replaces colours does not read them.
-      stay.ready = access.filled != 0 ? returns_->from(access.address) : 0;
-      stay.used_before = returns_->last_use(access.address);
-      stay.asked_again = false;
+    // What replaces colours does not read them.
+    if (time_.fetches_ahead() && access.replaced) uses_of(access).come(at, access.filled != 0);
+    return access.filled == 0 ? 0 : memory_.fill(access, at);
+  }
+  TimedLineUses& uses_of(const LineAccess& line) {
+    return uses_[(line.address - behaviour_->surface()->address(0)) / time_.cache.line_bytes];
+  }
+
+  /// The second look at the tag of a quad, as LinesAhead's; returns when its sectors are there.
+  [[gnu::noinline]] Cycle look_again(const ShadedWarp& warp, unsigned index, Cycle looked_up) {
+    const CropBehaviour::LineAccess& line = cache_.lines[cache_.line_of[index]];
+    const std::uint32_t sectors = cache_.sectors_of[index];
+    const std::uint32_t primitive = warp.first_primitive[index];
+    if (primitive != visiting_.primitive || warp.tile != visiting_.tile) ++visit_;
+    visiting_ = {warp.tile, primitive};
+    Cycle at = second_looks_.take(queue_.free_from(looked_up, 1), 1).first;
+    Cycle there = at;
+    const TimedLineUses::Look look = uses_of(line).look_again(visit_, sectors, time_.cache.sectors_of_a_half(), at);
+    if (look.again != 0) {
+      fetched_again_ += static_cast<unsigned>(__builtin_popcount(look.again));
+      if (look.is_first) send(1, at);
+      LineAccess again;
+      again.address = line.address;
+      again.filled = look.again;
+      there = memory_.fill(again, at);
     }
-    if (access.filled == 0) return stay.ready;
-    Cycle there = memory_.fill(access, at);
-    if (time_.fetches_ahead && stay.used_before > at) {
-      // Fetched before what the line held is written back, and so again.
-      fetched_again_ += static_cast<unsigned>(__builtin_popcount(access.filled));
-      Cycle again = stay.used_before;
-      there = std::max(there, memory_.fill(access, again));
-      stay.ready = std::max(stay.ready, there);
-      if (!std::exchange(stay.asked_again, true)) send(1, again);
-    }
-    return std::max(there, stay.ready);
+    second_looks_.hold(at);
+    ahead_.take(1, at);
+    return std::max(there, at);
   }
 
   void blend(const ShadedWarp& warp, unsigned from, unsigned to, CycleInterval at) {
@@ -255,7 +267,8 @@ class TimedCrop : public TimedUnit {
     for (unsigned i = 0; i < cache_.count; ++i) {
       const std::uint32_t line = cache_.lines[i].line;
       stays_[line].last_blend = at.last;
-      if (returns_) returns_->used(cache_.lines[i].address, at.last);
+      if (time_.fetches_ahead())
+        uses_of(cache_.lines[i]).used(cache_.sectors_of[from], time_.cache.sectors_of_a_half(), at.last);
       if (dirty[i] == 0) continue;
       behaviour_->make_dirty(line, dirty[i]);
       if (time_.port.is_on()) owe(stays_[line], dirty[i]);
@@ -308,10 +321,18 @@ class TimedCrop : public TimedUnit {
   std::unique_ptr<BlendOrderMonitor> monitor_;
   CropBehaviour::CacheLookUp cache_;
   ThroughputPort look_ups_;
+  ThroughputPort second_looks_;
+  SlotPool ahead_;    ///< quads between the first look at their tags and the second, if there are two
   SlotPool queue_;    ///< quads between look-up and blending
   Ring<Move> moves_;  ///< that the blender has not given its time to yet
   std::vector<Stay> stays_;
-  std::optional<LineReturns> returns_;  ///< where lines that come back wait
+  std::vector<TimedLineUses> uses_;  ///< by line of the surface, where tags are looked at twice
+  struct Visiting {
+    TileId tile;
+    std::uint32_t primitive = ~0U;
+  };
+  Visiting visiting_;  ///< of the last quad
+  LineVisits::Visit visit_ = 0;
   Cycle end_ = never;
   bool any_blended_ = false;
   StatisticSet more_cache_statistics_{*this, "cache"};

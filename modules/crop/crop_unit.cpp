@@ -63,6 +63,7 @@ class CropUnit : public Unit {
     SectoredCache::Line line = SectoredCache::no_line;  ///< or its stay (LinesAhead)
     std::uint32_t sectors = 0;                          ///< of the line, a bit each
     std::uint32_t place = 0;                            ///< in the surface's grid
+    LinesAhead::Visit visit = 0;
   };
 
   void end_of_elaboration() override {
@@ -79,10 +80,7 @@ class CropUnit : public Unit {
     monitor_.emplace(surface_->width(), surface_->height());
     go_to({});
     if (Plain) return;
-    came_back_.resize(organization.lines());
-    if (time_.lines_return())
-      returns_.emplace(surface_->address(0), surface_->size_bytes(), time_.cache.line_bytes, time_.line_return_cycles);
-    if (time_.fetches_ahead) ahead_.emplace(port_, statistics, fetched_again_, *returns_, time_.mshrs);
+    if (time_.fetches_ahead()) ahead_.emplace(port_, statistics, fetched_again_, *surface_, time_.mshrs);
   }
 
   /// Takes a quad from the link into the queue; false when it has to wait.
@@ -113,14 +111,15 @@ class CropUnit : public Unit {
     tile_place_ = surface_->grid().place(tile, 0);
     tile_address_ = surface_->address(tile_place_);
   }
-  [[gnu::always_inline]] void queue(const ColorQuad& quad, std::uint32_t line, std::uint32_t sectors,
-                                    std::size_t place) {
+  [[gnu::always_inline]] Entry& queue(const ColorQuad& quad, std::uint32_t line, std::uint32_t sectors,
+                                      std::size_t place) {
     // In place: a temporary of narrow stores would be waited for when it is copied.
     Entry& entry = queue_.push();
     entry.quad = quad;
     entry.line = line;
     entry.sectors = sectors;
     entry.place = static_cast<std::uint32_t>(place);
+    return entry;
   }
   [[gnu::noinline]] bool look_up_ahead(const ColorQuad& quad, std::uint64_t address, std::uint32_t sectors,
                                        std::size_t place) {
@@ -130,8 +129,32 @@ class CropUnit : public Unit {
     if (stay == LinesAhead::no_stay) return false;
     pay(ahead_->take_moves());
     if (fills) ask(quad, place);
-    queue(quad, stay, sectors, place);
+    queue(quad, stay, sectors, place).visit = visit_of(quad);
     return true;
+  }
+  LinesAhead::Visit visit_of(const ColorQuad& quad) {
+    const std::uint32_t primitive = quad.warp->first_primitive[quad.index];
+    if (primitive != visiting_.primitive || tile_place_ != visiting_.tile) ++visit_;
+    visiting_ = {tile_place_, primitive};
+    return visit_;
+  }
+  /// Quads in the queue, in their order.
+  [[gnu::noinline]] bool look_again() {
+    bool any = false;
+    for (unsigned budget = time_.most_in_a_cycle;
+         budget > 0 && looked_twice_ < queue_.size() && looked_twice_ < time_.input_quads; --budget) {
+      const Entry& next = queue_[looked_twice_];
+      if (!ahead_->look_again(next.line, next.sectors, next.visit)) break;
+      pay(ahead_->take_moves());
+      ++looked_twice_;
+      any = true;
+    }
+    return any;
+  }
+  /// Places of the queue for what arrives.
+  std::size_t room() const {
+    return Plain || !ahead_ ? time_.input_quads - queue_.size()
+                            : time_.fetch_ahead_quads - (queue_.size() - looked_twice_);
   }
   bool blends(const ColorQuad& quad) const {
     return Plain || !replaces_ || context_.state(quad.warp->draw[quad.index]).blend;
@@ -161,14 +184,10 @@ class CropUnit : public Unit {
   [[gnu::noinline]] SectoredCache::Line fill(std::uint64_t address, std::uint32_t sectors, std::uint32_t& asked_for) {
     wanted_.address = address;
     wanted_.sectors = sectors;
-    const bool had_line = wanted_.line != SectoredCache::no_line;
     const bool done = port_.look_up(wanted_, now(), [this](unsigned moved) { pay({moved, 0}); });
     if (!Plain) {
       const CachePort::LinesMoved moved = port_.take_lines_moved();
       if (time_.port.is_on()) send(moved.written_back + moved.sectors_written_back);
-      // It has just been pinned, by nobody else if it is new.
-      if (!had_line && wanted_.line != SectoredCache::no_line && port_.cache().present(wanted_.line) == 0)
-        came_back_[wanted_.line] = wanted_.reads && returns_ && returns_->from(address) != 0;
     }
     if (!done) return SectoredCache::no_line;
     asked_for = std::exchange(wanted_.asked_for, 0);
@@ -177,8 +196,7 @@ class CropUnit : public Unit {
 
   bool accept() {
     bool moved = false;
-    auto budget =
-        static_cast<unsigned>(std::min<std::size_t>(time_.most_in_a_cycle, time_.input_quads - queue_.size()));
+    auto budget = static_cast<unsigned>(std::min<std::size_t>(time_.most_in_a_cycle, room()));
     while (budget > 0 && in_.ready()) {
       const ColorBeat& beat = in_.front();
       if (beat.mark != Mark::none) {
@@ -217,7 +235,6 @@ class CropUnit : public Unit {
     opened_ = now;
     TerminationBeat beat;
     stop_ = UnitState::starved;
-    ready_at_ = never;
     unsigned budget = time_.most_in_a_cycle;
     for (; budget > 0 && !queue_.empty(); --budget) {
       if (!marks_.empty()) pass_marks(now);
@@ -227,7 +244,7 @@ class CropUnit : public Unit {
         stop_ = UnitState::blocked;
         break;
       }
-      if (is_awaited(entry, now) || !port_is_open()) {
+      if (is_awaited(entry) || !port_is_open()) {
         stop_ = UnitState::memory;
         break;
       }
@@ -258,7 +275,7 @@ class CropUnit : public Unit {
       if (quad.is_last()) quad.warp->release();
       Plain ? time_.blend(now) : time_.blend(priced, price, now);
       waits_from_ = never;
-      leave(entry, outcome.changed || time_.writes_unchanged, now);
+      leave(entry, outcome.changed || time_.writes_unchanged);
       queue_.pop();
       if (!marks_.empty()) --marks_.front().quads;
       if (queue_.size() > quads_ahead) prefetch(queue_[quads_ahead]);
@@ -282,29 +299,19 @@ class CropUnit : public Unit {
   }
 
   /// Whether the sectors of a quad whose turn it is are not there.
-  bool is_awaited(const Entry& entry, Cycle now) {
-    if (Plain || !ahead_) {
-      if (port_.awaited(entry.line, entry.sectors) != 0) return true;
-      if (Plain || !came_back_[entry.line]) return false;
-      const Cycle from = returns_->from(port_.cache().address(entry.line));
-      if (now < from) ready_at_ = from;
-      return now < from;
-    }
-    const LinesAhead::Wait wait = ahead_->waits(entry.line, entry.sectors, now);
-    if (wait == LinesAhead::Wait::until) ready_at_ = ahead_->ready_at(entry.line);
-    return wait != LinesAhead::Wait::none;
+  bool is_awaited(const Entry& entry) const {
+    if (Plain || !ahead_) return port_.awaited(entry.line, entry.sectors) != 0;
+    return looked_twice_ == 0 || ahead_->is_awaited(entry.line, entry.sectors);
   }
   /// A quad has been blended into its line.
-  void leave(const Entry& entry, bool changed, Cycle now) {
+  void leave(const Entry& entry, bool changed) {
     if (!Plain && ahead_) {
-      ahead_->blended(entry.line, entry.sectors, changed, now);
+      ahead_->blended(entry.line, entry.sectors, changed, entry.visit);
+      --looked_twice_;
       return pay(ahead_->take_moves());
     }
     if (changed) port_.cache().make_dirty(entry.line, entry.sectors);
     port_.cache().unpin(entry.line);
-    if (Plain) return;
-    if (returns_) returns_->used(port_.cache().address(entry.line), now);
-    came_back_[entry.line] = false;
   }
 
   /// Behind the quads in the queue.
@@ -341,14 +348,15 @@ class CropUnit : public Unit {
     }
     if (!in_reads_.empty()) take_reads();
     const bool blended = blend(now);
-    const bool accepted = accept();
+    bool accepted = accept();
+    if (!Plain && ahead_) accepted |= look_again();
     const bool marked = !marks_.empty() && pass_marks(now);
     if (!done_.empty()) send_done();
     enter(blended ? UnitState::busy : !queue_.empty() ? stop_ : UnitState::starved, now);
     const bool waits_for_time = !queue_.empty() && (stop_ == UnitState::latency || stop_ == UnitState::busy);
     if (blended || accepted || marked || waits_for_time) return now + 1;
     // A quad at the link that could not be looked up waits for a completion or for the queue to move.
-    Cycle next = std::min(port_.next_completion(), queue_.empty() ? never : ready_at_);
+    Cycle next = port_.next_completion();
     if (const Cycle open = Plain ? now : time_.port.open_from(now); open > now) next = std::min(next, open);
     for (const Cycle at : {in_.next_ready(), in_reads_.next_ready()}) {
       if (at > now) next = std::min(next, at);
@@ -379,12 +387,17 @@ class CropUnit : public Unit {
   TileId tile_;               ///< of the last quad that was looked up
   std::size_t tile_place_ = 0;
   std::uint64_t tile_address_ = 0;
-  std::vector<bool> came_back_;         ///< by line of the cache: it was there before, and has not been used since
-  std::optional<LineReturns> returns_;  ///< where lines that come back wait
-  std::optional<LinesAhead> ahead_;     ///< where tags run ahead of data
-  Cycle ready_at_ = never;              ///< of the quad whose turn it is, if that is known
-  Cycle waits_from_ = never;            ///< it has waited for nothing but the blender
-  Cycle opened_ = 0;                    ///< the blender, last
+  // Where tags run ahead of data:
+  std::optional<LinesAhead> ahead_;
+  std::size_t looked_twice_ = 0;  ///< quads at the front of the queue
+  struct Visiting {
+    std::size_t tile = 0;
+    std::uint32_t primitive = ~0U;
+  };
+  Visiting visiting_;  ///< of the last quad that was looked up
+  LinesAhead::Visit visit_ = 0;
+  Cycle waits_from_ = never;  ///< the quad whose turn it is has waited for nothing but the blender
+  Cycle opened_ = 0;          ///< the blender, last
   UnitState stop_ = UnitState::starved;
   struct QueuedMark {
     Mark mark = Mark::none;

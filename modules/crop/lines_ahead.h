@@ -9,35 +9,42 @@
 #include <vrpipe/component/statistic.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
-#include <vrpipe/memory/line_returns.h>
+#include <vrpipe/memory/line_visits.h>
 
 namespace vrpipe {
 
 /// The colour cache at cycle where its tags run ahead of its data (Igehy et al., "Prefetching in a texture cache
 /// architecture", 1998): a line goes for another though quads wait to be blended into it, so that more lines are under
-/// way than the cache holds. What it held is written back once the last of them has been. A line that is wanted again
-/// before that is fetched at once, and again behind what is written back (measured on a GH100 graphics GPC).
+/// way than the cache holds. What it held is written back once the last of them has been.
+///
+/// Tags are looked at twice. A first look asks for sectors at once; quads then wait, in order, for a second. What was asked for
+/// while quads still waited to be blended into an earlier stay of the line is fetched again there, and quads stop there for
+/// lines that come back (LineVisits).
 class LinesAhead {
  public:
   /// A stay of a line in the cache, by number.
   using Stay = std::uint32_t;
   static constexpr Stay no_stay = ~0U;
+  using Visit = LineVisits::Visit;
 
   /// The port's cache has been made. All but `mshrs` outlive it. `fetched_again`: sectors, a second time.
-  LinesAhead(CachePort& port, SectoredCacheStatistics& statistics, Counter& fetched_again, LineReturns& returns,
+  LinesAhead(CachePort& port, SectoredCacheStatistics& statistics, Counter& fetched_again, const ColorSurface& surface,
              unsigned mshrs)
       : port_(port),
         statistics_(statistics),
         fetched_again_(fetched_again),
-        returns_(returns),
+        base_(surface.address(0)),
+        line_shift_(static_cast<unsigned>(__builtin_ctz(port.cache().organization().line_bytes))),
         sector_bytes_(port.cache().organization().sector_bytes),
         sectors_of_a_line_(port.cache().organization().sectors_of_a_line()),
+        half_(port.cache().organization().sectors_of_a_half()),
         mshrs_(mshrs),
         stay_of_line_(port.cache().organization().lines(), no_stay),
-        latest_(returns.lines(), no_stay) {}
+        latest_((surface.size_bytes() >> line_shift_) + 1, no_stay),
+        uses_(latest_.size()) {}
 
-  /// Looks a quad up, which then waits to be blended; `no_stay` while it has to wait for the memory port or a register.
-  /// One that replaces what is there does not read. `fills`: whether sectors are asked for.
+  /// The first look at a quad's tag; `no_stay` while it has to wait for the memory port or a register. One that replaces
+  /// what is there does not read. `fills`: whether sectors are asked for.
   Stay look_up(std::uint64_t address, std::uint32_t sectors, bool reads, bool& fills) {
     const auto most = static_cast<unsigned>(__builtin_popcount(sectors));
     if (!requests_.empty() || !port_.memory().available()) return no_stay;
@@ -55,11 +62,32 @@ class LinesAhead {
     fills = access.filled != 0;
     if (!fills) return number;
     stay.filling |= access.filled;
-    if (stay.waits) stay.again |= access.filled;
     for_each_sector_run(access.filled, sectors_of_a_line_, [&](unsigned first, unsigned count) {
       request({number, first, count, Request::fill});
     });
     return number;
+  }
+
+  /// The second look, in the order of the first ones; false while the quad has to stop there.
+  bool look_again(Stay number, std::uint32_t sectors, Visit visit) {
+    State& stay = stays_[number];
+    LineUses& uses = uses_[index(stay.address)];
+    if (stay.is_new) {
+      if (stay.fetches_again && !uses.begin(sectors, half_)) return false;
+      if (!stay.fetches_again) uses.begin(0, half_);
+      stay.is_new = false;
+    }
+    if (!uses.may_go(visit, sectors, half_)) return false;
+    bool is_first = false;
+    const std::uint32_t again = uses.go(sectors, half_, is_first);
+    if (!stay.fetches_again || again == 0) return true;
+    if (is_first) ++moves_.flits;
+    stay.filling_again |= again;
+    fetched_again_ += static_cast<unsigned>(__builtin_popcount(again));
+    for_each_sector_run(again, sectors_of_a_line_, [&](unsigned first, unsigned count) {
+      request({number, first, count, Request::fill_again});
+    });
+    return true;
   }
 
   /// Takes the sectors that have come, and sends what waits for the memory port; true if there were any.
@@ -84,22 +112,17 @@ class LinesAhead {
     return any;
   }
 
-  /// What a quad whose turn it is to be blended still waits for.
-  enum class Wait : std::uint8_t { none, memory, until };
-  Wait waits(Stay number, std::uint32_t sectors, Cycle now) const {
+  /// Whether a quad whose turn it is to be blended still waits for sectors.
+  bool is_awaited(Stay number, std::uint32_t sectors) const {
     const State& stay = stays_[number];
-    if (stay.waits || ((stay.filling | stay.filling_again) & sectors) != 0) return Wait::memory;
-    return stay.came_back && now < returns_.from(stay.address) ? Wait::until : Wait::none;
+    return ((stay.filling | stay.filling_again) & sectors) != 0;
   }
-  /// Of one that waits `until`.
-  Cycle ready_at(Stay number) const { return returns_.from(stays_[number].address); }
 
   /// A quad has been blended.
-  void blended(Stay number, std::uint32_t sectors, bool changed, Cycle now) {
+  void blended(Stay number, std::uint32_t sectors, bool changed, Visit visit) {
     State& stay = stays_[number];
-    stay.came_back = false;
-    returns_.used(stay.address, now);
     if (changed) stay.dirty |= sectors;
+    uses_[index(stay.address)].used(visit, sectors, half_);
     if (--stay.quads == 0 && stay.left) end(number);
   }
 
@@ -112,14 +135,12 @@ class LinesAhead {
     std::uint64_t address = 0;
     std::uint32_t filling = 0;        ///< sectors on their way
     std::uint32_t filling_again = 0;  ///< and of the second fetch
-    std::uint32_t again = 0;          ///< to be fetched once more
     std::uint32_t dirty = 0;
-    std::uint32_t quads = 0;   ///< looked up and not blended
-    Stay following = no_stay;  ///< of the same line, which waits for the end of this one
-    bool left = false;         ///< the line has gone for another
+    std::uint32_t quads = 0;  ///< looked up and not blended
+    bool left = false;        ///< the line has gone for another
     bool ended = false;
-    bool waits = false;      ///< for the stay before it to end
-    bool came_back = false;  ///< the line was there before; nothing has been blended into it since
+    bool is_new = true;          ///< nothing was looked up twice
+    bool fetches_again = false;  ///< it began before the one before it had ended
   };
   struct Request {
     enum Kind : std::uint8_t { fill, fill_again, write_back };
@@ -130,6 +151,7 @@ class LinesAhead {
     std::uint64_t address = 0;
   };
 
+  std::size_t index(std::uint64_t address) const { return static_cast<std::size_t>((address - base_) >> line_shift_); }
   void begin(const LineAccess& access) {
     if (const Stay before = stay_of_line_[access.line]; before != no_stay) {
       stays_[before].left = true;
@@ -144,13 +166,8 @@ class LinesAhead {
     State& stay = stays_[number];
     stay = {};
     stay.address = access.address;
-    const bool reads = access.filled != 0;
-    stay.came_back = reads && returns_.from(access.address) != 0;
-    Stay& latest = latest_[returns_.index(access.address)];
-    if (latest != no_stay) {
-      stays_[latest].following = number;
-      stay.waits = stay.came_back = reads;
-    }
+    Stay& latest = latest_[index(access.address)];
+    stay.fetches_again = latest != no_stay && access.filled != 0;
     latest = number;
     stay_of_line_[access.line] = number;
   }
@@ -158,7 +175,7 @@ class LinesAhead {
   void end(Stay number) {
     State& stay = stays_[number];
     stay.ended = true;
-    Stay& latest = latest_[returns_.index(stay.address)];
+    Stay& latest = latest_[index(stay.address)];
     if (latest == number) latest = no_stay;
     if (stay.dirty != 0) {
       const auto count = static_cast<unsigned>(__builtin_popcount(stay.dirty));
@@ -167,17 +184,6 @@ class LinesAhead {
       moves_.write(count);
       for_each_sector_run(stay.dirty, sectors_of_a_line_, [&](unsigned first, unsigned sectors) {
         request({number, first, sectors, Request::write_back, stay.address});
-      });
-    }
-    if (stay.following != no_stay) {
-      State& following = stays_[stay.following];
-      following.waits = false;
-      const std::uint32_t again = std::exchange(following.again, 0);
-      following.filling_again = again;
-      moves_.flits += again != 0 ? 1 : 0;
-      fetched_again_ += static_cast<unsigned>(__builtin_popcount(again));
-      for_each_sector_run(again, sectors_of_a_line_, [&](unsigned first, unsigned sectors) {
-        request({stay.following, first, sectors, Request::fill_again});
       });
     }
     free_if_done(number);
@@ -210,15 +216,18 @@ class LinesAhead {
   CachePort& port_;
   SectoredCacheStatistics& statistics_;
   Counter& fetched_again_;
-  LineReturns& returns_;
+  const std::uint64_t base_;   ///< of the surface
+  const unsigned line_shift_;  ///< log2 of the bytes of a line
   const std::uint64_t sector_bytes_;
   const unsigned sectors_of_a_line_;
+  const unsigned half_;  ///< sectors of half a line
   const unsigned mshrs_;
   unsigned filling_ = 0;  ///< sectors
   std::vector<State> stays_;
   std::vector<Stay> free_;
   std::vector<Stay> stay_of_line_;  ///< by line of the cache
   std::vector<Stay> latest_;        ///< by line of the surface: of those that have not ended
+  std::vector<LineUses> uses_;      ///< by line of the surface: of quads that were looked up twice
   Ring<Request> requests_;          ///< that the memory port has not taken yet
   CropTime::Moves moves_;
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,30 +14,53 @@
 
 namespace vrpipe {
 
-/// An L2 that answers every access after the same time.
+/// An L2 that answers every access after its latency.
 class FixedLatency final : public MemoryBehaviour {
  public:
   struct Parameters : ParameterSet {
     Integer latency_cycles{
         *this, "latency_cycles", 146, 1, 100000, "cycles", "Accel-Sim, SM87_ORIN: L2 latency", "from request to data"};
+    Integer near_latency_cycles{*this,
+                                "near_latency_cycles",
+                                0,
+                                0,
+                                100000,
+                                "cycles",
+                                "left open by the paper; measured on a GH100 graphics GPC: 242 beside 433 (means)",
+                                "of the half of the addresses whose slices are near; 0: latency_cycles"};
+    Integer color_latency_cycles{*this,
+                                 "color_latency_cycles",
+                                 0,
+                                 0,
+                                 100000,
+                                 "cycles",
+                                 "left open by the paper; measured on a GH100 graphics GPC: 43",
+                                 "that CROP's accesses take more than others"};
     Integer bytes_per_cycle{*this, "bytes_per_cycle", 128,          32,
                             4096,  "bytes",           source::open, "moved for each GPC: four sectors"};
     OwnClock::Parameter frequency_mhz{*this};
   };
   FixedLatency(const Parameters& parameters, const RenderContext& context)
       : clock_("l2", parameters.frequency_mhz, context),
-        own_timing_{parameters.latency_cycles, parameters.bytes_per_cycle} {}
+        latency_{parameters.latency_cycles,
+                 parameters.near_latency_cycles > 0 ? parameters.near_latency_cycles : parameters.latency_cycles,
+                 parameters.color_latency_cycles},
+        bytes_per_cycle_(parameters.bytes_per_cycle) {}
 
   void access(const MemoryRequest&) override {}
   bool follows_accesses() const override { return false; }
-  TimingParameters timing() const override { return clock_.of_units(own_timing_); }
-  /// In cycles of its clock.
-  const TimingParameters& own_timing() const { return own_timing_; }
+  TimingParameters timing() const override {
+    return clock_.of_units({std::min(latency_.near, latency_.far), bytes_per_cycle_});
+  }
+  /// In cycles of its clock, as `bytes_per_cycle`.
+  const MemoryLatency& latency() const { return latency_; }
+  std::uint32_t bytes_per_cycle() const { return bytes_per_cycle_; }
   const OwnClock& clock() const { return clock_; }
 
  private:
   OwnClock clock_;
-  TimingParameters own_timing_;
+  MemoryLatency latency_;
+  std::uint32_t bytes_per_cycle_;
 };
 
 /// The same at `lt` and `cycle`.
@@ -45,8 +69,8 @@ class FixedLatencyUnit final : public MemoryUnit {
   FixedLatencyUnit(const std::string& name, ClockDomain& domain, std::unique_ptr<FixedLatency> behaviour,
                    const MemoryPlace& place)
       : behaviour_(std::move(behaviour)),
-        memory_(name.c_str(), domain, behaviour_->own_timing().latency_cycles,
-                behaviour_->clock().port_bytes(place, behaviour_->own_timing().bytes_per_cycle), below_of(place),
+        memory_(name.c_str(), domain, behaviour_->latency(),
+                behaviour_->clock().port_bytes(place, behaviour_->bytes_per_cycle()), below_of(place),
                 behaviour_->clock().period_ps()) {}
 
   tlm::tlm_base_target_socket_b<32>& target(unsigned index) override { return memory_.port(index); }

@@ -20,11 +20,11 @@ class BeatLines {
         line_bytes_(cache.organization.line_bytes),
         bytes_per_tile_(positions_per_tile * DepthStencilSurface::bytes_per_quad(surface.format())),
         places_(sectors_of_quads(cache.organization, DepthStencilSurface::bytes_per_quad(surface.format()))) {
+    halves_of_line_.resize(bytes_per_tile_ / line_bytes_);
     for (unsigned position = 0; position < positions_per_tile; ++position) {
       const unsigned column = position % quads_per_tile_row;
       const unsigned half = position / (4 * quads_per_tile_row) * 4 + column / 2;
-      sectors_of_half_[half].resize(std::max<std::size_t>(sectors_of_half_[half].size(), places_[position].line + 1));
-      sectors_of_half_[half][places_[position].line] |= places_[position].sectors;
+      halves_of_line_[places_[position].line][half] |= places_[position].sectors;
     }
   }
 
@@ -61,15 +61,21 @@ class BeatLines {
   /// Flits that reading sectors of a line takes of which others are held: one for each half, 4x8 pixels, of an 8x8 block of
   /// which none is (measured on a GH100 graphics GPC).
   unsigned flits_of(std::uint64_t address, std::uint32_t read, std::uint32_t held) const {
-    const std::uint64_t offset = address - surface_.address(std::size_t{0});
-    const auto line = static_cast<std::size_t>(offset % bytes_per_tile_ / line_bytes_);
     unsigned flits = 0;
-    for (const std::vector<std::uint32_t>& half : sectors_of_half_) {
-      const std::uint32_t sectors = line < half.size() ? half[line] : 0;
-      flits += (sectors & read) != 0 && (sectors & held) == 0 ? 1U : 0U;
-    }
+    for (const std::uint32_t half : halves_of(address)) flits += (half & read) != 0 && (half & held) == 0 ? 1U : 0U;
     return flits;
   }
+  /// All sectors of the halves of blocks in which some are.
+  std::uint32_t in_halves(std::uint64_t address, std::uint32_t sectors) const {
+    std::uint32_t all = sectors;
+    for (const std::uint32_t half : halves_of(address)) all |= (half & sectors) != 0 ? half : 0;
+    return all;
+  }
+  /// The number of a line of the surface, of so many.
+  std::size_t index(std::uint64_t address) const {
+    return static_cast<std::size_t>((address - surface_.address(std::size_t{0})) / line_bytes_);
+  }
+  std::size_t lines() const { return static_cast<std::size_t>(surface_.size_bytes() / line_bytes_) + 1; }
   /// Of an update.
   Needed::Line find(const TerminationSignal& signal) const {
     const auto [line, sectors] = places_[signal.position];
@@ -77,11 +83,17 @@ class BeatLines {
   }
 
  private:
+  /// Sectors of a line that are of each half, 4x8 pixels, of an 8x8 block.
+  using Halves = std::array<std::uint32_t, 8>;
+  const Halves& halves_of(std::uint64_t address) const {
+    return halves_of_line_[index(address) % halves_of_line_.size()];
+  }
+
   const DepthStencilSurface& surface_;
   const std::uint32_t line_bytes_;
   const std::uint32_t bytes_per_tile_;
   const std::array<QuadSectors, positions_per_tile> places_;
-  std::array<std::vector<std::uint32_t>, 8> sectors_of_half_;  ///< of a tile's halves of blocks, by line
+  std::vector<Halves> halves_of_line_;  ///< of a tile
 };
 
 }  // namespace vrpipe

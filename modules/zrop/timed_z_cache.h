@@ -9,7 +9,7 @@
 #include "z_cache_statistics.h"
 
 #include <vrpipe/kernel/rate.h>
-#include <vrpipe/memory/line_returns.h>
+#include <vrpipe/memory/line_visits.h>
 #include <vrpipe/memory/sectored_cache.h>
 #include <vrpipe/model/timed_cache_port.h>
 
@@ -32,7 +32,8 @@ class TimedZCache {
         early_(timing.quads_per_cycle, std::max(timing_.input_quads, QuadBeat::capacity)),
         late_(timing.quads_per_cycle, std::max(timing_.input_quads, quads_per_warp)),
         updates_(timing.updates_per_cycle),
-        queued_updates_(timing_.input_updates) {}
+        queued_updates_(timing_.input_updates),
+        lines_ahead_(std::max(timing_.fetch_ahead_lines, std::uint32_t{QuadBeat::capacity})) {}
 
   tlm::tlm_initiator_socket<32>& socket() { return port_.socket(); }
   const MemoryBytes& moved() const { return port_.moved(); }
@@ -43,10 +44,7 @@ class TimedZCache {
     cleared_ = cleared_sectors_of(surface, timing_, statistics_);
     kept_until_.resize(timing_.organization.lines());
     there_.resize(std::size_t{timing_.organization.lines()} * sectors_of_a_line_);
-    if (timing_.line_return_cycles == 0) return;
-    returns_.emplace(surface.address({0, 0}, 0), surface.size_bytes(), timing_.organization.line_bytes,
-                     timing_.line_return_cycles);
-    returned_from_.resize(timing_.organization.lines());
+    if (timing_.fetches_ahead()) uses_.resize(lines_->lines());
   }
 
   struct Times {
@@ -58,16 +56,24 @@ class TimedZCache {
     if (cleared_) cleared_->clear();
   }
   /// When so many quads that become visible in a cycle are looked up.
-  Cycle turn(unsigned quads, Cycle visible) { return early_.turn(quads, visible); }
+  Cycle turn(unsigned quads, Cycle visible) {
+    if (timing_.fetches_ahead()) return early_.look_ups.take(lines_ahead_.free_from(visible, 1), quads);
+    return early_.turn(quads, visible);
+  }
   /// In its turn; `tested` follows.
   Times look_up(const QuadBeat& beat, Cycle turn, bool needs_stencil) {
     if (!needs_stencil) return {turn, turn};
-    return look_up(beat, turn, early_);
+    Times times = look_up(beat, turn, early_);
+    if (timing_.fetches_ahead()) times.there = std::max(times.there, look_again(beat, times.at));
+    return times;
   }
   void tested(unsigned quads, bool needs_stencil, Cycle at) {
     early_.queue.take(quads, at);
-    if (!returns_ || !needs_stencil) return;
-    for (unsigned i = 0; i < needed_.count; ++i) returns_->used(needed_.lines[i].address, at);
+    if (!timing_.fetches_ahead() || !needs_stencil) return;
+    for (unsigned i = 0; i < needed_.count; ++i) {
+      const BeatLines::Needed::Line& line = needed_.lines[i];
+      uses_[lines_->index(line.address)].used(lines_->in_halves(line.address, line.sectors), half(), at);
+    }
   }
   /// The same of quads to be tested late, which become visible in a cycle; `tested_late` follows.
   Times look_up_late(const QuadBeat& quads, Cycle visible) {
@@ -144,10 +150,8 @@ class TimedZCache {
     Times times;
     times.at = turn;
     lines_->find(beat.tile, beat.quads.data(), beat.count, needed_);
-    Cycle returned = 0;
     for (unsigned i = 0; i < needed_.count; ++i) {
       const SectoredCache::Line line = look_up(needed_.lines[i], times);
-      if (returns_) returned = std::max(returned, returned_from_[line]);
       // Lines are read in order, and may go then.
       way.read = std::max(way.read, times.there);
       kept_until_[line] = std::max(kept_until_[line], way.read);
@@ -155,7 +159,7 @@ class TimedZCache {
     cache_->accessed(beat.count, beat.count);
     way.look_ups.hold(times.at);
     owe(times.at);
-    return {times.at, std::max({times.at, times.there, returned})};
+    return {times.at, std::max(times.at, times.there)};
   }
   /// Sets when its sectors are there, and when it could be looked up, if that has to wait.
   SectoredCache::Line look_up(const BeatLines::Needed::Line& needed, Times& times) {
@@ -167,16 +171,12 @@ class TimedZCache {
     if (cleared_) cleared_->count(access.missed & access.known);
     Cycle* const there = &there_[std::size_t{access.line} * sectors_of_a_line_];
     if (access.replaced) {
-      if (!timing_.fetches_ahead) times.at = std::max(times.at, kept_until_[access.line]);
+      if (!timing_.fetches_ahead()) times.at = std::max(times.at, kept_until_[access.line]);
       if (access.written_back != 0) write_back(access, times.at);
-      if (returns_) returned_from_[access.line] = returns_->from(access.address);
+      if (timing_.fetches_ahead()) uses_[lines_->index(access.address)].come(times.at, true);
     }
     if (access.filled != 0) {
-      if (!out_reads_.is_stub()) {
-        const std::uint32_t held = cache_->present(access.line) & ~access.filled;
-        if (const unsigned flits = lines_->flits_of(access.address, access.filled, held); flits > 0)
-          times.at = out_reads_.send({flits}, times.at).first;
-      }
+      send(access.address, access.filled, cache_->present(access.line) & ~access.filled, times.at);
       const Cycle filled = port_.fill(access, times.at, [&](unsigned first, unsigned count, Cycle cycle) {
         std::fill_n(there + first, count, cycle);
       });
@@ -184,6 +184,37 @@ class TimedZCache {
     }
     times.there = std::max(times.there, all_there(access.line, access.sectors));
     return access.line;
+  }
+  /// The second look at the lines of one primitive's quads, as ZLinesAhead's; returns when they are there.
+  [[gnu::noinline]] Cycle look_again(const QuadBeat& beat, Cycle looked_up) {
+    const std::uint32_t primitive = primitive_order(beat.quads[0]);
+    if (primitive != visiting_.primitive || beat.tile != visiting_.tile) ++visit_;
+    visiting_ = {beat.tile, primitive};
+    Cycle at = second_looks_.take(early_.queue.free_from(looked_up, beat.count));
+    Cycle there = at;
+    for (unsigned i = 0; i < needed_.count; ++i) {
+      const BeatLines::Needed::Line& needed = needed_.lines[i];
+      LineAccess again;
+      again.address = needed.address;
+      again.filled =
+          needed.sectors & uses_[lines_->index(needed.address)]
+                               .look_again(visit_, lines_->in_halves(needed.address, needed.sectors), half(), at)
+                               .again;
+      if (again.filled == 0) continue;
+      send(needed.address, again.filled, 0, at);
+      there = std::max(there, port_.fill(again, at));
+    }
+    second_looks_.hold(at);
+    lines_ahead_.take(needed_.count, at);
+    owe(at);
+    return std::max(there, at);
+  }
+  unsigned half() const { return timing_.organization.sectors_of_a_half(); }
+  /// What reading sectors takes of the ROPs' port.
+  void send(std::uint64_t line, std::uint32_t sectors, std::uint32_t held, Cycle& at) {
+    if (out_reads_.is_stub()) return;
+    if (const unsigned flits = lines_->flits_of(line, sectors, held); flits > 0)
+      at = out_reads_.send({flits}, at).first;
   }
   /// When all of these sectors are there; 0 for none.
   Cycle all_there(SectoredCache::Line line, std::uint32_t sectors) const {
@@ -215,13 +246,21 @@ class TimedZCache {
   std::optional<SectoredCache> cache_;
   std::optional<ClearedSectors> cleared_;
   BeatLines::Needed needed_;
-  std::vector<Cycle> kept_until_;       ///< by line of the cache
-  std::vector<Cycle> there_;            ///< by sector
-  Cycle fill_cycles_ = 0;               ///< of the last fill
-  Cycle foreseen_until_ = 0;            ///< of updates
-  std::optional<LineReturns> returns_;  ///< where lines that come back wait
-  std::vector<Cycle> returned_from_;    ///< by line of the cache
-  std::uint64_t owed_ = 0;              ///< sectors
+  std::vector<Cycle> kept_until_;  ///< by line of the cache
+  std::vector<Cycle> there_;       ///< by sector
+  Cycle fill_cycles_ = 0;          ///< of the last fill
+  Cycle foreseen_until_ = 0;       ///< of updates
+  // Where tags are looked at twice:
+  std::vector<TimedLineUses> uses_;  ///< by line of the surface
+  SlotPool lines_ahead_;             ///< between two looks
+  IssuePort second_looks_{1};
+  struct Visiting {
+    TileId tile;
+    std::uint32_t primitive = ~0U;
+  };
+  Visiting visiting_;  ///< of the last quads
+  std::uint32_t visit_ = 0;
+  std::uint64_t owed_ = 0;  ///< sectors
   Cycle owed_at_ = 0;
 };
 

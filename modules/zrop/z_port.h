@@ -8,11 +8,11 @@
 #include "beat_lines.h"
 #include "late_look_ups.h"
 #include "z_cache_statistics.h"
+#include "z_lines_ahead.h"
 
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/cache_port.h>
-#include <vrpipe/memory/line_returns.h>
 #include <vrpipe/pipeline/late_plan.h>
 #include <vrpipe/pipeline/render_context.h>
 
@@ -50,11 +50,7 @@ class ZPort {
     cleared_ = cleared_sectors_of(surface, timing_, statistics);
     if (cleared_) port_.know_cleared(*cleared_);
     lines_.emplace(timing_, surface);
-    fill_of_line_.resize(timing_.organization.lines());
-    if (timing_.line_return_cycles == 0) return;
-    returns_.emplace(surface.address({0, 0}, 0), surface.size_bytes(), timing_.organization.line_bytes,
-                     timing_.line_return_cycles);
-    were_there_.resize(returns_->lines());
+    if (timing_.fetches_ahead()) ahead_.emplace(port_, out_reads_, timing_, *lines_, cleared_ ? &*cleared_ : nullptr);
   }
   bool idle() const {
     return beats_.empty() && updates_.empty() && late_.empty() && changed_.empty() && port_.has_written_back();
@@ -70,16 +66,18 @@ class ZPort {
     moved |= take_updates(updates);
     if (plan_.is_used()) moved |= take_late(late);
     moved |= take_beats(quads);
-    moved |= timing_.fetches_ahead ? read_ahead() : read();
-    return moved;
+    if (!ahead_) return read() || moved;
+    moved |= ahead_->take_reads([this](std::uint32_t number) {
+      --beats_[(number - static_cast<std::uint32_t>(beats_tested_)) & ZLinesAhead::number_mask].waits.reads_again;
+    });
+    return look_again() || moved;
   }
   /// When it has to do so next, if nothing of its queues moves before.
   Cycle next(Cycle now, const StreamIn<QuadBeat>& quads, const StreamIn<TerminationBeat>& updates,
              const StreamIn<ShadedWarpItem>& late) const {
     Cycle next = port_.next_completion();
     // What could not be looked up waits for a completion, for the queue to move or for its turn.
-    for (const Cycle at :
-         {quads.next_ready(), updates.next_ready(), late.next_ready(), next_look_up_, late_.next(), returned_from()}) {
+    for (const Cycle at : {quads.next_ready(), updates.next_ready(), late.next_ready(), next_look_up_, late_.next()}) {
       if (at > now) next = std::min(next, at);
     }
     return next;
@@ -92,13 +90,15 @@ class ZPort {
   bool has_beats() const { return !beats_.empty(); }
   /// Whether all that the first beat needs has come.
   bool beat_is_there() const {
-    if (beats_.empty() || reads_done_ < beats_.front().reads) return false;
-    return !returns_ || returned_from() <= now_;
+    if (beats_.empty()) return false;
+    const ZLinesAhead::Waits& waits = beats_.front().waits;
+    if (!ahead_) return reads_done_ >= waits.reads;
+    return looked_twice_ > 0 && ahead_->has_come(waits.reads) && waits.reads_again == 0;
   }
   const QuadBeat& front() const { return beats_.front().beat; }
-  void pop(Cycle now) {
-    if (returns_) use(now);
+  void pop() {
     queued_quads_ -= beats_.front().beat.count;
+    if (ahead_) use();
     beats_.pop();
   }
 
@@ -137,7 +137,8 @@ class ZPort {
  private:
   struct Beat {
     QuadBeat beat;
-    std::uint64_t reads = 0;  ///< of lines, that are done once this beat has what it needs
+    unsigned lines = 0;
+    ZLinesAhead::Waits waits;  ///< where tags do not run ahead, for reads of lines alone
   };
   struct Read {
     SectoredCache::Line line = SectoredCache::no_line;
@@ -166,100 +167,35 @@ class ZPort {
            (cache.present(wanted.line) | cache.filling(wanted.line)) & ~wanted.asked_for);
     return true;
   }
-  /// A line that came back to the cache, for a beat.
-  struct Returned {
-    std::uint64_t beat = 0;  ///< as many were looked up before it
-    std::uint64_t address = 0;
-  };
-  /// The same where tags run ahead of data: what is missed is read for the beat, whatever becomes of the line.
-  /// `left` are the sectors yet to be read, between calls; `needs` becomes the last read that it waits for.
-  [[gnu::noinline]] bool look_up_ahead(CachePort::LookUp& wanted, std::uint32_t& left, std::uint64_t& needs,
-                                       bool waits) {
-    if (!port_.write_back(moves())) return false;
-    if (left == 0) {
-      SectoredCache& cache = port_.cache();
-      const bool is_held = cache.find(wanted.address) != SectoredCache::no_line;
-      if (!may_read() || (!is_held && !cache.can_allocate(wanted.address))) return false;
-      LineAccess access;
-      access.address = wanted.address;
-      access.sectors = wanted.sectors;
-      if (cleared_) access.known = cleared_->of_line(wanted.address);
-      cache.look_up(access);
-      if (cleared_) cleared_->count(access.missed & access.known);
-      wanted.line = access.line;
-      if (access.replaced) {
-        fill_of_line_[access.line] = 0;
-        if (waits) note_return();
-        if (access.written_back != 0) port_.evict(access);
-      }
-      left = access.filled;
-      if (left != 0) read(wanted.address, left, cache.present(access.line) & ~left);
-    }
-    while (left != 0) {
-      if (filling_ahead_ >= timing_.mshrs || !port_.memory_is_available()) return false;
-      const SectorRun run = take_sector_run(left, timing_.organization.sectors_of_a_line());
-      const auto sector_bytes = std::uint64_t{timing_.organization.sector_bytes};
-      ++reads_asked_;
-      port_.read_ahead(wanted.address + run.first * sector_bytes, run.count, static_cast<std::uint32_t>(reads_asked_));
-      sizes_.push(run.count);
-      filling_ahead_ += run.count;
-      moves()(run.count);
-      fill_of_line_[wanted.line] = reads_asked_;
-    }
-    needs = std::max(needs, fill_of_line_[wanted.line]);
+  bool look_up_line() {
+    if (ahead_) return ahead_->look_up(line_, at_, waits_of_beat_, moves());
+    if (!look_up(line_)) return false;
+    reads_.push({line_.line, line_.sectors});
+    waits_of_beat_.reads = ++reads_asked_;
     return true;
   }
-  /// Takes reads that have come; in their order, as beats use them.
-  [[gnu::noinline]] bool read_ahead() {
-    std::uint32_t id = 0;
-    while (port_.next_ahead(id)) came_.push_back(id);
-    bool any = false;
-    for (auto found = came_.begin();
-         (found = std::find(came_.begin(), came_.end(), static_cast<std::uint32_t>(reads_done_ + 1))) != came_.end();) {
-      came_.erase(found);
-      ++reads_done_;
-      filling_ahead_ -= sizes_.front();
-      sizes_.pop();
-      any = true;
-    }
-    return any;
+  bool reads_early(const QuadBeat& beat) const {
+    // All are of one state.
+    return beat.count > 0 && context_.state(beat.quads[0].draw).reads_depth_stencil_early();
   }
-  /// A line has been allocated for a beat: takes note if it was there before.
-  void note_return() {
-    if (!returns_) return;
-    const std::size_t line = returns_->index(line_.address);
-    if (were_there_[line]) returned_.push({beats_looked_up_, line_.address});
-    were_there_[line] = true;
-  }
-  /// Looks a line of a beat up, and takes note if it left since it was last used.
-  bool look_up_line() {
-    if (timing_.fetches_ahead) return look_up_ahead(line_, ahead_left_, reads_of_beat_, true);
-    const bool is_held =
-        line_.line != SectoredCache::no_line || port_.cache().find(line_.address) != SectoredCache::no_line;
-    const bool done = look_up(line_);
-    if (!is_held && line_.line != SectoredCache::no_line) note_return();
-    if (done) {
-      reads_.push({line_.line, line_.sectors});
-      reads_of_beat_ = ++reads_asked_;
-    }
-    return done;
-  }
-  /// The cycle from which on the lines of the first beat can be used.
-  Cycle returned_from() const {
-    Cycle from = 0;
-    for (std::size_t i = 0; i < returned_.size() && returned_[i].beat == beats_tested_; ++i)
-      from = std::max(from, returns_->from(returned_[i].address));
-    return from;
+  /// Beats that were looked up, a line or less in a cycle.
+  [[gnu::noinline]] bool look_again() {
+    if (looked_twice_ == beats_.size()) return false;
+    Beat& next = beats_[looked_twice_];
+    if (looked_twice_ > 0 && queued_quads_ + next.beat.count > timing_.input_quads) return false;
+    if (reads_early(next.beat) && !ahead_->look_again(next.beat, beats_tested_ + looked_twice_, next.waits, moves()))
+      return false;
+    lines_ahead_ -= next.lines;
+    queued_quads_ += next.beat.count;
+    ++looked_twice_;
+    return true;
   }
   /// The first beat is tested.
-  [[gnu::noinline]] void use(Cycle now) {
-    while (!returned_.empty() && returned_.front().beat == beats_tested_) returned_.pop();
+  [[gnu::noinline]] void use() {
     ++beats_tested_;
-    const QuadBeat& beat = beats_.front().beat;
-    if (beat.count == 0 || !context_.state(beat.quads[0].draw).reads_depth_stencil_early()) return;
-    BeatLines::Needed needed;
-    lines_->find(beat.tile, beat.quads.data(), beat.count, needed);
-    for (unsigned i = 0; i < needed.count; ++i) returns_->used(needed.lines[i].address, now);
+    --looked_twice_;
+    const Beat& first = beats_.front();
+    if (reads_early(first.beat)) ahead_->used(first.beat, first.waits);
   }
   struct Update {
     TerminationSignal signal;
@@ -304,30 +240,37 @@ class ZPort {
         if (at_ + 1 < needed_.count) begin_line(at_ + 1);
       }
       beat_begun_ = false;
-      if (needed_.count > 0) count_accesses(beat.count);
+      if (needed_.count > 0) count_accesses(part_.count);
       Beat& queued = beats_.push();
-      queued.beat = beat;
-      queued.reads = reads_of_beat_;
-      ++beats_looked_up_;
-      queued_quads_ += beat.count;
+      queued.beat = part_;
+      queued.waits = waits_of_beat_;
+      queued.lines = needed_.count;
+      if (ahead_) {
+        lines_ahead_ += needed_.count;
+      } else {
+        queued_quads_ += part_.count;
+      }
+      taken_ += part_.count;
+      moved = true;
+      if (taken_ < beat.count) continue;
+      taken_ = 0;
       waits_ = beat.mark != Mark::none && plan_.waits_at(beat.mark);
       in.pop();
-      moved = true;
     }
     return moved;
   }
   [[gnu::noinline]] bool take_late(StreamIn<ShadedWarpItem>& in) {
     const auto count = [this](unsigned quads) { count_accesses(quads); };
-    if (timing_.fetches_ahead) {
+    if (ahead_) {
       // In the place of the line, the read that it needs.
       const auto look_up = [this](CachePort::LookUp& line) {
         std::uint64_t needs = 0;
-        if (!look_up_ahead(line, late_left_, needs, false)) return false;
+        if (!ahead_->look_up_late(line, late_left_, needs, moves())) return false;
         line.line = static_cast<SectoredCache::Line>(needs);
         return true;
       };
       const bool moved = late_.take(in, *lines_, now_, look_up, count);
-      return late_.read([this](SectoredCache::Line needs, std::uint32_t) { return reads_done_ >= needs; }) || moved;
+      return late_.read([this](SectoredCache::Line needs, std::uint32_t) { return ahead_->has_come(needs); }) || moved;
     }
     const bool moved = late_.take(
         in, *lines_, now_, [this](CachePort::LookUp& line) { return look_up(line); }, count);
@@ -338,24 +281,44 @@ class ZPort {
     };
     return late_.read(is_there) || moved;
   }
-  /// To look a beat up; false if that has to wait.
+  /// To look a beat up, or what is of its next primitive where tags run ahead; false if that has to wait.
   bool begin(const QuadBeat& beat) {
-    if (!beats_.empty() && queued_quads_ + beat.count > timing_.input_quads) return false;
-    const unsigned width = std::max<unsigned>(beat.count, 1);
-    if (!look_ups_.allows(width, now_)) return false;
-    look_ups_.take(width);
-    next_look_up_ = look_ups_.next(now_);
+    if (ahead_ ? lines_ahead_ >= timing_.fetch_ahead_lines
+               : !beats_.empty() && queued_quads_ + beat.count > timing_.input_quads)
+      return false;
+    if (taken_ == 0) {
+      const unsigned width = std::max<unsigned>(beat.count, 1);
+      if (!look_ups_.allows(width, now_)) return false;
+      look_ups_.take(width);
+      next_look_up_ = look_ups_.next(now_);
+    }
+    take_part(beat);
     needed_.count = 0;
     at_ = 0;
-    // All are of one state.
-    if (beat.count > 0 && context_.state(beat.quads[0].draw).reads_depth_stencil_early()) {
-      lines_->find(beat.tile, beat.quads.data(), beat.count, needed_);
+    if (reads_early(part_)) {
+      lines_->find(part_.tile, part_.quads.data(), part_.count, needed_);
       begin_line(0);
     } else if (beat.mark != Mark::none && !plan_.waits_at(beat.mark)) {
       clear_at(beat.mark);
     }
     beat_begun_ = true;
     return true;
+  }
+  void take_part(const QuadBeat& beat) {
+    if (!ahead_ || beat.count == 0) {
+      part_ = beat;
+      return;
+    }
+    const std::uint32_t primitive = primitive_order(beat.quads[taken_]);
+    part_.tile = beat.tile;
+    part_.mark = Mark::none;
+    part_.count = 0;
+    for (unsigned i = taken_; i < beat.count && primitive_order(beat.quads[i]) == primitive; ++i)
+      part_.quads[part_.count++] = beat.quads[i];
+    part_.last_of_bin = beat.last_of_bin && taken_ + part_.count == beat.count;
+    if (primitive != visiting_.primitive || beat.tile != visiting_.tile) ++visit_;
+    visiting_ = {beat.tile, primitive};
+    waits_of_beat_ = {waits_of_beat_.reads, 0, visit_, 0, 0};
   }
   void clear_at(Mark mark) {
     if (cleared_ && context_.frame->clears_depth_stencil(mark)) cleared_->clear();
@@ -405,17 +368,17 @@ class ZPort {
   BatchLimit look_ups_;
   std::optional<BeatLines> lines_;
   std::optional<ClearedSectors> cleared_;
-  std::optional<LineReturns> returns_;  ///< where lines that come back wait
-  std::vector<bool> were_there_;        ///< by line of the surface
-  // Where tags run ahead of data; reads are numbered from 1.
-  std::uint32_t ahead_left_ = 0;             ///< sectors of the line that is looked up, yet to be read
-  std::uint32_t late_left_ = 0;              ///< the same for a late test
-  unsigned filling_ahead_ = 0;               ///< sectors
-  std::vector<std::uint64_t> fill_of_line_;  ///< by line of the cache: the last read for it
-  Ring<unsigned> sizes_;                     ///< of the reads under way, sectors
-  std::vector<std::uint32_t> came_;          ///< reads, before others that were asked for earlier
-  Ring<Returned> returned_;                  ///< for beats that are not tested
-  std::uint64_t beats_looked_up_ = 0;
+  // Where tags run ahead of data:
+  std::optional<ZLinesAhead> ahead_;
+  std::uint32_t late_left_ = 0;    ///< sectors of the line that is looked up for a late test, yet to be read
+  std::size_t looked_twice_ = 0;   ///< beats at the front of the queue
+  std::uint32_t lines_ahead_ = 0;  ///< of the beats behind them
+  struct Visiting {
+    TileId tile;
+    std::uint32_t primitive = ~0U;
+  };
+  Visiting visiting_;  ///< of the last quads that were looked up
+  std::uint32_t visit_ = 0;
   std::uint64_t beats_tested_ = 0;
   Cycle now_ = 0;
   Cycle next_look_up_ = 0;  ///< after a beat wider than the unit
@@ -423,6 +386,9 @@ class ZPort {
   unsigned accesses_ = 0;  ///< that are not counted yet
   // Of the beat at the link:
   bool beat_begun_ = false;
+  unsigned taken_ = 0;  ///< quads of it
+  QuadBeat part_;       ///< of it, that is looked up
+  ZLinesAhead::Waits waits_of_beat_;
   BeatLines::Needed needed_;
   unsigned at_ = 0;         ///< of the lines needed
   CachePort::LookUp line_;  ///< that one
@@ -433,10 +399,9 @@ class ZPort {
 
   Ring<BeatLines::Needed::Line> changed_;  ///< by tests, and not put back yet
   Ring<Beat> beats_;                       ///< looked up, and not tested
-  unsigned queued_quads_ = 0;
-  Ring<Read> reads_;  ///< lines of these, that are not read yet
+  unsigned queued_quads_ = 0;              ///< looked up twice, where there are two looks
+  Ring<Read> reads_;                       ///< lines of these, that are not read yet
   std::uint64_t reads_asked_ = 0;
-  std::uint64_t reads_of_beat_ = 0;  ///< the last that those looked up so far need
   std::uint64_t reads_done_ = 0;
   Ring<Update> updates_;  ///< looked up, and not applied
   LateLookUps late_;

@@ -77,18 +77,16 @@ class DepthStencilRop : public ZropBehaviour {
                       "cycles",
                       "left open by the paper; measured on a GH100 graphics GPC: 1.4",
                       "the least that such a block takes"};
-    Switch fetch_ahead{
-        *this, "fetch_ahead", false, "left open by the paper; measured on a GH100 graphics GPC: on",
-        "tags run ahead of data by input_quads: a line may go while it is fetched for a test, so that more are "
-        "under way than the z-cache holds"};
-    Integer line_return_cycles{*this,
-                               "line_return_cycles",
-                               0,
-                               0,
-                               100000,
-                               "cycles",
-                               "left open by the paper; measured on a GH100 graphics GPC: 461",
-                               "from the last test in a line that leaves the z-cache to the next one"};
+    Integer fetch_ahead_lines{*this,
+                              "fetch_ahead_lines",
+                              0,
+                              0,
+                              65536,
+                              "lines",
+                              "left open by the paper; measured on a GH100 graphics GPC: 128 to 512",
+                              "if any, tags run ahead of data: a look at them asks for sectors, and a second one, at "
+                              "most so many lines of primitives "
+                              "later, stops for lines that come back; a line may go while it is fetched for a test"};
     Switch fast_clear{*this, "fast_clear", true, "ATTILA: a state for each block of the target, on the chip",
                       "sectors to which nothing was written back after a clear are not read"};
   };

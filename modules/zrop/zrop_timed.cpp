@@ -153,7 +153,7 @@ class TimedZrop : public TimedUnit {
     }
     std::vector<Quad>& quads = item.storage->flush.quads;
     const unsigned total = item.quads;
-    const unsigned parts = (total + at_once_ - 1) / at_once_;
+    const unsigned parts = count_parts(quads, total);
     CycleInterval tested(never, 0);
     CycleInterval left(never, 0);
     CycleInterval looked_up(never, 0);
@@ -169,9 +169,9 @@ class TimedZrop : public TimedUnit {
     QuadBeat beat;
     beat.tile = item.tile;
     item.quads = 0;
-    for (unsigned part = 0; part < parts; ++part) {
-      const unsigned from = part * at_once_;
-      beat.count = static_cast<std::uint8_t>(std::min(total - from, at_once_));
+    for (unsigned part = 0, from = 0, end = 0; part < parts; ++part, from = end) {
+      end = end_of_part(quads, from, total);
+      beat.count = static_cast<std::uint8_t>(end - from);
       beat.last_of_bin = part + 1 == parts;
       std::copy_n(quads.begin() + from, beat.count, beat.quads.begin());
       Cycle ready = visible.of_part(part, parts);
@@ -215,6 +215,19 @@ class TimedZrop : public TimedUnit {
     return {tested.first, std::max(tested.last, taken.last)};
   }
 
+  /// Quads of a bin that are looked up and tested together: of one primitive where tags are looked at twice.
+  unsigned end_of_part(const std::vector<Quad>& quads, unsigned from, unsigned total) const {
+    const unsigned most = std::min(total, from + at_once_);
+    if (!has_cache_ || !timing_.z_cache.fetches_ahead()) return most;
+    unsigned end = from + 1;
+    while (end < most && primitive_order(quads[end]) == primitive_order(quads[from])) ++end;
+    return end;
+  }
+  unsigned count_parts(const std::vector<Quad>& quads, unsigned total) const {
+    unsigned parts = 0;
+    for (unsigned from = 0; from < total; ++parts) from = end_of_part(quads, from, total);
+    return parts;
+  }
   /// Some of them end, in the cycle before this one; of the others' draws it is known as well that they last so long.
   void end_quads(const QuadBeat& tested, unsigned count, Cycle cycle) {
     quads_last(cycle, count, [&](unsigned i) { return tested.quads[i].draw; });

@@ -127,7 +127,7 @@ class ZropUnit : public Unit {
       const unsigned width = std::max<unsigned>(next.count, 1);
       if (!limit_.allows(width, now) || !block_port_.is_free(now)) break;
       QuadBeat beat = next;
-      has_cache_ ? z_.pop(now) : in_.pop();
+      has_cache_ ? z_.pop() : in_.pop();
       tested_until_ = now + (width + timing_.quads_per_cycle - 1) / timing_.quads_per_cycle;
       if (blocks_.is_on()) pay_for_blocks(beat, now);
       did(ZropWork::tests, beat.count, now, tested_until_);

@@ -24,16 +24,14 @@ Platform gh100_gpc() {
       // 32 bins of 16x16 pixels, first in, first out: the defaults. Two quads part from a gap of 151 cycles on, of which nine
       // are the second's way.
       {"tc", "idle_timeout_cycles", "160"},
-      // 8 quads a cycle of full blocks, each touched half of one a cycle; rectangles of 2x2 take 4.17, of 16x16 10.67.
+      // 8 quads a cycle of full blocks, each touched half of one a cycle; a line is two blocks of stencil.
       {"zrop", "quads_per_cycle", "8"},
       {"zrop", "half_block_cycles", "1"},
-      {"zrop", "block_cycles", "1.4"},
-      {"zrop", "cache_bytes", "8192"},
-      {"zrop", "line_bytes", "256"},
-      {"zrop", "fetch_ahead", "on"},
+      {"zrop", "cache_bytes", "16384"},
+      {"zrop", "line_bytes", "512"},
+      {"zrop", "fetch_ahead_lines", "256"},
       {"zrop", "fast_clear", "off"},
       {"zrop", "mshrs", "2048"},
-      {"zrop", "line_return_cycles", "461"},
       // 64 quads to an SM, SMs in turn; 3.2 quads a cycle, 4 to 5.2 cycles a primitive and screen tile.
       {"sm", "cores", "4"},
       {"sm", "lanes_per_scheduler", "32"},
@@ -52,13 +50,14 @@ Platform gh100_gpc() {
       {"crop", "cache_bytes", "8192"},
       {"crop", "line_bytes", "256"},
       {"crop", "port_flits_per_cycle", "1"},
+      {"crop", "port_backlog_flits", "512"},
       {"crop", "gob_hazards", "on"},
       {"crop", "rgba32f_latency_cycles", "12"},
-      {"crop", "fetch_ahead", "on"},
-      {"crop", "input_quads", "1280"},
-      {"crop", "line_return_cycles", "503"},
+      {"crop", "fetch_ahead_quads", "512"},
       {"crop", "mshrs", "2048"},
-      {"l2", "latency_cycles", "455"},
+      {"l2", "latency_cycles", "433"},
+      {"l2", "near_latency_cycles", "242"},
+      {"l2", "color_latency_cycles", "43"},
   };
   platform.wire = [](Netlist& netlist) {
     wire_pipeline(netlist);

@@ -51,18 +51,18 @@ rc::Gen<Setting> setting() {
                                            {"crop", "gob_hazards", {"on"}},
                                            {"crop", "rgba32f_latency_cycles", {"12"}},
                                            {"raster", "half_tile_order", {"on"}},
-                                           {"crop", "fetch_ahead", {"on"}},
-                                           {"crop", "line_return_cycles", {"3", "500"}},
+                                           {"crop", "fetch_ahead_quads", {"1", "512"}},
                                            {"crop", "pairs_in_sector", {"on"}},
                                            {"crop", "rgba32f_column_cycles", {"1", "4"}},
                                            {"zrop", "half_block_cycles", {"0.3", "1"}},
                                            {"zrop", "block_cycles", {"1.4", "7"}},
-                                           {"zrop", "fetch_ahead", {"on"}},
-                                           {"zrop", "line_return_cycles", {"3", "461"}},
+                                           {"zrop", "fetch_ahead_lines", {"1", "256"}},
                                            {"sm", "warp_launch_cycles", {"0.5", "2.5"}},
                                            {"sm", "visit_launch_cycles", {"4", "11.5"}},
                                            {"sm", "discard_launch_cycles", {"1.2"}},
                                            {"l2", "latency_cycles", {"1", "1000"}},
+                                           {"l2", "near_latency_cycles", {"1", "300"}},
+                                           {"l2", "color_latency_cycles", {"45"}},
                                            {"l2", "bytes_per_cycle", {"32"}},
                                            {"state", "termination_threshold", {"0.1", "1e-9"}}};
   return rc::gen::mapcat(rc::gen::elementOf(choices), [](const Choice& choice) {
@@ -84,7 +84,7 @@ TEST(Bound, LetsQuadsShareTheLastCycleOfABlock) {
   }
   RunRequest r = request(variant_named("baseline"), ColorFormat::rgba8, Fidelity::bound);
   r.platform = &platform_named("gh100-gpc");
-  r.settings = {{"tc", "bin_quads", "4"}, {"zrop", "block_cycles", "1.9"}, {"zrop", "line_return_cycles", "0"}};
+  r.settings = {{"tc", "bin_quads", "4"}, {"zrop", "block_cycles", "1.9"}};
   Frame frame(256, 256);
   DrawState state = draw_state_of(r);
   state.stencil.test = true;

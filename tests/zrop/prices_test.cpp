@@ -240,10 +240,11 @@ TEST_P(ZropPrices, BlocksTakeWhatTheyAreMeasuredTo) {
   EXPECT_LE(tests + block_cycles, cycles);
 }
 
-const Bench::Settings small_cache{{"cache_bytes", "8192"},
-                                  {"line_bytes", "256"},
+/// 32 lines of two blocks of D24S8.
+const Bench::Settings small_cache{{"cache_bytes", "16384"},
+                                  {"line_bytes", "512"},
                                   {"mshrs", "2048"},
-                                  {"fetch_ahead", "on"}};
+                                  {"fetch_ahead_lines", "256"}};
 
 TEST_P(ZropPrices, AFlitReadsAHalfOfABlock) {
   const auto flits_of = [this](const std::vector<std::vector<Quad>>& beats) {
@@ -265,26 +266,35 @@ TEST_P(ZropPrices, AheadOfItsDataMoreLinesAreUnderWayThanTheCacheHolds) {
   std::vector<Bin> bins;
   for (unsigned i = 0; i < 128; ++i) bins.push_back({{static_cast<std::uint16_t>(i), 0}, {quad_at(0, i)}});
   Bench::Settings pinned = small_cache;
-  pinned.back().second = "off";
+  pinned.back().second = "0";
   EXPECT_LT(run(bins, small_cache, true, 1000), 1000U + 128 * 2 + 50);
   EXPECT_EQ(reads, 128U);
   EXPECT_GT(run(bins, pinned, true, 1000), 3 * 1000U) << "32 lines at a time";
 }
 
-TEST_P(ZropPrices, ALineThatLeftAndComesBackWaits) {
-  Bench::Settings settings = small_cache;
-  settings.push_back({"line_return_cycles", "461"});
-  const auto round = [&](unsigned tiles) {
+TEST_P(ZropPrices, LinesThatComeBackTakeTrips) {
+  // A round of visits to tiles in turn, of a primitive for each of `positions`, a quad of it.
+  constexpr unsigned trip = 400;
+  const auto trips = [&](unsigned tiles, const std::vector<unsigned>& positions) {
     const auto cycles = [&](unsigned rounds) {
       std::vector<Bin> bins;
-      for (unsigned i = 0; i < rounds * tiles; ++i)
-        bins.push_back({{static_cast<std::uint16_t>(i % tiles), 0}, {quad_at(0, i)}});
-      return static_cast<double>(run(bins, settings, true));
+      for (unsigned i = 0; i < rounds * tiles; ++i) {
+        Bin bin{{static_cast<std::uint16_t>(i % tiles), 0}, {}};
+        for (const unsigned position : positions)
+          bin.quads.push_back(quad_at(position, static_cast<std::uint32_t>(i * positions.size() + bin.quads.size())));
+        bins.push_back(bin);
+      }
+      return static_cast<double>(run(bins, small_cache, true, trip));
     };
-    return (cycles(10) - cycles(4)) / 6;
+    return (cycles(24) - cycles(8)) / 16 / trip;
   };
-  EXPECT_LT(round(32), 64) << "held: nothing comes back";
-  for (const unsigned tiles : {33U, 64U, 96U}) EXPECT_NEAR(round(tiles), 461, 2) << tiles;
+  EXPECT_LT(trips(32, {0}), 0.2) << "held: nothing comes back";
+  for (const unsigned tiles : {33U, 64U, 96U}) EXPECT_NEAR(trips(tiles, {0}), 1, 0.03) << tiles;
+  EXPECT_NEAR(trips(40, {0, 1}), 1, 0.05) << "the same half of a block";
+  EXPECT_GT(trips(40, {0, 2}), 1.4) << "the other half";
+  EXPECT_LT(trips(40, {0, 2}), 2.1);
+  EXPECT_NEAR(trips(40, {0, 4}), 1, 0.05) << "another block of the line";
+  EXPECT_NEAR(trips(40, {0, 32}), 1, 0.05) << "another line";
 }
 
 }  // namespace

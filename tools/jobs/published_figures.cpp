@@ -109,7 +109,7 @@ const std::vector<PublishedFigure>& published_figures() {
        "the simulator forwards a blend to the next, or waits crop.latency_cycles"},
       {"crop-cache", "return of a line, 64 tiles in turn, blending", "clk", not_given, 496.8, GpuScope::gpc, 10,
        "crop2.json, one_rect_per_tile, K = 64: clk a rectangle times K",
-       "crop.line_return_cycles is 0 where the paper is silent"},
+       "crop.fetch_ahead_quads is 0 where the paper is silent"},
       {"crop-cache", "sectors moved for a quad, 64 tiles in turn", "sectors", not_given, 3.0, GpuScope::partition, 5,
        "crop2.json, one_rect_per_tile 2x2, less the 9.6 of its vertices: read twice, written once", ""},
       {"crop-cache", "a quad on 64 tiles in turn, no blending", "clk", not_given, 4.18, GpuScope::gpc, 10,

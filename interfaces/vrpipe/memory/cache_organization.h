@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 
@@ -40,6 +41,8 @@ struct CacheOrganization {
   std::uint32_t ways_of_a_set() const { return ways == 0 ? lines() : ways; }
   std::uint32_t sets() const { return ways == 0 ? 1 : lines() / ways; }
   std::uint32_t sectors_of_a_line() const { return line_bytes / sector_bytes; }
+  /// Of half a line, or the only one.
+  std::uint32_t sectors_of_a_half() const { return std::max(sectors_of_a_line() / 2, 1U); }
 
   /// Throws UserError for a cache that cannot be. Bytes of a line and of a sector are powers of two, sets any number;
   /// sector <= line <= cache; the cache is whole sets of whole lines; a line has at most 32 sectors; a tree has 2 to 64

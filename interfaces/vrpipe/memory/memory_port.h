@@ -158,7 +158,27 @@ enum class MemoryBelow : std::uint8_t {
 class AnnotatedFills;
 class ClockedFills;
 
-/// A memory that answers every access after the same time; each port moves a number of bytes per cycle. Ports may stay
+/// From request to data, in cycles.
+struct MemoryLatency {
+  // NOLINTNEXTLINE(google-explicit-constructor): the same for all
+  MemoryLatency(std::uint32_t cycles) : far(cycles), near(cycles) {}
+  MemoryLatency(std::uint32_t far_cycles, std::uint32_t near_cycles, std::uint32_t more_of_color)
+      : far(far_cycles), near(near_cycles), color(more_of_color) {}
+  std::uint32_t far;
+  std::uint32_t near;       ///< of the other half of the addresses
+  std::uint32_t color = 0;  ///< CROP's accesses, on top
+  std::uint32_t of(const MemoryRequest& request) const {
+    const std::uint32_t more = request.origin.traffic == MemoryTraffic::color ? color : 0;
+    return (is_near(request.address) ? near : far) + more;
+  }
+  /// An L2 has slices near by and others, chosen by parities of the address: among tiles of 1 KB in a row by bits 1, 4 and 8 of
+  /// their number (measured on a GH100 graphics GPC, all 1024 of them).
+  static bool is_near(std::uint64_t address) {
+    return __builtin_parityll(address & (1U << 11U | 1U << 14U | 1U << 18U)) != 0;
+  }
+};
+
+/// A memory that answers every access after its latency; each port moves a number of bytes per cycle. Ports may stay
 /// unbound.
 ///
 /// With a memory below it, it is a cache of unbounded capacity, which has compulsory misses only. What is read, or
@@ -172,11 +192,11 @@ class FixedLatencyMemory : public sc_core::sc_module, public StatisticSet {
   static constexpr unsigned sector_bytes = 32;
 
   /// @param domain  outlives it
-  FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned latency_cycles,
+  FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain, MemoryLatency latency,
                      unsigned bytes_per_cycle, unsigned ports, MemoryBelow below = MemoryBelow::none);
   /// @param bytes_per_cycle  of each port
   /// @param period_ps        of a clock of its own, in whose cycles these are; 0 for the domain's
-  FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain, unsigned latency_cycles,
+  FixedLatencyMemory(const sc_core::sc_module_name& name, ClockDomain& domain, MemoryLatency latency,
                      const std::vector<unsigned>& bytes_per_cycle, MemoryBelow below = MemoryBelow::none,
                      std::uint64_t period_ps = 0);
   ~FixedLatencyMemory() override;
@@ -197,7 +217,7 @@ class FixedLatencyMemory : public sc_core::sc_module, public StatisticSet {
   class MemoryTarget;
   const ClockDomain& domain_;
   const ClockCrossing crossing_;
-  unsigned latency_cycles_;
+  const MemoryLatency latency_;
   MemoryTrafficCounters traffic_;
   CompulsoryMissStatistics cache_{*this, "cache"};
   std::unique_ptr<AnnotatedFills> annotated_;  ///< of MemoryBelow::annotated

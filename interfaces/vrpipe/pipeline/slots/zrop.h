@@ -31,8 +31,9 @@ struct ZCache {
   std::uint32_t input_updates = 64;       ///< the same of updates, signals
   std::uint32_t sectors_per_cycle = 16;   ///< filled or written back in a cycle in which nothing is tested or updated
   bool fast_clear = true;                 ///< sectors that a clear has left as they are in memory are not read
-  bool fetches_ahead = false;             ///< a line may go while it is fetched for a test
-  std::uint32_t line_return_cycles = 0;   ///< from a line's last use to the next, if it left in between
+  std::uint32_t fetch_ahead_lines = 0;    ///< between two looks at tags, if there are two
+  /// Whether a line may go while it is fetched for a test.
+  bool fetches_ahead() const { return fetch_ahead_lines > 0; }
   /// Throws UserError for one that cannot be: CacheOrganization::check; a sector holds a quad of the target, a line is of one
   /// screen tile.
   void check(DepthFormat format) const;

@@ -1,0 +1,152 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <utility>
+
+#include <vrpipe/kernel/accounting.h>
+
+namespace vrpipe {
+
+/// Visits to a line of a surface behind a cache whose tags run ahead of its data, and are looked at twice: a visit is what
+/// a primitive does with the line in a screen tile. A first look asks for what the cache lacks, a second one, later and in
+/// the same order, stops for lines that come back (measured on a GH100 graphics GPC, ZROP and CROP alike):
+///
+/// * When a line has come into the cache again, its first visit stops until what the line held before has been used, in the
+///   halves of the line that the visit needs. If it has to stop, the line comes back.
+/// * A line that comes back takes no sectors side by side: a visit that lacks some, in a half of which an earlier one has
+///   asked for others, stops until all earlier ones have used the line.
+///
+/// Sectors of a line are a bit each, at most 32; `half`: sectors of half a line.
+class LineVisits {
+ public:
+  using Visit = std::uint32_t;
+
+  /// The line has come into the cache.
+  void begin(bool comes_back) {
+    *this = {};
+    comes_back_ = comes_back;
+  }
+  /// Something of a visit is next; true if that is its first.
+  bool enter(Visit visit) {
+    if (visit == visit_) return false;
+    visit_ = visit;
+    by_earlier_ |= std::exchange(by_visit_, 0);
+    return true;
+  }
+  Visit visit() const { return visit_; }
+  /// Of the sectors that it needs.
+  std::uint32_t lacking(std::uint32_t sectors) const { return sectors & ~(by_earlier_ | by_visit_); }
+  /// Whether it stops for the uses of earlier ones.
+  bool stops(std::uint32_t sectors, unsigned half) const {
+    return comes_back_ && (halves_of(lacking(sectors), half) & halves_of(by_earlier_, half)) != 0;
+  }
+  /// It asks; true for the first that it asks for.
+  bool ask(std::uint32_t sectors) { return std::exchange(by_visit_, by_visit_ | sectors) == 0; }
+  /// Those with some of the sectors, a bit each.
+  static unsigned halves_of(std::uint32_t sectors, unsigned half) {
+    const std::uint32_t first = (1U << half) - 1;
+    return ((sectors & first) != 0 ? 1U : 0U) | ((sectors & ~first) != 0 ? 2U : 0U);
+  }
+
+ private:
+  Visit visit_ = ~0U;
+  std::uint32_t by_earlier_ = 0;  ///< sectors asked for
+  std::uint32_t by_visit_ = 0;
+  bool comes_back_ = false;
+};
+
+/// The same at `cycle`, where it is not known when a line will be used.
+class LineUses {
+ public:
+  using Visit = LineVisits::Visit;
+
+  /// Whether the first visit since the line came need not stop; it has come if so.
+  bool begin(std::uint32_t sectors, unsigned half) {
+    const unsigned halves = LineVisits::halves_of(sectors, half);
+    const bool is_held = ((halves & 1U) != 0 && of_half_[0] > 0) || ((halves & 2U) != 0 && of_half_[1] > 0);
+    stopped_ |= is_held;
+    if (is_held) return false;
+    visits_.begin(std::exchange(stopped_, false));
+    return true;
+  }
+  /// The same of what is next of a visit.
+  bool may_go(Visit visit, std::uint32_t sectors, unsigned half) {
+    if (visits_.enter(visit)) of_visit_ = 0;
+    return of_visit_ == all_ || !visits_.stops(sectors, half);
+  }
+  /// It goes, to use the line later. Returns what it lacks, and asks for; `is_first`: of its visit.
+  std::uint32_t go(std::uint32_t sectors, unsigned half, bool& is_first) {
+    count(sectors, half, 1);
+    ++of_visit_;
+    const std::uint32_t lacking = visits_.lacking(sectors);
+    if (lacking != 0) is_first = visits_.ask(lacking);
+    return lacking;
+  }
+  void used(Visit visit, std::uint32_t sectors, unsigned half) {
+    count(sectors, half, ~0U);
+    if (visits_.visit() == visit) --of_visit_;
+  }
+
+ private:
+  void count(std::uint32_t sectors, unsigned half, std::uint32_t more) {
+    const unsigned halves = LineVisits::halves_of(sectors, half);
+    all_ += more;
+    if ((halves & 1U) != 0) of_half_[0] += more;
+    if ((halves & 2U) != 0) of_half_[1] += more;
+  }
+
+  LineVisits visits_;
+  std::uint32_t all_ = 0;  ///< uses to come
+  std::uint32_t of_visit_ = 0;
+  std::array<std::uint32_t, 2> of_half_{};
+  bool stopped_ = false;
+};
+
+/// The same at `lt`, where a visit uses the line before the next one is looked at.
+class TimedLineUses {
+ public:
+  /// A line comes into the cache with a first look in a cycle, or fills nothing there, so that nothing stops for it.
+  void come(Cycle at, bool fills) {
+    came_at_ = fills ? at : 0;
+    is_new_ = true;
+  }
+  /// Of a second look.
+  struct Look {
+    std::uint32_t again = 0;  ///< sectors that were asked for in vain, while an earlier use was to come
+    bool is_first = false;    ///< that its visit asks for again
+  };
+  /// What is next of a visit, whose second look may be in cycle `at`, which becomes that in which it is.
+  Look look_again(LineVisits::Visit visit, std::uint32_t sectors, unsigned half, Cycle& at) {
+    if (std::exchange(is_new_, false)) {
+      const Cycle last = std::max(used_[0], used_[1]);
+      asks_again_ = came_at_ != 0 && last > came_at_;
+      const unsigned halves = LineVisits::halves_of(sectors, half);
+      const Cycle held = std::max((halves & 1U) != 0 ? used_[0] : 0, (halves & 2U) != 0 ? used_[1] : 0);
+      visits_.begin(asks_again_ && held > at);
+      if (asks_again_) at = std::max(at, held);
+    }
+    if (visits_.enter(visit)) used_by_earlier_ = std::max(used_[0], used_[1]);
+    if (visits_.stops(sectors, half)) at = std::max(at, used_by_earlier_);
+    const std::uint32_t lacking = visits_.lacking(sectors);
+    if (lacking == 0) return {};
+    const bool is_first = visits_.ask(lacking);
+    return {asks_again_ ? lacking : 0, is_first};
+  }
+  void used(std::uint32_t sectors, unsigned half, Cycle at) {
+    const unsigned halves = LineVisits::halves_of(sectors, half);
+    if ((halves & 1U) != 0) used_[0] = at;
+    if ((halves & 2U) != 0) used_[1] = at;
+  }
+
+ private:
+  LineVisits visits_;
+  std::array<Cycle, 2> used_{};  ///< last, by half
+  Cycle used_by_earlier_ = 0;
+  Cycle came_at_ = 0;
+  bool is_new_ = false;
+  bool asks_again_ = false;
+};
+
+}  // namespace vrpipe

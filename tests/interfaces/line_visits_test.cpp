@@ -1,0 +1,142 @@
+#include <deque>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/arithmetic/random.h>
+#include <vrpipe/memory/line_visits.h>
+
+namespace vrpipe {
+namespace {
+
+constexpr unsigned half = 4;  ///< of eight sectors
+
+LineVisits visited_by(bool comes_back, std::initializer_list<std::uint32_t> visits) {
+  LineVisits line;
+  line.begin(comes_back);
+  LineVisits::Visit visit = 0;
+  for (const std::uint32_t sectors : visits) {
+    line.enter(visit++);
+    line.ask(line.lacking(sectors));
+  }
+  line.enter(visit);
+  return line;
+}
+
+TEST(LineVisits, StopForSectorsThatAreMissingInAHalfThatWasAskedFor) {
+  const LineVisits line = visited_by(true, {0b0001});
+  EXPECT_TRUE(line.stops(0b0010, half));
+  EXPECT_TRUE(line.stops(0b0011, half));
+  EXPECT_FALSE(line.stops(0b0001, half)) << "asked for already";
+  EXPECT_FALSE(line.stops(0b0001'0000, half)) << "the other half";
+  EXPECT_TRUE(line.stops(0b0001'1000, half));
+}
+
+TEST(LineVisits, DoNotStopForALineThatHasNotComeBack) { EXPECT_FALSE(visited_by(false, {0b0001}).stops(0b0010, half)); }
+
+TEST(LineVisits, TakeSectorsOfAVisitTogether) {
+  LineVisits line;
+  line.begin(true);
+  line.enter(7);
+  EXPECT_TRUE(line.ask(line.lacking(0b0001))) << "the first of the visit";
+  EXPECT_FALSE(line.enter(7));
+  EXPECT_FALSE(line.stops(0b0010, half));
+  EXPECT_FALSE(line.ask(line.lacking(0b0010)));
+  EXPECT_EQ(line.lacking(0b0111), 0b0100U);
+}
+
+TEST(LineUses, OfOtherHalvesDoNotHoldTheFirstVisit) {
+  LineUses line;
+  bool is_first = false;
+  ASSERT_TRUE(line.begin(0b0001, half));
+  ASSERT_TRUE(line.may_go(0, 0b0001, half));
+  line.go(0b0001, half, is_first);
+  EXPECT_FALSE(line.begin(0b0010, half));
+  EXPECT_TRUE(line.begin(0b0010'0000, half));
+}
+
+/// What is looked at: a visit's sectors, and whether the line has come into its cache for that.
+struct Look {
+  LineVisits::Visit visit = 0;
+  std::uint32_t sectors = 0;
+  bool comes = false;
+  Cycle first_look = 0;
+};
+constexpr Cycle trip = 50;
+
+/// Cycles of the second looks, of which there is one a cycle, and what they ask for again. A use follows a trip later.
+struct Outcome {
+  std::vector<Cycle> looks;
+  std::vector<std::uint32_t> again;
+  bool operator==(const Outcome& other) const { return looks == other.looks && again == other.again; }
+};
+
+Outcome timed(const std::vector<Look>& all) {
+  Outcome outcome;
+  TimedLineUses line;
+  Cycle at = 0;
+  for (const Look& look : all) {
+    if (look.comes) line.come(look.first_look, true);
+    at = std::max(at, look.first_look + 1);
+    outcome.again.push_back(line.look_again(look.visit, look.sectors, half, at).again);
+    outcome.looks.push_back(at);
+    line.used(look.sectors, half, at + trip);
+    ++at;
+  }
+  return outcome;
+}
+
+Outcome cycle_by_cycle(const std::vector<Look>& all) {
+  Outcome outcome;
+  LineUses line;
+  std::deque<std::pair<Cycle, std::size_t>> uses;
+  bool has_come = false;
+  bool asks_again = false;
+  for (Cycle now = 0; outcome.looks.size() < all.size(); ++now) {
+    const Look& look = all[outcome.looks.size()];
+    for (; !uses.empty() && uses.front().first <= now; uses.pop_front()) {
+      const Look& done = all[uses.front().second];
+      line.used(done.visit, done.sectors, half);
+    }
+    if (now <= look.first_look) continue;
+    if (look.comes && !has_come) {
+      if (!line.begin(look.sectors, half)) continue;
+      has_come = true;
+      asks_again = !outcome.looks.empty() && outcome.looks.back() + trip > look.first_look;
+    }
+    if (!line.may_go(look.visit, look.sectors, half)) continue;
+    bool is_first = false;
+    const std::uint32_t lacking = line.go(look.sectors, half, is_first);
+    outcome.again.push_back(asks_again ? lacking : 0);
+    uses.emplace_back(now + trip, outcome.looks.size());
+    outcome.looks.push_back(now);
+    has_come = false;
+  }
+  return outcome;
+}
+
+TEST(TimedLineUses, AreThoseOfCycle) {
+  std::uint64_t draws = 20261126;
+  const auto below = [&draws](unsigned n) { return static_cast<unsigned>(mix(draws++) % n); };
+  unsigned stops = 0;
+  for (unsigned round = 0; round < 300; ++round) {
+    std::vector<Look> all;
+    Cycle first_look = 0;
+    for (unsigned i = 0; i < 30; ++i) {
+      const bool comes = i == 0 || below(4) == 0;
+      first_look += below(30);
+      const bool goes_on = !comes && below(4) == 0;
+      all.push_back({goes_on ? all.back().visit : i, 1U << below(8), comes, first_look});
+    }
+    const Outcome expected = cycle_by_cycle(all);
+    const Outcome found = timed(all);
+    ASSERT_EQ(found.looks, expected.looks) << round;
+    ASSERT_EQ(found.again, expected.again) << round;
+    for (std::size_t i = 1; i < all.size(); ++i)
+      stops += expected.looks[i] > std::max(expected.looks[i - 1], all[i].first_look) + 1 ? 1U : 0U;
+  }
+  EXPECT_GT(stops, 500U);
+}
+
+}  // namespace
+}  // namespace vrpipe
