@@ -87,7 +87,7 @@ unsigned put_covered(Quad* out, Words quads, Words covered) {
 TileRasterizer::TileRasterizer(const Parameters& parameters, const RenderContext& context)
     : context_(context),
       snapper_(context),
-      time_(parameters),
+      time_(parameters, context),
       wide_edges_gate_(context, "raster.wide_edges"),
       binned_gate_(context, "tgc.binning"),
       ownership_gate_(context, "raster.tile_ownership"),

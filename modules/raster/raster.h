@@ -10,6 +10,7 @@
 #include <vrpipe/kernel/accounting.h>
 #include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/geometry.h>
+#include <vrpipe/pipeline/render_context.h>
 #include <vrpipe/pipeline/slots/raster.h>
 
 namespace vrpipe {
@@ -33,6 +34,15 @@ struct RasterParameters : ParameterSet {
       "cycles",
       source::open,
       "from one set-up to the next; the 8 to 10 cycles that a set-up takes are a latency, not an interval"};
+  Real bare_setup_interval_cycles{*this,
+                                  "bare_setup_interval_cycles",
+                                  0,
+                                  0,
+                                  1000,
+                                  "cycles",
+                                  "left open by the paper; measured on a GH100 graphics GPC: at most 2.9",
+                                  "the same of a primitive of which fragments read no attributes, as where nothing is "
+                                  "shaded; 0: setup_interval_cycles"};
   Integer coarse_tiles_per_cycle{*this,
                                  "coarse_tiles_per_cycle",
                                  8,
@@ -69,20 +79,35 @@ struct RasterParameters : ParameterSet {
 
 /// What RASTER's work takes, by its parameters: all that its models of `cycle`, `lt` and `bound` ask for.
 struct RasterTime {
-  explicit RasterTime(const RasterParameters& parameters)
+  RasterTime(const RasterParameters& parameters, const RenderContext& context)
       : setup_latency_cycles(parameters.setup_latency_cycles),
         setup_interval_thousandths(parameters.setup_interval_cycles.thousandths()),
+        bare_setup_interval_thousandths(parameters.bare_setup_interval_cycles > 0
+                                            ? parameters.bare_setup_interval_cycles.thousandths()
+                                            : setup_interval_thousandths),
         coarse_tiles_per_cycle(parameters.coarse_tiles_per_cycle),
         fine_tiles_per_cycle(parameters.fine_tiles_per_cycle),
         screen_tile_interval_thousandths(parameters.screen_tile_interval_cycles.thousandths()),
-        quads_per_cycle(parameters.quads_per_cycle) {}
+        quads_per_cycle(parameters.quads_per_cycle),
+        context_(context) {}
 
   const std::uint32_t setup_latency_cycles;
   const std::uint32_t setup_interval_thousandths;        ///< of a cycle, between primitives
+  const std::uint32_t bare_setup_interval_thousandths;   ///< the same without attributes
   const std::uint32_t coarse_tiles_per_cycle;            ///< raster tiles tested
   const std::uint32_t fine_tiles_per_cycle;              ///< raster tiles made into quads
   const std::uint32_t screen_tile_interval_thousandths;  ///< of a cycle, between (primitive, screen tile) pairs
   const std::uint32_t quads_per_cycle;                   ///< handed to TC
+
+  /// What the set-up of a draw's primitive takes.
+  struct SetUp {
+    unsigned work;  ///< RasterWork
+    std::uint32_t thousandths;
+  };
+  SetUp set_up(DrawIndex draw) const {
+    if (reads_attributes(context_.state(draw).shader)) return {RasterWork::setup, setup_interval_thousandths};
+    return {RasterWork::bare_setup, bare_setup_interval_thousandths};
+  }
 
   /// As in RasterWork.
   std::vector<WorkKind> kinds() const {
@@ -90,8 +115,12 @@ struct RasterTime {
             {"coarse tests", 1, 1.0 / coarse_tiles_per_cycle, false},
             {"fine tiles", 2, 1.0 / fine_tiles_per_cycle, false},
             {"screen tiles", 3, screen_tile_interval_thousandths / 1000.0, false},
-            {"quads", 4, 1.0 / quads_per_cycle, true}};
+            {"quads", 4, 1.0 / quads_per_cycle, true},
+            {"bare set-up", 0, bare_setup_interval_thousandths / 1000.0, false}};
   }
+
+ private:
+  const RenderContext& context_;
 };
 
 /// Setup, coarse and fine rasterisation (paper 5.1): fixed point, samples at pixel centres, top-left rule, so that the

@@ -72,8 +72,9 @@ class TimedRaster : public TimedUnit {
     }
     now_ = setups_.free_from(now_);
     const Cycle setup = now_;
-    const Cycle set_up = setups_.take(setup, time_.setup_interval_thousandths);
-    did(RasterWork::setup, 1, setup, std::max(set_up, setup + 1));
+    const RasterTime::SetUp set_up = time_.set_up(job.primitive.draw);
+    const Cycle is_set_up = setups_.take(setup, set_up.thousandths);
+    did(set_up.work, 1, setup, std::max(is_set_up, setup + 1));
     charge(UnitState::busy, setup + 1);
     apply_updates(now_);
     behaviour_->begin(job.primitive, job.clip);

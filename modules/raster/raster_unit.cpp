@@ -123,10 +123,11 @@ class RasterUnit : public Unit {
           break;
         }
         if (!setups_.is_free(now)) break;
+        const RasterTime::SetUp set_up = time_.set_up(in_.front().primitive.draw);
         behaviour_->begin(in_.front().primitive, in_.front().clip);
         in_.pop();
-        const Cycle set_up = setups_.take(now, time_.setup_interval_thousandths);
-        did(RasterWork::setup, 1, now, std::max(set_up, now + 1));
+        const Cycle is_set_up = setups_.take(now, set_up.thousandths);
+        did(set_up.work, 1, now, std::max(is_set_up, now + 1));
       }
       unsigned tests = 0;
       bool new_screen_tile = false;

@@ -15,7 +15,8 @@ class UntimedRaster : public UntimedUnit {
         out_(*this, "out_quads"),
         in_(input<RasterJob>("in_jobs", [this](const RasterJob& job) { rasterize(job); })),
         in_hi_z_(input<HiZUpdate>("in_hi_z", [this](const HiZUpdate& update) { behaviour_->update(update); })),
-        behaviour_(std::move(behaviour)) {
+        behaviour_(std::move(behaviour)),
+        time_(behaviour_->time()) {
     in_hi_z_->set_optional();
   }
 
@@ -28,7 +29,7 @@ class UntimedRaster : public UntimedUnit {
       mark.mark = job.mark;
       return out_.send(mark);
     }
-    did(RasterWork::setup, 1);
+    did(time_.set_up(job.primitive.draw).work, 1);
     behaviour_->begin(job.primitive, job.clip);
     unsigned tests = 0;
     bool new_screen_tile = false;
@@ -46,6 +47,7 @@ class UntimedRaster : public UntimedUnit {
   std::unique_ptr<UntimedIn<RasterJob>> in_;
   std::unique_ptr<UntimedIn<HiZUpdate>> in_hi_z_;
   std::unique_ptr<RasterBehaviour> behaviour_;
+  const RasterTime time_;
   QuadBeat tile_;
 };
 

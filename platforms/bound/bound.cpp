@@ -206,7 +206,10 @@ std::vector<OccupancyPart> PhaseBound::parts_of(Pipeline::Place place, const Wor
   const Work::Items& tests = done.of[Pipeline::zrop];
   Work::Items items = done.of[place];
   switch (place) {
-    case Pipeline::tgc: items[TgcWork::primitives] = done.of[Pipeline::raster][RasterWork::setup]; break;
+    case Pipeline::tgc:
+      items[TgcWork::primitives] =
+          done.of[Pipeline::raster][RasterWork::setup] + done.of[Pipeline::raster][RasterWork::bare_setup];
+      break;
     case Pipeline::tc: items[TcWork::quads] = collected(done); break;
     case Pipeline::prop:
       items[PropWork::bins] = collected(done);

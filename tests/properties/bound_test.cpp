@@ -19,6 +19,7 @@ rc::Gen<Setting> setting() {
                                            {"vpo", "triangles_per_cycle", {"1", "16"}},
                                            {"tgc", "entries_per_cycle", {"1", "8"}},
                                            {"raster", "setup_interval_cycles", {"0.25", "2.7", "7", "1000"}},
+                                           {"raster", "bare_setup_interval_cycles", {"0.25", "7", "1000"}},
                                            {"raster", "screen_tile_interval_cycles", {"0.5", "6", "1000"}},
                                            {"raster", "coarse_tiles_per_cycle", {"1", "64"}},
                                            {"raster", "quads_per_cycle", {"1", "3"}},

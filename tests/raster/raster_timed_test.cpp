@@ -96,6 +96,27 @@ TEST_P(RasterTimedTest, SetUpsComeAtTheirInterval) {
   EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::setup), 8 * 7);
 }
 
+TEST_P(RasterTimedTest, SetUpsWithoutAttributesHaveAnIntervalOfTheirOwn) {
+  for (int i = 0; i < 8; ++i) add_one_quad(4);
+  for (const FragmentShader shader : {FragmentShader::none, FragmentShader::alpha_threshold, FragmentShader::splat}) {
+    testing::change_state(context, [&](DrawState& drawn) { drawn.shader = shader; });
+    for (const char* bare : {"3", "0"}) {
+      Bench bench(GetParam(), "raster", "tile-rasterizer", context,
+                  {{"setup_interval_cycles", "7"}, {"bare_setup_interval_cycles", bare}});
+      Source<RasterJob>& in = bench.source<RasterJob>("in_jobs", 16);
+      Sink<QuadBeat>& out = bench.sink<QuadBeat>("out_quads", 16);
+      for (const RasterJob& job : jobs()) in.add(job);
+      bench.run();
+      const bool reads = shader == FragmentShader::splat;
+      const unsigned interval = reads || *bare == '0' ? 7 : 3;
+      ASSERT_EQ(out.records().size(), 8U);
+      for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(out.records()[i].cycle, out.records()[0].cycle + interval * i);
+      EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::setup), reads ? 8 * interval : 0);
+      EXPECT_DOUBLE_EQ(testing::occupied(bench.unit(), RasterWork::bare_setup), reads ? 0 : 8 * interval);
+    }
+  }
+}
+
 // case R07
 TEST_P(RasterTimedTest, APrimitiveWithoutSamplesCostsItsCoarseTests) {
   // A sliver between samples whose bounds hold the whole diagonal: 256 raster tiles are tested, then one.

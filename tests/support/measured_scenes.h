@@ -22,7 +22,7 @@ struct MeasuredScene {
 MeasuredScene measured_scene(const std::string& name);
 const std::vector<std::string>& measured_scene_names();
 
-/// Splats of one size each, anywhere in 1024x1024 (tests/data/measured_uniform.csv: cycles a splat).
+/// Splats of one size each, anywhere in 1024x1024 (tools/jobs/measured/equal_splats.csv: cycles a splat).
 std::vector<MeasuredScene> measured_uniform_scenes();
 
 }  // namespace vrpipe::testing

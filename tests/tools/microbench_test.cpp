@@ -4,8 +4,10 @@
 #include <map>
 #include <regex>
 #include <set>
+#include <tuple>
 
 #include "documented_keys.h"
+#include "jobs/measured_table.h"
 #include "jobs/published_figures.h"
 #include "output/microbench_report.h"
 #include "output/text_plot.h"
@@ -62,6 +64,45 @@ TEST(MicrobenchFindings, SayWhatAgreesAndByHowMuchAndWhyWhatDoesNot) {
   EXPECT_TRUE(figure_of(0, 0.0, 0).agrees());
   EXPECT_FALSE(figure_of(3, 0.0, 0).agrees());
   EXPECT_EQ(tools::finding(figure_of(3, 0.0, 0)), "rate: 3 quads/clk, differs from the paper's 0");
+}
+
+TEST(MicrobenchFindings, SayHowFarAGroupIsOff) {
+  MicrobenchResult result;
+  for (const auto& [group, label, measured] :
+       {std::tuple{"a", "one", 2.1}, {"a", "two", 1.8}, {"b", "three", 2.0}, {"", "", 9.0}}) {
+    MicrobenchFigure figure = figure_of(measured, 2.0, 5);
+    figure.group = group;
+    figure.name = figure.group.empty() ? "alone" : figure.group + ": " + label;
+    result.figures.push_back(figure);
+  }
+  EXPECT_EQ(result.figures[1].label(), "two");
+  EXPECT_EQ(result.figures[3].label(), "alone");
+  const std::vector<MicrobenchGroup> groups = result.groups();
+  ASSERT_EQ(groups.size(), 3U);
+  EXPECT_NEAR(groups[0].mean_percent, 7.5, 1e-9);
+  EXPECT_NEAR(groups[0].worst_percent, -10, 1e-9);
+  EXPECT_EQ(groups[0].worst, "a: two");
+  EXPECT_NEAR(groups[2].mean_percent, 5, 1e-9);
+  EXPECT_EQ(tools::finding(groups[0]), "a: 2 figures, off by 7.5 % in the mean, by -10.0 % at most (two)");
+  EXPECT_EQ(tools::finding(groups[1]), "b: 1 figure, off by 0.0 % in the mean, by +0.0 % at most (three)");
+  EXPECT_EQ(tools::finding(groups[2]), "all: 3 figures, off by 5.0 % in the mean, by -10.0 % at most (a: two)");
+  EXPECT_EQ(tools::findings(result).size(), 4U);
+  result.figures.resize(2);
+  EXPECT_EQ(result.groups().size(), 1U) << "one group is all";
+  for (MicrobenchFigure& figure : result.figures) figure.reference.reset();
+  EXPECT_TRUE(result.groups().empty()) << "of another GPU";
+}
+
+TEST(MeasuredTables, AreAllThere) {
+  const std::pair<const char*, std::size_t> tables[] = {
+      {"strips", 35}, {"equal_splats", 24}, {"same_place", 92}, {"tiles_in_turn", 140}, {"hot_squares", 6}};
+  for (const auto& [name, rows] : tables) EXPECT_EQ(tools::measured_table(name).size(), rows) << name;
+  const tools::MeasuredRow& row = tools::measured_table("strips").front();
+  EXPECT_EQ(row.text("format"), "RGBA8");
+  EXPECT_EQ(row.count("width"), 4U);
+  EXPECT_EQ(row.number("clk"), 4.522);
+  EXPECT_THROW(row.text("nothing"), std::logic_error);
+  EXPECT_THROW(tools::measured_table("nothing"), std::logic_error);
 }
 
 TEST(TextPlot, PutsPointsWhereTheyBelong) {
@@ -157,6 +198,74 @@ TEST_F(Microbench, FollowsThePlatformsSettings) {
   EXPECT_EQ(measured(bins, "tile-binning").count("gap that parts a pair"), 0U) << "there is no time";
 }
 
+/// Ratios to what was measured, by name.
+std::map<std::string, double> ratios(const json& result) {
+  std::map<std::string, double> values;
+  for (const json& each : result["microbenchmarks"]) {
+    for (const json& figure : each["figures"]) {
+      const double gpu = figure["gpu"].get<double>();
+      EXPECT_TRUE(values.emplace(figure["name"], figure["measured"].get<double>() / gpu).second) << figure["name"];
+    }
+  }
+  return values;
+}
+
+TEST_F(Microbench, LawsOfStripsHoldAndThoseThatDoNotAreKnown) {
+  const json result = json_of({"microbench", "strips"});
+  EXPECT_EQ(result["platform"]["name"], "gh100-gpc") << "by default";
+  // The GPU's lines of 256 bytes are 32 bytes by 8 rows, the simulator's 8x4 pixels of RGBA16F.
+  const std::set<std::string> known{"RGBA16F, no blending: 4x8", "RGBA16F, blending: 4x8", "RGBA16F, no blending: 16x2",
+                                    "RGBA16F, no blending: 64x2", "RGBA32F, no blending: 4x4"};
+  for (const auto& [name, ratio] : ratios(result)) {
+    EXPECT_NEAR(ratio, 1, known.count(name) > 0 ? 0.2 : 0.025) << name;
+  }
+  EXPECT_EQ(result["microbenchmarks"][0]["groups"].back()["name"], "all");
+  EXPECT_LT(result["microbenchmarks"][0]["groups"].back()["mean_percent"].get<double>(), 3);
+}
+
+TEST_F(Microbench, QuadsWaitForTheSamePlaceAsMeasured) {
+  const Finished finished = vrpipe({"microbench", "same-place", "--json", "same.json", "--html", "same.html"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  const json result = json::parse(read_file(folder() / "same.json"));
+  for (const auto& [name, ratio] : ratios(result)) {
+    // What the front end bounds is 4.17 clk a filled rectangle there, 4.55 here.
+    if (name.find("no blending") != std::string::npos || name.find("4x1") != std::string::npos) {
+      EXPECT_NEAR(ratio, 1, 0.12) << name;
+    } else if (name == "RGBA16F, blending: 16x1, 16x1 at (0, 1) in turn") {
+      EXPECT_NEAR(ratio, 13.0 / 8.93, 0.05) << "two halves of a row of 8 quads do not wait for each other on the GPU";
+    } else {
+      EXPECT_NEAR(ratio, 1, name.find("16x12") != std::string::npos ? 0.045 : 0.027) << name;
+    }
+  }
+  EXPECT_NE(finished.out.find("RGBA32F, blending: 20 figures, off by 0.2 % in the mean"), std::string::npos)
+      << finished.out;
+  EXPECT_NE(finished.out.find("ratio"), std::string::npos);
+  EXPECT_NE(read_file(folder() / "same.html").find("RGBA32F, blending: 20 figures, off by"), std::string::npos);
+}
+
+// Of lines that return with others the law is a constant still (docs/silicon.md).
+TEST_F(Microbench, ALineThatReturnsAloneWaitsAsMeasured) {
+  const auto of = ratios(json_of({"microbench", "returning-lines", "--fidelity", "lt"}));
+  for (const char* name : {"killed, 40 tiles in turn: (0, 0)", "killed, 64 tiles in turn: (0, 0)",
+                           "RGBA16F, 40 tiles in turn: (0, 0)", "RGBA8, 40 tiles in turn: (0, 0)"}) {
+    EXPECT_NEAR(of.at(name), 1, 0.02) << name;
+  }
+}
+
+TEST_F(Microbench, LawsOfAnotherPlatformHaveNoRatio) {
+  const Finished finished = vrpipe({"microbench", "strips", "--platform", "agx-orin", "--fidelity", "bound"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  EXPECT_NE(finished.out.find("(one GPC of 2 TPCs)"), std::string::npos);
+  EXPECT_EQ(finished.out.find("off by"), std::string::npos);
+}
+
+TEST_F(Microbench, WhatALawsConfigurationSaysIsItsOwnDefault) {
+  const Finished printed = vrpipe({"microbench", "strips", "--print-config"});
+  EXPECT_NE(printed.out.find("platform = \"gh100-gpc\""), std::string::npos) << printed.out;
+  EXPECT_NE(vrpipe({"microbench", "kill-rate", "--print-config"}).out.find("platform = \"agx-orin\""),
+            std::string::npos);
+}
+
 TEST_F(Microbench, ResultsDoNotDependOnTheNumberOfProcesses) {
   const auto figures_of = [&](const char* jobs) {
     json result = json_of({"microbench", "front-end", "--fidelity", "lt", "--jobs", jobs});
@@ -176,7 +285,9 @@ TEST_F(Microbench, BlendsInOrderAtEveryFidelity) {
 TEST_F(Microbench, Refusals) {
   refused({"microbench"}, {"NAME is required"});
   refused({"microbench", "tile-bining"},
-          {"unknown microbenchmark 'tile-bining'", "did you mean tile-binning?", "and all"});
+          {"unknown microbenchmark 'tile-bining'", "did you mean tile-binning?", "and all", "and laws"});
+  refused({"microbench", "stripes"}, {"did you mean strips?"});
+  refused({"microbench", "laws", "--fidelity", "functional"}, {"cannot measure strips", "it measures time"});
   refused({"microbench", "all", "--fidelity", "functional"}, {"cannot measure rop-throughput", "it measures time"});
   refused({"microbench", "kill-rate", "--platform", "agx-orion"}, {"agx-orion", "agx-orin"});
   refused({"microbench", "kill-rate", "--set", "crop.cache_byte=1"}, {"crop.cache_bytes"});
@@ -191,7 +302,8 @@ TEST_F(Microbench, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
   const std::string page = read_file(std::filesystem::path(RESULTS_PAGE).parent_path() / "microbenchmarks.md");
   expect_documented({json_of({"microbench", "tile-binning", "--fidelity", "functional"}),
                      json_of({"microbench", "front-end", "--fidelity", "bound", "--plugin", TEST_PLUGIN, "--unit",
-                              "qru=same-splat"})},
+                              "qru=same-splat"}),
+                     json_of({"microbench", "strips", "--fidelity", "bound"})},
                     documented(page, "Keys"));
 }
 

@@ -78,7 +78,7 @@ const std::map<std::string, Words> texts_of = {
 };
 const std::set<std::string> may_be_repeated = {"--set", "--unit", "--variant", "--platform", "--log", "--mesh"};
 const Words commands = {"run", "compare", "accuracy", "microbench", "reproduce"};
-const Words microbenchmarks = {"tile-binning", "crop-cache", "all"};
+const Words microbenchmarks = {"tile-binning", "crop-cache", "all", "same-place"};
 
 struct Declared {
   std::string name;

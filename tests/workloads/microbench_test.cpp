@@ -1,8 +1,10 @@
 // That the frames of the microbenchmarks do what they claim, in numbers that are known beforehand.
 #include <vrpipe/workloads/microbench.h>
 
+#include <cmath>
 #include <cstring>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -110,6 +112,47 @@ TEST(BlendOrderFrames, TheSequentialReferenceIsTheImageBitForBit) {
       EXPECT_EQ(std::memcmp(pixel.data(), expected.data(), sizeof expected), 0) << name << " " << name_of(format);
     }
   }
+}
+
+TEST(RopLawFrames, BoxesAreBlendedWrittenOrKilled) {
+  const std::vector<Box> boxes{{0, 0, 4, 2}, {8, 6, 2, 2}};
+  const RunResult blended = run(boxes_in_turn(boxes, 5, BoxesAre::blended));
+  EXPECT_EQ(blended.counts.quads_blended, 5U * 3);
+  EXPECT_NEAR(blended.framebuffer.color.pixel(9, 7)[3], 1 - std::pow(0.98F, 5), 2e-3F);
+  EXPECT_EQ(run(boxes_in_turn(boxes, 5, BoxesAre::unchanged)).framebuffer.color.pixel(0, 0)[3], 1);
+  EXPECT_NEAR(run(boxes_in_turn(boxes, 5, BoxesAre::written)).framebuffer.color.pixel(0, 0)[3], 0.02F, 1e-4F);
+  EXPECT_EQ(run(boxes_in_turn(boxes, 5, BoxesAre::killed)).counts.quads_depth_stencil_failed, 5U * 3);
+  const RunResult stencil = run(boxes_in_turn(boxes, 5, BoxesAre::stencil_written));
+  EXPECT_EQ(stencil.counts.quads_shaded, 0U);
+  const DepthStencilSurface& surface = stencil.framebuffer.depth_stencil;
+  EXPECT_EQ(surface.quad(surface.grid().place({0, 0}, 8 * 3 + 4)).stencil[3], 5U);
+}
+
+TEST(RopLawFrames, StripsAndQuadsOfTilesAreInTilesOfTheirOwn) {
+  for (const auto& [width, height, tiles] : {std::tuple{16U, 2U, 1U}, {64U, 2U, 4U}, {2U, 64U, 4U}}) {
+    const RunResult result = run(strips(width, height, 96, 2, BoxesAre::blended));
+    EXPECT_EQ(result.counts.quads_blended, 2U * 96 * width * height / 4);
+    EXPECT_EQ(testing::statistic(result, "raster.screen_tile_pairs"), 2U * 96 * tiles);
+    EXPECT_NEAR(result.framebuffer.color.pixel(width - 1, height - 1)[3], 1 - 0.98F * 0.98F, 1e-3F)
+        << "each once a round";
+  }
+  const FramePointer frame = boxes_of_tiles({{0, 0, 2, 2}, {4, 2, 2, 2}}, 40, 3, BoxesAre::blended, 1);
+  ASSERT_EQ(frame->splats(), 3U * 40 * 2);
+  EXPECT_EQ(frame->draw_call(0).splat(1).cx, 5);
+  EXPECT_EQ(frame->draw_call(0).splat(2).cx, 17) << "then the next tile";
+}
+
+TEST(RopLawFrames, SplatsInASquareHaveTheWarpsThatWereCounted) {
+  // rmhot.json: 4x4 in 160x160, and anywhere.
+  const auto warps = [](unsigned region) {
+    fresh_simulation();
+    return simulate(testing::request_of("baseline", Fidelity::functional,
+                                        [](RunRequest& request) { request.platform = &platform_named("gh100-gpc"); }),
+                    *equal_splats(4, 4, 0.02F, 40000, region, SplatsAre::blended))
+        .counts.warps;
+  };
+  EXPECT_NEAR(static_cast<double>(warps(160)), 151263, 15);
+  EXPECT_NEAR(static_cast<double>(warps(1024)), 167226, 15);
 }
 
 TEST(FrontEndFrames, NothingIsShaded) {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <iostream>
 
 #include <fmt/format.h>
@@ -26,29 +27,38 @@ class MicrobenchCommand : public Command {
   std::string summary() const override { return "the paper's analysis of GPUs as workloads, beside a real GPU"; }
 
   void declare(Arguments& arguments) override {
-    arguments.add_positional("NAME", name_, fmt::format("{}, or all", fmt::join(microbench_names(), ", ")))
+    arguments
+        .add_positional("NAME", name_,
+                        fmt::format("{}, or all of these;\n{}, or laws for all of those, on {} by default",
+                                    fmt::join(microbench_names(), ", "), fmt::join(law_names(), ", "),
+                                    measured_platform))
         .is_required = true;
     arguments_.declare_machine(arguments);
     arguments.add_option("--html", html_, "FILE", "writes a page with the curves; it needs no network", result_group);
     arguments.set_footer(
-        "Each draws rectangles of its own on the baseline GPU and prints what the paper found, what a real GPU (one\n"
-        "graphics GPC of a GH100) measured and what the simulator does beside one another, with its curve. Draw state\n"
-        "is the microbenchmark's: of --set state.NAME the precision of the hardware is taken alone.\n"
+        "Each draws rectangles or splats of its own on the baseline GPU and prints what the paper found, what a real\n"
+        "GPU (one graphics GPC of a GH100) measured and what the simulator does beside one another, with its curve;\n"
+        "of the laws of that GPU's ROPs each measurement with its ratio, and how far each group of them is off. Draw\n"
+        "state is the microbenchmark's: of --set state.NAME the precision of the hardware is taken alone.\n"
         "\n"
         "Examples:\n"
         "  vrpipe microbench tile-binning\n"
         "  vrpipe microbench rop-throughput --set crop.bytes_per_cycle=32 --set crop.cache_bytes=8K\n"
-        "  vrpipe microbench all --json microbench.json --html microbench.html");
+        "  vrpipe microbench all --json microbench.json --html microbench.html\n"
+        "  vrpipe microbench same-place");
   }
 
   void run() override {
-    MachineJob job = arguments_.resolve_machine(invocation());
+    const std::vector<std::string> laws = law_names();
+    const bool is_law = name_ == "laws" || std::find(laws.begin(), laws.end(), name_) != laws.end();
+    MachineJob job = arguments_.resolve_machine(invocation(), is_law ? &platform_named(measured_platform) : nullptr);
     if (prints_config(invocation())) {
       std::cout << config_text(invocation(), {job.request}, {});
       return;
     }
-    std::vector<std::string> names = microbench_names();
-    if (name_ != "all") names = {name_};
+    const std::vector<std::string> names = name_ == "all"    ? microbench_names()
+                                           : name_ == "laws" ? laws
+                                                             : std::vector<std::string>{name_};
     check_microbench_state(job.request);
     for (const std::string& each : names) check_microbench(each, job.request);
     const auto html = single(html_, "--html");

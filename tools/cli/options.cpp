@@ -486,13 +486,13 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
   return job;
 }
 
-MachineJob SimulationArguments::resolve_machine(const Invocation& invocation) const {
+MachineJob SimulationArguments::resolve_machine(const Invocation& invocation, const Platform* platform) const {
   load_plugins(plugins_);
   MachineJob job;
   job.provenance = make_provenance(invocation.words, plugins_);
   note_config(invocation, job.provenance);
   SettingsByPart parts;
-  job.request = machine(parts, invocation);
+  job.request = machine(parts, invocation, platform);
   if (!parts.preprocessing.empty()) {
     throw UserError("cannot set 'preprocess." + parts.preprocessing.front().parameter + "'", "--set",
                     "no scene is preprocessed", "leave it out");
@@ -511,9 +511,10 @@ MachineJob SimulationArguments::resolve_machine(const Invocation& invocation) co
   return job;
 }
 
-RunRequest SimulationArguments::machine(SettingsByPart& parts, const Invocation& invocation) const {
+RunRequest SimulationArguments::machine(SettingsByPart& parts, const Invocation& invocation,
+                                        const Platform* platform) const {
   RunRequest request;
-  request.platform = chosen_platforms().front();
+  request.platform = platform_.empty() && platform != nullptr ? platform : chosen_platforms().front();
   if (const auto name = single(fidelity_, "--fidelity")) request.fidelity = fidelity_named(*name);
   std::vector<Setting> settings;
   for (const Setting& setting : parse_settings(settings_)) {

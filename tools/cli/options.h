@@ -38,8 +38,8 @@ class SimulationArguments {
   void declare_study(Arguments& arguments);
   /// Those alone that say on what and how exactly it is simulated, for commands that draw frames of their own.
   void declare_machine(Arguments& arguments);
-  /// What these say; as `resolve`.
-  MachineJob resolve_machine(const Invocation& invocation) const;
+  /// What these say; as `resolve`. `platform`: where --platform is not given; null: the first.
+  MachineJob resolve_machine(const Invocation& invocation, const Platform* platform = nullptr) const;
   /// --frame and --multi-pass, for commands that draw frames of several draws as well.
   void declare_frames(Arguments& arguments);
   /// --views and --journal, for commands that draw a scene from many cameras as well.
@@ -66,7 +66,7 @@ class SimulationArguments {
   void declare_changes(Arguments& arguments);
   void declare_fidelity(Arguments& arguments);
   /// The first platform, fidelity, settings and units.
-  RunRequest machine(SettingsByPart& parts, const Invocation& invocation) const;
+  RunRequest machine(SettingsByPart& parts, const Invocation& invocation, const Platform* platform = nullptr) const;
   std::vector<const Platform*> chosen_platforms() const;
   std::vector<Variant> chosen_variants(Variants variants) const;
   std::vector<RunRequest> requests(const RunRequest& common, Variants variants) const;

@@ -168,7 +168,9 @@ class ConfigWriter {
     if (!option.is_given() && !has_default) {
       return fmt::format("{:<{}} # {}\n", "# " + name, comment_column, default_of(option));
     }
-    if (!option.is_given()) return line_of(name, value_text(option.default_text), "default");
+    // Some commands' default platform goes by what they are to do.
+    const std::string& default_text = name == "platform" ? requests_.front().platform->name : option.default_text;
+    if (!option.is_given()) return line_of(name, value_text(default_text), "default");
     if (option.kind == Option::Kind::flag) return line_of(name, "true", given(option.name));
     std::vector<std::string> values;
     for (const std::string& text : option.texts) {

@@ -16,12 +16,14 @@
 namespace vrpipe::tools {
 
 class MicrobenchBench;
+struct PublishedFigure;
 
 struct MicrobenchDefinition {
   const char* name;
   const char* question;
   bool needs_time;
   void (*run)(MicrobenchBench& bench);
+  bool is_law = false;  ///< law_names()
 };
 
 /// The simulations of a microbenchmark, and what comes of them.
@@ -48,9 +50,14 @@ class MicrobenchBench {
 
   /// What was measured under a name that published_figures() has.
   void figure(const std::string& name, double measured, const std::string& note = {});
+  /// What was measured beside what the real GPU's graphics GPC took.
+  void law(const std::string& group, const std::string& label, double measured, double gpu, const char* unit,
+           const std::string& source);
   void curve(MicrobenchCurve curve) { result_.curves.push_back(std::move(curve)); }
 
  private:
+  void add_figure(const PublishedFigure& published, const std::string& name, const std::string& group, double measured,
+                  const std::string& note);
   std::string definition_name() const { return definition_.name; }
 
   const MicrobenchDefinition& definition_;
@@ -105,5 +112,10 @@ void measure_rop_throughput(MicrobenchBench& bench);
 void measure_quad_coverage(MicrobenchBench& bench);
 void measure_crop_cache(MicrobenchBench& bench);
 void measure_blend_order(MicrobenchBench& bench);
+// Of both ROPs (microbench_laws.cpp):
+void measure_strips(MicrobenchBench& bench);
+void measure_equal_splats(MicrobenchBench& bench);
+void measure_same_place(MicrobenchBench& bench);
+void measure_returning_lines(MicrobenchBench& bench);
 
 }  // namespace vrpipe::tools

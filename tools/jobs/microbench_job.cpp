@@ -30,12 +30,27 @@ void MicrobenchBench::run(bool with_images) {
 }
 
 void MicrobenchBench::figure(const std::string& name, double measured, const std::string& note) {
-  const PublishedFigure& published = published_figure(definition_.name, name);
+  add_figure(published_figure(definition_.name, name), name, {}, measured, note);
+}
+
+void MicrobenchBench::law(const std::string& group, const std::string& label, double measured, double gpu,
+                          const char* unit, const std::string& source) {
+  // Of all laws alike: what is further off is shown to differ.
+  constexpr double tolerance_percent = 5;
+  const std::string name = fmt::format("{}: {}", group, label);
+  add_figure({definition_.name, name.c_str(), unit, std::nullopt, gpu, GpuScope::gpc, tolerance_percent, source.c_str(),
+              ""},
+             name, group, measured, {});
+}
+
+void MicrobenchBench::add_figure(const PublishedFigure& published, const std::string& name, const std::string& group,
+                                 double measured, const std::string& note) {
   const std::string& platform = request_.platform->name;
   const bool is_real_gpus = platform == measured_platform;
   const bool is_papers = platform.rfind("agx-orin", 0) == 0;
   MicrobenchFigure figure;
   figure.name = name;
+  figure.group = group;
   figure.unit = published.unit;
   figure.paper = published.paper;
   figure.gpu = published.gpu;
@@ -79,8 +94,24 @@ const std::vector<tools::MicrobenchDefinition>& definitions() {
        tools::measure_front_end},
       {"kill-rate", "How many quads a clock do stencil, depth, Hi-Z and the shader kill?", true,
        tools::measure_kill_rate},
+      {"strips", "How long does CROP take for rectangles whose lines it has to fetch and to write back?", true,
+       tools::measure_strips, true},
+      {"equal-splats", "How long does a splat of one size take, by what becomes of it?", true,
+       tools::measure_equal_splats, true},
+      {"same-place", "How long does a quad wait for the one before on the same place?", true, tools::measure_same_place,
+       true},
+      {"returning-lines", "How long does a line wait that has left the cache and comes back?", true,
+       tools::measure_returning_lines, true},
   };
   return all;
+}
+
+std::vector<std::string> names_of(bool laws) {
+  std::vector<std::string> names;
+  for (const tools::MicrobenchDefinition& each : definitions()) {
+    if (each.is_law == laws) names.emplace_back(each.name);
+  }
+  return names;
 }
 
 const tools::MicrobenchDefinition& definition_named(const std::string& name) {
@@ -88,10 +119,13 @@ const tools::MicrobenchDefinition& definition_named(const std::string& name) {
   const auto found =
       std::find_if(all.begin(), all.end(), [&](const tools::MicrobenchDefinition& each) { return each.name == name; });
   if (found != all.end()) return *found;
-  const std::vector<std::string> known = microbench_names();
+  const std::vector<std::string> papers = microbench_names();
+  const std::vector<std::string> laws = law_names();
+  std::vector<std::string> known = papers;
+  known.insert(known.end(), laws.begin(), laws.end());
   throw UserError("unknown microbenchmark '" + name + "'", "vrpipe microbench", "there is no such one",
-                  fmt::format("did you mean {}? There are {}, and all", nearest_name(name, known),
-                              fmt::join(known, ", ")));
+                  fmt::format("did you mean {}? There are {}, and all; {}, and laws", nearest_name(name, known),
+                              fmt::join(papers, ", "), fmt::join(laws, ", ")));
 }
 
 }  // namespace
@@ -108,11 +142,36 @@ bool MicrobenchFigure::agrees() const {
   return difference && std::fabs(*difference) <= std::max(tolerance_percent, 0.0);
 }
 
-std::vector<std::string> microbench_names() {
-  std::vector<std::string> names;
-  for (const tools::MicrobenchDefinition& each : definitions()) names.emplace_back(each.name);
-  return names;
+std::string MicrobenchFigure::label() const { return group.empty() ? name : name.substr(group.size() + 2); }
+
+std::vector<MicrobenchGroup> MicrobenchResult::groups() const {
+  std::vector<MicrobenchGroup> groups;
+  MicrobenchGroup all;
+  all.name = "all";
+  const auto add = [](MicrobenchGroup& group, const MicrobenchFigure& figure, double percent) {
+    group.mean_percent += (std::fabs(percent) - group.mean_percent) / ++group.figures;
+    if (group.figures > 1 && std::fabs(percent) <= std::fabs(group.worst_percent)) return;
+    group.worst_percent = percent;
+    group.worst = figure.name;
+  };
+  for (const MicrobenchFigure& figure : figures) {
+    const std::optional<double> percent = figure.difference_percent();
+    if (figure.group.empty() || !percent) continue;
+    auto group =
+        std::find_if(groups.begin(), groups.end(), [&](const auto& each) { return each.name == figure.group; });
+    if (group == groups.end()) {
+      groups.emplace_back().name = figure.group;
+      group = groups.end() - 1;
+    }
+    add(*group, figure, *percent);
+    add(all, figure, *percent);
+  }
+  if (groups.size() > 1) groups.push_back(std::move(all));
+  return groups;
 }
+
+std::vector<std::string> microbench_names() { return names_of(false); }
+std::vector<std::string> law_names() { return names_of(true); }
 
 void check_microbench_name(const std::string& name) { definition_named(name); }
 

@@ -13,7 +13,8 @@ namespace vrpipe {
 
 /// What a microbenchmark measures, and what is known of it.
 struct MicrobenchFigure {
-  std::string name;
+  std::string name;   ///< unlike that of any other of the microbenchmark; begins with the group's
+  std::string group;  ///< of figures that are judged together; empty: it is judged by itself
   std::string unit;
   std::optional<double> paper;   ///< what the paper states
   std::optional<double> gpu;     ///< as measured on a real GPU
@@ -31,7 +32,8 @@ struct MicrobenchFigure {
 
   /// Against the reference; none without, or where that is 0 and the value is not.
   std::optional<double> difference_percent() const;
-  bool agrees() const;  ///< within the tolerance, where there is a reference
+  bool agrees() const;        ///< within the tolerance, where there is a reference
+  std::string label() const;  ///< its name within the group
 };
 
 using MicrobenchPoints = std::vector<std::pair<double, double>>;
@@ -43,6 +45,15 @@ struct MicrobenchCurve {
   MicrobenchPoints paper;
 };
 
+/// How far the figures of a group are from their references.
+struct MicrobenchGroup {
+  std::string name;
+  unsigned figures = 0;
+  double mean_percent = 0;   ///< of the absolute differences
+  double worst_percent = 0;  ///< the largest, with its sign
+  std::string worst;         ///< whose that is, a figure's name
+};
+
 struct MicrobenchResult {
   std::string name;
   std::string question;
@@ -51,6 +62,9 @@ struct MicrobenchResult {
   std::vector<MicrobenchCurve> curves;
   double seconds = 0;                                           ///< wall time of its simulations
   std::vector<std::pair<std::string, std::string>> parameters;  ///< RunResult::parameters
+
+  /// Of figures that have a group and a reference, in their order; with several, last one of them all, named "all".
+  std::vector<MicrobenchGroup> groups() const;
 };
 
 /// MicrobenchFigure::gpu_is_of.
@@ -60,8 +74,10 @@ inline constexpr const char* one_gpc = "one GPC of 2 TPCs";
 /// The platform that models the real GPU that was measured.
 inline constexpr const char* measured_platform = "gh100-gpc";
 
-/// All, in the order of reports.
+/// Those of the paper's analysis, in the order of reports: "all".
 std::vector<std::string> microbench_names();
+/// Those that a real GPU alone was measured with, to find the laws of its ROPs: "laws".
+std::vector<std::string> law_names();
 /// Throws UserError naming the nearest.
 void check_microbench_name(const std::string& name);
 /// Throws UserError for a setting of the draw's state, which is the microbenchmark's own, but for the hardware's precision.

@@ -26,6 +26,7 @@ Json chosen_units_json(const RunRequest& request) {
 
 Json figure_json(const MicrobenchFigure& figure) {
   return {{"name", figure.name},
+          {"group", figure.group.empty() ? Json() : Json(figure.group)},
           {"unit", figure.unit},
           {"paper", measured_json(figure.paper)},
           {"gpu", measured_json(figure.gpu)},
@@ -39,6 +40,14 @@ Json figure_json(const MicrobenchFigure& figure) {
           {"note", figure.note},
           {"source", figure.source},
           {"finding", finding(figure)}};
+}
+
+Json group_json(const MicrobenchGroup& group) {
+  return {{"name", group.name},
+          {"figures", group.figures},
+          {"mean_percent", number_json(group.mean_percent)},
+          {"worst_percent", number_json(group.worst_percent)},
+          {"worst", group.worst}};
 }
 
 Json curve_json(const MicrobenchCurve& curve) {
@@ -64,6 +73,8 @@ Json microbench_json(const MicrobenchRun& run) {
   for (const MicrobenchResult& result : run.results) {
     Json figures = Json::array();
     for (const MicrobenchFigure& figure : result.figures) figures.push_back(figure_json(figure));
+    Json groups = Json::array();
+    for (const MicrobenchGroup& group : result.groups()) groups.push_back(group_json(group));
     Json curves = Json::array();
     for (const MicrobenchCurve& curve : result.curves) curves.push_back(curve_json(curve));
     json["microbenchmarks"].push_back({{"name", result.name},
@@ -71,6 +82,7 @@ Json microbench_json(const MicrobenchRun& run) {
                                        {"platform", result.platform},
                                        {"seconds", result.seconds},
                                        {"figures", std::move(figures)},
+                                       {"groups", std::move(groups)},
                                        {"curves", std::move(curves)}});
   }
   return json;

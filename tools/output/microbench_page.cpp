@@ -82,7 +82,7 @@ std::string microbench_page(const MicrobenchRun& run) {
   for (const MicrobenchResult& result : run.results) {
     text += fmt::format("<h2 id=\"{0}\">{0}</h2>\n<p>{1}</p>\n", result.name, html_escaped(result.question));
     text += table_html(result) + "<ul>\n";
-    for (const MicrobenchFigure& figure : result.figures) text += "<li>" + html_escaped(finding(figure)) + "</li>\n";
+    for (const std::string& each : findings(result)) text += "<li>" + html_escaped(each) + "</li>\n";
     text += "</ul>\n";
     for (const MicrobenchCurve& curve : result.curves) text += curve_html(curve);
   }

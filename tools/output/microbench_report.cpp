@@ -53,7 +53,41 @@ std::string figures_table(const MicrobenchResult& result, const TextStyle& style
   return text;
 }
 
+/// Of figures that are judged in groups.
+std::string groups_table(const MicrobenchResult& result, const TextStyle& style) {
+  TextTable table({"", "real GPU", "simulator", "ratio", "unit"});
+  table.left(4);
+  std::string group;
+  for (const MicrobenchFigure& figure : result.figures) {
+    if (figure.group != group) table.group(figure.group);
+    group = figure.group;
+    const std::string ratio = figure.reference ? fmt::format("{:.3f}", figure.measured / *figure.reference) : "-";
+    table.row({figure.label(), gpu_text(figure), number_text(figure.measured), ratio, figure.unit});
+  }
+  return table.text(style);
+}
+
+std::string plural(unsigned count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
 }  // namespace
+
+std::string finding(const MicrobenchGroup& group) {
+  const bool is_own = group.worst.rfind(group.name + ": ", 0) == 0;
+  return fmt::format("{}: {}, off by {:.1f} % in the mean, by {:+.1f} % at most ({})", group.name,
+                     plural(group.figures, "figure"), group.mean_percent, group.worst_percent,
+                     is_own ? group.worst.substr(group.name.size() + 2) : group.worst);
+}
+
+std::vector<std::string> findings(const MicrobenchResult& result) {
+  std::vector<std::string> all;
+  for (const MicrobenchFigure& figure : result.figures) {
+    if (figure.group.empty()) all.push_back(finding(figure));
+  }
+  for (const MicrobenchGroup& group : result.groups()) all.push_back(finding(group));
+  return all;
+}
 
 std::string number_text(double value) {
   if (!std::isfinite(value)) return "none";
@@ -91,11 +125,13 @@ std::string finding(const MicrobenchFigure& figure) {
 std::string microbench_text(const MicrobenchRun& run, const TextStyle& style) {
   std::string text = machine_text(run.request, style);
   for (const MicrobenchResult& result : run.results) {
-    text += fmt::format("\n{}: {}\n\n", result.name, result.question) + figures_table(result, style);
+    const bool in_groups = !result.figures.empty() && !result.figures.front().group.empty();
+    text += fmt::format("\n{}: {}\n\n", result.name, result.question) +
+            (in_groups ? groups_table(result, style) : figures_table(result, style));
     for (const MicrobenchCurve& curve : result.curves) text += '\n' + plot(curve);
     text += '\n';
-    for (const MicrobenchFigure& figure : result.figures) {
-      const std::vector<std::string> lines = wrapped(finding(figure), finding_width);
+    for (const std::string& each : findings(result)) {
+      const std::vector<std::string> lines = wrapped(each, finding_width);
       for (std::size_t i = 0; i < lines.size(); ++i) text += (i == 0 ? "" : "  ") + lines[i] + '\n';
     }
     text += fmt::format("took {:.1f} s in {} process{} at a time\n", result.seconds, run.processes,

@@ -20,6 +20,11 @@ struct MicrobenchRun {
 /// One plain sentence: that a figure agrees with what is published, or by how much it differs, and why where that is known.
 std::string finding(const MicrobenchFigure& figure);
 
+/// The same of a group of figures: how far they are off.
+std::string finding(const MicrobenchGroup& group);
+/// Of figures that are judged by themselves, and of groups.
+std::vector<std::string> findings(const MicrobenchResult& result);
+
 /// A figure's number as people read it.
 std::string number_text(double value);
 /// That of the real GPU, with what it is of; "-" for none.

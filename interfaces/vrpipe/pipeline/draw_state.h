@@ -28,6 +28,10 @@ constexpr bool reads_color(FragmentShader shader) { return shader == FragmentSha
 constexpr bool writes_color(FragmentShader shader) {
   return shader != FragmentShader::none && shader != FragmentShader::alpha_threshold;
 }
+/// Whether fragments read what is interpolated over their primitive.
+constexpr bool reads_attributes(FragmentShader shader) {
+  return shader != FragmentShader::none && shader != FragmentShader::alpha_threshold;
+}
 
 /// Of the shader `lit`: colour times (ambient + (1 - ambient) max(0, n . l)).
 struct Light {

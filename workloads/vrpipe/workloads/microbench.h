@@ -64,6 +64,33 @@ FramePointer overlapping_layers(unsigned layers, unsigned side);
 /// What `overlapping_layers` gives, one layer after the other: the value of each pixel.
 std::array<float, 4> blended_in_order(const Frame& frame, ColorFormat format, BlendRounding rounding);
 
+// The ROPs by themselves.
+
+/// A rectangle in the grid of pixels.
+struct Box {
+  unsigned x, y, width, height;
+};
+/// What becomes of rectangles.
+enum class BoxesAre : std::uint8_t {
+  blended,         ///< each changes the values that it meets, until their alpha is about 1
+  unchanged,       ///< blended where alpha is 1, so that no value changes
+  written,         ///< not blended: they take the place of what is there
+  killed,          ///< by stencil
+  stencil_written  ///< nothing is shaded; each increments the stencil that it meets
+};
+/// `rounds` times all of the boxes, one after the other.
+FramePointer boxes_in_turn(const std::vector<Box>& boxes, unsigned rounds, BoxesAre what);
+/// `rounds` times one of width x height pixels in each of so many cells of whole screen tiles.
+FramePointer strips(unsigned width, unsigned height, unsigned cells, unsigned rounds, BoxesAre what);
+/// `rounds` times these boxes, each within a screen tile, in each of `tiles` screen tiles in turn.
+FramePointer boxes_of_tiles(const std::vector<Box>& boxes, unsigned tiles, unsigned rounds, BoxesAre what,
+                            unsigned gpcs);
+
+/// What becomes of splats.
+enum class SplatsAre : std::uint8_t { blended, written, passed, killed };
+/// The first `count` of measured::equal_splats, in its image.
+FramePointer equal_splats(double a, double b, float opacity, unsigned count, unsigned region, SplatsAre what);
+
 // Front end, and rates at which quads are killed.
 
 enum class Small : std::uint8_t { culled, rectangle, two_triangles };
