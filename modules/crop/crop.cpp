@@ -90,7 +90,6 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
     if (!cache_order_gate_.is_active()) organization.replacement = Replacement::random;  // which keeps no order
     cache_.emplace(organization, cache_statistics);
     if (!cache_order_gate_.is_active()) cache_->before_eviction([this] { cache_order_gate_.enter(); });
-    sectors_of_quads_ = sectors_of_quads(time_.cache, 4 * bytes_per_pixel(Format));
   }
   const std::uint64_t tile = surface_->address(warp.tile, 0);
   // Where a line of the tile is in `out.lines`, if it is there. Without branches, which would be mispredicted.
@@ -100,7 +99,7 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
   std::uint64_t seen = 0;
   unsigned count = 0;
   for (unsigned i = from; i < to; ++i) {
-    const auto [line, sectors] = sectors_of_quads_[warp.position[i]];
+    const auto [line, sectors] = time_.sectors_of_quads()[warp.position[i]];
     const bool is_new = (seen >> line & 1U) == 0;
     seen |= std::uint64_t{1} << line;
     const unsigned if_new = 0U - static_cast<unsigned>(is_new);
@@ -120,8 +119,7 @@ void ColorRop<Format, Rounding>::look_up(const ShadedWarp& warp, unsigned from, 
     cache_->look_up(out.lines[place]);
   }
   // All quads need as many sectors.
-  const std::uint32_t of_a_quad = sectors_of_quads_.front().sectors;
-  cache_->accessed(to - from, (to - from) * static_cast<unsigned>(__builtin_popcount(of_a_quad)));
+  cache_->accessed(to - from, (to - from) * time_.sectors_of_a_quad());
 }
 
 // Out of line, so that the common case stays short.

@@ -8,7 +8,6 @@
 #include "crop_time.h"
 
 #include <vrpipe/memory/sectored_cache.h>
-#include <vrpipe/pipeline/quad_sectors.h>
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/pipeline/slots/crop.h>
 
@@ -93,7 +92,6 @@ class ColorRop : public CropBehaviour {
   const bool checks_previous_;
   const CropTime time_;
   std::optional<SectoredCache> cache_;  ///< once looked up here; the timing model of `cycle` has one of its own
-  std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
 };
 
 /// Makes a CROP, ColorRop or what derives from it, for the draw's format and rounding.

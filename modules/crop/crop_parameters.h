@@ -79,6 +79,8 @@ struct CropParameters : ParameterSet {
                             "if any, tags run ahead of data: a look at them asks for sectors, and a second one, at "
                             "most so many quads later, stops "
                             "for lines that come back; a line may go while quads wait to be blended into it"};
+  Switch gob_lines{*this, "gob_lines", false, "left open by the paper; measured on a GH100 graphics GPC: on",
+                   "a tile's colours are in memory in blocks of 32 bytes by 8 rows, not in Morton order"};
   Switch gob_hazards{
       *this, "gob_hazards", false, "left open by the paper; measured on a GH100 graphics GPC: on",
       "without forwarding, pixels of a screen tile wait for one another that have the same place in a block of "

@@ -39,10 +39,12 @@ CropTime::CropTime(const CropParameters& parameters, ColorFormat format)
       hazard_mask_(parameters.gob_hazards ? place_in_gob(format) : positions_per_tile - 1) {
   cache.check("CROP cache", "crop", "cache_bytes");
   const std::uint32_t quad = 4 * bytes_per_pixel(format);
-  if (quad <= cache.line_bytes) return;
-  throw UserError("unusable CROP cache", "crop.line_bytes, --format",
-                  fmt::format("a quad of {} bytes does not fit into a line of {}", quad, cache.line_bytes),
-                  "use longer lines");
+  if (quad > cache.line_bytes) {
+    throw UserError("unusable CROP cache", "crop.line_bytes, --format",
+                    fmt::format("a quad of {} bytes does not fit into a line of {}", quad, cache.line_bytes),
+                    "use longer lines");
+  }
+  sectors_of_quads_ = vrpipe::sectors_of_quads(cache, quad, parameters.gob_lines ? TileOrder::gobs : TileOrder::morton);
 }
 
 std::vector<WorkKind> CropTime::kinds() const {

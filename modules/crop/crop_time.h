@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include <vrpipe/kernel/accounting.h>
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/kernel/ring.h>
+#include <vrpipe/pipeline/quad_sectors.h>
 #include <vrpipe/pipeline/slots/crop.h>
 
 namespace vrpipe {
@@ -39,6 +41,12 @@ class CropTime {
   const bool writes_unchanged;            ///< a blend that changes no value makes its sector dirty all the same
   const std::uint32_t fetch_ahead_quads;  ///< between two looks at tags, if there are two
   const std::int64_t parts_of_a_cycle;
+
+  /// What of the cache a quad needs, by its position in a screen tile.
+  const std::array<QuadSectors, positions_per_tile>& sectors_of_quads() const { return sectors_of_quads_; }
+  unsigned sectors_of_a_quad() const {
+    return static_cast<unsigned>(__builtin_popcount(sectors_of_quads_.front().sectors));
+  }
 
   /// What the cache moves through this, beside the blender; where it is not on, sectors take time of the blender.
   FlitPort port;
@@ -246,7 +254,8 @@ class CropTime {
   std::int64_t settled_ = 0;   ///< and of those before, not tallied yet
   Ring<Blend> in_pipeline_;    ///< without forwarding
   std::size_t hazard_mask_;    ///< of a quad's position
-  Visit visit_;                ///< the last
+  std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
+  Visit visit_;  ///< the last
 };
 
 }  // namespace vrpipe

@@ -10,7 +10,6 @@
 #include <vrpipe/model/unit.h>
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/order_monitor.h>
-#include <vrpipe/pipeline/quad_sectors.h>
 
 namespace vrpipe {
 
@@ -75,8 +74,7 @@ class CropUnit : public Unit {
     SectoredCacheStatistics& statistics = dynamic_cast<CropBehaviour&>(behaviour_->unit()).cache_statistics;
     port_.make_cache(organization, statistics);
     if (!cache_order_gate_.is_active()) port_.cache().before_eviction([this] { cache_order_gate_.enter(); });
-    sectors_of_quads_ = sectors_of_quads(time_.cache, 4 * bytes_per_pixel(surface_->format()));
-    sectors_of_a_quad_ = static_cast<unsigned>(__builtin_popcount(sectors_of_quads_.front().sectors));
+    sectors_of_a_quad_ = time_.sectors_of_a_quad();
     monitor_.emplace(surface_->width(), surface_->height());
     go_to({});
     if (Plain) return;
@@ -87,7 +85,7 @@ class CropUnit : public Unit {
   bool look_up(const ColorQuad& quad) {
     if (quad.warp->tile != tile_) go_to(quad.warp->tile);
     const unsigned position = quad.position();
-    const auto [line_of_tile, sectors] = sectors_of_quads_[position];
+    const auto [line_of_tile, sectors] = time_.sectors_of_quads()[position];
     const std::uint64_t address = tile_address_ + (std::uint64_t{line_of_tile} << line_shift_);
     if (!Plain && ahead_) return look_up_ahead(quad, address, sectors, tile_place_ + position);
     SectoredCache::Line line =
@@ -168,7 +166,7 @@ class CropUnit : public Unit {
   void ask(const ColorQuad& quad, std::size_t place) {
     if (!time_.port.is_on()) return;
     send(time_.flits_of_read(place - quad.position(), quad.warp->first_primitive[quad.index],
-                             sectors_of_quads_[quad.position()].line));
+                             time_.sectors_of_quads()[quad.position()].line));
   }
   /// ZROP's go first.
   [[gnu::noinline]] void take_reads() {
@@ -378,7 +376,6 @@ class CropUnit : public Unit {
   EffectGate cache_order_gate_;
   CachePort port_;
   const ColorSurface* surface_ = nullptr;
-  std::array<QuadSectors, positions_per_tile> sectors_of_quads_{};
   std::optional<BlendOrderMonitor> monitor_;
   unsigned line_shift_ = 0;   ///< log2 of the bytes of a line
   Ring<Entry> queue_;         ///< looked up and waiting to be blended

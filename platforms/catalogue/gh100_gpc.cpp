@@ -52,6 +52,7 @@ Platform gh100_gpc() {
       {"crop", "line_bytes", "256"},
       {"crop", "port_flits_per_cycle", "1"},
       {"crop", "port_backlog_flits", "512"},
+      {"crop", "gob_lines", "on"},
       {"crop", "gob_hazards", "on"},
       {"crop", "rgba32f_latency_cycles", "12"},
       {"crop", "fetch_ahead_quads", "512"},

@@ -50,6 +50,7 @@ rc::Gen<Setting> setting() {
                                            {"crop", "port_flits_per_cycle", {"1", "3"}},
                                            {"crop", "port_backlog_flits", {"1", "5000"}},
                                            {"crop", "gob_hazards", {"on"}},
+                                           {"crop", "gob_lines", {"on"}},
                                            {"crop", "rgba32f_latency_cycles", {"12"}},
                                            {"raster", "half_tile_order", {"on"}},
                                            {"crop", "fetch_ahead_quads", {"1", "512"}},
