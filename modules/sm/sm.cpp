@@ -254,6 +254,7 @@ void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp
     }
   }
   out.count = static_cast<std::uint8_t>(count);
+  fragments_of_back_quads += threads_in(live_of_warp & (merged_quads * all_lanes));
   if (merged != 0 && context_.fragments != nullptr) tell_merged(warp, merged);
   // The threads of each draw, most often of one.
   for (std::uint32_t left = ~0U >> (4 * (quads_per_warp - warp.count)); left != 0;) {

@@ -218,6 +218,7 @@ TEST(SplatShader, ThePartialQuadsOfASplatsTwoTrianglesMergeToItsWholeQuad) {
   EXPECT_EQ(std::memcmp(&whole.color[0], &merged.color[0], sizeof whole.color[0]), 0);
   EXPECT_EQ(shader.sm.quads_merged.value(), 1U);
   EXPECT_EQ(shader.sm.fragments_merged.value(), 0U) << "no lane had two";
+  EXPECT_EQ(shader.sm.fragments_of_back_quads.value(), 1U) << "the second quad has one all the same";
 }
 
 // case Q02
@@ -355,6 +356,7 @@ TEST(SplatShader, OnlyMarkedPairsMerge) {
   EXPECT_EQ(shader.shade(quads, 0b1111).count, 4);
   EXPECT_EQ(shader.sm.quads_merged.value(), 6U);
   EXPECT_EQ(shader.sm.fragments_merged.value(), 24U);
+  EXPECT_EQ(shader.sm.fragments_of_back_quads.value(), 24U);
 }
 
 TEST(SplatShader, AMergedQuadTellsItsFirstAndLastPrimitive) {

@@ -62,6 +62,7 @@ const std::map<std::string, Words> texts_of = {
     {"--html", {"page.html"}},
     {"--energy", {}},
     {"--energies", {"energies.toml"}},
+    {"--rows", {"rows.toml"}},
     {"--explain-effects", {}},
     {"--interval", {"100", "4096"}},
     {"--interval-csv", {"intervals.csv"}},
@@ -97,6 +98,9 @@ class CommandLines : public testing::ToolTest {
         R"("fx":30,"fy":30},{"id":1,"img_name":"two","width":32,"height":24,"position":[0,0,-5],)"
         R"("rotation":[[1,0,0],[0,1,0],[0,0,1]],"fx":30,"fy":30}])");
     write("energies.toml", vrpipe({"energies", "--toml"}).out);
+    write("rows.toml",
+          "schema = 'vrpipe.paper-rows/1'\n[[row]]\nid = 'A'\nsection = 'I'\nwhat = 'w'\nsays = 's'\nkind = 'input'\n"
+          "why = 'it is'\n");
   }
   std::vector<Declared> options_of(const std::string& command) const {
     std::istringstream help(vrpipe({command, "--help"}).out);

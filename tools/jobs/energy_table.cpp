@@ -12,15 +12,13 @@
 
 #include <vrpipe/component/error.h>
 
-#include "file_io.h"
 #include "jobs/settings.h"
-#include "jobs/toml_text.h"
+#include "jobs/toml_reader.h"
 
 namespace vrpipe::tools {
 namespace {
 
 constexpr const char* cannot_use_table = "cannot use energies";
-constexpr const char* schema = "vrpipe.energies/1";
 
 std::vector<std::string> split(const std::string& text, char separator) {
   std::vector<std::string> parts(1);
@@ -43,73 +41,23 @@ bool starts_number(const std::string& text) {
   return !text.empty() && ((text[0] >= '0' && text[0] <= '9') || text[0] == '.' || text[0] == '-');
 }
 
-class TableReader {
+class TableReader : TomlReader {
  public:
-  explicit TableReader(std::string file) : file_(std::move(file)) {}
+  explicit TableReader(const std::string& file)
+      : TomlReader(cannot_use_table, file, "as `vrpipe energies --toml` prints it") {}
 
-  EnergyTable read(const std::string& text) {
-    const toml::table root = parsed(text);
-    check_keys(root, {"schema", "process", "node", "event", "power"});
-    if (text_at(root, "schema") != schema) {
-      refuse(*root.get("schema"), "schema is not " + std::string(schema), fmt::format("write schema = \"{}\"", schema));
-    }
+  EnergyTable read(const std::string& text) const {
+    const toml::table root = parsed(text, "vrpipe.energies/1", {"schema", "process", "node", "event", "power"});
     EnergyTable table;
     table.process = text_at(root, "process");
-    for (const toml::table* each : tables(root, "node")) table.nodes.push_back(node(*each));
-    for (const toml::table* each : tables(root, "event")) table.events.push_back(event(*each, table.nodes));
-    for (const toml::table* each : tables(root, "power")) table.powers.push_back(power(*each));
+    for (const toml::table* each : named(root, "node")) table.nodes.push_back(node(*each));
+    for (const toml::table* each : named(root, "event")) table.events.push_back(event(*each, table.nodes));
+    for (const toml::table* each : named(root, "power")) table.powers.push_back(power(*each));
     if (table.events.empty()) refuse(root, "it has no event", "write at least one [[event]]");
     return table;
   }
 
  private:
-  std::string line(const toml::source_region& source) const {
-    return fmt::format("{} line {}", file_, source.begin.line);
-  }
-  [[noreturn]] void refuse(const toml::node& where, const std::string& why, const std::string& remedy) const {
-    throw UserError(cannot_use_table, line(where.source()), why, remedy);
-  }
-
-  toml::table parsed(const std::string& text) const {
-    return parse_toml(text, file_, [&](const toml::source_region& source, std::string why) {
-      std::replace(why.begin(), why.end(), '\n', ' ');
-      throw UserError(cannot_use_table, line(source), why, "write TOML 1.0, as `vrpipe energies --toml` prints it");
-    });
-  }
-
-  void check_keys(const toml::table& table, const std::vector<std::string>& known) const {
-    for (const auto& [key, value] : table) {
-      const std::string name(key.str());
-      if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-      throw UserError(cannot_use_table, line(key.source()), fmt::format("unknown key '{}'", name),
-                      fmt::format("did you mean {}? there are {}", nearest_name(name, known), fmt::join(known, ", ")));
-    }
-  }
-
-  const toml::node& at(const toml::table& table, const char* key, const std::string& example) const {
-    const toml::node* const found = table.get(key);
-    if (found == nullptr) {
-      const auto name = table["name"].value<std::string>();
-      refuse(table, fmt::format("{} has no {}", name ? "'" + *name + "'" : "it", key),
-             fmt::format("add {} = {}", key, example));
-    }
-    return *found;
-  }
-
-  std::string text_at(const toml::table& table, const char* key) const {
-    const toml::node& found = at(table, key, "\"...\"");
-    const auto text = found.value_exact<std::string>();
-    if (!text || text->empty()) refuse(found, fmt::format("{} is not a text", key), "write a text in quotes");
-    return *text;
-  }
-
-  double number(const toml::node& node, const std::string& what) const {
-    const auto value = node.is_number() ? node.value<double>() : std::nullopt;
-    if (!value || !std::isfinite(*value)) refuse(node, what + " is not a number", "write a number, as 4.5");
-    if (*value < 0) refuse(node, what + " is negative", "write 0 or more");
-    return *value;
-  }
-
   Range range(const toml::table& table, const char* key) const {
     const std::string example = "{ low = 1, nominal = 2, high = 3 }";
     const toml::node& found = at(table, key, example);
@@ -127,20 +75,14 @@ class TableReader {
     return read;
   }
 
-  /// Those of an array of tables, whose names differ, of events in a unit.
-  std::vector<const toml::table*> tables(const toml::table& root, const char* key) const {
-    std::vector<const toml::table*> found;
-    const toml::node* const node = root.get(key);
-    if (node == nullptr) return found;
-    if (!node->is_array_of_tables()) {
-      refuse(*node, fmt::format("{} is no array of tables", key), fmt::format("write [[{}]]", key));
-    }
+  /// Tables whose names differ, of events in a unit.
+  std::vector<const toml::table*> named(const toml::table& root, const char* key) const {
     std::set<std::pair<std::string, std::string>> names;
-    for (const toml::node& each : *node->as_array()) {
-      found.push_back(each.as_table());
-      const std::string name = text_at(*found.back(), "name");
-      const std::string unit = each.as_table()->contains("unit") ? text_at(*found.back(), "unit") : "";
-      if (!names.insert({unit, name}).second) refuse(each, fmt::format("there are two of '{}'", name), "rename one");
+    std::vector<const toml::table*> found = tables(root, key);
+    for (const toml::table* each : found) {
+      const std::string name = text_at(*each, "name");
+      const std::string unit = each->contains("unit") ? text_at(*each, "unit") : "";
+      if (!names.insert({unit, name}).second) refuse(*each, fmt::format("there are two of '{}'", name), "rename one");
     }
     return found;
   }
@@ -240,8 +182,6 @@ class TableReader {
     read.meaning = text_at(table, "meaning");
     return read;
   }
-
-  std::string file_;
 };
 
 }  // namespace
@@ -256,11 +196,7 @@ Range& Range::operator+=(const Range& other) {
 EnergyTable parse_energies(const std::string& text, const std::string& where) { return TableReader(where).read(text); }
 
 EnergyTable read_energies(const std::filesystem::path& path) {
-  const InputFile file(path, "cannot read energies");
-  std::string text(static_cast<std::size_t>(file.size()), '\0');
-  file.read(0, text.data(), text.size());
-  file.check_unchanged();
-  return parse_energies(text, path.string());
+  return parse_energies(table_text(path, "cannot read energies"), path.string());
 }
 
 const EnergyTable& shipped_energies() {

@@ -1,105 +1,211 @@
 #include "jobs/paper_rows.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <set>
 #include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <vrpipe/component/error.h>
+
+#include "jobs/reproduce_measures.h"
+#include "jobs/toml_reader.h"
 
 namespace vrpipe::tools {
 namespace {
 
-// Other scenes than the paper's, so a tenth either way says that it is the same effect.
-constexpr double of_scenes = 10;
-constexpr double exact = 0.5;
+template <class Value>
+using Named = std::vector<std::pair<std::string, Value>>;
 
-// Why a row is out of reach.
-constexpr const char* no_software_rasteriser = "needs a model of the software rasteriser (CUDA), which there is not";
-constexpr const char* no_whole_frame = "needs the times of preprocessing and sorting, which are not modelled";
-constexpr const char* simulated_energy = "energy of baseline over HET+QM, of counts and time (docs/energy.md)";
-constexpr const char* is_input = "goes into the model, and cannot come out of it";
+const Named<Verdict> verdicts{{"agrees", Verdict::agrees},           {"differs", Verdict::differs},
+                              {"cannot say", Verdict::cannot_say},   {"input", Verdict::input},
+                              {"cannot fail", Verdict::cannot_fail}, {"not modelled", Verdict::not_modelled}};
+const Named<Verdict> kinds{{"measured", Verdict::cannot_say},
+                           {"input", Verdict::input},
+                           {"cannot fail", Verdict::cannot_fail},
+                           {"not modelled", Verdict::not_modelled}};
+const Named<Relation> relations{{"about", Relation::about},
+                                {"at most", Relation::at_most},
+                                {"at least", Relation::at_least},
+                                {"above", Relation::above}};
 
-std::vector<PaperRow> all_rows() {
-  const Relation about = Relation::about, at_most = Relation::at_most, at_least = Relation::at_least,
-                 above = Relation::above, claim = Relation::claim;
-  std::vector<PaperRow> rows{
-      {"R1", "up to 2.78x", "abstract", "speed-up of HET+QM, best scene", "cycles of baseline over HET+QM", about, 2.78,
-       of_scenes},
-      {"R2", "2.07x", "VI-B", "the same, mean", "arithmetic mean over the scenes", about, 2.07, of_scenes},
-      {"R3", "up to 1.49x", "VI-B", "speed-up of QM alone, best scene", "cycles", about, 1.49, of_scenes},
-      {"R4", "1.80x", "VI-B", "speed-up of HET alone, mean", "arithmetic mean over the scenes", about, 1.80, of_scenes},
-      {"R5", "/2.52", "VI-C", "fragments blended, HET, mean", "baseline over HET", about, 2.52, of_scenes},
-      {"R6", "/1.30", "VI-C", "fragments blended, QM on top of HET", "HET over HET+QM", about, 1.30, of_scenes},
-      {"R7", "/1.90", "VI-C", "quads blended, HET, mean", "baseline over HET", about, 1.90, of_scenes},
-      {"R8", "/1.32", "VI-C", "quads blended, QM on top of HET", "HET over HET+QM", about, 1.32, of_scenes},
-      {"R9", "2.05x", "VI-B", "whole frame, HET+QM over CUDA", no_software_rasteriser},
-      {"R10", "1.60x", "VI-B", "whole frame, HET+QM over OpenGL", no_whole_frame},
-      {"R11", "> 70 %", "VI-B", "share of rasterisation in a frame", no_whole_frame},
-      {"R12", "1.65x", "VI-D", "energy efficiency of the draw, mean", simulated_energy},
-      {"R13", "up to 2.15x", "VI-D", "the same, best scene", simulated_energy},
-      {"R14", "24.25 KB", "VI-E", "storage of the TGC", "from the configured sizes", about, 24.25, exact},
-      {"R15", "688 B", "VI-E", "storage of the QRU", "from the configured sizes", about, 688, exact},
-      {"R16", "24.92 KB", "VI-E", "storage of QM, per GPC", "from the configured sizes", about, 24.92, exact},
-      {"R17", ">= 3.6 MB", "VII", "SRAM in a GPC of the Orin", "is a fact of a chip, not of the pipeline"},
-      {"R18", "nearly 4.4", "VII", "greatest early-termination ratio, Train", "views of the scene, functional", about,
-       4.4, of_scenes},
-      {"R19", "> 1.5", "VII", "mean ratio, in every scene", "the least of the scenes' means over views", above, 1.5},
-      {"R20", "> 33 %", "VII", "fragments that go, in every scene", "1 - 1 / ratio, of the least mean", above, 33.3},
-      {"R21", "< 25 FPS", "III-A", "whole frame, OpenGL, on an Orin", no_whole_frame},
-      {"R22", "< 40 %", "III-B", "lanes of a CUDA warp that blend", no_software_rasteriser},
-      {"R23", "<= 900 K", "VI-A", "Gaussians in the view, most of a scene", "the most of the scenes", at_most, 900e3,
-       of_scenes},
-      {"R24", "16 KB", "VII", "size of the CROP cache", "microbenchmark crop-cache", about, 16, of_scenes},
-      {"R25", "16 / 8 px/clk", "VII", "blended, RGBA8 / RGBA16F", "microbenchmark rop-throughput", about, 8, of_scenes},
-      {"R26", ">= 64 B/clk", "VII", "read by CROP from its cache", "R25 times 8 bytes a pixel", at_least, 64,
-       of_scenes},
-      {"R27", "2 x 8", "VII", "ROP partitions, and ROPs of each", is_input},
-      {"R28", "32", "VII", "TC bins", "microbenchmark tile-binning", about, 32, exact},
-      {"R29", "67 warps", "VII", "320 rectangles over 32 tiles", "microbenchmark tile-binning", about, 67, 5},
-      {"R30", "330 warps", "VII", "330 rectangles over 33 tiles", "microbenchmark tile-binning", about, 330, exact},
-      {"R31", "16x16 px", "II", "screen tile of a GPC", is_input},
-      {"R32", "9.06 M / 5.21 M", "VII", "Gaussians of Building and Rubble", "the scenes' own; of a stand-in, by design",
-       about, 9.06e6, 1},
-  };
-  const auto says = [&](const char* id, const char* value, const char* where, const char* what, const char* how) {
-    rows.push_back({id, value, where, what, how, claim});
-  };
-  says("C1", "OpenGL faster", "III-A", "than CUDA", no_software_rasteriser);
-  says("C2", "PROP, CROP busiest", "III-B", "units of the baseline; SM little", "utilisation in every scene");
-  says("C3", "less time than work", "III-B", "saved by termination in CUDA", no_software_rasteriser);
-  says("C4", "slower than ROP", "IV-A", "in-shader blending with a lock", "needs in-shader blending, not modelled");
-  says("C5", "gain in Train, Truck", "IV-B", "of passes; elsewhere marginal", "1, 4 and 16 passes of the baseline");
-  says("C6", "Train, Truck most", "VI-B", "of HET's gains; Bonsai least of the real scenes", "speed-ups of HET");
-  says("C7", "Bonsai, Kitchen less", "VI-B", "of QM's gains", "speed-ups of QM");
-  says("C8", "quads fall less", "VI-C", "than fragments under HET", "blended, in every scene");
-  says("C9", "outdoor above others", "VII", "early-termination ratios", "means over views");
-  says("C10", "GSCore faster", "VII", "than VR-Pipe", "needs a model of GSCore, which there is not");
-  says("C11", "ROP-bound, gains", "VII", "of Building and Rubble", "bottleneck of the baseline; speed-up of HET+QM");
-  says("C12", "partial quads slower", "VII", "in pixels a cycle", "microbenchmark quad-coverage");
-  says("C13", "preprocess correlates", "VI-B", "with an Orin, sorting not", no_whole_frame);
-  for (PaperRow& row : rows) {
-    const std::string how = row.how;
-    row.is_within_reach = how.rfind("needs", 0) != 0 && how != is_input && how.rfind("is a fact", 0) != 0;
+class RowReader : TomlReader {
+ public:
+  explicit RowReader(const std::string& file)
+      : TomlReader("cannot use rows", file, "as tools/jobs/paper_rows.toml is written") {}
+
+  std::vector<PaperRow> read(const std::string& text) const {
+    const toml::table root = parsed(text, "vrpipe.paper-rows/1", {"schema", "row"});
+    std::vector<PaperRow> rows;
+    std::set<std::string> ids;
+    for (const toml::table* each : tables(root, "row")) {
+      rows.push_back(row(*each));
+      if (!ids.insert(rows.back().id).second)
+        refuse(*each->get("id"), "there are two of " + rows.back().id, "rename one");
+    }
+    if (rows.empty()) refuse(root, "it has no row", "write at least one [[row]]");
+    for (const toml::table* each : tables(root, "row")) {
+      for (const toml::table* reason : tables(*each, "reason")) {
+        if (!reason->contains("row") || ids.count(text_at(*reason, "row")) > 0) continue;
+        refuse(*reason->get("row"), "there is no row " + text_at(*reason, "row"), "name the id of a row");
+      }
+    }
+    return rows;
   }
-  return rows;
-}
+
+ private:
+  std::string text_or_none(const toml::table& table, const char* key) const {
+    return table.contains(key) ? text_at(table, key) : "";
+  }
+  /// A value, or those of an array; none where there is no such key.
+  static std::vector<const toml::node*> values(const toml::table& table, const std::string& key) {
+    const toml::node* const found = table.get(key);
+    std::vector<const toml::node*> all;
+    if (found != nullptr && !found->is_array()) all.push_back(found);
+    if (found == nullptr || !found->is_array()) return all;
+    for (const toml::node& each : *found->as_array()) all.push_back(&each);
+    return all;
+  }
+  template <class Value>
+  Value one_of(const Named<Value>& all, const toml::table& table, const char* key) const {
+    const std::string text = text_at(table, key);
+    std::vector<std::string> names;
+    for (const auto& [name, value] : all) {
+      if (name == text) return value;
+      names.push_back(name);
+    }
+    refuse(*table.get(key), fmt::format("{} is '{}'", key, text), fmt::format("give {}", fmt::join(names, ", ")));
+  }
+  std::string text_of(const toml::node& node, const std::string& what) const {
+    const auto text = node.value_exact<std::string>();
+    if (!text) refuse(node, what + " is not a text", "write a text in quotes");
+    return *text;
+  }
+  std::string measure_name(const toml::node& node) const {
+    std::string text = text_of(node, "measure");
+    if (is_measure(text)) return text;
+    refuse(node, "nothing measures '" + text + "'", "did you mean " + nearest_name(text, measure_names()) + "?");
+  }
+  std::string quantity_name(const toml::node& node) const {
+    std::string text = text_of(node, "a quantity");
+    if (find_quantity(text) != nullptr) return text;
+    std::vector<std::string> names;
+    for (const Quantity& each : quantities()) names.push_back(each.name);
+    refuse(node, "there is no quantity '" + text + "'", "did you mean " + nearest_name(text, names) + "?");
+  }
+
+  PaperRow row(const toml::table& table) const {
+    check_keys(table, {"id", "section", "what", "says", "kind", "published", "unit", "decimals", "relation",
+                       "tolerance_percent", "tolerance_reason", "measure", "holds", "how", "why", "reason"});
+    PaperRow read;
+    read.id = text_at(table, "id");
+    read.section = text_at(table, "section");
+    read.what = text_at(table, "what");
+    read.says = text_at(table, "says");
+    read.unjudged = one_of(kinds, table, "kind");
+    read.unit = text_or_none(table, "unit");
+    if (const toml::node* const decimals = table.get("decimals")) {
+      read.decimals = static_cast<unsigned>(std::min(number(*decimals, "decimals"), 9.0));
+    }
+    for (const toml::node* each : values(table, "measure")) read.measures.push_back(measure_name(*each));
+    for (const toml::table* each : tables(table, "holds")) read.holds.push_back(condition(*each));
+    for (const toml::node* each : values(table, "published")) {
+      read.published.push_back(number(*each, "published"));
+      if (read.published.back() == 0) refuse(*each, "published is 0", "write a number above 0");
+    }
+    if (!read.published.empty()) {
+      read.relation = table.contains("relation") ? one_of(relations, table, "relation") : Relation::about;
+      if (read.measures.size() != read.published.size()) {
+        refuse(table,
+               fmt::format("'{}' has {} published numbers and {} measures", read.id, read.published.size(),
+                           read.measures.size()),
+               "give a measure of each");
+      }
+    }
+    if (const toml::node* const tolerance = table.get("tolerance_percent")) {
+      read.tolerance_percent = number(*tolerance, "tolerance_percent");
+      read.tolerance_reason = text_at(table, "tolerance_reason");
+    }
+    if (read.is_judged() && read.published.empty() == read.holds.empty()) {
+      refuse(table, "'" + read.id + "' is to be judged", "give either published numbers or holds");
+    }
+    const bool has_value = !read.measures.empty() || !read.holds.empty();
+    read.how = has_value ? text_at(table, "how") : text_or_none(table, "how");
+    read.why = read.is_judged() ? text_or_none(table, "why") : text_at(table, "why");
+    for (const toml::table* each : tables(table, "reason")) read.reasons.push_back(reason(*each, read));
+    return read;
+  }
+
+  RowCondition condition(const toml::table& table) const {
+    check_keys(table, {"of", "in", "above", "above_in", "below"});
+    RowCondition read;
+    read.of = quantity_name(at(table, "of", "\"speed-up of het\""));
+    for (const toml::node* each : values(table, "in")) read.in.push_back(text_of(*each, "a scene"));
+    for (const toml::node* each : values(table, "above_in")) read.than_in.push_back(text_of(*each, "a scene"));
+    read.is_above = !table.contains("below");
+    for (const toml::node* each : values(table, read.is_above ? "above" : "below")) {
+      if (each->is_number()) {
+        read.number = number(*each, "a bound");
+      } else {
+        read.than.push_back(quantity_name(*each));
+      }
+    }
+    if (table.contains("above") + table.contains("above_in") + table.contains("below") != 1) {
+      refuse(table, "it compares with nothing, or twice", "give one of above, above_in, below");
+    }
+    return read;
+  }
+
+  RowReason reason(const toml::table& table, const PaperRow& of) const {
+    check_keys(table, {"text", "setting", "measure", "row"});
+    RowReason read{text_at(table, "text"), text_or_none(table, "setting"), "", text_or_none(table, "row")};
+    if (const toml::node* const other = table.get("measure")) read.measure = measure_name(*other);
+    if (table.size() != 2) refuse(table, "a reason is shown by one thing", "give a setting, a measure or a row");
+    if (!read.setting.empty() && !of.is_of_variants()) {
+      refuse(*table.get("setting"), of.id + " is not of the four variants alone, on which settings are tried",
+             "give a measure or a row");
+    }
+    return read;
+  }
+};
 
 }  // namespace
 
 const char* name_of(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::agrees: return "agrees";
-    case Verdict::differs: return "differs";
-    case Verdict::cannot_say: break;
-  }
-  return "cannot say";
+  return std::find_if(verdicts.begin(), verdicts.end(), [&](const auto& each) { return each.second == verdict; })
+      ->first.c_str();
 }
 
-const char* paper_energy_method() {
-  return "measured on an AGX Orin whose shaders imitate termination, by a stencil that counts, and merging, by "
-         "shuffles "
-         "and blends; TGC and QRU are not in it";
+double PaperRow::number() const {
+  if (published.empty()) throw std::logic_error("the paper has no number in row " + id);
+  return published.front();
+}
+
+std::string PaperRow::text(double value) const {
+  const std::string number = fmt::format("{:.{}f}", value, decimals);
+  return unit == "/" ? unit + number : number + unit;
+}
+
+bool PaperRow::is_of_variants() const {
+  return std::all_of(measures.begin(), measures.end(), vrpipe::tools::is_of_variants) &&
+         std::all_of(holds.begin(), holds.end(),
+                     [](const RowCondition& condition) { return find_quantity(condition.of)->is_of_variants; });
+}
+
+std::vector<PaperRow> parse_rows(const std::string& text, const std::string& where) {
+  return RowReader(where).read(text);
+}
+
+std::vector<PaperRow> read_rows(const std::filesystem::path& path) {
+  return parse_rows(table_text(path, "cannot read rows"), path.string());
 }
 
 const std::vector<PaperRow>& paper_rows() {
-  static const std::vector<PaperRow> rows = all_rows();
+  static const std::vector<PaperRow> rows = parse_rows(shipped_rows_text(), "the rows that vrpipe comes with");
   return rows;
 }
 
@@ -110,20 +216,25 @@ const PaperRow& paper_row(const std::string& id) {
   throw std::logic_error("the paper has no row " + id);
 }
 
+double distance(Relation relation, double paper, double measured) {
+  switch (relation) {
+    case Relation::about: return std::fabs(measured - paper);
+    case Relation::at_most: return std::max(0.0, measured - paper);
+    case Relation::at_least:
+    case Relation::above: return std::max(0.0, paper - measured);
+    case Relation::claim: break;
+  }
+  return 0;
+}
+
 Verdict judge(Relation relation, double paper, double tolerance_percent, double measured) {
   // So that what lies on the edge is within.
   constexpr double rounding = 1e-12;
-  const double tolerance = paper * (tolerance_percent / 100 + rounding);
-  const auto verdict = [](bool holds) { return holds ? Verdict::agrees : Verdict::differs; };
-  if (!std::isfinite(measured)) return Verdict::cannot_say;
-  switch (relation) {
-    case Relation::about: return verdict(std::fabs(measured - paper) <= tolerance);
-    case Relation::at_most: return verdict(measured <= paper + tolerance);
-    case Relation::at_least: return verdict(measured >= paper - tolerance);
-    case Relation::above: return verdict(measured > paper);
-    case Relation::claim: break;
-  }
-  return Verdict::cannot_say;
+  if (!std::isfinite(measured) || relation == Relation::claim) return Verdict::cannot_say;
+  const bool holds = relation == Relation::above
+                         ? measured > paper
+                         : distance(relation, paper, measured) <= paper * (tolerance_percent / 100 + rounding);
+  return holds ? Verdict::agrees : Verdict::differs;
 }
 
 std::optional<double> difference_percent(double paper, double measured) {

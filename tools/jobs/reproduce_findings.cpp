@@ -47,6 +47,10 @@ Gains gains_of(const std::array<const PointResult*, 4>& points) {
   gains.het_qm = gain(baseline, both);
   gains.fragments_het = quotient(baseline.counts.fragments_blended, het.counts.fragments_blended);
   gains.fragments_merging = quotient(het.counts.fragments_blended, both.counts.fragments_blended);
+  // Of the second quads' fragments those on a live front are gone already.
+  gains.fragments_merging_whole =
+      quotient(het.counts.fragments_blended,
+               both.counts.fragments_blended + both.counts.fragments_merged - points[3]->fragments_of_back_quads);
   gains.quads_het = quotient(baseline.counts.quads_blended, het.counts.quads_blended);
   gains.quads_merging = quotient(het.counts.quads_blended, both.counts.quads_blended);
   gains.quads_qm = quotient(baseline.counts.quads_blended, qm.counts.quads_blended);
@@ -87,6 +91,7 @@ SceneFinding scene_finding(const ReproduceResult& result, std::size_t scene) {
   key.variant = "het";
   finding.map_with = &result.at(key);
   key.fidelity = sensitivity_fidelity;
+  key.settings = plan.passes_settings;
   const RunResult& het = result.at(key).run;
   key.variant = "baseline";
   const RunResult& one_pass = result.at(key).run;
@@ -205,18 +210,27 @@ void find_fragments(const ReproduceResult& result, Findings& findings) {
     key.settings = settings;
     add(plan.studied, settings);
   }
-  // Other ways to count the same runs: what is pruned counts without termination, and not with it.
-  std::vector<double> fragments, quads;
-  for (const SceneFinding& scene : findings.scenes) {
-    const Counts& without = scene.runs[0]->run.counts;
-    const Counts& with = scene.runs[2]->run.counts;
-    fragments.push_back(quotient(without.fragments_rasterized, with.fragments_blended));
-    quads.push_back(quotient(without.quads_blended, with.quads_blended));
+  key.fidelity = sensitivity_fidelity;
+  for (const std::string& settings : plan.trials) {
+    key.settings = settings;
+    add(plan.paper_scenes(), settings.empty() ? "the six scenes at lt" : "the six scenes with " + settings);
   }
-  FragmentFinding counted{"counted: rasterised fragments over HET's blended", mean_of(fragments).arithmetic,
-                          mean_of(quads).arithmetic, 0};
-  counted.fall_percent = 100 * (1 - counted.quads / counted.fragments);
-  findings.fragments.push_back(counted);
+}
+
+void find_trials(const ReproduceResult& result, Findings& findings) {
+  for (const std::string& settings : result.plan.trials) {
+    for (const std::size_t scene : result.plan.paper_scenes()) {
+      PointKey key;
+      key.scene = scene;
+      key.fidelity = sensitivity_fidelity;
+      key.settings = settings;
+      SceneFinding finding;
+      finding.scene = scene;
+      finding.runs = runs_of(result, key);
+      finding.gains = gains_of(finding.runs);
+      findings.trials[settings].push_back(std::move(finding));
+    }
+  }
 }
 
 }  // namespace
@@ -233,9 +247,11 @@ Mean mean_of(const std::vector<double>& values) {
           distribution_of(there)->geometric_mean};
 }
 
-double paper_het_efficiency() { return paper_row("R4").number / paper_row("R7").number; }
-double paper_het_qm_efficiency() { return paper_row("R2").number / (paper_row("R7").number * paper_row("R8").number); }
-double paper_fragment_fall_percent() { return 100 * (1 - paper_row("R7").number / paper_row("R5").number); }
+double paper_het_efficiency() { return paper_row("R4").number() / paper_row("R7").number(); }
+double paper_het_qm_efficiency() {
+  return paper_row("R2").number() / (paper_row("R7").number() * paper_row("R8").number());
+}
+double paper_fragment_fall_percent() { return 100 * (1 - paper_row("R7").number() / paper_row("R5").number()); }
 
 Findings find(const ReproduceResult& result) {
   const ReproducePlan& plan = result.plan;
@@ -247,6 +263,7 @@ Findings find(const ReproduceResult& result) {
   findings.main = study(result, plan.paper_scenes(), Extent::full, plan.fidelity, "");
   find_sensitivity(result, findings);
   find_fragments(result, findings);
+  find_trials(result, findings);
   return findings;
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,8 +23,9 @@ Mean mean_of(const std::vector<double>& values);
 
 /// What the variants of one scene gain over its baseline, and over one another.
 struct Gains {
-  double qm = 0, het = 0, het_qm = 0;                     ///< speed-ups
-  double fragments_het = 0, fragments_merging = 0;        ///< blended: baseline over HET, HET over HET+QM
+  double qm = 0, het = 0, het_qm = 0;               ///< speed-ups
+  double fragments_het = 0, fragments_merging = 0;  ///< blended: baseline over HET, HET over HET+QM
+  double fragments_merging_whole = 0;               ///< the latter, were all fragments of a pair's second quad gone
   double quads_het = 0, quads_merging = 0, quads_qm = 0;  ///< likewise; the last: baseline over QM
   double lanes_baseline = 0, lanes_het = 0;               ///< fragments of a blended quad
 };
@@ -80,6 +82,8 @@ struct Findings {
   std::vector<StudyPoint> efficiency;         ///< of the studied scenes; the default first
   std::vector<StudyPoint> indoor_efficiency;  ///< of the indoor scene, likewise
   std::vector<FragmentFinding> fragments;     ///< the main comparison, then what could move it
+  /// The six scenes, gains alone, at settings of ReproducePlan::trials.
+  std::map<std::string, std::vector<SceneFinding>> trials;
 };
 
 Findings find(const ReproduceResult& result);

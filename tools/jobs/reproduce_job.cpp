@@ -166,6 +166,7 @@ nlohmann::json to_reproduce_record(const std::string& name, const PointResult& p
   return {{"point", name},
           {"run", encode(point.run)},
           {"gaussians", {point.gaussians_total, point.gaussians_visible}},
+          {"fragments_of_back_quads", point.fragments_of_back_quads},
           {"size", {point.width, point.height}},
           {"map", point.map ? to_json(*point.map) : nlohmann::json()},
           {"energy", point.energy ? energy_to_json(*point.energy) : nlohmann::json()}};
@@ -179,6 +180,7 @@ PointResult reproduce_from_record(const nlohmann::json& record, const ReproduceP
   point.run.framebuffer.depth_stencil = DepthStencilSurface(1, 1);
   record.at("gaussians").at(0).get_to(point.gaussians_total);
   record.at("gaussians").at(1).get_to(point.gaussians_visible);
+  record.at("fragments_of_back_quads").get_to(point.fragments_of_back_quads);
   record.at("size").at(0).get_to(point.width);
   record.at("size").at(1).get_to(point.height);
   if (!record.at("map").is_null()) point.map = heat_map_from_json(record.at("map"));
@@ -254,6 +256,9 @@ void simulate_points(const ReproduceJob& job, const std::vector<bool>& is_done, 
     point.run.request = plan.points[i].request;
     if (plan.points[i].key.settings.empty() && point.run.cycles)
       point.energy = energy_amounts(point.run, shipped_energies());
+    for (const StatisticReport& statistic : point.run.statistics) {
+      if (statistic.name == "sm.fragments_of_back_quads") point.fragments_of_back_quads = statistic.value;
+    }
     result.cpu_seconds += point.run.cpu_seconds;
     strip_point(point.run, i == 0);
     tasks[task].request.observers.reset();

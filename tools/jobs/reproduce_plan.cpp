@@ -31,6 +31,9 @@ const std::vector<std::string> fragment_candidates{"state.termination_threshold=
                                                    "state.splat_extent=three_sigma",
                                                    "state.pruning_threshold=0.02"};
 
+/// Where memory is ideal, stencil tests and updates cost nothing, which is what passes are weighed against.
+constexpr const char* paper_memory = "platform=agx-orin-lpddr3";
+
 /// Adds points once each, in the order in which they are asked for.
 class Points {
  public:
@@ -105,7 +108,7 @@ std::optional<std::string> refusal(const ReproduceOptions& options, const std::s
   }
 }
 
-/// Of each parameter the values that there are on the platform.
+/// Of each parameter, and of what reasons name, the values that there are on the platform.
 void choose_parameters(const ReproduceOptions& options, ReproducePlan& plan) {
   const auto is_kept = [&](const std::string& settings) {
     const std::optional<std::string> why = refusal(options, settings);
@@ -125,6 +128,15 @@ void choose_parameters(const ReproduceOptions& options, ReproducePlan& plan) {
     if (options.quick && settings != "state.termination_threshold=0.9999") continue;
     if (is_kept(settings)) plan.fragment_settings.push_back(settings);
   }
+  if (options.quick) return;
+  std::set<std::string> seen{""};
+  plan.trials.emplace_back();
+  for (const PaperRow& row : options.rows) {
+    for (const RowReason& reason : row.reasons) {
+      if (seen.insert(reason.setting).second && is_kept(reason.setting)) plan.trials.push_back(reason.setting);
+    }
+  }
+  if (options.base.platform->name == "agx-orin" && !refusal(options, paper_memory)) plan.passes_settings = paper_memory;
 }
 
 }  // namespace
@@ -184,6 +196,7 @@ Extent ReproducePlan::extent_of(Breadth breadth) {
 ReproducePlan plan_reproduction(const ReproduceOptions& options) {
   ReproducePlan plan;
   plan.quick = options.quick;
+  plan.rows = options.rows;
   plan.views = options.views.value_or(options.quick ? views_of_a_quick_look : views_by_default);
   plan.fidelity = options.fidelity.value_or(options.quick ? sensitivity_fidelity : Fidelity::cycle);
   choose_scenes(options, plan);
@@ -204,10 +217,11 @@ ReproducePlan plan_reproduction(const ReproduceOptions& options) {
     add(plan.fidelity, "", all_variants);
     if (plan.scenes[scene].is_large) continue;
     add(Fidelity::functional, "", without_merging, true);
-    add(sensitivity_fidelity, "", without_merging);
+    for (const std::string& settings : plan.trials) add(sensitivity_fidelity, settings, all_variants);
+    add(sensitivity_fidelity, plan.passes_settings, without_merging);
     for (const unsigned passes : planned_passes(plan.quick)) {
       key.passes = passes;
-      add(sensitivity_fidelity, "", {"baseline"});
+      add(sensitivity_fidelity, plan.passes_settings, {"baseline"});
     }
     key.passes = 1;
     for (const std::string& settings : efficiency_settings()) {

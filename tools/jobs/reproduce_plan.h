@@ -9,7 +9,9 @@
 #include <vector>
 
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/workloads/camera.h>
 
+#include "jobs/paper_rows.h"
 #include "jobs/sensitivity_table.h"
 
 namespace vrpipe::tools {
@@ -62,7 +64,8 @@ struct ReproduceOptions {
   std::vector<std::pair<std::string, std::string>> cameras;  ///< scene and SceneRequest::camera
   Lenses lenses = Lenses::as_written;                        ///< of these
   std::vector<std::string> substitutions;                    ///< NAME=FILE
-  RunRequest base;                                           ///< platform, settings and so on of every point
+  std::vector<PaperRow> rows = paper_rows();
+  RunRequest base;                   ///< platform, settings and so on of every point
   std::optional<Fidelity> fidelity;  ///< of the main comparison; none: as exact as there is time for
 };
 
@@ -79,6 +82,9 @@ struct ReproducePlan {
   std::map<std::string, std::size_t> places;     ///< of the points, by the names of their keys
   std::vector<SensitivityParameter> parameters;  ///< that are varied, with the values that the platform knows
   std::vector<std::string> fragment_settings;    ///< that could move fragments a quad
+  std::vector<PaperRow> rows;
+  std::vector<std::string> trials;  ///< settings of reasons, after the default; none in a quick look
+  std::string passes_settings;      ///< of passes, and of what they are compared with
   std::vector<SkippedSetting> skipped;
 
   /// The scenes of a parameter's points, and what of them is drawn.

@@ -2,358 +2,166 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <map>
-#include <utility>
+#include <set>
 
 #include <fmt/format.h>
+
+#include "jobs/reproduce_measures.h"
 
 namespace vrpipe::tools {
 namespace {
 
-/// Why a row that differs does, as far as it is known.
-const std::map<std::string, std::string>& reasons() {
-  const std::string front_end =
-      "the speed-ups hang on the cycles of a (primitive, screen tile) pair, which the paper leaves open: see the "
-      "sensitivity";
-  const std::string quads =
-      "quads follow fragments closely here: see the first riddle, on what the paper may have counted";
-  static const std::map<std::string, std::string> all{
-      {"R1", front_end},
-      {"R2", front_end},
-      {"R3", "fewer pairs in the best scene; over all scenes quads fall as in the paper (R8)"},
-      {"R4", "quads fall more than in the paper (R7); " + front_end},
-      {"R5", "stand-ins terminate otherwise than trained scenes"},
-      {"R6", "a lane counts as merged only where both of its fragments live; the paper may count four a pair"},
-      {"R7", quads},
-      {"R18", "of views round a stand-in, not of the data set's"},
-      {"R23", "the stand-in's view has more of its Gaussians in it"},
-      {"C5",
-       "a stencil test costs no memory traffic on this platform; with LPDDR3 passes gain less "
-       "(docs/early-termination.md)"},
-      {"C6", "stand-ins: outdoors the splats are small, and the front end bounds HET before CROP does"},
-      {"C7", "stand-ins: fewer of their quads overlap within a bin than in kitchen and bonsai"},
-      {"C8", "stand-ins: what is in front has larger splats, whose quads are fuller, so that quads can fall more"},
+/// What a statement comes to: the values that it is about, scene by scene, and where it does not hold.
+void check_conditions(const Evidence& evidence, RowFinding& finding) {
+  std::vector<std::string> six, quantities;
+  for (const SceneFinding& each : evidence.scenes) six.push_back(evidence.name_of(each));
+  std::map<std::string, std::set<std::string>> about;  // scenes, by quantity
+  const auto value = [&](const std::string& quantity, const std::string& scene) {
+    if (about.count(quantity) == 0) quantities.push_back(quantity);
+    about[quantity].insert(scene);
+    return find_quantity(quantity)->of(*evidence.scene(scene));
   };
-  return all;
+  std::set<std::string> exceptions;
+  for (const RowCondition& condition : finding.row->holds) {
+    const std::vector<std::string>& in = condition.in.empty() ? six : condition.in;
+    for (const auto* names : {&in, &condition.than_in}) {
+      for (const std::string& name : *names) {
+        if (evidence.scene(name) == nullptr) return;
+      }
+    }
+    for (const std::string& scene : in) {
+      const double own = value(condition.of, scene);
+      std::vector<double> others;
+      if (condition.number) others.push_back(*condition.number);
+      for (const std::string& quantity : condition.than) others.push_back(value(quantity, scene));
+      for (const std::string& other : condition.than_in) others.push_back(value(condition.of, other));
+      const auto holds = [&](double other) { return condition.is_above ? own > other : own < other; };
+      if (!std::all_of(others.begin(), others.end(), holds)) exceptions.insert(scene);
+    }
+  }
+  std::vector<std::string> texts;
+  for (const std::string& quantity : quantities) {
+    std::vector<std::string> values;
+    for (const PlannedScene& scene : evidence.result.plan.scenes) {
+      if (about[quantity].count(scene.name) == 0) continue;
+      values.push_back(fmt::format("{} {:.3g}", scene.name, value(quantity, scene.name)));
+    }
+    texts.push_back(fmt::format("{}: {}", quantity, fmt::join(values, ", ")));
+  }
+  finding.measured = fmt::format("{}", fmt::join(texts, "; "));
+  finding.exceptions.assign(exceptions.begin(), exceptions.end());
+  finding.verdict = exceptions.empty() ? Verdict::agrees : Verdict::differs;
 }
 
-std::string list(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ", ")); }
-
-/// Fills rows one by one.
-class Rows {
- public:
-  Rows(const ReproduceResult& result, const Findings& findings) : result_(result), findings_(findings) {}
-
-  std::vector<RowFinding> all() {
-    numbers();
-    microbenches();
-    claims();
-    std::vector<RowFinding> rows;
-    for (const PaperRow& row : paper_rows()) {
-      const auto found = found_.find(row.id);
-      RowFinding finding = found == found_.end() ? RowFinding() : found->second;
-      finding.row = &row;
-      if (!row.is_within_reach) finding.reason = row.how;
-      if (found == found_.end() && row.is_within_reach) {
-        finding.reason = result_.plan.quick ? "not in a quick look" : "there is nothing to measure it by";
-      }
-      if (finding.verdict == Verdict::differs && reasons().count(row.id) > 0) {
-        finding.reason += (finding.reason.empty() ? "" : "; ") + reasons().at(row.id);
-        if (finding.row->number > 0 && finding.reason.find("sensitivity") != std::string::npos) {
-          finding.reason += front_end_text();
-        }
-      }
-      rows.push_back(std::move(finding));
-    }
-    return rows;
+/// A row's measures, or those of a reason, beside the paper.
+RowFinding measured_row(const PaperRow& row, const std::vector<std::string>& measures, const Evidence& evidence) {
+  RowFinding finding;
+  finding.row = &row;
+  std::vector<std::string> texts;
+  std::string detail;
+  for (std::size_t i = 0; i < measures.size(); ++i) {
+    const std::optional<Measured> here = measure(measures[i], evidence);
+    if (here && !std::isfinite(here->number)) finding.reason = "nothing was drawn";
+    if (!here || !finding.reason.empty()) break;
+    texts.push_back(row.text(here->number));
+    if (!here->detail.empty()) detail = " (" + here->detail + ")";
+    if (here->geometric_mean) detail = " (geometric mean " + row.text(*here->geometric_mean) + ")";
+    if (row.published.empty()) continue;
+    const std::optional<double> difference = difference_percent(row.published[i], here->number);
+    const Verdict verdict = judge(row.relation, row.published[i], row.tolerance_percent, here->number);
+    if (finding.verdict != Verdict::differs) finding.verdict = verdict;
+    if (finding.number && std::fabs(*difference) <= std::fabs(*finding.difference_percent)) continue;
+    finding.number = here->number;
+    finding.difference_percent = difference;
   }
-
- private:
-  /// What a front end between one and two cycles a pair gives.
-  std::string front_end_text() const {
-    for (const StudyPoint& point : findings_.efficiency) {
-      if (point.settings != "raster.screen_tile_interval_cycles=1.5") continue;
-      return fmt::format(" (at 1.5 cycles in place of 1 HET {:.2f}x, HET+QM {:.2f}x, of the scenes there)",
-                         point.het.arithmetic, point.het_qm.arithmetic);
-    }
-    return {};
+  if (texts.size() == measures.size()) {
+    finding.measured = fmt::format("{}{}", fmt::join(texts, " / "), texts.size() == 1 ? detail : "");
   }
-  const std::string& name_of(const SceneFinding& scene) const { return result_.plan.scenes[scene.scene].name; }
-  std::vector<double> each(const std::function<double(const SceneFinding&)>& value) const {
-    std::vector<double> values;
-    for (const SceneFinding& scene : findings_.scenes) values.push_back(value(scene));
-    return values;
+  if (!row.holds.empty()) check_conditions(evidence, finding);
+  if (!row.is_judged()) finding.verdict = row.unjudged;
+  return finding;
+}
+
+/// Whether what was tried gives the row, or at least half of what is missing.
+bool explains(const RowFinding& tried, const RowFinding& without) {
+  if (tried.verdict == Verdict::agrees) return true;
+  if (tried.row->relation == Relation::claim) return tried.exceptions.size() < without.exceptions.size();
+  const auto missing = [](const RowFinding& of) {
+    return distance(of.row->relation, of.row->number(), of.number.value_or(std::nan("")));
+  };
+  return missing(tried) <= missing(without) / 2;
+}
+
+/// What was found with a reason, in a few words.
+std::string short_text(const RowFinding& finding) {
+  if (finding.number) return finding.row->text(*finding.number);
+  return finding.exceptions.empty() ? "so in all" : fmt::format("not so in {}", fmt::join(finding.exceptions, ", "));
+}
+
+/// Nothing where it is not tried: in a quick look, and where the platform does not know the setting.
+std::optional<TriedReason> try_reason(const RowReason& reason, const RowFinding& finding,
+                                      const std::vector<RowFinding>& rows, const ReproduceResult& result,
+                                      const Findings& findings) {
+  const PaperRow& row = *finding.row;
+  if (!reason.measure.empty()) {
+    const RowFinding other = measured_row(row, {reason.measure}, {result, findings.scenes, findings.large});
+    return TriedReason{&reason, short_text(other), explains(other, finding)};
   }
-
-  void number(const std::string& id, double measured, const std::string& text, const std::string& reason = "") {
-    const PaperRow& row = paper_row(id);
-    RowFinding& finding = found_[id];
-    finding.measured = std::isfinite(measured) ? text : "";
-    if (std::isfinite(measured)) finding.number = measured;
-    finding.difference_percent = difference_percent(row.number, measured);
-    finding.verdict = judge(row.relation, row.number, row.tolerance_percent, measured);
-    finding.reason = std::isfinite(measured) ? reason : "nothing was drawn";
+  if (!reason.row.empty()) {
+    const RowFinding& other =
+        *std::find_if(rows.begin(), rows.end(), [&](const RowFinding& each) { return each.row->id == reason.row; });
+    const double sides = other.difference_percent.value_or(0) * finding.difference_percent.value_or(0);
+    return TriedReason{&reason, short_text(other), other.verdict == Verdict::differs && sides > 0};
   }
+  const auto at = findings.trials.find(reason.setting);
+  if (at == findings.trials.end()) return std::nullopt;
+  const std::vector<SceneFinding> none;
+  const RowFinding with = measured_row(row, row.measures, {result, at->second, none});
+  const RowFinding without = measured_row(row, row.measures, {result, findings.trials.at(""), none});
+  return TriedReason{&reason, short_text(with), explains(with, without)};
+}
 
-  void mean(const std::string& id, double Gains::*what, const char* form) {
-    const Mean of = mean_of(each([&](const SceneFinding& scene) { return scene.gains.*what; }));
-    number(id, of.arithmetic,
-           fmt::format(form, of.arithmetic) + " (geometric mean " + fmt::format(form, of.geometric) + ")");
+/// Where it does not hold, what is shown to be the reason, and what was tried in vain.
+std::string reason_text(const RowFinding& finding, bool is_quick) {
+  std::vector<std::string> parts, vain;
+  if (!finding.exceptions.empty()) parts.push_back(short_text(finding));
+  const std::size_t before = parts.size();
+  for (const TriedReason& tried : finding.tried) {
+    const RowReason& by = *tried.reason;
+    const std::string found = by.setting.empty() ? tried.measured : by.setting + ": " + tried.measured;
+    (tried.is_shown ? parts : vain).push_back(fmt::format("{} ({})", by.text, found));
   }
-
-  void best(const std::string& id, double Gains::*what) {
-    const auto is_less = [&](const SceneFinding& a, const SceneFinding& b) { return a.gains.*what < b.gains.*what; };
-    const auto most = std::max_element(findings_.scenes.begin(), findings_.scenes.end(), is_less);
-    number(id, most->gains.*what, fmt::format("{:.2f}x ({})", most->gains.*what, name_of(*most)));
+  if (parts.size() == before) {
+    const bool is_untried = is_quick && finding.tried.size() < finding.row->reasons.size();
+    parts.emplace_back(is_untried ? "reasons are not tried in a quick look" : "no reason is known");
   }
-
-  void numbers() {
-    best("R1", &Gains::het_qm);
-    mean("R2", &Gains::het_qm, "{:.2f}x");
-    best("R3", &Gains::qm);
-    mean("R4", &Gains::het, "{:.2f}x");
-    mean("R5", &Gains::fragments_het, "/{:.2f}");
-    mean("R6", &Gains::fragments_merging, "/{:.2f}");
-    mean("R7", &Gains::quads_het, "/{:.2f}");
-    mean("R8", &Gains::quads_merging, "/{:.2f}");
-    const StorageReport storage = quad_merging_storage(findings_.scenes.front().runs[3]->run.request);
-    const double tgc = static_cast<double>(storage.tgc_bytes), qru = static_cast<double>(storage.qru_bytes);
-    number("R14", tgc / 1024, fmt::format("{:.2f} KB", tgc / 1024));
-    number("R15", qru, fmt::format("{:.0f} B", qru));
-    number("R16", (tgc + qru) / 1024, fmt::format("{:.2f} KB", (tgc + qru) / 1024));
-    ratios();
-    energies();
-    draws();
-    scenes();
-  }
-
-  std::optional<double> figure(const std::string& bench, const std::string& name) const {
-    for (const MicrobenchResult& result : result_.microbenches) {
-      if (result.name != bench) continue;
-      for (const MicrobenchFigure& each : result.figures) {
-        if (each.name == name) return each.measured;
-      }
-    }
-    return std::nullopt;
-  }
-
-  void microbench(const std::string& id, const std::string& bench, const std::string& name, const char* form) {
-    const std::optional<double> measured = figure(bench, name);
-    if (measured) number(id, *measured, fmt::format(form, *measured));
-  }
-
-  void microbenches() {
-    microbench("R24", "crop-cache", "largest working set without reads", "{:.0f} KB");
-    microbench("R28", "tile-binning", "bins", "{:.0f}");
-    microbench("R29", "tile-binning", "warps, 320 quads over 32 tiles", "{:.0f} warps");
-    microbench("R30", "tile-binning", "warps, 330 quads over 33 tiles", "{:.0f} warps");
-    const std::optional<double> half = figure("rop-throughput", "RGBA16F, blending, 32x32");
-    const std::optional<double> bytes = figure("rop-throughput", "RGBA8, blending, 32x32");
-    if (half && bytes) {
-      constexpr double paper_rgba8 = 16;
-      number("R25", *half, fmt::format("{:.1f} / {:.1f} px/clk", *bytes, *half));
-      const PaperRow& row = paper_row("R25");
-      if (judge(row.relation, paper_rgba8, row.tolerance_percent, *bytes) == Verdict::differs) {
-        found_["R25"].verdict = Verdict::differs;
-      }
-      constexpr double bytes_of_rgba16f = 8;
-      number("R26", *half * bytes_of_rgba16f, fmt::format("{:.0f} B/clk", *half * bytes_of_rgba16f));
-    }
-    std::vector<std::string> texts, exceptions;
-    for (const char* live : {"3 of 4", "2 of 4, side by side", "1 of 4"}) {
-      const auto times = figure("quad-coverage", std::string("time of a live pixel, ") + live);
-      if (!times) return;
-      texts.push_back(fmt::format("{} live: {:.2f}x the time of a pixel", live, *times));
-      if (!(*times > 1)) exceptions.emplace_back(live);
-    }
-    claim("C12", list(texts), exceptions);
-  }
-
-  void ratios() {
-    double least = findings_.scenes.front().ratio_mean;
-    std::string of = name_of(findings_.scenes.front());
-    for (const SceneFinding& scene : findings_.scenes) {
-      if (scene.ratio_mean < least) {
-        least = scene.ratio_mean;
-        of = name_of(scene);
-      }
-      if (name_of(scene) != "train" || !scene.ratio_distribution) continue;
-      number("R18", scene.ratio_distribution->maximum,
-             fmt::format("{:.2f}, of {} views", scene.ratio_distribution->maximum, result_.plan.views));
-    }
-    number("R19", least, fmt::format("{:.2f} ({})", least, of));
-    number("R20", 100 * (1 - 1 / least), fmt::format("{:.0f} % ({})", 100 * (1 - 1 / least), of));
-  }
-
-  /// Beside the paper's, which are of another quantity: no verdict.
-  void energies() {
-    std::vector<Range> of;
-    for (const SceneFinding& scene : findings_.scenes) {
-      const auto &baseline = scene.runs[0]->energy, &extended = scene.runs[3]->energy;
-      const std::optional<Range> ratio =
-          baseline && extended ? energy_ratio(*baseline, *extended, shipped_energies()) : std::nullopt;
-      if (!ratio) return;
-      of.push_back(*ratio);
-    }
-    Range mean;
-    for (const Range& each : of) mean += each * (1 / static_cast<double>(of.size()));
-    const auto most =
-        std::max_element(of.begin(), of.end(), [](const Range& a, const Range& b) { return a.nominal < b.nominal; });
-    const auto best = static_cast<std::size_t>(most - of.begin());
-    const auto text = [](const Range& range) {
-      return fmt::format("{:.2f}x, from {:.2f}x to {:.2f}x", range.nominal, range.low, range.high);
-    };
-    found_["R12"].measured = text(mean);
-    found_["R13"].measured = text(of[best]) + " (" + name_of(findings_.scenes[best]) + ")";
-    for (const char* id : {"R12", "R13"}) {
-      found_[id].reason = std::string("another method: simulated here; the paper's is ") + paper_energy_method();
-    }
-  }
-
-  /// What the draw alone takes of R21's 40 ms; no verdict on the frame.
-  void draws() {
-    const std::vector<double> milliseconds =
-        each([](const SceneFinding& scene) { return scene.runs[0]->run.milliseconds; });
-    const auto [least, most] = std::minmax_element(milliseconds.begin(), milliseconds.end());
-    found_["R21"].measured = fmt::format("the draw alone: {:.0f} to {:.0f} ms", *least, *most);
-  }
-
-  void scenes() {
-    const auto most =
-        std::max_element(findings_.scenes.begin(), findings_.scenes.end(), [](const auto& a, const auto& b) {
-          return a.runs[0]->gaussians_visible < b.runs[0]->gaussians_visible;
-        });
-    const auto visible = static_cast<double>(most->runs[0]->gaussians_visible);
-    number("R23", visible, fmt::format("{:.0f} K ({})", visible / 1e3, name_of(*most)));
-    if (findings_.large.size() < 2) return;
-    const auto building = static_cast<double>(findings_.large[0].runs[0]->gaussians_total);
-    const auto rubble = static_cast<double>(findings_.large[1].runs[0]->gaussians_total);
-    number("R32", building, fmt::format("{:.2f} M / {:.2f} M", building / 1e6, rubble / 1e6));
-    if (judge(Relation::about, 5.21e6, 1, rubble) == Verdict::differs) found_["R32"].verdict = Verdict::differs;
-  }
-
-  /// A statement that holds in all scenes but those named.
-  void claim(const std::string& id, const std::string& measured, const std::vector<std::string>& exceptions) {
-    RowFinding& finding = found_[id];
-    finding.measured = measured;
-    finding.verdict = exceptions.empty() ? Verdict::agrees : Verdict::differs;
-    if (!exceptions.empty()) finding.reason = "not so in " + list(exceptions);
-  }
-
-  const SceneFinding& scene(const std::string& name) const {
-    return *std::find_if(findings_.scenes.begin(), findings_.scenes.end(),
-                         [&](const SceneFinding& each) { return name_of(each) == name; });
-  }
-
-  /// That some scenes have more of something than all others, by the scenes that have not.
-  std::vector<std::string> not_above(const std::vector<std::string>& high, const std::vector<std::string>& low,
-                                     const std::function<double(const SceneFinding&)>& value) const {
-    std::vector<std::string> exceptions;
-    for (const std::string& name : high) {
-      const bool is_above = std::all_of(low.begin(), low.end(), [&](const std::string& other) {
-        return value(scene(name)) > value(scene(other));
-      });
-      if (!is_above) exceptions.push_back(name);
-    }
-    return exceptions;
-  }
-
-  std::string values(const std::function<double(const SceneFinding&)>& value, const char* form) const {
-    std::vector<std::string> texts;
-    for (const SceneFinding& each : findings_.scenes) {
-      texts.push_back(name_of(each) + " " + fmt::format(form, value(each)));
-    }
-    return list(texts);
-  }
-
-  static double utilization(const PointResult& point, const std::string& unit) {
-    for (const auto& [name, value] : point.run.utilization) {
-      if (name == unit) return value;
-    }
-    return 0;
-  }
-
-  void claims() {
-    const std::vector<std::string> outdoor{"train", "truck"}, others{"kitchen", "bonsai", "lego", "palace"};
-    std::vector<std::string> exceptions;
-    for (const SceneFinding& each : findings_.scenes) {
-      const auto of = [&](const char* unit) { return utilization(*each.runs[0], unit); };
-      const double rop = std::min(of("prop"), of("crop"));
-      if (rop <= std::max({of("raster"), of("zrop"), of("sm")}) || of("sm") > 0.5 * rop) {
-        exceptions.push_back(name_of(each));
-      }
-    }
-    const auto unit = [](const char* name) {
-      return [name](const SceneFinding& each) { return 100 * utilization(*each.runs[0], name); };
-    };
-    claim("C2", "CROP, %: " + values(unit("crop"), "{:.0f}") + "; SM, %: " + values(unit("sm"), "{:.0f}"), exceptions);
-
-    passes(others, outdoor);
-
-    const auto het = [](const SceneFinding& each) { return each.gains.het; };
-    exceptions = not_above(outdoor, others, het);
-    for (const std::string& name : not_above({"kitchen", "train", "truck"}, {"bonsai"}, het)) {
-      exceptions.push_back(name + " against bonsai");
-    }
-    claim("C6", values(het, "{:.2f}x"), exceptions);
-    const auto qm = [](const SceneFinding& each) { return each.gains.qm; };
-    claim("C7", values(qm, "{:.2f}x"), not_above({"train", "truck", "lego", "palace"}, {"kitchen", "bonsai"}, qm));
-    exceptions.clear();
-    for (const SceneFinding& each : findings_.scenes) {
-      if (!(each.gains.quads_het < each.gains.fragments_het)) exceptions.push_back(name_of(each));
-    }
-    claim("C8",
-          "quads " + values([](const SceneFinding& each) { return each.gains.quads_het; }, "/{:.2f}") + "; fragments " +
-              values([](const SceneFinding& each) { return each.gains.fragments_het; }, "/{:.2f}"),
-          exceptions);
-    const auto ratio = [](const SceneFinding& each) { return each.ratio_mean; };
-    claim("C9", values(ratio, "{:.2f}"), not_above(outdoor, others, ratio));
-    large_scenes();
-  }
-
-  /// What passes gain at their best, against what they could: less than half of it, and elsewhere no more than a tenth.
-  void passes(const std::vector<std::string>& marginal, const std::vector<std::string>& gaining) {
-    constexpr double marginal_gain = 1.1;
-    const auto best = [](const SceneFinding& each) {
-      return *std::max_element(each.passes.begin(), each.passes.end());
-    };
-    std::vector<std::string> exceptions;
-    for (const std::string& name : marginal) {
-      if (!(best(scene(name)) <= marginal_gain)) exceptions.push_back(name);
-    }
-    for (const std::string& name : gaining) {
-      const SceneFinding& each = scene(name);
-      if (!(best(each) > 1 && best(each) < each.het_beside_passes)) exceptions.push_back(name);
-    }
-    claim("C5",
-          "best of passes " + values(best, "{:.2f}x") + "; HET " +
-              values([](const SceneFinding& each) { return each.het_beside_passes; }, "{:.2f}x"),
-          exceptions);
-  }
-
-  void large_scenes() {
-    if (findings_.large.empty()) return;
-    std::vector<std::string> exceptions, texts;
-    for (const SceneFinding& each : findings_.large) {
-      const std::optional<Bottleneck>& bottleneck = each.runs[0]->run.bottleneck;
-      const std::string unit = bottleneck ? bottleneck->unit : "nothing";
-      const bool is_rop = unit.find("crop") != std::string::npos || unit.find("prop") != std::string::npos;
-      if (!is_rop || !(each.gains.het_qm > 1)) exceptions.push_back(name_of(each));
-      texts.push_back(fmt::format("{} bound by {}, HET+QM {:.2f}x", name_of(each), unit, each.gains.het_qm));
-    }
-    claim("C11", list(texts), exceptions);
-  }
-
-  const ReproduceResult& result_;
-  const Findings& findings_;
-  std::map<std::string, RowFinding> found_;
-};
+  if (!vain.empty()) parts.push_back(fmt::format("tried in vain: {}", fmt::join(vain, ", ")));
+  return fmt::format("{}", fmt::join(parts, "; "));
+}
 
 }  // namespace
 
 std::vector<RowFinding> find_rows(const ReproduceResult& result, const Findings& findings) {
-  return Rows(result, findings).all();
+  std::vector<RowFinding> rows;
+  for (const PaperRow& row : result.plan.rows) {
+    RowFinding finding = measured_row(row, row.measures, {result, findings.scenes, findings.large});
+    if (!row.is_judged()) {
+      finding.reason = row.why;
+    } else if (finding.verdict == Verdict::cannot_say && finding.reason.empty()) {
+      finding.reason = result.plan.quick ? "not in a quick look" : "there is nothing to measure it by";
+    }
+    rows.push_back(std::move(finding));
+  }
+  for (RowFinding& finding : rows) {
+    if (finding.verdict != Verdict::differs) continue;
+    for (const RowReason& reason : finding.row->reasons) {
+      std::optional<TriedReason> tried = try_reason(reason, finding, rows, result, findings);
+      if (tried) finding.tried.push_back(std::move(*tried));
+    }
+    finding.reason = reason_text(finding, result.plan.quick);
+  }
+  return rows;
 }
 
 }  // namespace vrpipe::tools

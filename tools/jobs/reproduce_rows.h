@@ -9,17 +9,26 @@
 
 namespace vrpipe::tools {
 
+/// What came of a reason that was tried.
+struct TriedReason {
+  const RowReason* reason = nullptr;
+  std::string measured;  ///< with it
+  bool is_shown = false;
+};
+
 /// A row of the paper beside what was measured.
 struct RowFinding {
   const PaperRow* row = nullptr;
   std::string measured;                      ///< empty: nothing
-  std::optional<double> number;              ///< what is judged
+  std::optional<double> number;              ///< of several the one that is the farthest from the paper's
   std::optional<double> difference_percent;  ///< of the paper's
+  std::vector<std::string> exceptions;       ///< where a statement does not hold
   Verdict verdict = Verdict::cannot_say;
-  std::string reason;  ///< where it differs, cannot be said, or is by design
+  std::vector<TriedReason> tried;  ///< where it differs
+  std::string reason;              ///< where it differs or is not judged
 };
 
-/// Every row, in the order of the paper_rows().
+/// Every row of the plan, in its order. The plan outlives them.
 std::vector<RowFinding> find_rows(const ReproduceResult& result, const Findings& findings);
 
 }  // namespace vrpipe::tools

@@ -173,8 +173,8 @@ std::string energy_text(const std::vector<RunResult>& runs, std::size_t baseline
           printable(table.process)));
   text += left_out_text(runs, spent, table);
   if (runs.size() > 1) {
-    text += broken_at_commas(fmt::format("the paper has {} on average and {} (R12, R13) by another method: {}",
-                                         paper_row("R12").value, paper_row("R13").value, paper_energy_method()));
+    text += broken_at_commas(fmt::format("the paper has {} on average and {} (R12, R13) by {}", paper_row("R12").says,
+                                         paper_row("R13").says, paper_row("R12").why));
   }
   return text;
 }

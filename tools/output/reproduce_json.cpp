@@ -14,6 +14,7 @@ namespace {
 
 Json finite_json(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 Json finite_json(const std::optional<double>& value) { return value ? finite_json(*value) : Json(); }
+Json text_or_null(const std::string& text) { return text.empty() ? Json() : Json(text); }
 Json mean_json(const Mean& mean) {
   return {{"arithmetic", finite_json(mean.arithmetic)}, {"geometric", finite_json(mean.geometric)}};
 }
@@ -21,18 +22,28 @@ Json mean_json(const Mean& mean) {
 Json row_json(const RowFinding& finding) {
   const PaperRow& row = *finding.row;
   const bool is_number = row.relation != Relation::claim;
+  Json tried = Json::array();
+  for (const TriedReason& each : finding.tried) {
+    tried.push_back({{"reason", each.reason->text},
+                     {"setting", text_or_null(each.reason->setting)},
+                     {"measure", text_or_null(each.reason->measure)},
+                     {"row", text_or_null(each.reason->row)},
+                     {"measured", each.measured},
+                     {"is_shown", each.is_shown}});
+  }
   return {{"id", row.id},
           {"what", row.what},
-          {"section", row.where},
-          {"paper", row.value},
-          {"paper_number", is_number ? Json(row.number) : Json()},
+          {"section", row.section},
+          {"paper", row.says},
+          {"paper_number", is_number ? Json(row.number()) : Json()},
           {"tolerance_percent", is_number ? Json(row.tolerance_percent) : Json()},
-          {"how", row.how},
-          {"measured", finding.measured.empty() ? Json() : Json(finding.measured)},
+          {"how", text_or_null(row.how)},
+          {"measured", text_or_null(finding.measured)},
           {"measured_number", finite_json(finding.number)},
           {"difference_percent", finite_json(finding.difference_percent)},
           {"verdict", name_of(finding.verdict)},
-          {"reason", finding.reason.empty() ? Json() : Json(finding.reason)}};
+          {"reason", text_or_null(finding.reason)},
+          {"tried", std::move(tried)}};
 }
 
 Json point_json(const PointResult& point) {
@@ -68,7 +79,9 @@ Json finding_json(const Reproduction& of, const SceneFinding& scene) {
             {"speedup",
              {{"qm", finite_json(gains.qm)}, {"het", finite_json(gains.het)}, {"het+qm", finite_json(gains.het_qm)}}},
             {"fragments_blended",
-             {{"het", finite_json(gains.fragments_het)}, {"qm_on_het", finite_json(gains.fragments_merging)}}},
+             {{"het", finite_json(gains.fragments_het)},
+              {"qm_on_het", finite_json(gains.fragments_merging)},
+              {"qm_on_het_second_quads_whole", finite_json(gains.fragments_merging_whole)}}},
             {"quads_blended", {{"het", finite_json(gains.quads_het)}, {"qm_on_het", finite_json(gains.quads_merging)}}},
             {"runs", std::move(runs)}};
   if (!planned.is_large) {

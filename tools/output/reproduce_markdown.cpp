@@ -32,21 +32,24 @@ std::string table_markdown(const std::vector<std::string>& heading, const std::v
 std::string reproduction_markdown(const Reproduction& of) {
   std::string text =
       "# The paper's results, reproduced\n\n"
-      "Written by one command, on an unloaded machine of two cores in a quarter of an hour; do not edit:\n\n"
-      "<!-- not run: takes a quarter of an hour -->\n"
+      "Written by one command, on an unloaded machine of two cores in twenty minutes; do not edit:\n\n"
+      "<!-- not run: takes twenty minutes -->\n"
       "```console\n$ build/bin/vrpipe reproduce" +
       std::string(of.result.plan.quick ? " --quick" : "") +
       " --markdown docs/reproduction.md\n```\n\n"
       "`--quick` takes less than three minutes, `--html FILE` writes a page with plots and heat maps, `--scene "
       "train=FILE` takes a\n"
-      "trained model. What was done of an interrupted run is not done again.\n\n";
+      "trained model. What was done of an interrupted run is not done again. The rows are\n"
+      "[a file](../tools/jobs/paper_rows.toml): what the paper says and where, how it is measured and judged here, and "
+      "what may explain\n"
+      "a difference; `--rows FILE` takes one of yours.\n\n";
   for (const std::string& line : reproduction_heading(of)) text += "* " + line + "\n";
   text += "\n**" + verdict_summary(of) + ".**\n\n## Row by row\n\n";
   std::vector<std::vector<std::string>> rows;
   for (const RowFinding& finding : of.rows) {
     const PaperRow& row = *finding.row;
-    rows.push_back({row.id, row.what, row.where, row.value, finding.measured, difference_text(finding),
-                    verdict_text(of, finding), finding.reason.empty() ? row.how : finding.reason});
+    rows.push_back({row.id, row.what, row.section, row.says, finding.measured, difference_text(finding),
+                    verdict_text(of, finding), why_text(finding)});
   }
   text += table_markdown({"id", "what", "paper", "its number", "here", "difference", "verdict", "why, or how measured"},
                          rows);
@@ -70,8 +73,9 @@ std::string reproduction_markdown(const Reproduction& of) {
       "| key | holds |\n|---|---|\n"
       "| `schema`, `version`, `command`, `quick`, `platform`, `fidelity`, `format`, `simulations` | what was run |\n"
       "| `rows` | of each row `id`, `what`, `section`, `paper`, `paper_number`, `tolerance_percent`, `how`, "
-      "`measured`, "
-      "`measured_number`, `difference_percent`, `verdict`, `reason`; null where there is none |\n"
+      "`measured`, `measured_number`, `difference_percent`, `verdict`, `reason`, `tried`: of each reason its text, "
+      "`setting`, `measure` or `row`, what was `measured` with it and whether it `is_shown`; null where there is "
+      "none |\n"
       "| `scenes`, `large_scenes` | `runs` of the four variants with counts, utilisation and bottleneck; speed-ups; of "
       "the six "
       "also ratios by view, fragments a pixel, passes |\n"

@@ -53,12 +53,11 @@ std::string rows_html(const Reproduction& of) {
                              : finding.verdict == Verdict::differs ? "differs"
                                                                    : "cannot";
     text += fmt::format("<tr id=\"{0}\"><td>{0}</td>", row.id);
-    for (const std::string& cell : {std::string(row.what), std::string(row.where), std::string(row.value),
-                                    finding.measured, difference_text(finding)}) {
+    for (const std::string& cell : {row.what, row.section, row.says, finding.measured, difference_text(finding)}) {
       text += "<td>" + html_escaped(cell) + "</td>";
     }
     text += fmt::format("<td class=\"{}\">{}</td><td>{}</td></tr>\n", kind, verdict_text(of, finding),
-                        html_escaped(finding.reason.empty() ? row.how : finding.reason));
+                        html_escaped(why_text(finding)));
   }
   return text + "</table>\n";
 }

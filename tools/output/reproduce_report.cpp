@@ -26,13 +26,13 @@ std::string row_text(const Reproduction& of, const RowFinding& finding, const Te
                                  finding.verdict == Verdict::agrees    ? style.good(verdict)
                                  : finding.verdict == Verdict::differs ? style.bold(verdict)
                                                                        : style.dim(verdict),
-                                 row.value);
+                                 row.says);
   const std::string measured = finding.measured.empty() ? "-" : finding.measured;
   const std::string difference = difference_text(finding);
   const bool is_short = measured.size() + difference.size() < 30;
   text += (is_short ? measured + (difference.empty() ? "" : ", " + difference) : difference) + "\n";
   constexpr std::size_t indent = 4;
-  text += style.dim(indented(fmt::format("{}; paper {}", row.what, row.where), indent));
+  text += style.dim(indented(fmt::format("{}; paper {}", row.what, row.section), indent));
   if (!is_short) text += indented(measured, indent);
   if (!finding.reason.empty()) text += indented(finding.reason, indent);
   return text;

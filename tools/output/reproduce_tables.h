@@ -43,11 +43,13 @@ std::vector<ReportTable> all_tables(const Reproduction& of);
 
 /// What was simulated, and what was left out; one sentence each.
 std::vector<std::string> reproduction_heading(const Reproduction& of);
-/// How many rows agree, differ and cannot be judged.
+/// How many of the rows that could have failed agree, and what the others are.
 std::string verdict_summary(const Reproduction& of);
 /// The verdict of a row, which says where it is one on a reduced size.
 std::string verdict_text(const Reproduction& of, const RowFinding& row);
 std::string difference_text(const RowFinding& row);
+/// Why it differs or is not judged, else how it was measured.
+std::string why_text(const RowFinding& row);
 /// Settings, or what stands for none.
 std::string settings_text(const std::string& settings);
 /// Whether a study point's efficiencies are both near the paper's.

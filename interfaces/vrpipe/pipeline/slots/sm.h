@@ -103,6 +103,8 @@ class SmBehaviour : public Behaviour {
   /// Of a pair, its back quad's draw; what is left is its front quad's.
   DrawCounter quads_merged{*this, "quads_merged", "quads", "taken away by merging, one a pair with two live quads"};
   DrawCounter fragments_merged{*this, "fragments_merged", "fragments", "taken away by merging, where both are live"};
+  Counter fragments_of_back_quads{*this, "fragments_of_back_quads", "fragments",
+                                  "live in the back quads of merged pairs, whether or not the front's are"};
   Counter fragment_warps{*this, "fragment_warps", "warps", "of fragments"};
   Counter vertex_warps{*this, "vertex_warps", "warps", "of vertices"};
 
