@@ -213,14 +213,15 @@ std::map<std::string, double> ratios(const json& result) {
 TEST_F(Microbench, LawsOfStripsHoldAndThoseThatDoNotAreKnown) {
   const json result = json_of({"microbench", "strips"});
   EXPECT_EQ(result["platform"]["name"], "gh100-gpc") << "by default";
-  // The GPU's lines of 256 bytes are 32 bytes by 8 rows, the simulator's 8x4 pixels of RGBA16F.
-  const std::set<std::string> known{"RGBA16F, no blending: 4x8", "RGBA16F, blending: 4x8", "RGBA16F, no blending: 16x2",
-                                    "RGBA16F, no blending: 64x2", "RGBA32F, no blending: 4x4"};
+  // A column of quads takes a flit more a line there than its sectors; of rectangles so small some are bound by more.
+  const std::map<std::string, double> known{{"RGBA16F, no blending: 2x64", 0.17},
+                                            {"RGBA16F, no blending: 4x4", 0.045},
+                                            {"RGBA16F, blending: 4x4", 0.045}};
   for (const auto& [name, ratio] : ratios(result)) {
-    EXPECT_NEAR(ratio, 1, known.count(name) > 0 ? 0.2 : 0.025) << name;
+    EXPECT_NEAR(ratio, 1, known.count(name) > 0 ? known.at(name) : 0.025) << name;
   }
   EXPECT_EQ(result["microbenchmarks"][0]["groups"].back()["name"], "all");
-  EXPECT_LT(result["microbenchmarks"][0]["groups"].back()["mean_percent"].get<double>(), 3);
+  EXPECT_LT(result["microbenchmarks"][0]["groups"].back()["mean_percent"].get<double>(), 1.5);
 }
 
 TEST_F(Microbench, QuadsWaitForTheSamePlaceAsMeasured) {
@@ -241,15 +242,6 @@ TEST_F(Microbench, QuadsWaitForTheSamePlaceAsMeasured) {
       << finished.out;
   EXPECT_NE(finished.out.find("ratio"), std::string::npos);
   EXPECT_NE(read_file(folder() / "same.html").find("RGBA32F, blending: 20 figures, off by"), std::string::npos);
-}
-
-// Of lines that return with others the law is a constant still (docs/silicon.md).
-TEST_F(Microbench, ALineThatReturnsAloneWaitsAsMeasured) {
-  const auto of = ratios(json_of({"microbench", "returning-lines", "--fidelity", "lt"}));
-  for (const char* name : {"killed, 40 tiles in turn: (0, 0)", "killed, 64 tiles in turn: (0, 0)",
-                           "RGBA16F, 40 tiles in turn: (0, 0)", "RGBA8, 40 tiles in turn: (0, 0)"}) {
-    EXPECT_NEAR(of.at(name), 1, 0.02) << name;
-  }
 }
 
 TEST_F(Microbench, LawsOfAnotherPlatformHaveNoRatio) {
