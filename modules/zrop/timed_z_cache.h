@@ -48,8 +48,9 @@ class TimedZCache {
   }
 
   struct Times {
-    Cycle at = 0;     ///< looked up
-    Cycle there = 0;  ///< can be tested
+    Cycle at = 0;           ///< looked up
+    Cycle there = 0;        ///< can be tested
+    bool has_come = false;  ///< a line, into the cache
   };
   /// The depth-stencil target is cleared, behind what was looked up before.
   void clear() {
@@ -151,7 +152,10 @@ class TimedZCache {
     times.at = turn;
     lines_->find(beat.tile, beat.quads.data(), beat.count, needed_);
     for (unsigned i = 0; i < needed_.count; ++i) {
+      const Cycle at = times.at;
       const SectoredCache::Line line = look_up(needed_.lines[i], times);
+      if (std::exchange(times.has_come, false) && timing_.fetches_ahead() && &way == &early_)
+        uses_[lines_->index(needed_.lines[i].address)].come(at, true);
       // Lines are read in order, and may go then.
       way.read = std::max(way.read, times.there);
       kept_until_[line] = std::max(kept_until_[line], way.read);
@@ -173,7 +177,7 @@ class TimedZCache {
     if (access.replaced) {
       if (!timing_.fetches_ahead()) times.at = std::max(times.at, kept_until_[access.line]);
       if (access.written_back != 0) write_back(access, times.at);
-      if (timing_.fetches_ahead()) uses_[lines_->index(access.address)].come(times.at, true);
+      times.has_come = true;
     }
     if (access.filled != 0) {
       send(access.address, access.filled, cache_->present(access.line) & ~access.filled, times.at);
