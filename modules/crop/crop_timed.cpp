@@ -233,12 +233,11 @@ class TimedCrop : public TimedUnit {
   [[gnu::noinline]] Cycle look_again(const ShadedWarp& warp, unsigned index, Cycle looked_up) {
     const CropBehaviour::LineAccess& line = cache_.lines[cache_.line_of[index]];
     const std::uint32_t sectors = cache_.sectors_of[index];
-    const std::uint32_t primitive = warp.first_primitive[index];
-    if (primitive != visiting_.primitive || warp.tile != visiting_.tile) ++visit_;
-    visiting_ = {warp.tile, primitive};
+    const LineVisits::Visit visit =
+        visits_.of(behaviour_->surface()->grid().place(warp.tile, 0), warp.first_primitive[index]);
     Cycle at = second_looks_.take(queue_.free_from(looked_up, 1), 1).first;
     Cycle there = at;
-    const TimedLineUses::Look look = uses_of(line).look_again(visit_, sectors, time_.cache.sectors_of_a_half(), at);
+    const TimedLineUses::Look look = uses_of(line).look_again(visit, sectors, time_.cache.sectors_of_a_half(), at);
     if (look.again != 0) {
       fetched_again_ += static_cast<unsigned>(__builtin_popcount(look.again));
       if (look.is_first) send(1, at);
@@ -327,12 +326,7 @@ class TimedCrop : public TimedUnit {
   Ring<Move> moves_;  ///< that the blender has not given its time to yet
   std::vector<Stay> stays_;
   std::vector<TimedLineUses> uses_;  ///< by line of the surface, where tags are looked at twice
-  struct Visiting {
-    TileId tile;
-    std::uint32_t primitive = ~0U;
-  };
-  Visiting visiting_;  ///< of the last quad
-  LineVisits::Visit visit_ = 0;
+  VisitCounter visits_;
   Cycle end_ = never;
   bool any_blended_ = false;
   StatisticSet more_cache_statistics_{*this, "cache"};

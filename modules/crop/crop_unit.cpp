@@ -127,14 +127,8 @@ class CropUnit : public Unit {
     if (stay == LinesAhead::no_stay) return false;
     pay(ahead_->take_moves());
     if (fills) ask(quad, place);
-    queue(quad, stay, sectors, place).visit = visit_of(quad);
+    queue(quad, stay, sectors, place).visit = visits_.of(tile_place_, quad.warp->first_primitive[quad.index]);
     return true;
-  }
-  LinesAhead::Visit visit_of(const ColorQuad& quad) {
-    const std::uint32_t primitive = quad.warp->first_primitive[quad.index];
-    if (primitive != visiting_.primitive || tile_place_ != visiting_.tile) ++visit_;
-    visiting_ = {tile_place_, primitive};
-    return visit_;
   }
   /// Quads in the queue, in their order.
   [[gnu::noinline]] bool look_again() {
@@ -387,12 +381,7 @@ class CropUnit : public Unit {
   // Where tags run ahead of data:
   std::optional<LinesAhead> ahead_;
   std::size_t looked_twice_ = 0;  ///< quads at the front of the queue
-  struct Visiting {
-    std::size_t tile = 0;
-    std::uint32_t primitive = ~0U;
-  };
-  Visiting visiting_;  ///< of the last quad that was looked up
-  LinesAhead::Visit visit_ = 0;
+  VisitCounter visits_;
   Cycle waits_from_ = never;  ///< the quad whose turn it is has waited for nothing but the blender
   Cycle opened_ = 0;          ///< the blender, last
   UnitState stop_ = UnitState::starved;

@@ -71,6 +71,8 @@ class BeatLines {
     for (const std::uint32_t half : halves_of(address)) all |= (half & sectors) != 0 ? half : 0;
     return all;
   }
+  /// Where a screen tile begins.
+  std::uint64_t tile(TileId tile) const { return surface_.address(tile, 0); }
   /// The number of a line of the surface, of so many.
   std::size_t index(std::uint64_t address) const {
     return static_cast<std::size_t>((address - surface_.address(std::size_t{0})) / line_bytes_);

@@ -191,9 +191,7 @@ class TimedZCache {
   }
   /// The second look at the lines of one primitive's quads, as ZLinesAhead's; returns when they are there.
   [[gnu::noinline]] Cycle look_again(const QuadBeat& beat, Cycle looked_up) {
-    const std::uint32_t primitive = primitive_order(beat.quads[0]);
-    if (primitive != visiting_.primitive || beat.tile != visiting_.tile) ++visit_;
-    visiting_ = {beat.tile, primitive};
+    const LineVisits::Visit visit = visits_.of(lines_->tile(beat.tile), primitive_order(beat.quads[0]));
     Cycle at = second_looks_.take(early_.queue.free_from(looked_up, beat.count));
     Cycle there = at;
     for (unsigned i = 0; i < needed_.count; ++i) {
@@ -202,7 +200,7 @@ class TimedZCache {
       again.address = needed.address;
       again.filled =
           needed.sectors & uses_[lines_->index(needed.address)]
-                               .look_again(visit_, lines_->in_halves(needed.address, needed.sectors), half(), at)
+                               .look_again(visit, lines_->in_halves(needed.address, needed.sectors), half(), at)
                                .again;
       if (again.filled == 0) continue;
       send(needed.address, again.filled, 0, at);
@@ -258,12 +256,7 @@ class TimedZCache {
   std::vector<TimedLineUses> uses_;  ///< by line of the surface
   SlotPool lines_ahead_;             ///< between two looks
   IssuePort second_looks_{1};
-  struct Visiting {
-    TileId tile;
-    std::uint32_t primitive = ~0U;
-  };
-  Visiting visiting_;  ///< of the last quads
-  std::uint32_t visit_ = 0;
+  VisitCounter visits_;
   std::uint64_t owed_ = 0;  ///< sectors
   Cycle owed_at_ = 0;
 };

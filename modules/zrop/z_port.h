@@ -316,9 +316,7 @@ class ZPort {
     for (unsigned i = taken_; i < beat.count && primitive_order(beat.quads[i]) == primitive; ++i)
       part_.quads[part_.count++] = beat.quads[i];
     part_.last_of_bin = beat.last_of_bin && taken_ + part_.count == beat.count;
-    if (primitive != visiting_.primitive || beat.tile != visiting_.tile) ++visit_;
-    visiting_ = {beat.tile, primitive};
-    waits_of_beat_ = {waits_of_beat_.reads, 0, visit_, 0, 0};
+    waits_of_beat_ = {waits_of_beat_.reads, 0, visits_.of(lines_->tile(beat.tile), primitive), 0, 0};
   }
   void clear_at(Mark mark) {
     if (cleared_ && context_.frame->clears_depth_stencil(mark)) cleared_->clear();
@@ -373,12 +371,7 @@ class ZPort {
   std::uint32_t late_left_ = 0;    ///< sectors of the line that is looked up for a late test, yet to be read
   std::size_t looked_twice_ = 0;   ///< beats at the front of the queue
   std::uint32_t lines_ahead_ = 0;  ///< of the beats behind them
-  struct Visiting {
-    TileId tile;
-    std::uint32_t primitive = ~0U;
-  };
-  Visiting visiting_;  ///< of the last quads that were looked up
-  std::uint32_t visit_ = 0;
+  VisitCounter visits_;
   std::uint64_t beats_tested_ = 0;
   Cycle now_ = 0;
   Cycle next_look_up_ = 0;  ///< after a beat wider than the unit

@@ -57,7 +57,24 @@ class LineVisits {
   bool comes_back_ = false;
 };
 
-/// The same at `cycle`, where it is not known when a line will be used.
+/// Numbers visits: quads of a primitive in a screen tile that come one after the other.
+class VisitCounter {
+ public:
+  /// Of the next quad. @param tile  whatever tells screen tiles apart
+  LineVisits::Visit of(std::uint64_t tile, std::uint32_t primitive) {
+    if (tile != tile_ || primitive != primitive_) ++visit_;
+    tile_ = tile;
+    primitive_ = primitive;
+    return visit_;
+  }
+
+ private:
+  std::uint64_t tile_ = ~std::uint64_t{0};
+  std::uint32_t primitive_ = 0;
+  LineVisits::Visit visit_ = 0;
+};
+
+/// LineVisits at `cycle`, where it is not known when a line will be used.
 class LineUses {
  public:
   using Visit = LineVisits::Visit;
@@ -104,7 +121,7 @@ class LineUses {
   bool stopped_ = false;
 };
 
-/// The same at `lt`, where a visit uses the line before the next one is looked at.
+/// LineVisits at `lt`, where a visit uses the line before the next one is looked at.
 class TimedLineUses {
  public:
   /// A line comes into the cache with a first look in a cycle, or fills nothing there, so that nothing stops for it.
