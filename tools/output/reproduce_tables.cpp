@@ -122,16 +122,16 @@ std::vector<std::string> reproduction_heading(const Reproduction& of) {
   for (const PlannedScene& scene : plan.scenes) {
     if (scene.request.rfind("builtin:", 0) != 0) files.push_back(printable(scene_name(scene.request)));
   }
+  const char* const judged =
+      "Only rows that could have failed are judged; inputs come out as they went in, and some rows follow from others. "
+      "A reason is given where this run has shown it: what it names was tried on the six scenes, and the row then "
+      "agreed or lost at least half of its difference.";
   std::vector<std::string> lines{
       fmt::format("{}, {} fidelity, {}, {} simulations.", base.platform->name, vrpipe::name_of(plan.fidelity),
                   vrpipe::name_of(base.format), plan.points.size()),
       files.empty() ? "Scenes: stand-ins for the paper's, with the same size and number of Gaussians; none is trained."
                     : fmt::format("Scenes: stand-ins, none of them trained, but for {}.", fmt::join(files, ", ")),
-      tolerance_text(plan.rows),
-      "Only rows that could have failed are judged; inputs come out as they went in, and some rows follow from others. "
-      "A reason is given where this run has shown it: what it names was tried on the six scenes, and the row then "
-      "agreed or lost at least half of its difference.",
-      "What only the paper's pictures show is not compared."};
+      tolerance_text(plan.rows), judged, "What only the paper's pictures show is not compared."};
   if (plan.quick) {
     lines.emplace_back(fmt::format(
         "Quick look: at {} instead of cycle, {} views a scene, no large ones, one number of passes without memory, no "
