@@ -50,6 +50,8 @@ class CropTime {
 
   /// What the cache moves through this, beside the blender; where it is not on, sectors take time of the blender.
   FlitPort port;
+  /// Of lines that are written back, and of their sectors.
+  static constexpr unsigned flits_of_writes(unsigned lines, unsigned sectors) { return lines + sectors; }
   /// What the cache moves.
   struct Moves {
     unsigned sectors = 0;  ///< filled or written back
@@ -57,7 +59,7 @@ class CropTime {
     /// Sectors of a line are written back.
     void write(unsigned count) {
       sectors += count;
-      flits += 1 + count;
+      flits += flits_of_writes(1, count);
     }
   };
   /// A quad's triangle reads sectors of a line of its screen tile: flits, of which it takes one for all of its quads there.

@@ -276,7 +276,8 @@ class TimedCrop : public TimedUnit {
 
   /// Flits of what is dirty now.
   void owe(Stay& stay, std::uint32_t dirty) {
-    owed_ += static_cast<unsigned>(__builtin_popcount(dirty & ~stay.dirty)) + (stay.dirty == 0 ? 1U : 0U);
+    owed_ += CropTime::flits_of_writes(stay.dirty == 0 ? 1 : 0,
+                                       static_cast<unsigned>(__builtin_popcount(dirty & ~stay.dirty)));
     stay.dirty |= dirty;
   }
 

@@ -179,7 +179,7 @@ class CropUnit : public Unit {
     const bool done = port_.look_up(wanted_, now(), [this](unsigned moved) { pay({moved, 0}); });
     if (!Plain) {
       const CachePort::LinesMoved moved = port_.take_lines_moved();
-      if (time_.port.is_on()) send(moved.written_back + moved.sectors_written_back);
+      if (time_.port.is_on()) send(CropTime::flits_of_writes(moved.written_back, moved.sectors_written_back));
     }
     if (!done) return SectoredCache::no_line;
     asked_for = std::exchange(wanted_.asked_for, 0);

@@ -160,7 +160,7 @@ class UntimedCrop : public UntimedUnit {
     } else {
       // In any order each line is asked for once.
       if (!filled_.empty()) did(CropWork::flits, fills_line ? 1 : 0);
-      if (written_back != 0) did(CropWork::flits, 1 + popcount(written_back));
+      if (written_back != 0) did(CropWork::flits, CropTime::flits_of_writes(1, popcount(written_back)));
     }
   }
   /// A quad that is blended whenever bins are flushed: some of its pixels are not terminated by what was blended before.

@@ -73,8 +73,7 @@ class LinesAhead {
     State& stay = stays_[number];
     LineUses& uses = uses_[index(stay.address)];
     if (stay.is_new) {
-      if (stay.fetches_again && !uses.begin(sectors, half_)) return false;
-      if (!stay.fetches_again) uses.begin(0, half_);
+      if (!uses.begin(stay.fetches_again ? sectors : 0, half_)) return false;
       stay.is_new = false;
     }
     if (!uses.may_go(visit, sectors, half_)) return false;

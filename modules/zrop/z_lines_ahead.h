@@ -15,6 +15,23 @@
 
 namespace vrpipe {
 
+/// What reading into the z-cache takes of the ROPs' port, at cycle; nothing where that is not connected.
+class ReadFlits {
+ public:
+  /// Both outlive it.
+  ReadFlits(StreamOut<PortReads>& out, const BeatLines& lines) : out_(out), lines_(lines) {}
+  bool has_room() const { return out_.credits() > 0; }
+  /// Sectors of a line of which others are held; only while there is room.
+  void read(std::uint64_t address, std::uint32_t sectors, std::uint32_t held) {
+    if (sectors == 0 || out_.is_stub()) return;
+    if (const unsigned flits = lines_.flits_of(address, sectors, held); flits > 0) out_.push({flits});
+  }
+
+ private:
+  StreamOut<PortReads>& out_;
+  const BeatLines& lines_;
+};
+
 /// The z-cache at cycle where its tags run ahead of its data: what a test misses is read for it, and the line may go
 /// meanwhile. Tags are looked at twice, as CROP's are: a first look asks for what is missed, at once; beats then wait, in
 /// their order, for a second. What was asked for while an earlier stay of the line in the cache was still to be used is read
@@ -22,10 +39,9 @@ namespace vrpipe {
 class ZLinesAhead {
  public:
   /// All outlive it; `cleared` may be null.
-  ZLinesAhead(CachePort& port, StreamOut<PortReads>& out_reads, const ZCache& timing, const BeatLines& lines,
-              ClearedSectors* cleared)
+  ZLinesAhead(CachePort& port, ReadFlits& flits, const ZCache& timing, const BeatLines& lines, ClearedSectors* cleared)
       : port_(port),
-        out_reads_(out_reads),
+        flits_(flits),
         lines_(lines),
         cleared_(cleared),
         sectors_of_a_line_(timing.organization.sectors_of_a_line()),
@@ -44,7 +60,6 @@ class ZLinesAhead {
     std::uint16_t are_used = 0;  ///< and were still to be used
   };
 
-  bool has_room() const { return out_reads_.is_stub() || out_reads_.credits() > 0; }
   /// Goes on with the first look at a line, the `at`th of a beat; false while it has to wait.
   template <class Moved>
   bool look_up(CachePort::LookUp& wanted, unsigned at, Waits& waits, Moved&& moved) {
@@ -141,7 +156,7 @@ class ZLinesAhead {
     if (left == 0) {
       SectoredCache& cache = port_.cache();
       const bool is_held = cache.find(wanted.address) != SectoredCache::no_line;
-      if (!has_room() || (!is_held && !cache.can_allocate(wanted.address))) return false;
+      if (!flits_.has_room() || (!is_held && !cache.can_allocate(wanted.address))) return false;
       LineAccess access;
       access.address = wanted.address;
       access.sectors = wanted.sectors;
@@ -155,7 +170,7 @@ class ZLinesAhead {
         if (access.written_back != 0) port_.evict(access);
       }
       left = access.filled;
-      send(wanted.address, left, cache.present(access.line) & ~left);
+      flits_.read(wanted.address, left, cache.present(access.line) & ~left);
     }
     while (left != 0) {
       if (!may_read()) return false;
@@ -179,11 +194,11 @@ class ZLinesAhead {
         state.reads_again = (waits.are_used & bit) != 0;
         waits.begins = static_cast<std::uint16_t>(waits.begins & ~bit);
       }
-      if (!state.uses.may_go(waits.visit, halves, half_) || !has_room()) return false;
+      if (!state.uses.may_go(waits.visit, halves, half_) || !flits_.has_room()) return false;
       bool is_first = false;
       const std::uint32_t lacking = state.uses.go(halves, half_, is_first);
       left_again_ = state.reads_again ? lacking & line.sectors : 0;
-      send(line.address, left_again_, 0);
+      flits_.read(line.address, left_again_, 0);
     }
     while (left_again_ != 0) {
       if (!may_read()) return false;
@@ -210,14 +225,9 @@ class ZLinesAhead {
     moved(run.count);
     return run.count;
   }
-  /// What reading sectors takes of the ROPs' port.
-  void send(std::uint64_t line, std::uint32_t sectors, std::uint32_t held) {
-    if (sectors == 0 || out_reads_.is_stub()) return;
-    if (const unsigned flits = lines_.flits_of(line, sectors, held); flits > 0) out_reads_.push({flits});
-  }
 
   CachePort& port_;
-  StreamOut<PortReads>& out_reads_;
+  ReadFlits& flits_;
   const BeatLines& lines_;
   ClearedSectors* const cleared_;
   const unsigned sectors_of_a_line_;

@@ -50,7 +50,8 @@ class ZPort {
     cleared_ = cleared_sectors_of(surface, timing_, statistics);
     if (cleared_) port_.know_cleared(*cleared_);
     lines_.emplace(timing_, surface);
-    if (timing_.fetches_ahead()) ahead_.emplace(port_, out_reads_, timing_, *lines_, cleared_ ? &*cleared_ : nullptr);
+    flits_.emplace(out_reads_, *lines_);
+    if (timing_.fetches_ahead()) ahead_.emplace(port_, *flits_, timing_, *lines_, cleared_ ? &*cleared_ : nullptr);
   }
   bool idle() const {
     return beats_.empty() && updates_.empty() && late_.empty() && changed_.empty() && port_.has_written_back();
@@ -151,20 +152,12 @@ class ZPort {
     bool takes_time;
   };
   Moved moves() { return {owed_, out_reads_.is_stub()}; }
-  /// Whether something may be read.
-  bool may_read() const { return out_reads_.credits() > 0; }
-  void read(std::uint64_t address, std::uint32_t sectors, std::uint32_t held) {
-    if (out_reads_.is_stub()) return;
-    if (const unsigned flits = lines_->flits_of(address, sectors, held); flits > 0) out_reads_.push({flits});
-  }
   /// Goes on with a look-up in the cache.
   bool look_up(CachePort::LookUp& wanted) {
-    if (out_reads_.is_stub()) return port_.look_up(wanted, now_, moves());
-    if (!may_read() || !port_.look_up(wanted, now_, moves())) return false;
+    if (!flits_->has_room() || !port_.look_up(wanted, now_, moves())) return false;
     const SectoredCache& cache = port_.cache();
-    if (wanted.asked_for != 0)
-      read(wanted.address, wanted.asked_for,
-           (cache.present(wanted.line) | cache.filling(wanted.line)) & ~wanted.asked_for);
+    flits_->read(wanted.address, wanted.asked_for,
+                 (cache.present(wanted.line) | cache.filling(wanted.line)) & ~wanted.asked_for);
     return true;
   }
   bool look_up_line() {
@@ -365,6 +358,7 @@ class ZPort {
   CachePort port_;
   BatchLimit look_ups_;
   std::optional<BeatLines> lines_;
+  std::optional<ReadFlits> flits_;
   std::optional<ClearedSectors> cleared_;
   // Where tags run ahead of data:
   std::optional<ZLinesAhead> ahead_;
