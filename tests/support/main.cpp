@@ -1,5 +1,6 @@
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <cstdlib>
@@ -9,6 +10,7 @@
 #include <gtest/gtest.h>
 #if defined(VRPIPE_SANITIZED)
 #include <dlfcn.h>
+#include <pthread.h>
 #include <unwind.h>
 
 #include <sanitizer/asan_interface.h>
@@ -19,7 +21,19 @@
 extern "C" __attribute__((no_sanitize("address"))) _Unwind_Reason_Code _Unwind_RaiseException(
     _Unwind_Exception* exception) {
   constexpr std::size_t above = 256 * 1024;
-  ASAN_UNPOISON_MEMORY_REGION(__builtin_frame_address(0), above);
+  // Beyond the main stack's end there may be no memory at all.
+  static const auto* const end = [] {
+    pthread_attr_t attributes;
+    void* start = nullptr;
+    std::size_t size = 0;
+    ::pthread_getattr_np(::pthread_self(), &attributes);
+    ::pthread_attr_getstack(&attributes, &start, &size);
+    ::pthread_attr_destroy(&attributes);
+    return static_cast<const char*>(start) + size;
+  }();
+  const auto* const here = static_cast<const char*>(__builtin_frame_address(0));
+  const auto below_end = static_cast<std::size_t>(end - here);  // a huge number on other stacks that lie above
+  ASAN_UNPOISON_MEMORY_REGION(here, std::min(above, below_end));
   static const auto next =
       reinterpret_cast<_Unwind_Reason_Code (*)(_Unwind_Exception*)>(::dlsym(RTLD_NEXT, "_Unwind_RaiseException"));
   return next(exception);
