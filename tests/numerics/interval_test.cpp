@@ -45,28 +45,32 @@ TEST(Interval, WithPaddingEverySampleThatIsCertainlyVisibleIsBlended) {
                                  uniform(seed, 8 * i + 2, 0.55F, 9), uniform(seed, 8 * i + 3, 0.55F, 4),
                                  uniform(seed, 8 * i + 4, 0, 6), uniform(seed, 8 * i + 5, 0.005F, 1));
     const Draw draw = draw_of(64, 64, {splat});
-    for (const unsigned bits : {4U, 8U, 12U}) {
+    constexpr unsigned all_bits[] = {4, 8, 12};
+    std::vector<decltype(fragments_of(context_of(draw)))> fragments;
+    for (const unsigned bits : all_bits) {
       RenderContext context = context_of(draw);
       context.precision.subpixel_bits = bits;
-      const auto fragments = fragments_of(context);
-      for (std::uint32_t y = 0; y < 64; ++y) {
-        for (std::uint32_t x = 0; x < 64; ++x) {
-          using I = Interval<double>;
-          const I dx = I(x) + I(0.5) - I(splat.cx);
-          const I dy = I(y) + I(0.5) - I(splat.cy);
-          const I det = I(splat.ax) * I(splat.by) - I(splat.ay) * I(splat.bx);
-          const I u = (dx * I(splat.by) - dy * I(splat.bx)) * I(splat.r) / det;
-          const I v = (dy * I(splat.ax) - dx * I(splat.ay)) * I(splat.r) / det;
-          const I exponent = -(square(u) + square(v)) / 2.0;
-          // 2^-20: the shader's single precision and its two ulp of exponential.
-          const I weight = I(splat.opacity) * I(std::exp(exponent.lower()), std::exp(exponent.upper())) *
-                           I(1 - 0x1p-20, 1 + 0x1p-20);
-          const bool blended = !fragments[std::size_t{y} * 64 + x].empty();
+      fragments.push_back(fragments_of(context));
+    }
+    for (std::uint32_t y = 0; y < 64; ++y) {
+      for (std::uint32_t x = 0; x < 64; ++x) {
+        using I = Interval<double>;
+        const I dx = I(x) + I(0.5) - I(splat.cx);
+        const I dy = I(y) + I(0.5) - I(splat.cy);
+        const I det = I(splat.ax) * I(splat.by) - I(splat.ay) * I(splat.bx);
+        const I u = (dx * I(splat.by) - dy * I(splat.bx)) * I(splat.r) / det;
+        const I v = (dy * I(splat.ax) - dx * I(splat.ay)) * I(splat.r) / det;
+        const I exponent = -(square(u) + square(v)) / 2.0;
+        // 2^-20: the shader's single precision and its two ulp of exponential.
+        const I weight = I(splat.opacity) * I(std::exp(exponent.lower()), std::exp(exponent.upper())) *
+                         I(1 - 0x1p-20, 1 + 0x1p-20);
+        for (std::size_t k = 0; k < fragments.size(); ++k) {
+          const bool blended = !fragments[k][std::size_t{y} * 64 + x].empty();
           if (weight.lower() >= static_cast<double>(one_255th)) {
-            ASSERT_TRUE(blended) << i << " at " << x << "," << y;
+            ASSERT_TRUE(blended) << i << " at " << x << "," << y << ", " << all_bits[k] << " bits";
           }
           if (weight.upper() < static_cast<double>(one_255th)) {
-            ASSERT_FALSE(blended) << i << " at " << x << "," << y;
+            ASSERT_FALSE(blended) << i << " at " << x << "," << y << ", " << all_bits[k] << " bits";
           }
         }
       }

@@ -64,13 +64,14 @@ TEST_P(BuiltinScene, HasThePapersShapeAtReducedSize) {
   SceneRequest request;
   request.scene = "builtin:" + GetParam().first;
   request.size = GetParam().second;
+  request.fovy_degrees = 25;
   expect_the_papers_shape(load_scene(request).draw);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, BuiltinScene,
-                         ::testing::Values(std::pair<std::string, ImageSize>{"object", {320, 320}},
-                                           std::pair<std::string, ImageSize>{"indoor", {466, 312}},
-                                           std::pair<std::string, ImageSize>{"outdoor", {326, 182}}),
+                         ::testing::Values(std::pair<std::string, ImageSize>{"object", {200, 200}},
+                                           std::pair<std::string, ImageSize>{"indoor", {234, 156}},
+                                           std::pair<std::string, ImageSize>{"outdoor", {200, 112}}),
                          [](const auto& scene) { return scene.param.first; });
 
 }  // namespace
