@@ -120,7 +120,7 @@ void together(std::size_t most_splats, int repeat) {
               "all/auto");
   for (const Workload& workload : workloads()) {
     Measurement measurement(workload, most_splats);
-    for (const char* platform : {"agx-orin", "agx-orin-lpddr3"}) {
+    for (const char* platform : {"agx-orin-ideal-memory", "agx-orin"}) {
       for (const char* variant : {"baseline", "het+qm"}) {
         for (const Fidelity fidelity : {Fidelity::functional, Fidelity::lt, Fidelity::cycle}) {
           const RunRequest request = measurement.request(platform, variant, fidelity);
@@ -140,10 +140,10 @@ void one_by_one(std::size_t most_splats, int repeat) {
   Measurement measurement(workloads()[0], most_splats);
   std::vector<std::string> names;
   std::vector<std::vector<double>> ratios;
-  const std::vector<std::pair<const char*, Fidelity>> runs = {{"agx-orin", Fidelity::lt},
-                                                              {"agx-orin", Fidelity::cycle},
-                                                              {"agx-orin-lpddr3", Fidelity::functional},
-                                                              {"agx-orin-lpddr3", Fidelity::cycle}};
+  const std::vector<std::pair<const char*, Fidelity>> runs = {{"agx-orin-ideal-memory", Fidelity::lt},
+                                                              {"agx-orin-ideal-memory", Fidelity::cycle},
+                                                              {"agx-orin", Fidelity::functional},
+                                                              {"agx-orin", Fidelity::cycle}};
   for (const auto& [platform, fidelity] : runs) {
     const RunRequest request = measurement.request(platform, "baseline", fidelity);
     measurement.seconds(request, {EffectChoice()}, 1);

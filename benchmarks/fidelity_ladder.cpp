@@ -53,7 +53,7 @@ double percent(double value, double reference) { return 100.0 * (value / referen
 
 Run run_once(const Draw& draw, const Variant& variant, Fidelity fidelity) {
   RunRequest request;
-  request.platform = &platforms().front();
+  request.platform = &platform_named("agx-orin-ideal-memory");
   request.variant = variant;
   request.fidelity = fidelity;
   fresh_simulation();

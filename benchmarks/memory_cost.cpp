@@ -18,7 +18,7 @@ namespace vrpipe {
 
 namespace {
 
-/// agx-orin with so much of its memory.
+/// agx-orin-ideal-memory with so much of its memory.
 struct Part {
   const char* name;
   std::function<void(Netlist&)> wire;
@@ -30,7 +30,7 @@ void add_ideal_dram(Netlist& netlist) {
   netlist.connect_memory("l2", "dram");
 }
 
-// Each has what is above it; the last is agx-orin-lpddr3.
+// Each has what is above it; the last is agx-orin.
 const std::vector<Part>& parts() {
   static const std::vector<Part> made = {
       {"ideal memory", wire_pipeline},
@@ -84,7 +84,7 @@ void measure(const Draw& draw, const Variant& variant, Fidelity fidelity, int re
   std::vector<std::vector<double>> runs(parts().size());
   for (int run = 0; run < repeat; ++run) {
     for (std::size_t i = 0; i < parts().size(); ++i) {
-      Platform platform = platform_named("agx-orin");
+      Platform platform = platform_named("agx-orin-ideal-memory");
       platform.wire = parts()[i].wire;
       runs[i].push_back(seconds(draw, platform, variant, fidelity));
     }

@@ -24,7 +24,7 @@ const Draw& draw() {
 
 void frame(benchmark::State& state, const char* variant, Fidelity fidelity) {
   RunRequest request;
-  request.platform = &platforms().front();
+  request.platform = &platform_named("agx-orin-ideal-memory");
   request.variant = variant_named(variant);
   request.fidelity = fidelity;
   double cpu_seconds = 0;

@@ -181,8 +181,10 @@ template <typename ColorRop<Format, Rounding>::Way How>
   const LanePairBits passed = blended.blue_alpha >= threshold_;
   unsigned signalled = 0;
   if (How == Way::asking && signals_) {
+    const unsigned late = of_alpha(before.blue_alpha >= threshold_) & live;
+    tally.fragments_late += popcount(static_cast<LaneMask>(late));
     signalled = of_alpha(passed) & live;
-    if (checks_previous_) signalled &= ~of_alpha(before.blue_alpha >= threshold_);
+    if (checks_previous_) signalled &= ~late;
     if (signalled != 0) {
       ++tally.signals;
       if (drops_late_) terminated_[place] = static_cast<LaneMask>(terminated_[place] | signalled);

@@ -44,11 +44,13 @@ class ColorRop : public CropBehaviour {
 
   /// What was done, to be counted for a draw.
   struct Tally {
-    unsigned quads_blended = 0, fragments_blended = 0, quads_dropped = 0, fragments_dropped = 0, signals = 0;
+    unsigned quads_blended = 0, fragments_blended = 0, fragments_late = 0;
+    unsigned quads_dropped = 0, fragments_dropped = 0, signals = 0;
   };
   [[gnu::always_inline]] void count(DrawIndex draw, const Tally& tally) {
     quads_blended.add(draw, tally.quads_blended);
     fragments_blended.add(draw, tally.fragments_blended);
+    if (tally.fragments_late != 0) fragments_blended_late.add(draw, tally.fragments_late);
     if (tally.quads_dropped != 0) quads_dropped_late.add(draw, tally.quads_dropped);
     if (tally.fragments_dropped != 0) fragments_dropped_late.add(draw, tally.fragments_dropped);
     if (tally.signals != 0) termination_signals.add(draw, tally.signals);

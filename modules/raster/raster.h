@@ -65,8 +65,9 @@ struct RasterParameters : ParameterSet {
                                    0.001,
                                    1000,
                                    "cycles",
-                                   "measured on a GH100 graphics GPC: 5.5 cycles with 2 TPCs, scaled to 8",
-                                   "between (primitive, screen tile) pairs"};
+                                   source::open,
+                                   "between (primitive, screen tile) pairs; assumed: Emerald has no such interval, and "
+                                   "with its registered rates speed-ups are nearly the same (agx-orin-emerald-2)"};
   Integer quads_per_cycle{*this,
                           "quads_per_cycle",
                           16,

@@ -12,7 +12,14 @@ namespace vrpipe {
 
 namespace {
 std::vector<Platform>& list() {
-  static std::vector<Platform> all{agx_orin(), mobile(), desktop(), agx_orin_lpddr3(), agx_orin_lpddr5(), gh100_gpc()};
+  static std::vector<Platform> all{agx_orin(),
+                                   agx_orin_ideal_memory(),
+                                   agx_orin_lpddr5(),
+                                   agx_orin_emerald_2(),
+                                   agx_orin_emerald_1(),
+                                   mobile(),
+                                   desktop(),
+                                   gh100_gpc()};
   return all;
 }
 }  // namespace

@@ -13,7 +13,7 @@ namespace vrpipe {
 
 namespace {
 
-// Parameters of links, each tried alone on agx-orin, baseline and het+qm: errors of 1.1 % at most inside, of up to 40 % outside.
+// Parameters of links, each tried alone on agx-orin-ideal-memory, baseline and het+qm: errors of 1.1 % at most inside, of up to 40 % outside.
 constexpr std::uint64_t most_depth = 1024;
 constexpr std::uint64_t most_latency = 16;
 constexpr std::uint64_t most_latency_of_color = 4;

@@ -179,6 +179,20 @@ TEST_F(ColorRopTest, InPaperTerminationALateFragmentStillBlendsByWhatIsLeftAtMos
   EXPECT_EQ(count("fragments_dropped_late"), 0U);
 }
 
+TEST_F(ColorRopTest, FragmentsBehindAPixelsLastAreCountedAsLate) {
+  make();
+  blend(0.5F);
+  blend(0.9999F, 0b0011);  // the last of two pixels
+  EXPECT_EQ(count("fragments_blended_late"), 0U);
+  blend(0.5F);
+  EXPECT_EQ(count("fragments_blended_late"), 2U);
+  EXPECT_EQ(count("fragments_blended"), 10U);
+  make({{"previous_alpha_check", "off"}});
+  blend(0.9999F);
+  blend(0.5F, 0b0100);
+  EXPECT_EQ(count("fragments_blended_late"), 1U) << "signalled again, and late all the same";
+}
+
 TEST_F(ColorRopTest, TellsWhetherAValueChanged) {
   make();
   EXPECT_TRUE(crop->blend(0, 0, all_lanes, color_of(0.5F, 0, 0, 0.5F)).changed);

@@ -18,9 +18,9 @@ namespace {
 
 using namespace testing;
 
-/// agx-orin with a memory below its L2, which `add` adds as "dram".
+/// agx-orin-ideal-memory with a memory below its L2, which `add` adds as "dram".
 Platform with_dram(const std::function<void(Netlist&)>& add) {
-  Platform platform = platform_named("agx-orin");
+  Platform platform = platform_named("agx-orin-ideal-memory");
   platform.name = "with DRAM";
   platform.wire = [add](Netlist& netlist) {
     wire_pipeline(netlist);

@@ -17,7 +17,7 @@ constexpr double share_of_refresh = 130.0 / 1000;  // tRFC in tREFI
 /// A frame that waits for its DRAM: a channel of 8 bits.
 RunResult run(Fidelity fidelity, const EffectChoice& choice) {
   Scene scene = testing::plain_splats(fidelity);
-  scene.request.platform = &platform_named("agx-orin-lpddr3");
+  scene.request.platform = &platform_named("agx-orin");
   scene.request.settings = {{"dram", "channels", "1"},     {"dram", "channel_bits", "8"},
                             {"dram", "trfc_ps", "130000"}, {"dram", "trefi_ps", "1000000"},
                             {"dram", "hash", "off"},       {"crop", "cache_bytes", "2048"}};

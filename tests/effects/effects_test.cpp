@@ -88,7 +88,7 @@ TEST(Effects, ThatAreNeverOmittedCannotBeLeftOut) {
   for (const Effect& effect : effects()) {
     if (effect.decide != nullptr) continue;
     Scene scene = testing::plain_splats(Fidelity::cycle, "het+qm");
-    scene.request.platform = &platform_named("agx-orin-lpddr3");  // which has all components but an L1
+    scene.request.platform = &platform_named("agx-orin");  // which has all components but an L1
     EXPECT_FALSE(report_of(run_with(scene, {}), effect.full_name()).omitted);
     try {
       run_with(testing::plain_splats(Fidelity::functional), without(effect.full_name()));

@@ -79,10 +79,9 @@ TEST_P(OtherMakes, OfAPassThroughArePassedThrough) {
 // A cache of another make may ask the DRAM also where nothing has time.
 TEST_P(OtherMakes, OfMemoriesKeepWhatIsBelowThem) {
   Scene scene = testing::plain_splats(GetParam());
-  scene.request.platform = &platform_named("agx-orin-lpddr3");
+  scene.request.platform = &platform_named("agx-orin");
   const std::string usual = run_with(scene, {}).result_hash;
-  scene =
-      testing::on_platform(scene, "agx-orin-lpddr3", [](Netlist& netlist) { netlist.replace("l2", "another-make"); });
+  scene = testing::on_platform(scene, "agx-orin", [](Netlist& netlist) { netlist.replace("l2", "another-make"); });
   const RunResult result = run_with(scene, {});
   EXPECT_EQ(result.result_hash, usual);
   EXPECT_FALSE(said_of("l2.contents", result).omitted);

@@ -55,7 +55,8 @@ Scene mesh(Fidelity fidelity) {
 }
 
 Scene fetched(Scene scene) {
-  return on_platform(std::move(scene), "agx-orin", [](Netlist& netlist) { connect_attribute_traffic(netlist); });
+  return on_platform(std::move(scene), "agx-orin-ideal-memory",
+                     [](Netlist& netlist) { connect_attribute_traffic(netlist); });
 }
 
 Scene looked_at_by(Scene scene, const std::string& counter) {

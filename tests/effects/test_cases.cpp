@@ -48,7 +48,8 @@ Scene with_z_memory(Scene scene) {
   scene.request.settings.push_back({"zrop", "cache_bytes", "128"});
   scene.request.settings.push_back({"zrop", "mshrs", "1"});
   scene.request.settings.push_back({"zrop", "fast_clear", "off"});
-  return on_platform(std::move(scene), "agx-orin", [](Netlist& netlist) { connect_depth_stencil_traffic(netlist); });
+  return on_platform(std::move(scene), "agx-orin-ideal-memory",
+                     [](Netlist& netlist) { connect_depth_stencil_traffic(netlist); });
 }
 
 }  // namespace

@@ -14,9 +14,9 @@ namespace vrpipe::testing {
 
 namespace {
 
-/// agx-orin with a memory of another make, and times of its own, in place of its L2.
+/// agx-orin-ideal-memory with a memory of another make, and times of its own, in place of its L2.
 Scene on_foreign_memory(Scene scene) {
-  auto platform = std::make_shared<Platform>(platform_named("agx-orin"));
+  auto platform = std::make_shared<Platform>(platform_named("agx-orin-ideal-memory"));
   platform->wire = [](Netlist& netlist) {
     netlist.add("draw");
     netlist.add("vpo");
@@ -60,7 +60,7 @@ Scene on(Scene scene, const char* platform) {
 
 /// A refresh falls due within the frame, or only long after it.
 Scene refreshed(Fidelity fidelity, const char* every_ps) {
-  Scene scene = on(plain_splats(fidelity), "agx-orin-lpddr3");
+  Scene scene = on(plain_splats(fidelity), "agx-orin");
   scene.request.settings = {{"dram", "trefi_ps", every_ps}};
   return scene;
 }
@@ -79,7 +79,7 @@ Scene read(Scene scene, bool statistics) {
 
 Scene with_l1(Scene scene) {
   scene.request.settings = {{"sm", "l1_bytes", "0"}};
-  return on_platform(std::move(scene), "agx-orin", [](Netlist& netlist) {
+  return on_platform(std::move(scene), "agx-orin-ideal-memory", [](Netlist& netlist) {
     connect_attribute_traffic(netlist);
     insert_l1(netlist);
   });
@@ -89,7 +89,7 @@ Scene with_l1(Scene scene) {
 
 std::vector<EffectCase> time_cases() {
   const auto plain = [](Fidelity f) { return plain_splats(f); };
-  const auto on_dram = [](Fidelity f) { return on(plain_splats(f), "agx-orin-lpddr3"); };
+  const auto on_dram = [](Fidelity f) { return on(plain_splats(f), "agx-orin"); };
   // Layers over all of the screen, which has 256 lines in RGBA16F: bins of two come tile by tile, again and again.
   const auto on_cache = [](Fidelity f, const char* bytes) {
     Scene scene = scene_of("baseline", f);

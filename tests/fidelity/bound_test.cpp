@@ -88,7 +88,7 @@ TEST(Bound, HiZHidesAsMuchAsInBinsThatTimeOut) {
 // What a small L2 misses once more follows from the order of accesses.
 TEST(Bound, ADramMovesNoMoreThanInAnyOrder) {
   RunRequest request = with("baseline", {{"l2", "banks", "40"}, {"l2", "bytes", "81920"}, {"dram", "channels", "1"}});
-  request.platform = &platform_named("agx-orin-lpddr3");
+  request.platform = &platform_named("agx-orin");
   for (const std::uint64_t seed : {565696U, 2U, 5U, 23U})
     EXPECT_LE(share_of_cycle(request, mixed_frame(seed, request)), 1) << seed;
 }

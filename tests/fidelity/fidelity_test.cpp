@@ -64,12 +64,33 @@ TEST(Fidelity, AnUnknownNameIsAnErrorThatNamesTheNearest) {
   }
 }
 
+/// Whatever is under way when a pixel terminates, those that are not late are the fragments up to the one that takes it past
+/// the threshold, which strict termination blends and no other.
+TEST(Fidelity, FragmentsThatAreNotBlendedLateAreThoseOfStrictTermination) {
+  SceneRequest scene;
+  scene.scene = "builtin:object";
+  scene.size = ImageSize{120, 80};
+  const LoadedScene loaded = load_scene(scene);
+  const std::uint64_t in_time =
+      run(request_of("het", Fidelity::functional, strictly), loaded.draw).counts.fragments_blended;
+  for (const Fidelity fidelity : {Fidelity::functional, Fidelity::lt, Fidelity::cycle}) {
+    const RunResult result = run(request_of("het", fidelity), loaded.draw);
+    std::uint64_t late = 0;
+    for (const StatisticReport& statistic : result.statistics) {
+      if (statistic.name == "crop.fragments_blended_late") late = statistic.value;
+    }
+    EXPECT_GT(late, 0U) << name_of(fidelity);
+    EXPECT_EQ(result.counts.fragments_blended - late, in_time) << name_of(fidelity);
+  }
+}
+
 TEST(Fidelity, StrictImagesAndCountsAreTheSameOnBuiltinScenes) {
   for (const BuiltinSceneInfo& info : builtin_scenes()) {
     if (info.stands_for) continue;  // large, and of the same kinds
     SceneRequest scene;
     scene.scene = "builtin:" + info.name;
     scene.size = ImageSize{160, 96};
+    scene.fovy_degrees = 15;
     const LoadedScene loaded = load_scene(scene);
     // All variants of one scene; of the others the one that has all.
     for (const Variant& variant : variants()) {
@@ -183,7 +204,8 @@ TEST(Fidelity, TheBoundIsBelowCycleWhateverTheBottleneck) {
 TEST(Fidelity, LtStaysNearCycle) {
   SceneRequest scene;
   scene.scene = "builtin:object";
-  scene.size = ImageSize{240, 240};
+  scene.size = ImageSize{160, 160};
+  scene.fovy_degrees = 15;
   const LoadedScene loaded = load_scene(scene);
   for (const Variant& variant : variants()) {
     const auto cycles = static_cast<double>(*run(request_of(variant.name), loaded.draw).cycles);
@@ -216,7 +238,8 @@ TEST(Fidelity, EveryRungWithTimeReportsWhatItsUnitsDid) {
 }
 
 TEST(Fidelity, ADeadlockIsNamedOnEveryRungWithLinks) {
-  const Platform platform = edited("agx-orin", [](Netlist& netlist) { netlist.disconnect("gpc0.prop.out_release"); });
+  const Platform platform =
+      edited("agx-orin-ideal-memory", [](Netlist& netlist) { netlist.disconnect("gpc0.prop.out_release"); });
   const Draw draw = random_draw(64, 64, 200, 10);
   for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     for (const char* variant : {"baseline", "het+qm"}) {

@@ -73,7 +73,8 @@ TEST_P(Grid, LtIsWithinThreePercentBoundIsBelowAndStrictResultsAreTheSame) {
         const RunResult lt = result_at(Fidelity::lt);
         const RunResult bound = result_at(Fidelity::bound);
         EXPECT_LE(*bound.cycles, *cycle.cycles);
-        EXPECT_TRUE(lt.outside_validated_range.empty());
+        const bool has_deep_queues = request.platform->name == "agx-orin-emerald-1";
+        EXPECT_EQ(lt.outside_validated_range.empty(), !has_deep_queues) << "deeper than what was tried one by one";
         expect_near(request, percent_above(*lt.cycles, *cycle.cycles));
         if (exception_of(request) != nullptr) ++met;
         EXPECT_NEAR(percent_above(lt.counts.quads_blended, cycle.counts.quads_blended), 0, 1) << "% of what is blended";

@@ -67,7 +67,7 @@ void expect_counts(const DrawReport& draw, const Counts& alone) {
 
 class EveryFidelity : public ::testing::TestWithParam<std::tuple<Fidelity, std::string>> {
  protected:
-  RunRequest request(const std::string& platform = "agx-orin") const {
+  RunRequest request(const std::string& platform = "agx-orin-ideal-memory") const {
     RunRequest request = request_of(std::get<1>(GetParam()), std::get<0>(GetParam()), strictly);
     request.platform = &platform_named(platform);
     return request;
@@ -84,7 +84,7 @@ INSTANTIATE_TEST_SUITE_P(Frame, EveryFidelity,
                          });
 
 TEST_P(EveryFidelity, DrawsOfOneStateComeToTheirSingleDrawBitForBit) {
-  for (const char* platform : {"agx-orin", "desktop"}) {
+  for (const char* platform : {"agx-orin-ideal-memory", "desktop"}) {
     const auto draw = half_closed(400, 7);
     const RunRequest whole = request(platform);
     const DrawState state = draw_state_of(whole);
@@ -124,7 +124,7 @@ TEST_P(EveryFidelity, TheCountsOfDrawsSumToTheFrames) {
 TEST_P(EveryFidelity, TheCyclesOfDrawsSumToTheFrames) {
   const auto draw = half_closed(300, 11);
   const DrawState state = draw_state_of(request());
-  for (const char* platform : {"agx-orin", "desktop"}) {
+  for (const char* platform : {"agx-orin-ideal-memory", "desktop"}) {
     Frame frame(draw->width, draw->height);
     frame.draw(draw, state, "first", 0, 150);
     frame.draw(draw, state, "nothing", 150, 0);
@@ -157,7 +157,7 @@ TEST_P(EveryFidelity, DrawsWithAllClearedBetweenThemAreTwoRuns) {
   frame.draw(before, state, "before");
   frame.clear({true, true});
   frame.draw(after, state, "after");
-  for (const char* platform : {"agx-orin", "desktop"}) {
+  for (const char* platform : {"agx-orin-ideal-memory", "desktop"}) {
     for (const unsigned stalls : {0U, 64U}) {
       RunRequest both = request(platform);
       both.stall_seed = 5;
@@ -199,7 +199,7 @@ INSTANTIATE_TEST_SUITE_P(Frame, EveryFidelityUnmerged,
                          });
 
 TEST_P(EveryFidelity, FilledRectanglesAreTheAxisAlignedBoxesInFewerQuads) {
-  for (const char* platform : {"agx-orin", "desktop"}) {
+  for (const char* platform : {"agx-orin-ideal-memory", "desktop"}) {
     const auto draw = half_closed(200, 31);
     DrawState state = draw_state_of(request(platform));
     state.splat_extent = SplatExtent::axis_aligned_box;
@@ -238,7 +238,7 @@ TEST_P(EveryFidelityUnmerged, ADrawIsOfItsOwnState) {
 }
 
 TEST_P(EveryFidelity, WithoutBlendingTheLastFragmentStays) {
-  for (const char* platform : {"agx-orin", "desktop", "agx-orin-lpddr5"}) {
+  for (const char* platform : {"agx-orin-ideal-memory", "desktop", "agx-orin-lpddr5"}) {
     RunRequest exact = request(platform);
     exact.format = ColorFormat::rgba32f;
     const auto draw = half_closed(240, 23);

@@ -263,7 +263,7 @@ TEST_P(HiZWall, IsSeenByAStencilThatCountsWhatFails) {
 
 // The link is optional: RASTER then knows what depth was cleared to, and waits for nobody.
 TEST_P(HiZWall, WithoutTheLinkNothingIsCulledByWhatIsStored) {
-  Platform unlinked = platform_named("agx-orin");
+  Platform unlinked = platform_named("agx-orin-ideal-memory");
   unlinked.wire = [wire = unlinked.wire](Netlist& netlist) {
     wire(netlist);
     netlist.disconnect("gpc0.zrop.out_hi_z");

@@ -164,7 +164,7 @@ TEST_P(LateFrame, IsTheSameOnSeveralGpcsAndUnderStalls) {
 // Queues of one place and caches of one line: everybody waits for everybody, and nobody for ever.
 TEST_P(LateFrame, ComesToItsEndWithTheLeastOfRoom) {
   RunRequest least = request();
-  least.platform = &platform_named("agx-orin-lpddr3");
+  least.platform = &platform_named("agx-orin");
   least.effects = EffectChoice::everything();
   for (const char* link : {"prop.late", "zrop.late", "zrop.quads", "prop.test", "prop.survivors", "prop.color",
                            "qru.warps", "sm.shaded", "crop.terminations", "tc.bins"}) {
@@ -226,7 +226,7 @@ TEST_P(LateFrame, AnEarlyDrawSeesWhatALateOneBeforeItHasStored) {
 
 TEST_P(LateFrame, APlatformWithoutTheWayIsRefusedWhereADrawNeedsIt) {
   for (const char* port : {"gpc0.prop.out_late", "gpc0.zrop.out_late"}) {
-    Platform unlinked = platform_named("agx-orin");
+    Platform unlinked = platform_named("agx-orin-ideal-memory");
     unlinked.wire = [wire = unlinked.wire, port](Netlist& netlist) {
       wire(netlist);
       netlist.disconnect(port);

@@ -110,7 +110,7 @@ TEST_P(MixedFrame, IsTheSameOnSeveralGpcsAndUnderStalls) {
   for (std::uint64_t seed = 100; seed < 104; ++seed) {
     const Frame frame = random_frame(seed, request());
     const RunResult calm = run(request(), frame);
-    for (const char* platform : {"agx-orin", "desktop"}) {
+    for (const char* platform : {"agx-orin-ideal-memory", "desktop"}) {
       RunRequest stalled = request();
       stalled.platform = &platform_named(platform);
       stalled.stall_seed = seed;
@@ -128,7 +128,7 @@ TEST_P(MixedFrame, IsTheSameOnSeveralGpcsAndUnderStalls) {
 // Depth, stencil and termination share one z-cache, of few lines here; conservation of bytes is checked in every run.
 TEST_P(MixedFrame, ThroughAZCacheIsTheSame) {
   RunRequest through_memory = request();
-  through_memory.platform = &platform_named("agx-orin-lpddr3");
+  through_memory.platform = &platform_named("agx-orin");
   through_memory.effects = EffectChoice::everything();
   for (const unsigned lines : {1U, 3U, 128U}) {
     for (std::uint64_t seed = 100; seed < 104; ++seed) {

@@ -75,7 +75,7 @@ std::string name_of_case(const ::testing::TestParamInfo<MultiPass::ParamType>& e
 }
 INSTANTIATE_TEST_SUITE_P(Frame, MultiPass,
                          ::testing::Combine(::testing::ValuesIn(fidelities()), ::testing::Values("baseline", "qm"),
-                                            ::testing::Values("agx-orin", "desktop")),
+                                            ::testing::Values("agx-orin-ideal-memory", "desktop")),
                          name_of_case);
 
 // Neither stencils nor shaders are in what this is compared with: plain draws of the first batches, and the threshold.
@@ -160,7 +160,7 @@ class MultiPassInOrder : public MultiPass {};
 INSTANTIATE_TEST_SUITE_P(Frame, MultiPassInOrder,
                          ::testing::Combine(::testing::ValuesIn(fidelities()),
                                             ::testing::Values("baseline", "qm", "het", "het+qm"),
-                                            ::testing::Values("agx-orin", "desktop")),
+                                            ::testing::Values("agx-orin-ideal-memory", "desktop")),
                          name_of_case);
 
 TEST_P(MultiPassInOrder, StallsAndGpcsChangeNothing) {
@@ -168,7 +168,7 @@ TEST_P(MultiPassInOrder, StallsAndGpcsChangeNothing) {
   RunRequest strict = request();
   strict.termination = Termination::strict;
   RunRequest elsewhere = strict;
-  elsewhere.platform = &platform_named("agx-orin");
+  elsewhere.platform = &platform_named("agx-orin-ideal-memory");
   elsewhere.fidelity = Fidelity::functional;
   const RunResult expected = run_passes(elsewhere, draw, 5);
   for (const std::uint64_t seed : {0U, 1U, 2U}) {
@@ -176,7 +176,7 @@ TEST_P(MultiPassInOrder, StallsAndGpcsChangeNothing) {
     strict.stall_per_256 = seed == 0 ? 0 : 80;
     const RunResult result = run_passes(strict, draw, 5);
     // Which quads share a bin, and so merge, depends on how many GPCs there are.
-    if (!strict.variant.quad_merging || std::get<2>(GetParam()) == "agx-orin") {
+    if (!strict.variant.quad_merging || std::get<2>(GetParam()) == "agx-orin-ideal-memory") {
       EXPECT_TRUE(same_image(result.framebuffer.color, expected.framebuffer.color)) << seed;
       EXPECT_EQ(result.counts.fragments_blended, expected.counts.fragments_blended) << seed;
     }
@@ -218,7 +218,7 @@ TEST_P(MultiPassInOrder, WithHardwareEarlyTerminationEveryNumberOfPassesHasTheSa
 }
 
 class MultiPassBarrier : public ::testing::TestWithParam<std::string> {};
-INSTANTIATE_TEST_SUITE_P(Frame, MultiPassBarrier, ::testing::Values("agx-orin", "desktop"),
+INSTANTIATE_TEST_SUITE_P(Frame, MultiPassBarrier, ::testing::Values("agx-orin-ideal-memory", "desktop"),
                          [](const auto& each) { return each.param == "desktop" ? "several_gpcs" : "one_gpc"; });
 
 TEST_P(MultiPassBarrier, NoWarpThatReadsIsLaunchedBeforeTheLastBlendBeforeItAndNoneIsBlendedAfter) {
@@ -262,7 +262,7 @@ TEST_P(MultiPassBarrier, NoWarpThatReadsIsLaunchedBeforeTheLastBlendBeforeItAndN
 }
 
 TEST(MultiPass, APlatformOnWhichCropTellsDrawNothingIsRefusedAtEveryFidelity) {
-  Platform unlinked = platform_named("agx-orin");
+  Platform unlinked = platform_named("agx-orin-ideal-memory");
   unlinked.wire = [wire = unlinked.wire](Netlist& netlist) {
     wire(netlist);
     netlist.disconnect("gpc0.crop.out_done");
@@ -281,7 +281,7 @@ TEST(MultiPass, ReadingTheTargetIsTrafficOfColour) {
   for (const Fidelity fidelity : fidelities()) {
     SCOPED_TRACE(name_of(fidelity));
     RunRequest request = request_of("baseline", fidelity);
-    request.platform = &platform_named("agx-orin-lpddr3");
+    request.platform = &platform_named("agx-orin");
     request.effects = EffectChoice::everything();
     const RunResult result = run_passes(request, dense_splats(11), 3);
     const std::uint64_t read = testing::statistic(result, "l2.color_bytes_read");

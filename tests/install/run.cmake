@@ -126,7 +126,7 @@ endforeach()
 
 # The platform: two GPCs are faster than one.
 expect_success("twin cycle het\\+qm [0-9]+ cycles" ${WORK_DIR}/consumer/twin_gpu)
-string(REGEX MATCH "agx-orin cycle baseline ([0-9]+)" ignored "${output}")
+string(REGEX MATCH "agx-orin-ideal-memory cycle baseline ([0-9]+)" ignored "${output}")
 set(one ${CMAKE_MATCH_1})
 string(REGEX MATCH "twin cycle baseline ([0-9]+)" ignored "${output}")
 set(two ${CMAKE_MATCH_1})
@@ -139,7 +139,7 @@ expect_success("near: [1-9][0-9]* quads blended\nfar: [1-9][0-9]* quads blended"
 
 # And as a plugin that brings nothing else.
 set(wide ${WORK_DIR}/consumer/wide_platform.so)
-expect_success("agx-orin with two GPCs" ${vrpipe} platforms --plugin ${wide})
+expect_success("agx-orin-ideal-memory with two GPCs" ${vrpipe} platforms --plugin ${wide})
 expect_success("" ${vrpipe} run ${draw} --fidelity lt --plugin ${wide} --platform wide)
 expect_success("\"tgc.bins\": *32" ${vrpipe} run ${draw} --fidelity lt --plugin ${wide} --variant qm-small --json -)
 expect_success("qm-small" ${vrpipe} compare ${draw} --fidelity lt --plugin ${wide} --platform wide)

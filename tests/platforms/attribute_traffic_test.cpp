@@ -19,7 +19,7 @@ using testing::same_image;
 using testing::statistic;
 using testing::strictly;
 
-Platform with_attribute_traffic(const std::string& name = "agx-orin") {
+Platform with_attribute_traffic(const std::string& name = "agx-orin-ideal-memory") {
   Platform platform = platform_named(name);
   platform.wire = [wire = platform.wire](Netlist& netlist) {
     wire(netlist);
@@ -39,7 +39,7 @@ RunRequest attribute_traffic_request(const Platform& platform, const std::string
 TEST(AttributeTrafficOfAFrame, IsWhatItsSplatsAndPrimitivesNeed) {
   const std::uint32_t splats = 800;
   const Draw draw = testing::random_draw(128, 96, splats, 31);
-  for (const char* name : {"agx-orin", "desktop"}) {
+  for (const char* name : {"agx-orin-ideal-memory", "desktop"}) {
     const Platform platform = with_attribute_traffic(name);
     for (const char* variant : {"baseline", "het+qm"}) {
       for (const Fidelity fidelity : fidelities_with_time()) {
@@ -92,7 +92,7 @@ TEST(AttributeTrafficOfAFrame, ALargeL1OfOneCoreReadsEachPrimitiveOnce) {
 
 TEST(AttributeTrafficOfAFrame, ChangesNothingButTimeInStrictTermination) {
   const Draw draw = testing::random_draw(96, 96, 500, 33);
-  for (const char* name : {"agx-orin", "desktop"}) {
+  for (const char* name : {"agx-orin-ideal-memory", "desktop"}) {
     const Platform platform = with_attribute_traffic(name);
     for (const char* variant : {"baseline", "qm", "het", "het+qm"}) {
       const RunResult expected = run(request_of(variant, Fidelity::functional,
@@ -173,7 +173,7 @@ TEST(AttributeTrafficOfAFrame, SlowerMemoryMakesASlowerFrame) {
 
 TEST(AttributeTrafficOfAFrame, TakesAMemoryOfAnotherMake) {
   const Draw draw = testing::random_draw(96, 64, 400, 36);
-  Platform platform = platform_named("agx-orin");
+  Platform platform = platform_named("agx-orin-ideal-memory");
   platform.wire = [](Netlist& netlist) {
     wire_pipeline(netlist);
     connect_attribute_traffic(netlist);
@@ -201,7 +201,7 @@ TEST(AttributeTrafficOfAFrame, TakesAMemoryOfAnotherMake) {
 TEST(AttributeTrafficOfAFrame, GoesThroughAnL2ThatMissesAtEveryFidelity) {
   const std::uint32_t splats = 800;
   const Draw draw = testing::random_draw(96, 96, splats, 38);
-  const Platform platform = with_attribute_traffic("agx-orin-lpddr3");
+  const Platform platform = with_attribute_traffic("agx-orin");
   for (const char* variant : {"baseline", "het+qm"}) {
     const RunResult expected = run(request_of(variant, Fidelity::functional, strictly), draw);
     const RunResult clocked = run(attribute_traffic_request(platform, variant, Fidelity::cycle, strictly), draw);

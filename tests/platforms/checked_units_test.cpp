@@ -691,7 +691,7 @@ TEST(CheckedUnits, WhatAUnitDoesNotCountIsCountedForIt) {
 TEST(CheckedUnits, ChecksChangeNothing) {
   ASSERT_TRUE(registered);
   const Draw draw = random_draw(100, 60, 200, 2);
-  for (const char* platform : {"agx-orin", "desktop"}) {
+  for (const char* platform : {"agx-orin-ideal-memory", "desktop"}) {
     for (const char* variant : {"baseline", "het+qm"}) {
       for (const Fidelity fidelity : fidelities()) {
         for (const Termination termination : {Termination::paper, Termination::strict}) {
@@ -713,7 +713,7 @@ TEST(CheckedUnits, ChecksChangeNothing) {
 TEST(CheckedUnits, ChecksChangeNothingInAFrame) {
   const auto draw = std::make_shared<Draw>(random_draw(100, 60, 300, 3));
   for (std::uint32_t i = 0; i < 300; ++i) draw->splats[i].depth = testing::uniform(4, i, 0, 1);
-  for (const char* platform : {"agx-orin", "desktop"}) {
+  for (const char* platform : {"agx-orin-ideal-memory", "desktop"}) {
     for (const Fidelity fidelity : fidelities()) {
       for (const Termination termination : {Termination::paper, Termination::strict}) {
         RunRequest request = request_of("het+qm", fidelity, [&](RunRequest& r) {

@@ -77,7 +77,7 @@ TEST(Configuration, ParametersThatCannotBeAreRefusedWhateverTheFrameCallsFor) {
 }
 
 TEST(Platforms, OneWithoutGpcFrequencyOrWiringOrOfANameThatIsTakenIsRefused) {
-  const Platform good = platform_named("agx-orin");
+  const Platform good = platform_named("agx-orin-ideal-memory");
   EXPECT_THROW(add_platform(good), UserError);
   for (const auto& [gpcs, megahertz, wire] : {std::tuple{0U, 1.0, good.wire},
                                               {1U, 0.0, good.wire},
@@ -112,7 +112,7 @@ TEST(Platforms, OneWithoutGpcFrequencyOrWiringOrOfANameThatIsTakenIsRefused) {
 }
 
 TEST(Platforms, WiringThatThrowsIsAFaultThatNamesThePlatform) {
-  Platform platform = platform_named("agx-orin");
+  Platform platform = platform_named("agx-orin-ideal-memory");
   platform.name = "broken";
   platform.wire = [](Netlist&) { throw std::out_of_range("no such thing"); };
   const RunRequest request = request_of("qm", Fidelity::lt, [&](RunRequest& r) { r.platform = &platform; });

@@ -20,7 +20,7 @@ using testing::same_image;
 using testing::statistic;
 using testing::strictly;
 
-Platform with_z_traffic(const std::string& name = "agx-orin") {
+Platform with_z_traffic(const std::string& name = "agx-orin-ideal-memory") {
   Platform platform = platform_named(name);
   platform.wire = [wire = platform.wire](Netlist& netlist) {
     wire(netlist);
@@ -52,7 +52,7 @@ Draw terminating_draw(std::uint32_t width, std::uint32_t height, std::uint32_t s
 
 TEST(DepthStencilTraffic, IsWhatTheZCachesMove) {
   const Draw draw = terminating_draw(160, 128, 600, 41);
-  for (const char* name : {"agx-orin", "desktop"}) {
+  for (const char* name : {"agx-orin-ideal-memory", "desktop"}) {
     const Platform platform = with_z_traffic(name);
     for (const char* variant : {"het", "het+qm"}) {
       for (const Fidelity fidelity : fidelities_with_time()) {
@@ -84,7 +84,7 @@ TEST(DepthStencilTraffic, IsWhatTheZCachesMove) {
 
 TEST(DepthStencilTraffic, ACacheThatHoldsTheSurfaceReadsEachSectorOnceAndWritesNothing) {
   const Draw draw = terminating_draw(128, 96, 300, 42);
-  for (const char* name : {"agx-orin", "desktop"}) {
+  for (const char* name : {"agx-orin-ideal-memory", "desktop"}) {
     const Platform platform = with_z_traffic(name);
     for (const Fidelity fidelity : fidelities_with_time()) {
       const RunResult result = run(z_traffic_request(platform, "het", fidelity,
@@ -131,7 +131,7 @@ TEST(DepthStencilTraffic, AFrameThatDoesNotTerminateEarlyHasNone) {
 
 TEST(DepthStencilTraffic, ChangesNothingButTimeInStrictTermination) {
   const Draw draw = terminating_draw(96, 96, 300, 44);
-  for (const char* name : {"agx-orin", "desktop", "agx-orin-lpddr3"}) {
+  for (const char* name : {"agx-orin-ideal-memory", "desktop", "agx-orin"}) {
     const Platform platform = with_z_traffic(name);
     for (const char* variant : {"het", "het+qm"}) {
       const RunResult expected = run(request_of(variant, Fidelity::functional,
@@ -190,7 +190,7 @@ TEST(DepthStencilTraffic, DoesNotDependOnTheOrderOfTicks) {
 
 TEST(DepthStencilTraffic, AFastClearReadsOnlyWhatWasWrittenBack) {
   const Draw draw = terminating_draw(160, 128, 600, 46);
-  for (const char* name : {"agx-orin", "desktop"}) {
+  for (const char* name : {"agx-orin-ideal-memory", "desktop"}) {
     const Platform platform = with_z_traffic(name);
     for (const Fidelity fidelity : fidelities_with_time()) {
       const RunResult result =
@@ -214,12 +214,13 @@ TEST(DepthStencilTraffic, TimedFidelitiesStayNearCycleAndTheBoundBelow) {
   SceneRequest scene;
   scene.scene = "builtin:object";
   scene.size = ImageSize{128, 112};
+  scene.fovy_degrees = 20;
   const LoadedScene loaded = load_scene(scene);
   const Draw& draw = loaded.draw;
-  for (const char* name : {"agx-orin", "agx-orin-lpddr3", "desktop"}) {
+  for (const char* name : {"agx-orin-ideal-memory", "agx-orin", "desktop"}) {
     const Platform platform = with_z_traffic(name);
     for (const char* bytes : {"4096", "16384"}) {
-      if (std::string(name) != "agx-orin" && std::string(bytes) != "4096") continue;
+      if (std::string(name) != "agx-orin-ideal-memory" && std::string(bytes) != "4096") continue;
       const auto small = [&](RunRequest& request) { request.settings = {{"zrop", "cache_bytes", bytes}}; };
       const RunResult clocked = run(z_traffic_request(platform, "het", Fidelity::cycle, small), draw);
       const auto cycles = static_cast<double>(*clocked.cycles);
@@ -237,7 +238,7 @@ TEST(DepthStencilTraffic, TimedFidelitiesStayNearCycleAndTheBoundBelow) {
 /// Behind an L2 that misses lies a DRAM; without time both count what is asked of them.
 TEST(DepthStencilTraffic, IsCountedWithoutTimeWhereMemoryWantsToKnow) {
   const Draw draw = terminating_draw(128, 96, 600, 47);
-  const Platform platform = with_z_traffic("agx-orin-lpddr3");
+  const Platform platform = with_z_traffic("agx-orin");
   const auto clocked = static_cast<double>(
       statistic(run(z_traffic_request(platform, "het", Fidelity::cycle, strictly), draw), "zrop.cache.sector_misses"));
   for (const Fidelity fidelity : {Fidelity::functional, Fidelity::bound}) {
@@ -251,7 +252,7 @@ TEST(DepthStencilTraffic, IsCountedWithoutTimeWhereMemoryWantsToKnow) {
 
 TEST(DepthStencilTraffic, TakesAMemoryOfAnotherMake) {
   const Draw draw = terminating_draw(96, 64, 200, 48);
-  Platform platform = platform_named("agx-orin");
+  Platform platform = platform_named("agx-orin-ideal-memory");
   platform.wire = [](Netlist& netlist) {
     wire_pipeline(netlist);
     netlist.add_memory("dram", [](const std::string& name, unsigned) -> ForeignMemory {

@@ -34,7 +34,7 @@ TEST(Determinism, RepeatedRunsHaveTheSameHash) {
 TEST(Determinism, TheOrderInWhichUnitsTickChangesNoBit) {
   const Draw draw = testing::random_draw(64, 64, 300, 2);
   for (const Variant& variant : variants()) {
-    for (const char* platform : {"agx-orin", "desktop"}) {
+    for (const char* platform : {"agx-orin-ideal-memory", "desktop"}) {
       const auto on = [&](std::uint64_t seed) {
         return request_of(variant.name, Fidelity::cycle, [&](RunRequest& r) {
           r.platform = &platform_named(platform);
@@ -106,7 +106,7 @@ TEST(Determinism, TheLatenciesOfShadersChangeNoImage) {
 
 // case T10
 TEST(QueuesOfOnePlace, CompleteWithTheSameImageAndAreNotFaster) {
-  const Platform shallow = testing::edited("agx-orin", [](Netlist& netlist) {
+  const Platform shallow = testing::edited("agx-orin-ideal-memory", [](Netlist& netlist) {
     for (const Link& link : netlist.links()) link.parameters->depth = 1;
   });
   const Draw draw = testing::random_draw(64, 64, 300, 6);
@@ -118,7 +118,7 @@ TEST(QueuesOfOnePlace, CompleteWithTheSameImageAndAreNotFaster) {
         r.settings = {{"l2", "latency_cycles", "1"}};
       });
     };
-    const RunResult deep = run(on(&platform_named("agx-orin")), draw);
+    const RunResult deep = run(on(&platform_named("agx-orin-ideal-memory")), draw);
     const RunResult one = run(on(&shallow), draw);
     EXPECT_TRUE(same_image(deep.framebuffer.color, one.framebuffer.color)) << variant.name;
     EXPECT_EQ(deep.counts.named(), one.counts.named()) << variant.name;
@@ -158,7 +158,7 @@ void register_wall() {
 
 TEST(Deadlock, IsReportedWithTheUnitsThatWait) {
   register_wall();
-  const Platform broken = testing::edited("agx-orin", [](Netlist& netlist) {
+  const Platform broken = testing::edited("agx-orin-ideal-memory", [](Netlist& netlist) {
     netlist.disconnect("gpc0.prop.out_color");
     netlist.add("gpc0.wall");
     netlist.connect("gpc0.prop.out_color", "gpc0.wall.in_color", 2);
@@ -177,7 +177,7 @@ TEST(Deadlock, IsReportedWithTheUnitsThatWait) {
 }
 
 std::string refusal_of(std::function<void(Netlist&)> wire, Fidelity fidelity) {
-  Platform wrong = platform_named("agx-orin");
+  Platform wrong = platform_named("agx-orin-ideal-memory");
   wrong.name = "wrong";
   wrong.wire = std::move(wire);
   try {

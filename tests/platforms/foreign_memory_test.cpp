@@ -23,9 +23,9 @@ using testing::strictly;
 
 using Socket = tlm::tlm_base_target_socket_b<32>;
 
-/// agx-orin with a memory of another make in place of its L2.
+/// agx-orin-ideal-memory with a memory of another make in place of its L2.
 Platform with_memory(MemoryMaker make) {
-  Platform platform = platform_named("agx-orin");
+  Platform platform = platform_named("agx-orin-ideal-memory");
   platform.name = "foreign";
   platform.wire = [make = std::move(make)](Netlist& netlist) {
     netlist.add("draw");
@@ -36,9 +36,9 @@ Platform with_memory(MemoryMaker make) {
   return platform;
 }
 
-/// agx-orin with a memory of another make below its L2.
+/// agx-orin-ideal-memory with a memory of another make below its L2.
 Platform with_memory_below(MemoryMaker make) {
-  Platform platform = platform_named("agx-orin");
+  Platform platform = platform_named("agx-orin-ideal-memory");
   platform.name = "foreign";
   platform.wire = [make = std::move(make)](Netlist& netlist) {
     wire_pipeline(netlist);

@@ -115,7 +115,7 @@ TEST(DesktopPlatform, HasTheImageOfAgxOrinBitForBit) {
     };
   };
   for (const char* variant : {"baseline", "het"}) {  // merging depends on what else is in a bin
-    const RunResult orin = run(request_of(variant, Fidelity::cycle, on("agx-orin")), draw);
+    const RunResult orin = run(request_of(variant, Fidelity::cycle, on("agx-orin-ideal-memory")), draw);
     const RunResult desktop = run(request_of(variant, Fidelity::cycle, on("desktop")), draw);
     const RunResult functional = run(request_of(variant, Fidelity::functional, on("desktop")), draw);
     EXPECT_TRUE(same_image(orin.framebuffer.color, desktop.framebuffer.color)) << variant;

@@ -74,7 +74,7 @@ TEST(L1OfAnArray, StandsBetweenItAndTheL2) {
 TEST(L1OfAnArray, PassesOnWhatItLacksAndWhatIsWritten) {
   const std::uint32_t splats = 800;
   const Draw draw = testing::random_draw(128, 96, splats, 41);
-  for (const char* name : {"agx-orin-lpddr3", "desktop"}) {
+  for (const char* name : {"agx-orin", "desktop"}) {
     const Platform platform = with_l1(name);
     for (const char* variant : {"baseline", "het+qm"}) {
       for (const Fidelity fidelity : fidelities()) {
@@ -109,7 +109,7 @@ TEST(L1OfAnArray, PassesOnWhatItLacksAndWhatIsWritten) {
 
 TEST(L1OfAnArray, ThatHoldsThemAllReadsEachSectorOfAttributesOnce) {
   const Draw draw = testing::random_draw(96, 64, 300, 42);
-  const Platform platform = with_l1("agx-orin-lpddr3");
+  const Platform platform = with_l1("agx-orin");
   for (const char* variant : {"baseline", "het+qm"}) {
     for (const Fidelity fidelity : fidelities()) {
       const std::string what = std::string(variant) + " " + name_of(fidelity);
@@ -146,7 +146,7 @@ TEST(L1OfAnArray, HitsNothingThatAnotherArrayHasOverwritten) {
 
 TEST(L1OfAnArray, MissesWhatACacheByItsDefinitionMisses) {
   LookUps& look_ups = testing::record_look_ups("l1");
-  const Platform platform = without_own_l1s("agx-orin-lpddr3", "recorded");
+  const Platform platform = without_own_l1s("agx-orin", "recorded");
   for (const char* variant : {"baseline", "het+qm"}) {
     for (const char* replacement : {"lru", "fifo"}) {
       for (const std::uint32_t kilobytes : {8U, 64U}) {
@@ -182,7 +182,7 @@ TEST(L1OfAnArray, MissesWhatACacheByItsDefinitionMisses) {
 
 TEST(L1OfAnArray, ChangesNothingButTimeInStrictTermination) {
   const Draw draw = testing::random_draw(96, 96, 500, 44);
-  for (const char* name : {"agx-orin-lpddr3", "desktop"}) {
+  for (const char* name : {"agx-orin", "desktop"}) {
     const Platform platform = with_l1(name);
     const Platform none = without_own_l1s(name);
     for (const char* variant : {"baseline", "qm", "het", "het+qm"}) {
@@ -232,7 +232,7 @@ TEST(L1OfAnArray, ChangesNothingButTimeInStrictTermination) {
 
 TEST(L1OfAnArray, DoesNotDependOnTheOrderOfTicks) {
   const Draw draw = testing::random_draw(96, 64, 400, 45);
-  const Platform platform = with_l1("agx-orin-lpddr3");
+  const Platform platform = with_l1("agx-orin");
   RunRequest request = on(platform, "het+qm", Fidelity::cycle, small_l1);
   const RunResult expected = run(request, draw);
   for (std::uint64_t seed = 1; seed < 4; ++seed) {
@@ -245,7 +245,7 @@ TEST(L1OfAnArray, DoesNotDependOnTheOrderOfTicks) {
 
 TEST(L1OfAnArray, ThatIsSlowMakesASlowFrame) {
   const Draw draw = testing::random_draw(96, 64, 1500, 46);
-  const Platform platform = with_l1("agx-orin-lpddr3");
+  const Platform platform = with_l1("agx-orin");
   for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
     const RunResult usual = run(on(platform, "baseline", fidelity), draw);
     const RunResult one_bank =
@@ -262,7 +262,7 @@ TEST(L1OfAnArray, ThatIsSlowMakesASlowFrame) {
 // As the mark of the fidelity ladder.
 TEST(L1OfAnArray, TakesAsLongAtEachFidelity) {
   const Draw draw = testing::random_draw(192, 128, 3000, 47);
-  const Platform platform = with_l1("agx-orin-lpddr3");
+  const Platform platform = with_l1("agx-orin");
   for (const char* variant : {"baseline", "het+qm"}) {
     const std::vector<Setting> usual;
     const std::vector<Setting> one_bank = {{"l1", "banks", "1"}, {"l1", "bank_bytes_per_cycle", "16"}};
@@ -280,7 +280,7 @@ TEST(L1OfAnArray, TakesAsLongAtEachFidelity) {
 
 TEST(L1OfAnArray, MayBeAMemoryOfAnotherMake) {
   const Draw draw = testing::random_draw(96, 64, 400, 48);
-  Platform platform = with_l1("agx-orin-lpddr3");
+  Platform platform = with_l1("agx-orin");
   std::uint64_t requests = 0;
   class Dram final : public foreign::Dram {
    public:
@@ -318,8 +318,8 @@ TEST(L1OfAnArray, MayBeAMemoryOfAnotherMake) {
 
 TEST(L1OfAnArray, MayBeMissing) {
   const Draw draw = testing::random_draw(96, 64, 400, 49);
-  const Platform none = without_own_l1s("agx-orin-lpddr3");
-  const Platform usual = platform_named("agx-orin-lpddr3");
+  const Platform none = without_own_l1s("agx-orin");
+  const Platform usual = platform_named("agx-orin");
   for (const Fidelity fidelity : fidelities()) {
     const RunResult result = run(on(none, "baseline", fidelity), draw);
     const RunResult cached = run(on(usual, "baseline", fidelity), draw);

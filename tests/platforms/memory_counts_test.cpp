@@ -25,7 +25,7 @@ struct Memory {
 
 RunRequest request_for(const Memory& memory, const char* variant, Fidelity fidelity, const char* hash = "off") {
   RunRequest request = testing::request_of(variant, fidelity);
-  request.platform = &platform_named("agx-orin-lpddr3");
+  request.platform = &platform_named("agx-orin");
   request.effects = EffectChoice::everything();
   request.settings = {{"l2", "banks", std::to_string(memory.banks)},
                       {"l2", "bytes", std::to_string(memory.banks * memory.sets_of_a_bank * 16 * 128)},
@@ -97,7 +97,7 @@ TEST(MemoryCounts, OfRealGpusDrawAFrame) {
         Real{"2560K", "5", "5"}, Real{"5632K", "11", "11"}, Real{"6M", "48", "12"}}) {
     for (const Fidelity fidelity : {Fidelity::lt, Fidelity::cycle}) {
       RunRequest request = testing::request_of("baseline", fidelity);
-      request.platform = &platform_named("agx-orin-lpddr3");
+      request.platform = &platform_named("agx-orin");
       request.settings = {{"l2", "bytes", real.bytes},
                           {"l2", "banks", real.banks},
                           {"dram", "channels", real.channels}};
@@ -111,7 +111,7 @@ TEST(MemoryCounts, OfRealGpusDrawAFrame) {
 // An L2 and a DRAM of ours work in the cycles of the units' clock.
 TEST(MemoryCounts, OfThePlatformNeedNoEventOfTheKernelForEachCycle) {
   RunRequest request = testing::request_of("baseline", Fidelity::cycle);
-  request.platform = &platform_named("agx-orin-lpddr3");
+  request.platform = &platform_named("agx-orin");
   const RunResult result = run(request, testing::random_draw(64, 64, 200, 3));
   EXPECT_LT(result.kernel_events, *result.cycles / 10);
 }

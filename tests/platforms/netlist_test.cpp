@@ -133,7 +133,7 @@ TEST(Netlist, EditsThatCannotBeAreRefused) {
 
 // A platform that leaves the colour ROPs out draws nothing, whoever asks.
 TEST(Netlist, WhatAPlatformLeavesOutIsMissingAtEveryFidelity) {
-  const Platform half = edited("agx-orin", [](Netlist& netlist) { netlist.remove("gpc0.raster"); });
+  const Platform half = edited("agx-orin-ideal-memory", [](Netlist& netlist) { netlist.remove("gpc0.raster"); });
   const Draw draw = random_draw(64, 64, 100, 3);
   for (const Fidelity fidelity : {Fidelity::functional, Fidelity::bound}) {
     RunRequest request = request_of("baseline", fidelity);
@@ -154,7 +154,7 @@ TEST(Netlist, WhatAPlatformLeavesOutIsMissingAtEveryFidelity) {
 }
 
 TEST(Netlist, AFrontEndAloneRunsAtEveryFidelity) {
-  Platform front = platform_named("agx-orin");
+  Platform front = platform_named("agx-orin-ideal-memory");
   front.name = "front-end";
   front.wire = [](Netlist& netlist) {
     wire_pipeline(netlist);
@@ -175,7 +175,8 @@ TEST(Netlist, AFrontEndAloneRunsAtEveryFidelity) {
 }
 
 TEST(Netlist, StrictTerminationWithoutAWayToCropIsRefused) {
-  const Platform broken = edited("agx-orin", [](Netlist& netlist) { netlist.disconnect("gpc0.prop.out_survivors"); });
+  const Platform broken =
+      edited("agx-orin-ideal-memory", [](Netlist& netlist) { netlist.disconnect("gpc0.prop.out_survivors"); });
   EXPECT_NE(refusal_of(broken, Fidelity::cycle).find("no survivors leave PROP"), std::string::npos);
 }
 
@@ -221,7 +222,7 @@ TEST(Instances, UnknownPathsAndLinksGetTheNearestName) {
   EXPECT_NE(text({"link.tc.bin", "depth", "4"}).find("link.tc.bins"), std::string::npos);
   EXPECT_NE(text({"link.tc.bins", "deepth", "4"}).find("did you mean link.tc.bins.depth"), std::string::npos);
   EXPECT_NE(text({"link.tc.bins", "depth", "0"}).find("1 to 65536"), std::string::npos);
-  const Platform none = edited("agx-orin", [](Netlist& netlist) { netlist.remove("gpc0.tgc"); });
+  const Platform none = edited("agx-orin-ideal-memory", [](Netlist& netlist) { netlist.remove("gpc0.tgc"); });
   EXPECT_NE(refusal_of(none, Fidelity::functional, {{"tgc", "bins", "4"}}).find("has none"), std::string::npos);
 }
 
@@ -261,7 +262,7 @@ TEST(Links, TheirParametersDecideAtEveryFidelityWithTime) {
 // Its time goes on after the draw, and the run ends all the same.
 TEST(ForeignMemories, TakeThePlaceOfTheL2) {
   const Draw draw = random_draw(96, 96, 200, 7);
-  for (const char* base : {"agx-orin", "desktop", "mobile"}) {
+  for (const char* base : {"agx-orin-ideal-memory", "desktop", "mobile"}) {
     const Platform platform = edited(base, [](Netlist& netlist) { netlist.replace_memory("l2", make_other); });
     for (const Fidelity fidelity : fidelities()) {
       RunRequest request = request_of("het+qm", fidelity, strictly);
@@ -279,7 +280,7 @@ TEST(ForeignMemories, TakeThePlaceOfTheL2) {
 // The L2 that nobody uses any more is not there.
 TEST(ForeignMemories, MayStandBesideTheL2) {
   const Draw draw = random_draw(64, 64, 100, 7);
-  const Platform platform = edited("agx-orin", [](Netlist& netlist) {
+  const Platform platform = edited("agx-orin-ideal-memory", [](Netlist& netlist) {
     netlist.add_memory("other", make_other);
     netlist.connect_memory("gpc0.crop", "other");
   });
@@ -324,7 +325,7 @@ TEST(ForeignMemories, MayLieBelowTheL2) {
 }
 
 TEST(ForeignMemories, BelowAnL2ThatIsReplacedAreNotMade) {
-  const Platform platform = edited("agx-orin", [](Netlist& netlist) {
+  const Platform platform = edited("agx-orin-ideal-memory", [](Netlist& netlist) {
     netlist.add_memory("dram", [](const std::string&, unsigned) -> ForeignMemory { throw std::logic_error("made"); });
     netlist.connect_memory("l2", "dram");
     netlist.replace_memory("l2", make_other);
@@ -335,7 +336,7 @@ TEST(ForeignMemories, BelowAnL2ThatIsReplacedAreNotMade) {
 }
 
 TEST(ForeignMemories, BelowAnL2ThatNoUnitUsesAreNotMade) {
-  const Platform platform = edited("agx-orin", [](Netlist& netlist) {
+  const Platform platform = edited("agx-orin-ideal-memory", [](Netlist& netlist) {
     netlist.add_memory("dram", [](const std::string&, unsigned) -> ForeignMemory { throw std::logic_error("made"); });
     netlist.connect_memory("l2", "dram");
     netlist.add_memory("other", make_other);

@@ -83,7 +83,7 @@ TEST(Observers, SeeWhatBecomesOfFragments) {
   const Draw draw = random_draw(200, 120, 400, 3);
   for (const Fidelity fidelity : fidelities()) {
     for (const Termination termination : {Termination::paper, Termination::strict}) {
-      for (const char* platform : {"agx-orin", "desktop"}) {
+      for (const char* platform : {"agx-orin-ideal-memory", "desktop"}) {
         SCOPED_TRACE(std::string(name_of(fidelity)) + " " + name_of(termination) + " " + platform);
         RunRequest request = observed("het+qm", fidelity);
         request.termination = termination;

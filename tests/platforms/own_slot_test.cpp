@@ -152,7 +152,7 @@ const Registrar<Sieve, Behaviour> sieve("sieve", "sieve", "takes every third qua
 }();
 
 RunResult sieved(Fidelity fidelity, std::vector<Setting> settings = {}) {
-  static const Platform platform = testing::edited("agx-orin", [](Netlist& netlist) {
+  static const Platform platform = testing::edited("agx-orin-ideal-memory", [](Netlist& netlist) {
     netlist.insert("gpc0.raster.out_quads", "gpc0.sieve", "sieve", "in_quads", "out_quads");
   });
   static const Draw draw = testing::random_draw(96, 96, 2000, 3);

@@ -36,9 +36,9 @@ struct Pressure {
   std::string text() const { return fmt::format("{} {} {} KB", platform, variant, bytes / 1024); }
 };
 // Attributes alone go round in 64 KB.
-constexpr Pressure pressures[] = {{"agx-orin-lpddr3", "baseline", Replacement::lru, 65536},
-                                  {"agx-orin-lpddr3", "baseline", Replacement::fifo, 262144},
-                                  {"agx-orin-lpddr3", "het+qm", Replacement::lru, 262144},
+constexpr Pressure pressures[] = {{"agx-orin", "baseline", Replacement::lru, 65536},
+                                  {"agx-orin", "baseline", Replacement::fifo, 262144},
+                                  {"agx-orin", "het+qm", Replacement::lru, 262144},
                                   {"agx-orin-lpddr5", "baseline", Replacement::lru, 262144}};
 
 CacheOrganization organization_of(const Pressure& pressure) {
@@ -121,7 +121,7 @@ TEST(RecordedTraffic, OfTheColourCacheMakesTheHitsAndMissesOfACacheWithoutTime) 
   constexpr std::uint32_t height = 128;
   const Draw draw = testing::random_draw(width, height, 700, 33);
   const ColorSurface surface(width, height, ColorFormat::rgba16f);
-  for (const char* platform : {"agx-orin", "desktop", "agx-orin-lpddr3"}) {
+  for (const char* platform : {"agx-orin-ideal-memory", "desktop", "agx-orin"}) {
     for (const char* variant : {"baseline", "het+qm"}) {
       for (const std::uint32_t bytes : {2048U, 16384U}) {
         CacheOrganization organization;
@@ -167,7 +167,7 @@ TEST(TrafficToDram, IsWhatIsTouchedForTheFirstTimeWhereAllFitsIntoL2) {
   const std::uint32_t height = 96;
   auto splats = testing::random_draw(width, height, 500, 34).splats;
   const auto geometry = testing::geometry_of(width, height, splats);
-  for (const char* name : {"agx-orin-lpddr3", "agx-orin-lpddr5"}) {
+  for (const char* name : {"agx-orin", "agx-orin-lpddr5"}) {
     for (const char* variant : {"baseline", "het+qm"}) {
       for (const Fidelity fidelity : fidelities()) {
         RunRequest request = request_of(variant, fidelity);
@@ -213,7 +213,7 @@ TEST(TrafficToDram, IsWhatIsTouchedForTheFirstTimeWhereAllFitsIntoL2) {
 // sets. Nothing else goes through this L2.
 TEST(TrafficToDram, OfColourHasItsKneeWhereTheSurfaceFitsIntoL2) {
   constexpr std::uint64_t surface = 128 * 1024;
-  Platform platform = platform_named("agx-orin");
+  Platform platform = platform_named("agx-orin-ideal-memory");
   platform.wire = [](Netlist& netlist) {
     wire_pipeline(netlist);
     wire_dram(netlist, "lpddr3-1600");

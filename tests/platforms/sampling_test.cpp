@@ -255,7 +255,7 @@ TEST(Sampling, WhatAnObserverThrowsEndsTheRun) {
 
 TEST(Sampling, ChangesNothingBesideAMemoryWithItsOwnTime) {
   const Draw draw = random_draw(64, 64, 300, 7);
-  Platform platform = platform_named("agx-orin");
+  Platform platform = platform_named("agx-orin-ideal-memory");
   platform.wire = [wire = platform.wire](Netlist& netlist) {
     wire(netlist);
     netlist.replace_memory("l2", [](const std::string& name, unsigned) {
@@ -272,7 +272,7 @@ TEST(Sampling, ChangesNothingBesideAMemoryWithItsOwnTime) {
 }
 
 TEST(Sampling, KeepsNoDeadlockAlive) {
-  Platform platform = platform_named("agx-orin");
+  Platform platform = platform_named("agx-orin-ideal-memory");
   platform.wire = [wire = platform.wire](Netlist& netlist) {
     wire(netlist);
     netlist.disconnect("gpc0.prop.out_release");  // the SMs run out of room for warps

@@ -92,7 +92,7 @@ RC_GTEST_PROP(FrameFacts, BoundSplatsOfAnyExtent, ()) {
 RC_GTEST_PROP(FrameFacts, BoundMeshesAndSplatsOfSeveralDraws, ()) {
   const auto seed = static_cast<std::uint64_t>(*whole(1, 1 << 20));
   RunRequest request;
-  request.platform = &platforms().front();
+  request.platform = &platform_named("agx-orin-ideal-memory");
   request.variant = *rc::gen::elementOf(variants());
   RenderContext context =
       testing::context_of(*whole(0, 2) == 0 ? mixed_frame(seed, request) : random_frame(seed, request));

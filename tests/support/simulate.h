@@ -15,11 +15,11 @@
 
 namespace vrpipe::testing {
 
-/// A request for agx-orin; `change` makes it what the test is about.
+/// A request for agx-orin-ideal-memory; `change` makes it what the test is about.
 inline RunRequest request_of(const std::string& variant, Fidelity fidelity = Fidelity::cycle,
                              const std::function<void(RunRequest&)>& change = nullptr) {
   RunRequest request;
-  request.platform = &platform_named("agx-orin");
+  request.platform = &platform_named("agx-orin-ideal-memory");
   request.variant = variant_named(variant);
   request.fidelity = fidelity;
   if (change) change(request);

@@ -266,8 +266,8 @@ TEST_F(ComparePage, OfOneRunWithoutTimeOrWithSeveralPlatforms) {
   EXPECT_EQ(functional.find("<section id=\"course\">"), std::string::npos);
   EXPECT_EQ(functional.find("<section id=\"states\">"), std::string::npos);
   EXPECT_NE(functional.find("<section id=\"heat\">"), std::string::npos);
-  const std::string two = page_of({"compare", "--scene", "tiny.spl", "--platform", "agx-orin", "--platform", "mobile",
-                                   "--fidelity", "lt", "--relative-to", "mobile/baseline"});
+  const std::string two = page_of({"compare", "--scene", "tiny.spl", "--platform", "agx-orin-ideal-memory",
+                                   "--platform", "mobile", "--fidelity", "lt", "--relative-to", "mobile/baseline"});
   check_whole(two);
   EXPECT_NE(two.find("speed-up over mobile/baseline"), std::string::npos);
 }

@@ -260,7 +260,7 @@ TEST_F(EffectsCommand, AListLeavesOutNothingThatIsAlwaysActive) {
   for (const Effect& effect : effects()) {
     const std::string name = effect.full_name();
     if (name == "cache.details" || name == "crop.rounding_loss") continue;
-    // agx-orin has neither a DRAM nor an L2 that misses, and the list leaves all out that ZROP is there for.
+    // agx-orin-ideal-memory has neither a DRAM nor an L2 that misses, and the list leaves all out that ZROP is there for.
     const bool is_there = effect.component != "dram" && effect.component != "l2" && effect.component != "zrop";
     EXPECT_EQ(entries.at(name)["state"], effect.decide == nullptr && is_there ? "active" : "omitted") << name;
   }

@@ -53,7 +53,7 @@ meaning = "m"
 name = "leakage"
 count = "1"
 watts = { low = 1, nominal = 2, high = 4 }
-platforms = ["agx-orin"]
+platforms = ["agx-orin-ideal-memory"]
 source = "s"
 meaning = "m"
 )";
@@ -62,7 +62,7 @@ EnergyTable table_of(const std::string& text) { return tools::parse_energies(tex
 
 RunResult run_of(std::uint64_t quads, std::uint64_t bytes, std::uint64_t cycles) {
   RunResult run;
-  run.request.platform = &platform_named("agx-orin");
+  run.request.platform = &platform_named("agx-orin-ideal-memory");
   run.request.variant = variant_named("baseline");
   run.cycles = cycles;
   run.counts.fragments_blended = 1000;
@@ -80,7 +80,7 @@ RunResult run_of(std::uint64_t quads, std::uint64_t bytes, std::uint64_t cycles)
   return run;
 }
 
-constexpr std::uint64_t cycles_per_millisecond = 612'000;  // of agx-orin
+constexpr std::uint64_t cycles_per_millisecond = 612'000;  // of agx-orin-ideal-memory
 
 void expect_range(const Range& range, double low, double nominal, double high) {
   EXPECT_DOUBLE_EQ(range.low, low);
@@ -249,7 +249,7 @@ TEST(Energy, RatiosReachFromTheLeastToTheGreatestOverAllFigures) {
 
 TEST(Energy, PowerFoundForAnotherPlatformIsNamed) {
   const EnergyTable table = table_of(two_events);
-  EXPECT_TRUE(powers_of_other_platforms(table, platform_named("agx-orin")).empty());
+  EXPECT_TRUE(powers_of_other_platforms(table, platform_named("agx-orin-ideal-memory")).empty());
   EXPECT_EQ(powers_of_other_platforms(table, platform_named("desktop")), std::vector<std::string>{"leakage"});
 }
 
@@ -298,12 +298,12 @@ TEST(Energy, OfEveryPlatformIsCompleteAndSumsUp) {
 }
 
 TEST(Energy, WithMemoryNothingIsLeftOutButOtherWaysToIt) {
-  const RunResult run = simulated(platform_named("agx-orin-lpddr3"), variant_named("het+qm"), true);
+  const RunResult run = simulated(platform_named("agx-orin"), variant_named("het+qm"), true);
   EXPECT_TRUE(energy_amounts(run, tools::shipped_energies()).not_counted.empty());
 }
 
 TEST(Energy, DoesNotDependOnWhetherStatisticsAreFollowed) {
-  for (const char* platform : {"agx-orin", "agx-orin-lpddr5"}) {
+  for (const char* platform : {"agx-orin-ideal-memory", "agx-orin-lpddr5"}) {
     const Variant& variant = variant_named("het+qm");
     const auto amounts = [&](bool reads) {
       return energy_amounts(simulated(platform_named(platform), variant, reads), tools::shipped_energies());

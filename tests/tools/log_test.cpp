@@ -57,8 +57,8 @@ TEST_F(Log, SaysWhyABinIsFlushedAndWhatIsTerminated) {
 }
 
 TEST_F(Log, GoesToStderrForAWindow) {
-  const Finished finished =
-      vrpipe({"run", "--scene", "tiny.spl", "--log", "raster@100:200", "--log", "raster@150:300"});
+  const Finished finished = vrpipe({"run", "--scene", "tiny.spl", "--platform", "agx-orin-ideal-memory", "--log",
+                                    "raster@100:200", "--log", "raster@150:300"});
   EXPECT_EQ(finished.code, 0);
   const std::vector<Line> lines = lines_of(finished.err);
   EXPECT_FALSE(lines.empty());

@@ -5,6 +5,8 @@
 #include <set>
 #include <thread>
 
+#include <fmt/format.h>
+
 #include <vrpipe/component/error.h>
 #include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/gaussian_scene.h>
@@ -56,7 +58,7 @@ TEST(Sensitivity, VariesEveryParameterThatThePaperLeavesOpenOrSaysWhyNot) {
     not_varied.insert(each.name);
     EXPECT_FALSE(each.reason.empty());
   }
-  for (const char* platform : {"agx-orin", "agx-orin-lpddr3"}) {
+  for (const char* platform : {"agx-orin-ideal-memory", "agx-orin"}) {
     for (const ParameterListing& listing : list_parameters(&platform_named(platform))) {
       for (const Parameter* parameter : listing.parameters->parameters()) {
         if (std::string(parameter->source()) != source::open) continue;
@@ -75,8 +77,8 @@ TEST(Sensitivity, SkipsWithANoteWhatThePlatformDoesNotKnow) {
   request.platform = &platforms().front();
   request.variant = variant_named("het+qm");
   EXPECT_THROW(tools::with_settings(request, "crop.unheard_of=1"), UserError);
-  const RunRequest changed = tools::with_settings(request, "platform=agx-orin-lpddr3,tc.bins=16,termination=strict");
-  EXPECT_EQ(changed.platform->name, "agx-orin-lpddr3");
+  const RunRequest changed = tools::with_settings(request, "platform=agx-orin-lpddr5,tc.bins=16,termination=strict");
+  EXPECT_EQ(changed.platform->name, "agx-orin-lpddr5");
   EXPECT_EQ(changed.termination, Termination::strict);
   ASSERT_EQ(changed.settings.size(), 1U);
   EXPECT_EQ(changed.settings[0].unit + changed.settings[0].parameter + changed.settings[0].value, "tcbins16");
@@ -89,7 +91,7 @@ TEST(ReproducePlan, HasEveryPointOnceAndSceneByScene) {
     options.base.platform = &platforms().front();
     const tools::ReproducePlan plan = tools::plan_reproduction(options);
     ASSERT_EQ(plan.scenes.size(), 8U);
-    EXPECT_EQ(plan.paper_scenes().size(), 6U);
+    EXPECT_EQ(plan.scenes_of(tools::PlannedScene::Role::six).size(), 6U);
     EXPECT_EQ(plan.places.size(), plan.points.size());
     for (std::size_t i = 1; i < plan.points.size(); ++i) {
       EXPECT_LE(plan.points[i - 1].key.scene, plan.points[i].key.scene);
@@ -262,6 +264,43 @@ TEST_F(Synthetic, AReasonIsPrintedOnlyWhereThisRunHasShownIt) {
   EXPECT_EQ(row("R6").reason.find("no reason is known; tried in vain: the paper may"), 0U) << row("R6").reason;
 }
 
+TEST_F(Synthetic, RowsAreJudgedWithEachFrontEnd) {
+  const auto found = [&](std::size_t i) { return tools::reproduction_of(result_).front_ends().at(i); };
+  ASSERT_EQ(tools::reproduction_of(result_).front_ends().size(), 3U);
+  EXPECT_EQ(found(0).name, "agx-orin");
+  EXPECT_EQ(found(2).name, "agx-orin-emerald-1");
+  std::vector<std::string> ids;
+  for (const tools::RowFinding& each : found(0).rows) ids.push_back(each.row->id);
+  for (const char* id : {"R1", "R2", "R3", "R4", "R5", "R6", "R7", "R8", "C6", "C7", "C8"}) {
+    EXPECT_EQ(std::count(ids.begin(), ids.end(), id), 1) << id;
+  }
+  EXPECT_EQ(std::count(ids.begin(), ids.end(), "R18"), 0) << "of views, which a front end does not move";
+  EXPECT_EQ(std::count(ids.begin(), ids.end(), "C11"), 0) << "of large scenes, on which nothing is tried";
+  EXPECT_EQ(found(2).agree(), found(0).agree());
+  for (std::size_t i = 0; i < result_.points.size(); ++i) {
+    const tools::PointKey& key = result_.plan.points[i].key;
+    if (key.settings == "platform=agx-orin-emerald-1" && key.variant == "het") *result_.points[i].run.cycles /= 2;
+  }
+  EXPECT_EQ(found(1).agree(), found(0).agree());
+  EXPECT_EQ(found(2).agree(), found(0).agree() - 1) << "R4 alone";
+  EXPECT_NEAR(found(2).trial->means.het.arithmetic, 2 * found(0).trial->means.het.arithmetic, 1e-6);
+  const tools::ReportTable table = tools::front_ends_table(tools::reproduction_of(result_));
+  ASSERT_EQ(table.heading.size(), 6U);
+  EXPECT_EQ(table.rows.size(), ids.size() + 3);
+  EXPECT_EQ(table.rows.back().at(4), fmt::format("{} of {}", found(1).agree(), ids.size()));
+}
+
+TEST_F(Synthetic, FragmentsThatAreLateAreLeftOutBesideThoseThatAreBlended) {
+  const auto main = [&] { return tools::reproduction_of(result_).findings.fragments.front(); };
+  EXPECT_DOUBLE_EQ(main().fragments_in_time, main().fragments) << "none is late";
+  for (std::size_t scene = 0; scene < 6; ++scene) {
+    tools::PointResult& het = point(scene, "het");
+    het.fragments_blended_late = het.run.counts.fragments_blended / 5;
+  }
+  EXPECT_NEAR(main().fragments_in_time, main().fragments / 0.8, 1e-4);
+  EXPECT_NEAR(main().fall_percent_in_time, 100 * (1 - main().quads / main().fragments_in_time), 1e-9);
+}
+
 TEST_F(Synthetic, EnergyStandsBesideThePapersWithoutAVerdict) {
   EXPECT_EQ(row("R12").measured, "") << "nothing was counted";
   const tools::EnergyTable& table = tools::shipped_energies();
@@ -334,8 +373,8 @@ class Reproduce : public ToolTest {
 };
 
 TEST_F(Reproduce, SaysSomethingOfEveryRow) {
-  const Finished finished = vrpipe(command(
-      {"--json", "r.json", "--html", "r.html", "--markdown", "r.md", "--output", "maps", "--journal", "j.jsonl"}));
+  const Finished finished = vrpipe(command({"--json", "r.json", "--html", "r.html", "--markdown", "r.md", "--output",
+                                            "maps", "--journal", "j.jsonl", "--beside", "mine=cloud.ply"}));
   ASSERT_EQ(finished.code, 0) << finished.err;
   const json result = json::parse(read_file(folder() / "r.json"));
   EXPECT_EQ(result["schema"], "vrpipe.reproduce/1");
@@ -356,6 +395,13 @@ TEST_F(Reproduce, SaysSomethingOfEveryRow) {
     EXPECT_NE(document.find("| " + id + " |"), std::string::npos) << id;
     EXPECT_NE(finished.out.find("\n" + id + " "), std::string::npos) << id;
   }
+  // One beside the paper's is in no row and no mean.
+  ASSERT_EQ(result["scenes_beside"].size(), 1U);
+  EXPECT_EQ(result["scenes_beside"][0]["name"], "mine");
+  EXPECT_GT(result["scenes_beside"][0]["speedup"]["het"], 0);
+  EXPECT_NE(document.find("| mine (beside) |"), std::string::npos);
+  EXPECT_NE(document.find("| mine beside the six |"), std::string::npos);
+  EXPECT_NE(document.find("reproduce --quick --beside mine=cloud.ply --markdown"), std::string::npos);
   // A verdict of a quick look says so.
   EXPECT_EQ(document.find("| agrees |"), std::string::npos);
   EXPECT_NE(document.find("| agrees (quick) |"), std::string::npos);
@@ -378,7 +424,7 @@ TEST_F(Reproduce, SaysSomethingOfEveryRow) {
   EXPECT_NE(page.find("<svg"), std::string::npos);
 
   // A journal that was named stays, and nothing is simulated again.
-  const Finished again = vrpipe(command({"--json", "s.json", "--journal", "j.jsonl"}));
+  const Finished again = vrpipe(command({"--json", "s.json", "--journal", "j.jsonl", "--beside", "mine=cloud.ply"}));
   EXPECT_EQ(again.code, 0);
   EXPECT_NE(again.err.find("simulations were done before"), std::string::npos) << again.err;
   json other = json::parse(read_file(folder() / "s.json"));
@@ -396,7 +442,10 @@ kind = "measured"
 holds = [{ of = "fall of quads by het", above = 0.1 }]
 how = "baseline over HET"
 )");
-  ASSERT_EQ(vrpipe(command({"--json", "t.json", "--rows", "rows.toml", "--journal", "j.jsonl"})).code, 0);
+  ASSERT_EQ(vrpipe(command({"--json", "t.json", "--rows", "rows.toml", "--journal", "j.jsonl", "--beside",
+                            "mine=cloud.ply"}))
+                .code,
+            0);
   const json own = json::parse(read_file(folder() / "t.json"));
   ASSERT_EQ(own["rows"].size(), 1U);
   EXPECT_EQ(own["rows"][0]["id"], "Q1");
@@ -439,6 +488,10 @@ TEST_F(Reproduce, RefusesWhatItCannotDo) {
   refused({"reproduce", "--scene", "object=cloud.ply"}, {"(--scene object=cloud.ply)", "the paper does not have"});
   refused({"reproduce", "--scene", "train=none.ply"}, {"(--scene train=none.ply)", "no such file"});
   refused({"reproduce", "--scene", "train=cloud.ply", "--scene", "train=cloud.ply"}, {"train"});
+  refused({"reproduce", "--beside", "cloud.ply"}, {"'cloud.ply' (--beside)", "mine=model.ply"});
+  refused({"reproduce", "--beside", "mine=none.ply"}, {"(--beside mine=none.ply)", "no such file"});
+  refused({"reproduce", "--beside", "train=cloud.ply"}, {"name taken (--beside train=cloud.ply)", "--scene"});
+  refused({"reproduce", "--beside", "a b=cloud.ply"}, {"bad name 'a b' (--beside)"});
   refused({"reproduce", "--camera", "cameras.json"}, {"(--camera)", "NAME=FILE"});
   write("cameras.json",
         R"([{"img_name": "a", "width": 64, "height": 48, "position": [0, 0, -4],

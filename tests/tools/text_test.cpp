@@ -163,7 +163,7 @@ TEST(Text, ProgressLeavesNothingOnATerminalThatShrinks) {
 TEST(Text, WhatBoundsARunIsSaidWithItsParts) {
   RunResult run;
   run.request.variant = variant_named("baseline");
-  run.request.platform = &platform_named("agx-orin");
+  run.request.platform = &platform_named("agx-orin-ideal-memory");
   EXPECT_EQ(bound_text(run), "");
   run.bottleneck = Bottleneck{"gpc0.crop", 0.998, {{"blend", 0.926}, {"sectors", 0.072}, {"forwarding", 0.0}}};
   EXPECT_EQ(bound_text(run), "baseline is bound by CROP, occupied 99.8 % (blend 92.6 %, sectors 7.2 %)\n");
@@ -174,7 +174,7 @@ TEST(Text, WhatBoundsARunIsSaidWithItsParts) {
 TEST(Text, WhereNoUnitIsAlwaysOccupiedTheNextIsNamedToo) {
   RunResult run;
   run.request.variant = variant_named("het");
-  run.request.platform = &platform_named("agx-orin");
+  run.request.platform = &platform_named("agx-orin-ideal-memory");
   run.bottleneck = Bottleneck{"gpc0.raster", 0.76, {{"fine tiles", 0.76}}};
   run.units.resize(3);
   run.units[0] = {"gpc0.raster", {}, 0.76, {}};

@@ -64,16 +64,16 @@ TEST_F(Variants, WithAnotherUnitTakeOfWhatIsSetForAllWhatItDeclares) {
 }
 
 TEST_F(Variants, OfSeveralPlatformsAreComparedInSimulatedTime) {
-  const json result = compare({"--platform", "agx-orin", "--platform", "mobile", "--variant", "baseline", "--variant",
-                               "het+qm", "--relative-to", "mobile/baseline"});
-  EXPECT_EQ(names(result),
-            (std::vector<std::string>{"agx-orin/baseline", "agx-orin/het+qm", "mobile/baseline", "mobile/het+qm"}));
+  const json result = compare({"--platform", "agx-orin-ideal-memory", "--platform", "mobile", "--variant", "baseline",
+                               "--variant", "het+qm", "--relative-to", "mobile/baseline"});
+  EXPECT_EQ(names(result), (std::vector<std::string>{"agx-orin-ideal-memory/baseline", "agx-orin-ideal-memory/het+qm",
+                                                     "mobile/baseline", "mobile/het+qm"}));
   const json& orin = result["runs"][0];
   const json& mobile = result["runs"][2];
-  EXPECT_EQ(orin["platform"], "agx-orin");
+  EXPECT_EQ(orin["platform"], "agx-orin-ideal-memory");
   EXPECT_EQ(mobile["variant"], "baseline");
   const double milliseconds = mobile["milliseconds"].get<double>() / orin["milliseconds"].get<double>();
-  EXPECT_NEAR(result["speedup"]["agx-orin/baseline"].get<double>(), milliseconds, 1e-9);
+  EXPECT_NEAR(result["speedup"]["agx-orin-ideal-memory/baseline"].get<double>(), milliseconds, 1e-9);
   EXPECT_EQ(result["speedup"].count("mobile/baseline"), 0U);
   // Alone, each is the same.
   const json alone = json_of({"run", "--scene", "tiny.spl", "--platform", "mobile", "--variant", "het+qm"});
@@ -85,8 +85,9 @@ TEST_F(Variants, OfSeveralPlatformsAreComparedInSimulatedTime) {
 }
 
 TEST_F(Variants, HaveImagesOfTheirOwn) {
-  const Finished finished = vrpipe({"compare", "--scene", "tiny.spl", "--platform", "agx-orin", "--platform", "mobile",
-                                    "--variant", "mine=het,tc.bins=2", "--fidelity", "functional", "--output", "out"});
+  const Finished finished =
+      vrpipe({"compare", "--scene", "tiny.spl", "--platform", "agx-orin-ideal-memory", "--platform", "mobile",
+              "--variant", "mine=het,tc.bins=2", "--fidelity", "functional", "--output", "out"});
   EXPECT_EQ(finished.code, 0) << finished.err;
   EXPECT_EQ(files(), (std::vector<std::string>{"out", "out/tiny-agx-orin-mine.exr", "out/tiny-agx-orin-mine.png",
                                                "out/tiny-mobile-mine.exr", "out/tiny-mobile-mine.png", "tiny.spl"}));
@@ -131,7 +132,8 @@ TEST_F(Variants, ThatCannotBeAreRefused) {
   refused({"compare", "--scene", "tiny.spl", "--platform", "mobile", "--platform", "mobile"}, {"given twice"});
   refused({"compare", "--scene", "tiny.spl", "--relative-to", "hett"}, {"unknown run 'hett'", "did you mean het"});
   refused({"run", "--scene", "tiny.spl", "--variant", "qm", "--variant", "het"}, {"given twice"});
-  refused({"run", "--scene", "tiny.spl", "--platform", "mobile", "--platform", "agx-orin"}, {"given twice"});
+  refused({"run", "--scene", "tiny.spl", "--platform", "mobile", "--platform", "agx-orin-ideal-memory"},
+          {"given twice"});
 }
 
 }  // namespace

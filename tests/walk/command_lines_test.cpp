@@ -63,6 +63,7 @@ const std::map<std::string, Words> texts_of = {
     {"--energy", {}},
     {"--energies", {"energies.toml"}},
     {"--rows", {"rows.toml"}},
+    {"--beside", {"mine=small.ply", "other=tiny.spl"}},
     {"--explain-effects", {}},
     {"--interval", {"100", "4096"}},
     {"--interval-csv", {"intervals.csv"}},

@@ -121,7 +121,7 @@ std::vector<Finding> broken_draws(const RunResult& result) {
 /// the previous alpha a pixel is signalled that a draw which does not terminate has taken past the threshold.
 Case on_another_machine(const Case& c) {
   Case other = c;
-  other.platform = &platforms().front();
+  other.platform = &simplest_platform();
   other.units.clear();
   other.settings.clear();
   for (const Setting& setting : c.settings) {

@@ -36,6 +36,9 @@ struct Edits {
   }
 };
 
+/// What many cases are of, and what findings are made simpler to.
+const Platform& simplest_platform();
+
 /// One configuration and one scene of the random walk.
 struct Case {
   std::uint64_t seed = 0;

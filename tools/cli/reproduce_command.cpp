@@ -27,14 +27,25 @@
 namespace vrpipe::tools {
 namespace {
 
-/// NAME=FILE[#CAMERA].
-std::pair<std::string, std::string> camera_of_scene(const std::string& text) {
+/// Of an option that takes NAME=FILE. Throws UserError with an example.
+std::pair<std::string, std::string> named_file(const std::string& text, const char* option, const char* why,
+                                               const char* example) {
   const std::size_t equals = text.find('=');
   if (equals == 0 || equals == std::string::npos || equals + 1 == text.size()) {
-    throw UserError("bad value '" + text + "'", "--camera", "it does not say of which scene it is",
-                    "give NAME=FILE, e.g. train=cameras.json#3");
+    throw UserError("bad value '" + text + "'", option, why, std::string("give NAME=FILE, e.g. ") + example);
   }
   return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+/// Throws UserError where there is no such file.
+std::filesystem::path scene_path(const SceneSubstitution& scene, const std::string& option) {
+  std::filesystem::path path = gaussian_file_path(scene.file);
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) {
+    throw UserError("cannot read scene", option + " " + scene.name + "=" + scene.file, "there is no such file",
+                    "name a file of Gaussians");
+  }
+  return path;
 }
 
 class ReproduceCommand : public Command {
@@ -51,6 +62,10 @@ class ReproduceCommand : public Command {
     arguments.add_option("--scene", scenes_, "NAME=FILE",
                          "a trained model in the place of a scene's stand-in, e.g. train=model.ply;\n"
                          "can be repeated",
+                         scene_group);
+    arguments.add_option("--beside", beside_, "NAME=FILE",
+                         "a scene of your own beside the paper's, e.g. mine=model.ply: in no row, but wherever\n"
+                         "variants and settings are compared; can be repeated",
                          scene_group);
     arguments.add_option("--camera", cameras_, "NAME=FILE[#CAMERA]",
                          "cameras of such a model; the views are of this file, too; can be repeated", scene_group);
@@ -92,6 +107,7 @@ class ReproduceCommand : public Command {
         "  vrpipe reproduce --quick\n"
         "  vrpipe reproduce --html reproduction.html --output maps\n"
         "  vrpipe reproduce --scene train=train/point_cloud.ply --camera train=train/cameras.json\n"
+        "  vrpipe reproduce --beside mine=model.ply\n"
         "  vrpipe reproduce --quick --set raster.screen_tile_interval_cycles=2");
   }
 
@@ -131,13 +147,12 @@ class ReproduceCommand : public Command {
     job.options.quick = quick_;
     job.options.substitutions = scenes_;
     for (const SceneSubstitution& file : scene_substitutions(scenes_, "--scene")) {
-      const std::filesystem::path path = gaussian_file_path(file.file);
-      std::error_code ignored;
-      if (!std::filesystem::exists(path, ignored)) {
-        throw UserError("cannot read scene", "--scene " + file.name + "=" + file.file, "there is no such file",
-                        "name a file of Gaussians");
-      }
-      job.inputs.push_back({"--scene", path});
+      job.inputs.push_back({"--scene", scene_path(file, "--scene")});
+    }
+    for (const std::string& text : beside_) {
+      auto [name, file] = named_file(text, "--beside", "it does not say what to call it", "mine=model.ply");
+      job.options.beside.push_back({std::move(name), std::move(file)});
+      job.inputs.push_back({"--beside", scene_path(job.options.beside.back(), "--beside")});
     }
     if (const auto file = single_path(rows_, "--rows")) {
       job.options.rows = read_rows(*file);
@@ -145,7 +160,8 @@ class ReproduceCommand : public Command {
     }
     job.options.lenses = lenses_of(undistorted_, cameras_);
     for (const std::string& text : cameras_) {
-      job.options.cameras.push_back(camera_of_scene(text));
+      job.options.cameras.push_back(
+          named_file(text, "--camera", "it does not say of which scene it is", "train=cameras.json#3"));
       const std::string& camera = job.options.cameras.back().second;
       static_cast<void>(camera_from_file(camera, std::nullopt, job.options.lenses));
       for (const auto& file : camera_files(camera_choice(camera).file)) job.inputs.push_back({"--camera", file});
@@ -202,7 +218,7 @@ class ReproduceCommand : public Command {
     if (files.has("--output")) std::cout << "heat maps: " << printable(job.output->string()) << '\n';
   }
 
-  Values scenes_, cameras_, size_, views_, rows_, platform_, settings_, units_, plugins_, fidelity_;
+  Values scenes_, beside_, cameras_, size_, views_, rows_, platform_, settings_, units_, plugins_, fidelity_;
   Values output_, json_, html_, markdown_, journal_, jobs_;
   bool quick_ = false, undistorted_ = false;
 };

@@ -46,6 +46,8 @@ Gains gains_of(const std::array<const PointResult*, 4>& points) {
   gains.het = gain(baseline, het);
   gains.het_qm = gain(baseline, both);
   gains.fragments_het = quotient(baseline.counts.fragments_blended, het.counts.fragments_blended);
+  gains.fragments_het_in_time =
+      quotient(baseline.counts.fragments_blended, het.counts.fragments_blended - points[2]->fragments_blended_late);
   gains.fragments_merging = quotient(het.counts.fragments_blended, both.counts.fragments_blended);
   // Of the second quads' fragments those on a live front are gone already.
   gains.fragments_merging_whole =
@@ -67,16 +69,25 @@ double ratio_of(const ReproduceResult& result, PointKey key) {
   return quotient(without, result.at(key).run.counts.fragments_blended);
 }
 
-SceneFinding scene_finding(const ReproduceResult& result, std::size_t scene) {
-  const ReproducePlan& plan = result.plan;
-  SceneFinding finding;
-  finding.scene = scene;
+SceneFinding gains_finding(const ReproduceResult& result, std::size_t scene, Fidelity fidelity,
+                           const std::string& settings) {
   PointKey key;
   key.scene = scene;
-  key.fidelity = plan.fidelity;
+  key.fidelity = fidelity;
+  key.settings = settings;
+  SceneFinding finding;
+  finding.scene = scene;
   finding.runs = runs_of(result, key);
   finding.gains = gains_of(finding.runs);
-  if (plan.scenes[scene].is_large) return finding;
+  return finding;
+}
+
+SceneFinding scene_finding(const ReproduceResult& result, std::size_t scene) {
+  const ReproducePlan& plan = result.plan;
+  SceneFinding finding = gains_finding(result, scene, plan.fidelity, "");
+  if (plan.scenes[scene].role != PlannedScene::Role::six) return finding;
+  PointKey key;
+  key.scene = scene;
   std::vector<std::optional<double>> ratios;
   for (key.view = 0; key.view < plan.views; ++key.view) {
     finding.ratios.push_back(ratio_of(result, key));
@@ -91,7 +102,6 @@ SceneFinding scene_finding(const ReproduceResult& result, std::size_t scene) {
   key.variant = "het";
   finding.map_with = &result.at(key);
   key.fidelity = sensitivity_fidelity;
-  key.settings = plan.passes_settings;
   const RunResult& het = result.at(key).run;
   key.variant = "baseline";
   const RunResult& one_pass = result.at(key).run;
@@ -134,10 +144,10 @@ void find_sensitivity(const ReproduceResult& result, Findings& findings) {
   };
   findings.efficiency.push_back(at(Breadth::headline, ""));
   for (const SensitivityParameter& parameter : plan.parameters) {
-    SensitivityFinding finding{parameter, at(parameter.breadth, parameter.base), {}, 0};
+    SensitivityFinding finding{parameter, at(parameter.breadth, ""), {}, 0};
     double least = finding.at_default.het_qm.arithmetic, greatest = least;
     for (const std::string& value : parameter.values) {
-      finding.values.push_back(at(parameter.breadth, joined_settings(parameter.base, value)));
+      finding.values.push_back(at(parameter.breadth, value));
       least = std::min(least, finding.values.back().het_qm.arithmetic);
       greatest = std::max(greatest, finding.values.back().het_qm.arithmetic);
       if (parameter.breadth == Breadth::headline) findings.efficiency.push_back(finding.values.back());
@@ -171,40 +181,52 @@ void find_sensitivity(const ReproduceResult& result, Findings& findings) {
 
 FragmentFinding fragment_finding(const ReproduceResult& result, const std::vector<std::size_t>& scenes,
                                  const std::string& name, const PointKey& of) {
-  std::vector<double> fragments, quads;
+  std::vector<double> fragments, quads, in_time;
   for (const std::size_t scene : scenes) {
     PointKey key = of;
     key.scene = scene;
     key.variant = "baseline";
     const Counts& without = result.at(key).run.counts;
     key.variant = "het";
-    const Counts& with = result.at(key).run.counts;
+    const PointResult& het = result.at(key);
+    const Counts& with = het.run.counts;
+    in_time.push_back(quotient(without.fragments_blended, with.fragments_blended - het.fragments_blended_late));
     fragments.push_back(quotient(without.fragments_blended, with.fragments_blended));
     quads.push_back(quotient(without.quads_blended, with.quads_blended));
   }
-  FragmentFinding finding{name, mean_of(fragments).arithmetic, mean_of(quads).arithmetic, 0};
+  FragmentFinding finding;
+  finding.settings = name;
+  finding.fragments = mean_of(fragments).arithmetic;
+  finding.fragments_in_time = mean_of(in_time).arithmetic;
+  finding.quads = mean_of(quads).arithmetic;
   finding.fall_percent = 100 * (1 - finding.quads / finding.fragments);
+  finding.fall_percent_in_time = 100 * (1 - finding.quads / finding.fragments_in_time);
   return finding;
 }
 
 void find_fragments(const ReproduceResult& result, Findings& findings) {
   const ReproducePlan& plan = result.plan;
+  const std::vector<std::size_t> six = plan.scenes_of(PlannedScene::Role::six);
+  const std::vector<std::size_t> beside = plan.scenes_of(PlannedScene::Role::beside);
   PointKey key;
   key.fidelity = plan.fidelity;
   const auto add = [&](const std::vector<std::size_t>& scenes, const std::string& name) {
     findings.fragments.push_back(fragment_finding(result, scenes, name, key));
   };
-  add(plan.paper_scenes(), "main comparison");
+  add(six, "main comparison");
   key.fidelity = Fidelity::functional;
-  add(plan.paper_scenes(), "no late updates (functional)");
+  add(six, "no late updates (functional)");
   if (!plan.quick) {
     key.extent = Extent::half;
-    add(plan.paper_scenes(), "smaller splats: images of half the width");
+    add(six, "smaller splats: images of half the width");
     key.extent = Extent::quarter;
-    add(plan.paper_scenes(), "smaller splats: images of a quarter of the width");
+    add(six, "smaller splats: images of a quarter of the width");
   }
   key.extent = Extent::full;
-  for (const std::size_t scene : plan.paper_scenes()) add({scene}, plan.scenes[scene].name + " alone");
+  for (const std::size_t scene : six) add({scene}, plan.scenes[scene].name + " alone");
+  key.fidelity = plan.fidelity;
+  for (const std::size_t scene : beside) add({scene}, plan.scenes[scene].name + " beside the six");
+  key.fidelity = Fidelity::functional;
   if (plan.studied.size() > 1) add(plan.studied, "the scenes of what follows");
   for (const std::string& settings : plan.fragment_settings) {
     key.settings = settings;
@@ -213,23 +235,24 @@ void find_fragments(const ReproduceResult& result, Findings& findings) {
   key.fidelity = sensitivity_fidelity;
   for (const std::string& settings : plan.trials) {
     key.settings = settings;
-    add(plan.paper_scenes(), settings.empty() ? "the six scenes at lt" : "the six scenes with " + settings);
+    const std::string with = settings.empty() ? " at lt" : " with " + settings;
+    add(six, "the six scenes" + with);
+    for (const std::size_t scene : beside) add({scene}, plan.scenes[scene].name + with);
   }
 }
 
 void find_trials(const ReproduceResult& result, Findings& findings) {
+  const std::vector<std::size_t> six = result.plan.scenes_of(PlannedScene::Role::six);
   for (const std::string& settings : result.plan.trials) {
-    for (const std::size_t scene : result.plan.paper_scenes()) {
-      PointKey key;
-      key.scene = scene;
-      key.fidelity = sensitivity_fidelity;
-      key.settings = settings;
-      SceneFinding finding;
-      finding.scene = scene;
-      finding.runs = runs_of(result, key);
-      finding.gains = gains_of(finding.runs);
-      findings.trials[settings].push_back(std::move(finding));
-    }
+    const auto all = [&](const std::vector<std::size_t>& scenes) {
+      std::vector<SceneFinding> gains;
+      for (const std::size_t scene : scenes) {
+        gains.push_back(gains_finding(result, scene, sensitivity_fidelity, settings));
+      }
+      return gains;
+    };
+    findings.trials.push_back({settings, all(six), all(result.plan.scenes_of(PlannedScene::Role::beside)),
+                               study(result, six, Extent::full, sensitivity_fidelity, settings)});
   }
 }
 
@@ -247,6 +270,12 @@ Mean mean_of(const std::vector<double>& values) {
           distribution_of(there)->geometric_mean};
 }
 
+const TrialFinding* Findings::trial(const std::string& settings) const {
+  const auto at =
+      std::find_if(trials.begin(), trials.end(), [&](const auto& each) { return each.settings == settings; });
+  return at == trials.end() ? nullptr : &*at;
+}
+
 double paper_het_efficiency() { return paper_row("R4").number() / paper_row("R7").number(); }
 double paper_het_qm_efficiency() {
   return paper_row("R2").number() / (paper_row("R7").number() * paper_row("R8").number());
@@ -257,10 +286,15 @@ Findings find(const ReproduceResult& result) {
   const ReproducePlan& plan = result.plan;
   Findings findings;
   for (std::size_t scene = 0; scene < plan.scenes.size(); ++scene) {
-    if (plan.quick && plan.scenes[scene].is_large) continue;
-    (plan.scenes[scene].is_large ? findings.large : findings.scenes).push_back(scene_finding(result, scene));
+    switch (plan.scenes[scene].role) {
+      case PlannedScene::Role::six: findings.scenes.push_back(scene_finding(result, scene)); break;
+      case PlannedScene::Role::large:
+        if (!plan.quick) findings.large.push_back(scene_finding(result, scene));
+        break;
+      case PlannedScene::Role::beside: findings.beside.push_back(scene_finding(result, scene)); break;
+    }
   }
-  findings.main = study(result, plan.paper_scenes(), Extent::full, plan.fidelity, "");
+  findings.main = study(result, plan.scenes_of(PlannedScene::Role::six), Extent::full, plan.fidelity, "");
   find_sensitivity(result, findings);
   find_fragments(result, findings);
   find_trials(result, findings);

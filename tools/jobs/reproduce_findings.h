@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstddef>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,6 +24,7 @@ Mean mean_of(const std::vector<double>& values);
 struct Gains {
   double qm = 0, het = 0, het_qm = 0;               ///< speed-ups
   double fragments_het = 0, fragments_merging = 0;  ///< blended: baseline over HET, HET over HET+QM
+  double fragments_het_in_time = 0;                 ///< the former without fragments that were tested too early
   double fragments_merging_whole = 0;               ///< the latter, were all fragments of a pair's second quad gone
   double quads_het = 0, quads_merging = 0, quads_qm = 0;  ///< likewise; the last: baseline over QM
   double lanes_baseline = 0, lanes_het = 0;               ///< fragments of a blended quad
@@ -70,20 +70,32 @@ struct CheckFinding {
 struct FragmentFinding {
   std::string settings;             ///< or the extent
   double fragments = 0, quads = 0;  ///< arithmetic means of the baseline's over HET's
+  double fragments_in_time = 0;     ///< the first without those that HET blends late
   double fall_percent = 0;          ///< of fragments a blended quad
+  double fall_percent_in_time = 0;  ///< the same of those in time, over all quads
+};
+
+/// What one of ReproducePlan::trials gives: gains alone.
+struct TrialFinding {
+  std::string settings;
+  std::vector<SceneFinding> scenes, beside;  ///< the six, and the user's own
+  StudyPoint means;                          ///< of the six
 };
 
 struct Findings {
   std::vector<SceneFinding> scenes;             ///< the six
   std::vector<SceneFinding> large;              ///< none in a quick look
+  std::vector<SceneFinding> beside;             ///< of the user's own, gains alone
   std::vector<SensitivityFinding> sensitivity;  ///< the greatest spread first
   std::vector<CheckFinding> checks;
   StudyPoint main;                            ///< the six at the main fidelity
   std::vector<StudyPoint> efficiency;         ///< of the studied scenes; the default first
   std::vector<StudyPoint> indoor_efficiency;  ///< of the indoor scene, likewise
   std::vector<FragmentFinding> fragments;     ///< the main comparison, then what could move it
-  /// The six scenes, gains alone, at settings of ReproducePlan::trials.
-  std::map<std::string, std::vector<SceneFinding>> trials;
+  std::vector<TrialFinding> trials;           ///< as ReproducePlan::trials
+
+  /// Null where it was not simulated.
+  const TrialFinding* trial(const std::string& settings) const;
 };
 
 Findings find(const ReproduceResult& result);

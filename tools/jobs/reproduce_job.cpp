@@ -167,6 +167,7 @@ nlohmann::json to_reproduce_record(const std::string& name, const PointResult& p
           {"run", encode(point.run)},
           {"gaussians", {point.gaussians_total, point.gaussians_visible}},
           {"fragments_of_back_quads", point.fragments_of_back_quads},
+          {"fragments_blended_late", point.fragments_blended_late},
           {"size", {point.width, point.height}},
           {"map", point.map ? to_json(*point.map) : nlohmann::json()},
           {"energy", point.energy ? energy_to_json(*point.energy) : nlohmann::json()}};
@@ -181,6 +182,7 @@ PointResult reproduce_from_record(const nlohmann::json& record, const ReproduceP
   record.at("gaussians").at(0).get_to(point.gaussians_total);
   record.at("gaussians").at(1).get_to(point.gaussians_visible);
   record.at("fragments_of_back_quads").get_to(point.fragments_of_back_quads);
+  record.at("fragments_blended_late").get_to(point.fragments_blended_late);
   record.at("size").at(0).get_to(point.width);
   record.at("size").at(1).get_to(point.height);
   if (!record.at("map").is_null()) point.map = heat_map_from_json(record.at("map"));
@@ -258,6 +260,7 @@ void simulate_points(const ReproduceJob& job, const std::vector<bool>& is_done, 
       point.energy = energy_amounts(point.run, shipped_energies());
     for (const StatisticReport& statistic : point.run.statistics) {
       if (statistic.name == "sm.fragments_of_back_quads") point.fragments_of_back_quads = statistic.value;
+      if (statistic.name == "crop.fragments_blended_late") point.fragments_blended_late = statistic.value;
     }
     result.cpu_seconds += point.run.cpu_seconds;
     strip_point(point.run, i == 0);

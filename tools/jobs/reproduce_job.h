@@ -42,6 +42,7 @@ struct PointResult {
   RunResult run;  ///< without statistics, units, effects, draws and pixels
   std::uint64_t gaussians_total = 0, gaussians_visible = 0;
   std::uint64_t fragments_of_back_quads = 0;  ///< sm.fragments_of_back_quads
+  std::uint64_t fragments_blended_late = 0;   ///< crop.fragments_blended_late
   std::uint32_t width = 0, height = 0;        ///< pixels
   std::optional<HeatMap> map;
   std::optional<EnergyAmounts> energy;  ///< by shipped_energies(); of points that have time, at the default settings

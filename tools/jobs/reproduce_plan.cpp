@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/component/names.h>
+#include <vrpipe/component/printable.h>
 #include <vrpipe/workloads/builtin_scenes.h>
 #include <vrpipe/workloads/scene_substitution.h>
 
@@ -30,9 +32,6 @@ const std::vector<std::string> fragment_candidates{"state.termination_threshold=
                                                    "state.splat_extent=aabb",
                                                    "state.splat_extent=three_sigma",
                                                    "state.pruning_threshold=0.02"};
-
-/// Where memory is ideal, stencil tests and updates cost nothing, which is what passes are weighed against.
-constexpr const char* paper_memory = "platform=agx-orin-lpddr3";
 
 /// Adds points once each, in the order in which they are asked for.
 class Points {
@@ -64,9 +63,14 @@ void choose_scenes(const ReproduceOptions& options, ReproducePlan& plan) {
   const std::vector<SceneSubstitution> files = scene_substitutions(options.substitutions, "--scene");
   for (const BuiltinSceneInfo& info : builtin_scenes()) {
     if (!info.stands_for) continue;
-    plan.scenes.push_back({info.name, scene_in_place(info.name, files), {}, info.stands_for->kind == "aerial"});
+    const bool is_large = info.stands_for->kind == "aerial";
+    plan.scenes.push_back({info.name,
+                           scene_in_place(info.name, files),
+                           {},
+                           is_large ? PlannedScene::Role::large : PlannedScene::Role::six});
   }
-  std::stable_partition(plan.scenes.begin(), plan.scenes.end(), [](const auto& scene) { return !scene.is_large; });
+  std::stable_partition(plan.scenes.begin(), plan.scenes.end(),
+                        [](const auto& scene) { return scene.role == PlannedScene::Role::six; });
   const auto is_planned = [&](const std::string& name) {
     return std::any_of(plan.scenes.begin(), plan.scenes.end(), [&](const auto& scene) { return scene.name == name; });
   };
@@ -75,6 +79,17 @@ void choose_scenes(const ReproduceOptions& options, ReproducePlan& plan) {
     throw UserError("unused scene", "--scene " + file.name + "=" + file.file,
                     "it takes the place of a scene that the paper does not have",
                     "replace kitchen, bonsai, train, truck, lego, palace, building or rubble");
+  }
+  for (const SceneSubstitution& own : options.beside) {
+    if (!is_good_name(own.name)) {
+      throw UserError("bad name '" + printable(own.name) + "'", "--beside", std::string("it is not ") + good_name_rule,
+                      "choose another");
+    }
+    if (is_planned(own.name)) {
+      throw UserError("name taken", "--beside " + own.name + "=" + own.file, "there is a scene of that name",
+                      "choose another; --scene puts a model in the place of one of the paper's");
+    }
+    plan.scenes.push_back({own.name, own.file, {}, PlannedScene::Role::beside});
   }
   std::set<std::string> given;
   for (const auto& [name, camera] : options.cameras) {
@@ -86,7 +101,7 @@ void choose_scenes(const ReproduceOptions& options, ReproducePlan& plan) {
     const bool is_file = scene != plan.scenes.end() && scene->request != "builtin:" + name;
     if (!is_file) {
       throw UserError("camera without a scene", "--camera " + name, "no file takes the place of that scene",
-                      "add --scene " + name + "=FILE");
+                      "add --scene " + name + "=FILE, or --beside");
     }
     scene->camera = camera;
   }
@@ -120,7 +135,7 @@ void choose_parameters(const ReproduceOptions& options, ReproducePlan& plan) {
     chosen.values.clear();
     for (std::size_t i = 0; i < parameter.values.size(); ++i) {
       if (options.quick && i >= parameter.quick) break;
-      if (is_kept(joined_settings(parameter.base, parameter.values[i]))) chosen.values.push_back(parameter.values[i]);
+      if (is_kept(parameter.values[i])) chosen.values.push_back(parameter.values[i]);
     }
     if (!chosen.values.empty()) plan.parameters.push_back(std::move(chosen));
   }
@@ -129,14 +144,15 @@ void choose_parameters(const ReproduceOptions& options, ReproducePlan& plan) {
     if (is_kept(settings)) plan.fragment_settings.push_back(settings);
   }
   if (options.quick) return;
-  std::set<std::string> seen{""};
-  plan.trials.emplace_back();
+  std::set<std::string> seen;
+  for (const std::string& settings : front_ends()) {
+    if (seen.insert(settings).second && is_kept(settings)) plan.trials.push_back(settings);
+  }
   for (const PaperRow& row : options.rows) {
     for (const RowReason& reason : row.reasons) {
       if (seen.insert(reason.setting).second && is_kept(reason.setting)) plan.trials.push_back(reason.setting);
     }
   }
-  if (options.base.platform->name == "agx-orin" && !refusal(options, paper_memory)) plan.passes_settings = paper_memory;
 }
 
 }  // namespace
@@ -169,6 +185,11 @@ const std::vector<std::string>& efficiency_settings() {
   return settings;
 }
 
+const std::vector<std::string>& front_ends() {
+  static const std::vector<std::string> settings{"", "platform=agx-orin-emerald-2", "platform=agx-orin-emerald-1"};
+  return settings;
+}
+
 std::string PointKey::name(const std::vector<PlannedScene>& scenes) const {
   std::string text =
       fmt::format("{} {} {} {}", scenes.at(scene).name, tools::name_of(extent), vrpipe::name_of(fidelity), variant);
@@ -177,12 +198,12 @@ std::string PointKey::name(const std::vector<PlannedScene>& scenes) const {
   return settings.empty() ? text : text + " " + settings;
 }
 
-std::vector<std::size_t> ReproducePlan::paper_scenes() const {
-  std::vector<std::size_t> six;
+std::vector<std::size_t> ReproducePlan::scenes_of(PlannedScene::Role role) const {
+  std::vector<std::size_t> some;
   for (std::size_t i = 0; i < scenes.size(); ++i) {
-    if (!scenes[i].is_large) six.push_back(i);
+    if (scenes[i].role == role) some.push_back(i);
   }
-  return six;
+  return some;
 }
 
 std::vector<std::size_t> ReproducePlan::scenes_of(Breadth breadth) const {
@@ -213,15 +234,17 @@ ReproducePlan plan_reproduction(const ReproduceOptions& options) {
       key.settings = settings;
       points.add(key, variants, with_map);
     };
-    if (plan.quick && plan.scenes[scene].is_large) continue;
+    const PlannedScene::Role role = plan.scenes[scene].role;
+    if (plan.quick && role == PlannedScene::Role::large) continue;
     add(plan.fidelity, "", all_variants);
-    if (plan.scenes[scene].is_large) continue;
-    add(Fidelity::functional, "", without_merging, true);
+    if (role == PlannedScene::Role::large) continue;
     for (const std::string& settings : plan.trials) add(sensitivity_fidelity, settings, all_variants);
-    add(sensitivity_fidelity, plan.passes_settings, without_merging);
+    if (role == PlannedScene::Role::beside) continue;
+    add(Fidelity::functional, "", without_merging, true);
+    add(sensitivity_fidelity, "", without_merging);
     for (const unsigned passes : planned_passes(plan.quick)) {
       key.passes = passes;
-      add(sensitivity_fidelity, plan.passes_settings, {"baseline"});
+      add(sensitivity_fidelity, "", {"baseline"});
     }
     key.passes = 1;
     for (const std::string& settings : efficiency_settings()) {
@@ -235,10 +258,8 @@ ReproducePlan plan_reproduction(const ReproduceOptions& options) {
       key.extent = ReproducePlan::extent_of(breadth);
       for (const SensitivityParameter& parameter : plan.parameters) {
         if (parameter.breadth != breadth) continue;
-        add(sensitivity_fidelity, parameter.base, all_variants);
-        for (const std::string& value : parameter.values) {
-          add(sensitivity_fidelity, joined_settings(parameter.base, value), all_variants);
-        }
+        add(sensitivity_fidelity, "", all_variants);
+        for (const std::string& value : parameter.values) add(sensitivity_fidelity, value, all_variants);
       }
       if (breadth == Breadth::open) continue;
       for (const std::string& settings : plan.fragment_settings) add(Fidelity::functional, settings, without_merging);

@@ -10,6 +10,7 @@
 
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/workloads/camera.h>
+#include <vrpipe/workloads/scene_substitution.h>
 
 #include "jobs/paper_rows.h"
 #include "jobs/sensitivity_table.h"
@@ -25,12 +26,17 @@ enum class Extent {
 };
 const char* name_of(Extent extent);
 
-/// A scene that stands for one of the paper's.
+/// A scene that stands for one of the paper's, or is looked at beside them.
 struct PlannedScene {
-  std::string name;                   ///< of the built-in one, without "builtin:"
-  std::string request;                ///< SceneRequest::scene: builtin:NAME, or NAME=FILE
+  enum class Role {
+    six,    ///< of the paper's six, which its means are of
+    large,  ///< Building, Rubble
+    beside  ///< of the user's own: in no row, but beside the six where variants and settings are compared
+  };
+  std::string name;                   ///< of the built-in one, without "builtin:", or the user's
+  std::string request;                ///< SceneRequest::scene: builtin:NAME, NAME=FILE, or of the user's own FILE
   std::optional<std::string> camera;  ///< SceneRequest::camera
-  bool is_large = false;              ///< Building, Rubble: beside the paper's six
+  Role role = Role::six;
 };
 
 /// What tells one simulation from the others.
@@ -64,6 +70,7 @@ struct ReproduceOptions {
   std::vector<std::pair<std::string, std::string>> cameras;  ///< scene and SceneRequest::camera
   Lenses lenses = Lenses::as_written;                        ///< of these
   std::vector<std::string> substitutions;                    ///< NAME=FILE
+  std::vector<SceneSubstitution> beside;                     ///< of names that no scene of the paper has
   std::vector<PaperRow> rows = paper_rows();
   RunRequest base;                   ///< platform, settings and so on of every point
   std::optional<Fidelity> fidelity;  ///< of the main comparison; none: as exact as there is time for
@@ -71,7 +78,7 @@ struct ReproduceOptions {
 
 /// Everything that `reproduce` simulates, in the order in which it does.
 struct ReproducePlan {
-  std::vector<PlannedScene> scenes;  ///< the paper's six, then the large ones, which a quick look leaves out
+  std::vector<PlannedScene> scenes;  ///< the paper's six, the large ones, which a quick look leaves out, those beside
   std::vector<std::size_t> studied;  ///< scenes of Breadth::headline
   std::size_t indoor = 0;            ///< the scene of efficiency_settings()
   std::size_t column = 0;            ///< the scene of Breadth::open
@@ -83,15 +90,14 @@ struct ReproducePlan {
   std::vector<SensitivityParameter> parameters;  ///< that are varied, with the values that the platform knows
   std::vector<std::string> fragment_settings;    ///< that could move fragments a quad
   std::vector<PaperRow> rows;
-  std::vector<std::string> trials;  ///< settings of reasons, after the default; none in a quick look
-  std::string passes_settings;      ///< of passes, and of what they are compared with
+  /// The default, front_ends() and the settings of reasons, with which rows are judged again; none in a quick look.
+  std::vector<std::string> trials;
   std::vector<SkippedSetting> skipped;
 
   /// The scenes of a parameter's points, and what of them is drawn.
   std::vector<std::size_t> scenes_of(Breadth breadth) const;
   static Extent extent_of(Breadth breadth);
-  /// The six.
-  std::vector<std::size_t> paper_scenes() const;
+  std::vector<std::size_t> scenes_of(PlannedScene::Role role) const;
 };
 
 /// Of the sensitivity; a few of its points are repeated at the fidelity of the main comparison.
@@ -100,6 +106,8 @@ constexpr Fidelity sensitivity_fidelity = Fidelity::lt;
 const std::vector<std::string>& checked_settings();
 /// What could keep HET+QM from what its quads suggest, tried on an indoor scene, which CROP bounds; not in a quick look.
 const std::vector<std::string>& efficiency_settings();
+/// Of the paper's GPU, settings of each: what its text leaves open, and what the simulator has that it changed.
+const std::vector<std::string>& front_ends();
 /// Beside one.
 const std::vector<unsigned>& planned_passes(bool quick);
 

@@ -83,6 +83,11 @@ RowFinding measured_row(const PaperRow& row, const std::vector<std::string>& mea
   return finding;
 }
 
+RowFinding row_with(const TrialFinding& trial, const PaperRow& row, const ReproduceResult& result) {
+  const std::vector<SceneFinding> no_large;
+  return measured_row(row, row.measures, {result, trial.scenes, no_large});
+}
+
 /// Whether what was tried gives the row, or at least half of what is missing.
 bool explains(const RowFinding& tried, const RowFinding& without) {
   if (tried.verdict == Verdict::agrees) return true;
@@ -93,12 +98,6 @@ bool explains(const RowFinding& tried, const RowFinding& without) {
   return missing(tried) <= missing(without) / 2;
 }
 
-/// What was found with a reason, in a few words.
-std::string short_text(const RowFinding& finding) {
-  if (finding.number) return finding.row->text(*finding.number);
-  return finding.exceptions.empty() ? "so in all" : fmt::format("not so in {}", fmt::join(finding.exceptions, ", "));
-}
-
 /// Nothing where it is not tried: in a quick look, and where the platform does not know the setting.
 std::optional<TriedReason> try_reason(const RowReason& reason, const RowFinding& finding,
                                       const std::vector<RowFinding>& rows, const ReproduceResult& result,
@@ -106,26 +105,25 @@ std::optional<TriedReason> try_reason(const RowReason& reason, const RowFinding&
   const PaperRow& row = *finding.row;
   if (!reason.measure.empty()) {
     const RowFinding other = measured_row(row, {reason.measure}, {result, findings.scenes, findings.large});
-    return TriedReason{&reason, short_text(other), explains(other, finding)};
+    return TriedReason{&reason, other.short_text(), explains(other, finding)};
   }
   if (!reason.row.empty()) {
     const RowFinding& other =
         *std::find_if(rows.begin(), rows.end(), [&](const RowFinding& each) { return each.row->id == reason.row; });
     const double sides = other.difference_percent.value_or(0) * finding.difference_percent.value_or(0);
-    return TriedReason{&reason, short_text(other), other.verdict == Verdict::differs && sides > 0};
+    return TriedReason{&reason, other.short_text(), other.verdict == Verdict::differs && sides > 0};
   }
-  const auto at = findings.trials.find(reason.setting);
-  if (at == findings.trials.end()) return std::nullopt;
-  const std::vector<SceneFinding> none;
-  const RowFinding with = measured_row(row, row.measures, {result, at->second, none});
-  const RowFinding without = measured_row(row, row.measures, {result, findings.trials.at(""), none});
-  return TriedReason{&reason, short_text(with), explains(with, without)};
+  const TrialFinding* const tried = findings.trial(reason.setting);
+  if (tried == nullptr) return std::nullopt;
+  const RowFinding with = row_with(*tried, row, result);
+  const RowFinding without = row_with(*findings.trial(""), row, result);
+  return TriedReason{&reason, with.short_text(), explains(with, without)};
 }
 
 /// Where it does not hold, what is shown to be the reason, and what was tried in vain.
 std::string reason_text(const RowFinding& finding, bool is_quick) {
   std::vector<std::string> parts, vain;
-  if (!finding.exceptions.empty()) parts.push_back(short_text(finding));
+  if (!finding.exceptions.empty()) parts.push_back(finding.short_text());
   const std::size_t before = parts.size();
   for (const TriedReason& tried : finding.tried) {
     const RowReason& by = *tried.reason;
@@ -141,6 +139,11 @@ std::string reason_text(const RowFinding& finding, bool is_quick) {
 }
 
 }  // namespace
+
+std::string RowFinding::short_text() const {
+  if (number) return row->text(*number);
+  return exceptions.empty() ? "so in all" : fmt::format("not so in {}", fmt::join(exceptions, ", "));
+}
 
 std::vector<RowFinding> find_rows(const ReproduceResult& result, const Findings& findings) {
   std::vector<RowFinding> rows;
@@ -160,6 +163,16 @@ std::vector<RowFinding> find_rows(const ReproduceResult& result, const Findings&
       if (tried) finding.tried.push_back(std::move(*tried));
     }
     finding.reason = reason_text(finding, result.plan.quick);
+  }
+  return rows;
+}
+
+std::vector<RowFinding> find_rows_with(const TrialFinding& trial, const ReproduceResult& result) {
+  std::vector<RowFinding> rows;
+  for (const PaperRow& row : result.plan.rows) {
+    if (!row.is_judged() || !row.is_of_variants()) continue;
+    RowFinding finding = row_with(trial, row, result);
+    if (finding.verdict != Verdict::cannot_say) rows.push_back(std::move(finding));
   }
   return rows;
 }

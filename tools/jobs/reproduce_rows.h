@@ -26,9 +26,15 @@ struct RowFinding {
   Verdict verdict = Verdict::cannot_say;
   std::vector<TriedReason> tried;  ///< where it differs
   std::string reason;              ///< where it differs or is not judged
+
+  /// What was found, in a few words.
+  std::string short_text() const;
 };
 
 /// Every row of the plan, in its order. The plan outlives them.
 std::vector<RowFinding> find_rows(const ReproduceResult& result, const Findings& findings);
+
+/// Those that settings can be tried on, judged with a trial's.
+std::vector<RowFinding> find_rows_with(const TrialFinding& trial, const ReproduceResult& result);
 
 }  // namespace vrpipe::tools

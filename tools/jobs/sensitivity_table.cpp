@@ -8,17 +8,20 @@
 namespace vrpipe::tools {
 namespace {
 
-constexpr const char* lpddr3 = "platform=agx-orin-lpddr3";
-
 std::vector<SensitivityParameter> headline() {
   const auto of = [](const char* name, std::size_t quick, std::vector<std::string> values) {
-    return SensitivityParameter{name, Breadth::headline, std::move(values), "", quick};
+    return SensitivityParameter{name, Breadth::headline, std::move(values), quick};
   };
   return {
       of("raster.screen_tile_interval_cycles", 3,
          {"raster.screen_tile_interval_cycles=2", "raster.screen_tile_interval_cycles=3",
           "raster.screen_tile_interval_cycles=5", "raster.screen_tile_interval_cycles=1.5"}),
-      of("memory", 0, {"platform=agx-orin-lpddr3", "platform=agx-orin-lpddr5"}),
+      of("raster.coarse_tiles_per_cycle", 0,
+         {"raster.coarse_tiles_per_cycle=1", "raster.coarse_tiles_per_cycle=2", "raster.coarse_tiles_per_cycle=4"}),
+      of("raster.fine_tiles_per_cycle", 1,
+         {"raster.fine_tiles_per_cycle=1", "raster.fine_tiles_per_cycle=3", "raster.fine_tiles_per_cycle=4"}),
+      of("link.qru.warps.depth", 0, {"link.qru.warps.depth=128", "link.qru.warps.depth=8192"}),
+      of("memory", 0, {"platform=agx-orin-ideal-memory", "platform=agx-orin-lpddr5"}),
       of("tags that run ahead", 1, {"crop.fetch_ahead_quads=512,zrop.fetch_ahead_lines=256"}),
       of("tc.bins", 1, {"tc.bins=16", "tc.bins=64"}),
       of("state.termination_threshold", 1, {"state.termination_threshold=0.9999", "state.termination_threshold=0.98"}),
@@ -34,8 +37,8 @@ std::vector<SensitivityParameter> headline() {
 
 std::vector<SensitivityParameter> open() {
   std::vector<SensitivityParameter> all;
-  const auto of = [&](const std::string& name, const std::vector<std::string>& values, const char* base = "") {
-    SensitivityParameter parameter{name, Breadth::open, {}, base, 0};
+  const auto of = [&](const std::string& name, const std::vector<std::string>& values) {
+    SensitivityParameter parameter{name, Breadth::open, {}, 0};
     for (const std::string& value : values) parameter.values.push_back(parameter.name + "=" + value);
     all.push_back(parameter);
   };
@@ -46,37 +49,37 @@ std::vector<SensitivityParameter> open() {
   of("prop.latency_cycles", {"1", "40"});
   of("zrop.latency_cycles", {"1", "80"});
   of("zrop.updates_per_cycle", {"4"});
-  of("zrop.input_updates", {"8"}, lpddr3);
-  of("zrop.replacement", {"fifo"}, lpddr3);
-  of("zrop.hash_sets", {"on"}, lpddr3);
+  of("zrop.input_updates", {"8"});
+  of("zrop.replacement", {"fifo"});
+  of("zrop.hash_sets", {"on"});
   of("qru.latency_cycles", {"1", "40"});
   of("sm.vertex_warps", {"8", "128"});
   of("sm.vertex_instructions", {"10", "80"});
   of("sm.fragment_instructions", {"12", "48"});
   of("sm.merge_latency_cycles", {"0", "120"});
-  of("sm.attribute_buffer_bytes", {"262144"}, lpddr3);
-  of("sm.attribute_writes", {"80"}, lpddr3);
+  of("sm.attribute_buffer_bytes", {"262144"});
+  of("sm.attribute_writes", {"80"});
   of("crop.latency_cycles", {"1", "40"});
   of("crop.forwarding", {"off"});
   of("crop.replacement", {"fifo", "random", "tree-plru"});
   of("crop.hash_sets", {"on"});
-  of("sm.l1_ways", {"4"}, lpddr3);
+  of("sm.l1_ways", {"4"});
   of("l2.bytes_per_cycle", {"64", "256"});
-  of("l2.replacement", {"fifo"}, lpddr3);
-  of("l2.hash_sets", {"on"}, lpddr3);
-  of("l2.write_policy", {"write-through"}, lpddr3);
-  of("l2.write_allocate", {"byte-mask"}, lpddr3);
-  of("l2.write_backs", {"8"}, lpddr3);
-  of("l2.mshrs", {"16"}, lpddr3);
-  of("l2.arbitration", {"oldest"}, lpddr3);
-  of("dram.age_cap_cycles", {"128"}, lpddr3);
-  of("dram.port_requests", {"16"}, lpddr3);
+  of("l2.replacement", {"fifo"});
+  of("l2.hash_sets", {"on"});
+  of("l2.write_policy", {"write-through"});
+  of("l2.write_allocate", {"byte-mask"});
+  of("l2.write_backs", {"8"});
+  of("l2.mshrs", {"16"});
+  of("l2.arbitration", {"oldest"});
+  of("dram.age_cap_cycles", {"128"});
+  of("dram.port_requests", {"16"});
   of("state.exponential", {"exact", "fp16", "table256", "table16"});
   of("state.blend_rounding", {"rtz", "measured"});
   of("state.obb_padding", {"0", "4"});
   for (const char* link :
        {"draw.vertices", "sm.vertices", "vpo.primitives", "tgc.jobs", "raster.quads", "tc.bins", "prop.test",
-        "zrop.quads", "prop.survivors", "qru.warps", "sm.shaded", "prop.release", "prop.color", "crop.terminations"}) {
+        "zrop.quads", "prop.survivors", "sm.shaded", "prop.release", "prop.color", "crop.terminations"}) {
     of(std::string("link.") + link + ".depth", {"2", "128"});
   }
   return all;
@@ -113,10 +116,6 @@ const std::vector<NotVaried>& parameters_not_varied() {
       {"link.crop.done.depth", "of barriers between draws, which these frames do not have"},
   };
   return all;
-}
-
-std::string joined_settings(const std::string& base, const std::string& more) {
-  return base.empty() || more.empty() ? base + more : base + "," + more;
 }
 
 RunRequest with_settings(RunRequest request, const std::string& settings) {

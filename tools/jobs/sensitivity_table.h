@@ -20,7 +20,6 @@ struct SensitivityParameter {
   Breadth breadth;
   /// Each is settings, "UNIT.PARAMETER=VALUE,...", of which `platform=NAME` takes another platform.
   std::vector<std::string> values;
-  std::string base;         ///< settings that the default has as well
   std::size_t quick = 100;  ///< so many of the values in a quick look
 };
 const std::vector<SensitivityParameter>& sensitivity_parameters();
@@ -35,8 +34,5 @@ const std::vector<NotVaried>& parameters_not_varied();
 /// The request with settings in the form of SensitivityParameter::values. Throws UserError for what the platform does not
 /// know.
 RunRequest with_settings(RunRequest request, const std::string& settings);
-
-/// base and value as one text.
-std::string joined_settings(const std::string& base, const std::string& more);
 
 }  // namespace vrpipe::tools

@@ -84,7 +84,7 @@ Json finding_json(const Reproduction& of, const SceneFinding& scene) {
               {"qm_on_het_second_quads_whole", finite_json(gains.fragments_merging_whole)}}},
             {"quads_blended", {{"het", finite_json(gains.quads_het)}, {"qm_on_het", finite_json(gains.quads_merging)}}},
             {"runs", std::move(runs)}};
-  if (!planned.is_large) {
+  if (planned.role == PlannedScene::Role::six) {
     json.update(
         {{"early_termination_ratios", std::move(ratios)},
          {"fragments_per_pixel", {{"without", map_json(*scene.map_without)}, {"with", map_json(*scene.map_with)}}},
@@ -133,14 +133,21 @@ Json reproduction_json(const Reproduction& of) {
           {"rows", each(of.rows, row_json)},
           {"scenes", each(of.findings.scenes, scene)},
           {"large_scenes", each(of.findings.large, scene)},
+          {"scenes_beside", each(of.findings.beside, scene)},
           {"main", study_json(of.findings.main)},
+          {"front_ends", each(of.front_ends(),
+                              [&](const Reproduction::FrontEnd& front_end) -> Json {
+                                return {{"name", front_end.name},
+                                        {"rows", each(front_end.rows, row_json)},
+                                        {"agree", front_end.agree()},
+                                        {"means", study_json(front_end.trial->means)}};
+                              })},
           {"sensitivity",
            {{"fidelity", vrpipe::name_of(sensitivity_fidelity)},
             {"scenes", std::move(studied)},
             {"parameters", each(of.findings.sensitivity,
                                 [&](const SensitivityFinding& finding) -> Json {
                                   return {{"name", finding.parameter.name},
-                                          {"base", finding.parameter.base},
                                           {"extent", name_of(ReproducePlan::extent_of(finding.parameter.breadth))},
                                           {"spread_percent", finite_json(finding.spread_percent)},
                                           {"default", study_json(finding.at_default)},
@@ -161,7 +168,9 @@ Json reproduction_json(const Reproduction& of) {
                                         return {{"what", finding.settings},
                                                 {"fragments", finite_json(finding.fragments)},
                                                 {"quads", finite_json(finding.quads)},
-                                                {"fall_percent", finite_json(finding.fall_percent)}};
+                                                {"fall_percent", finite_json(finding.fall_percent)},
+                                                {"fragments_none_late", finite_json(finding.fragments_in_time)},
+                                                {"fall_percent_none_late", finite_json(finding.fall_percent_in_time)}};
                                       })},
           {"microbenchmarks",
            each(of.result.microbenches, [](const MicrobenchResult& result) { return Json(to_json(result)); })},

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <vrpipe/component/printable.h>
+
 #include "output/reproduce_answers.h"
 
 namespace vrpipe::tools {
@@ -30,12 +32,18 @@ std::string table_markdown(const std::vector<std::string>& heading, const std::v
 }  // namespace
 
 std::string reproduction_markdown(const Reproduction& of) {
+  std::string command = "build/bin/vrpipe reproduce";
+  if (of.result.plan.quick) command += " --quick";
+  for (const SceneFinding& scene : of.findings.beside) {
+    const PlannedScene& planned = of.result.plan.scenes[scene.scene];
+    command += " --beside " + planned.name + "=" + printable(planned.request);
+  }
   std::string text =
       "# The paper's results, reproduced\n\n"
       "Written by one command, on an unloaded machine of two cores in twenty minutes; do not edit:\n\n"
       "<!-- not run: takes twenty minutes -->\n"
-      "```console\n$ build/bin/vrpipe reproduce" +
-      std::string(of.result.plan.quick ? " --quick" : "") +
+      "```console\n$ " +
+      command +
       " --markdown docs/reproduction.md\n```\n\n"
       "`--quick` takes less than three minutes, `--html FILE` writes a page with plots and heat maps, `--scene "
       "train=FILE` takes a\n"

@@ -27,9 +27,12 @@ std::string percent(double share) { return number(100 * share, "{:.0f}"); }
 
 std::string scene_label(const Reproduction& of, const SceneFinding& scene) {
   const PlannedScene& planned = of.result.plan.scenes[scene.scene];
-  const bool is_builtin = planned.request.rfind("builtin:", 0) == 0;
-  return is_builtin ? planned.name : printable(scene_name(planned.request));
+  const bool has_name = planned.request.rfind("builtin:", 0) == 0 || planned.role == PlannedScene::Role::beside;
+  return has_name ? planned.name : printable(scene_name(planned.request));
 }
+
+/// Of a scene that is in no mean.
+constexpr const char* beside_them = " (beside)";
 
 std::string megacycles(const PointResult& point) {
   return point.run.cycles ? fmt::format("{:.2f}", static_cast<double>(*point.run.cycles) * 1e-6) : "-";
@@ -73,6 +76,22 @@ Reproduction reproduction_of(const ReproduceResult& result) {
   Reproduction of{result, find(result), {}};
   of.rows = find_rows(result, of.findings);
   return of;
+}
+
+std::size_t Reproduction::FrontEnd::agree() const {
+  return static_cast<std::size_t>(
+      std::count_if(rows.begin(), rows.end(), [](const RowFinding& row) { return row.verdict == Verdict::agrees; }));
+}
+
+std::vector<Reproduction::FrontEnd> Reproduction::front_ends() const {
+  std::vector<FrontEnd> all;
+  for (const std::string& settings : tools::front_ends()) {
+    const TrialFinding* const trial = findings.trial(settings);
+    if (trial == nullptr) continue;
+    all.push_back({settings.empty() ? result.plan.points.front().request.platform->name : short_value(settings), trial,
+                   find_rows_with(*trial, result)});
+  }
+  return all;
 }
 
 bool fits_both(const StudyPoint& point) {
@@ -134,7 +153,7 @@ std::vector<std::string> reproduction_heading(const Reproduction& of) {
       tolerance_text(plan.rows), judged, "What only the paper's pictures show is not compared."};
   if (plan.quick) {
     lines.emplace_back(fmt::format(
-        "Quick look: at {} instead of cycle, {} views a scene, no large ones, one number of passes without memory, no "
+        "Quick look: at {} instead of cycle, {} views a scene, no large ones, one number of passes, no "
         "reasons tried, the sensitivity of one scene and of few parameters. Verdicts say that they are of a quick "
         "look.",
         vrpipe::name_of(plan.fidelity), plan.views));
@@ -161,12 +180,13 @@ ReportTable scenes_table(const Reproduction& of) {
     return (dot == std::string::npos ? bottleneck->unit : bottleneck->unit.substr(dot + 1)) +
            fmt::format(" {:.0f} %", 100 * bottleneck->occupancy);
   };
-  for (const SceneFinding& scene : of.findings.scenes) {
+  const auto add = [&](const std::string& label, const SceneFinding& scene) {
     const PointResult& baseline = *scene.runs[0];
-    table.rows.push_back({scene_label(of, scene), fmt::format("{}x{}", baseline.width, baseline.height),
+    table.rows.push_back({label, fmt::format("{}x{}", baseline.width, baseline.height),
                           grouped(baseline.gaussians_visible), megacycles(baseline), times(scene.gains.qm),
                           times(scene.gains.het), times(scene.gains.het_qm), unit(baseline), unit(*scene.runs[3])});
-  }
+  };
+  for (const SceneFinding& scene : of.findings.scenes) add(scene_label(of, scene), scene);
   const auto mean = [&](double Gains::*what) {
     return mean_over(of, [what](const SceneFinding& scene) { return scene.gains.*what; });
   };
@@ -176,7 +196,37 @@ ReportTable scenes_table(const Reproduction& of) {
   table.rows.push_back(
       {"geometric mean", "", "", "", times(qm.geometric), times(het.geometric), times(both.geometric), "", ""});
   table.rows.push_back({"paper", "", "", "", said("R3"), said("R4"), said("R2"), "", ""});
+  for (const SceneFinding& scene : of.findings.beside) add(scene_label(of, scene) + beside_them, scene);
   table.note = "Bound: the unit that is occupied the most, and how much of the cycles.";
+  return table;
+}
+
+ReportTable front_ends_table(const Reproduction& of) {
+  ReportTable table;
+  const std::vector<Reproduction::FrontEnd> all = of.front_ends();
+  if (all.size() < 2) return table;
+  table.title = "Front ends";
+  table.heading = {"id", "what", "paper"};
+  for (const auto& front_end : all) table.heading.push_back(front_end.name);
+  const auto add = [&](std::vector<std::string> cells, const auto& cell) {
+    for (const auto& front_end : all) cells.push_back(cell(front_end));
+    table.rows.push_back(std::move(cells));
+  };
+  for (std::size_t i = 0; i < all.front().rows.size(); ++i) {
+    const PaperRow& row = *all.front().rows[i].row;
+    add({row.id, row.what, row.says}, [&](const auto& front_end) {
+      const RowFinding& finding = front_end.rows[i];
+      return (finding.verdict == Verdict::agrees ? "agrees: " : "") + finding.short_text();
+    });
+  }
+  add({"", "HET, % of what its quads suggest", percent(paper_het_efficiency())},
+      [](const auto& front_end) { return percent(front_end.trial->means.het_efficiency()); });
+  add({"", "HET+QM, % of what its quads suggest", percent(paper_het_qm_efficiency())},
+      [](const auto& front_end) { return percent(front_end.trial->means.het_qm_efficiency()); });
+  add({"", "rows that agree", ""},
+      [](const auto& front_end) { return fmt::format("{} of {}", front_end.agree(), front_end.rows.size()); });
+  table.note = fmt::format("Of the six scenes, at {}; docs/open-parameters.md says what they are.",
+                           vrpipe::name_of(sensitivity_fidelity));
   return table;
 }
 
@@ -289,9 +339,7 @@ ReportTable passes_table(const Reproduction& of) {
     cells.push_back(times(scene.het_beside_passes));
     table.rows.push_back(std::move(cells));
   }
-  const std::string& settings = of.result.plan.passes_settings;
-  table.note = fmt::format("Speed-ups over one pass, at {}{}.", vrpipe::name_of(sensitivity_fidelity),
-                           settings.empty() ? "" : ", " + settings + ", where stencil tests and updates take memory");
+  table.note = fmt::format("Speed-ups over one pass, at {}.", vrpipe::name_of(sensitivity_fidelity));
   return table;
 }
 
@@ -352,7 +400,6 @@ ReportTable sensitivity_table(const Reproduction& of) {
                 times(finding.values[i].het_qm.arithmetic);
     }
     std::string name = finding.parameter.name;
-    if (!finding.parameter.base.empty()) name += ", with LPDDR3";
     if (finding.parameter.breadth == Breadth::headline) name += " *";
     table.rows.push_back(
         {name, number(finding.spread_percent, "{:.1f}"), times(finding.at_default.het_qm.arithmetic), values});
@@ -383,12 +430,17 @@ ReportTable checks_table(const Reproduction& of) {
 ReportTable fragments_table(const Reproduction& of) {
   ReportTable table;
   table.title = "Riddle 1: fragments of a blended quad under HET";
-  table.heading = {"what differs", "fragments", "quads", "fall, %"};
+  table.heading = {"what differs", "fragments", "quads", "fall, %", "fragments, none late", "fall, %"};
   for (const FragmentFinding& finding : of.findings.fragments) {
     table.rows.push_back({settings_text(finding.settings), over(finding.fragments), over(finding.quads),
-                          number(finding.fall_percent, "{:.1f}")});
+                          number(finding.fall_percent, "{:.1f}"), over(finding.fragments_in_time),
+                          number(finding.fall_percent_in_time, "{:.1f}")});
   }
-  table.rows.push_back({"paper", said("R5"), said("R7"), number(paper_fragment_fall_percent(), "{:.1f}")});
+  const std::string fall = number(paper_fragment_fall_percent(), "{:.1f}");
+  table.rows.push_back({"paper", said("R5"), said("R7"), fall, said("R5"), fall});
+  table.note =
+      "None late: as if fragments did not count that were tested before the termination of their pixel landed, though "
+      "CROP took the time of their quads.";
   return table;
 }
 
@@ -430,9 +482,9 @@ ReportTable efficiency_table(const Reproduction& of) {
 
 std::vector<ReportTable> all_tables(const Reproduction& of) {
   std::vector<ReportTable> tables;
-  for (const auto make :
-       {scenes_table, blended_table, utilization_table, maps_table, ratios_table, passes_table, large_table, cost_table,
-        microbench_table, sensitivity_table, checks_table, fragments_table, efficiency_table}) {
+  for (const auto make : {scenes_table, front_ends_table, blended_table, utilization_table, maps_table, ratios_table,
+                          passes_table, large_table, cost_table, microbench_table, sensitivity_table, checks_table,
+                          fragments_table, efficiency_table}) {
     ReportTable table = make(of);
     if (!table.rows.empty()) tables.push_back(std::move(table));  // a quick look leaves some out
   }

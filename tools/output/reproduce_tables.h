@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,15 @@ struct Reproduction {
   const ReproduceResult& result;
   Findings findings;
   std::vector<RowFinding> rows;
+
+  /// Rows judged with one of front_ends().
+  struct FrontEnd {
+    std::string name;
+    const TrialFinding* trial;
+    std::vector<RowFinding> rows;
+    std::size_t agree() const;
+  };
+  std::vector<FrontEnd> front_ends() const;
 };
 /// From the points alone.
 Reproduction reproduction_of(const ReproduceResult& result);
@@ -26,6 +36,7 @@ struct ReportTable {
 };
 
 ReportTable scenes_table(const Reproduction& of);
+ReportTable front_ends_table(const Reproduction& of);
 ReportTable blended_table(const Reproduction& of);
 ReportTable utilization_table(const Reproduction& of);
 ReportTable ratios_table(const Reproduction& of);

@@ -76,7 +76,7 @@ class Observers {
   ///               is in the last sample, and the end is known late. `values` are in the order of the names.
   ///
   /// A sample has what was counted at the edges of all earlier cycles, and nothing of its own. Not every counter is at
-  /// the time of what it counts (figures: builtin:object, 400x400, agx-orin):
+  /// the time of what it counts (figures: builtin:object, 400x400, agx-orin-ideal-memory):
   /// - At `cycle` all are, but in strict termination with early termination, where SM and CROP count a bin when it is
   ///   tested: 1,000 cycles ahead on average, at most 4,000.
   /// - At `lt` all that a vertex warp leads to is counted when the warp is issued: 4,000 to 8,000 cycles before its time

@@ -7,7 +7,7 @@ VRPIPE_PLUGIN
 
 namespace {
 [[maybe_unused]] const bool added = [] {
-  vrpipe::Platform platform = vrpipe::platform_named("agx-orin");
+  vrpipe::Platform platform = vrpipe::platform_named("agx-orin-ideal-memory");
   platform.name = "decoy";
   vrpipe::add_platform(platform);
   return true;

@@ -131,9 +131,9 @@ class TallyUnit : public Unit {
 };
 
 Platform tallied() {
-  Platform platform = platform_named("agx-orin");
+  Platform platform = platform_named("agx-orin-ideal-memory");
   platform.name = "tallied";
-  platform.description = "agx-orin with a tally between RASTER and TC";
+  platform.description = "agx-orin-ideal-memory with a tally between RASTER and TC";
   platform.wire = [wire = platform.wire](Netlist& netlist) {
     wire(netlist);
     netlist.insert("gpc0.raster.out_quads", "gpc0.tally", "tally", "in_quads", "out_quads");

@@ -43,7 +43,8 @@ class Dram : public sc_core::sc_module {
 vrpipe::Platform twin() {
   vrpipe::Platform platform;
   platform.name = "twin";
-  platform.description = "two GPCs of agx-orin with different colour caches, and a memory of another make below the L2";
+  platform.description =
+      "two GPCs of agx-orin-ideal-memory with different colour caches, and a memory of another make below the L2";
   platform.gpcs = 2;
   platform.frequency_mhz = 612;
   platform.settings = {{"draw", "warps_per_1024_cycles", "176"},
@@ -72,7 +73,7 @@ int main() try {
   scene.size = vrpipe::ImageSize{160, 120};
   const vrpipe::Draw draw = vrpipe::load_scene(scene).draw;
 
-  for (const char* platform : {"agx-orin", "twin"}) {
+  for (const char* platform : {"agx-orin-ideal-memory", "twin"}) {
     for (const vrpipe::Fidelity fidelity : {vrpipe::Fidelity::lt, vrpipe::Fidelity::cycle}) {
       for (const vrpipe::Variant& variant : vrpipe::variants()) {
         vrpipe::RunRequest request;

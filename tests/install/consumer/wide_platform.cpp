@@ -10,7 +10,7 @@ namespace {
 vrpipe::Platform wide() {
   vrpipe::Platform platform;
   platform.name = "wide";
-  platform.description = "agx-orin with two GPCs";
+  platform.description = "agx-orin-ideal-memory with two GPCs";
   platform.gpcs = 2;
   platform.frequency_mhz = 612;
   platform.settings = {{"qru", "quads_per_cycle", "4"}};

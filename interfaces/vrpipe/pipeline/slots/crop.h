@@ -72,6 +72,9 @@ class CropBehaviour : public Behaviour {
 
   DrawCounter quads_blended{*this, "quads_blended", "quads", "blended"};
   DrawCounter fragments_blended{*this, "fragments_blended", "fragments", "blended"};
+  DrawCounter fragments_blended_late{*this, "fragments_blended_late", "fragments",
+                                     "of those blended, whose pixel had passed the threshold already: they were tested "
+                                     "before its termination landed"};
   DrawCounter quads_dropped_late{*this, "quads_dropped_late", "quads",
                                  "of which CROP finds every pixel terminated (strict)"};
   DrawCounter fragments_dropped_late{*this, "fragments_dropped_late", "fragments",
