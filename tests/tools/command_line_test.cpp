@@ -129,7 +129,8 @@ TEST_F(CommandLine, ScenesPlatformsAndUnitsListEverything) {
   }
   EXPECT_EQ(units_json["units"].size(), index);
 
-  expect_in(units, {"l2=fixed-latency (default on other platforms)", "l2=sectored-cache (on agx-orin)", "dram=lpddr3-1600 (default)"});
+  expect_in(units, {"l2=fixed-latency (default on other platforms)", "l2=sectored-cache (on agx-orin)",
+                    "dram=lpddr3-1600 (default)"});
   expect_in(vrpipe({"units", "--platform", "agx-orin-lpddr5"}).out,
             {"l2=fixed-latency (default on other platforms)", "l2=sectored-cache (on agx-orin-lpddr5)",
              "dram=lpddr5-6400 (on agx-orin-lpddr5)", "tc=tile-coalescing (default)"});

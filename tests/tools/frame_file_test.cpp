@@ -63,7 +63,7 @@ TEST_F(FrameFile, ItsFirstDrawsAloneAreTheFrameOfThese) {
 TEST_F(FrameFile, OfOneDrawIsTheScene) {
   for (const std::string scene : {"tiny.spl", "builtin:object"}) {
     std::vector<std::string> options{"--fidelity", "cycle"};
-    if (scene != "tiny.spl") options.insert(options.end(), {"--size", "48x48"});
+    if (scene != "tiny.spl") options.insert(options.end(), {"--size", "48x48", "--fovy", "5"});
     const json frame = run(R"({"commands": [{"draw": ")" + scene + R"("}]})", options);
     options.insert(options.begin(), {"run", "--scene", scene});
     const json alone = json_of(options)["runs"][0];
@@ -274,12 +274,14 @@ TEST_F(FrameFile, AFileInThePlaceOfABuiltInSceneIsRelativeToTheFileToo) {
 TEST_F(FrameFile, ScenesShareACameraAndAreRelativeToTheFile) {
   std::filesystem::create_directory(folder() / "frames");
   write("frames/both.json", R"({"commands": [{"draw": "../four.ply"}, {"draw": "builtin:object"}]})");
-  const json both = json_of({"run", "--frame", "frames/both.json", "--size", "48x40", "--output", "images"});
-  const json alone = json_of({"run", "--scene", "four.ply", "--size", "48x40"});
+  const json both = json_of(
+      {"run", "--frame", "frames/both.json", "--size", "48x40", "--fidelity", "functional", "--output", "images"});
+  const json alone = json_of({"run", "--scene", "four.ply", "--size", "48x40", "--fidelity", "functional"});
   EXPECT_EQ(both["camera"], alone["camera"]) << "the first scene's";
   EXPECT_EQ(both["scene"]["name"], "both.json");
-  EXPECT_EQ(both["scene"]["gaussians_total"].get<unsigned>(),
-            4 + json_of({"run", "--size", "8x8"})["scene"]["gaussians_total"].get<unsigned>());
+  EXPECT_EQ(
+      both["scene"]["gaussians_total"].get<unsigned>(),
+      4 + json_of({"run", "--size", "8x8", "--fidelity", "functional"})["scene"]["gaussians_total"].get<unsigned>());
   EXPECT_EQ(both["runs"][0]["draws"][0]["name"], "four.ply");
   EXPECT_EQ(both["runs"][0]["images"]["png"], "images/both-het+qm.png");
   // A draw list of the same size goes with them.

@@ -183,7 +183,7 @@ TEST_F(Microbench, OnThePapersGpuAllThatIsPublishedOfItAgrees) {
 
 TEST_F(Microbench, FollowsThePlatformsSettings) {
   const json halved = json_of({"microbench", "rop-throughput", "--set", "crop.bytes_per_cycle=32", "--set",
-                               "crop.cache_bytes=8K", "--fidelity", "lt"});
+                               "crop.cache_bytes=8K", "--fidelity", "lt", "--platform", "agx-orin-ideal-memory"});
   EXPECT_NEAR(measured(halved, "rop-throughput").at("RGBA16F, blending, 32x32"), 4, 0.05);
   EXPECT_EQ(halved["platform"]["parameters"]["crop.bytes_per_cycle"], 32);
   for (const json& figure : halved["microbenchmarks"][0]["figures"]) {
@@ -192,7 +192,8 @@ TEST_F(Microbench, FollowsThePlatformsSettings) {
     EXPECT_EQ(figure["gpu_is_of"], "one ROP partition");
     EXPECT_NE(figure["finding"].get<std::string>().find("differs from the paper's 8: 50 % less"), std::string::npos);
   }
-  const json small = json_of({"microbench", "crop-cache", "--set", "crop.cache_bytes=8K", "--fidelity", "lt"});
+  const json small = json_of({"microbench", "crop-cache", "--set", "crop.cache_bytes=8K", "--fidelity", "lt",
+                              "--platform", "agx-orin-ideal-memory"});
   EXPECT_EQ(measured(small, "crop-cache").at("largest working set without reads"), 8);
   const json bins = json_of({"microbench", "tile-binning", "--set", "tc.bins=16", "--fidelity", "functional"});
   EXPECT_EQ(measured(bins, "tile-binning").at("bins"), 16);

@@ -289,7 +289,7 @@ TEST_F(Sweep, WritesTheSamePointsAsCsvAndJsonLines) {
 
 TEST_F(Sweep, KilledAtAnyMomentEndsWithTheSameBytes) {
   write("study.toml",
-        "fidelity = \"lt\"\nsize = \"64x64\"\nfovy = 20\n[axes]\nview = [0, 1]\n"
+        "fidelity = \"lt\"\nsize = \"64x64\"\nfovy = 5\n[axes]\nview = [0, 1]\n"
         "variant = [\"baseline\", \"het+qm\"]\ntc.bins = [4, 32]\n");
   const std::vector<std::string> outputs{"--csv",  "s.csv",  "--jsonl", "s.jsonl",
                                          "--html", "s.html", "--json",  "s.json"};

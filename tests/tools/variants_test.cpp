@@ -103,8 +103,9 @@ TEST_F(Variants, AreSaidInTheReport) {
 }
 
 TEST_F(Variants, OfManyViewsAreRelativeToAnyOfThem) {
-  const json result = json_of({"compare", "--scene", "builtin:object", "--size", "24x24", "--views", "2", "--fidelity",
-                               "lt", "--variant", "het", "--variant", "baseline", "--relative-to", "baseline"});
+  const json result =
+      json_of({"compare", "--scene", "builtin:object", "--fovy", "5", "--size", "24x24", "--views", "2", "--fidelity",
+               "lt", "--variant", "het", "--variant", "baseline", "--relative-to", "baseline"});
   EXPECT_EQ(result["relative_to"], "baseline");
   EXPECT_EQ(result["distribution"]["speedup"].size(), 1U);
   EXPECT_TRUE(result["distribution"]["speedup"].contains("het"));
