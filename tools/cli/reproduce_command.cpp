@@ -101,7 +101,7 @@ class ReproduceCommand : public Command {
         "Every number and statement of the paper, R1 to R32 and C1 to C13, with what is measured here, the\n"
         "difference, and, of those that could have failed, whether they agree; early-termination ratios over\n"
         "views, utilisation, large scenes, heat maps, and how far the speed-ups move with what the paper leaves\n"
-        "open. Takes twenty minutes on two processors. Interrupted, the same command goes on where it was.\n"
+        "open. Takes half an hour on two processors. Interrupted, the same command goes on where it was.\n"
         "\n"
         "Examples:\n"
         "  vrpipe reproduce --quick\n"

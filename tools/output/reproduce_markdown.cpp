@@ -40,8 +40,8 @@ std::string reproduction_markdown(const Reproduction& of) {
   }
   std::string text =
       "# The paper's results, reproduced\n\n"
-      "Written by one command, on an unloaded machine of two cores in twenty minutes; do not edit:\n\n"
-      "<!-- not run: takes twenty minutes -->\n"
+      "Written by one command, on an unloaded machine of two cores in half an hour; do not edit:\n\n"
+      "<!-- not run: takes half an hour -->\n"
       "```console\n$ " +
       command +
       " --markdown docs/reproduction.md\n```\n\n"
