@@ -49,6 +49,20 @@ quietly() {
   rm -f "$log"
 }
 
+git() { command git -c safe.directory="$project" "$@"; }
+# The commit since which a change is: where HEAD left origin's branch, or, on that branch, the last one that is four hours
+# older than HEAD. Nothing where there is none.
+base_of_change() {
+  local base
+  base=$(git merge-base HEAD origin/HEAD 2>/dev/null || true)
+  if [ -z "$base" ] || [ "$base" = "$(git rev-parse HEAD)" ]; then
+    base=$(git rev-list -1 --before="$(($(git log -1 --format=%ct) - 4 * 3600))" HEAD)
+  fi
+  echo "$base"
+}
+# changed_since REVISION: files that are not what they were, what is not committed among them.
+changed_since() { { git diff --name-only "$1"; git ls-files --others --exclude-standard; } | sort -u; }
+
 # What ccache knows of one checkout serves another; what a source includes it has from the compiler, not from a second
 # pass of the preprocessor.
 export CCACHE_BASEDIR=$project CCACHE_NOHASHDIR=true CCACHE_DEPEND=true
