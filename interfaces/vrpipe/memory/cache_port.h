@@ -164,9 +164,8 @@ class CachePort {
     return write_back_ == 0;
   }
   bool has_written_back() const { return write_back_ == 0; }
-  /// Since this was last called: lines that were allocated, and lines of which sectors were written back, and these.
+  /// Since this was last called: lines of which sectors were written back, and these.
   struct LinesMoved {
-    unsigned allocated = 0;
     unsigned written_back = 0;
     unsigned sectors_written_back = 0;
   };
@@ -198,7 +197,6 @@ class CachePort {
       SectoredCache::Evicted evicted;
       wanted.line = cache_->allocate(wanted.address, evicted);
       write_back_ = evicted.dirty;
-      ++lines_moved_.allocated;
       lines_moved_.written_back += evicted.dirty != 0 ? 1U : 0U;
       lines_moved_.sectors_written_back += static_cast<unsigned>(__builtin_popcount(evicted.dirty));
       write_back_address_ = evicted.address;
