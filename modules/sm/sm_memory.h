@@ -200,10 +200,8 @@ class SmMemory {
       std::uint32_t fill = none;
       if (!ask(needed, missing, line, now, fill)) return false;
       const SectorRun run = fills_[fill].sectors;
-      for (unsigned sector = run.first; sector < run.first + run.count; ++sector) {
-        l1.cache->start_fill(line, sector);
-        l1.fills[line][sector] = fill;
-      }
+      l1.cache->start_fill(line, sector_mask(run.first, run.count));
+      for (unsigned sector = run.first; sector < run.first + run.count; ++sector) l1.fills[line][sector] = fill;
       l1.cache->pin(line);
     }
     return true;
@@ -216,10 +214,9 @@ class SmMemory {
     L1& l1 = l1s_[fill.core];
     l1.free_mshrs += fill.sectors.count;
     if (fill.line != SectoredCache::no_line) {
-      for (unsigned i = 0; i < fill.sectors.count; ++i) {
-        l1.cache->finish_fill(fill.line, fill.sectors.first + i);
-        statistics_.fill_cycles.see(now - fill.asked);
-      }
+      const std::uint32_t sectors = sector_mask(fill.sectors.first, fill.sectors.count);
+      l1.cache->finish_fill(fill.line, sectors);
+      statistics_.see_fill(sectors, now - fill.asked);
       l1.cache->unpin(fill.line);
     }
     for (std::uint32_t waiter = fill.waiters; waiter != none;) {
