@@ -73,7 +73,7 @@ class ClockedL2::Port final : public ClockedTarget {
     if (freed_in_ >= l2_.clock.domain->now()) return;
     free_ += std::exchange(freed_, 0);
   }
-  void admit(std::uint32_t request) {
+  [[gnu::always_inline]] void admit(std::uint32_t request) {
     --free_;
     const Request& admitted = l2_.requests_[request];
     l2_.cache_.prefetch(admitted.access.address);
@@ -176,23 +176,25 @@ Cycle ClockedL2::tick(Cycle cycle) {
   return std::max(std::min(next, memory_.next_completion()), cycle + 1);
 }
 
-inline void ClockedL2::occupy(std::uint32_t bank, std::uint64_t bytes, Cycle now) {
-  const std::uint32_t cycles = behaviour_->bank_cycles(bytes);
+[[gnu::always_inline]] inline void ClockedL2::occupy(std::uint32_t bank, std::uint32_t cycles, Cycle now) {
   const Cycle from = std::max(banks_[bank].free_at, now);
   banks_[bank].free_at = from + cycles;
   occupancy_.add(0, cycles, crossing_.cycle_of(from), crossing_.cycle_of(from + cycles));
 }
 
-inline void ClockedL2::respond(std::uint32_t request, Cycle from) {
+[[gnu::always_inline]] inline void ClockedL2::respond(std::uint32_t request, std::uint32_t cycles, Cycle from, Cycle now) {
   const Request& done = requests_[request];
-  const Cycle present = clock.domain->now();
   behaviour_->served(done.access);
   Port& port = *ports_[done.port];
-  const Cycle left = port.leave(from, behaviour_->response_bytes(done.access), crossing_.over_by(present));
-  const Cycle at = sizes_.latency_cycles + std::max(left, from + behaviour_->bank_cycles(done.access.bytes));
+  const Cycle left = port.leave(from, behaviour_->response_bytes(done.access), now);
+  const Cycle at = sizes_.latency_cycles + std::max(left, from + cycles);
   free_requests_.push_back(request);
   if (done.whole != nobody) return respond_in_part(done.whole, at);
-  port.respond(done.asker, crossing_.cycle_of(at), present);
+  port.respond(done.asker, crossing_.cycle_of(at), clock.domain->now());
+}
+
+void ClockedL2::respond(std::uint32_t request, Cycle now) {
+  respond(request, behaviour_->bank_cycles(requests_[request].access.bytes), now, now);
 }
 
 void ClockedL2::finish_fills(Cycle now, Cycle after) {
@@ -206,7 +208,7 @@ void ClockedL2::finish_fills(Cycle now, Cycle after) {
     }
     cache_.finish_fill(done.line, done.sectors);
     behaviour_->statistics().see_fill(done.sectors, now - done.since);
-    occupy(done.bank, done.access.bytes, now);
+    occupy(done.bank, behaviour_->bank_cycles(done.access.bytes), now);
     cache_.unpin(done.line);
     banks_[done.bank].stuck = false;
     std::uint32_t* link = &waiting_[done.line];
@@ -227,17 +229,19 @@ void ClockedL2::finish_fills(Cycle now, Cycle after) {
   }
 }
 
-inline void ClockedL2::hit(std::uint32_t index, std::uint32_t request, SectoredCache::Line line, Cycle now) {
+[[gnu::always_inline]] inline void ClockedL2::hit(std::uint32_t index, std::uint32_t request, SectoredCache::Line line,
+                                                  std::uint32_t sectors, Cycle now) {
   const MemoryRequest& access = requests_[request].access;
-  const std::uint32_t sectors = behaviour_->sectors_of(access);
+  const bool writes = access.command == tlm::TLM_WRITE_COMMAND;
   cache_.touch(line);
-  if (access.command == tlm::TLM_WRITE_COMMAND) cache_.make_dirty(line, sectors);
-  cache_.looked_up(line, behaviour_->first_of(access), access.bytes, access.command == tlm::TLM_WRITE_COMMAND);
+  if (writes) cache_.make_dirty(line, sectors);
+  cache_.looked_up(line, behaviour_->first_of(access), access.bytes, writes);
   const auto needed = static_cast<unsigned>(__builtin_popcount(sectors));
   behaviour_->looked_up(access, needed, 0);
   cache_.hit(needed);
-  occupy(index, access.bytes, now);
-  respond(request, now - 1);
+  const std::uint32_t cycles = behaviour_->bank_cycles(access.bytes);
+  occupy(index, cycles, now);
+  respond(request, cycles, now - 1, now);
 }
 
 inline std::uint32_t ClockedL2::choose(std::uint32_t index, Cycle now) const {
@@ -263,7 +267,8 @@ inline std::uint32_t ClockedL2::choose(std::uint32_t index, Cycle now) const {
   const MemoryRequest& access = requests_[request].access;
   const bool passes = behaviour_->passes(access);
   const SectoredCache::Line line = passes ? SectoredCache::no_line : cache_.find(access.address);
-  const bool hits = line != SectoredCache::no_line && (behaviour_->sectors_of(access) & ~cache_.settled(line)) == 0;
+  const std::uint32_t sectors = behaviour_->sectors_of(access);
+  const bool hits = line != SectoredCache::no_line && (sectors & ~cache_.settled(line)) == 0;
   if (!hits && !(passes ? bank.write_backs < sizes_.write_backs : can_go_on(index, access, line))) {
     bank.stuck = true;
     ++bank_stalls_;
@@ -274,7 +279,7 @@ inline std::uint32_t ClockedL2::choose(std::uint32_t index, Cycle now) const {
   ports_[port]->send(behaviour_->request_bytes(access), now);
   queue_cycles_.see(now - 1 - requests_[request].arrival);
   if (hits) {
-    hit(index, request, line, now);
+    hit(index, request, line, sectors, now);
   } else if (passes) {
     pass(index, request, now);
   } else {
@@ -314,7 +319,7 @@ void ClockedL2::pass(std::uint32_t index, std::uint32_t request, Cycle now) {
   const MemoryRequest& access = requests_[request].access;
   writes_.push({behaviour_->below_as(access), index, SectoredCache::no_line, 0, now, request});
   ++banks_[index].write_backs;
-  occupy(index, access.bytes, now);
+  occupy(index, behaviour_->bank_cycles(access.bytes), now);
 }
 
 void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, SectoredCache::Line line, Cycle now) {
@@ -349,12 +354,12 @@ void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, SectoredCach
   const auto needed = static_cast<unsigned>(__builtin_popcount(sectors));
   behaviour_->looked_up(access, needed, cache_.missed());
   cache_.accessed(1, needed);
-  occupy(index, moved, now);
+  occupy(index, behaviour_->bank_cycles(moved), now);
   Request& taken = requests_[request];
   taken.waits_for = cache_.filling(line) & sectors;
   if (taken.waits_for == 0) {
     cache_.unpin(line);
-    return respond(request, now - 1);
+    return respond(request, behaviour_->bank_cycles(access.bytes), now - 1, now);
   }
   mshrs_used_.see(bank.mshrs++);
   std::uint32_t* last = &waiting_[line];

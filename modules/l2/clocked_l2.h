@@ -109,12 +109,14 @@ class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Cl
   /// may need them.
   bool can_go_on(std::uint32_t index, const MemoryRequest& access, SectoredCache::Line line) const;
   /// Most requests: what they need is there.
-  void hit(std::uint32_t index, std::uint32_t request, SectoredCache::Line line, Cycle now);
+  void hit(std::uint32_t index, std::uint32_t request, SectoredCache::Line line, std::uint32_t sectors, Cycle now);
   [[gnu::noinline]] void look_up(std::uint32_t index, std::uint32_t request, SectoredCache::Line line, Cycle now);
   [[gnu::noinline]] void pass(std::uint32_t index, std::uint32_t request, Cycle now);
-  void respond(std::uint32_t request, Cycle from);
+  /// What a request needs is there in a cycle, of which a bank takes so many.
+  void respond(std::uint32_t request, std::uint32_t cycles, Cycle from, Cycle now);
+  void respond(std::uint32_t request, Cycle now);
   [[gnu::noinline]] void respond_in_part(std::uint32_t whole, Cycle at);
-  void occupy(std::uint32_t bank, std::uint64_t bytes, Cycle now);
+  void occupy(std::uint32_t bank, std::uint32_t cycles, Cycle now);
 
   std::unique_ptr<SectoredL2> behaviour_;
   const ClockCrossing crossing_;
