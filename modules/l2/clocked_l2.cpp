@@ -182,7 +182,8 @@ Cycle ClockedL2::tick(Cycle cycle) {
   occupancy_.add(0, cycles, crossing_.cycle_of(from), crossing_.cycle_of(from + cycles));
 }
 
-[[gnu::always_inline]] inline void ClockedL2::respond(std::uint32_t request, std::uint32_t cycles, Cycle from, Cycle now) {
+[[gnu::always_inline]] inline void ClockedL2::respond(std::uint32_t request, std::uint32_t cycles, Cycle from,
+                                                      Cycle now) {
   const Request& done = requests_[request];
   behaviour_->served(done.access);
   Port& port = *ports_[done.port];
