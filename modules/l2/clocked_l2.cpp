@@ -194,8 +194,8 @@ Cycle ClockedL2::tick(Cycle cycle) {
   port.respond(done.asker, crossing_.cycle_of(at), clock.domain->now());
 }
 
-void ClockedL2::respond(std::uint32_t request, Cycle now) {
-  respond(request, behaviour_->bank_cycles(requests_[request].access.bytes), now, now);
+void ClockedL2::respond(std::uint32_t request, Cycle from, Cycle now) {
+  respond(request, behaviour_->bank_cycles(requests_[request].access.bytes), from, now);
 }
 
 void ClockedL2::finish_fills(Cycle now, Cycle after) {
@@ -204,7 +204,7 @@ void ClockedL2::finish_fills(Cycle now, Cycle after) {
     const Below done = asked_[tag];
     free_tags_.push_back(tag);
     if (done.access.command == tlm::TLM_WRITE_COMMAND) {
-      if (done.request != nobody) respond(done.request, now);
+      if (done.request != nobody) respond(done.request, now, now);
       continue;
     }
     cache_.finish_fill(done.line, done.sectors);
@@ -224,7 +224,7 @@ void ClockedL2::finish_fills(Cycle now, Cycle after) {
       *link = request.next;
       --banks_[done.bank].mshrs;
       cache_.unpin(done.line);
-      respond(waiter, now);
+      respond(waiter, now, now);
       link = &waiting_[done.line];  // the requests may have moved
     }
   }
@@ -360,7 +360,7 @@ void ClockedL2::look_up(std::uint32_t index, std::uint32_t request, SectoredCach
   taken.waits_for = cache_.filling(line) & sectors;
   if (taken.waits_for == 0) {
     cache_.unpin(line);
-    return respond(request, behaviour_->bank_cycles(access.bytes), now - 1, now);
+    return respond(request, now - 1, now);
   }
   mshrs_used_.see(bank.mshrs++);
   std::uint32_t* last = &waiting_[line];

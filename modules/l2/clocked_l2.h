@@ -114,7 +114,7 @@ class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Cl
   [[gnu::noinline]] void pass(std::uint32_t index, std::uint32_t request, Cycle now);
   /// What a request needs is there in a cycle, of which a bank takes so many.
   void respond(std::uint32_t request, std::uint32_t cycles, Cycle from, Cycle now);
-  void respond(std::uint32_t request, Cycle now);
+  [[gnu::noinline]] void respond(std::uint32_t request, Cycle from, Cycle now);
   [[gnu::noinline]] void respond_in_part(std::uint32_t whole, Cycle at);
   void occupy(std::uint32_t bank, std::uint32_t cycles, Cycle now);
 

@@ -153,7 +153,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
       0;  ///< `never` until then; after a late END_REQ, the next cycle: the order of ticks does not matter
 };
 
-void ClockedTarget::respond(const Asker& asker, Cycle at, Cycle present) {
+[[gnu::always_inline]] inline void ClockedTarget::respond(const Asker& asker, Cycle at, Cycle present) {
   if (asker.payload == nullptr) return port_->complete(std::max(at, present + 1), asker.tag);
   answer(asker, at);
   send_answers(present);
