@@ -177,7 +177,7 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
   }
 
  private:
-  Cycle serve(const MemoryRequest& request, Cycle arrival) override {
+  [[gnu::always_inline]] Cycle serve(const MemoryRequest& request, Cycle arrival) override {
     if (memory_.annotated_ != nullptr) arrival = memory_.annotated_->filled(request, arrival);
     memory_.traffic_.count(request);
     bytes_ += request.bytes;
