@@ -34,6 +34,11 @@ EarlyCompletionMemory* early_completion_memory_of(tlm::tlm_initiator_socket<32>&
   return memory != nullptr && memory->completes_early() ? memory : nullptr;
 }
 
+ClockedTarget* clocked_target_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
+  if (clock.passes_sockets()) return nullptr;
+  return dynamic_cast<ClockedTarget*>(memory_of_clock(socket, clock));
+}
+
 bool meets_own_time(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock) {
   const ClockedMemory* const memory = memory_of_clock(socket, clock);
   return memory == nullptr || memory->has_own_time();
@@ -73,7 +78,9 @@ inline void MemoryPort::answer(Access& access, const sc_core::sc_time& delay) {
 void MemoryPort::send(const MemoryRequest& request, std::uint32_t tag) {
   if (next_access_ == nullptr) {
     next_access_ = unused_access();
-    memory_ = early_completion_memory_of(socket, *clock_.domain);  // from the second access on
+    // From the second access on:
+    memory_ = early_completion_memory_of(socket, *clock_.domain);
+    target_ = clocked_target_of(socket, *clock_.domain);
   }
   Access& access = *next_access_;
   if (access.data.size() < request.bytes) access.data.resize(request.bytes);
@@ -92,6 +99,7 @@ void MemoryPort::send(const MemoryRequest& request, std::uint32_t tag) {
   tlm::tlm_phase phase = tlm::BEGIN_REQ;
   sc_core::sc_time delay = sc_core::SC_ZERO_TIME;
   requesting_ = &access;  // until the memory says otherwise, perhaps from within the call
+  requesting_until_ = never;
   const tlm::tlm_sync_enum status = socket->nb_transport_fw(access, phase, delay);
   if (status != tlm::TLM_ACCEPTED) requesting_ = nullptr;
   if (requesting_ == nullptr) requesting_until_ = 0;  // it ended from within the call
@@ -116,9 +124,7 @@ tlm::tlm_sync_enum MemoryPort::nb_transport_bw(tlm::tlm_generic_payload& payload
   if (phase != tlm::END_REQ && phase != tlm::BEGIN_RESP) return tlm::TLM_ACCEPTED;  // ignorable ones of the memory's
   if (requesting_ == &access) {                                                     // BEGIN_RESP implies END_REQ
     requesting_ = nullptr;
-    // Whether or not an edge of the present time has been, or is to be: a unit that sleeps sees what one does that is awake.
-    requesting_until_ = clock_.domain->edge_after(sc_core::SC_ZERO_TIME);
-    clock_.domain->wake(clock_.unit, requesting_until_);
+    end_request();
   }
   if (phase == tlm::END_REQ) return tlm::TLM_ACCEPTED;
   // The memory's own process has called: through the kernel what is thrown would come out as a report of the kernel's.
@@ -171,7 +177,7 @@ class FixedLatencyMemory::MemoryTarget final : public tlm::tlm_fw_transport_if<>
   }
 
  private:
-  Cycle serve(const MemoryRequest& request, Cycle arrival) override {
+  [[gnu::always_inline]] Cycle serve(const MemoryRequest& request, Cycle arrival) override {
     if (memory_.annotated_ != nullptr) arrival = memory_.annotated_->filled(request, arrival);
     memory_.traffic_.count(request);
     bytes_ += request.bytes;

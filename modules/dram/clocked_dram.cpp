@@ -9,13 +9,11 @@
 
 namespace vrpipe {
 
-class ClockedDram::Port final : public tlm::tlm_fw_transport_if<>, public ClockedMemory {
+class ClockedDram::Port final : public ClockedTarget {
  public:
+  static constexpr std::uint32_t nobody = ~0U;
   Port(unsigned index, ClockedDram& dram)
-      : socket(("port_" + std::to_string(index)).c_str()), dram_(dram), index_(index) {
-    socket.bind(*this);
-  }
-  tlm::tlm_target_socket<32, tlm::tlm_base_protocol_types, 1, sc_core::SC_ZERO_OR_MORE_BOUND> socket;
+      : ClockedTarget("port_" + std::to_string(index), dram.domain_), dram_(dram), index_(index) {}
 
   std::vector<Waiting>& waiting() { return waiting_; }
   /// Of the requests `left` have entered the queues of their channels. What leaves in a cycle leaves room from the next
@@ -25,82 +23,44 @@ class ClockedDram::Port final : public tlm::tlm_fw_transport_if<>, public Clocke
     left_at_ = now;
   }
   /// Whether a request that was held up can be let in.
-  bool admits() const { return held_ != nullptr && waiting_.size() <= dram_.settings_.port_requests; }
+  bool admits() const { return held_ != nobody && waiting_.size() <= dram_.settings_.port_requests; }
   void admit() {
-    tlm::tlm_phase phase = tlm::END_REQ;
-    sc_core::sc_time delay = sc_core::SC_ZERO_TIME;
-    tlm::tlm_generic_payload& payload = *std::exchange(held_, nullptr);
-    socket->nb_transport_bw(payload, phase, delay);
+    held_ = nobody;
+    end_request();
   }
-  void push_answer(tlm::tlm_generic_payload& payload, Cycle at) { answers_.push_in_order({at, &payload}, &Answer::at); }
-  void respond(Cycle now) {
-    while (!answers_.empty() && !responding_) {
-      const Answer answer = answers_.front();
-      answers_.pop();
-      const Cycle ahead = std::max(answer.at, now + 1) - now;
-      auto delay = sc_core::sc_time::from_value(ahead * clock().period().value());
-      tlm::tlm_phase phase = tlm::BEGIN_RESP;
-      tlm::tlm_generic_payload& payload = *answer.payload;
-      payload.set_response_status(tlm::TLM_OK_RESPONSE);
-      responding_ = true;  // until the initiator says otherwise, perhaps from within the call
-      if (socket->nb_transport_bw(payload, phase, delay) != tlm::TLM_ACCEPTED) responding_ = false;
-      payload.release();
-    }
+  /// Of a request that is done: one that was held up ends with it.
+  void answer(std::uint32_t tag, const Asker& asker, Cycle at) {
+    if (tag == held_) admit();
+    ClockedTarget::answer(asker, at);
   }
+  using ClockedTarget::send_answers;
 
  private:
-  const ClockDomain& clock() const override { return dram_.domain_; }
-
-  void b_transport(tlm::tlm_generic_payload&, sc_core::sc_time&) override {
-    throw SimulationFault(socket.name(), clock().now(), "b_transport at cycle, where it would have to wait");
-  }
-  tlm::tlm_sync_enum nb_transport_fw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
-                                     sc_core::sc_time& delay) override {
-    if (phase == tlm::END_RESP) {
-      responding_ = false;
-      dram_.domain_.wake(dram_.handle_, clock().edge_after(sc_core::SC_ZERO_TIME));
-      return tlm::TLM_COMPLETED;
-    }
-    if (phase != tlm::BEGIN_REQ) return tlm::TLM_ACCEPTED;  // ignorable ones of the initiator's
-    // Also from outside an edge, by what has time of its own.
+  bool take(const MemoryRequest& request, const Asker& asker, Cycle arrival) override {
     const Cycle present = clock().edge_after(sc_core::SC_ZERO_TIME) - 1;
-    const Cycle arrived = present + clock().whole_cycles(delay);
-    last_arrival_ = std::max(last_arrival_, arrived);
-    const MemoryRequest request = request_of(payload);
-    check_alignment(socket, arrived, request.address, request.bytes);
-    payload.acquire();
+    last_arrival_ = std::max(last_arrival_, arrival);
+    check_alignment(socket, arrival, request.address, request.bytes);
     dram_.behaviour_.count(request);
     const unsigned bursts = dram_.settings_.bursts(request.bytes);
     const bool reads = request.command != tlm::TLM_WRITE_COMMAND;
-    const std::uint32_t tag = dram_.take(index_, payload, last_arrival_, bursts, reads);
+    const std::uint32_t tag = dram_.take(index_, asker, last_arrival_, bursts, reads);
     const std::size_t left = left_at_ == present ? left_ : 0;
     const bool has_room = waiting_.size() + left < dram_.settings_.port_requests;
     waiting_.push_back({tag, request.address, static_cast<std::uint16_t>(bursts), 0});
     dram_.domain_.wake(dram_.handle_, last_arrival_ + 1);
-    if (has_room) {
-      phase = tlm::END_REQ;
-      return tlm::TLM_UPDATED;
-    }
+    if (has_room) return true;
     ++dram_.statistics.requests_held;
-    held_ = &payload;
-    return tlm::TLM_ACCEPTED;
+    held_ = tag;
+    return false;
   }
-  bool get_direct_mem_ptr(tlm::tlm_generic_payload&, tlm::tlm_dmi&) override { return false; }
-  unsigned transport_dbg(tlm::tlm_generic_payload&) override { return 0; }
 
-  struct Answer {
-    Cycle at;
-    tlm::tlm_generic_payload* payload;
-  };
   ClockedDram& dram_;
   const unsigned index_;
   std::vector<Waiting> waiting_;
-  Ring<Answer> answers_;                      ///< not sent yet, by cycle
-  tlm::tlm_generic_payload* held_ = nullptr;  ///< the last of those that wait, if it has no END_REQ yet
+  std::uint32_t held_ = nobody;  ///< the request that has not ended yet: the last that came
   Cycle last_arrival_ = 0;
   Cycle left_at_ = never;
   std::size_t left_ = 0;
-  bool responding_ = false;  ///< BEGIN_RESP without END_RESP yet
 };
 
 ClockedDram::ClockedDram(const sc_core::sc_module_name& name, ClockDomain& domain, Dram& behaviour, unsigned ports)
@@ -121,7 +81,7 @@ ClockedDram::~ClockedDram() = default;
 
 tlm::tlm_base_target_socket_b<32>& ClockedDram::port(unsigned index) { return ports_.at(index)->socket; }
 
-std::uint32_t ClockedDram::take(unsigned port, tlm::tlm_generic_payload& payload, Cycle arrived, unsigned bursts,
+std::uint32_t ClockedDram::take(unsigned port, const ClockedTarget::Asker& asker, Cycle arrived, unsigned bursts,
                                 bool reads) {
   if (free_tags_.empty()) {
     free_tags_.push_back(static_cast<std::uint32_t>(pending_.size()));
@@ -129,7 +89,7 @@ std::uint32_t ClockedDram::take(unsigned port, tlm::tlm_generic_payload& payload
   }
   const std::uint32_t tag = free_tags_.back();
   free_tags_.pop_back();
-  pending_[tag] = {&payload, arrived, 0, static_cast<std::uint16_t>(port), static_cast<std::uint16_t>(bursts), reads};
+  pending_[tag] = {asker, arrived, 0, static_cast<std::uint16_t>(port), static_cast<std::uint16_t>(bursts), reads};
   return tag;
 }
 
@@ -161,7 +121,7 @@ Cycle ClockedDram::tick(Cycle now) {
     due_[index] = std::max(now + 1, clock_.seen(channel.next_command() + channel.data_cycles()) - 1);
     next = std::min(next, due_[index]);
   }
-  for (const auto& port : ports_) port->respond(now);
+  for (const auto& port : ports_) port->send_answers(now);
   return next;
 }
 
@@ -222,7 +182,7 @@ void ClockedDram::collect(DramChannel& channel) {
 
 void ClockedDram::answer(std::uint32_t tag) {
   const Pending& pending = pending_[tag];
-  ports_[pending.port]->push_answer(*pending.payload, clock_.seen(pending.done));
+  ports_[pending.port]->answer(tag, pending.asker, clock_.seen(pending.done));
   free_tags_.push_back(tag);
 }
 

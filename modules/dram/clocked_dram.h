@@ -11,7 +11,7 @@
 
 #include <vrpipe/kernel/clock_crossing.h>
 #include <vrpipe/kernel/clock_domain.h>
-#include <vrpipe/memory/memory_port.h>
+#include <vrpipe/memory/clocked_target.h>
 
 namespace vrpipe {
 
@@ -37,7 +37,7 @@ class ClockedDram : public Clocked, public sc_core::sc_module {
  private:
   class Port;
   struct Pending {
-    tlm::tlm_generic_payload* payload;
+    ClockedTarget::Asker asker;
     Cycle arrived;
     Cycle done;  ///< edge of the DRAM at which all of its bursts so far are done
     std::uint16_t port;
@@ -51,7 +51,7 @@ class ClockedDram : public Clocked, public sc_core::sc_module {
     std::uint16_t bursts, entered;
   };
   Cycle tick(Cycle now) override;
-  std::uint32_t take(unsigned port, tlm::tlm_generic_payload& payload, Cycle arrived, unsigned bursts, bool reads);
+  std::uint32_t take(unsigned port, const ClockedTarget::Asker& asker, Cycle arrived, unsigned bursts, bool reads);
   /// Enters bursts of a port's requests where there is room; returns the next cycle to try again.
   Cycle enter(Port& port, Cycle now, Cycle edge);
   /// The same of a request; false if it has to wait for a channel, which `full` then has, a bit each.

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "l2/sectored_l2.h"
@@ -46,15 +47,25 @@ class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Cl
   static constexpr std::uint32_t nobody = ~0U;
   /// A request, or the part of it in one line.
   struct Request {
-    tlm::tlm_generic_payload* payload = nullptr;
     MemoryRequest access;
+    ClockedTarget::Asker asker;
     Cycle arrival = 0;
     std::uint32_t port = 0;
     std::uint32_t waits_for = 0;   ///< sectors of its line
-    std::uint32_t next = nobody;   ///< that waits for the same line
+    std::uint32_t next = nobody;   ///< in the same queue, or that waits for the same line
     std::uint32_t whole = nobody;  ///< what it is a part of; nobody if it is all
     std::uint32_t parts = 0;       ///< of a whole, that are not answered yet
     Cycle answered = 0;            ///< those that are
+  };
+  /// Requests, chained through `next`.
+  struct Queue {
+    std::uint32_t first = nobody;
+    std::uint32_t last = nobody;
+    void push(std::uint32_t request, std::vector<Request>& requests) {
+      (first == nobody ? first : requests[last].next) = request;
+      last = request;
+    }
+    void pop(std::vector<Request>& requests) { first = std::exchange(requests[first].next, nobody); }
   };
   struct Bank {
     Cycle free_at = 0;
@@ -74,32 +85,49 @@ class ClockedL2 final : public sc_core::sc_module, public MemoryUnit, private Cl
   };
 
   Cycle tick(Cycle cycle) override;
-  std::uint32_t make_request();
+  std::uint32_t make_request() {
+    if (free_requests_.empty()) {
+      free_requests_.push_back(static_cast<std::uint32_t>(requests_.size()));
+      requests_.emplace_back();
+    }
+    const std::uint32_t made = free_requests_.back();
+    free_requests_.pop_back();
+    return made;
+  }
   void queue(std::uint32_t request);
-  void finish_fills(Cycle now);
-  void take_requests(Cycle now);
+  void queue_at_bank(std::uint32_t request);
+  [[gnu::noinline]] void queue_by_line(std::uint32_t request);
+  Queue& queue_of(std::uint32_t bank, std::uint32_t port) { return queues_[bank * ports_.size() + port]; }
+  /// Each of a bank or below returns when there is more to do, if nothing arrives; `never` for nothing.
+  Cycle take_requests(Cycle now);
+  Cycle ask_below();
+  void finish_fills(Cycle now, Cycle after);
+  /// The port whose first request for a bank has its turn, of those with room on their way in; nobody for none.
+  std::uint32_t choose(std::uint32_t index, Cycle now) const;
   bool take_one(std::uint32_t index, Cycle now);
-  Ring<std::uint32_t>& queue_of(std::uint32_t bank, std::uint32_t port) { return queues_[bank * ports_.size() + port]; }
   /// Whether a request, of a line that is held or none, finds an MSHR, a line and a place for what that evicts, as far as it
   /// may need them.
   bool can_go_on(std::uint32_t index, const MemoryRequest& access, SectoredCache::Line line) const;
-  void look_up(std::uint32_t index, std::uint32_t request, SectoredCache::Line line, Cycle now);
-  void pass(std::uint32_t index, std::uint32_t request, Cycle now);
-  void ask_below();
-  void respond(std::uint32_t request, Cycle from);
-  void answer(std::uint32_t request, Cycle at);
-  void occupy(std::uint32_t bank, std::uint64_t bytes, Cycle now);
+  /// Most requests: what they need is there.
+  void hit(std::uint32_t index, std::uint32_t request, SectoredCache::Line line, std::uint32_t sectors, Cycle now);
+  [[gnu::noinline]] void look_up(std::uint32_t index, std::uint32_t request, SectoredCache::Line line, Cycle now);
+  [[gnu::noinline]] void pass(std::uint32_t index, std::uint32_t request, Cycle now);
+  /// What a request needs is there in a cycle, of which a bank takes so many.
+  void respond(std::uint32_t request, std::uint32_t cycles, Cycle from, Cycle now);
+  [[gnu::noinline]] void respond(std::uint32_t request, Cycle from, Cycle now);
+  [[gnu::noinline]] void respond_in_part(std::uint32_t whole, Cycle at);
+  void occupy(std::uint32_t bank, std::uint32_t cycles, Cycle now);
 
   std::unique_ptr<SectoredL2> behaviour_;
   const ClockCrossing crossing_;
-  const SectoredL2::Sizes& sizes_;
+  const SectoredL2::Sizes sizes_;
   SectoredCache& cache_;
   Occupancy occupancy_;  ///< of the banks
   MemoryPort memory_;
   std::vector<std::unique_ptr<Port>> ports_;
   std::vector<Bank> banks_;
-  std::uint64_t banks_with_requests_ = 0;    ///< a bit each
-  std::vector<Ring<std::uint32_t>> queues_;  ///< of requests, by bank, then port
+  std::uint64_t banks_with_requests_ = 0;  ///< a bit each
+  std::vector<Queue> queues_;              ///< by bank, then port
   std::vector<Request> requests_;
   std::vector<std::uint32_t> free_requests_;
   std::vector<std::uint32_t> waiting_;  ///< the first that waits for a line of the cache

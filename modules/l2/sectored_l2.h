@@ -188,9 +188,12 @@ class SectoredL2 final : public MemoryBehaviour {
     if (holds_attributes_ && origin.traffic == MemoryTraffic::attribute) cache_.keep(line);
     if (spared) ++attribute_lines_held_;
   }
-  /// Of a request in one line.
+  /// Of a request in one line: its first byte there.
+  std::uint32_t first_of(const MemoryRequest& request) const {
+    return static_cast<std::uint32_t>(request.address & last_of_line_);
+  }
   std::uint32_t sectors_of(const MemoryRequest& request) const {
-    const auto first = static_cast<std::uint32_t>(request.address & last_of_line_);
+    const std::uint32_t first = first_of(request);
     const std::uint32_t from = first >> sector_shift_;
     return sector_mask(from, ((first + request.bytes - 1) >> sector_shift_) - from + 1);
   }

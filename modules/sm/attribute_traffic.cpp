@@ -35,12 +35,13 @@ std::uint32_t AttributeTraffic::visible_triangles(const VertexWarp& warp) const 
   const DrawCall& call = context_.draw(warp.draw);
   const unsigned triangles = primitives_per_splat(call);
   std::uint32_t visible = 0;
+  TriangleSnapper snapper(context_);
   PixelRect bounds;
   for (unsigned i = 0; i < warp.splats; ++i) {
     const std::uint32_t splat = warp.first_splat + i;
     if (!is_finite(call, splat)) continue;
     for (unsigned triangle = 0; triangle < triangles; ++triangle) {
-      const bool drawn = cull_triangle(context_, warp.draw, splat, triangle, bounds) == Culling::none;
+      const bool drawn = cull_triangle(context_, snapper, warp.draw, splat, triangle, bounds) == Culling::none;
       visible |= (drawn ? 1U : 0U) << (2 * i + triangle);
     }
   }

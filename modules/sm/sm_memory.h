@@ -72,8 +72,9 @@ class SmMemory {
   }
   /// Goes on with it; false while it has to wait.
   bool look_up(Cycle now) {
-    if (!l1s_[core_].cache || look_up_.traffic != MemoryTraffic::attribute) return ask_for_all(now);
-    SectoredCache& cache = *l1s_[core_].cache;
+    L1& l1 = l1s_[core_];
+    if (!l1.cache || look_up_.traffic != MemoryTraffic::attribute) return ask_for_all(l1, now);
+    SectoredCache& cache = *l1.cache;
     std::uint64_t sectors = 0;
     for (; at_ < look_up_.count; ++at_, seen_ = 0) {
       const AttributeTraffic::LineSectors& needed = look_up_.lines[at_];
@@ -83,7 +84,7 @@ class SmMemory {
         SectoredCache::Evicted clean;
         line = cache.allocate(needed.address, clean);
       }
-      if (!look_up_line(needed, line, now)) return false;
+      if (!look_up_line(l1, needed, line, now)) return false;
       cache.looked_up(line, needed.sectors);
     }
     for (unsigned i = 0; i < look_up_.count; ++i) {
@@ -161,20 +162,19 @@ class SmMemory {
   };
 
   /// As `look_up`, without an L1 or past it.
-  bool ask_for_all(Cycle now) {
+  bool ask_for_all(L1& l1, Cycle now) {
     for (; at_ < look_up_.count; ++at_, seen_ = 0) {
       const AttributeTraffic::LineSectors& needed = look_up_.lines[at_];
       for (std::uint32_t left = needed.sectors & ~seen_; left != 0;) {
         std::uint32_t fill = none;
-        if (!ask(needed, left, SectoredCache::no_line, now, fill)) return false;
+        if (!ask(l1, needed, left, SectoredCache::no_line, now, fill)) return false;
       }
     }
     return true;
   }
   /// Asks for the first of the missing sectors of a line, for which the warp then waits; false if that has to wait.
-  bool ask(const AttributeTraffic::LineSectors& needed, std::uint32_t& missing, SectoredCache::Line line, Cycle now,
-           std::uint32_t& fill) {
-    L1& l1 = l1s_[core_];
+  bool ask(L1& l1, const AttributeTraffic::LineSectors& needed, std::uint32_t& missing, SectoredCache::Line line,
+           Cycle now, std::uint32_t& fill) {
     if (l1.free_mshrs == 0 || !port_.available()) return false;
     const SectorRun run = take_sector_run(missing, l1.free_mshrs);
     fill = new_fill({core_, line, run, none, now});
@@ -186,8 +186,7 @@ class SmMemory {
   }
 
   /// Goes on with a line; sectors once seen are not looked at again.
-  bool look_up_line(const AttributeTraffic::LineSectors& needed, SectoredCache::Line line, Cycle now) {
-    L1& l1 = l1s_[core_];
+  bool look_up_line(L1& l1, const AttributeTraffic::LineSectors& needed, SectoredCache::Line line, Cycle now) {
     for (std::uint32_t coming = needed.sectors & l1.cache->filling(line) & ~seen_; coming != 0;) {
       const std::uint32_t fill = l1.fills[line][static_cast<unsigned>(__builtin_ctz(coming))];
       const SectorRun run = fills_[fill].sectors;
@@ -198,12 +197,10 @@ class SmMemory {
     std::uint32_t missing = needed.sectors & l1.cache->absent(line) & ~seen_;
     while (missing != 0) {
       std::uint32_t fill = none;
-      if (!ask(needed, missing, line, now, fill)) return false;
+      if (!ask(l1, needed, missing, line, now, fill)) return false;
       const SectorRun run = fills_[fill].sectors;
-      for (unsigned sector = run.first; sector < run.first + run.count; ++sector) {
-        l1.cache->start_fill(line, sector);
-        l1.fills[line][sector] = fill;
-      }
+      l1.cache->start_fill(line, sector_mask(run.first, run.count));
+      for (unsigned sector = run.first; sector < run.first + run.count; ++sector) l1.fills[line][sector] = fill;
       l1.cache->pin(line);
     }
     return true;
@@ -216,10 +213,9 @@ class SmMemory {
     L1& l1 = l1s_[fill.core];
     l1.free_mshrs += fill.sectors.count;
     if (fill.line != SectoredCache::no_line) {
-      for (unsigned i = 0; i < fill.sectors.count; ++i) {
-        l1.cache->finish_fill(fill.line, fill.sectors.first + i);
-        statistics_.fill_cycles.see(now - fill.asked);
-      }
+      const std::uint32_t sectors = sector_mask(fill.sectors.first, fill.sectors.count);
+      l1.cache->finish_fill(fill.line, sectors);
+      statistics_.see_fill(sectors, now - fill.asked);
       l1.cache->unpin(fill.line);
     }
     for (std::uint32_t waiter = fill.waiters; waiter != none;) {

@@ -392,7 +392,7 @@ class SmUnit : public Unit {
   }
 
   Cycle tick(Cycle now) override {
-    if (fetches_) take_answers(now);
+    if (fetches_ && memory_.next_completion() <= now) take_answers(now);
     release_slots();
     run_events(now);
     launch_fragments(now);

@@ -250,10 +250,10 @@ TEST(SectoredCache, SectorsComeOneByOneAndGoWithTheirLine) {
   SectoredCache::Evicted evicted;
   SectoredCache::Line line = cache.allocate(0, evicted);
   EXPECT_EQ(cache.absent(line) & 15U, 0b1111U);
-  cache.start_fill(line, 2);
+  cache.start_fill(line, 1U << 2U);
   EXPECT_EQ(cache.filling(line), 0b0100U);
   EXPECT_EQ(cache.absent(line) & 15U, 0b1011U) << "on its way: need not be asked for again";
-  cache.finish_fill(line, 2);
+  cache.finish_fill(line, 1U << 2U);
   EXPECT_EQ(cache.filling(line), 0U);
   EXPECT_EQ(cache.present(line), 0b0100U);
   cache.make_dirty(line, 0b0100);

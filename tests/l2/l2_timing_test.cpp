@@ -49,6 +49,7 @@ class L2Test : public ::testing::Test {
     dram.reset();
     fresh_simulation();
     clock = std::make_unique<ClockDomain>("clock", 1000);
+    if (passes_sockets) clock->set_passes_sockets();
   }
   void set(const std::string& name, const std::string& value) { parameters.set("l2", name, value); }
 
@@ -70,11 +71,12 @@ class L2Test : public ::testing::Test {
     l2->below()->bind(below->port(0));
   }
   /// Two channels of LPDDR3, 12.8 GB/s at the L2's 1 GHz.
-  static std::unique_ptr<Behaviour> dram_behaviour() {
+  std::unique_ptr<Behaviour> dram_behaviour() const {
     const Implementation& implementation = Registry::instance().find("dram", "lpddr3-1600");
-    const auto parameters = implementation.make_parameters();
-    parameters->set("dram", "channels", "2");
-    return implementation.make_behaviour(*parameters, RenderContext());
+    const auto of_dram = implementation.make_parameters();
+    of_dram->set("dram", "channels", "2");
+    of_dram->set("dram", "port_requests", dram_port_requests);
+    return implementation.make_behaviour(*of_dram, RenderContext());
   }
   /// When each access of each port completes.
   std::vector<std::vector<Cycle>> run(Time time, const std::vector<std::vector<Access>>& accesses) {
@@ -115,6 +117,8 @@ class L2Test : public ::testing::Test {
   SectoredL2Parameters parameters;
   std::unique_ptr<FixedLatencyMemory> below;
   bool over_dram = false;  ///< instead
+  std::string dram_port_requests = "64";
+  bool passes_sockets = false;
   std::unique_ptr<MemoryUnit> dram;
   std::unique_ptr<MemoryUnit> l2;
   SectoredL2* model = nullptr;
@@ -320,6 +324,32 @@ TEST_F(L2Test, OfAnyFrequencyItDoesNotMatterWhoTicksFirst) {
       completed[last] = run(Time::clocked, random_accesses(6, 1));
     }
     EXPECT_EQ(completed[0], completed[1]) << frequency;
+  }
+}
+
+TEST_F(L2Test, WhatIsWrittenWholeWhileItIsOnItsWayIsAwaitedAllTheSame) {
+  const std::vector<Cycle> completed = run(Time::clocked, {read(100, 0), write(110, 0), read(120, 0)});
+  EXPECT_EQ(completed[0], 100 + miss_cycles);
+  EXPECT_GE(completed[1], completed[0]);
+  EXPECT_GE(completed[2], completed[0]);
+}
+
+// Also where what waits for its place below is answered before it has one.
+TEST_F(L2Test, IsTheSameInEveryCycleThroughTheSocketsAndPastThem) {
+  over_dram = true;
+  for (const char* places : {"1", "3", "64"}) {
+    dram_port_requests = places;
+    for (const char* port_requests : {"1", "512"}) {
+      set("port_requests", port_requests);
+      std::vector<std::vector<Cycle>> completed[2];
+      for (const bool through : {false, true}) {
+        passes_sockets = through;
+        start();
+        completed[through] = run(Time::clocked, random_accesses(6, 1, 256));
+      }
+      EXPECT_EQ(completed[0], completed[1]) << places << ", " << port_requests;
+      EXPECT_GT(model->memory_bytes().written, 1000U);
+    }
   }
 }
 

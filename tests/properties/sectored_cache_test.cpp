@@ -138,7 +138,7 @@ RC_GTEST_PROP(SectoredCache, DoesTheSameInStepsWithLinesThatAreKept, ()) {
   };
   std::deque<Queued> queue;
   const auto finish_fill = [&] {
-    cache.finish_fill(fills.front().first, fills.front().second);
+    cache.finish_fill(fills.front().first, 1U << fills.front().second);
     fills.pop_front();
   };
   const auto let_one_go = [&](std::uint64_t chance) {
@@ -175,7 +175,7 @@ RC_GTEST_PROP(SectoredCache, DoesTheSameInStepsWithLinesThatAreKept, ()) {
         access.writes ? cache.write(line, first, access.bytes) : cache.read(line, first, access.bytes);
     done.filled = set_of(missing);
     for (const unsigned sector : done.filled) {
-      cache.start_fill(line, sector);
+      cache.start_fill(line, 1U << sector);
       fills.emplace_back(line, sector);
       if (mix(seed + i + sector) % 4 == 0) finish_fill();
     }

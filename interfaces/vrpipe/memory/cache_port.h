@@ -62,10 +62,9 @@ class CachePort {
       const SectoredCache::Line line = tag >> (2 * sector_bits);
       const unsigned first = tag & (sectors_at_most - 1);
       const unsigned count = (tag >> sector_bits & (sectors_at_most - 1)) + 1;
-      for (unsigned sector = first; sector < first + count; ++sector) {
-        cache_->finish_fill(line, sector);
-        if (has_details_) statistics_->fill_cycles.see(now - asked_at(line, sector));
-      }
+      cache_->finish_fill(line, sector_mask(first, count));
+      for (unsigned sector = first; has_details_ && sector < first + count; ++sector)
+        statistics_->fill_cycles.see(now - asked_at(line, sector));
       fills_in_flight_ -= count;
     }
     return any;
@@ -100,11 +99,11 @@ class CachePort {
                                 : take_sector_run(missing, std::min(longest_run_, mshrs_ - fills_in_flight_));
       memory_.read(wanted.address + (std::uint64_t{run.first} << sector_shift_), run.count << sector_shift_,
                    (wanted.line << sector_bits | (run.count - 1)) << sector_bits | run.first);
-      for (unsigned sector = run.first; sector < run.first + run.count; ++sector) {
-        cache_->start_fill(wanted.line, sector);
-        if (has_details_) asked_at(wanted.line, sector) = now;
-      }
-      wanted.asked_for |= sector_mask(run.first, run.count);
+      const std::uint32_t sectors = sector_mask(run.first, run.count);
+      cache_->start_fill(wanted.line, sectors);
+      for (unsigned sector = run.first; has_details_ && sector < run.first + run.count; ++sector)
+        asked_at(wanted.line, sector) = now;
+      wanted.asked_for |= sectors;
       fills_in_flight_ += run.count;
       moved(run.count);
     }

@@ -26,6 +26,10 @@ struct SectoredCacheStatistics : StatisticSet {
     for (Histogram* histogram : {&lines_pinned, &fill_cycles, &sectors_filling}) histogram->leave_out();
   }
   bool has_details() const { return !fill_cycles.is_left_out(); }
+  /// Sectors of a line, a bit each, have come together.
+  void see_fill(std::uint32_t sectors, Cycle took) {
+    for (std::uint32_t left = has_details() ? sectors : 0; left != 0; left &= left - 1) fill_cycles.see(took);
+  }
 
   Counter line_accesses{*this, "line_accesses", "accesses", "one for each item that needs sectors of a line"};
   Counter line_hits{*this, "line_hits", "accesses", "to a line that is held, its sectors there or not"};

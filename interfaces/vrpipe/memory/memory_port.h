@@ -15,6 +15,7 @@
 #include <vrpipe/kernel/ring.h>
 #include <vrpipe/memory/bandwidth.h>
 #include <vrpipe/memory/cache_statistics.h>
+#include <vrpipe/memory/clocked_target.h>
 #include <vrpipe/memory/memory_request.h>
 
 namespace vrpipe {
@@ -32,15 +33,6 @@ inline void check_response(const sc_core::sc_object& port, Cycle now, const tlm:
   if (access.is_response_error()) fault_of_response(port, now, access);
 }
 
-/// A memory that works in the cycles of a clock, and answers in them.
-class ClockedMemory {
- public:
-  virtual ~ClockedMemory() = default;
-  virtual const ClockDomain& clock() const = 0;
-  /// Whether its answers depend on anything but the requests and their cycles: on sc_time, or timers.
-  virtual bool has_own_time() const { return false; }
-};
-
 /// One that says as soon as an access begins when it will be complete. A port that is bound to it with nothing in
 /// between asks it directly instead of through the sockets, as with a direct memory interface; in the same cycles.
 class EarlyCompletionMemory : public ClockedMemory {
@@ -54,6 +46,8 @@ class EarlyCompletionMemory : public ClockedMemory {
 
 /// The memory that a socket is bound to, if it completes early and counts the cycles of this clock; null otherwise.
 EarlyCompletionMemory* early_completion_memory_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock);
+/// The same of one that answers later.
+ClockedTarget* clocked_target_of(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock);
 /// Whether what a socket is bound to has time of its own, as everything may but a ClockedMemory.
 bool meets_own_time(tlm::tlm_initiator_socket<32>& socket, const ClockDomain& clock);
 
@@ -70,9 +64,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   tlm::tlm_initiator_socket<32> socket;
 
   /// Whether another access can be issued now.
-  bool available() const {
-    return in_flight_ < most_in_flight_ && requesting_ == nullptr && requesting_until_ <= clock_.domain->now();
-  }
+  bool available() const { return in_flight_ < most_in_flight_ && requesting_until_ <= clock_.domain->now(); }
   /// Issues an access, in an edge of its unit. Its tag comes back from `next_completed`.
   void read(std::uint64_t address, unsigned bytes, std::uint32_t tag) {
     access({address, bytes, tlm::TLM_READ_COMMAND, origin_}, tag);
@@ -86,8 +78,9 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
     check_alignment(socket, now, request.address, request.bytes);
     ++in_flight_;
     moved_.count(request);
-    if (memory_ == nullptr) return send(request, tag);
-    complete(std::max(memory_->serve(request, now), now + 1), tag);
+    if (memory_ != nullptr) return complete(std::max(memory_->serve(request, now), now + 1), tag);
+    if (target_ == nullptr) return send(request, tag);
+    if (!target_->ask(request, tag, *this)) requesting_until_ = never;
   }
   /// Takes the next access that has completed, in a cycle after the one in which it was answered; false for none.
   bool next_completed(std::uint32_t& tag) {
@@ -102,6 +95,23 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   const MemoryBytes& moved() const { return moved_; }
   /// When the next known completion is due; `never` for none.
   Cycle next_completion() const { return next_completion_; }
+
+  // For a ClockedTarget that is called past the socket.
+
+  /// An access is complete in a cycle, later than now.
+  void complete(Cycle at, std::uint32_t tag) {
+    // Nearly always the last: memories answer in order.
+    completions_.push_in_order({at, tag}, &Completion::at);
+    if (at >= next_completion_) return;  // its unit comes for the earlier one, and asks again then
+    next_completion_ = at;
+    clock_.domain->wake(clock_.unit, at);
+  }
+  /// Another one may begin.
+  void end_request() {
+    // Whether or not an edge of the present time has been, or is to be: a unit that sleeps sees what one does that is awake.
+    requesting_until_ = clock_.domain->edge_after(sc_core::SC_ZERO_TIME);
+    clock_.domain->wake(clock_.unit, requesting_until_);
+  }
 
  private:
   struct Access : tlm::tlm_generic_payload {
@@ -118,13 +128,6 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   Access* unused_access();
   [[gnu::noinline]] void send(const MemoryRequest& request, std::uint32_t tag);
   void answer(Access& access, const sc_core::sc_time& delay);
-  void complete(Cycle at, std::uint32_t tag) {
-    // Nearly always the last: memories answer in order.
-    completions_.push_in_order({at, tag}, &Completion::at);
-    if (at >= next_completion_) return;  // its unit comes for the earlier one, and asks again then
-    next_completion_ = at;
-    clock_.domain->wake(clock_.unit, at);
-  }
   tlm::tlm_sync_enum nb_transport_bw(tlm::tlm_generic_payload& payload, tlm::tlm_phase& phase,
                                      sc_core::sc_time& delay) override;
   void invalidate_direct_mem_ptr(sc_dt::uint64, sc_dt::uint64) override {}
@@ -138,6 +141,7 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   std::vector<Access*> free_accesses_;
   Access* next_access_ = nullptr;            ///< for the next request; null before the first
   EarlyCompletionMemory* memory_ = nullptr;  ///< if it can be asked directly
+  ClockedTarget* target_ = nullptr;          ///< the same of one that answers later
   const MemoryOrigin origin_;
   const unsigned most_in_flight_;
   unsigned in_flight_ = 0;
@@ -145,8 +149,15 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   Ring<Completion> completions_;  ///< by cycle
   Cycle next_completion_ = never;
   const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
-  Cycle requesting_until_ = 0;          ///< after a late END_REQ, the next cycle: the order of ticks does not matter
+  Cycle requesting_until_ =
+      0;  ///< `never` until then; after a late END_REQ, the next cycle: the order of ticks does not matter
 };
+
+[[gnu::always_inline]] inline void ClockedTarget::respond(const Asker& asker, Cycle at, Cycle present) {
+  if (asker.payload == nullptr) return port_->complete(std::max(at, present + 1), asker.tag);
+  answer(asker, at);
+  send_answers(present);
+}
 
 /// Whether a memory has another one below it, and how it asks that.
 enum class MemoryBelow : std::uint8_t {

@@ -88,28 +88,36 @@ class SectoredCache {
     use(line);
   }
 
+  /// As if it was pinned and let go.
+  void touch(Line line) {
+    if (lines_[line].pins == 0) use(line);
+  }
+
   std::uint32_t present(Line line) const { return lines_[line].present; }
   /// Those on their way.
   std::uint32_t filling(Line line) const { return lines_[line].filling; }
+  /// Those that nobody waits for: what is written whole while it is on its way is both there and awaited.
+  std::uint32_t settled(Line line) const { return lines_[line].present & ~lines_[line].filling; }
   std::uint32_t absent(Line line) const { return ~(lines_[line].present | lines_[line].filling); }
   std::uint32_t dirty(Line line) const { return lines_[line].dirty; }
   /// Sectors to be filled for a read of bytes `first` to `first + bytes` - 1 of a line.
   std::uint32_t read(Line line, unsigned first, unsigned bytes) const;
   /// And for a write, which makes its sectors dirty, and those present that it completes.
   std::uint32_t write(Line line, unsigned first, unsigned bytes);
-  void start_fill(Line line, unsigned sector) {
+  void start_fill(Line line, std::uint32_t sectors) {
     Entry& entry = lines_[line];
-    entry.filling |= 1U << sector;
-    if (details_) statistics_->sectors_filling.see(filling_);
-    ++filling_;
-    count_misses(entry, 1U << sector);
+    entry.filling |= sectors;
+    const auto count = static_cast<std::uint32_t>(__builtin_popcount(sectors));
+    if (details_) see_filling(count);
+    filling_ += count;
+    count_misses(entry, sectors);
   }
   /// Ends what start_fill began, while the line still holds the same.
-  void finish_fill(Line line, unsigned sector) {
+  void finish_fill(Line line, std::uint32_t sectors) {
     Entry& entry = lines_[line];
-    entry.filling &= ~(1U << sector);
-    --filling_;
-    entry.present |= 1U << sector;
+    entry.filling &= ~sectors;
+    filling_ -= static_cast<std::uint32_t>(__builtin_popcount(sectors));
+    entry.present |= sectors;
   }
   /// Of what `absent` has: it is known what sectors hold, so that they are there without a fill.
   void fill_unread(Line line, std::uint32_t sectors) {
@@ -139,6 +147,14 @@ class SectoredCache {
     statistics_->sector_misses_capacity += missed_ - of_other_cause_;
     statistics_->bytes_filled += (missed_ - not_filled_) * sector_bytes_;
     allocated_ = missed_ = of_other_cause_ = not_filled_ = 0;
+  }
+
+  /// The same of an access that has found all of its sectors there, where every access is ended at once.
+  void hit(std::uint64_t sectors) {
+    ++statistics_->line_accesses;
+    ++statistics_->line_hits;
+    statistics_->sector_accesses += sectors;
+    statistics_->sector_hits += sectors;
   }
 
   /// All at once for sectors of a line (`address`, `sectors` and `known` are given): looks it up, allocates and fills.
@@ -258,6 +274,9 @@ class SectoredCache {
   bool has_byte(Line line, unsigned byte) const;
   bool is_masked() const { return !byte_masks_.empty(); }
 
+  void see_filling(std::uint32_t more) {
+    for (std::uint32_t i = 0; i < more; ++i) statistics_->sectors_filling.see(filling_ + i);
+  }
   /// Of sectors that are filled.
   void count_misses(Entry& entry, std::uint32_t sectors) {
     missed_ += static_cast<unsigned>(__builtin_popcount(sectors));
