@@ -248,7 +248,7 @@ INSTANTIATE_TEST_SUITE_P(OfThePaper, StandIn,
                          ::testing::Values(StandInMarks{"kitchen", 0.08, 0xa39782ea4f5edb9eu},
                                            StandInMarks{"bonsai", 0.08, 0x7c227b36f4158b08u},
                                            StandInMarks{"train", 0.08, 0x7d997a49c68dd75eu},
-                                           StandInMarks{"truck", 0.08, 0xebdd50ab7ae514cbu},
+                                           StandInMarks{"truck", 0.08, 0x39b80b51ff18479fu},
                                            StandInMarks{"lego", 0.08, 0x42e75f5ea6d5b0f2u},
                                            StandInMarks{"palace", 0.07, 0x53cae29124e44bd1u}),
                          [](const auto& parameter) { return parameter.param.name; });

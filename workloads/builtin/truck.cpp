@@ -13,15 +13,15 @@ void paint_truck(CapturePainter& painter) {
   for (const double x : {-14.0, -9.0, -4.0, 4.0, 9.0, 14.0}) painter.camera({x, 1.7, std::fabs(x) < 5 ? -15.0 : -11.0});
   Texture metal;
   metal.gloss = 0.16;
-  metal.layers = 27;
+  metal.layers = 20;
   Texture fine = metal;
   fine.size = 1.15;
   Texture ground;
   ground.gloss = 0.01;
   ground.size = 1;
-  ground.layers = 98;
+  ground.layers = 88;
   Texture wall = ground;
-  wall.layers = 38;
+  wall.layers = 39;
   const Vec3 chrome = {0.80, 0.81, 0.83}, black = {0.06, 0.06, 0.07};
   // Faded paint with rust that grows from below.
   const auto faded = [](const Vec3& p) {
@@ -164,7 +164,7 @@ void paint_truck(CapturePainter& painter) {
     return mix(mix({0.13, 0.26, 0.07}, {0.46, 0.56, 0.22}, 1.4 * grain - 0.2), {0.58, 0.52, 0.34}, 3 * (patch - 0.55));
   };
   Texture lawn = ground;
-  lawn.layers = 28;
+  lawn.layers = 29;
   painter.quad({-16, 0, -12}, {0, 0, 13.7}, {34, 0, 0}, land, ground);
   painter.quad({-16, 0, 1.7}, {0, 0, 12.3}, {34, 0, 0}, land, lawn);
   painter.block_box({1, -0.04, 1}, {16.9, 0.01, 12.9});
@@ -185,7 +185,7 @@ void paint_truck(CapturePainter& painter) {
           walls[(i + 2) % 5], {0.36, 0.26, 0.22}, wall);
   }
   Texture leaves;
-  leaves.layers = 48;
+  leaves.layers = 56;
   leaves.size = 1;
   for (int i = 0; i < 7; ++i) {
     tree(painter, {-17.0 + 6.8 * i + 2 * hash_fraction(i, 3), 0, 6.2 + 1.5 * hash_fraction(i, 4)},
@@ -214,7 +214,7 @@ void paint_truck(CapturePainter& painter) {
   }
   Texture heaven;
   heaven.size = 1;
-  heaven.layers = 104;
+  heaven.layers = 106;
   sky(painter, 160, 0.45, 1, heaven);
   painter.floaters({0, 2.0, 0}, {7, 1.8, 6}, 400, 1.2);
 }
