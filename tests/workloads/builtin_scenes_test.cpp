@@ -1,11 +1,16 @@
 #include <vrpipe/workloads/builtin_scenes.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <ostream>
 #include <set>
 
+#include <vrpipe/workloads/draw_list.h>
 #include <vrpipe/workloads/preprocess.h>
 
+#include "../support/data.h"
+#include "../support/draw_statistics.h"
 #include "../support/reference_renderer.h"
 #include "workload_test_support.h"
 
@@ -157,17 +162,59 @@ TEST(StandIns, HaveSizeNumberAndKindOfThePapersScenes) {
   }
 }
 
+struct Range {
+  double least, most;
+};
+
+/// Between which bounds draws of trained scenes lie: ten public models, trained by INRIA's code, of rooms, of streets and
+/// yards, and of lone things. But for two: splats of a trained room have a median side of 16 pixels and 79 % of their area in
+/// large ones, with fewer Gaussians in view than the paper's rooms, whose splats have to be smaller.
+struct Trained {
+  const char* kind;  ///< PaperScene::kind
+  Range opacity_low, opacity_median, side_median, boxes_per_pixel, area_of_large;
+};
+constexpr Trained kTrained[] = {{"indoor", {0.12, 0.15}, {0.70, 0.76}, {8, 16}, {100, 180}, {0.50, 0.80}},
+                                {"outdoor", {0.23, 0.31}, {0.86, 0.97}, {5, 12}, {100, 180}, {0.12, 0.30}},
+                                {"synthetic", {0.19, 0.24}, {0.67, 0.73}, {6, 9}, {35, 95}, {0.02, 0.60}}};
+constexpr Range kElongationMedian = {1.7, 2.7}, kElongation99 = {7, 11};
+constexpr Range kMixedQuads = {0.040, 0.053}, kFallOfFragmentsAQuad = {0.039, 0.134}, kTerminationRatio = {1.7, 3.2};
+
+void expect_in(const Range& range, double value, const char* what) {
+  EXPECT_GE(value, range.least) << what;
+  EXPECT_LE(value, range.most) << what;
+}
+
+/// But for elongations, which are greater in the robot's close view.
+void expect_as_trained(const testing::DrawStatistics& draw, const std::string& kind) {
+  const auto* trained =
+      std::find_if(std::begin(kTrained), std::end(kTrained), [&](const Trained& other) { return other.kind == kind; });
+  ASSERT_NE(trained, std::end(kTrained)) << kind;
+  expect_in(trained->opacity_low, draw.opacity_low, "opacity of a tenth");
+  expect_in(trained->opacity_median, draw.opacity_median, "opacity, median");
+  expect_in(trained->side_median, draw.side_median, "side, median");
+  expect_in(trained->boxes_per_pixel, draw.boxes_per_pixel, "boxes per pixel");
+  expect_in(trained->area_of_large, draw.area_of_large, "share of their area in large splats");
+  expect_in(kMixedQuads, draw.mixed_quads, "quads with dead and living pixels");
+  expect_in(kFallOfFragmentsAQuad, draw.fall_of_fragments_a_quad(), "fall of fragments a quad");
+  expect_in(kTerminationRatio, draw.termination_ratio, "early-termination ratio");
+}
+
+TEST(TrainedScenes, TheRobotOfTheTestsIsWhereTheOthersAre) {
+  const testing::UnpackedFile file("measured_draw.spl");
+  expect_as_trained(testing::statistics_of(read_draw_list(file.path()).draw), "synthetic");
+}
+
 struct StandInMarks {
   std::string name;
-  std::uint64_t scene_hash;            ///< the same with every compiler, optimisation level and processor
-  double least_visible, most_visible;  ///< share of all Gaussians
+  double least_fall;         ///< of fragments a quad; 8 % in five of the six
+  std::uint64_t scene_hash;  ///< the same with every compiler, optimisation level and processor
 };
 
 void PrintTo(const StandInMarks& marks, std::ostream* out) { *out << marks.name; }
 
 class StandIn : public ::testing::TestWithParam<StandInMarks> {};
 
-TEST_P(StandIn, HasThePapersNumberOfGaussiansAndTerminatesEarlyAsTrainedScenesDo) {
+TEST_P(StandIn, HasThePapersNumberOfGaussiansAndIsLikeATrainedScene) {
   const StandInMarks& marks = GetParam();
 #ifdef VRPIPE_SANITIZED
   const std::uint64_t gaussians = builtin_scene_named(marks.name).stands_for->gaussians;
@@ -180,37 +227,30 @@ TEST_P(StandIn, HasThePapersNumberOfGaussiansAndTerminatesEarlyAsTrainedScenesDo
   SceneSummary summary;
   const Draw draw = preprocess(builtin.gaussians, look_at(builtin.info.view, builtin.info.size), {}, summary);
   EXPECT_EQ(summary.rejected.total(), 0u);
-  const double visible = static_cast<double>(draw.splats.size()) / static_cast<double>(builtin.gaussians.size());
-  EXPECT_GE(visible, marks.least_visible);
-  EXPECT_LE(visible, marks.most_visible);
+  EXPECT_LE(draw.splats.size(), 900'000u) << "the most in a view of the paper";
+  EXPECT_GE(draw.splats.size(), builtin.gaussians.size() / 5);
 
 #ifdef VRPIPE_SANITIZED
-  // Two hundred million fragments would take minutes.
+  // A hundred million fragments would take minutes.
   if (gaussians > 400'000) return;
 #endif
-  const testing::ReferenceImage whole = testing::render_reference(draw);
-  testing::ReferenceOptions options;
-  options.termination_threshold = 0.996;
-  const testing::ReferenceImage terminated = testing::render_reference(draw, options);
-  // "every scene shows an average ratio greater than 1.5", and at most nearly 4.4.
-  const double ratio = static_cast<double>(whole.fragments_blended) / static_cast<double>(terminated.fragments_blended);
-  EXPECT_GT(ratio, 1.5);
-  EXPECT_LT(ratio, 4.4);
-  std::size_t filled = 0;
-  for (const auto& rgba : whole.rgba) filled += rgba[3] > 0.9;
-  const double share = static_cast<double>(filled) / static_cast<double>(whole.rgba.size());
+  const testing::DrawStatistics statistics = testing::statistics_of(draw);
+  expect_as_trained(statistics, builtin.info.stands_for->kind);
+  expect_in(kElongationMedian, statistics.elongation_median, "elongation, median");
+  expect_in(kElongation99, statistics.elongation_99, "elongation, 99 %");
+  EXPECT_GE(statistics.fall_of_fragments_a_quad(), marks.least_fall);
   const bool synthetic = builtin.info.stands_for->kind == "synthetic";
-  EXPECT_GT(share, synthetic ? 0.3 : 0.95);
-  EXPECT_LT(share, synthetic ? 0.85 : 1.01) << "nothing surrounds a synthetic scene";
+  EXPECT_GT(statistics.filled, synthetic ? 0.3 : 0.95);
+  EXPECT_LT(statistics.filled, synthetic ? 0.85 : 1.01) << "nothing surrounds a synthetic scene";
 }
 
 INSTANTIATE_TEST_SUITE_P(OfThePaper, StandIn,
-                         ::testing::Values(StandInMarks{"kitchen", 0x9e6b56971badd602u, 0.2, 0.7},
-                                           StandInMarks{"bonsai", 0x14f6f015d279800bu, 0.2, 0.7},
-                                           StandInMarks{"train", 0xc4c747089cee785cu, 0.3, 0.8},
-                                           StandInMarks{"truck", 0x1bdfd115323e4387u, 0.2, 0.6},
-                                           StandInMarks{"lego", 0x34212edd6abc4bc8u, 0.9, 1.0},
-                                           StandInMarks{"palace", 0x24d653bc5ac04cabu, 0.9, 1.0}),
+                         ::testing::Values(StandInMarks{"kitchen", 0.08, 0xa39782ea4f5edb9eu},
+                                           StandInMarks{"bonsai", 0.08, 0x7c227b36f4158b08u},
+                                           StandInMarks{"train", 0.08, 0x7d997a49c68dd75eu},
+                                           StandInMarks{"truck", 0.08, 0x39b80b51ff18479fu},
+                                           StandInMarks{"lego", 0.08, 0x42e75f5ea6d5b0f2u},
+                                           StandInMarks{"palace", 0.07, 0x53cae29124e44bd1u}),
                          [](const auto& parameter) { return parameter.param.name; });
 
 TEST(StandIns, AreTheSameWithAnyNumberOfThreads) {

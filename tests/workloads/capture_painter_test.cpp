@@ -13,7 +13,7 @@ const View kView = {{0, 0, -5}, {0, 0, 0}, {0, -1, 0}, 40};
 
 /// A wall before the viewer, and one as large that a third wall hides from all cameras.
 GaussianScene walls(std::uint64_t count, double hidden_share, unsigned threads = 1, int sh_degree = 1) {
-  CapturePainter painter(7, kView, 100, sh_degree);
+  CapturePainter painter(7, kView, 100, kObjectPopulation, sh_degree);
   painter.set_hidden_share(hidden_share);
   painter.quad({-1, -1, 0}, {0, 2, 0}, {2, 0, 0}, plain({0.5, 0.4, 0.3}), Texture());
   painter.block_box({0, 0, 0.5}, {50, 50, 0.1});
@@ -38,7 +38,7 @@ TEST(CapturePainter, HasFewWhereNoCameraLooks) {
 }
 
 TEST(CapturePainter, AnotherCameraThatSeesItChangesThat) {
-  CapturePainter painter(7, kView, 100, 0);
+  CapturePainter painter(7, kView, 100, kObjectPopulation, 0);
   painter.set_hidden_share(0);
   painter.quad({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, plain({0.5, 0.4, 0.3}), Texture());  // turned away
   EXPECT_THROW(painter.build(100), std::invalid_argument);
@@ -76,8 +76,58 @@ TEST(CapturePainter, MoreGaussiansAreSmaller) {
   EXPECT_NEAR(median(walls(10000, 1.0)) - median(walls(40000, 1.0)), std::log(2.0), 0.05);
 }
 
+TEST(CapturePainter, HasFewerWhereFewerCamerasLook) {
+  // Two walls back to back, far from a camera before one and three before the other.
+  CapturePainter painter(7, {{0, 0, -100}, {0, 0, 0}, {0, -1, 0}, 40}, 100, kObjectPopulation, 0);
+  for (const double x : {-1.0, 0.0, 1.0}) painter.camera({x, 0, 100});
+  painter.set_hidden_share(0);
+  Texture smooth;
+  smooth.depth = 0;
+  painter.quad({-1, -1, -1}, {0, 2, 0}, {2, 0, 0}, plain({0.5, 0.4, 0.3}), smooth);
+  painter.quad({-1, -1, 1}, {2, 0, 0}, {0, 2, 0}, plain({0.5, 0.4, 0.3}), smooth);
+  EXPECT_NEAR(static_cast<double>(behind(painter.build(20000))), 15000, 600);
+}
+
+TEST(CapturePainter, SplatsAreLargerOnWhatIsSeenAtASlant) {
+  const auto count_of_floor = [](double height) {
+    CapturePainter painter(7, {{0, -height, -100}, {0, 0, 0}, {0, -1, 0}, 40}, 100, kObjectPopulation, 0);
+    Texture smooth;
+    smooth.depth = 0;
+    painter.quad({-1, -1, 1}, {0, 2, 0}, {2, 0, 0}, plain({0.5, 0.4, 0.3}), smooth);
+    painter.quad({-1, -1, -1}, {0, 0, 1.6}, {2.5, 0, 0}, plain({0.5, 0.4, 0.3}), smooth);
+    return 20000 - behind(painter.build(20000));
+  };
+  // As many pixels, as many splats: the sine of the angle.
+  EXPECT_NEAR(static_cast<double>(count_of_floor(100)), 10000, 500);
+  EXPECT_NEAR(static_cast<double>(count_of_floor(20)), 20000 * 0.2 / 1.2, 700);
+}
+
+TEST(CapturePainter, PaintsAllOfAThinPoleThatIsFarAway) {
+  CapturePainter painter(7, {{0, 0, -50}, {0, 0, 0}, {0, -1, 0}, 40}, 100, kObjectPopulation, 0);
+  painter.surface(frustum_surface({0, 0, 0}, {0, 8, 0}, 0.1, 0.1), plain({0.5, 0.4, 0.3}), Texture());
+  const GaussianScene scene = painter.build(800);
+  std::vector<int> of_metre(9);
+  for (std::uint64_t i = 0; i < scene.size(); ++i) {
+    ++of_metre[static_cast<std::size_t>(std::min(8.0f, std::max(0.0f, -scene[i].position()[1])))];
+  }
+  for (std::size_t metre = 0; metre < 8; ++metre) EXPECT_NEAR(of_metre[metre], 100, 60) << metre;
+}
+
+TEST(CapturePainter, LargeSplatsAreFainter) {
+  const GaussianScene scene = walls(20000, 1.0);
+  double size = 0, logit = 0, product = 0;
+  const auto count = static_cast<double>(scene.size());
+  for (std::uint64_t i = 0; i < scene.size(); ++i) {
+    const double along_normal = scene[i].log_scale()[2];  // no edge limits it
+    size += along_normal / count;
+    logit += scene[i].opacity_logit() / count;
+    product += along_normal * scene[i].opacity_logit() / count;
+  }
+  EXPECT_LT(product - size * logit, -0.1);
+}
+
 TEST(CapturePainter, FloatersAreExtraAndExact) {
-  CapturePainter painter(7, kView, 100, 0);
+  CapturePainter painter(7, kView, 100, kObjectPopulation, 0);
   painter.quad({-1, -1, 0}, {0, 2, 0}, {2, 0, 0}, plain({0.5, 0.4, 0.3}), Texture());
   painter.floaters({0, 100, 0}, {1, 1, 1}, 40, 1);
   const GaussianScene scene = painter.build(500);

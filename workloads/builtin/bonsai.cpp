@@ -16,10 +16,10 @@ void paint_bonsai(CapturePainter& painter) {
   painter.ring_of_cameras({0, 1.65, 0}, 0.9, 4);
   Texture wall;
   wall.size = 1.7;
-  wall.layers = 60;
+  wall.layers = 66;
   wall.gloss = 0.03;
   Texture thing;
-  thing.layers = 54;
+  thing.layers = 58;
   thing.gloss = 0.08;
   thing.size = 1.1;
   Texture fine = thing;
@@ -91,7 +91,6 @@ void paint_bonsai(CapturePainter& painter) {
                       {6, {0.09, 1.25, 0.05}, {0.08, 0.035, 0.07}},   {6, {0.0, 1.32, 0.0}, {0.07, 0.035, 0.06}}};
   Texture leaves = fine;
   leaves.layers = 40;
-  leaves.opaque = 0.5;
   leaves.size = 0.6;
   const Paint leaf = [](const Vec3& p, double u, double) {
     return mix({0.05, 0.15, 0.04}, {0.40, 0.60, 0.16}, 0.45 * u + 0.75 * fractal_noise(p * 75.0, 2) - 0.15);

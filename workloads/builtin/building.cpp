@@ -204,7 +204,6 @@ void paint_building(CapturePainter& painter) {
   // Trees along the roads, a wood behind.
   Texture leaves = solid;
   leaves.layers = 22;
-  leaves.opaque = 0.4;
   const auto plant = [&](double x, double z, double key) {
     tree(painter, {x, 0, z}, 9 + 6 * hash_fraction(key, 51), key, leaves, solid);
   };
@@ -220,7 +219,7 @@ void paint_building(CapturePainter& painter) {
   Texture heaven;
   heaven.size = 4;
   heaven.layers = 24;
-  sky(painter, 900, 0.4, heaven);
+  sky(painter, 900, 0.4, 1, heaven);
   painter.floaters({0, 30, 0}, {150, 25, 150}, 3000, 1.2);
 }
 

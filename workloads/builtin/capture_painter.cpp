@@ -17,8 +17,6 @@
 namespace vrpipe {
 namespace {
 
-/// Mean area of a splat's box over the square of its median sigma, for the sizes and opacities of splat().
-constexpr double kCaptureBoxArea = 80.0;
 /// Median sigma, pixels, at scale 1: patches are laid out for it.
 constexpr double kSigma = 2.0;
 /// Side of a patch, in sigmas.
@@ -42,13 +40,28 @@ double bell(RandomStream& random) {
 
 }  // namespace
 
+// Median opacities of 0.93, 0.73 and 0.70; of a tenth of all at most 0.27, 0.13 and 0.20.
+const Population kOutdoorPopulation{2.2, 1.6, 3.0, 1.9, 0.5, 0.5, 0.16};
+const Population kIndoorPopulation{0.65, 1.45, 3.2, 1.4, 0.62, 0.5, 0.16};
+const Population kObjectPopulation{0.45, 1.15, 4.5, 0.8, 0.35, 0.64, 0.1};
+
+double Population::box_area() const {
+  // Weighted by area, the logarithm of the size is normal as well, its mean two variances higher.
+  const double typical = logit - 2 * size_deviation * logit_by_size;
+  const double opacity = 1 / (1 + portable_exp(-typical));
+  const double reach_squared = 2 * std::max(0.5, portable_log(255 * opacity));
+  return 4 * reach_squared * portable_exp(2 * size_deviation * size_deviation + axis_deviation * axis_deviation);
+}
+
 struct CapturePainter::Tools {
   BlockerTree blockers;
 };
 
-CapturePainter::CapturePainter(std::uint64_t seed, const View& view, std::uint32_t height, int sh_degree)
+CapturePainter::CapturePainter(std::uint64_t seed, const View& view, std::uint32_t height, const Population& population,
+                               int sh_degree)
     : seed_(seed),
       random_(seed),
+      population_(population),
       sh_degree_(sh_degree),
       pixel_angle_(2.0 * portable_tan_degrees(0.5 * view.fovy_degrees) / height) {
   if (sh_degree != 0 && sh_degree != 1) throw std::invalid_argument("CapturePainter: SH degree 0 or 1");
@@ -115,25 +128,26 @@ void CapturePainter::cloud(const Vec3& centre, const Vec3& radii, const Paint& p
 void CapturePainter::floaters(const Vec3& centre, const Vec3& half, std::uint64_t count, double size) {
   Texture texture;
   texture.size = size;
-  texture.opaque = 0;
-  texture.faint = 0.9;
+  texture.logit = -3;
   texture.emission = 1;
   strokes_.push_back({Kind::floaters, {}, plain({0.7, 0.7, 0.72}), texture, centre, half, count});
 }
 
-double CapturePainter::nearest_camera(const Vec3& position) const {
-  double least = 1e300;
+double CapturePainter::distance_of_cameras(const Vec3& position, const Vec3& normal) const {
+  double sum = 0;
   for (const Vec3& camera : cameras_) {
     const Vec3 offset = camera - position;
-    least = std::min(least, dot(offset, offset));
+    const double squared = std::max(0.09, dot(offset, offset));
+    const double facing = std::fabs(dot(offset, normal)) / std::sqrt(squared);
+    sum += (normal == Vec3{} ? 0.5 : std::max(0.02, facing)) / squared;
   }
-  return std::max(0.3, std::sqrt(least));
+  return std::sqrt(static_cast<double>(cameras_.size()) / sum);
 }
 
 void CapturePainter::divide(std::uint32_t stroke, double u, double v, double du, double dv, int depth,
                             std::vector<Cell>& cells) const {
   const Stroke& s = strokes_[stroke];
-  const Vec3 middle = s.surface(u + 0.5 * du, v + 0.5 * dv).position;
+  const SurfacePoint middle = s.surface(u + 0.5 * du, v + 0.5 * dv);
   const auto length = [&](double u0, double v0, double u1, double v1) {
     return glm::length(s.surface(u1, v1).position - s.surface(u0, v0).position);
   };
@@ -141,11 +155,12 @@ void CapturePainter::divide(std::uint32_t stroke, double u, double v, double du,
   const double um = u + 0.5 * du, vm = v + 0.5 * dv;
   const double along_u = length(u, vm, um, vm) + length(um, vm, u + du, vm);
   const double along_v = length(um, v, um, vm) + length(um, vm, um, v + dv);
-  const double distance = nearest_camera(middle);
+  const double distance = distance_of_cameras(middle.position, s.kind == Kind::quad ? middle.normal : Vec3{});
   const double side = kPatch * kSigma * s.texture.size * pixel_angle_ * distance;
-  // A closed curve seen from two points may look short.
-  if (depth < 2 || (std::max(along_u, along_v) > side && depth < 24)) {
-    if (along_u >= along_v) {
+  // Between the ends of a half or of a whole circle there is no area to see.
+  const bool bent = s.kind == Kind::surface && du > 0.25;
+  if (bent || (std::max(along_u, along_v) > side && depth < 24)) {
+    if (bent || along_u >= along_v) {
       divide(stroke, u, v, 0.5 * du, dv, depth + 1, cells);
       divide(stroke, um, v, 0.5 * du, dv, depth + 1, cells);
     } else {
@@ -159,7 +174,7 @@ void CapturePainter::divide(std::uint32_t stroke, double u, double v, double du,
   const double area = 0.5 * glm::length(cross(diagonal, other));
   const double sigma = kSigma * s.texture.size * pixel_angle_ * distance;
   Cell cell{stroke, u, v, du, dv, distance};
-  cell.weight = s.texture.layers * area / (kCaptureBoxArea * sigma * sigma);
+  cell.weight = s.texture.layers * area / (population_.box_area() * sigma * sigma);
   if (cell.weight > 0) cells.push_back(cell);
 }
 
@@ -183,33 +198,38 @@ SurfacePoint CapturePainter::point(const Stroke& stroke, const Cell& cell, Rando
   return stroke.surface(u, v);
 }
 
+bool CapturePainter::sees(const Vec3& camera, const SurfacePoint& point, const Tools& tools) {
+  const Vec3 ray = camera - point.position;
+  if (dot(ray, point.normal) < -0.05 * glm::length(ray)) return false;
+  // Starts clear of the surface, stops short of the camera.
+  return !tools.blockers.blocks(point.position + ray * 0.004, ray, 0.98);
+}
+
 bool CapturePainter::seen(const SurfacePoint& point, const Tools& tools) const {
-  for (const Vec3& camera : cameras_) {
-    const Vec3 ray = camera - point.position;
-    if (dot(ray, point.normal) < -0.05 * glm::length(ray)) continue;
-    // Starts clear of the surface, stops short of the camera.
-    if (!tools.blockers.blocks(point.position + ray * 0.004, ray, 0.98)) return true;
-  }
-  return false;
+  return std::any_of(cameras_.begin(), cameras_.end(), [&](const Vec3& camera) { return sees(camera, point, tools); });
 }
 
 void CapturePainter::weigh(Cell& cell, RandomStream& random, const Tools& tools) const {
   const Stroke& stroke = strokes_[cell.stroke];
-  if (stroke.kind == Kind::cloud || stroke.kind == Kind::floaters) return;
+  if (stroke.kind == Kind::floaters) return;
   Vec3 low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
   int visible = 0;
+  std::ptrdiff_t views = 0;
   for (int i = 0; i < kProbes; ++i) {
     double u, v;
     const SurfacePoint p = point(stroke, cell, random, u, v);
     const Vec3 colour = stroke.paint(p.position, u, v);
     low = glm::min(low, colour);
     high = glm::max(high, colour);
-    visible += seen(p, tools);
+    const auto from =
+        std::count_if(cameras_.begin(), cameras_.end(), [&](const Vec3& camera) { return sees(camera, p, tools); });
+    visible += from > 0;
+    views += from;
   }
   const Vec3 spread = high - low;
   const double detail = std::max(spread[0], std::max(spread[1], spread[2]));
-  cell.size = 1.45 - 0.8 * std::min(1.0, std::max(0.0, (detail - 0.04) / 0.36));
-  const double share = static_cast<double>(visible) / kProbes;
+  if (stroke.kind != Kind::cloud) cell.size = 1.45 - 0.8 * std::min(1.0, std::max(0.0, (detail - 0.04) / 0.36));
+  const double share = static_cast<double>(views) / (kProbes * static_cast<double>(cameras_.size()));
   cell.weight *= (share + (1 - share) * hidden_share_) / (cell.size * cell.size);
   cell.partly_seen = visible > 0 && visible < kProbes;
 }
@@ -241,15 +261,11 @@ GaussianAttributes CapturePainter::splat(const Stroke& stroke, const Cell& cell,
   if (random.uniform() < texture.behind) along_normal = -10 * std::fabs(along_normal);
   const Vec3 position = point.position + normal * (along_normal * cell.distance);
 
-  // A few splats are much larger and faint.
-  double log_size = portable_log(kSigma * scale * texture.size * cell.size * spacing) + 0.4 * bell(random);
-  double kind = random.uniform();
-  if (random.uniform() < 0.015) {
-    log_size += 1.1;
-    kind = 1 - 0.5 * texture.faint;
-  }
-  double log_t = log_size + 0.55 * bell(random);
-  double log_b = log_size + 0.55 * bell(random);
+  const double deviations = bell(random);
+  const double log_size =
+      portable_log(kSigma * scale * texture.size * cell.size * spacing) + population_.size_deviation * deviations;
+  double log_t = log_size + population_.axis_deviation * bell(random);
+  double log_b = log_size + population_.axis_deviation * bell(random);
 
   // A frame around the normal, which wobbles a little, turned at random about it.
   Vec3 n = normal, t, b;
@@ -283,14 +299,9 @@ GaussianAttributes CapturePainter::splat(const Stroke& stroke, const Cell& cell,
   }
   const std::array<double, 4> q = quaternion(t, b, n);
 
-  double logit;
-  if (kind < texture.opaque) {
-    logit = 3.2 + 1.3 * bell(random);
-  } else if (kind < 1 - texture.faint) {
-    logit = -0.4 + 1.1 * bell(random);
-  } else {
-    logit = -2.6 + 0.8 * bell(random);
-  }
+  const double rank = bell(random);
+  const double logit = population_.logit + texture.logit - population_.logit_by_size * deviations +
+                       (rank < 0 ? population_.logit_below : population_.logit_above) * rank;
 
   GaussianAttributes gaussian;
   gaussian.position = {static_cast<float>(position[0]), static_cast<float>(-position[1]),
@@ -300,7 +311,7 @@ GaussianAttributes CapturePainter::splat(const Stroke& stroke, const Cell& cell,
   }
   gaussian.opacity_logit = static_cast<float>(logit);
   gaussian.log_scale = {static_cast<float>(log_t), static_cast<float>(log_b),
-                        static_cast<float>(log_size + portable_log(texture.thickness) + 0.4 * bell(random))};
+                        static_cast<float>(log_size + portable_log(population_.thickness) + 0.4 * bell(random))};
   for (std::size_t i = 0; i < q.size(); ++i) gaussian.rotation[i] = static_cast<float>(q[i]);
   if (sh_degree_ == 0) return gaussian;
   // Degree 1: brighter when seen along the mirrored sun ray.
@@ -345,7 +356,7 @@ GaussianScene CapturePainter::build(std::uint64_t count, unsigned threads) {
       return;
     }
     Cell cell{index};
-    cell.distance = nearest_camera(stroke.a);
+    cell.distance = distance_of_cameras(stroke.a, {});
     if (stroke.kind == Kind::floaters) {
       cell.count = stroke.count;
       cells.push_back(cell);
@@ -353,7 +364,7 @@ GaussianScene CapturePainter::build(std::uint64_t count, unsigned threads) {
     }
     const double sigma = kSigma * stroke.texture.size * pixel_angle_ * cell.distance;
     const double shadow = kPi * std::max(stroke.b[0], stroke.b[2]) * stroke.b[1];  // about what it covers of the view
-    const double weight = stroke.texture.layers * shadow / (kCaptureBoxArea * sigma * sigma);
+    const double weight = stroke.texture.layers * shadow / (population_.box_area() * sigma * sigma);
     const double parts = std::max(1.0, std::floor(weight / 64));
     cell.weight = weight / parts;
     cells.assign(static_cast<std::size_t>(parts), cell);

@@ -16,10 +16,10 @@ void paint_kitchen(CapturePainter& painter) {
   painter.ring_of_cameras({0, 1.8, 0}, 0.9, 4);
   Texture wall;
   wall.size = 1.5;
-  wall.layers = 60;
+  wall.layers = 75;
   wall.gloss = 0.03;
   Texture thing;
-  thing.layers = 52;
+  thing.layers = 62;
   thing.gloss = 0.10;
   Texture fine = thing;
   fine.size = 0.7;
@@ -59,8 +59,7 @@ void paint_kitchen(CapturePainter& painter) {
     painter.surface(frustum_surface(place, place + Vec3{0, 0.014, 0}, 0.09, 0.135), plain(white), fine);
     const Vec3 glass = place * 0.9 + Vec3{0.17 * (i % 2 == 0 ? 0 : 1), 0.076, 0.17 * (i % 2 == 0 ? 1 : 0)};
     Texture clear = fine;
-    clear.opaque = 0.02;
-    clear.faint = 0.7;
+    clear.logit = -4;
     clear.layers = 16;
     clear.gloss = 0.3;
     painter.surface(frustum_surface(glass, glass + Vec3{0, 0.12, 0}, 0.028, 0.036), plain({0.82, 0.88, 0.90}), clear);

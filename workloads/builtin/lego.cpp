@@ -7,15 +7,13 @@ namespace vrpipe {
 void paint_lego(CapturePainter& painter) {
   painter.set_light({-0.5, 1.2, -0.75}, {0.80, 0.76, 0.68}, {0.46, 0.48, 0.52});
   painter.set_contact_reach(0.25);
-  painter.set_hidden_share(0.2);
   painter.ring_of_cameras({0, 0.9, 0}, 3.8, 8);
   painter.ring_of_cameras({0, 2.9, 0}, 2.6, 5);
   Texture brick;
-  brick.layers = 34;
+  brick.layers = 62;
   brick.gloss = 0.15;
   brick.depth = 0.0006;
   brick.behind = 0.12;
-  brick.opaque = 0.4;
   bulldozer(painter, {0, 0, 0}, 1.0, brick);
   painter.floaters({0, 0.6, 0}, {1.1, 0.6, 0.8}, 300, 1.5);
 }

@@ -13,17 +13,16 @@ namespace vrpipe {
 void paint_palace(CapturePainter& painter) {
   painter.set_light({-0.65, 1.0, -0.5}, {0.84, 0.78, 0.66}, {0.44, 0.47, 0.54});
   painter.set_contact_reach(0.2);
-  painter.set_hidden_share(0.2);
   painter.ring_of_cameras({0, 1.0, 0}, 3.9, 8);
   painter.ring_of_cameras({0, 2.9, 0}, 2.6, 5);
   Texture stone;
-  stone.layers = 34;
+  stone.layers = 78;
   stone.gloss = 0.05;
+  stone.size = 0.75;
   stone.depth = 0.0006;
   stone.behind = 0.12;
-  stone.opaque = 0.4;
   Texture fine = stone;
-  fine.size = 0.75;
+  fine.size = 0.85;
   Texture gilt = fine;
   gilt.gloss = 0.3;
   const Vec3 sand = {0.84, 0.70, 0.50}, pale = {0.93, 0.87, 0.74}, teal = {0.10, 0.50, 0.54}, gold = {0.90, 0.68, 0.20};

@@ -225,7 +225,7 @@ void bulldozer(CapturePainter& painter, const Vec3& origin, double scale, const 
   }
 }
 
-void sky(CapturePainter& painter, double radius, double cloudiness, const Texture& texture) {
+void sky(CapturePainter& painter, double radius, double cloudiness, double circle, const Texture& texture) {
   const Paint air = [=](const Vec3& p, double, double) {
     const Vec3 d = p * (1 / radius);
     const double clouds = fractal_noise({d[0] * 3.2, d[1] * 8 + 7, d[2] * 3.2}, 4);
@@ -236,7 +236,8 @@ void sky(CapturePainter& painter, double radius, double cloudiness, const Textur
   heaven.emission = 1;
   heaven.gloss = 0;
   heaven.behind = 0.3;
-  painter.surface(dome_surface({0, 0, 0}, radius, -0.12, 0.95), air, heaven);
+  const Surface dome = dome_surface({0, 0, 0}, radius, -0.12, 0.6);
+  painter.surface([=](double u, double v) { return dome(0.25 + circle * (u - 0.5), v); }, air, heaven);
 }
 
 }  // namespace vrpipe

@@ -32,7 +32,8 @@ void gable_roof(CapturePainter& painter, const Vec3& centre, double half_x, doub
 /// A model bulldozer of studded bricks on a baseplate, about 2 x 1 x 1.2 units before it is scaled; it faces -x.
 void bulldozer(CapturePainter& painter, const Vec3& origin, double scale, const Texture& texture);
 
-/// The inside of a dome of sky with clouds, blue above and hazy at the horizon.
-void sky(CapturePainter& painter, double radius, double cloudiness, const Texture& texture);
+/// The inside of a dome of sky with clouds, blue above and hazy at the horizon; of a whole circle, that share
+/// in the middle of which z is.
+void sky(CapturePainter& painter, double radius, double cloudiness, double circle, const Texture& texture);
 
 }  // namespace vrpipe

@@ -33,6 +33,11 @@ Entry stand_in(const std::string& name, const std::string& description, ImageSiz
   return {{name, description, size, view, paper}, seed, nullptr, capture, sh_degree, nullptr};
 }
 
+const Population& population_of(const PaperScene& paper) {
+  if (paper.kind == "indoor") return kIndoorPopulation;
+  return paper.kind == "synthetic" ? kObjectPopulation : kOutdoorPopulation;
+}
+
 const std::vector<Entry>& entries() {
   static const std::vector<Entry> all = {
       own("object", "a toy steam locomotive on a grassy base, 800x800, as the synthetic captures", {800, 800},
@@ -110,7 +115,7 @@ BuiltinScene make_builtin_scene(const std::string& name, unsigned threads) {
   const BuiltinSceneInfo& info = entry.info;
   BuiltinScene scene{info, {}, {}};
   if (entry.capture != nullptr) {
-    CapturePainter painter(entry.seed, info.view, info.size.height, entry.sh_degree);
+    CapturePainter painter(entry.seed, info.view, info.size.height, population_of(*info.stands_for), entry.sh_degree);
     entry.capture(painter);
     scene.gaussians = painter.build(info.stands_for->gaussians, threads);
   } else {

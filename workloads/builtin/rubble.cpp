@@ -212,8 +212,7 @@ void paint_rubble(CapturePainter& painter) {
     return fraction((p[0] + p[2]) / 3) < 0.05 ? Vec3{0.30, 0.30, 0.30} : Vec3{0.60, 0.62, 0.64};
   };
   Texture thin = solid;
-  thin.opaque = 0.05;
-  thin.faint = 0.6;
+  thin.logit = -3;
   thin.layers = 16;
   painter.quad({-70, 0, -54}, {140, 0, 0}, {0, 2, 0}, mesh, thin);
   painter.quad({70, 0, 68}, {-140, 0, 0}, {0, 2, 0}, mesh, thin);
@@ -221,7 +220,6 @@ void paint_rubble(CapturePainter& painter) {
   painter.quad({-70, 0, 68}, {0, 0, -122}, {0, 2, 0}, mesh, thin);
   Texture leaves = solid;
   leaves.layers = 22;
-  leaves.opaque = 0.4;
   const auto plant = [&](double x, double z, double number) {
     tree(painter, {x, 0, z}, 7 + 5 * hash_fraction(number, 51), number, leaves, solid);
   };
@@ -238,7 +236,7 @@ void paint_rubble(CapturePainter& painter) {
   Texture heaven;
   heaven.size = 4;
   heaven.layers = 24;
-  sky(painter, 700, 0.4, heaven);
+  sky(painter, 700, 0.4, 1, heaven);
   painter.floaters({0, 20, 0}, {90, 15, 90}, 2000, 1.2);
 }
 

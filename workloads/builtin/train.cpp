@@ -8,23 +8,17 @@ namespace vrpipe {
 // A diesel locomotive with a boxcar on a siding, as at a railway museum. Its nose looks to -z, towards the viewer.
 void paint_train(CapturePainter& painter) {
   painter.set_light({-0.75, 1.0, -0.65}, {0.86, 0.80, 0.68}, {0.46, 0.50, 0.58});
-  painter.ring_of_cameras({0, 2.2, 6}, 10.5, 9);
-  painter.camera({-6, 2.0, 13});
-  painter.camera({6, 2.0, 14});
-  painter.camera({-5, 4.5, 2});
-  painter.camera({-13, 2.0, 12});
-  painter.camera({-12, 2.0, 26});
-  painter.camera({-4, 2.0, -13});
-  painter.camera({-10, 2.0, -17});
-  painter.camera({12, 2.0, -14});
-  painter.camera({5, 2.0, -12});
+  constexpr double kCameras[][2] = {{-6, -2}, {-7, 4}, {0, -8}, {4, -6}, {8, 1}, {-3, -9}, {-7, 12}, {-6, 20}};
+  for (const auto& at : kCameras) painter.camera({at[0], 2.1, at[1]});
   Texture metal;
   metal.gloss = 0.16;
+  metal.layers = 54;
   Texture fine = metal;
-  fine.size = 0.75;
+  fine.size = 1;
   Texture earth;
   earth.gloss = 0.01;
-  earth.size = 1.15;
+  earth.size = 0.95;
+  earth.layers = 66;
   const Vec3 orange = {0.90, 0.36, 0.08}, silver = {0.70, 0.71, 0.72}, black = {0.07, 0.07, 0.08};
 
   // Body with rounded roof edges: below orange, above silver, a black line between; doors, grilles, round windows.
@@ -77,7 +71,9 @@ void paint_train(CapturePainter& painter) {
     if (within(half, 0.05, 0.42) && within(v, 0.22, 0.80)) return mix({0.10, 0.14, 0.18}, {0.50, 0.62, 0.72}, v);
     return within(half, 0.02, 0.46) && within(v, 0.14, 0.88) ? black : silver * 0.9;
   };
-  painter.quad({-1.45, 3.2, 2.25}, {2.9, 0, 0}, {0, 1.15, 0.6}, screen, fine);
+  Texture glass = fine;
+  glass.layers = 150;  // few cameras see it
+  painter.quad({-1.45, 3.2, 2.25}, {2.9, 0, 0}, {0, 1.15, 0.6}, screen, glass);
   for (const double x : {-1.0, 1.0}) {
     const Surface cheek = [=](double u, double v) {
       return SurfacePoint{{1.45 * x, 3.2 + 1.05 * v, 2.8 - 0.55 * (1 - v) * u}, {x, 0, 0}};
@@ -172,9 +168,10 @@ void paint_train(CapturePainter& painter) {
     return mix(dust, mix({0.25, 0.30, 0.10}, {0.55, 0.55, 0.26}, stones), 4 * (patches - 0.46));
   };
   painter.quad({-14, 0, -9}, {0, 0, 50}, {34, 0, 0}, ground, earth);
+  painter.block_box({3, -0.05, 16}, {16.9, 0.02, 24.9});
   Texture wide = earth;
-  wide.size = 2;
-  painter.quad({-70, -0.1, -50}, {0, 0, 140}, {150, 0, 0}, ground, wide);
+  wide.size = 1.2;
+  painter.quad({-70, -0.1, -14}, {0, 0, 104}, {150, 0, 0}, ground, wide);
   for (const double track : {0.0, 6.2}) {
     for (const double x : {-0.74, 0.74}) {
       painter.box(
@@ -188,9 +185,8 @@ void paint_train(CapturePainter& painter) {
 
   // Trees, a shed, poles with wires, hills, sky.
   Texture leaves;
-  leaves.layers = 28;
-  leaves.opaque = 0.4;
-  leaves.size = 0.8;
+  leaves.layers = 34;
+  leaves.size = 1;
   for (int i = 0; i < 9; ++i) {
     const double key = i;
     tree(painter, {-20 + 4.0 * hash_fraction(key, 1), 0, -6 + 7.5 * i}, 6.5 + 4 * hash_fraction(key, 2), key, leaves,
@@ -201,11 +197,6 @@ void paint_train(CapturePainter& painter) {
          earth);
   }
   for (int i = 0; i < 8; ++i) bush(painter, {-7.5 - 3 * hash_fraction(i, 7), 0.3, 1 + 4.5 * i}, 0.9, i, leaves);
-  for (int i = 0; i < 8; ++i) {  // behind the viewer
-    tree(painter, {-24 + 7.0 * i, 0, -24 - 8 * hash_fraction(i, 9)}, 8 + 3 * hash_fraction(i, 10), i + 40, leaves,
-         earth);
-    bush(painter, {-16 + 4.5 * i, 0.3, -14 - 4 * hash_fraction(i, 8)}, 1.0, i + 9, leaves);
-  }
   house(painter, {15, 0, 24}, 3.2, 4.5, 4.2, {0.66, 0.60, 0.48}, {0.42, 0.20, 0.16}, earth);
   for (int i = 0; i < 4; ++i) {
     const double z = 4 + 13.0 * i;
@@ -213,18 +204,16 @@ void paint_train(CapturePainter& painter) {
     painter.box({10, 7.4, z}, {1.0, 0.07, 0.07}, plain({0.30, 0.22, 0.16}), earth);
   }
   Texture far = earth;
-  far.size = 2.2;
+  far.size = 1;
   far.emission = 0.4;
   painter.surface(ellipsoid_surface({-60, -8, 150}, {110, 34, 30}), rough({0.28, 0.36, 0.34}, {0.52, 0.54, 0.44}, 0.1),
                   far);
   painter.surface(ellipsoid_surface({95, -8, 160}, {90, 26, 30}), rough({0.30, 0.38, 0.38}, {0.50, 0.52, 0.46}, 0.1),
                   far);
   Texture heaven;
-  heaven.size = 4;
-  heaven.layers = 34;
-  sky(painter, 230, 0.55, heaven);
-  heaven.layers = 14;
-  sky(painter, 300, 0.3, heaven);
+  heaven.size = 0.65;
+  heaven.layers = 88;
+  sky(painter, 230, 0.55, 0.42, heaven);
   painter.floaters({0, 2.5, 8}, {8, 2.5, 10}, 200, 1.2);
 }
 

@@ -10,21 +10,18 @@ namespace vrpipe {
 void paint_truck(CapturePainter& painter) {
   painter.set_light({-0.55, 1.0, -0.75}, {0.84, 0.79, 0.68}, {0.46, 0.50, 0.57});
   painter.ring_of_cameras({0.4, 1.6, 0}, 5.2, 10);
-  painter.camera({-9, 1.7, -9});
-  painter.camera({9, 1.7, -8});
-  painter.camera({10, 1.7, 7});
-  painter.camera({-10, 1.7, 7});
-  painter.camera({0, 1.7, -15});
-  painter.camera({-14, 1.7, -15});
-  painter.camera({14, 1.7, -15});
-  painter.camera({-17, 1.7, -2});
+  for (const double x : {-14.0, -9.0, -4.0, 4.0, 9.0, 14.0}) painter.camera({x, 1.7, std::fabs(x) < 5 ? -15.0 : -11.0});
   Texture metal;
   metal.gloss = 0.16;
+  metal.layers = 20;
   Texture fine = metal;
-  fine.size = 0.75;
+  fine.size = 1.15;
   Texture ground;
   ground.gloss = 0.01;
-  ground.size = 1.2;
+  ground.size = 1;
+  ground.layers = 88;
+  Texture wall = ground;
+  wall.layers = 39;
   const Vec3 chrome = {0.80, 0.81, 0.83}, black = {0.06, 0.06, 0.07};
   // Faded paint with rust that grows from below.
   const auto faded = [](const Vec3& p) {
@@ -166,9 +163,14 @@ void paint_truck(CapturePainter& painter) {
     }
     return mix(mix({0.13, 0.26, 0.07}, {0.46, 0.56, 0.22}, 1.4 * grain - 0.2), {0.58, 0.52, 0.34}, 3 * (patch - 0.55));
   };
-  painter.quad({-16, 0, -12}, {0, 0, 26}, {34, 0, 0}, land, ground);
+  Texture lawn = ground;
+  lawn.layers = 29;
+  painter.quad({-16, 0, -12}, {0, 0, 13.7}, {34, 0, 0}, land, ground);
+  painter.quad({-16, 0, 1.7}, {0, 0, 12.3}, {34, 0, 0}, land, lawn);
+  painter.block_box({1, -0.04, 1}, {16.9, 0.01, 12.9});
   Texture wide = ground;
-  wide.size = 2.2;
+  wide.size = 1.4;
+  wide.layers = 32;
   painter.quad({-70, -0.06, -60}, {0, 0, 130}, {140, 0, 0}, land, wide);
   painter.box({1, 0.06, 1.82}, {17, 0.06, 0.11}, plain({0.62, 0.60, 0.57}), ground);
 
@@ -178,14 +180,13 @@ void paint_truck(CapturePainter& painter) {
   for (int i = 0; i < 5; ++i) {
     const double key = i;
     house(painter, {-21 + 10.2 * i, 0, 14.5 + 2 * hash_fraction(key, 1)}, 3.9, 3.6, 3.2 + 2.8 * (i % 2), walls[i],
-          i % 2 == 0 ? Vec3{0.44, 0.22, 0.17} : Vec3{0.30, 0.29, 0.31}, ground);
+          i % 2 == 0 ? Vec3{0.44, 0.22, 0.17} : Vec3{0.30, 0.29, 0.31}, wall);
     house(painter, {-20 + 10.6 * i, 0, -22 - 2 * hash_fraction(key, 2)}, 3.9, 3.6, 3.2 + 2.8 * ((i + 1) % 2),
-          walls[(i + 2) % 5], {0.36, 0.26, 0.22}, ground);
+          walls[(i + 2) % 5], {0.36, 0.26, 0.22}, wall);
   }
   Texture leaves;
-  leaves.layers = 20;
-  leaves.opaque = 0.4;
-  leaves.size = 1.1;
+  leaves.layers = 56;
+  leaves.size = 1;
   for (int i = 0; i < 7; ++i) {
     tree(painter, {-17.0 + 6.8 * i + 2 * hash_fraction(i, 3), 0, 6.2 + 1.5 * hash_fraction(i, 4)},
          5.5 + 3 * hash_fraction(i, 5), i, leaves, ground);
@@ -212,11 +213,9 @@ void paint_truck(CapturePainter& painter) {
     painter.box({x, 6.0, 1.6}, {0.12, 0.06, 0.5}, plain({0.40, 0.42, 0.42}), fine);
   }
   Texture heaven;
-  heaven.size = 4;
-  heaven.layers = 30;
-  sky(painter, 160, 0.45, heaven);
-  heaven.layers = 12;
-  sky(painter, 220, 0.3, heaven);
+  heaven.size = 1;
+  heaven.layers = 106;
+  sky(painter, 160, 0.45, 1, heaven);
   painter.floaters({0, 2.0, 0}, {7, 1.8, 6}, 400, 1.2);
 }
 
