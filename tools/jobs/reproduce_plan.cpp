@@ -145,7 +145,9 @@ void choose_parameters(const ReproduceOptions& options, ReproducePlan& plan) {
   }
   if (options.quick) return;
   std::set<std::string> seen;
+  const bool is_papers = options.base.platform == &platforms().front();
   for (const std::string& settings : front_ends()) {
+    if (!settings.empty() && !is_papers) continue;
     if (seen.insert(settings).second && is_kept(settings)) plan.trials.push_back(settings);
   }
   for (const PaperRow& row : options.rows) {

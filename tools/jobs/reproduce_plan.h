@@ -90,7 +90,7 @@ struct ReproducePlan {
   std::vector<SensitivityParameter> parameters;  ///< that are varied, with the values that the platform knows
   std::vector<std::string> fragment_settings;    ///< that could move fragments a quad
   std::vector<PaperRow> rows;
-  /// The default, front_ends() and the settings of reasons, with which rows are judged again; none in a quick look.
+  /// The default, front_ends() if it is the paper's GPU, and the settings of reasons, with which rows are judged again; none in a quick look.
   std::vector<std::string> trials;
   std::vector<SkippedSetting> skipped;
 

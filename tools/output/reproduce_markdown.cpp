@@ -47,7 +47,8 @@ std::string reproduction_markdown(const Reproduction& of) {
       " --markdown docs/reproduction.md\n```\n\n"
       "`--quick` takes less than three minutes, `--html FILE` writes a page with plots and heat maps, `--scene "
       "train=FILE` takes a\n"
-      "trained model. What was done of an interrupted run is not done again. The rows are\n"
+      "trained model, `--beside NAME=FILE` shows a scene of yours beside the paper's. What was done of an interrupted "
+      "run is not done again. The rows are\n"
       "[a file](../tools/jobs/paper_rows.toml): what the paper says and where, how it is measured and judged here, and "
       "what may explain\n"
       "a difference; `--rows FILE` takes one of yours.\n\n";

@@ -137,9 +137,13 @@ std::string why_text(const RowFinding& row) {
 std::vector<std::string> reproduction_heading(const Reproduction& of) {
   const ReproducePlan& plan = of.result.plan;
   const RunRequest& base = plan.points.front().request;
-  std::vector<std::string> files;
+  std::vector<std::string> files, beside;
   for (const PlannedScene& scene : plan.scenes) {
-    if (scene.request.rfind("builtin:", 0) != 0) files.push_back(printable(scene_name(scene.request)));
+    if (scene.role == PlannedScene::Role::beside) {
+      beside.push_back(scene.name);
+    } else if (scene.request.rfind("builtin:", 0) != 0) {
+      files.push_back(printable(scene_name(scene.request)));
+    }
   }
   const char* const judged =
       "Only rows that could have failed are judged; inputs come out as they went in, and some rows follow from others. "
@@ -148,9 +152,14 @@ std::vector<std::string> reproduction_heading(const Reproduction& of) {
   std::vector<std::string> lines{
       fmt::format("{}, {} fidelity, {}, {} simulations.", base.platform->name, vrpipe::name_of(plan.fidelity),
                   vrpipe::name_of(base.format), plan.points.size()),
-      files.empty() ? "Scenes: stand-ins for the paper's, with the same size and number of Gaussians; none is trained."
-                    : fmt::format("Scenes: stand-ins, none of them trained, but for {}.", fmt::join(files, ", ")),
+      files.empty()
+          ? "Scenes: stand-ins for the paper's, with the same size and number of Gaussians, like trained scenes "
+            "to the pipeline (docs/scenes.md); none is trained."
+          : fmt::format("Scenes: stand-ins, none of them trained, but for {}.", fmt::join(files, ", ")),
       tolerance_text(plan.rows), judged, "What only the paper's pictures show is not compared."};
+  if (!beside.empty()) {
+    lines.insert(lines.begin() + 2, fmt::format("Beside them, in no row and no mean: {}.", fmt::join(beside, ", ")));
+  }
   if (plan.quick) {
     lines.emplace_back(fmt::format(
         "Quick look: at {} instead of cycle, {} views a scene, no large ones, one number of passes, no "
