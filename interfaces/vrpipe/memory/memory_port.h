@@ -149,8 +149,8 @@ class MemoryPort : private tlm::tlm_bw_transport_if<>, private tlm::tlm_mm_inter
   Ring<Completion> completions_;  ///< by cycle
   Cycle next_completion_ = never;
   const Access* requesting_ = nullptr;  ///< BEGIN_REQ without END_REQ yet
-  Cycle requesting_until_ =
-      0;  ///< `never` until then; after a late END_REQ, the next cycle: the order of ticks does not matter
+  /// `never` until then; after a late END_REQ, the next cycle: the order of ticks does not matter.
+  Cycle requesting_until_ = 0;
 };
 
 [[gnu::always_inline]] inline void ClockedTarget::respond(const Asker& asker, Cycle at, Cycle present) {
