@@ -62,8 +62,8 @@ TEST(Interval, WithPaddingEverySampleThatIsCertainlyVisibleIsBlended) {
         const I v = (dy * I(splat.ax) - dx * I(splat.ay)) * I(splat.r) / det;
         const I exponent = -(square(u) + square(v)) / 2.0;
         // 2^-20: the shader's single precision and its two ulp of exponential.
-        const I weight = I(splat.opacity) * I(std::exp(exponent.lower()), std::exp(exponent.upper())) *
-                         I(1 - 0x1p-20, 1 + 0x1p-20);
+        const I weight =
+            I(splat.opacity) * I(std::exp(exponent.lower()), std::exp(exponent.upper())) * I(1 - 0x1p-20, 1 + 0x1p-20);
         for (std::size_t k = 0; k < fragments.size(); ++k) {
           const bool blended = !fragments[k][std::size_t{y} * 64 + x].empty();
           if (weight.lower() >= static_cast<double>(one_255th)) {

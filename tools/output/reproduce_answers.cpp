@@ -92,12 +92,12 @@ Answer efficiency_answer(const Reproduction& of) {
     (het >= nearly_all ? bound_by_crop : others)
         .push_back(fmt::format("{} ({:.0f} and {:.0f} %)", answer_title(of, scene), 100 * het, 100 * both));
   }
-  if (!bound_by_crop.empty()) {
-    text += fmt::format("CROP bounds all of the frame in {}. ", fmt::join(bound_by_crop, ", "));
-  }
+  text += fmt::format("CROP bounds all of the frame in {}. ",
+                      bound_by_crop.empty() ? "none" : fmt::format("{}", fmt::join(bound_by_crop, ", ")));
   if (!others.empty()) {
     text += fmt::format(
-        "In {} it does not: where nearly every quad is killed, the front end bounds that part of the frame. ",
+        "It does not in {}: where nearly every quad is killed, the front end or the z-cache bounds that part of the "
+        "frame. ",
         fmt::join(others, ", "));
   }
   const std::vector<StudyPoint>& indoor = of.findings.indoor_efficiency;

@@ -85,10 +85,12 @@ std::string reproduction_markdown(const Reproduction& of) {
       "`measured`, `measured_number`, `difference_percent`, `verdict`, `reason`, `tried`: of each reason its text, "
       "`setting`, `measure` or `row`, what was `measured` with it and whether it `is_shown`; null where there is "
       "none |\n"
-      "| `scenes`, `large_scenes` | `runs` of the four variants with counts, utilisation and bottleneck; speed-ups; of "
+      "| `scenes`, `large_scenes`, `scenes_beside` | `runs` of the four variants with counts, utilisation and "
+      "bottleneck; speed-ups; of "
       "the six "
       "also ratios by view, fragments a pixel, passes |\n"
       "| `sensitivity` | `parameters`, the greatest spread first, `checks`, `not_tried` |\n"
+      "| `front_ends` | of each its `rows`, how many `agree`, and `means` over the six scenes |\n"
       "| `main`, `efficiency`, `fragments_per_quad`, `answers` | of the riddles |\n"
       "| `microbenchmarks` | figures of each |\n\n";
   while (text.size() > 1 && text[text.size() - 2] == '\n') text.pop_back();
