@@ -54,6 +54,10 @@ const Platform& platform_named(const std::string& name) {
     if (platform.name == name) return platform;
     names.push_back(platform.name);
   }
+  if (name == "agx-orin-lpddr3") {
+    throw UserError("unknown platform '" + name + "'", "--platform", "agx-orin has its memory now",
+                    "give agx-orin; what that was is agx-orin-ideal-memory");
+  }
   throw UserError("unknown platform '" + name + "'", "--platform", "there is no such platform",
                   "did you mean " + nearest_name(name, names) + "? `vrpipe platforms` lists all");
 }

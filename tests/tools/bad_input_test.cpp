@@ -160,6 +160,7 @@ TEST_F(BadInput, Cameras) {
 
 TEST_F(BadInput, Machines) {
   refused_with_outputs({"run", "--platform", "agx-orim"}, {"'agx-orim'", "did you mean agx-orin?"});
+  refused_with_outputs({"run", "--platform", "agx-orin-lpddr3"}, {"agx-orin has its memory now; give agx-orin"});
   refused_with_outputs({"run", "--variant", "hett"}, {"'hett'", "het+qm"});
   refused_with_outputs({"run", "--fidelity", "exact"}, {"'exact'", "There are functional, bound, lt, cycle"});
   refused_with_outputs({"run", "--format", "rgb10"}, {"'rgb10'", "rgba16f"});

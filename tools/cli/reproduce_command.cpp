@@ -64,8 +64,8 @@ class ReproduceCommand : public Command {
                          "can be repeated",
                          scene_group);
     arguments.add_option("--beside", beside_, "NAME=FILE",
-                         "a scene of your own beside the paper's, e.g. mine=model.ply: in no row, but wherever\n"
-                         "variants and settings are compared; can be repeated",
+                         "a scene of your own beside the paper's, e.g. mine=model.ply: in no row,\n"
+                         "but wherever variants and settings are compared; can be repeated",
                          scene_group);
     arguments.add_option("--camera", cameras_, "NAME=FILE[#CAMERA]",
                          "cameras of such a model; the views are of this file, too; can be repeated", scene_group);
