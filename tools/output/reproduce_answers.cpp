@@ -112,9 +112,9 @@ Answer efficiency_answer(const Reproduction& of) {
     }
     text += fmt::format("{}. ", fmt::join(candidates, "; "));
   }
-  for (const Reproduction::FrontEnd& front_end : of.front_ends()) {
-    if (front_end.trial->settings.empty()) continue;
-    text += fmt::format("With the front end of {} {}. ", front_end.name, efficiencies(front_end.trial->means));
+  for (const Reproduction::FrontEnd& front_end : of.front_ends) {
+    if (front_end.settings.empty()) continue;
+    text += fmt::format("With the front end of {} {}. ", front_end.name, efficiencies(front_end.means));
   }
   text += nearest_text(of);
   text +=

@@ -135,12 +135,12 @@ Json reproduction_json(const Reproduction& of) {
           {"large_scenes", each(of.findings.large, scene)},
           {"scenes_beside", each(of.findings.beside, scene)},
           {"main", study_json(of.findings.main)},
-          {"front_ends", each(of.front_ends(),
+          {"front_ends", each(of.front_ends,
                               [&](const Reproduction::FrontEnd& front_end) -> Json {
                                 return {{"name", front_end.name},
                                         {"rows", each(front_end.rows, row_json)},
                                         {"agree", front_end.agree()},
-                                        {"means", study_json(front_end.trial->means)}};
+                                        {"means", study_json(front_end.means)}};
                               })},
           {"sensitivity",
            {{"fidelity", vrpipe::name_of(sensitivity_fidelity)},

@@ -73,25 +73,21 @@ std::string short_value(const std::string& settings) {
 }  // namespace
 
 Reproduction reproduction_of(const ReproduceResult& result) {
-  Reproduction of{result, find(result), {}};
+  Reproduction of{result, find(result), {}, {}};
   of.rows = find_rows(result, of.findings);
+  for (const std::string& settings : front_ends()) {
+    const TrialFinding* const trial = of.findings.trial(settings);
+    if (trial == nullptr) continue;
+    const std::string name =
+        settings.empty() ? result.plan.points.front().request.platform->name : short_value(settings);
+    of.front_ends.push_back({name, settings, trial->means, find_rows_with(*trial, result)});
+  }
   return of;
 }
 
 std::size_t Reproduction::FrontEnd::agree() const {
   return static_cast<std::size_t>(
       std::count_if(rows.begin(), rows.end(), [](const RowFinding& row) { return row.verdict == Verdict::agrees; }));
-}
-
-std::vector<Reproduction::FrontEnd> Reproduction::front_ends() const {
-  std::vector<FrontEnd> all;
-  for (const std::string& settings : tools::front_ends()) {
-    const TrialFinding* const trial = findings.trial(settings);
-    if (trial == nullptr) continue;
-    all.push_back({settings.empty() ? result.plan.points.front().request.platform->name : short_value(settings), trial,
-                   find_rows_with(*trial, result)});
-  }
-  return all;
 }
 
 bool fits_both(const StudyPoint& point) {
@@ -212,7 +208,7 @@ ReportTable scenes_table(const Reproduction& of) {
 
 ReportTable front_ends_table(const Reproduction& of) {
   ReportTable table;
-  const std::vector<Reproduction::FrontEnd> all = of.front_ends();
+  const std::vector<Reproduction::FrontEnd>& all = of.front_ends;
   if (all.size() < 2) return table;
   table.title = "Front ends";
   table.heading = {"id", "what", "paper"};
@@ -229,9 +225,9 @@ ReportTable front_ends_table(const Reproduction& of) {
     });
   }
   add({"", "HET, % of what its quads suggest", percent(paper_het_efficiency())},
-      [](const auto& front_end) { return percent(front_end.trial->means.het_efficiency()); });
+      [](const auto& front_end) { return percent(front_end.means.het_efficiency()); });
   add({"", "HET+QM, % of what its quads suggest", percent(paper_het_qm_efficiency())},
-      [](const auto& front_end) { return percent(front_end.trial->means.het_qm_efficiency()); });
+      [](const auto& front_end) { return percent(front_end.means.het_qm_efficiency()); });
   add({"", "rows that agree", ""},
       [](const auto& front_end) { return fmt::format("{} of {}", front_end.agree(), front_end.rows.size()); });
   table.note = fmt::format("Of the six scenes, at {}; docs/open-parameters.md says what they are.",

@@ -17,12 +17,12 @@ struct Reproduction {
 
   /// Rows judged with one of front_ends().
   struct FrontEnd {
-    std::string name;
-    const TrialFinding* trial;
+    std::string name, settings;
+    StudyPoint means;  ///< of the six scenes
     std::vector<RowFinding> rows;
     std::size_t agree() const;
   };
-  std::vector<FrontEnd> front_ends() const;
+  std::vector<FrontEnd> front_ends;
 };
 /// From the points alone.
 Reproduction reproduction_of(const ReproduceResult& result);
