@@ -4,91 +4,127 @@
 
 namespace vrpipe {
 
-std::uint64_t BandwidthReservation::forget(Cycle present) {
-  const std::uint64_t oldest = (present - std::min(present, remembered_cycles)) * per_cycle_.value();
-  while (tail_ != head_ && gap(0).end <= oldest) ++head_;
-  return oldest;
+namespace {
+
+/// Bits from one on, and below another, of a word: `to` is in it, or the first of the next.
+std::uint64_t bits(Cycle from, Cycle to) {
+  const std::uint64_t from_on = ~std::uint64_t{0} << (from % 64);
+  return to % 64 == 0 ? from_on : from_on & ~(~std::uint64_t{0} << (to % 64));
 }
 
-void BandwidthReservation::make_room(Cycle present) {
-  forget(present);
-  if (2 * gaps() <= gaps_.size()) return;
-  std::vector<Gap> larger(2 * gaps_.size());
-  const std::size_t count = gaps();
-  for (std::size_t i = 0; i < count; ++i) larger[i] = gap(i);
-  gaps_ = std::move(larger);
-  mask_ = gaps_.size() - 1;
-  head_ = 0;
-  tail_ = count;
+Cycle next_word(Cycle cycle) { return (cycle / 64 + 1) * 64; }
+
+}  // namespace
+
+void BandwidthReservation::forget_before(Cycle cycle) {
+  const Cycle until = std::min(cycle, kept_from_ + kept_cycles());
+  for (Cycle word = kept_from_; word < until; word += 64) word_of(word) = {};
+  kept_from_ = cycle;
 }
 
-std::size_t BandwidthReservation::first_gap_after(std::uint64_t byte) const {
-  std::size_t low = 0;
-  std::size_t high = gaps();
-  while (low < high) {
-    const std::size_t middle = (low + high) / 2;
-    if (gap(middle).end > byte) {
-      high = middle;
-    } else {
-      low = middle + 1;
-    }
+void BandwidthReservation::make_room(Cycle until, Cycle present) {
+  if (!is_by_cycle() && used_.empty()) used_.resize(kept_cycles());
+  if (until <= kept_from_ + kept_cycles()) return;
+  const Cycle first = oldest(present) / 64 * 64;
+  if (first > kept_from_) forget_before(first);
+  std::size_t words = words_.size();
+  while (until > kept_from_ + 64 * words) words *= 2;
+  // So that it is not looked at again each time.
+  if (2 * (until - kept_from_) > 64 * words) words *= 2;
+  if (words == words_.size()) return;
+  std::vector<Word> more(words);
+  std::vector<std::uint32_t> used_bytes(used_.empty() ? 0 : 64 * words);
+  for (Cycle word = kept_from_; word < kept_from_ + kept_cycles(); word += 64) {
+    more[word / 64 & (words - 1)] = word_of(word);
+    if (!used_.empty()) std::copy_n(&used(word), 64, &used_bytes[word & (64 * words - 1)]);
   }
-  return low;
+  words_ = std::move(more);
+  used_ = std::move(used_bytes);
 }
 
-void BandwidthReservation::insert(std::size_t index, const Gap& inserted) {
-  const std::size_t count = gaps();
-  if (index < count / 2) {
-    --head_;
-    for (std::size_t i = 0; i < index; ++i) gap(i) = gap(i + 1);
-  } else {
-    ++tail_;
-    for (std::size_t i = count; i > index; --i) gap(i) = gap(i - 1);
+void BandwidthReservation::fill(Cycle from, Cycle to) {
+  for (Cycle cycle = from; cycle < to; cycle = next_word(cycle)) {
+    word_of(cycle).full |= bits(cycle, std::min(to, next_word(cycle)));
   }
-  gap(index) = inserted;
 }
 
-void BandwidthReservation::erase(std::size_t index) {
-  const std::size_t count = gaps();
-  if (index < count / 2) {
-    for (std::size_t i = index; i > 0; --i) gap(i) = gap(i - 1);
-    ++head_;
-  } else {
-    for (std::size_t i = index + 1; i < count; ++i) gap(i - 1) = gap(i);
-    --tail_;
+void BandwidthReservation::begin_run(Cycle arrival, Cycle present) {
+  make_room(arrival, present);
+  const Cycle whole = end_ / per_cycle_.value();
+  fill(std::max(run_begin_, kept_from_), whole);
+  const auto rest = static_cast<std::uint32_t>(end_ - whole * per_cycle_.value());
+  if (rest > 0 && whole >= kept_from_) {
+    used(whole) = rest;
+    word_of(whole).partial |= bits(whole, whole + 1);
   }
+  run_begin_ = no_gap_from_ = arrival;
+  end_ = arrival * per_cycle_.value();
+}
+
+Cycle BandwidthReservation::next_with_gap(Cycle cycle) const {
+  for (; cycle < run_begin_; cycle = next_word(cycle)) {
+    const std::uint64_t free = ~word_of(cycle).full & bits(cycle, next_word(cycle));
+    if (free != 0) return std::min(run_begin_, cycle / 64 * 64 + static_cast<unsigned>(__builtin_ctzll(free)));
+  }
+  return run_begin_;
 }
 
 Cycle BandwidthReservation::take_gaps(Cycle arrival, unsigned bytes, Cycle present) {
-  // One gap may be cut in two.
-  if (tail_ - head_ > mask_) make_room(present);
-  const std::uint64_t begin = std::max(arrival * per_cycle_.value(), forget(present));
   std::uint64_t left = bytes;
-  std::uint64_t end = 0;
-  for (std::size_t index = first_gap_after(begin); left > 0 && index < gaps();) {
-    const Gap found = gap(index);
-    const std::uint64_t from = std::max(found.begin, begin);
-    end = std::min(found.end, from + left);
-    left -= end - from;
-    if (from == found.begin && end == found.end) {
-      erase(index);
-      continue;
+  for (Cycle cycle = std::max({arrival, oldest(present), kept_from_});; ++cycle) {
+    const Cycle open = next_with_gap(cycle);
+    if (open == run_begin_) {
+      no_gap_from_ = std::min(cycle, run_begin_);
+      break;
     }
-    if (from > found.begin && end < found.end) insert(index++, {found.begin, from});
-    gap(index) = end < found.end ? Gap{end, found.end} : Gap{found.begin, from};
-    ++index;
+    cycle = open;
+    Word& word = word_of(cycle);
+    if (is_by_cycle()) {
+      // As many as follow one another.
+      const Cycle until = std::min({run_begin_, next_word(cycle), cycle + left});
+      const std::uint64_t taken = word.full & bits(cycle, until);
+      const Cycle end = taken == 0 ? until : cycle / 64 * 64 + static_cast<unsigned>(__builtin_ctzll(taken));
+      word.full |= bits(cycle, end);
+      left -= end - cycle;
+      cycle = end - 1;
+    } else {
+      const std::uint64_t bit = bits(cycle, cycle + 1);
+      const std::uint32_t before = (word.partial & bit) != 0 ? used(cycle) : 0;
+      const auto after = static_cast<std::uint32_t>(std::min<std::uint64_t>(before + left, per_cycle_.value()));
+      left -= after - before;
+      const bool is_full = after == per_cycle_.value();
+      (is_full ? word.full : word.partial) |= bit;
+      if (!is_full) used(cycle) = after;
+    }
+    if (left == 0) return cycle + 1;
   }
-  last_gap_end_ = gaps() == 0 ? 0 : gap(gaps() - 1).end;
-  if (left > 0) end = end_ += left;
-  return arrival + per_cycle_.quotient_up(end - arrival * per_cycle_.value());
+  end_ += left;
+  return arrival + per_cycle_.quotient_up(end_ - arrival * per_cycle_.value());
 }
 
 std::uint64_t BandwidthReservation::reserved_from(Cycle cycle) const {
-  const std::uint64_t begin = cycle * per_cycle_.value();
-  if (begin >= end_) return 0;
-  std::uint64_t reserved = end_ - begin;
-  for (std::size_t index = first_gap_after(begin); index < gaps(); ++index) {
-    reserved -= gap(index).end - std::max(gap(index).begin, begin);
+  const std::uint64_t begin = std::max(cycle, run_begin_) * per_cycle_.value();
+  return (end_ > begin ? end_ - begin : 0) + reserved_between(cycle, std::max(cycle, run_begin_));
+}
+
+std::uint64_t BandwidthReservation::reserved_between(Cycle from, Cycle to) const {
+  std::uint64_t reserved = 0;
+  if (to > run_begin_) {
+    const std::uint64_t begin = std::max(from, run_begin_) * per_cycle_.value();
+    const std::uint64_t until = std::min(end_, to * per_cycle_.value());
+    reserved += until > begin ? until - begin : 0;
+    to = run_begin_;
+  }
+  if (from < kept_from_) {
+    reserved += (std::min(to, kept_from_) - std::min(from, to)) * per_cycle_.value();
+    from = kept_from_;
+  }
+  for (Cycle cycle = from; cycle < to; cycle = next_word(cycle)) {
+    const std::uint64_t asked = bits(cycle, std::min(to, next_word(cycle)));
+    const Word& word = word_of(cycle);
+    reserved += static_cast<unsigned>(__builtin_popcountll(word.full & asked)) * per_cycle_.value();
+    for (std::uint64_t partial = word.partial & ~word.full & asked; partial != 0; partial &= partial - 1)
+      reserved += used(cycle / 64 * 64 + static_cast<unsigned>(__builtin_ctzll(partial)));
   }
   return reserved;
 }

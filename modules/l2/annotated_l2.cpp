@@ -114,7 +114,7 @@ std::uint64_t AnnotatedL2::write_back(const LineAccess& done, Bank& bank, Cycle 
 Cycle AnnotatedL2::occupy(Bank& bank, Cycle from, Cycle begin, std::uint32_t bytes) {
   std::uint64_t waits = 0;
   if (begin > from) {
-    const std::uint64_t reserved = bank.time.reserved_from(from) - bank.time.reserved_from(begin);
+    const std::uint64_t reserved = bank.time.reserved_between(from, begin);
     waits = (begin - from) * sizes_.bank_bytes_per_cycle - reserved;
   }
   bank.bytes += bytes;

@@ -15,8 +15,8 @@ namespace vrpipe {
 /// it. In the order of arrival this is a queue: an access begins when those before it are done. Exact: fractions of a
 /// cycle are kept as bytes.
 ///
-/// Only idle stretches before the furthest reservation are kept, at most one for each access; those that nobody can ask
-/// for any more are forgotten (compare the history lists of Graphite and Sniper, which keep a fixed number).
+/// What is reserved is kept by cycle, from the first that anybody can ask for up to the last run of reservations without a gap
+/// (compare the history lists of Graphite and Sniper, which keep a fixed number).
 class BandwidthReservation {
  public:
   /// Few ask for cycles further back from the present: what has waited for its time (timed_memory_port.h). They find what
@@ -31,45 +31,50 @@ class BandwidthReservation {
   /// Reserves for an access that arrives in a cycle. `present` is the cycle of the clock, and never decreases. Returns
   /// the first cycle at whose beginning all of its bytes have moved.
   Cycle take(Cycle arrival, unsigned bytes, Cycle present) {
+    if (arrival < no_gap_from_) return take_gaps(arrival, bytes, present);
     const std::uint64_t begin = arrival * per_cycle_.value();
-    if (begin < last_gap_end_) return take_gaps(arrival, bytes, present);
-    if (begin > end_) add_gap(begin, present);
+    if (begin > end_) begin_run(arrival, present);
     end_ += bytes;
     return arrival + per_cycle_.quotient_up(end_ - begin);
   }
 
   /// Bytes reserved from the beginning of a cycle on; one that is forgotten counts as all reserved.
   std::uint64_t reserved_from(Cycle cycle) const;
-  /// Idle stretches that are kept, for tests.
-  std::size_t gaps() const { return tail_ - head_; }
+  /// And before the beginning of another.
+  std::uint64_t reserved_between(Cycle from, Cycle to) const;
+  /// Cycles for which there is room, for tests.
+  std::size_t kept_cycles() const { return 64 * words_.size(); }
 
  private:
-  /// Free bytes, counted from the start of time, `bytes_per_cycle` for each cycle.
-  struct Gap {
-    std::uint64_t begin, end;
-  };
-  Gap& gap(std::size_t index) { return gaps_[(head_ + index) & mask_]; }
-  const Gap& gap(std::size_t index) const { return gaps_[(head_ + index) & mask_]; }
-  /// All bytes up to `begin` that are not reserved yet become a gap.
-  void add_gap(std::uint64_t begin, Cycle present) {
-    if (tail_ - head_ > mask_) make_room(present);
-    gaps_[tail_++ & mask_] = {end_, begin};
-    last_gap_end_ = end_ = begin;
-  }
+  /// All before the cycle that is not reserved yet is a gap.
+  [[gnu::noinline]] void begin_run(Cycle arrival, Cycle present);
   [[gnu::noinline]] Cycle take_gaps(Cycle arrival, unsigned bytes, Cycle present);
-  [[gnu::noinline]] void make_room(Cycle present);
-  std::uint64_t forget(Cycle present);
-  std::size_t first_gap_after(std::uint64_t byte) const;
-  void insert(std::size_t index, const Gap& gap);
-  void erase(std::size_t index);
+  void make_room(Cycle until, Cycle present);
+  void forget_before(Cycle cycle);
+  void fill(Cycle from, Cycle to);
+  /// The first from `cycle` on, and before the run, of which something is free; the run's first if there is none.
+  Cycle next_with_gap(Cycle cycle) const;
+  static Cycle oldest(Cycle present) { return present - (present < remembered_cycles ? present : remembered_cycles); }
+  /// Of 64 cycles.
+  struct Word {
+    std::uint64_t full = 0;     ///< a bit each
+    std::uint64_t partial = 0;  ///< of these `used_` says how much
+  };
+  Word& word_of(Cycle cycle) { return words_[cycle / 64 & (words_.size() - 1)]; }
+  const Word& word_of(Cycle cycle) const { return words_[cycle / 64 & (words_.size() - 1)]; }
+  std::uint32_t& used(Cycle cycle) { return used_[cycle & (64 * words_.size() - 1)]; }
+  std::uint32_t used(Cycle cycle) const { return used_[cycle & (64 * words_.size() - 1)]; }
+  /// Whether a cycle has one byte, so that it is full or free.
+  bool is_by_cycle() const { return per_cycle_.value() == 1; }
 
   Divisor per_cycle_;
-  std::uint64_t end_ = 0;                        ///< of the furthest reservation
-  std::uint64_t last_gap_end_ = 0;               ///< what arrives later finds no gap; 0 for none
-  std::vector<Gap> gaps_ = std::vector<Gap>(8);  ///< a ring, by position; none is empty
-  std::size_t mask_ = 7;
-  std::size_t head_ = 0;
-  std::size_t tail_ = 0;
+  std::uint64_t end_ = 0;  ///< in bytes from the start of time: of the furthest reservation
+  Cycle run_begin_ = 0;    ///< of the reservations up to it that leave no gap
+  Cycle no_gap_from_ = 0;  ///< from here to the furthest reservation nothing is free; at most `run_begin_`
+  Cycle kept_from_ = 0;    ///< cycles from here to `run_begin_` are kept; a multiple of 64
+  // Rings, by cycle. Beyond `run_begin_` words are 0.
+  std::vector<Word> words_ = std::vector<Word>(2);
+  std::vector<std::uint32_t> used_;  ///< bytes, where a cycle has several
 };
 
 }  // namespace vrpipe
