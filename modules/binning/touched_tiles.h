@@ -8,7 +8,7 @@
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/pipeline/payload.h>
 
-#include "binning/binning.h"
+#include "binning.h"
 
 namespace vrpipe {
 

@@ -9,9 +9,10 @@
 
 namespace vrpipe {
 
-/// The time that blocks of threads take on an SM array. A core issues for all of its warps together so many instructions
-/// a cycle at most, each of its warps has the same share of them, and none gets more than its dependent instructions
-/// allow; warps of a block wait for one another behind each batch. A fluid: no instruction has a cycle of its own.
+/// The time that blocks of threads take on an SM array. The warps of a block are spread over the schedulers of its core; a
+/// scheduler issues for all of its warps together so many instructions a cycle at most, each has the same share of them, and
+/// none gets more than its dependent instructions allow; warps of a block wait for one another behind each batch. A
+/// fluid: no instruction has a cycle of its own.
 class SmArray {
  public:
   SmArray(const SmBehaviour::TimingParameters& array, const RenderBehaviour::TimingParameters& kernel);
@@ -30,8 +31,9 @@ class SmArray {
  private:
   std::size_t cores_;
   std::size_t blocks_per_core_;
-  double core_rate_;  ///< thousandths of instructions a cycle, of a core
-  double warp_rate_;  ///< and of a warp
+  std::size_t schedulers_;  ///< of a core
+  double scheduler_rate_;   ///< thousandths of instructions a cycle
+  double warp_rate_;
 };
 
 }  // namespace vrpipe

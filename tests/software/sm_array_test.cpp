@@ -63,6 +63,12 @@ TEST(SmArray, WhenWarpsEndTheOthersHaveTheirShare) {
   EXPECT_DOUBLE_EQ(array_of(1).fluid(blocks), together + 20 * interval);
 }
 
+TEST(SmArray, AWarpStaysWithItsScheduler) {
+  // Warps 0 and 4 of eight blocks, on one scheduler: the other three have nothing to do.
+  const BlockWork block{8, {100'000, 0, 0, 0, 100'000, 0, 0, 0}};
+  EXPECT_DOUBLE_EQ(array_of(1).fluid(std::vector<BlockWork>(8, block)), 16 * 100 / issue);
+}
+
 TEST(SmArray, NothingTakesNoTime) {
   EXPECT_EQ(array_of(4).fluid({}), 0);
   EXPECT_EQ(array_of(4).fluid(std::vector<BlockWork>(5)), 0);
