@@ -1,6 +1,6 @@
 // What software rendering takes on `gh100-gpc`, beside what kernels after the published ones took on the GPU itself, on as
 // many of its SMs: milliseconds of the draw tests/data/measured_draw.spl.xz (tests/data/README.md).
-//   measured_software [--short]
+//   measured_software [--fidelity NAME] [--short]
 // --short takes one splat in two hundred, of which nothing was measured, to see that it works.
 #include <cmath>
 #include <cstdio>
@@ -35,16 +35,17 @@ constexpr MeasuredKernel measurements[] = {
     {"obb", "published", "132", 0.46, 0.63},
 };
 
-void compare(const Draw& draw) {
+void compare(const Draw& draw, Fidelity fidelity) {
   const auto percent = [](double got, double measured) { return 100 * (got / measured - 1); };
   std::printf(
-      "milliseconds                          render                     frame\n"
-      "lists        kernel      SMs     meas.   pred.     %%       meas.   pred.     %%     pairs   host s\n");
+      "%-38srender                     frame\n"
+      "lists        kernel      SMs     meas.   pred.     %%       meas.   pred.     %%     pairs   host s\n",
+      (std::string("milliseconds at ") + name_of(fidelity)).c_str());
   for (const MeasuredKernel& measured : measurements) {
     RunRequest request;
     request.platform = &platform_named("gh100-gpc");
     request.variant = variant_named("baseline");
-    request.fidelity = Fidelity::lt;
+    request.fidelity = fidelity;
     request.settings = {{"binning", "lists", measured.lists}, {"sm", "cores", measured.sms}};
     request.units = {{"render", measured.kernel}};
     const SoftwareResult result = simulate_software(request, *Frame::of(draw), {});
@@ -68,15 +69,26 @@ void compare(const Draw& draw) {
 }  // namespace vrpipe
 
 int main(int argc, char** argv) try {
-  const bool is_short = argc == 2 && std::strcmp(argv[1], "--short") == 0;
-  if (argc > 1 && !is_short) {
-    std::fprintf(stderr, "measured_software: unknown argument %s\n", argv[1]);
+  vrpipe::Fidelity fidelity = vrpipe::Fidelity::lt;
+  bool is_short = false;
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--short") == 0) {
+      is_short = true;
+    } else if (std::strcmp(argv[i], "--fidelity") == 0 && i + 1 < argc) {
+      fidelity = vrpipe::fidelity_named(argv[++i]);
+    } else {
+      std::fprintf(stderr, "measured_software: unknown argument %s\n", argv[i]);
+      return 2;
+    }
+  }
+  if (fidelity == vrpipe::Fidelity::functional) {
+    std::fprintf(stderr, "measured_software: functional has no time\n");
     return 2;
   }
   const vrpipe::testing::UnpackedFile file("measured_draw.spl");
   vrpipe::Draw draw = vrpipe::read_draw_list(file.path()).draw;
   if (is_short) draw.splats.resize(draw.splats.size() / 200);
-  vrpipe::compare(draw);
+  vrpipe::compare(draw, fidelity);
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "measured_software: %s\n", error.what());

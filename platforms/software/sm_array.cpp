@@ -5,6 +5,9 @@
 #include <queue>
 #include <utility>
 
+#include <vrpipe/kernel/accounting.h>
+#include <vrpipe/kernel/ring.h>
+
 namespace vrpipe {
 
 namespace {
@@ -41,20 +44,86 @@ class FluidScheduler {
   std::priority_queue<End, std::vector<End>, std::greater<>> ends_;
 };
 
+/// A block in flight on a core.
+struct ResidentBlock {
+  const BlockWork* block = nullptr;
+  std::size_t batch = 0;
+  std::uint32_t running = 0;  ///< warps before the barrier
+};
+
 struct FluidCore {
-  struct Resident {
-    const BlockWork* block = nullptr;
-    std::size_t batch = 0;
-    std::uint32_t running = 0;  ///< warps before the barrier
-  };
   std::vector<FluidScheduler> schedulers;
-  std::vector<Resident> residents;
+  std::vector<ResidentBlock> residents;
 
   void begin_batch(double now, std::size_t place) {
-    Resident& resident = residents[place];
+    ResidentBlock& resident = residents[place];
     const BlockWork& block = *resident.block;
     for (std::uint32_t warp = 0; warp < block.warps; ++warp) {
       schedulers[warp % schedulers.size()].begin(now, block.instructions[resident.batch * block.warps + warp], place);
+    }
+    resident.running = block.warps;
+  }
+};
+
+/// A scheduler that issues in whole cycles.
+class ClockedScheduler {
+ public:
+  struct Rates {
+    std::uint64_t issue_thousandths, cycles_per_instruction, warp_interval;
+  };
+  void begin(std::uint64_t instructions, std::size_t place) { ready_.push({0, instructions, place}); }
+
+  /// One cycle; `ended` gets the places of blocks of which a warp is at the barrier. Gives the next cycle in which there
+  /// is anything to do.
+  template <class Ended>
+  Cycle tick(Cycle now, const Rates& rates, Ended&& ended) {
+    for (; !waiting_.empty() && waiting_.front().ready_at <= now; waiting_.pop()) {
+      if (waiting_.front().left == 0) {
+        ended(waiting_.front().place);
+      } else {
+        ready_.push(waiting_.front());
+      }
+    }
+    // In parts of a cycle, so that slots are lost evenly.
+    if (!ready_.empty() && next_slot_ <= now * rates.issue_thousandths) {
+      ClockedWarp warp = ready_.front();
+      ready_.pop();
+      --warp.left;
+      warp.ready_at = now + rates.warp_interval;
+      waiting_.push(warp);
+      const std::uint64_t least = now == 0 ? 0 : (now - 1) * rates.issue_thousandths + 1;
+      next_slot_ = std::max(next_slot_, least) + 1000 * rates.cycles_per_instruction;
+    }
+    const Cycle slot = (next_slot_ + rates.issue_thousandths - 1) / rates.issue_thousandths;
+    const Cycle issue = ready_.empty() ? never : std::max(now + 1, slot);
+    return waiting_.empty() ? issue : std::min(issue, waiting_.front().ready_at);
+  }
+
+ private:
+  struct ClockedWarp {
+    Cycle ready_at = 0;
+    std::uint64_t left = 0;  ///< instructions to the barrier
+    std::size_t place = 0;
+  };
+  Ring<ClockedWarp> ready_;    ///< the one that has waited the longest in front
+  Ring<ClockedWarp> waiting_;  ///< for the instruction before, in the order in which those end
+  std::uint64_t next_slot_ = 0;
+};
+
+struct ClockedCore {
+  std::vector<ClockedScheduler> schedulers;
+  std::vector<ResidentBlock> residents;
+  std::vector<Cycle> next;         ///< of each scheduler, in which it has anything to do
+  std::vector<std::size_t> ended;  ///< places of blocks, a warp each, in a cycle
+
+  void begin_batch(Cycle now, std::size_t place) {
+    ResidentBlock& resident = residents[place];
+    const BlockWork& block = *resident.block;
+    for (std::uint32_t warp = 0; warp < block.warps; ++warp) {
+      const std::size_t scheduler = warp % schedulers.size();
+      const std::uint64_t thousandths = block.instructions[resident.batch * block.warps + warp];
+      schedulers[scheduler].begin(std::max<std::uint64_t>(1, (thousandths + 500) / 1000), place);
+      next[scheduler] = std::min(next[scheduler], now);
     }
     resident.running = block.warps;
   }
@@ -67,7 +136,10 @@ SmArray::SmArray(const SmBehaviour::TimingParameters& array, const RenderBehavio
       blocks_per_core_(kernel.blocks_per_core),
       schedulers_(array.schedulers_per_core),
       scheduler_rate_(double{1} * kernel.issue_thousandths / array.cycles_per_instruction()),
-      warp_rate_(1000.0 / kernel.warp_interval_cycles) {}
+      warp_rate_(1000.0 / kernel.warp_interval_cycles),
+      issue_thousandths_(kernel.issue_thousandths),
+      cycles_per_instruction_(array.cycles_per_instruction()),
+      warp_interval_(kernel.warp_interval_cycles) {}
 
 SmArray::Least SmArray::least(const std::vector<BlockWork>& blocks) const {
   std::uint64_t all = 0;
@@ -123,13 +195,62 @@ double SmArray::fluid(const std::vector<BlockWork>& blocks) const {
     if (first == nullptr) return now;
     now = end;
     const std::size_t place = first->end();
-    FluidCore::Resident& resident = core->residents[place];
+    ResidentBlock& resident = core->residents[place];
     if (--resident.running > 0) continue;
     if (++resident.batch < resident.block->batches()) {
       core->begin_batch(now, place);
     } else {
       give(*core, now, place);
     }
+  }
+}
+
+std::uint64_t SmArray::clocked(const std::vector<BlockWork>& blocks) const {
+  std::vector<ClockedCore> cores(cores_);
+  std::size_t next_block = 0;
+  const auto give = [&](ClockedCore& core, Cycle now, std::size_t place) {
+    while (next_block < blocks.size() && blocks[next_block].instructions.empty()) ++next_block;
+    if (next_block == blocks.size()) return false;
+    core.residents[place] = {&blocks[next_block++], 0, 0};
+    core.begin_batch(now, place);
+    return true;
+  };
+  for (ClockedCore& core : cores) {
+    core.schedulers.resize(schedulers_);
+    core.next.assign(schedulers_, never);
+    core.residents.resize(blocks_per_core_);
+  }
+  for (std::size_t place = 0; place < blocks_per_core_; ++place) {
+    for (ClockedCore& core : cores) give(core, 0, place);
+  }
+  const ClockedScheduler::Rates rates{issue_thousandths_, cycles_per_instruction_, warp_interval_};
+  Cycle now = 0;
+  for (;;) {
+    Cycle next = never;
+    for (ClockedCore& core : cores) {
+      for (std::size_t i = 0; i < schedulers_; ++i) {
+        if (core.next[i] <= now) {
+          core.next[i] = core.schedulers[i].tick(now, rates, [&](std::size_t place) { core.ended.push_back(place); });
+        }
+        next = std::min(next, core.next[i]);
+      }
+    }
+    // What begins now is seen by all schedulers in the next cycle.
+    for (ClockedCore& core : cores) {
+      for (const std::size_t place : core.ended) {
+        ResidentBlock& resident = core.residents[place];
+        if (--resident.running > 0) continue;
+        if (++resident.batch < resident.block->batches()) {
+          core.begin_batch(now + 1, place);
+        } else if (!give(core, now + 1, place)) {
+          continue;
+        }
+        next = now + 1;
+      }
+      core.ended.clear();
+    }
+    if (next == never) return now;
+    now = next;
   }
 }
 

@@ -28,12 +28,19 @@ class SmArray {
   /// to the core that has room first.
   double fluid(const std::vector<BlockWork>& blocks) const;
 
+  /// The same with every instruction in a cycle of its own: of the warps of a scheduler that may issue, the one that has
+  /// waited the longest does. A barrier takes a cycle. Instructions are rounded to whole ones for each warp and batch.
+  std::uint64_t clocked(const std::vector<BlockWork>& blocks) const;
+
  private:
   std::size_t cores_;
   std::size_t blocks_per_core_;
   std::size_t schedulers_;  ///< of a core
   double scheduler_rate_;   ///< thousandths of instructions a cycle
   double warp_rate_;
+  std::uint64_t issue_thousandths_;
+  std::uint64_t cycles_per_instruction_;  ///< of a scheduler
+  std::uint64_t warp_interval_;           ///< cycles
 };
 
 }  // namespace vrpipe

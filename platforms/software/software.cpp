@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "run/result_hash.h"
 #include "run/statistics.h"
 #include "software/sm_array.h"
 
@@ -170,10 +171,15 @@ void check_timing(const ChosenKernel& kernel, const RenderBehaviour::TimingParam
   }
 }
 
-void check_fidelity(const RunRequest& request) {
-  if (request.fidelity != Fidelity::cycle) return;
-  throw UserError("cannot render in software at fidelity cycle", "--fidelity", "kernels are fluids, without cycles",
-                  "take lt, bound or functional");
+/// Cycles of the render kernel; 0 where what binds it is all that is known.
+double time_of(const std::vector<BlockWork>& blocks, const SmArray& array, Fidelity fidelity) {
+  switch (fidelity) {
+    case Fidelity::functional:
+    case Fidelity::bound: return 0;
+    case Fidelity::lt: return array.fluid(blocks);
+    case Fidelity::cycle: return static_cast<double>(array.clocked(blocks));
+  }
+  return 0;
 }
 
 KernelReport preprocess_by(const ChosenKernel& preparation, const SoftwareMachine& machine,
@@ -218,7 +224,6 @@ void check_software(const RunRequest& request) {
 
 SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
                                  std::optional<std::uint64_t> gaussians) {
-  check_fidelity(request);
   check_frame(frame);
   const ChosenKernel preparation = choose(preparation_name, request);
   const ChosenKernel binning = choose(binning_name, request);
@@ -255,10 +260,11 @@ SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
   const SmArray array(machine.array(), timing);
   const SmArray::Least least = array.least(blocks);
   const std::uint64_t bytes = render.call("bytes", [&] { return tiles_by->bytes(); });
-  result.render = machine.report(
-      "render", lists.tiles(), bytes,
-      {{"sm", least.issue}, {"longest tile", least.longest_block}, {"memory", machine.memory_cycles(bytes)}},
-      timing.launch_microseconds, request.fidelity == Fidelity::lt ? array.fluid(blocks) : 0);
+  result.render = machine.report("render", lists.tiles(), bytes,
+                                 {{"sm", least.issue},
+                                  {"longest tile", least.longest_block},
+                                  {"memory", machine.memory_cycles(bytes)}},
+                                 timing.launch_microseconds, time_of(blocks, array, request.fidelity));
 
   if (request.fidelity != Fidelity::functional) {
     result.cycles = *result.render.cycles + (result.preprocess ? *result.preprocess->cycles : 0);
@@ -270,6 +276,11 @@ SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
   statistics.add(binning_name, binning_name, lists_by->unit());
   statistics.add(render_name, render_name, tiles_by->unit());
   result.statistics = statistics.reports();
+  ResultHash hash;
+  for (const StatisticReport& statistic : result.statistics) hash.add(statistic.value);
+  hash.add(result.cycles.value_or(0));
+  hash.add(result.framebuffer.color);
+  result.result_hash = hash.text();
   for (const ChosenKernel* kernel : {&preparation, &binning, &render}) {
     const Implementation& implementation = *kernel->implementation;
     result.implementations.emplace_back(implementation.slot, implementation.name);

@@ -75,6 +75,56 @@ TEST(SmArray, NothingTakesNoTime) {
   EXPECT_EQ(array_of(4).least(std::vector<BlockWork>(5)).issue, 0);
 }
 
+TEST(ClockedSmArray, AWarpAloneIssuesAtItsInterval) {
+  EXPECT_EQ(array_of(1).clocked({{1, {100'000}}}), 700U);
+  EXPECT_EQ(array_of(1).clocked({{1, {100'000, 50'000}}}), 700U + 1 + 350) << "and a cycle at the barrier";
+  EXPECT_EQ(array_of(1).clocked({{1, {99'499}}}), 7U * 99) << "whole instructions";
+}
+
+TEST(ClockedSmArray, WarpsWaitForTheSlowestBehindEachBatch) {
+  EXPECT_EQ(array_of(1).clocked({{2, {10'000, 90'000, 80'000, 20'000}}}), 7U * (90 + 80) + 1);
+}
+
+TEST(ClockedSmArray, ASchedulerLosesItsSharesOfSlots) {
+  // Sixteen warps on one scheduler have 1600 instructions, of which 91 go in 100 cycles; then the last one ends.
+  const BlockWork block{8, {100'000, 1000, 1000, 1000, 100'000, 1000, 1000, 1000}};
+  const double expected = 16 * 100 / issue;
+  EXPECT_NEAR(static_cast<double>(array_of(1).clocked(std::vector<BlockWork>(8, block))), expected, 8);
+}
+
+TEST(ClockedSmArray, BlocksBeginWhereOneEndsFirst) {
+  const BlockWork fifty{1, {50'000}}, twenty{1, {20'000}}, forty{1, {40'000}};
+  EXPECT_EQ(array_of(2, 1).clocked({fifty, twenty, forty}), 7U * (20 + 40) + 1);
+}
+
+TEST(ClockedSmArray, NothingTakesNoTime) {
+  EXPECT_EQ(array_of(4).clocked({}), 0U);
+  EXPECT_EQ(array_of(4).clocked(std::vector<BlockWork>(5)), 0U);
+}
+
+/// As those of tiles: warps of a block have much the same to do, some end early.
+std::vector<BlockWork> tiles(std::uint64_t seed, std::size_t count) {
+  std::vector<BlockWork> blocks;
+  for (std::size_t i = 0; i < count; ++i) {
+    BlockWork block{8, {}};
+    const std::size_t batches = 1 + mix(seed + 100 * i) % 4;
+    for (std::size_t j = 0; j < 8 * batches; ++j) {
+      const std::uint64_t number = mix(seed + 1000 * i + j);
+      block.instructions.push_back(number % 5 == 0 ? 60'000 : 4'000'000 + number % 4'000'000);
+    }
+    blocks.push_back(block);
+  }
+  return blocks;
+}
+
+TEST(ClockedSmArray, IsNearTheFluid) {
+  for (std::uint64_t seed = 1; seed < 6; ++seed) {
+    const std::vector<BlockWork> blocks = tiles(seed, 120);
+    const double fluid = array_of(4).fluid(blocks);
+    EXPECT_NEAR(static_cast<double>(array_of(4).clocked(blocks)), fluid, 0.02 * fluid);
+  }
+}
+
 TEST(SmArray, IsNeverUnderWhatBindsIt) {
   for (std::uint64_t seed = 1; seed < 40; ++seed) {
     std::vector<BlockWork> blocks;

@@ -44,7 +44,6 @@ std::optional<double> sum(const std::vector<std::optional<double>>& values) {
 
 /// With the kernels that the job says.
 RunRequest with_kernels(RunRequest request, const SimulationJob& job) {
-  if (request.fidelity == Fidelity::cycle) request.fidelity = Fidelity::lt;
   request.settings.insert(request.settings.end(), job.kernel_settings.begin(), job.kernel_settings.end());
   request.units.insert(request.units.end(), job.kernel_units.begin(), job.kernel_units.end());
   return request;
@@ -55,7 +54,7 @@ class PathMaker {
   explicit PathMaker(double frequency_mhz) : cycles_per_ms_(frequency_mhz * 1000) {}
 
   FramePath of_software(const SoftwareResult& result, const SimulationJob& job) const {
-    FramePath path = begin("software", result.implementations.back().second, result.request.fidelity);
+    FramePath path = begin("software", result.implementations.back().second);
     std::vector<Part> parts;
     std::vector<std::optional<double>> sorting;
     const auto add = [&](const KernelReport& kernel) {
@@ -74,7 +73,7 @@ class PathMaker {
     path.raster = milliseconds(result.render);
     path.frame = sum({path.preprocess, path.sort, path.raster});
     path.bound_by = longest(parts);
-    if (result.request.fidelity == Fidelity::lt && job.kernel_units.empty() && job.kernel_settings.empty())
+    if (result.request.fidelity >= Fidelity::lt && job.kernel_units.empty() && job.kernel_settings.empty())
       path.expected_error_percent = software_error_percent;
     for (const StatisticReport& statistic : result.statistics) {
       if (statistic.kind == "counter")
@@ -82,12 +81,13 @@ class PathMaker {
     }
     path.implementations = result.implementations;
     path.parameters = result.parameters;
+    path.result_hash = result.result_hash;
     path.host_seconds = result.host_seconds;
     return path;
   }
 
   FramePath of_hardware(const std::string& name, const RunResult& run, const HardwarePreparation& prepared) const {
-    FramePath path = begin(name, run.request.variant.name, run.request.fidelity);
+    FramePath path = begin(name, run.request.variant.name);
     std::vector<Part> parts;
     const auto add = [&](const KernelReport& kernel) {
       parts.push_back({kernel.name, milliseconds(kernel), kernel.bound_by});
@@ -104,16 +104,16 @@ class PathMaker {
     path.bound_by = longest(parts);
     path.counts = run.counts.named();
     add_dram_bytes(run, path);
+    path.result_hash = run.result_hash;
     path.host_seconds = run.host_seconds;
     return path;
   }
 
  private:
-  static FramePath begin(const std::string& path, const std::string& name, Fidelity fidelity) {
+  static FramePath begin(const std::string& path, const std::string& name) {
     FramePath begun;
     begun.path = path;
     begun.name = name;
-    begun.fidelity = fidelity;
     return begun;
   }
   std::optional<double> milliseconds(const KernelReport& kernel) const {

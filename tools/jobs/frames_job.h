@@ -16,7 +16,6 @@ namespace vrpipe::tools {
 struct FramePath {
   std::string path;  ///< software, hardware, vr-pipe
   std::string name;  ///< of the render kernel or the variant
-  Fidelity fidelity = Fidelity::functional;
   // Simulated milliseconds; none where the fidelity has no time.
   std::optional<double> preprocess;  ///< and of a draw list
   std::optional<double> sort;        ///< all that orders
@@ -29,6 +28,7 @@ struct FramePath {
   std::vector<KernelReport> kernels;                                 ///< all of them, in order, the draw left out
   std::vector<std::pair<std::string, std::string>> implementations;  ///< of kernels
   std::vector<std::pair<std::string, std::string>> parameters;       ///< and what they are set to
+  std::string result_hash;
   double host_seconds = 0;
 };
 
@@ -44,7 +44,7 @@ struct FramesResult {
 };
 
 /// Draws the frame of a job in software and by hardware: of its requests `baseline` is the path `hardware`, `het+qm`
-/// `vr-pipe`. At fidelity `cycle` kernels are at `lt`, the most exact that they have. Throws UserError, CommandFailure or a fault.
+/// `vr-pipe`. Throws UserError, CommandFailure or a fault.
 FramesResult perform_frames(const SimulationJob& job);
 
 }  // namespace vrpipe::tools

@@ -44,7 +44,6 @@ Json path_json(const FramePath& path, const Platform& platform) {
   for (const auto& [slot, name] : path.implementations) implementations[slot] = name;
   return {{"path", path.path},
           {"name", path.name},
-          {"fidelity", vrpipe::name_of(path.fidelity)},
           {"milliseconds",
            {{"preprocess", optional_json(path.preprocess)},
             {"sort", optional_json(path.sort)},
@@ -58,6 +57,7 @@ Json path_json(const FramePath& path, const Platform& platform) {
           {"kernels", kernels_json(path)},
           {"implementations", std::move(implementations)},
           {"parameters", kernel_parameters_json(path, platform)},
+          {"result_hash", path.result_hash},
           {"host_seconds", path.host_seconds}};
 }
 

@@ -61,9 +61,6 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
   text += table.text(style) + "\n";
   for (const FramePath& path : result.paths) {
     if (path.path == "software") text += lanes_text(path);
-    if (path.fidelity != result.runs.front().request.fidelity)
-      text +=
-          fmt::format("{}: at {}, the most exact that its kernels have\n", path.path, vrpipe::name_of(path.fidelity));
   }
   if (!result.viewpoint) text += "a draw list is preprocessed already: frames are without\n";
   for (const std::string& note : result.scene.notes) text += "note: " + printable(note) + "\n";

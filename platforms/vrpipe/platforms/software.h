@@ -37,6 +37,7 @@ struct SoftwareResult {
   std::vector<std::pair<std::string, std::string>> implementations;  ///< slot and name
   std::vector<std::pair<std::string, std::string>> parameters;       ///< SLOT.PARAMETER and value
   Framebuffer framebuffer;                                           ///< of RGBA32F
+  std::string result_hash;  ///< of statistics, cycles and the stored bits of the image, 16 hex digits
 };
 
 /// Whether --set and --unit of this name are for kernels.
@@ -45,9 +46,10 @@ bool is_of_software(const std::string& unit);
 RunRequest without_software(RunRequest request);
 
 /// Renders a frame in software. Settings and units of the request may be of the platform's units, too. `functional` counts and
-/// gives the image; `bound` is the least that kernels take; at `lt` the blocks of the render kernel share cores.
+/// gives the image; `bound` is the least that kernels take; at `lt` the blocks of the render kernel are a fluid that cores share, at
+/// `cycle` each of its instructions has a cycle. The other kernels have a price for each item at all of them.
 /// @param gaussians  of the scene; none where splats are given, and nothing is projected
-/// Throws UserError for unknown units, parameters and values, fidelity `cycle`, and a frame that is not one draw of splats;
+/// Throws UserError for unknown units, parameters and values, and a frame that is not one draw of splats;
 /// SimulationFault for a unit that breaks a rule.
 SoftwareResult simulate_software(const RunRequest& request, const Frame& frame, std::optional<std::uint64_t> gaussians);
 
