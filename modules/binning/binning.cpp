@@ -1,12 +1,20 @@
 #include "binning/binning.h"
 
+#include <numeric>
 #include <utility>
 
+#include <fmt/format.h>
+
+#include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/registry.h>
 
 #include "binning/touched_tiles.h"
 
 namespace vrpipe {
+
+namespace {
+constexpr std::uint64_t most_pairs = 0xffffffff;  // as the published sort numbers them, and TileLists
+}  // namespace
 
 PairBinning::PairBinning(const Parameters& parameters, const RenderContext& context)
     : context_(context),
@@ -46,6 +54,12 @@ TileLists PairBinning::make_lists() {
     ++with_area;
   });
   splats_without_area += frame.splats() - with_area;
+  const std::uint64_t all = std::accumulate(lists.begin.begin(), lists.begin.end(), std::uint64_t{0});
+  if (all > most_pairs) {
+    throw UserError("cannot list splats by tiles", "binning",
+                    fmt::format("they make {} pairs, of {} at most", all, most_pairs),
+                    "take a smaller image, or fewer splats");
+  }
   for (std::size_t tile = 0; tile < tiling_.tiles(); ++tile) lists.begin[tile + 1] += lists.begin[tile];
   lists.splats.resize(lists.begin.back());
   std::vector<std::uint32_t> next = lists.begin;

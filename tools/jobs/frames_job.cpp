@@ -10,6 +10,7 @@
 #include "host/progress_line.h"
 #include "host/stdout_to_stderr.h"
 #include "jobs/loaded_frame.h"
+#include "jobs/microbench_job.h"
 #include "jobs/processes.h"
 
 namespace vrpipe::tools {
@@ -73,8 +74,10 @@ class PathMaker {
     path.raster = milliseconds(result.render);
     path.frame = sum({path.preprocess, path.sort, path.raster});
     path.bound_by = longest(parts);
-    if (result.request.fidelity >= Fidelity::lt && job.kernel_units.empty() && job.kernel_settings.empty())
-      path.expected_error_percent = software_error_percent;
+    const bool is_as_measured = result.request.platform->name == measured_platform &&
+                                result.request.fidelity >= Fidelity::lt && job.kernel_units.empty() &&
+                                job.kernel_settings.empty();
+    if (is_as_measured) path.expected_error_percent = software_error_percent;
     for (const StatisticReport& statistic : result.statistics) {
       if (statistic.kind == "counter")
         path.counts.emplace_back(statistic.name.substr(statistic.name.find('.') + 1), statistic.value);
