@@ -65,6 +65,19 @@ ChosenKernel choose(const std::string& slot, const RunRequest& request) {
   return kernel;
 }
 
+void add_parameters(const ChosenKernel& kernel, std::vector<std::pair<std::string, std::string>>& parameters) {
+  for (const Parameter* parameter : kernel.parameters->parameters()) {
+    parameters.emplace_back(kernel.implementation->slot + "." + parameter->name(), parameter->value());
+  }
+}
+
+bool is_as_shipped(const ChosenKernel& kernel) {
+  const std::vector<Parameter*>& parameters = kernel.parameters->parameters();
+  return kernel.implementation->name == Registry::instance().slot(kernel.implementation->slot).implementation &&
+         std::all_of(parameters.begin(), parameters.end(),
+                     [](const Parameter* each) { return each->value() == each->default_value(); });
+}
+
 /// The parts of a GPU that kernels take.
 class SoftwareMachine {
  public:
@@ -211,15 +224,17 @@ RunRequest without_software(RunRequest request) {
   return request;
 }
 
-void check_software(const RunRequest& request) {
-  const Frame empty(1, 1);
+std::vector<std::pair<std::string, std::string>> check_software(const RunRequest& request) {
   RenderContext context;
-  context.frame = std::make_shared<Frame>(empty);
+  context.frame = std::make_shared<Frame>(1, 1);
+  std::vector<std::pair<std::string, std::string>> parameters;
   for (const Slot& slot : Registry::instance().slots()) {
     if (!slot.is_software) continue;
     const ChosenKernel kernel = choose(slot.name, request);
     kernel.implementation->make_behaviour(*kernel.parameters, context);
+    add_parameters(kernel, parameters);
   }
+  return parameters;
 }
 
 SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
@@ -284,9 +299,8 @@ SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
   for (const ChosenKernel* kernel : {&preparation, &binning, &render}) {
     const Implementation& implementation = *kernel->implementation;
     result.implementations.emplace_back(implementation.slot, implementation.name);
-    for (const Parameter* parameter : kernel->parameters->parameters()) {
-      result.parameters.emplace_back(implementation.slot + "." + parameter->name(), parameter->value());
-    }
+    add_parameters(*kernel, result.parameters);
+    result.as_shipped = result.as_shipped && is_as_shipped(*kernel);
   }
   return result;
 }

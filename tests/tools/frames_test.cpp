@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 #include <string>
@@ -10,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "documented_keys.h"
+#include "image/images.h"
 #include "tool_test_support.h"
 
 namespace vrpipe::testing {
@@ -126,6 +129,41 @@ TEST_F(Frames, AreTheSameWithAnyNumberOfProcesses) {
     for (json& path : (*result)["frames"]) path.erase("host_seconds");
   }
   EXPECT_EQ(one["frames"], three["frames"]);
+}
+
+TEST_F(Frames, ImagesOfEveryPathAreAlike) {
+  const json result = frames({"--fidelity", "functional", "--output", "images", "--unit", "render=endless"});
+  std::vector<tools::SharedImage> images;
+  for (const json& path : result["frames"]) {
+    EXPECT_EQ(path["images"]["png"], "images/tiny-" + path["path"].get<std::string>() + ".png");
+    images.push_back(tools::read_exr((folder() / path["images"]["exr"].get<std::string>()).string()));
+  }
+  ASSERT_EQ(images.size(), 3U);
+  float most = 0;
+  for (std::size_t i = 0; i < std::size_t{4} * images[0].width() * images[0].height(); ++i) {
+    for (std::size_t of : {1, 2}) most = std::max(most, std::fabs(images[0].values()[i] - images[of].values()[i]));
+  }
+  EXPECT_LT(most, 0.01F) << "halves, and what ends early";
+  EXPECT_GT(most, 0.0F) << "single precision in software";
+}
+
+TEST_F(Frames, AConfigurationReadsBackToTheSameFrames) {
+  const std::vector<std::string> arguments{"frames", "--scene",    "tiny.spl", "--fidelity",
+                                           "bound",  "--platform", "gh100-gpc"};
+  std::vector<std::string> changed = arguments;
+  changed.insert(changed.end(), {"--unit", "render=threshold", "--set", "binning.lists=box"});
+  for (std::vector<std::string> given : {arguments, changed}) {
+    json direct = json_of(given);
+    given.push_back("--print-config");
+    const Finished printed = vrpipe(given);
+    ASSERT_EQ(printed.code, 0) << printed.err;
+    write("frames.toml", printed.out);
+    json read = json_of({"frames", "--config", "frames.toml"});
+    for (json* result : {&direct, &read}) {
+      for (json& path : (*result)["frames"]) path.erase("host_seconds");
+    }
+    EXPECT_EQ(direct["frames"], read["frames"]);
+  }
 }
 
 TEST_F(Frames, TheTableHasEveryPath) {

@@ -1,6 +1,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -8,6 +9,7 @@
 
 #include "cli/command_line.h"
 #include "cli/options.h"
+#include "cli/print_config.h"
 #include "host/output_file.h"
 #include "host/stdout_to_stderr.h"
 #include "host/terminal.h"
@@ -43,12 +45,17 @@ class FramesCommand : public Command {
 
   void run() override {
     const SimulationJob job = arguments_.resolve(SimulationArguments::Variants::all, invocation());
-    if (job.json && *job.json != "-") {
-      check_output_file(*job.json, "--json");
-      check_files_differ(job.inputs, {{"--json", *job.json}});
+    if (prints_config(invocation())) {
+      std::vector<RunRequest> requests = job.requests;
+      std::vector<UnitChoice>& units = requests.front().units;
+      units.insert(units.end(), job.kernel_units.begin(), job.kernel_units.end());
+      auto parameters = job.preprocess_parameters;
+      parameters.insert(parameters.end(), job.kernel_parameters.begin(), job.kernel_parameters.end());
+      std::cout << config_text(invocation(), requests, parameters);
+      return;
     }
-    const FramesResult result = perform_frames(job);
-    ResultFiles files;
+    FramesResult result = perform_frames(job);
+    ResultFiles& files = result.files;
     std::string text;
     {
       const StdoutToStderr redirected;
@@ -63,6 +70,8 @@ class FramesCommand : public Command {
       }
     }
     std::cout << text;
+    if (job.json && *job.json == "-") return files.check();
+    if (files.has("--output")) std::cout << "images: " << printable(job.output->string()) << '\n';
     if (files.has("--json")) std::cout << "result: " << printable(*job.json) << '\n';
     files.check();
   }

@@ -185,13 +185,7 @@ void SimulationArguments::declare(Arguments& arguments, Variants variants) {
   if (variants == Variants::one) declare_variant(arguments);
   declare_changes(arguments);
   declare_rules(arguments);
-  arguments.add_option("--output", output_, "DIR",
-                       "writes SCENE-VARIANT.png (8 bit, over the background) and .exr (RGBA\n"
-                       "float, premultiplied, no background) there; created if missing",
-                       result_group);
-  arguments
-      .add_option("--background", background_, "R,G,B", "behind the PNG, each 0 to 1 (default: 0,0,0)", result_group)
-      .default_text = "0,0,0";
+  declare_images(arguments);
   declare_result_json(arguments, json_);
   arguments.add_option("--save-draw", save_draw_, "FILE.spl",
                        "writes the draw after preprocessing; --scene FILE.spl takes it in again", result_group);
@@ -223,12 +217,28 @@ void SimulationArguments::declare_machine(Arguments& arguments) {
   declare_jobs(arguments, jobs_);
 }
 
+void SimulationArguments::declare_images(Arguments& arguments) {
+  arguments.add_option("--output", output_, "DIR",
+                       "writes SCENE-VARIANT.png (8 bit, over the background) and .exr (RGBA\n"
+                       "float, premultiplied, no background) there; created if missing",
+                       result_group);
+  arguments
+      .add_option("--background", background_, "R,G,B", "behind the PNG, each 0 to 1 (default: 0,0,0)", result_group)
+      .default_text = "0,0,0";
+}
+
 void SimulationArguments::declare_whole_frames(Arguments& arguments) {
   takes_kernels_ = true;
   declare_scene(arguments);
+  declare_config(arguments);
+  arguments.add_option("--define", definitions_, "NAME=BASE,...", "", "");
   declare_platform(arguments);
   declare_changes(arguments);
   declare_rules(arguments);
+  declare_images(arguments);
+  arguments.find("--output")->help =
+      "writes SCENE-PATH.png (8 bit, over the background) and .exr (RGBA float,\n"
+      "premultiplied, no background) there; created if missing";
   declare_result_json(arguments, json_);
   declare_jobs(arguments, jobs_);
 }
@@ -483,7 +493,7 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
   if (const auto name = single(format_, "--format")) request.format = color_format_named(*name);
   if (const auto name = single(termination_, "--termination")) request.termination = termination_named(*name);
   if (takes_kernels_) {
-    check_software(request);
+    job.kernel_parameters = check_software(request);
     const auto take = [](const auto& all, auto& kernels, const auto& unit_of) {
       std::copy_if(all.begin(), all.end(), std::back_inserter(kernels),
                    [&](const auto& each) { return is_of_software(unit_of(each)); });

@@ -64,6 +64,7 @@ class SimulationArguments {
   void declare_scene(Arguments& arguments);
   void declare_variant(Arguments& arguments);
   void declare_rules(Arguments& arguments);
+  void declare_images(Arguments& arguments);
   void declare_platform(Arguments& arguments);
   void declare_changes(Arguments& arguments);
   void declare_fidelity(Arguments& arguments);

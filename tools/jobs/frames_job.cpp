@@ -7,8 +7,10 @@
 
 #include <vrpipe/component/error.h>
 
+#include "host/output_file.h"
 #include "host/progress_line.h"
 #include "host/stdout_to_stderr.h"
+#include "image/images.h"
 #include "jobs/loaded_frame.h"
 #include "jobs/microbench_job.h"
 #include "jobs/processes.h"
@@ -50,11 +52,19 @@ RunRequest with_kernels(RunRequest request, const SimulationJob& job) {
   return request;
 }
 
+std::optional<ImageFiles> write_image(const SimulationJob& job, const std::string& name, const SharedImage& image,
+                                      ResultFiles& written) {
+  const ImageFiles files = image_files(job, name);
+  const bool has_png = written.write(files.png, encode_png(image, job.background), "--output");
+  const bool has_exr = written.write(files.exr, encode_exr(image), "--output");
+  return has_png && has_exr ? std::optional(files) : std::nullopt;
+}
+
 class PathMaker {
  public:
   explicit PathMaker(double frequency_mhz) : cycles_per_ms_(frequency_mhz * 1000) {}
 
-  FramePath of_software(const SoftwareResult& result, const SimulationJob& job) const {
+  FramePath of_software(const SoftwareResult& result) const {
     FramePath path = begin("software", result.implementations.back().second);
     std::vector<Part> parts;
     std::vector<std::optional<double>> sorting;
@@ -75,8 +85,7 @@ class PathMaker {
     path.frame = sum({path.preprocess, path.sort, path.raster});
     path.bound_by = longest(parts);
     const bool is_as_measured = result.request.platform->name == measured_platform &&
-                                result.request.fidelity >= Fidelity::lt && job.kernel_units.empty() &&
-                                job.kernel_settings.empty();
+                                result.request.fidelity >= Fidelity::lt && result.as_shipped;
     if (is_as_measured) path.expected_error_percent = software_error_percent;
     for (const StatisticReport& statistic : result.statistics) {
       if (statistic.kind == "counter")
@@ -139,6 +148,10 @@ class PathMaker {
 }  // namespace
 
 FramesResult perform_frames(const SimulationJob& job) {
+  const std::vector<std::pair<std::string, std::string>> draws{{"hardware", "baseline"}, {"vr-pipe", "het+qm"}};
+  std::vector<std::string> images{image_name(job.frame.name, "software")};
+  for (const auto& [path, variant] : draws) images.push_back(image_name(job.frame.name, path));
+  check_outputs(job, images);
   FramesResult result;
   result.provenance = job.provenance;
   result.preprocessing = job.preprocessing;
@@ -158,28 +171,38 @@ FramesResult perform_frames(const SimulationJob& job) {
   std::optional<std::uint64_t> gaussians;
   if (loaded.preprocessed_here) gaussians = loaded.summary.gaussians_total;
 
-  const std::vector<std::pair<std::string, std::string>> paths{{"hardware", "baseline"}, {"vr-pipe", "het+qm"}};
   std::vector<RunRequest> requests;
-  for (const auto& [path, variant] : paths) {
+  for (const auto& [path, variant] : draws) {
     const auto found = std::find_if(job.requests.begin(), job.requests.end(),
                                     [name = variant](const RunRequest& each) { return each.variant.name == name; });
     requests.push_back(*found);
     requests.back().reads_statistics = true;
   }
   const auto frame_of = [&](const RunRequest& request) { return make_frame(request, job.frame, loaded); };
-  for (Simulated& run : simulate_in_processes(requests, frame_of, false, job.processes, progress))
-    result.runs.push_back(std::move(run.result));
+  if (job.output) create_output_folder(*job.output, "--output");
+  std::vector<Simulated> simulated =
+      simulate_in_processes(requests, frame_of, job.output.has_value(), job.processes, progress);
 
   const PathMaker make(requests.front().platform->frequency_mhz);
   const RunRequest request = with_kernels(requests.front(), job);
   const std::shared_ptr<const Frame> frame = frame_of(requests.front());
   const StdoutToStderr redirected;  // units of plugins may print
   progress.show("rendering in software");
-  result.paths.push_back(make.of_software(simulate_software(request, *frame, gaussians), job));
+  const SoftwareResult software = simulate_software(request, *frame, gaussians);
+  result.paths.push_back(make.of_software(software));
   const HardwarePreparation prepared = prepare_for_hardware(request, *frame, gaussians);
-  for (std::size_t i = 0; i < paths.size(); ++i)
-    result.paths.push_back(make.of_hardware(paths[i].first, result.runs[i], prepared));
+  for (std::size_t i = 0; i < draws.size(); ++i)
+    result.paths.push_back(make.of_hardware(draws[i].first, simulated[i].result, prepared));
   progress.erase();
+  if (job.output) {
+    progress.show("writing images");
+    SharedImage image(result.width, result.height);
+    image.copy_from(software.framebuffer.color);
+    for (std::size_t i = 0; i < result.paths.size(); ++i)
+      result.paths[i].images = write_image(job, images[i], i == 0 ? image : *simulated[i - 1].image, result.files);
+    progress.erase();
+  }
+  for (Simulated& run : simulated) result.runs.push_back(std::move(run.result));
   return result;
 }
 

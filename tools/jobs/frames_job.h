@@ -29,6 +29,7 @@ struct FramePath {
   std::vector<std::pair<std::string, std::string>> implementations;  ///< of kernels
   std::vector<std::pair<std::string, std::string>> parameters;       ///< and what they are set to
   std::string result_hash;
+  std::optional<ImageFiles> images;  ///< none where they could not be written, or were not asked for
   double host_seconds = 0;
 };
 
@@ -41,6 +42,7 @@ struct FramesResult {
   unsigned processes = 1;
   std::vector<FramePath> paths;
   std::vector<RunResult> runs;  ///< the draws by hardware
+  ResultFiles files;            ///< written so far: images
 };
 
 /// Draws the frame of a job in software and by hardware: of its requests `baseline` is the path `hardware`, `het+qm`

@@ -35,6 +35,8 @@ struct SimulationJob {
   std::size_t baseline = 0;              ///< of `requests`, over which speed-ups are
   std::vector<Setting> kernel_settings;  ///< of --set, and of --unit, what is for kernels: in no request
   std::vector<UnitChoice> kernel_units;
+  /// SLOT.PARAMETER and value of every parameter of kernels; empty where none are asked for.
+  std::vector<std::pair<std::string, std::string>> kernel_parameters;
   std::vector<Setting> preprocessing;  ///< of --set, for the report; `scene` has them
   /// `preprocess.NAME` and value of every parameter of preprocessing.
   std::vector<std::pair<std::string, std::string>> preprocess_parameters;

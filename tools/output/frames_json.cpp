@@ -58,6 +58,9 @@ Json path_json(const FramePath& path, const Platform& platform) {
           {"implementations", std::move(implementations)},
           {"parameters", kernel_parameters_json(path, platform)},
           {"result_hash", path.result_hash},
+          {"images",
+           {{"png", path.images ? Json(path.images->png) : Json()},
+            {"exr", path.images ? Json(path.images->exr) : Json()}}},
           {"host_seconds", path.host_seconds}};
 }
 

@@ -36,7 +36,8 @@ struct SoftwareResult {
   std::vector<StatisticReport> statistics;
   std::vector<std::pair<std::string, std::string>> implementations;  ///< slot and name
   std::vector<std::pair<std::string, std::string>> parameters;       ///< SLOT.PARAMETER and value
-  Framebuffer framebuffer;                                           ///< of RGBA32F
+  bool as_shipped = true;   ///< every slot has its own unit, and that its defaults
+  Framebuffer framebuffer;  ///< of RGBA32F
   std::string result_hash;  ///< of statistics, cycles and the stored bits of the image, 16 hex digits
 };
 
@@ -62,7 +63,8 @@ struct HardwarePreparation {
 HardwarePreparation prepare_for_hardware(const RunRequest& request, const Frame& frame,
                                          std::optional<std::uint64_t> gaussians);
 
-/// Units and settings of kernels, without running any; throws UserError.
-void check_software(const RunRequest& request);
+/// Units and settings of kernels, without running any; throws UserError. Gives SLOT.PARAMETER and final value of all that
+/// the chosen units have.
+std::vector<std::pair<std::string, std::string>> check_software(const RunRequest& request);
 
 }  // namespace vrpipe
