@@ -169,6 +169,14 @@ void check_lists(const ChosenKernel& kernel, const TileLists& lists, const Frame
   }
 }
 
+const KernelWork& checked(const ChosenKernel& kernel, const KernelWork& work) {
+  constexpr double most = 1e18;
+  const bool can_be = work.name != nullptr && work.sm_cycles >= 0 && work.sm_cycles < most &&
+                      work.launch_microseconds >= 0 && work.launch_microseconds < most / 1e6;
+  if (!can_be) kernel.fail("a kernel without a name or with a time that cannot be");
+  return work;
+}
+
 void check_block(const ChosenKernel& kernel, const BlockWork& block, std::size_t tile) {
   if (block.instructions.empty()) return;
   if (block.warps == 0 || block.instructions.size() % block.warps != 0) {
@@ -179,7 +187,7 @@ void check_block(const ChosenKernel& kernel, const BlockWork& block, std::size_t
 
 void check_timing(const ChosenKernel& kernel, const RenderBehaviour::TimingParameters& timing) {
   if (timing.blocks_per_core == 0 || timing.blocks_per_core > 4096 || timing.issue_thousandths == 0 ||
-      timing.warp_interval_cycles == 0 || !(timing.launch_microseconds >= 0)) {
+      timing.warp_interval_cycles == 0 || !(timing.launch_microseconds >= 0 && timing.launch_microseconds < 1e12)) {
     kernel.fail("no blocks, no rate or no interval in its timing");
   }
 }
@@ -199,7 +207,8 @@ KernelReport preprocess_by(const ChosenKernel& preparation, const SoftwareMachin
                            PreparationBehaviour::Path path, std::uint64_t gaussians) {
   const auto unit = preparation.make<PreparationBehaviour>(machine.context());
   const std::uint64_t visible = machine.context().frame->splats();
-  return machine.report(preparation.call("project", [&] { return unit->project(path, gaussians, visible); }));
+  const KernelWork work = preparation.call("project", [&] { return unit->project(path, gaussians, visible); });
+  return machine.report(checked(preparation, work));
 }
 
 }  // namespace
@@ -257,7 +266,7 @@ SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
   check_lists(binning, lists, frame);
   lists_by->count(lists);
   for (const KernelWork& work : binning.call("kernels", [&] { return lists_by->kernels(); })) {
-    result.binning.push_back(machine.report(work));
+    result.binning.push_back(machine.report(checked(binning, work)));
   }
 
   const auto tiles_by = render.make<RenderBehaviour>(machine.context());
@@ -314,8 +323,8 @@ HardwarePreparation prepare_for_hardware(const RunRequest& request, const Frame&
     prepared.preprocess = preprocess_by(preparation, machine, PreparationBehaviour::Path::hardware, *gaussians);
   }
   const auto unit = preparation.make<PreparationBehaviour>(machine.context());
-  prepared.sort =
-      machine.report(preparation.call("sort_by_depth", [&] { return unit->sort_by_depth(frame.splats()); }));
+  const KernelWork work = preparation.call("sort_by_depth", [&] { return unit->sort_by_depth(frame.splats()); });
+  prepared.sort = machine.report(checked(preparation, work));
   return prepared;
 }
 

@@ -1,6 +1,9 @@
 #include <vrpipe/platforms/software.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +11,7 @@
 
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/pipeline/slots/binning.h>
+#include <vrpipe/pipeline/slots/preparation.h>
 #include <vrpipe/pipeline/slots/render.h>
 
 #include "software/software_statistic.h"
@@ -168,6 +172,18 @@ class WrongLists : public BinningBehaviour {
   std::size_t tiles_;
 };
 
+/// And one whose time is no number.
+class Timeless : public PreparationBehaviour {
+ public:
+  struct Parameters : ParameterSet {};
+  Timeless(const Parameters&, const RenderContext&) {}
+  KernelWork project(Path, std::uint64_t gaussians, std::uint64_t) const override {
+    return {"preprocess", gaussians, std::numeric_limits<double>::quiet_NaN(), 0, 0};
+  }
+  KernelWork sort_by_depth(std::uint64_t splats) const override { return {"depth sort", splats}; }
+};
+
+const Registrar<Timeless, PreparationBehaviour> timeless("preparation", "timeless", "takes a time that is no number");
 const Registrar<FrontMost, RenderBehaviour> front_most("render", "front-most", "draws the first splat of each tile");
 const Registrar<WrongLists, BinningBehaviour> wrong_lists("binning", "wrong-lists", "names splats that are not there");
 
@@ -195,6 +211,11 @@ TEST(Software, AUnitThatBreaksARuleIsNamed) {
     EXPECT_NE(std::string(fault.what()).find("binning=wrong-lists"), std::string::npos) << fault.what();
     EXPECT_NE(std::string(fault.what()).find("splat 77 of 0"), std::string::npos) << fault.what();
   }
+}
+
+TEST(Software, AKernelOfATimeThatCannotBeIsAFault) {
+  EXPECT_THROW(render(request_at(Fidelity::lt, {}, {{"preparation", "timeless"}}), testing::draw_of(16, 16), 5),
+               SimulationFault);
 }
 
 TEST(Software, RefusesWhatItDoesNotKnow) {
