@@ -48,6 +48,7 @@ unsigned ClockDomain::attach(Clocked& unit) {
   units_.push_back(&unit);
   if (handle == due_.size()) due_.resize(due_.size() + cycles_per_vector, never);
   due_[handle] = 0;
+  active_.resize(due_.size() / at_a_time + 1);
   return handle;
 }
 
@@ -147,21 +148,27 @@ inline void ClockDomain::tick(Clocked& unit, Cycle cycle, Cycle& due) {
 }
 
 bool ClockDomain::tick_due(Cycle cycle) {
-  // A wake-up in this cycle is for a later one, so it does not matter who has ticked before it.
-  bool any = false;
-  for (std::size_t first = 0; first < due_.size(); first += at_a_time) {
+  // A wake-up in this cycle is for a later one: who is due is known before any of them ticks.
+  std::uint64_t active = take_due(due_.data(), std::min(at_a_time, due_.size()), cycle);
+  bool any = active != 0;
+  for (std::size_t first = at_a_time; first < due_.size(); first += at_a_time) {
+    std::uint64_t& further = active_[first / at_a_time];
+    further = take_due(due_.data() + first, std::min(at_a_time, due_.size() - first), cycle);
+    any = any || further != 0;
+  }
+  if (!any) return false;
+  now_ = cycle;
+  for (std::size_t first = 0;;) {
     Cycle* const due = due_.data() + first;
     Clocked* const* const units = units_.data() + first;
-    std::uint64_t active = take_due(due, std::min(at_a_time, due_.size() - first), cycle);
-    if (active == 0) continue;
-    any = true;
-    now_ = cycle;
     for (; active != 0; active &= active - 1) {
       const auto place = static_cast<std::size_t>(__builtin_ctzll(active));
       tick(*units[place], cycle, due[place]);
     }
+    first += at_a_time;
+    if (first >= due_.size()) return true;
+    active = active_[first / at_a_time];
   }
-  return any;
 }
 
 bool ClockDomain::tick_due_in_order(Cycle cycle) {

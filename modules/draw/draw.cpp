@@ -11,7 +11,7 @@
 namespace vrpipe {
 
 VertexIssue::VertexIssue(const Parameters& parameters, const RenderContext& context)
-    : frame_(*context.frame), rate_(parameters.warps_per_1024_cycles) {}
+    : frame_(*context.frame), rate_(parameters.warps_per_1024_cycles * context.placement.gpcs) {}
 
 /// Vertices fill warps; where those of a rectangle lie in two, it goes with the second.
 std::uint32_t VertexIssue::splats_that_fit(const DrawCall& call) const {

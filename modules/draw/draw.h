@@ -16,7 +16,7 @@ class VertexIssue : public DrawBehaviour {
                                   65536,
                                   "warps",
                                   "measured on a GH100 graphics GPC: 5.8 cycles a splat with 2 TPCs, scaled to 8",
-                                  "vertex warps issued in 1024 cycles: vertex fetch and attribute set-up"};
+                                  "vertex warps issued in 1024 cycles for each GPC: vertex fetch and attribute set-up"};
   };
   VertexIssue(const Parameters& parameters, const RenderContext& context);
 

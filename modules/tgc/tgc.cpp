@@ -46,21 +46,17 @@ void TileGridCoalescing::advance() {
   }
 }
 
-bool TileGridCoalescing::owns_tile_of_grid(std::uint32_t grid_x, std::uint32_t grid_y) const {
-  const auto tiles = static_cast<std::uint32_t>(grid_pixels_) / screen_tile_pixels;
-  for (std::uint32_t y = grid_y * tiles; y < (grid_y + 1) * tiles; ++y) {
-    for (std::uint32_t x = grid_x * tiles; x < (grid_x + 1) * tiles; ++x) {
-      if (context_.placement.owns({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)})) return true;
-    }
-  }
-  return false;
+bool TileGridCoalescing::owns_pixels_in_grid() const {
+  const PixelRect& bounds = primitive_.bounds;
+  const std::int32_t x = grid_x_ * grid_pixels_;
+  const std::int32_t y = grid_y_ * grid_pixels_;
+  return context_.placement.owns_any_of({std::max(bounds.x0, x), std::max(bounds.y0, y),
+                                         std::min(bounds.x1, x + grid_pixels_), std::min(bounds.y1, y + grid_pixels_)});
 }
 
 void TileGridCoalescing::skip_foreign_grids() {
   if (context_.placement.gpcs == 1) return;
-  while (entering() && !owns_tile_of_grid(static_cast<std::uint32_t>(grid_x_), static_cast<std::uint32_t>(grid_y_))) {
-    advance();
-  }
+  while (entering() && !owns_pixels_in_grid()) advance();
 }
 
 void TileGridCoalescing::flush_bin(std::uint32_t index, Flush& out) {

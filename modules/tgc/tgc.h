@@ -60,7 +60,8 @@ class TileGridCoalescing : public TgcBehaviour {
     std::vector<Primitive> primitives;
   };
   void flush_bin(std::uint32_t bin, Flush& out);
-  bool owns_tile_of_grid(std::uint32_t grid_x, std::uint32_t grid_y) const;
+  /// Of those that the primitive may cover.
+  bool owns_pixels_in_grid() const;
   void skip_foreign_grids();
   void advance();
 

@@ -24,7 +24,7 @@ class PrimitiveAssembly : public VpoBehaviour {
                            1000,
                            "cycles",
                            "Emerald: bounding box 4 cycles; ATTILA: clipper 6 cycles",
-                           "from the last vertex to the primitive at the GPC"};
+                           "from the last vertex to the primitive behind it"};
   };
   PrimitiveAssembly(const Parameters& parameters, const RenderContext& context);
 

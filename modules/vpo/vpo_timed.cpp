@@ -13,79 +13,61 @@ class TimedVpo : public TimedUnit {
       : TimedUnit(name, domain, VpoWork::kinds(behaviour->timing())),
         behaviour_(std::move(behaviour)),
         timing_(behaviour_->timing()),
-        gpcs_(gpcs),
+        ends_batches_(gpcs > 1),
+        out_(*this, "out_primitives"),
+        in_(*this, "in_vertices",
+            [this](const VertexWarp& warp, CycleInterval visible) { return assemble(warp, visible.first); }),
         lane_(timing_.items_per_cycle) {
-    for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
-      outs_.push_back(std::make_unique<TimedOut<PrimitiveItem>>(*this, "out_primitives_" + std::to_string(gpc)));
-      outs_.back()->set_pipeline(timing_.latency_cycles - 1, timing_.items_per_cycle);
-    }
-    for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
-      ins_.push_back(std::make_unique<TimedIn<VertexWarp>>(*this, "in_vertices_" + std::to_string(gpc),
-                                                           [this](const VertexWarp& warp, CycleInterval visible) {
-                                                             return assemble(warp, visible.first);
-                                                           }));
-    }
+    out_.set_pipeline(timing_.latency_cycles - 1, timing_.items_per_cycle);
   }
 
   Behaviour& behaviour() override { return *behaviour_; }
 
  private:
-  /// To every GPC concerned; returns the cycle in which the last has taken it.
-  Cycle send(const PrimitiveItem& item, Cycle at) {
-    Cycle taken = at;
-    for (unsigned gpc = 0; gpc < gpcs_; ++gpc) {
-      if (item.mark != Mark::none || concerns(item.primitive, gpcs_, gpc))
-        taken = std::max(taken, outs_[gpc]->send(item, at).first);
-    }
-    return taken;
-  }
-
   Cycle assemble(const VertexWarp& warp, Cycle visible) {
-    for (const auto& out : outs_) {
-      lane_.hold(out->last());
-      charge(UnitState::blocked, out->last());
-    }
+    lane_.hold(out_.last());
+    charge(UnitState::blocked, out_.last());
+    PrimitiveItem item;
     if (warp.mark != Mark::none) {
-      // The GPCs' ends follow one another; the first stands for all, since no warp comes after it.
       const Cycle at = lane_.take(visible);
-      if (!ended_) {
-        PrimitiveItem mark;
-        mark.mark = warp.mark;
-        send(mark, at);
-        ended_ = warp.mark == Mark::end_of_frame;
-      }
+      item.mark = warp.mark;
+      out_.send(item, at);
       return at;
     }
     Cycle left = never;
+    Cycle last = visible;
     for (std::uint32_t splat = warp.first_splat; splat < warp.first_splat + warp.splats; ++splat) {
       std::array<Primitive, 2> primitives;
       const unsigned count = behaviour_->assemble(warp.draw, splat, primitives);
       // Culled triangles take their turn as well.
       for (unsigned i = 0; i < std::max(count, 1U); ++i) {
-        const Cycle at = lane_.take(visible);
+        const Cycle at = last = lane_.take(visible);
         did(VpoWork::triangles, 1, at);
         left = std::min(left, at);
         charge(UnitState::starved, at);
         if (i < count) {
-          PrimitiveItem item;
           item.primitive = primitives[i];
-          const Cycle taken = send(item, at);
+          const Cycle taken = out_.send(item, at).first;
           charge(UnitState::blocked, taken);
           lane_.hold(taken);
         }
         charge(UnitState::busy, at + 1);
       }
     }
+    if (ends_batches_) {
+      PrimitiveItem end;
+      end.ends_batch = true;
+      out_.send(end, std::max(last, out_.last()));
+    }
     return left;
   }
 
   std::unique_ptr<VpoBehaviour> behaviour_;
   const Throughput timing_;
-  const unsigned gpcs_;
-  std::vector<std::unique_ptr<TimedOut<PrimitiveItem>>> outs_;
-  std::vector<std::unique_ptr<TimedIn<VertexWarp>>> ins_;
+  const bool ends_batches_;
+  TimedOut<PrimitiveItem> out_;
+  TimedIn<VertexWarp> in_;
   IssuePort lane_;
-  bool ended_ = false;
 };
 
 [[maybe_unused]] const bool vpo_timed_registered = [] {

@@ -12,13 +12,11 @@ namespace {
 class UntimedVpo : public UntimedUnit {
  public:
   UntimedVpo(const std::string& name, std::unique_ptr<VpoBehaviour> behaviour, unsigned gpcs)
-      : UntimedUnit(name, VpoWork::kinds(behaviour->timing())), behaviour_(std::move(behaviour)), gpcs_(gpcs) {
-    for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
-      const std::string index = std::to_string(gpc);
-      outs_.push_back(std::make_unique<UntimedOut<PrimitiveItem>>(*this, "out_primitives_" + index));
-      ins_.push_back(input<VertexWarp>("in_vertices_" + index, [this](const VertexWarp& warp) { assemble(warp); }));
-    }
-  }
+      : UntimedUnit(name, VpoWork::kinds(behaviour->timing())),
+        behaviour_(std::move(behaviour)),
+        ends_batches_(gpcs > 1),
+        out_(*this, "out_primitives"),
+        in_(input<VertexWarp>("in_vertices", [this](const VertexWarp& warp) { assemble(warp); })) {}
 
   Behaviour& behaviour() override { return *behaviour_; }
 
@@ -26,11 +24,8 @@ class UntimedVpo : public UntimedUnit {
   void assemble(const VertexWarp& warp) {
     PrimitiveItem item;
     if (warp.mark != Mark::none) {
-      // One end for each GPC; no warp comes after the first.
-      if (ended_) return;
-      ended_ = warp.mark == Mark::end_of_frame;
       item.mark = warp.mark;
-      for (const auto& out : outs_) out->send(item);
+      out_.send(item);
       return;
     }
     for (std::uint32_t splat = warp.first_splat; splat < warp.first_splat + warp.splats; ++splat) {
@@ -39,18 +34,19 @@ class UntimedVpo : public UntimedUnit {
       did(VpoWork::triangles, std::max(count, 1U));  // culled ones take their turn as well
       for (unsigned i = 0; i < count; ++i) {
         item.primitive = primitives[i];
-        for (unsigned gpc = 0; gpc < gpcs_; ++gpc) {
-          if (concerns(item.primitive, gpcs_, gpc)) outs_[gpc]->send(item);
-        }
+        out_.send(item);
       }
     }
+    if (!ends_batches_) return;
+    PrimitiveItem end;
+    end.ends_batch = true;
+    out_.send(end);
   }
 
   std::unique_ptr<VpoBehaviour> behaviour_;
-  const unsigned gpcs_;
-  std::vector<std::unique_ptr<UntimedOut<PrimitiveItem>>> outs_;
-  std::vector<std::unique_ptr<UntimedIn<VertexWarp>>> ins_;
-  bool ended_ = false;
+  const bool ends_batches_;
+  UntimedOut<PrimitiveItem> out_;
+  std::unique_ptr<UntimedIn<VertexWarp>> in_;
 };
 
 [[maybe_unused]] const bool vpo_untimed_registered = [] {

@@ -5,6 +5,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/checked_behaviours.h>
+#include <vrpipe/pipeline/slots/wdx.h>
 #include <vrpipe/platforms/observers.h>
 
 namespace vrpipe {
@@ -41,30 +42,42 @@ DrawState draw_state_from(const StateParameters& parameters) {
 }  // namespace
 
 namespace {
-void set_state(StateParameters& parameters, const RunRequest& request, const std::vector<Setting>& own) {
+/// What is said of `unit` by all who may, the last of them counting.
+void set_all(const char* unit, ParameterSet& parameters, const RunRequest& request,
+             const std::vector<Setting>& own = {}) {
   for (const auto* settings : {&request.platform->settings, &request.variant.settings, &request.settings,
                                &request.variant.changed_settings, &own}) {
     for (const Setting& setting : *settings) {
-      if (setting.unit == "state") parameters.set(setting.unit, setting.parameter, setting.value);
+      if (setting.unit == unit) parameters.set(setting.unit, setting.parameter, setting.value);
     }
   }
 }
 }  // namespace
 
+PlatformParameters::PlatformParameters(const Platform& platform)
+    : gpcs(*this, "gpcs", platform.gpcs, 1, most_gpcs, "GPCs", "the platform's",
+           "graphics processing clusters, which share screen tiles, L2 and DRAM") {}
+
+unsigned gpcs_of(const RunRequest& request) {
+  PlatformParameters parameters(*request.platform);
+  set_all("platform", parameters, request);
+  return parameters.gpcs;
+}
+
 DrawState draw_state_of(const RunRequest& request, const std::vector<Setting>& own) {
   StateParameters parameters;
-  set_state(parameters, request, own);
+  set_all("state", parameters, request, own);
   return draw_state_from(parameters);
 }
 
 DepthFormat depth_format_of(const RunRequest& request) {
   StateParameters parameters;
-  set_state(parameters, request, {});
+  set_all("state", parameters, request);
   return static_cast<DepthFormat>(static_cast<unsigned>(parameters.depth_format));
 }
 
 Configuration::Configuration(const RunRequest& request, const Frame& frame)
-    : request_(request), netlist_(request.platform->gpcs), elaborated_(request.platform->gpcs) {
+    : request_(request), netlist_(gpcs_of(request)), elaborated_(netlist_.gpcs()) {
   // Of the program itself; a plugin's are reported when it is loaded.
   const std::vector<Registry::Problem> problems = Registry::instance().take_problems();
   if (!problems.empty()) {
@@ -98,10 +111,37 @@ Configuration::Configuration(const RunRequest& request, const Frame& frame)
   context.clock_ps =
       std::max<std::uint64_t>(1, static_cast<std::uint64_t>(std::llround(1e6 / request.platform->frequency_mhz)));
   if (request.observers != nullptr) context.fragments = request.observers->of_fragments();
-  context.placement.gpcs = request.platform->gpcs;
-  for (unsigned& gpc = context.placement.gpc; gpc < request.platform->gpcs; ++gpc) contexts_.push_back(context);
+  context.placement.gpcs = netlist_.gpcs();
+  context.placement.owners = owners_of_tiles(context);
+  for (unsigned& gpc = context.placement.gpc; gpc < netlist_.gpcs(); ++gpc) contexts_.push_back(context);
   decide_effects();
   check_left_out();
+}
+
+/// Null where one GPC has all. The map is asked once: units look into a table.
+std::shared_ptr<const TileOwners> Configuration::owners_of_tiles(const RenderContext& context) const {
+  if (netlist_.gpcs() == 1) return nullptr;
+  const std::vector<const Instance*> crossbars = instances_of("wdx");
+  if (crossbars.size() != 1) {
+    throw UserError("incomplete platform " + request_.platform->name, "its wiring",
+                    "it has " + std::to_string(netlist_.gpcs()) + " GPCs and " + std::to_string(crossbars.size()) +
+                        " crossbars, which say whose the screen tiles are",
+                    "add one unit `wdx`, as wire_pipeline does");
+  }
+  const UnitChoices& unit = units_.at(crossbars.front()->path);
+  const auto map = behaviour_as<WdxBehaviour>(unit.real->make_behaviour(*unit.real_parameters, context));
+  return std::make_shared<TileOwners>(context.frame->width(), context.frame->height(),
+                                      [&](TileId tile) { return map->owner_of(tile); });
+}
+
+std::function<unsigned(TileId)> tile_map_of(const RunRequest& request) {
+  const Configuration configuration(request, Frame(1, 1));
+  for (const Instance& instance : configuration.netlist().instances()) {
+    if (instance.slot != "wdx") continue;
+    std::shared_ptr<const WdxBehaviour> map = configuration.make_as<WdxBehaviour>(instance);
+    return [map](TileId tile) { return map->owner_of(tile); };
+  }
+  return [](TileId) { return 0U; };
 }
 
 /// Parameters that cannot be are refused whatever the frame calls for: the units that are left out, or pass through in this
@@ -145,7 +185,15 @@ void Configuration::choose_implementations() {
   for (const auto* units : {&request_.units, &request_.variant.changed_units}) {
     choices.insert(choices.end(), units->begin(), units->end());
   }
+  for (const std::string& slot : netlist_.absent()) {
+    absent_[slot] = &default_implementation(registry.slot(slot), request_.variant);
+  }
   for (const UnitChoice& choice : choices) {
+    const auto absent = absent_.find(choice.slot);
+    if (absent != absent_.end()) {
+      absent->second = &registry.find(choice.slot, choice.implementation);
+      continue;
+    }
     const std::vector<const Instance*> named = instances_named(choice.slot);
     const std::string& slot = named.empty() ? choice.slot : named.front()->slot;
     const Implementation& implementation = registry.find(slot, choice.implementation);
@@ -197,10 +245,11 @@ bool Configuration::concerns_chosen_unit(const Setting& setting) const {
 
 void Configuration::apply(const Setting& setting) {
   if (setting.unit == "state") return state_parameters_.set(setting.unit, setting.parameter, setting.value);
+  if (setting.unit == "platform" || set_absent(setting)) return;  // gpcs_of has seen to the first
   if (setting.unit.compare(0, link_prefix.size(), link_prefix) == 0) return set_link(setting);
   const std::vector<const Instance*> named = instances_named(setting.unit);
   if (named.empty()) {
-    std::vector<std::string> known{"state"};
+    std::vector<std::string> known{"state", "platform"};
     for (const Instance& instance : netlist_.instances()) {
       known.push_back(instance.slot);
       known.push_back(instance.path);
@@ -216,6 +265,14 @@ void Configuration::apply(const Setting& setting) {
     unit.real_parameters->set(setting.unit, setting.parameter, setting.value);
     if (unit.chosen == unit.real) unit.chosen_parameters->set(setting.unit, setting.parameter, setting.value);
   }
+}
+
+/// Whether the setting is for a slot that the platform does without; then it is checked.
+bool Configuration::set_absent(const Setting& setting) {
+  const auto absent = absent_.find(setting.unit);
+  if (absent == absent_.end()) return false;
+  absent->second->make_parameters()->set(setting.unit, setting.parameter, setting.value);
+  return true;
 }
 
 void Configuration::set_link(const Setting& setting) {
@@ -266,6 +323,9 @@ std::vector<std::pair<std::string, std::string>> Configuration::parameters() con
   for (const Link& link : netlist_.links()) {
     add(link_prefix + without_gpc(link.name()), link_prefix + link.name(), *link.parameters);
   }
+  PlatformParameters platform(*request_.platform);
+  platform.gpcs = netlist_.gpcs();
+  add("platform", "platform", platform);
   add("state", "state", state_parameters_);
   return all;
 }

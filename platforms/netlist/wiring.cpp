@@ -5,17 +5,22 @@ namespace vrpipe {
 void wire_gpc(Netlist& netlist, unsigned gpc, const std::string& memory) {
   const std::string index = std::to_string(gpc);
   const std::string self = "gpc" + index + ".";
-  for (const char* slot : {"tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) netlist.add(self + slot);
+  for (const char* slot : {"vpo", "tgc", "raster", "tc", "prop", "zrop", "qru", "sm", "crop"}) netlist.add(self + slot);
   const auto connect = [&](const std::string& from, const std::string& to, unsigned depth = 4) {
     netlist.connect(from, to, depth);
   };
 
   // Vertices: issued, shaded on the SM array, assembled.
   connect("draw.out_vertices_" + index, self + "sm.in_vertices");
-  connect(self + "sm.out_vertices", "vpo.in_vertices_" + index);
+  connect(self + "sm.out_vertices", self + "vpo.in_vertices");
 
-  // Primitives to quads, quads to bins.
-  connect("vpo.out_primitives_" + index, self + "tgc.in_primitives", 16);
+  // Primitives to the GPCs that own their tiles, to quads, quads to bins.
+  if (netlist.gpcs() == 1) {
+    connect(self + "vpo.out_primitives", self + "tgc.in_primitives", 16);
+  } else {
+    connect(self + "vpo.out_primitives", "wdx.in_primitives_" + index, 16);
+    connect("wdx.out_primitives_" + index, self + "tgc.in_primitives", 16);
+  }
   connect(self + "tgc.out_jobs", self + "raster.in_jobs", 16);
   connect(self + "raster.out_quads", self + "tc.in_quads", 8);
   connect(self + "tc.out_bins", self + "prop.in_bins", 8);
@@ -49,7 +54,11 @@ void wire_gpc(Netlist& netlist, unsigned gpc, const std::string& memory) {
 
 void wire_pipeline(Netlist& netlist) {
   netlist.add("draw");
-  netlist.add("vpo");
+  if (netlist.gpcs() > 1) {
+    netlist.add("wdx");
+  } else {
+    netlist.do_without("wdx");
+  }
   netlist.add("l2");
   for (unsigned gpc = 0; gpc < netlist.gpcs(); ++gpc) wire_gpc(netlist, gpc);
 }

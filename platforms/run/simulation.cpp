@@ -606,6 +606,7 @@ std::vector<ParameterListing> list_parameters(const Platform* platform) {
         {name, "", without_gpc(link.from) + " to " + without_gpc(link.to), false, std::move(parameters)});
   }
 
+  listings.push_back({"platform", "gpu", "the GPU as a whole", false, std::make_unique<PlatformParameters>(wired)});
   listings.push_back({"state", "draw-state", "the draw's state and the precision of the fixed-function hardware", false,
                       std::make_unique<StateParameters>()});
   apply({"state"}, *listings.back().parameters);

@@ -58,8 +58,9 @@ std::vector<std::string> outside_validated_range(const std::vector<std::pair<std
 std::vector<std::string> outside_validated_range(const Netlist& netlist) {
   std::vector<std::string> reasons;
   for (const Instance& instance : netlist.instances()) {
-    if (!Netlist::is_memory(instance) && Pipeline::place_of(instance.slot) == Pipeline::places) {
-      reasons.push_back(instance.path + " is in slot " + instance.slot + " of a plugin, which was not validated");
+    const bool is_known = Netlist::is_memory(instance) || Pipeline::place_of(instance.slot) != Pipeline::places;
+    if (!is_known && Registry::instance().slot(instance.slot).validated.empty()) {
+      reasons.push_back(instance.path + " is in slot " + instance.slot + ", which was not validated");
     }
   }
   for (const Link& link : netlist.links()) check_link(link, reasons);

@@ -138,7 +138,7 @@ TEST(ColorRopOfAFrame, MarksOfDrawsAndTheEndClearNothing) {
 TEST(ColorRopOfAFrame, AGpcClearsItsOwnTilesAlone) {
   Frame frame(128, 128);
   frame.clear({true, true});
-  const Placement placement{3, 1};
+  const Placement placement = testing::placement_of(3, 1, 128, 128);
   Rop rop(frame, Termination::paper, ColorFormat::rgba16f, placement);
   const ScreenTiling& grid = rop.surface.grid();
   for (std::size_t place = 0; place < grid.quads(); ++place) rop.surface.quad(place) = color_of(1, 1, 1, 1);

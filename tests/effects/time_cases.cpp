@@ -19,7 +19,6 @@ Scene on_foreign_memory(Scene scene) {
   auto platform = std::make_shared<Platform>(platform_named("agx-orin-ideal-memory"));
   platform->wire = [](Netlist& netlist) {
     netlist.add("draw");
-    netlist.add("vpo");
     netlist.add_memory("dram", [](const std::string& name, unsigned) {
       const auto ns = [](double time) { return sc_core::sc_time(time, sc_core::SC_NS); };
       auto module = std::make_unique<foreign::Dram>(name.c_str(), ns(1), ns(40), ns(70));

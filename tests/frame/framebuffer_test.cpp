@@ -98,11 +98,12 @@ TEST(DepthStencilSurface, AGpcClearsTheTerminationOfItsOwnTiles) {
   for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
     DepthStencilSurface surface(100, 40);
     for (std::size_t place = 0; place < surface.grid().quads(); ++place) surface.terminated(place) = 0xa;
-    surface.clear(of_termination(), {gpcs, gpc});
+    const Placement placement = testing::placement_of(gpcs, gpc, 100, 40);
+    surface.clear(of_termination(), placement);
     std::size_t cleared = 0;
     for (std::size_t place = 0; place < surface.grid().quads(); ++place) {
       const TileId tile = surface.grid().tile(place / positions_per_tile);
-      const bool own = owner_of(tile, gpcs) == gpc;
+      const bool own = (tile.x + tile.y) % gpcs == gpc;
       ASSERT_EQ(surface.terminated(place), own ? 0 : 0xa) << tile.x << "," << tile.y;
       cleared += own;
     }

@@ -175,7 +175,7 @@ foreach(fidelity bound lt)
   endif()
   expect_success("bound by (gpc0\\.)?(tally|TALLY)" ${vrpipe} ${one_beat} --fidelity ${fidelity})
 endforeach()
-expect_success("gpc0.tally is in slot tally of a plugin" ${vrpipe} ${one_beat} --fidelity lt)
+expect_success("gpc0.tally is in slot tally, which was not validated" ${vrpipe} ${one_beat} --fidelity lt)
 expect_refusal("link.tally.quads" ${vrpipe} run ${draw} ${tally} --platform tallied --set link.tally.quadz.depth=4)
 expect_success("" ${vrpipe} run ${draw} ${tally} --platform tallied --set link.tally.quads.depth=1)
 

@@ -129,6 +129,20 @@ TEST_F(ClockDomainTest, AWakeUpOfAUnitThatTicksInTheSameCycleIsKept) {
   }
 }
 
+TEST_F(ClockDomainTest, WakeUpsAreKeptAmongManyUnits) {
+  // The first wakes all others each cycle, also those that tick in it themselves.
+  std::vector<std::unique_ptr<Ticker>> tickers;
+  tickers.push_back(std::make_unique<Ticker>(*clock, std::vector<Cycle>{1, 2, 3, 4}));
+  for (unsigned i = 1; i < 300; ++i) tickers.push_back(std::make_unique<Ticker>(*clock, std::vector<Cycle>{}));
+  tickers[0]->action = [&](Cycle now) {
+    for (unsigned i = 1; i < 300 && now < 4; ++i) clock->wake(tickers[i]->handle, now + 1);
+  };
+  sc_core::sc_start();
+  for (const auto& ticker : tickers) {
+    ASSERT_EQ(ticker->ticks, (std::vector<Cycle>{0, 1, 2, 3, 4})) << "unit " << ticker->handle;
+  }
+}
+
 TEST_F(ClockDomainTest, TheEarliestOfSeveralWakeUpsCounts) {
   Ticker waker(*clock, {});
   Ticker sleeper(*clock, {50});

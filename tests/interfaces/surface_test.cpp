@@ -74,21 +74,6 @@ TEST(BlendOrderMonitor, CatchesAPrimitiveThatComesAfterALaterOne) {
   EXPECT_THROW(monitor.blended(one_quad({1, 1}, 5, 17, 16), 0, 1, 3), SimulationFault);
 }
 
-TEST(TileOwnership, SpreadsNeighbouringTilesOverAllGpcs) {
-  for (const unsigned gpcs : {2U, 3U, 4U, 6U}) {
-    std::vector<unsigned> owned(gpcs);
-    for (std::uint16_t y = 0; y < 24; ++y) {
-      for (std::uint16_t x = 0; x < 24; ++x) {
-        const unsigned owner = owner_of({x, y}, gpcs);
-        ASSERT_LT(owner, gpcs);
-        ++owned[owner];
-        EXPECT_NE(owner, owner_of({static_cast<std::uint16_t>(x + 1), y}, gpcs));
-      }
-    }
-    for (const unsigned tiles : owned) EXPECT_EQ(tiles, 576 / gpcs) << gpcs;
-  }
-}
-
 TEST(RandomStalls, HoldInTheirShareOfCyclesAndDependOnTheSeed) {
   unsigned stalled = 0;
   unsigned different = 0;

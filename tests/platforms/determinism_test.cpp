@@ -203,13 +203,13 @@ TEST(Wiring, UnknownUnitsAndPortsGetTheNearestName) {
     };
     expect("did you mean draw", [](Netlist& netlist) {
       netlist.add("draw");
-      netlist.add("vpo");
-      netlist.connect("drow.out_vertices_0", "vpo.in_vertices_0");
+      netlist.add("gpc0.sm");
+      netlist.connect("drow.out_vertices_0", "gpc0.sm.in_vertices");
     });
     expect("out_vertices_0", [](Netlist& netlist) {
       netlist.add("draw");
-      netlist.add("vpo");
-      netlist.connect("draw.out_vertexes_0", "vpo.in_vertices_0");
+      netlist.add("gpc0.sm");
+      netlist.connect("draw.out_vertexes_0", "gpc0.sm.in_vertices");
     });
     expect("different items", [](Netlist& netlist) {
       netlist.add("draw");

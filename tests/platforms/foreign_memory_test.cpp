@@ -29,7 +29,6 @@ Platform with_memory(MemoryMaker make) {
   platform.name = "foreign";
   platform.wire = [make = std::move(make)](Netlist& netlist) {
     netlist.add("draw");
-    netlist.add("vpo");
     netlist.add_memory("dram", make);
     wire_gpc(netlist, 0, "dram");
   };

@@ -84,7 +84,7 @@ TEST(Hierarchy, EveryInstanceIsFoundByItsPathInItsGpc) {
       r.effects = EffectChoice::everything();
     }));
     EXPECT_EQ(names_of(sc_core::sc_get_top_level_objects()),
-              (std::vector<std::string>{"clock", "draw", "vpo", "gpc0", "gpc1", "gpc2", "gpc3", "l2", "dram"}));
+              (std::vector<std::string>{"clock", "draw", "wdx", "gpc0", "gpc1", "gpc2", "gpc3", "l2", "dram"}));
     for (const Gpu::Placed& placed : of.gpu().units()) {
       const std::string& path = placed.instance->path;
       EXPECT_EQ(sc_core::sc_find_object(path.c_str()), placed.unit.get()) << path;
@@ -95,8 +95,8 @@ TEST(Hierarchy, EveryInstanceIsFoundByItsPathInItsGpc) {
       EXPECT_EQ(parent_of(path), placed.instance->in_front_end ? "" : "gpc" + std::to_string(placed.instance->gpc));
     }
     EXPECT_EQ(names_of(sc_core::sc_find_object("gpc2")->get_child_objects()),
-              (std::vector<std::string>{"gpc2.tgc", "gpc2.raster", "gpc2.tc", "gpc2.prop", "gpc2.zrop", "gpc2.qru",
-                                        "gpc2.sm", "gpc2.crop", "gpc2.l1"}));
+              (std::vector<std::string>{"gpc2.vpo", "gpc2.tgc", "gpc2.raster", "gpc2.tc", "gpc2.prop", "gpc2.zrop",
+                                        "gpc2.qru", "gpc2.sm", "gpc2.crop", "gpc2.l1"}));
     EXPECT_EQ(parent_of("gpc3.crop.memory"), "gpc3.crop") << "a memory port";
   }
 }

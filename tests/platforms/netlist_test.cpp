@@ -79,13 +79,13 @@ ForeignMemory make_other(const std::string& name, unsigned units) {
 TEST(Netlist, IsWhatThePlatformsWire) {
   Netlist netlist(4);
   platform_named("desktop").wire(netlist);
-  EXPECT_EQ(netlist.instances().size(), 3U + 4 * 8);
-  EXPECT_EQ(netlist.links().size(), 4U * 18);
+  EXPECT_EQ(netlist.instances().size(), 3U + 4 * 9);
+  EXPECT_EQ(netlist.links().size(), 4U * 19);
   ASSERT_NE(netlist.find("gpc3.tc"), nullptr);
   EXPECT_EQ(netlist.find("gpc3.tc")->slot, "tc");
   EXPECT_EQ(netlist.find("gpc3.tc")->gpc, 3U);
   EXPECT_FALSE(netlist.find("gpc3.tc")->in_front_end);
-  EXPECT_TRUE(netlist.find("vpo")->in_front_end);
+  EXPECT_TRUE(netlist.find("wdx")->in_front_end);
   EXPECT_EQ(netlist.link_from("gpc3.tc.out_bins")->to, "gpc3.prop.in_bins");
   EXPECT_EQ(netlist.link_from("gpc3.tc.out_bins")->name(), "gpc3.tc.bins");
   EXPECT_EQ(netlist.bound_to("l2").size(), 4U);
@@ -93,7 +93,7 @@ TEST(Netlist, IsWhatThePlatformsWire) {
 
 TEST(Netlist, NamesOfAPathAreThePathAndThatOfAllGpcs) {
   EXPECT_EQ(without_gpc("gpc12.tc"), "tc");
-  EXPECT_EQ(without_gpc("vpo.primitives_3"), "vpo.primitives");
+  EXPECT_EQ(without_gpc("wdx.primitives_3"), "wdx.primitives");
   EXPECT_EQ(without_gpc("gpcx.tc"), "gpcx.tc");
   EXPECT_TRUE(names_path("tc", "gpc1.tc"));
   EXPECT_TRUE(names_path("gpc1.tc", "gpc1.tc"));
@@ -304,7 +304,7 @@ TEST(ForeignMemories, MayLieBelowTheL2) {
   Platform before = after;
   before.wire = [](Netlist& netlist) {
     netlist.add("draw");
-    netlist.add("vpo");
+    netlist.add("wdx");
     netlist.add_memory("dram", make_other);
     netlist.add("l2");
     netlist.connect_memory("l2", "dram");

@@ -166,7 +166,7 @@ TEST(Statistics, OfSeveralGpcsAddUpAtEveryFidelity) {
     ASSERT_GT(gpcs, 1U);
     unsigned summed = 0;
     for (const StatisticReport& report : result.statistics) {
-      const bool front_end = report.name.rfind("draw.", 0) == 0 || report.name.rfind("vpo.", 0) == 0;
+      const bool front_end = report.name.rfind("draw.", 0) == 0 || report.name.rfind("wdx.", 0) == 0;
       EXPECT_EQ(report.instances.empty(), front_end || report.name.rfind("l2.", 0) == 0) << report.name;
       if (report.instances.empty() || report.kind == "largest" || report.kind == "smallest") continue;
       std::uint64_t value = 0;

@@ -433,14 +433,14 @@ TEST(TileRasterizer, GpcsShareTheSamplesOutAmongThem) {
   RenderContext context = context_of(draw);
   const Coverage whole = rasterize(context);
   std::vector<unsigned> sum(whole.times.size());
-  context.placement.gpcs = 4;
-  for (context.placement.gpc = 0; context.placement.gpc < 4; ++context.placement.gpc) {
+  for (unsigned gpc = 0; gpc < 4; ++gpc) {
+    context.placement = testing::placement_of(4, gpc, 128, 128);
     const Coverage part = rasterize(context);
     for (std::size_t i = 0; i < sum.size(); ++i) {
       sum[i] += part.times[i];
       const TileId tile{static_cast<std::uint16_t>(i % 128 / 16), static_cast<std::uint16_t>(i / 128 / 16)};
       if (part.times[i] > 0) {
-        ASSERT_EQ(owner_of(tile, 4), context.placement.gpc);
+        ASSERT_EQ((tile.x + tile.y) % 4U, gpc);
       }
     }
   }

@@ -44,6 +44,12 @@ inline Draw draw_of(std::uint32_t width, std::uint32_t height, std::vector<Splat
 }
 
 /// A frame of this draw alone, which it refers to.
+/// A GPC of several, to which the screen tiles go one by one along rows, a tile further in each row.
+inline Placement placement_of(unsigned gpcs, unsigned gpc, unsigned width, unsigned height) {
+  return {gpcs, gpc,
+          std::make_shared<TileOwners>(width, height, [gpcs](TileId tile) { return (tile.x + tile.y) % gpcs; })};
+}
+
 inline RenderContext context_of(const Draw& draw, const DrawState& state = {}) {
   RenderContext context;
   context.frame = Frame::of(draw, state);

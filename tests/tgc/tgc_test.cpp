@@ -203,18 +203,30 @@ TEST_F(TileGridCoalescingTest, AGpcSkipsGridsInWhichItOwnsNoTile) {
   parameters.set("tgc", "grid_tiles", "1");
   unsigned entries = 0;
   for (unsigned gpc = 0; gpc < 4; ++gpc) {
-    context.placement.gpcs = 4;
-    context.placement.gpc = gpc;
+    context.placement = testing::placement_of(4, gpc, context.frame->width(), context.frame->height());
     TileGridCoalescing tgc(parameters, context);
     enter(tgc, {primitive_in(0, {0, 0, 256, 256})});
     for (const auto& flush : drain(tgc)) {
-      EXPECT_EQ(
-          owner_of({static_cast<std::uint16_t>(flush.clip.x0 / 16), static_cast<std::uint16_t>(flush.clip.y0 / 16)}, 4),
-          gpc);
+      EXPECT_EQ((flush.clip.x0 / 16 + flush.clip.y0 / 16) % 4, static_cast<int>(gpc));
       ++entries;
     }
   }
   EXPECT_EQ(entries, 256U);
+}
+
+TEST_F(TileGridCoalescingTest, AGpcSkipsGridsOfWhichItOwnsNoTileThatThePrimitiveMayCover) {
+  unsigned entries = 0;
+  for (unsigned gpc = 0; gpc < 4; ++gpc) {
+    context.placement = testing::placement_of(4, gpc, context.frame->width(), context.frame->height());
+    TileGridCoalescing tgc(parameters, context);
+    // Two tiles on either side of the border between two grids of 4x4: GPC 3's and GPC 0's.
+    enter(tgc, {primitive_in(0, {50, 2, 78, 9})});
+    for (const auto& flush : drain(tgc)) {
+      EXPECT_EQ(gpc, flush.clip.x0 == 0 ? 3U : 0U);
+      ++entries;
+    }
+  }
+  EXPECT_EQ(entries, 2U);
 }
 
 TEST_F(TileGridCoalescingTest, PassingThroughEveryPrimitiveIsAFlushOfItsBounds) {

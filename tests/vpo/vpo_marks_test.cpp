@@ -1,4 +1,4 @@
-// VPO in a frame of several draws: a mark comes from one GPC and goes to all.
+// VPO in a frame of several draws.
 #include <gtest/gtest.h>
 
 #include "support/fidelities.h"
@@ -37,36 +37,25 @@ class VpoMarksTest : public ::testing::TestWithParam<Fidelity> {};
 INSTANTIATE_TEST_SUITE_P(Fidelities, VpoMarksTest, ::testing::ValuesIn(testing::fidelities_with_time()),
                          testing::name_of_fidelity);
 
-/// VPO and its GPCs. What DRAW would hand on is added in its order.
+/// VPO, given what DRAW would hand on.
 struct VpoBench {
-  VpoBench(Fidelity fidelity, const RenderContext& context, unsigned gpcs, unsigned depth = 4)
-      : bench(fidelity, "vpo", "primitive-assembly", context, {}, gpcs) {
-    for (unsigned gpc = 0; gpc < gpcs; ++gpc) {
-      ins.push_back(&bench.source<VertexWarp>("in_vertices_" + std::to_string(gpc)));
-      outs.push_back(&bench.sink<PrimitiveItem>("out_primitives_" + std::to_string(gpc), depth));
-    }
-  }
-  void add(const VertexWarp& warp) {
-    // At lt the order of calls is that of cycles.
-    ins[turn]->add(warp, bench.fidelity() == Fidelity::lt ? 1000 * added : 0);
-    turn = (turn + 1) % static_cast<unsigned>(ins.size());
-    ++added;
-  }
+  VpoBench(Fidelity fidelity, const RenderContext& context, unsigned depth = 4)
+      : bench(fidelity, "vpo", "primitive-assembly", context),
+        in(bench.source<VertexWarp>("in_vertices")),
+        out(bench.sink<PrimitiveItem>("out_primitives", depth)) {}
   void add_frame() {
     for (std::uint32_t draw = 0; draw < marked_draws; ++draw) {
-      if (draw > 0) add(marked<VertexWarp>(before(draw)));
+      if (draw > 0) in.add(marked<VertexWarp>(before(draw)));
       for (std::uint32_t first = 0; first < splats_of_draw; first += 8) {
-        add({splats_of_draw * draw + first, 8, static_cast<DrawIndex>(draw), Mark::none});
+        in.add({splats_of_draw * draw + first, 8, static_cast<DrawIndex>(draw), Mark::none});
       }
     }
-    for (std::size_t gpc = 0; gpc < ins.size(); ++gpc) add(marked<VertexWarp>());
+    in.add(marked<VertexWarp>());
   }
 
   Bench bench;
-  std::vector<Source<VertexWarp>*> ins;
-  std::vector<Sink<PrimitiveItem>*> outs;
-  unsigned turn = 0;
-  unsigned added = 0;
+  Source<VertexWarp>& in;
+  Sink<PrimitiveItem>& out;
 };
 
 /// Each mark once, in order, between the primitives of the draws that it stands between.
@@ -90,37 +79,34 @@ void expect_marks_in_place(const Sink<PrimitiveItem>& sink) {
   EXPECT_EQ(draw + 1, marked_draws);
 }
 
-TEST_P(VpoMarksTest, AMarkGoesToEveryGpcOnceInItsPlace) {
+TEST_P(VpoMarksTest, AMarkGoesOnInItsPlace) {
   const RenderContext context = cleared_between_draws();
-  for (const unsigned gpcs : {1U, 2U, 3U, 4U}) {
-    VpoBench vpo(GetParam(), context, gpcs);
-    vpo.add_frame();
-    vpo.bench.run();
-    for (const Sink<PrimitiveItem>* out : vpo.outs) expect_marks_in_place(*out);
-    EXPECT_TRUE(vpo.bench.unit().idle());
-  }
+  VpoBench vpo(GetParam(), context);
+  vpo.add_frame();
+  vpo.bench.run();
+  expect_marks_in_place(vpo.out);
+  EXPECT_TRUE(vpo.bench.unit().idle());
 }
 
-TEST_P(VpoMarksTest, StallsAndGpcsThatTakeNothingForLongChangeNoOrder) {
+TEST_P(VpoMarksTest, StallsAndAReceiverThatTakesNothingForLongChangeNoOrder) {
   const RenderContext context = cleared_between_draws();
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
-    VpoBench vpo(GetParam(), context, 3, 2);
+    VpoBench vpo(GetParam(), context, 2);
     vpo.add_frame();
-    vpo.outs[1]->close(0, 700);
-    vpo.outs[2]->close(800, 1500);
+    vpo.out.close(0, 700);
     vpo.bench.stall_randomly(seed, GetParam() == Fidelity::lt ? 32 : 128);
     vpo.bench.run();
-    for (const Sink<PrimitiveItem>* out : vpo.outs) expect_marks_in_place(*out);
+    expect_marks_in_place(vpo.out);
     EXPECT_TRUE(vpo.bench.unit().idle());
   }
 }
 
 TEST_P(VpoMarksTest, AMarkTakesTheCycleOfATriangle) {
   const RenderContext context = cleared_between_draws();
-  VpoBench vpo(GetParam(), context, 1, 64);
-  vpo.ins[0]->add(marked<VertexWarp>(before(1)), 20);
+  VpoBench vpo(GetParam(), context, 64);
+  vpo.in.add(marked<VertexWarp>(before(1)), 20);
   vpo.bench.run();
-  EXPECT_EQ(testing::cycles_of(*vpo.outs[0]), (std::vector<Cycle>{21 + 10})) << "in hand at 21, latency 10";
+  EXPECT_EQ(testing::cycles_of(vpo.out), (std::vector<Cycle>{21 + 10})) << "in hand at 21, latency 10";
 }
 
 }  // namespace

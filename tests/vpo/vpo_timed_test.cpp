@@ -41,8 +41,8 @@ TEST_P(VpoTimedTest, APrimitiveIsSeenTheLatencyAfterItsVertices) {
   for (const unsigned latency : {1U, 10U}) {
     Bench bench(GetParam(), "vpo", "primitive-assembly", context,
                 {{"latency_cycles", std::to_string(latency)}, {"triangles_per_cycle", "1"}});
-    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
-    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
+    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices");
+    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives", 64);
     vertices.add({0, 1}, 20);
     bench.run();
     EXPECT_EQ(cycles_of(primitives), (std::vector<Cycle>{21 + latency, 22 + latency})) << "in hand at 21";
@@ -53,8 +53,8 @@ TEST_P(VpoTimedTest, AssemblesItsTrianglesPerCycle) {
   for (const unsigned rate : {1U, 2U, 4U}) {
     Bench bench(GetParam(), "vpo", "primitive-assembly", context,
                 {{"triangles_per_cycle", std::to_string(rate)}, {"latency_cycles", "10"}});
-    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", 8);
-    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
+    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices", 8);
+    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives", 64);
     for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
     bench.run();
     ASSERT_EQ(primitives.records().size(), 64U);
@@ -67,8 +67,8 @@ TEST_P(VpoTimedTest, CulledTrianglesTakeTheirTurn) {
   for (unsigned i = 0; i < 8; ++i) draw.splats[i] = testing::flat_box(-40, -40, -30, -30, 0.5F);
   Bench bench(GetParam(), "vpo", "primitive-assembly", context,
               {{"triangles_per_cycle", "1"}, {"latency_cycles", "1"}});
-  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
-  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
+  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices");
+  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives");
   vertices.add({0, 8});
   vertices.add({8, 1});
   bench.run();
@@ -78,8 +78,8 @@ TEST_P(VpoTimedTest, CulledTrianglesTakeTheirTurn) {
 
 TEST_P(VpoTimedTest, PrimitivesComeInDrawOrderAndTheEndLast) {
   Bench bench(GetParam(), "vpo", "primitive-assembly", context);
-  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
-  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
+  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices");
+  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives");
   for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
   vertices.add(marked<VertexWarp>());
   bench.run();
@@ -87,60 +87,32 @@ TEST_P(VpoTimedTest, PrimitivesComeInDrawOrderAndTheEndLast) {
   EXPECT_TRUE(bench.unit().idle());
 }
 
-TEST_P(VpoTimedTest, TakesTheGpcsVerticesInTurn) {
-  // At lt vertices come in draw order, since a warp and all that it leads to is a call from DRAW; elsewhere one that
-  // comes before its turn waits in its queue.
-  const bool in_order = GetParam() == Fidelity::lt;
-  Bench bench(GetParam(), "vpo", "primitive-assembly", context, {}, 2);
-  Source<VertexWarp>& even = bench.source<VertexWarp>("in_vertices_0");
-  Source<VertexWarp>& odd = bench.source<VertexWarp>("in_vertices_1");
-  Sink<PrimitiveItem>& first = bench.sink<PrimitiveItem>("out_primitives_0");
-  Sink<PrimitiveItem>& second = bench.sink<PrimitiveItem>("out_primitives_1");
-  even.add({0, 8}, 500);
-  odd.add({8, 8}, in_order ? 600 : 0);
-  even.add({16, 8}, 700);
-  odd.add({24, 8}, in_order ? 800 : 0);
-  even.add(marked<VertexWarp>(), 900);
-  odd.add(marked<VertexWarp>(), in_order ? 901 : 0);
-  bench.run();
-  std::size_t primitives = 0;
-  for (const Sink<PrimitiveItem>* sink : {&first, &second}) {
-    std::uint32_t last = 0;
-    for (const auto& record : sink->records()) {
-      if (record.item.mark == Mark::end_of_frame) continue;
-      const std::uint32_t order = 2 * record.item.primitive.splat + record.item.primitive.triangle;
-      EXPECT_GE(order, last);
-      EXPECT_GE(record.cycle, 500U);
-      last = order;
-      ++primitives;
+TEST_P(VpoTimedTest, TellsTheCrossbarWhereABatchEndsWhereThereAreSeveralGpcs) {
+  for (unsigned i = 8; i < 16; ++i) draw.splats[i] = testing::flat_box(-40, -40, -30, -30, 0.5F);
+  for (const unsigned gpcs : {1U, 2U}) {
+    Bench bench(GetParam(), "vpo", "primitive-assembly", context, {}, gpcs);
+    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices");
+    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives");
+    for (std::uint32_t first = 0; first < 24; first += 8) vertices.add({first, 8});
+    vertices.add(marked<VertexWarp>());
+    bench.run();
+    std::vector<std::size_t> ends;  // behind so many primitives
+    std::size_t behind = 0;
+    for (const auto& record : primitives.records()) {
+      if (record.item.ends_batch) ends.push_back(behind);
+      behind += record.item.mark == Mark::none && !record.item.ends_batch ? 1U : 0U;
     }
-    EXPECT_TRUE(sink->records().back().item.mark == Mark::end_of_frame);
-  }
-  EXPECT_EQ(primitives, 64U) << "no box is in tiles of both";
-  EXPECT_TRUE(bench.unit().idle());
-}
-
-TEST_P(VpoTimedTest, APrimitiveGoesToEveryGpcThatOwnsATileOfItsBoundsAndToNoOther) {
-  draw.splats.push_back(testing::flat_box(1, 1, 30, 5, 0.5F));  // tiles (0,0) and (1,0)
-  Bench bench(GetParam(), "vpo", "primitive-assembly", context, {}, 4);
-  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
-  const Sink<PrimitiveItem>* sinks[4];
-  for (unsigned gpc = 0; gpc < 4; ++gpc) {
-    sinks[gpc] = &bench.sink<PrimitiveItem>("out_primitives_" + std::to_string(gpc));
-  }
-  vertices.add({32, 1});
-  bench.run();
-  for (unsigned gpc = 0; gpc < 4; ++gpc) {
-    const bool owns = gpc == owner_of({0, 0}, 4) || gpc == owner_of({1, 0}, 4);
-    EXPECT_EQ(sinks[gpc]->records().size(), owns ? 2U : 0U) << gpc;
+    EXPECT_EQ(ends, gpcs == 1 ? std::vector<std::size_t>() : (std::vector<std::size_t>{16, 16, 32}))
+        << "the second is culled";
+    EXPECT_EQ(behind, 32U);
   }
 }
 
 TEST_P(VpoTimedTest, AFullReceiverStopsItUntilACycleAfterItTakes) {
   Bench bench(GetParam(), "vpo", "primitive-assembly", context,
               {{"triangles_per_cycle", "1"}, {"latency_cycles", "1"}});
-  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
-  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 2);
+  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices");
+  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives", 2);
   primitives.close(0, 50);
   vertices.add({0, 2});
   vertices.add(marked<VertexWarp>());
@@ -159,9 +131,8 @@ TEST_P(VpoTimedTest, AFullReceiverStopsItUntilACycleAfterItTakes) {
 TEST_P(VpoTimedTest, StallsChangeNeitherPrimitivesNorOrder) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     Bench bench(GetParam(), "vpo", "primitive-assembly", context);
-    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", static_cast<unsigned>(1 + seed % 2));
-    Sink<PrimitiveItem>& primitives =
-        bench.sink<PrimitiveItem>("out_primitives_0", static_cast<unsigned>(1 + seed % 10));
+    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices", static_cast<unsigned>(1 + seed % 2));
+    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives", static_cast<unsigned>(1 + seed % 10));
     for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
     vertices.add(marked<VertexWarp>());
     bench.stall_randomly(seed, 100);

@@ -27,8 +27,8 @@ class VpoUnitTest : public ::testing::Test {
 
 TEST_F(VpoUnitTest, APrimitiveIsSeenItsLatencyAfterTheVertices) {
   Bench bench("vpo", "primitive-assembly", context);
-  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
-  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
+  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices");
+  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives", 64);
   vertices.add({0, 1}, 20);
   bench.run();
   ASSERT_EQ(primitives.records().size(), 2U);
@@ -38,8 +38,8 @@ TEST_F(VpoUnitTest, APrimitiveIsSeenItsLatencyAfterTheVertices) {
 TEST_F(VpoUnitTest, AssemblesItsTrianglesPerCycle) {
   for (const unsigned rate : {1U, 2U, 4U}) {
     Bench bench("vpo", "primitive-assembly", context, {{"triangles_per_cycle", std::to_string(rate)}});
-    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", 8);
-    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0", 64);
+    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices", 8);
+    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives", 64);
     for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
     bench.run();
     ASSERT_EQ(primitives.records().size(), 64U);
@@ -49,8 +49,8 @@ TEST_F(VpoUnitTest, AssemblesItsTrianglesPerCycle) {
 
 TEST_F(VpoUnitTest, PrimitivesComeInDrawOrderAndTheEndLast) {
   Bench bench("vpo", "primitive-assembly", context);
-  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0");
-  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives_0");
+  Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices");
+  Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives");
   for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
   vertices.add(marked<VertexWarp>());
   bench.run();
@@ -63,55 +63,11 @@ TEST_F(VpoUnitTest, PrimitivesComeInDrawOrderAndTheEndLast) {
   EXPECT_TRUE(bench.unit().idle());
 }
 
-TEST_F(VpoUnitTest, TakesTheGpcsVerticesInTurnHoweverLateOneIs) {
-  Bench bench("vpo", "primitive-assembly", context, {}, 2);
-  Source<VertexWarp>& even = bench.source<VertexWarp>("in_vertices_0");
-  Source<VertexWarp>& odd = bench.source<VertexWarp>("in_vertices_1");
-  Sink<PrimitiveItem>& first = bench.sink<PrimitiveItem>("out_primitives_0");
-  Sink<PrimitiveItem>& second = bench.sink<PrimitiveItem>("out_primitives_1");
-  even.add({0, 8}, 500);
-  odd.add({8, 8});
-  even.add({16, 8}, 700);
-  odd.add({24, 8});
-  even.add(marked<VertexWarp>());
-  odd.add(marked<VertexWarp>());
-  bench.run();
-  for (const Sink<PrimitiveItem>* sink : {&first, &second}) {
-    std::uint32_t last = 0;
-    for (const auto& record : sink->records()) {
-      if (record.item.mark == Mark::end_of_frame) continue;
-      const std::uint32_t order = 2 * record.item.primitive.splat + record.item.primitive.triangle;
-      EXPECT_GE(order, last);
-      last = order;
-    }
-    EXPECT_TRUE(sink->records().back().item.mark == Mark::end_of_frame);
-  }
-  EXPECT_TRUE(bench.unit().idle());
-}
-
-TEST_F(VpoUnitTest, APrimitiveGoesToEveryGpcThatOwnsATileOfItsBoundsAndToNoOther) {
-  draw.splats.push_back(testing::flat_box(1, 1, 30, 5, 0.5F));  // tiles (0,0) and (1,0)
-  Bench bench("vpo", "primitive-assembly", context, {}, 4);
-  Source<VertexWarp>* sources[4];
-  Sink<PrimitiveItem>* sinks[4];
-  for (unsigned gpc = 0; gpc < 4; ++gpc) {
-    sources[gpc] = &bench.source<VertexWarp>("in_vertices_" + std::to_string(gpc));
-    sinks[gpc] = &bench.sink<PrimitiveItem>("out_primitives_" + std::to_string(gpc));
-  }
-  sources[0]->add({32, 1});
-  bench.run();
-  for (unsigned gpc = 0; gpc < 4; ++gpc) {
-    const bool owns = gpc == owner_of({0, 0}, 4) || gpc == owner_of({1, 0}, 4);
-    EXPECT_EQ(sinks[gpc]->records().size(), owns ? 2U : 0U) << gpc;
-  }
-}
-
 TEST_F(VpoUnitTest, StallsChangeNeitherPrimitivesNorOrder) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     Bench bench("vpo", "primitive-assembly", context);
-    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices_0", static_cast<unsigned>(1 + seed % 2));
-    Sink<PrimitiveItem>& primitives =
-        bench.sink<PrimitiveItem>("out_primitives_0", static_cast<unsigned>(1 + seed % 5));
+    Source<VertexWarp>& vertices = bench.source<VertexWarp>("in_vertices", static_cast<unsigned>(1 + seed % 2));
+    Sink<PrimitiveItem>& primitives = bench.sink<PrimitiveItem>("out_primitives", static_cast<unsigned>(1 + seed % 5));
     for (std::uint32_t i = 0; i < 4; ++i) vertices.add({8 * i, 8});
     vertices.add(marked<VertexWarp>());
     bench.stall_randomly(seed, 100);

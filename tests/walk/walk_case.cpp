@@ -216,17 +216,19 @@ std::string refused_value(Dice& dice, const Parameter& parameter) {
   return dice.one_of(nonsense);
 }
 
-/// Whether the platform has a unit of the slot, and memory of the kind: most have an L2 alone.
+/// Whether the platform has a unit of the slot and kind (most have an L2 alone), or does without and says so.
 bool is_of(const Platform& platform, const ParameterListing& listing) {
   const Registry& registry = Registry::instance();
   if (!registry.has_slot(listing.unit)) return true;
   const Slot& slot = registry.slot(listing.unit);
   Netlist netlist(platform.gpcs);
   platform.wire(netlist);
+  const std::vector<std::string>& absent = netlist.absent();
+  if (std::find(absent.begin(), absent.end(), slot.name) != absent.end())
+    return listing.implementation == slot.implementation;
   return std::any_of(netlist.instances().begin(), netlist.instances().end(), [&](const Instance& instance) {
     if (instance.slot != listing.unit) return false;
-    return !slot.is_memory ||
-           listing.implementation == (instance.implementation.empty() ? slot.implementation : instance.implementation);
+    return listing.implementation == (instance.implementation.empty() ? slot.implementation : instance.implementation);
   });
 }
 
@@ -246,7 +248,7 @@ bool fits(const Platform& platform, const std::vector<Setting>& settings) {
     value[setting.unit + "." + setting.parameter] = std::strtod(setting.value.c_str(), nullptr);
   }
   return value["tc.bins"] * value["tc.bin_quads"] <= 1 << 20 &&
-         value["tgc.bins"] * value["tgc.bin_primitives"] <= 1 << 20;
+         value["tgc.bins"] * value["tgc.bin_primitives"] <= 1 << 20 && value["platform.gpcs"] <= 8;
 }
 
 std::vector<Setting> draw_settings(Dice& dice, const Platform& platform, bool& refused) {
@@ -263,6 +265,8 @@ std::vector<Setting> draw_settings(Dice& dice, const Platform& platform, bool& r
     settings.push_back({unit, parameter->name(), allowed_value(dice, *parameter)});
     if (!fits(platform, settings)) settings.pop_back();
   }
+  const char* const some_gpcs[] = {"2", "3", "4", "7"};
+  if (dice.chance(10)) settings.push_back({"platform", "gpcs", dice.one_of(some_gpcs)});
   refused = dice.chance(3);
   if (refused) {
     const auto& [unit, parameter] = dice.one_of(all);

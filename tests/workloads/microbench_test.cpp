@@ -21,7 +21,7 @@ RunResult run(const FramePointer& frame, Fidelity fidelity = Fidelity::functiona
 
 TEST(TileBinningFrames, ARoundHasAQuadInEachTile) {
   for (const unsigned tiles : {1U, 17U, 33U}) {
-    const FramePointer frame = rounds_over_tiles(tiles, 10, 1);
+    const FramePointer frame = rounds_over_tiles(tiles, 10, {});
     EXPECT_EQ(frame->splats(), 10 * tiles);
     const RunResult result = run(frame);
     EXPECT_EQ(result.counts.primitives, 10 * tiles);
@@ -32,12 +32,13 @@ TEST(TileBinningFrames, ARoundHasAQuadInEachTile) {
 }
 
 TEST(TileBinningFrames, OfSeveralGpcsTheFirstHasAllTiles) {
-  const FramePointer frame = rounds_over_tiles(40, 1, 4);
+  const auto is_first = [](TileId tile) { return (tile.x + tile.y) % 4 == 0; };
+  const FramePointer frame = rounds_over_tiles(40, 1, {4, is_first});
   std::set<std::pair<unsigned, unsigned>> tiles;
   for (std::uint32_t i = 0; i < frame->splats(); ++i) {
     const Splat& splat = frame->draw_call(0).splat(i);
     const TileId tile{static_cast<std::uint16_t>(splat.cx / 16), static_cast<std::uint16_t>(splat.cy / 16)};
-    EXPECT_EQ(owner_of(tile, 4), 0U);
+    EXPECT_TRUE(is_first(tile));
     tiles.emplace(tile.x, tile.y);
   }
   EXPECT_EQ(tiles.size(), 40U);
@@ -87,7 +88,7 @@ TEST(QuadCoverageFrames, ShapesHaveTheQuadsThatTheySay) {
 }
 
 TEST(CropCacheFrames, ARectangleOfEachTileInTurn) {
-  const FramePointer frame = rectangles_in_turn(5, 3, 8, 16, true, 1);
+  const FramePointer frame = rectangles_in_turn(5, 3, 8, 16, true, {});
   const RunResult result = run(frame);
   EXPECT_EQ(result.counts.quads_blended, 5U * 3 * 32);
   for (unsigned i = 0; i < 15; ++i) {
@@ -136,7 +137,7 @@ TEST(RopLawFrames, StripsAndQuadsOfTilesAreInTilesOfTheirOwn) {
     EXPECT_NEAR(result.framebuffer.color.pixel(width - 1, height - 1)[3], 1 - 0.98F * 0.98F, 1e-3F)
         << "each once a round";
   }
-  const FramePointer frame = boxes_of_tiles({{0, 0, 2, 2}, {4, 2, 2, 2}}, 40, 3, BoxesAre::blended, 1);
+  const FramePointer frame = boxes_of_tiles({{0, 0, 2, 2}, {4, 2, 2, 2}}, 40, 3, BoxesAre::blended, {});
   ASSERT_EQ(frame->splats(), 3U * 40 * 2);
   EXPECT_EQ(frame->draw_call(0).splat(1).cx, 5);
   EXPECT_EQ(frame->draw_call(0).splat(2).cx, 17) << "then the next tile";

@@ -125,7 +125,7 @@ TEST(DepthStencilRopOfAFrame, ABeatOfSeveralDrawsIsCountedQuadByQuad) {
 
 TEST(DepthStencilRopOfAFrame, AGpcClearsItsOwnTilesAlone) {
   RenderContext context = three_draws(128);
-  context.placement = {2, 1};
+  context.placement = testing::placement_of(2, 1, context.frame->width(), context.frame->height());
   RopOfAFrame zrop(context);
   const ScreenTiling& grid = zrop.stencil.grid();
   for (std::size_t place = 0; place < grid.quads(); ++place) zrop.stencil.terminated(place) = all_lanes;

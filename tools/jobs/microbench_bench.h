@@ -31,10 +31,14 @@ class MicrobenchBench {
  public:
   MicrobenchBench(const MicrobenchDefinition& definition, const RunRequest& request, unsigned processes,
                   MicrobenchResult& result)
-      : definition_(definition), request_(request), processes_(processes), result_(result) {}
+      : definition_(definition), request_(request), processes_(processes), result_(result) {
+    first_gpc_.gpcs = gpcs_of(request);
+    first_gpc_.owns = [map = tile_map_of(request)](TileId tile) { return map(tile) == 0; };
+  }
 
   const RunRequest& request() const { return request_; }
-  unsigned gpcs() const { return request_.platform->gpcs; }
+  /// The screen tiles of the platform's first GPC.
+  const microbench::GpcTiles& first_gpc() const { return first_gpc_; }
   bool has_time() const { return request_.fidelity != Fidelity::functional; }
 
   /// A simulation that `run` is to do; returns its number.
@@ -62,6 +66,7 @@ class MicrobenchBench {
 
   const MicrobenchDefinition& definition_;
   const RunRequest request_;
+  microbench::GpcTiles first_gpc_;
   const unsigned processes_;
   MicrobenchResult& result_;
   ProgressLine progress_;

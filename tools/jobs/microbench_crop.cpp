@@ -41,9 +41,10 @@ void measure_rop_throughput(MicrobenchBench& bench) {
   }
   bench.run();
   std::map<std::string, double> rates;
-  const std::string of_a_gpc = bench.gpcs() > 1 ? fmt::format("a GPC's share of {}", bench.gpcs()) : "";
+  const std::string of_a_gpc =
+      bench.first_gpc().gpcs > 1 ? fmt::format("a GPC's share of {}", bench.first_gpc().gpcs) : "";
   for (const Point& point : points) {
-    rates[point.name] = point.side * point.side * point.slope.items_per_clk() / bench.gpcs();
+    rates[point.name] = point.side * point.side * point.slope.items_per_clk() / bench.first_gpc().gpcs;
     bench.figure(point.name, rates[point.name], of_a_gpc);
   }
   bench.figure("RGBA8 over RGBA16F, blending, 32x32",
@@ -115,7 +116,7 @@ void measure_quad_coverage(MicrobenchBench& bench) {
 }
 
 void measure_crop_cache(MicrobenchBench& bench) {
-  const unsigned gpcs = bench.gpcs();
+  const microbench::GpcTiles& gpc = bench.first_gpc();
   constexpr unsigned kilobytes_of_8x16 = 1;  // of RGBA16F
   RunRequest rgba16f = bench.request();
   rgba16f.format = ColorFormat::rgba16f;
@@ -123,8 +124,8 @@ void measure_crop_cache(MicrobenchBench& bench) {
                                    17, 18, 20, 24, 28, 31, 32, 33, 34, 36, 40, 48, 64};
   std::vector<MicrobenchSlope> reads;
   for (const unsigned rectangles : sets) {
-    reads.emplace_back(bench, rgba16f, 12, [rectangles, gpcs](unsigned rounds) {
-      return microbench::rectangles_in_turn(rectangles, rounds, 8, 16, true, gpcs);
+    reads.emplace_back(bench, rgba16f, 12, [rectangles, &gpc](unsigned rounds) {
+      return microbench::rectangles_in_turn(rectangles, rounds, 8, 16, true, gpc);
     });
   }
   const std::vector<unsigned> in_turn{1, 2, 4, 8, 16, 24, 31, 32, 33, 34, 36, 40, 48, 56, 64, 80, 96, 112, 128};
@@ -138,8 +139,8 @@ void measure_crop_cache(MicrobenchBench& bench) {
     for (const unsigned tiles : in_turn) {
       returns.push_back(
           {tiles, blend,
-           MicrobenchSlope(bench, rgba16f, std::max(64U, 4096 / tiles), [tiles, blend = blend, gpcs](unsigned rounds) {
-             return microbench::rectangles_in_turn(tiles, rounds, 2, 2, blend, gpcs);
+           MicrobenchSlope(bench, rgba16f, std::max(64U, 4096 / tiles), [tiles, blend = blend, &gpc](unsigned rounds) {
+             return microbench::rectangles_in_turn(tiles, rounds, 2, 2, blend, gpc);
            })});
     }
   }

@@ -12,19 +12,19 @@
 namespace vrpipe::tools {
 
 void measure_tile_binning(MicrobenchBench& bench) {
-  const unsigned gpcs = bench.gpcs();
+  const microbench::GpcTiles& gpc = bench.first_gpc();
   constexpr unsigned rounds = 10;
   std::vector<unsigned> tiles;
   for (unsigned n = 1; n <= 80; ++n) tiles.push_back(n);
   tiles.insert(tiles.end(), {96, 128, 256});
-  for (const unsigned n : tiles) bench.add([n, gpcs] { return microbench::rounds_over_tiles(n, rounds, gpcs); });
+  for (const unsigned n : tiles) bench.add([n, &gpc] { return microbench::rounds_over_tiles(n, rounds, gpc); });
   std::vector<std::size_t> apart;
   for (unsigned pixels = 2; pixels <= 32; pixels += 2)
     apart.push_back(bench.add([pixels] { return microbench::pair_at_distance(pixels); }));
   std::vector<unsigned> order;
   for (unsigned tile = 0; tile < 32; ++tile) order.push_back(tile);
   order.insert(order.end(), {0, 32, 0, 1, 2});
-  const std::size_t replacement = bench.add([order, gpcs] { return microbench::quads_in_tiles(order, gpcs); });
+  const std::size_t replacement = bench.add([order, &gpc] { return microbench::quads_in_tiles(order, gpc); });
   bench.run();
 
   MicrobenchCurve warps{"warps launched for ten rounds of quads", "screen tiles", "warps", {}, {}, {}};

@@ -177,7 +177,7 @@ void measure_same_place(MicrobenchBench& bench) {
 }
 
 void measure_returning_lines(MicrobenchBench& bench) {
-  const unsigned gpcs = bench.gpcs();
+  const microbench::GpcTiles& gpc = bench.first_gpc();
   std::vector<LawRow> in_turn;
   for (const MeasuredRow& row : measured_table("tiles_in_turn")) {
     const std::string& kind = row.text("what");
@@ -189,8 +189,8 @@ void measure_returning_lines(MicrobenchBench& bench) {
     // So many that all queues are full of quads that wait, from the shorter frame on.
     const auto rounds = static_cast<unsigned>(2048 / (tiles * quads.size()));
     const MicrobenchSlope slope(bench, of_format(bench, kind == "RGBA8" ? kind : "RGBA16F"), std::max(rounds, 2U),
-                                [=](unsigned count) {
-                                  return microbench::boxes_of_tiles(quads, tiles, count, what, gpcs);
+                                [=, &gpc](unsigned count) {
+                                  return microbench::boxes_of_tiles(quads, tiles, count, what, gpc);
                                 });
     in_turn.push_back({fmt::format("{}, {} tiles in turn", kind, tiles), label_of_quads(quads), row.number("clk"),
                        clk_of(slope), "rmtwice.json"});

@@ -309,9 +309,10 @@ nlohmann::json to_sweep_record(const Study& study, std::size_t place, const Poin
 /// Columns are statistics of some point. Throws UserError.
 void check_columns(const SweepJob& job, const std::vector<RunRequest>& requests) {
   std::set<std::string> known(image_columns.begin(), image_columns.end());
-  std::set<std::pair<std::string, std::string>> seen;  // platforms and variants
+  std::set<std::tuple<std::string, unsigned, std::string>> seen;  // platforms, GPCs and variants
   for (RunRequest request : requests) {
-    if (job.study.columns.empty() || !seen.emplace(request.platform->name, request.variant.name).second) continue;
+    if (job.study.columns.empty()) break;
+    if (!seen.emplace(request.platform->name, gpcs_of(request), request.variant.name).second) continue;
     request.fidelity = Fidelity::cycle;
     // Those of all GPCs: of one, gpc1.crop.quads_blended, there is no column.
     for (const std::string& name : sampled_statistics(request)) {

@@ -64,7 +64,7 @@ std::string states_figure(const std::vector<RunResult>& runs) {
     }
   }
   const bool has_gpcs =
-      std::any_of(runs.begin(), runs.end(), [](const RunResult& run) { return run.request.platform->gpcs > 1; });
+      std::any_of(runs.begin(), runs.end(), [](const RunResult& run) { return gpcs_of(run.request) > 1; });
   return html(PageFigure{"cycles",
                          std::string("Each unit charges each cycle to one state") +
                              (has_gpcs ? ", here over all GPCs" : "") +

@@ -16,7 +16,7 @@ namespace {
 std::string busiest_text(const RunResult& run) {
   if (!run.bottleneck) return "-";
   const std::string& unit = run.bottleneck->unit;
-  return fmt::format("{}, {:.0f} %", run.request.platform->gpcs > 1 ? unit : without_gpc(unit),
+  return fmt::format("{}, {:.0f} %", gpcs_of(run.request) > 1 ? unit : without_gpc(unit),
                      100 * run.bottleneck->occupancy);
 }
 

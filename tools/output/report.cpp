@@ -299,7 +299,7 @@ std::string heading(const JobResult& result, const TextStyle& style) {
 std::string unit_text(const std::string& unit, const RunResult& run) {
   const std::size_t dot = unit.rfind('.');
   if (dot == std::string::npos) return upper(unit);
-  return (run.request.platform->gpcs > 1 ? unit.substr(0, dot + 1) : std::string()) + upper(unit.substr(dot + 1));
+  return (gpcs_of(run.request) > 1 ? unit.substr(0, dot + 1) : std::string()) + upper(unit.substr(dot + 1));
 }
 
 /// The largest value of a statistic over the runs; 0 where none has it.

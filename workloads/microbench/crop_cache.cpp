@@ -5,8 +5,8 @@
 namespace vrpipe::microbench {
 
 FramePointer rectangles_in_turn(unsigned tiles, unsigned rounds, unsigned width, unsigned height, bool blend,
-                                unsigned gpcs) {
-  const std::vector<TileId> all = tiles_of_first_gpc(tiles, gpcs);
+                                const GpcTiles& gpc) {
+  const std::vector<TileId> all = tiles_of(gpc, tiles);
   std::vector<Splat> splats;
   for (unsigned i = 0; i < tiles * rounds; ++i) {
     const TileId tile = all[i % tiles];
@@ -14,7 +14,7 @@ FramePointer rectangles_in_turn(unsigned tiles, unsigned rounds, unsigned width,
   }
   DrawState state = rectangle_state();
   state.blend = blend;
-  return FrameMaker(16 * gpcs * screen_tile_pixels, (all.back().y + 1U) * screen_tile_pixels)
+  return FrameMaker(16 * gpc.gpcs * screen_tile_pixels, (all.back().y + 1U) * screen_tile_pixels)
       .draw(std::move(splats), state)
       .take();
 }

@@ -25,12 +25,12 @@ DrawState rectangle_state() {
   return state;
 }
 
-std::vector<TileId> tiles_of_first_gpc(unsigned count, unsigned gpcs) {
-  const unsigned in_a_row = 16 * gpcs;
+std::vector<TileId> tiles_of(const GpcTiles& gpc, unsigned count) {
+  const unsigned in_a_row = 16 * gpc.gpcs;
   std::vector<TileId> tiles;
   for (unsigned i = 0; tiles.size() < count; ++i) {
     const TileId tile{static_cast<std::uint16_t>(i % in_a_row), static_cast<std::uint16_t>(i / in_a_row)};
-    if (owner_of(tile, gpcs) == 0) tiles.push_back(tile);
+    if (gpc.owns(tile)) tiles.push_back(tile);
   }
   return tiles;
 }

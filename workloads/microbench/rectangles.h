@@ -7,6 +7,7 @@
 #include <vrpipe/pipeline/draw_state.h>
 #include <vrpipe/pipeline/frame.h>
 #include <vrpipe/pipeline/payload.h>
+#include <vrpipe/workloads/microbench.h>
 
 namespace vrpipe::microbench {
 
@@ -16,8 +17,8 @@ Splat rectangle(double x, double y, double width, double height, float alpha = 0
 /// Blends whatever it draws, as filled rectangles of exact size.
 DrawState rectangle_state();
 
-/// The first screen tiles of the first GPC, row by row, 16 in a row.
-std::vector<TileId> tiles_of_first_gpc(unsigned count, unsigned gpcs);
+/// The first screen tiles of a GPC, row by row; in a row those of 16 for each GPC.
+std::vector<TileId> tiles_of(const GpcTiles& gpc, unsigned count);
 
 /// Draws of one size, which take their splats along.
 class FrameMaker {

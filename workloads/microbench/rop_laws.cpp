@@ -60,9 +60,9 @@ FramePointer strips(unsigned width, unsigned height, unsigned cells, unsigned ro
 }
 
 FramePointer boxes_of_tiles(const std::vector<Box>& boxes, unsigned tiles, unsigned rounds, BoxesAre what,
-                            unsigned gpcs) {
+                            const GpcTiles& gpc) {
   std::vector<Box> all;
-  for (const TileId tile : tiles_of_first_gpc(tiles, gpcs)) {
+  for (const TileId tile : tiles_of(gpc, tiles)) {
     for (const Box& box : boxes)
       all.push_back({box.x + screen_tile_pixels * tile.x, box.y + screen_tile_pixels * tile.y, box.width, box.height});
   }

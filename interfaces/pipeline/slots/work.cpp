@@ -3,6 +3,7 @@
 #include <vrpipe/pipeline/slots/sm.h>
 #include <vrpipe/pipeline/slots/tgc.h>
 #include <vrpipe/pipeline/slots/vpo.h>
+#include <vrpipe/pipeline/slots/wdx.h>
 #include <vrpipe/pipeline/slots/zrop.h>
 
 namespace vrpipe {
@@ -19,6 +20,11 @@ std::vector<WorkKind> DrawWork::kinds() { return {{"warps", 0, 1.0, throughput}}
 
 std::vector<WorkKind> VpoWork::kinds(const Throughput& timing) {
   return {{"triangles", 0, per(timing.items_per_cycle), throughput}};
+}
+
+std::vector<WorkKind> WdxWork::kinds(const WdxBehaviour::Timing& timing, unsigned gpcs) {
+  const double port = per(static_cast<double>(timing.primitives_per_cycle) * gpcs);
+  return {{"taken", 0, port, throughput}, {"handed on", 1, port, throughput}};
 }
 
 std::vector<WorkKind> TgcWork::kinds(const Throughput& timing) {

@@ -152,9 +152,10 @@ class ClockDomain : public sc_core::sc_module {
   sc_core::sc_time period_;
   Divisor period_value_;  ///< in units of sc_time
   sc_core::sc_event event_;
-  std::vector<Clocked*> units_;       ///< by handle
-  std::vector<Cycle> due_;            ///< the edge that each wants; filled up with `never` to whole vectors
-  std::vector<unsigned> tick_order_;  ///< of handles; empty for their own order
+  std::vector<Clocked*> units_;        ///< by handle
+  std::vector<Cycle> due_;             ///< the edge that each wants; filled up with `never` to whole vectors
+  std::vector<std::uint64_t> active_;  ///< those due at an edge, beyond the first 64: a bit each
+  std::vector<unsigned> tick_order_;   ///< of handles; empty for their own order
   FrameEnd frame_end_;
   Cycle now_ = 0;
   Cycle next_ = 0;  ///< the edge that is armed; `never` for none

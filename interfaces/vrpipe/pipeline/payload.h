@@ -74,10 +74,11 @@ struct VertexWarp {
   Mark mark = Mark::none;  ///< or a mark; then `splats` is 0
 };
 
-/// VPO to TGC.
+/// VPO to TGC; of several GPCs, by way of the crossbar.
 struct PrimitiveItem {
   Primitive primitive;
-  Mark mark = Mark::none;  ///< or a mark; then there is no primitive
+  Mark mark = Mark::none;   ///< or a mark; then there is no primitive
+  bool ends_batch = false;  ///< to the crossbar: nor is there where a vertex warp's primitives end
 };
 
 /// TGC to RASTER: a primitive and the part of the screen in which to rasterise it now.
@@ -221,23 +222,6 @@ struct PortReads {
 struct BlendsDone {
   Mark mark = Mark::none;
 };
-
-/// The GPC that owns a screen tile: neighbours go to different GPCs.
-constexpr unsigned owner_of(TileId tile, unsigned gpcs) {
-  return gpcs == 1 ? 0 : (tile.x + tile.y * (gpcs / 2 + 1U)) % gpcs;
-}
-
-/// Whether a primitive may cover a pixel of a GPC's screen tiles; primitives go to those GPCs alone.
-inline bool concerns(const Primitive& primitive, unsigned gpcs, unsigned gpc) {
-  if (gpcs == 1) return true;
-  constexpr auto side = static_cast<int>(screen_tile_pixels);
-  for (int y = primitive.bounds.y0 / side; y <= (primitive.bounds.y1 - 1) / side; ++y) {
-    for (int x = primitive.bounds.x0 / side; x <= (primitive.bounds.x1 - 1) / side; ++x) {
-      if (owner_of({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)}, gpcs) == gpc) return true;
-    }
-  }
-  return false;
-}
 
 /// CROP to ZROP: signals of one cycle, or some of them.
 struct TerminationBeat {

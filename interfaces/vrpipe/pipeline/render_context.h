@@ -7,6 +7,7 @@
 #include <vrpipe/pipeline/effects.h>
 #include <vrpipe/pipeline/fragment_observer.h>
 #include <vrpipe/pipeline/frame.h>
+#include <vrpipe/pipeline/tile_owners.h>
 
 namespace vrpipe {
 
@@ -18,9 +19,11 @@ Termination termination_named(const std::string& name);
 
 /// Where a unit sits.
 struct Placement {
-  unsigned gpcs = 1;  ///< of the platform
-  unsigned gpc = 0;   ///< that the unit belongs to; it owns the screen tiles with owner_of(tile, gpcs) == gpc
-  bool owns(TileId tile) const { return gpcs == 1 || owner_of(tile, gpcs) == gpc; }
+  unsigned gpcs = 1;                                   ///< of the platform
+  unsigned gpc = 0;                                    ///< that the unit belongs to
+  std::shared_ptr<const TileOwners> owners = nullptr;  ///< of the frame's screen tiles; null: one GPC owns all
+  bool owns(TileId tile) const { return owners == nullptr || owners->owner_of(tile) == gpc; }
+  bool owns_any_of(const PixelRect& pixels) const { return owners == nullptr || owners->has_any(gpc, pixels); }
 };
 
 /// What a unit knows of the frame that it takes part in, of the hardware and of its own place.

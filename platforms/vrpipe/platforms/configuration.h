@@ -13,6 +13,12 @@
 
 namespace vrpipe {
 
+/// Parameters of a platform as a whole, set as `platform.NAME`.
+struct PlatformParameters : ParameterSet {
+  explicit PlatformParameters(const Platform& platform);
+  Integer gpcs;
+};
+
 /// Parameters of a draw's state, unless the draw says otherwise, and of the hardware's precision, set as `state.NAME`.
 struct StateParameters : ParameterSet {
   Real termination_threshold{*this,
@@ -113,6 +119,8 @@ class Configuration {
   void choose_implementations();
   void apply(const Setting& setting);
   void set_link(const Setting& setting);
+  bool set_absent(const Setting& setting);
+  std::shared_ptr<const TileOwners> owners_of_tiles(const RenderContext& context) const;
   bool concerns_chosen_unit(const Setting& setting) const;
   std::vector<const Instance*> instances_named(const std::string& name) const;
   std::vector<const Instance*> instances_of(const std::string& slot) const;
@@ -120,7 +128,8 @@ class Configuration {
   RunRequest request_;
   Netlist netlist_;  ///< the platform's
   Netlist elaborated_;
-  std::map<std::string, UnitChoices> units_;  ///< by path
+  std::map<std::string, UnitChoices> units_;             ///< by path
+  std::map<std::string, const Implementation*> absent_;  ///< what would be in slots that the platform does without
   StateParameters state_parameters_;
   std::vector<RenderContext> contexts_;  ///< by GPC
   std::vector<EffectReport> effects_;    ///< before the run

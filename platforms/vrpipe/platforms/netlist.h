@@ -65,6 +65,10 @@ class Netlist {
   /// Adds a unit, or a memory of this library. The path ends in its slot, or `slot` says what it is; gpcN. at its
   /// beginning puts it in a GPC.
   void add(const std::string& path, const std::string& slot = "", const std::string& implementation = "");
+  /// Says that there is no unit of a slot, and that nobody need mind: choices and settings of one are checked and change
+  /// nothing. Without it they are refused.
+  void do_without(const std::string& slot) { absent_.push_back(slot); }
+  const std::vector<std::string>& absent() const { return absent_; }
   /// Connects two ports, PATH.PORT each. `depth`: items that the receiver's queue holds; `latency`: cycles from push to
   /// visibility, at least 1. Ports are checked when the netlist is elaborated.
   void connect(const std::string& from, const std::string& to, unsigned depth = 4, unsigned latency = 1);
@@ -121,6 +125,7 @@ class Netlist {
 
   unsigned gpcs_;
   std::vector<Instance> instances_;
+  std::vector<std::string> absent_;  ///< slots
   std::vector<Link> links_;
   std::vector<ForeignInstance> foreign_memories_;
   std::vector<MemoryLink> memory_links_;

@@ -67,14 +67,11 @@ void add_variant(Variant variant);
 /// Throws UserError naming those that exist.
 const Variant& variant_named(const std::string& name);
 
-/// GPCs of a platform at most.
-constexpr unsigned most_gpcs = 256;
-
 /// A GPU: units and the links between them.
 struct Platform {
   std::string name;
   std::string description;  ///< one line
-  unsigned gpcs = 1;
+  unsigned gpcs = 1;        ///< unless `platform.gpcs` says otherwise (gpcs_of)
   double frequency_mhz = 0;
   std::vector<Setting> settings;               ///< where it differs from the units' defaults
   std::function<void(Netlist& netlist)> wire;  ///< adds the units and links
@@ -117,6 +114,10 @@ struct RunRequest {
   /// For tests: ticks units in a random order drawn from this seed; 0 for the order of wiring.
   std::uint64_t tick_order_seed = 0;
 };
+/// GPCs of the platform, by its settings, those of the variant and of the run. Throws UserError for a number that cannot be.
+unsigned gpcs_of(const RunRequest& request);
+/// The GPC that owns a screen tile, as the platform's crossbar has it; 0 where there is one GPC.
+std::function<unsigned(TileId)> tile_map_of(const RunRequest& request);
 /// What reports call a run, also in file names.
 const std::string& name_of(const RunRequest& request);
 

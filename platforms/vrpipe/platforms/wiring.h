@@ -5,11 +5,11 @@
 
 namespace vrpipe {
 
-/// Adds the pipeline of one GPC behind a front end of `draw` and `vpo`, and connects it as in agx-orin; CROP's memory is
-/// `memory`, which is there already. Building block for platforms of several GPCs.
+/// Adds the pipeline of one GPC behind `draw`, and connects it as in agx-orin; of several GPCs, primitives go through a
+/// crossbar, `wdx`. They are there already, as is CROP's memory, `memory`. Building block for platforms of several GPCs.
 void wire_gpc(Netlist& netlist, unsigned gpc, const std::string& memory = "l2");
 
-/// The same for all GPCs, with a front end and an L2 that holds everything.
+/// The same for all GPCs, with what they share: `draw`, `wdx` if they are several, and an L2 that holds everything.
 void wire_pipeline(Netlist& netlist);
 
 /// Behind such a pipeline, makes the L2 a cache and puts a DRAM below it, of an implementation of slot `dram`.

@@ -47,10 +47,7 @@ vrpipe::Platform twin() {
       "two GPCs of agx-orin-ideal-memory with different colour caches, and a memory of another make below the L2";
   platform.gpcs = 2;
   platform.frequency_mhz = 612;
-  platform.settings = {{"draw", "warps_per_1024_cycles", "176"},
-                       {"vpo", "triangles_per_cycle", "4"},
-                       {"gpc1.crop", "cache_bytes", "32768"},
-                       {"link.gpc1.prop.color", "depth", "256"}};
+  platform.settings = {{"gpc1.crop", "cache_bytes", "32768"}, {"link.gpc1.prop.color", "depth", "256"}};
   platform.wire = [](vrpipe::Netlist& netlist) {
     vrpipe::wire_pipeline(netlist);
     netlist.add_memory("dram", [](const std::string& name, unsigned) {

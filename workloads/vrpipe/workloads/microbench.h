@@ -2,25 +2,32 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
 #include <vrpipe/arithmetic/blend.h>
 #include <vrpipe/pipeline/frame.h>
+#include <vrpipe/pipeline/payload.h>
 
 /// What `vrpipe microbench` draws: the workloads of the paper's analysis (VII), and those with which a real GPU was measured
-/// beside it. Rectangles are filled rectangles, of whole pixels; nothing is pruned, and nothing terminates early. What takes
-/// `gpcs` draws in screen tiles of the first GPC alone, of a platform that has so many.
+/// beside it. Rectangles are filled rectangles, of whole pixels; nothing is pruned, and nothing terminates early.
 namespace vrpipe::microbench {
 
 using FramePointer = std::shared_ptr<const Frame>;
 
+/// What takes it draws in screen tiles of one GPC alone.
+struct GpcTiles {
+  unsigned gpcs = 1;  ///< that share the screen
+  std::function<bool(TileId)> owns = [](TileId) { return true; };
+};
+
 // Tile binning.
 
 /// Rectangles of one quad, one in each of these screen tiles, in this order; tiles are numbered row by row.
-FramePointer quads_in_tiles(const std::vector<unsigned>& tiles, unsigned gpcs);
+FramePointer quads_in_tiles(const std::vector<unsigned>& tiles, const GpcTiles& gpc);
 /// `rounds` of them over `tiles` screen tiles.
-FramePointer rounds_over_tiles(unsigned tiles, unsigned rounds, unsigned gpcs);
+FramePointer rounds_over_tiles(unsigned tiles, unsigned rounds, const GpcTiles& gpc);
 /// Two of them in a row of quads, so many pixels from one another.
 FramePointer pair_at_distance(unsigned pixels);
 /// Two of them at one place, and `culled` rectangles beyond the viewport between them.
@@ -55,7 +62,7 @@ FramePointer scattered(const Shape& shape, unsigned count);
 
 /// `rounds` of rectangles of width x height pixels in the upper left corner of `tiles` screen tiles, in turn.
 FramePointer rectangles_in_turn(unsigned tiles, unsigned rounds, unsigned width, unsigned height, bool blend,
-                                unsigned gpcs);
+                                const GpcTiles& gpc);
 
 // Order of blending.
 
@@ -84,7 +91,7 @@ FramePointer boxes_in_turn(const std::vector<Box>& boxes, unsigned rounds, Boxes
 FramePointer strips(unsigned width, unsigned height, unsigned cells, unsigned rounds, BoxesAre what);
 /// `rounds` times these boxes, each within a screen tile, in each of `tiles` screen tiles in turn.
 FramePointer boxes_of_tiles(const std::vector<Box>& boxes, unsigned tiles, unsigned rounds, BoxesAre what,
-                            unsigned gpcs);
+                            const GpcTiles& gpc);
 
 /// What becomes of splats.
 enum class SplatsAre : std::uint8_t { blended, written, passed, killed };

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <vrpipe/kernel/accounting.h>
+#include <vrpipe/pipeline/slots/behaviour.h>
+#include <vrpipe/pipeline/tile_owners.h>
+
+namespace vrpipe {
+
+/// Slot `wdx`: the work distribution crossbar, which takes each primitive from the GPC that assembled it to those that
+/// own screen tiles of its bounding box. It says who owns what; a platform of one GPC has none.
+class WdxBehaviour : public Behaviour {
+ public:
+  struct Timing {
+    std::uint32_t primitives_per_cycle;  ///< of a GPC, in and out
+    std::uint32_t latency_cycles;        ///< at least 2
+    std::uint32_t credits;               ///< primitives from one GPC to another that may wait for their turn
+  };
+  /// The GPC of a screen tile of the frame. Depends on the tile alone.
+  virtual unsigned owner_of(TileId tile) const = 0;
+  virtual Timing timing() const = 0;
+
+  Counter primitives{*this, "primitives", "triangles", "taken from the GPCs that assembled them"};
+  Counter copies{*this, "copies", "triangles", "handed to the GPCs that own tiles of their bounds, one for each"};
+};
+
+/// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity. Of all GPCs' ports
+/// together, as if they were busy alike.
+struct WdxWork {
+  enum : unsigned { taken, handed_on };
+  static std::vector<WorkKind> kinds(const WdxBehaviour::Timing& timing, unsigned gpcs);
+};
+
+/// The slot's SlotCheck.
+std::unique_ptr<Behaviour> check_wdx(const std::string& name, const RenderContext& context,
+                                     std::unique_ptr<Behaviour> behaviour);
+
+}  // namespace vrpipe
