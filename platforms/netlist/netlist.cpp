@@ -66,6 +66,10 @@ void Netlist::add(const std::string& path, const std::string& slot, const std::s
   if (added.gpc >= gpcs_) {
     refuse("cannot add " + path, path, "the platform has " + std::to_string(gpcs_) + " GPCs", "raise its `gpcs`");
   }
+  const Registry& registry = Registry::instance();
+  if (registry.has_slot(added.slot) && registry.slot(added.slot).is_software) {
+    refuse("cannot add " + path, path, "slot " + added.slot + " is of kernels, which have no ports", "leave it out");
+  }
   instances_.push_back(std::move(added));
 }
 

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstring>
 #include <ctime>
 #include <map>
 #include <optional>
 
 #include "bound/work_counter.h"
 #include "elaboration/untimed_gpu.h"
+#include "run/result_hash.h"
 #include "run/statistic_sampler.h"
 #include "run/statistics.h"
 
@@ -103,30 +103,15 @@ const Variant& variant_named(const std::string& name) {
 
 namespace {
 
-void fnv1a(std::uint64_t& hash, std::uint64_t value) {
-  for (unsigned byte = 0; byte < 8; ++byte) {
-    hash = (hash ^ ((value >> (8 * byte)) & 0xffU)) * 0x100000001b3ULL;
-  }
-}
-
 std::string hash_of(const RunResult& result) {
-  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  ResultHash hash;
   for (const CountField& field : Counts::fields()) {
     const std::uint64_t count = result.counts.*field.value;
-    if (count != 0 || !field.is_rare) fnv1a(hash, count);
+    if (count != 0 || !field.is_rare) hash.add(count);
   }
-  fnv1a(hash, result.cycles.value_or(0));
-  const ColorSurface& surface = result.framebuffer.color;
-  for (std::uint32_t y = 0; y < surface.height(); ++y) {
-    for (std::uint32_t x = 0; x < surface.width(); ++x) {
-      const std::array<float, 4> pixel = surface.pixel(x, y);
-      std::array<std::uint64_t, 2> bits;
-      std::memcpy(bits.data(), pixel.data(), sizeof bits);
-      fnv1a(hash, bits[0]);
-      fnv1a(hash, bits[1]);
-    }
-  }
-  return fmt::format("{:016x}", hash);
+  hash.add(result.cycles.value_or(0));
+  hash.add(result.framebuffer.color);
+  return hash.text();
 }
 
 /// The functional models of all units.

@@ -141,7 +141,9 @@ std::vector<StatisticReport> list_statistics(const ParameterListing& listing) {
       const Implementation& implementation = Registry::instance().find(listing.unit, listing.implementation);
       const auto make = [&] { return implementation.make_behaviour(*listing.parameters, context); };
       collector.add(listing.unit, "functional", make()->unit());
-      if (Registry::instance().slot(listing.unit).is_memory) {
+      if (Registry::instance().slot(listing.unit).is_software) {
+        // Kernels have no modules.
+      } else if (Registry::instance().slot(listing.unit).is_memory) {
         for (const bool is_clocked : {false, true}) {
           const auto memory = memory_unit_maker(listing.unit)("memory", clock, make(), {{0}, false, is_clocked});
           collector.add(listing.unit, is_clocked ? "cycle" : "timed", memory->statistics());

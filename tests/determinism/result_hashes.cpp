@@ -1,9 +1,10 @@
-// Prints the result hash of a small built-in scene in every variant, both terminations and three fidelities, as this build
-// computes it; scripts/check compares the lines of builds by other compilers and at other levels of optimisation.
+// Prints the result hash of a small built-in scene in every variant, both terminations and three fidelities, and of frames in
+// software, as this build computes it; scripts/check compares the lines of builds by other compilers and at other levels of optimisation.
 #include <cstdio>
 #include <exception>
 
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/platforms/software.h>
 #include <vrpipe/workloads/scene.h>
 
 namespace vrpipe {
@@ -27,6 +28,21 @@ void print_hashes() {
         const RunResult result = simulate(request, loaded.draw);
         std::printf("%s %s %s %s\n", name_of(fidelity), name_of(termination), variant.name.c_str(),
                     result.result_hash.c_str());
+      }
+    }
+  }
+  for (const Fidelity fidelity : {Fidelity::functional, Fidelity::lt, Fidelity::cycle}) {
+    for (const char* kernel : {"published", "endless", "threshold"}) {
+      for (const char* lists : {"three_sigma", "obb", "ellipse"}) {
+        RunRequest request;
+        request.platform = &platforms().front();
+        request.variant = variants().front();
+        request.fidelity = fidelity;
+        request.units = {{"render", kernel}};
+        request.settings = {{"binning", "lists", lists}};
+        const SoftwareResult result =
+            simulate_software(request, *Frame::of(loaded.draw), loaded.summary.gaussians_total);
+        std::printf("software %s %s %s %s\n", name_of(fidelity), kernel, lists, result.result_hash.c_str());
       }
     }
   }

@@ -179,6 +179,10 @@ expect_success("gpc0.tally is in slot tally, which was not validated" ${vrpipe} 
 expect_refusal("link.tally.quads" ${vrpipe} run ${draw} ${tally} --platform tallied --set link.tally.quadz.depth=4)
 expect_success("" ${vrpipe} run ${draw} ${tally} --platform tallied --set link.tally.quads.depth=1)
 
+# The render kernel: less waiting, and the same picture and counts.
+expect_success("software \\(no-barriers\\)" ${vrpipe} frames ${draw} --fidelity lt --plugin ${WORK_DIR}/consumer/no_barriers.so
+  --unit render=no-barriers)
+
 # The testbenches.
 expect_success("100 seeds" ${WORK_DIR}/consumer/same_splat_bench)
 expect_success("changes nothing" ${WORK_DIR}/consumer/counting_rop_bench)

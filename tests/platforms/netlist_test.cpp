@@ -108,6 +108,7 @@ TEST(Netlist, EditsThatCannotBeAreRefused) {
   };
   refused([](Netlist& n) { n.add("gpc0.tc"); });
   refused([](Netlist& n) { n.add("gpc1.tc"); });
+  refused([](Netlist& n) { n.add("gpc0.render"); });
   refused([](Netlist& n) { n.connect("gpc0.tc.out_bins", "gpc0.qru.in_quads"); });
   refused([](Netlist& n) { n.connect("nodot", "gpc0.qru.in_quads"); });
   refused([](Netlist& n) { n.remove("gpc0.tcc"); });

@@ -49,8 +49,9 @@ class BadInput : public ToolTest {
 };
 
 TEST_F(BadInput, Commands) {
-  refused({}, {"no command",
-               "run, compare, accuracy, sweep, reproduce, microbench, convert, diff, scenes, platforms, units"});
+  refused({},
+          {"no command",
+           "run, compare, accuracy, sweep, reproduce, frames, microbench, convert, diff, scenes, platforms, units"});
   refused({"swep"}, {"'swep'", "did you mean sweep?"});
   refused({"simulate", "a.json", "b.json"}, {"'simulate'"});
   refused({"compar"}, {"'compar'", "did you mean compare?"});

@@ -8,6 +8,8 @@
 #include <numeric>
 #include <thread>
 
+#include <fmt/format.h>
+
 #include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/gaussian_scene.h>
 

@@ -25,6 +25,7 @@ static std::vector<std::unique_ptr<Command>> all_commands() {
   VRPIPE_COMMAND(accuracy);
   VRPIPE_COMMAND(sweep);
   VRPIPE_COMMAND(reproduce);
+  VRPIPE_COMMAND(frames);
   VRPIPE_COMMAND(microbench);
   VRPIPE_COMMAND(convert);
   VRPIPE_COMMAND(diff);
@@ -54,6 +55,7 @@ constexpr const char* program_footer =
     "  vrpipe compare --config study.toml               all of it from a file; --print-config writes one\n"
     "  vrpipe sweep study.toml --html study.html        a study over scenes, GPUs and parameters\n"
     "  vrpipe diff before.json after.json               what differs between two results\n"
+    "  vrpipe frames --fidelity lt                      whole frames, in software beside by hardware\n"
     "  vrpipe microbench all --html microbench.html     the paper's analysis of GPUs as workloads\n"
     "  vrpipe units                                     every unit and parameter that can be changed\n"
     "\n"

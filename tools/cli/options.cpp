@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <thread>
 
 #include <fmt/format.h>
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/registry.h>
+#include <vrpipe/platforms/software.h>
 #include <vrpipe/workloads/gaussian_file.h>
 #include <vrpipe/workloads/scene_substitution.h>
 
@@ -37,6 +39,20 @@ std::string names_of(const std::vector<Fidelity>& fidelities) {
     text += vrpipe::name_of(fidelity);
   }
   return text;
+}
+
+/// Of a command that draws by hardware alone.
+void refuse_kernels(const RunRequest& request) {
+  const auto refuse = [](const std::string& option, const std::string& unit) {
+    throw UserError("cannot choose or set '" + unit + "'", option, "it is a kernel of software rendering",
+                    "leave it out, or take `vrpipe frames`");
+  };
+  for (const Setting& setting : request.settings) {
+    if (is_of_software(setting.unit)) refuse("--set " + setting.unit + "." + setting.parameter, setting.unit);
+  }
+  for (const UnitChoice& choice : request.units) {
+    if (is_of_software(choice.slot)) refuse("--unit " + choice.slot + "=" + choice.implementation, choice.slot);
+  }
 }
 
 /// Whether a setting is from a configuration file.
@@ -169,13 +185,7 @@ void SimulationArguments::declare(Arguments& arguments, Variants variants) {
   if (variants == Variants::one) declare_variant(arguments);
   declare_changes(arguments);
   declare_rules(arguments);
-  arguments.add_option("--output", output_, "DIR",
-                       "writes SCENE-VARIANT.png (8 bit, over the background) and .exr (RGBA\n"
-                       "float, premultiplied, no background) there; created if missing",
-                       result_group);
-  arguments
-      .add_option("--background", background_, "R,G,B", "behind the PNG, each 0 to 1 (default: 0,0,0)", result_group)
-      .default_text = "0,0,0";
+  declare_images(arguments);
   declare_result_json(arguments, json_);
   arguments.add_option("--save-draw", save_draw_, "FILE.spl",
                        "writes the draw after preprocessing; --scene FILE.spl takes it in again", result_group);
@@ -203,6 +213,32 @@ void SimulationArguments::declare_machine(Arguments& arguments) {
   declare_platform(arguments);
   declare_changes(arguments);
   declare_fidelity(arguments);
+  declare_result_json(arguments, json_);
+  declare_jobs(arguments, jobs_);
+}
+
+void SimulationArguments::declare_images(Arguments& arguments) {
+  arguments.add_option("--output", output_, "DIR",
+                       "writes SCENE-VARIANT.png (8 bit, over the background) and .exr (RGBA\n"
+                       "float, premultiplied, no background) there; created if missing",
+                       result_group);
+  arguments
+      .add_option("--background", background_, "R,G,B", "behind the PNG, each 0 to 1 (default: 0,0,0)", result_group)
+      .default_text = "0,0,0";
+}
+
+void SimulationArguments::declare_whole_frames(Arguments& arguments) {
+  takes_kernels_ = true;
+  declare_scene(arguments);
+  declare_config(arguments);
+  arguments.add_option("--define", definitions_, "NAME=BASE,...", "", "");
+  declare_platform(arguments);
+  declare_changes(arguments);
+  declare_rules(arguments);
+  declare_images(arguments);
+  arguments.find("--output")->help =
+      "writes SCENE-PATH.png (8 bit, over the background) and .exr (RGBA float,\n"
+      "premultiplied, no background) there; created if missing";
   declare_result_json(arguments, json_);
   declare_jobs(arguments, jobs_);
 }
@@ -456,6 +492,16 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
   request.reads_statistics = (single(json_, "--json").has_value() && views_.empty()) || job.html || !energies_.empty();
   if (const auto name = single(format_, "--format")) request.format = color_format_named(*name);
   if (const auto name = single(termination_, "--termination")) request.termination = termination_named(*name);
+  if (takes_kernels_) {
+    job.kernel_parameters = check_software(request);
+    const auto take = [](const auto& all, auto& kernels, const auto& unit_of) {
+      std::copy_if(all.begin(), all.end(), std::back_inserter(kernels),
+                   [&](const auto& each) { return is_of_software(unit_of(each)); });
+    };
+    take(request.settings, job.kernel_settings, [](const Setting& setting) { return setting.unit; });
+    take(request.units, job.kernel_units, [](const UnitChoice& choice) { return choice.slot; });
+    request = without_software(std::move(request));
+  }
   job.scene.preprocess = parts.preprocess;
   job.preprocessing = std::move(parts.preprocessing);
   job.preprocess_parameters = std::move(parts.preprocess_parameters);
@@ -523,6 +569,7 @@ RunRequest SimulationArguments::machine(SettingsByPart& parts, const Invocation&
   parts = sort_settings(settings);
   request.settings = parts.machine;
   request.units = parse_unit_choices(units_);
+  if (!takes_kernels_) refuse_kernels(request);
   return request;
 }
 

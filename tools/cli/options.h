@@ -40,6 +40,8 @@ class SimulationArguments {
   void declare_machine(Arguments& arguments);
   /// What these say; as `resolve`. `platform`: where --platform is not given; null: the first.
   MachineJob resolve_machine(const Invocation& invocation, const Platform* platform = nullptr) const;
+  /// Those of a command that draws a scene in software as well, with kernels that it may name and set.
+  void declare_whole_frames(Arguments& arguments);
   /// --frame and --multi-pass, for commands that draw frames of several draws as well.
   void declare_frames(Arguments& arguments);
   /// --views and --journal, for commands that draw a scene from many cameras as well.
@@ -62,6 +64,7 @@ class SimulationArguments {
   void declare_scene(Arguments& arguments);
   void declare_variant(Arguments& arguments);
   void declare_rules(Arguments& arguments);
+  void declare_images(Arguments& arguments);
   void declare_platform(Arguments& arguments);
   void declare_changes(Arguments& arguments);
   void declare_fidelity(Arguments& arguments);
@@ -83,6 +86,7 @@ class SimulationArguments {
   Values fidelity_, effects_, format_, termination_;
   Values views_, journal_, relative_to_;
   bool compares_any_ = false;
+  bool takes_kernels_ = false;
   Values background_, output_, json_, html_, save_draw_, jobs_;
   TimeArguments time_;
   Values energies_;

@@ -6,6 +6,7 @@
 #include <vrpipe/pipeline/registry.h>
 #include <vrpipe/platforms/configuration.h>
 #include <vrpipe/platforms/netlist.h>
+#include <vrpipe/platforms/software.h>
 #include <vrpipe/workloads/preprocess_parameters.h>
 
 namespace vrpipe::tools {
@@ -33,7 +34,7 @@ std::vector<ParameterListing> all_parameters(const Platform* platform) {
 }
 
 std::vector<std::pair<std::string, std::string>> final_parameters(const RunRequest& request) {
-  RunRequest all = request;
+  RunRequest all = without_software(request);
   all.effects = EffectChoice::parse("all");
   all.observers = nullptr;
   return Configuration(all, Frame(1, 1)).parameters();

@@ -22,7 +22,7 @@ struct SettingsByPart {
   std::vector<std::pair<std::string, std::string>> preprocess_parameters;
 };
 
-/// UNIT.PARAMETER and final value of everything that can be set, without preprocessing. Throws UserError.
+/// UNIT.PARAMETER and final value of everything that can be set, without preprocessing and kernels. Throws UserError.
 std::vector<std::pair<std::string, std::string>> final_parameters(const RunRequest& request);
 
 /// Whether the units of a request declare UNIT.PARAMETER: one that passes through, or is another make, may not. What is no

@@ -29,10 +29,14 @@ namespace vrpipe::tools {
 struct SimulationJob {
   std::string schema;  ///< of the JSON of `run` or `compare`
   Provenance provenance;
-  SceneRequest scene;                  ///< --scene, and how scenes are looked at
-  FrameDescription frame;              ///< of --frame, or --scene as its one draw
-  std::vector<RunRequest> requests;    ///< one for each platform and variant, alike in everything else
-  std::size_t baseline = 0;            ///< of `requests`, over which speed-ups are
+  SceneRequest scene;                    ///< --scene, and how scenes are looked at
+  FrameDescription frame;                ///< of --frame, or --scene as its one draw
+  std::vector<RunRequest> requests;      ///< one for each platform and variant, alike in everything else
+  std::size_t baseline = 0;              ///< of `requests`, over which speed-ups are
+  std::vector<Setting> kernel_settings;  ///< of --set, and of --unit, what is for kernels: in no request
+  std::vector<UnitChoice> kernel_units;
+  /// SLOT.PARAMETER and value of every parameter of kernels; empty where none are asked for.
+  std::vector<std::pair<std::string, std::string>> kernel_parameters;
   std::vector<Setting> preprocessing;  ///< of --set, for the report; `scene` has them
   /// `preprocess.NAME` and value of every parameter of preprocessing.
   std::vector<std::pair<std::string, std::string>> preprocess_parameters;

@@ -43,6 +43,8 @@ struct Slot {
   bool is_memory = false;     ///< of memories (MemoryBehaviour), which have no streams but are bound to memory ports
   std::vector<ValidatedRange> validated = {};  ///< of parameters that are not named every value is
   std::vector<PortNeed> needs = {};
+  /// Of kernels by which a frame is prepared or rendered in software: no netlist has a unit of it (slots/kernel_work.h).
+  bool is_software = false;
 };
 
 /// An implementation of a slot: a unit that a platform can be built with.
@@ -104,6 +106,15 @@ struct SlotRegistrar {
   explicit SlotRegistrar(Slot slot, std::vector<ValidatedRange> validated = {}, std::vector<PortNeed> needs = {}) {
     slot.validated = std::move(validated);
     slot.needs = std::move(needs);
+    Registry::instance().add(std::move(slot));
+  }
+};
+
+/// Registers a slot of kernels.
+struct SoftwareSlotRegistrar {
+  SoftwareSlotRegistrar(const char* name, unsigned rank, const char* implementation) {
+    Slot slot{name, rank, implementation};
+    slot.is_software = true;
     Registry::instance().add(std::move(slot));
   }
 };

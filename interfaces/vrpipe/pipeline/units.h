@@ -7,12 +7,15 @@
 /// items are used up. So one serves a timing model that moves a few quads a cycle and a loop that runs a whole draw.
 
 #include <vrpipe/pipeline/slots/behaviour.h>
+#include <vrpipe/pipeline/slots/binning.h>
 #include <vrpipe/pipeline/slots/crop.h>
 #include <vrpipe/pipeline/slots/draw.h>
 #include <vrpipe/pipeline/slots/memory.h>
+#include <vrpipe/pipeline/slots/preparation.h>
 #include <vrpipe/pipeline/slots/prop.h>
 #include <vrpipe/pipeline/slots/qru.h>
 #include <vrpipe/pipeline/slots/raster.h>
+#include <vrpipe/pipeline/slots/render.h>
 #include <vrpipe/pipeline/slots/sm.h>
 #include <vrpipe/pipeline/slots/tc.h>
 #include <vrpipe/pipeline/slots/tgc.h>

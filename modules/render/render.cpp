@@ -1,0 +1,244 @@
+#include "render/render.h"
+
+#include <algorithm>
+
+#include <vrpipe/arithmetic/exp2.h>
+#include <vrpipe/pipeline/framebuffer.h>
+#include <vrpipe/pipeline/geometry.h>
+#include <vrpipe/pipeline/registry.h>
+
+namespace vrpipe {
+
+namespace {
+constexpr float log2_e = 1.44269504F;
+constexpr float alpha_most = 0.99F;
+constexpr std::uint32_t lanes_of_warp = 32;
+
+std::uint32_t mask_of(const LanePairBits (&bits)[4]) {
+  std::uint32_t mask = 0;
+  for (unsigned i = 0; i < 4; ++i) mask |= sign_mask(bits[i]) << (8 * i);
+  return mask;
+}
+
+std::uint32_t count_bits(std::uint32_t mask) { return static_cast<std::uint32_t>(__builtin_popcount(mask)); }
+}  // namespace
+
+std::uint32_t TileKernel::WarpLanes::alive_mask() const {
+  std::uint32_t mask = 0;
+  for (unsigned i = 0; i < vectors; ++i) mask |= sign_mask(alive[i]) << (8 * i);
+  return mask;
+}
+
+TileKernel::TileKernel(const TileKernelParameters& parameters, const RenderContext& context, StopRule rule,
+                       float least_transmittance)
+    : rule_(rule),
+      least_transmittance_(least_transmittance),
+      pruning_threshold_(context.frame->draws().empty() ? 0 : context.state(0).pruning_threshold),
+      terminating_alpha_(context.frame->draws().empty() ? 1 : context.state(0).terminating_alpha()),
+      width_(context.frame->width()),
+      height_(context.frame->height()),
+      tiling_(width_, height_),
+      warp_width_(parameters.warp_pixels == 0U ? 16 : 8),
+      outside_(parameters.outside_instructions.thousandths()),
+      pruned_(parameters.pruned_instructions.thousandths()),
+      stopping_(parameters.stopping_instructions.thousandths()),
+      blending_(parameters.blending_instructions.thousandths()),
+      batch_(parameters.batch_instructions.thousandths()),
+      timing_{parameters.blocks_per_core, parameters.issue_rate.thousandths(), parameters.instruction_interval_cycles,
+              parameters.launch_microseconds} {
+  records_.reserve(context.frame->splats());
+  for (const DrawCall& call : context.frame->draws()) {
+    for (std::uint32_t number = call.base; number < call.base + call.splats && !call.geometry->is_mesh(); ++number) {
+      const Splat& splat = call.splat(number);
+      const float scale = splat.r > 0 ? 1 / splat.r : 0.0F;
+      const float ax = splat.ax * scale;
+      const float ay = splat.ay * scale;
+      const float bx = splat.bx * scale;
+      const float by = splat.by * scale;
+      const float xx = ax * ax + bx * bx;
+      const float xy = ax * ay + bx * by;
+      const float yy = ay * ay + by * by;
+      const float determinant = xx * yy - xy * xy;
+      // As published, what has none is not drawn.
+      Record record{};
+      if (determinant != 0 && is_finite(splat)) {
+        const float inverse = 1 / determinant;
+        record = {splat.cx,      splat.cy,  yy * inverse, -xy * inverse, xx * inverse,
+                  splat.opacity, splat.red, splat.green,  splat.blue};
+      }
+      records_.push_back(record);
+    }
+  }
+}
+
+void TileKernel::use_surfaces(Framebuffer& framebuffer) { color_ = &framebuffer.color; }
+
+std::uint32_t TileKernel::pixel_x(std::size_t tile, std::uint32_t warp, unsigned lane) const {
+  const std::uint32_t across = screen_tile_pixels / warp_width_;  // warps side by side
+  return tiling_.tile(tile).x * screen_tile_pixels + warp % across * warp_width_ + lane % warp_width_;
+}
+
+std::uint32_t TileKernel::pixel_y(std::size_t tile, std::uint32_t warp, unsigned lane) const {
+  const std::uint32_t across = screen_tile_pixels / warp_width_;
+  return tiling_.tile(tile).y * screen_tile_pixels + warp / across * (lanes_of_warp / warp_width_) + lane / warp_width_;
+}
+
+TileKernel::WarpLanes TileKernel::begin(std::size_t tile, std::uint32_t warp) const {
+  WarpLanes lanes{};
+  for (unsigned lane = 0; lane < lanes_of_warp; ++lane) {
+    const std::uint32_t x = pixel_x(tile, warp, lane);
+    const std::uint32_t y = pixel_y(tile, warp, lane);
+    lanes.x[lane / 8][lane % 8] = static_cast<float>(x) + 0.5F;
+    lanes.y[lane / 8][lane % 8] = static_cast<float>(y) + 0.5F;
+    lanes.alive[lane / 8][lane % 8] = x < width_ && y < height_ ? -1 : 0;
+  }
+  for (LanePair& transmittance : lanes.transmittance) transmittance = splat_pair(1);
+  return lanes;
+}
+
+template <StopRule Rule>
+TileKernel::Fates TileKernel::look_at(const Record& splat, WarpLanes& lanes) const {
+  LanePairBits inside[vectors], visible[vectors], blended[vectors];
+  LanePair alphas[vectors];
+  for (unsigned i = 0; i < vectors; ++i) {
+    const LanePair dx = splat.cx - lanes.x[i];
+    const LanePair dy = splat.cy - lanes.y[i];
+    const LanePair power = -0.5F * (splat.xx * dx * dx + splat.yy * dy * dy) - splat.xy * dx * dy;
+    inside[i] = lanes.alive[i] & (power <= 0.0F);
+    const LanePair exponent = select<LanePair>(inside[i], power, LanePair{});
+    const LanePair alpha = splat.opacity * exp2_nonpositive(exponent * log2_e);
+    alphas[i] = select<LanePair>(alpha > alpha_most, LanePair{} + alpha_most, alpha);
+    visible[i] = inside[i] & (alphas[i] >= pruning_threshold_);
+  }
+  Fates fates;
+  fates.inside = mask_of(inside);
+  fates.visible = mask_of(visible);
+  if (fates.visible == 0) return fates;
+  for (unsigned i = 0; i < vectors; ++i) {
+    LanePair& before = lanes.transmittance[i];
+    const LanePair after = before * (1.0F - alphas[i]);
+    blended[i] = visible[i];
+    if constexpr (Rule == StopRule::before) {
+      blended[i] &= after >= least_transmittance_;
+      lanes.alive[i] &= ~visible[i] | blended[i];
+    }
+    if constexpr (Rule == StopRule::after) lanes.alive[i] &= ~(blended[i] & (1.0F - after >= terminating_alpha_));
+    const LanePair weight = floats_of<LanePair>(bits_of(alphas[i] * before) & blended[i]);
+    lanes.red[i] += splat.red * weight;
+    lanes.green[i] += splat.green * weight;
+    lanes.blue[i] += splat.blue * weight;
+    before = select<LanePair>(blended[i], after, before);
+  }
+  fates.blended = mask_of(blended);
+  return fates;
+}
+
+std::uint64_t TileKernel::count(const Fates& fates, std::uint32_t alive) {
+  const std::uint32_t living = count_bits(alive);
+  const std::uint32_t visible = count_bits(fates.visible);
+  const std::uint32_t blended = count_bits(fates.blended);
+  ++warp_iterations;
+  lanes_dead += lanes_of_warp - living;
+  lanes_pruned += living - visible;
+  lanes_stopping += visible - blended;
+  lanes_blending += blended;
+  if (blended != 0) {
+    ++iterations_blending;
+    return blending_;
+  }
+  ++iterations_without_blending;
+  if (visible != 0) {
+    ++iterations_stopping;
+    return stopping_;
+  }
+  if (fates.inside != 0) {
+    ++iterations_pruned;
+    return pruned_;
+  }
+  ++iterations_outside;
+  return outside_;
+}
+
+template <StopRule Rule>
+void TileKernel::render_by(std::size_t tile, const std::uint32_t* splats, std::uint32_t length, BlockWork& out) {
+  const std::uint32_t all_batches = (length + batch_splats - 1) / batch_splats;
+  std::array<std::uint32_t, warps> lived{};  // batches that a warp began alive
+  out.warps = warps;
+  out.instructions.assign(std::size_t{all_batches} * warps, batch_);
+  std::uint32_t begun = 0;  // batches of the block
+  for (std::uint32_t warp = 0; warp < warps; ++warp) {
+    WarpLanes lanes = begin(tile, warp);
+    std::uint32_t alive = lanes.alive_mask();
+    while (lived[warp] < all_batches && alive != 0) {
+      std::uint64_t& instructions = out.instructions[std::size_t{lived[warp]} * warps + warp];
+      std::uint32_t next = lived[warp]++ * batch_splats;
+      const std::uint32_t end = std::min(next + batch_splats, length);
+      for (; next < end && alive != 0; ++next) {
+        instructions += count(look_at<Rule>(records_[splats[next]], lanes), alive);
+        if constexpr (Rule != StopRule::none) alive = lanes.alive_mask();
+      }
+    }
+    begun = std::max(begun, lived[warp]);
+    if (color_ != nullptr) store(tile, warp, lanes);
+  }
+  out.instructions.resize(std::size_t{begun} * warps);
+  batches += std::uint64_t{begun} * warps;
+  for (const std::uint32_t of_warp : lived) batches_of_dead_warps += begun - of_warp;
+  constexpr std::uint64_t entry_bytes = 28;  // number, centre, inverse covariance, opacity
+  constexpr std::uint64_t pixel_bytes = 16;
+  bytes_ += std::min(std::uint64_t{begun} * batch_splats, std::uint64_t{length}) * entry_bytes;
+  bytes_ += pixel_bytes * screen_tile_pixels * screen_tile_pixels;
+}
+
+void TileKernel::render(std::size_t tile, const std::uint32_t* splats, std::uint32_t length, BlockWork& out) {
+  switch (rule_) {
+    case StopRule::none: return render_by<StopRule::none>(tile, splats, length, out);
+    case StopRule::before: return render_by<StopRule::before>(tile, splats, length, out);
+    case StopRule::after: return render_by<StopRule::after>(tile, splats, length, out);
+  }
+}
+
+void TileKernel::store(std::size_t tile, std::uint32_t warp, const WarpLanes& lanes) {
+  for (unsigned lane = 0; lane < lanes_of_warp; ++lane) {
+    const std::uint32_t x = pixel_x(tile, warp, lane) % screen_tile_pixels;
+    const std::uint32_t y = pixel_y(tile, warp, lane) % screen_tile_pixels;
+    QuadColor& quad = color_->quad(tiling_.tile(tile), y / 2 * quads_per_tile_row + x / 2);
+    const unsigned at = y % 2 * 2 + x % 2;
+    quad.red[at] = lanes.red[lane / 8][lane % 8];
+    quad.green[at] = lanes.green[lane / 8][lane % 8];
+    quad.blue[at] = lanes.blue[lane / 8][lane % 8];
+    quad.alpha[at] = 1 - lanes.transmittance[lane / 8][lane % 8];
+  }
+}
+
+namespace {
+constexpr const char* fitted_instructions = "measured on a GH100: instructions of 15 lists, within 0.11 %";
+constexpr double sass_stopping = 41;
+}  // namespace
+
+PublishedKernel::Parameters::Parameters() : TileKernelParameters({38.0, sass_stopping, 59.7, fitted_instructions}) {}
+EndlessKernel::Parameters::Parameters() : TileKernelParameters({35.3, sass_stopping, 48.2, fitted_instructions}) {}
+ThresholdKernel::Parameters::Parameters() : TileKernelParameters({38.1, sass_stopping, 58.2, fitted_instructions}) {}
+
+PublishedKernel::PublishedKernel(const Parameters& parameters, const RenderContext& context)
+    : TileKernel(parameters, context, StopRule::before,
+                 static_cast<float>(static_cast<double>(parameters.least_transmittance))) {}
+EndlessKernel::EndlessKernel(const Parameters& parameters, const RenderContext& context)
+    : TileKernel(parameters, context, StopRule::none) {}
+ThresholdKernel::ThresholdKernel(const Parameters& parameters, const RenderContext& context)
+    : TileKernel(parameters, context, StopRule::after) {}
+
+namespace {
+const SoftwareSlotRegistrar render_slot("render", 220, "published");
+const Registrar<PublishedKernel, RenderBehaviour> published_kernel(
+    "render", "published", "the published kernel: a pixel stops before the splat that would bring T under 1e-4", false,
+    Trust::trusted);
+const Registrar<EndlessKernel, RenderBehaviour> endless_kernel("render", "endless",
+                                                               "the published kernel without termination", false,
+                                                               Trust::trusted);
+const Registrar<ThresholdKernel, RenderBehaviour> threshold_kernel(
+    "render", "threshold", "the published kernel with the hardware's rule: a pixel stops once its alpha is 0.996",
+    false, Trust::trusted);
+}  // namespace
+
+}  // namespace vrpipe

@@ -1,0 +1,238 @@
+#include <vrpipe/platforms/software.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <vrpipe/pipeline/registry.h>
+#include <vrpipe/pipeline/slots/binning.h>
+#include <vrpipe/pipeline/slots/preparation.h>
+#include <vrpipe/pipeline/slots/render.h>
+
+#include "software/software_statistic.h"
+#include "support/simulate.h"
+
+namespace vrpipe {
+namespace {
+
+using testing::software_statistic;
+
+RunRequest request_at(Fidelity fidelity, std::vector<Setting> settings = {}, std::vector<UnitChoice> units = {}) {
+  RunRequest request;
+  request.platform = &platform_named("gh100-gpc");
+  request.variant = variant_named("baseline");
+  request.fidelity = fidelity;
+  request.settings = std::move(settings);
+  request.units = std::move(units);
+  return request;
+}
+
+SoftwareResult render(const RunRequest& request, const Draw& draw, std::optional<std::uint64_t> gaussians = {}) {
+  return simulate_software(request, *Frame::of(draw), gaussians);
+}
+
+std::string refused(const RunRequest& request, const Frame& frame) {
+  try {
+    simulate_software(request, frame, {});
+  } catch (const UserError& error) {
+    return error.what();
+  }
+  return "";
+}
+std::string refused(const RunRequest& request) { return refused(request, *Frame::of(testing::draw_of(16, 16))); }
+
+TEST(Software, GivesTheSameCountsAndImageAtEveryFidelity) {
+  const Draw draw = testing::random_draw(100, 60, 300, 2);
+  const SoftwareResult functional = render(request_at(Fidelity::functional), draw);
+  EXPECT_FALSE(functional.cycles.has_value());
+  for (const Fidelity fidelity : {Fidelity::bound, Fidelity::lt, Fidelity::cycle}) {
+    const SoftwareResult timed = render(request_at(fidelity), draw);
+    EXPECT_TRUE(testing::same_image(functional.framebuffer.color, timed.framebuffer.color));
+    ASSERT_EQ(timed.statistics.size(), functional.statistics.size());
+    for (std::size_t i = 0; i < timed.statistics.size(); ++i) {
+      EXPECT_EQ(timed.statistics[i].value, functional.statistics[i].value) << timed.statistics[i].name;
+    }
+  }
+}
+
+TEST(Software, IsNeverUnderItsBound) {
+  const Draw draw = testing::random_draw(200, 120, 900, 4);
+  const SoftwareResult bound = render(request_at(Fidelity::bound), draw, 2000);
+  const SoftwareResult lt = render(request_at(Fidelity::lt), draw, 2000);
+  EXPECT_GE(*lt.cycles, *bound.cycles);
+  EXPECT_GT(*lt.render.cycles, *bound.render.cycles);
+  for (std::size_t i = 0; i < lt.binning.size(); ++i) EXPECT_EQ(*lt.binning[i].cycles, *bound.binning[i].cycles);
+}
+
+TEST(Software, TheFluidIsNearTheClock) {
+  const Draw draw = testing::random_draw(400, 300, 2000, 4);
+  const double cycle = static_cast<double>(*render(request_at(Fidelity::cycle), draw).render.cycles);
+  EXPECT_NEAR(static_cast<double>(*render(request_at(Fidelity::lt), draw).render.cycles), cycle, 0.03 * cycle);
+}
+
+TEST(Software, CyclesAreThoseOfItsKernelsOneAfterTheOther) {
+  const SoftwareResult result = render(request_at(Fidelity::lt), testing::random_draw(100, 60, 300, 2), 500);
+  ASSERT_TRUE(result.preprocess.has_value());
+  std::uint64_t sum = *result.preprocess->cycles + *result.render.cycles;
+  for (const KernelReport& kernel : result.binning) sum += *kernel.cycles;
+  EXPECT_EQ(*result.cycles, sum);
+}
+
+TEST(Software, OfADrawListNothingIsPreprocessed) {
+  EXPECT_FALSE(render(request_at(Fidelity::lt), testing::draw_of(16, 16)).preprocess.has_value());
+  EXPECT_FALSE(prepare_for_hardware(request_at(Fidelity::lt), *Frame::of(testing::draw_of(16, 16)), {}).preprocess);
+}
+
+TEST(Software, KernelsShareTheArrayAndLaunchWhateverItIs) {
+  const Frame frame(16, 16);
+  const std::uint64_t gaussians = 1'000'000;
+  const std::vector<Setting> price{{"preparation", "record_cycles", "12"}, {"preparation", "launch_microseconds", "3"}};
+  const auto on = [&](const char* cores) {
+    std::vector<Setting> settings = price;
+    settings.push_back({"sm", "cores", cores});
+    return *prepare_for_hardware(request_at(Fidelity::lt, settings), frame, gaussians).preprocess->cycles;
+  };
+  EXPECT_EQ(on("4"), 12 * gaussians / 4 + 3 * 1980);
+  EXPECT_EQ(on("8"), 12 * gaussians / 8 + 3 * 1980);
+}
+
+TEST(Software, ACoreOfHalfTheLanesIsHalfAnSm) {
+  RunRequest request = request_at(Fidelity::lt, {{"preparation", "launch_microseconds", "0"},
+                                                 {"preparation", "record_cycles", "12"},
+                                                 {"preparation", "visible_bytes", "0"},
+                                                 {"preparation", "culled_bytes", "0"}});
+  request.platform = &platform_named("agx-orin");
+  // 16 cores of 64 lanes.
+  EXPECT_EQ(*prepare_for_hardware(request, Frame(16, 16), 800'000).preprocess->cycles, 12U * 800'000 / 8);
+}
+
+TEST(Software, MemoryBindsWhatMovesMoreThanItsBandwidth) {
+  RunRequest request = request_at(Fidelity::bound, {{"preparation", "launch_microseconds", "0"},
+                                                    {"preparation", "culled_bytes", "65536"}});
+  request.platform = &platform_named("agx-orin");
+  const KernelReport kernel = *prepare_for_hardware(request, Frame(16, 16), 10'000).preprocess;
+  EXPECT_EQ(kernel.bound_by, "memory");
+  // 16 channels of 32 bits at 1600 million transfers a second, less what refreshing them takes; 612 million cycles.
+  const double without_refresh = 65536e4 / (16 * 4 * 1600e6 / 612e6);
+  EXPECT_GT(static_cast<double>(*kernel.cycles), without_refresh);
+  EXPECT_LT(static_cast<double>(*kernel.cycles), 1.05 * without_refresh);
+}
+
+/// A kernel of one's own, after the shipped ones: it draws whatever comes first, a warp instruction a tile.
+class FrontMost : public RenderBehaviour {
+ public:
+  struct Parameters : ParameterSet {
+    Integer instructions{*this, "instructions", 1, 1, 1000, "instructions", "this test", "of each warp"};
+  };
+  FrontMost(const Parameters& parameters, const RenderContext& context)
+      : context_(context), instructions_(parameters.instructions) {}
+  void use_surfaces(Framebuffer& framebuffer) override { color_ = &framebuffer.color; }
+  void render(std::size_t tile, const std::uint32_t* splats, std::uint32_t length, BlockWork& out) override {
+    out.warps = 1;
+    out.instructions.clear();
+    if (length == 0) return;
+    out.instructions.push_back(std::uint64_t{1000} * instructions_);
+    const Splat& splat = context_.draw(0).splat(splats[0]);
+    for (unsigned position = 0; position < positions_per_tile; ++position) {
+      color_->quad(color_->grid().tile(tile), position) = testing::color_of(splat.red, splat.green, splat.blue, 1);
+    }
+    ++warp_iterations;
+    lanes_blending += 32;
+  }
+  TimingParameters timing() const override { return {1, 1000, 1, 0}; }
+  std::uint64_t bytes() const override { return 0; }
+
+ private:
+  const RenderContext& context_;
+  const std::uint64_t instructions_;
+  ColorSurface* color_ = nullptr;
+};
+
+/// Breaks a rule: its lists name a splat that is not there.
+class WrongLists : public BinningBehaviour {
+ public:
+  struct Parameters : ParameterSet {};
+  WrongLists(const Parameters&, const RenderContext& context)
+      : tiles_(ScreenTiling(context.frame->width(), context.frame->height()).tiles()) {}
+  TileLists make_lists() override {
+    TileLists lists;
+    lists.begin.assign(tiles_ + 1, 1);
+    lists.begin.front() = 0;
+    lists.splats = {77};
+    return lists;
+  }
+  std::vector<KernelWork> kernels() const override { return {}; }
+
+ private:
+  std::size_t tiles_;
+};
+
+/// And one whose time is no number.
+class Timeless : public PreparationBehaviour {
+ public:
+  struct Parameters : ParameterSet {};
+  Timeless(const Parameters&, const RenderContext&) {}
+  KernelWork project(Path, std::uint64_t gaussians, std::uint64_t) const override {
+    return {"preprocess", gaussians, std::numeric_limits<double>::quiet_NaN(), 0, 0};
+  }
+  KernelWork sort_by_depth(std::uint64_t splats) const override { return {"depth sort", splats}; }
+};
+
+const Registrar<Timeless, PreparationBehaviour> timeless("preparation", "timeless", "takes a time that is no number");
+const Registrar<FrontMost, RenderBehaviour> front_most("render", "front-most", "draws the first splat of each tile");
+const Registrar<WrongLists, BinningBehaviour> wrong_lists("binning", "wrong-lists", "names splats that are not there");
+
+TEST(Software, AKernelOfOnesOwnTakesThePlaceOfTheShippedOne) {
+  const Draw draw =
+      testing::draw_of(32, 16,
+                       {testing::round_splat(8, 8, 2, 0.9F, 1, 0, 0), testing::round_splat(16, 8, 6, 0.9F, 0, 1, 0)});
+  const RunRequest request =
+      request_at(Fidelity::lt, {{"render", "instructions", "500"}, {"sm", "cores", "1"}}, {{"render", "front-most"}});
+  const SoftwareResult result = render(request, draw);
+  EXPECT_EQ(*result.render.cycles, 1000U) << "one block at a time, an instruction a cycle";
+  EXPECT_EQ(result.framebuffer.color.pixel(0, 0)[0], 1.0F);
+  EXPECT_EQ(result.framebuffer.color.pixel(20, 0)[1], 1.0F);
+  EXPECT_EQ(software_statistic(result, "render.lanes_blending"), 64U);
+  EXPECT_NE(std::find(result.implementations.begin(), result.implementations.end(),
+                      std::pair<std::string, std::string>{"render", "front-most"}),
+            result.implementations.end());
+}
+
+TEST(Software, AUnitThatBreaksARuleIsNamed) {
+  try {
+    render(request_at(Fidelity::functional, {}, {{"binning", "wrong-lists"}}), testing::draw_of(16, 16));
+    FAIL() << "nothing thrown";
+  } catch (const SimulationFault& fault) {
+    EXPECT_NE(std::string(fault.what()).find("binning=wrong-lists"), std::string::npos) << fault.what();
+    EXPECT_NE(std::string(fault.what()).find("splat 77 of 0"), std::string::npos) << fault.what();
+  }
+}
+
+TEST(Software, AKernelOfATimeThatCannotBeIsAFault) {
+  EXPECT_THROW(render(request_at(Fidelity::lt, {}, {{"preparation", "timeless"}}), testing::draw_of(16, 16), 5),
+               SimulationFault);
+}
+
+TEST(Software, RefusesWhatItDoesNotKnow) {
+  EXPECT_NE(refused(request_at(Fidelity::lt, {{"render", "issue_rat", "1"}})).find("issue_rate"), std::string::npos);
+  EXPECT_NE(refused(request_at(Fidelity::lt, {}, {{"render", "publishd"}})).find("published"), std::string::npos);
+  EXPECT_NE(refused(request_at(Fidelity::lt, {{"binning", "lists", "circle"}})).find("ellipse"), std::string::npos);
+  Frame two(16, 16);
+  for (int i = 0; i < 2; ++i) two.draw(testing::geometry_of(16, 16), {});
+  EXPECT_NE(refused(request_at(Fidelity::lt), two).find("one draw"), std::string::npos);
+}
+
+TEST(Software, IsNoneOfThePipelinesUnits) {
+  RunRequest request = request_at(Fidelity::functional, {{"render", "issue_rate", "1"}});
+  EXPECT_THROW(check_configuration(request), UserError);
+  EXPECT_NO_THROW(check_configuration(without_software(request)));
+  EXPECT_NO_THROW(check_software(request));
+}
+
+}  // namespace
+}  // namespace vrpipe

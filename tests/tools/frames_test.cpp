@@ -1,0 +1,204 @@
+// `vrpipe frames`: whole frames, in software beside by hardware.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "documented_keys.h"
+#include "image/images.h"
+#include "tool_test_support.h"
+
+namespace vrpipe::testing {
+namespace {
+
+using nlohmann::json;
+
+class Frames : public ToolTest {
+ protected:
+  json frames(std::vector<std::string> arguments = {}) const {
+    arguments.insert(arguments.begin(), {"frames", "--scene", "tiny.spl"});
+    return json_of(std::move(arguments));
+  }
+  static std::map<std::string, json> by_path(const json& result) {
+    std::map<std::string, json> paths;
+    for (const json& path : result["frames"]) paths[path["path"]] = path;
+    return paths;
+  }
+};
+
+TEST_F(Frames, AreTimedInSoftwareAndByHardware) {
+  const json result = frames({"--fidelity", "lt"});
+  EXPECT_EQ(result["schema"], "vrpipe.frames/1");
+  ASSERT_EQ(result["frames"].size(), 3U);
+  const std::vector<std::string> paths{"software", "hardware", "vr-pipe"}, names{"published", "baseline", "het+qm"};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const json& path = result["frames"][i];
+    EXPECT_EQ(path["path"], paths[i]);
+    EXPECT_EQ(path["name"], names[i]);
+    const json& milliseconds = path["milliseconds"];
+    EXPECT_TRUE(milliseconds["preprocess"].is_null()) << "of a draw list";
+    EXPECT_DOUBLE_EQ(milliseconds["frame"].get<double>(),
+                     milliseconds["sort"].get<double>() + milliseconds["raster"].get<double>());
+    EXPECT_GT(milliseconds["raster"], 0);
+    EXPECT_FALSE(path["bound_by"].get<std::string>().empty());
+  }
+}
+
+TEST_F(Frames, DrawsAreThoseOfCompare) {
+  const json result = frames({"--fidelity", "lt", "--platform", "mobile"});
+  const json compared = json_of({"compare", "--scene", "tiny.spl", "--fidelity", "lt", "--platform", "mobile"});
+  std::map<std::string, json> runs;
+  for (const json& run : compared["runs"]) runs[run["variant"]] = run;
+  for (const auto& [path, variant] : {std::pair{"hardware", "baseline"}, {"vr-pipe", "het+qm"}}) {
+    const json of_path = by_path(result)[path];
+    EXPECT_EQ(of_path["milliseconds"]["raster"], runs[variant]["milliseconds"]);
+    EXPECT_EQ(of_path["counts"], runs[variant]["counts"]);
+  }
+}
+
+TEST_F(Frames, AGaussianSceneIsPreprocessed) {
+  const json result =
+      json_of({"frames", "--size", "64x48", "--fovy", "10", "--fidelity", "bound", "--set", "preprocess.sh_degree=0"});
+  const std::uint64_t gaussians = result["scene"]["gaussians_total"];
+  for (const json& path : result["frames"]) {
+    EXPECT_GT(path["milliseconds"]["preprocess"], 0);
+    EXPECT_EQ(path["kernels"][0]["name"], "preprocess");
+    EXPECT_EQ(path["kernels"][0]["items"], gaussians);
+    double sum = 0;
+    for (const char* part : {"preprocess", "sort", "raster"}) sum += path["milliseconds"][part].get<double>();
+    EXPECT_DOUBLE_EQ(path["milliseconds"]["frame"].get<double>(), sum);
+  }
+}
+
+TEST_F(Frames, WithoutTimeThereAreCountsAlone) {
+  const json result = frames({"--fidelity", "functional"});
+  const json timed = frames({"--fidelity", "lt"});
+  for (std::size_t i = 0; i < 3; ++i) {
+    const json& path = result["frames"][i];
+    for (const char* part : {"preprocess", "sort", "raster", "frame"})
+      EXPECT_TRUE(path["milliseconds"][part].is_null());
+    EXPECT_TRUE(path["bound_by"].is_null());
+    EXPECT_TRUE(path["expected_error_percent"].is_null());
+  }
+  EXPECT_EQ(result["frames"][0]["counts"], timed["frames"][0]["counts"]);
+}
+
+TEST_F(Frames, CountsAreTheSameAtEveryFidelity) {
+  const json cycle = frames(), lt = frames({"--fidelity", "lt"});
+  EXPECT_EQ(cycle["fidelity"], "cycle");
+  EXPECT_EQ(cycle["frames"][0]["counts"], lt["frames"][0]["counts"]);
+  EXPECT_EQ(cycle["frames"][0]["milliseconds"]["sort"], lt["frames"][0]["milliseconds"]["sort"]);
+}
+
+TEST_F(Frames, KernelsAreChosenAndSet) {
+  const json result = frames({"--fidelity", "lt", "--unit", "render=endless", "--set", "binning.lists=three_sigma",
+                              "--set", "render.warp_pixels=8x4"});
+  const json software = by_path(result)["software"];
+  EXPECT_EQ(software["name"], "endless");
+  EXPECT_EQ(software["implementations"]["render"], "endless");
+  EXPECT_EQ(software["parameters"]["binning.lists"], "three_sigma");
+  EXPECT_EQ(software["parameters"]["render.warp_pixels"], "8x4");
+  EXPECT_EQ(software["parameters"]["render.blocks_per_core"], 8);
+  EXPECT_EQ(software["counts"]["lanes_stopping"], 0);
+  EXPECT_TRUE(software["expected_error_percent"].is_null()) << "nobody measured it";
+  EXPECT_TRUE(by_path(frames({"--fidelity", "lt"}))["software"]["expected_error_percent"].is_null());
+  const json measured = frames({"--fidelity", "lt", "--platform", "gh100-gpc"});
+  EXPECT_EQ(by_path(measured)["software"]["expected_error_percent"], 4);
+}
+
+TEST_F(Frames, AKernelOfAPluginTakesThePlaceOfTheShippedOne) {
+  const json shipped = by_path(frames({"--fidelity", "lt"}))["software"];
+  const json own =
+      by_path(frames({"--fidelity", "lt", "--plugin", KERNEL_PLUGIN, "--unit", "render=no-barriers"}))["software"];
+  EXPECT_EQ(own["name"], "no-barriers");
+  EXPECT_EQ(own["counts"]["lanes_blending"], shipped["counts"]["lanes_blending"]);
+  EXPECT_EQ(own["counts"]["barriers_gone"], 0) << "a list of 60 splats is one batch";
+  EXPECT_EQ(own["milliseconds"]["raster"], shipped["milliseconds"]["raster"]);
+}
+
+TEST_F(Frames, AreTheSameWithAnyNumberOfProcesses) {
+  json one = frames({"--fidelity", "lt", "--jobs", "1"}), three = frames({"--fidelity", "lt", "--jobs", "3"});
+  for (json* result : {&one, &three}) {
+    for (json& path : (*result)["frames"]) path.erase("host_seconds");
+  }
+  EXPECT_EQ(one["frames"], three["frames"]);
+}
+
+TEST_F(Frames, ImagesOfEveryPathAreAlike) {
+  const json result = frames({"--fidelity", "functional", "--output", "images", "--unit", "render=endless"});
+  std::vector<tools::SharedImage> images;
+  for (const json& path : result["frames"]) {
+    EXPECT_EQ(path["images"]["png"], "images/tiny-" + path["path"].get<std::string>() + ".png");
+    images.push_back(tools::read_exr((folder() / path["images"]["exr"].get<std::string>()).string()));
+  }
+  ASSERT_EQ(images.size(), 3U);
+  float most = 0;
+  for (std::size_t i = 0; i < std::size_t{4} * images[0].width() * images[0].height(); ++i) {
+    for (std::size_t of : {1, 2}) most = std::max(most, std::fabs(images[0].values()[i] - images[of].values()[i]));
+  }
+  EXPECT_LT(most, 0.01F) << "halves, and what ends early";
+  EXPECT_GT(most, 0.0F) << "single precision in software";
+}
+
+TEST_F(Frames, AConfigurationReadsBackToTheSameFrames) {
+  const std::vector<std::string> arguments{"frames", "--scene",    "tiny.spl", "--fidelity",
+                                           "bound",  "--platform", "gh100-gpc"};
+  std::vector<std::string> changed = arguments;
+  changed.insert(changed.end(), {"--unit", "render=threshold", "--set", "binning.lists=box"});
+  for (std::vector<std::string> given : {arguments, changed}) {
+    json direct = json_of(given);
+    given.push_back("--print-config");
+    const Finished printed = vrpipe(given);
+    ASSERT_EQ(printed.code, 0) << printed.err;
+    write("frames.toml", printed.out);
+    json read = json_of({"frames", "--config", "frames.toml"});
+    for (json* result : {&direct, &read}) {
+      for (json& path : (*result)["frames"]) path.erase("host_seconds");
+    }
+    EXPECT_EQ(direct["frames"], read["frames"]);
+  }
+}
+
+TEST_F(Frames, TheTableHasEveryPath) {
+  const Finished finished = vrpipe({"frames", "--scene", "tiny.spl", "--fidelity", "lt", "--json", "frames.json"});
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  for (const char* part :
+       {"software (published)", "hardware (baseline)", "vr-pipe (het+qm)", "preprocess", "over hardware",
+        "warp iterations", "a draw list is preprocessed already", "result: frames.json"}) {
+    EXPECT_NE(finished.out.find(part), std::string::npos) << part << " is not in\n" << finished.out;
+  }
+  EXPECT_EQ(json::parse(read_file(folder() / "frames.json"))["schema"], "vrpipe.frames/1");
+}
+
+TEST_F(Frames, MistakesAreToldInALine) {
+  refused({"frames", "--scene", "none.ply"}, {"none.ply"});
+  refused({"frames", "--scene", "tiny.spl", "--set", "render.issue_rat=1"}, {"render.issue_rate"});
+  refused({"frames", "--scene", "tiny.spl", "--unit", "render=publishd"}, {"published"});
+  refused({"frames", "--scene", "tiny.spl", "--set", "binning.lists=circle"}, {"ellipse"});
+  refused({"frames", "--scene", "builtin:courtyard", "--size", "32x32"}, {"meshes"});
+  refused({"frames", "--scene", "tiny.spl", "--json", "tiny.spl"}, {"--json"});
+  for (const char* command : {"run", "compare", "accuracy"}) {
+    refused({command, "--scene", "tiny.spl", "--set", "render.issue_rate=1"},
+            {"--set render.issue_rate", "vrpipe frames"});
+    refused({command, "--scene", "tiny.spl", "--unit", "render=endless"}, {"--unit render=endless", "vrpipe frames"});
+  }
+}
+
+TEST_F(Frames, EveryKeyOfTheResultIsDocumented) {
+  const std::string page = read_file(std::string(VRPIPE_DOCS) + "/software.md");
+  std::set<std::string> known;
+  for (const std::string& key : documented(page, "Keys of a path")) known.insert(key);
+  json paths = json::object();
+  paths["frames"] = frames({"--fidelity", "lt"})["frames"];
+  expect_documented({paths}, known);
+}
+
+}  // namespace
+}  // namespace vrpipe::testing

@@ -1,0 +1,209 @@
+#include "jobs/frames_job.h"
+
+#include <algorithm>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include <vrpipe/component/error.h>
+
+#include "host/output_file.h"
+#include "host/progress_line.h"
+#include "host/stdout_to_stderr.h"
+#include "image/images.h"
+#include "jobs/loaded_frame.h"
+#include "jobs/microbench_job.h"
+#include "jobs/processes.h"
+
+namespace vrpipe::tools {
+namespace {
+
+/// What software rendering was found to be off on a real GPU, with the shipped units (docs/software.md).
+constexpr double software_error_percent = 4;
+
+/// A part of a frame, and what bounds it.
+struct Part {
+  std::string name;
+  std::optional<double> milliseconds;
+  std::string bound_by;
+};
+
+std::string longest(const std::vector<Part>& parts) {
+  const auto found = std::max_element(parts.begin(), parts.end(), [](const Part& a, const Part& b) {
+    return a.milliseconds.value_or(-1) < b.milliseconds.value_or(-1);
+  });
+  return found->milliseconds ? found->name + ": " + found->bound_by : "";
+}
+
+std::optional<double> sum(const std::vector<std::optional<double>>& values) {
+  double all = 0;
+  bool any = false;
+  for (const std::optional<double>& value : values) {
+    all += value.value_or(0);
+    any = any || value;
+  }
+  return any ? std::optional(all) : std::nullopt;
+}
+
+/// With the kernels that the job says.
+RunRequest with_kernels(RunRequest request, const SimulationJob& job) {
+  request.settings.insert(request.settings.end(), job.kernel_settings.begin(), job.kernel_settings.end());
+  request.units.insert(request.units.end(), job.kernel_units.begin(), job.kernel_units.end());
+  return request;
+}
+
+std::optional<ImageFiles> write_image(const SimulationJob& job, const std::string& name, const SharedImage& image,
+                                      ResultFiles& written) {
+  const ImageFiles files = image_files(job, name);
+  const bool has_png = written.write(files.png, encode_png(image, job.background), "--output");
+  const bool has_exr = written.write(files.exr, encode_exr(image), "--output");
+  return has_png && has_exr ? std::optional(files) : std::nullopt;
+}
+
+class PathMaker {
+ public:
+  explicit PathMaker(double frequency_mhz) : cycles_per_ms_(frequency_mhz * 1000) {}
+
+  FramePath of_software(const SoftwareResult& result) const {
+    FramePath path = begin("software", result.implementations.back().second);
+    std::vector<Part> parts;
+    std::vector<std::optional<double>> sorting;
+    const auto add = [&](const KernelReport& kernel) {
+      parts.push_back({kernel.name, milliseconds(kernel), kernel.bound_by});
+      path.bytes.emplace_back(kernel.name, kernel.bytes);
+      path.kernels.push_back(kernel);
+    };
+    if (result.preprocess) add(*result.preprocess);
+    for (const KernelReport& kernel : result.binning) {
+      add(kernel);
+      sorting.push_back(milliseconds(kernel));
+    }
+    add(result.render);
+    if (result.preprocess) path.preprocess = milliseconds(*result.preprocess);
+    path.sort = sum(sorting);
+    path.raster = milliseconds(result.render);
+    path.frame = sum({path.preprocess, path.sort, path.raster});
+    path.bound_by = longest(parts);
+    const bool is_as_measured = result.request.platform->name == measured_platform &&
+                                result.request.fidelity >= Fidelity::lt && result.as_shipped;
+    if (is_as_measured) path.expected_error_percent = software_error_percent;
+    for (const StatisticReport& statistic : result.statistics) {
+      if (statistic.kind == "counter")
+        path.counts.emplace_back(statistic.name.substr(statistic.name.find('.') + 1), statistic.value);
+    }
+    path.implementations = result.implementations;
+    path.parameters = result.parameters;
+    path.result_hash = result.result_hash;
+    path.host_seconds = result.host_seconds;
+    return path;
+  }
+
+  FramePath of_hardware(const std::string& name, const RunResult& run, const HardwarePreparation& prepared) const {
+    FramePath path = begin(name, run.request.variant.name);
+    std::vector<Part> parts;
+    const auto add = [&](const KernelReport& kernel) {
+      parts.push_back({kernel.name, milliseconds(kernel), kernel.bound_by});
+      path.bytes.emplace_back(kernel.name, kernel.bytes);
+      path.kernels.push_back(kernel);
+    };
+    if (prepared.preprocess) add(*prepared.preprocess);
+    add(prepared.sort);
+    if (prepared.preprocess) path.preprocess = milliseconds(*prepared.preprocess);
+    path.sort = milliseconds(prepared.sort);
+    if (run.cycles) path.raster = run.milliseconds;
+    path.frame = sum({path.preprocess, path.sort, path.raster});
+    parts.push_back({"draw", path.raster, run.bottleneck ? run.bottleneck->unit : "nothing"});
+    path.bound_by = longest(parts);
+    path.counts = run.counts.named();
+    add_dram_bytes(run, path);
+    path.result_hash = run.result_hash;
+    path.host_seconds = run.host_seconds;
+    return path;
+  }
+
+ private:
+  static FramePath begin(const std::string& path, const std::string& name) {
+    FramePath begun;
+    begun.path = path;
+    begun.name = name;
+    return begun;
+  }
+  std::optional<double> milliseconds(const KernelReport& kernel) const {
+    return kernel.cycles ? std::optional(static_cast<double>(*kernel.cycles) / cycles_per_ms_) : std::nullopt;
+  }
+  /// Where the platform has one.
+  static void add_dram_bytes(const RunResult& run, FramePath& path) {
+    std::optional<std::uint64_t> bytes;
+    for (const StatisticReport& statistic : run.statistics) {
+      const bool is_moved = statistic.name.find("_bytes_read") != std::string::npos ||
+                            statistic.name.find("_bytes_written") != std::string::npos;
+      if (statistic.name.rfind("dram.", 0) == 0 && is_moved) bytes = bytes.value_or(0) + statistic.value;
+    }
+    if (bytes) path.bytes.emplace_back("draw", *bytes);
+  }
+
+  double cycles_per_ms_;
+};
+
+}  // namespace
+
+FramesResult perform_frames(const SimulationJob& job) {
+  const std::vector<std::pair<std::string, std::string>> draws{{"hardware", "baseline"}, {"vr-pipe", "het+qm"}};
+  std::vector<std::string> images{image_name(job.frame.name, "software")};
+  for (const auto& [path, variant] : draws) images.push_back(image_name(job.frame.name, path));
+  check_outputs(job, images);
+  FramesResult result;
+  result.provenance = job.provenance;
+  result.preprocessing = job.preprocessing;
+  result.processes = job.processes;
+  ProgressLine progress;
+  progress.show("loading " + job.frame.name);
+  const LoadedFrame loaded = load_frame(job.frame, job.scene);
+  progress.erase();
+  if (!loaded.meshes.front().empty()) {
+    throw UserError("cannot render in software", job.frame.name, "the scene has meshes, and software renders splats",
+                    "take a scene without meshes");
+  }
+  result.scene = loaded.summary;
+  result.viewpoint = loaded.viewpoint;
+  result.width = loaded.width;
+  result.height = loaded.height;
+  std::optional<std::uint64_t> gaussians;
+  if (loaded.preprocessed_here) gaussians = loaded.summary.gaussians_total;
+
+  std::vector<RunRequest> requests;
+  for (const auto& [path, variant] : draws) {
+    const auto found = std::find_if(job.requests.begin(), job.requests.end(),
+                                    [name = variant](const RunRequest& each) { return each.variant.name == name; });
+    requests.push_back(*found);
+    requests.back().reads_statistics = true;
+  }
+  const auto frame_of = [&](const RunRequest& request) { return make_frame(request, job.frame, loaded); };
+  if (job.output) create_output_folder(*job.output, "--output");
+  std::vector<Simulated> simulated =
+      simulate_in_processes(requests, frame_of, job.output.has_value(), job.processes, progress);
+
+  const PathMaker make(requests.front().platform->frequency_mhz);
+  const RunRequest request = with_kernels(requests.front(), job);
+  const std::shared_ptr<const Frame> frame = frame_of(requests.front());
+  const StdoutToStderr redirected;  // units of plugins may print
+  progress.show("rendering in software");
+  const SoftwareResult software = simulate_software(request, *frame, gaussians);
+  result.paths.push_back(make.of_software(software));
+  const HardwarePreparation prepared = prepare_for_hardware(request, *frame, gaussians);
+  for (std::size_t i = 0; i < draws.size(); ++i)
+    result.paths.push_back(make.of_hardware(draws[i].first, simulated[i].result, prepared));
+  progress.erase();
+  if (job.output) {
+    progress.show("writing images");
+    SharedImage image(result.width, result.height);
+    image.copy_from(software.framebuffer.color);
+    for (std::size_t i = 0; i < result.paths.size(); ++i)
+      result.paths[i].images = write_image(job, images[i], i == 0 ? image : *simulated[i - 1].image, result.files);
+    progress.erase();
+  }
+  for (Simulated& run : simulated) result.runs.push_back(std::move(run.result));
+  return result;
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <vrpipe/platforms/software.h>
+
+#include "jobs/simulation_job.h"
+
+namespace vrpipe::tools {
+
+/// One way to draw a whole frame.
+struct FramePath {
+  std::string path;  ///< software, hardware, vr-pipe
+  std::string name;  ///< of the render kernel or the variant
+  // Simulated milliseconds; none where the fidelity has no time.
+  std::optional<double> preprocess;  ///< and of a draw list
+  std::optional<double> sort;        ///< all that orders
+  std::optional<double> raster;
+  std::optional<double> frame;
+  std::vector<std::pair<std::string, std::uint64_t>> bytes;  ///< to and from memory, by kernel; of a draw, DRAM's
+  std::string bound_by;                          ///< the longest part, and what bounds that; empty without time
+  std::optional<double> expected_error_percent;  ///< of the frame's time against a GPU; none where unknown
+  std::vector<std::pair<std::string, std::uint64_t>> counts;
+  std::vector<KernelReport> kernels;                                 ///< all of them, in order, the draw left out
+  std::vector<std::pair<std::string, std::string>> implementations;  ///< of kernels
+  std::vector<std::pair<std::string, std::string>> parameters;       ///< and what they are set to
+  std::string result_hash;
+  std::optional<ImageFiles> images;  ///< none where they could not be written, or were not asked for
+  double host_seconds = 0;
+};
+
+struct FramesResult {
+  Provenance provenance;
+  SceneSummary scene;
+  std::optional<Viewpoint> viewpoint;  ///< none for draw lists
+  std::vector<Setting> preprocessing;
+  std::uint32_t width = 0, height = 0;
+  unsigned processes = 1;
+  std::vector<FramePath> paths;
+  std::vector<RunResult> runs;  ///< the draws by hardware
+  ResultFiles files;            ///< written so far: images
+};
+
+/// Draws the frame of a job in software and by hardware: of its requests `baseline` is the path `hardware`, `het+qm`
+/// `vr-pipe`. Throws UserError, CommandFailure or a fault.
+FramesResult perform_frames(const SimulationJob& job);
+
+}  // namespace vrpipe::tools

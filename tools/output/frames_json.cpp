@@ -1,0 +1,84 @@
+#include "output/frames_json.h"
+
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "jobs/optional_json.h"
+#include "jobs/settings.h"
+
+namespace vrpipe::tools {
+namespace {
+
+Json kernels_json(const FramePath& path) {
+  Json kernels = Json::array();
+  for (const KernelReport& kernel : path.kernels) {
+    kernels.push_back({{"name", kernel.name},
+                       {"items", kernel.items},
+                       {"bytes", kernel.bytes},
+                       {"cycles", kernel.cycles ? Json(*kernel.cycles) : Json()},
+                       {"bound_by", kernel.cycles ? Json(kernel.bound_by) : Json()}});
+  }
+  return kernels;
+}
+
+Json kernel_parameters_json(const FramePath& path, const Platform& platform) {
+  const std::vector<ParameterListing> listings = all_parameters(&platform);
+  Json values = Json::object();
+  for (const auto& [name, value] : path.parameters) {
+    const Parameter* declared = nullptr;
+    for (const ParameterListing& listing : listings) {
+      const bool is_used = std::find(path.implementations.begin(), path.implementations.end(),
+                                     std::pair{listing.unit, listing.implementation}) != path.implementations.end();
+      for (const Parameter* parameter : listing.parameters->parameters()) {
+        if (is_used && name == listing.unit + "." + parameter->name()) declared = parameter;
+      }
+    }
+    values[name] = declared != nullptr ? typed_value(*declared, value) : Json(value);
+  }
+  return values;
+}
+
+Json path_json(const FramePath& path, const Platform& platform) {
+  Json implementations = Json::object();
+  for (const auto& [slot, name] : path.implementations) implementations[slot] = name;
+  return {{"path", path.path},
+          {"name", path.name},
+          {"milliseconds",
+           {{"preprocess", optional_json(path.preprocess)},
+            {"sort", optional_json(path.sort)},
+            {"raster", optional_json(path.raster)},
+            {"frame", optional_json(path.frame)}}},
+          {"millijoules", Json()},
+          {"bytes", counts_json(path.bytes)},
+          {"bound_by", path.bound_by.empty() ? Json() : Json(path.bound_by)},
+          {"expected_error_percent", optional_json(path.expected_error_percent)},
+          {"counts", counts_json(path.counts)},
+          {"kernels", kernels_json(path)},
+          {"implementations", std::move(implementations)},
+          {"parameters", kernel_parameters_json(path, platform)},
+          {"result_hash", path.result_hash},
+          {"images",
+           {{"png", path.images ? Json(path.images->png) : Json()},
+            {"exr", path.images ? Json(path.images->exr) : Json()}}},
+          {"host_seconds", path.host_seconds}};
+}
+
+}  // namespace
+
+Json frames_json(const FramesResult& result) {
+  const RunRequest& request = result.runs.front().request;
+  Json frames = Json::array();
+  for (const FramePath& path : result.paths) frames.push_back(path_json(path, *request.platform));
+  Json json = head_json("vrpipe.frames/1", result.provenance, result.processes);
+  json.update({{"scene", scene_json(result.scene, result.width, result.height)},
+               {"camera", camera_json(result.viewpoint)},
+               {"platform", platform_json(result.runs, result.preprocessing, result.provenance)},
+               {"fidelity", vrpipe::name_of(request.fidelity)},
+               {"format", vrpipe::name_of(request.format)},
+               {"termination", vrpipe::name_of(request.termination)},
+               {"frames", std::move(frames)}});
+  return json;
+}
+
+}  // namespace vrpipe::tools

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "jobs/frames_job.h"
+#include "output/result_json.h"
+
+namespace vrpipe::tools {
+
+/// The result of `frames`: schema vrpipe.frames/1 of the contract.
+Json frames_json(const FramesResult& result);
+
+}  // namespace vrpipe::tools

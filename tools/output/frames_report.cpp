@@ -1,0 +1,70 @@
+#include "output/frames_report.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include <vrpipe/component/printable.h>
+
+#include "output/machines_text.h"
+#include "output/report.h"
+#include "output/text_table.h"
+
+namespace vrpipe::tools {
+namespace {
+
+std::string milliseconds_text(const std::optional<double>& value) {
+  return value ? fmt::format("{:.3f}", *value) : "-";
+}
+
+std::optional<std::uint64_t> count_of(const FramePath& path, const std::string& name) {
+  const auto found =
+      std::find_if(path.counts.begin(), path.counts.end(), [&](const auto& count) { return count.first == name; });
+  return found == path.counts.end() ? std::nullopt : std::optional(found->second);
+}
+
+/// Of lanes in all iterations of warps.
+std::string lanes_text(const FramePath& software) {
+  const std::uint64_t iterations = count_of(software, "warp_iterations").value_or(0);
+  if (iterations == 0) return "";
+  const auto percent = [&](const char* name, double of) {
+    return fmt::format("{:.1f} %", 100 * static_cast<double>(count_of(software, name).value_or(0)) / of);
+  };
+  const double lanes = 32 * static_cast<double>(iterations);
+  return fmt::format(
+      "software: {} pairs, {} warp iterations; of their lanes {} blend, {} are pruned, {} are dead beside a living\n"
+      "one, {} stop; in {} of the iterations no lane blends\n",
+      grouped(count_of(software, "pairs").value_or(0)), grouped(iterations), percent("lanes_blending", lanes),
+      percent("lanes_pruned", lanes), percent("lanes_dead", lanes), percent("lanes_stopping", lanes),
+      percent("iterations_without_blending", static_cast<double>(iterations)));
+}
+
+}  // namespace
+
+std::string frames_report(const FramesResult& result, const TextStyle& style) {
+  std::string text = fmt::format("{}: {} splats, {}x{}\n", style.bold(printable(result.scene.name)),
+                                 grouped(result.scene.gaussians_visible), result.width, result.height);
+  text += machine_text(result.runs.front().request, style) + "\n";
+  TextTable table({"milliseconds", "preprocess", "sort", "raster", "frame", "over hardware", "bound by"});
+  table.left(6);
+  const auto hardware = std::find_if(result.paths.begin(), result.paths.end(),
+                                     [](const FramePath& path) { return path.path == "hardware"; });
+  for (const FramePath& path : result.paths) {
+    const bool is_timed = path.frame && hardware->frame && *hardware->frame > 0;
+    table.row({printable(fmt::format("{} ({})", path.path, path.name)), milliseconds_text(path.preprocess),
+               milliseconds_text(path.sort), milliseconds_text(path.raster), milliseconds_text(path.frame),
+               is_timed ? fmt::format("{:.2f}x", *path.frame / *hardware->frame) : "-",
+               path.bound_by.empty() ? "-" : printable(path.bound_by)});
+  }
+  text += table.text(style) + "\n";
+  for (const FramePath& path : result.paths) {
+    if (path.path == "software") text += lanes_text(path);
+  }
+  if (!result.viewpoint) text += "a draw list is preprocessed already: frames are without\n";
+  for (const std::string& note : result.scene.notes) text += "note: " + printable(note) + "\n";
+  return text;
+}
+
+}  // namespace vrpipe::tools
