@@ -44,13 +44,13 @@ TileAcceleratorParameters::TileAcceleratorParameters(const Preset& preset)
                           4,
                           1024,
                           "pixels",
-                          preset.flow_source,
+                          preset.masks_source,
                           "of a sub-tile, which splats are masked for"},
       masks{*this,
             "masks",
             {"obb", "ellipse"},
             preset.masks,
-            preset.flow_source,
+            preset.masks_source,
             "a splat is in a tile or a sub-tile if this shape touches it: its oriented box at alpha 1/255, or that "
             "ellipse"},
       conversion{*this,
@@ -344,7 +344,8 @@ TileAcceleratorParameters::Preset gcc_preset() {
   preset.conversion = 1;
   preset.pair_bytes = 8;
   preset.area_mm2 = preset.power_watts = 0;
-  preset.flow_source = "assumed, after GCC: Gaussian by Gaussian, where its alpha counts";
+  preset.flow_source = "assumed, after GCC: Gaussian by Gaussian, converted when it is needed";
+  preset.masks_source = "assumed, after GCC: where its alpha counts";
   preset.units_source = "assumed: as GSCore";
   preset.pair_source = "assumed: a depth and a number";
   preset.area_source = preset.power_source = "not known here";
@@ -358,7 +359,7 @@ TileAcceleratorParameters::Preset flicker_preset() {
   preset.volume_units = 8;
   preset.area_mm2 = 3.47;
   preset.power_watts = 0;
-  preset.flow_source = "assumed: in the place of FLICKER's tests of what a Gaussian contributes to";
+  preset.masks_source = "assumed: in the place of FLICKER's tests of what a Gaussian contributes to";
   preset.units_source = "FLICKER: 32; assumed: in 4 cores";
   preset.area_source = "FLICKER: an input";
   preset.power_source = "not known here";
