@@ -8,8 +8,6 @@
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/registry.h>
 
-#include "binning/touched_tiles.h"
-
 namespace vrpipe {
 
 namespace {

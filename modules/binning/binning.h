@@ -3,16 +3,9 @@
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/pipeline/screen_tiling.h>
 #include <vrpipe/pipeline/slots/binning.h>
+#include <vrpipe/pipeline/touched_tiles.h>
 
 namespace vrpipe {
-
-/// By which shape a splat is listed in tiles.
-enum class ListShape : std::uint8_t {
-  three_sigma,  ///< the square of three sigmas of the longer axis around it, as published
-  box,          ///< the axis-aligned box of its ellipse at alpha 1/255
-  oriented,     ///< the oriented box of that ellipse
-  ellipse,      ///< the ellipse
-};
 
 /// The published binning: tiles counted for each splat, scanned, a pair of key (tile, depth) and splat for each tile, a radix
 /// sort of 64-bit keys, and the ranges of tiles in what is sorted.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include <vrpipe/arithmetic/exp2.h>
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/pipeline/registry.h>
@@ -10,8 +9,6 @@
 namespace vrpipe {
 
 namespace {
-constexpr float log2_e = 1.44269504F;
-constexpr float alpha_most = 0.99F;
 constexpr std::uint32_t lanes_of_warp = 32;
 
 std::uint32_t mask_of(const LanePairBits (&bits)[4]) {
@@ -25,7 +22,7 @@ std::uint32_t count_bits(std::uint32_t mask) { return static_cast<std::uint32_t>
 
 std::uint32_t TileKernel::WarpLanes::alive_mask() const {
   std::uint32_t mask = 0;
-  for (unsigned i = 0; i < vectors; ++i) mask |= sign_mask(alive[i]) << (8 * i);
+  for (unsigned i = 0; i < vectors; ++i) mask |= sign_mask(pixels[i].alive) << (8 * i);
   return mask;
 }
 
@@ -49,24 +46,7 @@ TileKernel::TileKernel(const TileKernelParameters& parameters, const RenderConte
   records_.reserve(context.frame->splats());
   for (const DrawCall& call : context.frame->draws()) {
     for (std::uint32_t number = call.base; number < call.base + call.splats && !call.geometry->is_mesh(); ++number) {
-      const Splat& splat = call.splat(number);
-      const float scale = splat.r > 0 ? 1 / splat.r : 0.0F;
-      const float ax = splat.ax * scale;
-      const float ay = splat.ay * scale;
-      const float bx = splat.bx * scale;
-      const float by = splat.by * scale;
-      const float xx = ax * ax + bx * bx;
-      const float xy = ax * ay + bx * by;
-      const float yy = ay * ay + by * by;
-      const float determinant = xx * yy - xy * xy;
-      // As published, what has none is not drawn.
-      Record record{};
-      if (determinant != 0 && is_finite(splat)) {
-        const float inverse = 1 / determinant;
-        record = {splat.cx,      splat.cy,  yy * inverse, -xy * inverse, xx * inverse,
-                  splat.opacity, splat.red, splat.green,  splat.blue};
-      }
-      records_.push_back(record);
+      records_.push_back(splat_record(call.splat(number)));
     }
   }
 }
@@ -88,46 +68,31 @@ TileKernel::WarpLanes TileKernel::begin(std::size_t tile, std::uint32_t warp) co
   for (unsigned lane = 0; lane < lanes_of_warp; ++lane) {
     const std::uint32_t x = pixel_x(tile, warp, lane);
     const std::uint32_t y = pixel_y(tile, warp, lane);
-    lanes.x[lane / 8][lane % 8] = static_cast<float>(x) + 0.5F;
-    lanes.y[lane / 8][lane % 8] = static_cast<float>(y) + 0.5F;
-    lanes.alive[lane / 8][lane % 8] = x < width_ && y < height_ ? -1 : 0;
+    SplatPixels& pixels = lanes.pixels[lane / 8];
+    pixels.x[lane % 8] = static_cast<float>(x) + 0.5F;
+    pixels.y[lane % 8] = static_cast<float>(y) + 0.5F;
+    pixels.alive[lane % 8] = x < width_ && y < height_ ? -1 : 0;
   }
-  for (LanePair& transmittance : lanes.transmittance) transmittance = splat_pair(1);
+  for (SplatPixels& pixels : lanes.pixels) pixels.transmittance = splat_pair(1);
   return lanes;
 }
 
 template <StopRule Rule>
-TileKernel::Fates TileKernel::look_at(const Record& splat, WarpLanes& lanes) const {
+TileKernel::Fates TileKernel::look_at(const SplatRecord& splat, WarpLanes& lanes) const {
+  SplatAlphas alphas[vectors];
   LanePairBits inside[vectors], visible[vectors], blended[vectors];
-  LanePair alphas[vectors];
   for (unsigned i = 0; i < vectors; ++i) {
-    const LanePair dx = splat.cx - lanes.x[i];
-    const LanePair dy = splat.cy - lanes.y[i];
-    const LanePair power = -0.5F * (splat.xx * dx * dx + splat.yy * dy * dy) - splat.xy * dx * dy;
-    inside[i] = lanes.alive[i] & (power <= 0.0F);
-    const LanePair exponent = select<LanePair>(inside[i], power, LanePair{});
-    const LanePair alpha = splat.opacity * exp2_nonpositive(exponent * log2_e);
-    alphas[i] = select<LanePair>(alpha > alpha_most, LanePair{} + alpha_most, alpha);
-    visible[i] = inside[i] & (alphas[i] >= pruning_threshold_);
+    alphas[i] = splat_alphas(splat, lanes.pixels[i], pruning_threshold_);
+    inside[i] = alphas[i].inside;
+    visible[i] = alphas[i].visible;
   }
   Fates fates;
   fates.inside = mask_of(inside);
   fates.visible = mask_of(visible);
   if (fates.visible == 0) return fates;
   for (unsigned i = 0; i < vectors; ++i) {
-    LanePair& before = lanes.transmittance[i];
-    const LanePair after = before * (1.0F - alphas[i]);
-    blended[i] = visible[i];
-    if constexpr (Rule == StopRule::before) {
-      blended[i] &= after >= least_transmittance_;
-      lanes.alive[i] &= ~visible[i] | blended[i];
-    }
-    if constexpr (Rule == StopRule::after) lanes.alive[i] &= ~(blended[i] & (1.0F - after >= terminating_alpha_));
-    const LanePair weight = floats_of<LanePair>(bits_of(alphas[i] * before) & blended[i]);
-    lanes.red[i] += splat.red * weight;
-    lanes.green[i] += splat.green * weight;
-    lanes.blue[i] += splat.blue * weight;
-    before = select<LanePair>(blended[i], after, before);
+    const float limit = Rule == StopRule::before ? least_transmittance_ : terminating_alpha_;
+    blended[i] = blend_splat<Rule>(splat, alphas[i], limit, lanes.pixels[i]);
   }
   fates.blended = mask_of(blended);
   return fates;
@@ -204,10 +169,11 @@ void TileKernel::store(std::size_t tile, std::uint32_t warp, const WarpLanes& la
     const std::uint32_t y = pixel_y(tile, warp, lane) % screen_tile_pixels;
     QuadColor& quad = color_->quad(tiling_.tile(tile), y / 2 * quads_per_tile_row + x / 2);
     const unsigned at = y % 2 * 2 + x % 2;
-    quad.red[at] = lanes.red[lane / 8][lane % 8];
-    quad.green[at] = lanes.green[lane / 8][lane % 8];
-    quad.blue[at] = lanes.blue[lane / 8][lane % 8];
-    quad.alpha[at] = 1 - lanes.transmittance[lane / 8][lane % 8];
+    const SplatPixels& pixels = lanes.pixels[lane / 8];
+    quad.red[at] = pixels.red[lane % 8];
+    quad.green[at] = pixels.green[lane % 8];
+    quad.blue[at] = pixels.blue[lane % 8];
+    quad.alpha[at] = 1 - pixels.transmittance[lane % 8];
   }
 }
 

@@ -4,20 +4,13 @@
 #include <cstdint>
 #include <vector>
 
-#include <vrpipe/arithmetic/lanes.h>
 #include <vrpipe/component/parameter.h>
 #include <vrpipe/pipeline/screen_tiling.h>
 #include <vrpipe/pipeline/slots/render.h>
+#include <vrpipe/pipeline/splat_pixels.h>
 #include <vrpipe/pipeline/surface.h>
 
 namespace vrpipe {
-
-/// When a pixel takes no more splats.
-enum class StopRule : std::uint8_t {
-  none,
-  before,  ///< as published: at the splat that would bring its transmittance under a threshold, which is not blended
-  after,   ///< as the hardware does: after the splat that brings its alpha to the threshold of the draw's state
-};
 
 /// What the render kernels have in common: a tile is a block of 256 threads, a pixel each, and batches of 256 splats go
 /// through shared memory. Prices are warp instructions of an iteration, by the farthest that any lane goes.
@@ -120,15 +113,9 @@ class TileKernel : public RenderBehaviour {
              float least_transmittance = 0);
 
  private:
-  /// As the kernel reads it: centre, inverse covariance, opacity; colour.
-  struct Record {
-    float cx, cy, xx, xy, yy, opacity;
-    float red, green, blue;
-  };
   static constexpr unsigned vectors = 4;  ///< of eight lanes
   struct WarpLanes {
-    std::array<LanePair, vectors> x, y, transmittance, red, green, blue;
-    std::array<LanePairBits, vectors> alive;
+    std::array<SplatPixels, vectors> pixels;
     std::uint32_t alive_mask() const;
   };
   /// Lanes of a warp by what they do with a splat, a bit each.
@@ -141,7 +128,7 @@ class TileKernel : public RenderBehaviour {
   template <StopRule Rule>
   void render_by(std::size_t tile, const std::uint32_t* splats, std::uint32_t length, BlockWork& out);
   template <StopRule Rule>
-  Fates look_at(const Record& splat, WarpLanes& lanes) const;
+  Fates look_at(const SplatRecord& splat, WarpLanes& lanes) const;
   WarpLanes begin(std::size_t tile, std::uint32_t warp) const;
   std::uint64_t count(const Fates& fates, std::uint32_t alive);
   void store(std::size_t tile, std::uint32_t warp, const WarpLanes& lanes);
@@ -157,7 +144,7 @@ class TileKernel : public RenderBehaviour {
   /// In thousandths.
   const std::uint64_t outside_, pruned_, stopping_, blending_, batch_;
   TimingParameters timing_;
-  std::vector<Record> records_;
+  std::vector<SplatRecord> records_;
   ColorSurface* color_ = nullptr;
   std::uint64_t bytes_ = 0;
 };

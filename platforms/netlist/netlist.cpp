@@ -68,7 +68,7 @@ void Netlist::add(const std::string& path, const std::string& slot, const std::s
   }
   const Registry& registry = Registry::instance();
   if (registry.has_slot(added.slot) && registry.slot(added.slot).is_software) {
-    refuse("cannot add " + path, path, "slot " + added.slot + " is of kernels, which have no ports", "leave it out");
+    refuse("cannot add " + path, path, "slot " + added.slot + " is of units that have no ports", "leave it out");
   }
   instances_.push_back(std::move(added));
 }

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "run/chosen_kernel.h"
 #include "run/result_hash.h"
 #include "run/statistics.h"
 #include "software/sm_array.h"
@@ -28,55 +29,6 @@ namespace {
 constexpr const char* preparation_name = "preparation";
 constexpr const char* binning_name = "binning";
 constexpr const char* render_name = "render";
-
-/// A slot's unit and its parameters, as a request has them.
-struct ChosenKernel {
-  const Implementation* implementation = nullptr;
-  std::unique_ptr<ParameterSet> parameters;
-  std::string name() const { return implementation->slot + "=" + implementation->name; }
-
-  template <class SlotBehaviour>
-  std::unique_ptr<SlotBehaviour> make(const RenderContext& context) const {
-    return behaviour_as<SlotBehaviour>(implementation->make_behaviour(*parameters, context));
-  }
-  template <class Call>
-  decltype(auto) call(const char* what, Call&& call) const {
-    return call_foreign(name(), what, 0, std::forward<Call>(call));
-  }
-  [[noreturn]] void fail(const std::string& item) const { throw SimulationFault(name(), 0, item); }
-};
-
-ChosenKernel choose(const std::string& slot, const RunRequest& request) {
-  const Registry& registry = Registry::instance();
-  ChosenKernel kernel;
-  std::string name = registry.slot(slot).implementation;
-  for (const auto* units : {&request.variant.units, &request.units, &request.variant.changed_units}) {
-    for (const UnitChoice& choice : *units) {
-      if (choice.slot == slot) name = choice.implementation;
-    }
-  }
-  kernel.implementation = &registry.find(slot, name);
-  kernel.parameters = kernel.implementation->make_parameters();
-  for (const auto* settings : {&request.variant.settings, &request.settings, &request.variant.changed_settings}) {
-    for (const Setting& setting : *settings) {
-      if (setting.unit == slot) kernel.parameters->set(slot, setting.parameter, setting.value);
-    }
-  }
-  return kernel;
-}
-
-void add_parameters(const ChosenKernel& kernel, std::vector<std::pair<std::string, std::string>>& parameters) {
-  for (const Parameter* parameter : kernel.parameters->parameters()) {
-    parameters.emplace_back(kernel.implementation->slot + "." + parameter->name(), parameter->value());
-  }
-}
-
-bool is_as_shipped(const ChosenKernel& kernel) {
-  const std::vector<Parameter*>& parameters = kernel.parameters->parameters();
-  return kernel.implementation->name == Registry::instance().slot(kernel.implementation->slot).implementation &&
-         std::all_of(parameters.begin(), parameters.end(),
-                     [](const Parameter* each) { return each->value() == each->default_value(); });
-}
 
 /// The parts of a GPU that kernels take.
 class SoftwareMachine {
@@ -144,17 +96,6 @@ class SoftwareMachine {
   SmBehaviour::TimingParameters array_{};
   std::uint64_t bytes_per_cycle_ = 0;
 };
-
-void check_frame(const Frame& frame) {
-  const auto refuse = [](const std::string& why, const std::string& remedy) {
-    throw UserError("cannot render in software", "the frame", why, remedy);
-  };
-  if (frame.commands().size() != 1 || frame.draws().size() != 1) {
-    refuse("it is not one draw", "draw one scene");
-  }
-  const Draw& draw = *frame.draws().front().geometry;
-  if (draw.is_mesh() || !draw.triangles.empty()) refuse("it draws triangles", "draw splats");
-}
 
 /// What a unit gives, whoever wrote it.
 void check_lists(const ChosenKernel& kernel, const TileLists& lists, const Frame& frame) {
@@ -239,19 +180,19 @@ std::vector<std::pair<std::string, std::string>> check_software(const RunRequest
   std::vector<std::pair<std::string, std::string>> parameters;
   for (const Slot& slot : Registry::instance().slots()) {
     if (!slot.is_software) continue;
-    const ChosenKernel kernel = choose(slot.name, request);
+    const ChosenKernel kernel = choose_kernel(slot.name, request);
     kernel.implementation->make_behaviour(*kernel.parameters, context);
-    add_parameters(kernel, parameters);
+    kernel.add_parameters_to(parameters);
   }
   return parameters;
 }
 
 SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
                                  std::optional<std::uint64_t> gaussians) {
-  check_frame(frame);
-  const ChosenKernel preparation = choose(preparation_name, request);
-  const ChosenKernel binning = choose(binning_name, request);
-  const ChosenKernel render = choose(render_name, request);
+  check_is_of_splats(frame, "cannot render in software");
+  const ChosenKernel preparation = choose_kernel(preparation_name, request);
+  const ChosenKernel binning = choose_kernel(binning_name, request);
+  const ChosenKernel render = choose_kernel(render_name, request);
   const SoftwareMachine machine(request, frame);
   SoftwareResult result;
   result.request = request;
@@ -308,15 +249,15 @@ SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
   for (const ChosenKernel* kernel : {&preparation, &binning, &render}) {
     const Implementation& implementation = *kernel->implementation;
     result.implementations.emplace_back(implementation.slot, implementation.name);
-    add_parameters(*kernel, result.parameters);
-    result.as_shipped = result.as_shipped && is_as_shipped(*kernel);
+    kernel->add_parameters_to(result.parameters);
+    result.as_shipped = result.as_shipped && kernel->is_as_shipped();
   }
   return result;
 }
 
 HardwarePreparation prepare_for_hardware(const RunRequest& request, const Frame& frame,
                                          std::optional<std::uint64_t> gaussians) {
-  const ChosenKernel preparation = choose(preparation_name, request);
+  const ChosenKernel preparation = choose_kernel(preparation_name, request);
   const SoftwareMachine machine(request, frame);
   HardwarePreparation prepared;
   if (gaussians) {

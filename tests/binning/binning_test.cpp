@@ -12,11 +12,16 @@
 #include <gtest/gtest.h>
 
 #include "support/builders.h"
+#include "support/splat_shapes.h"
 
 namespace vrpipe {
 namespace {
 
+using testing::distance_to;
 using testing::draw_of;
+using testing::in_axes;
+using testing::meets_square;
+using testing::Point;
 using testing::round_splat;
 using testing::splat_at;
 
@@ -40,10 +45,6 @@ struct Binned {
   TileLists lists;
 };
 
-struct Point {
-  double x, y;
-};
-
 /// Of the samples of a tile's pixels, in an image of whole tiles.
 std::array<Point, 4> corners_of_tile(std::size_t tile, std::size_t tiles_x) {
   const double x = 16.0 * static_cast<double>(tile % tiles_x) + 0.5;
@@ -51,67 +52,10 @@ std::array<Point, 4> corners_of_tile(std::size_t tile, std::size_t tiles_x) {
   return {Point{x, y}, {x + 15, y}, {x + 15, y + 15}, {x, y + 15}};
 }
 
-/// Distance of the origin to a polygon, 0 inside.
-double distance_to(const std::array<Point, 4>& polygon) {
-  double least = std::numeric_limits<double>::infinity();
-  bool left = true, right = true;
-  for (unsigned i = 0; i < 4; ++i) {
-    const Point a = polygon[i];
-    const Point b = polygon[(i + 1) % 4];
-    const Point d{b.x - a.x, b.y - a.y};
-    const double along = -(a.x * d.x + a.y * d.y) / (d.x * d.x + d.y * d.y);
-    const double t = std::fmin(1, std::fmax(0, along));
-    least = std::fmin(least, std::hypot(a.x + t * d.x, a.y + t * d.y));
-    const double side = a.x * b.y - a.y * b.x;
-    left = left && side >= 0;
-    right = right && side <= 0;
-  }
-  return left || right ? 0 : least;
-}
-
-/// The corners in the splat's own axes, in units of its half extents.
-std::array<Point, 4> in_axes(const Splat& splat, std::array<Point, 4> corners) {
-  const double a = double{splat.ax} * splat.ax + double{splat.ay} * splat.ay;
-  const double b = double{splat.bx} * splat.bx + double{splat.by} * splat.by;
-  for (Point& corner : corners) {
-    const Point d{corner.x - splat.cx, corner.y - splat.cy};
-    corner = {(d.x * splat.ax + d.y * splat.ay) / a, (d.x * splat.bx + d.y * splat.by) / b};
-  }
-  return corners;
-}
-
-/// The part of a polygon in [-1, 1] x [-1, 1], cut side by side; whether anything is left.
-bool meets_square(const std::array<Point, 4>& polygon) {
-  std::vector<Point> left(polygon.begin(), polygon.end());
-  for (const auto& [nx, ny] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
-    const auto beyond = [nx = nx, ny = ny](const Point& p) { return nx * p.x + ny * p.y - 1; };
-    std::vector<Point> cut;
-    for (std::size_t i = 0; i < left.size(); ++i) {
-      const Point& a = left[i];
-      const Point& b = left[(i + 1) % left.size()];
-      const double da = beyond(a), db = beyond(b);
-      if (da <= 0) cut.push_back(a);
-      if ((da < 0) != (db < 0)) cut.push_back({a.x + (b.x - a.x) * da / (da - db), a.y + (b.y - a.y) * da / (da - db)});
-    }
-    left = cut;
-  }
-  return !left.empty();
-}
-
 constexpr std::uint32_t width = 96, height = 80;
 constexpr std::size_t tiles_x = 6, tiles = 30;
 
-/// Large enough for each to meet samples; some reach over all of the image, some are outside.
-Draw large_splats() {
-  Draw draw = testing::random_draw(width, height, 400, 5);
-  for (Splat& splat : draw.splats) {
-    const float thin = std::hypot(splat.bx, splat.by);
-    if (thin >= 1.0F) continue;
-    splat.bx *= 1 / thin;
-    splat.by *= 1 / thin;
-  }
-  return draw;
-}
+Draw large_splats() { return testing::large_splats(width, height, 400, 5); }
 
 TEST(Binning, AnOrientedBoxIsListedWhereItMeetsTheSamplesOfATile) {
   const Draw draw = large_splats();

@@ -1,4 +1,4 @@
-// `vrpipe frames`: whole frames, in software beside by hardware.
+// `vrpipe frames`: whole frames, in software beside by hardware and by an accelerator.
 
 #include <gtest/gtest.h>
 
@@ -33,19 +33,24 @@ class Frames : public ToolTest {
   }
 };
 
-TEST_F(Frames, AreTimedInSoftwareAndByHardware) {
+TEST_F(Frames, AreTimedOnEveryPath) {
   const json result = frames({"--fidelity", "lt"});
   EXPECT_EQ(result["schema"], "vrpipe.frames/1");
-  ASSERT_EQ(result["frames"].size(), 3U);
-  const std::vector<std::string> paths{"software", "hardware", "vr-pipe"}, names{"published", "baseline", "het+qm"};
-  for (std::size_t i = 0; i < 3; ++i) {
+  ASSERT_EQ(result["frames"].size(), 4U);
+  const std::vector<std::string> paths{"software", "hardware", "vr-pipe", "accelerator"};
+  const std::vector<std::string> names{"published", "baseline", "het+qm", "gscore"};
+  for (std::size_t i = 0; i < 4; ++i) {
     const json& path = result["frames"][i];
     EXPECT_EQ(path["path"], paths[i]);
     EXPECT_EQ(path["name"], names[i]);
     const json& milliseconds = path["milliseconds"];
     EXPECT_TRUE(milliseconds["preprocess"].is_null()) << "of a draw list";
-    EXPECT_DOUBLE_EQ(milliseconds["frame"].get<double>(),
-                     milliseconds["sort"].get<double>() + milliseconds["raster"].get<double>());
+    const double sum = milliseconds["sort"].get<double>() + milliseconds["raster"].get<double>();
+    if (paths[i] == "accelerator") {
+      EXPECT_GT(milliseconds["frame"], std::max(milliseconds["sort"], milliseconds["raster"])) << "and latencies";
+    } else {
+      EXPECT_DOUBLE_EQ(milliseconds["frame"].get<double>(), sum);
+    }
     EXPECT_GT(milliseconds["raster"], 0);
     EXPECT_FALSE(path["bound_by"].get<std::string>().empty());
   }
@@ -73,21 +78,25 @@ TEST_F(Frames, AGaussianSceneIsPreprocessed) {
     EXPECT_EQ(path["kernels"][0]["items"], gaussians);
     double sum = 0;
     for (const char* part : {"preprocess", "sort", "raster"}) sum += path["milliseconds"][part].get<double>();
-    EXPECT_DOUBLE_EQ(path["milliseconds"]["frame"].get<double>(), sum);
+    if (path["path"] == "accelerator") {
+      EXPECT_GT(path["milliseconds"]["frame"], path["milliseconds"]["preprocess"]);
+    } else {
+      EXPECT_DOUBLE_EQ(path["milliseconds"]["frame"].get<double>(), sum);
+    }
   }
 }
 
 TEST_F(Frames, WithoutTimeThereAreCountsAlone) {
   const json result = frames({"--fidelity", "functional"});
   const json timed = frames({"--fidelity", "lt"});
-  for (std::size_t i = 0; i < 3; ++i) {
-    const json& path = result["frames"][i];
+  for (const json& path : result["frames"]) {
     for (const char* part : {"preprocess", "sort", "raster", "frame"})
       EXPECT_TRUE(path["milliseconds"][part].is_null());
     EXPECT_TRUE(path["bound_by"].is_null());
     EXPECT_TRUE(path["expected_error_percent"].is_null());
   }
-  EXPECT_EQ(result["frames"][0]["counts"], timed["frames"][0]["counts"]);
+  for (const char* path : {"software", "accelerator"})
+    EXPECT_EQ(by_path(result)[path]["counts"], by_path(timed)[path]["counts"]);
 }
 
 TEST_F(Frames, CountsAreTheSameAtEveryFidelity) {
@@ -95,6 +104,33 @@ TEST_F(Frames, CountsAreTheSameAtEveryFidelity) {
   EXPECT_EQ(cycle["fidelity"], "cycle");
   EXPECT_EQ(cycle["frames"][0]["counts"], lt["frames"][0]["counts"]);
   EXPECT_EQ(cycle["frames"][0]["milliseconds"]["sort"], lt["frames"][0]["milliseconds"]["sort"]);
+}
+
+TEST_F(Frames, AnAcceleratorIsTimedAtLtWhereCyclesAreAskedFor) {
+  json cycle = by_path(frames())["accelerator"], lt = by_path(frames({"--fidelity", "lt"}))["accelerator"];
+  EXPECT_EQ(cycle["fidelity"], "lt");
+  for (json* path : {&cycle, &lt}) path->erase("host_seconds");
+  EXPECT_EQ(cycle, lt);
+}
+
+TEST_F(Frames, AcceleratorsAreChosenAndSet) {
+  std::map<std::string, json> paths;
+  for (const char* name : {"gscore", "gcc", "flicker"}) {
+    paths[name] = by_path(frames({"--fidelity", "lt", "--unit", "accelerator=" + std::string(name)}))["accelerator"];
+    EXPECT_EQ(paths[name]["name"], name);
+    EXPECT_EQ(paths[name]["implementations"], json({{"accelerator", name}}));
+    std::uint64_t moved = 0;
+    for (const json& stage : paths[name]["kernels"]) moved += stage["bytes"].get<std::uint64_t>();
+    EXPECT_EQ(moved,
+              paths[name]["bytes"]["sort"].get<std::uint64_t>() + paths[name]["bytes"]["raster"].get<std::uint64_t>());
+  }
+  EXPECT_EQ(paths["gscore"]["parameters"]["accelerator.area_mm2"], 3.95);
+  EXPECT_EQ(paths["flicker"]["parameters"]["accelerator.volume_units"], 8);
+  EXPECT_EQ(paths["gcc"]["parameters"]["accelerator.conversion"], "chunk");
+  const json slow = by_path(frames({"--fidelity", "lt", "--set", "accelerator.frequency_mhz=500", "--set",
+                                    "accelerator.dram_gigabytes_per_second=25.6"}))["accelerator"];
+  EXPECT_DOUBLE_EQ(slow["milliseconds"]["frame"].get<double>(),
+                   2 * paths["gscore"]["milliseconds"]["frame"].get<double>());
 }
 
 TEST_F(Frames, KernelsAreChosenAndSet) {
@@ -138,10 +174,10 @@ TEST_F(Frames, ImagesOfEveryPathAreAlike) {
     EXPECT_EQ(path["images"]["png"], "images/tiny-" + path["path"].get<std::string>() + ".png");
     images.push_back(tools::read_exr((folder() / path["images"]["exr"].get<std::string>()).string()));
   }
-  ASSERT_EQ(images.size(), 3U);
+  ASSERT_EQ(images.size(), 4U);
   float most = 0;
   for (std::size_t i = 0; i < std::size_t{4} * images[0].width() * images[0].height(); ++i) {
-    for (std::size_t of : {1, 2}) most = std::max(most, std::fabs(images[0].values()[i] - images[of].values()[i]));
+    for (std::size_t of : {1, 2, 3}) most = std::max(most, std::fabs(images[0].values()[i] - images[of].values()[i]));
   }
   EXPECT_LT(most, 0.01F) << "halves, and what ends early";
   EXPECT_GT(most, 0.0F) << "single precision in software";
@@ -169,9 +205,9 @@ TEST_F(Frames, AConfigurationReadsBackToTheSameFrames) {
 TEST_F(Frames, TheTableHasEveryPath) {
   const Finished finished = vrpipe({"frames", "--scene", "tiny.spl", "--fidelity", "lt", "--json", "frames.json"});
   EXPECT_EQ(finished.code, 0) << finished.err;
-  for (const char* part :
-       {"software (published)", "hardware (baseline)", "vr-pipe (het+qm)", "preprocess", "over hardware",
-        "warp iterations", "a draw list is preprocessed already", "result: frames.json"}) {
+  for (const char* part : {"software (published)", "hardware (baseline)", "vr-pipe (het+qm)", "accelerator (gscore)",
+                           "3.95 mm2", "preprocess", "over hardware", "warp iterations",
+                           "a draw list is preprocessed already", "result: frames.json"}) {
     EXPECT_NE(finished.out.find(part), std::string::npos) << part << " is not in\n" << finished.out;
   }
   EXPECT_EQ(json::parse(read_file(folder() / "frames.json"))["schema"], "vrpipe.frames/1");
@@ -182,11 +218,16 @@ TEST_F(Frames, MistakesAreToldInALine) {
   refused({"frames", "--scene", "tiny.spl", "--set", "render.issue_rat=1"}, {"render.issue_rate"});
   refused({"frames", "--scene", "tiny.spl", "--unit", "render=publishd"}, {"published"});
   refused({"frames", "--scene", "tiny.spl", "--set", "binning.lists=circle"}, {"ellipse"});
+  refused({"frames", "--scene", "tiny.spl", "--set", "accelerator.volume_unit=1"}, {"accelerator.volume_units"});
+  refused({"frames", "--scene", "tiny.spl", "--unit", "accelerator=gscor"}, {"gscore"});
+  refused({"frames", "--scene", "tiny.spl", "--set", "accelerator.subtile_side_pixels=12"},
+          {"accelerator.subtile_side_pixels"});
   refused({"frames", "--scene", "builtin:courtyard", "--size", "32x32"}, {"meshes"});
   refused({"frames", "--scene", "tiny.spl", "--json", "tiny.spl"}, {"--json"});
   for (const char* command : {"run", "compare", "accuracy"}) {
     refused({command, "--scene", "tiny.spl", "--set", "render.issue_rate=1"},
             {"--set render.issue_rate", "vrpipe frames"});
+    refused({command, "--scene", "tiny.spl", "--unit", "accelerator=gcc"}, {"vrpipe frames"});
     refused({command, "--scene", "tiny.spl", "--unit", "render=endless"}, {"--unit render=endless", "vrpipe frames"});
   }
 }

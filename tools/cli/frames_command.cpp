@@ -24,7 +24,9 @@ namespace {
 class FramesCommand : public Command {
  public:
   std::string name() const override { return "frames"; }
-  std::string summary() const override { return "a whole frame in software, by today's hardware and by VR-Pipe"; }
+  std::string summary() const override {
+    return "a whole frame in software, by today's hardware, by VR-Pipe and by an accelerator";
+  }
 
   void declare(Arguments& arguments) override {
     arguments_.declare_whole_frames(arguments);
@@ -35,12 +37,15 @@ class FramesCommand : public Command {
         "them\n"
         "on the baseline GPU, `vr-pipe` with quad merging and early termination. Kernels run on the platform's SM "
         "array;\n"
-        "they are units, so that --unit puts another one into the slots preparation, binning and render.\n"
+        "they are units, so that --unit puts another one into the slots preparation, binning and render. `accelerator` "
+        "has\n"
+        "units, a clock and a memory of its own; --unit accelerator=NAME takes another: gscore, gcc, flicker.\n"
         "\n"
         "Examples:\n"
         "  vrpipe frames --fidelity lt\n"
         "  vrpipe frames --scene draw.spl --platform gh100-gpc --set sm.cores=8\n"
-        "  vrpipe frames --set binning.lists=three_sigma --unit render=endless --json -");
+        "  vrpipe frames --set binning.lists=three_sigma --unit render=endless --json -\n"
+        "  vrpipe frames --fidelity lt --unit accelerator=gcc --set accelerator.volume_units=8");
   }
 
   void run() override {

@@ -44,7 +44,7 @@ std::string names_of(const std::vector<Fidelity>& fidelities) {
 /// Of a command that draws by hardware alone.
 void refuse_kernels(const RunRequest& request) {
   const auto refuse = [](const std::string& option, const std::string& unit) {
-    throw UserError("cannot choose or set '" + unit + "'", option, "it is a kernel of software rendering",
+    throw UserError("cannot choose or set '" + unit + "'", option, "it is no unit of a draw by hardware",
                     "leave it out, or take `vrpipe frames`");
   };
   for (const Setting& setting : request.settings) {

@@ -65,7 +65,7 @@ class PathMaker {
   explicit PathMaker(double frequency_mhz) : cycles_per_ms_(frequency_mhz * 1000) {}
 
   FramePath of_software(const SoftwareResult& result) const {
-    FramePath path = begin("software", result.implementations.back().second);
+    FramePath path = begin("software", result.implementations.back().second, result.request.fidelity);
     std::vector<Part> parts;
     std::vector<std::optional<double>> sorting;
     const auto add = [&](const KernelReport& kernel) {
@@ -87,10 +87,7 @@ class PathMaker {
     const bool is_as_measured = result.request.platform->name == measured_platform &&
                                 result.request.fidelity >= Fidelity::lt && result.as_shipped;
     if (is_as_measured) path.expected_error_percent = software_error_percent;
-    for (const StatisticReport& statistic : result.statistics) {
-      if (statistic.kind == "counter")
-        path.counts.emplace_back(statistic.name.substr(statistic.name.find('.') + 1), statistic.value);
-    }
+    add_counters(result.statistics, path);
     path.implementations = result.implementations;
     path.parameters = result.parameters;
     path.result_hash = result.result_hash;
@@ -99,7 +96,7 @@ class PathMaker {
   }
 
   FramePath of_hardware(const std::string& name, const RunResult& run, const HardwarePreparation& prepared) const {
-    FramePath path = begin(name, run.request.variant.name);
+    FramePath path = begin(name, run.request.variant.name, run.request.fidelity);
     std::vector<Part> parts;
     const auto add = [&](const KernelReport& kernel) {
       parts.push_back({kernel.name, milliseconds(kernel), kernel.bound_by});
@@ -121,12 +118,41 @@ class PathMaker {
     return path;
   }
 
+  /// Its cycles are of a clock of its own.
+  static FramePath of_accelerator(const AcceleratorResult& result) {
+    const PathMaker of_its_clock(result.frequency_mhz);
+    FramePath path = begin("accelerator", result.name, result.request.fidelity);
+    const auto add = [&](const KernelReport& stage) {
+      path.bytes.emplace_back(stage.name, stage.bytes);
+      path.kernels.push_back(stage);
+      return of_its_clock.milliseconds(stage);
+    };
+    if (result.preprocess) path.preprocess = add(*result.preprocess);
+    path.sort = add(result.sort);
+    path.raster = add(result.raster);
+    if (result.cycles) path.frame = static_cast<double>(*result.cycles) / of_its_clock.cycles_per_ms_;
+    path.bound_by = result.bound_by;
+    add_counters(result.statistics, path);
+    path.implementations = {{"accelerator", result.name}};
+    path.parameters = result.parameters;
+    path.result_hash = result.result_hash;
+    path.host_seconds = result.host_seconds;
+    return path;
+  }
+
  private:
-  static FramePath begin(const std::string& path, const std::string& name) {
+  static FramePath begin(const std::string& path, const std::string& name, Fidelity fidelity) {
     FramePath begun;
     begun.path = path;
     begun.name = name;
+    begun.fidelity = fidelity;
     return begun;
+  }
+  static void add_counters(const std::vector<StatisticReport>& statistics, FramePath& path) {
+    for (const StatisticReport& statistic : statistics) {
+      if (statistic.kind == "counter")
+        path.counts.emplace_back(statistic.name.substr(statistic.name.find('.') + 1), statistic.value);
+    }
   }
   std::optional<double> milliseconds(const KernelReport& kernel) const {
     return kernel.cycles ? std::optional(static_cast<double>(*kernel.cycles) / cycles_per_ms_) : std::nullopt;
@@ -151,6 +177,7 @@ FramesResult perform_frames(const SimulationJob& job) {
   const std::vector<std::pair<std::string, std::string>> draws{{"hardware", "baseline"}, {"vr-pipe", "het+qm"}};
   std::vector<std::string> images{image_name(job.frame.name, "software")};
   for (const auto& [path, variant] : draws) images.push_back(image_name(job.frame.name, path));
+  images.push_back(image_name(job.frame.name, "accelerator"));
   check_outputs(job, images);
   FramesResult result;
   result.provenance = job.provenance;
@@ -184,7 +211,7 @@ FramesResult perform_frames(const SimulationJob& job) {
       simulate_in_processes(requests, frame_of, job.output.has_value(), job.processes, progress);
 
   const PathMaker make(requests.front().platform->frequency_mhz);
-  const RunRequest request = with_kernels(requests.front(), job);
+  RunRequest request = with_kernels(requests.front(), job);
   const std::shared_ptr<const Frame> frame = frame_of(requests.front());
   const StdoutToStderr redirected;  // units of plugins may print
   progress.show("rendering in software");
@@ -193,13 +220,21 @@ FramesResult perform_frames(const SimulationJob& job) {
   const HardwarePreparation prepared = prepare_for_hardware(request, *frame, gaussians);
   for (std::size_t i = 0; i < draws.size(); ++i)
     result.paths.push_back(make.of_hardware(draws[i].first, simulated[i].result, prepared));
+  progress.show("drawing by an accelerator");
+  request.fidelity = std::min(request.fidelity, Fidelity::lt);  // its units have no cycles of their own
+  const AcceleratorResult accelerator = simulate_accelerator(request, *frame, gaussians);
+  result.paths.push_back(PathMaker::of_accelerator(accelerator));
   progress.erase();
   if (job.output) {
     progress.show("writing images");
-    SharedImage image(result.width, result.height);
-    image.copy_from(software.framebuffer.color);
+    SharedImage in_software(result.width, result.height), by_accelerator(result.width, result.height);
+    in_software.copy_from(software.framebuffer.color);
+    by_accelerator.copy_from(accelerator.framebuffer.color);
+    std::vector<const SharedImage*> drawn{&in_software};
+    for (const Simulated& run : simulated) drawn.push_back(&*run.image);
+    drawn.push_back(&by_accelerator);
     for (std::size_t i = 0; i < result.paths.size(); ++i)
-      result.paths[i].images = write_image(job, images[i], i == 0 ? image : *simulated[i - 1].image, result.files);
+      result.paths[i].images = write_image(job, images[i], *drawn[i], result.files);
     progress.erase();
   }
   for (Simulated& run : simulated) result.runs.push_back(std::move(run.result));

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include <vrpipe/platforms/accelerator.h>
 #include <vrpipe/platforms/software.h>
 
 #include "jobs/simulation_job.h"
@@ -14,18 +15,20 @@ namespace vrpipe::tools {
 
 /// One way to draw a whole frame.
 struct FramePath {
-  std::string path;  ///< software, hardware, vr-pipe
-  std::string name;  ///< of the render kernel or the variant
+  std::string path;                          ///< software, hardware, vr-pipe, accelerator
+  std::string name;                          ///< of the render kernel, the variant or the accelerator
+  Fidelity fidelity = Fidelity::functional;  ///< of an accelerator `lt` where `cycle` was asked for
   // Simulated milliseconds; none where the fidelity has no time.
   std::optional<double> preprocess;  ///< and of a draw list
   std::optional<double> sort;        ///< all that orders
   std::optional<double> raster;
-  std::optional<double> frame;
-  std::vector<std::pair<std::string, std::uint64_t>> bytes;  ///< to and from memory, by kernel; of a draw, DRAM's
+  std::optional<double> frame;  ///< the sum; of an accelerator, whose stages overlap, less
+  std::vector<std::pair<std::string, std::uint64_t>>
+      bytes;                                     ///< to and from memory, by kernel or stage; of a draw, DRAM's
   std::string bound_by;                          ///< the longest part, and what bounds that; empty without time
   std::optional<double> expected_error_percent;  ///< of the frame's time against a GPU; none where unknown
   std::vector<std::pair<std::string, std::uint64_t>> counts;
-  std::vector<KernelReport> kernels;                                 ///< all of them, in order, the draw left out
+  std::vector<KernelReport> kernels;                                 ///< and stages, in order, the draw left out
   std::vector<std::pair<std::string, std::string>> implementations;  ///< of kernels
   std::vector<std::pair<std::string, std::string>> parameters;       ///< and what they are set to
   std::string result_hash;
@@ -45,8 +48,8 @@ struct FramesResult {
   ResultFiles files;            ///< written so far: images
 };
 
-/// Draws the frame of a job in software and by hardware: of its requests `baseline` is the path `hardware`, `het+qm`
-/// `vr-pipe`. Throws UserError, CommandFailure or a fault.
+/// Draws the frame of a job in software, by hardware and by an accelerator: of its requests `baseline` is the path `hardware`,
+/// `het+qm` `vr-pipe`. Throws UserError, CommandFailure or a fault.
 FramesResult perform_frames(const SimulationJob& job);
 
 }  // namespace vrpipe::tools

@@ -44,6 +44,7 @@ Json path_json(const FramePath& path, const Platform& platform) {
   for (const auto& [slot, name] : path.implementations) implementations[slot] = name;
   return {{"path", path.path},
           {"name", path.name},
+          {"fidelity", vrpipe::name_of(path.fidelity)},
           {"milliseconds",
            {{"preprocess", optional_json(path.preprocess)},
             {"sort", optional_json(path.sort)},

@@ -41,6 +41,23 @@ std::string lanes_text(const FramePath& software) {
       percent("iterations_without_blending", static_cast<double>(iterations)));
 }
 
+/// Of the list entries of an accelerator, and what was published of it.
+std::string entries_text(const FramePath& accelerator) {
+  const auto count = [&](const char* name) { return grouped(count_of(accelerator, name).value_or(0)); };
+  const auto published = [&](const char* name) {
+    const auto found = std::find_if(accelerator.parameters.begin(), accelerator.parameters.end(),
+                                    [&](const auto& each) { return each.first == name; });
+    return found == accelerator.parameters.end() || found->second == "0" ? "" : found->second;
+  };
+  std::string text =
+      fmt::format("accelerator: {} pairs; of {} with sub-tiles {} are drawn; {} of {} chunks are skipped\n",
+                  count("pairs"), count("subtile_pairs"), count("subtile_pairs_drawn"), count("chunks_skipped"),
+                  count("chunks"));
+  const std::string area = published("accelerator.area_mm2"), power = published("accelerator.power_watts");
+  if (!area.empty()) text += fmt::format("published: {} mm2{}\n", area, power.empty() ? "" : ", " + power + " W");
+  return text;
+}
+
 }  // namespace
 
 std::string frames_report(const FramesResult& result, const TextStyle& style) {
@@ -61,6 +78,9 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
   text += table.text(style) + "\n";
   for (const FramePath& path : result.paths) {
     if (path.path == "software") text += lanes_text(path);
+    if (path.path == "accelerator") text += entries_text(path);
+    if (path.fidelity != result.runs.front().request.fidelity)
+      text += fmt::format("{}: at {}, the finest that it has\n", path.path, vrpipe::name_of(path.fidelity));
   }
   if (!result.viewpoint) text += "a draw list is preprocessed already: frames are without\n";
   for (const std::string& note : result.scene.notes) text += "note: " + printable(note) + "\n";

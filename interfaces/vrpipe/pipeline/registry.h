@@ -43,7 +43,8 @@ struct Slot {
   bool is_memory = false;     ///< of memories (MemoryBehaviour), which have no streams but are bound to memory ports
   std::vector<ValidatedRange> validated = {};  ///< of parameters that are not named every value is
   std::vector<PortNeed> needs = {};
-  /// Of kernels by which a frame is prepared or rendered in software: no netlist has a unit of it (slots/kernel_work.h).
+  /// Of kernels by which a frame is prepared or rendered in software, and of accelerators: no netlist has a unit of it
+  /// (slots/kernel_work.h, slots/accelerator.h).
   bool is_software = false;
 };
 
@@ -110,7 +111,7 @@ struct SlotRegistrar {
   }
 };
 
-/// Registers a slot of kernels.
+/// Registers a slot of kernels or accelerators.
 struct SoftwareSlotRegistrar {
   SoftwareSlotRegistrar(const char* name, unsigned rank, const char* implementation) {
     Slot slot{name, rank, implementation};

@@ -6,6 +6,7 @@
 /// Functional models that turn a stream into batches work by steps: a call takes items until a batch comes out or the
 /// items are used up. So one serves a timing model that moves a few quads a cycle and a loop that runs a whole draw.
 
+#include <vrpipe/pipeline/slots/accelerator.h>
 #include <vrpipe/pipeline/slots/behaviour.h>
 #include <vrpipe/pipeline/slots/binning.h>
 #include <vrpipe/pipeline/slots/crop.h>

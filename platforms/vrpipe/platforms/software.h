@@ -41,9 +41,9 @@ struct SoftwareResult {
   std::string result_hash;  ///< of statistics, cycles and the stored bits of the image, 16 hex digits
 };
 
-/// Whether --set and --unit of this name are for kernels.
+/// Whether --set and --unit of this name are for kernels or an accelerator.
 bool is_of_software(const std::string& unit);
-/// The request without what is for kernels: for the pipeline.
+/// The request without what is for these: for the pipeline.
 RunRequest without_software(RunRequest request);
 
 /// Renders a frame in software. Settings and units of the request may be of the platform's units, too. `functional` counts and
@@ -63,7 +63,7 @@ struct HardwarePreparation {
 HardwarePreparation prepare_for_hardware(const RunRequest& request, const Frame& frame,
                                          std::optional<std::uint64_t> gaussians);
 
-/// Units and settings of kernels, without running any; throws UserError. Gives SLOT.PARAMETER and final value of all that
+/// Units and settings of kernels and accelerators, without running any; throws UserError. Gives SLOT.PARAMETER and final value of all that
 /// the chosen units have.
 std::vector<std::pair<std::string, std::string>> check_software(const RunRequest& request);
 

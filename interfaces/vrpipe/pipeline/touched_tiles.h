@@ -3,14 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <utility>
 
 #include <vrpipe/pipeline/draw.h>
 #include <vrpipe/pipeline/geometry.h>
 #include <vrpipe/pipeline/payload.h>
 
-#include "binning.h"
-
 namespace vrpipe {
+
+/// By which shape a splat is listed in tiles.
+enum class ListShape : std::uint8_t {
+  three_sigma,  ///< the square of three sigmas of the longer axis around it, as published
+  box,          ///< the axis-aligned box of its ellipse at alpha 1/255
+  oriented,     ///< the oriented box of that ellipse
+  ellipse,      ///< the ellipse
+};
 
 /// Whether a splat has a covariance that can be inverted; the others are in no list, as published.
 inline bool has_area(const Splat& splat) {
@@ -22,24 +30,36 @@ inline bool has_area(const Splat& splat) {
 /// between them is seen by no pixel.
 class TouchedTiles {
  public:
-  TouchedTiles(ListShape shape, std::uint32_t width, std::uint32_t height)
-      : shape_(shape), width_(static_cast<int>(width)), height_(static_cast<int>(height)) {}
+  /// width, height and the side of a tile in pixels.
+  TouchedTiles(ListShape shape, std::uint32_t width, std::uint32_t height, std::uint32_t side = screen_tile_pixels)
+      : shape_(shape),
+        width_(static_cast<int>(width)),
+        height_(static_cast<int>(height)),
+        side_(static_cast<int>(side)) {}
 
   /// Calls `touched(x, y)` for each, row by row. The splat has an area.
   template <class Touched>
   void visit(const Splat& splat, Touched&& touched) const {
+    constexpr std::int32_t beyond = std::numeric_limits<std::int32_t>::max();
+    visit(splat, {0, 0, beyond, beyond}, std::forward<Touched>(touched));
+  }
+  /// Of those of a rectangle of tiles. Gives how many the shape was tested against.
+  template <class Touched>
+  std::uint64_t visit(const Splat& splat, const PixelRect& within, Touched&& touched) const {
     const Ellipse of(splat);
-    const PixelRect tiles = shape_ == ListShape::three_sigma ? square(splat) : box(of);
+    PixelRect tiles = shape_ == ListShape::three_sigma ? square(splat) : box(of);
+    tiles = {std::max(tiles.x0, within.x0), std::max(tiles.y0, within.y0), std::min(tiles.x1, within.x1),
+             std::min(tiles.y1, within.y1)};
+    if (tiles.empty()) return 0;
     for (int y = tiles.y0; y < tiles.y1; ++y) {
       for (int x = tiles.x0; x < tiles.x1; ++x) {
         if (is_touched(of, x, y)) touched(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
       }
     }
+    return static_cast<std::uint64_t>(tiles.x1 - tiles.x0) * static_cast<std::uint64_t>(tiles.y1 - tiles.y0);
   }
 
  private:
-  static constexpr int side = screen_tile_pixels;
-
   /// That at whose edge alpha is 1/255: its half axes are those of the splat's box.
   struct Ellipse {
     explicit Ellipse(const Splat& splat)
@@ -61,7 +81,7 @@ class TouchedTiles {
   };
 
   /// Tiles whose samples lie between, clipped to the image.
-  static void tiles_between(double low, double high, int pixels, std::int32_t& first, std::int32_t& end) {
+  void tiles_between(double low, double high, int pixels, std::int32_t& first, std::int32_t& end) const {
     const double last_pixel = pixels - 1;
     const double from = std::ceil(std::max(low - 0.5, 0.0));
     const double to = std::floor(std::min(high - 0.5, last_pixel));
@@ -69,8 +89,8 @@ class TouchedTiles {
       first = end = 0;
       return;
     }
-    first = static_cast<std::int32_t>(from) / side;
-    end = static_cast<std::int32_t>(to) / side + 1;
+    first = static_cast<std::int32_t>(from) / side_;
+    end = static_cast<std::int32_t>(to) / side_ + 1;
   }
 
   PixelRect box(const Ellipse& of) const {
@@ -91,7 +111,7 @@ class TouchedTiles {
     const double a = std::sqrt(double{splat.ax} * splat.ax + double{splat.ay} * splat.ay) / r;
     const double b = std::sqrt(double{splat.bx} * splat.bx + double{splat.by} * splat.by) / r;
     const float radius = std::ceil(3.0F * static_cast<float>(std::max(a, b)));
-    const auto tile = [](float pixels, int along) {
+    const auto tile = [side = side_](float pixels, int along) {
       const int tiles = (along + side - 1) / side;
       const float quotient = pixels / static_cast<float>(side);
       if (!(quotient > 0)) return 0;
@@ -99,7 +119,7 @@ class TouchedTiles {
     };
     const float x = splat.cx - 0.5F;
     const float y = splat.cy - 0.5F;
-    constexpr float rest = side - 1;
+    const auto rest = static_cast<float>(side_ - 1);
     return {tile(x - radius, width_), tile(y - radius, height_), tile(x + radius + rest, width_),
             tile(y + radius + rest, height_)};
   }
@@ -107,10 +127,10 @@ class TouchedTiles {
   bool is_touched(const Ellipse& of, int x, int y) const {
     if (shape_ == ListShape::three_sigma || shape_ == ListShape::box) return true;
     // The samples of the tile's pixels, about the splat's centre.
-    const double left = side * x + 0.5 - of.cx;
-    const double top = side * y + 0.5 - of.cy;
-    const double right = std::min(side * (x + 1), width_) - 0.5 - of.cx;
-    const double bottom = std::min(side * (y + 1), height_) - 0.5 - of.cy;
+    const double left = side_ * x + 0.5 - of.cx;
+    const double top = side_ * y + 0.5 - of.cy;
+    const double right = std::min(side_ * (x + 1), width_) - 0.5 - of.cx;
+    const double bottom = std::min(side_ * (y + 1), height_) - 0.5 - of.cy;
     return shape_ == ListShape::oriented ? box_touches(of, left, top, right, bottom)
                                          : ellipse_touches(of, left, top, right, bottom);
   }
@@ -142,7 +162,7 @@ class TouchedTiles {
   }
 
   ListShape shape_;
-  int width_, height_;
+  int width_, height_, side_;
 };
 
 }  // namespace vrpipe
