@@ -36,10 +36,10 @@ class Frames : public ToolTest {
 TEST_F(Frames, AreTimedOnEveryPath) {
   const json result = frames({"--fidelity", "lt"});
   EXPECT_EQ(result["schema"], "vrpipe.frames/1");
-  ASSERT_EQ(result["frames"].size(), 4U);
-  const std::vector<std::string> paths{"software", "hardware", "vr-pipe", "accelerator"};
-  const std::vector<std::string> names{"published", "baseline", "het+qm", "gscore"};
-  for (std::size_t i = 0; i < 4; ++i) {
+  ASSERT_EQ(result["frames"].size(), 5U);
+  const std::vector<std::string> paths{"software", "hardware", "multi-pass", "vr-pipe", "accelerator"};
+  const std::vector<std::string> names{"published", "baseline", "4 passes", "het+qm", "gscore"};
+  for (std::size_t i = 0; i < 5; ++i) {
     const json& path = result["frames"][i];
     EXPECT_EQ(path["path"], paths[i]);
     EXPECT_EQ(path["name"], names[i]);
@@ -66,6 +66,18 @@ TEST_F(Frames, DrawsAreThoseOfCompare) {
     EXPECT_EQ(of_path["milliseconds"]["raster"], runs[variant]["milliseconds"]);
     EXPECT_EQ(of_path["counts"], runs[variant]["counts"]);
   }
+}
+
+TEST_F(Frames, SeveralPassesAreThoseOfRun) {
+  const json result = frames({"--fidelity", "lt", "--multi-pass", "3"});
+  const json run =
+      json_of({"run", "--scene", "tiny.spl", "--fidelity", "lt", "--variant", "baseline", "--multi-pass", "3"});
+  const json path = by_path(result)["multi-pass"];
+  EXPECT_EQ(path["name"], "3 passes");
+  EXPECT_EQ(path["milliseconds"]["raster"], run["runs"][0]["milliseconds"]);
+  EXPECT_EQ(path["counts"], run["runs"][0]["counts"]);
+  EXPECT_EQ(path["milliseconds"]["sort"], by_path(result)["hardware"]["milliseconds"]["sort"]);
+  EXPECT_EQ(by_path(frames({"--fidelity", "functional", "--multi-pass", "1"})).count("multi-pass"), 0U);
 }
 
 TEST_F(Frames, AGaussianSceneIsPreprocessed) {
@@ -174,10 +186,11 @@ TEST_F(Frames, ImagesOfEveryPathAreAlike) {
     EXPECT_EQ(path["images"]["png"], "images/tiny-" + path["path"].get<std::string>() + ".png");
     images.push_back(tools::read_exr((folder() / path["images"]["exr"].get<std::string>()).string()));
   }
-  ASSERT_EQ(images.size(), 4U);
+  ASSERT_EQ(images.size(), 5U);
   float most = 0;
   for (std::size_t i = 0; i < std::size_t{4} * images[0].width() * images[0].height(); ++i) {
-    for (std::size_t of : {1, 2, 3}) most = std::max(most, std::fabs(images[0].values()[i] - images[of].values()[i]));
+    for (std::size_t of : {1, 2, 3, 4})
+      most = std::max(most, std::fabs(images[0].values()[i] - images[of].values()[i]));
   }
   EXPECT_LT(most, 0.01F) << "halves, and what ends early";
   EXPECT_GT(most, 0.0F) << "single precision in software";

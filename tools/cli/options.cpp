@@ -29,6 +29,7 @@ constexpr const char* html_option = "--html";
 
 /// Each but the last is two draws.
 constexpr unsigned most_passes = most_draws / 2 + 1;
+constexpr unsigned usual_passes = 4;  // of the path that has several
 
 const std::string variant_default = "het+qm";
 
@@ -235,6 +236,8 @@ void SimulationArguments::declare_whole_frames(Arguments& arguments) {
   declare_platform(arguments);
   declare_changes(arguments);
   declare_rules(arguments);
+  arguments.add_option("--multi-pass", passes_, "N", "passes of the path multi-pass (default: 4; 1: without it)",
+                       scene_group);
   declare_images(arguments);
   arguments.find("--output")->help =
       "writes SCENE-PATH.png (8 bit, over the background) and .exr (RGBA float,\n"
@@ -418,6 +421,7 @@ FrameDescription SimulationArguments::frame() const {
   const auto file = single(frame_, "--frame");
   if (!file) {
     FrameDescription frame = frame_of_scene(single(scene_, "--scene").value_or(""));
+    if (takes_kernels_) frame.passes = usual_passes;
     if (const auto text = single(passes_, "--multi-pass"))
       frame.passes = parse_count(*text, "--multi-pass", most_passes);
     if (!draws_.empty())

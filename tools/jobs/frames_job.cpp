@@ -45,6 +45,13 @@ std::optional<double> sum(const std::vector<std::optional<double>>& values) {
   return any ? std::optional(all) : std::nullopt;
 }
 
+/// A draw by hardware.
+struct HardwareDraw {
+  std::string path, variant;
+  std::uint32_t passes = 1;
+  std::string name() const { return passes == 1 ? variant : fmt::format("{} passes", passes); }
+};
+
 /// With the kernels that the job says.
 RunRequest with_kernels(RunRequest request, const SimulationJob& job) {
   request.settings.insert(request.settings.end(), job.kernel_settings.begin(), job.kernel_settings.end());
@@ -95,8 +102,8 @@ class PathMaker {
     return path;
   }
 
-  FramePath of_hardware(const std::string& name, const RunResult& run, const HardwarePreparation& prepared) const {
-    FramePath path = begin(name, run.request.variant.name, run.request.fidelity);
+  FramePath of_hardware(const HardwareDraw& draw, const RunResult& run, const HardwarePreparation& prepared) const {
+    FramePath path = begin(draw.path, draw.name(), run.request.fidelity);
     std::vector<Part> parts;
     const auto add = [&](const KernelReport& kernel) {
       parts.push_back({kernel.name, milliseconds(kernel), kernel.bound_by});
@@ -174,9 +181,10 @@ class PathMaker {
 }  // namespace
 
 FramesResult perform_frames(const SimulationJob& job) {
-  const std::vector<std::pair<std::string, std::string>> draws{{"hardware", "baseline"}, {"vr-pipe", "het+qm"}};
+  std::vector<HardwareDraw> draws{{"hardware", "baseline"}, {"vr-pipe", "het+qm"}};
+  if (job.frame.passes > 1) draws.insert(draws.begin() + 1, {"multi-pass", "baseline", job.frame.passes});
   std::vector<std::string> images{image_name(job.frame.name, "software")};
-  for (const auto& [path, variant] : draws) images.push_back(image_name(job.frame.name, path));
+  for (const HardwareDraw& draw : draws) images.push_back(image_name(job.frame.name, draw.path));
   images.push_back(image_name(job.frame.name, "accelerator"));
   check_outputs(job, images);
   FramesResult result;
@@ -199,13 +207,18 @@ FramesResult perform_frames(const SimulationJob& job) {
   if (loaded.preprocessed_here) gaussians = loaded.summary.gaussians_total;
 
   std::vector<RunRequest> requests;
-  for (const auto& [path, variant] : draws) {
+  for (const HardwareDraw& draw : draws) {
     const auto found = std::find_if(job.requests.begin(), job.requests.end(),
-                                    [name = variant](const RunRequest& each) { return each.variant.name == name; });
+                                    [&](const RunRequest& each) { return each.variant.name == draw.variant; });
     requests.push_back(*found);
+    requests.back().name = draw.path;
     requests.back().reads_statistics = true;
   }
-  const auto frame_of = [&](const RunRequest& request) { return make_frame(request, job.frame, loaded); };
+  FrameDescription in_one_pass = job.frame;
+  in_one_pass.passes = 1;
+  const auto frame_of = [&](const RunRequest& request) {
+    return make_frame(request, request.name == "multi-pass" ? job.frame : in_one_pass, loaded);
+  };
   if (job.output) create_output_folder(*job.output, "--output");
   std::vector<Simulated> simulated =
       simulate_in_processes(requests, frame_of, job.output.has_value(), job.processes, progress);
@@ -219,7 +232,7 @@ FramesResult perform_frames(const SimulationJob& job) {
   result.paths.push_back(make.of_software(software));
   const HardwarePreparation prepared = prepare_for_hardware(request, *frame, gaussians);
   for (std::size_t i = 0; i < draws.size(); ++i)
-    result.paths.push_back(make.of_hardware(draws[i].first, simulated[i].result, prepared));
+    result.paths.push_back(make.of_hardware(draws[i], simulated[i].result, prepared));
   progress.show("drawing by an accelerator");
   request.fidelity = std::min(request.fidelity, Fidelity::lt);  // its units have no cycles of their own
   const AcceleratorResult accelerator = simulate_accelerator(request, *frame, gaussians);

@@ -15,8 +15,8 @@ namespace vrpipe::tools {
 
 /// One way to draw a whole frame.
 struct FramePath {
-  std::string path;                          ///< software, hardware, vr-pipe, accelerator
-  std::string name;                          ///< of the render kernel, the variant or the accelerator
+  std::string path;                          ///< software, hardware, multi-pass, vr-pipe, accelerator
+  std::string name;                          ///< of the render kernel, the variant, the passes or the accelerator
   Fidelity fidelity = Fidelity::functional;  ///< of an accelerator `lt` where `cycle` was asked for
   // Simulated milliseconds; none where the fidelity has no time.
   std::optional<double> preprocess;  ///< and of a draw list
@@ -49,7 +49,7 @@ struct FramesResult {
 };
 
 /// Draws the frame of a job in software, by hardware and by an accelerator: of its requests `baseline` is the path `hardware`,
-/// `het+qm` `vr-pipe`. Throws UserError, CommandFailure or a fault.
+/// in several passes `multi-pass`, `het+qm` `vr-pipe`. Throws UserError, CommandFailure or a fault.
 FramesResult perform_frames(const SimulationJob& job);
 
 }  // namespace vrpipe::tools
