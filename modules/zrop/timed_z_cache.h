@@ -21,7 +21,7 @@ class TimedZCache {
  public:
   /// @param out_reads  what they take of the ROPs' port
   TimedZCache(TimedUnit& owner, TimedOut<PortReads>& out_reads, const ZropBehaviour::TimingParameters& timing,
-              Placement placement, ZCacheStatistics& statistics)
+              const Placement& placement, ZCacheStatistics& statistics)
       : timing_(timing.z_cache),
         out_reads_(out_reads),
         sectors_of_a_line_(timing_.organization.sectors_of_a_line()),
