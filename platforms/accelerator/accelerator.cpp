@@ -29,17 +29,20 @@ void check_accelerator_timing(const ChosenKernel& unit, const AcceleratorBehavio
   }
 }
 
-/// A frame that takes longer than any, and would not be told from one that wraps around.
-void check_accelerator_steps(const ChosenKernel& unit, const std::vector<AcceleratorStep>& steps) {
-  constexpr std::uint64_t most = std::uint64_t{1} << 40U;
-  std::uint64_t sum = 0;
+/// That time fits into 64 bits, whatever a unit and its parameters make of a frame.
+void check_accelerator_steps(const ChosenKernel& unit, const std::vector<AcceleratorStep>& steps,
+                             const AcceleratorBehaviour::TimingParameters& timing) {
+  constexpr double most = 4e18;  // thousandths of a cycle
+  const double of_a_byte = 1000.0 * timing.frequency_mhz / timing.memory_mb_per_second;
+  double sum = 0;
   for (const AcceleratorStep& step : steps) {
     for (const AcceleratorStep::Part& part : step.parts) {
-      if (part.cycles > most || part.bytes > most || (sum += part.cycles + part.bytes) > most) {
-        unit.fail("a frame of more than 2^40 cycles and bytes");
-      }
+      sum += 1000 * static_cast<double>(part.cycles) + of_a_byte * static_cast<double>(part.bytes);
     }
   }
+  if (sum < most) return;
+  throw UserError("cannot draw by an accelerator", unit.name(), "a frame takes longer than can be told",
+                  "take fewer bytes and cycles, or a lower frequency");
 }
 
 KernelReport stage_report(const char* name, AcceleratorStage stage, const std::vector<AcceleratorStep>& steps,
@@ -83,7 +86,7 @@ AcceleratorResult simulate_accelerator(const RunRequest& request, const Frame& f
   const auto timing = unit.call("timing", [&] { return behaviour->timing(); });
   check_accelerator_timing(unit, timing);
   const std::vector<AcceleratorStep> steps = unit.call("draw", [&] { return behaviour->draw(gaussians); });
-  check_accelerator_steps(unit, steps);
+  check_accelerator_steps(unit, steps, timing);
   behaviour->check_end();
 
   result.frequency_mhz = timing.frequency_mhz;

@@ -6,8 +6,11 @@
 namespace vrpipe {
 
 std::uint64_t AcceleratorFlow::memory_time(std::uint64_t bytes) const {
-  // Megabytes a second are bytes a microsecond, megahertz cycles of one.
-  return (bytes * timing_.frequency_mhz * 1000 + timing_.memory_mb_per_second - 1) / timing_.memory_mb_per_second;
+  // Megabytes a second are bytes a microsecond, megahertz cycles of one. Whole microseconds first: the product may not fit.
+  const std::uint64_t of_a_microsecond = timing_.memory_mb_per_second;
+  const std::uint64_t thousandths = std::uint64_t{1000} * timing_.frequency_mhz;
+  return bytes / of_a_microsecond * thousandths +
+         (bytes % of_a_microsecond * thousandths + of_a_microsecond - 1) / of_a_microsecond;
 }
 
 std::uint64_t AcceleratorFlow::alone(const AcceleratorStep::Part& part) const {

@@ -95,22 +95,25 @@ TEST(AcceleratorFrame, OfADrawListNothingIsPreprocessed) {
   EXPECT_FALSE(drawn(accelerator_request(Fidelity::lt), testing::draw_of(16, 16)).preprocess.has_value());
 }
 
-/// Of one's own: a step of 100 cycles in each stage, but for `wrong`, which has no memory.
+/// Of one's own: two steps of the same cycles in each stage.
 class TwoSteps : public AcceleratorBehaviour {
  public:
   struct Parameters : ParameterSet {
     Integer bandwidth{*this, "bandwidth", 1000, 0, 1000000, "MB/s", "this test", "of memory"};
+    Integer cycles{*this, "cycles", 100, 0, 4000000000, "cycles", "this test", "of a step in a stage, up to a square"};
   };
-  TwoSteps(const Parameters& parameters, const RenderContext&) : bandwidth_(parameters.bandwidth) {}
+  TwoSteps(const Parameters& parameters, const RenderContext&)
+      : bandwidth_(parameters.bandwidth), cycles_(parameters.cycles) {}
   std::vector<AcceleratorStep> draw(std::optional<std::uint64_t>) override {
     AcceleratorStep step;
-    for (AcceleratorStep::Part& part : step.parts) part.cycles = 100;
+    for (AcceleratorStep::Part& part : step.parts) part.cycles = cycles_ > 1000000 ? cycles_ * cycles_ : cycles_;
     return {step, step};
   }
   TimingParameters timing() const override { return {500, bandwidth_, {}, 2, {"a", "b", "c"}}; }
 
  private:
   std::uint32_t bandwidth_;
+  std::uint64_t cycles_;
 };
 const Registrar<TwoSteps, AcceleratorBehaviour> two_steps("accelerator", "two-steps", "two steps");
 
@@ -138,6 +141,8 @@ TEST(AcceleratorFrame, RefusesWhatItDoesNotKnow) {
             std::string::npos);
   EXPECT_NE(refusal(accelerator_request(Fidelity::lt, {{"accelerator", "masks", "circle"}})).find("ellipse"),
             std::string::npos);
+  RunRequest endless = accelerator_request(Fidelity::lt, {{"accelerator", "cycles", "4000000000"}}, "two-steps");
+  EXPECT_NE(refusal(endless).find("accelerator=two-steps"), std::string::npos);
   Frame two(16, 16);
   for (int i = 0; i < 2; ++i) two.draw(testing::geometry_of(16, 16), {});
   EXPECT_NE(refusal(accelerator_request(Fidelity::lt), two).find("one draw"), std::string::npos);

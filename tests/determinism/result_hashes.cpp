@@ -1,8 +1,9 @@
 // Prints the result hash of a small built-in scene in every variant, both terminations and three fidelities, and of frames in
-// software, as this build computes it; scripts/check compares the lines of builds by other compilers and at other levels of optimisation.
+// software and by accelerators, as this build computes it; scripts/check compares the lines of builds by other compilers and at other levels of optimisation.
 #include <cstdio>
 #include <exception>
 
+#include <vrpipe/platforms/accelerator.h>
 #include <vrpipe/platforms/simulation.h>
 #include <vrpipe/platforms/software.h>
 #include <vrpipe/workloads/scene.h>
@@ -44,6 +45,18 @@ void print_hashes() {
             simulate_software(request, *Frame::of(loaded.draw), loaded.summary.gaussians_total);
         std::printf("software %s %s %s %s\n", name_of(fidelity), kernel, lists, result.result_hash.c_str());
       }
+    }
+  }
+  for (const Fidelity fidelity : {Fidelity::functional, Fidelity::bound, Fidelity::lt}) {
+    for (const char* unit : {"gscore", "gcc", "flicker"}) {
+      RunRequest request;
+      request.platform = &platforms().front();
+      request.variant = variants().front();
+      request.fidelity = fidelity;
+      request.units = {{"accelerator", unit}};
+      const AcceleratorResult result =
+          simulate_accelerator(request, *Frame::of(loaded.draw), loaded.summary.gaussians_total);
+      std::printf("accelerator %s %s %s\n", name_of(fidelity), unit, result.result_hash.c_str());
     }
   }
 }

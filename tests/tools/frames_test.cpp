@@ -200,7 +200,8 @@ TEST_F(Frames, AConfigurationReadsBackToTheSameFrames) {
   const std::vector<std::string> arguments{"frames", "--scene",    "tiny.spl", "--fidelity",
                                            "bound",  "--platform", "gh100-gpc"};
   std::vector<std::string> changed = arguments;
-  changed.insert(changed.end(), {"--unit", "render=threshold", "--set", "binning.lists=box"});
+  changed.insert(changed.end(), {"--unit", "render=threshold", "--set", "binning.lists=box", "--unit",
+                                 "accelerator=gcc", "--set", "accelerator.chunk_entries=16"});
   for (std::vector<std::string> given : {arguments, changed}) {
     json direct = json_of(given);
     given.push_back("--print-config");
