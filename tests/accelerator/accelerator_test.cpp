@@ -195,7 +195,7 @@ Draw crowd_of(std::uint32_t width, std::uint32_t height, std::uint32_t splats, s
 }
 
 TEST(Accelerator, CountsAreThoseOfEveryPixel) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
     // Sides that are no multiples of a tile's.
     const Draw draw = crowd_of(70, 45, 900, seed);
     const AcceleratorOracle oracle(draw, {16, 8, 32, false});
