@@ -73,7 +73,7 @@ class BandwidthReservation {
   Cycle no_gap_from_ = 0;  ///< from here to the furthest reservation nothing is free; at most `run_begin_`
   Cycle kept_from_ = 0;    ///< cycles from here to `run_begin_` are kept; a multiple of 64
   // Rings, by cycle. Beyond `run_begin_` words are 0.
-  std::vector<Word> words_ = std::vector<Word>(2);
+  std::vector<Word> words_ = std::vector<Word>(16);
   std::vector<std::uint32_t> used_;  ///< bytes, where a cycle has several
 };
 
