@@ -372,7 +372,7 @@ Gcc::Parameters::Parameters() : TileAcceleratorParameters(gcc_preset()) {}
 Flicker::Parameters::Parameters() : TileAcceleratorParameters(flicker_preset()) {}
 
 namespace {
-const SoftwareSlotRegistrar accelerator_slot("accelerator", 230, "gscore");
+const OutsideSlotRegistrar accelerator_slot("accelerator", 230, "gscore");
 const Registrar<Gscore, AcceleratorBehaviour> gscore("accelerator", "gscore",
                                                      "lists by tile, sorted and drawn in chunks by masks of sub-tiles",
                                                      false, Trust::trusted);

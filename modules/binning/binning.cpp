@@ -86,7 +86,7 @@ std::vector<KernelWork> PairBinning::kernels() const {
 }
 
 namespace {
-const SoftwareSlotRegistrar binning_slot("binning", 210, "pairs");
+const OutsideSlotRegistrar binning_slot("binning", 210, "pairs");
 const Registrar<PairBinning, BinningBehaviour> pair_binning(
     "binning", "pairs", "a pair for each splat and tile that it touches, sorted by tile and depth", false,
     Trust::trusted);

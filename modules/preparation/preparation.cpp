@@ -49,7 +49,7 @@ KernelWork PublishedPreparation::sort_by_depth(std::uint64_t splats) const {
 }
 
 namespace {
-const SoftwareSlotRegistrar preparation_slot("preparation", 200, "published");
+const OutsideSlotRegistrar preparation_slot("preparation", 200, "published");
 const Registrar<PublishedPreparation, PreparationBehaviour> published_preparation(
     "preparation", "published", "projection of Gaussians and, for a hardware draw, a radix sort by depth", false,
     Trust::trusted);

@@ -195,7 +195,7 @@ ThresholdKernel::ThresholdKernel(const Parameters& parameters, const RenderConte
     : TileKernel(parameters, context, StopRule::after) {}
 
 namespace {
-const SoftwareSlotRegistrar render_slot("render", 220, "published");
+const OutsideSlotRegistrar render_slot("render", 220, "published");
 const Registrar<PublishedKernel, RenderBehaviour> published_kernel(
     "render", "published", "the published kernel: a pixel stops before the splat that would bring T under 1e-4", false,
     Trust::trusted);

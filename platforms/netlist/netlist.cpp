@@ -67,7 +67,7 @@ void Netlist::add(const std::string& path, const std::string& slot, const std::s
     refuse("cannot add " + path, path, "the platform has " + std::to_string(gpcs_) + " GPCs", "raise its `gpcs`");
   }
   const Registry& registry = Registry::instance();
-  if (registry.has_slot(added.slot) && registry.slot(added.slot).is_software) {
+  if (registry.has_slot(added.slot) && registry.slot(added.slot).is_outside_pipeline) {
     refuse("cannot add " + path, path, "slot " + added.slot + " is of units that have no ports", "leave it out");
   }
   instances_.push_back(std::move(added));

@@ -141,7 +141,7 @@ std::vector<StatisticReport> list_statistics(const ParameterListing& listing) {
       const Implementation& implementation = Registry::instance().find(listing.unit, listing.implementation);
       const auto make = [&] { return implementation.make_behaviour(*listing.parameters, context); };
       collector.add(listing.unit, "functional", make()->unit());
-      if (Registry::instance().slot(listing.unit).is_software) {
+      if (Registry::instance().slot(listing.unit).is_outside_pipeline) {
         // Kernels have no modules.
       } else if (Registry::instance().slot(listing.unit).is_memory) {
         for (const bool is_clocked : {false, true}) {

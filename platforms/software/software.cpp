@@ -85,7 +85,7 @@ class SoftwareMachine {
  private:
   /// With all that the platform has, whatever the draw by hardware would do without.
   static RunRequest whole(const RunRequest& request) {
-    RunRequest of_machine = without_software(request);
+    RunRequest of_machine = of_pipeline_alone(request);
     of_machine.effects = EffectChoice::everything();
     of_machine.observers = nullptr;
     return of_machine;
@@ -154,18 +154,18 @@ KernelReport preprocess_by(const ChosenKernel& preparation, const SoftwareMachin
 
 }  // namespace
 
-bool is_of_software(const std::string& unit) {
+bool is_outside_pipeline(const std::string& unit) {
   const Registry& registry = Registry::instance();
-  return registry.has_slot(unit) && registry.slot(unit).is_software;
+  return registry.has_slot(unit) && registry.slot(unit).is_outside_pipeline;
 }
 
-RunRequest without_software(RunRequest request) {
+RunRequest of_pipeline_alone(RunRequest request) {
   const auto leave_out = [](std::vector<Setting>& settings, std::vector<UnitChoice>& units) {
     settings.erase(std::remove_if(settings.begin(), settings.end(),
-                                  [](const Setting& setting) { return is_of_software(setting.unit); }),
+                                  [](const Setting& setting) { return is_outside_pipeline(setting.unit); }),
                    settings.end());
     units.erase(std::remove_if(units.begin(), units.end(),
-                               [](const UnitChoice& choice) { return is_of_software(choice.slot); }),
+                               [](const UnitChoice& choice) { return is_outside_pipeline(choice.slot); }),
                 units.end());
   };
   leave_out(request.settings, request.units);
@@ -179,7 +179,7 @@ std::vector<std::pair<std::string, std::string>> check_software(const RunRequest
   context.frame = std::make_shared<Frame>(1, 1);
   std::vector<std::pair<std::string, std::string>> parameters;
   for (const Slot& slot : Registry::instance().slots()) {
-    if (!slot.is_software) continue;
+    if (!slot.is_outside_pipeline) continue;
     const ChosenKernel kernel = choose_kernel(slot.name, request);
     kernel.implementation->make_behaviour(*kernel.parameters, context);
     kernel.add_parameters_to(parameters);

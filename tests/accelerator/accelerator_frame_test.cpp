@@ -151,7 +151,7 @@ TEST(AcceleratorFrame, RefusesWhatItDoesNotKnow) {
 TEST(AcceleratorFrame, IsNoneOfThePipelinesUnits) {
   const RunRequest request = accelerator_request(Fidelity::functional, {{"accelerator", "volume_units", "8"}});
   EXPECT_THROW(check_configuration(request), UserError);
-  EXPECT_NO_THROW(check_configuration(without_software(request)));
+  EXPECT_NO_THROW(check_configuration(of_pipeline_alone(request)));
   EXPECT_NO_THROW(check_software(request));
 }
 

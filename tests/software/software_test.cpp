@@ -231,7 +231,7 @@ TEST(Software, RefusesWhatItDoesNotKnow) {
 TEST(Software, IsNoneOfThePipelinesUnits) {
   RunRequest request = request_at(Fidelity::functional, {{"render", "issue_rate", "1"}});
   EXPECT_THROW(check_configuration(request), UserError);
-  EXPECT_NO_THROW(check_configuration(without_software(request)));
+  EXPECT_NO_THROW(check_configuration(of_pipeline_alone(request)));
   EXPECT_NO_THROW(check_software(request));
 }
 

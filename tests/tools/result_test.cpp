@@ -328,7 +328,8 @@ TEST_F(Result, NamesTheCommandThePluginsAndTheUnits) {
     EXPECT_EQ(implementations["qru"], qru.at(run["variant"])) << run["variant"];
     EXPECT_EQ(implementations["crop"], "color-rop");
     const std::vector<Slot>& slots = Registry::instance().slots();
-    const auto kernels = std::count_if(slots.begin(), slots.end(), [](const Slot& slot) { return slot.is_software; });
+    const auto kernels =
+        std::count_if(slots.begin(), slots.end(), [](const Slot& slot) { return slot.is_outside_pipeline; });
     EXPECT_EQ(implementations.size(), slots.size() - 2 - static_cast<std::size_t>(kernels))
         << "agx-orin has no L1 in a slot of its own, one GPC needs no crossbar, and a draw by hardware no kernels";
   }

@@ -49,10 +49,10 @@ void refuse_kernels(const RunRequest& request) {
                     "leave it out, or take `vrpipe frames`");
   };
   for (const Setting& setting : request.settings) {
-    if (is_of_software(setting.unit)) refuse("--set " + setting.unit + "." + setting.parameter, setting.unit);
+    if (is_outside_pipeline(setting.unit)) refuse("--set " + setting.unit + "." + setting.parameter, setting.unit);
   }
   for (const UnitChoice& choice : request.units) {
-    if (is_of_software(choice.slot)) refuse("--unit " + choice.slot + "=" + choice.implementation, choice.slot);
+    if (is_outside_pipeline(choice.slot)) refuse("--unit " + choice.slot + "=" + choice.implementation, choice.slot);
   }
 }
 
@@ -500,11 +500,11 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
     job.kernel_parameters = check_software(request);
     const auto take = [](const auto& all, auto& kernels, const auto& unit_of) {
       std::copy_if(all.begin(), all.end(), std::back_inserter(kernels),
-                   [&](const auto& each) { return is_of_software(unit_of(each)); });
+                   [&](const auto& each) { return is_outside_pipeline(unit_of(each)); });
     };
     take(request.settings, job.kernel_settings, [](const Setting& setting) { return setting.unit; });
     take(request.units, job.kernel_units, [](const UnitChoice& choice) { return choice.slot; });
-    request = without_software(std::move(request));
+    request = of_pipeline_alone(std::move(request));
   }
   job.scene.preprocess = parts.preprocess;
   job.preprocessing = std::move(parts.preprocessing);

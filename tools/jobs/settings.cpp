@@ -34,7 +34,7 @@ std::vector<ParameterListing> all_parameters(const Platform* platform) {
 }
 
 std::vector<std::pair<std::string, std::string>> final_parameters(const RunRequest& request) {
-  RunRequest all = without_software(request);
+  RunRequest all = of_pipeline_alone(request);
   all.effects = EffectChoice::parse("all");
   all.observers = nullptr;
   return Configuration(all, Frame(1, 1)).parameters();

@@ -43,9 +43,9 @@ struct Slot {
   bool is_memory = false;     ///< of memories (MemoryBehaviour), which have no streams but are bound to memory ports
   std::vector<ValidatedRange> validated = {};  ///< of parameters that are not named every value is
   std::vector<PortNeed> needs = {};
-  /// Of kernels by which a frame is prepared or rendered in software, and of accelerators: no netlist has a unit of it
+  /// Of kernels by which a frame is prepared or rendered in software, and of accelerators: no pipeline has a unit of it
   /// (slots/kernel_work.h, slots/accelerator.h).
-  bool is_software = false;
+  bool is_outside_pipeline = false;
 };
 
 /// An implementation of a slot: a unit that a platform can be built with.
@@ -111,11 +111,11 @@ struct SlotRegistrar {
   }
 };
 
-/// Registers a slot of kernels or accelerators.
-struct SoftwareSlotRegistrar {
-  SoftwareSlotRegistrar(const char* name, unsigned rank, const char* implementation) {
+/// Registers a slot outside the pipeline: of kernels or accelerators.
+struct OutsideSlotRegistrar {
+  OutsideSlotRegistrar(const char* name, unsigned rank, const char* implementation) {
     Slot slot{name, rank, implementation};
-    slot.is_software = true;
+    slot.is_outside_pipeline = true;
     Registry::instance().add(std::move(slot));
   }
 };

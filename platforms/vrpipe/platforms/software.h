@@ -42,9 +42,9 @@ struct SoftwareResult {
 };
 
 /// Whether --set and --unit of this name are for kernels or an accelerator.
-bool is_of_software(const std::string& unit);
+bool is_outside_pipeline(const std::string& unit);
 /// The request without what is for these: for the pipeline.
-RunRequest without_software(RunRequest request);
+RunRequest of_pipeline_alone(RunRequest request);
 
 /// Renders a frame in software. Settings and units of the request may be of the platform's units, too. `functional` counts and
 /// gives the image; `bound` is the least that kernels take; at `lt` the blocks of the render kernel are a fluid that cores share, at
