@@ -11,7 +11,8 @@
 namespace vrpipe {
 
 /// What handing fragment warps to cores takes: so much for a warp, and beside that so much for a visit, the quads of a
-/// primitive in a screen tile that come one after the other; the longer of the two counts (measured on a GH100 graphics GPC).
+/// primitive in a screen tile that come one after the other; the longer of the two counts (measured on a GH100 graphics GPC). Of a
+/// warp of pairs, a primitive's quads are one visit, whatever is between them: assumed, since no GPU merges.
 class HandOver {
  public:
   HandOver(const SmBehaviour::TimingParameters& timing, const RenderContext& context)
@@ -72,6 +73,11 @@ class HandOver {
   std::uint64_t of_warp(const Warp& warp) const {
     return price_.warp_thousandths + (discards(warp) ? price_.discard_warp_thousandths : 0);
   }
+  /// Whether a quad's primitive has one further in front: pairs have front and back by turns.
+  static bool came_before(const Warp& warp, unsigned index) {
+    return std::any_of(warp.quads.begin(), warp.quads.begin() + index,
+                       [&](const Quad& quad) { return primitive_order(quad) == primitive_order(warp.quads[index]); });
+  }
   template <class Counts>
   std::uint64_t of_visits(const Warp& warp, Visit& last, Counts counts) const {
     unsigned visits = 0;
@@ -79,7 +85,7 @@ class HandOver {
       const std::uint32_t primitive = primitive_order(warp.quads[i]);
       if (!counts(last, primitive) || (primitive == last.primitive && warp.tile == last.tile)) continue;
       last = {warp.tile, primitive};
-      ++visits;
+      if (warp.merge_pairs == 0 || !came_before(warp, i)) ++visits;
     }
     return visits * (std::uint64_t{price_.visit_thousandths} + (discards(warp) ? price_.discard_thousandths : 0));
   }

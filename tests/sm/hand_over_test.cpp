@@ -82,6 +82,18 @@ TEST_P(HandOverTest, EachPrimitiveInATileTakesItsVisitAtLeast) {
   EXPECT_NEAR(cycles_of_a_warp({warp_of({1, 1, 2, 2, 3, 3, 4, 4}), warp_of({5, 5})}, measured), 5 * 5.7 / 2, 0.02);
 }
 
+TEST_P(HandOverTest, PairsOfTwoPrimitivesAreAVisitOfEach) {
+  const auto pairs_of = [](std::uint32_t front, std::uint32_t back) {
+    Warp warp = warp_of({front, back, front, back, front, back, front, back});
+    for (unsigned i = 0; i < warp.count; ++i) warp.quads[i].position = static_cast<std::uint8_t>(i / 2);
+    warp.merge_pairs = 0xf;
+    return warp;
+  };
+  EXPECT_NEAR(cycles_of_a_warp({pairs_of(1, 2), pairs_of(3, 4)}, measured), 2 * 5.7, 0.02);
+  EXPECT_NEAR(cycles_of_a_warp({pairs_of(1, 2), pairs_of(2, 3)}, measured), 3 * 5.7 / 2, 0.02)
+      << "2 goes on from one warp to the next";
+}
+
 TEST_P(HandOverTest, WarpsGoOnBesideVisits) {
   // Two visits of 5.7 cycles in six warps of 3.53: the warps are longer, the visits hide beside them.
   const Warp full = warp_of({1, 1, 1, 1, 1, 1, 1, 1});
