@@ -103,8 +103,7 @@ Cycle BandwidthReservation::take_gaps(Cycle arrival, unsigned bytes, Cycle prese
 }
 
 std::uint64_t BandwidthReservation::reserved_from(Cycle cycle) const {
-  const std::uint64_t begin = std::max(cycle, run_begin_) * per_cycle_.value();
-  return (end_ > begin ? end_ - begin : 0) + reserved_between(cycle, std::max(cycle, run_begin_));
+  return reserved_between(cycle, std::max(cycle, per_cycle_.quotient_up(end_)));
 }
 
 std::uint64_t BandwidthReservation::reserved_between(Cycle from, Cycle to) const {

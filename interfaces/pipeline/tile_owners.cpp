@@ -5,10 +5,10 @@
 namespace vrpipe {
 
 TileOwners::TileOwners(unsigned width, unsigned height, const std::function<unsigned(TileId)>& owner_of)
-    : columns_((width + screen_tile_pixels - 1) / screen_tile_pixels) {
-  const std::uint32_t rows = (height + screen_tile_pixels - 1) / screen_tile_pixels;
-  owners_.reserve(std::size_t{columns_} * rows);
-  for (std::uint32_t y = 0; y < rows; ++y) {
+    : columns_((width + screen_tile_pixels - 1) / screen_tile_pixels),
+      rows_((height + screen_tile_pixels - 1) / screen_tile_pixels) {
+  owners_.reserve(std::size_t{columns_} * rows_);
+  for (std::uint32_t y = 0; y < rows_; ++y) {
     for (std::uint32_t x = 0; x < columns_; ++x) {
       owners_.push_back(
           static_cast<std::uint8_t>(owner_of({static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)})));
@@ -20,10 +20,8 @@ TileOwners::TileOwners(unsigned width, unsigned height, const std::function<unsi
 template <class Look>
 void TileOwners::look_at(const PixelRect& pixels, Look&& look) const {
   constexpr auto side = static_cast<std::int32_t>(screen_tile_pixels);
-  const auto columns = static_cast<std::int32_t>(columns_);
-  const auto rows = static_cast<std::int32_t>(owners_.size() / std::max<std::size_t>(columns_, 1));
-  const std::int32_t last_x = std::min((pixels.x1 - 1) / side, columns - 1);
-  const std::int32_t last_y = std::min((pixels.y1 - 1) / side, rows - 1);
+  const std::int32_t last_x = std::min((pixels.x1 - 1) / side, static_cast<std::int32_t>(columns_) - 1);
+  const std::int32_t last_y = std::min((pixels.y1 - 1) / side, static_cast<std::int32_t>(rows_) - 1);
   for (std::int32_t y = pixels.y0 / side; y <= last_y; ++y) {
     for (std::int32_t x = pixels.x0 / side; x <= last_x; ++x) {
       if (look(owners_[static_cast<std::size_t>(y) * columns_ + static_cast<std::size_t>(x)])) return;

@@ -324,15 +324,7 @@ void TileAccelerator::store_tile() const {
     const std::size_t lane = i % pixels_of_vector;
     const auto x = static_cast<std::uint32_t>(pixels.x[lane]);
     const auto y = static_cast<std::uint32_t>(pixels.y[lane]);
-    if (x >= width_ || y >= height_) continue;
-    const TileId tile{static_cast<std::uint16_t>(x / screen_tile_pixels),
-                      static_cast<std::uint16_t>(y / screen_tile_pixels)};
-    QuadColor& quad = color_->quad(tile, y % screen_tile_pixels / 2 * quads_per_tile_row + x % screen_tile_pixels / 2);
-    const unsigned at = y % 2 * 2 + x % 2;
-    quad.red[at] = pixels.red[lane];
-    quad.green[at] = pixels.green[lane];
-    quad.blue[at] = pixels.blue[lane];
-    quad.alpha[at] = 1 - pixels.transmittance[lane];
+    if (x < width_ && y < height_) store_pixel(pixels, lane, x, y, *color_);
   }
 }
 

@@ -115,9 +115,8 @@ void TileRasterizer::begin(const Primitive& primitive, const PixelRect& clip) {
   const auto height = static_cast<std::int32_t>(context_.frame->height());
   mask_area_ = {0, 0, width, height};
   if (!whole && binned_gate_.enter()) {
-    area_ = {std::max(area_.x0, clip.x0), std::max(area_.y0, clip.y0), std::min(area_.x1, clip.x1),
-             std::min(area_.y1, clip.y1)};
-    mask_area_ = {std::max(clip.x0, 0), std::max(clip.y0, 0), std::min(clip.x1, width), std::min(clip.y1, height)};
+    area_ = intersection(area_, clip);
+    mask_area_ = intersection(mask_area_, clip);
   }
   tile_x_begin_ = area_.x0 / tile_side;
   tile_x_end_ = (area_.x1 - 1) / tile_side + 1;

@@ -165,15 +165,7 @@ void TileKernel::render(std::size_t tile, const std::uint32_t* splats, std::uint
 
 void TileKernel::store(std::size_t tile, std::uint32_t warp, const WarpLanes& lanes) {
   for (unsigned lane = 0; lane < lanes_of_warp; ++lane) {
-    const std::uint32_t x = pixel_x(tile, warp, lane) % screen_tile_pixels;
-    const std::uint32_t y = pixel_y(tile, warp, lane) % screen_tile_pixels;
-    QuadColor& quad = color_->quad(tiling_.tile(tile), y / 2 * quads_per_tile_row + x / 2);
-    const unsigned at = y % 2 * 2 + x % 2;
-    const SplatPixels& pixels = lanes.pixels[lane / 8];
-    quad.red[at] = pixels.red[lane % 8];
-    quad.green[at] = pixels.green[lane % 8];
-    quad.blue[at] = pixels.blue[lane % 8];
-    quad.alpha[at] = 1 - pixels.transmittance[lane % 8];
+    store_pixel(lanes.pixels[lane / 8], lane % 8, pixel_x(tile, warp, lane), pixel_y(tile, warp, lane), *color_);
   }
 }
 

@@ -46,12 +46,12 @@ void TileGridCoalescing::advance() {
   }
 }
 
+PixelRect TileGridCoalescing::area_of_grid(std::int32_t x, std::int32_t y) const {
+  return {x * grid_pixels_, y * grid_pixels_, (x + 1) * grid_pixels_, (y + 1) * grid_pixels_};
+}
+
 bool TileGridCoalescing::owns_pixels_in_grid() const {
-  const PixelRect& bounds = primitive_.bounds;
-  const std::int32_t x = grid_x_ * grid_pixels_;
-  const std::int32_t y = grid_y_ * grid_pixels_;
-  return context_.placement.owns_any_of({std::max(bounds.x0, x), std::max(bounds.y0, y),
-                                         std::min(bounds.x1, x + grid_pixels_), std::min(bounds.y1, y + grid_pixels_)});
+  return context_.placement.owns_any_of(intersection(primitive_.bounds, area_of_grid(grid_x_, grid_y_)));
 }
 
 void TileGridCoalescing::skip_foreign_grids() {
@@ -61,9 +61,8 @@ void TileGridCoalescing::skip_foreign_grids() {
 
 void TileGridCoalescing::flush_bin(std::uint32_t index, Flush& out) {
   Bin& bin = bins_[index];
-  const auto x = static_cast<std::int32_t>(bin.grid % grids_x_);
-  const auto y = static_cast<std::int32_t>(bin.grid / grids_x_);
-  out.clip = {x * grid_pixels_, y * grid_pixels_, (x + 1) * grid_pixels_, (y + 1) * grid_pixels_};
+  out.clip =
+      area_of_grid(static_cast<std::int32_t>(bin.grid % grids_x_), static_cast<std::int32_t>(bin.grid / grids_x_));
   flush_sizes.see(bin.primitives.size());
   out.primitives.clear();
   std::swap(out.primitives, bin.primitives);

@@ -60,6 +60,7 @@ class TileGridCoalescing : public TgcBehaviour {
     std::vector<Primitive> primitives;
   };
   void flush_bin(std::uint32_t bin, Flush& out);
+  PixelRect area_of_grid(std::int32_t x, std::int32_t y) const;  ///< by its place among the grids
   /// Of those that the primitive may cover.
   bool owns_pixels_in_grid() const;
   void skip_foreign_grids();

@@ -9,10 +9,6 @@ namespace vrpipe {
 
 namespace {
 
-WdxBehaviour::Timing timing_of(const WdxParameters& parameters) {
-  return {parameters.primitives_per_cycle, parameters.latency_cycles, parameters.credits};
-}
-
 /// About half of the GPCs further, so that diagonals are no GPC's either; coprime, so that a column has all of them.
 unsigned row_step_of(unsigned gpcs) {
   unsigned step = gpcs / 2 + 1;
@@ -22,22 +18,25 @@ unsigned row_step_of(unsigned gpcs) {
 
 }  // namespace
 
-TileInterleave::TileInterleave(const Parameters& parameters, const RenderContext& context)
+TileTable::TileTable(const WdxParameters& parameters, const RenderContext& context, unsigned entries,
+                     unsigned row_offset)
     : gpcs_(context.placement.gpcs),
       unit_tiles_(parameters.unit_tiles),
-      row_step_(row_step_of(gpcs_)),
-      timing_(timing_of(parameters)) {}
+      entries_(entries),
+      row_offset_(row_offset),
+      timing_{parameters.primitives_per_cycle, parameters.latency_cycles, parameters.credits} {}
 
-unsigned TileInterleave::owner_of(TileId tile) const {
-  return (tile.x / unit_tiles_ + tile.y / unit_tiles_ * row_step_) % gpcs_;
+unsigned TileTable::owner_of(TileId tile) const {
+  return (tile.x / unit_tiles_ + tile.y / unit_tiles_ * row_offset_) % entries_ % gpcs_;
 }
 
+TileInterleave::TileInterleave(const Parameters& parameters, const RenderContext& context)
+    : TileTable(parameters, context, context.placement.gpcs, row_step_of(context.placement.gpcs)) {}
+
 TpcTable::TpcTable(const Parameters& parameters, const RenderContext& context)
-    : gpcs_(context.placement.gpcs),
-      unit_tiles_(parameters.unit_tiles),
-      tpcs_(gpcs_ * parameters.tpcs_per_gpc),
-      row_offset_(parameters.row_offset > 0 ? static_cast<unsigned>(parameters.row_offset) : row_offset_of(tpcs_)),
-      timing_(timing_of(parameters)) {}
+    : TileTable(parameters, context, context.placement.gpcs * parameters.tpcs_per_gpc,
+                parameters.row_offset > 0 ? static_cast<unsigned>(parameters.row_offset)
+                                          : row_offset_of(context.placement.gpcs * parameters.tpcs_per_gpc)) {}
 
 unsigned TpcTable::row_offset_of(unsigned tpcs) {
   static const std::map<unsigned, unsigned> as_listed{{1, 1},  {2, 1},  {3, 2},  {5, 1},  {7, 1},
@@ -48,11 +47,6 @@ unsigned TpcTable::row_offset_of(unsigned tpcs) {
   unsigned prime = 3;
   while (std::gcd(prime, tpcs) != 1) prime += 2;
   return prime;
-}
-
-unsigned TpcTable::owner_of(TileId tile) const {
-  const unsigned entry = (tile.x / unit_tiles_ + tile.y / unit_tiles_ * row_offset_) % tpcs_;
-  return entry % gpcs_;
 }
 
 namespace {

@@ -37,25 +37,35 @@ struct WdxParameters : ParameterSet {
                   "from one GPC to another that may wait for their turn"};
 };
 
-/// Units of screen tiles go to GPCs in turn, along rows and down columns alike: neighbours belong to different GPCs.
-class TileInterleave : public WdxBehaviour {
+/// Units of screen tiles go to the entries of a table in turn along a row, and so many entries further in each row; of the
+/// entries, to the GPCs in turn.
+class TileTable : public WdxBehaviour {
  public:
-  struct Parameters : WdxParameters {};
-  TileInterleave(const Parameters& parameters, const RenderContext& context);
-
   unsigned owner_of(TileId tile) const override;
   Timing timing() const override { return timing_; }
+
+ protected:
+  /// `entries` is a multiple of the GPCs.
+  TileTable(const WdxParameters& parameters, const RenderContext& context, unsigned entries, unsigned row_offset);
 
  private:
   const unsigned gpcs_;
   const unsigned unit_tiles_;
-  const unsigned row_step_;  ///< from a row of units to the next
+  const unsigned entries_;
+  const unsigned row_offset_;
   const Timing timing_;
 };
 
-/// A table of all TPCs, each with its GPC, along a row of units, and a row offset, as NVIDIA's driver fills it in (nvgpu,
-/// init_rop_mapping). All GPCs have as many TPCs, so they come in turn in the table.
-class TpcTable : public WdxBehaviour {
+/// An entry for each GPC: neighbours along rows and down columns belong to different GPCs.
+class TileInterleave : public TileTable {
+ public:
+  struct Parameters : WdxParameters {};
+  TileInterleave(const Parameters& parameters, const RenderContext& context);
+};
+
+/// An entry for each TPC, with its GPC, as NVIDIA's driver fills it in (nvgpu, init_rop_mapping). All GPCs have as many TPCs,
+/// so they come in turn in the table.
+class TpcTable : public TileTable {
  public:
   struct Parameters : WdxParameters {
     Integer tpcs_per_gpc{*this, "tpcs_per_gpc", 8, 1, 64, "TPCs", "16 cores, two of them a TPC", "of each GPC"};
@@ -71,16 +81,6 @@ class TpcTable : public WdxBehaviour {
   TpcTable(const Parameters& parameters, const RenderContext& context);
   /// The driver's row offset for a table of so many TPCs.
   static unsigned row_offset_of(unsigned tpcs);
-
-  unsigned owner_of(TileId tile) const override;
-  Timing timing() const override { return timing_; }
-
- private:
-  const unsigned gpcs_;
-  const unsigned unit_tiles_;
-  const unsigned tpcs_;
-  const unsigned row_offset_;
-  const Timing timing_;
 };
 
 }  // namespace vrpipe

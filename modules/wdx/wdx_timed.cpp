@@ -41,7 +41,7 @@ class TimedWdx : public TimedUnit {
     // The GPCs' ends follow one another; the first stands for all.
     if (is_mark && ended_) return visible;
     ended_ = item.mark == Mark::end_of_frame;
-    const GpcSet to = is_mark ? ~GpcSet() : owners_->owners_in(item.primitive.bounds);
+    const GpcSet to = receivers_of(item, *owners_);
     Cycle at = visible;
     for (unsigned gpc = 0; gpc < gpcs_; ++gpc) {
       if (to[gpc]) at = queues_[std::size_t{from} * gpcs_ + gpc].free_from(at, 1);

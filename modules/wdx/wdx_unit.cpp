@@ -69,7 +69,7 @@ class WdxUnit : public Unit {
     StreamIn<PrimitiveItem>& in = *ins_[from];
     for (unsigned budget = timing_.primitives_per_cycle; budget > 0 && in.ready();) {
       const PrimitiveItem& item = in.front();
-      const GpcSet to = is_primitive(item) ? owners_->owners_in(item.primitive.bounds) : ~GpcSet();
+      const GpcSet to = receivers_of(item, *owners_);
       for (unsigned gpc = 0; gpc < gpcs_; ++gpc) {
         if (to[gpc] && queue(from, gpc).size() >= timing_.credits) return;
       }

@@ -29,7 +29,7 @@ class UntimedWdx : public UntimedUnit {
     // The GPCs' ends follow one another; the first stands for all.
     if (is_mark && ended_) return;
     ended_ = item.mark == Mark::end_of_frame;
-    const GpcSet to = is_mark ? ~GpcSet() : owners_->owners_in(item.primitive.bounds);
+    const GpcSet to = receivers_of(item, *owners_);
     did(WdxWork::taken, 1);
     if (!is_mark) ++behaviour_->primitives;
     for (std::size_t gpc = 0; gpc < outs_.size(); ++gpc) {

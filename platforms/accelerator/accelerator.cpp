@@ -112,11 +112,7 @@ AcceleratorResult simulate_accelerator(const RunRequest& request, const Frame& f
   StatisticCollector statistics;
   statistics.add(accelerator_name, accelerator_name, behaviour->unit());
   result.statistics = statistics.reports();
-  ResultHash hash;
-  for (const StatisticReport& statistic : result.statistics) hash.add(statistic.value);
-  hash.add(result.cycles.value_or(0));
-  hash.add(result.framebuffer.color);
-  result.result_hash = hash.text();
+  result.result_hash = hash_of(result.statistics, result.cycles, result.framebuffer.color);
   unit.add_parameters_to(result.parameters);
   return result;
 }

@@ -3,11 +3,14 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include <vrpipe/pipeline/surface.h>
+#include <vrpipe/platforms/simulation.h>
 
 namespace vrpipe {
 
@@ -33,5 +36,15 @@ class ResultHash {
  private:
   std::uint64_t hash_ = 0xcbf29ce484222325ULL;
 };
+
+/// Of a frame that is drawn outside the pipeline.
+inline std::string hash_of(const std::vector<StatisticReport>& statistics, std::optional<std::uint64_t> cycles,
+                           const ColorSurface& image) {
+  ResultHash hash;
+  for (const StatisticReport& statistic : statistics) hash.add(statistic.value);
+  hash.add(cycles.value_or(0));
+  hash.add(image);
+  return hash.text();
+}
 
 }  // namespace vrpipe

@@ -241,11 +241,7 @@ SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
   statistics.add(binning_name, binning_name, lists_by->unit());
   statistics.add(render_name, render_name, tiles_by->unit());
   result.statistics = statistics.reports();
-  ResultHash hash;
-  for (const StatisticReport& statistic : result.statistics) hash.add(statistic.value);
-  hash.add(result.cycles.value_or(0));
-  hash.add(result.framebuffer.color);
-  result.result_hash = hash.text();
+  result.result_hash = hash_of(result.statistics, result.cycles, result.framebuffer.color);
   for (const ChosenKernel* kernel : {&preparation, &binning, &render}) {
     const Implementation& implementation = *kernel->implementation;
     result.implementations.emplace_back(implementation.slot, implementation.name);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -46,6 +47,10 @@ struct PixelRect {
   std::int32_t y1 = 0;
   bool empty() const { return !(x0 < x1 && y0 < y1); }
 };
+/// What two have in common; empty if nothing.
+inline PixelRect intersection(const PixelRect& a, const PixelRect& b) {
+  return {std::max(a.x0, b.x0), std::max(a.y0, b.y0), std::min(a.x1, b.x1), std::min(a.y1, b.y1)};
+}
 
 /// A triangle after vertex processing. Attributes stay in the circular buffer in L2; units pass the pointer (`splat`).
 struct Primitive {

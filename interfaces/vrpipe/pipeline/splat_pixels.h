@@ -6,6 +6,7 @@
 #include <vrpipe/arithmetic/lanes.h>
 #include <vrpipe/pipeline/draw.h>
 #include <vrpipe/pipeline/geometry.h>
+#include <vrpipe/pipeline/surface.h>
 
 /// Splats drawn pixel by pixel as the published renderer does, in single precision, eight pixels side by side:
 /// alpha = min(0.99, opacity * exp(power)), by the inverse covariance.
@@ -46,6 +47,19 @@ struct SplatPixels {
   LanePair x, y, transmittance, red, green, blue;
   LanePairBits alive;
 };
+
+/// Puts one of them at a pixel of a surface.
+inline void store_pixel(const SplatPixels& pixels, std::size_t lane, std::uint32_t x, std::uint32_t y,
+                        ColorSurface& surface) {
+  const TileId tile{static_cast<std::uint16_t>(x / screen_tile_pixels),
+                    static_cast<std::uint16_t>(y / screen_tile_pixels)};
+  QuadColor& quad = surface.quad(tile, y % screen_tile_pixels / 2 * quads_per_tile_row + x % screen_tile_pixels / 2);
+  const unsigned at = y % 2 * 2 + x % 2;
+  quad.red[at] = pixels.red[lane];
+  quad.green[at] = pixels.green[lane];
+  quad.blue[at] = pixels.blue[lane];
+  quad.alpha[at] = 1 - pixels.transmittance[lane];
+}
 
 struct SplatAlphas {
   LanePair alpha;

@@ -30,7 +30,7 @@ class TileOwners {
   template <class Look>
   void look_at(const PixelRect& pixels, Look&& look) const;
 
-  std::uint32_t columns_;
+  std::uint32_t columns_, rows_;
   std::vector<std::uint8_t> owners_;  ///< row by row
 };
 

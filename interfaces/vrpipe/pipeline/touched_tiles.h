@@ -47,9 +47,7 @@ class TouchedTiles {
   template <class Touched>
   std::uint64_t visit(const Splat& splat, const PixelRect& within, Touched&& touched) const {
     const Ellipse of(splat);
-    PixelRect tiles = shape_ == ListShape::three_sigma ? square(splat) : box(of);
-    tiles = {std::max(tiles.x0, within.x0), std::max(tiles.y0, within.y0), std::min(tiles.x1, within.x1),
-             std::min(tiles.y1, within.y1)};
+    const PixelRect tiles = intersection(shape_ == ListShape::three_sigma ? square(splat) : box(of), within);
     if (tiles.empty()) return 0;
     for (int y = tiles.y0; y < tiles.y1; ++y) {
       for (int x = tiles.x0; x < tiles.x1; ++x) {

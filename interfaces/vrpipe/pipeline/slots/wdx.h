@@ -27,6 +27,12 @@ class WdxBehaviour : public Behaviour {
   Counter copies{*this, "copies", "triangles", "handed to the GPCs that own tiles of their bounds, one for each"};
 };
 
+/// The GPCs that an item goes to: with marks, and the ends of batches, all.
+inline GpcSet receivers_of(const PrimitiveItem& item, const TileOwners& owners) {
+  const bool is_primitive = item.mark == Mark::none && !item.ends_batch;
+  return is_primitive ? owners.owners_in(item.primitive.bounds) : ~GpcSet();
+}
+
 /// The slot's kinds of work, and what they cost by the unit's own words: the same at every fidelity. Of all GPCs' ports
 /// together, as if they were busy alike.
 struct WdxWork {
