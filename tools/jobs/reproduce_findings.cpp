@@ -110,6 +110,7 @@ SceneFinding scene_finding(const ReproduceResult& result, std::size_t scene) {
     key.passes = passes;
     finding.passes.push_back(gain(one_pass, result.at(key).run));
   }
+  if (scene < result.frames.size() && result.frames[scene]) finding.frame = &*result.frames[scene];
   return finding;
 }
 

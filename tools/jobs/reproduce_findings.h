@@ -40,6 +40,7 @@ struct SceneFinding {
   const PointResult *map_without = nullptr, *map_with = nullptr;
   std::vector<double> passes;  ///< speed-ups of planned_passes() over one pass
   double het_beside_passes = 0;
+  const WholeFrame* frame = nullptr;  ///< null where there is none
 };
 
 /// Mean gains at a setting.

@@ -279,6 +279,36 @@ void simulate_points(const ReproduceJob& job, const std::vector<bool>& is_done, 
   if (!tasks.empty()) run_tasks(tasks, false, job.processes, {"", 0, 0, 0}, progress, finished);
 }
 
+void simulate_whole_frames(const ReproduceJob& job, ReproduceResult& result, ProgressLine& progress) {
+  const ReproducePlan& plan = result.plan;
+  std::map<std::string, WholeFrame> done;
+  for (const nlohmann::json& record : result.journal->records()) {
+    try {
+      if (record.contains("whole frame")) done[record.at("whole frame")] = record.at("of").get<WholeFrame>();
+    } catch (const nlohmann::json::exception&) {
+      continue;  // damaged: it is simulated again
+    }
+  }
+  PointFrames frames(job, plan);
+  result.frames.resize(plan.scenes.size());
+  for (const std::size_t scene : plan.scenes_of(PlannedScene::Role::six)) {
+    const std::string& name = plan.scenes[scene].name;
+    auto found = done.find(name);
+    if (found == done.end()) {
+      progress.show(name + " in software");
+      PointKey key;
+      key.scene = scene;
+      const std::shared_ptr<const Frame> frame = frames.frame(key, job.options.base);
+      const LoadedFrame& loaded = frames.loaded(key);
+      const auto gaussians = loaded.preprocessed_here ? std::optional(loaded.summary.gaussians_total) : std::nullopt;
+      found = done.emplace(name, simulate_whole_frame(job.options.base, *frame, gaussians)).first;
+      progress.erase();
+      result.journal->append({{"whole frame", name}, {"of", found->second}});
+    }
+    result.frames[scene] = found->second;
+  }
+}
+
 /// After the points: they fork as well, and show their own progress.
 void run_microbenches(const ReproduceJob& job, ReproduceResult& result) {
   std::map<std::string, MicrobenchResult> done;
@@ -342,6 +372,7 @@ ReproduceResult simulate_reproduction(const ReproduceJob& job, ProgressLine& pro
   const auto start = SteadyClock::now();
   simulate_points(job, is_done, result, progress);
   run_microbenches(job, result);
+  simulate_whole_frames(job, result, progress);
   result.seconds = std::chrono::duration<double>(SteadyClock::now() - start).count();
   if (job.output) create_output_folder(*job.output, "--output");
   return result;

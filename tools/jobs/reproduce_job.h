@@ -19,6 +19,7 @@
 #include "jobs/journal.h"
 #include "jobs/microbench_job.h"
 #include "jobs/reproduce_plan.h"
+#include "jobs/whole_frame.h"
 
 namespace vrpipe::tools {
 
@@ -50,12 +51,13 @@ struct PointResult {
 
 struct ReproduceResult {
   ReproducePlan plan;
-  std::vector<PointResult> points;             ///< of each point of the plan
-  std::vector<MicrobenchResult> microbenches;  ///< in the order of microbench_names(), without curves
+  std::vector<PointResult> points;                ///< of each point of the plan
+  std::vector<std::optional<WholeFrame>> frames;  ///< of each scene of the plan; of the six alone
+  std::vector<MicrobenchResult> microbenches;     ///< in the order of microbench_names(), without curves
   Provenance provenance;
   std::size_t done_before = 0;  ///< of the points, in the journal
   double seconds = 0;           ///< wall time of all simulations of this run together
-  double cpu_seconds = 0;       ///< and their processor time, microbenchmarks left out
+  double cpu_seconds = 0;       ///< and their processor time, whole frames and microbenchmarks left out
   unsigned processes = 1;
   std::shared_ptr<Journal> journal;  ///< to be finished when the results are safe
 

@@ -33,6 +33,36 @@ bool is_bound_by_rop(const SceneFinding& scene) {
          (bottleneck->unit.find("crop") != std::string::npos || bottleneck->unit.find("prop") != std::string::npos);
 }
 
+/// Of a whole frame, by what is done before the draw.
+enum class Preparation : std::uint8_t { measured, papers };
+
+/// Milliseconds; NaN where they are unknown.
+struct FrameTimes {
+  double software = no_number, hardware = no_number, het_qm = no_number;
+  double before_lists = no_number, before_draw = no_number;  ///< of which come first, lists included
+  double draw = no_number;                                   ///< the baseline's
+
+  FrameTimes(const SceneFinding& scene, Preparation by) {
+    if (scene.frame == nullptr || !scene.runs[0]->run.cycles) return;
+    const WholeFrame& frame = *scene.frame;
+    const WholeFrame::Preparation& prepared = by == Preparation::measured ? frame.measured : frame.papers;
+    draw = scene.runs[0]->run.milliseconds;
+    software = frame.software(prepared);
+    hardware = prepared.hardware() + draw;
+    het_qm = prepared.hardware() + scene.runs[3]->run.milliseconds;
+    before_lists = software - frame.render;
+    before_draw = prepared.hardware();
+  }
+};
+
+FrameTimes measured(const SceneFinding& scene) { return {scene, Preparation::measured}; }
+FrameTimes papers(const SceneFinding& scene) { return {scene, Preparation::papers}; }
+double frames_a_second(double milliseconds) { return 1e3 / milliseconds; }
+
+double of_frame(const SceneFinding& scene, double (*of)(const WholeFrame&)) {
+  return scene.frame == nullptr ? no_number : of(*scene.frame);
+}
+
 /// A quantity's name behind what is taken of it over the scenes.
 std::pair<std::string, const Quantity*> parts_of(const std::string& measure) {
   const std::size_t space = measure.find(' ');
@@ -79,7 +109,6 @@ const std::vector<Quantity>& quantities() {
       {"utilisation of sm", [](Of of) { return utilization_of(of, "sm"); }, true},
       {"utilisation of crop", [](Of of) { return utilization_of(of, "crop"); }, true},
       {"ROP bounds the baseline", [](Of of) { return is_bound_by_rop(of) ? 1.0 : 0.0; }, true},
-      {"milliseconds of the baseline's draw", [](Of of) { return of.runs[0]->run.milliseconds; }, true},
       {"energy of baseline over het+qm", [](Of of) { return energy_of(of, &Range::nominal); }, false},
       {"low energy of baseline over het+qm", [](Of of) { return energy_of(of, &Range::low); }, false},
       {"high energy of baseline over het+qm", [](Of of) { return energy_of(of, &Range::high); }, false},
@@ -88,6 +117,41 @@ const std::vector<Quantity>& quantities() {
        [](Of of) { return of.ratio_distribution ? of.ratio_distribution->maximum : no_number; }, false},
       {"best speed-up of passes", [](Of of) { return *std::max_element(of.passes.begin(), of.passes.end()); }, false},
       {"speed-up of het beside passes", [](Of of) { return of.het_beside_passes; }, false},
+      {"frame in software over het+qm", [](Of of) { return measured(of).software / measured(of).het_qm; }, false},
+      {"frame in software over het+qm, prepared as in the paper",
+       [](Of of) { return papers(of).software / papers(of).het_qm; }, false},
+      {"frame by hardware over het+qm", [](Of of) { return measured(of).hardware / measured(of).het_qm; }, false},
+      {"frame by hardware over het+qm, prepared as in the paper",
+       [](Of of) { return papers(of).hardware / papers(of).het_qm; }, false},
+      {"percent that the draw is of a frame by hardware",
+       [](Of of) { return 100 * measured(of).draw / measured(of).hardware; }, false},
+      {"frames a second by hardware", [](Of of) { return frames_a_second(measured(of).hardware); }, false},
+      {"frames a second by hardware, prepared as in the paper",
+       [](Of of) { return frames_a_second(papers(of).hardware); }, false},
+      {"milliseconds of a frame in software", [](Of of) { return measured(of).software; }, false},
+      {"milliseconds of a frame by hardware", [](Of of) { return measured(of).hardware; }, false},
+      {"milliseconds of a frame by het+qm", [](Of of) { return measured(of).het_qm; }, false},
+      {"milliseconds of a frame by GSCore",
+       [](Of of) { return of_frame(of, [](const WholeFrame& frame) { return frame.accelerator; }); }, false},
+      {"milliseconds before rendering in software", [](Of of) { return measured(of).before_lists; }, false},
+      {"milliseconds before the draw by hardware", [](Of of) { return measured(of).before_draw; }, false},
+      {"percent of lanes that blend in software",
+       [](Of of) {
+         return of_frame(of, [](const WholeFrame& frame) {
+           return 100 * static_cast<double>(frame.fragments_blended) / static_cast<double>(frame.lanes);
+         });
+       },
+       false},
+      {"speed-up of termination in software",
+       [](Of of) { return of_frame(of, [](const WholeFrame& frame) { return frame.endless_render / frame.render; }); },
+       false},
+      {"fall of fragments by termination in software",
+       [](Of of) {
+         return of_frame(of, [](const WholeFrame& frame) {
+           return static_cast<double>(frame.endless_fragments_blended) / static_cast<double>(frame.fragments_blended);
+         });
+       },
+       false},
       {"thousands of Gaussians in view", [](Of of) { return 1e-3 * double(of.runs[0]->gaussians_visible); }, false},
       {"millions of Gaussians", [](Of of) { return 1e-6 * double(of.runs[0]->gaussians_total); }, false},
       {"KB of the TGC", [](Of of) { return double(storage_of(of).tgc_bytes) / 1024; }, false},

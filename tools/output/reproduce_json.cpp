@@ -60,6 +60,23 @@ Json map_json(const PointResult& point) {
   return {{"fragments", point.map->sum}, {"largest", point.map->largest}};
 }
 
+Json preparation_json(const WholeFrame::Preparation& by) {
+  return {{"software", by.software}, {"projection", by.projection}, {"sort", by.sort}};
+}
+
+Json frame_json(const WholeFrame& frame) {
+  return {{"milliseconds",
+           {{"preparation",
+             {{"published", preparation_json(frame.measured)}, {"papers-orin", preparation_json(frame.papers)}}},
+            {"lists", frame.lists},
+            {"render", frame.render},
+            {"render_without_termination", frame.endless_render},
+            {"accelerator", frame.accelerator}}},
+          {"lanes", frame.lanes},
+          {"fragments_blended", frame.fragments_blended},
+          {"fragments_blended_without_termination", frame.endless_fragments_blended}};
+}
+
 Json finding_json(const Reproduction& of, const SceneFinding& scene) {
   const PlannedScene& planned = of.result.plan.scenes[scene.scene];
   const Gains& gains = scene.gains;
@@ -89,6 +106,7 @@ Json finding_json(const Reproduction& of, const SceneFinding& scene) {
         {{"early_termination_ratios", std::move(ratios)},
          {"fragments_per_pixel", {{"without", map_json(*scene.map_without)}, {"with", map_json(*scene.map_with)}}},
          {"passes", std::move(passes)},
+         {"whole_frame", scene.frame == nullptr ? Json() : frame_json(*scene.frame)},
          {"het_beside_passes", finite_json(scene.het_beside_passes)}});
   }
   return json;

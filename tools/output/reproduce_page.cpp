@@ -189,6 +189,7 @@ std::string reproduction_page(const Reproduction& of) {
   text += section(maps_table(of), maps_html(of));
   text += section(ratios_table(of), ratios_plot(of));
   text += section(passes_table(of), "");
+  text += section(frames_table(of), "");
   text += section(large_table(of), "");
   text += section(cost_table(of), "");
   text += section(microbench_table(of), "");

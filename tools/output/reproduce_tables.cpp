@@ -348,6 +348,42 @@ ReportTable passes_table(const Reproduction& of) {
   return table;
 }
 
+ReportTable frames_table(const Reproduction& of) {
+  ReportTable table;
+  table.title = "Whole frames";
+  table.heading = {"scene, ms",
+                   "software: project",
+                   "lists",
+                   "render",
+                   "without termination",
+                   "lanes that blend, %",
+                   "hardware: project",
+                   "sort",
+                   "draw",
+                   "HET+QM's draw",
+                   "GSCore",
+                   "software / hardware",
+                   "hardware / HET+QM"};
+  const auto ms = [](double value) { return number(value, "{:.2f}"); };
+  for (const SceneFinding& scene : of.findings.scenes) {
+    if (scene.frame == nullptr) return {};
+    const WholeFrame& frame = *scene.frame;
+    const WholeFrame::Preparation& by = frame.measured;
+    const double draw = scene.runs[0]->run.milliseconds, het_qm = scene.runs[3]->run.milliseconds;
+    const double hardware = by.hardware() + draw;
+    table.rows.push_back(
+        {scene_label(of, scene), ms(by.software), ms(frame.lists), ms(frame.render), ms(frame.endless_render),
+         number(100 * static_cast<double>(frame.fragments_blended) / static_cast<double>(frame.lanes), "{:.1f}"),
+         ms(by.projection), ms(by.sort), ms(draw), ms(het_qm), ms(frame.accelerator),
+         times(frame.software(by) / hardware), times(hardware / (by.hardware() + het_qm))});
+  }
+  table.note =
+      "Simulated milliseconds, kernels at lt (docs/software.md); preparation at prices that were measured on a GH100. "
+      "GSCore has a "
+      "clock and a memory of its own (docs/accelerator.md).";
+  return table;
+}
+
 ReportTable large_table(const Reproduction& of) {
   ReportTable table;
   table.title = "Large scenes";
@@ -488,8 +524,8 @@ ReportTable efficiency_table(const Reproduction& of) {
 std::vector<ReportTable> all_tables(const Reproduction& of) {
   std::vector<ReportTable> tables;
   for (const auto make : {scenes_table, front_ends_table, blended_table, utilization_table, maps_table, ratios_table,
-                          passes_table, large_table, cost_table, microbench_table, sensitivity_table, checks_table,
-                          fragments_table, efficiency_table}) {
+                          passes_table, frames_table, large_table, cost_table, microbench_table, sensitivity_table,
+                          checks_table, fragments_table, efficiency_table}) {
     ReportTable table = make(of);
     if (!table.rows.empty()) tables.push_back(std::move(table));  // a quick look leaves some out
   }

@@ -42,6 +42,7 @@ ReportTable utilization_table(const Reproduction& of);
 ReportTable ratios_table(const Reproduction& of);
 ReportTable maps_table(const Reproduction& of);
 ReportTable passes_table(const Reproduction& of);
+ReportTable frames_table(const Reproduction& of);
 ReportTable large_table(const Reproduction& of);
 ReportTable cost_table(const Reproduction& of);
 ReportTable microbench_table(const Reproduction& of);
