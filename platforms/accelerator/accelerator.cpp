@@ -105,7 +105,9 @@ AcceleratorResult simulate_accelerator(const RunRequest& request, const Frame& f
       longest = *stage->cycles;
       result.bound_by = stage->name + ": " + stage->bound_by;
     }
-    if (whole_cycles(flow.memory_time(bytes)) > longest) result.bound_by = "memory";
+    const std::uint64_t moving = whole_cycles(flow.memory_time(bytes));
+    if (moving > longest) result.bound_by = "memory";
+    result.interval_cycles = std::max(longest, moving);
   }
   result.host_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 

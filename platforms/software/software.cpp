@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -29,6 +30,8 @@ namespace {
 constexpr const char* preparation_name = "preparation";
 constexpr const char* binning_name = "binning";
 constexpr const char* render_name = "render";
+constexpr const char* sm_part = "sm";
+constexpr const char* memory_part = "memory";
 
 /// The parts of a GPU that kernels take.
 class SoftwareMachine {
@@ -62,7 +65,7 @@ class SoftwareMachine {
   KernelReport report(const KernelWork& work) const {
     constexpr double issue_of_an_sm = 4;  // as KernelWork has it
     const double sm_cycles = work.sm_cycles * issue_of_an_sm / array_.instructions_per_cycle();
-    return report(work.name, work.items, work.bytes, {{"sm", sm_cycles}, {"memory", memory_cycles(work.bytes)}},
+    return report(work.name, work.items, work.bytes, {{sm_part, sm_cycles}, {memory_part, memory_cycles(work.bytes)}},
                   work.launch_microseconds);
   }
   /// The longest of what goes side by side, and launching.
@@ -79,6 +82,10 @@ class SoftwareMachine {
     const double launch = cycles_of(launch_microseconds);
     report.cycles = static_cast<std::uint64_t>(std::ceil(std::max(longest->second, at_least) + launch));
     report.bound_by = longest->second < launch ? "launch" : longest->first;
+    for (const auto& [part, cycles] : parts) {
+      if (part == std::string_view(sm_part)) report.sm_cycles = static_cast<std::uint64_t>(std::ceil(cycles));
+      if (part == std::string_view(memory_part)) report.memory_cycles = static_cast<std::uint64_t>(std::ceil(cycles));
+    }
     return report;
   }
 
@@ -226,9 +233,9 @@ SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
   const SmArray::Least least = array.least(blocks);
   const std::uint64_t bytes = render.call("bytes", [&] { return tiles_by->bytes(); });
   result.render = machine.report("render", lists.tiles(), bytes,
-                                 {{"sm", least.issue},
+                                 {{sm_part, least.issue},
                                   {"longest tile", least.longest_block},
-                                  {"memory", machine.memory_cycles(bytes)}},
+                                  {memory_part, machine.memory_cycles(bytes)}},
                                  timing.launch_microseconds, time_of(blocks, array, request.fidelity));
 
   if (request.fidelity != Fidelity::functional) {

@@ -56,6 +56,32 @@ TEST_F(Frames, AreTimedOnEveryPath) {
   }
 }
 
+TEST_F(Frames, InFlightTakeTheLongestOfWhatTheyShare) {
+  const std::vector<std::string> small{"--size",     "64x48", "--fovy", "10",
+                                       "--fidelity", "lt",    "--set",  "preprocess.sh_degree=0"};
+  const auto paths = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), small.begin(), small.end());
+    more.insert(more.begin(), "frames");
+    return by_path(json_of(more));
+  };
+  for (const auto& [name, path] : paths({})) {
+    const json& milliseconds = path["milliseconds"];
+    EXPECT_GT(milliseconds["interval"], 0) << name;
+    EXPECT_LE(milliseconds["interval"], milliseconds["frame"]) << name;
+  }
+  // Preparation as slow as can be is all of it: the draw's shaders add what they take of the SM array, which is less than the draw.
+  const std::vector<std::string> slow{"--set", "preparation.record_cycles=10000", "--set",
+                                      "preparation.launch_microseconds=0"};
+  const json prepared = paths(slow)["hardware"]["milliseconds"];
+  EXPECT_GT(prepared["interval"], prepared["preprocess"]);
+  EXPECT_LT(prepared["interval"], prepared["frame"]);
+  // And one that is free leaves the draw.
+  const json drawn = paths({"--set", "preparation.record_cycles=0", "--set", "preparation.depth_sort_cycles=0", "--set",
+                            "preparation.visible_bytes=0", "--set", "preparation.culled_bytes=0", "--set",
+                            "preparation.depth_sort_bytes=0"})["hardware"]["milliseconds"];
+  EXPECT_EQ(drawn["interval"], drawn["raster"]);
+}
+
 TEST_F(Frames, DrawsAreThoseOfCompare) {
   const json result = frames({"--fidelity", "lt", "--platform", "mobile"});
   const json compared = json_of({"compare", "--scene", "tiny.spl", "--fidelity", "lt", "--platform", "mobile"});
@@ -102,7 +128,7 @@ TEST_F(Frames, WithoutTimeThereAreCountsAlone) {
   const json result = frames({"--fidelity", "functional"});
   const json timed = frames({"--fidelity", "lt"});
   for (const json& path : result["frames"]) {
-    for (const char* part : {"preprocess", "sort", "raster", "frame"})
+    for (const char* part : {"preprocess", "sort", "raster", "frame", "interval"})
       EXPECT_TRUE(path["milliseconds"][part].is_null());
     EXPECT_TRUE(path["bound_by"].is_null());
     EXPECT_TRUE(path["expected_error_percent"].is_null());
@@ -227,6 +253,37 @@ TEST_F(Frames, TheTableHasEveryPath) {
   EXPECT_EQ(json::parse(read_file(folder() / "frames.json"))["schema"], "vrpipe.frames/1");
 }
 
+TEST_F(Frames, APageHasThePapersFiguresOfThisScene) {
+  const Finished finished =
+      vrpipe({"frames", "--scene", "tiny.spl", "--fidelity", "lt", "--html", "frames.html", "--json", "frames.json"});
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  EXPECT_NE(finished.out.find("page: frames.html"), std::string::npos) << finished.out;
+  const std::string page = read_file(folder() / "frames.html");
+  for (const char* part : {"Where a frame's time goes", "over software", "draw alone", "pruned", "fragments blended",
+                           "accelerator (gscore)", "vrpipe frames --scene tiny.spl"}) {
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+  }
+  const auto count = [&](const std::string& what) {
+    std::size_t found = 0;
+    for (std::size_t at = page.find(what); at != std::string::npos; at = page.find(what, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("<img "), 5U) << "a picture of each path";
+  EXPECT_EQ(count("<svg"), 5U);
+  EXPECT_EQ(count("http://") + count("https://"), count("http://www.w3.org/2000/svg")) << "it needs no network";
+
+  // What termination saves in software is measured for it, by the kernel that has none.
+  const json result = json::parse(read_file(folder() / "frames.json"));
+  const json with = by_path(result)["software"], without = result["without_termination"];
+  EXPECT_EQ(without["name"], "endless");
+  EXPECT_GE(without["counts"]["lanes_blending"], with["counts"]["lanes_blending"]);
+  EXPECT_EQ(without["counts"]["lanes_stopping"], 0);
+  EXPECT_TRUE(frames({"--fidelity", "lt"})["without_termination"].is_null());
+  const Finished untimed = vrpipe({"frames", "--scene", "tiny.spl", "--fidelity", "functional", "--html", "f.html"});
+  EXPECT_EQ(untimed.code, 0) << untimed.err;
+  EXPECT_NE(read_file(folder() / "f.html").find("nothing takes time"), std::string::npos);
+}
+
 TEST_F(Frames, MistakesAreToldInALine) {
   refused({"frames", "--scene", "none.ply"}, {"none.ply"});
   refused({"frames", "--scene", "tiny.spl", "--set", "render.issue_rat=1"}, {"render.issue_rate"});
@@ -251,7 +308,8 @@ TEST_F(Frames, EveryKeyOfTheResultIsDocumented) {
   std::set<std::string> known;
   for (const std::string& key : documented(page, "Keys of a path")) known.insert(key);
   json paths = json::object();
-  paths["frames"] = frames({"--fidelity", "lt"})["frames"];
+  const json result = frames({"--fidelity", "lt"});
+  for (const char* key : {"frames", "without_termination"}) paths[key] = result[key];
   expect_documented({paths}, known);
 }
 

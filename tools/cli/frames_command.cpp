@@ -15,6 +15,7 @@
 #include "host/terminal.h"
 #include "jobs/frames_job.h"
 #include "output/frames_json.h"
+#include "output/frames_page.h"
 #include "output/frames_report.h"
 #include "output/json_text.h"
 
@@ -42,7 +43,7 @@ class FramesCommand : public Command {
         "units, a clock and a memory of its own; --unit accelerator=NAME takes another: gscore, gcc, flicker.\n"
         "\n"
         "Examples:\n"
-        "  vrpipe frames --fidelity lt\n"
+        "  vrpipe frames --fidelity lt --html frames.html\n"
         "  vrpipe frames --scene draw.spl --platform gh100-gpc --set sm.cores=8\n"
         "  vrpipe frames --set binning.lists=three_sigma --unit render=endless --json -\n"
         "  vrpipe frames --fidelity lt --unit accelerator=gcc --set accelerator.volume_units=8");
@@ -65,6 +66,7 @@ class FramesCommand : public Command {
     {
       const StdoutToStderr redirected;
       text = frames_report(result, stdout_style());
+      if (job.html) files.write(*job.html, frames_page(result), "--html");
       if (job.json) {
         const std::string json = json_text(frames_json(result));
         if (*job.json != "-") {
@@ -77,6 +79,7 @@ class FramesCommand : public Command {
     std::cout << text;
     if (job.json && *job.json == "-") return files.check();
     if (files.has("--output")) std::cout << "images: " << printable(job.output->string()) << '\n';
+    if (files.has("--html")) std::cout << "page: " << printable(job.html->string()) << '\n';
     if (files.has("--json")) std::cout << "result: " << printable(*job.json) << '\n';
     files.check();
   }

@@ -242,6 +242,10 @@ void SimulationArguments::declare_whole_frames(Arguments& arguments) {
   arguments.find("--output")->help =
       "writes SCENE-PATH.png (8 bit, over the background) and .exr (RGBA float,\n"
       "premultiplied, no background) there; created if missing";
+  declare_page(arguments);
+  arguments.find(html_option)->help =
+      "writes a page: the paper's figures of whole frames, of this scene, and\n"
+      "pictures; it needs no network";
   declare_result_json(arguments, json_);
   declare_jobs(arguments, jobs_);
 }

@@ -13,6 +13,7 @@
 #include "image/images.h"
 #include "jobs/loaded_frame.h"
 #include "jobs/microbench_job.h"
+#include "jobs/page_material.h"
 #include "jobs/processes.h"
 
 namespace vrpipe::tools {
@@ -90,6 +91,7 @@ class PathMaker {
     path.sort = sum(sorting);
     path.raster = milliseconds(result.render);
     path.frame = sum({path.preprocess, path.sort, path.raster});
+    if (path.frame) path.interval = longest_of_shared(path, 0, 0);
     path.bound_by = longest(parts);
     const bool is_as_measured = result.request.platform->name == measured_platform &&
                                 result.request.fidelity >= Fidelity::lt && result.as_shipped;
@@ -116,6 +118,10 @@ class PathMaker {
     path.sort = milliseconds(prepared.sort);
     if (run.cycles) path.raster = run.milliseconds;
     path.frame = sum({path.preprocess, path.sort, path.raster});
+    if (path.raster) {
+      path.interval = std::max(*path.raster, longest_of_shared(path, *path.raster * utilization_of(run, "sm"),
+                                                               *path.raster * utilization_of(run, "dram")));
+    }
     parts.push_back({"draw", path.raster, run.bottleneck ? run.bottleneck->unit : "nothing"});
     path.bound_by = longest(parts);
     path.counts = run.counts.named();
@@ -138,6 +144,8 @@ class PathMaker {
     path.sort = add(result.sort);
     path.raster = add(result.raster);
     if (result.cycles) path.frame = static_cast<double>(*result.cycles) / of_its_clock.cycles_per_ms_;
+    if (result.interval_cycles)
+      path.interval = static_cast<double>(*result.interval_cycles) / of_its_clock.cycles_per_ms_;
     path.bound_by = result.bound_by;
     add_counters(result.statistics, path);
     path.implementations = {{"accelerator", result.name}};
@@ -163,6 +171,21 @@ class PathMaker {
   }
   std::optional<double> milliseconds(const KernelReport& kernel) const {
     return kernel.cycles ? std::optional(static_cast<double>(*kernel.cycles) / cycles_per_ms_) : std::nullopt;
+  }
+  static double utilization_of(const RunResult& run, const char* slot) {
+    for (const auto& [name, share] : run.utilization) {
+      if (name == slot) return share;
+    }
+    return 0;
+  }
+  /// Milliseconds of the SM array or of the memory, whichever a frame takes longer, with what its draw takes of them.
+  double longest_of_shared(const FramePath& path, double sm_of_draw, double memory_of_draw) const {
+    double sm = sm_of_draw, memory = memory_of_draw;
+    for (const KernelReport& kernel : path.kernels) {
+      sm += static_cast<double>(kernel.sm_cycles) / cycles_per_ms_;
+      memory += static_cast<double>(kernel.memory_cycles) / cycles_per_ms_;
+    }
+    return std::max(sm, memory);
   }
   /// Where the platform has one.
   static void add_dram_bytes(const RunResult& run, FramePath& path) {
@@ -221,7 +244,7 @@ FramesResult perform_frames(const SimulationJob& job) {
   };
   if (job.output) create_output_folder(*job.output, "--output");
   std::vector<Simulated> simulated =
-      simulate_in_processes(requests, frame_of, job.output.has_value(), job.processes, progress);
+      simulate_in_processes(requests, frame_of, job.output || job.html, job.processes, progress);
 
   const PathMaker make(requests.front().platform->frequency_mhz);
   RunRequest request = with_kernels(requests.front(), job);
@@ -230,6 +253,11 @@ FramesResult perform_frames(const SimulationJob& job) {
   progress.show("rendering in software");
   const SoftwareResult software = simulate_software(request, *frame, gaussians);
   result.paths.push_back(make.of_software(software));
+  if (job.html && software.implementations.back().second != "endless") {
+    RunRequest endless = request;
+    endless.units.push_back({"render", "endless"});
+    result.without_termination = make.of_software(simulate_software(endless, *frame, gaussians));
+  }
   const HardwarePreparation prepared = prepare_for_hardware(request, *frame, gaussians);
   for (std::size_t i = 0; i < draws.size(); ++i)
     result.paths.push_back(make.of_hardware(draws[i], simulated[i].result, prepared));
@@ -238,7 +266,7 @@ FramesResult perform_frames(const SimulationJob& job) {
   const AcceleratorResult accelerator = simulate_accelerator(request, *frame, gaussians);
   result.paths.push_back(PathMaker::of_accelerator(accelerator));
   progress.erase();
-  if (job.output) {
+  if (job.output || job.html) {
     progress.show("writing images");
     SharedImage in_software(result.width, result.height), by_accelerator(result.width, result.height);
     in_software.copy_from(software.framebuffer.color);
@@ -246,8 +274,11 @@ FramesResult perform_frames(const SimulationJob& job) {
     std::vector<const SharedImage*> drawn{&in_software};
     for (const Simulated& run : simulated) drawn.push_back(&*run.image);
     drawn.push_back(&by_accelerator);
-    for (std::size_t i = 0; i < result.paths.size(); ++i)
-      result.paths[i].images = write_image(job, images[i], *drawn[i], result.files);
+    for (std::size_t i = 0; i < result.paths.size(); ++i) {
+      if (job.output) result.paths[i].images = write_image(job, images[i], *drawn[i], result.files);
+      if (job.html)
+        result.pictures.push_back(picture_of(shown(*drawn[i], job.background), PageMaterial::largest_width));
+    }
     progress.erase();
   }
   for (Simulated& run : simulated) result.runs.push_back(std::move(run.result));

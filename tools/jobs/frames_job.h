@@ -9,6 +9,7 @@
 #include <vrpipe/platforms/accelerator.h>
 #include <vrpipe/platforms/software.h>
 
+#include "image/picture.h"
 #include "jobs/simulation_job.h"
 
 namespace vrpipe::tools {
@@ -23,6 +24,9 @@ struct FramePath {
   std::optional<double> sort;        ///< all that orders
   std::optional<double> raster;
   std::optional<double> frame;  ///< the sum; of an accelerator, whose stages overlap, less
+  /// Least from frame to frame where several are in flight, the next one prepared beside this one's draw: the longest that a frame
+  /// takes of what all of them share, the SM array, the memory and the graphics pipeline, or stages of an accelerator.
+  std::optional<double> interval;
   std::vector<std::pair<std::string, std::uint64_t>>
       bytes;                                     ///< to and from memory, by kernel or stage; of a draw, DRAM's
   std::string bound_by;                          ///< the longest part, and what bounds that; empty without time
@@ -45,7 +49,10 @@ struct FramesResult {
   unsigned processes = 1;
   std::vector<FramePath> paths;
   std::vector<RunResult> runs;  ///< the draws by hardware
-  ResultFiles files;            ///< written so far: images
+  /// The software path by `render=endless`, for the page; none where that is what was asked for, or no page was.
+  std::optional<FramePath> without_termination;
+  std::vector<Picture> pictures;  ///< one for each path, over the background; for the page
+  ResultFiles files;              ///< written so far: images
 };
 
 /// Draws the frame of a job in software, by hardware and by an accelerator: of its requests `baseline` is the path `hardware`,

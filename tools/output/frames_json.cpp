@@ -49,7 +49,8 @@ Json path_json(const FramePath& path, const Platform& platform) {
            {{"preprocess", optional_json(path.preprocess)},
             {"sort", optional_json(path.sort)},
             {"raster", optional_json(path.raster)},
-            {"frame", optional_json(path.frame)}}},
+            {"frame", optional_json(path.frame)},
+            {"interval", optional_json(path.interval)}}},
           {"millijoules", Json()},
           {"bytes", counts_json(path.bytes)},
           {"bound_by", path.bound_by.empty() ? Json() : Json(path.bound_by)},
@@ -78,7 +79,9 @@ Json frames_json(const FramesResult& result) {
                {"fidelity", vrpipe::name_of(request.fidelity)},
                {"format", vrpipe::name_of(request.format)},
                {"termination", vrpipe::name_of(request.termination)},
-               {"frames", std::move(frames)}});
+               {"frames", std::move(frames)},
+               {"without_termination",
+                result.without_termination ? path_json(*result.without_termination, *request.platform) : Json()}});
   return json;
 }
 

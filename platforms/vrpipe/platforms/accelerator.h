@@ -21,9 +21,10 @@ struct AcceleratorResult {
   /// Stages with what they are busy for alone, the memory theirs, in cycles of the accelerator. They overlap.
   std::optional<KernelReport> preprocess;  ///< none of a draw list
   KernelReport sort, raster;
-  std::optional<std::uint64_t> cycles;  ///< of the frame; none where the fidelity has no time
-  std::string bound_by;                 ///< the busiest stage and what bounds it, or "memory"; empty without time
-  double host_seconds = 0;              ///< wall time of the simulation alone
+  std::optional<std::uint64_t> cycles;           ///< of the frame; none where the fidelity has no time
+  std::optional<std::uint64_t> interval_cycles;  ///< least from frame to frame: of the busiest stage, or the memory
+  std::string bound_by;     ///< the busiest stage and what bounds it, or "memory"; empty without time
+  double host_seconds = 0;  ///< wall time of the simulation alone
   std::vector<StatisticReport> statistics;
   std::vector<std::pair<std::string, std::string>> parameters;  ///< accelerator.PARAMETER and value
   Framebuffer framebuffer;                                      ///< of RGBA32F

@@ -24,6 +24,8 @@ struct KernelReport {
   std::uint64_t bytes = 0;              ///< read from memory and written to it
   std::optional<std::uint64_t> cycles;  ///< of the platform; none where the fidelity has no time
   std::string bound_by;                 ///< "sm", "memory", "launch" or, of the render kernel, "longest tile"
+  /// Cycles of a whole SM array, and of all of the memory's bandwidth, that it takes; 0 without time, and of an accelerator.
+  std::uint64_t sm_cycles = 0, memory_cycles = 0;
 };
 
 struct SoftwareResult {
