@@ -31,6 +31,8 @@ const std::vector<Mode>& modes() {
       {"multi-pass, N = 8", ColorFormat::rgba16f, {}, 8},
       {"multi-pass, N = 16", ColorFormat::rgba16f, {}, 16},
       {"multi-pass, N = 32", ColorFormat::rgba16f, {}, 32},
+      {"in the shader", ColorFormat::rgba16f, {}, 1, false, false, "in-shader"},
+      {"in the shader, no lock", ColorFormat::rgba16f, {}, 1, false, false, "in-shader-no-lock"},
   };
   return all;
 }
@@ -46,7 +48,7 @@ const Mode& mode_named(const std::string& name) {
 RunResult Gpu::run(const Draw& draw, const Mode& mode) const {
   RunRequest request;
   request.platform = &platform_named("gh100-gpc");
-  request.variant = variant_named(mode.terminates ? "het" : "baseline");
+  request.variant = variant_named(mode.terminates ? "het" : mode.variant);
   request.termination = mode.terminates ? Termination::strict : Termination::paper;
   request.fidelity = fidelity_;
   request.format = mode.format;

@@ -16,6 +16,7 @@ struct Mode {
   std::uint32_t passes = 1;
   bool terminates = false;  ///< strictly, in bin order
   bool off_screen = false;
+  const char* variant = "baseline";
 };
 
 const Mode& mode_named(const std::string& name);
@@ -40,5 +41,7 @@ inline double percent(double predicted, double measured) { return 100 * (predict
 void compare_scenes(const Gpu& gpu, bool is_short);
 /// Splats of one size each, in %. `is_short`: a part of one of them.
 void compare_uniform(const Gpu& gpu, bool is_short);
+/// Blending in the shader, of equal splats and of draws. `is_short`: a part of a few.
+void compare_in_shader(const Gpu& gpu, bool is_short);
 
 }  // namespace vrpipe::measured

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "crop/crop_time.h"
+#include "crop/in_shader.h"
 
 #include <vrpipe/memory/line_visits.h>
 #include <vrpipe/model/timed_cache_port.h>
@@ -336,11 +337,15 @@ class TimedCrop : public TimedUnit {
 };
 
 [[maybe_unused]] const bool crop_timed_registered = [] {
-  register_timed_unit_maker("crop", [](const std::string& name, ClockDomain& domain,
-                                       std::unique_ptr<Behaviour> behaviour, const RenderContext& context, unsigned) {
-    return std::make_unique<TimedCrop>(name.c_str(), domain, behaviour_as<CropBehaviour>(std::move(behaviour)),
-                                       context);
-  });
+  register_timed_unit_maker("crop",
+                            [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
+                               const RenderContext& context, unsigned) -> std::unique_ptr<Unit> {
+                              if (blends_in_shader(*behaviour))
+                                return make_timed_in_shader_unit(name, domain, std::move(behaviour), context);
+                              return std::make_unique<TimedCrop>(name.c_str(), domain,
+                                                                 behaviour_as<CropBehaviour>(std::move(behaviour)),
+                                                                 context);
+                            });
   return true;
 }();
 

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "crop/crop_time.h"
+#include "crop/in_shader.h"
 #include "crop/lines_ahead.h"
 
 #include <vrpipe/kernel/ring.h>
@@ -405,6 +406,8 @@ class CropUnit : public Unit {
   register_unit_maker("crop",
                       [](const std::string& name, ClockDomain& domain, std::unique_ptr<Behaviour> behaviour,
                          const RenderContext& context, unsigned) -> std::unique_ptr<Unit> {
+                        if (blends_in_shader(*behaviour))
+                          return make_in_shader_unit(name, domain, std::move(behaviour), context);
                         auto crop = behaviour_as<CropBehaviour>(std::move(behaviour));
                         const Frame& frame = *context.frame;
                         const bool is_plain =

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "crop/crop_time.h"
+#include "crop/in_shader.h"
 
 #include <vrpipe/model/untimed.h>
 #include <vrpipe/pipeline/barrier_plan.h>
@@ -200,10 +201,15 @@ class UntimedCrop : public UntimedUnit {
 };
 
 [[maybe_unused]] const bool crop_untimed_registered = [] {
-  register_untimed_unit_maker("crop", [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
-                                         const RenderContext& context, unsigned) {
-    return std::make_unique<UntimedCrop>(name, behaviour_as<CropBehaviour>(std::move(behaviour)), context);
-  });
+  register_untimed_unit_maker("crop",
+                              [](const std::string& name, std::unique_ptr<Behaviour> behaviour,
+                                 const RenderContext& context, unsigned) -> std::unique_ptr<UntimedUnit> {
+                                if (blends_in_shader(*behaviour))
+                                  return make_untimed_in_shader_unit(name, std::move(behaviour), context);
+                                return std::make_unique<UntimedCrop>(name,
+                                                                     behaviour_as<CropBehaviour>(std::move(behaviour)),
+                                                                     context);
+                              });
   return true;
 }();
 

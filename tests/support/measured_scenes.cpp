@@ -68,4 +68,18 @@ std::vector<MeasuredScene> measured_uniform_scenes() {
   return scenes;
 }
 
+std::vector<MeasuredScene> measured_in_shader_scenes() {
+  std::vector<MeasuredScene> scenes = rows_of(data_file("measured_in_shader.csv"));
+  for (MeasuredScene& scene : scenes) {
+    if (scene.values.count("half_side") != 0) {
+      scene.draw.width = scene.draw.height = measured::equal_splats_side;
+      scene.draw.splats = measured::equal_splats(scene.values.at("half_side"), scene.values.at("half_side"), 0.02F,
+                                                 scene.count("splats"), scene.values.at("region"));
+    } else if (scene.name != "trained") {
+      scene.draw = measured_scene(scene.name).draw;
+    }
+  }
+  return scenes;
+}
+
 }  // namespace vrpipe::testing

@@ -25,4 +25,8 @@ const std::vector<std::string>& measured_scene_names();
 /// Splats of one size each, anywhere in 1024x1024 (tools/jobs/measured/equal_splats.csv: cycles a splat).
 std::vector<MeasuredScene> measured_uniform_scenes();
 
+/// What was blended in the shader (tests/data/measured_in_shader.csv: cycles): splats of one size in a square of so many
+/// pixels, and draws, of which the trained scene is not made here.
+std::vector<MeasuredScene> measured_in_shader_scenes();
+
 }  // namespace vrpipe::testing

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -31,10 +32,33 @@ class BlendOrderMonitor {
   [[gnu::always_inline]] void prefetch(std::size_t place) const { __builtin_prefetch(&next_[place], 1); }
 
  private:
+  friend class PixelOrderMonitor;
   [[noreturn]] static void fault(const ShadedWarp& warp, unsigned index, std::uint32_t next, std::uint64_t cycle);
 
   ScreenTiling grid_;
   std::vector<std::uint32_t> next_;
+};
+
+/// The same of every pixel, where the quads of a position wait for one another only if they share one.
+class PixelOrderMonitor {
+ public:
+  PixelOrderMonitor(std::uint32_t width, std::uint32_t height) : grid_(width, height), next_(grid_.quads()) {}
+
+  void blended(const ShadedWarp& warp, unsigned from, unsigned to, std::uint64_t cycle) {
+    const std::size_t tile = grid_.place(warp.tile, 0);
+    for (unsigned i = from; i < to; ++i) {
+      for (unsigned lane = 0; lane < 4; ++lane) {
+        if ((warp.live[i] >> lane & 1U) == 0) continue;
+        std::uint32_t& next = next_[tile + warp.position[i]][lane];
+        if (warp.first_primitive[i] < next) BlendOrderMonitor::fault(warp, i, next, cycle);
+        next = warp.last_primitive[i] + 1;
+      }
+    }
+  }
+
+ private:
+  ScreenTiling grid_;
+  std::vector<std::array<std::uint32_t, 4>> next_;
 };
 
 }  // namespace vrpipe

@@ -61,6 +61,8 @@ struct Variant {
 };
 /// The paper's four, then those that were added.
 const std::vector<Variant>& variants();
+/// Others that are known by name: the shader blends, with an ordered lock and without any.
+const std::vector<Variant>& more_variants();
 /// Adds one of your own, as `add_platform` does a platform. Throws UserError for a name that is taken or no name (names.h), and
 /// for a parameter that it sets twice.
 void add_variant(Variant variant);

@@ -1,0 +1,76 @@
+// Blending in the shader, with a lock and without, beside what was measured on the GPU.
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include <vrpipe/workloads/draw_list.h>
+
+#include "measured/gpu.h"
+#include "support/data.h"
+#include "support/measured_scenes.h"
+
+namespace vrpipe::measured {
+
+namespace {
+
+using testing::MeasuredScene;
+
+/// Pixels of which a channel is off by more than 1/255.
+double wrong_pixels(const ColorSurface& image, const ColorSurface& reference) {
+  double wrong = 0;
+  for (std::uint32_t y = 0; y < image.height(); ++y) {
+    for (std::uint32_t x = 0; x < image.width(); ++x) {
+      const auto is = image.pixel(x, y), ought = reference.pixel(x, y);
+      bool is_off = false;
+      for (unsigned channel = 0; channel < 4; ++channel)
+        is_off = is_off || std::fabs(is[channel] - ought[channel]) > 1.0F / 255;
+      wrong += is_off ? 1 : 0;
+    }
+  }
+  return 100 * wrong / (static_cast<double>(image.width()) * image.height());
+}
+
+void print(double measured, double predicted) {
+  std::printf("%9.2f%9.2f%+7.1f", measured, predicted, percent(predicted, measured));
+}
+
+void compare(const Gpu& gpu, const MeasuredScene& scene) {
+  const RunResult rop = gpu.run(scene.draw, mode_named("RGBA16F"));
+  const RunResult ordered = gpu.run(scene.draw, mode_named("in the shader"));
+  const RunResult racing = gpu.run(scene.draw, mode_named("in the shader, no lock"));
+  const auto cycles = [&](const char* column) { return scene.values.at(column) / 1e6; };
+  const double of_rop = Gpu::megacycles(rop), with = Gpu::megacycles(ordered), without = Gpu::megacycles(racing);
+  const auto region = scene.values.find("region");
+  std::printf("%-10s%6s", scene.name.c_str(),
+              region == scene.values.end() ? "" : std::to_string(static_cast<int>(region->second)).c_str());
+  print(cycles("ordered"), with);
+  print(cycles("ordered") / cycles("rop"), with / of_rop);
+  print(cycles("no_lock"), without);
+  print(cycles("no_lock") / cycles("rop"), without / of_rop);
+  const auto wrong = scene.values.find("wrong");
+  if (wrong != scene.values.end())
+    std::printf("%8.1f%8.1f", 100 * wrong->second, wrong_pixels(racing.framebuffer.color, ordered.framebuffer.color));
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+void compare_in_shader(const Gpu& gpu, bool is_short) {
+  std::printf("%-16s%25s%25s%25s%25s%16s\n", "millions of", "ordered lock  ", "over ROP  ", "no lock  ", "over ROP  ",
+              "wrong, %");
+  std::printf("%-16s", "cycles");
+  for (unsigned i = 0; i < 4; ++i) std::printf("%9s%9s%7s", "meas.", "pred.", "%");
+  std::printf("%8s%8s\n", "meas.", "pred.");
+  for (MeasuredScene& scene : testing::measured_in_shader_scenes()) {
+    if (is_short && scene.name != "8x8" && scene.name != "trained") continue;
+    if (scene.name == "trained") {
+      const testing::UnpackedFile file("measured_draw.spl");
+      scene.draw = read_draw_list(file.path()).draw;
+    }
+    if (is_short) scene.draw.splats.resize(scene.draw.splats.size() / 200);
+    compare(gpu, scene);
+  }
+}
+
+}  // namespace vrpipe::measured
