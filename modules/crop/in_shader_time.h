@@ -26,25 +26,25 @@ struct InShaderParameters : ParameterSet {
               "race, and updates are lost"};
   Real tile_lock_cycles{*this,
                         "tile_lock_cycles",
-                        17.5,
+                        18.2,
                         0,
                         10000,
                         "cycles",
-                        "measured on a GH100 graphics GPC, of 4 SMs: equal splats",
+                        "measured on a GH100 graphics GPC, of 4 SMs: equal splats and synthetic scenes",
                         "of taking the lock for a coverage tile: warps of a screen tile of which none has a pixel of "
                         "another"};
   Real warp_lock_cycles{*this,
                         "warp_lock_cycles",
-                        13.5,
+                        14,
                         0,
                         10000,
                         "cycles",
-                        "measured on a GH100 graphics GPC, of 4 SMs: equal splats",
+                        "measured on a GH100 graphics GPC, of 4 SMs: equal splats and synthetic scenes",
                         "beside that, of each of its warps; what is locked goes in draw order"};
   Integer hand_over_cycles{
       *this,
       "hand_over_cycles",
-      1370,
+      1300,
       0,
       1000000,
       "cycles",
@@ -63,11 +63,11 @@ struct InShaderParameters : ParameterSet {
       "cycles of any"};
   Integer blend_cycles{*this,
                        "blend_cycles",
-                       32,
+                       100,
                        0,
                        10000,
                        "cycles",
-                       "Accel-Sim, SM87_ORIN: 4 cycles an instruction; 8 that depend on each other",
+                       "Accel-Sim, SM87_ORIN: 4 cycles an instruction; 25 that depend on each other",
                        "from the loaded colour until it is stored: unpack, blend, pack"};
   Integer warps{*this,
                 "warps",
