@@ -73,7 +73,7 @@ const std::vector<Variant>& more_variants() {
   static const auto in_shader = [](const char* name, const char* lock) {
     Variant variant;
     variant.name = name;
-    variant.units = {{"crop", "in-shader"}};
+    variant.changed_units = {{"crop", "in-shader"}};
     variant.settings = {{"crop", "lock", lock},
                         {"sm", "fragment_instructions", "76"},
                         {"prop", "color_bytes_per_cycle", "256"}};

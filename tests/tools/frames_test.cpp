@@ -36,10 +36,10 @@ class Frames : public ToolTest {
 TEST_F(Frames, AreTimedOnEveryPath) {
   const json result = frames({"--fidelity", "lt"});
   EXPECT_EQ(result["schema"], "vrpipe.frames/1");
-  ASSERT_EQ(result["frames"].size(), 5U);
-  const std::vector<std::string> paths{"software", "hardware", "multi-pass", "vr-pipe", "accelerator"};
-  const std::vector<std::string> names{"published", "baseline", "4 passes", "het+qm", "gscore"};
-  for (std::size_t i = 0; i < 5; ++i) {
+  ASSERT_EQ(result["frames"].size(), 6U);
+  const std::vector<std::string> paths{"software", "hardware", "multi-pass", "in-shader", "vr-pipe", "accelerator"};
+  const std::vector<std::string> names{"published", "baseline", "4 passes", "ordered lock", "het+qm", "gscore"};
+  for (std::size_t i = 0; i < paths.size(); ++i) {
     const json& path = result["frames"][i];
     EXPECT_EQ(path["path"], paths[i]);
     EXPECT_EQ(path["name"], names[i]);
@@ -212,10 +212,10 @@ TEST_F(Frames, ImagesOfEveryPathAreAlike) {
     EXPECT_EQ(path["images"]["png"], "images/tiny-" + path["path"].get<std::string>() + ".png");
     images.push_back(tools::read_exr((folder() / path["images"]["exr"].get<std::string>()).string()));
   }
-  ASSERT_EQ(images.size(), 5U);
+  ASSERT_EQ(images.size(), 6U);
   float most = 0;
   for (std::size_t i = 0; i < std::size_t{4} * images[0].width() * images[0].height(); ++i) {
-    for (std::size_t of : {1, 2, 3, 4})
+    for (std::size_t of : {1, 2, 3, 4, 5})
       most = std::max(most, std::fabs(images[0].values()[i] - images[of].values()[i]));
   }
   EXPECT_LT(most, 0.01F) << "halves, and what ends early";
@@ -245,9 +245,9 @@ TEST_F(Frames, AConfigurationReadsBackToTheSameFrames) {
 TEST_F(Frames, TheTableHasEveryPath) {
   const Finished finished = vrpipe({"frames", "--scene", "tiny.spl", "--fidelity", "lt", "--json", "frames.json"});
   EXPECT_EQ(finished.code, 0) << finished.err;
-  for (const char* part : {"software (published)", "hardware (baseline)", "vr-pipe (het+qm)", "accelerator (gscore)",
-                           "3.95 mm2", "preprocess", "over hardware", "warp iterations",
-                           "a draw list is preprocessed already", "result: frames.json"}) {
+  for (const char* part : {"software (published)", "hardware (baseline)", "in-shader (ordered lock)",
+                           "vr-pipe (het+qm)", "accelerator (gscore)", "3.95 mm2", "preprocess", "over hardware",
+                           "warp iterations", "a draw list is preprocessed already", "result: frames.json"}) {
     EXPECT_NE(finished.out.find(part), std::string::npos) << part << " is not in\n" << finished.out;
   }
   EXPECT_EQ(json::parse(read_file(folder() / "frames.json"))["schema"], "vrpipe.frames/1");

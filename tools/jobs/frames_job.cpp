@@ -48,9 +48,7 @@ std::optional<double> sum(const std::vector<std::optional<double>>& values) {
 
 /// A draw by hardware.
 struct HardwareDraw {
-  std::string path, variant;
-  std::uint32_t passes = 1;
-  std::string name() const { return passes == 1 ? variant : fmt::format("{} passes", passes); }
+  std::string path, variant, name;
 };
 
 /// With the kernels that the job says.
@@ -105,7 +103,7 @@ class PathMaker {
   }
 
   FramePath of_hardware(const HardwareDraw& draw, const RunResult& run, const HardwarePreparation& prepared) const {
-    FramePath path = begin(draw.path, draw.name(), run.request.fidelity);
+    FramePath path = begin(draw.path, draw.name, run.request.fidelity);
     std::vector<Part> parts;
     const auto add = [&](const KernelReport& kernel) {
       parts.push_back({kernel.name, milliseconds(kernel), kernel.bound_by});
@@ -204,8 +202,10 @@ class PathMaker {
 }  // namespace
 
 FramesResult perform_frames(const SimulationJob& job) {
-  std::vector<HardwareDraw> draws{{"hardware", "baseline"}, {"vr-pipe", "het+qm"}};
-  if (job.frame.passes > 1) draws.insert(draws.begin() + 1, {"multi-pass", "baseline", job.frame.passes});
+  std::vector<HardwareDraw> draws{{"hardware", "baseline", "baseline"}};
+  if (job.frame.passes > 1) draws.push_back({"multi-pass", "baseline", fmt::format("{} passes", job.frame.passes)});
+  draws.push_back({"in-shader", "in-shader", "ordered lock"});
+  draws.push_back({"vr-pipe", "het+qm", "het+qm"});
   std::vector<std::string> images{image_name(job.frame.name, "software")};
   for (const HardwareDraw& draw : draws) images.push_back(image_name(job.frame.name, draw.path));
   images.push_back(image_name(job.frame.name, "accelerator"));
@@ -233,7 +233,8 @@ FramesResult perform_frames(const SimulationJob& job) {
   for (const HardwareDraw& draw : draws) {
     const auto found = std::find_if(job.requests.begin(), job.requests.end(),
                                     [&](const RunRequest& each) { return each.variant.name == draw.variant; });
-    requests.push_back(*found);
+    requests.push_back(found != job.requests.end() ? *found : job.requests.front());
+    requests.back().variant = variant_named(draw.variant);
     requests.back().name = draw.path;
     requests.back().reads_statistics = true;
   }

@@ -16,8 +16,8 @@ namespace vrpipe::tools {
 
 /// One way to draw a whole frame.
 struct FramePath {
-  std::string path;                          ///< software, hardware, multi-pass, vr-pipe, accelerator
-  std::string name;                          ///< of the render kernel, the variant, the passes or the accelerator
+  std::string path;  ///< software, hardware, multi-pass, in-shader, vr-pipe, accelerator
+  std::string name;  ///< of the render kernel, the variant, the passes, the lock or the accelerator
   Fidelity fidelity = Fidelity::functional;  ///< of an accelerator `lt` where `cycle` was asked for
   // Simulated milliseconds; none where the fidelity has no time.
   std::optional<double> preprocess;  ///< and of a draw list
@@ -56,7 +56,7 @@ struct FramesResult {
 };
 
 /// Draws the frame of a job in software, by hardware and by an accelerator: of its requests `baseline` is the path `hardware`,
-/// in several passes `multi-pass`, `het+qm` `vr-pipe`. Throws UserError, CommandFailure or a fault.
+/// in several passes `multi-pass`, with a shader that blends `in-shader`, `het+qm` `vr-pipe`. Throws UserError, CommandFailure or a fault.
 FramesResult perform_frames(const SimulationJob& job);
 
 }  // namespace vrpipe::tools

@@ -57,7 +57,8 @@ const Variant& add_user_variant(const VariantDefinition& definition) {
     throw UserError("bad name '" + definition.name + "' of a variant", variant_option,
                     fmt::format("it is not {}", good_name_rule), example);
   }
-  const auto& known = variants();
+  std::vector<Variant> known = variants();
+  known.insert(known.end(), more_variants().begin(), more_variants().end());
   if (std::any_of(known.begin(), known.end(), [&](const Variant& each) { return each.name == definition.name; })) {
     throw UserError("cannot define variant '" + definition.name + "'", where, "there is one of that name",
                     "choose another name");
