@@ -38,6 +38,7 @@ void InShaderBlending::pass(Mark mark) {
 
 CropBehaviour::Outcome InShaderBlending::store(DrawIndex draw, std::size_t place, LaneMask live, const QuadColor& color,
                                                const QuadColor& loaded) {
+  if (live == 0) return {0, false};  // all of it is pruned
   if (context_.fragments != nullptr) {
     context_.fragments->happened(FragmentFate::blended, surface_->grid().tile(place / positions_per_tile),
                                  static_cast<unsigned>(place % positions_per_tile), live);
@@ -59,7 +60,7 @@ CropBehaviour::Outcome InShaderBlending::store(DrawIndex draw, std::size_t place
 namespace {
 const Registrar<InShaderBlending, CropBehaviour> in_shader_registrar(
     "crop", "in-shader", "the fragment shader loads, blends and stores, with an ordered lock or none", false,
-    Trust::trusted);
+    Trust::trusted, true);
 }  // namespace
 
 }  // namespace vrpipe

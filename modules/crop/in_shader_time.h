@@ -10,6 +10,7 @@
 #include <vrpipe/kernel/rate.h>
 #include <vrpipe/memory/sectors.h>
 #include <vrpipe/model/occupancy.h>
+#include <vrpipe/pipeline/render_context.h>
 #include <vrpipe/pipeline/slots/crop.h>
 
 namespace vrpipe {
@@ -26,7 +27,7 @@ struct InShaderParameters : ParameterSet {
               "race, and updates are lost"};
   Real tile_lock_cycles{*this,
                         "tile_lock_cycles",
-                        18.2,
+                        17.3,
                         0,
                         10000,
                         "cycles",
@@ -35,7 +36,7 @@ struct InShaderParameters : ParameterSet {
                         "another"};
   Real warp_lock_cycles{*this,
                         "warp_lock_cycles",
-                        14,
+                        13.8,
                         0,
                         10000,
                         "cycles",
@@ -121,6 +122,13 @@ class InShaderTime {
   std::uint64_t warp_thousandths_;
 };
 
+/// Of each quad of a warp the pixels for which it takes the lock, and which it loads: all that it covers, if that is known.
+/// What a shader discards takes part, as the lock's unit knows nothing of that (measured: with it draws of pruned splats are met as others are).
+using PixelsOfQuads = std::array<LaneMask, quads_per_warp>;
+inline const PixelsOfQuads& pixels_of(const ShadedWarp& warp, const RenderContext& context) {
+  return context.hands_on_coverage ? warp.covered : warp.live;
+}
+
 /// Coverage tiles, one for each screen tile: warps of which none has a pixel of another take the lock together, and two
 /// quads of a warp with the same pixel take it one after the other (US 10,055,806).
 class CoverageTiles {
@@ -130,16 +138,16 @@ class CoverageTiles {
     unsigned end;  ///< its quads are those before
     bool opens;    ///< a coverage tile
   };
-  /// Quads of a warp from one on, up to the first of which a pixel is covered. `place` is the screen tile's; `is_open`:
+  /// Quads of a warp from one on, up to the first of which a pixel is taken. `place` is the screen tile's; `is_open`:
   /// whether any that were taken there before hold the lock or wait for it.
-  Part take(const ShadedWarp& warp, unsigned from, std::size_t place, bool is_open) {
+  Part take(const ShadedWarp& warp, const PixelsOfQuads& pixels, unsigned from, std::size_t place, bool is_open) {
     LaneMask* const covered = &covered_[place];
-    const bool opens = !is_open || (covered[warp.position[from]] & warp.live[from]) != 0;
+    const bool opens = !is_open || (covered[warp.position[from]] & pixels[from]) != 0;
     if (opens) std::fill_n(covered, positions_per_tile, LaneMask{0});
     unsigned end = from;
-    for (; end < warp.count && (covered[warp.position[end]] & warp.live[end]) == 0; ++end) {
+    for (; end < warp.count && (covered[warp.position[end]] & pixels[end]) == 0; ++end) {
       LaneMask& of_quad = covered[warp.position[end]];
-      of_quad = static_cast<LaneMask>(of_quad | warp.live[end]);
+      of_quad = static_cast<LaneMask>(of_quad | pixels[end]);
     }
     return {end, opens};
   }
@@ -148,10 +156,11 @@ class CoverageTiles {
   std::vector<LaneMask> covered_;
 };
 
-/// Calls `access(address, bytes)` for what quads of a warp load, and then store: naturally aligned, neighbours together.
+/// Calls `access(address, bytes)` for what quads of a warp that have any of `pixels` load or store: naturally aligned,
+/// neighbours together.
 template <class Access>
-void for_each_shader_access(const ColorSurface& surface, const ShadedWarp& warp, unsigned from, unsigned to,
-                            Access&& access) {
+void for_each_shader_access(const ColorSurface& surface, const ShadedWarp& warp, const PixelsOfQuads& pixels,
+                            unsigned from, unsigned to, Access&& access) {
   constexpr unsigned line_bytes = 128, sector_bytes = 32;
   const unsigned quad_bytes = 4 * bytes_per_pixel(surface.format());
   const unsigned unit_bytes = std::min(quad_bytes, sector_bytes);
@@ -160,6 +169,7 @@ void for_each_shader_access(const ColorSurface& surface, const ShadedWarp& warp,
   std::array<std::uint32_t, quads_per_warp> units;
   unsigned count = 0;
   for (unsigned i = from; i < to; ++i) {
+    if (pixels[i] == 0) continue;
     const std::uint64_t address = surface.address(tile + warp.position[i]);
     const std::uint64_t line = address / line_bytes;
     unsigned at = 0;

@@ -101,8 +101,9 @@ class TimedInShader : public TimedUnit {
   unsigned lock_part(const ShadedWarp& warp, unsigned from, Cycle in, Cycle& done) {
     const ScreenTiling& grid = behaviour_->surface()->grid();
     const std::size_t tile = grid.index(warp.tile), place = grid.place(warp.tile, 0);
+    const PixelsOfQuads& locked_pixels = pixels_of(warp, context_);
     const Cycle at = lock_.free_from(in);
-    const CoverageTiles::Part part = tiles_->take(warp, from, place, tile_is_open_until_[tile] > at);
+    const CoverageTiles::Part part = tiles_->take(warp, locked_pixels, from, place, tile_is_open_until_[tile] > at);
     const std::uint64_t price = time_.price_of(part.opens);
     const Cycle locked = std::max(lock_.take(at, price), at + 1);
     did(InShaderWork::lock, price, at, locked);
@@ -111,13 +112,13 @@ class TimedInShader : public TimedUnit {
     for (unsigned i = from; i < part.end; ++i) {
       const OfPixels& pixels = free_from_[place + warp.position[i]];
       for (unsigned lane = 0; lane < 4; ++lane)
-        if ((warp.live[i] >> lane & 1U) != 0) enters = std::max(enters, pixels[lane]);
+        if ((locked_pixels[i] >> lane & 1U) != 0) enters = std::max(enters, pixels[lane]);
     }
     const Cycle stored = move(warp, from, part.end, enters).second;
     for (unsigned i = from; i < part.end; ++i) {
       OfPixels& pixels = free_from_[place + warp.position[i]];
       for (unsigned lane = 0; lane < 4; ++lane)
-        if ((warp.live[i] >> lane & 1U) != 0) pixels[lane] = stored + time_.hand_over_cycles;
+        if ((locked_pixels[i] >> lane & 1U) != 0) pixels[lane] = stored + time_.hand_over_cycles;
     }
     tile_is_open_until_[tile] = std::max(tile_is_open_until_[tile], stored);
     monitor_->blended(warp, from, part.end, stored);
@@ -163,13 +164,14 @@ class TimedInShader : public TimedUnit {
     const ColorSurface& surface = *behaviour_->surface();
     Cycle there = at;
     if (context_.state(warp.draw[from]).blend) {  // all are of one state
-      for_each_shader_access(surface, warp, from, to, [&](std::uint64_t address, unsigned bytes) {
-        there = std::max(there, memory_.read(address, bytes, at));
-      });
+      for_each_shader_access(surface, warp, pixels_of(warp, context_), from, to,
+                             [&](std::uint64_t address, unsigned bytes) {
+                               there = std::max(there, memory_.read(address, bytes, at));
+                             });
     }
     const Cycle stores = there + time_.blend_cycles;
     Cycle done = stores;
-    for_each_shader_access(surface, warp, from, to, [&](std::uint64_t address, unsigned bytes) {
+    for_each_shader_access(surface, warp, warp.live, from, to, [&](std::uint64_t address, unsigned bytes) {
       done = std::max(done, memory_.write(address, bytes, stores));
     });
     return {stores, done};

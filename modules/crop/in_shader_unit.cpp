@@ -149,7 +149,8 @@ class InShaderUnit : public Unit {
       CoverageTiles::Part taken{warp.count, true};
       if (time_.locks) {
         const std::size_t tile = surface_->grid().index(warp.tile);
-        taken = tiles_->take(warp, next_quad_, tile * positions_per_tile, parts_of_tile_[tile]++ > 0);
+        taken = tiles_->take(warp, pixels_of(warp, context_), next_quad_, tile * positions_per_tile,
+                             parts_of_tile_[tile]++ > 0);
         const std::uint64_t price = time_.price_of(taken.opens);
         did(InShaderWork::lock, price, now, std::max(lock_.take(now, price), now + 1));
       }
@@ -178,19 +179,24 @@ class InShaderUnit : public Unit {
     made.waits_for_this = {};
     const ShadedWarp& warp = *warps_[index].warp;
     made.loads = context_.state(warp.draw[from]).blend;  // all are of one state
-    for_each_shader_access(*surface_, warp, from, to, [&](std::uint64_t address, unsigned bytes) {
-      made.access[made.accesses++] = {address, bytes};
-    });
+    set_accesses(made, warp, pixels_of(warp, context_));
     if (time_.locks) wait_for_pixels(warp, number, made);
     if (made.waits == 0) entering_.push_in_order({made.enters, number}, &Turn::at);
+  }
+  void set_accesses(Part& part, const ShadedWarp& warp, const PixelsOfQuads& pixels) {
+    part.accesses = part.issued = 0;
+    for_each_shader_access(*surface_, warp, pixels, part.from, part.to, [&](std::uint64_t address, unsigned bytes) {
+      part.access[part.accesses++] = {address, bytes};
+    });
   }
   /// Takes its place behind those that have its pixels.
   void wait_for_pixels(const ShadedWarp& warp, std::uint32_t number, Part& made) {
     const std::size_t place = surface_->grid().place(warp.tile, 0);
+    const PixelsOfQuads& pixels = pixels_of(warp, context_);
     unsigned pixel = 0;
     for (unsigned i = made.from; i < made.to; ++i) {
       for (unsigned lane = 0; lane < 4; ++lane, ++pixel) {
-        if ((warp.live[i] >> lane & 1U) == 0) continue;
+        if ((pixels[i] >> lane & 1U) == 0) continue;
         std::uint32_t& last = last_of_pixel_[place + warp.position[i]][lane];
         if (const std::uint32_t before = last - 1; last != 0 && is_known(before) && before != number) {
           Part& holder = part(before);
@@ -214,6 +220,10 @@ class InShaderUnit : public Unit {
       Part& next = part(number);
       if (!std::exchange(next.started, true)) {
         if (stores) store(next, now);
+        if (stores && next.accesses == 0) {
+          finish(next, now);
+          continue;
+        }
         if (!stores && !time_.locks) load(next);
         if (!stores && !next.loads) {
           next.started = false;
@@ -247,8 +257,9 @@ class InShaderUnit : public Unit {
     const std::size_t place = surface_->grid().place(warp.tile, 0);
     for (unsigned i = part.from; i < part.to; ++i) colors_[part.colors][i] = surface_->quad(place + warp.position[i]);
   }
-  void store(const Part& part, Cycle now) {
+  void store(Part& part, Cycle now) {
     const ShadedWarp& warp = *warps_[part.warp].warp;
+    set_accesses(part, warp, warp.live);
     const std::size_t place = surface_->grid().place(warp.tile, 0);
     if (time_.locks) {
       monitor_->blended(warp, part.from, part.to, now);
@@ -268,7 +279,6 @@ class InShaderUnit : public Unit {
       Part& of = part(number);
       if (--of.under_way > 0 || of.issued < of.accesses) continue;
       if ((tag & 1U) == 0) {
-        of.issued = 0;
         of.started = false;
         stores_.push_in_order({now + time_.blend_cycles, number}, &Turn::at);
       } else {

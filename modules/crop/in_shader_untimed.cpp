@@ -56,10 +56,12 @@ class UntimedInShader : public UntimedUnit {
     monitor_->blended(warp, 0, warp.count, 0);
     if (memory_.connected()) {
       const bool loads = warp.count > 0 && context_.state(warp.draw[0]).blend;  // all are of one state
-      for_each_shader_access(surface, warp, 0, warp.count, [&](std::uint64_t address, unsigned bytes) {
-        if (loads) memory_.read(address, bytes);
-        memory_.write(address, bytes);
-      });
+      if (loads) {
+        for_each_shader_access(surface, warp, pixels_of(warp, context_), 0, warp.count,
+                               [&](std::uint64_t address, unsigned bytes) { memory_.read(address, bytes); });
+      }
+      for_each_shader_access(surface, warp, warp.live, 0, warp.count,
+                             [&](std::uint64_t address, unsigned bytes) { memory_.write(address, bytes); });
     }
     CropBehaviour::Outcomes outcomes;
     behaviour_->blend_quads(warp, 0, warp.count, outcomes);

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include <fmt/format.h>
+
 #include <vrpipe/arithmetic/exp2.h>
 
 #include <vrpipe/component/error.h>
@@ -254,6 +256,7 @@ void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp
     }
   }
   out.count = static_cast<std::uint8_t>(count);
+  if (__builtin_expect(context_.hands_on_coverage, 0)) add_pruned(warp, live_of_warp, merged_quads, out);
   fragments_of_back_quads += threads_in(live_of_warp & (merged_quads * all_lanes));
   if (merged != 0 && context_.fragments != nullptr) tell_merged(warp, merged);
   // The threads of each draw, most often of one.
@@ -274,6 +277,39 @@ void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp
   }
 }
 
+[[gnu::noinline]] void SplatShader::add_pruned(const Warp& warp, std::uint32_t live, std::uint32_t merged_quads,
+                                               ShadedWarp& out) const {
+  unsigned from = out.count;
+  unsigned to = warp.count - threads_in(merged_quads);
+  out.count = static_cast<std::uint8_t>(to);
+  LaneMask of_back = 0;
+  // Those that survive move towards the end, so the last goes first.
+  for (unsigned i = warp.count; i-- > 0;) {
+    const Quad& quad = warp.quads[i];
+    if ((merged_quads >> (4 * i) & 1U) != 0) {
+      of_back = quad.coverage;
+      continue;
+    }
+    --to;
+    out.covered[to] = static_cast<LaneMask>(quad.coverage | std::exchange(of_back, LaneMask{0}));
+    if ((live >> (4 * i) & all_lanes) != 0) {
+      --from;
+      out.color[to] = out.color[from];
+      out.position[to] = out.position[from];
+      out.live[to] = out.live[from];
+      out.first_primitive[to] = out.first_primitive[from];
+      out.last_primitive[to] = out.last_primitive[from];
+      out.draw[to] = out.draw[from];
+    } else {
+      out.color[to] = QuadColor{};
+      out.position[to] = quad.position;
+      out.live[to] = 0;
+      out.first_primitive[to] = out.last_primitive[to] = primitive_order(quad);
+      out.draw[to] = quad.draw;
+    }
+  }
+}
+
 namespace {
 const SlotRegistrar sm_slot{{"sm", 90, "splat-shader", "", true, check_sm},
                             {{"cores", 4, 1024},
@@ -284,7 +320,7 @@ const SlotRegistrar sm_slot{{"sm", 90, "splat-shader", "", true, check_sm},
                              {"merge_latency_cycles", 0, 1000}}};
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
                                                     "Gaussian splatting shaders with alpha pruning and quad merging",
-                                                    false, Trust::trusted);
+                                                    false, Trust::trusted, true);
 const EffectRegistrar mesh_shading_effect{
     {"sm",
      "mesh_shading",

@@ -237,6 +237,8 @@ class SplatShader : public SmBehaviour {
   void shade_splats(const Warp& warp, WarpColors& colors);
   void shade_mesh(const Warp& warp, WarpColors& colors);
   void shade_by_alpha(const Warp& warp, WarpColors& colors);
+  /// Puts quads without a live fragment in their places among those that are handed on, and says what all cover.
+  void add_pruned(const Warp& warp, std::uint32_t live, std::uint32_t merged_quads, ShadedWarp& out) const;
   /// Merges, counts, and hands on what is live.
   void put_out(const Warp& warp, const WarpColors& colors, ShadedWarp& out);
   void tell_merged(const Warp& warp, std::uint32_t threads) const;

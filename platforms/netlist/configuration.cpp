@@ -113,9 +113,23 @@ Configuration::Configuration(const RunRequest& request, const Frame& frame)
   if (request.observers != nullptr) context.fragments = request.observers->of_fragments();
   context.placement.gpcs = netlist_.gpcs();
   context.placement.owners = owners_of_tiles(context);
-  for (unsigned& gpc = context.placement.gpc; gpc < netlist_.gpcs(); ++gpc) contexts_.push_back(context);
+  for (unsigned& gpc = context.placement.gpc; gpc < netlist_.gpcs(); ++gpc) {
+    context.hands_on_coverage = all_know_coverage("sm", gpc) && all_know_coverage("crop", gpc);
+    contexts_.push_back(context);
+  }
   decide_effects();
   check_left_out();
+}
+
+/// The units of a slot in a GPC, of which there is one.
+bool Configuration::all_know_coverage(const std::string& slot, unsigned gpc) const {
+  bool is_there = false;
+  for (const Instance* const instance : instances_of(slot)) {
+    if (instance->gpc != gpc) continue;
+    if (!units_.at(instance->path).chosen->knows_coverage) return false;
+    is_there = true;
+  }
+  return is_there;
 }
 
 /// Null where one GPC has all. The map is asked once: units look into a table.

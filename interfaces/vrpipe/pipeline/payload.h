@@ -119,7 +119,8 @@ inline constexpr std::uint16_t no_slot = 0xffff;
 
 class ShadedWarpPool;
 
-/// A warp's quads after shading, pruning and merging, as many as survive.
+/// A warp's quads after shading, pruning and merging, as many as survive; where RenderContext::hands_on_coverage, all, of
+/// which some may have no live sample.
 struct ShadedWarp {
   TileId tile;
   std::uint32_t sequence = 0;
@@ -134,6 +135,7 @@ struct ShadedWarp {
   std::array<std::uint32_t, quads_per_warp> first_primitive;
   std::array<std::uint32_t, quads_per_warp> last_primitive;
   std::array<DrawIndex, quads_per_warp> draw{};  ///< of each quad; of a merged one, that of its front
+  std::array<LaneMask, quads_per_warp> covered;  ///< where RenderContext::hands_on_coverage: before pruning
   std::array<QuadColor, quads_per_warp> color;   ///< premultiplied; (0,0,0,0) in dead lanes
 
   /// Takes samples out: of each quad those of `left` stay, and quads without any go.

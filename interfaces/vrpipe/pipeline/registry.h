@@ -55,6 +55,8 @@ struct Implementation {
   std::string description;    ///< one line
   bool pass_through = false;  ///< stands in for a unit that a variant does not have
   Trust trust = Trust::checked;
+  /// Of an SM array or a CROP: it hands on, or asks for, what warps cover (RenderContext::hands_on_coverage).
+  bool knows_coverage = false;
   std::function<std::unique_ptr<ParameterSet>()> make_parameters;
   std::function<std::unique_ptr<Behaviour>(const ParameterSet&, const RenderContext&)> make_behaviour;
 };
@@ -128,13 +130,14 @@ class Registrar {
 
  public:
   Registrar(const char* slot, const char* name, const char* description, bool pass_through = false,
-            Trust trust = Trust::checked) {
+            Trust trust = Trust::checked, bool knows_coverage = false) {
     Implementation implementation;
     implementation.slot = slot;
     implementation.name = name;
     implementation.description = description;
     implementation.pass_through = pass_through;
     implementation.trust = trust;
+    implementation.knows_coverage = knows_coverage;
     implementation.make_parameters = [] { return std::make_unique<typename Unit::Parameters>(); };
     implementation.make_behaviour = [](const ParameterSet& parameters, const RenderContext& context) {
       return std::make_unique<Unit>(dynamic_cast<const typename Unit::Parameters&>(parameters), context);

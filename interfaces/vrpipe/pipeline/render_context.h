@@ -36,6 +36,8 @@ struct RenderContext {
   std::uint64_t clock_ps = 1000;            ///< period of the units' clock, for what has a clock of its own
   std::shared_ptr<OmittedEffects> effects;  ///< null: none is left out
   FragmentObserver* fragments = nullptr;    ///< null: nobody looks
+  /// Warps come to CROP with what they cover, quads that are pruned too: a shader that blends takes a lock for these.
+  bool hands_on_coverage = false;
 
   const DrawCall& draw(DrawIndex draw) const { return frame->draw_call(draw); }
   const DrawState& state(DrawIndex draw) const { return frame->draw_call(draw).state; }

@@ -121,6 +121,7 @@ class Configuration {
   void set_link(const Setting& setting);
   bool set_absent(const Setting& setting);
   std::shared_ptr<const TileOwners> owners_of_tiles(const RenderContext& context) const;
+  bool all_know_coverage(const std::string& slot, unsigned gpc) const;
   bool concerns_chosen_unit(const Setting& setting) const;
   std::vector<const Instance*> instances_named(const std::string& name) const;
   std::vector<const Instance*> instances_of(const std::string& slot) const;
