@@ -24,6 +24,10 @@ struct KernelReport {
   std::uint64_t bytes = 0;              ///< read from memory and written to it
   std::optional<std::uint64_t> cycles;  ///< of the platform; none where the fidelity has no time
   std::string bound_by;                 ///< "sm", "memory", "launch" or, of the render kernel, "longest tile"
+  // What it spends energy on; none where a kernel does not say, in an accelerator, and cycles without time.
+  std::optional<double> warp_instructions;
+  std::optional<double> lane_instructions;  ///< of the lanes that take part in these
+  std::optional<double> core_cycles;        ///< in which a core has warps, of all cores
 };
 
 struct SoftwareResult {
