@@ -9,6 +9,7 @@
 #include <vrpipe/platforms/accelerator.h>
 #include <vrpipe/platforms/software.h>
 
+#include "jobs/frame_energy.h"
 #include "jobs/simulation_job.h"
 
 namespace vrpipe::tools {
@@ -23,6 +24,7 @@ struct FramePath {
   std::optional<double> sort;        ///< all that orders
   std::optional<double> raster;
   std::optional<double> frame;  ///< the sum; of an accelerator, whose stages overlap, less
+  FrameEnergy energy;
   std::vector<std::pair<std::string, std::uint64_t>>
       bytes;                                     ///< to and from memory, by kernel or stage; of a draw, DRAM's
   std::string bound_by;                          ///< the longest part, and what bounds that; empty without time
@@ -44,8 +46,10 @@ struct FramesResult {
   std::uint32_t width = 0, height = 0;
   unsigned processes = 1;
   std::vector<FramePath> paths;
-  std::vector<RunResult> runs;  ///< the draws by hardware
-  ResultFiles files;            ///< written so far: images
+  std::string process;            ///< for which the GPU's energies hold
+  std::string energy_leaves_out;  ///< of the GPU's, e.g. "idle power"; empty: nothing
+  std::vector<RunResult> runs;    ///< the draws by hardware
+  ResultFiles files;              ///< written so far: images
 };
 
 /// Draws the frame of a job in software, by hardware and by an accelerator: of its requests `baseline` is the path `hardware`,

@@ -8,6 +8,7 @@
 
 #include <vrpipe/component/printable.h>
 
+#include "output/energy_report.h"
 #include "output/machines_text.h"
 #include "output/report.h"
 #include "output/text_table.h"
@@ -58,14 +59,25 @@ std::string entries_text(const FramePath& accelerator) {
   return text;
 }
 
+/// Of what millijoules are, or why there are none.
+std::string energy_notes(const FramesResult& result) {
+  const auto is_known = [](const FramePath& path) { return path.path != "accelerator" && path.energy.frame; };
+  const bool any = std::any_of(result.paths.begin(), result.paths.end(), is_known);
+  if (!any) return "mJ of the GPU are not known: without time, without its figures, or of units that do not count\n";
+  std::string text = fmt::format("mJ at {}", printable(result.process));
+  if (!result.energy_leaves_out.empty()) text += "; not in them: " + printable(result.energy_leaves_out);
+  return text + " (docs/energy.md)\n";
+}
+
 }  // namespace
 
 std::string frames_report(const FramesResult& result, const TextStyle& style) {
   std::string text = fmt::format("{}: {} splats, {}x{}\n", style.bold(printable(result.scene.name)),
                                  grouped(result.scene.gaussians_visible), result.width, result.height);
   text += machine_text(result.runs.front().request, style) + "\n";
-  TextTable table({"milliseconds", "preprocess", "sort", "raster", "frame", "over hardware", "bound by"});
-  table.left(6);
+  TextTable table({"milliseconds", "preprocess", "sort", "raster", "frame", "over hardware", "mJ", "low to high",
+                   "over hardware", "bound by"});
+  table.left(9);
   const auto hardware = std::find_if(result.paths.begin(), result.paths.end(),
                                      [](const FramePath& path) { return path.path == "hardware"; });
   for (const FramePath& path : result.paths) {
@@ -73,6 +85,9 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
     table.row({printable(fmt::format("{} ({})", path.path, path.name)), milliseconds_text(path.preprocess),
                milliseconds_text(path.sort), milliseconds_text(path.raster), milliseconds_text(path.frame),
                is_timed ? fmt::format("{:.2f}x", *path.frame / *hardware->frame) : "-",
+               path.energy.frame ? three_digits(path.energy.frame->nominal) : "-",
+               path.energy.frame ? between(*path.energy.frame) : "-",
+               path.energy.over_hardware ? fmt::format("{:.2f}x", path.energy.over_hardware->nominal) : "-",
                path.bound_by.empty() ? "-" : printable(path.bound_by)});
   }
   text += table.text(style) + "\n";
@@ -82,6 +97,7 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
     if (path.fidelity != result.runs.front().request.fidelity)
       text += fmt::format("{}: at {}, the finest that it has\n", path.path, vrpipe::name_of(path.fidelity));
   }
+  text += energy_notes(result);
   if (!result.viewpoint) text += "a draw list is preprocessed already: frames are without\n";
   for (const std::string& note : result.scene.notes) text += "note: " + printable(note) + "\n";
   return text;
