@@ -23,7 +23,8 @@ PairBinning::PairBinning(const Parameters& parameters, const RenderContext& cont
       duplicate_cycles_(parameters.duplicate_cycles),
       sort_cycles_(parameters.sort_cycles),
       range_cycles_(parameters.range_cycles),
-      launch_microseconds_(parameters.launch_microseconds) {}
+      launch_microseconds_(parameters.launch_microseconds),
+      issue_rate_(parameters.issue_rate) {}
 
 TileLists PairBinning::make_lists() {
   const Frame& frame = *context_.frame;
@@ -76,7 +77,10 @@ std::vector<KernelWork> PairBinning::kernels() const {
   while (std::size_t{1} << tile_bits < tiling_.tiles()) ++tile_bits;
   const std::uint64_t passes = (32 + tile_bits + 7) / 8;
   const auto kernel = [&](const char* name, std::uint64_t items, double cycles, std::uint64_t bytes, double launches) {
-    return KernelWork{name, items, static_cast<double>(items) * cycles, bytes, launches * launch_microseconds_};
+    const double sm_cycles = static_cast<double>(items) * cycles;
+    constexpr double schedulers = 4;
+    return KernelWork{
+        name, items, sm_cycles, bytes, launches * launch_microseconds_, schedulers * issue_rate_ * sm_cycles};
   };
   return {kernel("count", all, count_cycles_, splats * (sizeof(Splat) + 4), 1),
           kernel("scan", splats, scan_cycles_, splats * 8, 2),

@@ -33,19 +33,33 @@ PublishedPreparation::PublishedPreparation(const Parameters& parameters, const R
       visible_bytes_(parameters.visible_bytes),
       culled_bytes_(parameters.culled_bytes),
       depth_sort_bytes_(parameters.depth_sort_bytes),
-      launch_microseconds_(parameters.launch_microseconds) {}
+      launch_microseconds_(parameters.launch_microseconds),
+      visible_instructions_(parameters.visible_instructions),
+      culled_instructions_(parameters.culled_instructions),
+      depth_sort_instructions_(parameters.depth_sort_instructions) {}
 
 KernelWork PublishedPreparation::project(Path path, std::uint64_t gaussians, std::uint64_t visible) const {
   const double cycles = path == Path::software ? gaussian_cycles_ : record_cycles_;
   const std::uint64_t culled = gaussians - std::min(gaussians, visible);
-  return {"preprocess", gaussians, static_cast<double>(gaussians) * cycles,
-          visible * visible_bytes_ + culled * culled_bytes_, launch_microseconds_};
+  constexpr double threads_of_warp = 32;
+  const double instructions =
+      static_cast<double>(visible) * visible_instructions_ + static_cast<double>(culled) * culled_instructions_;
+  return {"preprocess",
+          gaussians,
+          static_cast<double>(gaussians) * cycles,
+          visible * visible_bytes_ + culled * culled_bytes_,
+          launch_microseconds_,
+          instructions / threads_of_warp};
 }
 
 KernelWork PublishedPreparation::sort_by_depth(std::uint64_t splats) const {
   constexpr double launches = 6;  // histogram, its sum, four passes
-  return {"depth sort", splats, static_cast<double>(splats) * depth_sort_cycles_, splats * depth_sort_bytes_,
-          launches * launch_microseconds_};
+  return {"depth sort",
+          splats,
+          static_cast<double>(splats) * depth_sort_cycles_,
+          splats * depth_sort_bytes_,
+          launches * launch_microseconds_,
+          static_cast<double>(splats) * depth_sort_instructions_};
 }
 
 namespace {

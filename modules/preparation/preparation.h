@@ -44,6 +44,31 @@ class PublishedPreparation : public PreparationBehaviour {
                              "measured on a GH100: what binning takes on 4, 8 and 16 SMs alike",
                              "of a grid, before and behind its work; projecting has one, sorting six"};
 
+    Real visible_instructions{*this,
+                              "visible_instructions",
+                              720,
+                              0,
+                              1e6,
+                              "instructions",
+                              "SASS of the published kernel, harmonics of degree 3",
+                              "of a thread, of projecting a Gaussian that is visible; energy alone depends on it"};
+    Real culled_instructions{*this,
+                             "culled_instructions",
+                             75,
+                             0,
+                             1e6,
+                             "instructions",
+                             "SASS of the published kernel: one that is too near",
+                             "of a thread, of looking at one that is not; energy alone depends on it"};
+    Real depth_sort_instructions{*this,
+                                 "depth_sort_instructions",
+                                 18.8,
+                                 0,
+                                 1e6,
+                                 "instructions",
+                                 "assumed: as many a cycle as in binning, measured on a GH100",
+                                 "of a warp, of sorting a splat by depth; energy alone depends on it"};
+
    protected:
     struct Price {
       double sm_cycles;
@@ -61,6 +86,7 @@ class PublishedPreparation : public PreparationBehaviour {
   const double gaussian_cycles_, record_cycles_, depth_sort_cycles_;
   const std::uint64_t visible_bytes_, culled_bytes_, depth_sort_bytes_;
   const double launch_microseconds_;
+  const double visible_instructions_, culled_instructions_, depth_sort_instructions_;
 };
 
 /// The same kernels as slow as the paper has them, whose times of them are an Orin's: 27.5 % of a frame in which the draw gains

@@ -98,10 +98,13 @@ TileKernel::Fates TileKernel::look_at(const SplatRecord& splat, WarpLanes& lanes
   return fates;
 }
 
-std::uint64_t TileKernel::count(const Fates& fates, std::uint32_t alive) {
+std::uint64_t TileKernel::count(const Fates& fates, std::uint32_t alive, std::uint64_t& lane_instructions) {
   const std::uint32_t living = count_bits(alive);
   const std::uint32_t visible = count_bits(fates.visible);
   const std::uint32_t blended = count_bits(fates.blended);
+  const std::uint32_t inside = count_bits(fates.inside & alive);
+  lane_instructions += blended * blending_ + (visible - blended) * stopping_ + (inside - visible) * pruned_ +
+                       (living - inside) * outside_;
   ++warp_iterations;
   lanes_dead += lanes_of_warp - living;
   lanes_pruned += living - visible;
@@ -130,6 +133,7 @@ void TileKernel::render_by(std::size_t tile, const std::uint32_t* splats, std::u
   std::array<std::uint32_t, warps> lived{};  // batches that a warp began alive
   out.warps = warps;
   out.instructions.assign(std::size_t{all_batches} * warps, batch_);
+  out.lane_instructions = 0;
   std::uint32_t begun = 0;  // batches of the block
   for (std::uint32_t warp = 0; warp < warps; ++warp) {
     WarpLanes lanes = begin(tile, warp);
@@ -139,7 +143,7 @@ void TileKernel::render_by(std::size_t tile, const std::uint32_t* splats, std::u
       std::uint32_t next = lived[warp]++ * batch_splats;
       const std::uint32_t end = std::min(next + batch_splats, length);
       for (; next < end && alive != 0; ++next) {
-        instructions += count(look_at<Rule>(records_[splats[next]], lanes), alive);
+        instructions += count(look_at<Rule>(records_[splats[next]], lanes), alive, out.lane_instructions);
         if constexpr (Rule != StopRule::none) alive = lanes.alive_mask();
       }
     }
@@ -147,6 +151,7 @@ void TileKernel::render_by(std::size_t tile, const std::uint32_t* splats, std::u
     if (color_ != nullptr) store(tile, warp, lanes);
   }
   out.instructions.resize(std::size_t{begun} * warps);
+  out.lane_instructions += std::uint64_t{begun} * warps * lanes_of_warp * batch_;
   batches += std::uint64_t{begun} * warps;
   for (const std::uint32_t of_warp : lived) batches_of_dead_warps += begun - of_warp;
   constexpr std::uint64_t entry_bytes = 28;  // number, centre, inverse covariance, opacity

@@ -130,7 +130,8 @@ class TileKernel : public RenderBehaviour {
   template <StopRule Rule>
   Fates look_at(const SplatRecord& splat, WarpLanes& lanes) const;
   WarpLanes begin(std::size_t tile, std::uint32_t warp) const;
-  std::uint64_t count(const Fates& fates, std::uint32_t alive);
+  /// Gives the instructions of an iteration, and adds those of its lanes.
+  std::uint64_t count(const Fates& fates, std::uint32_t alive, std::uint64_t& lane_instructions);
   void store(std::size_t tile, std::uint32_t warp, const WarpLanes& lanes);
   std::uint32_t pixel_x(std::size_t tile, std::uint32_t warp, unsigned lane) const;
   std::uint32_t pixel_y(std::size_t tile, std::uint32_t warp, unsigned lane) const;

@@ -129,6 +129,13 @@ struct ClockedCore {
   }
 };
 
+/// No block is left for a core that has none.
+template <class Core>
+bool is_empty(const Core& core) {
+  return std::all_of(core.residents.begin(), core.residents.end(),
+                     [](const ResidentBlock& each) { return each.block == nullptr; });
+}
+
 }  // namespace
 
 SmArray::SmArray(const SmBehaviour::TimingParameters& array, const RenderBehaviour::TimingParameters& kernel)
@@ -161,7 +168,7 @@ SmArray::Least SmArray::least(const std::vector<BlockWork>& blocks) const {
           static_cast<double>(longest) / warp_rate_};
 }
 
-double SmArray::fluid(const std::vector<BlockWork>& blocks) const {
+double SmArray::fluid(const std::vector<BlockWork>& blocks, double* core_cycles) const {
   std::vector<FluidCore> cores(cores_);
   std::size_t next = 0;
   const auto give = [&](FluidCore& core, double now, std::size_t place) {
@@ -170,6 +177,7 @@ double SmArray::fluid(const std::vector<BlockWork>& blocks) const {
     core.residents[place] = {&blocks[next++], 0, 0};
     core.begin_batch(now, place);
   };
+  if (core_cycles != nullptr) *core_cycles = 0;
   for (FluidCore& core : cores) {
     core.schedulers.assign(schedulers_, FluidScheduler(scheduler_rate_, warp_rate_));
     core.residents.resize(blocks_per_core_);
@@ -200,12 +208,14 @@ double SmArray::fluid(const std::vector<BlockWork>& blocks) const {
     if (++resident.batch < resident.block->batches()) {
       core->begin_batch(now, place);
     } else {
+      resident.block = nullptr;
       give(*core, now, place);
+      if (core_cycles != nullptr && is_empty(*core)) *core_cycles += now;
     }
   }
 }
 
-std::uint64_t SmArray::clocked(const std::vector<BlockWork>& blocks) const {
+std::uint64_t SmArray::clocked(const std::vector<BlockWork>& blocks, double* core_cycles) const {
   std::vector<ClockedCore> cores(cores_);
   std::size_t next_block = 0;
   const auto give = [&](ClockedCore& core, Cycle now, std::size_t place) {
@@ -223,6 +233,7 @@ std::uint64_t SmArray::clocked(const std::vector<BlockWork>& blocks) const {
   for (std::size_t place = 0; place < blocks_per_core_; ++place) {
     for (ClockedCore& core : cores) give(core, 0, place);
   }
+  if (core_cycles != nullptr) *core_cycles = 0;
   const ClockedScheduler::Rates rates{issue_thousandths_, cycles_per_instruction_, warp_interval_};
   Cycle now = 0;
   for (;;) {
@@ -242,8 +253,12 @@ std::uint64_t SmArray::clocked(const std::vector<BlockWork>& blocks) const {
         if (--resident.running > 0) continue;
         if (++resident.batch < resident.block->batches()) {
           core.begin_batch(now + 1, place);
-        } else if (!give(core, now + 1, place)) {
-          continue;
+        } else {
+          resident.block = nullptr;
+          if (!give(core, now + 1, place)) {
+            if (core_cycles != nullptr && is_empty(core)) *core_cycles += static_cast<double>(now);
+            continue;
+          }
         }
         next = now + 1;
       }

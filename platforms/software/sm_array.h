@@ -26,11 +26,12 @@ class SmArray {
 
   /// Cycles until the last block is done. Blocks are given to cores in their order: at first to each core in turn, then
   /// to the core that has room first.
-  double fluid(const std::vector<BlockWork>& blocks) const;
+  /// @param core_cycles  where told: cycles in which a core has blocks, of all cores
+  double fluid(const std::vector<BlockWork>& blocks, double* core_cycles = nullptr) const;
 
   /// The same with every instruction in a cycle of its own: of the warps of a scheduler that may issue, the one that has
   /// waited the longest does. A barrier takes a cycle. Instructions are rounded to whole ones for each warp and batch.
-  std::uint64_t clocked(const std::vector<BlockWork>& blocks) const;
+  std::uint64_t clocked(const std::vector<BlockWork>& blocks, double* core_cycles = nullptr) const;
 
  private:
   std::size_t cores_;

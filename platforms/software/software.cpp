@@ -65,8 +65,13 @@ class SoftwareMachine {
   KernelReport report(const KernelWork& work) const {
     constexpr double issue_of_an_sm = 4;  // as KernelWork has it
     const double sm_cycles = work.sm_cycles * issue_of_an_sm / array_.instructions_per_cycle();
-    return report(work.name, work.items, work.bytes, {{sm_part, sm_cycles}, {memory_part, memory_cycles(work.bytes)}},
-                  work.launch_microseconds);
+    const double memory = memory_cycles(work.bytes);
+    KernelReport reported = report(work.name, work.items, work.bytes, {{sm_part, sm_cycles}, {memory_part, memory}},
+                                   work.launch_microseconds);
+    reported.warp_instructions = work.warp_instructions;
+    if (work.warp_instructions) reported.lane_instructions = 32 * *work.warp_instructions;
+    if (reported.cycles) reported.core_cycles = array_.cores * std::max(sm_cycles, memory);
+    return reported;
   }
   /// The longest of what goes side by side, and launching.
   KernelReport report(const char* name, std::uint64_t items, std::uint64_t bytes,
@@ -120,7 +125,8 @@ void check_lists(const ChosenKernel& kernel, const TileLists& lists, const Frame
 const KernelWork& checked(const ChosenKernel& kernel, const KernelWork& work) {
   constexpr double most = 1e18;
   const bool can_be = work.name != nullptr && work.sm_cycles >= 0 && work.sm_cycles < most &&
-                      work.launch_microseconds >= 0 && work.launch_microseconds < most / 1e6;
+                      work.launch_microseconds >= 0 && work.launch_microseconds < most / 1e6 &&
+                      work.warp_instructions.value_or(0) >= 0 && work.warp_instructions.value_or(0) < most;
   if (!can_be) kernel.fail("a kernel without a name or with a time that cannot be");
   return work;
 }
@@ -141,14 +147,27 @@ void check_timing(const ChosenKernel& kernel, const RenderBehaviour::TimingParam
 }
 
 /// Cycles of the render kernel; 0 where what binds it is all that is known.
-double time_of(const std::vector<BlockWork>& blocks, const SmArray& array, Fidelity fidelity) {
+/// @param core_cycles  in which a core has blocks, of all cores; as it was where that is not known
+double time_of(const std::vector<BlockWork>& blocks, const SmArray& array, Fidelity fidelity, double& core_cycles) {
   switch (fidelity) {
     case Fidelity::functional:
     case Fidelity::bound: return 0;
-    case Fidelity::lt: return array.fluid(blocks);
-    case Fidelity::cycle: return static_cast<double>(array.clocked(blocks));
+    case Fidelity::lt: return array.fluid(blocks, &core_cycles);
+    case Fidelity::cycle: return static_cast<double>(array.clocked(blocks, &core_cycles));
   }
   return 0;
+}
+
+void add_instructions(const std::vector<BlockWork>& blocks, KernelReport& report) {
+  double warps = 0, lanes = 0;
+  for (const BlockWork& block : blocks) {
+    double of_block = 0;
+    for (const std::uint64_t instructions : block.instructions) of_block += static_cast<double>(instructions);
+    warps += of_block;
+    lanes += block.lane_instructions == 0 ? 32 * of_block : static_cast<double>(block.lane_instructions);
+  }
+  report.warp_instructions = warps / 1000;
+  report.lane_instructions = lanes / 1000;
 }
 
 KernelReport preprocess_by(const ChosenKernel& preparation, const SoftwareMachine& machine,
@@ -232,11 +251,15 @@ SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
   const SmArray array(machine.array(), timing);
   const SmArray::Least least = array.least(blocks);
   const std::uint64_t bytes = render.call("bytes", [&] { return tiles_by->bytes(); });
+  double core_cycles = least.issue * machine.array().cores;
+  const double time = time_of(blocks, array, request.fidelity, core_cycles);
   result.render = machine.report("render", lists.tiles(), bytes,
                                  {{sm_part, least.issue},
                                   {"longest tile", least.longest_block},
                                   {memory_part, machine.memory_cycles(bytes)}},
-                                 timing.launch_microseconds, time_of(blocks, array, request.fidelity));
+                                 timing.launch_microseconds, time);
+  add_instructions(blocks, result.render);
+  if (result.render.cycles) result.render.core_cycles = core_cycles;
 
   if (request.fidelity != Fidelity::functional) {
     result.cycles = *result.render.cycles + (result.preprocess ? *result.preprocess->cycles : 0);

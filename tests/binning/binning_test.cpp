@@ -165,6 +165,7 @@ TEST(Binning, TheSortMovesPairsOncePerDigit) {
   EXPECT_EQ(kernels[3].items, pairs);
   EXPECT_EQ(kernels[3].bytes, 152 * pairs);
   EXPECT_DOUBLE_EQ(kernels[3].sm_cycles, 9.25 * static_cast<double>(pairs));
+  EXPECT_DOUBLE_EQ(kernels[3].warp_instructions.value(), 4 * 0.71 * kernels[3].sm_cycles);
 }
 
 }  // namespace

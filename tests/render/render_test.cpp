@@ -179,6 +179,7 @@ TEST(RenderKernel, WarpsIssueForTheFarthestThatALaneGoes) {
   for (const std::uint64_t instructions : rendered.blocks.front().instructions) {
     EXPECT_EQ(instructions, 1000U * (3 * 50 + 40 + 7));
   }
+  EXPECT_EQ(rendered.blocks.front().lane_instructions, 256 * 1000U * (3 * 50 + 40 + 7));
   EXPECT_EQ(rendered.kernel->lanes_stopping.value(), 256U);
   EXPECT_EQ(rendered.kernel->lanes_blending.value(), 3 * 256U);
 }
@@ -193,6 +194,8 @@ TEST(RenderKernel, AWarpIsPrunedWhereNoLaneReachesAlpha) {
   expected[0] = 50'000;
   EXPECT_EQ(rendered.blocks.front().instructions, expected);
   EXPECT_EQ(rendered.kernel->iterations_without_blending.value(), 7U);
+  const std::uint64_t blending = rendered.kernel->lanes_blending.value();
+  EXPECT_EQ(rendered.blocks.front().lane_instructions, 1000 * (50 * blending + 30 * (256 - blending)));
 }
 
 TEST(RenderKernel, ABlockEndsWithTheBatchInWhichItsLastPixelStops) {

@@ -91,6 +91,13 @@ INSTANTIATE_TEST_SUITE_P(Of, MeasuredKernels,
                                            Lockstep{"threshold", 18.4, 130.0 / 32, 14.2, 65.4, 20.4, 63.0, 6.56}),
                          [](const auto& tested) { return std::string(tested.param.kernel); });
 
+TEST_F(MeasuredSoftware, IssuesTheInstructionsOfTheGpu) {
+  const SoftwareResult result = render("obb", "published");
+  double all = *result.render.warp_instructions;
+  for (const KernelReport& kernel : result.binning) all += *kernel.warp_instructions;
+  expect_within(all / 1e6, 269, 1);
+}
+
 TEST_F(MeasuredSoftware, TakesTheTimeOfTheGpuOnAsManySms) {
   const SoftwareResult four = render("obb", "published", "4");
   expect_within(milliseconds(*four.cycles), 9.83, 4);

@@ -56,6 +56,18 @@ TEST(SmArray, ABlockBeginsWhereOneEndsFirst) {
   EXPECT_DOUBLE_EQ(array_of(2, 1).fluid({even(50), even(20), even(10)}), 50 * interval);
 }
 
+TEST(SmArray, CoresAreActiveUntilTheirLastBlockIsDone) {
+  double core_cycles = -1;
+  array_of(2, 1).fluid({even(50), even(20), even(10)}, &core_cycles);
+  EXPECT_DOUBLE_EQ(core_cycles, (50 + 20 + 10) * interval);
+  array_of(3, 1).fluid({even(50)}, &core_cycles);
+  EXPECT_DOUBLE_EQ(core_cycles, 50 * interval) << "two have none";
+  array_of(2, 1).clocked({{1, {50'000}}, {1, {20'000}}, {1, {10'000}}}, &core_cycles);
+  EXPECT_EQ(core_cycles, 7 * 50 + 7 * (20 + 10) + 1);
+  array_of(2).fluid({}, &core_cycles);
+  EXPECT_EQ(core_cycles, 0);
+}
+
 TEST(SmArray, WhenWarpsEndTheOthersHaveTheirShare) {
   // 32 warps share 3.64; when half of them are done the others go at their own pace.
   std::vector<BlockWork> blocks{even(10), even(10), even(30), even(30)};

@@ -102,6 +102,18 @@ TEST(Software, KernelsShareTheArrayAndLaunchWhateverItIs) {
   EXPECT_EQ(on("8"), 12 * gaussians / 8 + 3 * 1980);
 }
 
+TEST(Software, CoresAreActiveButForLaunching) {
+  const RunRequest request = request_at(Fidelity::lt, {{"preparation", "launch_microseconds", "1"},
+                                                       {"preparation", "record_cycles", "12"},
+                                                       {"preparation", "visible_instructions", "640"},
+                                                       {"preparation", "culled_instructions", "64"}});
+  const KernelReport kernel = *prepare_for_hardware(request, Frame(16, 16), 1000).preprocess;
+  EXPECT_EQ(kernel.core_cycles, 12 * 1000);
+  EXPECT_EQ(*kernel.cycles, 12 * 1000 / 4 + 1980U);
+  EXPECT_EQ(kernel.warp_instructions, 64 * 1000 / 32) << "none is visible";
+  EXPECT_EQ(kernel.lane_instructions, 64 * 1000);
+}
+
 TEST(Software, ACoreOfHalfTheLanesIsHalfAnSm) {
   RunRequest request = request_at(Fidelity::lt, {{"preparation", "launch_microseconds", "0"},
                                                  {"preparation", "record_cycles", "12"},

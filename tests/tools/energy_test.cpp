@@ -220,7 +220,7 @@ Range ratio_by_trying(const EnergyAmounts& baseline, const EnergyAmounts& run, c
     double before = 0, after = 0;
     for (std::size_t i = 0; i < terms; ++i) {
       const bool is_event = i < events;
-      const Range each = is_event ? table.events[i].picojoules * 1e-12 : table.powers[i - events].watts;
+      const Range each = is_event ? table.events[i].picojoules[0] * 1e-12 : table.powers[i - events].watts;
       const double value = (high >> i & 1) != 0 ? each.high : each.low;
       before += value * (is_event ? baseline.events[i] : baseline.powers[i - events] * *baseline.seconds);
       after += value * (is_event ? run.events[i] : run.powers[i - events] * *run.seconds);
@@ -251,6 +251,130 @@ TEST(Energy, PowerFoundForAnotherPlatformIsNamed) {
   const EnergyTable table = table_of(two_events);
   EXPECT_TRUE(powers_of_other_platforms(table, platform_named("agx-orin-ideal-memory")).empty());
   EXPECT_EQ(powers_of_other_platforms(table, platform_named("desktop")), std::vector<std::string>{"leakage"});
+}
+
+/// With a power of each active core, and GPUs of another process.
+EnergyTable table_with_active_cores() {
+  std::string text = two_events;
+  const std::size_t events = text.find("[[event]]");
+  text.insert(events, R"(
+[[other_process]]
+name = "4N"
+platforms = ["gh100-gpc"]
+leaves_out = "idle power"
+[[other_process.node]]
+name = "12 nm"
+factor = { low = 0.125, nominal = 0.25, high = 0.5 }
+voltage_ratio = 1
+source = "s"
+)");
+  text.replace(text.find("\"4 * sm.quads_shaded * sm.fragment_instructions\""), 48,
+               "[\"sm.quads_shaded\", \"kernel.lane_instructions\"]");
+  text.replace(text.find("\"l2.color_bytes_written / 32\""), 29, "\"kernel.bytes / 32\", \"kernel.dram_bytes\"");
+  return table_of(text + R"(
+[[power]]
+name = "core"
+count = "sm.cores"
+while = "sm"
+watts = { low = 1, nominal = 2, high = 4 }
+platforms = ["gh100-gpc"]
+source = "s"
+meaning = "m"
+)");
+}
+
+constexpr std::uint64_t cycles_of_a_gh100_millisecond = 1'980'000;
+
+RunResult run_on_gh100(std::uint64_t milliseconds) {
+  RunResult run = run_of(0, 0, milliseconds * cycles_of_a_gh100_millisecond);
+  run.request.platform = &platform_named("gh100-gpc");
+  run.parameters = {{"sm.cores", "4"}};
+  run.units = {{"gpc0.sm", {2, 1, 1, 0, 0}, 0, {}}, {"gpc0.crop", {4, 0, 0, 0, 0}, 0, {}}};
+  return run;
+}
+
+TEST(Energy, PowerOfWhatIsActiveIsForAsLong) {
+  const EnergyTable table = table_with_active_cores();
+  RunResult run = run_on_gh100(8);
+  // 4 cores of 1, 2, 4 W for three quarters of 8 ms; what was found for the other platform is not taken.
+  const EnergyAmounts amounts = energy_amounts(run, table);
+  EXPECT_EQ(amounts.powers, (std::vector<double>{0, 3}));
+  EXPECT_TRUE(powers_of_other_platforms(table, *run.request.platform).empty());
+  expect_range(energy_report(amounts, table).constant.value(), 24, 48, 96);
+  run.units[0].cycles = {0, 4, 0, 0, 0};
+  expect_range(energy_report(energy_amounts(run, table), table).constant.value(), 0, 0, 0);
+  run.units.clear();
+  EXPECT_EQ(energy_amounts(run, table).not_counted, std::vector<std::string>{"constant: core"});
+}
+
+TEST(Energy, OfAnEventIsThatOfTheProcessOfThePlatform) {
+  const EnergyTable table = table_with_active_cores();
+  RunResult run = run_on_gh100(1);
+  run.statistics[0].value = 1'000'000'000;
+  expect_range(energy_report(energy_amounts(run, table), table).moving, 0.25, 0.5, 1);
+  RunResult elsewhere = run_of(1'000'000'000, 0, 3 * cycles_per_millisecond);
+  const EnergyAmounts on_orin = energy_amounts(elsewhere, table);
+  expect_range(energy_report(on_orin, table).moving, 0.5, 1, 2);
+  EXPECT_EQ(on_orin.powers[1], 0);
+  EXPECT_FALSE(energy_ratio(on_orin, energy_amounts(run, table), table).has_value()) << "of two processes";
+  EXPECT_EQ(powers_of_other_platforms(table, platform_named("desktop")), std::vector<std::string>{"leakage"})
+      << "of its process";
+}
+
+KernelReport kernel_of(double instructions, std::uint64_t bytes, std::uint64_t milliseconds) {
+  KernelReport kernel;
+  kernel.name = "k";
+  kernel.bytes = bytes;
+  kernel.cycles = milliseconds * cycles_of_a_gh100_millisecond;
+  kernel.warp_instructions = instructions / 32;
+  kernel.lane_instructions = instructions;
+  kernel.core_cycles = 2 * static_cast<double>(*kernel.cycles);
+  return kernel;
+}
+
+TEST(Energy, OfAKernelIsOfItsInstructionsBytesAndActiveCores) {
+  const EnergyTable table = table_with_active_cores();
+  const RunResult machine = run_on_gh100(1);
+  const KernelReport kernel = kernel_of(1e9, 32'000'000'000, 5);
+  const EnergyAmounts amounts = energy_amounts(kernel, machine, table);
+  // No DRAM: of its bytes there are sectors alone. Two cores of the four, for 5 ms.
+  EXPECT_EQ(amounts.events, (std::vector<double>{1e9, 1e9}));
+  EXPECT_EQ(amounts.powers, (std::vector<double>{0, 2}));
+  const EnergyReport report = energy_report(amounts, table);
+  expect_range(report.moving, 0.25 + 0.5, 0.5 + 2, 1 + 8);
+  expect_range(report.constant.value(), 10, 20, 40);
+  RunResult with_dram = machine;
+  with_dram.parameters.emplace_back("dram.channels", "1");
+  EXPECT_EQ(energy_amounts(kernel, with_dram, table).events[1], 33e9);
+  KernelReport silent = kernel;
+  silent.warp_instructions.reset();
+  EXPECT_EQ(energy_amounts(silent, machine, table).missing, std::vector<std::string>{"warp instructions of k"});
+}
+
+TEST(Energy, OfKernelsOneAfterTheOtherIsTheirSum) {
+  const EnergyTable table = table_with_active_cores();
+  const RunResult machine = run_on_gh100(1);
+  EnergyAmounts both = energy_amounts(kernel_of(1e9, 0, 1), machine, table);
+  KernelReport idle = kernel_of(3e9, 32'000'000'000, 3);
+  idle.core_cycles = 0;
+  const Range first = energy_report(both, table).total.value();
+  const EnergyAmounts next = energy_amounts(idle, machine, table);
+  const Range second = energy_report(next, table).total.value();
+  both += next;
+  EXPECT_DOUBLE_EQ(both.seconds.value(), 4e-3);
+  expect_range(energy_report(both, table).total.value(), first.low + second.low, first.nominal + second.nominal,
+               first.high + second.high);
+  KernelReport untimed = idle;
+  untimed.cycles.reset();
+  both += energy_amounts(untimed, machine, table);
+  EXPECT_FALSE(energy_report(both, table).total.has_value());
+}
+
+TEST(Energy, OfBytesOfADramIsTheTables) {
+  const EnergyTable table = table_with_active_cores();
+  const EnergyReport report = energy_report(tools::energy_amounts_of_dram(1'000'000'000, table), table);
+  expect_range(report.moving, 1, 4, 16);
+  EXPECT_FALSE(report.total.has_value());
 }
 
 TEST(Energy, TheShippedTableCountsWhatPlatformsHave) {

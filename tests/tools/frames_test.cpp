@@ -124,6 +124,76 @@ TEST_F(Frames, AGaussianSceneIsPreprocessed) {
   }
 }
 
+void expect_range_of(const json& range, double low, double nominal, double high) {
+  EXPECT_NEAR(range["low"].get<double>(), low, 1e-9 * high);
+  EXPECT_NEAR(range["nominal"].get<double>(), nominal, 1e-9 * high);
+  EXPECT_NEAR(range["high"].get<double>(), high, 1e-9 * high);
+}
+
+TEST_F(Frames, EnergyIsOfAllPartsByOneTable) {
+  const auto paths = by_path(frames({"--fidelity", "lt", "--platform", "gh100-gpc"}));
+  const json run = json_of({"run", "--scene", "tiny.spl", "--fidelity", "lt", "--platform", "gh100-gpc", "--variant",
+                            "baseline", "--energy"});
+  EXPECT_EQ(paths.at("hardware")["millijoules"]["raster"], run["runs"][0]["energy"]["total_millijoules"]);
+  for (const auto& [name, path] : paths) {
+    if (name == "accelerator") continue;
+    SCOPED_TRACE(name);
+    const json& energy = path["millijoules"];
+    EXPECT_TRUE(energy["preprocess"].is_null());
+    const auto sum = [&](const char* end) {
+      return energy["sort"][end].get<double>() + energy["raster"][end].get<double>();
+    };
+    expect_range_of(energy, sum("low"), sum("nominal"), sum("high"));
+    EXPECT_GT(energy["sort"]["low"], 0);
+  }
+  expect_range_of(paths.at("hardware")["millijoules"]["over_hardware"], 1, 1, 1);
+  const json& software = paths.at("software")["millijoules"];
+  EXPECT_NEAR(software["over_hardware"]["nominal"].get<double>(),
+              software["nominal"].get<double>() / paths.at("hardware")["millijoules"]["nominal"].get<double>(), 1e-9);
+}
+
+TEST_F(Frames, EnergyOfAnAcceleratorIsItsPowerAndItsMemorys) {
+  write("e.toml", R"(
+schema = "vrpipe.energies/1"
+process = "mine"
+[[node]]
+name = "mine"
+factor = { low = 1, nominal = 1, high = 1 }
+voltage_ratio = 1
+source = "s"
+[[event]]
+name = "byte"
+unit = "DRAM"
+count = ["kernel.dram_bytes", "quads_blended"]
+node = "mine"
+pj = { low = 1e6, nominal = 2e6, high = 3e6 }
+source = "s"
+meaning = "m"
+)");
+  const json accelerator = by_path(frames({"--fidelity", "lt", "--energies", "e.toml"}))["accelerator"];
+  double bytes = 0;
+  for (const json& each : accelerator["bytes"]) bytes += each.get<double>();
+  const double units = 0.87 * accelerator["milliseconds"]["frame"].get<double>();
+  expect_range_of(accelerator["millijoules"], units + 1e-3 * bytes, units + 2e-3 * bytes, units + 3e-3 * bytes);
+  EXPECT_TRUE(accelerator["millijoules"]["raster"].is_null()) << "stages overlap";
+  const json unknown = by_path(frames({"--fidelity", "lt", "--unit", "accelerator=gcc"}))["accelerator"];
+  EXPECT_TRUE(unknown["millijoules"].is_null()) << "its power is not published";
+}
+
+TEST_F(Frames, EnergyThatIsNotKnownIsNotGuessed) {
+  for (const json& path : frames({"--fidelity", "functional"})["frames"]) EXPECT_TRUE(path["millijoules"].is_null());
+  const std::vector<std::string> elsewhere{"--fidelity", "lt", "--platform", "desktop"};
+  for (const auto& [name, path] : by_path(frames(elsewhere))) {
+    EXPECT_EQ(path["millijoules"].is_null(), name != "accelerator") << name;
+    if (name == "accelerator") {
+      EXPECT_TRUE(path["millijoules"]["over_hardware"].is_null());
+    }
+  }
+  const std::string said = vrpipe({"frames", "--scene", "tiny.spl", "--fidelity", "lt", "--platform", "desktop"}).out;
+  EXPECT_NE(said.find("mJ of the GPU are not known"), std::string::npos) << said;
+  refused({"frames", "--scene", "tiny.spl", "--energies", "none.toml"}, {"cannot read energies", "none.toml"});
+}
+
 TEST_F(Frames, WithoutTimeThereAreCountsAlone) {
   const json result = frames({"--fidelity", "functional"});
   const json timed = frames({"--fidelity", "lt"});
@@ -147,7 +217,10 @@ TEST_F(Frames, CountsAreTheSameAtEveryFidelity) {
 TEST_F(Frames, AnAcceleratorIsTimedAtLtWhereCyclesAreAskedFor) {
   json cycle = by_path(frames())["accelerator"], lt = by_path(frames({"--fidelity", "lt"}))["accelerator"];
   EXPECT_EQ(cycle["fidelity"], "lt");
-  for (json* path : {&cycle, &lt}) path->erase("host_seconds");
+  for (json* path : {&cycle, &lt}) {
+    path->erase("host_seconds");
+    (*path)["millijoules"].erase("over_hardware");
+  }
   EXPECT_EQ(cycle, lt);
 }
 
@@ -245,9 +318,10 @@ TEST_F(Frames, AConfigurationReadsBackToTheSameFrames) {
 TEST_F(Frames, TheTableHasEveryPath) {
   const Finished finished = vrpipe({"frames", "--scene", "tiny.spl", "--fidelity", "lt", "--json", "frames.json"});
   EXPECT_EQ(finished.code, 0) << finished.err;
-  for (const char* part : {"software (published)", "hardware (baseline)", "in-shader (ordered lock)",
-                           "vr-pipe (het+qm)", "accelerator (gscore)", "3.95 mm2", "preprocess", "over hardware",
-                           "warp iterations", "a draw list is preprocessed already", "result: frames.json"}) {
+  for (const char* part :
+       {"software (published)", "hardware (baseline)", "in-shader (ordered lock)", "vr-pipe (het+qm)",
+        "accelerator (gscore)", "3.95 mm2", "preprocess", "millijoules", "mJ at 8 nm", "over hardware", "in flight",
+        "warp iterations", "a draw list is preprocessed already", "result: frames.json"}) {
     EXPECT_NE(finished.out.find(part), std::string::npos) << part << " is not in\n" << finished.out;
   }
   EXPECT_EQ(json::parse(read_file(folder() / "frames.json"))["schema"], "vrpipe.frames/1");
@@ -310,7 +384,11 @@ TEST_F(Frames, EveryKeyOfTheResultIsDocumented) {
   json paths = json::object();
   const json result = frames({"--fidelity", "lt"});
   for (const char* key : {"frames", "without_termination"}) paths[key] = result[key];
-  expect_documented({paths}, known);
+  json untimed = paths, elsewhere = paths, preprocessed = paths;
+  untimed["frames"] = frames({"--fidelity", "functional"})["frames"];
+  elsewhere["frames"] = frames({"--fidelity", "bound", "--platform", "desktop"})["frames"];
+  preprocessed["frames"] = json_of({"frames", "--size", "64x48", "--fovy", "10", "--fidelity", "bound"})["frames"];
+  expect_documented({paths, untimed, elsewhere, preprocessed}, known);
 }
 
 }  // namespace

@@ -22,18 +22,29 @@ std::string range_text(const Range& range) {
   return fmt::format("{:.3g} / {:.3g} / {:.3g}", range.low, range.nominal, range.high);
 }
 
+std::string active_text(const ConstantPower& power) {
+  return power.active_unit.empty() ? "always" : printable(power.active_unit);
+}
+
 std::string energies_as_text(const EnergyTable& table, const TextStyle& style) {
   constexpr std::size_t width = 120;
-  TextTable events({"unit: event", fmt::format("pJ at {}", printable(table.process)), "how often"});
-  events.left(2);
+  std::vector<std::string> heading{"unit: event"};
+  for (const GpuProcess& process : table.processes) heading.push_back("pJ at " + printable(process.name));
+  heading.emplace_back("how often");
+  TextTable events(heading);
+  events.left(heading.size() - 1);
   events.wrap(width);
   for (const EnergyEvent& event : table.events) {
-    events.row({printable(event.unit + ": " + event.name), range_text(event.picojoules), printable(event.count.text)});
+    std::vector<std::string> row{printable(event.unit + ": " + event.name)};
+    for (const Range& each : event.picojoules) row.push_back(range_text(each));
+    row.push_back(printable(event.count.text));
+    events.row(std::move(row));
   }
-  TextTable powers({"constant power", "W", "how often"});
+  TextTable powers({"constant power", "W", "how often", "while active"});
   powers.left(2);
+  powers.left(3);
   for (const ConstantPower& power : table.powers) {
-    powers.row({printable(power.name), range_text(power.watts), printable(power.count.text)});
+    powers.row({printable(power.name), range_text(power.watts), printable(power.count.text), active_text(power)});
   }
   return events.text(style) + "\n" + powers.text(style) +
          "low / nominal / high; sources: --markdown; to change them: --toml, then `vrpipe compare --energies FILE`\n";
@@ -41,62 +52,86 @@ std::string energies_as_text(const EnergyTable& table, const TextStyle& style) {
 
 /// What the documentation holds.
 std::string energies_as_markdown(const EnergyTable& table) {
-  std::string text = fmt::format("| unit: event | pJ as published | pJ at {} | how often | what, and source |\n",
-                                 markdown_escaped(table.process)) +
-                     "|---|---|---|---|---|\n";
+  std::string text = "| unit: event | pJ as published |";
+  std::string rule = "|---|---|";
+  for (const GpuProcess& process : table.processes) {
+    text += fmt::format(" pJ at {} |", markdown_escaped(process.name));
+    rule += "---|";
+  }
+  text += " how often | what, and source |\n" + rule + "---|---|\n";
   for (const EnergyEvent& event : table.events) {
-    text += fmt::format("| {}: {} | {}, {} | {} | {} | {}. {} |\n", markdown_escaped(event.unit),
-                        markdown_escaped(event.name), range_text(event.published), markdown_escaped(event.node),
-                        range_text(event.picojoules), markdown_escaped(event.count.text),
-                        markdown_escaped(event.meaning), markdown_escaped(event.source));
+    text += fmt::format("| {}: {} | {}, {} |", markdown_escaped(event.unit), markdown_escaped(event.name),
+                        range_text(event.published), markdown_escaped(event.node));
+    for (const Range& each : event.picojoules) text += fmt::format(" {} |", range_text(each));
+    text += fmt::format(" {} | {}. {} |\n", markdown_escaped(event.count.text), markdown_escaped(event.meaning),
+                        markdown_escaped(event.source));
   }
-  text += fmt::format("\n| process | factor to {} | supply, of that | source |\n|---|---|---|---|\n",
-                      markdown_escaped(table.process));
-  for (const ProcessNode& node : table.nodes) {
-    text += fmt::format("| {} | {} | {:g} | {} |\n", markdown_escaped(node.name), range_text(node.factor),
-                        node.voltage_ratio, markdown_escaped(node.source));
+  text += "\n| from | to | of | factor | supply, of that | source |\n|---|---|---|---|---|---|\n";
+  for (const GpuProcess& process : table.processes) {
+    const std::string of =
+        process.platforms.empty() ? "all others" : fmt::format("{}", fmt::join(process.platforms, ", "));
+    for (const ProcessNode& node : process.nodes) {
+      text += fmt::format("| {} | {} | {} | {} | {:g} | {} |\n", markdown_escaped(node.name),
+                          markdown_escaped(process.name), markdown_escaped(of), range_text(node.factor),
+                          node.voltage_ratio, markdown_escaped(node.source));
+    }
   }
-  text += "\n| constant power | W | how often | of | what, and source |\n|---|---|---|---|---|\n";
+  text += "\n| constant power | W | how often | while active | of | what, and source |\n|---|---|---|---|---|---|\n";
   for (const ConstantPower& power : table.powers) {
-    text += fmt::format("| {} | {} | {} | {} | {}. {} |\n", markdown_escaped(power.name), range_text(power.watts),
-                        markdown_escaped(power.count.text),
+    text += fmt::format("| {} | {} | {} | {} | {} | {}. {} |\n", markdown_escaped(power.name), range_text(power.watts),
+                        markdown_escaped(power.count.text), markdown_escaped(active_text(power)),
                         markdown_escaped(fmt::format("{}", fmt::join(power.platforms, ", "))),
                         markdown_escaped(power.meaning), markdown_escaped(power.source));
   }
   return text;
 }
 
-Json range_json(const Range& range) { return {{"low", range.low}, {"nominal", range.nominal}, {"high", range.high}}; }
-
-Json energies_as_json(const EnergyTable& table) {
-  Json nodes = Json::array(), events = Json::array(), powers = Json::array();
-  for (const ProcessNode& node : table.nodes) {
+Json nodes_json(const GpuProcess& process) {
+  Json nodes = Json::array();
+  for (const ProcessNode& node : process.nodes) {
     nodes.push_back({{"name", node.name},
                      {"factor", range_json(node.factor)},
                      {"voltage_ratio", node.voltage_ratio},
                      {"source", node.source}});
   }
+  return nodes;
+}
+
+Json energies_as_json(const EnergyTable& table) {
+  Json others = Json::array(), events = Json::array(), powers = Json::array();
+  for (std::size_t i = 1; i < table.processes.size(); ++i) {
+    const GpuProcess& process = table.processes[i];
+    others.push_back({{"name", process.name},
+                      {"platforms", process.platforms},
+                      {"leaves_out", process.leaves_out.empty() ? Json() : Json(process.leaves_out)},
+                      {"nodes", nodes_json(process)}});
+  }
   for (const EnergyEvent& event : table.events) {
+    Json elsewhere = Json::array();
+    for (std::size_t i = 1; i < event.picojoules.size(); ++i) elsewhere.push_back(range_json(event.picojoules[i]));
     events.push_back({{"name", event.name},
                       {"unit", event.unit},
                       {"count", event.count.text},
                       {"node", event.node},
                       {"published_picojoules", range_json(event.published)},
-                      {"picojoules", range_json(event.picojoules)},
+                      {"picojoules", range_json(event.picojoules.front())},
+                      {"picojoules_in_other_processes", std::move(elsewhere)},
                       {"source", event.source},
                       {"meaning", event.meaning}});
   }
   for (const ConstantPower& power : table.powers) {
     powers.push_back({{"name", power.name},
                       {"count", power.count.text},
+                      {"while_active", power.active_unit.empty() ? Json() : Json(power.active_unit)},
                       {"watts", range_json(power.watts)},
                       {"platforms", power.platforms},
                       {"source", power.source},
                       {"meaning", power.meaning}});
   }
   return {{"schema", "vrpipe.energies/1"},
-          {"process", table.process},
-          {"nodes", std::move(nodes)},
+          {"process", table.processes.front().name},
+          {"nodes", nodes_json(table.processes.front())},
+          {"other_processes", std::move(others)},
           {"events", std::move(events)},
           {"powers", std::move(powers)}};
 }

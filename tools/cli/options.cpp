@@ -238,6 +238,10 @@ void SimulationArguments::declare_whole_frames(Arguments& arguments) {
   declare_rules(arguments);
   arguments.add_option("--multi-pass", passes_, "N", "passes of the path multi-pass (default: 4; 1: without it)",
                        scene_group);
+  arguments.add_option(energies_option, energies_, "FILE.toml",
+                       "millijoules by a table of your own (`vrpipe energies --toml` prints the one that\n"
+                       "vrpipe comes with)",
+                       result_group);
   declare_images(arguments);
   arguments.find("--output")->help =
       "writes SCENE-PATH.png (8 bit, over the background) and .exr (RGBA float,\n"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <functional>
 #include <map>
 #include <numeric>
 #include <set>
@@ -14,15 +15,12 @@ namespace {
 
 constexpr double millijoules_per_picojoule = 1e-9;
 
-/// The numbers of a run by name.
-class RunNumbers {
+/// The numbers of a run or a kernel by name.
+class EnergyNumbers {
  public:
-  explicit RunNumbers(const RunResult& run) {
-    for (const auto& [key, text] : run.parameters) {
-      double value = 0;
-      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-      if (error == std::errc() && end == text.data() + text.size()) numbers_[key] = value;
-    }
+  EnergyNumbers() = default;
+  explicit EnergyNumbers(const RunResult& run) {
+    add(run.parameters);
     for (const auto& [name, value] : run.counts.named()) numbers_[name] = static_cast<double>(value);
     for (const StatisticReport& report : run.statistics) {
       if (report.kind == "counter") numbers_[report.name] = static_cast<double>(report.value);
@@ -36,7 +34,20 @@ class RunNumbers {
     }
   }
 
-  /// Of the products that the run has numbers for: what a platform lacks does not happen there. None if it lacks all.
+  void add(const std::string& name, double value) { numbers_[name] = value; }
+  void add(const std::vector<std::pair<std::string, std::string>>& parameters) {
+    for (const auto& [key, text] : parameters) {
+      double value = 0;
+      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+      if (error == std::errc() && end == text.data() + text.size()) add(key, value);
+    }
+  }
+  std::optional<double> named(const std::string& name) const {
+    const auto found = numbers_.find(name);
+    return found == numbers_.end() ? std::nullopt : std::optional(found->second);
+  }
+
+  /// Of the products that there are numbers for: what a platform lacks does not happen there. None if it lacks all.
   /// @param missing  told what a unit of one's own should say and does not
   std::optional<double> value(const CountFormula& formula, std::set<std::string>& missing) const {
     std::optional<double> sum;
@@ -66,7 +77,7 @@ class RunNumbers {
     return value;
   }
 
-  std::map<std::string, double> numbers_;
+  std::map<std::string, double, std::less<>> numbers_;
   std::vector<std::string> passed_;                       ///< slots of units that pass items through, with a dot
   std::vector<std::pair<std::string, std::string>> own_;  ///< slots and names of units that are not of this library
 };
@@ -118,26 +129,107 @@ Range share_of(const Range& part, const Range& rest) {
   return {share(part.low, rest.high), share(part.nominal, rest.nominal), share(part.high, rest.low)};
 }
 
-}  // namespace
-
-EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table) {
-  const RunNumbers numbers(run);
+/// @param active  share of the time in which a unit, of a slot, has anything to do; none where it is not there
+EnergyAmounts amounts_of(const EnergyNumbers& numbers, const Platform& platform, const EnergyTable& table,
+                         const std::function<std::optional<double>(const std::string&)>& active) {
   EnergyAmounts amounts;
+  amounts.process = table.process_of(platform.name);
   std::set<std::string> missing;
-  const auto count = [&](const CountFormula& formula, const std::string& name) {
-    const std::optional<double> value = numbers.value(formula, missing);
+  const auto counted = [&](const std::optional<double>& value, const std::string& name) {
     if (!value) amounts.not_counted.push_back(name);
     return value.value_or(0);
   };
   for (const EnergyEvent& event : table.events) {
-    amounts.events.push_back(count(event.count, event.unit + ": " + event.name));
+    amounts.events.push_back(counted(numbers.value(event.count, missing), event.unit + ": " + event.name));
   }
   for (const ConstantPower& power : table.powers) {
-    amounts.powers.push_back(count(power.count, "constant: " + power.name));
+    if (!table.is_taken(power, platform.name)) {
+      amounts.powers.push_back(0);
+      continue;
+    }
+    std::optional<double> value = numbers.value(power.count, missing);
+    if (value && !power.active_unit.empty()) {
+      const std::optional<double> share = active(power.active_unit);
+      value = share ? std::optional(*value * *share) : std::nullopt;
+    }
+    amounts.powers.push_back(counted(value, "constant: " + power.name));
   }
   amounts.missing.assign(missing.begin(), missing.end());
+  return amounts;
+}
+
+/// Share of a run's cycles in which the units of a slot are not starved, their mean.
+std::optional<double> active_share(const RunResult& run, const std::string& slot) {
+  double starved = 0, all = 0;
+  for (const UnitReport& unit : run.units) {
+    if (unit.name.substr(unit.name.rfind('.') + 1) != slot) continue;
+    starved += static_cast<double>(unit.cycles[static_cast<unsigned>(UnitState::starved)]);
+    all += static_cast<double>(std::accumulate(unit.cycles.begin(), unit.cycles.end(), std::uint64_t{0}));
+  }
+  return all > 0 ? std::optional(1 - starved / all) : std::nullopt;
+}
+
+}  // namespace
+
+EnergyAmounts& EnergyAmounts::operator+=(const EnergyAmounts& next) {
+  const double before = seconds.value_or(0), after = next.seconds.value_or(0), both = before + after;
+  for (std::size_t i = 0; i < events.size(); ++i) events[i] += next.events[i];
+  for (std::size_t i = 0; i < powers.size(); ++i) {
+    powers[i] = both > 0 ? (powers[i] * before + next.powers[i] * after) / both : 0;
+  }
+  if (seconds && next.seconds) {
+    seconds = both;
+  } else {
+    seconds.reset();
+  }
+  fragments_blended += next.fragments_blended;
+  const auto add = [](std::vector<std::string>& names, const std::vector<std::string>& others) {
+    for (const std::string& name : others) {
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+  };
+  add(not_counted, next.not_counted);
+  add(missing, next.missing);
+  return *this;
+}
+
+EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table) {
+  EnergyAmounts amounts = amounts_of(EnergyNumbers(run), *run.request.platform, table,
+                                     [&](const std::string& slot) { return active_share(run, slot); });
   if (run.cycles) amounts.seconds = static_cast<double>(*run.cycles) / (run.request.platform->frequency_mhz * 1e6);
   amounts.fragments_blended = run.counts.fragments_blended;
+  return amounts;
+}
+
+EnergyAmounts energy_amounts(const KernelReport& kernel, const RunResult& machine, const EnergyTable& table) {
+  EnergyNumbers numbers;
+  numbers.add(machine.parameters);
+  if (kernel.warp_instructions) numbers.add("kernel.warp_instructions", *kernel.warp_instructions);
+  if (kernel.lane_instructions) numbers.add("kernel.lane_instructions", *kernel.lane_instructions);
+  numbers.add("kernel.bytes", static_cast<double>(kernel.bytes));
+  if (numbers.named("dram.channels")) numbers.add("kernel.dram_bytes", static_cast<double>(kernel.bytes));
+  const auto active = [&](const std::string& slot) -> std::optional<double> {
+    const double cores = numbers.named("sm.cores").value_or(0) * gpcs_of(machine.request);
+    const double core_cycles = cores * static_cast<double>(kernel.cycles.value_or(0));
+    return slot == "sm" && core_cycles > 0 ? kernel.core_cycles.value_or(0) / core_cycles : 0;
+  };
+  EnergyAmounts amounts = amounts_of(numbers, *machine.request.platform, table, active);
+  amounts.not_counted.clear();  // it has no part in what units of the pipeline count
+  if (!kernel.warp_instructions) amounts.missing.push_back("warp instructions of " + kernel.name);
+  if (kernel.cycles) {
+    amounts.seconds = static_cast<double>(*kernel.cycles) / (machine.request.platform->frequency_mhz * 1e6);
+  }
+  return amounts;
+}
+
+EnergyAmounts energy_amounts_of_dram(std::uint64_t bytes, const EnergyTable& table) {
+  EnergyNumbers numbers;
+  numbers.add("kernel.dram_bytes", static_cast<double>(bytes));
+  EnergyAmounts amounts;
+  std::set<std::string> missing;
+  for (const EnergyEvent& event : table.events)
+    amounts.events.push_back(numbers.value(event.count, missing).value_or(0));
+  amounts.powers.assign(table.powers.size(), 0);
   return amounts;
 }
 
@@ -149,7 +241,7 @@ EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& tabl
     const auto is_its = [&](const UnitEnergy& each) { return each.unit == event.unit; };
     auto unit = std::find_if(report.units.begin(), report.units.end(), is_its);
     if (unit == report.units.end()) unit = report.units.insert(unit, {event.unit, {}});
-    const Range spent = event.picojoules * (amounts.events[i] * millijoules_per_picojoule);
+    const Range spent = event.picojoules[amounts.process] * (amounts.events[i] * millijoules_per_picojoule);
     unit->millijoules += spent;
     (event.unit == "TGC" || event.unit == "QRU" ? merging : others) += spent;
   }
@@ -176,10 +268,10 @@ EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& tabl
 
 std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmounts& run, const EnergyTable& table) {
   if (!baseline.seconds || !run.seconds || baseline.fragments_blended == 0) return std::nullopt;
-  if (!baseline.missing.empty() || !run.missing.empty()) return std::nullopt;
+  if (!baseline.missing.empty() || !run.missing.empty() || baseline.process != run.process) return std::nullopt;
   std::vector<Term> terms;
   for (std::size_t i = 0; i < table.events.size(); ++i) {
-    terms.push_back({baseline.events[i], run.events[i], table.events[i].picojoules * 1e-12});
+    terms.push_back({baseline.events[i], run.events[i], table.events[i].picojoules[run.process] * 1e-12});
   }
   for (std::size_t i = 0; i < table.powers.size(); ++i) {
     const double before = baseline.powers[i] * *baseline.seconds, after = run.powers[i] * *run.seconds;
@@ -198,9 +290,8 @@ std::vector<std::string> powers_of_other_platforms(const EnergyTable& table, con
   std::vector<std::string> names;
   for (const ConstantPower& power : table.powers) {
     const std::vector<std::string>& known = power.platforms;
-    if (!known.empty() && std::find(known.begin(), known.end(), platform.name) == known.end()) {
-      names.push_back(power.name);
-    }
+    const bool is_others = !known.empty() && std::find(known.begin(), known.end(), platform.name) == known.end();
+    if (is_others && table.is_taken(power, platform.name)) names.push_back(power.name);
   }
   return names;
 }

@@ -6,25 +6,36 @@
 #include <vector>
 
 #include <vrpipe/platforms/simulation.h>
+#include <vrpipe/platforms/software.h>
 
 #include "jobs/energy_table.h"
 
 namespace vrpipe::tools {
 
-/// What a run has of everything in a table; all that its energy depends on.
+/// What a run, a kernel or several of them have of everything in a table; all that their energy depends on.
 struct EnergyAmounts {
+  std::size_t process = 0;        ///< in EnergyTable::processes
   std::vector<double> events;     ///< how often, by EnergyTable::events
-  std::vector<double> powers;     ///< how many, by EnergyTable::powers
+  std::vector<double> powers;     ///< how many, in the mean over the time, by EnergyTable::powers
   std::optional<double> seconds;  ///< simulated; none where the fidelity has no time
   std::uint64_t fragments_blended = 0;
   std::vector<std::string> not_counted;  ///< "UNIT: NAME" of events and powers of which the run has no counter
   /// What units of one's own do not say of themselves, e.g. "qru.pairs of qru=mine": what was spent is more, by nobody knows
   /// how much.
   std::vector<std::string> missing;
+
+  /// One after the other, on the same platform.
+  EnergyAmounts& operator+=(const EnergyAmounts& next);
 };
 
 /// A unit that passes items through has no events.
 EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table);
+
+/// Of a kernel of a frame, on the platform of a run: what there is of it is the run's. It takes no unit but the SM array.
+EnergyAmounts energy_amounts(const KernelReport& kernel, const RunResult& machine, const EnergyTable& table);
+
+/// Of so many bytes to and from a DRAM, of whomever; no time.
+EnergyAmounts energy_amounts_of_dram(std::uint64_t bytes, const EnergyTable& table);
 
 struct UnitEnergy {
   std::string unit;
@@ -46,10 +57,11 @@ EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& tabl
 
 /// Total of `baseline` over that of `run`, as a speed-up is of cycles; none without time, where the baseline blends nothing,
 /// or where the least that may have been spent is nothing. Both have the same energies and powers, whatever these are: low
-/// and high are the extremes over all that they may be. None where either misses something.
+/// and high are the extremes over all that they may be. None where either misses something, or they are made in two
+/// processes.
 std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmounts& run, const EnergyTable& table);
 
-/// Powers of which the table says that they were found for other platforms than this.
+/// Powers that the platform takes, though the table says that they were found for others.
 std::vector<std::string> powers_of_other_platforms(const EnergyTable& table, const Platform& platform);
 
 }  // namespace vrpipe::tools

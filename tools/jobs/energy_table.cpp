@@ -11,6 +11,7 @@
 #include <toml++/toml.h>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/pipeline/registry.h>
 
 #include "jobs/settings.h"
 #include "jobs/toml_reader.h"
@@ -47,11 +48,16 @@ class TableReader : TomlReader {
       : TomlReader(cannot_use_table, file, "as `vrpipe energies --toml` prints it") {}
 
   EnergyTable read(const std::string& text) const {
-    const toml::table root = parsed(text, "vrpipe.energies/1", {"schema", "process", "node", "event", "power"});
+    const toml::table root =
+        parsed(text, "vrpipe.energies/1", {"schema", "process", "node", "other_process", "event", "power"});
     EnergyTable table;
-    table.process = text_at(root, "process");
-    for (const toml::table* each : named(root, "node")) table.nodes.push_back(node(*each));
-    for (const toml::table* each : named(root, "event")) table.events.push_back(event(*each, table.nodes));
+    GpuProcess& first = table.processes.emplace_back();
+    first.name = text_at(root, "process");
+    for (const toml::table* each : named(root, "node")) first.nodes.push_back(node(*each));
+    for (const toml::table* each : named(root, "other_process")) {
+      table.processes.push_back(other_process(*each, table.processes));
+    }
+    for (const toml::table* each : named(root, "event")) table.events.push_back(event(*each, table.processes));
     for (const toml::table* each : named(root, "power")) table.powers.push_back(power(*each));
     if (table.events.empty()) refuse(root, "it has no event", "write at least one [[event]]");
     return table;
@@ -140,7 +146,51 @@ class TableReader : TomlReader {
     return read;
   }
 
-  EnergyEvent event(const toml::table& table, const std::vector<ProcessNode>& nodes) const {
+  GpuProcess other_process(const toml::table& table, const std::vector<GpuProcess>& before) const {
+    check_keys(table, {"name", "platforms", "leaves_out", "node"});
+    GpuProcess read;
+    read.name = text_at(table, "name");
+    read.platforms = platforms(table);
+    if (read.platforms.empty()) {
+      refuse(table, fmt::format("'{}' has no platform", read.name), "write e.g. platforms = [\"gh100-gpc\"]");
+    }
+    for (const GpuProcess& other : before) {
+      for (const std::string& platform : other.platforms) {
+        if (std::find(read.platforms.begin(), read.platforms.end(), platform) == read.platforms.end()) continue;
+        refuse(table, fmt::format("{} is made in '{}' already", platform, other.name), "leave it out of one");
+      }
+    }
+    if (table.contains("leaves_out")) read.leaves_out = text_at(table, "leaves_out");
+    const std::vector<const toml::table*> nodes = named(table, "node");
+    for (const ProcessNode& needed : before.front().nodes) {
+      const auto found = std::find_if(nodes.begin(), nodes.end(),
+                                      [&](const toml::table* each) { return text_at(*each, "name") == needed.name; });
+      if (found == nodes.end()) {
+        refuse(table, fmt::format("'{}' has no node '{}'", read.name, needed.name),
+               "write an [[other_process.node]] of that name");
+      }
+      read.nodes.push_back(node(**found));
+    }
+    if (nodes.size() != read.nodes.size()) {
+      refuse(table, fmt::format("'{}' has a node that no [[node]] is called", read.name), "leave it out, or add one");
+    }
+    return read;
+  }
+
+  std::vector<std::string> platforms(const toml::table& table) const {
+    std::vector<std::string> read;
+    const toml::node* const found = table.get("platforms");
+    if (found == nullptr) return read;
+    if (!found->is_array()) refuse(*found, "platforms is no array", "write e.g. [\"agx-orin\"]");
+    for (const toml::node& each : *found->as_array()) {
+      const auto name = each.value_exact<std::string>();
+      if (!name) refuse(each, "a platform is not a text", "write a text in quotes");
+      read.push_back(*name);
+    }
+    return read;
+  }
+
+  EnergyEvent event(const toml::table& table, const std::vector<GpuProcess>& processes) const {
     check_keys(table, {"name", "unit", "count", "node", "pj", "source", "meaning"});
     EnergyEvent read;
     read.name = text_at(table, "name");
@@ -148,36 +198,40 @@ class TableReader : TomlReader {
     read.count = count(table);
     read.node = text_at(table, "node");
     std::vector<std::string> names;
-    for (const ProcessNode& each : nodes) names.push_back(each.name);
+    for (const ProcessNode& each : processes.front().nodes) names.push_back(each.name);
     const auto found = std::find(names.begin(), names.end(), read.node);
     if (found == names.end()) {
       refuse(*table.get("node"), fmt::format("there is no node '{}'", read.node),
              names.empty() ? std::string("write a [[node]] of that name")
                            : fmt::format("did you mean {}?", nearest_name(read.node, names)));
     }
-    const Range scaling = nodes[static_cast<std::size_t>(found - names.begin())].scaling();
     read.published = range(table, "pj");
-    read.picojoules = {read.published.low * scaling.low, read.published.nominal * scaling.nominal,
-                       read.published.high * scaling.high};
+    for (const GpuProcess& process : processes) {
+      const Range scaling = process.nodes[static_cast<std::size_t>(found - names.begin())].scaling();
+      read.picojoules.push_back({read.published.low * scaling.low, read.published.nominal * scaling.nominal,
+                                 read.published.high * scaling.high});
+    }
     read.source = text_at(table, "source");
     read.meaning = text_at(table, "meaning");
     return read;
   }
 
   ConstantPower power(const toml::table& table) const {
-    check_keys(table, {"name", "count", "watts", "platforms", "source", "meaning"});
+    check_keys(table, {"name", "count", "while", "watts", "platforms", "source", "meaning"});
     ConstantPower read;
     read.name = text_at(table, "name");
     read.count = count(table);
-    read.watts = range(table, "watts");
-    if (const toml::node* const platforms = table.get("platforms")) {
-      if (!platforms->is_array()) refuse(*platforms, "platforms is no array", "write e.g. [\"agx-orin\"]");
-      for (const toml::node& each : *platforms->as_array()) {
-        const auto name = each.value_exact<std::string>();
-        if (!name) refuse(each, "a platform is not a text", "write a text in quotes");
-        read.platforms.push_back(*name);
+    if (table.contains("while")) {
+      read.active_unit = text_at(table, "while");
+      if (!Registry::instance().has_slot(read.active_unit)) {
+        std::vector<std::string> slots;
+        for (const Slot& slot : Registry::instance().slots()) slots.push_back(slot.name);
+        refuse(*table.get("while"), fmt::format("there is no unit '{}'", read.active_unit),
+               fmt::format("did you mean {}?", nearest_name(read.active_unit, slots)));
       }
     }
+    read.watts = range(table, "watts");
+    read.platforms = platforms(table);
     read.source = text_at(table, "source");
     read.meaning = text_at(table, "meaning");
     return read;
@@ -193,6 +247,24 @@ Range& Range::operator+=(const Range& other) {
   return *this;
 }
 
+std::size_t EnergyTable::process_of(const std::string& platform) const {
+  for (std::size_t i = 1; i < processes.size(); ++i) {
+    const std::vector<std::string>& of = processes[i].platforms;
+    if (std::find(of.begin(), of.end(), platform) != of.end()) return i;
+  }
+  return 0;
+}
+
+bool EnergyTable::is_taken(const ConstantPower& power, const std::string& platform) const {
+  const auto is_found = [&](const ConstantPower& each) {
+    return std::find(each.platforms.begin(), each.platforms.end(), platform) != each.platforms.end();
+  };
+  if (power.platforms.empty() || is_found(power)) return true;
+  if (std::any_of(powers.begin(), powers.end(), is_found)) return false;
+  return std::all_of(power.platforms.begin(), power.platforms.end(),
+                     [&](const std::string& other) { return process_of(other) == process_of(platform); });
+}
+
 EnergyTable parse_energies(const std::string& text, const std::string& where) { return TableReader(where).read(text); }
 
 EnergyTable read_energies(const std::filesystem::path& path) {
@@ -205,7 +277,7 @@ const EnergyTable& shipped_energies() {
 }
 
 void check_energy_names(const EnergyTable& table, const Platform& platform) {
-  std::set<std::string> countable;
+  std::set<std::string> countable(kernel_numbers.begin(), kernel_numbers.end());
   std::set<std::string> others;
   for (const auto& [name, value] : Counts().named()) countable.insert(name);
   for (const ParameterListing& listing : all_parameters(&platform)) {

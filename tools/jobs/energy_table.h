@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -43,9 +44,9 @@ struct EnergyEvent {
   std::string name;
   std::string unit;  ///< that spends it, e.g. "L2"
   CountFormula count;
-  Range published;   ///< pJ, in the process of `node`
-  std::string node;  ///< of ProcessNode
-  Range picojoules;  ///< in the process of the GPU
+  Range published;                ///< pJ, in the process of `node`
+  std::string node;               ///< of ProcessNode
+  std::vector<Range> picojoules;  ///< in the process of the GPU, by EnergyTable::processes
   std::string source;
   std::string meaning;
 };
@@ -53,20 +54,37 @@ struct EnergyEvent {
 /// Power that is there whatever moves.
 struct ConstantPower {
   std::string name;
-  CountFormula count;  ///< of what takes it each
+  CountFormula count;       ///< of what takes it each
+  std::string active_unit;  ///< slot: while it has anything to do; empty: all of the time
   Range watts;
   std::vector<std::string> platforms;  ///< for which it was found; empty: all
   std::string source;
   std::string meaning;
 };
 
+/// A process that GPUs are made in.
+struct GpuProcess {
+  std::string name;                    ///< e.g. "8 nm"
+  std::vector<std::string> platforms;  ///< made in it
+  std::vector<ProcessNode> nodes;      ///< to it, in the order of the first process's
+  std::string leaves_out;              ///< of these platforms' energy, e.g. "idle power"; empty: nothing
+};
+
 /// What events cost.
 struct EnergyTable {
-  std::string process;  ///< of the GPU, e.g. "8 nm"
-  std::vector<ProcessNode> nodes;
+  std::vector<GpuProcess> processes;  ///< the first: of all platforms that no other names
   std::vector<EnergyEvent> events;
   std::vector<ConstantPower> powers;
+
+  std::size_t process_of(const std::string& platform) const;  ///< in `processes`
+  /// Whether a platform takes a power: one that was found for it, or, where none was, for others in its process.
+  bool is_taken(const ConstantPower& power, const std::string& platform) const;
 };
+
+/// What a count may name of a compute kernel of a frame: warp instructions, those of the lanes that take part, bytes read and
+/// written, and of these what goes to a DRAM, where there is one.
+constexpr std::array<const char*, 4> kernel_numbers{"kernel.warp_instructions", "kernel.lane_instructions",
+                                                    "kernel.bytes", "kernel.dram_bytes"};
 
 /// The table that comes with the program, as TOML.
 const char* shipped_energies_text();

@@ -260,12 +260,21 @@ FramesResult perform_frames(const SimulationJob& job) {
     result.without_termination = make.of_software(simulate_software(endless, *frame, gaussians));
   }
   const HardwarePreparation prepared = prepare_for_hardware(request, *frame, gaussians);
-  for (std::size_t i = 0; i < draws.size(); ++i)
+  const EnergyTable& table = job.energies ? *job.energies : shipped_energies();
+  const FrameEnergies energies(table, simulated.front().result, prepared);
+  result.paths.back().energy = energies.of_software(software);
+  for (std::size_t i = 0; i < draws.size(); ++i) {
     result.paths.push_back(make.of_hardware(draws[i], simulated[i].result, prepared));
+    result.paths.back().energy = energies.of_draw(simulated[i].result, prepared);
+  }
+  const GpuProcess& process = table.processes[table.process_of(request.platform->name)];
+  result.process = process.name;
+  result.energy_leaves_out = process.leaves_out;
   progress.show("drawing by an accelerator");
   request.fidelity = std::min(request.fidelity, Fidelity::lt);  // its units have no cycles of their own
   const AcceleratorResult accelerator = simulate_accelerator(request, *frame, gaussians);
   result.paths.push_back(PathMaker::of_accelerator(accelerator));
+  result.paths.back().energy = energies.of_accelerator(accelerator);
   progress.erase();
   if (job.output || job.html) {
     progress.show("writing images");

@@ -10,6 +10,7 @@
 #include <vrpipe/platforms/software.h>
 
 #include "image/picture.h"
+#include "jobs/frame_energy.h"
 #include "jobs/simulation_job.h"
 
 namespace vrpipe::tools {
@@ -27,6 +28,7 @@ struct FramePath {
   /// Least from frame to frame where several are in flight, the next one prepared beside this one's draw: the longest that a frame
   /// takes of what all of them share, the SM array, the memory and the graphics pipeline, or stages of an accelerator.
   std::optional<double> interval;
+  FrameEnergy energy;
   std::vector<std::pair<std::string, std::uint64_t>>
       bytes;                                     ///< to and from memory, by kernel or stage; of a draw, DRAM's
   std::string bound_by;                          ///< the longest part, and what bounds that; empty without time
@@ -48,7 +50,9 @@ struct FramesResult {
   std::uint32_t width = 0, height = 0;
   unsigned processes = 1;
   std::vector<FramePath> paths;
-  std::vector<RunResult> runs;  ///< the draws by hardware
+  std::string process;            ///< for which the GPU's energies hold
+  std::string energy_leaves_out;  ///< of the GPU's, e.g. "idle power"; empty: nothing
+  std::vector<RunResult> runs;    ///< the draws by hardware
   /// The software path by `render=endless`, for the page; none where that is what was asked for, or no page was.
   std::optional<FramePath> without_termination;
   std::vector<Picture> pictures;  ///< one for each path, over the background; for the page

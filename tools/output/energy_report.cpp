@@ -17,16 +17,6 @@ namespace {
 
 constexpr std::size_t line_width = 100;
 
-/// Three digits or so, so that what is small is seen beside what is large.
-std::string three_digits(double value) {
-  if (value == 0) return "0";
-  if (value >= 99.95) return fmt::format("{:.0f}", value);
-  if (value >= 9.995) return fmt::format("{:.1f}", value);
-  if (value >= 0.9995) return fmt::format("{:.2f}", value);
-  return value >= 0.001 ? fmt::format("{:.3f}", value) : fmt::format("{:.1g}", value);
-}
-
-std::string between(const Range& range) { return three_digits(range.low) + " to " + three_digits(range.high); }
 std::string ratio_of_energies(double value) { return fmt::format("{:.2f}x", value); }
 
 /// Words between commas, broken between them.
@@ -138,10 +128,20 @@ std::string left_out_text(const std::vector<RunResult>& runs, const Spent& spent
   return text;
 }
 
+}  // namespace
+
+std::string three_digits(double value) {
+  if (value == 0) return "0";
+  if (value >= 99.95) return fmt::format("{:.0f}", value);
+  if (value >= 9.995) return fmt::format("{:.1f}", value);
+  if (value >= 0.9995) return fmt::format("{:.2f}", value);
+  return value >= 0.001 ? fmt::format("{:.3f}", value) : fmt::format("{:.1g}", value);
+}
+
+std::string between(const Range& range) { return three_digits(range.low) + " to " + three_digits(range.high); }
+
 Json range_json(const Range& range) { return {{"low", range.low}, {"nominal", range.nominal}, {"high", range.high}}; }
 Json range_json(const std::optional<Range>& range) { return range ? range_json(*range) : Json(); }
-
-}  // namespace
 
 std::string energy_text(const std::vector<RunResult>& runs, std::size_t baseline, const EnergyTable& table,
                         const TextStyle& style) {
@@ -170,7 +170,10 @@ std::string energy_text(const std::vector<RunResult>& runs, std::size_t baseline
       broken_at_commas(fmt::format(
           "energies at {}; low to high: wherever in its range each figure lies, in a ratio the same in both "
           "runs (docs/energy.md)",
-          printable(table.process)));
+          printable(table.processes[spent.amounts.front().process].name)));
+  if (const std::string& left_out = table.processes[spent.amounts.front().process].leaves_out; !left_out.empty()) {
+    text += broken_at_commas("not in it: " + printable(left_out));
+  }
   text += left_out_text(runs, spent, table);
   if (runs.size() > 1) {
     text += broken_at_commas(fmt::format("the paper has {} on average and {} (R12, R13) by {}", paper_row("R12").says,
@@ -191,11 +194,13 @@ Json energy_json(const RunResult& run, const RunResult* baseline, const EnergyTa
     events.push_back({{"name", table.events[i].name},
                       {"unit", table.events[i].unit},
                       {"count", amounts.events[i]},
-                      {"picojoules", range_json(table.events[i].picojoules)}});
+                      {"picojoules", range_json(table.events[i].picojoules[amounts.process])}});
   }
   std::optional<Range> ratio;
   if (baseline != nullptr) ratio = energy_ratio(energy_amounts(*baseline, table), amounts, table);
-  return {{"process", table.process},
+  const GpuProcess& process = table.processes[amounts.process];
+  return {{"process", process.name},
+          {"leaves_out", process.leaves_out.empty() ? Json() : Json(process.leaves_out)},
           {"units", std::move(units)},
           {"events", std::move(events)},
           {"moving_millijoules", range_json(report.moving)},

@@ -6,6 +6,7 @@
 
 #include "jobs/optional_json.h"
 #include "jobs/settings.h"
+#include "output/energy_report.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -39,6 +40,16 @@ Json kernel_parameters_json(const FramePath& path, const Platform& platform) {
   return values;
 }
 
+Json frame_energy_json(const FrameEnergy& energy) {
+  if (!energy.frame) return {};
+  Json json = range_json(energy.frame);
+  json.update({{"preprocess", range_json(energy.preprocess)},
+               {"sort", range_json(energy.sort)},
+               {"raster", range_json(energy.raster)},
+               {"over_hardware", range_json(energy.over_hardware)}});
+  return json;
+}
+
 Json path_json(const FramePath& path, const Platform& platform) {
   Json implementations = Json::object();
   for (const auto& [slot, name] : path.implementations) implementations[slot] = name;
@@ -51,7 +62,7 @@ Json path_json(const FramePath& path, const Platform& platform) {
             {"raster", optional_json(path.raster)},
             {"frame", optional_json(path.frame)},
             {"interval", optional_json(path.interval)}}},
-          {"millijoules", Json()},
+          {"millijoules", frame_energy_json(path.energy)},
           {"bytes", counts_json(path.bytes)},
           {"bound_by", path.bound_by.empty() ? Json() : Json(path.bound_by)},
           {"expected_error_percent", optional_json(path.expected_error_percent)},

@@ -8,6 +8,7 @@
 
 #include <vrpipe/component/printable.h>
 
+#include "output/energy_report.h"
 #include "output/machines_text.h"
 #include "output/report.h"
 #include "output/text_table.h"
@@ -58,6 +59,32 @@ std::string entries_text(const FramePath& accelerator) {
   return text;
 }
 
+/// Of what millijoules are, or why there are none.
+std::string energy_notes(const FramesResult& result) {
+  const auto is_known = [](const FramePath& path) { return path.path != "accelerator" && path.energy.frame; };
+  const bool any = std::any_of(result.paths.begin(), result.paths.end(), is_known);
+  if (!any) return "mJ of the GPU are not known: without time, without its figures, or of units that do not count\n";
+  std::string text = fmt::format("mJ at {}", printable(result.process));
+  if (!result.energy_leaves_out.empty()) text += "; not in them: " + printable(result.energy_leaves_out);
+  return text + " (docs/energy.md)\n";
+}
+
+/// Nothing where no path has any.
+std::string energies_text(const FramesResult& result, const TextStyle& style) {
+  TextTable table({"millijoules", "preprocess", "sort", "raster", "frame", "low to high", "over hardware"});
+  const auto nominal = [](const std::optional<Range>& range) { return range ? three_digits(range->nominal) : "-"; };
+  bool has_any = false;
+  for (const FramePath& path : result.paths) {
+    const FrameEnergy& energy = path.energy;
+    has_any = has_any || energy.frame;
+    table.row({printable(fmt::format("{} ({})", path.path, path.name)), nominal(energy.preprocess),
+               nominal(energy.sort), nominal(energy.raster), nominal(energy.frame),
+               energy.frame ? between(*energy.frame) : "-",
+               energy.over_hardware ? fmt::format("{:.2f}x", energy.over_hardware->nominal) : "-"});
+  }
+  return has_any ? table.text(style) + "\n" : "";
+}
+
 }  // namespace
 
 std::string frames_report(const FramesResult& result, const TextStyle& style) {
@@ -75,7 +102,7 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
                is_timed ? fmt::format("{:.2f}x", *path.frame / *hardware->frame) : "-",
                milliseconds_text(path.interval), path.bound_by.empty() ? "-" : printable(path.bound_by)});
   }
-  text += table.text(style) + "\n";
+  text += table.text(style) + "\n" + energies_text(result, style);
   if (hardware->frame)
     text +=
         "in flight: the least from frame to frame, the next prepared beside the draw of this one, as the SM array, "
@@ -87,6 +114,7 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
     if (path.fidelity != result.runs.front().request.fidelity)
       text += fmt::format("{}: at {}, the finest that it has\n", path.path, vrpipe::name_of(path.fidelity));
   }
+  text += energy_notes(result);
   if (!result.viewpoint) text += "a draw list is preprocessed already: frames are without\n";
   for (const std::string& note : result.scene.notes) text += "note: " + printable(note) + "\n";
   return text;

@@ -66,6 +66,11 @@ std::string energy_plot(const JobResult& result, const EnergyBars& bars) {
   return svg(plot);
 }
 
+std::string process_name(const JobResult& result) {
+  const EnergyTable& table = *result.energies;
+  return table.processes[table.process_of(result.runs.front().request.platform->name)].name;
+}
+
 }  // namespace
 
 std::string energy_section(const JobResult& result) {
@@ -85,8 +90,8 @@ std::string energy_section(const JobResult& result) {
     }
   }
   return html(PageFigure{"energy",
-                         "What each run spends, by unit, with the energies at " +
-                             html_escaped(result.energies->process) + ".",
+                         "What each run spends, by unit, with the energies at " + html_escaped(process_name(result)) +
+                             ".",
                          energy_plot(result, bars), csv.text()}) +
          "<details open><summary>With ranges</summary>\n<pre>" +
          html_escaped(energy_text(result.runs, result.baseline, *result.energies, TextStyle{})) + "</pre></details>\n";

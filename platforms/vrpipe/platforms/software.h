@@ -26,6 +26,10 @@ struct KernelReport {
   std::string bound_by;                 ///< "sm", "memory", "launch" or, of the render kernel, "longest tile"
   /// Cycles of a whole SM array, and of all of the memory's bandwidth, that it takes; 0 without time, and of an accelerator.
   std::uint64_t sm_cycles = 0, memory_cycles = 0;
+  // What it spends energy on; none where a kernel does not say, in an accelerator, and cycles without time.
+  std::optional<double> warp_instructions;
+  std::optional<double> lane_instructions;  ///< of the lanes that take part in these
+  std::optional<double> core_cycles;        ///< in which a core has warps, of all cores
 };
 
 struct SoftwareResult {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 namespace vrpipe {
 
@@ -12,8 +13,9 @@ struct KernelWork {
   std::uint64_t items = 0;  ///< Gaussians, splats or pairs
   /// Of all items, on one SM that issues four warp instructions a cycle; an array divides it among what it has.
   double sm_cycles = 0;
-  std::uint64_t bytes = 0;         ///< read from memory and written to it
-  double launch_microseconds = 0;  ///< of launching its grids, whatever the array
+  std::uint64_t bytes = 0;                       ///< read from memory and written to it
+  double launch_microseconds = 0;                ///< of launching its grids, whatever the array
+  std::optional<double> warp_instructions = {};  ///< of all items; none: nobody knows, nor what they spend
 };
 
 }  // namespace vrpipe

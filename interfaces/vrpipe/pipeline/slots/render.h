@@ -14,6 +14,7 @@ struct BlockWork {
   std::uint32_t warps = 0;
   /// Of batch `b` and warp `w` at [b * warps + w]: warp instructions, in thousandths.
   std::vector<std::uint64_t> instructions;
+  std::uint64_t lane_instructions = 0;  ///< of the lanes that take part in these, in thousandths; 0: of all 32
 
   std::size_t batches() const { return warps == 0 ? 0 : instructions.size() / warps; }
 };
