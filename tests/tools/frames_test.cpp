@@ -342,7 +342,7 @@ TEST_F(Frames, APageHasThePapersFiguresOfThisScene) {
     for (std::size_t at = page.find(what); at != std::string::npos; at = page.find(what, at + 1)) ++found;
     return found;
   };
-  EXPECT_EQ(count("<img "), 5U) << "a picture of each path";
+  EXPECT_EQ(count("<img "), 6U) << "a picture of each path";
   EXPECT_EQ(count("<svg"), 5U);
   EXPECT_EQ(count("http://") + count("https://"), count("http://www.w3.org/2000/svg")) << "it needs no network";
 
@@ -356,6 +356,50 @@ TEST_F(Frames, APageHasThePapersFiguresOfThisScene) {
   const Finished untimed = vrpipe({"frames", "--scene", "tiny.spl", "--fidelity", "functional", "--html", "f.html"});
   EXPECT_EQ(untimed.code, 0) << untimed.err;
   EXPECT_NE(read_file(folder() / "f.html").find("nothing takes time"), std::string::npos);
+}
+
+TEST_F(Frames, OfManyViewsAreThoseOfEach) {
+  const std::vector<std::string> small{"--size",       "48x36", "--fovy", "8",
+                                       "--fidelity",   "bound", "--set",  "preprocess.sh_degree=0",
+                                       "--multi-pass", "1"};
+  const auto run = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), small.begin(), small.end());
+    more.insert(more.begin(), "frames");
+    return json_of(more);
+  };
+  const json all = run({"--views", "3", "--output", "views"});
+  EXPECT_EQ(all["schema"], "vrpipe.frame-views/1");
+  EXPECT_EQ(all["cameras"], json({{"file", nullptr}, {"count", 3}, {"orbit", true}}));
+  ASSERT_EQ(all["views"].size(), 3U);
+  json first = all["views"][0]["frames"], alone = run({})["frames"];
+  for (json* paths : {&first, &alone}) {
+    for (json& path : *paths) {
+      path.erase("host_seconds");
+      path.erase("images");
+    }
+  }
+  EXPECT_EQ(first, alone) << "the first view round the scene is the scene's own";
+  std::vector<double> over;
+  for (const json& view : all["views"]) {
+    std::map<std::string, json> paths = by_path(view);
+    over.push_back(paths["vr-pipe"]["milliseconds"]["frame"].get<double>() /
+                   paths["hardware"]["milliseconds"]["frame"].get<double>());
+    EXPECT_TRUE(std::filesystem::exists(folder() / paths["software"]["images"]["png"].get<std::string>()));
+  }
+  const json distribution = all["distribution"]["vr-pipe"]["over_hardware"];
+  EXPECT_EQ(distribution["views"], 3);
+  EXPECT_DOUBLE_EQ(distribution["minimum"], *std::min_element(over.begin(), over.end()));
+  EXPECT_DOUBLE_EQ(distribution["maximum"], *std::max_element(over.begin(), over.end()));
+  EXPECT_EQ(over[distribution["maximum_in_view"].get<std::size_t>()], distribution["maximum"]);
+
+  std::vector<std::string> printed{"frames", "--views", "2"};
+  printed.insert(printed.end(), small.begin(), small.end());
+  const Finished text = vrpipe(printed);
+  EXPECT_EQ(text.code, 0) << text.err;
+  for (const char* part : {"2 views round the scene", "over hardware: least", "accelerator (gscore)"})
+    EXPECT_NE(text.out.find(part), std::string::npos) << part << " is not in\n" << text.out;
+  refused({"frames", "--scene", "tiny.spl", "--views", "2"}, {"--scene", "a draw list"});
+  refused({"frames", "--views", "2", "--html", "page.html"}, {"--html", "one view"});
 }
 
 TEST_F(Frames, MistakesAreToldInALine) {

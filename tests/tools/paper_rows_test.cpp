@@ -36,7 +36,7 @@ TEST(PaperRows, AreAllThereOnceInOrder) {
   EXPECT_EQ(found, expected);
   EXPECT_EQ(judged, (std::vector<std::string>{"R1",  "R2",  "R3",  "R4",  "R5",  "R6",  "R7",  "R8", "R9",
                                               "R10", "R11", "R18", "R19", "R21", "R22", "R23", "C1", "C2",
-                                              "C3",  "C5",  "C6",  "C7",  "C8",  "C9",  "C10", "C11"}));
+                                              "C3", "C4", "C5",  "C6",  "C7",  "C8",  "C9",  "C10", "C11"}));
 }
 
 TEST(PaperRows, AreOfEveryQuantity) {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -47,6 +48,7 @@ class FramesCommand : public Command {
         "\n"
         "Examples:\n"
         "  vrpipe frames --fidelity lt --html frames.html\n"
+        "  vrpipe frames --fidelity lt --views 6 --size 400x300\n"
         "  vrpipe frames --scene draw.spl --platform gh100-gpc --set sm.cores=8\n"
         "  vrpipe frames --set binning.lists=three_sigma --unit render=endless --json -\n"
         "  vrpipe frames --fidelity lt --unit accelerator=gcc --set accelerator.volume_units=8");
@@ -63,31 +65,48 @@ class FramesCommand : public Command {
       std::cout << config_text(invocation(), requests, parameters);
       return;
     }
-    FramesResult result = perform_frames(job);
-    ResultFiles& files = result.files;
-    std::string text;
-    {
-      const StdoutToStderr redirected;
-      text = frames_report(result, stdout_style());
-      if (job.html) files.write(*job.html, frames_page(result), "--html");
-      if (job.json) {
-        const std::string json = json_text(frames_json(result));
-        if (*job.json != "-") {
-          files.write(*job.json, json, "--json");
-        } else {
-          text = json;
-        }
-      }
+    if (const std::optional<ViewsChoice> views = arguments_.views()) {
+      FrameViewsResult result = perform_frame_views(job, *views);
+      ResultFiles files;
+      const bool has_images = std::all_of(result.views.begin(), result.views.end(),
+                                          [](const FramesResult& view) { return view.files.has("--output"); });
+      print(job, result, files, has_images);
+      for (const FramesResult& view : result.views) view.files.check();
+      return;
     }
+    FramesResult result = perform_frames(job);
+    if (job.html) {
+      std::string page;
+      {
+        const StdoutToStderr redirected;
+        page = frames_page(result);
+      }
+      result.files.write(*job.html, page, "--html");
+    }
+    print(job, result, result.files, result.files.has("--output"));
+  }
+
+ private:
+  template <class Result>
+  static void print(const SimulationJob& job, const Result& result, ResultFiles& files, bool has_images) {
+    std::string text, json;
+    {
+      const StdoutToStderr redirected;  // units of plugins may print
+      text = frames_report(result, stdout_style());
+      if (job.json) json = json_text(frames_json(result));
+    }
+    if (job.json && *job.json == "-") {
+      std::cout << json;
+      return files.check();
+    }
+    if (job.json) files.write(*job.json, json, "--json");
     std::cout << text;
-    if (job.json && *job.json == "-") return files.check();
-    if (files.has("--output")) std::cout << "images: " << printable(job.output->string()) << '\n';
+    if (has_images) std::cout << "images: " << printable(job.output->string()) << '\n';
     if (files.has("--html")) std::cout << "page: " << printable(job.html->string()) << '\n';
     if (files.has("--json")) std::cout << "result: " << printable(*job.json) << '\n';
     files.check();
   }
 
- private:
   SimulationArguments arguments_;
 };
 

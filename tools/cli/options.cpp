@@ -238,6 +238,10 @@ void SimulationArguments::declare_whole_frames(Arguments& arguments) {
   declare_rules(arguments);
   arguments.add_option("--multi-pass", passes_, "N", "passes of the path multi-pass (default: 4; 1: without it)",
                        scene_group);
+  arguments.add_option(ViewsChoice::option, views_, "N|all",
+                       "the scene from N cameras evenly spaced among those of --camera FILE, or from\n"
+                       "all of them; without a file, from N round the scene: how frames are distributed",
+                       scene_group);
   arguments.add_option(energies_option, energies_, "FILE.toml",
                        "millijoules by a table of your own (`vrpipe energies --toml` prints the one that\n"
                        "vrpipe comes with)",
@@ -356,7 +360,8 @@ std::optional<ViewsChoice> SimulationArguments::views() const {
   refuse(explain_effects_, "--explain-effects", "it measures the runs of one view");
   const std::string observing = time_.any_given();
   refuse(!observing.empty(), observing.c_str(), "it looks at the runs of one view");
-  refuse(energy_ || !energies_.empty(), energy_ ? "--energy" : energies_option, "it is of the runs of one view");
+  refuse(energy_ || (!energies_.empty() && !takes_kernels_), energy_ ? "--energy" : energies_option,
+         "it is of the runs of one view");
   const auto scene = single(scene_, "--scene");
   refuse(scene && is_draw_list(*scene), "--scene", "a .spl is a draw list, of one camera");
   const auto camera = single(camera_, "--camera");

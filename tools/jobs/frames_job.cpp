@@ -1,6 +1,8 @@
 #include "jobs/frames_job.h"
 
 #include <algorithm>
+#include <filesystem>
+#include <functional>
 #include <memory>
 
 #include <fmt/format.h>
@@ -18,6 +20,8 @@
 
 namespace vrpipe::tools {
 namespace {
+
+namespace fs = std::filesystem;
 
 /// What software rendering was found to be off on a real GPU, with the shipped units (docs/software.md).
 constexpr double software_error_percent = 4;
@@ -199,25 +203,33 @@ class PathMaker {
   double cycles_per_ms_;
 };
 
-}  // namespace
-
-FramesResult perform_frames(const SimulationJob& job) {
+/// The draws by hardware of a job.
+std::vector<HardwareDraw> hardware_draws(const SimulationJob& job) {
   std::vector<HardwareDraw> draws{{"hardware", "baseline", "baseline"}};
   if (job.frame.passes > 1) draws.push_back({"multi-pass", "baseline", fmt::format("{} passes", job.frame.passes)});
   draws.push_back({"in-shader", "in-shader", "ordered lock"});
   draws.push_back({"vr-pipe", "het+qm", "het+qm"});
-  std::vector<std::string> images{image_name(job.frame.name, "software")};
-  for (const HardwareDraw& draw : draws) images.push_back(image_name(job.frame.name, draw.path));
-  images.push_back(image_name(job.frame.name, "accelerator"));
-  check_outputs(job, images);
+  return draws;
+}
+
+/// Names of the images of all paths, in their order.
+std::vector<std::string> path_images(const SimulationJob& job, const fs::path& folder) {
+  std::vector<std::string> names{"software"};
+  for (const HardwareDraw& draw : hardware_draws(job)) names.push_back(draw.path);
+  names.emplace_back("accelerator");
+  for (std::string& name : names) name = (folder / image_name(job.frame.name, name)).string();
+  return names;
+}
+
+/// Draws what was loaded on every path.
+/// @param folder  of its images, in that of --output
+FramesResult frames_of(const SimulationJob& job, const LoadedFrame& loaded, const fs::path& folder,
+                       ProgressLine& progress) {
+  const std::vector<HardwareDraw> draws = hardware_draws(job);
   FramesResult result;
   result.provenance = job.provenance;
   result.preprocessing = job.preprocessing;
   result.processes = job.processes;
-  ProgressLine progress;
-  progress.show("loading " + job.frame.name);
-  const LoadedFrame loaded = load_frame(job.frame, job.scene);
-  progress.erase();
   if (!loaded.meshes.front().empty()) {
     throw UserError("cannot render in software", job.frame.name, "the scene has meshes, and software renders splats",
                     "take a scene without meshes");
@@ -243,7 +255,7 @@ FramesResult perform_frames(const SimulationJob& job) {
   const auto frame_of = [&](const RunRequest& request) {
     return make_frame(request, request.name == "multi-pass" ? job.frame : in_one_pass, loaded);
   };
-  if (job.output) create_output_folder(*job.output, "--output");
+  if (job.output) create_output_folder(*job.output / folder, "--output");
   std::vector<Simulated> simulated =
       simulate_in_processes(requests, frame_of, job.output || job.html, job.processes, progress);
 
@@ -284,6 +296,7 @@ FramesResult perform_frames(const SimulationJob& job) {
     std::vector<const SharedImage*> drawn{&in_software};
     for (const Simulated& run : simulated) drawn.push_back(&*run.image);
     drawn.push_back(&by_accelerator);
+    const std::vector<std::string> images = path_images(job, folder);
     for (std::size_t i = 0; i < result.paths.size(); ++i) {
       if (job.output) result.paths[i].images = write_image(job, images[i], *drawn[i], result.files);
       if (job.html)
@@ -293,6 +306,63 @@ FramesResult perform_frames(const SimulationJob& job) {
   }
   for (Simulated& run : simulated) result.runs.push_back(std::move(run.result));
   return result;
+}
+
+std::optional<Distribution> over_views(const FrameViewsResult& result,
+                                       const std::function<std::optional<double>(const FramesResult&)>& value) {
+  std::vector<std::optional<double>> values;
+  for (const FramesResult& view : result.views) values.push_back(value(view));
+  return distribution_of(values);
+}
+
+}  // namespace
+
+FramesResult perform_frames(const SimulationJob& job) {
+  check_outputs(job, path_images(job, ""));
+  ProgressLine progress;
+  progress.show("loading " + job.frame.name);
+  const LoadedFrame loaded = load_frame(job.frame, job.scene);
+  progress.erase();
+  return frames_of(job, loaded, "", progress);
+}
+
+FrameViewsResult perform_frame_views(const SimulationJob& job, const ViewsChoice& choice) {
+  FrameViewsResult result;
+  ProgressLine progress;
+  progress.show("loading " + job.frame.name);
+  OpenedScene scene = open_scene(job.scene);
+  const std::vector<Viewpoint> cameras = all_cameras(job, choice, scene);
+  result.cameras = cameras.size();
+  if (job.scene.camera) result.camera_file = camera_choice(*job.scene.camera).file;
+  result.indices = chosen_views(choice, cameras.size(), result.camera_file.value_or("the orbit"));
+  std::vector<std::string> images;
+  for (const std::size_t index : result.indices) {
+    const fs::path folder = view_folder(index, cameras.size());
+    if (job.output) check_output_folder(*job.output / folder, "--output");
+    for (std::string& name : path_images(job, folder)) images.push_back(std::move(name));
+  }
+  progress.erase();
+  check_outputs(job, images);
+  for (const std::size_t index : result.indices) {
+    progress.show(fmt::format("preparing view {}, {} of {}", index, result.views.size() + 1, result.indices.size()));
+    scene.viewpoint = cameras[index];
+    const LoadedFrame loaded = load_frame(job.frame, scene, job.scene.preprocess);
+    progress.erase();
+    result.views.push_back(frames_of(job, loaded, view_folder(index, cameras.size()), progress));
+  }
+  return result;
+}
+
+std::optional<Distribution> frame_distribution(const FrameViewsResult& result, std::size_t path) {
+  return over_views(result, [path](const FramesResult& view) { return view.paths[path].frame; });
+}
+
+std::optional<Distribution> over_hardware_distribution(const FrameViewsResult& result, std::size_t path) {
+  constexpr std::size_t hardware = 1;
+  return over_views(result, [path](const FramesResult& view) -> std::optional<double> {
+    const std::optional<double>&own = view.paths[path].frame, &other = view.paths[hardware].frame;
+    return own && other && *other > 0 ? std::optional(*own / *other) : std::nullopt;
+  });
 }
 
 }  // namespace vrpipe::tools

@@ -12,6 +12,7 @@
 #include "image/picture.h"
 #include "jobs/frame_energy.h"
 #include "jobs/simulation_job.h"
+#include "jobs/views_job.h"
 
 namespace vrpipe::tools {
 
@@ -59,8 +60,23 @@ struct FramesResult {
   ResultFiles files;              ///< written so far: images
 };
 
+/// Frames of one scene from many cameras.
+struct FrameViewsResult {
+  std::optional<std::string> camera_file;  ///< none: an orbit
+  std::size_t cameras = 0;                 ///< in the file, or on the orbit
+  std::vector<std::size_t> indices;        ///< of the views, among these
+  std::vector<FramesResult> views;
+};
+
 /// Draws the frame of a job in software, by hardware and by an accelerator: of its requests `baseline` is the path `hardware`,
 /// in several passes `multi-pass`, with a shader that blends `in-shader`, `het+qm` `vr-pipe`. Throws UserError, CommandFailure or a fault.
 FramesResult perform_frames(const SimulationJob& job);
+
+/// The same of many cameras, one after the other; images of a view are in a folder of its own.
+FrameViewsResult perform_frame_views(const SimulationJob& job, const ViewsChoice& choice);
+
+/// Over the views, of a path: milliseconds of a frame, and these over the path `hardware`. None without time.
+std::optional<Distribution> frame_distribution(const FrameViewsResult& result, std::size_t path);
+std::optional<Distribution> over_hardware_distribution(const FrameViewsResult& result, std::size_t path);
 
 }  // namespace vrpipe::tools

@@ -106,6 +106,11 @@ SceneFinding scene_finding(const ReproduceResult& result, std::size_t scene) {
   key.variant = "baseline";
   const RunResult& one_pass = result.at(key).run;
   finding.het_beside_passes = gain(one_pass, het);
+  key.variant = "in-shader";
+  finding.in_shader = gain(result.at(key).run, one_pass);
+  key.variant = "in-shader-no-lock";
+  finding.in_shader_no_lock = gain(result.at(key).run, one_pass);
+  key.variant = "baseline";
   for (const unsigned passes : planned_passes(plan.quick)) {
     key.passes = passes;
     finding.passes.push_back(gain(one_pass, result.at(key).run));

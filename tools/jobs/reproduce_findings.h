@@ -40,6 +40,8 @@ struct SceneFinding {
   const PointResult *map_without = nullptr, *map_with = nullptr;
   std::vector<double> passes;  ///< speed-ups of planned_passes() over one pass
   double het_beside_passes = 0;
+  /// Time of the draw where the shader blends, with an ordered lock and without one, over the baseline's.
+  double in_shader = 0, in_shader_no_lock = 0;
   const WholeFrame* frame = nullptr;  ///< null where there is none
 };
 

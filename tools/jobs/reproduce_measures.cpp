@@ -117,6 +117,8 @@ const std::vector<Quantity>& quantities() {
        [](Of of) { return of.ratio_distribution ? of.ratio_distribution->maximum : no_number; }, false},
       {"best speed-up of passes", [](Of of) { return *std::max_element(of.passes.begin(), of.passes.end()); }, false},
       {"speed-up of het beside passes", [](Of of) { return of.het_beside_passes; }, false},
+      {"time of in-shader blending with a lock", [](Of of) { return of.in_shader; }, false},
+      {"time of in-shader blending without a lock", [](Of of) { return of.in_shader_no_lock; }, false},
       {"frame in software over het+qm", [](Of of) { return measured(of).software / measured(of).het_qm; }, false},
       {"frame in software over het+qm, prepared as in the paper",
        [](Of of) { return papers(of).software / papers(of).het_qm; }, false},

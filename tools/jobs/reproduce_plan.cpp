@@ -19,6 +19,7 @@ constexpr std::size_t views_of_a_quick_look = 2;
 
 const std::vector<std::string> all_variants{"baseline", "qm", "het", "het+qm"};
 const std::vector<std::string> without_merging{"baseline", "het"};
+const std::vector<std::string> in_shader{"in-shader", "in-shader-no-lock"};
 
 /// What could make the fragments of a blended quad fewer under HET: rules of termination, how many quads are tested at a
 /// time, what is rasterised for a splat.
@@ -244,6 +245,7 @@ ReproducePlan plan_reproduction(const ReproduceOptions& options) {
     if (role == PlannedScene::Role::beside) continue;
     add(Fidelity::functional, "", without_merging, true);
     add(sensitivity_fidelity, "", without_merging);
+    add(sensitivity_fidelity, "", in_shader);
     for (const unsigned passes : planned_passes(plan.quick)) {
       key.passes = passes;
       add(sensitivity_fidelity, "", {"baseline"});

@@ -82,7 +82,12 @@ void check_outputs(const SimulationJob& job, const std::vector<std::string>& ima
       }
     }
   }
-  for (const NamedFile& output : outputs) check_output_file(output.path, output.option, job.output);
+  for (const NamedFile& output : outputs) {
+    // An image's folder, which may be one of several in that of --output, is made for it.
+    const bool is_image = output.option == "--output";
+    check_output_file(output.path, output.option,
+                      is_image ? std::filesystem::path(output.path).parent_path() : job.output);
+  }
   check_files_differ(job.inputs, outputs);
 }
 

@@ -33,25 +33,6 @@ using SteadyClock = std::chrono::steady_clock;
 
 // What is drawn.
 
-/// Of a file, or round the view that the scene was opened with.
-std::vector<Viewpoint> all_cameras(const SimulationJob& job, const ViewsChoice& choice, const OpenedScene& scene) {
-  std::vector<Viewpoint> cameras;
-  const std::optional<ImageSize>& size = job.scene.size;
-  if (job.scene.camera) {
-    const std::string file = camera_choice(*job.scene.camera).file;
-    for (Camera& camera : load_cameras(file, job.scene.lenses)) {
-      CameraName name{file, cameras.size(), camera.name};
-      cameras.push_back({size ? resized(camera, *size) : std::move(camera), {}, std::move(name)});
-    }
-    return cameras;
-  }
-  const Camera& first = scene.viewpoint.camera;
-  for (const View& view : orbit_views(*scene.viewpoint.view, choice.count.value())) {
-    cameras.push_back({look_at(view, {first.width, first.height}), view, {}});
-  }
-  return cameras;
-}
-
 /// Preprocesses views when they are asked for, and holds the last of them.
 class ViewFrames {
  public:
@@ -287,6 +268,24 @@ void simulate_views(const SimulationJob& job, ViewFrames& frames, ViewsResult& r
 }
 
 }  // namespace
+
+std::vector<Viewpoint> all_cameras(const SimulationJob& job, const ViewsChoice& choice, const OpenedScene& scene) {
+  std::vector<Viewpoint> cameras;
+  const std::optional<ImageSize>& size = job.scene.size;
+  if (job.scene.camera) {
+    const std::string file = camera_choice(*job.scene.camera).file;
+    for (Camera& camera : load_cameras(file, job.scene.lenses)) {
+      CameraName name{file, cameras.size(), camera.name};
+      cameras.push_back({size ? resized(camera, *size) : std::move(camera), {}, std::move(name)});
+    }
+    return cameras;
+  }
+  const Camera& first = scene.viewpoint.camera;
+  for (const View& view : orbit_views(*scene.viewpoint.view, choice.count.value())) {
+    cameras.push_back({look_at(view, {first.width, first.height}), view, {}});
+  }
+  return cameras;
+}
 
 std::vector<std::size_t> chosen_views(const ViewsChoice& choice, std::size_t cameras, const std::string& file) {
   const std::size_t count = choice.count.value_or(cameras);

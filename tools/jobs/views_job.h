@@ -57,6 +57,9 @@ struct ViewsResult {
   std::shared_ptr<Journal> journal;  ///< to be finished when the results are safe
 };
 
+/// Those of a file, or round the view that the scene was opened with. Throws UserError.
+std::vector<Viewpoint> all_cameras(const SimulationJob& job, const ViewsChoice& choice, const OpenedScene& scene);
+
 /// The views that are drawn of so many cameras: all, or every n-th, from the first on.
 /// Throws UserError when there are fewer cameras, or none.
 std::vector<std::size_t> chosen_views(const ViewsChoice& choice, std::size_t cameras, const std::string& file);

@@ -7,6 +7,7 @@
 #include "jobs/optional_json.h"
 #include "jobs/settings.h"
 #include "output/energy_report.h"
+#include "output/views_json.h"
 
 namespace vrpipe::tools {
 namespace {
@@ -77,22 +78,58 @@ Json path_json(const FramePath& path, const Platform& platform) {
           {"host_seconds", path.host_seconds}};
 }
 
+Json paths_json(const FramesResult& result) {
+  Json frames = Json::array();
+  for (const FramePath& path : result.paths) frames.push_back(path_json(path, *result.runs.front().request.platform));
+  return frames;
+}
+
+/// What all views have in common.
+Json machine_json(const char* schema, const FramesResult& result) {
+  const RunRequest& request = result.runs.front().request;
+  Json json = head_json(schema, result.provenance, result.processes);
+  json.update({{"platform", platform_json(result.runs, result.preprocessing, result.provenance)},
+               {"fidelity", vrpipe::name_of(request.fidelity)},
+               {"format", vrpipe::name_of(request.format)},
+               {"termination", vrpipe::name_of(request.termination)}});
+  return json;
+}
+
 }  // namespace
 
 Json frames_json(const FramesResult& result) {
-  const RunRequest& request = result.runs.front().request;
-  Json frames = Json::array();
-  for (const FramePath& path : result.paths) frames.push_back(path_json(path, *request.platform));
-  Json json = head_json("vrpipe.frames/1", result.provenance, result.processes);
+  Json json = machine_json("vrpipe.frames/1", result);
+  const Platform& platform = *result.runs.front().request.platform;
   json.update({{"scene", scene_json(result.scene, result.width, result.height)},
                {"camera", camera_json(result.viewpoint)},
-               {"platform", platform_json(result.runs, result.preprocessing, result.provenance)},
-               {"fidelity", vrpipe::name_of(request.fidelity)},
-               {"format", vrpipe::name_of(request.format)},
-               {"termination", vrpipe::name_of(request.termination)},
-               {"frames", std::move(frames)},
+               {"frames", paths_json(result)},
                {"without_termination",
-                result.without_termination ? path_json(*result.without_termination, *request.platform) : Json()}});
+                result.without_termination ? path_json(*result.without_termination, platform) : Json()}});
+  return json;
+}
+
+Json frames_json(const FrameViewsResult& result) {
+  Json json = machine_json("vrpipe.frame-views/1", result.views.front());
+  Json views = Json::array(), distributions = Json::object();
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    const FramesResult& view = result.views[i];
+    views.push_back({{"index", result.indices[i]},
+                     {"camera", camera_json(view.viewpoint)},
+                     {"scene", scene_json(view.scene, view.width, view.height)},
+                     {"frames", paths_json(view)}});
+  }
+  const std::vector<FramePath>& paths = result.views.front().paths;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    distributions[paths[i].path] = {{"milliseconds", distribution_json(frame_distribution(result, i), result.indices)},
+                                    {"over_hardware",
+                                     distribution_json(over_hardware_distribution(result, i), result.indices)}};
+  }
+  json.update({{"cameras",
+                {{"file", result.camera_file ? Json(*result.camera_file) : Json()},
+                 {"count", result.cameras},
+                 {"orbit", !result.camera_file}}},
+               {"views", std::move(views)},
+               {"distribution", std::move(distributions)}});
   return json;
 }
 

@@ -120,4 +120,27 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
   return text;
 }
 
+std::string frames_report(const FrameViewsResult& result, const TextStyle& style) {
+  const FramesResult& first = result.views.front();
+  std::string text = style.bold(fmt::format("{}, {} views", printable(first.scene.name), result.views.size()));
+  text += result.camera_file ? fmt::format(", of {} cameras in {}\n", result.cameras, printable(*result.camera_file))
+                             : std::string(" round the scene\n");
+  text += machine_text(first.runs.front().request, style) + "\n";
+  TextTable table({"frame, milliseconds", "least", "median", "most", "over hardware: least", "median", "most",
+                   "in view least, most"});
+  for (std::size_t i = 0; i < first.paths.size(); ++i) {
+    const FramePath& path = first.paths[i];
+    const std::optional<Distribution> frame = frame_distribution(result, i),
+                                      over = over_hardware_distribution(result, i);
+    std::vector<std::string> cells{printable(fmt::format("{} ({})", path.path, path.name))};
+    for (const double Distribution::*value : {&Distribution::minimum, &Distribution::median, &Distribution::maximum})
+      cells.push_back(frame ? milliseconds_text(*frame.*value) : "-");
+    for (const double Distribution::*value : {&Distribution::minimum, &Distribution::median, &Distribution::maximum})
+      cells.push_back(over ? fmt::format("{:.2f}x", *over.*value) : "-");
+    cells.push_back(over ? fmt::format("{}, {}", result.indices[over->least], result.indices[over->most]) : "-");
+    table.row(std::move(cells));
+  }
+  return text + table.text(style);
+}
+
 }  // namespace vrpipe::tools

@@ -53,7 +53,9 @@ Json view_json(const ViewResult& view, std::size_t baseline) {
           {"early_termination_ratio", optional_json(early_termination_ratio(view.runs))}};
 }
 
-Json distribution_json(const std::optional<Distribution>& of, const ViewsResult& result) {
+}  // namespace
+
+Json distribution_json(const std::optional<Distribution>& of, const std::vector<std::size_t>& indices) {
   if (!of) return {};
   return {{"views", of->count},
           {"minimum", of->minimum},
@@ -62,13 +64,13 @@ Json distribution_json(const std::optional<Distribution>& of, const ViewsResult&
           {"upper_quartile", of->upper_quartile},
           {"maximum", of->maximum},
           {"geometric_mean", of->geometric_mean},
-          {"minimum_in_view", result.views[of->least].index},
-          {"maximum_in_view", result.views[of->most].index}};
+          {"minimum_in_view", indices[of->least]},
+          {"maximum_in_view", indices[of->most]}};
 }
 
-}  // namespace
-
 Json views_json(const ViewsResult& result) {
+  std::vector<std::size_t> indices;
+  for (const ViewResult& view : result.views) indices.push_back(view.index);
   std::vector<RunResult> runs = result.views.front().runs;
   const RunRequest& request = runs.front().request;
   for (RunResult& run : runs) add_preprocess_parameters(result.preprocess_parameters, result.views.front().scene, run);
@@ -77,7 +79,7 @@ Json views_json(const ViewsResult& result) {
   Json speedups = Json::object();
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (i == result.baseline) continue;
-    speedups[name_of(runs[i].request)] = distribution_json(speedup_distribution(result, i), result);
+    speedups[name_of(runs[i].request)] = distribution_json(speedup_distribution(result, i), indices);
   }
   const StorageReport storage = quad_merging_storage(request);
   Json json = head_json(result.schema, result.provenance, result.processes);
@@ -98,7 +100,7 @@ Json views_json(const ViewsResult& result) {
                {"views", std::move(views)},
                {"distribution",
                 {{"speedup", std::move(speedups)},
-                 {"early_termination_ratio", distribution_json(ratio_distribution(result), result)}}},
+                 {"early_termination_ratio", distribution_json(ratio_distribution(result), indices)}}},
                {"quad_merging_storage_bytes", {{"tgc", storage.tgc_bytes}, {"qru", storage.qru_bytes}}}});
   for (const RunResult& run : runs) json["implementations"][name_of(run.request)] = implementations_json(run);
   return json;
