@@ -352,7 +352,11 @@ TEST_F(Frames, APageHasThePapersFiguresOfThisScene) {
   EXPECT_EQ(without["name"], "endless");
   EXPECT_GE(without["counts"]["lanes_blending"], with["counts"]["lanes_blending"]);
   EXPECT_EQ(without["counts"]["lanes_stopping"], 0);
-  EXPECT_TRUE(frames({"--fidelity", "lt"})["without_termination"].is_null());
+  EXPECT_EQ(result["without_lock"]["name"], "no lock");
+  EXPECT_LT(result["without_lock"]["milliseconds"]["raster"], by_path(result)["in-shader"]["milliseconds"]["raster"]);
+  EXPECT_NE(page.find("in-shader (no lock)"), std::string::npos);
+  const json plain = frames({"--fidelity", "lt"});
+  for (const char* key : {"without_termination", "without_lock"}) EXPECT_TRUE(plain[key].is_null()) << key;
   const Finished untimed = vrpipe({"frames", "--scene", "tiny.spl", "--fidelity", "functional", "--html", "f.html"});
   EXPECT_EQ(untimed.code, 0) << untimed.err;
   EXPECT_NE(read_file(folder() / "f.html").find("nothing takes time"), std::string::npos);
@@ -427,7 +431,7 @@ TEST_F(Frames, EveryKeyOfTheResultIsDocumented) {
   for (const std::string& key : documented(page, "Keys of a path")) known.insert(key);
   json paths = json::object();
   const json result = frames({"--fidelity", "lt"});
-  for (const char* key : {"frames", "without_termination"}) paths[key] = result[key];
+  for (const char* key : {"frames", "without_termination", "without_lock"}) paths[key] = result[key];
   json untimed = paths, elsewhere = paths, preprocessed = paths;
   untimed["frames"] = frames({"--fidelity", "functional"})["frames"];
   elsewhere["frames"] = frames({"--fidelity", "bound", "--platform", "desktop"})["frames"];

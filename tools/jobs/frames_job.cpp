@@ -225,7 +225,9 @@ std::vector<std::string> path_images(const SimulationJob& job, const fs::path& f
 /// @param folder  of its images, in that of --output
 FramesResult frames_of(const SimulationJob& job, const LoadedFrame& loaded, const fs::path& folder,
                        ProgressLine& progress) {
-  const std::vector<HardwareDraw> draws = hardware_draws(job);
+  std::vector<HardwareDraw> draws = hardware_draws(job);
+  const std::size_t paths = draws.size();
+  if (job.html) draws.push_back({"in-shader", "in-shader-no-lock", "no lock"});
   FramesResult result;
   result.provenance = job.provenance;
   result.preprocessing = job.preprocessing;
@@ -276,9 +278,15 @@ FramesResult frames_of(const SimulationJob& job, const LoadedFrame& loaded, cons
   const FrameEnergies energies(table, simulated.front().result, prepared);
   result.paths.back().energy = energies.of_software(software);
   for (std::size_t i = 0; i < draws.size(); ++i) {
-    result.paths.push_back(make.of_hardware(draws[i], simulated[i].result, prepared));
-    result.paths.back().energy = energies.of_draw(simulated[i].result, prepared);
+    FramePath path = make.of_hardware(draws[i], simulated[i].result, prepared);
+    path.energy = energies.of_draw(simulated[i].result, prepared);
+    if (i < paths) {
+      result.paths.push_back(std::move(path));
+    } else {
+      result.without_lock = std::move(path);
+    }
   }
+  simulated.resize(paths);
   const GpuProcess& process = table.processes[table.process_of(request.platform->name)];
   result.process = process.name;
   result.energy_leaves_out = process.leaves_out;

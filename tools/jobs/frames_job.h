@@ -54,8 +54,9 @@ struct FramesResult {
   std::string process;            ///< for which the GPU's energies hold
   std::string energy_leaves_out;  ///< of the GPU's, e.g. "idle power"; empty: nothing
   std::vector<RunResult> runs;    ///< the draws by hardware
-  /// The software path by `render=endless`, for the page; none where that is what was asked for, or no page was.
-  std::optional<FramePath> without_termination;
+  // For the page, none where it was not asked for: the software path by `render=endless`, unless that is what was asked for; and
+  // the path `in-shader` without a lock.
+  std::optional<FramePath> without_termination, without_lock;
   std::vector<Picture> pictures;  ///< one for each path, over the background; for the page
   ResultFiles files;              ///< written so far: images
 };

@@ -99,12 +99,14 @@ Json machine_json(const char* schema, const FramesResult& result) {
 
 Json frames_json(const FramesResult& result) {
   Json json = machine_json("vrpipe.frames/1", result);
-  const Platform& platform = *result.runs.front().request.platform;
+  const auto beside = [&](const std::optional<FramePath>& path) {
+    return path ? path_json(*path, *result.runs.front().request.platform) : Json();
+  };
   json.update({{"scene", scene_json(result.scene, result.width, result.height)},
                {"camera", camera_json(result.viewpoint)},
                {"frames", paths_json(result)},
-               {"without_termination",
-                result.without_termination ? path_json(*result.without_termination, platform) : Json()}});
+               {"without_termination", beside(result.without_termination)},
+               {"without_lock", beside(result.without_lock)}});
   return json;
 }
 

@@ -87,10 +87,13 @@ std::string raster_figure(const FramesResult& result) {
   plot.description = "time of the draw alone over that of today's hardware, by path";
   plot.title = "time of the draw, hardware's being 1";
   plot.line = 1;
-  for (const FramePath& path : result.paths) {
-    if (path.path == "software" || path.path == "accelerator") continue;
+  const auto add = [&](const FramePath& path) {
     const double over = *path.raster / *hardware->raster;
     plot.groups.push_back({label_of(path), {{0, over, hardware_color, fmt::format("{:.2f}", over)}}, {}});
+  };
+  for (const FramePath& path : result.paths) {
+    if (path.path != "software" && path.path != "accelerator") add(path);
+    if (path.path == "in-shader" && result.without_lock) add(*result.without_lock);
   }
   return figure("draw times", plot, "The draw alone, by what blends and what terminates (Figures 10 and 11).");
 }
