@@ -268,7 +268,7 @@ TEST_F(Frames, APageHasThePapersFiguresOfThisScene) {
     for (std::size_t at = page.find(what); at != std::string::npos; at = page.find(what, at + 1)) ++found;
     return found;
   };
-  EXPECT_EQ(count("<img "), 5U) << "a picture of each path";
+  EXPECT_EQ(count("<img "), 6U) << "a picture of each path";
   EXPECT_EQ(count("<svg"), 5U);
   EXPECT_EQ(count("http://") + count("https://"), count("http://www.w3.org/2000/svg")) << "it needs no network";
 
