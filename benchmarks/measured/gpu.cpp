@@ -47,12 +47,13 @@ const Mode& mode_named(const std::string& name) {
 
 RunResult Gpu::run(const Draw& draw, const Mode& mode) const {
   RunRequest request;
-  request.platform = &platform_named("gh100-gpc");
+  request.platform = &platform_named(platform_);
   request.variant = variant_named(mode.terminates ? "het" : mode.variant);
   request.termination = mode.terminates ? Termination::strict : Termination::paper;
   request.fidelity = fidelity_;
   request.format = mode.format;
   request.settings = {{"state", "obb_padding", "0"}};  // the splats have the boxes that were drawn
+  request.settings.insert(request.settings.end(), settings_.begin(), settings_.end());
   DrawState state = draw_state_of(request);
   state.early_termination = mode.terminates;
   if (mode.change) mode.change(state);

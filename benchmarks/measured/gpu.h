@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <vrpipe/platforms/simulation.h>
 
@@ -21,11 +23,13 @@ struct Mode {
 
 const Mode& mode_named(const std::string& name);
 
-/// `gh100-gpc`.
+/// `gh100-gpc`, or another platform.
 class Gpu {
  public:
-  explicit Gpu(Fidelity fidelity) : fidelity_(fidelity) {}
+  explicit Gpu(Fidelity fidelity, const char* platform = "gh100-gpc", std::vector<Setting> settings = {})
+      : fidelity_(fidelity), platform_(platform), settings_(std::move(settings)) {}
 
+  Fidelity fidelity() const { return fidelity_; }
   RunResult run(const Draw& draw, const Mode& mode) const;
   /// Millions.
   double cycles(const Draw& draw, const Mode& mode) const { return megacycles(run(draw, mode)); }
@@ -33,6 +37,8 @@ class Gpu {
 
  private:
   Fidelity fidelity_;
+  const char* platform_;
+  std::vector<Setting> settings_;
 };
 
 inline double percent(double predicted, double measured) { return 100 * (predicted / measured - 1); }

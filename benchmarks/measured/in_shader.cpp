@@ -54,6 +54,21 @@ void compare(const Gpu& gpu, const MeasuredScene& scene) {
   std::fflush(stdout);
 }
 
+/// Nobody knows whether the lock takes as many cycles of another clock, or as long.
+void compare_clocks(const Gpu& gpu, const Draw& draw) {
+  const Gpu in_cycles(gpu.fidelity(), "agx-orin"),
+      as_long(gpu.fidelity(), "agx-orin", {{"crop", "lock_clock_mhz", "1980"}});
+  const double rop = in_cycles.cycles(draw, mode_named("RGBA16F"));
+  std::printf("\n%-44s%12s%12s\n", "trained on agx-orin, 612 MHz", "M cycles", "over ROP");
+  const auto row = [&](const char* name, double cycles) {
+    std::printf("%-44s%12.2f%12.2f\n", name, cycles, cycles / rop);
+  };
+  row("ROP", rop);
+  row("ordered lock, cycles of any clock", in_cycles.cycles(draw, mode_named("in the shader")));
+  row("ordered lock, as long at any clock", as_long.cycles(draw, mode_named("in the shader")));
+  row("no lock", in_cycles.cycles(draw, mode_named("in the shader, no lock")));
+}
+
 }  // namespace
 
 void compare_in_shader(const Gpu& gpu, bool is_short) {
@@ -70,6 +85,7 @@ void compare_in_shader(const Gpu& gpu, bool is_short) {
     }
     if (is_short) scene.draw.splats.resize(scene.draw.splats.size() / 200);
     compare(gpu, scene);
+    if (scene.name == "trained") compare_clocks(gpu, scene.draw);
   }
 }
 

@@ -14,7 +14,7 @@ void ShadedWarp::keep(const std::array<LaneMask, quads_per_warp>& left) {
                    select(lanes, from.alpha, none)};
     position[kept] = position[i];
     live[kept] = alive;
-    covered[kept] = covered[i];
+    covered[kept] = alive;
     first_primitive[kept] = first_primitive[i];
     last_primitive[kept] = last_primitive[i];
     draw[kept] = draw[i];

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "crop/checked_crop.h"
+#include "crop/in_shader_time.h"
 
 #include <vrpipe/pipeline/barrier_plan.h>
 #include <vrpipe/pipeline/frame_facts.h>
@@ -363,11 +364,13 @@ const EffectRegistrar blend_hazard_effect{
      "",
      EffectKind::timing,
      "a quad waits until an overlapping one has left the blending pipeline",
-     "crop.forwarding is on: it takes the value in the pipeline",
+     "crop.forwarding is on: it takes the value in the pipeline; or shaders blend, who wait for a lock or not at all",
      "a list of the quads in the pipeline, looked through for each quad",
      "before a quad is blended without forwarding",
      {},
      [](const EffectQuestion& asked) {
+       if (dynamic_cast<const InShaderParameters*>(&asked.parameters) != nullptr)
+         return EffectDecision::omit("the shader blends");
        const auto* const crop = dynamic_cast<const CropParameters*>(&asked.parameters);
        if (crop == nullptr) return EffectDecision::keep("the unit is not of this library");
        if (crop->forwarding) return EffectDecision::omit("crop.forwarding=on");

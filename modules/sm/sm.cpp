@@ -279,6 +279,10 @@ void SplatShader::put_out(const Warp& warp, const WarpColors& colors, ShadedWarp
 
 [[gnu::noinline]] void SplatShader::add_pruned(const Warp& warp, std::uint32_t live, std::uint32_t merged_quads,
                                                ShadedWarp& out) const {
+  if (context_.state(warp.quads[0].draw).tests_late()) {  // what that leaves is all that takes part
+    out.covered = out.live;
+    return;
+  }
   unsigned from = out.count;
   unsigned to = warp.count - threads_in(merged_quads);
   out.count = static_cast<std::uint8_t>(to);

@@ -74,9 +74,9 @@ const std::vector<Variant>& more_variants() {
     Variant variant;
     variant.name = name;
     variant.changed_units = {{"crop", "in-shader"}};
-    variant.settings = {{"crop", "lock", lock},
-                        {"sm", "fragment_instructions", "76"},
-                        {"prop", "color_bytes_per_cycle", "256"}};
+    variant.changed_settings = {{"crop", "lock", lock},
+                                {"sm", "fragment_instructions", "76"},
+                                {"prop", "color_bytes_per_cycle", "256"}};
     return variant;
   };
   static const std::vector<Variant> all{in_shader("in-shader", "ordered"), in_shader("in-shader-no-lock", "none")};
