@@ -11,6 +11,7 @@
 #include "host/progress_line.h"
 #include "host/stdout_to_stderr.h"
 #include "image/images.h"
+#include "jobs/imitation.h"
 #include "jobs/loaded_frame.h"
 #include "jobs/microbench_job.h"
 #include "jobs/processes.h"
@@ -49,7 +50,9 @@ std::optional<double> sum(const std::vector<std::optional<double>>& values) {
 struct HardwareDraw {
   std::string path, variant;
   std::uint32_t passes = 1;
-  std::string name() const { return passes == 1 ? variant : fmt::format("{} passes", passes); }
+  std::string name() const {
+    return path == "imitation" ? "stencil, shuffles" : passes == 1 ? variant : fmt::format("{} passes", passes);
+  }
 };
 
 /// With the kernels that the job says.
@@ -183,6 +186,7 @@ class PathMaker {
 FramesResult perform_frames(const SimulationJob& job) {
   std::vector<HardwareDraw> draws{{"hardware", "baseline"}, {"vr-pipe", "het+qm"}};
   if (job.frame.passes > 1) draws.insert(draws.begin() + 1, {"multi-pass", "baseline", job.frame.passes});
+  if (job.imitation) draws.push_back({"imitation", "baseline"});
   std::vector<std::string> images{image_name(job.frame.name, "software")};
   for (const HardwareDraw& draw : draws) images.push_back(image_name(job.frame.name, draw.path));
   images.push_back(image_name(job.frame.name, "accelerator"));
@@ -216,9 +220,19 @@ FramesResult perform_frames(const SimulationJob& job) {
   }
   FrameDescription in_one_pass = job.frame;
   in_one_pass.passes = 1;
+  std::optional<Imitation> imitation;
   const auto frame_of = [&](const RunRequest& request) {
+    if (request.name == "imitation") return imitation->frame;
     return make_frame(request, request.name == "multi-pass" ? job.frame : in_one_pass, loaded);
   };
+  if (job.imitation) {
+    progress.show("counting what is imitated");
+    const DrawState state = frame_of(requests.front())->draws().front().state;
+    imitation = imitation_of(requests.front(), loaded.geometry.front(), state);
+    imitation->request.name = requests.back().name;
+    requests.back() = imitation->request;
+    progress.erase();
+  }
   if (job.output) create_output_folder(*job.output, "--output");
   std::vector<Simulated> simulated =
       simulate_in_processes(requests, frame_of, job.output.has_value(), job.processes, progress);
@@ -237,6 +251,12 @@ FramesResult perform_frames(const SimulationJob& job) {
   for (std::size_t i = 0; i < draws.size(); ++i) {
     result.paths.push_back(make.of_hardware(draws[i], simulated[i].result, prepared));
     result.paths.back().energy = energies.of_draw(simulated[i].result, prepared);
+  }
+  if (imitation) {
+    const bool is_known = result.paths.back().energy.frame.has_value();
+    result.imitation = {imitation->paired_quads, imitation->discarded_quads, imitation->pixels_short,
+                        is_known ? imitated_efficiency(simulated.front().result, simulated.back().result, table)
+                                 : std::nullopt};
   }
   const GpuProcess& process = table.processes[table.process_of(request.platform->name)];
   result.process = process.name;

@@ -76,6 +76,14 @@ Json path_json(const FramePath& path, const Platform& platform) {
           {"host_seconds", path.host_seconds}};
 }
 
+Json imitation_json(const std::optional<ImitationReport>& imitation) {
+  if (!imitation) return {};
+  return {{"paired_quads", imitation->paired_quads},
+          {"discarded_quads", imitation->discarded_quads},
+          {"pixels_short", imitation->pixels_short},
+          {"efficiency", range_json(imitation->efficiency)}};
+}
+
 }  // namespace
 
 Json frames_json(const FramesResult& result) {
@@ -89,7 +97,8 @@ Json frames_json(const FramesResult& result) {
                {"fidelity", vrpipe::name_of(request.fidelity)},
                {"format", vrpipe::name_of(request.format)},
                {"termination", vrpipe::name_of(request.termination)},
-               {"frames", std::move(frames)}});
+               {"frames", std::move(frames)},
+               {"imitation", imitation_json(result.imitation)}});
   return json;
 }
 
