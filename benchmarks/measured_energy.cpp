@@ -49,11 +49,7 @@ EnergyAmounts in_software(const Draw& draw, const RunResult& hardware, const cha
   request.fidelity = hardware.request.fidelity;
   request.settings = {{"sm", "cores", sms}};
   const auto frame = Frame::of(draw);
-  RunResult machine = hardware;
-  for (auto& [name, value] : machine.parameters) {
-    if (name == "sm.cores") value = sms;
-  }
-  const tools::FrameEnergies energies(table(), machine, prepare_for_hardware(request, *frame, {}));
+  const tools::FrameEnergies energies(table(), hardware, prepare_for_hardware(request, *frame, {}));
   return *energies.of_software(simulate_software(request, *frame, {})).amounts;
 }
 

@@ -16,18 +16,18 @@ namespace {
 
 auto fields_of(const StencilFace& face) {
   return std::tie(face.compare, face.stencil_fail, face.depth_fail, face.pass, face.reference, face.read_mask,
-                  face.write_mask);
+                  face.write_mask, face.bits);
 }
 
 /// Of a format that stores whole steps, those from 0 to 1.
 constexpr std::uint32_t steps(DepthFormat format) { return format == DepthFormat::d16 ? 0xffff : 0xffffff; }
 
-unsigned operated(StencilOperation operation, unsigned stored, unsigned reference) {
+unsigned operated(StencilOperation operation, unsigned stored, unsigned reference, unsigned most) {
   switch (operation) {
     case StencilOperation::keep: return stored;
     case StencilOperation::zero: return 0;
     case StencilOperation::replace: return reference;
-    case StencilOperation::increment: return stored == stencil_bits ? stored : stored + 1;
+    case StencilOperation::increment: return stored == most ? stored : stored + 1;
     case StencilOperation::decrement: return stored == 0 ? 0 : stored - 1;
     case StencilOperation::invert: return ~stored;
     case StencilOperation::increment_wrap: return stored + 1;
@@ -39,8 +39,8 @@ unsigned operated(StencilOperation operation, unsigned stored, unsigned referenc
 }  // namespace
 
 std::uint8_t StencilFace::apply(StencilOperation operation, std::uint8_t stored) const {
-  const unsigned written = write_mask & stencil_bits;
-  const unsigned value = operated(operation, stored & stencil_bits, reference & stencil_bits);
+  const unsigned written = write_mask & bits;
+  const unsigned value = operated(operation, stored & bits, reference & bits, bits);
   return static_cast<std::uint8_t>((stored & ~written) | (value & written));
 }
 

@@ -21,7 +21,7 @@ constexpr std::uint64_t most_splats = std::uint64_t{1} << 31;  // primitives are
 auto fields_of(const DrawState& state) {
   return std::tie(state.early_termination, state.termination_threshold, state.termination_inclusive,
                   state.pruning_threshold, state.splat_extent, state.obb_padding, state.depth, state.stencil,
-                  state.late_tests, state.cull, state.shader, state.light, state.blend);
+                  state.late_tests, state.early_tests, state.cull, state.shader, state.light, state.blend);
 }
 
 }  // namespace
@@ -85,6 +85,9 @@ void Frame::draw(std::shared_ptr<const Draw> geometry, const DrawState& state, s
   if (state.late_tests && state.shader == FragmentShader::none) {
     refuse("its tests are to come after shading, and it shades nothing", "leave late_tests out, or shade it");
   }
+  if (state.late_tests && state.early_tests) {
+    refuse("its tests are to come before shading and after it", "leave late_tests or early_tests out");
+  }
   if (state.early_termination && !state.blend) {
     refuse("it terminates early, and does not blend", "leave early_termination or blend out");
   }
@@ -94,10 +97,16 @@ void Frame::draw(std::shared_ptr<const Draw> geometry, const DrawState& state, s
     refuse("its shader writes no colour, and it writes neither depth nor stencil", "have it write the stencil");
   }
   for (const StencilFace* face : {&state.stencil.front, &state.stencil.back}) {
-    if (face->reference > stencil_bits) {
+    if (face->bits != stencil_bits && face->bits != all_stencil_bits)
+      refuse(fmt::format("its stencil has bits {:#x}", face->bits), "use 0x7f or 0xff");
+    if (face->reference > face->bits) {
       refuse(fmt::format("its stencil reference is {}", face->reference),
              "use 0 to 127: the highest bit is termination's");
     }
+  }
+  has_all_stencil_bits_ = has_all_stencil_bits_ || state.stencil.has_all_bits();
+  if (has_all_stencil_bits_ && (state.early_termination || terminates_early())) {
+    refuse("a draw terminates early, and one has all bits of the stencil", "leave the highest to termination");
   }
   if (!geometry->triangles.empty() && geometry->triangles.size() != there) {
     refuse(fmt::format("it has {} triangles for {} splats", geometry->triangles.size(), there),
@@ -116,6 +125,15 @@ void Frame::draw(std::shared_ptr<const Draw> geometry, const DrawState& state, s
   add(command);
   draws_.push_back({std::move(name), state, std::move(geometry), first, splats, splats_, epoch_});
   splats_ += splats;
+}
+
+void Frame::preset_stencil(std::vector<std::uint8_t> values) {
+  if (values.size() != std::size_t{width_} * height_) {
+    throw UserError("cannot preset the stencil", "frame",
+                    fmt::format("there are {} values for {}x{} pixels", values.size(), width_, height_),
+                    "give one for each pixel");
+  }
+  stencil_ = std::make_shared<const std::vector<std::uint8_t>>(std::move(values));
 }
 
 void Frame::clear(Clear clear) {

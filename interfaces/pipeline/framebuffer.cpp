@@ -41,6 +41,21 @@ DepthStencilSurface::DepthStencilSurface(std::uint32_t width, std::uint32_t heig
   clear(all, {});
 }
 
+void DepthStencilSurface::preset_stencil(const std::vector<std::uint8_t>& values, std::uint32_t width) {
+  is_preset_ = true;
+  for (std::size_t tile = 0; tile < grid_.tiles(); ++tile) {
+    const TileId of = grid_.tile(tile);
+    for (unsigned position = 0; position < positions_per_tile; ++position) {
+      DepthStencilQuad& quad = quads_[tile * positions_per_tile + position];
+      for (unsigned lane = 0; lane < 4; ++lane) {
+        const std::size_t x = of.x * screen_tile_pixels + 2U * (position % quads_per_tile_row) + lane % 2;
+        const std::size_t y = of.y * screen_tile_pixels + 2U * (position / quads_per_tile_row) + lane / 2;
+        if (x < width && y * width < values.size()) quad.stencil[lane] = values[y * width + x];
+      }
+    }
+  }
+}
+
 void DepthStencilSurface::clear(const Clear& clear, const Placement& placement) {
   const std::uint32_t depth = store_depth(format_, static_cast<double>(clear.depth_value));
   for (std::size_t tile = 0; tile < grid_.tiles(); ++tile) {
@@ -63,6 +78,10 @@ Framebuffer::Framebuffer(const Frame& frame, ColorFormat format)
     : addresses(address_map(frame, format)),
       color(frame.width(), frame.height(), format),
       depth_stencil(frame.width(), frame.height(), addresses.depth_stencil.address, frame.depth_format(),
-                    frame.tests_depth_stencil()) {}
+                    frame.tests_depth_stencil()) {
+  if (frame.stencil_preset() != nullptr && frame.tests_depth_stencil()) {
+    depth_stencil.preset_stencil(*frame.stencil_preset(), frame.width());
+  }
+}
 
 }  // namespace vrpipe

@@ -10,7 +10,7 @@ namespace {
 
 /// Whether a fragment of a face that does not pass both tests may change the stencil.
 bool failing_writes(const StencilFace& face) {
-  if ((face.write_mask & stencil_bits) == 0) return false;
+  if ((face.write_mask & face.bits) == 0) return false;
   return (face.compare != Compare::always && face.stencil_fail != StencilOperation::keep) ||
          (face.compare != Compare::none && face.depth_fail != StencilOperation::keep);
 }

@@ -1,5 +1,7 @@
 #include "sm/sm.h"
 
+#include "sm/imitated_merging.h"
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -325,6 +327,9 @@ const SlotRegistrar sm_slot{{"sm", 90, "splat-shader", "", true, check_sm},
 const Registrar<SplatShader, SmBehaviour> registrar("sm", "splat-shader",
                                                     "Gaussian splatting shaders with alpha pruning and quad merging",
                                                     false, Trust::trusted, true);
+const Registrar<ImitatedMerging, SmBehaviour> imitated_merging(
+    "sm", "imitated-merging", "the splat shader with shuffles, blends and discards in place of quad merging", false,
+    Trust::trusted);
 const EffectRegistrar mesh_shading_effect{
     {"sm",
      "mesh_shading",

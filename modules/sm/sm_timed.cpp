@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "sm/active_cores.h"
 #include "sm/fragment_programs.h"
 #include "sm/hand_over.h"
 #include "sm/timed_sm_memory.h"
@@ -58,6 +59,12 @@ class TimedSm : public TimedUnit {
   unsigned memory_bytes_per_cycle() const override { return timing_.cores * timing_.fetch.core_bytes; }
   bool memory_is_optional() const override { return true; }
   MemoryBytes memory_bytes() const override { return memory_.moved(); }
+  void close_account(Cycle end) override {
+    for (; !releases_.empty(); releases_.pop())
+      active_.released(releases_.front().core, std::min(end, releases_.front().at));
+    active_.close(end);
+    TimedUnit::close_account(end);
+  }
 
  private:
   void before_end_of_elaboration() override {
@@ -123,6 +130,7 @@ class TimedSm : public TimedUnit {
     for (; !releases_.empty() && releases_.front().at <= at; releases_.pop()) {
       ++free_of_core_[releases_.front().core];
       ++free_slots_;
+      active_.released(releases_.front().core, releases_.front().at);
     }
     if (!(tile == last_tile_ && sent_to_core_ < timing_.warps_to_one_core && free_of_core_[core_] > 0)) {
       do {
@@ -134,6 +142,7 @@ class TimedSm : public TimedUnit {
     ++sent_to_core_;
     --free_of_core_[core_];
     --free_slots_;
+    active_.launched(core_, at);
     return at;
   }
 
@@ -332,6 +341,7 @@ class TimedSm : public TimedUnit {
   const Cycle cycles_per_instruction_;
   const bool roomy_;
   SectoredCacheStatistics l1_statistics_{*this, "l1"};
+  ActiveCores active_{*this, timing_.cores};
   TimedSmMemory memory_;
   std::unique_ptr<FixedLatencyMemory> no_memory_;
   bool fetches_ = false;      ///< the memory port is connected

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "sm/active_cores.h"
 #include "sm/fragment_programs.h"
 #include "sm/hand_over.h"
 #include "sm/sm_memory.h"
@@ -130,6 +131,10 @@ class SmUnit : public Unit {
   unsigned memory_bytes_per_cycle() const override { return timing_.cores * timing_.fetch.core_bytes; }
   bool memory_is_optional() const override { return true; }
   MemoryBytes memory_bytes() const override { return memory_.moved(); }
+  void close_account(Cycle end) override {
+    active_.close(end);
+    Unit::close_account(end);
+  }
 
  private:
   struct Program {
@@ -280,13 +285,15 @@ class SmUnit : public Unit {
         });
   }
 
-  void release_slots() {
+  void release_slots(Cycle now) {
     for (; in_release_.ready(); in_release_.pop()) {
       const std::uint32_t slot = in_release_.front().slot;
       if (slot == no_slot) continue;
-      free_of_core_[warps_per_core_.quotient(slot)].push_back(slot);
+      const auto core = static_cast<std::uint32_t>(warps_per_core_.quotient(slot));
+      free_of_core_[core].push_back(slot);
       ++free_slots_;
       --in_flight_;
+      active_.released(core, now);
     }
   }
 
@@ -357,6 +364,7 @@ class SmUnit : public Unit {
     in_warps_.pop();
     ++in_flight_;
     ++running_;
+    active_.launched(core_, now);
     make_ready(slot, now);
   }
 
@@ -393,7 +401,7 @@ class SmUnit : public Unit {
 
   Cycle tick(Cycle now) override {
     if (fetches_ && memory_.next_completion() <= now) take_answers(now);
-    release_slots();
+    release_slots(now);
     run_events(now);
     launch_fragments(now);
     if (in_vertices_.ready() && vertex_count_ < timing_.vertex_warps) launch_vertex_warp(now);
@@ -434,6 +442,7 @@ class SmUnit : public Unit {
   const std::uint32_t cycles_per_instruction_;
   const Divisor warps_per_core_;
   SectoredCacheStatistics l1_statistics_{*this, "l1"};
+  ActiveCores active_{*this, timing_.cores};
   SmMemory memory_;
   std::unique_ptr<FixedLatencyMemory> no_memory_;
   bool fetches_ = false;      ///< the memory port is connected

@@ -17,7 +17,7 @@ struct ZCacheStatistics : SectoredCacheStatistics {
 /// The sectors of a GPC's surface; none where every one that is missed is read. The statistics outlive it.
 inline std::optional<ClearedSectors> cleared_sectors_of(const DepthStencilSurface& surface, const ZCache& cache,
                                                         ZCacheStatistics& statistics) {
-  if (!cache.fast_clear) return std::nullopt;
+  if (!cache.fast_clear || surface.is_preset()) return std::nullopt;
   return std::optional<ClearedSectors>(std::in_place, surface.address(std::size_t{0}), surface.size_bytes(),
                                        cache.organization, statistics.sectors_as_cleared);
 }

@@ -117,6 +117,8 @@ TEST(Frame, EveryFieldOfAStateTellsItFromAnother) {
       [](DrawState& state) { state.stencil.back.reference = 1; },
       [](DrawState& state) { state.stencil.back.read_mask = 1; },
       [](DrawState& state) { state.stencil.back.write_mask = 1; },
+      [](DrawState& state) { state.stencil.back.bits = all_stencil_bits; },
+      [](DrawState& state) { state.early_tests = true; },
       [](DrawState& state) { state.cull = CullMode::front; },
       [](DrawState& state) { state.shader = FragmentShader::lit; },
       [](DrawState& state) { state.light.x = 1; },
@@ -197,6 +199,44 @@ TEST(Frame, AMeshAndItsStateBelongTogether) {
   DrawState marked = lit;
   marked.stencil.back.reference = 128;
   EXPECT_THROW(frame.draw(mesh, marked), UserError) << "the bit of termination";
+}
+
+TEST(Frame, AllBitsOfTheStencilAreThereWhereNothingTerminates) {
+  const auto splats = numbered_splats(1);
+  DrawState whole;
+  whole.stencil.test = true;
+  whole.stencil.front.bits = whole.stencil.back.bits = all_stencil_bits;
+  whole.stencil.front.reference = 255;
+  DrawState terminates;
+  terminates.early_termination = true;
+  Frame frame(64, 48);
+  frame.draw(splats, whole);
+  EXPECT_THROW(frame.draw(splats, terminates), UserError);
+  Frame other(64, 48);
+  other.draw(splats, terminates);
+  EXPECT_THROW(other.draw(splats, whole), UserError);
+  whole.stencil.back.bits = 0x3f;
+  EXPECT_THROW(Frame(64, 48).draw(splats, whole), UserError) << "neither 7 nor 8";
+}
+
+TEST(Frame, TestsAreBeforeShadingOrBehindIt) {
+  DrawState state;
+  state.stencil.test = true;
+  state.stencil.front.pass = StencilOperation::decrement;
+  EXPECT_TRUE(state.tests_late()) << "the shader may discard";
+  state.early_tests = true;
+  EXPECT_TRUE(state.tests_early());
+  EXPECT_TRUE(state.merges());
+  state.late_tests = true;
+  EXPECT_THROW(Frame(64, 48).draw(numbered_splats(1), state), UserError);
+}
+
+TEST(Frame, APresetStencilHasAValueForEachPixel) {
+  Frame frame(64, 48);
+  EXPECT_EQ(frame.stencil_preset(), nullptr);
+  EXPECT_THROW(frame.preset_stencil(std::vector<std::uint8_t>(64 * 47)), UserError);
+  frame.preset_stencil(std::vector<std::uint8_t>(64 * 48, 200));
+  EXPECT_EQ(frame.stencil_preset()->at(5), 200);
 }
 
 TEST(Frame, ClearsAreOfWhatATargetHolds) {

@@ -93,6 +93,28 @@ TEST(Framebuffer, HasTheFramesSizeAndIsCleared) {
   }
 }
 
+TEST(Framebuffer, HasTheStencilThatIsPreset) {
+  Frame frame(35, 20);
+  DrawState state;
+  state.stencil.test = true;
+  frame.draw(std::make_shared<const Draw>(testing::draw_of(35, 20)), state);
+  EXPECT_FALSE(Framebuffer(frame, ColorFormat::rgba8).depth_stencil.is_preset());
+  std::vector<std::uint8_t> values;
+  for (unsigned i = 0; i < 35 * 20; ++i) values.push_back(static_cast<std::uint8_t>(i % 256));
+  frame.preset_stencil(values);
+  const DepthStencilSurface surface = Framebuffer(frame, ColorFormat::rgba8).depth_stencil;
+  EXPECT_TRUE(surface.is_preset());
+  const auto at = [&](std::uint16_t x, std::uint16_t y) {
+    const TileId tile{static_cast<std::uint16_t>(x / 16), static_cast<std::uint16_t>(y / 16)};
+    const unsigned position = (y % 16U) / 2 * 8 + (x % 16U) / 2;
+    return surface.quad(surface.grid().place(tile, position)).stencil[(y % 2U) * 2 + x % 2U];
+  };
+  EXPECT_EQ(at(0, 0), 0);
+  EXPECT_EQ(at(34, 19), (19 * 35 + 34) % 256);
+  EXPECT_EQ(at(17, 5), (5 * 35 + 17) % 256);
+  EXPECT_EQ(at(16, 18), (18 * 35 + 16) % 256);
+}
+
 TEST(DepthStencilSurface, AGpcClearsTheTerminationOfItsOwnTiles) {
   constexpr unsigned gpcs = 3;
   for (unsigned gpc = 0; gpc < gpcs; ++gpc) {

@@ -84,6 +84,23 @@ MeshTriangle random_triangle(std::uint64_t seed, float side) {
   return triangle;
 }
 
+TEST(StencilFace, HasSevenBitsOrAllOfThem) {
+  StencilFace face;
+  face.compare = Compare::less;
+  EXPECT_TRUE(face.test(127));
+  EXPECT_FALSE(face.test(128)) << "its low bits are 0";
+  EXPECT_EQ(face.apply(StencilOperation::increment, 127), 127);
+  EXPECT_EQ(face.apply(StencilOperation::decrement, 200), 199);
+  EXPECT_EQ(face.apply(StencilOperation::decrement, 128), 128);
+  face.bits = face.read_mask = face.write_mask = all_stencil_bits;
+  EXPECT_TRUE(face.test(128));
+  EXPECT_FALSE(face.test(0));
+  EXPECT_EQ(face.apply(StencilOperation::decrement, 128), 127);
+  EXPECT_EQ(face.apply(StencilOperation::decrement, 0), 0);
+  EXPECT_EQ(face.apply(StencilOperation::increment, 127), 128);
+  EXPECT_EQ(face.apply(StencilOperation::increment, 255), 255);
+}
+
 TEST(DepthPlane, IsThatThroughTheSnappedVerticesInExactArithmetic) {
   std::uint64_t samples = 0;
   for (std::uint64_t seed = 0; seed < 200; ++seed) {

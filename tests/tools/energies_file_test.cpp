@@ -52,7 +52,10 @@ TEST_F(EnergiesFile, MistakesNameTheLineAndWhatToDo) {
   refused_with("name = \"operands of a merge\"", "name = \"operands of a lane\"", {"there are two"});
   refused_with("vrpipe.energies/1", "vrpipe.energies/9", {"schema is not vrpipe.energies/1"});
   refused_with("[[event]]", "[event", {"e.toml line", "--toml"});
-  refused_with("while = \"sm\"", "while = \"sn\"", {"there is no unit 'sn'", "did you mean sm?"});
+  refused_with("cycles = [\"sm.fragments.core_cycles\"", "count = \"1\"\ncycles = [\"sm.fragments.core_cycles\"",
+               {"'active SM' has a count and cycles"});
+  refused_with("cycles = [\"sm.fragments.core_cycles\"", "cycles = [\"sm.fragments.core_cycle\"",
+               {"nothing counts 'sm.fragments.core_cycle'", "did you mean sm.fragments.core_cycles?"});
   refused_with("[[other_process.node]]\nname = \"22 nm\"", "[[other_process.node]]\nname = \"23 nm\"",
                {line_of("[[other_process]]"), "'4N' has no node '22 nm'", "[[other_process.node]]"});
   refused_with("platforms = [\"gh100-gpc\"]\nleaves_out", "platforms = []\nleaves_out", {"'4N' has no platform"});

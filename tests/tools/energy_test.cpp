@@ -274,8 +274,7 @@ source = "s"
   return table_of(text + R"(
 [[power]]
 name = "core"
-count = "sm.cores"
-while = "sm"
+cycles = ["sm.fragments.core_cycles", "kernel.core_cycles"]
 watts = { low = 1, nominal = 2, high = 4 }
 platforms = ["gh100-gpc"]
 source = "s"
@@ -288,23 +287,34 @@ constexpr std::uint64_t cycles_of_a_gh100_millisecond = 1'980'000;
 RunResult run_on_gh100(std::uint64_t milliseconds) {
   RunResult run = run_of(0, 0, milliseconds * cycles_of_a_gh100_millisecond);
   run.request.platform = &platform_named("gh100-gpc");
-  run.parameters = {{"sm.cores", "4"}};
-  run.units = {{"gpc0.sm", {2, 1, 1, 0, 0}, 0, {}}, {"gpc0.crop", {4, 0, 0, 0, 0}, 0, {}}};
+  StatisticReport active;
+  active.name = "sm.fragments.core_cycles";
+  active.kind = "counter";
+  active.value = 3 * *run.cycles;
+  run.statistics.push_back(active);
   return run;
 }
 
 TEST(Energy, PowerOfWhatIsActiveIsForAsLong) {
   const EnergyTable table = table_with_active_cores();
   RunResult run = run_on_gh100(8);
-  // 4 cores of 1, 2, 4 W for three quarters of 8 ms; what was found for the other platform is not taken.
+  // Three cores of 1, 2, 4 W, in the mean, for 8 ms; what was found for the other platform is not taken.
   const EnergyAmounts amounts = energy_amounts(run, table);
   EXPECT_EQ(amounts.powers, (std::vector<double>{0, 3}));
   EXPECT_TRUE(powers_of_other_platforms(table, *run.request.platform).empty());
   expect_range(energy_report(amounts, table).constant.value(), 24, 48, 96);
-  run.units[0].cycles = {0, 4, 0, 0, 0};
+  run.statistics.back().value = 0;
   expect_range(energy_report(energy_amounts(run, table), table).constant.value(), 0, 0, 0);
-  run.units.clear();
-  EXPECT_EQ(energy_amounts(run, table).not_counted, std::vector<std::string>{"constant: core"});
+}
+
+TEST(Energy, WithoutActiveCyclesItIsAtLeastTheRest) {
+  const EnergyTable table = table_with_active_cores();
+  RunResult run = run_on_gh100(8);
+  const EnergyAmounts with = energy_amounts(run, table);
+  run.statistics.pop_back();
+  const EnergyAmounts without = energy_amounts(run, table);
+  EXPECT_EQ(without.missing, std::vector<std::string>{"sm.fragments.core_cycles + kernel.core_cycles"});
+  EXPECT_FALSE(energy_ratio(with, without, table).has_value());
 }
 
 TEST(Energy, OfAnEventIsThatOfTheProcessOfThePlatform) {
@@ -337,7 +347,7 @@ TEST(Energy, OfAKernelIsOfItsInstructionsBytesAndActiveCores) {
   const RunResult machine = run_on_gh100(1);
   const KernelReport kernel = kernel_of(1e9, 32'000'000'000, 5);
   const EnergyAmounts amounts = energy_amounts(kernel, machine, table);
-  // No DRAM: of its bytes there are sectors alone. Two cores of the four, for 5 ms.
+  // No DRAM: of its bytes there are sectors alone. Two cores, for 5 ms.
   EXPECT_EQ(amounts.events, (std::vector<double>{1e9, 1e9}));
   EXPECT_EQ(amounts.powers, (std::vector<double>{0, 2}));
   const EnergyReport report = energy_report(amounts, table);

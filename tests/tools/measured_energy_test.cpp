@@ -42,14 +42,10 @@ class MeasuredEnergy : public ::testing::Test {
     return simulate(request, *Frame::of(draw_, state));
   }
   EnergyAmounts software(const RunResult& hardware, const char* sms) const {
-    RunResult machine = hardware;
-    for (auto& [name, value] : machine.parameters) {
-      if (name == "sm.cores") value = sms;
-    }
     RunRequest in_software = request("baseline");
     in_software.settings = {{"sm", "cores", sms}};
     const auto frame = Frame::of(draw_);
-    const tools::FrameEnergies energies(table_, machine, prepare_for_hardware(in_software, *frame, {}));
+    const tools::FrameEnergies energies(table_, hardware, prepare_for_hardware(in_software, *frame, {}));
     return energies.of_software(simulate_software(in_software, *frame, {})).amounts.value();
   }
   double millijoules(const EnergyAmounts& amounts) const { return energy_report(amounts, table_).total->nominal; }

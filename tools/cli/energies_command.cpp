@@ -22,8 +22,10 @@ std::string range_text(const Range& range) {
   return fmt::format("{:.3g} / {:.3g} / {:.3g}", range.low, range.nominal, range.high);
 }
 
-std::string active_text(const ConstantPower& power) {
-  return power.active_unit.empty() ? "always" : printable(power.active_unit);
+/// Cycles over those of the run are how many are active.
+std::string how_many(const ConstantPower& power) {
+  const std::string text = printable(power.count.text);
+  return power.is_of_cycles ? "(" + text + ") / cycles" : text;
 }
 
 std::string energies_as_text(const EnergyTable& table, const TextStyle& style) {
@@ -40,11 +42,10 @@ std::string energies_as_text(const EnergyTable& table, const TextStyle& style) {
     row.push_back(printable(event.count.text));
     events.row(std::move(row));
   }
-  TextTable powers({"constant power", "W", "how often", "while active"});
+  TextTable powers({"constant power", "W", "how many"});
   powers.left(2);
-  powers.left(3);
   for (const ConstantPower& power : table.powers) {
-    powers.row({printable(power.name), range_text(power.watts), printable(power.count.text), active_text(power)});
+    powers.row({printable(power.name), range_text(power.watts), how_many(power)});
   }
   return events.text(style) + "\n" + powers.text(style) +
          "low / nominal / high; sources: --markdown; to change them: --toml, then `vrpipe compare --energies FILE`\n";
@@ -76,10 +77,10 @@ std::string energies_as_markdown(const EnergyTable& table) {
                           node.voltage_ratio, markdown_escaped(node.source));
     }
   }
-  text += "\n| constant power | W | how often | while active | of | what, and source |\n|---|---|---|---|---|---|\n";
+  text += "\n| constant power | W | how many | of | what, and source |\n|---|---|---|---|---|\n";
   for (const ConstantPower& power : table.powers) {
-    text += fmt::format("| {} | {} | {} | {} | {} | {}. {} |\n", markdown_escaped(power.name), range_text(power.watts),
-                        markdown_escaped(power.count.text), markdown_escaped(active_text(power)),
+    text += fmt::format("| {} | {} | {} | {} | {}. {} |\n", markdown_escaped(power.name), range_text(power.watts),
+                        markdown_escaped(how_many(power)),
                         markdown_escaped(fmt::format("{}", fmt::join(power.platforms, ", "))),
                         markdown_escaped(power.meaning), markdown_escaped(power.source));
   }
@@ -122,7 +123,7 @@ Json energies_as_json(const EnergyTable& table) {
   for (const ConstantPower& power : table.powers) {
     powers.push_back({{"name", power.name},
                       {"count", power.count.text},
-                      {"while_active", power.active_unit.empty() ? Json() : Json(power.active_unit)},
+                      {"is_of_cycles", power.is_of_cycles},
                       {"watts", range_json(power.watts)},
                       {"platforms", power.platforms},
                       {"source", power.source},

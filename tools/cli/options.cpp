@@ -242,6 +242,10 @@ void SimulationArguments::declare_whole_frames(Arguments& arguments) {
                        "the scene from N cameras evenly spaced among those of --camera FILE, or from\n"
                        "all of them; without a file, from N round the scene: how frames are distributed",
                        scene_group);
+  arguments.add_flag("--imitation", imitation_,
+                     "one more path: the baseline as the paper measured energy with it, termination imitated\n"
+                     "by a stencil that counts, merging by the shader (docs/energy.md)",
+                     scene_group);
   arguments.add_option(energies_option, energies_, "FILE.toml",
                        "millijoules by a table of your own (`vrpipe energies --toml` prints the one that\n"
                        "vrpipe comes with)",
@@ -504,6 +508,7 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
   check_explanation(request.effects);
   job.explain_effects = explain_effects_;
   job.energies = energies(*request.platform);
+  job.imitation = imitation_;
   // Those of the table that vrpipe comes with are counted in any case.
   job.html = single(html_, html_option);
   request.reads_statistics = (single(json_, "--json").has_value() && views_.empty()) || job.html || !energies_.empty();

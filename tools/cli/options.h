@@ -87,6 +87,7 @@ class SimulationArguments {
   Values views_, journal_, relative_to_;
   bool compares_any_ = false;
   bool takes_kernels_ = false;
+  bool imitation_ = false;
   Values background_, output_, json_, html_, save_draw_, jobs_;
   TimeArguments time_;
   Values energies_;

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
-#include <functional>
 #include <map>
-#include <numeric>
 #include <set>
 #include <utility>
 
@@ -42,10 +40,7 @@ class EnergyNumbers {
       if (error == std::errc() && end == text.data() + text.size()) add(key, value);
     }
   }
-  std::optional<double> named(const std::string& name) const {
-    const auto found = numbers_.find(name);
-    return found == numbers_.end() ? std::nullopt : std::optional(found->second);
-  }
+  bool has(const std::string& name) const { return numbers_.count(name) > 0; }
 
   /// Of the products that there are numbers for: what a platform lacks does not happen there. None if it lacks all.
   /// @param missing  told what a unit of one's own should say and does not
@@ -77,7 +72,7 @@ class EnergyNumbers {
     return value;
   }
 
-  std::map<std::string, double, std::less<>> numbers_;
+  std::map<std::string, double> numbers_;
   std::vector<std::string> passed_;                       ///< slots of units that pass items through, with a dot
   std::vector<std::pair<std::string, std::string>> own_;  ///< slots and names of units that are not of this library
 };
@@ -129,9 +124,9 @@ Range share_of(const Range& part, const Range& rest) {
   return {share(part.low, rest.high), share(part.nominal, rest.nominal), share(part.high, rest.low)};
 }
 
-/// @param active  share of the time in which a unit, of a slot, has anything to do; none where it is not there
+/// @param cycles  that it takes; none without time
 EnergyAmounts amounts_of(const EnergyNumbers& numbers, const Platform& platform, const EnergyTable& table,
-                         const std::function<std::optional<double>(const std::string&)>& active) {
+                         const std::optional<std::uint64_t>& cycles) {
   EnergyAmounts amounts;
   amounts.process = table.process_of(platform.name);
   std::set<std::string> missing;
@@ -143,30 +138,20 @@ EnergyAmounts amounts_of(const EnergyNumbers& numbers, const Platform& platform,
     amounts.events.push_back(counted(numbers.value(event.count, missing), event.unit + ": " + event.name));
   }
   for (const ConstantPower& power : table.powers) {
-    if (!table.is_taken(power, platform.name)) {
-      amounts.powers.push_back(0);
-      continue;
+    amounts.powers.push_back(0);
+    if (!table.is_taken(power, platform.name)) continue;
+    const std::optional<double> value = numbers.value(power.count, missing);
+    if (!power.is_of_cycles) {
+      amounts.powers.back() = counted(value, "constant: " + power.name);
+    } else if (!value) {
+      missing.insert(power.count.text);  // where the fidelity has none, somebody is active all the same
+    } else if (cycles.value_or(0) > 0) {
+      amounts.powers.back() = *value / static_cast<double>(*cycles);
     }
-    std::optional<double> value = numbers.value(power.count, missing);
-    if (value && !power.active_unit.empty()) {
-      const std::optional<double> share = active(power.active_unit);
-      value = share ? std::optional(*value * *share) : std::nullopt;
-    }
-    amounts.powers.push_back(counted(value, "constant: " + power.name));
   }
   amounts.missing.assign(missing.begin(), missing.end());
+  if (cycles) amounts.seconds = static_cast<double>(*cycles) / (platform.frequency_mhz * 1e6);
   return amounts;
-}
-
-/// Share of a run's cycles in which the units of a slot are not starved, their mean.
-std::optional<double> active_share(const RunResult& run, const std::string& slot) {
-  double starved = 0, all = 0;
-  for (const UnitReport& unit : run.units) {
-    if (unit.name.substr(unit.name.rfind('.') + 1) != slot) continue;
-    starved += static_cast<double>(unit.cycles[static_cast<unsigned>(UnitState::starved)]);
-    all += static_cast<double>(std::accumulate(unit.cycles.begin(), unit.cycles.end(), std::uint64_t{0}));
-  }
-  return all > 0 ? std::optional(1 - starved / all) : std::nullopt;
 }
 
 }  // namespace
@@ -194,9 +179,7 @@ EnergyAmounts& EnergyAmounts::operator+=(const EnergyAmounts& next) {
 }
 
 EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table) {
-  EnergyAmounts amounts = amounts_of(EnergyNumbers(run), *run.request.platform, table,
-                                     [&](const std::string& slot) { return active_share(run, slot); });
-  if (run.cycles) amounts.seconds = static_cast<double>(*run.cycles) / (run.request.platform->frequency_mhz * 1e6);
+  EnergyAmounts amounts = amounts_of(EnergyNumbers(run), *run.request.platform, table, run.cycles);
   amounts.fragments_blended = run.counts.fragments_blended;
   return amounts;
 }
@@ -207,18 +190,11 @@ EnergyAmounts energy_amounts(const KernelReport& kernel, const RunResult& machin
   if (kernel.warp_instructions) numbers.add("kernel.warp_instructions", *kernel.warp_instructions);
   if (kernel.lane_instructions) numbers.add("kernel.lane_instructions", *kernel.lane_instructions);
   numbers.add("kernel.bytes", static_cast<double>(kernel.bytes));
-  if (numbers.named("dram.channels")) numbers.add("kernel.dram_bytes", static_cast<double>(kernel.bytes));
-  const auto active = [&](const std::string& slot) -> std::optional<double> {
-    const double cores = numbers.named("sm.cores").value_or(0) * gpcs_of(machine.request);
-    const double core_cycles = cores * static_cast<double>(kernel.cycles.value_or(0));
-    return slot == "sm" && core_cycles > 0 ? kernel.core_cycles.value_or(0) / core_cycles : 0;
-  };
-  EnergyAmounts amounts = amounts_of(numbers, *machine.request.platform, table, active);
+  if (numbers.has("dram.channels")) numbers.add("kernel.dram_bytes", static_cast<double>(kernel.bytes));
+  if (kernel.core_cycles) numbers.add("kernel.core_cycles", *kernel.core_cycles);
+  EnergyAmounts amounts = amounts_of(numbers, *machine.request.platform, table, kernel.cycles);
   amounts.not_counted.clear();  // it has no part in what units of the pipeline count
   if (!kernel.warp_instructions) amounts.missing.push_back("warp instructions of " + kernel.name);
-  if (kernel.cycles) {
-    amounts.seconds = static_cast<double>(*kernel.cycles) / (machine.request.platform->frequency_mhz * 1e6);
-  }
   return amounts;
 }
 

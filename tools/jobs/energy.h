@@ -20,8 +20,8 @@ struct EnergyAmounts {
   std::optional<double> seconds;  ///< simulated; none where the fidelity has no time
   std::uint64_t fragments_blended = 0;
   std::vector<std::string> not_counted;  ///< "UNIT: NAME" of events and powers of which the run has no counter
-  /// What units of one's own do not say of themselves, e.g. "qru.pairs of qru=mine": what was spent is more, by nobody knows
-  /// how much.
+  /// What units of one's own do not say of themselves, e.g. "qru.pairs of qru=mine", or active cycles that a fidelity does not
+  /// have: what was spent is more, by nobody knows how much.
   std::vector<std::string> missing;
 
   /// One after the other, on the same platform.
@@ -31,7 +31,7 @@ struct EnergyAmounts {
 /// A unit that passes items through has no events.
 EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table);
 
-/// Of a kernel of a frame, on the platform of a run: what there is of it is the run's. It takes no unit but the SM array.
+/// Of a kernel of a frame, on the platform of a run: what there is of it is the run's.
 EnergyAmounts energy_amounts(const KernelReport& kernel, const RunResult& machine, const EnergyTable& table);
 
 /// Of so many bytes to and from a DRAM, of whomever; no time.

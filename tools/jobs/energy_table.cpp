@@ -11,7 +11,6 @@
 #include <toml++/toml.h>
 
 #include <vrpipe/component/error.h>
-#include <vrpipe/pipeline/registry.h>
 
 #include "jobs/settings.h"
 #include "jobs/toml_reader.h"
@@ -117,13 +116,15 @@ class TableReader : TomlReader {
     return read;
   }
 
-  CountFormula count(const toml::table& table) const {
-    const toml::node& found = at(table, "count", "\"sm.quads_shaded\"");
+  CountFormula count(const toml::table& table, const char* key = "count") const {
+    const toml::node& found = at(table, key, "\"sm.quads_shaded\"");
     CountFormula formula;
     formula.where = line(found.source());
     const auto add = [&](const toml::node& node) {
       const auto text = node.value_exact<std::string>();
-      if (!text) refuse(node, "count is neither a text nor an array of texts", "write e.g. \"4 * sm.quads_shaded\"");
+      if (!text)
+        refuse(node, fmt::format("{} is neither a text nor an array of texts", key),
+               "write e.g. \"4 * sm.quads_shaded\"");
       formula.products.push_back(product(node, *text));
       formula.text += (formula.text.empty() ? "" : " + ") + *text;
     };
@@ -132,7 +133,7 @@ class TableReader : TomlReader {
     } else {
       add(found);
     }
-    if (formula.products.empty()) refuse(found, "count is empty", "write e.g. \"sm.quads_shaded\"");
+    if (formula.products.empty()) refuse(found, fmt::format("{} is empty", key), "write e.g. \"sm.quads_shaded\"");
     return formula;
   }
 
@@ -217,19 +218,14 @@ class TableReader : TomlReader {
   }
 
   ConstantPower power(const toml::table& table) const {
-    check_keys(table, {"name", "count", "while", "watts", "platforms", "source", "meaning"});
+    check_keys(table, {"name", "count", "cycles", "watts", "platforms", "source", "meaning"});
     ConstantPower read;
     read.name = text_at(table, "name");
-    read.count = count(table);
-    if (table.contains("while")) {
-      read.active_unit = text_at(table, "while");
-      if (!Registry::instance().has_slot(read.active_unit)) {
-        std::vector<std::string> slots;
-        for (const Slot& slot : Registry::instance().slots()) slots.push_back(slot.name);
-        refuse(*table.get("while"), fmt::format("there is no unit '{}'", read.active_unit),
-               fmt::format("did you mean {}?", nearest_name(read.active_unit, slots)));
-      }
+    read.is_of_cycles = table.contains("cycles");
+    if (read.is_of_cycles && table.contains("count")) {
+      refuse(table, fmt::format("'{}' has a count and cycles", read.name), "leave one out");
     }
+    read.count = count(table, read.is_of_cycles ? "cycles" : "count");
     read.watts = range(table, "watts");
     read.platforms = platforms(table);
     read.source = text_at(table, "source");

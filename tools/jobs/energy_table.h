@@ -54,8 +54,8 @@ struct EnergyEvent {
 /// Power that is there whatever moves.
 struct ConstantPower {
   std::string name;
-  CountFormula count;       ///< of what takes it each
-  std::string active_unit;  ///< slot: while it has anything to do; empty: all of the time
+  CountFormula count;         ///< of what takes it each, all of the time
+  bool is_of_cycles = false;  ///< `count` is of cycles instead, summed over all that take it: while they are active
   Range watts;
   std::vector<std::string> platforms;  ///< for which it was found; empty: all
   std::string source;
@@ -82,9 +82,9 @@ struct EnergyTable {
 };
 
 /// What a count may name of a compute kernel of a frame: warp instructions, those of the lanes that take part, bytes read and
-/// written, and of these what goes to a DRAM, where there is one.
-constexpr std::array<const char*, 4> kernel_numbers{"kernel.warp_instructions", "kernel.lane_instructions",
-                                                    "kernel.bytes", "kernel.dram_bytes"};
+/// written, of these what goes to a DRAM, where there is one, and cycles in which cores have warps, of all cores.
+constexpr std::array<const char*, 5> kernel_numbers{"kernel.warp_instructions", "kernel.lane_instructions",
+                                                    "kernel.bytes", "kernel.dram_bytes", "kernel.core_cycles"};
 
 /// The table that comes with the program, as TOML.
 const char* shipped_energies_text();

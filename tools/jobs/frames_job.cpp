@@ -13,6 +13,7 @@
 #include "host/progress_line.h"
 #include "host/stdout_to_stderr.h"
 #include "image/images.h"
+#include "jobs/imitation.h"
 #include "jobs/loaded_frame.h"
 #include "jobs/microbench_job.h"
 #include "jobs/page_material.h"
@@ -209,6 +210,7 @@ std::vector<HardwareDraw> hardware_draws(const SimulationJob& job) {
   if (job.frame.passes > 1) draws.push_back({"multi-pass", "baseline", fmt::format("{} passes", job.frame.passes)});
   draws.push_back({"in-shader", "in-shader", "ordered lock"});
   draws.push_back({"vr-pipe", "het+qm", "het+qm"});
+  if (job.imitation) draws.push_back({"imitation", "baseline", "stencil, shuffles"});
   return draws;
 }
 
@@ -254,9 +256,25 @@ FramesResult frames_of(const SimulationJob& job, const LoadedFrame& loaded, cons
   }
   FrameDescription in_one_pass = job.frame;
   in_one_pass.passes = 1;
+  const auto place_of = [&](const char* path) {
+    return static_cast<std::size_t>(
+        std::find_if(draws.begin(), draws.end(), [&](const HardwareDraw& draw) { return draw.path == path; }) -
+        draws.begin());
+  };
+  std::optional<Imitation> imitation;
   const auto frame_of = [&](const RunRequest& request) {
+    if (request.name == "imitation") return imitation->frame;
     return make_frame(request, request.name == "multi-pass" ? job.frame : in_one_pass, loaded);
   };
+  if (job.imitation) {
+    progress.show("counting what is imitated");
+    const DrawState state = frame_of(requests.front())->draws().front().state;
+    imitation = imitation_of(requests.front(), loaded.geometry.front(), state);
+    RunRequest& request = requests[place_of("imitation")];
+    imitation->request.name = request.name;
+    request = imitation->request;
+    progress.erase();
+  }
   if (job.output) create_output_folder(*job.output / folder, "--output");
   std::vector<Simulated> simulated =
       simulate_in_processes(requests, frame_of, job.output || job.html, job.processes, progress);
@@ -285,6 +303,13 @@ FramesResult frames_of(const SimulationJob& job, const LoadedFrame& loaded, cons
     } else {
       result.without_lock = std::move(path);
     }
+  }
+  if (imitation) {
+    const std::size_t place = place_of("imitation");
+    const RunResult &baseline = simulated.front().result, &imitated = simulated[place].result;
+    const bool is_known = result.paths[place + 1].energy.frame.has_value();  // software is the first path
+    result.imitation = {imitation->paired_quads, imitation->discarded_quads, imitation->pixels_short,
+                        is_known ? imitated_efficiency(baseline, imitated, table) : std::nullopt};
   }
   simulated.resize(paths);
   const GpuProcess& process = table.processes[table.process_of(request.platform->name)];

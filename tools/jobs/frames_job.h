@@ -18,7 +18,7 @@ namespace vrpipe::tools {
 
 /// One way to draw a whole frame.
 struct FramePath {
-  std::string path;  ///< software, hardware, multi-pass, in-shader, vr-pipe, accelerator
+  std::string path;  ///< software, hardware, multi-pass, in-shader, vr-pipe, imitation, accelerator
   std::string name;  ///< of the render kernel, the variant, the passes, the lock or the accelerator
   Fidelity fidelity = Fidelity::functional;  ///< of an accelerator `lt` where `cycle` was asked for
   // Simulated milliseconds; none where the fidelity has no time.
@@ -43,6 +43,13 @@ struct FramePath {
   double host_seconds = 0;
 };
 
+/// Of the path `imitation` (Imitation).
+struct ImitationReport {
+  double paired_quads = 0, discarded_quads = 0;
+  std::uint64_t pixels_short = 0;
+  std::optional<Range> efficiency;  ///< imitated_efficiency(), of the draws alone; none where energy is not known
+};
+
 struct FramesResult {
   Provenance provenance;
   SceneSummary scene;
@@ -51,6 +58,7 @@ struct FramesResult {
   std::uint32_t width = 0, height = 0;
   unsigned processes = 1;
   std::vector<FramePath> paths;
+  std::optional<ImitationReport> imitation;
   std::string process;            ///< for which the GPU's energies hold
   std::string energy_leaves_out;  ///< of the GPU's, e.g. "idle power"; empty: nothing
   std::vector<RunResult> runs;    ///< the draws by hardware

@@ -53,6 +53,7 @@ struct SimulationJob {
   bool heat_maps = false;                             ///< beside the images
   bool explain_effects = false;                       ///< measures what each effect that a run omits would cost
   std::shared_ptr<const EnergyTable> energies;        ///< by which energy is reported; null if it is not
+  bool imitation = false;                             ///< of `frames`: a path for what the paper measured energy by
   unsigned processes = 1;                             ///< simulations at a time
 };
 

@@ -95,6 +95,14 @@ Json machine_json(const char* schema, const FramesResult& result) {
   return json;
 }
 
+Json imitation_json(const std::optional<ImitationReport>& imitation) {
+  if (!imitation) return {};
+  return {{"paired_quads", imitation->paired_quads},
+          {"discarded_quads", imitation->discarded_quads},
+          {"pixels_short", imitation->pixels_short},
+          {"efficiency", range_json(imitation->efficiency)}};
+}
+
 }  // namespace
 
 Json frames_json(const FramesResult& result) {
@@ -105,6 +113,7 @@ Json frames_json(const FramesResult& result) {
   json.update({{"scene", scene_json(result.scene, result.width, result.height)},
                {"camera", camera_json(result.viewpoint)},
                {"frames", paths_json(result)},
+               {"imitation", imitation_json(result.imitation)},
                {"without_termination", beside(result.without_termination)},
                {"without_lock", beside(result.without_lock)}});
   return json;

@@ -8,6 +8,7 @@
 
 #include <vrpipe/component/printable.h>
 
+#include "jobs/paper_rows.h"
 #include "output/energy_report.h"
 #include "output/machines_text.h"
 #include "output/report.h"
@@ -57,6 +58,19 @@ std::string entries_text(const FramePath& accelerator) {
   const std::string area = published("accelerator.area_mm2"), power = published("accelerator.power_watts");
   if (!area.empty()) text += fmt::format("published: {} mm2{}\n", area, power.empty() ? "" : ", " + power + " W");
   return text;
+}
+
+std::string imitation_text(const ImitationReport& imitation) {
+  std::string text = fmt::format(
+      "imitation: {:.1f} % of the quads issue a merge, {:.1f} % of those left are discarded; {} pixels end at fragment "
+      "255\n",
+      100 * imitation.paired_quads, 100 * imitation.discarded_quads, grouped(imitation.pixels_short));
+  if (!imitation.efficiency) return text;
+  return text +
+         fmt::format(
+             "its draw's energy efficiency over hardware {:.2f}x ({:.2f} to {:.2f}); the paper measured {} (R12)\n",
+             imitation.efficiency->nominal, imitation.efficiency->low, imitation.efficiency->high,
+             paper_row("R12").says);
 }
 
 /// Of what millijoules are, or why there are none.
@@ -111,6 +125,7 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
   for (const FramePath& path : result.paths) {
     if (path.path == "software") text += lanes_text(path);
     if (path.path == "accelerator") text += entries_text(path);
+    if (path.path == "imitation") text += imitation_text(*result.imitation);
     if (path.fidelity != result.runs.front().request.fidelity)
       text += fmt::format("{}: at {}, the finest that it has\n", path.path, vrpipe::name_of(path.fidelity));
   }

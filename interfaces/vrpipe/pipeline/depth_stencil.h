@@ -41,6 +41,8 @@ inline constexpr unsigned stencil_operations = 8;
 /// The most significant bit of a stencil value is early termination's (paper 5.2); an application has the others.
 inline constexpr std::uint8_t termination_bit = 0x80;
 inline constexpr std::uint8_t stencil_bits = 0x7f;
+/// Those that it has where nothing terminates early.
+inline constexpr std::uint8_t all_stencil_bits = 0xff;
 
 /// Of what faces the viewer, or turns its back to him.
 struct StencilFace {
@@ -48,20 +50,21 @@ struct StencilFace {
   StencilOperation stencil_fail = StencilOperation::keep;
   StencilOperation depth_fail = StencilOperation::keep;  ///< passes the stencil test, fails the depth test
   StencilOperation pass = StencilOperation::keep;  ///< passes both, or passes that of stencil where depth is not tested
-  std::uint8_t reference = 0;                      ///< 0 to 127
+  std::uint8_t reference = 0;                      ///< within `bits`
   std::uint8_t read_mask = stencil_bits;           ///< of what is compared
   std::uint8_t write_mask = stencil_bits;
+  std::uint8_t bits = stencil_bits;  ///< of a value; all_stencil_bits only where no draw of the frame terminates early
 
   bool writes() const {
     const bool changes = stencil_fail != StencilOperation::keep || depth_fail != StencilOperation::keep ||
                          pass != StencilOperation::keep;
-    return changes && (write_mask & stencil_bits) != 0;
+    return changes && (write_mask & bits) != 0;
   }
   bool test(std::uint8_t stored) const {
-    const unsigned mask = read_mask & stencil_bits;
+    const unsigned mask = read_mask & bits;
     return passes(compare, reference & mask, stored & mask);
   }
-  /// The stored value after an operation; the termination bit stays.
+  /// The stored value after an operation; what is not of `bits` stays.
   std::uint8_t apply(StencilOperation operation, std::uint8_t stored) const;
 };
 bool operator==(const StencilFace& a, const StencilFace& b);
@@ -72,6 +75,7 @@ struct StencilState {
   StencilFace back;
   const StencilFace& face(bool is_back) const { return is_back ? back : front; }
   bool writes() const { return test && (front.writes() || back.writes()); }
+  bool has_all_bits() const { return test && (front.bits == all_stencil_bits || back.bits == all_stencil_bits); }
 };
 bool operator==(const StencilState& a, const StencilState& b);
 

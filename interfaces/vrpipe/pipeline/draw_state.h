@@ -56,6 +56,8 @@ struct DrawState {
   DepthState depth;
   StencilState stencil;
   bool late_tests = false;  ///< depth and stencil are tested after shading, also where they might be before it
+  /// They are tested before it, also where the shader discards: that leaves its trace (GLSL's early_fragment_tests).
+  bool early_tests = false;
   CullMode cull = CullMode::none;
   FragmentShader shader = FragmentShader::splat;
   Light light;
@@ -73,7 +75,7 @@ struct DrawState {
   }
   /// Whether depth and stencil are tested after shading: a fragment that the shader drops leaves no trace in them.
   bool tests_late() const {
-    return tests_depth_stencil() && shader != FragmentShader::none &&
+    return tests_depth_stencil() && shader != FragmentShader::none && !early_tests &&
            (late_tests || (discards() && writes_depth_stencil()));
   }
   bool tests_early() const { return tests_depth_stencil() && !tests_late(); }

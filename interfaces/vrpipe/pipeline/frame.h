@@ -62,12 +62,19 @@ class Frame {
 
   /// Splats `first` to `first` + `splats` - 1 of a geometry, all of it by default. Throws UserError for one of another
   /// size than the frame's, splats that it does not have, triangles that are not as many as its splats, a mesh that has splats,
-  /// a shader for what it is not, late tests where nothing is shaded, early termination without blending, a stencil
-  /// reference beyond 127, and more than 32767 draws, 65534 commands or 2^31 splats.
+  /// a shader for what it is not, late tests where nothing is shaded or tests are early, early termination without blending
+  /// or beside a draw that has all bits of the stencil, a stencil reference beyond its bits, and more than 32767 draws,
+  /// 65534 commands or 2^31 splats.
   void draw(std::shared_ptr<const Draw> geometry, const DrawState& state, std::string name = {},
             std::uint32_t first = 0, std::uint32_t splats = ~0U);
   /// Throws UserError for more than 65534 commands, a depth outside [0, 1] and a stencil value beyond 127.
   void clear(Clear clear);
+
+  /// What the stencil holds before the first command, row by row; without, 0. No fast clear is known of then: all is read.
+  /// Throws UserError unless there is a value for each pixel.
+  void preset_stencil(std::vector<std::uint8_t> values);
+  /// Null: all 0.
+  const std::vector<std::uint8_t>* stencil_preset() const { return stencil_.get(); }
 
   /// A clear or a draw.
   struct Command {
@@ -110,6 +117,8 @@ class Frame {
   std::uint16_t epoch_ = 0;
   std::vector<Command> commands_;
   std::vector<DrawCall> draws_;
+  bool has_all_stencil_bits_ = false;  ///< a draw
+  std::shared_ptr<const std::vector<std::uint8_t>> stencil_;
 };
 
 }  // namespace vrpipe

@@ -33,7 +33,7 @@ AddressMap address_map(const Frame& frame, ColorFormat format);
 /// Depth and stencil of a quad's four pixels.
 struct DepthStencilQuad {
   std::array<std::uint32_t, 4> depth;   ///< as store_depth has it
-  std::array<std::uint8_t, 4> stencil;  ///< without the termination bit
+  std::array<std::uint8_t, 4> stencil;  ///< without the termination bit, which is kept apart
 };
 
 /// A depth-stencil target, block-linear as a ColorSurface is: of 4 bytes a pixel two quads (4x2 pixels) are one 32-byte
@@ -55,6 +55,10 @@ class DepthStencilSurface {
   std::uint8_t terminated(std::size_t place) const { return terminated_[place]; }
   DepthStencilQuad& quad(std::size_t place) { return quads_[place]; }
   const DepthStencilQuad& quad(std::size_t place) const { return quads_[place]; }
+  /// The stencil of each pixel, row by row of so many pixels.
+  void preset_stencil(const std::vector<std::uint8_t>& values, std::uint32_t width);
+  /// Whether it was not cleared at first.
+  bool is_preset() const { return is_preset_; }
   /// In the screen tiles of a GPC.
   void clear(const Clear& clear, const Placement& placement);
   /// Byte address of a quad in the modelled memory. Tiles, and quads in them, are naturally aligned.
@@ -72,6 +76,7 @@ class DepthStencilSurface {
   DepthFormat format_;
   std::vector<std::uint8_t> terminated_;
   std::vector<DepthStencilQuad> quads_;  ///< or none
+  bool is_preset_ = false;
 };
 
 /// What a frame is drawn into.
