@@ -34,9 +34,9 @@ TEST(PaperRows, AreAllThereOnceInOrder) {
     EXPECT_EQ(row.tolerance_percent == PaperRow::default_tolerance_percent, row.tolerance_reason.empty()) << row.id;
   }
   EXPECT_EQ(found, expected);
-  EXPECT_EQ(judged, (std::vector<std::string>{"R1",  "R2",  "R3",  "R4",  "R5",  "R6",  "R7",  "R8", "R9",
-                                              "R10", "R11", "R18", "R19", "R21", "R22", "R23", "C1", "C2",
-                                              "C3", "C4", "C5",  "C6",  "C7",  "C8",  "C9",  "C10", "C11"}));
+  EXPECT_EQ(judged, (std::vector<std::string>{"R1",  "R2",  "R3",  "R4",  "R5",  "R6",  "R7",  "R8",  "R9", "R10",
+                                              "R11", "R12", "R13", "R18", "R19", "R21", "R22", "R23", "C1", "C2",
+                                              "C3",  "C4",  "C5",  "C6",  "C7",  "C8",  "C9",  "C10", "C11"}));
 }
 
 TEST(PaperRows, AreOfEveryQuantity) {

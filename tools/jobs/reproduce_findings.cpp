@@ -110,6 +110,13 @@ SceneFinding scene_finding(const ReproduceResult& result, std::size_t scene) {
   finding.in_shader = gain(result.at(key).run, one_pass);
   key.variant = "in-shader-no-lock";
   finding.in_shader_no_lock = gain(result.at(key).run, one_pass);
+  key.variant = PointKey::imitated_variant;
+  if (plan.places.count(key.name(plan.scenes)) > 0) {
+    const std::optional<EnergyAmounts>& imitated = result.at(key).energy;
+    key.variant = "baseline";
+    const std::optional<EnergyAmounts>& baseline = result.at(key).energy;
+    if (baseline && imitated) finding.imitated_efficiency = energy_ratio(*baseline, *imitated, shipped_energies());
+  }
   key.variant = "baseline";
   for (const unsigned passes : planned_passes(plan.quick)) {
     key.passes = passes;

@@ -42,6 +42,8 @@ struct SceneFinding {
   double het_beside_passes = 0;
   /// Time of the draw where the shader blends, with an ordered lock and without one, over the baseline's.
   double in_shader = 0, in_shader_no_lock = 0;
+  /// Energy of the baseline over that of its imitation of HET+QM, by shipped_energies(); none in a quick look.
+  std::optional<Range> imitated_efficiency;
   const WholeFrame* frame = nullptr;  ///< null where there is none
 };
 

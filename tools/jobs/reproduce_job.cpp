@@ -15,6 +15,7 @@
 #include <vrpipe/component/printable.h>
 
 #include "jobs/identity.h"
+#include "jobs/imitation.h"
 #include "jobs/loaded_frame.h"
 #include "jobs/microbench_record.h"
 #include "jobs/processes.h"
@@ -237,6 +238,12 @@ void simulate_points(const ReproduceJob& job, const std::vector<bool>& is_done, 
       const ReproducePoint& drawn = plan.points[i];
       progress.show("preparing " + drawn.key.name(plan.scenes));
       std::shared_ptr<const Frame> made = frames.frame(drawn.key, request);
+      if (drawn.key.variant == PointKey::imitated_variant) {
+        const Imitation imitation =
+            imitation_of(request, frames.loaded(drawn.key).geometry.front(), made->draws().front().state);
+        tasks[task].request = imitation.request;
+        made = imitation.frame;
+      }
       const LoadedFrame& loaded = frames.loaded(drawn.key);
       PointResult& of = result.points[i];
       of.gaussians_total = loaded.summary.gaussians_total;

@@ -20,11 +20,11 @@ double utilization_of(const SceneFinding& scene, const char* unit) {
 
 StorageReport storage_of(const SceneFinding& scene) { return quad_merging_storage(scene.runs[3]->run.request); }
 
-double energy_of(const SceneFinding& scene, double Range::*end) {
+double energy_of(const SceneFinding& scene) {
   const auto &baseline = scene.runs[0]->energy, &extended = scene.runs[3]->energy;
   if (!baseline || !extended) return no_number;
   const std::optional<Range> ratio = energy_ratio(*baseline, *extended, shipped_energies());
-  return ratio ? *ratio.*end : no_number;
+  return ratio ? ratio->nominal : no_number;
 }
 
 bool is_bound_by_rop(const SceneFinding& scene) {
@@ -109,9 +109,9 @@ const std::vector<Quantity>& quantities() {
       {"utilisation of sm", [](Of of) { return utilization_of(of, "sm"); }, true},
       {"utilisation of crop", [](Of of) { return utilization_of(of, "crop"); }, true},
       {"ROP bounds the baseline", [](Of of) { return is_bound_by_rop(of) ? 1.0 : 0.0; }, true},
-      {"energy of baseline over het+qm", [](Of of) { return energy_of(of, &Range::nominal); }, false},
-      {"low energy of baseline over het+qm", [](Of of) { return energy_of(of, &Range::low); }, false},
-      {"high energy of baseline over het+qm", [](Of of) { return energy_of(of, &Range::high); }, false},
+      {"energy of baseline over its imitation of het+qm",
+       [](Of of) { return of.imitated_efficiency ? of.imitated_efficiency->nominal : no_number; }, false},
+      {"energy of baseline over het+qm", [](Of of) { return energy_of(of); }, false},
       {"early-termination ratio", [](Of of) { return of.ratio_mean; }, false},
       {"greatest early-termination ratio",
        [](Of of) { return of.ratio_distribution ? of.ratio_distribution->maximum : no_number; }, false},

@@ -49,7 +49,7 @@ class Points {
       }
       RunRequest request = with_settings(base_, key.settings);
       request.fidelity = key.fidelity;
-      request.variant = variant_named(variant);
+      request.variant = variant_named(variant == PointKey::imitated_variant ? "baseline" : variant);
       request.reads_statistics = false;
       plan_.points.push_back({key, std::move(request), with_map});
     }
@@ -246,6 +246,7 @@ ReproducePlan plan_reproduction(const ReproduceOptions& options) {
     add(Fidelity::functional, "", without_merging, true);
     add(sensitivity_fidelity, "", without_merging);
     add(sensitivity_fidelity, "", in_shader);
+    if (!plan.quick) add(sensitivity_fidelity, "", {PointKey::imitated_variant});
     for (const unsigned passes : planned_passes(plan.quick)) {
       key.passes = passes;
       add(sensitivity_fidelity, "", {"baseline"});

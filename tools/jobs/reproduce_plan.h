@@ -46,8 +46,11 @@ struct PointKey {
   std::size_t view = 0;  ///< 0: the scene's own camera
   unsigned passes = 1;
   Fidelity fidelity = Fidelity::cycle;
-  std::string settings;  ///< as SensitivityParameter::values
-  std::string variant = "baseline";
+  std::string settings;              ///< as SensitivityParameter::values
+  std::string variant = "baseline";  ///< or imitated_variant
+
+  /// The baseline that imitates HET+QM, as the paper measured energy (Imitation).
+  static constexpr const char* imitated_variant = "imitation";
 
   std::string name(const std::vector<PlannedScene>& scenes) const;
 };

@@ -119,7 +119,7 @@ std::string verdict_summary(const Reproduction& of) {
   const std::string unsaid =
       counts[Verdict::cannot_say] == 0 ? "" : fmt::format("; of {} nothing can be said", counts[Verdict::cannot_say]);
   return fmt::format(
-      "{} of {} rows that could have failed agree{}; {} are inputs, {} cannot fail, {} are not modelled{}",
+      "{} of {} rows that could have failed agree{}; {} are inputs, {} cannot fail, {} not modelled{}",
       counts[Verdict::agrees], counts[Verdict::agrees] + counts[Verdict::differs], unsaid, counts[Verdict::input],
       counts[Verdict::cannot_fail], counts[Verdict::not_modelled], of.result.plan.quick ? "; of a quick look" : "");
 }
