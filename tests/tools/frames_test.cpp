@@ -94,6 +94,15 @@ TEST_F(Frames, DrawsAreThoseOfCompare) {
   }
 }
 
+TEST_F(Frames, AShaderThatBlendsIsThatOfRun) {
+  const std::vector<std::string> set{"--fidelity", "lt", "--platform", "gh100-gpc", "--set", "crop.cache_bytes=4096"};
+  std::vector<std::string> run{"run", "--scene", "tiny.spl", "--variant", "in-shader"};
+  run.insert(run.end(), set.begin(), set.end());
+  const json of_run = json_of(run)["runs"][0], path = by_path(frames(set))["in-shader"];
+  EXPECT_EQ(path["milliseconds"]["raster"], of_run["milliseconds"]);
+  EXPECT_EQ(path["result_hash"], of_run["result_hash"]);
+}
+
 TEST_F(Frames, SeveralPassesAreThoseOfRun) {
   const json result = frames({"--fidelity", "lt", "--multi-pass", "3"});
   const json run =
