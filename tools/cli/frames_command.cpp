@@ -40,10 +40,12 @@ class FramesCommand : public Command {
         "they are units, so that --unit puts another one into the slots preparation, binning and render. `accelerator` "
         "has\n"
         "units, a clock and a memory of its own; --unit accelerator=NAME takes another: gscore, gcc, flicker.\n"
+        "Millijoules are by the table of `vrpipe energies`; --imitation adds what the paper measured energy by.\n"
         "\n"
         "Examples:\n"
         "  vrpipe frames --fidelity lt\n"
         "  vrpipe frames --scene draw.spl --platform gh100-gpc --set sm.cores=8\n"
+        "  vrpipe frames --fidelity lt --imitation\n"
         "  vrpipe frames --set binning.lists=three_sigma --unit render=endless --json -\n"
         "  vrpipe frames --fidelity lt --unit accelerator=gcc --set accelerator.volume_units=8");
   }
