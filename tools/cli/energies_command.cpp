@@ -141,7 +141,7 @@ class EnergiesCommand : public Command {
  public:
   std::string name() const override { return "energies"; }
   std::string summary() const override {
-    return "what events cost, by which --energy reports; or checks a file of them";
+    return "what events and active time cost, by which --energy reports; or checks a file of them";
   }
 
   void declare(Arguments& arguments) override {

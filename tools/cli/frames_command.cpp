@@ -45,11 +45,13 @@ class FramesCommand : public Command {
         "`accelerator` has units, a clock and a memory of its own; --unit accelerator=NAME takes another: gscore, "
         "gcc,\n"
         "flicker.\n"
+        "Millijoules are by the table of `vrpipe energies`; --imitation adds what the paper measured energy by.\n"
         "\n"
         "Examples:\n"
         "  vrpipe frames --fidelity lt --html frames.html\n"
         "  vrpipe frames --fidelity lt --views 6 --size 400x300\n"
         "  vrpipe frames --scene draw.spl --platform gh100-gpc --set sm.cores=8\n"
+        "  vrpipe frames --fidelity lt --imitation\n"
         "  vrpipe frames --set binning.lists=three_sigma --unit render=endless --json -\n"
         "  vrpipe frames --fidelity lt --unit accelerator=gcc --set accelerator.volume_units=8");
   }

@@ -143,9 +143,9 @@ EnergyAmounts amounts_of(const EnergyNumbers& numbers, const Platform& platform,
     const std::optional<double> value = numbers.value(power.count, missing);
     if (!power.is_of_cycles) {
       amounts.powers.back() = counted(value, "constant: " + power.name);
-    } else if (!value) {
-      missing.insert(power.count.text);  // where the fidelity has none, somebody is active all the same
-    } else if (cycles.value_or(0) > 0) {
+    } else if (!value && cycles) {
+      missing.insert("cycles of " + power.name);  // somebody is active all the same
+    } else if (value && cycles.value_or(0) > 0) {
       amounts.powers.back() = *value / static_cast<double>(*cycles);
     }
   }
