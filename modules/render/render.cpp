@@ -138,6 +138,7 @@ void TileKernel::render_by(std::size_t tile, const std::uint32_t* splats, std::u
   for (std::uint32_t warp = 0; warp < warps; ++warp) {
     WarpLanes lanes = begin(tile, warp);
     std::uint32_t alive = lanes.alive_mask();
+    const std::uint64_t off_frame = lanes_of_warp - count_bits(alive), iterations = warp_iterations.value();
     while (lived[warp] < all_batches && alive != 0) {
       std::uint64_t& instructions = out.instructions[std::size_t{lived[warp]} * warps + warp];
       std::uint32_t next = lived[warp]++ * batch_splats;
@@ -147,6 +148,7 @@ void TileKernel::render_by(std::size_t tile, const std::uint32_t* splats, std::u
         if constexpr (Rule != StopRule::none) alive = lanes.alive_mask();
       }
     }
+    lanes_off_frame_ += off_frame * (warp_iterations.value() - iterations);
     begun = std::max(begun, lived[warp]);
     if (color_ != nullptr) store(tile, warp, lanes);
   }
@@ -166,6 +168,17 @@ void TileKernel::render(std::size_t tile, const std::uint32_t* splats, std::uint
     case StopRule::before: return render_by<StopRule::before>(tile, splats, length, out);
     case StopRule::after: return render_by<StopRule::after>(tile, splats, length, out);
   }
+}
+
+void TileKernel::add_to(Counts& counts, const CountOf& of) const {
+  const std::uint64_t terminated = of(lanes_dead) - lanes_off_frame_;
+  const std::uint64_t shaded = of(lanes_blending) + of(lanes_stopping) + of(lanes_pruned);
+  counts.fragments_rasterized += terminated + shaded;
+  counts.fragments_terminated += terminated;
+  counts.fragments_shaded += shaded;
+  counts.fragments_pruned += of(lanes_pruned);
+  counts.fragments_dropped_late += of(lanes_stopping);
+  counts.fragments_blended += of(lanes_blending);
 }
 
 void TileKernel::store(std::size_t tile, std::uint32_t warp, const WarpLanes& lanes) {

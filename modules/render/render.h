@@ -99,6 +99,8 @@ class TileKernel : public RenderBehaviour {
 
   void use_surfaces(Framebuffer& framebuffer) override;
   void render(std::size_t tile, const std::uint32_t* splats, std::uint32_t length, BlockWork& out) override;
+  /// A fragment is a lane's look at a splat, of a pixel of the frame.
+  void add_to(Counts& counts, const CountOf& of) const override;
   TimingParameters timing() const override { return timing_; }
   std::uint64_t bytes() const override { return bytes_; }
 
@@ -148,6 +150,7 @@ class TileKernel : public RenderBehaviour {
   std::vector<SplatRecord> records_;
   ColorSurface* color_ = nullptr;
   std::uint64_t bytes_ = 0;
+  std::uint64_t lanes_off_frame_ = 0;  ///< of those that are dead
 };
 
 /// Stops as published.

@@ -271,6 +271,7 @@ SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
   statistics.add(binning_name, binning_name, lists_by->unit());
   statistics.add(render_name, render_name, tiles_by->unit());
   result.statistics = statistics.reports();
+  tiles_by->unit().add_to(result.counts, CountOf());
   result.result_hash = hash_of(result.statistics, result.cycles, result.framebuffer.color);
   for (const ChosenKernel* kernel : {&preparation, &binning, &render}) {
     const Implementation& implementation = *kernel->implementation;
