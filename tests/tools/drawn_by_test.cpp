@@ -70,6 +70,27 @@ TEST_F(DrawnBy, SoftwareTakesTheListsAndTheRenderingOfItsFrame) {
   EXPECT_EQ(run["result_hash"], path["result_hash"]);
 }
 
+TEST_F(DrawnBy, HeatMapsOfSoftwareSumToItsCounts) {
+  for (const char* pixels : {"16x2", "8x4"}) {
+    SCOPED_TRACE(pixels);
+    std::vector<std::string> command{"run",        "--scene", "tiny.spl",
+                                     "--fidelity", "lt",      "--variant",
+                                     "software",   "--set",   std::string("render.warp_pixels=") + pixels,
+                                     "--output",   "o"};
+    const json unseen = json_of(command)["runs"][0];
+    command.emplace_back("--heat-maps");
+    const json run = json_of(command)["runs"][0];
+    EXPECT_EQ(run["result_hash"], unseen["result_hash"]);
+    const json maps = json::parse(read_file(folder() / "o/tiny-software-heat-maps.json"))["pixels"];
+    const json& counts = run["counts"];
+    EXPECT_EQ(maps["rasterized"]["sum"], counts["fragments_rasterized"]);
+    EXPECT_EQ(maps["blended"]["sum"], counts["fragments_blended"]);
+    EXPECT_EQ(maps["terminated"]["sum"], sum_of(counts, {"terminated", "dropped_late"}));
+    EXPECT_EQ(maps["merged"]["sum"], 0);
+    EXPECT_GT(sum_of(counts, {"terminated"}), 0U);
+  }
+}
+
 TEST_F(DrawnBy, AGaussianSceneIsProjectedBefore) {
   const std::vector<std::string> small{"--size", "64x48", "--fovy", "10", "--set", "preprocess.sh_degree=0"};
   std::vector<std::string> arguments = small;
