@@ -306,8 +306,10 @@ bool TileAccelerator::draw_in_subtile(const SplatRecord& splat, std::size_t subt
   for (std::size_t vector = 0; vector < vectors_; ++vector) {
     SplatPixels& pixels = pixels_[subtile * vectors_ + vector];
     if (!any_bit(pixels.alive)) continue;
+    fragments_looked_at_ += static_cast<std::uint64_t>(__builtin_popcount(sign_mask(pixels.alive)));
     const SplatAlphas alphas = splat_alphas(splat, pixels, pruning_threshold_);
     if (any_bit(alphas.visible)) {
+      fragments_visible_ += static_cast<std::uint64_t>(__builtin_popcount(sign_mask(alphas.visible)));
       const LanePairBits in = blend_splat<StopRule::before>(splat, alphas, least_transmittance_, pixels);
       blended += static_cast<std::uint64_t>(__builtin_popcount(sign_mask(in)));
     }
@@ -316,6 +318,14 @@ bool TileAccelerator::draw_in_subtile(const SplatRecord& splat, std::size_t subt
   fragments_blended += blended;
   if (blended == 0) ++subtile_pairs_unblended;
   return is_living;
+}
+
+void TileAccelerator::add_to(Counts& counts, const CountOf& of) const {
+  counts.fragments_rasterized += fragments_looked_at_;
+  counts.fragments_shaded += fragments_looked_at_;
+  counts.fragments_pruned += fragments_looked_at_ - fragments_visible_;
+  counts.fragments_dropped_late += fragments_visible_ - of(fragments_blended);
+  counts.fragments_blended += of(fragments_blended);
 }
 
 void TileAccelerator::store_tile() const {

@@ -153,6 +153,8 @@ class TileAccelerator : public AcceleratorBehaviour {
  public:
   void use_surfaces(Framebuffer& framebuffer) override;
   std::vector<AcceleratorStep> draw(std::optional<std::uint64_t> gaussians) override;
+  /// A fragment is a pixel of a drawn sub-tile that still takes.
+  void add_to(Counts& counts, const CountOf& of) const override;
   TimingParameters timing() const override { return timing_; }
 
   Counter gaussians_converted{*this, "gaussians_converted", "Gaussians",
@@ -205,6 +207,7 @@ class TileAccelerator : public AcceleratorBehaviour {
   std::vector<SplatRecord> records_;
   ColorSurface* color_ = nullptr;
   bool converts_ = false;
+  std::uint64_t fragments_looked_at_ = 0, fragments_visible_ = 0;
 
   // Of the tile that is drawn.
   PixelRect subtiles_;               ///< its own, numbered over the image

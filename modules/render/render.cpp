@@ -1,6 +1,7 @@
 #include "render/render.h"
 
 #include <algorithm>
+#include <type_traits>
 
 #include <vrpipe/pipeline/framebuffer.h>
 #include <vrpipe/pipeline/geometry.h>
@@ -42,7 +43,8 @@ TileKernel::TileKernel(const TileKernelParameters& parameters, const RenderConte
       blending_(parameters.blending_instructions.thousandths()),
       batch_(parameters.batch_instructions.thousandths()),
       timing_{parameters.blocks_per_core, parameters.issue_rate.thousandths(), parameters.instruction_interval_cycles,
-              parameters.launch_microseconds} {
+              parameters.launch_microseconds},
+      fragments_(context.fragments) {
   records_.reserve(context.frame->splats());
   for (const DrawCall& call : context.frame->draws()) {
     for (std::uint32_t number = call.base; number < call.base + call.splats && !call.geometry->is_mesh(); ++number) {
@@ -127,7 +129,25 @@ std::uint64_t TileKernel::count(const Fates& fates, std::uint32_t alive, std::ui
   return outside_;
 }
 
-template <StopRule Rule>
+void TileKernel::tell(std::size_t tile, std::uint32_t warp, const Fates& fates, std::uint32_t in_frame,
+                      std::uint32_t alive) const {
+  const std::uint32_t quads = warp_width_ / 2;  // side by side
+  const auto tell_of = [&](FragmentFate fate, std::uint32_t lanes) {
+    for (std::uint32_t quad = 0; quad < lanes_of_warp / 4; ++quad) {
+      const std::uint32_t lane = quad / quads * 2 * warp_width_ + quad % quads * 2;
+      const std::uint32_t rows = (lanes >> lane & 3U) | (lanes >> (lane + warp_width_) & 3U) << 2U;
+      if (rows == 0) continue;
+      const std::uint32_t x = pixel_x(tile, warp, lane) % screen_tile_pixels;
+      const std::uint32_t y = pixel_y(tile, warp, lane) % screen_tile_pixels;
+      fragments_->happened(fate, tiling_.tile(tile), y / 2 * quads_per_tile_row + x / 2, static_cast<LaneMask>(rows));
+    }
+  };
+  tell_of(FragmentFate::rasterized, in_frame);
+  tell_of(FragmentFate::terminated, (in_frame & ~alive) | (fates.visible & ~fates.blended));
+  tell_of(FragmentFate::blended, fates.blended);
+}
+
+template <StopRule Rule, bool IsSeen>
 void TileKernel::render_by(std::size_t tile, const std::uint32_t* splats, std::uint32_t length, BlockWork& out) {
   const std::uint32_t all_batches = (length + batch_splats - 1) / batch_splats;
   std::array<std::uint32_t, warps> lived{};  // batches that a warp began alive
@@ -138,15 +158,20 @@ void TileKernel::render_by(std::size_t tile, const std::uint32_t* splats, std::u
   for (std::uint32_t warp = 0; warp < warps; ++warp) {
     WarpLanes lanes = begin(tile, warp);
     std::uint32_t alive = lanes.alive_mask();
+    const std::uint32_t in_frame = alive;
+    const std::uint64_t iterations = warp_iterations.value();
     while (lived[warp] < all_batches && alive != 0) {
       std::uint64_t& instructions = out.instructions[std::size_t{lived[warp]} * warps + warp];
       std::uint32_t next = lived[warp]++ * batch_splats;
       const std::uint32_t end = std::min(next + batch_splats, length);
       for (; next < end && alive != 0; ++next) {
-        instructions += count(look_at<Rule>(records_[splats[next]], lanes), alive, out.lane_instructions);
+        const Fates fates = look_at<Rule>(records_[splats[next]], lanes);
+        instructions += count(fates, alive, out.lane_instructions);
+        if constexpr (IsSeen) tell(tile, warp, fates, in_frame, alive);
         if constexpr (Rule != StopRule::none) alive = lanes.alive_mask();
       }
     }
+    lanes_off_frame_ += (lanes_of_warp - count_bits(in_frame)) * (warp_iterations.value() - iterations);
     begun = std::max(begun, lived[warp]);
     if (color_ != nullptr) store(tile, warp, lanes);
   }
@@ -161,11 +186,25 @@ void TileKernel::render_by(std::size_t tile, const std::uint32_t* splats, std::u
 }
 
 void TileKernel::render(std::size_t tile, const std::uint32_t* splats, std::uint32_t length, BlockWork& out) {
-  switch (rule_) {
-    case StopRule::none: return render_by<StopRule::none>(tile, splats, length, out);
-    case StopRule::before: return render_by<StopRule::before>(tile, splats, length, out);
-    case StopRule::after: return render_by<StopRule::after>(tile, splats, length, out);
-  }
+  const auto render_for = [&](auto is_seen) {
+    switch (rule_) {
+      case StopRule::none: return render_by<StopRule::none, is_seen>(tile, splats, length, out);
+      case StopRule::before: return render_by<StopRule::before, is_seen>(tile, splats, length, out);
+      case StopRule::after: return render_by<StopRule::after, is_seen>(tile, splats, length, out);
+    }
+  };
+  fragments_ != nullptr ? render_for(std::true_type()) : render_for(std::false_type());
+}
+
+void TileKernel::add_to(Counts& counts, const CountOf& of) const {
+  const std::uint64_t terminated = of(lanes_dead) - lanes_off_frame_;
+  const std::uint64_t shaded = of(lanes_blending) + of(lanes_stopping) + of(lanes_pruned);
+  counts.fragments_rasterized += terminated + shaded;
+  counts.fragments_terminated += terminated;
+  counts.fragments_shaded += shaded;
+  counts.fragments_pruned += of(lanes_pruned);
+  counts.fragments_dropped_late += of(lanes_stopping);
+  counts.fragments_blended += of(lanes_blending);
 }
 
 void TileKernel::store(std::size_t tile, std::uint32_t warp, const WarpLanes& lanes) {

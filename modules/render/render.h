@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <vrpipe/component/parameter.h>
+#include <vrpipe/pipeline/fragment_observer.h>
 #include <vrpipe/pipeline/screen_tiling.h>
 #include <vrpipe/pipeline/slots/render.h>
 #include <vrpipe/pipeline/splat_pixels.h>
@@ -99,6 +100,8 @@ class TileKernel : public RenderBehaviour {
 
   void use_surfaces(Framebuffer& framebuffer) override;
   void render(std::size_t tile, const std::uint32_t* splats, std::uint32_t length, BlockWork& out) override;
+  /// A fragment is a lane's look at a splat, of a pixel of the frame.
+  void add_to(Counts& counts, const CountOf& of) const override;
   TimingParameters timing() const override { return timing_; }
   std::uint64_t bytes() const override { return bytes_; }
 
@@ -125,7 +128,7 @@ class TileKernel : public RenderBehaviour {
     std::uint32_t blended = 0;  ///< of these
   };
 
-  template <StopRule Rule>
+  template <StopRule Rule, bool IsSeen>
   void render_by(std::size_t tile, const std::uint32_t* splats, std::uint32_t length, BlockWork& out);
   template <StopRule Rule>
   Fates look_at(const SplatRecord& splat, WarpLanes& lanes) const;
@@ -133,6 +136,10 @@ class TileKernel : public RenderBehaviour {
   /// Gives the instructions of an iteration, and adds those of its lanes.
   std::uint64_t count(const Fates& fates, std::uint32_t alive, std::uint64_t& lane_instructions);
   void store(std::size_t tile, std::uint32_t warp, const WarpLanes& lanes);
+  /// Tells who looks at fragments.
+  /// @param in_frame, alive  lanes of pixels of the frame, and of these, before the splat
+  void tell(std::size_t tile, std::uint32_t warp, const Fates& fates, std::uint32_t in_frame,
+            std::uint32_t alive) const;
   std::uint32_t pixel_x(std::size_t tile, std::uint32_t warp, unsigned lane) const;
   std::uint32_t pixel_y(std::size_t tile, std::uint32_t warp, unsigned lane) const;
 
@@ -146,8 +153,10 @@ class TileKernel : public RenderBehaviour {
   const std::uint64_t outside_, pruned_, stopping_, blending_, batch_;
   TimingParameters timing_;
   std::vector<SplatRecord> records_;
+  FragmentObserver* const fragments_;  ///< null: nobody looks
   ColorSurface* color_ = nullptr;
   std::uint64_t bytes_ = 0;
+  std::uint64_t lanes_off_frame_ = 0;  ///< of those that are dead
 };
 
 /// Stops as published.

@@ -114,6 +114,7 @@ AcceleratorResult simulate_accelerator(const RunRequest& request, const Frame& f
   StatisticCollector statistics;
   statistics.add(accelerator_name, accelerator_name, behaviour->unit());
   result.statistics = statistics.reports();
+  behaviour->unit().add_to(result.counts, CountOf());
   result.result_hash = hash_of(result.statistics, result.cycles, result.framebuffer.color);
   unit.add_parameters_to(result.parameters);
   return result;

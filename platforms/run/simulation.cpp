@@ -1,13 +1,13 @@
 #include <vrpipe/platforms/simulation.h>
 
 #include <algorithm>
-#include <chrono>
-#include <ctime>
 #include <map>
 #include <optional>
 
 #include "bound/work_counter.h"
 #include "elaboration/untimed_gpu.h"
+#include "run/host_timer.h"
+#include "run/outside_pipeline.h"
 #include "run/result_hash.h"
 #include "run/statistic_sampler.h"
 #include "run/statistics.h"
@@ -22,6 +22,7 @@
 #include <vrpipe/pipeline/slots/tgc.h>
 #include <vrpipe/platforms/gpu.h>
 #include <vrpipe/platforms/observers.h>
+#include <vrpipe/platforms/software.h>
 #include <vrpipe/platforms/validated_range.h>
 
 namespace vrpipe {
@@ -79,7 +80,15 @@ const std::vector<Variant>& more_variants() {
                                 {"prop", "color_bytes_per_cycle", "256"}};
     return variant;
   };
-  static const std::vector<Variant> all{in_shader("in-shader", "ordered"), in_shader("in-shader-no-lock", "none")};
+  const auto outside = [](const char* name, DrawnBy drawn_by) {
+    Variant variant;
+    variant.name = name;
+    variant.drawn_by = drawn_by;
+    return variant;
+  };
+  static const std::vector<Variant> all{in_shader("in-shader", "ordered"), in_shader("in-shader-no-lock", "none"),
+                                        outside("software", DrawnBy::software),
+                                        outside("accelerator", DrawnBy::accelerator)};
   return all;
 }
 
@@ -364,24 +373,6 @@ class OccupancyReport {
   std::map<std::string, std::pair<unsigned, double>> throughput_of_;
 };
 
-/// Takes the time of a simulation on the host. Wall time counts what else the machine does; processor time does not.
-class HostTimer {
- public:
-  void stop(RunResult& result) const {
-    result.host_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_).count();
-    result.cpu_seconds = processor_seconds() - processor_;
-  }
-
- private:
-  static double processor_seconds() {
-    timespec now{};
-    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-  }
-  std::chrono::steady_clock::time_point wall_ = std::chrono::steady_clock::now();
-  double processor_ = processor_seconds();
-};
-
 void set_time(const Configuration& configuration, Cycle cycles, RunResult& result) {
   result.cycles = cycles;
   result.milliseconds = static_cast<double>(cycles) / (configuration.platform().frequency_mhz * 1e3);
@@ -515,13 +506,9 @@ void run_untimed(const Configuration& configuration, std::atomic<float>* progres
   for (const std::string& reason : others->unknown()) result.outside_validated_range.push_back(reason);
 }
 
-}  // namespace
+bool is_outside(const RunRequest& request) { return request.variant.drawn_by != DrawnBy::pipeline; }
 
-RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<float>* progress) {
-  return simulate(request, *Frame::of(draw, draw_state_of(request)), progress);
-}
-
-RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
+RunResult simulate_pipeline(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
   check_sampling_has_time(request);
   check_may_stop(request);
   const Configuration configuration(request, frame);
@@ -542,8 +529,20 @@ RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<fl
     run_untimed(configuration, progress, result);
   }
   result.effects = configuration.effects();
-  if (!result.stopped) check_conservation(result.counts);
   result.result_hash = hash_of(result);
+  return result;
+}
+
+}  // namespace
+
+RunResult simulate(const RunRequest& request, const Draw& draw, std::atomic<float>* progress) {
+  return simulate(request, *Frame::of(draw, draw_state_of(request)), progress);
+}
+
+RunResult simulate(const RunRequest& request, const Frame& frame, std::atomic<float>* progress) {
+  RunResult result =
+      is_outside(request) ? simulate_outside_pipeline(request, frame) : simulate_pipeline(request, frame, progress);
+  if (!result.stopped) check_conservation(result.counts);
   if (request.observers != nullptr) request.observers->end(result);
   return result;
 }
@@ -577,19 +576,29 @@ void check_configuration(const RunRequest& request) {
   empty.set_depth_format(depth_format_of(request));
   check_sampling_has_time(request);
   check_may_stop(request);
-  const Configuration configuration(with_all_effects(request), empty);
+  RunRequest of_pipeline = with_all_effects(request);
+  if (is_outside(request)) {
+    check_outside_pipeline(request);
+    of_pipeline = of_pipeline_alone(std::move(of_pipeline));
+    of_pipeline.observers = nullptr;
+  }
+  const Configuration configuration(of_pipeline, empty);
   for (const Instance& instance : configuration.netlist().instances()) configuration.make(instance);
-  if (!samples_statistics(request)) return;
+  if (!samples_statistics(of_pipeline)) return;
   with_sampler(configuration, [&](StatisticSampler& sampler) { sampler.find(*request.observers); });
 }
 
 std::vector<std::string> sampled_statistics(const RunRequest& request) {
   std::vector<std::string> names;
-  if (!has_time(request.fidelity)) return names;
+  if (!has_time(request.fidelity) || is_outside(request)) return names;
   const Frame empty(1, 1);
   const Configuration configuration(with_all_effects(request), empty);
   with_sampler(configuration, [&](const StatisticSampler& sampler) { names = sampler.names(); });
   return names;
+}
+
+std::vector<std::string> counted_statistics(const RunRequest& request) {
+  return is_outside(request) ? statistics_outside_pipeline(request) : sampled_statistics(request);
 }
 
 std::vector<ParameterListing> list_parameters(const Platform* platform) {
@@ -633,7 +642,7 @@ std::vector<ParameterListing> list_parameters(const Platform* platform) {
 
 StorageReport quad_merging_storage(const RunRequest& request) {
   const Frame empty(1, 1);
-  RunRequest merging = request;
+  RunRequest merging = of_pipeline_alone(request);
   merging.variant.quad_merging = true;
   merging.effects = EffectChoice::everything();
   const Configuration configuration(merging, empty);

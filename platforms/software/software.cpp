@@ -22,6 +22,7 @@
 #include <vrpipe/pipeline/slots/preparation.h>
 #include <vrpipe/pipeline/slots/render.h>
 #include <vrpipe/platforms/configuration.h>
+#include <vrpipe/platforms/observers.h>
 
 namespace vrpipe {
 
@@ -236,7 +237,9 @@ SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
     result.binning.push_back(machine.report(checked(binning, work)));
   }
 
-  const auto tiles_by = render.make<RenderBehaviour>(machine.context());
+  RenderContext seen = machine.context();
+  if (request.observers != nullptr) seen.fragments = request.observers->of_fragments();
+  const auto tiles_by = render.make<RenderBehaviour>(seen);
   tiles_by->use_surfaces(result.framebuffer);
   std::vector<BlockWork> blocks(lists.tiles());
   render.call("render", [&] {
@@ -271,6 +274,7 @@ SoftwareResult simulate_software(const RunRequest& request, const Frame& frame,
   statistics.add(binning_name, binning_name, lists_by->unit());
   statistics.add(render_name, render_name, tiles_by->unit());
   result.statistics = statistics.reports();
+  tiles_by->unit().add_to(result.counts, CountOf());
   result.result_hash = hash_of(result.statistics, result.cycles, result.framebuffer.color);
   for (const ChosenKernel* kernel : {&preparation, &binning, &render}) {
     const Implementation& implementation = *kernel->implementation;

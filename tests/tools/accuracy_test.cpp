@@ -656,7 +656,7 @@ TEST_F(Accuracy, RefusesBadInputAndWritesNothing) {
   const std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>> cases{
       {{"--format", "rgb10a2"}, {"rgb10a2", "2-bit alpha", "rgba16f"}},
       {{"--format", "r11g11b10f"}, {"r11g11b10f", "no alpha"}},
-      {{"--variant", "qm"}, {"'--variant'", "`vrpipe run`"}},
+      {{"--variant", "qn"}, {"'qn'", "did you mean qm"}},
       {{"--repeat", "0"}, {"--repeat", "1 to 100"}},
       {{"--html", "nowhere/page.html"}, {"--html nowhere/page.html", "no folder"}},
       {{"--html", ""}, {"--html", "missing value"}},

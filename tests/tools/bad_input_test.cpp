@@ -61,7 +61,7 @@ TEST_F(BadInput, Commands) {
 TEST_F(BadInput, Options) {
   refused({"run", "--scen", "tiny.spl"}, {"'--scen'", "vrpipe run", "did you mean --scene?"});
   refused({"run", "--formt=rgba8"}, {"'--formt'", "did you mean --format?"});
-  refused({"accuracy", "--variant", "qm"}, {"'--variant'", "`vrpipe run`"});
+  refused({"accuracy", "--trace", "t.json"}, {"'--trace'", "`vrpipe run`"});
   refused({"run", "-x"}, {"'-x'"});
   refused({"run", "extra"}, {"'extra'"});
   refused({"run", "--scene"}, {"missing value", "--scene"});

@@ -49,6 +49,7 @@ RunResult full_result() {
   unit.parts = {{"blend", 0.5}, {"sectors", 0.125}};
   result.units = {unit, {}};
   result.bottleneck = {"l2", 0.625, {{"reads", 0.375}}};
+  result.kernels = {{"sort", huge - 4, 24, huge - 5, "memory", 25, huge - 6, 0.1, denormal, 26.5}};
   result.statistics.resize(2);
   StatisticReport& statistic = result.statistics.front();
   statistic.name = "crop.hits";
@@ -143,8 +144,8 @@ void expect_equal_intervals(const IntervalReport& actual, const IntervalReport& 
 /// All but the request and the surfaces. A new member has to be named here, and compared.
 void expect_equal(const RunResult& actual, const RunResult& expected) {
   const auto& [request, cycles, stopped, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
-               bottleneck, statistics, implementations, parameters, outside_validated_range, effects, result_hash,
-               kernel_events, framebuffer, draws, intervals] = actual;
+               bottleneck, kernels, statistics, implementations, parameters, outside_validated_range, effects,
+               result_hash, kernel_events, framebuffer, draws, intervals] = actual;
   ASSERT_EQ(intervals.has_value(), expected.intervals.has_value());
   if (intervals) expect_equal_intervals(*intervals, *expected.intervals);
   EXPECT_EQ(framebuffer.addresses.attributes.address, expected.framebuffer.addresses.attributes.address);
@@ -156,6 +157,21 @@ void expect_equal(const RunResult& actual, const RunResult& expected) {
     EXPECT_EQ(cycles_of_draw, expected.draws[i].cycles);
     EXPECT_EQ(name, expected.draws[i].name);
     EXPECT_EQ(counts_of_draw, expected.draws[i].counts);
+  }
+  ASSERT_EQ(kernels.size(), expected.kernels.size());
+  for (std::size_t i = 0; i < kernels.size(); ++i) {
+    const auto& [name, items, bytes, cycles_of_kernel, bound_by, sm_cycles, memory_cycles, warp_instructions,
+                 lane_instructions, core_cycles] = kernels[i];
+    EXPECT_EQ(name, expected.kernels[i].name);
+    EXPECT_EQ(items, expected.kernels[i].items);
+    EXPECT_EQ(bytes, expected.kernels[i].bytes);
+    EXPECT_EQ(cycles_of_kernel, expected.kernels[i].cycles);
+    EXPECT_EQ(bound_by, expected.kernels[i].bound_by);
+    EXPECT_EQ(sm_cycles, expected.kernels[i].sm_cycles);
+    EXPECT_EQ(memory_cycles, expected.kernels[i].memory_cycles);
+    EXPECT_EQ(warp_instructions, expected.kernels[i].warp_instructions);
+    EXPECT_EQ(lane_instructions, expected.kernels[i].lane_instructions);
+    EXPECT_EQ(core_cycles, expected.kernels[i].core_cycles);
   }
   ASSERT_EQ(effects.size(), expected.effects.size());
   for (std::size_t i = 0; i < effects.size(); ++i) {

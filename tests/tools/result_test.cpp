@@ -466,6 +466,7 @@ TEST_F(Result, EveryKeyIsDocumentedAndEveryDocumentedKeyExists) {
          json_of({"run", "--scene", "tiny.spl", "--platform", "desktop"}),
          json_of({"compare", "--scene", "tiny.spl", "--variant", "mine=qm,qru=pass-through,tc.bins=2"}),
          json_of({"run", "--frame", "frame.json"}),
+         json_of({"run", "--scene", "tiny.spl", "--fidelity", "lt", "--variant", "software"}),
          json_of({"run", "--scene", "tiny.spl", "--fidelity", "functional", "--explain-effects"}),
          json_of({"compare", "--scene", "tiny.spl", "--platform", "desktop", "--energy"}),
          json_of({"run", "--scene", "tiny.spl", "--interval", "100"}),

@@ -28,6 +28,7 @@ class AccuracyCommand : public Command {
 
   void declare(Arguments& arguments) override {
     arguments_.declare(arguments, SimulationArguments::Variants::all);
+    arguments_.declare_variants(arguments);
     const std::string ladders = "The ladders";
     arguments.add_flag("--quick", quick_,
                        "a first answer: the middle ninth of the image unless --size is given, two\n"
@@ -52,6 +53,7 @@ class AccuracyCommand : public Command {
         "  vrpipe accuracy --quick\n"
         "  vrpipe accuracy --scene builtin:indoor --html indoor.html --json indoor.json\n"
         "  vrpipe accuracy --repeat 5 --set state.blend_rounding=measured\n"
+        "  vrpipe accuracy --variant software --variant accelerator\n"
         "  vrpipe accuracy --scene point_cloud.ply --camera cameras.json#3 --fidelity functional");
   }
 

@@ -42,18 +42,23 @@ std::string names_of(const std::vector<Fidelity>& fidelities) {
   return text;
 }
 
-/// Of a command that draws by hardware alone.
-void refuse_kernels(const RunRequest& request) {
-  const auto refuse = [](const std::string& option, const std::string& unit) {
-    throw UserError("cannot choose or set '" + unit + "'", option, "it is no unit of a draw by hardware",
-                    "leave it out, or take `vrpipe frames`");
+/// Whether it draws with kernels, or by an accelerator.
+bool is_outside(const Variant& variant) { return variant.drawn_by != DrawnBy::pipeline; }
+
+/// What is for kernels and accelerators, where no variant draws with these.
+void refuse_unused(const RunRequest& request, const std::vector<Variant>& variants) {
+  const bool draws_outside = std::any_of(variants.begin(), variants.end(), is_outside);
+  const auto check = [&](const std::string& option, const std::string& slot) {
+    const auto uses = [&](const Variant& variant) { return draws_with(variant, slot); };
+    if (!is_outside_pipeline(slot) || std::any_of(variants.begin(), variants.end(), uses)) return;
+    throw UserError("cannot choose or set '" + slot + "'", option,
+                    draws_outside ? "no variant here draws with it" : "it is no unit of a draw by hardware",
+                    "leave it out, or take a variant that draws with it, or `vrpipe frames`");
   };
-  for (const Setting& setting : request.settings) {
-    if (is_outside_pipeline(setting.unit)) refuse("--set " + setting.unit + "." + setting.parameter, setting.unit);
-  }
-  for (const UnitChoice& choice : request.units) {
-    if (is_outside_pipeline(choice.slot)) refuse("--unit " + choice.slot + "=" + choice.implementation, choice.slot);
-  }
+  for (const Setting& setting : request.settings)
+    check("--set " + setting.unit + "." + setting.parameter, setting.unit);
+  for (const UnitChoice& choice : request.units)
+    check("--unit " + choice.slot + "=" + choice.implementation, choice.slot);
 }
 
 /// Whether a setting is from a configuration file.
@@ -137,9 +142,9 @@ void SimulationArguments::declare_scene(Arguments& arguments) {
 void SimulationArguments::declare_variant(Arguments& arguments) {
   arguments
       .add_option("--variant", variant_, "NAME|NAME=BASE,...",
-                  "baseline, qm (quad merging), het (hardware early termination) or\n"
-                  "het+qm, or one of your own, as in mine=het+qm,qru=same-splat,tc.bins=64\n"
-                  "(default: " +
+                  "baseline, qm (quad merging), het (hardware early termination), het+qm,\n"
+                  "software or accelerator (docs/software.md), or one of your own, as in\n"
+                  "mine=het+qm,qru=same-splat,tc.bins=64 (default: " +
                       variant_default + "; docs/configuration.md)",
                   machine_group)
       .default_text = variant_default;
@@ -193,16 +198,20 @@ void SimulationArguments::declare(Arguments& arguments, Variants variants) {
   if (variants == Variants::all) declare_jobs(arguments, jobs_);
 }
 
+void SimulationArguments::declare_variants(Arguments& arguments) {
+  arguments.add_option("--variant", variant_, "NAME|NAME=BASE,...",
+                       "what is compared: baseline, qm, het, het+qm, software, accelerator, or one of\n"
+                       "your own, as in mine=het+qm,qru=same-splat,tc.bins=64; can be repeated (default:\n"
+                       "the first four, and those of plugins and of --config; docs/configuration.md)",
+                       machine_group);
+}
+
 void SimulationArguments::declare_comparison(Arguments& arguments) {
   compares_any_ = true;
   arguments.find("--platform")->help =
       "the GPU (default: " + platforms().front().name +
       "; `vrpipe platforms` lists them); can be\nrepeated: every variant on every platform";
-  arguments.add_option("--variant", variant_, "NAME|NAME=BASE,...",
-                       "what is compared: baseline, qm, het, het+qm, or one of your own, as in\n"
-                       "mine=het+qm,qru=same-splat,tc.bins=64; can be repeated (default: those four,\n"
-                       "and those of plugins and of --config; docs/configuration.md)",
-                       machine_group);
+  declare_variants(arguments);
   arguments.add_option("--relative-to", relative_to_, "NAME",
                        "over what speed-ups are: a variant, or PLATFORM/VARIANT where there are\n"
                        "several platforms (default: the first)",
@@ -490,7 +499,43 @@ void SimulationArguments::check_explanation(const EffectChoice& effects) const {
   }
 }
 
-SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& invocation) const {
+std::vector<Variant> SimulationArguments::variants_drawn_by(const SimulationJob& job,
+                                                            const std::vector<std::string>& of_study) {
+  std::vector<Variant> all;
+  for (const std::string& name : of_study) all.push_back(variant_named(name));
+  if (!of_study.empty()) return all;
+  for (const RunRequest& request : job.requests) all.push_back(request.variant);
+  return all;
+}
+
+/// Of variants that draw outside the pipeline, what there is not.
+void SimulationArguments::check_outside(const SimulationJob& job, const std::vector<Variant>& variants) const {
+  if (takes_kernels_) return;
+  refuse_unused(job.requests.front(), variants);
+  const auto found = std::find_if(variants.begin(), variants.end(), is_outside);
+  if (found == variants.end()) return;
+  const auto refuse = [&](bool is_given, const char* option, const std::string& why) {
+    if (!is_given) return;
+    throw UserError("cannot use option", option, why, "leave out this or the variant");
+  };
+  const std::string who = "variant " + found->name;
+  refuse(!frame_.empty(), "--frame", who + " draws one scene, without states of draws");
+  refuse(job.frame.passes > 1, "--multi-pass", who + " draws in one pass");
+  refuse(!meshes_.empty(), "--mesh", who + " draws splats alone");
+  const std::string observing = time_.any_of_units();
+  refuse(!observing.empty(), observing.c_str(), who + " has no units of a pipeline, nor a course of time");
+  const auto accelerator = std::find_if(variants.begin(), variants.end(), [](const Variant& variant) {
+    return variant.drawn_by == DrawnBy::accelerator;
+  });
+  if (accelerator != variants.end())
+    refuse(time_.heat_maps(), HeatMaps::option, "variant " + accelerator->name + " does not tell of its fragments");
+  if (!std::all_of(variants.begin(), variants.end(), is_outside)) return;
+  refuse(job.requests.front().effects.text() != EffectChoice().text(), "--effects", who + " has no effects");
+  refuse(explain_effects_, "--explain-effects", who + " has no effects");
+}
+
+SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& invocation,
+                                           const std::vector<std::string>& of_study) const {
   // Plugins first: they may bring the platform and the units that the other options name.
   load_plugins(plugins_);
   for (const std::string& text : definitions_) add_user_variant(parse_variant(text));
@@ -529,10 +574,12 @@ SimulationJob SimulationArguments::resolve(Variants variants, const Invocation& 
   job.preprocess_parameters = std::move(parts.preprocess_parameters);
 
   job.requests = requests(request, variants);
+  check_outside(job, variants_drawn_by(job, of_study));
   leave_out_restated(job.requests, of_file(invocation));
-  for (const RunRequest& each : job.requests) {
+  for (RunRequest& each : job.requests) {
     const StdoutToStderr redirected;
-    check_configuration(each);
+    each.fidelity = std::min(each.fidelity, finest_fidelity(each.variant));
+    check_configuration(of_variant_alone(each));
   }
   job.baseline = place_of_run(job.requests, single(relative_to_, "--relative-to").value_or(""), "--relative-to");
   if (job.baseline != 0 && request.fidelity == Fidelity::functional) {
@@ -566,6 +613,7 @@ MachineJob SimulationArguments::resolve_machine(const Invocation& invocation, co
                     "no scene is preprocessed", "leave it out");
   }
   job.request.variant = variant_named("baseline");
+  refuse_unused(job.request, {job.request.variant});
   std::vector<RunRequest> requests{job.request};
   leave_out_restated(requests, of_file(invocation));
   job.request = requests.front();
@@ -591,7 +639,6 @@ RunRequest SimulationArguments::machine(SettingsByPart& parts, const Invocation&
   parts = sort_settings(settings);
   request.settings = parts.machine;
   request.units = parse_unit_choices(units_);
-  if (!takes_kernels_) refuse_kernels(request);
   return request;
 }
 

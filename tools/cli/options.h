@@ -32,7 +32,9 @@ class SimulationArguments {
   enum class Variants { one, all };
 
   void declare(Arguments& arguments, Variants variants);
-  /// --variant and --platform as often as one likes, and --relative-to, for commands that compare any set of them.
+  /// --variant as often as one likes.
+  void declare_variants(Arguments& arguments);
+  /// The same, --platform, and --relative-to, for commands that compare any set of them.
   void declare_comparison(Arguments& arguments);
   /// Those that all points of a study share.
   void declare_study(Arguments& arguments);
@@ -58,7 +60,9 @@ class SimulationArguments {
   /// --explain-effects, for commands that report effects of each run.
   void declare_explanation(Arguments& arguments);
   /// Loads the plugins and checks every option but the names of output files, which the commands know. Throws UserError.
-  SimulationJob resolve(Variants variants, const Invocation& invocation) const;
+  /// @param of_study  names of those that a study draws with, in the place of the only one
+  SimulationJob resolve(Variants variants, const Invocation& invocation,
+                        const std::vector<std::string>& of_study = {}) const;
 
  private:
   void declare_scene(Arguments& arguments);
@@ -76,6 +80,8 @@ class SimulationArguments {
   SceneRequest scene_request() const;
   FrameDescription frame() const;
   std::vector<NamedFile> inputs(const FrameDescription& frame) const;
+  static std::vector<Variant> variants_drawn_by(const SimulationJob& job, const std::vector<std::string>& of_study);
+  void check_outside(const SimulationJob& job, const std::vector<Variant>& variants) const;
   void check_explanation(const EffectChoice& effects) const;
   /// Null if energy is not asked for; throws UserError.
   std::shared_ptr<const EnergyTable> energies(const Platform& platform) const;

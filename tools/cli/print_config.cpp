@@ -10,6 +10,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/platforms/netlist.h>
+#include <vrpipe/platforms/software.h>
 
 #include "jobs/settings.h"
 
@@ -132,6 +133,11 @@ class ConfigWriter {
     });
     std::string text = "\n[set]\n";
     for (const auto& [name, value] : preprocess) text += parameter_line(name, value, nullptr);
+    // Their own values are those of units that variants may have put others in the place of.
+    for (const Setting& setting : requests_.front().settings) {
+      if (!is_outside_pipeline(setting.unit)) continue;
+      text += parameter_line(setting.unit + "." + setting.parameter, setting.value, nullptr);
+    }
     if (one_platform) {
       RunRequest common = requests_.front();
       common.variant = variant_named("het+qm");
@@ -141,6 +147,7 @@ class ConfigWriter {
       return text;
     }
     for (const Setting& setting : requests_.front().settings) {
+      if (is_outside_pipeline(setting.unit)) continue;
       const std::string name = setting.unit + "." + setting.parameter;
       text += line_of(key_text(name), value_text(setting.value), given("--set", name));
     }

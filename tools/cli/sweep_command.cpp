@@ -141,7 +141,9 @@ class SweepCommand : public Command {
     check_pareto(job.study);
     if (const auto text = single(relative_to_, "--relative-to"))
       job.study.relative_to = parse_axis_values(*text, job.study, "--relative-to");
-    job.common = arguments_.resolve(SimulationArguments::Variants::one, invocation());
+    const auto variants = job.study.axis("variant");
+    job.common = arguments_.resolve(SimulationArguments::Variants::one, invocation(),
+                                    variants ? job.study.axes[*variants].values : std::vector<std::string>());
     leave_out_absent(job);
     choose_references(job);
     job.csv = single_path(csv_, "--csv");

@@ -5,6 +5,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/platforms/intervals.h>
+#include <vrpipe/platforms/software.h>
 
 #include "cli/parse.h"
 #include "host/stdout_to_stderr.h"
@@ -88,7 +89,7 @@ void TimeArguments::declare(Arguments& arguments, const std::string& group, bool
                      group);
 }
 
-std::string TimeArguments::any_given() const {
+std::string TimeArguments::any_of_units() const {
   for (const auto& [values, option] :
        {std::pair{&interval_, interval_option}, std::pair{&interval_csv_, csv_option},
         std::pair{&interval_statistics_, statistics_option}, std::pair{&trace_, Trace::option},
@@ -96,7 +97,12 @@ std::string TimeArguments::any_given() const {
         std::pair{&until_, until_option}}) {
     if (!values->empty()) return option;
   }
-  return heat_maps_ ? HeatMaps::option : "";
+  return {};
+}
+
+std::string TimeArguments::any_given() const {
+  const std::string observing = any_of_units();
+  return observing.empty() && heat_maps_ ? HeatMaps::option : observing;
 }
 
 std::optional<Cycle> TimeArguments::every() const {
@@ -140,7 +146,9 @@ void TimeArguments::observe(SimulationJob& job) const {
     for (RunRequest& request : job.requests) record(request, *interval);
   } else if (job.html && has_course(job.requests.front()) && !job.explain_effects) {
     job.intervals_for_page = true;
-    for (RunRequest& request : job.requests) record_intervals(observers_of(request), page_interval, {});
+    for (RunRequest& request : job.requests) {
+      if (request.variant.drawn_by == DrawnBy::pipeline) record_intervals(observers_of(request), page_interval, {});
+    }
   }
   RunRequest& request = job.requests.front();
   if (trace) {
@@ -160,7 +168,7 @@ void TimeArguments::observe(SimulationJob& job) const {
     job.log->attach(request, observers_of(request));
   }
   for (const RunRequest& each : job.requests) {
-    if (each.observers != nullptr || each.stop_at > 0) check_configuration(each);
+    if (each.observers != nullptr || each.stop_at > 0) check_configuration(of_variant_alone(each));
   }
 }
 

@@ -17,6 +17,9 @@ class TimeArguments {
   void declare(Arguments& arguments, const std::string& group, bool of_one_run);
   /// An option that is given, to be named where none of them can be; empty for none.
   std::string any_given() const;
+  /// The same, but for what a variant that draws outside the pipeline may have as well.
+  std::string any_of_units() const;
+  bool heat_maps() const { return heat_maps_; }
   /// Adds observers to the requests of a job, and says what they write. Its other members are final. Throws UserError.
   void observe(SimulationJob& job) const;
 

@@ -4,10 +4,12 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <utility>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/platforms/software.h>
 #include <vrpipe/platforms/stress.h>
 #include <vrpipe/workloads/exact_image.h>
 #include <vrpipe/workloads/scene.h>
@@ -175,14 +177,18 @@ void compare_rungs(FidelityLevel* levels, std::size_t count) {
   for (std::size_t i = 1; i < timed.size(); ++i) timed[i]->dominated = beaten[i];
 }
 
+bool is_finest(const RunRequest& request) { return request.fidelity == finest_fidelity(request.variant); }
+bool is_of_pipeline(const RunRequest& request) { return request.variant.drawn_by == DrawnBy::pipeline; }
+
 /// The runs of the fidelity ladder: for each variant from the most exact fidelity on, so that its image is there to
 /// compare with.
 std::vector<RunRequest> fidelity_requests(const AccuracyJob& job) {
   std::vector<RunRequest> requests;
   for (const RunRequest& request : job.simulation.requests) {
     const Variant& variant = request.variant;
-    if (job.quick && variant.quad_merging != variant.early_termination) continue;
+    if (job.quick && variant.quad_merging != variant.early_termination) continue;  // pipelines alone have either
     for (auto fidelity = fidelities().rbegin(); fidelity != fidelities().rend(); ++fidelity) {
+      if (*fidelity > finest_fidelity(variant)) continue;
       requests.push_back(request);
       requests.back().fidelity = *fidelity;
     }
@@ -212,23 +218,30 @@ void climb_fidelities(const AccuracyJob& job, const Workload& workload, const st
     FidelityLevel& level = result.fidelity[rung_index];
     level.run = std::move(simulated.result);
     ShownImage image = shown(*simulated.image, job.simulation.background);
-    if (level.run.request.fidelity == fidelities().back()) most_exact = image;
+    if (is_finest(level.run.request)) most_exact = image;
     level.image = image_error(image, most_exact);
   });
 
-  const std::size_t levels = fidelities().size();
   for (std::size_t i = 0; i < requests.size(); ++i) {
     FidelityLevel& level = result.fidelity[i];
     level.host_seconds = median(host_seconds[i]);
     level.cpu_seconds = median(cpu_seconds[i]);
     const auto quads = static_cast<double>(level.run.counts.quads_rasterized);
     level.quads_per_second = level.cpu_seconds > 0 ? quads / level.cpu_seconds : 0;
-    level.speedup = speedup(result.fidelity[i % levels].run, level.run);
+    for (const FidelityLevel& other : result.fidelity) {
+      const RunRequest& baseline = other.run.request;
+      if (baseline.variant.name != requests.front().variant.name || baseline.fidelity != level.run.request.fidelity)
+        continue;
+      level.speedup = speedup(other.run, level.run);
+    }
   }
-  for (std::size_t first = 0; first < requests.size(); first += levels) {
-    compare_rungs(&result.fidelity[first], levels);
+  for (std::size_t first = 0; first < requests.size();) {
+    std::size_t end = first + 1;
+    while (end < requests.size() && !is_finest(requests[end])) ++end;
+    compare_rungs(&result.fidelity[first], end - first);
     std::reverse(result.fidelity.begin() + static_cast<std::ptrdiff_t>(first),
-                 result.fidelity.begin() + static_cast<std::ptrdiff_t>(first + levels));
+                 result.fidelity.begin() + static_cast<std::ptrdiff_t>(end));
+    first = end;
   }
 }
 
@@ -237,14 +250,17 @@ constexpr std::array stress_rungs{Fidelity::bound, Fidelity::lt, Fidelity::cycle
 /// The first variant and the last of what was asked for under every stress configuration, at each of `stress_rungs`, in the
 /// middle of the image.
 std::vector<Task> stress_tasks(const AccuracyJob& job, const Workload& workload, AccuracyResult& result) {
-  std::vector<RunRequest> variants{job.simulation.requests.front()};
-  if (job.simulation.requests.size() > 1) variants.push_back(job.simulation.requests.back());
+  std::vector<RunRequest> all, variants;
+  std::copy_if(job.simulation.requests.begin(), job.simulation.requests.end(), std::back_inserter(all), is_of_pipeline);
   std::vector<Task> tasks;
+  if (all.empty()) return tasks;
+  variants.push_back(all.front());
+  if (all.size() > 1) variants.push_back(all.back());
   for (const StressConfiguration& configuration : stress_configurations()) {
     if (job.quick && !configuration.quick) continue;
     std::vector<RunRequest> requests;
     try {
-      for (const RunRequest& variant : variants) requests.push_back(stressed(variant, configuration));
+      for (const RunRequest& variant : variants) requests.push_back(stressed(of_variant_alone(variant), configuration));
     } catch (const UserError& error) {
       result.stress_left_out.push_back({configuration.name, error.what()});
       continue;
@@ -263,6 +279,7 @@ std::vector<Task> stress_tasks(const AccuracyJob& job, const Workload& workload,
 
 void climb_stress(const AccuracyJob& job, const std::vector<Task>& tasks, const BatchPlace& place,
                   AccuracyResult& result, ProgressLine& progress) {
+  if (tasks.empty()) return;
   std::vector<double> cycles(tasks.size());
   const unsigned processes = std::min(job.simulation.processes, static_cast<unsigned>(tasks.size()));
   run_tasks(tasks, false, processes, place, progress,
@@ -286,6 +303,10 @@ std::vector<PrecisionSettings> choose_values(const AccuracyJob& job, bool is_dra
     if (job.quick && knob.quick_value.empty()) continue;
     if (knob.is_preprocessing && is_draw_list) {
       result.knobs_left_out.push_back(knob.name);
+      continue;
+    }
+    if (knob.is_of_pipeline && !is_of_pipeline(result.base)) {
+      result.knobs_without_pipeline.push_back(knob.name);
       continue;
     }
     const std::string chosen = knob.value(settings.front());
@@ -353,7 +374,9 @@ AccuracyResult measure_accuracy(const AccuracyJob& job, ProgressLine& progress) 
   result.provenance = job.simulation.provenance;
   result.quick = job.quick;
   result.repeat = job.repeat;
-  result.base = job.simulation.requests.back();  // with all that the paper adds
+  const std::vector<RunRequest>& requests = job.simulation.requests;
+  const auto base = std::find_if(requests.rbegin(), requests.rend(), is_of_pipeline);  // with all that the paper adds
+  result.base = base != requests.rend() ? *base : requests.back();
   progress.show("loading the scene");
   const Workload workload = load(job, result);
   if (job.simulation.output) create_output_folder(*job.simulation.output, "--output");

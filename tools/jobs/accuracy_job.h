@@ -30,7 +30,7 @@ struct AccuracyJob {
 constexpr Tolerance fidelity_tolerance{0.05, 0.01};
 constexpr Tolerance precision_tolerance{0.001, 0.1};
 
-/// One variant at one fidelity, beside the most exact fidelity.
+/// One variant at one fidelity, beside the most exact fidelity that there is of it.
 struct FidelityLevel {
   RunResult run;
   double host_seconds = 0;                     ///< the median
@@ -88,12 +88,13 @@ struct AccuracyResult {
   unsigned repeat = 1;
   unsigned processes = 1;                   ///< of the precision ladder
   std::vector<Setting> preprocessing;       ///< what --set changed of it
-  RunRequest base;                          ///< what the precision ladder varies
+  RunRequest base;                          ///< what the precision ladder varies: of the pipeline, if anything is
   std::vector<FidelityLevel> fidelity;      ///< by variant, then from the least exact to the most
   std::vector<PrecisionRun> runs;           ///< the default first
   std::vector<PrecisionRow> precision;      ///< by knob
   std::vector<std::string> knobs_left_out;  ///< those that mean nothing for a draw list
-  std::vector<StressRow> stress;            ///< by configuration, then by variant
+  std::vector<std::string> knobs_without_pipeline;  ///< those that mean nothing for what draws outside it
+  std::vector<StressRow> stress;                    ///< by configuration, then by variant
   std::vector<StressLeftOut> stress_left_out;
   Picture reference;             ///< the exact image, for the page
   double reference_seconds = 0;  ///< to render it

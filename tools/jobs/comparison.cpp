@@ -10,7 +10,9 @@ namespace vrpipe::tools {
 
 std::optional<double> speedup(const RunResult& baseline, const RunResult& run) {
   if (!baseline.cycles || !run.cycles || *run.cycles == 0) return std::nullopt;
-  if (baseline.counts.fragments_rasterized == 0) return std::nullopt;
+  // What is drawn outside the pipeline may not count fragments.
+  const bool is_of_pipeline = baseline.request.variant.drawn_by == DrawnBy::pipeline;
+  if (is_of_pipeline && baseline.counts.fragments_rasterized == 0) return std::nullopt;
   const double ratio = static_cast<double>(*baseline.cycles) / static_cast<double>(*run.cycles);
   if (baseline.request.platform == run.request.platform) return ratio;
   const double from = baseline.request.platform->frequency_mhz;
@@ -23,13 +25,19 @@ std::optional<double> early_termination_ratio(const std::vector<RunResult>& runs
   const RunResult* with = nullptr;
   for (const RunResult& run : runs) {
     const Variant& variant = run.request.variant;
-    if (variant.quad_merging || !variant.base.empty()) continue;
+    if (variant.drawn_by != DrawnBy::pipeline || variant.quad_merging || !variant.base.empty()) continue;
     if (run.request.platform != runs.front().request.platform) continue;
     const RunResult*& found = variant.early_termination ? with : without;
     if (found == nullptr) found = &run;
   }
   if (without == nullptr || with == nullptr || with->counts.fragments_blended == 0) return std::nullopt;
   return static_cast<double>(without->counts.fragments_blended) / static_cast<double>(with->counts.fragments_blended);
+}
+
+Fidelity finest_fidelity_of(const std::vector<RunResult>& runs) {
+  Fidelity finest = Fidelity::functional;
+  for (const RunResult& run : runs) finest = std::max(finest, run.request.fidelity);
+  return finest;
 }
 
 bool are_of_several_platforms(const std::vector<RunResult>& runs) {

@@ -16,6 +16,9 @@ std::optional<double> speedup(const RunResult& baseline, const RunResult& run);
 /// that are no changes of others and on one platform; none when a run is missing, or nothing is blended.
 std::optional<double> early_termination_ratio(const std::vector<RunResult>& runs);
 
+/// The most exact fidelity of any run.
+Fidelity finest_fidelity_of(const std::vector<RunResult>& runs);
+
 /// Whether runs are of several platforms.
 bool are_of_several_platforms(const std::vector<RunResult>& runs);
 

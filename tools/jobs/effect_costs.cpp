@@ -66,7 +66,9 @@ std::vector<EffectCosts> measure_effects(const std::vector<RunResult>& runs, con
                                          ProgressLine& progress) {
   std::vector<EffectCosts> costs(runs.size());
   std::vector<Repetition> repetitions;
-  for (std::size_t i = 0; i < runs.size(); ++i) add_repetitions(runs[i], costs[i], repetitions);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (!runs[i].effects.empty()) add_repetitions(runs[i], costs[i], repetitions);
+  }
   double seconds = 0;
   for (const Repetition& repetition : repetitions) seconds += measured_rounds * repetition.run->cpu_seconds;
   const std::string text = announcement(measured_rounds * repetitions.size(), seconds);

@@ -178,7 +178,29 @@ EnergyAmounts& EnergyAmounts::operator+=(const EnergyAmounts& next) {
   return *this;
 }
 
+namespace {
+/// Of kernels one after the other.
+EnergyAmounts amounts_of_kernels(const RunResult& run, const EnergyTable& table) {
+  EnergyAmounts amounts = energy_amounts(run.kernels.front(), run, table);
+  for (std::size_t i = 1; i < run.kernels.size(); ++i) amounts += energy_amounts(run.kernels[i], run, table);
+  return amounts;
+}
+
+EnergyAmounts unknown_amounts(const RunResult& run, const EnergyTable& table) {
+  EnergyAmounts amounts = energy_amounts_of_dram(0, table);
+  amounts.process = table.process_of(run.request.platform->name);
+  amounts.missing.push_back("what an accelerator spends");
+  return amounts;
+}
+}  // namespace
+
 EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table) {
+  if (run.request.variant.drawn_by != DrawnBy::pipeline) {
+    const bool is_known = run.request.variant.drawn_by == DrawnBy::software && !run.kernels.empty();
+    EnergyAmounts amounts = is_known ? amounts_of_kernels(run, table) : unknown_amounts(run, table);
+    amounts.fragments_blended = run.counts.fragments_blended;
+    return amounts;
+  }
   EnergyAmounts amounts = amounts_of(EnergyNumbers(run), *run.request.platform, table, run.cycles);
   amounts.fragments_blended = run.counts.fragments_blended;
   return amounts;

@@ -59,7 +59,8 @@ PrecisionKnob variant_knob(const std::string& name, const std::string& meaning, 
     Variant wanted = settings.request.variant;
     wanted.*member = value == "on";
     for (const Variant& variant : variants()) {
-      if (variant.quad_merging == wanted.quad_merging && variant.early_termination == wanted.early_termination) {
+      if (variant.drawn_by == DrawnBy::pipeline && variant.quad_merging == wanted.quad_merging &&
+          variant.early_termination == wanted.early_termination) {
         settings.request.variant = variant;
       }
     }
@@ -112,6 +113,7 @@ std::vector<PrecisionKnob> make_knobs() {
   // The same rates, latencies and instructions whatever they are set to; and preprocessing is before the draw.
   const std::vector<std::string> free{"blend_rounding", "termination_compare", "subpixel_bits",
                                       "exponential",    "depth_key_bits",      "sh_degree"};
+  for (PrecisionKnob& knob : knobs) knob.is_of_pipeline = !knob.is_preprocessing && knob.name != "pruning_threshold";
   for (PrecisionKnob& knob : knobs) knob.is_charged = std::find(free.begin(), free.end(), knob.name) == free.end();
   return knobs;
 }

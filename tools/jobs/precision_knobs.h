@@ -27,6 +27,7 @@ struct PrecisionKnob {
   std::function<void(PrecisionSettings&, const std::string&)> set;
   /// Whether the model takes time for it. Without, cycles may still differ: by which fragments live.
   bool is_charged = true;
+  bool is_of_pipeline = true;  ///< of no meaning for what is drawn outside it
 };
 
 /// All knobs, in the order of reports.

@@ -28,6 +28,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/pipeline/registry.h>
+#include <vrpipe/platforms/software.h>
 
 #include "host/command_failure.h"
 #include "host/crash_report.h"
@@ -208,7 +209,7 @@ class Worker {
     if (!loaded_plugins().empty()) report_crashes_to(out, outcome_fault);
     std::string message;
     try {
-      const RunResult result = simulate(request_, frame, &progress);
+      const RunResult result = simulate(of_variant_alone(request_), frame, &progress);
       if (image != nullptr) image->copy_from(result.framebuffer.color);
       message = char{outcome_result} + to_bytes(result);
     } catch (const UserError& error) {
@@ -251,7 +252,8 @@ Simulated simulate_here(const RunRequest& request, const Frame& frame, bool with
     std::atomic<float> done{0.0F};
     const ProgressThread drawing(name_of(request), done, progress);
     if (!loaded_plugins().empty()) report_crashes("variant " + name_of(request) + ": ");
-    simulated.result = simulate(request, frame, &done);
+    simulated.result = simulate(of_variant_alone(request), frame, &done);
+    simulated.result.request = request;
   }
   progress.erase();
   if (with_image) {

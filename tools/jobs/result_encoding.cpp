@@ -47,6 +47,8 @@ std::enable_if_t<std::is_same<std::remove_const_t<Value>, Counts>::value> each_m
 }
 VRPIPE_MEMBERS(UnitReport, name, cycles, occupancy, parts)
 VRPIPE_MEMBERS(Bottleneck, unit, occupancy, parts)
+VRPIPE_MEMBERS(KernelReport, name, items, bytes, cycles, bound_by, sm_cycles, memory_cycles, warp_instructions,
+               lane_instructions, core_cycles)
 VRPIPE_MEMBERS(HistogramBucket, from, to, count)
 VRPIPE_MEMBERS(HistogramReport, smallest, largest, buckets)
 VRPIPE_MEMBERS(InstanceStatistic, path, value, denominator)
@@ -60,8 +62,8 @@ VRPIPE_MEMBERS(UnitIntervals, name, cycles)
 VRPIPE_MEMBERS(StatisticIntervals, name, kind, values, denominators)
 VRPIPE_MEMBERS(IntervalReport, every, from, units, statistics)
 VRPIPE_MEMBERS(RunResult, request, cycles, stopped, milliseconds, host_seconds, cpu_seconds, counts, utilization, units,
-               bottleneck, statistics, implementations, parameters, outside_validated_range, effects, result_hash,
-               kernel_events, framebuffer, draws, intervals)
+               bottleneck, kernels, statistics, implementations, parameters, outside_validated_range, effects,
+               result_hash, kernel_events, framebuffer, draws, intervals)
 
 /// Types of members that stay behind.
 template <class Member>

@@ -44,7 +44,12 @@ bool declares(const RunRequest& request, const std::string& parameter) {
   const std::size_t dot = parameter.rfind('.');
   const std::string slot = without_gpc(parameter.substr(0, dot)), name = parameter.substr(dot + 1);
   if (!Registry::instance().has_slot(slot)) return true;
-  const auto implementations = Configuration(request, Frame(1, 1)).implementations();
+  if (!draws_with(request.variant, slot)) return false;
+  if (is_outside_pipeline(slot)) {
+    const auto has = check_software(of_variant_alone(request));
+    return std::any_of(has.begin(), has.end(), [&](const auto& each) { return each.first == parameter; });
+  }
+  const auto implementations = Configuration(of_pipeline_alone(request), Frame(1, 1)).implementations();
   return std::any_of(implementations.begin(), implementations.end(), [&](const auto& of_slot) {
     if (without_gpc(of_slot.first) != slot) return false;
     const std::unique_ptr<ParameterSet> set = Registry::instance().find(slot, of_slot.second).make_parameters();

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <vrpipe/component/error.h>
+#include <vrpipe/platforms/software.h>
 #include <vrpipe/workloads/draw_list.h>
 
 #include "for_each_chunk.h"
@@ -42,7 +43,9 @@ std::vector<std::unique_ptr<HeatMaps>> observe_heat(std::vector<RunRequest>& req
   for (RunRequest& request : requests) {
     if (request.observers == nullptr) request.observers = std::make_shared<Observers>();
     maps.push_back(std::make_unique<HeatMaps>(width, height, request.fidelity));
-    maps.back()->attach(*request.observers, request.variant.early_termination);
+    // An accelerator does not tell; its maps stay black.
+    if (request.variant.drawn_by != DrawnBy::accelerator)
+      maps.back()->attach(*request.observers, request.variant.early_termination);
   }
   return maps;
 }
@@ -127,7 +130,7 @@ JobResult perform(const SimulationJob& job) {
     result.passes = job.frame.passes;
     const auto frame_of = [&](const RunRequest& request) { return make_frame(request, job.frame, loaded); };
     // What cannot be drawn is refused before anything is written.
-    for (const RunRequest& request : job.requests) static_cast<void>(frame_of(request));
+    for (const RunRequest& request : job.requests) check_drawable(request, *frame_of(request));
     if (job.output) create_output_folder(*job.output, "--output");
     if (job.save_draw) {
       if (!loaded.meshes.front().empty()) {

@@ -18,6 +18,7 @@
 
 #include <vrpipe/component/error.h>
 #include <vrpipe/component/printable.h>
+#include <vrpipe/platforms/software.h>
 #include <vrpipe/workloads/exact_image.h>
 
 #include "image/image_error.h"
@@ -313,9 +314,9 @@ void check_columns(const SweepJob& job, const std::vector<RunRequest>& requests)
   for (RunRequest request : requests) {
     if (job.study.columns.empty()) break;
     if (!seen.emplace(request.platform->name, gpcs_of(request), request.variant.name).second) continue;
-    request.fidelity = Fidelity::cycle;
+    request.fidelity = finest_fidelity(request.variant);
     // Those of all GPCs: of one, gpc1.crop.quads_blended, there is no column.
-    for (const std::string& name : sampled_statistics(request)) {
+    for (const std::string& name : counted_statistics(of_variant_alone(request))) {
       if (name.rfind("gpc", 0) != 0) known.insert(name);
     }
   }
@@ -445,6 +446,7 @@ class Foresight {
 
 void strip_row(RunResult& run) {
   run.units.clear();
+  run.kernels.clear();
   run.statistics.clear();
   run.effects.clear();
   run.draws.clear();
@@ -580,6 +582,15 @@ RunRequest request_of(const SweepJob& job, const StudiedPoint& point) {
     request.settings.push_back({axis.substr(0, dot), axis.substr(dot + 1), value});
   }
   request.name = request.variant.name;
+  // What an axis says stands, and is refused if it cannot be.
+  if (!job.study.axis("fidelity")) request.fidelity = std::min(request.fidelity, finest_fidelity(request.variant));
+  for (std::size_t i = 0; i < job.study.axes.size(); ++i) {
+    const std::string& axis = job.study.axes[i].name;
+    const std::string slot = axis.substr(0, axis.rfind('.'));
+    if (point.values[i] == no_value || !is_outside_pipeline(slot) || draws_with(request.variant, slot)) continue;
+    throw UserError("axis " + axis + " changes nothing", "variant " + request.variant.name,
+                    "no variant of the study draws with " + slot, "add variant = [\"software\"] or [\"accelerator\"]");
+  }
   for (const Setting& own : request.variant.changed_settings) {
     const std::string name = own.unit + "." + own.parameter;
     for (const StudyAxis& axis : job.study.axes) {
@@ -631,7 +642,8 @@ void choose_references(SweepJob& job) {
     if (!is_parameter(axis.name) || follows_the_point(axis.name)) continue;
     const std::size_t dot = axis.name.rfind('.');
     const auto value_in = [&](const RunRequest& request) {
-      for (const auto& [name, value] : final_parameters(request)) {
+      const bool is_outside = is_outside_pipeline(axis.name.substr(0, dot));
+      for (const auto& [name, value] : is_outside ? check_software(request) : final_parameters(request)) {
         if (name == axis.name) return value;
       }
       return std::string();
@@ -660,7 +672,7 @@ SweepResult run_sweep(const SweepJob& job) {
   for (const StudiedPoint& point : job.study.points) {
     try {
       requests.push_back(request_of(job, point));
-      check_configuration(requests.back());
+      check_configuration(of_variant_alone(requests.back()));
     } catch (const UserError& error) {
       throw error.also_in("of the point " + point_text(job.study, point));
     }

@@ -224,6 +224,7 @@ void write_view_images(const SimulationJob& job, const ImageFiles& files, const 
 /// What many views would fill memory and journal with, and nobody reads.
 void strip_view(RunResult& run) {
   run.units.clear();
+  run.kernels.clear();
   run.statistics.clear();
   run.effects.clear();
   run.draws.clear();

@@ -83,6 +83,8 @@ Json accuracy_json(const AccuracyResult& result) {
     stress_left_out.push_back({{"configuration", left_out.configuration}, {"reason", left_out.reason}});
   Json precision = Json::array();
   for (const PrecisionRow& row : result.precision) precision.push_back(precision_json(row, result.runs[row.run]));
+  std::vector<std::string> left_out = result.knobs_left_out;
+  left_out.insert(left_out.end(), result.knobs_without_pipeline.begin(), result.knobs_without_pipeline.end());
   Json json = head_json("vrpipe.accuracy/1", result.provenance, result.processes);
   json.update({{"scene", scene_json(result.scene, result.width, result.height)},
                {"camera", camera_json(result.viewpoint)},
@@ -96,7 +98,7 @@ Json accuracy_json(const AccuracyResult& result) {
                {"precision_variant", result.base.variant.name},
                {"precision_fidelity", vrpipe::name_of(result.base.fidelity)},
                {"precision_processes", result.processes},
-               {"knobs_left_out", result.knobs_left_out},
+               {"knobs_left_out", left_out},
                {"tolerances",
                 {{"cpu_seconds_percent", 100 * fidelity_tolerance.cost_share},
                  {"cycles_error_percent", fidelity_tolerance.error},

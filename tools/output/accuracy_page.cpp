@@ -202,8 +202,9 @@ std::string functional_note(const AccuracyResult& result) {
 std::string omitted_effects_section(const AccuracyResult& result) {
   std::vector<const RunResult*> runs;
   for (const FidelityLevel& level : result.fidelity) {
-    if (level.run.request.fidelity == fidelities().back()) runs.push_back(&level.run);
+    if (level.run.request.fidelity == fidelities().back() && !level.run.effects.empty()) runs.push_back(&level.run);
   }
+  if (runs.empty()) return {};
   return fmt::format(
              "<h2>Effects: what is simulated</h2>\n<p>At {}, with <code>--effects {}</code>. What is not active is "
              "omitted: <b>static</b>, since frame, camera and platform decide beforehand; <b>verified</b>, as nothing "
@@ -230,12 +231,13 @@ std::string accuracy_page(const AccuracyResult& result) {
   text += fmt::format(
       "<p>Every variant at every fidelity, one simulation at a time. Errors are against <b>{}</b>; what lies further "
       "left is sooner done, further down more exact.</p>\n",
-      vrpipe::name_of(fidelities().back()));
-  text += fidelity_plot(result) + functional_note(result) + definition(fidelity_definition()) +
+      html_escaped(most_exact_text(result)));
+  text += fidelity_plot(result) + functional_note(result) + definition(fidelity_definition(result)) +
           word_list(fidelity_summary(result)) + table(fidelity_table(result));
 
-  text += "<h3>" + html_escaped(stress_title(result)) + "</h3>\n" + table(stress_table(result)) +
-          word_list(stress_notes(result));
+  if (!result.stress.empty())
+    text += "<h3>" + html_escaped(stress_title(result)) + "</h3>\n" + table(stress_table(result));
+  text += word_list(stress_notes(result));
 
   text += "<h2>Precision: how exact numbers are</h2>\n";
   if (const std::string verdict = precision_verdict(result); !verdict.empty()) {

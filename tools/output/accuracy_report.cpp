@@ -128,6 +128,7 @@ std::string text_of(const AccuracyTable& source, const std::vector<std::size_t>&
 
 /// How one fidelity does over all variants.
 struct FidelityRange {
+  bool is_there = false, is_reference = true;
   bool timed = false;
   bool always_dominated = true;
   double slowest = INFINITY, fastest = 0;          // times as fast as the most exact
@@ -138,15 +139,22 @@ struct FidelityRange {
 
 FidelityRange range_of(const AccuracyResult& result, Fidelity fidelity) {
   FidelityRange range;
+  const auto is_finest = [](const RunRequest& request) { return request.fidelity == finest_fidelity(request.variant); };
   for (const FidelityLevel& level : result.fidelity) {
     if (level.run.request.fidelity != fidelity) continue;
+    range.is_there = true;
+    range.is_reference = range.is_reference && is_finest(level.run.request);
+  }
+  for (const FidelityLevel& level : result.fidelity) {
+    if (level.run.request.fidelity != fidelity || (is_finest(level.run.request) && !range.is_reference)) continue;
     range.timed = level.run.cycles.has_value();
     range.always_dominated &= level.dominated;
     range.slowest = std::min(range.slowest, level.times_as_fast);
     range.fastest = std::max(range.fastest, level.times_as_fast);
     range.cycles_percent = std::max(range.cycles_percent, std::fabs(level.cycles_error_percent.value_or(0)));
     range.speedup_percent = std::max(range.speedup_percent, std::fabs(level.speedup_error_percent.value_or(0)));
-    range.quads_per_second = std::min(range.quads_per_second, level.quads_per_second);
+    if (level.run.request.variant.drawn_by == DrawnBy::pipeline)
+      range.quads_per_second = std::min(range.quads_per_second, level.quads_per_second);
     range.worst_image_db = std::min(range.worst_image_db, level.image.psnr_db);
   }
   return range;
@@ -169,6 +177,30 @@ std::string times_text(const FidelityRange& range) {
 
 }  // namespace
 
+namespace {
+Fidelity most_exact(const AccuracyResult& result) {
+  Fidelity finest = Fidelity::functional;
+  for (const FidelityLevel& level : result.fidelity) finest = std::max(finest, level.run.request.fidelity);
+  return finest;
+}
+}  // namespace
+
+std::string most_exact_text(const AccuracyResult& result) {
+  std::string text;
+  for (auto fidelity = fidelities().rbegin(); fidelity != fidelities().rend(); ++fidelity) {
+    std::vector<std::string> names;
+    for (const FidelityLevel& level : result.fidelity) {
+      const Variant& variant = level.run.request.variant;
+      const bool is_finest = level.run.request.fidelity == finest_fidelity(variant);
+      if (is_finest && level.run.request.fidelity == *fidelity) names.push_back(variant.name);
+    }
+    if (names.empty()) continue;
+    text += text.empty() ? vrpipe::name_of(*fidelity)
+                         : fmt::format(", {} of {}", vrpipe::name_of(*fidelity), fmt::join(names, ", "));
+  }
+  return text;
+}
+
 AccuracyTable fidelity_table(const AccuracyResult& result) {
   AccuracyTable table;
   table.group_heading = "variant";
@@ -178,7 +210,7 @@ AccuracyTable fidelity_table(const AccuracyResult& result) {
                    "speed-up",
                    "error %",
                    "CPU s",
-                   std::string("vs ") + vrpipe::name_of(fidelities().back()),
+                   std::string("vs ") + vrpipe::name_of(most_exact(result)),
                    "dominated",
                    "Mquads/s",
                    "events",
@@ -191,7 +223,9 @@ AccuracyTable fidelity_table(const AccuracyResult& result) {
          {vrpipe::name_of(run.request.fidelity), cycles_text(run), signed_percent(level.cycles_error_percent),
           level.speedup ? fmt::format("{:.3f}", *level.speedup) : "-", signed_percent(level.speedup_error_percent),
           fmt::format("{:.2f}", level.cpu_seconds), fmt::format("{:.2f}x", level.times_as_fast),
-          level.dominated ? "yes" : "", fmt::format("{:.2f}", level.quads_per_second * 1e-6),
+          level.dominated ? "yes" : "",
+          run.request.variant.drawn_by == DrawnBy::pipeline ? fmt::format("{:.2f}", level.quads_per_second * 1e-6)
+                                                            : "-",
           grouped(run.kernel_events), signed_percent(level.fragments_blended_error_percent),
           decibels(level.image.psnr_db)},
          false});
@@ -250,10 +284,11 @@ std::string within(double percent) {
 }
 
 std::string fidelity_verdict(const AccuracyResult& result) {
-  const std::string exact = vrpipe::name_of(fidelities().back());
+  const std::string exact = most_exact_text(result);
   std::string text;
-  for (auto fidelity = fidelities().rbegin() + 1; fidelity != fidelities().rend(); ++fidelity) {
+  for (auto fidelity = fidelities().rbegin(); fidelity != fidelities().rend(); ++fidelity) {
     const FidelityRange range = range_of(result, *fidelity);
+    if (!range.is_there || range.is_reference) continue;
     const bool first = text.empty();
     text += fmt::format("{}{}: {}{}, {}", first ? "" : "; ", vrpipe::name_of(*fidelity), times_text(range),
                         first ? " as fast as " + exact : "",
@@ -262,11 +297,11 @@ std::string fidelity_verdict(const AccuracyResult& result) {
   return text;
 }
 
-std::string fidelity_definition() {
+std::string fidelity_definition(const AccuracyResult& result) {
   return fmt::format(
       "dominated: another fidelity of the variant is better in CPU seconds (by over {:g} %) or in error (by over {:g} "
       "points) and no worse in the other; {}, which errors are measured against, never is",
-      100 * fidelity_tolerance.cost_share, fidelity_tolerance.error, vrpipe::name_of(fidelities().back()));
+      100 * fidelity_tolerance.cost_share, fidelity_tolerance.error, most_exact_text(result));
 }
 
 std::string precision_definition() {
@@ -280,8 +315,9 @@ std::vector<std::string> fidelity_summary(const AccuracyResult& result) {
   std::vector<std::string> lines;
   for (const Fidelity fidelity : fidelities()) {
     const FidelityRange range = range_of(result, fidelity);
+    if (!range.is_there) continue;
     std::string line = fmt::format("{}: ", vrpipe::name_of(fidelity));
-    if (fidelity == fidelities().back()) {
+    if (range.is_reference) {
       line += "what the others are measured against";
     } else {
       line += times_text(range) + " as fast";
@@ -291,7 +327,8 @@ std::vector<std::string> fidelity_summary(const AccuracyResult& result) {
       line += std::isinf(range.worst_image_db) ? ", the same images"
                                                : fmt::format(", images within {:.1f} dB", range.worst_image_db);
     }
-    line += fmt::format(", at least {:.2f} M quads rasterised per CPU second", range.quads_per_second * 1e-6);
+    if (!std::isinf(range.quads_per_second))
+      line += fmt::format(", at least {:.2f} M quads rasterised per CPU second", range.quads_per_second * 1e-6);
     if (range.always_dominated) line += "; dominated in every variant";
     lines.push_back(line);
   }
@@ -343,6 +380,9 @@ std::vector<std::string> precision_summary(const AccuracyResult& result) {
   if (!result.knobs_left_out.empty()) {
     lines.push_back("left out, since a draw list is preprocessed already: " + joined(result.knobs_left_out));
   }
+  if (!result.knobs_without_pipeline.empty()) {
+    lines.push_back("left out, since they are of the graphics pipeline: " + joined(result.knobs_without_pipeline));
+  }
   return lines;
 }
 
@@ -370,7 +410,7 @@ std::vector<std::string> accuracy_heading(const AccuracyResult& result) {
 namespace {
 
 std::string fidelity_title(const AccuracyResult& result) {
-  return fmt::format("Fidelity, against {}: one simulation at a time{}", vrpipe::name_of(fidelities().back()),
+  return fmt::format("Fidelity, against {}: one simulation at a time{}", most_exact_text(result),
                      result.repeat > 1 ? fmt::format(", CPU seconds the median of {}", result.repeat) : "");
 }
 
@@ -390,8 +430,9 @@ std::string accuracy_text(const AccuracyResult& result, const TextStyle& style) 
   text +=
       text_of(fidelity, {0, 1, 2, 3, 4, 5, 6}, style) + "\n" + text_of(fidelity, {0, 7, 8, 9, 10, 11}, style) + "\n";
   for (const std::string& line : fidelity_summary(result)) text += line + "\n";
-  text += fidelity_definition() + "\n";
-  text += "\n" + style.bold(stress_title(result)) + "\n\n" + text_of(stress_table(result), {0, 1, 2, 3}, style);
+  text += fidelity_definition(result) + "\n";
+  if (!result.stress.empty())
+    text += "\n" + style.bold(stress_title(result)) + "\n\n" + text_of(stress_table(result), {0, 1, 2, 3}, style);
   for (const std::string& line : stress_notes(result)) text += line + "\n";
   text += "\n" + style.bold(precision_title(result)) + "\n\n";
   text += text_of(precision_table(result), {0, 1, 3, 5, 6, 7, 9}, style) + "\n";
@@ -407,7 +448,7 @@ std::string accuracy_markdown(const AccuracyResult& result) {
   for (const std::string& line : accuracy_heading(result)) text += line + ".\n";
   text += "\n" + markdown(fidelity_table(result)) + "\n";
   for (const std::string& line : fidelity_summary(result)) text += "* " + line + "\n";
-  text += "\n" + stress_title(result) + ":\n\n" + markdown(stress_table(result)) + "\n";
+  if (!result.stress.empty()) text += "\n" + stress_title(result) + ":\n\n" + markdown(stress_table(result)) + "\n";
   for (const std::string& line : stress_notes(result)) text += "* " + line + "\n";
   text += (result.stress_left_out.empty() ? "" : "\n") + markdown(precision_table(result)) + "\n";
   for (const std::string& line : precision_summary(result)) text += "* " + line + "\n";

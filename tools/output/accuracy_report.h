@@ -36,8 +36,11 @@ std::string stress_title(const AccuracyResult& result);
 std::vector<std::string> stress_notes(const AccuracyResult& result);
 
 // What the words of the tables mean, tolerances included.
-std::string fidelity_definition();   ///< of "dominated"
-std::string precision_definition();  ///< of "front"
+std::string fidelity_definition(const AccuracyResult& result);  ///< of "dominated"
+std::string precision_definition();                             ///< of "front"
+
+/// The fidelities that the others of a variant are measured against, e.g. "cycle, lt of accelerator".
+std::string most_exact_text(const AccuracyResult& result);
 
 /// A bound on an error, percent, rounded up: 0 only for 0.
 std::string within(double percent);

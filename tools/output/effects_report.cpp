@@ -87,23 +87,23 @@ std::string short_text(const RunResult& run) {
 }
 
 /// Those that differ, a column for each run; the others are counted.
-std::string comparison_text(const std::vector<RunResult>& runs, const TextStyle& style) {
+std::string comparison_text(const std::vector<const RunResult*>& runs, const TextStyle& style) {
   std::vector<std::string> heading{"effects that differ"};
-  for (const RunResult& run : runs) heading.push_back(printable(name_of(run.request)));
+  for (const RunResult* run : runs) heading.push_back(printable(name_of(run->request)));
   TextTable table(std::move(heading));
   bool any_differs = false;
   std::map<std::string, std::vector<std::string>> alike;  // names, by state
   // Platforms may have different ones.
   std::set<std::string> all_names;
-  for (const RunResult& run : runs) {
-    for (const EffectReport& effect : run.effects) all_names.insert(effect.name);
+  for (const RunResult* run : runs) {
+    for (const EffectReport& effect : run->effects) all_names.insert(effect.name);
   }
   for (const std::string& name : all_names) {
     std::vector<std::string> cells{printable(name)};
-    for (const RunResult& run : runs) {
-      const auto found = std::find_if(run.effects.begin(), run.effects.end(),
+    for (const RunResult* run : runs) {
+      const auto found = std::find_if(run->effects.begin(), run->effects.end(),
                                       [&](const EffectReport& effect) { return effect.name == name; });
-      cells.push_back(found == run.effects.end() ? "-" : state_of(run, *found));
+      cells.push_back(found == run->effects.end() ? "-" : state_of(*run, *found));
     }
     if (std::all_of(cells.begin() + 1, cells.end(), [&](const std::string& cell) { return cell == cells[1]; })) {
       alike[cells[1]].push_back(cells[0]);
@@ -135,10 +135,17 @@ std::string effects_choice_text(const RunRequest& request) {
 
 std::string effects_text(const std::vector<RunResult>& runs, const std::vector<EffectCosts>& costs,
                          const TextStyle& style) {
-  if (runs.front().effects.empty()) return {};
-  if (costs.empty()) return "\n" + (runs.size() > 1 ? comparison_text(runs, style) : short_text(runs.front()));
+  std::vector<const RunResult*> with;
+  for (const RunResult& run : runs) {
+    if (!run.effects.empty()) with.push_back(&run);
+  }
+  if (with.empty()) return {};
+  if (costs.empty()) return "\n" + (with.size() > 1 ? comparison_text(with, style) : short_text(*with.front()));
   std::string text;
-  for (std::size_t i = 0; i < runs.size(); ++i) text += "\n" + run_text(runs[i], costs[i], style);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    text += "\n" + (runs[i].effects.empty() ? fmt::format("{} has no effects\n", printable(name_of(runs[i].request)))
+                                            : run_text(runs[i], costs[i], style));
+  }
   return text;
 }
 

@@ -6,6 +6,7 @@
 
 #include <vrpipe/component/printable.h>
 
+#include "jobs/comparison.h"
 #include "jobs/user_variants.h"
 #include "output/effects_report.h"
 
@@ -47,7 +48,9 @@ std::string machines_text(const std::vector<RunResult>& runs, const std::vector<
     const Platform& platform = *run.request.platform;
     if (is_first(platform.name, platforms)) text += platform_line(platform, style);
   }
-  text += common_text(runs.front().request, preprocessing, passes);
+  RunRequest common = runs.front().request;
+  common.fidelity = finest_fidelity_of(runs);
+  text += common_text(common, preprocessing, passes);
   for (const RunResult& run : runs) {
     const Variant& variant = run.request.variant;
     if (variant.base.empty() || !is_first(variant.name, variants)) continue;

@@ -181,9 +181,12 @@ std::string slices_csv(const std::vector<RunResult>& runs, const std::vector<std
 }  // namespace
 
 std::string course_section(const JobResult& result) {
-  const std::vector<RunResult>& runs = result.runs;
+  std::vector<RunResult> runs;
+  for (const RunResult& run : result.runs) {
+    if (run.request.variant.drawn_by == DrawnBy::pipeline) runs.push_back(run);
+  }
   const auto has_course = [](const RunResult& run) { return run.intervals && !run.intervals->from.empty(); };
-  if (!std::all_of(runs.begin(), runs.end(), has_course)) return {};
+  if (runs.empty() || !std::all_of(runs.begin(), runs.end(), has_course)) return {};
   CourseScale scale;
   std::uint64_t longest = 1;
   for (const RunResult& run : runs) {

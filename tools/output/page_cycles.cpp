@@ -77,18 +77,24 @@ std::string utilization_table(const std::vector<RunResult>& runs) {
   std::vector<std::string> heading{"utilization, % of peak"}, names{"run"};
   for (const RunResult& run : runs) heading.push_back(name_of(run.request));
   std::vector<PageRow> rows;
-  for (std::size_t i = 0; i < runs.front().utilization.size(); ++i) {
-    const std::string& name = runs.front().utilization[i].first;
-    names.push_back(name);
-    const auto is_idle = [i](const RunResult& run) { return run.utilization[i].second <= 0; };
-    if (name == "dram" && std::all_of(runs.begin(), runs.end(), is_idle)) continue;
+  const auto most = std::max_element(runs.begin(), runs.end(), [](const RunResult& a, const RunResult& b) {
+    return a.utilization.size() < b.utilization.size();
+  });
+  for (const auto& each : most->utilization) names.push_back(each.first);
+  for (const std::string& name : utilized(runs)) {
     PageRow& row = rows.emplace_back(PageRow{{name}});
-    for (const RunResult& run : runs) row.cells.push_back(fmt::format("{:.1f}", 100 * run.utilization[i].second));
+    for (const RunResult& run : runs) {
+      const std::optional<double> share = utilization_of(run, name);
+      row.cells.push_back(share ? fmt::format("{:.1f}", 100 * *share) : "-");
+    }
   }
   CsvText csv(names);
   for (const RunResult& run : runs) {
     std::vector<std::string> cells{name_of(run.request)};
-    for (const auto& unit : run.utilization) cells.push_back(csv_number(unit.second));
+    for (std::size_t i = 1; i < names.size(); ++i) {
+      const std::optional<double> share = utilization_of(run, names[i]);
+      cells.push_back(share ? csv_number(*share) : std::string());
+    }
     csv.row(cells);
   }
   return "<h3>Utilization</h3>\n<p>Work done over peak rate x cycles. <span class=\"links\">" +
@@ -106,7 +112,7 @@ std::string cycles_section(const JobResult& result) {
   }
   std::string text = bounds.empty() ? std::string() : "<ul>\n" + bounds + "</ul>\n";
   text += states_figure(runs);
-  return runs.front().utilization.empty() ? text : text + utilization_table(runs);
+  return utilized(runs).empty() ? text : text + utilization_table(runs);
 }
 
 }  // namespace vrpipe::tools

@@ -76,8 +76,10 @@ std::string speedups_section(const JobResult& result) {
 
 std::string runs_effects_section(const JobResult& result) {
   std::vector<const RunResult*> runs;
-  for (const RunResult& run : result.runs) runs.push_back(&run);
-  if (runs.front()->effects.empty()) return {};
+  for (const RunResult& run : result.runs) {
+    if (!run.effects.empty()) runs.push_back(&run);
+  }
+  if (runs.empty()) return {};
   return "<p>With <code>--effects " + html_escaped(result.runs.front().request.effects.text()) +
          "</code>. What is not active is omitted: <b>static</b>, since frame, camera and platform decide beforehand; "
          "<b>verified</b>, as nothing called for it in the run; <b>bounded</b>, as an approximation; or by "

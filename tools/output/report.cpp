@@ -53,6 +53,8 @@ std::string upper(std::string text) {
   return text;
 }
 
+bool is_of_pipeline(const RunResult& run) { return run.request.variant.drawn_by == DrawnBy::pipeline; }
+
 /// Builds rows with one cell for each run.
 class RunTable {
  public:
@@ -66,10 +68,13 @@ class RunTable {
     table_.row(std::move(cells), emphasised);
   }
   /// A row of counts; left out when all are zero and it is not `always` there.
-  void counts(const std::string& label, std::uint64_t Counts::*member, const CountScale& scale, bool always = true) {
+  /// @param of_pipeline  whether only the pipeline has any
+  void counts(const std::string& label, std::uint64_t Counts::*member, const CountScale& scale, bool of_pipeline,
+              bool always = true) {
     const auto is_zero = [member](const RunResult& run) { return run.counts.*member == 0; };
     if (!always && std::all_of(runs_.begin(), runs_.end(), is_zero)) return;
-    row(label, [&](const RunResult& run) { return scale(run.counts.*member); });
+    row(label,
+        [&](const RunResult& run) { return of_pipeline && !is_of_pipeline(run) ? "-" : scale(run.counts.*member); });
   }
   std::string text(const TextStyle& style) const { return table_.text(style); }
 
@@ -113,24 +118,27 @@ constexpr Fates fragment_fates{&Counts::fragments_rasterized,  &Counts::fragment
 
 void add_fates(RunTable& table, const std::string& title, const Fates& fates, const JobResult& result) {
   const std::vector<RunResult>& runs = result.runs;
+  const bool of_pipeline = fates.rasterized == quad_fates.rasterized;
   std::uint64_t largest = 0;
   for (const RunResult& run : runs) largest = std::max(largest, run.counts.*fates.rasterized);
   const CountScale scale = scale_for(largest);
   table.group(title + scale.suffix);
-  table.counts("rasterized", fates.rasterized, scale);
-  table.counts("depth/stencil failed", fates.depth_stencil_failed, scale, false);
-  table.counts("terminated", fates.terminated, scale);
-  table.counts("not shaded (depth alone)", fates.unshaded, scale, false);
-  table.counts("shaded", fates.shaded, scale);
-  table.counts("pruned (alpha < 1/255)", fates.pruned, scale);
-  table.counts("merged away", fates.merged, scale);
-  table.counts("dropped late", fates.dropped_late, scale, false);
-  table.counts("late failed", fates.late_failed, scale, false);
-  table.counts("not blended (no colour)", fates.unblended, scale, false);
-  table.counts("blended", fates.blended, scale);
+  table.counts("rasterized", fates.rasterized, scale, of_pipeline);
+  table.counts("depth/stencil failed", fates.depth_stencil_failed, scale, of_pipeline, false);
+  table.counts("terminated", fates.terminated, scale, of_pipeline);
+  table.counts("not shaded (depth alone)", fates.unshaded, scale, of_pipeline, false);
+  table.counts("shaded", fates.shaded, scale, of_pipeline);
+  table.counts("pruned (alpha < 1/255)", fates.pruned, scale, of_pipeline);
+  table.counts("merged away", fates.merged, scale, of_pipeline);
+  table.counts("dropped late", fates.dropped_late, scale, of_pipeline, false);
+  table.counts("late failed", fates.late_failed, scale, of_pipeline, false);
+  table.counts("not blended (no colour)", fates.unblended, scale, of_pipeline, false);
+  table.counts("blended", fates.blended, scale, of_pipeline);
   if (runs.size() > 1) {
     const std::uint64_t before = runs[result.baseline].counts.*fates.blended;
-    table.row("blended, reduction", [&](const RunResult& run) { return ratio(before, run.counts.*fates.blended); });
+    table.row("blended, reduction", [&](const RunResult& run) {
+      return before == 0 ? std::string("-") : ratio(before, run.counts.*fates.blended);
+    });
   }
 }
 
@@ -156,14 +164,14 @@ void add_time(RunTable& table, const JobResult& result) {
 }
 
 void add_utilization(RunTable& table, const std::vector<RunResult>& runs) {
-  if (runs.front().utilization.empty()) return;
+  const std::vector<std::string> names = utilized(runs);
+  if (names.empty()) return;
   table.group("utilization, % of peak");
-  for (std::size_t i = 0; i < runs.front().utilization.size(); ++i) {
-    const std::string& name = runs.front().utilization[i].first;
-    // DRAM does nothing while L2 is all the memory there is.
-    const auto is_idle = [i](const RunResult& run) { return run.utilization[i].second <= 0; };
-    if (name == "dram" && std::all_of(runs.begin(), runs.end(), is_idle)) continue;
-    table.row(name, [i](const RunResult& run) { return tenths_of_percent(run.utilization[i].second); });
+  for (const std::string& name : names) {
+    table.row(name, [&](const RunResult& run) {
+      const std::optional<double> share = utilization_of(run, name);
+      return share ? tenths_of_percent(*share) : std::string("-");
+    });
   }
 }
 
@@ -210,7 +218,7 @@ void add_memory(RunTable& table, const std::vector<RunResult>& runs) {
       };
       if (std::none_of(runs.begin(), runs.end(), [&](const RunResult& run) { return cell(run) > 0; })) continue;
       table.row(fmt::format("{}, {}", shown, what),
-                [&](const RunResult& run) { return fmt::format("{:.2f}", cell(run)); });
+                [&](const RunResult& run) { return is_of_pipeline(run) ? fmt::format("{:.2f}", cell(run)) : "-"; });
     }
   }
 }
@@ -394,13 +402,30 @@ std::string rejected_text(const RejectedGaussians& rejected) {
                      grouped(rejected.total()), grouped(rejected.not_finite), grouped(rejected.zero_quaternion));
 }
 
+/// What is drawn outside the pipeline may not count fragments.
+bool draws_nothing(const RunResult& run, const SceneSummary& scene) {
+  return run.counts.fragments_rasterized == 0 && (is_of_pipeline(run) || scene.gaussians_visible == 0);
+}
+
+/// Of runs that are less exact than the others, since there is no more of them.
+std::string fidelities_text(const std::vector<RunResult>& runs) {
+  std::string text;
+  for (const RunResult& run : runs) {
+    if (run.request.fidelity >= finest_fidelity_of(runs)) continue;
+    text += fmt::format("{} is at {}: there is nothing more exact of it\n", name_of(run.request),
+                        vrpipe::name_of(run.request.fidelity));
+  }
+  return text;
+}
+
 std::string remarks(const JobResult& result) {
   const std::vector<RunResult>& runs = result.runs;
   std::string text;
-  if (runs.front().counts.fragments_rasterized == 0) {
+  if (draws_nothing(runs.front(), result.scene)) {
     text += nothing_visible(result.scene, result.viewpoint.has_value()) + "\n";
   }
   text += stopped_text(runs.front());
+  text += fidelities_text(runs);
   for (const RunResult& run : runs) text += bound_text(run);
   text += validated_text(runs);
   if (const auto early = early_termination_ratio(runs)) {
@@ -424,6 +449,27 @@ std::string remarks(const JobResult& result) {
 
 }  // namespace
 
+std::optional<double> utilization_of(const RunResult& run, const std::string& name) {
+  for (const auto& [slot, share] : run.utilization) {
+    if (slot == name) return share;
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string> utilized(const std::vector<RunResult>& runs) {
+  const auto most = std::max_element(runs.begin(), runs.end(), [](const RunResult& a, const RunResult& b) {
+    return a.utilization.size() < b.utilization.size();
+  });
+  std::vector<std::string> names;
+  for (const auto& each : most->utilization) {
+    const std::string& name = each.first;
+    // DRAM does nothing while L2 is all the memory there is.
+    const auto is_idle = [&](const RunResult& run) { return utilization_of(run, name).value_or(0) <= 0; };
+    if (name != "dram" || !std::all_of(runs.begin(), runs.end(), is_idle)) names.push_back(name);
+  }
+  return names;
+}
+
 std::string grouped(std::uint64_t value) {
   std::string digits = std::to_string(value);
   for (std::size_t place = digits.size(); place > 3;) {
@@ -442,7 +488,7 @@ std::string nothing_visible(const SceneSummary& scene, bool has_camera) {
 
 std::vector<std::string> notes_of(const JobResult& result) {
   std::string text;
-  if (result.runs.front().counts.fragments_rasterized == 0) {
+  if (draws_nothing(result.runs.front(), result.scene)) {
     text += nothing_visible(result.scene, result.viewpoint.has_value()) + "\n";
   }
   text += anomaly_text(result.runs) + validated_text(result.runs) + rejected_text(result.scene.rejected);
@@ -485,13 +531,15 @@ std::string report(const JobResult& result, const TextStyle& style) {
   RunTable table(runs);
   add_time(table, result);
   add_fates(table, "fragments", fragment_fates, result);
-  add_fates(table, "quads", quad_fates, result);
-  const CountScale exact{1, ""};
-  table.group("batches");
-  table.counts("warps", &Counts::warps, exact);
-  table.counts("TGC flushes", &Counts::tgc_flushes, exact);
-  table.counts("TC flushes", &Counts::tc_flushes, exact);
-  table.counts("termination updates", &Counts::termination_updates, exact);
+  if (std::any_of(runs.begin(), runs.end(), is_of_pipeline)) {
+    add_fates(table, "quads", quad_fates, result);
+    const CountScale exact{1, ""};
+    table.group("batches");
+    table.counts("warps", &Counts::warps, exact, true);
+    table.counts("TGC flushes", &Counts::tgc_flushes, exact, true);
+    table.counts("TC flushes", &Counts::tc_flushes, exact, true);
+    table.counts("termination updates", &Counts::termination_updates, exact, true);
+  }
   add_utilization(table, runs);
   add_cache(table, runs);
   add_memory(table, runs);

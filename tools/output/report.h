@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,11 @@ constexpr double bounding_occupancy = 0.9;
 
 /// What bounds a run: the unit that is occupied the most, and what with; a line, empty where nothing has time.
 std::string bound_text(const RunResult& run);
+
+/// Share of the peak of units of a slot; none in a run without them, or without time.
+std::optional<double> utilization_of(const RunResult& run, const std::string& slot);
+/// Slots of which any run has it.
+std::vector<std::string> utilized(const std::vector<RunResult>& runs);
 
 /// Digits in groups of three: 12,345,678.
 std::string grouped(std::uint64_t value);

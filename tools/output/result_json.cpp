@@ -218,6 +218,18 @@ Json storage_json(const RunRequest& request) {
   return {{"tgc", storage.tgc_bytes}, {"qru", storage.qru_bytes}};
 }
 
+Json kernels_json(const RunResult& run) {
+  Json kernels = Json::array();
+  for (const KernelReport& kernel : run.kernels) {
+    kernels.push_back({{"name", kernel.name},
+                       {"items", kernel.items},
+                       {"bytes", kernel.bytes},
+                       {"cycles", kernel.cycles ? Json(*kernel.cycles) : Json()},
+                       {"bound_by", kernel.cycles ? Json(kernel.bound_by) : Json()}});
+  }
+  return kernels;
+}
+
 /// @param parameters  of platform_json()
 Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, const EffectCosts* costs,
               const Json& parameters) {
@@ -246,6 +258,10 @@ Json run_json(const RunResult& run, const std::optional<ImageFiles>& images, con
                {"quad_merging_storage_bytes", run.request.variant.quad_merging ? storage_json(run.request) : Json()},
                {"kernel_events", run.kernel_events},
                {"outside_validated_range", run.outside_validated_range}};
+  if (run.request.variant.drawn_by != DrawnBy::pipeline) {
+    json["fidelity"] = vrpipe::name_of(run.request.fidelity);
+    json["kernels"] = kernels_json(run);
+  }
   if (run.intervals) json["intervals"] = intervals_json(*run.intervals);
   if (costs != nullptr) json["all_effects"]["host_seconds"] = {{"with", costs->with_all}, {"without", costs->without}};
   return json;
@@ -378,7 +394,7 @@ Json result_json(const JobResult& result) {
                {"scene", scene_json(result.scene, result.width, result.height)},
                {"camera", camera_json(result.viewpoint)},
                {"platform", std::move(platform)},
-               {"fidelity", vrpipe::name_of(request.fidelity)},
+               {"fidelity", vrpipe::name_of(finest_fidelity_of(result.runs))},
                {"format", vrpipe::name_of(request.format)},
                {"termination", name_of(request.termination)},
                {"effects", request.effects.text()},

@@ -25,6 +25,7 @@ struct AcceleratorResult {
   std::optional<std::uint64_t> interval_cycles;  ///< least from frame to frame: of the busiest stage, or the memory
   std::string bound_by;     ///< the busiest stage and what bounds it, or "memory"; empty without time
   double host_seconds = 0;  ///< wall time of the simulation alone
+  Counts counts;            ///< fragments, as far as the unit says
   std::vector<StatisticReport> statistics;
   std::vector<std::pair<std::string, std::string>> parameters;  ///< accelerator.PARAMETER and value
   Framebuffer framebuffer;                                      ///< of RGBA32F

@@ -102,6 +102,8 @@ class Observers {
   void check(const Netlist& netlist) const;
   LinkObservers of_link(const std::string& name);
   bool observes_link(const std::string& name) const;
+  /// Whether anybody looks at links, states or statistics.
+  bool sees_units() const { return !links_.empty() || !states_.empty() || !statistics_.empty(); }
   /// Null if nobody looks.
   StateObserver* of_unit(const std::string& path);
   FragmentObserver* of_fragments() { return fragments_.see.empty() ? nullptr : &fragments_; }

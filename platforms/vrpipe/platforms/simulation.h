@@ -45,6 +45,10 @@ struct UnitChoice {
   std::string implementation;
 };
 
+/// What draws a frame: the graphics pipeline, kernels on the platform's SM array (software.h), or a unit beside the GPU
+/// (accelerator.h).
+enum class DrawnBy : std::uint8_t { pipeline, software, accelerator };
+
 /// Which of the paper's two extensions a run has, and perhaps units and settings of its own, which come before those of
 /// the run.
 struct Variant {
@@ -58,11 +62,14 @@ struct Variant {
   /// everything else differ in them.
   std::vector<UnitChoice> changed_units = {};
   std::vector<Setting> changed_settings = {};
+  DrawnBy drawn_by = DrawnBy::pipeline;
 };
 /// The paper's four, then those that were added.
 const std::vector<Variant>& variants();
-/// Others that are known by name: the shader blends, with an ordered lock and without any.
+/// Others that are known by name: the shader blends, with an ordered lock and without any; software; an accelerator.
 const std::vector<Variant>& more_variants();
+/// The most exact that there is of what a variant draws with: `cycle`, of an accelerator `lt`.
+Fidelity finest_fidelity(const Variant& variant);
 /// Adds one of your own, as `add_platform` does a platform. Throws UserError for a name that is taken or no name (names.h), and
 /// for a parameter that it sets twice.
 void add_variant(Variant variant);
@@ -209,6 +216,21 @@ struct IntervalReport {
   std::vector<StatisticIntervals> statistics;
 };
 
+/// A kernel that has run, or a stage of an accelerator.
+struct KernelReport {
+  std::string name;
+  std::uint64_t items = 0;              ///< as in KernelWork; of the render kernel, tiles
+  std::uint64_t bytes = 0;              ///< read from memory and written to it
+  std::optional<std::uint64_t> cycles;  ///< of the platform; none where the fidelity has no time
+  std::string bound_by;                 ///< "sm", "memory", "launch" or, of the render kernel, "longest tile"
+  /// Cycles of a whole SM array, and of all of the memory's bandwidth, that it takes; 0 without time, and of an accelerator.
+  std::uint64_t sm_cycles = 0, memory_cycles = 0;
+  // What it spends energy on; none where a kernel does not say, in an accelerator, and cycles without time.
+  std::optional<double> warp_instructions;
+  std::optional<double> lane_instructions;  ///< of the lanes that take part in these
+  std::optional<double> core_cycles;        ///< in which a core has warps, of all cores
+};
+
 struct RunResult {
   RunRequest request;
   std::optional<std::uint64_t> cycles;  ///< none where the fidelity has no time
@@ -221,8 +243,9 @@ struct RunResult {
   Counts counts;
   /// raster zrop prop sm crop l2 dram, in [0, 1]; empty without time. DRAM is 0 while L2 is all the memory there is.
   std::vector<std::pair<std::string, double>> utilization;
-  std::vector<UnitReport> units;
+  std::vector<UnitReport> units;         ///< of a frame drawn outside the pipeline, its kernels or stages
   std::optional<Bottleneck> bottleneck;  ///< none without time, or without work
+  std::vector<KernelReport> kernels;     ///< of a frame drawn outside the pipeline: lists and rendering, or stages
   std::vector<StatisticReport> statistics;
   /// Slot and name of the implementation in it, as the variant has it, in the order of the pipeline.
   std::vector<std::pair<std::string, std::string>> implementations;
@@ -246,7 +269,8 @@ DrawState draw_state_of(const RunRequest& request, const std::vector<Setting>& o
 /// Of the depth target of a frame that is made for a request: `state.depth_format`.
 DepthFormat depth_format_of(const RunRequest& request);
 
-/// Runs one variant. Checks conservation, order per pixel and that the states of each unit sum to the cycles; throws
+/// Runs one variant. What draws outside the pipeline draws what is projected already, in a target of its own, RGBA32F, and
+/// terminates by its own rule; its time is that of lists and rendering, in cycles of the platform. Checks conservation, order per pixel and that the states of each unit sum to the cycles; throws
 /// SimulationFault if one is broken and UserError for a configuration that does not exist. With time, one simulation
 /// per process is the safe way; tests run several with `fresh_simulation()`.
 /// `progress`, if given, goes from 0 to 1.
@@ -261,6 +285,9 @@ void check_configuration(const RunRequest& request);
 /// The names that Observers::on_statistics takes in a run of this request; none where it has no time. Throws UserError.
 /// Not while a simulation of this process is elaborated.
 std::vector<std::string> sampled_statistics(const RunRequest& request);
+
+/// The same, and of what is drawn outside the pipeline, which is not sampled, the names of its statistics.
+std::vector<std::string> counted_statistics(const RunRequest& request);
 
 /// What can be set by --set, per unit, with the platform's settings applied. For `vrpipe units` and the reference.
 struct ParameterListing {

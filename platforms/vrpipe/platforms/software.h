@@ -17,21 +17,6 @@ namespace vrpipe {
 /// by their slot's default or `--unit`, and have parameters and statistics; the SM array's cores, the clock and the
 /// memory are those of the platform.
 
-/// A kernel that has run.
-struct KernelReport {
-  std::string name;
-  std::uint64_t items = 0;              ///< as in KernelWork; of the render kernel, tiles
-  std::uint64_t bytes = 0;              ///< read from memory and written to it
-  std::optional<std::uint64_t> cycles;  ///< of the platform; none where the fidelity has no time
-  std::string bound_by;                 ///< "sm", "memory", "launch" or, of the render kernel, "longest tile"
-  /// Cycles of a whole SM array, and of all of the memory's bandwidth, that it takes; 0 without time, and of an accelerator.
-  std::uint64_t sm_cycles = 0, memory_cycles = 0;
-  // What it spends energy on; none where a kernel does not say, in an accelerator, and cycles without time.
-  std::optional<double> warp_instructions;
-  std::optional<double> lane_instructions;  ///< of the lanes that take part in these
-  std::optional<double> core_cycles;        ///< in which a core has warps, of all cores
-};
-
 struct SoftwareResult {
   RunRequest request;
   std::optional<KernelReport> preprocess;  ///< none of a draw list
@@ -39,6 +24,7 @@ struct SoftwareResult {
   KernelReport render;
   std::optional<std::uint64_t> cycles;  ///< of all; none where the fidelity has no time
   double host_seconds = 0;              ///< wall time of the simulation alone
+  Counts counts;                        ///< fragments, as far as the render kernel says
   std::vector<StatisticReport> statistics;
   std::vector<std::pair<std::string, std::string>> implementations;  ///< slot and name
   std::vector<std::pair<std::string, std::string>> parameters;       ///< SLOT.PARAMETER and value
@@ -51,6 +37,12 @@ struct SoftwareResult {
 bool is_outside_pipeline(const std::string& unit);
 /// The request without what is for these: for the pipeline.
 RunRequest of_pipeline_alone(RunRequest request);
+/// Whether a variant draws with a unit of this slot.
+bool draws_with(const Variant& variant, const std::string& slot);
+/// Throws UserError for a frame that the variant of a request cannot draw: outside the pipeline one plain draw of splats is all.
+void check_drawable(const RunRequest& request, const Frame& frame);
+/// The request without its settings and units for kernels and accelerators that its variant does not draw with.
+RunRequest of_variant_alone(RunRequest request);
 
 /// Renders a frame in software. Settings and units of the request may be of the platform's units, too. `functional` counts and
 /// gives the image; `bound` is the least that kernels take; at `lt` the blocks of the render kernel are a fluid that cores share, at
