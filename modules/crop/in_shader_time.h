@@ -27,20 +27,20 @@ struct InShaderParameters : ParameterSet {
               "race, and updates are lost"};
   Real tile_lock_cycles{*this,
                         "tile_lock_cycles",
-                        17.3,
+                        17.4,
                         0,
                         10000,
                         "cycles",
-                        "measured on a GH100 graphics GPC, of 4 SMs: equal splats and synthetic scenes",
+                        "measured on a GH100 graphics GPC, of 4 SMs: splats of one size",
                         "of taking the lock for a coverage tile: warps of a screen tile of which none has a pixel of "
                         "another"};
   Real warp_lock_cycles{*this,
                         "warp_lock_cycles",
-                        13.8,
+                        13.7,
                         0,
                         10000,
                         "cycles",
-                        "measured on a GH100 graphics GPC, of 4 SMs: equal splats and synthetic scenes",
+                        "measured on a GH100 graphics GPC, of 4 SMs: splats of one size",
                         "beside that, of each of its warps; what is locked goes in draw order"};
   Integer hand_over_cycles{
       *this,
