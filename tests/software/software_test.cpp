@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,8 @@
 #include <vrpipe/pipeline/slots/binning.h>
 #include <vrpipe/pipeline/slots/preparation.h>
 #include <vrpipe/pipeline/slots/render.h>
+#include <vrpipe/platforms/accelerator.h>
+#include <vrpipe/platforms/observers.h>
 
 #include "preparation/preparation.h"
 #include "software/software_statistic.h"
@@ -245,6 +248,92 @@ TEST(Software, IsNoneOfThePipelinesUnits) {
   EXPECT_THROW(check_configuration(request), UserError);
   EXPECT_NO_THROW(check_configuration(of_pipeline_alone(request)));
   EXPECT_NO_THROW(check_software(request));
+}
+
+RunRequest variant_at(const char* variant, Fidelity fidelity, std::vector<UnitChoice> units = {}) {
+  RunRequest request = request_at(fidelity, {}, std::move(units));
+  request.variant = variant_named(variant);
+  return request;
+}
+
+TEST(SoftwareVariant, IsWhatStandsInThePlaceOfTheDraw) {
+  const Draw draw = testing::random_draw(100, 60, 300, 2);
+  const RunResult run = simulate(variant_at("software", Fidelity::lt), draw);
+  const SoftwareResult result = render(request_at(Fidelity::lt), draw);
+  EXPECT_EQ(run.cycles, result.cycles);
+  EXPECT_EQ(run.result_hash, result.result_hash);
+  EXPECT_DOUBLE_EQ(run.milliseconds, static_cast<double>(*run.cycles) / (1980 * 1e3));
+  EXPECT_EQ(run.kernels.size(), result.binning.size() + 1);
+  EXPECT_TRUE(run.effects.empty());
+  std::uint64_t busy = 0;
+  for (const UnitReport& unit : run.units) {
+    std::uint64_t sum = 0;
+    for (const std::uint64_t cycles : unit.cycles) sum += cycles;
+    EXPECT_EQ(sum, *run.cycles) << unit.name;
+    busy += unit.cycles[static_cast<unsigned>(UnitState::busy)];
+  }
+  EXPECT_EQ(busy, *run.cycles) << "one after the other";
+  ASSERT_TRUE(run.bottleneck.has_value());
+  EXPECT_GT(testing::utilization(run, "sm"), 0);
+  EXPECT_LE(testing::utilization(run, "sm"), 1);
+}
+
+TEST(SoftwareVariant, CountsFragmentsOfTheFrameAlone) {
+  const Draw draw = testing::random_draw(100, 60, 300, 2);  // beside it are lanes of tiles, and none of its pixels
+  const Counts counts = simulate(variant_at("software", Fidelity::functional, {{"render", "endless"}}), draw).counts;
+  const SoftwareResult lanes = render(request_at(Fidelity::functional, {}, {{"render", "endless"}}), draw);
+  EXPECT_GT(software_statistic(lanes, "render.lanes_dead"), 0U);
+  EXPECT_EQ(counts.fragments_terminated, 0U);
+  EXPECT_EQ(counts.fragments_shaded, counts.fragments_rasterized);
+  EXPECT_EQ(counts.fragments_blended, software_statistic(lanes, "render.lanes_blending"));
+  EXPECT_EQ(counts.quads_rasterized, 0U);
+}
+
+TEST(SoftwareVariant, AKernelThatSaysNothingOfFragmentsHasNone) {
+  const RunResult run =
+      simulate(variant_at("software", Fidelity::lt, {{"render", "front-most"}}), testing::random_draw(50, 40, 30, 2));
+  EXPECT_EQ(run.counts.fragments_rasterized, 0U);
+  EXPECT_GT(*run.cycles, 0U);
+}
+
+TEST(SoftwareVariant, RefusesWhatIsOfThePipelineAlone) {
+  const Draw draw = testing::draw_of(16, 16);
+  const auto refusal_of = [&](const RunRequest& request) -> std::string {
+    try {
+      simulate(request, draw);
+    } catch (const UserError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  RunRequest stopped = variant_at("software", Fidelity::cycle);
+  stopped.stop_at = 10;
+  EXPECT_NE(refusal_of(stopped).find("stop"), std::string::npos);
+  RunRequest stalled = variant_at("software", Fidelity::cycle);
+  stalled.stall_seed = 1;
+  EXPECT_NE(refusal_of(stalled).find("ports"), std::string::npos);
+  RunRequest observed = variant_at("software", Fidelity::cycle);
+  observed.observers = std::make_shared<Observers>();
+  observed.observers->on_states([](const std::string&, UnitState, Cycle) {});
+  EXPECT_NE(refusal_of(observed).find("observed"), std::string::npos);
+  EXPECT_THROW(check_configuration(observed), UserError);
+  EXPECT_NE(refusal_of(variant_at("accelerator", Fidelity::cycle)).find("take lt"), std::string::npos);
+  Frame tested(16, 16);
+  DrawState state;
+  state.depth.test = true;
+  tested.draw(testing::geometry_of(16, 16), state);
+  EXPECT_THROW(simulate(variant_at("software", Fidelity::lt), tested), UserError);
+}
+
+TEST(AcceleratorVariant, IsInWholeCyclesOfThePlatform) {
+  const Draw draw = testing::random_draw(100, 60, 300, 2);
+  const RunRequest request = variant_at("accelerator", Fidelity::lt);
+  const AcceleratorResult own = simulate_accelerator(request, *Frame::of(draw), {});
+  const RunResult run = simulate(request, draw);
+  const std::uint64_t scaled = *own.cycles * 1980;
+  EXPECT_EQ(*run.cycles, (scaled + own.frequency_mhz - 1) / own.frequency_mhz);
+  EXPECT_EQ(finest_fidelity(request.variant), Fidelity::lt);
+  EXPECT_EQ(run.counts.fragments_blended, own.counts.fragments_blended);
 }
 
 // The paper: HET+QM draws 2.07 times as fast, and frames are 1.60 times as fast; under 25 frames a second in OpenGL.

@@ -240,6 +240,17 @@ TEST_F(DrawnBy, EnergyOfSoftwareIsThatOfItsFrame) {
   const json path = frame("software", {"--platform", platform});
   EXPECT_NEAR(run["energy"]["total_millijoules"]["nominal"].get<double>(), path["millijoules"]["nominal"].get<double>(),
               1e-9);
+  const auto accelerators = by_variant(compared({"--variant", "baseline", "--variant", "accelerator", "--variant",
+                                                 "mine=accelerator,accelerator=gcc", "--energy"}));
+  const json own = accelerators.at("accelerator")["energy"], beside = frame("accelerator")["millijoules"];
+  EXPECT_NEAR(own["total_millijoules"]["nominal"].get<double>(), beside["nominal"].get<double>(),
+              0.87 * 1e3 / (accelerators.at("baseline")["frequency_mhz"].get<double>() * 1e3))
+      << "of a whole cycle of the platform";
+  EXPECT_GT(own["ratio_over_baseline"]["nominal"], 0);
+  const json unknown = accelerators.at("mine")["energy"];
+  EXPECT_TRUE(unknown["total_millijoules"].is_null());
+  EXPECT_TRUE(unknown["ratio_over_baseline"].is_null());
+  EXPECT_FALSE(unknown["missing"].empty());
 }
 
 TEST_F(DrawnBy, AStudyGoesOverListsAndKernels) {

@@ -42,6 +42,7 @@ class CompareCommand : public Command {
         "  vrpipe compare --scene builtin:indoor --views 8 --fidelity lt\n"
         "  vrpipe compare --platform mobile --format rgba8\n"
         "  vrpipe compare --variant het+qm --variant small=het+qm,tc.bins=16,tgc.bins=64\n"
+        "  vrpipe compare --variant baseline --variant software --variant no-end=software,render=endless\n"
         "  vrpipe compare --platform agx-orin --platform mobile --relative-to mobile/baseline\n"
         "  vrpipe compare --platform agx-orin-lpddr5 --energy\n"
         "  vrpipe compare --set qru.quads_per_cycle=4 --json - | python3 -m json.tool");

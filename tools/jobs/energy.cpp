@@ -167,6 +167,8 @@ EnergyAmounts& EnergyAmounts::operator+=(const EnergyAmounts& next) {
   } else {
     seconds.reset();
   }
+  own_joules += next.own_joules;
+  is_known = is_known && next.is_known;
   fragments_blended += next.fragments_blended;
   const auto add = [](std::vector<std::string>& names, const std::vector<std::string>& others) {
     for (const std::string& name : others) {
@@ -186,18 +188,26 @@ EnergyAmounts amounts_of_kernels(const RunResult& run, const EnergyTable& table)
   return amounts;
 }
 
-EnergyAmounts unknown_amounts(const RunResult& run, const EnergyTable& table) {
-  EnergyAmounts amounts = energy_amounts_of_dram(0, table);
-  amounts.process = table.process_of(run.request.platform->name);
-  amounts.missing.push_back("what an accelerator spends");
+EnergyAmounts amounts_of_accelerator(const RunResult& run, const EnergyTable& table) {
+  std::uint64_t bytes = 0;
+  for (const KernelReport& stage : run.kernels) bytes += stage.bytes;
+  EnergyAmounts amounts = energy_amounts_of_dram(bytes, table);
+  const std::optional<double> watts = published_watts(run.parameters);
+  amounts.is_known = watts && run.cycles;
+  if (!amounts.is_known) {
+    amounts.missing.push_back("power of the accelerator");
+    return amounts;
+  }
+  amounts.seconds = run.milliseconds * 1e-3;
+  amounts.own_joules = *watts * *amounts.seconds;
   return amounts;
 }
 }  // namespace
 
 EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table) {
   if (run.request.variant.drawn_by != DrawnBy::pipeline) {
-    const bool is_known = run.request.variant.drawn_by == DrawnBy::software && !run.kernels.empty();
-    EnergyAmounts amounts = is_known ? amounts_of_kernels(run, table) : unknown_amounts(run, table);
+    EnergyAmounts amounts = run.request.variant.drawn_by == DrawnBy::software ? amounts_of_kernels(run, table)
+                                                                              : amounts_of_accelerator(run, table);
     amounts.fragments_blended = run.counts.fragments_blended;
     return amounts;
   }
@@ -244,6 +254,9 @@ EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& tabl
     (event.unit == "TGC" || event.unit == "QRU" ? merging : others) += spent;
   }
   for (const UnitEnergy& unit : report.units) report.moving += unit.millijoules;
+  const double own = amounts.own_joules * 1e3;
+  report.moving += {own, own, own};
+  others += {own, own, own};
   if (!amounts.seconds) return report;
 
   const double seconds = *amounts.seconds;
@@ -275,6 +288,7 @@ std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmo
     const double before = baseline.powers[i] * *baseline.seconds, after = run.powers[i] * *run.seconds;
     terms.push_back({before, after, table.powers[i].watts});
   }
+  terms.push_back({baseline.own_joules, run.own_joules, {1, 1, 1}});
   // Its quotient would be no number.
   const auto is_nothing = [](const Term& term) { return term.baseline == 0 && term.run == 0; };
   terms.erase(std::remove_if(terms.begin(), terms.end(), is_nothing), terms.end());
@@ -282,6 +296,16 @@ std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmo
     if (!(total(terms, amount, &Range::low) > 0)) return std::nullopt;
   }
   return range_of_ratio(std::move(terms));
+}
+
+std::optional<double> published_watts(const std::vector<std::pair<std::string, std::string>>& parameters) {
+  for (const auto& [name, text] : parameters) {
+    double watts = 0;
+    if (name != "accelerator.power_watts") continue;
+    std::from_chars(text.data(), text.data() + text.size(), watts);
+    if (watts > 0) return watts;
+  }
+  return std::nullopt;
 }
 
 std::vector<std::string> powers_of_other_platforms(const EnergyTable& table, const Platform& platform) {

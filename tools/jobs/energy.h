@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <vrpipe/platforms/simulation.h>
@@ -18,6 +19,8 @@ struct EnergyAmounts {
   std::vector<double> events;     ///< how often, by EnergyTable::events
   std::vector<double> powers;     ///< how many, in the mean over the time, by EnergyTable::powers
   std::optional<double> seconds;  ///< simulated; none where the fidelity has no time
+  double own_joules = 0;          ///< of an accelerator, by its published power, beside all of the table
+  bool is_known = true;           ///< false: nobody knows what was spent
   std::uint64_t fragments_blended = 0;
   std::vector<std::string> not_counted;  ///< "UNIT: NAME" of events and powers of which the run has no counter
   /// What units of one's own do not say of themselves, e.g. "qru.pairs of qru=mine", or active cycles that a fidelity does not
@@ -28,7 +31,8 @@ struct EnergyAmounts {
   EnergyAmounts& operator+=(const EnergyAmounts& next);
 };
 
-/// A unit that passes items through has no events.
+/// A unit that passes items through has no events. What draws in software spends what its kernels do, an accelerator its
+/// published power and the bytes of its DRAM; without that power nothing is known.
 EnergyAmounts energy_amounts(const RunResult& run, const EnergyTable& table);
 
 /// Of a kernel of a frame, on the platform of a run: what there is of it is the run's.
@@ -60,6 +64,9 @@ EnergyReport energy_report(const EnergyAmounts& amounts, const EnergyTable& tabl
 /// and high are the extremes over all that they may be. None where either misses something, or they are made in two
 /// processes.
 std::optional<Range> energy_ratio(const EnergyAmounts& baseline, const EnergyAmounts& run, const EnergyTable& table);
+
+/// Watts of an accelerator as published, by its parameters; none where they are not known, or it is of another kind.
+std::optional<double> published_watts(const std::vector<std::pair<std::string, std::string>>& parameters);
 
 /// Powers that the platform takes, though the table says that they were found for others.
 std::vector<std::string> powers_of_other_platforms(const EnergyTable& table, const Platform& platform);

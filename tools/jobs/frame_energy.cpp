@@ -1,25 +1,9 @@
 #include "jobs/frame_energy.h"
 
 #include <algorithm>
-#include <charconv>
 #include <string>
 
 namespace vrpipe::tools {
-namespace {
-
-/// As published; none where it is not known, or the unit is of another kind.
-std::optional<double> published_watts(const AcceleratorResult& result) {
-  for (const auto& [name, text] : result.parameters) {
-    double watts = 0;
-    if (name != "accelerator.power_watts") continue;
-    std::from_chars(text.data(), text.data() + text.size(), watts);
-    if (watts > 0) return watts;
-  }
-  return std::nullopt;
-}
-
-}  // namespace
-
 FrameEnergies::FrameEnergies(const EnergyTable& table, const RunResult& draw, const HardwarePreparation& hardware)
     : table_(table), machine_(draw) {
   hardware_ = of_draw(draw, hardware);
@@ -68,7 +52,7 @@ FrameEnergy FrameEnergies::of_draw(const RunResult& draw, const HardwarePreparat
 
 FrameEnergy FrameEnergies::of_accelerator(const AcceleratorResult& result) const {
   FrameEnergy energy;
-  const std::optional<double> watts = published_watts(result);
+  const std::optional<double> watts = published_watts(result.parameters);
   if (!watts || !result.cycles) return energy;
   std::uint64_t bytes = result.sort.bytes + result.raster.bytes;
   if (result.preprocess) bytes += result.preprocess->bytes;

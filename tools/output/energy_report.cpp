@@ -55,10 +55,12 @@ class SpentTable {
       return range ? show(*range * scale) : std::string("-");
     };
     row(label, [&](std::size_t i) {
+      if (!spent_.amounts[i].is_known) return std::string("-");
       const std::string at_least = spent_.amounts[i].missing.empty() ? "" : "at least ";
       return cell(i, [&](const Range& range) { return at_least + three_digits(range.nominal); });
     });
-    row("  low to high", [&](std::size_t i) { return cell(i, between); });
+    row("  low to high",
+        [&](std::size_t i) { return spent_.amounts[i].is_known ? cell(i, between) : std::string("-"); });
   }
   std::string text(const TextStyle& style) const { return table_.text(style); }
 
@@ -109,7 +111,8 @@ std::string left_out_text(const std::vector<RunResult>& runs, const Spent& spent
     names.erase(std::remove_if(names.begin(), names.end(), is_counted), names.end());
   }
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    if (spent.amounts[i].missing.empty()) continue;
+    if (!spent.amounts[i].is_known) text += fmt::format("what {} spends is not known\n", name_of(runs[i].request));
+    if (spent.amounts[i].missing.empty() || !spent.amounts[i].is_known) continue;
     text += broken_at_commas(
         fmt::format("{} spends more than is said here, by nobody knows how much: its units do not count {}",
                     name_of(runs[i].request), printable(fmt::format("{}", fmt::join(spent.amounts[i].missing, ", ")))));
@@ -152,7 +155,7 @@ std::string energy_text(const std::vector<RunResult>& runs, std::size_t baseline
     const auto spends = [&](const EnergyReport& report) { return of(report) > 0; };
     if (std::none_of(spent.reports.begin(), spent.reports.end(), spends)) continue;
     rows.row(printable(spent.reports.front().units[unit].unit),
-             [&](std::size_t i) { return three_digits(of(spent.reports[i])); });
+             [&](std::size_t i) { return spent.amounts[i].is_known ? three_digits(of(spent.reports[i])) : "-"; });
   }
   rows.both(
       "all that moves", [&](std::size_t i) { return spent.reports[i].moving; }, 1);

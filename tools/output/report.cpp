@@ -402,22 +402,6 @@ std::string rejected_text(const RejectedGaussians& rejected) {
                      grouped(rejected.total()), grouped(rejected.not_finite), grouped(rejected.zero_quaternion));
 }
 
-/// What is drawn outside the pipeline may not count fragments.
-bool draws_nothing(const RunResult& run, const SceneSummary& scene) {
-  return run.counts.fragments_rasterized == 0 && (is_of_pipeline(run) || scene.gaussians_visible == 0);
-}
-
-/// Of runs that are less exact than the others, since there is no more of them.
-std::string fidelities_text(const std::vector<RunResult>& runs) {
-  std::string text;
-  for (const RunResult& run : runs) {
-    if (run.request.fidelity >= finest_fidelity_of(runs)) continue;
-    text += fmt::format("{} is at {}: there is nothing more exact of it\n", name_of(run.request),
-                        vrpipe::name_of(run.request.fidelity));
-  }
-  return text;
-}
-
 std::string remarks(const JobResult& result) {
   const std::vector<RunResult>& runs = result.runs;
   std::string text;
@@ -468,6 +452,20 @@ std::vector<std::string> utilized(const std::vector<RunResult>& runs) {
     if (name != "dram" || !std::all_of(runs.begin(), runs.end(), is_idle)) names.push_back(name);
   }
   return names;
+}
+
+bool draws_nothing(const RunResult& run, const SceneSummary& scene) {
+  return run.counts.fragments_rasterized == 0 && (is_of_pipeline(run) || scene.gaussians_visible == 0);
+}
+
+std::string fidelities_text(const std::vector<RunResult>& runs) {
+  std::string text;
+  for (const RunResult& run : runs) {
+    if (run.request.fidelity >= finest_fidelity_of(runs)) continue;
+    text += fmt::format("{} is at {}: there is nothing more exact of it\n", name_of(run.request),
+                        vrpipe::name_of(run.request.fidelity));
+  }
+  return text;
 }
 
 std::string grouped(std::uint64_t value) {

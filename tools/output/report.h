@@ -25,6 +25,11 @@ constexpr double bounding_occupancy = 0.9;
 /// What bounds a run: the unit that is occupied the most, and what with; a line, empty where nothing has time.
 std::string bound_text(const RunResult& run);
 
+/// Whether nothing of the scene is in a run's image. What is drawn outside the pipeline may not count fragments.
+bool draws_nothing(const RunResult& run, const SceneSummary& scene);
+/// Which runs are less exact than others, since there is nothing more exact of them; a line each.
+std::string fidelities_text(const std::vector<RunResult>& runs);
+
 /// Share of the peak of units of a slot; none in a run without them, or without time.
 std::optional<double> utilization_of(const RunResult& run, const std::string& slot);
 /// Slots of which any run has it.

@@ -132,9 +132,9 @@ std::string view_remarks(const ViewsResult& result) {
       "quartiles are interpolated between views; the ratio is that of fragments blended without over with "
       "termination\n";
   std::size_t empty = 0;
-  for (const ViewResult& view : result.views) empty += view.runs.front().counts.fragments_rasterized == 0 ? 1U : 0U;
+  for (const ViewResult& view : result.views) empty += draws_nothing(view.runs.front(), view.scene) ? 1U : 0U;
   if (empty > 0) text += fmt::format("{} with nothing visible, without speed-up and ratio\n", count_of(empty, "view"));
-  text += views_validated_text(result);
+  text += fidelities_text(result.views.front().runs) + views_validated_text(result);
   // Cameras of a file have notes of their own.
   std::vector<std::string> said;
   for (const ViewResult& view : result.views) {
