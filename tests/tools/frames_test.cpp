@@ -267,6 +267,10 @@ TEST_F(Frames, KernelsAreChosenAndSet) {
   EXPECT_TRUE(by_path(frames({"--fidelity", "lt"}))["software"]["expected_error_percent"].is_null());
   const json measured = frames({"--fidelity", "lt", "--platform", "gh100-gpc"});
   EXPECT_EQ(by_path(measured)["software"]["expected_error_percent"], 4);
+  EXPECT_EQ(by_path(measured)["hardware"]["expected_error_percent"], 5);
+  EXPECT_TRUE(by_path(measured)["vr-pipe"]["expected_error_percent"].is_null()) << "there is none";
+  const json changed = frames({"--fidelity", "lt", "--platform", "gh100-gpc", "--set", "crop.latency_cycles=20"});
+  EXPECT_TRUE(by_path(changed)["hardware"]["expected_error_percent"].is_null());
 }
 
 TEST_F(Frames, AKernelOfAPluginTakesThePlaceOfTheShippedOne) {

@@ -24,8 +24,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What software rendering was found to be off on a real GPU, with the shipped units (docs/software.md).
-constexpr double software_error_percent = 4;
+// What frames were found to be off, with the shipped units: on a real GPU in software (docs/software.md), drawn as they are, in
+// their order, and by a shader that blends under a lock (docs/silicon.md); by an accelerator of which a frame is published
+// (docs/accelerator.md).
+constexpr double software_error_percent = 4, hardware_error_percent = 5, in_shader_error_percent = 6;
+constexpr double accelerator_error_percent = 100;
+
+bool is_as_shipped(const RunRequest& request) { return request.settings.empty() && request.units.empty(); }
 
 /// A part of a frame, and what bounds it.
 struct Part {
@@ -121,6 +126,11 @@ class PathMaker {
     path.sort = milliseconds(prepared.sort);
     if (run.cycles) path.raster = run.milliseconds;
     path.frame = sum({path.preprocess, path.sort, path.raster});
+    if (run.request.platform->name == measured_platform && run.request.fidelity >= Fidelity::lt &&
+        is_as_shipped(run.request)) {
+      if (draw.path == "hardware") path.expected_error_percent = hardware_error_percent;
+      if (draw.path == "in-shader") path.expected_error_percent = in_shader_error_percent;
+    }
     if (path.raster) {
       path.interval = std::max(*path.raster, longest_of_shared(path, *path.raster * utilization_of(run, "sm"),
                                                                *path.raster * utilization_of(run, "dram")));
@@ -147,6 +157,8 @@ class PathMaker {
     path.sort = add(result.sort);
     path.raster = add(result.raster);
     if (result.cycles) path.frame = static_cast<double>(*result.cycles) / of_its_clock.cycles_per_ms_;
+    if (result.name == "gscore" && result.request.fidelity == Fidelity::lt && is_as_shipped(result.request))
+      path.expected_error_percent = accelerator_error_percent;
     if (result.interval_cycles)
       path.interval = static_cast<double>(*result.interval_cycles) / of_its_clock.cycles_per_ms_;
     path.bound_by = result.bound_by;

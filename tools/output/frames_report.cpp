@@ -105,8 +105,9 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
   std::string text = fmt::format("{}: {} splats, {}x{}\n", style.bold(printable(result.scene.name)),
                                  grouped(result.scene.gaussians_visible), result.width, result.height);
   text += machine_text(result.runs.front().request, style) + "\n";
-  TextTable table({"milliseconds", "preprocess", "sort", "raster", "frame", "over hardware", "in flight", "bound by"});
-  table.left(7);
+  TextTable table(
+      {"milliseconds", "preprocess", "sort", "raster", "frame", "over hardware", "in flight", "off by, %", "bound by"});
+  table.left(8);
   const auto hardware = std::find_if(result.paths.begin(), result.paths.end(),
                                      [](const FramePath& path) { return path.path == "hardware"; });
   for (const FramePath& path : result.paths) {
@@ -114,14 +115,16 @@ std::string frames_report(const FramesResult& result, const TextStyle& style) {
     table.row({printable(fmt::format("{} ({})", path.path, path.name)), milliseconds_text(path.preprocess),
                milliseconds_text(path.sort), milliseconds_text(path.raster), milliseconds_text(path.frame),
                is_timed ? fmt::format("{:.2f}x", *path.frame / *hardware->frame) : "-",
-               milliseconds_text(path.interval), path.bound_by.empty() ? "-" : printable(path.bound_by)});
+               milliseconds_text(path.interval),
+               path.expected_error_percent ? fmt::format("{:g}", *path.expected_error_percent) : "-",
+               path.bound_by.empty() ? "-" : printable(path.bound_by)});
   }
   text += table.text(style) + "\n" + energies_text(result, style);
   if (hardware->frame)
     text +=
         "in flight: the least from frame to frame, the next prepared beside the draw of this one, as the SM array, "
         "the\n"
-        "memory and the graphics pipeline allow\n";
+        "memory and the graphics pipeline allow; off by: at most, where there is something measured to hold it to\n";
   for (const FramePath& path : result.paths) {
     if (path.path == "software") text += lanes_text(path);
     if (path.path == "accelerator") text += entries_text(path);
