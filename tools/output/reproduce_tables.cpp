@@ -118,10 +118,10 @@ std::string verdict_summary(const Reproduction& of) {
   for (const RowFinding& row : of.rows) ++counts[row.verdict];
   const std::string unsaid =
       counts[Verdict::cannot_say] == 0 ? "" : fmt::format("; of {} nothing can be said", counts[Verdict::cannot_say]);
-  return fmt::format(
-      "{} of {} rows that could have failed agree{}; {} are inputs, {} cannot fail, {} not modelled{}",
-      counts[Verdict::agrees], counts[Verdict::agrees] + counts[Verdict::differs], unsaid, counts[Verdict::input],
-      counts[Verdict::cannot_fail], counts[Verdict::not_modelled], of.result.plan.quick ? "; of a quick look" : "");
+  return fmt::format("{} of {} rows that could have failed agree{}; {} are inputs, {} cannot fail, {} not modelled{}",
+                     counts[Verdict::agrees], counts[Verdict::agrees] + counts[Verdict::differs], unsaid,
+                     counts[Verdict::input], counts[Verdict::cannot_fail], counts[Verdict::not_modelled],
+                     of.result.plan.quick ? "; of a quick look" : "");
 }
 
 std::string why_text(const RowFinding& row) {
