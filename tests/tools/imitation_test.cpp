@@ -151,8 +151,8 @@ class ImitationCommand : public ToolTest {};
 TEST_F(ImitationCommand, IsOneMorePathOfFrames) {
   const std::vector<std::string> command{"frames", "--scene", "tiny.spl", "--fidelity", "lt", "--imitation"};
   const json result = json_of(command);
-  ASSERT_EQ(result["frames"].size(), 6U);
-  const json& path = result["frames"][4];
+  ASSERT_EQ(result["frames"].size(), 7U);
+  const json& path = result["frames"][5];
   EXPECT_EQ(path["path"], "imitation");
   EXPECT_GT(path["counts"]["quads_merged"], 0);
   EXPECT_GT(result["imitation"]["efficiency"]["nominal"], 0.0);
