@@ -232,6 +232,8 @@ TEST_F(Synthetic, RowsOfWholeFramesSayWhatComesBeforeADrawAndBesideIt) {
   result_.frames[4].reset();
   EXPECT_EQ(row("R9").verdict, Verdict::cannot_say);
   EXPECT_EQ(row("R9").reason, "nothing was drawn");
+  EXPECT_EQ(row("C1").verdict, Verdict::cannot_say);
+  EXPECT_EQ(row("C3").measured, "");
 }
 
 TEST(WholeFrames, ComeBackFromAJournal) {

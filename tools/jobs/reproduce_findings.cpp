@@ -106,12 +106,12 @@ SceneFinding scene_finding(const ReproduceResult& result, std::size_t scene) {
   key.variant = "baseline";
   const RunResult& one_pass = result.at(key).run;
   finding.het_beside_passes = gain(one_pass, het);
-  key.variant = "in-shader";
-  finding.in_shader = gain(result.at(key).run, one_pass);
-  key.variant = "in-shader-no-lock";
-  finding.in_shader_no_lock = gain(result.at(key).run, one_pass);
-  key.variant = PointKey::imitated_variant;
-  if (plan.places.count(key.name(plan.scenes)) > 0) {
+  if (!plan.quick) {
+    key.variant = "in-shader";
+    finding.in_shader = gain(result.at(key).run, one_pass);
+    key.variant = "in-shader-no-lock";
+    finding.in_shader_no_lock = gain(result.at(key).run, one_pass);
+    key.variant = PointKey::imitated_variant;
     const std::optional<EnergyAmounts>& imitated = result.at(key).energy;
     key.variant = "baseline";
     const std::optional<EnergyAmounts>& baseline = result.at(key).energy;

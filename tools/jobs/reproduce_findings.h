@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,8 +41,9 @@ struct SceneFinding {
   const PointResult *map_without = nullptr, *map_with = nullptr;
   std::vector<double> passes;  ///< speed-ups of planned_passes() over one pass
   double het_beside_passes = 0;
-  /// Time of the draw where the shader blends, with an ordered lock and without one, over the baseline's.
-  double in_shader = 0, in_shader_no_lock = 0;
+  /// Time of the draw where the shader blends, with an ordered lock and without one, over the baseline's; NaN in a quick look.
+  double in_shader = std::numeric_limits<double>::quiet_NaN();
+  double in_shader_no_lock = std::numeric_limits<double>::quiet_NaN();
   /// Energy of the baseline over that of its imitation of HET+QM, by shipped_energies(); none in a quick look.
   std::optional<Range> imitated_efficiency;
   const WholeFrame* frame = nullptr;  ///< null where there is none

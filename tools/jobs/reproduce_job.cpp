@@ -298,6 +298,7 @@ void simulate_whole_frames(const ReproduceJob& job, ReproduceResult& result, Pro
   }
   PointFrames frames(job, plan);
   result.frames.resize(plan.scenes.size());
+  if (plan.quick) return;
   for (const std::size_t scene : plan.scenes_of(PlannedScene::Role::six)) {
     const std::string& name = plan.scenes[scene].name;
     auto found = done.find(name);

@@ -51,9 +51,10 @@ struct PointResult {
 
 struct ReproduceResult {
   ReproducePlan plan;
-  std::vector<PointResult> points;                ///< of each point of the plan
-  std::vector<std::optional<WholeFrame>> frames;  ///< of each scene of the plan; of the six alone
-  std::vector<MicrobenchResult> microbenches;     ///< in the order of microbench_names(), without curves
+  std::vector<PointResult> points;  ///< of each point of the plan
+  std::vector<std::optional<WholeFrame>>
+      frames;  ///< of each scene of the plan; of the six alone, and of none in a quick look
+  std::vector<MicrobenchResult> microbenches;  ///< in the order of microbench_names(), without curves
   Provenance provenance;
   std::size_t done_before = 0;  ///< of the points, in the journal
   double seconds = 0;           ///< wall time of all simulations of this run together

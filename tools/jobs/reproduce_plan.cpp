@@ -245,7 +245,7 @@ ReproducePlan plan_reproduction(const ReproduceOptions& options) {
     if (role == PlannedScene::Role::beside) continue;
     add(Fidelity::functional, "", without_merging, true);
     add(sensitivity_fidelity, "", without_merging);
-    add(sensitivity_fidelity, "", in_shader);
+    if (!plan.quick) add(sensitivity_fidelity, "", in_shader);
     if (!plan.quick) add(sensitivity_fidelity, "", {PointKey::imitated_variant});
     for (const unsigned passes : planned_passes(plan.quick)) {
       key.passes = passes;

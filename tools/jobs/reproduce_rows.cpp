@@ -32,10 +32,13 @@ void check_conditions(const Evidence& evidence, RowFinding& finding) {
     }
     for (const std::string& scene : in) {
       const double own = value(condition.of, scene);
+      if (!std::isfinite(own)) return;
       std::vector<double> others;
       if (condition.number) others.push_back(*condition.number);
       for (const std::string& quantity : condition.than) others.push_back(value(quantity, scene));
       for (const std::string& other : condition.than_in) others.push_back(value(condition.of, other));
+      const auto is_number = [](double other) { return std::isfinite(other); };
+      if (!std::all_of(others.begin(), others.end(), is_number)) return;
       const auto holds = [&](double other) { return condition.is_above ? own > other : own < other; };
       if (!std::all_of(others.begin(), others.end(), holds)) exceptions.insert(scene);
     }
@@ -62,8 +65,10 @@ RowFinding measured_row(const PaperRow& row, const std::vector<std::string>& mea
   std::string detail;
   for (std::size_t i = 0; i < measures.size(); ++i) {
     const std::optional<Measured> here = measure(measures[i], evidence);
-    if (here && !std::isfinite(here->number)) finding.reason = "nothing was drawn";
-    if (!here || !finding.reason.empty()) break;
+    const bool is_number = here && std::isfinite(here->number);
+    const bool is_left_out = evidence.result.plan.quick && !is_of_variants(measures[i]);
+    if (here && !is_number && !is_left_out) finding.reason = "nothing was drawn";
+    if (!is_number) break;
     texts.push_back(row.text(here->number));
     if (!here->detail.empty()) detail = " (" + here->detail + ")";
     if (here->geometric_mean) detail = " (geometric mean " + row.text(*here->geometric_mean) + ")";

@@ -158,7 +158,8 @@ std::vector<std::string> reproduction_heading(const Reproduction& of) {
   }
   if (plan.quick) {
     lines.emplace_back(fmt::format(
-        "Quick look: at {} instead of cycle, {} views a scene, no large ones, one number of passes, no "
+        "Quick look: at {} instead of cycle, {} views a scene, no large ones, no whole frames, no shader that blends, "
+        "one number of passes, no "
         "reasons tried, the sensitivity of one scene and of few parameters. Verdicts say that they are of a quick "
         "look.",
         vrpipe::name_of(plan.fidelity), plan.views));
