@@ -1,7 +1,10 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "in_shader_time.h"
 
@@ -36,6 +39,34 @@ class InShaderBlending final : public CropBehaviour {
   const RenderContext& context_;
   const InShaderTime time_;
   const BlendFunction blend_;
+};
+
+/// Quads of warps as they were when they were loaded, where nothing is locked.
+class LoadedColors {
+ public:
+  /// Keeps those of a warp from one on to another; returns their number.
+  std::uint32_t load(const ColorSurface& surface, const ShadedWarp& warp, unsigned from, unsigned to) {
+    if (free_.empty()) {
+      free_.push_back(static_cast<std::uint32_t>(colors_.size()));
+      colors_.emplace_back();
+    }
+    const std::uint32_t number = free_.back();
+    free_.pop_back();
+    const std::size_t place = surface.grid().place(warp.tile, 0);
+    for (unsigned i = from; i < to; ++i) colors_[number][i] = surface.quad(place + warp.position[i]);
+    return number;
+  }
+  /// Stores what is blended onto them, and lets go of them.
+  void store(std::uint32_t number, InShaderBlending& shader, const ShadedWarp& warp, unsigned from, unsigned to) {
+    const std::size_t place = shader.surface()->grid().place(warp.tile, 0);
+    for (unsigned i = from; i < to; ++i)
+      shader.store(warp.draw[i], place + warp.position[i], warp.live[i], warp.color[i], colors_[number][i]);
+    free_.push_back(number);
+  }
+
+ private:
+  std::vector<std::array<QuadColor, quads_per_warp>> colors_;
+  std::vector<std::uint32_t> free_;
 };
 
 // The modules of slot `crop` around it.

@@ -133,15 +133,7 @@ class TimedInShader : public TimedUnit {
     Loaded loaded;
     loaded.warp = &warp;
     std::tie(loaded.at, done) = move(warp, 0, warp.count, in);
-    const std::size_t place = behaviour_->surface()->grid().place(warp.tile, 0);
-    if (free_colors_.empty()) {
-      free_colors_.push_back(static_cast<std::uint32_t>(colors_.size()));
-      colors_.emplace_back();
-    }
-    loaded.colors = free_colors_.back();
-    free_colors_.pop_back();
-    for (unsigned i = 0; i < warp.count; ++i)
-      colors_[loaded.colors][i] = behaviour_->surface()->quad(place + warp.position[i]);
+    loaded.colors = colors_.load(*behaviour_->surface(), warp, 0, warp.count);
     loaded_.push_in_order(loaded, &Loaded::at);
     return warp.count;
   }
@@ -149,13 +141,8 @@ class TimedInShader : public TimedUnit {
   void store_until(Cycle until) {
     for (; !loaded_.empty() && loaded_.front().at <= until; loaded_.pop()) {
       const Loaded& next = loaded_.front();
-      const std::size_t place = behaviour_->surface()->grid().place(next.warp->tile, 0);
-      for (unsigned i = 0; i < next.warp->count; ++i) {
-        shader_.store(next.warp->draw[i], place + next.warp->position[i], next.warp->live[i], next.warp->color[i],
-                      colors_[next.colors][i]);
-      }
+      colors_.store(next.colors, shader_, *next.warp, 0, next.warp->count);
       next.warp->release();
-      free_colors_.push_back(next.colors);
     }
   }
 
@@ -200,8 +187,7 @@ class TimedInShader : public TimedUnit {
     std::uint32_t colors = 0;
   };
   Ring<Loaded> loaded_;
-  std::vector<std::array<QuadColor, quads_per_warp>> colors_;
-  std::vector<std::uint32_t> free_colors_;
+  LoadedColors colors_;
 
   std::priority_queue<Cycle, std::vector<Cycle>, std::greater<>> ends_of_warps_;
   Cycle from_ = 0;  ///< after a mark, which all before it are done for

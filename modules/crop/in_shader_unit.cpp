@@ -224,7 +224,7 @@ class InShaderUnit : public Unit {
           finish(next, now);
           continue;
         }
-        if (!stores && !time_.locks) load(next);
+        if (!stores && !time_.locks) next.colors = colors_.load(*surface_, *warps_[next.warp].warp, next.from, next.to);
         if (!stores && !next.loads) {
           next.started = false;
           stores_.push_in_order({now + time_.blend_cycles, number}, &Turn::at);
@@ -245,31 +245,16 @@ class InShaderUnit : public Unit {
     }
     return any;
   }
-  /// Without a lock, keeps the colours as they are now.
-  void load(Part& part) {
-    if (free_colors_.empty()) {
-      free_colors_.push_back(static_cast<std::uint32_t>(colors_.size()));
-      colors_.emplace_back();
-    }
-    part.colors = free_colors_.back();
-    free_colors_.pop_back();
-    const ShadedWarp& warp = *warps_[part.warp].warp;
-    const std::size_t place = surface_->grid().place(warp.tile, 0);
-    for (unsigned i = part.from; i < part.to; ++i) colors_[part.colors][i] = surface_->quad(place + warp.position[i]);
-  }
   void store(Part& part, Cycle now) {
     const ShadedWarp& warp = *warps_[part.warp].warp;
     set_accesses(part, warp, warp.live);
-    const std::size_t place = surface_->grid().place(warp.tile, 0);
     if (time_.locks) {
       monitor_->blended(warp, part.from, part.to, now);
       CropBehaviour::Outcomes outcomes;
       behaviour_->blend_quads(warp, part.from, part.to, outcomes);
       return;
     }
-    for (unsigned i = part.from; i < part.to; ++i)
-      shader_.store(warp.draw[i], place + warp.position[i], warp.live[i], warp.color[i], colors_[part.colors][i]);
-    free_colors_.push_back(part.colors);
+    colors_.store(part.colors, shader_, warp, part.from, part.to);
   }
 
   bool finish_accesses(Cycle now) {
@@ -360,9 +345,7 @@ class InShaderUnit : public Unit {
   std::optional<CoverageTiles> tiles_;
   std::vector<std::uint32_t> parts_of_tile_;  ///< under way
   std::vector<OfPixels> last_of_pixel_;       ///< by quad: number of the last part that has it, plus 1; 0: none yet
-  // Without:
-  std::vector<std::array<QuadColor, quads_per_warp>> colors_;
-  std::vector<std::uint32_t> free_colors_;
+  LoadedColors colors_;                       ///< without
 
   Ring<BlendsDone> done_marks_;
   Cycle last_done_ = 0;

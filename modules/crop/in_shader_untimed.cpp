@@ -15,7 +15,7 @@ namespace {
 class UntimedInShader : public UntimedUnit {
  public:
   UntimedInShader(const std::string& name, std::unique_ptr<CropBehaviour> behaviour, const RenderContext& context)
-      : UntimedUnit(name, work()),
+      : UntimedUnit(name, InShaderTime::kinds()),
         context_(context),
         out_(*this, "out_terminations"),
         out_done_(*this, "out_done"),
@@ -38,13 +38,6 @@ class UntimedInShader : public UntimedUnit {
   std::uint64_t room_in_warps() const override { return time_.warps; }
 
  private:
-  /// `bound` asks for work of a colour ROP by its place (CropWork): there is none.
-  static std::vector<WorkKind> work() {
-    std::vector<WorkKind> kinds = InShaderTime::kinds();
-    while (kinds.size() < most_work_kinds) kinds.push_back({"nothing", 1, 0, false});
-    return kinds;
-  }
-
   void take(const ShadedWarp& warp) {
     if (warp.mark != Mark::none) {
       behaviour_->pass(warp.mark);
