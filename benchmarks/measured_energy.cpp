@@ -4,18 +4,15 @@
 // --short takes one splat in two hundred, of which nothing was measured, to see that it works.
 #include <cmath>
 #include <cstdio>
-#include <cstring>
-#include <exception>
 #include <string>
 #include <vector>
 
 #include <vrpipe/platforms/software.h>
-#include <vrpipe/workloads/draw_list.h>
 
 #include "jobs/energy.h"
 #include "jobs/frame_energy.h"
+#include "measured/command.h"
 #include "measured/gpu.h"
-#include "support/data.h"
 
 namespace vrpipe::measured {
 namespace {
@@ -75,29 +72,6 @@ void compare(const Draw& draw, Fidelity fidelity) {
 }  // namespace
 }  // namespace vrpipe::measured
 
-int main(int argc, char** argv) try {
-  vrpipe::Fidelity fidelity = vrpipe::Fidelity::lt;
-  bool is_short = false;
-  for (int i = 1; i < argc; ++i) {
-    if (std::strcmp(argv[i], "--short") == 0) {
-      is_short = true;
-    } else if (std::strcmp(argv[i], "--fidelity") == 0 && i + 1 < argc) {
-      fidelity = vrpipe::fidelity_named(argv[++i]);
-    } else {
-      std::fprintf(stderr, "measured_energy: unknown argument %s\n", argv[i]);
-      return 2;
-    }
-  }
-  if (fidelity == vrpipe::Fidelity::functional) {
-    std::fprintf(stderr, "measured_energy: functional has no time\n");
-    return 2;
-  }
-  const vrpipe::testing::UnpackedFile file("measured_draw.spl");
-  vrpipe::Draw draw = vrpipe::read_draw_list(file.path()).draw;
-  if (is_short) draw.splats.resize(draw.splats.size() / 200);
-  vrpipe::measured::compare(draw, fidelity);
-  return 0;
-} catch (const std::exception& error) {
-  std::fprintf(stderr, "measured_energy: %s\n", error.what());
-  return 2;
+int main(int argc, char** argv) {
+  return vrpipe::measured::run_of_measured_draw("measured_energy", argc, argv, vrpipe::measured::compare);
 }
